@@ -1,0 +1,2 @@
+//! Tasks of the wakescope workspace.
+fn main() {}
