@@ -1,0 +1,323 @@
+//! Results at the border to files and pictures: a scanned map of fields over (ray, gate), and cross-planes of the wind.
+//! Plain data; the writers call [`VelocityMap::check`] first, so a wrong shape is an error and never a wrong file.
+//! Check: each rule of `check` is broken once by a test; positions follow from ray geometry.
+
+use super::error::{OutputError, OutputResult, increasing, same_length};
+use ndarray::{Array2, Array3};
+
+/// Unit of a field: its tag in a CSV column name and its text in NetCDF (UDUNITS).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Unit {
+    /// Dimensionless; no tag.
+    One,
+    /// Metre, tag `m`.
+    Metre,
+    /// Metre per second, tag `m_s`.
+    MetrePerSecond,
+    /// Square metre per second, tag `m2_s`.
+    SquareMetrePerSecond,
+    /// Hertz, tag `hz`.
+    Hertz,
+    /// Decibel, tag `db`.
+    Decibel,
+}
+
+impl Unit {
+    /// Tag that ends a CSV column name; empty for a dimensionless one.
+    pub fn tag(self) -> &'static str {
+        match self {
+            Self::One => "",
+            Self::Metre => "m",
+            Self::MetrePerSecond => "m_s",
+            Self::SquareMetrePerSecond => "m2_s",
+            Self::Hertz => "hz",
+            Self::Decibel => "db",
+        }
+    }
+
+    /// Text of the NetCDF attribute `units`.
+    pub fn udunits(self) -> &'static str {
+        match self {
+            Self::One => "1",
+            Self::Metre => "m",
+            Self::MetrePerSecond => "m s-1",
+            Self::SquareMetrePerSecond => "m2 s-1",
+            Self::Hertz => "Hz",
+            Self::Decibel => "dB",
+        }
+    }
+}
+
+/// How the values of a field are stored in binary formats.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FieldKind {
+    /// 32-bit float; NaN is missing.
+    Float,
+    /// 8-bit flag; every value must be one of these codes, none may be missing.
+    Flag {
+        /// Code and its meaning (one word, underscores allowed).
+        meanings: Vec<(i8, String)>,
+    },
+}
+
+/// One quantity over all rays and gates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// NetCDF variable name, such as `radial_velocity` or `v_exact`.
+    pub name: String,
+    /// Unit of `values`.
+    pub unit: Unit,
+    /// One sentence for plots and headers; for velocities it says that positive means away from the lidar.
+    pub long_name: String,
+    /// CF or CfRadial standard name, where one exists.
+    pub standard_name: Option<String>,
+    /// Values `[ray, gate]`; NaN = missing. Infinite values are refused.
+    pub values: Array2<f64>,
+    /// Storage type.
+    pub kind: FieldKind,
+}
+
+impl Field {
+    /// A float field.
+    pub fn float(name: &str, unit: Unit, long_name: &str, values: Array2<f64>) -> Self {
+        Self {
+            name: name.into(),
+            unit,
+            long_name: long_name.into(),
+            standard_name: standard_name_of(name).map(str::to_owned),
+            values,
+            kind: FieldKind::Float,
+        }
+    }
+
+    /// Column name in a CSV table: name and unit tag, with the short names `v_mean_m_s` and `std_m_s` of the estimate and `snr_db`.
+    pub fn column(&self) -> String {
+        match self.name.as_str() {
+            "radial_velocity" => "v_mean_m_s".into(),
+            "velocity_standard_deviation" => "std_m_s".into(),
+            "signal_to_noise_ratio" => "snr_db".into(),
+            name if self.unit == Unit::One => name.into(),
+            name => format!("{name}_{}", self.unit.tag()),
+        }
+    }
+}
+
+fn standard_name_of(name: &str) -> Option<&'static str> {
+    match name {
+        "radial_velocity" => Some("radial_velocity_of_scatterers_away_from_instrument"),
+        "signal_to_noise_ratio" => Some("signal_to_noise_ratio"),
+        _ => None,
+    }
+}
+
+/// One line of sight of the scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Index into [`VelocityMap::sweeps`]; the rays of a sweep are contiguous and sweeps follow in order.
+    pub sweep: usize,
+    /// Time of the ray from the start of the flow [s]; increases strictly over all rays.
+    pub time_s: f64,
+    /// Elevation above the horizontal [rad].
+    pub elevation_rad: f64,
+    /// Azimuth of the scan plane, clockwise from north [rad].
+    pub azimuth_rad: f64,
+}
+
+/// One sweep in elevation (RHI) at one age of the wake.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sweep {
+    /// Age of the wake, dimensionless (t Gamma0 / (2 pi b0^2)).
+    pub tau: f64,
+    /// Azimuth of the scan plane [rad].
+    pub azimuth_rad: f64,
+}
+
+/// Pulse and acquisition, the same for all rays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PulseInfo {
+    /// Pulse repetition time [s].
+    pub prt_s: f64,
+    /// Pulse duration [s].
+    pub pulse_width_s: f64,
+    /// Largest velocity that can be told apart, sample rate times wavelength / 4 [m/s].
+    pub nyquist_velocity_m_s: f64,
+    /// Pulses averaged per ray.
+    pub samples: u32,
+    /// Optical frequency [Hz].
+    pub frequency_hz: f64,
+}
+
+/// A scanned map: fields over (ray, gate), in the geometry of the lidar.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VelocityMap {
+    /// Title, such as `Early wake, 200 ns, N = 32`.
+    pub title: String,
+    /// Rays in the order of their times.
+    pub rays: Vec<Ray>,
+    /// Gate centres [m], increasing.
+    pub range_m: Vec<f64>,
+    /// Sweeps, each tiled by its rays.
+    pub sweeps: Vec<Sweep>,
+    /// Pulse and acquisition.
+    pub pulse: PulseInfo,
+    /// Quantities over (ray, gate).
+    pub fields: Vec<Field>,
+    /// Horizontal position of the lidar in the frame of the flow [m].
+    pub lidar_y_m: f64,
+    /// Height of the telescope above the ground [m].
+    pub lidar_height_m: f64,
+}
+
+impl VelocityMap {
+    /// Horizontal position of a gate in the frame of the flow [m].
+    pub fn y_m(&self, ray: usize, gate: usize) -> f64 {
+        self.lidar_y_m + self.range_m[gate] * self.rays[ray].elevation_rad.cos()
+    }
+
+    /// Height of a gate above the ground [m].
+    pub fn z_m(&self, ray: usize, gate: usize) -> f64 {
+        self.lidar_height_m + self.range_m[gate] * self.rays[ray].elevation_rad.sin()
+    }
+
+    /// The field of that name.
+    pub fn field(&self, name: &str) -> Option<&Field> {
+        self.fields.iter().find(|f| f.name == name)
+    }
+
+    /// First and last (inclusive) ray of each sweep.
+    pub fn sweep_bounds(&self) -> Vec<(usize, usize)> {
+        (0..self.sweeps.len())
+            .filter_map(|s| {
+                let first = self.rays.iter().position(|r| r.sweep == s)?;
+                let last = self.rays.iter().rposition(|r| r.sweep == s)?;
+                Some((first, last))
+            })
+            .collect()
+    }
+
+    /// Checks shapes, order and values.
+    ///
+    /// # Errors
+    /// The first rule that is broken: no rays or sweeps, times or ranges that do not increase, sweeps that do not tile the
+    /// rays in order, a field of another shape, a repeated field name, an infinite value, a flag without meaning.
+    pub fn check(&self) -> OutputResult<()> {
+        increasing("range_m", &self.range_m)?;
+        let times: Vec<f64> = self.rays.iter().map(|r| r.time_s).collect();
+        increasing("ray time_s", &times)?;
+        if self.range_m[0] <= 0.0 {
+            return Err(OutputError::value(
+                "range_m",
+                self.range_m[0],
+                "must be positive",
+            ));
+        }
+        self.check_rays()?;
+        for (i, field) in self.fields.iter().enumerate() {
+            if self.fields[..i].iter().any(|f| f.name == field.name) {
+                return Err(OutputError::Duplicate {
+                    what: "field",
+                    name: field.name.clone(),
+                });
+            }
+            self.check_field(field)?;
+        }
+        Ok(())
+    }
+
+    fn check_rays(&self) -> OutputResult<()> {
+        let mut expected = 0;
+        for (i, ray) in self.rays.iter().enumerate() {
+            if !(ray.elevation_rad.is_finite() && ray.azimuth_rad.is_finite()) {
+                let pair = format!("{}, {}", ray.elevation_rad, ray.azimuth_rad);
+                return Err(OutputError::value(
+                    format!("ray {i} angles"),
+                    pair,
+                    "must be finite",
+                ));
+            }
+            if i > 0 && ray.sweep == expected + 1 {
+                expected += 1;
+            }
+            if ray.sweep != expected {
+                return Err(OutputError::value(
+                    format!("ray {i} sweep"),
+                    ray.sweep,
+                    format!("sweeps tile the rays in order: {expected} is next"),
+                ));
+            }
+        }
+        same_length("sweeps", self.sweeps.len(), "the rays", expected + 1)
+    }
+
+    fn check_field(&self, field: &Field) -> OutputResult<()> {
+        let (rays, gates) = field.values.dim();
+        same_length(&field.name, rays, "rays", self.rays.len())?;
+        same_length(&field.name, gates, "range_m", self.range_m.len())?;
+        if let Some(bad) = field.values.iter().find(|v| v.is_infinite()) {
+            return Err(OutputError::value(
+                &field.name,
+                bad,
+                "must be finite, or NaN where missing",
+            ));
+        }
+        if let FieldKind::Flag { meanings } = &field.kind {
+            let known = |v: f64| meanings.iter().any(|(code, _)| f64::from(*code) == v);
+            if let Some(bad) = field.values.iter().find(|v| !known(**v)) {
+                return Err(OutputError::value(
+                    &field.name,
+                    bad,
+                    "must be one of the flag's codes",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Wind in planes across the flight direction, at cell centres of a stretched mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CrossPlanes {
+    /// Title of the file.
+    pub title: String,
+    /// Ages of the wake, increasing.
+    pub tau: Vec<f64>,
+    /// Times of the planes [s], one per `tau`.
+    pub time_s: Vec<f64>,
+    /// Horizontal cell centres [m], increasing.
+    pub y_m: Vec<f64>,
+    /// Vertical cell centres [m], increasing.
+    pub z_m: Vec<f64>,
+    /// Horizontal wind `[tau, z, y]` [m/s]; NaN = missing.
+    pub v_m_s: Array3<f64>,
+    /// Vertical wind `[tau, z, y]` [m/s]; NaN = missing.
+    pub w_m_s: Array3<f64>,
+}
+
+impl CrossPlanes {
+    /// Checks axes and shapes.
+    ///
+    /// # Errors
+    /// An axis that is empty or does not increase, or an array of another shape.
+    pub fn check(&self) -> OutputResult<()> {
+        increasing("tau", &self.tau)?;
+        increasing("time_s", &self.time_s)?;
+        increasing("y_m", &self.y_m)?;
+        increasing("z_m", &self.z_m)?;
+        same_length("time_s", self.time_s.len(), "tau", self.tau.len())?;
+        for (name, array) in [("v_m_s", &self.v_m_s), ("w_m_s", &self.w_m_s)] {
+            let (t, z, y) = array.dim();
+            same_length(name, t, "tau", self.tau.len())?;
+            same_length(name, z, "z_m", self.z_m.len())?;
+            same_length(name, y, "y_m", self.y_m.len())?;
+            if let Some(bad) = array.iter().find(|v| v.is_infinite()) {
+                return Err(OutputError::value(
+                    name,
+                    bad,
+                    "must be finite, or NaN where missing",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
