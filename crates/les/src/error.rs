@@ -1,0 +1,100 @@
+//! What can be wrong with a wind: one error type for the crate.
+
+/// Why a wind could not be built or sampled. Every variant carries the values and what is allowed.
+#[non_exhaustive]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// A number is outside its range, or is not finite.
+    #[error("{field} = {value}: must be {allowed}")]
+    OutOfRange {
+        /// Name of the field or parameter, with its unit suffix.
+        field: &'static str,
+        /// The value found.
+        value: f64,
+        /// The values that are allowed, in words.
+        allowed: &'static str,
+    },
+    /// The output slice is not as long as the list of points.
+    #[error("{points} points but {out} places for their velocities: the two lengths must be equal")]
+    LengthMismatch {
+        /// Number of points.
+        points: usize,
+        /// Length of the output slice.
+        out: usize,
+    },
+    /// A mesh has too few nodes in one direction for the four-point stencil.
+    #[error("the {axis} axis has {nodes} nodes: at least {needed} are needed")]
+    TooFewNodes {
+        /// `"y"` or `"z"`.
+        axis: &'static str,
+        /// Number of nodes found.
+        nodes: usize,
+        /// Smallest number allowed.
+        needed: usize,
+    },
+    /// Node coordinates are not finite or do not increase.
+    #[error("{axis}_m[{index}] = {value_m} m: node coordinates must be finite and strictly increasing")]
+    NodesNotIncreasing {
+        /// `"y"` or `"z"`.
+        axis: &'static str,
+        /// Index of the node that breaks the order.
+        index: usize,
+        /// Its coordinate.
+        value_m: f64,
+    },
+    /// Two neighbouring cells differ so much that the index coordinate is not monotone between them.
+    #[error("the {axis} cell {index} is {ratio} times narrower than a neighbour: at most 5 is allowed")]
+    StretchTooAbrupt {
+        /// `"y"` or `"z"`.
+        axis: &'static str,
+        /// Index of the narrower cell, counted from the first node.
+        index: usize,
+        /// Width of the neighbour over the width of this cell.
+        ratio: f64,
+    },
+    /// The number of velocities is not the number of nodes.
+    #[error("{found} velocities for a mesh of {nodes_y} x {nodes_z} nodes: one per node is needed")]
+    WrongNodeCount {
+        /// Number of velocities found.
+        found: usize,
+        /// Nodes in y.
+        nodes_y: usize,
+        /// Nodes in z.
+        nodes_z: usize,
+    },
+    /// A boundary lies inside the mesh, or too far from it.
+    #[error("{boundary} of the {axis} axis at {value_m} m: must be {allowed}")]
+    MisplacedBoundary {
+        /// `"y"` or `"z"`.
+        axis: &'static str,
+        /// Which boundary.
+        boundary: &'static str,
+        /// Position of the wall or length of the period.
+        value_m: f64,
+        /// The values that are allowed, in words.
+        allowed: &'static str,
+    },
+    /// A point is outside the mesh and the policy is to refuse it.
+    #[error("the point y = {y_m} m, z = {z_m} m is outside the mesh")]
+    OutsideMesh {
+        /// Lateral coordinate of the point.
+        y_m: f64,
+        /// Height of the point.
+        z_m: f64,
+    },
+}
+
+/// `value` if it is finite and `accept` holds, else [`Error::OutOfRange`].
+pub(crate) fn check(
+    field: &'static str,
+    value: f64,
+    allowed: &'static str,
+    accept: impl Fn(f64) -> bool,
+) -> Result<(), Error> {
+    if value.is_finite() && accept(value) { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed }) }
+}
+
+/// Equal lengths of points and outputs, or [`Error::LengthMismatch`].
+pub(crate) fn check_lengths(points: usize, out: usize) -> Result<(), Error> {
+    if points == out { Ok(()) } else { Err(Error::LengthMismatch { points, out }) }
+}

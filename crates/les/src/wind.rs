@@ -1,0 +1,155 @@
+//! A wind: the velocity of the air at any point and time, asked for in batches.
+//!
+//! Axes: x along the flight direction, y across it (to the right), z up; the ground is z = 0.
+//!
+//! Check: a sum of winds is the sum of the velocities, and wrong lengths are refused by every wind.
+
+use crate::Error;
+use crate::error::{check, check_lengths};
+
+/// The velocity field of the air.
+///
+/// Object safe, so that a scene may hold any wind as `Box<dyn Wind>`; batched, so that one virtual call serves
+/// a whole line of sight. Analytic flows and sampled simulations implement it alike.
+///
+/// A point with a coordinate that is not a number gives a velocity that is not a number.
+pub trait Wind: Send + Sync {
+    /// Writes the velocity `(u, v, w)` \[m/s\] at each of `points_m` = `(x, y, z)` \[m\] into `out_m_s`.
+    ///
+    /// # Errors
+    /// [`Error::LengthMismatch`] if the slices differ in length; what else depends on the wind, such as
+    /// [`Error::OutsideMesh`].
+    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error>;
+
+    /// Upper bound of the gradient of the radial velocity along any straight line, `|e . grad(u) . e|` for unit
+    /// `e` \[1/s\]: the largest eigenvalue of the strain rate. It sets how thin the layers of a lidar signal must
+    /// be. Each wind says how sharp its bound is.
+    fn max_gradient_per_s(&self, time_s: f64) -> f64;
+}
+
+/// Air at rest.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Calm;
+
+impl Wind for Calm {
+    fn velocity_into(&self, points_m: &[[f64; 3]], _time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+        check_lengths(points_m.len(), out_m_s.len())?;
+        out_m_s.fill([0.0; 3]);
+        Ok(())
+    }
+
+    /// Exactly zero.
+    fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
+        0.0
+    }
+}
+
+/// The same velocity everywhere and always.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Uniform {
+    velocity_m_s: [f64; 3],
+}
+
+impl Uniform {
+    /// A uniform wind of `velocity_m_s` = `(u, v, w)`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if a component is not finite.
+    pub fn new(velocity_m_s: [f64; 3]) -> Result<Self, Error> {
+        for component in velocity_m_s {
+            check("velocity_m_s", component, "finite", |_| true)?;
+        }
+        Ok(Self { velocity_m_s })
+    }
+
+    /// The velocity `(u, v, w)` \[m/s\].
+    pub fn velocity_m_s(&self) -> [f64; 3] {
+        self.velocity_m_s
+    }
+}
+
+impl Wind for Uniform {
+    fn velocity_into(&self, points_m: &[[f64; 3]], _time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+        check_lengths(points_m.len(), out_m_s.len())?;
+        out_m_s.fill(self.velocity_m_s);
+        Ok(())
+    }
+
+    /// Exactly zero.
+    fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
+        0.0
+    }
+}
+
+/// The sum of several winds, such as a vortex pair in a cross wind. An empty sum is calm air.
+#[derive(Default)]
+pub struct Sum {
+    /// The winds that are added, in this order.
+    pub winds: Vec<Box<dyn Wind>>,
+}
+
+/// Points handled at once by [`Sum`], so that its scratch stays on the stack.
+const SUM_BATCH: usize = 256;
+
+impl Wind for Sum {
+    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+        check_lengths(points_m.len(), out_m_s.len())?;
+        out_m_s.fill([0.0; 3]);
+        let mut scratch = [[0.0; 3]; SUM_BATCH];
+        for (points, outs) in points_m.chunks(SUM_BATCH).zip(out_m_s.chunks_mut(SUM_BATCH)) {
+            let part = &mut scratch[..points.len()];
+            for wind in &self.winds {
+                wind.velocity_into(points, time_s, part)?;
+                for (out, add) in outs.iter_mut().zip(part.iter()) {
+                    for (o, a) in out.iter_mut().zip(add) {
+                        *o += a;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The sum of the bounds: sharp when one wind dominates.
+    fn max_gradient_per_s(&self, time_s: f64) -> f64 {
+        self.winds.iter().map(|wind| wind.max_gradient_per_s(time_s)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sum_adds_velocities_and_gradients_over_more_than_one_batch() {
+        let uniform = |v| Box::new(Uniform::new(v).unwrap()) as Box<dyn Wind>;
+        let sum = Sum { winds: vec![uniform([1.0, 2.0, 3.0]), Box::new(Calm), uniform([0.5, -4.0, 0.25])] };
+        let points = vec![[0.0; 3]; 2 * SUM_BATCH + 7];
+        let mut out = vec![[9.0; 3]; points.len()];
+        sum.velocity_into(&points, 0.0, &mut out).unwrap();
+        assert!(out.iter().all(|&v| v == [1.5, -2.0, 3.25]));
+        assert_eq!(sum.max_gradient_per_s(0.0), 0.0);
+    }
+
+    #[test]
+    fn an_empty_sum_is_calm() {
+        let mut out = [[9.0; 3]; 2];
+        Sum::default().velocity_into(&[[1.0; 3]; 2], 0.0, &mut out).unwrap();
+        assert_eq!(out, [[0.0; 3]; 2]);
+    }
+
+    #[test]
+    fn every_wind_refuses_slices_of_different_length() {
+        let winds: [Box<dyn Wind>; 3] =
+            [Box::new(Calm), Box::new(Uniform::new([1.0; 3]).unwrap()), Box::new(Sum::default())];
+        for wind in &winds {
+            let result = wind.velocity_into(&[[0.0; 3]; 3], 0.0, &mut [[0.0; 3]; 2]);
+            assert_eq!(result, Err(Error::LengthMismatch { points: 3, out: 2 }));
+        }
+    }
+
+    #[test]
+    fn a_wind_that_is_not_finite_is_refused() {
+        assert!(matches!(Uniform::new([0.0, f64::NAN, 0.0]), Err(Error::OutOfRange { field: "velocity_m_s", .. })));
+    }
+}
