@@ -1,0 +1,78 @@
+//! What can be wrong with a signal: one error type for the crate.
+
+/// Why a signal could not be made. Every variant carries the values and what is allowed.
+#[non_exhaustive]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// A number is outside its range, or is not finite.
+    #[error("{field} = {value}: must be {allowed}")]
+    OutOfRange {
+        /// Name of the field or parameter, with its unit suffix.
+        field: &'static str,
+        /// The value found.
+        value: f64,
+        /// The values that are allowed, in words.
+        allowed: &'static str,
+    },
+    /// One element of a list is outside its range.
+    #[error("{field}[{index}] = {value}: must be {allowed}")]
+    ElementOutOfRange {
+        /// Name of the list, with its unit suffix.
+        field: &'static str,
+        /// Index of the element.
+        index: usize,
+        /// The value found.
+        value: f64,
+        /// The values that are allowed, in words.
+        allowed: &'static str,
+    },
+    /// Two slices that go together differ in length.
+    #[error("{field} has {found} elements: must have {expected}")]
+    LengthMismatch {
+        /// Name of the slice.
+        field: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length it must have.
+        expected: usize,
+    },
+    /// A list that must hold something is empty.
+    #[error("{field} is empty")]
+    Empty {
+        /// Name of the list.
+        field: &'static str,
+    },
+    /// The detector band does not fit between zero and half the sampling rate.
+    #[error(
+        "the detector band {low_hz} to {high_hz} Hz (intermediate_frequency_hz -+ bandwidth_hz/2) \
+         must lie between 0 and half the sampling rate, {nyquist_hz} Hz"
+    )]
+    BandBeyondNyquist {
+        /// Lower edge of the band.
+        low_hz: f64,
+        /// Upper edge of the band.
+        high_hz: f64,
+        /// Half the sampling rate.
+        nyquist_hz: f64,
+    },
+}
+
+/// `value` if it is finite and `accept` holds, else [`Error::OutOfRange`].
+pub(crate) fn check(
+    field: &'static str,
+    value: f64,
+    allowed: &'static str,
+    accept: impl Fn(f64) -> bool,
+) -> Result<(), Error> {
+    if value.is_finite() && accept(value) { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed }) }
+}
+
+/// A finite number above zero, or [`Error::OutOfRange`].
+pub(crate) fn check_positive(field: &'static str, value: f64) -> Result<(), Error> {
+    check(field, value, "finite and positive", |v| v > 0.0)
+}
+
+/// A slice of the expected length, or [`Error::LengthMismatch`].
+pub(crate) fn check_length(field: &'static str, found: usize, expected: usize) -> Result<(), Error> {
+    if found == expected { Ok(()) } else { Err(Error::LengthMismatch { field, found, expected }) }
+}

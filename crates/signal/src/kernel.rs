@@ -1,0 +1,74 @@
+//! The inner loop of the heterodyne sum: one sample from the rotating phasors of all layers that the pulse lights.
+//!
+//! The loops are compiled for several instruction sets and the best is chosen at run time. Products and sums are kept
+//! apart (no fused operation) and lanes are fixed, so every version gives the same bits.
+//!
+//! Check: the tests of `heterodyne` against the literal sum.
+
+// The attribute generates the run-time choice of the compiled version, which is unsafe code that its crate answers for.
+#![allow(unsafe_code)]
+
+use multiversion::multiversion;
+
+/// Sums that run side by side: two AVX-512 registers, four AVX2, eight SSE2.
+const LANES: usize = 16;
+
+/// Phasors of the layers, real and imaginary parts apart, and their rotation in one sampling interval.
+#[derive(Debug, Default)]
+pub(crate) struct Phasors {
+    pub(crate) re: Vec<f64>,
+    pub(crate) im: Vec<f64>,
+    pub(crate) turn_re: Vec<f64>,
+    pub(crate) turn_im: Vec<f64>,
+}
+
+impl Phasors {
+    pub(crate) fn resize(&mut self, layers: usize) {
+        for part in [&mut self.re, &mut self.im, &mut self.turn_re, &mut self.turn_im] {
+            part.resize(layers, 0.0);
+        }
+    }
+
+    /// `sum_l envelope[l - first] phasor[l]` over `envelope.len()` layers, then turns these phasors by one sampling
+    /// interval.
+    pub(crate) fn sum_and_turn(&mut self, first: usize, envelope: &[f64]) -> (f64, f64) {
+        let window = first..first + envelope.len();
+        sum_and_turn(
+            envelope,
+            &mut self.re[window.clone()],
+            &mut self.im[window.clone()],
+            &self.turn_re[window.clone()],
+            &self.turn_im[window],
+        )
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn sum_and_turn(envelope: &[f64], re: &mut [f64], im: &mut [f64], turn_re: &[f64], turn_im: &[f64]) -> (f64, f64) {
+    let (mut sum_re, mut sum_im) = ([0.0; LANES], [0.0; LANES]);
+    let (envelope, envelope_rest) = envelope.as_chunks::<LANES>();
+    let (re, re_rest) = re.as_chunks_mut::<LANES>();
+    let (im, im_rest) = im.as_chunks_mut::<LANES>();
+    let (turn_re, turn_re_rest) = turn_re.as_chunks::<LANES>();
+    let (turn_im, turn_im_rest) = turn_im.as_chunks::<LANES>();
+    let state = re.iter_mut().zip(im).zip(turn_re.iter().zip(turn_im));
+    for (weight, ((re, im), (turn_re, turn_im))) in envelope.iter().zip(state) {
+        for i in 0..LANES {
+            let (x, y) = (re[i], im[i]);
+            sum_re[i] += weight[i] * x;
+            sum_im[i] += weight[i] * y;
+            re[i] = x * turn_re[i] - y * turn_im[i];
+            im[i] = x * turn_im[i] + y * turn_re[i];
+        }
+    }
+    let mut total = (sum_re.iter().sum::<f64>(), sum_im.iter().sum::<f64>());
+    let state = re_rest.iter_mut().zip(im_rest).zip(turn_re_rest.iter().zip(turn_im_rest));
+    for (&weight, ((re, im), (&turn_re, &turn_im))) in envelope_rest.iter().zip(state) {
+        let (x, y) = (*re, *im);
+        total.0 += weight * x;
+        total.1 += weight * y;
+        *re = x * turn_re - y * turn_im;
+        *im = x * turn_im + y * turn_re;
+    }
+    total
+}

@@ -1,0 +1,143 @@
+//! Detector noise: real Gaussian numbers with the spectrum of shot noise, (13).
+//!
+//! Band-limited noise is made from its spectrum on a circular record of at least twice the length, then cut, so that the
+//! end of the record does not know its beginning. Frequencies that the edge of the band cuts have their share of the
+//! power, so the variance is exact.
+//!
+//! Check: variance (13); nothing outside the band; flat inside.
+
+use std::fmt;
+use std::sync::Arc;
+
+use num_complex::Complex;
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+use realfft::{ComplexToReal, RealFftPlanner};
+
+use crate::{NoiseModel, Receiver};
+
+/// Buffers for the synthesis of noise.
+#[derive(Debug, Default)]
+pub(crate) struct NoiseScratch {
+    spectrum: Vec<Complex<f64>>,
+    circular: Vec<f64>,
+    transform: Vec<Complex<f64>>,
+}
+
+/// Noise of one receiver for records of one length.
+#[derive(Clone)]
+pub(crate) enum NoiseSource {
+    None,
+    White { sd_a: f64 },
+    Band(BandNoise),
+}
+
+impl fmt::Debug for NoiseSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::None => f.write_str("None"),
+            Self::White { sd_a } => write!(f, "White {{ sd_a: {sd_a} }}"),
+            Self::Band(band) => write!(f, "Band {{ frequencies: {} }}", band.sd_a.len()),
+        }
+    }
+}
+
+/// Noise synthesised from the frequencies of its band.
+#[derive(Clone)]
+pub(crate) struct BandNoise {
+    transform: Arc<dyn ComplexToReal<f64>>,
+    /// Index of the first frequency of the band.
+    first: usize,
+    /// Standard deviation of the real and of the imaginary part at each frequency from `first` on.
+    sd_a: Vec<f64>,
+}
+
+impl NoiseSource {
+    pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {
+        match receiver.noise {
+            NoiseModel::None => Self::None,
+            NoiseModel::White => {
+                let variance_a2 = receiver.noise_density_a2_hz() * 0.5 * receiver.sample_rate_hz;
+                Self::White { sd_a: variance_a2.sqrt() }
+            }
+            NoiseModel::BandLimited => Self::Band(BandNoise::new(receiver, samples)),
+        }
+    }
+
+    /// Adds the noise of one record to `out_a`.
+    pub(crate) fn add_to<R: Rng + ?Sized>(&self, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [f64]) {
+        match self {
+            Self::None => {}
+            Self::White { sd_a } => {
+                for out in out_a {
+                    let normal: f64 = rng.sample(StandardNormal);
+                    *out += sd_a * normal;
+                }
+            }
+            Self::Band(band) => band.add_to(rng, scratch, out_a),
+        }
+    }
+}
+
+impl BandNoise {
+    fn new(receiver: &Receiver, samples: usize) -> Self {
+        let length = smooth_even_length(2 * samples);
+        let cell_hz = receiver.sample_rate_hz / length as f64;
+        let low_hz = receiver.intermediate_frequency_hz - 0.5 * receiver.bandwidth_hz;
+        let high_hz = receiver.intermediate_frequency_hz + 0.5 * receiver.bandwidth_hz;
+        let density = receiver.noise_density_a2_hz();
+        let last = length / 2;
+        let first = ((low_hz / cell_hz - 0.5).ceil().max(0.0) as usize).min(last);
+        let end = ((high_hz / cell_hz + 0.5).floor() as usize).min(last);
+        let sd_a = (first..=end)
+            .map(|bin| {
+                let centre_hz = bin as f64 * cell_hz;
+                let upper = (centre_hz + 0.5 * cell_hz).min(high_hz);
+                let lower = (centre_hz - 0.5 * cell_hz).max(low_hz);
+                let variance_a2 = density * (upper - lower).max(0.0);
+                // Inside, a frequency and its mirror give 2 Re{X}: variance 4 sd^2. The two ends have no mirror.
+                if bin == 0 || bin == last { variance_a2.sqrt() } else { 0.5 * variance_a2.sqrt() }
+            })
+            .collect();
+        let transform = RealFftPlanner::new().plan_fft_inverse(length);
+        Self { transform, first, sd_a }
+    }
+
+    fn add_to<R: Rng + ?Sized>(&self, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [f64]) {
+        let length = self.transform.len();
+        scratch.spectrum.clear();
+        scratch.spectrum.resize(length / 2 + 1, Complex::ZERO);
+        scratch.circular.resize(length, 0.0);
+        scratch.transform.resize(self.transform.get_scratch_len(), Complex::ZERO);
+        for (value, sd) in scratch.spectrum[self.first..].iter_mut().zip(&self.sd_a) {
+            let re: f64 = rng.sample(StandardNormal);
+            let im: f64 = rng.sample(StandardNormal);
+            *value = Complex::new(re, im) * *sd;
+        }
+        scratch.spectrum[0].im = 0.0;
+        scratch.spectrum[length / 2].im = 0.0;
+        self.transform
+            .process_with_scratch(&mut scratch.spectrum, &mut scratch.circular, &mut scratch.transform)
+            .expect("buffers have the lengths of the plan and the end frequencies are real");
+        for (out, noise) in out_a.iter_mut().zip(&scratch.circular) {
+            *out += noise;
+        }
+    }
+}
+
+/// Smallest even product of powers of 2, 3 and 5 that is at least `least` (and 16).
+fn smooth_even_length(least: usize) -> usize {
+    let mut length = least.max(16).next_multiple_of(2);
+    loop {
+        let mut rest: usize = length;
+        for factor in [2, 3, 5] {
+            while rest.is_multiple_of(factor) {
+                rest /= factor;
+            }
+        }
+        if rest == 1 {
+            return length;
+        }
+        length += 2;
+    }
+}
