@@ -78,60 +78,32 @@ pub type OutputResult<T> = Result<T, OutputError>;
 
 impl OutputError {
     pub(crate) fn encode(format: &'static str, error: impl std::fmt::Display) -> Self {
-        Self::Encode {
-            format,
-            message: error.to_string(),
-        }
+        Self::Encode { format, message: error.to_string() }
     }
 
-    pub(crate) fn value(
-        field: impl Into<String>,
-        value: impl ToString,
-        allowed: impl Into<String>,
-    ) -> Self {
-        Self::Value {
-            field: field.into(),
-            value: value.to_string(),
-            allowed: allowed.into(),
-        }
+    pub(crate) fn value(field: impl Into<String>, value: impl ToString, allowed: impl Into<String>) -> Self {
+        Self::Value { field: field.into(), value: value.to_string(), allowed: allowed.into() }
     }
 }
 
 /// Refuses a length that does not match its axis.
-pub(crate) fn same_length(
-    field: &str,
-    actual: usize,
-    axis: &str,
-    expected: usize,
-) -> OutputResult<()> {
+pub(crate) fn same_length(field: &str, actual: usize, axis: &str, expected: usize) -> OutputResult<()> {
     if actual == expected {
         return Ok(());
     }
-    Err(OutputError::Length {
-        field: field.into(),
-        axis: axis.into(),
-        expected,
-        actual,
-    })
+    Err(OutputError::Length { field: field.into(), axis: axis.into(), expected, actual })
 }
 
 /// Refuses an axis that is empty, not finite or not strictly increasing.
 pub(crate) fn increasing(field: &str, values: &[f64]) -> OutputResult<()> {
     if values.is_empty() {
-        return Err(OutputError::Missing {
-            what: field.into(),
-            needed: "at least one value".into(),
-        });
+        return Err(OutputError::Missing { what: field.into(), needed: "at least one value".into() });
     }
     if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
         return Err(OutputError::value(field, bad, "must be finite"));
     }
     if let Some(pair) = values.windows(2).find(|w| w[1] <= w[0]) {
-        return Err(OutputError::value(
-            field,
-            format!("{}, {}", pair[0], pair[1]),
-            "must increase strictly",
-        ));
+        return Err(OutputError::value(field, format!("{}, {}", pair[0], pair[1]), "must increase strictly"));
     }
     Ok(())
 }

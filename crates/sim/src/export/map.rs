@@ -206,19 +206,12 @@ impl VelocityMap {
         let times: Vec<f64> = self.rays.iter().map(|r| r.time_s).collect();
         increasing("ray time_s", &times)?;
         if self.range_m[0] <= 0.0 {
-            return Err(OutputError::value(
-                "range_m",
-                self.range_m[0],
-                "must be positive",
-            ));
+            return Err(OutputError::value("range_m", self.range_m[0], "must be positive"));
         }
         self.check_rays()?;
         for (i, field) in self.fields.iter().enumerate() {
             if self.fields[..i].iter().any(|f| f.name == field.name) {
-                return Err(OutputError::Duplicate {
-                    what: "field",
-                    name: field.name.clone(),
-                });
+                return Err(OutputError::Duplicate { what: "field", name: field.name.clone() });
             }
             self.check_field(field)?;
         }
@@ -230,11 +223,7 @@ impl VelocityMap {
         for (i, ray) in self.rays.iter().enumerate() {
             if !(ray.elevation_rad.is_finite() && ray.azimuth_rad.is_finite()) {
                 let pair = format!("{}, {}", ray.elevation_rad, ray.azimuth_rad);
-                return Err(OutputError::value(
-                    format!("ray {i} angles"),
-                    pair,
-                    "must be finite",
-                ));
+                return Err(OutputError::value(format!("ray {i} angles"), pair, "must be finite"));
             }
             if i > 0 && ray.sweep == expected + 1 {
                 expected += 1;
@@ -255,20 +244,12 @@ impl VelocityMap {
         same_length(&field.name, rays, "rays", self.rays.len())?;
         same_length(&field.name, gates, "range_m", self.range_m.len())?;
         if let Some(bad) = field.values.iter().find(|v| v.is_infinite()) {
-            return Err(OutputError::value(
-                &field.name,
-                bad,
-                "must be finite, or NaN where missing",
-            ));
+            return Err(OutputError::value(&field.name, bad, "must be finite, or NaN where missing"));
         }
         if let FieldKind::Flag { meanings } = &field.kind {
             let known = |v: f64| meanings.iter().any(|(code, _)| f64::from(*code) == v);
             if let Some(bad) = field.values.iter().find(|v| !known(**v)) {
-                return Err(OutputError::value(
-                    &field.name,
-                    bad,
-                    "must be one of the flag's codes",
-                ));
+                return Err(OutputError::value(&field.name, bad, "must be one of the flag's codes"));
             }
         }
         Ok(())
@@ -311,11 +292,7 @@ impl CrossPlanes {
             same_length(name, z, "z_m", self.z_m.len())?;
             same_length(name, y, "y_m", self.y_m.len())?;
             if let Some(bad) = array.iter().find(|v| v.is_infinite()) {
-                return Err(OutputError::value(
-                    name,
-                    bad,
-                    "must be finite, or NaN where missing",
-                ));
+                return Err(OutputError::value(name, bad, "must be finite, or NaN where missing"));
             }
         }
         Ok(())

@@ -63,10 +63,7 @@ mod tests {
     #[test]
     fn every_line_of_the_scene_is_a_comment() {
         let text = example().comment_lines();
-        assert!(
-            text.lines().all(|l| l.starts_with('#') && l == l.trim_end()),
-            "{text}"
-        );
+        assert!(text.lines().all(|l| l.starts_with('#') && l == l.trim_end()), "{text}");
         assert!(text.contains("# seed: 18446744073709551615\n"));
         assert!(text.contains("#   [laser]\n"));
         assert!(text.ends_with('\n'));
