@@ -1,1 +1,69 @@
-//! wakescope-estimate
+//! Velocity of the wind from sampled heterodyne signals: periodogram, accumulation over regions, errors, and
+//! the bound on what any estimator can reach.
+//!
+//! The crate takes plain arrays, real at an intermediate frequency or complex, at any sampling rate; it
+//! knows nothing of how they were made, so measured windows serve as well as simulated ones.
+//! Radial velocities are positive away from the lidar. Equation numbers are those of the chapter on simulating
+//! wake vortices seen by a coherent Doppler lidar; "corrected" marks a departure from its print.
+//!
+//! ```
+//! use wakescope_estimate::{PeriodogramOptions, PeriodogramPlan, Sampling, Scratch};
+//!
+//! // 250 MHz sampling, target at rest at 80 MHz, 1.55 um, detector band 55 .. 105 MHz
+//! let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6))?;
+//! let plan = PeriodogramPlan::<f64>::new(&sampling, 64, &PeriodogramOptions::default())?;
+//! // a tone from a target that recedes at 3 m/s, with a disturbance elsewhere in the band
+//! let turn = |f_hz: f64, n: usize| std::f64::consts::TAU * f_hz * n as f64 / 250e6;
+//! let frequency_hz = sampling.frequency_hz(3.0);
+//! let window: Vec<f64> = (0..64)
+//!     .map(|n| turn(frequency_hz, n).cos() + 0.1 * turn(97e6, n).sin())
+//!     .collect();
+//! let estimate = plan.velocity(&window, &mut Scratch::new())?;
+//! assert!(estimate.is_good() && (estimate.velocity_m_s - 3.0).abs() < 0.1);
+//! # Ok::<(), wakescope_estimate::Error>(())
+//! ```
+//!
+//! A map is made in two steps: [`Scan::new`] computes a [`Statistic`] of all windows of a scan,
+//! [`Scan::map`] averages it over the region of each point and hands the mean to an [`Estimator`].
+//!
+//! | module | content |
+//! |---|---|
+//! | `sampling`, `gates`, `sample` | frequencies and velocities, windows and ranges, real and complex samples |
+//! | `weighting`, `transform`, `periodogram` | window weights, their transform, (29) and (30) |
+//! | `correlogram`, `spectrum` | biased correlogram and the density that belongs to it |
+//! | `velocity`, `statistic` | peak search with flags; the traits for estimators of one's own |
+//! | `region`, `accumulate` | circular regions, accumulation level and n_eff; Table 3 |
+//! | `error_map` | bias, standard deviation, root mean square with standard errors, (33) |
+//!
+//! Features: `rayon` (default) works on lines of sight and map points in the caller's thread pool; the
+//! bits of the result do not depend on it.
+
+mod accumulate;
+mod correlogram;
+mod error;
+mod error_map;
+mod gates;
+mod parallel;
+mod periodogram;
+mod region;
+mod sample;
+mod sampling;
+mod spectrum;
+mod statistic;
+mod transform;
+mod velocity;
+mod weighting;
+
+pub use accumulate::{MapPoint, Radius, Scan};
+pub use correlogram::{Correlogram, Taper, correlogram_by_sum};
+pub use error::Error;
+pub use error_map::{ErrorMap, ErrorStatistics};
+pub use gates::Gates;
+pub use periodogram::{Periodogram, PeriodogramOptions, PeriodogramPlan};
+pub use region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, polar_points};
+pub use sample::{Sample, Scratch, SignalKind};
+pub use sampling::{SPEED_OF_LIGHT_M_S, Sampling};
+pub use spectrum::{LagSpectrum, density_at};
+pub use statistic::{Estimator, Statistic, estimate_window};
+pub use velocity::{GateVelocity, Quality, Refinement, SpectralPeak};
+pub use weighting::Weighting;

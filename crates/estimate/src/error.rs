@@ -1,0 +1,73 @@
+//! The one error type of this crate. Every variant carries the offending values and what is allowed.
+
+/// Why an estimator could not be set up or applied.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A number lies outside what is allowed.
+    #[error("{field} = {value}: must be {allowed}")]
+    OutOfRange {
+        /// Name of the field or parameter, with its unit suffix.
+        field: &'static str,
+        /// The value that was given.
+        value: f64,
+        /// What is allowed, in words.
+        allowed: &'static str,
+    },
+    /// The detector band is empty, reversed or not contained in the spectrum of the samples.
+    #[error("band_hz = ({low_hz}, {high_hz}): must be {allowed}")]
+    Band {
+        /// Lower edge \[Hz\].
+        low_hz: f64,
+        /// Upper edge \[Hz\].
+        high_hz: f64,
+        /// What is allowed, in words.
+        allowed: &'static str,
+    },
+    /// The analysis window does not fit in the record.
+    #[error(
+        "window_samples = {window_samples} is longer than the record of {record_samples} samples: \
+         shorten the window or record longer"
+    )]
+    WindowLongerThanRecord {
+        /// Samples of one window.
+        window_samples: usize,
+        /// Samples of the record.
+        record_samples: usize,
+    },
+    /// There is nothing to estimate from.
+    #[error("{field} is empty: at least one is needed")]
+    Empty {
+        /// Name of the empty argument.
+        field: &'static str,
+    },
+    /// An array has the wrong length.
+    #[error("{field} has {found} elements, {expected} are needed")]
+    Length {
+        /// Name of the array.
+        field: &'static str,
+        /// Length that is needed.
+        expected: usize,
+        /// Length that was given.
+        found: usize,
+    },
+}
+
+/// Checks that a number is finite and positive.
+pub(crate) fn positive(field: &'static str, value: f64) -> Result<(), Error> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(Error::OutOfRange { field, value, allowed: "finite and above 0" })
+    }
+}
+
+/// Checks that a number is finite.
+pub(crate) fn finite(field: &'static str, value: f64) -> Result<(), Error> {
+    if value.is_finite() { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed: "finite" }) }
+}
+
+/// Checks the length of an array.
+pub(crate) fn length(field: &'static str, expected: usize, found: usize) -> Result<(), Error> {
+    if expected == found { Ok(()) } else { Err(Error::Length { field, expected, found }) }
+}

@@ -1,0 +1,57 @@
+//! The two traits that an estimator is made of, so that others can plug in their own.
+//!
+//! A [`Statistic`] turns a window into numbers whose mean over windows makes sense; an
+//! [`Estimator`] turns such a mean into a velocity. Accumulation stands between the two and knows neither.
+//! Check: the mean over a region equals the mean of the statistics of its windows.
+
+use crate::error::{Error, length};
+use crate::sample::{Sample, Scratch, binary_scale};
+use crate::velocity::{GateVelocity, Quality};
+
+/// Numbers drawn from one window, to be averaged over windows: I_k of Table 3.
+pub trait Statistic<S: Sample>: Sync {
+    /// Samples of one window.
+    fn window_samples(&self) -> usize;
+    /// How many numbers one window gives.
+    fn statistic_len(&self) -> usize;
+    /// Writes the numbers of `window` into `out`.
+    ///
+    /// The caller passes exactly [`Statistic::window_samples`] finite samples, scaled to order one,
+    /// and [`Statistic::statistic_len`] places. The result must be quadratic in the samples.
+    fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]);
+}
+
+/// Velocity from the mean of a [`Statistic`].
+pub trait Estimator: Sync {
+    /// How many numbers the mean has.
+    fn statistic_len(&self) -> usize;
+    /// The velocity for the mean statistic `mean`.
+    ///
+    /// The samples behind `mean` were scaled by a power of two, so nothing but `power` may depend on
+    /// their scale; the caller scales `power` back.
+    fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity;
+}
+
+/// Velocity of a single window, without accumulation.
+///
+/// # Errors
+/// [`Error::Length`] if the window has the wrong length or statistic and estimator do not match.
+pub fn estimate_window<S: Sample>(
+    statistic: &impl Statistic<S>,
+    estimator: &impl Estimator,
+    window: &[S],
+    scratch: &mut Scratch,
+) -> Result<GateVelocity, Error> {
+    length("window", statistic.window_samples(), window.len())?;
+    length("statistic", estimator.statistic_len(), statistic.statistic_len())?;
+    if !window.iter().all(|sample| sample.is_finite()) {
+        return Ok(GateVelocity::none(Quality::Invalid));
+    }
+    let scale = binary_scale(window.iter().copied());
+    let scaled: Vec<S> = window.iter().map(|sample| sample.scaled(scale.recip())).collect();
+    let mut numbers = vec![0.0; statistic.statistic_len()];
+    statistic.evaluate(&scaled, scratch, &mut numbers);
+    let mut estimate = estimator.estimate(&numbers, scratch);
+    estimate.power *= scale * scale;
+    Ok(estimate)
+}
