@@ -29,7 +29,8 @@
 //!
 //! | module | what is in it |
 //! |---|---|
-//! | `pulse` | Gaussian envelope (7), range weight (28) |
+//! | `pulse` | Gaussian envelope (7), its range weight |
+//! | `filter` | [`RangeFilter`]: velocity profiles weighted by pulse and gate, (28) |
 //! | `line` | [`LineOfSight`]; how thin a layer must be |
 //! | `receiver` | sampling, responsivity, noise power (13), signal-to-noise ratio (14) |
 //! | `heterodyne` | [`Simulator`]: one record per pulse, (15), (12), fast form |
@@ -41,6 +42,7 @@
 
 mod constants;
 mod error;
+mod filter;
 mod heterodyne;
 mod kernel;
 mod line;
@@ -53,6 +55,7 @@ mod window;
 
 pub use constants::{ELEMENTARY_CHARGE_C, PLANCK_J_S, SPEED_OF_LIGHT_M_S};
 pub use error::Error;
+pub use filter::RangeFilter;
 pub use heterodyne::{Record, Scratch, Simulator};
 pub use line::{LineOfSight, layer_thickness_m};
 pub use literal::literal_envelope;

@@ -1,0 +1,290 @@
+//! The velocity that a pulsed lidar can at best report: the radial velocity weighted by the pulse, (28), corrected, or
+//! by the pulse and the window of the spectral analysis together.
+//!
+//! `v_pulse(R)` weights the air at range `rho` by `|f(2 (R - rho)/c)|^2 2/c`. A window of N samples sees more: sample n sees
+//! `c t_n/2`, so `v_gate(R)` weights it by the mean of these weights with `h_n^2`. A window is placed by
+//! `R = c (t_p + N T_s/2)/2`, `t_p` the time of its first sample; its samples are then centred half a sample, `c T_s/4`,
+//! before R.
+//!
+//! Check: a constant is kept to round-off, a linear profile is kept (seen `c T_s/4` before R through a gate), and the
+//! discrete weights agree with a fine quadrature.
+
+use crate::error::{check, check_length, check_positive};
+use crate::{Error, GaussianPulse, SPEED_OF_LIGHT_M_S};
+
+/// Reach of the weights beyond the outermost sample, in units of `c sigma/2`: `|f|^2` is 2e-16 of its peak there.
+const REACH_SIGMAS: f64 = 6.0;
+
+/// Ranges are placed between layers to this many parts of a layer, so that equal positions share their weights
+/// whatever the rounding of the range.
+const PARTS_OF_LAYER: f64 = (1_u64 << 24) as f64;
+
+/// Smallest part of the weight that must fall on air with a known velocity.
+const LEAST_KNOWN_WEIGHT: f64 = 0.5;
+
+/// Weights of the air about a range, for profiles on layers of one thickness.
+#[derive(Debug, Clone)]
+pub struct RangeFilter {
+    pulse: GaussianPulse,
+    layer_thickness_m: f64,
+    /// Times of the samples about `2 R/c` \[s\] and their weights, which sum to 1.
+    taps: Vec<(f64, f64)>,
+    /// Weights for a range in the middle of a layer: first offset in layers, and one weight per layer.
+    centred: (i64, Vec<f64>),
+}
+
+impl RangeFilter {
+    /// Weights of the pulse alone: `v_pulse`, (28), corrected.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the thickness is not positive, or not thinner than `c sigma/2`.
+    pub fn pulse(pulse: &GaussianPulse, layer_thickness_m: f64) -> Result<Self, Error> {
+        Self::new(pulse, vec![(0.0, 1.0)], layer_thickness_m)
+    }
+
+    /// Weights of the pulse and of an analysis window with the coefficients `window`, `h_n`: `v_gate`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] as [`RangeFilter::pulse`], or for a bad sampling rate; [`Error::Empty`] without
+    /// coefficients; [`Error::ElementOutOfRange`] if one is not finite, or all are zero.
+    pub fn gate(
+        pulse: &GaussianPulse,
+        window: &[f64],
+        sample_rate_hz: f64,
+        layer_thickness_m: f64,
+    ) -> Result<Self, Error> {
+        check_positive("sample_rate_hz", sample_rate_hz)?;
+        if window.is_empty() {
+            return Err(Error::Empty { field: "window" });
+        }
+        let refuse =
+            |index: usize, allowed| Error::ElementOutOfRange { field: "window", index, value: window[index], allowed };
+        if let Some(index) = window.iter().position(|h| !h.is_finite()) {
+            return Err(refuse(index, "finite"));
+        }
+        let largest = window.iter().fold(0.0_f64, |largest, h| largest.max(h.abs()));
+        if largest == 0.0 {
+            return Err(refuse(0, "not zero in every place"));
+        }
+        let half = 0.5 * window.len() as f64;
+        let squares = window.iter().map(|h| (h / largest) * (h / largest));
+        let sum: f64 = squares.clone().sum();
+        let taps = squares.enumerate().map(|(n, square)| ((n as f64 - half) / sample_rate_hz, square / sum)).collect();
+        Self::new(pulse, taps, layer_thickness_m)
+    }
+
+    fn new(pulse: &GaussianPulse, taps: Vec<(f64, f64)>, layer_thickness_m: f64) -> Result<Self, Error> {
+        check_positive("layer_thickness_m", layer_thickness_m)?;
+        let length_m = pulse.sigma_m();
+        check("layer_thickness_m", layer_thickness_m, "at most c sigma/2 and above 1e-7 of it", |t| {
+            t <= length_m && t > 1e-7 * length_m
+        })?;
+        let mut filter = Self { pulse: *pulse, layer_thickness_m, taps, centred: (0, Vec::new()) };
+        filter.centred = filter.weights(0.0);
+        Ok(filter)
+    }
+
+    /// Weight of the air at `offset_m` beyond the range in question \[1/m\]; integrates to 1.
+    pub fn weight_per_m(&self, offset_m: f64) -> f64 {
+        let weight = |&(time_s, weight): &(f64, f64)| {
+            let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * time_s;
+            weight * self.pulse.range_weight_per_m(sample_m - offset_m)
+        };
+        self.taps.iter().map(weight).sum()
+    }
+
+    /// Filtered velocity \[m/s\] at `range_m` of a profile given by a function of range \[m\], evaluated at the layer
+    /// thickness apart. Where the function is NaN there are no scatterers; see [`RangeFilter::apply_into`].
+    pub fn at_range(&self, range_m: f64, radial_velocity_m_s: impl Fn(f64) -> f64) -> f64 {
+        let (first, weights) = &self.centred;
+        let offset_m = |i: usize| (first + i as i64) as f64 * self.layer_thickness_m;
+        weighted_mean(weights, (0..weights.len()).map(|i| radial_velocity_m_s(range_m + offset_m(i))))
+    }
+
+    /// Writes the filtered velocity at each of `range_m` of a profile on layers whose centres are `first_range_m`,
+    /// `first_range_m + layer_thickness_m` and so on.
+    ///
+    /// Layers with the velocity NaN (masked), and the air beyond both ends of the profile, return nothing: the weights
+    /// of the others are scaled up to 1. Where less than half of the weight is left, the result is NaN.
+    ///
+    /// Fastest if the ranges lie on centres of layers, or all at the same place between two.
+    ///
+    /// # Errors
+    /// [`Error::LengthMismatch`] if `out_m_s` has not one place per range; [`Error::Empty`] for an empty profile;
+    /// [`Error::OutOfRange`] for a first range, [`Error::ElementOutOfRange`] for a range that is not finite.
+    pub fn apply_into(
+        &self,
+        first_range_m: f64,
+        radial_velocity_m_s: &[f64],
+        range_m: &[f64],
+        out_m_s: &mut [f64],
+    ) -> Result<(), Error> {
+        check("first_range_m", first_range_m, "finite", |_| true)?;
+        check_length("out_m_s", out_m_s.len(), range_m.len())?;
+        if radial_velocity_m_s.is_empty() {
+            return Err(Error::Empty { field: "radial_velocity_m_s" });
+        }
+        let mut between = (0.0, self.centred.clone());
+        for (index, (&range_m, out)) in range_m.iter().zip(out_m_s).enumerate() {
+            if !range_m.is_finite() {
+                return Err(Error::ElementOutOfRange { field: "range_m", index, value: range_m, allowed: "finite" });
+            }
+            let position = (range_m - first_range_m) / self.layer_thickness_m;
+            let nearest = position.round();
+            let part = ((position - nearest) * PARTS_OF_LAYER).round() / PARTS_OF_LAYER;
+            if part != between.0 {
+                between = (part, self.weights(part));
+            }
+            let (offset, weights) = &between.1;
+            *out = mean_of_profile(weights, (nearest as i64).saturating_add(*offset), radial_velocity_m_s);
+        }
+        Ok(())
+    }
+
+    /// Weights for a range that lies `part` of a layer beyond the centre of one: offset of the first in layers from that
+    /// one, and one weight per layer; they sum to 1.
+    fn weights(&self, part: f64) -> (i64, Vec<f64>) {
+        let reach_m = REACH_SIGMAS * self.pulse.sigma_m();
+        let sample_m = |tap: Option<&(f64, f64)>| 0.5 * SPEED_OF_LIGHT_M_S * tap.map_or(0.0, |&(time_s, _)| time_s);
+        let layers = |offset_m: f64| (offset_m / self.layer_thickness_m) as i64;
+        let first = layers(sample_m(self.taps.first()) - reach_m) - 1;
+        let last = layers(sample_m(self.taps.last()) + reach_m) + 1;
+        let mut weights: Vec<f64> =
+            (first..=last).map(|l| self.weight_per_m((l as f64 - part) * self.layer_thickness_m)).collect();
+        let sum: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|weight| *weight /= sum);
+        (first, weights)
+    }
+}
+
+/// Mean of the part of a profile that the weights cover; the first weight belongs to layer `first`, which may be negative.
+fn mean_of_profile(weights: &[f64], first: i64, radial_velocity_m_s: &[f64]) -> f64 {
+    let layers = radial_velocity_m_s.len() as i64;
+    let start = first.clamp(0, layers);
+    let end = first.saturating_add(weights.len() as i64).clamp(start, layers);
+    if start == end {
+        return f64::NAN;
+    }
+    let covered = &weights[(start - first) as usize..(end - first) as usize];
+    let profile = &radial_velocity_m_s[start as usize..end as usize];
+    weighted_mean(covered, profile.iter().copied())
+}
+
+/// Weighted mean of the velocities that are numbers; NaN if they carry too little of the weight.
+fn weighted_mean(weights: &[f64], velocities_m_s: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut known) = (0.0, 0.0);
+    for (weight, velocity) in weights.iter().zip(velocities_m_s) {
+        if !velocity.is_nan() {
+            sum += weight * velocity;
+            known += weight;
+        }
+    }
+    if known < LEAST_KNOWN_WEIGHT { f64::NAN } else { sum / known }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PulseDuration;
+    use approx::{assert_abs_diff_eq, assert_relative_eq};
+
+    const STEP_M: f64 = SPEED_OF_LIGHT_M_S / 500e6;
+
+    fn pulse() -> GaussianPulse {
+        GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6).unwrap()
+    }
+
+    fn hann(n: usize) -> Vec<f64> {
+        (0..n).map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / n as f64).sin().powi(2)).collect()
+    }
+
+    fn filters() -> [(RangeFilter, f64); 3] {
+        let gate = |window: &[f64]| RangeFilter::gate(&pulse(), window, 250e6, STEP_M / 3.0).unwrap();
+        // A gate is seen half a sample before its range.
+        [
+            (RangeFilter::pulse(&pulse(), STEP_M / 3.0).unwrap(), 0.0),
+            (gate(&[1.0; 64]), -0.5 * STEP_M),
+            (gate(&hann(64)), -0.5 * STEP_M),
+        ]
+    }
+
+    #[test]
+    fn a_constant_is_kept_to_round_off_even_at_the_ends_and_beside_a_mask() {
+        for (filter, _) in filters() {
+            let mut profile = vec![3.7; 2000];
+            profile[700..720].fill(f64::NAN);
+            let ranges: Vec<f64> = (0..400).map(|i| 105.0 + 0.973 * f64::from(i)).collect();
+            let mut out = vec![0.0; ranges.len()];
+            filter.apply_into(100.0, &profile, &ranges, &mut out).unwrap();
+            let worst = out.iter().map(|v| (v - 3.7).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-13 && out.iter().all(|v| v.is_finite()), "{worst}");
+        }
+    }
+
+    #[test]
+    fn a_linear_profile_is_kept_on_and_between_layers() {
+        for (filter, shift_m) in filters() {
+            let thickness = STEP_M / 3.0;
+            let profile: Vec<f64> = (0..9000).map(|l| 0.02 * (f64::from(l) * thickness - 900.0)).collect();
+            let ranges = [700.0, 700.1, 812.345, 900.0 + 17.0 * thickness];
+            let mut out = [0.0; 4];
+            filter.apply_into(0.0, &profile, &ranges, &mut out).unwrap();
+            for (range, v) in ranges.iter().zip(out) {
+                assert_abs_diff_eq!(v, 0.02 * (range + shift_m - 900.0), epsilon = 1e-9);
+                let from_function = filter.at_range(*range, |rho| 0.02 * (rho - 900.0));
+                assert_abs_diff_eq!(v, from_function, epsilon = 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn a_parabola_rises_by_half_the_squared_length_of_the_pulse() {
+        // The second moment of |f(2 x/c)|^2 2/c is (c sigma/2)^2/2: fails if the Jacobian or a factor 2 were wrong.
+        let filter = RangeFilter::pulse(&pulse(), 0.2).unwrap();
+        let at_centre = filter.at_range(500.0, |rho| (rho - 500.0).powi(2));
+        assert_relative_eq!(at_centre, 0.5 * pulse().sigma_m().powi(2), max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_gate_adds_the_variance_of_its_window() {
+        let filter = RangeFilter::gate(&pulse(), &[1.0; 64], 250e6, 0.2).unwrap();
+        let centre = 500.0 - 0.5 * STEP_M;
+        let spread = filter.at_range(500.0, |rho| (rho - centre).powi(2));
+        let window = STEP_M * STEP_M * (64.0 * 64.0 - 1.0) / 12.0;
+        assert_relative_eq!(spread, 0.5 * pulse().sigma_m().powi(2) + window, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn weights_integrate_to_one_per_metre() {
+        for (filter, _) in filters() {
+            let sum: f64 = (-6000..6000).map(|i| 0.05 * filter.weight_per_m(0.05 * f64::from(i))).sum();
+            assert_relative_eq!(sum, 1.0, max_relative = 1e-12);
+        }
+    }
+
+    #[test]
+    fn ranges_that_see_too_little_air_are_not_numbers() {
+        let filter = RangeFilter::pulse(&pulse(), 0.5).unwrap();
+        let mut out = [0.0; 4];
+        filter.apply_into(100.0, &[1.0; 1000], &[20.0, 90.0, 110.0, 1e18], &mut out).unwrap();
+        assert!(out[0].is_nan() && out[1].is_nan() && out[3].is_nan());
+        assert_abs_diff_eq!(out[2], 1.0, epsilon = 1e-14);
+        filter.apply_into(100.0, &[f64::NAN; 1000], &[300.0; 4], &mut out).unwrap();
+        assert!(out.iter().all(|v| v.is_nan()));
+    }
+
+    #[test]
+    fn input_that_makes_no_filter_is_refused() {
+        assert!(RangeFilter::pulse(&pulse(), 0.0).is_err());
+        assert!(RangeFilter::pulse(&pulse(), 1000.0).is_err());
+        assert!(RangeFilter::pulse(&pulse(), 1e-9).is_err());
+        let gate = |window: &[f64]| RangeFilter::gate(&pulse(), window, 250e6, 0.5);
+        assert!(matches!(gate(&[]), Err(Error::Empty { .. })));
+        assert!(matches!(gate(&[0.0; 3]), Err(Error::ElementOutOfRange { .. })));
+        assert!(matches!(gate(&[1.0, f64::NAN]), Err(Error::ElementOutOfRange { index: 1, .. })));
+        let filter = RangeFilter::pulse(&pulse(), 0.5).unwrap();
+        assert!(filter.apply_into(0.0, &[], &[1.0], &mut [0.0]).is_err());
+        assert!(filter.apply_into(0.0, &[1.0], &[1.0], &mut [0.0; 2]).is_err());
+        assert!(filter.apply_into(0.0, &[1.0], &[f64::NAN], &mut [0.0]).is_err());
+    }
+}
