@@ -1,1 +1,40 @@
-//! wakescope-optics
+//! Heterodyne efficiency of a coherent lidar: beam, telescope, free space and SNR.
+//!
+//! The system-antenna efficiency eta_s(R) of (19) is the overlap, at the target, of the transmitted beam and of the
+//! local oscillator propagated backwards through the receiver (BPLO), both normalised to unit power before truncation.
+//!
+//! ```
+//! use wakescope_optics::{SnrModel, Telescope, theory};
+//!
+//! # fn main() -> Result<(), wakescope_optics::Error> {
+//! let telescope = Telescope::chapter(); // 1.55 um, 1/e radius 30 mm, aperture radius 50 mm, collimated
+//! let efficiency = theory::free_space_efficiency(&telescope, 400.0)?;
+//! assert!((efficiency - 8.801_813e-3).abs() < 1e-8);
+//!
+//! let snr = SnrModel::chapter().snr(400.0, efficiency)?;
+//! assert!((10.0 * snr.log10() + 8.436).abs() < 1e-3);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! | module | what is in it |
+//! |---|---|
+//! | [`beam`] | telescope, focus, obscuration, misalignment of the two beams |
+//! | [`theory`] | exact efficiency: free space, closed forms |
+//! | [`hankel`] | the same by an independent Fresnel-Hankel quadrature; free-space irradiance |
+//! | [`efficiency`] | efficiency profile with scatter and error |
+//! | [`snr`] | signal-to-noise ratio (14), corrected |
+
+pub mod beam;
+pub mod efficiency;
+mod error;
+pub mod hankel;
+mod overlap;
+mod quadrature;
+pub mod snr;
+pub mod theory;
+
+pub use beam::{Focus, Misalignment, RadiusDefinition, Telescope};
+pub use efficiency::EfficiencyProfile;
+pub use error::Error;
+pub use snr::{PlanckConvention, SnrModel};

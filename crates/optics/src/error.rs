@@ -1,0 +1,84 @@
+//! The one error type of the crate: each variant names the field, the value that was given and what is allowed.
+
+use thiserror::Error;
+
+/// Everything that can go wrong in this crate.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A number lies outside its allowed interval, or is not a number.
+    #[error("{field} = {value} is not allowed: {allowed}")]
+    OutOfRange {
+        /// Name of the field or parameter, with its unit suffix.
+        field: &'static str,
+        /// The value that was given.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Two lists that belong together have different lengths.
+    #[error("{field} has {found} entries, {expected} are needed")]
+    Length {
+        /// Name of the list.
+        field: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length it must have.
+        expected: usize,
+    },
+    /// A list that must increase strictly does not.
+    #[error("{field} must increase strictly, but entry {index} = {value} does not exceed the one before")]
+    NotIncreasing {
+        /// Name of the list.
+        field: &'static str,
+        /// Index of the first offending entry.
+        index: usize,
+        /// The offending entry.
+        value: f64,
+    },
+    /// A profile was asked for a range that it does not cover.
+    #[error(
+        "range {range_m} m lies outside the profile, which covers {first_m} m to {last_m} m: nothing is extrapolated"
+    )]
+    Extrapolation {
+        /// The range that was asked for [m].
+        range_m: f64,
+        /// First range of the profile [m].
+        first_m: f64,
+        /// Last range of the profile [m].
+        last_m: f64,
+    },
+    /// A quadrature did not reach its tolerance.
+    #[error("quadrature of {quantity} stopped at a relative error of {error:.1e}, {tolerance:.1e} was asked for")]
+    Convergence {
+        /// What was integrated.
+        quantity: &'static str,
+        /// Estimated relative error when it stopped.
+        error: f64,
+        /// Tolerance that was asked for.
+        tolerance: f64,
+    },
+}
+
+/// `value` when it is finite and positive, else an error that names `field`.
+pub(crate) fn positive(field: &'static str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(Error::OutOfRange { field, value, allowed: "a finite number above 0" })
+    }
+}
+
+/// `value` when it is finite and not negative, else an error that names `field`.
+pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(Error::OutOfRange { field, value, allowed: "a finite number, 0 or above" })
+    }
+}
+
+/// `value` when it is finite, else an error that names `field`.
+pub(crate) fn finite(field: &'static str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() { Ok(value) } else { Err(Error::OutOfRange { field, value, allowed: "a finite number" }) }
+}
