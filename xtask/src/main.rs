@@ -1,2 +1,76 @@
-//! Tasks of the wakescope workspace.
-fn main() {}
+//! Tasks of the wakescope workspace: `cargo xtask --help`.
+
+mod bless;
+mod ci;
+mod curves;
+mod figures;
+mod regress;
+mod reproduce;
+mod tidy;
+mod workspace;
+
+use clap::{Parser, Subcommand};
+use std::fmt;
+
+/// Why a task failed, in words.
+#[derive(Debug)]
+pub(crate) struct Failure(String);
+
+impl Failure {
+    pub(crate) fn new(message: String) -> Self {
+        Self(message)
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// Any library error becomes words here, where a person reads them.
+impl<E: std::error::Error> From<E> for Failure {
+    fn from(e: E) -> Self {
+        Self(e.to_string())
+    }
+}
+
+pub(crate) type Outcome = Result<(), Failure>;
+
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", about = "Tasks of the wakescope workspace")]
+struct Cli {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Draw the figures, measure the claims, write the report.
+    ReproduceFigs(reproduce::Options),
+    /// Compare what the crates compute now with the stored reference curves.
+    Regress(regress::Options),
+    /// Write stored reference curves from what the crates compute now.
+    Bless(bless::Options),
+    /// Check the rules of the house.
+    Tidy,
+    /// Everything that continuous integration runs.
+    Ci(ci::Options),
+}
+
+fn main() -> std::process::ExitCode {
+    let result = match Cli::parse().task {
+        Task::ReproduceFigs(options) => reproduce::run(&options),
+        Task::Regress(options) => regress::run(&options),
+        Task::Bless(options) => bless::run(&options),
+        Task::Tidy => tidy::run(),
+        Task::Ci(options) => ci::run(&options),
+    };
+    match result {
+        Ok(()) => std::process::ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            std::process::ExitCode::from(2)
+        }
+    }
+}

@@ -1,1 +1,5 @@
-fn main() {}
+//! The program `wakescope`; everything is in the library.
+
+fn main() -> std::process::ExitCode {
+    wakescope_sim::cli::main().into()
+}

@@ -91,6 +91,7 @@ impl Scene {
         self.check_flow(&mut c);
         self.check_scan(&mut c);
         check_estimator(&self.estimator, &mut c);
+        self.check_outputs(&mut c);
         // Limits between keys make sense only once each key does.
         if c.0.is_empty() {
             self.check_between(&mut c);
@@ -151,6 +152,12 @@ impl Scene {
             "m",
         );
         c.within("telescope.beam_radius_m", t.beam_radius_m, 1e-4, 10.0, "m");
+        c.require(
+            t.obscuration_radius_m >= 0.0 && t.obscuration_radius_m < t.aperture_radius_m,
+            "telescope.obscuration_radius_m",
+            t.obscuration_radius_m,
+            "from 0 to below telescope.aperture_radius_m",
+        );
         let focus_ok = !t.focus_m.is_nan() && t.focus_m != 0.0 && t.focus_m != f64::NEG_INFINITY;
         c.require(
             focus_ok,
@@ -256,6 +263,21 @@ impl Scene {
         c.within("scan.range_max_m", s.range_max_m, 1.0, 1e6, "m");
         c.count("scan.pulses_per_line", s.pulses_per_line, 1, 1_000_000);
         c.count("scan.realisations", s.realisations, 1, 1_000_000);
+    }
+
+    fn check_outputs(&self, c: &mut Checker) {
+        let o = &self.outputs;
+        c.within("outputs.profile_range_min_m", o.profile_range_min_m, 1.0, 1e6, "m");
+        c.within("outputs.profile_range_max_m", o.profile_range_max_m, 1.0, 1e6, "m");
+        c.require(
+            !(o.profile_range_max_m <= o.profile_range_min_m),
+            "outputs.profile_range_max_m",
+            o.profile_range_max_m,
+            format!("above outputs.profile_range_min_m, {} m", o.profile_range_min_m),
+        );
+        c.count("outputs.profile_points", o.profile_points, 2, 100_000);
+        let any = o.csv || o.netcdf || o.svg || o.png;
+        c.require(any, "outputs.csv", o.csv, "true, or else one of netcdf, svg and png: nothing would be written");
     }
 
     fn check_between(&self, c: &mut Checker) {

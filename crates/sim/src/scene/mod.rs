@@ -12,6 +12,7 @@ pub use check::Problem;
 pub use read::{Located, SceneError, SceneFile};
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 /// The commented scene that `wakescope init` writes: every key with its default.
 pub const TABLE2_TOML: &str = include_str!("table2.toml");
@@ -143,6 +144,8 @@ section! {
     Telescope {
         /// Radius of the hard aperture, m.
         aperture_radius_m: f64 = 0.05,
+        /// Radius of a central obscuration, m; 0 for none.
+        obscuration_radius_m: f64 = 0.0,
         /// 1/e radius of the Gaussian beam at the aperture, m.
         beam_radius_m: f64 = 0.03,
         /// Whether `beam_radius_m` is that of the irradiance or of the field.
@@ -344,7 +347,18 @@ section! {
         flow: bool = true,
         /// The raw signals of the first realisation.
         signals: bool = false,
+        /// First range of the efficiency and SNR profile, m.
+        profile_range_min_m: f64 = 100.0,
+        /// Last range of the profile, m.
+        profile_range_max_m: f64 = 3000.0,
+        /// Ranges in the profile.
+        profile_points: usize = 59,
     }
+}
+
+/// The short name of a text: the first 16 hexadecimal digits of its SHA-256.
+pub fn hash_of(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().take(8).map(|b| format!("{b:02x}")).collect()
 }
 
 impl Scene {

@@ -1,7 +1,6 @@
 //! Reading a scene file, with errors that name the key, the value, what is allowed and the line.
 
 use super::{Problem, Scene};
-use sha2::{Digest, Sha256};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
@@ -114,11 +113,7 @@ impl SceneFile {
             return Err(problems);
         }
         let toml = scene.to_toml();
-        let hash = Sha256::digest(toml.as_bytes())
-            .iter()
-            .take(8)
-            .map(|b| format!("{b:02x}"))
-            .collect();
+        let hash = super::hash_of(&toml);
         Ok(Self { scene, toml, hash })
     }
 }

@@ -1,0 +1,197 @@
+//! The command line program `wakescope`: words in, files and exit codes out.
+//!
+//! Exit codes: 0 done, 2 wrong input or unusable output. Progress and plans go to standard error,
+//! results to standard output; `--json` makes the result one JSON object.
+
+mod progress;
+
+use crate::plan::{Plan, Target};
+use crate::progress::{Observer, Silent};
+use crate::scene::{SceneFile, TABLE2_TOML};
+use crate::{Error, run, write};
+use clap::{Args, Parser, Subcommand};
+use serde_json::{Value, json};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Simulator of coherent Doppler lidar measurements of aircraft wake vortices.
+#[derive(Debug, Parser)]
+#[command(name = "wakescope", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Threads to compute with; the default is one for each core. Results do not depend on it.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Seed to use instead of the scene's.
+    #[arg(long, global = true, value_name = "N")]
+    seed: Option<u64>,
+    /// Show neither plan nor progress.
+    #[arg(long, global = true)]
+    quiet: bool,
+    /// Print the result as one JSON object.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Write a commented scene: the lidar of the chapter's Table 2 and an analytic vortex pair.
+    Init {
+        /// The file to write.
+        #[arg(default_value = "scene.toml")]
+        scene: PathBuf,
+        /// Replace the file if it exists.
+        #[arg(long)]
+        force: bool,
+    },
+    /// Check a scene and print the plan: what will run, what is left out and why, at what cost.
+    Check {
+        /// The scene.
+        scene: PathBuf,
+    },
+    /// Run the whole measurement and write everything that the scene asks for.
+    Run(Io),
+    /// Heterodyne efficiency and signal-to-noise ratio against range.
+    Efficiency(Io),
+    /// The raw signals of one realisation of the scan.
+    Signal(Io),
+    /// The radial-velocity map with its errors.
+    Map(Io),
+}
+
+#[derive(Debug, Args)]
+struct Io {
+    /// The scene.
+    scene: PathBuf,
+    /// Folder to write to; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Runs the program with the words of the command line; returns its exit code.
+pub fn main() -> u8 {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            // Help and version are no errors and go to standard output; clap knows which is which.
+            let _ = e.print();
+            return e.exit_code() as u8;
+        }
+    };
+    match dispatch(&cli) {
+        Ok(()) => 0,
+        Err(e) => {
+            let _ = writeln!(std::io::stderr(), "error: {e}");
+            2
+        }
+    }
+}
+
+fn dispatch(cli: &Cli) -> Result<(), Error> {
+    match &cli.command {
+        Command::Init { scene, force } => init(scene, *force, cli),
+        Command::Check { scene } => check(scene, cli),
+        Command::Run(io) => execute(io, Target::Run, cli),
+        Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
+        Command::Signal(io) => execute(io, Target::Signal, cli),
+        Command::Map(io) => execute(io, Target::Map, cli),
+    }
+}
+
+fn init(path: &Path, force: bool, cli: &Cli) -> Result<(), Error> {
+    let text = match cli.seed {
+        Some(seed) => TABLE2_TOML.replacen("seed = 1 ", &format!("seed = {seed} "), 1),
+        None => TABLE2_TOML.to_owned(),
+    };
+    SceneFile::parse(&text, path)?;
+    if !force && path.exists() {
+        let source = std::io::Error::new(std::io::ErrorKind::AlreadyExists, "it exists; --force replaces it");
+        return Err(Error::Io { action: "write", path: path.to_owned(), source });
+    }
+    crate::export::write_atomic(path, text.as_bytes())?;
+    say(cli, json!({ "scene": path }), &format!("wrote {}\nnext: wakescope check {0}", path.display()));
+    Ok(())
+}
+
+fn check(path: &Path, cli: &Cli) -> Result<(), Error> {
+    let plan = Plan::new(load(path, cli)?, Target::Run)?;
+    say(cli, plan_json(&plan), &format!("{}: good\n{plan}", path.display()));
+    Ok(())
+}
+
+fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
+    let plan = Plan::new(load(&io.scene, cli)?, target)?;
+    // An output that cannot be used is found before the computing, not after it.
+    write::prepare(&io.out)?;
+    let outcome = if cli.quiet {
+        with_threads(cli, || run::run(&plan, &Silent))??
+    } else {
+        let _ = write!(std::io::stderr(), "{plan}");
+        let bars = progress::Bars::new();
+        with_threads(cli, || run::run(&plan, &bars as &dyn Observer))??
+    };
+    let files = write::write(&plan, &outcome, &io.out)?;
+    let summary = outcome.summary();
+    let mut text: Vec<String> = summary.iter().map(|line| format!("{:<44} {}", line.text, shown(line.value))).collect();
+    text.push(format!("wrote {} files to {}", files.len(), io.out.display()));
+    let values: serde_json::Map<String, Value> = summary.iter().map(|l| (l.key.to_owned(), json!(l.value))).collect();
+    let mut object = plan_json(&plan);
+    object["results"] = Value::Object(values);
+    object["files"] = json!(files);
+    say(cli, object, &text.join("\n"));
+    Ok(())
+}
+
+fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
+    let mut file = SceneFile::read(path)?;
+    if let Some(seed) = cli.seed {
+        file.scene.seed = seed;
+        file = SceneFile::new(file.scene).map_err(|problems| crate::scene::SceneError::Invalid {
+            path: path.to_owned(),
+            problems: problems.into_iter().map(|problem| crate::scene::Located { problem, line: None }).collect(),
+        })?;
+    }
+    Ok(file)
+}
+
+fn with_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> T + Send) -> Result<T, Error> {
+    let threads = usize::from(cli.threads.unwrap_or(0));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Error::Threads { threads, reason: e.to_string() })?;
+    Ok(pool.install(work))
+}
+
+fn plan_json(plan: &Plan) -> Value {
+    let stages: Vec<Value> = plan
+        .stages
+        .iter()
+        .map(|s| {
+            json!({
+                "stage": s.stage.name(), "runs": s.cost.is_some(), "reason": s.reason,
+                "core_s": s.cost.map(|c| c.core_s), "memory_bytes": s.cost.map(|c| c.memory_bytes),
+            })
+        })
+        .collect();
+    json!({
+        "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.scene.seed,
+        "stages": stages, "warnings": plan.warnings,
+    })
+}
+
+/// Four digits; what cannot be given is a dash.
+fn shown(value: f64) -> String {
+    match value {
+        v if v.is_nan() => "-".into(),
+        v if v != 0.0 && !(1e-3..1e5).contains(&v.abs()) => format!("{v:.3e}"),
+        v => format!("{v:.4}"),
+    }
+}
+
+/// Prints the result; a closed pipe is no error.
+fn say(cli: &Cli, object: Value, text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = if cli.json { writeln!(out, "{object:#}") } else { writeln!(out, "{}", text.trim_end()) };
+}

@@ -1,0 +1,46 @@
+//! What can go wrong in a run.
+
+use crate::scene::SceneError;
+use std::path::PathBuf;
+
+/// Why a run could not be made or finished.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The scene was refused.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The wind refused a point or a time.
+    #[error("wind: {0}")]
+    Wind(#[from] wakescope_les::Error),
+    /// The optics refused a telescope or a range.
+    #[error("optics: {0}")]
+    Optics(#[from] wakescope_optics::Error),
+    /// The signal simulation refused its input.
+    #[error("signal: {0}")]
+    Signal(#[from] wakescope_signal::Error),
+    /// An estimator refused its input.
+    #[error("estimate: {0}")]
+    Estimate(#[from] wakescope_estimate::Error),
+    /// A file could not be written.
+    #[error(transparent)]
+    Export(#[from] crate::export::OutputError),
+    /// A file or folder could not be used.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The number of threads cannot be had.
+    #[error("--threads {threads}: {reason}")]
+    Threads {
+        /// The number asked for.
+        threads: usize,
+        /// What the thread pool says.
+        reason: String,
+    },
+}

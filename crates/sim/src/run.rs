@@ -1,0 +1,103 @@
+//! Runs a plan: each stage once, nothing that the plan leaves out.
+
+use crate::Error;
+use crate::export::CrossPlanes;
+use crate::map::{self, VelocityEstimates};
+use crate::plan::{Plan, Stage, Target};
+use crate::plane;
+use crate::profile::{RangeProfile, range_profile};
+use crate::progress::Observer;
+use crate::scan::Scanner;
+use ndarray::Array2;
+
+/// What a run gives; absent is what was not asked for.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RunResult {
+    /// Efficiency and SNR against range.
+    pub profile: Option<RangeProfile>,
+    /// Wind on a cross-plane.
+    pub plane: Option<CrossPlanes>,
+    /// Raw signals of the first realisation \[pulse, sample\], A.
+    pub signals_a: Option<Array2<f64>>,
+    /// The velocity map with its errors.
+    pub map: Option<VelocityEstimates>,
+}
+
+/// One line of the summary that a person or a program reads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SummaryLine {
+    /// Name for programs, with the unit.
+    pub key: &'static str,
+    /// Description for people.
+    pub text: &'static str,
+    /// The value; NaN if it cannot be given.
+    pub value: f64,
+}
+
+/// Runs a plan.
+///
+/// # Errors
+/// What the crates refuse; a checked scene gives none.
+pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
+    let mut result = RunResult::default();
+    if matches!(plan.target, Target::Run | Target::Efficiency) {
+        result.profile = Some(range_profile(&plan.scene.scene)?);
+    }
+    if plan.runs(Stage::CrossPlane) {
+        observer.begin(Stage::CrossPlane, 1);
+        result.plane = Some(plane::cross_plane(plan)?);
+        observer.end();
+    }
+    if plan.runs(Stage::Signals) {
+        let scanner = Scanner::new(plan, observer)?;
+        if plan.runs(Stage::Estimates) {
+            let keep = plan.keeps_signals();
+            let mut first = None;
+            let map = map::estimate(plan, &scanner, observer, |records| first = keep.then(|| records.clone()))?;
+            result.signals_a = first;
+            result.map = Some(map);
+        } else {
+            observer.begin(Stage::Signals, plan.geometry.elevation_rad.len() as u64);
+            result.signals_a = Some(scanner.records(0, observer)?);
+            observer.end();
+        }
+    }
+    Ok(result)
+}
+
+impl RunResult {
+    /// The results in a few numbers.
+    pub fn summary(&self) -> Vec<SummaryLine> {
+        let mut out = Vec::new();
+        let mut line = |key, text, value| out.push(SummaryLine { key, text, value });
+        if let Some(p) = &self.profile {
+            let middle = p.snr_db.len() / 2;
+            line("profile_range_m", "middle of the profile [m]", p.efficiency.range_m[middle]);
+            line("efficiency", "efficiency there", p.efficiency.mean[middle]);
+            line("snr_db", "signal-to-noise ratio there [dB]", p.snr_db[middle]);
+        }
+        if let Some(a) = &self.signals_a {
+            line("signal_rms_a", "rms of the raw signals [A]", (a.mapv(|x| x * x).sum() / a.len() as f64).sqrt());
+        }
+        if let Some(m) = &self.map {
+            line("v_max_m_s", "largest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::max));
+            line("v_min_m_s", "smallest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::min));
+            line("bias_mean_m_s", "mean bias against v_pulse [m/s]", mean(&m.bias_m_s));
+            line("rms_mean_m_s", "root mean square error against v_pulse [m/s]", mean(&m.rms_m_s.mapv(|x| x * x)).sqrt());
+            line("std_mean_m_s", "standard deviation of one estimate [m/s]", mean(&m.std_m_s));
+            line("flagged_fraction", "fraction of flagged estimates", mean(&m.flagged));
+            line("level_mean", "windows accumulated, mean", mean(&m.level));
+        }
+        out
+    }
+}
+
+/// Mean of the values that are numbers; NaN if there is none.
+fn mean(values: &Array2<f64>) -> f64 {
+    let numbers: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    numbers.iter().sum::<f64>() / numbers.len() as f64
+}
+
+fn fold(values: &Array2<f64>, pick: fn(f64, f64) -> f64) -> f64 {
+    values.iter().copied().fold(f64::NAN, pick)
+}

@@ -1,0 +1,159 @@
+//! Writes what a run gives: all files of a run appear together, or none.
+
+use crate::Error;
+use crate::export::signals::RawSignals;
+use crate::export::{Field, FileGroup, Provenance, PulseInfo, Ray, Sweep, Table, Unit, VelocityMap, tables};
+use crate::map::VelocityEstimates;
+use crate::plan::Plan;
+use crate::profile::RangeProfile;
+use crate::run::RunResult;
+use crate::scene::Flow;
+use std::path::{Path, PathBuf};
+
+/// Finds out, before any computing, whether files can be written to a folder; makes it if needed.
+///
+/// # Errors
+/// The folder cannot be made, is a file, or cannot be written to.
+pub fn prepare(folder: &Path) -> Result<(), Error> {
+    let io = |action, source| Error::Io { action, path: folder.to_owned(), source };
+    std::fs::create_dir_all(folder).map_err(|e| io("make the folder", e))?;
+    let probe = folder.join(".wakescope-probe");
+    std::fs::write(&probe, b"").map_err(|e| io("write to", e))?;
+    std::fs::remove_file(&probe).map_err(|e| io("write to", e))
+}
+
+/// Writes the results that the plan's scene asks for; returns the paths of the files.
+///
+/// # Errors
+/// A result that a format cannot hold, or what the system says. Nothing is left half-written.
+pub fn write(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let outputs = plan.scene.scene.outputs;
+    let origin = provenance(plan);
+    let mut files = FileGroup::new(folder);
+    files.add("scene.toml", scene_text(&origin))?;
+    if let Some(profile) = &result.profile {
+        if outputs.csv {
+            files.add("profile.csv", profile_table(profile).to_csv(&origin)?)?;
+        }
+        #[cfg(feature = "plots")]
+        pictures::add(&mut files, plan, "profile", &pictures::profile(profile), &origin)?;
+    }
+    if let Some(plane) = &result.plane {
+        if outputs.csv {
+            files.add("flow.csv", tables::planes_table(plane)?.to_csv(&origin)?)?;
+        }
+        #[cfg(feature = "netcdf")]
+        if outputs.netcdf {
+            files.add("flow.nc", crate::export::cf_planes::cf_planes_bytes(plane, &origin)?)?;
+        }
+    }
+    if let Some(current_a) = &result.signals_a {
+        let signals = raw_signals(plan, current_a.clone());
+        if outputs.csv {
+            files.add("signals.csv", signals.table()?.to_csv(&origin)?)?;
+        }
+        #[cfg(feature = "netcdf")]
+        if outputs.netcdf {
+            files.add("signals.nc", crate::export::cf_signals::cf_signals_bytes(&signals, &origin)?)?;
+        }
+    }
+    if let Some(estimates) = &result.map {
+        let map = velocity_map(plan, estimates);
+        if outputs.csv {
+            files.add("map.csv", tables::map_table(&map)?.to_csv(&origin)?)?;
+        }
+        #[cfg(feature = "netcdf")]
+        if outputs.netcdf {
+            files.add("map.nc", crate::export::cfradial::cfradial_bytes(&map, &origin)?)?;
+        }
+        #[cfg(feature = "plots")]
+        pictures::add_map(&mut files, plan, &map, &origin)?;
+    }
+    Ok(files.commit()?)
+}
+
+/// Where the files of a run come from.
+pub fn provenance(plan: &Plan) -> Provenance {
+    Provenance {
+        program: crate::PROGRAM.into(),
+        scene_toml: plan.scene.toml.clone(),
+        scene_hash: plan.scene.hash.clone(),
+        seed: plan.scene.scene.seed,
+    }
+}
+
+/// The scene with every default written out: running it again gives the same files.
+fn scene_text(origin: &Provenance) -> String {
+    format!("# {}, scene {}\n{}", origin.program, origin.scene_hash, origin.scene_toml)
+}
+
+/// Efficiency and SNR as a table.
+pub fn profile_table(profile: &RangeProfile) -> Table {
+    let e = &profile.efficiency;
+    Table::new()
+        .float("range_m", e.range_m.clone())
+        .float("efficiency", e.mean.clone())
+        .float("efficiency_standard_deviation", e.standard_deviation.clone())
+        .float("efficiency_standard_error", e.standard_error.clone())
+        .float("snr_db", profile.snr_db.clone())
+}
+
+/// The raw signals of a plan's first realisation.
+fn raw_signals(plan: &Plan, current_a: ndarray::Array2<f64>) -> RawSignals {
+    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let pulses = scene.scan.pulses_per_line;
+    let first_s = 2.0 * g.first_range_m / crate::SPEED_OF_LIGHT_M_S;
+    RawSignals {
+        current_a,
+        elevation_rad: g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect(),
+        time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
+        pulses_per_line: pulses,
+    }
+}
+
+/// The map of a run in the form that files and pictures take.
+pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
+    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let azimuth_rad = scene.scan.azimuth_rad;
+    let away = |what: &str| format!("{what}, positive away from the lidar");
+    let speed = |name: &str, text: String, values: &ndarray::Array2<f64>| {
+        Field::float(name, Unit::MetrePerSecond, &text, values.clone())
+    };
+    let number = |name: &str, text: &str, values: &ndarray::Array2<f64>| Field::float(name, Unit::One, text, values.clone());
+    VelocityMap {
+        title: "Radial velocity of a wake-vortex scan".into(),
+        rays: (0..g.elevation_rad.len())
+            .map(|i| Ray { sweep: 0, time_s: g.line_time_s[i], elevation_rad: g.elevation_rad[i], azimuth_rad })
+            .collect(),
+        range_m: e.range_m.clone(),
+        sweeps: vec![Sweep {
+            tau: match scene.flow {
+                Flow::VortexPair(pair) => pair.age_tau,
+                _ => 0.0,
+            },
+            azimuth_rad,
+        }],
+        pulse: PulseInfo {
+            prt_s: 1.0 / scene.laser.pulse_repetition_hz,
+            pulse_width_s: scene.pulse.duration_s,
+            nyquist_velocity_m_s: 0.25 * scene.laser.wavelength_m * scene.detector.sampling_hz,
+            samples: scene.scan.pulses_per_line as u32,
+            frequency_hz: crate::SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m,
+        },
+        fields: vec![
+            speed("v_exact", away("radial velocity of the air at the gate's centre"), &e.v_exact_m_s),
+            speed("v_pulse", away("radial velocity weighted with the pulse"), &e.v_pulse_m_s),
+            speed("v_gate", away("radial velocity weighted with pulse and window"), &e.v_gate_m_s),
+            speed("radial_velocity", away("mean estimated radial velocity"), &e.v_mean_m_s),
+            speed("velocity_standard_deviation", "standard deviation of one estimate".into(), &e.std_m_s),
+            speed("rms", "root mean square error against v_pulse".into(), &e.rms_m_s),
+            number("level", "windows accumulated for one estimate", &e.level),
+            number("n_eff", "independent windows that these are worth", &e.n_eff),
+            speed("bias", "mean error against v_pulse".into(), &e.bias_m_s),
+            speed("standard_error", "standard error of the root mean square error".into(), &e.standard_error_m_s),
+            number("flagged", "fraction of the realisations whose estimate was flagged", &e.flagged),
+        ],
+        lidar_y_m: 0.0,
+        lidar_height_m: scene.scan.lidar_height_m,
+    }
+}

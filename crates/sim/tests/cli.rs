@@ -1,0 +1,150 @@
+//! The program from outside: what a user types, what files come, and what wrong input gives.
+
+#![cfg(feature = "cli")]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A scene small enough to run in a moment.
+const SMALL: &str = r#"
+seed = 5
+[detector.snr]
+reference = "fixed"
+snr_db = 10.0
+[scan]
+elevation_min_rad = 0.1
+elevation_max_rad = 0.12
+elevation_step_rad = 2.5e-3
+range_min_m = 330.0
+range_max_m = 430.0
+pulses_per_line = 2
+realisations = 3
+[outputs]
+signals = true
+profile_points = 5
+"#;
+
+fn wakescope(folder: &Path, words: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_wakescope")).args(words).current_dir(folder).output().unwrap()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// Runs a scene that must be refused; returns the message.
+fn refused(scene: &str, words: &[&str]) -> String {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("s.toml"), scene).unwrap();
+    let out = wakescope(temp.path(), words);
+    assert_eq!(out.status.code(), Some(2), "{}", String::from_utf8_lossy(&out.stderr));
+    assert_eq!(names(temp.path()), ["s.toml"], "nothing may be left behind");
+    assert!(out.stdout.is_empty());
+    String::from_utf8(out.stderr).unwrap()
+}
+
+const RUN: [&str; 4] = ["run", "s.toml", "--out", "o"];
+
+#[test]
+fn wrong_scenes_are_refused_with_key_value_range_and_line() {
+    for (scene, wanted) in [
+        ("[laser]\ncolour = 1.0\n", ["s.toml:2", "unknown field `colour`", "wavelength_m"]),
+        (
+            "[telescope]\naperture_radius_m = -0.05\n",
+            ["s.toml:2", "telescope.aperture_radius_m = -0.05", "from 0.0001 to 10 m"],
+        ),
+        ("[pulse]\nduration_s = nan\n", ["s.toml:2", "pulse.duration_s = NaN", "1e-9"]),
+        ("[scan]\nelevation_min_rad = -0.1\n", ["s.toml:2", "scan.elevation_min_rad = -0.1", "below the ground"]),
+        ("[scan]\nrange_max_m = 300.0\n", ["estimator.window_samples = 64", "at most 34", "samples recorded"]),
+        (
+            "[estimator]\nwindow_samples = 1000\npadded_samples = 2048\n",
+            ["s.toml:2", "estimator.window_samples = 1000", "at most 401"],
+        ),
+    ] {
+        let message = refused(scene, &RUN);
+        for part in wanted {
+            assert!(message.contains(part), "{part} is not in: {message}");
+        }
+    }
+}
+
+#[test]
+fn missing_files_and_unusable_outputs_are_refused() {
+    assert!(refused("", &["run", "none.toml", "--out", "o"]).contains("none.toml"));
+    assert!(refused("", &["run", "s.toml", "--out", "s.toml"]).contains("s.toml"));
+    assert!(refused("", &["run", "s.toml", "--out", "s.toml/deeper"]).contains("s.toml/deeper"));
+    assert!(refused("", &["init", "s.toml"]).contains("--force"));
+    assert!(refused("", &["run", "s.toml"]).contains("--out"));
+    assert!(refused("", &["run", "s.toml", "--out", "o", "--threads", "0"]).contains("--threads"));
+    assert!(refused("", &["check", "s.toml", "--seed", "18446744073709551615"]).contains("seed"));
+}
+
+#[test]
+fn an_initial_scene_is_good_and_its_plan_says_what_is_left_out() {
+    let temp = tempfile::tempdir().unwrap();
+    assert!(wakescope(temp.path(), &["init"]).status.success());
+    let out = wakescope(temp.path(), &["check", "scene.toml"]);
+    assert!(out.status.success());
+    let text = String::from_utf8(out.stdout).unwrap();
+    for part in ["skip  phase screens", "skip  flow simulation", "run   signals", "run   estimates"] {
+        assert!(text.contains(part), "{part} is not in:\n{text}");
+    }
+}
+
+#[test]
+fn each_stage_can_be_asked_for_alone() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
+    for (stage, csv) in [("efficiency", "profile.csv"), ("signal", "signals.csv"), ("map", "map.csv")] {
+        let out = wakescope(temp.path(), &[stage, "s.toml", "--out", stage, "--quiet"]);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        assert!(out.stderr.is_empty(), "--quiet");
+        let files = names(&temp.path().join(stage));
+        assert!(files.contains(&csv.to_owned()), "{files:?}");
+        let tables = files.iter().filter(|f| f.ends_with(".csv")).count();
+        assert_eq!(tables, 1, "{stage} gives nothing else: {files:?}");
+    }
+}
+
+#[test]
+fn a_run_gives_the_same_tables_for_one_and_two_threads_and_says_where_they_come_from() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
+    for threads in ["1", "2"] {
+        let out = wakescope(temp.path(), &["run", "s.toml", "--out", threads, "--threads", threads, "--json"]);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert_eq!(json["seed"], 5);
+        assert!(json["results"]["rms_mean_m_s"].as_f64().unwrap() > 0.0);
+    }
+    let (one, two) = (temp.path().join("1"), temp.path().join("2"));
+    assert_eq!(names(&one), names(&two));
+    let mut tables = 0;
+    for name in names(&one) {
+        let bytes = std::fs::read(one.join(&name)).unwrap();
+        assert_eq!(bytes, std::fs::read(two.join(&name)).unwrap(), "{name} depends on the number of threads");
+        if name.ends_with(".csv") {
+            let text = String::from_utf8(bytes).unwrap();
+            assert!(text.contains("# seed: 5\n") && text.contains(concat!("wakescope ", env!("CARGO_PKG_VERSION"))));
+            assert!(text.contains("snr_db = 10.0"), "{name} carries the scene");
+            tables += 1;
+        }
+    }
+    assert_eq!(tables, 4);
+}
+
+#[test]
+fn a_written_scene_runs_again_to_the_same_files() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
+    assert!(wakescope(temp.path(), &["map", "s.toml", "--out", "a", "--seed", "9", "--quiet"]).status.success());
+    assert!(wakescope(temp.path(), &["map", "a/scene.toml", "--out", "b", "--quiet"]).status.success());
+    let read = |file: &str| std::fs::read_to_string(temp.path().join(file)).unwrap();
+    assert_eq!(read("a/map.csv"), read("b/map.csv"));
+    assert!(wakescope(temp.path(), &["map", "s.toml", "--out", "c", "--quiet"]).status.success());
+    let body = |text: String| text.lines().filter(|l| !l.starts_with('#')).collect::<Vec<_>>().join("\n");
+    assert_ne!(body(read("a/map.csv")), body(read("c/map.csv")), "the seed matters");
+}

@@ -1,0 +1,45 @@
+//! `cargo xtask bless NAME ...`: writes stored curves from what the crates compute now.
+//!
+//! The only way to write one. Curves from independent sources are never written.
+
+use crate::curves::{ALL, Origin};
+use crate::workspace::root;
+use crate::{Failure, Outcome};
+use wakescope_sim::export::write_atomic;
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Names of the curves, as `cargo xtask regress` prints them.
+    #[arg(required = true)]
+    names: Vec<String>,
+}
+
+/// Writes the curves.
+///
+/// # Errors
+/// An unknown name, a curve of independent origin, or one that cannot be computed.
+pub(crate) fn run(options: &Options) -> Outcome {
+    for name in &options.names {
+        let curve = ALL.iter().find(|c| c.name == name).ok_or_else(|| {
+            let known: Vec<&str> = ALL.iter().map(|c| c.name).collect();
+            Failure::new(format!("bless {name}: no such curve; there are {}", known.join(", ")))
+        })?;
+        let Origin::Blessed { quantity, grid } = curve.origin else {
+            return Err(Failure::new(format!("bless {name}: it comes from an independent source and is not ours to write")));
+        };
+        let x = grid();
+        let y = (curve.compute)(&x)?;
+        let mut text = format!(
+            "# {quantity}\n# Source: cargo xtask bless {name}\n# Uncertainty: the same seed gives the same curve; tolerance of the comparison {:e}\n{},{}\n",
+            curve.tolerance, curve.x, curve.y
+        );
+        for (x, y) in x.iter().zip(&y) {
+            text.push_str(&format!("{x:?},{y:?}\n"));
+        }
+        let path = root().join(curve.file);
+        write_atomic(&path, text)?;
+        println!("wrote {} points to {}: say in CHANGELOG.md, under Numerics, why the curve changed", x.len(), curve.file);
+    }
+    Ok(())
+}

@@ -1,0 +1,100 @@
+//! `cargo xtask ci`: every check that continuous integration makes, in its order.
+//!
+//! `.ci/run` calls it, so that a person can run the same before a commit.
+
+use crate::workspace::{read, root};
+use crate::{Failure, Outcome};
+use std::process::Command;
+use std::time::Instant;
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Run only the steps whose name contains this.
+    #[arg(long, value_name = "WORD")]
+    only: Option<String>,
+}
+
+struct Step {
+    name: &'static str,
+    command: String,
+    environment: &'static [(&'static str, &'static str)],
+}
+
+/// Feature sets that must build: each crate with nothing, and each feature alone.
+const FEATURES: [(&str, &[&str]); 4] = [
+    ("wakescope-optics", &["", "rayon", "screens"]),
+    ("wakescope-les", &[""]),
+    ("wakescope-estimate", &["", "rayon", "bundled-lapack"]),
+    ("wakescope-sim", &["", "cli", "netcdf", "plots", "vtk", "npz"]),
+];
+
+fn steps() -> Result<Vec<Step>, Failure> {
+    let plain = |name, command: String| Step { name, command, environment: &[] };
+    let mut out = vec![
+        plain("format", "cargo fmt --all --check".into()),
+        plain("clippy", "cargo clippy --workspace --all-targets -- -D warnings".into()),
+        plain("test", readme_test_command(&read("README.md")?)?),
+        Step {
+            name: "docs",
+            command: "cargo doc --workspace --no-deps --document-private-items".into(),
+            environment: &[("RUSTDOCFLAGS", "-D warnings")],
+        },
+    ];
+    for (package, sets) in FEATURES {
+        for set in sets {
+            let command = format!("cargo check --package {package} --no-default-features --features '{set}'");
+            out.push(plain("features", command));
+        }
+    }
+    out.push(plain("examples", "cargo build --workspace --examples --benches".into()));
+    out.push(plain("tidy", "cargo xtask tidy".into()));
+    out.push(plain("regress", "cargo xtask regress".into()));
+    out.push(plain("figures", "cargo xtask reproduce-figs --profile quick --no-cache".into()));
+    Ok(out)
+}
+
+/// The test command as the README gives it, so that CI runs what a reader runs.
+fn readme_test_command(readme: &str) -> Result<String, Failure> {
+    readme
+        .lines()
+        .map(str::trim)
+        .find(|l| l.starts_with("cargo test"))
+        .map(|l| l.split('#').next().unwrap_or(l).trim().to_owned())
+        .ok_or_else(|| Failure::new("README.md gives no line that begins with `cargo test`".into()))
+}
+
+/// Runs the steps; stops at the first that fails.
+///
+/// # Errors
+/// The step that failed.
+pub(crate) fn run(options: &Options) -> Outcome {
+    let wanted = |s: &Step| options.only.as_ref().is_none_or(|word| s.name.contains(word.as_str()));
+    for step in steps()?.into_iter().filter(wanted) {
+        println!("== {}: {}", step.name, step.command);
+        let start = Instant::now();
+        let status = Command::new("sh")
+            .args(["-c", &step.command])
+            .envs(step.environment.iter().copied())
+            .current_dir(root())
+            .status()
+            .map_err(|e| Failure::new(format!("cannot run sh: {e}")))?;
+        if !status.success() {
+            return Err(Failure::new(format!("ci: {} failed: {}", step.name, step.command)));
+        }
+        println!("== {}: passed in {:.0} s", step.name, start.elapsed().as_secs_f64());
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_test_command_is_the_readmes() {
+        let readme = "text\n```sh\ncargo xtask reproduce-figs   # figures\ncargo test --workspace   # tests\n```\n";
+        assert_eq!(readme_test_command(readme).unwrap(), "cargo test --workspace");
+        assert!(readme_test_command("nothing").is_err());
+    }
+}

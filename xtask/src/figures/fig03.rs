@@ -1,0 +1,66 @@
+//! Figure 3: the scan pattern on the runway, with the vortices and the lines of sight.
+
+use super::{Context, Rendered};
+use crate::Failure;
+use wakescope_sim::export::Table;
+use wakescope_sim::join;
+use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_sim::scene::{Flow, Scene};
+
+/// Every so many lines are drawn; the table has all.
+const DRAWN: usize = 8;
+
+pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
+    let plan = Plan::new(context.scene_file(Scene::default())?, Target::Run)?;
+    let scene = &plan.scene.scene;
+    let elevation_rad = &plan.geometry.elevation_rad;
+    let far_m = scene.scan.range_max_m;
+    let at = |range_m: f64, el: f64| (range_m * el.cos(), scene.scan.lidar_height_m + range_m * el.sin());
+    let near_m = scene.scan.range_min_m;
+
+    let column = |f: fn((f64, f64)) -> f64, range_m: f64| elevation_rad.iter().map(move |&el| f(at(range_m, el)));
+    let table = Table::new()
+        .int("line", (0..elevation_rad.len()).map(|i| i as i64))
+        .float("elevation_rad", elevation_rad.iter().copied())
+        .float("y_first_sample_m", column(|p| p.0, near_m))
+        .float("z_first_sample_m", column(|p| p.1, near_m))
+        .float("y_last_sample_m", column(|p| p.0, far_m))
+        .float("z_last_sample_m", column(|p| p.1, far_m));
+    let mut out = Rendered::default();
+    let origin = wakescope_sim::write::provenance(&plan);
+    out.csv(table.to_csv(&origin)?);
+
+    let mut fan = Vec::new();
+    for &el in elevation_rad.iter().step_by(DRAWN) {
+        // There and back, so that one series draws the whole fan.
+        fan.extend([at(0.0, el), at(far_m, el), at(0.0, el)]);
+    }
+    let recorded: Vec<(f64, f64)> = elevation_rad.iter().map(|&el| at(near_m, el)).collect();
+    let last: Vec<(f64, f64)> = elevation_rad.iter().map(|&el| at(far_m, el)).collect();
+    let mut series = vec![
+        Series::new(&format!("line of sight, every {DRAWN}th"), fan, Style::Line),
+        Series::new("first and last sample", recorded, Style::Dash),
+        Series::new("", last, Style::Dash),
+        Series::new("ground", vec![(0.0, 0.0), (1.05 * far_m, 0.0)], Style::Line),
+    ];
+    if let Flow::VortexPair(pair) = scene.flow {
+        let c = join::vortex_pair(&pair).centres(join::start_time_s(scene));
+        let centres = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
+        series.push(Series::new("vortices", centres, Style::Markers));
+    }
+    let plot = CurvePlot {
+        title: "Scan across the runway".into(),
+        x: Axis::linear("distance from the lidar [m]"),
+        y: Axis::linear("height [m]"),
+        series,
+    };
+    let figure = Figure::single(plot);
+    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    out.caption = format!(
+        "Vertical scan of {} lines of sight in steps of {} mrad; one in {DRAWN} is drawn.",
+        elevation_rad.len(),
+        1e3 * scene.scan.elevation_step_rad
+    );
+    Ok(out)
+}

@@ -1,0 +1,36 @@
+//! Table 1: ICAO separations, as distances and as times at approach speed.
+
+use super::{Claim, Context, Rendered};
+use crate::Failure;
+use wakescope_sim::export::Table;
+
+const NAUTICAL_MILE_M: f64 = 1852.0;
+const APPROACH_SPEED_M_S: f64 = 70.0;
+
+/// Leader, follower, separation in nautical miles, delay as the chapter prints it in seconds.
+const ROWS: [(&str, &str, f64, f64); 4] = [
+    ("heavy", "heavy", 4.0, 106.0),
+    ("heavy", "medium", 5.0, 132.0),
+    ("heavy", "light", 6.0, 159.0),
+    ("medium", "light", 5.0, 132.0),
+];
+
+pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
+    let delay_s = |miles: f64| miles * NAUTICAL_MILE_M / APPROACH_SPEED_M_S;
+    let table = Table::new()
+        .text("leader", ROWS.iter().map(|r| r.0))
+        .text("follower", ROWS.iter().map(|r| r.1))
+        .float("separation_m", ROWS.iter().map(|r| r.2 * NAUTICAL_MILE_M))
+        .float("delay_s", ROWS.iter().map(|r| delay_s(r.2)))
+        .float("delay_chapter_s", ROWS.iter().map(|r| r.3));
+    let mut out = Rendered::default();
+    let parameters = format!("approach_speed_m_s = {APPROACH_SPEED_M_S:?}\n");
+    out.csv(table.to_csv(&context.provenance_of_formula(&parameters))?);
+    out.caption = "Separations behind a landing aircraft (ICAO) and the time that they take at 70 m/s.".into();
+    let measured: Vec<String> = ROWS.iter().map(|r| format!("{:.1}", delay_s(r.2))).collect();
+    // The chapter prints whole seconds.
+    let pass = ROWS.iter().all(|r| (delay_s(r.2) - r.3).abs() <= 0.5);
+    let statement = "the delays follow from the distance at 70 m/s";
+    out.claims.push(Claim::exact("T1", "tab01", statement, "106, 132, 159, 132 s", format!("{} s", measured.join(", ")), pass));
+    Ok(out)
+}

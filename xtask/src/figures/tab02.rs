@@ -1,0 +1,45 @@
+//! Table 2: the lidar's parameters, read back from a scene that went through a file.
+
+use super::{Claim, Context, Rendered};
+use crate::Failure;
+use std::path::Path;
+use wakescope_sim::export::Table;
+use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::scene::{Scene, SceneFile, TABLE2_TOML};
+
+/// A row: name, value of the chapter, and where a scene has it.
+type Row = (&'static str, f64, fn(&Scene) -> f64);
+
+const ROWS: [Row; 11] = [
+    ("wavelength_m", 1.55e-6, |s| s.laser.wavelength_m),
+    ("pulse_energy_j", 150e-6, |s| s.pulse.energy_j),
+    ("detector_bandwidth_hz", 50e6, |s| s.detector.bandwidth_hz),
+    ("pulse_repetition_hz", 400.0, |s| s.laser.pulse_repetition_hz),
+    ("intermediate_frequency_hz", 80e6, |s| s.detector.intermediate_frequency_hz),
+    ("sampling_hz", 250e6, |s| s.detector.sampling_hz),
+    ("angular_resolution_rad", 1.25e-3, |s| s.scan.elevation_step_rad),
+    ("beam_radius_m", 0.03, |s| s.telescope.beam_radius_m),
+    ("aperture_radius_m", 0.05, |s| s.telescope.aperture_radius_m),
+    ("backscatter_per_m_sr", 1e-7, |s| s.atmosphere.backscatter_per_m_sr),
+    ("extinction_per_m", 7e-5, |s| s.atmosphere.extinction_per_m),
+];
+
+pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
+    let file = SceneFile::parse(TABLE2_TOML, Path::new("table2.toml"))?;
+    let plan = Plan::new(context.scene_file(file.scene)?, Target::Run)?;
+    // What counts is the scene as the run writes it down, not as it was read.
+    let back = SceneFile::parse(&plan.scene.toml, Path::new("scene.toml"))?.scene;
+    let values: Vec<f64> = ROWS.iter().map(|r| (r.2)(&back)).collect();
+    let table = Table::new()
+        .text("parameter", ROWS.iter().map(|r| r.0))
+        .float("chapter", ROWS.iter().map(|r| r.1))
+        .float("scene", values.iter().copied());
+    let mut out = Rendered::default();
+    out.csv(table.to_csv(&wakescope_sim::write::provenance(&plan))?);
+    out.caption = "The chapter's Table 2 and the same parameters in the scene that a run writes beside its results.".into();
+    let equal = ROWS.iter().zip(&values).filter(|(r, v)| r.1 == **v).count();
+    let statement = "the scene that is run has the parameters of Table 2";
+    let expected = format!("{} of {0} equal", ROWS.len());
+    out.claims.push(Claim::exact("T2", "tab02", statement, &expected, format!("{equal} of {} equal", ROWS.len()), equal == ROWS.len()));
+    Ok(out)
+}

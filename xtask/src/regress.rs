@@ -1,0 +1,67 @@
+//! `cargo xtask regress`: what the crates compute now against the curves stored in
+//! `tests/reference/`, as a table of name, error, tolerance, run time and verdict.
+
+use crate::curves::{ALL, Comparison, Curve};
+use crate::workspace::root;
+use crate::{Failure, Outcome};
+use std::time::Instant;
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Compare only the curves whose name contains this.
+    #[arg(long, value_name = "WORD")]
+    only: Option<String>,
+}
+
+/// Compares all curves; on failure draws stored and computed curve over one another.
+///
+/// # Errors
+/// When a curve is out of tolerance or cannot be read or computed.
+pub(crate) fn run(options: &Options) -> Outcome {
+    let wanted = |c: &&Curve| options.only.as_ref().is_none_or(|word| c.name.contains(word.as_str()));
+    println!("{:<34} {:>6} {:>11} {:>11} {:>9}  verdict", "curve", "points", "error", "tolerance", "time");
+    let mut failed = Vec::new();
+    for curve in ALL.iter().filter(wanted) {
+        let start = Instant::now();
+        let compared = curve.compare();
+        let time_s = start.elapsed().as_secs_f64();
+        match compared {
+            Ok(c) => {
+                let verdict = if c.passes(curve) { "pass" } else { "FAIL" };
+                println!(
+                    "{:<34} {:>6} {:>11.3e} {:>11.1e} {:>7.3} s  {verdict}, worst at {} = {}",
+                    curve.name, c.x.len(), c.worst_error, curve.tolerance, time_s, curve.x, c.x[c.worst]
+                );
+                if !c.passes(curve) {
+                    failed.push(curve.name);
+                    println!("{:<34} see {}", "", draw(curve, &c)?);
+                }
+            }
+            Err(failure) => {
+                println!("{:<34} {:>6} {:>11} {:>11} {time_s:>7.3} s  ERROR: {failure}", curve.name, "", "", "");
+                failed.push(curve.name);
+            }
+        }
+    }
+    if failed.is_empty() { Ok(()) } else { Err(Failure::new(format!("regress: out of tolerance: {}", failed.join(", ")))) }
+}
+
+fn draw(curve: &Curve, c: &Comparison) -> Result<String, Failure> {
+    let points = |y: &[f64]| c.x.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
+    let plot = CurvePlot {
+        title: curve.name.into(),
+        x: Axis::linear(curve.x),
+        y: Axis::linear(curve.y),
+        series: vec![
+            Series::new("stored", points(&c.stored), Style::Line),
+            Series::new("computed", points(&c.computed), Style::Dash),
+        ],
+    };
+    let folder = root().join("target/regress");
+    std::fs::create_dir_all(&folder)?;
+    let path = folder.join(format!("{}.svg", curve.name.replace('/', "_")));
+    std::fs::write(&path, Figure::single(plot).svg()?)?;
+    Ok(path.display().to_string())
+}

@@ -1,0 +1,141 @@
+//! `cargo xtask reproduce-figs`: draws the figures, measures the claims, writes one report.
+//!
+//! Each figure is written as soon as it is made, and kept in a cache whose key is the content of
+//! this program, the figure, the profile and the seed: a second run draws only what has changed,
+//! and an interrupted one goes on where it was.
+
+mod cache;
+mod report;
+
+use crate::figures::{self, Claim, Context, Figure, Profile, Rendered, Verdict};
+use crate::workspace::root;
+use crate::{Failure, Outcome};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use wakescope_sim::export::{FileGroup, Table, write_atomic};
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Numbers of the figures to draw, such as 1,5; the default is all.
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    only: Vec<u32>,
+    /// Resolution and sample counts.
+    #[arg(long, value_enum, default_value_t = Profile::Quick)]
+    profile: Profile,
+    /// Folder to write to.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Seed of every random number.
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
+    seed: u64,
+    /// Threads to compute with; the default is one for each core. Results do not depend on it.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    threads: usize,
+    /// Draw everything anew.
+    #[arg(long)]
+    no_cache: bool,
+}
+
+/// Runs the task.
+///
+/// # Errors
+/// Unknown figure, unusable output, or a figure that cannot be computed. A failed claim is no error.
+pub(crate) fn run(options: &Options) -> Outcome {
+    let chosen = choose(&options.only)?;
+    let out = options.out.clone().unwrap_or_else(|| root().join("target/figures"));
+    std::fs::create_dir_all(&out).map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
+    let context = Context { profile: options.profile, seed: options.seed };
+    let cache = cache::Cache::new(&context)?;
+    let bar = progress_bar(chosen.len() as u64);
+
+    let mut done = Vec::new();
+    for figure in chosen {
+        bar.set_message(figure.id);
+        let cached = if options.no_cache { None } else { cache.load(figure.id) };
+        let from_cache = cached.is_some();
+        let rendered = match cached {
+            Some(rendered) => rendered,
+            None => {
+                let start = Instant::now();
+                let mut rendered = pool.install(|| (figure.make)(&context))?;
+                rendered.timings.push(("total".into(), start.elapsed().as_secs_f64()));
+                cache.store(figure.id, &rendered)?;
+                rendered
+            }
+        };
+        write_figure(&out, figure, &rendered)?;
+        bar.inc(1);
+        bar.println(format!("{}{}: {}", figure.id, if from_cache { " (cached)" } else { "" }, figure.title));
+        done.push((figure, rendered));
+    }
+    bar.finish_and_clear();
+    finish(&out, &context, &done)
+}
+
+fn choose(only: &[u32]) -> Result<Vec<&'static Figure>, Failure> {
+    let numbers: Vec<u32> = figures::ALL.iter().map(|f| f.number).collect();
+    if let Some(unknown) = only.iter().find(|n| !numbers.contains(n)) {
+        return Err(Failure::new(format!("--only {unknown}: there are {numbers:?}")));
+    }
+    Ok(figures::ALL.iter().filter(|f| only.is_empty() || only.contains(&f.number)).collect())
+}
+
+fn progress_bar(length: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template("[{bar:32}] {pos}/{len} {msg}  {elapsed} gone, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(length).with_style(style);
+    bar.enable_steady_tick(std::time::Duration::from_millis(250));
+    bar
+}
+
+fn write_figure(out: &Path, figure: &Figure, rendered: &Rendered) -> Outcome {
+    let mut group = FileGroup::new(out);
+    for (extension, bytes) in &rendered.files {
+        group.add(&format!("{}.{extension}", figure.id), bytes.clone())?;
+    }
+    group.commit()?;
+    Ok(())
+}
+
+/// Writes the tables over all figures and the report, and says what the claims came to.
+fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)]) -> Outcome {
+    let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
+    write_atomic(&out.join("claims.csv"), claims_table(&claims).to_csv(&context.provenance_of_run())?)?;
+    let timings: Vec<(&str, &str, f64)> = done
+        .iter()
+        .flat_map(|(f, r)| r.timings.iter().map(|(stage, s)| (f.id, stage.as_str(), *s)))
+        .collect();
+    let table = Table::new()
+        .text("figure", timings.iter().map(|t| t.0))
+        .text("stage", timings.iter().map(|t| t.1))
+        .float("wall_s", timings.iter().map(|t| t.2));
+    write_atomic(&out.join("timings.csv"), table.to_csv(&context.provenance_of_run())?)?;
+    write_atomic(&out.join("index.html"), report::html(context, done)?)?;
+    for claim in &claims {
+        println!("{claim}");
+    }
+    let count = |v: Verdict| claims.iter().filter(|c| c.verdict == v).count();
+    println!(
+        "{} claims pass, {} fail, {} not resolved; report: {}",
+        count(Verdict::Pass),
+        count(Verdict::Fail),
+        count(Verdict::NotResolved),
+        out.join("index.html").display()
+    );
+    Ok(())
+}
+
+fn claims_table(claims: &[&Claim]) -> Table {
+    let text = |get: fn(&Claim) -> String| claims.iter().map(|c| get(c)).collect::<Vec<_>>();
+    Table::new()
+        .text("id", text(|c| c.id.to_owned()))
+        .text("figure", text(|c| c.figure.to_owned()))
+        .text("statement", text(|c| c.statement.clone()))
+        .text("expected", text(|c| c.expected.clone()))
+        .text("measured", text(|c| c.measured.clone()))
+        .float("standard_error", claims.iter().map(|c| c.standard_error))
+        .text("verdict", text(|c| c.verdict.name().to_owned()))
+}

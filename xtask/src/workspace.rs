@@ -1,0 +1,29 @@
+//! The files of the workspace.
+
+use crate::Failure;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The root folder of the workspace.
+pub(crate) fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new(".")).to_owned()
+}
+
+/// The text of a file, by its path from the root.
+pub(crate) fn read(file: &str) -> Result<String, Failure> {
+    std::fs::read_to_string(root().join(file)).map_err(|e| Failure::new(format!("cannot read {file}: {e}")))
+}
+
+/// Paths, from the root, of the files that git tracks or would track.
+pub(crate) fn tracked_files() -> Result<Vec<String>, Failure> {
+    let out = Command::new("git")
+        .args(["ls-files", "--cached", "--others", "--exclude-standard"])
+        .current_dir(root())
+        .output()
+        .map_err(|e| Failure::new(format!("cannot run git: {e}")))?;
+    if !out.status.success() {
+        return Err(Failure::new("git ls-files failed: tidy needs a git checkout".into()));
+    }
+    let text = String::from_utf8_lossy(&out.stdout);
+    Ok(text.lines().filter(|f| root().join(f).exists()).map(str::to_owned).collect())
+}
