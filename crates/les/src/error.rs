@@ -43,14 +43,18 @@ pub enum Error {
         value_m: f64,
     },
     /// Two neighbouring cells differ so much that the index coordinate is not monotone between them.
-    #[error("the {axis} cell {index} is {ratio} times narrower than a neighbour: at most 5 is allowed")]
+    #[error(
+        "the cells beside node {index} of the {axis} axis differ by a factor {ratio}: at most {allowed} is allowed"
+    )]
     StretchTooAbrupt {
         /// `"y"` or `"z"`.
         axis: &'static str,
-        /// Index of the narrower cell, counted from the first node.
+        /// Index of the node between the two cells.
         index: usize,
-        /// Width of the neighbour over the width of this cell.
+        /// Width of the wider cell over that of the narrower.
         ratio: f64,
+        /// Largest ratio allowed there: 5, or 2.5 towards an open end.
+        allowed: f64,
     },
     /// The number of velocities is not the number of nodes.
     #[error("{found} velocities for a mesh of {nodes_y} x {nodes_z} nodes: one per node is needed")]

@@ -29,18 +29,27 @@
 //! | `wind` | the trait [`Wind`]; [`Calm`], [`Uniform`], [`Sum`] |
 //! | `profile` | circulation against radius of one vortex, (3), (4) |
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
+//! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
+//! | `axis` | one direction of a mesh: stretching, walls, periods |
+//! | `kernel` | the M'4 kernel, (27) |
 //! | `diagnose` | circulation on circles, (1), and `Gamma_5-15` |
 //!
 //! No optional features.
 
+mod axis;
 mod diagnose;
 mod error;
+mod grid_wind;
+mod kernel;
 mod profile;
 mod vortex;
 mod wind;
 
+pub use axis::{Edges, Side};
 pub use diagnose::{circulation_m2_s, mean_circulation_5_15_m2_s};
 pub use error::Error;
+pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
+pub use kernel::{m4_prime, m4_prime_weights};
 pub use profile::CirculationProfile;
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};
 pub use wind::{Calm, Sum, Uniform, Wind};
