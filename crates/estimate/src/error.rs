@@ -51,6 +51,16 @@ pub enum Error {
         /// Length that was given.
         found: usize,
     },
+    /// A matrix cannot be inverted or diagonalised.
+    #[error("{what} of order {order} {reason}")]
+    Linalg {
+        /// Name of the matrix.
+        what: &'static str,
+        /// Its order.
+        order: usize,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
 }
 
 /// Checks that a number is finite and positive.

@@ -33,16 +33,33 @@
 //! | `correlogram`, `spectrum` | biased correlogram and the density that belongs to it |
 //! | `velocity`, `statistic` | peak search with flags; the traits for estimators of one's own |
 //! | `region`, `accumulate` | circular regions, accumulation level and n_eff; Table 3 |
+//! | `likelihood` | tapers that make the accumulated periodogram the likelihood of a known pulse |
+//! | `bound`, `linalg` | Cramer-Rao bound; solve and eigenvectors with residual checks |
 //! | `error_map` | bias, standard deviation, root mean square with standard errors, (33) |
 //!
-//! Features: `rayon` (default) works on lines of sight and map points in the caller's thread pool; the
-//! bits of the result do not depend on it.
+//! Features:
+//! - `rayon` (default) works on lines of sight and map points in the caller's thread pool; the bits of the result
+//!   do not depend on it.
+//! - `bundled-lapack` (default) defines the few LAPACK symbols that `ndarray-linalg` calls here, in Rust. They are for
+//!   matrices of the order of a window, not a general LAPACK. A program that also links a real LAPACK
+//!   takes this crate without default features, else two definitions of one symbol meet; with neither of the two
+//!   features such a library must be there at link time.
+//! - `openblas-system` links a system OpenBLAS instead; the build stops with the remedy if there is none.
 
 mod accumulate;
+mod bound;
 mod correlogram;
+#[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
+mod dense;
 mod error;
 mod error_map;
 mod gates;
+#[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
+mod lapack;
+mod likelihood;
+mod linalg;
+#[cfg(feature = "openblas-system")]
+mod openblas;
 mod parallel;
 mod periodogram;
 mod region;
@@ -55,10 +72,12 @@ mod velocity;
 mod weighting;
 
 pub use accumulate::{MapPoint, Radius, Scan};
+pub use bound::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s};
 pub use correlogram::{Correlogram, Taper, correlogram_by_sum};
 pub use error::Error;
 pub use error_map::{ErrorMap, ErrorStatistics};
 pub use gates::Gates;
+pub use likelihood::likelihood_tapers;
 pub use periodogram::{Periodogram, PeriodogramOptions, PeriodogramPlan};
 pub use region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, polar_points};
 pub use sample::{Sample, Scratch, SignalKind};

@@ -1,0 +1,166 @@
+//! The bound against a stored curve, a closed form and difference quotients.
+
+#![allow(clippy::unwrap_used)]
+
+use approx::assert_relative_eq;
+use ndarray::Array2;
+use num_complex::Complex;
+use wakescope_estimate::*;
+
+fn table_2() -> Sampling {
+    Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap()
+}
+
+fn sigma_s(full_width_s: f64) -> f64 {
+    full_width_s / (2.0 * 2.0_f64.ln().sqrt())
+}
+
+#[test]
+fn bound_of_a_200_ns_pulse_is_the_stored_curve_from_minus_40_to_60_db() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/signal/crlb_200ns.csv");
+    let text = std::fs::read_to_string(path).unwrap();
+    let model = |sigma_s: f64| WindowModel::gaussian_pulse(&table_2(), 64, sigma_s, Noise::White).unwrap();
+    let columns = [
+        (model(sigma_s(200e-9)), SignalKind::Complex),
+        (model(sigma_s(200e-9)), SignalKind::Real),
+        (model(100e-9), SignalKind::Complex),
+        (model(200e-9), SignalKind::Complex),
+    ];
+    let mut rows = 0;
+    for line in text.lines().filter(|line| line.starts_with(|c: char| c == '-' || c.is_ascii_digit())) {
+        let fields: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
+        let snr = 10.0_f64.powf(fields[0] / 10.0);
+        for ((model, kind), expected_m_s) in columns.iter().zip(&fields[1..]) {
+            let found_m_s = model.bound_m_s(0.0, snr, *kind, 1.0).unwrap();
+            // the curve is printed with 8 digits
+            let digit = 10.0_f64.powf(expected_m_s.log10().floor() - 7.0);
+            let error = (found_m_s - expected_m_s).abs();
+            assert!(error <= 1e-8 * expected_m_s + 0.5 * digit, "{} dB {kind}: {found_m_s} {expected_m_s}", fields[0]);
+        }
+        rows += 1;
+    }
+    assert_eq!(rows, 41);
+}
+
+#[test]
+fn independent_windows_lower_the_bound_by_the_root_of_their_number() {
+    let model = WindowModel::gaussian_pulse(&table_2(), 64, sigma_s(200e-9), Noise::White).unwrap();
+    for kind in [SignalKind::Real, SignalKind::Complex] {
+        let one_m_s = model.bound_m_s(1.0, 3.0, kind, 1.0).unwrap();
+        let many_m_s = model.bound_m_s(1.0, 3.0, kind, 7.5).unwrap();
+        assert_relative_eq!(many_m_s, one_m_s / 7.5_f64.sqrt(), max_relative = 1e-13);
+    }
+}
+
+#[test]
+fn complex_bound_does_not_depend_on_velocity_and_the_real_one_hardly() {
+    let model = WindowModel::gaussian_pulse(&table_2(), 64, sigma_s(200e-9), Noise::White).unwrap();
+    let at = |velocity_m_s: f64, kind| model.bound_m_s(velocity_m_s, 10.0, kind, 1.0).unwrap();
+    for velocity_m_s in [-15.0, 3.0, 18.0] {
+        assert_relative_eq!(at(velocity_m_s, SignalKind::Complex), at(0.0, SignalKind::Complex), max_relative = 1e-9);
+        assert_relative_eq!(at(velocity_m_s, SignalKind::Real), at(0.0, SignalKind::Real), max_relative = 1e-2);
+    }
+}
+
+#[test]
+fn band_noise_lowers_the_bound_by_one_to_eleven_percent() {
+    for full_width_s in [200e-9, 400e-9] {
+        for snr in [0.1, 1.0, 10.0, 100.0] {
+            let at = |noise| {
+                WindowModel::gaussian_pulse(&table_2(), 64, sigma_s(full_width_s), noise)
+                    .unwrap()
+                    .bound_m_s(0.0, snr, SignalKind::Real, 1.0)
+                    .unwrap()
+            };
+            let ratio = at(Noise::Band { floor: 0.01 }) / at(Noise::White);
+            assert!((0.85..0.999).contains(&ratio), "{snr}: {ratio}");
+            assert_relative_eq!(at(Noise::Band { floor: 1.0 }), at(Noise::White), max_relative = 1e-9);
+        }
+    }
+}
+
+#[test]
+fn point_target_bound_is_its_closed_form() {
+    // R = u u^H + q I: information per (m/s)^2 = 2 gain^2 / (1 + gain) * spread * (4 pi / lambda)^2, with gain = |u|^2 / q and
+    // spread the variance of time weighted by |u|^2
+    let amplitude: Vec<f64> = (0..64).map(|n| (-((n as f64 - 20.0) / 17.0).powi(2)).exp()).collect();
+    let model = WindowModel::point_target(&table_2(), &amplitude, Noise::White).unwrap();
+    let energy: f64 = amplitude.iter().map(|a| a * a).sum();
+    let moment =
+        |p: i32| amplitude.iter().enumerate().map(|(n, a)| a * a * (n as f64 / 250e6).powi(p)).sum::<f64>() / energy;
+    let spread = moment(2) - moment(1).powi(2);
+    for snr in [0.1, 1.0, 100.0] {
+        let gain = 64.0 * snr * 50e6 / 250e6;
+        let wave = 4.0 * std::f64::consts::PI / 1.55e-6;
+        let expected_m_s = (2.0 * gain * gain / (1.0 + gain) * spread * wave * wave).sqrt().recip();
+        let found_m_s = model.bound_m_s(2.0, snr, SignalKind::Complex, 1.0).unwrap();
+        assert_relative_eq!(found_m_s, expected_m_s, max_relative = 1e-9);
+    }
+}
+
+#[test]
+fn derivative_of_the_covariance_is_its_difference_quotient_with_sign() {
+    let model = WindowModel::gaussian_pulse(&table_2(), 16, sigma_s(200e-9), Noise::Band { floor: 0.1 }).unwrap();
+    for kind in [SignalKind::Real, SignalKind::Complex] {
+        let at = |velocity_m_s: f64| model.covariance(velocity_m_s, 2.0, kind).unwrap();
+        let [_, derivative] = at(3.0);
+        let quotient = (&at(3.001)[0] - &at(2.999)[0]).mapv(|value| value / 0.002);
+        for (a, b) in derivative.iter().zip(&quotient) {
+            assert!((a - b).norm() < 1e-6);
+        }
+    }
+    // v > 0 lowers the frequency: the phase between neighbouring samples falls with v
+    let complex = WindowModel::gaussian_pulse(&table_2(), 2, 1.0, Noise::White).unwrap();
+    let phase =
+        |velocity_m_s: f64| complex.covariance(velocity_m_s, 1.0, SignalKind::Complex).unwrap()[0][[1, 0]].arg();
+    assert_relative_eq!(phase(1.0) - phase(0.0), -std::f64::consts::TAU * 2.0 / 1.55e-6 / 250e6, max_relative = 1e-9);
+}
+
+#[test]
+fn noise_power_in_the_band_follows_from_the_snr() {
+    // white: (250/50)/SNR for complex, (125/50)/SNR for real samples; band: 1/SNR for both
+    let power = |noise, kind| {
+        let model = WindowModel::gaussian_pulse(&table_2(), 8, 1e-7, noise).unwrap();
+        let [covariance, _] = model.covariance(0.0, 4.0, kind).unwrap();
+        covariance[[3, 3]].re - 1.0
+    };
+    assert_relative_eq!(power(Noise::White, SignalKind::Complex), 1.25, max_relative = 1e-12);
+    assert_relative_eq!(power(Noise::White, SignalKind::Real), 0.625, max_relative = 1e-12);
+    for kind in [SignalKind::Real, SignalKind::Complex] {
+        assert_relative_eq!(power(Noise::Band { floor: 0.0 }, kind), 0.25, max_relative = 1e-12);
+    }
+}
+
+#[test]
+fn any_covariance_is_accepted_and_impossible_ones_are_refused() {
+    let identity = Array2::<Complex<f64>>::eye(3);
+    let zero = Array2::<Complex<f64>>::zeros((3, 3));
+    // nothing depends on velocity
+    assert!(bound_complex_m_s(identity.view(), zero.view(), 1.0).is_err());
+    // singular
+    assert!(bound_complex_m_s(zero.view(), identity.view(), 1.0).is_err());
+    // scale: R = I, dR = s I gives 1 / (s sqrt(n))
+    let scaled = identity.mapv(|value| value * 2.0);
+    assert_relative_eq!(
+        bound_complex_m_s(identity.view(), scaled.view(), 1.0).unwrap(),
+        1.0 / 12.0_f64.sqrt(),
+        max_relative = 1e-14
+    );
+    let real = Array2::<f64>::eye(3);
+    assert_relative_eq!(
+        bound_real_m_s(real.view(), (2.0 * &real).view(), 1.0).unwrap(),
+        1.0 / 6.0_f64.sqrt(),
+        max_relative = 1e-14
+    );
+    assert!(bound_real_m_s(real.view(), real.view(), 0.0).is_err());
+    let mut skew = real.clone();
+    skew[[0, 1]] = 0.5;
+    assert!(bound_real_m_s(skew.view(), real.view(), 1.0).is_err());
+    let sampling = table_2();
+    assert!(WindowModel::gaussian_pulse(&sampling, 0, 1e-7, Noise::White).is_err());
+    assert!(WindowModel::gaussian_pulse(&sampling, 8, f64::NAN, Noise::White).is_err());
+    assert!(WindowModel::gaussian_pulse(&sampling, 8, 1e-7, Noise::Band { floor: 2.0 }).is_err());
+    assert!(WindowModel::point_target(&sampling, &[0.0; 4], Noise::White).is_err());
+    let model = WindowModel::gaussian_pulse(&sampling, 8, 1e-7, Noise::White).unwrap();
+    assert!(model.bound_m_s(0.0, 0.0, SignalKind::Real, 1.0).is_err());
+}
