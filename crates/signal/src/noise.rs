@@ -125,9 +125,9 @@ impl BandNoise {
     }
 }
 
-/// Smallest even product of powers of 2, 3 and 5 that is at least `least` (and 16).
+/// Smallest even product of powers of 2, 3 and 5 that is at least `least` (and 512, so that the band of a short record is resolved).
 fn smooth_even_length(least: usize) -> usize {
-    let mut length = least.max(16).next_multiple_of(2);
+    let mut length = least.max(512).next_multiple_of(2);
     loop {
         let mut rest: usize = length;
         for factor in [2, 3, 5] {
