@@ -32,9 +32,14 @@ pub mod hankel;
 mod overlap;
 mod quadrature;
 pub mod snr;
+pub mod spectrum;
+pub mod structure;
 pub mod theory;
+pub mod turbulence;
 
 pub use beam::{Focus, Misalignment, RadiusDefinition, Telescope};
 pub use efficiency::EfficiencyProfile;
 pub use error::Error;
 pub use snr::{PlanckConvention, SnrModel};
+pub use spectrum::{HillAndrews, OuterScaleConvention, Spectrum, VonKarman};
+pub use turbulence::{Cn2Path, Turbulence};

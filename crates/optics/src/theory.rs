@@ -6,8 +6,11 @@
 
 use crate::Error;
 use crate::beam::{Misalignment, Telescope};
-use crate::error::positive;
+use crate::error::{not_negative, positive};
 use crate::overlap::efficiency_with;
+use crate::quadrature::GaussLegendre;
+use crate::structure::StructureTable;
+use crate::turbulence::{self, Cn2Path, Turbulence};
 use std::f64::consts::PI;
 
 /// Free-space efficiency eta_s (19) of a matched, aligned pair at `range_m`, by pupil overlap.
@@ -65,4 +68,172 @@ pub(crate) fn untruncated_radius2_m2(telescope: &Telescope, range_m: f64) -> f64
     let geometric = s * (1.0 - range_m * telescope.focus.curvature_per_m());
     let diffraction = range_m / (telescope.wavenumber_rad_m() * s);
     geometric * geometric + diffraction * diffraction
+}
+
+/// One phase screen of a simulated path, for [`bistatic_efficiency_screens`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScreenStrength {
+    /// Distance of the screen from the telescope [m].
+    pub position_m: f64,
+    /// Cn2 of its layer times the thickness of the layer [m^(1/3)].
+    pub cn2_thickness_m13: f64,
+}
+
+/// Mean bistatic efficiency (19) on independent paths through turbulence: exact at any strength (Markov approximation).
+///
+/// The spherical-wave structure function is D(rho) = k^2 integral of Cn2(z) G(rho (1 - z/R)) dz over the path.
+///
+/// # Errors
+/// [`Error`] for arguments that are not allowed or a quadrature that fails.
+pub fn bistatic_efficiency(
+    telescope: &Telescope,
+    misalignment: &Misalignment,
+    turbulence: &Turbulence,
+    range_m: f64,
+) -> Result<f64, Error> {
+    let table = StructureTable::new(&*turbulence.spectrum);
+    bistatic_efficiency_with(telescope, misalignment, &turbulence.cn2, &table, range_m)
+}
+
+/// As [`bistatic_efficiency`], with the structure function tabulated beforehand (a table serves all ranges).
+///
+/// # Errors
+/// As [`bistatic_efficiency`].
+pub fn bistatic_efficiency_with(
+    telescope: &Telescope,
+    misalignment: &Misalignment,
+    cn2: &Cn2Path,
+    table: &StructureTable,
+    range_m: f64,
+) -> Result<f64, Error> {
+    let cn2 = cn2.clone().validated()?;
+    let range_m = positive("range_m", range_m)?;
+    if cn2.is_none() {
+        return free_space_efficiency_misaligned(telescope, misalignment, range_m);
+    }
+    let k2 = telescope.validated()?.wavenumber_rad_m().powi(2);
+    let rule = GaussLegendre::new(16);
+    let panels = if matches!(cn2, Cn2Path::Uniform { .. }) { 1 } else { 8 };
+    let mut weights = Vec::new();
+    for panel in 0..panels {
+        let h = range_m / f64::from(panels);
+        let start = h * f64::from(panel);
+        for (z, dz) in rule.mapped(start, start + h) {
+            weights.push((1.0 - z / range_m, k2 * cn2.at(z)? * dz));
+        }
+    }
+    efficiency_with(telescope, misalignment, range_m, &|rho| weights.iter().map(|(g, w)| w * table.at(rho * g)).sum())
+}
+
+/// Mean bistatic efficiency (19) for the very screens of a simulated path: no modelling gap between this number and a
+/// Monte Carlo with these screens. Screens at or beyond `range_m` do not count.
+///
+/// # Errors
+/// As [`bistatic_efficiency`].
+pub fn bistatic_efficiency_screens(
+    telescope: &Telescope,
+    misalignment: &Misalignment,
+    screens: &[ScreenStrength],
+    table: &StructureTable,
+    range_m: f64,
+) -> Result<f64, Error> {
+    let range_m = positive("range_m", range_m)?;
+    let k2 = telescope.validated()?.wavenumber_rad_m().powi(2);
+    let mut weights = Vec::new();
+    for screen in screens {
+        let strength = not_negative("cn2_thickness_m13", screen.cn2_thickness_m13)?;
+        if not_negative("position_m", screen.position_m)? < range_m {
+            weights.push((1.0 - screen.position_m / range_m, k2 * strength));
+        }
+    }
+    efficiency_with(telescope, misalignment, range_m, &|rho| weights.iter().map(|(g, w)| w * table.at(rho * g)).sum())
+}
+
+/// Closed form of the bistatic efficiency for an untruncated beam, square-law structure function, l0 = 0, L0 infinite
+/// (Frehlich and Kavaya 1991): sigma_R^2 -> s^2 (1 - R/F)^2 + (R/(k s))^2 + (2 R/(k rho_0))^2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeakTurbulence {
+    /// Bistatic efficiency of the closed form.
+    pub bistatic: f64,
+    /// First-order monostatic enhancement (1 + sigma_I^2) times the bistatic value, sigma_I^2 taken as the Rytov variance
+    /// of a spherical wave, 0.4 times that of a plane wave: an estimate of its size.
+    pub monostatic: f64,
+    /// Rytov variance of a plane wave over the path.
+    pub rytov_variance: f64,
+    /// Whether the Rytov variance is below 0.3, where the closed form holds for the monostatic value.
+    pub valid: bool,
+}
+
+/// The closed form [`WeakTurbulence`] for a constant Cn2.
+///
+/// # Errors
+/// [`Error::OutOfRange`] names the argument that is not allowed.
+pub fn weak_turbulence_efficiency(
+    telescope: &Telescope,
+    cn2_m_m23: f64,
+    range_m: f64,
+) -> Result<WeakTurbulence, Error> {
+    let free = untruncated_efficiency(telescope, range_m)?;
+    let rytov_variance = turbulence::rytov_variance(cn2_m_m23, telescope.wavelength_m, range_m)?;
+    let rho_0 = turbulence::coherence_radius_m(cn2_m_m23, telescope.wavelength_m, range_m)?;
+    let width2 = untruncated_radius2_m2(telescope, range_m);
+    let spread = 2.0 * range_m / (telescope.wavenumber_rad_m() * rho_0);
+    let bistatic = free * width2 / (width2 + spread * spread);
+    Ok(WeakTurbulence {
+        bistatic,
+        monostatic: bistatic * (1.0 + 0.4 * rytov_variance),
+        rytov_variance,
+        valid: rytov_variance < 0.3,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Focus, RadiusDefinition};
+
+    #[test]
+    fn square_law_quadrature_gives_the_closed_form() {
+        // An aperture of ten radii and a quadratic structure function 2 (rho/rho_0)^2 are what the closed form assumes.
+        let t = Telescope::new(1.55e-6, 0.2, 0.02, RadiusDefinition::Intensity, Focus::At(700.0)).unwrap();
+        let (cn2, range_m) = (3e-14, 1200.0);
+        let closed = weak_turbulence_efficiency(&t, cn2, range_m).unwrap();
+        let rho_0 = turbulence::coherence_radius_m(cn2, 1.55e-6, range_m).unwrap();
+        let exact = efficiency_with(&t, &Misalignment::NONE, range_m, &|rho| 2.0 * (rho / rho_0).powi(2)).unwrap();
+        assert!((closed.bistatic / exact - 1.0).abs() < 1e-9);
+        assert!(closed.bistatic < untruncated_efficiency(&t, range_m).unwrap());
+    }
+
+    #[test]
+    fn kolmogorov_path_has_three_eighths_of_the_plane_wave_structure_function() {
+        // exp(-D) with D = 2 (rho/rho_0)^(5/3), through the integral over the path.
+        let t = Telescope::chapter();
+        let turbulence = Turbulence {
+            spectrum: std::sync::Arc::new(crate::spectrum::VonKarman::kolmogorov()),
+            cn2: Cn2Path::Uniform { cn2_m_m23: 1e-13 },
+        };
+        let path = bistatic_efficiency(&t, &Misalignment::NONE, &turbulence, 1500.0).unwrap();
+        let rho_0 = turbulence::coherence_radius_m(1e-13, 1.55e-6, 1500.0).unwrap();
+        let law = efficiency_with(&t, &Misalignment::NONE, 1500.0, &|rho| 2.0 * (rho / rho_0).powf(5.0 / 3.0)).unwrap();
+        assert!((path / law - 1.0).abs() < 2e-4, "{path} {law}");
+    }
+
+    #[test]
+    fn many_screens_tend_to_the_continuous_path() {
+        let t = Telescope::chapter();
+        let turbulence = Turbulence::chapter(1e-13).unwrap();
+        let table = StructureTable::new(&*turbulence.spectrum);
+        let exact = bistatic_efficiency(&t, &Misalignment::NONE, &turbulence, 1000.0).unwrap();
+        let screens = |n: usize, shift: f64| -> f64 {
+            let dz = 1000.0 / n as f64;
+            let list: Vec<_> = (0..n)
+                .map(|i| ScreenStrength { position_m: (i as f64 + shift) * dz, cn2_thickness_m13: 1e-13 * dz })
+                .collect();
+            bistatic_efficiency_screens(&t, &Misalignment::NONE, &list, &table, 1000.0).unwrap() / exact - 1.0
+        };
+        // Mid-layer screens are second order; screens at the start of the layer overweight the turbulence near the lidar.
+        assert!(screens(10, 0.5).abs() < 2e-3, "{}", screens(10, 0.5));
+        assert!(screens(40, 0.5).abs() < 2e-4);
+        assert!((screens(10, 0.0) + 0.067).abs() < 0.005, "{}", screens(10, 0.0));
+    }
 }
