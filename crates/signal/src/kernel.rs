@@ -5,8 +5,6 @@
 //!
 //! Check: the tests of `heterodyne` against the literal sum.
 
-// The attribute generates the run-time choice of the compiled version, which is unsafe code that its crate answers for.
-#![allow(unsafe_code)]
 
 use multiversion::multiversion;
 
