@@ -5,7 +5,6 @@
 //!
 //! Check: the tests of `heterodyne` against the literal sum.
 
-
 use multiversion::multiversion;
 
 /// Sums that run side by side: two AVX-512 registers, four AVX2, eight SSE2.
