@@ -15,7 +15,9 @@ pub fn cf_signals_bytes(signals: &RawSignals, provenance: &Provenance) -> Output
     let (rays, samples) = signals.current_a.dim();
     let ray_numbers: Vec<i32> = (0..rays as i32).collect();
     let variables = vec![
-        Variable::new("ray", &["ray"], Data::I32(ray_numbers)).text("long_name", "number of the pulse").text("units", "1"),
+        Variable::new("ray", &["ray"], Data::I32(ray_numbers))
+            .text("long_name", "number of the pulse")
+            .text("units", "1"),
         Variable::new("time", &["time"], Data::F64(signals.time_s.clone()))
             .text("long_name", "time after the middle of the pulse left the telescope")
             .text("units", "s"),

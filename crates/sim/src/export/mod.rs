@@ -38,6 +38,8 @@ pub mod vtr;
 
 pub use atomic::{FileGroup, write_atomic};
 pub use csv::Table;
+#[cfg(feature = "plots")]
+pub(crate) use error::same_length;
 pub use error::{OutputError, OutputResult};
 pub use map::{CrossPlanes, Field, FieldKind, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 pub use provenance::Provenance;

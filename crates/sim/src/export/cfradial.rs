@@ -1,0 +1,256 @@
+//! A scanned map as CfRadial 1.4 in classic NetCDF: rays along `time`, gates along `range`, sweeps of mode `rhi`.
+//! Opens in Py-ART (`pyart.io.read_cfradial`), xradar (`open_cfradial1_datatree(f, first_dim="time")`), wradlib, xarray, scipy.
+//! A simulation has no date: ray times count from 2024-01-01T00:00:00Z, the start of the flow.
+//! Check: the tests read the bytes back with an independent reader and hold them to the list that the clients need.
+
+use super::error::{OutputError, OutputResult};
+use super::map::{Field, FieldKind, Unit, VelocityMap};
+use super::netcdf::{Attr, Data, FILL, Layout, Variable};
+use super::provenance::Provenance;
+
+/// Length of all text variables; unused bytes are NUL, since blanks stay in the strings of xarray and Py-ART.
+const TEXT: usize = 32;
+/// Synthetic start of the flow.
+const EPOCH: &str = "2024-01-01T00:00:00Z";
+/// Ray times stay within the month of the epoch.
+const MAX_TIME_S: f64 = 31.0 * 86_400.0;
+
+/// The file's bytes.
+///
+/// `radial_velocity` is the estimate; a map without one gets a copy of the first of `v_gate`, `v_pulse`, `v_exact` under that name
+/// (its `comment` says so), because no client opens a file without it.
+///
+/// # Errors
+/// What [`VelocityMap::check`] finds, ray times outside 0 to 31 days, no velocity at all, a result too large for one file.
+pub fn cfradial_bytes(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    layout(map, provenance)?.to_bytes(provenance)
+}
+
+fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
+    map.check()?;
+    let outside = |t: &&f64| !(0.0..MAX_TIME_S).contains(*t);
+    let times: Vec<f64> = map.rays.iter().map(|r| r.time_s).collect();
+    if let Some(bad) = times.iter().find(outside) {
+        return Err(OutputError::value("ray time_s", bad, "0 to 31 days"));
+    }
+    let mut variables = axes(map, times);
+    variables.extend(site(map));
+    variables.extend(sweeps(map));
+    variables.extend(texts(map));
+    variables.extend(instrument(map));
+    variables.extend(fields(map)?);
+    Ok(Layout {
+        dims: vec![
+            ("time", map.rays.len()),
+            ("range", map.range_m.len()),
+            ("sweep", map.sweeps.len()),
+            ("string_length_32", TEXT),
+            ("frequency", 1),
+        ],
+        globals: globals(map, provenance),
+        variables,
+    })
+}
+
+fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, String)> {
+    let fixed = [
+        ("Conventions", "CF-1.7 CF/Radial instrument_parameters"),
+        ("version", "1.4"),
+        ("institution", "simulation, no institution"),
+        ("references", "CfRadial data file format, version 1.4, NCAR (2016)"),
+        (
+            "comment",
+            "Simulated measurement: date, latitude and longitude are synthetic; velocity is positive away from the lidar",
+        ),
+        ("instrument_name", "wakescope lidar"),
+        ("site_name", "simulated runway"),
+        ("scan_name", "rhi"),
+        ("platform_is_mobile", "false"),
+        ("n_gates_vary", "false"),
+        ("ray_times_increase", "true"),
+        ("simulated", "true"),
+    ];
+    let made = [("title", map.title.clone()), ("history", format!("written by {}", provenance.program))];
+    let fixed = fixed.map(|(name, text)| (name, text.to_owned()));
+    fixed.into_iter().chain(made).collect()
+}
+
+fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
+    let gates = &map.range_m;
+    let spacing = if gates.len() > 1 { gates[1] - gates[0] } else { 0.0 };
+    // Gate centres come from sums and products of a few terms: equal to a part in 1e6 is constant.
+    let constant = gates.windows(2).all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
+    let degrees =
+        |angle: fn(&super::map::Ray) -> f64| Data::F32(map.rays.iter().map(|r| angle(r).to_degrees() as f32).collect());
+    vec![
+        Variable::new("time", &["time"], Data::F64(times))
+            .text("standard_name", "time")
+            .text("long_name", "time since the start of the flow")
+            .text("units", &format!("seconds since {EPOCH}"))
+            .text("calendar", "gregorian"),
+        Variable::new("range", &["range"], single(gates))
+            .text("standard_name", "projection_range_coordinate")
+            .text("long_name", "range to centre of measurement volume")
+            .text("units", "meters")
+            .text("spacing_is_constant", if constant { "true" } else { "false" })
+            .attr("meters_to_center_of_first_gate", Attr::F32(gates[0] as f32))
+            .attr("meters_between_gates", Attr::F32(spacing as f32))
+            .text("axis", "radial_range_coordinate"),
+        Variable::new("azimuth", &["time"], degrees(|r| turn(r.azimuth_rad)))
+            .text("standard_name", "ray_azimuth_angle")
+            .text("long_name", "azimuth angle from true north")
+            .text("units", "degrees")
+            .text("axis", "radial_azimuth_coordinate"),
+        Variable::new("elevation", &["time"], degrees(|r| r.elevation_rad))
+            .text("standard_name", "ray_elevation_angle")
+            .text("long_name", "elevation angle from horizontal plane")
+            .text("units", "degrees")
+            .text("axis", "radial_elevation_coordinate"),
+    ]
+}
+
+fn site(map: &VelocityMap) -> Vec<Variable> {
+    vec![
+        Variable::new("latitude", &[], Data::F64(vec![0.0]))
+            .text("standard_name", "latitude")
+            .text("units", "degrees_north"),
+        Variable::new("longitude", &[], Data::F64(vec![0.0]))
+            .text("standard_name", "longitude")
+            .text("units", "degrees_east"),
+        Variable::new("altitude", &[], Data::F64(vec![map.lidar_height_m]))
+            .text("standard_name", "altitude")
+            .text("long_name", "height of the telescope above the ground")
+            .text("units", "meters")
+            .text("positive", "up"),
+    ]
+}
+
+fn sweeps(map: &VelocityMap) -> Vec<Variable> {
+    let bounds = map.sweep_bounds();
+    let ints = |values: &mut dyn Iterator<Item = usize>| Data::I32(values.map(|v| v as i32).collect());
+    let floats = |get: fn(&super::map::Sweep) -> f64| Data::F32(map.sweeps.iter().map(|s| get(s) as f32).collect());
+    vec![
+        Variable::new("volume_number", &[], Data::I32(vec![0])).text("long_name", "volume number"),
+        Variable::new("sweep_number", &["sweep"], ints(&mut (0..bounds.len())))
+            .text("long_name", "sweep number, from 0"),
+        Variable::new("fixed_angle", &["sweep"], floats(|s| turn(s.azimuth_rad).to_degrees()))
+            .text("long_name", "azimuth of the scan plane")
+            .text("units", "degrees"),
+        Variable::new("sweep_start_ray_index", &["sweep"], ints(&mut bounds.iter().map(|b| b.0)))
+            .text("long_name", "index of the first ray of the sweep"),
+        Variable::new("sweep_end_ray_index", &["sweep"], ints(&mut bounds.iter().map(|b| b.1)))
+            .text("long_name", "index of the last ray of the sweep, inclusive"),
+        Variable::new("wake_age", &["sweep"], floats(|s| s.tau))
+            .text("long_name", "age of the wake, t Gamma0 / (2 pi b0^2)")
+            .text("units", "1"),
+    ]
+}
+
+fn texts(map: &VelocityMap) -> Vec<Variable> {
+    const ONE: &[&str] = &["string_length_32"];
+    const EACH: &[&str] = &["sweep", "string_length_32"];
+    let time = |ray: Option<&super::map::Ray>| iso_time(ray.map_or(0.0, |r| r.time_s));
+    let one = |name: &str, text: &str| Variable::new(name, ONE, Data::Char(padded(text)));
+    let each = |name: &str, text: &str| Variable::new(name, EACH, Data::Char(padded(text).repeat(map.sweeps.len())));
+    vec![
+        one("time_coverage_start", &time(map.rays.first())),
+        one("time_coverage_end", &time(map.rays.last())),
+        one("time_reference", EPOCH),
+        one("platform_type", "fixed"),
+        one("instrument_type", "lidar"),
+        one("primary_axis", "axis_z"),
+        each("sweep_mode", "rhi"),
+        each("follow_mode", "none"),
+        each("prt_mode", "fixed"),
+    ]
+}
+
+fn instrument(map: &VelocityMap) -> Vec<Variable> {
+    let (rays, pulse) = (map.rays.len(), &map.pulse);
+    let each = |value: f64| Data::F32(vec![value as f32; rays]);
+    let group = |v: Variable, units: &str| v.text("units", units).text("meta_group", "instrument_parameters");
+    vec![
+        group(
+            Variable::new("frequency", &["frequency"], Data::F32(vec![pulse.frequency_hz as f32]))
+                .text("standard_name", "radiation_frequency"),
+            "s-1",
+        ),
+        group(Variable::new("prt", &["time"], each(pulse.prt_s)), "seconds"),
+        group(Variable::new("pulse_width", &["time"], each(pulse.pulse_width_s)), "seconds"),
+        group(Variable::new("nyquist_velocity", &["time"], each(pulse.nyquist_velocity_m_s)), "meters per second"),
+        group(
+            Variable::new(
+                "n_samples",
+                &["time"],
+                Data::I32(vec![i32::try_from(pulse.samples).unwrap_or(i32::MAX); rays]),
+            ),
+            "1",
+        ),
+        Variable::new("antenna_transition", &["time"], Data::I8(vec![0; rays]))
+            .text("long_name", "1 while the telescope moves between sweeps"),
+    ]
+}
+
+fn fields(map: &VelocityMap) -> OutputResult<Vec<Variable>> {
+    let mut out: Vec<Variable> = map.fields.iter().map(field_variable).collect();
+    if map.field("radial_velocity").is_none() {
+        let source = ["v_gate", "v_pulse", "v_exact"].iter().find_map(|name| map.field(name));
+        let source = source.ok_or_else(|| OutputError::Missing {
+            what: "field radial_velocity".into(),
+            needed: "a CfRadial file needs it, or one of v_gate, v_pulse, v_exact to stand for it".into(),
+        })?;
+        let copy = Field::float("radial_velocity", Unit::MetrePerSecond, &source.long_name, source.values.clone());
+        out.push(field_variable(&copy).text("comment", &format!("no estimate was made: copy of {}", source.name)));
+    }
+    Ok(out)
+}
+
+fn field_variable(field: &Field) -> Variable {
+    const DIMS: &[&str] = &["time", "range"];
+    let data = match &field.kind {
+        FieldKind::Float => Data::filled(&field.values),
+        FieldKind::Flag { .. } => Data::I8(field.values.iter().map(|v| *v as i8).collect()),
+    };
+    let mut out = Variable::new(&field.name, DIMS, data)
+        .text("long_name", &field.long_name)
+        .text("units", field.unit.udunits())
+        .text("coordinates", "elevation azimuth range");
+    if let Some(name) = &field.standard_name {
+        out = out.text("standard_name", name);
+    }
+    match &field.kind {
+        FieldKind::Float => out.attr("_FillValue", Attr::F32(FILL)),
+        // A fill value would make xarray turn the flags into floats.
+        FieldKind::Flag { meanings } => {
+            let words: Vec<&str> = meanings.iter().map(|(_, m)| m.as_str()).collect();
+            out.attr("flag_values", Attr::I8(meanings.iter().map(|(c, _)| *c).collect()))
+                .text("flag_meanings", &words.join(" "))
+        }
+    }
+}
+
+fn single(values: &[f64]) -> Data {
+    Data::F32(values.iter().map(|v| *v as f32).collect())
+}
+
+/// Angle in 0 .. 2 pi.
+fn turn(angle_rad: f64) -> f64 {
+    angle_rad.rem_euclid(std::f64::consts::TAU)
+}
+
+fn padded(text: &str) -> Vec<u8> {
+    let mut bytes = text.as_bytes().to_vec();
+    bytes.resize(TEXT, 0);
+    bytes
+}
+
+/// Date and time of a number of seconds after the epoch, whole seconds, rounded down; within January 2024.
+fn iso_time(time_s: f64) -> String {
+    let s = time_s as u64;
+    let (day, h, m) = (s / 86_400 + 1, s / 3600 % 24, s / 60 % 60);
+    format!("2024-01-{day:02}T{h:02}:{m:02}:{:02}Z", s % 60)
+}
+
+#[cfg(test)]
+#[path = "cfradial_tests.rs"]
+mod tests;

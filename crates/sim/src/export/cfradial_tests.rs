@@ -1,0 +1,153 @@
+use super::super::provenance::example;
+use super::super::samples;
+use super::*;
+use netcdf3::FileReader;
+
+/// Writes the map, and opens it with a reader that shares no code with the writer.
+fn reopened(map: &VelocityMap) -> (tempfile::TempDir, FileReader) {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path().join("map.nc");
+    std::fs::write(&path, cfradial_bytes(map, &example()).unwrap()).unwrap();
+    let file = FileReader::open(&path).unwrap();
+    (temp, file)
+}
+
+/// What a client fails without: (name, dimensions, units).
+const NEEDED: &[(&str, &[&str], Option<&str>)] = &[
+    ("time", &["time"], Some("seconds since 2024-01-01T00:00:00Z")),
+    ("range", &["range"], Some("meters")),
+    ("azimuth", &["time"], Some("degrees")),
+    ("elevation", &["time"], Some("degrees")),
+    ("latitude", &[], Some("degrees_north")),
+    ("longitude", &[], Some("degrees_east")),
+    ("altitude", &[], Some("meters")),
+    ("sweep_number", &["sweep"], None),
+    ("sweep_mode", &["sweep", "string_length_32"], None),
+    ("fixed_angle", &["sweep"], Some("degrees")),
+    ("sweep_start_ray_index", &["sweep"], None),
+    ("sweep_end_ray_index", &["sweep"], None),
+    ("volume_number", &[], None),
+    ("platform_type", &["string_length_32"], None),
+    ("instrument_type", &["string_length_32"], None),
+    ("primary_axis", &["string_length_32"], None),
+    ("time_coverage_start", &["string_length_32"], None),
+    ("time_coverage_end", &["string_length_32"], None),
+    ("radial_velocity", &["time", "range"], Some("m s-1")),
+    ("velocity_standard_deviation", &["time", "range"], Some("m s-1")),
+    ("signal_to_noise_ratio", &["time", "range"], Some("dB")),
+    ("v_exact", &["time", "range"], Some("m s-1")),
+];
+
+#[test]
+fn every_variable_that_a_client_needs_has_its_dimensions_and_units() {
+    let (_temp, file) = reopened(&samples::map());
+    let set = file.data_set();
+    for (name, dims, units) in NEEDED {
+        let variable = set.get_var(name).unwrap_or_else(|| panic!("no {name}"));
+        assert_eq!(&variable.dim_names(), dims, "{name}");
+        assert_eq!(set.get_var_attr_as_string(name, "units").as_deref(), *units, "{name}");
+    }
+    for name in set.get_var_names() {
+        assert!(set.get_var_attr_as_string(&name, "_Encoding").is_none(), "_Encoding breaks Py-ART");
+    }
+    for name in [
+        "Conventions",
+        "version",
+        "title",
+        "institution",
+        "references",
+        "source",
+        "history",
+        "comment",
+        "instrument_name",
+    ] {
+        assert!(set.get_global_attr_as_string(name).is_some(), "no global {name}");
+    }
+}
+
+#[test]
+fn values_angles_and_times_read_back() {
+    let map = samples::map();
+    let (_temp, mut file) = reopened(&map);
+    let velocity = file.read_var_f32("radial_velocity").unwrap();
+    let gates = map.range_m.len();
+    let values = &map.field("radial_velocity").unwrap().values;
+    for ((ray, gate), value) in values.indexed_iter() {
+        let got = velocity[ray * gates + gate];
+        if value.is_nan() {
+            assert_eq!(got, FILL, "missing is the fill value, never NaN");
+        } else {
+            assert_eq!(got, *value as f32);
+        }
+    }
+    assert_eq!(velocity.iter().filter(|v| **v == FILL).count(), 1);
+    let elevation = file.read_var_f32("elevation").unwrap();
+    for (ray, degrees) in map.rays.iter().zip(elevation) {
+        approx::assert_relative_eq!(
+            f64::from(degrees),
+            ray.elevation_rad * 180.0 / std::f64::consts::PI,
+            max_relative = 1e-7
+        );
+    }
+    let times: Vec<f64> = map.rays.iter().map(|r| r.time_s).collect();
+    assert_eq!(file.read_var_f64("time").unwrap(), times);
+    assert_eq!(file.read_var_f32("fixed_angle").unwrap(), [90.0, 90.0]);
+    assert_eq!(file.read_var_f32("wake_age").unwrap(), [2.5, 5.0]);
+}
+
+#[test]
+fn sweeps_tile_the_rays_with_inclusive_ends() {
+    let (_temp, mut file) = reopened(&samples::map());
+    assert_eq!(file.read_var_i32("sweep_start_ray_index").unwrap(), [0, 6]);
+    assert_eq!(file.read_var_i32("sweep_end_ray_index").unwrap(), [5, 11]);
+    let mode = file.read_var_u8("sweep_mode").unwrap();
+    assert_eq!(mode.len(), 64);
+    for text in mode.chunks(32) {
+        assert_eq!(&text[..3], b"rhi");
+        assert!(text[3..].iter().all(|b| *b == 0), "padded with NUL");
+    }
+}
+
+#[test]
+fn fill_value_is_on_floats_and_not_on_flags() {
+    let (_temp, mut file) = reopened(&samples::map());
+    let set = file.data_set();
+    assert_eq!(set.get_var_attr_f32("radial_velocity", "_FillValue").unwrap(), [-9999.0]);
+    assert!(set.get_var_attr("quality_flag", "_FillValue").is_none());
+    assert_eq!(set.get_var_attr_as_string("quality_flag", "flag_meanings").unwrap(), "good low_signal");
+    assert_eq!(file.read_var_i8("quality_flag").unwrap()[..3], [0, 1, 0]);
+}
+
+#[test]
+fn provenance_is_in_the_global_attributes() {
+    let (_temp, file) = reopened(&samples::map());
+    for (name, text) in example().entries() {
+        assert_eq!(file.data_set().get_global_attr_as_string(name).unwrap(), text);
+    }
+}
+
+#[test]
+fn a_map_without_estimate_shows_the_gate_velocity() {
+    let mut map = samples::map();
+    map.fields.retain(|f| f.name.starts_with("v_"));
+    let (_temp, mut file) = reopened(&map);
+    assert_eq!(file.read_var_f32("radial_velocity").unwrap(), file.read_var_f32("v_gate").unwrap());
+    map.fields.clear();
+    assert!(matches!(cfradial_bytes(&map, &example()), Err(OutputError::Missing { .. })));
+}
+
+#[test]
+fn times_outside_the_synthetic_month_are_refused() {
+    let mut map = samples::map();
+    map.rays[0].time_s = -1.0;
+    assert!(cfradial_bytes(&map, &example()).is_err());
+    assert_eq!(iso_time(90_061.9), "2024-01-02T01:01:01Z");
+}
+
+#[test]
+fn the_bytes_are_the_same_every_time() {
+    let map = samples::map();
+    let first = cfradial_bytes(&map, &example()).unwrap();
+    assert_eq!(first[..4], *b"CDF\x02");
+    assert_eq!(first, cfradial_bytes(&map, &example()).unwrap());
+}

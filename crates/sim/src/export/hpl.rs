@@ -1,0 +1,179 @@
+//! One sweep of a map as a HALO Photonics raw file (`.hpl`), which doppy, halo-reader and xradar read.
+//! A lossy export: velocity to 5e-5 m/s, angles to 0.005 degrees, no place for errors or for the scene (the table beside it has both),
+//! and no code for a missing value, which becomes velocity 0 at intensity 1 (no signal).
+//! Check: the tests read the text back line by line.
+
+use super::error::{OutputError, OutputResult};
+use super::map::VelocityMap;
+use crate::SPEED_OF_LIGHT_M_S;
+use std::fmt::Write as _;
+
+const DAY_S: f64 = 86_400.0;
+
+/// The bytes of the file called `file_name` (the header repeats it) with the rays of sweep `sweep`.
+///
+/// Gate 0 of the format starts at the lidar, so gates before the first of the map are filled with no signal.
+///
+/// # Errors
+/// What [`VelocityMap::check`] finds; no such sweep; no field `radial_velocity` or `signal_to_noise_ratio`; gates that overlap or leave gaps, or do
+/// not start a whole number of gates from the lidar (the format derives the range from the gate number); a sweep across midnight of the synthetic day.
+pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResult<Vec<u8>> {
+    map.check()?;
+    let bounds = map.sweep_bounds();
+    let &(first, last) =
+        bounds.get(sweep).ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))?;
+    let (gate_m, before) = gate_grid(&map.range_m)?;
+    let times = (map.rays[first].time_s, map.rays[last].time_s);
+    if times.0 < 0.0 || (times.0 / DAY_S).floor() != (times.1 / DAY_S).floor() {
+        return Err(OutputError::value(
+            "ray time_s",
+            format!("{} to {}", times.0, times.1),
+            "from 0 on, and a sweep within one day",
+        ));
+    }
+    let need = |name: &str| {
+        map.field(name).ok_or_else(|| OutputError::Missing {
+            what: format!("field {name}"),
+            needed: "an .hpl file holds velocity and intensity".into(),
+        })
+    };
+    let velocity = &need("radial_velocity")?.values;
+    let snr_db = &need("signal_to_noise_ratio")?.values;
+    let mut out = header(map, file_name, gate_m, before + map.range_m.len(), (first, last));
+    for ray in first..=last {
+        push_ray_line(map, ray, &mut out);
+        for gate in 0..before {
+            push_gate(gate, f64::NAN, f64::NAN, &mut out);
+        }
+        for gate in 0..map.range_m.len() {
+            let cell = [ray, gate];
+            push_gate(before + gate, velocity[cell], snr_db[cell], &mut out);
+        }
+    }
+    Ok(out.into_bytes())
+}
+
+/// Gate length [m] and number of gates between the lidar and the first one.
+fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
+    let refuse = |reason: String| OutputError::Unsupported { format: "HALO .hpl", reason };
+    if range_m.len() < 2 {
+        return Err(refuse("one gate does not tell the gate length".into()));
+    }
+    let gate_m = (range_m[range_m.len() - 1] - range_m[0]) / (range_m.len() - 1) as f64;
+    let before = (range_m[0] / gate_m - 0.5).round();
+    let misplaced = |(i, r): &(usize, &f64)| {
+        // Readers compute the centre as (gate + 0.5) * length; a millimetre is below what they keep.
+        before < 0.0 || ((before + *i as f64 + 0.5) * gate_m - **r).abs() > 1e-3
+    };
+    if let Some((i, r)) = range_m.iter().enumerate().find(misplaced) {
+        let expected = (before + i as f64 + 0.5) * gate_m;
+        return Err(refuse(format!(
+            "gate {i} is at {r} m; the format puts it at {expected} m: gates must touch, and start a whole number of gates from the lidar"
+        )));
+    }
+    Ok((gate_m, before as usize))
+}
+
+fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize, usize)) -> String {
+    let pulse = &map.pulse;
+    let wavelength_m = SPEED_OF_LIGHT_M_S / pulse.frequency_hz;
+    let sample_rate_hz = 4.0 * pulse.nyquist_velocity_m_s / wavelength_m;
+    let points = (2.0 * gate_m / SPEED_OF_LIGHT_M_S * sample_rate_hz).round().max(1.0);
+    let resolution_m_s = 2.0 * pulse.nyquist_velocity_m_s / points;
+    let lines = [
+        format!("Filename:\t{name}"),
+        "System ID:\t0".into(),
+        format!("Number of gates:\t{gates}"),
+        format!("Range gate length (m):\t{gate_m:.4}"),
+        format!("Gate length (pts):\t{points}"),
+        format!("Pulses/ray:\t{}", pulse.samples),
+        format!("No. of rays in file:\t{}", rays.1 - rays.0 + 1),
+        "Scan type:\tRHI".into(),
+        // 65535 stands for a collimated beam; readers ask for an integer.
+        "Focus range:\t65535".into(),
+        format!("Start time:\t{}", start_time(map.rays[rays.0].time_s)),
+        format!("Resolution (m/s):\t{resolution_m_s:.4}"),
+        "Range of measurement (center of gate) = (range gate + 0.5) * Gate length".into(),
+        "Data line 1: Decimal time (hours)  Azimuth (degrees)  Elevation (degrees) Pitch (degrees) Roll (degrees)"
+            .into(),
+        "f9.6,1x,f6.2,1x,f6.2".into(),
+        "Data line 2: Range Gate  Doppler (m/s)  Intensity (SNR + 1)  Beta (m-1 sr-1)".into(),
+        "i3,1x,f6.4,1x,f8.6,1x,e12.6 - repeat for no. gates".into(),
+        "****".into(),
+    ];
+    lines.join("\r\n") + "\r\n"
+}
+
+fn start_time(time_s: f64) -> String {
+    let s = time_s % DAY_S;
+    let (h, m) = ((s / 3600.0) as u32, (s / 60.0) as u32 % 60);
+    // Hundredths are cut, not rounded: 59.999 s must not become 60.00.
+    let rest = ((s % 60.0) * 100.0).floor() / 100.0;
+    let day = (time_s / DAY_S) as u32 + 1;
+    format!("202401{day:02} {h:02}:{m:02}:{rest:05.2}")
+}
+
+fn push_ray_line(map: &VelocityMap, ray: usize, out: &mut String) {
+    let r = &map.rays[ray];
+    let hours = r.time_s % DAY_S / 3600.0;
+    let azimuth = r.azimuth_rad.rem_euclid(std::f64::consts::TAU).to_degrees();
+    let elevation = r.elevation_rad.to_degrees();
+    // Writing to a String cannot fail.
+    let _ = write!(out, "{hours:11.8} {azimuth:6.2} {elevation:6.2} {:.2} {:.2}\r\n", 0.0, 0.0);
+}
+
+fn push_gate(gate: usize, velocity_m_s: f64, snr_db: f64, out: &mut String) {
+    let missing = velocity_m_s.is_nan() || snr_db.is_nan();
+    let (velocity, intensity) = if missing { (0.0, 1.0) } else { (velocity_m_s, 1.0 + 10_f64.powf(snr_db / 10.0)) };
+    let backscatter = format!("{:.6E}", 0.0);
+    let _ = write!(out, "{gate:3} {velocity:.4} {intensity:.6} {backscatter:>13}\r\n");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples;
+    use super::*;
+
+    fn lines(map: &VelocityMap, sweep: usize) -> Vec<String> {
+        let text = String::from_utf8(hpl_bytes(map, sweep, "x_1.hpl").unwrap()).unwrap();
+        assert_eq!(text.matches('\n').count(), text.matches("\r\n").count());
+        text.split("\r\n").map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn header_has_seventeen_lines_and_the_body_its_values() {
+        let map = samples::map();
+        let lines = lines(&map, 1);
+        assert_eq!(lines[0], "Filename:\tx_1.hpl");
+        assert_eq!(lines[2], "Number of gates:\t6", "one empty gate before the first at 45 m");
+        assert_eq!(lines[9], "Start time:\t20240101 00:01:20.00");
+        assert_eq!(lines[16], "****");
+        assert_eq!(lines.len(), 17 + 6 * 7 + 1);
+        let ray: Vec<f64> = lines[17].split_whitespace().map(|c| c.parse().unwrap()).collect();
+        assert_eq!(ray.len(), 5);
+        approx::assert_abs_diff_eq!(ray[0], 80.0 / 3600.0, epsilon = 1e-8);
+        approx::assert_abs_diff_eq!(ray[2], map.rays[6].elevation_rad.to_degrees(), epsilon = 5e-3);
+        assert_eq!(lines[18].split_whitespace().collect::<Vec<_>>()[..3], ["0", "0.0000", "1.000000"]);
+        let gate: Vec<f64> = lines[19].split_whitespace().map(|c| c.parse().unwrap()).collect();
+        let value = |name: &str| map.field(name).unwrap().values[[6, 0]];
+        approx::assert_abs_diff_eq!(gate[1], value("radial_velocity"), epsilon = 5e-5);
+        let snr = 10.0 * (gate[2] - 1.0).log10();
+        approx::assert_abs_diff_eq!(snr, value("signal_to_noise_ratio"), epsilon = 1e-3);
+    }
+
+    #[test]
+    fn a_missing_value_is_no_signal() {
+        let map = samples::map();
+        let lines = lines(&map, 1);
+        let last: Vec<&str> = lines[lines.len() - 2].split_whitespace().collect();
+        assert_eq!(last[..3], ["5", "0.0000", "1.000000"]);
+    }
+
+    #[test]
+    fn gates_that_the_format_cannot_place_are_refused() {
+        let mut map = samples::map();
+        map.range_m.iter_mut().for_each(|r| *r += 7.0);
+        assert!(matches!(hpl_bytes(&map, 0, "x.hpl"), Err(OutputError::Unsupported { .. })));
+        assert!(matches!(hpl_bytes(&samples::map(), 2, "x.hpl"), Err(OutputError::Value { .. })));
+    }
+}

@@ -1,0 +1,353 @@
+//! Curves over one pair of axes: lines, markers, uncertainty bands and error bars, with a legend in the emptiest corner.
+//! Check: a line breaks at a missing value, and a value lands at its coordinate; the rest is for the eye.
+
+use super::axis::{Axis, Scale};
+use super::colour::curve_colour;
+use super::drawing::{Frame, Pen, Shape};
+use super::font::Font;
+use super::frame::{BOTTOM, Decor, LEFT, top_room};
+use super::legend::{Entry, legend};
+use crate::export::{OutputResult, same_length};
+
+const RIGHT: f64 = 24.0;
+const LINE_WIDTH: f64 = 2.2;
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// Solid line.
+    Line,
+    /// Dashed line.
+    Dash,
+    /// Dotted line.
+    Dot,
+    /// Dashes and dots in turn.
+    DashDot,
+    /// A marker at each point, no line; a band becomes error bars.
+    Markers,
+    /// Solid line with a marker at each point.
+    LineMarkers,
+}
+
+impl Style {
+    fn dash(self) -> &'static [f64] {
+        match self {
+            Self::Dash => &[9.0, 5.0],
+            Self::Dot => &[2.5, 4.0],
+            Self::DashDot => &[11.0, 4.0, 2.5, 4.0],
+            Self::Line | Self::Markers | Self::LineMarkers => &[],
+        }
+    }
+
+    fn has_line(self) -> bool {
+        self != Self::Markers
+    }
+
+    fn has_markers(self) -> bool {
+        matches!(self, Self::Markers | Self::LineMarkers)
+    }
+}
+
+/// One curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name in the legend; none where empty.
+    pub label: String,
+    /// Points (x, y) in the order in which they are joined; a NaN breaks the line.
+    pub points: Vec<(f64, f64)>,
+    /// Line or markers.
+    pub style: Style,
+    /// Lower and upper y at each point, drawn as a band.
+    pub band: Option<Vec<(f64, f64)>>,
+    /// Index into the palette; the position of the series in the plot where absent.
+    pub colour: Option<usize>,
+}
+
+impl Series {
+    /// A curve without band, in the next colour.
+    pub fn new(label: &str, style: Style, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { label: label.into(), points: points.into_iter().collect(), style, band: None, colour: None }
+    }
+
+    /// The same curve with a band of +- `half_width` about each point.
+    #[must_use]
+    pub fn with_band(mut self, half_width: &[f64]) -> Self {
+        self.band = Some(self.points.iter().zip(half_width).map(|(p, h)| (p.1 - h, p.1 + h)).collect());
+        self
+    }
+
+    /// The same curve in colour `index` of the palette.
+    #[must_use]
+    pub fn in_colour(mut self, index: usize) -> Self {
+        self.colour = Some(index);
+        self
+    }
+}
+
+/// Curves over one pair of axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CurvePlot {
+    /// Title above the panel; none where empty.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// Curves, later ones over earlier ones.
+    pub series: Vec<Series>,
+    /// One metre is as long upward as sideways; the range of one axis is widened for it. Linear axes only.
+    pub equal_scales: bool,
+    /// Height over width of the panel; ignored with equal scales.
+    pub shape: f64,
+}
+
+impl CurvePlot {
+    /// An empty plot of the usual shape.
+    pub fn new(title: &str, x: Axis, y: Axis) -> Self {
+        Self { title: title.into(), x, y, series: Vec::new(), equal_scales: false, shape: 0.5 }
+    }
+
+    /// The same plot with one more curve.
+    #[must_use]
+    pub fn with(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    fn ranges(&self) -> OutputResult<((f64, f64), (f64, f64))> {
+        let points = || self.series.iter().flat_map(|s| &s.points);
+        let bands = self.series.iter().flat_map(|s| s.band.iter().flatten()).flat_map(|b| [b.0, b.1]);
+        let pad = if self.equal_scales || self.series.iter().any(|s| s.style == Style::Markers) { 0.04 } else { 0.0 };
+        let x = self.x.resolve(points().map(|p| p.0), pad)?;
+        let y = self.y.resolve(points().map(|p| p.1).chain(bands), 0.06)?;
+        Ok((x, y))
+    }
+
+    /// Height of the panel at that width, drawing units.
+    pub(crate) fn height(&self, width: f64) -> OutputResult<f64> {
+        if !self.equal_scales {
+            return Ok(self.shape * width);
+        }
+        let (x, y) = self.ranges()?;
+        let inner = (width - LEFT - RIGHT) * (y.1 - y.0) / (x.1 - x.0);
+        Ok(inner.clamp(120.0, 1.2 * width) + top_room(&self.title) + BOTTOM)
+    }
+
+    pub(crate) fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
+        for series in &self.series {
+            if let Some(band) = &series.band {
+                same_length(&format!("band of '{}'", series.label), band.len(), "its points", series.points.len())?;
+            }
+        }
+        let frame = Frame {
+            left: cell.left + LEFT,
+            top: cell.top + top_room(&self.title),
+            width: cell.width - LEFT - RIGHT,
+            height: cell.height - top_room(&self.title) - BOTTOM,
+        };
+        let (mut x_range, mut y_range) = self.ranges()?;
+        if self.equal_scales && !self.x.log && !self.y.log {
+            widen(&mut x_range, &mut y_range, &frame);
+        }
+        let x = Scale { range: x_range, log: self.x.log, paper: (frame.left, frame.right()) };
+        let y = Scale { range: y_range, log: self.y.log, paper: (frame.bottom(), frame.top) };
+        let decor = Decor { frame, x, y, x_label: &self.x.label, y_label: &self.y.label, title: &self.title };
+        decor.grid(out);
+        let mut content = Vec::new();
+        let mut entries = Vec::new();
+        let mut occupied = Vec::new();
+        for (i, series) in self.series.iter().enumerate() {
+            let index = series.colour.unwrap_or(i);
+            let place = |p: &(f64, f64)| (x.place(p.0), y.place(p.1));
+            let points: Vec<(f64, f64)> = series.points.iter().map(place).collect();
+            push_series(series, index, &points, &y, &mut content);
+            occupied.extend(along(&points, series.style.has_line()));
+            if !series.label.is_empty() {
+                entries.push(Entry {
+                    label: &series.label,
+                    pen: series.style.has_line().then(|| pen(series, index)),
+                    marker: series.style.has_markers().then_some(index),
+                    colour: curve_colour(index),
+                });
+            }
+        }
+        out.push(Shape::Clip { frame, shapes: content });
+        decor.axes(font, out);
+        legend(&entries, frame, &occupied, font, out);
+        Ok(())
+    }
+}
+
+/// Widens one range so that a unit is equally long on both axes.
+fn widen(x: &mut (f64, f64), y: &mut (f64, f64), frame: &Frame) {
+    let unit = ((x.1 - x.0) / frame.width).max((y.1 - y.0) / frame.height);
+    let centred = |r: (f64, f64), length: f64| {
+        let middle = 0.5 * (r.0 + r.1);
+        (middle - 0.5 * length, middle + 0.5 * length)
+    };
+    *x = centred(*x, unit * frame.width);
+    *y = centred(*y, unit * frame.height);
+}
+
+fn pen(series: &Series, index: usize) -> Pen {
+    Pen { colour: curve_colour(index), width: LINE_WIDTH, dash: series.style.dash() }
+}
+
+fn push_series(series: &Series, index: usize, points: &[(f64, f64)], y: &Scale, out: &mut Vec<Shape>) {
+    let colour = curve_colour(index);
+    if let Some(band) = &series.band {
+        let placed: Vec<(f64, f64)> = band.iter().map(|b| (y.place(b.0), y.place(b.1))).collect();
+        if series.style == Style::Markers {
+            for (p, b) in points.iter().zip(&placed) {
+                push_error_bar(p.0, *b, Pen::solid(colour, 1.4), out);
+            }
+        } else {
+            push_band(points, &placed, colour, out);
+        }
+    }
+    if series.style.has_line() {
+        for piece in pieces(points) {
+            out.push(Shape::Line { points: piece.to_vec(), pen: pen(series, index) });
+        }
+    }
+    if series.style.has_markers() {
+        for p in points.iter().filter(|p| finite(p)) {
+            out.push(Shape::Area { points: marker(*p, index), fill: colour, opacity: 1.0 });
+        }
+    }
+}
+
+fn push_band(points: &[(f64, f64)], band: &[(f64, f64)], colour: [u8; 3], out: &mut Vec<Shape>) {
+    // One polygon per stretch without gap: forth along the upper edge, back along the lower.
+    let whole: Vec<(f64, f64, f64)> = points.iter().zip(band).map(|(p, b)| (p.0, b.0, b.1)).collect();
+    for stretch in whole.split(|c| !(c.0.is_finite() && c.1.is_finite() && c.2.is_finite())) {
+        if stretch.len() > 1 {
+            let upper = stretch.iter().map(|c| (c.0, c.2));
+            let lower = stretch.iter().rev().map(|c| (c.0, c.1));
+            out.push(Shape::Area { points: upper.chain(lower).collect(), fill: colour, opacity: 0.22 });
+        }
+    }
+}
+
+fn push_error_bar(x: f64, band: (f64, f64), pen: Pen, out: &mut Vec<Shape>) {
+    if !(x.is_finite() && finite(&band)) {
+        return;
+    }
+    let cap = 4.0;
+    for points in [
+        vec![(x, band.0), (x, band.1)],
+        vec![(x - cap, band.0), (x + cap, band.0)],
+        vec![(x - cap, band.1), (x + cap, band.1)],
+    ] {
+        out.push(Shape::Line { points, pen });
+    }
+}
+
+fn finite(p: &(f64, f64)) -> bool {
+    p.0.is_finite() && p.1.is_finite()
+}
+
+/// Stretches of at least two finite points.
+fn pieces(points: &[(f64, f64)]) -> impl Iterator<Item = &[(f64, f64)]> {
+    points.split(|p| !finite(p)).filter(|s| s.len() > 1)
+}
+
+/// Where the ink is: the points, and every few units along the lines between them.
+fn along(points: &[(f64, f64)], joined: bool) -> Vec<(f64, f64)> {
+    let mut out: Vec<(f64, f64)> = points.iter().copied().filter(finite).collect();
+    if joined {
+        for pair in pieces(points).flat_map(|s| s.windows(2)) {
+            let length = (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1);
+            let steps = (length / 8.0).min(400.0) as usize;
+            for k in 1..steps {
+                let t = k as f64 / steps as f64;
+                out.push((pair[0].0 + t * (pair[1].0 - pair[0].0), pair[0].1 + t * (pair[1].1 - pair[0].1)));
+            }
+        }
+    }
+    out
+}
+
+/// Corners of the marker of a series: its shape differs as well as its colour.
+pub(crate) fn marker(at: (f64, f64), index: usize) -> Vec<(f64, f64)> {
+    let (corners, radius, turn): (u32, f64, f64) = match index % 4 {
+        0 => (24, 4.6, 0.0),
+        1 => (4, 5.6, 0.125),
+        2 => (3, 6.2, -0.25),
+        _ => (4, 5.8, 0.0),
+    };
+    (0..corners)
+        .map(|i| {
+            let angle = std::f64::consts::TAU * (f64::from(i) / f64::from(corners) + turn);
+            (at.0 + radius * angle.cos(), at.1 + radius * angle.sin())
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shapes(plot: &CurvePlot) -> Vec<Shape> {
+        let mut out = Vec::new();
+        let cell = Frame { left: 0.0, top: 0.0, width: 600.0, height: 400.0 };
+        plot.draw(cell, &Font::load().unwrap(), &mut out).unwrap();
+        out
+    }
+
+    fn content(plot: &CurvePlot) -> Vec<Shape> {
+        let found = shapes(plot).into_iter().find_map(|s| match s {
+            Shape::Clip { shapes, .. } => Some(shapes),
+            _ => None,
+        });
+        found.unwrap()
+    }
+
+    fn plot(points: Vec<(f64, f64)>, style: Style) -> CurvePlot {
+        CurvePlot::new("t", Axis::linear("x").between(0.0, 10.0), Axis::linear("y").between(0.0, 1.0))
+            .with(Series::new("a", style, points))
+    }
+
+    #[test]
+    fn a_line_breaks_at_a_missing_value() {
+        let content = content(&plot(
+            vec![(0.0, 0.0), (1.0, 1.0), (2.0, f64::NAN), (3.0, 0.0), (4.0, 1.0), (5.0, 0.5)],
+            Style::Line,
+        ));
+        let lengths: Vec<usize> =
+            content.iter().map(|s| if let Shape::Line { points, .. } = s { points.len() } else { 0 }).collect();
+        assert_eq!(lengths, [2, 3]);
+    }
+
+    #[test]
+    fn values_land_at_their_coordinates_with_y_upward() {
+        let Shape::Line { points, .. } = &content(&plot(vec![(0.0, 0.0), (10.0, 1.0)], Style::Line))[0] else {
+            panic!("no line")
+        };
+        assert_eq!(points[0], (LEFT, 400.0 - BOTTOM));
+        assert_eq!(points[1], (600.0 - RIGHT, top_room("t")));
+    }
+
+    #[test]
+    fn equal_scales_make_a_metre_equally_long() {
+        let mut plot = CurvePlot::new("", Axis::linear("y [m]"), Axis::linear("z [m]")).with(Series::new(
+            "",
+            Style::Line,
+            [(-50.0, 0.0), (50.0, 40.0)],
+        ));
+        plot.equal_scales = true;
+        let Shape::Line { points, .. } = &content(&plot)[0] else { panic!("no line") };
+        let (dx, dy) = (points[1].0 - points[0].0, points[0].1 - points[1].1);
+        approx::assert_relative_eq!(dx / 100.0, dy / 40.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_band_must_match_its_curve() {
+        let mut plot = plot(vec![(0.0, 0.0), (1.0, 1.0)], Style::Line);
+        plot.series[0].band = Some(vec![(0.0, 1.0)]);
+        let cell = Frame { left: 0.0, top: 0.0, width: 600.0, height: 400.0 };
+        assert!(plot.draw(cell, &Font::load().unwrap(), &mut Vec::new()).is_err());
+        let bars = plot.series[0].clone().with_band(&[0.1, 0.2]);
+        assert_eq!(bars.band.unwrap()[1], (0.8, 1.2));
+    }
+}

@@ -1,0 +1,162 @@
+//! A picture as a list of shapes in drawing units (pixels at scale 1, y downward), which both file formats draw.
+//! Check: text with raised and lowered parts is split in the tests; the formats' tests do the rest.
+
+use super::colour::Rgb;
+
+/// Axis-aligned box: left, top, width, height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frame {
+    pub(crate) left: f64,
+    pub(crate) top: f64,
+    pub(crate) width: f64,
+    pub(crate) height: f64,
+}
+
+impl Frame {
+    pub(crate) fn right(&self) -> f64 {
+        self.left + self.width
+    }
+
+    pub(crate) fn bottom(&self) -> f64 {
+        self.top + self.height
+    }
+
+    pub(crate) fn corners(&self) -> Vec<(f64, f64)> {
+        let (l, t, r, b) = (self.left, self.top, self.right(), self.bottom());
+        vec![(l, t), (r, t), (r, b), (l, b)]
+    }
+}
+
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pen {
+    pub(crate) colour: Rgb,
+    pub(crate) width: f64,
+    /// On and off lengths in drawing units; empty = solid.
+    pub(crate) dash: &'static [f64],
+}
+
+impl Pen {
+    pub(crate) fn solid(colour: Rgb, width: f64) -> Self {
+        Self { colour, width, dash: &[] }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// Pixels of an embedded picture, 4 bytes each (not premultiplied), row by row from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Raster {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) rgba: Vec<u8>,
+}
+
+/// A line of text; `^{...}` raises and `_{...}` lowers a part of it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Text {
+    /// Anchor point on the base line.
+    pub(crate) at: (f64, f64),
+    pub(crate) text: String,
+    pub(crate) size: f64,
+    pub(crate) anchor: Anchor,
+    /// Turned to read upward.
+    pub(crate) upward: bool,
+    pub(crate) colour: Rgb,
+    pub(crate) bold: bool,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Shape {
+    Line {
+        points: Vec<(f64, f64)>,
+        pen: Pen,
+    },
+    Area {
+        points: Vec<(f64, f64)>,
+        fill: Rgb,
+        opacity: f64,
+    },
+    Text(Text),
+    Image {
+        frame: Frame,
+        raster: Raster,
+    },
+    /// Shapes of which only the part inside the frame is seen.
+    Clip {
+        frame: Frame,
+        shapes: Vec<Shape>,
+    },
+}
+
+/// The whole picture.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Drawing {
+    pub(crate) width: f64,
+    pub(crate) height: f64,
+    pub(crate) shapes: Vec<Shape>,
+}
+
+/// Part of a text with one position: 0 on the base line, 1 raised, -1 lowered.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Run<'a> {
+    pub(crate) text: &'a str,
+    pub(crate) level: i8,
+}
+
+impl Run<'_> {
+    /// Size of the run's letters where the base letters have size 1.
+    pub(crate) fn scale(&self) -> f64 {
+        if self.level == 0 { 1.0 } else { 0.72 }
+    }
+
+    /// Height of its base line above that of the text, in text sizes.
+    pub(crate) fn rise(&self) -> f64 {
+        match self.level {
+            0 => 0.0,
+            1 => 0.36,
+            _ => -0.18,
+        }
+    }
+}
+
+/// Splits a text at `^{...}` and `_{...}`; a brace that is never closed is plain text.
+pub(crate) fn runs(text: &str) -> Vec<Run<'_>> {
+    let mut out = Vec::new();
+    let mut rest = text;
+    while !rest.is_empty() {
+        let next = ["^{", "_{"].iter().filter_map(|m| rest.find(m)).min();
+        let marked = next.and_then(|start| rest[start..].find('}').map(|end| (start, start + end)));
+        let Some((start, end)) = marked else {
+            out.push(Run { text: rest, level: 0 });
+            break;
+        };
+        if start > 0 {
+            out.push(Run { text: &rest[..start], level: 0 });
+        }
+        let level = if rest[start..].starts_with('^') { 1 } else { -1 };
+        if end > start + 2 {
+            out.push(Run { text: &rest[start + 2..end], level });
+        }
+        rest = &rest[end + 1..];
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn raised_and_lowered_parts_are_split() {
+        let parts: Vec<(&str, i8)> = runs("Γ_{5-15} [m^{2}/s] v_mean").iter().map(|r| (r.text, r.level)).collect();
+        assert_eq!(parts, [("Γ", 0), ("5-15", -1), (" [m", 0), ("2", 1), ("/s] v_mean", 0)]);
+        assert_eq!(runs("a^{b"), [Run { text: "a^{b", level: 0 }]);
+        assert!(runs("").is_empty());
+    }
+}

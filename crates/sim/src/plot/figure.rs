@@ -1,0 +1,193 @@
+//! A figure: panels in columns, written as SVG text or as PNG bytes from one list of shapes.
+//! Check: both formats of a figure with every kind of panel come out the same twice, and the panels do not overlap.
+
+use super::curves::CurvePlot;
+use super::drawing::{Anchor, Drawing, Frame, Shape, Text};
+use super::font::Font;
+use super::frame::INK;
+use super::map::MapPlot;
+use super::{png_file, svg};
+use crate::export::{OutputError, OutputResult, Provenance};
+
+const TITLE_ROOM: f64 = 40.0;
+const MARGIN: f64 = 10.0;
+
+/// One panel of a figure.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Panel {
+    /// Curves.
+    Curves(CurvePlot),
+    /// A map over distance and height.
+    Map(MapPlot),
+}
+
+impl From<CurvePlot> for Panel {
+    fn from(plot: CurvePlot) -> Self {
+        Self::Curves(plot)
+    }
+}
+
+impl From<MapPlot> for Panel {
+    fn from(plot: MapPlot) -> Self {
+        Self::Map(plot)
+    }
+}
+
+/// Panels, filled row by row.
+///
+/// ```
+/// use wakescope_sim::export::Provenance;
+/// use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+/// let origin = Provenance { program: "wakescope".into(), scene_toml: String::new(), scene_hash: "0".into(), seed: 1 };
+/// let curve = Series::new("pair", Style::Line, (0..50).map(|i| (f64::from(i), f64::from(i).sin())));
+/// let plot = CurvePlot::new("", Axis::linear("y [m]"), Axis::linear("w [m/s]")).with(curve);
+/// let figure = Figure::stacked([plot]);
+/// assert!(figure.svg(&origin)?.starts_with("<svg"));
+/// assert_eq!(figure.png(&origin)?[1..4], *b"PNG");
+/// # Ok::<(), wakescope_sim::export::OutputError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Title above all panels; none where empty.
+    pub title: String,
+    /// Panels in reading order.
+    pub panels: Vec<Panel>,
+    /// Panels side by side, at least one.
+    pub columns: usize,
+    /// Width of the whole [drawing units: 1 in SVG, 1.2 pixels in PNG].
+    pub width: f64,
+}
+
+impl Figure {
+    /// Panels one below the other.
+    pub fn stacked(panels: impl IntoIterator<Item = impl Into<Panel>>) -> Self {
+        let panels = panels.into_iter().map(Into::into).collect();
+        Self { title: String::new(), panels, columns: 1, width: 960.0 }
+    }
+
+    /// Panels side by side.
+    pub fn side_by_side(panels: impl IntoIterator<Item = impl Into<Panel>>) -> Self {
+        let mut figure = Self::stacked(panels);
+        figure.columns = figure.panels.len().max(1);
+        figure
+    }
+
+    /// The same figure under a title.
+    #[must_use]
+    pub fn titled(mut self, title: &str) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// The figure as SVG text.
+    ///
+    /// # Errors
+    /// A range that cannot be drawn, a band of another length than its curve, a size out of range.
+    pub fn svg(&self, provenance: &Provenance) -> OutputResult<String> {
+        svg::svg_text(&self.draw()?, provenance)
+    }
+
+    /// The figure as PNG bytes.
+    ///
+    /// # Errors
+    /// As [`Self::svg`].
+    pub fn png(&self, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+        png_file::png_bytes(&self.draw()?, provenance)
+    }
+
+    fn draw(&self) -> OutputResult<Drawing> {
+        if self.columns == 0 || !(200.0..=10_000.0).contains(&self.width) {
+            let value = format!("{} columns, width {}", self.columns, self.width);
+            return Err(OutputError::value("figure", value, "at least one column, width 200 to 10000"));
+        }
+        let font = Font::load()?;
+        let mut shapes = Vec::new();
+        let mut top = MARGIN;
+        if !self.title.is_empty() {
+            shapes.push(Shape::Text(Text {
+                at: (self.width / 2.0, top + 22.0),
+                text: self.title.clone(),
+                size: 20.0,
+                anchor: Anchor::Middle,
+                upward: false,
+                colour: INK,
+                bold: true,
+            }));
+            top += TITLE_ROOM;
+        }
+        for (cells, panels) in self.rows(&mut top)? {
+            for (cell, panel) in cells.into_iter().zip(panels) {
+                match panel {
+                    Panel::Curves(plot) => plot.draw(cell, &font, &mut shapes)?,
+                    Panel::Map(plot) => plot.draw(cell, &font, &mut shapes)?,
+                }
+            }
+        }
+        Ok(Drawing { width: self.width, height: (top + MARGIN).ceil(), shapes })
+    }
+
+    /// Cells and panels row by row; a row is as high as its highest panel.
+    fn rows(&self, top: &mut f64) -> OutputResult<Vec<(Vec<Frame>, &[Panel])>> {
+        let width = (self.width - 2.0 * MARGIN) / self.columns as f64;
+        let mut rows = Vec::new();
+        for panels in self.panels.chunks(self.columns) {
+            let mut height: f64 = 0.0;
+            for panel in panels {
+                height = height.max(match panel {
+                    Panel::Curves(plot) => plot.height(width)?,
+                    Panel::Map(plot) => plot.height(width),
+                });
+            }
+            let cell = |i: usize| Frame { left: MARGIN + i as f64 * width, top: *top, width, height };
+            rows.push(((0..panels.len()).map(cell).collect(), panels));
+            *top += height;
+        }
+        Ok(rows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::provenance::example;
+    use crate::export::samples;
+    use crate::plot::{Axis, Series, Style};
+
+    fn figure() -> Figure {
+        let map = MapPlot::new(&samples::map(), 0, "radial_velocity").unwrap();
+        let curve = Series::new("a < b", Style::LineMarkers, [(1.0, 1e-3), (2.0, 1e-1)]).with_band(&[1e-4, 1e-2]);
+        let curves = CurvePlot::new("curves", Axis::linear("x"), Axis::log("C_{n}^{2}")).with(curve);
+        Figure::stacked([Panel::Map(map), curves.clone().into(), curves.into()])
+    }
+
+    #[test]
+    fn both_formats_are_the_same_twice() {
+        let (figure, origin) = (figure(), example());
+        let svg = figure.svg(&origin).unwrap();
+        assert_eq!(svg, figure.svg(&origin).unwrap());
+        assert_eq!(figure.png(&origin).unwrap(), figure.png(&origin).unwrap());
+        assert_eq!(svg.matches("<image").count(), 2, "map and colour bar");
+        assert_eq!(svg.matches("<svg").count(), svg.matches("</svg>").count());
+        assert!(svg.contains("a &lt; b") && !svg.contains("NaN"));
+    }
+
+    #[test]
+    fn cells_fill_rows_without_overlap() {
+        let mut figure = figure();
+        figure.columns = 2;
+        let mut top = 0.0;
+        let rows = figure.rows(&mut top).unwrap();
+        assert_eq!(rows.len(), 2);
+        assert_eq!(rows[0].0[0].right(), rows[0].0[1].left);
+        assert_eq!(rows[0].0[0].bottom(), rows[1].0[0].top);
+        assert_eq!(rows[1].0[0].bottom(), top);
+    }
+
+    #[test]
+    fn impossible_figures_are_refused() {
+        for (columns, width) in [(0, 960.0), (1, 10.0), (1, f64::NAN)] {
+            let figure = Figure { columns, width, ..figure() };
+            assert!(figure.svg(&example()).is_err());
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! The report of a run as one HTML page that opens from disk: pictures inside, no script, nothing fetched.
+//! Check: every text is escaped, the page names nothing outside itself, verdicts are marked by colour and by word.
+
+use super::svg::escape;
+use crate::export::{OutputError, OutputResult, same_length};
+
+/// A table of the page.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct HtmlTable {
+    /// Column names.
+    pub header: Vec<String>,
+    /// Cells, row by row, as many as columns. The words `pass`, `fail` and `not_resolved` are coloured.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// A figure or table of the report.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReportEntry {
+    /// Short name and link target, such as `fig04`.
+    pub id: String,
+    /// What is shown and how it was made.
+    pub caption: String,
+    /// The picture as SVG text; the scene's metadata may be in it.
+    pub svg: Option<String>,
+    /// A table, for entries that are one.
+    pub table: Option<HtmlTable>,
+    /// Short notes shown as labels beside the name, such as `analytic pair`.
+    pub marks: Vec<String>,
+}
+
+/// The whole page.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Report {
+    /// Title of the page.
+    pub title: String,
+    /// Name and value of what holds for the whole run: version, seed, machine, profile, command.
+    pub facts: Vec<(String, String)>,
+    /// Figures and tables in order.
+    pub entries: Vec<ReportEntry>,
+    /// Claims and their verdicts.
+    pub claims: HtmlTable,
+    /// Run time of each stage.
+    pub timings: HtmlTable,
+}
+
+const STYLE: &str = "\
+:root{color-scheme:light}
+body{font:16px/1.5 system-ui,'Segoe UI','Helvetica Neue',Arial,sans-serif;color:#222;background:#fff;max-width:1040px;margin:0 auto;padding:24px 20px 80px}
+h1{font-size:28px;margin:8px 0 4px}h2{font-size:21px;margin:44px 0 10px;border-bottom:1px solid #ddd;padding-bottom:4px}
+h3{font-size:17px;margin:0 0 6px}
+nav{font-size:14px;margin:14px 0}nav a{margin-right:12px;white-space:nowrap}a{color:#0063a6}
+dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 18px;font-size:14px;margin:14px 0}dt{color:#666}dd{margin:0;overflow-wrap:anywhere}
+figure{margin:26px 0;padding:16px;border:1px solid #e3e3e3;border-radius:6px;background:#fff}
+figure svg{display:block;width:100%;height:auto}figcaption{font-size:14.5px;color:#333;margin-top:10px;white-space:pre-line}
+.mark{display:inline-block;font-size:12px;font-weight:normal;background:#eef3f8;border:1px solid #cbd9e6;border-radius:10px;padding:1px 9px;margin-left:8px;vertical-align:2px}
+.scroll{overflow-x:auto}table{border-collapse:collapse;font-size:14px;width:100%}
+th,td{border-bottom:1px solid #e6e6e6;padding:5px 10px;text-align:left;vertical-align:top}th{background:#f6f6f6;font-weight:600}
+td.pass{color:#00643f;font-weight:600}td.fail{color:#b03a00;font-weight:600}td.not_resolved{color:#6b5a00;font-weight:600}
+@media print{figure{break-inside:avoid}}
+";
+
+impl Report {
+    /// The page.
+    ///
+    /// # Errors
+    /// A row with another number of cells than its header, a picture that is not an `<svg>` element, two entries of one id.
+    pub fn to_html(&self) -> OutputResult<String> {
+        let title = escape(&self.title);
+        let mut out = format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n"
+        );
+        out += "<dl>\n";
+        for (name, value) in &self.facts {
+            out += &format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value));
+        }
+        out += "</dl>\n<nav>";
+        for entry in &self.entries {
+            out += &format!("<a href=\"#{0}\">{0}</a>", escape(&entry.id));
+        }
+        out += "<a href=\"#claims\">claims</a><a href=\"#timings\">timings</a></nav>\n";
+        for (i, entry) in self.entries.iter().enumerate() {
+            if self.entries[..i].iter().any(|e| e.id == entry.id) {
+                return Err(OutputError::Duplicate { what: "report entry", name: entry.id.clone() });
+            }
+            push_entry(entry, &mut out)?;
+        }
+        out += "<h2 id=\"claims\">Claims</h2>\n";
+        push_table("claims", &self.claims, &mut out)?;
+        out += "<h2 id=\"timings\">Timings</h2>\n";
+        push_table("timings", &self.timings, &mut out)?;
+        out += "</body>\n</html>\n";
+        Ok(out)
+    }
+}
+
+fn push_entry(entry: &ReportEntry, out: &mut String) -> OutputResult<()> {
+    let id = escape(&entry.id);
+    *out += &format!("<figure id=\"{id}\">\n<h3>{id}");
+    for mark in &entry.marks {
+        *out += &format!("<span class=\"mark\">{}</span>", escape(mark));
+    }
+    *out += "</h3>\n";
+    if let Some(svg) = &entry.svg {
+        if !svg.starts_with("<svg") || svg.contains("<script") {
+            let start: String = svg.chars().take(20).collect();
+            return Err(OutputError::value(format!("picture of {id}"), start, "one <svg> element without script"));
+        }
+        *out += svg;
+    }
+    if let Some(table) = &entry.table {
+        push_table(&entry.id, table, out)?;
+    }
+    *out += &format!("<figcaption>{}</figcaption>\n</figure>\n", escape(&entry.caption));
+    Ok(())
+}
+
+fn push_table(name: &str, table: &HtmlTable, out: &mut String) -> OutputResult<()> {
+    *out += "<div class=\"scroll\"><table>\n<thead><tr>";
+    for column in &table.header {
+        *out += &format!("<th>{}</th>", escape(column));
+    }
+    *out += "</tr></thead>\n<tbody>\n";
+    for row in &table.rows {
+        same_length(&format!("row of table {name}"), row.len(), "its header", table.header.len())?;
+        *out += "<tr>";
+        for cell in row {
+            let class = match cell.as_str() {
+                "pass" | "fail" | "not_resolved" => format!(" class=\"{cell}\""),
+                _ => String::new(),
+            };
+            *out += &format!("<td{class}>{}</td>", escape(cell));
+        }
+        *out += "</tr>\n";
+    }
+    *out += "</tbody></table></div>\n";
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WILD: &str = "<script>alert('x & \"y\"')</script>";
+
+    fn report() -> Report {
+        let row = |cell: &str| HtmlTable { header: vec![WILD.into()], rows: vec![vec![cell.into()]] };
+        Report {
+            title: WILD.into(),
+            facts: vec![(WILD.into(), WILD.into())],
+            entries: vec![ReportEntry {
+                id: "fig01".into(),
+                caption: WILD.into(),
+                svg: Some("<svg xmlns=\"http://www.w3.org/2000/svg\"></svg>\n".into()),
+                table: Some(row(WILD)),
+                marks: vec![WILD.into()],
+            }],
+            claims: row("not_resolved"),
+            timings: row(WILD),
+        }
+    }
+
+    #[test]
+    fn every_text_is_escaped_and_nothing_is_fetched() {
+        let page = report().to_html().unwrap();
+        assert!(!page.contains("<script"), "{page}");
+        assert_eq!(page.matches("&lt;script&gt;").count(), 11);
+        assert!(page.contains("<td class=\"not_resolved\">not_resolved</td>"));
+        for outside in ["src=", "url(", "@import", "<link", "href=\"http"] {
+            assert!(!page.contains(outside), "{outside}");
+        }
+        assert_eq!(page.matches("<figure").count(), page.matches("</figure>").count());
+    }
+
+    #[test]
+    fn broken_reports_are_refused() {
+        let mut uneven = report();
+        uneven.claims.rows.push(vec![]);
+        assert!(uneven.to_html().is_err());
+        let mut twice = report();
+        twice.entries.push(twice.entries[0].clone());
+        assert!(matches!(twice.to_html(), Err(OutputError::Duplicate { .. })));
+        let mut foreign = report();
+        foreign.entries[0].svg = Some("<script>".into());
+        assert!(matches!(foreign.to_html(), Err(OutputError::Value { .. })));
+    }
+}

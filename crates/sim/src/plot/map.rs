@@ -1,0 +1,276 @@
+//! One field of a sweep as a picture over distance and height in metres, with equal scales, colour bar, ground and lidar.
+//! Check: the colour map is chosen from the field (symmetric for velocities), and the panel's height follows the scan's shape.
+
+use super::axis::Scale;
+use super::colour::ColourMap;
+use super::drawing::{Anchor, Frame, Pen, Raster, Shape};
+use super::font::Font;
+use super::frame::{BOTTOM, Decor, INK, LEFT, TICK_SIZE, label, tick_mark, top_room, upward};
+use super::polar::PolarCells;
+use crate::export::{OutputError, OutputResult, Unit, VelocityMap};
+
+/// Room to the right of the box, for the colour bar and its label.
+const RIGHT: f64 = 118.0;
+/// Pixels of the embedded picture per drawing unit: cell edges stay sharp when the picture is enlarged.
+const DENSITY: f64 = 2.0;
+const GROUND: [u8; 3] = [222, 211, 196];
+
+/// A map to draw.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapPlot {
+    /// Title above the panel.
+    pub title: String,
+    /// Label of the colour bar, with the unit.
+    pub bar_label: String,
+    /// Colours and their range.
+    pub colours: ColourMap,
+    /// Cells and values.
+    pub cells: PolarCells,
+    /// Whether the lidar and its way to the first gate are in the picture.
+    pub show_lidar: bool,
+    /// Points (y, z) [m] to mark, such as vortex centres.
+    pub points_m: Vec<(f64, f64)>,
+}
+
+impl MapPlot {
+    /// The picture of a field of sweep `sweep`. Fields named `v_...`, `radial_velocity` and `bias` get symmetric colours, others light to
+    /// dark; the limits are those of the sweep. The lidar is shown where it stands less than half the width of the scan away.
+    ///
+    /// # Errors
+    /// What [`VelocityMap::check`] finds, no such sweep or field.
+    pub fn new(map: &VelocityMap, sweep: usize, field: &str) -> OutputResult<Self> {
+        map.check()?;
+        if sweep >= map.sweeps.len() {
+            return Err(OutputError::value("sweep", sweep, format!("below {}", map.sweeps.len())));
+        }
+        let field = map.field(field).ok_or_else(|| OutputError::Missing {
+            what: format!("field {field}"),
+            needed: "the map must have the field that is to be drawn".into(),
+        })?;
+        let cells = PolarCells::of_sweep(map, sweep, |r, g| field.values[[r, g]]);
+        let signed = field.name.starts_with("v_") || field.name == "radial_velocity" || field.name == "bias";
+        let ((left, right), _) = cells.extent_m();
+        Ok(Self {
+            title: map.title.clone(),
+            bar_label: bar_label(&field.long_name, field.unit),
+            colours: colours_for(&cells.values, signed),
+            show_lidar: left - map.lidar_y_m < 0.5 * (right - left),
+            cells,
+            points_m: Vec::new(),
+        })
+    }
+
+    /// The same map under another title.
+    #[must_use]
+    pub fn titled(mut self, title: &str) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// The same map with another label at the colour bar.
+    #[must_use]
+    pub fn labelled(mut self, bar_label: &str) -> Self {
+        self.bar_label = bar_label.into();
+        self
+    }
+
+    /// The same map with other colours, such as those of the map beside it.
+    #[must_use]
+    pub fn coloured(mut self, colours: ColourMap) -> Self {
+        self.colours = colours;
+        self
+    }
+
+    /// Box to show: (left, right), (lowest, highest) [m].
+    fn view_m(&self) -> ((f64, f64), (f64, f64)) {
+        let (mut y, mut z) = self.cells.extent_m();
+        z.0 = z.0.min(0.0);
+        if self.show_lidar {
+            y = (y.0.min(self.cells.lidar_m.0), y.1.max(self.cells.lidar_m.0));
+            z.1 = z.1.max(self.cells.lidar_m.1);
+        }
+        let pad = 0.02 * (y.1 - y.0);
+        ((y.0 - pad, y.1 + pad), (z.0 - pad, z.1 + pad))
+    }
+
+    pub(crate) fn height(&self, width: f64) -> f64 {
+        let (y, z) = self.view_m();
+        let inner = (width - LEFT - RIGHT) * (z.1 - z.0) / (y.1 - y.0);
+        inner.clamp(90.0, 1.5 * width) + top_room(&self.title) + BOTTOM
+    }
+
+    pub(crate) fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
+        let (low, high) = self.colours.range();
+        if !(low < high && low.is_finite() && high.is_finite()) {
+            return Err(OutputError::value("range of colours", format!("{low} to {high}"), "finite and increasing"));
+        }
+        let frame = Frame {
+            left: cell.left + LEFT,
+            top: cell.top + top_room(&self.title),
+            width: cell.width - LEFT - RIGHT,
+            height: cell.height - top_room(&self.title) - BOTTOM,
+        };
+        let (y_m, z_m) = self.fitted(&frame);
+        let x = Scale { range: y_m, log: false, paper: (frame.left, frame.right()) };
+        let y = Scale { range: z_m, log: false, paper: (frame.bottom(), frame.top) };
+        let decor = Decor { frame, x, y, x_label: "distance [m]", y_label: "height [m]", title: &self.title };
+        decor.grid(out);
+        let ground = Frame { top: y.place(0.0), height: frame.bottom() - y.place(0.0), ..frame };
+        let size = ((frame.width * DENSITY) as u32, (frame.height * DENSITY) as u32);
+        let mut content = vec![
+            Shape::Area { points: ground.corners(), fill: GROUND, opacity: 1.0 },
+            Shape::Image { frame, raster: self.cells.raster(y_m, z_m, size, &self.colours) },
+            Shape::Line {
+                points: vec![(frame.left, ground.top), (frame.right(), ground.top)],
+                pen: Pen::solid(INK, 1.4),
+            },
+        ];
+        self.push_marks(&x, &y, &mut content);
+        out.push(Shape::Clip { frame, shapes: content });
+        decor.axes(font, out);
+        self.push_bar(&frame, font, out);
+        Ok(())
+    }
+
+    /// The view, widened along one axis to the shape of the frame.
+    fn fitted(&self, frame: &Frame) -> ((f64, f64), (f64, f64)) {
+        let (mut y, mut z) = self.view_m();
+        let unit = ((y.1 - y.0) / frame.width).max((z.1 - z.0) / frame.height);
+        let extra = unit * frame.width - (y.1 - y.0);
+        y = (y.0 - 0.5 * extra, y.1 + 0.5 * extra);
+        // Room above, not below the ground.
+        z.1 = z.0 + unit * frame.height;
+        (y, z)
+    }
+
+    fn push_marks(&self, x: &Scale, y: &Scale, out: &mut Vec<Shape>) {
+        let lidar = (x.place(self.cells.lidar_m.0), y.place(self.cells.lidar_m.1));
+        if self.show_lidar {
+            // A tripod on the ground, large enough to be seen when the telescope is low.
+            let ground = y.place(0.0);
+            let apex = (lidar.0, lidar.1.min(ground - 13.0));
+            let triangle = vec![apex, (lidar.0 - 8.0, ground), (lidar.0 + 8.0, ground)];
+            out.push(Shape::Area { points: triangle, fill: INK, opacity: 1.0 });
+            out.push(label((lidar.0 + 13.0, ground - 4.0), "lidar".into(), TICK_SIZE, Anchor::Start));
+        }
+        for p in &self.points_m {
+            let (px, py) = (x.place(p.0), y.place(p.1));
+            for (colour, width) in [([255, 255, 255], 4.5), (INK, 2.0)] {
+                for d in [7.0, -7.0] {
+                    let arm = vec![(px - 7.0, py - d), (px + 7.0, py + d)];
+                    out.push(Shape::Line { points: arm, pen: Pen::solid(colour, width) });
+                }
+            }
+        }
+    }
+
+    fn push_bar(&self, frame: &Frame, font: &Font, out: &mut Vec<Shape>) {
+        let bar = Frame { left: frame.right() + 18.0, top: frame.top, width: 18.0, height: frame.height };
+        let range = self.colours.range();
+        // Wide enough that a viewer's smoothing stays at the rim.
+        let (steps, columns) = (256, 36);
+        let rgba = (0..steps).flat_map(|i| {
+            let value = range.1 - (f64::from(i) + 0.5) / f64::from(steps) * (range.1 - range.0);
+            let c = self.colours.colour(value);
+            [c[0], c[1], c[2], 255].repeat(columns)
+        });
+        out.push(Shape::Image {
+            frame: bar,
+            raster: Raster { width: columns as u32, height: steps, rgba: rgba.collect() },
+        });
+        let mut outline = bar.corners();
+        outline.push((bar.left, bar.top));
+        out.push(Shape::Line { points: outline, pen: Pen::solid(INK, 1.2) });
+        let scale = Scale { range, log: false, paper: (bar.bottom(), bar.top) };
+        let mut widest: f64 = 0.0;
+        for tick in scale.ticks(40.0) {
+            let y = scale.place(tick.value);
+            widest = widest.max(font.width(&tick.label, TICK_SIZE));
+            out.push(tick_mark((bar.right(), y), (5.0, 0.0)));
+            out.push(label((bar.right() + 9.0, y + 0.36 * TICK_SIZE), tick.label, TICK_SIZE, Anchor::Start));
+        }
+        out.push(upward((bar.right() + 9.0 + widest + 20.0, bar.top + bar.height / 2.0), &self.bar_label));
+    }
+}
+
+/// Colours from the finite values: symmetric about zero for signed fields, rounded up to two digits.
+fn colours_for(values: &[f64], signed: bool) -> ColourMap {
+    let finite = || values.iter().copied().filter(|v| v.is_finite());
+    let low = finite().fold(f64::INFINITY, f64::min);
+    let high = finite().fold(f64::NEG_INFINITY, f64::max);
+    if signed {
+        let largest = high.max(-low);
+        let limit = if largest > 0.0 && largest.is_finite() { round_up(largest) } else { 1.0 };
+        return ColourMap::Diverging { limit };
+    }
+    if low > high {
+        return ColourMap::Sequential { low: 0.0, high: 1.0 };
+    }
+    let low = if low >= 0.0 && low < 0.5 * high { 0.0 } else { low };
+    let high = if high > low { high } else { low + 1.0 };
+    ColourMap::Sequential { low, high }
+}
+
+fn round_up(value: f64) -> f64 {
+    let step = 10_f64.powf(value.log10().floor() - 1.0);
+    (value / step - 1e-9).ceil() * step
+}
+
+fn bar_label(long_name: &str, unit: Unit) -> String {
+    // The part after a comma explains the sign; a colour bar shows it.
+    let short = long_name.split(',').next().unwrap_or(long_name);
+    let unit = match unit {
+        Unit::One => return short.into(),
+        Unit::Metre => "m",
+        Unit::MetrePerSecond => "m/s",
+        Unit::SquareMetrePerSecond => "m²/s",
+        Unit::Hertz => "Hz",
+        Unit::Decibel => "dB",
+    };
+    format!("{short} [{unit}]")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::samples;
+
+    #[test]
+    fn velocities_get_symmetric_colours_and_errors_do_not() {
+        let map = samples::map();
+        let velocity = MapPlot::new(&map, 0, "v_exact").unwrap();
+        let (low, high) = velocity.colours.range();
+        assert_eq!(low, -high);
+        assert!((7.0..=8.0).contains(&high), "{high}");
+        let spread = MapPlot::new(&map, 0, "velocity_standard_deviation").unwrap();
+        assert!(matches!(spread.colours, ColourMap::Sequential { low: 0.0, .. }));
+        assert_eq!(velocity.bar_label, "exact radial velocity [m/s]");
+    }
+
+    #[test]
+    fn a_metre_is_equally_long_both_ways_and_the_ground_is_below() {
+        let map = samples::map();
+        let plot = MapPlot::new(&map, 0, "v_exact").unwrap();
+        for height in [180.0, 400.0] {
+            let frame = Frame { left: 0.0, top: 0.0, width: 500.0, height };
+            let (y, z) = plot.fitted(&frame);
+            approx::assert_relative_eq!((y.1 - y.0) / 500.0, (z.1 - z.0) / height, max_relative = 1e-12);
+            assert!(z.0 <= 0.0 && z.1 >= plot.view_m().1.1 - 1e-9);
+        }
+        assert!(plot.show_lidar);
+    }
+
+    #[test]
+    fn limits_are_rounded_up() {
+        approx::assert_relative_eq!(round_up(7.31), 7.4, max_relative = 1e-12);
+        approx::assert_relative_eq!(round_up(0.5), 0.5, max_relative = 1e-12);
+        assert_eq!(colours_for(&[f64::NAN], true), ColourMap::Diverging { limit: 1.0 });
+    }
+
+    #[test]
+    fn what_is_not_there_is_refused() {
+        let map = samples::map();
+        assert!(matches!(MapPlot::new(&map, 0, "nothing"), Err(OutputError::Missing { .. })));
+        assert!(matches!(MapPlot::new(&map, 2, "v_exact"), Err(OutputError::Value { .. })));
+    }
+}

@@ -1,0 +1,33 @@
+//! Pictures of results: curves, RHI maps in metres, and a report page. One list of shapes is drawn as SVG and as PNG,
+//! with a font that is compiled in, so that no system font is needed and the same input gives the same bytes.
+//! Check: the tests look up single pixels, ticks and colours; the PNG files are for the eye.
+//!
+//! | module | draws |
+//! |---|---|
+//! | [`figure`] | panels side by side or stacked, as SVG text or PNG bytes |
+//! | [`curves`] | curves with bands and markers, linear or logarithmic |
+//! | [`map`] | one field of a sweep over distance and height, equal scales, with colour bar |
+//! | [`polar`] | (inside a map) pixels from polar cells |
+//! | [`colour`] | palette and colour maps |
+//! | [`html`] | the self-contained report page |
+
+mod axis;
+pub mod colour;
+pub mod curves;
+mod drawing;
+pub mod figure;
+mod font;
+mod frame;
+pub mod html;
+mod legend;
+pub mod map;
+mod png_file;
+pub mod polar;
+mod svg;
+
+pub use axis::Axis;
+pub use colour::ColourMap;
+pub use curves::{CurvePlot, Series, Style};
+pub use figure::{Figure, Panel};
+pub use html::{HtmlTable, Report, ReportEntry};
+pub use map::MapPlot;
