@@ -53,7 +53,7 @@ pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResu
     Ok(out.into_bytes())
 }
 
-/// Gate length [m] and number of gates between the lidar and the first one.
+/// Gate length in metres, and number of gates between the lidar and the first one.
 fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
     let refuse = |reason: String| OutputError::Unsupported { format: "HALO .hpl", reason };
     if range_m.len() < 2 {

@@ -116,11 +116,11 @@ fn standard_name_of(name: &str) -> Option<&'static str> {
 pub struct Ray {
     /// Index into [`VelocityMap::sweeps`]; the rays of a sweep are contiguous and sweeps follow in order.
     pub sweep: usize,
-    /// Time of the ray from the start of the flow [s]; increases strictly over all rays.
+    /// Time of the ray from the start of the flow, s; increases strictly over all rays.
     pub time_s: f64,
-    /// Elevation above the horizontal [rad].
+    /// Elevation above the horizontal, rad.
     pub elevation_rad: f64,
-    /// Azimuth of the scan plane, clockwise from north [rad].
+    /// Azimuth of the scan plane, clockwise from north, rad.
     pub azimuth_rad: f64,
 }
 
@@ -129,22 +129,22 @@ pub struct Ray {
 pub struct Sweep {
     /// Age of the wake, dimensionless (t Gamma0 / (2 pi b0^2)).
     pub tau: f64,
-    /// Azimuth of the scan plane [rad].
+    /// Azimuth of the scan plane, rad.
     pub azimuth_rad: f64,
 }
 
 /// Pulse and acquisition, the same for all rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PulseInfo {
-    /// Pulse repetition time [s].
+    /// Pulse repetition time, s.
     pub prt_s: f64,
-    /// Pulse duration [s].
+    /// Pulse duration, s.
     pub pulse_width_s: f64,
-    /// Largest velocity that can be told apart, sample rate times wavelength / 4 [m/s].
+    /// Largest velocity that can be told apart, sample rate times wavelength / 4, m/s.
     pub nyquist_velocity_m_s: f64,
     /// Pulses averaged per ray.
     pub samples: u32,
-    /// Optical frequency [Hz].
+    /// Optical frequency, Hz.
     pub frequency_hz: f64,
 }
 
@@ -155,7 +155,7 @@ pub struct VelocityMap {
     pub title: String,
     /// Rays in the order of their times.
     pub rays: Vec<Ray>,
-    /// Gate centres [m], increasing.
+    /// Gate centres, m, increasing.
     pub range_m: Vec<f64>,
     /// Sweeps, each tiled by its rays.
     pub sweeps: Vec<Sweep>,
@@ -163,19 +163,19 @@ pub struct VelocityMap {
     pub pulse: PulseInfo,
     /// Quantities over (ray, gate).
     pub fields: Vec<Field>,
-    /// Horizontal position of the lidar in the frame of the flow [m].
+    /// Horizontal position of the lidar in the frame of the flow, m.
     pub lidar_y_m: f64,
-    /// Height of the telescope above the ground [m].
+    /// Height of the telescope above the ground, m.
     pub lidar_height_m: f64,
 }
 
 impl VelocityMap {
-    /// Horizontal position of a gate in the frame of the flow [m].
+    /// Horizontal position of a gate in the frame of the flow, m.
     pub fn y_m(&self, ray: usize, gate: usize) -> f64 {
         self.lidar_y_m + self.range_m[gate] * self.rays[ray].elevation_rad.cos()
     }
 
-    /// Height of a gate above the ground [m].
+    /// Height of a gate above the ground, m.
     pub fn z_m(&self, ray: usize, gate: usize) -> f64 {
         self.lidar_height_m + self.range_m[gate] * self.rays[ray].elevation_rad.sin()
     }
@@ -263,15 +263,15 @@ pub struct CrossPlanes {
     pub title: String,
     /// Ages of the wake, increasing.
     pub tau: Vec<f64>,
-    /// Times of the planes [s], one per `tau`.
+    /// Times of the planes, s, one per `tau`.
     pub time_s: Vec<f64>,
-    /// Horizontal cell centres [m], increasing.
+    /// Horizontal cell centres, m, increasing.
     pub y_m: Vec<f64>,
-    /// Vertical cell centres [m], increasing.
+    /// Vertical cell centres, m, increasing.
     pub z_m: Vec<f64>,
-    /// Horizontal wind `[tau, z, y]` [m/s]; NaN = missing.
+    /// Horizontal wind `[tau, z, y]`, m/s; NaN = missing.
     pub v_m_s: Array3<f64>,
-    /// Vertical wind `[tau, z, y]` [m/s]; NaN = missing.
+    /// Vertical wind `[tau, z, y]`, m/s; NaN = missing.
     pub w_m_s: Array3<f64>,
 }
 

@@ -28,7 +28,7 @@ pub struct MapPlot {
     pub cells: PolarCells,
     /// Whether the lidar and its way to the first gate are in the picture.
     pub show_lidar: bool,
-    /// Points (y, z) [m] to mark, such as vortex centres.
+    /// Points (y, z) in metres to mark, such as vortex centres.
     pub points_m: Vec<(f64, f64)>,
 }
 
@@ -81,7 +81,7 @@ impl MapPlot {
         self
     }
 
-    /// Box to show: (left, right), (lowest, highest) [m].
+    /// Box to show: (left, right), (lowest, highest), m.
     fn view_m(&self) -> ((f64, f64), (f64, f64)) {
         let (mut y, mut z) = self.cells.extent_m();
         z.0 = z.0.min(0.0);

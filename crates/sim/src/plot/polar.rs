@@ -9,11 +9,11 @@ use crate::export::VelocityMap;
 /// Cells of one sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolarCells {
-    /// Horizontal position and height of the lidar [m].
+    /// Horizontal position and height of the lidar, m.
     pub lidar_m: (f64, f64),
-    /// Edges of the gates [m], one more than gates.
+    /// Edges of the gates, m, one more than gates.
     pub range_edge_m: Vec<f64>,
-    /// Edges of the rays [rad], increasing, one more than rays.
+    /// Edges of the rays, rad, increasing, one more than rays.
     pub elevation_edge_rad: Vec<f64>,
     /// Values, ray by ray in the order of increasing elevation, the gate running fastest.
     pub values: Vec<f64>,
@@ -42,7 +42,7 @@ impl PolarCells {
         Some(self.values[ray * (self.range_edge_m.len() - 1) + gate])
     }
 
-    /// Box around all cells: (left, right), (lowest, highest) [m].
+    /// Box around all cells: (left, right), (lowest, highest), m.
     pub fn extent_m(&self) -> ((f64, f64), (f64, f64)) {
         let mut y = (f64::INFINITY, f64::NEG_INFINITY);
         let mut z = y;
