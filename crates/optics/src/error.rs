@@ -48,6 +48,30 @@ pub enum Error {
         /// Last range of the profile [m].
         last_m: f64,
     },
+    /// A grid or layering cannot hold what it is asked to hold.
+    #[error("sampling: {limit}: {needed:.4e} is needed, the set-up has {available:.4e}")]
+    Sampling {
+        /// The limit that is violated, with its unit.
+        limit: &'static str,
+        /// Smallest (or, for a spacing, largest) value that works.
+        needed: f64,
+        /// The value of the set-up.
+        available: f64,
+    },
+    /// The absorbing border took so much power that the result means nothing.
+    #[error("the absorbing border took {fraction:.3} of the power before {range_m} m, 0.05 at most: use a wider grid")]
+    PowerLost {
+        /// Range at which it was noticed [m].
+        range_m: f64,
+        /// Mean fraction of the power that was lost.
+        fraction: f64,
+    },
+    /// The caller's progress function asked to stop.
+    #[error("cancelled after {realisations} realisations")]
+    Cancelled {
+        /// Realisations that were done.
+        realisations: usize,
+    },
     /// A quadrature did not reach its tolerance.
     #[error("quadrature of {quantity} stopped at a relative error of {error:.1e}, {tolerance:.1e} was asked for")]
     Convergence {

@@ -28,10 +28,22 @@
 pub mod beam;
 pub mod efficiency;
 mod error;
+#[cfg(feature = "screens")]
+pub mod grid;
 pub mod hankel;
+#[cfg(feature = "screens")]
+mod kernel;
+#[cfg(feature = "screens")]
+mod low_frequency;
 mod overlap;
+#[cfg(feature = "screens")]
+pub mod propagate;
 mod quadrature;
+#[cfg(feature = "screens")]
+pub mod screen;
 pub mod snr;
+#[cfg(feature = "screens")]
+pub mod source;
 pub mod spectrum;
 pub mod structure;
 pub mod theory;
@@ -40,6 +52,10 @@ pub mod turbulence;
 pub use beam::{Focus, Misalignment, RadiusDefinition, Telescope};
 pub use efficiency::EfficiencyProfile;
 pub use error::Error;
+#[cfg(feature = "screens")]
+pub use grid::Grid;
+#[cfg(feature = "screens")]
+pub use kernel::Real;
 pub use snr::{PlanckConvention, SnrModel};
 pub use spectrum::{HillAndrews, OuterScaleConvention, Spectrum, VonKarman};
 pub use turbulence::{Cn2Path, Turbulence};
