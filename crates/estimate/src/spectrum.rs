@@ -153,6 +153,13 @@ impl Band {
         (self.first + bin).rem_euclid(self.padded as i64) as usize
     }
 
+    /// The densities of the band in order, in two pieces where it crosses 0 Hz.
+    pub(crate) fn pieces<'d>(&self, density: &'d [f64]) -> [&'d [f64]; 2] {
+        let start = self.index(0);
+        let end = (start + self.bins).min(density.len());
+        [&density[start..end], &density[..start + self.bins - end]]
+    }
+
     /// Frequency \[Hz\] of a (fractional) bin of the band.
     pub(crate) fn frequency_hz(&self, bin: f64) -> f64 {
         (self.first as f64 + bin) * self.spacing_hz
@@ -207,6 +214,10 @@ mod tests {
         assert_eq!((literal.bins, literal.index(0)), (12, 15));
         let baseband = Sampling::baseband(250e6, 1.55e-6, 250e6).unwrap();
         let whole = Band::new(&baseband, SignalKind::Complex, 64).unwrap();
+        let places: Vec<f64> = (0..64).map(f64::from).collect();
+        for (bin, place) in whole.pieces(&places).concat().iter().enumerate() {
+            assert_eq!(whole.index(bin as i64) as f64, *place);
+        }
         assert!(whole.cyclic && whole.bins == 64);
     }
 

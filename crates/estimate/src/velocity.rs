@@ -120,7 +120,7 @@ impl SpectralPeak {
     /// [`Error::Length`] if `correlogram` has not the planned number of lags.
     pub fn band_density(&self, correlogram: &[f64], scratch: &mut Scratch) -> Result<Vec<f64>, Error> {
         let density = self.spectrum.density(correlogram, scratch)?;
-        Ok((0..self.band.bins as i64).map(|bin| density[self.band.index(bin)]).collect())
+        Ok(self.band.pieces(density).concat())
     }
 
     /// Fractional bin of the peak next to bin `top`, by parabola.
@@ -163,7 +163,7 @@ impl SpectralPeak {
     /// Flag of a search whose highest density in the band is `peak`, in bin `top`.
     fn flag(&self, density: &[f64], peak: f64, top: i64) -> Quality {
         let padded = density.len();
-        let (place, highest) = highest(density.iter().copied());
+        let (place, highest) = highest(density);
         if peak < SIDELOBE * highest {
             // distance from 0 Hz in units of the resolution 1/N, N lags wide windows
             let from_zero = place.min(padded - place) as f64 / padded as f64;
@@ -192,9 +192,10 @@ impl Estimator for SpectralPeak {
             return GateVelocity::none(Quality::Invalid);
         };
         let bins = self.band.bins;
-        let in_band = (0..bins as i64).map(|bin| density[self.band.index(bin)]);
-        let (top, peak) = highest(in_band.clone());
-        let sum: f64 = in_band.sum();
+        let pieces = self.band.pieces(density);
+        let [(left, low), (right, high)] = pieces.map(highest);
+        let (top, peak) = if high > low { (pieces[0].len() + right, high) } else { (left, low) };
+        let sum: f64 = pieces.iter().flat_map(|piece| piece.iter()).sum();
         let top = top as i64;
         let sides = match self.spectrum.kind() {
             SignalKind::Real => 2.0,
@@ -222,12 +223,17 @@ impl Estimator for SpectralPeak {
     }
 }
 
-/// Place and value of the first highest number.
-fn highest(values: impl Iterator<Item = f64>) -> (usize, f64) {
-    values.enumerate().fold(
-        (0, f64::NEG_INFINITY),
-        |best, (place, value)| {
-            if value > best.1 { (place, value) } else { best }
-        },
-    )
+/// Place and value of the first highest number; (0, -inf) if there is none.
+fn highest(values: &[f64]) -> (usize, f64) {
+    // independent lanes, so that the comparisons need not wait for each other
+    let mut lanes = [f64::NEG_INFINITY; 8];
+    let chunks = values.chunks_exact(8);
+    let rest = chunks.remainder();
+    for chunk in chunks {
+        for (lane, value) in lanes.iter_mut().zip(chunk) {
+            *lane = if *value > *lane { *value } else { *lane };
+        }
+    }
+    let highest = lanes.iter().chain(rest).copied().fold(f64::NEG_INFINITY, f64::max);
+    (values.iter().position(|value| *value == highest).unwrap_or(0), highest)
 }

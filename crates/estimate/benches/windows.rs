@@ -1,0 +1,49 @@
+//! Time per window: statistic, spectrum and peak, and the direct periodogram beside them.
+
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use num_complex::Complex;
+use std::hint::black_box;
+use wakescope_estimate::*;
+
+fn window() -> Vec<f64> {
+    let turn = std::f64::consts::TAU * 80e6 / 250e6;
+    (0..64).map(|n| (turn * n as f64).cos() + 0.3 * (n as f64 * 12.9898).sin()).collect()
+}
+
+fn windows(criterion: &mut Criterion) {
+    let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();
+    let plan = PeriodogramPlan::<f64>::new(&sampling, 64, &PeriodogramOptions::default()).unwrap();
+    let (real, mut scratch) = (window(), Scratch::new());
+    let complex: Vec<_> = real.iter().map(|x| Complex::new(*x, 0.5 * x)).collect();
+    let mut lags = vec![0.0; 64];
+    criterion.bench_function("correlogram, 64 real samples", |b| {
+        b.iter(|| plan.statistic.evaluate(black_box(&real), &mut scratch, &mut lags));
+    });
+    let statistic = Correlogram::<Complex<f64>>::new(Weighting::default(), 64).unwrap();
+    let mut complex_lags = vec![0.0; 128];
+    criterion.bench_function("correlogram, 64 complex samples", |b| {
+        b.iter(|| statistic.evaluate(black_box(&complex), &mut scratch, &mut complex_lags));
+    });
+    criterion.bench_function("spectrum of 1024 points and peak", |b| {
+        b.iter(|| plan.estimator.estimate(black_box(&lags), &mut scratch));
+    });
+    let exact = PeriodogramOptions { refinement: Refinement::Exact, ..PeriodogramOptions::default() };
+    let exact = PeriodogramPlan::<f64>::new(&sampling, 64, &exact).unwrap();
+    criterion.bench_function("the same with exact refinement", |b| {
+        b.iter(|| exact.estimator.estimate(black_box(&lags), &mut scratch));
+    });
+    let direct = Periodogram::<f64>::new(Weighting::default(), 64, 1024).unwrap();
+    criterion.bench_function("direct periodogram of 1024 points", |b| {
+        b.iter(|| direct.density(black_box(&real), &mut scratch).unwrap()[300]);
+    });
+    let model = WindowModel::gaussian_pulse(&sampling, 64, 120e-9, Noise::White).unwrap();
+    let tapers = Correlogram::<f64>::with_tapers(likelihood_tapers(&model, 10.0).unwrap()).unwrap();
+    criterion.bench_function("likelihood correlogram at 10 dB", |b| {
+        b.iter(|| tapers.evaluate(black_box(&real), &mut scratch, &mut lags));
+    });
+}
+
+criterion_group!(benches, windows);
+criterion_main!(benches);
