@@ -1,1 +1,5 @@
-//! Tests across the crates of wakescope.
+//! Claims that hold across crates, one module for each family.
+
+mod point_target;
+mod power;
+mod uniform_wind;

@@ -26,7 +26,9 @@ pub(crate) fn run(options: &Options) -> Outcome {
             Failure::new(format!("bless {name}: no such curve; there are {}", known.join(", ")))
         })?;
         let Origin::Blessed { quantity, grid } = curve.origin else {
-            return Err(Failure::new(format!("bless {name}: it comes from an independent source and is not ours to write")));
+            return Err(Failure::new(format!(
+                "bless {name}: it comes from an independent source and is not ours to write"
+            )));
         };
         let x = grid();
         let y = (curve.compute)(&x)?;
@@ -39,7 +41,11 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
         let path = root().join(curve.file);
         write_atomic(&path, text)?;
-        println!("wrote {} points to {}: say in CHANGELOG.md, under Numerics, why the curve changed", x.len(), curve.file);
+        println!(
+            "wrote {} points to {}: say in CHANGELOG.md, under Numerics, why the curve changed",
+            x.len(),
+            curve.file
+        );
     }
     Ok(())
 }

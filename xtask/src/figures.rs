@@ -50,9 +50,8 @@ impl Context {
     /// The scene of a figure as a checked file, with this run's seed.
     pub(crate) fn scene_file(&self, mut scene: Scene) -> Result<wakescope_sim::scene::SceneFile, Failure> {
         scene.seed = self.seed;
-        wakescope_sim::scene::SceneFile::new(scene).map_err(|problems| {
-            Failure::new(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-        })
+        wakescope_sim::scene::SceneFile::new(scene)
+            .map_err(|problems| Failure::new(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")))
     }
 
     /// Provenance of what belongs to no scene: the tables over all figures.
@@ -86,6 +85,8 @@ pub(crate) struct Rendered {
     pub(crate) files: Vec<(String, Vec<u8>)>,
     /// What is drawn, for the report.
     pub(crate) caption: String,
+    /// Short notes beside the name, such as what is not the real thing.
+    pub(crate) marks: Vec<String>,
     /// Claims measured on the data of the run.
     pub(crate) claims: Vec<Claim>,
     /// Stage and wall-clock time, s.
@@ -174,7 +175,12 @@ impl fmt::Display for Claim {
 pub(crate) const ALL: [Figure; 7] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
     Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
-    Figure { id: "tab02", number: 2, title: "Lidar parameters as read back from the scene that was run", make: tab02::make },
+    Figure {
+        id: "tab02",
+        number: 2,
+        title: "Lidar parameters as read back from the scene that was run",
+        make: tab02::make,
+    },
     Figure { id: "fig03", number: 3, title: "Scan pattern across the runway", make: fig03::make },
     Figure { id: "fig05", number: 5, title: "M'4 stencil on a line of sight", make: fig05::make },
     Figure { id: "fig08", number: 8, title: "Radial velocity of the early wake (analytic pair)", make: fig08::make },

@@ -5,6 +5,7 @@ use crate::curves::{ALL, Comparison, Curve};
 use crate::workspace::root;
 use crate::{Failure, Outcome};
 use std::time::Instant;
+use wakescope_sim::export::Provenance;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Options of the task.
@@ -32,7 +33,13 @@ pub(crate) fn run(options: &Options) -> Outcome {
                 let verdict = if c.passes(curve) { "pass" } else { "FAIL" };
                 println!(
                     "{:<34} {:>6} {:>11.3e} {:>11.1e} {:>7.3} s  {verdict}, worst at {} = {}",
-                    curve.name, c.x.len(), c.worst_error, curve.tolerance, time_s, curve.x, c.x[c.worst]
+                    curve.name,
+                    c.x.len(),
+                    c.worst_error,
+                    curve.tolerance,
+                    time_s,
+                    curve.x,
+                    c.x[c.worst]
                 );
                 if !c.passes(curve) {
                     failed.push(curve.name);
@@ -45,23 +52,27 @@ pub(crate) fn run(options: &Options) -> Outcome {
             }
         }
     }
-    if failed.is_empty() { Ok(()) } else { Err(Failure::new(format!("regress: out of tolerance: {}", failed.join(", ")))) }
+    if failed.is_empty() {
+        Ok(())
+    } else {
+        Err(Failure::new(format!("regress: out of tolerance: {}", failed.join(", "))))
+    }
 }
 
 fn draw(curve: &Curve, c: &Comparison) -> Result<String, Failure> {
     let points = |y: &[f64]| c.x.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
-    let plot = CurvePlot {
-        title: curve.name.into(),
-        x: Axis::linear(curve.x),
-        y: Axis::linear(curve.y),
-        series: vec![
-            Series::new("stored", points(&c.stored), Style::Line),
-            Series::new("computed", points(&c.computed), Style::Dash),
-        ],
+    let plot = CurvePlot::new(curve.name, Axis::linear(curve.x), Axis::linear(curve.y))
+        .with(Series::new("stored", Style::Line, points(&c.stored)))
+        .with(Series::new("computed", Style::Dash, points(&c.computed)));
+    let origin = Provenance {
+        program: wakescope_sim::PROGRAM.into(),
+        scene_toml: format!("curve = \"{}\"\n", curve.name),
+        scene_hash: wakescope_sim::scene::hash_of(curve.name),
+        seed: 0,
     };
     let folder = root().join("target/regress");
     std::fs::create_dir_all(&folder)?;
     let path = folder.join(format!("{}.svg", curve.name.replace('/', "_")));
-    std::fs::write(&path, Figure::single(plot).svg()?)?;
+    std::fs::write(&path, Figure::stacked([plot]).svg(&origin)?)?;
     Ok(path.display().to_string())
 }

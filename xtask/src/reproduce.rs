@@ -104,10 +104,8 @@ fn write_figure(out: &Path, figure: &Figure, rendered: &Rendered) -> Outcome {
 fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)]) -> Outcome {
     let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
     write_atomic(&out.join("claims.csv"), claims_table(&claims).to_csv(&context.provenance_of_run())?)?;
-    let timings: Vec<(&str, &str, f64)> = done
-        .iter()
-        .flat_map(|(f, r)| r.timings.iter().map(|(stage, s)| (f.id, stage.as_str(), *s)))
-        .collect();
+    let timings: Vec<(&str, &str, f64)> =
+        done.iter().flat_map(|(f, r)| r.timings.iter().map(|(stage, s)| (f.id, stage.as_str(), *s))).collect();
     let table = Table::new()
         .text("figure", timings.iter().map(|t| t.0))
         .text("stage", timings.iter().map(|t| t.1))

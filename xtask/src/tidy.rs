@@ -24,8 +24,21 @@ const MAX_LINES: usize = 400;
 
 /// Files and folders that may stand at the top.
 const TOP_LEVEL: [&str; 15] = [
-    ".cargo", ".ci", ".gitignore", "CHANGELOG.md", "CITATION.cff", "Cargo.lock", "Cargo.toml", "LICENSE", "README.md",
-    "clippy.toml", "crates", "docs", "rustfmt.toml", "tests", "xtask",
+    ".cargo",
+    ".ci",
+    ".gitignore",
+    "CHANGELOG.md",
+    "CITATION.cff",
+    "Cargo.lock",
+    "Cargo.toml",
+    "LICENSE",
+    "README.md",
+    "clippy.toml",
+    "crates",
+    "docs",
+    "rustfmt.toml",
+    "tests",
+    "xtask",
 ];
 
 /// File types that may stand anywhere below.
@@ -36,16 +49,66 @@ const PRIVATE: [&str; 5] = ["/home/", "/root/", "/work/", "/tmp/", "C:\\Users"];
 
 /// Words that name a physical quantity: a public number of that name needs a unit at its end.
 const QUANTITIES: [&str; 26] = [
-    "range", "velocity", "speed", "time", "frequency", "wavelength", "length", "radius", "height", "width", "distance",
-    "thickness", "spacing", "power", "energy", "duration", "elevation", "azimuth", "angle", "circulation", "bandwidth",
-    "backscatter", "extinction", "area", "wavenumber", "position",
+    "range",
+    "velocity",
+    "speed",
+    "time",
+    "frequency",
+    "wavelength",
+    "length",
+    "radius",
+    "height",
+    "width",
+    "distance",
+    "thickness",
+    "spacing",
+    "power",
+    "energy",
+    "duration",
+    "elevation",
+    "azimuth",
+    "angle",
+    "circulation",
+    "bandwidth",
+    "backscatter",
+    "extinction",
+    "area",
+    "wavenumber",
+    "position",
 ];
 
 /// What a name with a unit ends with.
 const UNITS: [&str; 30] = [
-    "_m", "_s", "_hz", "_rad", "_rad_m", "_m_s", "_m2_s", "_m2", "_m3", "_j", "_w", "_a", "_a_w", "_a2", "_db", "_per_m",
-    "_per_s", "_per_m_sr", "_per_m2", "_deg", "_kg", "_kg_m3", "_m_m23", "_n", "_bytes", "_samples", "_m_s2", "_a2_hz",
-    "_per_hz", "_per_sqrt_s",
+    "_m",
+    "_s",
+    "_hz",
+    "_rad",
+    "_rad_m",
+    "_m_s",
+    "_m2_s",
+    "_m2",
+    "_m3",
+    "_j",
+    "_w",
+    "_a",
+    "_a_w",
+    "_a2",
+    "_db",
+    "_per_m",
+    "_per_s",
+    "_per_m_sr",
+    "_per_m2",
+    "_deg",
+    "_kg",
+    "_kg_m3",
+    "_m_m23",
+    "_n",
+    "_bytes",
+    "_samples",
+    "_m_s2",
+    "_a2_hz",
+    "_per_hz",
+    "_per_sqrt_s",
 ];
 
 /// Checks the tree; every violation is printed.
@@ -104,7 +167,11 @@ fn check_source(file: &str, text: &str, found: &mut Vec<String>) {
         found.push(format!("{file}: {lines} lines, at most {MAX_LINES}: split it by subject"));
     }
     for (i, line) in text.lines().enumerate() {
-        if line.contains("TODO") || line.contains("FIXME") || line.contains("todo!(") || line.contains("unimplemented!(") {
+        if line.contains("TODO")
+            || line.contains("FIXME")
+            || line.contains("todo!(")
+            || line.contains("unimplemented!(")
+        {
             if !file.ends_with("tidy.rs") {
                 found.push(format!("{file}:{}: unfinished work", i + 1));
             }
@@ -132,7 +199,9 @@ fn lacks_unit(name: &str) -> bool {
 
 fn check_reference(file: &str, text: &str, found: &mut Vec<String>) {
     if !text.starts_with('#') {
-        found.push(format!("{file}:1: a reference curve says in `#` lines what it is, its source, units and uncertainty"));
+        found.push(format!(
+            "{file}:1: a reference curve says in `#` lines what it is, its source, units and uncertainty"
+        ));
     }
 }
 
@@ -157,7 +226,11 @@ fn check_manifest(folder: &str, allowed: &[&str], text: &str, found: &mut Vec<St
         let Some((key, value)) = line.split_once('=').filter(|_| section.ends_with("dependencies")) else { continue };
         let name = key.trim().split('.').next().unwrap_or("");
         if !line.contains("workspace = true") {
-            found.push(format!("{folder}/Cargo.toml:{}: `{name}`: versions stand in the workspace ({})", i + 1, value.trim()));
+            found.push(format!(
+                "{folder}/Cargo.toml:{}: `{name}`: versions stand in the workspace ({})",
+                i + 1,
+                value.trim()
+            ));
         }
         if let Some(own) = name.strip_prefix("wakescope-") {
             if !allowed.contains(&own) {

@@ -47,8 +47,7 @@ impl Geometry {
         let sample_spacing_m = scene.sample_spacing_m();
         let samples = scene.samples_per_record();
         let window = scene.estimator.window_samples;
-        let gate_first_sample: Vec<usize> =
-            (0..=samples - window).step_by(scene.estimator.gate_step_samples).collect();
+        let gate_first_sample: Vec<usize> = (0..=samples - window).step_by(scene.estimator.gate_step_samples).collect();
         // Windows are indexed by their centre, R = c (t_p + N T_s/2)/2.
         let centre_m = |first: &usize| scan.range_min_m + (*first as f64 + 0.5 * window as f64) * sample_spacing_m;
         let sigma_s = scene.pulse_sigma_s();

@@ -1,4 +1,45 @@
-//! The whole measurement: from a scene file to a radial-velocity map with its errors.
+//! The whole measurement: a scene file goes in, a radial-velocity map with its errors comes out.
+//!
+//! This crate joins the four others, which know nothing of each other: the wind of `les`, the efficiency
+//! of `optics`, the records of `signal` and the velocities of `estimate`. A [`scene::Scene`] becomes a
+//! [`plan::Plan`], which says what will run and what is left out and why; [`run::run`] runs it; [`write::write`]
+//! puts the results on disk, all files or none.
+//!
+//! ```
+//! use wakescope_sim::plan::{Plan, Stage, Target};
+//! use wakescope_sim::progress::Silent;
+//! use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
+//!
+//! # fn main() -> Result<(), wakescope_sim::Error> {
+//! let mut scene = Scene::default(); // the lidar of the chapter's Table 2 and a vortex pair 400 m away
+//! scene.detector.snr = SnrReference::Fixed { snr_db: 10.0 };
+//! scene.scan.elevation_min_rad = 0.1;
+//! scene.scan.elevation_max_rad = 0.11;
+//! scene.scan.pulses_per_line = 1;
+//! let plan = Plan::new(SceneFile::new(scene).expect("a good scene"), Target::Map)?;
+//! assert!(!plan.runs(Stage::PhaseScreens)); // no turbulence, no screens
+//! let map = wakescope_sim::run::run(&plan, &Silent)?.map.expect("a map was asked for");
+//! assert_eq!(map.v_mean_m_s.dim(), (9, map.range_m.len()));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! | module | what is in it |
+//! |---|---|
+//! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
+//! | [`plan`] | stages, what is left out, forecast of time and memory |
+//! | [`geometry`] | lines of sight, samples, gates, layers |
+//! | [`join`] | the only place where the types of two crates meet |
+//! | [`profile`] | efficiency and signal-to-noise ratio against range |
+//! | [`scan`] | air along the lines of sight, and their records |
+//! | [`map`] | estimates and their errors against the truth |
+//! | [`run`], [`write`] | running a plan, writing its results |
+//! | [`streams`] | one random stream for each pulse |
+//! | [`export`], [`plot`] | file formats, pictures |
+//! | [`cli`] | the program `wakescope` |
+//!
+//! Features, all but the last two on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
+//! PNG, the report page), `vtk` and `npz` (more formats for fields).
 
 pub mod export;
 pub mod geometry;

@@ -6,10 +6,10 @@ use crate::scan::{Scanner, radial_velocity_m_s};
 use crate::scene::{Method, NoiseKind, Scene, SnrReference};
 use crate::{Error, join};
 use ndarray::{Array2, ArrayView1};
-use wakescope_signal::RangeFilter;
 use wakescope_estimate::{
     Correlogram, ErrorMap, PolarPoint, Quality, Radius, Scan, SpectralPeak, WindowCorrelation, polar_points,
 };
+use wakescope_signal::RangeFilter;
 
 /// Estimates of the radial velocity and their errors, each \[line, gate\].
 #[derive(Debug, Clone, PartialEq)]
@@ -71,8 +71,13 @@ impl<'a> Mapper<'a> {
         let e = &scene.estimator;
         let sampling = join::sampling(scene)?;
         let statistic = Correlogram::new(join::weighting(scene), e.window_samples)?;
-        let peak =
-            SpectralPeak::new(&sampling, statistic.kind(), statistic.lags(), e.padded_samples, join::refinement(scene))?;
+        let peak = SpectralPeak::new(
+            &sampling,
+            statistic.kind(),
+            statistic.lags(),
+            e.padded_samples,
+            join::refinement(scene),
+        )?;
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let pulses = scene.scan.pulses_per_line;
         Ok(Self {
@@ -158,7 +163,8 @@ fn correlation(scene: &Scene) -> Result<WindowCorrelation, Error> {
             join::snr_model(scene)?.snr(range_m, efficiency)?
         }
     };
-    let noise_to_signal = in_band_hz / d.bandwidth_hz / snr;
+    // Without any return there is only noise, which a large finite ratio says as well.
+    let noise_to_signal = (in_band_hz / d.bandwidth_hz / snr).min(1e12);
     Ok(WindowCorrelation::gaussian_pulse(
         &window,
         &join::gates(scene)?,

@@ -160,7 +160,7 @@ fn stages(scene: &Scene, target: Target, g: &Geometry) -> Vec<PlannedStage> {
         Turbulence::None {} => skip(Stage::PhaseScreens, "atmosphere.turbulence.kind is \"none\""),
     });
     out.push(match (target, scene.detector.snr) {
-        (Target::Map | Target::Run | Target::Signal, SnrReference::Fixed { snr_db }) => {
+        (Target::Map | Target::Signal, SnrReference::Fixed { snr_db }) => {
             skip(Stage::Efficiency, &format!("detector.snr fixes {snr_db} dB at every range"))
         }
         _ => {
@@ -176,11 +176,9 @@ fn stages(scene: &Scene, target: Target, g: &Geometry) -> Vec<PlannedStage> {
         skip(Stage::LinesOfSight, "not asked for")
     });
     out.push(if signals {
-        let reason = format!(
-            "{realisations} x {records} records of {} samples, {} layers each",
-            g.samples, g.layers_per_sample
-        );
-        let terms = realisations as f64 * records * (samples + g.layers_per_sample as f64) * g.layers_per_sample as f64;
+        let reason =
+            format!("{realisations} x {records} records of {} samples, {} layers each", g.samples, g.layers_per_sample);
+        let terms = realisations as f64 * records * samples * g.layers_per_sample as f64;
         run(Stage::Signals, reason, terms * LAYER_SAMPLE_S, records * samples * 8.0)
     } else {
         skip(Stage::Signals, "not asked for")
@@ -203,8 +201,9 @@ fn stages(scene: &Scene, target: Target, g: &Geometry) -> Vec<PlannedStage> {
         let reason = format!("{lines} x {gates} gates, {region}");
         let lags = scene.estimator.window_samples as f64;
         let core_s = realisations as f64
-            * (records * windows * lags * WINDOW_LAG_S + (lines * gates) as f64 * scene.estimator.padded_samples as f64 * SPECTRUM_POINT_S);
-        run(Stage::Estimates, reason, core_s, records * windows * lags * 8.0)
+            * (records * windows * lags * WINDOW_LAG_S
+                + (lines * gates) as f64 * scene.estimator.padded_samples as f64 * SPECTRUM_POINT_S);
+        run(Stage::Estimates, reason, core_s, lines as f64 * windows * lags * 8.0)
     } else {
         skip(Stage::Estimates, "not asked for")
     });
@@ -235,8 +234,11 @@ fn warnings(scene: &Scene) -> Vec<String> {
         ));
     }
     if scene.estimator.padded_samples < 4 * scene.estimator.window_samples {
-        let bin_m_s = 0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / scene.estimator.padded_samples as f64;
-        out.push(format!("estimator.padded_samples gives a spectrum in steps of {bin_m_s:.2} m/s: expect a bias of that order"));
+        let bin_m_s =
+            0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / scene.estimator.padded_samples as f64;
+        out.push(format!(
+            "estimator.padded_samples gives a spectrum in steps of {bin_m_s:.2} m/s: expect a bias of that order"
+        ));
     }
     if scene.scan.realisations < 2 {
         out.push("one realisation: no standard deviation can be given".into());
@@ -252,7 +254,13 @@ impl fmt::Display for Plan {
             match s.cost {
                 Some(c) => {
                     let name = s.stage.name();
-                    writeln!(f, "  run   {name:<16} {:>9} {:>10}   {}", seconds(c.core_s), bytes(c.memory_bytes), s.reason)?;
+                    writeln!(
+                        f,
+                        "  run   {name:<16} {:>9} {:>10}   {}",
+                        seconds(c.core_s),
+                        bytes(c.memory_bytes),
+                        s.reason
+                    )?;
                     total_s += c.core_s;
                     peak_bytes += c.memory_bytes;
                 }
@@ -287,9 +295,64 @@ fn bytes(b: f64) -> String {
 
 // Unit costs on one core.
 const WIND_POINT_S: f64 = 3e-8;
-const QUADRATURE_S: f64 = 3e-4;
-const LAYER_SAMPLE_S: f64 = 1.2e-9;
-const NOISE_SAMPLE_S: f64 = 6e-8;
-const WINDOW_LAG_S: f64 = 2e-8;
+const QUADRATURE_S: f64 = 5e-4;
+const LAYER_SAMPLE_S: f64 = 7.5e-10;
+const NOISE_SAMPLE_S: f64 = 4e-8;
+const WINDOW_LAG_S: f64 = 5e-9;
 const SPECTRUM_POINT_S: f64 = 1e-8;
 const TRUTH_CELL_S: f64 = 1e-6;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::VortexPair;
+
+    fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
+        let mut scene = Scene::default();
+        change(&mut scene);
+        Plan::new(SceneFile::new(scene).unwrap(), target).unwrap()
+    }
+
+    fn run_stages(plan: &Plan) -> Vec<&'static str> {
+        plan.stages.iter().filter(|s| s.cost.is_some()).map(|s| s.stage.name()).collect()
+    }
+
+    #[test]
+    fn each_target_runs_only_what_it_needs() {
+        let stages = |target| run_stages(&plan(target, |_| {}));
+        assert_eq!(stages(Target::Efficiency), ["efficiency"]);
+        assert_eq!(stages(Target::Signal), ["efficiency", "lines of sight", "signals", "noise"]);
+        assert_eq!(stages(Target::Map), ["efficiency", "lines of sight", "signals", "noise", "estimates", "errors"]);
+        assert_eq!(stages(Target::Run).len(), 7);
+    }
+
+    #[test]
+    fn what_the_scene_does_not_need_is_left_out_with_a_reason() {
+        let lean = plan(Target::Map, |s| {
+            s.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
+            s.detector.noise = NoiseKind::None;
+        });
+        assert_eq!(run_stages(&lean), ["lines of sight", "signals", "estimates", "errors"]);
+        assert!(lean.stages.iter().filter(|s| s.cost.is_none()).all(|s| !s.reason.is_empty()));
+        let calm = plan(Target::Run, |s| s.flow = Flow::Calm {});
+        assert!(!calm.runs(Stage::CrossPlane));
+    }
+
+    #[test]
+    fn forecasts_grow_with_the_work() {
+        let cost = |change: fn(&mut Scene)| {
+            plan(Target::Map, change).stages.iter().filter_map(|s| s.cost).map(|c| c.core_s).sum::<f64>()
+        };
+        let once = cost(|s| s.scan.realisations = 10);
+        let twice = cost(|s| s.scan.realisations = 20);
+        assert!((1.9..2.0).contains(&(twice / once)), "{}", twice / once);
+    }
+
+    #[test]
+    fn air_faster_than_the_band_is_warned_of() {
+        let fast =
+            |s: &mut Scene| s.flow = Flow::VortexPair(VortexPair { core_radius_m: 1.0, ..VortexPair::default() });
+        assert!(plan(Target::Map, fast).warnings.iter().any(|w| w.contains("19.4 m/s")));
+        assert!(plan(Target::Map, |_| {}).warnings.is_empty());
+    }
+}

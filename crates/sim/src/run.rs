@@ -83,7 +83,11 @@ impl RunResult {
             line("v_max_m_s", "largest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::max));
             line("v_min_m_s", "smallest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::min));
             line("bias_mean_m_s", "mean bias against v_pulse [m/s]", mean(&m.bias_m_s));
-            line("rms_mean_m_s", "root mean square error against v_pulse [m/s]", mean(&m.rms_m_s.mapv(|x| x * x)).sqrt());
+            line(
+                "rms_mean_m_s",
+                "root mean square error against v_pulse [m/s]",
+                mean(&m.rms_m_s.mapv(|x| x * x)).sqrt(),
+            );
             line("std_mean_m_s", "standard deviation of one estimate [m/s]", mean(&m.std_m_s));
             line("flagged_fraction", "fraction of flagged estimates", mean(&m.flagged));
             line("level_mean", "windows accumulated, mean", mean(&m.level));

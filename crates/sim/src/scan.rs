@@ -30,7 +30,7 @@ impl<'a> Scanner<'a> {
     /// What the crates refuse; a checked scene gives none.
     pub fn new(plan: &'a Plan, observer: &dyn Observer) -> Result<Self, Error> {
         let (scene, geometry) = (&plan.scene.scene, &plan.geometry);
-        let weight_per_m = layer_weights(scene, geometry, plan.runs(Stage::Efficiency), observer)?;
+        let weight_per_m = layer_weights(scene, geometry, observer)?;
         let wind = join::wind(scene)?;
         let start_s = join::start_time_s(scene);
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
@@ -88,16 +88,10 @@ impl<'a> Scanner<'a> {
 }
 
 /// Return per metre of each layer, K^2 beta A_R eta_s/R^2; the efficiency is interpolated.
-fn layer_weights(
-    scene: &Scene,
-    geometry: &Geometry,
-    efficiency: bool,
-    observer: &dyn Observer,
-) -> Result<Vec<f64>, Error> {
+fn layer_weights(scene: &Scene, geometry: &Geometry, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         return Ok(join::fixed_weights_per_m(scene, geometry, snr_db));
     }
-    debug_assert!(efficiency, "the plan leaves the efficiency out only where the SNR is fixed");
     observer.begin(Stage::Efficiency, 1);
     let last_m = geometry.first_layer_range_m + geometry.layers as f64 * geometry.layer_thickness_m;
     let profile = efficiency_at(scene, &spaced(geometry.first_layer_range_m, last_m, PROFILE_POINTS))?;

@@ -1,6 +1,5 @@
 //! Writes what a run gives: all files of a run appear together, or none.
 
-use crate::Error;
 use crate::export::signals::RawSignals;
 use crate::export::{Field, FileGroup, Provenance, PulseInfo, Ray, Sweep, Table, Unit, VelocityMap, tables};
 use crate::map::VelocityEstimates;
@@ -8,18 +7,27 @@ use crate::plan::Plan;
 use crate::profile::RangeProfile;
 use crate::run::RunResult;
 use crate::scene::Flow;
+use crate::{Error, join};
 use std::path::{Path, PathBuf};
 
-/// Finds out, before any computing, whether files can be written to a folder; makes it if needed.
+/// Finds out, before any computing, whether files can be written to a folder; leaves no trace.
 ///
 /// # Errors
 /// The folder cannot be made, is a file, or cannot be written to.
 pub fn prepare(folder: &Path) -> Result<(), Error> {
     let io = |action, source| Error::Io { action, path: folder.to_owned(), source };
-    std::fs::create_dir_all(folder).map_err(|e| io("make the folder", e))?;
+    let missing: Vec<&Path> =
+        folder.ancestors().filter(|p| !p.as_os_str().is_empty()).take_while(|p| !p.exists()).collect();
+    let made = std::fs::create_dir_all(folder).map_err(|e| io("make the folder", e));
     let probe = folder.join(".wakescope-probe");
-    std::fs::write(&probe, b"").map_err(|e| io("write to", e))?;
-    std::fs::remove_file(&probe).map_err(|e| io("write to", e))
+    let tried = made.and_then(|()| {
+        std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(|e| io("write to", e))
+    });
+    for path in missing {
+        // Innermost first; one that was not made cannot be removed, which is what is wanted.
+        let _ = std::fs::remove_dir(path);
+    }
+    tried
 }
 
 /// Writes the results that the plan's scene asks for; returns the paths of the files.
@@ -115,15 +123,22 @@ fn raw_signals(plan: &Plan, current_a: ndarray::Array2<f64>) -> RawSignals {
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let azimuth_rad = scene.scan.azimuth_rad;
+    let start_s = join::start_time_s(scene);
     let away = |what: &str| format!("{what}, positive away from the lidar");
     let speed = |name: &str, text: String, values: &ndarray::Array2<f64>| {
         Field::float(name, Unit::MetrePerSecond, &text, values.clone())
     };
-    let number = |name: &str, text: &str, values: &ndarray::Array2<f64>| Field::float(name, Unit::One, text, values.clone());
+    let number =
+        |name: &str, text: &str, values: &ndarray::Array2<f64>| Field::float(name, Unit::One, text, values.clone());
     VelocityMap {
         title: "Radial velocity of a wake-vortex scan".into(),
         rays: (0..g.elevation_rad.len())
-            .map(|i| Ray { sweep: 0, time_s: g.line_time_s[i], elevation_rad: g.elevation_rad[i], azimuth_rad })
+            .map(|i| Ray {
+                sweep: 0,
+                time_s: start_s + g.line_time_s[i],
+                elevation_rad: g.elevation_rad[i],
+                azimuth_rad,
+            })
             .collect(),
         range_m: e.range_m.clone(),
         sweeps: vec![Sweep {
@@ -155,5 +170,75 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         ],
         lidar_y_m: 0.0,
         lidar_height_m: scene.scan.lidar_height_m,
+    }
+}
+
+/// The pictures of a run.
+#[cfg(feature = "plots")]
+mod pictures {
+    use super::{Error, FileGroup, Plan, Provenance, RangeProfile, VelocityMap};
+    use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
+    use crate::scene::Flow;
+
+    /// Adds a figure in the formats that the scene asks for.
+    pub(super) fn add(
+        files: &mut FileGroup,
+        plan: &Plan,
+        name: &str,
+        figure: &Figure,
+        origin: &Provenance,
+    ) -> Result<(), Error> {
+        let outputs = plan.scene.scene.outputs;
+        if outputs.svg {
+            files.add(&format!("{name}.svg"), figure.svg(origin)?)?;
+        }
+        if outputs.png {
+            files.add(&format!("{name}.png"), figure.png(origin)?)?;
+        }
+        Ok(())
+    }
+
+    /// Signal-to-noise ratio and efficiency against range, with the standard error as a band.
+    pub(super) fn profile(profile: &RangeProfile) -> Figure {
+        let e = &profile.efficiency;
+        let range = || Axis::linear("range [m]");
+        let points = |y: &[f64]| e.range_m.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
+        let mut efficiency = Series::new("", Style::Line, points(&e.mean));
+        if e.standard_error.iter().any(|&s| s > 0.0) {
+            efficiency = efficiency.with_band(&e.standard_error);
+        }
+        Figure::side_by_side([
+            CurvePlot::new("Signal-to-noise ratio", range(), Axis::linear("SNR [dB]")).with(Series::new(
+                "",
+                Style::Line,
+                points(&profile.snr_db),
+            )),
+            CurvePlot::new("System efficiency", range(), Axis::linear("efficiency")).with(efficiency),
+        ])
+    }
+
+    /// The map of the estimates, and that of their errors, each over the truth where it helps.
+    pub(super) fn add_map(
+        files: &mut FileGroup,
+        plan: &Plan,
+        map: &VelocityMap,
+        origin: &Provenance,
+    ) -> Result<(), Error> {
+        let centres_m = match plan.scene.scene.flow {
+            Flow::VortexPair(pair) => {
+                let c = crate::join::vortex_pair(&pair).centres(crate::join::start_time_s(&plan.scene.scene));
+                vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
+            }
+            _ => Vec::new(),
+        };
+        let panel = |field: &str, title: &str, label: &str| -> Result<MapPlot, Error> {
+            let mut plot = MapPlot::new(map, 0, field)?.titled(title).labelled(label);
+            plot.points_m.clone_from(&centres_m);
+            Ok(plot)
+        };
+        let truth = panel("v_pulse", "Radial velocity weighted with the pulse", "v_pulse [m/s]")?;
+        let estimate = panel("radial_velocity", "Mean estimated radial velocity", "v [m/s]")?.coloured(truth.colours);
+        let error = panel("rms", "Root mean square error", "rms [m/s]")?;
+        add(files, plan, "map", &Figure::stacked([truth, estimate, error]), origin)
     }
 }

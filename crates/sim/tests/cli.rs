@@ -54,7 +54,7 @@ fn wrong_scenes_are_refused_with_key_value_range_and_line() {
         ("[laser]\ncolour = 1.0\n", ["s.toml:2", "unknown field `colour`", "wavelength_m"]),
         (
             "[telescope]\naperture_radius_m = -0.05\n",
-            ["s.toml:2", "telescope.aperture_radius_m = -0.05", "from 0.0001 to 10 m"],
+            ["s.toml:2", "telescope.aperture_radius_m = -0.05", "from 0.0001 to 10.0 m"],
         ),
         ("[pulse]\nduration_s = nan\n", ["s.toml:2", "pulse.duration_s = NaN", "1e-9"]),
         ("[scan]\nelevation_min_rad = -0.1\n", ["s.toml:2", "scan.elevation_min_rad = -0.1", "below the ground"]),
@@ -147,4 +147,25 @@ fn a_written_scene_runs_again_to_the_same_files() {
     assert!(wakescope(temp.path(), &["map", "s.toml", "--out", "c", "--quiet"]).status.success());
     let body = |text: String| text.lines().filter(|l| !l.starts_with('#')).collect::<Vec<_>>().join("\n");
     assert_ne!(body(read("a/map.csv")), body(read("c/map.csv")), "the seed matters");
+}
+
+#[test]
+fn extreme_scenes_run_to_the_end() {
+    let nothing_returns = "[atmosphere]\nbackscatter_per_m_sr = 0.0\n";
+    let short_pulse = "[pulse]\nduration_s = 1e-9\n";
+    let long_pulse = "[pulse]\nduration_s = 1.2e-6\n[scan]\nrange_min_m = 500.0\nrange_max_m = 560.0\n";
+    let faint = "[detector.snr]\nreference = \"fixed\"\nsnr_db = -40.0\n";
+    let loud = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 60.0\n";
+    let silent = "[detector]\nnoise = \"none\"\n[flow]\nkind = \"calm\"\n";
+    for scene in [nothing_returns, short_pulse, long_pulse, faint, loud, silent] {
+        let temp = tempfile::tempdir().unwrap();
+        let scan = "elevation_max_rad = 0.0025\npulses_per_line = 1\nrealisations = 2\n";
+        let text = match scene.contains("[scan]") {
+            true => scene.replace("[scan]\n", &format!("[scan]\n{scan}")),
+            false => format!("{scene}[scan]\n{scan}"),
+        };
+        std::fs::write(temp.path().join("s.toml"), text).unwrap();
+        let out = wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]);
+        assert!(out.status.success(), "{scene}: {}", String::from_utf8_lossy(&out.stderr));
+    }
 }

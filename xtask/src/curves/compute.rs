@@ -1,7 +1,7 @@
 //! The curves as the crates compute them now, one function for each.
 
 use crate::Failure;
-use wakescope_estimate::bound;
+use wakescope_estimate::{Noise, SignalKind, WindowModel};
 use wakescope_les::{Ground, Motion, VortexPair, m4_prime as kernel};
 use wakescope_optics::{RadiusDefinition, SnrModel, Telescope, hankel, theory};
 use wakescope_sim::plan::{Plan, Target};
@@ -67,16 +67,19 @@ pub(super) fn pair_z(tau: &[f64]) -> Values {
 
 /// The windows of the stored bound: 64 samples at 250 MHz, 200 ns, white noise of the density that
 /// gives the SNR in 50 MHz.
-fn bound_m_s(snr_db: &[f64], real: bool) -> Values {
-    each(snr_db, |snr_db| bound::table2_white_noise_m_s(10f64.powf(0.1 * snr_db), real))
+fn bound_m_s(snr_db: &[f64], kind: SignalKind) -> Values {
+    let scene = Scene::default();
+    let sampling = wakescope_sim::join::sampling(&scene)?;
+    let model = WindowModel::gaussian_pulse(&sampling, 64, scene.pulse_sigma_s(), Noise::White)?;
+    each(snr_db, |snr_db| model.bound_m_s(0.0, 10f64.powf(0.1 * snr_db), kind, 1.0))
 }
 
 pub(super) fn bound_complex(snr_db: &[f64]) -> Values {
-    bound_m_s(snr_db, false)
+    bound_m_s(snr_db, SignalKind::Complex)
 }
 
 pub(super) fn bound_real(snr_db: &[f64]) -> Values {
-    bound_m_s(snr_db, true)
+    bound_m_s(snr_db, SignalKind::Real)
 }
 
 fn checked(scene: Scene) -> Result<SceneFile, Failure> {

@@ -24,8 +24,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         profile: CirculationProfile::Algebraic,
         motion: Motion::Frozen,
     };
-    let y_m: Vec<f64> =
-        (0..POINTS).map(|i| HALF_WIDTH_M * (2.0 * i as f64 / (POINTS - 1) as f64 - 1.0)).collect();
+    let y_m: Vec<f64> = (0..POINTS).map(|i| HALF_WIDTH_M * (2.0 * i as f64 / (POINTS - 1) as f64 - 1.0)).collect();
     let points_m: Vec<[f64; 3]> = y_m.iter().map(|&y| [0.0, y, SPACING_M]).collect();
     let mut velocity_m_s = vec![[0.0; 3]; POINTS];
     pair.wind()?.velocity_into(&points_m, 0.0, &mut velocity_m_s)?;
@@ -44,16 +43,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
     let top_m_s = GAMMA_M2_S / (4.0 * PI * CORE_M);
     let scaled = |v: &[f64]| y_m.iter().map(|y| y / SPACING_M).zip(v.iter().map(|v| v / top_m_s)).collect::<Vec<_>>();
-    let plot = CurvePlot {
-        title: "Vertical velocity through the cores".into(),
-        x: Axis::linear("y / b0"),
-        y: Axis::linear("w / (Gamma0 / 4 pi rc)").between(-1.6, 1.6),
-        series: vec![
-            Series::new("algebraic profile (3)", scaled(&w_m_s), Style::Line),
-            Series::new("potential vortices", scaled(&potential_m_s), Style::DashDot),
-        ],
-    };
-    let figure = Figure::single(plot);
+    let x = Axis::linear("y / b0");
+    let y = Axis::linear("w / (Gamma0 / 4 pi rc)").between(-1.6, 1.6);
+    // The potential profile is cut where it leaves the frame, or a line would join its two ends.
+    let inside = |v: &f64| if (v / top_m_s).abs() < 1.7 { *v } else { f64::NAN };
+    let drawn_m_s: Vec<f64> = potential_m_s.iter().map(inside).collect();
+    let plot = CurvePlot::new("Vertical velocity through the cores", x, y)
+        .with(Series::new("algebraic profile (3)", Style::Line, scaled(&w_m_s)))
+        .with(Series::new("potential vortices", Style::DashDot, scaled(&drawn_m_s)));
+    let figure = Figure::stacked([plot]);
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
     out.caption = format!(
         "Vertical velocity through the two cores of a pair with Gamma0 = {GAMMA_M2_S} m2/s, b0 = {SPACING_M} m, rc = {CORE_M} m, \

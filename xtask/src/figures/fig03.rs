@@ -39,23 +39,19 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let recorded: Vec<(f64, f64)> = elevation_rad.iter().map(|&el| at(near_m, el)).collect();
     let last: Vec<(f64, f64)> = elevation_rad.iter().map(|&el| at(far_m, el)).collect();
     let mut series = vec![
-        Series::new(&format!("line of sight, every {DRAWN}th"), fan, Style::Line),
-        Series::new("first and last sample", recorded, Style::Dash),
-        Series::new("", last, Style::Dash),
-        Series::new("ground", vec![(0.0, 0.0), (1.05 * far_m, 0.0)], Style::Line),
+        Series::new(&format!("line of sight, every {DRAWN}th"), Style::Line, fan),
+        Series::new("first and last sample", Style::Dash, recorded),
+        Series::new("", Style::Dash, last),
+        Series::new("ground", Style::Line, vec![(0.0, 0.0), (1.05 * far_m, 0.0)]),
     ];
     if let Flow::VortexPair(pair) = scene.flow {
         let c = join::vortex_pair(&pair).centres(join::start_time_s(scene));
         let centres = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
-        series.push(Series::new("vortices", centres, Style::Markers));
+        series.push(Series::new("vortices", Style::Markers, centres));
     }
-    let plot = CurvePlot {
-        title: "Scan across the runway".into(),
-        x: Axis::linear("distance from the lidar [m]"),
-        y: Axis::linear("height [m]"),
-        series,
-    };
-    let figure = Figure::single(plot);
+    let (x, y) = (Axis::linear("distance from the lidar [m]"), Axis::linear("height [m]"));
+    let plot = CurvePlot { series, equal_scales: true, ..CurvePlot::new("Scan across the runway", x, y) };
+    let figure = Figure::stacked([plot]);
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
     out.caption = format!(
         "Vertical scan of {} lines of sight in steps of {} mrad; one in {DRAWN} is drawn.",

@@ -65,18 +65,14 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     };
     let slope = TARGET_M.1 / TARGET_M.0;
     let line: Vec<(f64, f64)> = [-3.5, 4.5].iter().map(|d| (TARGET_M.0 + d, TARGET_M.1 + slope * d)).collect();
-    let plot = CurvePlot {
-        title: "M'4 stencil: 16 grid points for one point of a line of sight".into(),
-        x: Axis::linear("y [m]"),
-        y: Axis::linear("z [m]"),
-        series: vec![
-            Series::new("grid", grid(false), Style::Dot),
-            Series::new("stencil", grid(true), Style::Markers),
-            Series::new("line of sight", line, Style::Line),
-            Series::new("target", vec![TARGET_M], Style::Squares),
-        ],
-    };
-    let figure = Figure::single(plot);
+    let title = "M'4 stencil: 16 grid points for one point of a line of sight";
+    let mut plot = CurvePlot::new(title, Axis::linear("y [m]").between(396.5, 406.5), Axis::linear("z [m]"))
+        .with(Series::new("line of sight", Style::Line, line))
+        .with(Series::new("grid", Style::Markers, grid(false)))
+        .with(Series::new("stencil", Style::Markers, grid(true)))
+        .with(Series::new("target", Style::Markers, [TARGET_M]));
+    plot.equal_scales = true;
+    let figure = Figure::stacked([plot]);
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
     out.caption = "The 16 grid points (26) that give the velocity at one point of a line of sight; their weights, \
                    products of the kernel (27), are in the table."

@@ -8,7 +8,7 @@ use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::plot::{Figure, MapPanel};
+use wakescope_sim::plot::{Figure, MapPlot};
 use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::{Flow, Scene, SnrReference, VortexMotion, VortexPair};
 use wakescope_sim::{run, write};
@@ -36,12 +36,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = write::provenance(&plan);
     let mut out = Rendered::default();
     out.csv(map_table(&map)?.to_csv(&origin)?);
-    let figure = Figure::maps(vec![
-        MapPanel::diverging(&map, "v_exact", "Radial velocity of the analytic pair, tau = 2.5")?,
-        MapPanel::diverging(&map, "radial_velocity", "Mean estimate, periodogram accumulation, 0 dB, rho = 2 m")?,
-        MapPanel::sequential(&map, "rms", "Root mean square error against the pulse-weighted velocity")?,
-    ]);
+    let exact = MapPlot::new(&map, 0, "v_exact")?.titled("Radial velocity of the analytic pair, tau = 2.5");
+    let estimate = MapPlot::new(&map, 0, "radial_velocity")?
+        .titled("Mean estimate, periodogram accumulation, 0 dB, rho = 2 m")
+        .coloured(exact.colours);
+    let error = MapPlot::new(&map, 0, "rms")?.titled("Root mean square error against the pulse-weighted velocity");
+    let figure =
+        Figure::stacked([exact.labelled("v_R [m/s]"), estimate.labelled("v_R [m/s]"), error.labelled("rms [m/s]")]);
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    out.marks = vec!["analytic pair".into()];
     out.caption = format!(
         "ANALYTIC PAIR, not a simulated flow: radial velocity at tau = {TAU} on the inviscid path over the ground (top), what \
          periodogram accumulation makes of {} scans at 0 dB (middle), and its error (bottom). The late map needs the simulated flow.",
@@ -54,8 +57,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             "fig08",
             "late extrema are weaker than early ones",
             "late below early",
-            format!("early: {:.2} to {:.2} m/s; the analytic pair does not decay, so there is no late map",
-                extreme(&estimates.v_exact_m_s, f64::min), extreme(&estimates.v_exact_m_s, f64::max)),
+            format!(
+                "early: {:.2} to {:.2} m/s; the analytic pair does not decay, so there is no late map",
+                extreme(&estimates.v_exact_m_s, f64::min),
+                extreme(&estimates.v_exact_m_s, f64::max)
+            ),
             false,
         )
     });

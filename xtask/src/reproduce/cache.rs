@@ -20,6 +20,7 @@ pub(super) struct Cache {
 #[derive(Serialize, Deserialize)]
 struct Index {
     caption: String,
+    marks: Vec<String>,
     extensions: Vec<String>,
     claims: Vec<StoredClaim>,
     timings: Vec<(String, f64)>,
@@ -55,6 +56,7 @@ impl Cache {
         Some(Rendered {
             files: index.extensions.iter().map(file).collect::<Option<_>>()?,
             caption: index.caption,
+            marks: index.marks,
             claims: index.claims.into_iter().map(restore).collect::<Option<_>>()?,
             timings: index.timings,
         })
@@ -67,6 +69,7 @@ impl Cache {
         }
         let index = Index {
             caption: rendered.caption.clone(),
+            marks: rendered.marks.clone(),
             extensions: rendered.files.iter().map(|(e, _)| e.clone()).collect(),
             claims: rendered.claims.iter().map(keep).collect(),
             timings: rendered.timings.clone(),
@@ -98,10 +101,9 @@ mod tests {
         let cache = Cache { folder: temp.path().to_owned() };
         let mut rendered = Rendered { caption: "a caption".into(), ..Rendered::default() };
         rendered.csv("a\n1\n".into());
-        rendered.claims.push(Claim {
-            standard_error: 0.25,
-            ..Claim::exact("F0", "fig00", "statement", "1", "2".into(), false)
-        });
+        rendered
+            .claims
+            .push(Claim { standard_error: 0.25, ..Claim::exact("F0", "fig00", "statement", "1", "2".into(), false) });
         rendered.timings.push(("total".into(), 1.5));
         assert!(cache.load("fig00").is_none());
         cache.store("fig00", &rendered).unwrap();

@@ -13,9 +13,10 @@ pub(super) struct Bars {
 
 impl Bars {
     pub(super) fn new() -> Self {
-        let style = ProgressStyle::with_template("  {prefix:<16} [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left")
-            .unwrap_or_else(|_| ProgressStyle::default_bar())
-            .progress_chars("=> ");
+        let style =
+            ProgressStyle::with_template("  {prefix:<16} [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left")
+                .unwrap_or_else(|_| ProgressStyle::default_bar())
+                .progress_chars("=> ");
         Self { style, current: Mutex::new(ProgressBar::hidden()) }
     }
 

@@ -20,11 +20,7 @@ pub struct Problem {
 
 impl Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "{} = {} is not allowed: {}",
-            self.key, self.value, self.allowed
-        )
+        write!(f, "{} = {} is not allowed: {}", self.key, self.value, self.allowed)
     }
 }
 
@@ -32,19 +28,9 @@ impl Display for Problem {
 struct Checker(Vec<Problem>);
 
 impl Checker {
-    fn require(
-        &mut self,
-        ok: bool,
-        key: &str,
-        value: impl Display,
-        allowed: impl Into<String>,
-    ) -> bool {
+    fn require(&mut self, ok: bool, key: &str, value: impl Display, allowed: impl Into<String>) -> bool {
         if !ok {
-            self.0.push(Problem {
-                key: key.into(),
-                value: value.to_string(),
-                allowed: allowed.into(),
-            });
+            self.0.push(Problem { key: key.into(), value: value.to_string(), allowed: allowed.into() });
         }
         ok
     }
@@ -52,21 +38,12 @@ impl Checker {
     /// Finite and in `[low, high]`.
     fn within(&mut self, key: &str, value: f64, low: f64, high: f64, unit: &str) -> bool {
         let ok = value >= low && value <= high && value.is_finite();
-        self.require(
-            ok,
-            key,
-            value,
-            format!("a number from {low} to {high} {unit}").trim_end(),
-        )
+        // `{:?}` writes 1e-9 where `{}` would write all the zeros.
+        self.require(ok, key, format!("{value:?}"), format!("a number from {low:?} to {high:?} {unit}").trim_end())
     }
 
     fn count(&mut self, key: &str, value: usize, low: usize, high: usize) -> bool {
-        self.require(
-            (low..=high).contains(&value),
-            key,
-            value,
-            format!("a whole number from {low} to {high}"),
-        )
+        self.require((low..=high).contains(&value), key, value, format!("a whole number from {low} to {high}"))
     }
 }
 
@@ -74,19 +51,9 @@ impl Scene {
     /// Everything in this scene that cannot be simulated; empty for a good scene.
     pub fn problems(&self) -> Vec<Problem> {
         let mut c = Checker::default();
-        c.require(
-            self.format == FORMAT,
-            "format",
-            self.format,
-            format!("{FORMAT}, the format of this program"),
-        );
+        c.require(self.format == FORMAT, "format", self.format, format!("{FORMAT}, the format of this program"));
         // TOML integers are signed 64-bit: a larger seed could not be written back.
-        c.require(
-            self.seed <= i64::MAX as u64,
-            "seed",
-            self.seed,
-            format!("a whole number from 0 to {}", i64::MAX),
-        );
+        c.require(self.seed <= i64::MAX as u64, "seed", self.seed, format!("a whole number from 0 to {}", i64::MAX));
         self.check_instrument(&mut c);
         self.check_flow(&mut c);
         self.check_scan(&mut c);
@@ -100,57 +67,21 @@ impl Scene {
     }
 
     fn check_instrument(&self, c: &mut Checker) {
-        c.within(
-            "laser.wavelength_m",
-            self.laser.wavelength_m,
-            1e-7,
-            2e-5,
-            "m",
-        );
-        c.within(
-            "laser.pulse_repetition_hz",
-            self.laser.pulse_repetition_hz,
-            1e-3,
-            1e6,
-            "Hz",
-        );
+        c.within("laser.wavelength_m", self.laser.wavelength_m, 1e-7, 2e-5, "m");
+        c.within("laser.pulse_repetition_hz", self.laser.pulse_repetition_hz, 1e-3, 1e6, "Hz");
         c.within("pulse.energy_j", self.pulse.energy_j, 1e-12, 1e3, "J");
         c.within("pulse.duration_s", self.pulse.duration_s, 1e-9, 1e-4, "s");
         let d = &self.detector;
         c.within("detector.bandwidth_hz", d.bandwidth_hz, 1e3, 1e11, "Hz");
-        c.within(
-            "detector.intermediate_frequency_hz",
-            d.intermediate_frequency_hz,
-            1e3,
-            1e11,
-            "Hz",
-        );
+        c.within("detector.intermediate_frequency_hz", d.intermediate_frequency_hz, 1e3, 1e11, "Hz");
         c.within("detector.sampling_hz", d.sampling_hz, 1e3, 1e11, "Hz");
-        c.within(
-            "detector.quantum_efficiency",
-            d.quantum_efficiency,
-            1e-6,
-            1.0,
-            "",
-        );
-        c.within(
-            "detector.local_oscillator_w",
-            d.local_oscillator_w,
-            1e-12,
-            1e3,
-            "W",
-        );
+        c.within("detector.quantum_efficiency", d.quantum_efficiency, 1e-6, 1.0, "");
+        c.within("detector.local_oscillator_w", d.local_oscillator_w, 1e-12, 1e3, "W");
         if let SnrReference::Fixed { snr_db } = d.snr {
             c.within("detector.snr.snr_db", snr_db, -100.0, 100.0, "dB");
         }
         let t = &self.telescope;
-        c.within(
-            "telescope.aperture_radius_m",
-            t.aperture_radius_m,
-            1e-4,
-            10.0,
-            "m",
-        );
+        c.within("telescope.aperture_radius_m", t.aperture_radius_m, 1e-4, 10.0, "m");
         c.within("telescope.beam_radius_m", t.beam_radius_m, 1e-4, 10.0, "m");
         c.require(
             t.obscuration_radius_m >= 0.0 && t.obscuration_radius_m < t.aperture_radius_m,
@@ -166,49 +97,22 @@ impl Scene {
             "a distance in m other than 0, or inf for a collimated beam",
         );
         let a = &self.atmosphere;
-        c.within(
-            "atmosphere.backscatter_per_m_sr",
-            a.backscatter_per_m_sr,
-            0.0,
-            1.0,
-            "1/(m sr)",
-        );
-        c.within(
-            "atmosphere.extinction_per_m",
-            a.extinction_per_m,
-            0.0,
-            1.0,
-            "1/m",
-        );
+        c.within("atmosphere.backscatter_per_m_sr", a.backscatter_per_m_sr, 0.0, 1.0, "1/(m sr)");
+        c.within("atmosphere.extinction_per_m", a.extinction_per_m, 0.0, 1.0, "1/m");
     }
 
     fn check_flow(&self, c: &mut Checker) {
         match self.flow {
             Flow::Calm {} => {}
-            Flow::Uniform {
-                lateral_m_s,
-                vertical_m_s,
-            } => {
+            Flow::Uniform { lateral_m_s, vertical_m_s } => {
                 c.within("flow.lateral_m_s", lateral_m_s, -1e3, 1e3, "m/s");
                 c.within("flow.vertical_m_s", vertical_m_s, -1e3, 1e3, "m/s");
             }
             Flow::VortexPair(p) => {
-                c.within(
-                    "flow.circulation_m2_s",
-                    p.circulation_m2_s,
-                    0.0,
-                    1e5,
-                    "m^2/s",
-                );
+                c.within("flow.circulation_m2_s", p.circulation_m2_s, 0.0, 1e5, "m^2/s");
                 c.within("flow.spacing_m", p.spacing_m, 1e-2, 1e4, "m");
                 c.within("flow.core_radius_m", p.core_radius_m, 1e-3, 1e3, "m");
-                c.within(
-                    "flow.lateral_position_m",
-                    p.lateral_position_m,
-                    -1e5,
-                    1e5,
-                    "m",
-                );
+                c.within("flow.lateral_position_m", p.lateral_position_m, -1e5, 1e5, "m");
                 c.within("flow.height_m", p.height_m, 1e-2, 1e4, "m");
                 c.within("flow.cross_wind_m_s", p.cross_wind_m_s, -1e3, 1e3, "m/s");
                 c.within("flow.age_tau", p.age_tau, 0.0, 1e3, "");
@@ -231,34 +135,10 @@ impl Scene {
     fn check_scan(&self, c: &mut Checker) {
         let s = &self.scan;
         c.within("scan.lidar_height_m", s.lidar_height_m, 0.0, 1e4, "m");
-        c.within(
-            "scan.azimuth_rad",
-            s.azimuth_rad,
-            0.0,
-            2.0 * std::f64::consts::PI,
-            "rad",
-        );
-        c.within(
-            "scan.elevation_min_rad",
-            s.elevation_min_rad,
-            -FRAC_PI_2,
-            FRAC_PI_2,
-            "rad",
-        );
-        c.within(
-            "scan.elevation_max_rad",
-            s.elevation_max_rad,
-            -FRAC_PI_2,
-            FRAC_PI_2,
-            "rad",
-        );
-        c.within(
-            "scan.elevation_step_rad",
-            s.elevation_step_rad,
-            1e-7,
-            FRAC_PI_2,
-            "rad",
-        );
+        c.within("scan.azimuth_rad", s.azimuth_rad, 0.0, 2.0 * std::f64::consts::PI, "rad");
+        c.within("scan.elevation_min_rad", s.elevation_min_rad, -FRAC_PI_2, FRAC_PI_2, "rad");
+        c.within("scan.elevation_max_rad", s.elevation_max_rad, -FRAC_PI_2, FRAC_PI_2, "rad");
+        c.within("scan.elevation_step_rad", s.elevation_step_rad, 1e-7, FRAC_PI_2, "rad");
         c.within("scan.range_min_m", s.range_min_m, 1.0, 1e6, "m");
         c.within("scan.range_max_m", s.range_max_m, 1.0, 1e6, "m");
         c.count("scan.pulses_per_line", s.pulses_per_line, 1, 1_000_000);
@@ -285,11 +165,11 @@ impl Scene {
         let half = 0.5 * d.bandwidth_hz;
         let nyquist_hz = 0.5 * d.sampling_hz;
         c.require(
-            d.intermediate_frequency_hz - half > 0.0 && d.intermediate_frequency_hz + half <= nyquist_hz,
+            d.intermediate_frequency_hz - half > 0.0 && d.intermediate_frequency_hz + half < nyquist_hz,
             "detector.intermediate_frequency_hz",
             d.intermediate_frequency_hz,
             format!(
-                "from {half} to {} Hz, so that the detector band lies between 0 and half the sampling frequency",
+                "between {half} and {} Hz, so that the detector band lies between 0 and half the sampling frequency",
                 nyquist_hz - half
             ),
         );
@@ -298,20 +178,14 @@ impl Scene {
             s.elevation_max_rad >= s.elevation_min_rad,
             "scan.elevation_max_rad",
             s.elevation_max_rad,
-            format!(
-                "at least scan.elevation_min_rad, {} rad",
-                s.elevation_min_rad
-            ),
+            format!("at least scan.elevation_min_rad, {} rad", s.elevation_min_rad),
         );
         let lines = (s.elevation_max_rad - s.elevation_min_rad) / s.elevation_step_rad;
         c.require(
             lines < 1e5,
             "scan.elevation_step_rad",
             s.elevation_step_rad,
-            format!(
-                "at most 100000 lines of sight; this step gives {:.3e}",
-                lines + 1.0
-            ),
+            format!("at most 100000 lines of sight; this step gives {:.3e}", lines + 1.0),
         );
         let lowest_m = s.lidar_height_m + s.range_max_m * s.elevation_min_rad.sin();
         c.require(
@@ -349,20 +223,14 @@ impl Scene {
                 self.estimator.window_samples <= n,
                 "estimator.window_samples",
                 self.estimator.window_samples,
-                format!(
-                    "at most {n}, the samples recorded from scan.range_min_m to scan.range_max_m"
-                ),
+                format!("at most {n}, the samples recorded from scan.range_min_m to scan.range_max_m"),
             );
         }
     }
 
     /// Samples recorded of each pulse: from `range_min_m` to `range_max_m`, ends included.
     pub fn samples_per_record(&self) -> usize {
-        let Scan {
-            range_min_m,
-            range_max_m,
-            ..
-        } = self.scan;
+        let Scan { range_min_m, range_max_m, .. } = self.scan;
         ((range_max_m - range_min_m) / self.sample_spacing_m() + 1e-9) as usize + 1
     }
 
@@ -374,9 +242,7 @@ impl Scene {
     /// The 1/e half width sigma of |f|^2 in (7), s.
     pub fn pulse_sigma_s(&self) -> f64 {
         match self.pulse.definition {
-            super::PulseDefinition::Fwhm => {
-                self.pulse.duration_s / (2.0 * std::f64::consts::LN_2.sqrt())
-            }
+            super::PulseDefinition::Fwhm => self.pulse.duration_s / (2.0 * std::f64::consts::LN_2.sqrt()),
             super::PulseDefinition::OneOverEHalfWidth => self.pulse.duration_s,
         }
     }
@@ -389,24 +255,9 @@ impl Scene {
 
 fn check_estimator(e: &Estimator, c: &mut Checker) {
     c.count("estimator.window_samples", e.window_samples, 4, 65_536);
-    c.count(
-        "estimator.window_step_samples",
-        e.window_step_samples,
-        1,
-        1_000_000,
-    );
-    c.count(
-        "estimator.gate_step_samples",
-        e.gate_step_samples,
-        1,
-        1_000_000,
-    );
-    c.count(
-        "estimator.padded_samples",
-        e.padded_samples,
-        e.window_samples,
-        1 << 22,
-    );
+    c.count("estimator.window_step_samples", e.window_step_samples, 1, 1_000_000);
+    c.count("estimator.gate_step_samples", e.gate_step_samples, 1, 1_000_000);
+    c.count("estimator.padded_samples", e.padded_samples, e.window_samples, 1 << 22);
     if e.method == Method::PeriodogramAccumulation {
         c.within("estimator.radius_m", e.radius_m, 0.0, 1e5, "m");
     }
@@ -429,32 +280,14 @@ mod tests {
 
     #[test]
     fn impossible_values_are_named() {
-        assert_eq!(
-            keys(|s| s.telescope.beam_radius_m = -0.03),
-            ["telescope.beam_radius_m"]
-        );
-        assert_eq!(
-            keys(|s| s.pulse.duration_s = f64::NAN),
-            ["pulse.duration_s"]
-        );
+        assert_eq!(keys(|s| s.telescope.beam_radius_m = -0.03), ["telescope.beam_radius_m"]);
+        assert_eq!(keys(|s| s.pulse.duration_s = f64::NAN), ["pulse.duration_s"]);
         assert_eq!(keys(|s| s.telescope.focus_m = 0.0), ["telescope.focus_m"]);
-        assert_eq!(
-            keys(|s| s.scan.elevation_min_rad = -0.01),
-            ["scan.elevation_min_rad"]
-        );
-        assert_eq!(
-            keys(|s| s.scan.range_max_m = 281.0),
-            ["estimator.window_samples"]
-        );
+        assert_eq!(keys(|s| s.scan.elevation_min_rad = -0.01), ["scan.elevation_min_rad"]);
+        assert_eq!(keys(|s| s.scan.range_max_m = 281.0), ["estimator.window_samples"]);
         assert_eq!(keys(|s| s.scan.range_min_m = 40.0), ["scan.range_min_m"]);
-        assert_eq!(
-            keys(|s| s.detector.intermediate_frequency_hz = 110e6),
-            ["detector.intermediate_frequency_hz"]
-        );
-        assert_eq!(
-            keys(|s| s.estimator.padded_samples = 63),
-            ["estimator.padded_samples"]
-        );
+        assert_eq!(keys(|s| s.detector.intermediate_frequency_hz = 110e6), ["detector.intermediate_frequency_hz"]);
+        assert_eq!(keys(|s| s.estimator.padded_samples = 63), ["estimator.padded_samples"]);
         assert_eq!(keys(|s| s.seed = u64::MAX), ["seed"]);
         assert_eq!(keys(|s| s.format = 7), ["format"]);
     }
@@ -471,9 +304,7 @@ mod tests {
     #[test]
     fn age_needs_motion() {
         let mut scene = Scene::default();
-        let Flow::VortexPair(pair) = &mut scene.flow else {
-            unreachable!()
-        };
+        let Flow::VortexPair(pair) = &mut scene.flow else { unreachable!() };
         pair.age_tau = 1.0;
         assert_eq!(scene.problems()[0].key, "flow.age_tau");
     }

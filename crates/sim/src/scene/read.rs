@@ -74,10 +74,8 @@ impl SceneFile {
     /// # Errors
     /// [`SceneError`] names the file, the line, the key, the value and what is allowed.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Unreadable {
-            path: path.to_owned(),
-            source,
-        })?;
+        let text =
+            std::fs::read_to_string(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })?;
         Self::parse(&text, path)
     }
 
@@ -90,16 +88,10 @@ impl SceneFile {
         Self::new(scene).map_err(|problems| {
             let document = DeTable::parse(text).ok();
             let locate = |problem: Problem| {
-                let line = document
-                    .as_ref()
-                    .and_then(|d| find(d.get_ref(), &problem.key))
-                    .map(|at| line_of(text, at));
+                let line = document.as_ref().and_then(|d| find(d.get_ref(), &problem.key)).map(|at| line_of(text, at));
                 Located { problem, line }
             };
-            SceneError::Invalid {
-                path: path.to_owned(),
-                problems: problems.into_iter().map(locate).collect(),
-            }
+            SceneError::Invalid { path: path.to_owned(), problems: problems.into_iter().map(locate).collect() }
         })
     }
 
@@ -122,17 +114,11 @@ fn malformed(text: &str, path: &Path, error: &toml::de::Error) -> SceneError {
     let message = error.message().replace('\n', " ");
     let span = error.span().unwrap_or(0..0);
     // In a section that is chosen by a tag, the parser knows only where the section begins.
-    let at = quoted(&message)
-        .filter(|_| message.starts_with("unknown field"))
-        .and_then(|key| {
-            let document = DeTable::parse(text).ok()?;
-            find_under(document.get_ref(), key, &span)
-        });
-    SceneError::Malformed {
-        path: path.to_owned(),
-        line: line_of(text, at.unwrap_or(span.start)),
-        message,
-    }
+    let at = quoted(&message).filter(|_| message.starts_with("unknown field")).and_then(|key| {
+        let document = DeTable::parse(text).ok()?;
+        find_under(document.get_ref(), key, &span)
+    });
+    SceneError::Malformed { path: path.to_owned(), line: line_of(text, at.unwrap_or(span.start)), message }
 }
 
 /// The first word between backticks.
@@ -146,9 +132,7 @@ fn line_of(text: &str, offset: usize) -> usize {
 
 /// Offset of the key with this path.
 fn find(table: &DeTable<'_>, path: &str) -> Option<usize> {
-    let (head, rest) = path
-        .split_once('.')
-        .map_or((path, None), |(h, r)| (h, Some(r)));
+    let (head, rest) = path.split_once('.').map_or((path, None), |(h, r)| (h, Some(r)));
     let (key, value) = table.iter().find(|(k, _)| k.get_ref() == head)?;
     match (rest, value.get_ref()) {
         (None, _) => Some(key.span().start),
@@ -161,8 +145,7 @@ fn find(table: &DeTable<'_>, path: &str) -> Option<usize> {
 fn find_under(table: &DeTable<'_>, name: &str, span: &std::ops::Range<usize>) -> Option<usize> {
     let mut found = None;
     for (key, value) in table.iter() {
-        let here =
-            (key.get_ref() == name && key.span().start >= span.start).then(|| key.span().start);
+        let here = (key.get_ref() == name && key.span().start >= span.start).then(|| key.span().start);
         let inner = match value.get_ref() {
             DeValue::Table(inner) => find_under(inner, name, span),
             _ => None,
@@ -183,53 +166,33 @@ mod tests {
     use super::*;
 
     fn message(text: &str) -> String {
-        SceneFile::parse(text, Path::new("s.toml"))
-            .unwrap_err()
-            .to_string()
+        SceneFile::parse(text, Path::new("s.toml")).unwrap_err().to_string()
     }
 
     #[test]
     fn limits_are_reported_with_key_value_range_and_line() {
         let text = "seed = 3\n[scan]\nrange_min_m = 300.0\nrealisations = 0\n";
-        assert_eq!(
-            message(text),
-            "s.toml:4: scan.realisations = 0 is not allowed: a whole number from 1 to 1000000"
-        );
+        assert_eq!(message(text), "s.toml:4: scan.realisations = 0 is not allowed: a whole number from 1 to 1000000");
     }
 
     #[test]
     fn unknown_keys_are_refused_where_they_stand() {
         let text = "[laser]\nwavelength_m = 1.5e-6\nwavelenght_m = 1.5e-6\n";
         let m = message(text);
-        assert!(
-            m.starts_with("s.toml:3: unknown field `wavelenght_m`"),
-            "{m}"
-        );
-        assert!(
-            m.contains("pulse_repetition_hz"),
-            "allowed keys are listed: {m}"
-        );
+        assert!(m.starts_with("s.toml:3: unknown field `wavelenght_m`"), "{m}");
+        assert!(m.contains("pulse_repetition_hz"), "allowed keys are listed: {m}");
     }
 
     #[test]
     fn unknown_keys_are_found_in_tagged_sections_too() {
         for (text, line) in [
-            (
-                "seed = 1\n[flow]\nkind = \"vortex_pair\"\nspacing_m = 40.0\ncore_m = 1.0\n",
-                5,
-            ),
+            ("seed = 1\n[flow]\nkind = \"vortex_pair\"\nspacing_m = 40.0\ncore_m = 1.0\n", 5),
             ("[flow]\nkind = \"calm\"\nspacing_m = 40.0\n", 3),
-            (
-                "[detector.snr]\nreference = \"physical\"\nsnr_db = 0.0\n",
-                3,
-            ),
+            ("[detector.snr]\nreference = \"physical\"\nsnr_db = 0.0\n", 3),
             ("[atmosphere.turbulence]\nkind = \"none\"\ncn2 = 1e-14\n", 3),
         ] {
             let m = message(text);
-            assert!(
-                m.starts_with(&format!("s.toml:{line}: unknown field")),
-                "{m}"
-            );
+            assert!(m.starts_with(&format!("s.toml:{line}: unknown field")), "{m}");
         }
     }
 
@@ -243,10 +206,7 @@ mod tests {
     #[test]
     fn equal_scenes_have_equal_hashes() {
         let hash = |text: &str| SceneFile::parse(text, Path::new("s")).unwrap().hash;
-        assert_eq!(
-            hash(""),
-            hash("[laser]\nwavelength_m = 1.55e-6 # as the default\n")
-        );
+        assert_eq!(hash(""), hash("[laser]\nwavelength_m = 1.55e-6 # as the default\n"));
         assert_ne!(hash(""), hash("seed = 2\n"));
     }
 }

@@ -1,0 +1,77 @@
+//! The power of the simulated signal against (14), through all crates that have a part in it.
+
+use wakescope_optics::theory::free_space_efficiency;
+use wakescope_sim::join;
+use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
+use wakescope_sim::run;
+use wakescope_sim::scene::{Flow, NoiseKind, Scene, SceneFile};
+
+fn plan(change: impl Fn(&mut Scene)) -> Plan {
+    let mut scene = Scene { flow: Flow::Calm {}, ..Scene::default() };
+    scene.scan.elevation_max_rad = 0.1;
+    scene.scan.elevation_step_rad = 0.01;
+    scene.scan.pulses_per_line = 300;
+    change(&mut scene);
+    Plan::new(SceneFile::new(scene).unwrap(), Target::Signal).unwrap()
+}
+
+/// Mean square of the current and its standard error over the pulses, A^2.
+fn mean_square_a2(plan: &Plan) -> (f64, f64) {
+    let signals = run::run(plan, &Silent).unwrap().signals_a.unwrap();
+    let of_pulse: Vec<f64> = signals.rows().into_iter().map(|r| r.dot(&r) / r.len() as f64).collect();
+    let n = of_pulse.len() as f64;
+    let mean = of_pulse.iter().sum::<f64>() / n;
+    let variance = of_pulse.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+#[test]
+fn mean_signal_power_over_noise_power_is_the_snr_of_14() {
+    let plan = plan(|s| s.detector.noise = NoiseKind::None);
+    let (power_a2, error_a2) = mean_square_a2(&plan);
+    let noise_a2 = join::receiver(&plan.scene.scene).noise_variance_a2();
+    let model = join::snr_model(&plan.scene.scene).unwrap();
+    let telescope = join::telescope(&plan.scene.scene).unwrap();
+    // The mean over the samples of the record.
+    let g = &plan.geometry;
+    let expected = (0..g.samples)
+        .map(|k| g.first_range_m + k as f64 * g.sample_spacing_m)
+        .map(|r| model.snr(r, free_space_efficiency(&telescope, r).unwrap()).unwrap())
+        .sum::<f64>()
+        / g.samples as f64;
+    let (snr, error) = (power_a2 / noise_a2, error_a2 / noise_a2);
+    assert!(error / expected < 0.01, "the test resolves a per cent: {error}");
+    assert!((snr - expected).abs() < 3.5 * error, "SNR {snr} +- {error}, (14) gives {expected}");
+}
+
+#[test]
+fn noise_power_is_13_in_the_band_and_two_and_a_half_times_that_if_white() {
+    for (kind, factor) in [(NoiseKind::Band, 1.0), (NoiseKind::White, 2.5)] {
+        let plan = plan(|s| {
+            s.detector.noise = kind;
+            s.atmosphere.backscatter_per_m_sr = 0.0;
+        });
+        let (power_a2, error_a2) = mean_square_a2(&plan);
+        let expected_a2 = factor * join::receiver(&plan.scene.scene).noise_variance_a2();
+        assert!(
+            (power_a2 - expected_a2).abs() < 3.5 * error_a2,
+            "{kind:?}: {power_a2} +- {error_a2}, not {expected_a2}"
+        );
+        assert!(error_a2 < 0.005 * expected_a2);
+    }
+}
+
+#[test]
+fn power_does_not_depend_on_the_layer_thickness() {
+    // A steep flow makes the layers thinner; at rest the same scene has layers of one sample.
+    let thick = plan(|s| s.detector.noise = NoiseKind::None);
+    let mut thin = thick.clone();
+    let factor = 4;
+    let g = &mut thin.geometry;
+    g.layer_thickness_m /= factor as f64;
+    g.layers *= factor;
+    g.layers_per_sample = (g.layers_per_sample - 1) * factor + 1;
+    let ((a, a_error), (b, b_error)) = (mean_square_a2(&thick), mean_square_a2(&thin));
+    assert!((a - b).abs() < 3.5 * a_error.hypot(b_error), "{a} +- {a_error} and {b} +- {b_error}");
+}

@@ -1,0 +1,99 @@
+//! The report of a run: one page with all figures, claims and run times.
+
+use crate::Failure;
+use crate::figures::{Context, Figure, Rendered};
+use std::process::Command;
+use wakescope_sim::plot::html::HtmlTable;
+use wakescope_sim::plot::{Report, ReportEntry};
+
+/// The page as HTML.
+pub(super) fn html(context: &Context, done: &[(&Figure, Rendered)]) -> Result<String, Failure> {
+    let report = Report {
+        title: "wakescope: figures and claims".into(),
+        facts: facts(context),
+        entries: done.iter().map(|(figure, rendered)| entry(figure, rendered)).collect(),
+        claims: claims(done),
+        timings: timings(done),
+    };
+    Ok(report.to_html()?)
+}
+
+fn facts(context: &Context) -> Vec<(String, String)> {
+    let fact = |name: &str, value: String| (name.to_owned(), value);
+    vec![
+        fact("version", wakescope_sim::PROGRAM.into()),
+        fact("seed", context.seed.to_string()),
+        fact("profile", context.profile_name().into()),
+        fact("machine", machine()),
+        fact(
+            "command",
+            format!("cargo xtask reproduce-figs --profile {} --seed {}", context.profile_name(), context.seed),
+        ),
+    ]
+}
+
+/// Kind of processor, number of cores and compiler, as far as the system tells.
+fn machine() -> String {
+    let cpu = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
+        let line = text.lines().find(|l| l.starts_with("model name"))?;
+        line.split_once(':').map(|(_, name)| name.trim().to_owned())
+    });
+    let cores = std::thread::available_parallelism().map_or(0, usize::from);
+    let compiler = Command::new("rustc")
+        .arg("--version")
+        .output()
+        .ok()
+        .map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned());
+    format!(
+        "{} ({}, {}), {cores} cores, {}",
+        cpu.unwrap_or_else(|| "processor unknown".into()),
+        std::env::consts::ARCH,
+        std::env::consts::OS,
+        compiler.unwrap_or_else(|| "compiler unknown".into())
+    )
+}
+
+fn entry(figure: &Figure, rendered: &Rendered) -> ReportEntry {
+    let svg = rendered.file("svg").map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    // A table shows its own rows; a figure's rows are in its file.
+    let table = match (&svg, rendered.file("csv")) {
+        (None, Some(csv)) => Some(table_of_csv(&String::from_utf8_lossy(csv))),
+        _ => None,
+    };
+    ReportEntry {
+        id: figure.id.into(),
+        caption: format!("{}. {}", figure.title, rendered.caption),
+        svg,
+        table,
+        marks: rendered.marks.clone(),
+    }
+}
+
+/// The rows of a table whose cells hold no commas.
+fn table_of_csv(csv: &str) -> HtmlTable {
+    let mut rows =
+        csv.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
+    HtmlTable { header: rows.next().unwrap_or_default(), rows: rows.collect() }
+}
+
+fn words(list: &[&str]) -> Vec<String> {
+    list.iter().map(|&w| w.to_owned()).collect()
+}
+
+fn claims(done: &[(&Figure, Rendered)]) -> HtmlTable {
+    let row = |c: &crate::figures::Claim| {
+        let error = if c.standard_error.is_nan() { String::new() } else { format!("{:.3}", c.standard_error) };
+        vec![c.id.clone(), c.statement.clone(), c.expected.clone(), c.measured.clone(), error, c.verdict.name().into()]
+    };
+    HtmlTable {
+        header: words(&["id", "statement", "expected", "measured", "standard error", "verdict"]),
+        rows: done.iter().flat_map(|(_, r)| r.claims.iter().map(row)).collect(),
+    }
+}
+
+fn timings(done: &[(&Figure, Rendered)]) -> HtmlTable {
+    let rows = done
+        .iter()
+        .flat_map(|(f, r)| r.timings.iter().map(|(stage, s)| vec![f.id.to_owned(), stage.clone(), format!("{s:.3}")]));
+    HtmlTable { header: words(&["figure", "stage", "wall-clock time [s]"]), rows: rows.collect() }
+}
