@@ -35,7 +35,11 @@ pub mod hankel;
 mod kernel;
 #[cfg(feature = "screens")]
 mod low_frequency;
+#[cfg(feature = "screens")]
+pub mod monte_carlo;
 mod overlap;
+#[cfg(feature = "screens")]
+pub mod path;
 #[cfg(feature = "screens")]
 pub mod propagate;
 mod quadrature;
@@ -45,9 +49,13 @@ pub mod snr;
 #[cfg(feature = "screens")]
 pub mod source;
 pub mod spectrum;
+#[cfg(feature = "screens")]
+mod statistics;
 pub mod structure;
 pub mod theory;
 pub mod turbulence;
+#[cfg(feature = "screens")]
+mod walk;
 
 pub use beam::{Focus, Misalignment, RadiusDefinition, Telescope};
 pub use efficiency::EfficiencyProfile;
@@ -56,6 +64,10 @@ pub use error::Error;
 pub use grid::Grid;
 #[cfg(feature = "screens")]
 pub use kernel::Real;
+#[cfg(feature = "screens")]
+pub use monte_carlo::{EfficiencyEstimate, MonteCarlo, Progress, Sampling, Stop};
+#[cfg(feature = "screens")]
+pub use path::Layers;
 pub use snr::{PlanckConvention, SnrModel};
 pub use spectrum::{HillAndrews, OuterScaleConvention, Spectrum, VonKarman};
 pub use turbulence::{Cn2Path, Turbulence};
