@@ -1,5 +1,8 @@
 //! Tasks of the wakescope workspace: `cargo xtask --help`.
 
+// A task talks to a person at a terminal.
+#![allow(clippy::print_stdout)]
+
 mod bless;
 mod ci;
 mod curves;

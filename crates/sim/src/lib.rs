@@ -2,7 +2,7 @@
 //!
 //! This crate joins the four others, which know nothing of each other: the wind of `les`, the efficiency
 //! of `optics`, the records of `signal` and the velocities of `estimate`. A [`scene::Scene`] becomes a
-//! [`plan::Plan`], which says what will run and what is left out and why; [`run::run`] runs it; [`write::write`]
+//! [`plan::Plan`], which says what will run and what is left out and why; [`run::run`] runs it; [`write()`](write::write)
 //! puts the results on disk, all files or none.
 //!
 //! ```
@@ -33,7 +33,7 @@
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | [`scan`] | air along the lines of sight, and their records |
 //! | [`map`] | estimates and their errors against the truth |
-//! | [`run`], [`write`] | running a plan, writing its results |
+//! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
 //! | [`streams`] | one random stream for each pulse |
 //! | [`export`], [`plot`] | file formats, pictures |
 //! | [`cli`] | the program `wakescope` |

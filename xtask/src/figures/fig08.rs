@@ -16,8 +16,8 @@ use wakescope_sim::{run, write};
 const TAU: f64 = 2.5;
 
 fn scene(context: &Context) -> Scene {
-    let mut scene = Scene::default();
-    scene.flow = Flow::VortexPair(VortexPair { motion: VortexMotion::Inviscid, age_tau: TAU, ..VortexPair::default() });
+    let pair = VortexPair { motion: VortexMotion::Inviscid, age_tau: TAU, ..VortexPair::default() };
+    let mut scene = Scene { flow: Flow::VortexPair(pair), ..Scene::default() };
     // At tau = 2.5 the inviscid pair has spread over the ground: the scan must reach both.
     scene.scan.range_min_m = 240.0;
     scene.scan.range_max_m = 560.0;

@@ -1,3 +1,5 @@
+//! The bytes of a CfRadial file, read back by a reader that shares no code with the writer.
+
 use super::super::provenance::example;
 use super::super::samples;
 use super::*;

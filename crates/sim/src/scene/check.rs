@@ -150,7 +150,7 @@ impl Scene {
         c.within("outputs.profile_range_min_m", o.profile_range_min_m, 1.0, 1e6, "m");
         c.within("outputs.profile_range_max_m", o.profile_range_max_m, 1.0, 1e6, "m");
         c.require(
-            !(o.profile_range_max_m <= o.profile_range_min_m),
+            o.profile_range_max_m > o.profile_range_min_m,
             "outputs.profile_range_max_m",
             o.profile_range_max_m,
             format!("above outputs.profile_range_min_m, {} m", o.profile_range_min_m),
