@@ -34,6 +34,17 @@ fn windows(criterion: &mut Criterion) {
     criterion.bench_function("the same with exact refinement", |b| {
         b.iter(|| exact.estimator.estimate(black_box(&lags), &mut scratch));
     });
+    criterion.bench_function("Levinson recursion of order 16", |b| {
+        b.iter(|| Autoregression::yule_walker(black_box(&lags), SignalKind::Real, 16).unwrap().noise_power);
+    });
+    let ca = AutoregressivePeak::new(&sampling, SignalKind::Real, 64, 16, 2048, Refinement::Parabola).unwrap();
+    criterion.bench_function("AR(16), spectrum of 2048 points and peak", |b| {
+        b.iter(|| ca.estimate(black_box(&lags), &mut scratch));
+    });
+    let lag_window = LagWindowPeak::new(&sampling, SignalKind::Real, 64, 16, 1024, Refinement::Parabola).unwrap();
+    criterion.bench_function("Hann lag window, spectrum of 1024 points and peak", |b| {
+        b.iter(|| lag_window.estimate(black_box(&lags), &mut scratch));
+    });
     let direct = Periodogram::<f64>::new(Weighting::default(), 64, 1024).unwrap();
     criterion.bench_function("direct periodogram of 1024 points", |b| {
         b.iter(|| direct.density(black_box(&real), &mut scratch).unwrap()[300]);

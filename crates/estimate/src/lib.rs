@@ -31,8 +31,10 @@
 //! | `sampling`, `gates`, `sample` | frequencies and velocities, windows and ranges, real and complex samples |
 //! | `weighting`, `transform`, `periodogram` | window weights, their transform, (29) and (30) |
 //! | `correlogram`, `spectrum` | biased correlogram and the density that belongs to it |
-//! | `velocity`, `statistic` | peak search with flags; the traits for estimators of one's own |
+//! | `velocity`, `statistic` | velocity with flags; the traits for estimators of one's own |
+//! | `peak` | the search for the peak in the detector band |
 //! | `region`, `accumulate` | circular regions, accumulation level and n_eff; Table 3 |
+//! | `autoregressive`, `correlogram_estimators` | (31), (32); the estimators of the accumulated correlogram: CA, lag window, pulse pair |
 //! | `likelihood` | tapers that make the accumulated periodogram the likelihood of a known pulse |
 //! | `bound`, `linalg` | Cramer-Rao bound; solve and eigenvectors with residual checks |
 //! | `error_map` | bias, standard deviation, root mean square with standard errors, (33) |
@@ -47,8 +49,10 @@
 //! - `openblas-system` links a system OpenBLAS instead; the build stops with the remedy if there is none.
 
 mod accumulate;
+mod autoregressive;
 mod bound;
 mod correlogram;
+mod correlogram_estimators;
 #[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
 mod dense;
 mod error;
@@ -61,6 +65,7 @@ mod linalg;
 #[cfg(feature = "openblas-system")]
 mod openblas;
 mod parallel;
+mod peak;
 mod periodogram;
 mod region;
 mod sample;
@@ -72,17 +77,20 @@ mod velocity;
 mod weighting;
 
 pub use accumulate::{MapPoint, Radius, Scan};
+pub use autoregressive::Autoregression;
 pub use bound::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s};
 pub use correlogram::{Correlogram, Taper, correlogram_by_sum};
+pub use correlogram_estimators::{AutoregressivePeak, LagWindowPeak, PulsePair};
 pub use error::Error;
 pub use error_map::{ErrorMap, ErrorStatistics};
 pub use gates::Gates;
 pub use likelihood::likelihood_tapers;
+pub use peak::SpectralPeak;
 pub use periodogram::{Periodogram, PeriodogramOptions, PeriodogramPlan};
 pub use region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, polar_points};
 pub use sample::{Sample, Scratch, SignalKind};
 pub use sampling::{SPEED_OF_LIGHT_M_S, Sampling};
 pub use spectrum::{LagSpectrum, density_at};
 pub use statistic::{Estimator, Statistic, estimate_window};
-pub use velocity::{GateVelocity, Quality, Refinement, SpectralPeak};
+pub use velocity::{GateVelocity, Quality, Refinement};
 pub use weighting::Weighting;

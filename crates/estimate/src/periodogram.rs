@@ -7,11 +7,12 @@
 
 use crate::correlogram::Correlogram;
 use crate::error::{Error, length};
+use crate::peak::SpectralPeak;
 use crate::sample::{Sample, Scratch, SignalKind};
 use crate::sampling::Sampling;
 use crate::statistic::estimate_window;
 use crate::transform::WindowTransform;
-use crate::velocity::{GateVelocity, Refinement, SpectralPeak};
+use crate::velocity::{GateVelocity, Refinement};
 use crate::weighting::Weighting;
 
 /// Choices of the periodogram estimator.

@@ -3,6 +3,7 @@
 //! Check: scaling is exact because scales are powers of two, so amplitudes of 1e-200 and 1e200 keep
 //! their velocity to the last bit.
 
+use crate::autoregressive::Autoregression;
 use num_complex::Complex;
 use std::fmt;
 
@@ -125,6 +126,10 @@ pub struct Scratch {
     pub(crate) half: Vec<Complex<f64>>,
     /// Inner work space of the transforms.
     pub(crate) transform: Vec<Complex<f64>>,
+    /// Correlogram on its way into a transform.
+    pub(crate) numbers: Vec<f64>,
+    /// Autoregressive model.
+    pub(crate) model: Autoregression,
     /// Power spectrum of one window.
     pub(crate) power: Vec<f64>,
 }
