@@ -4,6 +4,7 @@
 
 mod fig01;
 mod fig03;
+mod fig04;
 mod fig05;
 mod fig08;
 mod fig09;
@@ -172,7 +173,7 @@ impl fmt::Display for Claim {
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 7] = [
+pub(crate) const ALL: [Figure; 8] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
     Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
     Figure {
@@ -182,6 +183,7 @@ pub(crate) const ALL: [Figure; 7] = [
         make: tab02::make,
     },
     Figure { id: "fig03", number: 3, title: "Scan pattern across the runway", make: fig03::make },
+    Figure { id: "fig04", number: 4, title: "Signal-to-noise ratio and system efficiency", make: fig04::make },
     Figure { id: "fig05", number: 5, title: "M'4 stencil on a line of sight", make: fig05::make },
     Figure { id: "fig08", number: 8, title: "Radial velocity of the early wake (analytic pair)", make: fig08::make },
     Figure { id: "fig09", number: 9, title: "Accumulation level against range", make: fig09::make },

@@ -1,0 +1,246 @@
+//! Figure 4: signal-to-noise ratio and system efficiency against range, in free space and through turbulence.
+
+use super::{Claim, Context, Rendered, Verdict};
+use crate::Failure;
+use std::ops::ControlFlow;
+use wakescope_optics::structure::StructureTable;
+use wakescope_optics::{
+    EfficiencyEstimate, EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Stop, Telescope, Turbulence,
+    theory,
+};
+use wakescope_sim::export::Table;
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+
+const WEAK_M_M23: f64 = 1e-15;
+const MEDIUM_M_M23: f64 = 1e-13;
+/// Beyond this range the collimated beam has left its near field enough for the two receivers to differ.
+const NEAR_FIELD_M: f64 = 300.0;
+
+/// One curve of the figure.
+struct Curve {
+    name: &'static str,
+    label: &'static str,
+    style: Style,
+    profile: EfficiencyProfile,
+}
+
+pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
+    let realisations = context.choose(64, 400, 400);
+    // A range in the middle and at the end of each layer of the chapter's path.
+    let range_m: Vec<f64> = (1..=20).map(|i| 150.0 * f64::from(i)).collect();
+    let weak = monte_carlo(WEAK_M_M23, &range_m, realisations, context.seed)?;
+    let medium = monte_carlo(MEDIUM_M_M23, &range_m, realisations, context.seed)?;
+    let telescope = Telescope::chapter();
+    let free = EfficiencyProfile::from_theory(&range_m, |r| theory::free_space_efficiency(&telescope, r))?;
+    let turbulence = Turbulence::chapter(MEDIUM_M_M23)?;
+    let exact = EfficiencyProfile::from_theory(&range_m, |r| {
+        theory::bistatic_efficiency(&telescope, &Misalignment::NONE, &turbulence, r)
+    })?;
+    let bistatic = medium.bistatic.clone().ok_or_else(|| Failure::new("one realisation has no pairs".into()))?;
+    let curves = [
+        Curve { name: "free_space", label: "free space", style: Style::Line, profile: free },
+        Curve {
+            name: "monostatic_1e-15", label: "monostatic, 10^{−15}", style: Style::Dash, profile: weak.monostatic
+        },
+        Curve { name: "bistatic_1e-13", label: "bistatic, 10^{−13}", style: Style::Dot, profile: bistatic },
+        Curve {
+            name: "monostatic_1e-13",
+            label: "monostatic, 10^{−13}",
+            style: Style::DashDot,
+            profile: medium.monostatic,
+        },
+        Curve {
+            name: "bistatic_1e-13_exact", label: "bistatic, 10^{−13}, exact", style: Style::Line, profile: exact
+        },
+    ];
+
+    let mut out = Rendered::default();
+    let parameters =
+        format!("set_up = \"chapter: 512 x 512 points of 2 mm, 10 layers\"\nrealisations = {realisations}\n");
+    let origin = context.provenance_of_formula(&parameters);
+    out.csv(table(&curves)?.to_csv(&origin)?);
+    let figure = Figure::side_by_side([
+        plot("Signal-to-noise ratio", "SNR [dB]", &curves, |c| decibels(&c.profile, &c.profile.mean))?,
+        plot("System efficiency", "efficiency", &curves, |c| Ok(c.profile.mean.clone()))?,
+    ]);
+    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    out.caption = format!(
+        "Signal-to-noise ratio (14) with h nu, and system efficiency (19), for the parameters of Table 2; {realisations} realisations \
+         of 10 phase screens, bands of one standard error. Cn2 in m^(-2/3); bistatic means independent paths."
+    );
+    out.claims = claims(&curves, &exact_for_screens(&range_m, &turbulence)?)?;
+    Ok(out)
+}
+
+fn monte_carlo(cn2_m_m23: f64, range_m: &[f64], realisations: usize, seed: u64) -> Result<EfficiencyEstimate, Failure> {
+    let set_up = MonteCarlo { range_m: range_m.to_vec(), ..MonteCarlo::chapter(cn2_m_m23, seed)? };
+    Ok(set_up.run::<f32>(Stop::after(realisations), |_| ControlFlow::Continue(()))?)
+}
+
+/// Exact bistatic efficiency for the ten screens that the Monte Carlo uses.
+fn exact_for_screens(range_m: &[f64], turbulence: &Turbulence) -> Result<EfficiencyProfile, Failure> {
+    let layers = Layers::equal(10, 3000.0)?;
+    let table = StructureTable::new(&*turbulence.spectrum);
+    let telescope = Telescope::chapter();
+    Ok(EfficiencyProfile::from_theory(range_m, |r| {
+        let screens = layers.screens_to(r, &turbulence.cn2)?;
+        theory::bistatic_efficiency_screens(&telescope, &Misalignment::NONE, &screens, &table, r)
+    })?)
+}
+
+fn decibels(profile: &EfficiencyProfile, efficiency: &[f64]) -> Result<Vec<f64>, Failure> {
+    let model = SnrModel::chapter();
+    profile.range_m.iter().zip(efficiency).map(|(&r, &e)| Ok(10.0 * model.snr(r, e)?.log10())).collect()
+}
+
+fn table(curves: &[Curve]) -> Result<Table, Failure> {
+    let column =
+        |get: fn(&EfficiencyProfile) -> &Vec<f64>| curves.iter().flat_map(move |c| get(&c.profile).iter().copied());
+    let mut snr_db = Vec::new();
+    for curve in curves {
+        snr_db.extend(decibels(&curve.profile, &curve.profile.mean)?);
+    }
+    Ok(Table::new()
+        .text("configuration", curves.iter().flat_map(|c| std::iter::repeat_n(c.name, c.profile.range_m.len())))
+        .float("range_m", column(|p| &p.range_m))
+        .float("efficiency", column(|p| &p.mean))
+        .float("efficiency_standard_deviation", column(|p| &p.standard_deviation))
+        .float("efficiency_standard_error", column(|p| &p.standard_error))
+        .float("snr_db", snr_db))
+}
+
+fn plot(
+    title: &str,
+    label: &str,
+    curves: &[Curve],
+    value: fn(&Curve) -> Result<Vec<f64>, Failure>,
+) -> Result<CurvePlot, Failure> {
+    let mut plot = CurvePlot::new(title, Axis::linear("range [m]"), Axis::linear(label));
+    plot.shape = 0.8;
+    for curve in curves {
+        let p = &curve.profile;
+        let y = value(curve)?;
+        let mut series = Series::new(curve.label, curve.style, p.range_m.iter().copied().zip(y.iter().copied()));
+        if p.standard_error.iter().any(|&e| e > 0.0) {
+            // The same relative error in the scale that is drawn.
+            let slope =
+                |i: usize| if label.ends_with("[dB]") { 10.0 / std::f64::consts::LN_10 / p.mean[i] } else { 1.0 };
+            let half: Vec<f64> = (0..y.len()).map(|i| slope(i) * p.standard_error[i]).collect();
+            series = series.with_band(&half);
+        }
+        plot = plot.with(series);
+    }
+    Ok(plot)
+}
+
+/// Difference of two profiles in units of its standard error, range by range.
+fn z_scores(a: &EfficiencyProfile, b: &EfficiencyProfile) -> Vec<f64> {
+    (0..a.mean.len()).map(|i| (a.mean[i] - b.mean[i]) / a.standard_error[i].hypot(b.standard_error[i])).collect()
+}
+
+fn claims(curves: &[Curve; 5], screens: &EfficiencyProfile) -> Result<Vec<Claim>, Failure> {
+    let [free, weak, bistatic, medium, exact] = [0, 1, 2, 3, 4].map(|i| &curves[i].profile);
+    let range_m = &free.range_m;
+
+    let ratio: Vec<f64> = exact.mean.iter().zip(&free.mean).map(|(e, f)| e / f).collect();
+    let falls = ratio.windows(2).all(|w| w[1] < w[0]);
+    let worst_z = z_scores(bistatic, screens).into_iter().map(f64::abs).fold(0.0, f64::max);
+    let f4a = Claim {
+        verdict: if worst_z > 3.5 { Verdict::Fail } else { Verdict::of(falls) },
+        ..Claim::exact(
+            "F4a",
+            "fig04",
+            "bistatic efficiency over free space falls monotonically with range at 1e-13 (exact theory; the Monte Carlo must agree with it)",
+            "falls; |z| below 3.5",
+            format!("{:.3} to {:.3}; largest |z| {worst_z:.1}", ratio[0], ratio[ratio.len() - 1]),
+            falls,
+        )
+    };
+
+    let beyond: Vec<f64> = z_scores(medium, bistatic)
+        .into_iter()
+        .zip(range_m)
+        .filter(|(_, r)| **r >= NEAR_FIELD_M)
+        .map(|(z, _)| z)
+        .collect();
+    let least = beyond.iter().copied().fold(f64::INFINITY, f64::min);
+    let f4b = Claim {
+        verdict: if least > 2.0 {
+            Verdict::Pass
+        } else if least < -2.0 {
+            Verdict::Fail
+        } else {
+            Verdict::NotResolved
+        },
+        ..Claim::exact(
+            "F4b",
+            "fig04",
+            "monostatic exceeds bistatic at 1e-13 at every range beyond the near field (300 m)",
+            "above 2 standard errors everywhere",
+            format!("at least {least:.1} standard errors"),
+            true,
+        )
+    };
+
+    let z = z_scores(medium, weak);
+    let above: Vec<f64> = range_m.iter().zip(&z).filter(|(_, z)| **z > 3.0).map(|(r, _)| *r).collect();
+    let best = (0..z.len()).max_by(|&a, &b| z[a].total_cmp(&z[b])).unwrap_or(0);
+    let f4c = Claim {
+        standard_error: medium.standard_error[best].hypot(weak.standard_error[best]),
+        ..Claim::exact(
+            "F4c",
+            "fig04",
+            "monostatic at 1e-13 exceeds monostatic at 1e-15 over some interval of range",
+            "an excess above 3 standard errors",
+            match (above.first(), above.last()) {
+                (Some(first), Some(last)) => {
+                    format!(
+                        "from {first} to {last} m; {:+.4} at {} m",
+                        medium.mean[best] - weak.mean[best],
+                        range_m[best]
+                    )
+                }
+                _ => format!("none; at most {:.1} standard errors", z[best]),
+            },
+            !above.is_empty(),
+        )
+    };
+    let after = (best..z.len()).find(|&i| medium.mean[i] < weak.mean[i]);
+    let below = (best..z.len()).filter(|&i| z[i] < -3.0).count();
+    let f4d = Claim {
+        verdict: match (after, below) {
+            (Some(_), 1..) => Verdict::Pass,
+            (Some(_), 0) => Verdict::NotResolved,
+            (None, _) => Verdict::Fail,
+        },
+        ..Claim::exact(
+            "F4d",
+            "fig04",
+            "the interval ends: beyond it monostatic at 1e-13 is below monostatic at 1e-15",
+            "a crossover",
+            after.map_or_else(
+                || format!("none out to {} m", range_m[range_m.len() - 1]),
+                |i| format!("between {} and {} m", range_m[i.max(1) - 1], range_m[i]),
+            ),
+            true,
+        )
+    };
+    Ok(vec![f4a, f4b, f4c, f4d, free_space_claim()?])
+}
+
+/// The crate's quadrature against the stored curve of independent origin.
+fn free_space_claim() -> Result<Claim, Failure> {
+    let curve = crate::curves::ALL
+        .iter()
+        .find(|c| c.name == "optics/eta_intensity_radius")
+        .ok_or_else(|| Failure::new("the stored curve of the efficiency is gone".into()))?;
+    let compared = curve.compare()?;
+    Ok(Claim::exact(
+        "F4e",
+        "fig04",
+        "the free-space efficiency agrees with the reference curve",
+        &format!("within {:e}", curve.tolerance),
+        format!("within {:.1e} at {} ranges", compared.worst_error, compared.x.len()),
+        compared.passes(curve),
+    ))
+}
