@@ -87,6 +87,12 @@ impl Grid {
     }
 }
 
+/// Buffers of [`Fft2`].
+pub(crate) struct FftScratch<T> {
+    block: Vec<Complex<T>>,
+    inner: Vec<Complex<T>>,
+}
+
 /// Fourier transforms of the rows and columns of one grid, planned once.
 pub(crate) struct Fft2<T: Real> {
     pub(crate) nx: usize,
@@ -107,23 +113,26 @@ impl<T: Real> Fft2<T> {
         Self { nx: grid.nx, ny: grid.ny, forward, inverse, scratch }
     }
 
-    pub(crate) fn scratch(&self) -> Vec<Complex<T>> {
-        vec![Complex::default(); self.scratch]
+    /// Buffers of one transform: a block of rows, which stays in the fastest cache, and the transform's own.
+    pub(crate) fn scratch(&self) -> FftScratch<T> {
+        FftScratch {
+            block: vec![Complex::default(); ROWS * self.nx.max(self.ny)],
+            inner: vec![Complex::default(); self.scratch],
+        }
     }
 
-    /// Calls `rows` on blocks of rows of the field (`length` points each), with the index of the first row, and stores
-    /// the block transposed into `out`.
+    /// Calls `rows` on each block of `length`-point rows, with the index of its first row, and stores it transposed in `out`.
     fn transposing(
-        field: &mut [Complex<T>],
         out: &mut [Complex<T>],
         length: usize,
+        block: &mut [Complex<T>],
         mut rows: impl FnMut(usize, &mut [Complex<T>]),
     ) {
-        let count = field.len() / length;
-        for (block_index, block) in field.chunks_mut(ROWS * length).enumerate() {
-            let first = block_index * ROWS;
+        let count = out.len() / length;
+        for first in (0..count).step_by(ROWS) {
+            let height = ROWS.min(count - first);
+            let block = &mut block[..height * length];
             rows(first, block);
-            let height = block.len() / length;
             if height == ROWS {
                 for (i, column) in out.chunks_exact_mut(count).enumerate() {
                     let target = &mut column[first..first + ROWS];
@@ -144,14 +153,17 @@ impl<T: Real> Fft2<T> {
     /// Rows `[y][x]`: `before` each block, forward transform along x, transposed into `out` `[kx][y]`.
     pub(crate) fn forward_x(
         &self,
-        field: &mut [Complex<T>],
+        field: &[Complex<T>],
         out: &mut [Complex<T>],
-        scratch: &mut [Complex<T>],
+        scratch: &mut FftScratch<T>,
         mut before: impl FnMut(usize, &mut [Complex<T>]),
     ) {
-        Self::transposing(field, out, self.nx, |first, block| {
+        let FftScratch { block, inner } = scratch;
+        Self::transposing(out, self.nx, block, |first, block| {
+            let start = first * self.nx;
+            block.copy_from_slice(&field[start..start + block.len()]);
             before(first, block);
-            self.forward[0].process_with_scratch(block, &mut scratch[..self.forward[0].get_inplace_scratch_len()]);
+            self.forward[0].process_with_scratch(block, &mut inner[..self.forward[0].get_inplace_scratch_len()]);
         });
     }
 
@@ -159,29 +171,32 @@ impl<T: Real> Fft2<T> {
     /// into `out` `[y][kx]`.
     pub(crate) fn filter_y(
         &self,
-        field: &mut [Complex<T>],
+        field: &[Complex<T>],
         out: &mut [Complex<T>],
-        scratch: &mut [Complex<T>],
+        scratch: &mut FftScratch<T>,
         mut middle: impl FnMut(usize, &mut [Complex<T>]),
     ) {
-        Self::transposing(field, out, self.ny, |first, block| {
-            self.forward[1].process_with_scratch(block, &mut scratch[..self.forward[1].get_inplace_scratch_len()]);
+        let FftScratch { block, inner } = scratch;
+        Self::transposing(out, self.ny, block, |first, block| {
+            let start = first * self.ny;
+            block.copy_from_slice(&field[start..start + block.len()]);
+            self.forward[1].process_with_scratch(block, &mut inner[..self.forward[1].get_inplace_scratch_len()]);
             middle(first, block);
-            self.inverse[1].process_with_scratch(block, &mut scratch[..self.inverse[1].get_inplace_scratch_len()]);
+            self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);
         });
     }
 
-    /// Rows `[kx][ky]`: `fill` each block, inverse along y, transposed into `out` `[y][kx]`.
+    /// Rows `[kx][ky]`: `fill` makes each block, inverse along y, transposed into `out` `[y][kx]`.
     pub(crate) fn inverse_y(
         &self,
-        field: &mut [Complex<T>],
         out: &mut [Complex<T>],
-        scratch: &mut [Complex<T>],
+        scratch: &mut FftScratch<T>,
         mut fill: impl FnMut(usize, &mut [Complex<T>]),
     ) {
-        Self::transposing(field, out, self.ny, |first, block| {
+        let FftScratch { block, inner } = scratch;
+        Self::transposing(out, self.ny, block, |first, block| {
             fill(first, block);
-            self.inverse[1].process_with_scratch(block, &mut scratch[..self.inverse[1].get_inplace_scratch_len()]);
+            self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);
         });
     }
 
@@ -189,11 +204,12 @@ impl<T: Real> Fft2<T> {
     pub(crate) fn inverse_x(
         &self,
         field: &mut [Complex<T>],
-        scratch: &mut [Complex<T>],
+        scratch: &mut FftScratch<T>,
         mut after: impl FnMut(usize, &mut [Complex<T>]),
     ) {
         for (block_index, block) in field.chunks_mut(ROWS * self.nx).enumerate() {
-            self.inverse[0].process_with_scratch(block, &mut scratch[..self.inverse[0].get_inplace_scratch_len()]);
+            self.inverse[0]
+                .process_with_scratch(block, &mut scratch.inner[..self.inverse[0].get_inplace_scratch_len()]);
             after(block_index * ROWS, block);
         }
     }
@@ -210,12 +226,12 @@ mod tests {
         let mut scratch = fft.scratch();
         let field: Vec<Complex<f64>> =
             (0..grid.points()).map(|i| Complex::new((i as f64 * 0.7).sin(), (i as f64 * 1.3).cos())).collect();
-        let (mut a, mut b) = (field.clone(), field.clone());
-        fft.forward_x(&mut a, &mut b, &mut scratch, |_, _| {});
+        let mut b = field.clone();
+        fft.forward_x(&field, &mut b, &mut scratch, |_, _| {});
         let mut found = Complex::default();
         let (kx, ky) = (5usize, 3usize);
         let mut out = field.clone();
-        fft.filter_y(&mut b, &mut out, &mut scratch, |first, block| {
+        fft.filter_y(&b, &mut out, &mut scratch, |first, block| {
             if (first..first + block.len() / 23).contains(&kx) {
                 found = block[(kx - first) * 23 + ky];
             }

@@ -6,7 +6,7 @@
 
 use crate::Error;
 use crate::error::{finite, positive};
-use crate::grid::{Fft2, Grid};
+use crate::grid::{Fft2, FftScratch, Grid};
 use crate::kernel::Real;
 use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
@@ -41,7 +41,7 @@ pub struct Propagator<T: Real> {
 /// Buffers of a step, reused.
 pub struct PropagatorWork<T: Real> {
     transposed: Vec<Complex<T>>,
-    scratch: Vec<Complex<T>>,
+    scratch: FftScratch<T>,
 }
 
 impl<T: Real> Propagator<T> {

@@ -11,7 +11,7 @@
 //! it stays within 0.1 % of quadrature of the continuous spectrum.
 
 use crate::Error;
-use crate::grid::{Fft2, Grid};
+use crate::grid::{Fft2, FftScratch, Grid};
 use crate::kernel::{LowRow, Real};
 use crate::low_frequency::{LowFrequencies, unit};
 use crate::quadrature::GaussLegendre;
@@ -45,9 +45,8 @@ pub struct ScreenGenerator<T: Real> {
 
 /// Buffers of a synthesis, reused from screen to screen.
 pub struct ScreenWork<T: Real> {
-    spectrum: Vec<Complex<T>>,
     field: Vec<Complex<T>>,
-    scratch: Vec<Complex<T>>,
+    scratch: FftScratch<T>,
     radius: Vec<u32>,
     angle: Vec<u32>,
     row: Vec<T>,
@@ -106,10 +105,8 @@ impl<T: Real> ScreenGenerator<T> {
 
     /// Buffers for [`ScreenGenerator::fill_pair`].
     pub fn work(&self) -> ScreenWork<T> {
-        let n = self.grid.points();
         ScreenWork {
-            spectrum: vec![Complex::default(); n],
-            field: vec![Complex::default(); n],
+            field: vec![Complex::default(); self.grid.points()],
             scratch: self.fft.scratch(),
             radius: vec![0; self.grid.ny],
             angle: vec![0; self.grid.ny],
@@ -227,9 +224,9 @@ impl<T: Real> ScreenGenerator<T> {
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let shift = [unit(rng) - 0.5, unit(rng) - 0.5];
         let low = self.low.draw(&*self.spectrum, displacement_m, rng);
-        let ScreenWork { spectrum, field, scratch, radius, angle, row, ramp } = work;
+        let ScreenWork { field, scratch, radius, angle, row, ramp } = work;
         let wind = self.displacement_phases(shift, displacement_m);
-        self.fft.inverse_y(spectrum, field, scratch, |ix, block| {
+        self.fft.inverse_y(field, scratch, |ix, block| {
             for (i, line) in block.chunks_exact_mut(ny).enumerate() {
                 for (u, v) in radius.iter_mut().zip(angle.iter_mut()) {
                     let word = rng.next_u64();

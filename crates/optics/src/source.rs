@@ -98,7 +98,10 @@ pub(crate) fn aperture_field<T: Real>(
     let fft = Fft2::<f64>::new(grid);
     let mut field = vec![Complex::default(); grid.points()];
     let mut scratch = fft.scratch();
-    fft.inverse_y(&mut spectrum, &mut field, &mut scratch, |_, _| {});
+    fft.inverse_y(&mut field, &mut scratch, |ix, block| {
+        let start = ix * grid.ny;
+        block.copy_from_slice(&spectrum[start..start + block.len()]);
+    });
     fft.inverse_x(&mut field, &mut scratch, |_, _| {});
     let k = telescope.wavenumber_rad_m();
     let bend = 0.5 * k * telescope.focus.curvature_per_m();
