@@ -32,7 +32,7 @@
 //! | `weighting`, `transform`, `periodogram` | window weights, their transform, (29) and (30) |
 //! | `correlogram`, `spectrum` | biased correlogram and the density that belongs to it |
 //! | `velocity`, `statistic` | velocity with flags; the traits for estimators of one's own |
-//! | `peak` | the search for the peak in the detector band |
+//! | `peak`, `detection` | the search for the peak in the detector band; how high that of pure noise stands |
 //! | `region`, `accumulate` | circular regions, accumulation level and n_eff; Table 3 |
 //! | `autoregressive`, `correlogram_estimators` | (31), (32); the estimators of the accumulated correlogram: CA, lag window, pulse pair |
 //! | `likelihood` | tapers that make the accumulated periodogram the likelihood of a known pulse |
@@ -55,6 +55,7 @@ mod correlogram;
 mod correlogram_estimators;
 #[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
 mod dense;
+mod detection;
 mod error;
 mod error_map;
 mod gates;
@@ -81,6 +82,7 @@ pub use autoregressive::Autoregression;
 pub use bound::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s};
 pub use correlogram::{Correlogram, Taper, correlogram_by_sum};
 pub use correlogram_estimators::{AutoregressivePeak, LagWindowPeak, PulsePair};
+pub use detection::noise_quality;
 pub use error::Error;
 pub use error_map::{ErrorMap, ErrorStatistics};
 pub use gates::Gates;
