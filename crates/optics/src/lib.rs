@@ -37,6 +37,8 @@ mod kernel;
 mod low_frequency;
 #[cfg(feature = "screens")]
 pub mod monte_carlo;
+#[cfg(all(test, feature = "screens"))]
+mod mutation;
 mod overlap;
 #[cfg(feature = "screens")]
 pub mod path;

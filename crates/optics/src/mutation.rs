@@ -1,0 +1,35 @@
+//! A mistake put in on purpose: the bistatic test must find a wrong sign of the random frequency shift.
+//!
+//! With the wrong sign a frequency kappa_m - s carries the amplitude that belongs to kappa_m + s. Screens look right and the
+//! monostatic efficiency hardly changes; the bistatic efficiency falls by several standard errors.
+
+use crate::structure::StructureTable;
+use crate::{EfficiencyEstimate, Grid, Misalignment, MonteCarlo, Stop, theory};
+use std::ops::ControlFlow;
+
+/// Largest |z| of the bistatic mean against exact theory for the screens used.
+fn worst_z(run: &MonteCarlo, estimate: &EfficiencyEstimate) -> f64 {
+    let table = StructureTable::new(&*run.turbulence.spectrum);
+    let bistatic = estimate.bistatic.as_ref().unwrap();
+    let mut worst = 0f64;
+    for (i, &range_m) in run.range_m.iter().enumerate() {
+        let screens = run.layers.screens_to(range_m, &run.turbulence.cn2).unwrap();
+        let exact = theory::bistatic_efficiency_screens(&run.telescope, &Misalignment::NONE, &screens, &table, range_m)
+            .unwrap();
+        worst = worst.max(((bistatic.mean[i] - exact) / bistatic.standard_error[i]).abs());
+    }
+    worst
+}
+
+#[test]
+fn bistatic_test_passes_and_finds_a_wrong_sign_of_the_frequency_shift() {
+    let mut run = MonteCarlo::chapter(1e-13, 20).unwrap();
+    run.grid = Grid::square(256, 4e-3).unwrap();
+    let mut prepared = run.prepare::<f32>().unwrap();
+    let mut go = |_| ControlFlow::Continue(());
+    let right = run.run_prepared(&prepared, Stop::after(320), &mut go).unwrap();
+    assert!(worst_z(&run, &right) < 3.0, "{}", worst_z(&run, &right));
+    prepared.screens.as_mut().unwrap().shift_sign = -1.0;
+    let wrong = run.run_prepared(&prepared, Stop::after(320), &mut go).unwrap();
+    assert!(worst_z(&run, &wrong) > 4.0, "{}", worst_z(&run, &wrong));
+}

@@ -1,0 +1,180 @@
+//! Monte-Carlo efficiency against exact theory, and its behaviour in extreme cases.
+#![cfg(feature = "screens")]
+
+use std::ops::ControlFlow;
+use wakescope_optics::structure::StructureTable;
+use wakescope_optics::theory::{bistatic_efficiency_screens, free_space_efficiency};
+use wakescope_optics::{
+    Cn2Path, EfficiencyEstimate, Error, Focus, Grid, Layers, Misalignment, MonteCarlo, Progress, Real, Sampling, Stop,
+    Telescope, Turbulence,
+};
+
+fn go(_: Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// The chapter's width with half its resolution: a quarter of the work.
+fn coarse(cn2_m_m23: f64, seed: u64) -> MonteCarlo {
+    let mut run = MonteCarlo::chapter(cn2_m_m23, seed).expect("set-up");
+    run.grid = Grid::square(256, 4e-3).expect("grid");
+    run
+}
+
+/// z of the bistatic mean against exact theory for the screens used, at each range.
+fn bistatic_z(run: &MonteCarlo, estimate: &EfficiencyEstimate) -> Vec<f64> {
+    let table = StructureTable::new(&*run.turbulence.spectrum);
+    let bistatic = estimate.bistatic.as_ref().expect("pairs");
+    run.range_m
+        .iter()
+        .enumerate()
+        .map(|(i, &range_m)| {
+            let screens = run.layers.screens_to(range_m, &run.turbulence.cn2).expect("screens");
+            let exact = bistatic_efficiency_screens(&run.telescope, &run.misalignment, &screens, &table, range_m);
+            (bistatic.mean[i] - exact.expect("theory")) / bistatic.standard_error[i]
+        })
+        .collect()
+}
+
+#[test]
+fn bistatic_mean_agrees_with_exact_theory_and_monostatic_exceeds_it() {
+    for (cn2, seed) in [(1e-15, 3), (1e-14, 4), (1e-13, 5)] {
+        let run = coarse(cn2, seed);
+        let estimate = run.run::<f32>(Stop::after(240), go).expect("run");
+        let z = bistatic_z(&run, &estimate);
+        assert!(z.iter().all(|z| z.abs() < 3.0), "{cn2:e}: {z:?}");
+        let bistatic = estimate.bistatic.as_ref().expect("pairs");
+        for (mono, bi) in estimate.monostatic.mean.iter().zip(&bistatic.mean) {
+            assert!(mono > bi, "{cn2:e}: {mono} {bi}");
+        }
+    }
+}
+
+#[test]
+fn branches_profiles_and_displaced_beams_agree_with_exact_theory() {
+    let mut run = coarse(1e-13, 9);
+    run.telescope.focus = Focus::At(900.0);
+    run.misalignment = Misalignment { offset_m: [0.01, 0.0], tilt_rad: [0.0, 1e-5] };
+    run.turbulence.cn2 = Cn2Path::Heights {
+        height_m: vec![0.0, 50.0, 500.0],
+        cn2_m_m23: vec![3e-13, 5e-14, 1e-14],
+        telescope_height_m: 2.0,
+        elevation_rad: 0.1,
+    };
+    run.layers = Layers::new(vec![150.0, 400.0, 700.0, 1100.0]).expect("layers");
+    // Before the first screen, inside layers, and at the end of one.
+    run.range_m = vec![60.0, 300.0, 700.0, 1000.0];
+    let estimate = run.run::<f32>(Stop::after(240), go).expect("run");
+    let z = bistatic_z(&run, &estimate);
+    assert!(z.iter().all(|z| z.abs() < 3.2), "{z:?}");
+    // Different beams: the same-path value may fall below, but not by much of its error.
+    assert!(estimate.lost_power.iter().all(|&l| l < 0.01));
+}
+
+#[test]
+fn free_space_on_the_chapters_grid_is_within_1e_3_raw_and_exact_when_corrected() {
+    let mut run = MonteCarlo::chapter(0.0, 1).expect("set-up");
+    run.range_m = vec![100.0, 150.0, 250.0, 400.0, 700.0, 1000.0, 2000.0, 3000.0];
+    run.correct_grid = false;
+    let raw = run.run::<f64>(Stop::after(400), go).expect("run");
+    for (range_m, eta) in run.range_m.iter().zip(&raw.monostatic.mean) {
+        let exact = free_space_efficiency(&run.telescope, *range_m).expect("theory");
+        assert!((eta / exact - 1.0).abs() < 1e-3, "{range_m}: {}", eta / exact - 1.0);
+    }
+    run.correct_grid = true;
+    let corrected = run.run::<f64>(Stop::after(400), go).expect("run");
+    for (eta, exact) in corrected.monostatic.mean.iter().zip(&corrected.exact_free_space) {
+        assert!((eta / exact - 1.0).abs() < 1e-13);
+    }
+    assert_eq!(corrected.realisations, 1);
+    assert!(corrected.monostatic.standard_error.iter().all(|&e| e == 0.0));
+    assert_eq!(corrected.bistatic.expect("same as monostatic").mean, corrected.monostatic.mean);
+}
+
+#[test]
+fn very_weak_turbulence_differs_from_free_space_by_little() {
+    let mut run = coarse(1e-18, 1);
+    run.range_m = vec![1500.0];
+    let estimate = run.run::<f64>(Stop::after(4), go).expect("run");
+    let change = estimate.monostatic.mean[0] / estimate.exact_free_space[0] - 1.0;
+    assert!(change.abs() < 5e-3, "{change}");
+    assert!(estimate.monostatic.standard_error[0] > 0.0);
+}
+
+#[test]
+fn single_realisation_has_no_bistatic_value() {
+    let mut run = coarse(1e-14, 1);
+    run.range_m = vec![300.0];
+    let estimate = run.run::<f32>(Stop::after(1), go).expect("run");
+    assert!(estimate.bistatic.is_none());
+    assert_eq!(estimate.realisations, 1);
+    assert!(run.run::<f32>(Stop::after(0), go).is_err());
+}
+
+#[test]
+fn single_and_double_precision_agree_far_below_the_monte_carlo_error() {
+    let mut run = coarse(1e-13, 6);
+    run.grid = Grid { nx: 128, ny: 135, dx_m: 4e-3, dy_m: 4e-3 };
+    run.range_m = vec![300.0, 600.0];
+    let single = run.run::<f32>(Stop::after(6), go).expect("run");
+    let double = run.run::<f64>(Stop::after(6), go).expect("run");
+    for (a, b) in single.monostatic.mean.iter().zip(&double.monostatic.mean) {
+        assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
+    }
+}
+
+#[test]
+fn odd_and_rectangular_grids_agree_with_exact_theory() {
+    let mut run = coarse(3e-14, 11);
+    run.grid = Grid { nx: 131, ny: 192, dx_m: 5e-3, dy_m: 4e-3 };
+    run.layers = Layers::equal(4, 1000.0).expect("layers");
+    run.range_m = vec![500.0, 1000.0];
+    let estimate = run.run::<f32>(Stop::after(200), go).expect("run");
+    let z = bistatic_z(&run, &estimate);
+    assert!(z.iter().all(|z| z.abs() < 3.0), "{z:?}");
+}
+
+#[cfg(feature = "rayon")]
+#[test]
+fn result_has_the_same_bits_for_one_two_and_eight_threads() {
+    fn with_threads<T: Real>(threads: usize, sampling: Sampling) -> EfficiencyEstimate {
+        let mut run = coarse(1e-13, 8);
+        run.grid = Grid::square(128, 4e-3).expect("grid");
+        run.range_m = vec![200.0, 600.0];
+        run.sampling = sampling;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
+        pool.install(|| run.run::<T>(Stop::after(76), go)).expect("run")
+    }
+    for sampling in [Sampling::Independent, Sampling::Antithetic] {
+        let one = with_threads::<f32>(1, sampling);
+        assert_eq!(one, with_threads::<f32>(2, sampling));
+        assert_eq!(one, with_threads::<f32>(8, sampling));
+    }
+}
+
+#[test]
+fn run_ends_at_the_target_error_and_can_be_cancelled() {
+    let mut run = coarse(1e-14, 2);
+    run.grid = Grid::square(128, 4e-3).expect("grid");
+    run.range_m = vec![300.0];
+    let stop = Stop { realisations: 100_000, relative_standard_error: Some(0.02) };
+    let estimate = run.run::<f32>(stop, go).expect("run");
+    let relative = estimate.monostatic.standard_error[0] / estimate.monostatic.mean[0];
+    assert!(relative <= 0.02 && estimate.realisations < 10_000, "{relative}");
+    let cancelled = run.run::<f32>(Stop::after(1000), |p| {
+        if p.done >= 128 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert_eq!(cancelled, Err(Error::Cancelled { realisations: 128 }));
+}
+
+#[test]
+fn beam_that_leaves_the_grid_is_refused() {
+    let mut run = coarse(1e-13, 2);
+    run.telescope = Telescope { focus: Focus::At(200.0), ..run.telescope };
+    assert!(matches!(run.run::<f32>(Stop::after(2), go), Err(Error::Sampling { .. })));
+    // Strong turbulence on a narrow grid: the border takes the scattered light.
+    let mut run = coarse(1e-12, 2);
+    run.grid = Grid::square(128, 3e-3).expect("grid");
+    run.telescope.beam_radius_m = 0.03;
+    assert!(matches!(run.run::<f32>(Stop::after(8), go), Err(Error::PowerLost { .. } | Error::Sampling { .. })));
+    assert!(Turbulence::chapter(-1.0).is_err());
+}
