@@ -3,9 +3,10 @@
 use crate::Error;
 use crate::geometry::Geometry;
 use crate::scene::{
-    BeamRadiusDefinition, Flow, NoiseKind, PulseDefinition, Refinement, Scene, SnrReference, VortexMotion, VortexPair,
-    VortexProfile, Weighting,
+    BeamRadiusDefinition, Flow, NoiseKind, OuterScaleWavenumber, PulseDefinition, Refinement, RefractiveTurbulence,
+    Scene, SnrReference, SpectrumKind, VortexMotion, VortexPair, VortexProfile, Weighting,
 };
+use std::sync::Arc;
 use wakescope_estimate as estimate;
 use wakescope_les as les;
 use wakescope_optics as optics;
@@ -78,6 +79,49 @@ pub fn telescope(scene: &Scene) -> Result<optics::Telescope, Error> {
         focus: if t.focus_m.is_infinite() { optics::Focus::Collimated } else { optics::Focus::At(t.focus_m) },
     };
     Ok(telescope.validated()?)
+}
+
+/// The turbulence of a scene.
+///
+/// # Errors
+/// What the optics refuse; a checked scene gives none.
+pub fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, Error> {
+    let convention = match t.outer_scale_wavenumber {
+        OuterScaleWavenumber::Inverse => optics::OuterScaleConvention::Inverse,
+        OuterScaleWavenumber::TwoPiOver => optics::OuterScaleConvention::TwoPiOver,
+    };
+    let spectrum: Arc<dyn optics::Spectrum> = match t.spectrum {
+        SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(
+            t.outer_scale_m,
+            t.inner_scale_m,
+            convention,
+            optics::spectrum::CHAPTER_CONSTANT,
+        )?),
+        SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
+        SpectrumKind::Tatarskii => Arc::new(optics::VonKarman::tatarskii(t.inner_scale_m)?),
+        SpectrumKind::HillAndrews => Arc::new(optics::HillAndrews::new(t.outer_scale_m, t.inner_scale_m, convention)?),
+    };
+    Ok(optics::Turbulence { spectrum, cn2: optics::Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 }.validated()? })
+}
+
+/// The Monte Carlo of a scene's turbulence for given ranges, m, increasing.
+///
+/// # Errors
+/// What the optics refuse, such as a grid too small for the beam.
+pub fn monte_carlo(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> Result<optics::MonteCarlo, Error> {
+    let last_m = range_m.last().copied().unwrap_or(0.0);
+    Ok(optics::MonteCarlo {
+        telescope: telescope(scene)?,
+        misalignment: optics::Misalignment::NONE,
+        turbulence: turbulence(t)?,
+        grid: optics::Grid::square(t.grid_points, t.grid_spacing_m)?,
+        layers: optics::Layers::equal(t.layers, last_m)?,
+        range_m: range_m.to_vec(),
+        transfer: optics::propagate::TransferKind::Paraxial,
+        seed: scene.seed,
+        sampling: optics::Sampling::Independent,
+        correct_grid: true,
+    })
 }
 
 /// Everything of (14) but the efficiency.

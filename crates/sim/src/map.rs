@@ -3,7 +3,7 @@
 use crate::plan::{Plan, Stage};
 use crate::progress::Observer;
 use crate::scan::{Scanner, radial_velocity_m_s};
-use crate::scene::{Method, NoiseKind, Scene, SnrReference};
+use crate::scene::{Method, NoiseKind, Scene};
 use crate::{Error, join};
 use ndarray::{Array2, ArrayView1};
 use wakescope_estimate::{
@@ -86,7 +86,7 @@ impl<'a> Mapper<'a> {
             elevation_of_ray_rad: g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect(),
             statistic,
             peak,
-            correlation: correlation(scene)?,
+            correlation: correlation(scene, scanner)?,
             radius: Radius::Fixed {
                 radius_m: match e.method {
                     Method::Periodogram => 0.0,
@@ -146,7 +146,7 @@ impl<'a> Mapper<'a> {
 }
 
 /// Correlation between windows of one pulse: of the speckle, and of the noise at the scene's typical SNR.
-fn correlation(scene: &Scene) -> Result<WindowCorrelation, Error> {
+fn correlation(scene: &Scene, scanner: &Scanner<'_>) -> Result<WindowCorrelation, Error> {
     let e = &scene.estimator;
     let window = join::weighting(scene).weights(e.window_samples)?;
     let d = &scene.detector;
@@ -154,15 +154,7 @@ fn correlation(scene: &Scene) -> Result<WindowCorrelation, Error> {
         NoiseKind::White => 0.5 * d.sampling_hz,
         NoiseKind::Band | NoiseKind::None => d.bandwidth_hz,
     };
-    let snr = match (d.noise, d.snr) {
-        (NoiseKind::None, _) => f64::INFINITY,
-        (_, SnrReference::Fixed { snr_db }) => 10f64.powf(0.1 * snr_db),
-        _ => {
-            let range_m = 0.5 * (scene.scan.range_min_m + scene.scan.range_max_m);
-            let efficiency = crate::profile::efficiency_at(scene, &[range_m])?.mean[0];
-            join::snr_model(scene)?.snr(range_m, efficiency)?
-        }
-    };
+    let snr = if d.noise == NoiseKind::None { f64::INFINITY } else { scanner.mean_snr() };
     // Without any return there is only noise, which a large finite ratio says as well.
     let noise_to_signal = (in_band_hz / d.bandwidth_hz / snr).min(1e12);
     Ok(WindowCorrelation::gaussian_pulse(

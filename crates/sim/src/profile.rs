@@ -1,52 +1,153 @@
-//! Efficiency and signal-to-noise ratio against range.
+//! Efficiency and signal-to-noise ratio against range, by the cheapest model that is valid.
+//!
+//! Free space is a quadrature. Turbulence on independent paths (bistatic) has an exact mean at any strength.
+//! Only turbulence that both beams share (monostatic) needs phase screens.
 
-use crate::scene::{Scene, SnrReference, Turbulence};
+use crate::plan::Stage;
+use crate::progress::Observer;
+use crate::scene::{ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence};
 use crate::{Error, join};
-use wakescope_optics::EfficiencyProfile;
-use wakescope_optics::theory::free_space_efficiency;
+use std::ops::ControlFlow;
+use wakescope_optics::structure::StructureTable;
+use wakescope_optics::theory::{bistatic_efficiency_with, free_space_efficiency};
+use wakescope_optics::{EfficiencyProfile, Misalignment, Stop};
+
+/// How the efficiency is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EfficiencyModel {
+    /// No turbulence: quadrature.
+    FreeSpace,
+    /// Independent paths: quadrature over the coherence of the mean field.
+    ExactBistatic,
+    /// One path out and back: phase screens.
+    MonteCarlo,
+}
+
+impl EfficiencyModel {
+    /// The cheapest model that is valid for a scene.
+    pub fn of(scene: &Scene) -> Self {
+        match (turbulence(scene), scene.telescope.receiver) {
+            (None, _) => Self::FreeSpace,
+            (Some(_), ReceiverPath::Bistatic) => Self::ExactBistatic,
+            (Some(_), ReceiverPath::Monostatic) => Self::MonteCarlo,
+        }
+    }
+
+    /// A few words for plans and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FreeSpace => "free space, by quadrature",
+            Self::ExactBistatic => "independent paths, exact by quadrature",
+            Self::MonteCarlo => "one path out and back, by phase screens",
+        }
+    }
+}
+
+/// The turbulence of a scene, if there is any.
+pub fn turbulence(scene: &Scene) -> Option<RefractiveTurbulence> {
+    match scene.atmosphere.turbulence {
+        Turbulence::Refractive(t) if t.cn2_m_m23 > 0.0 => Some(t),
+        _ => None,
+    }
+}
 
 /// Efficiency (19) and signal-to-noise ratio (14) at the same ranges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RangeProfile {
-    /// Efficiency with its scatter and error.
+    /// The model that the scene's signals use.
+    pub model: EfficiencyModel,
+    /// Efficiency by that model, with its scatter and error.
     pub efficiency: EfficiencyProfile,
     /// Mean signal-to-noise ratio in the detector band, dB, for a pulse short against the changes
     /// of the path.
     pub snr_db: Vec<f64>,
+    /// The other models side by side, by the name of their column; empty without turbulence.
+    pub others: Vec<(&'static str, EfficiencyProfile)>,
 }
 
-/// The profile that the scene's outputs ask for.
+/// The profile that the scene's outputs ask for: with turbulence, theory and Monte Carlo side by side.
 ///
 /// # Errors
-/// What the optics refuse; a checked scene gives none.
-pub fn range_profile(scene: &Scene) -> Result<RangeProfile, Error> {
+/// What the optics refuse, such as a grid too small for the beam.
+pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProfile, Error> {
     let o = &scene.outputs;
-    let ranges_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
-    let efficiency = efficiency_at(scene, &ranges_m)?;
-    let model = join::snr_model(scene)?;
+    let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
+    let model = EfficiencyModel::of(scene);
+    let mut others = Vec::new();
+    let efficiency = match turbulence(scene) {
+        None => free_space(scene, &range_m)?,
+        Some(t) => {
+            let exact = exact_bistatic(scene, &t, &range_m)?;
+            let [monostatic, bistatic] = monte_carlo(scene, &t, &range_m, observer)?;
+            others.push(("efficiency_free_space", free_space(scene, &range_m)?));
+            others.push(("efficiency_bistatic_exact", exact.clone()));
+            others.push(("efficiency_monostatic_monte_carlo", monostatic.clone()));
+            others.push(("efficiency_bistatic_monte_carlo", bistatic));
+            if model == EfficiencyModel::MonteCarlo { monostatic } else { exact }
+        }
+    };
+    let snr = join::snr_model(scene)?;
     let snr_db = efficiency
         .range_m
         .iter()
         .zip(&efficiency.mean)
         .map(|(&range_m, &mean)| match scene.detector.snr {
             SnrReference::Fixed { snr_db } => Ok(snr_db),
-            _ => Ok(10.0 * model.snr(range_m, mean)?.log10()),
+            _ => Ok(10.0 * snr.snr(range_m, mean)?.log10()),
         })
         .collect::<Result<_, Error>>()?;
-    Ok(RangeProfile { efficiency, snr_db })
+    Ok(RangeProfile { model, efficiency, snr_db, others })
 }
 
-/// The efficiency at given ranges, m, increasing.
+/// The efficiency at given ranges, m, increasing, by the cheapest model that is valid.
 ///
 /// # Errors
-/// What the optics refuse, such as a range of 0.
-pub fn efficiency_at(scene: &Scene, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
-    let telescope = join::telescope(scene)?;
-    Ok(match scene.atmosphere.turbulence {
-        Turbulence::None {} => {
-            EfficiencyProfile::from_theory(range_m, |range_m| free_space_efficiency(&telescope, range_m))?
+/// What the optics refuse, such as a range of 0 or a grid too small for the beam.
+pub fn efficiency_at(scene: &Scene, range_m: &[f64], observer: &dyn Observer) -> Result<EfficiencyProfile, Error> {
+    match (turbulence(scene), EfficiencyModel::of(scene)) {
+        (Some(t), EfficiencyModel::ExactBistatic) => exact_bistatic(scene, &t, range_m),
+        (Some(t), EfficiencyModel::MonteCarlo) => {
+            let [monostatic, _] = monte_carlo(scene, &t, range_m, observer)?;
+            Ok(monostatic)
         }
-    })
+        _ => free_space(scene, range_m),
+    }
+}
+
+fn free_space(scene: &Scene, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
+    let telescope = join::telescope(scene)?;
+    Ok(EfficiencyProfile::from_theory(range_m, |range_m| free_space_efficiency(&telescope, range_m))?)
+}
+
+fn exact_bistatic(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
+    let telescope = join::telescope(scene)?;
+    let turbulence = join::turbulence(t)?;
+    let table = StructureTable::new(&*turbulence.spectrum);
+    Ok(EfficiencyProfile::from_theory(range_m, |range_m| {
+        bistatic_efficiency_with(&telescope, &Misalignment::NONE, &turbulence.cn2, &table, range_m)
+    })?)
+}
+
+/// Monostatic and bistatic efficiency by phase screens, from one set of realisations.
+fn monte_carlo(
+    scene: &Scene,
+    t: &RefractiveTurbulence,
+    range_m: &[f64],
+    observer: &dyn Observer,
+) -> Result<[EfficiencyProfile; 2], Error> {
+    observer.begin(Stage::PhaseScreens, t.realisations as u64);
+    let mut seen = 0;
+    // Single precision: its rounding is far below the error of any number of realisations.
+    let estimate = join::monte_carlo(scene, t, range_m)?.run::<f32>(Stop::after(t.realisations), |progress| {
+        observer.advance((progress.done - seen) as u64);
+        seen = progress.done;
+        ControlFlow::Continue(())
+    })?;
+    observer.end();
+    // A checked scene has at least two realisations, and so pairs of them.
+    let bistatic =
+        estimate.bistatic.ok_or(wakescope_optics::Error::Length { field: "realisations", found: 1, expected: 2 })?;
+    Ok([estimate.monostatic, bistatic])
 }
 
 /// `points` values from `low` to `high`, both included.

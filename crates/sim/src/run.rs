@@ -41,7 +41,7 @@ pub struct SummaryLine {
 pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let mut result = RunResult::default();
     if matches!(plan.target, Target::Run | Target::Efficiency) {
-        result.profile = Some(range_profile(&plan.scene.scene)?);
+        result.profile = Some(range_profile(&plan.scene.scene, observer)?);
     }
     if plan.runs(Stage::CrossPlane) {
         observer.begin(Stage::CrossPlane, 1);

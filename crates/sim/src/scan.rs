@@ -2,7 +2,7 @@
 
 use crate::geometry::Geometry;
 use crate::plan::{Plan, Stage};
-use crate::profile::{efficiency_at, spaced};
+use crate::profile::{EfficiencyModel, efficiency_at, spaced};
 use crate::progress::Observer;
 use crate::scene::{Scene, SnrReference};
 use crate::streams::stream;
@@ -12,8 +12,14 @@ use rayon::prelude::*;
 use wakescope_les::Wind;
 use wakescope_signal::{LineOfSight, Scratch, Simulator};
 
-/// Points of the efficiency profile from which the layers take theirs.
-pub(crate) const PROFILE_POINTS: usize = 65;
+/// Points of the efficiency profile from which the layers take theirs: dense where it is a quadrature, few
+/// where each costs transforms and the errors of neighbours are alike.
+pub(crate) fn profile_points(scene: &Scene) -> usize {
+    match EfficiencyModel::of(scene) {
+        EfficiencyModel::FreeSpace | EfficiencyModel::ExactBistatic => 65,
+        EfficiencyModel::MonteCarlo => 9,
+    }
+}
 
 /// The lines of sight of a scan, and what makes signals of them.
 pub struct Scanner<'a> {
@@ -55,6 +61,13 @@ impl<'a> Scanner<'a> {
         Ok(Self { scene, geometry, simulator, lines })
     }
 
+    /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
+    pub fn mean_snr(&self) -> f64 {
+        let weights = self.lines.first().map_or(&[][..], |line| &line.weight_per_m);
+        let mean_per_m = weights.iter().sum::<f64>() / weights.len().max(1) as f64;
+        join::receiver(self.scene).slowly_varying_snr(self.scene.pulse.energy_j, mean_per_m)
+    }
+
     /// The air along each line of sight, in the order of the geometry's elevations.
     pub fn lines(&self) -> &[LineOfSight] {
         &self.lines
@@ -94,7 +107,8 @@ fn layer_weights(scene: &Scene, geometry: &Geometry, observer: &dyn Observer) ->
     }
     observer.begin(Stage::Efficiency, 1);
     let last_m = geometry.first_layer_range_m + geometry.layers as f64 * geometry.layer_thickness_m;
-    let profile = efficiency_at(scene, &spaced(geometry.first_layer_range_m, last_m, PROFILE_POINTS))?;
+    let ranges_m = spaced(geometry.first_layer_range_m, last_m, profile_points(scene));
+    let profile = efficiency_at(scene, &ranges_m, observer)?;
     observer.end();
     join::layer_weights_per_m(scene, geometry, &profile)
 }

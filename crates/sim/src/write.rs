@@ -98,12 +98,19 @@ fn scene_text(origin: &Provenance) -> String {
 /// Efficiency and SNR as a table.
 pub fn profile_table(profile: &RangeProfile) -> Table {
     let e = &profile.efficiency;
-    Table::new()
+    let table = Table::new()
         .float("range_m", e.range_m.clone())
         .float("efficiency", e.mean.clone())
         .float("efficiency_standard_deviation", e.standard_deviation.clone())
         .float("efficiency_standard_error", e.standard_error.clone())
-        .float("snr_db", profile.snr_db.clone())
+        .float("snr_db", profile.snr_db.clone());
+    profile.others.iter().fold(table, |table, (name, other)| {
+        let table = table.float(name, other.mean.clone());
+        match other.standard_error.iter().any(|&error| error > 0.0) {
+            true => table.float(&format!("{name}_standard_error"), other.standard_error.clone()),
+            false => table,
+        }
+    })
 }
 
 /// The raw signals of a plan's first realisation.
@@ -179,6 +186,7 @@ mod pictures {
     use super::{Error, FileGroup, Plan, Provenance, RangeProfile, VelocityMap};
     use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
     use crate::scene::Flow;
+    use wakescope_optics::EfficiencyProfile;
 
     /// Adds a figure in the formats that the scene asks for.
     pub(super) fn add(
@@ -203,9 +211,20 @@ mod pictures {
         let e = &profile.efficiency;
         let range = || Axis::linear("range [m]");
         let points = |y: &[f64]| e.range_m.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
-        let mut efficiency = Series::new("", Style::Line, points(&e.mean));
-        if e.standard_error.iter().any(|&s| s > 0.0) {
-            efficiency = efficiency.with_band(&e.standard_error);
+        let curve = |label: &str, style: Style, profile: &EfficiencyProfile| {
+            let series = Series::new(label, style, points(&profile.mean));
+            match profile.standard_error.iter().any(|&error| error > 0.0) {
+                true => series.with_band(&profile.standard_error),
+                false => series,
+            }
+        };
+        let mut efficiency = CurvePlot::new("System efficiency", range(), Axis::linear("efficiency"));
+        if profile.others.is_empty() {
+            efficiency = efficiency.with(curve("", Style::Line, e));
+        }
+        let styles = [Style::Line, Style::Dash, Style::DashDot, Style::Dot];
+        for ((name, other), style) in profile.others.iter().zip(styles) {
+            efficiency = efficiency.with(curve(&name.replace("efficiency_", "").replace('_', " "), style, other));
         }
         Figure::side_by_side([
             CurvePlot::new("Signal-to-noise ratio", range(), Axis::linear("SNR [dB]")).with(Series::new(
@@ -213,7 +232,7 @@ mod pictures {
                 Style::Line,
                 points(&profile.snr_db),
             )),
-            CurvePlot::new("System efficiency", range(), Axis::linear("efficiency")).with(efficiency),
+            efficiency,
         ])
     }
 

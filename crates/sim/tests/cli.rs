@@ -171,3 +171,32 @@ fn extreme_scenes_run_to_the_end() {
         assert!(out.status.success(), "{scene}: {}", String::from_utf8_lossy(&out.stderr));
     }
 }
+
+#[test]
+fn turbulence_gives_theory_and_monte_carlo_side_by_side() {
+    let turbulent = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-13\ngrid_points = 128\n\
+                     grid_spacing_m = 0.004\nlayers = 3\nrealisations = 40\n\
+                     [outputs]\nprofile_range_min_m = 200.0\nprofile_range_max_m = 600.0\nprofile_points = 3\n";
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("s.toml"), turbulent).unwrap();
+    let out = wakescope(temp.path(), &["efficiency", "s.toml", "--out", "o", "--quiet"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let text = std::fs::read_to_string(temp.path().join("o/profile.csv")).unwrap();
+    let mut rows = text.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').collect::<Vec<_>>());
+    let header = rows.next().unwrap();
+    let last: Vec<f64> = rows.next_back().unwrap().iter().map(|c| c.parse().unwrap()).collect();
+    let value = |name: &str| last[header.iter().position(|h| *h == name).unwrap()];
+    assert_eq!(value("efficiency"), value("efficiency_monostatic_monte_carlo"), "the scene is monostatic");
+    let error = value("efficiency_bistatic_monte_carlo_standard_error");
+    let z = (value("efficiency_bistatic_monte_carlo") - value("efficiency_bistatic_exact")) / error;
+    assert!(error > 0.0 && z.abs() < 4.0, "z = {z}");
+    assert!(value("efficiency_bistatic_exact") < value("efficiency_free_space"));
+
+    // Independent paths have an exact theory: a map needs no screens.
+    let bistatic = format!("{turbulent}[telescope]\nreceiver = \"bistatic\"\n[scan]\nelevation_max_rad = 0.0025\n");
+    std::fs::write(temp.path().join("b.toml"), bistatic).unwrap();
+    let out = wakescope(temp.path(), &["map", "b.toml", "--out", "b", "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    let stage = json["stages"].as_array().unwrap().iter().find(|s| s["stage"] == "phase screens").unwrap().clone();
+    assert_eq!(stage["runs"], false, "{stage}");
+}

@@ -96,6 +96,9 @@ impl Scene {
             t.focus_m,
             "a distance in m other than 0, or inf for a collimated beam",
         );
+        if let super::Turbulence::Refractive(t) = self.atmosphere.turbulence {
+            check_turbulence(&t, c);
+        }
         let a = &self.atmosphere;
         c.within("atmosphere.backscatter_per_m_sr", a.backscatter_per_m_sr, 0.0, 1.0, "1/(m sr)");
         c.within("atmosphere.extinction_per_m", a.extinction_per_m, 0.0, 1.0, "1/m");
@@ -251,6 +254,24 @@ impl Scene {
     pub fn pulse_reach_m(&self) -> f64 {
         3.72 * self.pulse_sigma_s() * 0.5 * crate::SPEED_OF_LIGHT_M_S
     }
+}
+
+fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker) {
+    const SECTION: &str = "atmosphere.turbulence";
+    let key = |name: &str| format!("{SECTION}.{name}");
+    c.within(&key("cn2_m_m23"), t.cn2_m_m23, 0.0, 1e-9, "m^(-2/3)");
+    c.within(&key("inner_scale_m"), t.inner_scale_m, 0.0, 1.0, "m");
+    c.require(t.outer_scale_m > 0.0, &key("outer_scale_m"), t.outer_scale_m, "above 0 m, or inf for none");
+    c.require(
+        t.outer_scale_m.is_nan() || t.outer_scale_m > t.inner_scale_m,
+        &key("outer_scale_m"),
+        t.outer_scale_m,
+        format!("above {SECTION}.inner_scale_m, {} m", t.inner_scale_m),
+    );
+    c.count(&key("grid_points"), t.grid_points, 16, 16_384);
+    c.within(&key("grid_spacing_m"), t.grid_spacing_m, 1e-5, 1.0, "m");
+    c.count(&key("layers"), t.layers, 1, 10_000);
+    c.count(&key("realisations"), t.realisations, 2, 10_000_000);
 }
 
 fn check_estimator(e: &Estimator, c: &mut Checker) {

@@ -17,10 +17,12 @@ macro_rules! section {
     };
 }
 
+mod atmosphere;
 mod check;
 mod flow;
 mod read;
 
+pub use atmosphere::{Atmosphere, OuterScaleWavenumber, RefractiveTurbulence, SpectrumKind, Turbulence};
 pub use check::Problem;
 pub use flow::{Flow, VortexMotion, VortexPair, VortexProfile};
 pub use read::{Located, SceneError, SceneFile};
@@ -154,7 +156,19 @@ section! {
         beam_radius_definition: BeamRadiusDefinition = BeamRadiusDefinition::Intensity,
         /// Distance of the focus, m; `inf` for a collimated beam.
         focus_m: f64 = f64::INFINITY,
+        /// Whether transmitted and received light cross the same turbulence.
+        receiver: ReceiverPath = ReceiverPath::Monostatic,
     }
+}
+
+/// Whether transmitted and received light cross the same turbulence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReceiverPath {
+    /// One telescope: the same path out and back.
+    Monostatic,
+    /// Two telescopes: independent paths; in free space they are taken to coincide.
+    Bistatic,
 }
 
 /// Which 1/e radius is meant.
@@ -165,26 +179,6 @@ pub enum BeamRadiusDefinition {
     Intensity,
     /// Of the field, E ~ exp(-r^2/w^2).
     Field,
-}
-
-section! {
-    /// Aerosol and refractive turbulence.
-    Atmosphere {
-        /// Aerosol backscatter coefficient, 1/(m sr).
-        backscatter_per_m_sr: f64 = 1e-7,
-        /// Extinction coefficient, 1/m, one way.
-        extinction_per_m: f64 = 7e-5,
-        /// Refractive turbulence.
-        turbulence: Turbulence = Turbulence::None {},
-    }
-}
-
-/// Refractive turbulence along the beam.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Turbulence {
-    /// None: the free-space efficiency by quadrature, no phase screens.
-    None {},
 }
 
 section! {

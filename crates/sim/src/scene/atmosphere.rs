@@ -1,0 +1,75 @@
+//! Aerosol and refractive turbulence of a scene.
+
+use serde::{Deserialize, Serialize};
+
+section! {
+    /// Aerosol and refractive turbulence.
+    #[derive(Copy)]
+    Atmosphere {
+        /// Aerosol backscatter coefficient, 1/(m sr).
+        backscatter_per_m_sr: f64 = 1e-7,
+        /// Extinction coefficient, 1/m, one way.
+        extinction_per_m: f64 = 7e-5,
+        /// Refractive turbulence.
+        turbulence: Turbulence = Turbulence::None {},
+    }
+}
+
+/// Refractive turbulence along the beam.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Turbulence {
+    /// None: the free-space efficiency by quadrature, no phase screens.
+    None {},
+    /// Turbulence of constant strength along the path.
+    Refractive(RefractiveTurbulence),
+}
+
+section! {
+    /// Turbulence of constant strength along the path, and how a Monte Carlo samples it.
+    #[derive(Copy)]
+    RefractiveTurbulence {
+        /// Structure constant Cn2, m^(-2/3).
+        cn2_m_m23: f64 = 1e-15,
+        /// Shape of the spectrum.
+        spectrum: SpectrumKind = SpectrumKind::VonKarman,
+        /// Inner scale l0, m; 0 for none.
+        inner_scale_m: f64 = 0.01,
+        /// Outer scale L0, m; `inf` for none.
+        outer_scale_m: f64 = 1.0,
+        /// Wave number of the outer scale.
+        outer_scale_wavenumber: OuterScaleWavenumber = OuterScaleWavenumber::Inverse,
+        /// Points along each side of the phase screens.
+        grid_points: usize = 512,
+        /// Distance between points of the screens, m.
+        grid_spacing_m: f64 = 0.002,
+        /// Phase screens along the path.
+        layers: usize = 10,
+        /// Realisations of the path.
+        realisations: usize = 400,
+    }
+}
+
+/// Shape of the refractive-index spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SpectrumKind {
+    /// (17), with outer scale and Gaussian inner scale.
+    VonKarman,
+    /// Kolmogorov: neither scale.
+    Kolmogorov,
+    /// Tatarskii: the inner scale only.
+    Tatarskii,
+    /// Hill's bump near the inner scale, in Andrews' form.
+    HillAndrews,
+}
+
+/// How the outer scale gives the wave number kappa_0 of (17).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OuterScaleWavenumber {
+    /// 1/L0, as (17) has it.
+    Inverse,
+    /// 2 pi/L0.
+    TwoPiOver,
+}
