@@ -10,6 +10,7 @@ mod figures;
 mod regress;
 mod reproduce;
 mod tidy;
+mod work_precision;
 mod workspace;
 
 use clap::{Parser, Subcommand};
@@ -55,6 +56,8 @@ enum Task {
     Regress(regress::Options),
     /// Write stored reference curves from what the crates compute now.
     Bless(bless::Options),
+    /// Measure error against run time.
+    WorkPrecision(work_precision::Options),
     /// Check the rules of the house.
     Tidy,
     /// Everything that continuous integration runs.
@@ -66,6 +69,7 @@ fn main() -> std::process::ExitCode {
         Task::ReproduceFigs(options) => reproduce::run(&options),
         Task::Regress(options) => regress::run(&options),
         Task::Bless(options) => bless::run(&options),
+        Task::WorkPrecision(options) => work_precision::run(&options),
         Task::Tidy => tidy::run(),
         Task::Ci(options) => ci::run(&options),
     };

@@ -120,5 +120,5 @@ pub(super) fn profile_ranges() -> Vec<f64> {
 }
 
 pub(super) fn profile_snr(_: &[f64]) -> Values {
-    Ok(profile::range_profile(&Scene::default())?.snr_db)
+    Ok(profile::range_profile(&Scene::default(), &Silent)?.snr_db)
 }

@@ -1,0 +1,150 @@
+//! `cargo xtask work-precision --crate optics`: error against run time, knob by knob.
+//!
+//! Every row is measured in this run, on one thread; the table and the picture go to
+//! `target/work-precision`. Errors are against exact theory, or are standard errors where the case says so.
+
+mod optics;
+
+use crate::workspace::root;
+use crate::{Failure, Outcome};
+use std::path::PathBuf;
+use std::time::Instant;
+use wakescope_sim::export::{FileGroup, Provenance, Table};
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Crate to measure.
+    #[arg(long = "crate", value_enum)]
+    name: Measured,
+    /// Folder to write to.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Multiplies sample counts; 1 takes a few minutes.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    effort: u32,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Measured {
+    Optics,
+}
+
+/// One measurement.
+pub(crate) struct Row {
+    pub(crate) case: &'static str,
+    pub(crate) method: String,
+    pub(crate) knob: &'static str,
+    pub(crate) value: f64,
+    pub(crate) error: f64,
+    pub(crate) metric: &'static str,
+    pub(crate) reference: &'static str,
+    pub(crate) cost: Cost,
+}
+
+/// What a piece of work took.
+#[derive(Clone, Copy)]
+pub(crate) struct Cost {
+    cpu_s: f64,
+    wall_s: f64,
+    peak_mem_bytes: f64,
+}
+
+/// Runs a piece of work and measures it.
+pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
+    let (cpu_s, start) = (cpu_s(), Instant::now());
+    let value = work()?;
+    let cost =
+        Cost { cpu_s: self::cpu_s() - cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: peak_mem_bytes() };
+    Ok((value, cost))
+}
+
+/// Processor time of all threads so far, s; NaN where the system does not tell.
+fn cpu_s() -> f64 {
+    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
+    let of = |path: PathBuf| -> Option<f64> {
+        std::fs::read_to_string(path.join("schedstat")).ok()?.split_whitespace().next()?.parse().ok()
+    };
+    tasks.flatten().filter_map(|task| of(task.path())).sum::<f64>() * 1e-9
+}
+
+/// Largest resident memory of this process so far, bytes; NaN where the system does not tell.
+fn peak_mem_bytes() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).map_or(f64::NAN, |kb| 1024.0 * kb)
+}
+
+/// Measures, prints and writes.
+///
+/// # Errors
+/// What the crate refuses, or an unusable output.
+pub(crate) fn run(options: &Options) -> Outcome {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let rows = match options.name {
+        Measured::Optics => pool.install(|| optics::rows(options.effort as usize))?,
+    };
+    println!(
+        "{:<22} {:<34} {:<14} {:>10} {:>11} {:>9}  metric, reference",
+        "case", "method", "knob", "value", "error", "cpu"
+    );
+    for r in &rows {
+        println!(
+            "{:<22} {:<34} {:<14} {:>10} {:>11.3e} {:>7.3} s  {}, {}",
+            r.case, r.method, r.knob, r.value, r.error, r.cost.cpu_s, r.metric, r.reference
+        );
+    }
+    let parameters = format!("crate = \"optics\"\neffort = {}\n", options.effort);
+    let origin = Provenance {
+        program: wakescope_sim::PROGRAM.into(),
+        scene_hash: wakescope_sim::scene::hash_of(&parameters),
+        scene_toml: parameters,
+        seed: optics::SEED,
+    };
+    let folder = options.out.clone().unwrap_or_else(|| root().join("target/work-precision"));
+    let mut files = FileGroup::new(&folder);
+    files.add("optics.csv", table(&rows).to_csv(&origin)?)?;
+    files.add("optics.svg", figure(&rows).svg(&origin)?)?;
+    files.commit()?;
+    println!("wrote {}", folder.join("optics.csv").display());
+    Ok(())
+}
+
+fn table(rows: &[Row]) -> Table {
+    Table::new()
+        .text("case", rows.iter().map(|r| r.case))
+        .text("method", rows.iter().map(|r| r.method.clone()))
+        .text("knob", rows.iter().map(|r| r.knob))
+        .float("value", rows.iter().map(|r| r.value))
+        .float("error", rows.iter().map(|r| r.error))
+        .text("metric", rows.iter().map(|r| r.metric))
+        .text("reference", rows.iter().map(|r| r.reference))
+        .float("cpu_s", rows.iter().map(|r| r.cost.cpu_s))
+        .float("wall_s", rows.iter().map(|r| r.cost.wall_s))
+        .int("threads", rows.iter().map(|_| 1))
+        .float("peak_mem_bytes", rows.iter().map(|r| r.cost.peak_mem_bytes))
+}
+
+/// Error against processor time, a panel for each case.
+fn figure(rows: &[Row]) -> Figure {
+    let mut panels: Vec<CurvePlot> = Vec::new();
+    let mut cases: Vec<&str> = rows.iter().map(|r| r.case).collect();
+    cases.dedup();
+    for case in cases {
+        let mut plot = CurvePlot::new(case, Axis::log("processor time [s]"), Axis::log("error"));
+        let mut methods: Vec<&String> = rows.iter().filter(|r| r.case == case).map(|r| &r.method).collect();
+        methods.dedup();
+        for method in methods {
+            let of = |r: &&Row| r.case == case && r.method == *method && r.error > 0.0 && r.cost.cpu_s > 0.0;
+            let points: Vec<(f64, f64)> = rows.iter().filter(of).map(|r| (r.cost.cpu_s, r.error)).collect();
+            if !points.is_empty() {
+                plot = plot.with(Series::new(method, Style::LineMarkers, points));
+            }
+        }
+        if !plot.series.is_empty() {
+            panels.push(plot);
+        }
+    }
+    Figure::stacked(panels)
+}

@@ -1,0 +1,159 @@
+//! Error against run time of the optics: quadrature, layers, grid, screens, realisations, precision, variance reduction.
+
+use super::{Cost, Row, measured};
+use crate::Failure;
+use std::ops::ControlFlow;
+use wakescope_optics::structure::{StructureTable, structure_function_m53};
+use wakescope_optics::{
+    EfficiencyEstimate, Grid, Layers, Misalignment, MonteCarlo, Sampling, Stop, Telescope, Turbulence, VonKarman,
+    hankel, screen::ScreenGenerator, theory,
+};
+
+pub(super) const SEED: u64 = 1;
+/// Strong turbulence at a range where the Monte Carlo is needed.
+const CN2_M_M23: f64 = 1e-13;
+const RANGE_M: f64 = 1000.0;
+
+/// All measurements; `effort` multiplies the numbers of realisations.
+pub(super) fn rows(effort: usize) -> Result<Vec<Row>, Failure> {
+    let mut rows = free_space()?;
+    rows.extend(layers(effort)?);
+    rows.extend(grids()?);
+    rows.extend(screens()?);
+    rows.extend(realisations(effort)?);
+    Ok(rows)
+}
+
+fn row(
+    case: &'static str,
+    method: &str,
+    knob: &'static str,
+    (value, error): (f64, f64),
+    words: [&'static str; 2],
+    cost: Cost,
+) -> Row {
+    Row { case, method: method.into(), knob, value, error, metric: words[0], reference: words[1], cost }
+}
+
+/// Two quadratures of the free-space efficiency against one another.
+fn free_space() -> Result<Vec<Row>, Failure> {
+    let telescope = Telescope::chapter();
+    let mut rows = Vec::new();
+    for range_m in [100.0, RANGE_M, 3000.0] {
+        let (overlap, overlap_cost) = measured(|| Ok(theory::free_space_efficiency(&telescope, range_m)?))?;
+        let (hankel, hankel_cost) = measured(|| Ok(hankel::free_space_efficiency_hankel(&telescope, range_m)?))?;
+        let error = (hankel / overlap - 1.0).abs();
+        let words = ["relative difference of the two methods", "each other"];
+        rows.push(row("free space", "pupil overlap", "range_m", (range_m, error), words, overlap_cost));
+        rows.push(row("free space", "Fresnel-Hankel", "range_m", (range_m, error), words, hankel_cost));
+    }
+    Ok(rows)
+}
+
+fn set_up(layers: usize, grid: Grid) -> Result<MonteCarlo, Failure> {
+    Ok(MonteCarlo {
+        layers: Layers::equal(layers, RANGE_M)?,
+        range_m: vec![RANGE_M],
+        grid,
+        ..MonteCarlo::chapter(CN2_M_M23, SEED)?
+    })
+}
+
+fn estimate(set_up: &MonteCarlo, realisations: usize, double: bool) -> Result<EfficiencyEstimate, Failure> {
+    let go = |_| ControlFlow::Continue(());
+    let stop = Stop::after(realisations);
+    Ok(if double { set_up.run::<f64>(stop, go)? } else { set_up.run::<f32>(stop, go)? })
+}
+
+/// What a finite number of screens does to the exact bistatic efficiency, and what the screens cost.
+fn layers(effort: usize) -> Result<Vec<Row>, Failure> {
+    let (telescope, turbulence) = (Telescope::chapter(), Turbulence::chapter(CN2_M_M23)?);
+    let table = StructureTable::new(&*turbulence.spectrum);
+    let none = Misalignment::NONE;
+    let continuous = theory::bistatic_efficiency_with(&telescope, &none, &turbulence.cn2, &table, RANGE_M)?;
+    let mut rows = Vec::new();
+    for count in [1, 2, 5, 10, 20] {
+        let screens = Layers::equal(count, RANGE_M)?.screens_to(RANGE_M, &turbulence.cn2)?;
+        let exact = theory::bistatic_efficiency_screens(&telescope, &none, &screens, &table, RANGE_M)?;
+        let (_, cost) = measured(|| estimate(&set_up(count, Grid::chapter())?, 8 * effort, false))?;
+        let words = ["bistatic efficiency, relative", "exact theory of the continuous path"];
+        rows.push(row(
+            "layers",
+            "mid-layer screens",
+            "layers",
+            (count as f64, (exact / continuous - 1.0).abs()),
+            words,
+            cost,
+        ));
+    }
+    Ok(rows)
+}
+
+/// What the grid does to the free-space efficiency, before the correction.
+fn grids() -> Result<Vec<Row>, Failure> {
+    let exact = theory::free_space_efficiency(&Telescope::chapter(), RANGE_M)?;
+    let mut rows = Vec::new();
+    for (points, spacing_m) in [(256, 4e-3), (512, 2e-3), (1024, 1e-3)] {
+        for (method, double) in [("f32", false), ("f64", true)] {
+            let set_up = set_up(10, Grid::square(points, spacing_m)?)?;
+            let (eta, cost) = measured(|| {
+                Ok(if double { set_up.grid_free_space::<f64>()? } else { set_up.grid_free_space::<f32>()? })
+            })?;
+            let words = ["free-space efficiency, relative, uncorrected", "exact theory"];
+            rows.push(row("grid", method, "points", (points as f64, (eta[0] / exact - 1.0).abs()), words, cost));
+        }
+    }
+    Ok(rows)
+}
+
+/// Expected structure function of the screens against theory: the worst from 2 dx to half the grid.
+fn screens() -> Result<Vec<Row>, Failure> {
+    let spectrum = VonKarman::chapter();
+    let mut rows = Vec::new();
+    for points in [256, 512, 1024] {
+        let grid = Grid::square(points, 2e-3)?;
+        let generator = ScreenGenerator::<f32>::new(grid, std::sync::Arc::new(spectrum))?;
+        let mut work = generator.work();
+        let mut pair = [vec![0.0f32; points * points], vec![0.0f32; points * points]];
+        let [first, second] = &mut pair;
+        let mut rng = wakescope_optics::screen::stream(SEED, 0, 0);
+        let (_, cost) = measured(|| Ok(generator.fill_pair(&mut rng, &mut work, first, second)?))?;
+        let mut worst: f64 = 0.0;
+        let mut steps = 2;
+        while steps <= points / 2 {
+            let theory = structure_function_m53(&spectrum, steps as f64 * 2e-3)?;
+            worst = worst.max((generator.expected_structure_m53(steps, 0) / theory - 1.0).abs());
+            steps *= 2;
+        }
+        let words = ["expected structure function, relative, worst", "quadrature of the spectrum"];
+        rows.push(row(
+            "screens (a pair)",
+            "random shift and subharmonics",
+            "points",
+            (points as f64, worst),
+            words,
+            cost,
+        ));
+    }
+    Ok(rows)
+}
+
+/// Standard errors of the monostatic efficiency against the work, for each way of drawing.
+fn realisations(effort: usize) -> Result<Vec<Row>, Failure> {
+    let ways = [
+        ("independent, f32", Sampling::Independent, false),
+        ("independent, f64", Sampling::Independent, true),
+        ("antithetic, f32", Sampling::Antithetic, false),
+    ];
+    let mut rows = Vec::new();
+    for (method, sampling, double) in ways {
+        for count in [32, 64, 128] {
+            let set_up = MonteCarlo { sampling, ..set_up(10, Grid::chapter())? };
+            let (found, cost) = measured(|| estimate(&set_up, count * effort, double))?;
+            let error = found.monostatic.standard_error[0] / found.monostatic.mean[0];
+            let words = ["relative standard error, monostatic", "itself"];
+            rows.push(row("realisations", method, "realisations", ((count * effort) as f64, error), words, cost));
+        }
+    }
+    Ok(rows)
+}
