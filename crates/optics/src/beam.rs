@@ -21,12 +21,12 @@ pub enum RadiusDefinition {
 pub enum Focus {
     /// Plane wave front at the aperture (focus at infinity).
     Collimated,
-    /// Focus at this distance from the aperture [m]; negative values are a diverging beam with its virtual focus behind.
+    /// Focus at this distance from the aperture \[m\]; negative values are a diverging beam with its virtual focus behind.
     At(f64),
 }
 
 impl Focus {
-    /// 1/F [1/m]; 0 for a collimated beam.
+    /// 1/F \[1/m\]; 0 for a collimated beam.
     pub fn curvature_per_m(self) -> f64 {
         match self {
             Self::Collimated => 0.0,
@@ -40,13 +40,13 @@ impl Focus {
 /// The fields are plain data; every function of this crate that takes a telescope calls [`Telescope::validated`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Telescope {
-    /// Wavelength [m], above 0.
+    /// Wavelength \[m\], above 0.
     pub wavelength_m: f64,
-    /// Radius of the circular aperture [m], above 0.
+    /// Radius of the circular aperture \[m\], above 0.
     pub aperture_radius_m: f64,
-    /// Radius of a central obscuration [m], 0 (none) or above, below the aperture radius.
+    /// Radius of a central obscuration \[m\], 0 (none) or above, below the aperture radius.
     pub obscuration_radius_m: f64,
-    /// 1/e radius of the beam [m], above 0. `f64::INFINITY` is the uniformly lit aperture: the power before
+    /// 1/e radius of the beam \[m\], above 0. `f64::INFINITY` is the uniformly lit aperture: the power before
     /// truncation then has no meaning and unit power is counted on the open aperture.
     pub beam_radius_m: f64,
     /// Whether `beam_radius_m` belongs to the irradiance or to the field.
@@ -118,12 +118,12 @@ impl Telescope {
         Ok(self)
     }
 
-    /// Wave number k = 2 pi / lambda [rad/m].
+    /// Wave number k = 2 pi / lambda \[rad/m\].
     pub fn wavenumber_rad_m(&self) -> f64 {
         2.0 * PI / self.wavelength_m
     }
 
-    /// 1/e radius of the irradiance [m], whatever the definition in use.
+    /// 1/e radius of the irradiance \[m\], whatever the definition in use.
     pub fn intensity_radius_m(&self) -> f64 {
         match self.radius_definition {
             RadiusDefinition::Intensity => self.beam_radius_m,
@@ -148,7 +148,7 @@ impl Telescope {
         (-inner).exp() * -(inner - outer).exp_m1()
     }
 
-    /// Irradiance at the aperture [1/m^2] at distance `radius_m` from the axis, for unit power before truncation.
+    /// Irradiance at the aperture \[1/m^2\] at distance `radius_m` from the axis, for unit power before truncation.
     pub fn aperture_irradiance_per_m2(&self, radius_m: f64) -> f64 {
         if radius_m > self.aperture_radius_m || radius_m < self.obscuration_radius_m {
             return 0.0;
@@ -156,7 +156,7 @@ impl Telescope {
         self.peak_irradiance_per_m2() * self.relative_irradiance(radius_m)
     }
 
-    /// Irradiance of the untruncated beam on its axis [1/m^2].
+    /// Irradiance of the untruncated beam on its axis \[1/m^2\].
     pub(crate) fn peak_irradiance_per_m2(&self) -> f64 {
         let s = self.intensity_radius_m();
         if s.is_infinite() {
@@ -175,9 +175,9 @@ impl Telescope {
 /// Displacement of the BPLO against the transmitted beam: an offset of parallel axes, and an angle between them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Misalignment {
-    /// Offset of the two axes at the telescope, x and y [m].
+    /// Offset of the two axes at the telescope, x and y \[m\].
     pub offset_m: [f64; 2],
-    /// Angle between the two axes, x and y [rad].
+    /// Angle between the two axes, x and y \[rad\].
     pub tilt_rad: [f64; 2],
 }
 
@@ -197,7 +197,7 @@ impl Misalignment {
         Ok(self)
     }
 
-    /// Distance between the two axes at range `range_m` [m].
+    /// Distance between the two axes at range `range_m` \[m\].
     pub fn separation_m(&self, range_m: f64) -> f64 {
         let [x, y] = [0, 1].map(|i| self.offset_m[i] + self.tilt_rad[i] * range_m);
         x.hypot(y)

@@ -10,7 +10,7 @@ use crate::error::{finite, not_negative, positive};
 /// All four lists have the same length; `range_m` increases strictly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EfficiencyProfile {
-    /// Ranges [m].
+    /// Ranges \[m\].
     pub range_m: Vec<f64>,
     /// Mean efficiency at each range.
     pub mean: Vec<f64>,
@@ -21,7 +21,7 @@ pub struct EfficiencyProfile {
 }
 
 impl EfficiencyProfile {
-    /// A profile without scatter or error, from a function of range [m] (theory).
+    /// A profile without scatter or error, from a function of range \[m\] (theory).
     ///
     /// # Errors
     /// What the function returns, and as [`EfficiencyProfile::validated`].
@@ -62,7 +62,7 @@ impl EfficiencyProfile {
         Ok(self)
     }
 
-    /// Mean efficiency at `range_m` [m], by monotone cubic interpolation (Fritsch and Carlson 1980).
+    /// Mean efficiency at `range_m` \[m\], by monotone cubic interpolation (Fritsch and Carlson 1980).
     ///
     /// # Errors
     /// [`Error::Extrapolation`] outside the profile, [`Error::OutOfRange`] for a range that is not a number.
@@ -70,7 +70,7 @@ impl EfficiencyProfile {
         self.interpolate(&self.mean, range_m)
     }
 
-    /// Standard deviation of one realisation at `range_m` [m], interpolated as the mean is.
+    /// Standard deviation of one realisation at `range_m` \[m\], interpolated as the mean is.
     ///
     /// # Errors
     /// As [`EfficiencyProfile::interpolated`].
@@ -78,7 +78,7 @@ impl EfficiencyProfile {
         self.interpolate(&self.standard_deviation, range_m)
     }
 
-    /// Standard error of the mean at `range_m` [m], interpolated as the mean is.
+    /// Standard error of the mean at `range_m` \[m\], interpolated as the mean is.
     ///
     /// # Errors
     /// As [`EfficiencyProfile::interpolated`].

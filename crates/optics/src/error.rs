@@ -41,11 +41,11 @@ pub enum Error {
         "range {range_m} m lies outside the profile, which covers {first_m} m to {last_m} m: nothing is extrapolated"
     )]
     Extrapolation {
-        /// The range that was asked for [m].
+        /// The range that was asked for \[m\].
         range_m: f64,
-        /// First range of the profile [m].
+        /// First range of the profile \[m\].
         first_m: f64,
-        /// Last range of the profile [m].
+        /// Last range of the profile \[m\].
         last_m: f64,
     },
     /// A grid or layering cannot hold what it is asked to hold.
@@ -61,7 +61,7 @@ pub enum Error {
     /// The absorbing border took so much power that the result means nothing.
     #[error("the absorbing border took {fraction:.3} of the power before {range_m} m, 0.05 at most: use a wider grid")]
     PowerLost {
-        /// Range at which it was noticed [m].
+        /// Range at which it was noticed \[m\].
         range_m: f64,
         /// Mean fraction of the power that was lost.
         fraction: f64,

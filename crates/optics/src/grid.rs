@@ -1,6 +1,6 @@
 //! The transverse grid and its two-dimensional Fourier transform with one transpose.
 //!
-//! Fields are row-major, `[y][x]`; spectra and the transposed fields `[x][y]`. A transform of the rows followed by a
+//! Fields are row-major, `[y]\[x\]`; spectra and the transposed fields `[x]\[y\]`. A transform of the rows followed by a
 //! transposed store leaves the other axis contiguous, so that a forward and an inverse transform cost two transposes
 //! together. Check: against the direct sum, for odd and prime sizes too.
 
@@ -21,9 +21,9 @@ pub struct Grid {
     pub nx: usize,
     /// Points along y.
     pub ny: usize,
-    /// Spacing along x [m].
+    /// Spacing along x \[m\].
     pub dx_m: f64,
-    /// Spacing along y [m].
+    /// Spacing along y \[m\].
     pub dy_m: f64,
 }
 
@@ -64,19 +64,19 @@ impl Grid {
         self.nx * self.ny
     }
 
-    /// Shorter side [m].
+    /// Shorter side \[m\].
     pub fn smallest_width_m(&self) -> f64 {
         (self.nx as f64 * self.dx_m).min(self.ny as f64 * self.dy_m)
     }
 
-    /// Largest step for which the transfer function of (16) is sampled: N dx^2 / lambda [m].
+    /// Largest step for which the transfer function of (16) is sampled: N dx^2 / lambda \[m\].
     pub fn largest_step_m(&self, wavelength_m: f64) -> f64 {
         let x = self.nx as f64 * self.dx_m.powi(2);
         let y = self.ny as f64 * self.dy_m.powi(2);
         x.min(y) / wavelength_m
     }
 
-    /// Distance of point i of n from the axis [m].
+    /// Distance of point i of n from the axis \[m\].
     pub(crate) fn offset_m(n: usize, spacing_m: f64, i: usize) -> f64 {
         (i as f64 - (n / 2) as f64) * spacing_m
     }
@@ -150,7 +150,7 @@ impl<T: Real> Fft2<T> {
         }
     }
 
-    /// Rows `[y][x]`: `before` each block, forward transform along x, transposed into `out` `[kx][y]`.
+    /// Rows `[y]\[x\]`: `before` each block, forward transform along x, transposed into `out` `[kx]\[y\]`.
     pub(crate) fn forward_x(
         &self,
         field: &[Complex<T>],
@@ -167,8 +167,8 @@ impl<T: Real> Fft2<T> {
         });
     }
 
-    /// Rows `[kx][y]`: forward along y, `middle` on the spectrum `[kx][ky]` of each block, inverse along y, transposed
-    /// into `out` `[y][kx]`.
+    /// Rows `[kx]\[y\]`: forward along y, `middle` on the spectrum `[kx]\[ky\]` of each block, inverse along y, transposed
+    /// into `out` `[y]\[kx\]`.
     pub(crate) fn filter_y(
         &self,
         field: &[Complex<T>],
@@ -186,7 +186,7 @@ impl<T: Real> Fft2<T> {
         });
     }
 
-    /// Rows `[kx][ky]`: `fill` makes each block, inverse along y, transposed into `out` `[y][kx]`.
+    /// Rows `[kx]\[ky\]`: `fill` makes each block, inverse along y, transposed into `out` `[y]\[kx\]`.
     pub(crate) fn inverse_y(
         &self,
         out: &mut [Complex<T>],
@@ -200,7 +200,7 @@ impl<T: Real> Fft2<T> {
         });
     }
 
-    /// Rows `[y][kx]`: inverse along x, then `after` on each block with the index of its first row.
+    /// Rows `[y]\[kx\]`: inverse along x, then `after` on each block with the index of its first row.
     pub(crate) fn inverse_x(
         &self,
         field: &mut [Complex<T>],

@@ -12,9 +12,9 @@ use std::f64::consts::PI;
 
 /// Nodes and weights of the aperture integral with everything that does not depend on the target point.
 struct Aperture {
-    /// Radius [m] and the complex weighted field (k/R) E(r') r' dr' exp(j ...).
+    /// Radius \[m\] and the complex weighted field (k/R) E(r') r' dr' exp(j ...).
     node: Vec<(f64, f64, f64)>,
-    /// k/R [rad/m^2].
+    /// k/R \[rad/m^2\].
     scale_rad_m2: f64,
 }
 
@@ -56,7 +56,7 @@ impl Aperture {
     }
 }
 
-/// Irradiance of the transmitted beam at `range_m` in free space [1/m^2], for unit power before truncation.
+/// Irradiance of the transmitted beam at `range_m` in free space \[1/m^2\], for unit power before truncation.
 ///
 /// # Errors
 /// [`Error::OutOfRange`] for a telescope, range (<= 0) or radius (< 0) that is not allowed.

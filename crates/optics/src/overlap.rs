@@ -21,7 +21,7 @@ const GAUSSIAN_REACH: f64 = 6.2;
 pub(crate) struct Overlap {
     telescope: Telescope,
     rule: GaussLegendre,
-    /// k (1/R - 1/F) [rad/m^2].
+    /// k (1/R - 1/F) \[rad/m^2\].
     phase_rad_m2: f64,
 }
 

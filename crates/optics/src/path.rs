@@ -10,14 +10,14 @@ use crate::grid::Grid;
 use crate::theory::ScreenStrength;
 use crate::turbulence::Cn2Path;
 
-/// Ends of the layers along the path [m]; the first layer begins at the telescope.
+/// Ends of the layers along the path \[m\]; the first layer begins at the telescope.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layers {
     end_m: Vec<f64>,
 }
 
 impl Layers {
-    /// Layers that end at these distances [m], increasing.
+    /// Layers that end at these distances \[m\], increasing.
     ///
     /// # Errors
     /// [`Error`] for an empty list, or ends that are not positive and increasing.
@@ -38,12 +38,12 @@ impl Layers {
         Self::new((1..=count).map(|i| range_m * i as f64 / count as f64).collect())
     }
 
-    /// Ends of the layers [m].
+    /// Ends of the layers \[m\].
     pub fn end_m(&self) -> &[f64] {
         &self.end_m
     }
 
-    /// Start and end of layer i [m].
+    /// Start and end of layer i \[m\].
     pub(crate) fn bounds_m(&self, i: usize) -> (f64, f64) {
         (if i == 0 { 0.0 } else { self.end_m[i - 1] }, self.end_m[i])
     }
@@ -89,7 +89,7 @@ pub(crate) enum Op {
 #[derive(Debug, Clone)]
 pub(crate) struct Program {
     pub(crate) ops: Vec<Op>,
-    /// Distances of the transfer functions [m].
+    /// Distances of the transfer functions \[m\].
     pub(crate) distance_m: Vec<f64>,
     /// sqrt(k^2 Cn2 dz) of each layer; empty without turbulence.
     pub(crate) strength: Vec<f64>,

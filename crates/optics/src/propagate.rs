@@ -1,6 +1,6 @@
 //! Propagation through one layer (16): screen phase, transfer function, absorbing border.
 //!
-//! E(z + dz) = F^-1 { exp(-j pi lambda dz f^2) F [E exp(j psi)] }, f in CYCLES per metre. The transfer function is a product
+//! E(z + dz) = F^-1 { exp(-j pi lambda dz f^2) F \[E exp(j psi)\] }, f in CYCLES per metre. The transfer function is a product
 //! of one factor per axis and is applied in the transposed layout. Check: width and Gouy phase of a Gaussian beam,
 //! conserved power, a step forth and back.
 
@@ -25,7 +25,7 @@ pub enum TransferKind {
 pub struct Transfer<T: Real> {
     x: Vec<Complex<T>>,
     y: Vec<Complex<T>>,
-    /// `[kx][ky]`, in place of `x` and `y`.
+    /// `[kx]\[ky\]`, in place of `x` and `y`.
     full: Option<Vec<Complex<T>>>,
 }
 
@@ -115,7 +115,7 @@ impl<T: Real> Propagator<T> {
         })
     }
 
-    /// One step: field `[y][x]` times exp(j scale screen), over the distance of `transfer`, times the absorbing border.
+    /// One step: field `[y]\[x\]` times exp(j scale screen), over the distance of `transfer`, times the absorbing border.
     /// Returns the power that is left, the integral of |E|^2 over the grid.
     ///
     /// # Errors

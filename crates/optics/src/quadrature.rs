@@ -5,7 +5,7 @@
 
 use crate::Error;
 
-/// Gauss-Legendre rule on [-1, 1].
+/// Gauss-Legendre rule on \[-1, 1\].
 #[derive(Debug, Clone)]
 pub(crate) struct GaussLegendre {
     node: Vec<f64>,
@@ -54,7 +54,7 @@ impl GaussLegendre {
         (0..panels).map(|i| self.integrate(a + h * i as f64, a + h * (i + 1) as f64, &mut f)).sum()
     }
 
-    /// Nodes and weights mapped to [a, b].
+    /// Nodes and weights mapped to \[a, b\].
     pub(crate) fn mapped(&self, a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let (mid, half) = (0.5 * (a + b), 0.5 * (b - a));
         self.node.iter().zip(&self.weight).map(move |(x, w)| (mid + half * x, half * w))

@@ -9,9 +9,9 @@ use crate::error::{finite, not_negative, positive};
 use crate::quadrature::GaussLegendre;
 use std::f64::consts::PI;
 
-/// Speed of light [m/s].
+/// Speed of light \[m/s\].
 pub const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
-/// Planck constant [J s].
+/// Planck constant \[J s\].
 pub const PLANCK_J_S: f64 = 6.626_070_15e-34;
 
 /// Which constant multiplies the optical frequency in (14).
@@ -26,19 +26,19 @@ pub enum PlanckConvention {
 /// Everything in (14) except the efficiency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SnrModel {
-    /// Wavelength [m].
+    /// Wavelength \[m\].
     pub wavelength_m: f64,
-    /// Receiver area A_R [m^2], the one that normalises the efficiency.
+    /// Receiver area A_R \[m^2\], the one that normalises the efficiency.
     pub aperture_area_m2: f64,
-    /// Pulse energy E_t [J], counted before the aperture (as the efficiency is).
+    /// Pulse energy E_t \[J\], counted before the aperture (as the efficiency is).
     pub pulse_energy_j: f64,
     /// Quantum efficiency eta_Q, 0 to 1.
     pub quantum_efficiency: f64,
-    /// Detector (noise) bandwidth B_w [Hz].
+    /// Detector (noise) bandwidth B_w \[Hz\].
     pub bandwidth_hz: f64,
-    /// Backscatter coefficient beta [1/(m sr)].
+    /// Backscatter coefficient beta \[1/(m sr)\].
     pub backscatter_per_m_sr: f64,
-    /// Extinction coefficient alpha [1/m]; K = exp(-alpha R) one way, K^2 for the round trip.
+    /// Extinction coefficient alpha \[1/m\]; K = exp(-alpha R) one way, K^2 for the round trip.
     pub extinction_per_m: f64,
     /// h nu or hbar nu.
     pub planck: PlanckConvention,
@@ -80,7 +80,7 @@ impl SnrModel {
         Ok(self)
     }
 
-    /// Energy of a photon [J] in the convention chosen: h c / lambda, or hbar c / lambda.
+    /// Energy of a photon \[J\] in the convention chosen: h c / lambda, or hbar c / lambda.
     pub fn photon_energy_j(&self) -> f64 {
         let h_nu = PLANCK_J_S * SPEED_OF_LIGHT_M_S / self.wavelength_m;
         match self.planck {
@@ -89,7 +89,7 @@ impl SnrModel {
         }
     }
 
-    /// Return per metre of range for an efficiency of 1, K^2 beta A_R / R^2 [1/m], (9): what a layer of air at `range_m`
+    /// Return per metre of range for an efficiency of 1, K^2 beta A_R / R^2 \[1/m\], (9): what a layer of air at `range_m`
     /// sends back, before the heterodyne mixing.
     ///
     /// # Errors
@@ -98,7 +98,7 @@ impl SnrModel {
         Ok(self.validated()?.backscatter_factor_per_m(positive("range_m", range_m)?))
     }
 
-    /// K^2 beta A_R / R^2 at `range_m` [1/m], the variance (9) per unit length and unit efficiency.
+    /// K^2 beta A_R / R^2 at `range_m` \[1/m\], the variance (9) per unit length and unit efficiency.
     fn backscatter_factor_per_m(&self, range_m: f64) -> f64 {
         (-2.0 * self.extinction_per_m * range_m).exp() * self.backscatter_per_m_sr * self.aperture_area_m2
             / (range_m * range_m)
@@ -124,7 +124,7 @@ impl SnrModel {
     /// SNR (14), corrected, at time `time_s` after the centre of the pulse left: the integral over range weighted with
     /// the pulse |f(t - 2R/c)|^2 of (7).
     ///
-    /// `pulse_sigma_s` is sigma of (7) [s] (1/e half-width of |f|^2); `efficiency(range_m)` is eta_s. The part of the
+    /// `pulse_sigma_s` is sigma of (7) \[s\] (1/e half-width of |f|^2); `efficiency(range_m)` is eta_s. The part of the
     /// pulse within 6 sigma counts, and only ranges above 0.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! Sums from which the efficiencies and their errors follow, for both receivers from one set of realisations.
 //!
 //! Monostatic: mean of q_i = integral of j_i^2. Bistatic: all pairs of different realisations,
-//! [integral of (sum j)^2 - sum of integral j_i^2] / (n (n - 1)). The irradiance is folded onto one quadrant, which
+//! \[integral of (sum j)^2 - sum of integral j_i^2\] / (n (n - 1)). The irradiance is folded onto one quadrant, which
 //! is exact for beams symmetric about the axes; its error is the jackknife over realisations, for which
 //! the overlap of one realisation with all is taken on rings.
 //! Check: against the double sum over pairs and the full jackknife.

@@ -1,6 +1,6 @@
 //! Phase structure function of a thin layer, by quadrature of its spectrum.
 //!
-//! D(r) = k^2 Cn2 dz G(r), G(r) = 8 pi^2 integral of kappa Phi_n/Cn2 (1 - J0(kappa r)) dkappa [m^(5/3)].
+//! D(r) = k^2 Cn2 dz G(r), G(r) = 8 pi^2 integral of kappa Phi_n/Cn2 (1 - J0(kappa r)) dkappa \[m^(5/3)\].
 //! Check: the stored curve of (17) to 1e-9, and 2.914 r^(5/3) for Kolmogorov's spectrum.
 
 use crate::Error;
@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 /// Beyond this argument the oscillating part of the integral is below 1e-10 of the whole.
 const LAST_OSCILLATION: f64 = 1200.0;
 
-/// G(r) [m^(5/3)] at separation `separation_m`: structure function per unit k^2 Cn2 dz.
+/// G(r) \[m^(5/3)\] at separation `separation_m`: structure function per unit k^2 Cn2 dz.
 ///
 /// # Errors
 /// [`Error::OutOfRange`] for a negative separation or one that is not a number.
@@ -43,7 +43,7 @@ pub fn structure_function_m53(spectrum: &dyn Spectrum, separation_m: f64) -> Res
     Ok(8.0 * PI * PI * sum)
 }
 
-/// Integral over [a, b] on panels equal in the logarithm, three to a decade.
+/// Integral over \[a, b\] on panels equal in the logarithm, three to a decade.
 fn logarithmic(rule: &GaussLegendre, a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
     if b <= a {
         return 0.0;
@@ -91,7 +91,7 @@ impl StructureTable {
         Self { first_ln, step_ln, ln_value }
     }
 
-    /// G(r) [m^(5/3)] at `separation_m` >= 0.
+    /// G(r) \[m^(5/3)\] at `separation_m` >= 0.
     pub fn at(&self, separation_m: f64) -> f64 {
         if separation_m <= 0.0 {
             return 0.0;

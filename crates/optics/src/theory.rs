@@ -62,7 +62,7 @@ pub fn untruncated_efficiency(telescope: &Telescope, range_m: f64) -> Result<f64
     Ok((telescope.wavelength_m * range_m).powi(2) / (2.0 * PI * area * width2))
 }
 
-/// Square of the 1/e irradiance radius of the untruncated beam at `range_m` [m^2].
+/// Square of the 1/e irradiance radius of the untruncated beam at `range_m` \[m^2\].
 pub(crate) fn untruncated_radius2_m2(telescope: &Telescope, range_m: f64) -> f64 {
     let s = telescope.intensity_radius_m();
     let geometric = s * (1.0 - range_m * telescope.focus.curvature_per_m());
@@ -73,9 +73,9 @@ pub(crate) fn untruncated_radius2_m2(telescope: &Telescope, range_m: f64) -> f64
 /// One phase screen of a simulated path, for [`bistatic_efficiency_screens`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScreenStrength {
-    /// Distance of the screen from the telescope [m].
+    /// Distance of the screen from the telescope \[m\].
     pub position_m: f64,
-    /// Cn2 of its layer times the thickness of the layer [m^(1/3)].
+    /// Cn2 of its layer times the thickness of the layer \[m^(1/3)\].
     pub cn2_thickness_m13: f64,
 }
 

@@ -16,24 +16,24 @@ pub enum Cn2Path {
     None,
     /// The same everywhere (a horizontal path).
     Uniform {
-        /// Cn2 [m^(-2/3)], above 0.
+        /// Cn2 \[m^(-2/3)\], above 0.
         cn2_m_m23: f64,
     },
     /// A profile over height, seen along a slanted line; linear between the points.
     Heights {
-        /// Heights above ground [m], increasing strictly.
+        /// Heights above ground \[m\], increasing strictly.
         height_m: Vec<f64>,
-        /// Cn2 at these heights [m^(-2/3)].
+        /// Cn2 at these heights \[m^(-2/3)\].
         cn2_m_m23: Vec<f64>,
-        /// Height of the telescope above ground [m].
+        /// Height of the telescope above ground \[m\].
         telescope_height_m: f64,
-        /// Elevation of the line of sight [rad].
+        /// Elevation of the line of sight \[rad\].
         elevation_rad: f64,
     },
 }
 
 impl Cn2Path {
-    /// Cn2 [m^(-2/3)] at distance `range_m` from the telescope.
+    /// Cn2 \[m^(-2/3)\] at distance `range_m` from the telescope.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a height outside the profile.
@@ -60,7 +60,7 @@ impl Cn2Path {
         }
     }
 
-    /// Mean of Cn2 [m^(-2/3)] from `start_m` to `end_m` along the path.
+    /// Mean of Cn2 \[m^(-2/3)\] from `start_m` to `end_m` along the path.
     ///
     /// # Errors
     /// As [`Cn2Path::at`].
@@ -135,7 +135,7 @@ pub struct Turbulence {
 }
 
 impl Turbulence {
-    /// The chapter's spectrum (17) with a constant Cn2 [m^(-2/3)]; 0 is no turbulence.
+    /// The chapter's spectrum (17) with a constant Cn2 \[m^(-2/3)\]; 0 is no turbulence.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a negative Cn2 or one that is not a number.
@@ -159,8 +159,8 @@ pub fn rytov_variance(cn2_m_m23: f64, wavelength_m: f64, range_m: f64) -> Result
     Ok(1.23 * cn2 * k.powf(7.0 / 6.0) * positive("range_m", range_m)?.powf(11.0 / 6.0))
 }
 
-/// Coherence radius rho_0 of a spherical wave [m] at the telescope: exp(-(rho/rho_0)^(5/3)) is its mutual coherence,
-/// rho_0 = [1.4572 k^2 Cn2 R 3/8]^(-3/5) (Kolmogorov; no factor 2 inside the bracket). Infinite for Cn2 = 0.
+/// Coherence radius rho_0 of a spherical wave \[m\] at the telescope: exp(-(rho/rho_0)^(5/3)) is its mutual coherence,
+/// rho_0 = \[1.4572 k^2 Cn2 R 3/8\]^(-3/5) (Kolmogorov; no factor 2 inside the bracket). Infinite for Cn2 = 0.
 ///
 /// # Errors
 /// [`Error::OutOfRange`] names the argument that is not allowed.
