@@ -43,6 +43,8 @@ mod overlap;
 #[cfg(feature = "screens")]
 pub mod path;
 #[cfg(feature = "screens")]
+pub mod plan;
+#[cfg(feature = "screens")]
 pub mod propagate;
 mod quadrature;
 #[cfg(feature = "screens")]

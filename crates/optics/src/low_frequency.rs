@@ -28,6 +28,8 @@ pub(crate) struct LowFrequencies<T> {
     /// Lagrange polynomials of these points, sampled at the grid points along x and y.
     pub(crate) basis: [Vec<Vec<T>>; 2],
     spacing_m: [f64; 2],
+    /// Middle of the grid [m].
+    centre_m: [f64; 2],
 }
 
 /// One screen pair's coefficients: complex, because real and imaginary part are two screens.
@@ -38,8 +40,9 @@ impl<T: Real> LowFrequencies<T> {
         let delta = [0, 1].map(|a| 2.0 * PI / (size[a] as f64 * spacing_m[a]));
         let point = [0, 1].map(|a| chebyshev(size[a]));
         let basis = [0, 1].map(|a| lagrange(&point[a], size[a]));
+        let centre_m = [0, 1].map(|a| 0.5 * size[a] as f64 * spacing_m[a]);
         let width = (size[0] as f64 * spacing_m[0]).max(size[1] as f64 * spacing_m[1]);
-        Self { cells: cells(delta, levels(spectrum, delta, width)), point, basis, spacing_m }
+        Self { cells: cells(delta, levels(spectrum, delta, width)), point, basis, spacing_m, centre_m }
     }
 
     /// Draws the waves and sums them at the Chebyshev points, which are the polynomial's coefficients. `[y][x]`.
@@ -47,20 +50,25 @@ impl<T: Real> LowFrequencies<T> {
         &self,
         spectrum: &dyn Spectrum,
         displacement_m: [f64; 2],
+        shift_sign: f64,
         rng: &mut impl Rng,
     ) -> LowCoefficients {
         let mut sum = [[Complex::default(); LOW_ORDER]; LOW_ORDER];
         for cell in &self.cells {
-            let kappa = [0, 1].map(|a| cell.corner_rad_m[a] + cell.size_rad_m[a] * unit(rng));
+            let centre = [0, 1].map(|a| cell.corner_rad_m[a] + 0.5 * cell.size_rad_m[a]);
+            let shift = [0, 1].map(|a| cell.size_rad_m[a] * (unit(rng) - 0.5));
             let area = cell.size_rad_m[0] * cell.size_rad_m[1];
-            let density = 2.0 * PI * spectrum.density_per_cn2(kappa[0].hypot(kappa[1]));
+            let density = 2.0 * PI * spectrum.density_per_cn2((centre[0] + shift[0]).hypot(centre[1] + shift[1]));
             let amplitude = (density * area).sqrt() * normal_pair(rng);
+            let kappa = [0, 1].map(|a| centre[a] + shift_sign * shift[a]);
             let wave = [0, 1]
                 .map(|a| self.point[a].map(|p| Complex::cis(kappa[a] * (p * self.spacing_m[a] - displacement_m[a]))));
+            // Without an outer scale the slowest waves are huge: what they have in common over the grid is taken off.
+            let piston = amplitude * Complex::cis(kappa[0] * self.centre_m[0] + kappa[1] * self.centre_m[1]);
             for (row, y) in sum.iter_mut().zip(wave[1]) {
                 let factor = amplitude * y;
                 for (value, x) in row.iter_mut().zip(wave[0]) {
-                    *value += factor * x;
+                    *value += factor * x - piston;
                 }
             }
         }

@@ -278,7 +278,8 @@ impl MonteCarlo {
         let (mut mono, mut bi) = (Columns::default(), Columns::default());
         for (i, samples) in sums.samples.iter().enumerate() {
             let (fraction, _) = mean_and_variance(samples.iter().map(|s| s.lost));
-            if fraction > 0.05 {
+            // Not `> 0.05`: a fraction that is no number must not pass.
+            if !(fraction <= 0.05) {
                 return Err(Error::PowerLost { range_m: self.range_m[i], fraction });
             }
             lost_power.push(fraction);

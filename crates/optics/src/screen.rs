@@ -223,7 +223,7 @@ impl<T: Real> ScreenGenerator<T> {
         }
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let shift = [unit(rng) - 0.5, unit(rng) - 0.5];
-        let low = self.low.draw(&*self.spectrum, displacement_m, rng);
+        let low = self.low.draw(&*self.spectrum, displacement_m, self.shift_sign, rng);
         let ScreenWork { field, scratch, radius, angle, row, ramp } = work;
         let wind = self.displacement_phases(shift, displacement_m);
         self.fft.inverse_y(field, scratch, |ix, block| {

@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use wakescope_optics::structure::StructureTable;
 use wakescope_optics::theory::{bistatic_efficiency_screens, free_space_efficiency};
 use wakescope_optics::{
-    Cn2Path, EfficiencyEstimate, Error, Focus, Grid, Layers, Misalignment, MonteCarlo, Progress, Real, Sampling, Stop,
-    Telescope, Turbulence,
+    Cn2Path, EfficiencyEstimate, Error, Focus, Grid, Layers, Misalignment, MonteCarlo, OuterScaleConvention, Progress,
+    Real, Sampling, Stop, Telescope, Turbulence, VonKarman,
 };
 
 fn go(_: Progress) -> ControlFlow<()> {
@@ -88,6 +88,17 @@ fn free_space_on_the_chapters_grid_is_within_1e_3_raw_and_exact_when_corrected()
     assert_eq!(corrected.realisations, 1);
     assert!(corrected.monostatic.standard_error.iter().all(|&e| e == 0.0));
     assert_eq!(corrected.bistatic.expect("same as monostatic").mean, corrected.monostatic.mean);
+}
+
+#[test]
+fn infinite_outer_scale_agrees_with_exact_theory() {
+    let mut run = coarse(1e-14, 12);
+    let spectrum = VonKarman::new(f64::INFINITY, 0.01, OuterScaleConvention::Inverse, 0.033);
+    run.turbulence.spectrum = std::sync::Arc::new(spectrum.expect("spectrum"));
+    run.range_m = vec![900.0, 2100.0];
+    let estimate = run.run::<f32>(Stop::after(200), go).expect("run");
+    let z = bistatic_z(&run, &estimate);
+    assert!(z.iter().all(|z| z.abs() < 3.0), "{z:?}");
 }
 
 #[test]
