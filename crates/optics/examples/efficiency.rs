@@ -2,6 +2,8 @@
 //!
 //! `cargo run --release --example efficiency -- [cn2_m_m23] [realisations] [seed]`
 
+#![allow(clippy::print_stdout)]
+
 use std::ops::ControlFlow;
 use std::time::Instant;
 use wakescope_optics::structure::StructureTable;

@@ -14,7 +14,7 @@ pub struct EfficiencyProfile {
     pub range_m: Vec<f64>,
     /// Mean efficiency at each range.
     pub mean: Vec<f64>,
-    /// Standard deviation of the efficiency of one realisation, sqrt(<eta^2> - <eta>^2); 0 for exact theory.
+    /// Standard deviation of the efficiency of one realisation, `sqrt(<eta^2> - <eta>^2)`; 0 for exact theory.
     pub standard_deviation: Vec<f64>,
     /// Standard error of `mean`; 0 for exact theory.
     pub standard_error: Vec<f64>,

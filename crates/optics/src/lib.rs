@@ -1,4 +1,4 @@
-//! Heterodyne efficiency of a coherent lidar: beam, telescope, free space and SNR.
+//! Heterodyne efficiency of a coherent lidar: exact theory, and phase screens through turbulence of any strength.
 //!
 //! The system-antenna efficiency eta_s(R) of (19) is the overlap, at the target, of the transmitted beam and of the
 //! local oscillator propagated backwards through the receiver (BPLO), both normalised to unit power before truncation.
@@ -17,13 +17,24 @@
 //! # }
 //! ```
 //!
+//! Through turbulence the bistatic mean needs no random numbers ([`theory::bistatic_efficiency`]); the monostatic one is a
+//! Monte Carlo (`MonteCarlo`), which gives both receivers from one set of realisations.
+//!
 //! | module | what is in it |
 //! |---|---|
 //! | [`beam`] | telescope, focus, obscuration, misalignment of the two beams |
-//! | [`theory`] | exact efficiency: free space, closed forms |
-//! | [`hankel`] | the same by an independent Fresnel-Hankel quadrature; free-space irradiance |
+//! | [`theory`] | exact efficiency: free space, bistatic at any strength, closed forms |
+//! | [`hankel`] | free space by an independent Fresnel-Hankel quadrature; free-space irradiance |
+//! | [`spectrum`], [`structure`] | spectra of the refractive index and their structure functions |
+//! | [`turbulence`] | Cn2 along the path, Rytov variance, coherence radius |
 //! | [`efficiency`] | efficiency profile with scatter and error |
 //! | [`snr`] | signal-to-noise ratio (14), corrected |
+//! | `grid`, `screen`, `propagate`, `source` | transverse grid, phase screens, split step, field at the telescope |
+//! | `path`, `monte_carlo` | layers of the path; efficiency by Monte Carlo |
+//! | `plan` | grid, layers, memory, time; refusals that name the limit |
+//!
+//! Features: `screens` (default) compiles the modules without a link above, with their FFT and random numbers; `rayon`
+//! (default) runs realisations in parallel, with the same bits.
 
 pub mod beam;
 pub mod efficiency;

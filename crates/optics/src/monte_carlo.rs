@@ -76,7 +76,7 @@ pub struct MonteCarlo {
     pub grid: Grid,
     /// Layers of the path, one screen each.
     pub layers: Layers,
-    /// Ranges at which the efficiency is wanted [m], increasing, within the layers.
+    /// Ranges at which the efficiency is wanted `[m]`, increasing, within the layers.
     pub range_m: Vec<f64>,
     /// Transfer function of the steps.
     pub transfer: TransferKind,
@@ -278,8 +278,7 @@ impl MonteCarlo {
         let (mut mono, mut bi) = (Columns::default(), Columns::default());
         for (i, samples) in sums.samples.iter().enumerate() {
             let (fraction, _) = mean_and_variance(samples.iter().map(|s| s.lost));
-            // Not `> 0.05`: a fraction that is no number must not pass.
-            if !(fraction <= 0.05) {
+            if fraction.is_nan() || fraction > 0.05 {
                 return Err(Error::PowerLost { range_m: self.range_m[i], fraction });
             }
             lost_power.push(fraction);

@@ -375,7 +375,7 @@ impl<T: Real> FrozenScreens<T> {
         let grid = &self.generator.grid;
         let width = [grid.nx as f64 * grid.dx_m, grid.ny as f64 * grid.dy_m];
         for axis in 0..2 {
-            if !(displacement_m[axis].abs() <= width[axis]) {
+            if displacement_m[axis].is_nan() || displacement_m[axis].abs() > width[axis] {
                 return Err(Error::OutOfRange {
                     field: "displacement_m",
                     value: displacement_m[axis],

@@ -40,6 +40,9 @@ struct Mark<T> {
     planes: Vec<Vec<T>>,
 }
 
+/// Output, marks of the lanes, and the product of two different realisations.
+type Measured<T> = (usize, Vec<Mark<T>>, Option<f64>);
+
 impl<'a, T: Real> Walker<'a, T> {
     pub(crate) fn new(prepared: &'a Prepared<T>, seed: u64, sampling: Sampling) -> Self {
         let grid = prepared.propagator.grid();
@@ -132,8 +135,7 @@ impl<'a, T: Real> Walker<'a, T> {
         Ok(())
     }
 
-    #[allow(clippy::type_complexity)]
-    fn execute(&mut self, op: Op, active: usize) -> Result<Option<(usize, Vec<Mark<T>>, Option<f64>)>, Error> {
+    fn execute(&mut self, op: Op, active: usize) -> Result<Option<Measured<T>>, Error> {
         match op {
             Op::Step { screen, transfer, times } => {
                 for lane in 0..active {
@@ -165,7 +167,6 @@ impl<'a, T: Real> Walker<'a, T> {
     }
 
     /// To an output inside a layer, and back to where it began.
-    #[allow(clippy::type_complexity)]
     fn branch(
         &mut self,
         layer: usize,
@@ -174,7 +175,7 @@ impl<'a, T: Real> Walker<'a, T> {
         times: usize,
         output: usize,
         active: usize,
-    ) -> Result<(usize, Vec<Mark<T>>, Option<f64>), Error> {
+    ) -> Result<Measured<T>, Error> {
         let mut kept = Vec::new();
         for lane in 0..active {
             self.fetch_screen(lane, layer)?;

@@ -2,6 +2,7 @@
 #![cfg(feature = "screens")]
 
 use std::ops::ControlFlow;
+use wakescope_optics::propagate::TransferKind;
 use wakescope_optics::structure::StructureTable;
 use wakescope_optics::theory::{bistatic_efficiency_screens, free_space_efficiency};
 use wakescope_optics::{
@@ -99,6 +100,57 @@ fn infinite_outer_scale_agrees_with_exact_theory() {
     let estimate = run.run::<f32>(Stop::after(200), go).expect("run");
     let z = bistatic_z(&run, &estimate);
     assert!(z.iter().all(|z| z.abs() < 3.0), "{z:?}");
+}
+
+#[test]
+fn antithetic_paths_are_unbiased_and_worth_more_than_twice_their_number() {
+    let mut run = coarse(1e-13, 77);
+    run.layers = Layers::equal(4, 1000.0).expect("layers");
+    run.range_m = vec![500.0, 1000.0];
+    let plain = run.run::<f32>(Stop::after(400), go).expect("run");
+    run.seed = 78;
+    run.sampling = Sampling::Antithetic;
+    let paired = run.run::<f32>(Stop::after(400), go).expect("run");
+    let z = bistatic_z(&run, &paired);
+    assert!(z.iter().all(|z| z.abs() < 3.0), "{z:?}");
+    for i in 0..2 {
+        let (a, b) = (&plain.monostatic, &paired.monostatic);
+        let z = (a.mean[i] - b.mean[i]) / a.standard_error[i].hypot(b.standard_error[i]);
+        assert!(z.abs() < 3.0, "{z}");
+        // Variance of the mean below two thirds of that of as many independent paths.
+        assert!(b.standard_error[i] < 0.8 * b.standard_deviation[i] / 20.0, "{i}");
+    }
+}
+
+#[test]
+fn long_waves_and_the_exact_transfer_function_give_free_space_too() {
+    let mut run = coarse(0.0, 1);
+    run.telescope.wavelength_m = 10.6e-6;
+    run.correct_grid = false;
+    run.range_m = vec![200.0, 500.0, 1000.0];
+    for transfer in [TransferKind::Paraxial, TransferKind::Exact] {
+        run.transfer = transfer;
+        let estimate = run.run::<f64>(Stop::after(1), go).expect("run");
+        for (eta, exact) in estimate.monostatic.mean.iter().zip(&estimate.exact_free_space) {
+            assert!((eta / exact - 1.0).abs() < 2e-3, "{transfer:?}: {eta} {exact}");
+        }
+    }
+}
+
+#[test]
+fn focused_obscured_and_uniform_beams_are_right_on_the_grid() {
+    for (focus, obscuration_radius_m, beam_radius_m) in
+        [(Focus::At(600.0), 0.0, 0.03), (Focus::At(-2000.0), 0.02, 0.03), (Focus::At(400.0), 0.015, f64::INFINITY)]
+    {
+        let mut run = MonteCarlo::chapter(0.0, 1).expect("set-up");
+        run.telescope = Telescope { focus, obscuration_radius_m, beam_radius_m, ..run.telescope };
+        run.correct_grid = false;
+        run.range_m = vec![400.0, 600.0, 1000.0];
+        let estimate = run.run::<f64>(Stop::after(1), go).expect("run");
+        for (eta, exact) in estimate.monostatic.mean.iter().zip(&estimate.exact_free_space) {
+            assert!((eta / exact - 1.0).abs() < 2e-3, "{focus:?}: {eta} {exact}");
+        }
+    }
 }
 
 #[test]
