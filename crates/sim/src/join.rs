@@ -3,8 +3,9 @@
 use crate::Error;
 use crate::geometry::Geometry;
 use crate::scene::{
-    BeamRadiusDefinition, Flow, NoiseKind, OuterScaleWavenumber, PulseDefinition, Refinement, RefractiveTurbulence,
-    Scene, SnrReference, SpectrumKind, VortexMotion, VortexPair, VortexProfile, Weighting,
+    BeamRadiusDefinition, Flow, NoiseKind, OuterScaleWavenumber, PulseDefinition, ReceiverPath, Refinement,
+    RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind, VortexMotion, VortexPair, VortexProfile,
+    Weighting,
 };
 use std::sync::Arc;
 use wakescope_estimate as estimate;
@@ -104,22 +105,46 @@ pub fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, Error>
     Ok(optics::Turbulence { spectrum, cn2: optics::Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 }.validated()? })
 }
 
+/// Which paths the two beams of a scene take.
+pub fn receiver_path(scene: &Scene) -> optics::plan::Receiver {
+    match scene.telescope.receiver {
+        ReceiverPath::Monostatic => optics::plan::Receiver::Monostatic,
+        ReceiverPath::Bistatic => optics::plan::Receiver::Bistatic,
+    }
+}
+
+/// Grid and layers of a scene's phase screens for given ranges, m, increasing, with their cost.
+///
+/// # Errors
+/// What cannot be resolved, with the limit and what would do.
+pub fn screen_plan(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> Result<optics::plan::Plan, Error> {
+    let (telescope, turbulence, none) = (telescope(scene)?, turbulence(t)?, optics::Misalignment::NONE);
+    Ok(match t.sampling {
+        ScreenSampling::Derived => optics::plan::plan(&telescope, &none, &turbulence, range_m)?,
+        ScreenSampling::Explicit => {
+            let grid = optics::Grid::square(t.grid_points, t.grid_spacing_m)?;
+            let layers = optics::Layers::equal(t.layers, range_m.last().copied().unwrap_or(0.0))?;
+            optics::plan::examine(&telescope, &none, &turbulence, &grid, &layers, range_m)?
+        }
+    })
+}
+
 /// The Monte Carlo of a scene's turbulence for given ranges, m, increasing.
 ///
 /// # Errors
-/// What the optics refuse, such as a grid too small for the beam.
+/// As [`screen_plan`].
 pub fn monte_carlo(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> Result<optics::MonteCarlo, Error> {
-    let last_m = range_m.last().copied().unwrap_or(0.0);
+    let plan = screen_plan(scene, t, range_m)?;
     Ok(optics::MonteCarlo {
         telescope: telescope(scene)?,
         misalignment: optics::Misalignment::NONE,
         turbulence: turbulence(t)?,
-        grid: optics::Grid::square(t.grid_points, t.grid_spacing_m)?,
-        layers: optics::Layers::equal(t.layers, last_m)?,
+        grid: plan.grid,
+        layers: plan.layers,
         range_m: range_m.to_vec(),
         transfer: optics::propagate::TransferKind::Paraxial,
         seed: scene.seed,
-        sampling: optics::Sampling::Independent,
+        sampling: optics::Sampling::Antithetic,
         correct_grid: true,
     })
 }

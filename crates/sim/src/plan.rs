@@ -6,9 +6,10 @@
 
 use crate::Error;
 use crate::geometry::Geometry;
-use crate::profile::{EfficiencyModel, turbulence};
-use crate::scene::{Flow, Method, NoiseKind, Scene, SceneFile, SnrReference};
+use crate::scene::{Flow, Method, NoiseKind, Scene, SceneFile};
 use std::fmt;
+
+mod optics;
 
 /// What the user asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,11 +103,12 @@ impl Plan {
     /// Plans a run.
     ///
     /// # Errors
-    /// What a crate refuses of the scene; a checked scene gives none.
+    /// What a crate refuses of the scene, such as phase screens too coarse for the turbulence.
     pub fn new(scene: SceneFile, target: Target) -> Result<Self, Error> {
         let geometry = Geometry::new(&scene.scene)?;
-        let stages = stages(&scene.scene, target, &geometry);
-        let warnings = warnings(&scene.scene);
+        let mut warnings = warnings(&scene.scene);
+        let optics = optics::stages(&scene.scene, target, &geometry, &mut warnings)?;
+        let stages = stages(&scene.scene, target, &geometry, optics);
         Ok(Self { scene, target, stages, geometry, warnings })
     }
 
@@ -130,7 +132,7 @@ impl Plan {
     }
 }
 
-fn stages(scene: &Scene, target: Target, g: &Geometry) -> Vec<PlannedStage> {
+fn stages(scene: &Scene, target: Target, g: &Geometry, optics: [PlannedStage; 2]) -> Vec<PlannedStage> {
     let run = |stage, reason: String, core_s: f64, memory_bytes: f64| PlannedStage {
         stage,
         reason,
@@ -157,7 +159,7 @@ fn stages(scene: &Scene, target: Target, g: &Geometry) -> Vec<PlannedStage> {
         let points = (ny * nz) as f64;
         run(Stage::CrossPlane, format!("{ny} x {nz} points"), points * WIND_POINT_S, points * 48.0)
     });
-    out.extend(optics_stages(scene, target));
+    out.extend(optics);
     out.push(if signals {
         let reason = format!("{lines} lines of {} layers of {:.3} m", g.layers, g.layer_thickness_m);
         run(Stage::LinesOfSight, reason, if calm { 0.0 } else { layers * WIND_POINT_S }, layers * 16.0)
@@ -204,58 +206,6 @@ fn stages(scene: &Scene, target: Target, g: &Geometry) -> Vec<PlannedStage> {
         skip(Stage::Errors, "not asked for")
     });
     out
-}
-
-/// The stages of the optics: phase screens only where no theory is valid, or where they are asked for beside it.
-fn optics_stages(scene: &Scene, target: Target) -> [PlannedStage; 2] {
-    let planned = |stage, reason: String, cost| PlannedStage { stage, reason, cost };
-    let profile = matches!(target, Target::Run | Target::Efficiency);
-    let signals = target != Target::Efficiency;
-    let fixed = match scene.detector.snr {
-        SnrReference::Fixed { snr_db } => Some(snr_db),
-        _ => None,
-    };
-    let model = EfficiencyModel::of(scene);
-    let for_signals = signals && fixed.is_none();
-    // Ranges at which the efficiency is wanted, for the table and for the layers.
-    let ranges = |wanted: bool, points: usize| if wanted { points } else { 0 };
-    let quadratures = (ranges(profile, scene.outputs.profile_points)
-        + ranges(for_signals, crate::scan::profile_points(scene))) as f64;
-    let screens = match turbulence(scene) {
-        None => planned(Stage::PhaseScreens, "no turbulence: atmosphere.turbulence".into(), None),
-        Some(t) if profile || (for_signals && model == EfficiencyModel::MonteCarlo) => {
-            let runs = [
-                ranges(profile, scene.outputs.profile_points),
-                ranges(for_signals && model == EfficiencyModel::MonteCarlo, crate::scan::profile_points(scene)),
-            ];
-            let steps: usize = runs.iter().filter(|&&r| r > 0).map(|r| r + t.layers).sum();
-            let pixels = (t.grid_points * t.grid_points) as f64;
-            let reason = format!(
-                "{} realisations of {} screens of {} x {2} points{}",
-                t.realisations,
-                t.layers,
-                t.grid_points,
-                if model == EfficiencyModel::MonteCarlo { "" } else { ", beside the exact theory" }
-            );
-            let core_s = t.realisations as f64 * steps as f64 * pixels * SCREEN_PIXEL_S;
-            planned(Stage::PhaseScreens, reason, Some(Cost { core_s, memory_bytes: pixels * 160.0 }))
-        }
-        Some(_) if model == EfficiencyModel::ExactBistatic => {
-            planned(Stage::PhaseScreens, "the bistatic efficiency has an exact theory".into(), None)
-        }
-        Some(_) => planned(Stage::PhaseScreens, "not asked for".into(), None),
-    };
-    let efficiency = match fixed {
-        Some(snr_db) if !profile => {
-            planned(Stage::Efficiency, format!("detector.snr fixes {snr_db} dB at every range"), None)
-        }
-        _ => {
-            let reason = format!("{}, at {quadratures} ranges", model.name());
-            let cost = Cost { core_s: quadratures * QUADRATURE_S, memory_bytes: quadratures * 64.0 };
-            planned(Stage::Efficiency, reason, Some(cost))
-        }
-    };
-    [screens, efficiency]
 }
 
 /// What is allowed but probably not meant.
@@ -336,8 +286,6 @@ fn bytes(b: f64) -> String {
 
 // Unit costs on one core.
 const WIND_POINT_S: f64 = 3e-8;
-const QUADRATURE_S: f64 = 2e-3;
-const SCREEN_PIXEL_S: f64 = 3e-8;
 const LAYER_SAMPLE_S: f64 = 7.5e-10;
 const NOISE_SAMPLE_S: f64 = 4e-8;
 const WINDOW_LAG_S: f64 = 5e-9;
@@ -347,7 +295,7 @@ const TRUTH_CELL_S: f64 = 1e-6;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::VortexPair;
+    use crate::scene::{SnrReference, VortexPair};
 
     fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
         let mut scene = Scene::default();

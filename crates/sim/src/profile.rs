@@ -5,42 +5,21 @@
 
 use crate::plan::Stage;
 use crate::progress::Observer;
-use crate::scene::{ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence};
+use crate::scene::{RefractiveTurbulence, Scene, SnrReference, Turbulence};
 use crate::{Error, join};
 use std::ops::ControlFlow;
+use wakescope_optics::plan::{Model, cheapest_model};
 use wakescope_optics::structure::StructureTable;
 use wakescope_optics::theory::{bistatic_efficiency_with, free_space_efficiency};
-use wakescope_optics::{EfficiencyProfile, Misalignment, Stop};
+use wakescope_optics::{Cn2Path, EfficiencyProfile, Misalignment, Stop};
 
-/// How the efficiency is computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum EfficiencyModel {
-    /// No turbulence: quadrature.
-    FreeSpace,
-    /// Independent paths: quadrature over the coherence of the mean field.
-    ExactBistatic,
-    /// One path out and back: phase screens.
-    MonteCarlo,
-}
-
-impl EfficiencyModel {
-    /// The cheapest model that is valid for a scene.
-    pub fn of(scene: &Scene) -> Self {
-        match (turbulence(scene), scene.telescope.receiver) {
-            (None, _) => Self::FreeSpace,
-            (Some(_), ReceiverPath::Bistatic) => Self::ExactBistatic,
-            (Some(_), ReceiverPath::Monostatic) => Self::MonteCarlo,
-        }
-    }
-
-    /// A few words for plans and tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::FreeSpace => "free space, by quadrature",
-            Self::ExactBistatic => "independent paths, exact by quadrature",
-            Self::MonteCarlo => "one path out and back, by phase screens",
-        }
-    }
+/// The cheapest model of the efficiency that is valid for a scene.
+pub fn model(scene: &Scene) -> Model {
+    let cn2 = match turbulence(scene) {
+        None => Cn2Path::None,
+        Some(t) => Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 },
+    };
+    cheapest_model(join::receiver_path(scene), &cn2)
 }
 
 /// The turbulence of a scene, if there is any.
@@ -55,7 +34,7 @@ pub fn turbulence(scene: &Scene) -> Option<RefractiveTurbulence> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RangeProfile {
     /// The model that the scene's signals use.
-    pub model: EfficiencyModel,
+    pub model: Model,
     /// Efficiency by that model, with its scatter and error.
     pub efficiency: EfficiencyProfile,
     /// Mean signal-to-noise ratio in the detector band, dB, for a pulse short against the changes
@@ -72,7 +51,7 @@ pub struct RangeProfile {
 pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProfile, Error> {
     let o = &scene.outputs;
     let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
-    let model = EfficiencyModel::of(scene);
+    let model = self::model(scene);
     let mut others = Vec::new();
     let efficiency = match turbulence(scene) {
         None => free_space(scene, &range_m)?,
@@ -83,7 +62,7 @@ pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProf
             others.push(("efficiency_bistatic_exact", exact.clone()));
             others.push(("efficiency_monostatic_monte_carlo", monostatic.clone()));
             others.push(("efficiency_bistatic_monte_carlo", bistatic));
-            if model == EfficiencyModel::MonteCarlo { monostatic } else { exact }
+            if model == Model::MonteCarlo { monostatic } else { exact }
         }
     };
     let snr = join::snr_model(scene)?;
@@ -104,9 +83,9 @@ pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProf
 /// # Errors
 /// What the optics refuse, such as a range of 0 or a grid too small for the beam.
 pub fn efficiency_at(scene: &Scene, range_m: &[f64], observer: &dyn Observer) -> Result<EfficiencyProfile, Error> {
-    match (turbulence(scene), EfficiencyModel::of(scene)) {
-        (Some(t), EfficiencyModel::ExactBistatic) => exact_bistatic(scene, &t, range_m),
-        (Some(t), EfficiencyModel::MonteCarlo) => {
+    match (turbulence(scene), model(scene)) {
+        (Some(t), Model::ExactBistatic) => exact_bistatic(scene, &t, range_m),
+        (Some(t), Model::MonteCarlo) => {
             let [monostatic, _] = monte_carlo(scene, &t, range_m, observer)?;
             Ok(monostatic)
         }

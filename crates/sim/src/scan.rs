@@ -2,7 +2,7 @@
 
 use crate::geometry::Geometry;
 use crate::plan::{Plan, Stage};
-use crate::profile::{EfficiencyModel, efficiency_at, spaced};
+use crate::profile::{efficiency_at, model, spaced};
 use crate::progress::Observer;
 use crate::scene::{Scene, SnrReference};
 use crate::streams::stream;
@@ -10,15 +10,18 @@ use crate::{Error, join};
 use ndarray::Array2;
 use rayon::prelude::*;
 use wakescope_les::Wind;
+use wakescope_optics::plan::Model;
 use wakescope_signal::{LineOfSight, Scratch, Simulator};
 
-/// Points of the efficiency profile from which the layers take theirs: dense where it is a quadrature, few
+/// Ranges of the efficiency profile from which the layers take theirs, m: dense where it is a quadrature, few
 /// where each costs transforms and the errors of neighbours are alike.
-pub(crate) fn profile_points(scene: &Scene) -> usize {
-    match EfficiencyModel::of(scene) {
-        EfficiencyModel::FreeSpace | EfficiencyModel::ExactBistatic => 65,
-        EfficiencyModel::MonteCarlo => 9,
-    }
+pub(crate) fn profile_ranges_m(scene: &Scene, geometry: &Geometry) -> Vec<f64> {
+    let points = match model(scene) {
+        Model::FreeSpace | Model::ExactBistatic => 65,
+        Model::MonteCarlo => 9,
+    };
+    let last_m = geometry.first_layer_range_m + geometry.layers as f64 * geometry.layer_thickness_m;
+    spaced(geometry.first_layer_range_m, last_m, points)
 }
 
 /// The lines of sight of a scan, and what makes signals of them.
@@ -106,8 +109,7 @@ fn layer_weights(scene: &Scene, geometry: &Geometry, observer: &dyn Observer) ->
         return Ok(join::fixed_weights_per_m(scene, geometry, snr_db));
     }
     observer.begin(Stage::Efficiency, 1);
-    let last_m = geometry.first_layer_range_m + geometry.layers as f64 * geometry.layer_thickness_m;
-    let ranges_m = spaced(geometry.first_layer_range_m, last_m, profile_points(scene));
+    let ranges_m = profile_ranges_m(scene, geometry);
     let profile = efficiency_at(scene, &ranges_m, observer)?;
     observer.end();
     join::layer_weights_per_m(scene, geometry, &profile)

@@ -200,3 +200,23 @@ fn turbulence_gives_theory_and_monte_carlo_side_by_side() {
     let stage = json["stages"].as_array().unwrap().iter().find(|s| s["stage"] == "phase screens").unwrap().clone();
     assert_eq!(stage["runs"], false, "{stage}");
 }
+
+#[test]
+fn screens_that_cannot_resolve_the_scene_are_refused_before_the_run() {
+    let screens = |keys: &str| format!("[atmosphere.turbulence]\nkind = \"refractive\"\n{keys}");
+    for (keys, wanted) in [
+        ("cn2_m_m23 = 1e-13\ngrid_points = 16\n", "grid"),
+        ("cn2_m_m23 = 1e-12\n", "grid"),
+        ("spectrum = \"hill_andrews\"\ninner_scale_m = 0.0\n", "inner_scale_m"),
+    ] {
+        let message = refused(&screens(keys), &["check", "s.toml"]);
+        assert!(message.contains(wanted), "{wanted} is not in: {message}");
+    }
+    let temp = tempfile::tempdir().unwrap();
+    let check = |keys: &str| {
+        std::fs::write(temp.path().join("s.toml"), screens(keys)).unwrap();
+        String::from_utf8(wakescope(temp.path(), &["check", "s.toml"]).stdout).unwrap()
+    };
+    assert!(check("cn2_m_m23 = 1e-13\n").contains("atmosphere.turbulence.layers = "), "thick layers are warned of");
+    assert!(!check("cn2_m_m23 = 1e-13\nsampling = \"derived\"\n").contains("Rytov"));
+}

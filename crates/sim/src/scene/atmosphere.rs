@@ -39,15 +39,27 @@ section! {
         outer_scale_m: f64 = 1.0,
         /// Wave number of the outer scale.
         outer_scale_wavenumber: OuterScaleWavenumber = OuterScaleWavenumber::Inverse,
-        /// Points along each side of the phase screens.
+        /// Who chooses grid and layers of the phase screens.
+        sampling: ScreenSampling = ScreenSampling::Explicit,
+        /// Points along each side of the phase screens; not used with `sampling = "derived"`.
         grid_points: usize = 512,
-        /// Distance between points of the screens, m.
+        /// Distance between points of the screens, m; not used with `sampling = "derived"`.
         grid_spacing_m: f64 = 0.002,
-        /// Phase screens along the path.
+        /// Phase screens along the path; not used with `sampling = "derived"`.
         layers: usize = 10,
         /// Realisations of the path.
         realisations: usize = 400,
     }
+}
+
+/// Who chooses grid and layers of the phase screens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ScreenSampling {
+    /// The scene; what cannot be resolved is refused, what is doubtful is warned of.
+    Explicit,
+    /// The planner, from beam, turbulence and range.
+    Derived,
 }
 
 /// Shape of the refractive-index spectrum.

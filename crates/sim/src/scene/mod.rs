@@ -22,7 +22,9 @@ mod check;
 mod flow;
 mod read;
 
-pub use atmosphere::{Atmosphere, OuterScaleWavenumber, RefractiveTurbulence, SpectrumKind, Turbulence};
+pub use atmosphere::{
+    Atmosphere, OuterScaleWavenumber, RefractiveTurbulence, ScreenSampling, SpectrumKind, Turbulence,
+};
 pub use check::Problem;
 pub use flow::{Flow, VortexMotion, VortexPair, VortexProfile};
 pub use read::{Located, SceneError, SceneFile};
@@ -322,6 +324,20 @@ mod tests {
             keys
         };
         assert_eq!(flat(TABLE2_TOML), flat(&Scene::default().to_toml()));
+    }
+
+    #[test]
+    fn the_turbulence_keys_that_stand_as_comments_are_the_defaults() {
+        let commented: String = TABLE2_TOML
+            .lines()
+            .skip_while(|l| !l.starts_with("# kind = \"refractive\""))
+            .take_while(|l| l.starts_with("# "))
+            .map(|l| format!("{}\n", &l[2..]))
+            .collect();
+        let read: Turbulence = toml::from_str(&commented).unwrap();
+        assert_eq!(read, Turbulence::Refractive(RefractiveTurbulence::default()));
+        let keys = commented.lines().filter(|l| l.contains(" = ")).count();
+        assert_eq!(keys, toml::to_string(&read).unwrap().lines().count(), "each key is there");
     }
 
     #[test]
