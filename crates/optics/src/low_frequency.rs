@@ -12,7 +12,7 @@ use rand::Rng;
 use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
 
-/// A cell of the spectral plane: lower corner and size [rad/m].
+/// A cell of the spectral plane: lower corner and size \[rad/m\].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cell {
     pub(crate) corner_rad_m: [f64; 2],
@@ -28,7 +28,7 @@ pub(crate) struct LowFrequencies<T> {
     /// Lagrange polynomials of these points, sampled at the grid points along x and y.
     pub(crate) basis: [Vec<Vec<T>>; 2],
     spacing_m: [f64; 2],
-    /// Middle of the grid [m].
+    /// Middle of the grid \[m\].
     centre_m: [f64; 2],
 }
 
@@ -45,7 +45,7 @@ impl<T: Real> LowFrequencies<T> {
         Self { cells: cells(delta, levels(spectrum, delta, width)), point, basis, spacing_m, centre_m }
     }
 
-    /// Draws the waves and sums them at the Chebyshev points, which are the polynomial's coefficients. `[y][x]`.
+    /// Draws the waves and sums them at the Chebyshev points, which are the polynomial's coefficients. `[y]\[x\]`.
     pub(crate) fn draw(
         &self,
         spectrum: &dyn Spectrum,

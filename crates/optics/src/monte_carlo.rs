@@ -76,7 +76,7 @@ pub struct MonteCarlo {
     pub grid: Grid,
     /// Layers of the path, one screen each.
     pub layers: Layers,
-    /// Ranges at which the efficiency is wanted `[m]`, increasing, within the layers.
+    /// Ranges at which the efficiency is wanted `\[m\]`, increasing, within the layers.
     pub range_m: Vec<f64>,
     /// Transfer function of the steps.
     pub transfer: TransferKind,
@@ -134,7 +134,7 @@ impl MonteCarlo {
     /// The chapter's set-up: 512 x 512 points of 2 mm, 10 layers out to 3 km with a range at the end of each, Table 2.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a Cn2 [m^(-2/3)] that is not allowed.
+    /// [`Error::OutOfRange`] for a Cn2 \[m^(-2/3)\] that is not allowed.
     pub fn chapter(cn2_m_m23: f64, seed: u64) -> Result<Self, Error> {
         let layers = Layers::equal(10, 3000.0)?;
         Ok(Self {

@@ -13,9 +13,9 @@ use crate::{Error, Misalignment, Telescope, Turbulence};
 
 /// Largest Rytov variance (plane wave) of one layer.
 pub const LARGEST_LAYER_RYTOV: f64 = 0.1;
-/// CPU time of one f32 layer per point, transforms included [s]; f64 takes twice as long. Measured, one core of 2023.
+/// CPU time of one f32 layer per point, transforms included \[s\]; f64 takes twice as long. Measured, one core of 2023.
 const LAYER_S: f64 = 9e-9;
-/// CPU time of one f32 screen per point [s].
+/// CPU time of one f32 screen per point \[s\].
 const SCREEN_S: f64 = 9e-9;
 /// Largest number of points along an axis that a plan proposes.
 const LARGEST_POINTS: usize = 4096;
@@ -58,9 +58,9 @@ pub struct Plan {
     pub layers: Layers,
     /// Largest Rytov variance of a layer.
     pub layer_rytov_variance: f64,
-    /// Memory of a run with eight groups at a time in f32 `[bytes]`.
+    /// Memory of a run with eight groups at a time in f32 `\[bytes\]`.
     pub memory_bytes: usize,
-    /// CPU time of one realisation in f32 `[s]`, an estimate within a factor of two on current machines.
+    /// CPU time of one realisation in f32 `\[s\]`, an estimate within a factor of two on current machines.
     pub realisation_cpu_s: f64,
     /// What is allowed but deserves a word.
     pub warnings: Vec<Warning>,
@@ -113,7 +113,7 @@ fn enough_layers(cn2: &Cn2Path, wavelength_m: f64, range_m: f64) -> Result<usize
     Err(Error::Sampling { limit: "number of layers", needed: f64::INFINITY, available: MOST as f64 })
 }
 
-/// Width [m] and spacing [m] that the beam needs at `range_m` in this turbulence (Schmidt 2010).
+/// Width \[m\] and spacing \[m\] that the beam needs at `range_m` in this turbulence (Schmidt 2010).
 fn needs(telescope: &Telescope, misalignment: &Misalignment, cn2: &Cn2Path, range_m: f64) -> Result<(f64, f64), Error> {
     let lambda = telescope.wavelength_m;
     let reach = telescope.aperture_radius_m.min(3.0 * telescope.intensity_radius_m());
@@ -134,7 +134,7 @@ fn needs(telescope: &Telescope, misalignment: &Misalignment, cn2: &Cn2Path, rang
     Ok((width.max(2.5 * (telescope.aperture_radius_m + offset)), spacing))
 }
 
-/// Derives grid and layers for ranges `[m]` (increasing; layers end at the largest).
+/// Derives grid and layers for ranges `\[m\]` (increasing; layers end at the largest).
 ///
 /// # Errors
 /// [`Error::Sampling`] when more than 4096 points along an axis are needed; [`Error`] for a scene that is not allowed.

@@ -25,7 +25,7 @@ pub enum TransferKind {
 pub struct Transfer<T: Real> {
     x: Vec<Complex<T>>,
     y: Vec<Complex<T>>,
-    /// `[kx]\[ky\]`, in place of `x` and `y`.
+    /// `\[kx\]\[ky\]`, in place of `x` and `y`.
     full: Option<Vec<Complex<T>>>,
 }
 
@@ -115,7 +115,7 @@ impl<T: Real> Propagator<T> {
         })
     }
 
-    /// One step: field `[y]\[x\]` times exp(j scale screen), over the distance of `transfer`, times the absorbing border.
+    /// One step: field `\[y\]\[x\]` times exp(j scale screen), over the distance of `transfer`, times the absorbing border.
     /// Returns the power that is left, the integral of |E|^2 over the grid.
     ///
     /// # Errors

@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 /// light just below Nyquist does: 0 leaves the chapter's efficiency 0.2 % too small at 100 m, 1 makes it 0.3 % too large.
 const RESTORED: f64 = 0.4;
 
-/// Hankel transform of the aperture field, 2 pi integral of E(r) J0(kappa r) r dr [m], tabulated.
+/// Hankel transform of the aperture field, 2 pi integral of E(r) J0(kappa r) r dr \[m\], tabulated.
 struct Transform {
     step_rad_m: f64,
     value: Vec<f64>,
@@ -59,7 +59,7 @@ impl Transform {
     }
 }
 
-/// Field of the telescope on the grid, `[y][x]`, for unit power before truncation; `misalignment` displaces and tilts it.
+/// Field of the telescope on the grid, `[y]\[x\]`, for unit power before truncation; `misalignment` displaces and tilts it.
 pub(crate) fn aperture_field<T: Real>(
     telescope: &Telescope,
     misalignment: &Misalignment,
