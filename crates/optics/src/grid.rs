@@ -90,6 +90,7 @@ impl Grid {
 /// Buffers of [`Fft2`].
 pub(crate) struct FftScratch<T> {
     block: Vec<Complex<T>>,
+    spectrum: Vec<Complex<T>>,
     inner: Vec<Complex<T>>,
 }
 
@@ -117,6 +118,7 @@ impl<T: Real> Fft2<T> {
     pub(crate) fn scratch(&self) -> FftScratch<T> {
         FftScratch {
             block: vec![Complex::default(); ROWS * self.nx.max(self.ny)],
+            spectrum: vec![Complex::default(); ROWS * self.nx.max(self.ny)],
             inner: vec![Complex::default(); self.scratch],
         }
     }
@@ -133,18 +135,25 @@ impl<T: Real> Fft2<T> {
             let height = ROWS.min(count - first);
             let block = &mut block[..height * length];
             rows(first, block);
-            if height == ROWS {
-                for (i, column) in out.chunks_exact_mut(count).enumerate() {
-                    let target = &mut column[first..first + ROWS];
-                    for (b, value) in target.iter_mut().enumerate() {
-                        *value = block[b * length + i];
-                    }
+            Self::store_transposed(out, length, first, block);
+        }
+    }
+
+    /// Stores a block of rows of `length` points, of which the first is row `first`, as columns of `out`.
+    fn store_transposed(out: &mut [Complex<T>], length: usize, first: usize, block: &[Complex<T>]) {
+        let count = out.len() / length;
+        let height = block.len() / length;
+        if height == ROWS {
+            for (i, column) in out.chunks_exact_mut(count).enumerate() {
+                let target = &mut column[first..first + ROWS];
+                for (b, value) in target.iter_mut().enumerate() {
+                    *value = block[b * length + i];
                 }
-            } else {
-                for (i, column) in out.chunks_exact_mut(count).enumerate() {
-                    for b in 0..height {
-                        column[first + b] = block[b * length + i];
-                    }
+            }
+        } else {
+            for (i, column) in out.chunks_exact_mut(count).enumerate() {
+                for b in 0..height {
+                    column[first + b] = block[b * length + i];
                 }
             }
         }
@@ -158,7 +167,7 @@ impl<T: Real> Fft2<T> {
         scratch: &mut FftScratch<T>,
         mut before: impl FnMut(usize, &mut [Complex<T>]),
     ) {
-        let FftScratch { block, inner } = scratch;
+        let FftScratch { block, inner, .. } = scratch;
         Self::transposing(out, self.nx, block, |first, block| {
             let start = first * self.nx;
             block.copy_from_slice(&field[start..start + block.len()]);
@@ -176,7 +185,7 @@ impl<T: Real> Fft2<T> {
         scratch: &mut FftScratch<T>,
         mut middle: impl FnMut(usize, &mut [Complex<T>]),
     ) {
-        let FftScratch { block, inner } = scratch;
+        let FftScratch { block, inner, .. } = scratch;
         Self::transposing(out, self.ny, block, |first, block| {
             let start = first * self.ny;
             block.copy_from_slice(&field[start..start + block.len()]);
@@ -186,6 +195,31 @@ impl<T: Real> Fft2<T> {
         });
     }
 
+    /// As [`Fft2::filter_y`] with two filters of the same spectrum into two fields: one forward transform serves both.
+    pub(crate) fn filter_y_twice(
+        &self,
+        field: &[Complex<T>],
+        outs: [&mut [Complex<T>]; 2],
+        scratch: &mut FftScratch<T>,
+        mut middle: impl FnMut(usize, usize, &mut [Complex<T>]),
+    ) {
+        let FftScratch { block, spectrum, inner } = scratch;
+        let [first_out, second_out] = outs;
+        for (index, rows) in field.chunks(ROWS * self.ny).enumerate() {
+            let first = index * ROWS;
+            let spectrum = &mut spectrum[..rows.len()];
+            spectrum.copy_from_slice(rows);
+            self.forward[1].process_with_scratch(spectrum, &mut inner[..self.forward[1].get_inplace_scratch_len()]);
+            for (which, out) in [&mut *first_out, &mut *second_out].into_iter().enumerate() {
+                let block = &mut block[..rows.len()];
+                block.copy_from_slice(spectrum);
+                middle(which, first, block);
+                self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);
+                Self::store_transposed(out, self.ny, first, block);
+            }
+        }
+    }
+
     /// Rows `[kx]\[ky\]`: `fill` makes each block, inverse along y, transposed into `out` `[y]\[kx\]`.
     pub(crate) fn inverse_y(
         &self,
@@ -193,7 +227,7 @@ impl<T: Real> Fft2<T> {
         scratch: &mut FftScratch<T>,
         mut fill: impl FnMut(usize, &mut [Complex<T>]),
     ) {
-        let FftScratch { block, inner } = scratch;
+        let FftScratch { block, inner, .. } = scratch;
         Self::transposing(out, self.ny, block, |first, block| {
             fill(first, block);
             self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);

@@ -79,6 +79,8 @@ fn same(a: f64, b: f64) -> bool {
 pub(crate) enum Op {
     /// `times` steps with transfer function `transfer`; the screen of a layer, if any, before the first.
     Step { screen: Option<usize>, transfer: usize, times: usize },
+    /// A step that also leaves the field of output `output` on its way: transfer functions to the output and to the end.
+    Tap { screen: Option<usize>, transfers: [usize; 2], output: usize },
     /// The field is that at output `output`.
     Output { output: usize },
     /// From here to output `output` on a copy: step, the screen of `layer` times `weight`, step.
@@ -109,11 +111,7 @@ impl Compiler<'_> {
         let limit = self.grid.largest_step_m(self.wavelength_m);
         let times = (distance_m / limit - 1e-9).ceil().max(1.0) as usize;
         let piece = distance_m / times as f64;
-        let known = self.program.distance_m.iter().position(|&d| same(d, piece));
-        let index = known.unwrap_or_else(|| {
-            self.program.distance_m.push(piece);
-            self.program.distance_m.len() - 1
-        });
+        let index = self.program.transfer_index(piece);
         (index, times)
     }
 
@@ -151,7 +149,7 @@ impl Program {
                 c.advance(range_m[output]);
                 c.program.ops.push(Op::Output { output });
             }
-            return Ok(c.program);
+            return Ok(c.program.with_taps(grid.largest_step_m(wavelength_m)));
         }
         let k = 2.0 * std::f64::consts::PI / wavelength_m;
         let furthest = order.last().map_or(0.0, |&o| range_m[o]);
@@ -184,15 +182,50 @@ impl Program {
                 next += 1;
             }
         }
-        Ok(c.program)
+        Ok(c.program.with_taps(grid.largest_step_m(wavelength_m)))
+    }
+
+    /// Joins step, output, step into one step with a tap where one transfer function reaches.
+    fn with_taps(mut self, largest_step_m: f64) -> Self {
+        let mut ops: Vec<Op> = Vec::with_capacity(self.ops.len());
+        for op in std::mem::take(&mut self.ops) {
+            let joined = match (&ops[..], op) {
+                (
+                    [.., Op::Step { screen, transfer: first, times: 1 }, Op::Output { output }],
+                    Op::Step { screen: None, transfer: second, times: 1 },
+                ) => Some((*screen, *first, second, *output)),
+                _ => None,
+            };
+            match joined {
+                Some((screen, first, second, output))
+                    if self.distance_m[first] + self.distance_m[second] <= largest_step_m =>
+                {
+                    let end = self.transfer_index(self.distance_m[first] + self.distance_m[second]);
+                    ops.truncate(ops.len() - 2);
+                    ops.push(Op::Tap { screen, transfers: [first, end], output });
+                }
+                _ => ops.push(op),
+            }
+        }
+        self.ops = ops;
+        self
+    }
+
+    /// Index of the transfer function of a distance, new if need be.
+    fn transfer_index(&mut self, distance_m: f64) -> usize {
+        self.distance_m.iter().position(|&d| same(d, distance_m)).unwrap_or_else(|| {
+            self.distance_m.push(distance_m);
+            self.distance_m.len() - 1
+        })
     }
 
     /// Fourier transform pairs of one realisation.
-    pub(crate) fn transform_pairs(&self) -> usize {
+    pub(crate) fn transform_pairs(&self) -> f64 {
         let pairs = |op: &Op| match *op {
-            Op::Step { times, .. } => times,
-            Op::Branch { times, .. } => 2 * times,
-            Op::Output { .. } => 0,
+            Op::Step { times, .. } => times as f64,
+            Op::Tap { .. } => 1.5,
+            Op::Branch { times, .. } => 2.0 * times as f64,
+            Op::Output { .. } => 0.0,
         };
         self.ops.iter().map(pairs).sum()
     }
@@ -218,6 +251,11 @@ mod tests {
             for op in &p.ops {
                 match *op {
                     Op::Step { transfer, times, .. } => at += p.distance_m[transfer] * times as f64,
+                    Op::Tap { transfers, output, .. } => {
+                        assert!((at + p.distance_m[transfers[0]] - range_m[output]).abs() < 1e-9);
+                        at += p.distance_m[transfers[1]];
+                        seen += 1;
+                    }
                     Op::Output { output } => {
                         assert!((at - range_m[output]).abs() < 1e-9);
                         seen += 1;
@@ -240,7 +278,7 @@ mod tests {
         assert!(p.strength.is_empty());
         assert!(p.ops.iter().all(|op| !matches!(op, Op::Step { screen: Some(_), .. } | Op::Branch { .. })));
         // 3 km exceeds the limit of one step on this grid.
-        assert_eq!(p.transform_pairs(), 3);
+        assert_eq!(p.transform_pairs(), 3.0);
     }
 
     #[test]
@@ -252,6 +290,14 @@ mod tests {
             assert!((total / (1e-14 * range_m) - 1.0).abs() < 1e-12);
             assert!(screens.iter().all(|s| s.position_m < range_m));
         }
+    }
+
+    #[test]
+    fn outputs_at_layer_ends_cost_half_a_transform_pair() {
+        let layers = Layers::equal(10, 3000.0).unwrap();
+        let p = compile(&layers, layers.end_m(), &UNIFORM);
+        // First half step, nine layers with a tap, last half step.
+        assert_eq!(p.transform_pairs(), 1.0 + 9.0 * 1.5 + 1.0);
     }
 
     #[test]

@@ -232,7 +232,7 @@ pub fn examine(
         layer_rytov_variance: worst,
         memory_bytes: memory_bytes(grid, range_m.len(), beams),
         realisation_cpu_s: grid.points() as f64
-            * (LAYER_S * (program.transform_pairs() * beams) as f64 + SCREEN_S * program.strength.len() as f64),
+            * (LAYER_S * program.transform_pairs() * beams as f64 + SCREEN_S * program.strength.len() as f64),
         warnings,
     })
 }
@@ -248,7 +248,7 @@ fn missing_at_one_spacing(turbulence: &Turbulence, grid: &Grid) -> Result<f64, E
 fn memory_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
     let points = grid.points();
     let complex = 8 * points;
-    let per_group = complex * (2 * beams + 2) + 4 * 4 * points;
+    let per_group = complex * (4 * beams + 2) + 4 * 4 * points;
     let plane = if beams == 1 { (grid.nx / 2 + 1) * (grid.ny / 2 + 1) } else { points };
     8 * (per_group + 4 * plane * beams * (ranges + 4)) + (12 + complex / points) * points
 }

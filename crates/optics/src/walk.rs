@@ -25,6 +25,8 @@ pub(crate) struct Walker<'a, T: Real> {
 /// One realisation under way: its fields (transmitted beam, and BPLO if displaced) and its two screens at hand.
 struct Lane<T: Real> {
     fields: Vec<Vec<Complex<T>>>,
+    /// Fields that a tap leaves.
+    taps: Vec<Vec<Complex<T>>>,
     power: Vec<f64>,
     screens: [Vec<T>; 2],
     /// Synthesis that filled `screens`.
@@ -51,6 +53,7 @@ impl<'a, T: Real> Walker<'a, T> {
         let lanes = (0..count)
             .map(|_| Lane {
                 fields: prepared.start.clone(),
+                taps: prepared.start.clone(),
                 power: vec![prepared.power; prepared.start.len()],
                 screens: [empty(), empty()],
                 synthesis: None,
@@ -156,6 +159,18 @@ impl<'a, T: Real> Walker<'a, T> {
                 }
                 Ok(None)
             }
+            Op::Tap { screen, transfers, output } => {
+                let mut kept = Vec::with_capacity(active);
+                for lane in 0..active {
+                    kept.push(self.tap(lane, screen, transfers)?);
+                }
+                let (marks, product) = self.measure(output, active);
+                for (state, power) in self.lanes.iter_mut().zip(kept) {
+                    std::mem::swap(&mut state.fields, &mut state.taps);
+                    state.power = power;
+                }
+                Ok(Some((output, marks, product)))
+            }
             Op::Output { output } => {
                 let (marks, product) = self.measure(output, active);
                 Ok(Some((output, marks, product)))
@@ -164,6 +179,27 @@ impl<'a, T: Real> Walker<'a, T> {
                 self.branch(layer, weight, transfer, times, output, active).map(Some)
             }
         }
+    }
+
+    /// A step of one lane with a tap, after which the tapped fields stand in the place of the fields; the powers at the end.
+    fn tap(&mut self, lane: usize, screen: Option<usize>, transfers: [usize; 2]) -> Result<Vec<f64>, Error> {
+        if let Some(layer) = screen {
+            self.fetch_screen(lane, layer)?;
+        }
+        let state = &mut self.lanes[lane];
+        let mut ends = Vec::with_capacity(state.fields.len());
+        let steps = transfers.map(|t| &self.prepared.transfers[t]);
+        for ((field, tap), power) in state.fields.iter_mut().zip(&mut state.taps).zip(&mut state.power) {
+            let phase = screen.map(|layer| {
+                let strength = state.sign * self.prepared.program.strength[layer];
+                (state.screens[layer % 2].as_slice(), T::of(strength))
+            });
+            let [at_tap, at_end] = self.prepared.propagator.step_with_tap(field, tap, phase, steps, &mut self.work)?;
+            *power = at_tap;
+            ends.push(at_end);
+        }
+        std::mem::swap(&mut state.fields, &mut state.taps);
+        Ok(ends)
     }
 
     /// To an output inside a layer, and back to where it began.

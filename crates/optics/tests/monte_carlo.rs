@@ -7,7 +7,7 @@ use wakescope_optics::structure::StructureTable;
 use wakescope_optics::theory::{bistatic_efficiency_screens, free_space_efficiency};
 use wakescope_optics::{
     Cn2Path, EfficiencyEstimate, Error, Focus, Grid, Layers, Misalignment, MonteCarlo, OuterScaleConvention, Progress,
-    Real, Sampling, Stop, Telescope, Turbulence, VonKarman,
+    Sampling, Stop, Telescope, Turbulence, VonKarman,
 };
 
 fn go(_: Progress) -> ControlFlow<()> {
@@ -199,7 +199,7 @@ fn odd_and_rectangular_grids_agree_with_exact_theory() {
 #[cfg(feature = "rayon")]
 #[test]
 fn result_has_the_same_bits_for_one_two_and_eight_threads() {
-    fn with_threads<T: Real>(threads: usize, sampling: Sampling) -> EfficiencyEstimate {
+    fn with_threads<T: wakescope_optics::Real>(threads: usize, sampling: Sampling) -> EfficiencyEstimate {
         let mut run = coarse(1e-13, 8);
         run.grid = Grid::square(128, 4e-3).expect("grid");
         run.range_m = vec![200.0, 600.0];
