@@ -77,8 +77,8 @@ const QUANTITIES: [&str; 26] = [
     "position",
 ];
 
-/// What a name with a unit ends with.
-const UNITS: [&str; 31] = [
+/// What a name with a unit ends with; a fraction has none.
+const UNITS: [&str; 32] = [
     "_m",
     "_s",
     "_hz",
@@ -109,13 +109,15 @@ const UNITS: [&str; 31] = [
     "_m_s2",
     "_a2_hz",
     "_per_hz",
+    "_fraction",
     "_per_sqrt_s",
 ];
 
 /// Public numbers that name a quantity but have no unit of the SI: the path begins with the first word.
-const WITHOUT_UNIT: [(&str, &str); 2] = [
+const WITHOUT_UNIT: [(&str, &str); 3] = [
     // In the square of whatever unit the caller's samples have.
     ("crates/estimate/src/velocity.rs", "power"),
+    ("crates/estimate/src/autoregressive.rs", "noise_power"),
     // In drawing units.
     ("crates/sim/src/plot/", "width"),
 ];

@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             mono.mean[i],
             mono.standard_error[i],
             (bi - exact) / bi_error,
-            estimate.lost_power[i],
+            estimate.lost_power_fraction[i],
         );
     }
     Ok(())

@@ -103,7 +103,7 @@ pub struct EfficiencyEstimate {
     pub exact_free_space: Vec<f64>,
     /// Mean fraction of the power that the absorbing border took before each range. Above 0.01 the result is doubtful;
     /// above 0.05 it is refused.
-    pub lost_power: Vec<f64>,
+    pub lost_power_fraction: Vec<f64>,
 }
 
 /// Sums of one group.
@@ -274,14 +274,14 @@ impl MonteCarlo {
             .iter()
             .map(|&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r))
             .collect::<Result<Vec<_>, _>>()?;
-        let mut lost_power = Vec::new();
+        let mut lost_power_fraction = Vec::new();
         let (mut mono, mut bi) = (Columns::default(), Columns::default());
         for (i, samples) in sums.samples.iter().enumerate() {
             let (fraction, _) = mean_and_variance(samples.iter().map(|s| s.lost));
             if fraction.is_nan() || fraction > 0.05 {
                 return Err(Error::PowerLost { range_m: self.range_m[i], fraction });
             }
-            lost_power.push(fraction);
+            lost_power_fraction.push(fraction);
             let factor = if self.correct_grid { exact_free_space[i] / grid_free_space[i] } else { 1.0 };
             if prepared.screens.is_none() {
                 mono.push(factor * grid_free_space[i], 0.0, 0.0);
@@ -307,7 +307,7 @@ impl MonteCarlo {
             realisations: if prepared.screens.is_some() { realisations } else { 1 },
             grid_free_space,
             exact_free_space,
-            lost_power,
+            lost_power_fraction,
         })
     }
 }

@@ -68,7 +68,7 @@ fn branches_profiles_and_displaced_beams_agree_with_exact_theory() {
     let z = bistatic_z(&run, &estimate);
     assert!(z.iter().all(|z| z.abs() < 3.2), "{z:?}");
     // Different beams: the same-path value may fall below, but not by much of its error.
-    assert!(estimate.lost_power.iter().all(|&l| l < 0.01));
+    assert!(estimate.lost_power_fraction.iter().all(|&l| l < 0.01));
 }
 
 #[test]

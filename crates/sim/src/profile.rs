@@ -42,6 +42,9 @@ pub struct RangeProfile {
     pub snr_db: Vec<f64>,
     /// The other models side by side, by the name of their column; empty without turbulence.
     pub others: Vec<(&'static str, EfficiencyProfile)>,
+    /// Largest mean fraction of the power that the absorbing border of the phase screens took; above 0.01 the
+    /// Monte Carlo is doubtful. `None` without one.
+    pub lost_power_fraction: Option<f64>,
 }
 
 /// The profile that the scene's outputs ask for: with turbulence, theory and Monte Carlo side by side.
@@ -53,11 +56,13 @@ pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProf
     let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
     let model = self::model(scene);
     let mut others = Vec::new();
+    let mut lost_power_fraction = None;
     let efficiency = match turbulence(scene) {
         None => free_space(scene, &range_m)?,
         Some(t) => {
             let exact = exact_bistatic(scene, &t, &range_m)?;
-            let [monostatic, bistatic] = monte_carlo(scene, &t, &range_m, observer)?;
+            let ([monostatic, bistatic], lost) = monte_carlo(scene, &t, &range_m, observer)?;
+            lost_power_fraction = Some(lost);
             others.push(("efficiency_free_space", free_space(scene, &range_m)?));
             others.push(("efficiency_bistatic_exact", exact.clone()));
             others.push(("efficiency_monostatic_monte_carlo", monostatic.clone()));
@@ -75,7 +80,7 @@ pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProf
             _ => Ok(10.0 * snr.snr(range_m, mean)?.log10()),
         })
         .collect::<Result<_, Error>>()?;
-    Ok(RangeProfile { model, efficiency, snr_db, others })
+    Ok(RangeProfile { model, efficiency, snr_db, others, lost_power_fraction })
 }
 
 /// The efficiency at given ranges, m, increasing, by the cheapest model that is valid.
@@ -86,7 +91,7 @@ pub fn efficiency_at(scene: &Scene, range_m: &[f64], observer: &dyn Observer) ->
     match (turbulence(scene), model(scene)) {
         (Some(t), Model::ExactBistatic) => exact_bistatic(scene, &t, range_m),
         (Some(t), Model::MonteCarlo) => {
-            let [monostatic, _] = monte_carlo(scene, &t, range_m, observer)?;
+            let ([monostatic, _], _) = monte_carlo(scene, &t, range_m, observer)?;
             Ok(monostatic)
         }
         _ => free_space(scene, range_m),
@@ -107,13 +112,14 @@ fn exact_bistatic(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> R
     })?)
 }
 
-/// Monostatic and bistatic efficiency by phase screens, from one set of realisations.
+/// Monostatic and bistatic efficiency by phase screens, from one set of realisations, and the largest mean fraction
+/// of the power that the border of the grid took.
 fn monte_carlo(
     scene: &Scene,
     t: &RefractiveTurbulence,
     range_m: &[f64],
     observer: &dyn Observer,
-) -> Result<[EfficiencyProfile; 2], Error> {
+) -> Result<([EfficiencyProfile; 2], f64), Error> {
     observer.begin(Stage::PhaseScreens, t.realisations as u64);
     let mut seen = 0;
     // Single precision: its rounding is far below the error of any number of realisations.
@@ -126,7 +132,8 @@ fn monte_carlo(
     // A checked scene has at least two realisations, and so pairs of them.
     let bistatic =
         estimate.bistatic.ok_or(wakescope_optics::Error::Length { field: "realisations", found: 1, expected: 2 })?;
-    Ok([estimate.monostatic, bistatic])
+    let lost = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
+    Ok(([estimate.monostatic, bistatic], lost))
 }
 
 /// `points` values from `low` to `high`, both included.

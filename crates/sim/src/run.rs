@@ -75,6 +75,9 @@ impl RunResult {
             line("profile_range_m", "middle of the profile [m]", p.efficiency.range_m[middle]);
             line("efficiency", "efficiency there", p.efficiency.mean[middle]);
             line("snr_db", "signal-to-noise ratio there [dB]", p.snr_db[middle]);
+            if let Some(fraction) = p.lost_power_fraction {
+                line("lost_power_fraction", "power lost at the screens' border (< 0.01)", fraction);
+            }
         }
         if let Some(a) = &self.signals_a {
             line("signal_rms_a", "rms of the raw signals [A]", (a.mapv(|x| x * x).sum() / a.len() as f64).sqrt());
