@@ -51,6 +51,11 @@ pub(crate) struct Cost {
     peak_mem_bytes: f64,
 }
 
+impl Cost {
+    /// Of what was not timed.
+    pub(crate) const NONE: Self = Self { cpu_s: f64::NAN, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
+}
+
 /// Runs a piece of work and measures it.
 pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
     let (cpu_s, start) = (cpu_s(), Instant::now());

@@ -5,14 +5,16 @@ use crate::Failure;
 use std::ops::ControlFlow;
 use wakescope_optics::structure::{StructureTable, structure_function_m53};
 use wakescope_optics::{
-    EfficiencyEstimate, Grid, Layers, Misalignment, MonteCarlo, Sampling, Stop, Telescope, Turbulence, VonKarman,
-    hankel, screen::ScreenGenerator, theory,
+    EfficiencyEstimate, Grid, Layers, Misalignment, MonteCarlo, Sampling, Spectrum, Stop, Telescope, Turbulence,
+    VonKarman, hankel, screen::ScreenGenerator, theory,
 };
 
 pub(super) const SEED: u64 = 1;
 /// Strong turbulence at a range where the Monte Carlo is needed.
 const CN2_M_M23: f64 = 1e-13;
 const RANGE_M: f64 = 1000.0;
+/// Spacing of the chapter's screens.
+const SPACING_M: f64 = 2e-3;
 
 /// All measurements; `effort` multiplies the numbers of realisations.
 pub(super) fn rows(effort: usize) -> Result<Vec<Row>, Failure> {
@@ -106,36 +108,68 @@ fn grids() -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
-/// Expected structure function of the screens against theory: the worst from 2 dx to half the grid.
+/// Expected structure function of the screens against theory, beside plain Fourier synthesis and Lane's subharmonics:
+/// the worst from 2 dx to half the grid.
 fn screens() -> Result<Vec<Row>, Failure> {
     let spectrum = VonKarman::chapter();
+    let words = ["expected structure function, relative, worst", "quadrature of the spectrum"];
     let mut rows = Vec::new();
     for points in [256, 512, 1024] {
-        let grid = Grid::square(points, 2e-3)?;
+        let grid = Grid::square(points, SPACING_M)?;
         let generator = ScreenGenerator::<f32>::new(grid, std::sync::Arc::new(spectrum))?;
         let mut work = generator.work();
         let mut pair = [vec![0.0f32; points * points], vec![0.0f32; points * points]];
         let [first, second] = &mut pair;
         let mut rng = wakescope_optics::screen::stream(SEED, 0, 0);
         let (_, cost) = measured(|| Ok(generator.fill_pair(&mut rng, &mut work, first, second)?))?;
-        let mut worst: f64 = 0.0;
-        let mut steps = 2;
-        while steps <= points / 2 {
-            let theory = structure_function_m53(&spectrum, steps as f64 * 2e-3)?;
-            worst = worst.max((generator.expected_structure_m53(steps, 0) / theory - 1.0).abs());
-            steps *= 2;
-        }
-        let words = ["expected structure function, relative, worst", "quadrature of the spectrum"];
+        let own = worst_error(&spectrum, points, |steps| generator.expected_structure_m53(steps, 0))?;
         rows.push(row(
             "screens (a pair)",
             "random shift and subharmonics",
             "points",
-            (points as f64, worst),
+            (points as f64, own),
             words,
             cost,
         ));
+        for (method, levels) in [("plain synthesis (no cost taken)", 0), ("3 levels of Lane (no cost taken)", 3)] {
+            // Only the expectation is computed: these screens are not part of the crate.
+            let (error, _) = measured(|| {
+                worst_error(&spectrum, points, |steps| {
+                    expected_lane_m53(&spectrum, points, levels, steps as f64 * SPACING_M)
+                })
+            })?;
+            rows.push(row("screens (a pair)", method, "points", (points as f64, error), words, Cost::NONE));
+        }
     }
     Ok(rows)
+}
+
+/// Largest relative error of a structure function from 2 dx to half the grid.
+fn worst_error(spectrum: &VonKarman, points: usize, expected_m53: impl Fn(usize) -> f64) -> Result<f64, Failure> {
+    let mut worst: f64 = 0.0;
+    let mut steps = 2;
+    while steps <= points / 2 {
+        let theory_m53 = structure_function_m53(spectrum, steps as f64 * SPACING_M)?;
+        worst = worst.max((expected_m53(steps) / theory_m53 - 1.0).abs());
+        steps *= 2;
+    }
+    Ok(worst)
+}
+
+/// Expected structure function of Fourier synthesis on a square grid with `levels` of Lane's 3 x 3 subharmonics (Lane
+/// et al. 1992), per unit k^2 Cn2 dz: 4 pi times the sum over the frequencies of Phi_n dkappa^2 (1 - cos(kappa_x r)).
+fn expected_lane_m53(spectrum: &VonKarman, points: usize, levels: i32, separation_m: f64) -> f64 {
+    let step_rad_m = 2.0 * std::f64::consts::PI / (points as f64 * SPACING_M);
+    let cells = |half: i32, cell_rad_m: f64| -> f64 {
+        let mut sum = 0.0;
+        for (i, j) in (-half..=half).flat_map(|i| (-half..=half).map(move |j| (i, j))).filter(|c| *c != (0, 0)) {
+            let (x, y) = (f64::from(i) * cell_rad_m, f64::from(j) * cell_rad_m);
+            sum += spectrum.density_per_cn2(x.hypot(y)) * cell_rad_m * cell_rad_m * (1.0 - (x * separation_m).cos());
+        }
+        sum
+    };
+    let subharmonics: f64 = (1..=levels).map(|level| cells(1, step_rad_m / 3f64.powi(level))).sum();
+    4.0 * std::f64::consts::PI * (cells(points as i32 / 2 - 1, step_rad_m) + subharmonics)
 }
 
 /// Standard errors of the monostatic efficiency against the work, for each way of drawing.
