@@ -1,6 +1,6 @@
 //! The transverse grid and its two-dimensional Fourier transform with one transpose.
 //!
-//! Fields are row-major, `[y]\[x\]`; spectra and the transposed fields `[x]\[y\]`. A transform of the rows followed by a
+//! Fields are row-major, `[y][x]`; spectra and the transposed fields `[x][y]`. A transform of the rows followed by a
 //! transposed store leaves the other axis contiguous, so that a forward and an inverse transform cost two transposes
 //! together. Check: against the direct sum, for odd and prime sizes too.
 
@@ -159,7 +159,7 @@ impl<T: Real> Fft2<T> {
         }
     }
 
-    /// Rows `[y]\[x\]`: `before` each block, forward transform along x, transposed into `out` `[kx]\[y\]`.
+    /// Rows `[y][x]`: `before` each block, forward transform along x, transposed into `out` `[kx][y]`.
     pub(crate) fn forward_x(
         &self,
         field: &[Complex<T>],
@@ -176,7 +176,7 @@ impl<T: Real> Fft2<T> {
         });
     }
 
-    /// Rows `[kx]\[y\]`: forward along y, `middle` on the spectrum `[kx]\[ky\]` of each block, inverse along y, transposed
+    /// Rows `[kx][y]`: forward along y, `middle` on the spectrum `[kx][ky]` of each block, inverse along y, transposed
     /// into `out` `[y]\[kx\]`.
     pub(crate) fn filter_y(
         &self,
@@ -220,7 +220,7 @@ impl<T: Real> Fft2<T> {
         }
     }
 
-    /// Rows `[kx]\[ky\]`: `fill` makes each block, inverse along y, transposed into `out` `[y]\[kx\]`.
+    /// Rows `[kx][ky]`: `fill` makes each block, inverse along y, transposed into `out` `[y]\[kx\]`.
     pub(crate) fn inverse_y(
         &self,
         out: &mut [Complex<T>],

@@ -76,7 +76,8 @@ pub struct MonteCarlo {
     pub grid: Grid,
     /// Layers of the path, one screen each.
     pub layers: Layers,
-    /// Ranges at which the efficiency is wanted `\[m\]`, increasing, within the layers.
+    /// Ranges at which the efficiency is wanted \[m\], in any order, within the layers; results come in increasing
+    /// order, each range once.
     pub range_m: Vec<f64>,
     /// Transfer function of the steps.
     pub transfer: TransferKind,
@@ -104,6 +105,14 @@ pub struct EfficiencyEstimate {
     /// Mean fraction of the power that the absorbing border took before each range. Above 0.01 the result is doubtful;
     /// above 0.05 it is refused.
     pub lost_power_fraction: Vec<f64>,
+}
+
+impl EfficiencyEstimate {
+    /// Ranges \[m\] at which the absorbing border took more than 0.01 of the power: the grid is too narrow to be trusted.
+    pub fn doubtful_range_m(&self) -> Vec<f64> {
+        let doubtful = |pair: &(&f64, &f64)| *pair.1 > 0.01;
+        self.monostatic.range_m.iter().zip(&self.lost_power_fraction).filter(doubtful).map(|(&r, _)| r).collect()
+    }
 }
 
 /// Sums of one group.
@@ -162,8 +171,9 @@ impl MonteCarlo {
         stop: Stop,
         mut progress: impl FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<EfficiencyEstimate, Error> {
-        let prepared = self.prepare::<T>()?;
-        self.run_prepared(&prepared, stop, &mut progress)
+        let set_up = self.in_order();
+        let prepared = set_up.prepare::<T>()?;
+        set_up.run_prepared(&prepared, stop, &mut progress)
     }
 
     /// Mean irradiance overlap without turbulence on this very grid, at each range: the grid's free-space efficiency.
@@ -171,10 +181,18 @@ impl MonteCarlo {
     /// # Errors
     /// As [`MonteCarlo::run`].
     pub fn grid_free_space<T: Real>(&self) -> Result<Vec<f64>, Error> {
-        let calm = Self { turbulence: Turbulence::none(), ..self.clone() };
+        let calm = Self { turbulence: Turbulence::none(), ..self.in_order() };
         let prepared = calm.prepare::<T>()?;
         let sums = Walker::new(&prepared, calm.seed, calm.sampling).group(0, 1)?;
         Ok(sums.samples.iter().map(|s| s[0].same_path).collect())
+    }
+
+    /// The same run with its ranges in increasing order; one that is not a number is refused later, by name.
+    fn in_order(&self) -> Self {
+        let mut range_m = self.range_m.clone();
+        range_m.sort_by(f64::total_cmp);
+        range_m.dedup();
+        Self { range_m, ..self.clone() }
     }
 
     pub(crate) fn prepare<T: Real>(&self) -> Result<Prepared<T>, Error> {

@@ -58,9 +58,9 @@ pub struct Plan {
     pub layers: Layers,
     /// Largest Rytov variance of a layer.
     pub layer_rytov_variance: f64,
-    /// Memory of a run with eight groups at a time in f32 `\[bytes\]`.
+    /// Memory of a run with eight groups at a time in f32 \[bytes\].
     pub memory_bytes: usize,
-    /// CPU time of one realisation in f32 `\[s\]`, an estimate within a factor of two on current machines.
+    /// CPU time of one realisation in f32 \[s\], an estimate within a factor of two on current machines.
     pub realisation_cpu_s: f64,
     /// What is allowed but deserves a word.
     pub warnings: Vec<Warning>,
@@ -134,7 +134,7 @@ fn needs(telescope: &Telescope, misalignment: &Misalignment, cn2: &Cn2Path, rang
     Ok((width.max(2.5 * (telescope.aperture_radius_m + offset)), spacing))
 }
 
-/// Derives grid and layers for ranges `\[m\]` (increasing; layers end at the largest).
+/// Derives grid and layers for ranges \[m\] (increasing; layers end at the largest).
 ///
 /// # Errors
 /// [`Error::Sampling`] when more than 4096 points along an axis are needed; [`Error`] for a scene that is not allowed.

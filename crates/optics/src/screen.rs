@@ -32,9 +32,9 @@ pub struct ScreenGenerator<T: Real> {
     grid: Grid,
     spectrum: Arc<dyn Spectrum>,
     fft: Fft2<T>,
-    /// Amplitude of each frequency, `[kx]\[ky\]`.
+    /// Amplitude of each frequency, `[kx][ky]`.
     amplitude: Vec<T>,
-    /// Folded part of the spectrum per cell for the exact frequencies, `[kx]\[ky\]`.
+    /// Folded part of the spectrum per cell for the exact frequencies, `[kx][ky]`.
     folded: Vec<f64>,
     low: LowFrequencies<T>,
     delta_rad_m: [f64; 2],
@@ -193,7 +193,7 @@ impl<T: Real> ScreenGenerator<T> {
         }
     }
 
-    /// Draws two independent screens (unit k^2 Cn2 dz, `[y]\[x\]`, rad) from one synthesis.
+    /// Draws two independent screens (unit k^2 Cn2 dz, `[y][x]`, rad) from one synthesis.
     ///
     /// # Errors
     /// [`Error::Length`] when a screen has not the size of the grid.

@@ -59,7 +59,7 @@ impl Transform {
     }
 }
 
-/// Field of the telescope on the grid, `[y]\[x\]`, for unit power before truncation; `misalignment` displaces and tilts it.
+/// Field of the telescope on the grid, `[y][x]`, for unit power before truncation; `misalignment` displaces and tilts it.
 pub(crate) fn aperture_field<T: Real>(
     telescope: &Telescope,
     misalignment: &Misalignment,

@@ -241,3 +241,21 @@ fn beam_that_leaves_the_grid_is_refused() {
     assert!(matches!(run.run::<f32>(Stop::after(8), go), Err(Error::PowerLost { .. } | Error::Sampling { .. })));
     assert!(Turbulence::chapter(-1.0).is_err());
 }
+
+#[test]
+fn ranges_may_be_listed_in_any_order() {
+    let sorted = MonteCarlo { range_m: vec![300.0, 700.0, 900.0], ..coarse(1e-14, 3) };
+    let mixed = MonteCarlo { range_m: vec![900.0, 300.0, 700.0, 300.0], ..coarse(1e-14, 3) };
+    let run = |set_up: &MonteCarlo| set_up.run::<f32>(Stop::after(4), go).expect("run");
+    assert_eq!(run(&mixed), run(&sorted));
+    let bad = MonteCarlo { range_m: vec![900.0, f64::NAN], ..coarse(1e-14, 3) };
+    assert!(bad.run::<f32>(Stop::after(4), go).is_err());
+}
+
+#[test]
+fn power_lost_at_the_border_is_flagged_above_one_per_cent() {
+    let mut estimate = coarse(0.0, 1).run::<f32>(Stop::after(1), go).expect("run");
+    assert!(estimate.doubtful_range_m().is_empty(), "{:?}", estimate.lost_power_fraction);
+    estimate.lost_power_fraction[4] = 0.011;
+    assert_eq!(estimate.doubtful_range_m(), [estimate.monostatic.range_m[4]]);
+}
