@@ -193,7 +193,9 @@ impl<T: Real> ScreenGenerator<T> {
         }
     }
 
-    /// Draws two independent screens (unit k^2 Cn2 dz, `[y][x]`, rad) from one synthesis.
+    /// Draws two uncorrelated screens (unit k^2 Cn2 dz, `[y][x]`, rad) from one synthesis.
+    ///
+    /// They share the random shift of the frequencies: given that, they are independent.
     ///
     /// # Errors
     /// [`Error::Length`] when a screen has not the size of the grid.

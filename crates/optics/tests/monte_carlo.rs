@@ -103,7 +103,7 @@ fn infinite_outer_scale_agrees_with_exact_theory() {
 }
 
 #[test]
-fn antithetic_paths_are_unbiased_and_worth_more_than_twice_their_number() {
+fn antithetic_paths_are_unbiased_and_worth_half_as_many_again() {
     let mut run = coarse(1e-13, 77);
     run.layers = Layers::equal(4, 1000.0).expect("layers");
     run.range_m = vec![500.0, 1000.0];
