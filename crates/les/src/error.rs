@@ -42,6 +42,18 @@ pub enum Error {
         /// Its coordinate.
         value_m: f64,
     },
+    /// A direction of the flow's mesh that the schemes cannot take.
+    #[error("{axis} direction: {what} = {value}: must be {allowed}")]
+    BadDirection {
+        /// `"x"`, `"y"` or `"z"`.
+        axis: &'static str,
+        /// What is wrong.
+        what: &'static str,
+        /// The value found.
+        value: f64,
+        /// The values that are allowed, in words.
+        allowed: &'static str,
+    },
     /// Two neighbouring cells differ so much that the index coordinate is not monotone between them.
     #[error(
         "the cells beside node {index} of the {axis} axis differ by a factor {ratio}: at most {allowed} is allowed"

@@ -42,6 +42,7 @@ mod error;
 mod grid_wind;
 mod kernel;
 mod profile;
+mod solver;
 mod vortex;
 mod wind;
 
@@ -51,5 +52,6 @@ pub use error::Error;
 pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
 pub use kernel::{m4_prime, m4_prime_weights};
 pub use profile::CirculationProfile;
+pub use solver::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};
 pub use wind::{Calm, Sum, Uniform, Wind};

@@ -1,0 +1,312 @@
+//! Convection along one direction, in skew-symmetric form: it makes no energy, and no momentum where the flow is
+//! divergence-free, stretched meshes and walls included.
+//!
+//! The weighted convection of `q` by the fluxes `F_n` through the faces `n` is `sum_n F_n S^n q` with skew matrices `S^n`. With
+//! `d^n` the weighted divergence that a unit flux through face `n` makes at the points of `q`, the rows satisfy `S^n 1 = d^n/2`:
+//! then the divergence form `S^n + diag(d^n)/2` and this one agree for divergence-free fluxes, constants are convected
+//! exactly, and energy is conserved whatever the divergence. Inside the flow this is the scheme of Vasilyev (2000).
+//!
+//! - `q` at the centres (velocities along the wall): pairs `(n-1, n)` with 9/16 and `(n-2, n+1)` with -1/48.
+//! - `q` at the faces (velocity normal to the wall): pairs of faces about each cell, times the fourth-order mean of the flux.
+//!
+//! At a no-slip wall both are closed so that the rows match the summation-by-parts divergence.
+//!
+//! Check: skewness, row sums, exactness for parabolas, mirror symmetry of the two walls.
+
+use super::line::{Line, Taps, resolve_cell, resolve_face};
+
+/// Weights of the pairs at distance 1 and 3.
+pub(crate) const PAIR: [f64; 2] = [9.0 / 16.0, -1.0 / 48.0];
+/// Fourth-order mean of four neighbours.
+pub(crate) const MEAN: [f64; 4] = [-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0];
+
+/// One product of a flux and a value: face of the flux, index of the value, coefficient.
+pub(crate) type Product = (usize, usize, f64);
+
+/// Transport of the values of one kind along one direction.
+#[derive(Debug, Clone)]
+pub(crate) struct Transport {
+    /// For each row the products; rows inside `regular` may be computed by the formula of the interior.
+    pub(crate) rows: Vec<Vec<Product>>,
+    /// Rows to which the interior's formula applies within the stored values, without wrapping or mirroring.
+    pub(crate) regular: std::ops::Range<usize>,
+}
+
+/// Rows of the normal velocity that a no-slip wall changes.
+const WALL_ROWS: usize = 7;
+
+/// Extra products of flux 3 on the cells 0, 1, 2 at a no-slip wall (the upper triangle; the lower is its negative).
+const WALL_PAIRS: [(usize, usize, f64); 3] = [(0, 1, -1.0 / 48.0), (0, 2, 1.0 / 36.0), (1, 2, -1.0 / 24.0)];
+
+/// Mean of the weighted fluxes along the wall at the faces 1 to 4: coefficients of the cells 0 to 5.
+#[rustfmt::skip]
+const WALL_MEAN: [[f64; 6]; 4] = [
+    [0.551_682_692_307_692_4, 0.5625, 0.03375, 0.0, 0.0, 0.0],
+    [-0.029_446_363_690_511_63, 0.572_914_805_328_885_95, 0.569_375_781_761_867_87, -0.0625, 0.0, 0.0],
+    [0.003_805_338_049_485_998_3, -0.072_914_805_328_885_959, 0.523_957_551_571_465_51, 0.5625, -0.0625, 0.0],
+    [0.0, 0.0, -0.06, 0.5625, 0.5625, -0.0625],
+];
+
+/// Upper triangles of `S^1` to `S^4` at a no-slip wall for the normal velocity at the faces.
+#[rustfmt::skip]
+const WALL_SKEW: [&[(usize, usize, f64)]; 4] = [
+    &[(0, 1, 0.313_476_562_5), (0, 3, -3.0 / 256.0), (1, 2, 0.306_089_743_589_743_56), (1, 4, 1.0 / 768.0),
+      (2, 3, -0.032_738_413_983_667_558), (3, 4, -1.0 / 768.0)],
+    &[(0, 1, 0.003_016_493_055_555_5), (0, 3, -3.0 / 256.0), (0, 4, 0.001_406_25), (1, 2, 81.0 / 256.0),
+      (1, 3, -0.015_742_521_367_521_349), (1, 4, -3.0 / 256.0), (2, 3, 81.0 / 256.0), (2, 5, 1.0 / 768.0), (3, 4, -9.0 / 256.0)],
+    &[(0, 1, -0.017_989_444_357_422_977), (0, 2, -0.001_607_413_324_976_628_8), (0, 3, 1.0 / 768.0),
+      (0, 4, -0.014_475_769_632_415_305), (1, 2, -9.0 / 256.0), (1, 3, 0.007_399_861_459_197_113_7),
+      (1, 4, 0.009_613_698_991_072_231_6), (2, 3, 81.0 / 256.0), (2, 4, -0.002_188_977_973_787_721_8), (2, 5, -3.0 / 256.0),
+      (3, 4, 0.311_165_631_948_464_08), (3, 6, 1.0 / 768.0), (4, 5, -9.0 / 256.0)],
+    &[(0, 1, 0.002_057_291_666_666_669_5), (0, 3, -0.000_659_722_222_222_22), (1, 4, 0.001_354_166_666_666_666_7),
+      (2, 3, -0.035_299_495_453_372_25), (2, 5, -3.0 / 256.0), (3, 4, 81.0 / 256.0), (3, 6, -3.0 / 256.0), (4, 5, 81.0 / 256.0),
+      (4, 7, 1.0 / 768.0), (5, 6, -9.0 / 256.0)],
+];
+
+impl Line {
+    /// Mean of the weighted fluxes along a wall at the stored faces: cells and coefficients, the masses of the cells included.
+    /// The rows of wall faces are empty.
+    pub(crate) fn flux_mean(&self) -> Vec<Taps> {
+        let n = self.cells;
+        let sticks = self.no_slip();
+        (0..n)
+            .map(|face| {
+                let mut sums = vec![0.0; n];
+                if self.is_thin() {
+                    sums[0] = 1.0;
+                } else if face < self.first_face() {
+                } else if sticks[0] && face <= 4 {
+                    sums[..6].copy_from_slice(&WALL_MEAN[face - 1]);
+                } else if sticks[1] && face + 4 >= n {
+                    for (i, c) in WALL_MEAN[n - face - 1].iter().enumerate() {
+                        sums[n - 1 - i] += c;
+                    }
+                } else {
+                    for (i, c) in MEAN.iter().enumerate() {
+                        sums[resolve_cell(n, self.ends, (face + i) as isize - 2)] += c;
+                    }
+                }
+                let weighted = sums.iter().zip(&self.cell_mass_m).enumerate();
+                weighted.filter(|(_, (c, _))| **c != 0.0).map(|(i, (c, mass))| (i, c * mass)).collect()
+            })
+            .collect()
+    }
+
+    /// Transport of values at the centres by the fluxes through the faces.
+    pub(crate) fn transport_of_cells(&self) -> Transport {
+        let n = self.cells;
+        let mut rows = vec![Vec::new(); n];
+        if self.is_thin() {
+            return Transport { rows, regular: 0..0 };
+        }
+        let sticks = self.no_slip();
+        for (k, row) in rows.iter_mut().enumerate() {
+            let k = k as isize;
+            let pairs =
+                [(k + 1, k + 1, PAIR[0]), (k, k - 1, -PAIR[0]), (k + 2, k + 3, PAIR[1]), (k - 1, k - 3, -PAIR[1])];
+            for (face, cell, c) in pairs {
+                // No ghosts behind a no-slip wall.
+                if (sticks[0] && cell < 0) || (sticks[1] && cell >= n as isize) {
+                    continue;
+                }
+                let (face, sign) = resolve_face(n, self.ends, face);
+                if self.is_periodic() || (face > 0 && face < n) {
+                    row.push((face, resolve_cell(n, self.ends, cell), sign * c));
+                }
+            }
+        }
+        for (a, b, c) in WALL_PAIRS {
+            if sticks[0] {
+                rows[a].push((3, b, c));
+                rows[b].push((3, a, -c));
+            }
+            if sticks[1] {
+                rows[n - 1 - a].push((n - 3, n - 1 - b, -c));
+                rows[n - 1 - b].push((n - 3, n - 1 - a, c));
+            }
+        }
+        Transport { rows, regular: regular(3, n.saturating_sub(3)) }
+    }
+
+    /// Transport of the normal velocity at the faces by itself.
+    pub(crate) fn transport_of_faces(&self) -> Transport {
+        let n = self.cells;
+        let mut rows = vec![Vec::new(); n];
+        if self.is_thin() {
+            return Transport { rows, regular: 0..0 };
+        }
+        let sticks = self.no_slip();
+        let from_table = |face: usize| (sticks[0] && face <= 4) || (sticks[1] && face + 4 >= n);
+        for (m, row) in rows.iter_mut().enumerate().skip(self.first_face()) {
+            for (face, value, c) in interior_products(m as isize) {
+                let (face, face_sign) = resolve_face(n, self.ends, face);
+                let (value, value_sign) = resolve_face(n, self.ends, value);
+                let walls = !self.is_periodic() && (face == 0 || face == n || value == 0 || value == n);
+                if !walls && !from_table(face) {
+                    row.push((face, value, face_sign * value_sign * c));
+                }
+            }
+        }
+        for (i, table) in WALL_SKEW.iter().enumerate() {
+            for &(a, b, c) in table.iter().filter(|entry| entry.0 > 0) {
+                if sticks[0] {
+                    rows[a].push((i + 1, b, c));
+                    rows[b].push((i + 1, a, -c));
+                }
+                if sticks[1] {
+                    rows[n - a].push((n - i - 1, n - b, -c));
+                    rows[n - b].push((n - i - 1, n - a, c));
+                }
+            }
+        }
+        let margin = |sticks: bool| if sticks { WALL_ROWS + 1 } else { 3 };
+        Transport { rows, regular: regular(margin(sticks[0]), n.saturating_sub(margin(sticks[1]))) }
+    }
+}
+
+/// `low..high`, or nothing.
+fn regular(low: usize, high: usize) -> std::ops::Range<usize> {
+    if low < high { low..high } else { 0..0 }
+}
+
+/// Products of row `m` of the normal velocity away from walls: pairs of faces times the mean flux of the cell between.
+fn interior_products(m: isize) -> impl Iterator<Item = (isize, isize, f64)> {
+    let pairs = [(m, m + 1, PAIR[0]), (m - 1, m - 1, -PAIR[0]), (m + 1, m + 3, PAIR[1]), (m - 2, m - 3, -PAIR[1])];
+    pairs.into_iter().flat_map(|(cell, value, c)| {
+        MEAN.iter().enumerate().map(move |(i, mean)| (cell + i as isize - 1, value, c * mean))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::{Direction, Mapping, Wall};
+    use super::*;
+
+    fn kinds() -> Vec<Direction> {
+        vec![
+            Direction::periodic(20, 0.0, 1.0).stretched(Mapping::Sine { amplitude: 0.4 }),
+            Direction::between(20, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST)
+                .stretched(Mapping::TanhBoth { strength: 1.5 }),
+            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.5 }),
+            Direction::between(19, 0.0, 1.0, Wall::Slip, Wall::Slip),
+        ]
+    }
+
+    /// `S^n` of a transport as dense matrices.
+    fn dense(rows: &[Vec<Product>], n: usize) -> Vec<Vec<Vec<f64>>> {
+        let mut matrices = vec![vec![vec![0.0; n]; n]; n];
+        for (row, products) in rows.iter().enumerate() {
+            for &(face, value, c) in products {
+                matrices[face][row][value] += c;
+            }
+        }
+        matrices
+    }
+
+    #[test]
+    fn transport_is_skew_for_every_flux() {
+        for direction in kinds() {
+            let line = Line::new(&direction);
+            for transport in [line.transport_of_cells(), line.transport_of_faces()] {
+                for matrix in dense(&transport.rows, line.cells) {
+                    for i in 0..line.cells {
+                        for j in 0..line.cells {
+                            assert!((matrix[i][j] + matrix[j][i]).abs() < 1e-17, "{direction:?} ({i}, {j})");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn row_sums_are_half_the_divergence_that_the_flux_makes() {
+        for direction in kinds() {
+            let line = Line::new(&direction);
+            let n = line.cells;
+            let first = line.first_face();
+            let matrices = dense(&line.transport_of_cells().rows, n);
+            for face in first..n {
+                for cell in 0..n {
+                    let sum: f64 = matrices[face][cell].iter().sum();
+                    let made: f64 = line.divergence[cell].iter().filter(|t| t.0 == face).map(|t| t.1).sum();
+                    assert!((sum - 0.5 * made).abs() < 1e-16, "{direction:?}: flux {face}, cell {cell}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tables_of_the_normal_velocity_meet_their_row_sums() {
+        let n = 24;
+        let line = Line::new(&Direction::between(n, 0.0, 24.0, Wall::AT_REST, Wall::AT_REST));
+        let mean = line.flux_mean();
+        for face in 1..=4 {
+            for row in 1..10 {
+                let mut sum = 0.0;
+                for &(a, b, c) in WALL_SKEW[face - 1] {
+                    sum += if a == row { c } else { 0.0 } - if b == row { c } else { 0.0 };
+                }
+                // The mean of the weighted divergence; the cells' masses belong to the fluxes along the wall alone.
+                let made: f64 = mean[row]
+                    .iter()
+                    .map(|&(cell, c)| {
+                        let divergence: f64 = line.divergence[cell].iter().filter(|t| t.0 == face).map(|t| t.1).sum();
+                        c / line.cell_mass_m[cell] * divergence
+                    })
+                    .sum();
+                assert!((sum - 0.5 * made).abs() < 2e-16, "flux {face}, row {row}: {sum} against {}", 0.5 * made);
+            }
+        }
+    }
+
+    #[test]
+    fn the_flux_mean_keeps_constants_and_slopes_at_a_wall() {
+        let line = Line::new(&Direction::between(24, 0.0, 24.0, Wall::AT_REST, Wall::Slip));
+        for (face, row) in line.flux_mean().iter().enumerate().skip(1) {
+            let sum: f64 = row.iter().map(|t| t.1).sum();
+            assert!((sum - line.face_mass_m[face]).abs() < 1e-15, "face {face}: {sum}");
+            let slope: f64 = row.iter().map(|t| t.1 * (t.0 as f64 + 0.5)).sum();
+            let at_slip_wall = face + 2 > 24;
+            assert!(
+                at_slip_wall || (slope - face as f64 * line.face_mass_m[face]).abs() < 1e-13,
+                "face {face}: {slope}"
+            );
+        }
+    }
+
+    #[test]
+    fn transport_along_a_wall_is_exact_for_a_parabolic_flux() {
+        let line = Line::new(&Direction::between(24, 0.0, 24.0, Wall::AT_REST, Wall::AT_REST));
+        let transport = line.transport_of_cells();
+        // q = 1, F = z^2: the skew form gives half the derivative of F, and the same for F = z, q = z is exact to z^2.
+        for (k, row) in transport.rows.iter().take(6).enumerate() {
+            let z = k as f64 + 0.5;
+            let sum: f64 = row.iter().map(|&(f, _, c)| c * (f as f64).powi(2)).sum();
+            assert!((sum / line.cell_mass_m[k] - z).abs() < 1e-14, "cell {k}: {sum}");
+            let sum: f64 = row.iter().map(|&(f, l, c)| c * f as f64 * (l as f64 + 0.5)).sum();
+            // z dq/dz + q/2 with q = z.
+            assert!((sum / line.cell_mass_m[k] - 1.5 * z).abs() < 1e-13, "cell {k}: {sum}");
+        }
+    }
+
+    #[test]
+    fn rows_called_regular_follow_the_formula_of_the_interior() {
+        for direction in kinds() {
+            let line = Line::new(&direction);
+            let faces = line.transport_of_faces();
+            for m in faces.regular.clone() {
+                let matrices = dense(&faces.rows, line.cells);
+                for (face, value, _) in interior_products(m as isize) {
+                    let expected: f64 =
+                        interior_products(m as isize).filter(|p| (p.0, p.1) == (face, value)).map(|p| p.2).sum();
+                    // Values on a wall are zero and leave no product.
+                    if value > 0 || line.is_periodic() {
+                        let found = matrices[face as usize][m][value as usize];
+                        assert!((found - expected).abs() < 1e-16, "{direction:?}, row {m}");
+                    }
+                }
+            }
+        }
+    }
+}
