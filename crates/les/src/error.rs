@@ -54,6 +54,44 @@ pub enum Error {
         /// The values that are allowed, in words.
         allowed: &'static str,
     },
+    /// A simulation has produced values that are not finite.
+    #[error(
+        "the {field} {component} is not finite at step {step} (t = {time_s} s), cell {cell:?}, x, y, z = {position_m:?} m: \
+         the time step is too long, the mesh too coarse for the viscosity, or the initial field was not finite"
+    )]
+    Diverged {
+        /// Which field.
+        field: &'static str,
+        /// Number of the step that failed.
+        step: u64,
+        /// Time that it reached \[s\].
+        time_s: f64,
+        /// Velocity component, `"u"`, `"v"` or `"w"`.
+        component: &'static str,
+        /// First such cell, indices along x, y, z.
+        cell: [usize; 3],
+        /// Its position \[m\].
+        position_m: [f64; 3],
+    },
+    /// A time step is so long that the scheme would be unstable.
+    #[error(
+        "step {step} of {step_s} s has Courant number {courant}, above {limit}: fastest is {component} at x, y, z = \
+         {position_m:?} m; shorten the step or let a Courant number control it"
+    )]
+    CourantTooLarge {
+        /// Number of the step that was refused.
+        step: u64,
+        /// Its length \[s\].
+        step_s: f64,
+        /// Its Courant number.
+        courant: f64,
+        /// Largest allowed.
+        limit: f64,
+        /// Fastest velocity component.
+        component: &'static str,
+        /// Where it is \[m\].
+        position_m: [f64; 3],
+    },
     /// Two neighbouring cells differ so much that the index coordinate is not monotone between them.
     #[error(
         "the cells beside node {index} of the {axis} axis differ by a factor {ratio}: at most {allowed} is allowed"

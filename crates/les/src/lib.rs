@@ -52,6 +52,10 @@ pub use error::Error;
 pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
 pub use kernel::{m4_prime, m4_prime_weights};
 pub use profile::CirculationProfile;
-pub use solver::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
+
+pub use solver::{
+    Direction, Ends, Flow, FlowSettings, Mapping, MappingFn, Mesh, PressureMethod, StartReport, StepReport,
+    SubgridModel, TimeScheme, TimeStep, ViscousTreatment, Wall, cases,
+};
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};
 pub use wind::{Calm, Sum, Uniform, Wind};

@@ -1,9 +1,24 @@
 //! Incompressible large-eddy simulation.
 
+pub mod cases;
+mod fields;
+mod flow;
+mod implicit;
+mod interim;
+mod interim_subgrid;
 mod layout;
 mod line;
 mod mesh;
+mod momentum;
 mod pressure;
+mod projection;
+mod rows;
+mod settings;
+
 mod transport;
 
+pub use flow::{Flow, StartReport, StepReport};
+pub use interim::PressureMethod;
+pub use interim_subgrid::SubgridModel;
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
+pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};

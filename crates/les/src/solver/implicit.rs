@@ -1,0 +1,220 @@
+//! Line solves of the implicit viscosity, `(1 - a L) x = r` along one axis.
+//!
+//! With the masses as weights the matrix is symmetric and positive definite, so it is factored once per time step length as
+//! `L D L^T` without pivoting. Its envelope is seven bands wide; walls and periods add a few entries outside, which are kept
+//! as further taps of their rows. Lines are solved side by side, so that the elimination runs over contiguous values.
+//!
+//! Check: residuals against the explicit operator, every kind of end.
+
+use rayon::prelude::*;
+
+use super::layout::Shape;
+use super::line::Taps;
+use super::momentum::Momentum;
+use super::rows::add_rows;
+
+/// Factors of `1 - a L` along one axis for one component.
+#[derive(Debug, Clone)]
+pub(crate) struct LineSolver {
+    axis: usize,
+    mass: Vec<f64>,
+    inverse_pivot: Vec<f64>,
+    /// Rows of `-L` below the diagonal and of `-L^T` above it.
+    lower: Vec<Taps>,
+    upper: Vec<Taps>,
+}
+
+/// Lines of axis 0 that are solved side by side.
+const TILE: usize = 16;
+
+impl LineSolver {
+    /// Factors `1 - a L` of component `ops` along `axis`, `a_s_m2` being half the time step times the viscosity \[m^2\].
+    pub(crate) fn new(ops: &Momentum, axis: usize, a_m2: f64) -> Self {
+        let mass = ops.mass(axis).to_vec();
+        let n = mass.len();
+        let mut dense: Vec<Taps> = Vec::with_capacity(n);
+        let mut pivot = vec![0.0; n];
+        for (i, row) in ops.laplacian(axis).iter().enumerate() {
+            // Row i of the factor, from its first entry to the diagonal.
+            let first = row.iter().map(|tap| tap.0).filter(|j| *j <= i).min().unwrap_or(i);
+            let mut work = vec![0.0; i - first + 1];
+            work[i - first] = mass[i];
+            for &(j, c) in row.iter().filter(|tap| tap.0 <= i) {
+                work[j - first] -= a_m2 * mass[i] * c;
+            }
+            let mut taps = Taps::new();
+            for j in first..i {
+                // work[j] holds l_ij d_j once the earlier columns are taken off.
+                let sum: f64 = dense[j].iter().filter(|t| t.0 >= first).map(|&(p, l)| l * work[p - first]).sum();
+                work[j - first] -= sum;
+            }
+            let mut diagonal = work[i - first];
+            for j in first..i {
+                let value = work[j - first];
+                if value != 0.0 {
+                    diagonal -= value * value / pivot[j];
+                    taps.push((j, value / pivot[j]));
+                }
+            }
+            pivot[i] = diagonal;
+            dense.push(taps);
+        }
+        let mut lower = vec![Taps::new(); n];
+        let mut upper = vec![Taps::new(); n];
+        for (i, taps) in dense.iter().enumerate() {
+            for &(j, l) in taps {
+                lower[i].push((j, -l));
+                upper[j].push((i, -l));
+            }
+        }
+        Self { axis, mass, inverse_pivot: pivot.iter().map(|d| 1.0 / d).collect(), lower, upper }
+    }
+
+    /// Replaces `field` by the solution.
+    pub(crate) fn solve(&self, shape: Shape, field: &mut [f64]) {
+        match self.axis {
+            0 => field.par_chunks_mut(shape.n[0] * TILE).for_each(|rows| self.solve_tile(rows, shape.n[0])),
+            1 => field.par_chunks_mut(shape.plane()).for_each(|plane| self.solve_block(plane, shape.n[0])),
+            _ => self.solve_across_planes(shape, field),
+        }
+    }
+
+    /// Solves lines that run across the rows of `block`, which are `width` long.
+    fn solve_block(&self, block: &mut [f64], width: usize) {
+        for i in 0..self.mass.len() {
+            let (before, rest) = block.split_at_mut(i * width);
+            let row = &mut rest[..width];
+            for value in row.iter_mut() {
+                *value *= self.mass[i];
+            }
+            add_taps(row, before, &self.lower[i], 0, width);
+        }
+        for i in (0..self.mass.len()).rev() {
+            let (head, after) = block.split_at_mut((i + 1) * width);
+            let row = &mut head[i * width..];
+            for value in row.iter_mut() {
+                *value *= self.inverse_pivot[i];
+            }
+            add_taps(row, after, &self.upper[i], i + 1, width);
+        }
+    }
+
+    /// Lines along axis 0: a few rows are turned so that they lie side by side.
+    fn solve_tile(&self, rows: &mut [f64], n: usize) {
+        let width = rows.len() / n;
+        let mut block = vec![0.0; rows.len()];
+        for (r, row) in rows.chunks_exact(n).enumerate() {
+            for (i, value) in row.iter().enumerate() {
+                block[i * width + r] = *value;
+            }
+        }
+        self.solve_block(&mut block, width);
+        for (r, row) in rows.chunks_exact_mut(n).enumerate() {
+            for (i, value) in row.iter_mut().enumerate() {
+                *value = block[i * width + r];
+            }
+        }
+    }
+
+    /// Lines along axis 2: the row of each index of axis 1 is gathered from all planes.
+    fn solve_across_planes(&self, shape: Shape, field: &mut [f64]) {
+        let width = shape.n[0];
+        let mut strips: Vec<Vec<&mut [f64]>> = (0..shape.n[1]).map(|_| Vec::with_capacity(shape.n[2])).collect();
+        for plane in field.chunks_mut(shape.plane()) {
+            for (strip, row) in strips.iter_mut().zip(plane.chunks_mut(width)) {
+                strip.push(row);
+            }
+        }
+        // A plane flow has one strip; it is then cut along the rows.
+        if shape.n[1] == 1 {
+            strips = cut(strips, width);
+        }
+        strips.par_iter_mut().for_each(|strip| {
+            let width = strip.first().map_or(0, |row| row.len());
+            let mut block = vec![0.0; strip.len() * width];
+            for (to, from) in block.chunks_mut(width).zip(strip.iter()) {
+                to.copy_from_slice(from);
+            }
+            self.solve_block(&mut block, width);
+            for (from, to) in block.chunks(width).zip(strip.iter_mut()) {
+                to.copy_from_slice(from);
+            }
+        });
+    }
+}
+
+/// Cuts strips of rows into strips of at most 32 columns.
+fn cut(strips: Vec<Vec<&mut [f64]>>, width: usize) -> Vec<Vec<&mut [f64]>> {
+    const COLUMNS: usize = 32;
+    let mut pieces: Vec<Vec<&mut [f64]>> = (0..width.div_ceil(COLUMNS)).map(|_| Vec::new()).collect();
+    for row in strips.into_iter().flatten() {
+        for (piece, part) in pieces.iter_mut().zip(row.chunks_mut(COLUMNS)) {
+            piece.push(part);
+        }
+    }
+    pieces
+}
+
+/// `row += sum c x_i`, `x_i` being the rows of `other`, the first of which has index `first`.
+fn add_taps(row: &mut [f64], other: &[f64], taps: &[(usize, f64)], first: usize, width: usize) {
+    for chunk in taps.chunks(4) {
+        let mut places = [(0, 0.0); 4];
+        for (place, &(i, c)) in places.iter_mut().zip(chunk) {
+            *place = ((i - first) * width, c);
+        }
+        accumulate(row, other, &places[..chunk.len()]);
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn accumulate(row: &mut [f64], other: &[f64], places: &[(usize, f64)]) {
+    if let [a, b, c] = *places {
+        let n = row.len();
+        let [x, y, z] = [a.0, b.0, c.0].map(|start| &other[start..start + n]);
+        for i in 0..n {
+            row[i] += (a.1 * x[i] + b.1 * y[i]) + c.1 * z[i];
+        }
+    } else {
+        add_rows(row, other, places);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::layout::Layout;
+    use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+    use super::*;
+
+    #[test]
+    fn solutions_satisfy_the_explicit_operator_on_every_axis_and_kind_of_end() {
+        let a_m2 = 0.02;
+        let kinds = [
+            Direction::periodic(20, 0.0, 1.0).stretched(Mapping::Sine { amplitude: 0.5 }),
+            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.5 }),
+            Direction::between(18, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST),
+        ];
+        for shift in 0..3 {
+            let d = |i: usize| kinds[(i + shift) % 3].clone();
+            let layout = Layout::new(&Mesh::new(d(0), d(1), d(2)).unwrap(), None);
+            let shape = layout.shape;
+            let [nx, ny, _] = shape.n;
+            for component in 0..3 {
+                let ops = Momentum::new(&layout, component);
+                for axis in 0..3 {
+                    let right: Vec<f64> = (0..shape.len()).map(|i| ((i * i) as f64).sin()).collect();
+                    let mut x = right.clone();
+                    LineSolver::new(&ops, axis, a_m2).solve(shape, &mut x);
+                    let stride = [1, nx, nx * ny][axis];
+                    for place in 0..shape.len() {
+                        let index = place / stride % shape.n[axis];
+                        let origin = place - index * stride;
+                        let applied: f64 =
+                            ops.laplacian(axis)[index].iter().map(|&(i, c)| c * x[origin + i * stride]).sum();
+                        let residual = x[place] - a_m2 * applied - right[place];
+                        assert!(residual.abs() < 1e-11, "component {component}, axis {axis}, {index}: {residual}");
+                    }
+                }
+            }
+        }
+    }
+}

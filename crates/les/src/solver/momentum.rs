@@ -1,0 +1,430 @@
+//! The momentum equation of one velocity component, row by row: convection, viscosity, pressure gradient.
+//!
+//! Convection of component `a` along direction `b` is `(f_a m_b)^-1 sum_n G_n S^n u_a`, where `G_n` is the flux through face `n`
+//! of `b`, weighted with the mass of the cells along `a` and brought to the faces of `a` (`b = a`: the flux itself over `f_a`).
+//! Weighting before interpolating is what conserves mass, momentum and energy on a stretched mesh (Vasilyev 2000).
+//!
+//! Check: energy and momentum made by the discrete convection, order on stretched meshes (tests of `flow`).
+
+use multiversion::multiversion;
+
+use super::layout::Layout;
+use super::line::Taps;
+use super::rows::{Columns, HALO, add_pairs, add_product, add_rows, pad};
+use super::transport::{MEAN, Transport};
+
+/// The operators of one component.
+#[derive(Debug, Clone)]
+pub(crate) struct Momentum {
+    /// Memory axis of the component.
+    axis: usize,
+    /// Sizes of the memory axes.
+    n: [usize; 3],
+    periodic: [bool; 3],
+    thin: [bool; 3],
+    /// Weighted flux along `axis` at its faces from the cells.
+    flux_mean: Vec<Taps>,
+    flux_mean_columns: Columns,
+    transport: [Transport; 3],
+    /// `1/m_b` at the cells of each axis.
+    inverse_cell_mass: [Vec<f64>; 3],
+    /// `1/f` at the faces of `axis`, zero at a wall.
+    inverse_face_mass: Vec<f64>,
+    /// Mass of the control volume of this component along each axis.
+    mass: [Vec<f64>; 3],
+    /// Laplacian along each axis and the source from moving walls.
+    laplacian: [Vec<Taps>; 3],
+    laplacian_columns: Columns,
+    wall_source: [Vec<f64>; 3],
+    gradient: Vec<Taps>,
+    gradient_columns: Columns,
+}
+
+/// Rows that a task reuses.
+#[derive(Debug, Default)]
+pub(crate) struct Scratch {
+    padded: [Vec<f64>; 2],
+    flux: [Vec<f64>; 4],
+    pub(crate) convection: Vec<f64>,
+    pub(crate) explicit: Vec<f64>,
+    pub(crate) implicit: Vec<f64>,
+    pub(crate) model: Vec<f64>,
+    pub(crate) pressure: Vec<f64>,
+}
+
+impl Scratch {
+    pub(crate) fn new(n: usize) -> Self {
+        let row = || vec![0.0; n];
+        let padded = || vec![0.0; n + 2 * HALO];
+        Self {
+            padded: [padded(), padded()],
+            flux: [row(), row(), row(), row()],
+            convection: row(),
+            explicit: row(),
+            implicit: row(),
+            model: row(),
+            pressure: row(),
+        }
+    }
+}
+
+impl Momentum {
+    pub(crate) fn new(layout: &Layout, axis: usize) -> Self {
+        let line = &layout.line;
+        let n = layout.shape.n;
+        let own = &line[axis];
+        let inverse = |x: &f64| 1.0 / x;
+        let inverse_face_mass =
+            (0..n[axis]).map(|face| if face < own.first_face() { 0.0 } else { 1.0 / own.face_mass_m[face] }).collect();
+        let mut wall_source: [Vec<f64>; 3] = std::array::from_fn(|b| vec![0.0; n[b]]);
+        let laplacian = std::array::from_fn(|b| {
+            if b == axis {
+                return line[b].laplacian_at_faces();
+            }
+            let (rows, walls) = line[b].laplacian_at_cells();
+            let [low, high] = layout.wall_velocity_m_s(b, axis);
+            for (source, wall) in wall_source[b].iter_mut().zip(walls) {
+                *source = wall[0] * low + wall[1] * high;
+            }
+            rows
+        });
+        let flux_mean = own.flux_mean();
+        let gradient = own.gradient();
+        let columns = |rows: &[Taps], of: usize| {
+            if of == 0 { Columns::new(rows, line[0].is_periodic()) } else { Columns::default() }
+        };
+        Self {
+            axis,
+            n,
+            periodic: std::array::from_fn(|b| line[b].is_periodic()),
+            thin: std::array::from_fn(|b| line[b].is_thin()),
+            flux_mean_columns: columns(&flux_mean, axis),
+            flux_mean,
+            transport: std::array::from_fn(|b| {
+                if b == axis { line[b].transport_of_faces() } else { line[b].transport_of_cells() }
+            }),
+            inverse_cell_mass: std::array::from_fn(|b| line[b].cell_mass_m.iter().map(inverse).collect()),
+            inverse_face_mass,
+            mass: std::array::from_fn(|b| {
+                if b == axis { own.face_mass_m[..n[b]].to_vec() } else { line[b].cell_mass_m.clone() }
+            }),
+            laplacian_columns: columns(&laplacian[0], 0),
+            laplacian,
+            wall_source,
+            gradient_columns: columns(&gradient, axis),
+            gradient,
+        }
+    }
+
+    /// Mass of the control volumes of row `(j, k)` as a factor common to the row and the factors along axis 0.
+    pub(crate) fn row_mass(&self, j: usize, k: usize) -> (f64, &[f64]) {
+        (self.mass[1][j] * self.mass[2][k], &self.mass[0])
+    }
+
+    /// Masses along one axis.
+    pub(crate) fn mass(&self, axis: usize) -> &[f64] {
+        &self.mass[axis]
+    }
+
+    /// Rows of the Laplacian along one axis.
+    pub(crate) fn laplacian(&self, axis: usize) -> &[Taps] {
+        &self.laplacian[axis]
+    }
+
+    /// Whether row `(j, k)` lies on a wall, where this component is zero.
+    pub(crate) fn is_wall_row(&self, j: usize, k: usize) -> bool {
+        match self.axis {
+            1 => self.inverse_face_mass[j] == 0.0,
+            2 => self.inverse_face_mass[k] == 0.0,
+            _ => false,
+        }
+    }
+
+    fn start(&self, j: usize, k: usize) -> usize {
+        (k * self.n[1] + j) * self.n[0]
+    }
+
+    /// Start of the row whose index along `axis` (1 or 2) is replaced.
+    fn start_with(&self, j: usize, k: usize, axis: usize, index: usize) -> usize {
+        if axis == 1 { self.start(index, k) } else { self.start(j, index) }
+    }
+}
+
+/// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn convection_row(
+    ops: &Momentum,
+    velocity: [&[f64]; 3],
+    j: usize,
+    k: usize,
+    out: &mut [f64],
+    padded: &mut [Vec<f64>; 2],
+    flux: &mut [Vec<f64>; 4],
+) {
+    out.fill(0.0);
+    if !ops.thin[0] {
+        along_row(ops, velocity, j, k, out, padded, flux);
+    }
+    for axis in 1..3 {
+        if !ops.thin[axis] {
+            across_rows(ops, velocity, j, k, axis, out, padded, flux);
+        }
+    }
+    match ops.axis {
+        0 => {
+            for (out, inverse) in out.iter_mut().zip(&ops.inverse_face_mass) {
+                *out *= inverse;
+            }
+        }
+        axis => {
+            let inverse = ops.inverse_face_mass[if axis == 1 { j } else { k }];
+            for out in out.iter_mut() {
+                *out *= inverse;
+            }
+        }
+    }
+}
+
+/// The part of the convection along axis 0.
+#[inline(always)]
+fn along_row(
+    ops: &Momentum,
+    velocity: [&[f64]; 3],
+    j: usize,
+    k: usize,
+    out: &mut [f64],
+    padded: &mut [Vec<f64>; 2],
+    flux: &mut [Vec<f64>; 4],
+) {
+    let n = out.len();
+    let periodic = ops.periodic[0];
+    let start = ops.start(j, k);
+    let [values, fluxes] = padded;
+    pad(values, &velocity[ops.axis][start..start + n], periodic);
+    let transport = &ops.transport[0];
+    if ops.axis == 0 {
+        // Mean fluxes of the cells -2 to n + 1, at which the padded places 2 to n + 5 hold them.
+        for c in 2..n + 6 {
+            fluxes[c] =
+                (MEAN[0] * values[c - 1] + MEAN[1] * values[c]) + (MEAN[2] * values[c + 1] + MEAN[3] * values[c + 2]);
+        }
+        let at = |offset: usize| &fluxes[HALO + offset - 3..];
+        let q = |offset: usize| &values[HALO + offset - 3..];
+        add_pairs(out, 1.0, [at(1), at(2), at(3), at(4)], [q(0), q(2), q(4), q(6)]);
+        if !periodic {
+            irregular_columns(transport, out, &velocity[0][start..start + n], &velocity[0][start..start + n], None);
+        }
+    } else {
+        flux_row(ops, velocity, 0, j, k, 0, &mut flux[0], fluxes);
+        pad(fluxes, &flux[0], periodic);
+        let at = |offset: usize| &fluxes[HALO + offset - 1..];
+        let q = |offset: usize| &values[HALO + offset - 3..];
+        let line = &mut flux[1];
+        line.fill(0.0);
+        add_pairs(line, 1.0, [at(0), at(1), at(2), at(3)], [q(0), q(2), q(4), q(6)]);
+        let inverse = &ops.inverse_cell_mass[0];
+        for ((out, line), inverse) in out.iter_mut().zip(line.iter()).zip(inverse) {
+            *out += inverse * line;
+        }
+        if !periodic {
+            // The regular formula was added to every column; the others are computed anew.
+            let (done, fresh) = (&flux[1], &flux[0]);
+            let values = &velocity[ops.axis][start..start + n];
+            for i in irregular(transport, n) {
+                let sum: f64 = transport.rows[i].iter().map(|&(face, cell, c)| c * fresh[face] * values[cell]).sum();
+                out[i] += inverse[i] * (sum - done[i]);
+            }
+        }
+    }
+}
+
+/// Replaces the columns to which the formula of the interior does not apply.
+#[inline(always)]
+fn irregular_columns(transport: &Transport, out: &mut [f64], flux: &[f64], values: &[f64], scale: Option<&[f64]>) {
+    for i in irregular(transport, out.len()) {
+        let sum: f64 = transport.rows[i].iter().map(|&(face, cell, c)| c * flux[face] * values[cell]).sum();
+        out[i] = scale.map_or(1.0, |scale| scale[i]) * sum;
+    }
+}
+
+fn irregular(transport: &Transport, n: usize) -> impl Iterator<Item = usize> + use<> {
+    let regular = transport.regular.clone();
+    (0..n).filter(move |i| !regular.contains(i))
+}
+
+/// The part of the convection along axis 1 or 2.
+#[inline(always)]
+fn across_rows(
+    ops: &Momentum,
+    velocity: [&[f64]; 3],
+    j: usize,
+    k: usize,
+    axis: usize,
+    out: &mut [f64],
+    padded: &mut [Vec<f64>; 2],
+    flux: &mut [Vec<f64>; 4],
+) {
+    let length = out.len();
+    let index = if axis == 1 { j } else { k };
+    let count = ops.n[axis];
+    let transport = &ops.transport[axis];
+    let scale = if axis == ops.axis { 1.0 } else { ops.inverse_cell_mass[axis][index] };
+    let values = velocity[ops.axis];
+    let row = |i: usize| {
+        let start = ops.start_with(j, k, axis, i);
+        &values[start..start + length]
+    };
+    if ops.periodic[axis] || transport.regular.contains(&index) {
+        let at = |offset: usize| {
+            // Offset 3 is the row itself; a regular row of a bounded direction never wraps.
+            let i = index + offset + count - 3;
+            if ops.periodic[axis] { i % count } else { i - count }
+        };
+        let q = [0, 2, 4, 6].map(|offset| row(at(offset)));
+        if axis == ops.axis {
+            mean_rows(flux, [0, 1, 2, 3, 4, 5, 6].map(|offset| row(at(offset))));
+        } else {
+            for (slot, out) in flux.iter_mut().enumerate() {
+                flux_row(ops, velocity, axis, j, k, at(slot + 2), out, &mut padded[0]);
+            }
+        }
+        add_pairs(out, scale, flux.each_ref().map(Vec::as_slice), q);
+    } else {
+        for &(face, cell, c) in &transport.rows[index] {
+            if axis == ops.axis {
+                add_product(out, scale * c, row(face), row(cell));
+            } else {
+                flux_row(ops, velocity, axis, j, k, face, &mut flux[0], &mut padded[0]);
+                add_product(out, scale * c, &flux[0], row(cell));
+            }
+        }
+    }
+}
+
+/// Mean fluxes of the four cells about a face from the fluxes at seven faces.
+#[inline(always)]
+fn mean_rows(flux: &mut [Vec<f64>; 4], rows: [&[f64]; 7]) {
+    for (slot, out) in flux.iter_mut().enumerate() {
+        // Cell m - 2 + slot lies between the faces m - 2 + slot and m - 1 + slot.
+        let n = out.len();
+        let [a, b, c, d] = std::array::from_fn(|i| &rows[slot + i][..n]);
+        for i in 0..n {
+            out[i] = (MEAN[0] * a[i] + MEAN[1] * b[i]) + (MEAN[2] * c[i] + MEAN[3] * d[i]);
+        }
+    }
+}
+
+/// The flux along `along` through its face `face`, weighted along the component's axis and brought to its faces.
+#[inline(always)]
+fn flux_row(
+    ops: &Momentum,
+    velocity: [&[f64]; 3],
+    along: usize,
+    j: usize,
+    k: usize,
+    face: usize,
+    out: &mut [f64],
+    padded: &mut [f64],
+) {
+    let field = velocity[along];
+    let n = out.len();
+    out.fill(0.0);
+    if ops.axis == 0 {
+        let start = ops.start_with(j, k, along, face);
+        pad(padded, &field[start..start + n], ops.periodic[0]);
+        ops.flux_mean_columns.add(out, padded);
+        return;
+    }
+    let (mut j, mut k) = (j, k);
+    match along {
+        1 => j = face,
+        2 => k = face,
+        _ => {}
+    }
+    let own = if ops.axis == 1 { j } else { k };
+    let taps = &ops.flux_mean[own];
+    let mut rows = [(0, 0.0); 6];
+    for (row, tap) in rows.iter_mut().zip(taps) {
+        *row = (ops.start_with(j, k, ops.axis, tap.0), tap.1);
+    }
+    add_rows(out, field, &rows[..taps.len().min(6)]);
+}
+
+/// Adds the Laplacian of the component along `axis` to row `(j, k)` \[1/(m s)\].
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn add_laplacian_row(
+    ops: &Momentum,
+    field: &[f64],
+    axis: usize,
+    j: usize,
+    k: usize,
+    out: &mut [f64],
+    padded: &mut [f64],
+) {
+    let n = out.len();
+    if axis == 0 {
+        let start = ops.start(j, k);
+        pad(padded, &field[start..start + n], ops.periodic[0]);
+        ops.laplacian_columns.add(out, padded);
+        for (out, source) in out.iter_mut().zip(&ops.wall_source[0]) {
+            *out += source;
+        }
+        return;
+    }
+    let index = if axis == 1 { j } else { k };
+    let taps = &ops.laplacian[axis][index];
+    let mut rows = [(0, 0.0); 12];
+    for (row, tap) in rows.iter_mut().zip(taps) {
+        *row = (ops.start_with(j, k, axis, tap.0), tap.1);
+    }
+    add_rows(out, field, &rows[..taps.len().min(12)]);
+    let source = ops.wall_source[axis][index];
+    if source != 0.0 {
+        for out in out.iter_mut() {
+            *out += source;
+        }
+    }
+}
+
+/// Gradient of a field at the centres for row `(j, k)` of the component.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn gradient_row(ops: &Momentum, field: &[f64], j: usize, k: usize, out: &mut [f64], padded: &mut [f64]) {
+    let n = out.len();
+    out.fill(0.0);
+    if ops.axis == 0 {
+        let start = ops.start(j, k);
+        pad(padded, &field[start..start + n], ops.periodic[0]);
+        ops.gradient_columns.add(out, padded);
+        return;
+    }
+    let taps = &ops.gradient[if ops.axis == 1 { j } else { k }];
+    let mut rows = [(0, 0.0); 6];
+    for (row, tap) in rows.iter_mut().zip(taps) {
+        *row = (ops.start_with(j, k, ops.axis, tap.0), tap.1);
+    }
+    add_rows(out, field, &rows[..taps.len().min(6)]);
+}
+
+impl Scratch {
+    /// Convection of one row into `self.convection`.
+    pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
+        convection_row(ops, velocity, j, k, &mut self.convection, &mut self.padded, &mut self.flux);
+    }
+
+    /// Laplacians of one row: those along the implicit axes into `self.implicit`, the others into `self.explicit`.
+    pub(crate) fn laplacians(&mut self, ops: &Momentum, field: &[f64], implicit: [bool; 3], j: usize, k: usize) {
+        self.implicit.fill(0.0);
+        self.explicit.fill(0.0);
+        for axis in 0..3 {
+            if !ops.thin[axis] {
+                let out = if implicit[axis] { &mut self.implicit } else { &mut self.explicit };
+                add_laplacian_row(ops, field, axis, j, k, out, &mut self.padded[0]);
+            }
+        }
+    }
+
+    /// Gradient of one row into `self.pressure`.
+    pub(crate) fn gradient(&mut self, ops: &Momentum, field: &[f64], j: usize, k: usize) {
+        gradient_row(ops, field, j, k, &mut self.pressure, &mut self.padded[0]);
+    }
+}

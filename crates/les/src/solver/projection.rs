@@ -1,0 +1,250 @@
+//! The projection onto divergence-free fields: the weighted divergence, and the correction by the gradient of the pressure.
+//!
+//! Check: adjointness with the gradient, divergence after a projection (tests of `flow`).
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::layout::{Layout, Shape};
+use super::line::Taps;
+use super::momentum::{Momentum, Scratch};
+use super::rows::{Columns, HALO, add_rows, wrap};
+
+/// The weighted divergence `sum_b (prod_{d != b} m_d) Dw_b u_b` \[m^3/s\].
+#[derive(Debug, Clone)]
+pub(crate) struct Divergence {
+    shape: Shape,
+    periodic: bool,
+    columns: Columns,
+    rows: [Vec<Taps>; 3],
+    cell_mass: [Vec<f64>; 3],
+}
+
+impl Divergence {
+    pub(crate) fn new(layout: &Layout) -> Self {
+        let rows: [Vec<Taps>; 3] = std::array::from_fn(|b| layout.line[b].stored_divergence());
+        let periodic = layout.line[0].is_periodic();
+        Self {
+            shape: layout.shape,
+            periodic,
+            columns: Columns::new(&rows[0], periodic),
+            rows,
+            cell_mass: std::array::from_fn(|b| layout.line[b].cell_mass_m.clone()),
+        }
+    }
+
+    /// Writes `scale` times the weighted divergence of `velocity` to `out`.
+    pub(crate) fn apply(&self, velocity: [&[f64]; 3], scale: f64, out: &mut [f64]) {
+        let n = self.shape.n[0];
+        out.par_chunks_mut(self.shape.plane()).enumerate().for_each_init(
+            || vec![0.0; n + 2 * HALO],
+            |padded, (k, plane)| {
+                for (j, row) in plane.chunks_mut(n).enumerate() {
+                    divergence_row(self, velocity, scale, j, k, row, padded);
+                }
+            },
+        );
+    }
+
+    /// Largest modulus of the divergence \[1/s\].
+    pub(crate) fn largest_per_s(&self, velocity: [&[f64]; 3]) -> f64 {
+        let n = self.shape.n[0];
+        (0..self.shape.n[2])
+            .into_par_iter()
+            .map_init(
+                || (vec![0.0; n + 2 * HALO], vec![0.0; n]),
+                |(padded, row), k| {
+                    let mut largest = 0.0_f64;
+                    for j in 0..self.shape.n[1] {
+                        divergence_row(self, velocity, 1.0, j, k, row, padded);
+                        let across = self.cell_mass[1][j] * self.cell_mass[2][k];
+                        for (value, mass) in row.iter().zip(&self.cell_mass[0]) {
+                            largest = largest.max((value / (mass * across)).abs());
+                        }
+                    }
+                    largest
+                },
+            )
+            .reduce(|| 0.0, f64::max)
+    }
+
+    fn start(&self, j: usize, k: usize) -> usize {
+        (k * self.shape.n[1] + j) * self.shape.n[0]
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn divergence_row(
+    ops: &Divergence,
+    velocity: [&[f64]; 3],
+    scale: f64,
+    j: usize,
+    k: usize,
+    out: &mut [f64],
+    padded: &mut [f64],
+) {
+    let n = out.len();
+    let (mass_1, mass_2) = (scale * ops.cell_mass[1][j], scale * ops.cell_mass[2][k]);
+    out.fill(0.0);
+    let mut taps = [(0, 0.0); 6];
+    let mut add = |field: &[f64], own: &Taps, mass: f64, start: &dyn Fn(usize) -> usize| {
+        for (row, tap) in taps.iter_mut().zip(own) {
+            *row = (start(tap.0), mass * tap.1);
+        }
+        add_rows(out, field, &taps[..own.len().min(6)]);
+    };
+    add(velocity[1], &ops.rows[1][j], mass_2, &|i| ops.start(i, k));
+    add(velocity[2], &ops.rows[2][k], mass_1, &|i| ops.start(j, i));
+    for (out, mass) in out.iter_mut().zip(&ops.cell_mass[0]) {
+        *out *= mass;
+    }
+    let across = mass_1 * ops.cell_mass[2][k];
+    let start = ops.start(j, k);
+    for (to, from) in padded[HALO..].iter_mut().zip(&velocity[0][start..start + n]) {
+        *to = across * from;
+    }
+    wrap(padded, n, ops.periodic);
+    ops.columns.add(out, padded);
+}
+
+/// What the correction learns of the new field on its way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FieldSummary {
+    /// `1/2 sum mass u^2` \[m^5/s^2\].
+    pub(crate) energy: f64,
+    /// Largest `sum_a |u_a|/h_a` \[1/s\].
+    pub(crate) courant_per_s: f64,
+    /// Place of that value.
+    pub(crate) place: usize,
+}
+
+/// `1/h` at the stored faces of each axis \[1/m\]; zero where the flow cannot vary.
+fn inverse_metrics(layout: &Layout) -> [Vec<f64>; 3] {
+    std::array::from_fn(|a| {
+        let line = &layout.line[a];
+        let inverse = |h: &f64| if line.is_thin() { 0.0 } else { 1.0 / h };
+        line.face_metric_m[..line.cells].iter().map(inverse).collect()
+    })
+}
+
+/// `velocity = star - scale grad(phi)`, and the summary of the new field.
+pub(crate) fn correct(
+    ops: &[Momentum; 3],
+    layout: &Layout,
+    star: [&[f64]; 3],
+    phi: &[f64],
+    scale: f64,
+    velocity: [&mut [f64]; 3],
+) -> FieldSummary {
+    let shape = layout.shape;
+    let n = shape.n[0];
+    let inverse_metric = inverse_metrics(layout);
+    let [u, v, w] = velocity.map(|field| field.par_chunks_mut(shape.plane()));
+    let planes: Vec<FieldSummary> = (u, v, w)
+        .into_par_iter()
+        .enumerate()
+        .map_init(
+            || (Scratch::new(n), vec![0.0; n]),
+            |(scratch, rate), (k, (u, v, w))| {
+                let mut planes = [u, v, w];
+                let mut summary = FieldSummary { energy: 0.0, courant_per_s: 0.0, place: k * shape.plane() };
+                for j in 0..shape.n[1] {
+                    rate.fill(0.0);
+                    for (a, plane) in planes.iter_mut().enumerate() {
+                        let at = shape.row(j, k);
+                        let row = &mut plane[j * n..(j + 1) * n];
+                        scratch.gradient(&ops[a], phi, j, k);
+                        let (across, along) = ops[a].row_mass(j, k);
+                        let own = match a {
+                            0 => 1.0,
+                            1 => inverse_metric[1][j],
+                            _ => inverse_metric[2][k],
+                        };
+                        let sum = correct_row(
+                            row,
+                            &star[a][at],
+                            &scratch.pressure,
+                            scale,
+                            along,
+                            rate,
+                            own,
+                            (a == 0).then_some(&inverse_metric[0]),
+                        );
+                        summary.energy += 0.5 * across * sum;
+                    }
+                    for (i, &value) in rate.iter().enumerate() {
+                        if value > summary.courant_per_s {
+                            summary.courant_per_s = value;
+                            summary.place = shape.row(j, k).start + i;
+                        }
+                    }
+                }
+                summary
+            },
+        )
+        .collect();
+    let mut total = FieldSummary { energy: 0.0, courant_per_s: 0.0, place: 0 };
+    for plane in planes {
+        total.energy += plane.energy;
+        if plane.courant_per_s > total.courant_per_s {
+            (total.courant_per_s, total.place) = (plane.courant_per_s, plane.place);
+        }
+    }
+    total
+}
+
+/// Corrects one row, adds its part of the Courant rate, and returns `sum mass u^2`.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+#[allow(clippy::too_many_arguments)]
+fn correct_row(
+    row: &mut [f64],
+    star: &[f64],
+    gradient: &[f64],
+    scale: f64,
+    mass: &[f64],
+    rate: &mut [f64],
+    inverse_metric: f64,
+    inverse_metric_columns: Option<&Vec<f64>>,
+) -> f64 {
+    let n = row.len();
+    let (star, gradient, mass, rate) = (&star[..n], &gradient[..n], &mass[..n], &mut rate[..n]);
+    for i in 0..n {
+        row[i] = star[i] - scale * gradient[i];
+    }
+    match inverse_metric_columns {
+        Some(columns) => {
+            let columns = &columns[..n];
+            for i in 0..n {
+                rate[i] += row[i].abs() * columns[i];
+            }
+        }
+        None => {
+            for i in 0..n {
+                rate[i] += row[i].abs() * inverse_metric;
+            }
+        }
+    }
+    weighted_square(row, mass)
+}
+
+/// `sum mass x^2` with fixed lanes.
+#[inline(always)]
+fn weighted_square(x: &[f64], mass: &[f64]) -> f64 {
+    weighted_dot(x, x, mass)
+}
+
+/// `sum mass x y` with fixed lanes, so that the sum vectorises and does not depend on the instruction set.
+#[inline(always)]
+pub(crate) fn weighted_dot(x: &[f64], y: &[f64], mass: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let mut sums = [0.0; LANES];
+    let ((x, x_rest), (y, y_rest), (m, m_rest)) =
+        (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), mass.as_chunks::<LANES>());
+    for ((x, y), m) in x.iter().zip(y).zip(m) {
+        for i in 0..LANES {
+            sums[i] += m[i] * (x[i] * y[i]);
+        }
+    }
+    let rest: f64 = x_rest.iter().zip(y_rest).zip(m_rest).map(|((x, y), m)| m * (x * y)).sum();
+    sums.iter().sum::<f64>() + rest
+}

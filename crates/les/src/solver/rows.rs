@@ -1,0 +1,150 @@
+//! Kernels on rows of memory axis 0. They are inlined into functions that are compiled for several instruction sets;
+//! products and sums are kept apart, so that each version gives the same bits.
+
+use super::line::Taps;
+use super::transport::PAIR;
+
+/// Values before and after a padded row.
+pub(crate) const HALO: usize = 4;
+
+/// A banded operator along axis 0: for each offset one coefficient per column.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Columns {
+    bands: Vec<(usize, Vec<f64>)>,
+}
+
+impl Columns {
+    /// The operator with the rows `rows`, whose taps are at most [`HALO`] away, in the periodic sense if `periodic`.
+    pub(crate) fn new(rows: &[Taps], periodic: bool) -> Self {
+        let n = rows.len();
+        let mut bands = vec![vec![0.0; n]; 2 * HALO + 1];
+        for (i, row) in rows.iter().enumerate() {
+            for &(index, c) in row {
+                // A wrapped tap belongs to the offset that the padded row shows it at.
+                let band = (0..=2 * HALO).find(|band| {
+                    let place = (i + band) as isize - HALO as isize;
+                    if periodic { place.rem_euclid(n as isize) == index as isize } else { place == index as isize }
+                });
+                if let Some(band) = band {
+                    bands[band][i] += c;
+                }
+            }
+        }
+        let used = bands.into_iter().enumerate().filter(|(_, band)| band.iter().any(|c| *c != 0.0));
+        Self { bands: used.collect() }
+    }
+
+    /// `out += self padded`.
+    #[inline(always)]
+    pub(crate) fn add(&self, out: &mut [f64], padded: &[f64]) {
+        let mut bands = self.bands.as_slice();
+        while let [a, b, c, d, rest @ ..] = bands {
+            add_products(out, [&a.1, &b.1, &c.1, &d.1], [a.0, b.0, c.0, d.0].map(|offset| &padded[offset..]));
+            bands = rest;
+        }
+        for (offset, coefficient) in bands {
+            let values = &padded[*offset..];
+            for ((out, c), x) in out.iter_mut().zip(coefficient).zip(values) {
+                *out += c * x;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add_products(out: &mut [f64], c: [&[f64]; 4], x: [&[f64]; 4]) {
+    let n = out.len();
+    let [c0, c1, c2, c3] = c.map(|c| &c[..n]);
+    let [x0, x1, x2, x3] = x.map(|x| &x[..n]);
+    for i in 0..n {
+        out[i] += (c0[i] * x0[i] + c1[i] * x1[i]) + (c2[i] * x2[i] + c3[i] * x3[i]);
+    }
+}
+
+/// Copies `row` between its halos: wrapped if `periodic`, else zero.
+#[inline(always)]
+pub(crate) fn pad(padded: &mut [f64], row: &[f64], periodic: bool) {
+    let n = row.len();
+    padded[HALO..HALO + n].copy_from_slice(row);
+    wrap(padded, n, periodic);
+}
+
+/// Fills the halos of a padded row of `n` values.
+#[inline(always)]
+pub(crate) fn wrap(padded: &mut [f64], n: usize, periodic: bool) {
+    if periodic {
+        for h in 0..HALO {
+            // One value is its own neighbour on both sides.
+            padded[HALO - 1 - h] = padded[HALO + n - 1 - h % n];
+            padded[HALO + n + h] = padded[HALO + h % n];
+        }
+    } else {
+        padded[..HALO].fill(0.0);
+        padded[HALO + n..HALO + n + HALO].fill(0.0);
+    }
+}
+
+/// `out += sum c row`, the rows of `field` starting at the given places.
+#[inline(always)]
+pub(crate) fn add_rows(out: &mut [f64], field: &[f64], taps: &[(usize, f64)]) {
+    let n = out.len();
+    let mut taps = taps;
+    while let [a, b, c, d, rest @ ..] = taps {
+        let [x0, x1, x2, x3] = [a.0, b.0, c.0, d.0].map(|start| &field[start..start + n]);
+        for i in 0..n {
+            out[i] += (a.1 * x0[i] + b.1 * x1[i]) + (c.1 * x2[i] + d.1 * x3[i]);
+        }
+        taps = rest;
+    }
+    for &(start, c) in taps {
+        for (out, x) in out.iter_mut().zip(&field[start..start + n]) {
+            *out += c * x;
+        }
+    }
+}
+
+/// `out += scale transport`, by the pairs of the interior: fluxes `g` at -1, 0, 1, 2 and values `q` at -3, -1, 1, 3.
+#[inline(always)]
+pub(crate) fn add_pairs(out: &mut [f64], scale: f64, g: [&[f64]; 4], q: [&[f64]; 4]) {
+    let n = out.len();
+    let [g0, g1, g2, g3] = g.map(|g| &g[..n]);
+    let [q0, q1, q2, q3] = q.map(|q| &q[..n]);
+    let (near, far) = (scale * PAIR[0], scale * PAIR[1]);
+    for i in 0..n {
+        out[i] += near * (g2[i] * q2[i] - g1[i] * q1[i]) + far * (g3[i] * q3[i] - g0[i] * q0[i]);
+    }
+}
+
+/// `out += scale g q`.
+#[inline(always)]
+pub(crate) fn add_product(out: &mut [f64], scale: f64, g: &[f64], q: &[f64]) {
+    for ((out, g), q) in out.iter_mut().zip(g).zip(q) {
+        *out += scale * g * q;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_apply_the_rows_with_and_without_wrapping() {
+        for (n, periodic) in [(9, true), (5, true), (4, true), (9, false)] {
+            let index = |i: usize, o: isize| (i as isize + o).rem_euclid(n as isize) as usize;
+            let rows: Vec<Taps> = (0..n)
+                .map(|i| (-2..=2).map(|o| (index(i, o), (i as f64) + 0.1 * o as f64)).collect::<Taps>())
+                .map(|row| if periodic { row } else { row.into_iter().take(1).filter(|t| t.0 + 2 < n).collect() })
+                .collect();
+            let x: Vec<f64> = (0..n).map(|i| ((3 * i) as f64).cos()).collect();
+            let mut padded = vec![0.0; n + 2 * HALO];
+            pad(&mut padded, &x, periodic);
+            let mut out = vec![0.0; n];
+            Columns::new(&rows, periodic).add(&mut out, &padded);
+            for (i, row) in rows.iter().enumerate() {
+                let reachable = |j: usize| periodic || j.abs_diff(i) <= HALO;
+                let expected: f64 = row.iter().filter(|t| reachable(t.0)).map(|&(j, c)| c * x[j]).sum();
+                assert!((out[i] - expected).abs() < 1e-14, "n = {n}, row {i}");
+            }
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! What a simulation is told beside its mesh and its initial field.
+
+use crate::Error;
+use crate::error::check;
+
+/// Time integration of convection and subgrid stresses; viscosity is Crank-Nicolson along implicit axes in both.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum TimeScheme {
+    /// Second-order Adams-Bashforth, (22): one pressure solve per step; the first step is an Euler step.
+    #[default]
+    AdamsBashforth2,
+    /// The low-storage Runge-Kutta scheme of three stages of Wray (Spalart, Moser and Rogers 1991): three pressure solves per
+    /// step, about four times the step.
+    RungeKutta3,
+}
+
+impl TimeScheme {
+    /// Fraction of the time step and the weights of the new and of the old terms, stage by stage; `ratio` is the step over
+    /// the one before, `None` where no old terms exist.
+    pub(crate) fn stages(self, ratio: Option<f64>) -> Vec<Stage> {
+        match (self, ratio) {
+            (Self::AdamsBashforth2, None) => vec![Stage { fraction: 1.0, new: 1.0, old: 0.0 }],
+            (Self::AdamsBashforth2, Some(r)) => vec![Stage { fraction: 1.0, new: 1.0 + 0.5 * r, old: -0.5 * r }],
+            (Self::RungeKutta3, _) => {
+                let gamma = [8.0 / 15.0, 5.0 / 12.0, 3.0 / 4.0];
+                let zeta = [0.0, -17.0 / 60.0, -5.0 / 12.0];
+                let stage = |i: usize| {
+                    let fraction = gamma[i] + zeta[i];
+                    Stage { fraction, new: gamma[i] / fraction, old: zeta[i] / fraction }
+                };
+                vec![stage(0), stage(1), stage(2)]
+            }
+        }
+    }
+
+    /// Courant number that the scheme runs at by default.
+    pub fn default_courant(self) -> f64 {
+        match self {
+            Self::AdamsBashforth2 => 0.35,
+            Self::RungeKutta3 => 1.2,
+        }
+    }
+
+    /// Courant number beyond which a step is refused.
+    pub fn largest_courant(self) -> f64 {
+        match self {
+            Self::AdamsBashforth2 => 1.0,
+            Self::RungeKutta3 => 2.0,
+        }
+    }
+}
+
+/// One stage of a time step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Stage {
+    pub(crate) fraction: f64,
+    pub(crate) new: f64,
+    pub(crate) old: f64,
+}
+
+/// How long a time step is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TimeStep {
+    /// Always the same.
+    Fixed {
+        /// Time step \[s\].
+        step_s: f64,
+    },
+    /// As long as a Courant number `dt max sum |u_i|/h_i` and a longest step allow; it grows by at most a tenth per step.
+    Courant {
+        /// Courant number.
+        courant: f64,
+        /// Longest step \[s\].
+        longest_s: f64,
+    },
+}
+
+/// Along which directions viscosity is implicit (Crank-Nicolson with line solves). The others are integrated as
+/// convection is, which costs no line solve but limits the time step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum ViscousTreatment {
+    /// Implicit along the directions in which the first time step exceeds a tenth of the explicit limit.
+    #[default]
+    Auto,
+    /// Implicit along x, y, z where true.
+    Implicit([bool; 3]),
+}
+
+/// The physical and numerical settings of a [`Flow`](super::Flow).
+#[derive(Debug, Clone)]
+pub struct FlowSettings {
+    /// Kinematic viscosity \[m^2/s\]; zero is allowed between slip walls.
+    pub viscosity_m2_s: f64,
+    /// Body force per mass along x, y, z \[m/s^2\].
+    pub force_m_s2: [f64; 3],
+    /// Time integration.
+    pub scheme: TimeScheme,
+    /// Length of the time step.
+    pub time_step: TimeStep,
+    /// Directions of implicit viscosity.
+    pub viscous: ViscousTreatment,
+    /// Which pressure solver.
+    pub pressure: super::PressureMethod,
+    /// Relative residual at which the pressure equation counts as solved.
+    pub pressure_tolerance: f64,
+    /// Rotational form of the pressure update (Timmermans, Minev and Van de Vosse 1996): `p += phi - nu/2 div u*`, which
+    /// removes the numerical boundary layer of the pressure at walls. It takes one more array.
+    pub rotational: bool,
+    /// Subgrid model.
+    pub subgrid: super::SubgridModel,
+    /// Order of the directions in memory, slowest last; `None` chooses. It changes rounding, nothing else.
+    pub memory_order: Option<[usize; 3]>,
+}
+
+impl FlowSettings {
+    /// The defaults for a viscosity and a way to step in time.
+    pub fn new(viscosity_m2_s: f64, time_step: TimeStep) -> Self {
+        Self {
+            viscosity_m2_s,
+            force_m_s2: [0.0; 3],
+            scheme: TimeScheme::default(),
+            time_step,
+            viscous: ViscousTreatment::default(),
+            pressure: super::PressureMethod::Auto,
+            pressure_tolerance: 1e-10,
+            rotational: false,
+            subgrid: super::SubgridModel::None,
+            memory_order: None,
+        }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        check("viscosity_m2_s", self.viscosity_m2_s, "finite and not negative", |nu| nu >= 0.0)?;
+        for force in self.force_m_s2 {
+            check("force_m_s2", force, "finite", |_| true)?;
+        }
+        check("pressure_tolerance", self.pressure_tolerance, "between 1e-15 and 0.1", |t| (1e-15..=0.1).contains(&t))?;
+        match self.time_step {
+            TimeStep::Fixed { step_s } => check("step_s", step_s, "finite and positive", |dt| dt > 0.0)?,
+            TimeStep::Courant { courant, longest_s } => {
+                let limit = self.scheme.largest_courant();
+                check("courant", courant, "positive, at most 1 (Adams-Bashforth) or 2 (Runge-Kutta)", |c| {
+                    c > 0.0 && c <= limit
+                })?;
+                check("longest_s", longest_s, "finite and positive", |dt| dt > 0.0)?;
+            }
+        }
+        let order = self.memory_order.unwrap_or([0, 1, 2]);
+        let mut sorted = order;
+        sorted.sort_unstable();
+        if sorted != [0, 1, 2] {
+            let value = order[0] as f64;
+            return Err(Error::OutOfRange { field: "memory_order", value, allowed: "a permutation of 0, 1, 2" });
+        }
+        Ok(())
+    }
+}
