@@ -129,3 +129,54 @@ fn taylor_green_vortices_on_a_mesh_stretched_both_ways_converge_with_fourth_orde
     let order = (coarse / fine).log2();
     assert!(order > 3.9, "errors {coarse}, {fine}: order {order}");
 }
+
+#[test]
+#[ignore]
+fn tmp_timing() {
+    let n = 64;
+    let case = super::super::cases::taylor_green_3d(n, 1600.0).unwrap();
+    let mut flow = Flow::at_rest(case.mesh.clone(), case.settings.clone()).unwrap();
+    for a in 0..3 {
+        for (i, v) in flow.state.velocity[a].iter_mut().enumerate() {
+            *v = ((i * i % 977) as f64 * 0.01).sin();
+        }
+    }
+    let cells = (n * n * n) as f64;
+    let time = |name: &str, f: &mut dyn FnMut()| {
+        f();
+        let mut best = f64::INFINITY;
+        for _ in 0..5 {
+            let t = std::time::Instant::now();
+            f();
+            best = best.min(t.elapsed().as_secs_f64());
+        }
+        println!("{name}: {:.4} us/cell", best * 1e6 / cells);
+    };
+    time("momentum explicit", &mut || {
+        flow.momentum(&Stage { fraction: 1.0, new: 1.5, old: -0.5 }, 1e-3, false);
+    });
+    let star = flow.work.star.clone();
+    let phi = star[0].clone();
+    time("divergence", &mut || {
+        flow.divergence.apply(star.each_ref().map(Vec::as_slice), 1.0, &mut flow.work.phi);
+    });
+    time("correct", &mut || {
+        correct(
+            &flow.ops,
+            &flow.layout,
+            star.each_ref().map(Vec::as_slice),
+            &phi,
+            1e-3,
+            flow.state.velocity.each_mut().map(Vec::as_mut_slice),
+        );
+    });
+    time("pressure update", &mut || flow.update_pressure());
+    flow.state.implicit = [false, false, true];
+    time("lines z", &mut || flow.solve_lines(1e-4));
+    flow.line_solvers.clear();
+    flow.state.implicit = [false, true, false];
+    time("lines y", &mut || flow.solve_lines(1e-4));
+    flow.line_solvers.clear();
+    flow.state.implicit = [true, false, false];
+    time("lines x", &mut || flow.solve_lines(1e-4));
+}

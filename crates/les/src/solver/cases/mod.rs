@@ -2,9 +2,19 @@
 //!
 //! All are in the units of their literature (lengths, speeds of order one), which the solver takes as SI.
 
+mod cavity;
+mod channel;
+mod dipole;
+mod orr_sommerfeld;
 mod taylor_green;
+mod vortex_pair;
 
+pub use cavity::lid_driven_cavity;
+pub use channel::{channel, couette, decaying_layer, poiseuille, rayleigh_plate};
+pub use dipole::dipole_against_wall;
+pub use orr_sommerfeld::TollmienSchlichting;
 pub use taylor_green::{taylor_green_3d, taylor_green_plane, taylor_green_plane_exact};
+pub use vortex_pair::{PAIR_CIRCULATION, VortexPairCase};
 
 use super::mesh::Mesh;
 use super::settings::FlowSettings;
