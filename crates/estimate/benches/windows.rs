@@ -18,6 +18,7 @@ fn windows(criterion: &mut Criterion) {
     let (real, mut scratch) = (window(), Scratch::new());
     let complex: Vec<_> = real.iter().map(|x| Complex::new(*x, 0.5 * x)).collect();
     let mut lags = vec![0.0; 64];
+    plan.statistic.evaluate(&real, &mut scratch, &mut lags);
     criterion.bench_function("correlogram, 64 real samples", |b| {
         b.iter(|| plan.statistic.evaluate(black_box(&real), &mut scratch, &mut lags));
     });
@@ -34,8 +35,18 @@ fn windows(criterion: &mut Criterion) {
     criterion.bench_function("the same with exact refinement", |b| {
         b.iter(|| exact.estimator.estimate(black_box(&lags), &mut scratch));
     });
+    let (mut model, mut work) = (Autoregression::default(), Vec::new());
     criterion.bench_function("Levinson recursion of order 16", |b| {
-        b.iter(|| Autoregression::yule_walker(black_box(&lags), SignalKind::Real, 16).unwrap().noise_power);
+        b.iter(|| model.fit(black_box(&lags), SignalKind::Real, 16, &mut work).unwrap());
+    });
+    let sliding = ShortCorrelogram::<f64>::new(64, 17).unwrap();
+    let record: Vec<f64> = (0..1063).map(|n| (2.0106 * n as f64).cos() + 0.3 * (n as f64 * 12.9898).sin()).collect();
+    criterion.bench_function("sliding correlogram of 17 lags, 1000 windows", |b| {
+        b.iter(|| {
+            let mut sum = 0.0;
+            sliding.evaluate_record(black_box(&record), 1, &|_| true, &mut scratch, &mut |_, lags| sum += lags[16]);
+            sum
+        });
     });
     let ca = AutoregressivePeak::new(&sampling, SignalKind::Real, 64, 16, 2048, Refinement::Parabola).unwrap();
     criterion.bench_function("AR(16), spectrum of 2048 points and peak", |b| {
@@ -50,9 +61,18 @@ fn windows(criterion: &mut Criterion) {
         b.iter(|| direct.density(black_box(&real), &mut scratch).unwrap()[300]);
     });
     let model = WindowModel::gaussian_pulse(&sampling, 64, 120e-9, Noise::White).unwrap();
-    let tapers = Correlogram::<f64>::with_tapers(likelihood_tapers(&model, 10.0).unwrap()).unwrap();
-    criterion.bench_function("likelihood correlogram at 10 dB", |b| {
-        b.iter(|| tapers.evaluate(black_box(&real), &mut scratch, &mut lags));
+    let mut tapers = likelihood_tapers(&model, 10.0).unwrap();
+    tapers.truncate(4);
+    let likelihood = Correlogram::<f64>::with_tapers(tapers).unwrap();
+    criterion.bench_function("likelihood of 4 tapers, with the peak of 1024 points", |b| {
+        b.iter(|| {
+            likelihood.evaluate(black_box(&real), &mut scratch, &mut lags);
+            plan.estimator.estimate(&lags, &mut scratch)
+        });
+    });
+    let capon = CaponPeak::new(&sampling, SignalKind::Real, 64, 16, 1024, Refinement::Parabola).unwrap();
+    criterion.bench_function("Capon of 17 samples, 1024 points and peak", |b| {
+        b.iter(|| capon.estimate(black_box(&lags), &mut scratch));
     });
 }
 

@@ -102,19 +102,15 @@ impl Scan {
         for_each_chunk(
             &mut sums,
             count * numbers,
-            || (Scratch::new(), vec![0.0; numbers], Vec::with_capacity(samples)),
-            |(scratch, one, row), line, chunk| {
+            || (Scratch::new(), Vec::with_capacity(samples)),
+            |(scratch, row), line, chunk| {
                 for &ray in &geometry.line_rays()[line] {
                     row.clear();
                     row.extend(records.row(ray).iter().map(|s| s.scaled(scale.recip())));
-                    for (gate, sum) in chunk.chunks_exact_mut(numbers).enumerate() {
-                        if invalid[ray].as_ref().is_some_and(|invalid| invalid[gate]) {
-                            continue;
-                        }
-                        let start = gate * gates.step_samples;
-                        statistic.evaluate(&row[start..start + gates.window_samples], scratch, one);
-                        add(sum, one);
-                    }
+                    let valid = |gate: usize| !invalid[ray].as_ref().is_some_and(|invalid| invalid[gate]);
+                    statistic.evaluate_record(row, gates.step_samples, &valid, scratch, &mut |gate, one| {
+                        add(&mut chunk[gate * numbers..(gate + 1) * numbers], one);
+                    });
                 }
                 prefix_in_blocks(chunk, numbers);
             },

@@ -12,8 +12,61 @@
 use num_complex::Complex;
 
 use crate::error::Error;
+use crate::levinson::reflect;
+use crate::poles::roots;
 use crate::sample::{Sample, SignalKind, binary_scale};
 use crate::sampling::Sampling;
+
+/// How the order of a model is found, from the prediction errors of all orders up to a largest one.
+///
+/// Both criteria weigh n ln(prediction error) against the number of coefficients p, with n the number of independent
+/// samples behind the correlogram (those of one window times [`n_eff`](crate::MapPoint::n_eff)).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum OrderChoice {
+    /// The given order.
+    Fixed,
+    /// Least n ln(error) + 2 p (Akaike 1974): AIC.
+    Akaike {
+        /// n.
+        samples: f64,
+    },
+    /// Least n ln(error) + p ln n (Rissanen 1978): MDL, which does not overestimate the order of a long record.
+    DescriptionLength {
+        /// n.
+        samples: f64,
+    },
+}
+
+impl OrderChoice {
+    /// The order with the least value of the criterion, 1 .. p, from the reflection coefficients of all p stages.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the number of samples is not above 0, [`Error::Empty`] without stages.
+    pub fn order(&self, reflection: &[Complex<f64>]) -> Result<usize, Error> {
+        let (samples, penalty) = match *self {
+            Self::Fixed => (1.0, f64::NEG_INFINITY),
+            Self::Akaike { samples } => (samples, 2.0),
+            Self::DescriptionLength { samples } => (samples, samples.ln()),
+        };
+        crate::error::positive("samples", samples)?;
+        if reflection.is_empty() {
+            return Err(Error::Empty { field: "reflection" });
+        }
+        if *self == Self::Fixed {
+            return Ok(reflection.len());
+        }
+        let (mut best, mut least, mut value) = (1, f64::INFINITY, 0.0);
+        for (stage, k) in reflection.iter().enumerate() {
+            // a pure line leaves no error: the logarithm stays finite
+            value += samples * (1.0 - k.norm_sqr()).max(f64::MIN_POSITIVE).ln() + penalty;
+            if value < least {
+                (best, least) = (stage + 1, value);
+            }
+        }
+        Ok(best)
+    }
+}
 
 /// x(n) = - sum over k = 1 .. p of a_k x(n-k) + w(n), w white noise.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -35,23 +88,84 @@ impl Autoregression {
     pub fn yule_walker(correlogram: &[f64], kind: SignalKind, order: usize) -> Result<Self, Error> {
         check_order(order, correlogram.len() / kind.lag_numbers(1))?;
         let mut model = Self::default();
-        model.solve(correlogram, kind, order)?;
+        model.solve(correlogram, kind, order, &mut Vec::with_capacity(4 * order))?;
         Ok(model)
     }
 
-    /// The Levinson-Durbin recursion into this model, without allocation once its vectors have grown.
-    pub(crate) fn solve(&mut self, correlogram: &[f64], kind: SignalKind, order: usize) -> Result<(), Error> {
+    /// The same into this model, without allocation once its vectors and `work` have grown.
+    ///
+    /// # Errors
+    /// As [`Autoregression::yule_walker`]; the model is then unspecified.
+    pub fn fit(
+        &mut self,
+        correlogram: &[f64],
+        kind: SignalKind,
+        order: usize,
+        work: &mut Vec<f64>,
+    ) -> Result<(), Error> {
+        check_order(order, correlogram.len() / kind.lag_numbers(1))?;
+        self.solve(correlogram, kind, order, work)
+    }
+
+    /// The recursion for an order that is known to fit.
+    pub(crate) fn solve(
+        &mut self,
+        correlogram: &[f64],
+        kind: SignalKind,
+        order: usize,
+        work: &mut Vec<f64>,
+    ) -> Result<(), Error> {
         self.coefficients.clear();
         self.reflection.clear();
         self.noise_power = kind.lag(correlogram, 0).re;
         crate::error::positive("lag 0 of the correlogram", self.noise_power)?;
-        for m in 1..=order {
-            let forward: Complex<f64> =
-                self.coefficients.iter().enumerate().map(|(j, a)| a * kind.lag(correlogram, m - 1 - j)).sum();
-            let reflection = -(kind.lag(correlogram, m) + forward) / self.noise_power;
-            self.extend(reflection)?;
+        match kind {
+            SignalKind::Real => {
+                let found = reflect(correlogram, order, work).map_err(unstable)?;
+                self.coefficients.extend(found.coefficients.iter().map(|a| Complex::from(*a)));
+                self.reflection.extend(found.reflection.iter().map(|k| Complex::from(*k)));
+                self.noise_power = found.noise_power;
+            }
+            SignalKind::Complex => {
+                for m in 1..=order {
+                    let past = self.coefficients.iter().enumerate();
+                    let forward: Complex<f64> = past.map(|(j, a)| a * kind.lag(correlogram, m - 1 - j)).sum();
+                    let reflection = -(kind.lag(correlogram, m) + forward) / self.noise_power;
+                    let size = reflection.norm();
+                    if size.is_nan() || size >= 1.0 {
+                        return Err(unstable(size));
+                    }
+                    self.update(reflection);
+                }
+            }
         }
         Ok(())
+    }
+
+    /// The model of a lower order of the same signal, from the first reflection coefficients.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the order is 0 or above that of this model.
+    pub fn truncated(&self, order: usize) -> Result<Self, Error> {
+        check_order(order, self.order() + 1)?;
+        let errors = self.reflection.iter().map(|k| 1.0 - k.norm_sqr());
+        let mut model = Self { noise_power: self.noise_power / errors.product::<f64>(), ..Self::default() };
+        self.reflection[..order].iter().for_each(|k| model.update(*k));
+        Ok(model)
+    }
+
+    /// The model of the order that `choice` prefers among those up to `largest`.
+    ///
+    /// # Errors
+    /// As [`Autoregression::yule_walker`] and [`OrderChoice::order`].
+    pub fn of_chosen_order(
+        correlogram: &[f64],
+        kind: SignalKind,
+        largest: usize,
+        choice: OrderChoice,
+    ) -> Result<Self, Error> {
+        let model = Self::yule_walker(correlogram, kind, largest)?;
+        model.truncated(choice.order(&model.reflection)?)
     }
 
     /// Model of order `order` of one window by Burg's method: forward and backward prediction errors together.
@@ -85,21 +199,6 @@ impl Autoregression {
         }
         model.noise_power *= scale * scale;
         Ok(model)
-    }
-
-    /// Adds a stage; refuses one that is not inside the unit circle.
-    fn extend(&mut self, reflection: Complex<f64>) -> Result<(), Error> {
-        let size = reflection.norm();
-        if size < 1.0 {
-            self.update(reflection);
-            Ok(())
-        } else {
-            Err(Error::OutOfRange {
-                field: "reflection coefficient",
-                value: size,
-                allowed: "below 1: the correlogram is not positive definite (is it the biased one?)",
-            })
-        }
     }
 
     /// The Levinson update of coefficients and noise power.
@@ -138,17 +237,65 @@ impl Autoregression {
         self.noise_power / (sum + 1.0).norm_sqr()
     }
 
-    /// Correlogram of the coefficients 1, a_1 .. a_p themselves: the transform of its p + 1 lags is |A|^2.
-    pub(crate) fn inverse_lags(&self, kind: SignalKind, out: &mut Vec<f64>) {
+    /// Densities (32) at any frequencies \[Hz\], in their order.
+    #[must_use]
+    pub fn densities(&self, frequency_hz: &[f64], sampling: &Sampling) -> Vec<f64> {
+        frequency_hz.iter().map(|&f_hz| self.density(f_hz, sampling)).collect()
+    }
+
+    /// Poles: the p roots of z^p + a_1 z^(p-1) + ... + a_p, in no order.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if a coefficient is not finite or the roots do not settle.
+    pub fn poles(&self) -> Result<Vec<Complex<f64>>, Error> {
+        roots(&self.coefficients).ok_or(Error::OutOfRange {
+            field: "coefficients",
+            value: self.coefficients.iter().map(|a| a.norm()).fold(0.0, f64::max),
+            allowed: "finite, with roots that can be told apart",
+        })
+    }
+
+    /// The pole nearest to the unit circle among those whose frequency lies in the detector band: frequency \[Hz\] and modulus.
+    ///
+    /// `None` if the band holds no pole.
+    ///
+    /// # Errors
+    /// As [`Autoregression::poles`].
+    pub fn nearest_pole(&self, sampling: &Sampling) -> Result<Option<(f64, f64)>, Error> {
+        let (low_hz, high_hz) = sampling.band_hz;
+        let places = self.poles()?.into_iter().map(|pole| {
+            let (modulus, angle) = pole.to_polar();
+            (angle / std::f64::consts::TAU * sampling.sample_rate_hz, modulus)
+        });
+        let inside = places.filter(|(frequency_hz, _)| (low_hz..=high_hz).contains(frequency_hz));
+        Ok(inside.max_by(|a, b| a.1.total_cmp(&b.1)))
+    }
+
+    /// The correlogram whose transform is |A|^2 / noise power, or with `capon` e^H R^-1 e / (p + 1) with R of order p + 1.
+    ///
+    /// The second is the sum of |A|^2 / noise power over the models of orders 0 .. p, collected by Musicus (1985).
+    pub(crate) fn inverse_lags(&self, kind: SignalKind, capon: bool, out: &mut Vec<f64>) {
+        let order = self.order();
         let a = |k: usize| if k == 0 { Complex::ONE } else { self.coefficients[k - 1] };
         out.clear();
-        for m in 0..=self.order() {
-            let lag: Complex<f64> = (0..=self.order() - m).map(|k| a(k + m) * a(k).conj()).sum();
-            out.push(lag.re);
+        for m in 0..=order {
+            let weight = |k: usize| if capon { (order + 1 - m) as f64 - 2.0 * k as f64 } else { 1.0 };
+            let lag: Complex<f64> = (0..=order - m).map(|k| a(k + m) * a(k).conj() * weight(k)).sum();
+            let scale = if capon { 1.0 / ((order + 1) as f64 * self.noise_power) } else { 1.0 / self.noise_power };
+            out.push(lag.re * scale);
             if kind == SignalKind::Complex {
-                out.push(lag.im);
+                out.push(lag.im * scale);
             }
         }
+    }
+}
+
+/// The error of a reflection coefficient of that size.
+fn unstable(size: f64) -> Error {
+    Error::OutOfRange {
+        field: "reflection coefficient",
+        value: size,
+        allowed: "below 1: the correlogram is not positive definite (is it the biased one?)",
     }
 }
 

@@ -70,6 +70,18 @@ impl<S: Sample> Correlogram<S> {
         &self.tapers
     }
 
+    /// Weights of the lags of white data, w_m = sum over tapers of factor times the tapers' correlogram, w_0 = 1: 1 - m / N without weighting.
+    ///
+    /// [`SpectralPeak::with_lag_weights`](crate::SpectralPeak::with_lag_weights) takes them to tell spectral width from resolution.
+    #[must_use]
+    pub fn lag_weights(&self) -> Vec<f64> {
+        let at = |m: usize| -> f64 {
+            let of = |h: &[f64]| h[m..].iter().zip(h).map(|(a, b)| a * b).sum::<f64>();
+            self.tapers.iter().map(|taper| taper.factor * of(&taper.weights)).sum()
+        };
+        (0..self.lags()).map(|m| at(m) / at(0)).collect()
+    }
+
     /// Number of lags N, lag 0 included.
     #[must_use]
     pub fn lags(&self) -> usize {

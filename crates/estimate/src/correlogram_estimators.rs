@@ -1,89 +1,17 @@
-//! Estimators that work on an accumulated correlogram beside the periodogram: AR peak (CA), lag window, pulse pair.
+//! Estimators that work on an accumulated correlogram beside the periodogram and the models: lag window and pulse pair.
 //!
-//! Computes velocities from the mean biased correlogram of a region: CA is the peak of the AR spectrum (32) of order 16 in the
-//! literal form; the lag-window form multiplies the correlogram by a Hann window and transforms it. Check: both against spectra
-//! evaluated frequency by frequency, a stored window, and tones.
+//! Computes velocities from the mean biased correlogram of a region: CA-BT multiplies it by a Hann window and
+//! transforms it; the pulse pair takes the phase of lag 1. Check: spectra evaluated frequency by frequency, tones, noise.
 
 use num_complex::Complex;
 
 use crate::autoregressive::check_order;
 use crate::error::Error;
-use crate::peak::{PeakSearch, SpectralPeak, unusable};
+use crate::peak::SpectralPeak;
 use crate::sample::{Scratch, SignalKind};
 use crate::sampling::Sampling;
-use crate::spectrum::LagSpectrum;
 use crate::statistic::Estimator;
 use crate::velocity::{GateVelocity, Quality, Refinement};
-
-/// CA: peak of the autoregressive spectrum of the accumulated correlogram in the detector band.
-#[derive(Clone)]
-pub struct AutoregressivePeak {
-    order: usize,
-    lags: usize,
-    kind: SignalKind,
-    inverse: LagSpectrum,
-    search: PeakSearch,
-    refinement: Refinement,
-}
-
-impl AutoregressivePeak {
-    /// Plans AR(`order`) of correlograms with `lags` lags and a search over `padded_samples` frequencies.
-    ///
-    /// The chapter uses order 16; 2048 frequencies or more resolve its peaks. [`Refinement::Exact`] counts as
-    /// the parabola.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] unless 1 <= `order` < `lags`; [`Error::Band`] for an impossible band.
-    pub fn new(
-        sampling: &Sampling,
-        kind: SignalKind,
-        lags: usize,
-        order: usize,
-        padded_samples: usize,
-        refinement: Refinement,
-    ) -> Result<Self, Error> {
-        check_order(order, lags)?;
-        Ok(Self {
-            order,
-            lags,
-            kind,
-            inverse: LagSpectrum::new(kind, order + 1, padded_samples)?,
-            search: PeakSearch::new(sampling, kind, padded_samples, 1.0 / lags as f64)?,
-            refinement,
-        })
-    }
-}
-
-impl Estimator for AutoregressivePeak {
-    fn statistic_len(&self) -> usize {
-        self.kind.lag_numbers(self.lags)
-    }
-
-    fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
-        if let Some(flag) = unusable(mean) {
-            return GateVelocity::none(flag);
-        }
-        let mut model = std::mem::take(&mut scratch.model);
-        let mut numbers = std::mem::take(&mut scratch.numbers);
-        let solved = model.solve(mean, self.kind, self.order).is_ok();
-        let mut estimate = GateVelocity::none(Quality::Invalid);
-        if solved {
-            model.inverse_lags(self.kind, &mut numbers);
-            if self.inverse.density(&numbers, scratch).is_ok() {
-                // a pole on the circle to rounding must not turn the density negative or infinite
-                let least = f64::MIN_POSITIVE.max(1e-300 * model.noise_power);
-                for value in &mut scratch.density {
-                    *value = model.noise_power / value.max(least);
-                }
-                let found = self.search.locate(&scratch.density, self.refinement);
-                estimate = self.search.velocity(&found, self.search.band.frequency_hz(found.bin));
-            }
-        }
-        scratch.model = model;
-        scratch.numbers = numbers;
-        estimate
-    }
-}
 
 /// Peak of the transform of the accumulated correlogram times a Hann lag window (Blackman and Tukey 1958).
 #[derive(Clone)]
@@ -110,12 +38,12 @@ impl LagWindowPeak {
     ) -> Result<Self, Error> {
         check_order(reach_lags, lags)?;
         let turn = std::f64::consts::PI / reach_lags as f64;
-        Ok(Self {
-            weights: (0..reach_lags).map(|m| 0.5 + 0.5 * (turn * m as f64).cos()).collect(),
-            lags,
-            kind,
-            peak: SpectralPeak::new(sampling, kind, reach_lags, padded_samples, refinement)?,
-        })
+        let weights: Vec<f64> = (0..reach_lags).map(|m| 0.5 + 0.5 * (turn * m as f64).cos()).collect();
+        let triangle = |m: usize| 1.0 - m as f64 / lags as f64;
+        let seen: Vec<f64> = weights.iter().enumerate().map(|(m, weight)| weight * triangle(m)).collect();
+        let peak =
+            SpectralPeak::new(sampling, kind, reach_lags, padded_samples, refinement)?.with_lag_weights(&seen)?;
+        Ok(Self { weights, lags, kind, peak })
     }
 }
 
@@ -150,6 +78,8 @@ pub struct PulsePair {
     kind: SignalKind,
     lags: usize,
     band: SpectralPeak,
+    /// exp(2 pi i f / F_s) at the frequencies of the band.
+    turns: Vec<Complex<f64>>,
 }
 
 impl PulsePair {
@@ -160,16 +90,15 @@ impl PulsePair {
     pub fn new(sampling: &Sampling, kind: SignalKind, lags: usize) -> Result<Self, Error> {
         check_order(1, lags)?;
         let band = SpectralPeak::new(sampling, kind, lags, 4 * lags, Refinement::None)?;
-        Ok(Self { sampling: *sampling, kind, lags, band })
+        let turn = std::f64::consts::TAU * sampling.period_s();
+        let turns = band.band_frequencies_hz().iter().map(|f_hz| Complex::from_polar(1.0, turn * f_hz)).collect();
+        Ok(Self { sampling: *sampling, kind, lags, band, turns })
     }
 
-    /// Lag 1 of the band-limited analytic signal, and its lag 0.
-    fn band_limited(&self, mean: &[f64], scratch: &mut Scratch) -> Option<(Complex<f64>, f64)> {
+    /// Lag 1 of the band-limited analytic signal.
+    fn band_limited(&self, mean: &[f64], scratch: &mut Scratch) -> Option<Complex<f64>> {
         let density = self.band.band_density(mean, scratch).ok()?;
-        let frequencies_hz = self.band.band_frequencies_hz();
-        let turn = std::f64::consts::TAU * self.sampling.period_s();
-        let lag = density.iter().zip(frequencies_hz).map(|(s, f_hz)| Complex::from_polar(*s, turn * f_hz)).sum();
-        Some((lag, density.iter().sum()))
+        Some(density.iter().zip(&self.turns).map(|(s, turn)| turn * s).sum())
     }
 }
 
@@ -179,16 +108,16 @@ impl Estimator for PulsePair {
     }
 
     fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
-        // flags and power are those of the spectrum in the band
+        // all but the velocity is that of the spectrum in the band
         let peak = self.band.estimate(mean, scratch);
         if !matches!(peak.flag, Quality::Good | Quality::OutOfBand) {
             return peak;
         }
         let lag = match self.kind {
-            SignalKind::Complex => Some((self.kind.lag(mean, 1), self.kind.lag(mean, 0).re)),
+            SignalKind::Complex => Some(self.kind.lag(mean, 1)),
             SignalKind::Real => self.band_limited(mean, scratch),
         };
-        let Some((lag, power)) = lag else {
+        let Some(lag) = lag else {
             return GateVelocity::none(Quality::Invalid);
         };
         let frequency_hz = lag.arg() / std::f64::consts::TAU * self.sampling.sample_rate_hz;
@@ -196,7 +125,6 @@ impl Estimator for PulsePair {
         let inside = (low_hz..=high_hz).contains(&frequency_hz);
         GateVelocity {
             velocity_m_s: self.sampling.velocity_m_s(frequency_hz),
-            quality: lag.norm() / power,
             flag: if inside { peak.flag } else { Quality::OutOfBand },
             ..peak
         }

@@ -30,11 +30,13 @@
 //! |---|---|
 //! | `sampling`, `gates`, `sample` | frequencies and velocities, windows and ranges, real and complex samples |
 //! | `weighting`, `transform`, `periodogram` | window weights, their transform, (29) and (30) |
-//! | `correlogram`, `spectrum` | biased correlogram and the density that belongs to it |
-//! | `velocity`, `statistic` | velocity with flags; the traits for estimators of one's own |
-//! | `peak`, `detection` | the search for the peak in the detector band; how high that of pure noise stands |
+//! | `correlogram`, `sliding`, `unbiased` | biased correlogram of all lags; of the first lags, slid along a record; the unbiased form |
+//! | `spectrum`, `zoom` | the density that belongs to a correlogram, on a whole grid and at chosen frequencies |
+//! | `velocity`, `statistic` | velocity with width, SNR, runner-up and flags; the traits for estimators of one's own |
+//! | `search`, `peak`, `detection` | the peak in the detector band and what it tells; how high that of pure noise stands |
 //! | `region`, `accumulate` | circular regions, accumulation level and n_eff; Table 3 |
-//! | `autoregressive`, `correlogram_estimators` | (31), (32); the estimators of the accumulated correlogram: CA, lag window, pulse pair |
+//! | `autoregressive`, `levinson`, `poles` | (31), (32): models, the choice of their order, their poles |
+//! | `model_peaks`, `correlogram_estimators` | estimators of the accumulated correlogram: CA, pole, Capon; lag window, pulse pair |
 //! | `likelihood` | tapers that make the accumulated periodogram the likelihood of a known pulse |
 //! | `bound`, `linalg` | Cramer-Rao bound; solve and eigenvectors with residual checks |
 //! | `error_map` | bias, standard deviation, root mean square with standard errors, (33) |
@@ -61,38 +63,49 @@ mod error_map;
 mod gates;
 #[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
 mod lapack;
+mod levinson;
 mod likelihood;
 mod linalg;
+mod model_peaks;
 #[cfg(feature = "openblas-system")]
 mod openblas;
 mod parallel;
 mod peak;
 mod periodogram;
+mod poles;
 mod region;
 mod sample;
 mod sampling;
+mod search;
+mod sliding;
 mod spectrum;
 mod statistic;
 mod transform;
+mod unbiased;
 mod velocity;
 mod weighting;
+mod zoom;
 
 pub use accumulate::{MapPoint, Radius, Scan};
-pub use autoregressive::Autoregression;
+pub use autoregressive::{Autoregression, OrderChoice};
 pub use bound::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s};
 pub use correlogram::{Correlogram, Taper, correlogram_by_sum};
-pub use correlogram_estimators::{AutoregressivePeak, LagWindowPeak, PulsePair};
+pub use correlogram_estimators::{LagWindowPeak, PulsePair};
 pub use detection::noise_quality;
 pub use error::Error;
 pub use error_map::{ErrorMap, ErrorStatistics};
 pub use gates::Gates;
 pub use likelihood::likelihood_tapers;
+pub use model_peaks::{AutoregressivePeak, AutoregressivePole, CaponPeak};
 pub use peak::SpectralPeak;
 pub use periodogram::{Periodogram, PeriodogramOptions, PeriodogramPlan};
 pub use region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, polar_points};
 pub use sample::{Sample, Scratch, SignalKind};
 pub use sampling::{SPEED_OF_LIGHT_M_S, Sampling};
+pub use sliding::ShortCorrelogram;
 pub use spectrum::{LagSpectrum, density_at};
 pub use statistic::{Estimator, Statistic, estimate_window};
-pub use velocity::{GateVelocity, Quality, Refinement};
+pub use unbiased::{Unbiased, unbiased_correlogram};
+pub use velocity::{GateVelocity, Quality, Refinement, RunnerUp};
 pub use weighting::Weighting;
+pub use zoom::ZoomSpectrum;

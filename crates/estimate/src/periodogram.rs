@@ -108,16 +108,11 @@ impl<S: Sample> PeriodogramPlan<S> {
     /// # Errors
     /// [`Error::Band`] or [`Error::OutOfRange`] if sampling, window or options make no sense.
     pub fn new(sampling: &Sampling, window_samples: usize, options: &PeriodogramOptions) -> Result<Self, Error> {
-        Ok(Self {
-            statistic: Correlogram::new(options.weighting, window_samples)?,
-            estimator: SpectralPeak::new(
-                sampling,
-                S::KIND,
-                window_samples,
-                options.padded_samples,
-                options.refinement,
-            )?,
-        })
+        let statistic = Correlogram::new(options.weighting, window_samples)?;
+        let estimator =
+            SpectralPeak::new(sampling, S::KIND, window_samples, options.padded_samples, options.refinement)?
+                .with_lag_weights(&statistic.lag_weights())?;
+        Ok(Self { statistic, estimator })
     }
 
     /// Velocity of one window.

@@ -62,6 +62,11 @@ pub trait Sample: Copy + Send + Sync + sealed::Sealed + 'static {
     fn largest_part(self) -> f64;
     /// Whether all parts are finite.
     fn is_finite(self) -> bool;
+    /// Adds the products of a sample that enters a window with itself and those before it, and takes away those of one that leaves it.
+    ///
+    /// `entering` ends with the new sample, `leaving` begins with the old one; both are as long as `sums` has lags.
+    #[doc(hidden)]
+    fn slide(sums: &mut [f64], entering: &[Self], leaving: &[Self]);
 }
 
 impl Sample for f64 {
@@ -78,6 +83,14 @@ impl Sample for f64 {
     fn is_finite(self) -> bool {
         f64::is_finite(self)
     }
+    fn slide(sums: &mut [f64], entering: &[Self], leaving: &[Self]) {
+        let (Some(&new), Some(&old)) = (entering.last(), leaving.first()) else {
+            return;
+        };
+        for ((sum, before), after) in sums.iter_mut().zip(entering.iter().rev()).zip(leaving) {
+            *sum += new * before - old * after;
+        }
+    }
 }
 
 impl Sample for Complex<f64> {
@@ -93,6 +106,17 @@ impl Sample for Complex<f64> {
     }
     fn is_finite(self) -> bool {
         Complex::is_finite(self)
+    }
+    fn slide(sums: &mut [f64], entering: &[Self], leaving: &[Self]) {
+        let (Some(&new), Some(&old)) = (entering.last(), leaving.first()) else {
+            return;
+        };
+        let (sums, _) = sums.as_chunks_mut::<2>();
+        for ((sum, before), after) in sums.iter_mut().zip(entering.iter().rev()).zip(leaving) {
+            let change = new * before.conj() - after * old.conj();
+            sum[0] += change.re;
+            sum[1] += change.im;
+        }
     }
 }
 
@@ -120,7 +144,9 @@ pub struct Scratch {
     pub real: Vec<f64>,
     /// Free complex numbers.
     pub complex: Vec<Complex<f64>>,
-    /// Spectrum of the peak search.
+    /// Densities in the detector band and next to it.
+    pub(crate) band: Vec<f64>,
+    /// Spectrum on the whole grid.
     pub(crate) density: Vec<f64>,
     /// Half spectrum of the transforms.
     pub(crate) half: Vec<Complex<f64>>,
@@ -128,6 +154,8 @@ pub struct Scratch {
     pub(crate) transform: Vec<Complex<f64>>,
     /// Correlogram on its way into a transform.
     pub(crate) numbers: Vec<f64>,
+    /// Correlogram on its way into an estimator of unbiased ones.
+    pub(crate) unbiased: Vec<f64>,
     /// Autoregressive model.
     pub(crate) model: Autoregression,
     /// Power spectrum of one window.

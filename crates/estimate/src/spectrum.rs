@@ -120,7 +120,6 @@ pub fn density_at(correlogram: &[f64], kind: SignalKind, frequency_hz: f64, samp
 /// The frequencies of a grid of `padded_samples` points that lie inside the detector band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Band {
-    padded: usize,
     first: i64,
     pub(crate) bins: usize,
     /// The band covers all frequencies of a complex signal, so that it has no edge.
@@ -145,19 +144,12 @@ impl Band {
                 allowed: "wide enough to hold a frequency of the padded spectrum: pad more or widen",
             });
         }
-        Ok(Self { padded, first, bins: bins.min(padded), cyclic: bins >= padded, spacing_hz })
+        Ok(Self { first, bins: bins.min(padded), cyclic: bins >= padded, spacing_hz })
     }
 
-    /// Place in the density array of bin `bin` of the band; -1 and `bins` are its outer neighbours.
-    pub(crate) fn index(&self, bin: i64) -> usize {
-        (self.first + bin).rem_euclid(self.padded as i64) as usize
-    }
-
-    /// The densities of the band in order, in two pieces where it crosses 0 Hz.
-    pub(crate) fn pieces<'d>(&self, density: &'d [f64]) -> [&'d [f64]; 2] {
-        let start = self.index(0);
-        let end = (start + self.bins).min(density.len());
-        [&density[start..end], &density[..start + self.bins - end]]
+    /// Frequencies \[Hz\] of the bins and of one neighbour on each side.
+    pub(crate) fn with_neighbours_hz(&self) -> Vec<f64> {
+        (0..self.bins + 2).map(|place| self.frequency_hz(place as f64 - 1.0)).collect()
     }
 
     /// Frequency \[Hz\] of a (fractional) bin of the band.
@@ -209,15 +201,15 @@ mod tests {
     #[test]
     fn detector_band_holds_205_bins_of_1024_and_12_of_64() {
         let wide = Band::new(&sampling(), SignalKind::Real, 1024).unwrap();
-        assert_eq!((wide.bins, wide.index(0)), (205, 226));
+        let places = |band: &Band, padded: f64| (band.bins, (band.frequency_hz(0.0) * padded / 250e6).round() as i64);
+        assert_eq!(places(&wide, 1024.0), (205, 226));
+        let neighbours_hz = wide.with_neighbours_hz();
+        assert_eq!(neighbours_hz.len(), 207);
+        assert_abs_diff_eq!(neighbours_hz[206], 431.0 * 250e6 / 1024.0, epsilon = 1e-3);
         let literal = Band::new(&sampling(), SignalKind::Real, 64).unwrap();
-        assert_eq!((literal.bins, literal.index(0)), (12, 15));
+        assert_eq!(places(&literal, 64.0), (12, 15));
         let baseband = Sampling::baseband(250e6, 1.55e-6, 250e6).unwrap();
         let whole = Band::new(&baseband, SignalKind::Complex, 64).unwrap();
-        let places: Vec<f64> = (0..64).map(f64::from).collect();
-        for (bin, place) in whole.pieces(&places).concat().iter().enumerate() {
-            assert_eq!(whole.index(bin as i64) as f64, *place);
-        }
         assert!(whole.cyclic && whole.bins == 64);
     }
 

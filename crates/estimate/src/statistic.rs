@@ -19,6 +19,27 @@ pub trait Statistic<S: Sample>: Sync {
     /// The caller passes exactly [`Statistic::window_samples`] finite samples, scaled to order one,
     /// and [`Statistic::statistic_len`] places. The result must be quadratic in the samples.
     fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]);
+
+    /// Hands the numbers of all valid windows of a record, `step_samples` apart, to `each` with the index of the window.
+    ///
+    /// `valid` says which windows are to be used: those with finite samples. The form given here calls [`Statistic::evaluate`] for every
+    /// window; a statistic that can go on from the window before replaces it.
+    fn evaluate_record(
+        &self,
+        record: &[S],
+        step_samples: usize,
+        valid: &dyn Fn(usize) -> bool,
+        scratch: &mut Scratch,
+        each: &mut dyn FnMut(usize, &[f64]),
+    ) {
+        let mut one = vec![0.0; self.statistic_len()];
+        for (gate, window) in record.windows(self.window_samples()).step_by(step_samples).enumerate() {
+            if valid(gate) {
+                self.evaluate(window, scratch, &mut one);
+                each(gate, &one);
+            }
+        }
+    }
 }
 
 /// Velocity from the mean of a [`Statistic`].

@@ -256,7 +256,7 @@ impl Estimator for LagOnePhase {
             velocity_m_s: -0.5 * 1.55e-6 * frequency_hz,
             power: mean[0].hypot(mean[1]),
             quality: 1.0,
-            flag: Quality::Good,
+            ..GateVelocity::none(Quality::Good)
         }
     }
 }

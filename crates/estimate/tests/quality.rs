@@ -1,0 +1,147 @@
+//! What an estimate says of itself: spectral width, SNR, runner-up, and whether it can be trusted.
+
+#![allow(clippy::unwrap_used)]
+
+mod draw;
+
+use draw::{Draw, Windows};
+use num_complex::Complex;
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use wakescope_estimate::*;
+
+fn table_2() -> Sampling {
+    Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap()
+}
+
+fn baseband() -> Sampling {
+    Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap()
+}
+
+fn sigma_s(full_width_s: f64) -> f64 {
+    full_width_s / (2.0 * 2.0_f64.ln().sqrt())
+}
+
+fn estimators(sampling: &Sampling, kind: SignalKind) -> Vec<(&'static str, Box<dyn Estimator>)> {
+    let refinement = Refinement::Parabola;
+    vec![
+        ("periodogram", Box::new(SpectralPeak::new(sampling, kind, 64, 1024, refinement).unwrap())),
+        ("lag window", Box::new(LagWindowPeak::new(sampling, kind, 64, 16, 1024, refinement).unwrap())),
+        ("pulse pair", Box::new(PulsePair::new(sampling, kind, 64).unwrap())),
+        ("AR peak", Box::new(AutoregressivePeak::new(sampling, kind, 64, 16, 2048, refinement).unwrap())),
+        ("AR pole", Box::new(AutoregressivePole::new(sampling, kind, 64, 16, 2048, refinement).unwrap())),
+        ("Capon", Box::new(CaponPeak::new(sampling, kind, 64, 16, 2048, refinement).unwrap())),
+    ]
+}
+
+/// Mean correlogram of `count` windows of wind at `velocity_m_s`.
+fn mean<S: Draw>(windows: &Windows<S>, weighting: Weighting, count: usize, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+    let statistic = Correlogram::<S>::new(weighting, 64).unwrap();
+    let (mut scratch, mut one) = (Scratch::new(), vec![0.0; statistic.statistic_len()]);
+    let mut mean = one.clone();
+    for _ in 0..count {
+        statistic.evaluate(&windows.draw(rng), &mut scratch, &mut one);
+        mean.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / count as f64);
+    }
+    mean
+}
+
+/// sigma_v = lambda / (4 sqrt 2 pi sigma): 0.726 m/s at 200 ns.
+fn pulse_width_m_s(full_width_s: f64) -> f64 {
+    1.55e-6 / (4.0 * 2.0_f64.sqrt() * std::f64::consts::PI * sigma_s(full_width_s))
+}
+
+fn wind(full_width_s: f64, snr: f64) -> Windows<f64> {
+    let model = WindowModel::gaussian_pulse(&table_2(), 64, sigma_s(full_width_s), Noise::White).unwrap();
+    Windows::new(&model.covariance(4.0, snr, SignalKind::Real).unwrap()[0])
+}
+
+#[test]
+fn width_and_snr_are_those_of_the_simulated_wind() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mean = mean(&wind(200e-9, 1.0), Weighting::Rectangular, 4000, &mut rng);
+    for (name, estimator) in estimators(&table_2(), SignalKind::Real) {
+        let found = estimator.estimate(&mean, &mut Scratch::new());
+        // Capon's spectrum is no density, and the peak of a model narrows with the SNR: their widths only rank estimates
+        if matches!(name, "periodogram" | "lag window") {
+            let ratio = found.width_m_s / pulse_width_m_s(200e-9);
+            assert!((0.85..1.15).contains(&ratio), "{name}: width ratio {ratio}");
+        }
+        let least = if name == "Capon" { 0.5 } else { 0.85 };
+        assert!((least..1.15).contains(&found.snr), "{name}: SNR {}", found.snr);
+        assert!(found.width_m_s >= 0.0 && found.quality > 1.0, "{name}");
+    }
+}
+
+#[test]
+fn weighted_windows_measure_width_and_snr_up_to_20_db() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
+    for (full_width_s, snr) in [(200e-9, 10.0), (100e-9, 10.0), (200e-9, 100.0)] {
+        let mean = mean(&wind(full_width_s, snr), Weighting::default(), 4000, &mut rng);
+        let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &PeriodogramOptions::default()).unwrap();
+        let found = plan.estimator.estimate(&mean, &mut Scratch::new());
+        let ratios = (found.width_m_s / pulse_width_m_s(full_width_s), found.snr / snr);
+        assert!((0.9..1.1).contains(&ratios.0), "{full_width_s} {snr}: width ratio {}", ratios.0);
+        assert!((0.8..1.1).contains(&ratios.1), "{full_width_s} {snr}: SNR ratio {}", ratios.1);
+    }
+}
+
+#[test]
+fn noise_alone_has_no_snr_and_a_runner_up_near_the_peak() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
+    let mean = mean(&wind(200e-9, 1e-6), Weighting::Rectangular, 400, &mut rng);
+    for (name, estimator) in estimators(&table_2(), SignalKind::Real) {
+        let found = estimator.estimate(&mean, &mut Scratch::new());
+        assert!(found.snr < 0.1 && found.quality < 1.4, "{name}: {found:?}");
+        let second = found.runner_up.unwrap();
+        assert!((0.75..=1.0).contains(&second.relative_density), "{name}: {second:?}");
+    }
+}
+
+#[test]
+fn two_targets_are_both_returned() {
+    let turn = |v_m_s: f64| std::f64::consts::TAU * table_2().frequency_hz(v_m_s) / 250e6;
+    let real: Vec<f64> =
+        (0..64).map(f64::from).map(|n| (turn(-6.0) * n).cos() + 0.8 * (turn(8.0) * n + 1.0).cos()).collect();
+    let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &PeriodogramOptions::default()).unwrap();
+    let found = plan.velocity(&real, &mut Scratch::new()).unwrap();
+    let second = found.runner_up.unwrap();
+    assert!((found.velocity_m_s + 6.0).abs() < 0.3 && (second.velocity_m_s - 8.0).abs() < 0.3, "{found:?}");
+    assert!((second.relative_density - 0.64).abs() < 0.1, "{second:?}");
+    // the same for all estimators, from a mean over phases in a little noise; 16 lags resolve 12 m/s
+    let lag = |m: f64| (turn(-10.0) * m).cos() + 0.64 * (turn(12.0) * m).cos() + f64::from(u8::from(m == 0.0)) * 0.1;
+    let lags: Vec<f64> = (0..64).map(f64::from).map(|m| (1.0 - m / 64.0) * lag(m)).collect();
+    for (name, estimator) in estimators(&table_2(), SignalKind::Real) {
+        let found = estimator.estimate(&lags, &mut Scratch::new());
+        let second_m_s = found.runner_up.map_or(f64::NAN, |second| second.velocity_m_s);
+        assert!((second_m_s - 12.0).abs() < 0.6, "{name}: {found:?}");
+        if name != "pulse pair" {
+            assert!((found.velocity_m_s + 10.0).abs() < 0.6, "{name}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn threshold_tells_bad_estimates_from_good_ones() {
+    // 20 windows at -10 dB: the periodogram is often wrong, and then its peak is lower
+    let model = WindowModel::gaussian_pulse(&baseband(), 64, sigma_s(200e-9), Noise::White).unwrap();
+    let windows = Windows::<Complex<f64>>::new(&model.covariance(4.0, 0.1, SignalKind::Complex).unwrap()[0]);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let threshold = noise_quality(20.0, 12.8, 0.01).unwrap();
+    let peak = SpectralPeak::new(&baseband(), SignalKind::Complex, 64, 1024, Refinement::Parabola).unwrap();
+    let trials = 1000;
+    let (mut bad, mut kept, mut kept_bad) = (0, 0, 0);
+    for _ in 0..trials {
+        let found = peak.estimate(&mean(&windows, Weighting::Rectangular, 20, &mut rng), &mut Scratch::new());
+        let wrong = (found.velocity_m_s - 4.0).abs() > 4.0;
+        bad += usize::from(wrong);
+        if found.exceeds(threshold) {
+            kept += 1;
+            kept_bad += usize::from(wrong);
+        }
+    }
+    let share = |a: usize, b: usize| a as f64 / b as f64;
+    assert!(share(bad, trials) > 0.05, "{bad}");
+    assert!(share(kept, trials) > 0.2, "{kept}");
+    assert!(share(kept_bad, kept) < 0.25 * share(bad, trials), "{kept_bad} of {kept}, {bad} of {trials}");
+}
