@@ -128,6 +128,28 @@ pub enum Error {
         /// The values that are allowed, in words.
         allowed: &'static str,
     },
+    /// A field does not have one value for each cell.
+    #[error("a field of {values} values for a mesh of {} x {} x {} cells: one per cell is needed", cells[0], cells[1], cells[2])]
+    WrongFieldLength {
+        /// Number of values found.
+        values: usize,
+        /// Cells of the mesh, in the order of the field's axes.
+        cells: [usize; 3],
+    },
+    /// The pressure equation was not solved to the tolerance asked for.
+    #[error(
+        "the {method} did not reach the tolerance {tolerance:.1e} of the pressure equation; \
+         relative residuals after each pass: {}",
+        listed(history)
+    )]
+    PressureNotSolved {
+        /// Which solver.
+        method: &'static str,
+        /// Largest relative residual allowed.
+        tolerance: f64,
+        /// Relative residual after each pass or iteration.
+        history: Vec<f64>,
+    },
     /// A point is outside the mesh and the policy is to refuse it.
     #[error("the point y = {y_m} m, z = {z_m} m is outside the mesh")]
     OutsideMesh {
@@ -136,6 +158,11 @@ pub enum Error {
         /// Height of the point.
         z_m: f64,
     },
+}
+
+/// Residuals, one after the other.
+fn listed(history: &[f64]) -> String {
+    history.iter().map(|residual| format!("{residual:.1e}")).collect::<Vec<_>>().join(", ")
 }
 
 /// `value` if it is finite and `accept` holds, else [`Error::OutOfRange`].

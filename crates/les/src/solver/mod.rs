@@ -18,7 +18,7 @@ mod settings;
 mod transport;
 
 pub use flow::{Flow, StartReport, StepReport};
-pub use interim::PressureMethod;
 pub use interim_subgrid::SubgridModel;
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
+pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
 pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};

@@ -3,19 +3,73 @@
 //! `g` is the weighted divergence; the operator is the product of the very divergence and gradient of the projection, so that
 //! the residual of the solution is the divergence left in the flow.
 
+mod apply;
+mod banded;
+mod direct;
+mod eigen;
+mod equation;
+mod gemm;
+mod kernel;
+mod lines;
+mod transform;
+
+#[cfg(test)]
+mod checks;
+
+use super::layout::{Layout, Shape};
 use crate::Error;
+use crate::error::check;
+
+pub(crate) use direct::direct;
+pub use equation::PressureEquation;
+
+/// How the pressure equation is solved.
+#[non_exhaustive]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PressureMethod {
+    /// The faster one for the mesh.
+    #[default]
+    Auto,
+    /// Transforms and a banded factorisation: the residual is round-off.
+    Direct,
+}
+
+/// The solver that `method` asks for.
+///
+/// # Errors
+/// Those of the solvers.
+pub(crate) fn build(layout: &Layout, method: PressureMethod) -> Result<Box<dyn PressureSolver>, Error> {
+    match method {
+        PressureMethod::Auto | PressureMethod::Direct => direct(layout),
+    }
+}
+
+/// Refuses a field of another size and a tolerance that is no number.
+fn check_request(shape: Shape, field: &[f64], tolerance: f64) -> Result<(), Error> {
+    check_length(shape, field)?;
+    check("tolerance", tolerance, "above 0 and below 1", |t| t > 0.0 && t < 1.0)
+}
+
+/// Refuses a field of another size.
+fn check_length(shape: Shape, field: &[f64]) -> Result<(), Error> {
+    if field.len() == shape.len() {
+        Ok(())
+    } else {
+        Err(Error::WrongFieldLength { values: field.len(), cells: shape.n })
+    }
+}
 
 /// What a solve did.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Solved {
+pub struct Solved {
     /// Norm of the residual over that of the right side; `None` where a direct solve has not measured it.
-    pub(crate) residual: Option<f64>,
+    pub residual: Option<f64>,
     /// Iterations, 0 for a direct solve.
-    pub(crate) iterations: usize,
+    pub iterations: usize,
     /// Mean factor by which an iteration reduced the residual.
-    pub(crate) factor: Option<f64>,
+    pub factor: Option<f64>,
     /// Sum of the right side over the sum of its moduli: what no pressure can balance, and was removed.
-    pub(crate) imbalance: f64,
+    pub imbalance: f64,
 }
 
 /// A solver of the pressure equation of one mesh.

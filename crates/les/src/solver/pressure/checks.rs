@@ -1,0 +1,222 @@
+//! Checks that concern all solvers: residuals on the meshes of the table, null space, threads.
+
+use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::*;
+use apply::{Operator, turbulent_right_side};
+use direct::Direct;
+
+/// Equal cells, periodic.
+fn waves(n: usize) -> Direction {
+    Direction::periodic(n, 0.0, 2.0)
+}
+
+fn slip(n: usize) -> Direction {
+    Direction::between(n, -3.0, 3.0, Wall::Slip, Wall::Slip)
+}
+
+/// No-slip below, slip above.
+fn ground(n: usize) -> Direction {
+    Direction::between(n, 0.0, 3.0, Wall::AT_REST, Wall::Slip)
+}
+
+fn closed(n: usize) -> Direction {
+    Direction::between(n, 0.0, 2.0, Wall::AT_REST, Wall::AT_REST)
+}
+
+fn sinh(strength: f64) -> Mapping {
+    Mapping::SinhMiddle { strength }
+}
+
+fn tanh(strength: f64) -> Mapping {
+    Mapping::TanhLow { strength }
+}
+
+/// Meshes of all kinds with the residual that one solve may leave.
+fn meshes() -> Vec<(&'static str, [Direction; 3], f64)> {
+    let thin = || Direction::thin(1.0);
+    let sine = || Mapping::Sine { amplitude: 0.6 };
+    vec![
+        ("uniform", [waves(32), slip(48), ground(40)], 1e-12),
+        ("aspect 144", [waves(32), slip(64).stretched(sinh(3.0)), ground(48).stretched(tanh(3.0))], 1e-12),
+        ("aspect 1e4", [waves(32), slip(128).stretched(sinh(5.0)), ground(96).stretched(tanh(5.0))], 1e-11),
+        ("prime", [waves(97), slip(61).stretched(sinh(3.0)), ground(53).stretched(tanh(3.0))], 1e-12),
+        ("all periodic", [waves(16), waves(12), waves(10)], 1e-12),
+        (
+            "all periodic and stretched",
+            [waves(17).stretched(sine()), waves(19).stretched(sine()), waves(23).stretched(sine())],
+            1e-12,
+        ),
+        ("closed box", [closed(20), closed(17), closed(24).stretched(Mapping::TanhBoth { strength: 2.0 })], 1e-12),
+        ("long axis 1", [slip(12), ground(60).stretched(tanh(2.0)), slip(20)], 1e-12),
+        ("one cell in x, y long", [thin(), waves(48), ground(40).stretched(tanh(3.0))], 1e-12),
+        ("one cell in x, z long", [thin(), slip(40), closed(64)], 1e-12),
+        ("one cell in y", [waves(36), thin(), ground(32)], 1e-12),
+        ("one cell in z", [closed(24), slip(32), thin()], 1e-12),
+        ("one cell in z, periodic", [waves(24), waves(33), thin()], 1e-12),
+        ("cells in x only", [closed(40), thin(), thin()], 1e-12),
+        ("cells in z only", [thin(), thin(), ground(40)], 1e-12),
+        ("one cell", [thin(), thin(), thin()], 1e-12),
+        ("smallest", [waves(4), slip(4), ground(12)], 1e-12),
+        (
+            "nanometres",
+            [
+                Direction::periodic(16, 0.0, 2e-9),
+                Direction::between(16, 0.0, 1e-9, Wall::Slip, Wall::Slip),
+                Direction::periodic(16, 0.0, 3e-9),
+            ],
+            1e-12,
+        ),
+    ]
+}
+
+fn layout([x, y, z]: [Direction; 3]) -> Layout {
+    Layout::new(&Mesh::new(x, y, z).unwrap(), None)
+}
+
+fn mean_of(layout: &Layout, phi: &[f64]) -> f64 {
+    let operator = Operator::new(layout);
+    let mut weighted = phi.to_vec();
+    operator.weigh(&mut weighted);
+    weighted.iter().sum::<f64>() / weighted.iter().map(|value| value.abs()).sum::<f64>().max(f64::MIN_POSITIVE)
+}
+
+#[test]
+fn the_direct_solver_leaves_round_off_on_every_mesh() {
+    for (name, directions, allowed) in meshes() {
+        let layout = layout(directions);
+        let operator = Operator::new(&layout);
+        let mut solver = Direct::new(&layout).unwrap();
+        let g = turbulent_right_side(&layout);
+        let mut phi = g.clone();
+        let solved = solver.solve(&mut phi, 1e-6).unwrap();
+        let residual = operator.relative_residual(&g, &phi);
+        assert!(residual <= allowed, "{name}: residual {residual:e}, {}", solver.describe());
+        assert!(solved.imbalance.abs() < 1e-14, "{name}");
+        let mean = mean_of(&layout, &phi);
+        assert!(mean.abs() <= 1e-13, "{name}: mean {mean:e}");
+    }
+}
+
+#[test]
+fn the_operator_is_symmetric_and_ignores_constants() {
+    for (name, directions, _) in meshes() {
+        let layout = layout(directions);
+        if layout.shape.len() > 50_000 {
+            continue;
+        }
+        let operator = Operator::new(&layout);
+        let apply = |phi: &[f64]| {
+            let mut out = vec![0.0; phi.len()];
+            operator.residual(&vec![0.0; phi.len()], phi, &mut out);
+            out
+        };
+        let wave = |f: f64| (0..layout.shape.len()).map(|p| (p as f64 * f).sin()).collect::<Vec<f64>>();
+        let (a, b) = (wave(0.7), wave(1.3));
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (ab, ba, aa) = (dot(&a, &apply(&b)), dot(&b, &apply(&a)), dot(&a, &apply(&a)));
+        assert!((ab - ba).abs() <= 1e-12 * aa.abs(), "{name}: {ab} against {ba}");
+        let flat = apply(&vec![1.0; a.len()]).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let rough = apply(&a).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        assert!(flat <= 1e-13 * rough, "{name}: {flat:e} of {rough:e}");
+    }
+}
+
+#[test]
+fn refinement_reaches_what_one_solve_does_not_and_says_where_it_ends() {
+    let layout = layout([waves(16), slip(64).stretched(sinh(5.0)), ground(64).stretched(tanh(5.0))]);
+    let mut solver = Direct::new(&layout).unwrap();
+    let operator = Operator::new(&layout);
+    let g = turbulent_right_side(&layout);
+    let mut once = g.clone();
+    solver.solve(&mut once, 1e-6).unwrap();
+    let once = operator.relative_residual(&g, &once);
+    let mut phi = g.clone();
+    let solved = solver.solve(&mut phi, 0.5 * once).unwrap();
+    let refined = operator.relative_residual(&g, &phi);
+    assert!(refined < 0.5 * once && (solved.residual.unwrap() / refined - 1.0).abs() < 0.2, "{once:e} {refined:e}");
+    match solver.solve(&mut g.clone(), 1e-17).unwrap_err() {
+        Error::PressureNotSolved { history, tolerance, .. } => {
+            assert!(history.len() > 1 && tolerance == 1e-17, "{history:?}");
+        }
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn what_no_pressure_balances_is_removed_and_reported() {
+    for directions in
+        [[waves(16), slip(12), ground(14)], [slip(8), ground(40), closed(20)], [waves(8), waves(6), waves(5)]]
+    {
+        let layout = layout(directions);
+        let operator = Operator::new(&layout);
+        let mut solver = Direct::new(&layout).unwrap();
+        let balanced = turbulent_right_side(&layout);
+        let mut mass = vec![1.0; balanced.len()];
+        operator.weigh(&mut mass);
+        let moduli: f64 = balanced.iter().map(|g| g.abs()).sum();
+        let excess = 0.1 * moduli / mass.iter().sum::<f64>();
+        let mut phi: Vec<f64> = balanced.iter().zip(&mass).map(|(g, m)| g + excess * m).collect();
+        let total: f64 = phi.iter().map(|g| g.abs()).sum();
+        let solved = solver.solve(&mut phi, 1e-6).unwrap();
+        assert!((solved.imbalance - 0.1 * moduli / total).abs() < 1e-12, "{}", solved.imbalance);
+        let residual = operator.relative_residual(&balanced, &phi);
+        assert!(residual < 1e-12, "{residual:e}");
+    }
+}
+
+/// The field that `method` finds with a number of threads.
+fn with_threads(layout: &Layout, method: PressureMethod, threads: usize) -> Vec<f64> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| {
+        let mut phi = turbulent_right_side(layout);
+        build(layout, method).unwrap().solve(&mut phi, 1e-8).unwrap();
+        phi
+    })
+}
+
+#[test]
+fn every_number_of_threads_gives_the_same_bits() {
+    for directions in [
+        [waves(24), slip(20), ground(37).stretched(tanh(3.0))],
+        [waves(40), Direction::thin(1.0), ground(32)],
+        [closed(18), ground(40), waves(9)],
+    ] {
+        let layout = layout(directions);
+        let reference = with_threads(&layout, PressureMethod::Direct, 1);
+        for threads in [2, 7] {
+            assert!(with_threads(&layout, PressureMethod::Direct, threads) == reference, "{threads} threads");
+        }
+    }
+}
+
+#[test]
+fn a_scale_of_the_mesh_scales_the_solution() {
+    let scaled = |size: f64| {
+        let d = |n: usize, length: f64| Direction::between(n, 0.0, size * length, Wall::AT_REST, Wall::Slip);
+        let layout = layout([Direction::periodic(16, 0.0, size), d(20, 1.0), d(24, 2.0).stretched(tanh(3.0))]);
+        let mut phi = turbulent_right_side(&layout);
+        build(&layout, PressureMethod::Auto).unwrap().solve(&mut phi, 1e-8).unwrap();
+        phi
+    };
+    let reference = scaled(1.0);
+    let largest = reference.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    for size in [1e-9, 1e9] {
+        // The right side is a flux, in m^2 times the velocity; phi then grows with the length.
+        for (a, b) in scaled(size).iter().zip(&reference) {
+            assert!((a / size - b).abs() < 1e-12 * largest, "{size:e}");
+        }
+    }
+}
+
+#[test]
+fn fields_and_tolerances_that_make_no_sense_are_refused() {
+    let layout = layout([waves(8), waves(8), waves(8)]);
+    let mut solver = build(&layout, PressureMethod::Auto).unwrap();
+    assert!(solver.solve(&mut [0.0; 511], 1e-6).unwrap_err().to_string().contains("511"));
+    for tolerance in [0.0, 1.0, f64::NAN] {
+        assert!(solver.solve(&mut [0.0; 512], tolerance).unwrap_err().to_string().contains("tolerance"));
+    }
+    let mut still = [0.0; 512];
+    solver.solve(&mut still, 1e-16).unwrap();
+    assert!(still.iter().all(|phi| *phi == 0.0));
+}

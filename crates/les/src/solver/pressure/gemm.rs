@@ -1,0 +1,184 @@
+//! Products of a small dense matrix with many rows or columns of a field, in place.
+//!
+//! One tile of the result, 6 rows by 32 columns, stays in registers while the inner index runs over its whole length; the
+//! operands are packed so that each step reads 6 and 32 neighbouring numbers. The order of operations of one element never
+//! depends on the tile it falls into or on the number of threads. Every multiply-add is fused, on every machine.
+//!
+//! Check: against the sum written out, for all remainders of the tile.
+
+use multiversion::{multiversion, target::target_cfg_f};
+
+/// Rows of a tile.
+const ROWS: usize = 6;
+/// Columns of a tile.
+pub(crate) const COLUMNS: usize = 32;
+/// Columns of a tile where registers are few or the matrix ends.
+const NARROW: usize = 8;
+
+type TileRow = [f64; COLUMNS];
+type Tile = [TileRow; ROWS];
+
+/// A square matrix packed for products from the left, `A f`: groups of 6 rows, column by column.
+#[derive(Debug)]
+pub(crate) struct Left {
+    n: usize,
+    groups: Vec<Vec<[f64; ROWS]>>,
+}
+
+/// A square matrix packed for products from the right, `f B`: panels of 32 columns, row by row.
+#[derive(Debug)]
+pub(crate) struct Right {
+    n: usize,
+    panels: Vec<Vec<TileRow>>,
+}
+
+/// Space for one packed operand.
+#[derive(Debug, Default)]
+pub(crate) struct Packed {
+    rows: Vec<[f64; ROWS]>,
+    columns: Vec<TileRow>,
+}
+
+impl Left {
+    /// The `n x n` matrix of elements `at(row, column)`.
+    pub(crate) fn new(n: usize, at: impl Fn(usize, usize) -> f64) -> Self {
+        let group = |first: usize| -> Vec<[f64; ROWS]> {
+            let entry = |i: usize, k: usize| if first + i < n { at(first + i, k) } else { 0.0 };
+            (0..n).map(|k| std::array::from_fn(|i| entry(i, k))).collect()
+        };
+        Self { n, groups: (0..n).step_by(ROWS).map(group).collect() }
+    }
+
+    /// Replaces the `n` rows `f` of equal length by `A f`.
+    pub(crate) fn apply(&self, f: &mut [&mut [f64]], packed: &mut Packed) {
+        let width = f.first().map_or(0, |row| row.len());
+        let panel = &mut packed.columns;
+        panel.resize(self.n, [0.0; COLUMNS]);
+        for start in (0..width).step_by(COLUMNS) {
+            let columns = COLUMNS.min(width - start);
+            for (packed, row) in panel.iter_mut().zip(f.iter()) {
+                copy(&row[start..start + columns], packed);
+            }
+            for (group, out) in self.groups.iter().zip(f.chunks_mut(ROWS)) {
+                let mut tile = [[0.0; COLUMNS]; ROWS];
+                multiply(group, panel, columns, &mut tile);
+                for (row, tile) in out.iter_mut().zip(&tile) {
+                    paste(tile, &mut row[start..start + columns]);
+                }
+            }
+        }
+    }
+}
+
+impl Right {
+    /// The `n x n` matrix of elements `at(row, column)`.
+    pub(crate) fn new(n: usize, at: impl Fn(usize, usize) -> f64) -> Self {
+        let panel = |first: usize| -> Vec<TileRow> {
+            let entry = |k: usize, l: usize| if first + l < n { at(k, first + l) } else { 0.0 };
+            (0..n).map(|k| std::array::from_fn(|l| entry(k, l))).collect()
+        };
+        Self { n, panels: (0..n).step_by(COLUMNS).map(panel).collect() }
+    }
+
+    /// Replaces the rows of `n` values in `f` by `f B`.
+    pub(crate) fn apply(&self, f: &mut [f64], packed: &mut Packed) {
+        packed.rows.resize(self.n, [0.0; ROWS]);
+        for rows in f.chunks_mut(ROWS * self.n) {
+            for (i, row) in rows.chunks(self.n).enumerate() {
+                for (packed, value) in packed.rows.iter_mut().zip(row) {
+                    packed[i] = *value;
+                }
+            }
+            for (panel, start) in self.panels.iter().zip((0..self.n).step_by(COLUMNS)) {
+                let columns = COLUMNS.min(self.n - start);
+                let mut tile = [[0.0; COLUMNS]; ROWS];
+                multiply(&packed.rows, panel, columns, &mut tile);
+                for (row, tile) in rows.chunks_mut(self.n).zip(&tile) {
+                    paste(tile, &mut row[start..start + columns]);
+                }
+            }
+        }
+    }
+}
+
+/// Copies into a row of a panel; a whole row at once where it can.
+#[inline(always)]
+fn copy(from: &[f64], to: &mut TileRow) {
+    match <&TileRow>::try_from(from) {
+        Ok(whole) => *to = *whole,
+        Err(_) => to[..from.len()].copy_from_slice(from),
+    }
+}
+
+/// Copies the beginning of a row of a tile; a whole row at once where it can.
+#[inline(always)]
+fn paste(from: &TileRow, to: &mut [f64]) {
+    if let Ok(whole) = <&mut TileRow>::try_from(&mut *to) {
+        *whole = *from;
+    } else {
+        let length = to.len();
+        to.copy_from_slice(&from[..length]);
+    }
+}
+
+/// `tile = a b` over the first `columns` columns (rounded up to 8).
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+fn multiply(a: &[[f64; ROWS]], b: &[TileRow], columns: usize, tile: &mut Tile) {
+    if target_cfg_f!(target_feature = "avx512f") && columns > COLUMNS - NARROW {
+        multiply_part::<COLUMNS>(a, b, 0, tile);
+    } else {
+        for first in (0..columns).step_by(NARROW) {
+            multiply_part::<NARROW>(a, b, first, tile);
+        }
+    }
+}
+
+/// The columns `first` to `first + WIDTH` of a tile.
+#[inline(always)]
+fn multiply_part<const WIDTH: usize>(a: &[[f64; ROWS]], b: &[TileRow], first: usize, tile: &mut Tile) {
+    let mut sum = [[0.0_f64; WIDTH]; ROWS];
+    for (a, b) in a.iter().zip(b) {
+        let b = &b[first..first + WIDTH];
+        for i in 0..ROWS {
+            for l in 0..WIDTH {
+                sum[i][l] = a[i].mul_add(b[l], sum[i][l]);
+            }
+        }
+    }
+    for (row, sum) in tile.iter_mut().zip(&sum) {
+        row[first..first + WIDTH].copy_from_slice(sum);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(i: usize, j: usize) -> f64 {
+        ((i * 7 + j * 13) % 11) as f64 - 4.5 + 0.1 * i as f64
+    }
+
+    #[test]
+    fn products_from_both_sides_equal_the_sum_written_out() {
+        for (n, width) in [(1, 1), (4, 3), (6, 32), (13, 41), (37, 64), (65, 8)] {
+            let f: Vec<f64> = (0..n * width).map(|i| (i as f64 * 0.37).sin()).collect();
+            let mut left = f.clone();
+            let mut rows: Vec<&mut [f64]> = left.chunks_mut(width).collect();
+            Left::new(n, entry).apply(&mut rows, &mut Packed::default());
+            let mut right = f.clone();
+            Right::new(n, entry).apply(&mut right, &mut Packed::default());
+            for r in 0..n {
+                for c in 0..width {
+                    let sum: f64 = (0..n).map(|k| entry(r, k) * f[k * width + c]).sum();
+                    assert!((left[r * width + c] - sum).abs() < 1e-11, "{n} {width} left ({r}, {c})");
+                }
+            }
+            for r in 0..width {
+                for c in 0..n {
+                    let sum: f64 = (0..n).map(|k| f[r * n + k] * entry(k, c)).sum();
+                    assert!((right[r * n + c] - sum).abs() < 1e-11, "{n} {width} right ({r}, {c})");
+                }
+            }
+        }
+    }
+}

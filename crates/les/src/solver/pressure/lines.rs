@@ -1,0 +1,70 @@
+//! A field cut into independent bundles of lines.
+
+use super::super::layout::Shape;
+
+/// Neighbouring lines along one axis: one row piece for each index of that axis.
+#[derive(Debug)]
+pub(crate) struct Bundle<'a> {
+    /// Index of the lines along the other of axes 1 and 2.
+    pub(crate) other: usize,
+    /// First index along axis 0.
+    pub(crate) start: usize,
+    /// The pieces, all of the same length.
+    pub(crate) rows: Vec<&'a mut [f64]>,
+}
+
+/// Cuts `field` into bundles of lines along `axis` (1 or 2), in an order and with widths that depend on the shape alone.
+pub(crate) fn bundles(field: &mut [f64], shape: Shape, axis: usize) -> Vec<Bundle<'_>> {
+    let [n0, n1, _] = shape.n;
+    let (along, others) = if axis == 1 { (n1, shape.n[2]) } else { (shape.n[2], n1) };
+    let width = width(n0, others);
+    let pieces = n0.div_ceil(width);
+    let mut bundles: Vec<Bundle<'_>> = (0..others * pieces)
+        .map(|b| Bundle { other: b / pieces, start: b % pieces * width, rows: Vec::with_capacity(along) })
+        .collect();
+    for (r, row) in field.chunks_mut(n0).enumerate() {
+        let other = if axis == 1 { r / n1 } else { r % n1 };
+        for (piece, bundle) in row.chunks_mut(width).zip(&mut bundles[other * pieces..]) {
+            bundle.rows.push(piece);
+        }
+    }
+    bundles
+}
+
+/// Bundles that keep all cores of a large machine busy.
+const ENOUGH: usize = 64;
+/// Widths are multiples of this: the tile of the matrix product.
+const STEP: usize = super::gemm::COLUMNS;
+
+/// Width of the bundles: whole rows, unless there are few.
+fn width(n0: usize, others: usize) -> usize {
+    if others >= ENOUGH {
+        return n0;
+    }
+    (n0 * others).div_ceil(ENOUGH).next_multiple_of(STEP).min(n0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bundles_hold_every_value_once_in_its_place() {
+        for n in [[70, 3, 5], [4, 1, 9], [33, 80, 2], [1, 1, 1]] {
+            let shape = Shape { n };
+            let mut field: Vec<f64> = (0..shape.len()).map(|i| i as f64).collect();
+            for axis in [1, 2] {
+                let mut seen = 0;
+                for bundle in bundles(&mut field, shape, axis) {
+                    assert_eq!(bundle.rows.len(), n[axis]);
+                    for (i, row) in bundle.rows.iter().enumerate() {
+                        let (j, k) = if axis == 1 { (i, bundle.other) } else { (bundle.other, i) };
+                        assert_eq!(row[0], ((k * n[1] + j) * n[0] + bundle.start) as f64);
+                        seen += row.len();
+                    }
+                }
+                assert_eq!(seen, shape.len());
+            }
+        }
+    }
+}

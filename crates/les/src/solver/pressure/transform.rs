@@ -1,0 +1,245 @@
+//! Change of basis along one axis to the eigenvectors of its pressure operator, and back, in place.
+//!
+//! Axis 0: real Fourier transform where the cells are equal, the direction periodic and their number has small factors;
+//! otherwise a product with the matrix of eigenvectors. Axes 1 and 2: the matrix product.
+//!
+//! Check: there and back; the two forms of the Fourier transform against each other.
+
+use std::fmt;
+use std::sync::Arc;
+
+use realfft::num_complex::Complex;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+
+use super::super::line::Line;
+use super::eigen::Basis;
+use super::gemm::{Left, Packed, Right};
+
+/// Space that a thread needs for transforms.
+#[derive(Debug, Default)]
+pub(crate) struct Work {
+    packed: Packed,
+    spectrum: Vec<Complex<f64>>,
+    scratch: Vec<Complex<f64>>,
+}
+
+/// Transform of the rows along axis 0.
+pub(crate) enum RowTransform {
+    /// One cell: its scale alone.
+    Thin(f64),
+    /// Fourier transform; the modes are stored as real and imaginary parts in the places of the row.
+    Fourier { cells: usize, forward: Arc<dyn RealToComplex<f64>>, inverse: Arc<dyn ComplexToReal<f64>> },
+    /// Products with the eigenvectors and their transpose.
+    Dense { forward: Right, inverse: Right },
+}
+
+impl fmt::Debug for RowTransform {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Largest prime factor for which the Fourier transform is fast.
+const SMOOTH: usize = 11;
+/// Cells up to which the matrix product is faster than a Fourier transform of a number with large factors.
+const SMALL: usize = 150;
+/// Cells up to which the matrix product is faster than any Fourier transform.
+const TINY: usize = 12;
+
+impl RowTransform {
+    /// The transform, the eigenvalues by place, and the factor that both ways together leave out.
+    pub(crate) fn new(line: &Line) -> (Self, Vec<f64>, f64) {
+        let n = line.cells;
+        let fast = n > TINY && (n > SMALL || largest_factor(n) <= SMOOTH);
+        if line.is_thin() {
+            let scale = 1.0 / line.cell_mass_m[0].sqrt();
+            (Self::Thin(scale), vec![0.0], 1.0)
+        } else if line.is_fourier() && fast {
+            let mut planner = RealFftPlanner::new();
+            let (forward, inverse) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
+            let transform = Self::Fourier { cells: n, forward, inverse };
+            let h = line.cell_mass_m[0];
+            (transform, Basis::wave_values(n, h), 1.0 / (n as f64 * h))
+        } else {
+            let Basis { value, vector } = Basis::new(line);
+            let forward = Right::new(n, |i, m| vector[i * n + m]);
+            let inverse = Right::new(n, |m, i| vector[i * n + m]);
+            (Self::Dense { forward, inverse }, value, 1.0)
+        }
+    }
+
+    /// Rows to modes.
+    pub(crate) fn forward(&self, rows: &mut [f64], work: &mut Work) {
+        match self {
+            Self::Thin(scale) => rows.iter_mut().for_each(|value| *value *= scale),
+            Self::Dense { forward, .. } => forward.apply(rows, &mut work.packed),
+            Self::Fourier { cells, forward, .. } => {
+                let (spectrum, scratch) = work.fourier(*cells, forward.get_scratch_len());
+                for row in rows.chunks_mut(*cells) {
+                    if forward.process_with_scratch(row, spectrum, scratch).is_err() {
+                        spoil(row);
+                    }
+                    row[0] = spectrum[0].re;
+                    let (pairs, last) = row[1..].as_chunks_mut::<2>();
+                    for (pair, mode) in pairs.iter_mut().zip(&spectrum[1..]) {
+                        *pair = [mode.re, mode.im];
+                    }
+                    if let Some(last) = last.first_mut() {
+                        *last = spectrum[cells / 2].re;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Modes to rows.
+    pub(crate) fn inverse(&self, rows: &mut [f64], work: &mut Work) {
+        match self {
+            Self::Thin(scale) => rows.iter_mut().for_each(|value| *value *= scale),
+            Self::Dense { inverse, .. } => inverse.apply(rows, &mut work.packed),
+            Self::Fourier { cells, inverse, .. } => {
+                let (spectrum, scratch) = work.fourier(*cells, inverse.get_scratch_len());
+                for row in rows.chunks_mut(*cells) {
+                    spectrum[0] = Complex::new(row[0], 0.0);
+                    let (pairs, last) = row[1..].as_chunks::<2>();
+                    for (pair, mode) in pairs.iter().zip(&mut spectrum[1..]) {
+                        *mode = Complex::new(pair[0], pair[1]);
+                    }
+                    if let Some(last) = last.first() {
+                        spectrum[cells / 2] = Complex::new(*last, 0.0);
+                    }
+                    if inverse.process_with_scratch(spectrum, row, scratch).is_err() {
+                        spoil(row);
+                    }
+                }
+            }
+        }
+    }
+
+    /// What it is, for the log.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Thin(_) => "one cell",
+            Self::Fourier { .. } => "Fourier",
+            Self::Dense { .. } => "dense",
+        }
+    }
+}
+
+/// A length that does not fit the plan cannot occur; if it did, it must not go unseen.
+fn spoil(row: &mut [f64]) {
+    row.fill(f64::NAN);
+}
+
+impl Work {
+    fn fourier(&mut self, cells: usize, scratch: usize) -> (&mut [Complex<f64>], &mut [Complex<f64>]) {
+        self.spectrum.resize(cells / 2 + 1, Complex::default());
+        if self.scratch.len() < scratch {
+            self.scratch.resize(scratch, Complex::default());
+        }
+        (&mut self.spectrum, &mut self.scratch[..scratch])
+    }
+}
+
+/// Transform of lines along axis 1 or 2.
+#[derive(Debug)]
+pub(crate) enum LineTransform {
+    /// One cell: its scale alone.
+    Thin(f64),
+    /// Products with the eigenvectors and their transpose.
+    Dense { forward: Left, inverse: Left },
+}
+
+impl LineTransform {
+    /// The transform and its eigenvalues.
+    pub(crate) fn new(line: &Line) -> (Self, Vec<f64>) {
+        let n = line.cells;
+        let Basis { value, vector } = Basis::new(line);
+        let transform = if line.is_thin() {
+            Self::Thin(vector[0])
+        } else {
+            let forward = Left::new(n, |m, i| vector[i * n + m]);
+            let inverse = Left::new(n, |i, m| vector[i * n + m]);
+            Self::Dense { forward, inverse }
+        };
+        (transform, value)
+    }
+
+    /// Lines to modes.
+    pub(crate) fn forward(&self, rows: &mut [&mut [f64]], work: &mut Work) {
+        match self {
+            Self::Thin(scale) => scale_rows(rows, *scale),
+            Self::Dense { forward, .. } => forward.apply(rows, &mut work.packed),
+        }
+    }
+
+    /// Modes to lines.
+    pub(crate) fn inverse(&self, rows: &mut [&mut [f64]], work: &mut Work) {
+        match self {
+            Self::Thin(scale) => scale_rows(rows, *scale),
+            Self::Dense { inverse, .. } => inverse.apply(rows, &mut work.packed),
+        }
+    }
+
+    /// What it is, for the log.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Thin(_) => "one cell",
+            Self::Dense { .. } => "dense",
+        }
+    }
+}
+
+fn scale_rows(rows: &mut [&mut [f64]], scale: f64) {
+    rows.iter_mut().flat_map(|row| row.iter_mut()).for_each(|value| *value *= scale);
+}
+
+/// Largest prime factor.
+fn largest_factor(n: usize) -> usize {
+    let (mut rest, mut factor) = (n, 2);
+    while factor * factor <= rest {
+        if rest.is_multiple_of(factor) {
+            rest /= factor;
+        } else {
+            factor += 1;
+        }
+    }
+    rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::mesh::Direction;
+    use super::*;
+
+    #[test]
+    fn the_fourier_transform_and_the_matrix_of_waves_give_the_same_modes() {
+        for n in [16, 27, 60] {
+            let line = Line::new(&Direction::periodic(n, 0.0, 3.0));
+            let (transform, value, factor) = RowTransform::new(&line);
+            assert_eq!(transform.name(), "Fourier");
+            let basis = Basis::new(&line);
+            assert_eq!(value, basis.value);
+            let row: Vec<f64> = (0..n).map(|i| (1.0 + i as f64).sqrt().sin()).collect();
+            let mut modes = row.clone();
+            transform.forward(&mut modes, &mut Work::default());
+            for (m, mode) in modes.iter().enumerate() {
+                let product: f64 = (0..n).map(|i| basis.vector[i * n + m] * row[i]).sum();
+                // The Fourier transform has no norm; waves in pairs have twice the norm of single ones.
+                let single = m == 0 || m == n - 1 && n % 2 == 0;
+                let norm = if single { 1.0 } else { 0.5_f64.sqrt() } * factor.sqrt();
+                let scaled = mode * norm * if single { 1.0 } else { 2.0 };
+                assert!((product - scaled).abs() < 1e-13, "{n}, mode {m}: {product} against {scaled}");
+            }
+            transform.inverse(&mut modes, &mut Work::default());
+            for (a, b) in modes.iter().zip(&row) {
+                assert!((a / n as f64 - b).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn the_largest_prime_factor_is_found() {
+        assert_eq!([1, 2, 64, 97, 98, 121, 510].map(largest_factor), [1, 2, 2, 97, 7, 11, 17]);
+    }
+}
