@@ -1,6 +1,8 @@
-//! What can be wrong with a wind: one error type for the crate.
+//! What can be wrong with a wind or a simulation: one error type for the crate.
 
-/// Why a wind could not be built or sampled. Every variant carries the values and what is allowed.
+use std::path::PathBuf;
+
+/// Why a wind could not be built or sampled, or a flow not simulated. Every variant carries the values and what is allowed.
 #[non_exhaustive]
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -91,6 +93,76 @@ pub enum Error {
         component: &'static str,
         /// Where it is \[m\].
         position_m: [f64; 3],
+    },
+    /// The system refused to read or write a file.
+    #[error("cannot {action} {}: {reason}", path.display())]
+    File {
+        /// What was tried, such as `"write"`.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Class of the refusal, such as a full disk.
+        kind: std::io::ErrorKind,
+        /// The system's words.
+        reason: String,
+    },
+    /// The file is something else than a checkpoint.
+    #[error("{} is not a checkpoint of a flow: its first bytes are others", path.display())]
+    NotACheckpoint {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The checkpoint was written by another version of this program, in a form that this one does not know.
+    #[error("{} is a checkpoint of version {found}: this program reads version {supported}", path.display())]
+    CheckpointVersion {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+        /// The version that can be read.
+        supported: u32,
+    },
+    /// The checkpoint is cut off or altered.
+    #[error("{} is damaged: {what}; go back to an older checkpoint", path.display())]
+    CheckpointDamaged {
+        /// The file.
+        path: PathBuf,
+        /// What does not fit.
+        what: &'static str,
+    },
+    /// The checkpoint belongs to another mesh or to settings that do not allow to continue it.
+    #[error("{}: {what} is {stored} in the checkpoint, but {wanted} is asked for: they must be equal", path.display())]
+    CheckpointMismatch {
+        /// The file.
+        path: PathBuf,
+        /// The property of mesh or settings that differs.
+        what: String,
+        /// Its value in the checkpoint.
+        stored: String,
+        /// Its value in the present mesh or settings.
+        wanted: String,
+    },
+    /// Who watches a run has stopped it, such as an output that cannot be written.
+    #[error("the run was stopped after step {step} (t = {time_s} s): {reason}")]
+    Stopped {
+        /// Last step made.
+        step: u64,
+        /// Time reached \[s\].
+        time_s: f64,
+        /// The observer's words.
+        reason: String,
+    },
+    /// The time step that the Courant number allows has become so short that the run would not end.
+    #[error("step {step} at t = {time_s} s is {step_s} s long, too short to reach {end_s} s: the flow is blowing up")]
+    StepTooShort {
+        /// Number of the step.
+        step: u64,
+        /// Time reached \[s\].
+        time_s: f64,
+        /// Length of the step \[s\].
+        step_s: f64,
+        /// Time at which the run was to end \[s\].
+        end_s: f64,
     },
     /// Two neighbouring cells differ so much that the index coordinate is not monotone between them.
     #[error(

@@ -54,8 +54,11 @@ pub use kernel::{m4_prime, m4_prime_weights};
 pub use profile::CirculationProfile;
 
 pub use solver::{
-    Direction, Ends, Flow, FlowSettings, Mapping, MappingFn, Mesh, PressureEquation, PressureMethod,
-    PressureSolved, StartReport, StepReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment, Wall, cases,
+    CheckpointPlan, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent, StepRecord,
+};
+pub use solver::{
+    Direction, Ends, Flow, FlowSettings, Mapping, MappingFn, Mesh, PressureEquation, PressureMethod, PressureSolved,
+    StartReport, StepReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment, Wall, cases,
 };
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};
 pub use wind::{Calm, Sum, Uniform, Wind};

@@ -1,6 +1,7 @@
 //! Incompressible large-eddy simulation.
 
 pub mod cases;
+mod checkpoint;
 mod fields;
 mod flow;
 mod implicit;
@@ -13,6 +14,7 @@ mod momentum;
 mod pressure;
 mod projection;
 mod rows;
+mod run;
 mod settings;
 
 mod transport;
@@ -21,4 +23,7 @@ pub use flow::{Flow, StartReport, StepReport};
 pub use interim_subgrid::SubgridModel;
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
 pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
+pub use run::{
+    CheckpointPlan, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent, StepRecord,
+};
 pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};

@@ -1,0 +1,201 @@
+//! Checkpoints: the whole state of a simulation in one file, from which it continues with the same bits.
+//!
+//! A file holds the state (velocity, the terms of the step before, pressure, time, step lengths, implicit directions), what
+//! mesh and settings it belongs to, and bytes of the caller. It is versioned, has a checksum and is put in place by renaming.
+//! Mesh, walls, viscosity, force, scheme, viscous treatment, form of the pressure update, subgrid model and memory order must
+//! be the same to continue; time step, pressure method and tolerance may be changed.
+//!
+//! Check: restarts of every scheme against uninterrupted runs bit for bit; damaged, foreign and unfitting files.
+
+mod container;
+
+use std::path::Path;
+
+use super::flow::{Flow, State};
+use super::layout::Layout;
+use super::mesh::{AXIS_NAMES, Mesh};
+use super::settings::FlowSettings;
+use crate::Error;
+use container::{Content, Reader, Tag};
+
+/// Version of the content. Raise it with every change of the sections or of the words in [`identity`].
+const VERSION: u32 = 1;
+
+const IDENTITY: &Tag = b"IDENTITY";
+const METRICS: [&Tag; 3] = [b"METRIC X", b"METRIC Y", b"METRIC Z"];
+const SCALARS: &Tag = b"SCALARS ";
+const VELOCITY: [&Tag; 3] = [b"VELOCIT0", b"VELOCIT1", b"VELOCIT2"];
+const HISTORY: [&Tag; 3] = [b"HISTORY0", b"HISTORY1", b"HISTORY2"];
+const PRESSURE: &Tag = b"PRESSURE";
+const USER: &Tag = b"USERDATA";
+
+/// Positions and metrics of another machine may differ in their last digits; a different mapping differs more.
+const METRIC_TOLERANCE: f64 = 1e-11;
+
+impl Flow {
+    /// Writes a checkpoint; `user_data` comes back from [`Self::restore`]. An older file of that name is replaced only when
+    /// the new one is safe on disk, so there is always a whole one.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the system refuses; nothing is changed then.
+    pub fn save(&self, path: impl AsRef<Path>, user_data: &[u8]) -> Result<(), Error> {
+        self.save_and_keep(path.as_ref(), None, user_data)
+    }
+
+    /// As [`Self::save`], with the older file renamed to `previous`.
+    pub(crate) fn save_and_keep(&self, path: &Path, previous: Option<&Path>, user_data: &[u8]) -> Result<(), Error> {
+        let text: String =
+            identity(self.mesh(), self.settings(), &self.layout).iter().map(|(k, v)| format!("{k}\t{v}\n")).collect();
+        let metrics = self.mesh().directions().each_ref().map(|d| metrics(d.cells, |xi| d.at(xi)));
+        let state = &self.state;
+        let scalars = scalars(state);
+        let mut sections = vec![(*IDENTITY, Content::Bytes(text.as_bytes()))];
+        sections.extend(METRICS.iter().zip(&metrics).map(|(tag, m)| (**tag, Content::Floats(m))));
+        sections.push((*SCALARS, Content::Bytes(&scalars)));
+        sections.extend(VELOCITY.iter().zip(&state.velocity).map(|(tag, f)| (**tag, Content::Floats(f))));
+        sections.extend(HISTORY.iter().zip(&state.history).map(|(tag, f)| (**tag, Content::Floats(f))));
+        sections.push((*PRESSURE, Content::Floats(&state.pressure)));
+        sections.push((*USER, Content::Bytes(user_data)));
+        container::write(path, previous, VERSION, &sections)
+    }
+
+    /// The simulation of a checkpoint, with the caller's bytes. With equal settings it continues bit for bit as if it had
+    /// not been interrupted, on any number of threads.
+    ///
+    /// # Errors
+    /// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`], [`Error::CheckpointDamaged`]; what
+    /// [`Flow::new`] refuses; [`Error::CheckpointMismatch`] names what differs between the checkpoint and `mesh` or `settings`.
+    pub fn restore(path: impl AsRef<Path>, mesh: Mesh, settings: FlowSettings) -> Result<(Self, Vec<u8>), Error> {
+        let path = path.as_ref();
+        let mut file = Reader::open(path, VERSION)?;
+        let text = file.bytes(IDENTITY)?;
+        let Ok(text) = std::str::from_utf8(&text) else { return Err(file.damaged("its properties are no text")) };
+        let wanted = identity(&mesh, &settings, &Layout::new(&mesh, settings.memory_order));
+        compare_identity(path, text, &wanted)?;
+        for (axis, tag) in METRICS.iter().enumerate() {
+            let direction = &mesh.directions()[axis];
+            let present = metrics(direction.cells, |xi| direction.at(xi));
+            compare_metrics(path, axis, &file.floats(tag)?, &present)?;
+        }
+        let mut flow = Self::at_rest(mesh, settings)?;
+        read_scalars(&file.bytes(SCALARS)?, &mut flow.state)
+            .ok_or_else(|| file.damaged("its scalars are not whole"))?;
+        let cells = flow.layout.shape.len();
+        let mut field = |tag: &Tag| match file.floats(tag)? {
+            values if values.len() == cells => Ok(values),
+            _ => Err(file.damaged("a field is not of the size of the mesh")),
+        };
+        for (values, tag) in flow.state.velocity.iter_mut().zip(VELOCITY) {
+            *values = field(tag)?;
+        }
+        for (values, tag) in flow.state.history.iter_mut().zip(HISTORY) {
+            *values = field(tag)?;
+        }
+        flow.state.pressure = field(PRESSURE)?;
+        let user_data = file.bytes(USER)?;
+        Ok((flow, user_data))
+    }
+}
+
+/// What a checkpoint and its continuation must have in common, as names and values.
+fn identity(mesh: &Mesh, settings: &FlowSettings, layout: &Layout) -> Vec<(String, String)> {
+    let mut list = Vec::new();
+    for (axis, d) in AXIS_NAMES.iter().zip(mesh.directions()) {
+        list.push((format!("the number of cells along {axis}"), d.cells.to_string()));
+        list.push((format!("the low end of {axis}"), format!("{:?} m", d.low_m)));
+        list.push((format!("the high end of {axis}"), format!("{:?} m", d.high_m)));
+        list.push((format!("the mapping of {axis}"), format!("{:?}", d.mapping)));
+        list.push((format!("what bounds {axis}"), format!("{:?}", d.ends)));
+    }
+    let mut add = |name: &str, value: String| list.push((name.to_owned(), value));
+    add("viscosity_m2_s", format!("{:?}", settings.viscosity_m2_s));
+    add("force_m_s2", format!("{:?}", settings.force_m_s2));
+    add("the time scheme", format!("{:?}", settings.scheme));
+    add("the viscous treatment", format!("{:?}", settings.viscous));
+    add("the rotational pressure update", settings.rotational.to_string());
+    add("the subgrid model", format!("{:?}", settings.subgrid));
+    add("the order of the directions in memory", format!("{:?}", layout.direction));
+    list
+}
+
+fn compare_identity(path: &Path, stored: &str, wanted: &[(String, String)]) -> Result<(), Error> {
+    let mismatch = |what: &str, stored: &str, wanted: &str| Error::CheckpointMismatch {
+        path: path.to_owned(),
+        what: what.to_owned(),
+        stored: stored.to_owned(),
+        wanted: wanted.to_owned(),
+    };
+    let found: Vec<(&str, &str)> = stored.lines().filter_map(|line| line.split_once('\t')).collect();
+    for (what, value) in wanted {
+        match found.iter().find(|(name, _)| name == what) {
+            Some((_, stored)) if stored == value => {}
+            Some((_, stored)) => return Err(mismatch(what, stored, value)),
+            None => return Err(mismatch(what, "absent", value)),
+        }
+    }
+    Ok(())
+}
+
+/// Position and metric at all faces and centres \[m\].
+fn metrics(cells: usize, at: impl Fn(f64) -> (f64, f64)) -> Vec<f64> {
+    (0..=2 * cells)
+        .flat_map(|i| {
+            let (x, h) = at(0.5 * i as f64);
+            [x, h]
+        })
+        .collect()
+}
+
+/// Tells custom mappings apart, which have no name.
+fn compare_metrics(path: &Path, axis: usize, stored: &[f64], wanted: &[f64]) -> Result<(), Error> {
+    let length_m = wanted[wanted.len() - 2] - wanted[0];
+    let scale_m = [length_m, wanted[0].abs() + length_m];
+    // Positions against the length, metrics against themselves.
+    let differs = |(i, (a, b)): (usize, (&f64, &f64))| {
+        let scale_m = if i % 2 == 0 { scale_m[1] } else { b.abs() };
+        (a - b).abs() > METRIC_TOLERANCE * scale_m
+    };
+    let place =
+        if stored.len() == wanted.len() { stored.iter().zip(wanted).enumerate().position(differs) } else { Some(0) };
+    let Some(i) = place else { return Ok(()) };
+    let (kind, xi) = (["position [m]", "metric [m]"][i % 2], 0.5 * (i / 2) as f64);
+    Err(Error::CheckpointMismatch {
+        path: path.to_owned(),
+        what: format!("the {kind} at xi = {xi} of the mapping of {}", AXIS_NAMES[axis]),
+        stored: stored.get(i).map_or("absent".into(), |v| format!("{v:?}")),
+        wanted: format!("{:?}", wanted[i]),
+    })
+}
+
+/// The numbers of the state, eight bytes each.
+fn scalars(state: &State) -> Vec<u8> {
+    let State { velocity: _, history: _, pressure: _, time_s, step, last_step_s, courant_per_s, energy, implicit } =
+        state;
+    let words = [
+        time_s.to_bits(),
+        *step,
+        last_step_s.to_bits(),
+        courant_per_s.to_bits(),
+        energy.to_bits(),
+        u64::from(implicit[0]),
+        u64::from(implicit[1]),
+        u64::from(implicit[2]),
+    ];
+    words.into_iter().flat_map(u64::to_le_bytes).collect()
+}
+
+fn read_scalars(bytes: &[u8], state: &mut State) -> Option<()> {
+    let (words, []) = bytes.as_chunks::<8>() else { return None };
+    let words: [u64; 8] = words.iter().map(|w| u64::from_le_bytes(*w)).collect::<Vec<_>>().try_into().ok()?;
+    let [time, step, last_step, courant, energy, implicit @ ..] = words;
+    state.time_s = f64::from_bits(time);
+    state.step = step;
+    state.last_step_s = f64::from_bits(last_step);
+    state.courant_per_s = f64::from_bits(courant);
+    state.energy = f64::from_bits(energy);
+    state.implicit = implicit.map(|flag| flag != 0);
+    Some(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,345 @@
+//! The driver of a simulation: to an end time, with outputs at exact times, a record of every step, and checkpoints.
+//!
+//! It prints nothing and writes nothing but checkpoints; who watches a run is told of everything through [`RunObserver`].
+//! Every decision follows from the state and the plan, so that a run resumed from a checkpoint makes the same steps, records
+//! and outputs, bit for bit, as one that was not interrupted.
+//!
+//! Check: resumed against uninterrupted runs, times hit, the energy budget against a flow with known decay, runs that blow
+//! up, observers that fail.
+
+use std::path::{Path, PathBuf};
+
+use super::flow::{Flow, StepReport};
+use super::mesh::Mesh;
+use super::settings::FlowSettings;
+use crate::Error;
+use crate::error::check;
+
+/// Share of the largest Courant number beyond which the run warns.
+const WARNING_SHARE: f64 = 0.6;
+/// A step shorter than this share of the time of the run does not lead to its end.
+const SHORTEST_SHARE: f64 = 1e-10;
+/// Times closer than this share of the time of the run are the same.
+const SAME_TIME: f64 = 1e-12;
+
+/// How often.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Interval {
+    /// After so many steps.
+    Steps(u64),
+    /// After so much simulated time \[s\].
+    Time {
+        /// The time between \[s\].
+        time_s: f64,
+    },
+}
+
+/// Where and how often checkpoints are written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckpointPlan {
+    /// The file. The one before it is kept beside it, with `.previous` at the end of its name.
+    pub path: PathBuf,
+    /// How often; one is written at the end as well.
+    pub every: Interval,
+}
+
+/// What a run is to do.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RunPlan {
+    /// Time at which it ends \[s\].
+    pub end_s: f64,
+    /// Times of the outputs \[s\], increasing; that of the start may be among them.
+    pub output_times_s: Vec<f64>,
+    /// Checkpoints, if any.
+    pub checkpoint: Option<CheckpointPlan>,
+    /// The run pauses when the flow has made this many steps.
+    pub pause_after_steps: Option<u64>,
+}
+
+/// What became of the kinetic energy in one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EnergyBudget {
+    /// Number of the step.
+    pub step: u64,
+    /// Change of the energy over the length of the step \[m^5/s^3\].
+    pub rate_m5_s3: f64,
+    /// Viscous, subgrid and force power, mean of both ends of the step \[m^5/s^3\].
+    pub power_m5_s3: f64,
+}
+
+impl EnergyBudget {
+    /// What the powers do not explain: the error of the time step, and of the pressure solve \[m^5/s^3\].
+    pub fn residual_m5_s3(&self) -> f64 {
+        self.rate_m5_s3 - self.power_m5_s3
+    }
+}
+
+/// One step as the observer sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepRecord {
+    /// What the flow reported.
+    pub report: StepReport,
+    /// Largest divergence over the largest `sum |u_i|/h_i`.
+    pub relative_divergence: f64,
+    /// The energy budget of the step before: the powers at its end are known only now. None in the first step.
+    pub budget_before: Option<EnergyBudget>,
+}
+
+/// What deserves attention but does not stop a run; each kind is told once.
+#[non_exhaustive]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RunWarning {
+    /// The Courant number is so high that the time scheme is near its limit.
+    Courant {
+        /// Number of the step.
+        step: u64,
+        /// Its Courant number.
+        courant: f64,
+        /// Courant number beyond which a step is refused.
+        limit: f64,
+    },
+}
+
+/// Who watches a run. An `Err` with a reason stops it; the last checkpoint stays.
+pub trait RunObserver {
+    /// After every step.
+    ///
+    /// # Errors
+    /// A reason to stop.
+    fn step(&mut self, flow: &Flow, record: &StepRecord) -> Result<(), String> {
+        let _ = (flow, record);
+        Ok(())
+    }
+
+    /// At output `index` of the plan.
+    ///
+    /// # Errors
+    /// A reason to stop, such as an output that cannot be written.
+    fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
+        let _ = (flow, index);
+        Ok(())
+    }
+
+    /// When something deserves attention.
+    fn warning(&mut self, warning: &RunWarning) {
+        let _ = warning;
+    }
+
+    /// Bytes that the next checkpoint keeps; they come back from [`Run::resume`].
+    fn user_data(&self) -> Vec<u8> {
+        Vec::new()
+    }
+}
+
+/// An observer that looks away.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silent;
+
+impl RunObserver for Silent {}
+
+/// What a run did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunSummary {
+    /// Steps of the flow, those before a restart included.
+    pub steps: u64,
+    /// Time reached \[s\].
+    pub time_s: f64,
+    /// Whether that is the end, not a pause.
+    pub is_complete: bool,
+}
+
+/// A step whose energy budget waits for the powers at its end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct OpenBudget {
+    step: u64,
+    rate_m5_s3: f64,
+    power_m5_s3: f64,
+}
+
+/// A simulation with its plan.
+#[derive(Debug)]
+pub struct Run {
+    flow: Flow,
+    plan: RunPlan,
+    open: Option<OpenBudget>,
+    has_warned: bool,
+    is_fresh: bool,
+}
+
+impl Run {
+    /// A run that begins with the present state of `flow`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty intervals.
+    pub fn new(flow: Flow, plan: RunPlan) -> Result<Self, Error> {
+        plan.check(flow.time_s())?;
+        Ok(Self { flow, plan, open: None, has_warned: false, is_fresh: true })
+    }
+
+    /// A run that continues from a checkpoint written by a run, with the bytes that the observer had given.
+    ///
+    /// # Errors
+    /// As [`Flow::restore`] and [`Run::new`].
+    pub fn resume(
+        path: impl AsRef<Path>,
+        mesh: Mesh,
+        settings: FlowSettings,
+        plan: RunPlan,
+    ) -> Result<(Self, Vec<u8>), Error> {
+        let path = path.as_ref();
+        let (flow, bytes) = Flow::restore(path, mesh, settings)?;
+        let what = "it was written by another kind of program";
+        let Some((open, user_data)) = read_open(&bytes) else {
+            return Err(Error::CheckpointDamaged { path: path.to_owned(), what });
+        };
+        plan.check(f64::NEG_INFINITY)?;
+        Ok((Self { flow, plan, open, has_warned: false, is_fresh: false }, user_data.to_vec()))
+    }
+
+    /// The simulation.
+    pub fn flow(&self) -> &Flow {
+        &self.flow
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &RunPlan {
+        &self.plan
+    }
+
+    /// Runs to the end, or to the pause.
+    ///
+    /// # Errors
+    /// What [`Flow::step`] refuses, [`Error::StepTooShort`], [`Error::Stopped`] by the observer, [`Error::File`] for a
+    /// checkpoint. The last good checkpoint stays as it was.
+    pub fn to_end(&mut self, observer: &mut dyn RunObserver) -> Result<RunSummary, Error> {
+        let (start_s, end_s) = (self.flow.time_s(), self.plan.end_s);
+        // A fresh run gives the output of its start; a resumed one gave it before its checkpoint.
+        let given = |&t: &f64| if self.is_fresh { t < start_s } else { self.is_reached(t) };
+        let mut next_output = self.plan.output_times_s.iter().take_while(|t| given(t)).count();
+        self.is_fresh = false;
+        self.give_outputs(&mut next_output, observer)?;
+        while !self.is_reached(end_s) {
+            if self.plan.pause_after_steps.is_some_and(|steps| self.flow.steps() >= steps) {
+                break;
+            }
+            let target_s = self.plan.output_times_s.get(next_output).map_or(end_s, |t| t.min(end_s));
+            let before_s = self.flow.time_s();
+            let energy = self.flow.kinetic_energy_m5_s2();
+            let report = self.flow.step_towards(target_s)?;
+            if report.step_s < SHORTEST_SHARE * (end_s - start_s) && !self.is_reached(target_s) {
+                let (step, step_s) = (report.step, report.step_s);
+                return Err(Error::StepTooShort { step, time_s: report.time_s, step_s, end_s });
+            }
+            self.warn(&report, observer);
+            let record = self.record(report, energy);
+            observer.step(&self.flow, &record).map_err(|reason| self.stopped(reason))?;
+            self.give_outputs(&mut next_output, observer)?;
+            if self.checkpoint_is_due(before_s, &report) {
+                self.write_checkpoint(observer)?;
+            }
+        }
+        let is_complete = self.is_reached(end_s);
+        self.write_checkpoint(observer)?;
+        Ok(RunSummary { steps: self.flow.steps(), time_s: self.flow.time_s(), is_complete })
+    }
+
+    fn is_reached(&self, time_s: f64) -> bool {
+        time_s - self.flow.time_s() <= SAME_TIME * time_s.abs().max(self.plan.end_s.abs())
+    }
+
+    fn give_outputs(&self, next: &mut usize, observer: &mut dyn RunObserver) -> Result<(), Error> {
+        while self.plan.output_times_s.get(*next).is_some_and(|&t| self.is_reached(t)) {
+            observer.output(&self.flow, *next).map_err(|reason| self.stopped(reason))?;
+            *next += 1;
+        }
+        Ok(())
+    }
+
+    fn stopped(&self, reason: String) -> Error {
+        Error::Stopped { step: self.flow.steps(), time_s: self.flow.time_s(), reason }
+    }
+
+    fn warn(&mut self, report: &StepReport, observer: &mut dyn RunObserver) {
+        let limit = self.flow.settings().scheme.largest_courant();
+        if report.courant > WARNING_SHARE * limit && !self.has_warned {
+            self.has_warned = true;
+            observer.warning(&RunWarning::Courant { step: report.step, courant: report.courant, limit });
+        }
+    }
+
+    fn record(&mut self, report: StepReport, energy_before: f64) -> StepRecord {
+        let power_m5_s3 = report.viscous_power_m5_s3 + report.subgrid_power_m5_s3 + report.force_power_m5_s3;
+        let budget_before = self.open.map(|open| EnergyBudget {
+            step: open.step,
+            rate_m5_s3: open.rate_m5_s3,
+            power_m5_s3: 0.5 * (open.power_m5_s3 + power_m5_s3),
+        });
+        let rate_m5_s3 = (report.kinetic_energy_m5_s2 - energy_before) / report.step_s;
+        self.open = Some(OpenBudget { step: report.step, rate_m5_s3, power_m5_s3 });
+        StepRecord { report, relative_divergence: self.flow.relative_divergence(), budget_before }
+    }
+
+    fn checkpoint_is_due(&self, before_s: f64, report: &StepReport) -> bool {
+        // The last step's checkpoint is written by the end of the run.
+        let Some(plan) = &self.plan.checkpoint else { return false };
+        if self.is_reached(self.plan.end_s) {
+            return false;
+        }
+        // One whose next step would be refused is not worth keeping.
+        let limit = self.flow.settings().scheme.largest_courant();
+        let is_good = self.flow.state.courant_per_s * report.step_s <= limit;
+        is_good
+            && match plan.every {
+                Interval::Steps(steps) => report.step.is_multiple_of(steps),
+                Interval::Time { time_s } => (report.time_s / time_s).floor() > (before_s / time_s).floor(),
+            }
+    }
+
+    fn write_checkpoint(&self, observer: &dyn RunObserver) -> Result<(), Error> {
+        let Some(plan) = &self.plan.checkpoint else { return Ok(()) };
+        let mut previous = plan.path.clone().into_os_string();
+        previous.push(".previous");
+        let bytes = [open_bytes(self.open), observer.user_data()].concat();
+        self.flow.save_and_keep(&plan.path, Some(Path::new(&previous)), &bytes)
+    }
+}
+
+impl RunPlan {
+    fn check(&self, start_s: f64) -> Result<(), Error> {
+        check("end_s", self.end_s, "finite and not before the start", |t| t >= start_s)?;
+        let mut last_s = start_s;
+        for (i, &time_s) in self.output_times_s.iter().enumerate() {
+            let apart = if i == 0 { 0.0 } else { 1e-9 * self.end_s.abs() };
+            check("output_times_s", time_s, "increasing, from the start to the end of the run", |t| {
+                t >= last_s + apart && t <= self.end_s
+            })?;
+            last_s = time_s;
+        }
+        match self.checkpoint.as_ref().map(|plan| plan.every) {
+            Some(Interval::Steps(steps)) => check("checkpoint interval", steps as f64, "at least 1 step", |n| n >= 1.0),
+            Some(Interval::Time { time_s }) => check("checkpoint interval", time_s, "positive", |t| t > 0.0),
+            None => Ok(()),
+        }
+    }
+}
+
+/// An open budget as bytes: its presence, then its numbers.
+fn open_bytes(open: Option<OpenBudget>) -> Vec<u8> {
+    let words = open.map_or([0; 4], |b| [1, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]);
+    words.into_iter().flat_map(u64::to_le_bytes).collect()
+}
+
+fn read_open(bytes: &[u8]) -> Option<(Option<OpenBudget>, &[u8])> {
+    let (own, rest) = bytes.split_at_checked(32)?;
+    let words: Vec<u64> = own.as_chunks::<8>().0.iter().map(|w| u64::from_le_bytes(*w)).collect();
+    let [present, step, rate, power] = words[..] else { return None };
+    let (rate_m5_s3, power_m5_s3) = (f64::from_bits(rate), f64::from_bits(power));
+    match present {
+        0 => Some((None, rest)),
+        1 => Some((Some(OpenBudget { step, rate_m5_s3, power_m5_s3 }), rest)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests;
