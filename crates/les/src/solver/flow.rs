@@ -11,14 +11,13 @@
 use rayon::prelude::*;
 
 use super::implicit::LineSolver;
-use super::interim as pressure;
 use super::interim_subgrid::Subgrid;
 use super::layout::Layout;
 use super::mesh::{AXIS_NAMES, Ends, Mesh, Wall};
 use super::momentum::{Momentum, Scratch};
-use super::pressure::{PressureSolver, Solved};
+use super::pressure::{self, PressureSolver, Solved};
 use super::projection::{Divergence, correct, weighted_dot};
-use super::settings::{FlowSettings, Stage, TimeStep, ViscousTreatment};
+use super::settings::{FlowSettings, Stage, TimeScheme, TimeStep, ViscousTreatment};
 use crate::Error;
 
 /// Largest symbol of the Laplacian times the square of the spacing.
@@ -240,15 +239,25 @@ impl Flow {
         let courant = step_s * self.state.courant_per_s;
         self.refuse_courant(courant, step_s)?;
         let ratio = (self.state.last_step_s > 0.0).then(|| step_s / self.state.last_step_s);
+        let implicit_share = if self.state.step < self.settings.damped_steps { 1.0 } else { 0.5 };
+        // Adams-Bashforth starts with a step of Runge-Kutta and then wants the terms of the initial field.
+        let starting = self.settings.scheme == TimeScheme::AdamsBashforth2 && ratio.is_none();
+        let mut first_terms = None;
         let mut powers = None;
         let mut solved = None;
         for stage in self.settings.scheme.stages(ratio) {
             let stage_s = stage.fraction * step_s;
             let found = self.momentum(&stage, stage_s, false);
+            if powers.is_none() && starting {
+                first_terms = Some(self.state.history.clone());
+            }
             powers.get_or_insert(found);
-            self.solve_lines(0.5 * stage_s * self.settings.viscosity_m2_s);
+            self.solve_lines(implicit_share * stage_s * self.settings.viscosity_m2_s);
             solved = Some(self.project(stage_s)?);
             self.update_pressure();
+        }
+        if let Some(terms) = first_terms {
+            self.state.history = terms;
         }
         self.state.step += 1;
         self.state.time_s += step_s;

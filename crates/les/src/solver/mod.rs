@@ -5,7 +5,6 @@ mod checkpoint;
 mod fields;
 mod flow;
 mod implicit;
-mod interim;
 mod interim_subgrid;
 mod layout;
 mod line;

@@ -17,8 +17,7 @@ pub(super) fn between_plates(cells: usize, strength: f64, velocity_m_s: [f64; 2]
 /// # Errors
 /// Cells, stretching or viscosity out of range.
 pub fn poiseuille(cells: usize, strength: f64, viscosity_m2_s: f64, share: f64, step_s: f64) -> Result<Case, Error> {
-    let mesh =
-        Mesh::new(Direction::periodic(8, 0.0, 1.0), Direction::thin(1.0), between_plates(cells, strength, [0.0; 2]))?;
+    let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), between_plates(cells, strength, [0.0; 2]))?;
     let mut settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
     settings.force_m_s2 = [2.0 * viscosity_m2_s, 0.0, 0.0];
     let initial = move |at_m: [f64; 3]| [share * (1.0 - at_m[2].powi(2)), 0.0, 0.0];
@@ -31,7 +30,7 @@ pub fn poiseuille(cells: usize, strength: f64, viscosity_m2_s: f64, share: f64, 
 /// Cells, stretching or viscosity out of range.
 pub fn couette(cells: usize, strength: f64, viscosity_m2_s: f64, share: f64, step_s: f64) -> Result<Case, Error> {
     let plates = between_plates(cells, strength, [-1.0, 1.0]);
-    let mesh = Mesh::new(Direction::periodic(8, 0.0, 1.0), Direction::thin(1.0), plates)?;
+    let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
     let initial = move |at_m: [f64; 3]| [share * at_m[2], 0.0, 0.0];
     Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 10.0 / viscosity_m2_s })
@@ -43,7 +42,7 @@ pub fn couette(cells: usize, strength: f64, viscosity_m2_s: f64, share: f64, ste
 /// Cells, stretching or viscosity out of range.
 pub fn decaying_layer(cells: usize, strength: f64, viscosity_m2_s: f64, step_s: f64) -> Result<Case, Error> {
     let plates = between_plates(cells, strength, [0.0; 2]);
-    let mesh = Mesh::new(Direction::periodic(8, 0.0, 1.0), Direction::thin(1.0), plates)?;
+    let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
     let initial = |at_m: [f64; 3]| [(0.5 * std::f64::consts::PI * at_m[2]).cos(), 0.0, 0.0];
     Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 1.0 / viscosity_m2_s })
@@ -55,7 +54,7 @@ pub fn decaying_layer(cells: usize, strength: f64, viscosity_m2_s: f64, step_s: 
 /// Cells, stretching or viscosity out of range.
 pub fn rayleigh_plate(cells: usize, strength: f64, viscosity_m2_s: f64, step_s: f64) -> Result<Case, Error> {
     let plates = between_plates(cells, strength, [1.0, 0.0]);
-    let mesh = Mesh::new(Direction::periodic(8, 0.0, 1.0), Direction::thin(1.0), plates)?;
+    let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
     Ok(Case { mesh, settings, initial: Box::new(|_| [0.0; 3]), end_s: 0.05 / viscosity_m2_s })
 }
