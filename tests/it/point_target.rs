@@ -85,7 +85,7 @@ fn point_target_at_3_m_s_comes_out_within_twice_the_cramer_rao_bound() {
     let amplitude: Vec<f64> = (0..WINDOW)
         .map(|k| {
             let t_s = target.simulator.time_s(k) - 2.0 * target.line.first_range_m / SPEED_OF_LIGHT_M_S;
-            target.simulator.pulse().envelope_per_sqrt_s(t_s)
+            target.simulator.pulse().envelope_per_sqrt_s(t_s).re
         })
         .collect();
     let bound_m_s = WindowModel::point_target(&sampling, &amplitude, Noise::White)

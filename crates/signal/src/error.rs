@@ -42,6 +42,22 @@ pub enum Error {
         /// Name of the list.
         field: &'static str,
     },
+    /// The wind of a layer is not known, and the policy is [`OutsideDomain::Error`](crate::OutsideDomain::Error).
+    #[error("no wind at layer {index}, range {range_m} m: the line of sight leaves the domain of the flow")]
+    NoWind {
+        /// Index of the first such layer.
+        index: usize,
+        /// Its range \[m\].
+        range_m: f64,
+    },
+    /// A sum is too large for a number of double precision.
+    #[error("{field}[{index}] overflows: lower weight_per_m, energy_j or local_oscillator_w")]
+    Overflow {
+        /// Name of the result.
+        field: &'static str,
+        /// Index of its first element that overflows.
+        index: usize,
+    },
     /// The detector band does not fit between zero and half the sampling rate.
     #[error(
         "the detector band {low_hz} to {high_hz} Hz (intermediate_frequency_hz -+ bandwidth_hz/2) \

@@ -10,10 +10,7 @@
 //! discrete weights agree with a fine quadrature.
 
 use crate::error::{check, check_length, check_positive};
-use crate::{Error, GaussianPulse, SPEED_OF_LIGHT_M_S};
-
-/// Reach of the weights beyond the outermost sample, in units of `c sigma/2`: `|f|^2` is 2e-16 of its peak there.
-const REACH_SIGMAS: f64 = 6.0;
+use crate::{Error, Pulse, SPEED_OF_LIGHT_M_S};
 
 /// Ranges are placed between layers to this many parts of a layer, so that equal positions share their weights
 /// whatever the rounding of the range.
@@ -25,7 +22,7 @@ const LEAST_KNOWN_WEIGHT: f64 = 0.5;
 /// Weights of the air about a range, for profiles on layers of one thickness.
 #[derive(Debug, Clone)]
 pub struct RangeFilter {
-    pulse: GaussianPulse,
+    pulse: Pulse,
     layer_thickness_m: f64,
     /// Times of the samples about `2 R/c` \[s\] and their weights, which sum to 1.
     taps: Vec<(f64, f64)>,
@@ -37,9 +34,10 @@ impl RangeFilter {
     /// Weights of the pulse alone: `v_pulse`, (28), corrected.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] if the thickness is not positive, or not thinner than `c sigma/2`.
-    pub fn pulse(pulse: &GaussianPulse, layer_thickness_m: f64) -> Result<Self, Error> {
-        Self::new(pulse, vec![(0.0, 1.0)], layer_thickness_m)
+    /// [`Error::OutOfRange`] if the thickness is not positive, or thicker than `c sigma/2` or than
+    /// [`Pulse::max_layer_thickness_m`].
+    pub fn pulse(pulse: impl Into<Pulse>, layer_thickness_m: f64) -> Result<Self, Error> {
+        Self::new(pulse.into(), vec![(0.0, 1.0)], layer_thickness_m)
     }
 
     /// Weights of the pulse and of an analysis window with the coefficients `window`, `h_n`: `v_gate`.
@@ -48,7 +46,7 @@ impl RangeFilter {
     /// [`Error::OutOfRange`] as [`RangeFilter::pulse`], or for a bad sampling rate; [`Error::Empty`] without
     /// coefficients; [`Error::ElementOutOfRange`] if one is not finite, or all are zero.
     pub fn gate(
-        pulse: &GaussianPulse,
+        pulse: impl Into<Pulse>,
         window: &[f64],
         sample_rate_hz: f64,
         layer_thickness_m: f64,
@@ -70,16 +68,15 @@ impl RangeFilter {
         let squares = window.iter().map(|h| (h / largest) * (h / largest));
         let sum: f64 = squares.clone().sum();
         let taps = squares.enumerate().map(|(n, square)| ((n as f64 - half) / sample_rate_hz, square / sum)).collect();
-        Self::new(pulse, taps, layer_thickness_m)
+        Self::new(pulse.into(), taps, layer_thickness_m)
     }
 
-    fn new(pulse: &GaussianPulse, taps: Vec<(f64, f64)>, layer_thickness_m: f64) -> Result<Self, Error> {
+    fn new(pulse: Pulse, taps: Vec<(f64, f64)>, layer_thickness_m: f64) -> Result<Self, Error> {
         check_positive("layer_thickness_m", layer_thickness_m)?;
-        let length_m = pulse.sigma_m();
-        check("layer_thickness_m", layer_thickness_m, "at most c sigma/2 and above 1e-7 of it", |t| {
-            t <= length_m && t > 1e-7 * length_m
-        })?;
-        let mut filter = Self { pulse: *pulse, layer_thickness_m, taps, centred: (0, Vec::new()) };
+        let (length_m, thickest_m) = (pulse.sigma_m(), pulse.sigma_m().min(pulse.max_layer_thickness_m()));
+        let allowed = "at most c sigma/2 (less for a pulse with steep edges) and above 1e-7 of it";
+        check("layer_thickness_m", layer_thickness_m, allowed, |t| t <= thickest_m && t > 1e-7 * length_m)?;
+        let mut filter = Self { pulse, layer_thickness_m, taps, centred: (0, Vec::new()) };
         filter.centred = filter.weights(0.0);
         Ok(filter)
     }
@@ -144,11 +141,11 @@ impl RangeFilter {
     /// Weights for a range that lies `part` of a layer beyond the centre of one: offset of the first in layers from that
     /// one, and one weight per layer; they sum to 1.
     fn weights(&self, part: f64) -> (i64, Vec<f64>) {
-        let reach_m = REACH_SIGMAS * self.pulse.sigma_m();
+        let (near_m, far_m) = self.pulse.weight_reach_m();
         let sample_m = |tap: Option<&(f64, f64)>| 0.5 * SPEED_OF_LIGHT_M_S * tap.map_or(0.0, |&(time_s, _)| time_s);
         let layers = |offset_m: f64| (offset_m / self.layer_thickness_m) as i64;
-        let first = layers(sample_m(self.taps.first()) - reach_m) - 1;
-        let last = layers(sample_m(self.taps.last()) + reach_m) + 1;
+        let first = layers(sample_m(self.taps.first()) + near_m) - 1;
+        let last = layers(sample_m(self.taps.last()) + far_m) + 1;
         let mut weights: Vec<f64> =
             (first..=last).map(|l| self.weight_per_m((l as f64 - part) * self.layer_thickness_m)).collect();
         let sum: f64 = weights.iter().sum();
@@ -185,7 +182,7 @@ fn weighted_mean(weights: &[f64], velocities_m_s: impl Iterator<Item = f64>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::PulseDuration;
+    use crate::{GaussianPulse, PulseDuration};
     use approx::{assert_abs_diff_eq, assert_relative_eq};
 
     const STEP_M: f64 = SPEED_OF_LIGHT_M_S / 500e6;
@@ -199,10 +196,10 @@ mod tests {
     }
 
     fn filters() -> [(RangeFilter, f64); 3] {
-        let gate = |window: &[f64]| RangeFilter::gate(&pulse(), window, 250e6, STEP_M / 3.0).unwrap();
+        let gate = |window: &[f64]| RangeFilter::gate(pulse(), window, 250e6, STEP_M / 3.0).unwrap();
         // A gate is seen half a sample before its range.
         [
-            (RangeFilter::pulse(&pulse(), STEP_M / 3.0).unwrap(), 0.0),
+            (RangeFilter::pulse(pulse(), STEP_M / 3.0).unwrap(), 0.0),
             (gate(&[1.0; 64]), -0.5 * STEP_M),
             (gate(&hann(64)), -0.5 * STEP_M),
         ]
@@ -240,14 +237,14 @@ mod tests {
     #[test]
     fn a_parabola_rises_by_half_the_squared_length_of_the_pulse() {
         // The second moment of |f(2 x/c)|^2 2/c is (c sigma/2)^2/2: fails if the Jacobian or a factor 2 were wrong.
-        let filter = RangeFilter::pulse(&pulse(), 0.2).unwrap();
+        let filter = RangeFilter::pulse(pulse(), 0.2).unwrap();
         let at_centre = filter.at_range(500.0, |rho| (rho - 500.0).powi(2));
         assert_relative_eq!(at_centre, 0.5 * pulse().sigma_m().powi(2), max_relative = 1e-12);
     }
 
     #[test]
     fn a_gate_adds_the_variance_of_its_window() {
-        let filter = RangeFilter::gate(&pulse(), &[1.0; 64], 250e6, 0.2).unwrap();
+        let filter = RangeFilter::gate(pulse(), &[1.0; 64], 250e6, 0.2).unwrap();
         let centre = 500.0 - 0.5 * STEP_M;
         let spread = filter.at_range(500.0, |rho| (rho - centre).powi(2));
         let window = STEP_M * STEP_M * (64.0 * 64.0 - 1.0) / 12.0;
@@ -264,7 +261,7 @@ mod tests {
 
     #[test]
     fn ranges_that_see_too_little_air_are_not_numbers() {
-        let filter = RangeFilter::pulse(&pulse(), 0.5).unwrap();
+        let filter = RangeFilter::pulse(pulse(), 0.5).unwrap();
         let mut out = [0.0; 4];
         filter.apply_into(100.0, &[1.0; 1000], &[20.0, 90.0, 110.0, 1e18], &mut out).unwrap();
         assert!(out[0].is_nan() && out[1].is_nan() && out[3].is_nan());
@@ -275,14 +272,14 @@ mod tests {
 
     #[test]
     fn input_that_makes_no_filter_is_refused() {
-        assert!(RangeFilter::pulse(&pulse(), 0.0).is_err());
-        assert!(RangeFilter::pulse(&pulse(), 1000.0).is_err());
-        assert!(RangeFilter::pulse(&pulse(), 1e-9).is_err());
-        let gate = |window: &[f64]| RangeFilter::gate(&pulse(), window, 250e6, 0.5);
+        assert!(RangeFilter::pulse(pulse(), 0.0).is_err());
+        assert!(RangeFilter::pulse(pulse(), 1000.0).is_err());
+        assert!(RangeFilter::pulse(pulse(), 1e-9).is_err());
+        let gate = |window: &[f64]| RangeFilter::gate(pulse(), window, 250e6, 0.5);
         assert!(matches!(gate(&[]), Err(Error::Empty { .. })));
         assert!(matches!(gate(&[0.0; 3]), Err(Error::ElementOutOfRange { .. })));
         assert!(matches!(gate(&[1.0, f64::NAN]), Err(Error::ElementOutOfRange { index: 1, .. })));
-        let filter = RangeFilter::pulse(&pulse(), 0.5).unwrap();
+        let filter = RangeFilter::pulse(pulse(), 0.5).unwrap();
         assert!(filter.apply_into(0.0, &[], &[1.0], &mut [0.0]).is_err());
         assert!(filter.apply_into(0.0, &[1.0], &[1.0], &mut [0.0; 2]).is_err());
         assert!(filter.apply_into(0.0, &[1.0], &[f64::NAN], &mut [0.0]).is_err());

@@ -19,9 +19,9 @@ use rand_distr::StandardNormal;
 
 use crate::error::{check, check_length};
 use crate::kernel::Phasors;
-use crate::noise::{NoiseScratch, NoiseSource};
+use crate::noise::{BasebandNoise, NoiseScratch, NoiseSource};
 use crate::window::Window;
-use crate::{Error, GaussianPulse, LineOfSight, Receiver};
+use crate::{Error, LineOfSight, Pulse, Receiver, Shot};
 
 /// Samples after which all phasors are computed afresh, so that rounding cannot build up.
 const RENEWAL_SAMPLES: usize = 1024;
@@ -38,7 +38,7 @@ pub struct Record {
 /// Buffers of one worker, reused from pulse to pulse.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    window: Window,
+    pub(crate) window: Window,
     phasors: Phasors,
     speckle: Vec<Complex<f64>>,
     envelope: Vec<Complex<f64>>,
@@ -50,10 +50,11 @@ pub struct Scratch {
 /// Shared between threads; each needs its own [`Scratch`] and random generator.
 #[derive(Debug, Clone)]
 pub struct Simulator {
-    pulse: GaussianPulse,
+    pulse: Pulse,
     receiver: Receiver,
     record: Record,
     noise: NoiseSource,
+    baseband_noise: BasebandNoise,
     carrier: Vec<Complex<f64>>,
 }
 
@@ -62,7 +63,8 @@ impl Simulator {
     ///
     /// # Errors
     /// As [`Receiver::validate`]; [`Error::OutOfRange`] for a record without samples or a first time that is not finite.
-    pub fn new(pulse: GaussianPulse, receiver: Receiver, record: Record) -> Result<Self, Error> {
+    pub fn new(pulse: impl Into<Pulse>, receiver: Receiver, record: Record) -> Result<Self, Error> {
+        let pulse = pulse.into();
         receiver.validate()?;
         check("time_of_first_sample_s", record.time_of_first_sample_s, "finite", |_| true)?;
         check("samples", record.samples as f64, "1 or more", |n| n >= 1.0)?;
@@ -76,11 +78,12 @@ impl Simulator {
             })
             .collect();
         let noise = NoiseSource::new(&receiver, record.samples);
-        Ok(Self { pulse, receiver, record, noise, carrier })
+        let baseband_noise = BasebandNoise::new(&receiver, record.samples);
+        Ok(Self { pulse, receiver, record, noise, baseband_noise, carrier })
     }
 
     /// The pulse.
-    pub fn pulse(&self) -> &GaussianPulse {
+    pub fn pulse(&self) -> &Pulse {
         &self.pulse
     }
 
@@ -107,11 +110,11 @@ impl Simulator {
     /// for `BandLimited`.
     ///
     /// # Errors
-    /// As [`LineOfSight::validate`]; [`Error::LengthMismatch`] if `out_a` has not one place per sample;
-    /// [`Error::OutOfRange`] for layers far thinner than any use.
-    pub fn record_into<R: Rng + ?Sized>(
+    /// As [`Shot::validate`]; [`Error::LengthMismatch`] if `out_a` has not one place per sample;
+    /// [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any use; [`Error::Overflow`].
+    pub fn record_into<'a, R: Rng + ?Sized>(
         &self,
-        line: &LineOfSight,
+        shot: impl Into<Shot<'a>>,
         rng: &mut R,
         scratch: &mut Scratch,
         out_a: &mut [f64],
@@ -119,7 +122,7 @@ impl Simulator {
         check_length("out_a", out_a.len(), self.record.samples)?;
         let mut envelope = std::mem::take(&mut scratch.envelope);
         envelope.resize(self.record.samples, Complex::ZERO);
-        let result = self.envelope_into(line, rng, scratch, &mut envelope);
+        let result = self.envelope_into(shot, rng, scratch, &mut envelope);
         if result.is_ok() {
             for ((out, s), carrier) in out_a.iter_mut().zip(&envelope).zip(&self.carrier) {
                 *out = SQRT_2 * (s.re * carrier.re - s.im * carrier.im);
@@ -130,28 +133,53 @@ impl Simulator {
         result
     }
 
+    /// Writes the complex baseband signal of one pulse, `s(t_k)` with circular noise of the detector band about zero
+    /// frequency \[A\]: what a receiver with two quadratures delivers.
+    ///
+    /// The real current is `sqrt(2) Re{(s + n) exp(j 2 pi f_c t)}`, so the mean square of the noise is (13), and the
+    /// signal-to-noise ratio is (14), as for [`Simulator::record_into`]. `White` noise fills `-F_s/2` to `F_s/2` with the
+    /// density of the band.
+    ///
+    /// Draws the speckle as [`Simulator::record_into`] does, then two normal numbers per sample or per frequency.
+    ///
+    /// # Errors
+    /// As [`Simulator::record_into`].
+    pub fn baseband_into<'a, R: Rng + ?Sized>(
+        &self,
+        shot: impl Into<Shot<'a>>,
+        rng: &mut R,
+        scratch: &mut Scratch,
+        out_a: &mut [Complex<f64>],
+    ) -> Result<(), Error> {
+        self.envelope_into(shot, rng, scratch, out_a)?;
+        self.baseband_noise.add_to(rng, &mut scratch.noise, out_a);
+        Ok(())
+    }
+
     /// Writes the complex envelope `s(t_k)` of one pulse, (15), corrected \[A\], without noise.
     ///
     /// Draws the speckle as [`Simulator::record_into`] does.
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
-    pub fn envelope_into<R: Rng + ?Sized>(
+    pub fn envelope_into<'a, R: Rng + ?Sized>(
         &self,
-        line: &LineOfSight,
+        shot: impl Into<Shot<'a>>,
         rng: &mut R,
         scratch: &mut Scratch,
         out_a: &mut [Complex<f64>],
     ) -> Result<(), Error> {
-        line.validate()?;
+        let shot = shot.into();
+        shot.validate()?;
+        check_length("out_a", out_a.len(), self.record.samples)?;
         let mut speckle = std::mem::take(&mut scratch.speckle);
         speckle.clear();
-        speckle.extend((0..line.layers()).map(|_| {
+        speckle.extend((0..shot.line.layers()).map(|_| {
             let re: f64 = rng.sample(StandardNormal);
             let im: f64 = rng.sample(StandardNormal);
             Complex::new(re, im) * FRAC_1_SQRT_2
         }));
-        let result = self.envelope_of_speckle_into(line, &speckle, scratch, out_a);
+        let result = self.sum_into(shot, &speckle, scratch, out_a);
         scratch.speckle = speckle;
         result
     }
@@ -160,22 +188,35 @@ impl Simulator {
     ///
     /// # Errors
     /// As [`Simulator::record_into`]; [`Error::LengthMismatch`] if there is not one amplitude per layer.
-    pub fn envelope_of_speckle_into(
+    pub fn envelope_of_speckle_into<'a>(
         &self,
-        line: &LineOfSight,
+        shot: impl Into<Shot<'a>>,
         speckle: &[Complex<f64>],
         scratch: &mut Scratch,
         out_a: &mut [Complex<f64>],
     ) -> Result<(), Error> {
+        let shot = shot.into();
         check_length("out_a", out_a.len(), self.record.samples)?;
-        line.validate()?;
-        check_length("speckle", speckle.len(), line.layers())?;
+        shot.validate()?;
+        check_length("speckle", speckle.len(), shot.line.layers())?;
+        self.sum_into(shot, speckle, scratch, out_a)
+    }
+
+    /// The sum (15) of a shot that is valid, with one amplitude per layer.
+    fn sum_into(
+        &self,
+        shot: Shot<'_>,
+        speckle: &[Complex<f64>],
+        scratch: &mut Scratch,
+        out_a: &mut [Complex<f64>],
+    ) -> Result<(), Error> {
+        let line = shot.line;
         self.prepare(line, scratch)?;
         let Scratch { window, phasors, .. } = scratch;
         phasors.resize(line.layers());
         for (block, outs) in out_a.chunks_mut(RENEWAL_SAMPLES).enumerate() {
             let start = block * RENEWAL_SAMPLES;
-            self.renew(line, speckle, window, phasors, start, outs.len());
+            self.renew(shot, speckle, window, phasors, start, outs.len());
             for (i, out) in outs.iter_mut().enumerate() {
                 let (first, _) = window.layers_at(start + i);
                 let envelope = window.amplitudes_at(&self.pulse, line.layer_thickness_m, start + i);
@@ -183,44 +224,10 @@ impl Simulator {
                 *out = Complex::new(re, im);
             }
         }
-        Ok(())
-    }
-
-    /// Writes the mean power `E|s(t_k)|^2` of the discrete sum \[A^2\]: what many pulses average to, without drawing any.
-    /// It is also the mean square of the signal part of [`Simulator::record_into`].
-    ///
-    /// # Errors
-    /// As [`Simulator::record_into`].
-    pub fn mean_power_into(&self, line: &LineOfSight, scratch: &mut Scratch, out_a2: &mut [f64]) -> Result<(), Error> {
-        check_length("out_a2", out_a2.len(), self.record.samples)?;
-        line.validate()?;
-        self.prepare(line, scratch)?;
-        let gain = self.amplitude_gain_a_sqrt_s(line).powi(2);
-        for (k, out) in out_a2.iter_mut().enumerate() {
-            let (first, _) = scratch.window.layers_at(k);
-            let envelope = scratch.window.amplitudes_at(&self.pulse, line.layer_thickness_m, k);
-            let sum: f64 = envelope
-                .iter()
-                .zip(&line.weight_per_m[first..])
-                .zip(&line.radial_velocity_m_s[first..])
-                .filter(|&(_, velocity)| !velocity.is_nan())
-                .map(|((f, weight), _)| f * f * weight)
-                .sum();
-            *out = gain * sum;
+        match out_a.iter().position(|s| !s.is_finite()) {
+            Some(index) => Err(Error::Overflow { field: "out_a", index }),
+            None => Ok(()),
         }
-        Ok(())
-    }
-
-    /// Writes the signal-to-noise ratio of each sample, (14), corrected: mean signal power over the noise power in the
-    /// detector band.
-    ///
-    /// # Errors
-    /// As [`Simulator::record_into`].
-    pub fn snr_into(&self, line: &LineOfSight, scratch: &mut Scratch, out: &mut [f64]) -> Result<(), Error> {
-        self.mean_power_into(line, scratch, out)?;
-        let noise_a2 = self.receiver.noise_variance_a2();
-        out.iter_mut().for_each(|power| *power /= noise_a2);
-        Ok(())
     }
 
     /// `sqrt(2) S sqrt(E_t P_LO) sqrt(DeltaR)`: what `f b_l` is multiplied with in (15) \[A s^1/2 m^1/2\].
@@ -234,7 +241,7 @@ impl Simulator {
         -4.0 * PI * radial_velocity_m_s / self.receiver.wavelength_m
     }
 
-    fn prepare(&self, line: &LineOfSight, scratch: &mut Scratch) -> Result<(), Error> {
+    pub(crate) fn prepare(&self, line: &LineOfSight, scratch: &mut Scratch) -> Result<(), Error> {
         scratch.window.prepare(
             &self.pulse,
             line,
@@ -248,13 +255,14 @@ impl Simulator {
     /// the first sample that lights it.
     fn renew(
         &self,
-        line: &LineOfSight,
+        shot: Shot<'_>,
         speckle: &[Complex<f64>],
         window: &Window,
         phasors: &mut Phasors,
         start: usize,
         samples: usize,
     ) {
+        let line = shot.line;
         let gain = self.amplitude_gain_a_sqrt_s(line);
         let mut next = window.layers_at(start).0;
         for k in start..start + samples {
@@ -263,7 +271,7 @@ impl Simulator {
             let from = next.max(first);
             for (layer, g) in (from..end).zip(&speckle[from.min(end)..end]) {
                 let velocity_m_s = line.radial_velocity_m_s[layer];
-                let amplitude = gain * line.weight_per_m[layer].sqrt() * g;
+                let amplitude = gain * shot.weight_per_m(layer).sqrt() * g;
                 self.set_phasor(phasors, layer, velocity_m_s, amplitude, time_s);
             }
             next = next.max(end);

@@ -7,6 +7,8 @@
 
 use multiversion::multiversion;
 
+use crate::window::Lit;
+
 /// Sums that run side by side: two AVX-512 registers, four AVX2, eight SSE2.
 const LANES: usize = 16;
 
@@ -26,17 +28,17 @@ impl Phasors {
         }
     }
 
-    /// `sum_l envelope[l - first] phasor[l]` over `envelope.len()` layers, then turns these phasors by one sampling
+    /// `sum_l envelope[l - first] phasor[l]` over the layers of `envelope`, then turns these phasors by one sampling
     /// interval.
-    pub(crate) fn sum_and_turn(&mut self, first: usize, envelope: &[f64]) -> (f64, f64) {
-        let window = first..first + envelope.len();
-        sum_and_turn(
-            envelope,
-            &mut self.re[window.clone()],
-            &mut self.im[window.clone()],
-            &self.turn_re[window.clone()],
-            &self.turn_im[window],
-        )
+    pub(crate) fn sum_and_turn(&mut self, first: usize, envelope: Lit<'_>) -> (f64, f64) {
+        let window = first..first + envelope.re.len();
+        let (re, im) = (&mut self.re[window.clone()], &mut self.im[window.clone()]);
+        let (turn_re, turn_im) = (&self.turn_re[window.clone()], &self.turn_im[window]);
+        if envelope.im.is_empty() {
+            sum_and_turn(envelope.re, re, im, turn_re, turn_im)
+        } else {
+            sum_complex_and_turn(envelope.re, envelope.im, re, im, turn_re, turn_im)
+        }
     }
 }
 
@@ -64,6 +66,45 @@ fn sum_and_turn(envelope: &[f64], re: &mut [f64], im: &mut [f64], turn_re: &[f64
         let (x, y) = (*re, *im);
         total.0 += weight * x;
         total.1 += weight * y;
+        *re = x * turn_re - y * turn_im;
+        *im = x * turn_im + y * turn_re;
+    }
+    total
+}
+
+/// The same for an envelope with real part `weight_re` and imaginary part `weight_im`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn sum_complex_and_turn(
+    weight_re: &[f64],
+    weight_im: &[f64],
+    re: &mut [f64],
+    im: &mut [f64],
+    turn_re: &[f64],
+    turn_im: &[f64],
+) -> (f64, f64) {
+    let (mut sum_re, mut sum_im) = ([0.0; LANES], [0.0; LANES]);
+    let (weight_re, weight_re_rest) = weight_re.as_chunks::<LANES>();
+    let (weight_im, weight_im_rest) = weight_im.as_chunks::<LANES>();
+    let (re, re_rest) = re.as_chunks_mut::<LANES>();
+    let (im, im_rest) = im.as_chunks_mut::<LANES>();
+    let (turn_re, turn_re_rest) = turn_re.as_chunks::<LANES>();
+    let (turn_im, turn_im_rest) = turn_im.as_chunks::<LANES>();
+    let state = re.iter_mut().zip(im).zip(turn_re.iter().zip(turn_im));
+    for ((a, b), ((re, im), (turn_re, turn_im))) in weight_re.iter().zip(weight_im).zip(state) {
+        for i in 0..LANES {
+            let (x, y) = (re[i], im[i]);
+            sum_re[i] += a[i] * x - b[i] * y;
+            sum_im[i] += a[i] * y + b[i] * x;
+            re[i] = x * turn_re[i] - y * turn_im[i];
+            im[i] = x * turn_im[i] + y * turn_re[i];
+        }
+    }
+    let mut total = (sum_re.iter().sum::<f64>(), sum_im.iter().sum::<f64>());
+    let state = re_rest.iter_mut().zip(im_rest).zip(turn_re_rest.iter().zip(turn_im_rest));
+    for ((&a, &b), ((re, im), (&turn_re, &turn_im))) in weight_re_rest.iter().zip(weight_im_rest).zip(state) {
+        let (x, y) = (*re, *im);
+        total.0 += a * x - b * y;
+        total.1 += a * y + b * x;
         *re = x * turn_re - y * turn_im;
         *im = x * turn_im + y * turn_re;
     }

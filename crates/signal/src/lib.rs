@@ -29,36 +29,66 @@
 //!
 //! | module | what is in it |
 //! |---|---|
-//! | `pulse` | Gaussian envelope (7), its range weight |
-//! | `filter` | [`RangeFilter`]: velocity profiles weighted by pulse and gate, (28) |
-//! | `line` | [`LineOfSight`]; how thin a layer must be |
-//! | `receiver` | sampling, responsivity, noise power (13), signal-to-noise ratio (14) |
+//! | `pulse` | [`GaussianPulse`]: envelope (7), its range weight |
+//! | `sampled` | [`SampledPulse`]: any envelope given by samples, and how it is resampled |
+//! | `transmitted` | [`Pulse`]: either of them, with chirp; its moments, and the layers it needs |
+//! | `piecewise` | the cubic pieces that a sampled envelope is kept in |
+//! | `medium` | [`Medium`]: backscatter and extinction by range |
+//! | `efficiency` | [`EfficiencyTable`]: heterodyne efficiency, one curve or one realisation per pulse |
+//! | `table` | tables over range |
+//! | `line` | [`LineOfSight`]; how thin a layer must be; what to do outside the flow's domain |
+//! | `shot` | [`Shot`]: what one pulse meets |
+//! | `receiver` | sampling, responsivity, noise power (13), signal-to-noise ratio (14), folding |
 //! | `heterodyne` | [`Simulator`]: one record per pulse, (15), (12), fast form |
+//! | `window`, `kernel` | which layers are lit at a sample; the inner loop |
 //! | `literal` | the same sum term by term, as oracle |
-//! | `noise` | band-limited or white shot noise |
+//! | `noise` | band-limited or white shot noise, real or complex |
+//! | `expected` | mean power, (14), and covariance of the samples, without drawing any |
+//! | `digitise` | [`Digitiser`]: rounding and saturation |
+//! | `scan` | [`Scan`]: all pulses of a scan, in parallel and in bounded memory |
+//! | `parallel` | loops on the caller's thread pool |
 //! | `series` | [`TimeSeries`]: records of many pulses |
+//! | `filter` | [`RangeFilter`]: velocity profiles weighted by pulse and gate, (28) |
 //!
-//! No optional features.
+//! Feature `rayon` (default): the pulses of a scan in the caller's thread pool; the bits of the result do not depend on it.
 
 mod constants;
+mod digitise;
+mod efficiency;
 mod error;
+mod expected;
 mod filter;
 mod heterodyne;
 mod kernel;
 mod line;
 mod literal;
+mod medium;
 mod noise;
+mod parallel;
+mod piecewise;
 mod pulse;
 mod receiver;
+mod sampled;
+mod scan;
 mod series;
+mod shot;
+mod table;
+mod transmitted;
 mod window;
 
 pub use constants::{ELEMENTARY_CHARGE_C, PLANCK_J_S, SPEED_OF_LIGHT_M_S};
+pub use digitise::{Clipped, Digitiser};
+pub use efficiency::{EfficiencyTable, LayerEfficiency};
 pub use error::Error;
 pub use filter::RangeFilter;
 pub use heterodyne::{Record, Scratch, Simulator};
-pub use line::{LineOfSight, layer_thickness_m};
+pub use line::{BeyondBand, LineOfSight, OutsideDomain, layer_thickness_m};
 pub use literal::literal_envelope;
+pub use medium::Medium;
 pub use pulse::{GaussianPulse, PulseDuration};
 pub use receiver::{NoiseModel, PlanckConvention, Receiver};
+pub use sampled::{Resampling, SampledPulse};
+pub use scan::{PulseKey, Sample, Scan, pulse_generator};
 pub use series::TimeSeries;
+pub use shot::Shot;
+pub use transmitted::Pulse;

@@ -4,7 +4,7 @@
 //! Check: the thickness divides the range step of one sample and obeys the rule of the steepest gradient.
 
 use crate::error::{check, check_length, check_positive};
-use crate::{Error, SPEED_OF_LIGHT_M_S};
+use crate::{Error, Receiver, SPEED_OF_LIGHT_M_S};
 
 /// The air along one line of sight, cut into layers of equal thickness.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -20,7 +20,71 @@ pub struct LineOfSight {
     pub weight_per_m: Vec<f64>,
 }
 
+/// What to do where a line of sight leaves the domain in which the wind is known, marked by NaN velocities.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum OutsideDomain {
+    /// Refuse the line.
+    #[default]
+    Error,
+    /// Take this radial velocity \[m/s\].
+    Constant(f64),
+    /// No scatterers there: nothing returns.
+    Mask,
+}
+
+/// Layers that move too fast for the detector band.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeyondBand {
+    /// Number of such layers.
+    pub layers: usize,
+    /// Range of the fastest \[m\].
+    pub range_m: f64,
+    /// Its radial velocity \[m/s\].
+    pub radial_velocity_m_s: f64,
+    /// The largest velocity of the band \[m/s\].
+    pub limit_m_s: f64,
+    /// The velocity that the sampled current shows for the fastest layer \[m/s\], folded if beyond 0 or `F_s/2`.
+    pub folded_m_s: f64,
+}
+
 impl LineOfSight {
+    /// Which layers return frequencies outside the detector band; `None` if all lie in it. Such returns are simulated as
+    /// they are (the band limits the noise only), but estimators that search the band do not find them.
+    pub fn beyond_band(&self, receiver: &Receiver) -> Option<BeyondBand> {
+        let limit_m_s = receiver.band_velocity_m_s();
+        let fast = |v: &f64| v.abs() > limit_m_s;
+        let layers = self.radial_velocity_m_s.iter().filter(|v| fast(v)).count();
+        let by_speed = |a: &(usize, &f64), b: &(usize, &f64)| a.1.abs().total_cmp(&b.1.abs());
+        let (index, velocity) =
+            self.radial_velocity_m_s.iter().enumerate().filter(|(_, v)| fast(v)).max_by(by_speed)?;
+        let (range_m, folded_m_s) = (self.range_m(index), receiver.folded_velocity_m_s(*velocity));
+        Some(BeyondBand { layers, range_m, radial_velocity_m_s: *velocity, limit_m_s, folded_m_s })
+    }
+
+    /// Applies a policy to the layers whose velocity is NaN, and says how many there are.
+    ///
+    /// [`Simulator`](crate::Simulator) takes NaN as [`OutsideDomain::Mask`] does. Parts of a line that are to be treated
+    /// differently (below the ground: masked; beyond a mesh: constant) are set one after the other.
+    ///
+    /// # Errors
+    /// [`Error::NoWind`] with the first such layer if the policy is `Error`; [`Error::OutOfRange`] for a constant that is
+    /// not finite.
+    pub fn resolve_outside(&mut self, policy: OutsideDomain) -> Result<usize, Error> {
+        let outside = self.radial_velocity_m_s.iter().filter(|v| v.is_nan()).count();
+        match policy {
+            OutsideDomain::Error => match self.radial_velocity_m_s.iter().position(|v| v.is_nan()) {
+                Some(index) => return Err(Error::NoWind { index, range_m: self.range_m(index) }),
+                None => return Ok(0),
+            },
+            OutsideDomain::Constant(velocity_m_s) => {
+                check("constant radial_velocity_m_s", velocity_m_s, "finite", |_| true)?;
+                self.radial_velocity_m_s.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = velocity_m_s);
+            }
+            OutsideDomain::Mask => {}
+        }
+        Ok(outside)
+    }
+
     /// Says what is wrong with the line, if anything.
     ///
     /// # Errors
@@ -97,6 +161,19 @@ mod tests {
             radial_velocity_m_s: vec![1.0, f64::NAN, 3.0],
             weight_per_m: vec![1e-16; 3],
         }
+    }
+
+    #[test]
+    fn a_line_that_leaves_the_domain_is_refused_filled_or_masked_by_choice() {
+        assert_eq!(line().resolve_outside(OutsideDomain::Error), Err(Error::NoWind { index: 1, range_m: 100.5 }));
+        let mut filled = line();
+        assert_eq!(filled.resolve_outside(OutsideDomain::Constant(-2.0)), Ok(1));
+        assert_eq!(filled.radial_velocity_m_s, [1.0, -2.0, 3.0]);
+        assert_eq!(filled.resolve_outside(OutsideDomain::Error), Ok(0));
+        let mut masked = line();
+        assert_eq!(masked.resolve_outside(OutsideDomain::Mask), Ok(1));
+        assert!(masked.radial_velocity_m_s[1].is_nan());
+        assert!(matches!(masked.resolve_outside(OutsideDomain::Constant(f64::NAN)), Err(Error::OutOfRange { .. })));
     }
 
     #[test]

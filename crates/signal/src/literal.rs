@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use num_complex::Complex;
 
 use crate::error::check_length;
-use crate::window::half_length;
+use crate::window::reach;
 use crate::{Error, LineOfSight, SPEED_OF_LIGHT_M_S, Simulator};
 
 /// The complex envelope \[A\] of (15), corrected, by direct evaluation of every term: about 100 times slower than
@@ -26,7 +26,7 @@ pub fn literal_envelope(
     check_length("speckle", speckle.len(), line.layers())?;
     let (pulse, receiver) = (simulator.pulse(), simulator.receiver());
     let thickness_m = line.layer_thickness_m;
-    let half = half_length(pulse, thickness_m)? as f64;
+    let (near, far) = reach(pulse, thickness_m)?;
     let scale = (receiver.heterodyne_gain_a2_w() * pulse.energy_j() * thickness_m).sqrt();
     let sample = |k: usize| {
         let time_s = simulator.time_s(k);
@@ -35,7 +35,8 @@ pub fn literal_envelope(
         let mut sum = Complex::ZERO;
         for (layer, g) in speckle.iter().enumerate() {
             let velocity_m_s = line.radial_velocity_m_s[layer];
-            if (layer as f64 - centre).abs() > half || velocity_m_s.is_nan() {
+            let from_centre = layer as f64 - centre;
+            if from_centre < -near as f64 || from_centre > far as f64 || velocity_m_s.is_nan() {
                 continue;
             }
             let delay_s = 2.0 * line.range_m(layer) / SPEED_OF_LIGHT_M_S;

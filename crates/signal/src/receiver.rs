@@ -72,6 +72,21 @@ impl Receiver {
         Ok(())
     }
 
+    /// Largest radial velocity whose return lies in the detector band, `lambda B/4` \[m/s\], to either side.
+    pub fn band_velocity_m_s(&self) -> f64 {
+        0.25 * self.wavelength_m * self.bandwidth_hz
+    }
+
+    /// The radial velocity \[m/s\] that the sampled real current shows for a true one: beyond the frequencies 0 and
+    /// `F_s/2` the return is folded back. Equal to the true one from `-lambda (F_s/2 - f_c)/2` to `lambda f_c/2`
+    /// (-34.9 to 62.0 m/s at 1.55 um, 250 MHz and 80 MHz).
+    pub fn folded_velocity_m_s(&self, radial_velocity_m_s: f64) -> f64 {
+        let frequency_hz = self.intermediate_frequency_hz - 2.0 * radial_velocity_m_s / self.wavelength_m;
+        let turned_hz = frequency_hz.rem_euclid(self.sample_rate_hz);
+        let shown_hz = turned_hz.min(self.sample_rate_hz - turned_hz);
+        0.5 * self.wavelength_m * (self.intermediate_frequency_hz - shown_hz)
+    }
+
     /// Energy of a photon, `h c/lambda` \[J\].
     pub fn photon_energy_j(&self) -> f64 {
         PLANCK_J_S * SPEED_OF_LIGHT_M_S / self.wavelength_m
@@ -162,6 +177,17 @@ mod tests {
         let ratio = printed.slowly_varying_snr(1.0, 1.0) / receiver().slowly_varying_snr(1.0, 1.0);
         assert_relative_eq!(ratio, 2.0 * PI, max_relative = 1e-14);
         assert_eq!(printed.noise_variance_a2(), receiver().noise_variance_a2());
+    }
+
+    #[test]
+    fn velocities_beyond_the_sampled_band_fold_to_known_ones() {
+        assert_relative_eq!(receiver().band_velocity_m_s(), 19.375, max_relative = 1e-14);
+        for (true_m_s, shown_m_s) in
+            [(0.0, 0.0), (19.0, 19.0), (-34.8, -34.8), (61.9, 61.9), (63.0, 61.0), (100.0, 24.0), (-36.0, -33.75)]
+        {
+            assert_relative_eq!(receiver().folded_velocity_m_s(true_m_s), shown_m_s, epsilon = 1e-9);
+        }
+        assert!(receiver().folded_velocity_m_s(f64::NAN).is_nan());
     }
 
     #[test]

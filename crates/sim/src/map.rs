@@ -176,8 +176,8 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     let start_s = join::start_time_s(scene);
     let pulse = join::pulse(scene)?;
     let window = join::weighting(scene).weights(scene.estimator.window_samples)?;
-    let by_pulse = RangeFilter::pulse(&pulse, g.layer_thickness_m)?;
-    let by_gate = RangeFilter::gate(&pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
+    let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
+    let by_gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
     for (i, line) in scanner.lines().iter().enumerate() {
         let time_s = start_s + g.line_time_s[i];
         let exact_m_s = radial_velocity_m_s(&*wind, scene, g.elevation_rad[i], time_s, &g.gate_range_m)?;

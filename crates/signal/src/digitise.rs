@@ -1,0 +1,184 @@
+//! The analogue-to-digital converter: rounding to a number of bits, and saturation.
+//!
+//! Check: the error of rounding has the variance `step^2/12`, a full-scale tone the ratio `6.02 bits + 1.76` dB; what
+//! lies beyond full scale is clipped and counted.
+
+use num_complex::Complex;
+
+use crate::Error;
+use crate::error::{check, check_positive};
+
+/// A converter with `2^bits` codes, from `-2^(bits-1)` to `2^(bits-1) - 1`; code 0 is no current.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Digitiser {
+    bits: u32,
+    full_scale_a: f64,
+}
+
+/// Samples beyond full scale.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Clipped {
+    /// Samples set to the lowest code.
+    pub low: u64,
+    /// Samples set to the highest code.
+    pub high: u64,
+}
+
+impl Clipped {
+    /// Number of samples that were clipped.
+    pub fn total(self) -> u64 {
+        self.low + self.high
+    }
+}
+
+impl std::ops::AddAssign for Clipped {
+    fn add_assign(&mut self, other: Self) {
+        self.low += other.low;
+        self.high += other.high;
+    }
+}
+
+impl Digitiser {
+    /// A converter of `bits` for currents from `-full_scale_a` to `full_scale_a`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] unless there are 1 to 32 bits and the full scale is finite and positive.
+    pub fn new(bits: u32, full_scale_a: f64) -> Result<Self, Error> {
+        check("bits", f64::from(bits), "1 to 32", |b| (1.0..=32.0).contains(&b))?;
+        check_positive("full_scale_a", full_scale_a)?;
+        check("full_scale_a", full_scale_a, "large enough for its steps to be normal numbers", |s| {
+            (s / 2f64.powi(31)).is_normal()
+        })?;
+        Ok(Self { bits, full_scale_a })
+    }
+
+    /// Number of bits.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// Current of full scale \[A\].
+    pub fn full_scale_a(&self) -> f64 {
+        self.full_scale_a
+    }
+
+    /// Current from one code to the next \[A\], `2 full_scale/2^bits`.
+    pub fn step_a(&self) -> f64 {
+        2.0 * self.full_scale_a / self.levels()
+    }
+
+    fn levels(&self) -> f64 {
+        f64::from(self.bits).exp2()
+    }
+
+    /// Code of a current, before and after saturation.
+    fn codes(&self, current_a: f64) -> (f64, f64) {
+        let half = 0.5 * self.levels();
+        let code = (current_a / self.step_a()).round_ties_even();
+        (code, code.clamp(-half, half - 1.0))
+    }
+
+    /// Code of a current; currents beyond full scale have the lowest or highest code.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for NaN, which no converter delivers.
+    pub fn code(&self, current_a: f64) -> Result<i64, Error> {
+        if current_a.is_nan() {
+            return Err(Error::OutOfRange { field: "current_a", value: current_a, allowed: "a number" });
+        }
+        Ok(self.codes(current_a).1 as i64)
+    }
+
+    /// Replaces each current by that of its code, and counts those beyond full scale.
+    ///
+    /// # Errors
+    /// [`Error::ElementOutOfRange`] with the first sample that is NaN; then nothing was changed.
+    pub fn digitise(&self, samples_a: &mut [f64]) -> Result<Clipped, Error> {
+        if let Some(index) = samples_a.iter().position(|i| i.is_nan()) {
+            let allowed = "a number";
+            return Err(Error::ElementOutOfRange { field: "samples_a", index, value: samples_a[index], allowed });
+        }
+        let (step_a, mut clipped) = (self.step_a(), Clipped::default());
+        for sample in samples_a {
+            let (code, kept) = self.codes(*sample);
+            clipped.low += u64::from(code < kept);
+            clipped.high += u64::from(code > kept);
+            *sample = kept * step_a;
+        }
+        Ok(clipped)
+    }
+
+    /// The same for the two parts of complex samples, each with a converter of its own.
+    ///
+    /// # Errors
+    /// As [`Digitiser::digitise`].
+    pub fn digitise_complex(&self, samples_a: &mut [Complex<f64>]) -> Result<Clipped, Error> {
+        if let Some((index, i)) = samples_a.iter().enumerate().find(|(_, i)| i.is_nan()) {
+            let value = if i.re.is_nan() { i.re } else { i.im };
+            return Err(Error::ElementOutOfRange { field: "samples_a", index, value, allowed: "a number" });
+        }
+        let mut clipped = Clipped::default();
+        for sample in samples_a {
+            let mut parts = [sample.re, sample.im];
+            clipped += self.digitise(&mut parts)?;
+            *sample = Complex::new(parts[0], parts[1]);
+        }
+        Ok(clipped)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn a_full_scale_tone_has_6_db_per_bit() {
+        for bits in [8, 10, 12, 14] {
+            let digitiser = Digitiser::new(bits, 2e-3).unwrap();
+            let amplitude_a = 2e-3 - 2.0 * digitiser.step_a();
+            let tone: Vec<f64> = (0..100_000).map(|k| amplitude_a * (0.737_123 * f64::from(k)).sin()).collect();
+            let mut digital = tone.clone();
+            assert_eq!(digitiser.digitise(&mut digital).unwrap(), Clipped::default());
+            let error: f64 = tone.iter().zip(&digital).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 1e5;
+            assert_relative_eq!(error, digitiser.step_a().powi(2) / 12.0, max_relative = 0.03);
+            let ratio_db = 10.0 * (0.5 * amplitude_a * amplitude_a / error).log10();
+            assert!((ratio_db - (6.02 * f64::from(bits) + 1.76)).abs() < 0.3, "{bits} bits: {ratio_db} dB");
+        }
+    }
+
+    #[test]
+    fn what_lies_beyond_full_scale_is_clipped_and_counted() {
+        let digitiser = Digitiser::new(3, 4.0).unwrap();
+        let mut samples = [-9.0, -4.4, -4.6, -4.0, -0.4, 0.0, 0.6, 2.5, 3.0, 3.4, 3.6, 1e300];
+        let clipped = digitiser.digitise(&mut samples).unwrap();
+        assert_eq!(samples, [-4.0, -4.0, -4.0, -4.0, 0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0]);
+        assert_eq!((clipped, clipped.total()), (Clipped { low: 2, high: 2 }, 4));
+        assert_eq!(digitiser.code(f64::INFINITY), Ok(3));
+        assert_eq!(digitiser.code(-2.2), Ok(-2));
+        let mut pair = [Complex::new(9.0, -1.2)];
+        assert_eq!(digitiser.digitise_complex(&mut pair).unwrap().total(), 1);
+        assert_eq!(pair[0], Complex::new(3.0, -1.0));
+    }
+
+    #[test]
+    fn one_bit_keeps_the_sign() {
+        let digitiser = Digitiser::new(1, 1.0).unwrap();
+        let mut samples = [-0.9, 0.2, -0.6];
+        digitiser.digitise(&mut samples).unwrap();
+        assert_eq!(samples, [-1.0, 0.0, -1.0]);
+    }
+
+    #[test]
+    fn what_is_no_converter_or_no_sample_is_refused() {
+        for (bits, scale) in [(0, 1.0), (33, 1.0), (8, 0.0), (8, f64::NAN), (8, 1e-305)] {
+            assert!(matches!(Digitiser::new(bits, scale), Err(Error::OutOfRange { .. })));
+        }
+        let digitiser = Digitiser::new(8, 1.0).unwrap();
+        let mut samples = [0.123, f64::NAN];
+        assert!(matches!(digitiser.digitise(&mut samples), Err(Error::ElementOutOfRange { index: 1, .. })));
+        assert_eq!(samples[0], 0.123);
+        assert!(digitiser.code(f64::NAN).is_err());
+        assert!(digitiser.digitise_complex(&mut [Complex::new(0.0, f64::NAN)]).is_err());
+    }
+}

@@ -1,0 +1,104 @@
+//! What many pulses average to, without drawing any: mean power, signal-to-noise ratio (14) and covariance of the samples.
+//!
+//! Check: closed forms of the covariance in a uniform wind and a linear gradient; the mean square of the simulator's own
+//! responses to each layer.
+
+use ndarray::Array2;
+use num_complex::Complex;
+
+use crate::error::check_length;
+use crate::{Error, Scratch, Shot, Simulator};
+
+impl Simulator {
+    /// Writes the mean power `E|s(t_k)|^2` of the discrete sum \[A^2\]: what many pulses average to.
+    /// It is also the mean square of the signal part of [`Simulator::record_into`].
+    ///
+    /// # Errors
+    /// As [`Simulator::record_into`].
+    pub fn mean_power_into<'a>(
+        &self,
+        shot: impl Into<Shot<'a>>,
+        scratch: &mut Scratch,
+        out_a2: &mut [f64],
+    ) -> Result<(), Error> {
+        let shot = shot.into();
+        check_length("out_a2", out_a2.len(), self.record().samples)?;
+        shot.validate()?;
+        let line = shot.line;
+        self.prepare(line, scratch)?;
+        let gain = self.amplitude_gain_a_sqrt_s(line).powi(2);
+        for (k, out) in out_a2.iter_mut().enumerate() {
+            let (first, _) = scratch.window.layers_at(k);
+            let lit = scratch.window.amplitudes_at(self.pulse(), line.layer_thickness_m, k);
+            let power = |j: usize| lit.re[j] * lit.re[j] + lit.im.get(j).map_or(0.0, |im| im * im);
+            let sum: f64 = (0..lit.re.len())
+                .filter(|j| !line.radial_velocity_m_s[first + j].is_nan())
+                .map(|j| power(j) * shot.weight_per_m(first + j))
+                .sum();
+            *out = gain * sum;
+        }
+        match out_a2.iter().position(|power| !power.is_finite()) {
+            Some(index) => Err(Error::Overflow { field: "out_a2", index }),
+            None => Ok(()),
+        }
+    }
+
+    /// Writes the signal-to-noise ratio of each sample, (14), corrected: mean signal power over the noise power in the
+    /// detector band.
+    ///
+    /// # Errors
+    /// As [`Simulator::record_into`].
+    pub fn snr_into<'a>(&self, shot: impl Into<Shot<'a>>, scratch: &mut Scratch, out: &mut [f64]) -> Result<(), Error> {
+        self.mean_power_into(shot, scratch, out)?;
+        let noise_a2 = self.receiver().noise_variance_a2();
+        out.iter_mut().for_each(|power| *power /= noise_a2);
+        Ok(())
+    }
+
+    /// The covariance `E{s(t_m) s*(t_n)}` of the samples of the envelope, without noise \[A^2\]; row m, column n, Hermitian.
+    ///
+    /// With the covariance of the noise it gives the bound of any estimator for any profile of velocity and return along
+    /// the line. Takes about `samples^2/2` times the number of lit layers products.
+    ///
+    /// # Errors
+    /// As [`Simulator::record_into`].
+    pub fn covariance_a2<'a>(&self, shot: impl Into<Shot<'a>>) -> Result<Array2<Complex<f64>>, Error> {
+        let shot = shot.into();
+        shot.validate()?;
+        let (line, samples) = (shot.line, self.record().samples);
+        let mut scratch = Scratch::default();
+        self.prepare(line, &mut scratch)?;
+        let gain = self.amplitude_gain_a_sqrt_s(line);
+        let mut responses = Vec::with_capacity(samples);
+        for k in 0..samples {
+            let (first, _) = scratch.window.layers_at(k);
+            let lit = scratch.window.amplitudes_at(self.pulse(), line.layer_thickness_m, k);
+            let response = |j: usize| {
+                let velocity_m_s = line.radial_velocity_m_s[first + j];
+                if velocity_m_s.is_nan() {
+                    return Complex::ZERO;
+                }
+                let envelope = Complex::new(lit.re[j], lit.im.get(j).copied().unwrap_or(0.0));
+                let phase_rad = self.phase_rate_rad_s(velocity_m_s) * self.time_s(k);
+                envelope * Complex::cis(phase_rad) * (gain * shot.weight_per_m(first + j).sqrt())
+            };
+            responses.push((first, (0..lit.re.len()).map(response).collect::<Vec<_>>()));
+        }
+        let mut covariance = Array2::zeros((samples, samples));
+        for (m, (first_m, row)) in responses.iter().enumerate() {
+            for (n, (first_n, column)) in responses[..=m].iter().enumerate() {
+                let start = (*first_m).max(*first_n);
+                let (row, column) = (row.get(start - first_m..), column.get(start - first_n..));
+                let pairs = row.into_iter().flatten().zip(column.into_iter().flatten());
+                let sum: Complex<f64> = pairs.map(|(a, b)| a * b.conj()).sum();
+                covariance[(m, n)] = sum;
+                covariance[(n, m)] = sum.conj();
+            }
+        }
+        if covariance.iter().all(|c: &Complex<f64>| c.is_finite()) {
+            Ok(covariance)
+        } else {
+            Err(Error::Overflow { field: "covariance_a2", index: 0 })
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! Loops that run on the caller's thread pool with feature `rayon` and one after the other without.
+//!
+//! Every item is computed alone and results stand in the order of the items, so the bits do not depend on the number of
+//! threads.
+
+/// `f(state, index, chunk)` for every chunk of `size` elements; `state` is made once per worker.
+pub(crate) fn map_chunks<T: Send, S, O: Send>(
+    data: &mut [T],
+    size: usize,
+    state: impl Fn() -> S + Sync + Send,
+    f: impl Fn(&mut S, usize, &mut [T]) -> O + Sync + Send,
+) -> Vec<O> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        let chunks = data.par_chunks_mut(size).enumerate();
+        chunks.map_init(state, |worker, (index, chunk)| f(worker, index, chunk)).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    {
+        let mut worker = state();
+        data.chunks_mut(size).enumerate().map(|(index, chunk)| f(&mut worker, index, chunk)).collect()
+    }
+}
+
+/// `f(index)` for every index below `count`.
+pub(crate) fn map_indices<O: Send>(count: usize, f: impl Fn(usize) -> O + Sync + Send) -> Vec<O> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        (0..count).into_par_iter().map(f).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    {
+        (0..count).map(f).collect()
+    }
+}

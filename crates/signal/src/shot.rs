@@ -1,0 +1,54 @@
+//! What one pulse meets: a line of sight, and the efficiency of the air's turbulence at that moment.
+//!
+//! Check: a factor of one changes nothing; a factor scales the mean power of its layer.
+
+use crate::error::check_length;
+use crate::{Error, LineOfSight};
+
+/// One pulse along a line of sight.
+///
+/// A `&LineOfSight` converts into a shot without a factor of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shot<'a> {
+    /// The air; it may be shared by many pulses.
+    pub line: &'a LineOfSight,
+    /// What the return of each layer is multiplied with for this pulse, one factor per layer, finite and not negative:
+    /// the heterodyne efficiency of this moment if the line's weights leave it out, or its ratio to the mean if they
+    /// contain the mean. `None`: the line's weights as they are.
+    pub efficiency: Option<&'a [f64]>,
+}
+
+impl<'a> From<&'a LineOfSight> for Shot<'a> {
+    fn from(line: &'a LineOfSight) -> Self {
+        Self { line, efficiency: None }
+    }
+}
+
+impl Shot<'_> {
+    /// Says what is wrong with the shot, if anything.
+    ///
+    /// # Errors
+    /// As [`LineOfSight::validate`]; [`Error::LengthMismatch`] if there is not one factor per layer;
+    /// [`Error::ElementOutOfRange`] for a factor that is negative or not finite.
+    pub fn validate(&self) -> Result<(), Error> {
+        self.line.validate()?;
+        let Some(efficiency) = self.efficiency else { return Ok(()) };
+        check_length("efficiency", efficiency.len(), self.line.layers())?;
+        match efficiency.iter().position(|e| !(e.is_finite() && *e >= 0.0)) {
+            Some(index) => {
+                let allowed = "finite and not negative";
+                Err(Error::ElementOutOfRange { field: "efficiency", index, value: efficiency[index], allowed })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Return of a layer per metre of range for this pulse \[1/m\].
+    pub(crate) fn weight_per_m(&self, layer: usize) -> f64 {
+        let weight_per_m = self.line.weight_per_m[layer];
+        match self.efficiency {
+            Some(efficiency) => weight_per_m * efficiency[layer],
+            None => weight_per_m,
+        }
+    }
+}

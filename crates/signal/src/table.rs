@@ -1,0 +1,53 @@
+//! Tables over range: what they must be, and straight lines between their points.
+//!
+//! Check: the tests of `medium` and `efficiency`.
+
+use crate::Error;
+use crate::error::check_length;
+
+/// Ranges that are finite and increase, at least one.
+pub(crate) fn check_ranges(range_m: &[f64]) -> Result<(), Error> {
+    if range_m.is_empty() {
+        return Err(Error::Empty { field: "range_m" });
+    }
+    let refuse = |index, allowed| Error::ElementOutOfRange { field: "range_m", index, value: range_m[index], allowed };
+    if let Some(index) = range_m.iter().position(|r| !r.is_finite()) {
+        return Err(refuse(index, "finite"));
+    }
+    match range_m.windows(2).position(|r| r[1] <= r[0]) {
+        Some(before) => Err(refuse(before + 1, "larger than the range before")),
+        None => Ok(()),
+    }
+}
+
+/// One value per range, finite and not negative.
+pub(crate) fn check_values(field: &'static str, values: &[f64], ranges: usize) -> Result<(), Error> {
+    check_length(field, values.len(), ranges)?;
+    match values.iter().position(|v| !(v.is_finite() && *v >= 0.0)) {
+        Some(index) => {
+            Err(Error::ElementOutOfRange { field, index, value: values[index], allowed: "finite and not negative" })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Interval of a table that holds a range, and the part of it that lies before the range; `None` beyond the table.
+pub(crate) fn locate(table_m: &[f64], range_m: f64) -> Option<(usize, f64)> {
+    let (first, last) = (table_m.first()?, table_m.last()?);
+    if !(range_m >= *first && range_m <= *last) {
+        return None;
+    }
+    let index = table_m.partition_point(|r| *r <= range_m).saturating_sub(1).min(table_m.len().saturating_sub(2));
+    match table_m.get(index + 1) {
+        Some(next) => Some((index, (range_m - table_m[index]) / (next - table_m[index]))),
+        None => Some((index, 0.0)),
+    }
+}
+
+/// Value of a table in an interval found by [`locate`].
+pub(crate) fn value(values: &[f64], (index, part): (usize, f64)) -> f64 {
+    match values.get(index + 1) {
+        Some(next) => values[index] + part * (next - values[index]),
+        None => values[index],
+    }
+}
