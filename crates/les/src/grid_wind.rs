@@ -145,14 +145,14 @@ fn with_ghosts(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> Vec<[f64; 3]> {
 }
 
 /// Each ghost of a direction with its padded index.
-fn ghost_places(axis: &Axis) -> impl Iterator<Item = (usize, Ghost)> {
+pub(crate) fn ghost_places(axis: &Axis) -> impl Iterator<Item = (usize, Ghost)> {
     let above = GHOSTS + axis.nodes();
     let [low, high] = axis.ghosts;
     [(GHOSTS - 1, low[0]), (GHOSTS - 2, low[1]), (above, high[0]), (above + 1, high[1])].into_iter()
 }
 
 /// Velocity of a ghost; `normal` is the component across the wall.
-fn ghost_value(ghost: Ghost, normal: usize, at: impl Fn(usize) -> [f64; 3]) -> [f64; 3] {
+pub(crate) fn ghost_value(ghost: Ghost, normal: usize, at: impl Fn(usize) -> [f64; 3]) -> [f64; 3] {
     match ghost {
         Ghost::Copy(node) => at(node),
         Ghost::Parabola(nodes) => {

@@ -30,6 +30,7 @@
 //! | `profile` | circulation against radius of one vortex, (3), (4) |
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
 //! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
+//! | `series` | [`GridSeries`]: snapshots at several times, a wind that moves |
 //! | `axis` | one direction of a mesh: stretching, walls, periods |
 //! | `kernel` | the M'4 kernel, (27) |
 //! | `diagnose` | circulation on circles, (1), and `Gamma_5-15` |
@@ -42,6 +43,7 @@ mod error;
 mod grid_wind;
 mod kernel;
 mod profile;
+mod series;
 mod solver;
 mod vortex;
 mod wind;
@@ -52,9 +54,11 @@ pub use error::Error;
 pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
 pub use kernel::{m4_prime, m4_prime_weights};
 pub use profile::CirculationProfile;
+pub use series::GridSeries;
 
 pub use solver::{
-    CheckpointPlan, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent, StepRecord,
+    CheckpointPlan, CrossPlane, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent,
+    StepRecord,
 };
 pub use solver::{
     Direction, Ends, Flow, FlowSettings, Mapping, MappingFn, Mesh, PressureEquation, PressureMethod, PressureSolved,

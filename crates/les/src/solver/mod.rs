@@ -14,6 +14,7 @@ mod pressure;
 mod projection;
 mod rows;
 mod run;
+mod sample;
 mod settings;
 
 mod transport;
@@ -25,4 +26,5 @@ pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
 pub use run::{
     CheckpointPlan, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent, StepRecord,
 };
+pub use sample::CrossPlane;
 pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};
