@@ -12,6 +12,9 @@ use crate::{Error, GridSnapshot, Wind};
 /// Points handled at once, so that the scratch stays on the stack.
 const BATCH: usize = 256;
 
+/// The snapshot at or before a time, the one behind it, and the weight of the latter.
+type About<'a> = (&'a GridSnapshot, Option<(&'a GridSnapshot, f64)>);
+
 /// Snapshots of one flow at increasing times.
 #[derive(Debug, Clone)]
 pub struct GridSeries {
@@ -40,8 +43,8 @@ impl GridSeries {
         &self.time_s
     }
 
-    /// The snapshot at or before `time_s`, the one behind it, and the weight of the latter.
-    fn about(&self, time_s: f64) -> Result<(&GridSnapshot, Option<(&GridSnapshot, f64)>), Error> {
+    /// The snapshots about `time_s`.
+    fn about(&self, time_s: f64) -> Result<About<'_>, Error> {
         let last = self.time_s.len() - 1;
         check("time_s", time_s, "between the times of the first and the last snapshot", |t| {
             self.time_s[0] <= t && t <= self.time_s[last]

@@ -1,5 +1,8 @@
 //! Flows at the edge of what can be asked for: each must work, or be refused with a sentence that says why.
 
+// A flow that cannot be set up or stepped has failed the test.
+#![allow(clippy::unwrap_used)]
+
 use std::f64::consts::TAU;
 
 use wakescope_les::{
@@ -177,9 +180,6 @@ fn an_inviscid_flow_between_slip_walls_loses_energy_with_the_third_power_of_the_
         (flow.kinetic_energy_m5_s2() / report.kinetic_energy_m5_s2 - 1.0).abs()
     };
     for scheme in schemes() {
-        for s in [0.01, 0.005, 0.0025, 0.00125] {
-            println!("{scheme:?} {s} {:e}", drift(scheme, s));
-        }
         let (coarse, fine) = (drift(scheme, 0.005), drift(scheme, 0.0025));
         let slope = (coarse / fine).log2();
         assert!((slope - 3.0).abs() < 0.3, "{scheme:?}: drifts {coarse:e}, {fine:e}: slope {slope}");
