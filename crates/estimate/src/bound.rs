@@ -26,13 +26,7 @@ pub fn bound_complex_m_s(
     derivative: ArrayView2<'_, Complex<f64>>,
     windows: f64,
 ) -> Result<f64, Error> {
-    check_hermitian(
-        covariance.indexed_iter().map(|((i, j), value)| (*value - covariance[[j, i]].conj()).norm()),
-        covariance.iter().map(|value| value.norm()),
-    )?;
-    let x = linalg::solve("covariance", covariance, derivative)?;
-    let information: f64 = x.indexed_iter().map(|((i, j), value)| (value * x[[j, i]]).re).sum();
-    from_information(information, windows)
+    from_information(information_complex(covariance, &[derivative])?[[0, 0]], windows)
 }
 
 /// The same for real Gaussian windows, E{x x^T}.
@@ -44,13 +38,47 @@ pub fn bound_real_m_s(
     derivative: ArrayView2<'_, f64>,
     windows: f64,
 ) -> Result<f64, Error> {
+    from_information(information_real(covariance, &[derivative])?[[0, 0]], windows)
+}
+
+/// Fisher information of one circular complex window on any parameters: tr(R^-1 dR_i R^-1 dR_j), \[i, j\].
+///
+/// `derivatives` are those of the covariance \[n, n\] with respect to each parameter. The inverse of the sum over all windows bounds the
+/// covariance of any unbiased estimates.
+///
+/// # Errors
+/// [`Error::Linalg`] if the covariance is singular or not Hermitian, [`Error::Length`] if shapes differ.
+pub fn information_complex(
+    covariance: ArrayView2<'_, Complex<f64>>,
+    derivatives: &[ArrayView2<'_, Complex<f64>>],
+) -> Result<Array2<f64>, Error> {
+    check_hermitian(
+        covariance.indexed_iter().map(|((i, j), value)| (*value - covariance[[j, i]].conj()).norm()),
+        covariance.iter().map(|value| value.norm()),
+    )?;
+    let solved = derivatives.iter().map(|derivative| linalg::solve("covariance", covariance, *derivative));
+    let x: Vec<Array2<Complex<f64>>> = solved.collect::<Result<_, _>>()?;
+    let trace = |(i, j): (usize, usize)| x[i].indexed_iter().map(|((n, m), value)| (value * x[j][[m, n]]).re).sum();
+    Ok(Array2::from_shape_fn((x.len(), x.len()), trace))
+}
+
+/// The same for one real Gaussian window: half of that trace.
+///
+/// # Errors
+/// As [`information_complex`].
+pub fn information_real(
+    covariance: ArrayView2<'_, f64>,
+    derivatives: &[ArrayView2<'_, f64>],
+) -> Result<Array2<f64>, Error> {
     check_hermitian(
         covariance.indexed_iter().map(|((i, j), value)| (value - covariance[[j, i]]).abs()),
         covariance.iter().map(|value| value.abs()),
     )?;
-    let x = linalg::solve("covariance", covariance, derivative)?;
-    let information: f64 = x.indexed_iter().map(|((i, j), value)| value * x[[j, i]]).sum();
-    from_information(0.5 * information, windows)
+    let solved = derivatives.iter().map(|derivative| linalg::solve("covariance", covariance, *derivative));
+    let x: Vec<Array2<f64>> = solved.collect::<Result<_, _>>()?;
+    let trace =
+        |(i, j): (usize, usize)| 0.5 * x[i].indexed_iter().map(|((n, m), value)| value * x[j][[m, n]]).sum::<f64>();
+    Ok(Array2::from_shape_fn((x.len(), x.len()), trace))
 }
 
 /// Refuses a covariance that differs from its adjoint by more than rounding.
@@ -83,6 +111,40 @@ pub enum Noise {
         /// Density outside the band over density inside, 0 .. 1.
         floor: f64,
     },
+}
+
+impl Noise {
+    /// Checks the floor.
+    pub(crate) fn validate(self) -> Result<(), Error> {
+        match self {
+            Self::Band { floor } if !(0.0..=1.0).contains(&floor) => {
+                Err(Error::OutOfRange { field: "floor", value: floor, allowed: "between 0 and 1" })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Covariance of the noise, complex and for two-sided density 1 in the band, at a lag \[samples\].
+    pub(crate) fn covariance(self, sampling: &Sampling, lag: f64, kind: SignalKind) -> Complex<f64> {
+        let (low, high) = (sampling.band_hz.0 / sampling.sample_rate_hz, sampling.band_hz.1 / sampling.sample_rate_hz);
+        // real samples carry half of their power at the negative frequencies
+        let share = match kind {
+            SignalKind::Real => 0.5,
+            SignalKind::Complex => 1.0,
+        };
+        let white = if lag == 0.0 { share } else { 0.0 };
+        let in_band = match lag {
+            0.0 => Complex::new(high - low, 0.0),
+            _ => {
+                let turn = std::f64::consts::PI * lag;
+                Complex::from_polar((turn * (high - low)).sin() / turn, turn * (high + low))
+            }
+        };
+        match self {
+            Self::White => Complex::new(white, 0.0),
+            Self::Band { floor } => in_band * (1.0 - floor) + white * floor,
+        }
+    }
 }
 
 /// Second-order model of a window: signal envelope, carrier, and noise at a given SNR.
@@ -137,11 +199,7 @@ impl WindowModel {
         }
         length("envelope", envelope.nrows(), envelope.ncols())?;
         positive("mean of the envelope's diagonal", envelope.diag().mean().unwrap_or(0.0))?;
-        if let Noise::Band { floor } = noise
-            && !(0.0..=1.0).contains(&floor)
-        {
-            return Err(Error::OutOfRange { field: "floor", value: floor, allowed: "between 0 and 1" });
-        }
+        noise.validate()?;
         Ok(Self { sampling: *sampling, envelope, noise })
     }
 
@@ -155,31 +213,6 @@ impl WindowModel {
     #[must_use]
     pub fn sampling(&self) -> &Sampling {
         &self.sampling
-    }
-
-    /// Covariance of the noise, complex and for two-sided density 1 in the band, at a lag \[samples\].
-    fn noise_at(&self, lag: f64, kind: SignalKind) -> Complex<f64> {
-        let (low, high) = (
-            self.sampling.band_hz.0 / self.sampling.sample_rate_hz,
-            self.sampling.band_hz.1 / self.sampling.sample_rate_hz,
-        );
-        // real samples carry half of their power at the negative frequencies
-        let share = match kind {
-            SignalKind::Real => 0.5,
-            SignalKind::Complex => 1.0,
-        };
-        let white = if lag == 0.0 { share } else { 0.0 };
-        let in_band = match lag {
-            0.0 => Complex::new(high - low, 0.0),
-            _ => {
-                let turn = std::f64::consts::PI * lag;
-                Complex::from_polar((turn * (high - low)).sin() / turn, turn * (high + low))
-            }
-        };
-        match self.noise {
-            Noise::White => Complex::new(white, 0.0),
-            Noise::Band { floor } => in_band * (1.0 - floor) + white * floor,
-        }
     }
 
     /// Covariance and its derivative with respect to velocity \[per m/s\], complex samples.
@@ -205,7 +238,7 @@ impl WindowModel {
         let lag = |(n, m): (usize, usize)| n as f64 - m as f64;
         let signal = |place: (usize, usize)| Complex::from_polar(self.envelope[place], angle * lag(place));
         let covariance = Array2::from_shape_fn(self.envelope.dim(), |place| {
-            signal(place) + self.noise_at(lag(place), kind) * density
+            signal(place) + self.noise.covariance(&self.sampling, lag(place), kind) * density
         });
         let derivative =
             Array2::from_shape_fn(self.envelope.dim(), |place| signal(place) * Complex::new(0.0, slope * lag(place)));

@@ -61,6 +61,8 @@ mod detection;
 mod error;
 mod error_map;
 mod gates;
+mod gradient;
+mod gradient_likelihood;
 #[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
 mod lapack;
 mod levinson;
@@ -88,13 +90,15 @@ mod zoom;
 
 pub use accumulate::{MapPoint, Radius, Scan};
 pub use autoregressive::{Autoregression, OrderChoice};
-pub use bound::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s};
+pub use bound::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s, information_complex, information_real};
 pub use correlogram::{Correlogram, Taper, correlogram_by_sum};
 pub use correlogram_estimators::{LagWindowPeak, PulsePair};
 pub use detection::noise_quality;
 pub use error::Error;
 pub use error_map::{ErrorMap, ErrorStatistics};
 pub use gates::Gates;
+pub use gradient::{GradientBound, GradientModel};
+pub use gradient_likelihood::{GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity};
 pub use likelihood::likelihood_tapers;
 pub use model_peaks::{AutoregressivePeak, AutoregressivePole, CaponPeak};
 pub use peak::SpectralPeak;

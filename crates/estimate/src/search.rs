@@ -57,7 +57,7 @@ pub(crate) struct Located {
     pub(crate) top: i64,
     /// Fractional bin of the peak in the band.
     pub(crate) bin: f64,
-    peak: f64,
+    pub(crate) peak: f64,
     sum: f64,
     lobe: Lobe,
     pub(crate) flag: Quality,

@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used)]
 
-#[allow(dead_code)]
 mod draw;
 
 use approx::assert_abs_diff_eq;

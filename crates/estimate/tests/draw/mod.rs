@@ -1,10 +1,12 @@
 //! Gaussian windows with a given covariance, for the tests: a Cholesky factor times white noise.
 
+#![allow(dead_code)]
+
 use ndarray::Array2;
 use num_complex::Complex;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wakescope_estimate::{Sample, SignalKind};
+use wakescope_estimate::{GradientModel, Noise, Sample, Sampling, SignalKind, WindowModel};
 
 /// Draws windows x = L w with L L^H the covariance.
 pub(crate) struct Windows<S> {
@@ -68,5 +70,49 @@ impl<S: Draw> Windows<S> {
     pub(crate) fn draw(&self, rng: &mut Xoshiro256PlusPlus) -> Vec<S> {
         let white: Vec<S> = (0..self.factor.len()).map(|_| S::normal(rng)).collect();
         self.factor.iter().enumerate().map(|(i, row)| S::sum_of_products(&row[..=i], &white[..=i])).collect()
+    }
+}
+
+/// Real or complex windows of wind with any velocity: signal of unit power and a constant gradient, white or band noise.
+pub(crate) struct Wind {
+    signal: Windows<Complex<f64>>,
+    noise: Windows<f64>,
+    sampling: Sampling,
+}
+
+impl Wind {
+    /// Half-width of |f|^2 at 1/e of a pulse of that full width at half maximum.
+    pub(crate) fn sigma_s(full_width_s: f64) -> f64 {
+        full_width_s / (2.0 * 2.0_f64.ln().sqrt())
+    }
+
+    /// The 200 ns pulse in windows of 64 samples; `noise` is that of real windows, complex ones get white noise.
+    pub(crate) fn new(sampling: &Sampling, gradient_per_s: f64, snr: f64, noise: Noise) -> Self {
+        let rest = Sampling { intermediate_frequency_hz: 0.0, band_hz: (-25e6, 25e6), ..*sampling };
+        let model = GradientModel::new(&rest, 64, Self::sigma_s(200e-9), Noise::White).unwrap();
+        let [signal, ..] = model.covariance(0.0, gradient_per_s, 1e12, SignalKind::Complex).unwrap();
+        let real = WindowModel::gaussian_pulse(sampling, 64, Self::sigma_s(200e-9), noise).unwrap();
+        let kind = if sampling.band_hz.0 < 0.0 { SignalKind::Complex } else { SignalKind::Real };
+        let at = |snr: f64| real.covariance(0.0, snr, kind).unwrap()[0].clone();
+        let noise = (at(snr) - at(1e15)).mapv(|value| Complex::from(value.re));
+        Self { signal: Windows::new(&signal), noise: Windows::new(&noise), sampling: *sampling }
+    }
+
+    pub(crate) fn complex(&self, velocity_m_s: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<Complex<f64>> {
+        let turn = std::f64::consts::TAU * self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
+        let mut window = self.signal.draw(rng);
+        let (re, im) = (self.noise.draw(rng), self.noise.draw(rng));
+        for (n, value) in window.iter_mut().enumerate() {
+            *value = *value * Complex::from_polar(1.0, turn * n as f64) + Complex::new(re[n], im[n]) * 0.5_f64.sqrt();
+        }
+        window
+    }
+
+    pub(crate) fn real(&self, velocity_m_s: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+        let turn = std::f64::consts::TAU * self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
+        let signal = self.signal.draw(rng);
+        let noise = self.noise.draw(rng);
+        let carried = signal.iter().enumerate().map(|(n, z)| (z * Complex::from_polar(1.0, turn * n as f64)).re);
+        carried.zip(noise).map(|(signal, noise)| 2.0_f64.sqrt() * signal + noise).collect()
     }
 }
