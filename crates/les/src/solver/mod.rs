@@ -5,7 +5,6 @@ mod checkpoint;
 mod fields;
 mod flow;
 mod implicit;
-mod interim_subgrid;
 mod layout;
 mod line;
 mod mesh;
@@ -16,11 +15,10 @@ mod rows;
 mod run;
 mod sample;
 mod settings;
-
+mod subgrid;
 mod transport;
 
 pub use flow::{Flow, StartReport, StepReport};
-pub use interim_subgrid::SubgridModel;
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
 pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
 pub use run::{
@@ -28,3 +26,4 @@ pub use run::{
 };
 pub use sample::CrossPlane;
 pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};
+pub use subgrid::SubgridModel;

@@ -1,0 +1,202 @@
+//! The subgrid stress `2 nu S` and its divergence.
+//!
+//! Diagonal strains live at the centres, `m^-1 Dw u`; the others at the edges, half the sum of the two gradients, with the
+//! mean viscosity of the four centres about the edge. The divergence is built from the transposed operators, so that the
+//! work that it does on the flow is `-sum weights tau:S`, for any viscosity, mesh and wall. Edges on walls carry no stress:
+//! an eddy viscosity vanishes at a no-slip wall, and so does the strain at a slip wall.
+//!
+//! Of the divergence, what comes from the stresses in a plane of axis 2 is kept ready; for the rest the three stresses that act
+//! across that axis are kept.
+//!
+//! Check: the energy identity to round-off.
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::super::rows::{HALO, pad};
+use super::operators::{Operator, Operators};
+
+/// What the divergence needs of the stress.
+#[derive(Debug, Clone)]
+pub(super) struct Stress {
+    /// Acceleration of each component by the stresses whose divergence is taken along the axes 0 and 1 \[m/s^2\].
+    pub(super) in_plane: [Vec<f64>; 3],
+    /// `tau_02`, `tau_12` at the edges and `tau_22` at the centres \[m^2/s^2\].
+    pub(super) across: [Vec<f64>; 3],
+}
+
+#[derive(Debug)]
+struct Scratch {
+    /// `tau_01` of a plane.
+    shear: Vec<f64>,
+    /// `tau_11` of a plane.
+    normal: Vec<f64>,
+    row: Vec<f64>,
+    viscosity: Vec<f64>,
+    padded: Vec<f64>,
+}
+
+/// One plane of each array of [`Stress`].
+struct Planes<'a> {
+    in_plane: [&'a mut [f64]; 3],
+    across: [&'a mut [f64]; 3],
+}
+
+impl Stress {
+    pub(super) fn new(cells: usize) -> Self {
+        let fields = || [vec![0.0; cells], vec![0.0; cells], vec![0.0; cells]];
+        Self { in_plane: fields(), across: fields() }
+    }
+
+    /// The stress by the viscosity at the centres and the strain of `velocity`.
+    pub(super) fn update(&mut self, operators: &Operators, viscosity: &[f64], velocity: [&[f64]; 3]) {
+        let (n, plane) = (operators.shape.n[0], operators.shape.plane());
+        let [a0, a1, a2] = self.in_plane.each_mut().map(|field| field.par_chunks_mut(plane));
+        let [t0, t1, t2] = self.across.each_mut().map(|field| field.par_chunks_mut(plane));
+        (a0, a1, a2, t0, t1, t2).into_par_iter().enumerate().for_each_init(
+            || Scratch {
+                shear: vec![0.0; plane],
+                normal: vec![0.0; plane],
+                row: vec![0.0; n],
+                viscosity: vec![0.0; n],
+                padded: vec![0.0; n + 2 * HALO],
+            },
+            |scratch, (k, (a0, a1, a2, t0, t1, t2))| {
+                let mut planes = Planes { in_plane: [a0, a1, a2], across: [t0, t1, t2] };
+                stress_plane(operators, viscosity, velocity, k, &mut planes, scratch);
+            },
+        );
+    }
+
+    /// Adds the divergence of the stress to the acceleration of the row `at` of `component` \[m/s^2\].
+    pub(super) fn add_divergence_row(&self, operators: &Operators, component: usize, at: [usize; 2], out: &mut [f64]) {
+        let in_plane = &self.in_plane[component][operators.shape.row(at[0], at[1])];
+        let operator = if component == 2 { &operators.to_faces[2] } else { &operators.to_cells[2] };
+        add_divergence_row(operator, in_plane, &self.across[component], at, out);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn add_divergence_row(operator: &Operator, in_plane: &[f64], across: &[f64], at: [usize; 2], out: &mut [f64]) {
+    for (out, value) in out.iter_mut().zip(in_plane) {
+        *out += value;
+    }
+    operator.add_across(out, across, at);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn stress_plane(
+    operators: &Operators,
+    viscosity: &[f64],
+    velocity: [&[f64]; 3],
+    k: usize,
+    planes: &mut Planes<'_>,
+    scratch: &mut Scratch,
+) {
+    let shape = operators.shape;
+    let n = shape.n[0];
+    for j in 0..shape.n[1] {
+        let (at, place) = ([j, k], j * n..(j + 1) * n);
+        let [in_0, in_1, in_2] = planes.in_plane.each_mut().map(|plane| &mut plane[place.clone()]);
+        let [across_0, across_1, across_2] = planes.across.each_mut().map(|plane| &mut plane[place.clone()]);
+        let Scratch { shear, normal, row, viscosity: sum, padded } = scratch;
+        let (shear, normal) = (&mut shear[place.clone()], &mut normal[place]);
+        let (before_j, before_k) = (operators.before(1, j), operators.before(2, k));
+        let nu = |j: usize, k: usize| &viscosity[shape.row(j, k)];
+
+        diagonal(operators, nu(j, k), velocity, 0, at, row, padded);
+        in_0.fill(0.0);
+        operators.to_faces[0].add_along(in_0, row, padded);
+        diagonal(operators, nu(j, k), velocity, 1, at, normal, padded);
+        diagonal(operators, nu(j, k), velocity, 2, at, across_2, padded);
+
+        sum_of_two(sum, nu(before_j, k), nu(j, k));
+        edge_along(operators, sum, velocity, 1, at, shear, padded);
+        in_1.fill(0.0);
+        operators.to_cells[0].add_along(in_1, shear, padded);
+
+        sum_of_two(sum, nu(j, before_k), nu(j, k));
+        edge_along(operators, sum, velocity, 2, at, across_0, padded);
+        in_2.fill(0.0);
+        operators.to_cells[0].add_along(in_2, across_0, padded);
+
+        shear_strain(operators, velocity, [1, 2], at, across_1, padded);
+        scale_by_mean(across_1, [nu(before_j, before_k), nu(j, before_k), nu(before_j, k), nu(j, k)]);
+    }
+    for j in 0..shape.n[1] {
+        let [in_0, in_1, in_2] = planes.in_plane.each_mut().map(|plane| &mut plane[j * n..(j + 1) * n]);
+        // The planes stand alone: their rows are those of plane 0.
+        operators.to_cells[1].add_across(in_0, &scratch.shear, [j, 0]);
+        operators.to_faces[1].add_across(in_1, &scratch.normal, [j, 0]);
+        operators.to_cells[1].add_across(in_2, planes.across[1], [j, 0]);
+    }
+}
+
+/// `tau_aa` at the centres.
+#[inline(always)]
+fn diagonal(
+    operators: &Operators,
+    viscosity: &[f64],
+    velocity: [&[f64]; 3],
+    axis: usize,
+    at: [usize; 2],
+    out: &mut [f64],
+    padded: &mut [f64],
+) {
+    out.fill(0.0);
+    operators.to_cells[axis].add(out, velocity[axis], at, padded);
+    for (out, viscosity) in out.iter_mut().zip(viscosity) {
+        *out *= 2.0 * viscosity;
+    }
+}
+
+/// `2 S_ab` at the edges.
+#[inline(always)]
+fn shear_strain(
+    operators: &Operators,
+    velocity: [&[f64]; 3],
+    [a, b]: [usize; 2],
+    at: [usize; 2],
+    out: &mut [f64],
+    padded: &mut [f64],
+) {
+    out.fill(0.0);
+    operators.to_faces[b].add(out, velocity[a], at, padded);
+    operators.to_faces[a].add(out, velocity[b], at, padded);
+}
+
+/// `tau_0b` at the edges from the viscosity summed over the two centres beside each face of axis `b`.
+#[inline(always)]
+fn edge_along(
+    operators: &Operators,
+    viscosity: &[f64],
+    velocity: [&[f64]; 3],
+    b: usize,
+    at: [usize; 2],
+    out: &mut [f64],
+    padded: &mut [f64],
+) {
+    let n = out.len();
+    shear_strain(operators, velocity, [0, b], at, out, padded);
+    pad(padded, viscosity, operators.periodic[0]);
+    let (low, high) = (&padded[HALO - 1..][..n], &padded[HALO..][..n]);
+    for i in 0..n {
+        out[i] *= 0.25 * (low[i] + high[i]);
+    }
+}
+
+#[inline(always)]
+fn sum_of_two(out: &mut [f64], a: &[f64], b: &[f64]) {
+    for ((out, a), b) in out.iter_mut().zip(a).zip(b) {
+        *out = a + b;
+    }
+}
+
+#[inline(always)]
+fn scale_by_mean(out: &mut [f64], rows: [&[f64]; 4]) {
+    let n = out.len();
+    let [a, b, c, d] = rows.map(|row| &row[..n]);
+    for i in 0..n {
+        out[i] *= 0.25 * ((a[i] + b[i]) + (c[i] + d[i]));
+    }
+}

@@ -1,0 +1,217 @@
+//! The eddy viscosity at the centres, from the gradient tensor there.
+//!
+//! Derivatives of a component along its own axis are the terms of the divergence; the others are the means of the gradients
+//! at the four edges about a centre, edges on a wall included with the gradient at the wall.
+//!
+//! Check: closed forms for uniform gradients, zero in shear flows, cubic growth from a wall.
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::super::rows::HALO;
+use super::operators::Operators;
+
+/// Which formula gives the eddy viscosity, with the square of its constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Formula {
+    /// `(C Delta)^2 sqrt(2 S:S)`.
+    Smagorinsky { square: f64 },
+    /// `(C Delta)^2 (Sd:Sd)^(3/2)/[(S:S)^(5/2) + (Sd:Sd)^(5/4)]`.
+    Wale { square: f64 },
+}
+
+/// Values of one row at a time.
+#[derive(Debug)]
+struct Scratch {
+    /// `[component][axis]`.
+    gradient: [[Vec<f64>; 3]; 3],
+    row: Vec<f64>,
+    padded: Vec<f64>,
+}
+
+impl Scratch {
+    fn new(n: usize) -> Self {
+        let row = || vec![0.0; n];
+        let three = || [row(), row(), row()];
+        Self { gradient: [three(), three(), three()], row: vec![0.0; n + 1], padded: vec![0.0; n + 2 * HALO] }
+    }
+}
+
+/// Writes the eddy viscosity \[m^2/s\] of `velocity` and returns the largest.
+pub(super) fn eddy_viscosity(
+    operators: &Operators,
+    formula: Formula,
+    velocity: [&[f64]; 3],
+    viscosity: &mut [f64],
+) -> f64 {
+    let n = operators.shape.n[0];
+    viscosity
+        .par_chunks_mut(operators.shape.plane())
+        .enumerate()
+        .map_init(
+            || Scratch::new(n),
+            |scratch, (k, plane)| viscosity_plane(operators, formula, velocity, k, plane, scratch),
+        )
+        .reduce(|| 0.0, f64::max)
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn viscosity_plane(
+    operators: &Operators,
+    formula: Formula,
+    velocity: [&[f64]; 3],
+    k: usize,
+    plane: &mut [f64],
+    scratch: &mut Scratch,
+) -> f64 {
+    let n = operators.shape.n[0];
+    let mut largest = [0.0; LANES];
+    for (j, row) in plane.chunks_mut(n).enumerate() {
+        gradient_rows(operators, velocity, [j, k], scratch);
+        let across = operators.width[1][j] * operators.width[2][k];
+        let gradient = scratch.gradient.each_ref().map(|rows| rows.each_ref().map(|row| &row[..n]));
+        match formula {
+            Formula::Smagorinsky { square } => smagorinsky(row, gradient, square * across, &operators.width[0]),
+            Formula::Wale { square } => wale(row, gradient, square * across, &operators.width[0]),
+        }
+        for chunk in row.chunks(LANES) {
+            for (largest, value) in largest.iter_mut().zip(chunk) {
+                *largest = if *value > *largest { *value } else { *largest };
+            }
+        }
+    }
+    largest.into_iter().fold(0.0, f64::max)
+}
+
+/// Maxima that are kept side by side.
+const LANES: usize = 8;
+
+/// The nine derivatives at the centres of the row `at`.
+#[inline(always)]
+fn gradient_rows(operators: &Operators, velocity: [&[f64]; 3], at: [usize; 2], scratch: &mut Scratch) {
+    let Scratch { gradient, row, padded } = scratch;
+    for (component, gradient) in gradient.iter_mut().enumerate() {
+        let field = velocity[component];
+        for (axis, out) in gradient.iter_mut().enumerate() {
+            if axis == component {
+                out.fill(0.0);
+                operators.to_cells[axis].add(out, field, at, padded);
+            } else if component == 0 {
+                mean_along(operators, field, axis, at, out, row, padded);
+            } else {
+                mean_across(operators, field, [component, axis], at, out, row, padded);
+            }
+        }
+    }
+}
+
+/// Derivative along `axis` of the component along axis 0: taken at the faces, then averaged over those of each cell.
+#[inline(always)]
+fn mean_along(
+    operators: &Operators,
+    field: &[f64],
+    axis: usize,
+    at: [usize; 2],
+    out: &mut [f64],
+    row: &mut [f64],
+    padded: &mut [f64],
+) {
+    let n = out.len();
+    row.fill(operators.wall_source[axis][0][at[axis - 1]]);
+    operators.half_mean_gradient[axis].add(&mut row[..n], field, at, padded);
+    if operators.periodic[0] {
+        row[n] = row[0];
+    }
+    let (low, high) = (&row[..n], &row[1..n + 1]);
+    for i in 0..n {
+        out[i] = low[i] + high[i];
+    }
+}
+
+/// Derivative along `axis` of a component along axis 1 or 2, averaged over the two faces of each cell of the row.
+#[inline(always)]
+fn mean_across(
+    operators: &Operators,
+    field: &[f64],
+    [component, axis]: [usize; 2],
+    at: [usize; 2],
+    out: &mut [f64],
+    row: &mut [f64],
+    padded: &mut [f64],
+) {
+    let n = out.len();
+    let gradient = &operators.half_mean_gradient[axis];
+    let source = &operators.wall_source[axis][component];
+    let next = operators.after(component, at[component - 1]).map(|index| {
+        let mut next = at;
+        next[component - 1] = index;
+        next
+    });
+    if axis == 0 {
+        let row = &mut row[..n];
+        row.copy_from_slice(&field[operators.shape.row(at[0], at[1])]);
+        if let Some([j, k]) = next {
+            for (sum, value) in row.iter_mut().zip(&field[operators.shape.row(j, k)]) {
+                *sum += value;
+            }
+        }
+        for (out, source) in out.iter_mut().zip(source) {
+            *out = 2.0 * source;
+        }
+        gradient.add_along(out, row, padded);
+    } else {
+        out.fill(2.0 * source[at[axis - 1]]);
+        gradient.add_across(out, field, at);
+        if let Some(next) = next {
+            gradient.add_across(out, field, next);
+        }
+    }
+}
+
+/// `S:S` of a gradient.
+#[inline(always)]
+fn strain_square(g: [[f64; 3]; 3]) -> f64 {
+    let [xy, xz, yz] = [g[0][1] + g[1][0], g[0][2] + g[2][0], g[1][2] + g[2][1]];
+    (g[0][0] * g[0][0] + g[1][1] * g[1][1] + g[2][2] * g[2][2]) + 0.5 * (xy * xy + xz * xz + yz * yz)
+}
+
+/// `Sd:Sd`, `Sd` the deviator of the symmetric part of `g g`.
+#[inline(always)]
+fn squared_gradient_square(g: [[f64; 3]; 3]) -> f64 {
+    let product = |a: usize, b: usize| g[a][0] * g[0][b] + g[a][1] * g[1][b] + g[a][2] * g[2][b];
+    let (xx, yy, zz) = (product(0, 0), product(1, 1), product(2, 2));
+    let (xy, xz, yz) = (product(0, 1) + product(1, 0), product(0, 2) + product(2, 0), product(1, 2) + product(2, 1));
+    let third = (xx + yy + zz) * (1.0 / 3.0);
+    let (xx, yy, zz) = (xx - third, yy - third, zz - third);
+    (xx * xx + yy * yy + zz * zz) + 0.5 * (xy * xy + xz * xz + yz * yz)
+}
+
+#[inline(always)]
+fn at(gradient: &[[&[f64]; 3]; 3], i: usize) -> [[f64; 3]; 3] {
+    gradient.each_ref().map(|rows| rows.each_ref().map(|row| row[i]))
+}
+
+#[inline(always)]
+fn smagorinsky(out: &mut [f64], gradient: [[&[f64]; 3]; 3], scale: f64, width: &[f64]) {
+    let n = out.len();
+    let width = &width[..n];
+    let gradient = gradient.map(|rows| rows.map(|row| &row[..n]));
+    for i in 0..n {
+        out[i] = scale * width[i] * (2.0 * strain_square(at(&gradient, i))).sqrt();
+    }
+}
+
+#[inline(always)]
+fn wale(out: &mut [f64], gradient: [[&[f64]; 3]; 3], scale: f64, width: &[f64]) {
+    let n = out.len();
+    let width = &width[..n];
+    let gradient = gradient.map(|rows| rows.map(|row| &row[..n]));
+    for i in 0..n {
+        let g = at(&gradient, i);
+        let (s, d) = (strain_square(g), squared_gradient_square(g));
+        let root = d.sqrt();
+        // The smallest number only keeps a fluid at rest from dividing by zero.
+        let rate = s * s * s.sqrt() + d * root.sqrt() + f64::MIN_POSITIVE;
+        out[i] = scale * width[i] * (d * root / rate);
+    }
+}
