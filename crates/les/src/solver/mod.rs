@@ -5,6 +5,7 @@ mod checkpoint;
 mod fields;
 mod flow;
 mod implicit;
+mod interim;
 mod layout;
 mod line;
 mod mesh;
