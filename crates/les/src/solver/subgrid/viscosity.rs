@@ -69,10 +69,10 @@ fn viscosity_plane(
     for (j, row) in plane.chunks_mut(n).enumerate() {
         gradient_rows(operators, velocity, [j, k], scratch);
         let across = operators.width[1][j] * operators.width[2][k];
-        let gradient = scratch.gradient.each_ref().map(|rows| rows.each_ref().map(|row| &row[..n]));
+        let (gradient, width) = (&scratch.gradient, &operators.width[0]);
         match formula {
-            Formula::Smagorinsky { square } => smagorinsky(row, gradient, square * across, &operators.width[0]),
-            Formula::Wale { square } => wale(row, gradient, square * across, &operators.width[0]),
+            Formula::Smagorinsky { square } => apply(row, gradient, square * across, width, smagorinsky),
+            Formula::Wale { square } => apply(row, gradient, square * across, width, wale),
         }
         for chunk in row.chunks(LANES) {
             for (largest, value) in largest.iter_mut().zip(chunk) {
@@ -186,32 +186,37 @@ fn squared_gradient_square(g: [[f64; 3]; 3]) -> f64 {
     (xx * xx + yy * yy + zz * zz) + 0.5 * (xy * xy + xz * xz + yz * yz)
 }
 
+/// Replaces each value by `scale width` times what `formula` makes of the gradient there.
 #[inline(always)]
-fn at(gradient: &[[&[f64]; 3]; 3], i: usize) -> [[f64; 3]; 3] {
-    gradient.each_ref().map(|rows| rows.each_ref().map(|row| row[i]))
-}
-
-#[inline(always)]
-fn smagorinsky(out: &mut [f64], gradient: [[&[f64]; 3]; 3], scale: f64, width: &[f64]) {
+fn apply(
+    out: &mut [f64],
+    gradient: &[[Vec<f64>; 3]; 3],
+    scale: f64,
+    width: &[f64],
+    formula: impl Fn([[f64; 3]; 3]) -> f64,
+) {
     let n = out.len();
     let width = &width[..n];
-    let gradient = gradient.map(|rows| rows.map(|row| &row[..n]));
+    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = gradient;
+    let (xx, xy, xz) = (&xx[..n], &xy[..n], &xz[..n]);
+    let (yx, yy, yz) = (&yx[..n], &yy[..n], &yz[..n]);
+    let (zx, zy, zz) = (&zx[..n], &zy[..n], &zz[..n]);
     for i in 0..n {
-        out[i] = scale * width[i] * (2.0 * strain_square(at(&gradient, i))).sqrt();
+        let g = [[xx[i], xy[i], xz[i]], [yx[i], yy[i], yz[i]], [zx[i], zy[i], zz[i]]];
+        out[i] = scale * width[i] * formula(g);
     }
 }
 
 #[inline(always)]
-fn wale(out: &mut [f64], gradient: [[&[f64]; 3]; 3], scale: f64, width: &[f64]) {
-    let n = out.len();
-    let width = &width[..n];
-    let gradient = gradient.map(|rows| rows.map(|row| &row[..n]));
-    for i in 0..n {
-        let g = at(&gradient, i);
-        let (s, d) = (strain_square(g), squared_gradient_square(g));
-        let root = d.sqrt();
-        // The smallest number only keeps a fluid at rest from dividing by zero.
-        let rate = s * s * s.sqrt() + d * root.sqrt() + f64::MIN_POSITIVE;
-        out[i] = scale * width[i] * (d * root / rate);
-    }
+fn smagorinsky(g: [[f64; 3]; 3]) -> f64 {
+    (2.0 * strain_square(g)).sqrt()
+}
+
+#[inline(always)]
+fn wale(g: [[f64; 3]; 3]) -> f64 {
+    let (s, d) = (strain_square(g), squared_gradient_square(g));
+    let root = d.sqrt();
+    // The smallest number only keeps a fluid at rest from dividing by zero.
+    let rate = s * s * s.sqrt() + d * root.sqrt() + f64::MIN_POSITIVE;
+    d * root / rate
 }

@@ -168,3 +168,4 @@ fn models_that_are_absent_or_wrong_are_told_apart() {
         assert!(Subgrid::new(&layout, model).unwrap_err().to_string().contains("1 to 4"));
     }
 }
+
