@@ -11,13 +11,13 @@
 use rayon::prelude::*;
 
 use super::implicit::LineSolver;
-use super::interim_subgrid::Subgrid;
 use super::layout::Layout;
 use super::mesh::{AXIS_NAMES, Ends, Mesh, Wall};
 use super::momentum::{Momentum, Scratch};
 use super::pressure::{self, PressureSolver, Solved};
 use super::projection::{Divergence, correct, weighted_dot};
 use super::settings::{FlowSettings, Stage, TimeScheme, TimeStep, ViscousTreatment};
+use super::subgrid::Subgrid;
 use crate::Error;
 
 /// Largest symbol of the Laplacian times the square of the spacing.
@@ -339,7 +339,7 @@ impl Flow {
         let Self { ops, state, work, model, layout, settings, .. } = self;
         let velocity = state.velocity.each_ref().map(Vec::as_slice);
         if let Some(model) = model.as_mut() {
-            model.update(layout, velocity);
+            model.update(velocity);
         }
         let task = Task {
             layout,
@@ -612,7 +612,7 @@ impl Task<'_> {
         }
         if let Some(model) = self.model {
             scratch.model.fill(0.0);
-            model.add_divergence_row(self.layout, axis, j, k, &mut scratch.model);
+            model.add_divergence_row(axis, j, k, &mut scratch.model);
             powers.subgrid += across * weighted_dot(own, &scratch.model, along);
         }
         let force = self.force_m_s2[axis];

@@ -5,7 +5,6 @@ mod checkpoint;
 mod fields;
 mod flow;
 mod implicit;
-mod interim;
 mod layout;
 mod line;
 mod mesh;

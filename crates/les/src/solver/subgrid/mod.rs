@@ -113,7 +113,7 @@ impl Subgrid {
     }
 
     /// Eddy viscosity and stress of the flow `velocity_m_s`.
-    pub(crate) fn update(&mut self, _layout: &Layout, velocity_m_s: [&[f64]; 3]) {
+    pub(crate) fn update(&mut self, velocity_m_s: [&[f64]; 3]) {
         self.largest_m2_s = eddy_viscosity(&self.operators, self.formula, velocity_m_s, &mut self.viscosity);
         let strained = match &mut self.small {
             Some((filter, small)) => {
@@ -127,7 +127,7 @@ impl Subgrid {
 
     /// Adds the divergence of the stress to the acceleration of row `(j, k)` of one component \[m/s^2\]. Rows of walls get
     /// nothing.
-    pub(crate) fn add_divergence_row(&self, _layout: &Layout, component: usize, j: usize, k: usize, out_m_s2: &mut [f64]) {
+    pub(crate) fn add_divergence_row(&self, component: usize, j: usize, k: usize, out_m_s2: &mut [f64]) {
         self.stress.add_divergence_row(&self.operators, component, [j, k], out_m_s2);
     }
 

@@ -26,7 +26,7 @@ impl Modelled {
         let layout = Layout::new(&mesh, Some([0, 1, 2]));
         let velocity = faces(&mesh, &layout, field);
         let mut model = Subgrid::new(&layout, model).unwrap().unwrap();
-        model.update(&layout, velocity.each_ref().map(Vec::as_slice));
+        model.update(velocity.each_ref().map(Vec::as_slice));
         Self { mesh, layout, velocity, model }
     }
 
@@ -45,7 +45,7 @@ impl Modelled {
             let mut field = vec![0.0; shape.len()];
             for k in 0..shape.n[2] {
                 for j in 0..shape.n[1] {
-                    self.model.add_divergence_row(&self.layout, component, j, k, &mut field[shape.row(j, k)]);
+                    self.model.add_divergence_row(component, j, k, &mut field[shape.row(j, k)]);
                 }
             }
             field
@@ -168,4 +168,3 @@ fn models_that_are_absent_or_wrong_are_told_apart() {
         assert!(Subgrid::new(&layout, model).unwrap_err().to_string().contains("1 to 4"));
     }
 }
-
