@@ -1,4 +1,5 @@
-//! Cost of a record: 1000 samples at 200 ns, by layer thickness, beside the literal sum. Throughput is in samples.
+//! Cost of a record: 1000 samples at 200 ns, by layer thickness and kind of pulse, beside the same sum in its plain form
+//! (exponentials over the band, term by term); and of a scan of 185 such lines. Throughput is in samples.
 
 use std::hint::black_box;
 
@@ -7,13 +8,14 @@ use num_complex::Complex;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_signal::{
-    Error, GaussianPulse, LineOfSight, NoiseModel, PlanckConvention, PulseDuration, Receiver, Record,
-    SPEED_OF_LIGHT_M_S, Scratch, Simulator, literal_envelope,
+    Error, GaussianPulse, LineOfSight, NoiseModel, PlanckConvention, Pulse, PulseDuration, PulseKey, Receiver, Record,
+    SPEED_OF_LIGHT_M_S, Scan, Scratch, Shot, Simulator, literal_envelope, pulse_generator,
 };
 
 const SAMPLES: usize = 1000;
+const LINES: usize = 185;
 
-fn simulator(noise: NoiseModel) -> Result<Simulator, Error> {
+fn simulator(noise: NoiseModel, chirp_hz_s: f64) -> Result<Simulator, Error> {
     let receiver = Receiver {
         wavelength_m: 1.55e-6,
         sample_rate_hz: 250e6,
@@ -25,6 +27,7 @@ fn simulator(noise: NoiseModel) -> Result<Simulator, Error> {
         noise,
     };
     let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6)?;
+    let pulse = Pulse::from(pulse).with_chirp(chirp_hz_s)?;
     Simulator::new(pulse, receiver, Record { time_of_first_sample_s: 1.0e-6, samples: SAMPLES })
 }
 
@@ -47,8 +50,8 @@ fn heterodyne(criterion: &mut Criterion) {
     let mut scratch = Scratch::default();
     let mut current_a = vec![0.0; SAMPLES];
     let mut envelope_a = vec![Complex::ZERO; SAMPLES];
-    let bare = simulator(NoiseModel::None).expect("valid settings");
-    let noisy = simulator(NoiseModel::BandLimited).expect("valid settings");
+    let bare = simulator(NoiseModel::None, 0.0).expect("valid settings");
+    let noisy = simulator(NoiseModel::BandLimited, 0.0).expect("valid settings");
     for parts in [1, 3, 6] {
         let line = line(parts);
         let speckle = vec![Complex::new(0.6, -0.8); line.layers()];
@@ -62,12 +65,60 @@ fn heterodyne(criterion: &mut Criterion) {
     }
     let line = line(1);
     let speckle = vec![Complex::new(0.6, -0.8); line.layers()];
+    let chirped = simulator(NoiseModel::None, 1e14).expect("valid settings");
+    group.bench_function("envelope of a chirped pulse, 225 scatterers", |bench| {
+        bench.iter(|| chirped.envelope_of_speckle_into(&line, &speckle, &mut scratch, &mut envelope_a));
+    });
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    group.bench_function("baseband with noise, 225 scatterers", |bench| {
+        bench.iter(|| noisy.baseband_into(&line, &mut rng, &mut scratch, &mut envelope_a));
+    });
     group.sample_size(10);
-    group.bench_function("literal, 225 scatterers", |bench| {
+    group.bench_function("plain form, 225 scatterers", |bench| {
         bench.iter(|| black_box(literal_envelope(&bare, &line, &speckle)));
     });
     group.finish();
 }
 
-criterion_group!(benches, heterodyne);
+/// Runs `f` with one thread.
+fn on_one_thread<T: Send>(f: impl FnOnce() -> T + Send) -> T {
+    #[cfg(feature = "rayon")]
+    {
+        rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread").install(f)
+    }
+    #[cfg(not(feature = "rayon"))]
+    {
+        f()
+    }
+}
+
+fn scan(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("scan");
+    group.throughput(Throughput::Elements((LINES * SAMPLES) as u64));
+    group.sample_size(10);
+    let noisy = simulator(NoiseModel::BandLimited, 0.0).expect("valid settings");
+    for parts in [1, 3] {
+        let lines = vec![line(parts); LINES];
+        let scan = Scan {
+            simulator: &noisy,
+            lines: LINES,
+            pulses_per_line: 1,
+            shot: |key: PulseKey| Shot::from(&lines[key.line]),
+            generator: |key| pulse_generator(1, key),
+            digitiser: None,
+        };
+        let run = || {
+            scan.for_each::<f64, Error>(|_, record| {
+                black_box(record);
+                Ok(())
+            })
+        };
+        let name = format!("185 lines with speckle and noise, {} scatterers", 225 * parts);
+        group.bench_function(format!("{name}, one thread"), |bench| on_one_thread(|| bench.iter(run)));
+        group.bench_function(format!("{name}, all threads"), |bench| bench.iter(run));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, heterodyne, scan);
 criterion_main!(benches);
