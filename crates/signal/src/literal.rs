@@ -10,7 +10,7 @@ use crate::error::check_length;
 use crate::window::reach;
 use crate::{Error, LineOfSight, SPEED_OF_LIGHT_M_S, Simulator};
 
-/// The complex envelope \[A\] of (15), corrected, by direct evaluation of every term: about 100 times slower than
+/// The complex envelope \[A\] of (15), corrected, by direct evaluation of every term: some 40 times slower than
 /// [`Simulator::envelope_of_speckle_into`], for tests.
 ///
 /// `speckle` holds the amplitude `g_l` of each layer (mean square 1).

@@ -1,5 +1,7 @@
 //! Pulses of any shape through the simulator and the range filter.
 
+use std::f64::consts::PI;
+
 use approx::assert_relative_eq;
 use num_complex::Complex;
 use wakescope_signal::{NoiseModel, Pulse, RangeFilter, Resampling, SampledPulse, Scratch, literal_envelope};
@@ -122,4 +124,17 @@ fn v_gate_of_any_pulse_is_the_first_moment_of_the_power_in_the_window() {
         let expected = moment / powers.iter().sum::<f64>();
         assert_relative_eq!(filter.at_range(400.0, wind), expected, epsilon = 2e-3);
     }
+}
+
+#[test]
+fn a_pulse_above_its_nominal_frequency_raises_that_of_the_return() {
+    let times: Vec<f64> = (-200..=200).map(|i| f64::from(i) * 4e-9).collect();
+    let turning = |t: &f64| Complex::from_polar(gaussian(200e-9).envelope_per_sqrt_s(*t), 2.0 * PI * 5e6 * t);
+    let amplitude: Vec<_> = times.iter().map(turning).collect();
+    let pulse = Pulse::from(SampledPulse::new(&times, &amplitude, Resampling::BandLimited, 1e-4).unwrap());
+    assert_relative_eq!(pulse.mean_frequency_hz(), 5e6, max_relative = 1e-6);
+    let simulator = simulator(pulse, NoiseModel::None, 400.0, 2);
+    let covariance = simulator.covariance_a2(&line(300.0, 500.0, STEP_M, |_| 2.0)).unwrap();
+    let frequency_hz = covariance[(1, 0)].arg() * 250e6 / (2.0 * PI);
+    assert_relative_eq!(frequency_hz, 5e6 - 2.0 * 2.0 / 1.55e-6, max_relative = 1e-5);
 }
