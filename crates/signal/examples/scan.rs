@@ -96,11 +96,19 @@ fn main() -> Result<(), Error> {
     let filter = RangeFilter::gate(&pulse, &window, RECEIVER.sample_rate_hz, thickness_m)?;
     let middle_s = simulator.time_s(GATE.start) + 0.5 * window.len() as f64 / RECEIVER.sample_rate_hz;
     let range_m = 0.5 * SPEED_OF_LIGHT_M_S * middle_s;
-    println!("distance [m]   v_gate [m/s]  pulse pair [m/s]   at {range_m:.1} m, {PULSES} pulses per line");
-    for (distance_m, lag) in distances_m.iter().zip(lags) {
-        let expected = filter.at_range(range_m, |r| wind_m_s(*distance_m, r));
-        let per_rad = RECEIVER.wavelength_m * RECEIVER.sample_rate_hz / (4.0 * PI * 5.0);
-        println!("{distance_m:12.1}  {expected:13.2}  {:16.2}", -lag.arg() * per_rad);
+    let mut mean_efficiency = vec![0.0; lines[0].layers()];
+    efficiency.mean_into(&mut mean_efficiency)?;
+    let velocity_m_s = |lag: Complex<f64>| -lag.arg() * RECEIVER.wavelength_m * RECEIVER.sample_rate_hz / (20.0 * PI);
+    println!(
+        "Velocities at {range_m:.1} m [m/s], {PULSES} pulses per line. Near air returns more, and at any moment it returns"
+    );
+    println!("light that was sent later: the chirp lowers what is measured below what the gate sees.");
+    println!("distance [m]  v_gate  expected of pulse pair  pulse pair");
+    for ((distance_m, lag), line) in distances_m.iter().zip(lags).zip(&lines) {
+        let seen = filter.at_range(range_m, |r| wind_m_s(*distance_m, r));
+        let covariance = simulator.covariance_a2(Shot { line, efficiency: Some(&mean_efficiency) })?;
+        let expected = velocity_m_s(GATE.map(|k| covariance[(k + 5, k)]).sum());
+        println!("{distance_m:12.1}  {seen:6.2}  {expected:22.2}  {:10.2}", velocity_m_s(lag));
     }
     println!("{} of {} parts of samples clipped", clipped.total(), 2 * scan.records() * SAMPLES);
     Ok(())
