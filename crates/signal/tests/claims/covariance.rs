@@ -160,7 +160,7 @@ fn windows_of_many_pulses_have_the_covariance_of_the_gate() {
 }
 
 #[test]
-#[ignore = "slow: 3 times 100 000 windows; half a minute"]
+#[ignore = "slow: 3 times 100 000 windows; 20 s of one core"]
 fn a_hundred_thousand_windows_have_the_covariance_within_1_percent() {
     check_windows(100_000, |name, found, expected| {
         let (error, in_expectations) = frobenius(found, expected, 100_000);

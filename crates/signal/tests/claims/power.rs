@@ -118,7 +118,7 @@ fn simulated_power_averages_to_its_expectation_at_every_range() {
 }
 
 #[test]
-#[ignore = "slow: 600 000 pulses of 700 samples; two minutes"]
+#[ignore = "slow: 600 000 pulses of 700 samples; 70 s of one core"]
 fn simulated_power_is_within_half_a_percent_of_14_at_every_range() {
     let (found, expected) = simulated(600_000, 6);
     let worst = found.iter().zip(&expected).map(|(f, e)| (f / e - 1.0).abs()).fold(0.0, f64::max);
