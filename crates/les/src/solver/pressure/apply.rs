@@ -61,8 +61,8 @@ impl Operator {
     }
 
     /// Subtracts from a right side the multiple of the cells' masses that makes its sum zero; returns the sum over the sum of
-    /// the moduli, and the sum.
-    pub(crate) fn remove_imbalance(&self, g: &mut [f64]) -> (f64, f64) {
+    /// the moduli.
+    pub(crate) fn remove_imbalance(&self, g: &mut [f64]) -> f64 {
         let [n0, n1, _] = self.shape.n;
         let rows: Vec<[f64; 2]> = g.par_chunks(n0).map(kernel::sum_and_moduli).collect();
         let [sum, moduli] = rows.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
@@ -73,7 +73,7 @@ impl Operator {
                 *g -= mass * m0;
             }
         });
-        (if moduli > 0.0 { sum / moduli } else { 0.0 }, sum)
+        if moduli > 0.0 { sum / moduli } else { 0.0 }
     }
 
     /// Multiplies each value by the mass of its cell.

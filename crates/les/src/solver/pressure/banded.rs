@@ -203,3 +203,44 @@ fn substitute(scratch: &mut Scratch) {
         x = [*right, x[0], x[1], x[2]];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::mesh::{Direction, Mapping, Wall};
+    use super::super::apply::stiffness;
+    use super::*;
+
+    #[test]
+    fn the_factors_invert_the_operator_with_walls_at_either_end() {
+        let (rest, slip) = (Wall::AT_REST, Wall::Slip);
+        for (n, low, high) in [(4, slip, slip), (12, rest, slip), (13, slip, rest), (16, rest, rest), (40, rest, rest)]
+        {
+            let mapping = Mapping::TanhLow { strength: 0.8 };
+            let line = Line::new(&Direction::between(n, 0.0, n as f64, low, high).stretched(mapping));
+            let band = Band::new(&line).unwrap();
+            let shifts: Vec<f64> = (0..19).map(|l| 0.05 * f64::from(l)).collect();
+            let mut right: Vec<Vec<f64>> =
+                (0..n).map(|k| (0..19).map(|l| ((k * 19 + l) as f64 * 0.7).sin()).collect()).collect();
+            // The singular line, of shift zero, needs a balanced right side.
+            let mean = right.iter().map(|row| row[0]).sum::<f64>() / line.cell_mass_m.iter().sum::<f64>();
+            right.iter_mut().zip(&line.cell_mass_m).for_each(|(row, mass)| row[0] -= mean * mass);
+            let mut x = right.clone();
+            let mut rows: Vec<&mut [f64]> = x.iter_mut().map(Vec::as_mut_slice).collect();
+            band.solve(&mut rows, 0.0, &shifts, -2.0, &mut Scratch::default());
+            for (k, row) in stiffness(&line).iter().enumerate() {
+                for (l, shift) in shifts.iter().enumerate() {
+                    let sum: f64 = row.iter().map(|&(i, c)| c * x[i][l]).sum();
+                    let left = sum + shift * line.cell_mass_m[k] * x[k][l] + 2.0 * right[k][l];
+                    assert!(left.abs() < 1e-11, "{n} cells, cell {k}, line {l}: {left:e}");
+                }
+            }
+            let mean: f64 = x.iter().zip(&line.cell_mass_m).map(|(x, mass)| x[0] * mass).sum();
+            assert!(mean.abs() < 1e-10, "{n} cells: {mean:e}");
+        }
+    }
+
+    #[test]
+    fn a_periodic_direction_is_not_banded() {
+        assert!(Band::new(&Line::new(&Direction::periodic(12, 0.0, 1.0))).is_none());
+    }
+}

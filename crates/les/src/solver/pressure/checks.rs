@@ -122,6 +122,36 @@ fn the_operator_is_symmetric_and_ignores_constants() {
 }
 
 #[test]
+fn the_operator_is_the_divergence_of_the_gradient() {
+    let layout =
+        layout([waves(8).stretched(Mapping::Sine { amplitude: 0.4 }), slip(7), ground(13).stretched(tanh(1.0))]);
+    let [n0, n1, n2] = layout.shape.n;
+    let phi: Vec<f64> = (0..layout.shape.len()).map(|p| (p as f64 * 0.37).sin()).collect();
+    let mut expected = vec![0.0; phi.len()];
+    for (b, stride) in [1, n0, n0 * n1].into_iter().enumerate() {
+        let (gradient, divergence) = (layout.line[b].gradient(), layout.line[b].stored_divergence());
+        for (p, expected) in expected.iter_mut().enumerate() {
+            let at = [p % n0, p / n0 % n1, p / n0 / n1];
+            let first = p - at[b] * stride;
+            let slope = |face: usize| gradient[face].iter().map(|(i, c)| c * phi[first + i * stride]).sum::<f64>();
+            let sum: f64 = divergence[at[b]].iter().map(|&(face, c)| c * slope(face)).sum();
+            *expected += sum * mass_of(&layout, at) / layout.line[b].cell_mass_m[at[b]];
+        }
+    }
+    assert_eq!(n0 * n1 * n2, expected.len());
+    let mut found = vec![0.0; phi.len()];
+    Operator::new(&layout).residual(&vec![0.0; phi.len()], &phi, &mut found);
+    let largest = expected.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    for (a, b) in found.iter().zip(&expected) {
+        assert!((a - b).abs() < 1e-14 * largest, "{a} {b}");
+    }
+}
+
+fn mass_of(layout: &Layout, at: [usize; 3]) -> f64 {
+    (0..3).map(|b| layout.line[b].cell_mass_m[at[b]]).product()
+}
+
+#[test]
 fn refinement_reaches_what_one_solve_does_not_and_says_where_it_ends() {
     let layout = layout([waves(16), slip(64).stretched(sinh(5.0)), ground(64).stretched(tanh(5.0))]);
     let mut solver = Direct::new(&layout).unwrap();
@@ -182,28 +212,32 @@ fn every_number_of_threads_gives_the_same_bits() {
         [closed(18), ground(40), waves(9)],
     ] {
         let layout = layout(directions);
-        let reference = with_threads(&layout, PressureMethod::Direct, 1);
-        for threads in [2, 7] {
-            assert!(with_threads(&layout, PressureMethod::Direct, threads) == reference, "{threads} threads");
+        for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
+            let reference = with_threads(&layout, method, 1);
+            for threads in [2, 7] {
+                assert!(with_threads(&layout, method, threads) == reference, "{method:?}, {threads} threads");
+            }
         }
     }
 }
 
 #[test]
 fn a_scale_of_the_mesh_scales_the_solution() {
-    let scaled = |size: f64| {
+    let scaled = |size: f64, method: PressureMethod| {
         let d = |n: usize, length: f64| Direction::between(n, 0.0, size * length, Wall::AT_REST, Wall::Slip);
         let layout = layout([Direction::periodic(16, 0.0, size), d(20, 1.0), d(24, 2.0).stretched(tanh(3.0))]);
         let mut phi = turbulent_right_side(&layout);
-        build(&layout, PressureMethod::Auto).unwrap().solve(&mut phi, 1e-8).unwrap();
+        build(&layout, method).unwrap().solve(&mut phi, 1e-8).unwrap();
         phi
     };
-    let reference = scaled(1.0);
-    let largest = reference.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    for size in [1e-9, 1e9] {
-        // The right side is a flux, in m^2 times the velocity; phi then grows with the length.
-        for (a, b) in scaled(size).iter().zip(&reference) {
-            assert!((a / size - b).abs() < 1e-12 * largest, "{size:e}");
+    for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
+        let reference = scaled(1.0, method);
+        let largest = reference.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        for size in [1e-9, 1e9] {
+            // The right side is a flux, in m^2 times the velocity; phi then grows with the length.
+            for (a, b) in scaled(size, method).iter().zip(&reference) {
+                assert!((a / size - b).abs() < 1e-12 * largest, "{method:?} {size:e}");
+            }
         }
     }
 }
@@ -219,4 +253,45 @@ fn fields_and_tolerances_that_make_no_sense_are_refused() {
     let mut still = [0.0; 512];
     solver.solve(&mut still, 1e-16).unwrap();
     assert!(still.iter().all(|phi| *phi == 0.0));
+}
+
+#[test]
+fn multigrid_agrees_with_the_direct_solver_and_converges_as_fast_on_every_mesh() {
+    for (name, directions, _) in meshes() {
+        let layout = layout(directions);
+        let operator = Operator::new(&layout);
+        let g = turbulent_right_side(&layout);
+        let mut multigrid = Multigrid::new(&layout);
+        let mut phi = g.clone();
+        let solved = multigrid.solve(&mut phi, 1e-6).unwrap();
+        let (factor, residual) = (solved.factor.unwrap_or(0.0), operator.relative_residual(&g, &phi));
+        let found = format!("{name}: {} iterations, factor {factor:.3}, residual {residual:.1e}", solved.iterations);
+        assert!(residual <= 1e-6 && (solved.residual.unwrap() - residual).abs() <= 1e-6 * residual + 1e-14, "{found}");
+        assert!(solved.iterations <= 7 && factor <= 0.14, "{found}");
+        let mut phi = g.clone();
+        multigrid.solve(&mut phi, 1e-10).unwrap();
+        let mean = mean_of(&layout, &phi);
+        assert!(mean.abs() <= 1e-12, "{name}: mean {mean:e}");
+        let mut exact = g;
+        Direct::new(&layout).unwrap().solve(&mut exact, 1e-6).unwrap();
+        let largest = exact.iter().fold(0.0_f64, |m, phi| m.max(phi.abs()));
+        let apart = exact.iter().zip(&phi).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+        assert!(apart <= 3e-10 * largest, "{name}: the fields differ by {apart:e} of {largest:e}");
+    }
+}
+
+#[test]
+fn multigrid_that_cannot_reach_the_tolerance_tells_its_history() {
+    let layout = layout([waves(16), slip(20), ground(24).stretched(tanh(3.0))]);
+    match Multigrid::new(&layout).solve(&mut turbulent_right_side(&layout), 1e-17).unwrap_err() {
+        Error::PressureNotSolved { history, method, .. } => {
+            assert_eq!(method, "multigrid");
+            let least = history.iter().copied().fold(1.0, f64::min);
+            assert!(history.len() > 10 && history[5] < 1e-4 && least < 1e-13, "{history:?}");
+        }
+        other => panic!("{other}"),
+    }
+    let mut field = turbulent_right_side(&layout);
+    field[77] = f64::NAN;
+    assert!(Multigrid::new(&layout).solve(&mut field, 1e-6).is_err());
 }

@@ -17,9 +17,10 @@ use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
 use super::super::mesh::AXIS_NAMES;
-use super::apply::{Operator, norm, turbulent_right_side};
+use super::apply::{Operator, turbulent_right_side};
 use super::banded::{Band, Scratch};
 use super::lines::bundles;
+use super::refine::{Pass, Refinement};
 use super::transform::{LineTransform, RowTransform, Work};
 use super::{PressureSolver, Solved, kernel};
 use crate::Error;
@@ -44,15 +45,11 @@ pub(crate) struct Direct {
     scale: f64,
     /// Relative residual of one solve of a rough field.
     floor: f64,
-    /// Right side and residual, kept only while a solve is refined.
-    kept: Vec<f64>,
-    left: Vec<f64>,
+    refinement: Refinement,
 }
 
 /// A tolerance this much above the residual of the trial needs no measurement.
 const MARGIN: f64 = 100.0;
-/// Refinements after which the residual no longer falls.
-const MAX_REFINEMENTS: usize = 4;
 /// Planes from which a transform of both axes of a plane at a time keeps the cores busy.
 const ENOUGH_PLANES: usize = 8;
 
@@ -85,8 +82,7 @@ impl Direct {
             value,
             scale: -factor,
             floor: 0.0,
-            kept: Vec::new(),
-            left: Vec::new(),
+            refinement: Refinement::default(),
         };
         solver.floor = solver.trial(layout);
         Ok(solver)
@@ -191,47 +187,24 @@ impl Direct {
             });
         }
     }
-
-    /// Solves, measures, and solves for what is left, till `tolerance` is reached.
-    fn refine(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
-        let mut kept = std::mem::take(&mut self.kept);
-        let mut left = std::mem::take(&mut self.left);
-        kept.clear();
-        kept.extend_from_slice(field);
-        left.resize(field.len(), 0.0);
-        let (imbalance, _) = self.operator.remove_imbalance(&mut kept);
-        let size = norm(self.shape(), &kept);
-        field.copy_from_slice(&kept);
-        self.solve_once(field);
-        let mut history = Vec::new();
-        loop {
-            self.operator.residual(&kept, field, &mut left);
-            let residual = if size > 0.0 { norm(self.shape(), &left) / size } else { 0.0 };
-            let last = history.last().copied().unwrap_or(f64::INFINITY);
-            history.push(residual);
-            let stuck = residual.is_nan() || residual > 0.5 * last || history.len() > MAX_REFINEMENTS;
-            if residual <= tolerance || stuck {
-                break;
-            }
-            // The solver takes the negative of its right side.
-            left.par_iter_mut().for_each(|value| *value = -*value);
-            self.solve_once(&mut left);
-            field.par_iter_mut().zip(&left).for_each(|(phi, more)| *phi += more);
-        }
-        (self.kept, self.left) = (kept, left);
-        let residual = history.last().copied();
-        if residual.is_some_and(|residual| residual <= tolerance) {
-            return Ok(Solved { residual, iterations: 0, factor: None, imbalance });
-        }
-        Err(Error::PressureNotSolved { method: "direct solver", tolerance, history })
-    }
 }
 
 impl PressureSolver for Direct {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
         super::check_request(self.shape(), field, tolerance)?;
         if tolerance < MARGIN * self.floor {
-            return self.refine(field, tolerance);
+            let mut refinement = std::mem::take(&mut self.refinement);
+            let done = refinement.run(&self.operator, field, tolerance, |field, _, _| {
+                self.solve_once(field);
+                Pass(Vec::new())
+            });
+            self.refinement = refinement;
+            return match done {
+                Ok(done) => {
+                    Ok(Solved { residual: Some(done.residual), iterations: 0, factor: None, imbalance: done.imbalance })
+                }
+                Err(history) => Err(Error::PressureNotSolved { method: "direct solver", tolerance, history }),
+            };
         }
         let [sum, moduli] = self.solve_once(field);
         let imbalance = if moduli > 0.0 { sum / moduli } else { 0.0 };
@@ -248,6 +221,12 @@ impl PressureSolver for Direct {
             (0..3).map(|axis| format!("{} {}", AXIS_NAMES[self.direction[axis]], names[axis])).collect();
         format!("direct: {}; residual about {:.0e}", parts.join(", "), self.floor)
     }
+}
+
+/// Cells of the longest axis that the direct solver would treat by products with a dense matrix, axis 0 apart.
+pub(crate) fn dense_cells(layout: &Layout) -> usize {
+    let banded = banded_axis(layout);
+    [1, 2].into_iter().filter(|axis| Some(*axis) != banded).map(|axis| layout.shape.n[axis]).max().unwrap_or(0)
 }
 
 /// The axis that is factorised: the longer of the bounded ones, axis 2 if they are about equal.

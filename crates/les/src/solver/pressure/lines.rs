@@ -31,6 +31,19 @@ pub(crate) fn bundles(field: &mut [f64], shape: Shape, axis: usize) -> Vec<Bundl
     bundles
 }
 
+/// Cuts `field` into groups of `width` places of axis 0: one piece for each row, in the order of the rows.
+pub(crate) fn columns(field: &mut [f64], shape: Shape, width: usize) -> Vec<Vec<&mut [f64]>> {
+    let n0 = shape.n[0];
+    let mut groups: Vec<Vec<&mut [f64]>> = Vec::new();
+    groups.resize_with(n0.div_ceil(width), || Vec::with_capacity(shape.len() / n0));
+    for row in field.chunks_mut(n0) {
+        for (group, piece) in groups.iter_mut().zip(row.chunks_mut(width)) {
+            group.push(piece);
+        }
+    }
+    groups
+}
+
 /// Bundles that keep all cores of a large machine busy.
 const ENOUGH: usize = 64;
 /// Widths are multiples of this: the tile of the matrix product.

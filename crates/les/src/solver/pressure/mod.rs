@@ -11,6 +11,8 @@ mod equation;
 mod gemm;
 mod kernel;
 mod lines;
+mod multigrid;
+mod refine;
 mod transform;
 
 #[cfg(test)]
@@ -19,6 +21,7 @@ mod checks;
 use super::layout::{Layout, Shape};
 use crate::Error;
 use crate::error::check;
+use multigrid::Multigrid;
 
 pub(crate) use direct::direct;
 pub use equation::PressureEquation;
@@ -32,7 +35,12 @@ pub enum PressureMethod {
     Auto,
     /// Transforms and a banded factorisation: the residual is round-off.
     Direct,
+    /// A transform along one direction, and for each of its modes conjugate gradients with multigrid in the other two.
+    Multigrid,
 }
+
+/// Cells of a dense direction from which multigrid is faster to a residual of 1e-6.
+const DENSE_LIMIT: usize = 3000;
 
 /// The solver that `method` asks for.
 ///
@@ -40,7 +48,9 @@ pub enum PressureMethod {
 /// Those of the solvers.
 pub(crate) fn build(layout: &Layout, method: PressureMethod) -> Result<Box<dyn PressureSolver>, Error> {
     match method {
+        PressureMethod::Auto if direct::dense_cells(layout) > DENSE_LIMIT => Ok(Box::new(Multigrid::new(layout))),
         PressureMethod::Auto | PressureMethod::Direct => direct(layout),
+        PressureMethod::Multigrid => Ok(Box::new(Multigrid::new(layout))),
     }
 }
 

@@ -116,6 +116,18 @@ impl RowTransform {
         }
     }
 
+    /// Square of the norm of a right side that consists of mode `m`, over that of the mode, for cells of mass `mass_m`. Of a
+    /// stretched direction only the mean is known.
+    pub(crate) fn weight(&self, m: usize, mass_m: f64) -> f64 {
+        match self {
+            Self::Fourier { cells, .. } => {
+                let single = m == 0 || 2 * m.div_ceil(2) == *cells;
+                if single { 1.0 / *cells as f64 } else { 2.0 / *cells as f64 }
+            }
+            _ => mass_m,
+        }
+    }
+
     /// What it is, for the log.
     pub(crate) fn name(&self) -> &'static str {
         match self {
