@@ -10,6 +10,7 @@ mod figures;
 mod regress;
 mod reproduce;
 mod tidy;
+mod validate;
 mod work_precision;
 mod workspace;
 
@@ -58,6 +59,8 @@ enum Task {
     Bless(bless::Options),
     /// Measure error against run time.
     WorkPrecision(work_precision::Options),
+    /// Run the flows with known answers and draw them beside their references.
+    Validate(validate::Options),
     /// Check the rules of the house.
     Tidy,
     /// Everything that continuous integration runs.
@@ -70,6 +73,7 @@ fn main() -> std::process::ExitCode {
         Task::Regress(options) => regress::run(&options),
         Task::Bless(options) => bless::run(&options),
         Task::WorkPrecision(options) => work_precision::run(&options),
+        Task::Validate(options) => validate::run(&options),
         Task::Tidy => tidy::run(),
         Task::Ci(options) => ci::run(&options),
     };

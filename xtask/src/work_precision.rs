@@ -1,8 +1,9 @@
-//! `cargo xtask work-precision --crate optics`: error against run time, knob by knob.
+//! `cargo xtask work-precision --crate les|optics`: error against run time, knob by knob.
 //!
 //! Every row is measured in this run, on one thread; the table and the picture go to
 //! `target/work-precision`. Errors are against exact theory, or are standard errors where the case says so.
 
+mod les;
 mod optics;
 
 use crate::workspace::root;
@@ -28,6 +29,7 @@ pub(crate) struct Options {
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Measured {
+    Les,
     Optics,
 }
 
@@ -88,6 +90,7 @@ fn peak_mem_bytes() -> f64 {
 pub(crate) fn run(options: &Options) -> Outcome {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let rows = match options.name {
+        Measured::Les => pool.install(|| les::rows(options.effort as usize))?,
         Measured::Optics => pool.install(|| optics::rows(options.effort as usize))?,
     };
     println!(
@@ -100,7 +103,11 @@ pub(crate) fn run(options: &Options) -> Outcome {
             r.case, r.method, r.knob, r.value, r.error, r.cost.cpu_s, r.metric, r.reference
         );
     }
-    let parameters = format!("crate = \"optics\"\neffort = {}\n", options.effort);
+    let name = match options.name {
+        Measured::Les => "les",
+        Measured::Optics => "optics",
+    };
+    let parameters = format!("crate = \"{name}\"\neffort = {}\n", options.effort);
     let origin = Provenance {
         program: wakescope_sim::PROGRAM.into(),
         scene_hash: wakescope_sim::scene::hash_of(&parameters),
@@ -109,10 +116,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
     };
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/work-precision"));
     let mut files = FileGroup::new(&folder);
-    files.add("optics.csv", table(&rows).to_csv(&origin)?)?;
-    files.add("optics.svg", figure(&rows).svg(&origin)?)?;
+    files.add(&format!("{name}.csv"), table(&rows).to_csv(&origin)?)?;
+    files.add(&format!("{name}.svg"), figure(&rows).svg(&origin)?)?;
     files.commit()?;
-    println!("wrote {}", folder.join("optics.csv").display());
+    println!("wrote {}", folder.join(format!("{name}.csv")).display());
     Ok(())
 }
 

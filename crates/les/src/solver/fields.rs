@@ -16,12 +16,12 @@ const INSIDE: [f64; 4] = [-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0];
 impl Flow {
     /// The mesh.
     pub fn mesh(&self) -> &Mesh {
-        self.mesh_ref()
+        &self.mesh
     }
 
     /// The settings.
     pub fn settings(&self) -> &FlowSettings {
-        self.settings_ref()
+        &self.settings
     }
 
     /// Present time \[s\].
@@ -42,7 +42,7 @@ impl Flow {
     /// Largest divergence over the largest `sum |u_i|/h_i`: what the flow fails to conserve of its own volume.
     pub fn relative_divergence(&self) -> f64 {
         let velocity = self.state.velocity.each_ref().map(Vec::as_slice);
-        let largest = self.divergence_ref().largest_per_s(velocity);
+        let largest = self.divergence.largest_per_s(velocity);
         if largest == 0.0 { 0.0 } else { largest / self.state.courant_per_s }
     }
 

@@ -10,33 +10,26 @@
 
 use rayon::prelude::*;
 
+use super::control::refuse_sticking_without_viscosity;
 use super::implicit::LineSolver;
 use super::layout::Layout;
-use super::mesh::{AXIS_NAMES, Ends, Mesh, Wall};
+use super::mesh::Mesh;
 use super::momentum::{Momentum, Scratch};
 use super::pressure::{self, PressureSolver, Solved};
-use super::projection::{Divergence, correct, weighted_dot};
-use super::settings::{FlowSettings, Stage, TimeScheme, TimeStep, ViscousTreatment};
+use super::projection::{Divergence, correct, divide_by_volume, weighted_dot};
+use super::settings::{FlowSettings, Stage, TimeScheme};
+use super::stage::{Powers, Task};
 use super::subgrid::Subgrid;
 use crate::Error;
-
-/// Largest symbol of the Laplacian times the square of the spacing.
-const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
-/// Share of the explicit viscous limit beyond which a direction is taken implicitly.
-const IMPLICIT_SHARE: f64 = 0.1;
-/// Largest share of the explicit viscous limit that a variable time step may use.
-const EXPLICIT_SHARE: f64 = 0.5;
-/// Largest growth of the time step from one step to the next.
-const LARGEST_GROWTH: f64 = 1.1;
 
 /// An incompressible flow that is being simulated.
 #[derive(Debug)]
 pub struct Flow {
-    mesh: Mesh,
-    settings: FlowSettings,
+    pub(super) mesh: Mesh,
+    pub(super) settings: FlowSettings,
     pub(crate) layout: Layout,
     ops: [Momentum; 3],
-    divergence: Divergence,
+    pub(super) divergence: Divergence,
     pressure_solver: Box<dyn PressureSolver>,
     model: Option<Subgrid>,
     line_solvers: Vec<(f64, Vec<(usize, LineSolver)>)>,
@@ -105,13 +98,6 @@ pub struct StartReport {
     pub given_energy_m5_s2: f64,
     /// Kinetic energy after the projection \[m^5/s^2\].
     pub kinetic_energy_m5_s2: f64,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Powers {
-    viscous: f64,
-    subgrid: f64,
-    force: f64,
 }
 
 impl Flow {
@@ -283,54 +269,6 @@ impl Flow {
         })
     }
 
-    /// Length of the next step \[s\].
-    fn next_step_s(&self) -> f64 {
-        match self.settings.time_step {
-            TimeStep::Fixed { step_s } => step_s,
-            TimeStep::Courant { courant, longest_s } => {
-                let mut step_s = longest_s.min(courant / self.state.courant_per_s);
-                let explicit = self.explicit_viscous_rate_per_s();
-                if explicit > 0.0 {
-                    step_s = step_s.min(EXPLICIT_SHARE / explicit);
-                }
-                if self.state.last_step_s > 0.0 {
-                    step_s = step_s.min(LARGEST_GROWTH * self.state.last_step_s);
-                }
-                step_s
-            }
-        }
-    }
-
-    /// Largest decay rate of the viscous term along one memory axis \[1/s\].
-    fn viscous_rate_per_s(&self, axis: usize) -> f64 {
-        let line = &self.layout.line[axis];
-        if line.is_thin() {
-            return 0.0;
-        }
-        let least_m = line.cell_metric_m.iter().copied().fold(f64::INFINITY, f64::min);
-        LAPLACIAN_SYMBOL * self.settings.viscosity_m2_s / least_m.powi(2)
-    }
-
-    fn explicit_viscous_rate_per_s(&self) -> f64 {
-        (0..3).filter(|&axis| !self.state.implicit[axis]).map(|axis| self.viscous_rate_per_s(axis)).sum()
-    }
-
-    fn choose_implicit(&self) -> [bool; 3] {
-        if self.settings.viscosity_m2_s == 0.0 {
-            return [false; 3];
-        }
-        match self.settings.viscous {
-            ViscousTreatment::Implicit(directions) => self.layout.direction.map(|d| directions[d]),
-            ViscousTreatment::Auto => {
-                let step_s = match self.settings.time_step {
-                    TimeStep::Fixed { step_s } => step_s,
-                    TimeStep::Courant { courant, longest_s } => longest_s.min(courant / self.state.courant_per_s),
-                };
-                std::array::from_fn(|axis| step_s * self.viscous_rate_per_s(axis) > IMPLICIT_SHARE)
-            }
-        }
-    }
-
     /// The right side of (22) into `star`: with the velocity added if no line solve follows; `acceleration_only` leaves out
     /// the old pressure and the velocity.
     fn momentum(&mut self, stage: &Stage, stage_s: f64, acceleration_only: bool) -> Powers {
@@ -442,74 +380,6 @@ impl Flow {
         }
     }
 
-    fn refuse_courant(&self, courant: f64, step_s: f64) -> Result<(), Error> {
-        let limit = self.settings.scheme.largest_courant();
-        if courant <= limit {
-            return Ok(());
-        }
-        let mut worst = (0, 0, 0.0);
-        for (axis, field) in self.state.velocity.iter().enumerate() {
-            for (place, value) in field.iter().enumerate() {
-                if value.abs() > worst.2 {
-                    worst = (axis, place, value.abs());
-                }
-            }
-        }
-        let (axis, place, _) = worst;
-        Err(Error::CourantTooLarge {
-            step: self.state.step + 1,
-            step_s,
-            courant,
-            limit,
-            component: self.component_name(axis),
-            position_m: self.position_m(place),
-        })
-    }
-
-    fn diverged(&self, axis: usize, field: &'static str) -> Error {
-        let place = self.state.velocity[axis].iter().position(|v| !v.is_finite()).unwrap_or(0);
-        Error::Diverged {
-            field,
-            step: self.state.step,
-            time_s: self.state.time_s,
-            component: self.component_name(axis),
-            cell: self.cell(place),
-            position_m: self.position_m(place),
-        }
-    }
-
-    fn component_name(&self, axis: usize) -> &'static str {
-        ["u", "v", "w"][self.layout.direction[axis]]
-    }
-
-    /// Indices along x, y, z of a place in memory.
-    fn cell(&self, place: usize) -> [usize; 3] {
-        let [n0, n1, _] = self.layout.shape.n;
-        let index = [place % n0, place / n0 % n1, place / (n0 * n1)];
-        let mut cell = [0; 3];
-        for (axis, index) in index.into_iter().enumerate() {
-            cell[self.layout.direction[axis]] = index;
-        }
-        cell
-    }
-
-    fn position_m(&self, place: usize) -> [f64; 3] {
-        let cell = self.cell(place);
-        std::array::from_fn(|d| self.mesh.directions()[d].at(cell[d] as f64 + 0.5).0)
-    }
-
-    pub(crate) fn mesh_ref(&self) -> &Mesh {
-        &self.mesh
-    }
-
-    pub(crate) fn settings_ref(&self) -> &FlowSettings {
-        &self.settings
-    }
-
-    pub(crate) fn divergence_ref(&self) -> &Divergence {
-        &self.divergence
-    }
-
     fn kinetic_energy(&self) -> f64 {
         let shape = self.layout.shape;
         let mut energy = 0.0;
@@ -523,172 +393,6 @@ impl Flow {
             }
         }
         energy
-    }
-}
-
-/// `scale` times a weighted field over the masses of the cells.
-fn divide_by_volume(layout: &Layout, scale: f64, field: &mut [f64]) {
-    let shape = layout.shape;
-    let mass: [&[f64]; 3] = std::array::from_fn(|b| layout.line[b].cell_mass_m.as_slice());
-    field.par_chunks_mut(shape.plane()).enumerate().for_each(|(k, plane)| {
-        for (j, row) in plane.chunks_mut(shape.n[0]).enumerate() {
-            let factor = scale / (mass[1][j] * mass[2][k]);
-            for (value, mass) in row.iter_mut().zip(mass[0]) {
-                *value *= factor / mass;
-            }
-        }
-    });
-}
-
-/// Without viscosity nothing can stick to a wall.
-fn refuse_sticking_without_viscosity(mesh: &Mesh, viscosity_m2_s: f64) -> Result<(), Error> {
-    let sticks = |ends: Ends| match ends {
-        Ends::Periodic => false,
-        Ends::Walls { low, high } => [low, high].iter().any(|w| matches!(w, Wall::NoSlip { .. })),
-    };
-    let found = (0..3).find(|&axis| sticks(mesh.directions()[axis].ends));
-    match found {
-        Some(axis) if viscosity_m2_s == 0.0 => Err(Error::BadDirection {
-            axis: AXIS_NAMES[axis],
-            what: "no-slip wall with viscosity_m2_s",
-            value: 0.0,
-            allowed: "positive: an inviscid flow cannot stick to a wall, so make it a slip wall",
-        }),
-        _ => Ok(()),
-    }
-}
-
-/// What the planes of the momentum equation read.
-struct Task<'a> {
-    layout: &'a Layout,
-    ops: &'a [Momentum; 3],
-    velocity: [&'a [f64]; 3],
-    pressure: &'a [f64],
-    model: Option<&'a Subgrid>,
-    viscosity_m2_s: f64,
-    force_m_s2: [f64; 3],
-    implicit: [bool; 3],
-    stage: Stage,
-    stage_s: f64,
-    add_velocity: bool,
-    acceleration_only: bool,
-}
-
-impl Task<'_> {
-    fn plane(&self, axis: usize, k: usize, star: &mut [f64], history: &mut [f64], scratch: &mut Scratch) -> Powers {
-        let shape = self.layout.shape;
-        let n = shape.n[0];
-        let mut powers = Powers::default();
-        for (j, (star, history)) in star.chunks_mut(n).zip(history.chunks_mut(n)).enumerate() {
-            if self.ops[axis].is_wall_row(j, k) {
-                star.fill(0.0);
-                continue;
-            }
-            self.row(axis, j, k, star, history, scratch, &mut powers);
-        }
-        powers
-    }
-
-    fn row(
-        &self,
-        axis: usize,
-        j: usize,
-        k: usize,
-        star: &mut [f64],
-        history: &mut [f64],
-        scratch: &mut Scratch,
-        powers: &mut Powers,
-    ) {
-        let ops = &self.ops[axis];
-        let own = &self.velocity[axis][self.layout.shape.row(j, k)];
-        let (across, along) = ops.row_mass(j, k);
-        scratch.convection(ops, self.velocity, j, k);
-        scratch.implicit.fill(0.0);
-        scratch.explicit.fill(0.0);
-        if self.viscosity_m2_s > 0.0 {
-            scratch.laplacians(ops, self.velocity[axis], self.implicit, j, k);
-            let work = weighted_dot(own, &scratch.implicit, along) + weighted_dot(own, &scratch.explicit, along);
-            powers.viscous += across * self.viscosity_m2_s * work;
-        }
-        if let Some(model) = self.model {
-            scratch.model.fill(0.0);
-            model.add_divergence_row(axis, j, k, &mut scratch.model);
-            powers.subgrid += across * weighted_dot(own, &scratch.model, along);
-        }
-        let force = self.force_m_s2[axis];
-        if force != 0.0 {
-            let momentum: f64 = own.iter().zip(along).map(|(u, mass)| u * mass).sum();
-            powers.force += across * force * momentum;
-        }
-        if !self.acceleration_only {
-            scratch.gradient(ops, self.pressure, j, k);
-        }
-        let new = NewTerms {
-            convection: &scratch.convection,
-            explicit: &scratch.explicit,
-            model: self.model.map(|_| scratch.model.as_slice()),
-            nu: self.viscosity_m2_s,
-            force,
-        };
-        if self.acceleration_only {
-            new.write(star);
-            for (star, implicit) in star.iter_mut().zip(&scratch.implicit) {
-                *star += self.viscosity_m2_s * implicit;
-            }
-        } else {
-            self.advance(&new, &scratch.implicit, &scratch.pressure, own, star, history);
-        }
-        if axis == 0 && self.layout.line[0].first_face() == 1 {
-            star[0] = 0.0;
-        }
-    }
-
-    /// `star = dt (c N + c' N' - grad p + nu L u) [+ u]`, and the history.
-    fn advance(
-        &self,
-        new: &NewTerms<'_>,
-        implicit: &[f64],
-        pressure: &[f64],
-        own: &[f64],
-        star: &mut [f64],
-        history: &mut [f64],
-    ) {
-        let Stage { new: weight, old, .. } = self.stage;
-        let dt = self.stage_s;
-        new.write(star);
-        let n = star.len();
-        let (implicit, pressure, own, history) = (&implicit[..n], &pressure[..n], &own[..n], &mut history[..n]);
-        let keep = if self.add_velocity { 1.0 } else { 0.0 };
-        for i in 0..n {
-            let term = star[i];
-            let total = weight * term + old * history[i] - pressure[i] + new.nu * implicit[i];
-            history[i] = term;
-            star[i] = dt * total + keep * own[i];
-        }
-    }
-}
-
-/// The terms that are integrated explicitly.
-struct NewTerms<'a> {
-    convection: &'a [f64],
-    explicit: &'a [f64],
-    model: Option<&'a [f64]>,
-    nu: f64,
-    force: f64,
-}
-
-impl NewTerms<'_> {
-    fn write(&self, out: &mut [f64]) {
-        let n = out.len();
-        let (convection, explicit) = (&self.convection[..n], &self.explicit[..n]);
-        for i in 0..n {
-            out[i] = self.nu * explicit[i] - convection[i] + self.force;
-        }
-        if let Some(model) = self.model {
-            for (out, model) in out.iter_mut().zip(model) {
-                *out += model;
-            }
-        }
     }
 }
 

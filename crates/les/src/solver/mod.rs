@@ -2,6 +2,8 @@
 
 pub mod cases;
 mod checkpoint;
+mod control;
+mod convection;
 mod fields;
 mod flow;
 mod implicit;
@@ -15,6 +17,7 @@ mod rows;
 mod run;
 mod sample;
 mod settings;
+mod stage;
 mod subgrid;
 mod transport;
 

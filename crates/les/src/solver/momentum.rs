@@ -8,28 +8,29 @@
 
 use multiversion::multiversion;
 
+use super::convection::convection_row;
 use super::layout::Layout;
 use super::line::Taps;
-use super::rows::{Columns, HALO, add_pairs, add_product, add_rows, pad};
-use super::transport::{MEAN, Transport};
+use super::rows::{Columns, HALO, add_rows, pad};
+use super::transport::Transport;
 
 /// The operators of one component.
 #[derive(Debug, Clone)]
 pub(crate) struct Momentum {
     /// Memory axis of the component.
-    axis: usize,
+    pub(super) axis: usize,
     /// Sizes of the memory axes.
-    n: [usize; 3],
-    periodic: [bool; 3],
-    thin: [bool; 3],
+    pub(super) n: [usize; 3],
+    pub(super) periodic: [bool; 3],
+    pub(super) thin: [bool; 3],
     /// Weighted flux along `axis` at its faces from the cells.
-    flux_mean: Vec<Taps>,
-    flux_mean_columns: Columns,
-    transport: [Transport; 3],
+    pub(super) flux_mean: Vec<Taps>,
+    pub(super) flux_mean_columns: Columns,
+    pub(super) transport: [Transport; 3],
     /// `1/m_b` at the cells of each axis.
-    inverse_cell_mass: [Vec<f64>; 3],
+    pub(super) inverse_cell_mass: [Vec<f64>; 3],
     /// `1/f` at the faces of `axis`, zero at a wall.
-    inverse_face_mass: Vec<f64>,
+    pub(super) inverse_face_mass: Vec<f64>,
     /// Mass of the control volume of this component along each axis.
     mass: [Vec<f64>; 3],
     /// Laplacian along each axis and the source from moving walls.
@@ -140,214 +141,14 @@ impl Momentum {
         }
     }
 
-    fn start(&self, j: usize, k: usize) -> usize {
+    pub(super) fn start(&self, j: usize, k: usize) -> usize {
         (k * self.n[1] + j) * self.n[0]
     }
 
     /// Start of the row whose index along `axis` (1 or 2) is replaced.
-    fn start_with(&self, j: usize, k: usize, axis: usize, index: usize) -> usize {
+    pub(super) fn start_with(&self, j: usize, k: usize, axis: usize, index: usize) -> usize {
         if axis == 1 { self.start(index, k) } else { self.start(j, index) }
     }
-}
-
-/// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn convection_row(
-    ops: &Momentum,
-    velocity: [&[f64]; 3],
-    j: usize,
-    k: usize,
-    out: &mut [f64],
-    padded: &mut [Vec<f64>; 2],
-    flux: &mut [Vec<f64>; 4],
-) {
-    out.fill(0.0);
-    if !ops.thin[0] {
-        along_row(ops, velocity, j, k, out, padded, flux);
-    }
-    for axis in 1..3 {
-        if !ops.thin[axis] {
-            across_rows(ops, velocity, j, k, axis, out, padded, flux);
-        }
-    }
-    match ops.axis {
-        0 => {
-            for (out, inverse) in out.iter_mut().zip(&ops.inverse_face_mass) {
-                *out *= inverse;
-            }
-        }
-        axis => {
-            let inverse = ops.inverse_face_mass[if axis == 1 { j } else { k }];
-            for out in out.iter_mut() {
-                *out *= inverse;
-            }
-        }
-    }
-}
-
-/// The part of the convection along axis 0.
-#[inline(always)]
-fn along_row(
-    ops: &Momentum,
-    velocity: [&[f64]; 3],
-    j: usize,
-    k: usize,
-    out: &mut [f64],
-    padded: &mut [Vec<f64>; 2],
-    flux: &mut [Vec<f64>; 4],
-) {
-    let n = out.len();
-    let periodic = ops.periodic[0];
-    let start = ops.start(j, k);
-    let [values, fluxes] = padded;
-    pad(values, &velocity[ops.axis][start..start + n], periodic);
-    let transport = &ops.transport[0];
-    if ops.axis == 0 {
-        // Mean fluxes of the cells -2 to n + 1, at which the padded places 2 to n + 5 hold them.
-        for c in 2..n + 6 {
-            fluxes[c] =
-                (MEAN[0] * values[c - 1] + MEAN[1] * values[c]) + (MEAN[2] * values[c + 1] + MEAN[3] * values[c + 2]);
-        }
-        let at = |offset: usize| &fluxes[HALO + offset - 3..];
-        let q = |offset: usize| &values[HALO + offset - 3..];
-        add_pairs(out, 1.0, [at(1), at(2), at(3), at(4)], [q(0), q(2), q(4), q(6)]);
-        if !periodic {
-            irregular_columns(transport, out, &velocity[0][start..start + n], &velocity[0][start..start + n], None);
-        }
-    } else {
-        flux_row(ops, velocity, 0, j, k, 0, &mut flux[0], fluxes);
-        pad(fluxes, &flux[0], periodic);
-        let at = |offset: usize| &fluxes[HALO + offset - 1..];
-        let q = |offset: usize| &values[HALO + offset - 3..];
-        let line = &mut flux[1];
-        line.fill(0.0);
-        add_pairs(line, 1.0, [at(0), at(1), at(2), at(3)], [q(0), q(2), q(4), q(6)]);
-        let inverse = &ops.inverse_cell_mass[0];
-        for ((out, line), inverse) in out.iter_mut().zip(line.iter()).zip(inverse) {
-            *out += inverse * line;
-        }
-        if !periodic {
-            // The regular formula was added to every column; the others are computed anew.
-            let (done, fresh) = (&flux[1], &flux[0]);
-            let values = &velocity[ops.axis][start..start + n];
-            for i in irregular(transport, n) {
-                let sum: f64 = transport.rows[i].iter().map(|&(face, cell, c)| c * fresh[face] * values[cell]).sum();
-                out[i] += inverse[i] * (sum - done[i]);
-            }
-        }
-    }
-}
-
-/// Replaces the columns to which the formula of the interior does not apply.
-#[inline(always)]
-fn irregular_columns(transport: &Transport, out: &mut [f64], flux: &[f64], values: &[f64], scale: Option<&[f64]>) {
-    for i in irregular(transport, out.len()) {
-        let sum: f64 = transport.rows[i].iter().map(|&(face, cell, c)| c * flux[face] * values[cell]).sum();
-        out[i] = scale.map_or(1.0, |scale| scale[i]) * sum;
-    }
-}
-
-fn irregular(transport: &Transport, n: usize) -> impl Iterator<Item = usize> + use<> {
-    let regular = transport.regular.clone();
-    (0..n).filter(move |i| !regular.contains(i))
-}
-
-/// The part of the convection along axis 1 or 2.
-#[inline(always)]
-fn across_rows(
-    ops: &Momentum,
-    velocity: [&[f64]; 3],
-    j: usize,
-    k: usize,
-    axis: usize,
-    out: &mut [f64],
-    padded: &mut [Vec<f64>; 2],
-    flux: &mut [Vec<f64>; 4],
-) {
-    let length = out.len();
-    let index = if axis == 1 { j } else { k };
-    let count = ops.n[axis];
-    let transport = &ops.transport[axis];
-    let scale = if axis == ops.axis { 1.0 } else { ops.inverse_cell_mass[axis][index] };
-    let values = velocity[ops.axis];
-    let row = |i: usize| {
-        let start = ops.start_with(j, k, axis, i);
-        &values[start..start + length]
-    };
-    if ops.periodic[axis] || transport.regular.contains(&index) {
-        let at = |offset: usize| {
-            // Offset 3 is the row itself; a regular row of a bounded direction never wraps.
-            let i = index + offset + count - 3;
-            if ops.periodic[axis] { i % count } else { i - count }
-        };
-        let q = [0, 2, 4, 6].map(|offset| row(at(offset)));
-        if axis == ops.axis {
-            mean_rows(flux, [0, 1, 2, 3, 4, 5, 6].map(|offset| row(at(offset))));
-        } else {
-            for (slot, out) in flux.iter_mut().enumerate() {
-                flux_row(ops, velocity, axis, j, k, at(slot + 2), out, &mut padded[0]);
-            }
-        }
-        add_pairs(out, scale, flux.each_ref().map(Vec::as_slice), q);
-    } else {
-        for &(face, cell, c) in &transport.rows[index] {
-            if axis == ops.axis {
-                add_product(out, scale * c, row(face), row(cell));
-            } else {
-                flux_row(ops, velocity, axis, j, k, face, &mut flux[0], &mut padded[0]);
-                add_product(out, scale * c, &flux[0], row(cell));
-            }
-        }
-    }
-}
-
-/// Mean fluxes of the four cells about a face from the fluxes at seven faces.
-#[inline(always)]
-fn mean_rows(flux: &mut [Vec<f64>; 4], rows: [&[f64]; 7]) {
-    for (slot, out) in flux.iter_mut().enumerate() {
-        // Cell m - 2 + slot lies between the faces m - 2 + slot and m - 1 + slot.
-        let n = out.len();
-        let [a, b, c, d] = std::array::from_fn(|i| &rows[slot + i][..n]);
-        for i in 0..n {
-            out[i] = (MEAN[0] * a[i] + MEAN[1] * b[i]) + (MEAN[2] * c[i] + MEAN[3] * d[i]);
-        }
-    }
-}
-
-/// The flux along `along` through its face `face`, weighted along the component's axis and brought to its faces.
-#[inline(always)]
-fn flux_row(
-    ops: &Momentum,
-    velocity: [&[f64]; 3],
-    along: usize,
-    j: usize,
-    k: usize,
-    face: usize,
-    out: &mut [f64],
-    padded: &mut [f64],
-) {
-    let field = velocity[along];
-    let n = out.len();
-    out.fill(0.0);
-    if ops.axis == 0 {
-        let start = ops.start_with(j, k, along, face);
-        pad(padded, &field[start..start + n], ops.periodic[0]);
-        ops.flux_mean_columns.add(out, padded);
-        return;
-    }
-    let (mut j, mut k) = (j, k);
-    match along {
-        1 => j = face,
-        2 => k = face,
-        _ => {}
-    }
-    let own = if ops.axis == 1 { j } else { k };
-    let taps = &ops.flux_mean[own];
-    let mut rows = [(0, 0.0); 6];
-    for (row, tap) in rows.iter_mut().zip(taps) {
-        *row = (ops.start_with(j, k, ops.axis, tap.0), tap.1);
-    }
-    add_rows(out, field, &rows[..taps.len().min(6)]);
 }
 
 /// Adds the Laplacian of the component along `axis` to row `(j, k)` \[1/(m s)\].

@@ -107,6 +107,20 @@ fn divergence_row(
     ops.columns.add(out, padded);
 }
 
+/// `scale` times a weighted field over the masses of the cells.
+pub(super) fn divide_by_volume(layout: &Layout, scale: f64, field: &mut [f64]) {
+    let shape = layout.shape;
+    let mass: [&[f64]; 3] = std::array::from_fn(|b| layout.line[b].cell_mass_m.as_slice());
+    field.par_chunks_mut(shape.plane()).enumerate().for_each(|(k, plane)| {
+        for (j, row) in plane.chunks_mut(shape.n[0]).enumerate() {
+            let factor = scale / (mass[1][j] * mass[2][k]);
+            for (value, mass) in row.iter_mut().zip(mass[0]) {
+                *value *= factor / mass;
+            }
+        }
+    });
+}
+
 /// What the correction learns of the new field on its way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FieldSummary {

@@ -10,16 +10,25 @@ const CENTRE_VORTICITY_PER_S: f64 = 299.528_385_375_226;
 /// Radius of the vortices \[m\].
 const RADIUS_M: f64 = 0.1;
 
+/// Refinement of the middle of a closed box.
+const MIDDLE_STRENGTH: f64 = 1.5;
+
 /// The dipole in the plane y, z of the box `[-1, 1]^2`, running along z; `1/reynolds` is the viscosity. The walls at z = -1
-/// and 1 are no-slip; those at y = -1 and 1 too if `closed`, else y is periodic. `strength` stretches both towards the walls.
+/// and 1 are no-slip; those at y = -1 and 1 too if `closed`, else y is periodic with equal cells. `strength` refines z towards
+/// its walls; in a closed box y is refined in the middle, where the vortices stay.
 ///
 /// # Errors
 /// Cells, stretching or Reynolds number out of range.
 pub fn dipole_against_wall(cells: [usize; 2], strength: f64, reynolds: f64, closed: bool) -> Result<Case, Error> {
     let walls = |n| Direction::between(n, -1.0, 1.0, Wall::AT_REST, Wall::AT_REST);
-    let tanh = |d: Direction| if strength == 0.0 { d } else { d.stretched(Mapping::TanhBoth { strength }) };
-    let y = if closed { tanh(walls(cells[0])) } else { Direction::periodic(cells[0], -1.0, 1.0) };
-    let mesh = Mesh::new(Direction::thin(1.0), y, tanh(walls(cells[1])))?;
+    let stretched = |d: Direction, mapping| if strength == 0.0 { d } else { d.stretched(mapping) };
+    let y = if closed {
+        stretched(walls(cells[0]), Mapping::SinhMiddle { strength: MIDDLE_STRENGTH })
+    } else {
+        Direction::periodic(cells[0], -1.0, 1.0)
+    };
+    let z = stretched(walls(cells[1]), Mapping::TanhBoth { strength });
+    let mesh = Mesh::new(Direction::thin(1.0), y, z)?;
     let settings = FlowSettings::new(1.0 / reynolds, TimeStep::Courant { courant: 0.35, longest_s: 1e-3 });
     let initial = |at_m: [f64; 3]| {
         let mut velocity = [0.0; 3];

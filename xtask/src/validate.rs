@@ -1,0 +1,172 @@
+//! `cargo xtask validate`: the flows with known answers, run at full resolution and drawn beside their references.
+//!
+//! The bars are printed with what was measured; the pictures and tables go to `target/validation`, from where the book takes
+//! them. A bar that is missed is printed plainly and fails the task at its end.
+
+mod cavity;
+mod channel;
+mod dipole;
+mod order;
+mod pair;
+mod vortices;
+mod waves;
+
+use crate::workspace::{read, root};
+use crate::{Failure, Outcome};
+use std::path::PathBuf;
+use std::time::Instant;
+use wakescope_sim::export::{FileGroup, Provenance, Table};
+use wakescope_sim::plot::Figure;
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Only the cases whose name contains this.
+    #[arg(long, value_name = "WORD")]
+    only: Option<String>,
+    /// How fine the meshes are.
+    #[arg(long, value_enum, default_value_t = Profile::Quick)]
+    profile: Profile,
+    /// Folder to write to.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// How much is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Profile {
+    /// Coarse meshes and short times, minutes in all; most bars are then wider.
+    Quick,
+    /// The meshes of the bars, an hour or so.
+    Standard,
+    /// The standard ones, and the turbulent channel.
+    Full,
+}
+
+/// One comparison with a bar.
+pub(crate) struct Check {
+    pub(crate) quantity: String,
+    pub(crate) measured: f64,
+    pub(crate) reference: f64,
+    /// Largest allowed difference, in the unit of the quantity.
+    pub(crate) allowed: f64,
+}
+
+impl Check {
+    /// Within `share` of the reference.
+    pub(crate) fn relative(quantity: &str, measured: f64, reference: f64, share: f64) -> Self {
+        Self { quantity: quantity.into(), measured, reference, allowed: share * reference.abs() }
+    }
+
+    /// At least `bar`.
+    pub(crate) fn at_least(quantity: &str, measured: f64, bar: f64) -> Self {
+        // Anything above is fine: the difference is then zero.
+        Self { quantity: quantity.into(), measured, reference: measured.max(bar), allowed: 0.0 }
+    }
+
+    /// At most `bar`.
+    pub(crate) fn at_most(quantity: &str, measured: f64, bar: f64) -> Self {
+        Self { quantity: quantity.into(), measured, reference: measured.min(bar), allowed: 0.0 }
+    }
+
+    fn passes(&self) -> bool {
+        (self.measured - self.reference).abs() <= self.allowed
+    }
+}
+
+/// What a case shows.
+pub(crate) struct Shown {
+    pub(crate) checks: Vec<Check>,
+    pub(crate) table: Table,
+    pub(crate) figure: Figure,
+}
+
+type CaseFn = fn(Profile) -> Result<Shown, Failure>;
+
+const CASES: [(&str, CaseFn); 8] = [
+    ("les_order", order::show),
+    ("les_waves", waves::show),
+    ("les_dipole_625", dipole::show_625),
+    ("les_dipole_1250", dipole::show_1250),
+    ("les_cavity", cavity::show),
+    ("les_vortices", vortices::show),
+    ("les_pair", pair::show),
+    ("les_channel", channel::show),
+];
+
+/// Runs the cases, prints the checks, writes tables and pictures.
+///
+/// # Errors
+/// A case that cannot be run, a bar that is missed, an unusable output.
+pub(crate) fn run(options: &Options) -> Outcome {
+    let folder = options.out.clone().unwrap_or_else(|| root().join("target/validation"));
+    let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
+    println!("{:<16} {:<46} {:>13} {:>13} {:>10}  verdict", "case", "quantity", "measured", "reference", "allowed");
+    let mut missed = Vec::new();
+    for (name, show) in CASES.into_iter().filter(|case| wanted(case.0)) {
+        if name == "les_channel" && options.profile != Profile::Full {
+            continue;
+        }
+        let start = Instant::now();
+        let shown = show(options.profile)?;
+        for check in &shown.checks {
+            let verdict = if check.passes() { "pass" } else { "MISSED" };
+            println!(
+                "{name:<16} {:<46} {:>13.6} {:>13.6} {:>10.2e}  {verdict}",
+                check.quantity, check.measured, check.reference, check.allowed
+            );
+            if !check.passes() {
+                missed.push(format!("{name}: {}", check.quantity));
+            }
+        }
+        println!("{name:<16} took {:.1} s", start.elapsed().as_secs_f64());
+        write(name, options.profile, &shown, &folder)?;
+    }
+    println!("pictures and tables in {}", folder.display());
+    if missed.is_empty() { Ok(()) } else { Err(Failure::new(format!("bars missed: {}", missed.join("; ")))) }
+}
+
+fn write(name: &str, profile: Profile, shown: &Shown, folder: &std::path::Path) -> Outcome {
+    let parameters = format!("case = \"{name}\"\nprofile = \"{profile:?}\"\n").to_lowercase();
+    let origin = Provenance {
+        program: wakescope_sim::PROGRAM.into(),
+        scene_hash: wakescope_sim::scene::hash_of(&parameters),
+        scene_toml: parameters,
+        seed: 0,
+    };
+    let checks = Table::new()
+        .text("quantity", shown.checks.iter().map(|c| c.quantity.clone()))
+        .float("measured", shown.checks.iter().map(|c| c.measured))
+        .float("reference", shown.checks.iter().map(|c| c.reference))
+        .float("allowed_difference", shown.checks.iter().map(|c| c.allowed));
+    let mut files = FileGroup::new(folder);
+    files.add(&format!("{name}.csv"), shown.table.to_csv(&origin)?)?;
+    files.add(&format!("{name}_checks.csv"), checks.to_csv(&origin)?)?;
+    files.add(&format!("{name}.svg"), shown.figure.svg(&origin)?)?;
+    files.add(&format!("{name}.png"), shown.figure.png(&origin)?)?;
+    files.commit()?;
+    Ok(())
+}
+
+/// Numbers of a reference file without its comments, row by row.
+pub(crate) fn numbers(file: &str) -> Result<Vec<Vec<f64>>, Failure> {
+    let text = read(&format!("tests/reference/les/{file}"))?;
+    let rows = text.lines().filter(|line| !line.starts_with('#'));
+    let parse = |line: &str| line.split(',').map(|cell| cell.trim().parse().ok()).collect::<Option<Vec<f64>>>();
+    Ok(rows.filter_map(parse).collect())
+}
+
+/// Linear interpolation in points of increasing abscissa.
+pub(crate) fn interpolate(points: &[(f64, f64)], x: f64) -> f64 {
+    let i = points.partition_point(|p| p.0 < x).clamp(1, points.len().max(2) - 1);
+    let (a, b) = (points[i - 1], points[i]);
+    a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0)
+}
+
+/// The extremum of the parabola through three points.
+pub(crate) fn parabola_vertex([a, b, c]: [(f64, f64); 3]) -> (f64, f64) {
+    let (left, right) = ((b.1 - a.1) / (b.0 - a.0), (c.1 - b.1) / (c.0 - b.0));
+    let bend = (right - left) / (c.0 - a.0);
+    let x = 0.5 * (a.0 + b.0) - left / (2.0 * bend);
+    (x, a.1 + left * (x - a.0) + bend * (x - a.0) * (x - b.0))
+}
