@@ -58,7 +58,7 @@ fn vortices() -> Result<Vec<Row>, Failure> {
 fn tolerances() -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     let words = ["divergence over the largest velocity per cell", "none: what the solve leaves"];
-    let methods = [("direct", PressureMethod::Direct)];
+    let methods = [("direct", PressureMethod::Direct), ("multigrid", PressureMethod::Multigrid)];
     for (name, method) in methods {
         for tolerance in [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
             let mut case = cases::taylor_green_3d(32, 1600.0)?;
