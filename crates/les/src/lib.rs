@@ -58,7 +58,7 @@ pub use series::GridSeries;
 
 pub use solver::{
     CheckpointPlan, CrossPlane, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent,
-    StepRecord,
+    StepRecord, check_checkpoint,
 };
 pub use solver::{
     Direction, Ends, Flow, FlowSettings, Mapping, MappingFn, Mesh, PressureEquation, PressureMethod, PressureSolved,

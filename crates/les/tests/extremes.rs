@@ -6,7 +6,8 @@
 use std::f64::consts::TAU;
 
 use wakescope_les::{
-    Direction, Error, Flow, FlowSettings, Mapping, Mesh, TimeScheme, TimeStep, ViscousTreatment, Wall, cases,
+    Direction, Error, Flow, FlowSettings, Mapping, Mesh, SubgridModel, TimeScheme, TimeStep, ViscousTreatment, Wall,
+    cases,
 };
 
 /// A flow without symmetries between a no-slip wall and a slip wall, all lengths in `length` and velocities in `speed`.
@@ -44,20 +45,28 @@ fn schemes() -> [TimeScheme; 2] {
     [TimeScheme::AdamsBashforth2, TimeScheme::RungeKutta3]
 }
 
+fn models() -> [SubgridModel; 4] {
+    [SubgridModel::None, SubgridModel::SMAGORINSKY, SubgridModel::WALE, SubgridModel::MULTISCALE_WALE]
+}
+
 #[test]
 fn results_are_the_same_in_all_units_from_nanometres_to_gigametres() {
-    for scheme in schemes() {
-        let run = |length: f64, speed: f64| steps(layered(length, speed, |settings| settings.scheme = scheme), 5);
+    for (scheme, subgrid) in schemes().into_iter().flat_map(|s| models().map(|m| (s, m))) {
+        let change = |settings: &mut FlowSettings| (settings.scheme, settings.subgrid) = (scheme, subgrid);
+        let run = |length: f64, speed: f64| steps(layered(length, speed, change), 5);
         let plain = run(1.0, 1.0);
         for (length, speed) in [(1e-9, 1.0), (1e9, 1.0), (1.0, 1e-9), (1.0, 1e9), (1e-9, 1e-9), (1e9, 1e9), (1e-9, 1e9)]
         {
             let scaled = run(length, speed);
             let energy = scaled.kinetic_energy_m5_s2() / (speed * speed * length.powi(3));
-            assert!((energy / plain.kinetic_energy_m5_s2() - 1.0).abs() < 1e-12, "{length} {speed}: energy");
+            assert!(
+                (energy / plain.kinetic_energy_m5_s2() - 1.0).abs() < 1e-12,
+                "{length} {speed} {subgrid:?}: energy"
+            );
             for d in 0..3 {
                 let (a, b) = (plain.face_velocity_m_s(d), scaled.face_velocity_m_s(d));
                 let worst = a.iter().zip(&b).map(|(a, b)| (a - b / speed).abs()).fold(0.0, f64::max);
-                assert!(worst < 1e-12, "{length} m, {speed} m/s, component {d}: {worst}");
+                assert!(worst < 1e-12, "{length} m, {speed} m/s, {subgrid:?}, component {d}: {worst}");
             }
         }
     }
@@ -65,12 +74,12 @@ fn results_are_the_same_in_all_units_from_nanometres_to_gigametres() {
 
 #[test]
 fn fields_have_the_same_bits_on_one_two_and_seven_threads() {
-    for scheme in schemes() {
+    for (scheme, subgrid) in schemes().into_iter().flat_map(|s| models().map(|m| (s, m))) {
         for implicit in [[false; 3], [true; 3]] {
             let run = |threads: usize| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let change = |settings: &mut FlowSettings| {
-                    settings.scheme = scheme;
+                    (settings.scheme, settings.subgrid) = (scheme, subgrid);
                     settings.viscous = ViscousTreatment::Implicit(implicit);
                     settings.time_step = TimeStep::Courant { courant: 0.3, longest_s: 0.02 };
                 };
@@ -80,7 +89,7 @@ fn fields_have_the_same_bits_on_one_two_and_seven_threads() {
                 })
             };
             let one = run(1);
-            assert!(one == run(2) && one == run(7), "{scheme:?}, implicit {implicit:?}");
+            assert!(one == run(2) && one == run(7), "{scheme:?}, {subgrid:?}, implicit {implicit:?}");
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 2 wrong input or unusable output. Progress and plans go to standard error,
 //! results to standard output; `--json` makes the result one JSON object.
 
+mod flow;
 mod progress;
 
 use crate::plan::{Plan, Target};
@@ -58,6 +59,8 @@ enum Command {
     Signal(Io),
     /// The radial-velocity map with its errors.
     Map(Io),
+    /// Simulate a flow: a case file goes in, fields and checkpoints come out.
+    Flow(flow::FlowWords),
 }
 
 #[derive(Debug, Args)]
@@ -96,6 +99,7 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
+        Command::Flow(words) => flow::flow(words, cli),
     }
 }
 

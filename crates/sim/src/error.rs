@@ -13,6 +13,23 @@ pub enum Error {
     /// The wind refused a point or a time.
     #[error("wind: {0}")]
     Wind(#[from] wakescope_les::Error),
+    /// The simulation of a flow could not be started or finished.
+    #[error("flow: {0}")]
+    Flow(wakescope_les::Error),
+    /// A file that a flow case names does not hold what it should.
+    #[error("{}: {reason}", path.display())]
+    Input {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with what is allowed.
+        reason: String,
+    },
+    /// The folder holds the checkpoint of an earlier run.
+    #[error("{} is the checkpoint of an earlier run: --restart continues it, --overwrite begins anew", path.display())]
+    CheckpointInTheWay {
+        /// The checkpoint.
+        path: PathBuf,
+    },
     /// The optics refused a telescope or a range.
     #[error("optics: {0}")]
     Optics(#[from] wakescope_optics::Error),

@@ -41,14 +41,19 @@ pub fn vortex_pair(pair: &VortexPair) -> les::VortexPair {
         lateral_position_m: pair.lateral_position_m,
         height_m: pair.height_m,
         ground: les::Ground::Image,
-        profile: match pair.profile {
-            VortexProfile::Algebraic => les::CirculationProfile::Algebraic,
-            VortexProfile::LambOseen => les::CirculationProfile::LambOseen,
-        },
+        profile: circulation_profile(pair.profile),
         motion: match pair.motion {
             VortexMotion::Frozen => les::Motion::Frozen,
             VortexMotion::Inviscid => les::Motion::Inviscid,
         },
+    }
+}
+
+/// The circulation profile of a scene or a flow case.
+pub(crate) fn circulation_profile(profile: VortexProfile) -> les::CirculationProfile {
+    match profile {
+        VortexProfile::Algebraic => les::CirculationProfile::Algebraic,
+        VortexProfile::LambOseen => les::CirculationProfile::LambOseen,
     }
 }
 

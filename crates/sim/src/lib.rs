@@ -34,6 +34,7 @@
 //! | [`scan`] | air along the lines of sight, and their records |
 //! | [`map`] | estimates and their errors against the truth |
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
+//! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`streams`] | one random stream for each pulse |
 //! | [`export`], [`plot`] | file formats, pictures |
 //! | [`cli`] | the program `wakescope` |
@@ -42,6 +43,7 @@
 //! PNG, the report page), `vtk` and `npz` (more formats for fields).
 
 pub mod export;
+pub mod flow;
 pub mod geometry;
 pub mod join;
 pub mod map;

@@ -220,3 +220,41 @@ fn screens_that_cannot_resolve_the_scene_are_refused_before_the_run() {
     assert!(check("cn2_m_m23 = 1e-13\n").contains("atmosphere.turbulence.layers = "), "thick layers are warned of");
     assert!(!check("cn2_m_m23 = 1e-13\nsampling = \"derived\"\n").contains("Rytov"));
 }
+
+#[test]
+fn a_flow_runs_pauses_and_continues_and_every_example_is_printed() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    let printed = wakescope(folder, &["flow", "--example", "taylor_green_plane"]);
+    let text = String::from_utf8(printed.stdout).unwrap();
+    assert!(printed.status.success() && text.contains("kind = \"taylor_green_plane\""));
+    let unknown = wakescope(folder, &["flow", "--example", "tornado"]);
+    assert!(!unknown.status.success() && String::from_utf8_lossy(&unknown.stderr).contains("vortex_pair"));
+    let small =
+        text.replace("cells = 64 ", "cells = 12 ").replace("end_s = 0.5", "end_s = 0.02\npause_after_steps = 4");
+    std::fs::write(folder.join("case.toml"), small.replace("every_s = 0.1\n", "")).unwrap();
+    let run = |words: &[&str]| {
+        let out = wakescope(folder, &[&["flow", "case.toml", "--out", "o", "--json"], words].concat());
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        serde_json::from_slice::<serde_json::Value>(&out.stdout).unwrap()
+    };
+    let paused = run(&["--threads", "2"]);
+    assert_eq!((paused["steps"].as_u64(), paused["is_complete"].as_bool()), (Some(4), Some(false)));
+    let text = std::fs::read_to_string(folder.join("case.toml")).unwrap();
+    std::fs::write(folder.join("case.toml"), text.replace("pause_after_steps = 4", "")).unwrap();
+    let again = wakescope(folder, &["flow", "case.toml", "--out", "o"]);
+    assert_eq!(again.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("--restart"));
+    let done = run(&["--restart", "--threads", "1"]);
+    assert_eq!((done["steps"].as_u64(), done["time_s"].as_f64()), (Some(10), Some(0.02)));
+    let files = names(&folder.join("o"));
+    assert!(files.contains(&"steps.csv".to_owned()) && files.contains(&"flow.checkpoint".to_owned()), "{files:?}");
+
+    // A flow that blows up: exit code, place, checkpoint.
+    let text = std::fs::read_to_string(folder.join("case.toml")).unwrap();
+    std::fs::write(folder.join("case.toml"), text.replace("step_s = 0.002", "step_s = 0.2").replace("0.02", "1.0"))
+        .unwrap();
+    let blown = wakescope(folder, &["flow", "case.toml", "--out", "p", "--quiet"]);
+    assert_eq!(blown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&blown.stderr).contains("Courant number"), "{blown:?}");
+}

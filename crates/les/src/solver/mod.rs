@@ -21,6 +21,7 @@ mod stage;
 mod subgrid;
 mod transport;
 
+pub use checkpoint::check_checkpoint;
 pub use flow::{Flow, StartReport, StepReport};
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
 pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};

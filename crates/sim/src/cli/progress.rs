@@ -1,9 +1,12 @@
 //! Progress bars with the time left, on standard error; nothing where that is no terminal.
 
+use crate::flow::Watch;
 use crate::plan::Stage;
 use crate::progress::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write as _;
 use std::sync::Mutex;
+use wakescope_les::StepRecord;
 
 /// One bar at a time, for the stage that runs.
 pub(super) struct Bars {
@@ -38,5 +41,40 @@ impl Observer for Bars {
 
     fn end(&self) {
         self.bar().finish();
+    }
+}
+
+/// Divisions of the bar of a flow.
+const FLOW_DIVISIONS: f64 = 10_000.0;
+
+/// The bar of a flow: share of the simulated time, the time left, where the flow is.
+pub(super) struct FlowBar(ProgressBar);
+
+impl FlowBar {
+    pub(super) fn new() -> Self {
+        let style = ProgressStyle::with_template("  flow [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left  {msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar())
+            .progress_chars("=> ");
+        Self(ProgressBar::new(FLOW_DIVISIONS as u64).with_style(style))
+    }
+}
+
+impl Watch for FlowBar {
+    fn step(&mut self, share: f64, record: &StepRecord) {
+        let r = &record.report;
+        self.0.set_message(format!("step {}, t = {:.4} s, Courant {:.2}", r.step, r.time_s, r.courant));
+        self.0.set_position((share * FLOW_DIVISIONS) as u64);
+    }
+
+    fn note(&mut self, text: &str) {
+        self.0.suspend(|| {
+            let _ = writeln!(std::io::stderr(), "note: {text}");
+        });
+    }
+}
+
+impl Drop for FlowBar {
+    fn drop(&mut self) {
+        self.0.abandon();
     }
 }

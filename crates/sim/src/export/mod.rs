@@ -6,16 +6,19 @@
 //! | module | writes | feature |
 //! |---|---|---|
 //! | [`map`] | (data) [`VelocityMap`], [`CrossPlanes`] | - |
+//! | [`fields`] | (data) [`VelocityField`] | - |
 //! | [`provenance`] | (data) where a file comes from | - |
 //! | [`csv`] | any table | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
-//! | `cfradial`, `cf_planes` (through `netcdf`) | classic NetCDF | `netcdf` |
+//! | `cfradial`, `cf_planes`, `cf_fields` (through `netcdf`) | classic NetCDF | `netcdf` |
 //! | `vtr` | VTK rectilinear grids and their collection | `vtk` |
 //! | `npz` | NumPy archive | `npz` |
 
 pub mod atomic;
+#[cfg(feature = "netcdf")]
+pub mod cf_fields;
 #[cfg(feature = "netcdf")]
 pub mod cf_planes;
 #[cfg(feature = "netcdf")]
@@ -24,6 +27,7 @@ pub mod cf_signals;
 pub mod cfradial;
 pub mod csv;
 mod error;
+pub mod fields;
 pub mod hpl;
 pub mod map;
 #[cfg(feature = "netcdf")]
@@ -41,6 +45,7 @@ pub use csv::Table;
 #[cfg(feature = "plots")]
 pub(crate) use error::same_length;
 pub use error::{OutputError, OutputResult};
+pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, FieldKind, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 pub use provenance::Provenance;
 

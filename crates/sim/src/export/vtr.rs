@@ -1,8 +1,10 @@
-//! Cross-planes of the wind as VTK rectilinear grids (`.vtr`, one per age) and their collection (`.pvd`), for ParaView and PyVista.
-//! Point vectors `velocity` = (u, v, w) in m/s with u = 0, on one x point; names in VTK carry no units.
+//! Cross-planes and whole fields as VTK rectilinear grids (`.vtr`, one per age) and their collection (`.pvd`), for ParaView and
+//! PyVista.
+//! Point vectors `velocity` = (u, v, w) in m/s, in planes with u = 0 on one x point; names in VTK carry no units.
 //! Check: a test reads the file back with the VTK parser.
 
 use super::error::{OutputError, OutputResult};
+use super::fields::VelocityField;
 use super::map::CrossPlanes;
 use super::provenance::Provenance;
 use vtkio::model::{
@@ -22,12 +24,47 @@ pub fn vtr_series(planes: &CrossPlanes, stem: &str, provenance: &Provenance) -> 
         files.push((name.clone(), plane_bytes(planes, i, provenance)?));
         entries += &format!("    <DataSet timestep=\"{tau:?}\" part=\"0\" file=\"{name}\"/>\n");
     }
-    let collection = format!(
+    files.push((format!("{stem}.pvd"), collection(&entries, provenance)));
+    Ok(files)
+}
+
+/// The collection of a series of files: members with their times, in this order.
+pub fn pvd_bytes<'a>(members: impl IntoIterator<Item = (f64, &'a str)>, provenance: &Provenance) -> Vec<u8> {
+    let entry =
+        |(time, name): (f64, &str)| format!("    <DataSet timestep=\"{time:?}\" part=\"0\" file=\"{name}\"/>\n");
+    let entries: String = members.into_iter().map(entry).collect();
+    collection(&entries, provenance)
+}
+
+fn collection(entries: &str, provenance: &Provenance) -> Vec<u8> {
+    format!(
         "<?xml version=\"1.0\"?>\n{}<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n{entries}  </Collection>\n</VTKFile>\n",
         comment(provenance)
-    );
-    files.push((format!("{stem}.pvd"), collection.into_bytes()));
-    Ok(files)
+    )
+    .into_bytes()
+}
+
+/// A whole field as a rectilinear grid with points at the centres: vectors `velocity` in m/s, scalars `pressure` in m^2/s^2.
+///
+/// # Errors
+/// What [`VelocityField::check`] finds, or a refusal of the encoder.
+pub fn field_bytes(field: &VelocityField, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    field.check()?;
+    let [u, v, w] = &field.velocity_m_s;
+    let velocity: Vec<f32> = u.iter().zip(v).zip(w).flat_map(|((u, v), w)| [*u as f32, *v as f32, *w as f32]).collect();
+    let pressure: Vec<f32> = field.pressure_m2_s2.iter().map(|p| *p as f32).collect();
+    let point =
+        vec![Attribute::vectors("velocity").with_data(velocity), Attribute::scalars("pressure", 1).with_data(pressure)];
+    grid_bytes(&field.title, [&field.x_m, &field.y_m, &field.z_m], point, provenance)
+}
+
+/// The first plane alone.
+///
+/// # Errors
+/// As [`vtr_series`].
+pub fn plane_file(planes: &CrossPlanes, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    planes.check()?;
+    plane_bytes(planes, 0, provenance)
 }
 
 fn plane_bytes(planes: &CrossPlanes, index: usize, provenance: &Provenance) -> OutputResult<Vec<u8>> {
@@ -40,15 +77,21 @@ fn plane_bytes(planes: &CrossPlanes, index: usize, provenance: &Provenance) -> O
             velocity.extend([0.0, planes.v_m_s[cell] as f32, planes.w_m_s[cell] as f32]);
         }
     }
-    let as_range = |n: usize| 0..=(n as i32 - 1);
+    let point = vec![Attribute::vectors("velocity").with_data(velocity)];
+    grid_bytes(&planes.title, [&[0.0], &planes.y_m, &planes.z_m], point, provenance)
+}
+
+fn grid_bytes(title: &str, axes: [&[f64]; 3], point: Vec<Attribute>, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    let [x, y, z] = axes.map(<[f64]>::to_vec);
+    let range = |axis: &[f64]| 0..=(axis.len() as i32 - 1);
     let grid = RectilinearGridPiece {
-        extent: Extent::Ranges([0..=0, as_range(ny), as_range(nz)]),
-        coords: Coordinates { x: vec![0.0_f64].into(), y: planes.y_m.clone().into(), z: planes.z_m.clone().into() },
-        data: Attributes { point: vec![Attribute::vectors("velocity").with_data(velocity)], cell: vec![] },
+        extent: Extent::Ranges([range(&x), range(&y), range(&z)]),
+        coords: Coordinates { x: x.into(), y: y.into(), z: z.into() },
+        data: Attributes { point, cell: vec![] },
     };
     let file = Vtk {
         version: Version::new((1, 0)),
-        title: planes.title.clone(),
+        title: title.to_owned(),
         byte_order: ByteOrder::LittleEndian,
         data: DataSet::inline(grid),
         file_path: None,
@@ -105,5 +148,20 @@ mod tests {
             let text = String::from_utf8_lossy(bytes);
             assert!(text.contains("18446744073709551615"), "seed in every file");
         }
+    }
+
+    #[test]
+    fn a_whole_field_reads_back_with_x_fastest() {
+        let field = super::super::fields::example();
+        let vtk = Vtk::parse_xml(field_bytes(&field, &example()).unwrap().as_slice()).unwrap();
+        let DataSet::RectilinearGrid { pieces, .. } = vtk.data else { panic!("no rectilinear grid") };
+        let Piece::Inline(grid) = &pieces[0] else { panic!("no inline piece") };
+        assert_eq!(grid.coords.x.clone().cast_into::<f64>().unwrap(), field.x_m);
+        let Attribute::DataArray(array) = &grid.data.point[0] else { panic!("no point data") };
+        let velocity = array.data.clone().cast_into::<f32>().unwrap();
+        let place = (3 * field.y_m.len() + 1) * field.x_m.len() + 2;
+        assert_eq!(velocity[3 * place..][..3], field.velocity_m_s.each_ref().map(|u| u[place] as f32));
+        let pvd = String::from_utf8(pvd_bytes([(0.5, "a.vtr"), (1.0, "b.vtr")], &example())).unwrap();
+        assert!(pvd.contains("timestep=\"0.5\" part=\"0\" file=\"a.vtr\""));
     }
 }

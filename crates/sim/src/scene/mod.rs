@@ -16,6 +16,7 @@ macro_rules! section {
         }
     };
 }
+pub(crate) use section;
 
 mod atmosphere;
 mod check;
@@ -28,6 +29,7 @@ pub use atmosphere::{
 pub use check::Problem;
 pub use flow::{Flow, VortexMotion, VortexPair, VortexProfile};
 pub use read::{Located, SceneError, SceneFile};
+pub(crate) use read::{invalid, malformed};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

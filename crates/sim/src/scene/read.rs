@@ -85,14 +85,7 @@ impl SceneFile {
     /// As [`SceneFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
         let scene: Scene = toml::from_str(text).map_err(|e| malformed(text, path, &e))?;
-        Self::new(scene).map_err(|problems| {
-            let document = DeTable::parse(text).ok();
-            let locate = |problem: Problem| {
-                let line = document.as_ref().and_then(|d| find(d.get_ref(), &problem.key)).map(|at| line_of(text, at));
-                Located { problem, line }
-            };
-            SceneError::Invalid { path: path.to_owned(), problems: problems.into_iter().map(locate).collect() }
-        })
+        Self::new(scene).map_err(|problems| invalid(text, path, problems))
     }
 
     /// Checks a scene that was made in memory.
@@ -110,7 +103,18 @@ impl SceneFile {
     }
 }
 
-fn malformed(text: &str, path: &Path, error: &toml::de::Error) -> SceneError {
+/// Problems with the lines where the text states their keys.
+pub(crate) fn invalid(text: &str, path: &Path, problems: Vec<Problem>) -> SceneError {
+    let document = DeTable::parse(text).ok();
+    let locate = |problem: Problem| {
+        let line = document.as_ref().and_then(|d| find(d.get_ref(), &problem.key)).map(|at| line_of(text, at));
+        Located { problem, line }
+    };
+    SceneError::Invalid { path: path.to_owned(), problems: problems.into_iter().map(locate).collect() }
+}
+
+/// What the parser of TOML refused, with its line.
+pub(crate) fn malformed(text: &str, path: &Path, error: &toml::de::Error) -> SceneError {
     let message = error.message().replace('\n', " ");
     let span = error.span().unwrap_or(0..0);
     // In a section that is chosen by a tag, the parser knows only where the section begins.

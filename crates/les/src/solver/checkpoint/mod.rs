@@ -97,6 +97,14 @@ impl Flow {
     }
 }
 
+/// Whether a file is a whole checkpoint that this program can read; whether it fits a mesh, [`Flow::restore`] says.
+///
+/// # Errors
+/// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`], [`Error::CheckpointDamaged`].
+pub fn check_checkpoint(path: impl AsRef<Path>) -> Result<(), Error> {
+    Reader::open(path.as_ref(), VERSION).map(drop)
+}
+
 /// What a checkpoint and its continuation must have in common, as names and values.
 fn identity(mesh: &Mesh, settings: &FlowSettings, layout: &Layout) -> Vec<(String, String)> {
     let mut list = Vec::new();

@@ -1,0 +1,72 @@
+//! `wakescope flow`: simulations from case files.
+
+use super::{Cli, progress, say, with_threads};
+use crate::Error;
+use crate::flow::{Begin, CaseFile, EXAMPLES, Unwatched, Watch, example, run};
+use clap::Args;
+use serde_json::json;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Words of `wakescope flow`.
+#[derive(Debug, Args)]
+pub(super) struct FlowWords {
+    /// The case file; --example prints one.
+    #[arg(required_unless_present = "example")]
+    case: Option<PathBuf>,
+    /// Folder to write to; made if it does not exist.
+    #[arg(long, value_name = "DIR", required_unless_present = "example")]
+    out: Option<PathBuf>,
+    /// Continue from the checkpoint in the folder.
+    #[arg(long, conflicts_with = "overwrite")]
+    restart: bool,
+    /// Begin anew although the folder holds a checkpoint.
+    #[arg(long)]
+    overwrite: bool,
+    /// Print a commented case file and do nothing else.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "out"], value_parser = EXAMPLES.map(|(name, _)| name))]
+    example: Option<String>,
+}
+
+pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
+    if let Some(text) = words.example.as_deref().and_then(example) {
+        let _ = std::io::stdout().lock().write_all(text.as_bytes());
+        return Ok(());
+    }
+    // The words were checked: without an example both are there.
+    let (Some(case), Some(out)) = (&words.case, &words.out) else { return Ok(()) };
+    let file = CaseFile::read(case)?;
+    let begin = match (words.restart, words.overwrite) {
+        (true, _) => Begin::Restart,
+        (_, true) => Begin::Overwrite,
+        _ => Begin::New,
+    };
+    let outcome = with_threads(cli, || {
+        let mut unwatched = Unwatched;
+        let mut bar;
+        let watch: &mut dyn Watch = if cli.quiet {
+            &mut unwatched
+        } else {
+            bar = progress::FlowBar::new();
+            &mut bar
+        };
+        run(&file, out, begin, watch)
+    })??;
+    let object = json!({
+        "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
+        "is_complete": outcome.is_complete, "kinetic_energy_m5_s2": outcome.kinetic_energy_m5_s2,
+        "relative_divergence": outcome.relative_divergence, "files": outcome.files, "warnings": outcome.warnings,
+    });
+    let state = if outcome.is_complete { "done" } else { "paused, --restart continues it" };
+    let text = format!(
+        "{state}: step {}, t = {} s, energy {:.6e} m^5/s^2, relative divergence {:.1e}\nwrote {} files to {}",
+        outcome.steps,
+        outcome.time_s,
+        outcome.kinetic_energy_m5_s2,
+        outcome.relative_divergence,
+        outcome.files.len(),
+        out.display()
+    );
+    say(cli, object, &text);
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! Whole velocity fields as CF NetCDF (classic): at the centres over (time, z, y, x), or each component on its own faces in
+//! full precision, from which a run can start. One file for each time: `xarray.concat` or `open_mfdataset` joins them.
+//! Check: the tests read the bytes back and compare axes and values.
+
+use super::error::{OutputResult, same_length};
+use super::fields::VelocityField;
+use super::netcdf::{Attr, Data, FILL, Layout, Variable};
+use super::provenance::Provenance;
+
+/// The field at the centres as the bytes of a file.
+///
+/// # Errors
+/// What [`VelocityField::check`] finds, or a result too large for one file.
+pub fn cf_field_bytes(field: &VelocityField, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    field.check()?;
+    const DIMS: &[&str] = &["time", "z", "y", "x"];
+    let [u, v, w] = &field.velocity_m_s;
+    let data = |name: &str, values: &[f64], units: &str, long_name: &str| {
+        Variable::new(name, DIMS, Data::filled(values))
+            .text("long_name", long_name)
+            .text("units", units)
+            .attr("_FillValue", Attr::F32(FILL))
+    };
+    let variables = vec![
+        Variable::new("time", &["time"], Data::F64(vec![field.time_s]))
+            .text("long_name", "time since the start of the flow")
+            .text("units", "s"),
+        axis("z", &["z"], &field.z_m, "height of the cell centre above the ground").text("positive", "up"),
+        axis("y", &["y"], &field.y_m, "position of the cell centre across the flight direction"),
+        axis("x", &["x"], &field.x_m, "position of the cell centre along the flight direction"),
+        data("u", u, "m s-1", "wind along the flight direction"),
+        data("v", v, "m s-1", "horizontal wind across the flight direction"),
+        data("w", w, "m s-1", "vertical wind").text("standard_name", "upward_air_velocity"),
+        data("pressure", &field.pressure_m2_s2, "m2 s-2", "pressure over density, up to a constant"),
+    ];
+    let dims = vec![("time", 1), ("z", field.z_m.len()), ("y", field.y_m.len()), ("x", field.x_m.len())];
+    file(&field.title, dims, variables, provenance)
+}
+
+/// Velocity components at the low faces of the cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FaceVelocities {
+    /// Title of the file.
+    pub title: String,
+    /// Time, s.
+    pub time_s: f64,
+    /// Centres of the cells along x, y, z, m.
+    pub centre_m: [Vec<f64>; 3],
+    /// Their low faces along x, y, z, m.
+    pub face_m: [Vec<f64>; 3],
+    /// Velocities u, v, w, each `[z][y][x]`, m/s.
+    pub velocity_m_s: [Vec<f64>; 3],
+}
+
+/// The components on their own faces as the bytes of a file.
+///
+/// # Errors
+/// An array of another length than its axes, or a result too large for one file.
+pub fn cf_faces_bytes(faces: &FaceVelocities, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    const NAMES: [(&str, &[&str], &str, &[&str]); 3] = [
+        ("x", &["x"], "x_face", &["x_face"]),
+        ("y", &["y"], "y_face", &["y_face"]),
+        ("z", &["z"], "z_face", &["z_face"]),
+    ];
+    const DIMS: [&[&str]; 3] = [&["z", "y", "x_face"], &["z", "y_face", "x"], &["z_face", "y", "x"]];
+    let mut dims = Vec::new();
+    let mut variables = vec![
+        Variable::new("time", &[], Data::F64(vec![faces.time_s]))
+            .text("long_name", "time since the start of the flow")
+            .text("units", "s"),
+    ];
+    for (d, (name, own, face, own_face)) in NAMES.into_iter().enumerate() {
+        same_length(face, faces.face_m[d].len(), name, faces.centre_m[d].len())?;
+        dims.extend([(name, faces.centre_m[d].len()), (face, faces.face_m[d].len())]);
+        variables.push(axis(name, own, &faces.centre_m[d], "cell centre"));
+        variables.push(axis(face, own_face, &faces.face_m[d], "low face of the cell"));
+    }
+    for (d, (name, values)) in ["u", "v", "w"].into_iter().zip(&faces.velocity_m_s).enumerate() {
+        let variable = Variable::new(name, DIMS[d], Data::F64(values.clone()))
+            .text("long_name", ["wind along the flight direction", "horizontal wind across it", "vertical wind"][d])
+            .text("units", "m s-1");
+        variables.push(variable);
+    }
+    file(&faces.title, dims, variables, provenance)
+}
+
+fn axis(name: &str, dims: &'static [&'static str], values: &[f64], long_name: &str) -> Variable {
+    let letter = if name.starts_with('x') {
+        "X"
+    } else if name.starts_with('y') {
+        "Y"
+    } else {
+        "Z"
+    };
+    let variable = Variable::new(name, dims, Data::F64(values.to_vec()))
+        .text("long_name", long_name)
+        .text("units", "m")
+        .text("axis", letter);
+    if name == "z" { variable.text("standard_name", "height") } else { variable }
+}
+
+fn file(
+    title: &str,
+    dims: Vec<(&'static str, usize)>,
+    variables: Vec<Variable>,
+    provenance: &Provenance,
+) -> OutputResult<Vec<u8>> {
+    let globals = vec![
+        ("Conventions", "CF-1.10".into()),
+        ("title", title.to_owned()),
+        ("history", format!("written by {}", provenance.program)),
+    ];
+    Layout { dims, globals, variables }.to_bytes(provenance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fields;
+    use super::super::provenance::example;
+    use super::*;
+    use netcdf3::FileReader;
+
+    fn open(bytes: Vec<u8>) -> (tempfile::TempDir, FileReader) {
+        let temp = tempfile::tempdir().unwrap();
+        let path = temp.path().join("field.nc");
+        std::fs::write(&path, bytes).unwrap();
+        let file = FileReader::open(&path).unwrap();
+        (temp, file)
+    }
+
+    #[test]
+    fn a_field_at_the_centres_reads_back() {
+        let field = fields::example();
+        let (_temp, mut file) = open(cf_field_bytes(&field, &example()).unwrap());
+        assert_eq!(file.read_var_f64("x").unwrap(), field.x_m);
+        assert_eq!(file.read_var_f64("z").unwrap(), field.z_m);
+        assert_eq!(file.read_var_f64("time").unwrap(), [2.5]);
+        assert_eq!(file.data_set().get_var("w").unwrap().dim_names(), ["time", "z", "y", "x"]);
+        let expected: Vec<f32> = field.velocity_m_s[2].iter().map(|v| *v as f32).collect();
+        assert_eq!(file.read_var_f32("w").unwrap(), expected);
+        assert_eq!(file.data_set().get_global_attr_as_string("scene").unwrap(), example().scene_toml);
+    }
+
+    #[test]
+    fn components_on_their_faces_read_back_in_full_precision() {
+        let field = fields::example();
+        let centre_m = [field.x_m.clone(), field.y_m.clone(), field.z_m.clone()];
+        let face_m = centre_m.clone().map(|axis| axis.iter().map(|a| a - 0.05).collect::<Vec<f64>>());
+        let mut velocity_m_s = field.velocity_m_s.clone();
+        velocity_m_s[0][5] = 1.0 / 3.0;
+        let faces = FaceVelocities { title: "A".into(), time_s: 2.5, centre_m, face_m, velocity_m_s };
+        let (_temp, mut file) = open(cf_faces_bytes(&faces, &example()).unwrap());
+        assert_eq!(file.data_set().get_var("v").unwrap().dim_names(), ["z", "y_face", "x"]);
+        assert_eq!(file.read_var_f64("u").unwrap(), faces.velocity_m_s[0]);
+        assert_eq!(file.read_var_f64("y_face").unwrap(), faces.face_m[1]);
+        let mut short = faces;
+        short.velocity_m_s[2].pop();
+        assert!(cf_faces_bytes(&short, &example()).is_err());
+    }
+}

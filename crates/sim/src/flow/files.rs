@@ -1,0 +1,153 @@
+//! What a run writes at its output times: whole fields, planes, initial fields, collections.
+
+use super::case::{FileFormat, Output};
+use crate::Error;
+use crate::export::{CrossPlanes, FileGroup, Provenance, VelocityField, tables};
+use ndarray::Array3;
+use std::path::{Path, PathBuf};
+use wakescope_les::Flow;
+
+/// The plan of the files.
+#[derive(Debug)]
+pub(super) struct Files {
+    pub(super) folder: PathBuf,
+    pub(super) output: Output,
+    pub(super) origin: Provenance,
+    #[cfg(feature = "vtk")]
+    pub(super) times_s: Vec<f64>,
+    /// Age of the wake per time \[1/s\].
+    pub(super) tau_per_s: f64,
+    pub(super) title: String,
+}
+
+impl Files {
+    /// Writes all files of output `index`, or none of them; returns their paths.
+    pub(super) fn write(&self, flow: &Flow, index: usize) -> Result<Vec<PathBuf>, Error> {
+        let mut group = FileGroup::new(&self.folder);
+        self.add_fields(&mut group, flow, index)?;
+        for (number, &x_m) in self.output.planes_x_m.iter().enumerate() {
+            self.add_plane(&mut group, flow, index, &format!("plane{}", number + 1), x_m)?;
+        }
+        Ok(group.commit()?)
+    }
+
+    fn add_fields(&self, group: &mut FileGroup, flow: &Flow, index: usize) -> Result<(), Error> {
+        let name = |extension: &str| format!("fields_{:04}.{extension}", index + 1);
+        let formats = &self.output.fields;
+        if formats.iter().any(|format| *format != FileFormat::InitialNetcdf) {
+            let field = self.field(flow);
+            for format in formats {
+                match format {
+                    FileFormat::Csv => group.add(&name("csv"), field.table()?.to_csv(&self.origin)?)?,
+                    #[cfg(feature = "netcdf")]
+                    FileFormat::Netcdf => {
+                        group.add(&name("nc"), crate::export::cf_fields::cf_field_bytes(&field, &self.origin)?)?;
+                    }
+                    #[cfg(feature = "vtk")]
+                    FileFormat::Vtr => {
+                        group.add(&name("vtr"), crate::export::vtr::field_bytes(&field, &self.origin)?)?;
+                        group.add("fields.pvd", self.collection("fields", index, 1.0))?;
+                    }
+                    // A case that names a format which this build lacks was refused.
+                    _ => {}
+                }
+            }
+        }
+        #[cfg(feature = "netcdf")]
+        if formats.contains(&FileFormat::InitialNetcdf) {
+            let bytes = crate::export::cf_fields::cf_faces_bytes(&self.faces(flow), &self.origin)?;
+            group.add(&format!("initial_{:04}.nc", index + 1), bytes)?;
+        }
+        Ok(())
+    }
+
+    fn add_plane(&self, group: &mut FileGroup, flow: &Flow, index: usize, stem: &str, x_m: f64) -> Result<(), Error> {
+        let plane = self.plane(flow, x_m)?;
+        for format in &self.output.planes {
+            match format {
+                FileFormat::Csv => {
+                    let table = tables::planes_table(&plane)?.to_csv(&self.origin)?;
+                    group.add(&format!("{stem}_{:04}.csv", index + 1), table)?;
+                }
+                #[cfg(feature = "netcdf")]
+                FileFormat::Netcdf => {
+                    let bytes = crate::export::cf_planes::cf_planes_bytes(&plane, &self.origin)?;
+                    group.add(&format!("{stem}_{:04}.nc", index + 1), bytes)?;
+                }
+                #[cfg(feature = "vtk")]
+                FileFormat::Vtr => {
+                    let bytes = crate::export::vtr::plane_file(&plane, &self.origin)?;
+                    group.add(&format!("{stem}_{:04}.vtr", index + 1), bytes)?;
+                    group.add(&format!("{stem}.pvd"), self.collection(stem, index, self.tau_per_s))?;
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The collection of all outputs up to this one.
+    #[cfg(feature = "vtk")]
+    fn collection(&self, stem: &str, index: usize, per_s: f64) -> Vec<u8> {
+        let names: Vec<String> = (0..=index).map(|i| format!("{stem}_{:04}.vtr", i + 1)).collect();
+        let members = self.times_s.iter().map(|t| t * per_s).zip(names.iter().map(String::as_str));
+        crate::export::vtr::pvd_bytes(members, &self.origin)
+    }
+
+    fn field(&self, flow: &Flow) -> VelocityField {
+        let mesh = flow.mesh();
+        VelocityField {
+            title: self.title.clone(),
+            time_s: flow.time_s(),
+            x_m: mesh.centre_m(0),
+            y_m: mesh.centre_m(1),
+            z_m: mesh.centre_m(2),
+            velocity_m_s: [0, 1, 2].map(|axis| flow.centre_velocity_m_s(axis)),
+            pressure_m2_s2: flow.pressure_m2_s2(),
+        }
+    }
+
+    #[cfg(feature = "netcdf")]
+    fn faces(&self, flow: &Flow) -> crate::export::cf_fields::FaceVelocities {
+        let mesh = flow.mesh();
+        crate::export::cf_fields::FaceVelocities {
+            title: self.title.clone(),
+            time_s: flow.time_s(),
+            centre_m: [0, 1, 2].map(|axis| mesh.centre_m(axis)),
+            face_m: [0, 1, 2].map(|axis| {
+                let mut faces_m = mesh.face_m(axis);
+                faces_m.pop();
+                faces_m
+            }),
+            velocity_m_s: [0, 1, 2].map(|axis| flow.face_velocity_m_s(axis)),
+        }
+    }
+
+    fn plane(&self, flow: &Flow, x_m: f64) -> Result<CrossPlanes, Error> {
+        let plane = flow.cross_plane(x_m).map_err(Error::Flow)?;
+        let shape = (1, plane.z_m.len(), plane.y_m.len());
+        let component = |c: usize| {
+            let values = plane.velocity_m_s.iter().map(|v| v[c]).collect();
+            Array3::from_shape_vec(shape, values).unwrap_or_else(|_| Array3::zeros(shape))
+        };
+        Ok(CrossPlanes {
+            title: format!("{}, plane at x = {x_m} m", self.title),
+            tau: vec![flow.time_s() * self.tau_per_s],
+            time_s: vec![flow.time_s()],
+            v_m_s: component(1),
+            w_m_s: component(2),
+            y_m: plane.y_m,
+            z_m: plane.z_m,
+        })
+    }
+
+    /// The table of the steps.
+    pub(super) fn steps_path(&self) -> PathBuf {
+        self.folder.join("steps.csv")
+    }
+}
+
+/// The checkpoint of a run in `folder`, and the one before it.
+pub(super) fn checkpoint_paths(folder: &Path) -> [PathBuf; 2] {
+    [folder.join("flow.checkpoint"), folder.join("flow.checkpoint.previous")]
+}

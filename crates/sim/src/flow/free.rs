@@ -1,0 +1,270 @@
+//! A flow of one's own: mesh, walls, viscosity and initial field, in SI units.
+
+use super::case::Problems;
+use super::setup::{Initial, Setup};
+use crate::scene::{VortexProfile, section};
+use crate::{Error, join};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use wakescope_les::{
+    Direction, Ends, FlowSettings, Ground, Mapping, Mesh, Motion, TimeScheme, TimeStep, VortexPair, Wall, Wind,
+};
+
+/// How the cells of a direction are spread.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MappingName {
+    /// Equal cells.
+    Uniform,
+    /// Finer and coarser by a sine; `stretch` is its amplitude, -1 to 1.
+    Sine,
+    /// Fine at the low end.
+    TanhLow,
+    /// Fine at the high end.
+    TanhHigh,
+    /// Fine at both ends.
+    TanhBoth,
+    /// Fine in the middle.
+    SinhMiddle,
+}
+
+/// What bounds a direction at one end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EndName {
+    /// The flow repeats itself; both ends must say so.
+    Periodic,
+    /// A frictionless plane.
+    Slip,
+    /// A wall to which the air sticks.
+    NoSlip,
+}
+
+section! {
+    /// One direction of the mesh.
+    #[derive(Copy)]
+    Axis {
+        /// Number of cells; 1 if nothing varies.
+        cells: usize = 1,
+        /// Position of the low end \[m\].
+        low_m: f64 = 0.0,
+        /// Position of the high end \[m\].
+        high_m: f64 = 1.0,
+        /// How the cells are spread.
+        mapping: MappingName = MappingName::Uniform,
+        /// Strength of the mapping, or amplitude of the sine.
+        stretch: f64 = 0.0,
+        /// What bounds it at the low end.
+        low_end: EndName = EndName::Periodic,
+        /// What bounds it at the high end.
+        high_end: EndName = EndName::Periodic,
+        /// Velocity `(u, v, w)` of a no-slip wall at the low end \[m/s\].
+        low_velocity_m_s: [f64; 3] = [0.0; 3],
+        /// Velocity of a no-slip wall at the high end \[m/s\].
+        high_velocity_m_s: [f64; 3] = [0.0; 3],
+    }
+}
+
+/// The field that the flow starts from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum InitialName {
+    /// The same velocity everywhere.
+    Uniform {
+        /// Velocity `(u, v, w)` \[m/s\].
+        velocity_m_s: [f64; 3],
+    },
+    /// The analytic vortex pair with its images below the ground.
+    VortexPair(InitialPair),
+    /// Velocities `u`, `v`, `w` of a classic NetCDF file, each on its own axes, which need not be those of the mesh.
+    Netcdf {
+        /// The file; a relative path counts from the case file.
+        path: String,
+    },
+}
+
+section! {
+    /// A vortex pair in still air or a cross wind.
+    #[derive(Copy)]
+    InitialPair {
+        /// Circulation of each vortex \[m^2/s\].
+        circulation_m2_s: f64 = 500.0,
+        /// Distance between the vortices \[m\].
+        spacing_m: f64 = 47.0,
+        /// Core radius \[m\].
+        core_radius_m: f64 = 4.7,
+        /// Position of the midpoint of the pair \[m\].
+        lateral_position_m: f64 = 0.0,
+        /// Height \[m\].
+        height_m: f64 = 47.0,
+        /// Circulation against radius.
+        profile: VortexProfile = VortexProfile::Algebraic,
+        /// Uniform cross wind \[m/s\].
+        cross_wind_m_s: f64 = 0.0,
+    }
+}
+
+section! {
+    /// A flow of one's own.
+    Free {
+        /// Direction x, along the flight.
+        x: Axis = Axis::default(),
+        /// Direction y, across it.
+        y: Axis = Axis { cells: 64, low_m: -100.0, high_m: 100.0, ..Axis::default() },
+        /// Direction z, up.
+        z: Axis = Axis {
+            cells: 48, high_m: 120.0, low_end: EndName::NoSlip, high_end: EndName::Slip, ..Axis::default()
+        },
+        /// Kinematic viscosity \[m^2/s\].
+        viscosity_m2_s: f64 = 0.1,
+        /// Body force per mass along x, y, z \[m/s^2\].
+        force_m_s2: [f64; 3] = [0.0; 3],
+        /// The field that the flow starts from.
+        initial: InitialName = InitialName::VortexPair(InitialPair::default()),
+    }
+}
+
+impl Axis {
+    fn check(&self, name: &str, p: &mut Problems) {
+        let key = |field: &str| format!("case.{name}.{field}");
+        p.cells(&key("cells"), &[self.cells]);
+        let ordered = self.low_m.is_finite() && self.high_m.is_finite() && self.high_m > self.low_m;
+        p.require(ordered, &key("high_m"), self.high_m, "finite, above low_m");
+        match self.mapping {
+            MappingName::Uniform => {
+                p.require(self.stretch == 0.0, &key("stretch"), self.stretch, "0 for equal cells; name a mapping");
+            }
+            MappingName::Sine => {
+                p.require(self.stretch.abs() < 1.0, &key("stretch"), self.stretch, "between -1 and 1 for a sine");
+            }
+            _ => p.require(
+                self.stretch > 0.0 && self.stretch <= 20.0,
+                &key("stretch"),
+                self.stretch,
+                "above 0 and at most 20 for this mapping",
+            ),
+        }
+        let periodic = [self.low_end, self.high_end].map(|end| end == EndName::Periodic);
+        p.require(periodic[0] == periodic[1], &key("high_end"), self.high_end, "periodic at both ends or at none");
+        for (field, end, velocity) in [
+            ("low_velocity_m_s", self.low_end, self.low_velocity_m_s),
+            ("high_velocity_m_s", self.high_end, self.high_velocity_m_s),
+        ] {
+            let ok = velocity.iter().all(|v| v.is_finite()) && (end == EndName::NoSlip || velocity == [0.0; 3]);
+            p.require(ok, &key(field), velocity, "finite, and 0 where there is no no-slip wall");
+        }
+    }
+
+    fn direction(&self) -> Direction {
+        let strength = self.stretch;
+        let wall = |end: EndName, velocity_m_s: [f64; 3]| match end {
+            EndName::NoSlip => Wall::NoSlip { velocity_m_s },
+            EndName::Slip | EndName::Periodic => Wall::Slip,
+        };
+        Direction {
+            cells: self.cells,
+            low_m: self.low_m,
+            high_m: self.high_m,
+            mapping: match self.mapping {
+                MappingName::Uniform => Mapping::Uniform,
+                MappingName::Sine => Mapping::Sine { amplitude: strength },
+                MappingName::TanhLow => Mapping::TanhLow { strength },
+                MappingName::TanhHigh => Mapping::TanhHigh { strength },
+                MappingName::TanhBoth => Mapping::TanhBoth { strength },
+                MappingName::SinhMiddle => Mapping::SinhMiddle { strength },
+            },
+            ends: match self.low_end {
+                EndName::Periodic => Ends::Periodic,
+                _ => Ends::Walls {
+                    low: wall(self.low_end, self.low_velocity_m_s),
+                    high: wall(self.high_end, self.high_velocity_m_s),
+                },
+            },
+        }
+    }
+}
+
+impl Free {
+    pub(super) fn check(&self, p: &mut Problems) {
+        for (name, axis) in [("x", self.x), ("y", self.y), ("z", self.z)] {
+            axis.check(name, p);
+        }
+        p.not_negative("case.viscosity_m2_s", self.viscosity_m2_s);
+        p.require(self.force_m_s2.iter().all(|f| f.is_finite()), "case.force_m_s2", self.force_m_s2, "finite");
+        match &self.initial {
+            InitialName::Uniform { velocity_m_s: v } => {
+                p.require(v.iter().all(|v| v.is_finite()), "case.initial.velocity_m_s", v, "finite");
+            }
+            InitialName::VortexPair(pair) => {
+                p.positive("case.initial.circulation_m2_s", pair.circulation_m2_s);
+                p.positive("case.initial.spacing_m", pair.spacing_m);
+                p.positive("case.initial.core_radius_m", pair.core_radius_m);
+                p.positive("case.initial.height_m", pair.height_m);
+                let [y, wind] = [pair.lateral_position_m, pair.cross_wind_m_s];
+                p.require(y.is_finite(), "case.initial.lateral_position_m", y, "finite");
+                p.require(wind.is_finite(), "case.initial.cross_wind_m_s", wind, "finite");
+            }
+            InitialName::Netcdf { path } => {
+                let ok = cfg!(feature = "netcdf");
+                p.require(ok, "case.initial.path", path, "absent: this build lacks the feature `netcdf`");
+            }
+        }
+    }
+
+    pub(super) fn setup(&self, folder: &Path) -> Result<Setup, Error> {
+        let mesh = Mesh::new(self.x.direction(), self.y.direction(), self.z.direction()).map_err(Error::Flow)?;
+        let (initial, tau_per_s) = self.initial(&mesh, folder)?;
+        // Without an end of its own a case needs one from its file, and so has no longest step of its own.
+        let courant = TimeScheme::AdamsBashforth2.default_courant();
+        let longest_s = f64::MAX;
+        let mut settings = FlowSettings::new(self.viscosity_m2_s, TimeStep::Courant { courant, longest_s });
+        settings.force_m_s2 = self.force_m_s2;
+        Ok(Setup { mesh, settings, initial, end_s: None, tau_per_s })
+    }
+
+    fn initial(&self, mesh: &Mesh, folder: &Path) -> Result<(Initial, f64), Error> {
+        match &self.initial {
+            &InitialName::Uniform { velocity_m_s } => Ok((Initial::Field(Box::new(move |_| velocity_m_s)), 1.0)),
+            InitialName::VortexPair(pair) => {
+                let speed_m_s = pair.circulation_m2_s / (std::f64::consts::TAU * pair.spacing_m);
+                Ok((pair.field()?, speed_m_s / pair.spacing_m))
+            }
+            InitialName::Netcdf { path } => Ok((from_file(&folder.join(path), mesh)?, 1.0)),
+        }
+    }
+}
+
+#[cfg(feature = "netcdf")]
+fn from_file(path: &Path, mesh: &Mesh) -> Result<Initial, Error> {
+    super::initial_file::read(path, mesh).map(Initial::Faces)
+}
+
+#[cfg(not(feature = "netcdf"))]
+fn from_file(path: &Path, _: &Mesh) -> Result<Initial, Error> {
+    // A checked case does not come here.
+    Err(Error::Input { path: path.to_owned(), reason: "NetCDF needs a build with the feature `netcdf`".into() })
+}
+
+impl InitialPair {
+    fn field(&self) -> Result<Initial, Error> {
+        let pair = VortexPair {
+            circulation_m2_s: self.circulation_m2_s,
+            spacing_m: self.spacing_m,
+            core_radius_m: self.core_radius_m,
+            lateral_position_m: self.lateral_position_m,
+            height_m: self.height_m,
+            ground: Ground::Image,
+            profile: join::circulation_profile(self.profile),
+            motion: Motion::Frozen,
+        };
+        let (wind, cross_m_s) = (pair.wind().map_err(Error::Flow)?, self.cross_wind_m_s);
+        Ok(Initial::Field(Box::new(move |at_m| {
+            let mut velocity = [[0.0; 3]];
+            // One point and one place for it: what could be refused would show as a field that is not finite.
+            match wind.velocity_into(&[at_m], 0.0, &mut velocity) {
+                Ok(()) => [velocity[0][0], velocity[0][1] + cross_m_s, velocity[0][2]],
+                Err(_) => [f64::NAN; 3],
+            }
+        })))
+    }
+}

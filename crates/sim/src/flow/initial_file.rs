@@ -1,0 +1,178 @@
+//! An initial field from a classic NetCDF file, on axes of its own.
+//!
+//! The file has variables `u`, `v`, `w` in m/s, each over three dimensions, slowest first along z, y, x, with a coordinate
+//! variable for each dimension in metres. Along each direction the values are brought to the faces or centres of the mesh by
+//! the cubic through the four nearest nodes, which gives a value at its own node back exactly; periodic directions wrap.
+//!
+//! Check: a field written by a run reads back to the same values; a smooth field on another mesh with fourth order.
+
+use crate::Error;
+use netcdf3::{DataVector, FileReader};
+use std::path::Path;
+use wakescope_les::{Direction, Ends, Mesh};
+
+/// A node of the target takes its value from these nodes of the source.
+type Taps = Vec<(usize, f64)>;
+
+/// Velocities along x, y, z at the low faces of the cells of `mesh`, `[z][y][x]` \[m/s\].
+///
+/// # Errors
+/// A file that cannot be read, without the variables, or that does not cover the mesh.
+pub(super) fn read(path: &Path, mesh: &Mesh) -> Result<[Vec<f64>; 3], Error> {
+    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+    if let Err(source) = std::fs::metadata(path) {
+        return Err(Error::Io { action: "read", path: path.to_owned(), source });
+    }
+    let mut file = FileReader::open(path).map_err(|e| {
+        refuse(format!("no classic NetCDF file ({e:?}); from xarray, save with format=\"NETCDF3_64BIT\""))
+    })?;
+    let mut component = |axis: usize| -> Result<Vec<f64>, String> {
+        let name = ["u", "v", "w"][axis];
+        let dims = match file.data_set().get_var(name) {
+            Some(variable) => variable.dim_names(),
+            None => return Err(format!("it has no variable {name}: u, v and w are needed")),
+        };
+        let [z, y, x] = &dims[..] else {
+            return Err(format!("{name} has the dimensions {dims:?}: three are needed, along z, y, x"));
+        };
+        let mut values = floats(&mut file, name)?;
+        let mut shape = [0; 3];
+        // x is the fastest: direction 0 is the last dimension.
+        for (direction, dim) in [x, y, z].into_iter().enumerate() {
+            let coordinate_m = floats(&mut file, dim)?;
+            shape[direction] = coordinate_m.len();
+            let target_m = if direction == axis { mesh.face_m(direction) } else { mesh.centre_m(direction) };
+            let along = &mesh.directions()[direction];
+            let taps = taps(&coordinate_m, &target_m[..along.cells], along).map_err(|e| format!("{dim}: {e}"))?;
+            let count: usize = values.len() / coordinate_m.len().max(1);
+            let inner = shape[..direction].iter().product();
+            if count * coordinate_m.len() != values.len() {
+                return Err(format!("{name} is not of the size of its dimensions"));
+            }
+            values = apply(&taps, &values, inner, coordinate_m.len());
+            shape[direction] = along.cells;
+        }
+        match values.iter().position(|v| !v.is_finite()) {
+            Some(place) => Err(format!("{name} is missing or not finite at the mesh's face {place}")),
+            None => Ok(values),
+        }
+    };
+    let mut read = |axis| component(axis).map_err(refuse);
+    Ok([read(0)?, read(1)?, read(2)?])
+}
+
+/// A variable as `f64`, whatever its type of number.
+fn floats(file: &mut FileReader, name: &str) -> Result<Vec<f64>, String> {
+    match file.read_var(name) {
+        Ok(DataVector::F64(values)) => Ok(values),
+        Ok(DataVector::F32(values)) => Ok(values.into_iter().map(f64::from).collect()),
+        Ok(DataVector::I32(values)) => Ok(values.into_iter().map(f64::from).collect()),
+        Ok(DataVector::I16(values)) => Ok(values.into_iter().map(f64::from).collect()),
+        Ok(_) => Err(format!("variable {name} is not made of numbers")),
+        Err(e) => Err(format!("coordinate or variable {name} cannot be read: {e:?}")),
+    }
+}
+
+/// Sums along one direction: `[slower][n][inner]` becomes `[slower][taps][inner]`.
+fn apply(taps: &[Taps], values: &[f64], inner: usize, n: usize) -> Vec<f64> {
+    let mut out = Vec::with_capacity(values.len() / n * taps.len());
+    for block in values.chunks_exact(n * inner) {
+        for row in taps {
+            let start = out.len();
+            out.resize(start + inner, 0.0);
+            for &(node, weight) in row {
+                for (out, value) in out[start..].iter_mut().zip(&block[node * inner..(node + 1) * inner]) {
+                    *out += weight * value;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// The cubic through the four source nodes nearest to each target.
+fn taps(source_m: &[f64], target_m: &[f64], along: &Direction) -> Result<Vec<Taps>, String> {
+    let n = source_m.len();
+    if n == 1 {
+        return Ok(vec![vec![(0, 1.0)]; target_m.len()]);
+    }
+    if !source_m.windows(2).all(|w| w[1] > w[0]) {
+        return Err("the coordinates must increase".into());
+    }
+    let periodic = along.ends == Ends::Periodic;
+    let period_m = along.length_m();
+    let slack_m = source_m[1] - source_m[0];
+    let last_m = source_m[n - 1];
+    if periodic && last_m - source_m[0] > period_m * (1.0 - 1e-9) {
+        return Err(format!("{n} nodes span {} m: a period of {period_m} m has no node twice", last_m - source_m[0]));
+    }
+    let count = n.min(4);
+    let position_m = |i: isize| {
+        let m = n as isize;
+        source_m[i.rem_euclid(m) as usize] + period_m * i.div_euclid(m) as f64
+    };
+    target_m
+        .iter()
+        .map(|&x_m| {
+            let x_m = if periodic { source_m[0] + (x_m - source_m[0]).rem_euclid(period_m) } else { x_m };
+            let outside = x_m < source_m[0] - slack_m || x_m > last_m + (last_m - source_m[n - 2]);
+            if !periodic && outside {
+                return Err(format!("{x_m} m of the mesh is not covered by {} to {last_m} m", source_m[0]));
+            }
+            let below = source_m.partition_point(|&s| s <= x_m) as isize - 1;
+            let first = if periodic { below - 1 } else { (below - 1).clamp(0, (n - count) as isize) };
+            let nodes: Vec<isize> = (first..first + count as isize).collect();
+            Ok(nodes
+                .iter()
+                .map(|&i| {
+                    let others = nodes.iter().filter(|&&j| j != i);
+                    let weight = others.map(|&j| (x_m - position_m(j)) / (position_m(i) - position_m(j))).product();
+                    (i.rem_euclid(n as isize) as usize, weight)
+                })
+                .filter(|&(_, weight): &(usize, f64)| weight != 0.0)
+                .collect())
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cubics_come_back_exactly_and_nodes_keep_their_values() {
+        let cubic = |x: f64| 1.0 - x + 2.0 * x * x - 0.7 * x.powi(3);
+        let source_m = [0.0, 0.1, 0.25, 0.5, 0.8, 1.0];
+        let bounded = Direction::between(8, 0.0, 1.0, wakescope_les::Wall::Slip, wakescope_les::Wall::Slip);
+        let target_m = [0.0, 0.05, 0.3, 0.5, 0.99, 1.0];
+        for (row, x) in taps(&source_m, &target_m, &bounded).unwrap().iter().zip(target_m) {
+            let found: f64 = row.iter().map(|&(i, w)| w * cubic(source_m[i])).sum();
+            assert!((found - cubic(x)).abs() < 1e-14, "{x}");
+            if source_m.contains(&x) {
+                assert_eq!(row.len(), 1, "{x} is a node");
+            }
+        }
+    }
+
+    #[test]
+    fn periodic_directions_wrap_with_fourth_order() {
+        let along = Direction::periodic(8, 0.0, 1.0);
+        let error = |n: usize| {
+            let source_m: Vec<f64> = (0..n).map(|i| (i as f64 + 0.5) / n as f64).collect();
+            let target_m: Vec<f64> = (0..100).map(|i| 0.01 * f64::from(i)).collect();
+            let wave = |x: f64| (std::f64::consts::TAU * x).sin();
+            let taps = taps(&source_m, &target_m, &along).unwrap();
+            let found = taps.iter().map(|row| row.iter().map(|&(i, w)| w * wave(source_m[i])).sum::<f64>());
+            found.zip(&target_m).map(|(f, x)| (f - wave(*x)).abs()).fold(0.0, f64::max)
+        };
+        assert!((error(16) / error(32)).log2() > 3.7);
+    }
+
+    #[test]
+    fn a_source_that_does_not_cover_the_mesh_is_refused() {
+        let bounded = Direction::between(8, 0.0, 1.0, wakescope_les::Wall::Slip, wakescope_les::Wall::Slip);
+        assert!(taps(&[0.0, 0.2, 0.4], &[0.7], &bounded).unwrap_err().contains("0.7"));
+        assert!(taps(&[0.0, 0.2, 0.1], &[0.1], &bounded).unwrap_err().contains("increase"));
+        assert!(taps(&[0.0, 0.5, 1.0], &[0.1], &Direction::periodic(8, 0.0, 1.0)).unwrap_err().contains("twice"));
+    }
+}

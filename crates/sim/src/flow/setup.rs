@@ -1,0 +1,99 @@
+//! From a case file to a simulation at its start.
+
+use super::case::{AxisName, FlowCase, Pressure, Scheme, Subgrid};
+use crate::Error;
+use std::path::Path;
+use wakescope_les::cases::InitialField;
+use wakescope_les::{
+    Flow, FlowSettings, Mesh, PressureMethod, StartReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment,
+};
+
+/// The field that a flow starts from.
+pub(super) enum Initial {
+    /// A formula.
+    Field(InitialField),
+    /// Values at the low faces of the cells, `[z][y][x]` \[m/s\].
+    #[cfg(feature = "netcdf")]
+    Faces([Vec<f64>; 3]),
+}
+
+/// All that a simulation is made of.
+pub(super) struct Setup {
+    pub(super) mesh: Mesh,
+    pub(super) settings: FlowSettings,
+    pub(super) initial: Initial,
+    /// The case's own end \[s\].
+    pub(super) end_s: Option<f64>,
+    /// Age of the wake per time \[1/s\]; 1 where there is no wake.
+    pub(super) tau_per_s: f64,
+}
+
+impl Setup {
+    /// The setup of a case whose file lies in `folder`.
+    pub(super) fn new(case: &FlowCase, folder: &Path) -> Result<Self, Error> {
+        let mut setup = case.case.setup(folder)?;
+        let (s, solver) = (&mut setup.settings, &case.solver);
+        let own_scheme = s.scheme;
+        s.scheme = match case.time.scheme {
+            Scheme::AdamsBashforth2 => TimeScheme::AdamsBashforth2,
+            Scheme::RungeKutta3 => TimeScheme::RungeKutta3,
+        };
+        s.time_step = time_step(case, s.time_step, s.scheme != own_scheme, s.scheme);
+        s.damped_steps = case.time.damped_steps;
+        if let Some(axes) = &solver.implicit_viscosity {
+            s.viscous =
+                ViscousTreatment::Implicit([AxisName::X, AxisName::Y, AxisName::Z].map(|axis| axes.contains(&axis)));
+        }
+        s.pressure = match solver.pressure {
+            Pressure::Auto => PressureMethod::Auto,
+            Pressure::Direct => PressureMethod::Direct,
+        };
+        s.pressure_tolerance = solver.pressure_tolerance;
+        s.rotational = solver.rotational;
+        s.subgrid = subgrid(solver.subgrid);
+        Ok(setup)
+    }
+
+    pub(super) fn start(self) -> Result<(Flow, StartReport), Error> {
+        let Self { mesh, settings, initial, .. } = self;
+        match initial {
+            Initial::Field(field) => Flow::new(mesh, settings, field),
+            #[cfg(feature = "netcdf")]
+            Initial::Faces(faces) => Flow::from_face_velocities(mesh, settings, faces.each_ref().map(Vec::as_slice)),
+        }
+        .map_err(Error::Flow)
+    }
+}
+
+fn time_step(case: &FlowCase, own: TimeStep, other_scheme: bool, scheme: TimeScheme) -> TimeStep {
+    let time = case.time;
+    if let Some(step_s) = time.step_s {
+        return TimeStep::Fixed { step_s };
+    }
+    let (own_courant, own_longest_s) = match own {
+        TimeStep::Courant { courant, longest_s } if !other_scheme => (courant, longest_s),
+        TimeStep::Courant { longest_s, .. } => (scheme.default_courant(), longest_s),
+        TimeStep::Fixed { step_s } => (scheme.default_courant(), step_s),
+    };
+    TimeStep::Courant {
+        courant: time.courant.unwrap_or(own_courant),
+        longest_s: time.longest_step_s.unwrap_or(own_longest_s),
+    }
+}
+
+fn subgrid(choice: Subgrid) -> SubgridModel {
+    match choice {
+        Subgrid::None {} => SubgridModel::None,
+        Subgrid::Smagorinsky { constant: None } => SubgridModel::SMAGORINSKY,
+        Subgrid::Smagorinsky { constant: Some(constant) } => SubgridModel::Smagorinsky { constant },
+        Subgrid::Wale { constant: None } => SubgridModel::WALE,
+        Subgrid::Wale { constant: Some(constant) } => SubgridModel::Wale { constant },
+        Subgrid::MultiscaleWale { constant: None, order: None } => SubgridModel::MULTISCALE_WALE,
+        Subgrid::MultiscaleWale { constant, order } => {
+            // The constant of the order that gives WALE's dissipation with the constant of its authors.
+            let order = order.unwrap_or(3);
+            let constant = constant.unwrap_or_else(|| SubgridModel::multiscale_constant(0.5, order));
+            SubgridModel::MultiscaleWale { constant, order }
+        }
+    }
+}

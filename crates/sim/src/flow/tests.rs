@@ -1,0 +1,260 @@
+//! Case files, interrupted runs, wrong input.
+
+use super::*;
+use std::collections::BTreeMap;
+use std::fs;
+
+/// The example with few cells and three steps.
+fn tiny(name: &str, text: &str) -> String {
+    let mut table: toml::Table = text.parse().unwrap();
+    let case = table["case"].as_table_mut().unwrap();
+    let few = |value: &mut toml::Value| match value {
+        toml::Value::Array(cells) => {
+            let n = cells.len();
+            for (i, cell) in cells.iter_mut().enumerate() {
+                *cell = toml::Value::Integer(if i + 1 == n {
+                    24
+                } else if name == "dipole" {
+                    16
+                } else {
+                    8
+                });
+            }
+        }
+        cell => *cell = toml::Value::Integer(16),
+    };
+    if let Some(cells) = case.get_mut("cells") {
+        few(cells);
+    }
+    for axis in ["y", "z"] {
+        if let Some(axis) = case.get_mut(axis) {
+            few(&mut axis.as_table_mut().unwrap()["cells"]);
+        }
+    }
+    let time = table["time"].as_table_mut().unwrap();
+    time.insert("pause_after_steps".into(), 3.into());
+    // Few cells allow longer steps than those of the example; the output of the start is among the files.
+    let output = table["output"].as_table_mut().unwrap();
+    output.remove("every_s");
+    output.insert("times_s".into(), toml::Value::Array(vec![toml::Value::Float(0.0)]));
+    toml::to_string(&table).unwrap()
+}
+
+fn parse(text: &str) -> CaseFile {
+    CaseFile::parse(text, Path::new("case.toml")).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+fn refused(text: &str) -> String {
+    CaseFile::parse(text, Path::new("case.toml")).unwrap_err().to_string()
+}
+
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let file = |e: fs::DirEntry| (e.file_name().into_string().unwrap(), fs::read(e.path()).unwrap());
+    fs::read_dir(folder).unwrap().map(|e| file(e.unwrap())).collect()
+}
+
+#[test]
+fn every_example_is_a_good_case_that_keeps_its_meaning_and_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in EXAMPLES {
+        let file = parse(text);
+        assert_eq!(parse(&file.toml).case, file.case, "{name} written out and read again");
+        assert!(text.contains(&format!("kind = \"{name}\"")), "{name}");
+        let out = folder.path().join(name);
+        let outcome =
+            run(&parse(&tiny(name, text)), &out, Begin::New, &mut Unwatched).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!((outcome.steps, outcome.is_complete), (3, false), "{name}");
+        assert!(outcome.relative_divergence < 1e-8, "{name}: {}", outcome.relative_divergence);
+        assert!(outcome.files.iter().all(|path| path.exists()));
+        let steps = fs::read_to_string(out.join("steps.csv")).unwrap();
+        assert_eq!(steps.lines().filter(|l| !l.starts_with('#')).count(), 4, "{name}: a header and three rows");
+    }
+    assert!(example("dipole").is_some() && example("none").is_none());
+}
+
+/// Decaying vortices with all outputs.
+fn vortices(pause: Option<u64>) -> CaseFile {
+    let pause = pause.map_or(String::new(), |steps| format!("pause_after_steps = {steps}\n"));
+    let formats = if cfg!(feature = "netcdf") { "\"csv\", \"netcdf\", \"initial_netcdf\"" } else { "\"csv\"" };
+    let planes = if cfg!(feature = "netcdf") { "\"csv\", \"netcdf\"" } else { "\"csv\"" };
+    parse(&format!(
+        "[case]\nkind = \"taylor_green_plane\"\ncells = 12\n[time]\nend_s = 0.2\ncourant = 0.3\n{pause}\
+         [output]\ntimes_s = [0.0, 0.1, 0.2]\nfields = [{formats}]\nplanes_x_m = [0.5]\nplanes = [{planes}]\n\
+         [checkpoint]\nevery_steps = 2\n"
+    ))
+}
+
+#[test]
+fn an_interrupted_run_leaves_the_same_files_byte_for_byte_as_one_that_was_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let [whole, parts] = ["whole", "parts"].map(|name| folder.path().join(name));
+    let outcome = run(&vortices(None), &whole, Begin::New, &mut Unwatched).unwrap();
+    assert!(outcome.is_complete && outcome.steps > 6, "{outcome:?}");
+    run(&vortices(Some(3)), &parts, Begin::New, &mut Unwatched).unwrap();
+    // As if the machine had failed behind the checkpoint: a row too many, and half of one.
+    let mut steps = fs::read_to_string(parts.join("steps.csv")).unwrap();
+    steps += "4,0.1,0.0";
+    fs::write(parts.join("steps.csv"), steps).unwrap();
+    run(&vortices(Some(5)), &parts, Begin::Restart, &mut Unwatched).unwrap();
+    let last = run(&vortices(None), &parts, Begin::Restart, &mut Unwatched).unwrap();
+    assert_eq!((last.steps, last.time_s), (outcome.steps, outcome.time_s));
+    let (whole, parts) = (contents(&whole), contents(&parts));
+    assert!(whole.keys().any(|name| name == "plane1_0003.csv"), "{:?}", whole.keys());
+    for (name, bytes) in &whole {
+        // Files of the start say that the run would pause; checkpoints of other steps went before.
+        let body = |bytes: &[u8]| {
+            let text = String::from_utf8_lossy(bytes).into_owned();
+            text.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect::<String>()
+        };
+        if name.ends_with(".csv") {
+            assert_eq!(body(bytes), body(&parts[name]), "{name}");
+        } else if name == "flow.checkpoint" {
+            assert!(bytes == &parts[name], "the state at the end");
+        }
+    }
+    assert!(whole["steps.csv"] == parts["steps.csv"], "the table with its head");
+}
+
+#[test]
+fn a_checkpoint_is_not_lost_by_mistake_and_a_damaged_one_gives_way_to_the_one_before() {
+    let folder = tempfile::tempdir().unwrap();
+    run(&vortices(Some(5)), folder.path(), Begin::New, &mut Unwatched).unwrap();
+    let error = run(&vortices(None), folder.path(), Begin::New, &mut Unwatched).unwrap_err();
+    assert!(matches!(error, Error::CheckpointInTheWay { .. }), "{error}");
+    let path = folder.path().join("flow.checkpoint");
+    let bytes = fs::read(&path).unwrap();
+    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let outcome = run(&vortices(None), folder.path(), Begin::Restart, &mut Unwatched).unwrap();
+    assert!(outcome.is_complete && outcome.warnings[0].contains("damaged"), "{outcome:?}");
+    let fresh = tempfile::tempdir().unwrap();
+    run(&vortices(None), fresh.path(), Begin::New, &mut Unwatched).unwrap();
+    let steps = |folder: &Path| fs::read(folder.join("steps.csv")).unwrap();
+    assert!(steps(folder.path()) == steps(fresh.path()));
+    run(&vortices(Some(1)), folder.path(), Begin::Overwrite, &mut Unwatched).unwrap();
+    let nothing = run(&vortices(None), &folder.path().join("none"), Begin::Restart, &mut Unwatched).unwrap_err();
+    assert!(nothing.to_string().contains("flow.checkpoint"), "{nothing}");
+    // Another flow does not continue this one.
+    let other = parse(&vortices(None).toml.replace("cells = 12", "cells = 14"));
+    let error = run(&other, folder.path(), Begin::Restart, &mut Unwatched).unwrap_err().to_string();
+    assert!(error.contains("cells along y") && error.contains("12") && error.contains("14"), "{error}");
+}
+
+#[test]
+fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    // A folder stands where the second output would go.
+    fs::create_dir_all(folder.path().join("fields_0002.csv")).unwrap();
+    let error = run(&vortices(None), folder.path(), Begin::New, &mut Unwatched).unwrap_err();
+    assert!(matches!(error, Error::Export(_)), "{error}");
+    assert!(wakescope_les::check_checkpoint(folder.path().join("flow.checkpoint")).is_ok());
+    fs::remove_dir(folder.path().join("fields_0002.csv")).unwrap();
+    assert!(run(&vortices(None), folder.path(), Begin::Restart, &mut Unwatched).unwrap().is_complete);
+    assert!(folder.path().join("fields_0002.csv").is_file());
+}
+
+#[test]
+fn a_flow_that_blows_up_names_step_and_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "[case]\nkind = \"taylor_green_plane\"\ncells = 12\n[time]\nend_s = 1.0\nstep_s = 0.1\n";
+    let error = run(&parse(text), folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
+    assert!(error.starts_with("flow: step 1 ") && error.contains("Courant number"), "{error}");
+}
+
+#[test]
+fn wrong_cases_are_refused_with_key_value_and_what_is_allowed() {
+    let dipole = |rest: &str| refused(&format!("[case]\nkind = \"dipole\"\n{rest}"));
+    for (message, wanted) in [
+        (refused("[case]\nkind = \"tornado\"\n"), ["tornado", "vortex_pair"]),
+        (refused("[time]\nend_s = 1.0\n"), ["missing field", "case"]),
+        (dipole("reynolds = -5.0\n"), ["case.toml:3: case.reynolds = -5.0", "above 0"]),
+        (dipole("viscosity = 1.0\n"), ["case.toml:3: unknown field `viscosity`", "reynolds"]),
+        (dipole("cells = [0, 4]\n"), ["case.cells = [0, 4]", "1 to 100000"]),
+        (dipole("[time]\nstep_s = 0.1\ncourant = 0.3\n"), ["time.step_s = 0.1", "absent"]),
+        (dipole("[time]\nscheme = \"euler\"\n"), ["euler", "adams_bashforth2"]),
+        (dipole("[solver]\npressure_tolerance = 2.0\n"), ["case.toml:4: solver.pressure_tolerance", "1e-15 to 0.1"]),
+        (dipole("[solver]\nsubgrid = { model = \"magic\" }\n"), ["magic", "multiscale_wale"]),
+        (dipole("[output]\ntimes_s = [0.2, 0.1]\n"), ["output.times_s", "increasing"]),
+        (dipole("[output]\nplanes = [\"initial_netcdf\"]\n"), ["output.planes", "whole field"]),
+        (dipole("[checkpoint]\nevery_steps = 0\n"), ["checkpoint.every_steps", "above 0"]),
+        (
+            refused("[case]\nkind = \"free\"\n[case.z]\ncells = 16\nlow_end = \"slip\"\n"),
+            ["case.z.high_end", "periodic at both ends"],
+        ),
+    ] {
+        for part in wanted {
+            assert!(message.contains(part), "{part} is not in: {message}");
+        }
+    }
+}
+
+#[test]
+fn what_only_the_mesh_tells_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let start = |text: &str| run(&parse(text), &out, Begin::New, &mut Unwatched).unwrap_err().to_string();
+    let message = start("[case]\nkind = \"free\"\n");
+    assert!(message.contains("time.end_s = \"absent\""), "{message}");
+    let walls = "[case]\nkind = \"free\"\n[case.x]\ncells = 8\nlow_end = \"slip\"\nhigh_end = \"slip\"\n\
+                 [time]\nend_s = 1.0\n[output]\nplanes_x_m = [2.0]\n";
+    let message = start(walls);
+    assert!(message.contains("output.planes_x_m = 2.0") && message.contains("0.0 to 1.0 m"), "{message}");
+    let message = start("[case]\nkind = \"dipole\"\ncells = [16, 9]\nstretch = 0.0\n");
+    assert!(message.contains("z direction: cells = 9") && message.contains("at least 16"), "{message}");
+    let message = start("[case]\nkind = \"dipole\"\ncells = [16, 16]\n[output]\nevery_s = 1e-6\n");
+    assert!(message.contains("output.every_s = 1e-6") && message.contains("9999"), "{message}");
+    let message = start("[case]\nkind = \"dipole\"\ncells = [16, 16]\n[output]\ntimes_s = [2.0]\n");
+    assert!(message.contains("output.times_s = 2.0") && message.contains("0.75"), "{message}");
+    assert!(!out.exists());
+}
+
+#[cfg(feature = "netcdf")]
+#[test]
+fn a_field_written_by_a_run_starts_another_with_the_same_velocities() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = |initial: &str, mesh: &str| {
+        let text = format!(
+            "[case]\nkind = \"free\"\nviscosity_m2_s = 0.01\n[case.initial]\n{initial}\n{mesh}[time]\nend_s = 0.05\n\
+             step_s = 0.01\n[output]\ntimes_s = [0.0, 0.05]\nfields = [\"initial_netcdf\", \"csv\"]\n"
+        );
+        CaseFile::parse(&text, &folder.path().join("case.toml")).unwrap()
+    };
+    let mesh = |n: usize| {
+        format!(
+            "[case.y]\ncells = {n}\nlow_m = -4.0\nhigh_m = 4.0\n[case.z]\ncells = {n}\nlow_m = 0.0\nhigh_m = 4.0\n\
+             low_end = \"no_slip\"\nhigh_end = \"slip\"\nmapping = \"tanh_low\"\nstretch = 1.0\n"
+        )
+    };
+    let pair = "kind = \"vortex_pair\"\ncirculation_m2_s = 6.28\nspacing_m = 2.0\ncore_radius_m = 0.8\nheight_m = 2.0";
+    run(&case(pair, &mesh(24)), &folder.path().join("a"), Begin::New, &mut Unwatched).unwrap();
+    let again = "kind = \"netcdf\"\npath = \"a/initial_0001.nc\"";
+    run(&case(again, &mesh(24)), &folder.path().join("b"), Begin::New, &mut Unwatched).unwrap();
+    let speeds = |name: &str| -> Vec<f64> {
+        let text = fs::read_to_string(folder.path().join(name)).unwrap();
+        let rows = text.lines().filter(|l| !l.starts_with('#')).skip(1);
+        rows.flat_map(|l| l.split(',').skip(4).take(3).map(|c| c.parse().unwrap()).collect::<Vec<f64>>()).collect()
+    };
+    for output in ["fields_0001.csv", "fields_0002.csv"] {
+        let (a, b) = (speeds(&format!("a/{output}")), speeds(&format!("b/{output}")));
+        assert_eq!(a.len(), 3 * 24 * 24);
+        let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-12, "{output}: {worst}");
+    }
+    // Also on a mesh of its own: both runs then differ by the error of the coarser one.
+    let outcome = run(&case(again, &mesh(20)), &folder.path().join("c"), Begin::New, &mut Unwatched).unwrap();
+    let energy = |folder_name: &str| {
+        let text = fs::read_to_string(folder.path().join(folder_name).join("steps.csv")).unwrap();
+        text.lines().last().unwrap().split(',').nth(4).unwrap().parse::<f64>().unwrap()
+    };
+    assert!((outcome.kinetic_energy_m5_s2 / energy("a") - 1.0).abs() < 0.02);
+    // What is no NetCDF, not there, or too small is refused by name.
+    fs::write(folder.path().join("text.nc"), "no NetCDF").unwrap();
+    for (path, mesh, wanted) in [
+        ("text.nc", mesh(24), "NETCDF3_64BIT"),
+        ("none.nc", mesh(24), "none.nc"),
+        ("a/initial_0001.nc", mesh(24).replace("high_m = 4.0\nlow_end", "high_m = 9.0\nlow_end"), "not covered"),
+    ] {
+        let file = case(&format!("kind = \"netcdf\"\npath = \"{path}\""), &mesh);
+        let message = run(&file, &folder.path().join("d"), Begin::New, &mut Unwatched).unwrap_err().to_string();
+        assert!(message.contains(wanted), "{wanted} is not in: {message}");
+    }
+}
