@@ -27,7 +27,7 @@ use crate::error::check;
 use filter::{Filter, HIGHEST_ORDER};
 use operators::Operators;
 use stress::Stress;
-use viscosity::{Formula, eddy_viscosity};
+use viscosity::{Formula, Largest, eddy_viscosity};
 
 /// How the eddies below the mesh are modelled.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -81,7 +81,7 @@ pub(crate) struct Subgrid {
     small: Option<(Filter, [Vec<f64>; 3])>,
     /// At the centres \[m^2/s\].
     viscosity: Vec<f64>,
-    largest_m2_s: f64,
+    largest: Largest,
     stress: Stress,
 }
 
@@ -107,14 +107,16 @@ impl Subgrid {
             operators: Operators::new(layout),
             small: order.map(|order| (Filter::new(layout, order), fields())),
             viscosity: vec![0.0; cells],
-            largest_m2_s: 0.0,
+            largest: Largest::default(),
             stress: Stress::new(cells),
         }))
     }
 
-    /// Eddy viscosity and stress of the flow `velocity_m_s`.
-    pub(crate) fn update(&mut self, velocity_m_s: [&[f64]; 3]) {
-        self.largest_m2_s = eddy_viscosity(&self.operators, self.formula, velocity_m_s, &mut self.viscosity);
+    /// Eddy viscosity and stress of the flow `velocity_m_s`. The viscosity is cut where the shortest waves would decay faster
+    /// than `limit_per_s`, which an explicit time step could not follow; infinity leaves it as it is.
+    pub(crate) fn update(&mut self, velocity_m_s: [&[f64]; 3], limit_per_s: f64) {
+        let Self { operators, formula, viscosity, .. } = self;
+        self.largest = eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity);
         let strained = match &mut self.small {
             Some((filter, small)) => {
                 filter.small_scales(velocity_m_s, small);
@@ -133,7 +135,12 @@ impl Subgrid {
 
     /// Largest eddy viscosity \[m^2/s\].
     pub(crate) fn max_viscosity_m2_s(&self) -> f64 {
-        self.largest_m2_s
+        self.largest.viscosity_m2_s
+    }
+
+    /// Largest decay rate of the shortest waves by the eddy viscosity, before it was cut \[1/s\].
+    pub(crate) fn max_decay_per_s(&self) -> f64 {
+        self.largest.decay_per_s
     }
 
     /// Eddy viscosity at the centres, in the order of memory \[m^2/s\].

@@ -71,7 +71,12 @@ pub(super) struct Operators {
     pub(super) wall_source: [[Vec<f64>; 3]; 3],
     /// `h^(2/3)` of the cells of each axis: their product is the square of the filter width.
     pub(super) width: [Vec<f64>; 3],
+    /// Largest decay rate by a unit viscosity along each axis, `49/9 h^-2`; zero along a thin one \[1/m^2\].
+    pub(super) decay: [Vec<f64>; 3],
 }
+
+/// Largest symbol of the fourth-order Laplacian times the square of the spacing.
+const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
 
 impl Operators {
     pub(super) fn new(layout: &Layout) -> Self {
@@ -91,6 +96,11 @@ impl Operators {
             }),
             width: std::array::from_fn(|axis| {
                 layout.line[axis].cell_metric_m.iter().map(|h| h.powf(2.0 / 3.0)).collect()
+            }),
+            decay: std::array::from_fn(|axis| {
+                let line = &layout.line[axis];
+                let symbol = if line.is_thin() { 0.0 } else { LAPLACIAN_SYMBOL };
+                line.cell_metric_m.iter().map(|h| symbol / (h * h)).collect()
             }),
         }
     }

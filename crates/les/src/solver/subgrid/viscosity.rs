@@ -37,22 +37,42 @@ impl Scratch {
     }
 }
 
-/// Writes the eddy viscosity \[m^2/s\] of `velocity` and returns the largest.
+/// Writes the eddy viscosity \[m^2/s\] of `velocity`, at most as large as lets no wave decay faster than `limit_per_s`, and
+/// returns the largest viscosity and the largest decay rate that it would have had without this limit.
 pub(super) fn eddy_viscosity(
     operators: &Operators,
     formula: Formula,
     velocity: [&[f64]; 3],
+    limit_per_s: f64,
     viscosity: &mut [f64],
-) -> f64 {
+) -> Largest {
     let n = operators.shape.n[0];
     viscosity
         .par_chunks_mut(operators.shape.plane())
         .enumerate()
         .map_init(
             || Scratch::new(n),
-            |scratch, (k, plane)| viscosity_plane(operators, formula, velocity, k, plane, scratch),
+            |scratch, (k, plane)| viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch),
         )
-        .reduce(|| 0.0, f64::max)
+        .reduce(Largest::default, Largest::or)
+}
+
+/// Extremes of the eddy viscosity.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Largest {
+    /// \[m^2/s\].
+    pub(super) viscosity_m2_s: f64,
+    /// Decay rate of the shortest waves, before the limit \[1/s\].
+    pub(super) decay_per_s: f64,
+}
+
+impl Largest {
+    fn or(self, other: Self) -> Self {
+        Self {
+            viscosity_m2_s: self.viscosity_m2_s.max(other.viscosity_m2_s),
+            decay_per_s: self.decay_per_s.max(other.decay_per_s),
+        }
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
@@ -60,12 +80,13 @@ fn viscosity_plane(
     operators: &Operators,
     formula: Formula,
     velocity: [&[f64]; 3],
+    limit_per_s: f64,
     k: usize,
     plane: &mut [f64],
     scratch: &mut Scratch,
-) -> f64 {
+) -> Largest {
     let n = operators.shape.n[0];
-    let mut largest = [0.0; LANES];
+    let mut largest = Largest::default();
     for (j, row) in plane.chunks_mut(n).enumerate() {
         gradient_rows(operators, velocity, [j, k], scratch);
         let across = operators.width[1][j] * operators.width[2][k];
@@ -74,13 +95,26 @@ fn viscosity_plane(
             Formula::Smagorinsky { square } => apply(row, gradient, square * across, width, smagorinsky),
             Formula::Wale { square } => apply(row, gradient, square * across, width, wale),
         }
-        for chunk in row.chunks(LANES) {
-            for (largest, value) in largest.iter_mut().zip(chunk) {
-                *largest = if *value > *largest { *value } else { *largest };
-            }
+        let decay = operators.decay[1][j] + operators.decay[2][k];
+        largest = largest.or(limit(row, &operators.decay[0], decay, limit_per_s));
+    }
+    largest
+}
+
+/// Cuts a row at the viscosity of the largest decay rate.
+#[inline(always)]
+fn limit(row: &mut [f64], along: &[f64], across: f64, limit_per_s: f64) -> Largest {
+    let mut largest = [Largest::default(); LANES];
+    for (row, along) in row.chunks_mut(LANES).zip(along.chunks(LANES)) {
+        for ((value, along), largest) in row.iter_mut().zip(along).zip(&mut largest) {
+            let decay = *value * (along + across);
+            let cut = if decay > limit_per_s { limit_per_s / (along + across) } else { *value };
+            *value = cut;
+            largest.decay_per_s = if decay > largest.decay_per_s { decay } else { largest.decay_per_s };
+            largest.viscosity_m2_s = if cut > largest.viscosity_m2_s { cut } else { largest.viscosity_m2_s };
         }
     }
-    largest.into_iter().fold(0.0, f64::max)
+    largest.into_iter().fold(Largest::default(), Largest::or)
 }
 
 /// Maxima that are kept side by side.
