@@ -86,6 +86,12 @@ impl Flow {
         to_xyz(&self.layout, &self.state.pressure)
     }
 
+    /// Eddy viscosity at the centres \[m^2/s\], `[z][y][x]`, of the field that the last step started from; `None` without a
+    /// subgrid model.
+    pub fn subgrid_viscosity_m2_s(&self) -> Option<Vec<f64>> {
+        self.model.as_ref().map(|model| to_xyz(&self.layout, model.viscosity_m2_s()))
+    }
+
     /// A flow that starts from velocities given at the low faces of the cells, `[z][y][x]` \[m/s\]; they are projected.
     ///
     /// # Errors

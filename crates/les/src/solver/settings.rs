@@ -41,6 +41,15 @@ impl TimeScheme {
         }
     }
 
+    /// Largest product of step and decay rate at which terms integrated like convection are stable: the reach of the stability
+    /// region along the real axis.
+    pub(crate) fn largest_decay(self) -> f64 {
+        match self {
+            Self::AdamsBashforth2 => 1.0,
+            Self::RungeKutta3 => 2.5,
+        }
+    }
+
     /// Courant number beyond which a step is refused.
     pub fn largest_courant(self) -> f64 {
         match self {
