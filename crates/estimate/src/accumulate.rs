@@ -5,13 +5,16 @@
 //! line of sight. Check: against the plain mean of the windows, its independence of the order of rays and of the
 //! number of threads, and that a window with a NaN is left out without harm to its neighbours.
 
+use std::f64::consts::TAU;
+
 use ndarray::ArrayView2;
+use num_complex::Complex;
 
 use crate::error::{Error, length};
 use crate::gates::Gates;
 use crate::parallel::{for_each_chunk, map_indexed};
 use crate::region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, effective};
-use crate::sample::{Sample, Scratch, binary_scale};
+use crate::sample::{Sample, Scratch, SignalKind, binary_scale};
 use crate::sampling::Sampling;
 use crate::statistic::{Estimator, Statistic};
 use crate::velocity::{GateVelocity, Quality};
@@ -184,6 +187,89 @@ impl Scan {
                     estimate.power *= self.scale * self.scale;
                 }
                 Ok(MapPoint { estimate, level, n_eff })
+            },
+        )
+        .into_iter()
+        .collect()
+    }
+
+    /// Mean correlogram of the valid windows within `radius_m` of `point`, each line of sight shifted to the velocity of the point first.
+    ///
+    /// `relative_m_s` tells by how much the wind at a place of the region is faster than at the point: the difference of a first map, or a model.
+    /// What differs between the lines then adds up in place instead of blurring the spectrum. The statistic must be a correlogram of the given kind; `mean` is
+    /// always complex (two numbers per lag), for an estimator planned for [`SignalKind::Complex`]. The mirror image of real samples moves along and
+    /// stays outside the band. Returns the number of windows.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if `mean` has not two places per lag.
+    pub fn region_mean_following(
+        &self,
+        point: PolarPoint,
+        radius_m: f64,
+        kind: SignalKind,
+        sampling: &Sampling,
+        relative_m_s: &dyn Fn(PolarPoint) -> f64,
+        mean: &mut [f64],
+    ) -> Result<usize, Error> {
+        let lags = self.numbers / kind.lag_numbers(1);
+        length("mean", 2 * lags, mean.len())?;
+        mean.fill(0.0);
+        let mut sum = vec![0.0; self.numbers];
+        let mut level = 0;
+        for chord in self.geometry.chords(point, radius_m) {
+            level += self.valid(chord);
+            sum.fill(0.0);
+            self.add_chord(chord, &mut sum);
+            let place = self.geometry.middle(chord);
+            let shift_m_s = relative_m_s(place);
+            let shift_m_s = if shift_m_s.is_finite() { shift_m_s } else { 0.0 };
+            // a faster wind has the lower frequency: turn it up
+            let step =
+                Complex::from_polar(1.0, 2.0 * TAU * shift_m_s / (sampling.wavelength_m * sampling.sample_rate_hz));
+            let mut turn = Complex::new(1.0, 0.0);
+            for (m, pair) in mean.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+                let lag = kind.lag(&sum, m) * turn;
+                pair[0] += lag.re;
+                pair[1] += lag.im;
+                turn *= step;
+            }
+        }
+        if level > 0 {
+            mean.iter_mut().for_each(|value| *value /= level as f64);
+        }
+        Ok(level)
+    }
+
+    /// Velocities at `points` by [`Scan::region_mean_following`]; `guess_m_s` gives the wind of a first estimate anywhere, NaN where it has none.
+    ///
+    /// # Errors
+    /// As [`Scan::map`]; the estimator takes complex correlograms with as many lags as this scan has.
+    pub fn map_following(
+        &self,
+        points: &[PolarPoint],
+        radius: &Radius,
+        kind: SignalKind,
+        sampling: &Sampling,
+        guess_m_s: &(dyn Fn(PolarPoint) -> f64 + Sync),
+        estimator: &(impl Estimator + ?Sized),
+    ) -> Result<Vec<MapPoint>, Error> {
+        let numbers = 2 * self.numbers / kind.lag_numbers(1);
+        length("statistic", estimator.statistic_len(), numbers)?;
+        map_indexed(
+            points.len(),
+            || (Scratch::new(), vec![0.0; numbers]),
+            |(scratch, mean), index| {
+                let point = points[index];
+                let radius_m = radius.at_m(point.range_m)?;
+                let here_m_s = guess_m_s(point);
+                let relative = |place: PolarPoint| guess_m_s(place) - here_m_s;
+                let level = self.region_mean_following(point, radius_m, kind, sampling, &relative, mean)?;
+                let mut estimate = GateVelocity::none(Quality::Empty);
+                if level > 0 {
+                    estimate = estimator.estimate(mean, scratch);
+                    estimate.power *= self.scale * self.scale;
+                }
+                Ok(MapPoint { estimate, level, n_eff: f64::NAN })
             },
         )
         .into_iter()

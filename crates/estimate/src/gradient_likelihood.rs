@@ -23,7 +23,7 @@ use crate::gradient::GradientModel;
 use crate::linalg::hermitian_eigen;
 use crate::sample::{Sample, Scratch, SignalKind};
 use crate::sampling::Sampling;
-use crate::search::{PeakSearch, unusable};
+use crate::search::{PeakSearch, beyond_doubt, density_limit, highest, unusable};
 use crate::statistic::{Estimator, Statistic};
 use crate::velocity::{GateVelocity, Quality, Refinement};
 use crate::zoom::ZoomSpectrum;
@@ -71,6 +71,7 @@ pub struct GradientPeak {
     numbers: usize,
     sampling: Sampling,
     zoom: ZoomSpectrum,
+    whole: ZoomSpectrum,
     search: PeakSearch,
     /// For each gradient what the peak reads for increasing true velocities \[m/s\]: (read, true); empty for complex samples.
     corrections: Vec<Vec<(f64, f64)>>,
@@ -115,6 +116,7 @@ impl<S: Sample> GradientLikelihood<S> {
             true => std::iter::once(Complex::from(sides)).chain(std::iter::repeat_n(Complex::ZERO, n - 1)).collect(),
             false => (0..n).map(|m| band_lag(sampling, m, share)).collect(),
         };
+        let grid_hz: Vec<f64> = (0..4 * n).map(|k| k as f64 * sampling.sample_rate_hz / (4 * n) as f64).collect();
         let mut planner = FftPlanner::new();
         let mut estimator = GradientPeak {
             corrections: Vec::new(),
@@ -124,6 +126,7 @@ impl<S: Sample> GradientLikelihood<S> {
             numbers: 2 * n,
             sampling: *sampling,
             zoom: ZoomSpectrum::new(SignalKind::Complex, n, sampling, &search.band.with_neighbours_hz())?,
+            whole: ZoomSpectrum::new(SignalKind::Complex, n, sampling, &grid_hz)?,
             search,
         };
         if S::KIND == SignalKind::Real {
@@ -325,7 +328,13 @@ impl GradientPeak {
             if self.zoom.density_into(lags, &mut scratch.band).is_err() {
                 return none(Quality::Invalid);
             }
-            let located = self.search.locate(&scratch.band, Refinement::Parabola, |_, _| None);
+            let located = self.search.locate(&scratch.band, Refinement::Parabola, |peak, _| {
+                if beyond_doubt(peak, density_limit(lags)) {
+                    return None;
+                }
+                self.whole.density_into(lags, &mut scratch.density).ok()?;
+                Some((highest(&scratch.density).1, 0.5))
+            });
             let estimate = self.search.velocity(&located, self.search.band.frequency_hz(located.bin));
             // a window of a noise-free line leaves no energy: the logarithm stays finite
             let rest = (energy - located.peak).max(1e-12 * energy).max(f64::MIN_POSITIVE);

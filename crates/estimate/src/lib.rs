@@ -34,10 +34,12 @@
 //! | `spectrum`, `zoom` | the density that belongs to a correlogram, on a whole grid and at chosen frequencies |
 //! | `velocity`, `statistic` | velocity with width, SNR, runner-up and flags; the traits for estimators of one's own |
 //! | `search`, `peak`, `detection` | the peak in the detector band and what it tells; how high that of pure noise stands |
-//! | `region`, `accumulate` | circular regions, accumulation level and n_eff; Table 3 |
+//! | `region`, `accumulate`, `auto_radius` | circular regions, accumulation level and n_eff; Table 3, also following the wind; rho(R) for a target variance |
 //! | `autoregressive`, `levinson`, `poles` | (31), (32): models, the choice of their order, their poles |
 //! | `model_peaks`, `correlogram_estimators` | estimators of the accumulated correlogram: CA, pole, Capon; lag window, pulse pair |
 //! | `likelihood` | tapers that make the accumulated periodogram the likelihood of a known pulse |
+//! | `gradient`, `gradient_likelihood` | a linear wind in the window; likelihood of velocity and gradient, for real windows too |
+//! | `first_moment` | the mean of a skewed spectrum, which (28) asks for |
 //! | `bound`, `linalg` | Cramer-Rao bound; solve and eigenvectors with residual checks |
 //! | `error_map` | bias, standard deviation, root mean square with standard errors, (33) |
 //!
@@ -51,6 +53,7 @@
 //! - `openblas-system` links a system OpenBLAS instead; the build stops with the remedy if there is none.
 
 mod accumulate;
+mod auto_radius;
 mod autoregressive;
 mod bound;
 mod correlogram;
@@ -60,6 +63,7 @@ mod dense;
 mod detection;
 mod error;
 mod error_map;
+mod first_moment;
 mod gates;
 mod gradient;
 mod gradient_likelihood;
@@ -96,6 +100,7 @@ pub use correlogram_estimators::{LagWindowPeak, PulsePair};
 pub use detection::noise_quality;
 pub use error::Error;
 pub use error_map::{ErrorMap, ErrorStatistics};
+pub use first_moment::FirstMoment;
 pub use gates::Gates;
 pub use gradient::{GradientBound, GradientModel};
 pub use gradient_likelihood::{GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity};

@@ -68,6 +68,12 @@ impl SpectralPeak {
         (0..self.search.band.bins).map(|bin| self.search.band.frequency_hz(bin as f64)).collect()
     }
 
+    /// First of [`SpectralPeak::band_frequencies_hz`] and the distance between them \[Hz\].
+    pub(crate) fn first_and_spacing_hz(&self) -> (f64, f64) {
+        let first_hz = self.search.band.frequency_hz(0.0);
+        (first_hz, self.search.band.frequency_hz(1.0) - first_hz)
+    }
+
     /// Densities at [`SpectralPeak::band_frequencies_hz`].
     ///
     /// # Errors

@@ -126,6 +126,12 @@ impl ScanGeometry {
         (0..self.gates).map(|gate| self.first_range_m + gate as f64 * self.spacing_m).collect()
     }
 
+    /// The middle of a chord.
+    pub(crate) fn middle(&self, chord: Chord) -> PolarPoint {
+        let gate = 0.5 * (chord.first + chord.last) as f64;
+        PolarPoint { range_m: self.first_range_m + gate * self.spacing_m, elevation_rad: self.lines[chord.line] }
+    }
+
     /// Chords of the disc of radius `radius_m` \[m\] about `point`, by increasing elevation.
     ///
     /// A window on the circle counts as inside (up to a millionth of the gate spacing).

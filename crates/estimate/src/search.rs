@@ -210,7 +210,7 @@ fn parabola(density: &[f64], top: usize) -> f64 {
 }
 
 /// Sum in independent lanes, so that the additions need not wait for each other.
-fn lanes_sum(values: &[f64]) -> f64 {
+pub(crate) fn lanes_sum(values: &[f64]) -> f64 {
     let (chunks, rest) = values.as_chunks::<8>();
     let mut lanes = [0.0; 8];
     for chunk in chunks {
