@@ -5,4 +5,5 @@
 
 mod point_target;
 mod power;
+mod scan_errors;
 mod uniform_wind;
