@@ -3,6 +3,7 @@
 // A test that cannot set up its scene has failed.
 #![allow(clippy::unwrap_used)]
 
+mod circulation;
 mod point_target;
 mod power;
 mod scan_errors;

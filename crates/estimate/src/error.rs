@@ -61,6 +61,33 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// A fit did not come to its end.
+    #[error(
+        "the fit is not converged after {iterations} iterations, {sigmas_left:.2e} standard deviations are left: \
+         start nearer, free fewer parameters or allow more iterations"
+    )]
+    NotConverged {
+        /// Iterations that were done.
+        iterations: usize,
+        /// The step that is left, in standard deviations of the fit.
+        sigmas_left: f64,
+    },
+    /// The velocity map shows no vortex pair.
+    #[error("no vortex pair found: the best one has a significance of {significance:.1}, at least {needed} is needed")]
+    NoVortex {
+        /// Significance of the best pair.
+        significance: f64,
+        /// Least significance that is accepted.
+        needed: f64,
+    },
+    /// Too few points of a map are finite.
+    #[error("{found} of the map's velocities are finite, at least {needed} are needed")]
+    TooFewVelocities {
+        /// Finite velocities.
+        found: usize,
+        /// Least number that is accepted.
+        needed: usize,
+    },
 }
 
 /// Checks that a number is finite and positive.

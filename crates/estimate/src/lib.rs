@@ -42,6 +42,7 @@
 //! | `first_moment` | the mean of a skewed spectrum, which (28) asks for |
 //! | `bound`, `linalg` | Cramer-Rao bound; solve and eigenvectors with residual checks |
 //! | `error_map` | bias, standard deviation, root mean square with standard errors, (33) |
+//! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
 //!
 //! Features:
 //! - `rayon` (default) works on lines of sight and map points in the caller's thread pool; the bits of the result
@@ -89,6 +90,7 @@ mod statistic;
 mod transform;
 mod unbiased;
 mod velocity;
+pub mod vortex_fit;
 mod weighting;
 mod zoom;
 

@@ -1,0 +1,188 @@
+//! The circulation of a simulated wake: from raw signals to a map, to a fit of the map, to a fit of all raw signals.
+//!
+//! The scan is that of an analytic pair of 500 m^2/s at 47 m height, 376.5 and 423.5 m away, seen once by each line.
+
+use ndarray::Array2;
+use wakescope_estimate::vortex_fit::{
+    FreeParameters, MapFit, MapFitOptions, Parameter, Powers, PulseShape, RangeKernel, ScanModel, ScanSetup, Sharing,
+    SignalFit, SignalFitOptions, VelocityMap, Vortex, Wake, WakeModel, fit_map, fit_signals,
+};
+use wakescope_estimate::{Correlogram, LagWindowPeak, Noise, Radius, Scan, SignalKind, Weighting, polar_points};
+use wakescope_sim::join;
+use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
+use wakescope_sim::run;
+use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
+
+const CIRCULATION_M2_S: f64 = 500.0;
+
+fn truth() -> Wake {
+    let vortex = |lateral_position_m| Vortex {
+        circulation_m2_s: CIRCULATION_M2_S,
+        lateral_position_m,
+        height_m: 47.0,
+        core_radius_m: 2.35,
+    };
+    Wake { left: vortex(376.5), right: vortex(423.5), lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }
+}
+
+/// One scan: how it was taken, and its signals.
+struct Taken {
+    plan: Plan,
+    setup: ScanSetup,
+    snr: f64,
+    noise_power_a2: f64,
+    records_a: Array2<f64>,
+}
+
+fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
+    let mut scene = Scene { seed, ..Scene::default() };
+    scene.detector.snr = SnrReference::Fixed { snr_db };
+    scene.scan.pulses_per_line = 1;
+    scene.scan.realisations = 1;
+    change(&mut scene);
+    let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Signal).unwrap();
+    let scene = &plan.scene.scene;
+    let setup = ScanSetup {
+        sampling: join::sampling(scene).unwrap(),
+        kind: SignalKind::Real,
+        noise: Noise::Band { floor: 0.0 },
+        pulse: PulseShape::gaussian(join::pulse(scene).unwrap().sigma_s()).unwrap(),
+        wake: WakeModel::default(),
+        elevation_rad: plan.geometry.elevation_rad.clone(),
+        first_sample_time_s: 2.0 * plan.geometry.first_range_m / wakescope_estimate::SPEED_OF_LIGHT_M_S,
+        record_samples: plan.geometry.samples,
+    };
+    let noise_power_a2 = join::receiver(scene).noise_variance_a2();
+    let records_a = run::run(&plan, &Silent).unwrap().signals_a.unwrap();
+    Taken { setup, snr: 10f64.powf(0.1 * snr_db), noise_power_a2, records_a, plan }
+}
+
+/// Accumulated map with regions of 2 m (lag window of 16 lags), and the fit to it without prior knowledge.
+fn map_fit(taken: &Taken) -> MapFit {
+    let sampling = taken.setup.sampling;
+    let gates = join::gates(&taken.plan.scene.scene).unwrap();
+    let weighting = Weighting::default();
+    let statistic = Correlogram::<f64>::new(weighting, 64).unwrap();
+    let scan = Scan::new(&statistic, &sampling, &gates, &taken.setup.elevation_rad, taken.records_a.view()).unwrap();
+    let range_m: Vec<f64> = scan.geometry().gate_ranges_m().into_iter().step_by(8).collect();
+    let elevation_rad = scan.geometry().line_elevation_rad().to_vec();
+    let points = polar_points(&elevation_rad, &range_m);
+    let peak = LagWindowPeak::new(&sampling, SignalKind::Real, 64, 16, 1024, Default::default()).unwrap();
+    let found = scan.map(&points, &Radius::Fixed { radius_m: 2.0 }, None, &peak).unwrap();
+    let velocities = found.iter().map(|p| p.estimate.velocity_m_s).collect();
+    let velocity_m_s = Array2::from_shape_vec((elevation_rad.len(), range_m.len()), velocities).unwrap();
+    // what a gate sees, and the line of pulse, data window (h^2 at 1/e after a quarter of it) and lag window
+    let sigma_s = join::pulse(&taken.plan.scene.scene).unwrap().sigma_s();
+    let (window, period_s) = (weighting.weights(64).unwrap(), sampling.period_s());
+    let (quarter_s, lags_s) = (16.0 * period_s, 16.0 * period_s);
+    let line = RangeKernel::line_width_m_s(sampling.wavelength_m, sigma_s, quarter_s, Some(lags_s)).unwrap();
+    let kernel = RangeKernel::gaussian_gate(sigma_s, &window, period_s, 1.2).unwrap().seen_as_peak(line).unwrap();
+    let map = VelocityMap {
+        elevation_rad: &elevation_rad,
+        range_m: &range_m,
+        velocity_m_s: velocity_m_s.view(),
+        standard_deviation_m_s: None,
+    };
+    fit_map(&map, &taken.setup.wake, &kernel, &MapFitOptions::default()).unwrap()
+}
+
+/// Circulation of both vortices, positions and heights; the core radius is known, as it is for the bound of 6.8 m^2/s.
+fn known_core() -> FreeParameters {
+    FreeParameters { core_radius: Sharing::Fixed, ..FreeParameters::common_circulation() }
+}
+
+/// The likelihood fit, from the outcome of the map on; a fixed core keeps its true radius.
+fn signal_fit(taken: &Taken, map: &MapFit, free: FreeParameters) -> SignalFit {
+    let mut guess = map.wake;
+    if free.core_radius == Sharing::Fixed {
+        guess.left.core_radius_m = truth().left.core_radius_m;
+        guess.right.core_radius_m = truth().right.core_radius_m;
+    }
+    let options = SignalFitOptions { free, ..Default::default() };
+    fit_signals(&taken.setup, |_, _| taken.snr, taken.records_a.view(), taken.noise_power_a2, &guess, &options).unwrap()
+}
+
+#[test]
+fn bound_on_the_common_circulation_is_6_8_m2_s_at_0_db_and_2_5_at_10_db() {
+    // an independent study has 6.9 and 2.5 m^2/s, 0.13 m in height and 0.8 m across at 0 dB
+    for (snr_db, circulation_m2_s, height_m, lateral_m) in [(0.0, 6.9, 0.13, 0.8), (10.0, 2.5, 0.055, 0.40)] {
+        let taken = taken(1, snr_db, |_| {});
+        let model = ScanModel::new(&taken.setup, |_, _| taken.snr, &truth()).unwrap();
+        let bound = model.bound(&truth(), Powers::default(), &known_core(), true).unwrap();
+        let of = |parameter: Parameter| bound[[parameter as usize; 2]].sqrt();
+        for (parameter, expected) in [
+            (Parameter::LeftCirculation, circulation_m2_s),
+            (Parameter::LeftHeight, height_m),
+            (Parameter::RightLateral, lateral_m),
+        ] {
+            assert!((of(parameter) / expected - 1.0).abs() < 0.06, "{snr_db} dB, {parameter:?}: {}", of(parameter));
+        }
+    }
+}
+
+#[test]
+fn fits_of_maps_at_0_db_are_within_five_per_cent_of_the_circulation() {
+    let scans = 3;
+    let mut mean = 0.0;
+    for seed in 1..=scans {
+        let found = map_fit(&taken(seed, 0.0, |_| {})).wake;
+        let pair = 0.5 * (found.left.circulation_m2_s + found.right.circulation_m2_s);
+        assert!((pair / CIRCULATION_M2_S - 1.0).abs() < 0.1, "scan {seed}: {pair} m^2/s");
+        assert!((found.left.lateral_position_m - 376.5).abs() < 4.0 && (found.right.height_m - 47.0).abs() < 2.0);
+        mean += pair / scans as f64;
+    }
+    assert!((mean / CIRCULATION_M2_S - 1.0).abs() < 0.05, "mean of {scans} scans: {mean} m^2/s");
+}
+
+#[test]
+fn likelihood_fit_after_the_map_is_within_its_error_of_the_truth() {
+    // half of the lines: the bound is that of the model for them
+    let taken = taken(2, 0.0, |scene| scene.scan.elevation_step_rad = 2.5e-3);
+    let fit = signal_fit(&taken, &map_fit(&taken), known_core());
+    for parameter in [
+        Parameter::LeftCirculation,
+        Parameter::LeftLateral,
+        Parameter::RightLateral,
+        Parameter::LeftHeight,
+        Parameter::RightHeight,
+    ] {
+        let error = fit.wake.to_array()[parameter as usize] - truth().to_array()[parameter as usize];
+        let sigma = fit.standard_deviation(parameter);
+        assert!(error.abs() < 4.0 * sigma, "{parameter:?}: error {error}, bound {sigma}");
+    }
+    assert!(fit.standard_deviation(Parameter::LeftCirculation) < 15.0 && fit.log_likelihood_gain > 500.0);
+    assert!(fit.powers.log_signal.abs() < 0.1 && fit.powers.log_noise.abs() < 0.05, "{:?}", fit.powers);
+}
+
+/// Standard deviation and bias of the likelihood fit over scans. `SCANS`, `SNR_DB` and `FREE_CORE` in the environment
+/// change the number of scans (24), the signal-to-noise ratio (0) and free the core radii.
+///
+/// `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
+#[test]
+#[ignore = "minutes: measures bias and standard deviation"]
+fn circulation_over_many_scans() {
+    let number = |name, default: f64| std::env::var(name).map_or(default, |text| text.parse().unwrap());
+    let (scans, snr_db) = (number("SCANS", 24.0) as u64, number("SNR_DB", 0.0));
+    let free = if std::env::var("FREE_CORE").is_ok() { FreeParameters::common_circulation() } else { known_core() };
+    let (mut maps, mut fits) = (vec![], vec![]);
+    for seed in 1..=scans {
+        let taken = taken(seed, snr_db, |_| {});
+        let map = map_fit(&taken);
+        let fit = signal_fit(&taken, &map, free);
+        maps.push(map.wake.to_array());
+        fits.push(fit.wake.to_array());
+        println!("{seed}: map {:.1?}", map.wake.to_array());
+        println!("   signals {:.2?} in {} evaluations", fit.wake.to_array(), fit.evaluations);
+        for (name, all) in [("map", &maps), ("signals", &fits)] {
+            let n = all.len() as f64;
+            for (index, label) in [(0, "left Gamma"), (1, "right Gamma"), (2, "left y"), (3, "left z"), (6, "core")] {
+                let mean = all.iter().map(|a| a[index]).sum::<f64>() / n;
+                let std = (all.iter().map(|a| (a[index] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+                let bias = mean - truth().to_array()[index];
+                print!("   {name} {label}: bias {bias:.3} +- {:.3}, std {std:.3};", std / n.sqrt());
+            }
+            println!();
+        }
+    }
+}
