@@ -94,8 +94,7 @@ pub(super) fn first_guess(map: &VelocityMap<'_>, model: &WakeModel, kernel: &Ran
         .collect();
     let deviation = median(&mut rest) / 0.674_5;
     let significance = explained / (deviation * deviation) / 6.0;
-    // also refuses NaN
-    if !(significance >= SIGNIFICANT) {
+    if significance.is_nan() || significance < SIGNIFICANT {
         return Err(Error::NoVortex { significance, needed: SIGNIFICANT });
     }
     let spacing_m = places[right].lateral_m - places[left].lateral_m;
@@ -139,7 +138,7 @@ fn places(thinned: &Thinned, model: &WakeModel, kernel: &RangeKernel) -> Vec<Pla
         let mut shape = Vec::with_capacity(thinned.velocity.len());
         for &elevation_rad in &thinned.elevation_rad {
             let ray = Ray::new(elevation_rad);
-            kernel.apply(model, &wake, ray, &thinned.range_m, false, scratch, |_, velocity, _| shape.push(velocity));
+            kernel.apply((model, &wake, ray), &thinned.range_m, false, scratch, |_, velocity, _| shape.push(velocity));
         }
         Place { lateral_m, height_m, shape }
     })

@@ -248,7 +248,7 @@ impl Problem<'_, '_> {
         let lines = self.lines(|line, scratch| {
             let mut residuals = Vec::new();
             let ray = Ray::new(self.map.elevation_rad[line]);
-            self.kernel.apply(self.model, wake, ray, self.map.range_m, false, scratch, |gate, velocity, _| {
+            self.kernel.apply((self.model, wake, ray), self.map.range_m, false, scratch, |gate, velocity, _| {
                 let measured = self.map.velocity_m_s[[line, gate]];
                 if measured.is_finite() {
                     residuals.push((measured - velocity - self.shift(line, gate)) / self.map.deviation(line, gate));
@@ -290,14 +290,14 @@ impl Problem<'_, '_> {
             for i in 0..order {
                 let s = slope[i] / unit;
                 sums.gradient[i] -= weight * residual * s;
-                for j in 0..=i {
-                    let product = s * slope[j] / unit;
+                for (j, other) in slope.iter().enumerate().take(i + 1) {
+                    let product = s * other / unit;
                     sums.weighted[[i, j]] += weight * product;
                     sums.curved[[i, j]] += second * product;
                 }
             }
         };
-        self.kernel.apply(self.model, wake, ray, self.map.range_m, true, scratch, take);
+        self.kernel.apply((self.model, wake, ray), self.map.range_m, true, scratch, take);
         sums
     }
 

@@ -139,7 +139,7 @@ impl RangeKernel {
     ) -> Vec<f64> {
         let mut shifts = vec![0.0; range_m.len()];
         if let Some(width_m_s) = self.line_width_m_s {
-            self.apply(model, wake, ray, range_m, false, scratch, |_, _, _| {});
+            self.apply((model, wake, ray), range_m, false, scratch, |_, _, _| {});
             let nearest_m = range_m.iter().copied().fold(f64::INFINITY, f64::min);
             for (shift, r_m) in shifts.iter_mut().zip(range_m) {
                 // to the nearest grid point: the shift is smooth
@@ -190,9 +190,7 @@ impl RangeKernel {
     /// Gate velocities of a line, and with `slopes` their derivatives: `out(gate, velocity, derivatives)` for each range.
     pub(super) fn apply(
         &self,
-        model: &WakeModel,
-        wake: &Wake,
-        ray: Ray,
+        (model, wake, ray): (&WakeModel, &Wake, Ray),
         range_m: &[f64],
         slopes: bool,
         scratch: &mut LineScratch,
@@ -265,11 +263,17 @@ mod tests {
         let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1]);
         let elevation_rad = 0.3_f64;
         let ranges = [300.0, 300.25, 412.3];
-        gate().apply(&model, &calm, Ray::new(elevation_rad), &ranges, false, &mut LineScratch::default(), |i, v, _| {
-            let at_m = ranges[i] - 0.25 * SPEED_OF_LIGHT_M_S * 4e-9;
-            let expected = (1.0 + 0.1 * at_m * elevation_rad.sin()) * elevation_rad.cos();
-            assert_relative_eq!(v, expected, max_relative = 1e-9);
-        });
+        gate().apply(
+            (&model, &calm, Ray::new(elevation_rad)),
+            &ranges,
+            false,
+            &mut LineScratch::default(),
+            |i, v, _| {
+                let at_m = ranges[i] - 0.25 * SPEED_OF_LIGHT_M_S * 4e-9;
+                let expected = (1.0 + 0.1 * at_m * elevation_rad.sin()) * elevation_rad.cos();
+                assert_relative_eq!(v, expected, max_relative = 1e-9);
+            },
+        );
     }
 
     #[test]
@@ -287,10 +291,10 @@ mod tests {
         let ranges = [377.7, 400.0];
         let values = |wake: &Wake| {
             let mut values = vec![];
-            kernel.apply(&model, wake, ray, &ranges, false, &mut LineScratch::default(), |_, v, _| values.push(v));
+            kernel.apply((&model, wake, ray), &ranges, false, &mut LineScratch::default(), |_, v, _| values.push(v));
             values
         };
-        kernel.apply(&model, &wake(), ray, &ranges, true, &mut LineScratch::default(), |gate, velocity, slope| {
+        kernel.apply((&model, &wake(), ray), &ranges, true, &mut LineScratch::default(), |gate, velocity, slope| {
             assert_eq!(velocity, values(&wake())[gate]);
             for (index, slope) in slope.iter().enumerate() {
                 let moved = |by: f64| {

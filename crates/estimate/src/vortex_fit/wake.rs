@@ -285,13 +285,7 @@ mod tests {
     fn derivatives_are_difference_quotients_for_both_profiles_with_and_without_ground() {
         for profile in [CoreProfile::Algebraic, CoreProfile::LambOseen] {
             for images in [true, false] {
-                let model = WakeModel {
-                    profile,
-                    images,
-                    lidar_lateral_position_m: -20.0,
-                    lidar_height_m: 1.5,
-                    ..Default::default()
-                };
+                let model = WakeModel { profile, images, lidar_lateral_position_m: -20.0, lidar_height_m: 1.5 };
                 // the last two are inside a core, one within the series of the Lamb-Oseen profile
                 for (range_m, elevation_rad) in [(300.0, 0.05), (420.0, 0.2), (399.0, 0.109_3), (398.923_6, 0.109_261)]
                 {
