@@ -30,7 +30,7 @@ const MAX_PASSES: usize = 5;
 /// A pass that leaves more than this has stalled.
 const STALLED: f64 = 0.5;
 /// Part of the tolerance asked of a pass: the residual it sees is not exactly the field's.
-const SAFETY: f64 = 0.98;
+const SAFETY: f64 = 0.999;
 
 impl Refinement {
     /// Replaces the right side in `field` by the solution. `solve` replaces a right side of the given norm by a solution of

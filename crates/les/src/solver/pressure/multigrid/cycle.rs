@@ -98,8 +98,8 @@ impl Hierarchy {
             level.coarsest(mode, u, f, scratch);
             return;
         };
-        relax((second, first), mode, u, f, false, scratch);
         relax((first, second), mode, u, f, false, scratch);
+        relax((second, first), mode, u, f, false, scratch);
         coarse.f.fill([0.0; LANES]);
         restrict(level, mode, u, f, &mut coarse.f, row, coarse_row);
         self.descend(l + 1, mode, work);
@@ -107,8 +107,8 @@ impl Hierarchy {
         let (fine, coarse) = fields.split_at_mut(l + 1);
         let (Some(Fields { u, f }), Some(coarse)) = (fine.last_mut(), coarse.first()) else { return };
         interpolate(level, &coarse.u, u, coarse_row);
-        relax((first, second), mode, u, f, true, scratch);
         relax((second, first), mode, u, f, true, scratch);
+        relax((first, second), mode, u, f, true, scratch);
     }
 }
 

@@ -78,8 +78,8 @@ impl Axis {
         let pair = |i: usize| 2 * i..(2 * i + 2).min(self.len());
         let coarse = self.len().div_ceil(2);
         let mass: Vec<f64> = (0..coarse).map(|i| self.mass[pair(i)].iter().sum()).collect();
-        let moment = |i: usize| pair(i).map(|c| self.mass[c] * self.centre[c]).sum::<f64>();
-        let centre: Vec<f64> = (0..coarse).map(|i| moment(i) / mass[i]).collect();
+        let sum = |i: usize| pair(i).map(|c| self.centre[c]).sum::<f64>();
+        let centre: Vec<f64> = (0..coarse).map(|i| sum(i) / pair(i).len() as f64).collect();
         let weights = (0..self.len()).map(|i| self.weights(i, &centre)).collect();
         (Self::of(mass, centre, self.period), weights)
     }

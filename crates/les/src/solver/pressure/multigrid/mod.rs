@@ -39,7 +39,7 @@ type Lanes = [f32; LANES];
 type Wide = [f64; LANES];
 
 /// Part of the tolerance that is shared in proportion to the right side of each group of modes.
-const PROPORTIONAL: f64 = 0.9;
+const PROPORTIONAL: f64 = 0.99;
 
 /// The multigrid solver of one mesh.
 #[derive(Debug)]
