@@ -117,6 +117,8 @@ pub enum Pressure {
     Auto,
     /// Transforms and a banded factorisation.
     Direct,
+    /// Multigrid behind the transform of one direction.
+    Multigrid,
 }
 
 /// The subgrid model; constants that are left out are the model's own.

@@ -47,6 +47,7 @@ impl Setup {
         s.pressure = match solver.pressure {
             Pressure::Auto => PressureMethod::Auto,
             Pressure::Direct => PressureMethod::Direct,
+            Pressure::Multigrid => PressureMethod::Multigrid,
         };
         s.pressure_tolerance = solver.pressure_tolerance;
         s.rotational = solver.rotational;
