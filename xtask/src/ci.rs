@@ -24,9 +24,9 @@ struct Step {
 /// Feature sets that must build: each crate with nothing, and each feature alone.
 const FEATURES: [(&str, &[&str]); 4] = [
     ("wakescope-optics", &["", "rayon", "screens"]),
-    ("wakescope-les", &[""]),
+    ("wakescope-les", &["", "solver"]),
     ("wakescope-estimate", &["", "rayon", "bundled-lapack"]),
-    ("wakescope-sim", &["", "cli", "netcdf", "plots", "vtk", "npz"]),
+    ("wakescope-sim", &["", "cli", "flow", "netcdf", "plots", "vtk", "npz"]),
 ];
 
 fn steps() -> Result<Vec<Step>, Failure> {

@@ -31,11 +31,12 @@
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
 //! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
 //! | `series` | [`GridSeries`]: snapshots at several times, a wind that moves |
+//! | `solver` | [`Flow`], [`Mesh`], [`FlowSettings`]: the simulation; [`Run`]: a run with outputs and checkpoints; [`cases`] |
 //! | `axis` | one direction of a mesh: stretching, walls, periods |
 //! | `kernel` | the M'4 kernel, (27) |
 //! | `diagnose` | circulation on circles, (1), and `Gamma_5-15` |
 //!
-//! No optional features.
+//! Feature `solver` (default): the large-eddy simulation, see [`Flow`]. Without it neither threads nor transforms are compiled.
 
 mod axis;
 mod diagnose;
@@ -44,6 +45,7 @@ mod grid_wind;
 mod kernel;
 mod profile;
 mod series;
+#[cfg(feature = "solver")]
 mod solver;
 mod vortex;
 mod wind;
@@ -55,11 +57,12 @@ pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
 pub use kernel::{m4_prime, m4_prime_weights};
 pub use profile::CirculationProfile;
 pub use series::GridSeries;
-
+#[cfg(feature = "solver")]
 pub use solver::{
     CheckpointPlan, CrossPlane, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent,
     StepRecord, check_checkpoint,
 };
+#[cfg(feature = "solver")]
 pub use solver::{
     Direction, Ends, Flow, FlowSettings, Mapping, MappingFn, Mesh, PressureEquation, PressureMethod, PressureSolved,
     StartReport, StepReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment, Wall, cases,

@@ -43,6 +43,7 @@
 //! PNG, the report page), `vtk` and `npz` (more formats for fields).
 
 pub mod export;
+#[cfg(feature = "flow")]
 pub mod flow;
 pub mod geometry;
 pub mod join;

@@ -209,7 +209,6 @@ pub(crate) fn correct(
 
 /// Corrects one row, adds its part of the Courant rate, and returns `sum mass u^2`.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-#[allow(clippy::too_many_arguments)]
 fn correct_row(
     row: &mut [f64],
     star: &[f64],

@@ -13,6 +13,9 @@
 //!
 //! Check: skewness, row sums, exactness for parabolas, mirror symmetry of the two walls.
 
+// The tables are written as they were derived, with all digits.
+#![allow(clippy::excessive_precision)]
+
 use super::line::{Line, Taps, resolve_cell, resolve_face};
 
 /// Weights of the pairs at distance 1 and 3.

@@ -87,7 +87,7 @@ impl TollmienSchlichting {
 fn chebyshev() -> (Vec<f64>, Vec<Vec<f64>>) {
     let n = ORDER;
     let z: Vec<f64> = (0..=n).map(|j| (std::f64::consts::PI * j as f64 / n as f64).cos()).collect();
-    let weight = |j: usize| if j == 0 || j == n { 2.0 } else { 1.0 } * if j % 2 == 0 { 1.0 } else { -1.0 };
+    let weight = |j: usize| if j == 0 || j == n { 2.0 } else { 1.0 } * if j.is_multiple_of(2) { 1.0 } else { -1.0 };
     let mut d = vec![vec![0.0; n + 1]; n + 1];
     for i in 0..=n {
         for j in 0..=n {
@@ -196,7 +196,8 @@ fn interpolate(values: &[C64], z: f64) -> C64 {
         if (z - node).abs() < 1e-15 {
             return *value;
         }
-        let weight = if j == 0 || j == n { 0.5 } else { 1.0 } * if j % 2 == 0 { 1.0 } else { -1.0 } / (z - node);
+        let weight =
+            if j == 0 || j == n { 0.5 } else { 1.0 } * if j.is_multiple_of(2) { 1.0 } else { -1.0 } / (z - node);
         above += value * weight;
         below += weight;
     }
