@@ -12,7 +12,17 @@
 //! damps the cores of vortices. The multiscale form (the regularised variational one of Jeanmart and Winckelmans 2007) removes this:
 //! the strain is that of `u` minus its low-pass filtered field, which is zero for flows that vary slowly from cell to cell.
 //!
-//! Where no model is asked for there is none: no arrays, no work.
+//! Constants: those of the multiscale form follow from that of WALE by the share of the strain that the small scales have in a
+//! `k^(-5/3)` spectrum ([`SubgridModel::multiscale_constant`]). In decaying grid turbulence on 64^3 cells (the example
+//! `decaying_turbulence`) the energy of the upper third of the wave numbers is then 0.97 and 1.03 of the measured one at the two
+//! later stations (order 3; 1.03 and 0.85 for WALE with 0.5, 4.2 and 4.6 without a model).
+//!
+//! The stress is integrated explicitly. In the core of a vortex the viscosity, which has nothing to act on there, can exceed
+//! what the step follows: it is cut at that value. Without the cut noise along a vortex of three cells grew a thousandfold in
+//! 150 steps; a step short enough gave the same noise and, to 5e-5, the same energy as the cut.
+//!
+//! Where no model is asked for there is none: no arrays, no work. A model takes 7 arrays of the size of the mesh, the multiscale
+//! one 10.
 //!
 //! Check: closed forms, laminar flows, walls, vortices, the energy identity, bits against threads.
 
