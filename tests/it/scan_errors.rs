@@ -48,7 +48,7 @@ impl Scene {
         let weight_per_m = 10f64.powf(0.1 * snr_db) / receiver.slowly_varying_snr(150e-6, 1.0);
         let first_s = 2.0 * FIRST_SAMPLE_M / SPEED_OF_LIGHT_M_S;
         let record = Record { time_of_first_sample_s: first_s, samples: SAMPLES };
-        let simulator = Simulator::new(pulse.clone(), receiver, record).unwrap();
+        let simulator = Simulator::new(pulse, receiver, record).unwrap();
         let pair = VortexPair {
             circulation_m2_s: 500.0,
             spacing_m: 47.0,
@@ -88,7 +88,7 @@ impl Scene {
             gates.ranges_m(SAMPLES, &sampling).unwrap().into_iter().skip(3).step_by(EVERY).collect();
         let points = polar_points(&elevation_rad, &range_m);
         let filters = [
-            RangeFilter::pulse(pulse.clone(), thickness_m).unwrap(),
+            RangeFilter::pulse(pulse, thickness_m).unwrap(),
             RangeFilter::gate(pulse, &[1.0; WINDOW], 250e6, thickness_m).unwrap(),
         ];
         let truth = |filter: &RangeFilter| -> Vec<f64> {

@@ -78,7 +78,7 @@ const QUANTITIES: [&str; 26] = [
 ];
 
 /// What a name with a unit ends with; a fraction has none.
-const UNITS: [&str; 32] = [
+const UNITS: [&str; 35] = [
     "_m",
     "_s",
     "_hz",
@@ -107,6 +107,9 @@ const UNITS: [&str; 32] = [
     "_bytes",
     "_samples",
     "_m_s2",
+    "_m2_s2",
+    "_m5_s2",
+    "_m5_s3",
     "_a2_hz",
     "_per_hz",
     "_fraction",
@@ -114,10 +117,13 @@ const UNITS: [&str; 32] = [
 ];
 
 /// Public numbers that name a quantity but have no unit of the SI: the path begins with the first word.
-const WITHOUT_UNIT: [(&str, &str); 3] = [
+const WITHOUT_UNIT: [(&str, &str); 5] = [
     // In the square of whatever unit the caller's samples have.
     ("crates/estimate/src/velocity.rs", "power"),
     ("crates/estimate/src/autoregressive.rs", "noise_power"),
+    // In spacings of the pair.
+    ("crates/les/src/solver/cases/vortex_pair.rs", "height"),
+    ("crates/les/src/solver/cases/vortex_pair.rs", "core_radius"),
     // In drawing units.
     ("crates/sim/src/plot/", "width"),
 ];

@@ -77,21 +77,25 @@ pub enum Error {
     },
     /// A time step is so long that the scheme would be unstable.
     #[error(
-        "step {step} of {step_s} s has Courant number {courant}, above {limit}: fastest is {component} at x, y, z = \
-         {position_m:?} m; shorten the step or let a Courant number control it"
+        "step {step} of {step_s} s at t = {time_s} s has Courant number {courant}, above {limit}: fastest is {component} in cell \
+         {cell:?}, x, y, z = {position_m:?} m; shorten the step or let a Courant number control it"
     )]
     CourantTooLarge {
         /// Number of the step that was refused.
         step: u64,
         /// Its length \[s\].
         step_s: f64,
+        /// Time at which it would begin \[s\].
+        time_s: f64,
         /// Its Courant number.
         courant: f64,
         /// Largest allowed.
         limit: f64,
         /// Fastest velocity component.
         component: &'static str,
-        /// Where it is \[m\].
+        /// Where it is: cell along x, y, z.
+        cell: [usize; 3],
+        /// Position of that cell \[m\].
         position_m: [f64; 3],
     },
     /// The system refused to read or write a file.

@@ -65,8 +65,11 @@ fn show(reynolds: f64, profile: Profile) -> Result<Shown, Failure> {
     Ok(Shown { checks, table, figure: Figure::stacked([curve, wall]) })
 }
 
+/// Time and value of each of the two maxima.
+type Maxima = ((f64, f64), (f64, f64));
+
 /// Times and values of the two maxima in the literature.
-fn literature(reynolds: f64) -> Result<((f64, f64), (f64, f64)), Failure> {
+fn literature(reynolds: f64) -> Result<Maxima, Failure> {
     let text = read("tests/reference/les/dipole_wall_normal.csv")?;
     let rows = text.lines().filter(|line| line.ends_with("C&B2006"));
     let cells = rows.map(|line| line.split(',').filter_map(|cell| cell.trim().parse().ok()).collect::<Vec<f64>>());

@@ -80,9 +80,11 @@ impl Flow {
         Err(Error::CourantTooLarge {
             step: self.state.step + 1,
             step_s,
+            time_s: self.state.time_s,
             courant,
             limit,
             component: self.component_name(axis),
+            cell: self.cell(place),
             position_m: self.position_m(place),
         })
     }

@@ -1,6 +1,6 @@
 //! The discrete conservation laws, exact solutions and orders of the time step.
 
-use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Ends, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::*;
 

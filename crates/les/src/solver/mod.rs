@@ -16,6 +16,7 @@ mod mesh;
 mod momentum;
 mod pressure;
 mod projection;
+mod report;
 mod rows;
 mod run;
 mod sample;
@@ -25,9 +26,10 @@ mod subgrid;
 mod transport;
 
 pub use checkpoint::check_checkpoint;
-pub use flow::{Flow, StartReport, StepReport};
+pub use flow::Flow;
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
 pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
+pub use report::{StartReport, StepReport};
 pub use run::{
     CheckpointPlan, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent, StepRecord,
 };

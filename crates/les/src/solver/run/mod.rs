@@ -9,8 +9,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::flow::{Flow, StepReport};
+use super::flow::Flow;
 use super::mesh::Mesh;
+use super::report::StepReport;
 use super::settings::FlowSettings;
 use crate::Error;
 use crate::error::check;
