@@ -125,6 +125,9 @@ pub struct MapFit {
     /// Covariance \[10, 10\] of the parameters in the order of [`Parameter`]; zeros where one is fixed. It tells of scatter, not of
     /// what an estimator of velocity adds to all maps alike.
     pub covariance: Array2<f64>,
+    /// Whether core radii were fitted to the end. A core that the map does not resolve keeps the value of the round before, with
+    /// zeros in the covariance.
+    pub cores_fitted: bool,
     /// Velocities that were used.
     pub used: usize,
     /// Those with a residual above 3 scales.
@@ -178,14 +181,21 @@ pub fn refine_map_fit(
     if used < needed {
         return Err(Error::TooFewVelocities { found: used, needed });
     }
+    let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
     let mut problem = Problem { map, model, kernel, groups: &groups, loss: options.loss, shifts: Vec::new() };
     let stop = Stop { iterations: options.max_iterations, sigmas: options.tolerance_sigmas, learns: false };
     let mut wake = options.free.start(guess);
     let mut scale = problem.scale(&wake)?;
     let mut iterations = 0;
-    for _ in 0..ROUNDS {
-        let evaluate = |wake: &Wake| problem.normal(wake, scale, model.images);
-        (wake, _, iterations) = descend(wake, stop, evaluate, |wake, step| moved(&groups, wake, step))?;
+    for round in 0..ROUNDS {
+        (wake, iterations) = match problem.descend(wake, scale, stop) {
+            // a core that the map does not resolve may run away to nothing: it keeps what the last round gave
+            Err(Error::NotConverged { .. }) if round > 0 && coreless.len() < problem.groups.len() => {
+                problem.groups = &coreless;
+                problem.descend(wake, scale, stop)?
+            }
+            end => end?,
+        };
         problem.shifts = problem.lines(|line, scratch| {
             kernel.peak_shifts(model, &wake, Ray::new(map.elevation_rad[line]), map.range_m, scratch)
         });
@@ -197,13 +207,19 @@ pub fn refine_map_fit(
     let calm_cost = problem.calm(&wake, scale, stop).map_or(f64::NAN, |calm| cost(&problem.residuals(&calm)));
     Ok(MapFit {
         wake,
-        covariance: spread(&groups, &covariance),
+        covariance: spread(problem.groups, &covariance),
+        cores_fitted: problem.groups.iter().any(|group| is_core(group)),
         used,
         outliers: residuals.iter().filter(|r| r.abs() > 3.0 * scale).count(),
         residual_scale: scale,
         explained_fraction: 1.0 - cost(&residuals) / calm_cost,
         iterations,
     })
+}
+
+/// Whether a free number moves core radii.
+fn is_core(group: &[usize]) -> bool {
+    group.iter().all(|&place| place == Parameter::LeftCore as usize || place == Parameter::RightCore as usize)
 }
 
 /// Median of the numbers, which are reordered; NaN if there are none.
@@ -237,6 +253,13 @@ struct LineSums {
 impl Problem<'_, '_> {
     fn lines<T: Send>(&self, f: impl Fn(usize, &mut LineScratch) -> T + Sync + Send) -> Vec<T> {
         map_indexed(self.map.elevation_rad.len(), LineScratch::default, |scratch, line| f(line, scratch))
+    }
+
+    /// One round from a start on: the wake and the evaluations.
+    fn descend(&self, start: Wake, scale: f64, stop: Stop) -> Result<(Wake, usize), Error> {
+        let evaluate = |wake: &Wake| self.normal(wake, scale, self.model.images);
+        let step = |wake: &Wake, step: &[f64]| moved(self.groups, wake, step);
+        descend(start, stop, evaluate, step).map(|(wake, _, iterations)| (wake, iterations))
     }
 
     fn shift(&self, line: usize, gate: usize) -> f64 {

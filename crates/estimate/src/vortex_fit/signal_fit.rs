@@ -115,13 +115,23 @@ pub fn fit_signals<S: Sample>(
     for round in 0..ROUNDS {
         let model = ScanModel::new(setup, &snr, &state.0)?;
         let signals = ScanSignals::new(&model, records, noise_power)?;
-        if round == 0 && model.largest_snr > 1.0 {
-            // The likelihood of a strong signal has many tops; that of the same signal said to be weak leads to the highest.
-            let weak = Powers { log_signal: -model.largest_snr.ln(), log_noise: 0.0 };
+        // The likelihood of a strong signal has many tops; that of the same signal said to be weak leads to the highest.
+        let rough = |wake: Wake, snr: f64, evaluations: &mut usize| {
+            let weak = Powers { log_signal: (snr / model.largest_snr).ln(), log_noise: 0.0 };
             let rough = SignalFitOptions { fit_powers: false, tolerance_sigmas: ROUGH_SIGMAS, ..*options };
-            state.0 = climb(&model, &signals, (state.0, weak), &rough, &mut evaluations)?.0;
+            climb(&model, &signals, (wake, weak), &rough, evaluations).map(|(wake, _)| (wake, Powers::default()))
+        };
+        if round == 0 && model.largest_snr > 1.0 {
+            state = rough(state.0, 1.0, &mut evaluations)?;
         }
-        state = climb(&model, &signals, state, options, &mut evaluations)?;
+        state = match climb(&model, &signals, state, options, &mut evaluations) {
+            // astray between two tops: once more, from where a weaker signal leads
+            Err(Error::NotConverged { .. }) if round == 0 => {
+                let start = rough(state.0, 0.3 * model.largest_snr.min(1.0), &mut evaluations)?;
+                climb(&model, &signals, start, options, &mut evaluations)?
+            }
+            end => end?,
+        };
         if model.covers(&state.0) {
             return finish(&model, &signals, state, options, evaluations);
         }
