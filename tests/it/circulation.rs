@@ -4,10 +4,12 @@
 
 use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
-    FreeParameters, MapFit, MapFitOptions, Parameter, Powers, PulseShape, RangeKernel, ScanModel, ScanSetup, Sharing,
-    SignalFit, SignalFitOptions, VelocityMap, Vortex, Wake, WakeModel, fit_map, fit_signals,
+    FreeParameters, Loss, MapFit, MapFitOptions, Parameter, Powers, PulseShape, RangeKernel, ScanModel, ScanSetup,
+    Sharing, SignalFit, SignalFitOptions, VelocityMap, Vortex, Wake, WakeModel, fit_map, fit_signals,
 };
-use wakescope_estimate::{Correlogram, LagWindowPeak, Noise, Radius, Scan, SignalKind, Weighting, polar_points};
+use wakescope_estimate::{
+    Correlogram, Estimator, FirstMoment, LagWindowPeak, Noise, Radius, Scan, SignalKind, Weighting, polar_points,
+};
 use wakescope_sim::join;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
@@ -58,33 +60,53 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
     Taken { setup, snr: 10f64.powf(0.1 * snr_db), noise_power_a2, records_a, plan }
 }
 
-/// Accumulated map with regions of 2 m (lag window of 16 lags), and the fit to it without prior knowledge.
-fn map_fit(taken: &Taken) -> MapFit {
-    let sampling = taken.setup.sampling;
+/// How a map is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Velocities {
+    /// Peak of the spectrum with a lag window of 16 lags; the fit is told so.
+    LagWindow,
+    /// First moment, which is nearly what a gate sees.
+    Moment,
+}
+
+/// Accumulated map with regions of 2 m, and the fit to it without prior knowledge.
+fn map_fit(taken: &Taken, velocities: Velocities, options: &MapFitOptions) -> MapFit {
+    let (sampling, kind) = (taken.setup.sampling, SignalKind::Real);
     let gates = join::gates(&taken.plan.scene.scene).unwrap();
-    let weighting = Weighting::default();
+    let weighting = match velocities {
+        Velocities::LagWindow => Weighting::default(),
+        Velocities::Moment => Weighting::Rectangular,
+    };
     let statistic = Correlogram::<f64>::new(weighting, 64).unwrap();
     let scan = Scan::new(&statistic, &sampling, &gates, &taken.setup.elevation_rad, taken.records_a.view()).unwrap();
     let range_m: Vec<f64> = scan.geometry().gate_ranges_m().into_iter().step_by(8).collect();
     let elevation_rad = scan.geometry().line_elevation_rad().to_vec();
     let points = polar_points(&elevation_rad, &range_m);
-    let peak = LagWindowPeak::new(&sampling, SignalKind::Real, 64, 16, 1024, Default::default()).unwrap();
-    let found = scan.map(&points, &Radius::Fixed { radius_m: 2.0 }, None, &peak).unwrap();
-    let velocities = found.iter().map(|p| p.estimate.velocity_m_s).collect();
-    let velocity_m_s = Array2::from_shape_vec((elevation_rad.len(), range_m.len()), velocities).unwrap();
-    // what a gate sees, and the line of pulse, data window (h^2 at 1/e after a quarter of it) and lag window
+    let estimator: Box<dyn Estimator> = match velocities {
+        Velocities::LagWindow => {
+            Box::new(LagWindowPeak::new(&sampling, kind, 64, 16, 1024, Default::default()).unwrap())
+        }
+        Velocities::Moment => Box::new(FirstMoment::new(&sampling, kind, 64, 512, 3.5).unwrap()),
+    };
+    let found = scan.map(&points, &Radius::Fixed { radius_m: 2.0 }, None, estimator.as_ref()).unwrap();
+    let velocity = found.iter().map(|p| p.estimate.velocity_m_s).collect();
+    let velocity_m_s = Array2::from_shape_vec((elevation_rad.len(), range_m.len()), velocity).unwrap();
     let sigma_s = join::pulse(&taken.plan.scene.scene).unwrap().sigma_s();
     let (window, period_s) = (weighting.weights(64).unwrap(), sampling.period_s());
-    let (quarter_s, lags_s) = (16.0 * period_s, 16.0 * period_s);
-    let line = RangeKernel::line_width_m_s(sampling.wavelength_m, sigma_s, quarter_s, Some(lags_s)).unwrap();
-    let kernel = RangeKernel::gaussian_gate(sigma_s, &window, period_s, 1.2).unwrap().seen_as_peak(line).unwrap();
+    let mut kernel = RangeKernel::gaussian_gate(sigma_s, &window, period_s, 1.2).unwrap();
+    if velocities == Velocities::LagWindow {
+        // the line of pulse, data window (h^2 at 1/e after a quarter of it) and lag window
+        let (quarter_s, lags_s) = (16.0 * period_s, 16.0 * period_s);
+        let line = RangeKernel::line_width_m_s(sampling.wavelength_m, sigma_s, quarter_s, Some(lags_s)).unwrap();
+        kernel = kernel.seen_as_peak(line).unwrap();
+    }
     let map = VelocityMap {
         elevation_rad: &elevation_rad,
         range_m: &range_m,
         velocity_m_s: velocity_m_s.view(),
         standard_deviation_m_s: None,
     };
-    fit_map(&map, &taken.setup.wake, &kernel, &MapFitOptions::default()).unwrap()
+    fit_map(&map, &taken.setup.wake, &kernel, options).unwrap()
 }
 
 /// Circulation of both vortices, positions and heights; the core radius is known, as it is for the bound of 6.8 m^2/s.
@@ -121,25 +143,29 @@ fn bound_on_the_common_circulation_is_6_8_m2_s_at_0_db_and_2_5_at_10_db() {
     }
 }
 
+/// One core radius and one circulation for both vortices: the lag window leaves some 6 % too much, and 5 % of scatter.
 #[test]
-fn fits_of_maps_at_0_db_are_within_five_per_cent_of_the_circulation() {
+fn fits_of_maps_at_0_db_are_within_eight_per_cent_of_the_circulation_on_average() {
+    let free = FreeParameters { core_radius: Sharing::Common, ..FreeParameters::common_circulation() };
+    let options = MapFitOptions { free, ..Default::default() };
     let scans = 3;
     let mut mean = 0.0;
     for seed in 1..=scans {
-        let found = map_fit(&taken(seed, 0.0, |_| {})).wake;
-        let pair = 0.5 * (found.left.circulation_m2_s + found.right.circulation_m2_s);
-        assert!((pair / CIRCULATION_M2_S - 1.0).abs() < 0.1, "scan {seed}: {pair} m^2/s");
+        let found = map_fit(&taken(seed, 0.0, |_| {}), Velocities::LagWindow, &options).wake;
+        let circulation_m2_s = found.left.circulation_m2_s;
+        assert!((circulation_m2_s / CIRCULATION_M2_S - 1.0).abs() < 0.15, "scan {seed}: {circulation_m2_s} m^2/s");
         assert!((found.left.lateral_position_m - 376.5).abs() < 4.0 && (found.right.height_m - 47.0).abs() < 2.0);
-        mean += pair / scans as f64;
+        mean += circulation_m2_s / scans as f64;
     }
-    assert!((mean / CIRCULATION_M2_S - 1.0).abs() < 0.05, "mean of {scans} scans: {mean} m^2/s");
+    assert!((mean / CIRCULATION_M2_S - 1.0).abs() < 0.08, "mean of {scans} scans: {mean} m^2/s");
 }
 
 #[test]
 fn likelihood_fit_after_the_map_is_within_its_error_of_the_truth() {
     // half of the lines: the bound is that of the model for them
     let taken = taken(2, 0.0, |scene| scene.scan.elevation_step_rad = 2.5e-3);
-    let fit = signal_fit(&taken, &map_fit(&taken), known_core()).unwrap();
+    let fit =
+        signal_fit(&taken, &map_fit(&taken, Velocities::LagWindow, &MapFitOptions::default()), known_core()).unwrap();
     for parameter in [
         Parameter::LeftCirculation,
         Parameter::LeftLateral,
@@ -168,7 +194,7 @@ fn circulation_over_many_scans() {
     let (mut maps, mut fits) = (vec![], vec![]);
     for seed in number("FIRST", 1.0) as u64..=scans {
         let taken = taken(seed, snr_db, |_| {});
-        let map = map_fit(&taken);
+        let map = map_fit(&taken, Velocities::LagWindow, &MapFitOptions::default());
         let fit = match signal_fit(&taken, &map, free) {
             Ok(fit) => fit,
             Err(error) => {
@@ -190,5 +216,41 @@ fn circulation_over_many_scans() {
             }
             println!();
         }
+    }
+}
+
+/// Mean circulation of the pair from fits of maps over scans, for each way to make a map. `SCANS` and `SNR_DB` as above.
+///
+/// `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_from_many_maps`
+#[test]
+#[ignore = "minutes: measures bias and standard deviation"]
+fn circulation_from_many_maps() {
+    let number = |name, default: f64| std::env::var(name).map_or(default, |text| text.parse().unwrap());
+    let (scans, snr_db) = (number("SCANS", 24.0) as u64, number("SNR_DB", 0.0));
+    let all_free = MapFitOptions::default();
+    let one_core = MapFitOptions {
+        free: FreeParameters { core_radius: Sharing::Common, ..FreeParameters::common_circulation() },
+        ..all_free
+    };
+    let squares = MapFitOptions { loss: Loss::Squares, ..one_core };
+    let mut found = vec![];
+    for seed in 1..=scans {
+        let taken = taken(seed, snr_db, |_| {});
+        let mut row = vec![];
+        for velocities in [Velocities::LagWindow, Velocities::Moment] {
+            for options in [&all_free, &one_core, &squares] {
+                let wake = map_fit(&taken, velocities, options).wake;
+                row.push(0.5 * (wake.left.circulation_m2_s + wake.right.circulation_m2_s));
+            }
+        }
+        println!("{seed}: {row:.1?}");
+        found.push(row);
+    }
+    let n = found.len() as f64;
+    for column in 0..found[0].len() {
+        let mean = found.iter().map(|row| row[column]).sum::<f64>() / n;
+        let std = (found.iter().map(|row| (row[column] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        let (velocities, fit) = (["lag window", "moment"][column / 3], ["free", "one core", "squares"][column % 3]);
+        println!("{velocities}, {fit}: {mean:.1} +- {:.1}, std {std:.1} m^2/s", std / n.sqrt());
     }
 }

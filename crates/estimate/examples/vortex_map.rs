@@ -100,8 +100,8 @@ fn made_up(model: &WakeModel) -> Result<Map, Box<dyn Error>> {
     let mut place = 0.0_f64;
     let velocity_m_s = Array2::from_shape_fn((93, 40), |(line, gate)| {
         // the mean over the gate, roughly, and a number between -1.5 and 1.5
-        let seen = (-40..=40).map(|i| {
-            let weight = (-(f64::from(i) / 20.0).powi(2)).exp() / (20.0 * std::f64::consts::PI.sqrt());
+        let seen = (-60..=60).map(|i| {
+            let weight = (-(f64::from(i) / 24.0).powi(2)).exp() / (24.0 * std::f64::consts::PI.sqrt());
             weight * model.radial_velocity_m_s(&wake, range_m[gate] + f64::from(i), elevation_rad[line])
         });
         place += 1.0;

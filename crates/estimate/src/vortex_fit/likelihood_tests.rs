@@ -95,7 +95,8 @@ fn covariance_of_a_line_is_the_plain_sum_over_thin_layers() {
                     let place = space.factor.at(column, down);
                     let found = C64::new(space.factor.re[place], space.factor.im[place]);
                     let error = (found - plain[[column + down, column]]).norm();
-                    assert!(error < 2e-4, "{profile:?} ({column} + {down}): {error}");
+                    // of a power of 3 to 4
+                    assert!(error < 5e-4, "{profile:?} ({column} + {down}): {error}");
                 }
             }
         }

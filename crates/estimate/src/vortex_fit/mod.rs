@@ -19,14 +19,16 @@
 //!   0.13 m in height, 0.78 m across;
 //! - fit of the signals: bias -0.3 +- 1.3 m^2/s and standard deviation 5.5 +- 0.9 with the core known (19 scans), 1.1 +- 2.2 and
 //!   10.7 +- 1.6 with each core fitted (24 scans): 0.8 +- 0.13 and 1.3 +- 0.19 times the bound;
-//! - fit of a map (lag window of 16 lags, regions of 2 m): about 3 % too much circulation when
-//!   [`RangeKernel::seen_as_peak`] tells what the map holds, 7 % when it is taken for a mean. From the peak of the plain periodogram
-//!   it is 40 %: the peak follows the fast side of a core.
+//! - fit of a map with regions of 2 m, 12 scans: from [`FirstMoment`](crate::FirstMoment) 498 +- 17 m^2/s with a standard deviation
+//!   of 60; from [`LagWindowPeak`](crate::LagWindowPeak) (16 lags, [`RangeKernel::seen_as_peak`]) 537 +- 8 and 27, or
+//!   529 +- 7 and 23 with one circulation and one core radius for both vortices. From the peak of the plain periodogram,
+//!   taken for a mean, it is 40 % too much: the peak follows the fast side of a core.
 //!
 //! The likelihood of one scan has several tops near the highest, since few lines cross a core and each has its speckle;
 //! they lie within one or two standard deviations of each other, and which one is found depends on the start.
 //!
 //! To measure again: `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
+//! (signals) or `circulation_from_many_maps` (maps).
 
 mod band;
 mod baseband;

@@ -2,8 +2,8 @@
 //!
 //! v(R) = sum over i of w_i v_R(R + offset_i), the weights summing to 1: (28), corrected, on a grid; or, for an estimator that takes
 //! the peak of a spectrum, the peak of sum over i of w_i W(v - v_i), W the line that uniform wind shows. In a vortex the spectrum is
-//! skewed and its peak is nearer to the fast air than the mean is: a fit that takes one for the other finds up to
-//! 7 % (lag window of 64 ns) or 40 % (periodogram) too much circulation.
+//! skewed and its peak is nearer to the fast air than the mean is: a fit that takes one for the other finds
+//! some 10 % (lag window of 64 ns) or 40 % (periodogram) too much circulation.
 //! Check: a linear wind is kept but for the mean offset; gates between grid points are interpolated; derivatives against
 //! difference quotients; for a wide line the peak is off the mean by the third moment.
 
