@@ -118,8 +118,13 @@ const UNTRUNCATED: &str = "tests/reference/optics/eta_untruncated_analytic.csv";
 const CRLB: &str = "tests/reference/signal/crlb_200ns.csv";
 const HYPERBOLA: &str = "tests/reference/les/vortex_pair_inviscid_ground_h1.csv";
 
+const ORR_SOMMERFELD: &str = "tests/reference/les/orr_sommerfeld.csv";
+const GROUND_PAIR: &str = "tests/reference/les/wake_2d_ground_re2500.csv";
+/// The file names its columns in a sentence; this is what stands between the commas.
+const GROUND_PAIR_ENSTROPHY: &str = "enstrophy 1/2 int w^2 and energy 1/2 int |u|^2 over y in [-3";
+
 /// All stored curves.
-pub(crate) const ALL: [Curve; 12] = [
+pub(crate) const ALL: [Curve; 14] = [
     independent("optics/eta_intensity_radius", ETA, ("R_m", "eta_int_before"), 1e-9, compute::eta_intensity_radius),
     independent("optics/eta_field_radius", ETA, ("R_m", "eta_fld_before"), 1e-9, compute::eta_field_radius),
     independent("optics/eta_hankel", ETA, ("R_m", "eta_int_before"), 1e-7, compute::eta_hankel),
@@ -135,6 +140,17 @@ pub(crate) const ALL: [Curve; 12] = [
             compute::m4_prime,
         )
     },
+    Curve {
+        absolute: true,
+        ..independent("les/orr_sommerfeld", ORR_SOMMERFELD, ("Re", "omega_i"), 2e-7, compute::growth_rates)
+    },
+    independent(
+        "les/ground_pair_enstrophy",
+        GROUND_PAIR,
+        ("tau", GROUND_PAIR_ENSTROPHY),
+        2e-2,
+        compute::pair_enstrophy,
+    ),
     independent("les/inviscid_pair_y", HYPERBOLA, ("tau", "y"), 5e-9, compute::pair_y),
     independent("les/inviscid_pair_z", HYPERBOLA, ("tau", "z"), 5e-9, compute::pair_z),
     independent("estimate/bound_complex", CRLB, ("snr_db", "crlb_complex"), 1e-7, compute::bound_complex),

@@ -2,7 +2,8 @@
 
 use crate::Failure;
 use wakescope_estimate::{Noise, SignalKind, WindowModel};
-use wakescope_les::{Ground, Motion, VortexPair, m4_prime as kernel};
+use wakescope_les::cases::{TollmienSchlichting, VortexPairCase};
+use wakescope_les::{Flow, Ground, Motion, TimeStep, VortexPair, m4_prime as kernel};
 use wakescope_optics::{RadiusDefinition, SnrModel, Telescope, hankel, theory};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
@@ -53,6 +54,45 @@ fn unit_pair() -> VortexPair {
         profile: wakescope_les::CirculationProfile::Algebraic,
         motion: Motion::Inviscid,
     }
+}
+
+/// Growth rates of the least stable waves on plane Poiseuille flow, at the wave numbers of the stored file.
+pub(super) fn growth_rates(reynolds: &[f64]) -> Values {
+    each(reynolds, |re| {
+        let alpha = if re == 5772.22 { 1.02056 } else { 1.0 };
+        Ok::<f64, wakescope_les::Error>(TollmienSchlichting::new(re, alpha)?.omega.im)
+    })
+}
+
+/// Enstrophy of the plane vortex pair over a sticky ground at Re 2500, on a mesh of 192 x 96 cells.
+pub(super) fn pair_enstrophy(tau: &[f64]) -> Values {
+    let reynolds = 2500.0;
+    let pair = VortexPairCase {
+        cells: [1, 192, 96],
+        size: [1.0, 6.0, 3.0],
+        core_radius: 0.12,
+        profile: wakescope_les::CirculationProfile::LambOseen,
+        reynolds,
+        perturbation: 0.0,
+        ..VortexPairCase::default()
+    };
+    let (mut flow, _) = pair.case(TimeStep::Courant { courant: 0.35, longest_s: 0.01 })?.start()?;
+    let viscosity = 2.0 * std::f64::consts::PI / reynolds;
+    let mut values = Vec::new();
+    for &tau in tau {
+        while flow.time_s() < tau {
+            flow.step_towards(tau)?;
+        }
+        // The power that a step reports is that of its start: a copy of the flow makes the step.
+        let faces = [0, 1, 2].map(|d| flow.face_velocity_m_s(d));
+        let (mut here, _) = Flow::from_face_velocities(
+            flow.mesh().clone(),
+            flow.settings().clone(),
+            faces.each_ref().map(Vec::as_slice),
+        )?;
+        values.push(-0.5 * here.step()?.viscous_power_m5_s3 / viscosity);
+    }
+    Ok(values)
 }
 
 pub(super) fn pair_y(tau: &[f64]) -> Values {
