@@ -83,16 +83,13 @@ fn literature(reynolds: f64) -> Result<Maxima, Failure> {
     Err(Failure::new(format!("no row of Reynolds number {reynolds}")))
 }
 
-/// Vorticity at the wall that the dipole meets, z = 1, from the slope of the parabola through the wall.
+/// Vorticity at the wall that the dipole meets, z = -1, from the slope of the parabola through the wall.
 fn wall_vorticity(flow: &wakescope_les::Flow) -> Vec<(f64, f64)> {
-    let [_, ny, nz] = flow.mesh().cells();
+    let ny = flow.mesh().cells()[1];
     let (v, z_m) = (flow.face_velocity_m_s(1), flow.mesh().centre_m(2));
     let y_m = flow.mesh().face_m(1);
-    let (a, b) = (1.0 - z_m[nz - 1], 1.0 - z_m[nz - 2]);
-    let slope = |j: usize| {
-        let (near, far) = (v[(nz - 1) * ny + j], v[(nz - 2) * ny + j]);
-        // dv/dz at the wall, where v is zero; the vorticity is its negative.
-        (near * b * b - far * a * a) / (a * b * (b - a))
-    };
-    (0..ny).map(|j| (y_m[j], slope(j))).filter(|p| p.0.abs() < 0.6).collect()
+    let (a, b) = (1.0 + z_m[0], 1.0 + z_m[1]);
+    // The vorticity is -dv/dz at the wall, where v is zero.
+    let slope = |j: usize| (v[j] * b * b - v[ny + j] * a * a) / (a * b * (b - a));
+    (0..ny).map(|j| (y_m[j], -slope(j))).filter(|p| p.0.abs() < 0.6).collect()
 }
