@@ -90,15 +90,17 @@ fn covariance_of_a_line_is_the_plain_sum_over_thin_layers() {
             let plain = plain_covariance(&setup, &wake(), elevation_rad);
             let mut space = Space::default();
             model.covariance_into(line, &wake(), Powers::default(), &mut space);
+            let mut worst = 0.0_f64;
             for column in 0..40 {
                 for down in 0..40 - column {
                     let place = space.factor.at(column, down);
                     let found = C64::new(space.factor.re[place], space.factor.im[place]);
                     let error = (found - plain[[column + down, column]]).norm();
-                    // of a power of 3 to 4
-                    assert!(error < 5e-4, "{profile:?} ({column} + {down}): {error}");
+                    worst = worst.max(error);
                 }
             }
+            // of a power of 3 to 4
+            assert!(worst < 8e-4, "{profile:?}, {elevation_rad} rad: {worst}");
         }
     }
 }
