@@ -16,6 +16,7 @@ macro_rules! section {
         }
     };
 }
+#[cfg(feature = "flow")]
 pub(crate) use section;
 
 mod atmosphere;
@@ -29,6 +30,7 @@ pub use atmosphere::{
 pub use check::Problem;
 pub use flow::{Flow, VortexMotion, VortexPair, VortexProfile};
 pub use read::{Located, SceneError, SceneFile};
+#[cfg(feature = "flow")]
 pub(crate) use read::{invalid, malformed};
 
 use serde::{Deserialize, Serialize};
