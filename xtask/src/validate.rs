@@ -48,29 +48,50 @@ pub(crate) struct Check {
     pub(crate) quantity: String,
     pub(crate) measured: f64,
     pub(crate) reference: f64,
-    /// Largest allowed difference, in the unit of the quantity.
-    pub(crate) allowed: f64,
+    pub(crate) bar: Bar,
+}
+
+/// What a measured value may be beside its reference.
+pub(crate) enum Bar {
+    /// At most so far from it, in the unit of the quantity.
+    Within(f64),
+    /// Not below it.
+    AtLeast,
+    /// Not above it.
+    AtMost,
 }
 
 impl Check {
     /// Within `share` of the reference.
     pub(crate) fn relative(quantity: &str, measured: f64, reference: f64, share: f64) -> Self {
-        Self { quantity: quantity.into(), measured, reference, allowed: share * reference.abs() }
+        Self { quantity: quantity.into(), measured, reference, bar: Bar::Within(share * reference.abs()) }
     }
 
-    /// At least `bar`.
-    pub(crate) fn at_least(quantity: &str, measured: f64, bar: f64) -> Self {
-        // Anything above is fine: the difference is then zero.
-        Self { quantity: quantity.into(), measured, reference: measured.max(bar), allowed: 0.0 }
+    /// At least `reference`.
+    pub(crate) fn at_least(quantity: &str, measured: f64, reference: f64) -> Self {
+        Self { quantity: quantity.into(), measured, reference, bar: Bar::AtLeast }
     }
 
-    /// At most `bar`.
-    pub(crate) fn at_most(quantity: &str, measured: f64, bar: f64) -> Self {
-        Self { quantity: quantity.into(), measured, reference: measured.min(bar), allowed: 0.0 }
+    /// At most `reference`.
+    pub(crate) fn at_most(quantity: &str, measured: f64, reference: f64) -> Self {
+        Self { quantity: quantity.into(), measured, reference, bar: Bar::AtMost }
     }
 
+    /// A value that is not a number passes no bar.
     fn passes(&self) -> bool {
-        (self.measured - self.reference).abs() <= self.allowed
+        match self.bar {
+            Bar::Within(allowed) => (self.measured - self.reference).abs() <= allowed,
+            Bar::AtLeast => self.measured >= self.reference,
+            Bar::AtMost => self.measured <= self.reference,
+        }
+    }
+
+    fn bar_words(&self) -> String {
+        match self.bar {
+            Bar::Within(allowed) => format!("+- {allowed:.2e}"),
+            Bar::AtLeast => "at least".into(),
+            Bar::AtMost => "at most".into(),
+        }
     }
 }
 
@@ -101,7 +122,7 @@ const CASES: [(&str, CaseFn); 8] = [
 pub(crate) fn run(options: &Options) -> Outcome {
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/validation"));
     let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
-    println!("{:<16} {:<46} {:>13} {:>13} {:>10}  verdict", "case", "quantity", "measured", "reference", "allowed");
+    println!("{:<16} {:<46} {:>13} {:>13} {:>12}  verdict", "case", "quantity", "measured", "reference", "bar");
     let mut missed = Vec::new();
     for (name, show) in CASES.into_iter().filter(|case| wanted(case.0)) {
         if name == "les_channel" && options.profile != Profile::Full {
@@ -112,8 +133,11 @@ pub(crate) fn run(options: &Options) -> Outcome {
         for check in &shown.checks {
             let verdict = if check.passes() { "pass" } else { "MISSED" };
             println!(
-                "{name:<16} {:<46} {:>13.6} {:>13.6} {:>10.2e}  {verdict}",
-                check.quantity, check.measured, check.reference, check.allowed
+                "{name:<16} {:<46} {:>13.6} {:>13.6} {:>12}  {verdict}",
+                check.quantity,
+                check.measured,
+                check.reference,
+                check.bar_words()
             );
             if !check.passes() {
                 missed.push(format!("{name}: {}", check.quantity));
@@ -138,7 +162,7 @@ fn write(name: &str, profile: Profile, shown: &Shown, folder: &std::path::Path) 
         .text("quantity", shown.checks.iter().map(|c| c.quantity.clone()))
         .float("measured", shown.checks.iter().map(|c| c.measured))
         .float("reference", shown.checks.iter().map(|c| c.reference))
-        .float("allowed_difference", shown.checks.iter().map(|c| c.allowed));
+        .text("bar", shown.checks.iter().map(Check::bar_words));
     let mut files = FileGroup::new(folder);
     files.add(&format!("{name}.csv"), shown.table.to_csv(&origin)?)?;
     files.add(&format!("{name}_checks.csv"), checks.to_csv(&origin)?)?;

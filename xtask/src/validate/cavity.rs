@@ -31,7 +31,6 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
     }
     let stored = numbers("ghia_cavity_u.csv")?;
     let ghia: Vec<(f64, f64)> = stored.iter().map(|r| (r[0], r[3])).collect();
-    // Ghia's table has misprints of a few per cent of its own near its extremum; the bar is against Botella and Peyret.
     let table = Table::new()
         .float("position_m", column.iter().map(|p| p.0))
         .float("u_on_vertical_m_s", column.iter().map(|p| p.1))

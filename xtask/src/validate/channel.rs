@@ -1,4 +1,4 @@
-//! Turbulent channel flow at Re_tau 178 against Moser, Kim and Mansour (1999): hours of processor time.
+//! Turbulent channel flow at Re_tau 178 against Moser, Kim and Mansour (1999): the longest of the cases.
 
 use super::{Check, Profile, Shown, interpolate, numbers};
 use crate::Failure;

@@ -68,7 +68,7 @@ fn along_row(
         let q = |offset: usize| &values[HALO + offset - 3..];
         add_pairs(out, 1.0, [at(1), at(2), at(3), at(4)], [q(0), q(2), q(4), q(6)]);
         if !periodic {
-            irregular_columns(transport, out, &velocity[0][start..start + n], &velocity[0][start..start + n], None);
+            irregular_columns(transport, out, &velocity[0][start..start + n]);
         }
     } else {
         flux_row(ops, velocity, 0, j, k, 0, &mut flux[0], fluxes);
@@ -94,12 +94,11 @@ fn along_row(
     }
 }
 
-/// Replaces the columns to which the formula of the interior does not apply.
+/// Replaces the columns of a normal velocity to which the formula of the interior does not apply.
 #[inline(always)]
-fn irregular_columns(transport: &Transport, out: &mut [f64], flux: &[f64], values: &[f64], scale: Option<&[f64]>) {
+fn irregular_columns(transport: &Transport, out: &mut [f64], values: &[f64]) {
     for i in irregular(transport, out.len()) {
-        let sum: f64 = transport.rows[i].iter().map(|&(face, cell, c)| c * flux[face] * values[cell]).sum();
-        out[i] = scale.map_or(1.0, |scale| scale[i]) * sum;
+        out[i] = transport.rows[i].iter().map(|&(face, cell, c)| c * values[face] * values[cell]).sum();
     }
 }
 

@@ -78,6 +78,7 @@ impl Line {
                 if self.is_thin() {
                     sums[0] = 1.0;
                 } else if face < self.first_face() {
+                    return Taps::new();
                 } else if sticks[0] && face <= 4 {
                     sums[..6].copy_from_slice(&WALL_MEAN[face - 1]);
                 } else if sticks[1] && face + 4 >= n {

@@ -5,7 +5,7 @@
 //! it divergence-free and lets nothing through ground and top. The three-dimensional perturbation is the curl of a smooth
 //! potential given by a closed formula without random numbers, so that any code on any mesh can start from the same field.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
@@ -181,9 +181,6 @@ impl Perturbation {
         [d(2, 1) - d(1, 2), d(0, 2) - d(2, 0), d(1, 0) - d(0, 1)].map(|v| self.amplitude * v)
     }
 }
-
-/// `Gamma0` of a pair in its own units.
-pub const PAIR_CIRCULATION: f64 = 2.0 * PI;
 
 #[cfg(test)]
 mod tests {
