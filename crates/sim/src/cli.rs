@@ -151,10 +151,12 @@ fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
     let mut file = SceneFile::read(path)?;
     if let Some(seed) = cli.seed {
         file.scene.seed = seed;
+        let folder = file.folder;
         file = SceneFile::new(file.scene).map_err(|problems| crate::scene::SceneError::Invalid {
             path: path.to_owned(),
             problems: problems.into_iter().map(|problem| crate::scene::Located { problem, line: None }).collect(),
         })?;
+        file.folder = folder;
     }
     Ok(file)
 }

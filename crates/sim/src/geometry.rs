@@ -2,9 +2,10 @@
 //!
 //! Only arithmetic on the scene, so that the plan can state sizes before anything is allocated.
 
+use crate::Error;
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::scene::Scene;
-use crate::{Error, join};
+use crate::wind::SceneWind;
 
 /// The sampling of one scan in angle, range and time.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,12 +39,13 @@ impl Geometry {
     ///
     /// # Errors
     /// What the wind or the layers refuse; a checked scene gives none.
-    pub fn new(scene: &Scene) -> Result<Self, Error> {
-        let max_gradient_per_s = join::wind(scene)?.max_gradient_per_s(join::start_time_s(scene));
+    pub fn new(scene: &Scene, wind: &SceneWind) -> Result<Self, Error> {
         let scan = &scene.scan;
         let lines = ((scan.elevation_max_rad - scan.elevation_min_rad) / scan.elevation_step_rad + 1e-9) as usize + 1;
         let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
         let pulses = scan.pulses_per_line as f64;
+        let line_time_s: Vec<f64> = (0..lines).map(|i| (i as f64 * pulses + 0.5 * (pulses - 1.0)) * prt_s).collect();
+        let max_gradient_per_s = wind.max_gradient_per_s(&line_time_s);
         let sample_spacing_m = scene.sample_spacing_m();
         let samples = scene.samples_per_record();
         let window = scene.estimator.window_samples;
@@ -61,7 +63,7 @@ impl Geometry {
         let record_m = (samples - 1) as f64 * sample_spacing_m;
         Ok(Self {
             elevation_rad: (0..lines).map(|i| scan.elevation_min_rad + i as f64 * scan.elevation_step_rad).collect(),
-            line_time_s: (0..lines).map(|i| (i as f64 * pulses + 0.5 * (pulses - 1.0)) * prt_s).collect(),
+            line_time_s,
             samples,
             first_range_m: scan.range_min_m,
             sample_spacing_m,

@@ -13,16 +13,16 @@ use wakescope_les as les;
 use wakescope_optics as optics;
 use wakescope_signal as signal;
 
-/// The wind of a scene.
+/// The wind of a scene whose flow is analytic, and calm air for another; [`SceneWind`](crate::wind::SceneWind) has all.
 ///
 /// # Errors
 /// What the wind refuses; a checked scene gives none.
-pub fn wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
-    Ok(match scene.flow {
-        Flow::Calm {} => Box::new(les::Calm),
-        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::Uniform::new([0.0, lateral_m_s, vertical_m_s])?),
+pub fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
+    Ok(match &scene.flow {
+        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::Calm),
+        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?),
         Flow::VortexPair(pair) => {
-            let vortices = Box::new(vortex_pair(&pair).wind()?);
+            let vortices = Box::new(vortex_pair(pair).wind()?);
             if pair.cross_wind_m_s == 0.0 {
                 return Ok(vortices);
             }
@@ -57,11 +57,11 @@ pub(crate) fn circulation_profile(profile: VortexProfile) -> les::CirculationPro
     }
 }
 
-/// Age of the flow when the scan begins, s.
+/// Age of an analytic flow when the scan begins, s.
 pub fn start_time_s(scene: &Scene) -> f64 {
-    match scene.flow {
+    match &scene.flow {
         Flow::VortexPair(pair) if pair.age_tau > 0.0 && pair.circulation_m2_s > 0.0 => {
-            vortex_pair(&pair).time_s(pair.age_tau)
+            vortex_pair(pair).time_s(pair.age_tau)
         }
         _ => 0.0,
     }

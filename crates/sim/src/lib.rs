@@ -30,6 +30,7 @@
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
 //! | [`geometry`] | lines of sight, samples, gates, layers |
 //! | [`join`] | the only place where the types of two crates meet |
+//! | [`wind`] | the wind: analytic, or the planes of a simulated flow |
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | [`scan`] | air along the lines of sight, and their records |
 //! | [`map`] | estimates and their errors against the truth |
@@ -48,14 +49,19 @@ pub mod flow;
 pub mod geometry;
 pub mod join;
 pub mod map;
+#[cfg(feature = "netcdf")]
+mod netcdf_input;
 pub mod plan;
 mod plane;
+#[cfg(feature = "netcdf")]
+mod planes_input;
 pub mod profile;
 pub mod progress;
 pub mod run;
 pub mod scan;
 pub mod scene;
 pub mod streams;
+pub mod wind;
 pub mod write;
 
 #[cfg(feature = "cli")]

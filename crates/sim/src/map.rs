@@ -172,15 +172,12 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     let shape = (g.elevation_rad.len(), g.gate_range_m.len());
     let mut truth =
         Truth { exact_m_s: Array2::zeros(shape), pulse_m_s: Array2::zeros(shape), gate_m_s: Array2::zeros(shape) };
-    let wind = join::wind(scene)?;
-    let start_s = join::start_time_s(scene);
     let pulse = join::pulse(scene)?;
     let window = join::weighting(scene).weights(scene.estimator.window_samples)?;
     let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
     let by_gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
     for (i, line) in scanner.lines().iter().enumerate() {
-        let time_s = start_s + g.line_time_s[i];
-        let exact_m_s = radial_velocity_m_s(&*wind, scene, g.elevation_rad[i], time_s, &g.gate_range_m)?;
+        let exact_m_s = radial_velocity_m_s(plan, i, &g.gate_range_m)?;
         truth.exact_m_s.row_mut(i).assign(&ArrayView1::from(&exact_m_s));
         let mut filtered_m_s = vec![0.0; g.gate_range_m.len()];
         for (filter, cells) in [(&by_pulse, &mut truth.pulse_m_s), (&by_gate, &mut truth.gate_m_s)] {

@@ -4,12 +4,11 @@ use crate::geometry::Geometry;
 use crate::plan::{Plan, Stage};
 use crate::profile::{efficiency_at, model, spaced};
 use crate::progress::Observer;
-use crate::scene::{Scene, SnrReference};
+use crate::scene::{Outside, Scene, SnrReference};
 use crate::streams::stream;
 use crate::{Error, join};
 use ndarray::Array2;
 use rayon::prelude::*;
-use wakescope_les::Wind;
 use wakescope_optics::plan::Model;
 use wakescope_signal::{LineOfSight, Scratch, Simulator};
 
@@ -40,16 +39,12 @@ impl<'a> Scanner<'a> {
     pub fn new(plan: &'a Plan, observer: &dyn Observer) -> Result<Self, Error> {
         let (scene, geometry) = (&plan.scene.scene, &plan.geometry);
         let weight_per_m = layer_weights(scene, geometry, observer)?;
-        let wind = join::wind(scene)?;
-        let start_s = join::start_time_s(scene);
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
         let lines = (0..geometry.elevation_rad.len())
             .into_par_iter()
             .map(|i| {
                 let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
-                let time_s = start_s + geometry.line_time_s[i];
-                let radial_velocity_m_s =
-                    radial_velocity_m_s(&*wind, scene, geometry.elevation_rad[i], time_s, &ranges_m)?;
+                let radial_velocity_m_s = radial_velocity_m_s(plan, i, &ranges_m)?;
                 observer.advance(1);
                 Ok(LineOfSight {
                     first_range_m: geometry.first_layer_range_m,
@@ -115,20 +110,29 @@ fn layer_weights(scene: &Scene, geometry: &Geometry, observer: &dyn Observer) ->
     join::layer_weights_per_m(scene, geometry, &profile)
 }
 
-/// Radial velocity, m/s, positive away from the lidar, at ranges along a line of sight; NaN below
-/// the ground, where there is no air to scatter.
-pub(crate) fn radial_velocity_m_s(
-    wind: &dyn Wind,
-    scene: &Scene,
-    elevation_rad: f64,
-    time_s: f64,
-    range_m: &[f64],
-) -> Result<Vec<f64>, Error> {
+/// Radial velocity, m/s, positive away from the lidar, at ranges along line of sight `line`; NaN where nothing returns light:
+/// below the ground or outside the flow, if the scene masks that.
+pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+    let scan = &plan.scene.scene.scan;
+    let elevation_rad = plan.geometry.elevation_rad[line];
+    let time_s = plan.wind.start_s + plan.geometry.line_time_s[line];
     let (sin, cos) = elevation_rad.sin_cos();
-    let height_m = scene.scan.lidar_height_m;
-    let points_m: Vec<[f64; 3]> = range_m.iter().map(|r| [0.0, r * cos, height_m + r * sin]).collect();
+    let points_m: Vec<[f64; 3]> = range_m.iter().map(|r| [0.0, r * cos, scan.lidar_height_m + r * sin]).collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    wind.velocity_into(&points_m, time_s, &mut velocity_m_s)?;
-    let project = |(p, v): (&[f64; 3], &[f64; 3])| if p[2] < 0.0 { f64::NAN } else { v[1] * cos + v[2] * sin };
-    Ok(points_m.iter().zip(&velocity_m_s).map(project).collect())
+    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
+    let project = |((&[_, y_m, z_m], v), &range_m): ((&[f64; 3], &[f64; 3]), &f64)| {
+        let known_m_s = v[1] * cos + v[2] * sin;
+        let outside = match (z_m < 0.0, known_m_s.is_nan()) {
+            (true, _) => scan.below_ground,
+            (false, true) => scan.outside_flow,
+            (false, false) => return Ok(known_m_s),
+        };
+        match outside {
+            Outside::Constant { radial_velocity_m_s } => Ok(radial_velocity_m_s),
+            // A scene with lines below the ground was refused, but for air behind its last sample.
+            Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow { elevation_rad, range_m, y_m, z_m }),
+            Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
+        }
+    };
+    points_m.iter().zip(&velocity_m_s).zip(range_m).map(project).collect()
 }

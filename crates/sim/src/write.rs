@@ -1,13 +1,12 @@
 //! Writes what a run gives: all files of a run appear together, or none.
 
+use crate::Error;
 use crate::export::signals::RawSignals;
 use crate::export::{Field, FileGroup, Provenance, PulseInfo, Ray, Sweep, Table, Unit, VelocityMap, tables};
 use crate::map::VelocityEstimates;
 use crate::plan::Plan;
 use crate::profile::RangeProfile;
 use crate::run::RunResult;
-use crate::scene::Flow;
-use crate::{Error, join};
 use std::path::{Path, PathBuf};
 
 /// Finds out, before any computing, whether files can be written to a folder; leaves no trace.
@@ -130,7 +129,7 @@ fn raw_signals(plan: &Plan, current_a: ndarray::Array2<f64>) -> RawSignals {
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let azimuth_rad = scene.scan.azimuth_rad;
-    let start_s = join::start_time_s(scene);
+    let start_s = plan.wind.start_s;
     let away = |what: &str| format!("{what}, positive away from the lidar");
     let speed = |name: &str, text: String, values: &ndarray::Array2<f64>| {
         Field::float(name, Unit::MetrePerSecond, &text, values.clone())
@@ -148,13 +147,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             })
             .collect(),
         range_m: e.range_m.clone(),
-        sweeps: vec![Sweep {
-            tau: match scene.flow {
-                Flow::VortexPair(pair) => pair.age_tau,
-                _ => 0.0,
-            },
-            azimuth_rad,
-        }],
+        sweeps: vec![Sweep { tau: plan.wind.tau, azimuth_rad }],
         pulse: PulseInfo {
             prt_s: 1.0 / scene.laser.pulse_repetition_hz,
             pulse_width_s: scene.pulse.duration_s,
@@ -243,9 +236,9 @@ mod pictures {
         map: &VelocityMap,
         origin: &Provenance,
     ) -> Result<(), Error> {
-        let centres_m = match plan.scene.scene.flow {
+        let centres_m = match &plan.scene.scene.flow {
             Flow::VortexPair(pair) => {
-                let c = crate::join::vortex_pair(&pair).centres(crate::join::start_time_s(&plan.scene.scene));
+                let c = crate::join::vortex_pair(pair).centres(plan.wind.start_s);
                 vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
             }
             _ => Vec::new(),

@@ -26,6 +26,10 @@ pub struct CrossPlane {
     pub z_m: Vec<f64>,
     /// Velocities `(u, v, w)` \[m/s\], `[z][y]`.
     pub velocity_m_s: Vec<[f64; 3]>,
+    /// What lies beyond the ends in y: walls or a period of the mesh.
+    pub y_edges: Edges,
+    /// The same in z.
+    pub z_edges: Edges,
 }
 
 impl Flow {
@@ -65,7 +69,15 @@ impl Flow {
                 sum
             })
             .collect();
-        Ok(CrossPlane { x_m, y_m: mesh.centre_m(1), z_m: mesh.centre_m(2), velocity_m_s })
+        let [_, y, z] = mesh.directions();
+        Ok(CrossPlane {
+            x_m,
+            y_m: mesh.centre_m(1),
+            z_m: mesh.centre_m(2),
+            velocity_m_s,
+            y_edges: edges(y),
+            z_edges: edges(z),
+        })
     }
 
     /// The cross-plane at `x_m` \[m\] as a wind at the present time, with the walls and periods of the mesh.
@@ -76,7 +88,7 @@ impl Flow {
         let plane = self.cross_plane(x_m)?;
         let [_, y, z] = self.mesh().directions();
         let (y_m, z_m) = (nodes(y, &plane.y_m), nodes(z, &plane.z_m));
-        let mesh = PlaneMesh { y_edges: edges(y), z_edges: edges(z), outside, y_m, z_m };
+        let mesh = PlaneMesh { y_edges: plane.y_edges, z_edges: plane.z_edges, outside, y_m, z_m };
         let pick = |thin: bool, i: usize| if thin { 0 } else { i };
         let [_, ny, nz] = self.mesh().cells();
         let velocity_m_s: Vec<[f64; 3]> = (0..mesh.z_m.len())

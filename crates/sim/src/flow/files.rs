@@ -138,6 +138,8 @@ impl Files {
             w_m_s: component(2),
             y_m: plane.y_m,
             z_m: plane.z_m,
+            y_edges: plane.y_edges,
+            z_edges: plane.z_edges,
         })
     }
 

@@ -105,12 +105,13 @@ impl Scene {
     }
 
     fn check_flow(&self, c: &mut Checker) {
-        match self.flow {
+        match &self.flow {
             Flow::Calm {} => {}
             Flow::Uniform { lateral_m_s, vertical_m_s } => {
-                c.within("flow.lateral_m_s", lateral_m_s, -1e3, 1e3, "m/s");
-                c.within("flow.vertical_m_s", vertical_m_s, -1e3, 1e3, "m/s");
+                c.within("flow.lateral_m_s", *lateral_m_s, -1e3, 1e3, "m/s");
+                c.within("flow.vertical_m_s", *vertical_m_s, -1e3, 1e3, "m/s");
             }
+            Flow::Simulated(flow) => check_simulated(flow, c),
             Flow::VortexPair(p) => {
                 c.within("flow.circulation_m2_s", p.circulation_m2_s, 0.0, 1e5, "m^2/s");
                 c.within("flow.spacing_m", p.spacing_m, 1e-2, 1e4, "m");
@@ -146,6 +147,11 @@ impl Scene {
         c.within("scan.range_max_m", s.range_max_m, 1.0, 1e6, "m");
         c.count("scan.pulses_per_line", s.pulses_per_line, 1, 1_000_000);
         c.count("scan.realisations", s.realisations, 1, 1_000_000);
+        for (key, outside) in [("below_ground", s.below_ground), ("outside_flow", s.outside_flow)] {
+            if let super::Outside::Constant { radial_velocity_m_s } = outside {
+                c.within(&format!("scan.{key}.radial_velocity_m_s"), radial_velocity_m_s, -1e3, 1e3, "m/s");
+            }
+        }
     }
 
     fn check_outputs(&self, c: &mut Checker) {
@@ -192,11 +198,12 @@ impl Scene {
         );
         let lowest_m = s.lidar_height_m + s.range_max_m * s.elevation_min_rad.sin();
         c.require(
-            lowest_m >= 0.0,
+            lowest_m >= 0.0 || s.below_ground != (super::Outside::Error {}),
             "scan.elevation_min_rad",
             s.elevation_min_rad,
             format!(
-                "at least {} rad; at scan.range_max_m the lowest line is {:.3} m below the ground",
+                "at least {} rad; at scan.range_max_m the lowest line is {:.3} m below the ground, which \
+                 scan.below_ground.policy = \"mask\" allows",
                 (-s.lidar_height_m / s.range_max_m).asin(),
                 -lowest_m
             ),
@@ -254,6 +261,25 @@ impl Scene {
     pub fn pulse_reach_m(&self) -> f64 {
         3.72 * self.pulse_sigma_s() * 0.5 * crate::SPEED_OF_LIGHT_M_S
     }
+}
+
+fn check_simulated(flow: &super::SimulatedFlow, c: &mut Checker) {
+    c.require(
+        !flow.planes.is_empty(),
+        "flow.planes",
+        "\"\"",
+        "a file of cross-planes, or the beginning of the names of numbered ones",
+    );
+    if let Some(time_s) = flow.time_s {
+        c.within("flow.time_s", time_s, -1e9, 1e9, "s");
+        c.require(flow.age_tau.is_none(), "flow.time_s", time_s, "absent beside flow.age_tau");
+    }
+    if let Some(age_tau) = flow.age_tau {
+        c.within("flow.age_tau", age_tau, -1e9, 1e9, "");
+    }
+    c.within("flow.lateral_position_m", flow.lateral_position_m, -1e5, 1e5, "m");
+    c.within("flow.length_unit_m", flow.length_unit_m, 1e-6, 1e6, "m");
+    c.within("flow.velocity_unit_m_s", flow.velocity_unit_m_s, 1e-6, 1e6, "m/s");
 }
 
 fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker) {

@@ -28,7 +28,7 @@ pub use atmosphere::{
     Atmosphere, OuterScaleWavenumber, RefractiveTurbulence, ScreenSampling, SpectrumKind, Turbulence,
 };
 pub use check::Problem;
-pub use flow::{Flow, VortexMotion, VortexPair, VortexProfile};
+pub use flow::{Flow, Outside, SimulatedFlow, SimulatedMotion, VortexMotion, VortexPair, VortexProfile};
 pub use read::{Located, SceneError, SceneFile};
 #[cfg(feature = "flow")]
 pub(crate) use read::{invalid, malformed};
@@ -208,6 +208,10 @@ section! {
         pulses_per_line: usize = 16,
         /// Independent repetitions of the whole scan, for the errors.
         realisations: usize = 4,
+        /// What lines below the ground meet.
+        below_ground: Outside = Outside::Error {},
+        /// What lines that leave a simulated flow meet.
+        outside_flow: Outside = Outside::Error {},
     }
 }
 
@@ -308,6 +312,9 @@ impl Scene {
 mod tests {
     use super::*;
 
+    /// Keys that `wakescope init` does not write.
+    const RARE_KEYS: [&str; 2] = ["policy", "policy"];
+
     #[test]
     fn commented_table2_is_the_default_scene() {
         let scene: Scene = toml::from_str(TABLE2_TOML).unwrap();
@@ -317,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn every_default_is_written_down() {
+    fn every_default_is_written_down_in_the_file_or_in_the_book() {
         let flat = |text: &str| {
             let mut keys: Vec<String> = text
                 .lines()
@@ -327,7 +334,17 @@ mod tests {
             keys.sort();
             keys
         };
-        assert_eq!(flat(TABLE2_TOML), flat(&Scene::default().to_toml()));
+        let (written, all) = (flat(TABLE2_TOML), flat(&Scene::default().to_toml()));
+        for key in &written {
+            assert!(all.contains(key), "{key} is no key");
+        }
+        let book = include_str!("../../../../docs/src/scene.md");
+        for key in &all {
+            assert!(book.contains(&format!("`{key}`")), "{key} is not in the book");
+        }
+        // What a first scene does not need stands in the book alone.
+        let rare: Vec<&String> = all.iter().filter(|key| !written.contains(key)).collect();
+        assert_eq!(rare, RARE_KEYS);
     }
 
     #[test]
