@@ -10,6 +10,7 @@ mod figures;
 mod regress;
 mod reproduce;
 mod tidy;
+mod trials;
 mod validate;
 mod work_precision;
 mod workspace;
