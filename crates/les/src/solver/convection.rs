@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::momentum::Momentum;
-use super::rows::{HALO, add_pairs, add_product, add_rows, pad};
+use super::rows::{HALO, add_product, add_rows, add_transport, pad};
 use super::transport::{MEAN, Transport};
 
 /// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
@@ -66,7 +66,8 @@ fn along_row(
         }
         let at = |offset: usize| &fluxes[HALO + offset - 3..];
         let q = |offset: usize| &values[HALO + offset - 3..];
-        add_pairs(out, 1.0, [at(1), at(2), at(3), at(4)], [q(0), q(2), q(4), q(6)]);
+        let values = [q(0), q(1), q(2), q(3), q(4), q(5), q(6)];
+        add_transport(out, 1.0, transport.stencil, [at(1), at(2), at(3), at(4)], values);
         if !periodic {
             irregular_columns(transport, out, &velocity[0][start..start + n]);
         }
@@ -77,7 +78,8 @@ fn along_row(
         let q = |offset: usize| &values[HALO + offset - 3..];
         let line = &mut flux[1];
         line.fill(0.0);
-        add_pairs(line, 1.0, [at(0), at(1), at(2), at(3)], [q(0), q(2), q(4), q(6)]);
+        let values = [q(0), q(1), q(2), q(3), q(4), q(5), q(6)];
+        add_transport(line, 1.0, transport.stencil, [at(0), at(1), at(2), at(3)], values);
         let inverse = &ops.inverse_cell_mass[0];
         for ((out, line), inverse) in out.iter_mut().zip(line.iter()).zip(inverse) {
             *out += inverse * line;
@@ -135,15 +137,15 @@ fn across_rows(
             let i = index + offset + count - 3;
             if ops.periodic[axis] { i % count } else { i - count }
         };
-        let q = [0, 2, 4, 6].map(|offset| row(at(offset)));
+        let q = [0, 1, 2, 3, 4, 5, 6].map(|offset| row(at(offset)));
         if axis == ops.axis {
-            mean_rows(flux, [0, 1, 2, 3, 4, 5, 6].map(|offset| row(at(offset))));
+            mean_rows(flux, q);
         } else {
             for (slot, out) in flux.iter_mut().enumerate() {
                 flux_row(ops, velocity, axis, j, k, at(slot + 2), out, &mut padded[0]);
             }
         }
-        add_pairs(out, scale, flux.each_ref().map(Vec::as_slice), q);
+        add_transport(out, scale, transport.stencil, flux.each_ref().map(Vec::as_slice), q);
     } else {
         for &(face, cell, c) in &transport.rows[index] {
             if axis == ops.axis {

@@ -2,7 +2,7 @@
 //! products and sums are kept apart, so that each version gives the same bits.
 
 use super::line::Taps;
-use super::transport::PAIR;
+use super::transport::Stencil;
 
 /// Values before and after a padded row.
 pub(crate) const HALO: usize = 4;
@@ -103,15 +103,23 @@ pub(crate) fn add_rows(out: &mut [f64], field: &[f64], taps: &[(usize, f64)]) {
     }
 }
 
-/// `out += scale transport`, by the pairs of the interior: fluxes `g` at -1, 0, 1, 2 and values `q` at -3, -1, 1, 3.
+/// `out += scale transport`, by the formula of the interior: fluxes `g` at -1, 0, 1, 2 and values `q` at -3 to 3.
 #[inline(always)]
-pub(crate) fn add_pairs(out: &mut [f64], scale: f64, g: [&[f64]; 4], q: [&[f64]; 4]) {
+pub(crate) fn add_transport(out: &mut [f64], scale: f64, stencil: Stencil, g: [&[f64]; 4], q: [&[f64]; 7]) {
     let n = out.len();
     let [g0, g1, g2, g3] = g.map(|g| &g[..n]);
-    let [q0, q1, q2, q3] = q.map(|q| &q[..n]);
-    let (near, far) = (scale * PAIR[0], scale * PAIR[1]);
+    let [q0, q1, q2, _, q4, q5, q6] = q.map(|q| &q[..n]);
+    let ([a, b, c], [d, e, f]) = (stencil.near.map(|c| scale * c), stencil.far.map(|c| scale * c));
+    if stencil.is_plain() {
+        for i in 0..n {
+            out[i] += b * (g2[i] * q4[i] - g1[i] * q2[i]) + f * (g3[i] * q6[i] - g0[i] * q0[i]);
+        }
+        return;
+    }
     for i in 0..n {
-        out[i] += near * (g2[i] * q2[i] - g1[i] * q1[i]) + far * (g3[i] * q3[i] - g0[i] * q0[i]);
+        let after = [a * q2[i] + (b * q4[i] + c * q5[i]), d * q4[i] + (e * q5[i] + f * q6[i])];
+        let before = [a * q4[i] + (b * q2[i] + c * q1[i]), d * q2[i] + (e * q1[i] + f * q0[i])];
+        out[i] += (g2[i] * after[0] - g1[i] * before[0]) + (g3[i] * after[1] - g0[i] * before[1]);
     }
 }
 
