@@ -115,7 +115,7 @@ impl VortexPair {
     /// vortices.
     ///
     /// In closed form for the algebraic profile, `Gamma0 [1 - (r_c/10)(atan(15/r_c) - atan(5/r_c))]`; by Simpson's
-    /// rule, to round-off, for Lamb-Oseen.
+    /// rule, to round-off, for the others.
     pub fn circulation_5_15_m2_s(&self) -> f64 {
         let core = self.core_radius_m;
         match self.profile {
@@ -123,7 +123,7 @@ impl VortexPair {
                 let lost = 0.1 * core * ((15.0 / core).atan() - (5.0 / core).atan());
                 self.circulation_m2_s * (1.0 - lost)
             }
-            CirculationProfile::LambOseen => {
+            CirculationProfile::LambOseen | CirculationProfile::TwoScale(_) => {
                 let step = 10.0 / f64::from(SIMPSON_PANELS);
                 let sum: f64 = (0..=SIMPSON_PANELS)
                     .map(|i| {

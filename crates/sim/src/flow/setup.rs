@@ -3,19 +3,10 @@
 use super::case::{AxisName, FlowCase, Pressure, Scheme, Subgrid};
 use crate::Error;
 use std::path::Path;
-use wakescope_les::cases::InitialField;
+pub(super) use wakescope_les::cases::Initial;
 use wakescope_les::{
     Flow, FlowSettings, Mesh, PressureMethod, StartReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment,
 };
-
-/// The field that a flow starts from.
-pub(super) enum Initial {
-    /// A formula.
-    Field(InitialField),
-    /// Values at the low faces of the cells, `[z][y][x]` \[m/s\].
-    #[cfg(feature = "netcdf")]
-    Faces([Vec<f64>; 3]),
-}
 
 /// All that a simulation is made of.
 pub(super) struct Setup {
@@ -57,12 +48,7 @@ impl Setup {
 
     pub(super) fn start(self) -> Result<(Flow, StartReport), Error> {
         let Self { mesh, settings, initial, .. } = self;
-        match initial {
-            Initial::Field(field) => Flow::new(mesh, settings, field),
-            #[cfg(feature = "netcdf")]
-            Initial::Faces(faces) => Flow::from_face_velocities(mesh, settings, faces.each_ref().map(Vec::as_slice)),
-        }
-        .map_err(Error::Flow)
+        initial.start(mesh, settings).map_err(Error::Flow)
     }
 }
 
