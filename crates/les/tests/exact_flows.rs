@@ -201,3 +201,15 @@ fn tollmien_schlichting_waves_grow_at_the_rate_of_linear_theory() {
     let rate = 0.5 * (energies[1] / energies[0]).ln() / 20.0;
     assert!((rate / expected - 1.0).abs() < 0.01, "rate {rate}, linear theory {expected}");
 }
+
+#[test]
+fn an_eighth_of_the_taylor_green_vortices_between_planes_of_symmetry_is_the_whole_flow() {
+    let energy = |case: Case, share: f64| {
+        let mut case = case;
+        case.settings.time_step = TimeStep::Fixed { step_s: 0.02 };
+        share * run(&case, 100).kinetic_energy_m5_s2()
+    };
+    let whole = energy(cases::taylor_green_3d(24, 1600.0).unwrap(), 1.0);
+    let eighth = energy(cases::taylor_green_eighth(12, 1600.0).unwrap(), 8.0);
+    assert!((whole / eighth - 1.0).abs() < 1e-12, "{whole} against {eighth}");
+}

@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::momentum::Momentum;
-use super::rows::{HALO, add_product, add_rows, add_transport, pad};
+use super::rows::{HALO, add_product, add_rows, add_transport, even_mean, pad};
 use super::transport::{MEAN, Transport};
 
 /// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
@@ -185,10 +185,14 @@ fn flux_row(
 ) {
     let field = velocity[along];
     let n = out.len();
-    out.fill(0.0);
     if ops.axis == 0 {
         let start = ops.start_with(j, k, along, face);
         pad(padded, &field[start..start + n], ops.periodic[0]);
+        if let Some(mass) = ops.equal_mass {
+            even_mean(out, mass, std::array::from_fn(|offset| &padded[HALO + offset - 2..]));
+            return;
+        }
+        out.fill(0.0);
         ops.flux_mean_columns.add(out, padded);
         return;
     }
@@ -199,6 +203,16 @@ fn flux_row(
         _ => {}
     }
     let own = if ops.axis == 1 { j } else { k };
+    if let Some(mass) = ops.equal_mass {
+        let count = ops.n[ops.axis];
+        let row = |offset: usize| {
+            let start = ops.start_with(j, k, ops.axis, (own + offset + 2 * count - 2) % count);
+            &field[start..start + n]
+        };
+        even_mean(out, mass, std::array::from_fn(row));
+        return;
+    }
+    out.fill(0.0);
     let taps = &ops.flux_mean[own];
     let mut rows = [(0, 0.0); 6];
     for (row, tap) in rows.iter_mut().zip(taps) {

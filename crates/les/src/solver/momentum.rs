@@ -10,8 +10,8 @@ use multiversion::multiversion;
 
 use super::convection::convection_row;
 use super::layout::Layout;
-use super::line::Taps;
-use super::rows::{Columns, HALO, add_rows, pad};
+use super::line::{DIFFERENCE, Taps};
+use super::rows::{Columns, HALO, add_even, add_rows, pad};
 use super::transport::Transport;
 
 /// The operators of one component.
@@ -26,6 +26,8 @@ pub(crate) struct Momentum {
     /// Weighted flux along `axis` at its faces from the cells.
     pub(super) flux_mean: Vec<Taps>,
     pub(super) flux_mean_columns: Columns,
+    /// Mass of the cells along `axis` where all are equal and the direction is periodic.
+    pub(super) equal_mass: Option<f64>,
     pub(super) transport: [Transport; 3],
     /// `1/m_b` at the cells of each axis.
     pub(super) inverse_cell_mass: [Vec<f64>; 3],
@@ -33,13 +35,21 @@ pub(crate) struct Momentum {
     pub(super) inverse_face_mass: Vec<f64>,
     /// Mass of the control volume of this component along each axis.
     mass: [Vec<f64>; 3],
-    /// Laplacian along each axis and the source from moving walls.
+    /// Laplacian along each axis, by its symmetric coefficients where all rows are the same, and the source from moving walls.
     laplacian: [Vec<Taps>; 3],
+    even_laplacian: [Option<[f64; 3]>; 3],
     laplacian_columns: Columns,
     wall_source: [Vec<f64>; 3],
     gradient: Vec<Taps>,
     gradient_columns: Columns,
 }
+
+/// The staggered difference of fourth order, twice: coefficients of the points at distance 1, 2, 3.
+const SECOND_DIFFERENCE: [f64; 3] = [
+    DIFFERENCE[2] * DIFFERENCE[2] - 2.0 * DIFFERENCE[2] * DIFFERENCE[3],
+    2.0 * DIFFERENCE[2] * DIFFERENCE[3],
+    DIFFERENCE[3] * DIFFERENCE[3],
+];
 
 /// Rows that a task reuses.
 #[derive(Debug, Default)]
@@ -101,6 +111,7 @@ impl Momentum {
             thin: std::array::from_fn(|b| line[b].is_thin()),
             flux_mean_columns: columns(&flux_mean, axis),
             flux_mean,
+            equal_mass: own.is_fourier().then(|| own.cell_mass_m[0]),
             transport: std::array::from_fn(|b| {
                 if b == axis { line[b].transport_of_faces() } else { line[b].transport_of_cells() }
             }),
@@ -111,6 +122,10 @@ impl Momentum {
             }),
             laplacian_columns: columns(&laplacian[0], 0),
             laplacian,
+            even_laplacian: std::array::from_fn(|b| {
+                let per_h2 = line[b].cell_mass_m[0].powi(-2);
+                line[b].is_fourier().then(|| SECOND_DIFFERENCE.map(|c| c * per_h2))
+            }),
             wall_source,
             gradient_columns: columns(&gradient, axis),
             gradient,
@@ -166,6 +181,10 @@ pub(crate) fn add_laplacian_row(
     if axis == 0 {
         let start = ops.start(j, k);
         pad(padded, &field[start..start + n], ops.periodic[0]);
+        if let Some(c) = ops.even_laplacian[0] {
+            add_even(out, c, std::array::from_fn(|offset| &padded[HALO + offset - 3..]));
+            return;
+        }
         ops.laplacian_columns.add(out, padded);
         for (out, source) in out.iter_mut().zip(&ops.wall_source[0]) {
             *out += source;
@@ -173,6 +192,15 @@ pub(crate) fn add_laplacian_row(
         return;
     }
     let index = if axis == 1 { j } else { k };
+    if let Some(c) = ops.even_laplacian[axis] {
+        let count = ops.n[axis];
+        let row = |offset: usize| {
+            let start = ops.start_with(j, k, axis, (index + offset + 3 * count - 3) % count);
+            &field[start..start + n]
+        };
+        add_even(out, c, std::array::from_fn(row));
+        return;
+    }
     let taps = &ops.laplacian[axis][index];
     let mut rows = [(0, 0.0); 12];
     for (row, tap) in rows.iter_mut().zip(taps) {

@@ -2,7 +2,7 @@
 //! products and sums are kept apart, so that each version gives the same bits.
 
 use super::line::Taps;
-use super::transport::Stencil;
+use super::transport::{MEAN, Stencil};
 
 /// Values before and after a padded row.
 pub(crate) const HALO: usize = 4;
@@ -120,6 +120,30 @@ pub(crate) fn add_transport(out: &mut [f64], scale: f64, stencil: Stencil, g: [&
         let after = [a * q2[i] + (b * q4[i] + c * q5[i]), d * q4[i] + (e * q5[i] + f * q6[i])];
         let before = [a * q4[i] + (b * q2[i] + c * q1[i]), d * q2[i] + (e * q1[i] + f * q0[i])];
         out[i] += (g2[i] * after[0] - g1[i] * before[0]) + (g3[i] * after[1] - g0[i] * before[1]);
+    }
+}
+
+/// `out += sum_d c_d (q_d + q_-d - 2 q)` of the values at -3 to 3: nothing at all for a constant.
+#[inline(always)]
+pub(crate) fn add_even(out: &mut [f64], c: [f64; 3], q: [&[f64]; 7]) {
+    let n = out.len();
+    let [q0, q1, q2, q3, q4, q5, q6] = q.map(|q| &q[..n]);
+    for i in 0..n {
+        let own = q3[i];
+        let pair = |low: f64, high: f64| (low - own) + (high - own);
+        out[i] += c[0] * pair(q2[i], q4[i]) + (c[1] * pair(q1[i], q5[i]) + c[2] * pair(q0[i], q6[i]));
+    }
+}
+
+/// `out = scale` times the fourth-order mean of the values at -2 to 1: a constant stays itself.
+#[inline(always)]
+pub(crate) fn even_mean(out: &mut [f64], scale: f64, q: [&[f64]; 4]) {
+    let n = out.len();
+    let [q0, q1, q2, q3] = q.map(|q| &q[..n]);
+    let far = -MEAN[0];
+    for i in 0..n {
+        let (low, high) = (q1[i], q2[i]);
+        out[i] = scale * (0.5 * (low + high) + far * ((low - q0[i]) + (high - q3[i])));
     }
 }
 

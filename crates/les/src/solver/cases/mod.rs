@@ -14,7 +14,7 @@ pub use cavity::lid_driven_cavity;
 pub use channel::{channel, couette, decaying_layer, poiseuille, rayleigh_plate};
 pub use dipole::dipole_against_wall;
 pub use orr_sommerfeld::TollmienSchlichting;
-pub use taylor_green::{taylor_green_3d, taylor_green_plane, taylor_green_plane_exact};
+pub use taylor_green::{taylor_green_3d, taylor_green_eighth, taylor_green_plane, taylor_green_plane_exact};
 pub use vortex_pair::VortexPairCase;
 
 use super::mesh::Mesh;

@@ -1,8 +1,8 @@
 //! Vortices of Taylor and Green: the decaying ones of the plane, an exact solution, and those of space, which become turbulent.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
-use super::super::mesh::{Direction, Mapping, Mesh};
+use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::{Case, Initial};
 use crate::Error;
@@ -36,7 +36,19 @@ pub fn taylor_green_plane_exact(at_m: [f64; 3], time_s: f64, viscosity_m2_s: f64
 /// # Errors
 /// Cells or Reynolds number out of range.
 pub fn taylor_green_3d(cells: usize, reynolds: f64) -> Result<Case, Error> {
-    let direction = || Direction::periodic(cells, 0.0, TAU);
+    in_space(|| Direction::periodic(cells, 0.0, TAU), reynolds)
+}
+
+/// The eighth of [`taylor_green_3d`] between the planes of symmetry, `cells` over `pi`: the same flow, as these planes are
+/// frictionless walls, at an eighth of the cost.
+///
+/// # Errors
+/// Cells or Reynolds number out of range.
+pub fn taylor_green_eighth(cells: usize, reynolds: f64) -> Result<Case, Error> {
+    in_space(|| Direction::between(cells, 0.0, PI, Wall::Slip, Wall::Slip), reynolds)
+}
+
+fn in_space(direction: impl Fn() -> Direction, reynolds: f64) -> Result<Case, Error> {
     let mesh = Mesh::new(direction(), direction(), direction())?;
     let initial = |at_m: [f64; 3]| {
         let [x, y, z] = at_m;

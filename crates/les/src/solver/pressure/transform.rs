@@ -25,8 +25,8 @@ pub(crate) struct Work {
 
 /// Transform of the rows along axis 0.
 pub(crate) enum RowTransform {
-    /// One cell: its scale alone.
-    Thin(f64),
+    /// One cell: nothing to do.
+    Thin,
     /// Fourier transform; the modes are stored as real and imaginary parts in the places of the row.
     Fourier { cells: usize, forward: Arc<dyn RealToComplex<f64>>, inverse: Arc<dyn ComplexToReal<f64>> },
     /// Products with the eigenvectors and their transpose.
@@ -50,10 +50,10 @@ impl RowTransform {
     /// The transform, the eigenvalues by place, and the factor that both ways together leave out.
     pub(crate) fn new(line: &Line) -> (Self, Vec<f64>, f64) {
         let n = line.cells;
-        let fast = n > TINY && (n > SMALL || largest_factor(n) <= SMOOTH);
+        // Powers of two add equal values exactly: a flow that does not vary stays as it is, whatever the number of cells.
+        let fast = n.is_power_of_two() || n > TINY && (n > SMALL || largest_factor(n) <= SMOOTH);
         if line.is_thin() {
-            let scale = 1.0 / line.cell_mass_m[0].sqrt();
-            (Self::Thin(scale), vec![0.0], 1.0)
+            (Self::Thin, vec![0.0], 1.0 / line.cell_mass_m[0])
         } else if line.is_fourier() && fast {
             let mut planner = RealFftPlanner::new();
             let (forward, inverse) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
@@ -71,7 +71,7 @@ impl RowTransform {
     /// Rows to modes.
     pub(crate) fn forward(&self, rows: &mut [f64], work: &mut Work) {
         match self {
-            Self::Thin(scale) => rows.iter_mut().for_each(|value| *value *= scale),
+            Self::Thin => {}
             Self::Dense { forward, .. } => forward.apply(rows, &mut work.packed),
             Self::Fourier { cells, forward, .. } => {
                 let (spectrum, scratch) = work.fourier(*cells, forward.get_scratch_len());
@@ -95,7 +95,7 @@ impl RowTransform {
     /// Modes to rows.
     pub(crate) fn inverse(&self, rows: &mut [f64], work: &mut Work) {
         match self {
-            Self::Thin(scale) => rows.iter_mut().for_each(|value| *value *= scale),
+            Self::Thin => {}
             Self::Dense { inverse, .. } => inverse.apply(rows, &mut work.packed),
             Self::Fourier { cells, inverse, .. } => {
                 let (spectrum, scratch) = work.fourier(*cells, inverse.get_scratch_len());
@@ -124,14 +124,15 @@ impl RowTransform {
                 let single = m == 0 || 2 * m.div_ceil(2) == *cells;
                 if single { 1.0 / *cells as f64 } else { 2.0 / *cells as f64 }
             }
-            _ => mass_m,
+            Self::Thin => 1.0,
+            Self::Dense { .. } => mass_m,
         }
     }
 
     /// What it is, for the log.
     pub(crate) fn name(&self) -> &'static str {
         match self {
-            Self::Thin(_) => "one cell",
+            Self::Thin => "one cell",
             Self::Fourier { .. } => "Fourier",
             Self::Dense { .. } => "dense",
         }
@@ -226,7 +227,7 @@ mod tests {
 
     #[test]
     fn the_fourier_transform_and_the_matrix_of_waves_give_the_same_modes() {
-        for n in [16, 27, 60] {
+        for n in [4, 16, 27, 60] {
             let line = Line::new(&Direction::periodic(n, 0.0, 3.0));
             let (transform, value, factor) = RowTransform::new(&line);
             assert_eq!(transform.name(), "Fourier");
