@@ -270,6 +270,20 @@ pub struct Aircraft {
 }
 
 impl Aircraft {
+    /// A320 at its largest landing mass, in standard air at sea level.
+    pub const A320: Self = Self::landing(66_000.0, 34.1);
+    /// A340-300 at its largest landing mass.
+    pub const A340_300: Self = Self::landing(190_000.0, 60.3);
+    /// B747-400 at its largest landing mass.
+    pub const B747_400: Self = Self::landing(285_800.0, 64.4);
+    /// A380-800 at its largest landing mass.
+    pub const A380_800: Self = Self::landing(391_000.0, 79.8);
+
+    /// At 70 m/s, the approach speed of the chapter, in standard air at sea level.
+    const fn landing(mass_kg: f64, span_m: f64) -> Self {
+        Self { mass_kg, speed_m_s: 70.0, span_m, air_density_kg_m3: 1.225 }
+    }
+
     /// Distance between the vortices, `b0 = pi b/4` \[m\].
     ///
     /// # Errors

@@ -5,6 +5,7 @@
 
 mod flow;
 mod progress;
+mod wake;
 
 use crate::plan::{Plan, Target};
 use crate::progress::{Observer, Silent};
@@ -61,6 +62,8 @@ enum Command {
     Map(Io),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow(flow::FlowWords),
+    /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
+    Wake(wake::WakeWords),
 }
 
 #[derive(Debug, Args)]
@@ -100,6 +103,7 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
         Command::Flow(words) => flow::flow(words, cli),
+        Command::Wake(words) => wake::wake(words, cli),
     }
 }
 

@@ -33,7 +33,7 @@ pub mod fields;
 pub mod hpl;
 pub mod map;
 #[cfg(feature = "netcdf")]
-mod netcdf;
+pub(crate) mod netcdf;
 #[cfg(feature = "npz")]
 pub mod npz;
 pub mod provenance;

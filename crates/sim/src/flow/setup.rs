@@ -6,6 +6,7 @@ use std::path::Path;
 pub(super) use wakescope_les::cases::Initial;
 use wakescope_les::{
     Flow, FlowSettings, Mesh, PressureMethod, StartReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment,
+    WakeMeter, WakeScales,
 };
 
 /// All that a simulation is made of.
@@ -17,6 +18,14 @@ pub(super) struct Setup {
     pub(super) end_s: Option<f64>,
     /// Age of the wake per time \[1/s\]; 1 where there is no wake.
     pub(super) tau_per_s: f64,
+    /// What a wake is measured by.
+    pub(super) wake: Option<WakeSetup>,
+}
+
+/// The meter of a wake and its scales.
+pub(super) struct WakeSetup {
+    pub(super) meter: WakeMeter,
+    pub(super) scales: WakeScales,
 }
 
 impl Setup {

@@ -35,6 +35,7 @@ const WINDOW: [f64; 2] = [5.0 / 47.0, 15.0 / 47.0];
 pub struct WakeMeter {
     scales: WakeScales,
     window: [f64; 2],
+    core_radius: f64,
     curl: Curl,
     face_m: [Vec<f64>; 2],
     period_m: Option<f64>,
@@ -60,6 +61,7 @@ impl WakeMeter {
         Ok(Self {
             scales,
             window: WINDOW,
+            core_radius: CORE_RADIUS,
             face_m,
             period_m: (lateral.ends == Ends::Periodic).then(|| lateral.length_m()),
             viscosity_m2_s,
@@ -77,6 +79,16 @@ impl WakeMeter {
         check("radius of the window", window[0], "positive", |r| r > 0.0)?;
         check("radius of the window", window[1], "above the first", |r| r > window[0])?;
         Ok(Self { window, ..self })
+    }
+
+    /// The same with another radius, in `b0`, of the circle of a centroid, 0.15 by default. A small one finds the place of the
+    /// strongest vorticity.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a radius that is not positive.
+    pub fn with_core_radius(self, core_radius: f64) -> Result<Self, Error> {
+        check("core_radius", core_radius, "positive", |r| r > 0.0)?;
+        Ok(Self { core_radius, ..self })
     }
 
     /// The same, told how the two vortices move at first, `(v, w)` \[m/s\]: needed where they move by more than a core radius
@@ -123,7 +135,7 @@ impl WakeMeter {
         crate::error::check_lengths(cells, velocity[0].len())?;
         let plane = self.mean_vorticity(&velocity);
         let wind = flow.plane_snapshot(&flow.mean_cross_plane(), OutsidePolicy::Mask)?;
-        let radius_m = CORE_RADIUS * self.scales.spacing_m;
+        let radius_m = self.core_radius * self.scales.spacing_m;
         let time_s = flow.time_s();
         let cores: [Option<Core>; 2] =
             std::array::from_fn(|v| plane.core(guess(&self.track[v], time_s), SIGN[v], radius_m));
@@ -192,7 +204,7 @@ impl WakeMeter {
 
     /// The core in each cross-plane about the one of the mean; NaN where there is none.
     fn slices(&self, velocity: &Faces, about: Core, sign: f64) -> Vec<[f64; 2]> {
-        let radius_m = CORE_RADIUS * self.scales.spacing_m;
+        let radius_m = self.core_radius * self.scales.spacing_m;
         let (ny, nx) = (self.face_m[0].len(), self.curl.cell_m[0].len());
         let near = |k: usize| (self.face_m[1][k] - about.centre_m[1]).abs() < 2.0 * radius_m;
         let flat = self.edge_plane(Vec::new());
@@ -231,7 +243,7 @@ impl WakeMeter {
         }
         let gamma_m2_s = self.radii_m().into_iter().map(circulation).collect::<Result<_, _>>()?;
         let above = |y: f64, z: f64| z > ABOVE_LAYER * spacing_m && side.has(y);
-        let slices_m = match side.plane.core(centre_m, sign, CORE_RADIUS * spacing_m) {
+        let slices_m = match side.plane.core(centre_m, sign, self.core_radius * spacing_m) {
             Some(core) if is_found => self.slices(velocity, core, sign),
             _ => Vec::new(),
         };
@@ -254,7 +266,8 @@ impl WakeMeter {
     fn secondary(&self, velocity: &Faces, side: &Side<'_>, above: impl Fn(f64, f64) -> bool) -> SecondaryRecord {
         let sign = -SIGN[side.own];
         let guess_m = side.plane.strongest_m(sign, above);
-        let found = guess_m.and_then(|guess_m| side.plane.core(guess_m, sign, CORE_RADIUS * self.scales.spacing_m));
+        let found =
+            guess_m.and_then(|guess_m| side.plane.core(guess_m, sign, self.core_radius * self.scales.spacing_m));
         let least_m2_s = LEAST_SECONDARY * self.scales.circulation_m2_s;
         match found {
             Some(core) if core.circulation_m2_s.abs() >= least_m2_s => {
