@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 2 wrong input or unusable output. Progress and plans go to standard error,
 //! results to standard output; `--json` makes the result one JSON object.
 
+mod bound;
 mod flow;
 mod progress;
 mod wake;
@@ -60,6 +61,8 @@ enum Command {
     Signal(Io),
     /// The radial-velocity map with its errors.
     Map(Io),
+    /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
+    Bound(bound::BoundWords),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow(flow::FlowWords),
     /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
@@ -102,6 +105,7 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
+        Command::Bound(words) => bound::bound(words, cli),
         Command::Flow(words) => flow::flow(words, cli),
         Command::Wake(words) => wake::wake(words, cli),
     }

@@ -51,6 +51,9 @@ pub enum Error {
     /// The signal simulation refused its input.
     #[error("signal: {0}")]
     Signal(#[from] wakescope_signal::Error),
+    /// A scene without noise has no bound.
+    #[error("detector.noise = \"none\": without noise nothing bounds the velocity; \"band\" or \"white\" is needed")]
+    NoBound,
     /// An estimator refused its input.
     #[error("estimate: {0}")]
     Estimate(#[from] wakescope_estimate::Error),

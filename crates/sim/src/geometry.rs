@@ -2,10 +2,10 @@
 //!
 //! Only arithmetic on the scene, so that the plan can state sizes before anything is allocated.
 
-use crate::Error;
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::scene::Scene;
 use crate::wind::SceneWind;
+use crate::{Error, join};
 
 /// The sampling of one scan in angle, range and time.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ pub struct Geometry {
     pub first_layer_range_m: f64,
     /// Number of layers of a line.
     pub layers: usize,
-    /// Layers that contribute to one sample, 2 L_c + 1.
+    /// Layers that contribute to one sample, 2 L_c + 1 for a Gaussian pulse.
     pub layers_per_sample: usize,
 }
 
@@ -52,14 +52,13 @@ impl Geometry {
         let gate_first_sample: Vec<usize> = (0..=samples - window).step_by(scene.estimator.gate_step_samples).collect();
         // Windows are indexed by their centre, R = c (t_p + N T_s/2)/2.
         let centre_m = |first: &usize| scan.range_min_m + (*first as f64 + 0.5 * window as f64) * sample_spacing_m;
-        let sigma_s = scene.pulse_sigma_s();
-        let layer_thickness_m = wakescope_signal::layer_thickness_m(
-            scene.detector.sampling_hz,
-            scene.laser.wavelength_m,
-            sigma_s,
-            max_gradient_per_s,
-        )?;
-        let half = (3.72 * sigma_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m).ceil() as usize;
+        let pulse = join::pulse(scene)?;
+        let layer_thickness_m =
+            pulse.layer_thickness_m(scene.detector.sampling_hz, scene.laser.wavelength_m, max_gradient_per_s)?;
+        // Layers before and behind the range of a sample that the pulse lights.
+        let (first_s, last_s) = pulse.support_s();
+        let reach = |time_s: f64| (time_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m).max(0.0).ceil() as usize;
+        let (near, far) = (reach(last_s), reach(-first_s));
         let record_m = (samples - 1) as f64 * sample_spacing_m;
         Ok(Self {
             elevation_rad: (0..lines).map(|i| scan.elevation_min_rad + i as f64 * scan.elevation_step_rad).collect(),
@@ -70,9 +69,9 @@ impl Geometry {
             gate_range_m: gate_first_sample.iter().map(centre_m).collect(),
             gate_first_sample,
             layer_thickness_m,
-            first_layer_range_m: scan.range_min_m - half as f64 * layer_thickness_m,
-            layers: (record_m / layer_thickness_m).ceil() as usize + 2 * half + 1,
-            layers_per_sample: 2 * half + 1,
+            first_layer_range_m: scan.range_min_m - near as f64 * layer_thickness_m,
+            layers: (record_m / layer_thickness_m).ceil() as usize + near + far + 1,
+            layers_per_sample: near + far + 1,
         })
     }
 

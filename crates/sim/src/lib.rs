@@ -34,6 +34,7 @@
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | [`scan`] | air along the lines of sight, and their records |
 //! | [`map`] | estimates and their errors against the truth |
+//! | [`mod@bound`] | the Cramer-Rao bound for a scene |
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`streams`] | one random stream for each pulse |
@@ -43,6 +44,7 @@
 //! Features, all but the last two on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
 //! PNG, the report page), `vtk` and `npz` (more formats for fields).
 
+pub mod bound;
 pub mod export;
 #[cfg(feature = "flow")]
 pub mod flow;
@@ -57,6 +59,7 @@ mod plane;
 mod planes_input;
 pub mod profile;
 pub mod progress;
+mod region;
 pub mod run;
 pub mod scan;
 pub mod scene;

@@ -6,7 +6,7 @@
 
 use crate::Error;
 use crate::geometry::Geometry;
-use crate::scene::{Flow, Method, NoiseKind, Scene, SceneFile};
+use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, SceneFile, Weighting};
 use crate::wind::SceneWind;
 use std::fmt;
 
@@ -200,7 +200,13 @@ fn stages(scene: &Scene, target: Target, g: &Geometry, wind: &str, optics: [Plan
         let windows = ((g.samples - scene.estimator.window_samples) / scene.estimator.window_step_samples + 1) as f64;
         let region = match scene.estimator.method {
             Method::Periodogram => "no region".to_owned(),
-            Method::PeriodogramAccumulation => format!("regions of {} m", scene.estimator.radius_m),
+            _ => match &scene.estimator.radius {
+                RegionRadius::Fixed {} => format!("regions of {} m", scene.estimator.radius_m),
+                RegionRadius::OfRange { .. } => "regions whose radius depends on range".to_owned(),
+                RegionRadius::Target { standard_deviation_m_s, .. } => {
+                    format!("regions for a standard deviation of {standard_deviation_m_s} m/s")
+                }
+            },
         };
         let reason = format!("{lines} x {gates} gates, {region}");
         let lags = scene.estimator.window_samples as f64;
@@ -237,6 +243,14 @@ fn warnings(scene: &Scene, wind: &SceneWind) -> Vec<String> {
         out.push(format!(
             "estimator.padded_samples gives a spectrum in steps of {bin_m_s:.2} m/s: expect a bias of that order"
         ));
+    }
+    let models =
+        [Method::Autoregressive, Method::AutoregressivePole, Method::Capon, Method::FirstMoment, Method::LagWindow];
+    if models.contains(&scene.estimator.method) && scene.estimator.weighting != Weighting::Rectangular {
+        out.push(
+            "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\""
+                .into(),
+        );
     }
     if scene.scan.realisations < 2 {
         out.push("one realisation: no standard deviation can be given".into());
