@@ -8,7 +8,14 @@ mod fig04;
 mod fig05;
 mod fig08;
 mod fig09;
+mod fig10;
+mod fig11;
+mod fig12;
+mod fig13;
+mod fig14;
 mod fig18;
+mod profiles;
+mod study;
 mod tab01;
 mod tab02;
 
@@ -174,7 +181,7 @@ impl fmt::Display for Claim {
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 9] = [
+pub(crate) const ALL: [Figure; 14] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
     Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
     Figure {
@@ -188,5 +195,10 @@ pub(crate) const ALL: [Figure; 9] = [
     Figure { id: "fig05", number: 5, title: "M'4 stencil on a line of sight", make: fig05::make },
     Figure { id: "fig08", number: 8, title: "Radial velocity of the early wake (analytic pair)", make: fig08::make },
     Figure { id: "fig09", number: 9, title: "Accumulation level against range", make: fig09::make },
+    Figure { id: "fig10", number: 10, title: "Estimation error and gradient (analytic pair)", make: fig10::make },
+    Figure { id: "fig11", number: 11, title: "Estimated map, late, 400 ns (analytic pair)", make: fig11::make },
+    Figure { id: "fig12", number: 12, title: "Error against pulse energy (analytic pair)", make: fig12::make },
+    Figure { id: "fig13", number: 13, title: "Correlogram against periodogram accumulation", make: fig13::make },
+    Figure { id: "fig14", number: 14, title: "The same at 200 and 400 ns about the centre", make: fig14::make },
     Figure { id: "fig18", number: 18, title: "Velocity estimators against the Cramer-Rao bound", make: fig18::make },
 ];
