@@ -82,7 +82,10 @@ fn correlation(a: &Array2<f64>, b: &Array2<f64>) -> f64 {
     sums[2] / (sums[0] * sums[1]).sqrt()
 }
 
-fn claim(shown: &[(&str, (f64, f64), (f64, f64))]) -> Claim {
+/// Name of a reference and two correlations, each with its standard error or limits.
+type Correlations<'a> = (&'a str, (f64, f64), (f64, f64));
+
+fn claim(shown: &[Correlations<'_>]) -> Claim {
     let words: Vec<String> = shown
         .iter()
         .map(|(name, rms, std)| {

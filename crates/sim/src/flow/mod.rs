@@ -14,6 +14,8 @@ mod free;
 #[cfg(feature = "netcdf")]
 mod initial_file;
 mod named;
+#[cfg(feature = "netcdf")]
+mod read;
 mod setup;
 mod steps;
 mod wake;
@@ -28,6 +30,8 @@ pub use named::{
     Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
 };
 
+#[cfg(feature = "netcdf")]
+pub use read::{FieldInSpace, read_field, read_planes};
 pub use wake::{PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile};
 
 use crate::Error;

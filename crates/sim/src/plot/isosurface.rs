@@ -4,7 +4,7 @@
 use super::colour::Rgb;
 use super::drawing::{Anchor, Frame, Pen, Raster, Shape};
 use super::font::Font;
-use super::frame::{INK, TICK_SIZE, label, top_room};
+use super::frame::{TICK_SIZE, label, top_room};
 use super::volume::Volume;
 use crate::export::{OutputError, OutputResult};
 use rayon::prelude::*;
