@@ -4,8 +4,6 @@
 #![allow(clippy::unwrap_used)]
 
 mod circulation;
-mod guided;
-mod pair_scene;
 mod point_target;
 mod power;
 mod scan_errors;

@@ -14,18 +14,8 @@ pub(super) struct FlowWords {
     /// The case file; --example prints one.
     #[arg(required_unless_present = "example")]
     case: Option<PathBuf>,
-    #[command(flatten)]
-    run: RunWords,
-    /// Print a commented case file and do nothing else.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "out"], value_parser = EXAMPLES.map(|(name, _)| name))]
-    example: Option<String>,
-}
-
-/// Where a simulation writes and how it begins.
-#[derive(Debug, Args)]
-pub(super) struct RunWords {
     /// Folder to write to; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", required_unless_present = "example")]
     out: Option<PathBuf>,
     /// Continue from the checkpoint in the folder.
     #[arg(long, conflicts_with = "overwrite")]
@@ -33,6 +23,9 @@ pub(super) struct RunWords {
     /// Begin anew although the folder holds a checkpoint.
     #[arg(long)]
     overwrite: bool,
+    /// Print a commented case file and do nothing else.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "out"], value_parser = EXAMPLES.map(|(name, _)| name))]
+    example: Option<String>,
 }
 
 pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
@@ -40,17 +33,9 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
         let _ = std::io::stdout().lock().write_all(text.as_bytes());
         return Ok(());
     }
-    // The words were checked: without an example there is a case.
-    let Some(case) = &words.case else { return Ok(()) };
-    simulate(&CaseFile::read(case)?, &words.run, cli)
-}
-
-/// Runs a case and says what came of it.
-pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(), Error> {
-    let Some(out) = &words.out else {
-        let reason = "a run needs a folder to write to".into();
-        return Err(Error::Input { path: PathBuf::from("--out DIR"), reason });
-    };
+    // The words were checked: without an example both are there.
+    let (Some(case), Some(out)) = (&words.case, &words.out) else { return Ok(()) };
+    let file = CaseFile::read(case)?;
     let begin = match (words.restart, words.overwrite) {
         (true, _) => Begin::Restart,
         (_, true) => Begin::Overwrite,
@@ -65,7 +50,7 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
             bar = progress::FlowBar::new();
             &mut bar
         };
-        run(file, out, begin, watch)
+        run(&file, out, begin, watch)
     })??;
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
