@@ -2,12 +2,14 @@
 //!
 //! A figure is a function from a [`Context`] to the files it writes and the claims it measures.
 
+mod ca_pa;
 mod fig01;
 mod fig03;
 mod fig04;
 mod fig05;
 mod fig08;
 mod fig09;
+mod fig17;
 mod fig18;
 mod tab01;
 mod tab02;
@@ -174,7 +176,7 @@ impl fmt::Display for Claim {
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 9] = [
+pub(crate) const ALL: [Figure; 11] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
     Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
     Figure {
@@ -188,5 +190,7 @@ pub(crate) const ALL: [Figure; 9] = [
     Figure { id: "fig05", number: 5, title: "M'4 stencil on a line of sight", make: fig05::make },
     Figure { id: "fig08", number: 8, title: "Radial velocity of the early wake (analytic pair)", make: fig08::make },
     Figure { id: "fig09", number: 9, title: "Accumulation level against range", make: fig09::make },
+    Figure { id: "fig17", number: 17, title: "Circulation and positions from single scans", make: fig17::make },
     Figure { id: "fig18", number: 18, title: "Velocity estimators against the Cramer-Rao bound", make: fig18::make },
+    Figure { id: "ca_pa", number: 19, title: "CA against PA: where the claim holds", make: ca_pa::make },
 ];
