@@ -4,6 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 mod circulation;
+mod guided;
+mod pair_scene;
 mod point_target;
 mod power;
 mod scan_errors;

@@ -65,8 +65,7 @@ fn noise_power_is_13_in_the_band_and_two_and_a_half_times_that_if_white() {
 #[test]
 fn power_does_not_depend_on_the_layer_thickness() {
     // A steep flow makes the layers thinner; at rest the same scene has layers of one sample.
-    let thick = plan(|s| s.detector.noise = NoiseKind::None);
-    let mut thin = thick.clone();
+    let [thick, mut thin] = [(), ()].map(|()| plan(|s| s.detector.noise = NoiseKind::None));
     let factor = 4;
     let g = &mut thin.geometry;
     g.layer_thickness_m /= factor as f64;

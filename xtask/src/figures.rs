@@ -6,14 +6,25 @@ mod fig01;
 mod fig03;
 mod fig04;
 mod fig05;
+mod fig06;
+mod fig07;
 mod fig08;
 mod fig09;
+mod fig10;
+mod fig11;
+mod fig12;
+mod fig13;
+mod fig14;
 mod fig18;
+mod profiles;
+mod study;
 mod tab01;
 mod tab02;
+mod wake;
 
 use crate::Failure;
 use std::fmt;
+use std::path::PathBuf;
 use wakescope_sim::export::Provenance;
 use wakescope_sim::scene::Scene;
 
@@ -28,11 +39,23 @@ pub(crate) enum Profile {
     Full,
 }
 
+impl Profile {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Quick => "quick",
+            Self::Standard => "standard",
+            Self::Full => "full",
+        }
+    }
+}
+
 /// What a figure may depend on.
 #[derive(Debug, Clone)]
 pub(crate) struct Context {
     pub(crate) profile: Profile,
     pub(crate) seed: u64,
+    /// Folder for runs that several figures share.
+    pub(crate) stages: PathBuf,
 }
 
 impl Context {
@@ -46,7 +69,7 @@ impl Context {
     }
 
     pub(crate) fn profile_name(&self) -> &'static str {
-        self.choose("quick", "standard", "full")
+        self.profile.name()
     }
 
     /// The scene of a figure as a checked file, with this run's seed.
@@ -174,7 +197,7 @@ impl fmt::Display for Claim {
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 9] = [
+pub(crate) const ALL: [Figure; 16] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
     Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
     Figure {
@@ -186,7 +209,14 @@ pub(crate) const ALL: [Figure; 9] = [
     Figure { id: "fig03", number: 3, title: "Scan pattern across the runway", make: fig03::make },
     Figure { id: "fig04", number: 4, title: "Signal-to-noise ratio and system efficiency", make: fig04::make },
     Figure { id: "fig05", number: 5, title: "M'4 stencil on a line of sight", make: fig05::make },
-    Figure { id: "fig08", number: 8, title: "Radial velocity of the early wake (analytic pair)", make: fig08::make },
+    Figure { id: "fig06", number: 6, title: "Surfaces of equal vorticity", make: fig06::make },
+    Figure { id: "fig07", number: 7, title: "Circulation and paths of the vortices", make: fig07::make },
+    Figure { id: "fig08", number: 8, title: "Radial velocity of the wake, early and late", make: fig08::make },
     Figure { id: "fig09", number: 9, title: "Accumulation level against range", make: fig09::make },
+    Figure { id: "fig10", number: 10, title: "Estimation error and gradient (analytic pair)", make: fig10::make },
+    Figure { id: "fig11", number: 11, title: "Estimated map, late, 400 ns (analytic pair)", make: fig11::make },
+    Figure { id: "fig12", number: 12, title: "Error against pulse energy (analytic pair)", make: fig12::make },
+    Figure { id: "fig13", number: 13, title: "Correlogram against periodogram accumulation", make: fig13::make },
+    Figure { id: "fig14", number: 14, title: "The same at 200 and 400 ns about the centre", make: fig14::make },
     Figure { id: "fig18", number: 18, title: "Velocity estimators against the Cramer-Rao bound", make: fig18::make },
 ];

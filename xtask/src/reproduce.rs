@@ -47,8 +47,11 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let out = options.out.clone().unwrap_or_else(|| root().join("target/figures"));
     std::fs::create_dir_all(&out).map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
-    let context = Context { profile: options.profile, seed: options.seed };
-    let cache = cache::Cache::new(&context)?;
+    let cache = cache::Cache::new(options.profile, options.seed)?;
+    let context = Context { profile: options.profile, seed: options.seed, stages: cache.stages() };
+    if options.no_cache && context.stages.exists() {
+        std::fs::remove_dir_all(&context.stages)?;
+    }
     let bar = progress_bar(chosen.len() as u64);
 
     let mut done = Vec::new();

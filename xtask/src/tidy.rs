@@ -78,7 +78,7 @@ const QUANTITIES: [&str; 26] = [
 ];
 
 /// What a name with a unit ends with; a fraction has none.
-const UNITS: [&str; 35] = [
+const UNITS: [&str; 36] = [
     "_m",
     "_s",
     "_hz",
@@ -108,6 +108,7 @@ const UNITS: [&str; 35] = [
     "_samples",
     "_m_s2",
     "_m2_s2",
+    "_m4_s2",
     "_m5_s2",
     "_m5_s3",
     "_a2_hz",

@@ -9,6 +9,7 @@ mod dipole;
 mod order;
 mod pair;
 mod vortices;
+mod wake;
 mod waves;
 
 use crate::workspace::{read, root};
@@ -104,7 +105,7 @@ pub(crate) struct Shown {
 
 type CaseFn = fn(Profile) -> Result<Shown, Failure>;
 
-const CASES: [(&str, CaseFn); 8] = [
+const CASES: [(&str, CaseFn); 13] = [
     ("les_order", order::show),
     ("les_waves", waves::show),
     ("les_dipole_625", dipole::show_625),
@@ -112,6 +113,11 @@ const CASES: [(&str, CaseFn); 8] = [
     ("les_cavity", cavity::show),
     ("les_vortices", vortices::show),
     ("les_pair", pair::show),
+    ("les_hyperbola", pair::show_hyperbola),
+    ("les_wake_coarse", wake::show_coarse),
+    ("les_wake_medium", wake::show_medium),
+    ("wake_onset", wake::show_onset),
+    ("wake_crosswind", wake::show_crosswind),
     ("les_channel", channel::show),
 ];
 
@@ -125,7 +131,9 @@ pub(crate) fn run(options: &Options) -> Outcome {
     println!("{:<16} {:<46} {:>13} {:>13} {:>12}  verdict", "case", "quantity", "measured", "reference", "bar");
     let mut missed = Vec::new();
     for (name, show) in CASES.into_iter().filter(|case| wanted(case.0)) {
-        if name == "les_channel" && options.profile != Profile::Full {
+        let is_long = (name == "les_channel" && options.profile != Profile::Full)
+            || (name == "les_wake_medium" && options.profile == Profile::Quick);
+        if is_long {
             continue;
         }
         let start = Instant::now();

@@ -41,6 +41,7 @@
 //! | `gradient`, `gradient_likelihood` | a linear wind in the window; likelihood of velocity and gradient, for real windows too |
 //! | `first_moment` | the mean of a skewed spectrum, which (28) asks for |
 //! | `bound`, `linalg` | Cramer-Rao bound; solve and eigenvectors with residual checks |
+//! | `shrinkage` | a map drawn towards a guess of the wind as far as it does not contradict it |
 //! | `error_map` | bias, standard deviation, root mean square with standard errors, (33) |
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
 //!
@@ -84,6 +85,7 @@ mod region;
 mod sample;
 mod sampling;
 mod search;
+mod shrinkage;
 mod sliding;
 mod spectrum;
 mod statistic;
@@ -113,6 +115,7 @@ pub use periodogram::{Periodogram, PeriodogramOptions, PeriodogramPlan};
 pub use region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, polar_points};
 pub use sample::{Sample, Scratch, SignalKind};
 pub use sampling::{SPEED_OF_LIGHT_M_S, Sampling};
+pub use shrinkage::{ShrinkageOptions, ShrunkMap, shrink_to_guess};
 pub use sliding::ShortCorrelogram;
 pub use spectrum::{LagSpectrum, density_at};
 pub use statistic::{Estimator, Statistic, estimate_window};

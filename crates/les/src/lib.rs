@@ -28,10 +28,11 @@
 //! |---|---|
 //! | `wind` | the trait [`Wind`]; [`Calm`], [`Uniform`], [`Sum`] |
 //! | `profile` | circulation against radius of one vortex, (3), (4) |
+//! | `two_scale` | the two-scale profile |
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
 //! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
 //! | `series` | [`GridSeries`]: snapshots at several times, a wind that moves |
-//! | `solver` | [`Flow`], [`Mesh`], [`FlowSettings`]: the simulation; [`Run`]: a run with outputs and checkpoints; [`cases`] |
+//! | `solver` | [`Flow`], [`Mesh`], [`FlowSettings`]: the simulation; [`Run`]: a run with outputs and checkpoints; [`WakeMeter`]: what a wake is measured by; [`cases`] |
 //! | `axis` | one direction of a mesh: stretching, walls, periods |
 //! | `kernel` | the M'4 kernel, (27) |
 //! | `diagnose` | circulation on circles, (1), and `Gamma_5-15` |
@@ -47,6 +48,7 @@ mod profile;
 mod series;
 #[cfg(feature = "solver")]
 mod solver;
+mod two_scale;
 mod vortex;
 mod wind;
 
@@ -65,7 +67,9 @@ pub use solver::{
 #[cfg(feature = "solver")]
 pub use solver::{
     Direction, Ends, Flow, FlowSettings, Mapping, MappingFn, Mesh, PressureEquation, PressureMethod, PressureSolved,
-    StartReport, StepReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment, Wall, cases,
+    SecondaryRecord, StartReport, StepReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment, VortexRecord,
+    WakeMeter, WakeRecord, WakeScales, Wall, cases,
 };
+pub use two_scale::TwoScale;
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};
 pub use wind::{Calm, Sum, Uniform, Wind};

@@ -5,6 +5,8 @@
 
 use std::f64::consts::PI;
 
+use crate::TwoScale;
+
 /// Root of `2 s + 1 = exp(s)`: makes `r_c` the radius of the largest tangential velocity of a Lamb-Oseen vortex.
 const LAMB_OSEEN_BETA: f64 = 1.256_431_208_626_169_6;
 
@@ -13,8 +15,8 @@ const LAMB_OSEEN_STRAIN_ROOT: f64 = 1.793_282_132_900_760_4;
 
 /// How the circulation grows with the distance from the centre of a vortex.
 ///
-/// Both profiles tend to the full circulation far away and have their largest tangential velocity at `core_radius_m`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+/// All profiles tend to the full circulation far away and have their largest tangential velocity at `core_radius_m`.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum CirculationProfile {
     /// `Gamma0 r^2/(r^2 + r_c^2)`, equation (3); Burnham and Hallock (1982). Its largest velocity is half that of a
     /// point vortex at the same radius.
@@ -23,6 +25,8 @@ pub enum CirculationProfile {
     /// `Gamma0 (1 - exp(-1.2564 r^2/r_c^2))`: the vortex of Lamb and Oseen, a solution of the Navier-Stokes equations
     /// (Lamb 1932, section 334a).
     LambOseen,
+    /// A viscous core inside a broad distribution of circulation, as after the roll-up of a wing's vortex sheet.
+    TwoScale(TwoScale),
 }
 
 impl CirculationProfile {
@@ -51,6 +55,20 @@ impl CirculationProfile {
                 let s = LAMB_OSEEN_STRAIN_ROOT;
                 scale * LAMB_OSEEN_BETA * (-(-s).exp_m1() / s - (-s).exp())
             }
+            Self::TwoScale(_) => {
+                // The strain has one maximum, beyond the core radius.
+                let strain = |s: f64| self.strain_rate_per_s(circulation_m2_s, core_radius_m, s * core_radius_m);
+                let (mut low, mut high) = (0.0, 4.0);
+                for _ in 0..100 {
+                    let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+                    if strain(a) < strain(b) {
+                        low = a;
+                    } else {
+                        high = b;
+                    }
+                }
+                strain(low)
+            }
         }
     }
 
@@ -71,6 +89,10 @@ impl CirculationProfile {
                 let ratio = if s < 1e-8 { 1.0 - 0.5 * s } else { -(-s).exp_m1() / s };
                 circulation_m2_s * LAMB_OSEEN_BETA / (2.0 * PI * core2) * ratio
             }
+            Self::TwoScale(shape) => {
+                let s2 = (radius_squared_m2 / core2).max(1e-12);
+                circulation_m2_s / (2.0 * PI * core2) * -(-shape.exponent(s2).0).exp_m1() / s2
+            }
         }
     }
 
@@ -85,6 +107,15 @@ impl CirculationProfile {
                 let core = LAMB_OSEEN_BETA * circulation_m2_s / (2.0 * PI * core2);
                 if s < 1e-4 { core * 0.5 * s } else { core * (-(-s).exp_m1() / s - (-s).exp()) }
             }
+            Self::TwoScale(shape) => {
+                let s2 = r2 / core2;
+                if s2 < 1e-6 {
+                    return 0.0;
+                }
+                // |r d(omega)/dr|/2 of omega = Gamma/(2 pi r^2).
+                let (q, slope) = shape.exponent(s2);
+                circulation_m2_s / (2.0 * PI * r2) * (-(-q).exp_m1() - 0.5 * slope * (-q).exp())
+            }
         }
     }
 }
@@ -94,7 +125,12 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    const PROFILES: [CirculationProfile; 2] = [CirculationProfile::Algebraic, CirculationProfile::LambOseen];
+    const COMPACT: [CirculationProfile; 2] = [CirculationProfile::Algebraic, CirculationProfile::LambOseen];
+
+    fn profiles() -> [CirculationProfile; 3] {
+        let broad = CirculationProfile::TwoScale(TwoScale::new(25.0).unwrap());
+        [CirculationProfile::Algebraic, CirculationProfile::LambOseen, broad]
+    }
 
     #[test]
     fn algebraic_peak_velocity_is_gamma0_over_4_pi_core_radius() {
@@ -104,7 +140,7 @@ mod tests {
 
     #[test]
     fn tangential_velocity_is_largest_at_the_core_radius() {
-        for profile in PROFILES {
+        for profile in profiles() {
             let at = |r: f64| profile.tangential_velocity_m_s(500.0, 2.35, r);
             assert!(at(2.35) > at(2.35 * 0.999) && at(2.35) > at(2.35 * 1.001));
             let slope = (at(2.35 + 1e-5) - at(2.35 - 1e-5)) / 2e-5;
@@ -114,7 +150,7 @@ mod tests {
 
     #[test]
     fn profiles_are_within_four_percent_of_a_point_vortex_beyond_five_core_radii() {
-        for profile in PROFILES {
+        for profile in COMPACT {
             for step in 0..100 {
                 let r = 2.35 * (5.0 + 0.5 * f64::from(step));
                 let point = 500.0 / (2.0 * PI * r);
@@ -135,7 +171,7 @@ mod tests {
 
     #[test]
     fn largest_line_gradient_is_that_found_by_search_over_radius_and_direction() {
-        for profile in PROFILES {
+        for profile in profiles() {
             let (gamma, core) = (500.0, 2.35);
             let velocity = |y: f64, z: f64| {
                 let omega = profile.angular_velocity_rad_s(gamma, core, y * y + z * z);
@@ -162,7 +198,7 @@ mod tests {
 
     #[test]
     fn strain_rate_peaks_at_the_largest_line_gradient_and_vanishes_at_the_centre() {
-        for profile in PROFILES {
+        for profile in profiles() {
             let peak =
                 (0..100_000).map(|i| profile.strain_rate_per_s(500.0, 2.0, 1e-4 * f64::from(i))).fold(0.0, f64::max);
             let stated = profile.max_line_gradient_per_s(500.0, 2.0);

@@ -115,7 +115,7 @@ impl VortexPair {
     /// vortices.
     ///
     /// In closed form for the algebraic profile, `Gamma0 [1 - (r_c/10)(atan(15/r_c) - atan(5/r_c))]`; by Simpson's
-    /// rule, to round-off, for Lamb-Oseen.
+    /// rule, to round-off, for the others.
     pub fn circulation_5_15_m2_s(&self) -> f64 {
         let core = self.core_radius_m;
         match self.profile {
@@ -123,7 +123,7 @@ impl VortexPair {
                 let lost = 0.1 * core * ((15.0 / core).atan() - (5.0 / core).atan());
                 self.circulation_m2_s * (1.0 - lost)
             }
-            CirculationProfile::LambOseen => {
+            CirculationProfile::LambOseen | CirculationProfile::TwoScale(_) => {
                 let step = 10.0 / f64::from(SIMPSON_PANELS);
                 let sum: f64 = (0..=SIMPSON_PANELS)
                     .map(|i| {
@@ -270,6 +270,20 @@ pub struct Aircraft {
 }
 
 impl Aircraft {
+    /// A320 at its largest landing mass, in standard air at sea level.
+    pub const A320: Self = Self::landing(66_000.0, 34.1);
+    /// A340-300 at its largest landing mass.
+    pub const A340_300: Self = Self::landing(190_000.0, 60.3);
+    /// B747-400 at its largest landing mass.
+    pub const B747_400: Self = Self::landing(285_800.0, 64.4);
+    /// A380-800 at its largest landing mass.
+    pub const A380_800: Self = Self::landing(391_000.0, 79.8);
+
+    /// At 70 m/s, the approach speed of the chapter, in standard air at sea level.
+    const fn landing(mass_kg: f64, span_m: f64) -> Self {
+        Self { mass_kg, speed_m_s: 70.0, span_m, air_density_kg_m3: 1.225 }
+    }
+
     /// Distance between the vortices, `b0 = pi b/4` \[m\].
     ///
     /// # Errors

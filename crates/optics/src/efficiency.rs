@@ -153,6 +153,39 @@ pub(crate) fn check_increasing(field: &'static str, list: &[f64]) -> Result<(), 
     Ok(())
 }
 
+/// Result of a Monte-Carlo run.
+#[cfg(feature = "screens")]
+#[derive(Debug, Clone, PartialEq)]
+pub struct EfficiencyEstimate {
+    /// Both beams through the same path.
+    pub monostatic: EfficiencyProfile,
+    /// Beams through independent paths; none from a single realisation, which has no pairs.
+    pub bistatic: Option<EfficiencyProfile>,
+    /// Efficiency of each realisation at each range, `[range][realisation]`, both beams through the same path; a realisation
+    /// has the same index at every range. One without turbulence.
+    pub monostatic_realisations: Vec<Vec<f64>>,
+    /// The same for beams through the independent paths of two realisations each; empty without pairs.
+    pub bistatic_realisations: Vec<Vec<f64>>,
+    /// Realisations done (1 without turbulence).
+    pub realisations: usize,
+    /// Free-space efficiency of the same steps on the same grid.
+    pub grid_free_space: Vec<f64>,
+    /// Exact free-space efficiency.
+    pub exact_free_space: Vec<f64>,
+    /// Mean fraction of the power that the absorbing border took before each range. Above 0.01 the result is doubtful;
+    /// above 0.05 it is refused.
+    pub lost_power_fraction: Vec<f64>,
+}
+
+#[cfg(feature = "screens")]
+impl EfficiencyEstimate {
+    /// Ranges \[m\] at which the absorbing border took more than 0.01 of the power: the grid is too narrow to be trusted.
+    pub fn doubtful_range_m(&self) -> Vec<f64> {
+        let doubtful = |pair: &(&f64, &f64)| *pair.1 > 0.01;
+        self.monostatic.range_m.iter().zip(&self.lost_power_fraction).filter(doubtful).map(|(&r, _)| r).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

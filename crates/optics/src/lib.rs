@@ -73,6 +73,8 @@ pub mod turbulence;
 mod walk;
 
 pub use beam::{Focus, Misalignment, RadiusDefinition, Telescope};
+#[cfg(feature = "screens")]
+pub use efficiency::EfficiencyEstimate;
 pub use efficiency::EfficiencyProfile;
 pub use error::Error;
 #[cfg(feature = "screens")]
@@ -80,7 +82,7 @@ pub use grid::Grid;
 #[cfg(feature = "screens")]
 pub use kernel::Real;
 #[cfg(feature = "screens")]
-pub use monte_carlo::{EfficiencyEstimate, MonteCarlo, Progress, Sampling, Stop};
+pub use monte_carlo::{MonteCarlo, Progress, Sampling, Stop};
 #[cfg(feature = "screens")]
 pub use path::Layers;
 pub use snr::{PlanckConvention, SnrModel};

@@ -7,7 +7,7 @@
 //! Check: bistatic against exact theory for the very screens used, as a z-score; no turbulence gives free space with an
 //! error of exactly 0.
 
-use crate::efficiency::EfficiencyProfile;
+use crate::efficiency::{EfficiencyEstimate, EfficiencyProfile};
 use crate::grid::Grid;
 use crate::kernel::Real;
 use crate::path::{Layers, Program};
@@ -87,32 +87,6 @@ pub struct MonteCarlo {
     pub sampling: Sampling,
     /// Whether means, scatter and errors are multiplied with the ratio of exact to grid free-space efficiency.
     pub correct_grid: bool,
-}
-
-/// Result of a Monte-Carlo run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EfficiencyEstimate {
-    /// Both beams through the same path.
-    pub monostatic: EfficiencyProfile,
-    /// Beams through independent paths; none from a single realisation, which has no pairs.
-    pub bistatic: Option<EfficiencyProfile>,
-    /// Realisations done (1 without turbulence).
-    pub realisations: usize,
-    /// Free-space efficiency of the same steps on the same grid.
-    pub grid_free_space: Vec<f64>,
-    /// Exact free-space efficiency.
-    pub exact_free_space: Vec<f64>,
-    /// Mean fraction of the power that the absorbing border took before each range. Above 0.01 the result is doubtful;
-    /// above 0.05 it is refused.
-    pub lost_power_fraction: Vec<f64>,
-}
-
-impl EfficiencyEstimate {
-    /// Ranges \[m\] at which the absorbing border took more than 0.01 of the power: the grid is too narrow to be trusted.
-    pub fn doubtful_range_m(&self) -> Vec<f64> {
-        let doubtful = |pair: &(&f64, &f64)| *pair.1 > 0.01;
-        self.monostatic.range_m.iter().zip(&self.lost_power_fraction).filter(doubtful).map(|(&r, _)| r).collect()
-    }
 }
 
 /// Sums of one group.
@@ -294,6 +268,7 @@ impl MonteCarlo {
             .collect::<Result<Vec<_>, _>>()?;
         let mut lost_power_fraction = Vec::new();
         let (mut mono, mut bi) = (Columns::default(), Columns::default());
+        let [mut single, mut pairs] = [Vec::new(), Vec::new()];
         for (i, samples) in sums.samples.iter().enumerate() {
             let (fraction, _) = mean_and_variance(samples.iter().map(|s| s.lost));
             if fraction.is_nan() || fraction > 0.05 {
@@ -301,6 +276,8 @@ impl MonteCarlo {
             }
             lost_power_fraction.push(fraction);
             let factor = if self.correct_grid { exact_free_space[i] / grid_free_space[i] } else { 1.0 };
+            single.push(samples.iter().flat_map(|s| s.single.iter().map(|eta| factor * eta)).collect());
+            pairs.push(sums.products[i].iter().map(|eta| factor * eta).collect());
             if prepared.screens.is_none() {
                 mono.push(factor * grid_free_space[i], 0.0, 0.0);
                 bi.push(factor * grid_free_space[i], 0.0, 0.0);
@@ -322,6 +299,8 @@ impl MonteCarlo {
         Ok(EfficiencyEstimate {
             monostatic: mono.profile(&self.range_m),
             bistatic: has_pairs.then(|| bi.profile(&self.range_m)),
+            monostatic_realisations: single,
+            bistatic_realisations: pairs,
             realisations: if prepared.screens.is_some() { realisations } else { 1 },
             grid_free_space,
             exact_free_space,

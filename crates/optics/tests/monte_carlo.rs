@@ -259,3 +259,23 @@ fn power_lost_at_the_border_is_flagged_above_one_per_cent() {
     estimate.lost_power_fraction[4] = 0.011;
     assert_eq!(estimate.doubtful_range_m(), [estimate.monostatic.range_m[4]]);
 }
+
+#[test]
+fn efficiencies_of_the_realisations_have_the_mean_and_the_scatter_of_the_profile() {
+    let mut run = coarse(1e-13, 21);
+    run.grid = Grid::square(128, 4e-3).expect("grid");
+    run.range_m = vec![200.0, 600.0];
+    run.sampling = Sampling::Antithetic;
+    let estimate = run.run::<f32>(Stop::after(48), go).expect("run");
+    let bistatic = estimate.bistatic.as_ref().expect("pairs");
+    for (range, list) in estimate.monostatic_realisations.iter().enumerate() {
+        assert_eq!(list.len(), 48);
+        let mean = list.iter().sum::<f64>() / 48.0;
+        let scatter = (list.iter().map(|eta| (eta - mean).powi(2)).sum::<f64>() / 47.0).sqrt();
+        assert!((mean / estimate.monostatic.mean[range] - 1.0).abs() < 1e-9);
+        assert!((scatter / estimate.monostatic.standard_deviation[range] - 1.0).abs() < 0.02);
+        let pairs = &estimate.bistatic_realisations[range];
+        let mean = pairs.iter().sum::<f64>() / pairs.len() as f64;
+        assert!(pairs.len() > 10 && (mean / bistatic.mean[range] - 1.0).abs() < 0.5, "{mean}");
+    }
+}

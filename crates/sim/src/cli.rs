@@ -3,8 +3,10 @@
 //! Exit codes: 0 done, 2 wrong input or unusable output. Progress and plans go to standard error,
 //! results to standard output; `--json` makes the result one JSON object.
 
+mod bound;
 mod flow;
 mod progress;
+mod wake;
 
 use crate::plan::{Plan, Target};
 use crate::progress::{Observer, Silent};
@@ -59,8 +61,12 @@ enum Command {
     Signal(Io),
     /// The radial-velocity map with its errors.
     Map(Io),
+    /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
+    Bound(bound::BoundWords),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow(flow::FlowWords),
+    /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
+    Wake(wake::WakeWords),
 }
 
 #[derive(Debug, Args)]
@@ -99,7 +105,9 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
+        Command::Bound(words) => bound::bound(words, cli),
         Command::Flow(words) => flow::flow(words, cli),
+        Command::Wake(words) => wake::wake(words, cli),
     }
 }
 
@@ -151,10 +159,12 @@ fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
     let mut file = SceneFile::read(path)?;
     if let Some(seed) = cli.seed {
         file.scene.seed = seed;
+        let folder = file.folder;
         file = SceneFile::new(file.scene).map_err(|problems| crate::scene::SceneError::Invalid {
             path: path.to_owned(),
             problems: problems.into_iter().map(|problem| crate::scene::Located { problem, line: None }).collect(),
         })?;
+        file.folder = folder;
     }
     Ok(file)
 }

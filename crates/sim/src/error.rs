@@ -30,12 +30,30 @@ pub enum Error {
         /// The checkpoint.
         path: PathBuf,
     },
+    /// A line of sight leaves the simulated flow, and the scene does not say what is there.
+    #[error(
+        "the line at elevation {elevation_rad:.6} rad leaves the simulated flow at range {range_m:.2} m (y = {y_m:.2} m, \
+         z = {z_m:.2} m): shorten the scan, or set scan.outside_flow.policy to \"mask\" or \"constant\""
+    )]
+    OutsideFlow {
+        /// Elevation of the line, rad.
+        elevation_rad: f64,
+        /// Range of the point, m.
+        range_m: f64,
+        /// Its distance from the lidar along the ground, m.
+        y_m: f64,
+        /// Its height, m.
+        z_m: f64,
+    },
     /// The optics refused a telescope or a range.
     #[error("optics: {0}")]
     Optics(#[from] wakescope_optics::Error),
     /// The signal simulation refused its input.
     #[error("signal: {0}")]
     Signal(#[from] wakescope_signal::Error),
+    /// A scene without noise has no bound.
+    #[error("detector.noise = \"none\": without noise nothing bounds the velocity; \"band\" or \"white\" is needed")]
+    NoBound,
     /// An estimator refused its input.
     #[error("estimate: {0}")]
     Estimate(#[from] wakescope_estimate::Error),

@@ -4,6 +4,7 @@
 
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::scene::Scene;
+use crate::wind::SceneWind;
 use crate::{Error, join};
 
 /// The sampling of one scan in angle, range and time.
@@ -29,7 +30,7 @@ pub struct Geometry {
     pub first_layer_range_m: f64,
     /// Number of layers of a line.
     pub layers: usize,
-    /// Layers that contribute to one sample, 2 L_c + 1.
+    /// Layers that contribute to one sample, 2 L_c + 1 for a Gaussian pulse.
     pub layers_per_sample: usize,
 }
 
@@ -38,39 +39,39 @@ impl Geometry {
     ///
     /// # Errors
     /// What the wind or the layers refuse; a checked scene gives none.
-    pub fn new(scene: &Scene) -> Result<Self, Error> {
-        let max_gradient_per_s = join::wind(scene)?.max_gradient_per_s(join::start_time_s(scene));
+    pub fn new(scene: &Scene, wind: &SceneWind) -> Result<Self, Error> {
         let scan = &scene.scan;
         let lines = ((scan.elevation_max_rad - scan.elevation_min_rad) / scan.elevation_step_rad + 1e-9) as usize + 1;
         let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
         let pulses = scan.pulses_per_line as f64;
+        let line_time_s: Vec<f64> = (0..lines).map(|i| (i as f64 * pulses + 0.5 * (pulses - 1.0)) * prt_s).collect();
+        let max_gradient_per_s = wind.max_gradient_per_s(&line_time_s);
         let sample_spacing_m = scene.sample_spacing_m();
         let samples = scene.samples_per_record();
         let window = scene.estimator.window_samples;
         let gate_first_sample: Vec<usize> = (0..=samples - window).step_by(scene.estimator.gate_step_samples).collect();
         // Windows are indexed by their centre, R = c (t_p + N T_s/2)/2.
         let centre_m = |first: &usize| scan.range_min_m + (*first as f64 + 0.5 * window as f64) * sample_spacing_m;
-        let sigma_s = scene.pulse_sigma_s();
-        let layer_thickness_m = wakescope_signal::layer_thickness_m(
-            scene.detector.sampling_hz,
-            scene.laser.wavelength_m,
-            sigma_s,
-            max_gradient_per_s,
-        )?;
-        let half = (3.72 * sigma_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m).ceil() as usize;
+        let pulse = join::pulse(scene)?;
+        let layer_thickness_m =
+            pulse.layer_thickness_m(scene.detector.sampling_hz, scene.laser.wavelength_m, max_gradient_per_s)?;
+        // Layers before and behind the range of a sample that the pulse lights.
+        let (first_s, last_s) = pulse.support_s();
+        let reach = |time_s: f64| (time_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m).max(0.0).ceil() as usize;
+        let (near, far) = (reach(last_s), reach(-first_s));
         let record_m = (samples - 1) as f64 * sample_spacing_m;
         Ok(Self {
             elevation_rad: (0..lines).map(|i| scan.elevation_min_rad + i as f64 * scan.elevation_step_rad).collect(),
-            line_time_s: (0..lines).map(|i| (i as f64 * pulses + 0.5 * (pulses - 1.0)) * prt_s).collect(),
+            line_time_s,
             samples,
             first_range_m: scan.range_min_m,
             sample_spacing_m,
             gate_range_m: gate_first_sample.iter().map(centre_m).collect(),
             gate_first_sample,
             layer_thickness_m,
-            first_layer_range_m: scan.range_min_m - half as f64 * layer_thickness_m,
-            layers: (record_m / layer_thickness_m).ceil() as usize + 2 * half + 1,
-            layers_per_sample: 2 * half + 1,
+            first_layer_range_m: scan.range_min_m - near as f64 * layer_thickness_m,
+            layers: (record_m / layer_thickness_m).ceil() as usize + near + far + 1,
+            layers_per_sample: near + far + 1,
         })
     }
 

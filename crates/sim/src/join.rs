@@ -1,28 +1,34 @@
 //! The only place where the types of two crates meet: a scene in the words of each crate.
 
+mod estimators;
+
+pub use estimators::{
+    Toolkit, WindowStatistics, gates, refinement, sampling, signal_kind, weighting, window_correlation, window_model,
+};
+
 use crate::Error;
 use crate::geometry::Geometry;
 use crate::scene::{
-    BeamRadiusDefinition, Flow, NoiseKind, OuterScaleWavenumber, PulseDefinition, ReceiverPath, Refinement,
-    RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind, VortexMotion, VortexPair, VortexProfile,
-    Weighting,
+    AirProfile, BeamRadiusDefinition, Digitiser, Flow, NoiseKind, OuterScaleWavenumber, PulseDefinition,
+    PulseResampling, PulseShape, ReceiverPath, RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind,
+    VortexMotion, VortexPair, VortexProfile,
 };
+use num_complex::Complex;
 use std::sync::Arc;
-use wakescope_estimate as estimate;
 use wakescope_les as les;
 use wakescope_optics as optics;
 use wakescope_signal as signal;
 
-/// The wind of a scene.
+/// The wind of a scene whose flow is analytic, and calm air for another; [`SceneWind`](crate::wind::SceneWind) has all.
 ///
 /// # Errors
 /// What the wind refuses; a checked scene gives none.
-pub fn wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
-    Ok(match scene.flow {
-        Flow::Calm {} => Box::new(les::Calm),
-        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::Uniform::new([0.0, lateral_m_s, vertical_m_s])?),
+pub fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
+    Ok(match &scene.flow {
+        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::Calm),
+        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?),
         Flow::VortexPair(pair) => {
-            let vortices = Box::new(vortex_pair(&pair).wind()?);
+            let vortices = Box::new(vortex_pair(pair).wind()?);
             if pair.cross_wind_m_s == 0.0 {
                 return Ok(vortices);
             }
@@ -57,11 +63,11 @@ pub(crate) fn circulation_profile(profile: VortexProfile) -> les::CirculationPro
     }
 }
 
-/// Age of the flow when the scan begins, s.
+/// Age of an analytic flow when the scan begins, s.
 pub fn start_time_s(scene: &Scene) -> f64 {
-    match scene.flow {
+    match &scene.flow {
         Flow::VortexPair(pair) if pair.age_tau > 0.0 && pair.circulation_m2_s > 0.0 => {
-            vortex_pair(&pair).time_s(pair.age_tau)
+            vortex_pair(pair).time_s(pair.age_tau)
         }
         _ => 0.0,
     }
@@ -178,13 +184,74 @@ pub fn snr_model(scene: &Scene) -> Result<optics::SnrModel, Error> {
 /// The pulse of a scene.
 ///
 /// # Errors
-/// What the signal simulation refuses; a checked scene gives none.
-pub fn pulse(scene: &Scene) -> Result<signal::GaussianPulse, Error> {
-    let duration = match scene.pulse.definition {
-        PulseDefinition::Fwhm => signal::PulseDuration::FullWidthHalfMaximum(scene.pulse.duration_s),
-        PulseDefinition::OneOverEHalfWidth => signal::PulseDuration::OneOverEHalfWidth(scene.pulse.duration_s),
+/// What the signal simulation refuses, such as samples that are no pulse.
+pub fn pulse(scene: &Scene) -> Result<signal::Pulse, Error> {
+    let p = &scene.pulse;
+    let pulse = match &p.shape {
+        PulseShape::Gaussian {} => {
+            let duration = match p.definition {
+                PulseDefinition::Fwhm => signal::PulseDuration::FullWidthHalfMaximum(p.duration_s),
+                PulseDefinition::OneOverEHalfWidth => signal::PulseDuration::OneOverEHalfWidth(p.duration_s),
+            };
+            signal::Pulse::from(signal::GaussianPulse::new(duration, p.energy_j)?)
+        }
+        PulseShape::Sampled(shape) => {
+            let resampling = match shape.resampling {
+                PulseResampling::CubicSpline => signal::Resampling::CubicSpline,
+                PulseResampling::BandLimited => signal::Resampling::BandLimited,
+                PulseResampling::Linear => signal::Resampling::Linear,
+            };
+            let sampled = if shape.phase_rad.is_empty() {
+                signal::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
+            } else {
+                let polar = |(power, phase): (&f64, &f64)| Complex::from_polar(power.sqrt(), *phase);
+                let envelope: Vec<_> = shape.power.iter().zip(&shape.phase_rad).map(polar).collect();
+                signal::SampledPulse::new(&shape.time_s, &envelope, resampling, p.energy_j)?
+            };
+            signal::Pulse::from(if shape.centred { sampled.centred() } else { sampled })
+        }
     };
-    Ok(signal::GaussianPulse::new(duration, scene.pulse.energy_j)?)
+    Ok(pulse.with_chirp(p.chirp_hz_s)?)
+}
+
+/// The air of a scene that changes with range; none where it is uniform.
+///
+/// # Errors
+/// What the signal simulation refuses, such as ranges that do not increase.
+pub fn medium(scene: &Scene) -> Result<Option<signal::Medium>, Error> {
+    let Some(profile) = &scene.atmosphere.profile else { return Ok(None) };
+    let AirProfile { mut range_m, mut backscatter_per_m_sr, mut extinction_per_m } = profile.clone();
+    // Beyond the table the air is as at its end.
+    range_m.push(range_m.last().copied().unwrap_or(0.0).max(0.0) + 1e7);
+    backscatter_per_m_sr.extend(profile.backscatter_per_m_sr.last());
+    extinction_per_m.extend(profile.extinction_per_m.last());
+    Ok(Some(signal::Medium::new(range_m, backscatter_per_m_sr, extinction_per_m)?))
+}
+
+/// Return per metre of range K^2 beta A_R/R^2 of the air of a scene, (9) without the efficiency, 1/m.
+///
+/// # Errors
+/// What optics or signal refuse; a checked scene gives none.
+pub fn return_per_m(scene: &Scene) -> Result<impl Fn(f64) -> Result<f64, Error>, Error> {
+    let (model, medium) = (snr_model(scene)?, medium(scene)?);
+    Ok(move |range_m: f64| match &medium {
+        Some(medium) => Ok(medium.return_per_m(range_m, model.aperture_area_m2)?),
+        None => Ok(model.return_per_m(range_m)?),
+    })
+}
+
+/// The converter of a scene, if it has one.
+///
+/// # Errors
+/// What the signal simulation refuses; a checked scene gives none.
+pub fn digitiser(scene: &Scene) -> Result<Option<signal::Digitiser>, Error> {
+    match scene.detector.digitiser {
+        Digitiser::None {} => Ok(None),
+        Digitiser::Quantised { bits, full_scale_over_noise } => {
+            let full_scale_a = full_scale_over_noise * receiver(scene).noise_variance_a2().sqrt();
+            Ok(Some(signal::Digitiser::new(bits, full_scale_a)?))
+        }
+    }
 }
 
 /// The receiver of a scene.
@@ -221,62 +288,25 @@ pub fn simulator(scene: &Scene, geometry: &Geometry) -> Result<signal::Simulator
     Ok(signal::Simulator::new(pulse(scene)?, receiver(scene), record)?)
 }
 
-/// Return per metre K^2 beta A_R eta_s/R^2 of each layer, (9).
+/// Return per metre K^2 beta A_R eta_s/R^2 of each layer, (9); without an efficiency, that for eta_s = 1.
 ///
 /// # Errors
 /// What the optics refuse, such as a layer outside the efficiency profile.
 pub fn layer_weights_per_m(
     scene: &Scene,
     geometry: &Geometry,
-    efficiency: &optics::EfficiencyProfile,
+    efficiency: Option<&optics::EfficiencyProfile>,
 ) -> Result<Vec<f64>, Error> {
-    let model = snr_model(scene)?;
-    geometry
-        .layer_range_m()
-        .map(|range_m| Ok(model.return_per_m(range_m)? * efficiency.interpolated(range_m)?))
-        .collect()
+    let return_per_m = return_per_m(scene)?;
+    let weight = |range_m: f64| {
+        let eta = efficiency.map_or(Ok(1.0), |e| e.interpolated(range_m))?;
+        Ok(return_per_m(range_m)? * eta)
+    };
+    geometry.layer_range_m().map(weight).collect()
 }
 
 /// The constant return per metre of each layer that gives the signal-to-noise ratio `snr_db`.
 pub fn fixed_weights_per_m(scene: &Scene, geometry: &Geometry, snr_db: f64) -> Vec<f64> {
     let unit = receiver(scene).slowly_varying_snr(scene.pulse.energy_j, 1.0);
     vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers]
-}
-
-/// The sampling of the records, in the words of the estimators.
-///
-/// # Errors
-/// What the estimators refuse; a checked scene gives none.
-pub fn sampling(scene: &Scene) -> Result<estimate::Sampling, Error> {
-    let d = &scene.detector;
-    let half_hz = 0.5 * d.bandwidth_hz;
-    let band_hz = (d.intermediate_frequency_hz - half_hz, d.intermediate_frequency_hz + half_hz);
-    Ok(estimate::Sampling::new(d.sampling_hz, d.intermediate_frequency_hz, scene.laser.wavelength_m, band_hz)?)
-}
-
-/// The windows that are accumulated.
-///
-/// # Errors
-/// What the estimators refuse; a checked scene gives none.
-pub fn gates(scene: &Scene) -> Result<estimate::Gates, Error> {
-    let e = &scene.estimator;
-    let first_sample_time_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
-    Ok(estimate::Gates::new(e.window_samples, e.window_step_samples, first_sample_time_s)?)
-}
-
-/// The weighting of the windows.
-pub fn weighting(scene: &Scene) -> estimate::Weighting {
-    match scene.estimator.weighting {
-        Weighting::Gaussian => estimate::Weighting::default(),
-        Weighting::Rectangular => estimate::Weighting::Rectangular,
-        Weighting::Hann => estimate::Weighting::Hann,
-    }
-}
-
-/// How a peak is refined.
-pub fn refinement(scene: &Scene) -> estimate::Refinement {
-    match scene.estimator.refinement {
-        Refinement::Parabola => estimate::Refinement::Parabola,
-        Refinement::None => estimate::Refinement::None,
-    }
 }

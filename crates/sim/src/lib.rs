@@ -30,9 +30,11 @@
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
 //! | [`geometry`] | lines of sight, samples, gates, layers |
 //! | [`join`] | the only place where the types of two crates meet |
+//! | [`wind`] | the wind: analytic, or the planes of a simulated flow |
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | [`scan`] | air along the lines of sight, and their records |
 //! | [`map`] | estimates and their errors against the truth |
+//! | [`mod@bound`] | the Cramer-Rao bound for a scene |
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`streams`] | one random stream for each pulse |
@@ -42,20 +44,27 @@
 //! Features, all but the last two on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
 //! PNG, the report page), `vtk` and `npz` (more formats for fields).
 
+pub mod bound;
 pub mod export;
 #[cfg(feature = "flow")]
 pub mod flow;
 pub mod geometry;
 pub mod join;
 pub mod map;
+#[cfg(feature = "netcdf")]
+mod netcdf_input;
 pub mod plan;
 mod plane;
+#[cfg(feature = "netcdf")]
+mod planes_input;
 pub mod profile;
 pub mod progress;
+mod region;
 pub mod run;
 pub mod scan;
 pub mod scene;
 pub mod streams;
+pub mod wind;
 pub mod write;
 
 #[cfg(feature = "cli")]

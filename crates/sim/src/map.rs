@@ -1,15 +1,17 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
+use crate::join::{Toolkit, WindowStatistics};
 use crate::plan::{Plan, Stage};
 use crate::progress::Observer;
+use crate::region::{interpolated, region_radius};
 use crate::scan::{Scanner, radial_velocity_m_s};
-use crate::scene::{Method, NoiseKind, Scene};
 use crate::{Error, join};
 use ndarray::{Array2, ArrayView1};
 use wakescope_estimate::{
-    Correlogram, ErrorMap, PolarPoint, Quality, Radius, Scan, SpectralPeak, WindowCorrelation, polar_points,
+    ErrorMap, Gates, MapPoint, PolarPoint, Radius, Sample, Sampling, Scan, ScanGeometry, WindowCorrelation,
+    noise_quality, polar_points,
 };
-use wakescope_signal::RangeFilter;
+use wakescope_signal::{Clipped, RangeFilter};
 
 /// Estimates of the radial velocity and their errors, each \[line, gate\].
 #[derive(Debug, Clone, PartialEq)]
@@ -40,22 +42,68 @@ pub struct VelocityEstimates {
     pub n_eff: Array2<f64>,
     /// Fraction of the realisations whose estimate was flagged.
     pub flagged: Array2<f64>,
+    /// Realisations with a velocity, flagged ones included.
+    pub count: Array2<f64>,
+    /// Mean spectral width beyond that of the window, m/s; NaN where the estimator gives none.
+    pub width_m_s: Array2<f64>,
+    /// Signal-to-noise ratio in the detector band that the spectra show, of the mean power ratio, dB; NaN where there is none.
+    pub snr_db: Array2<f64>,
+    /// Mean density of the peak over the mean density in the band; 1 for a flat spectrum.
+    pub quality: Array2<f64>,
+    /// Fraction of the samples that the converter clipped.
+    pub clipped_fraction: f64,
+}
+
+/// Sums over the realisations of what an estimator says beside the velocity.
+struct Figures {
+    flagged: Array2<f64>,
+    count: Array2<f64>,
+    /// Sum and number of the finite values: width, power ratio, quality.
+    sums: [Array2<(f64, f64)>; 3],
+}
+
+impl Figures {
+    fn new(shape: (usize, usize)) -> Self {
+        let sums = || Array2::from_elem(shape, (0.0, 0.0));
+        Self { flagged: Array2::zeros(shape), count: Array2::zeros(shape), sums: [sums(), sums(), sums()] }
+    }
+
+    fn add(&mut self, place: (usize, usize), point: &MapPoint, is_flagged: bool) {
+        let e = &point.estimate;
+        self.flagged[place] += f64::from(u8::from(is_flagged));
+        self.count[place] += f64::from(u8::from(e.velocity_m_s.is_finite()));
+        for (sums, value) in self.sums.iter_mut().zip([e.width_m_s, e.snr, e.quality]) {
+            if value.is_finite() {
+                sums[place].0 += value;
+                sums[place].1 += 1.0;
+            }
+        }
+    }
+
+    fn means(&self) -> [Array2<f64>; 3] {
+        self.sums.each_ref().map(|sums| sums.mapv(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }))
+    }
 }
 
 /// Accumulates the errors of realisation after realisation.
-pub(crate) struct Mapper<'a> {
-    scene: &'a Scene,
+pub(crate) struct Mapper<S> {
+    sampling: Sampling,
+    gates: Gates,
     points: Vec<PolarPoint>,
+    shape: (usize, usize),
     elevation_of_ray_rad: Vec<f64>,
-    statistic: Correlogram<f64>,
-    peak: SpectralPeak,
+    tools: Toolkit<S>,
     correlation: WindowCorrelation,
     radius: Radius,
+    /// Probability that noise passes for a signal, and independent frequencies of the band.
+    detection: Option<(f64, f64)>,
     truth: Truth,
     errors: ErrorMap<ndarray::Ix2>,
-    flagged: Array2<f64>,
+    figures: Figures,
     level: Array2<f64>,
     n_eff: Array2<f64>,
+    clipped: Clipped,
+    samples: f64,
     realisations: usize,
 }
 
@@ -65,61 +113,81 @@ struct Truth {
     gate_m_s: Array2<f64>,
 }
 
-impl<'a> Mapper<'a> {
-    pub(crate) fn new(plan: &'a Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
+impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
+    pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
-        let e = &scene.estimator;
-        let sampling = join::sampling(scene)?;
-        let statistic = Correlogram::new(join::weighting(scene), e.window_samples)?;
-        let peak = SpectralPeak::new(
-            &sampling,
-            statistic.kind(),
-            statistic.lags(),
-            e.padded_samples,
-            join::refinement(scene),
-        )?;
+        let (sampling, gates) = (join::sampling(scene)?, join::gates(scene)?);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let pulses = scene.scan.pulses_per_line;
+        let correlation = join::window_correlation(scene, scanner.mean_snr())?;
+        let elevation_of_ray_rad: Vec<f64> =
+            g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect();
+        let places = ScanGeometry::new(&sampling, &gates, &elevation_of_ray_rad, g.samples)?;
+        let radius = region_radius(scene, scanner, &places, &correlation)?;
+        let middle = PolarPoint {
+            range_m: g.gate_range_m[g.gate_range_m.len() / 2],
+            elevation_rad: g.elevation_rad[g.elevation_rad.len() / 2],
+        };
+        let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
+        let known = WindowStatistics { snr: scanner.mean_snr(), n_eff };
+        let cells = scene.detector.bandwidth_hz * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
         Ok(Self {
-            scene,
+            sampling,
+            gates,
             points: polar_points(&g.elevation_rad, &g.gate_range_m),
-            elevation_of_ray_rad: g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect(),
-            statistic,
-            peak,
-            correlation: correlation(scene, scanner)?,
-            radius: Radius::Fixed {
-                radius_m: match e.method {
-                    Method::Periodogram => 0.0,
-                    Method::PeriodogramAccumulation => e.radius_m,
-                },
-            },
+            shape,
+            elevation_of_ray_rad,
+            tools: Toolkit::new(scene, &known)?,
+            correlation,
+            radius,
+            detection: scene.estimator.false_alarm.map(|rate| (rate, cells)),
             truth: truth(plan, scanner)?,
             errors: ErrorMap::new(ndarray::Dim(shape)),
-            flagged: Array2::zeros(shape),
+            figures: Figures::new(shape),
             level: Array2::zeros(shape),
             n_eff: Array2::zeros(shape),
+            clipped: Clipped::default(),
+            samples: 0.0,
             realisations: 0,
         })
     }
 
+    /// Estimates the velocities of one realisation.
+    fn map(&self, records: &Array2<S>) -> Result<Vec<MapPoint>, Error> {
+        let Toolkit { statistic, estimator, following } = &self.tools;
+        let scan = Scan::new(&**statistic, &self.sampling, &self.gates, &self.elevation_of_ray_rad, records.view())?;
+        let first = scan.map(&self.points, &self.radius, Some(&self.correlation), &**estimator)?;
+        let Some(following) = following else { return Ok(first) };
+        let velocity_m_s =
+            Array2::from_shape_fn(self.shape, |(i, j)| first[i * self.shape.1 + j].estimate.velocity_m_s);
+        let guess = interpolated(&self.points, velocity_m_s);
+        let mut second =
+            scan.map_following(&self.points, &self.radius, S::KIND, &self.sampling, &guess, &**following)?;
+        second.iter_mut().zip(&first).for_each(|(point, first)| point.n_eff = first.n_eff);
+        Ok(second)
+    }
+
     /// Estimates the velocities of one realisation and adds their errors.
-    pub(crate) fn add(&mut self, records: &Array2<f64>) -> Result<(), Error> {
-        let sampling = join::sampling(self.scene)?;
-        let gates = join::gates(self.scene)?;
-        let scan = Scan::new(&self.statistic, &sampling, &gates, &self.elevation_of_ray_rad, records.view())?;
-        let map = scan.map(&self.points, &self.radius, Some(&self.correlation), &self.peak)?;
-        let shape = self.flagged.dim();
-        let velocity = Array2::from_shape_fn(shape, |(i, j)| map[i * shape.1 + j].estimate.velocity_m_s);
+    pub(crate) fn add(&mut self, records: &Array2<S>, clipped: Clipped) -> Result<(), Error> {
+        let map = self.map(records)?;
+        let columns = self.shape.1;
+        let velocity = Array2::from_shape_fn(self.shape, |(i, j)| map[i * columns + j].estimate.velocity_m_s);
         self.errors.add(velocity.view(), self.truth.pulse_m_s.view())?;
-        for ((cell, point), (level, n_eff)) in
-            self.flagged.iter_mut().zip(&map).zip(self.level.iter_mut().zip(self.n_eff.iter_mut()))
-        {
-            if point.estimate.flag != Quality::Good {
-                *cell += 1.0;
-            }
+        for (index, point) in map.iter().enumerate() {
+            let place = (index / columns, index % columns);
+            let is_flagged = match self.detection {
+                Some((rate, cells)) if point.estimate.is_good() => {
+                    let threshold = noise_quality(point.n_eff.max(1e-3), cells, rate)?;
+                    !point.estimate.exceeds(threshold)
+                }
+                _ => !point.estimate.is_good(),
+            };
+            self.figures.add(place, point, is_flagged);
             // The level is the same for all realisations: a matter of geometry.
-            (*level, *n_eff) = (point.level as f64, point.n_eff);
+            (self.level[place], self.n_eff[place]) = (point.level as f64, point.n_eff);
         }
+        self.clipped += clipped;
+        self.samples += (records.len() * S::KIND.lag_numbers(1)) as f64;
         self.realisations += 1;
         Ok(())
     }
@@ -127,6 +195,7 @@ impl<'a> Mapper<'a> {
     pub(crate) fn finish(self, plan: &Plan) -> VelocityEstimates {
         let statistics = self.errors.statistics();
         let bias_m_s = statistics.mapv(|s| s.bias_m_s);
+        let [width_m_s, snr, quality] = self.figures.means();
         VelocityEstimates {
             elevation_rad: plan.geometry.elevation_rad.clone(),
             range_m: plan.geometry.gate_range_m.clone(),
@@ -140,31 +209,14 @@ impl<'a> Mapper<'a> {
             v_gate_m_s: self.truth.gate_m_s,
             level: self.level,
             n_eff: self.n_eff,
-            flagged: self.flagged / self.realisations.max(1) as f64,
+            flagged: self.figures.flagged / self.realisations.max(1) as f64,
+            count: self.figures.count,
+            width_m_s,
+            snr_db: snr.mapv(|snr| if snr > 0.0 { 10.0 * snr.log10() } else { f64::NAN }),
+            quality,
+            clipped_fraction: self.clipped.total() as f64 / self.samples.max(1.0),
         }
     }
-}
-
-/// Correlation between windows of one pulse: of the speckle, and of the noise at the scene's typical SNR.
-fn correlation(scene: &Scene, scanner: &Scanner<'_>) -> Result<WindowCorrelation, Error> {
-    let e = &scene.estimator;
-    let window = join::weighting(scene).weights(e.window_samples)?;
-    let d = &scene.detector;
-    let in_band_hz = match d.noise {
-        NoiseKind::White => 0.5 * d.sampling_hz,
-        NoiseKind::Band | NoiseKind::None => d.bandwidth_hz,
-    };
-    let snr = if d.noise == NoiseKind::None { f64::INFINITY } else { scanner.mean_snr() };
-    // Without any return there is only noise, which a large finite ratio says as well.
-    let noise_to_signal = (in_band_hz / d.bandwidth_hz / snr).min(1e12);
-    Ok(WindowCorrelation::gaussian_pulse(
-        &window,
-        &join::gates(scene)?,
-        scene.samples_per_record(),
-        d.sampling_hz,
-        scene.pulse_sigma_s(),
-        noise_to_signal,
-    )?)
 }
 
 fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
@@ -172,15 +224,12 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     let shape = (g.elevation_rad.len(), g.gate_range_m.len());
     let mut truth =
         Truth { exact_m_s: Array2::zeros(shape), pulse_m_s: Array2::zeros(shape), gate_m_s: Array2::zeros(shape) };
-    let wind = join::wind(scene)?;
-    let start_s = join::start_time_s(scene);
     let pulse = join::pulse(scene)?;
     let window = join::weighting(scene).weights(scene.estimator.window_samples)?;
-    let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
-    let by_gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
+    let by_pulse = RangeFilter::pulse(&pulse, g.layer_thickness_m)?;
+    let by_gate = RangeFilter::gate(&pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
     for (i, line) in scanner.lines().iter().enumerate() {
-        let time_s = start_s + g.line_time_s[i];
-        let exact_m_s = radial_velocity_m_s(&*wind, scene, g.elevation_rad[i], time_s, &g.gate_range_m)?;
+        let exact_m_s = radial_velocity_m_s(plan, i, &g.gate_range_m)?;
         truth.exact_m_s.row_mut(i).assign(&ArrayView1::from(&exact_m_s));
         let mut filtered_m_s = vec![0.0; g.gate_range_m.len()];
         for (filter, cells) in [(&by_pulse, &mut truth.pulse_m_s), (&by_gate, &mut truth.gate_m_s)] {
@@ -192,20 +241,20 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
 }
 
 /// Runs the estimates of all realisations.
-pub(crate) fn estimate(
+pub(crate) fn estimate<S: Sample + wakescope_signal::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
-    mut first_records: impl FnMut(&Array2<f64>),
+    mut first_records: impl FnMut(&Array2<S>),
 ) -> Result<VelocityEstimates, Error> {
     let mut mapper = Mapper::new(plan, scanner)?;
     observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
     for realisation in 0..plan.realisations() {
-        let records = scanner.records(realisation, observer)?;
+        let (records, clipped) = scanner.samples(realisation, observer)?;
         if realisation == 0 {
             first_records(&records);
         }
-        mapper.add(&records)?;
+        mapper.add(&records, clipped)?;
     }
     observer.end();
     Ok(mapper.finish(plan))

@@ -1,12 +1,13 @@
 //! From a scene to a plan: which stages run, which are left out and why, what each will cost.
 //!
-//! Pure: nothing is computed but sizes. The cost figures are the products of counts with the unit
+//! Nothing is computed but sizes; the planes of a simulated flow are read. The cost figures are the products of counts with the unit
 //! costs at the end of this file, which `cargo bench` measures; they are forecasts, good to a
 //! factor of two or three on another machine.
 
 use crate::Error;
 use crate::geometry::Geometry;
-use crate::scene::{Flow, Method, NoiseKind, Scene, SceneFile};
+use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, SceneFile, Weighting};
+use crate::wind::SceneWind;
 use std::fmt;
 
 mod optics;
@@ -85,7 +86,7 @@ pub struct Cost {
 }
 
 /// What a run will do.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct Plan {
     /// The scene, checked.
     pub scene: SceneFile,
@@ -95,21 +96,33 @@ pub struct Plan {
     pub stages: Vec<PlannedStage>,
     /// Sampling in angle, range and time.
     pub geometry: Geometry,
+    /// The wind.
+    pub wind: SceneWind,
     /// What the user should know before the run.
     pub warnings: Vec<String>,
 }
 
 impl Plan {
-    /// Plans a run.
+    /// Plans a run; reads the planes of a simulated flow.
     ///
     /// # Errors
-    /// What a crate refuses of the scene, such as phase screens too coarse for the turbulence.
+    /// Planes that cannot be read or end before the scan; what a crate refuses of the scene, such as phase screens too coarse for the turbulence.
     pub fn new(scene: SceneFile, target: Target) -> Result<Self, Error> {
-        let geometry = Geometry::new(&scene.scene)?;
-        let mut warnings = warnings(&scene.scene);
+        let wind = SceneWind::new(&scene)?;
+        let geometry = Geometry::new(&scene.scene, &wind)?;
+        let last_s = wind.start_s + geometry.line_time_s.last().copied().unwrap_or(0.0);
+        if last_s > wind.end_s {
+            let reason = format!(
+                "the scan ends at {last_s:.3} s of the flow, the planes at {:.3} s: begin earlier, scan faster, or set \
+                 flow.motion = \"frozen\"",
+                wind.end_s
+            );
+            return Err(Error::Input { path: "flow.planes".into(), reason });
+        }
+        let mut warnings = warnings(&scene.scene, &wind);
         let optics = optics::stages(&scene.scene, target, &geometry, &mut warnings)?;
-        let stages = stages(&scene.scene, target, &geometry, optics);
-        Ok(Self { scene, target, stages, geometry, warnings })
+        let stages = stages(&scene.scene, target, &geometry, &wind.source, optics);
+        Ok(Self { scene, target, stages, geometry, wind, warnings })
     }
 
     /// Whether a stage runs.
@@ -132,7 +145,7 @@ impl Plan {
     }
 }
 
-fn stages(scene: &Scene, target: Target, g: &Geometry, optics: [PlannedStage; 2]) -> Vec<PlannedStage> {
+fn stages(scene: &Scene, target: Target, g: &Geometry, wind: &str, optics: [PlannedStage; 2]) -> Vec<PlannedStage> {
     let run = |stage, reason: String, core_s: f64, memory_bytes: f64| PlannedStage {
         stage,
         reason,
@@ -149,7 +162,7 @@ fn stages(scene: &Scene, target: Target, g: &Geometry, optics: [PlannedStage; 2]
     let layers = (lines * g.layers) as f64;
     let calm = matches!(scene.flow, Flow::Calm {});
 
-    let mut out = vec![skip(Stage::FlowSimulation, "the flow is analytic")];
+    let mut out = vec![skip(Stage::FlowSimulation, wind)];
     out.push(if target != Target::Run || !scene.outputs.flow {
         skip(Stage::CrossPlane, "not asked for")
     } else if calm {
@@ -187,7 +200,13 @@ fn stages(scene: &Scene, target: Target, g: &Geometry, optics: [PlannedStage; 2]
         let windows = ((g.samples - scene.estimator.window_samples) / scene.estimator.window_step_samples + 1) as f64;
         let region = match scene.estimator.method {
             Method::Periodogram => "no region".to_owned(),
-            Method::PeriodogramAccumulation => format!("regions of {} m", scene.estimator.radius_m),
+            _ => match &scene.estimator.radius {
+                RegionRadius::Fixed {} => format!("regions of {} m", scene.estimator.radius_m),
+                RegionRadius::OfRange { .. } => "regions whose radius depends on range".to_owned(),
+                RegionRadius::Target { standard_deviation_m_s, .. } => {
+                    format!("regions for a standard deviation of {standard_deviation_m_s} m/s")
+                }
+            },
         };
         let reason = format!("{lines} x {gates} gates, {region}");
         let lags = scene.estimator.window_samples as f64;
@@ -209,16 +228,10 @@ fn stages(scene: &Scene, target: Target, g: &Geometry, optics: [PlannedStage; 2]
 }
 
 /// What is allowed but probably not meant.
-fn warnings(scene: &Scene) -> Vec<String> {
+fn warnings(scene: &Scene, wind: &SceneWind) -> Vec<String> {
     let mut out = Vec::new();
     let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
-    let speed_m_s = match scene.flow {
-        Flow::Calm {} => 0.0,
-        Flow::Uniform { lateral_m_s, vertical_m_s } => lateral_m_s.hypot(vertical_m_s),
-        Flow::VortexPair(p) => {
-            p.circulation_m2_s / (4.0 * std::f64::consts::PI * p.core_radius_m) + p.cross_wind_m_s.abs()
-        }
-    };
+    let speed_m_s = wind.max_speed_m_s;
     if speed_m_s > half_band_m_s {
         out.push(format!(
             "the flow reaches {speed_m_s:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster air is not seen"
@@ -230,6 +243,14 @@ fn warnings(scene: &Scene) -> Vec<String> {
         out.push(format!(
             "estimator.padded_samples gives a spectrum in steps of {bin_m_s:.2} m/s: expect a bias of that order"
         ));
+    }
+    let models =
+        [Method::Autoregressive, Method::AutoregressivePole, Method::Capon, Method::FirstMoment, Method::LagWindow];
+    if models.contains(&scene.estimator.method) && scene.estimator.weighting != Weighting::Rectangular {
+        out.push(
+            "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\""
+                .into(),
+        );
     }
     if scene.scan.realisations < 2 {
         out.push("one realisation: no standard deviation can be given".into());

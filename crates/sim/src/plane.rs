@@ -1,10 +1,9 @@
 //! The wind on a cross-plane around the scan, for the files.
 
-use crate::export::CrossPlanes;
+use crate::Error;
+use crate::export::{CrossPlanes, OPEN_EDGES};
 use crate::plan::Plan;
 use crate::profile::spaced;
-use crate::scene::Flow;
-use crate::{Error, join};
 use ndarray::Array3;
 
 /// Points of the plane across and up.
@@ -25,22 +24,20 @@ pub(crate) fn cross_plane(plan: &Plan) -> Result<CrossPlanes, Error> {
     let z_m = spaced(0.0, top_m, POINTS.1);
     let points_m: Vec<[f64; 3]> = z_m.iter().flat_map(|&z| y_m.iter().map(move |&y| [0.0, y, z])).collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    let time_s = join::start_time_s(scene);
-    join::wind(scene)?.velocity_into(&points_m, time_s, &mut velocity_m_s)?;
+    let time_s = plan.wind.start_s;
+    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
     let at = |component: usize| {
         Array3::from_shape_fn((1, z_m.len(), y_m.len()), |(_, k, j)| velocity_m_s[k * y_m.len() + j][component])
     };
-    let tau = match scene.flow {
-        Flow::VortexPair(pair) => pair.age_tau,
-        _ => 0.0,
-    };
     Ok(CrossPlanes {
         title: "Wind across the runway at the start of the scan".into(),
-        tau: vec![tau],
+        tau: vec![plan.wind.tau],
         time_s: vec![time_s],
         v_m_s: at(1),
         w_m_s: at(2),
         y_m,
         z_m,
+        y_edges: OPEN_EDGES,
+        z_edges: OPEN_EDGES,
     })
 }

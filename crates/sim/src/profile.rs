@@ -5,7 +5,7 @@
 
 use crate::plan::Stage;
 use crate::progress::Observer;
-use crate::scene::{RefractiveTurbulence, Scene, SnrReference, Turbulence};
+use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence};
 use crate::{Error, join};
 use std::ops::ControlFlow;
 use wakescope_optics::plan::{Model, cheapest_model};
@@ -28,6 +28,11 @@ pub fn turbulence(scene: &Scene) -> Option<RefractiveTurbulence> {
         Turbulence::Refractive(t) if t.cn2_m_m23 > 0.0 => Some(t),
         _ => None,
     }
+}
+
+/// The turbulence of a scene whose pulses each have the efficiency of one realisation.
+pub(crate) fn drawn_turbulence(scene: &Scene) -> Option<RefractiveTurbulence> {
+    turbulence(scene).filter(|t| t.efficiency == EfficiencyOfPulse::Realisation)
 }
 
 /// Efficiency (19) and signal-to-noise ratio (14) at the same ranges.
@@ -61,7 +66,8 @@ pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProf
         None => free_space(scene, &range_m)?,
         Some(t) => {
             let exact = exact_bistatic(scene, &t, &range_m)?;
-            let ([monostatic, bistatic], lost) = monte_carlo(scene, &t, &range_m, observer)?;
+            let Paths { monostatic, bistatic, lost_power_fraction: lost, .. } =
+                monte_carlo(scene, &t, &range_m, observer)?;
             lost_power_fraction = Some(lost);
             others.push(("efficiency_free_space", free_space(scene, &range_m)?));
             others.push(("efficiency_bistatic_exact", exact.clone()));
@@ -70,14 +76,14 @@ pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProf
             if model == Model::MonteCarlo { monostatic } else { exact }
         }
     };
-    let snr = join::snr_model(scene)?;
+    let (receiver, return_per_m) = (join::receiver(scene), join::return_per_m(scene)?);
     let snr_db = efficiency
         .range_m
         .iter()
         .zip(&efficiency.mean)
         .map(|(&range_m, &mean)| match scene.detector.snr {
             SnrReference::Fixed { snr_db } => Ok(snr_db),
-            _ => Ok(10.0 * snr.snr(range_m, mean)?.log10()),
+            _ => Ok(10.0 * receiver.slowly_varying_snr(scene.pulse.energy_j, return_per_m(range_m)? * mean).log10()),
         })
         .collect::<Result<_, Error>>()?;
     Ok(RangeProfile { model, efficiency, snr_db, others, lost_power_fraction })
@@ -90,10 +96,7 @@ pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProf
 pub fn efficiency_at(scene: &Scene, range_m: &[f64], observer: &dyn Observer) -> Result<EfficiencyProfile, Error> {
     match (turbulence(scene), model(scene)) {
         (Some(t), Model::ExactBistatic) => exact_bistatic(scene, &t, range_m),
-        (Some(t), Model::MonteCarlo) => {
-            let ([monostatic, _], _) = monte_carlo(scene, &t, range_m, observer)?;
-            Ok(monostatic)
-        }
+        (Some(t), Model::MonteCarlo) => Ok(monte_carlo(scene, &t, range_m, observer)?.monostatic),
         _ => free_space(scene, range_m),
     }
 }
@@ -112,14 +115,42 @@ fn exact_bistatic(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> R
     })?)
 }
 
-/// Monostatic and bistatic efficiency by phase screens, from one set of realisations, and the largest mean fraction
-/// of the power that the border of the grid took.
+/// Efficiency of each realisation of the path at given ranges, m, increasing: `[realisation][range]`, by phase screens.
+///
+/// # Errors
+/// As [`efficiency_at`].
+pub fn efficiency_realisations(
+    scene: &Scene,
+    t: &RefractiveTurbulence,
+    range_m: &[f64],
+    observer: &dyn Observer,
+) -> Result<Vec<Vec<f64>>, Error> {
+    let paths = monte_carlo(scene, t, range_m, observer)?;
+    let by_range = match scene.telescope.receiver {
+        ReceiverPath::Monostatic => paths.monostatic_realisations,
+        ReceiverPath::Bistatic => paths.bistatic_realisations,
+    };
+    let count = by_range.iter().map(Vec::len).min().unwrap_or(0);
+    Ok((0..count).map(|i| by_range.iter().map(|efficiencies| efficiencies[i]).collect()).collect())
+}
+
+/// What the phase screens give for both receivers.
+struct Paths {
+    monostatic: EfficiencyProfile,
+    bistatic: EfficiencyProfile,
+    monostatic_realisations: Vec<Vec<f64>>,
+    bistatic_realisations: Vec<Vec<f64>>,
+    /// Largest mean fraction of the power that the border of the grid took.
+    lost_power_fraction: f64,
+}
+
+/// Monostatic and bistatic efficiency by phase screens, from one set of realisations.
 fn monte_carlo(
     scene: &Scene,
     t: &RefractiveTurbulence,
     range_m: &[f64],
     observer: &dyn Observer,
-) -> Result<([EfficiencyProfile; 2], f64), Error> {
+) -> Result<Paths, Error> {
     observer.begin(Stage::PhaseScreens, t.realisations as u64);
     let mut seen = 0;
     // Single precision: its rounding is far below the error of any number of realisations.
@@ -132,8 +163,13 @@ fn monte_carlo(
     // A checked scene has at least two realisations, and so pairs of them.
     let bistatic =
         estimate.bistatic.ok_or(wakescope_optics::Error::Length { field: "realisations", found: 1, expected: 2 })?;
-    let lost = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
-    Ok(([estimate.monostatic, bistatic], lost))
+    Ok(Paths {
+        monostatic: estimate.monostatic,
+        bistatic,
+        monostatic_realisations: estimate.monostatic_realisations,
+        bistatic_realisations: estimate.bistatic_realisations,
+        lost_power_fraction: estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max),
+    })
 }
 
 /// `points` values from `low` to `high`, both included.

@@ -8,7 +8,10 @@ use crate::plane;
 use crate::profile::{RangeProfile, range_profile};
 use crate::progress::Observer;
 use crate::scan::Scanner;
+use crate::scene::DetectorSignal;
 use ndarray::Array2;
+use num_complex::Complex;
+use wakescope_estimate::Sample;
 
 /// What a run gives; absent is what was not asked for.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -19,6 +22,8 @@ pub struct RunResult {
     pub plane: Option<CrossPlanes>,
     /// Raw signals of the first realisation \[pulse, sample\], A.
     pub signals_a: Option<Array2<f64>>,
+    /// Its second quadrature, if the receiver delivers two.
+    pub quadrature_a: Option<Array2<f64>>,
     /// The velocity map with its errors.
     pub map: Option<VelocityEstimates>,
 }
@@ -50,19 +55,42 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     }
     if plan.runs(Stage::Signals) {
         let scanner = Scanner::new(plan, observer)?;
-        if plan.runs(Stage::Estimates) {
-            let keep = plan.keeps_signals();
-            let mut first = None;
-            let map = map::estimate(plan, &scanner, observer, |records| first = keep.then(|| records.clone()))?;
-            result.signals_a = first;
-            result.map = Some(map);
-        } else {
-            observer.begin(Stage::Signals, plan.geometry.elevation_rad.len() as u64);
-            result.signals_a = Some(scanner.records(0, observer)?);
-            observer.end();
+        match plan.scene.scene.detector.signal {
+            DetectorSignal::IntermediateFrequency => {
+                signals_and_map(plan, &scanner, observer, &mut result, |records: &Array2<f64>| {
+                    (records.clone(), None)
+                })?;
+            }
+            DetectorSignal::Baseband => {
+                let parts = |records: &Array2<Complex<f64>>| (records.mapv(|s| s.re), Some(records.mapv(|s| s.im)));
+                signals_and_map(plan, &scanner, observer, &mut result, parts)?;
+            }
         }
     }
     Ok(result)
+}
+
+/// Signals of the first realisation and the map, as the plan has them; `parts` takes records apart for the files.
+fn signals_and_map<S: Sample + wakescope_signal::Sample>(
+    plan: &Plan,
+    scanner: &Scanner<'_>,
+    observer: &dyn Observer,
+    result: &mut RunResult,
+    parts: impl Fn(&Array2<S>) -> (Array2<f64>, Option<Array2<f64>>),
+) -> Result<(), Error> {
+    let mut first = None;
+    if plan.runs(Stage::Estimates) {
+        let keep = plan.keeps_signals();
+        result.map = Some(map::estimate(plan, scanner, observer, |records| first = keep.then(|| parts(records)))?);
+    } else {
+        observer.begin(Stage::Signals, plan.geometry.elevation_rad.len() as u64);
+        first = Some(parts(&scanner.samples(0, observer)?.0));
+        observer.end();
+    }
+    if let Some((in_phase, quadrature)) = first {
+        (result.signals_a, result.quadrature_a) = (Some(in_phase), quadrature);
+    }
+    Ok(())
 }
 
 impl RunResult {
@@ -93,6 +121,9 @@ impl RunResult {
             );
             line("std_mean_m_s", "standard deviation of one estimate [m/s]", mean(&m.std_m_s));
             line("flagged_fraction", "fraction of flagged estimates", mean(&m.flagged));
+            if m.clipped_fraction > 0.0 {
+                line("clipped_fraction", "fraction of clipped samples", m.clipped_fraction);
+            }
             line("level_mean", "windows accumulated, mean", mean(&m.level));
         }
         out

@@ -2,23 +2,24 @@
 
 use crate::geometry::Geometry;
 use crate::plan::{Plan, Stage};
-use crate::profile::{efficiency_at, model, spaced};
+use crate::profile::{drawn_turbulence, efficiency_at, efficiency_realisations, model, spaced};
 use crate::progress::Observer;
-use crate::scene::{Scene, SnrReference};
+use crate::scene::{Outside, Scene, SnrReference};
 use crate::streams::stream;
 use crate::{Error, join};
 use ndarray::Array2;
 use rayon::prelude::*;
-use wakescope_les::Wind;
 use wakescope_optics::plan::Model;
-use wakescope_signal::{LineOfSight, Scratch, Simulator};
+use wakescope_signal::{
+    Clipped, Digitiser, EfficiencyTable, LayerEfficiency, LineOfSight, PulseKey, Sample, Scan, Shot, Simulator,
+};
 
 /// Ranges of the efficiency profile from which the layers take theirs, m: dense where it is a quadrature, few
 /// where each costs transforms and the errors of neighbours are alike.
 pub(crate) fn profile_ranges_m(scene: &Scene, geometry: &Geometry) -> Vec<f64> {
     let points = match model(scene) {
-        Model::FreeSpace | Model::ExactBistatic => 65,
-        Model::MonteCarlo => 9,
+        Model::FreeSpace | Model::ExactBistatic if drawn_turbulence(scene).is_none() => 65,
+        _ => 9,
     };
     let last_m = geometry.first_layer_range_m + geometry.layers as f64 * geometry.layer_thickness_m;
     spaced(geometry.first_layer_range_m, last_m, points)
@@ -27,9 +28,11 @@ pub(crate) fn profile_ranges_m(scene: &Scene, geometry: &Geometry) -> Vec<f64> {
 /// The lines of sight of a scan, and what makes signals of them.
 pub struct Scanner<'a> {
     scene: &'a Scene,
-    geometry: &'a Geometry,
     simulator: Simulator,
     lines: Vec<LineOfSight>,
+    /// What each pulse brings instead of the mean efficiency.
+    efficiency: Option<LayerEfficiency>,
+    digitiser: Option<Digitiser>,
 }
 
 impl<'a> Scanner<'a> {
@@ -40,16 +43,12 @@ impl<'a> Scanner<'a> {
     pub fn new(plan: &'a Plan, observer: &dyn Observer) -> Result<Self, Error> {
         let (scene, geometry) = (&plan.scene.scene, &plan.geometry);
         let weight_per_m = layer_weights(scene, geometry, observer)?;
-        let wind = join::wind(scene)?;
-        let start_s = join::start_time_s(scene);
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
         let lines = (0..geometry.elevation_rad.len())
             .into_par_iter()
             .map(|i| {
                 let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
-                let time_s = start_s + geometry.line_time_s[i];
-                let radial_velocity_m_s =
-                    radial_velocity_m_s(&*wind, scene, geometry.elevation_rad[i], time_s, &ranges_m)?;
+                let radial_velocity_m_s = radial_velocity_m_s(plan, i, &ranges_m)?;
                 observer.advance(1);
                 Ok(LineOfSight {
                     first_range_m: geometry.first_layer_range_m,
@@ -58,17 +57,31 @@ impl<'a> Scanner<'a> {
                     weight_per_m: weight_per_m.clone(),
                 })
             })
-            .collect::<Result<_, Error>>()?;
+            .collect::<Result<Vec<_>, Error>>()?;
         observer.end();
-        let simulator = join::simulator(scene, geometry)?;
-        Ok(Self { scene, geometry, simulator, lines })
+        let efficiency = drawn_efficiency(scene, geometry, &lines, observer)?;
+        let (simulator, digitiser) = (join::simulator(scene, geometry)?, join::digitiser(scene)?);
+        Ok(Self { scene, simulator, lines, efficiency, digitiser })
     }
 
     /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
     pub fn mean_snr(&self) -> f64 {
-        let weights = self.lines.first().map_or(&[][..], |line| &line.weight_per_m);
-        let mean_per_m = weights.iter().sum::<f64>() / weights.len().max(1) as f64;
-        join::receiver(self.scene).slowly_varying_snr(self.scene.pulse.energy_j, mean_per_m)
+        let layers = self.layer_snr();
+        layers.iter().map(|(_, snr)| snr).sum::<f64>() / layers.len().max(1) as f64
+    }
+
+    /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; the efficiency is its
+    /// mean.
+    pub fn layer_snr(&self) -> Vec<(f64, f64)> {
+        let Some(line) = self.lines.first() else { return Vec::new() };
+        let receiver = join::receiver(self.scene);
+        let mut mean = vec![1.0; line.layers()];
+        if let Some(efficiency) = &self.efficiency {
+            // As many places as layers: the efficiencies were made for this line.
+            let _ = efficiency.mean_into(&mut mean);
+        }
+        let snr = |l: usize| receiver.slowly_varying_snr(self.scene.pulse.energy_j, line.weight_per_m[l] * mean[l]);
+        (0..line.layers()).map(|l| (line.range_m(l), snr(l))).collect()
     }
 
     /// The air along each line of sight, in the order of the geometry's elevations.
@@ -78,57 +91,96 @@ impl<'a> Scanner<'a> {
 
     /// The signals of one realisation \[pulse, sample\], A; the pulses of a line stand together.
     ///
+    /// # Errors
+    /// As [`Scanner::samples`].
+    pub fn records(&self, realisation: usize, observer: &dyn Observer) -> Result<Array2<f64>, Error> {
+        Ok(self.samples(realisation, observer)?.0)
+    }
+
+    /// The signals of one realisation \[pulse, sample\], A, real at the intermediate frequency or complex about zero, and how
+    /// many samples the converter clipped.
+    ///
     /// Every pulse has its own random stream, keyed by realisation, line and pulse.
     ///
     /// # Errors
     /// What the signal simulation refuses; a checked scene gives none.
-    pub fn records(&self, realisation: usize, observer: &dyn Observer) -> Result<Array2<f64>, Error> {
-        let pulses = self.scene.scan.pulses_per_line;
-        let samples = self.geometry.samples;
-        let shape = (self.lines.len() * pulses, samples);
-        let mut records_a = vec![0.0; shape.0 * shape.1];
-        records_a.par_chunks_mut(pulses * samples).enumerate().try_for_each_init(
-            Scratch::default,
-            |scratch, (line, rows)| {
-                for (pulse, out_a) in rows.chunks_mut(samples).enumerate() {
-                    let index = ((realisation * self.lines.len() + line) * pulses + pulse) as u64;
-                    let mut rng = stream(self.scene.seed, "signal", index);
-                    self.simulator.record_into(&self.lines[line], &mut rng, scratch, out_a)?;
+    pub fn samples<T: Sample>(
+        &self,
+        realisation: usize,
+        observer: &dyn Observer,
+    ) -> Result<(Array2<T>, Clipped), Error> {
+        let (lines, pulses_per_line) = (self.lines.len(), self.scene.scan.pulses_per_line);
+        let index = |key: PulseKey| (realisation * lines + key.line) * pulses_per_line + key.pulse;
+        let scan = Scan {
+            simulator: &self.simulator,
+            lines,
+            pulses_per_line,
+            shot: |key: PulseKey| {
+                if key.pulse == 0 {
+                    observer.advance(1);
                 }
-                observer.advance(1);
-                Ok::<(), Error>(())
+                let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
+                Shot { line: &self.lines[key.line], efficiency }
             },
-        )?;
-        Ok(Array2::from_shape_vec(shape, records_a).unwrap_or_else(|e| unreachable!("the vector has this shape: {e}")))
+            generator: |key| stream(self.scene.seed, "signal", index(key) as u64),
+            digitiser: self.digitiser,
+        };
+        Ok(scan.collect()?)
     }
 }
 
-/// Return per metre of each layer, K^2 beta A_R eta_s/R^2; the efficiency is interpolated.
+/// Return per metre of each layer, K^2 beta A_R eta_s/R^2; the efficiency is interpolated. It is left out if each pulse brings
+/// its own.
 fn layer_weights(scene: &Scene, geometry: &Geometry, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         return Ok(join::fixed_weights_per_m(scene, geometry, snr_db));
+    }
+    if drawn_turbulence(scene).is_some() {
+        return join::layer_weights_per_m(scene, geometry, None);
     }
     observer.begin(Stage::Efficiency, 1);
     let ranges_m = profile_ranges_m(scene, geometry);
     let profile = efficiency_at(scene, &ranges_m, observer)?;
     observer.end();
-    join::layer_weights_per_m(scene, geometry, &profile)
+    join::layer_weights_per_m(scene, geometry, Some(&profile))
 }
 
-/// Radial velocity, m/s, positive away from the lidar, at ranges along a line of sight; NaN below
-/// the ground, where there is no air to scatter.
-pub(crate) fn radial_velocity_m_s(
-    wind: &dyn Wind,
+/// Efficiencies of the layers, one set for each realisation of the turbulence, if the pulses have their own.
+fn drawn_efficiency(
     scene: &Scene,
-    elevation_rad: f64,
-    time_s: f64,
-    range_m: &[f64],
-) -> Result<Vec<f64>, Error> {
+    geometry: &Geometry,
+    lines: &[LineOfSight],
+    observer: &dyn Observer,
+) -> Result<Option<LayerEfficiency>, Error> {
+    let (Some(t), Some(line)) = (drawn_turbulence(scene), lines.first()) else { return Ok(None) };
+    let ranges_m = profile_ranges_m(scene, geometry);
+    let realisations = efficiency_realisations(scene, &t, &ranges_m, observer)?;
+    Ok(Some(EfficiencyTable::new(ranges_m, &realisations)?.onto_layers(line)?))
+}
+
+/// Radial velocity, m/s, positive away from the lidar, at ranges along line of sight `line`; NaN where nothing returns light:
+/// below the ground or outside the flow, if the scene masks that.
+pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+    let scan = &plan.scene.scene.scan;
+    let elevation_rad = plan.geometry.elevation_rad[line];
+    let time_s = plan.wind.start_s + plan.geometry.line_time_s[line];
     let (sin, cos) = elevation_rad.sin_cos();
-    let height_m = scene.scan.lidar_height_m;
-    let points_m: Vec<[f64; 3]> = range_m.iter().map(|r| [0.0, r * cos, height_m + r * sin]).collect();
+    let points_m: Vec<[f64; 3]> = range_m.iter().map(|r| [0.0, r * cos, scan.lidar_height_m + r * sin]).collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    wind.velocity_into(&points_m, time_s, &mut velocity_m_s)?;
-    let project = |(p, v): (&[f64; 3], &[f64; 3])| if p[2] < 0.0 { f64::NAN } else { v[1] * cos + v[2] * sin };
-    Ok(points_m.iter().zip(&velocity_m_s).map(project).collect())
+    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
+    let project = |((&[_, y_m, z_m], v), &range_m): ((&[f64; 3], &[f64; 3]), &f64)| {
+        let known_m_s = v[1] * cos + v[2] * sin;
+        let outside = match (z_m < 0.0, known_m_s.is_nan()) {
+            (true, _) => scan.below_ground,
+            (false, true) => scan.outside_flow,
+            (false, false) => return Ok(known_m_s),
+        };
+        match outside {
+            Outside::Constant { radial_velocity_m_s } => Ok(radial_velocity_m_s),
+            // A scene with lines below the ground was refused, but for air behind its last sample.
+            Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow { elevation_rad, range_m, y_m, z_m }),
+            Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
+        }
+    };
+    points_m.iter().zip(&velocity_m_s).zip(range_m).map(project).collect()
 }

@@ -1,13 +1,12 @@
 //! Writes what a run gives: all files of a run appear together, or none.
 
+use crate::Error;
 use crate::export::signals::RawSignals;
 use crate::export::{Field, FileGroup, Provenance, PulseInfo, Ray, Sweep, Table, Unit, VelocityMap, tables};
 use crate::map::VelocityEstimates;
 use crate::plan::Plan;
 use crate::profile::RangeProfile;
 use crate::run::RunResult;
-use crate::scene::Flow;
-use crate::{Error, join};
 use std::path::{Path, PathBuf};
 
 /// Finds out, before any computing, whether files can be written to a folder; leaves no trace.
@@ -56,7 +55,7 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Vec<PathB
         }
     }
     if let Some(current_a) = &result.signals_a {
-        let signals = raw_signals(plan, current_a.clone());
+        let signals = raw_signals(plan, current_a.clone(), result.quadrature_a.clone());
         if outputs.csv {
             files.add("signals.csv", signals.table()?.to_csv(&origin)?)?;
         }
@@ -114,12 +113,13 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 }
 
 /// The raw signals of a plan's first realisation.
-fn raw_signals(plan: &Plan, current_a: ndarray::Array2<f64>) -> RawSignals {
+fn raw_signals(plan: &Plan, current_a: ndarray::Array2<f64>, quadrature_a: Option<ndarray::Array2<f64>>) -> RawSignals {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let pulses = scene.scan.pulses_per_line;
     let first_s = 2.0 * g.first_range_m / crate::SPEED_OF_LIGHT_M_S;
     RawSignals {
         current_a,
+        quadrature_a,
         elevation_rad: g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect(),
         time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
         pulses_per_line: pulses,
@@ -130,7 +130,7 @@ fn raw_signals(plan: &Plan, current_a: ndarray::Array2<f64>) -> RawSignals {
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let azimuth_rad = scene.scan.azimuth_rad;
-    let start_s = join::start_time_s(scene);
+    let start_s = plan.wind.start_s;
     let away = |what: &str| format!("{what}, positive away from the lidar");
     let speed = |name: &str, text: String, values: &ndarray::Array2<f64>| {
         Field::float(name, Unit::MetrePerSecond, &text, values.clone())
@@ -148,13 +148,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             })
             .collect(),
         range_m: e.range_m.clone(),
-        sweeps: vec![Sweep {
-            tau: match scene.flow {
-                Flow::VortexPair(pair) => pair.age_tau,
-                _ => 0.0,
-            },
-            azimuth_rad,
-        }],
+        sweeps: vec![Sweep { tau: plan.wind.tau, azimuth_rad }],
         pulse: PulseInfo {
             prt_s: 1.0 / scene.laser.pulse_repetition_hz,
             pulse_width_s: scene.pulse.duration_s,
@@ -174,6 +168,15 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             speed("bias", "mean error against v_pulse".into(), &e.bias_m_s),
             speed("standard_error", "standard error of the root mean square error".into(), &e.standard_error_m_s),
             number("flagged", "fraction of the realisations whose estimate was flagged", &e.flagged),
+            number("count", "realisations with a velocity", &e.count),
+            speed("width", "mean spectral width beyond that of the window".into(), &e.width_m_s),
+            Field::float(
+                "signal_to_noise_ratio",
+                Unit::Decibel,
+                "signal-to-noise ratio in the detector band that the spectra show",
+                e.snr_db.clone(),
+            ),
+            number("quality", "density of the peak over the mean density in the band", &e.quality),
         ],
         lidar_y_m: 0.0,
         lidar_height_m: scene.scan.lidar_height_m,
@@ -243,9 +246,9 @@ mod pictures {
         map: &VelocityMap,
         origin: &Provenance,
     ) -> Result<(), Error> {
-        let centres_m = match plan.scene.scene.flow {
+        let centres_m = match &plan.scene.scene.flow {
             Flow::VortexPair(pair) => {
-                let c = crate::join::vortex_pair(&pair).centres(crate::join::start_time_s(&plan.scene.scene));
+                let c = crate::join::vortex_pair(pair).centres(plan.wind.start_s);
                 vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
             }
             _ => Vec::new(),

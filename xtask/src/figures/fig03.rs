@@ -44,8 +44,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         Series::new("", Style::Dash, last),
         Series::new("ground", Style::Line, vec![(0.0, 0.0), (1.05 * far_m, 0.0)]),
     ];
-    if let Flow::VortexPair(pair) = scene.flow {
-        let c = join::vortex_pair(&pair).centres(join::start_time_s(scene));
+    if let Flow::VortexPair(pair) = &scene.flow {
+        let c = join::vortex_pair(pair).centres(join::start_time_s(scene));
         let centres = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
         series.push(Series::new("vortices", Style::Markers, centres));
     }

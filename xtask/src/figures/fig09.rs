@@ -8,6 +8,7 @@ use wakescope_sim::geometry::Geometry;
 use wakescope_sim::join;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::Scene;
+use wakescope_sim::wind::SceneWind;
 
 const RADII_M: [f64; 3] = [1.0, 2.0, 4.0];
 /// Where the chapter gives the levels.
@@ -23,7 +24,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let file = context.scene_file(scene)?;
     let scene = &file.scene;
     let gates = join::gates(scene)?;
-    let elevation_rad = Geometry::new(scene)?.elevation_rad;
+    let elevation_rad = Geometry::new(scene, &SceneWind::new(&file)?)?.elevation_rad;
     let samples = scene.samples_per_record();
     let geometry = ScanGeometry::new(&join::sampling(scene)?, &gates, &elevation_rad, samples)?;
     let window = join::weighting(scene).weights(scene.estimator.window_samples)?;

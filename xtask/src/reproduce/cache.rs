@@ -4,7 +4,7 @@
 //! crate makes new figures; the value is a folder with the figure's files and one TOML index. What
 //! cannot be read is drawn anew.
 
-use crate::figures::{Claim, Context, Rendered, Verdict};
+use crate::figures::{Claim, Profile, Rendered, Verdict};
 use crate::workspace::root;
 use crate::{Failure, Outcome};
 use serde::{Deserialize, Serialize};
@@ -38,14 +38,19 @@ struct StoredClaim {
 }
 
 impl Cache {
-    pub(super) fn new(context: &Context) -> Result<Self, Failure> {
+    pub(super) fn new(profile: Profile, seed: u64) -> Result<Self, Failure> {
         let program = std::fs::read(std::env::current_exe()?)?;
         let mut hash = Sha256::new();
         hash.update(&program);
-        hash.update(context.profile_name());
-        hash.update(context.seed.to_le_bytes());
+        hash.update(profile.name());
+        hash.update(seed.to_le_bytes());
         let key: String = hash.finalize().iter().take(12).map(|b| format!("{b:02x}")).collect();
         Ok(Self { folder: root().join("target/figures-cache").join(key) })
+    }
+
+    /// Folder for what several figures share.
+    pub(super) fn stages(&self) -> PathBuf {
+        self.folder.join("stages")
     }
 
     /// The figure, if it was made before and can be read.

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `wake`, `free` | the vortex pair with its images and the wind, derivatives; which parameters a fit may change |
 //! | `range_kernel` | what a range gate sees of it: mean along the line, or peak of the spectrum |
+//! | `wake_map` | the map that an estimator would show of a wake |
 //! | `guess`, `map_fit` | fit to a map: search for the best pair, then robust least squares |
 //! | `baseband`, `pulse`, `scan_model` | raw signals at the rate of the detector band; lines cut into layers |
 //! | `line`, `band`, `likelihood` | covariance of a line, its factor and derivatives; likelihood and Fisher information |
@@ -43,6 +44,7 @@ mod scan_model;
 mod signal_fit;
 mod small;
 mod wake;
+mod wake_map;
 
 pub use baseband::Baseband;
 pub use free::{FreeParameters, Sharing, WindFit};

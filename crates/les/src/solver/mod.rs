@@ -24,6 +24,7 @@ mod settings;
 mod stage;
 mod subgrid;
 mod transport;
+mod wake;
 
 pub use checkpoint::check_checkpoint;
 pub use flow::Flow;
@@ -36,3 +37,4 @@ pub use run::{
 pub use sample::CrossPlane;
 pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};
 pub use subgrid::SubgridModel;
+pub use wake::{SecondaryRecord, VortexRecord, WakeMeter, WakeRecord, WakeScales};

@@ -26,6 +26,10 @@ pub struct CrossPlane {
     pub z_m: Vec<f64>,
     /// Velocities `(u, v, w)` \[m/s\], `[z][y]`.
     pub velocity_m_s: Vec<[f64; 3]>,
+    /// What lies beyond the ends in y: walls or a period of the mesh.
+    pub y_edges: Edges,
+    /// The same in z.
+    pub z_edges: Edges,
 }
 
 impl Flow {
@@ -65,7 +69,15 @@ impl Flow {
                 sum
             })
             .collect();
-        Ok(CrossPlane { x_m, y_m: mesh.centre_m(1), z_m: mesh.centre_m(2), velocity_m_s })
+        let [_, y, z] = mesh.directions();
+        Ok(CrossPlane {
+            x_m,
+            y_m: mesh.centre_m(1),
+            z_m: mesh.centre_m(2),
+            velocity_m_s,
+            y_edges: edges(y),
+            z_edges: edges(z),
+        })
     }
 
     /// The cross-plane at `x_m` \[m\] as a wind at the present time, with the walls and periods of the mesh.
@@ -73,10 +85,40 @@ impl Flow {
     /// # Errors
     /// As [`Self::cross_plane`].
     pub fn snapshot(&self, x_m: f64, outside: OutsidePolicy) -> Result<GridSnapshot, Error> {
-        let plane = self.cross_plane(x_m)?;
+        self.plane_snapshot(&self.cross_plane(x_m)?, outside)
+    }
+
+    /// The velocity averaged along the flight, at the centres of the cells; its `x_m` is the middle of the mesh.
+    pub fn mean_cross_plane(&self) -> CrossPlane {
+        let mesh = self.mesh();
+        let along = &mesh.directions()[0];
+        let length_m: Vec<f64> = mesh.face_m(0).windows(2).map(|w| w[1] - w[0]).collect();
+        let nx = length_m.len();
+        let mut velocity_m_s = vec![[0.0; 3]; mesh.cells()[1] * mesh.cells()[2]];
+        for component in 0..3 {
+            let centred = self.centre_velocity_m_s(component);
+            for (mean, row) in velocity_m_s.iter_mut().zip(centred.chunks(nx)) {
+                let sum: f64 = row.iter().zip(&length_m).map(|(value, length_m)| value * length_m).sum();
+                mean[component] = sum / along.length_m();
+            }
+        }
+        let x_m = 0.5 * (along.low_m + along.high_m);
+        let [_, y, z] = mesh.directions();
+        CrossPlane {
+            x_m,
+            y_m: mesh.centre_m(1),
+            z_m: mesh.centre_m(2),
+            velocity_m_s,
+            y_edges: edges(y),
+            z_edges: edges(z),
+        }
+    }
+
+    /// A plane of this flow as a wind.
+    pub(super) fn plane_snapshot(&self, plane: &CrossPlane, outside: OutsidePolicy) -> Result<GridSnapshot, Error> {
         let [_, y, z] = self.mesh().directions();
         let (y_m, z_m) = (nodes(y, &plane.y_m), nodes(z, &plane.z_m));
-        let mesh = PlaneMesh { y_edges: edges(y), z_edges: edges(z), outside, y_m, z_m };
+        let mesh = PlaneMesh { y_edges: plane.y_edges, z_edges: plane.z_edges, outside, y_m, z_m };
         let pick = |thin: bool, i: usize| if thin { 0 } else { i };
         let [_, ny, nz] = self.mesh().cells();
         let velocity_m_s: Vec<[f64; 3]> = (0..mesh.z_m.len())

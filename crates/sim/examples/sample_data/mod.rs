@@ -2,7 +2,9 @@
 #![allow(dead_code, reason = "each example uses a part")]
 
 use ndarray::{Array2, Array3};
-use wakescope_sim::export::{CrossPlanes, Field, FieldKind, Provenance, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+use wakescope_sim::export::{
+    CrossPlanes, Field, FieldKind, OPEN_EDGES, Provenance, PulseInfo, Ray, Sweep, Unit, VelocityMap,
+};
 
 /// Origin written into the sample files.
 pub(crate) fn origin() -> Provenance {
@@ -100,5 +102,7 @@ pub(crate) fn planes() -> CrossPlanes {
         tau,
         y_m,
         z_m,
+        y_edges: OPEN_EDGES,
+        z_edges: OPEN_EDGES,
     }
 }

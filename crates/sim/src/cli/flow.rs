@@ -14,8 +14,18 @@ pub(super) struct FlowWords {
     /// The case file; --example prints one.
     #[arg(required_unless_present = "example")]
     case: Option<PathBuf>,
+    #[command(flatten)]
+    run: RunWords,
+    /// Print a commented case file and do nothing else.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "out"], value_parser = EXAMPLES.map(|(name, _)| name))]
+    example: Option<String>,
+}
+
+/// Where a simulation writes and how it begins.
+#[derive(Debug, Args)]
+pub(super) struct RunWords {
     /// Folder to write to; made if it does not exist.
-    #[arg(long, value_name = "DIR", required_unless_present = "example")]
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Continue from the checkpoint in the folder.
     #[arg(long, conflicts_with = "overwrite")]
@@ -23,9 +33,6 @@ pub(super) struct FlowWords {
     /// Begin anew although the folder holds a checkpoint.
     #[arg(long)]
     overwrite: bool,
-    /// Print a commented case file and do nothing else.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "out"], value_parser = EXAMPLES.map(|(name, _)| name))]
-    example: Option<String>,
 }
 
 pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
@@ -33,9 +40,17 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
         let _ = std::io::stdout().lock().write_all(text.as_bytes());
         return Ok(());
     }
-    // The words were checked: without an example both are there.
-    let (Some(case), Some(out)) = (&words.case, &words.out) else { return Ok(()) };
-    let file = CaseFile::read(case)?;
+    // The words were checked: without an example there is a case.
+    let Some(case) = &words.case else { return Ok(()) };
+    simulate(&CaseFile::read(case)?, &words.run, cli)
+}
+
+/// Runs a case and says what came of it.
+pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(), Error> {
+    let Some(out) = &words.out else {
+        let reason = "a run needs a folder to write to".into();
+        return Err(Error::Input { path: PathBuf::from("--out DIR"), reason });
+    };
     let begin = match (words.restart, words.overwrite) {
         (true, _) => Begin::Restart,
         (_, true) => Begin::Overwrite,
@@ -50,7 +65,7 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
             bar = progress::FlowBar::new();
             &mut bar
         };
-        run(&file, out, begin, watch)
+        run(file, out, begin, watch)
     })??;
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,

@@ -21,7 +21,7 @@ pub fn cf_field_bytes(field: &VelocityField, provenance: &Provenance) -> OutputR
             .text("units", units)
             .attr("_FillValue", Attr::F32(FILL))
     };
-    let variables = vec![
+    let mut variables = vec![
         Variable::new("time", &["time"], Data::F64(vec![field.time_s]))
             .text("long_name", "time since the start of the flow")
             .text("units", "s"),
@@ -33,6 +33,9 @@ pub fn cf_field_bytes(field: &VelocityField, provenance: &Provenance) -> OutputR
         data("w", w, "m s-1", "vertical wind").text("standard_name", "upward_air_velocity"),
         data("pressure", &field.pressure_m2_s2, "m2 s-2", "pressure over density, up to a constant"),
     ];
+    if let Some(vorticity) = &field.vorticity_per_s {
+        variables.push(data("vorticity_magnitude", vorticity, "s-1", "magnitude of the vorticity"));
+    }
     let dims = vec![("time", 1), ("z", field.z_m.len()), ("y", field.y_m.len()), ("x", field.x_m.len())];
     file(&field.title, dims, variables, provenance)
 }

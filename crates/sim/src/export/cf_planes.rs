@@ -2,6 +2,7 @@
 //! Opens in xarray (netCDF4 and scipy engines): `ds.v.sel(tau=2.5).interp(y=..., z=...)`.
 //! Check: the tests read the bytes back and compare axes, values and the missing one.
 
+use super::edges;
 use super::error::OutputResult;
 use super::map::CrossPlanes;
 use super::netcdf::{Attr, Data, FILL, Layout, Variable};
@@ -26,10 +27,12 @@ pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputR
             .text("long_name", "height of the cell centre above the ground")
             .text("units", "m")
             .text("positive", "up")
+            .text("edges", &edges::to_text(planes.z_edges))
             .text("axis", "Z"),
         axis("y", &["y"], &planes.y_m)
             .text("long_name", "horizontal position of the cell centre across the flight direction")
             .text("units", "m")
+            .text("edges", &edges::to_text(planes.y_edges))
             .text("axis", "Y"),
         // Not "seconds since": the run has no date.
         axis("time", &["tau"], &planes.time_s).text("long_name", "time since the start of the flow").text("units", "s"),

@@ -14,7 +14,7 @@ pub fn cf_signals_bytes(signals: &RawSignals, provenance: &Provenance) -> Output
     signals.check()?;
     let (rays, samples) = signals.current_a.dim();
     let ray_numbers: Vec<i32> = (0..rays as i32).collect();
-    let variables = vec![
+    let mut variables = vec![
         Variable::new("ray", &["ray"], Data::I32(ray_numbers))
             .text("long_name", "number of the pulse")
             .text("units", "1"),
@@ -28,6 +28,12 @@ pub fn cf_signals_bytes(signals: &RawSignals, provenance: &Provenance) -> Output
             .text("long_name", "heterodyne current of the detector")
             .text("units", "A"),
     ];
+    if let Some(quadrature) = &signals.quadrature_a {
+        let values = Data::F64(quadrature.iter().copied().collect());
+        let text = "second quadrature of the baseband signal; the first is current_a";
+        variables
+            .push(Variable::new("quadrature_a", &["ray", "time"], values).text("long_name", text).text("units", "A"));
+    }
     let globals = vec![("Conventions", "CF-1.10".to_owned()), ("title", "Raw heterodyne signals".to_owned())];
     Layout { dims: vec![("ray", rays), ("time", samples)], globals, variables }.to_bytes(provenance)
 }

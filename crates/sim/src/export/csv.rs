@@ -82,6 +82,34 @@ impl Table {
         self
     }
 
+    /// The rows of several tables, one table after the other.
+    ///
+    /// # Errors
+    /// Tables whose columns differ in number, name or kind.
+    pub fn stack(tables: impl IntoIterator<Item = Self>) -> OutputResult<Self> {
+        let mut tables = tables.into_iter();
+        let mut all = tables.next().unwrap_or_default();
+        for table in tables {
+            let same = all.columns.len() == table.columns.len();
+            for ((name, column), (other, more)) in all.columns.iter_mut().zip(table.columns) {
+                let fits = same && *name == other;
+                match (column, more) {
+                    (Column::Float(column), Column::Float(more)) if fits => column.extend(more),
+                    (Column::Int(column), Column::Int(more)) if fits => column.extend(more),
+                    (Column::Text(column), Column::Text(more)) if fits => column.extend(more),
+                    _ => {
+                        return Err(OutputError::value(
+                            "column of a table",
+                            other,
+                            format!("{name}, of the same kind"),
+                        ));
+                    }
+                }
+            }
+        }
+        Ok(all)
+    }
+
     /// Names and values in order.
     pub fn columns(&self) -> &[(String, Column)] {
         &self.columns

@@ -21,6 +21,8 @@ pub struct VelocityField {
     pub velocity_m_s: [Vec<f64>; 3],
     /// Pressure over density, `[z][y][x]`, m^2/s^2, up to a constant.
     pub pressure_m2_s2: Vec<f64>,
+    /// Magnitude of the vorticity, `[z][y][x]`, 1/s; where it is wanted.
+    pub vorticity_per_s: Option<Vec<f64>>,
 }
 
 impl VelocityField {
@@ -43,12 +45,15 @@ impl VelocityField {
     }
 
     /// The fields with their names.
-    pub(crate) fn named(&self) -> [(&'static str, &[f64]); 4] {
+    pub(crate) fn named(&self) -> impl Iterator<Item = (&'static str, &[f64])> {
         let [u, v, w] = &self.velocity_m_s;
-        [("u_m_s", u), ("v_m_s", v), ("w_m_s", w), ("pressure_m2_s2", &self.pressure_m2_s2)]
+        let always: [(&'static str, &[f64]); 4] =
+            [("u_m_s", u), ("v_m_s", v), ("w_m_s", w), ("pressure_m2_s2", &self.pressure_m2_s2)];
+        always.into_iter().chain(self.vorticity_per_s.as_deref().map(|values| ("vorticity_per_s", values)))
     }
 
-    /// The table `time_s, z_m, y_m, x_m, u_m_s, v_m_s, w_m_s, pressure_m2_s2`, x running fastest.
+    /// The table `time_s, z_m, y_m, x_m, u_m_s, v_m_s, w_m_s, pressure_m2_s2`, and `vorticity_per_s` where
+    /// it is there, x running fastest.
     ///
     /// # Errors
     /// What [`Self::check`] finds.
@@ -61,7 +66,7 @@ impl VelocityField {
             .float("z_m", cells().map(|i| self.z_m[i / (nx * ny)]))
             .float("y_m", cells().map(|i| self.y_m[i / nx % ny]))
             .float("x_m", cells().map(|i| self.x_m[i % nx]));
-        Ok(self.named().into_iter().fold(table, |table, (name, values)| table.float(name, values.iter().copied())))
+        Ok(self.named().fold(table, |table, (name, values)| table.float(name, values.iter().copied())))
     }
 }
 
@@ -77,6 +82,7 @@ pub(crate) fn example() -> VelocityField {
         z_m,
         velocity_m_s: [field(0.25), field(100.5), field(-300.0)],
         pressure_m2_s2: field(0.125),
+        vorticity_per_s: Some(field(7.5)),
     }
 }
 

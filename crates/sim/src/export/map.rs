@@ -4,6 +4,7 @@
 
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use ndarray::{Array2, Array3};
+use wakescope_les::{Edges, Side};
 
 /// Unit of a field: its tag in a CSV column name and its text in NetCDF (UDUNITS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -273,7 +274,14 @@ pub struct CrossPlanes {
     pub v_m_s: Array3<f64>,
     /// Vertical wind `[tau, z, y]`, m/s; NaN = missing.
     pub w_m_s: Array3<f64>,
+    /// What lies beyond the ends in y, for those who interpolate.
+    pub y_edges: Edges,
+    /// The same in z.
+    pub z_edges: Edges,
 }
+
+/// Ends of an axis of which nothing is known beyond its last values.
+pub const OPEN_EDGES: Edges = Edges::Bounded { low: Side::Open, high: Side::Open };
 
 impl CrossPlanes {
     /// Checks axes and shapes.

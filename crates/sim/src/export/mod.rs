@@ -26,12 +26,14 @@ pub mod cf_signals;
 #[cfg(feature = "netcdf")]
 pub mod cfradial;
 pub mod csv;
+#[cfg(feature = "netcdf")]
+pub(crate) mod edges;
 mod error;
 pub mod fields;
 pub mod hpl;
 pub mod map;
 #[cfg(feature = "netcdf")]
-mod netcdf;
+pub(crate) mod netcdf;
 #[cfg(feature = "npz")]
 pub mod npz;
 pub mod provenance;
@@ -46,7 +48,9 @@ pub use csv::Table;
 pub(crate) use error::same_length;
 pub use error::{OutputError, OutputResult};
 pub use fields::VelocityField;
-pub use map::{CrossPlanes, Field, FieldKind, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+pub use map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+#[cfg(feature = "netcdf")]
+pub(crate) use netcdf::FILL;
 pub use provenance::Provenance;
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Small made-up results for the tests of the writers: two sweeps, missing values, a stretched mesh.
 
-use super::map::{CrossPlanes, Field, FieldKind, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+use super::map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 use ndarray::{Array2, Array3};
 
 /// Two sweeps of 6 rays, 5 gates; NaN in a corner.
@@ -97,5 +97,7 @@ pub(crate) fn planes() -> CrossPlanes {
         z_m: vec![0.5, 1.7, 4.1, 9.0],
         w_m_s: Array3::from_shape_fn(shape, |(t, z, y)| (t * 20 + z * 5 + y) as f64 / 7.0),
         v_m_s,
+        y_edges: OPEN_EDGES,
+        z_edges: OPEN_EDGES,
     }
 }

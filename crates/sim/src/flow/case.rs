@@ -7,6 +7,7 @@ use super::free::Free;
 use super::named::{
     Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
 };
+use super::wake::{WakeFlow, WakeOutput};
 use crate::scene::{Problem, section};
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,9 @@ pub struct FlowCase {
     /// How often the whole state is saved.
     #[serde(default)]
     pub checkpoint: Checkpoint,
+    /// What is measured and written of a wake; only with `kind = "wake"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wake: Option<WakeOutput>,
 }
 
 fn format() -> u32 {
@@ -69,6 +73,8 @@ pub enum CaseKind {
     Channel(Channel),
     /// A vortex pair above ground, in plane or space.
     VortexPair(VortexPairFlow),
+    /// The wake of an aircraft near the ground, measured while it runs.
+    Wake(Box<WakeFlow>),
     /// A mesh, viscosity and initial field of one's own, in SI units.
     Free(Box<Free>),
 }
@@ -271,6 +277,7 @@ impl FlowCase {
             "a number from 1e-15 to 0.1",
         );
         self.check_output(&mut p);
+        self.check_wake(&mut p);
         let c = self.checkpoint;
         p.require(c.every_steps != Some(0), "checkpoint.every_steps", c.every_steps, "a whole number above 0");
         if let Some(every_s) = c.every_s {
@@ -278,6 +285,19 @@ impl FlowCase {
             p.require(c.every_steps.is_none(), "checkpoint.every_s", every_s, "absent beside checkpoint.every_steps");
         }
         p.0
+    }
+
+    fn check_wake(&self, p: &mut Problems) {
+        let is_wake = matches!(self.case, CaseKind::Wake(_));
+        if let Some(wake) = &self.wake {
+            p.require(is_wake, "wake.end_tau", wake.end_tau, "absent: the section is for case.kind = \"wake\"");
+            wake.check(p);
+        }
+        let o = &self.output;
+        let by_age = !is_wake || (o.times_s.is_empty() && o.every_s.is_none());
+        p.require(by_age, "output.times_s", &o.times_s, "absent, like output.every_s: the section wake has the ages");
+        let planes = !is_wake || o.planes_x_m.is_empty();
+        p.require(planes, "output.planes_x_m", &o.planes_x_m, "absent: see wake.planes_x");
     }
 
     fn check_time(&self, p: &mut Problems) {

@@ -1,7 +1,7 @@
 //! Commented case files, one for each kind of flow, as `wakescope flow --example NAME` prints them.
 
 /// Names and texts of the examples.
-pub const EXAMPLES: [(&str, &str); 12] = [
+pub const EXAMPLES: [(&str, &str); 13] = [
     ("taylor_green_plane", include_str!("examples/taylor_green_plane.toml")),
     ("taylor_green", include_str!("examples/taylor_green.toml")),
     ("poiseuille", include_str!("examples/poiseuille.toml")),
@@ -13,6 +13,7 @@ pub const EXAMPLES: [(&str, &str); 12] = [
     ("lid_driven_cavity", include_str!("examples/lid_driven_cavity.toml")),
     ("channel", include_str!("examples/channel.toml")),
     ("vortex_pair", include_str!("examples/vortex_pair.toml")),
+    ("wake", include_str!("examples/wake.toml")),
     ("free", include_str!("examples/free.toml")),
 ];
 

@@ -1,6 +1,7 @@
 //! What a run writes at its output times: whole fields, planes, initial fields, collections.
 
 use super::case::{FileFormat, Output};
+use super::wake::Due;
 use crate::Error;
 use crate::export::{CrossPlanes, FileGroup, Provenance, VelocityField, tables};
 use ndarray::Array3;
@@ -13,20 +14,27 @@ pub(super) struct Files {
     pub(super) folder: PathBuf,
     pub(super) output: Output,
     pub(super) origin: Provenance,
+    /// Times of the fields, and of the planes \[s\].
     #[cfg(feature = "vtk")]
-    pub(super) times_s: Vec<f64>,
+    pub(super) times_s: [Vec<f64>; 2],
+    /// Whether fields have the vorticity, too.
+    pub(super) with_vorticity: bool,
     /// Age of the wake per time \[1/s\].
     pub(super) tau_per_s: f64,
     pub(super) title: String,
 }
 
 impl Files {
-    /// Writes all files of output `index`, or none of them; returns their paths.
-    pub(super) fn write(&self, flow: &Flow, index: usize) -> Result<Vec<PathBuf>, Error> {
+    /// Writes all files that are due, or none of them; returns their paths.
+    pub(super) fn write(&self, flow: &Flow, due: Due) -> Result<Vec<PathBuf>, Error> {
         let mut group = FileGroup::new(&self.folder);
-        self.add_fields(&mut group, flow, index)?;
-        for (number, &x_m) in self.output.planes_x_m.iter().enumerate() {
-            self.add_plane(&mut group, flow, index, &format!("plane{}", number + 1), x_m)?;
+        if let Some(index) = due.fields {
+            self.add_fields(&mut group, flow, index)?;
+        }
+        if let Some(index) = due.planes {
+            for (number, &x_m) in self.output.planes_x_m.iter().enumerate() {
+                self.add_plane(&mut group, flow, index, &format!("plane{}", number + 1), x_m)?;
+            }
         }
         Ok(group.commit()?)
     }
@@ -35,7 +43,7 @@ impl Files {
         let name = |extension: &str| format!("fields_{:04}.{extension}", index + 1);
         let formats = &self.output.fields;
         if formats.iter().any(|format| *format != FileFormat::InitialNetcdf) {
-            let field = self.field(flow);
+            let field = self.field(flow)?;
             for format in formats {
                 match format {
                     FileFormat::Csv => group.add(&name("csv"), field.table()?.to_csv(&self.origin)?)?,
@@ -46,7 +54,7 @@ impl Files {
                     #[cfg(feature = "vtk")]
                     FileFormat::Vtr => {
                         group.add(&name("vtr"), crate::export::vtr::field_bytes(&field, &self.origin)?)?;
-                        group.add("fields.pvd", self.collection("fields", index, 1.0))?;
+                        group.add("fields.pvd", self.collection("fields", index, &self.times_s[0], 1.0))?;
                     }
                     // A case that names a format which this build lacks was refused.
                     _ => {}
@@ -78,7 +86,8 @@ impl Files {
                 FileFormat::Vtr => {
                     let bytes = crate::export::vtr::plane_file(&plane, &self.origin)?;
                     group.add(&format!("{stem}_{:04}.vtr", index + 1), bytes)?;
-                    group.add(&format!("{stem}.pvd"), self.collection(stem, index, self.tau_per_s))?;
+                    group
+                        .add(&format!("{stem}.pvd"), self.collection(stem, index, &self.times_s[1], self.tau_per_s))?;
                 }
                 _ => {}
             }
@@ -88,15 +97,17 @@ impl Files {
 
     /// The collection of all outputs up to this one.
     #[cfg(feature = "vtk")]
-    fn collection(&self, stem: &str, index: usize, per_s: f64) -> Vec<u8> {
+    fn collection(&self, stem: &str, index: usize, times_s: &[f64], per_s: f64) -> Vec<u8> {
         let names: Vec<String> = (0..=index).map(|i| format!("{stem}_{:04}.vtr", i + 1)).collect();
-        let members = self.times_s.iter().map(|t| t * per_s).zip(names.iter().map(String::as_str));
+        let members = times_s.iter().map(|t| t * per_s).zip(names.iter().map(String::as_str));
         crate::export::vtr::pvd_bytes(members, &self.origin)
     }
 
-    fn field(&self, flow: &Flow) -> VelocityField {
+    fn field(&self, flow: &Flow) -> Result<VelocityField, Error> {
         let mesh = flow.mesh();
-        VelocityField {
+        let vorticity_per_s =
+            if self.with_vorticity { Some(flow.vorticity_magnitude_per_s().map_err(Error::Flow)?) } else { None };
+        Ok(VelocityField {
             title: self.title.clone(),
             time_s: flow.time_s(),
             x_m: mesh.centre_m(0),
@@ -104,7 +115,8 @@ impl Files {
             z_m: mesh.centre_m(2),
             velocity_m_s: [0, 1, 2].map(|axis| flow.centre_velocity_m_s(axis)),
             pressure_m2_s2: flow.pressure_m2_s2(),
-        }
+            vorticity_per_s,
+        })
     }
 
     #[cfg(feature = "netcdf")]
@@ -138,6 +150,8 @@ impl Files {
             w_m_s: component(2),
             y_m: plane.y_m,
             z_m: plane.z_m,
+            y_edges: plane.y_edges,
+            z_edges: plane.z_edges,
         })
     }
 

@@ -219,7 +219,7 @@ impl Free {
         let longest_s = f64::MAX;
         let mut settings = FlowSettings::new(self.viscosity_m2_s, TimeStep::Courant { courant, longest_s });
         settings.force_m_s2 = self.force_m_s2;
-        Ok(Setup { mesh, settings, initial, end_s: None, tau_per_s })
+        Ok(Setup { mesh, settings, initial, end_s: None, tau_per_s, wake: None })
     }
 
     fn initial(&self, mesh: &Mesh, folder: &Path) -> Result<(Initial, f64), Error> {

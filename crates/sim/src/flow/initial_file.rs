@@ -7,7 +7,7 @@
 //! Check: a field written by a run reads back to the same values; a smooth field on another mesh with fourth order.
 
 use crate::Error;
-use netcdf3::{DataVector, FileReader};
+use crate::netcdf_input::{floats, open};
 use std::path::Path;
 use wakescope_les::{Direction, Ends, Mesh};
 
@@ -20,12 +20,7 @@ type Taps = Vec<(usize, f64)>;
 /// A file that cannot be read, without the variables, or that does not cover the mesh.
 pub(super) fn read(path: &Path, mesh: &Mesh) -> Result<[Vec<f64>; 3], Error> {
     let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
-    if let Err(source) = std::fs::metadata(path) {
-        return Err(Error::Io { action: "read", path: path.to_owned(), source });
-    }
-    let mut file = FileReader::open(path).map_err(|e| {
-        refuse(format!("no classic NetCDF file ({e:?}); from xarray, save with format=\"NETCDF3_64BIT\""))
-    })?;
+    let mut file = open(path)?;
     let mut component = |axis: usize| -> Result<Vec<f64>, String> {
         let name = ["u", "v", "w"][axis];
         let dims = match file.data_set().get_var(name) {
@@ -59,18 +54,6 @@ pub(super) fn read(path: &Path, mesh: &Mesh) -> Result<[Vec<f64>; 3], Error> {
     };
     let mut read = |axis| component(axis).map_err(refuse);
     Ok([read(0)?, read(1)?, read(2)?])
-}
-
-/// A variable as `f64`, whatever its type of number.
-fn floats(file: &mut FileReader, name: &str) -> Result<Vec<f64>, String> {
-    match file.read_var(name) {
-        Ok(DataVector::F64(values)) => Ok(values),
-        Ok(DataVector::F32(values)) => Ok(values.into_iter().map(f64::from).collect()),
-        Ok(DataVector::I32(values)) => Ok(values.into_iter().map(f64::from).collect()),
-        Ok(DataVector::I16(values)) => Ok(values.into_iter().map(f64::from).collect()),
-        Ok(_) => Err(format!("variable {name} is not made of numbers")),
-        Err(e) => Err(format!("coordinate or variable {name} cannot be read: {e:?}")),
-    }
 }
 
 /// Sums along one direction: `[slower][n][inner]` becomes `[slower][taps][inner]`.

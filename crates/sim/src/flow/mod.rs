@@ -14,8 +14,12 @@ mod free;
 #[cfg(feature = "netcdf")]
 mod initial_file;
 mod named;
+#[cfg(feature = "netcdf")]
+mod read;
 mod setup;
 mod steps;
+mod wake;
+mod writer;
 
 pub use case::{
     AxisName, CaseKind, Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time,
@@ -26,14 +30,20 @@ pub use named::{
     Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
 };
 
+#[cfg(feature = "netcdf")]
+pub use read::{FieldInSpace, read_field, read_planes};
+pub use wake::{PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile};
+
 use crate::Error;
 use crate::export::{Provenance, write_atomic};
 use crate::scene::{Problem, SceneError, hash_of, invalid, malformed};
 use files::{Files, checkpoint_paths};
-use setup::Setup;
+use setup::{Setup, WakeSetup};
 use std::path::{Path, PathBuf};
 use steps::StepTable;
-use wakescope_les::{CheckpointPlan, Ends, Flow, Interval, Run, RunObserver, RunPlan, RunWarning, StepRecord};
+use wake::{Schedule, WakeRun};
+use wakescope_les::{CheckpointPlan, Ends, Interval, Run, RunPlan, StepRecord};
+use writer::{Kept, Writer};
 
 /// Steps between checkpoints where a case states nothing.
 const STEPS_PER_CHECKPOINT: u64 = 500;
@@ -70,7 +80,10 @@ impl CaseFile {
     /// # Errors
     /// As [`CaseFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        let case: FlowCase = toml::from_str(text).map_err(|e| malformed(text, path, &e))?;
+        let mut case: FlowCase = toml::from_str(text).map_err(|e| malformed(text, path, &e))?;
+        if matches!(case.case, CaseKind::Wake(_)) {
+            case.wake.get_or_insert_default();
+        }
         let problems = case.problems();
         if !problems.is_empty() {
             return Err(invalid(text, path, problems));
@@ -78,6 +91,29 @@ impl CaseFile {
         let toml = toml::to_string(&case).unwrap_or_else(|e| unreachable!("a case is plain data: {e}"));
         let hash = hash_of(&toml);
         Ok(Self { case, toml, hash, path: path.to_owned(), text: text.to_owned() })
+    }
+
+    /// A preset.
+    ///
+    /// # Errors
+    /// None of a preset as it is.
+    pub fn preset(preset: WakePreset) -> Result<Self, SceneError> {
+        let toml = toml::to_string(&preset.case()).unwrap_or_else(|e| unreachable!("a case is plain data: {e}"));
+        Self::parse(&toml, Path::new("preset"))
+    }
+
+    /// The text of a case file of a wake over a preset: keys that it does not have are those of the preset.
+    ///
+    /// # Errors
+    /// As [`CaseFile::parse`]; lines of what only the whole reveals are those of the whole.
+    pub fn parse_over(preset: WakePreset, text: &str, path: &Path) -> Result<Self, SceneError> {
+        Self::parse(text, path)?;
+        let base = Self::preset(preset)?;
+        let read = |text: &str| text.parse::<toml::Table>().map_err(|e| malformed(text, path, &e));
+        let mut whole = read(&base.toml)?;
+        overlay(&mut whole, read(text)?);
+        let whole = toml::to_string(&whole).unwrap_or_else(|e| unreachable!("a table is plain data: {e}"));
+        Self::parse(&whole, path)
     }
 
     fn refuse(&self, key: &str, value: impl std::fmt::Debug, allowed: String) -> Error {
@@ -91,6 +127,22 @@ impl CaseFile {
             scene_toml: self.toml.clone(),
             scene_hash: self.hash.clone(),
             seed: 0,
+        }
+    }
+}
+
+/// Takes the keys of `over` into `base`. A table whose first key says which kind it is replaces the other as a whole.
+fn overlay(base: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (base.get_mut(&key), value) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(value))
+                if !value.contains_key("from") && !value.contains_key("model") =>
+            {
+                overlay(inner, value);
+            }
+            (_, value) => {
+                base.insert(key, value);
+            }
         }
     }
 }
@@ -155,8 +207,8 @@ pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) 
     if begin == Begin::New && checkpoint.exists() {
         return Err(Error::CheckpointInTheWay { path: checkpoint });
     }
-    let setup = Setup::new(&file.case, file.path.parent().unwrap_or(Path::new("")))?;
-    let (plan, files) = plan(file, &setup, folder)?;
+    let mut setup = Setup::new(&file.case, file.path.parent().unwrap_or(Path::new("")))?;
+    let (plan, files, schedule) = plan(file, &setup, folder)?;
     crate::write::prepare(folder)?;
     std::fs::create_dir_all(folder).map_err(|source| Error::Io {
         action: "make the folder",
@@ -164,6 +216,7 @@ pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) 
         source,
     })?;
     let mut warnings = Vec::new();
+    let meter = setup.wake.take().map(|wake| wake.meter);
     let (mut run, kept) = if begin == Begin::Restart {
         let path = readable(&checkpoint, &previous, &mut warnings);
         Run::resume(path, setup.mesh, setup.settings, plan).map_err(Error::Flow)?
@@ -179,21 +232,29 @@ pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) 
         (Run::new(flow, plan).map_err(Error::Flow)?, Vec::new())
     };
     warnings.iter().for_each(|text| watch.note(text));
+    let mut wake = meter.map(|meter| WakeRun::new(meter, run.flow(), folder.to_owned(), file.provenance()));
+    let kept = Kept::read(&kept, wake.is_some());
+    if let (Some(wake), true) = (&mut wake, begin == Begin::Restart) {
+        let what = "its history of the wake is not that of this case";
+        wake.restore(&kept.wake)
+            .ok_or_else(|| Error::Flow(wakescope_les::Error::CheckpointDamaged { path: checkpoint.clone(), what }))?;
+    }
     let case_toml = folder.join("case.toml");
     write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
     let steps_path = files.steps_path();
     let steps = match (files.output.steps, begin) {
         (false, _) => None,
-        (true, Begin::Restart) => Some(StepTable::resume(&steps_path, &files.origin, &kept)?),
+        (true, Begin::Restart) => Some(StepTable::resume(&steps_path, &files.origin, &kept.steps)?),
         (true, _) => Some(StepTable::begin(&steps_path, &files.origin)?),
     };
     let mut written = vec![case_toml];
     written.extend(steps.is_some().then_some(steps_path));
+    written.extend(wake.iter().flat_map(WakeRun::paths));
     let (start_s, end_s) = (run.flow().time_s(), run.plan().end_s);
-    let mut writer = Writer { files, steps, written, warnings, watch, start_s, end_s, error: None };
+    let mut writer = Writer { files, schedule, steps, wake, written, warnings, watch, start_s, end_s, error: None };
     let result = run.to_end(&mut writer);
     // Also of a run that failed: its last row is what one wants to see.
-    let finished = writer.steps.as_mut().map_or(Ok(()), StepTable::finish);
+    let finished = writer.finish();
     let Writer { written, warnings, error, .. } = writer;
     let summary = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
     finished?;
@@ -221,14 +282,24 @@ fn readable<'a>(checkpoint: &'a Path, previous: &'a Path, warnings: &mut Vec<Str
 }
 
 /// The plan of the run and of its files, with all that can be refused before the computing.
-fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files), Error> {
+fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files, Schedule), Error> {
     let case = &file.case;
-    let Some(end_s) = case.time.end_s.or(setup.end_s) else {
+    let wake_end_s = case.wake.as_ref().map(|wake| wake.end_tau / setup.tau_per_s);
+    let Some(end_s) = case.time.end_s.or(wake_end_s).or(setup.end_s) else {
         return Err(file.refuse("time.end_s", "absent", "needed for a flow of one's own".into()));
     };
-    let output_times_s =
-        case.output_times_s(end_s).map_err(|problem| Error::Scene(invalid(&file.text, &file.path, vec![problem])))?;
-    if let Some(late) = output_times_s.iter().find(|t| **t > end_s) {
+    let mut output = case.output.clone();
+    let schedule = match (&case.wake, &setup.wake) {
+        (Some(wake), Some(WakeSetup { scales, .. })) => {
+            output.planes_x_m = wake.planes_x.iter().map(|x| x * scales.spacing_m).collect();
+            Schedule::of_wake(wake, setup.tau_per_s, end_s)
+        }
+        _ => Schedule::plain(
+            case.output_times_s(end_s)
+                .map_err(|problem| Error::Scene(invalid(&file.text, &file.path, vec![problem])))?,
+        ),
+    };
+    if let Some(late) = schedule.times_s.iter().find(|t| **t > end_s) {
         return Err(file.refuse("output.times_s", late, format!("at most the end, {end_s:?} s")));
     }
     let along = &setup.mesh.directions()[0];
@@ -245,76 +316,21 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
     let [path, _] = checkpoint_paths(folder);
     let run = RunPlan {
         end_s,
-        output_times_s: output_times_s.clone(),
+        output_times_s: schedule.times_s.clone(),
         checkpoint: case.checkpoint.write.then_some(CheckpointPlan { path, every }),
         pause_after_steps: case.time.pause_after_steps,
     };
     let files = Files {
         folder: folder.to_owned(),
-        output: case.output.clone(),
+        output,
         origin: file.provenance(),
         #[cfg(feature = "vtk")]
-        times_s: output_times_s,
+        times_s: [schedule.times_of(|due| due.fields), schedule.times_of(|due| due.planes)],
+        with_vorticity: setup.wake.is_some(),
         tau_per_s: setup.tau_per_s,
         title: format!("Simulated flow, case {}", file.hash),
     };
-    Ok((run, files))
-}
-
-/// Writes what the run gives.
-struct Writer<'a> {
-    files: Files,
-    steps: Option<StepTable>,
-    written: Vec<PathBuf>,
-    warnings: Vec<String>,
-    watch: &'a mut dyn Watch,
-    start_s: f64,
-    end_s: f64,
-    /// What stopped the run, in full.
-    error: Option<Error>,
-}
-
-impl Writer<'_> {
-    fn keep<T>(&mut self, result: Result<T, Error>) -> Result<T, String> {
-        result.map_err(|error| {
-            let reason = error.to_string();
-            self.error = Some(error);
-            reason
-        })
-    }
-}
-
-impl RunObserver for Writer<'_> {
-    fn step(&mut self, _: &Flow, record: &StepRecord) -> Result<(), String> {
-        let done = (record.report.time_s - self.start_s) / (self.end_s - self.start_s);
-        self.watch.step(done, record);
-        let pushed = self.steps.as_mut().map_or(Ok(()), |steps| steps.push(record));
-        self.keep(pushed)
-    }
-
-    fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
-        let written = self.files.write(flow, index);
-        let mut written = self.keep(written)?;
-        // A collection is written anew with each output.
-        written.retain(|path| !self.written.contains(path));
-        self.written.append(&mut written);
-        Ok(())
-    }
-
-    fn warning(&mut self, warning: &RunWarning) {
-        let text = match warning {
-            RunWarning::Courant { step, courant, limit } => {
-                format!("step {step} has Courant number {courant:.3}, near the limit {limit}: shorten the time step")
-            }
-            _ => format!("{warning:?}"),
-        };
-        self.watch.note(&text);
-        self.warnings.push(text);
-    }
-
-    fn user_data(&self) -> Vec<u8> {
-        self.steps.as_ref().map_or_else(Vec::new, StepTable::kept)
-    }
+    Ok((run, files, schedule))
 }
 
 #[cfg(test)]

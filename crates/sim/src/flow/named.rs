@@ -1,7 +1,7 @@
 //! The flows with known answers: their parameters, and the cases of the solver that these select.
 
 use super::case::{CaseKind, Problems};
-use super::setup::{Initial, Setup};
+use super::setup::Setup;
 use crate::scene::{VortexProfile, section};
 use crate::{Error, join};
 use serde::{Deserialize, Serialize};
@@ -183,6 +183,7 @@ impl CaseKind {
                 p.positive("case.reynolds_tau", c.reynolds_tau);
             }
             Self::VortexPair(c) => c.check(p),
+            Self::Wake(c) => c.check(p),
             Self::Free(c) => c.check(p),
         }
     }
@@ -218,10 +219,11 @@ impl CaseKind {
             Self::LidDrivenCavity(ref c) => cases::lid_driven_cavity(c.cells, c.stretch, c.reynolds),
             Self::Channel(ref c) => cases::channel(c.cells, c.stretch, c.reynolds_tau),
             Self::VortexPair(ref c) => c.case(),
+            Self::Wake(ref c) => return c.setup(),
             Self::Free(ref c) => return c.setup(folder),
         };
         let Case { mesh, settings, initial, end_s } = case.map_err(Error::Flow)?;
-        Ok(Setup { mesh, settings, initial: Initial::Field(initial), end_s: Some(end_s), tau_per_s: 1.0 })
+        Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0, wake: None })
     }
 }
 
@@ -257,6 +259,7 @@ impl VortexPairFlow {
             slip_sides: self.slip_sides,
             perturbation: self.perturbation,
             cross_wind: self.cross_wind,
+            ..VortexPairCase::coarse()
         }
         .case(TimeStep::Courant { courant, longest_s: 0.02 })
     }

@@ -3,19 +3,11 @@
 use super::case::{AxisName, FlowCase, Pressure, Scheme, Subgrid};
 use crate::Error;
 use std::path::Path;
-use wakescope_les::cases::InitialField;
+pub(super) use wakescope_les::cases::Initial;
 use wakescope_les::{
     Flow, FlowSettings, Mesh, PressureMethod, StartReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment,
+    WakeMeter, WakeScales,
 };
-
-/// The field that a flow starts from.
-pub(super) enum Initial {
-    /// A formula.
-    Field(InitialField),
-    /// Values at the low faces of the cells, `[z][y][x]` \[m/s\].
-    #[cfg(feature = "netcdf")]
-    Faces([Vec<f64>; 3]),
-}
 
 /// All that a simulation is made of.
 pub(super) struct Setup {
@@ -26,6 +18,14 @@ pub(super) struct Setup {
     pub(super) end_s: Option<f64>,
     /// Age of the wake per time \[1/s\]; 1 where there is no wake.
     pub(super) tau_per_s: f64,
+    /// What a wake is measured by.
+    pub(super) wake: Option<WakeSetup>,
+}
+
+/// The meter of a wake and its scales.
+pub(super) struct WakeSetup {
+    pub(super) meter: WakeMeter,
+    pub(super) scales: WakeScales,
 }
 
 impl Setup {
@@ -57,12 +57,7 @@ impl Setup {
 
     pub(super) fn start(self) -> Result<(Flow, StartReport), Error> {
         let Self { mesh, settings, initial, .. } = self;
-        match initial {
-            Initial::Field(field) => Flow::new(mesh, settings, field),
-            #[cfg(feature = "netcdf")]
-            Initial::Faces(faces) => Flow::from_face_velocities(mesh, settings, faces.each_ref().map(Vec::as_slice)),
-        }
-        .map_err(Error::Flow)
+        initial.start(mesh, settings).map_err(Error::Flow)
     }
 }
 

@@ -34,6 +34,14 @@ fn tiny(name: &str, text: &str) -> String {
     let time = table["time"].as_table_mut().unwrap();
     time.insert("pause_after_steps".into(), 3.into());
     // Few cells allow longer steps than those of the example; the output of the start is among the files.
+    if name == "wake" {
+        // Its outputs are by age; one of each kind comes within three steps.
+        let wake = table["wake"].as_table_mut().unwrap();
+        for key in ["fields_tau", "planes_tau"] {
+            wake.insert(key.into(), toml::Value::Array(vec![toml::Value::Float(0.0)]));
+        }
+        return toml::to_string(&table).unwrap();
+    }
     let output = table["output"].as_table_mut().unwrap();
     output.remove("every_s");
     output.insert("times_s".into(), toml::Value::Array(vec![toml::Value::Float(0.0)]));
@@ -113,6 +121,106 @@ fn an_interrupted_run_leaves_the_same_files_byte_for_byte_as_one_that_was_not() 
         }
     }
     assert!(whole["steps.csv"] == parts["steps.csv"], "the table with its head");
+}
+
+/// A small wake with records, fields, planes and checkpoints.
+fn small_wake(pause: Option<u64>) -> CaseFile {
+    let pause = pause.map_or(String::new(), |steps| format!("pause_after_steps = {steps}\n"));
+    let format = if cfg!(feature = "netcdf") { "netcdf" } else { "csv" };
+    parse(&format!(
+        "[case]\nkind = \"wake\"\npair = {{ from = \"a340\" }}\ncells = [6, 32, 24]\ncross_wind_m_s = 0.5\n\
+         [wake]\nend_tau = 0.2\nevery_tau = 0.04\nfields_tau = [0.1]\nplanes_tau = [0.0]\nseries_tau = [0.1, 0.2]\n\
+         series_every_tau = 0.05\n[time]\n{pause}[output]\nfields = [\"{format}\"]\nplanes = [\"{format}\"]\n\
+         [checkpoint]\nevery_steps = 5\n"
+    ))
+}
+
+#[test]
+fn an_interrupted_wake_leaves_the_same_histories_fields_and_planes() {
+    let folder = tempfile::tempdir().unwrap();
+    let [whole, parts] = ["whole", "parts"].map(|name| folder.path().join(name));
+    let outcome = run(&small_wake(None), &whole, Begin::New, &mut Unwatched).unwrap();
+    assert!(outcome.is_complete && outcome.steps > 12, "{outcome:?}");
+    run(&small_wake(Some(7)), &parts, Begin::New, &mut Unwatched).unwrap();
+    let last = run(&small_wake(None), &parts, Begin::Restart, &mut Unwatched).unwrap();
+    assert_eq!(last.steps, outcome.steps);
+    let (whole, parts) = (contents(&whole), contents(&parts));
+    let end = if cfg!(feature = "netcdf") { "nc" } else { "csv" };
+    assert!(whole["wake.csv"] == parts["wake.csv"] && whole["flow.checkpoint"] == parts["flow.checkpoint"]);
+    for name in ["plane1_0004", "fields_0001"].map(|stem| format!("{stem}.{end}")) {
+        assert!(whole[&name] == parts[&name], "{name}");
+    }
+    if cfg!(feature = "netcdf") {
+        assert!(whole["wake.nc"] == parts["wake.nc"]);
+    }
+    let text = String::from_utf8(whole["wake.csv"].clone()).unwrap();
+    let rows: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
+    assert_eq!(rows.len(), 7, "a header and the ages 0, 0.04, ..., 0.2");
+    let of = |row: usize, name: &str| -> f64 {
+        let at = rows[0].split(',').position(|n| n == name).unwrap_or_else(|| panic!("{name} in {}", rows[0]));
+        rows[row].split(',').nth(at).unwrap().parse().unwrap()
+    };
+    // The A340's pair: b0 = pi b/4.
+    let spacing_m = std::f64::consts::PI * 60.3 / 4.0;
+    assert!((of(1, "y_right_m") / of(1, "y_right") - spacing_m).abs() < 1e-9);
+    assert!((of(1, "y_left") + 0.5).abs() < 0.02 && (of(1, "z_right") - 1.0).abs() < 0.02);
+    assert!((of(6, "tau") - 0.2).abs() < 1e-12 && of(6, "z_left") < of(1, "z_left") - 0.05);
+    assert!(of(6, "gamma_5_15_left_m2_s") < 0.0 && of(6, "gamma_ratio_left") < 1.0);
+}
+
+#[cfg(feature = "netcdf")]
+#[test]
+fn the_history_of_a_wake_opens_with_its_axes() {
+    let folder = tempfile::tempdir().unwrap();
+    run(&small_wake(None), folder.path(), Begin::New, &mut Unwatched).unwrap();
+    let mut file = netcdf3::FileReader::open(folder.path().join("wake.nc")).unwrap();
+    let [tau, radius, mode] = ["tau", "radius", "mode"].map(|name| file.read_var_f64(name).unwrap());
+    assert_eq!((tau.len(), radius.len(), mode.len()), (6, 24, 4));
+    let gamma = file.read_var_f64("gamma").unwrap();
+    assert_eq!(gamma.len(), 6 * 2 * 24);
+    let scales = PairScale::A340 {}.scales().unwrap();
+    // At the start the right vortex has Gamma0 r^2/(r^2 + r_c^2); its sixteenth radius is 0.4 b0.
+    let share = gamma[24 + 15] / scales.circulation_m2_s;
+    assert!((share - 0.16 / 0.17).abs() < 0.03, "{share}");
+    assert_eq!(file.read_var_f64("y_centre").unwrap().len(), 6 * 2 * 6);
+    let mut field = netcdf3::FileReader::open(folder.path().join("fields_0001.nc")).unwrap();
+    let vorticity = field.read_var_f32("vorticity_magnitude").unwrap();
+    let largest = vorticity.iter().fold(0.0_f32, |a, b| a.max(*b));
+    assert!(f64::from(largest) > 10.0 / scales.time_unit_s(), "{largest}");
+}
+
+#[test]
+fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
+    let coarse = CaseFile::preset(WakePreset::Coarse).unwrap();
+    let text = example("wake").unwrap();
+    let mut commented = parse(text).case;
+    commented.time.courant = None;
+    commented.checkpoint.every_steps = None;
+    if cfg!(feature = "netcdf") {
+        assert_eq!(commented, coarse.case, "the commented example is the preset");
+    }
+    for preset in [WakePreset::Coarse, WakePreset::Medium, WakePreset::Fine, WakePreset::Chapter] {
+        let file = CaseFile::preset(preset).unwrap();
+        let CaseKind::Wake(flow) = &file.case.case else { panic!("{preset:?}") };
+        let mut pair = flow.pair_case().unwrap();
+        pair.subgrid = preset.pair().subgrid;
+        assert_eq!(pair, preset.pair());
+    }
+    let own = "[case]\nkind = \"wake\"\nreynolds = 1e4\npair = { from = \"a320\" }\n[wake]\nend_tau = 1.0\n\
+               fields_tau = []\nplanes_tau = []\n";
+    let file = CaseFile::parse_over(WakePreset::Medium, own, Path::new("case.toml")).unwrap();
+    let CaseKind::Wake(flow) = &file.case.case else { panic!() };
+    assert_eq!((flow.cells, flow.reynolds, flow.pair), ([48, 240, 128], 1e4, PairScale::A320 {}));
+    let over =
+        |text: &str| CaseFile::parse_over(WakePreset::Coarse, text, Path::new("c.toml")).unwrap_err().to_string();
+    let message = over("[case]\nkind = \"wake\"\ncore_radius = -0.1\n");
+    assert!(message.contains("c.toml:3") && message.contains("case.core_radius = -0.1"), "{message}");
+    let message = over("[case]\nkind = \"wake\"\n[wake]\nfields_tau = [9.0]\n");
+    assert!(message.contains("wake.fields_tau") && message.contains("wake.end_tau"), "{message}");
+    let message = refused("[case]\nkind = \"dipole\"\n[wake]\nevery_tau = 0.1\n");
+    assert!(message.contains("case.kind = \"wake\""), "{message}");
+    let message = refused("[case]\nkind = \"wake\"\n[output]\ntimes_s = [1.0]\n");
+    assert!(message.contains("output.times_s"), "{message}");
 }
 
 #[test]

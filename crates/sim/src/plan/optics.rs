@@ -2,7 +2,7 @@
 
 use super::{Cost, PlannedStage, Stage, Target};
 use crate::geometry::Geometry;
-use crate::profile::{model, spaced, turbulence};
+use crate::profile::{drawn_turbulence, model, spaced, turbulence};
 use crate::scan::profile_ranges_m;
 use crate::scene::{RefractiveTurbulence, Scene, SnrReference};
 use crate::{Error, join};
@@ -37,7 +37,7 @@ pub(super) fn stages(
     let screens = match turbulence(scene) {
         None => planned(Stage::PhaseScreens, "no turbulence: atmosphere.turbulence".into(), None),
         Some(t) => {
-            let drawn = layers.filter(|_| model == Model::MonteCarlo);
+            let drawn = layers.filter(|_| model == Model::MonteCarlo || drawn_turbulence(scene).is_some());
             let runs: Vec<Vec<f64>> = [table, drawn].into_iter().flatten().collect();
             match (runs.is_empty(), model) {
                 (false, _) => screens(scene, &t, &runs, warnings)?,

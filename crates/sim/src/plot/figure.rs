@@ -5,6 +5,7 @@ use super::curves::CurvePlot;
 use super::drawing::{Anchor, Drawing, Frame, Shape, Text};
 use super::font::Font;
 use super::frame::INK;
+use super::isosurface::IsosurfacePlot;
 use super::map::MapPlot;
 use super::{png_file, svg};
 use crate::export::{OutputError, OutputResult, Provenance};
@@ -19,6 +20,14 @@ pub enum Panel {
     Curves(CurvePlot),
     /// A map over distance and height.
     Map(MapPlot),
+    /// Surfaces in space.
+    Surfaces(IsosurfacePlot),
+}
+
+impl From<IsosurfacePlot> for Panel {
+    fn from(plot: IsosurfacePlot) -> Self {
+        Self::Surfaces(plot)
+    }
 }
 
 impl From<CurvePlot> for Panel {
@@ -95,7 +104,7 @@ impl Figure {
         png_file::png_bytes(&self.draw()?, provenance)
     }
 
-    fn draw(&self) -> OutputResult<Drawing> {
+    pub(crate) fn draw(&self) -> OutputResult<Drawing> {
         if self.columns == 0 || !(200.0..=10_000.0).contains(&self.width) {
             let value = format!("{} columns, width {}", self.columns, self.width);
             return Err(OutputError::value("figure", value, "at least one column, width 200 to 10000"));
@@ -120,6 +129,7 @@ impl Figure {
                 match panel {
                     Panel::Curves(plot) => plot.draw(cell, &font, &mut shapes)?,
                     Panel::Map(plot) => plot.draw(cell, &font, &mut shapes)?,
+                    Panel::Surfaces(plot) => plot.draw(cell, &font, &mut shapes)?,
                 }
             }
         }
@@ -136,6 +146,7 @@ impl Figure {
                 height = height.max(match panel {
                     Panel::Curves(plot) => plot.height(width)?,
                     Panel::Map(plot) => plot.height(width),
+                    Panel::Surfaces(plot) => plot.height(width),
                 });
             }
             let cell = |i: usize| Frame { left: MARGIN + i as f64 * width, top: *top, width, height };

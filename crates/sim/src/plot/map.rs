@@ -6,7 +6,7 @@ use super::colour::ColourMap;
 use super::drawing::{Anchor, Frame, Pen, Raster, Shape};
 use super::font::Font;
 use super::frame::{BOTTOM, Decor, INK, LEFT, TICK_SIZE, label, tick_mark, top_room, upward};
-use super::polar::PolarCells;
+use super::polar::{MapCells, PlaneCells, PolarCells};
 use crate::export::{OutputError, OutputResult, Unit, VelocityMap};
 
 /// Room to the right of the box, for the colour bar and its label.
@@ -25,7 +25,7 @@ pub struct MapPlot {
     /// Colours and their range.
     pub colours: ColourMap,
     /// Cells and values.
-    pub cells: PolarCells,
+    pub cells: MapCells,
     /// Whether the lidar and its way to the first gate are in the picture.
     pub show_lidar: bool,
     /// Points (y, z) in metres to mark, such as vortex centres.
@@ -55,9 +55,21 @@ impl MapPlot {
             bar_label: bar_label(&field.long_name, field.unit),
             colours: colours_for(&cells.values, signed),
             show_lidar: left - map.lidar_y_m < 0.5 * (right - left),
-            cells,
+            cells: MapCells::Polar(cells),
             points_m: Vec::new(),
         })
+    }
+
+    /// The picture of a field on a cross-plane; signed fields get symmetric colours.
+    pub fn of_plane(cells: PlaneCells, bar_label: &str, signed: bool) -> Self {
+        Self {
+            title: String::new(),
+            bar_label: bar_label.into(),
+            colours: colours_for(&cells.values, signed),
+            show_lidar: false,
+            cells: MapCells::Plane(cells),
+            points_m: Vec::new(),
+        }
     }
 
     /// The same map under another title.
@@ -81,13 +93,17 @@ impl MapPlot {
         self
     }
 
+    fn shown_lidar_m(&self) -> Option<(f64, f64)> {
+        self.cells.lidar_m().filter(|_| self.show_lidar)
+    }
+
     /// Box to show: (left, right), (lowest, highest), m.
     fn view_m(&self) -> ((f64, f64), (f64, f64)) {
         let (mut y, mut z) = self.cells.extent_m();
         z.0 = z.0.min(0.0);
-        if self.show_lidar {
-            y = (y.0.min(self.cells.lidar_m.0), y.1.max(self.cells.lidar_m.0));
-            z.1 = z.1.max(self.cells.lidar_m.1);
+        if let Some(lidar_m) = self.shown_lidar_m() {
+            y = (y.0.min(lidar_m.0), y.1.max(lidar_m.0));
+            z.1 = z.1.max(lidar_m.1);
         }
         let pad = 0.02 * (y.1 - y.0);
         ((y.0 - pad, y.1 + pad), (z.0 - pad, z.1 + pad))
@@ -144,8 +160,8 @@ impl MapPlot {
     }
 
     fn push_marks(&self, x: &Scale, y: &Scale, out: &mut Vec<Shape>) {
-        let lidar = (x.place(self.cells.lidar_m.0), y.place(self.cells.lidar_m.1));
-        if self.show_lidar {
+        if let Some(lidar_m) = self.shown_lidar_m() {
+            let lidar = (x.place(lidar_m.0), y.place(lidar_m.1));
             // A tripod on the ground, large enough to be seen when the telescope is low.
             let ground = y.place(0.0);
             let apex = (lidar.0, lidar.1.min(ground - 13.0));

@@ -6,11 +6,15 @@
 //! |---|---|
 //! | [`figure`] | panels side by side or stacked, as SVG text or PNG bytes |
 //! | [`curves`] | curves with bands and markers, linear or logarithmic |
-//! | [`map`] | one field of a sweep over distance and height, equal scales, with colour bar |
-//! | [`polar`] | (inside a map) pixels from polar cells |
+//! | [`map`] | one field of a sweep or of a plane over distance and height, equal scales, with colour bar |
+//! | [`polar`] | (inside a map) pixels from polar and rectangular cells |
+//! | [`isosurface`] | lit surfaces of equal value of a field in space |
+//! | [`volume`] | (inside it) rays through a mesh |
+//! | [`animation`] | pictures one after the other, as APNG |
 //! | [`colour`] | palette and colour maps |
 //! | [`html`] | the self-contained report page |
 
+pub mod animation;
 mod axis;
 pub mod colour;
 pub mod curves;
@@ -19,15 +23,19 @@ pub mod figure;
 mod font;
 mod frame;
 pub mod html;
+pub mod isosurface;
 mod legend;
 pub mod map;
 mod png_file;
 pub mod polar;
 mod svg;
+pub mod volume;
 
 pub use axis::Axis;
 pub use colour::ColourMap;
 pub use curves::{CurvePlot, Series, Style};
 pub use figure::{Figure, Panel};
 pub use html::{HtmlTable, Report, ReportEntry};
+pub use isosurface::{IsosurfacePlot, Surface};
 pub use map::MapPlot;
+pub use volume::Volume;

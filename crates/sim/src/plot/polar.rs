@@ -1,5 +1,5 @@
-//! Pixels of a scan: each pixel of a picture in metres takes the value of the polar cell (ray, gate) that it lies in.
-//! Cells reach half-way to their neighbours; the outer ones as far outward as inward.
+//! Pixels of a scan or of a plane: each pixel of a picture in metres takes the value of the cell that it lies in, polar (ray,
+//! gate) or rectangular. Cells reach half-way to their neighbours; the outer ones as far outward as inward.
 //! Check: the centre of every cell finds its own value, upward is up and away from the lidar is right.
 
 use super::colour::ColourMap;
@@ -55,8 +55,79 @@ impl PolarCells {
         }
         (y, z)
     }
+}
 
-    /// Picture of the box `y_m` x `z_m` with that many pixels; transparent outside the scan, the first row is the highest.
+/// Cells of a cross-plane.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaneCells {
+    /// Edges across, m, increasing, one more than cells.
+    pub y_edge_m: Vec<f64>,
+    /// Edges upward, m, increasing, one more than cells.
+    pub z_edge_m: Vec<f64>,
+    /// Values `[z][y]`.
+    pub values: Vec<f64>,
+}
+
+impl PlaneCells {
+    /// Cells about the centres `y_m` and `z_m` \[m\], increasing, with values `[z][y]`.
+    pub fn about(y_m: &[f64], z_m: &[f64], values: Vec<f64>) -> Self {
+        Self { y_edge_m: edges(y_m, 0.5), z_edge_m: edges(z_m, 0.5), values }
+    }
+
+    /// Value at a point; `None` outside.
+    pub fn at(&self, y_m: f64, z_m: f64) -> Option<f64> {
+        let (j, k) = (cell(&self.y_edge_m, y_m)?, cell(&self.z_edge_m, z_m)?);
+        self.values.get(k * (self.y_edge_m.len() - 1) + j).copied()
+    }
+}
+
+/// The cells of a map.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MapCells {
+    /// Of a scan.
+    Polar(PolarCells),
+    /// Of a plane.
+    Plane(PlaneCells),
+}
+
+impl MapCells {
+    /// Values in the order of the cells.
+    pub fn values(&self) -> &[f64] {
+        match self {
+            Self::Polar(cells) => &cells.values,
+            Self::Plane(cells) => &cells.values,
+        }
+    }
+
+    /// Horizontal position and height of the lidar, m, where there is one.
+    pub fn lidar_m(&self) -> Option<(f64, f64)> {
+        match self {
+            Self::Polar(cells) => Some(cells.lidar_m),
+            Self::Plane(_) => None,
+        }
+    }
+
+    /// Value at a point; `None` outside the cells, NaN where it is missing.
+    pub fn at(&self, y_m: f64, z_m: f64) -> Option<f64> {
+        match self {
+            Self::Polar(cells) => cells.at(y_m, z_m),
+            Self::Plane(cells) => cells.at(y_m, z_m),
+        }
+    }
+
+    /// Box around all cells: (left, right), (lowest, highest), m.
+    pub fn extent_m(&self) -> ((f64, f64), (f64, f64)) {
+        let ends = |edges: &[f64]| match edges {
+            [first, .., last] => (*first, *last),
+            _ => (f64::NAN, f64::NAN),
+        };
+        match self {
+            Self::Polar(cells) => cells.extent_m(),
+            Self::Plane(cells) => (ends(&cells.y_edge_m), ends(&cells.z_edge_m)),
+        }
+    }
+
+    /// Picture of the box `y_m` x `z_m` with that many pixels; transparent outside the cells, the first row is the highest.
     pub(crate) fn raster(
         &self,
         y_m: (f64, f64),
@@ -131,6 +202,16 @@ mod tests {
     }
 
     #[test]
+    fn cells_of_a_plane_reach_half_way_to_their_neighbours() {
+        let cells = PlaneCells::about(&[0.0, 1.0, 3.0], &[1.0, 2.0], vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(cells.at(-0.4, 0.6), Some(1.0));
+        assert_eq!(cells.at(1.9, 1.4), Some(2.0));
+        assert_eq!(cells.at(2.1, 1.6), Some(6.0));
+        assert_eq!((cells.at(4.1, 1.0), cells.at(0.0, 0.4)), (None, None));
+        assert_eq!(MapCells::Plane(cells).extent_m(), ((-0.5, 4.0), (0.5, 2.5)));
+    }
+
+    #[test]
     fn up_is_up_and_away_from_the_lidar_is_right() {
         // Two rays and two gates: low-near 1, low-far 2, high-near 3, high-far missing.
         let cells = PolarCells {
@@ -139,6 +220,7 @@ mod tests {
             elevation_edge_rad: vec![0.0, 0.5, 1.0],
             values: vec![1.0, 2.0, 3.0, f64::NAN],
         };
+        let cells = MapCells::Polar(cells);
         let colours = ColourMap::Sequential { low: 0.0, high: 3.0 };
         let raster = cells.raster((0.0, 30.0), (0.0, 30.0), (300, 300), &colours);
         let pixel = |range: f64, angle: f64| {

@@ -4,15 +4,39 @@ use serde::{Deserialize, Serialize};
 
 section! {
     /// Aerosol and refractive turbulence.
-    #[derive(Copy)]
     Atmosphere {
         /// Aerosol backscatter coefficient, 1/(m sr).
         backscatter_per_m_sr: f64 = 1e-7,
         /// Extinction coefficient, 1/m, one way.
         extinction_per_m: f64 = 7e-5,
+        /// Aerosol that changes with range, in place of the two values above.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        profile: Option<AirProfile> = None,
         /// Refractive turbulence.
         turbulence: Turbulence = Turbulence::None {},
     }
+}
+
+section! {
+    /// Aerosol along the lines of sight: straight lines between the ranges, beyond them as at the ends.
+    AirProfile {
+        /// Ranges, m, increasing.
+        range_m: Vec<f64> = Vec::new(),
+        /// Backscatter coefficient at each, 1/(m sr).
+        backscatter_per_m_sr: Vec<f64> = Vec::new(),
+        /// Extinction coefficient at each, 1/m, one way.
+        extinction_per_m: Vec<f64> = Vec::new(),
+    }
+}
+
+/// Which efficiency the pulses have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EfficiencyOfPulse {
+    /// All the mean.
+    Mean,
+    /// Each that of one realisation of the path, in turn.
+    Realisation,
 }
 
 /// Refractive turbulence along the beam.
@@ -49,6 +73,8 @@ section! {
         layers: usize = 10,
         /// Realisations of the path.
         realisations: usize = 400,
+        /// Which efficiency the pulses have.
+        efficiency: EfficiencyOfPulse = EfficiencyOfPulse::Mean,
     }
 }
 

@@ -3,7 +3,10 @@
 //! [`Scene::problems`] collects all violations, so that one run of `wakescope check` shows them
 //! all. Each names the key, the value and what is allowed.
 
-use super::{Estimator, FORMAT, Flow, Method, Scan, Scene, SnrReference, VortexMotion};
+use super::check_estimator::check_estimator;
+use super::{
+    Digitiser, EfficiencyOfPulse, FORMAT, Flow, PulseShape, Scan, Scene, SnrReference, Turbulence, VortexMotion,
+};
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Display;
 
@@ -25,10 +28,10 @@ impl Display for Problem {
 }
 
 #[derive(Default)]
-struct Checker(Vec<Problem>);
+pub(super) struct Checker(Vec<Problem>);
 
 impl Checker {
-    fn require(&mut self, ok: bool, key: &str, value: impl Display, allowed: impl Into<String>) -> bool {
+    pub(super) fn require(&mut self, ok: bool, key: &str, value: impl Display, allowed: impl Into<String>) -> bool {
         if !ok {
             self.0.push(Problem { key: key.into(), value: value.to_string(), allowed: allowed.into() });
         }
@@ -36,13 +39,13 @@ impl Checker {
     }
 
     /// Finite and in `[low, high]`.
-    fn within(&mut self, key: &str, value: f64, low: f64, high: f64, unit: &str) -> bool {
+    pub(super) fn within(&mut self, key: &str, value: f64, low: f64, high: f64, unit: &str) -> bool {
         let ok = value >= low && value <= high && value.is_finite();
         // `{:?}` writes 1e-9 where `{}` would write all the zeros.
         self.require(ok, key, format!("{value:?}"), format!("a number from {low:?} to {high:?} {unit}").trim_end())
     }
 
-    fn count(&mut self, key: &str, value: usize, low: usize, high: usize) -> bool {
+    pub(super) fn count(&mut self, key: &str, value: usize, low: usize, high: usize) -> bool {
         self.require((low..=high).contains(&value), key, value, format!("a whole number from {low} to {high}"))
     }
 }
@@ -57,7 +60,7 @@ impl Scene {
         self.check_instrument(&mut c);
         self.check_flow(&mut c);
         self.check_scan(&mut c);
-        check_estimator(&self.estimator, &mut c);
+        check_estimator(self, &mut c);
         self.check_outputs(&mut c);
         // Limits between keys make sense only once each key does.
         if c.0.is_empty() {
@@ -71,6 +74,16 @@ impl Scene {
         c.within("laser.pulse_repetition_hz", self.laser.pulse_repetition_hz, 1e-3, 1e6, "Hz");
         c.within("pulse.energy_j", self.pulse.energy_j, 1e-12, 1e3, "J");
         c.within("pulse.duration_s", self.pulse.duration_s, 1e-9, 1e-4, "s");
+        c.within("pulse.chirp_hz_s", self.pulse.chirp_hz_s, -1e18, 1e18, "Hz/s");
+        if let PulseShape::Sampled(shape) = &self.pulse.shape {
+            let phases = shape.phase_rad.len();
+            c.require(
+                shape.time_s.len() == shape.power.len() && (phases == 0 || phases == shape.time_s.len()),
+                "pulse.shape.time_s",
+                format!("{} values", shape.time_s.len()),
+                "as many as pulse.shape.power has, and phase_rad if it is given",
+            );
+        }
         let d = &self.detector;
         c.within("detector.bandwidth_hz", d.bandwidth_hz, 1e3, 1e11, "Hz");
         c.within("detector.intermediate_frequency_hz", d.intermediate_frequency_hz, 1e3, 1e11, "Hz");
@@ -79,6 +92,10 @@ impl Scene {
         c.within("detector.local_oscillator_w", d.local_oscillator_w, 1e-12, 1e3, "W");
         if let SnrReference::Fixed { snr_db } = d.snr {
             c.within("detector.snr.snr_db", snr_db, -100.0, 100.0, "dB");
+        }
+        if let Digitiser::Quantised { bits, full_scale_over_noise } = d.digitiser {
+            c.count("detector.digitiser.bits", bits as usize, 1, 32);
+            c.within("detector.digitiser.full_scale_over_noise", full_scale_over_noise, 1e-6, 1e12, "");
         }
         let t = &self.telescope;
         c.within("telescope.aperture_radius_m", t.aperture_radius_m, 1e-4, 10.0, "m");
@@ -96,21 +113,37 @@ impl Scene {
             t.focus_m,
             "a distance in m other than 0, or inf for a collimated beam",
         );
-        if let super::Turbulence::Refractive(t) = self.atmosphere.turbulence {
+        if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
             check_turbulence(&t, c);
+            c.require(
+                t.efficiency == EfficiencyOfPulse::Mean || !matches!(d.snr, SnrReference::Fixed { .. }),
+                "atmosphere.turbulence.efficiency",
+                "\"realisation\"",
+                "\"mean\" with detector.snr.reference = \"fixed\", which asks for no efficiency",
+            );
         }
         let a = &self.atmosphere;
         c.within("atmosphere.backscatter_per_m_sr", a.backscatter_per_m_sr, 0.0, 1.0, "1/(m sr)");
         c.within("atmosphere.extinction_per_m", a.extinction_per_m, 0.0, 1.0, "1/m");
+        // What is a profile of the air, or a sampled pulse, the simulation of signals knows best.
+        if let Err(e) = crate::join::medium(self) {
+            c.require(false, "atmosphere.profile", "the table", e.to_string());
+        }
+        if matches!(self.pulse.shape, PulseShape::Sampled(_))
+            && let Err(e) = crate::join::pulse(self)
+        {
+            c.require(false, "pulse.shape", "the table", e.to_string());
+        }
     }
 
     fn check_flow(&self, c: &mut Checker) {
-        match self.flow {
+        match &self.flow {
             Flow::Calm {} => {}
             Flow::Uniform { lateral_m_s, vertical_m_s } => {
-                c.within("flow.lateral_m_s", lateral_m_s, -1e3, 1e3, "m/s");
-                c.within("flow.vertical_m_s", vertical_m_s, -1e3, 1e3, "m/s");
+                c.within("flow.lateral_m_s", *lateral_m_s, -1e3, 1e3, "m/s");
+                c.within("flow.vertical_m_s", *vertical_m_s, -1e3, 1e3, "m/s");
             }
+            Flow::Simulated(flow) => check_simulated(flow, c),
             Flow::VortexPair(p) => {
                 c.within("flow.circulation_m2_s", p.circulation_m2_s, 0.0, 1e5, "m^2/s");
                 c.within("flow.spacing_m", p.spacing_m, 1e-2, 1e4, "m");
@@ -146,6 +179,11 @@ impl Scene {
         c.within("scan.range_max_m", s.range_max_m, 1.0, 1e6, "m");
         c.count("scan.pulses_per_line", s.pulses_per_line, 1, 1_000_000);
         c.count("scan.realisations", s.realisations, 1, 1_000_000);
+        for (key, outside) in [("below_ground", s.below_ground), ("outside_flow", s.outside_flow)] {
+            if let super::Outside::Constant { radial_velocity_m_s } = outside {
+                c.within(&format!("scan.{key}.radial_velocity_m_s"), radial_velocity_m_s, -1e3, 1e3, "m/s");
+            }
+        }
     }
 
     fn check_outputs(&self, c: &mut Checker) {
@@ -192,11 +230,12 @@ impl Scene {
         );
         let lowest_m = s.lidar_height_m + s.range_max_m * s.elevation_min_rad.sin();
         c.require(
-            lowest_m >= 0.0,
+            lowest_m >= 0.0 || s.below_ground != (super::Outside::Error {}),
             "scan.elevation_min_rad",
             s.elevation_min_rad,
             format!(
-                "at least {} rad; at scan.range_max_m the lowest line is {:.3} m below the ground",
+                "at least {} rad; at scan.range_max_m the lowest line is {:.3} m below the ground, which \
+                 scan.below_ground.policy = \"mask\" allows",
                 (-s.lidar_height_m / s.range_max_m).asin(),
                 -lowest_m
             ),
@@ -242,18 +281,38 @@ impl Scene {
         0.5 * crate::SPEED_OF_LIGHT_M_S / self.detector.sampling_hz
     }
 
-    /// The 1/e half width sigma of |f|^2 in (7), s.
+    /// The 1/e half width sigma of |f|^2 in (7), s; for a sampled pulse that of the Gaussian with the same spread.
     pub fn pulse_sigma_s(&self) -> f64 {
-        match self.pulse.definition {
-            super::PulseDefinition::Fwhm => self.pulse.duration_s / (2.0 * std::f64::consts::LN_2.sqrt()),
-            super::PulseDefinition::OneOverEHalfWidth => self.pulse.duration_s,
+        match (&self.pulse.shape, self.pulse.definition) {
+            (PulseShape::Sampled(_), _) => crate::join::pulse(self).map_or(f64::NAN, |pulse| pulse.sigma_s()),
+            (_, super::PulseDefinition::Fwhm) => self.pulse.duration_s / (2.0 * std::f64::consts::LN_2.sqrt()),
+            (_, super::PulseDefinition::OneOverEHalfWidth) => self.pulse.duration_s,
         }
     }
 
-    /// Half the range from which scatterers contribute to one sample, 3.72 sigma c/2, m.
+    /// How far before the range of a sample air contributes to it, c/2 times the last time of the pulse, m.
     pub fn pulse_reach_m(&self) -> f64 {
-        3.72 * self.pulse_sigma_s() * 0.5 * crate::SPEED_OF_LIGHT_M_S
+        crate::join::pulse(self).map_or(f64::NAN, |pulse| 0.5 * crate::SPEED_OF_LIGHT_M_S * pulse.support_s().1)
     }
+}
+
+fn check_simulated(flow: &super::SimulatedFlow, c: &mut Checker) {
+    c.require(
+        !flow.planes.is_empty(),
+        "flow.planes",
+        "\"\"",
+        "a file of cross-planes, or the beginning of the names of numbered ones",
+    );
+    if let Some(time_s) = flow.time_s {
+        c.within("flow.time_s", time_s, -1e9, 1e9, "s");
+        c.require(flow.age_tau.is_none(), "flow.time_s", time_s, "absent beside flow.age_tau");
+    }
+    if let Some(age_tau) = flow.age_tau {
+        c.within("flow.age_tau", age_tau, -1e9, 1e9, "");
+    }
+    c.within("flow.lateral_position_m", flow.lateral_position_m, -1e5, 1e5, "m");
+    c.within("flow.length_unit_m", flow.length_unit_m, 1e-6, 1e6, "m");
+    c.within("flow.velocity_unit_m_s", flow.velocity_unit_m_s, 1e-6, 1e6, "m/s");
 }
 
 fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker) {
@@ -273,16 +332,6 @@ fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker) {
     c.count(&key("layers"), t.layers, 1, 10_000);
     // The error of the bistatic mean is taken by leaving one out: two are too few.
     c.count(&key("realisations"), t.realisations, 3, 10_000_000);
-}
-
-fn check_estimator(e: &Estimator, c: &mut Checker) {
-    c.count("estimator.window_samples", e.window_samples, 4, 65_536);
-    c.count("estimator.window_step_samples", e.window_step_samples, 1, 1_000_000);
-    c.count("estimator.gate_step_samples", e.gate_step_samples, 1, 1_000_000);
-    c.count("estimator.padded_samples", e.padded_samples, e.window_samples, 1 << 22);
-    if e.method == Method::PeriodogramAccumulation {
-        c.within("estimator.radius_m", e.radius_m, 0.0, 1e5, "m");
-    }
 }
 
 #[cfg(test)]

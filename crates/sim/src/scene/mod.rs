@@ -21,14 +21,23 @@ pub(crate) use section;
 
 mod atmosphere;
 mod check;
+mod check_estimator;
+mod estimator;
 mod flow;
+mod instrument;
 mod read;
 
 pub use atmosphere::{
-    Atmosphere, OuterScaleWavenumber, RefractiveTurbulence, ScreenSampling, SpectrumKind, Turbulence,
+    AirProfile, Atmosphere, EfficiencyOfPulse, OuterScaleWavenumber, RefractiveTurbulence, ScreenSampling,
+    SpectrumKind, Turbulence,
 };
 pub use check::Problem;
-pub use flow::{Flow, VortexMotion, VortexPair, VortexProfile};
+pub use estimator::{CorrelogramForm, Estimator, Method, OrderChoice, Refinement, RegionRadius, Weighting};
+pub use flow::{Flow, Outside, SimulatedFlow, SimulatedMotion, VortexMotion, VortexPair, VortexProfile};
+pub use instrument::{
+    BeamRadiusDefinition, Detector, DetectorSignal, Digitiser, Laser, NoiseKind, Pulse, PulseDefinition,
+    PulseResampling, PulseShape, ReceiverPath, SampledShape, SnrReference, Telescope,
+};
 pub use read::{Located, SceneError, SceneFile};
 #[cfg(feature = "flow")]
 pub(crate) use read::{invalid, malformed};
@@ -71,123 +80,6 @@ section! {
 }
 
 section! {
-    /// The laser source.
-    Laser {
-        /// Wavelength, m.
-        wavelength_m: f64 = 1.55e-6,
-        /// Pulse repetition frequency, Hz.
-        pulse_repetition_hz: f64 = 400.0,
-    }
-}
-
-section! {
-    /// The transmitted pulse, (6)-(8).
-    Pulse {
-        /// Pulse energy at the telescope, before its aperture truncates the beam, J.
-        energy_j: f64 = 150e-6,
-        /// Pulse duration, s, as [`PulseDefinition`] has it.
-        duration_s: f64 = 200e-9,
-        /// What `duration_s` means.
-        definition: PulseDefinition = PulseDefinition::Fwhm,
-    }
-}
-
-/// What a pulse duration means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PulseDefinition {
-    /// Full width at half maximum of |f|^2: 2 sqrt(ln 2) sigma.
-    Fwhm,
-    /// Half width at 1/e of |f|^2: the sigma of (7) itself.
-    OneOverEHalfWidth,
-}
-
-section! {
-    /// Photodetector and digitiser, (12)-(14).
-    Detector {
-        /// Detector bandwidth B_w, Hz, centred on the intermediate frequency.
-        bandwidth_hz: f64 = 50e6,
-        /// Intermediate frequency f_c, Hz.
-        intermediate_frequency_hz: f64 = 80e6,
-        /// Sampling frequency, Hz.
-        sampling_hz: f64 = 250e6,
-        /// Quantum efficiency eta_Q.
-        quantum_efficiency: f64 = 1.0,
-        /// Power of the local oscillator on the detector, W. The SNR does not depend on it.
-        local_oscillator_w: f64 = 1e-3,
-        /// Spectrum of the shot noise.
-        noise: NoiseKind = NoiseKind::Band,
-        /// What sets the signal-to-noise ratio.
-        snr: SnrReference = SnrReference::Physical {},
-    }
-}
-
-/// Spectrum of the shot noise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NoiseKind {
-    /// Flat in the detector band, nothing outside, variance (13).
-    Band,
-    /// The same density up to half the sampling frequency.
-    White,
-    /// No noise, and no random numbers drawn for it.
-    None,
-}
-
-/// What sets the signal-to-noise ratio.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "reference", rename_all = "snake_case", deny_unknown_fields)]
-pub enum SnrReference {
-    /// (14) with Planck's constant h: the shot-noise limit.
-    Physical {},
-    /// (14) as the chapter prints it, with h/(2 pi): 8 dB more.
-    Chapter {},
-    /// The same value at every range, whatever the optics and the aerosol.
-    Fixed {
-        /// Signal-to-noise ratio in the detector band, dB.
-        snr_db: f64,
-    },
-}
-
-section! {
-    /// Telescope and beam.
-    Telescope {
-        /// Radius of the hard aperture, m.
-        aperture_radius_m: f64 = 0.05,
-        /// Radius of a central obscuration, m; 0 for none.
-        obscuration_radius_m: f64 = 0.0,
-        /// 1/e radius of the Gaussian beam at the aperture, m.
-        beam_radius_m: f64 = 0.03,
-        /// Whether `beam_radius_m` is that of the irradiance or of the field.
-        beam_radius_definition: BeamRadiusDefinition = BeamRadiusDefinition::Intensity,
-        /// Distance of the focus, m; `inf` for a collimated beam.
-        focus_m: f64 = f64::INFINITY,
-        /// Whether transmitted and received light cross the same turbulence.
-        receiver: ReceiverPath = ReceiverPath::Monostatic,
-    }
-}
-
-/// Whether transmitted and received light cross the same turbulence.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ReceiverPath {
-    /// One telescope: the same path out and back.
-    Monostatic,
-    /// Two telescopes: independent paths; in free space they are taken to coincide.
-    Bistatic,
-}
-
-/// Which 1/e radius is meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BeamRadiusDefinition {
-    /// Of the irradiance, |E|^2 ~ exp(-r^2/w^2).
-    Intensity,
-    /// Of the field, E ~ exp(-r^2/w^2).
-    Field,
-}
-
-section! {
     /// Where the lidar looks: a vertical scan (RHI) across the runway.
     Scan {
         /// Height of the telescope above the ground, m.
@@ -208,61 +100,11 @@ section! {
         pulses_per_line: usize = 16,
         /// Independent repetitions of the whole scan, for the errors.
         realisations: usize = 4,
+        /// What lines below the ground meet.
+        below_ground: Outside = Outside::Error {},
+        /// What lines that leave a simulated flow meet.
+        outside_flow: Outside = Outside::Error {},
     }
-}
-
-section! {
-    /// From signals to velocities.
-    Estimator {
-        /// Which estimator.
-        method: Method = Method::PeriodogramAccumulation,
-        /// Samples N of a window.
-        window_samples: usize = 64,
-        /// Weighting h of the window, (29).
-        weighting: Weighting = Weighting::Gaussian,
-        /// Samples between windows that are accumulated.
-        window_step_samples: usize = 1,
-        /// Samples between gates of the map.
-        gate_step_samples: usize = 5,
-        /// Points of the zero-padded spectrum; `window_samples` for the literal (29).
-        padded_samples: usize = 1024,
-        /// How the peak is refined between the points of the spectrum.
-        refinement: Refinement = Refinement::Parabola,
-        /// Radius of the circular region of accumulation, m.
-        radius_m: f64 = 2.0,
-    }
-}
-
-/// Which estimator makes the map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// Mean periodogram of the pulses of one line at one range.
-    Periodogram,
-    /// Mean periodogram of all windows within `radius_m` (Table 3).
-    PeriodogramAccumulation,
-}
-
-/// Weighting of the samples of a window.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Weighting {
-    /// Gaussian, as the chapter's default.
-    Gaussian,
-    /// All samples alike.
-    Rectangular,
-    /// Hann.
-    Hann,
-}
-
-/// How a spectral peak is refined between the points of the spectrum.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Refinement {
-    /// Parabola through the logarithms of three points.
-    Parabola,
-    /// None: the velocity of the highest point.
-    None,
 }
 
 section! {
@@ -308,6 +150,25 @@ impl Scene {
 mod tests {
     use super::*;
 
+    /// Keys that `wakescope init` does not write.
+    const RARE_KEYS: [&str; 15] = [
+        "chirp_hz_s",
+        "correlogram",
+        "follow_wind",
+        "gradient_max_per_s",
+        "gradients",
+        "kind",
+        "kind",
+        "kind",
+        "lag_window_lags",
+        "moment_reach",
+        "order",
+        "order_choice",
+        "policy",
+        "policy",
+        "signal",
+    ];
+
     #[test]
     fn commented_table2_is_the_default_scene() {
         let scene: Scene = toml::from_str(TABLE2_TOML).unwrap();
@@ -317,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn every_default_is_written_down() {
+    fn every_default_is_written_down_in_the_file_or_in_the_book() {
         let flat = |text: &str| {
             let mut keys: Vec<String> = text
                 .lines()
@@ -327,7 +188,25 @@ mod tests {
             keys.sort();
             keys
         };
-        assert_eq!(flat(TABLE2_TOML), flat(&Scene::default().to_toml()));
+        let (written, all) = (flat(TABLE2_TOML), flat(&Scene::default().to_toml()));
+        for key in &written {
+            assert!(all.contains(key), "{key} is no key");
+        }
+        let book = include_str!("../../../../docs/src/scene.md");
+        for key in &all {
+            assert!(book.contains(&format!("`{key}`")), "{key} is not in the book");
+        }
+        // What a first scene does not need stands in the book alone.
+        let mut rest = written.clone();
+        let mut is_rare = |key: &&String| match rest.iter().position(|w| w == *key) {
+            Some(place) => {
+                rest.remove(place);
+                false
+            }
+            None => true,
+        };
+        let rare: Vec<&String> = all.iter().filter(|key| is_rare(key)).collect();
+        assert_eq!(rare, RARE_KEYS);
     }
 
     #[test]

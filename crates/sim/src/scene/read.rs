@@ -66,6 +66,8 @@ pub struct SceneFile {
     pub toml: String,
     /// First 16 hexadecimal digits of the SHA-256 of `toml`.
     pub hash: String,
+    /// Folder to which names of files in the scene are relative.
+    pub folder: PathBuf,
 }
 
 impl SceneFile {
@@ -79,16 +81,17 @@ impl SceneFile {
         Self::parse(&text, path)
     }
 
-    /// Checks the text of a scene file; `path` only serves the error messages.
+    /// Checks the text of a scene file; `path` serves the error messages, and its folder is where files of the scene are looked for.
     ///
     /// # Errors
     /// As [`SceneFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
         let scene: Scene = toml::from_str(text).map_err(|e| malformed(text, path, &e))?;
-        Self::new(scene).map_err(|problems| invalid(text, path, problems))
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        Ok(Self { folder, ..Self::new(scene).map_err(|problems| invalid(text, path, problems))? })
     }
 
-    /// Checks a scene that was made in memory.
+    /// Checks a scene that was made in memory; its files are relative to the working folder.
     ///
     /// # Errors
     /// All problems of the scene.
@@ -99,7 +102,7 @@ impl SceneFile {
         }
         let toml = scene.to_toml();
         let hash = super::hash_of(&toml);
-        Ok(Self { scene, toml, hash })
+        Ok(Self { scene, toml, hash, folder: PathBuf::new() })
     }
 }
 

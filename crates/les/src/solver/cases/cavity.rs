@@ -2,7 +2,7 @@
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
-use super::Case;
+use super::{Case, Initial};
 use crate::Error;
 
 /// The unit square in y and z, at rest, whose lid z = 1 moves along y with speed 1; `1/reynolds` is the viscosity.
@@ -17,5 +17,5 @@ pub fn lid_driven_cavity(cells: usize, strength: f64, reynolds: f64) -> Result<C
     };
     let mesh = Mesh::new(Direction::thin(1.0), direction(Wall::AT_REST), direction(lid))?;
     let settings = FlowSettings::new(1.0 / reynolds, TimeStep::Courant { courant: 0.35, longest_s: 0.02 });
-    Ok(Case { mesh, settings, initial: Box::new(|_| [0.0; 3]), end_s: 60.0 })
+    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(|_| [0.0; 3])), end_s: 60.0 })
 }

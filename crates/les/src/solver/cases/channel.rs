@@ -2,7 +2,7 @@
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
-use super::Case;
+use super::{Case, Initial};
 use crate::Error;
 
 /// The plates at z = -1 and 1 with the velocities of the walls along x, `strength` 0 giving equal cells.
@@ -21,7 +21,7 @@ pub fn poiseuille(cells: usize, strength: f64, viscosity_m2_s: f64, share: f64, 
     let mut settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
     settings.force_m_s2 = [2.0 * viscosity_m2_s, 0.0, 0.0];
     let initial = move |at_m: [f64; 3]| [share * (1.0 - at_m[2].powi(2)), 0.0, 0.0];
-    Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 10.0 / viscosity_m2_s })
+    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 10.0 / viscosity_m2_s })
 }
 
 /// Couette's flow: plates at speeds -1 and 1 drag `u = z`; it starts from `share` of that profile.
@@ -33,7 +33,7 @@ pub fn couette(cells: usize, strength: f64, viscosity_m2_s: f64, share: f64, ste
     let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
     let initial = move |at_m: [f64; 3]| [share * at_m[2], 0.0, 0.0];
-    Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 10.0 / viscosity_m2_s })
+    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 10.0 / viscosity_m2_s })
 }
 
 /// Slowest decaying mode between plates at rest, `u = cos(pi z/2) exp(-nu pi^2 t/4)`, a Stokes layer without forcing.
@@ -45,7 +45,7 @@ pub fn decaying_layer(cells: usize, strength: f64, viscosity_m2_s: f64, step_s: 
     let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
     let initial = |at_m: [f64; 3]| [(0.5 * std::f64::consts::PI * at_m[2]).cos(), 0.0, 0.0];
-    Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 1.0 / viscosity_m2_s })
+    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 1.0 / viscosity_m2_s })
 }
 
 /// Rayleigh's problem: the low plate starts with speed 1 under a fluid at rest; the high plate is far away.
@@ -56,7 +56,7 @@ pub fn rayleigh_plate(cells: usize, strength: f64, viscosity_m2_s: f64, step_s: 
     let plates = between_plates(cells, strength, [1.0, 0.0]);
     let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
-    Ok(Case { mesh, settings, initial: Box::new(|_| [0.0; 3]), end_s: 0.05 / viscosity_m2_s })
+    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(|_| [0.0; 3])), end_s: 0.05 / viscosity_m2_s })
 }
 
 /// Turbulent channel flow in a box of `4 pi x 2 pi x 2`, driven by the force that balances the friction of
@@ -87,5 +87,5 @@ pub fn channel(cells: [usize; 3], strength: f64, reynolds_tau: f64) -> Result<Ca
         let w = -1.5 * (4.0 * y + x).cos() * shape;
         [mean + streaks, v, w]
     };
-    Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 20.0 })
+    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 20.0 })
 }

@@ -2,7 +2,7 @@
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
-use super::Case;
+use super::{Case, Initial};
 use crate::Error;
 
 /// Vorticity at the centres of the two vortices \[1/s\]: makes the energy of the box 2 and its enstrophy 800.
@@ -41,5 +41,5 @@ pub fn dipole_against_wall(cells: [usize; 2], strength: f64, reynolds: f64, clos
         }
         velocity
     };
-    Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 0.75 })
+    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 0.75 })
 }

@@ -6,6 +6,7 @@ mod cavity;
 mod channel;
 mod dipole;
 mod orr_sommerfeld;
+mod perturbation;
 mod taylor_green;
 mod vortex_pair;
 
@@ -23,6 +24,27 @@ use crate::{Error, Flow, StartReport};
 /// Velocity at a position \[m\], `(u, v, w)` \[m/s\].
 pub type InitialField = Box<dyn Fn([f64; 3]) -> [f64; 3] + Send + Sync>;
 
+/// What a flow starts from.
+pub enum Initial {
+    /// A formula.
+    Field(InitialField),
+    /// Velocities along x, y, z at the low faces of the cells, `[z][y][x]` \[m/s\].
+    Faces([Vec<f64>; 3]),
+}
+
+impl Initial {
+    /// The simulation that starts from this field.
+    ///
+    /// # Errors
+    /// As [`Flow::new`] and [`Flow::from_face_velocities`].
+    pub fn start(&self, mesh: Mesh, settings: FlowSettings) -> Result<(Flow, StartReport), Error> {
+        match self {
+            Self::Field(field) => Flow::new(mesh, settings, field),
+            Self::Faces(faces) => Flow::from_face_velocities(mesh, settings, faces.each_ref().map(Vec::as_slice)),
+        }
+    }
+}
+
 /// A flow ready to be simulated.
 pub struct Case {
     /// The mesh.
@@ -30,7 +52,7 @@ pub struct Case {
     /// The settings, which may be changed before the start.
     pub settings: FlowSettings,
     /// The initial field.
-    pub initial: InitialField,
+    pub initial: Initial,
     /// Time at which the literature ends \[s\].
     pub end_s: f64,
 }
@@ -41,7 +63,7 @@ impl Case {
     /// # Errors
     /// As [`Flow::new`].
     pub fn start(&self) -> Result<(Flow, StartReport), Error> {
-        Flow::new(self.mesh.clone(), self.settings.clone(), &self.initial)
+        self.initial.start(self.mesh.clone(), self.settings.clone())
     }
 }
 

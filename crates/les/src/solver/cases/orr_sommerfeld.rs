@@ -10,8 +10,8 @@ use num_complex::Complex;
 
 use super::super::mesh::{Direction, Mesh};
 use super::super::settings::{FlowSettings, TimeStep};
-use super::Case;
 use super::channel::between_plates;
+use super::{Case, Initial};
 use crate::Error;
 use crate::error::check;
 
@@ -79,7 +79,7 @@ impl TollmienSchlichting {
             let (u, w) = self.velocity(at_m[0], at_m[2]);
             [1.0 - at_m[2].powi(2) + amplitude * u, 0.0, amplitude * w]
         };
-        Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 60.0 })
+        Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 60.0 })
     }
 }
 

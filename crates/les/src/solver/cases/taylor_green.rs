@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
-use super::Case;
+use super::{Case, Initial};
 use crate::Error;
 
 /// The vortices of the plane on `cells` x `cells` of the unit square in y and z, stretched by sines of the amplitudes
@@ -20,7 +20,7 @@ pub fn taylor_green_plane(cells: usize, stretch: [f64; 2], viscosity_m2_s: f64, 
     let mesh = Mesh::new(Direction::thin(1.0), direction(stretch[0]), direction(stretch[1]))?;
     let initial = move |at_m: [f64; 3]| taylor_green_plane_exact(at_m, 0.0, viscosity_m2_s);
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
-    Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 1.0 })
+    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 1.0 })
 }
 
 /// Velocity of the vortices of the plane at any time: `v = sin(2 pi y) cos(2 pi z) exp(-8 pi^2 nu t)`.
@@ -56,5 +56,5 @@ fn in_space(direction: impl Fn() -> Direction, reynolds: f64) -> Result<Case, Er
     };
     let time_step = TimeStep::Courant { courant: 0.35, longest_s: 0.1 };
     let settings = FlowSettings::new(1.0 / reynolds, time_step);
-    Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 10.0 })
+    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 10.0 })
 }

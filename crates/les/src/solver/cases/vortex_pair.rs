@@ -1,22 +1,27 @@
 //! A wake-vortex pair that sinks towards the ground, in the units of the pair: `b0 = V0 = 1`, so that time is `tau` and
-//! `Gamma0 = 2 pi`.
+//! `Gamma0 = 2 pi`; [`VortexPairCase::scaled`] gives it any size.
 //!
 //! The field is the sum of the two vortices, their images below the ground and periodic copies of all; the projection makes
-//! it divergence-free and lets nothing through ground and top. The three-dimensional perturbation is the curl of a smooth
-//! potential given by a closed formula without random numbers, so that any code on any mesh can start from the same field.
+//! it divergence-free and lets nothing through ground and top. Noise makes it three-dimensional, a cross wind carries it.
+//!
+//! Check: symmetry of the plane flow to round-off, drift with the wind, scales; the flow against independent codes
+//! (`cargo xtask validate --only wake`).
 
 use std::f64::consts::TAU;
 
-use super::super::mesh::{Direction, Mapping, Mesh, Wall};
-use super::super::settings::{FlowSettings, TimeStep};
-use super::Case;
-use crate::error::check;
-use crate::{CirculationProfile, Error};
+use num_complex::Complex;
+use rayon::prelude::*;
 
-/// Amplitude factor of the perturbation at which each component has an rms of 0.01 `V0` within 0.3 `b0` of the vortices.
-const PERTURBATION_SCALE: f64 = 0.265_202_26;
-/// Modes of the perturbation.
-const MODES: usize = 48;
+use super::super::mesh::{Direction, Ends, Mapping, Mesh, Wall};
+use super::super::settings::{FlowSettings, TimeStep};
+use super::super::wake::WakeScales;
+use super::perturbation::Perturbation;
+use super::{Case, Initial};
+use crate::error::check;
+use crate::{CirculationProfile, Error, SubgridModel, TwoScale, WakeMeter};
+
+/// Where the pair is when the case ends, in `tau`.
+const END: f64 = 5.0;
 
 /// A vortex pair above a plane, lengths in `b0`, velocities in `V0`.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +32,8 @@ pub struct VortexPairCase {
     pub size: [f64; 3],
     /// Refinement of the mesh towards the ground, `a` of [`Mapping::TanhLow`]; 0 for equal cells.
     pub ground_stretch: f64,
+    /// Refinement of the mesh towards y = 0: its cells are `1 - a` of the mean there and `1 + a` at the sides.
+    pub lateral_stretch: f64,
     /// Height of both vortices.
     pub height: f64,
     /// Core radius, that of the largest tangential velocity.
@@ -39,19 +46,36 @@ pub struct VortexPairCase {
     pub sticky_ground: bool,
     /// Whether the sides at minus and plus half the width are frictionless planes instead of periodic.
     pub slip_sides: bool,
-    /// Root-mean-square of each component of the perturbation within 0.3 of the vortices; 0 for none.
+    /// Root-mean-square of each component of the noise within 0.3 of the vortices; 0 for none.
     pub perturbation: f64,
-    /// Cross wind along y, uniform; zero at a sticky ground after the first step. Needs periodic sides.
+    /// Seed of the noise and of the background turbulence; without one the noise is the closed formula of the reference.
+    pub seed: Option<u64>,
+    /// Root-mean-square of each component of turbulence that fills the box; 0 for none. Needs periodic sides.
+    pub background: f64,
+    /// Cross wind along y at the height of the vortices. Needs periodic sides.
     pub cross_wind: f64,
+    /// Roughness length of a logarithmic wind, `ln(1 + z/z0)`; 0 for the same wind at all heights, which a sticky ground
+    /// stops in the first step.
+    pub wind_roughness: f64,
+    /// Subgrid model.
+    pub subgrid: SubgridModel,
 }
 
 impl Default for VortexPairCase {
-    /// The coarse case of the independent reference: 24 x 128 x 80 cells, `Re_Gamma` 5000, `r_c` 0.1, noise 0.01.
+    /// [`VortexPairCase::coarse`].
     fn default() -> Self {
+        Self::coarse()
+    }
+}
+
+impl VortexPairCase {
+    /// The coarse case of the independent reference: 24 x 128 x 80 cells, `Re_Gamma` 5000, `r_c` 0.1, noise 0.01, no model.
+    pub fn coarse() -> Self {
         Self {
             cells: [24, 128, 80],
             size: [1.0, 4.0, 2.5],
             ground_stretch: 1.5,
+            lateral_stretch: 0.0,
             height: 1.0,
             core_radius: 0.1,
             profile: CirculationProfile::Algebraic,
@@ -59,163 +83,210 @@ impl Default for VortexPairCase {
             sticky_ground: true,
             slip_sides: false,
             perturbation: 0.01,
+            seed: None,
+            background: 0.0,
             cross_wind: 0.0,
+            wind_roughness: 0.0,
+            subgrid: SubgridModel::None,
         }
     }
-}
 
-impl VortexPairCase {
-    /// The case with the given way to step in time.
+    /// The case B of the independent reference: the flow of [`Self::coarse`] in a wider box on 48 x 240 x 128 cells.
+    pub fn medium() -> Self {
+        Self { cells: [48, 240, 128], size: [1.0, 5.0, 2.5], ..Self::coarse() }
+    }
+
+    /// `Re_Gamma` 2e4 and `r_c` 0.05 with the multiscale model on 64 x 256 x 144 cells refined about the vortices, a third of a
+    /// core radius and more: hours.
+    pub fn fine() -> Self {
+        Self {
+            cells: [64, 256, 144],
+            size: [1.0, 5.0, 2.5],
+            ground_stretch: 2.0,
+            lateral_stretch: 0.45,
+            core_radius: 0.05,
+            reynolds: 2e4,
+            subgrid: SubgridModel::MULTISCALE_WALE,
+            ..Self::coarse()
+        }
+    }
+
+    /// The chapter's flow with walls resolved: `Re_Gamma` 2e4, `r_c` 0.05, the multiscale model, 128 x 432 x 224 cells; days.
+    pub fn chapter() -> Self {
+        Self { cells: [128, 432, 224], size: [2.0, 6.0, 3.0], ground_stretch: 2.2, ..Self::fine() }
+    }
+
+    /// The profile of two scales whose span is that of an elliptically loaded wing, `b = 4 b0/pi`, and core that of the case.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a core too large for its span.
+    pub fn with_two_scales(self) -> Result<Self, Error> {
+        let span = 4.0 / std::f64::consts::PI;
+        let profile = CirculationProfile::TwoScale(TwoScale::new(span / self.core_radius)?);
+        Ok(Self { profile, ..self })
+    }
+
+    /// The case with the given way to step in time, in the units of the pair.
     ///
     /// # Errors
     /// Values out of range.
     pub fn case(self, time_step: TimeStep) -> Result<Case, Error> {
+        self.scaled(&WakeScales::REDUCED, time_step)
+    }
+
+    /// The case in SI units: the pair has the given spacing and circulation, and `time_step` is in seconds.
+    ///
+    /// # Errors
+    /// Values out of range.
+    pub fn scaled(self, scales: &WakeScales, time_step: TimeStep) -> Result<Case, Error> {
+        scales.validate()?;
+        self.validate()?;
+        let viscosity_m2_s = scales.circulation_m2_s / self.reynolds;
+        let mut settings = FlowSettings::new(viscosity_m2_s, time_step);
+        settings.subgrid = self.subgrid;
+        // The start is made in the units of the pair and scaled, so that it does not depend on its size.
+        let mesh = self.mesh(1.0)?;
+        let mut faces = self.faces(&mesh);
+        let speed_m_s = scales.descent_speed_m_s();
+        faces.iter_mut().flatten().for_each(|v| *v *= speed_m_s);
+        let end_s = END * scales.time_unit_s();
+        Ok(Case { mesh: self.mesh(scales.spacing_m)?, settings, initial: Initial::Faces(faces), end_s })
+    }
+
+    /// A meter for this case in the given size.
+    ///
+    /// # Errors
+    /// As [`WakeMeter::new`].
+    pub fn meter(&self, scales: &WakeScales) -> Result<WakeMeter, Error> {
+        let b0_m = scales.spacing_m;
+        let centres_m = [-0.5, 0.5].map(|y| [y * b0_m, self.height * b0_m]);
+        let meter = WakeMeter::new(&self.mesh(b0_m)?, scales.circulation_m2_s / self.reynolds, *scales, centres_m)?;
+        // Point vortices over a plane: dy/dtau = y^2/[2 z (y^2 + z^2)], dz/dtau = -z^2/[2 y (y^2 + z^2)].
+        let (y, z) = (0.5, self.height);
+        let scale = scales.descent_speed_m_s() / (2.0 * (y * y + z * z));
+        let drift_m_s = self.cross_wind * scales.descent_speed_m_s();
+        let [out_m_s, down_m_s] = [scale * y * y / z, -scale * z * z / y];
+        Ok(meter.moving_with([-1.0, 1.0].map(|side| [drift_m_s + side * out_m_s, down_m_s])))
+    }
+
+    fn validate(&self) -> Result<(), Error> {
         check("height", self.height, "positive, below the top", |h| h > 0.0 && h < self.size[2])?;
         check("core_radius", self.core_radius, "positive", |r| r > 0.0)?;
         check("reynolds", self.reynolds, "positive", |r| r > 0.0)?;
+        check("lateral_stretch", self.lateral_stretch, "from 0 to 0.9", |a| (0.0..=0.9).contains(&a))?;
         check("perturbation", self.perturbation, "zero or positive", |p| p >= 0.0)?;
+        check("wind_roughness", self.wind_roughness, "zero or positive", |r| r >= 0.0)?;
         let periodic = !self.slip_sides;
-        check("cross_wind", self.cross_wind, "zero between frictionless sides", |w| w == 0.0 || periodic)?;
-        let [length, width, height] = self.size;
-        let x =
-            if self.cells[0] == 1 { Direction::thin(length) } else { Direction::periodic(self.cells[0], 0.0, length) };
-        let y = if self.slip_sides {
-            Direction::between(self.cells[1], -0.5 * width, 0.5 * width, Wall::Slip, Wall::Slip)
-        } else {
-            Direction::periodic(self.cells[1], -0.5 * width, 0.5 * width)
-        };
-        let ground = if self.sticky_ground { Wall::AT_REST } else { Wall::Slip };
-        let z = Direction::between(self.cells[2], 0.0, height, ground, Wall::Slip);
-        let z = if self.ground_stretch == 0.0 {
-            z
-        } else {
-            z.stretched(Mapping::TanhLow { strength: self.ground_stretch })
-        };
-        let mesh = Mesh::new(x, y, z)?;
-        let settings = FlowSettings::new(TAU / self.reynolds, time_step);
-        let perturbation = (self.perturbation > 0.0).then(|| Perturbation::new(length, self.perturbation));
-        let initial = move |at_m: [f64; 3]| {
-            let mut velocity = self.pair(at_m[1], at_m[2]);
-            if let Some(perturbation) = &perturbation {
-                for (v, p) in velocity.iter_mut().zip(perturbation.velocity(at_m)) {
-                    *v += p;
-                }
-            }
-            velocity
-        };
-        Ok(Case { mesh, settings, initial: Box::new(initial), end_s: 5.0 })
+        check("background", self.background, "zero or positive, zero between frictionless sides", |b| {
+            b == 0.0 || (b > 0.0 && periodic)
+        })?;
+        check("cross_wind", self.cross_wind, "zero between frictionless sides", |w| w == 0.0 || periodic)
     }
 
-    /// Velocity of the vortices with their images and copies.
+    /// The mesh in units of `unit_m` \[m\].
+    fn mesh(&self, unit_m: f64) -> Result<Mesh, Error> {
+        let [length, width, height] = self.size.map(|l| l * unit_m);
+        let x =
+            if self.cells[0] == 1 { Direction::thin(length) } else { Direction::periodic(self.cells[0], 0.0, length) };
+        let mut y = Direction::periodic(self.cells[1], -0.5 * width, 0.5 * width);
+        if self.slip_sides {
+            y.ends = Ends::Walls { low: Wall::Slip, high: Wall::Slip };
+        }
+        if self.lateral_stretch != 0.0 {
+            y = y.stretched(Mapping::Sine { amplitude: self.lateral_stretch });
+        }
+        let ground = if self.sticky_ground { Wall::AT_REST } else { Wall::Slip };
+        let mut z = Direction::between(self.cells[2], 0.0, height, ground, Wall::Slip);
+        if self.ground_stretch != 0.0 {
+            z = z.stretched(Mapping::TanhLow { strength: self.ground_stretch });
+        }
+        Mesh::new(x, y, z)
+    }
+
+    /// The initial velocities at the low faces of the cells of the mesh, in the units of the pair.
+    fn faces(&self, mesh: &Mesh) -> [Vec<f64>; 3] {
+        let noise = (self.perturbation > 0.0)
+            .then(|| Perturbation::noise(self.size[0], self.height, self.perturbation, self.seed));
+        let background = (self.background > 0.0)
+            .then(|| Perturbation::background(self.size, self.background, self.seed.unwrap_or_default()));
+        let disturbances: Vec<Perturbation> = if self.cells[0] == 1 {
+            // Nothing varies along x in a plane flow.
+            Vec::new()
+        } else {
+            noise.into_iter().chain(background).collect()
+        };
+        let [nx, ny, _] = self.cells;
+        std::array::from_fn(|component| {
+            let at = |d: usize| if d == component { mesh.face_m(d) } else { mesh.centre_m(d) };
+            let (x, y, z) = (at(0), at(1), at(2));
+            // On the line where the box meets its copy the mean of both sides, so that left and right are alike.
+            let seam = (component == 1 && !self.slip_sides).then_some(y[0]);
+            let at_seam = |z: f64| 0.5 * (self.pair(y[0], z)[1] + self.pair(y[0] + self.size[1], z)[1]);
+            let mut field = vec![0.0; self.cells.iter().product()];
+            field.par_chunks_mut(nx * ny).zip(&z).for_each(|(plane, &z)| {
+                for (row, &y) in plane.chunks_mut(nx).zip(&y) {
+                    row.fill(if seam == Some(y) { at_seam(z) } else { self.pair(y, z)[component] });
+                    for disturbance in &disturbances {
+                        let waves = disturbance.row(component, y, z);
+                        for (value, x) in row.iter_mut().zip(&x) {
+                            *value += sum_of_waves(&waves, TAU * x / self.size[0]);
+                        }
+                    }
+                }
+            });
+            field
+        })
+    }
+
+    /// Velocity of the vortices with their images and copies, and of the wind.
     fn pair(&self, y: f64, z: f64) -> [f64; 3] {
-        let mut velocity = [0.0, self.cross_wind, 0.0];
+        let shear = |z: f64| if self.wind_roughness > 0.0 { (1.0 + z / self.wind_roughness).ln() } else { 1.0 };
+        let mut velocity = [0.0, self.cross_wind * shear(z) / shear(self.height), 0.0];
         // Planes mirror the pair, which is its own copy one width further; so copies serve both kinds of sides.
-        for copy in -2..=2 {
-            let shift = f64::from(copy) * self.size[1];
-            for (y0, sign) in [(-0.5, -1.0), (0.5, 1.0)] {
-                for (z0, sign) in [(self.height, sign), (-self.height, -sign)] {
-                    let (dy, dz) = (y - y0 - shift, z - z0);
+        for (y0, sign) in [(-0.5, -1.0), (0.5, 1.0)] {
+            for (z0, sign) in [(self.height, sign), (-self.height, -sign)] {
+                for copy in -NEAR_COPIES..=NEAR_COPIES {
+                    let (dy, dz) = (y - y0 - f64::from(copy) * self.size[1], z - z0);
                     let r2 = dy * dy + dz * dz;
                     let turn = sign * self.profile.angular_velocity_rad_s(TAU, self.core_radius, r2);
                     velocity[1] -= turn * dz;
                     velocity[2] += turn * dy;
                 }
+                let far = sign * far_copies(Complex::new(y - y0, z - z0), self.size[1]);
+                velocity[1] += far.im;
+                velocity[2] += far.re;
             }
         }
         velocity
     }
 }
 
-/// `C curl A`, `A_c = g(y, z) sum_n cos(k_n . x + phase_nc)/|k_n|`.
-#[derive(Debug, Clone)]
-struct Perturbation {
-    amplitude: f64,
-    modes: Vec<Mode>,
+/// Copies on each side that have a core.
+const NEAR_COPIES: i32 = 2;
+/// Copies on each side that are summed one by one; the rest is an integral.
+const FAR_COPIES: i32 = 40;
+
+/// `w + i v` of the point vortices of circulation 2 pi at `n` times `width` to both sides, `n` above [`NEAR_COPIES`], seen from
+/// `at = dy + i dz`: the sum of `1/(at - n width)`.
+fn far_copies(at: Complex<f64>, width: f64) -> Complex<f64> {
+    let square = at * at;
+    let pair = |n: i32| 2.0 * at / (square - (f64::from(n) * width).powi(2));
+    let sum: Complex<f64> = (NEAR_COPIES + 1..=FAR_COPIES).map(pair).sum();
+    sum - 2.0 * at / (width * width * (f64::from(FAR_COPIES) + 0.5))
 }
 
-#[derive(Debug, Clone)]
-struct Mode {
-    wave: [f64; 3],
-    inverse_length: f64,
-    phase: [f64; 3],
-}
-
-impl Perturbation {
-    fn new(length: f64, rms: f64) -> Self {
-        let fraction = |x: f64| x - x.floor();
-        let mode = |n: usize| {
-            let count = n as f64;
-            let axial = TAU * (1 + n % 8) as f64 / length;
-            let across = TAU * (0.5 + 3.5 * fraction(count * 0.618_033_988_749_894_9));
-            let angle = TAU * fraction(count * 2.0_f64.sqrt());
-            Mode {
-                wave: [axial, across * angle.cos(), across * angle.sin()],
-                inverse_length: 1.0 / axial.hypot(across),
-                phase: [7.0_f64, 11.0, 13.0].map(|s| TAU * fraction(count * s.sqrt())),
-            }
-        };
-        Self { amplitude: PERTURBATION_SCALE * rms, modes: (0..MODES).map(mode).collect() }
+/// The sum of waves at the angle of the first, by rotation from one to the next.
+fn sum_of_waves(waves: &[[f64; 2]], angle: f64) -> f64 {
+    let (step_sin, step_cos) = angle.sin_cos();
+    let (mut sin, mut cos) = (0.0, 1.0);
+    let mut sum = 0.0;
+    for [a, b] in waves {
+        sum += a * cos + b * sin;
+        (cos, sin) = (cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin);
     }
-
-    fn velocity(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
-        // The envelope and its slopes along y and z.
-        let near = 1.0 - (-(z / 0.2).powi(2)).exp();
-        let tops = (-(z / 1.6).powi(8) - (y / 1.6).powi(8)).exp();
-        let g = near * tops;
-        let by_y = -8.0 * y.powi(7) / 1.6_f64.powi(8) * g;
-        let by_z = 2.0 * z / 0.04 * (-(z / 0.2).powi(2)).exp() * tops - 8.0 * z.powi(7) / 1.6_f64.powi(8) * g;
-        let (mut potential, mut slope) = ([0.0; 3], [[0.0; 3]; 3]);
-        for mode in &self.modes {
-            let angle = mode.wave[0] * x + mode.wave[1] * y + mode.wave[2] * z;
-            for c in 0..3 {
-                let (sin, cos) = (angle + mode.phase[c]).sin_cos();
-                potential[c] += cos * mode.inverse_length;
-                for d in 0..3 {
-                    slope[c][d] -= sin * mode.inverse_length * mode.wave[d];
-                }
-            }
-        }
-        // d A_c/d d.
-        let envelope = [0.0, by_y, by_z];
-        let d = |c: usize, along: usize| g * slope[c][along] + envelope[along] * potential[c];
-        [d(2, 1) - d(1, 2), d(0, 2) - d(2, 0), d(1, 0) - d(0, 1)].map(|v| self.amplitude * v)
-    }
+    sum
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_perturbation_is_free_of_divergence_and_as_strong_as_stated() {
-        let perturbation = Perturbation::new(1.0, 0.01);
-        let h = 1e-5;
-        let at = |p: [f64; 3]| perturbation.velocity(p);
-        for p in [[0.1, 0.4, 0.9], [0.7, -0.6, 1.2], [0.3, 0.1, 0.15]] {
-            let slope = |d: usize| {
-                let (mut a, mut b) = (p, p);
-                a[d] += h;
-                b[d] -= h;
-                (at(a)[d] - at(b)[d]) / (2.0 * h)
-            };
-            assert!((slope(0) + slope(1) + slope(2)).abs() < 1e-8);
-        }
-        let (mut sum, mut count) = (0.0, 0);
-        for i in 0..20 {
-            for j in -12..=12 {
-                for k in -12..=12 {
-                    let (y, z) = (0.025 * f64::from(j), 0.025 * f64::from(k));
-                    if y.hypot(z) < 0.3 {
-                        for side in [-0.5, 0.5] {
-                            sum +=
-                                at([0.05 * f64::from(i), side + y, 1.0 + z]).iter().map(|v| v * v).sum::<f64>() / 3.0;
-                            count += 1;
-                        }
-                    }
-                }
-            }
-        }
-        let rms = (sum / f64::from(count)).sqrt();
-        assert!((rms / 0.01 - 1.0).abs() < 0.02, "rms {rms}");
-    }
-}
+#[path = "vortex_pair_tests.rs"]
+mod tests;

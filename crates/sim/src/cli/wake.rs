@@ -1,0 +1,50 @@
+//! `wakescope wake`: the wake of an aircraft near the ground, from a preset or a case file.
+
+use super::Cli;
+use super::flow::{RunWords, simulate};
+use crate::Error;
+use crate::flow::{CaseFile, CaseKind, WakePreset};
+use clap::Args;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Words of `wakescope wake`.
+#[derive(Debug, Args)]
+pub(super) struct WakeWords {
+    /// A case file with kind = "wake"; keys that it lacks are those of the preset.
+    case: Option<PathBuf>,
+    /// How fine the flow is; coarse without one, unless a case file is given.
+    #[arg(long, value_enum)]
+    preset: Option<WakePreset>,
+    /// Print the case file and do nothing else.
+    #[arg(long)]
+    print: bool,
+    #[command(flatten)]
+    run: RunWords,
+}
+
+pub(super) fn wake(words: &WakeWords, cli: &Cli) -> Result<(), Error> {
+    let file = case_file(words)?;
+    if !matches!(file.case.case, CaseKind::Wake(_)) {
+        let path = words.case.clone().unwrap_or_default();
+        return Err(Error::Input { path, reason: "case.kind is not \"wake\": wakescope flow runs it".into() });
+    }
+    if words.print {
+        let _ = std::io::stdout().lock().write_all(file.toml.as_bytes());
+        return Ok(());
+    }
+    simulate(&file, &words.run, cli)
+}
+
+fn case_file(words: &WakeWords) -> Result<CaseFile, Error> {
+    let Some(path) = &words.case else {
+        return Ok(CaseFile::preset(words.preset.unwrap_or(WakePreset::Coarse))?);
+    };
+    let Some(preset) = words.preset else { return CaseFile::read(path) };
+    let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
+        action: "read the case",
+        path: path.clone(),
+        source,
+    })?;
+    Ok(CaseFile::parse_over(preset, &text, path)?)
+}

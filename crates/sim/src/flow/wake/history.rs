@@ -1,0 +1,303 @@
+//! The history of a wake: records as the run goes, as a table and as NetCDF, kept whole in every checkpoint.
+//!
+//! A run that is resumed takes its rows from the checkpoint, not from the files, so that these come out the same, byte for byte.
+//!
+//! Check: tests of `flow` interrupt runs and compare the bytes; rows against the record they came from.
+
+use crate::Error;
+use crate::export::{Provenance, Table, write_atomic};
+use std::path::PathBuf;
+use wakescope_les::{Flow, VortexRecord, WakeMeter, WakeRecord, WakeScales};
+
+/// What a number is, for its unit and its scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    Length,
+    Gamma,
+    Rate,
+    Energy,
+    Enstrophy,
+    Number,
+}
+
+impl Kind {
+    fn suffix(self) -> &'static str {
+        match self {
+            Self::Length => "_m",
+            Self::Gamma => "_m2_s",
+            Self::Rate => "_per_s",
+            Self::Energy => "_m4_s2",
+            Self::Enstrophy => "_m2_s2",
+            Self::Number => "",
+        }
+    }
+
+    /// Its unit in the scales of the pair; circulations in `Gamma0`.
+    fn unit(self, scales: &WakeScales) -> f64 {
+        let speed = scales.descent_speed_m_s();
+        match self {
+            Self::Length => scales.spacing_m,
+            Self::Gamma => scales.circulation_m2_s,
+            Self::Rate => 1.0 / scales.time_unit_s(),
+            Self::Energy => (scales.spacing_m * speed).powi(2),
+            Self::Enstrophy => speed * speed,
+            Self::Number => 1.0,
+        }
+    }
+}
+
+type OfVortex = (&'static str, Kind, fn(&VortexRecord) -> f64);
+type OfFlow = (&'static str, Kind, fn(&WakeRecord) -> f64);
+
+/// Numbers of each vortex; the first is the one whose ratio to its start is given, too.
+const VORTEX: [OfVortex; 12] = [
+    ("gamma_5_15", Kind::Gamma, |v| v.gamma_5_15_m2_s),
+    ("y", Kind::Length, |v| v.y_m),
+    ("z", Kind::Length, |v| v.z_m),
+    ("y_spread", Kind::Length, |v| v.y_spread_m),
+    ("z_spread", Kind::Length, |v| v.z_spread_m),
+    ("gamma_opposite", Kind::Gamma, |v| v.gamma_opposite_m2_s),
+    ("secondary_gamma", Kind::Gamma, |v| v.secondary.gamma_m2_s),
+    ("secondary_y", Kind::Length, |v| v.secondary.y_m),
+    ("secondary_z", Kind::Length, |v| v.secondary.z_m),
+    ("secondary_y_spread", Kind::Length, |v| v.secondary.y_spread_m),
+    ("secondary_z_spread", Kind::Length, |v| v.secondary.z_spread_m),
+    ("outward_shear", Kind::Rate, |v| v.outward_shear_per_s),
+];
+/// Numbers of the flow.
+const FLOW: [OfFlow; 5] = [
+    ("energy", Kind::Energy, |r| r.energy_m4_s2),
+    ("energy_3d", Kind::Energy, WakeRecord::energy_3d_m4_s2),
+    ("enstrophy", Kind::Enstrophy, |r| r.enstrophy_m2_s2),
+    ("wall_shear", Kind::Rate, |r| r.wall_shear_per_s),
+    ("wall_units", Kind::Number, |r| r.wall_units),
+];
+const SIDES: [&str; 2] = ["left", "right"];
+/// Axial modes in the table; NetCDF has all.
+const TABLE_MODES: usize = 8;
+
+/// Lengths of the lists of a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Lengths {
+    radii: usize,
+    slices: usize,
+    modes: usize,
+}
+
+impl Lengths {
+    /// Where the lists begin in a row: circulations, centres, modes, and its length.
+    fn starts(self) -> [usize; 4] {
+        let gamma = 1 + 2 * VORTEX.len() + FLOW.len();
+        let slices = gamma + 2 * self.radii;
+        let modes = slices + 4 * self.slices;
+        [gamma, slices, modes, modes + self.modes]
+    }
+}
+
+/// The meter of a run, what it has found, and its files.
+#[derive(Debug)]
+pub(in super::super) struct WakeRun {
+    meter: WakeMeter,
+    scales: WakeScales,
+    radius_m: Vec<f64>,
+    lengths: Lengths,
+    #[cfg(feature = "netcdf")]
+    x_m: Vec<f64>,
+    /// Rows of numbers in SI units.
+    rows: Vec<Vec<f64>>,
+    folder: PathBuf,
+    origin: Provenance,
+}
+
+impl WakeRun {
+    /// An empty history of flows on the mesh of `flow`.
+    pub(in super::super) fn new(meter: WakeMeter, flow: &Flow, folder: PathBuf, origin: Provenance) -> Self {
+        let (scales, radius_m, x_m) = (*meter.scales(), meter.radii_m(), flow.mesh().centre_m(0));
+        let lengths = Lengths { radii: radius_m.len(), slices: x_m.len(), modes: x_m.len() / 2 + 1 };
+        Self {
+            meter,
+            scales,
+            radius_m,
+            lengths,
+            #[cfg(feature = "netcdf")]
+            x_m,
+            rows: Vec::new(),
+            folder,
+            origin,
+        }
+    }
+
+    /// Takes back what [`Self::kept`] gave.
+    pub(in super::super) fn restore(&mut self, bytes: &[u8]) -> Option<()> {
+        let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let (state, rows) = numbers.split_first_chunk::<12>()?;
+        let [.., length] = self.lengths.starts();
+        if rows.len() % length != 0 || !bytes.len().is_multiple_of(8) {
+            return None;
+        }
+        self.meter.restore(*state);
+        self.rows = rows.chunks(length).map(<[f64]>::to_vec).collect();
+        Some(())
+    }
+
+    /// What a checkpoint must keep.
+    pub(in super::super) fn kept(&self) -> Vec<u8> {
+        let state = self.meter.state();
+        state.iter().chain(self.rows.iter().flatten()).flat_map(|x| x.to_le_bytes()).collect()
+    }
+
+    /// Measures the flow and writes the table anew.
+    pub(in super::super) fn record(&mut self, flow: &Flow) -> Result<(), Error> {
+        let record = self.meter.measure(flow).map_err(Error::Flow)?;
+        let row = self.row(&record);
+        self.rows.push(row);
+        self.write_table()
+    }
+
+    /// The files of the history.
+    pub(in super::super) fn paths(&self) -> Vec<PathBuf> {
+        let netcdf = cfg!(feature = "netcdf").then(|| self.folder.join("wake.nc"));
+        std::iter::once(self.folder.join("wake.csv")).chain(netcdf).collect()
+    }
+
+    /// Writes the files of the whole history.
+    pub(in super::super) fn finish(&self) -> Result<(), Error> {
+        self.write_table()?;
+        #[cfg(feature = "netcdf")]
+        write_atomic(&self.folder.join("wake.nc"), self.netcdf()?)?;
+        Ok(())
+    }
+
+    fn row(&self, record: &WakeRecord) -> Vec<f64> {
+        let vortices = [&record.left, &record.right];
+        let mut row = vec![record.time_s];
+        row.extend(vortices.iter().flat_map(|v| VORTEX.map(|(_, _, of)| of(v))));
+        row.extend(FLOW.map(|(_, _, of)| of(record)));
+        row.extend(vortices.iter().flat_map(|v| v.gamma_m2_s.iter()));
+        for c in 0..2 {
+            row.extend(vortices.iter().flat_map(|v| v.slices_m.iter().map(move |slice| slice[c])));
+        }
+        row.extend(&record.mode_energy_m4_s2);
+        row
+    }
+
+    /// Names, kinds and places of the single numbers.
+    fn singles() -> impl Iterator<Item = (String, Kind, usize)> {
+        let vortex = |side: usize| {
+            let named = move |(i, (name, kind, _)): (usize, &OfVortex)| {
+                (format!("{name}_{}", SIDES[side]), *kind, 1 + side * VORTEX.len() + i)
+            };
+            VORTEX.iter().enumerate().map(named).collect::<Vec<_>>()
+        };
+        let flow =
+            FLOW.iter().enumerate().map(|(i, (name, kind, _))| (String::from(*name), *kind, 1 + 2 * VORTEX.len() + i));
+        vortex(0).into_iter().chain(vortex(1)).chain(flow)
+    }
+
+    fn column(&self, place: usize, unit: f64) -> Vec<f64> {
+        self.rows.iter().map(|row| row[place] / unit).collect()
+    }
+
+    fn tau(&self) -> Vec<f64> {
+        self.column(0, self.scales.time_unit_s())
+    }
+
+    /// SI columns with their units, then the same in the scales of the pair without.
+    fn table(&self) -> Table {
+        let [.., modes, _] = self.lengths.starts();
+        let shown = self.lengths.modes.min(TABLE_MODES + 1);
+        let mut table = Table::new().float("tau", self.tau()).float("time_s", self.column(0, 1.0));
+        for (side, name) in SIDES.iter().enumerate() {
+            let gamma = self.column(1 + side * VORTEX.len(), 1.0);
+            let first = gamma.first().copied().unwrap_or(f64::NAN);
+            table = table.float(&format!("gamma_ratio_{name}"), gamma.iter().map(|g| g / first));
+        }
+        for (name, kind, place) in Self::singles() {
+            table = table.float(&format!("{name}{}", kind.suffix()), self.column(place, 1.0));
+        }
+        for mode in 0..shown {
+            table = table.float(&format!("energy_mode_{mode}_m4_s2"), self.column(modes + mode, 1.0));
+        }
+        for (name, kind, place) in Self::singles().filter(|(_, kind, _)| *kind != Kind::Number) {
+            table = table.float(&name, self.column(place, kind.unit(&self.scales)));
+        }
+        for mode in 0..shown {
+            table =
+                table.float(&format!("energy_mode_{mode}"), self.column(modes + mode, Kind::Energy.unit(&self.scales)));
+        }
+        table
+    }
+
+    fn write_table(&self) -> Result<(), Error> {
+        Ok(write_atomic(&self.folder.join("wake.csv"), self.table().to_csv(&self.origin)?)?)
+    }
+
+    /// All lists over their axes, in SI units.
+    #[cfg(feature = "netcdf")]
+    fn netcdf(&self) -> Result<Vec<u8>, Error> {
+        use crate::export::netcdf::{Data, Layout, Variable};
+        let [gamma, slices, modes, end] = self.lengths.starts();
+        let part =
+            |from: usize, to: usize| self.rows.iter().flat_map(|row| row[from..to].to_vec()).collect::<Vec<f64>>();
+        let lists = |name: &str, dims: &'static [&'static str], values: Vec<f64>, units: &str, long_name: &str| {
+            Variable::new(name, dims, Data::F64(values)).text("units", units).text("long_name", long_name)
+        };
+        let middle = slices + 2 * self.lengths.slices;
+        let mut variables = vec![
+            lists("tau", &["tau"], self.tau(), "1", "age of the wake, t Gamma0 / (2 pi b0^2)"),
+            lists("time", &["tau"], self.column(0, 1.0), "s", "time since the start of the flow"),
+            lists("radius", &["radius"], self.radius_m.clone(), "m", "radius of a circle about the centre of a vortex"),
+            lists("x", &["x"], self.x_m.clone(), "m", "position along the flight direction"),
+            lists("vortex", &["vortex"], vec![0.0, 1.0], "1", "0: began at smaller y; 1: at larger y"),
+            lists(
+                "mode",
+                &["mode"],
+                (0..self.lengths.modes).map(|m| m as f64).collect(),
+                "1",
+                "waves along x in the box",
+            ),
+            lists(
+                "gamma",
+                &["tau", "vortex", "radius"],
+                part(gamma, slices),
+                "m2 s-1",
+                "circulation of the flow averaged along x; NaN where the circle leaves the flow",
+            ),
+            lists("y_centre", &["tau", "vortex", "x"], part(slices, middle), "m", "lateral position of the vortex"),
+            lists("z_centre", &["tau", "vortex", "x"], part(middle, modes), "m", "height of the vortex"),
+            lists(
+                "mode_energy",
+                &["tau", "mode"],
+                part(modes, end),
+                "m4 s-2",
+                "kinetic energy of an axial mode, per length of x",
+            ),
+        ];
+        for (name, kind, place) in Self::singles() {
+            let units = match kind {
+                Kind::Length => "m",
+                Kind::Gamma => "m2 s-1",
+                Kind::Rate => "s-1",
+                Kind::Energy => "m4 s-2",
+                Kind::Enstrophy => "m2 s-2",
+                Kind::Number => "1",
+            };
+            variables.push(Variable::new(&name, &["tau"], Data::F64(self.column(place, 1.0))).text("units", units));
+        }
+        let dims = vec![
+            ("tau", self.rows.len()),
+            ("vortex", 2),
+            ("radius", self.radius_m.len()),
+            ("x", self.x_m.len()),
+            ("mode", self.lengths.modes),
+        ];
+        let globals = vec![
+            ("Conventions", "CF-1.10".into()),
+            ("title", "History of a simulated wake".into()),
+            ("history", format!("written by {}", self.origin.program)),
+            ("spacing_m", format!("{:?}", self.scales.spacing_m)),
+            ("circulation_m2_s", format!("{:?}", self.scales.circulation_m2_s)),
+        ];
+        Ok(Layout { dims, globals, variables }.to_bytes(&self.origin)?)
+    }
+}

@@ -1,0 +1,103 @@
+//! At which output time what is written.
+//!
+//! Check: lists that share times, the series, the numbers of the files.
+
+use super::WakeOutput;
+
+/// Ages closer than this are the same.
+const SAME: f64 = 1e-6;
+
+/// What is due at one output time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(in super::super) struct Due {
+    /// A record of the wake.
+    pub(in super::super) record: bool,
+    /// Whole fields, with their number from 0.
+    pub(in super::super) fields: Option<usize>,
+    /// Planes, with their number from 0.
+    pub(in super::super) planes: Option<usize>,
+}
+
+/// The output times and what is due at each.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Schedule {
+    pub(in super::super) times_s: Vec<f64>,
+    pub(in super::super) due: Vec<Due>,
+}
+
+impl Schedule {
+    /// Fields and planes at all times.
+    pub(in super::super) fn plain(times_s: Vec<f64>) -> Self {
+        let due = (0..times_s.len()).map(|i| Due { record: false, fields: Some(i), planes: Some(i) }).collect();
+        Self { times_s, due }
+    }
+
+    /// The outputs of a wake whose `tau` grows by `tau_per_s` and which ends at `end_s`.
+    pub(in super::super) fn of_wake(output: &WakeOutput, tau_per_s: f64, end_s: f64) -> Self {
+        let end_tau = end_s * tau_per_s;
+        let every = |[from, to]: [f64; 2], step: f64| {
+            let count = ((to - from) / step + SAME).floor() as usize;
+            (0..=count).map(move |i| from + i as f64 * step).collect::<Vec<f64>>()
+        };
+        let mut planes = output.planes_tau.clone();
+        planes.extend(output.series_tau.map(|range| every(range, output.series_every_tau)).unwrap_or_default());
+        let lists = [every([0.0, end_tau], output.every_tau), output.fields_tau.clone(), planes];
+        let mut all: Vec<(f64, usize)> =
+            lists.iter().enumerate().flat_map(|(kind, list)| list.iter().map(move |tau| (*tau, kind))).collect();
+        all.retain(|(tau, _)| *tau <= end_tau + SAME);
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut schedule = Self { times_s: Vec::new(), due: Vec::new() };
+        let (mut last, mut fields, mut planes) = (f64::NEG_INFINITY, 0..usize::MAX, 0..usize::MAX);
+        for (tau, kind) in all {
+            if tau - last > SAME {
+                last = tau;
+                // The last age may be the end but for rounding.
+                let is_end = (tau - end_tau).abs() <= SAME;
+                schedule.times_s.push(if is_end { end_s } else { tau / tau_per_s });
+                schedule.due.push(Due::default());
+            }
+            if let Some(due) = schedule.due.last_mut() {
+                match kind {
+                    0 => due.record = true,
+                    1 => due.fields = due.fields.or_else(|| fields.next()),
+                    _ => due.planes = due.planes.or_else(|| planes.next()),
+                }
+            }
+        }
+        schedule
+    }
+
+    /// Times of the fields or planes that `number` picks \[s\].
+    #[cfg(feature = "vtk")]
+    pub(in super::super) fn times_of(&self, number: impl Fn(&Due) -> Option<usize>) -> Vec<f64> {
+        self.times_s.iter().zip(&self.due).filter(|(_, due)| number(due).is_some()).map(|(time_s, _)| *time_s).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_that_share_ages_are_joined_and_numbered() {
+        let output = WakeOutput {
+            every_tau: 0.5,
+            fields_tau: vec![1.0, 2.0],
+            planes_tau: vec![0.25, 1.5],
+            series_tau: Some([1.0, 1.5]),
+            series_every_tau: 0.25,
+            ..WakeOutput::default()
+        };
+        let schedule = Schedule::of_wake(&output, 0.1, 20.0);
+        let expected = [0.0, 2.5, 5.0, 10.0, 12.5, 15.0, 20.0];
+        assert_eq!(schedule.times_s.len(), expected.len());
+        assert!(schedule.times_s.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}", schedule.times_s);
+        let planes: Vec<Option<usize>> = schedule.due.iter().map(|d| d.planes).collect();
+        assert_eq!(planes, [None, Some(0), None, Some(1), Some(2), Some(3), None]);
+        let fields: Vec<Option<usize>> = schedule.due.iter().map(|d| d.fields).collect();
+        assert_eq!(fields, [None, None, None, Some(0), None, None, Some(1)]);
+        let records: Vec<bool> = schedule.due.iter().map(|d| d.record).collect();
+        assert_eq!(records, [true, false, true, true, false, true, true]);
+        assert_eq!(schedule.times_s[6], 20.0, "the end to the bit");
+    }
+}

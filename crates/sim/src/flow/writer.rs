@@ -1,0 +1,107 @@
+//! Writes what a run gives, as it goes, and keeps in its checkpoints what the files need to be continued.
+//!
+//! Check: the tests of `flow` interrupt runs and compare the bytes.
+
+use super::Watch;
+use super::files::Files;
+use super::steps::StepTable;
+use super::wake::{Schedule, WakeRun};
+use crate::Error;
+use std::path::PathBuf;
+use wakescope_les::{Flow, RunObserver, RunWarning, StepRecord};
+
+/// What a checkpoint keeps for the files.
+#[derive(Debug, Default)]
+pub(super) struct Kept {
+    /// The row of the table of the steps that waits.
+    pub(super) steps: Vec<u8>,
+    /// The history of a wake.
+    pub(super) wake: Vec<u8>,
+}
+
+impl Kept {
+    /// From the bytes of a checkpoint; those of a wake begin with the length of the row.
+    pub(super) fn read(bytes: &[u8], is_wake: bool) -> Self {
+        if !is_wake {
+            return Self { steps: bytes.to_vec(), wake: Vec::new() };
+        }
+        let Some((length, rest)) = bytes.split_first_chunk::<8>() else { return Self::default() };
+        let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
+        let (steps, wake) = rest.split_at_checked(length).unwrap_or_default();
+        Self { steps: steps.to_vec(), wake: wake.to_vec() }
+    }
+}
+
+/// Writes what the run gives.
+pub(super) struct Writer<'a> {
+    pub(super) files: Files,
+    pub(super) schedule: Schedule,
+    pub(super) steps: Option<StepTable>,
+    pub(super) wake: Option<WakeRun>,
+    pub(super) written: Vec<PathBuf>,
+    pub(super) warnings: Vec<String>,
+    pub(super) watch: &'a mut dyn Watch,
+    pub(super) start_s: f64,
+    pub(super) end_s: f64,
+    /// What stopped the run, in full.
+    pub(super) error: Option<Error>,
+}
+
+impl Writer<'_> {
+    fn keep<T>(&mut self, result: Result<T, Error>) -> Result<T, String> {
+        result.map_err(|error| {
+            let reason = error.to_string();
+            self.error = Some(error);
+            reason
+        })
+    }
+
+    /// Completes the tables.
+    pub(super) fn finish(&mut self) -> Result<(), Error> {
+        let steps = self.steps.as_mut().map_or(Ok(()), StepTable::finish);
+        let wake = self.wake.as_ref().map_or(Ok(()), WakeRun::finish);
+        steps.and(wake)
+    }
+}
+
+impl RunObserver for Writer<'_> {
+    fn step(&mut self, _: &Flow, record: &StepRecord) -> Result<(), String> {
+        let done = (record.report.time_s - self.start_s) / (self.end_s - self.start_s);
+        self.watch.step(done, record);
+        let pushed = self.steps.as_mut().map_or(Ok(()), |steps| steps.push(record));
+        self.keep(pushed)
+    }
+
+    fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
+        let due = self.schedule.due.get(index).copied().unwrap_or_default();
+        if due.record {
+            let recorded = self.wake.as_mut().map_or(Ok(()), |wake| wake.record(flow));
+            self.keep(recorded)?;
+        }
+        let written = self.files.write(flow, due);
+        let mut written = self.keep(written)?;
+        // A collection is written anew with each output.
+        written.retain(|path| !self.written.contains(path));
+        self.written.append(&mut written);
+        Ok(())
+    }
+
+    fn warning(&mut self, warning: &RunWarning) {
+        let text = match warning {
+            RunWarning::Courant { step, courant, limit } => {
+                format!("step {step} has Courant number {courant:.3}, near the limit {limit}: shorten the time step")
+            }
+            _ => format!("{warning:?}"),
+        };
+        self.watch.note(&text);
+        self.warnings.push(text);
+    }
+
+    fn user_data(&self) -> Vec<u8> {
+        let steps = self.steps.as_ref().map_or_else(Vec::new, StepTable::kept);
+        match &self.wake {
+            None => steps,
+            Some(wake) => [&(steps.len() as u64).to_le_bytes()[..], &steps, &wake.kept()].concat(),
+        }
+    }
+}

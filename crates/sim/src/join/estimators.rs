@@ -1,0 +1,280 @@
+//! The estimator of a scene in the words of `estimate`: statistic of the windows, estimator of their mean, models of both.
+
+use super::pulse;
+use crate::Error;
+use crate::scene::{
+    CorrelogramForm, DetectorSignal, Estimator as Words, Method, NoiseKind, OrderChoice, PulseShape, Refinement, Scene,
+    Weighting,
+};
+use ndarray::Array2;
+use num_complex::Complex;
+use wakescope_estimate as estimate;
+use wakescope_estimate::{Estimator, Sample, SignalKind, Statistic};
+
+/// The sampling of the records, in the words of the estimators.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn sampling(scene: &Scene) -> Result<estimate::Sampling, Error> {
+    let d = &scene.detector;
+    let lambda_m = scene.laser.wavelength_m;
+    let half_hz = 0.5 * d.bandwidth_hz;
+    let band_hz = (d.intermediate_frequency_hz - half_hz, d.intermediate_frequency_hz + half_hz);
+    Ok(match d.signal {
+        DetectorSignal::IntermediateFrequency => {
+            estimate::Sampling::new(d.sampling_hz, d.intermediate_frequency_hz, lambda_m, band_hz)?
+        }
+        DetectorSignal::Baseband => estimate::Sampling::baseband(d.sampling_hz, lambda_m, d.bandwidth_hz)?,
+    })
+}
+
+/// Whether the records are real or complex.
+pub fn signal_kind(scene: &Scene) -> SignalKind {
+    match scene.detector.signal {
+        DetectorSignal::IntermediateFrequency => SignalKind::Real,
+        DetectorSignal::Baseband => SignalKind::Complex,
+    }
+}
+
+/// The windows that are accumulated.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn gates(scene: &Scene) -> Result<estimate::Gates, Error> {
+    let e = &scene.estimator;
+    let first_sample_time_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
+    Ok(estimate::Gates::new(e.window_samples, e.window_step_samples, first_sample_time_s)?)
+}
+
+/// The weighting of the windows.
+pub fn weighting(scene: &Scene) -> estimate::Weighting {
+    match scene.estimator.weighting {
+        Weighting::Gaussian => estimate::Weighting::default(),
+        Weighting::Rectangular => estimate::Weighting::Rectangular,
+        Weighting::Hann => estimate::Weighting::Hann,
+    }
+}
+
+/// How a peak is refined.
+pub fn refinement(scene: &Scene) -> estimate::Refinement {
+    match scene.estimator.refinement {
+        Refinement::Parabola => estimate::Refinement::Parabola,
+        Refinement::Exact => estimate::Refinement::Exact,
+        Refinement::None => estimate::Refinement::None,
+    }
+}
+
+/// Real part of the autocorrelation of the pulse at a lag of its samples, its mean frequency taken out; 1 at lag 0.
+///
+/// `exp(-tau^2/(4 sigma^2))` for a Gaussian.
+fn pulse_correlation(scene: &Scene) -> Result<Vec<f64>, Error> {
+    let (count, period_s) = (scene.samples_per_record(), 1.0 / scene.detector.sampling_hz);
+    let pulse = pulse(scene)?;
+    let plain = scene.pulse.shape == (PulseShape::Gaussian {}) && scene.pulse.chirp_hz_s == 0.0;
+    if plain {
+        let lag = |m: usize| m as f64 * period_s / pulse.sigma_s();
+        return Ok((0..count).map(|m| (-0.25 * lag(m).powi(2)).exp()).collect());
+    }
+    // Fine enough for the spectrum of the pulse; the sum over a smooth pulse that ends at 0 converges fast.
+    let parts = (16.0 * pulse.spectral_width_hz() * period_s).ceil().max(1.0) as usize;
+    let step_s = period_s / parts as f64;
+    let (first_s, last_s) = pulse.support_s();
+    let steps = ((last_s - first_s) / step_s).ceil() as usize;
+    let turn = -std::f64::consts::TAU * pulse.mean_frequency_hz();
+    let at = |i: usize| {
+        let time_s = first_s + i as f64 * step_s;
+        pulse.envelope_per_sqrt_s(time_s) * Complex::from_polar(1.0, turn * time_s)
+    };
+    let envelope: Vec<Complex<f64>> = (0..=steps).map(at).collect();
+    let lag = |m: usize| -> f64 {
+        envelope.iter().skip(m * parts).zip(&envelope).map(|(late, early)| (late * early.conj()).re).sum()
+    };
+    let energy = lag(0);
+    Ok((0..count).map(|m| if m * parts <= steps { lag(m) / energy } else { 0.0 }).collect())
+}
+
+/// Second-order model of a window of the scene in a uniform wind, for likelihood and bound.
+///
+/// `None` without noise: no bound is above 0 then.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn window_model(scene: &Scene) -> Result<Option<estimate::WindowModel>, Error> {
+    let noise = match scene.detector.noise {
+        NoiseKind::White => estimate::Noise::White,
+        // A floor of a millionth keeps the covariance regular.
+        NoiseKind::Band => estimate::Noise::Band { floor: 1e-6 },
+        NoiseKind::None => return Ok(None),
+    };
+    let correlation = pulse_correlation(scene)?;
+    let n = scene.estimator.window_samples;
+    let at = |m: usize| correlation.get(m).copied().unwrap_or(0.0);
+    let envelope = Array2::from_shape_fn((n, n), |(a, b)| at(a.abs_diff(b)));
+    Ok(Some(estimate::WindowModel::with_envelope(&sampling(scene)?, envelope, noise)?))
+}
+
+/// Correlation between windows of one pulse: of the speckle, and of the noise at a signal-to-noise ratio `snr`.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn window_correlation(scene: &Scene, snr: f64) -> Result<estimate::WindowCorrelation, Error> {
+    let e = &scene.estimator;
+    let window = weighting(scene).weights(e.window_samples)?;
+    let d = &scene.detector;
+    let in_band_hz = match (d.noise, d.signal) {
+        (NoiseKind::White, DetectorSignal::IntermediateFrequency) => 0.5 * d.sampling_hz,
+        (NoiseKind::White, DetectorSignal::Baseband) => d.sampling_hz,
+        (NoiseKind::Band | NoiseKind::None, _) => d.bandwidth_hz,
+    };
+    let snr = if d.noise == NoiseKind::None { f64::INFINITY } else { snr };
+    // Without any return there is only noise, which a large finite ratio says as well.
+    let noise_to_signal = (in_band_hz / d.bandwidth_hz / snr).min(1e12);
+    let correlation = pulse_correlation(scene)?;
+    let covariance = |m: usize| correlation.get(m).copied().unwrap_or(0.0) + if m == 0 { noise_to_signal } else { 0.0 };
+    let samples = scene.samples_per_record();
+    Ok(estimate::WindowCorrelation::from_covariance(&window, e.window_step_samples, samples, covariance)?)
+}
+
+/// What is known of the windows before any is seen, for estimators that are planned for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowStatistics {
+    /// Signal-to-noise ratio in the detector band, a power ratio.
+    pub snr: f64,
+    /// Independent windows of a region in the middle of the scan.
+    pub n_eff: f64,
+}
+
+/// Statistic and estimator of a scene.
+pub struct Toolkit<S> {
+    /// Numbers of each window.
+    pub statistic: Box<dyn Statistic<S>>,
+    /// Velocity of their mean.
+    pub estimator: Box<dyn Estimator>,
+    /// The same for the complex mean of lines that were shifted, if the scene follows the wind.
+    pub following: Option<Box<dyn Estimator>>,
+}
+
+impl<S: Sample> Toolkit<S> {
+    /// Plans the estimator of a scene for samples of its kind.
+    ///
+    /// # Errors
+    /// What the estimators refuse, such as a covariance that cannot be diagonalised.
+    pub fn new(scene: &Scene, known: &WindowStatistics) -> Result<Self, Error> {
+        let e = &scene.estimator;
+        let snr = e.likelihood_snr_db.map_or(known.snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8);
+        match e.method {
+            Method::GradientLikelihood => gradient_likelihood(scene, snr),
+            Method::Likelihood => {
+                // The tapers are those of white noise and need no inverse, whatever the noise.
+                let mut white = scene.clone();
+                white.detector.noise = NoiseKind::White;
+                let model = window_model(&white)?.ok_or(estimate::Error::Empty { field: "noise" })?;
+                let statistic = estimate::Correlogram::<S>::with_tapers(estimate::likelihood_tapers(&model, snr)?)?;
+                let weights = statistic.lag_weights();
+                Self::planned(scene, Box::new(statistic), &weights, known)
+            }
+            Method::Autoregressive | Method::AutoregressivePole | Method::Capon
+                if e.weighting == Weighting::Rectangular =>
+            {
+                let statistic = estimate::ShortCorrelogram::<S>::new(e.window_samples, e.order + 1)?;
+                let weights = statistic.lag_weights();
+                Self::planned(scene, Box::new(statistic), &weights, known)
+            }
+            _ => {
+                let statistic = estimate::Correlogram::<S>::new(weighting(scene), e.window_samples)?;
+                let weights = statistic.lag_weights();
+                Self::planned(scene, Box::new(statistic), &weights, known)
+            }
+        }
+    }
+
+    fn planned(
+        scene: &Scene,
+        statistic: Box<dyn Statistic<S>>,
+        lag_weights: &[f64],
+        known: &WindowStatistics,
+    ) -> Result<Self, Error> {
+        let estimator = of_correlogram(scene, S::KIND, lag_weights, known)?;
+        let following = match scene.estimator.follow_wind {
+            true => Some(of_correlogram(scene, SignalKind::Complex, lag_weights, known)?),
+            false => None,
+        };
+        Ok(Self { statistic, estimator, following })
+    }
+}
+
+/// The estimator of a mean correlogram whose lags carry `lag_weights`.
+fn of_correlogram(
+    scene: &Scene,
+    kind: SignalKind,
+    lag_weights: &[f64],
+    known: &WindowStatistics,
+) -> Result<Box<dyn Estimator>, Error> {
+    let (e, sampling, refine) = (&scene.estimator, sampling(scene)?, refinement(scene));
+    let (lags, padded) = (lag_weights.len(), e.padded_samples);
+    let choice = order_choice(e, known);
+    match e.method {
+        Method::Periodogram | Method::PeriodogramAccumulation | Method::Likelihood | Method::GradientLikelihood => {
+            let peak = estimate::SpectralPeak::new(&sampling, kind, lags, padded, refine)?;
+            finish(e, kind, lag_weights, peak.with_lag_weights(lag_weights)?)
+        }
+        Method::Autoregressive => {
+            let peak = estimate::AutoregressivePeak::new(&sampling, kind, lags, e.order, padded, refine)?;
+            finish(e, kind, lag_weights, peak.choosing(choice))
+        }
+        Method::AutoregressivePole => {
+            let pole = estimate::AutoregressivePole::new(&sampling, kind, lags, e.order, padded, refine)?;
+            finish(e, kind, lag_weights, pole.choosing(choice))
+        }
+        Method::Capon => {
+            let peak = estimate::CaponPeak::new(&sampling, kind, lags, e.order, padded, refine)?;
+            finish(e, kind, lag_weights, peak.choosing(choice))
+        }
+        Method::LagWindow => {
+            let peak = estimate::LagWindowPeak::new(&sampling, kind, lags, e.lag_window_lags, padded, refine)?;
+            finish(e, kind, lag_weights, peak)
+        }
+        Method::PulsePair => finish(e, kind, lag_weights, estimate::PulsePair::new(&sampling, kind, lags)?),
+        Method::FirstMoment => {
+            let moment = estimate::FirstMoment::new(&sampling, kind, lags, padded, e.moment_reach)?;
+            finish(e, kind, lag_weights, moment)
+        }
+    }
+}
+
+/// The estimator itself, or on the unbiased correlogram.
+fn finish<E: Estimator + 'static>(
+    words: &Words,
+    kind: SignalKind,
+    lag_weights: &[f64],
+    estimator: E,
+) -> Result<Box<dyn Estimator>, Error> {
+    Ok(match words.correlogram {
+        CorrelogramForm::Biased => Box::new(estimator),
+        CorrelogramForm::Unbiased => Box::new(estimate::Unbiased::new(estimator, kind, lag_weights)?),
+    })
+}
+
+fn order_choice(e: &Words, known: &WindowStatistics) -> estimate::OrderChoice {
+    let samples = e.window_samples as f64 * known.n_eff.max(1.0);
+    match e.order_choice {
+        OrderChoice::Fixed => estimate::OrderChoice::Fixed,
+        OrderChoice::Aic => estimate::OrderChoice::Akaike { samples },
+        OrderChoice::Mdl => estimate::OrderChoice::DescriptionLength { samples },
+    }
+}
+
+fn gradient_likelihood<S: Sample>(scene: &Scene, snr: f64) -> Result<Toolkit<S>, Error> {
+    let e = &scene.estimator;
+    let noise = match scene.detector.noise {
+        NoiseKind::White => estimate::Noise::White,
+        NoiseKind::Band | NoiseKind::None => estimate::Noise::Band { floor: 0.0 },
+    };
+    let sampling = sampling(scene)?;
+    let model = estimate::GradientModel::new(&sampling, e.window_samples, pulse(scene)?.sigma_s(), noise)?;
+    let half = (e.gradients / 2) as f64;
+    let gradient = |k: usize| if half > 0.0 { e.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
+    let gradients: Vec<f64> = (0..e.gradients).map(gradient).collect();
+    let plan = estimate::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
+    Ok(Toolkit { statistic: Box::new(plan.statistic), estimator: Box::new(plan.estimator), following: None })
+}

@@ -1,0 +1,143 @@
+//! From signals to velocities: the estimator of a scene and its knobs.
+
+use serde::{Deserialize, Serialize};
+
+section! {
+    /// From signals to velocities.
+    Estimator {
+        /// Which estimator.
+        method: Method = Method::PeriodogramAccumulation,
+        /// Samples N of a window.
+        window_samples: usize = 64,
+        /// Weighting h of the window, (29).
+        weighting: Weighting = Weighting::Gaussian,
+        /// Samples between windows that are accumulated.
+        window_step_samples: usize = 1,
+        /// Samples between gates of the map.
+        gate_step_samples: usize = 5,
+        /// Points of the zero-padded spectrum; `window_samples` for the literal (29).
+        padded_samples: usize = 1024,
+        /// How the peak is refined between the points of the spectrum.
+        refinement: Refinement = Refinement::Parabola,
+        /// Radius of the circular region of accumulation, m.
+        radius_m: f64 = 2.0,
+        /// Order of autoregressive models and of Capon's filter; the largest one if it is chosen.
+        order: usize = 16,
+        /// How the order is found.
+        order_choice: OrderChoice = OrderChoice::Fixed,
+        /// Which correlogram the estimator is given.
+        correlogram: CorrelogramForm = CorrelogramForm::Biased,
+        /// Lag at which the window of `lag_window` falls to 0.
+        lag_window_lags: usize = 16,
+        /// Half width of the part of the spectrum that `first_moment` averages, in its standard deviations.
+        moment_reach: f64 = 3.5,
+        /// Signal-to-noise ratio for which the likelihoods are planned, dB; the scene's own if absent.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        likelihood_snr_db: Option<f64> = None,
+        /// Gradients of `gradient_likelihood` reach from minus to plus this, 1/s.
+        gradient_max_per_s: f64 = 0.6,
+        /// How many there are; odd, so that 0 is among them.
+        gradients: usize = 7,
+        /// Whether the lines of a region are shifted to the velocity of its centre before they are added, by a first map.
+        follow_wind: bool = false,
+        /// Probability that noise alone passes for a signal; estimates whose peak is not above it are flagged. Absent: no test.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        false_alarm: Option<f64> = None,
+        /// How the radius depends on range.
+        radius: RegionRadius = RegionRadius::Fixed {},
+    }
+}
+
+/// Which estimator makes the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Mean periodogram of the pulses of one line at one range, no region.
+    Periodogram,
+    /// PA: mean periodogram of all windows of the region (Table 3).
+    PeriodogramAccumulation,
+    /// CA: peak of the autoregressive spectrum of the mean correlogram (Table 3).
+    Autoregressive,
+    /// Pole of the same model that is nearest to the unit circle.
+    AutoregressivePole,
+    /// Peak of Capon's spectrum of the mean correlogram.
+    Capon,
+    /// Peak of the transform of the mean correlogram times a Hann window of lags.
+    LagWindow,
+    /// Phase of the first lag.
+    PulsePair,
+    /// Mean of the main peak of the spectrum.
+    FirstMoment,
+    /// Maximum likelihood of the velocity for the known pulse, by tapers.
+    Likelihood,
+    /// Maximum likelihood of velocity and gradient along the line of sight.
+    GradientLikelihood,
+}
+
+/// How the order of a model is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OrderChoice {
+    /// It is `order`.
+    Fixed,
+    /// Akaike's criterion.
+    Aic,
+    /// Rissanen's minimum description length.
+    Mdl,
+}
+
+/// Which correlogram.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CorrelogramForm {
+    /// Divided by the number of samples: positive semi-definite.
+    Biased,
+    /// Divided by the number of products; often no model of it exists.
+    Unbiased,
+}
+
+/// How the radius of the region depends on range.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum RegionRadius {
+    /// `radius_m` at every range.
+    Fixed {},
+    /// Straight lines between the points of a table; beyond its ends as at the ends.
+    OfRange {
+        /// Ranges, m, increasing.
+        range_m: Vec<f64>,
+        /// Radius at each, m.
+        radius_m: Vec<f64>,
+    },
+    /// The smallest for which the bound on the velocity reaches a standard deviation.
+    Target {
+        /// That standard deviation, m/s.
+        standard_deviation_m_s: f64,
+        /// Largest radius, m.
+        largest_m: f64,
+    },
+}
+
+/// Weighting of the samples of a window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Weighting {
+    /// Gaussian, as the chapter's default.
+    Gaussian,
+    /// All samples alike.
+    Rectangular,
+    /// Hann.
+    Hann,
+}
+
+/// How a spectral peak is refined between the points of the spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Refinement {
+    /// Parabola through the logarithms of three points.
+    Parabola,
+    /// Maximum of the exact spectrum, where the estimator is a spectrum; else as the parabola.
+    Exact,
+    /// None: the velocity of the highest point.
+    None,
+}

@@ -1,0 +1,191 @@
+//! The instrument of a scene: laser, pulse, detector, telescope.
+
+use serde::{Deserialize, Serialize};
+
+section! {
+    /// The laser source.
+    Laser {
+        /// Wavelength, m.
+        wavelength_m: f64 = 1.55e-6,
+        /// Pulse repetition frequency, Hz.
+        pulse_repetition_hz: f64 = 400.0,
+    }
+}
+
+section! {
+    /// The transmitted pulse, (6)-(8).
+    Pulse {
+        /// Pulse energy at the telescope, before its aperture truncates the beam, J.
+        energy_j: f64 = 150e-6,
+        /// Pulse duration, s, as [`PulseDefinition`] has it.
+        duration_s: f64 = 200e-9,
+        /// What `duration_s` means.
+        definition: PulseDefinition = PulseDefinition::Fwhm,
+        /// Rate of the linear chirp, Hz/s: the frequency rises by it.
+        chirp_hz_s: f64 = 0.0,
+        /// Shape of |f|^2; one that is sampled has its own duration.
+        shape: PulseShape = PulseShape::Gaussian {},
+    }
+}
+
+/// Shape of the pulse.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum PulseShape {
+    /// The Gaussian (7) of `duration_s`.
+    Gaussian {},
+    /// A table.
+    Sampled(SampledShape),
+}
+
+section! {
+    /// A pulse given by samples.
+    SampledShape {
+        /// Times of the samples, s, increasing.
+        time_s: Vec<f64> = Vec::new(),
+        /// Power |f|^2 at these times, in any unit.
+        power: Vec<f64> = Vec::new(),
+        /// Phase of f at these times, rad; empty for none.
+        phase_rad: Vec<f64> = Vec::new(),
+        /// How the envelope is continued between the samples.
+        resampling: PulseResampling = PulseResampling::CubicSpline,
+        /// Whether ranges count from the centroid of the power instead of from time 0.
+        centred: bool = true,
+    }
+}
+
+/// How a sampled envelope is continued between its samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PulseResampling {
+    /// The cubic spline.
+    CubicSpline,
+    /// The function without frequencies beyond half the sampling rate; evenly spaced times only.
+    BandLimited,
+    /// Straight lines.
+    Linear,
+}
+
+/// What a pulse duration means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PulseDefinition {
+    /// Full width at half maximum of |f|^2: 2 sqrt(ln 2) sigma.
+    Fwhm,
+    /// Half width at 1/e of |f|^2: the sigma of (7) itself.
+    OneOverEHalfWidth,
+}
+
+section! {
+    /// Photodetector and digitiser, (12)-(14).
+    Detector {
+        /// Detector bandwidth B_w, Hz, centred on the intermediate frequency.
+        bandwidth_hz: f64 = 50e6,
+        /// Intermediate frequency f_c, Hz.
+        intermediate_frequency_hz: f64 = 80e6,
+        /// Sampling frequency, Hz.
+        sampling_hz: f64 = 250e6,
+        /// Quantum efficiency eta_Q.
+        quantum_efficiency: f64 = 1.0,
+        /// Power of the local oscillator on the detector, W. The SNR does not depend on it.
+        local_oscillator_w: f64 = 1e-3,
+        /// Spectrum of the shot noise.
+        noise: NoiseKind = NoiseKind::Band,
+        /// What the receiver delivers.
+        signal: DetectorSignal = DetectorSignal::IntermediateFrequency,
+        /// The analogue-to-digital converter.
+        digitiser: Digitiser = Digitiser::None {},
+        /// What sets the signal-to-noise ratio.
+        snr: SnrReference = SnrReference::Physical {},
+    }
+}
+
+/// What the receiver delivers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DetectorSignal {
+    /// The real current at the intermediate frequency.
+    IntermediateFrequency,
+    /// Two quadratures about zero frequency.
+    Baseband,
+}
+
+/// The analogue-to-digital converter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Digitiser {
+    /// Samples are neither rounded nor clipped.
+    None {},
+    /// Rounding to 2^bits codes, and saturation.
+    Quantised {
+        /// Bits of a sample.
+        bits: u32,
+        /// Full scale over the root mean square (13) of the shot noise in the detector band.
+        full_scale_over_noise: f64,
+    },
+}
+
+/// Spectrum of the shot noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseKind {
+    /// Flat in the detector band, nothing outside, variance (13).
+    Band,
+    /// The same density up to half the sampling frequency.
+    White,
+    /// No noise, and no random numbers drawn for it.
+    None,
+}
+
+/// What sets the signal-to-noise ratio.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "reference", rename_all = "snake_case", deny_unknown_fields)]
+pub enum SnrReference {
+    /// (14) with Planck's constant h: the shot-noise limit.
+    Physical {},
+    /// (14) as the chapter prints it, with h/(2 pi): 8 dB more.
+    Chapter {},
+    /// The same value at every range, whatever the optics and the aerosol.
+    Fixed {
+        /// Signal-to-noise ratio in the detector band, dB.
+        snr_db: f64,
+    },
+}
+
+section! {
+    /// Telescope and beam.
+    Telescope {
+        /// Radius of the hard aperture, m.
+        aperture_radius_m: f64 = 0.05,
+        /// Radius of a central obscuration, m; 0 for none.
+        obscuration_radius_m: f64 = 0.0,
+        /// 1/e radius of the Gaussian beam at the aperture, m.
+        beam_radius_m: f64 = 0.03,
+        /// Whether `beam_radius_m` is that of the irradiance or of the field.
+        beam_radius_definition: BeamRadiusDefinition = BeamRadiusDefinition::Intensity,
+        /// Distance of the focus, m; `inf` for a collimated beam.
+        focus_m: f64 = f64::INFINITY,
+        /// Whether transmitted and received light cross the same turbulence.
+        receiver: ReceiverPath = ReceiverPath::Monostatic,
+    }
+}
+
+/// Whether transmitted and received light cross the same turbulence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReceiverPath {
+    /// One telescope: the same path out and back.
+    Monostatic,
+    /// Two telescopes: independent paths; in free space they are taken to coincide.
+    Bistatic,
+}
+
+/// Which 1/e radius is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BeamRadiusDefinition {
+    /// Of the irradiance, |E|^2 ~ exp(-r^2/w^2).
+    Intensity,
+    /// Of the field, E ~ exp(-r^2/w^2).
+    Field,
+}

@@ -1,0 +1,251 @@
+//! Maps drawn towards a fitted wake, against the velocity weighted with the pulse and with pulse and window.
+
+use crate::pair_scene::{FIRST_SAMPLE_M, SAMPLES, STEP_RAD, Scene, WINDOW};
+use ndarray::{Array2, Axis};
+use wakescope_estimate::vortex_fit::{
+    FreeParameters, MapFitOptions, PulseShape, RangeKernel, ScanSetup, Sharing, SignalFitOptions, VelocityMap, Wake,
+    WakeModel, fit_map, fit_signals,
+};
+use wakescope_estimate::*;
+use wakescope_les::{CirculationProfile, Ground, Motion, Sum, VortexPair, Wind};
+use wakescope_signal::NoiseModel;
+
+/// Radius of the regions \[m\].
+const RADIUS_M: f64 = 2.0;
+/// Grid of the kernels \[m\].
+const GRID_M: f64 = 0.6;
+
+/// Root-mean-square errors over scans: against the pulse's velocity within 8 m of a core and beyond 30 m, against the gate's within 8 m.
+#[derive(Debug, Default, Clone, Copy)]
+struct Errors {
+    squares: [f64; 3],
+    counts: [f64; 3],
+}
+
+impl Errors {
+    fn add(&mut self, scene: &Scene, pulse_m_s: &Array2<f64>, gate_m_s: &Array2<f64>) {
+        let all = pulse_m_s.iter().zip(gate_m_s).enumerate();
+        for (i, (pulse, gate)) in all {
+            let mut take = |place: usize, error: f64| {
+                self.squares[place] += error * error;
+                self.counts[place] += 1.0;
+            };
+            if scene.distance_m[i] < 8.0 {
+                take(0, pulse - scene.v_pulse_m_s[i]);
+                take(2, gate - scene.v_gate_m_s[i]);
+            } else if scene.distance_m[i] > 30.0 {
+                take(1, pulse - scene.v_pulse_m_s[i]);
+            }
+        }
+    }
+
+    fn rms(&self) -> [f64; 3] {
+        [0, 1, 2].map(|k| (self.squares[k] / self.counts[k]).sqrt())
+    }
+}
+
+struct Guided<'s> {
+    scene: &'s Scene,
+    snr: f64,
+    gate: RangeKernel,
+    pulse: RangeKernel,
+}
+
+fn sigma_s(pulse_s: f64) -> f64 {
+    pulse_s / (2.0 * 2.0_f64.ln().sqrt())
+}
+
+impl<'s> Guided<'s> {
+    fn new(scene: &'s Scene, snr: f64) -> Self {
+        let period_s = scene.sampling.period_s();
+        let gate = RangeKernel::gaussian_gate(sigma_s(200e-9), &[1.0; WINDOW], period_s, GRID_M).unwrap();
+        // a window of one sample lies c T_s / 4 before the range of its gate
+        let reach = (0.5 * SPEED_OF_LIGHT_M_S * 4.0 * sigma_s(200e-9) / GRID_M).ceil() as i64;
+        let weight = |i: i64| (-(2.0 * i as f64 * GRID_M / SPEED_OF_LIGHT_M_S / sigma_s(200e-9)).powi(2)).exp();
+        let weights: Vec<f64> = (-reach..=reach).map(weight).collect();
+        let pulse = RangeKernel::new(-(reach as f64) * GRID_M, GRID_M, &weights).unwrap();
+        Self { scene, snr, gate, pulse }
+    }
+
+    fn scan(&self, records: &Array2<f64>, weighting: Weighting, lines: &[usize]) -> Scan {
+        let statistic = Correlogram::<f64>::new(weighting, WINDOW).unwrap();
+        let chosen = records.select(Axis(0), lines);
+        let elevation_rad: Vec<f64> = lines.iter().map(|&line| self.scene.elevation_rad[line]).collect();
+        Scan::new(&statistic, &self.scene.sampling, &self.scene.gates, &elevation_rad, chosen.view()).unwrap()
+    }
+
+    fn map(&self, scan: &Scan, estimator: &dyn Estimator) -> Array2<f64> {
+        let found = scan.map(&self.scene.points, &Radius::Fixed { radius_m: RADIUS_M }, None, estimator).unwrap();
+        let velocity = found.iter().map(|p| p.estimate.velocity_m_s).collect();
+        Array2::from_shape_vec((self.scene.elevation_rad.len(), self.scene.range_m.len()), velocity).unwrap()
+    }
+
+    /// The wake that fits the map of lag-window peaks, and with `signals` all raw signals after it.
+    fn wake(&self, records: &Array2<f64>, signals: bool) -> Result<Wake, Error> {
+        let all: Vec<usize> = (0..self.scene.elevation_rad.len()).collect();
+        let (sampling, kind) = (&self.scene.sampling, SignalKind::Real);
+        let lag_window = LagWindowPeak::new(sampling, kind, WINDOW, 16, 1024, Refinement::Parabola).unwrap();
+        let velocity_m_s = self.map(&self.scan(records, Weighting::default(), &all), &lag_window);
+        let window = Weighting::default().weights(WINDOW).unwrap();
+        let (period_s, sigma_s) = (sampling.period_s(), sigma_s(200e-9));
+        let line = RangeKernel::line_width_m_s(sampling.wavelength_m, sigma_s, 64e-9, Some(64e-9)).unwrap();
+        let kernel = RangeKernel::gaussian_gate(sigma_s, &window, period_s, 1.2).unwrap().seen_as_peak(line).unwrap();
+        let map = VelocityMap {
+            elevation_rad: &self.scene.elevation_rad,
+            range_m: &self.scene.range_m,
+            velocity_m_s: velocity_m_s.view(),
+            standard_deviation_m_s: None,
+        };
+        let free = FreeParameters { core_radius: Sharing::Common, ..FreeParameters::common_circulation() };
+        let options = MapFitOptions { free, ..Default::default() };
+        let mut found = fit_map(&map, &WakeModel::default(), &kernel, &options)?.wake;
+        if signals {
+            let setup = ScanSetup {
+                sampling: *sampling,
+                kind,
+                noise: Noise::Band { floor: 0.0 },
+                pulse: PulseShape::gaussian(sigma_s).unwrap(),
+                wake: WakeModel::default(),
+                elevation_rad: self.scene.elevation_rad.clone(),
+                first_sample_time_s: 2.0 * FIRST_SAMPLE_M / SPEED_OF_LIGHT_M_S,
+                record_samples: SAMPLES,
+            };
+            let noise = self.scene.receiver.noise_variance_a2();
+            let options = SignalFitOptions { free, ..Default::default() };
+            found = fit_signals(&setup, |_, _| self.snr, records.view(), noise, &found, &options)?.wake;
+        }
+        Ok(found)
+    }
+
+    /// Maps against the pulse's and the gate's velocity, drawn towards a wake; towards rest without one.
+    fn guided(&self, records: &Array2<f64>, wake: Option<&Wake>, options: &ShrinkageOptions) -> [Array2<f64>; 2] {
+        let moment = FirstMoment::new(&self.scene.sampling, SignalKind::Real, WINDOW, 512, 3.5).unwrap();
+        let lines = self.scene.elevation_rad.len();
+        let map = |lines: Vec<usize>| self.map(&self.scan(records, Weighting::Rectangular, &lines), &moment);
+        let whole = map((0..lines).collect());
+        let halves = [map((0..lines).step_by(2).collect()), map((1..lines).step_by(2).collect())];
+        let half_difference = 0.5 * (&halves[0] - &halves[1]);
+        let of = |kernel: &RangeKernel, radius_m: f64| match wake {
+            Some(wake) => WakeModel::default()
+                .map(wake, kernel, &self.scene.elevation_rad, &self.scene.range_m, radius_m)
+                .unwrap(),
+            None => Array2::zeros(whole.dim()),
+        };
+        let seen = of(&self.gate, RADIUS_M);
+        [&self.pulse, &self.gate].map(|wanted| {
+            let wanted = of(wanted, 0.0);
+            shrink_to_guess(whole.view(), half_difference.view(), seen.view(), wanted.view(), options)
+                .unwrap()
+                .velocity_m_s
+        })
+    }
+}
+
+fn options(scene: &Scene) -> ShrinkageOptions {
+    let gate_spacing_m = scene.range_m[1] - scene.range_m[0];
+    ShrinkageOptions::for_map(400.0 * STEP_RAD, gate_spacing_m, RADIUS_M, 15.0).unwrap()
+}
+
+/// Errors over scans of maps guided by a fit of the map, by one of all signals, by that fit alone, and of CA.
+fn measured(scene: &Scene, snr: f64, seeds: std::ops::Range<u64>, signals: bool) -> Vec<(&'static str, Errors)> {
+    let guided = Guided::new(scene, snr);
+    let shrunk = options(scene);
+    let mut all = ["guided by the map", "guided by the signals", "wake alone", "first moment", "CA"]
+        .map(|name| (name, Errors::default()))
+        .to_vec();
+    for seed in seeds {
+        let records = scene.records(seed);
+        let by_map = guided.wake(&records, false).ok();
+        let by_signals = if signals { guided.wake(&records, true).ok() } else { by_map };
+        let unguided = ShrinkageOptions { factor: 0.0, ..shrunk };
+        let nothing_else = ShrinkageOptions { factor: 1e9, ..shrunk };
+        let runs = [(by_map, shrunk), (by_signals, shrunk), (by_signals, nothing_else), (None, unguided)];
+        for ((_, errors), (wake, options)) in all.iter_mut().zip(runs) {
+            let [pulse, gate] = guided.guided(&records, wake.as_ref(), &options);
+            errors.add(scene, &pulse, &gate);
+        }
+        let lines = (0..scene.elevation_rad.len()).collect::<Vec<_>>();
+        let peak = AutoregressivePeak::new(&scene.sampling, SignalKind::Real, WINDOW, 16, 2048, Refinement::Parabola);
+        let ca = guided.map(&guided.scan(&records, Weighting::Rectangular, &lines), &peak.unwrap());
+        all[4].1.add(scene, &ca, &ca);
+    }
+    all
+}
+
+#[test]
+fn a_map_guided_by_the_fit_of_its_signals_is_within_1_3_m_s_inside_and_better_than_ca_outside() {
+    let scene = Scene::new(200e-9, 0.0, NoiseModel::BandLimited);
+    let found = measured(&scene, 1.0, 0..1, true);
+    let ([inside, outside, gate], [.., ca_outside, _]) = (found[1].1.rms(), found[4].1.rms());
+    assert!(inside < 1.3 && outside < ca_outside && gate < 0.9, "{found:?}");
+}
+
+/// Two vortices that the fit does not know of come out of the data at 10 dB, somewhat blurred; the fitted wake alone has nothing there.
+#[test]
+fn vortices_that_no_fit_knows_of_come_out_of_the_data() {
+    let found = measured(&distorted(10.0), 10.0, 0..1, false);
+    let [guided, _, alone, data, ca] = [0, 1, 2, 3, 4].map(|k| found[k].1.rms());
+    assert!(guided[0] < 0.65 * alone[0] && guided[0] < 0.65 * ca[0] && guided[0] < 2.0 * data[0], "{found:?}");
+    assert!(guided[1] < data[1] && guided[1] < ca[1] && guided[2] < 0.5 * alone[2], "{found:?}");
+}
+
+/// `SCANS` and `SNR_DB` in the environment change the number of scans (4) and the signal-to-noise ratio (0), `UNKNOWN` adds vortices that the fit
+/// does not know of, about which the errors are then taken.
+///
+/// `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture errors_of_guided_maps`
+#[test]
+#[ignore = "minutes: measures errors over scans"]
+fn errors_of_guided_maps_over_scans() {
+    let number = |name, default: f64| std::env::var(name).map_or(default, |text| text.parse().unwrap());
+    let (scans, snr_db) = (number("SCANS", 4.0) as u64, number("SNR_DB", 0.0));
+    let scene = match std::env::var("UNKNOWN") {
+        Ok(_) => distorted(snr_db),
+        Err(_) => Scene::new(200e-9, snr_db, NoiseModel::BandLimited),
+    };
+    let mut means = vec![(0.0, 0.0); 15];
+    for seed in 0..scans {
+        let found = measured(&scene, 10f64.powf(0.1 * snr_db), seed..seed + 1, true);
+        for (k, (_, errors)) in found.iter().enumerate() {
+            for (j, rms) in errors.rms().into_iter().enumerate() {
+                means[3 * k + j].0 += rms * rms;
+                means[3 * k + j].1 += rms.powi(4);
+            }
+        }
+        let n = (seed + 1) as f64;
+        for (k, (name, _)) in found.iter().enumerate() {
+            let show = |j: usize| {
+                let (mean, squares) = (means[3 * k + j].0 / n, means[3 * k + j].1 / n);
+                let error = ((squares - mean * mean).max(0.0) / (n - 1.0).max(1.0)).sqrt() / (2.0 * mean.sqrt());
+                format!("{:.3} +- {error:.3}", mean.sqrt())
+            };
+            println!("{n} scans, {name:<22} inside {}, outside {}, gate inside {}", show(0), show(1), show(2));
+        }
+    }
+}
+
+/// The pair with a second, smaller one above it that no fit knows of; distances are those to the smaller one's cores.
+fn distorted(snr_db: f64) -> Scene {
+    let pair = VortexPair {
+        circulation_m2_s: 500.0,
+        spacing_m: 47.0,
+        core_radius_m: 2.35,
+        lateral_position_m: 400.0,
+        height_m: 47.0,
+        ground: Ground::Image,
+        profile: CirculationProfile::Algebraic,
+        motion: Motion::Frozen,
+    };
+    let small =
+        VortexPair { circulation_m2_s: 250.0, spacing_m: 25.0, lateral_position_m: 420.0, height_m: 80.0, ..pair };
+    let winds: Vec<Box<dyn Wind>> = vec![Box::new(pair.wind().unwrap()), Box::new(small.wind().unwrap())];
+    let mut scene = Scene::of_wind(200e-9, snr_db, NoiseModel::BandLimited, &Sum { winds });
+    for (point, distance_m) in scene.points.iter().zip(&mut scene.distance_m) {
+        let (sin, cos) = point.elevation_rad.sin_cos();
+        let to = |y_m: f64| (point.range_m * cos - y_m).hypot(point.range_m * sin - 80.0);
+        let near_m = to(407.5).min(to(432.5));
+        // outside is outside of both pairs
+        let elsewhere = *distance_m > 30.0;
+        *distance_m = if near_m < 8.0 || elsewhere { near_m } else { 20.0 };
+    }
+    scene
+}

@@ -1,0 +1,157 @@
+//! Figure 7: circulation and paths of the two vortices of the simulated wake.
+
+use super::wake::Wake;
+use super::{Claim, Context, Rendered, Verdict};
+use crate::Failure;
+use crate::validate::{interpolate, numbers};
+use wakescope_sim::export::Table;
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+
+/// The Reynolds number and core of the chapter.
+const CHAPTER: (f64, f64) = (2e4, 0.05);
+const SIDES: [&str; 2] = ["left", "right"];
+
+pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
+    let wake = Wake::of(context)?;
+    let origin = context.provenance_of_formula(&wake.case_toml);
+    let mut out = Rendered::default();
+    out.csv(table(&wake)?.to_csv(&origin)?);
+    let figure = Figure::side_by_side([circulation(&wake)?, paths(&wake)?]);
+    let figure = Figure { width: 1200.0, ..figure };
+    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    out.caption = format!(
+        "Circulation averaged over 5 to 15 m (left) and paths of both vortices (right) beside the inviscid hyperbola and an independent \
+         simulation at Γ₀/ν = 5000; {}. The noise sets when the fast decay begins.",
+        wake.words()
+    );
+    out.claims = claims(&wake)?;
+    Ok(out)
+}
+
+fn table(wake: &Wake) -> Result<Table, Failure> {
+    let mut table = Table::new();
+    let names =
+        ["tau", "gamma_5_15_left_m2_s", "gamma_5_15_right_m2_s", "y_left_m", "z_left_m", "y_right_m", "z_right_m"];
+    for name in names {
+        table = table.float(name, wake.column(name)?.iter().copied());
+    }
+    Ok(table)
+}
+
+/// The independent simulation in the box of this profile.
+fn reference(wake: &Wake) -> Result<Vec<Vec<f64>>, Failure> {
+    let narrow = wake.flow.size[1] < 4.5;
+    numbers(if narrow { "wake_3d_ground_re5000_coarse_box4_cans.csv" } else { "wake_3d_ground_re5000_cans.csv" })
+}
+
+fn circulation(wake: &Wake) -> Result<CurvePlot, Failure> {
+    let mut plot = CurvePlot::new("", Axis::linear("τ"), Axis::linear("Γ_{5-15}(τ)/Γ_{5-15}(0)"));
+    let stored = reference(wake)?;
+    for (place, side) in SIDES.iter().enumerate() {
+        plot = plot.with(Series::new(side, Style::Line, wake.curve(&format!("gamma_ratio_{side}"))?)).with(
+            Series::new(&format!("independent, {side}"), Style::Markers, stored.iter().map(|r| (r[0], r[1 + place]))),
+        );
+    }
+    Ok(plot)
+}
+
+fn paths(wake: &Wake) -> Result<CurvePlot, Failure> {
+    let mut plot = CurvePlot::new("", Axis::linear("y/b₀"), Axis::linear("z/b₀"));
+    let stored = reference(wake)?;
+    for (place, side) in SIDES.iter().enumerate() {
+        let y = wake.column(&format!("y_{side}"))?.iter().copied();
+        let path = y.zip(wake.column(&format!("z_{side}"))?.iter().copied());
+        plot = plot.with(Series::new(side, Style::Line, path.collect::<Vec<_>>())).with(Series::new(
+            &format!("independent, {side}"),
+            Style::Markers,
+            stored.iter().map(|r| (r[3 + 2 * place], r[4 + 2 * place])),
+        ));
+    }
+    for (name, sign) in [("inviscid", 1.0), ("", -1.0)] {
+        let hyperbola = numbers("vortex_pair_inviscid_ground_h1.csv")?;
+        let path = hyperbola.iter().filter(|r| r[0] <= 5.0).map(|r| (sign * r[1], r[2]));
+        plot = plot.with(Series::new(name, Style::Dash, path.collect::<Vec<_>>()));
+    }
+    Ok(plot)
+}
+
+/// Mean of both vortices against tau.
+fn mean(wake: &Wake, name: &str, sign: f64) -> Result<Vec<(f64, f64)>, Failure> {
+    let (left, right) = (wake.curve(&format!("{name}_left"))?, wake.curve(&format!("{name}_right"))?);
+    Ok(left.iter().zip(right).map(|(l, r)| (l.0, 0.5 * (sign * l.1 + r.1))).collect())
+}
+
+/// When the mean circulation first falls three times as fast as on average from 0.5 to 1.5.
+fn onset(gamma: &[(f64, f64)]) -> Option<f64> {
+    let at = |tau: f64| interpolate(gamma, tau);
+    let early = at(0.5) - at(1.5);
+    (0..=30).map(|i| 1.5 + 0.1 * f64::from(i)).find(|tau| (at(tau - 0.1) - at(tau + 0.1)) / 0.2 > 3.0 * early)
+}
+
+fn claims(wake: &Wake) -> Result<Vec<Claim>, Failure> {
+    let gamma = mean(wake, "gamma_ratio", 1.0)?;
+    let at = |tau: f64| interpolate(&gamma, tau);
+    let onset = onset(&gamma);
+    let noise = format!("noise {} V₀, Γ₀/ν = {}", wake.flow.perturbation, wake.flow.reynolds);
+    let like_chapter = wake.flow.reynolds >= CHAPTER.0 && wake.flow.core_radius <= CHAPTER.1;
+    // What depends on the Reynolds number of the chapter is measured, but not judged, at another.
+    let of_chapter = |claim: Claim| if like_chapter { claim } else { Claim { verdict: Verdict::NotResolved, ..claim } };
+    let onset_words = onset.map_or("never".into(), |tau| format!("tau = {tau:.1}"));
+    let before = onset.map_or(f64::NAN, |tau| 1.0 - at(tau - 0.1));
+    let (y, z) = (mean(wake, "y", -1.0)?, mean(wake, "z", 1.0)?);
+    Ok(vec![
+        of_chapter(Claim::exact(
+            "F7a",
+            "fig07",
+            "before the fast phase the loss of circulation is below 10 %",
+            "below 0.10",
+            format!("{before:.3} at the onset, {onset_words} ({noise})"),
+            before < 0.1,
+        )),
+        of_chapter(Claim::exact(
+            "F7b",
+            "fig07",
+            "the fast decay begins at tau = 2.8",
+            "2.8 +- 0.3",
+            format!("{onset_words} ({noise})"),
+            onset.is_some_and(|tau| (tau - 2.8).abs() <= 0.3),
+        )),
+        of_chapter(Claim::exact(
+            "F7c",
+            "fig07",
+            "the final level is 40 % lower",
+            "0.6 +- 0.07",
+            format!("{:.3} at tau = 5 ({noise})", at(5.0)),
+            (at(5.0) - 0.6).abs() <= 0.07,
+        )),
+        inviscid_path(wake, &y, &z)?,
+        rebound(&y, &z),
+    ])
+}
+
+fn inviscid_path(wake: &Wake, y: &[(f64, f64)], z: &[(f64, f64)]) -> Result<Claim, Failure> {
+    let shear = mean(wake, "outward_shear", 1.0)?;
+    let separation = shear.iter().find(|p| p.0 > 0.1 && p.1 < 0.0).map_or(f64::NAN, |p| p.0);
+    let hyperbola = numbers("vortex_pair_inviscid_ground_h1.csv")?;
+    let exact =
+        |column: usize, tau: f64| interpolate(&hyperbola.iter().map(|r| (r[0], r[column])).collect::<Vec<_>>(), tau);
+    let distance = |tau: f64| (interpolate(y, tau) - exact(1, tau)).hypot(interpolate(z, tau) - exact(2, tau));
+    let worst = y.iter().map(|p| p.0).filter(|tau| *tau <= separation).map(distance).fold(0.0, f64::max);
+    let statement = "the path is the inviscid one until the boundary layer separates";
+    let measured = format!("{worst:.4} b₀ until tau = {separation:.2}, where the shear at the ground turns");
+    Ok(Claim::exact("F7d", "fig07", statement, "within 0.03 b₀", measured, separation.is_finite() && worst < 0.03))
+}
+
+fn rebound(y: &[(f64, f64)], z: &[(f64, f64)]) -> Claim {
+    let lowest = z.iter().filter(|p| p.0 < 2.0).fold((0.0, f64::INFINITY), |m, p| if p.1 < m.1 { *p } else { m });
+    let top = z.iter().filter(|p| p.0 > lowest.0 && p.0 < 3.5).fold((0.0, 0.0), |m, p| if p.1 > m.1 { *p } else { m });
+    let widest = y.iter().filter(|p| p.0 < 3.0).fold((0.0, 0.0), |m, p| if p.1 > m.1 { *p } else { m });
+    let inner = y.iter().filter(|p| p.0 > widest.0).fold((0.0, f64::INFINITY), |m, p| if p.1 < m.1 { *p } else { m });
+    let measured = format!(
+        "lowest {:.3} at tau = {:.2}, top {:.3} at {:.2}; widest {:.3} at {:.2}, then inward to {:.3} at {:.2}",
+        lowest.1, lowest.0, top.1, top.0, widest.1, widest.0, inner.1, inner.0
+    );
+    let pass = top.1 > lowest.1 + 0.2 && inner.1 < widest.1 - 0.1;
+    let statement = "the vortices rise again and their paths make loops";
+    Claim::exact("F7e", "fig07", statement, "up by more than 0.2 b₀, back by more than 0.1 b₀", measured, pass)
+}

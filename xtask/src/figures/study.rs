@@ -1,0 +1,248 @@
+//! What figures 10 to 14 share: scans of the vortex pair, regions about the cores, averages with their standard errors.
+//!
+//! Maps of neighbouring cells share their windows: as independent counts one line of sight in [`SHARED_LINES`] and one gate in
+//! [`SHARED_GATES`].
+
+use super::Context;
+use crate::Failure;
+use wakescope_sim::export::csv::Column;
+use wakescope_sim::export::{Provenance, Table};
+use wakescope_sim::map::VelocityEstimates;
+use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
+use wakescope_sim::scene::{
+    Flow, Method, RefractiveTurbulence, Scene, SnrReference, Turbulence, VortexPair, Weighting,
+};
+use wakescope_sim::{join, run, write};
+
+/// Lines of sight 0.5 m apart that a region of 2 m shares.
+const SHARED_LINES: f64 = 9.0;
+/// Gates 3 m apart that share a window of 38.4 m and the pulse.
+const SHARED_GATES: f64 = 10.0;
+/// What counts as inside a vortex, m from its centre.
+pub(super) const INSIDE_M: f64 = 8.0;
+/// What counts as outside of both, m.
+pub(super) const OUTSIDE_M: f64 = 30.0;
+
+/// The two references of the signal-to-noise ratio for which the chapter's figures are drawn.
+pub(super) const REFERENCES: [(&str, SnrReference); 2] =
+    [("physical", SnrReference::Physical {}), ("chapter", SnrReference::Chapter {})];
+
+/// One pulse a line, unweighted windows, regions of 2 m, the early pair 400 m away.
+pub(super) fn early_scene(realisations: usize) -> Scene {
+    let mut scene = Scene::default();
+    (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.03, 0.2);
+    (scene.scan.range_min_m, scene.scan.range_max_m) = (310.0, 500.0);
+    (scene.scan.pulses_per_line, scene.scan.realisations) = (1, realisations);
+    scene.estimator.weighting = Weighting::Rectangular;
+    scene
+}
+
+/// The scene with the chapter's periodogram accumulation (PA) or correlogram accumulation (CA).
+pub(super) fn with_method(mut scene: Scene, method: &str) -> Scene {
+    scene.estimator.method = if method == "CA" { Method::Autoregressive } else { Method::PeriodogramAccumulation };
+    scene.estimator.padded_samples = if method == "CA" { 2048 } else { 1024 };
+    scene
+}
+
+/// The same scan about the cores alone.
+pub(super) fn near_scene(realisations: usize) -> Scene {
+    let mut scene = early_scene(realisations);
+    (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.065, 0.175);
+    (scene.scan.range_min_m, scene.scan.range_max_m) = (315.0, 485.0);
+    scene
+}
+
+/// The scene with refractive turbulence on the path: few realisations on a grid of half the chapter's width with `quick`.
+pub(super) fn with_turbulence(context: &Context, mut scene: Scene, cn2_m_m23: f64) -> Scene {
+    let turbulence = RefractiveTurbulence {
+        cn2_m_m23,
+        realisations: context.choose(8, 100, 400),
+        grid_points: context.choose(256, 512, 512),
+        ..RefractiveTurbulence::default()
+    };
+    scene.atmosphere.turbulence = Turbulence::Refractive(turbulence);
+    scene
+}
+
+/// A map that was made, with what is needed to read it.
+pub(super) struct Study {
+    pub(super) plan: Plan,
+    pub(super) map: VelocityEstimates,
+    /// Distance to the nearer core, m, and range from it along the line, m: `[line][gate]`.
+    pub(super) distance_m: Vec<Vec<f64>>,
+}
+
+impl Study {
+    /// Runs the map of a scene.
+    pub(super) fn run(context: &Context, scene: Scene) -> Result<Self, Failure> {
+        let plan = Plan::new(context.scene_file(scene)?, Target::Map)?;
+        let map = run::run(&plan, &Silent)?.map.ok_or_else(|| Failure::new("the plan gave no map".into()))?;
+        let cores = cores_of(&plan.scene.scene);
+        let distance = |el: f64, r: f64| {
+            let (y, z) = (r * el.cos(), plan.scene.scene.scan.lidar_height_m + r * el.sin());
+            cores.iter().map(|c| (y - c.0).hypot(z - c.1)).fold(f64::INFINITY, f64::min)
+        };
+        let row = |el: &f64| map.range_m.iter().map(|&r| distance(*el, r)).collect();
+        let distance_m = map.elevation_rad.iter().map(row).collect();
+        Ok(Self { plan, map, distance_m })
+    }
+
+    pub(super) fn provenance(&self) -> Provenance {
+        write::provenance(&self.plan)
+    }
+
+    /// Centres of the vortices in the polar coordinates of the scan: (range, elevation).
+    pub(super) fn cores_polar(&self) -> Vec<(f64, f64)> {
+        let height_m = self.plan.scene.scene.scan.lidar_height_m;
+        cores_of(&self.plan.scene.scene)
+            .iter()
+            .map(|c| (c.0.hypot(c.1 - height_m), (c.1 - height_m).atan2(c.0)))
+            .collect()
+    }
+
+    /// Averages over the cells whose distance to the nearer core, m, is accepted.
+    pub(super) fn over(&self, accept: impl Fn(f64) -> bool) -> Average {
+        let mut cells = Vec::new();
+        for (i, row) in self.distance_m.iter().enumerate() {
+            cells.extend(row.iter().enumerate().filter(|(_, d)| accept(**d)).map(|(j, _)| (i, j)));
+        }
+        self.average(&cells, SHARED_LINES * SHARED_GATES)
+    }
+
+    /// Averages over some cells, whose neighbours share lines and gates.
+    pub(super) fn over_cells(&self, cells: &[(usize, usize)]) -> Average {
+        self.average(cells, SHARED_LINES * SHARED_GATES)
+    }
+
+    /// Averages over cells of a profile: at one gate, or at one for each vortex.
+    pub(super) fn over_profile(&self, cells: &[(usize, usize)]) -> Average {
+        self.average(cells, SHARED_LINES)
+    }
+
+    fn average(&self, cells: &[(usize, usize)], shared: f64) -> Average {
+        let m = &self.map;
+        let known: Vec<(usize, usize)> = cells.iter().copied().filter(|c| m.rms_m_s[*c].is_finite()).collect();
+        let n = known.len() as f64;
+        let mean = |field: &ndarray::Array2<f64>| known.iter().map(|c| field[*c]).sum::<f64>() / n;
+        let square = |field: &ndarray::Array2<f64>| (known.iter().map(|c| field[*c].powi(2)).sum::<f64>() / n).sqrt();
+        Average {
+            bias_m_s: mean(&m.bias_m_s),
+            std_m_s: square(&m.std_m_s),
+            rms_m_s: square(&m.rms_m_s),
+            standard_error_m_s: square(&m.standard_error_m_s) / (n / shared).max(1.0).sqrt(),
+        }
+    }
+}
+
+/// Errors over a set of cells: the mean bias, and root means of squares.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Average {
+    pub(super) bias_m_s: f64,
+    pub(super) std_m_s: f64,
+    pub(super) rms_m_s: f64,
+    /// Of `rms_m_s`.
+    pub(super) standard_error_m_s: f64,
+}
+
+impl Average {
+    /// Averages of independent batches of equal size as one.
+    pub(super) fn joined(batches: impl ExactSizeIterator<Item = Self>) -> Self {
+        let n = batches.len() as f64;
+        let mut sums = [0.0; 4];
+        for b in batches {
+            let squares = [b.bias_m_s, b.std_m_s.powi(2), b.rms_m_s.powi(2), b.standard_error_m_s.powi(2)];
+            sums.iter_mut().zip(squares).for_each(|(sum, value)| *sum += value / n);
+        }
+        let [bias_m_s, std, rms, error] = sums;
+        Self { bias_m_s, std_m_s: std.sqrt(), rms_m_s: rms.sqrt(), standard_error_m_s: (error / n).sqrt() }
+    }
+}
+
+/// Centres of the vortices when the scan begins, (y, z), m; none where the flow is no pair.
+pub(super) fn cores_of(scene: &Scene) -> Vec<(f64, f64)> {
+    match &scene.flow {
+        Flow::VortexPair(pair) => {
+            let c = join::vortex_pair(pair).centres(join::start_time_s(scene));
+            vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// A vortex pair of an age on its inviscid path.
+pub(super) fn aged(age_tau: f64) -> Flow {
+    let motion = wakescope_sim::scene::VortexMotion::Inviscid;
+    Flow::VortexPair(VortexPair { motion, age_tau, ..VortexPair::default() })
+}
+
+/// Tables of the same columns one below the other, with a first column that tells them apart.
+pub(super) fn stacked(name: &str, parts: &[(&str, Table)]) -> Table {
+    let labels = parts.iter().flat_map(|(label, table)| {
+        let rows = table.columns().first().map_or(0, |(_, column)| match column {
+            Column::Float(v) => v.len(),
+            Column::Int(v) => v.len(),
+            Column::Text(v) => v.len(),
+        });
+        std::iter::repeat_n(*label, rows)
+    });
+    let mut out = Vec::new();
+    if let Some((_, first)) = parts.first() {
+        for (place, (column_name, kind)) in first.columns().iter().enumerate() {
+            let columns = parts.iter().map(|(_, table)| &table.columns()[place].1);
+            let joined = match kind {
+                Column::Float(_) => Column::Float(columns.flat_map(floats).collect()),
+                Column::Int(_) => Column::Int(columns.flat_map(ints).collect()),
+                Column::Text(_) => Column::Text(columns.flat_map(texts).collect()),
+            };
+            out.push((column_name.clone(), joined));
+        }
+    }
+    let table = out.into_iter().fold(Table::new(), |table, (column_name, column)| table.column(&column_name, column));
+    table.text(name, labels)
+}
+
+fn floats(column: &Column) -> Vec<f64> {
+    if let Column::Float(values) = column { values.clone() } else { Vec::new() }
+}
+
+fn ints(column: &Column) -> Vec<i64> {
+    if let Column::Int(values) = column { values.clone() } else { Vec::new() }
+}
+
+fn texts(column: &Column) -> Vec<String> {
+    if let Column::Text(values) = column { values.clone() } else { Vec::new() }
+}
+
+/// Mean of some numbers and its standard error.
+pub(super) fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stacked_tables_keep_their_rows_and_say_which_is_which() {
+        let part = |x: f64| Table::new().float("x_m", [x, x + 1.0]).int("n", [1, 2]).text("t", ["a", "b"]);
+        let both = stacked("which", &[("one", part(1.0)), ("two", part(5.0))]);
+        let text = both.to_csv(&Provenance {
+            program: String::new(),
+            scene_toml: String::new(),
+            scene_hash: String::new(),
+            seed: 0,
+        });
+        let text = text.unwrap();
+        assert!(text.ends_with("x_m,n,t,which\n1.0,1,a,one\n2.0,2,b,one\n5.0,1,a,two\n6.0,2,b,two\n"), "{text}");
+    }
+
+    #[test]
+    fn the_mean_has_the_error_of_the_mean() {
+        let (mean, error) = mean_and_error(&[1.0, 2.0, 3.0, 4.0]);
+        assert!((mean - 2.5).abs() < 1e-12 && (error - (5.0_f64 / 12.0).sqrt()).abs() < 1e-12);
+    }
+}

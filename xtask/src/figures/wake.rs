@@ -1,0 +1,92 @@
+//! The simulated wake that figures share: it is run once for a profile, continued where it was interrupted, and read from its
+//! files by every figure.
+
+use super::Context;
+use crate::Failure;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use wakescope_sim::flow::{self, Begin, CaseFile, CaseKind, Unwatched, WakeFlow, WakePreset};
+
+/// Ages of the cross-planes that are kept, for pictures that move.
+const SERIES_EVERY: f64 = 0.1;
+/// Two figures must not run the same wake at the same time.
+static RUNNING: Mutex<()> = Mutex::new(());
+
+/// A finished run.
+pub(super) struct Wake {
+    /// Where its files are.
+    pub(super) folder: PathBuf,
+    /// The flow.
+    pub(super) flow: WakeFlow,
+    /// The case as TOML.
+    pub(super) case_toml: String,
+    /// Ages of the whole fields, in the order of the files.
+    pub(super) fields_tau: Vec<f64>,
+    columns: HashMap<String, Vec<f64>>,
+}
+
+impl Wake {
+    /// The wake of the profile.
+    pub(super) fn of(context: &Context) -> Result<Self, Failure> {
+        let preset = context.choose(WakePreset::Coarse, WakePreset::Medium, WakePreset::Chapter);
+        let mut case = preset.case();
+        if let Some(output) = &mut case.wake {
+            output.series_tau = Some([0.0, output.end_tau]);
+            output.series_every_tau = SERIES_EVERY;
+        }
+        let file = CaseFile::parse(&toml::to_string(&case)?, Path::new("wake"))?;
+        let folder = context.stages.join(format!("wake-{}", file.hash));
+        let done = folder.join("done");
+        {
+            let _running = RUNNING.lock().map_err(|_| Failure::new("another figure failed".into()))?;
+            if !done.exists() {
+                let begin = if folder.join("flow.checkpoint").exists() { Begin::Restart } else { Begin::Overwrite };
+                flow::run(&file, &folder, begin, &mut Unwatched)?;
+                std::fs::write(&done, &file.hash)?;
+            }
+        }
+        let CaseKind::Wake(flow) = file.case.case.clone() else {
+            return Err(Failure::new("the preset is no wake".into()));
+        };
+        let fields_tau = file.case.wake.as_ref().map(|wake| wake.fields_tau.clone()).unwrap_or_default();
+        let columns = columns(&std::fs::read_to_string(folder.join("wake.csv"))?)?;
+        Ok(Self { folder, flow: *flow, case_toml: file.toml, fields_tau, columns })
+    }
+
+    /// A column of the history.
+    pub(super) fn column(&self, name: &str) -> Result<&[f64], Failure> {
+        self.columns
+            .get(name)
+            .map(Vec::as_slice)
+            .ok_or_else(|| Failure::new(format!("the history of the wake has no column {name}")))
+    }
+
+    /// A column against `tau`.
+    pub(super) fn curve(&self, name: &str) -> Result<Vec<(f64, f64)>, Failure> {
+        Ok(self.column("tau")?.iter().copied().zip(self.column(name)?.iter().copied()).collect())
+    }
+
+    /// The run in words, its noise among them.
+    pub(super) fn words(&self) -> String {
+        let [x, y, z] = self.flow.cells;
+        format!(
+            "simulated flow, {x} x {y} x {z} cells, Γ₀/ν = {}, core {} b₀, noise {} V₀",
+            self.flow.reynolds, self.flow.core_radius, self.flow.perturbation
+        )
+    }
+}
+
+/// Columns of a table by name; empty places are NaN.
+fn columns(text: &str) -> Result<HashMap<String, Vec<f64>>, Failure> {
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let mut columns = vec![Vec::new(); names.len()];
+    for line in lines {
+        for (column, value) in columns.iter_mut().zip(line.split(',')) {
+            let number = if value.is_empty() { Ok(f64::NAN) } else { value.parse() };
+            column.push(number.map_err(|_| Failure::new(format!("{value} in the history of the wake is no number")))?);
+        }
+    }
+    Ok(names.into_iter().map(String::from).zip(columns).collect())
+}

@@ -1,0 +1,206 @@
+//! The pair in space against the independent code, row by row: coarse and medium mesh, without and with the multiscale model.
+
+use super::{History, PER_TAU, Stored, growth, onset, run, worst};
+use crate::Failure;
+use crate::validate::{Check, Profile, Shown, interpolate};
+use wakescope_les::SubgridModel;
+use wakescope_les::cases::VortexPairCase;
+use wakescope_sim::export::Table;
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+
+const END: f64 = 5.0;
+/// The flow is laminar until here.
+const LAMINAR: f64 = 2.2;
+
+/// What one mesh must keep.
+struct Bars {
+    file: &'static str,
+    position: f64,
+    gamma: f64,
+    energy: f64,
+    log_energy_3d: f64,
+    growth: f64,
+    onset: f64,
+    /// Circulation at 3, 4, 5 with what it may be off.
+    late: [(f64, f64, f64); 3],
+    ratio_to_plane: (f64, f64),
+    last_energy: (f64, f64),
+    peak: [f64; 2],
+    peak_tau: [f64; 2],
+}
+
+const COARSE: Bars = Bars {
+    file: "wake_3d_ground_re5000_coarse_box4_cans.csv",
+    position: 0.02,
+    gamma: 0.008,
+    energy: 0.005,
+    log_energy_3d: 0.7,
+    growth: 0.15,
+    onset: 0.25,
+    late: [(3.0, 0.65, 0.07), (4.0, 0.54, 0.07), (5.0, 0.50, 0.07)],
+    ratio_to_plane: (0.68, 0.07),
+    last_energy: (4.6, 0.35),
+    peak: [700.0, 1100.0],
+    peak_tau: [2.8, 3.2],
+};
+
+const MEDIUM: Bars = Bars {
+    file: "wake_3d_ground_re5000_cans.csv",
+    position: 0.01,
+    gamma: 0.005,
+    energy: 0.003,
+    log_energy_3d: 0.35,
+    growth: 0.08,
+    onset: 0.15,
+    late: [(3.0, 0.68, 0.04), (4.0, 0.565, 0.04), (5.0, 0.515, 0.05)],
+    ratio_to_plane: (0.70, 0.05),
+    last_energy: (4.75, 0.25),
+    peak: [800.0, 1000.0],
+    peak_tau: [3.0, 3.2],
+};
+
+/// 24 x 128 x 80 cells; also the multiscale model up to the end of the laminar phase, which it must leave alone.
+pub(crate) fn show_coarse(_: Profile) -> Result<Shown, Failure> {
+    let model = VortexPairCase { subgrid: SubgridModel::MULTISCALE_WALE, ..VortexPairCase::coarse() };
+    show(VortexPairCase::coarse(), &COARSE, Some(model))
+}
+
+/// 48 x 240 x 128 cells.
+pub(crate) fn show_medium(_: Profile) -> Result<Shown, Failure> {
+    show(VortexPairCase::medium(), &MEDIUM, None)
+}
+
+fn show(pair: VortexPairCase, bars: &Bars, model: Option<VortexPairCase>) -> Result<Shown, Failure> {
+    let stored = Stored::read(bars.file)?;
+    let flow = run(&pair, END)?;
+    let plane = run(&VortexPairCase { cells: [1, pair.cells[1], pair.cells[2]], ..pair }, END)?;
+    let mut checks = laminar("", &flow, &stored, bars);
+    checks.extend(turbulent(&flow, &plane, &stored, bars));
+    if let Some(model) = model {
+        let modelled = run(&model, LAMINAR)?;
+        checks.extend(laminar("multiscale: ", &modelled, &stored, bars));
+        let apart = |right| worst(&modelled.gamma(right), &flow.gamma(right), [0.0, LAMINAR], |a, b| (a - b).abs());
+        checks.push(Check::at_most("multiscale: Gamma against no model", apart(false).max(apart(true)), 0.005));
+    }
+    let figure = figure(&flow, &plane, &stored);
+    Ok(Shown { checks, table: table(&flow), figure })
+}
+
+fn laminar(name: &str, flow: &History, stored: &Stored, bars: &Bars) -> Vec<Check> {
+    let apart = |measured: &[(f64, f64)], column: usize, to: f64| {
+        worst(measured, &stored.curve(column), [0.0, to], |a, b| (a - b).abs())
+    };
+    let position = [
+        apart(&flow.curve(|r| r.left.y_m), Stored::Y[0], 2.0),
+        apart(&flow.curve(|r| r.right.y_m), Stored::Y[1], 2.0),
+        apart(&flow.curve(|r| r.left.z_m), Stored::Z[0], 2.0),
+        apart(&flow.curve(|r| r.right.z_m), Stored::Z[1], 2.0),
+    ];
+    let gamma = [false, true].map(|right| apart(&flow.gamma(right), Stored::GAMMA[usize::from(right)], LAMINAR));
+    let energy = worst(&flow.curve(|r| r.energy_m4_s2), &stored.curve(Stored::ENERGY), [0.1, LAMINAR], |a, b| {
+        (a / b - 1.0).abs()
+    });
+    let waves = flow.curve(|r| r.energy_3d_m4_s2());
+    let logarithm = worst(&waves, &stored.curve(Stored::ENERGY_3D), [0.5, LAMINAR], |a, b| (a / b).ln().abs());
+    let check = |what: &str, measured: f64, bar: f64| Check::at_most(&format!("{name}{what}"), measured, bar);
+    let mut checks = vec![
+        check("y, z to 2", position.into_iter().fold(0.0, f64::max), bars.position),
+        check("Gamma ratio to 2.2", gamma[0].max(gamma[1]), bars.gamma),
+        check("energy to 2.2, relative", energy, bars.energy),
+        check("energy budget of a step, relative", flow.budget_error, 0.005),
+        check("2 nu Z against viscous power, relative", flow.dissipation_error, 0.005),
+        check("ln E_3d, 0.5 to 2.2", logarithm, bars.log_energy_3d),
+    ];
+    for (mode, column) in [(2, Stored::MODE_2), (3, Stored::MODE_3)] {
+        let measured = growth(&flow.curve(|r| r.mode_energy_m4_s2[mode]), 1.0, 2.0);
+        let reference = growth(&stored.curve(column), 1.0, 2.0);
+        checks.push(Check::relative(&format!("{name}growth of mode {mode}, 1 to 2"), measured, reference, bars.growth));
+    }
+    checks
+}
+
+fn turbulent(flow: &History, plane: &History, stored: &Stored, bars: &Bars) -> Vec<Check> {
+    let mean_onset = |curves: [Vec<(f64, f64)>; 2]| {
+        let [a, b] = curves.map(|curve| onset(&curve).unwrap_or(f64::NAN));
+        0.5 * (a + b)
+    };
+    let within = |what: &str, measured, reference, bar| Check {
+        quantity: what.into(),
+        measured,
+        reference,
+        bar: crate::validate::Bar::Within(bar),
+    };
+    let mut checks = vec![within(
+        "onset of the fast decay",
+        mean_onset([flow.gamma(false), flow.gamma(true)]),
+        mean_onset(Stored::GAMMA.map(|column| stored.curve(column))),
+        bars.onset,
+    )];
+    for (tau, reference, bar) in bars.late {
+        checks.push(within(&format!("Gamma ratio at {tau}"), flow.mean_gamma(tau), reference, bar));
+    }
+    let (ratio, ratio_bar) = bars.ratio_to_plane;
+    checks.push(within("3-D over 2-D Gamma at 5", flow.mean_gamma(END) / plane.mean_gamma(END), ratio, ratio_bar));
+    let energy = flow.curve(|r| r.energy_m4_s2);
+    checks.push(within("energy at 5", interpolate(&energy, END), bars.last_energy.0, bars.last_energy.1));
+    let enstrophy = flow.curve(|r| r.enstrophy_m2_s2);
+    let late = enstrophy.iter().filter(|p| p.0 > LAMINAR);
+    let peak = late.fold((0.0, 0.0), |best, p| if p.1 > best.1 { *p } else { best });
+    let middle = |[low, high]: [f64; 2]| (0.5 * (low + high), 0.5 * (high - low));
+    let (value, value_bar) = middle(bars.peak);
+    let (tau, tau_bar) = middle(bars.peak_tau);
+    checks.push(within("second enstrophy peak", peak.1, value, value_bar));
+    checks.push(within("its tau", peak.0, tau, tau_bar + 0.5 / PER_TAU as f64));
+    checks
+}
+
+fn table(flow: &History) -> Table {
+    let column = |table: Table, name: &str, of: &dyn Fn(&wakescope_les::WakeRecord) -> f64| {
+        table.float(name, flow.records.iter().map(of))
+    };
+    let mut table = Table::new()
+        .float("tau", flow.records.iter().map(|r| r.time_s))
+        .float("gamma_5_15_left", flow.gamma(false).into_iter().map(|p| p.1))
+        .float("gamma_5_15_right", flow.gamma(true).into_iter().map(|p| p.1));
+    table = column(table, "y_left", &|r| r.left.y_m);
+    table = column(table, "z_left", &|r| r.left.z_m);
+    table = column(table, "y_right", &|r| r.right.y_m);
+    table = column(table, "z_right", &|r| r.right.z_m);
+    table = column(table, "energy", &|r| r.energy_m4_s2);
+    table = column(table, "enstrophy", &|r| r.enstrophy_m2_s2);
+    table = column(table, "energy_3d", &|r| r.energy_3d_m4_s2());
+    table = column(table, "gamma_opposite_left", &|r| r.left.gamma_opposite_m2_s / std::f64::consts::TAU);
+    table = column(table, "gamma_opposite_right", &|r| r.right.gamma_opposite_m2_s / std::f64::consts::TAU);
+    table = column(table, "secondary_y_left", &|r| r.left.secondary.y_m);
+    table = column(table, "secondary_z_left", &|r| r.left.secondary.z_m);
+    table = column(table, "secondary_y_right", &|r| r.right.secondary.y_m);
+    table = column(table, "secondary_z_right", &|r| r.right.secondary.z_m);
+    column(table, "wall_units", &|r| r.wall_units)
+}
+
+fn figure(flow: &History, plane: &History, stored: &Stored) -> Figure {
+    let path = |y: Vec<(f64, f64)>, z: Vec<(f64, f64)>| y.into_iter().zip(z).map(|(y, z)| (y.1.abs(), z.1)).collect();
+    let right: Vec<(f64, f64)> = path(flow.curve(|r| r.right.y_m), flow.curve(|r| r.right.z_m));
+    let left: Vec<(f64, f64)> = path(flow.curve(|r| r.left.y_m), flow.curve(|r| r.left.z_m));
+    let known: Vec<(f64, f64)> = path(stored.curve(Stored::Y[1]), stored.curve(Stored::Z[1]));
+    let decay =
+        CurvePlot::new("Circulation", Axis::linear("tau"), Axis::linear("Gamma_5-15 / initial").between(0.3, 1.02))
+            .with(Series::new("left", Style::Line, flow.gamma(false)))
+            .with(Series::new("right", Style::Line, flow.gamma(true)))
+            .with(Series::new("plane flow", Style::Dash, plane.gamma(true)))
+            .with(Series::new("independent code, left", Style::Markers, stored.curve(Stored::GAMMA[0])))
+            .with(Series::new("independent code, right", Style::Markers, stored.curve(Stored::GAMMA[1])));
+    let paths = CurvePlot::new("Paths", Axis::linear("|y| / b0"), Axis::linear("z / b0"))
+        .with(Series::new("left", Style::Line, left))
+        .with(Series::new("right", Style::Line, right))
+        .with(Series::new("independent code, right", Style::Markers, known));
+    let waves = CurvePlot::new("Energy along x", Axis::linear("tau"), Axis::log("E_3d [b0^2 V0^2]"))
+        .with(Series::new("this solver", Style::Line, flow.curve(|r| r.energy_3d_m4_s2())))
+        .with(Series::new("independent code", Style::Markers, stored.curve(Stored::ENERGY_3D)));
+    let enstrophy = CurvePlot::new("Enstrophy", Axis::linear("tau"), Axis::linear("Z [V0^2]").between(0.0, 1100.0))
+        .with(Series::new("this solver", Style::Line, flow.curve(|r| r.enstrophy_m2_s2.min(1100.0))))
+        .with(Series::new("independent code", Style::Markers, {
+            stored.curve(Stored::ENSTROPHY).into_iter().map(|p| (p.0, p.1.min(1100.0)))
+        }));
+    Figure::stacked([decay, paths, waves, enstrophy])
+}

@@ -1,0 +1,77 @@
+//! The pair in a cross wind: drift, and secondary vortices of different strength.
+
+use super::{History, run};
+use crate::Failure;
+use crate::validate::{Check, Profile, Shown, interpolate};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+use wakescope_les::WakeRecord;
+use wakescope_les::cases::VortexPairCase;
+use wakescope_sim::export::Table;
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+
+/// Logarithmic winds at the height of the vortices, in `V0`.
+const WINDS: [f64; 3] = [0.0, 0.5, 1.0];
+/// Roughness length in `b0`.
+const ROUGHNESS: f64 = 0.002;
+const END: f64 = 2.5;
+/// When the strengths are compared: the secondary vortices are up, the flow is still plane.
+const COMPARED: f64 = 1.5;
+
+pub(crate) fn show(profile: Profile) -> Result<Shown, Failure> {
+    let cells = if profile == Profile::Quick { [12, 96, 64] } else { [24, 160, 80] };
+    let runs: Vec<(f64, History)> = WINDS
+        .into_par_iter()
+        .map(|cross_wind| {
+            let pair = VortexPairCase {
+                cells,
+                size: [1.0, 5.0, 2.5],
+                cross_wind,
+                wind_roughness: ROUGHNESS,
+                ..VortexPairCase::coarse()
+            };
+            Ok((cross_wind, run(&pair, END)?))
+        })
+        .collect::<Result<_, Failure>>()?;
+    // Strengths of the secondary vortices, and how far the middle of the pair has moved.
+    let second = |flow: &History, right: bool| {
+        flow.curve(|r| if right { r.right.secondary.gamma_m2_s } else { r.left.secondary.gamma_m2_s } / TAU)
+    };
+    let middle = |r: &WakeRecord| 0.5 * (r.left.y_m + r.right.y_m);
+    let strength = |flow: &History, right: bool| interpolate(&second(flow, right), COMPARED).abs();
+    let unequal = |flow: &History| strength(flow, false) / strength(flow, true);
+    let drift = |flow: &History| interpolate(&flow.curve(middle), COMPARED);
+    let (still, windy) = (&runs[0].1, &runs[2].1);
+    let checks = vec![
+        Check::at_most("no wind: drift to 1.5", drift(still).abs(), 1e-3),
+        Check::relative("no wind: left over right secondary", unequal(still), 1.0, 0.01),
+        Check::at_least("wind V0: drift to 1.5", drift(windy), 0.8),
+        Check::at_least("wind V0: drift twice that of V0/2, share", drift(windy) / drift(&runs[1].1), 1.8),
+        Check::at_least("wind V0: stronger over weaker secondary", unequal(windy).max(1.0 / unequal(windy)), 1.1),
+    ];
+    let mut table = Table::new().float("tau", still.records.iter().map(|r| r.time_s));
+    let mut drifts = CurvePlot::new("Middle of the pair", Axis::linear("tau"), Axis::linear("y / b0"));
+    let mut strengths = CurvePlot::new("Secondary vortices", Axis::linear("tau"), Axis::linear("|Gamma| / Gamma0"));
+    let mut paths = CurvePlot::new("Paths relative to the middle", Axis::linear("y / b0"), Axis::linear("z / b0"));
+    for (wind, flow) in &runs {
+        let name = |what: &str| format!("{what}_wind_{wind}");
+        table = table.float(&name("middle"), flow.records.iter().map(middle));
+        drifts = drifts.with(Series::new(&format!("wind {wind} V0"), Style::Line, flow.curve(middle)));
+        for right in [false, true] {
+            let side = if right { "right" } else { "left" };
+            let curve = second(flow, right);
+            table = table.float(&name(&format!("secondary_{side}")), curve.iter().map(|p| p.1));
+            let style = if right { Style::Dash } else { Style::Line };
+            let shown = curve.into_iter().filter(|p| p.1.is_finite()).map(|p| (p.0, p.1.abs()));
+            strengths = strengths.with(Series::new(&format!("wind {wind} V0, {side}"), style, shown));
+            let path = flow.records.iter().map(|r| {
+                let vortex = if right { &r.right } else { &r.left };
+                (vortex.y_m - middle(r), vortex.z_m)
+            });
+            paths = paths.with(Series::new(&format!("wind {wind} V0, {side}"), style, path));
+            let gamma = flow.gamma(right);
+            table = table.float(&name(&format!("gamma_5_15_{side}")), gamma.into_iter().map(|p| p.1));
+        }
+    }
+    Ok(Shown { checks, table, figure: Figure::stacked([drifts, strengths, paths]) })
+}
