@@ -203,10 +203,13 @@ impl WakeMeter {
     }
 
     /// The core in each cross-plane about the one of the mean; NaN where there is none.
-    fn slices(&self, velocity: &Faces, about: Core, sign: f64) -> Vec<[f64; 2]> {
+    fn slices(&self, velocity: &Faces, about: Core, sign: f64, floor_m: f64) -> Vec<[f64; 2]> {
         let radius_m = self.core_radius * self.scales.spacing_m;
         let (ny, nx) = (self.face_m[0].len(), self.curl.cell_m[0].len());
-        let near = |k: usize| (self.face_m[1][k] - about.centre_m[1]).abs() < 2.0 * radius_m;
+        let near = |k: usize| {
+            let z_m = self.face_m[1][k];
+            z_m > floor_m && (z_m - about.centre_m[1]).abs() < 2.0 * radius_m
+        };
         let flat = self.edge_plane(Vec::new());
         let is_beside = |j: usize| flat.lateral_m(about.centre_m[0], self.face_m[0][j]).abs() < 2.0 * radius_m;
         let beside: Vec<usize> = (0..ny).filter(|j| is_beside(*j)).collect();
@@ -244,8 +247,8 @@ impl WakeMeter {
         let gamma_m2_s = self.radii_m().into_iter().map(circulation).collect::<Result<_, _>>()?;
         let above = |y: f64, z: f64| z > ABOVE_LAYER * spacing_m && side.has(y);
         let slices_m = match side.plane.core(centre_m, sign, self.core_radius * spacing_m) {
-            Some(core) if is_found => self.slices(velocity, core, sign),
-            _ => Vec::new(),
+            Some(core) if is_found => self.slices(velocity, core, sign, f64::NEG_INFINITY),
+            _ => vec![[f64::NAN; 2]; self.curl.cell_m[0].len()],
         };
         let [y_spread_m, z_spread_m] = spread(&slices_m);
         let missing = if is_found { 0.0 } else { f64::NAN };
@@ -271,7 +274,7 @@ impl WakeMeter {
         let least_m2_s = LEAST_SECONDARY * self.scales.circulation_m2_s;
         match found {
             Some(core) if core.circulation_m2_s.abs() >= least_m2_s => {
-                let [y_spread_m, z_spread_m] = spread(&self.slices(velocity, core, sign));
+                let [y_spread_m, z_spread_m] = spread(&self.slices(velocity, core, sign, floor_m));
                 let ([y_m, z_m], gamma_m2_s) = (core.centre_m, core.circulation_m2_s);
                 SecondaryRecord { y_m, z_m, y_spread_m, z_spread_m, gamma_m2_s }
             }
