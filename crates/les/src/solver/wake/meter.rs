@@ -269,8 +269,13 @@ impl WakeMeter {
     fn secondary(&self, velocity: &Faces, side: &Side<'_>, above: impl Fn(f64, f64) -> bool) -> SecondaryRecord {
         let sign = -SIGN[side.own];
         let guess_m = side.plane.strongest_m(sign, above);
-        let found =
-            guess_m.and_then(|guess_m| side.plane.core(guess_m, sign, self.core_radius * self.scales.spacing_m));
+        // The layer at the ground has vorticity of the same sign and would draw the centroid down.
+        let floor_m = ABOVE_LAYER * self.scales.spacing_m;
+        let mut upper = side.plane.clone();
+        let below = self.face_m[1].partition_point(|z_m| *z_m <= floor_m) * self.face_m[0].len();
+        upper.vorticity_per_s[..below].fill(0.0);
+        let radius_m = self.core_radius * self.scales.spacing_m;
+        let found = guess_m.and_then(|guess_m| upper.core(guess_m, sign, radius_m));
         let least_m2_s = LEAST_SECONDARY * self.scales.circulation_m2_s;
         match found {
             Some(core) if core.circulation_m2_s.abs() >= least_m2_s => {
