@@ -2,6 +2,7 @@
 //!
 //! A figure is a function from a [`Context`] to the files it writes and the claims it measures.
 
+mod ca_pa;
 mod fig01;
 mod fig03;
 mod fig04;
@@ -15,6 +16,7 @@ mod fig11;
 mod fig12;
 mod fig13;
 mod fig14;
+mod fig17;
 mod fig18;
 mod profiles;
 mod study;
@@ -197,7 +199,7 @@ impl fmt::Display for Claim {
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 16] = [
+pub(crate) const ALL: [Figure; 18] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
     Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
     Figure {
@@ -218,5 +220,7 @@ pub(crate) const ALL: [Figure; 16] = [
     Figure { id: "fig12", number: 12, title: "Error against pulse energy (analytic pair)", make: fig12::make },
     Figure { id: "fig13", number: 13, title: "Correlogram against periodogram accumulation", make: fig13::make },
     Figure { id: "fig14", number: 14, title: "The same at 200 and 400 ns about the centre", make: fig14::make },
+    Figure { id: "fig17", number: 17, title: "Circulation and positions from single scans", make: fig17::make },
     Figure { id: "fig18", number: 18, title: "Velocity estimators against the Cramer-Rao bound", make: fig18::make },
+    Figure { id: "ca_pa", number: 19, title: "CA against PA: where the claim holds", make: ca_pa::make },
 ];

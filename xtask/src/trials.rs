@@ -4,16 +4,17 @@
 
 pub(crate) mod methods;
 pub(crate) mod mixture;
+pub(crate) mod pair;
 pub(crate) mod uniform;
 
 use wakescope_estimate::Sampling;
 use wakescope_signal::{NoiseModel, PlanckConvention, Receiver};
 
 /// Energy of the pulses \[J\]; only the signal-to-noise ratio matters here.
-const ENERGY_J: f64 = 150e-6;
+pub(crate) const ENERGY_J: f64 = 150e-6;
 
 /// The chapter's receiver with the given noise.
-fn receiver(noise: NoiseModel) -> Receiver {
+pub(crate) fn receiver(noise: NoiseModel) -> Receiver {
     Receiver {
         wavelength_m: 1.55e-6,
         sample_rate_hz: 250e6,

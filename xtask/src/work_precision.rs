@@ -1,10 +1,12 @@
-//! `cargo xtask work-precision --crate les|optics`: error against run time, knob by knob.
+//! `cargo xtask work-precision --crate les|optics|signal|estimate`: error against run time, knob by knob.
 //!
 //! Every row is measured in this run, on one thread; the table and the picture go to
 //! `target/work-precision`. Errors are against exact theory, or are standard errors where the case says so.
 
+mod estimate;
 mod les;
 mod optics;
+mod signal;
 
 use crate::workspace::root;
 use crate::{Failure, Outcome};
@@ -31,6 +33,8 @@ pub(crate) struct Options {
 enum Measured {
     Les,
     Optics,
+    Signal,
+    Estimate,
 }
 
 /// One measurement.
@@ -56,6 +60,12 @@ pub(crate) struct Cost {
 impl Cost {
     /// Of what was not timed.
     pub(crate) const NONE: Self = Self { cpu_s: f64::NAN, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
+
+    /// The same for one of `count` equal pieces of work.
+    pub(crate) fn per(self, count: usize) -> Self {
+        let n = count as f64;
+        Self { cpu_s: self.cpu_s / n, wall_s: self.wall_s / n, ..self }
+    }
 }
 
 /// Runs a piece of work and measures it.
@@ -92,6 +102,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let rows = match options.name {
         Measured::Les => pool.install(|| les::rows(options.effort as usize))?,
         Measured::Optics => pool.install(|| optics::rows(options.effort as usize))?,
+        Measured::Signal => pool.install(|| signal::rows(options.effort as usize))?,
+        Measured::Estimate => pool.install(|| estimate::rows(options.effort as usize))?,
     };
     println!(
         "{:<22} {:<34} {:<14} {:>10} {:>11} {:>9}  metric, reference",
@@ -106,6 +118,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let name = match options.name {
         Measured::Les => "les",
         Measured::Optics => "optics",
+        Measured::Signal => "signal",
+        Measured::Estimate => "estimate",
     };
     let parameters = format!("crate = \"{name}\"\neffort = {}\n", options.effort);
     let origin = Provenance {
