@@ -66,9 +66,8 @@ pub(crate) struct PairScan {
     /// Ranges of the map \[m\]; with the elevations, its points.
     pub(crate) range_m: Vec<f64>,
     pub(crate) points: Vec<PolarPoint>,
-    /// Velocity weighted with the pulse, and with pulse and window \[m/s\], at the points; distance to the nearer core \[m\].
+    /// Velocity weighted with the pulse \[m/s\] at the points; distance to the nearer core \[m\].
     pub(crate) v_pulse_m_s: Vec<f64>,
-    pub(crate) v_gate_m_s: Vec<f64>,
     pub(crate) distance_m: Vec<f64>,
 }
 
@@ -122,7 +121,6 @@ impl PairScan {
         };
         Ok(Self {
             v_pulse_m_s: truth(RangeFilter::pulse(pulse, thickness_m)?)?,
-            v_gate_m_s: truth(RangeFilter::gate(pulse, &[1.0; WINDOW], 250e6, thickness_m)?)?,
             distance_m: points.iter().map(distance).collect(),
             snr: 10f64.powf(0.1 * snr_db),
             simulator,
