@@ -148,7 +148,7 @@ pub(crate) const ALL: [Curve; 14] = [
         "les/ground_pair_enstrophy",
         GROUND_PAIR,
         ("tau", GROUND_PAIR_ENSTROPHY),
-        2e-2,
+        2e-3,
         compute::pair_enstrophy,
     ),
     independent("les/inviscid_pair_y", HYPERBOLA, ("tau", "y"), 5e-9, compute::pair_y),

@@ -8,28 +8,20 @@ pub(crate) mod pair;
 pub(crate) mod uniform;
 
 use wakescope_estimate::Sampling;
-use wakescope_signal::{NoiseModel, PlanckConvention, Receiver};
+use wakescope_signal::{NoiseModel, Receiver};
+use wakescope_sim::{join, scene::Scene};
 
 /// Energy of the pulses \[J\]; only the signal-to-noise ratio matters here.
 pub(crate) const ENERGY_J: f64 = 150e-6;
 
-/// The chapter's receiver with the given noise.
+/// The receiver of Table 2 with the given noise.
 pub(crate) fn receiver(noise: NoiseModel) -> Receiver {
-    Receiver {
-        wavelength_m: 1.55e-6,
-        sample_rate_hz: 250e6,
-        intermediate_frequency_hz: 80e6,
-        bandwidth_hz: 50e6,
-        quantum_efficiency: 1.0,
-        local_oscillator_w: 1e-3,
-        planck: PlanckConvention::H,
-        noise,
-    }
+    Receiver { noise, ..join::receiver(&Scene::default()) }
 }
 
 /// The same in the words of the estimators.
-pub(crate) fn sampling() -> Result<Sampling, wakescope_estimate::Error> {
-    Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6))
+pub(crate) fn sampling() -> Result<Sampling, wakescope_sim::Error> {
+    join::sampling(&Scene::default())
 }
 
 /// Name of a noise in tables.

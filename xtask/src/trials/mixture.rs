@@ -63,7 +63,7 @@ mod tests {
 
     /// Quantiles of a Gaussian of deviation 0.3 about 0.1, and of a floor over 40 m/s.
     fn drawn(good: usize, bad: usize) -> Vec<f64> {
-        // the sum of twelve evenly spread numbers would do; a sine series of low discrepancy is exact enough
+        // rational approximation of the quantile, Abramowitz & Stegun 26.2.23: within 4.5e-4
         let bell = (0..good).map(|i| {
             let p = (i as f64 + 0.5) / good as f64;
             let t = (-2.0 * p.min(1.0 - p).ln()).sqrt();

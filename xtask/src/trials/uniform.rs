@@ -15,7 +15,7 @@ use wakescope_signal::{
 
 /// Velocities lie within this distance of rest \[m/s\]: the band ends at 19.4.
 const FASTEST_M_S: f64 = 14.0;
-/// Width of the band \[m/s\]: where bad estimates lie.
+/// Width of the band \[m/s\], its 50 MHz times half a wavelength: where bad estimates lie.
 pub(crate) const BAND_M_S: f64 = 38.75;
 /// Name of the estimator that takes a single window.
 pub(crate) const BURG: &str = "Burg(16), pole";

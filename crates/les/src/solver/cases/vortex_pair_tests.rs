@@ -44,11 +44,20 @@ fn left_and_right_mirror_each_other_to_round_off() {
 
 #[test]
 fn over_a_frictionless_ground_the_pair_follows_the_hyperbola() {
-    let pair = VortexPairCase { sticky_ground: false, reynolds: 1e6, size: [1.0, 8.0, 4.0], ..plane([192, 96]) };
+    // Compact cores: the tails of algebraic ones overlap with their images.
+    let pair = VortexPairCase {
+        sticky_ground: false,
+        reynolds: 1e6,
+        size: [1.0, 8.0, 4.0],
+        core_radius: 0.12,
+        profile: CirculationProfile::LambOseen,
+        ..plane([192, 96])
+    };
     let (_, records) = history(&pair, 0.25, 1.0);
     for record in records.iter().skip(1) {
         let (y, z) = (record.right.y_m, record.right.z_m);
         let invariant = 1.0 / (y * y) + 1.0 / (z * z);
+        eprintln!("{} {y} {z} {invariant}", record.time_s);
         assert!((invariant / 5.0 - 1.0).abs() < 0.04, "{y}, {z}");
     }
     let last = &records[4].right;
