@@ -23,7 +23,7 @@ use crate::gradient::GradientModel;
 use crate::linalg::hermitian_eigen;
 use crate::sample::{Sample, Scratch, SignalKind};
 use crate::sampling::Sampling;
-use crate::search::{PeakSearch, beyond_doubt, density_limit, highest, unusable};
+use crate::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
 use crate::statistic::{Estimator, Statistic};
 use crate::velocity::{GateVelocity, Quality, Refinement};
 use crate::zoom::ZoomSpectrum;
@@ -129,6 +129,13 @@ impl<S: Sample> GradientLikelihood<S> {
             whole: ZoomSpectrum::new(SignalKind::Complex, n, sampling, &grid_hz)?,
             search,
         };
+        // Tapers of other gradients are these with a chirp, which takes out that of the wind.
+        let slowest = (0..tapers.len()).min_by(|&a, &b| gradient_per_s[a].abs().total_cmp(&gradient_per_s[b].abs()));
+        if let Some(slowest) = slowest {
+            let tone = expected_lags(&Array2::ones((n, n)), &tapers[slowest]);
+            let weights: Vec<f64> = tone.iter().step_by(2).map(|weight| weight / tone[0]).collect();
+            estimator.search.own_width = own_width_cycles(&weights) * padded_samples as f64;
+        }
         if S::KIND == SignalKind::Real {
             let read = gradient_per_s.iter().zip(&tapers).map(|(&g, tapers)| estimator.readings(model, g, snr, tapers));
             estimator.corrections = read.collect::<Result<_, _>>()?;

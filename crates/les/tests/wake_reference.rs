@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 use wakescope_les::cases::VortexPairCase;
-use wakescope_les::{SubgridModel, TimeStep, WakeRecord, WakeScales};
+use wakescope_les::{SubgridModel, WakeRecord, WakeScales};
 
 /// Rows of the stored run: tau first.
 fn stored() -> Vec<Vec<f64>> {
@@ -20,7 +20,7 @@ fn stored() -> Vec<Vec<f64>> {
 fn plane_flow(subgrid: SubgridModel, end: f64) -> (Vec<WakeRecord>, f64) {
     let pair = VortexPairCase { cells: [1, 128, 80], subgrid, ..VortexPairCase::coarse() };
     let mut meter = pair.meter(&WakeScales::REDUCED).unwrap();
-    let case = pair.case(TimeStep::Courant { courant: 0.35, longest_s: 0.01 }).unwrap();
+    let case = pair.case(VortexPairCase::steps(0.01)).unwrap();
     let (mut flow, _) = case.start().unwrap();
     let mut records = vec![meter.measure(&flow).unwrap()];
     let mut worst = 0.0_f64;
@@ -59,8 +59,7 @@ fn the_plane_phase_is_that_of_the_independent_code_without_and_with_the_multisca
                 assert!((record.energy_m4_s2 / row[11] - 1.0).abs() < 0.005, "tau {tau}: {}", record.energy_m4_s2);
             }
         }
-        // The layer at the wall is a few cells thick; on finer meshes the two are closer.
-        assert!(dissipation < 0.015, "2 nu Z against the viscous power: {dissipation}");
+        assert!(dissipation < 0.005, "2 nu Z against the viscous power: {dissipation}");
         // Separated, with secondary vortices up; the stored run has 0.34 of the circulation above the layer at 1.5.
         let at = &records[15];
         assert!(at.left.outward_shear_per_s < 0.0 && at.right.outward_shear_per_s < 0.0);

@@ -3,7 +3,7 @@
 use crate::Failure;
 use wakescope_estimate::{Noise, SignalKind, WindowModel};
 use wakescope_les::cases::{TollmienSchlichting, VortexPairCase};
-use wakescope_les::{Flow, Ground, Motion, TimeStep, VortexPair, m4_prime as kernel};
+use wakescope_les::{Flow, Ground, Motion, VortexPair, m4_prime as kernel};
 use wakescope_optics::{RadiusDefinition, SnrModel, Telescope, hankel, theory};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
@@ -76,7 +76,7 @@ pub(super) fn pair_enstrophy(tau: &[f64]) -> Values {
         perturbation: 0.0,
         ..VortexPairCase::default()
     };
-    let (mut flow, _) = pair.case(TimeStep::Courant { courant: 0.35, longest_s: 0.01 })?.start()?;
+    let (mut flow, _) = pair.case(VortexPairCase::steps(0.01))?.start()?;
     let viscosity = 2.0 * std::f64::consts::PI / reynolds;
     let mut values = Vec::new();
     for &tau in tau {

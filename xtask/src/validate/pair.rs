@@ -71,12 +71,12 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
 
 /// Point vortices and their images follow `1/y^2 + 1/z^2 = 5`; compact cores in a wide box without friction should, too.
 pub(super) fn show_hyperbola(profile: Profile) -> Result<Shown, Failure> {
-    let cells = if profile == Profile::Quick { [1, 320, 96] } else { [1, 480, 144] };
+    let cells = if profile == Profile::Quick { [1, 384, 128] } else { [1, 560, 176] };
     let pair = VortexPairCase {
         cells,
-        size: [1.0, 18.0, 6.0],
-        ground_stretch: 1.5,
-        lateral_stretch: 0.3,
+        size: [1.0, 36.0, 11.0],
+        ground_stretch: 2.0,
+        lateral_stretch: 0.55,
         core_radius: 0.12,
         profile: CirculationProfile::LambOseen,
         reynolds: 1e7,

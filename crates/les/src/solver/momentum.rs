@@ -12,7 +12,7 @@ use super::convection::convection_row;
 use super::layout::Layout;
 use super::line::{DIFFERENCE, Taps};
 use super::rows::{Columns, HALO, add_even, add_rows, pad};
-use super::transport::Transport;
+use super::transport::{Stencil, Transport};
 
 /// The operators of one component.
 #[derive(Debug, Clone)]
@@ -100,6 +100,7 @@ impl Momentum {
             rows
         });
         let flux_mean = own.flux_mean();
+        let stencil = Stencil::of(line);
         let gradient = own.gradient();
         let columns = |rows: &[Taps], of: usize| {
             if of == 0 { Columns::new(rows, line[0].is_periodic()) } else { Columns::default() }
@@ -113,7 +114,7 @@ impl Momentum {
             flux_mean,
             equal_mass: own.is_fourier().then(|| own.cell_mass_m[0]),
             transport: std::array::from_fn(|b| {
-                if b == axis { line[b].transport_of_faces() } else { line[b].transport_of_cells() }
+                if b == axis { line[b].transport_of_faces(stencil) } else { line[b].transport_of_cells(stencil) }
             }),
             inverse_cell_mass: std::array::from_fn(|b| line[b].cell_mass_m.iter().map(inverse).collect()),
             inverse_face_mass,

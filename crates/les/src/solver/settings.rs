@@ -34,10 +34,14 @@ impl TimeScheme {
     }
 
     /// Courant number that the scheme runs at by default.
+    ///
+    /// Waves of the mesh turn by at most 1.59 times the Courant number in a step (sixth-order transport). Runge-Kutta is
+    /// stable up to 1.73. Adams-Bashforth lets every wave grow by `angle^4/4` per step, so that viscosity or a model has to
+    /// take that out of the shortest: without either, short runs or a smaller number.
     pub fn default_courant(self) -> f64 {
         match self {
             Self::AdamsBashforth2 => 0.35,
-            Self::RungeKutta3 => 1.2,
+            Self::RungeKutta3 => 1.0,
         }
     }
 

@@ -11,8 +11,9 @@
 //!
 //! These pairs carry waves of four cells a quarter too slowly. Any skew matrix whose row sums vanish may be added to `S^n`
 //! without touching energy or momentum; on the four cells about a face there is one that keeps the order, and its share
-//! is chosen such that a uniform flux carries waves with the error of the sixth-order central difference. It is left out along directions with a
-//! no-slip wall, where the closure below takes its place: both are closed so that the rows match the summation-by-parts divergence.
+//! is chosen such that a uniform flux carries waves with the error of the sixth-order central difference. It is left out along
+//! all directions if one of them has a no-slip wall, whose closure belongs to the pairs: a vortex that turns is to meet the
+//! same errors in all directions.
 //!
 //! Check: skewness, row sums, speed of waves, exactness for parabolas, mirror symmetry of the two walls.
 
@@ -55,9 +56,14 @@ pub(crate) struct Stencil {
 
 impl Stencil {
     /// Pairs alone.
-    const PLAIN: Self = Self::with(0.0);
+    pub(crate) const PLAIN: Self = Self::with(0.0);
     /// Sixth order in a uniform flux.
-    const WIDE: Self = Self::with(SIXTH);
+    pub(crate) const WIDE: Self = Self::with(SIXTH);
+
+    /// That of a mesh with these directions.
+    pub(crate) fn of(lines: &[Line]) -> Self {
+        if lines.iter().all(|line| line.no_slip() == [false; 2]) { Self::WIDE } else { Self::PLAIN }
+    }
 
     const fn with(share: f64) -> Self {
         Self { near: [-share, PAIR[0] + 3.0 * share, -2.0 * share], far: [share, -2.0 * share, PAIR[1] + share] }
@@ -139,11 +145,10 @@ impl Line {
             .collect()
     }
 
-    /// Transport of values at the centres by the fluxes through the faces.
-    pub(crate) fn transport_of_cells(&self) -> Transport {
+    /// Transport of values at the centres by the fluxes through the faces; pairs alone at a no-slip wall.
+    pub(crate) fn transport_of_cells(&self, stencil: Stencil) -> Transport {
         let n = self.cells;
         let mut rows = vec![Vec::new(); n];
-        let stencil = self.stencil();
         if self.is_thin() {
             return Transport { rows, regular: 0..0, stencil };
         }
@@ -174,16 +179,10 @@ impl Line {
         Transport { rows, regular: regular(3, n.saturating_sub(3)), stencil }
     }
 
-    /// The closure at no-slip walls belongs to the pairs.
-    fn stencil(&self) -> Stencil {
-        if self.no_slip() == [false; 2] { Stencil::WIDE } else { Stencil::PLAIN }
-    }
-
-    /// Transport of the normal velocity at the faces by itself.
-    pub(crate) fn transport_of_faces(&self) -> Transport {
+    /// Transport of the normal velocity at the faces by itself; pairs alone at a no-slip wall.
+    pub(crate) fn transport_of_faces(&self, stencil: Stencil) -> Transport {
         let n = self.cells;
         let mut rows = vec![Vec::new(); n];
-        let stencil = self.stencil();
         if self.is_thin() {
             return Transport { rows, regular: 0..0, stencil };
         }
@@ -245,6 +244,13 @@ mod tests {
         ]
     }
 
+    /// What may be used along a direction.
+    fn stencils(line: &Line) -> Vec<Stencil> {
+        let mut stencils = vec![Stencil::PLAIN];
+        stencils.extend((line.no_slip() == [false; 2]).then_some(Stencil::WIDE));
+        stencils
+    }
+
     /// `S^n` of a transport as dense matrices.
     fn dense(rows: &[Vec<Product>], n: usize) -> Vec<Vec<Vec<f64>>> {
         let mut matrices = vec![vec![vec![0.0; n]; n]; n];
@@ -260,7 +266,8 @@ mod tests {
     fn transport_is_skew_for_every_flux() {
         for direction in kinds() {
             let line = Line::new(&direction);
-            for transport in [line.transport_of_cells(), line.transport_of_faces()] {
+            let both = |s| [line.transport_of_cells(s), line.transport_of_faces(s)];
+            for transport in stencils(&line).into_iter().flat_map(both) {
                 for matrix in dense(&transport.rows, line.cells) {
                     for i in 0..line.cells {
                         for j in 0..line.cells {
@@ -278,12 +285,14 @@ mod tests {
             let line = Line::new(&direction);
             let n = line.cells;
             let first = line.first_face();
-            let matrices = dense(&line.transport_of_cells().rows, n);
-            for face in first..n {
-                for cell in 0..n {
-                    let sum: f64 = matrices[face][cell].iter().sum();
-                    let made: f64 = line.divergence[cell].iter().filter(|t| t.0 == face).map(|t| t.1).sum();
-                    assert!((sum - 0.5 * made).abs() < 4e-16, "{direction:?}: flux {face}, cell {cell}");
+            for stencil in stencils(&line) {
+                let matrices = dense(&line.transport_of_cells(stencil).rows, n);
+                for face in first..n {
+                    for cell in 0..n {
+                        let sum: f64 = matrices[face][cell].iter().sum();
+                        let made: f64 = line.divergence[cell].iter().filter(|t| t.0 == face).map(|t| t.1).sum();
+                        assert!((sum - 0.5 * made).abs() < 4e-16, "{direction:?}: flux {face}, cell {cell}");
+                    }
                 }
             }
         }
@@ -331,7 +340,7 @@ mod tests {
     #[test]
     fn transport_along_a_wall_is_exact_for_a_parabolic_flux() {
         let line = Line::new(&Direction::between(24, 0.0, 24.0, Wall::AT_REST, Wall::AT_REST));
-        let transport = line.transport_of_cells();
+        let transport = line.transport_of_cells(Stencil::PLAIN);
         // q = 1, F = z^2: the skew form gives half the derivative of F, and the same for F = z, q = z is exact to z^2.
         for (k, row) in transport.rows.iter().take(6).enumerate() {
             let z = k as f64 + 0.5;
@@ -362,8 +371,10 @@ mod tests {
     fn rows_called_regular_follow_the_formula_of_the_interior() {
         for direction in kinds() {
             let line = Line::new(&direction);
-            let faces = line.transport_of_faces();
-            for m in faces.regular.clone() {
+            for (faces, m) in stencils(&line).into_iter().flat_map(|stencil| {
+                let faces = line.transport_of_faces(stencil);
+                faces.regular.clone().map(move |m| (faces.clone(), m))
+            }) {
                 let matrices = dense(&faces.rows, line.cells);
                 for (face, value, _) in interior_products(faces.stencil, m as isize) {
                     let expected: f64 = interior_products(faces.stencil, m as isize)

@@ -96,8 +96,9 @@ section! {
         /// Time at which the run ends \[s\]; that of the literature if absent.
         #[serde(skip_serializing_if = "Option::is_none")]
         end_s: Option<f64> = None,
-        /// Time integration of convection.
-        scheme: Scheme = Scheme::AdamsBashforth2,
+        /// Time integration of convection; that of the case if absent.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        scheme: Option<Scheme> = None,
         /// Fixed time step \[s\]; if absent, a Courant number controls it.
         #[serde(skip_serializing_if = "Option::is_none")]
         step_s: Option<f64> = None,

@@ -246,7 +246,6 @@ impl VortexPairFlow {
     fn case(&self) -> Result<Case, wakescope_les::Error> {
         let Self { cells, size, ground_stretch, height, core_radius, reynolds, .. } = *self;
         let profile = join::circulation_profile(self.profile);
-        let courant = TimeScheme::AdamsBashforth2.default_courant();
         VortexPairCase {
             cells,
             size,
@@ -261,6 +260,6 @@ impl VortexPairFlow {
             cross_wind: self.cross_wind,
             ..VortexPairCase::coarse()
         }
-        .case(TimeStep::Courant { courant, longest_s: 0.02 })
+        .case(VortexPairCase::steps(0.02))
     }
 }

@@ -35,8 +35,9 @@ impl Setup {
         let (s, solver) = (&mut setup.settings, &case.solver);
         let own_scheme = s.scheme;
         s.scheme = match case.time.scheme {
-            Scheme::AdamsBashforth2 => TimeScheme::AdamsBashforth2,
-            Scheme::RungeKutta3 => TimeScheme::RungeKutta3,
+            None => own_scheme,
+            Some(Scheme::AdamsBashforth2) => TimeScheme::AdamsBashforth2,
+            Some(Scheme::RungeKutta3) => TimeScheme::RungeKutta3,
         };
         s.time_step = time_step(case, s.time_step, s.scheme != own_scheme, s.scheme);
         s.damped_steps = case.time.damped_steps;

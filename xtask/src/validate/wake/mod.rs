@@ -14,12 +14,10 @@ use super::{interpolate, numbers};
 use crate::Failure;
 use std::f64::consts::TAU;
 use wakescope_les::cases::VortexPairCase;
-use wakescope_les::{TimeStep, WakeMeter, WakeRecord, WakeScales};
+use wakescope_les::{WakeMeter, WakeRecord, WakeScales};
 
 /// Records per unit of tau.
 pub(super) const PER_TAU: usize = 20;
-/// Courant number of the runs.
-const COURANT: f64 = 0.35;
 
 /// One run, in the units of the pair.
 pub(super) struct History {
@@ -56,7 +54,7 @@ pub(super) fn run(pair: &VortexPairCase, end: f64) -> Result<History, Failure> {
 
 /// The same with a meter of one's own.
 pub(super) fn run_with(pair: &VortexPairCase, mut meter: WakeMeter, end: f64) -> Result<History, Failure> {
-    let (mut flow, _) = pair.clone().case(TimeStep::Courant { courant: COURANT, longest_s: 0.01 })?.start()?;
+    let (mut flow, _) = pair.clone().case(VortexPairCase::steps(0.01))?.start()?;
     let [length, viscosity] = [pair.size[0], TAU / pair.reynolds];
     let mut history = History { records: vec![meter.measure(&flow)?], budget_error: 0.0, dissipation_error: 0.0 };
     // Energy rate of a step and the powers at its start wait for the powers at its end.

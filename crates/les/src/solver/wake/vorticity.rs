@@ -1,7 +1,7 @@
 //! The vorticity of a flow at the edges of its cells, and what is summed from it.
 //!
 //! Component `c` lies at the edges along `c`: at centres in its own direction, at faces in the two others. Differences are
-//! of fourth order ([`Slope`]); the sums are trapezoidal.
+//! of fourth order ([`Slope`]); the sums are trapezoidal, that of the enstrophy with an end correction at the ground.
 //!
 //! Check: solid rotation and sheared columns; enstrophy against the dissipation of a decaying exact flow.
 
@@ -11,6 +11,9 @@ use super::super::flow::Flow;
 use super::super::mesh::{AXIS_NAMES, Ends, Mesh};
 use super::slope::Slope;
 use crate::Error;
+
+/// Weights of the first faces over those of the trapezoidal rule: 3/8, 7/6, 23/24 for 1/2, 1, 1.
+const GREGORY: [f64; 3] = [0.75, 7.0 / 6.0, 23.0 / 24.0];
 
 /// Velocities at the low faces of the cells, `[z][y][x]` \[m/s\].
 pub(super) type Faces = [Vec<f64>; 3];
@@ -27,6 +30,8 @@ pub(super) struct Curl {
     pub(super) cell_m: [Vec<f64>; 3],
     /// Lengths about the faces, from centre to centre, half a cell at the ends \[m\].
     pub(super) face_m: [Vec<f64>; 3],
+    /// The same along z with Gregory's end correction at the ground: the squared vorticity falls steeply there.
+    corrected_m: Vec<f64>,
 }
 
 impl Curl {
@@ -59,7 +64,12 @@ impl Curl {
             (cell, about)
         };
         let lengths = [0, 1, 2].map(lengths);
+        let mut corrected_m = lengths[2].1.clone();
+        for (length_m, factor) in corrected_m.iter_mut().zip(GREGORY) {
+            *length_m *= factor;
+        }
         Ok(Self {
+            corrected_m,
             cells,
             faces: std::array::from_fn(|d| cells[d] + usize::from(!periodic[d])),
             slope: std::array::from_fn(|along| std::array::from_fn(|c| Slope::new(&directions[along], c))),
@@ -127,7 +137,8 @@ impl Curl {
             .map(|c| {
                 let [ny, nz] = self.places(c);
                 let weight = |d: usize| if c == d { &self.cell_m[d] } else { &self.face_m[d] };
-                let (x_m, y_m, z_m) = (weight(0), weight(1), weight(2));
+                let (x_m, y_m) = (weight(0), weight(1));
+                let z_m = if c == 2 { &self.cell_m[2] } else { &self.corrected_m };
                 let plane = |k: usize| {
                     let mut row = vec![0.0; nx];
                     let mut sum = 0.0;

@@ -17,7 +17,7 @@ use crate::Error;
 use crate::scene::section;
 use serde::{Deserialize, Serialize};
 use wakescope_les::cases::{Case, VortexPairCase};
-use wakescope_les::{Aircraft, CirculationProfile, SubgridModel, TimeScheme, TimeStep, WakeScales};
+use wakescope_les::{Aircraft, CirculationProfile, SubgridModel, WakeScales};
 
 /// Longest step, in `tau`.
 const LONGEST_STEP: f64 = 0.01;
@@ -264,11 +264,10 @@ impl WakeFlow {
         let scales = self.pair.scales().map_err(Error::Flow)?;
         let pair = self.pair_case().map_err(Error::Flow)?;
         let unit_s = scales.time_unit_s();
-        let courant = TimeScheme::AdamsBashforth2.default_courant();
-        let step = TimeStep::Courant { courant, longest_s: LONGEST_STEP * unit_s };
         let window = self.circulation_radii_m.map(|r| r / scales.spacing_m);
         let meter = pair.meter(&scales).and_then(|meter| meter.with_window(window)).map_err(Error::Flow)?;
-        let Case { mesh, settings, initial, end_s } = pair.scaled(&scales, step).map_err(Error::Flow)?;
+        let Case { mesh, settings, initial, end_s } =
+            pair.scaled(&scales, VortexPairCase::steps(LONGEST_STEP * unit_s)).map_err(Error::Flow)?;
         let wake = Some(WakeSetup { meter, scales });
         Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0 / unit_s, wake })
     }
