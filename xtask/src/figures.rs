@@ -22,7 +22,6 @@ mod profiles;
 mod study;
 mod tab01;
 mod tab02;
-mod wake;
 
 use crate::Failure;
 use std::fmt;
@@ -58,6 +57,8 @@ pub(crate) struct Context {
     pub(crate) seed: u64,
     /// Folder for runs that several figures share.
     pub(crate) stages: PathBuf,
+    /// Folder of a wake that is to be shown instead of that of the profile.
+    pub(crate) wake: Option<PathBuf>,
 }
 
 impl Context {

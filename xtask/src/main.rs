@@ -12,6 +12,7 @@ mod reproduce;
 mod tidy;
 mod trials;
 mod validate;
+mod wakes;
 mod work_precision;
 mod workspace;
 

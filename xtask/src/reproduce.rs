@@ -36,6 +36,9 @@ pub(crate) struct Options {
     /// Draw everything anew.
     #[arg(long)]
     no_cache: bool,
+    /// Folder of a finished `wakescope wake` that figures 6 to 8 show, instead of the run of the profile.
+    #[arg(long, value_name = "DIR")]
+    wake: Option<PathBuf>,
 }
 
 /// Runs the task.
@@ -48,7 +51,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
     std::fs::create_dir_all(&out).map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
     let cache = cache::Cache::new(options.profile, options.seed)?;
-    let context = Context { profile: options.profile, seed: options.seed, stages: cache.stages() };
+    let context =
+        Context { profile: options.profile, seed: options.seed, stages: cache.stages(), wake: options.wake.clone() };
+    // The key of the cache knows nothing of that folder.
+    let anew = options.no_cache || options.wake.is_some();
     if options.no_cache && context.stages.exists() {
         std::fs::remove_dir_all(&context.stages)?;
     }
@@ -57,7 +63,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let mut done = Vec::new();
     for figure in chosen {
         bar.set_message(figure.id);
-        let cached = if options.no_cache { None } else { cache.load(figure.id) };
+        let cached = if anew { None } else { cache.load(figure.id) };
         let from_cache = cached.is_some();
         let rendered = match cached {
             Some(rendered) => rendered,
@@ -65,7 +71,9 @@ pub(crate) fn run(options: &Options) -> Outcome {
                 let start = Instant::now();
                 let mut rendered = pool.install(|| (figure.make)(&context))?;
                 rendered.timings.push(("total".into(), start.elapsed().as_secs_f64()));
-                cache.store(figure.id, &rendered)?;
+                if options.wake.is_none() {
+                    cache.store(figure.id, &rendered)?;
+                }
                 rendered
             }
         };

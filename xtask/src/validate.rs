@@ -28,6 +28,9 @@ pub(crate) struct Options {
     /// How fine the meshes are.
     #[arg(long, value_enum, default_value_t = Profile::Quick)]
     profile: Profile,
+    /// Folder of a finished `wakescope wake` in the flow of `coarse` or `medium`: that alone is compared.
+    #[arg(long, value_name = "DIR")]
+    wake: Option<PathBuf>,
     /// Folder to write to.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -130,14 +133,22 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
     println!("{:<16} {:<46} {:>13} {:>13} {:>12}  verdict", "case", "quantity", "measured", "reference", "bar");
     let mut missed = Vec::new();
-    for (name, show) in CASES.into_iter().filter(|case| wanted(case.0)) {
-        let is_long = (name == "les_channel" && options.profile != Profile::Full)
-            || (name == "les_wake_medium" && options.profile == Profile::Quick);
-        if is_long {
-            continue;
-        }
+    type Make<'a> = Box<dyn Fn() -> Result<Shown, Failure> + 'a>;
+    let is_long = |name: &str| {
+        (name == "les_channel" && options.profile != Profile::Full)
+            || (name == "les_wake_medium" && options.profile == Profile::Quick)
+    };
+    let cases: Vec<(&str, Make)> = match &options.wake {
+        Some(run) => vec![("les_wake_files", Box::new(move || wake::show_files(run)))],
+        None => CASES
+            .into_iter()
+            .filter(|case| wanted(case.0) && !is_long(case.0))
+            .map(|(name, show)| (name, Box::new(move || show(options.profile)) as Make))
+            .collect(),
+    };
+    for (name, show) in cases {
         let start = Instant::now();
-        let shown = show(options.profile)?;
+        let shown = show()?;
         for check in &shown.checks {
             let verdict = if check.passes() { "pass" } else { "MISSED" };
             println!(

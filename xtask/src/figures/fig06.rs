@@ -1,8 +1,8 @@
 //! Figure 6: surfaces of equal vorticity of the wake, and an animation of a cross-plane.
 
-use super::wake::Wake;
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
+use crate::wakes::Wake;
 use std::sync::Arc;
 use wakescope_sim::export::{CrossPlanes, Table};
 use wakescope_sim::flow::{read_field, read_planes};

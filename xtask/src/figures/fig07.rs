@@ -1,9 +1,9 @@
 //! Figure 7: circulation and paths of the two vortices of the simulated wake.
 
-use super::wake::Wake;
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
 use crate::validate::{interpolate, numbers};
+use crate::wakes::Wake;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

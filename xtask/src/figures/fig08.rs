@@ -1,8 +1,8 @@
 //! Figure 8: radial velocity of the simulated wake, early and late, and what the lidar makes of it.
 
-use super::wake::Wake;
 use super::{Claim, Context, Rendered};
 use crate::Failure;
+use crate::wakes::Wake;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::export::{Table, VelocityMap};
 use wakescope_sim::plan::{Plan, Target};

@@ -164,7 +164,7 @@ fn an_interrupted_wake_leaves_the_same_histories_fields_and_planes() {
     let spacing_m = std::f64::consts::PI * 60.3 / 4.0;
     assert!((of(1, "y_right_m") / of(1, "y_right") - spacing_m).abs() < 1e-9);
     assert!((of(1, "y_left") + 0.5).abs() < 0.02 && (of(1, "z_right") - 1.0).abs() < 0.02);
-    assert!((of(6, "tau") - 0.2).abs() < 1e-12 && of(6, "z_left") < of(1, "z_left") - 0.05);
+    assert!((of(6, "tau") - 0.2).abs() < 1e-12 && of(4, "z_left") < of(1, "z_left") - 0.03, "it sinks at first");
     assert!(of(6, "gamma_5_15_left_m2_s") < 0.0 && of(6, "gamma_ratio_left") < 1.0);
 }
 

@@ -3,6 +3,8 @@
 use super::{History, PER_TAU, Stored, growth, onset, run, worst};
 use crate::Failure;
 use crate::validate::{Check, Profile, Shown, interpolate};
+use crate::wakes::Wake;
+use std::path::Path;
 use wakescope_les::SubgridModel;
 use wakescope_les::cases::VortexPairCase;
 use wakescope_sim::export::Table;
@@ -68,6 +70,29 @@ pub(crate) fn show_coarse(_: Profile) -> Result<Shown, Failure> {
 /// 48 x 240 x 128 cells.
 pub(crate) fn show_medium(_: Profile) -> Result<Shown, Failure> {
     show(VortexPairCase::medium(), &MEDIUM, None)
+}
+
+/// A finished run of the flow of either preset on its own or a finer mesh, instead of one made here.
+pub(crate) fn show_files(folder: &Path) -> Result<Shown, Failure> {
+    let wake = Wake::read(folder)?;
+    let f = &wake.flow;
+    let like = |pair: &VortexPairCase| {
+        f.reynolds == pair.reynolds
+            && f.core_radius == pair.core_radius
+            && f.perturbation == pair.perturbation
+            && f.size == pair.size
+            && f.cells.iter().zip(pair.cells).all(|(has, least)| *has >= least)
+    };
+    let choices = [(VortexPairCase::medium(), &MEDIUM), (VortexPairCase::coarse(), &COARSE)];
+    let Some((pair, bars)) = choices.into_iter().find(|(pair, _)| like(pair)) else {
+        return Err(Failure::new(format!("{}: no stored run is of this flow", folder.display())));
+    };
+    let (stored, flow) = (Stored::read(bars.file)?, History::read(&wake)?);
+    let plane = run(&VortexPairCase { cells: [1, f.cells[1], f.cells[2]], subgrid: SubgridModel::None, ..pair }, END)?;
+    let mut checks = laminar("", &flow, &stored, bars);
+    checks.extend(turbulent(&flow, &plane, &stored, bars));
+    let figure = figure(&flow, &plane, &stored);
+    Ok(Shown { checks, table: table(&flow), figure })
 }
 
 fn show(pair: VortexPairCase, bars: &Bars, model: Option<VortexPairCase>) -> Result<Shown, Failure> {

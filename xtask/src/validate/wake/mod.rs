@@ -4,9 +4,10 @@
 
 mod bars;
 mod crosswind;
+mod files;
 mod onset;
 
-pub(super) use bars::{show_coarse, show_medium};
+pub(super) use bars::{show_coarse, show_files, show_medium};
 pub(super) use crosswind::show as show_crosswind;
 pub(super) use onset::show as show_onset;
 

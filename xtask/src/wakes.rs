@@ -1,8 +1,8 @@
-//! The simulated wake that figures share: it is run once for a profile, continued where it was interrupted, and read from its
-//! files by every figure.
+//! Simulated wakes read from their files. Figures share one, which is run once for a profile and continued where it was
+//! interrupted, or lies in a folder that was named.
 
-use super::Context;
 use crate::Failure;
+use crate::figures::Context;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -14,21 +14,24 @@ const SERIES_EVERY: f64 = 0.1;
 static RUNNING: Mutex<()> = Mutex::new(());
 
 /// A finished run.
-pub(super) struct Wake {
+pub(crate) struct Wake {
     /// Where its files are.
-    pub(super) folder: PathBuf,
+    pub(crate) folder: PathBuf,
     /// The flow.
-    pub(super) flow: WakeFlow,
+    pub(crate) flow: WakeFlow,
     /// The case as TOML.
-    pub(super) case_toml: String,
+    pub(crate) case_toml: String,
     /// Ages of the whole fields, in the order of the files.
-    pub(super) fields_tau: Vec<f64>,
+    pub(crate) fields_tau: Vec<f64>,
     columns: HashMap<String, Vec<f64>>,
 }
 
 impl Wake {
-    /// The wake of the profile.
-    pub(super) fn of(context: &Context) -> Result<Self, Failure> {
+    /// The wake that was named, or that of the profile.
+    pub(crate) fn of(context: &Context) -> Result<Self, Failure> {
+        if let Some(folder) = &context.wake {
+            return Self::read(folder);
+        }
         let preset = context.choose(WakePreset::Coarse, WakePreset::Medium, WakePreset::Chapter);
         let mut case = preset.case();
         if let Some(output) = &mut case.wake {
@@ -46,16 +49,32 @@ impl Wake {
                 std::fs::write(&done, &file.hash)?;
             }
         }
-        let CaseKind::Wake(flow) = file.case.case.clone() else {
-            return Err(Failure::new("the preset is no wake".into()));
+        Self::from_files(&file, folder)
+    }
+
+    /// The finished run in a folder.
+    pub(crate) fn read(folder: &Path) -> Result<Self, Failure> {
+        let toml = std::fs::read_to_string(folder.join("case.toml"))?;
+        Self::from_files(&CaseFile::parse(&toml, folder)?, folder.to_path_buf())
+    }
+
+    fn from_files(file: &CaseFile, folder: PathBuf) -> Result<Self, Failure> {
+        let (CaseKind::Wake(flow), Some(output)) = (file.case.case.clone(), &file.case.wake) else {
+            return Err(Failure::new(format!("{}: the case is no wake", folder.display())));
         };
-        let fields_tau = file.case.wake.as_ref().map(|wake| wake.fields_tau.clone()).unwrap_or_default();
-        let columns = columns(&std::fs::read_to_string(folder.join("wake.csv"))?)?;
-        Ok(Self { folder, flow: *flow, case_toml: file.toml, fields_tau, columns })
+        let columns = table(&std::fs::read_to_string(folder.join("wake.csv"))?)?;
+        let wake =
+            Self { folder, flow: *flow, case_toml: file.toml.clone(), fields_tau: output.fields_tau.clone(), columns };
+        let reached = wake.column("tau")?.last().copied().unwrap_or(0.0);
+        if reached < output.end_tau - 1e-9 {
+            let place = wake.folder.display();
+            return Err(Failure::new(format!("{place}: the run stands at tau = {reached} of {}", output.end_tau)));
+        }
+        Ok(wake)
     }
 
     /// A column of the history.
-    pub(super) fn column(&self, name: &str) -> Result<&[f64], Failure> {
+    pub(crate) fn column(&self, name: &str) -> Result<&[f64], Failure> {
         self.columns
             .get(name)
             .map(Vec::as_slice)
@@ -63,12 +82,12 @@ impl Wake {
     }
 
     /// A column against `tau`.
-    pub(super) fn curve(&self, name: &str) -> Result<Vec<(f64, f64)>, Failure> {
+    pub(crate) fn curve(&self, name: &str) -> Result<Vec<(f64, f64)>, Failure> {
         Ok(self.column("tau")?.iter().copied().zip(self.column(name)?.iter().copied()).collect())
     }
 
     /// The run in words, its noise among them.
-    pub(super) fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         let [x, y, z] = self.flow.cells;
         format!(
             "simulated flow, {x} x {y} x {z} cells, Γ₀/ν = {}, core {} b₀, noise {} V₀",
@@ -78,7 +97,7 @@ impl Wake {
 }
 
 /// Columns of a table by name; empty places are NaN.
-fn columns(text: &str) -> Result<HashMap<String, Vec<f64>>, Failure> {
+pub(crate) fn table(text: &str) -> Result<HashMap<String, Vec<f64>>, Failure> {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
     let mut columns = vec![Vec::new(); names.len()];
