@@ -59,6 +59,8 @@ pub(crate) struct Context {
     pub(crate) stages: PathBuf,
     /// Folder of a wake that is to be shown instead of that of the profile.
     pub(crate) wake: Option<PathBuf>,
+    /// Whether figures 10 to 14 look at the analytic pair instead of the simulated wake.
+    pub(crate) analytic: bool,
 }
 
 impl Context {
@@ -216,9 +218,9 @@ pub(crate) const ALL: [Figure; 18] = [
     Figure { id: "fig07", number: 7, title: "Circulation and paths of the vortices", make: fig07::make },
     Figure { id: "fig08", number: 8, title: "Radial velocity of the wake, early and late", make: fig08::make },
     Figure { id: "fig09", number: 9, title: "Accumulation level against range", make: fig09::make },
-    Figure { id: "fig10", number: 10, title: "Estimation error and gradient (analytic pair)", make: fig10::make },
-    Figure { id: "fig11", number: 11, title: "Estimated map, late, 400 ns (analytic pair)", make: fig11::make },
-    Figure { id: "fig12", number: 12, title: "Error against pulse energy (analytic pair)", make: fig12::make },
+    Figure { id: "fig10", number: 10, title: "Estimation error and gradient", make: fig10::make },
+    Figure { id: "fig11", number: 11, title: "Estimated map, late, 400 ns", make: fig11::make },
+    Figure { id: "fig12", number: 12, title: "Error against pulse energy", make: fig12::make },
     Figure { id: "fig13", number: 13, title: "Correlogram against periodogram accumulation", make: fig13::make },
     Figure { id: "fig14", number: 14, title: "The same at 200 and 400 ns about the centre", make: fig14::make },
     Figure { id: "fig17", number: 17, title: "Circulation and positions from single scans", make: fig17::make },

@@ -36,9 +36,12 @@ pub(crate) struct Options {
     /// Draw everything anew.
     #[arg(long)]
     no_cache: bool,
-    /// Folder of a finished `wakescope wake` that figures 6 to 8 show, instead of the run of the profile.
+    /// Folder of a finished `wakescope wake` that figures 6 to 14 show, instead of the run of the profile.
     #[arg(long, value_name = "DIR")]
     wake: Option<PathBuf>,
+    /// Figures 10 to 14 on the analytic pair instead of the simulated wake.
+    #[arg(long)]
+    analytic: bool,
 }
 
 /// Runs the task.
@@ -51,10 +54,16 @@ pub(crate) fn run(options: &Options) -> Outcome {
     std::fs::create_dir_all(&out).map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
     let cache = cache::Cache::new(options.profile, options.seed)?;
-    let context =
-        Context { profile: options.profile, seed: options.seed, stages: cache.stages(), wake: options.wake.clone() };
-    // The key of the cache knows nothing of that folder.
-    let anew = options.no_cache || options.wake.is_some();
+    let context = Context {
+        profile: options.profile,
+        seed: options.seed,
+        stages: cache.stages(),
+        wake: options.wake.clone(),
+        analytic: options.analytic,
+    };
+    // The key of the cache knows nothing of these.
+    let is_other = options.wake.is_some() || options.analytic;
+    let anew = options.no_cache || is_other;
     if options.no_cache && context.stages.exists() {
         std::fs::remove_dir_all(&context.stages)?;
     }
@@ -71,7 +80,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
                 let start = Instant::now();
                 let mut rendered = pool.install(|| (figure.make)(&context))?;
                 rendered.timings.push(("total".into(), start.elapsed().as_secs_f64()));
-                if options.wake.is_none() {
+                if !is_other {
                     cache.store(figure.id, &rendered)?;
                 }
                 rendered

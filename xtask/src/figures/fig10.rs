@@ -2,7 +2,7 @@
 //!
 //! Some independent batches of realisations give the correlation its confidence interval.
 
-use super::study::{REFERENCES, Study, early_scene, mean_and_error, stacked, with_method};
+use super::study::{Age, REFERENCES, Sight, Study, early_scene, mean_and_error, stacked, with_method};
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
 use ndarray::Array2;
@@ -16,6 +16,7 @@ const STUDENT: f64 = 3.182;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let realisations = context.choose(4, 32, 100);
+    let sight = Sight::of(context, Age::Early)?;
     let mut out = Rendered::default();
     let (mut tables, mut panels, mut shown) = (Vec::new(), Vec::new(), Vec::new());
     let mut origin = None;
@@ -25,7 +26,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             let mut scene = with_method(early_scene(realisations), "PA");
             scene.detector.snr = reference;
             let batch_context = Context { seed: context.seed + 1_000_003 * batch, ..context.clone() };
-            let study = Study::run(&batch_context, scene)?;
+            let study = Study::run(&batch_context, &sight, scene)?;
             let gradient = gradient_per_s(&study);
             of_rms.push(correlation(&study.map.rms_m_s, &gradient));
             of_std.push(correlation(&study.map.std_m_s, &gradient));
@@ -35,7 +36,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
                 if panels.is_empty() {
                     panels.push(
                         MapPlot::new(&map, 0, "v_exact")?
-                            .titled("Radial velocity, analytic pair")
+                            .titled(&format!("Radial velocity, {}", sight.mark))
                             .labelled("v_R [m/s]"),
                     );
                 }
@@ -50,10 +51,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     out.csv(stacked("snr_reference", &tables).to_csv(&origin)?);
     let figure = Figure::stacked(panels);
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
-    out.marks = vec!["analytic pair".into()];
+    out.marks = vec![sight.mark];
     out.caption = format!(
-        "ANALYTIC PAIR: radial velocity (top) and standard deviation of its estimates by periodogram accumulation over \
-         {realisations} scans of one pulse a line, rho = 2 m, for (14) with h (middle) and as the chapter prints it (bottom)."
+        "Radial velocity (top) and standard deviation of its estimates by periodogram accumulation over \
+         {realisations} scans of one pulse a line, rho = 2 m, for (14) with h (middle) and as the chapter prints it (bottom); {}.",
+        sight.words
     );
     out.claims.push(claim(&shown));
     Ok(out)

@@ -1,6 +1,6 @@
 //! Figure 11: estimated map and its error, late, 400 ns, Cn2 = 1e-15, windows of 64 samples.
 
-use super::study::{REFERENCES, Study, aged, cores_of, early_scene, stacked, with_method, with_turbulence};
+use super::study::{Age, REFERENCES, Sight, Study, early_scene, stacked, with_method, with_turbulence};
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
 use ndarray::Array2;
@@ -9,16 +9,13 @@ use wakescope_sim::plot::{Figure, MapPlot};
 use wakescope_sim::scene::Scene;
 use wakescope_sim::write;
 
-/// The late case.
-const TAU: f64 = 5.0;
 /// Cells that count as those of a vortex, m from its centre.
 const NEAR_M: f64 = 15.0;
 
-fn scene(context: &Context) -> Scene {
+fn scene(context: &Context, sight: &Sight) -> Scene {
     let mut scene = with_method(early_scene(context.choose(4, 24, 100)), "PA");
-    scene.flow = aged(TAU);
-    // The inviscid pair has spread far over the ground.
-    let cores: Vec<(f64, f64)> = cores_of(&scene);
+    // An inviscid pair has spread far over the ground by then.
+    let cores = &sight.cores;
     let (near_m, far_m) = cores.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), c| (a.min(c.0), b.max(c.0)));
     let highest_rad = cores.iter().map(|c| (c.1 + NEAR_M).atan2(c.0)).fold(0.0, f64::max);
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.0, highest_rad);
@@ -43,16 +40,17 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut out = Rendered::default();
     let (mut tables, mut panels, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     let mut origin = None;
+    let sight = Sight::of(context, Age::Late)?;
     for (name, reference) in REFERENCES {
-        let mut scene = scene(context);
+        let mut scene = scene(context, &sight);
         scene.detector.snr = reference;
-        let study = Study::run(context, scene)?;
+        let study = Study::run(context, &sight, scene)?;
         let map = write::velocity_map(&study.plan, &study.map);
         tables.push((name, map_table(&map)?));
         let exact = MapPlot::new(&map, 0, "v_exact")?;
         let mean = MapPlot::new(&map, 0, "radial_velocity")?.coloured(exact.colours);
         if panels.is_empty() {
-            panels.push(exact.titled("Radial velocity, analytic pair, tau = 5").labelled("v_R [m/s]"));
+            panels.push(exact.titled(&format!("Radial velocity, {}", sight.mark)).labelled("v_R [m/s]"));
         }
         panels.push(mean.titled(&format!("Mean estimate, {name} signal-to-noise ratio")).labelled("v_R [m/s]"));
         let error = MapPlot::new(&map, 0, "rms")?;
@@ -64,10 +62,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     out.csv(stacked("snr_reference", &tables).to_csv(&origin)?);
     let figure = Figure::stacked(panels);
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
-    out.marks = vec!["analytic pair".into()];
+    out.marks = vec![sight.mark];
     out.caption = format!(
-        "ANALYTIC PAIR at tau = {TAU} on the inviscid path: 400 ns, Cn2 = 1e-15, N = 64 (a gate of 38.4 m), periodogram \
-         accumulation, rho = 2 m, one pulse a line; mean estimate and root mean square error (33) against v_pulse."
+        "Late: 400 ns, Cn2 = 1e-15, N = 64 (a gate of 38.4 m), periodogram \
+         accumulation, rho = 2 m, one pulse a line; mean estimate and root mean square error (33) against v_pulse; {}.",
+        sight.words
     );
     out.claims.push(claim(&measured));
     Ok(out)

@@ -1,6 +1,8 @@
 //! Figure 12: error of correlogram accumulation against range for four pulse energies, Cn2 = 1e-13, 200 ns.
 
-use super::study::{Average, INSIDE_M, OUTSIDE_M, REFERENCES, Study, early_scene, with_method, with_turbulence};
+use super::study::{
+    Age, Average, INSIDE_M, OUTSIDE_M, REFERENCES, Sight, Study, early_scene, with_method, with_turbulence,
+};
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
 use wakescope_sim::export::Table;
@@ -28,11 +30,16 @@ fn scene(context: &Context) -> Scene {
     with_turbulence(context, with_method(early_scene(context.choose(3, 24, 100)), "CA"), 1e-13)
 }
 
-fn curve(context: &Context, reference: (&'static str, SnrReference), energy_j: f64) -> Result<Curve, Failure> {
+fn curve(
+    context: &Context,
+    sight: &Sight,
+    reference: (&'static str, SnrReference),
+    energy_j: f64,
+) -> Result<Curve, Failure> {
     let mut scene = scene(context);
     scene.detector.snr = reference.1;
     scene.pulse.energy_j = energy_j;
-    let study = Study::run(context, scene)?;
+    let study = Study::run(context, sight, scene)?;
     let lines = study.map.elevation_rad.len();
     let at = |gate: usize| (0..lines).map(|line| (line, gate)).collect::<Vec<_>>();
     let over_lines = (0..study.map.range_m.len()).map(|gate| study.over_profile(&at(gate))).collect();
@@ -59,12 +66,13 @@ fn curve(context: &Context, reference: (&'static str, SnrReference), energy_j: f
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut curves = Vec::new();
+    let sight = Sight::of(context, Age::Early)?;
     for reference in REFERENCES {
         for energy_j in ENERGIES_J {
-            curves.push(curve(context, reference, energy_j)?);
+            curves.push(curve(context, &sight, reference, energy_j)?);
         }
     }
-    let origin = context.provenance_of_formula(&context.scene_file(scene(context))?.toml);
+    let origin = context.provenance_of_formula(&sight.scene(context, scene(context)).to_toml());
     let mut out = Rendered::default();
     out.csv(table(&curves).to_csv(&origin)?);
     let styles = [Style::Dash, Style::Dot, Style::DashDot, Style::Line];
@@ -84,11 +92,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     };
     let figure = Figure::stacked(REFERENCES.map(|(name, _)| panel(name)));
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
-    out.marks = vec!["analytic pair".into()];
-    out.caption = "ANALYTIC PAIR: root mean square over the lines of sight of the error (33) of correlogram accumulation, rho = 2 m, \
+    out.marks = vec![sight.mark];
+    out.caption = format!(
+        "Root mean square over the lines of sight of the error (33) of correlogram accumulation, rho = 2 m, \
                    200 ns, Cn2 = 1e-13, one pulse a line. sigma_v of the chapter is the root of a squared error: bias and scatter \
-                   together; the table has both."
-        .into();
+                   together; the table has both; {}.",
+        sight.words
+    );
     out.claims = vec![outside_claim(&curves), inside_claim(&curves), ratio_claim()?];
     Ok(out)
 }

@@ -1,6 +1,6 @@
 //! Figure 13: correlogram against periodogram accumulation on the early pair, 200 ns, and how it depends on the SNR.
 
-use super::study::{INSIDE_M, REFERENCES, Study, mean_and_error, near_scene, with_method};
+use super::study::{Age, INSIDE_M, REFERENCES, Sight, Study, mean_and_error, near_scene, with_method};
 use super::{Claim, Context, Rendered, Verdict, profiles};
 use crate::Failure;
 use profiles::{Profiles, edge_level};
@@ -22,7 +22,13 @@ struct Pair {
     differences_m_s: Vec<f64>,
 }
 
-fn pair(context: &Context, name: &'static str, reference: SnrReference, realisations: usize) -> Result<Pair, Failure> {
+fn pair(
+    context: &Context,
+    sight: &Sight,
+    name: &'static str,
+    reference: SnrReference,
+    realisations: usize,
+) -> Result<Pair, Failure> {
     let (mut batches, mut differences_m_s) = ([Vec::new(), Vec::new()], Vec::new());
     for batch in 0..BATCHES {
         let batch_context = Context { seed: context.seed + 1_000_003 * batch, ..context.clone() };
@@ -30,7 +36,7 @@ fn pair(context: &Context, name: &'static str, reference: SnrReference, realisat
         for (place, method) in ["PA", "CA"].into_iter().enumerate() {
             let mut scene = with_method(near_scene(realisations), method);
             scene.detector.snr = reference;
-            let profiles = Profiles::of(method, name, &Study::run(&batch_context, scene)?)?;
+            let profiles = Profiles::of(method, name, &Study::run(&batch_context, sight, scene)?)?;
             level_m_s[place] = profiles.inside.rms_m_s - edge_level(&profiles);
             batches[place].push(profiles);
         }
@@ -42,11 +48,13 @@ fn pair(context: &Context, name: &'static str, reference: SnrReference, realisat
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let realisations = context.choose(2, 8, 32);
+    let sight = Sight::of(context, Age::Early)?;
     let fixed = FIXED_DB.map(|snr_db| ("fixed", SnrReference::Fixed { snr_db }));
     let pairs = REFERENCES.into_iter().chain(fixed);
-    let pairs: Vec<Pair> =
-        pairs.map(|(name, reference)| pair(context, name, reference, realisations)).collect::<Result<_, _>>()?;
-    let origin = context.provenance_of_formula(&context.scene_file(near_scene(realisations))?.toml);
+    let pairs: Vec<Pair> = pairs
+        .map(|(name, reference)| pair(context, &sight, name, reference, realisations))
+        .collect::<Result<_, _>>()?;
+    let origin = context.provenance_of_formula(&sight.scene(context, near_scene(realisations)).to_toml());
     let mut out = Rendered::default();
     let all: Vec<&Profiles> = pairs.iter().flat_map(|p| [&p.pa, &p.ca]).collect();
     out.csv(profiles::table(&all).to_csv(&origin)?);
@@ -54,11 +62,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let panels = pairs.iter().filter(shown).map(|p| profiles::plot(&p.pa.title(), &[&p.pa, &p.ca]));
     let figure = Figure::stacked(panels);
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
-    out.marks = vec!["analytic pair".into()];
+    out.marks = vec![sight.mark];
     out.caption = format!(
-        "ANALYTIC PAIR: root mean square error against the range from the vortex centre, over the lines within 4 m of a core, less its \
-         level at the edges; periodogram (PA) and correlogram accumulation (CA, AR(16)), rho = 2 m, 200 ns, {} scans.",
-        BATCHES as usize * realisations
+        "Root mean square error against the range from the vortex centre, over the lines within 4 m of a core, less its \
+         level at the edges; periodogram (PA) and correlogram accumulation (CA, AR(16)), rho = 2 m, 200 ns, {} scans; {}.",
+        BATCHES as usize * realisations,
+        sight.words
     );
     out.claims.push(claim(&pairs));
     Ok(out)

@@ -1,6 +1,6 @@
 //! Figure 14: correlogram against periodogram accumulation at 200 and 400 ns, Cn2 = 1e-15, about the vortex centre.
 
-use super::study::{REFERENCES, Study, near_scene, with_method, with_turbulence};
+use super::study::{Age, REFERENCES, Sight, Study, near_scene, with_method, with_turbulence};
 use super::{Claim, Context, Rendered, Verdict, profiles};
 use crate::Failure;
 use profiles::{Profiles, peak, width_m};
@@ -10,6 +10,7 @@ const DURATIONS_S: [f64; 2] = [200e-9, 400e-9];
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let realisations = context.choose(3, 24, 100);
+    let sight = Sight::of(context, Age::Early)?;
     let mut all = Vec::new();
     for (name, reference) in REFERENCES {
         for duration_s in DURATIONS_S {
@@ -18,11 +19,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
                 scene.detector.snr = reference;
                 scene.pulse.duration_s = duration_s;
                 let scene = with_turbulence(context, scene, 1e-15);
-                all.push(Profiles::of(method, name, &Study::run(context, scene)?)?);
+                all.push(Profiles::of(method, name, &Study::run(context, &sight, scene)?)?);
             }
         }
     }
-    let origin = context.provenance_of_formula(&context.scene_file(near_scene(realisations))?.toml);
+    let origin = context.provenance_of_formula(&sight.scene(context, near_scene(realisations)).to_toml());
     let mut out = Rendered::default();
     let every: Vec<&Profiles> = all.iter().collect();
     out.csv(profiles::table(&every).to_csv(&origin)?);
@@ -32,10 +33,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     });
     let figure = Figure::stacked(panels);
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
-    out.marks = vec!["analytic pair".into()];
+    out.marks = vec![sight.mark];
     out.caption = format!(
-        "ANALYTIC PAIR: root mean square error against the range from the vortex centre, over the lines within 4 m of a core, less its \
-         level at the edges; PA and CA at 200 and 400 ns, Cn2 = 1e-15, rho = 2 m, {realisations} scans of one pulse a line."
+        "Root mean square error against the range from the vortex centre, over the lines within 4 m of a core, less its \
+         level at the edges; PA and CA at 200 and 400 ns, Cn2 = 1e-15, rho = 2 m, {realisations} scans of one pulse a line; {}.",
+        sight.words
     );
     out.claims = vec![peak_claim(&all), width_claim(&all)];
     Ok(out)

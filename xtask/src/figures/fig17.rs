@@ -35,8 +35,8 @@ fn free() -> FreeParameters {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let scans = context.choose(4, 24, 100);
-    let levels_db = context.choose(vec![0.0], vec![0.0, 10.0], vec![0.0, 10.0]);
+    let scans = context.choose(4, 100, 100);
+    let levels_db = context.choose(vec![0.0], vec![0.0], vec![0.0, 10.0]);
     let mut fits = Vec::new();
     let mut bounds = Vec::new();
     for &snr_db in &levels_db {
@@ -193,7 +193,7 @@ fn spread(fits: &[Fits], method: usize) -> ([(f64, f64); 3], usize) {
 
 fn claims(fits: &[Fits], [known_m2_s, fitted_m2_s]: [f64; 2]) -> Vec<Claim> {
     let at_most = |id: &str, statement: &str, bar: f64, unit: &str, (measured, error): (f64, f64)| {
-        let resolved = (measured - bar).abs() > error && error.is_finite();
+        let resolved = (measured - bar).abs() > 2.0 * error && error.is_finite();
         Claim {
             standard_error: error,
             verdict: if resolved { Verdict::of(measured < bar) } else { Verdict::NotResolved },

@@ -1,17 +1,21 @@
-//! What figures 10 to 14 share: scans of the vortex pair, regions about the cores, averages with their standard errors.
+//! What figures 10 to 14 share: scans of the simulated wake or of the analytic pair, regions about the cores, averages with their standard errors.
 //!
 //! Maps of neighbouring cells share their windows: as independent counts one line of sight in [`SHARED_LINES`] and one gate in
 //! [`SHARED_GATES`].
 
 use super::Context;
 use crate::Failure;
+use crate::validate::interpolate;
+use crate::wakes::Wake;
+use std::path::PathBuf;
 use wakescope_sim::export::csv::Column;
 use wakescope_sim::export::{Provenance, Table};
 use wakescope_sim::map::VelocityEstimates;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::{
-    Flow, Method, RefractiveTurbulence, Scene, SnrReference, Turbulence, VortexPair, Weighting,
+    Flow, Method, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion, SnrReference,
+    Turbulence, VortexPair, Weighting,
 };
 use wakescope_sim::{join, run, write};
 
@@ -28,7 +32,7 @@ pub(super) const OUTSIDE_M: f64 = 30.0;
 pub(super) const REFERENCES: [(&str, SnrReference); 2] =
     [("physical", SnrReference::Physical {}), ("chapter", SnrReference::Chapter {})];
 
-/// One pulse a line, unweighted windows, regions of 2 m, the early pair 400 m away.
+/// One pulse a line, unweighted windows, regions of 2 m, the pair 400 m away.
 pub(super) fn early_scene(realisations: usize) -> Scene {
     let mut scene = Scene::default();
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.03, 0.2);
@@ -65,8 +69,81 @@ pub(super) fn with_turbulence(context: &Context, mut scene: Scene, cn2_m_m23: f6
     scene
 }
 
+/// The flow that is looked at.
+pub(super) struct Sight {
+    flow: Flow,
+    /// Folder from which the flow is read.
+    folder: PathBuf,
+    /// Centres of the vortices, (y, z), m.
+    pub(super) cores: Vec<(f64, f64)>,
+    /// Which flow it is, for captions.
+    pub(super) words: String,
+    /// The same in two words.
+    pub(super) mark: String,
+}
+
+impl Sight {
+    /// The wake of an age, simulated or analytic: at its start if early, on its inviscid path if late.
+    pub(super) fn of(context: &Context, age: Age) -> Result<Self, Failure> {
+        if context.analytic {
+            let mut scene = Scene::default();
+            let mut words = "ANALYTIC PAIR".to_owned();
+            if age == Age::Late {
+                let motion = wakescope_sim::scene::VortexMotion::Inviscid;
+                scene.flow = Flow::VortexPair(VortexPair { motion, age_tau: age.tau(), ..VortexPair::default() });
+                words = format!("{words} at tau = {} on its inviscid path", age.tau());
+            }
+            let cores = cores_of(&scene);
+            return Ok(Self { flow: scene.flow, folder: PathBuf::new(), cores, words, mark: "analytic pair".into() });
+        }
+        let wake = Wake::of(context)?;
+        let b0_m = wake.flow.pair.scales()?.spacing_m;
+        let flow = SimulatedFlow {
+            planes: "plane1".into(),
+            motion: SimulatedMotion::Frozen,
+            age_tau: Some(age.tau()),
+            ..SimulatedFlow::default()
+        };
+        let core = |side: &str| -> Result<(f64, f64), Failure> {
+            let at =
+                |name: &str| Ok::<f64, Failure>(b0_m * interpolate(&wake.curve(&format!("{name}_{side}"))?, age.tau()));
+            Ok((flow.lateral_position_m + at("y")?, at("z")?))
+        };
+        let cores = vec![core("left")?, core("right")?];
+        let words = format!("tau = {}, {}", age.tau(), wake.words());
+        Ok(Self { flow: Flow::Simulated(flow), folder: wake.folder, cores, words, mark: "simulated flow".into() })
+    }
+
+    /// The scene with this flow.
+    pub(super) fn scene(&self, context: &Context, mut scene: Scene) -> Scene {
+        scene.seed = context.seed;
+        scene.flow = self.flow.clone();
+        if matches!(self.flow, Flow::Simulated(_)) {
+            scene.scan.outside_flow = Outside::Mask {};
+        }
+        scene
+    }
+}
+
+/// The two ages of the chapter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Age {
+    Early,
+    Late,
+}
+
+impl Age {
+    fn tau(self) -> f64 {
+        match self {
+            Self::Early => 2.5,
+            Self::Late => 5.0,
+        }
+    }
+}
+
 /// A map that was made, with what is needed to read it.
 pub(super) struct Study {
+    cores: Vec<(f64, f64)>,
     pub(super) plan: Plan,
     pub(super) map: VelocityEstimates,
     /// Distance to the nearer core, m, and range from it along the line, m: `[line][gate]`.
@@ -75,17 +152,18 @@ pub(super) struct Study {
 
 impl Study {
     /// Runs the map of a scene.
-    pub(super) fn run(context: &Context, scene: Scene) -> Result<Self, Failure> {
-        let plan = Plan::new(context.scene_file(scene)?, Target::Map)?;
+    pub(super) fn run(context: &Context, sight: &Sight, scene: Scene) -> Result<Self, Failure> {
+        let toml = sight.scene(context, scene).to_toml();
+        let plan = Plan::new(SceneFile::parse(&toml, &sight.folder.join("scene.toml"))?, Target::Map)?;
         let map = run::run(&plan, &Silent)?.map.ok_or_else(|| Failure::new("the plan gave no map".into()))?;
-        let cores = cores_of(&plan.scene.scene);
+        let cores = sight.cores.clone();
         let distance = |el: f64, r: f64| {
             let (y, z) = (r * el.cos(), plan.scene.scene.scan.lidar_height_m + r * el.sin());
             cores.iter().map(|c| (y - c.0).hypot(z - c.1)).fold(f64::INFINITY, f64::min)
         };
         let row = |el: &f64| map.range_m.iter().map(|&r| distance(*el, r)).collect();
         let distance_m = map.elevation_rad.iter().map(row).collect();
-        Ok(Self { plan, map, distance_m })
+        Ok(Self { cores, plan, map, distance_m })
     }
 
     pub(super) fn provenance(&self) -> Provenance {
@@ -95,10 +173,7 @@ impl Study {
     /// Centres of the vortices in the polar coordinates of the scan: (range, elevation).
     pub(super) fn cores_polar(&self) -> Vec<(f64, f64)> {
         let height_m = self.plan.scene.scene.scan.lidar_height_m;
-        cores_of(&self.plan.scene.scene)
-            .iter()
-            .map(|c| (c.0.hypot(c.1 - height_m), (c.1 - height_m).atan2(c.0)))
-            .collect()
+        self.cores.iter().map(|c| (c.0.hypot(c.1 - height_m), (c.1 - height_m).atan2(c.0))).collect()
     }
 
     /// Averages over the cells whose distance to the nearer core, m, is accepted.
@@ -160,7 +235,7 @@ impl Average {
 }
 
 /// Centres of the vortices when the scan begins, (y, z), m; none where the flow is no pair.
-pub(super) fn cores_of(scene: &Scene) -> Vec<(f64, f64)> {
+fn cores_of(scene: &Scene) -> Vec<(f64, f64)> {
     match &scene.flow {
         Flow::VortexPair(pair) => {
             let c = join::vortex_pair(pair).centres(join::start_time_s(scene));
@@ -168,12 +243,6 @@ pub(super) fn cores_of(scene: &Scene) -> Vec<(f64, f64)> {
         }
         _ => Vec::new(),
     }
-}
-
-/// A vortex pair of an age on its inviscid path.
-pub(super) fn aged(age_tau: f64) -> Flow {
-    let motion = wakescope_sim::scene::VortexMotion::Inviscid;
-    Flow::VortexPair(VortexPair { motion, age_tau, ..VortexPair::default() })
 }
 
 /// Tables of the same columns one below the other, with a first column that tells them apart.
