@@ -106,12 +106,12 @@ pub(crate) fn run(options: &Options) -> Outcome {
         Measured::Estimate => pool.install(|| estimate::rows(options.effort as usize))?,
     };
     println!(
-        "{:<22} {:<34} {:<14} {:>10} {:>11} {:>9}  metric, reference",
+        "{:<22} {:<34} {:<14} {:>10} {:>11} {:>10} metric, reference",
         "case", "method", "knob", "value", "error", "cpu"
     );
     for r in &rows {
         println!(
-            "{:<22} {:<34} {:<14} {:>10} {:>11.3e} {:>7.3} s  {}, {}",
+            "{:<22} {:<34} {:<14} {:>10} {:>11.3e} {:>8.1e} s {}, {}",
             r.case, r.method, r.knob, r.value, r.error, r.cost.cpu_s, r.metric, r.reference
         );
     }

@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use wakescope_les::cases::{self, Case, VortexPairCase};
-use wakescope_les::{Error, Flow, PressureMethod, SubgridModel, TimeScheme, TimeStep};
+use wakescope_les::{Error, Flow, PressureMethod, SubgridModel, TimeScheme, TimeStep, WakeScales};
 
 const MULTISCALE: SubgridModel = SubgridModel::MULTISCALE_WALE;
 
@@ -54,7 +54,25 @@ fn all(c: &mut Criterion) -> Result<(), Error> {
     bench_case(c, "pair above ground 48 x 96 x 64, multiscale model", &wake)?;
     wake.settings.pressure = PressureMethod::Multigrid;
     wake.settings.pressure_tolerance = 1e-6;
-    bench_case(c, "pair above ground 48 x 96 x 64, multiscale model, multigrid", &wake)
+    bench_case(c, "pair above ground 48 x 96 x 64, multiscale model, multigrid", &wake)?;
+    coarse_wake(c)
+}
+
+/// A Runge-Kutta step of the coarse wake, and a record of what is measured in it.
+fn coarse_wake(c: &mut Criterion) -> Result<(), Error> {
+    let pair = VortexPairCase::coarse();
+    let mut meter = pair.meter(&WakeScales::REDUCED)?;
+    let case = pair.case(VortexPairCase::steps(0.01))?;
+    bench_case(c, "coarse wake, Runge-Kutta", &case)?;
+    let (flow, _) = case.start()?;
+    let cells: usize = flow.mesh().cells().iter().product();
+    let mut group = c.benchmark_group("step");
+    group.sample_size(10).throughput(Throughput::Elements(cells as u64));
+    group.bench_function("coarse wake, record", |bench| {
+        bench.iter(|| black_box(meter.measure(&flow).map_or(f64::NAN, |record| record.energy_m4_s2)))
+    });
+    group.finish();
+    Ok(())
 }
 
 fn steps(c: &mut Criterion) {
