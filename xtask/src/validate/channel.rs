@@ -8,11 +8,11 @@ use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const REYNOLDS_TAU: f64 = 178.12;
 /// Averages are taken from here on, in half heights over friction velocity.
-const FROM_S: f64 = 8.0;
+const FROM_S: f64 = 10.0;
 const TO_S: f64 = 20.0;
 
 pub(super) fn show(_: Profile) -> Result<Shown, Failure> {
-    let cells = [64, 64, 64];
+    let cells = [48, 48, 64];
     let mut case = cases::channel(cells, 1.8, REYNOLDS_TAU)?;
     case.settings.subgrid = SubgridModel::MULTISCALE_WALE;
     let (mut flow, _) = case.start()?;
@@ -40,7 +40,7 @@ pub(super) fn show(_: Profile) -> Result<Shown, Failure> {
         .float("z_plus", profile.iter().map(|p| p.0))
         .float("mean_velocity_plus", profile.iter().map(|p| p.1));
     let plot = CurvePlot::new("Mean velocity, Re_tau 178", Axis::log("z+"), Axis::linear("U+"))
-        .with(Series::new("64 x 64 x 64, multiscale model", Style::Line, profile))
+        .with(Series::new("48 x 48 x 64, multiscale model", Style::Line, profile))
         .with(Series::new("Moser, Kim and Mansour", Style::Markers, stored));
     Ok(Shown { checks, table, figure: Figure::stacked([plot]) })
 }

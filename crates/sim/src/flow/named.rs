@@ -99,7 +99,7 @@ section! {
 }
 
 section! {
-    /// Turbulent flow in a box of `4 pi x 2 pi x 2` half heights.
+    /// Turbulent flow in a box of `2 pi x pi x 2` half heights.
     #[derive(Copy)]
     Channel {
         /// Cells along x, y, z.

@@ -59,7 +59,7 @@ pub fn rayleigh_plate(cells: usize, strength: f64, viscosity_m2_s: f64, step_s: 
     Ok(Case { mesh, settings, initial: Initial::Field(Box::new(|_| [0.0; 3])), end_s: 0.05 / viscosity_m2_s })
 }
 
-/// Turbulent channel flow in a box of `4 pi x 2 pi x 2`, driven by the force that balances the friction of
+/// Turbulent channel flow in a box of `2 pi x pi x 2`, driven by the force that balances the friction of
 /// `reynolds_tau`; lengths in half heights, velocities in friction velocities. It starts from a mean profile with
 /// long streaks and vortices, which trip within a few units of time.
 ///
@@ -68,8 +68,8 @@ pub fn rayleigh_plate(cells: usize, strength: f64, viscosity_m2_s: f64, step_s: 
 pub fn channel(cells: [usize; 3], strength: f64, reynolds_tau: f64) -> Result<Case, Error> {
     use std::f64::consts::TAU;
     let mesh = Mesh::new(
-        Direction::periodic(cells[0], 0.0, 2.0 * TAU),
-        Direction::periodic(cells[1], 0.0, TAU),
+        Direction::periodic(cells[0], 0.0, TAU),
+        Direction::periodic(cells[1], 0.0, 0.5 * TAU),
         between_plates(cells[2], strength, [0.0; 2]),
     )?;
     let mut settings = FlowSettings::new(1.0 / reynolds_tau, TimeStep::Courant { courant: 0.35, longest_s: 0.01 });
