@@ -268,14 +268,23 @@ impl WakeMeter {
 
     fn secondary(&self, velocity: &Faces, side: &Side<'_>, above: impl Fn(f64, f64) -> bool) -> SecondaryRecord {
         let sign = -SIGN[side.own];
-        let guess_m = side.plane.strongest_m(sign, above);
         // The layer at the ground has vorticity of the same sign and would draw the centroid down.
         let floor_m = ABOVE_LAYER * self.scales.spacing_m;
         let mut upper = side.plane.clone();
         let below = self.face_m[1].partition_point(|z_m| *z_m <= floor_m) * self.face_m[0].len();
         upper.vorticity_per_s[..below].fill(0.0);
         let radius_m = self.core_radius * self.scales.spacing_m;
-        let found = guess_m.and_then(|guess_m| upper.core(guess_m, sign, radius_m));
+        let core_at = |guess_m: [f64; 2]| upper.core(guess_m, sign, radius_m);
+        let first = side.plane.strongest_m(sign, &above).and_then(core_at);
+        // The strongest vorticity may be that of the sheet which the layer sends up: the vortex is then a second maximum.
+        let apart = |y_m: f64, z_m: f64, core: &Core| {
+            side.plane.lateral_m(core.centre_m[0], y_m).hypot(z_m - core.centre_m[1]) > 2.0 * radius_m
+        };
+        let second = first.and_then(|core| {
+            side.plane.strongest_m(sign, |y_m, z_m| above(y_m, z_m) && apart(y_m, z_m, &core)).and_then(core_at)
+        });
+        let size = |core: &Core| core.circulation_m2_s.abs();
+        let found = first.into_iter().chain(second).max_by(|a, b| size(a).total_cmp(&size(b)));
         let least_m2_s = LEAST_SECONDARY * self.scales.circulation_m2_s;
         match found {
             Some(core) if core.circulation_m2_s.abs() >= least_m2_s => {
