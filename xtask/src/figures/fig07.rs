@@ -69,7 +69,7 @@ fn paths(wake: &Wake) -> Result<CurvePlot, Failure> {
     }
     for (name, sign) in [("inviscid", 1.0), ("", -1.0)] {
         let hyperbola = numbers("vortex_pair_inviscid_ground_h1.csv")?;
-        let path = hyperbola.iter().filter(|r| r[0] <= 5.0).map(|r| (sign * r[1], r[2]));
+        let path = hyperbola.iter().filter(|r| r[1] <= 2.0).map(|r| (sign * r[1], r[2]));
         plot = plot.with(Series::new(name, Style::Dash, path.collect::<Vec<_>>()));
     }
     Ok(plot)

@@ -274,7 +274,8 @@ impl WakeMeter {
         let below = self.face_m[1].partition_point(|z_m| *z_m <= floor_m) * self.face_m[0].len();
         upper.vorticity_per_s[..below].fill(0.0);
         let radius_m = self.core_radius * self.scales.spacing_m;
-        let core_at = |guess_m: [f64; 2]| upper.core(guess_m, sign, radius_m);
+        // The first vortex of the other side has the same sign: a search that slides over to it has found nothing.
+        let core_at = |guess_m: [f64; 2]| upper.core(guess_m, sign, radius_m).filter(|core| side.has(core.centre_m[0]));
         let first = side.plane.strongest_m(sign, &above).and_then(core_at);
         // The strongest vorticity may be that of the sheet which the layer sends up: the vortex is then a second maximum.
         let apart = |y_m: f64, z_m: f64, core: &Core| {
