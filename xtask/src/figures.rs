@@ -157,6 +157,15 @@ impl Verdict {
         if pass { Self::Pass } else { Self::Fail }
     }
 
+    /// Of differences in standard errors: pass if all are above `limit`, fail if one is below its negative.
+    pub(crate) fn of_differences(z: &[f64], limit: f64) -> Self {
+        match (z.iter().all(|z| *z > limit), z.iter().any(|z| *z < -limit)) {
+            (true, _) => Self::Pass,
+            (_, true) => Self::Fail,
+            _ => Self::NotResolved,
+        }
+    }
+
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Pass => "pass",

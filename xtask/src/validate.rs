@@ -12,6 +12,8 @@ mod vortices;
 mod wake;
 mod waves;
 
+pub(crate) use wake::onset;
+
 use crate::workspace::{read, root};
 use crate::{Failure, Outcome};
 use std::path::PathBuf;

@@ -54,7 +54,7 @@ impl Wake {
 
     /// The finished run in a folder.
     pub(crate) fn read(folder: &Path) -> Result<Self, Failure> {
-        let toml = std::fs::read_to_string(folder.join("case.toml"))?;
+        let toml = text(&folder.join("case.toml"))?;
         Self::from_files(&CaseFile::parse(&toml, folder)?, folder.to_path_buf())
     }
 
@@ -62,7 +62,7 @@ impl Wake {
         let (CaseKind::Wake(flow), Some(output)) = (file.case.case.clone(), &file.case.wake) else {
             return Err(Failure::new(format!("{}: the case is no wake", folder.display())));
         };
-        let columns = table(&std::fs::read_to_string(folder.join("wake.csv"))?)?;
+        let columns = table(&text(&folder.join("wake.csv"))?)?;
         let wake =
             Self { folder, flow: *flow, case_toml: file.toml.clone(), fields_tau: output.fields_tau.clone(), columns };
         let reached = wake.column("tau")?.last().copied().unwrap_or(0.0);
@@ -94,6 +94,11 @@ impl Wake {
             self.flow.reynolds, self.flow.core_radius, self.flow.perturbation
         )
     }
+}
+
+/// The text of a file of a run.
+pub(crate) fn text(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|e| Failure::new(format!("cannot read {}: {e}", path.display())))
 }
 
 /// Columns of a table by name; empty places are NaN.

@@ -2,7 +2,7 @@
 
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
-use crate::validate::{interpolate, numbers};
+use crate::validate::{interpolate, numbers, onset};
 use crate::wakes::Wake;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -81,13 +81,6 @@ fn mean(wake: &Wake, name: &str, sign: f64) -> Result<Vec<(f64, f64)>, Failure> 
     Ok(left.iter().zip(right).map(|(l, r)| (l.0, 0.5 * (sign * l.1 + r.1))).collect())
 }
 
-/// When the mean circulation first falls three times as fast as on average from 0.5 to 1.5.
-fn onset(gamma: &[(f64, f64)]) -> Option<f64> {
-    let at = |tau: f64| interpolate(gamma, tau);
-    let early = at(0.5) - at(1.5);
-    (0..=30).map(|i| 1.5 + 0.1 * f64::from(i)).find(|tau| (at(tau - 0.1) - at(tau + 0.1)) / 0.2 > 3.0 * early)
-}
-
 fn claims(wake: &Wake) -> Result<Vec<Claim>, Failure> {
     let gamma = mean(wake, "gamma_ratio", 1.0)?;
     let at = |tau: f64| interpolate(&gamma, tau);
@@ -96,7 +89,7 @@ fn claims(wake: &Wake) -> Result<Vec<Claim>, Failure> {
     let like_chapter = wake.flow.reynolds >= CHAPTER.0 && wake.flow.core_radius <= CHAPTER.1;
     // What depends on the Reynolds number of the chapter is measured, but not judged, at another.
     let of_chapter = |claim: Claim| if like_chapter { claim } else { Claim { verdict: Verdict::NotResolved, ..claim } };
-    let onset_words = onset.map_or("never".into(), |tau| format!("tau = {tau:.1}"));
+    let onset_words = onset.map_or("never".into(), |tau| format!("tau = {tau:.2}"));
     let before = onset.map_or(f64::NAN, |tau| 1.0 - at(tau - 0.1));
     let (y, z) = (mean(wake, "y", -1.0)?, mean(wake, "z", 1.0)?);
     Ok(vec![

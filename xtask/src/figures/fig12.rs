@@ -121,15 +121,6 @@ fn above(a: &Average, b: &Average) -> f64 {
     (a.rms_m_s - b.rms_m_s) / a.standard_error_m_s.hypot(b.standard_error_m_s)
 }
 
-/// Pass if all are above 2, fail if one is below -2.
-fn verdict_of(z: &[f64]) -> Verdict {
-    match (z.iter().all(|z| *z > 2.0), z.iter().any(|z| *z < -2.0)) {
-        (true, _) => Verdict::Pass,
-        (_, true) => Verdict::Fail,
-        _ => Verdict::NotResolved,
-    }
-}
-
 fn outside_claim(curves: &[Curve]) -> Claim {
     let (mut falls, mut grows, mut words) = (Vec::new(), Vec::new(), Vec::new());
     for (name, _) in REFERENCES {
@@ -147,7 +138,7 @@ fn outside_claim(curves: &[Curve]) -> Claim {
     }
     let all: Vec<f64> = falls.into_iter().chain(grows).collect();
     Claim {
-        verdict: verdict_of(&all),
+        verdict: Verdict::of_differences(&all, 2.0),
         standard_error: curves.iter().map(|c| c.outside.standard_error_m_s).fold(0.0, f64::max),
         ..Claim::exact(
             "F12a",

@@ -86,13 +86,8 @@ fn claim(pairs: &[Pair]) -> Claim {
             pair.pa.inside.rms_m_s
         ));
     }
-    let verdict = match (z.iter().all(|z| *z > STUDENT), z.iter().any(|z| *z < -STUDENT)) {
-        (true, _) => Verdict::Pass,
-        (_, true) => Verdict::Fail,
-        _ => Verdict::NotResolved,
-    };
     Claim {
-        verdict,
+        verdict: Verdict::of_differences(&z, STUDENT),
         standard_error: error,
         ..Claim::exact(
             "F13",

@@ -52,13 +52,8 @@ fn peak_claim(all: &[Profiles]) -> Claim {
         error = error.max(standard_error);
         words.push(format!("{}: PA {pa:.2}, CA {ca:.2} (+- {standard_error:.2})", pair[0].title()));
     }
-    let verdict = match (z.iter().all(|z| *z > 2.0), z.iter().any(|z| *z < -2.0)) {
-        (true, _) => Verdict::Pass,
-        (_, true) => Verdict::Fail,
-        _ => Verdict::NotResolved,
-    };
     Claim {
-        verdict,
+        verdict: Verdict::of_differences(&z, 2.0),
         standard_error: error,
         ..Claim::exact(
             "F14a",

@@ -368,6 +368,14 @@ mod tests {
     }
 
     #[test]
+    fn one_no_slip_wall_takes_the_wide_stencil_from_all_directions() {
+        let around = || Line::new(&Direction::periodic(20, 0.0, 1.0));
+        let between = |wall| Line::new(&Direction::between(20, 0.0, 1.0, wall, Wall::Slip));
+        assert_eq!(Stencil::of(&[around(), around(), between(Wall::Slip)]), Stencil::WIDE);
+        assert_eq!(Stencil::of(&[around(), around(), between(Wall::AT_REST)]), Stencil::PLAIN);
+    }
+
+    #[test]
     fn rows_called_regular_follow_the_formula_of_the_interior() {
         for direction in kinds() {
             let line = Line::new(&direction);

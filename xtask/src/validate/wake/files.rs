@@ -2,7 +2,7 @@
 
 use super::History;
 use crate::Failure;
-use crate::wakes::{Wake, table};
+use crate::wakes::{Wake, table, text};
 use std::f64::consts::TAU;
 use wakescope_les::{SecondaryRecord, VortexRecord, WakeRecord};
 
@@ -56,7 +56,7 @@ fn record(wake: &Wake, row: usize) -> Result<WakeRecord, Failure> {
 
 /// Largest relative errors of the energy budget of a step, and of the dissipation of a record by its vorticity.
 fn errors(wake: &Wake, records: &[WakeRecord]) -> Result<[f64; 2], Failure> {
-    let steps = table(&std::fs::read_to_string(wake.folder.join("steps.csv"))?)?;
+    let steps = table(&text(&wake.folder.join("steps.csv"))?)?;
     let column = |name: &str| steps.get(name).ok_or_else(|| Failure::new(format!("steps.csv has no column {name}")));
     let (time, step) = (column("time_s")?, column("step_s")?);
     let (rate, residual) = (column("energy_rate_m5_s3")?, column("energy_residual_m5_s3")?);

@@ -121,7 +121,7 @@ pub(super) fn worst(
 }
 
 /// When the fast decay begins: where the loss of the ratio per tau first exceeds three times its mean over 0.5 to 1.5.
-pub(super) fn onset(gamma: &[(f64, f64)]) -> Option<f64> {
+pub(crate) fn onset(gamma: &[(f64, f64)]) -> Option<f64> {
     let early = interpolate(gamma, 0.5) - interpolate(gamma, 1.5);
     let last = gamma.last()?.0;
     let slope = |tau: f64| (interpolate(gamma, tau - 0.05) - interpolate(gamma, tau + 0.05)) / 0.1;

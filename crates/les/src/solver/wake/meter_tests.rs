@@ -108,6 +108,22 @@ fn a_bent_pair_has_its_spread_and_secondary_vortices_belong_to_their_side() {
 }
 
 #[test]
+fn the_secondary_vortex_is_neither_the_sharpest_sheet_nor_the_first_vortex_of_the_other_side() {
+    // On the right a weak spot of higher vorticity than the secondary; over the middle the tail of a wide right vortex.
+    const LIST: &[(f64, f64, f64, f64)] = &[
+        (-TAU, -0.5, 0.8, 0.1),
+        (2.0 * TAU, 0.5, 0.8, 0.3),
+        (-0.2 * TAU, 1.5, 0.9, 0.1),
+        (-0.05 * TAU, 1.6, 0.4, 0.04),
+    ];
+    let flow = flow(1, vortices(LIST, |_| 0.0));
+    let record = meter(&flow).measure(&flow).unwrap();
+    close(record.right.secondary.y_m, 1.5, 0.02, "y of the larger");
+    close(record.right.secondary.z_m, 0.9, 0.02, "z of the larger");
+    assert!(record.left.secondary.gamma_m2_s.is_nan(), "{:?}", record.left.secondary);
+}
+
+#[test]
 fn the_meter_follows_across_the_period_and_remembers_through_a_restart() {
     let pair = VortexPairCase {
         cells: [1, 64, 40],
