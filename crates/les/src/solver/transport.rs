@@ -246,9 +246,7 @@ mod tests {
 
     /// What may be used along a direction.
     fn stencils(line: &Line) -> Vec<Stencil> {
-        let mut stencils = vec![Stencil::PLAIN];
-        stencils.extend((line.no_slip() == [false; 2]).then_some(Stencil::WIDE));
-        stencils
+        if line.no_slip() == [false; 2] { vec![Stencil::PLAIN, Stencil::WIDE] } else { vec![Stencil::PLAIN] }
     }
 
     /// `S^n` of a transport as dense matrices.
