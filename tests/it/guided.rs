@@ -3,8 +3,8 @@
 use crate::pair_scene::{FIRST_SAMPLE_M, SAMPLES, STEP_RAD, Scene, WINDOW};
 use ndarray::{Array2, Axis};
 use wakescope_estimate::vortex_fit::{
-    FreeParameters, MapFitOptions, PulseShape, RangeKernel, ScanSetup, Sharing, SignalFitOptions, VelocityMap, Wake,
-    WakeModel, fit_map, fit_signals,
+    EstimatorResponse, FreeParameters, MapFitOptions, PulseShape, RangeKernel, ScanSetup, Sharing, SignalFitOptions,
+    VelocityMap, Wake, WakeModel, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::*;
 use wakescope_les::{CirculationProfile, Ground, Motion, Sum, VortexPair, Wind};
@@ -84,12 +84,9 @@ impl<'s> Guided<'s> {
     fn wake(&self, records: &Array2<f64>, signals: bool) -> Result<Wake, Error> {
         let all: Vec<usize> = (0..self.scene.elevation_rad.len()).collect();
         let (sampling, kind) = (&self.scene.sampling, SignalKind::Real);
+        let (pulse, noise) = (PulseShape::gaussian(sigma_s(200e-9)).unwrap(), Noise::Band { floor: 0.0 });
         let lag_window = LagWindowPeak::new(sampling, kind, WINDOW, 16, 1024, Refinement::Parabola).unwrap();
         let velocity_m_s = self.map(&self.scan(records, Weighting::default(), &all), &lag_window);
-        let window = Weighting::default().weights(WINDOW).unwrap();
-        let (period_s, sigma_s) = (sampling.period_s(), sigma_s(200e-9));
-        let line = RangeKernel::line_width_m_s(sampling.wavelength_m, sigma_s, 64e-9, Some(64e-9)).unwrap();
-        let kernel = RangeKernel::gaussian_gate(sigma_s, &window, period_s, 1.2).unwrap().seen_as_peak(line).unwrap();
         let map = VelocityMap {
             elevation_rad: &self.scene.elevation_rad,
             range_m: &self.scene.range_m,
@@ -98,13 +95,15 @@ impl<'s> Guided<'s> {
         };
         let free = FreeParameters { core_radius: Sharing::Common, ..FreeParameters::common_circulation() };
         let options = MapFitOptions { free, ..Default::default() };
-        let mut found = fit_map(&map, &WakeModel::default(), &kernel, &options)?.wake;
+        let statistic = Correlogram::<f64>::new(Weighting::default(), WINDOW).unwrap();
+        let shown = EstimatorResponse::new(&statistic, &lag_window, sampling, &pulse, (noise, self.snr), RADIUS_M)?;
+        let mut found = fit_map_of_estimator(&map, &WakeModel::default(), &shown, &options)?.wake;
         if signals {
             let setup = ScanSetup {
                 sampling: *sampling,
                 kind,
-                noise: Noise::Band { floor: 0.0 },
-                pulse: PulseShape::gaussian(sigma_s).unwrap(),
+                noise,
+                pulse,
                 wake: WakeModel::default(),
                 elevation_rad: self.scene.elevation_rad.clone(),
                 first_sample_time_s: 2.0 * FIRST_SAMPLE_M / SPEED_OF_LIGHT_M_S,

@@ -1,24 +1,31 @@
 //! Fit of the wake to a map of radial velocities.
 //!
-//! Weighted least squares with a robust loss by the iteration of Levenberg and Marquardt. The scale of the residuals is their
-//! median, and what a peak is off the mean velocity is that of the last wake; both are taken anew in each of a few rounds. Velocities of one line share air and noise, and neighbouring lines share windows where
-//! a map is accumulated, so the covariance is the sandwich A^-1 B A^-1 (Huber 1967), with B from the sums of the gradients over
-//! lines, neighbours tapered (Newey and West 1987). Check: exact maps; noise; outliers; the spread of fits over many maps.
+//! Weighted least squares with a robust loss. What a wake shows is either the mean over the gate ([`fit_map`], by the iteration of Levenberg and
+//! Marquardt) or what the estimator of the map itself makes of the wake's spectra ([`fit_map_of_estimator`], by damped steps of Gauss and Newton
+//! with difference quotients). The scale of the residuals is their median, taken anew in each of a few rounds.
+//! Check: exact maps; noise; outliers; the spread of fits over many maps.
 
 use ndarray::{Array2, ArrayView2};
 
-use super::free::{FreeParameters, gathered, moved, spread};
+use super::estimator_response::EstimatorResponse;
+use super::free::{FreeParameters, Sharing, spread};
 use super::guess::first_guess;
-use super::range_kernel::{LineScratch, RangeKernel};
-use super::small::{Normal, Stop, descend, inverse};
-use super::wake::{PARAMETERS, Parameter, Ray, Wake, WakeModel};
+use super::map_problem::{Expected, Problem};
+use super::range_kernel::RangeKernel;
+use super::small::Stop;
+use super::tangent::Tangent;
+use super::wake::{PARAMETERS, Parameter, Wake, WakeModel};
 use crate::error::{Error, finite, length, positive};
-use crate::parallel::map_indexed;
 
-/// Median of the absolute value of a normal number.
-const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
-/// Scale and shifts of peaks are taken anew this often.
+/// The scale of residuals from means is taken anew this often.
 const ROUNDS: usize = 5;
+/// Most steps of Gauss and Newton, and halvings of one.
+const STEPS: usize = 40;
+const HALVINGS: i32 = 6;
+/// Core radii below this part of a region's radius, or of the distance of lines, do not show in a map.
+const SMALLEST_CORE: f64 = 0.25;
+/// They end at a step of this many standard deviations at the latest: estimators round.
+const NEAR_SIGMAS: f64 = 0.03;
 
 /// A map of radial velocities, such as accumulation gives.
 #[derive(Debug, Clone, Copy)]
@@ -39,12 +46,7 @@ impl VelocityMap<'_> {
         let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
         length("lines of velocity_m_s", lines, self.velocity_m_s.nrows())?;
         length("gates of velocity_m_s", gates, self.velocity_m_s.ncols())?;
-        for (field, axis) in [("elevation_rad", self.elevation_rad), ("range_m", self.range_m)] {
-            axis.iter().try_for_each(|value| finite(field, *value))?;
-            if let Some(pair) = axis.windows(2).find(|pair| pair[1] <= pair[0]) {
-                return Err(Error::OutOfRange { field, value: pair[1], allowed: "increasing along its axis" });
-            }
-        }
+        validate_axes(self.elevation_rad, self.range_m)?;
         if let Some(deviation) = &self.standard_deviation_m_s {
             length("lines of standard_deviation_m_s", lines, deviation.nrows())?;
             length("gates of standard_deviation_m_s", gates, deviation.ncols())?;
@@ -57,10 +59,28 @@ impl VelocityMap<'_> {
         Ok(self.velocity_m_s.iter().filter(|v| v.is_finite()).count())
     }
 
+    /// Distance of neighbouring lines in the middle of the map.
+    fn line_spacing_m(&self) -> f64 {
+        let length = |axis: &[f64]| axis.last().copied().unwrap_or(0.0) - axis.first().copied().unwrap_or(0.0);
+        let middle_m = self.range_m.first().copied().unwrap_or(0.0) + 0.5 * length(self.range_m);
+        middle_m * length(self.elevation_rad) / self.elevation_rad.len() as f64
+    }
+
     /// Standard deviation of one velocity, 1 if none was given.
     pub(super) fn deviation(&self, line: usize, gate: usize) -> f64 {
         self.standard_deviation_m_s.as_ref().map_or(1.0, |d| d[[line, gate]])
     }
+}
+
+/// Both axes are finite and increase.
+pub(super) fn validate_axes(elevation_rad: &[f64], range_m: &[f64]) -> Result<(), Error> {
+    for (field, axis) in [("elevation_rad", elevation_rad), ("range_m", range_m)] {
+        axis.iter().try_for_each(|value| finite(field, *value))?;
+        if let Some(pair) = axis.windows(2).find(|pair| pair[1] <= pair[0]) {
+            return Err(Error::OutOfRange { field, value: pair[1], allowed: "increasing along its axis" });
+        }
+    }
+    Ok(())
 }
 
 /// What a residual costs, in units of the scale.
@@ -77,7 +97,7 @@ pub enum Loss {
 
 impl Loss {
     /// Cost, its slope over the residual (the weight), and its second derivative.
-    fn at(self, residual: f64) -> (f64, f64, f64) {
+    pub(super) fn at(self, residual: f64) -> (f64, f64, f64) {
         match self {
             Self::Squares => (0.5 * residual * residual, 1.0, 1.0),
             Self::Cauchy { width } => {
@@ -132,11 +152,12 @@ pub struct MapFit {
     pub used: usize,
     /// Those with a residual above 3 scales.
     pub outliers: usize,
-    /// Scale of the residuals over the given standard deviations, from their median; \[m/s\] if none were given.
+    /// Scale of the residuals over the given standard deviations, from their median; \[m/s\] if none were given. In uniform wind, for the
+    /// map of an estimator.
     pub residual_scale: f64,
     /// Part of the robust cost of the best wind without vortices that the vortices take away: near 1 for a good fit.
     pub explained_fraction: f64,
-    /// Evaluations of the map in the last round.
+    /// Evaluations of the map in the last round; steps of Gauss and Newton for the map of an estimator.
     pub iterations: usize,
 }
 
@@ -148,7 +169,8 @@ impl MapFit {
     }
 }
 
-/// Fits the wake to a map without any prior knowledge: a search for the best pair, then [`refine_map_fit`].
+/// Fits the wake to a map whose velocities are means over gates, without any prior knowledge: a search for the best pair, then
+/// [`refine_map_fit`].
 ///
 /// # Errors
 /// [`Error::NoVortex`] if no pair stands out; [`Error::TooFewVelocities`]; as [`refine_map_fit`].
@@ -174,47 +196,171 @@ pub fn refine_map_fit(
     guess: &Wake,
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
-    let used = map.validate()?;
-    guess.validate()?;
-    let groups = options.free.groups();
-    let needed = 10 * groups.len().max(1);
-    if used < needed {
-        return Err(Error::TooFewVelocities { found: used, needed });
-    }
-    let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
-    let mut problem = Problem { map, model, kernel, groups: &groups, loss: options.loss, shifts: Vec::new() };
-    let stop = Stop { iterations: options.max_iterations, sigmas: options.tolerance_sigmas, learns: false };
+    let fit = Fit::new(map, model, kernel, guess, options)?;
+    let coreless = fit.coreless();
+    let mut problem = fit.problem(&fit.groups, Expected::Means(kernel));
     let mut wake = options.free.start(guess);
     let mut scale = problem.scale(&wake)?;
     let mut iterations = 0;
     for round in 0..ROUNDS {
-        (wake, iterations) = match problem.descend(wake, scale, stop) {
+        (wake, iterations) = match problem.descend(wake, scale, fit.stop) {
             // a core that the map does not resolve may run away to nothing: it keeps what the last round gave
             Err(Error::NotConverged { .. }) if round > 0 && coreless.len() < problem.groups.len() => {
                 problem.groups = &coreless;
-                problem.descend(wake, scale, stop)?
+                problem.descend(wake, scale, fit.stop)?
             }
             end => end?,
         };
-        problem.shifts = problem.lines(|line, scratch| {
-            kernel.peak_shifts(model, &wake, Ray::new(map.elevation_rad[line]), map.range_m, scratch)
-        });
         scale = problem.scale(&wake)?;
     }
-    let covariance = problem.covariance(&wake, scale, options.correlated_lines)?;
-    let residuals = problem.residuals(&wake);
-    let cost = |residuals: &[f64]| residuals.iter().map(|r| options.loss.at(r / scale).0).sum::<f64>();
-    let calm_cost = problem.calm(&wake, scale, stop).map_or(f64::NAN, |calm| cost(&problem.residuals(&calm)));
-    Ok(MapFit {
-        wake,
-        covariance: spread(problem.groups, &covariance),
-        cores_fitted: problem.groups.iter().any(|group| is_core(group)),
-        used,
-        outliers: residuals.iter().filter(|r| r.abs() > 3.0 * scale).count(),
-        residual_scale: scale,
-        explained_fraction: 1.0 - cost(&residuals) / calm_cost,
-        iterations,
-    })
+    fit.outcome(&problem, wake, scale, iterations)
+}
+
+/// Fits the wake to a map that an estimator of this crate made, without any prior knowledge: as [`fit_map`] with its mean gate, then
+/// [`refine_map_fit_of_estimator`].
+///
+/// # Errors
+/// As [`fit_map`] and [`refine_map_fit_of_estimator`].
+pub fn fit_map_of_estimator(
+    map: &VelocityMap<'_>,
+    model: &WakeModel,
+    response: &EstimatorResponse<'_>,
+    options: &MapFitOptions,
+) -> Result<MapFit, Error> {
+    map.validate()?;
+    let kernel = response.kernel(map.range_m)?;
+    let guess = first_guess(map, model, &kernel)?;
+    // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
+    let free = FreeParameters { core_radius: Sharing::Fixed, ..options.free };
+    let start = refine_map_fit(map, model, &kernel, &guess, &MapFitOptions { free, ..*options });
+    let start = start.map_or(guess, |fit| fit.wake);
+    refine_map_fit_of_estimator(map, model, response, &start, options)
+}
+
+/// Fits the wake to a map that an estimator made, from a given start on: what is expected of a wake is the estimate from its
+/// expected correlograms.
+///
+/// # Errors
+/// As [`refine_map_fit`].
+pub fn refine_map_fit_of_estimator(
+    map: &VelocityMap<'_>,
+    model: &WakeModel,
+    response: &EstimatorResponse<'_>,
+    guess: &Wake,
+    options: &MapFitOptions,
+) -> Result<MapFit, Error> {
+    map.validate()?;
+    let kernel = response.kernel(map.range_m)?;
+    let fit = Fit::new(map, model, &kernel, guess, options)?;
+    let prepared = response.prepared(map.range_m);
+    let least_core_m = SMALLEST_CORE * map.line_spacing_m().max(response.radius_m());
+    let coreless = fit.coreless();
+    let mut groups = &fit.groups;
+    let mut wake = options.free.start(guess);
+    let (mut turns, mut last, mut sigmas_left) = (0, [0.0; PARAMETERS], f64::INFINITY);
+    for step in 1..=STEPS {
+        let here = prepared.velocities(model, &wake, map.elevation_rad);
+        let tangent = Tangent::new((&prepared, model), wake, here.view(), groups, map);
+        let learnt = Some(&tangent.deviation);
+        let problem = Problem { learnt, ..fit.problem(groups, Expected::Shown(&tangent)) };
+        let scale = problem.scale(&wake)?;
+        let near = problem.reweighted(wake, scale, fit.stop)?;
+        let (from, to) = (wake.to_array(), near.to_array());
+        let way: [f64; PARAMETERS] = std::array::from_fn(|i| to[i] - from[i]);
+        // where peaks jump the map is not smooth: each time the steps turn round they are shortened, so that their ends are averaged (Kesten 1958)
+        turns += usize::from(problem.product(&wake, &way, &last, scale) < 0.0);
+        let share = ((1 + turns) as f64).recip();
+        sigmas_left = share * problem.product(&wake, &way, &way, scale).sqrt();
+        if sigmas_left <= NEAR_SIGMAS.max(options.tolerance_sigmas) {
+            return fit.outcome(&problem, wake, scale, step);
+        }
+        let part = share.min(tangent.reach(&near));
+        let trial = |halving: i32| {
+            let part = part * 0.5_f64.powi(halving);
+            let trial = Wake::from_array(&std::array::from_fn(|i| from[i] + part * way[i]));
+            fit.allows(&trial).then_some(trial)
+        };
+        wake = (0..=HALVINGS).find_map(trial).ok_or(Error::NotConverged { iterations: step, sigmas_left })?;
+        last = way;
+        if groups.len() > coreless.len() && raised(&mut wake, least_core_m) {
+            groups = &coreless;
+        }
+    }
+    Err(Error::NotConverged { iterations: STEPS, sigmas_left })
+}
+
+/// What both fits share.
+struct Fit<'a, 'm> {
+    map: &'a VelocityMap<'m>,
+    model: &'a WakeModel,
+    kernel: &'a RangeKernel,
+    options: &'a MapFitOptions,
+    groups: Vec<Vec<usize>>,
+    stop: Stop,
+    used: usize,
+}
+
+impl<'a, 'm> Fit<'a, 'm> {
+    fn new(
+        map: &'a VelocityMap<'m>,
+        model: &'a WakeModel,
+        kernel: &'a RangeKernel,
+        guess: &Wake,
+        options: &'a MapFitOptions,
+    ) -> Result<Self, Error> {
+        let used = map.validate()?;
+        guess.validate()?;
+        let groups = options.free.groups();
+        let needed = 10 * groups.len().max(1);
+        if used < needed {
+            return Err(Error::TooFewVelocities { found: used, needed });
+        }
+        let stop = Stop { iterations: options.max_iterations, sigmas: options.tolerance_sigmas, learns: false };
+        Ok(Self { map, model, kernel, options, groups, stop, used })
+    }
+
+    fn coreless(&self) -> Vec<Vec<usize>> {
+        self.groups.iter().filter(|group| !is_core(group)).cloned().collect()
+    }
+
+    fn problem<'p>(&'p self, groups: &'p [Vec<usize>], expected: Expected<'p>) -> Problem<'p, 'm> {
+        Problem { map: self.map, model: self.model, expected, groups, loss: self.options.loss, learnt: None }
+    }
+
+    /// Whether the model exists there: with images, above the ground only.
+    fn allows(&self, wake: &Wake) -> bool {
+        let above = wake.left.height_m > 0.0 && wake.right.height_m > 0.0;
+        wake.validate().is_ok() && (above || !self.model.images)
+    }
+
+    fn outcome(&self, problem: &Problem<'_, '_>, wake: Wake, scale: f64, iterations: usize) -> Result<MapFit, Error> {
+        let covariance = problem.covariance(&wake, scale, self.options.correlated_lines)?;
+        let residuals = problem.residuals(&wake);
+        let cost = |residuals: &[f64]| residuals.iter().map(|r| self.options.loss.at(r / scale).0).sum::<f64>();
+        // without vortices a gate shows its mean
+        let means = Problem { expected: Expected::Means(self.kernel), ..*problem };
+        let calm_cost = means.calm(&wake, scale, self.stop).map_or(f64::NAN, |calm| cost(&means.residuals(&calm)));
+        Ok(MapFit {
+            wake,
+            covariance: spread(problem.groups, &covariance),
+            cores_fitted: problem.groups.iter().any(|group| is_core(group)),
+            used: self.used,
+            outliers: residuals.iter().filter(|r| r.abs() > 3.0 * scale).count(),
+            residual_scale: scale,
+            explained_fraction: 1.0 - cost(&residuals) / calm_cost,
+            iterations,
+        })
+    }
+}
+
+/// Raises core radii below the least one, and tells whether there were any.
+fn raised(wake: &mut Wake, least_m: f64) -> bool {
+    let mut any = false;
+    for core_m in [&mut wake.left.core_radius_m, &mut wake.right.core_radius_m] {
+        any |= *core_m < least_m;
+        *core_m = core_m.max(least_m);
+    }
+    any
 }
 
 /// Whether a free number moves core radii.
@@ -229,171 +375,4 @@ pub(super) fn median(numbers: &mut [f64]) -> f64 {
     }
     let middle = numbers.len() / 2;
     *numbers.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-struct Problem<'a, 'm> {
-    map: &'a VelocityMap<'m>,
-    model: &'a WakeModel,
-    kernel: &'a RangeKernel,
-    groups: &'a [Vec<usize>],
-    loss: Loss,
-    /// What a peak is off the mean, for each line, at the wake of the last round; none at first.
-    shifts: Vec<Vec<f64>>,
-}
-
-/// Sums over one line.
-struct LineSums {
-    cost: f64,
-    gradient: Vec<f64>,
-    /// Sums of j j^T with the weights of the loss, and with its second derivative.
-    weighted: Array2<f64>,
-    curved: Array2<f64>,
-}
-
-impl Problem<'_, '_> {
-    fn lines<T: Send>(&self, f: impl Fn(usize, &mut LineScratch) -> T + Sync + Send) -> Vec<T> {
-        map_indexed(self.map.elevation_rad.len(), LineScratch::default, |scratch, line| f(line, scratch))
-    }
-
-    /// One round from a start on: the wake and the evaluations.
-    fn descend(&self, start: Wake, scale: f64, stop: Stop) -> Result<(Wake, usize), Error> {
-        let evaluate = |wake: &Wake| self.normal(wake, scale, self.model.images);
-        let step = |wake: &Wake, step: &[f64]| moved(self.groups, wake, step);
-        descend(start, stop, evaluate, step).map(|(wake, _, iterations)| (wake, iterations))
-    }
-
-    fn shift(&self, line: usize, gate: usize) -> f64 {
-        self.shifts.get(line).map_or(0.0, |shifts| shifts[gate])
-    }
-
-    /// Residuals over their standard deviations, of all velocities.
-    fn residuals(&self, wake: &Wake) -> Vec<f64> {
-        let lines = self.lines(|line, scratch| {
-            let mut residuals = Vec::new();
-            let ray = Ray::new(self.map.elevation_rad[line]);
-            self.kernel.apply((self.model, wake, ray), self.map.range_m, false, scratch, |gate, velocity, _| {
-                let measured = self.map.velocity_m_s[[line, gate]];
-                if measured.is_finite() {
-                    residuals.push((measured - velocity - self.shift(line, gate)) / self.map.deviation(line, gate));
-                }
-            });
-            residuals
-        });
-        lines.concat()
-    }
-
-    /// Robust scale of the residuals; a millionth of the speeds where the fit is exact.
-    fn scale(&self, wake: &Wake) -> Result<f64, Error> {
-        let mut residuals: Vec<f64> = self.residuals(wake).iter().map(|r| r.abs()).collect();
-        let scale = median(&mut residuals) / NORMAL_MEDIAN;
-        finite("scale of the residuals", scale)?;
-        Ok(scale.max(1e-6))
-    }
-
-    fn line_sums(&self, wake: &Wake, scale: f64, line: usize, scratch: &mut LineScratch) -> LineSums {
-        let order = self.groups.len();
-        let mut sums = LineSums {
-            cost: 0.0,
-            gradient: vec![0.0; order],
-            weighted: Array2::zeros((order, order)),
-            curved: Array2::zeros((order, order)),
-        };
-        let mut slope = vec![0.0; order];
-        let ray = Ray::new(self.map.elevation_rad[line]);
-        let take = |gate: usize, velocity: f64, slopes: &[f64; PARAMETERS]| {
-            let measured = self.map.velocity_m_s[[line, gate]];
-            if !measured.is_finite() {
-                return;
-            }
-            let unit = scale * self.map.deviation(line, gate);
-            gathered(self.groups, slopes, &mut slope);
-            let residual = (measured - velocity - self.shift(line, gate)) / unit;
-            let (cost, weight, second) = self.loss.at(residual);
-            sums.cost += cost;
-            for i in 0..order {
-                let s = slope[i] / unit;
-                sums.gradient[i] -= weight * residual * s;
-                for (j, other) in slope.iter().enumerate().take(i + 1) {
-                    let product = s * other / unit;
-                    sums.weighted[[i, j]] += weight * product;
-                    sums.curved[[i, j]] += second * product;
-                }
-            }
-        };
-        self.kernel.apply((self.model, wake, ray), self.map.range_m, true, scratch, take);
-        sums
-    }
-
-    /// Cost, gradient and curvature; nothing for a wake that is impossible or, with images, below the ground.
-    fn normal(&self, wake: &Wake, scale: f64, above_ground: bool) -> Option<Normal> {
-        wake.validate().ok()?;
-        if above_ground && (wake.left.height_m <= 0.0 || wake.right.height_m <= 0.0) {
-            return None;
-        }
-        let order = self.groups.len();
-        let mut normal = Normal { cost: 0.0, gradient: vec![0.0; order], curvature: Array2::zeros((order, order)) };
-        for sums in self.lines(|line, scratch| self.line_sums(wake, scale, line, scratch)) {
-            normal.cost += sums.cost;
-            normal.gradient.iter_mut().zip(sums.gradient).for_each(|(n, s)| *n += s);
-            normal.curvature += &sums.weighted;
-        }
-        mirror(&mut normal.curvature);
-        Some(normal)
-    }
-
-    /// The sandwich, with gradients of lines up to `correlated` apart taken together.
-    fn covariance(&self, wake: &Wake, scale: f64, correlated: usize) -> Result<Array2<f64>, Error> {
-        let order = self.groups.len();
-        let lines = self.lines(|line, scratch| self.line_sums(wake, scale, line, scratch));
-        let (mut bread, mut weighted) = (Array2::zeros((order, order)), Array2::zeros((order, order)));
-        let mut filling = Array2::<f64>::zeros((order, order));
-        for (a, line) in lines.iter().enumerate() {
-            bread += &line.curved;
-            weighted += &line.weighted;
-            for (b, other) in lines.iter().enumerate().skip(a.saturating_sub(correlated)).take(2 * correlated + 1) {
-                let distance = a.abs_diff(b);
-                if distance <= correlated {
-                    let taper = 1.0 - distance as f64 / (correlated + 1) as f64;
-                    for ((i, j), f) in filling.indexed_iter_mut() {
-                        *f += taper * line.gradient[i] * other.gradient[j];
-                    }
-                }
-            }
-        }
-        mirror(&mut bread);
-        mirror(&mut weighted);
-        // with many outliers the second derivatives need not be positive: their weights are, and are larger
-        let bread = inverse("curvature of the fit", &bread).or_else(|_| inverse("curvature of the fit", &weighted))?;
-        Ok(bread.dot(&filling).dot(&bread))
-    }
-
-    /// The best wind without vortices.
-    fn calm(&self, wake: &Wake, scale: f64, stop: Stop) -> Option<Wake> {
-        let mut calm = *wake;
-        (calm.left.circulation_m2_s, calm.right.circulation_m2_s) = (0.0, 0.0);
-        let groups: Vec<Vec<usize>> =
-            self.groups.iter().filter(|group| group[0] >= Parameter::Wind as usize).cloned().collect();
-        if groups.is_empty() {
-            return Some(calm);
-        }
-        let wind = Problem {
-            map: self.map,
-            model: self.model,
-            kernel: self.kernel,
-            groups: &groups,
-            loss: self.loss,
-            shifts: Vec::new(),
-        };
-        let step = |wake: &Wake, step: &[f64]| moved(&groups, wake, step);
-        descend(calm, stop, |wake| wind.normal(wake, scale, false), step).ok().map(|(calm, _, _)| calm)
-    }
-}
-
-/// Copies the lower triangle to the upper one.
-fn mirror(a: &mut Array2<f64>) {
-    for i in 0..a.nrows() {
-        for j in 0..i {
-            a[[j, i]] = a[[i, j]];
-        }
-    }
 }

@@ -3,14 +3,14 @@
 //! | file | content |
 //! |---|---|
 //! | `wake`, `free` | the vortex pair with its images and the wind, derivatives; which parameters a fit may change |
-//! | `range_kernel` | what a range gate sees of it: mean along the line, or peak of the spectrum |
-//! | `wake_map` | the map that an estimator would show of a wake |
-//! | `guess`, `map_fit` | fit to a map: search for the best pair, then robust least squares |
+//! | `range_kernel`, `wake_map` | what a range gate and a region see of it in the mean |
+//! | `estimator_response`, `tangent` | what an estimator makes of its spectra: the map of very many pulses, and that of wakes near by |
+//! | `guess`, `map_fit`, `map_problem` | fit to a map: search for the best pair, then robust least squares |
 //! | `baseband`, `pulse`, `scan_model` | raw signals at the rate of the detector band; lines cut into layers |
 //! | `line`, `band`, `likelihood` | covariance of a line, its factor and derivatives; likelihood and Fisher information |
 //! | `signal_fit`, `small` | fit to all raw signals; the damped Newton iteration of both fits |
 //!
-//! A map is fitted first, without prior knowledge ([`fit_map`]); its outcome starts the fit of the signals ([`fit_signals`]).
+//! A map is fitted first, without prior knowledge ([`fit_map_of_estimator`]; [`fit_map`] if its velocities are means over gates); its outcome starts the fit of the signals ([`fit_signals`]).
 //! The bound on any unbiased fit of the signals is [`ScanModel::bound`].
 //!
 //! Measured on scans of an analytic pair (500 m^2/s, 47 m apart and high, 376.5 and 423.5 m away, core 2.35 m, 200 ns,
@@ -20,10 +20,8 @@
 //!   0.13 m in height, 0.78 m across;
 //! - fit of the signals: bias -0.3 +- 1.3 m^2/s and standard deviation 5.5 +- 0.9 with the core known (19 scans), 1.1 +- 2.2 and
 //!   10.7 +- 1.6 with each core fitted (24 scans): 0.8 +- 0.13 and 1.3 +- 0.19 times the bound;
-//! - fit of a map with regions of 2 m, 12 scans: from [`FirstMoment`](crate::FirstMoment) 498 +- 17 m^2/s with a standard deviation
-//!   of 60; from [`LagWindowPeak`](crate::LagWindowPeak) (16 lags, [`RangeKernel::seen_as_peak`]) 537 +- 8 and 27, or
-//!   529 +- 7 and 23 with one circulation and one core radius for both vortices. From the peak of the plain periodogram,
-//!   taken for a mean, it is 40 % too much: the peak follows the fast side of a core.
+//! - fit of a map: see figure 17 in the book. What an estimator shows of a core is not its mean: taken for one, the peaks of the plain
+//!   periodogram give 40 % too much circulation.
 //!
 //! The likelihood of one scan has several tops near the highest, since few lines cross a core and each has its speckle;
 //! they lie within one or two standard deviations of each other, and which one is found depends on the start.
@@ -33,23 +31,30 @@
 
 mod band;
 mod baseband;
+mod estimator_response;
 mod free;
 mod guess;
 mod likelihood;
 mod line;
 mod map_fit;
+mod map_problem;
 mod pulse;
 mod range_kernel;
 mod scan_model;
 mod signal_fit;
 mod small;
+mod tangent;
 mod wake;
 mod wake_map;
 
 pub use baseband::Baseband;
+pub use estimator_response::EstimatorResponse;
 pub use free::{FreeParameters, Sharing, WindFit};
 pub use likelihood::{LikelihoodValue, Powers, ScanSignals};
-pub use map_fit::{Loss, MapFit, MapFitOptions, VelocityMap, fit_map, refine_map_fit};
+pub use map_fit::{
+    Loss, MapFit, MapFitOptions, VelocityMap, fit_map, fit_map_of_estimator, refine_map_fit,
+    refine_map_fit_of_estimator,
+};
 pub use pulse::PulseShape;
 pub use range_kernel::RangeKernel;
 pub use scan_model::{ScanModel, ScanSetup};

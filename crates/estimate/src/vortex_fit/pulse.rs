@@ -44,7 +44,7 @@ impl PulseShape {
     }
 
     /// f \[s^-1/2\] at a time \[s\].
-    fn at(&self, time_s: f64) -> f64 {
+    pub(super) fn at(&self, time_s: f64) -> f64 {
         match &self.0 {
             Form::Gaussian { sigma_s } => (-0.5 * (time_s / sigma_s).powi(2)).exp() / (PI.sqrt() * sigma_s).sqrt(),
             Form::Sampled { first_s, interval_s, per_sqrt_s } => {
@@ -60,7 +60,7 @@ impl PulseShape {
     }
 
     /// Largest time \[s\] at which f^2 matters (1e-7 of its peak for the Gaussian).
-    fn reach_s(&self) -> f64 {
+    pub(super) fn reach_s(&self) -> f64 {
         match &self.0 {
             Form::Gaussian { sigma_s } => 4.0 * sigma_s,
             Form::Sampled { first_s, interval_s, per_sqrt_s } => {

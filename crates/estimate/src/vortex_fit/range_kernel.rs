@@ -1,13 +1,8 @@
 //! Radial velocity as a range gate reports it: the wind along a line weighted by pulse and window, with derivatives.
 //!
-//! v(R) = sum over i of w_i v_R(R + offset_i), the weights summing to 1: (28), corrected, on a grid; or, for an estimator that takes
-//! the peak of a spectrum, the peak of sum over i of w_i W(v - v_i), W the line that uniform wind shows. In a vortex the spectrum is
-//! skewed and its peak is nearer to the fast air than the mean is: a fit that takes one for the other finds
-//! some 10 % (lag window of 64 ns) or 40 % (periodogram) too much circulation.
+//! v(R) = sum over i of w_i v_R(R + offset_i), the weights summing to 1: (28), corrected, on a grid.
 //! Check: a linear wind is kept but for the mean offset; gates between grid points are interpolated; derivatives against
-//! difference quotients; for a wide line the peak is off the mean by the third moment.
-
-use std::f64::consts::{PI, SQRT_2};
+//! difference quotients.
 
 use super::band::dot;
 use super::wake::{PARAMETERS, Ray, Wake, WakeModel};
@@ -20,12 +15,7 @@ pub struct RangeKernel {
     first_offset_m: f64,
     spacing_m: f64,
     weights: Vec<f64>,
-    /// Standard deviation of the line W, if the peak is seen.
-    line_width_m_s: Option<f64>,
 }
-
-/// Places at which the highest peak is looked for.
-const STARTS: usize = 16;
 
 impl RangeKernel {
     /// `weights` of the air at R + `first_offset_m`, `spacing_m` apart; they are scaled to the sum 1.
@@ -39,38 +29,7 @@ impl RangeKernel {
         let sum: f64 = weights.iter().sum();
         positive("sum of the weights", sum)?;
         let weights = weights.iter().map(|w| w / sum).collect();
-        Ok(Self { first_offset_m, spacing_m, weights, line_width_m_s: None })
-    }
-
-    /// The same for velocities that are the peak of a spectrum whose line in uniform wind is Gaussian with the standard deviation
-    /// `line_width_m_s` \[m/s\].
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] if it is not positive.
-    pub fn seen_as_peak(self, line_width_m_s: f64) -> Result<Self, Error> {
-        positive("line_width_m_s", line_width_m_s)?;
-        Ok(Self { line_width_m_s: Some(line_width_m_s), ..self })
-    }
-
-    /// Width \[m/s\] of the line of a Gaussian pulse, for [`RangeKernel::seen_as_peak`]: its covariance exp(-tau^2 / (4 sigma^2)), times
-    /// the autocorrelation of the data window, times (1 + cos(pi tau / tau_max))/2 if a Hann lag window up to tau_max is used,
-    /// all taken as Gaussian near lag 0: sigma_v = (lambda/2) / (2 pi sqrt 2 sigma_all).
-    ///
-    /// `window_sigma_s` is the 1/e half-width of the squared Gaussian data window h^2, infinite if there is none.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] for a pulse or wavelength that is not positive.
-    pub fn line_width_m_s(
-        wavelength_m: f64,
-        pulse_sigma_s: f64,
-        window_sigma_s: f64,
-        hann_lags_s: Option<f64>,
-    ) -> Result<f64, Error> {
-        positive("wavelength_m", wavelength_m)?;
-        positive("pulse_sigma_s", pulse_sigma_s)?;
-        let hann_sigma_s = hann_lags_s.map_or(f64::INFINITY, |reach_s| reach_s / PI);
-        let inverse_square: f64 = [pulse_sigma_s, window_sigma_s, hann_sigma_s].iter().map(|s| s.powi(-2)).sum();
-        Ok(wavelength_m * inverse_square.sqrt() / (4.0 * SQRT_2 * PI))
+        Ok(Self { first_offset_m, spacing_m, weights })
     }
 
     /// The weights of a Gaussian pulse of 1/e half-width `pulse_sigma_s` \[s\] seen through the window `window`, h_n, of samples
@@ -106,7 +65,6 @@ impl RangeKernel {
             first_offset_m: self.first_offset_m + 0.5 * (factor - 1) as f64 * self.spacing_m,
             spacing_m: factor as f64 * self.spacing_m,
             weights,
-            line_width_m_s: self.line_width_m_s,
         }
     }
 }
@@ -125,66 +83,6 @@ impl RangeKernel {
             *found = dot(&self.weights, &row[index..index + self.weights.len()]);
         }
         found
-    }
-
-    /// By how much the peak of the spectrum differs from the mean velocity, for each range of a line \[m/s\]; zeros unless the
-    /// kernel is [`RangeKernel::seen_as_peak`].
-    pub(super) fn peak_shifts(
-        &self,
-        model: &WakeModel,
-        wake: &Wake,
-        ray: Ray,
-        range_m: &[f64],
-        scratch: &mut LineScratch,
-    ) -> Vec<f64> {
-        let mut shifts = vec![0.0; range_m.len()];
-        if let Some(width_m_s) = self.line_width_m_s {
-            self.apply((model, wake, ray), range_m, false, scratch, |_, _, _| {});
-            let nearest_m = range_m.iter().copied().fold(f64::INFINITY, f64::min);
-            for (shift, r_m) in shifts.iter_mut().zip(range_m) {
-                // to the nearest grid point: the shift is smooth
-                let index = ((r_m - nearest_m) / self.spacing_m).round() as usize;
-                let velocities = &scratch.rows[0][index..index + self.weights.len()];
-                let mean = dot(&self.weights, velocities);
-                *shift = self.peak(velocities, mean, width_m_s) - mean;
-            }
-        }
-        shifts
-    }
-
-    /// Peak of the sum of lines.
-    fn peak(&self, velocities: &[f64], mean: f64, width_m_s: f64) -> f64 {
-        let sums = |at: f64| {
-            let (mut height, mut pull, mut curvature) = (0.0, 0.0, 0.0);
-            for (w, v) in self.weights.iter().zip(velocities) {
-                let x = (at - v) / width_m_s;
-                let line = w * (-0.5 * x * x).exp();
-                height += line;
-                pull += line * x;
-                curvature += line * (1.0 - x * x);
-            }
-            (height, pull, curvature)
-        };
-        let (low, high) = velocities.iter().fold((mean, mean), |(low, high), v| (low.min(*v), high.max(*v)));
-        let starts = if high - low > width_m_s { STARTS } else { 0 };
-        let place = |i: usize| low + (high - low) * (i as f64 + 0.5) / STARTS as f64;
-        let (mut at, mut most) = (mean, sums(mean).0);
-        for start in (0..starts).map(place) {
-            let height = sums(start).0;
-            if height > most {
-                (at, most) = (start, height);
-            }
-        }
-        // Newton's step where the peak is round, else the step to the weighted mean, which always goes uphill
-        for _ in 0..50 {
-            let (height, pull, curvature) = sums(at);
-            let step = -width_m_s * pull / if curvature > 0.3 * height { curvature } else { height };
-            at += step;
-            if step.abs() < 1e-9 * width_m_s {
-                break;
-            }
-        }
-        at
     }
 
     /// Gate velocities of a line, and with `slopes` their derivatives: `out(gate, velocity, derivatives)` for each range.
@@ -306,37 +204,6 @@ mod tests {
                 assert_relative_eq!(*slope, quotient, max_relative = 1e-6, epsilon = 1e-8);
             }
         });
-    }
-
-    #[test]
-    fn the_peak_of_a_skewed_spectrum_is_not_its_mean_unless_the_line_is_wide() {
-        let (model, ray, ranges) = (WakeModel::default(), Ray::new(0.115), [377.7, 380.1, 399.3]);
-        let shifts =
-            |kernel: &RangeKernel| kernel.peak_shifts(&model, &wake(), ray, &ranges, &mut LineScratch::default());
-        assert_eq!(shifts(&gate()), [0.0; 3]);
-        // for a wide line the shift tends to half the third central moment over the variance of the line
-        let kernel = gate().seen_as_peak(40.0).unwrap();
-        let weights: Vec<f64> = kernel.weights.clone();
-        for (range_m, found) in ranges.iter().zip(shifts(&kernel)) {
-            let velocities: Vec<f64> = (0..weights.len())
-                .map(|i| {
-                    let at_m = range_m + kernel.first_offset_m + i as f64 * kernel.spacing_m;
-                    model.radial_velocity_m_s(&wake(), at_m, 0.115)
-                })
-                .collect();
-            let mean = dot(&weights, &velocities);
-            let third: f64 = weights.iter().zip(&velocities).map(|(w, v)| w * (v - mean).powi(3)).sum();
-            assert_relative_eq!(found, -third / (2.0 * 40.0 * 40.0), max_relative = 0.05);
-        }
-    }
-
-    #[test]
-    fn line_widths_are_those_of_the_pulse_and_of_the_lag_window() {
-        let width = |window_s, hann| RangeKernel::line_width_m_s(1.55e-6, 120.112e-9, window_s, hann).unwrap();
-        // the spectral width of a 200 ns pulse
-        assert_relative_eq!(width(f64::INFINITY, None), 0.726, max_relative = 1e-3);
-        let all_s = (120.112_f64.powi(-2) + 64.0_f64.powi(-2) + (64.0 / PI).powi(-2)).sqrt().recip() * 1e-9;
-        assert_relative_eq!(width(64e-9, Some(64e-9)), 1.55e-6 / (4.0 * SQRT_2 * PI * all_s), max_relative = 1e-12);
     }
 
     #[test]

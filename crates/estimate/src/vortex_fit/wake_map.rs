@@ -1,6 +1,6 @@
 //! The map of radial velocities that gates and regions would show of a wake.
 //!
-//! Each velocity is the mean over the kernel along its line, or the peak of that spectrum, and over the lines of its region, weighted with their
+//! Each velocity is the mean over the kernel along its line and over the lines of its region, weighted with their
 //! chords. Check: a region of radius 0 gives the kernel's velocities; a wind linear in height is kept.
 
 use ndarray::Array2;
@@ -32,32 +32,32 @@ impl WakeModel {
         }
         let rows = map_indexed(elevation_rad.len(), LineScratch::default, |scratch, line| {
             let ray = Ray::new(elevation_rad[line]);
-            let mut velocities = kernel.peak_shifts(self, wake, ray, range_m, scratch);
-            kernel.apply((self, wake, ray), range_m, false, scratch, |gate, velocity, _| velocities[gate] += velocity);
+            let mut velocities = vec![0.0; range_m.len()];
+            kernel.apply((self, wake, ray), range_m, false, scratch, |gate, velocity, _| velocities[gate] = velocity);
             velocities
         });
-        let chord = |line: usize, other: usize, range_m: f64| {
-            let away_m = range_m * (elevation_rad[line] - elevation_rad[other]).abs();
-            (radius_m * radius_m - away_m * away_m).max(0.0).sqrt()
-        };
         Ok(Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
-            let (mut sum, mut weights) = (0.0, 0.0);
-            // outwards to both sides until the region ends
-            let sides: [&mut dyn Iterator<Item = usize>; 2] =
-                [&mut (0..=line).rev(), &mut (line + 1..elevation_rad.len())];
-            for side in sides {
-                for other in side {
-                    let weight = chord(line, other, range_m[gate]);
-                    if weight == 0.0 {
-                        break;
-                    }
-                    sum += weight * rows[other][gate];
-                    weights += weight;
-                }
-            }
-            if weights > 0.0 { sum / weights } else { rows[line][gate] }
+            region(elevation_rad, line, range_m[gate], radius_m).map(|(other, share)| share * rows[other][gate]).sum()
         }))
     }
+}
+
+/// Lines within `radius_m` of a line at that range, with their shares: the chords that the circle cuts, over their sum. A line alone if
+/// no other is as near.
+pub(super) fn region(
+    elevation_rad: &[f64],
+    line: usize,
+    range_m: f64,
+    radius_m: f64,
+) -> impl Iterator<Item = (usize, f64)> {
+    let chord = move |other: usize| {
+        let away_m = range_m * (elevation_rad[line] - elevation_rad[other]).abs();
+        (radius_m * radius_m - away_m * away_m).max(0.0).sqrt()
+    };
+    let first = (0..line).rev().take_while(|&other| chord(other) > 0.0).last().unwrap_or(line);
+    let last = (line + 1..elevation_rad.len()).take_while(|&other| chord(other) > 0.0).last().unwrap_or(line);
+    let sum: f64 = (first..=last).map(chord).sum();
+    (first..=last).map(move |other| (other, if sum > 0.0 { chord(other) / sum } else { 1.0 }))
 }
 
 #[cfg(test)]
