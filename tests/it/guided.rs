@@ -15,7 +15,8 @@ const RADIUS_M: f64 = 2.0;
 /// Grid of the kernels \[m\].
 const GRID_M: f64 = 0.6;
 
-/// Root-mean-square errors over scans: against the pulse's velocity within 8 m of a core and beyond 30 m, against the gate's within 8 m.
+/// Root-mean-square errors over scans: against the pulse's velocity within 8 m of a core and beyond 30 m, against the
+/// gate's within 8 m.
 #[derive(Debug, Default, Clone, Copy)]
 struct Errors {
     squares: [f64; 3],
@@ -179,7 +180,8 @@ fn a_map_guided_by_the_fit_of_its_signals_is_within_1_3_m_s_inside_and_better_th
     assert!(inside < 1.3 && outside < ca_outside && gate < 0.9, "{found:?}");
 }
 
-/// Two vortices that the fit does not know of come out of the data at 10 dB, somewhat blurred; the fitted wake alone has nothing there.
+/// Two vortices that the fit does not know of come out of the data at 10 dB, somewhat blurred; the fitted wake alone
+/// has nothing there.
 #[test]
 fn vortices_that_no_fit_knows_of_come_out_of_the_data() {
     let found = measured(&distorted(10.0), 10.0, 0..1, false);
@@ -188,8 +190,8 @@ fn vortices_that_no_fit_knows_of_come_out_of_the_data() {
     assert!(guided[1] < data[1] && guided[1] < ca[1] && guided[2] < 0.5 * alone[2], "{found:?}");
 }
 
-/// `SCANS` and `SNR_DB` in the environment change the number of scans (4) and the signal-to-noise ratio (0), `UNKNOWN` adds vortices that the fit
-/// does not know of, about which the errors are then taken.
+/// `SCANS` and `SNR_DB` in the environment change the number of scans (4) and the signal-to-noise ratio (0),
+/// `UNKNOWN` adds vortices that the fit does not know of, about which the errors are then taken.
 ///
 /// `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture errors_of_guided_maps`
 #[test]

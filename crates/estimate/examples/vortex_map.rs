@@ -1,8 +1,8 @@
 //! Fits a vortex pair to a map of radial velocities of one's own: no other crate of wakescope is needed.
 //!
-//! `cargo run --release --example vortex_map -p wakescope-estimate [FILE]` reads `elevation_rad,range_m,velocity_m_s` per line (a full grid, lines by
-//! increasing elevation, ranges running fastest; NaN where there is none) and prints both vortices with
-//! their standard deviations. Without a file it makes a noisy map itself.
+//! `cargo run --release --example vortex_map -p wakescope-estimate [FILE]` reads `elevation_rad,range_m,velocity_m_s`
+//! per line (a full grid, lines by increasing elevation, ranges running fastest; NaN where there is none) and prints
+//! both vortices with their standard deviations. Without a file it makes a noisy map itself.
 
 #![allow(clippy::print_stdout)]
 

@@ -193,11 +193,13 @@ impl Scan {
         .collect()
     }
 
-    /// Mean correlogram of the valid windows within `radius_m` of `point`, each line of sight shifted to the velocity of the point first.
+    /// Mean correlogram of the valid windows within `radius_m` of `point`, each line of sight shifted to the velocity
+    /// of the point first.
     ///
-    /// `relative_m_s` tells by how much the wind at a place of the region is faster than at the point: the difference of a first map, or a model.
-    /// What differs between the lines then adds up in place instead of blurring the spectrum. The statistic must be a correlogram of the given kind; `mean` is
-    /// always complex (two numbers per lag), for an estimator planned for [`SignalKind::Complex`]. The mirror image of real samples moves along and
+    /// `relative_m_s` tells by how much the wind at a place of the region is faster than at the point: the difference
+    /// of a first map, or a model. What differs between the lines then adds up in place instead of blurring the
+    /// spectrum. The statistic must be a correlogram of the given kind; `mean` is always complex (two numbers per
+    /// lag), for an estimator planned for [`SignalKind::Complex`]. The mirror image of real samples moves along and
     /// stays outside the band. Returns the number of windows.
     ///
     /// # Errors
@@ -240,7 +242,8 @@ impl Scan {
         Ok(level)
     }
 
-    /// Velocities at `points` by [`Scan::region_mean_following`]; `guess_m_s` gives the wind of a first estimate anywhere, NaN where it has none.
+    /// Velocities at `points` by [`Scan::region_mean_following`]; `guess_m_s` gives the wind of a first estimate
+    /// anywhere, NaN where it has none.
     ///
     /// # Errors
     /// As [`Scan::map`]; the estimator takes complex correlograms with as many lags as this scan has.

@@ -1,8 +1,9 @@
-//! The radius rho(R) that a target variance needs: small where the signal is strong or the lines are close, larger where they are not.
+//! The radius rho(R) that a target variance needs: small where the signal is strong or the lines are close, larger
+//! where they are not.
 //!
-//! A large region averages noise away and blurs the vortex; this takes the smallest that is enough. The
-//! variance of a mean of n_eff independent windows is that of one window over n_eff. Check: the variance asked for is reached and not by much more;
-//! the radius grows with range.
+//! A large region averages noise away and blurs the vortex; this takes the smallest that is enough. The variance of a
+//! mean of n_eff independent windows is that of one window over n_eff. Check: the variance asked for is reached and
+//! not by much more; the radius grows with range.
 
 use crate::accumulate::Radius;
 use crate::error::{Error, positive};
@@ -48,12 +49,13 @@ impl ScanGeometry {
 }
 
 impl Radius {
-    /// rho(R) for a target standard deviation `target_m_s` \[m/s\] of velocity: the smallest region in the middle of the scan that is enough, at
-    /// most `largest_m`.
+    /// rho(R) for a target standard deviation `target_m_s` \[m/s\] of velocity: the smallest region in the middle of
+    /// the scan that is enough, at most `largest_m`.
     ///
-    /// `single_m_s` gives the standard deviation of one window \[m/s\] at a range \[m\]: the bound for the signal-to-noise ratio there
-    /// ([`WindowModel::bound_m_s`](crate::WindowModel::bound_m_s)) times what the estimator loses. Between the ranges of a table of 65, increasing, the radius is
-    /// interpolated. Where `largest_m` is not enough it is taken all the same: n_eff of the map tells.
+    /// `single_m_s` gives the standard deviation of one window \[m/s\] at a range \[m\]: the bound for the
+    /// signal-to-noise ratio there ([`WindowModel::bound_m_s`](crate::WindowModel::bound_m_s)) times what the
+    /// estimator loses. Between the ranges of a table of 65, increasing, the radius is interpolated. Where
+    /// `largest_m` is not enough it is taken all the same: n_eff of the map tells.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a target, radius or standard deviation that is not above 0.

@@ -83,8 +83,8 @@ impl Autoregression {
     /// Model of order `order` from a correlogram (stored as [`SignalKind::lag_numbers`] says).
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] if the order is 0 or not below the number of lags, if there is no power, or if the correlogram is not positive
-    /// definite.
+    /// [`Error::OutOfRange`] if the order is 0 or not below the number of lags, if there is no power, or if the
+    /// correlogram is not positive definite.
     pub fn yule_walker(correlogram: &[f64], kind: SignalKind, order: usize) -> Result<Self, Error> {
         check_order(order, correlogram.len() / kind.lag_numbers(1))?;
         let mut model = Self::default();

@@ -15,8 +15,8 @@ use crate::sampling::Sampling;
 
 /// Bound on the standard deviation of velocity \[m/s\] from one or more independent circular complex windows.
 ///
-/// `covariance` \[n, n\] = E{x x^H} and `derivative` \[n, n\], its derivative per m/s, in any common unit; `windows` counts independent windows and
-/// may be an effective number.
+/// `covariance` \[n, n\] = E{x x^H} and `derivative` \[n, n\], its derivative per m/s, in any common unit; `windows`
+/// counts independent windows and may be an effective number.
 ///
 /// # Errors
 /// [`Error::Linalg`] if the covariance is singular or not Hermitian, [`Error::Length`] if shapes differ,
@@ -43,8 +43,8 @@ pub fn bound_real_m_s(
 
 /// Fisher information of one circular complex window on any parameters: tr(R^-1 dR_i R^-1 dR_j), \[i, j\].
 ///
-/// `derivatives` are those of the covariance \[n, n\] with respect to each parameter. The inverse of the sum over all windows bounds the
-/// covariance of any unbiased estimates.
+/// `derivatives` are those of the covariance \[n, n\] with respect to each parameter. The inverse of the sum over all
+/// windows bounds the covariance of any unbiased estimates.
 ///
 /// # Errors
 /// [`Error::Linalg`] if the covariance is singular or not Hermitian, [`Error::Length`] if shapes differ.
@@ -217,7 +217,8 @@ impl WindowModel {
 
     /// Covariance and its derivative with respect to velocity \[per m/s\], complex samples.
     ///
-    /// `snr` is signal power (mean over the window) over noise power in the detector band. The signal keeps the unit of the envelope.
+    /// `snr` is signal power (mean over the window) over noise power in the detector band. The signal keeps the unit
+    /// of the envelope.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] if `snr` is not above 0 or the velocity not finite.

@@ -70,7 +70,8 @@ impl<S: Sample> Correlogram<S> {
         &self.tapers
     }
 
-    /// Weights of the lags of white data, w_m = sum over tapers of factor times the tapers' correlogram, w_0 = 1: 1 - m / N without weighting.
+    /// Weights of the lags of white data, w_m = sum over tapers of factor times the tapers' correlogram, w_0 = 1: 1 -
+    /// m / N without weighting.
     ///
     /// [`SpectralPeak::with_lag_weights`](crate::SpectralPeak::with_lag_weights) takes them to tell spectral width from resolution.
     #[must_use]

@@ -1,17 +1,18 @@
 //! How high the peak of pure noise stands: the threshold that tells a signal from noise.
 //!
-//! Computes the level that the highest of K independent cells of an averaged periodogram, over their mean, exceeds with a given
-//! probability: Fisher's test (1929), for the mean of n_eff windows. A cell over the sum of all has a beta distribution of parameters
-//! n_eff and (K - 1) n_eff; its quantile is that of Paulson (1942), good to 4 % from n_eff = 1 on. Check: Fisher's closed form
-//! for one window, and the rate of false alarms on white noise.
+//! Computes the level that the highest of K independent cells of an averaged periodogram, over their mean, exceeds
+//! with a given probability: Fisher's test (1929), for the mean of n_eff windows. A cell over the sum of all has a
+//! beta distribution of parameters n_eff and (K - 1) n_eff; its quantile is that of Paulson (1942), good to 4 % from
+//! n_eff = 1 on. Check: Fisher's closed form for one window, and the rate of false alarms on white noise.
 
 use crate::error::{Error, positive};
 
-/// [`GateVelocity::quality`](crate::GateVelocity::quality) that the spectral peak of white noise exceeds with probability `false_alarm`.
+/// [`GateVelocity::quality`](crate::GateVelocity::quality) that the spectral peak of white noise exceeds with
+/// probability `false_alarm`.
 ///
-/// `n_eff` is the number of independent windows averaged and `cells` the width of the band over the resolution, B_w N / F_s: 12.8 for
-/// 50 MHz, 64 samples and 250 MHz. A peak below this level is not distinguishable from noise and its velocity
-/// lies anywhere in the band.
+/// `n_eff` is the number of independent windows averaged and `cells` the width of the band over the resolution, B_w N
+/// / F_s: 12.8 for 50 MHz, 64 samples and 250 MHz. A peak below this level is not distinguishable from noise and its
+/// velocity lies anywhere in the band.
 ///
 /// # Errors
 /// [`Error::OutOfRange`] unless `n_eff` is above 0, `cells` above 1 and `false_alarm` between 0 and 1.

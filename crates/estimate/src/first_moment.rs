@@ -1,9 +1,10 @@
 //! First moment of the main peak: the mean velocity of a spectrum that is skewed or has several peaks.
 //!
-//! (28) weights velocities, so that its estimate is a mean, not the most frequent value: where the wind changes within a gate the peak of the
-//! spectrum lies aside of it. Computes the centroid of the density above the noise floor within some standard deviations about itself, both found
-//! by iteration from a peak of the lag-windowed spectrum, which is smooth. Narrow spectra are thus cut out of the noise and wide ones taken
-//! whole. Check: the mean of two lines; simulated wind; the errors on a scan of a vortex pair.
+//! (28) weights velocities, so that its estimate is a mean, not the most frequent value: where the wind changes
+//! within a gate the peak of the spectrum lies aside of it. Computes the centroid of the density above the noise
+//! floor within some standard deviations about itself, both found by iteration from a peak of the lag-windowed
+//! spectrum, which is smooth. Narrow spectra are thus cut out of the noise and wide ones taken whole. Check: the mean
+//! of two lines; simulated wind; the errors on a scan of a vortex pair.
 
 use crate::error::{Error, positive};
 use crate::peak::SpectralPeak;

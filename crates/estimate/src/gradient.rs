@@ -1,9 +1,10 @@
 //! A window of wind that changes linearly along the line of sight: its covariance, and the bound on velocity and gradient together.
 //!
-//! With v(R) = v + g (R - R_c) and a Gaussian pulse, |f|^2 ~ exp(-t^2 / sigma^2), the covariance of the complex signal at the times t_1, t_2 from the
-//! centre of the window is exp(-tau^2 / (4 sigma^2) - (k g c sigma tau / 4)^2) exp(-j k (v + g c (t_1 + t_2) / 4) tau), tau = t_1 - t_2, k = 4 pi /
-//! lambda: a chirp, and a spectrum that is broader by the spread of velocities in the pulse (Frehlich 1997 calls it shear broadening). Check: the sum
-//! over layers, difference quotients, and g = 0.
+//! With v(R) = v + g (R - R_c) and a Gaussian pulse, |f|^2 ~ exp(-t^2 / sigma^2), the covariance of the complex
+//! signal at the times t_1, t_2 from the centre of the window is exp(-tau^2 / (4 sigma^2) - (k g c sigma tau / 4)^2)
+//! exp(-j k (v + g c (t_1 + t_2) / 4) tau), tau = t_1 - t_2, k = 4 pi / lambda: a chirp, and a spectrum that is
+//! broader by the spread of velocities in the pulse (Frehlich 1997 calls it shear broadening). Check: the sum over
+//! layers, difference quotients, and g = 0.
 
 use ndarray::Array2;
 use num_complex::Complex;
@@ -88,7 +89,8 @@ impl GradientModel {
         [0, 1].map(|which| Array2::from_shape_fn(shape, |place| parts(place)[which]))
     }
 
-    /// Covariance and its derivatives with respect to velocity \[per m/s\] and gradient \[per 1/s\], complex samples of unit signal power.
+    /// Covariance and its derivatives with respect to velocity \[per m/s\] and gradient \[per 1/s\], complex samples
+    /// of unit signal power.
     ///
     /// `snr` is signal power over noise power in the detector band.
     ///

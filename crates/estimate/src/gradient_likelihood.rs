@@ -1,15 +1,16 @@
 //! Maximum likelihood of velocity and gradient together, for real or complex windows of a known pulse.
 //!
 //! For each gradient of a list the signal covariance S is that of [`GradientModel`]; M is the noise, and for real
-//! windows the mirror image of the signal too, wherever in the detector band that may lie. With M^-1/2 S M^-1/2 = V mu V^H and h_i = M^-1/2 v_i
-//! the likelihood depends on the velocity through D = sum over i of P mu_i / (1 + P mu_i) |h_i^H E^H x|^2, E the carrier: a sum of
-//! tapered periodograms that accumulates over windows. The unknown level of the signal is the one that suits best, so that
-//! -n ln(energy - D) - sum ln(1 + P mu_i) is the logarithm of the likelihood. In white noise n is the number of samples of the window and the energy
-//! that of all of them (half of both for real ones: the side of the band); in band-limited noise both are those of the band.
+//! windows the mirror image of the signal too, wherever in the detector band that may lie. With M^-1/2 S M^-1/2 = V
+//! mu V^H and h_i = M^-1/2 v_i the likelihood depends on the velocity through D = sum over i of P mu_i / (1 + P mu_i)
+//! |h_i^H E^H x|^2, E the carrier: a sum of tapered periodograms that accumulates over windows. The unknown level of
+//! the signal is the one that suits best, so that -n ln(energy - D) - sum ln(1 + P mu_i) is the logarithm of the
+//! likelihood. In white noise n is the number of samples of the window and the energy that of all of them (half of
+//! both for real ones: the side of the band); in band-limited noise both are those of the band.
 //!
-//! What is left of the mirror image shifts the peak by a known amount, a smooth function of the velocity, which is tabulated from the
-//! expected statistic and taken away. Check: the bound of [`GradientModel::bound`]; with the gradient 0 alone, that of
-//! [`WindowModel::bound_m_s`](crate::WindowModel::bound_m_s).
+//! What is left of the mirror image shifts the peak by a known amount, a smooth function of the velocity, which is
+//! tabulated from the expected statistic and taken away. Check: the bound of [`GradientModel::bound`]; with the
+//! gradient 0 alone, that of [`WindowModel::bound_m_s`](crate::WindowModel::bound_m_s).
 
 use std::sync::Arc;
 
@@ -89,12 +90,13 @@ pub struct GradientLikelihood<S> {
 impl<S: Sample> GradientLikelihood<S> {
     /// Plans the estimator for windows like those of `model` at signal-to-noise ratio `snr` (in the detector band).
     ///
-    /// The gradients \[1/s\] increase; between them the likelihood is interpolated, so that a spacing of twice the bound on the gradient will do. With
-    /// a single gradient only the velocity is sought. Each gradient costs some complex transforms of 2 N samples per window.
+    /// The gradients \[1/s\] increase; between them the likelihood is interpolated, so that a spacing of twice the
+    /// bound on the gradient will do. With a single gradient only the velocity is sought. Each gradient costs some
+    /// complex transforms of 2 N samples per window.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] if `snr` is not above 0 or the gradients do not increase, [`Error::Empty`] without gradients, [`Error::Band`] for an
-    /// impossible band, [`Error::Linalg`] if the covariance cannot be diagonalised.
+    /// [`Error::OutOfRange`] if `snr` is not above 0 or the gradients do not increase, [`Error::Empty`] without
+    /// gradients, [`Error::Band`] for an impossible band, [`Error::Linalg`] if the covariance cannot be diagonalised.
     pub fn new(model: &GradientModel, snr: f64, gradient_per_s: &[f64], padded_samples: usize) -> Result<Self, Error> {
         positive("snr", snr)?;
         if gradient_per_s.is_empty() {

@@ -1,8 +1,8 @@
 //! Reflection and prediction coefficients of a real correlogram, fast: Schur's recursion with one division per order.
 //!
-//! Schur's recursion (Kailath 1986) carries two vectors instead of the inner products of Levinson's, so nothing waits for a sum; the
-//! coefficients follow from the reflections by Levinson's update. Check: the complex Levinson recursion in
-//! `autoregressive`, the Yule-Walker equations, and a stored window.
+//! Schur's recursion (Kailath 1986) carries two vectors instead of the inner products of Levinson's, so nothing waits
+//! for a sum; the coefficients follow from the reflections by Levinson's update. Check: the complex Levinson
+//! recursion in `autoregressive`, the Yule-Walker equations, and a stored window.
 
 /// Solution of the Yule-Walker equations of a real correlogram.
 pub(crate) struct Reflected<'w> {

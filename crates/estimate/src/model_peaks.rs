@@ -1,9 +1,10 @@
 //! Estimators that fit a model to the accumulated correlogram: CA (the AR spectrum's peak), its pole, and Capon.
 //!
-//! Computes the peak in the detector band of the AR spectrum (32), of order 16 in the literal form; the pole of the same model that is nearest
-//! to the unit circle; and the peak of Capon's minimum-variance spectrum (p + 1) / (e^H R^-1 e) (Capon 1969). Their inverse
-//! spectra are trigonometric polynomials of the order of the model and so cheap at any frequency. Check: spectra evaluated frequency by frequency,
-//! e^H R^-1 e with R inverted, a stored window, and tones.
+//! Computes the peak in the detector band of the AR spectrum (32), of order 16 in the literal form; the pole of the
+//! same model that is nearest to the unit circle; and the peak of Capon's minimum-variance spectrum (p + 1) / (e^H
+//! R^-1 e) (Capon 1969). Their inverse spectra are trigonometric polynomials of the order of the model and so cheap
+//! at any frequency. Check: spectra evaluated frequency by frequency, e^H R^-1 e with R inverted, a stored window,
+//! and tones.
 
 use crate::autoregressive::{Autoregression, OrderChoice, check_order};
 use crate::error::Error;
@@ -200,7 +201,8 @@ model_estimator!(
 );
 
 model_estimator!(
-    /// Velocity of the pole nearest to the unit circle in the detector band, of the autoregressive model of the accumulated correlogram.
+    /// Velocity of the pole nearest to the unit circle in the detector band, of the autoregressive model of the
+    /// accumulated correlogram.
     ///
     /// Width, SNR, quality and flags are those of the model's spectrum.
     AutoregressivePole,

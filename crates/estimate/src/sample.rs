@@ -62,7 +62,8 @@ pub trait Sample: Copy + Send + Sync + sealed::Sealed + 'static {
     fn largest_part(self) -> f64;
     /// Whether all parts are finite.
     fn is_finite(self) -> bool;
-    /// Adds the products of a sample that enters a window with itself and those before it, and takes away those of one that leaves it.
+    /// Adds the products of a sample that enters a window with itself and those before it, and takes away those of
+    /// one that leaves it.
     ///
     /// `entering` ends with the new sample, `leaving` begins with the old one; both are as long as `sums` has lags.
     #[doc(hidden)]

@@ -1,17 +1,19 @@
 //! A velocity map drawn towards a first guess, as far as the map itself does not contradict it.
 //!
-//! The residual of the measured map against what the estimator would show of the guess is split into scales (the wavelet transform "a trous" with the
-//! cubic B-spline, Holschneider et al. 1989, Starck and Murtagh 1994). At each scale and place the energy of the residual is compared with that
-//! of noise, which two maps made from one half of the pulses each give: half of their difference has the noise of the
-//! whole map and no wind. What exceeds the noise stays, the rest goes (block shrinkage of James and Stein, Cai 1999):
+//! The residual of the measured map against what the estimator would show of the guess is split into scales (the
+//! wavelet transform "a trous" with the cubic B-spline, Holschneider et al. 1989, Starck and Murtagh 1994). At each
+//! scale and place the energy of the residual is compared with that of noise, which two maps made from one half of
+//! the pulses each give: half of their difference has the noise of the whole map and no wind. What exceeds the noise
+//! stays, the rest goes (block shrinkage of James and Stein, Cai 1999):
 //!
 //! ```text
 //! weight = max(0, 1 - factor <noise^2> / <residual^2>)
 //! ```
 //!
-//! So a guess that is right takes the noise away, and where it is wrong the data replace it. The guess may be a fitted wake
-//! ([`WakeModel::map`](crate::vortex_fit::WakeModel::map)), a simulated flow, or zeros, which smooths the map. The coarsest scale is
-//! always that of the data. The price of a guess that is wrong in a place is some detail there. Check: a right guess removes noise, a wrong one is corrected, no guess keeps structures.
+//! So a guess that is right takes the noise away, and where it is wrong the data replace it. The guess may be a
+//! fitted wake ([`WakeModel::map`](crate::vortex_fit::WakeModel::map)), a simulated flow, or zeros, which smooths the
+//! map. The coarsest scale is always that of the data. The price of a guess that is wrong in a place is some detail
+//! there. Check: a right guess removes noise, a wrong one is corrected, no guess keeps structures.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -29,14 +31,15 @@ pub struct ShrinkageOptions {
     pub gate_step: usize,
     /// Number of scales, each twice as coarse as the one before.
     pub scales: usize,
-    /// What the energy of the residual must be over that of the noise to count: 1 is Wiener's filter, 4.5 removes nearly all noise (Cai
-    /// 1999) and with it what is weak; 0 leaves the data as they are.
+    /// What the energy of the residual must be over that of the noise to count: 1 is Wiener's filter, 4.5 removes
+    /// nearly all noise (Cai 1999) and with it what is weak; 0 leaves the data as they are.
     pub factor: f64,
 }
 
 impl ShrinkageOptions {
-    /// Four scales and a factor of 2 for a map whose regions have the radius `radius_m`, lines `line_spacing_m` and gates `gate_spacing_m` apart, and whose pulse
-    /// and window see `gate_length_m` of air together (root mean square): the finest scale is that of what the map resolves.
+    /// Four scales and a factor of 2 for a map whose regions have the radius `radius_m`, lines `line_spacing_m` and
+    /// gates `gate_spacing_m` apart, and whose pulse and window see `gate_length_m` of air together (root mean
+    /// square): the finest scale is that of what the map resolves.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for spacings that are not positive.
@@ -64,12 +67,14 @@ pub struct ShrunkMap {
 
 /// Draws `measured_m_s` towards a guess.
 ///
-/// All maps are \[line, gate\] in m/s. `half_difference_m_s` is half the difference of two maps made from one half of the pulses each, such as those of the
-/// odd and of the even lines; `seen_m_s` is what the estimator would show of the guess, `wanted_m_s` what is to be known of it, for example
-/// its mean over pulse and gate, and over the pulse alone. Velocities that are NaN in the first two are missing.
+/// All maps are \[line, gate\] in m/s. `half_difference_m_s` is half the difference of two maps made from one half of
+/// the pulses each, such as those of the odd and of the even lines; `seen_m_s` is what the estimator would show of
+/// the guess, `wanted_m_s` what is to be known of it, for example its mean over pulse and gate, and over the pulse
+/// alone. Velocities that are NaN in the first two are missing.
 ///
 /// # Errors
-/// [`Error::Length`] if the maps differ in shape, [`Error::Empty`] if they are empty, [`Error::OutOfRange`] for a step of 0 or a negative factor.
+/// [`Error::Length`] if the maps differ in shape, [`Error::Empty`] if they are empty, [`Error::OutOfRange`] for a
+/// step of 0 or a negative factor.
 pub fn shrink_to_guess(
     measured_m_s: ArrayView2<'_, f64>,
     half_difference_m_s: ArrayView2<'_, f64>,

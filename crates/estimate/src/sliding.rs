@@ -1,8 +1,8 @@
 //! The first lags of the biased correlogram of unweighted windows, slid along a record.
 //!
-//! Computes r_m = (1/N) sum over n of s(n+m) conj(s(n)) for m = 0 .. L-1, what CA of order L - 1 needs. From one window to the next a
-//! sample enters and one leaves: 2 L products instead of N L. Check: against the sum written out, also after a missing
-//! sample and after a burst.
+//! Computes r_m = (1/N) sum over n of s(n+m) conj(s(n)) for m = 0 .. L-1, what CA of order L - 1 needs. From one
+//! window to the next a sample enters and one leaves: 2 L products instead of N L. Check: against the sum written
+//! out, also after a missing sample and after a burst.
 //!
 //! Rounding cannot build up: the sums start afresh every 256 windows, and after windows that were left out.
 

@@ -22,8 +22,8 @@ pub trait Statistic<S: Sample>: Sync {
 
     /// Hands the numbers of all valid windows of a record, `step_samples` apart, to `each` with the index of the window.
     ///
-    /// `valid` says which windows are to be used: those with finite samples. The form given here calls [`Statistic::evaluate`] for every
-    /// window; a statistic that can go on from the window before replaces it.
+    /// `valid` says which windows are to be used: those with finite samples. The form given here calls
+    /// [`Statistic::evaluate`] for every window; a statistic that can go on from the window before replaces it.
     fn evaluate_record(
         &self,
         record: &[S],

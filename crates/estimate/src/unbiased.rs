@@ -1,10 +1,11 @@
 //! The unbiased correlogram: the biased one over the weights that the window gives its lags.
 //!
-//! Computes r_m / w_m, w_m = 1 - m / N without weighting: its mean is the autocovariance of the signal. It is offered for comparison
-//! and for the pulse pair; CA takes the biased form. Dividing raises the last lags, which few products support, and the result
-//! need not be positive semi-definite: the noise of a band-limited receiver has next to no power outside its band, so that small errors there
-//! make the density negative, the reflection coefficients leave the unit circle and no model of order 16 exists
-//! ([`Quality::Invalid`](crate::Quality::Invalid)). Check: its mean over noise of known covariance; how often a model fails.
+//! Computes r_m / w_m, w_m = 1 - m / N without weighting: its mean is the autocovariance of the signal. It is offered
+//! for comparison and for the pulse pair; CA takes the biased form. Dividing raises the last lags, which few products
+//! support, and the result need not be positive semi-definite: the noise of a band-limited receiver has next to no
+//! power outside its band, so that small errors there make the density negative, the reflection coefficients leave
+//! the unit circle and no model of order 16 exists ([`Quality::Invalid`](crate::Quality::Invalid)). Check: its mean
+//! over noise of known covariance; how often a model fails.
 
 use crate::error::{Error, length};
 use crate::sample::{Scratch, SignalKind};

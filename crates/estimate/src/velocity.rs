@@ -30,7 +30,8 @@ pub struct RunnerUp {
     pub velocity_m_s: f64,
     /// Its density over that of the main peak, at most 1.
     ///
-    /// An unweighted window alone has sidelobes of 0.047; two targets of like strength come near 1, and so does noise without a signal.
+    /// An unweighted window alone has sidelobes of 0.047; two targets of like strength come near 1, and so does noise
+    /// without a signal.
     pub relative_density: f64,
 }
 
@@ -50,13 +51,13 @@ pub struct GateVelocity {
     ///
     /// [`noise_quality`](crate::noise_quality) tells what noise alone reaches.
     pub quality: f64,
-    /// Standard deviation of the velocities that the main peak stands for \[m/s\]: its width at half height above the floor as that of a
-    /// Gaussian, less the resolution of the window; 0 where that is all, NaN where unknown.
+    /// Standard deviation of the velocities that the main peak stands for \[m/s\]: its width at half height above the
+    /// floor as that of a Gaussian, less the resolution of the window; 0 where that is all, NaN where unknown.
     pub width_m_s: f64,
     /// Signal power over noise power in the detector band; the noise is the mean density away from the main peak.
     ///
-    /// 0 where the band holds no more than that, NaN where unknown. The sidelobes of an unweighted window count as noise, so that above
-    /// 5 dB it reads too low; a Gaussian weighting is good to 20 dB.
+    /// 0 where the band holds no more than that, NaN where unknown. The sidelobes of an unweighted window count as
+    /// noise, so that above 5 dB it reads too low; a Gaussian weighting is good to 20 dB.
     pub snr: f64,
     /// The second peak, if there is one.
     pub runner_up: Option<RunnerUp>,

@@ -1,8 +1,9 @@
 //! Spectrum of a correlogram at chosen frequencies alone: the detector band without the rest of the grid.
 //!
-//! Computes S(f) = r_0 + 2 Re sum over m >= 1 of r_m exp(-2 pi i f m / F_s) for all frequencies at once, by Clenshaw's recurrence for
-//! real signals and Horner's rule for complex ones. For 64 lags and a fifth of 1024 frequencies this is several times
-//! faster than the transform of the whole grid. Check: [`density_at`](crate::density_at) at every frequency, and the transform.
+//! Computes S(f) = r_0 + 2 Re sum over m >= 1 of r_m exp(-2 pi i f m / F_s) for all frequencies at once, by
+//! Clenshaw's recurrence for real signals and Horner's rule for complex ones. For 64 lags and a fifth of 1024
+//! frequencies this is several times faster than the transform of the whole grid. Check:
+//! [`density_at`](crate::density_at) at every frequency, and the transform.
 //!
 //! Clenshaw's recurrence loses accuracy near 0 Hz and F_s/2, by a factor of the number of lags at most.
 

@@ -1,9 +1,9 @@
 //! What a run needs: grid, spacing, layers, memory and time, derived from the scene - or a refusal that names the limit.
 //!
 //! Rules: at least 25 points across the aperture radius and l0 >= 2 dx; coherence radius at the target resolved; room
-//! for beam and turbulent spread inside the absorbing border; Rytov variance of a layer at most 0.1.
-//! Check: the chapter's set-up passes for Cn2 up to 1e-13 at 1 km, 1e-12 beyond 1 km on 512 points is refused, and what the plan proposes passes
-//! its own test.
+//! for beam and turbulent spread inside the absorbing border; Rytov variance of a layer at most 0.1. Check: the
+//! chapter's set-up passes for Cn2 up to 1e-13 at 1 km, 1e-12 beyond 1 km on 512 points is refused, and what the plan
+//! proposes passes its own test.
 
 use crate::grid::Grid;
 use crate::path::{Layers, Program};

@@ -1,8 +1,9 @@
 //! The field at the telescope, sampled on the grid without staircase error at the aperture's edge.
 //!
 //! The spectrum of the truncated Gaussian is known (a Hankel transform); its part below Nyquist is put on the grid
-//! exactly. A share of the light that the edge throws beyond Nyquist is put back into the corners of the band.
-//! Check: power equals the transmitted fraction to 0.1 % for the chapter, to 1 % for a uniform beam; free-space efficiency after propagation within 1e-3 of exact theory.
+//! exactly. A share of the light that the edge throws beyond Nyquist is put back into the corners of the band. Check:
+//! power equals the transmitted fraction to 0.1 % for the chapter, to 1 % for a uniform beam; free-space efficiency
+//! after propagation within 1e-3 of exact theory.
 
 use crate::beam::Telescope;
 use crate::grid::{Fft2, Grid};

@@ -204,7 +204,8 @@ impl BasebandNoise {
     }
 }
 
-/// Smallest even product of powers of 2, 3 and 5 that is at least `least` (and 512, so that the band of a short record is resolved).
+/// Smallest even product of powers of 2, 3 and 5 that is at least `least` (and 512, so that the band of a short
+/// record is resolved).
 fn smooth_even_length(least: usize) -> usize {
     let mut length = least.max(512).next_multiple_of(2);
     loop {

@@ -1,7 +1,7 @@
 //! From a scene to a plan: which stages run, which are left out and why, what each will cost.
 //!
-//! Nothing is computed but sizes; the planes of a simulated flow are read. The cost figures are the products of counts with the unit
-//! costs at the end of this file, which `cargo bench` measures; they are forecasts, good to a
+//! Nothing is computed but sizes; the planes of a simulated flow are read. The cost figures are the products of
+//! counts with the unit costs at the end of this file, which `cargo bench` measures; they are forecasts, good to a
 //! factor of two or three on another machine.
 
 use crate::Error;
@@ -106,7 +106,8 @@ impl Plan {
     /// Plans a run; reads the planes of a simulated flow.
     ///
     /// # Errors
-    /// Planes that cannot be read or end before the scan; what a crate refuses of the scene, such as phase screens too coarse for the turbulence.
+    /// Planes that cannot be read or end before the scan; what a crate refuses of the scene, such as phase screens
+    /// too coarse for the turbulence.
     pub fn new(scene: SceneFile, target: Target) -> Result<Self, Error> {
         let wind = SceneWind::new(&scene)?;
         let geometry = Geometry::new(&scene.scene, &wind)?;

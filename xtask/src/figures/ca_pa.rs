@@ -1,4 +1,5 @@
-//! The chapter's claim that CA errs less than PA, measured against signal-to-noise ratio, radius of the region and duration of the pulse.
+//! The chapter's claim that CA errs less than PA, measured against signal-to-noise ratio, radius of the region and
+//! duration of the pulse.
 
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;

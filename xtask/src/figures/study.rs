@@ -1,4 +1,5 @@
-//! What figures 10 to 14 share: scans of the simulated wake or of the analytic pair, regions about the cores, averages with their standard errors.
+//! What figures 10 to 14 share: scans of the simulated wake or of the analytic pair, regions about the cores,
+//! averages with their standard errors.
 //!
 //! Maps of neighbouring cells share their windows: as independent counts one line of sight in [`SHARED_LINES`] and one gate in
 //! [`SHARED_GATES`].

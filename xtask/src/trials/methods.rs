@@ -73,7 +73,8 @@ impl Methods {
         self
     }
 
-    /// Every estimator of the crate for means of those numbers of windows; those of one window alone, such as Burg's, are not among them.
+    /// Every estimator of the crate for means of those numbers of windows; those of one window alone, such as Burg's,
+    /// are not among them.
     pub(crate) fn all(known: &Known, counts: &[usize]) -> Result<Self, Failure> {
         let (s, kind, refinement) = (sampling()?, SignalKind::Real, Refinement::Parabola);
         let plain = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW)?;

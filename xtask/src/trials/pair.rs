@@ -1,7 +1,7 @@
 //! Scans of the analytic vortex pair: one pulse along each of 185 lines, and what pulse and gate see of the wind.
 //!
-//! Gamma0 500 m^2/s, 47 m apart and 47 m high, cores of 2.35 m, 376.5 and 423.5 m away; 0 to 13.2 degrees in steps of 1.25 mrad; layers
-//! thin enough for the cores. Scans differ in their speckle and noise only.
+//! Gamma0 500 m^2/s, 47 m apart and 47 m high, cores of 2.35 m, 376.5 and 423.5 m away; 0 to 13.2 degrees in steps of
+//! 1.25 mrad; layers thin enough for the cores. Scans differ in their speckle and noise only.
 
 use super::methods::WINDOW;
 use super::{ENERGY_J, receiver, sampling};

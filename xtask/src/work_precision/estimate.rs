@@ -1,8 +1,8 @@
 //! Error against run time of the velocity estimators: every one of the crate, and its knobs.
 //!
-//! In a uniform wind the error is the standard deviation of the good estimates over the Cramer-Rao bound; a method of which more than a
-//! fifth of the estimates are bad has failed, and its row says so. On a scan of the vortex pair it is the root mean
-//! square error against the velocity that the pulse sees.
+//! In a uniform wind the error is the standard deviation of the good estimates over the Cramer-Rao bound; a method of
+//! which more than a fifth of the estimates are bad has failed, and its row says so. On a scan of the vortex pair it
+//! is the root mean square error against the velocity that the pulse sees.
 
 use super::{Row, measured};
 use crate::Failure;

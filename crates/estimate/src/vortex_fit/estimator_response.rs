@@ -6,10 +6,11 @@
 //! W_m(x) exp(j 2 pi f(v_R(R + x)) m T_s),   W_m(x) = sum over tapers a, n of a h(n+m) h(n) f(t_(n+m) - 2x/c) f(t_n - 2x/c)
 //! ```
 //!
-//! with t_n counted from the middle of the window, f(v) from (30) and f(t) the pulse; noise adds its own lags, real samples keep the real part. The
-//! correlograms of a region's lines are added, and the estimator itself turns the sum into a velocity. So whatever it makes of
-//! the skewed and broad spectra of a core is part of what is expected of it: nothing is taken for a mean. Check: uniform wind;
-//! a wide line shows the mean over the gate; the correlogram of signals summed over layers; fits of simulated scans.
+//! with t_n counted from the middle of the window, f(v) from (30) and f(t) the pulse; noise adds its own lags, real
+//! samples keep the real part. The correlograms of a region's lines are added, and the estimator itself turns the sum
+//! into a velocity. So whatever it makes of the skewed and broad spectra of a core is part of what is expected of it:
+//! nothing is taken for a mean. Check: uniform wind; a wide line shows the mean over the gate; the correlogram of
+//! signals summed over layers; fits of simulated scans.
 
 use ndarray::Array2;
 use std::f64::consts::TAU;
@@ -46,8 +47,9 @@ pub struct EstimatorResponse<'a> {
 }
 
 impl<'a> EstimatorResponse<'a> {
-    /// Of a map that `estimator` made of the correlograms `statistic`, accumulated over regions of radius `radius_m` \[m\] (0: each line
-    /// for itself), with a backscatter that changes little along a gate. `snr` is the signal-to-noise ratio in the detector band.
+    /// Of a map that `estimator` made of the correlograms `statistic`, accumulated over regions of radius `radius_m`
+    /// \[m\] (0: each line for itself), with a backscatter that changes little along a gate. `snr` is the
+    /// signal-to-noise ratio in the detector band.
     ///
     /// # Errors
     /// [`Error::Length`] if statistic and estimator do not match; [`Error::OutOfRange`], [`Error::Band`] for impossible numbers.
@@ -87,8 +89,8 @@ impl<'a> EstimatorResponse<'a> {
         })
     }
 
-    /// The map \[line, gate\] of velocities \[m/s\] at `elevation_rad` \[rad\] and `range_m` \[m\], both increasing; NaN where the estimator finds
-    /// none.
+    /// The map \[line, gate\] of velocities \[m/s\] at `elevation_rad` \[rad\] and `range_m` \[m\], both increasing;
+    /// NaN where the estimator finds none.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for an impossible wake or axis.

@@ -1,9 +1,9 @@
 //! A first guess of the wake from the map alone: the best pair on a grid of places.
 //!
-//! The map is thinned to medians of blocks, which outliers do not move. For vortices at given places their circulations and the wind enter
-//! linearly, so every pair of places on a polar grid is tried by least squares, the left one clockwise and the
-//! right one anticlockwise as those of an aircraft are. Check: wakes at many places, in noise and among outliers, come out
-//! near enough for the fit; maps of noise hold no vortex.
+//! The map is thinned to medians of blocks, which outliers do not move. For vortices at given places their
+//! circulations and the wind enter linearly, so every pair of places on a polar grid is tried by least squares, the
+//! left one clockwise and the right one anticlockwise as those of an aircraft are. Check: wakes at many places, in
+//! noise and among outliers, come out near enough for the fit; maps of noise hold no vortex.
 
 use super::map_fit::{VelocityMap, median};
 use super::range_kernel::{LineScratch, RangeKernel};

@@ -1,11 +1,11 @@
 //! Covariance of the baseband samples of one line of sight, and its derivatives with respect to the wind, forwards and
 //! backwards.
 //!
-//! R(k, l) = sum over layers of w f(t_k - 2 R/c) f(t_l - 2 R/c) G(v) exp(j omega(v) (t_k - t_l)) + noise, w the SNR times the layer,
-//! G the power gain of the filter and omega its angular frequency. The sum runs in two steps: phasors of all lags are shared
-//! among nodes, then weighted by the pulse. The backward pass applies the transpose of both, which gives
-//! the derivative of a scalar with respect to the velocities of all layers at the price of one covariance.
-//! Check: the plain double sum; backward against forward derivatives; difference quotients.
+//! R(k, l) = sum over layers of w f(t_k - 2 R/c) f(t_l - 2 R/c) G(v) exp(j omega(v) (t_k - t_l)) + noise, w the SNR
+//! times the layer, G the power gain of the filter and omega its angular frequency. The sum runs in two steps:
+//! phasors of all lags are shared among nodes, then weighted by the pulse. The backward pass applies the transpose of
+//! both, which gives the derivative of a scalar with respect to the velocities of all layers at the price of one
+//! covariance. Check: the plain double sum; backward against forward derivatives; difference quotients.
 
 use num_complex::Complex;
 

@@ -1,9 +1,10 @@
 //! Fit of the wake to a map of radial velocities.
 //!
-//! Weighted least squares with a robust loss. What a wake shows is either the mean over the gate ([`fit_map`], by the iteration of Levenberg and
-//! Marquardt) or what the estimator of the map itself makes of the wake's spectra ([`fit_map_of_estimator`], by damped steps of Gauss and Newton
-//! with difference quotients). The scale of the residuals is their median, taken anew in each of a few rounds.
-//! Check: exact maps; noise; outliers; the spread of fits over many maps.
+//! Weighted least squares with a robust loss. What a wake shows is either the mean over the gate ([`fit_map`], by the
+//! iteration of Levenberg and Marquardt) or what the estimator of the map itself makes of the wake's spectra
+//! ([`fit_map_of_estimator`], by damped steps of Gauss and Newton with difference quotients). The scale of the
+//! residuals is their median, taken anew in each of a few rounds. Check: exact maps; noise; outliers; the spread of
+//! fits over many maps.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -152,8 +153,8 @@ pub struct MapFit {
     pub used: usize,
     /// Those with a residual above 3 scales.
     pub outliers: usize,
-    /// Scale of the residuals over the given standard deviations, from their median; \[m/s\] if none were given. In uniform wind, for the
-    /// map of an estimator.
+    /// Scale of the residuals over the given standard deviations, from their median; \[m/s\] if none were given. In
+    /// uniform wind, for the map of an estimator.
     pub residual_scale: f64,
     /// Part of the robust cost of the best wind without vortices that the vortices take away: near 1 for a good fit.
     pub explained_fraction: f64,
@@ -187,8 +188,9 @@ pub fn fit_map(
 /// Fits the wake to a map from a given start on. `kernel` is what each velocity sees of the air about its range.
 ///
 /// # Errors
-/// [`Error::Length`], [`Error::OutOfRange`] for impossible input; [`Error::TooFewVelocities`] with less than ten velocities for each free
-/// number; [`Error::NotConverged`]; [`Error::Linalg`] if a free parameter does not show in the map.
+/// [`Error::Length`], [`Error::OutOfRange`] for impossible input; [`Error::TooFewVelocities`] with less than ten
+/// velocities for each free number; [`Error::NotConverged`]; [`Error::Linalg`] if a free parameter does not show in
+/// the map.
 pub fn refine_map_fit(
     map: &VelocityMap<'_>,
     model: &WakeModel,
@@ -216,8 +218,8 @@ pub fn refine_map_fit(
     fit.outcome(&problem, wake, scale, iterations)
 }
 
-/// Fits the wake to a map that an estimator of this crate made, without any prior knowledge: as [`fit_map`] with its mean gate, then
-/// [`refine_map_fit_of_estimator`].
+/// Fits the wake to a map that an estimator of this crate made, without any prior knowledge: as [`fit_map`] with its
+/// mean gate, then [`refine_map_fit_of_estimator`].
 ///
 /// # Errors
 /// As [`fit_map`] and [`refine_map_fit_of_estimator`].
@@ -267,7 +269,8 @@ pub fn refine_map_fit_of_estimator(
         let near = problem.reweighted(wake, scale, fit.stop)?;
         let (from, to) = (wake.to_array(), near.to_array());
         let way: [f64; PARAMETERS] = std::array::from_fn(|i| to[i] - from[i]);
-        // where peaks jump the map is not smooth: each time the steps turn round they are shortened, so that their ends are averaged (Kesten 1958)
+        // where peaks jump the map is not smooth: each time the steps turn round they are shortened, so that their
+        // ends are averaged (Kesten 1958)
         turns += usize::from(problem.product(&wake, &way, &last, scale) < 0.0);
         let share = ((1 + turns) as f64).recip();
         sigmas_left = share * problem.product(&wake, &way, &way, scale).sqrt();

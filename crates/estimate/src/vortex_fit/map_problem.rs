@@ -96,7 +96,8 @@ impl Problem<'_, '_> {
         }
     }
 
-    /// Minimum for velocities that are linear in the parameters, by least squares with weights taken anew: each round lowers the cost.
+    /// Minimum for velocities that are linear in the parameters, by least squares with weights taken anew: each round
+    /// lowers the cost.
     pub(super) fn reweighted(&self, start: Wake, scale: f64, stop: Stop) -> Result<Wake, Error> {
         let mut wake = start;
         for _ in 0..stop.iterations {

@@ -10,8 +10,9 @@
 //! | `line`, `band`, `likelihood` | covariance of a line, its factor and derivatives; likelihood and Fisher information |
 //! | `signal_fit`, `small` | fit to all raw signals; the damped Newton iteration of both fits |
 //!
-//! A map is fitted first, without prior knowledge ([`fit_map_of_estimator`]; [`fit_map`] if its velocities are means over gates); its outcome starts the fit of the signals ([`fit_signals`]).
-//! The bound on any unbiased fit of the signals is [`ScanModel::bound`].
+//! A map is fitted first, without prior knowledge ([`fit_map_of_estimator`]; [`fit_map`] if its velocities are means
+//! over gates); its outcome starts the fit of the signals ([`fit_signals`]). The bound on any unbiased fit of the
+//! signals is [`ScanModel::bound`].
 //!
 //! Measured on scans of an analytic pair (500 m^2/s, 47 m apart and high, 376.5 and 423.5 m away, core 2.35 m, 200 ns,
 //! 185 lines of one pulse each, 0 dB in 50 MHz, band noise, records from 280 to 520 m):
@@ -20,8 +21,8 @@
 //!   0.13 m in height, 0.78 m across;
 //! - fit of the signals: bias -0.3 +- 1.3 m^2/s and standard deviation 5.5 +- 0.9 with the core known (19 scans), 1.1 +- 2.2 and
 //!   10.7 +- 1.6 with each core fitted (24 scans): 0.8 +- 0.13 and 1.3 +- 0.19 times the bound;
-//! - fit of a map: see figure 17 in the book. What an estimator shows of a core is not its mean: taken for one, the peaks of the plain
-//!   periodogram give 40 % too much circulation.
+//! - fit of a map: see figure 17 in the book. What an estimator shows of a core is not its mean: taken for one, the
+//!   peaks of the plain periodogram give 40 % too much circulation.
 //!
 //! The likelihood of one scan has several tops near the highest, since few lines cross a core and each has its speckle;
 //! they lie within one or two standard deviations of each other, and which one is found depends on the start.

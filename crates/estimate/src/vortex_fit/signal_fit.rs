@@ -77,8 +77,8 @@ impl SignalFit {
 }
 
 impl ScanModel {
-    /// Cramer-Rao bound: least covariance \[10, 10\], in the order of [`Parameter`], of any unbiased estimate of the free parameters
-    /// of `wake` from one scan; zeros where a parameter is fixed.
+    /// Cramer-Rao bound: least covariance \[10, 10\], in the order of [`Parameter`], of any unbiased estimate of the
+    /// free parameters of `wake` from one scan; zeros where a parameter is fixed.
     ///
     /// # Errors
     /// As [`ScanModel::information`]; [`Error::Linalg`] if a free parameter does not show in the signals.

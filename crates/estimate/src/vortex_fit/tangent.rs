@@ -1,9 +1,10 @@
 //! The map that an estimator shows of wakes near a given one, to first order, and how far its velocities scatter.
 //!
-//! Slopes are difference quotients over steps of about a third of what a scan tells of a parameter: peaks of spectra jump, and over such a step enough
-//! of them do for a mean slope. Velocities scatter the more the broader the air's velocities: the logarithm of the residuals is fitted by a
-//! straight line over ln(1 + variance of the air / its median), and its slope p gives standard deviations (1 + ...)^p. Check: fits of exact maps, the
-//! spread of fits over scans, and the power of made-up residuals.
+//! Slopes are difference quotients over steps of about a third of what a scan tells of a parameter: peaks of spectra
+//! jump, and over such a step enough of them do for a mean slope. Velocities scatter the more the broader the air's
+//! velocities: the logarithm of the residuals is fitted by a straight line over ln(1 + variance of the air / its
+//! median), and its slope p gives standard deviations (1 + ...)^p. Check: fits of exact maps, the spread of fits over
+//! scans, and the power of made-up residuals.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -44,7 +45,8 @@ impl Tangent {
         tangent
     }
 
-    /// Learns from the residuals how they grow with the variance of the air: ln|r| is a straight line over ln(1 + variance / its median).
+    /// Learns from the residuals how they grow with the variance of the air: ln|r| is a straight line over ln(1 +
+    /// variance / its median).
     fn learn_deviations(&mut self, variance: &Array2<f64>, map: &VelocityMap<'_>) {
         let typical = median(&mut variance.iter().copied().collect::<Vec<f64>>()).max(f64::MIN_POSITIVE);
         let broad = variance.mapv(|v| (v / typical).ln_1p());

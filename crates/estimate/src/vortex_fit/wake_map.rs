@@ -11,8 +11,9 @@ use crate::error::{Error, finite};
 use crate::parallel::map_indexed;
 
 impl WakeModel {
-    /// Radial velocities \[m/s\] \[line, gate\] of `wake` at `elevation_rad` \[rad\] and `range_m` \[m\], both increasing, as a gate with that kernel shows them,
-    /// averaged over regions of radius `radius_m` \[m\], 0 for none.
+    /// Radial velocities \[m/s\] \[line, gate\] of `wake` at `elevation_rad` \[rad\] and `range_m` \[m\], both
+    /// increasing, as a gate with that kernel shows them, averaged over regions of radius `radius_m` \[m\], 0 for
+    /// none.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for an impossible wake or number.
@@ -42,8 +43,8 @@ impl WakeModel {
     }
 }
 
-/// Lines within `radius_m` of a line at that range, with their shares: the chords that the circle cuts, over their sum. A line alone if
-/// no other is as near.
+/// Lines within `radius_m` of a line at that range, with their shares: the chords that the circle cuts, over their
+/// sum. A line alone if no other is as near.
 pub(super) fn region(
     elevation_rad: &[f64],
     line: usize,

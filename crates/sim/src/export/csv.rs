@@ -154,7 +154,8 @@ impl Table {
     }
 }
 
-/// Shortest text that reads back to the same value; empty for NaN, and one zero for both signs, which no reader should have to tell apart.
+/// Shortest text that reads back to the same value; empty for NaN, and one zero for both signs, which no reader
+/// should have to tell apart.
 pub(crate) fn float_text(value: f64) -> String {
     if value.is_nan() {
         String::new()

@@ -1,7 +1,7 @@
-//! One sweep of a map as a HALO Photonics raw file (`.hpl`), which doppy, halo-reader and xradar read.
-//! A lossy export: velocity to 5e-5 m/s, angles to 0.005 degrees, no place for errors or for the scene (the table beside it has both),
-//! and no code for a missing value, which becomes velocity 0 at intensity 1 (no signal).
-//! Check: the tests read the text back line by line.
+//! One sweep of a map as a HALO Photonics raw file (`.hpl`), which doppy, halo-reader and xradar read. A lossy
+//! export: velocity to 5e-5 m/s, angles to 0.005 degrees, no place for errors or for the scene (the table beside it
+//! has both), and no code for a missing value, which becomes velocity 0 at intensity 1 (no signal). Check: the tests
+//! read the text back line by line.
 
 use super::error::{OutputError, OutputResult};
 use super::map::VelocityMap;
@@ -15,8 +15,9 @@ const DAY_S: f64 = 86_400.0;
 /// Gate 0 of the format starts at the lidar, so gates before the first of the map are filled with no signal.
 ///
 /// # Errors
-/// What [`VelocityMap::check`] finds; no such sweep; no field `radial_velocity` or `signal_to_noise_ratio`; gates that overlap or leave gaps, or do
-/// not start a whole number of gates from the lidar (the format derives the range from the gate number); a sweep across midnight of the synthetic day.
+/// What [`VelocityMap::check`] finds; no such sweep; no field `radial_velocity` or `signal_to_noise_ratio`; gates
+/// that overlap or leave gaps, or do not start a whole number of gates from the lidar (the format derives the range
+/// from the gate number); a sweep across midnight of the synthetic day.
 pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResult<Vec<u8>> {
     map.check()?;
     let bounds = map.sweep_bounds();

@@ -33,8 +33,9 @@ pub struct MapPlot {
 }
 
 impl MapPlot {
-    /// The picture of a field of sweep `sweep`. Fields named `v_...`, `radial_velocity` and `bias` get symmetric colours, others light to
-    /// dark; the limits are those of the sweep. The lidar is shown where it stands less than half the width of the scan away.
+    /// The picture of a field of sweep `sweep`. Fields named `v_...`, `radial_velocity` and `bias` get symmetric
+    /// colours, others light to dark; the limits are those of the sweep. The lidar is shown where it stands less than
+    /// half the width of the scan away.
     ///
     /// # Errors
     /// What [`VelocityMap::check`] finds, no such sweep or field.

@@ -81,7 +81,8 @@ impl SceneFile {
         Self::parse(&text, path)
     }
 
-    /// Checks the text of a scene file; `path` serves the error messages, and its folder is where files of the scene are looked for.
+    /// Checks the text of a scene file; `path` serves the error messages, and its folder is where files of the scene
+    /// are looked for.
     ///
     /// # Errors
     /// As [`SceneFile::read`].

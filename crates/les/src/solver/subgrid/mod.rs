@@ -6,11 +6,12 @@
 //! | WALE (Nicoud and Ducros 1999) | `(C Delta)^2 (Sd:Sd)^(3/2)/[(S:S)^(5/2) + (Sd:Sd)^(5/4)]` | the strain of the flow |
 //! | multiscale WALE | the same | the strain of the small scales of the flow |
 //!
-//! `S` is the strain, `Sd` the deviator of the symmetric part of the squared velocity gradient, `Delta` the cube root of the
-//! volume of a cell, `h_x h_y h_z` by the metrics of the mesh (a direction of one cell counts with its length). WALE
-//! vanishes in pure shear and grows with the cube of the distance from a wall, but not in solid rotation, so that it
-//! damps the cores of vortices. The multiscale form (the regularised variational one of Jeanmart and Winckelmans 2007) removes this:
-//! the strain is that of `u` minus its low-pass filtered field, which is zero for flows that vary slowly from cell to cell.
+//! `S` is the strain, `Sd` the deviator of the symmetric part of the squared velocity gradient, `Delta` the cube root
+//! of the volume of a cell, `h_x h_y h_z` by the metrics of the mesh (a direction of one cell counts with its
+//! length). WALE vanishes in pure shear and grows with the cube of the distance from a wall, but not in solid
+//! rotation, so that it damps the cores of vortices. The multiscale form (the regularised variational one of Jeanmart
+//! and Winckelmans 2007) removes this: the strain is that of `u` minus its low-pass filtered field, which is zero for
+//! flows that vary slowly from cell to cell.
 //!
 //! Constants: those of the multiscale form follow from that of WALE by the share of the strain that the small scales have in a
 //! `k^(-5/3)` spectrum ([`SubgridModel::multiscale_constant`]). In decaying grid turbulence on 64^3 cells (the example
