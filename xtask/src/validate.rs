@@ -12,7 +12,7 @@ mod vortices;
 mod wake;
 mod waves;
 
-pub(crate) use wake::onset;
+pub(crate) use wake::{knee, onset};
 
 use crate::workspace::{read, root};
 use crate::{Failure, Outcome};

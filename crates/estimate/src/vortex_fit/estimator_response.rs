@@ -127,7 +127,9 @@ impl<'a> EstimatorResponse<'a> {
         let lags = self.tapers[0].weights.len();
         let gap_m = range_m.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
         let widest_m = NODE_M.min(NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
-        let spacing_m = if gap_m.is_finite() { gap_m / (gap_m / widest_m).ceil() } else { widest_m };
+        // gates fall on nodes unless they are so close that this would take many more
+        let fits = gap_m.is_finite() && gap_m > 0.25 * widest_m;
+        let spacing_m = if fits { gap_m / (gap_m / widest_m).ceil() } else { widest_m };
         let half_s = 0.5 * lags as f64 * period_s;
         let reach = (0.5 * SPEED_OF_LIGHT_M_S * (half_s + self.pulse.reach_s()) / spacing_m).ceil() as i64;
         let numbers = self.kind.lag_numbers(lags);
@@ -348,6 +350,14 @@ mod tests {
             let shown = response(&statistic, estimator, (Noise::White, snr), radius_m)
                 .map(&model, &wake(), &LINES_RAD, &RANGES_M)
                 .unwrap();
+            // ranges between nodes
+            let close = [RANGES_M[0], RANGES_M[1], RANGES_M[1] + 1e-9, RANGES_M[2]];
+            let between = response(&statistic, estimator, (Noise::White, snr), radius_m)
+                .map(&model, &wake(), &LINES_RAD, &close)
+                .unwrap();
+            for (gate, place) in [(0, 0), (1, 1), (1, 2), (2, 3)] {
+                assert!((between[[1, place]] - shown[[1, gate]]).abs() < 0.02, "{name} {between} {shown}");
+            }
             for (gate, &range_m) in RANGES_M.iter().enumerate() {
                 // the other lines are 1.1 and 0.93 m away at 372 m
                 let chord = |line: usize| (radius_m.powi(2) - (range_m * (LINES_RAD[line] - 0.115)).powi(2)).sqrt();

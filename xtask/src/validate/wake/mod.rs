@@ -128,7 +128,36 @@ pub(crate) fn onset(gamma: &[(f64, f64)]) -> Option<f64> {
     (0..).map(|i| 1.5 + 0.02 * f64::from(i)).take_while(|tau| tau + 0.05 <= last).find(|tau| slope(*tau) > 3.0 * early)
 }
 
+/// Where the line through the ratio at 0.5 and 1.5 meets the steepest line over 0.8: a beginning of the fast decay that
+/// does not depend on how slow the decay before it is.
+pub(crate) fn knee(gamma: &[(f64, f64)]) -> Option<f64> {
+    let at = |tau: f64| interpolate(gamma, tau);
+    let last = gamma.last()?.0;
+    let early = at(1.5) - at(0.5);
+    let starts = (0..).map(|i| 1.5 + 0.02 * f64::from(i)).take_while(|tau| tau + 0.8 <= last);
+    let from = starts.min_by(|a, b| (at(a + 0.8) - at(*a)).total_cmp(&(at(b + 0.8) - at(*b))))?;
+    let steep = (at(from + 0.8) - at(from)) / 0.8;
+    Some((at(from) - steep * from - at(0.5) + 0.5 * early) / (early - steep)).filter(|tau| tau.is_finite())
+}
+
 /// Amplitude growth rate of a mode whose energy is given: half the slope of its logarithm from `from` to `to`.
 pub(super) fn growth(energy: &[(f64, f64)], from: f64, to: f64) -> f64 {
     0.5 * (interpolate(energy, to) / interpolate(energy, from)).ln() / (to - from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_broken_line_has_its_knee_and_its_onset_where_it_breaks() {
+        let gamma: Vec<(f64, f64)> = (0..=100)
+            .map(|i| 0.05 * f64::from(i))
+            .map(|tau| (tau, 1.0 - 0.01 * tau - 0.3 * (tau - 2.4).max(0.0) + 0.25 * (tau - 3.6).max(0.0)))
+            .collect();
+        assert!((knee(&gamma).unwrap() - 2.4).abs() < 1e-9);
+        assert!((onset(&gamma).unwrap() - 2.4).abs() < 0.06);
+        let straight: Vec<(f64, f64)> = gamma.iter().map(|(tau, _)| (*tau, 1.0 - 0.0625 * tau)).collect();
+        assert!(onset(&straight).is_none());
+    }
 }
