@@ -149,15 +149,15 @@ fn typical_core() -> MapFitOptions {
     MapFitOptions { free, ..Default::default() }
 }
 
-/// Over 24 scans the standard deviation was 17 m^2/s, and 23 with one core radius fitted.
+/// Over 100 scans the standard deviation is 19 m^2/s, and 25 with one core radius fitted (figure 17).
 #[test]
 fn fits_of_maps_at_0_db_are_within_five_per_cent_of_the_circulation_on_average() {
     let one_core = FreeParameters { core_radius: Sharing::Common, ..FreeParameters::common_circulation() };
     let one_core = MapFitOptions { free: one_core, ..Default::default() };
     let scans = 3;
     for (velocities, options, scatter) in [
-        (Velocities::Likelihood, typical_core(), 17.0),
-        (Velocities::Likelihood, one_core, 23.0),
+        (Velocities::Likelihood, typical_core(), 19.0),
+        (Velocities::Likelihood, one_core, 25.0),
         (Velocities::LagWindow, typical_core(), 25.0),
     ] {
         let mut mean = 0.0;

@@ -19,10 +19,12 @@
 //!
 //! - bound on the common circulation 6.8 m^2/s if the core is known and 8.3 if each core is fitted (2.5 and 3.4 at 10 dB);
 //!   0.13 m in height, 0.78 m across;
-//! - fit of the signals: bias -0.3 +- 1.3 m^2/s and standard deviation 5.5 +- 0.9 with the core known (19 scans), 1.1 +- 2.2 and
-//!   10.7 +- 1.6 with each core fitted (24 scans): 0.8 +- 0.13 and 1.3 +- 0.19 times the bound;
-//! - fit of a map: see figure 17 in the book. What an estimator shows of a core is not its mean: taken for one, the
-//!   peaks of the plain periodogram give 40 % too much circulation.
+//! - fit of the signals: bias -0.2 +- 0.8 m^2/s and standard deviation 7.8 +- 0.6 with the core known, -0.5 +- 1.0 and
+//!   9.7 +- 0.7 with one core radius fitted: 1.14 +- 0.08 and 1.17 +- 0.08 times the bound (100 scans);
+//! - fit of a map: 19.3 +- 1.4 m^2/s with a core of 4.5 % of the spacing, 24.7 +- 1.8 with one core radius fitted. What
+//!   an estimator shows of a core is not its mean: taken for one, peaks of periodograms mislead by more than 10 %.
+//!
+//! `cargo xtask reproduce-figs --profile standard --only 17` measures them again.
 //!
 //! The likelihood of one scan has several tops near the highest, since few lines cross a core and each has its speckle;
 //! they lie within one or two standard deviations of each other, and which one is found depends on the start.
