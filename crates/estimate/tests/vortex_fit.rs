@@ -130,6 +130,31 @@ fn exact_maps_of_peaks_give_the_wake_back_where_means_mislead() {
 }
 
 #[test]
+fn a_core_that_the_regions_do_not_resolve_keeps_the_least_radius_and_says_so() {
+    let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();
+    let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+    let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
+    let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
+    let shown = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 1.0), 4.0).unwrap();
+    let (elevation_rad, range_m) = axes();
+    let (model, mut truth) = (WakeModel::default(), wake(376.5, 47.0, 45.0));
+    (truth.left.core_radius_m, truth.right.core_radius_m) = (0.1, 0.1);
+    let velocity = shown.map(&model, &truth, &elevation_rad, &range_m).unwrap();
+    let map = VelocityMap {
+        elevation_rad: &elevation_rad,
+        range_m: &range_m,
+        velocity_m_s: velocity.view(),
+        standard_deviation_m_s: None,
+    };
+    let free = FreeParameters { core_radius: Sharing::Common, wind: WindFit::Linear, ..Default::default() };
+    let found = fit_map_of_estimator(&map, &model, &shown, &MapFitOptions { free, ..Default::default() }).unwrap();
+    // a quarter of the regions' radius
+    assert!(!found.cores_fitted && found.wake.left.core_radius_m == 1.0, "{found:?}");
+    assert_eq!(found.standard_deviation(Parameter::LeftCore), 0.0);
+    assert_relative_eq!(found.wake.left.circulation_m2_s, truth.left.circulation_m2_s, max_relative = 0.05);
+}
+
+#[test]
 fn noise_outliers_and_gaps_leave_errors_that_the_covariance_tells() {
     let model = WakeModel::default();
     let truth = wake(376.5, 47.0, 45.0);

@@ -89,7 +89,7 @@ fn claims(wake: &Wake) -> Result<Vec<Claim>, Failure> {
     let like_chapter = wake.flow.reynolds >= CHAPTER.0 && wake.flow.core_radius <= CHAPTER.1;
     // What depends on the Reynolds number of the chapter is measured, but not judged, at another.
     let of_chapter = |claim: Claim| if like_chapter { claim } else { Claim { verdict: Verdict::NotResolved, ..claim } };
-    let meets = knee(&gamma).unwrap_or(f64::NAN);
+    let meets = knee(&gamma).map_or("never".into(), |tau| format!("at {tau:.2}"));
     let onset_words = onset.map_or("never".into(), |tau| format!("tau = {tau:.2}"));
     let before = onset.map_or(f64::NAN, |tau| 1.0 - at(tau - 0.1));
     let (y, z) = (mean(wake, "y", -1.0)?, mean(wake, "z", 1.0)?);
@@ -107,9 +107,7 @@ fn claims(wake: &Wake) -> Result<Vec<Claim>, Failure> {
             "fig07",
             "the fast decay begins at tau = 2.8",
             "2.8 +- 0.3",
-            format!(
-                "{onset_words} by three times the early loss; early and steepest line meet at {meets:.2} ({noise})"
-            ),
+            format!("{onset_words} by three times the early loss; early and steepest line meet {meets} ({noise})"),
             onset.is_some_and(|tau| (tau - 2.8).abs() <= 0.3),
         )),
         of_chapter(Claim::exact(

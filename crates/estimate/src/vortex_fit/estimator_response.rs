@@ -9,8 +9,9 @@
 //! with t_n counted from the middle of the window, f(v) from (30) and f(t) the pulse; noise adds its own lags, real
 //! samples keep the real part. The correlograms of a region's lines are added, and the estimator itself turns the sum
 //! into a velocity. So whatever it makes of the skewed and broad spectra of a core is part of what is expected of it:
-//! nothing is taken for a mean. Check: uniform wind; a wide line shows the mean over the gate; the correlogram of
-//! signals summed over layers; fits of simulated scans.
+//! nothing is taken for a mean. Left out is the extent of a region along the line, short against a gate. Check:
+//! uniform wind; a wide line shows the mean over the gate; the correlogram of signals summed over layers; fits of
+//! simulated scans.
 
 use ndarray::Array2;
 use std::f64::consts::TAU;
@@ -52,7 +53,8 @@ impl<'a> EstimatorResponse<'a> {
     /// signal-to-noise ratio in the detector band.
     ///
     /// # Errors
-    /// [`Error::Length`] if statistic and estimator do not match; [`Error::OutOfRange`], [`Error::Band`] for impossible numbers.
+    /// [`Error::Length`] if statistic and estimator do not match; [`Error::OutOfRange`], [`Error::Band`] for impossible
+    /// numbers.
     pub fn new<S: Sample>(
         statistic: &Correlogram<S>,
         estimator: &'a dyn Estimator,

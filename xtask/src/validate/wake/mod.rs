@@ -129,7 +129,7 @@ pub(crate) fn onset(gamma: &[(f64, f64)]) -> Option<f64> {
 }
 
 /// Where the line through the ratio at 0.5 and 1.5 meets the steepest line over 0.8: a beginning of the fast decay that
-/// does not depend on how slow the decay before it is.
+/// does not depend on how slow the decay before it is; none if the steepest line is less than twice as steep.
 pub(crate) fn knee(gamma: &[(f64, f64)]) -> Option<f64> {
     let at = |tau: f64| interpolate(gamma, tau);
     let last = gamma.last()?.0;
@@ -137,7 +137,7 @@ pub(crate) fn knee(gamma: &[(f64, f64)]) -> Option<f64> {
     let starts = (0..).map(|i| 1.5 + 0.02 * f64::from(i)).take_while(|tau| tau + 0.8 <= last);
     let from = starts.min_by(|a, b| (at(a + 0.8) - at(*a)).total_cmp(&(at(b + 0.8) - at(*b))))?;
     let steep = (at(from + 0.8) - at(from)) / 0.8;
-    Some((at(from) - steep * from - at(0.5) + 0.5 * early) / (early - steep)).filter(|tau| tau.is_finite())
+    (steep < 2.0 * early).then(|| (at(from) - steep * from - at(0.5) + 0.5 * early) / (early - steep))
 }
 
 /// Amplitude growth rate of a mode whose energy is given: half the slope of its logarithm from `from` to `to`.
@@ -157,7 +157,7 @@ mod tests {
             .collect();
         assert!((knee(&gamma).unwrap() - 2.4).abs() < 1e-9);
         assert!((onset(&gamma).unwrap() - 2.4).abs() < 0.06);
-        let straight: Vec<(f64, f64)> = gamma.iter().map(|(tau, _)| (*tau, 1.0 - 0.0625 * tau)).collect();
-        assert!(onset(&straight).is_none());
+        let straight: Vec<(f64, f64)> = gamma.iter().map(|(tau, _)| (*tau, 1.0 - 0.06 * tau)).collect();
+        assert!(onset(&straight).is_none() && knee(&straight).is_none());
     }
 }
