@@ -50,6 +50,7 @@ pub mod export;
 pub mod flow;
 pub mod geometry;
 pub mod join;
+mod keys;
 pub mod map;
 #[cfg(feature = "netcdf")]
 mod netcdf_input;
@@ -64,6 +65,7 @@ pub mod run;
 pub mod scan;
 pub mod scene;
 pub mod streams;
+mod text_file;
 pub mod wind;
 pub mod write;
 

@@ -18,6 +18,7 @@ mod named;
 mod read;
 mod setup;
 mod steps;
+mod text;
 mod wake;
 mod writer;
 
@@ -36,7 +37,8 @@ pub use wake::{PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile};
 
 use crate::Error;
 use crate::export::{Provenance, write_atomic};
-use crate::scene::{Problem, SceneError, hash_of, invalid, malformed};
+use crate::scene::{Problem, SceneError, hash_of, located, parsed};
+use crate::text_file;
 use files::{Files, checkpoint_paths};
 use setup::{Setup, WakeSetup};
 use std::path::{Path, PathBuf};
@@ -67,11 +69,7 @@ impl CaseFile {
     /// # Errors
     /// What the system says; [`SceneError`] names the file, the line, the key, the value and what is allowed.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
-            action: "read the case",
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = case_text(path)?;
         Ok(Self::parse(&text, path)?)
     }
 
@@ -80,17 +78,7 @@ impl CaseFile {
     /// # Errors
     /// As [`CaseFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        let mut case: FlowCase = toml::from_str(text).map_err(|e| malformed(text, path, &e))?;
-        if matches!(case.case, CaseKind::Wake(_)) {
-            case.wake.get_or_insert_default();
-        }
-        let problems = case.problems();
-        if !problems.is_empty() {
-            return Err(invalid(text, path, problems));
-        }
-        let toml = toml::to_string(&case).unwrap_or_else(|e| unreachable!("a case is plain data: {e}"));
-        let hash = hash_of(&toml);
-        Ok(Self { case, toml, hash, path: path.to_owned(), text: text.to_owned() })
+        Ok(Self::of(text::read(text, path, None)?, text, path))
     }
 
     /// A preset.
@@ -102,23 +90,38 @@ impl CaseFile {
         Self::parse(&toml, Path::new("preset"))
     }
 
+    /// Reads a case file of a wake over a preset.
+    ///
+    /// # Errors
+    /// As [`CaseFile::read`].
+    pub fn read_over(preset: WakePreset, path: &Path) -> Result<Self, Error> {
+        Ok(Self::parse_over(preset, &case_text(path)?, path)?)
+    }
+
     /// The text of a case file of a wake over a preset: keys that it does not have are those of the preset.
     ///
     /// # Errors
-    /// As [`CaseFile::parse`]; lines of what only the whole reveals are those of the whole.
+    /// As [`CaseFile::parse`].
     pub fn parse_over(preset: WakePreset, text: &str, path: &Path) -> Result<Self, SceneError> {
-        Self::parse(text, path)?;
-        let base = Self::preset(preset)?;
-        let read = |text: &str| text.parse::<toml::Table>().map_err(|e| malformed(text, path, &e));
-        let mut whole = read(&base.toml)?;
-        overlay(&mut whole, read(text)?);
-        let whole = toml::to_string(&whole).unwrap_or_else(|e| unreachable!("a table is plain data: {e}"));
-        Self::parse(&whole, path)
+        Ok(Self::of(text::read(text, path, Some(&preset.case()))?, text, path))
+    }
+
+    fn of(case: FlowCase, text: &str, path: &Path) -> Self {
+        let toml = toml::to_string(&case).unwrap_or_else(|e| unreachable!("a case is plain data: {e}"));
+        let hash = hash_of(&toml);
+        Self { case, toml, hash, path: path.to_owned(), text: text.to_owned() }
     }
 
     fn refuse(&self, key: &str, value: impl std::fmt::Debug, allowed: String) -> Error {
-        let problem = Problem { key: key.into(), value: format!("{value:?}"), allowed };
-        Error::Scene(invalid(&self.text, &self.path, vec![problem]))
+        Error::Scene(self.located(Problem { key: key.into(), value: format!("{value:?}"), allowed }))
+    }
+
+    /// A problem with the line of its key.
+    fn located(&self, problem: Problem) -> SceneError {
+        match parsed(&self.text, &self.path) {
+            Ok(document) => located(&document, &self.path, vec![problem]),
+            Err(error) => error,
+        }
     }
 
     fn provenance(&self) -> Provenance {
@@ -131,20 +134,9 @@ impl CaseFile {
     }
 }
 
-/// Takes the keys of `over` into `base`. A table whose first key says which kind it is replaces the other as a whole.
-fn overlay(base: &mut toml::Table, over: toml::Table) {
-    for (key, value) in over {
-        match (base.get_mut(&key), value) {
-            (Some(toml::Value::Table(inner)), toml::Value::Table(value))
-                if !value.contains_key("from") && !value.contains_key("model") =>
-            {
-                overlay(inner, value);
-            }
-            (_, value) => {
-                base.insert(key, value);
-            }
-        }
-    }
+/// The text of a case file.
+fn case_text(path: &Path) -> Result<String, Error> {
+    text_file::read(path).map_err(|source| Error::Io { action: "read the case", path: path.to_owned(), source })
 }
 
 /// Whether a run begins or continues.
@@ -286,7 +278,9 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
     let case = &file.case;
     let wake_end_s = case.wake.as_ref().map(|wake| wake.end_tau / setup.tau_per_s);
     let Some(end_s) = case.time.end_s.or(wake_end_s).or(setup.end_s) else {
-        return Err(file.refuse("time.end_s", "absent", "needed for a flow of one's own".into()));
+        let allowed = "a number in s, e.g. 30.0, is needed for a flow of one's own".into();
+        let problem = Problem { key: "time.end_s".into(), value: Problem::ABSENT.into(), allowed };
+        return Err(Error::Scene(file.located(problem)));
     };
     let mut output = case.output.clone();
     let schedule = match (&case.wake, &setup.wake) {
@@ -294,10 +288,7 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
             output.planes_x_m = wake.planes_x.iter().map(|x| x * scales.spacing_m).collect();
             Schedule::of_wake(wake, setup.tau_per_s, end_s)
         }
-        _ => Schedule::plain(
-            case.output_times_s(end_s)
-                .map_err(|problem| Error::Scene(invalid(&file.text, &file.path, vec![problem])))?,
-        ),
+        _ => Schedule::plain(case.output_times_s(end_s).map_err(|problem| Error::Scene(file.located(problem)))?),
     };
     if let Some(late) = schedule.times_s.iter().find(|t| **t > end_s) {
         return Err(file.refuse("output.times_s", late, format!("at most the end, {end_s:?} s")));

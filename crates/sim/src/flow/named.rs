@@ -158,6 +158,9 @@ impl CaseKind {
                 p.stretch("case.stretch", c.stretch);
                 p.positive("case.viscosity_m2_s", c.viscosity_m2_s);
                 p.require(c.initial_share.is_finite(), "case.initial_share", c.initial_share, "finite");
+                let has_share = matches!(self, Self::Poiseuille(_) | Self::Couette(_));
+                let allowed = "absent: this key is for case.kind = \"poiseuille\" or \"couette\"";
+                p.require(has_share || c.initial_share == 0.0, "case.initial_share", c.initial_share, allowed);
             }
             Self::OrrSommerfeld(c) => {
                 p.cells("case.cells", &c.cells);

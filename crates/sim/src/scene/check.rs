@@ -3,6 +3,7 @@
 //! [`Scene::problems`] collects all violations, so that one run of `wakescope check` shows them
 //! all. Each names the key, the value and what is allowed.
 
+use super::between::Side;
 use super::check_estimator::check_estimator;
 use super::{
     Digitiser, EfficiencyOfPulse, FORMAT, Flow, PulseShape, Scan, Scene, SnrReference, Turbulence, VortexMotion,
@@ -21,19 +22,41 @@ pub struct Problem {
     pub allowed: String,
 }
 
+impl Problem {
+    /// The value of a key that is not there.
+    pub const ABSENT: &str = "absent";
+}
+
 impl Display for Problem {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} = {} is not allowed: {}", self.key, self.value, self.allowed)
+        match self.value.as_str() {
+            Self::ABSENT => write!(f, "{} is missing: {}", self.key, self.allowed),
+            // A table is not repeated.
+            "" => write!(f, "{} is not allowed: {}", self.key, self.allowed),
+            value => write!(f, "{} = {value} is not allowed: {}", self.key, self.allowed),
+        }
     }
 }
 
-#[derive(Default)]
-pub(super) struct Checker(Vec<Problem>);
+/// Collects what is wrong; `is_stated` says which keys the file states.
+pub(super) struct Checker<'s> {
+    found: Vec<Problem>,
+    is_stated: &'s dyn Fn(&str) -> bool,
+}
 
-impl Checker {
+impl Checker<'_> {
     pub(super) fn require(&mut self, ok: bool, key: &str, value: impl Display, allowed: impl Into<String>) -> bool {
         if !ok {
-            self.0.push(Problem { key: key.into(), value: value.to_string(), allowed: allowed.into() });
+            self.found.push(Problem { key: key.into(), value: value.to_string(), allowed: allowed.into() });
+        }
+        ok
+    }
+
+    /// A limit between keys: the first that the file states has to give way, or else the first.
+    pub(super) fn between(&mut self, ok: bool, sides: &[Side<'_>]) -> bool {
+        let blamed = sides.iter().find(|(key, ..)| (self.is_stated)(key)).or(sides.first());
+        if let Some((key, value, allowed)) = blamed.filter(|_| !ok) {
+            self.found.push(Problem { key: (*key).into(), value: value.clone(), allowed: allowed.clone() });
         }
         ok
     }
@@ -53,7 +76,12 @@ impl Checker {
 impl Scene {
     /// Everything in this scene that cannot be simulated; empty for a good scene.
     pub fn problems(&self) -> Vec<Problem> {
-        let mut c = Checker::default();
+        self.problems_where(&|_| true)
+    }
+
+    /// The same for a file that states only some keys: limits between keys blame those.
+    pub(super) fn problems_where(&self, is_stated: &dyn Fn(&str) -> bool) -> Vec<Problem> {
+        let mut c = Checker { found: Vec::new(), is_stated };
         c.require(self.format == FORMAT, "format", self.format, format!("{FORMAT}, the format of this program"));
         // TOML integers are signed 64-bit: a larger seed could not be written back.
         c.require(self.seed <= i64::MAX as u64, "seed", self.seed, format!("a whole number from 0 to {}", i64::MAX));
@@ -63,13 +91,13 @@ impl Scene {
         check_estimator(self, &mut c);
         self.check_outputs(&mut c);
         // Limits between keys make sense only once each key does.
-        if c.0.is_empty() {
+        if c.found.is_empty() {
             self.check_between(&mut c);
         }
-        c.0
+        c.found
     }
 
-    fn check_instrument(&self, c: &mut Checker) {
+    fn check_instrument(&self, c: &mut Checker<'_>) {
         c.within("laser.wavelength_m", self.laser.wavelength_m, 1e-7, 2e-5, "m");
         c.within("laser.pulse_repetition_hz", self.laser.pulse_repetition_hz, 1e-3, 1e6, "Hz");
         c.within("pulse.energy_j", self.pulse.energy_j, 1e-12, 1e3, "J");
@@ -77,12 +105,14 @@ impl Scene {
         c.within("pulse.chirp_hz_s", self.pulse.chirp_hz_s, -1e18, 1e18, "Hz/s");
         if let PulseShape::Sampled(shape) = &self.pulse.shape {
             let phases = shape.phase_rad.len();
-            c.require(
-                shape.time_s.len() == shape.power.len() && (phases == 0 || phases == shape.time_s.len()),
-                "pulse.shape.time_s",
-                format!("{} values", shape.time_s.len()),
-                "as many as pulse.shape.power has, and phase_rad if it is given",
-            );
+            let (times, powers) = (shape.time_s.len(), shape.power.len());
+            let ok = times == powers && (phases == 0 || phases == times);
+            let allowed =
+                "as many values as the other lists of pulse.shape have: time_s, power, and phase_rad if it is given";
+            let lists = [("time_s", times), ("power", powers), ("phase_rad", phases)];
+            let keys = lists.map(|(name, count)| (format!("pulse.shape.{name}"), format!("{count} values")));
+            let sides: Vec<Side<'_>> = keys.iter().map(|(k, v)| (k.as_str(), v.clone(), allowed.to_owned())).collect();
+            c.between(ok, &sides);
         }
         let d = &self.detector;
         c.within("detector.bandwidth_hz", d.bandwidth_hz, 1e3, 1e11, "Hz");
@@ -100,12 +130,7 @@ impl Scene {
         let t = &self.telescope;
         c.within("telescope.aperture_radius_m", t.aperture_radius_m, 1e-4, 10.0, "m");
         c.within("telescope.beam_radius_m", t.beam_radius_m, 1e-4, 10.0, "m");
-        c.require(
-            t.obscuration_radius_m >= 0.0 && t.obscuration_radius_m < t.aperture_radius_m,
-            "telescope.obscuration_radius_m",
-            t.obscuration_radius_m,
-            "from 0 to below telescope.aperture_radius_m",
-        );
+        c.within("telescope.obscuration_radius_m", t.obscuration_radius_m, 0.0, 10.0, "m");
         let focus_ok = !t.focus_m.is_nan() && t.focus_m != 0.0 && t.focus_m != f64::NEG_INFINITY;
         c.require(
             focus_ok,
@@ -127,16 +152,16 @@ impl Scene {
         c.within("atmosphere.extinction_per_m", a.extinction_per_m, 0.0, 1.0, "1/m");
         // What is a profile of the air, or a sampled pulse, the simulation of signals knows best.
         if let Err(e) = crate::join::medium(self) {
-            c.require(false, "atmosphere.profile", "the table", e.to_string());
+            c.require(false, "atmosphere.profile", "", e.to_string());
         }
         if matches!(self.pulse.shape, PulseShape::Sampled(_))
             && let Err(e) = crate::join::pulse(self)
         {
-            c.require(false, "pulse.shape", "the table", e.to_string());
+            c.require(false, "pulse.shape", "", e.to_string());
         }
     }
 
-    fn check_flow(&self, c: &mut Checker) {
+    fn check_flow(&self, c: &mut Checker<'_>) {
         match &self.flow {
             Flow::Calm {} => {}
             Flow::Uniform { lateral_m_s, vertical_m_s } => {
@@ -158,17 +183,11 @@ impl Scene {
                     p.age_tau,
                     "0 for a pair at rest; an age needs flow.motion = \"inviscid\"",
                 );
-                c.require(
-                    p.core_radius_m.is_nan() || p.core_radius_m < 0.5 * p.spacing_m,
-                    "flow.core_radius_m",
-                    p.core_radius_m,
-                    format!("below half of flow.spacing_m, {} m", 0.5 * p.spacing_m),
-                );
             }
         }
     }
 
-    fn check_scan(&self, c: &mut Checker) {
+    fn check_scan(&self, c: &mut Checker<'_>) {
         let s = &self.scan;
         c.within("scan.lidar_height_m", s.lidar_height_m, 0.0, 1e4, "m");
         c.within("scan.azimuth_rad", s.azimuth_rad, 0.0, 2.0 * std::f64::consts::PI, "rad");
@@ -186,88 +205,14 @@ impl Scene {
         }
     }
 
-    fn check_outputs(&self, c: &mut Checker) {
+    fn check_outputs(&self, c: &mut Checker<'_>) {
         let o = &self.outputs;
         c.within("outputs.profile_range_min_m", o.profile_range_min_m, 1.0, 1e6, "m");
         c.within("outputs.profile_range_max_m", o.profile_range_max_m, 1.0, 1e6, "m");
-        c.require(
-            o.profile_range_max_m > o.profile_range_min_m,
-            "outputs.profile_range_max_m",
-            o.profile_range_max_m,
-            format!("above outputs.profile_range_min_m, {} m", o.profile_range_min_m),
-        );
         c.count("outputs.profile_points", o.profile_points, 2, 100_000);
         let any = o.csv || o.netcdf || o.svg || o.png;
-        c.require(any, "outputs.csv", o.csv, "true, or else one of netcdf, svg and png: nothing would be written");
-    }
-
-    fn check_between(&self, c: &mut Checker) {
-        let d = &self.detector;
-        let half = 0.5 * d.bandwidth_hz;
-        let nyquist_hz = 0.5 * d.sampling_hz;
-        c.require(
-            d.intermediate_frequency_hz - half > 0.0 && d.intermediate_frequency_hz + half < nyquist_hz,
-            "detector.intermediate_frequency_hz",
-            d.intermediate_frequency_hz,
-            format!(
-                "between {half} and {} Hz, so that the detector band lies between 0 and half the sampling frequency",
-                nyquist_hz - half
-            ),
-        );
-        let s = &self.scan;
-        c.require(
-            s.elevation_max_rad >= s.elevation_min_rad,
-            "scan.elevation_max_rad",
-            s.elevation_max_rad,
-            format!("at least scan.elevation_min_rad, {} rad", s.elevation_min_rad),
-        );
-        let lines = (s.elevation_max_rad - s.elevation_min_rad) / s.elevation_step_rad;
-        c.require(
-            lines < 1e5,
-            "scan.elevation_step_rad",
-            s.elevation_step_rad,
-            format!("at most 100000 lines of sight; this step gives {:.3e}", lines + 1.0),
-        );
-        let lowest_m = s.lidar_height_m + s.range_max_m * s.elevation_min_rad.sin();
-        c.require(
-            lowest_m >= 0.0 || s.below_ground != (super::Outside::Error {}),
-            "scan.elevation_min_rad",
-            s.elevation_min_rad,
-            format!(
-                "at least {} rad; at scan.range_max_m the lowest line is {:.3} m below the ground, which \
-                 scan.below_ground.policy = \"mask\" allows",
-                (-s.lidar_height_m / s.range_max_m).asin(),
-                -lowest_m
-            ),
-        );
-        // Scatterers that a sample sees reach back by the length of the summation of (15).
-        let reach_m = self.pulse_reach_m();
-        c.require(
-            s.range_min_m > reach_m,
-            "scan.range_min_m",
-            s.range_min_m,
-            format!("above {reach_m:.3} m, half the length of the pulse in the air"),
-        );
-        if c.require(
-            s.range_max_m > s.range_min_m,
-            "scan.range_max_m",
-            s.range_max_m,
-            format!("above scan.range_min_m, {} m", s.range_min_m),
-        ) {
-            let n = self.samples_per_record();
-            c.require(
-                n <= 100_000_000,
-                "scan.range_max_m",
-                s.range_max_m,
-                format!("records of at most 100000000 samples; this one has {n}"),
-            );
-            c.require(
-                self.estimator.window_samples <= n,
-                "estimator.window_samples",
-                self.estimator.window_samples,
-                format!("at most {n}, the samples recorded from scan.range_min_m to scan.range_max_m"),
-            );
-        }
+        let allowed = "true, or else one of csv, netcdf, svg and png: nothing would be written";
+        c.require(any, "outputs.csv", o.csv, allowed);
     }
 
     /// Samples recorded of each pulse: from `range_min_m` to `range_max_m`, ends included.
@@ -296,7 +241,7 @@ impl Scene {
     }
 }
 
-fn check_simulated(flow: &super::SimulatedFlow, c: &mut Checker) {
+fn check_simulated(flow: &super::SimulatedFlow, c: &mut Checker<'_>) {
     c.require(
         !flow.planes.is_empty(),
         "flow.planes",
@@ -315,18 +260,12 @@ fn check_simulated(flow: &super::SimulatedFlow, c: &mut Checker) {
     c.within("flow.velocity_unit_m_s", flow.velocity_unit_m_s, 1e-6, 1e6, "m/s");
 }
 
-fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker) {
+fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker<'_>) {
     const SECTION: &str = "atmosphere.turbulence";
     let key = |name: &str| format!("{SECTION}.{name}");
     c.within(&key("cn2_m_m23"), t.cn2_m_m23, 0.0, 1e-9, "m^(-2/3)");
     c.within(&key("inner_scale_m"), t.inner_scale_m, 0.0, 1.0, "m");
     c.require(t.outer_scale_m > 0.0, &key("outer_scale_m"), t.outer_scale_m, "above 0 m, or inf for none");
-    c.require(
-        t.outer_scale_m.is_nan() || t.outer_scale_m > t.inner_scale_m,
-        &key("outer_scale_m"),
-        t.outer_scale_m,
-        format!("above {SECTION}.inner_scale_m, {} m", t.inner_scale_m),
-    );
     c.count(&key("grid_points"), t.grid_points, 16, 16_384);
     c.within(&key("grid_spacing_m"), t.grid_spacing_m, 1e-5, 1.0, "m");
     c.count(&key("layers"), t.layers, 1, 10_000);

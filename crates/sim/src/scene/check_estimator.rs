@@ -1,19 +1,30 @@
 //! What the estimator of a scene may say.
 
+use super::between::Side;
 use super::check::Checker;
 use super::{CorrelogramForm, Estimator, Method, PulseShape, RegionRadius, Scene};
 
 /// Every limit of the estimator's keys, and those between them.
-pub(super) fn check_estimator(scene: &Scene, c: &mut Checker) {
+pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
     let e = &scene.estimator;
     c.count("estimator.window_samples", e.window_samples, 4, 65_536);
     c.count("estimator.window_step_samples", e.window_step_samples, 1, 1_000_000);
     c.count("estimator.gate_step_samples", e.gate_step_samples, 1, 1_000_000);
-    c.count("estimator.padded_samples", e.padded_samples, e.window_samples, 1 << 22);
-    let largest = e.window_samples.saturating_sub(1).max(1);
-    c.count("estimator.order", e.order, 1, if uses_order(e.method) { largest } else { 65_535 });
-    let reach = if e.method == Method::LagWindow { largest } else { 65_535 };
-    c.count("estimator.lag_window_lags", e.lag_window_lags, 1, reach);
+    c.count("estimator.padded_samples", e.padded_samples, 1, 1 << 22);
+    let window = e.window_samples;
+    let beside_window = |key, value: usize, limit: &str| -> [Side<'_>; 2] {
+        [
+            (key, value.to_string(), format!("{limit} estimator.window_samples, {window}")),
+            ("estimator.window_samples", window.to_string(), format!("{} {key}, {value}", other_side(limit))),
+        ]
+    };
+    c.between(e.padded_samples >= window, &beside_window("estimator.padded_samples", e.padded_samples, "at least"));
+    c.count("estimator.order", e.order, 1, 65_535);
+    let order_fits = e.order < window || !uses_order(e.method);
+    c.between(order_fits, &beside_window("estimator.order", e.order, "below"));
+    c.count("estimator.lag_window_lags", e.lag_window_lags, 1, 65_535);
+    let lags_fit = e.lag_window_lags < window || e.method != Method::LagWindow;
+    c.between(lags_fit, &beside_window("estimator.lag_window_lags", e.lag_window_lags, "below"));
     c.within("estimator.moment_reach", e.moment_reach, 0.1, 100.0, "");
     if let Some(snr_db) = e.likelihood_snr_db {
         c.within("estimator.likelihood_snr_db", snr_db, -100.0, 100.0, "dB");
@@ -28,12 +39,17 @@ pub(super) fn check_estimator(scene: &Scene, c: &mut Checker) {
     check_combinations(scene, c);
 }
 
+/// What one key must be beside another, seen from the other.
+fn other_side(limit: &str) -> &'static str {
+    if limit == "below" { "above" } else { "at most" }
+}
+
 /// Whether a method fits a model of `order`.
 fn uses_order(method: Method) -> bool {
     matches!(method, Method::Autoregressive | Method::AutoregressivePole | Method::Capon)
 }
 
-fn check_radius(e: &Estimator, c: &mut Checker) {
+fn check_radius(e: &Estimator, c: &mut Checker<'_>) {
     match &e.radius {
         RegionRadius::Fixed {} => {
             c.within("estimator.radius_m", e.radius_m, 0.0, 1e5, "m");
@@ -67,7 +83,7 @@ fn check_radius(e: &Estimator, c: &mut Checker) {
 }
 
 /// Methods that exclude a knob.
-fn check_combinations(scene: &Scene, c: &mut Checker) {
+fn check_combinations(scene: &Scene, c: &mut Checker<'_>) {
     let e = &scene.estimator;
     let likelihood = matches!(e.method, Method::Likelihood | Method::GradientLikelihood);
     c.require(

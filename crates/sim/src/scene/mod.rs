@@ -20,10 +20,12 @@ macro_rules! section {
 pub(crate) use section;
 
 mod atmosphere;
+mod between;
 mod check;
 mod check_estimator;
 mod estimator;
 mod flow;
+mod idle;
 mod instrument;
 mod read;
 
@@ -40,13 +42,16 @@ pub use instrument::{
 };
 pub use read::{Located, SceneError, SceneFile};
 #[cfg(feature = "flow")]
-pub(crate) use read::{invalid, malformed};
+pub(crate) use read::{located, parsed, unlike};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 /// The commented scene that `wakescope init` writes: every key with its default.
 pub const TABLE2_TOML: &str = include_str!("table2.toml");
+
+/// Values of keys that [`TABLE2_TOML`] does not state, for messages.
+const SCENE_EXAMPLES: &str = include_str!("examples.toml");
 
 /// The version of the scene format that this program reads and writes.
 pub const FORMAT: u32 = 1;
@@ -138,11 +143,12 @@ pub fn hash_of(text: &str) -> String {
 }
 
 impl Scene {
-    /// The scene with every default written out, as TOML.
+    /// The scene with every default written out, as TOML; keys that it has no use for are left out.
     ///
     /// Equal scenes give equal text; the hash of it names the scene.
     pub fn to_toml(&self) -> String {
-        toml::to_string(self).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"))
+        let whole = toml::to_string(self).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
+        idle::without_idle(self, &whole)
     }
 }
 
@@ -188,7 +194,7 @@ mod tests {
             keys.sort();
             keys
         };
-        let (written, all) = (flat(TABLE2_TOML), flat(&Scene::default().to_toml()));
+        let (written, all) = (flat(TABLE2_TOML), flat(&toml::to_string(&Scene::default()).unwrap()));
         for key in &written {
             assert!(all.contains(key), "{key} is no key");
         }

@@ -1,9 +1,12 @@
 //! Reading a scene file, with errors that name the key, the value, what is allowed and the line.
 
-use super::{Problem, Scene};
+use super::{Problem, SCENE_EXAMPLES, Scene, TABLE2_TOML, idle};
+use crate::keys::{Document, Format, Key, keys_of};
+use crate::text_file;
+use serde::Deserialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use toml::de::{DeTable, DeValue};
+use std::sync::LazyLock;
 
 /// A problem of a scene and the line where the file states it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,7 +29,7 @@ pub enum SceneError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// The text is no scene: broken TOML, an unknown key, a value of the wrong type.
+    /// The text is no TOML.
     #[error("{}:{line}: {message}", path.display())]
     Malformed {
         /// The file.
@@ -36,7 +39,7 @@ pub enum SceneError {
         /// What is wrong and what is allowed.
         message: String,
     },
-    /// Values out of their limits.
+    /// Unknown or missing keys, values of the wrong kind or out of their limits.
     #[error("{}", list(path, problems))]
     Invalid {
         /// The file.
@@ -51,7 +54,7 @@ fn list(path: &Path, problems: &[Located]) -> String {
         .iter()
         .map(|p| match p.line {
             Some(line) => format!("{}:{line}: {}", path.display(), p.problem),
-            None => format!("{}: {} (a default)", path.display(), p.problem),
+            None => format!("{}: {}", path.display(), p.problem),
         })
         .collect();
     lines.join("\n")
@@ -76,8 +79,7 @@ impl SceneFile {
     /// # Errors
     /// [`SceneError`] names the file, the line, the key, the value and what is allowed.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })?;
+        let text = text_file::read(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })?;
         Self::parse(&text, path)
     }
 
@@ -87,9 +89,17 @@ impl SceneFile {
     /// # Errors
     /// As [`SceneFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        let scene: Scene = toml::from_str(text).map_err(|e| malformed(text, path, &e))?;
+        let document = parsed(text, path)?;
+        let refuse = |problems| SceneError::Invalid { path: path.to_owned(), problems };
+        let table = document.vet(&scene_format()).map_err(refuse)?;
+        let scene = Scene::deserialize(table).map_err(|e| unlike(path, &e))?;
+        let mut problems = scene.problems_where(&|key| document.line(key).is_some());
+        problems.extend(idle::problems(&scene, &document));
+        if !problems.is_empty() {
+            return Err(located(&document, path, problems));
+        }
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        Ok(Self { folder, ..Self::new(scene).map_err(|problems| invalid(text, path, problems))? })
+        Ok(Self { folder, ..Self::new(scene).map_err(|problems| located(&document, path, problems))? })
     }
 
     /// Checks a scene that was made in memory; its files are relative to the working folder.
@@ -107,60 +117,33 @@ impl SceneFile {
     }
 }
 
-/// Problems with the lines where the text states their keys.
-pub(crate) fn invalid(text: &str, path: &Path, problems: Vec<Problem>) -> SceneError {
-    let document = DeTable::parse(text).ok();
-    let locate = |problem: Problem| {
-        let line = document.as_ref().and_then(|d| find(d.get_ref(), &problem.key)).map(|at| line_of(text, at));
-        Located { problem, line }
+/// What a scene may say.
+fn scene_format() -> Format<'static> {
+    static KEYS: LazyLock<Vec<Key>> = LazyLock::new(keys_of::<Scene>);
+    static DEFAULTS: LazyLock<toml::Table> =
+        LazyLock::new(|| toml::Table::try_from(Scene::default()).unwrap_or_default());
+    Format { keys: &KEYS, defaults: &DEFAULTS, examples: &[TABLE2_TOML, SCENE_EXAMPLES] }
+}
+
+/// A text as TOML.
+pub(crate) fn parsed<'a>(text: &'a str, path: &Path) -> Result<Document<'a>, SceneError> {
+    Document::parse(text).map_err(|(line, message)| SceneError::Malformed { path: path.to_owned(), line, message })
+}
+
+/// Problems with the lines where the text states their keys, and values as it writes them.
+pub(crate) fn located(document: &Document<'_>, path: &Path, problems: Vec<Problem>) -> SceneError {
+    let locate = |mut problem: Problem| {
+        if let Some(written) = document.written(&problem.key) {
+            problem.value = written;
+        }
+        Located { line: document.line(&problem.key), problem }
     };
     SceneError::Invalid { path: path.to_owned(), problems: problems.into_iter().map(locate).collect() }
 }
 
-/// What the parser of TOML refused, with its line.
-pub(crate) fn malformed(text: &str, path: &Path, error: &toml::de::Error) -> SceneError {
-    let message = error.message().replace('\n', " ");
-    let span = error.span().unwrap_or(0..0);
-    // In a section that is chosen by a tag, the parser knows only where the section begins.
-    let at = quoted(&message).filter(|_| message.starts_with("unknown field")).and_then(|key| {
-        let document = DeTable::parse(text).ok()?;
-        find_under(document.get_ref(), key, &span)
-    });
-    SceneError::Malformed { path: path.to_owned(), line: line_of(text, at.unwrap_or(span.start)), message }
-}
-
-/// The first word between backticks.
-fn quoted(message: &str) -> Option<&str> {
-    message.split('`').nth(1)
-}
-
-fn line_of(text: &str, offset: usize) -> usize {
-    text.bytes().take(offset).filter(|&b| b == b'\n').count() + 1
-}
-
-/// Offset of the key with this path.
-fn find(table: &DeTable<'_>, path: &str) -> Option<usize> {
-    let (head, rest) = path.split_once('.').map_or((path, None), |(h, r)| (h, Some(r)));
-    let (key, value) = table.iter().find(|(k, _)| k.get_ref() == head)?;
-    match (rest, value.get_ref()) {
-        (None, _) => Some(key.span().start),
-        (Some(rest), DeValue::Table(inner)) => find(inner, rest),
-        (Some(_), _) => None,
-    }
-}
-
-/// Offset of a key of this name at or behind the start of `span`, in any table.
-fn find_under(table: &DeTable<'_>, name: &str, span: &std::ops::Range<usize>) -> Option<usize> {
-    let mut found = None;
-    for (key, value) in table.iter() {
-        let here = (key.get_ref() == name && key.span().start >= span.start).then(|| key.span().start);
-        let inner = match value.get_ref() {
-            DeValue::Table(inner) => find_under(inner, name, span),
-            _ => None,
-        };
-        found = [found, here, inner].into_iter().flatten().min();
-    }
-    found
+/// A table whose keys all fit, and that is refused nevertheless.
+pub(crate) fn unlike(path: &Path, error: &toml::de::Error) -> SceneError {
+    SceneError::Malformed { path: path.to_owned(), line: 1, message: error.message().replace('\n', " ") }
 }
 
 impl fmt::Display for Located {
@@ -172,6 +155,8 @@ impl fmt::Display for Located {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::keys::Kind;
+    use crate::scene::{Flow, VortexPair};
 
     fn message(text: &str) -> String {
         SceneFile::parse(text, Path::new("s.toml")).unwrap_err().to_string()
@@ -185,30 +170,104 @@ mod tests {
 
     #[test]
     fn unknown_keys_are_refused_where_they_stand() {
-        let text = "[laser]\nwavelength_m = 1.5e-6\nwavelenght_m = 1.5e-6\n";
-        let m = message(text);
-        assert!(m.starts_with("s.toml:3: unknown field `wavelenght_m`"), "{m}");
-        assert!(m.contains("pulse_repetition_hz"), "allowed keys are listed: {m}");
+        assert_eq!(
+            message("[laser]\nwavelength_m = 1.5e-6\nwavelenght_m = 1.5e-6\n"),
+            "s.toml:3: laser.wavelenght_m = 1.5e-6 is not allowed: there is no such key; did you mean wavelength_m?; [laser] \
+             has wavelength_m, pulse_repetition_hz"
+        );
+        let elsewhere = message("wavelength_m = 1.5e-6\n");
+        assert!(elsewhere.starts_with("s.toml:1: wavelength_m = 1.5e-6 is not allowed"), "{elsewhere}");
+        assert!(elsewhere.contains("it is a key of [laser]"), "{elsewhere}");
     }
 
     #[test]
-    fn unknown_keys_are_found_in_tagged_sections_too() {
-        for (text, line) in [
-            ("seed = 1\n[flow]\nkind = \"vortex_pair\"\nspacing_m = 40.0\ncore_m = 1.0\n", 5),
-            ("[flow]\nkind = \"calm\"\nspacing_m = 40.0\n", 3),
-            ("[detector.snr]\nreference = \"physical\"\nsnr_db = 0.0\n", 3),
-            ("[atmosphere.turbulence]\nkind = \"none\"\ncn2 = 1e-14\n", 3),
+    fn keys_of_another_kind_say_which_kind_they_are_for() {
+        for (text, wanted) in [
+            (
+                "seed = 1\n[flow]\nkind = \"calm\"\nspacing_m = 40.0\n",
+                "s.toml:4: flow.spacing_m = 40.0 is not allowed: this key is for flow.kind = \"vortex_pair\", and flow.kind is \
+                 \"calm\"",
+            ),
+            (
+                "[flow]\nlateral_m_s = 3\n",
+                "s.toml:2: flow.lateral_m_s = 3 is not allowed: this key is for flow.kind = \"uniform\", and flow.kind is \
+                 \"vortex_pair\", the default",
+            ),
+            (
+                "[detector.snr]\nreference = \"physical\"\nsnr_db = 0.0\n",
+                "s.toml:3: detector.snr.snr_db = 0.0 is not allowed: this key is for detector.snr.reference = \"fixed\", and \
+                 detector.snr.reference is \"physical\"",
+            ),
         ] {
-            let m = message(text);
-            assert!(m.starts_with(&format!("s.toml:{line}: unknown field")), "{m}");
+            assert_eq!(message(text), wanted);
         }
     }
 
     #[test]
-    fn nan_and_wrong_types_are_errors() {
-        assert!(message("[pulse]\nenergy_j = nan\n").contains("s.toml:2: pulse.energy_j = NaN"));
-        assert!(message("[pulse]\nenergy_j = \"much\"\n").starts_with("s.toml:2: "));
-        assert!(message("[pulse\n").starts_with("s.toml:1: "));
+    fn a_table_without_its_kind_has_the_default_kind() {
+        let scene = |text: &str| SceneFile::parse(text, Path::new("s.toml")).unwrap().scene;
+        let Flow::VortexPair(pair) = scene("[flow]\nlateral_position_m = 1500\n").flow else { panic!("a pair") };
+        assert_eq!(pair, VortexPair { lateral_position_m: 1500.0, ..VortexPair::default() });
+        assert_eq!(scene("[scan]\nbelow_ground = {}\n[detector]\nsnr = {}\n"), Scene::default());
+    }
+
+    #[test]
+    fn values_of_the_wrong_kind_are_named_all_at_once_with_an_example() {
+        assert_eq!(
+            message(
+                "[pulse]\nenergy_j = \"much\"\ndefinition = \"hwhm\"\n[scan]\nrealisations = -1\n[outputs]\ncsv = 1\n[flow]\n\
+                 kind = \"uniform\"\nlateral_m_s = 1\n"
+            )
+            .lines()
+            .collect::<Vec<_>>(),
+            [
+                "s.toml:2: pulse.energy_j = \"much\" is not allowed: a number in J, e.g. 150e-6",
+                "s.toml:3: pulse.definition = \"hwhm\" is not allowed: one of \"fwhm\", \"one_over_e_half_width\"; did you mean \
+                 \"fwhm\"?",
+                "s.toml:5: scan.realisations = -1 is not allowed: a whole number, 0 or more, e.g. 4",
+                "s.toml:7: outputs.csv = 1 is not allowed: true or false",
+                "s.toml:8: flow.vertical_m_s is missing: a number in m/s, e.g. 0.0",
+            ]
+        );
+        assert!(message("[pulse]\nenergy_j = nan\n").contains("s.toml:2: pulse.energy_j = nan is"));
+        assert!(message("[pulse\n").starts_with("s.toml:1: this is no valid TOML: "));
+    }
+
+    /// Each key of each kind, with a value that no key takes.
+    fn wrong<'k>(keys: &'k [Key], path: &str, before: &str, out: &mut Vec<(String, &'k Kind, String)>) {
+        for key in keys {
+            let here = crate::keys::join(path, key.name);
+            out.push((here.clone(), &key.kind, format!("{before}{here} = 1979-05-27\n")));
+            match &key.kind {
+                Kind::Table(inner) => wrong(inner, &here, before, out),
+                Kind::Tagged { tag, kinds } => {
+                    out.push((format!("{here}.{tag}"), &Kind::Switch, format!("{before}{here}.{tag} = \"?\"\n")));
+                    for (name, inner) in kinds {
+                        wrong(inner, &here, &format!("{before}{here}.{tag} = \"{name}\"\n"), out);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    #[test]
+    fn every_key_names_itself_what_it_takes_and_its_line() {
+        let mut cases = Vec::new();
+        wrong(scene_format().keys, "", "", &mut cases);
+        assert!(cases.len() > 120, "{}", cases.len());
+        for (key, kind, text) in cases {
+            let line = text.lines().count();
+            let m = message(&text);
+            let own = m.lines().find(|l| l.starts_with(&format!("s.toml:{line}: {key} "))).unwrap_or_else(|| {
+                panic!("{text}{m}");
+            });
+            let says = ["e.g. ", "one of ", "true or false", "names out of"].iter().any(|word| own.contains(word));
+            assert!(says, "{own}");
+            let plain = matches!(kind, Kind::Number | Kind::Whole { .. } | Kind::Text | Kind::List { .. });
+            let example = scene_format().example(&key, kind);
+            assert!(!plain || example.is_some(), "{key} needs a value in scene/examples.toml");
+        }
     }
 
     #[test]

@@ -1,0 +1,360 @@
+//! A text beside the description of its keys: what does not fit, and the table that it stands for.
+
+use super::words::{near, one_of, quote, tables_with, wanted};
+use super::{Key, Kind, join};
+use crate::scene::{Located, Problem};
+use std::ops::Range;
+use toml::Spanned;
+use toml::Value;
+use toml::de::{DeTable, DeValue};
+
+/// What a kind of file may say.
+pub(crate) struct Format<'a> {
+    /// Its keys.
+    pub(crate) keys: &'a [Key],
+    /// A whole file: kinds and needed values that a text leaves out are those of this one.
+    pub(crate) defaults: &'a toml::Table,
+    /// Texts with examples of values, the best ones first.
+    pub(crate) examples: &'a [&'a str],
+}
+
+/// A text that is TOML.
+pub(crate) struct Document<'a> {
+    text: &'a str,
+    table: DeTable<'a>,
+}
+
+impl<'a> Document<'a> {
+    /// Reads a text.
+    ///
+    /// # Errors
+    /// The line and what is wrong, without the text that is there.
+    pub(crate) fn parse(text: &'a str) -> Result<Self, (usize, String)> {
+        match DeTable::parse(text) {
+            Ok(table) => Ok(Self { text, table: table.into_inner() }),
+            Err(e) => {
+                let at = e.span().map_or(0, |span| span.start);
+                Err((line_of(text, at), format!("this is no valid TOML: {}", e.message().replace('\n', " "))))
+            }
+        }
+    }
+
+    /// The line of a key, from 1; none if the text does not state it.
+    pub(crate) fn line(&self, path: &str) -> Option<usize> {
+        find(&self.table, path).map(|(span, _)| line_of(self.text, span.start))
+    }
+
+    /// The value of a key.
+    pub(crate) fn value(&self, path: &str) -> Option<&DeValue<'a>> {
+        find(&self.table, path).map(|(_, value)| value.get_ref())
+    }
+
+    /// A plain value as the text writes it; none for lists and tables, of which a message knows the part that matters.
+    pub(crate) fn written(&self, path: &str) -> Option<String> {
+        let (_, value) = find(&self.table, path)?;
+        let is_plain = !matches!(value.get_ref(), DeValue::Array(_) | DeValue::Table(_));
+        is_plain.then(|| self.quote(value.span()))
+    }
+
+    /// The table that the text stands for, with the kinds that it leaves out.
+    ///
+    /// # Errors
+    /// Every key that is not known, has a value of the wrong kind or is missing, in the order of the lines.
+    pub(crate) fn vet(&self, format: &Format<'_>) -> Result<toml::Table, Vec<Located>> {
+        let mut walk = Walk { document: self, format, found: Vec::new() };
+        let table = walk.table(format.keys, &self.table, "", &[], Some(format.defaults), 1);
+        if walk.found.is_empty() {
+            return Ok(table);
+        }
+        walk.found.sort_by_key(|located| located.line);
+        Err(walk.found)
+    }
+
+    fn quote(&self, span: Range<usize>) -> String {
+        quote(self.text.get(span).unwrap_or_default())
+    }
+}
+
+fn line_of(text: &str, offset: usize) -> usize {
+    text.bytes().take(offset).filter(|&b| b == b'\n').count() + 1
+}
+
+/// Where the key with this path stands, and its value.
+fn find<'t, 'a>(table: &'t DeTable<'a>, path: &str) -> Option<(Range<usize>, &'t Spanned<DeValue<'a>>)> {
+    let (head, rest) = path.split_once('.').map_or((path, None), |(h, r)| (h, Some(r)));
+    let (key, value) = table.iter().find(|(key, _)| key.get_ref() == head)?;
+    match (rest, value.get_ref()) {
+        (None, _) => Some((key.span(), value)),
+        (Some(rest), DeValue::Table(inner)) => find(inner, rest),
+        (Some(_), _) => None,
+    }
+}
+
+fn number(value: &DeValue<'_>) -> Option<f64> {
+    match value {
+        DeValue::Float(value) => {
+            let number: f64 = value.as_str().parse().ok()?;
+            (number.is_finite() || !value.as_str().contains(|c: char| c.is_ascii_digit())).then_some(number)
+        }
+        DeValue::Integer(value) if value.radix() == 10 => value.as_str().parse().ok(),
+        DeValue::Integer(_) => whole(value).map(|whole| whole as f64),
+        _ => None,
+    }
+}
+
+fn whole(value: &DeValue<'_>) -> Option<i64> {
+    let DeValue::Integer(value) = value else { return None };
+    i64::from_str_radix(value.as_str(), value.radix()).ok()
+}
+
+/// The kinds that a table with a tag may have, and the one that it has.
+type Kinds<'k> = (&'k str, &'k str, &'k [(&'static str, Vec<Key>)]);
+
+struct Walk<'w> {
+    document: &'w Document<'w>,
+    format: &'w Format<'w>,
+    found: Vec<Located>,
+}
+
+impl Walk<'_> {
+    fn refuse(&mut self, key: String, value: String, allowed: String, at: usize) {
+        self.refuse_on(key, value, allowed, line_of(self.document.text, at));
+    }
+
+    fn refuse_on(&mut self, key: String, value: String, allowed: String, line: usize) {
+        self.found.push(Located { problem: Problem { key, value, allowed }, line: Some(line) });
+    }
+
+    /// A table with these keys; `kinds` are those of a table with a tag.
+    fn table(
+        &mut self,
+        keys: &[Key],
+        table: &DeTable<'_>,
+        path: &str,
+        kinds: &[Kinds<'_>],
+        defaults: Option<&toml::Table>,
+        line: usize,
+    ) -> toml::Table {
+        let mut out = toml::Table::new();
+        for (name, value) in table {
+            let at = join(path, name.get_ref());
+            let default = defaults.and_then(|d| d.get(name.get_ref().as_ref()));
+            match keys.iter().find(|key| key.name == name.get_ref()) {
+                Some(key) => {
+                    let read = self.value(&key.kind, value, &at, key.name, default, name.span().start);
+                    out.extend(read.map(|value| (key.name.to_owned(), value)));
+                }
+                None if kinds.iter().any(|(tag, ..)| tag == name.get_ref()) => {}
+                None => self.unknown(keys, name, value, path, kinds),
+            }
+        }
+        for key in keys.iter().filter(|key| key.is_required && !table.contains_key(key.name)) {
+            match defaults.and_then(|d| d.get(key.name)) {
+                Some(default) => out.extend([(key.name.to_owned(), default.clone())]),
+                None => self.missing(&join(path, key.name), key, line),
+            }
+        }
+        out
+    }
+
+    fn missing(&mut self, path: &str, key: &Key, line: usize) {
+        // Of a table with a tag, the tag is what must be said.
+        let (path, allowed) = match &key.kind {
+            Kind::Tagged { tag, kinds } => (join(path, tag), one_of(&names(kinds))),
+            kind => (path.to_owned(), self.wanted(path, key.name, kind)),
+        };
+        self.refuse_on(path, Problem::ABSENT.into(), allowed, line);
+    }
+
+    fn value(
+        &mut self,
+        kind: &Kind,
+        value: &Spanned<DeValue<'_>>,
+        path: &str,
+        name: &str,
+        default: Option<&Value>,
+        at: usize,
+    ) -> Option<Value> {
+        let line = line_of(self.document.text, at);
+        let defaults = default.and_then(Value::as_table);
+        let inner = value.get_ref();
+        let read = match (kind, inner) {
+            (Kind::Number, _) => number(inner).map(Value::Float),
+            (Kind::Whole { largest }, _) => {
+                whole(inner).filter(|w| u64::try_from(*w).is_ok_and(|w| w <= *largest)).map(Value::Integer)
+            }
+            (Kind::Switch, DeValue::Boolean(value)) => Some(Value::Boolean(*value)),
+            (Kind::Text, DeValue::String(text)) => Some(Value::String(text.to_string())),
+            (Kind::Choice(names), DeValue::String(text)) => {
+                names.contains(&text.as_ref()).then(|| Value::String(text.to_string()))
+            }
+            (Kind::List { of, len }, DeValue::Array(values)) if len.is_none_or(|len| len == values.len()) => {
+                // Each value that does not fit is named itself.
+                let mut list = Vec::with_capacity(values.len());
+                for (i, value) in values.iter().enumerate() {
+                    let at = value.span().start;
+                    list.extend(self.value(of, value, &format!("{path}[{i}]"), name, None, at));
+                }
+                return Some(Value::Array(list));
+            }
+            (Kind::Table(keys), DeValue::Table(table)) => {
+                return Some(Value::Table(self.table(keys, table, path, &[], defaults, line)));
+            }
+            (Kind::Tagged { tag, kinds }, DeValue::Table(table)) => {
+                return self.tagged(tag, kinds, table, path, defaults, line).map(Value::Table);
+            }
+            _ => None,
+        };
+        if read.is_none() {
+            let mut allowed = self.wanted(path, name, kind);
+            if let (Kind::Choice(names), DeValue::String(text)) = (kind, inner)
+                && let Some(name) = near(text, names.iter().copied())
+            {
+                allowed += &format!("; did you mean \"{name}\"?");
+            }
+            // A table has no value that a line could show.
+            let shown = if inner.is_table() { String::new() } else { self.document.quote(value.span()) };
+            self.refuse(path.to_owned(), shown, allowed, at);
+        }
+        read
+    }
+
+    fn tagged(
+        &mut self,
+        tag: &'static str,
+        kinds: &[(&'static str, Vec<Key>)],
+        table: &DeTable<'_>,
+        path: &str,
+        defaults: Option<&toml::Table>,
+        line: usize,
+    ) -> Option<toml::Table> {
+        let of_default = defaults.and_then(|d| d.get(tag)).and_then(Value::as_str);
+        let at = join(path, tag);
+        let stated = table.iter().find(|(key, _)| key.get_ref() == tag);
+        let name = match stated {
+            Some((key, value)) => {
+                let name = value.get_ref().as_str().filter(|text| kinds.iter().any(|(name, _)| name == text));
+                if name.is_none() {
+                    let names = names(kinds);
+                    let text = value.get_ref().as_str().unwrap_or_default();
+                    let meant = near(text, names.iter().copied());
+                    let hint = meant.map(|name| format!("; did you mean \"{name}\"?")).unwrap_or_default();
+                    self.refuse(at, self.document.quote(value.span()), one_of(&names) + &hint, key.span().start);
+                }
+                name?
+            }
+            None => match of_default {
+                Some(name) => name,
+                None => {
+                    self.refuse_on(at, Problem::ABSENT.into(), one_of(&names(kinds)), line);
+                    return None;
+                }
+            },
+        };
+        let keys = kinds.iter().find(|(n, _)| *n == name).map_or(&[][..], |(_, keys)| keys);
+        let same = defaults.filter(|_| of_default == Some(name));
+        let mut out = self.table(keys, table, path, &[(tag, name, kinds)], same, line);
+        out.insert(tag.to_owned(), Value::String(name.to_owned()));
+        Some(out)
+    }
+
+    fn unknown(
+        &mut self,
+        keys: &[Key],
+        name: &Spanned<toml::de::DeString<'_>>,
+        value: &Spanned<DeValue<'_>>,
+        path: &str,
+        kinds: &[Kinds<'_>],
+    ) {
+        let here = name.get_ref().as_ref();
+        let shown = if value.get_ref().is_table() { String::new() } else { self.document.quote(value.span()) };
+        let place = if path.is_empty() { "the file".to_owned() } else { format!("[{path}]") };
+        for (tag, chosen, all) in kinds {
+            let others: Vec<&str> =
+                all.iter().filter(|(_, keys)| keys.iter().any(|key| key.name == here)).map(|(name, _)| *name).collect();
+            if !others.is_empty() {
+                let needed = others.iter().map(|o| format!("\"{o}\"")).collect::<Vec<_>>().join(" or ");
+                let tag = join(path, tag);
+                let stated = if self.document.value(&tag).is_some() { "" } else { ", the default" };
+                let allowed = format!("this key is for {tag} = {needed}, and {tag} is \"{chosen}\"{stated}");
+                return self.refuse(join(path, &quote(here)), shown, allowed, name.span().start);
+            }
+        }
+        let meant = near(here, keys.iter().map(|key| key.name));
+        let elsewhere = tables_with(self.format.keys, here, "");
+        let hint = match (meant, elsewhere.first()) {
+            (Some(meant), _) => format!("; did you mean {meant}?"),
+            (None, Some(table)) if table.is_empty() => "; it stands before the first [section]".into(),
+            (None, Some(table)) => format!("; it is a key of [{table}]"),
+            (None, None) => String::new(),
+        };
+        let tags = kinds.iter().map(|(tag, ..)| *tag);
+        let known: Vec<&str> = tags.chain(keys.iter().map(|key| key.name)).collect();
+        let allowed = format!("there is no such key{hint}; {place} has {}", known.join(", "));
+        self.refuse(join(path, &quote(here)), shown, allowed, name.span().start);
+    }
+
+    /// What a key takes, with an example.
+    fn wanted(&self, path: &str, name: &str, kind: &Kind) -> String {
+        let what = wanted(name, kind);
+        match kind {
+            Kind::Switch | Kind::Choice(_) | Kind::Other => what,
+            Kind::Table(keys) => {
+                let inner =
+                    keys.first().map(|k| format!("{} = {}", k.name, self.example(&join(path, k.name), &k.kind)));
+                format!("{what}, e.g. {{ {} }}", inner.unwrap_or_default())
+            }
+            Kind::Tagged { tag, kinds } => {
+                let plainest = kinds.iter().min_by_key(|(_, keys)| keys.iter().filter(|k| k.is_required).count());
+                format!("{what}, e.g. {{ {tag} = \"{}\" }}", plainest.map_or("", |(name, _)| name))
+            }
+            _ => format!("{what}, e.g. {}", self.example(path, kind)),
+        }
+    }
+
+    /// An example of the value of a key: its own, else one of the kind.
+    fn example(&self, path: &str, kind: &Kind) -> String {
+        self.format.example(path, kind).unwrap_or_else(|| match kind {
+            Kind::Number => "1.0".into(),
+            Kind::Whole { .. } => "1".into(),
+            Kind::Switch => "true".into(),
+            Kind::Choice(names) => format!("\"{}\"", names.first().unwrap_or(&"")),
+            Kind::List { of, len } => format!("[{}]", vec![self.example("", of); len.unwrap_or(2)].join(", ")),
+            Kind::Text | Kind::Table(_) | Kind::Tagged { .. } | Kind::Other => "\"name\"".into(),
+        })
+    }
+}
+
+impl Format<'_> {
+    /// The value of a key in the texts with examples, or its default; of a list also one of its values, `key[0]`.
+    pub(crate) fn example(&self, path: &str, kind: &Kind) -> Option<String> {
+        let (whole, element) = path.split_once('[').map_or((path, false), |(whole, _)| (whole, true));
+        let is_list = matches!(kind, Kind::List { .. });
+        let of_text = |text: &&str| {
+            let document = Document::parse(text).ok()?;
+            let (_, value) = find(&document.table, whole)?;
+            let span = match value.get_ref() {
+                DeValue::Array(values) if element => values.first()?.span(),
+                DeValue::Array(values) if is_list && !values.is_empty() => value.span(),
+                DeValue::Array(_) => return None,
+                _ if is_list || element => return None,
+                _ => value.span(),
+            };
+            Some(document.quote(span))
+        };
+        let of_defaults = || {
+            let mut keys = whole.split('.');
+            let value = keys.try_fold(None, |table: Option<&Value>, key| match table {
+                None => self.defaults.get(key).map(Some),
+                Some(table) => table.get(key).map(Some),
+            })??;
+            let plain = !value.is_array() && !value.is_table() && !element;
+            plain.then(|| value.to_string())
+        };
+        self.examples.iter().find_map(of_text).or_else(of_defaults)
+    }
+}
+
+fn names(kinds: &[(&'static str, Vec<Key>)]) -> Vec<&'static str> {
+    kinds.iter().map(|(name, _)| *name).collect()
+}

@@ -1,0 +1,153 @@
+//! What a key may hold, in words: the kind of value, its unit, names that are near.
+
+use super::{Key, Kind, join};
+
+/// Longest piece of a file that a message repeats, in characters.
+const LONGEST_QUOTE: usize = 60;
+
+/// Endings of names and the units that they stand for, longer ones first.
+const UNITS: [(&str, &str); 23] = [
+    ("_per_m_sr", "1/(m sr)"),
+    ("_m2_s", "m^2/s"),
+    ("_m_m23", "m^(-2/3)"),
+    ("_kg_m3", "kg/m^3"),
+    ("_per_m", "1/m"),
+    ("_per_s", "1/s"),
+    ("_hz_s", "Hz/s"),
+    ("_m_s2", "m/s^2"),
+    ("_m_s", "m/s"),
+    ("_rad", "rad"),
+    ("_deg", "degrees"),
+    ("_tau", "units of b0/V0"),
+    ("_hz", "Hz"),
+    ("_db", "dB"),
+    ("_kg", "kg"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("_j", "J"),
+    ("_w", "W"),
+    ("_a", "A"),
+    ("_k", "K"),
+    ("_pa", "Pa"),
+    ("_sr", "sr"),
+];
+
+/// " in m", or nothing where the name has no unit.
+fn in_unit(key: &str) -> String {
+    UNITS.iter().find(|(end, _)| key.ends_with(end)).map(|(_, unit)| format!(" in {unit}")).unwrap_or_default()
+}
+
+/// The kind of value that a key of this name takes.
+pub(super) fn wanted(key: &str, kind: &Kind) -> String {
+    match kind {
+        Kind::Number => format!("a number{}", in_unit(key)),
+        Kind::Whole { largest } if *largest < u64::from(u32::MAX) => format!("a whole number from 0 to {largest}"),
+        Kind::Whole { .. } => "a whole number, 0 or more".into(),
+        Kind::Switch => "true or false".into(),
+        Kind::Text => "a text in quotation marks".into(),
+        Kind::Choice(names) => one_of(names),
+        Kind::List { of, len } => {
+            let many = len.map(|len| format!("{len} ")).unwrap_or_default();
+            match &**of {
+                Kind::Number => format!("a list of {many}numbers{}", in_unit(key)),
+                Kind::Whole { .. } => format!("a list of {many}whole numbers, 0 or more"),
+                Kind::Choice(names) => format!("a list of {many}names out of {}", list(names)),
+                _ => format!("a list of {many}values"),
+            }
+        }
+        Kind::Table(_) | Kind::Tagged { .. } => "a table".into(),
+        Kind::Other => "another value".into(),
+    }
+}
+
+/// `one of "a", "b"`.
+pub(super) fn one_of(names: &[&str]) -> String {
+    format!("one of {}", list(names))
+}
+
+fn list(names: &[&str]) -> String {
+    names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+}
+
+/// The name that is nearest to a word, if it is near enough to be meant.
+pub(super) fn near<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let word: Vec<char> = word.chars().take(LONGEST_QUOTE).map(|c| c.to_ascii_lowercase()).collect();
+    let far = (word.len() / 3).max(1);
+    names.map(|name| (distance(&word, name), name)).filter(|(d, _)| *d <= far).min_by_key(|(d, _)| *d).map(|(_, n)| n)
+}
+
+/// Letters that must be put in, taken out, changed or swapped with their neighbour to get from one word to the other.
+fn distance(word: &[char], name: &str) -> usize {
+    let name: Vec<char> = name.chars().collect();
+    let mut before = vec![0; name.len() + 1];
+    let mut row: Vec<usize> = (0..=name.len()).collect();
+    for (i, letter) in word.iter().enumerate() {
+        let mut next = vec![i + 1];
+        for (j, other) in name.iter().enumerate() {
+            let changed = row[j] + usize::from(letter != other);
+            let mut least = changed.min(row[j + 1] + 1).min(next[j] + 1);
+            if i > 0 && j > 0 && word[i - 1] == *other && *letter == name[j - 1] {
+                least = least.min(before[j - 1] + 1);
+            }
+            next.push(least);
+        }
+        before = std::mem::replace(&mut row, next);
+    }
+    row[name.len()]
+}
+
+/// A piece of a file, on one line and not too long.
+pub(super) fn quote(text: &str) -> String {
+    let line = text.trim().lines().next().unwrap_or_default();
+    let short: String = line.chars().filter(|c| !c.is_control()).take(LONGEST_QUOTE).collect();
+    if short.len() < text.trim().len() { format!("{short}...") } else { short }
+}
+
+/// Paths of the tables, below `keys`, that have a key of this name.
+pub(super) fn tables_with(keys: &[Key], name: &str, path: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    if keys.iter().any(|key| key.name == name) {
+        found.push(path.to_owned());
+    }
+    for key in keys {
+        let here = join(path, key.name);
+        match &key.kind {
+            Kind::Table(inner) => found.extend(tables_with(inner, name, &here)),
+            Kind::Tagged { kinds, .. } => found.extend(kinds.iter().flat_map(|(_, k)| tables_with(k, name, &here))),
+            _ => {}
+        }
+    }
+    found.dedup();
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_come_from_the_end_of_the_name() {
+        let number = |key| wanted(key, &Kind::Number);
+        assert_eq!(number("energy_j"), "a number in J");
+        assert_eq!(number("circulation_m2_s"), "a number in m^2/s");
+        assert_eq!(number("backscatter_per_m_sr"), "a number in 1/(m sr)");
+        assert_eq!(number("radial_velocity_m_s"), "a number in m/s");
+        assert_eq!(number("quantum_efficiency"), "a number");
+    }
+
+    #[test]
+    fn slips_of_the_finger_are_near_and_other_words_are_not() {
+        let names = ["wavelength_m", "pulse_repetition_hz"];
+        assert_eq!(near("wavelenght_m", names.into_iter()), Some("wavelength_m"));
+        assert_eq!(near("Wavelength", names.into_iter()), Some("wavelength_m"));
+        assert_eq!(near("colour", names.into_iter()), None);
+        assert_eq!(near("", names.into_iter()), None);
+    }
+
+    #[test]
+    fn quotes_are_short_and_on_one_line() {
+        assert_eq!(quote("150e-6"), "150e-6");
+        assert_eq!(quote("[\n1.0,\n]"), "[...");
+        assert_eq!(quote(&"x".repeat(100_000)).len(), 63);
+    }
+}

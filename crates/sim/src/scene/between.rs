@@ -1,0 +1,304 @@
+//! Limits between the keys of a scene. Each blames a key that the file states, not the default beside it.
+
+use super::check::Checker;
+use super::{Flow, Outside, PulseShape, Scene, Turbulence};
+
+/// One side of a limit between keys: the key, its value, what is allowed beside the others.
+pub(super) type Side<'a> = (&'a str, String, String);
+
+pub(super) fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
+    (key, format!("{value:?}"), allowed)
+}
+
+impl Scene {
+    /// Limits that make sense only where each key is within its own.
+    pub(super) fn check_between(&self, c: &mut Checker<'_>) {
+        self.check_instrument_between(c);
+        self.check_band(c);
+        self.check_lines(c);
+        self.check_ranges(c);
+        let o = &self.outputs;
+        let (first_m, last_m) = (o.profile_range_min_m, o.profile_range_max_m);
+        c.between(
+            last_m > first_m,
+            &[
+                side("outputs.profile_range_max_m", last_m, format!("above outputs.profile_range_min_m, {first_m} m")),
+                side("outputs.profile_range_min_m", first_m, format!("below outputs.profile_range_max_m, {last_m} m")),
+            ],
+        );
+    }
+
+    fn check_instrument_between(&self, c: &mut Checker<'_>) {
+        let t = &self.telescope;
+        let (inner_m, outer_m) = (t.obscuration_radius_m, t.aperture_radius_m);
+        c.between(
+            inner_m < outer_m,
+            &[
+                side(
+                    "telescope.obscuration_radius_m",
+                    inner_m,
+                    format!("below telescope.aperture_radius_m, {outer_m} m"),
+                ),
+                side(
+                    "telescope.aperture_radius_m",
+                    outer_m,
+                    format!("above telescope.obscuration_radius_m, {inner_m} m"),
+                ),
+            ],
+        );
+        if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
+            const SECTION: &str = "atmosphere.turbulence";
+            let (inner_m, outer_m) = (t.inner_scale_m, t.outer_scale_m);
+            c.between(
+                outer_m > inner_m,
+                &[
+                    side(
+                        "atmosphere.turbulence.outer_scale_m",
+                        outer_m,
+                        format!("above {SECTION}.inner_scale_m, {inner_m} m"),
+                    ),
+                    side(
+                        "atmosphere.turbulence.inner_scale_m",
+                        inner_m,
+                        format!("below {SECTION}.outer_scale_m, {outer_m} m"),
+                    ),
+                ],
+            );
+        }
+        if let Flow::VortexPair(p) = &self.flow {
+            let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
+            c.between(
+                core_m < 0.5 * spacing_m,
+                &[
+                    side("flow.core_radius_m", core_m, format!("below half of flow.spacing_m, {} m", 0.5 * spacing_m)),
+                    side("flow.spacing_m", spacing_m, format!("above twice flow.core_radius_m, {} m", 2.0 * core_m)),
+                ],
+            );
+        }
+    }
+
+    /// The detector band lies between 0 and half the sampling frequency.
+    fn check_band(&self, c: &mut Checker<'_>) {
+        let d = &self.detector;
+        let (centre_hz, half_hz, nyquist_hz) = (d.intermediate_frequency_hz, 0.5 * d.bandwidth_hz, 0.5 * d.sampling_hz);
+        let why = "so that the detector band lies between 0 and half of detector.sampling_hz";
+        let ok = centre_hz > half_hz && centre_hz + half_hz < nyquist_hz;
+        let narrowest_hz = centre_hz.min(nyquist_hz - centre_hz);
+        let mut sides = Vec::new();
+        if half_hz < nyquist_hz - half_hz {
+            let allowed = format!("between {half_hz:e} and {:e} Hz, {why}", nyquist_hz - half_hz);
+            sides.push(side("detector.intermediate_frequency_hz", centre_hz, allowed));
+        }
+        if centre_hz > half_hz {
+            let allowed = format!("above {:e} Hz, {why}", 2.0 * (centre_hz + half_hz));
+            sides.push(side("detector.sampling_hz", d.sampling_hz, allowed));
+        }
+        if narrowest_hz > 0.0 {
+            let allowed = format!("below {:e} Hz, {why}", 2.0 * narrowest_hz);
+            sides.push(side("detector.bandwidth_hz", d.bandwidth_hz, allowed));
+        }
+        // Where no single key can mend it, the one that asks for most.
+        let allowed = format!("more than detector.bandwidth_hz, {:e} Hz, and {why}", d.bandwidth_hz);
+        sides.push(side("detector.sampling_hz", d.sampling_hz, allowed.clone()));
+        sides.push(side("detector.bandwidth_hz", d.bandwidth_hz, format!("below {nyquist_hz:e} Hz, {why}")));
+        let beyond = format!("between {half_hz:e} Hz, half of detector.bandwidth_hz, and {nyquist_hz:e} Hz less that");
+        sides.push(side("detector.intermediate_frequency_hz", centre_hz, beyond));
+        c.between(ok, &sides);
+    }
+
+    fn check_lines(&self, c: &mut Checker<'_>) {
+        let s = &self.scan;
+        let (low_rad, high_rad, step_rad) = (s.elevation_min_rad, s.elevation_max_rad, s.elevation_step_rad);
+        c.between(
+            high_rad >= low_rad,
+            &[
+                side("scan.elevation_max_rad", high_rad, format!("at least scan.elevation_min_rad, {low_rad} rad")),
+                side("scan.elevation_min_rad", low_rad, format!("at most scan.elevation_max_rad, {high_rad} rad")),
+            ],
+        );
+        let lines = (high_rad - low_rad) / step_rad;
+        let allowed = format!("at most 100000 lines of sight; there would be {:.3e}", lines + 1.0);
+        c.between(
+            lines < 1e5,
+            &[
+                side("scan.elevation_step_rad", step_rad, allowed.clone()),
+                side("scan.elevation_max_rad", high_rad, allowed.clone()),
+                side("scan.elevation_min_rad", low_rad, allowed),
+            ],
+        );
+        let lowest_m = s.lidar_height_m + s.range_max_m * low_rad.sin();
+        c.require(
+            lowest_m >= 0.0 || s.below_ground != (Outside::Error {}),
+            "scan.elevation_min_rad",
+            low_rad,
+            format!(
+                "at least {} rad; at scan.range_max_m the lowest line is {:.3} m below the ground, which \
+                 scan.below_ground.policy = \"mask\" allows",
+                (-s.lidar_height_m / s.range_max_m).asin(),
+                -lowest_m
+            ),
+        );
+    }
+
+    fn check_ranges(&self, c: &mut Checker<'_>) {
+        let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
+        // Scatterers that a sample sees reach back by the length of the summation of (15).
+        let reach_m = self.pulse_reach_m();
+        let mut sides = vec![side(
+            "scan.range_min_m",
+            first_m,
+            format!("above {reach_m:.3} m, half the length of the pulse in the air"),
+        )];
+        match self.pulse.shape {
+            PulseShape::Sampled(_) => {
+                let allowed = format!(
+                    "that ends so early that half its length in the air, {reach_m:.3} m, is below scan.range_min_m"
+                );
+                sides.push(("pulse.shape", String::new(), format!("a pulse {allowed}, {first_m} m")));
+            }
+            PulseShape::Gaussian {} => {
+                // A little less, so that rounding it is safe.
+                let longest_s = self.pulse.duration_s * first_m / reach_m * (1.0 - 1e-4);
+                let allowed = format!(
+                    "below {longest_s:.4e} s, so that half the length of the pulse in the air is below scan.range_min_m, {first_m} m"
+                );
+                sides.push(side("pulse.duration_s", self.pulse.duration_s, allowed));
+            }
+        }
+        c.between(first_m > reach_m, &sides);
+        let ordered = c.between(
+            last_m > first_m,
+            &[
+                side("scan.range_max_m", last_m, format!("above scan.range_min_m, {first_m} m")),
+                side("scan.range_min_m", first_m, format!("below scan.range_max_m, {last_m} m")),
+            ],
+        );
+        if ordered {
+            self.check_record(c);
+        }
+    }
+
+    /// The record has samples for a window, and not too many of them.
+    fn check_record(&self, c: &mut Checker<'_>) {
+        let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
+        let sampling_hz = self.detector.sampling_hz;
+        let (samples, spacing_m) = (self.samples_per_record(), self.sample_spacing_m());
+        let many = format!("records of at most 100000000 samples; this one has {samples}");
+        c.between(
+            samples <= 100_000_000,
+            &[
+                side("scan.range_max_m", last_m, many.clone()),
+                side("scan.range_min_m", first_m, many.clone()),
+                side("detector.sampling_hz", sampling_hz, many),
+            ],
+        );
+        let window = self.estimator.window_samples;
+        let window_m = (window as f64 - 1.0) * spacing_m;
+        let why = format!("so that the record, {samples} samples, holds estimator.window_samples, {window}");
+        // Rounded to the side that is accepted.
+        let up = |x: f64| (x * 1e3).ceil() / 1e3;
+        let down = |x: f64| (x * 1e3).floor() / 1e3;
+        let window_side = (
+            "estimator.window_samples",
+            window.to_string(),
+            format!("at most {samples}, the samples recorded from scan.range_min_m to scan.range_max_m"),
+        );
+        let faster_hz = sampling_hz * (window_m / (last_m - first_m)) * (1.0 + 1e-6);
+        c.between(
+            window <= samples,
+            &[
+                window_side,
+                side("scan.range_max_m", last_m, format!("at least {} m, {why}", up(first_m + window_m))),
+                side("scan.range_min_m", first_m, format!("at most {} m, {why}", down(last_m - window_m))),
+                side("detector.sampling_hz", sampling_hz, format!("at least {faster_hz:.6e} Hz, {why}")),
+            ],
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::SceneFile;
+    use std::path::Path;
+
+    fn message(text: &str) -> String {
+        SceneFile::parse(text, Path::new("s.toml")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_limit_between_keys_blames_the_one_that_the_file_states() {
+        for (text, wanted) in [
+            (
+                "[estimator]\nwindow_samples = 65536\n",
+                "s.toml:2: estimator.window_samples = 65536 is not allowed: at most estimator.padded_samples, 1024",
+            ),
+            (
+                "[detector]\nsampling_hz = 100e6\n",
+                "s.toml:2: detector.sampling_hz = 100e6 is not allowed: above 2.1e8 Hz",
+            ),
+            ("[detector]\nbandwidth_hz = 95e6\n", "detector.bandwidth_hz = 95e6 is not allowed: below 9e7 Hz"),
+            ("[scan]\nrange_max_m = 300\n", "s.toml:2: scan.range_max_m = 300 is not allowed: at least 317.774 m"),
+            ("[pulse]\nduration_s = 1.2e-6\n", "s.toml:2: pulse.duration_s = 1.2e-6 is not allowed: below 8.36"),
+            ("[flow]\nspacing_m = 3\n", "flow.spacing_m = 3 is not allowed: above twice flow.core_radius_m, 4.7 m"),
+            (
+                "[telescope]\naperture_radius_m = 0.01\nobscuration_radius_m = 0.02\n",
+                "telescope.obscuration_radius_m = 0.02",
+            ),
+            (
+                "[scan]\nelevation_min_rad = 0.5\n",
+                "scan.elevation_min_rad = 0.5 is not allowed: at most scan.elevation_max_rad",
+            ),
+            ("[outputs]\nprofile_range_min_m = 4000\n", "outputs.profile_range_min_m = 4000 is not allowed: below"),
+            (
+                "[estimator]\nmethod = \"capon\"\nwindow_samples = 10\n",
+                "estimator.window_samples = 10 is not allowed: above estimator.order, 16",
+            ),
+        ] {
+            let m = message(text);
+            assert!(m.contains(wanted), "{m}");
+        }
+    }
+
+    #[test]
+    fn what_a_limit_names_is_accepted() {
+        let good = |text: &str| SceneFile::parse(text, Path::new("s.toml")).map(|_| ()).map_err(|e| e.to_string());
+        assert_eq!(good("[pulse]\nduration_s = 8.36e-7\n"), Ok(()));
+        assert_eq!(good("[scan]\nrange_max_m = 317.774\n"), Ok(()));
+        assert_eq!(good("[scan]\nrange_min_m = 482.226\n"), Ok(()));
+        assert_eq!(good("[detector]\nsampling_hz = 210000001\n"), Ok(()));
+    }
+
+    /// A default beside a changed key is not what the user wrote: nobody looks for it in the file.
+    #[test]
+    fn no_single_change_of_a_number_is_blamed_on_a_default() {
+        let defaults = toml::Table::try_from(super::Scene::default()).unwrap();
+        let mut texts = Vec::new();
+        for (section, keys) in defaults.iter().filter_map(|(name, value)| Some((name, value.as_table()?))) {
+            for (key, value) in keys {
+                let values: Vec<String> = match value {
+                    toml::Value::Float(x) => {
+                        let factors = [-1.0, 1e-9, 1e-4, 0.01, 0.1, 0.5, 2.0, 5.0, 20.0, 1e3, 1e6, 1e12];
+                        factors.iter().map(|f| format!("{:?}", x * f)).chain(["nan".into(), "inf".into()]).collect()
+                    }
+                    toml::Value::Integer(_) => {
+                        ["0", "1", "3", "100", "5000", "70000", "2000000"].map(String::from).into()
+                    }
+                    toml::Value::Boolean(_) => vec!["true".into(), "false".into()],
+                    _ => continue,
+                };
+                for value in values {
+                    texts.push((format!("{section}.{key}"), format!("[{section}]\n{key} = {value}\n")));
+                }
+            }
+        }
+        let mut refused = 0;
+        for (key, text) in texts {
+            let Err(error) = SceneFile::parse(&text, Path::new("s.toml")) else { continue };
+            refused += 1;
+            for line in error.to_string().lines() {
+                assert!(line.starts_with(&format!("s.toml:2: {key} = ")), "{text}{line}");
+            }
+        }
+        assert!(refused > 150, "{refused}");
+    }
+}

@@ -1,0 +1,178 @@
+//! Keys that a scene states and that nothing reads, because another key chose a method that has no use for them.
+//!
+//! They are refused, so that nobody turns a knob that turns nothing. Keys that stand in the file of `wakescope init` may stay
+//! there with their default.
+
+use super::{Method, OuterScaleWavenumber, PulseShape, RefractiveTurbulence, RegionRadius, Scene};
+use super::{Problem, ScreenSampling, SpectrumKind, Turbulence};
+use crate::keys::Document;
+
+/// A key without use.
+struct Idle {
+    key: &'static str,
+    /// What the key is for, and what the scene has instead.
+    purpose: String,
+    /// Whether even its default is refused.
+    even_default: bool,
+}
+
+/// Keys that belong to methods, each with these methods.
+const OF_METHODS: [(&str, &[Method]); 7] = [
+    ("estimator.order", &[Method::Autoregressive, Method::AutoregressivePole, Method::Capon]),
+    ("estimator.order_choice", &[Method::Autoregressive, Method::AutoregressivePole, Method::Capon]),
+    ("estimator.lag_window_lags", &[Method::LagWindow]),
+    ("estimator.moment_reach", &[Method::FirstMoment]),
+    ("estimator.likelihood_snr_db", &[Method::Likelihood, Method::GradientLikelihood]),
+    ("estimator.gradient_max_per_s", &[Method::GradientLikelihood]),
+    ("estimator.gradients", &[Method::GradientLikelihood]),
+];
+
+/// Keys of a scene without use.
+fn idle(scene: &Scene) -> Vec<Idle> {
+    let method = name(&scene.estimator.method);
+    let mut found: Vec<Idle> = OF_METHODS
+        .iter()
+        .filter(|(_, methods)| !methods.contains(&scene.estimator.method))
+        .map(|(key, methods)| {
+            let needed: Vec<String> = methods.iter().map(name).collect();
+            let needed = needed.join(" or ");
+            let purpose = format!("this key is for estimator.method = {needed}, and estimator.method is {method}");
+            Idle { key, purpose, even_default: true }
+        })
+        .collect();
+    let mut unused = |is_idle: bool, keys: &[&'static str], purpose: String| {
+        if is_idle {
+            let idle = |key: &&'static str| Idle { key, purpose: purpose.clone(), even_default: false };
+            found.extend(keys.iter().map(idle));
+        }
+    };
+    let without_peak = matches!(scene.estimator.method, Method::PulsePair | Method::FirstMoment);
+    unused(without_peak, &["estimator.refinement"], format!("estimator.method = {method} refines no peak"));
+    let without_spectrum = scene.estimator.method == Method::PulsePair;
+    unused(without_spectrum, &["estimator.padded_samples"], format!("estimator.method = {method} has no spectrum"));
+    let without_region = scene.estimator.method == Method::Periodogram;
+    unused(without_region, &["estimator.radius_m"], format!("estimator.method = {method} has no region"));
+    let own_radius = !without_region && scene.estimator.radius != RegionRadius::Fixed {};
+    unused(own_radius, &["estimator.radius_m"], "this key is for estimator.radius.kind = \"fixed\"".into());
+    let sampled = matches!(scene.pulse.shape, PulseShape::Sampled(_));
+    let purpose = "a pulse with pulse.shape.kind = \"sampled\" has the duration of its samples";
+    unused(sampled, &["pulse.duration_s", "pulse.definition"], purpose.into());
+    let air = ["atmosphere.backscatter_per_m_sr", "atmosphere.extinction_per_m"];
+    unused(scene.atmosphere.profile.is_some(), &air, "atmosphere.profile takes its place".into());
+    if let Turbulence::Refractive(turbulence) = &scene.atmosphere.turbulence {
+        of_turbulence(turbulence, unused);
+    }
+    found
+}
+
+fn of_turbulence(turbulence: &RefractiveTurbulence, mut unused: impl FnMut(bool, &[&'static str], String)) {
+    const SCREENS: [&str; 3] =
+        ["atmosphere.turbulence.grid_points", "atmosphere.turbulence.grid_spacing_m", "atmosphere.turbulence.layers"];
+    const OUTER: [&str; 2] = ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.outer_scale_wavenumber"];
+    let derived = turbulence.sampling == ScreenSampling::Derived;
+    unused(derived, &SCREENS, "this key is for atmosphere.turbulence.sampling = \"explicit\"".into());
+    let spectrum = name(&turbulence.spectrum);
+    let without_inner = turbulence.spectrum == SpectrumKind::Kolmogorov;
+    let without_outer = without_inner || turbulence.spectrum == SpectrumKind::Tatarskii;
+    let purpose = |scale| format!("atmosphere.turbulence.spectrum = {spectrum} has no {scale} scale");
+    unused(without_inner, &["atmosphere.turbulence.inner_scale_m"], purpose("inner"));
+    unused(without_outer, &OUTER, purpose("outer"));
+    // A spectrum without outer scale has no wave number of it.
+    let endless = !without_outer && turbulence.outer_scale_m == f64::INFINITY;
+    let unset = turbulence.outer_scale_wavenumber == OuterScaleWavenumber::Inverse;
+    unused(endless && !unset, &OUTER[1..], "atmosphere.turbulence.outer_scale_m = inf is no outer scale".into());
+}
+
+/// A variant as the file writes it.
+fn name(variant: &impl serde::Serialize) -> String {
+    toml::Value::try_from(variant).map(|value| value.to_string()).unwrap_or_default()
+}
+
+/// What a text states in vain.
+pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
+    let idle: Vec<Idle> = idle(scene).into_iter().filter(|idle| document.line(idle.key).is_some()).collect();
+    if idle.is_empty() {
+        return Vec::new();
+    }
+    let mut usual = Scene::default();
+    usual.atmosphere.turbulence = Turbulence::Refractive(RefractiveTurbulence::default());
+    let value = |scene: &Scene, key: &str| {
+        let whole = toml::Value::try_from(scene).ok()?;
+        key.split('.').try_fold(whole, |table, name| table.get(name).cloned())
+    };
+    idle.into_iter()
+        .filter(|idle| idle.even_default || value(scene, idle.key) != value(&usual, idle.key))
+        .map(|idle| {
+            let value = value(scene, idle.key).map(|value| value.to_string()).unwrap_or_default();
+            Problem { key: idle.key.into(), value, allowed: format!("{}: take the line out", idle.purpose) }
+        })
+        .collect()
+}
+
+/// The text of a scene without the keys that it has no use for.
+pub(super) fn without_idle(scene: &Scene, toml: &str) -> String {
+    let idle = idle(scene);
+    let mut section = String::new();
+    let mut out = String::with_capacity(toml.len());
+    for line in toml.lines() {
+        if let Some(name) = line.strip_prefix('[') {
+            section = name.trim_end_matches(']').to_owned();
+        }
+        let key = line.split_once(" = ").map(|(key, _)| crate::keys::join(&section, key));
+        if !key.is_some_and(|key| idle.iter().any(|idle| idle.key == key)) {
+            out += line;
+            out.push('\n');
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::SceneFile;
+    use std::path::Path;
+
+    fn parse(text: &str) -> Result<SceneFile, String> {
+        SceneFile::parse(text, Path::new("s.toml")).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_key_of_another_method_is_refused_and_says_what_it_is_for() {
+        assert_eq!(
+            parse("[estimator]\nmethod = \"periodogram\"\norder = 8\n").unwrap_err(),
+            "s.toml:3: estimator.order = 8 is not allowed: this key is for estimator.method = \"autoregressive\" or \
+             \"autoregressive_pole\" or \"capon\", and estimator.method is \"periodogram\": take the line out"
+        );
+        for (text, key) in [
+            ("[estimator]\norder = 16\n", "estimator.order = 16"),
+            ("[estimator]\nmethod = \"capon\"\nmoment_reach = 2.0\n", "estimator.moment_reach = 2.0"),
+            ("[estimator]\nlikelihood_snr_db = 3\n", "estimator.likelihood_snr_db = 3"),
+            ("[estimator]\nmethod = \"periodogram\"\nradius_m = 5.0\n", "estimator.radius_m = 5.0"),
+            ("[estimator]\nmethod = \"pulse_pair\"\nrefinement = \"none\"\n", "estimator.refinement = \"none\""),
+            (
+                "[atmosphere]\nextinction_per_m = 1e-3\nprofile = { range_m = [0.0], backscatter_per_m_sr = [1e-7], \
+                 extinction_per_m = [1e-4] }\n",
+                "atmosphere.extinction_per_m = 1e-3",
+            ),
+            (
+                "[atmosphere.turbulence]\nkind = \"refractive\"\nsampling = \"derived\"\nlayers = 20\n",
+                "atmosphere.turbulence.layers = 20",
+            ),
+        ] {
+            let message = parse(text).unwrap_err();
+            assert!(message.contains(&format!("{key} is not allowed: ")), "{message}");
+        }
+    }
+
+    #[test]
+    fn what_the_first_scene_states_may_stay_and_written_scenes_read_again() {
+        for method in ["periodogram", "pulse_pair", "first_moment"] {
+            let text = super::super::TABLE2_TOML.replace("\"periodogram_accumulation\"", &format!("\"{method}\""));
+            let file = parse(&text).unwrap();
+            assert_eq!(parse(&file.toml).unwrap().toml, file.toml);
+        }
+        let fitted = parse("[estimator]\nmethod = \"capon\"\norder = 8\n").unwrap();
+        assert!(fitted.toml.contains("\norder = 8\n") && !fitted.toml.contains("gradients"), "{}", fitted.toml);
+        assert_eq!(parse(&fitted.toml).unwrap().scene, fitted.scene);
+    }
+}
