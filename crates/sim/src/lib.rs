@@ -53,6 +53,8 @@ pub mod join;
 mod keys;
 pub mod map;
 #[cfg(feature = "netcdf")]
+mod netcdf_header;
+#[cfg(feature = "netcdf")]
 mod netcdf_input;
 pub mod plan;
 mod plane;

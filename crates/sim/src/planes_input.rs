@@ -1,14 +1,13 @@
 //! Cross-planes of a simulated flow, read back from the files that `wakescope flow` writes.
 //!
 //! A file has the variables `v` and `w` in m/s over (`tau`, `z`, `y`), the coordinates of the same names, and `time`; attributes
-//! `edges` of `y` and `z` say what lies beyond their ends. Check: what was written comes back; files that lack something are
-//! refused by name.
+//! `edges` of `y` and `z` say what lies beyond their ends. Files of others may have `time` in place of `tau`, and any order.
+//! Check: what was written comes back; files that lack something are refused by name.
 
 use crate::Error;
 use crate::export::{CrossPlanes, OPEN_EDGES, edges};
-use crate::netcdf_input::{floats, open};
+use crate::netcdf_input::{ClassicFile, TIME, Y, Z, open};
 use ndarray::Array3;
-use netcdf3::FileReader;
 use std::path::{Path, PathBuf};
 use wakescope_les::Edges;
 
@@ -44,40 +43,71 @@ pub(crate) fn files(planes: &Path) -> Result<Vec<PathBuf>, Error> {
 /// A file that cannot be read, lacks a variable, or has values that are missing.
 pub(crate) fn read(path: &Path) -> Result<CrossPlanes, Error> {
     let mut file = open(path)?;
-    let read = planes(&mut file).map_err(|reason| Error::Input { path: path.to_owned(), reason })?;
-    Ok(read)
+    planes(&mut file).map_err(|reason| file.refuse(reason))
 }
 
-fn planes(file: &mut FileReader) -> Result<CrossPlanes, String> {
-    let [tau, z_m, y_m] = ["tau", "z", "y"].map(|name| floats(file, name));
-    let (tau, z_m, y_m) = (tau?, z_m?, y_m?);
-    let time_s = floats(file, "time")?;
+fn planes(file: &mut ClassicFile) -> Result<CrossPlanes, String> {
+    let dims = file.roles("v", [TIME, Z, Y])?;
+    let others = file.roles("w", [TIME, Z, Y])?;
+    if dims != others {
+        return Err("v and w have not the same dimensions".into());
+    }
+    let [time, z, y] = &dims;
+    let (z_m, y_m) = (file.coordinate(z)?, file.coordinate(y)?);
+    let [tau, time_s] = times(file, time)?;
+    for (name, values) in [("tau", &tau), ("time", &time_s), ("z", &z_m), ("y", &y_m)] {
+        let increases = values.windows(2).all(|pair| pair[1] > pair[0]) && values.iter().all(|v| v.is_finite());
+        if !increases || values.is_empty() {
+            return Err(format!("{name} must have at least one value, be finite and increase from value to value"));
+        }
+    }
     let shape = (tau.len(), z_m.len(), y_m.len());
     let mut component = |name: &str| -> Result<Array3<f64>, String> {
-        let dims = file.data_set().get_var(name).map(netcdf3::Variable::dim_names).unwrap_or_default();
-        if dims != ["tau", "z", "y"] {
-            return Err(format!("{name} has the dimensions {dims:?}: (tau, z, y) are needed"));
-        }
-        let values = floats(file, name)?;
-        let fill = f64::from(crate::export::FILL);
-        if let Some(place) = values.iter().position(|v| !v.is_finite() || *v == fill) {
+        let values = file.ordered(name, &dims)?;
+        if let Some(place) = values.iter().position(|v| !v.is_finite()) {
             return Err(format!("{name} is missing or not finite at place {place}"));
         }
-        Array3::from_shape_vec(shape, values).map_err(|e| format!("{name}: {e}"))
+        Array3::from_shape_vec(shape, values).map_err(|_| format!("{name} has not the lengths of its coordinates"))
     };
     let (v_m_s, w_m_s) = (component("v")?, component("w")?);
-    let (y_edges, z_edges) = (ends(file, "y")?, ends(file, "z")?);
+    let (y_edges, z_edges) = (ends(file, y)?, ends(file, z)?);
     let planes = CrossPlanes { title: String::new(), tau, time_s, y_m, z_m, v_m_s, w_m_s, y_edges, z_edges };
     planes.check().map_err(|e| e.to_string())?;
     Ok(planes)
 }
 
+/// Ages and times \[s\] of the planes: each from the variable of its name, or else from the coordinate of the planes.
+fn times(file: &mut ClassicFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
+    let count = file.coordinate(dim)?.len();
+    let is_age = ["tau", "age"].contains(&dim.to_ascii_lowercase().as_str());
+    let mut values = |name: &str| -> Result<Vec<f64>, String> {
+        if name == "time" && is_age && !file.has(name) {
+            return Err("it has no variable time, the times of the planes in s".into());
+        }
+        let source = if file.has(name) { name } else { dim };
+        if name == "time" {
+            in_seconds(file, source)?;
+        }
+        let values = file.floats(source)?;
+        if values.len() == count { Ok(values) } else { Err(format!("{name} has not one value for each plane")) }
+    };
+    Ok([values("tau")?, values("time")?])
+}
+
+/// Times have no unit, or seconds.
+fn in_seconds(file: &ClassicFile, name: &str) -> Result<(), String> {
+    let unit = file.text(name, "units").and_then(|units| units.split_whitespace().next());
+    match unit {
+        None | Some("s" | "sec" | "secs" | "second" | "seconds" | "1") => Ok(()),
+        Some(_) => Err("time is not in seconds: its attribute units must be s, or begin with seconds".into()),
+    }
+}
+
 /// The ends of an axis; open if the file does not say.
-fn ends(file: &FileReader, axis: &str) -> Result<Edges, String> {
-    match file.data_set().get_var_attr_as_string(axis, "edges") {
-        Some(text) => edges::from_text(&text).ok_or_else(|| {
-            format!("attribute edges = \"{text}\" of {axis}: must be as `wakescope flow` writes it, or be taken out")
-        }),
+fn ends(file: &ClassicFile, axis: &str) -> Result<Edges, String> {
+    match file.text(axis, "edges") {
+        Some(text) => edges::from_text(text)
+            .ok_or_else(|| "an attribute edges must be as `wakescope flow` writes it, or be taken out".to_owned()),
         None => Ok(OPEN_EDGES),
     }
 }
@@ -127,7 +157,7 @@ mod tests {
         assert!(message.contains("plane1_0001.nc"), "{message}");
         std::fs::write(folder.path().join("other.nc"), b"no such file").unwrap();
         let message = read(&folder.path().join("other.nc")).unwrap_err().to_string();
-        assert!(message.contains("no classic NetCDF"), "{message}");
+        assert!(message.contains("no NetCDF file"), "{message}");
     }
 
     #[test]

@@ -49,8 +49,6 @@ pub(crate) use error::same_length;
 pub use error::{OutputError, OutputResult};
 pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
-#[cfg(feature = "netcdf")]
-pub(crate) use netcdf::FILL;
 pub use provenance::Provenance;
 
 #[cfg(test)]

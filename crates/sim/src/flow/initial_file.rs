@@ -1,13 +1,13 @@
 //! An initial field from a classic NetCDF file, on axes of its own.
 //!
-//! The file has variables `u`, `v`, `w` in m/s, each over three dimensions, slowest first along z, y, x, with a coordinate
-//! variable for each dimension in metres. Along each direction the values are brought to the faces or centres of the mesh by
+//! The file has variables `u`, `v`, `w` in m/s, each over three dimensions with a coordinate variable in metres for each; they
+//! are found by their names or the attribute `axis`, or else are taken to be z, y, x, the last fastest. Along each direction the values are brought to the faces or centres of the mesh by
 //! the cubic through the four nearest nodes, which gives a value at its own node back exactly; periodic directions wrap.
 //!
 //! Check: a field written by a run reads back to the same values; a smooth field on another mesh with fourth order.
 
 use crate::Error;
-use crate::netcdf_input::{floats, open};
+use crate::netcdf_input::{ClassicFile, X, Y, Z, open};
 use std::path::Path;
 use wakescope_les::{Direction, Ends, Mesh};
 
@@ -19,41 +19,48 @@ type Taps = Vec<(usize, f64)>;
 /// # Errors
 /// A file that cannot be read, without the variables, or that does not cover the mesh.
 pub(super) fn read(path: &Path, mesh: &Mesh) -> Result<[Vec<f64>; 3], Error> {
-    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
     let mut file = open(path)?;
-    let mut component = |axis: usize| -> Result<Vec<f64>, String> {
-        let name = ["u", "v", "w"][axis];
-        let dims = match file.data_set().get_var(name) {
-            Some(variable) => variable.dim_names(),
-            None => return Err(format!("it has no variable {name}: u, v and w are needed")),
-        };
-        let [z, y, x] = &dims[..] else {
-            return Err(format!("{name} has the dimensions {dims:?}: three are needed, along z, y, x"));
-        };
-        let mut values = floats(&mut file, name)?;
-        let mut shape = [0; 3];
-        // x is the fastest: direction 0 is the last dimension.
-        for (direction, dim) in [x, y, z].into_iter().enumerate() {
-            let coordinate_m = floats(&mut file, dim)?;
-            shape[direction] = coordinate_m.len();
-            let target_m = if direction == axis { mesh.face_m(direction) } else { mesh.centre_m(direction) };
-            let along = &mesh.directions()[direction];
-            let taps = taps(&coordinate_m, &target_m[..along.cells], along).map_err(|e| format!("{dim}: {e}"))?;
-            let count: usize = values.len() / coordinate_m.len().max(1);
-            let inner = shape[..direction].iter().product();
-            if count * coordinate_m.len() != values.len() {
-                return Err(format!("{name} is not of the size of its dimensions"));
-            }
-            values = apply(&taps, &values, inner, coordinate_m.len());
-            shape[direction] = along.cells;
+    let mut component = |axis: usize| velocity(&mut file, mesh, axis).map_err(|reason| file.refuse(reason));
+    Ok([component(0)?, component(1)?, component(2)?])
+}
+
+/// One component, brought to the faces of the mesh.
+fn velocity(file: &mut ClassicFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, String> {
+    let name = ["u", "v", "w"][axis];
+    let dims = axes(file, name)?;
+    let mut values = file.ordered(name, &dims)?;
+    let mut shape = [0; 3];
+    // x is the fastest: direction 0 is the last dimension.
+    for (direction, dim) in dims.iter().rev().enumerate() {
+        let coordinate_m = file.coordinate(dim)?;
+        shape[direction] = coordinate_m.len();
+        let target_m = if direction == axis { mesh.face_m(direction) } else { mesh.centre_m(direction) };
+        let along = &mesh.directions()[direction];
+        let letter = ["x", "y", "z"][direction];
+        let taps =
+            taps(&coordinate_m, &target_m[..along.cells], along).map_err(|e| format!("{letter} of {name}: {e}"))?;
+        let count: usize = values.len() / coordinate_m.len().max(1);
+        let inner = shape[..direction].iter().product();
+        if count * coordinate_m.len() != values.len() {
+            return Err(format!("{name} is not of the size of its dimensions"));
         }
-        match values.iter().position(|v| !v.is_finite()) {
-            Some(place) => Err(format!("{name} is missing or not finite at the mesh's face {place}")),
-            None => Ok(values),
-        }
-    };
-    let mut read = |axis| component(axis).map_err(refuse);
-    Ok([read(0)?, read(1)?, read(2)?])
+        values = apply(&taps, &values, inner, coordinate_m.len());
+        shape[direction] = along.cells;
+    }
+    match values.iter().position(|v| !v.is_finite()) {
+        Some(place) => Err(format!("{name} is missing or not finite at the mesh's face {place}")),
+        None => Ok(values),
+    }
+}
+
+/// The dimensions of a component along z, y, x: by what they are for, or three of any name in this order.
+fn axes(file: &ClassicFile, name: &str) -> Result<[String; 3], String> {
+    file.roles(name, [Z, Y, X]).or_else(|reason| {
+        let dims: Vec<String> = file.dims(name).unwrap_or_default().into_iter().map(str::to_owned).collect();
+        let letters = |dim: &String| ["x", "y", "z", "X", "Y", "Z"].iter().any(|letter| dim.starts_with(letter));
+        // Names that say something else must not be taken for what they are not.
+        if dims.iter().any(letters) { Err(reason) } else { dims.try_into().map_err(|_| reason) }
+    })
 }
 
 /// Sums along one direction: `[slower][n][inner]` becomes `[slower][taps][inner]`.

@@ -4,7 +4,7 @@
 
 use crate::Error;
 use crate::export::CrossPlanes;
-use crate::netcdf_input::{floats, open};
+use crate::netcdf_input::{TIME, X, Y, Z, open};
 use crate::planes_input;
 use std::path::Path;
 
@@ -26,18 +26,16 @@ pub struct FieldInSpace {
 pub fn read_field(path: &Path, variable: &str) -> Result<FieldInSpace, Error> {
     let mut file = open(path)?;
     let mut read = || -> Result<FieldInSpace, String> {
-        let dims = file.data_set().get_var(variable).map(netcdf3::Variable::dim_names).unwrap_or_default();
-        let [time, z, y, x] = &dims[..] else {
-            return Err(format!("{variable} has the dimensions {dims:?}: (time, z, y, x) are needed"));
-        };
-        let times_s = floats(&mut file, time)?;
+        let dims = file.roles(variable, [TIME, Z, Y, X])?;
+        let [time, z, y, x] = &dims;
+        let times_s = file.coordinate(time)?;
         let [time_s] = times_s[..] else {
             return Err(format!("{} times: one is needed", times_s.len()));
         };
-        let axis_m = [floats(&mut file, x)?, floats(&mut file, y)?, floats(&mut file, z)?];
-        Ok(FieldInSpace { time_s, axis_m, values: floats(&mut file, variable)? })
+        let axis_m = [file.coordinate(x)?, file.coordinate(y)?, file.coordinate(z)?];
+        Ok(FieldInSpace { time_s, axis_m, values: file.ordered(variable, &dims)? })
     };
-    read().map_err(|reason| Error::Input { path: path.to_owned(), reason })
+    read().map_err(|reason| file.refuse(reason))
 }
 
 /// The cross-planes that a name stands for: a file, or all files `name_0001.nc`, ..., in their order.
