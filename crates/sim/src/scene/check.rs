@@ -62,6 +62,7 @@ impl Scene {
         self.check_scan(&mut c);
         check_estimator(self, &mut c);
         self.check_outputs(&mut c);
+        self.check_site(&mut c);
         // Limits between keys make sense only once each key does.
         if c.0.is_empty() {
             self.check_between(&mut c);
@@ -186,22 +187,10 @@ impl Scene {
         }
     }
 
-    fn check_outputs(&self, c: &mut Checker) {
-        let o = &self.outputs;
-        c.within("outputs.profile_range_min_m", o.profile_range_min_m, 1.0, 1e6, "m");
-        c.within("outputs.profile_range_max_m", o.profile_range_max_m, 1.0, 1e6, "m");
-        c.require(
-            o.profile_range_max_m > o.profile_range_min_m,
-            "outputs.profile_range_max_m",
-            o.profile_range_max_m,
-            format!("above outputs.profile_range_min_m, {} m", o.profile_range_min_m),
-        );
-        c.count("outputs.profile_points", o.profile_points, 2, 100_000);
-        let any = o.csv || o.netcdf || o.svg || o.png;
-        c.require(any, "outputs.csv", o.csv, "true, or else one of netcdf, svg and png: nothing would be written");
-    }
-
     fn check_between(&self, c: &mut Checker) {
+        if self.outputs.hpl {
+            self.check_hpl(c);
+        }
         let d = &self.detector;
         let half = 0.5 * d.bandwidth_hz;
         let nyquist_hz = 0.5 * d.sampling_hz;
