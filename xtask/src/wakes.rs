@@ -62,7 +62,12 @@ impl Wake {
         let (CaseKind::Wake(flow), Some(output)) = (file.case.case.clone(), &file.case.wake) else {
             return Err(Failure::new(format!("{}: the case is no wake", folder.display())));
         };
-        let columns = table(&text(&folder.join("wake.csv"))?)?;
+        let mut columns = table(&text(&folder.join("wake.csv"))?)?;
+        let scaled = folder.join("wake_scaled.csv");
+        // Runs of earlier versions have all columns in one file.
+        if scaled.exists() {
+            columns.extend(table(&text(&scaled)?)?);
+        }
         let wake =
             Self { folder, flow: *flow, case_toml: file.toml.clone(), fields_tau: output.fields_tau.clone(), columns };
         let reached = wake.column("tau")?.last().copied().unwrap_or(0.0);

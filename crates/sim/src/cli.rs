@@ -8,6 +8,7 @@ mod flow;
 mod progress;
 mod wake;
 
+use crate::export::Existing;
 use crate::plan::{Plan, Target};
 use crate::progress::{Observer, Silent};
 use crate::scene::{SceneFile, TABLE2_TOML};
@@ -57,7 +58,7 @@ enum Command {
     Run(Io),
     /// Heterodyne efficiency and signal-to-noise ratio against range.
     Efficiency(Io),
-    /// The raw signals of one realisation of the scan.
+    /// The raw signals of one realisation of the scan, or of all.
     Signal(Io),
     /// The radial-velocity map with its errors.
     Map(Io),
@@ -76,6 +77,9 @@ struct Io {
     /// Folder to write to; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Replace files in the folder that this program did not write, or that were changed since.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 /// Runs the program with the words of the command line; returns its exit code.
@@ -135,7 +139,9 @@ fn check(path: &Path, cli: &Cli) -> Result<(), Error> {
 fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     let plan = Plan::new(load(&io.scene, cli)?, target)?;
     // An output that cannot be used is found before the computing, not after it.
-    write::prepare(&io.out)?;
+    let existing = if io.overwrite { Existing::Any } else { Existing::Own };
+    let names = write::names(&plan);
+    write::prepare(&io.out, names.iter().map(String::as_str), existing)?;
     let outcome = if cli.quiet {
         with_threads(cli, || run::run(&plan, &Silent))??
     } else {
@@ -143,7 +149,7 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
         let bars = progress::Bars::new();
         with_threads(cli, || run::run(&plan, &bars as &dyn Observer))??
     };
-    let files = write::write(&plan, &outcome, &io.out)?;
+    let files = write::write(&plan, &outcome, &io.out, existing)?;
     let summary = outcome.summary();
     let mut text: Vec<String> = summary.iter().map(|line| format!("{:<44} {}", line.text, shown(line.value))).collect();
     text.push(format!("wrote {} files to {}", files.len(), io.out.display()));

@@ -26,6 +26,8 @@ pub struct VelocityEstimates {
     pub v_pulse_m_s: Array2<f64>,
     /// The same weighted with pulse and window.
     pub v_gate_m_s: Array2<f64>,
+    /// Estimate of the first realisation, m/s; NaN where there is no true velocity, as in the mean.
+    pub v_scan_m_s: Array2<f64>,
     /// Mean estimate over the realisations, m/s.
     pub v_mean_m_s: Array2<f64>,
     /// Mean error against `v_pulse_m_s`, m/s.
@@ -98,6 +100,7 @@ pub(crate) struct Mapper<S> {
     /// Probability that noise passes for a signal, and independent frequencies of the band.
     detection: Option<(f64, f64)>,
     truth: Truth,
+    first_m_s: Array2<f64>,
     errors: ErrorMap<ndarray::Ix2>,
     figures: Figures,
     level: Array2<f64>,
@@ -142,6 +145,7 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
             radius,
             detection: scene.estimator.false_alarm.map(|rate| (rate, cells)),
             truth: truth(plan, scanner)?,
+            first_m_s: Array2::from_elem(shape, f64::NAN),
             errors: ErrorMap::new(ndarray::Dim(shape)),
             figures: Figures::new(shape),
             level: Array2::zeros(shape),
@@ -173,6 +177,10 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
         let columns = self.shape.1;
         let velocity = Array2::from_shape_fn(self.shape, |(i, j)| map[i * columns + j].estimate.velocity_m_s);
         self.errors.add(velocity.view(), self.truth.pulse_m_s.view())?;
+        if self.realisations == 0 {
+            let known = |estimate: &f64, truth: &f64| if truth.is_nan() { f64::NAN } else { *estimate };
+            self.first_m_s = ndarray::Zip::from(&velocity).and(&self.truth.pulse_m_s).map_collect(known);
+        }
         for (index, point) in map.iter().enumerate() {
             let place = (index / columns, index % columns);
             let is_flagged = match self.detection {
@@ -199,6 +207,7 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
         VelocityEstimates {
             elevation_rad: plan.geometry.elevation_rad.clone(),
             range_m: plan.geometry.gate_range_m.clone(),
+            v_scan_m_s: self.first_m_s,
             v_mean_m_s: &self.truth.pulse_m_s + &bias_m_s,
             bias_m_s,
             std_m_s: statistics.mapv(|s| s.std_m_s),
@@ -240,19 +249,19 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     Ok(truth)
 }
 
-/// Runs the estimates of all realisations.
+/// Runs the estimates of all realisations; `keep` is given the records that the files will have.
 pub(crate) fn estimate<S: Sample + wakescope_signal::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
-    mut first_records: impl FnMut(&Array2<S>),
+    mut keep: impl FnMut(&Array2<S>),
 ) -> Result<VelocityEstimates, Error> {
     let mut mapper = Mapper::new(plan, scanner)?;
     observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
     for realisation in 0..plan.realisations() {
         let (records, clipped) = scanner.samples(realisation, observer)?;
-        if realisation == 0 {
-            first_records(&records);
+        if realisation < plan.kept_realisations() {
+            keep(&records);
         }
         mapper.add(&records, clipped)?;
     }

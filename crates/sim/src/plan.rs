@@ -6,7 +6,7 @@
 
 use crate::Error;
 use crate::geometry::Geometry;
-use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, SceneFile, Weighting};
+use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, SceneFile, SignalsOf, Weighting};
 use crate::wind::SceneWind;
 use std::fmt;
 
@@ -19,7 +19,7 @@ pub enum Target {
     Run,
     /// Heterodyne efficiency and signal-to-noise ratio against range.
     Efficiency,
-    /// The raw signals of the first realisation.
+    /// The raw signals.
     Signal,
     /// The radial-velocity map with its errors.
     Map,
@@ -123,7 +123,9 @@ impl Plan {
         let mut warnings = warnings(&scene.scene, &wind);
         let optics = optics::stages(&scene.scene, target, &geometry, &mut warnings)?;
         let stages = stages(&scene.scene, target, &geometry, &wind.source, optics);
-        Ok(Self { scene, target, stages, geometry, wind, warnings })
+        let plan = Self { scene, target, stages, geometry, wind, warnings };
+        crate::write::check(&plan)?;
+        Ok(plan)
     }
 
     /// Whether a stage runs.
@@ -131,7 +133,16 @@ impl Plan {
         self.stages.iter().any(|s| s.stage == stage && s.cost.is_some())
     }
 
-    /// Whether the raw signals of the first realisation are kept for the files.
+    /// Realisations whose raw signals are kept for the files.
+    pub fn kept_realisations(&self) -> usize {
+        match (self.keeps_signals(), self.scene.scene.outputs.signals_of) {
+            (false, _) => 0,
+            (true, SignalsOf::First) => 1,
+            (true, SignalsOf::All) => self.scene.scene.scan.realisations,
+        }
+    }
+
+    /// Whether raw signals are kept for the files.
     pub fn keeps_signals(&self) -> bool {
         match self.target {
             Target::Signal => true,
@@ -140,9 +151,9 @@ impl Plan {
         }
     }
 
-    /// Realisations to run: the raw signals alone need one.
+    /// Realisations to run: the raw signals alone need those that are kept.
     pub fn realisations(&self) -> usize {
-        if self.runs(Stage::Estimates) { self.scene.scene.scan.realisations } else { 1 }
+        if self.runs(Stage::Estimates) { self.scene.scene.scan.realisations } else { self.kept_realisations() }
     }
 }
 
@@ -157,7 +168,11 @@ fn stages(scene: &Scene, target: Target, g: &Geometry, wind: &str, optics: [Plan
     let lines = g.elevation_rad.len();
     let signals = target != Target::Efficiency;
     let maps = matches!(target, Target::Run | Target::Map);
-    let realisations = if maps { scene.scan.realisations } else { 1 };
+    let keeps = target == Target::Signal || (target == Target::Run && scene.outputs.signals);
+    let keeps_all = keeps && scene.outputs.signals_of == SignalsOf::All;
+    let realisations = if maps || keeps_all { scene.scan.realisations } else { 1 };
+    // Those that are worked on, and those that wait for the files.
+    let held = if keeps_all { 1 + realisations } else { 1 + usize::from(keeps) };
     let records = (lines * scene.scan.pulses_per_line) as f64;
     let samples = g.samples as f64;
     let layers = (lines * g.layers) as f64;
@@ -184,7 +199,7 @@ fn stages(scene: &Scene, target: Target, g: &Geometry, wind: &str, optics: [Plan
         let reason =
             format!("{realisations} x {records} records of {} samples, {} layers each", g.samples, g.layers_per_sample);
         let terms = realisations as f64 * records * samples * g.layers_per_sample as f64;
-        run(Stage::Signals, reason, terms * LAYER_SAMPLE_S, records * samples * 8.0)
+        run(Stage::Signals, reason, terms * LAYER_SAMPLE_S, held as f64 * records * samples * 8.0)
     } else {
         skip(Stage::Signals, "not asked for")
     });

@@ -20,10 +20,12 @@ pub struct RunResult {
     pub profile: Option<RangeProfile>,
     /// Wind on a cross-plane.
     pub plane: Option<CrossPlanes>,
-    /// Raw signals of the first realisation \[pulse, sample\], A.
+    /// Raw signals \[pulse, sample\], A; one realisation after the other.
     pub signals_a: Option<Array2<f64>>,
-    /// Its second quadrature, if the receiver delivers two.
+    /// Their second quadrature, if the receiver delivers two.
     pub quadrature_a: Option<Array2<f64>>,
+    /// True radial velocity of the layers of each line \[line, layer\], m/s, where there are signals.
+    pub line_velocity_m_s: Option<Array2<f64>>,
     /// The velocity map with its errors.
     pub map: Option<VelocityEstimates>,
 }
@@ -70,27 +72,51 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     Ok(result)
 }
 
-/// Signals of the first realisation and the map, as the plan has them; `parts` takes records apart for the files.
+/// Current and second quadrature of one realisation.
+type Parts = (Array2<f64>, Option<Array2<f64>>);
+
+/// Signals and the map, as the plan has them; `parts` takes records apart for the files.
 fn signals_and_map<S: Sample + wakescope_signal::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
     result: &mut RunResult,
-    parts: impl Fn(&Array2<S>) -> (Array2<f64>, Option<Array2<f64>>),
+    parts: impl Fn(&Array2<S>) -> Parts,
 ) -> Result<(), Error> {
-    let mut first = None;
+    let mut kept: Vec<Parts> = Vec::new();
     if plan.runs(Stage::Estimates) {
-        let keep = plan.keeps_signals();
-        result.map = Some(map::estimate(plan, scanner, observer, |records| first = keep.then(|| parts(records)))?);
+        result.map = Some(map::estimate(plan, scanner, observer, |records| kept.push(parts(records)))?);
     } else {
-        observer.begin(Stage::Signals, plan.geometry.elevation_rad.len() as u64);
-        first = Some(parts(&scanner.samples(0, observer)?.0));
+        let steps = (plan.realisations() * plan.geometry.elevation_rad.len()) as u64;
+        observer.begin(Stage::Signals, steps);
+        for realisation in 0..plan.realisations() {
+            kept.push(parts(&scanner.samples(realisation, observer)?.0));
+        }
         observer.end();
     }
-    if let Some((in_phase, quadrature)) = first {
-        (result.signals_a, result.quadrature_a) = (Some(in_phase), quadrature);
+    if !kept.is_empty() {
+        let (current, quadrature): (Vec<_>, Vec<_>) = kept.into_iter().unzip();
+        let quadrature: Option<Vec<Array2<f64>>> = quadrature.into_iter().collect();
+        result.signals_a = Some(joined(&current));
+        result.quadrature_a = quadrature.map(|parts| joined(&parts));
+        result.line_velocity_m_s = Some(line_velocities(scanner));
     }
     Ok(())
+}
+
+/// Arrays of equal rows below each other.
+fn joined(parts: &[Array2<f64>]) -> Array2<f64> {
+    let columns = parts.first().map_or(0, Array2::ncols);
+    let mut out = Array2::zeros((parts.iter().map(Array2::nrows).sum(), columns));
+    let all = parts.iter().flat_map(|part| part.outer_iter());
+    out.outer_iter_mut().zip(all).for_each(|(mut row, from)| row.assign(&from));
+    out
+}
+
+fn line_velocities(scanner: &Scanner<'_>) -> Array2<f64> {
+    let lines = scanner.lines();
+    let layers = lines.first().map_or(0, |line| line.radial_velocity_m_s.len());
+    Array2::from_shape_fn((lines.len(), layers), |(i, l)| lines[i].radial_velocity_m_s[l])
 }
 
 impl RunResult {

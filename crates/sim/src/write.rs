@@ -1,19 +1,33 @@
 //! Writes what a run gives: all files of a run appear together, or none.
 
-use crate::Error;
-use crate::export::signals::RawSignals;
-use crate::export::{Field, FileGroup, Provenance, PulseInfo, Ray, Sweep, Table, Unit, VelocityMap, tables};
-use crate::map::VelocityEstimates;
-use crate::plan::Plan;
+mod limits;
+mod map;
+#[cfg(feature = "plots")]
+mod pictures;
+
+pub use limits::check;
+pub use map::velocity_map;
+
+use crate::export::own::refuse_foreign;
+use crate::export::signals::{LineVelocities, RawSignals, Recording};
+use crate::export::{Existing, FileGroup, Provenance, Table, hpl, tables};
+use crate::plan::{Plan, Stage, Target};
 use crate::profile::RangeProfile;
 use crate::run::RunResult;
+use crate::scene::{DetectorSignal, NoiseKind};
+use crate::{Error, join};
 use std::path::{Path, PathBuf};
 
-/// Finds out, before any computing, whether files can be written to a folder; leaves no trace.
+/// The table of the HALO file has its name.
+const HALO: &str = "halo.hpl";
+
+/// Finds out, before any computing, whether files of these names can be written to a folder; leaves no trace.
 ///
 /// # Errors
-/// The folder cannot be made, is a file, or cannot be written to.
-pub fn prepare(folder: &Path) -> Result<(), Error> {
+/// The folder cannot be made, is a file, or cannot be written to; a folder is in the way of a file, or a file that this
+/// program did not write and may not replace.
+pub fn prepare<'a>(folder: &Path, names: impl IntoIterator<Item = &'a str>, existing: Existing) -> Result<(), Error> {
+    refuse_foreign(folder, names, existing)?;
     let io = |action, source| Error::Io { action, path: folder.to_owned(), source };
     let missing: Vec<&Path> =
         folder.ancestors().filter(|p| !p.as_os_str().is_empty()).take_while(|p| !p.exists()).collect();
@@ -29,12 +43,38 @@ pub fn prepare(folder: &Path) -> Result<(), Error> {
     tried
 }
 
+/// Names of the files that a plan will write.
+pub fn names(plan: &Plan) -> Vec<String> {
+    let o = &plan.scene.scene.outputs;
+    let mut out = vec!["scene.toml".to_owned()];
+    let mut add = |stem: &str, kinds: &[(bool, &str)]| {
+        out.extend(kinds.iter().filter(|kind| kind.0).map(|kind| format!("{stem}.{}", kind.1)));
+    };
+    let (netcdf, plots) = (o.netcdf && cfg!(feature = "netcdf"), cfg!(feature = "plots"));
+    let pictures = [(o.svg && plots, "svg"), (o.png && plots, "png")];
+    if matches!(plan.target, Target::Run | Target::Efficiency) {
+        add("profile", &[(o.csv, "csv"), pictures[0], pictures[1]]);
+    }
+    if plan.runs(Stage::CrossPlane) {
+        add("flow", &[(o.csv, "csv"), (netcdf, "nc")]);
+    }
+    if plan.keeps_signals() {
+        add("signals", &[(o.csv, "csv"), (netcdf, "nc")]);
+    }
+    if plan.runs(Stage::Estimates) {
+        add("map", &[(o.csv, "csv"), (netcdf, "nc"), pictures[0], pictures[1]]);
+        add("halo", &[(o.hpl, "hpl"), (o.hpl && o.csv, "csv")]);
+    }
+    out
+}
+
 /// Writes the results that the plan's scene asks for; returns the paths of the files.
 ///
 /// # Errors
-/// A result that a format cannot hold, or what the system says. Nothing is left half-written.
-pub fn write(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let outputs = plan.scene.scene.outputs;
+/// A result that a format cannot hold, a file in the way that may not be replaced, or what the system says. Nothing is
+/// left half-written.
+pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+    let outputs = &plan.scene.scene.outputs;
     let origin = provenance(plan);
     let mut files = FileGroup::new(folder);
     files.add("scene.toml", scene_text(&origin))?;
@@ -43,7 +83,7 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Vec<PathB
             files.add("profile.csv", profile_table(profile).to_csv(&origin)?)?;
         }
         #[cfg(feature = "plots")]
-        pictures::add(&mut files, plan, "profile", &pictures::profile(profile), &origin)?;
+        pictures::add(&mut files, plan, "profile", &pictures::profile(plan, profile), &origin)?;
     }
     if let Some(plane) = &result.plane {
         if outputs.csv {
@@ -54,8 +94,7 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Vec<PathB
             files.add("flow.nc", crate::export::cf_planes::cf_planes_bytes(plane, &origin)?)?;
         }
     }
-    if let Some(current_a) = &result.signals_a {
-        let signals = raw_signals(plan, current_a.clone(), result.quadrature_a.clone());
+    if let Some(signals) = raw_signals(plan, result) {
         if outputs.csv {
             files.add("signals.csv", signals.table()?.to_csv(&origin)?)?;
         }
@@ -73,9 +112,18 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Vec<PathB
         if outputs.netcdf {
             files.add("map.nc", crate::export::cfradial::cfradial_bytes(&map, &origin)?)?;
         }
+        if outputs.hpl {
+            files.add(HALO, hpl::hpl_bytes(&map, 0, HALO, &origin)?)?;
+            if outputs.csv {
+                files.add("halo.csv", hpl::hpl_table(&map, 0)?.to_csv(&origin)?)?;
+            }
+        }
         #[cfg(feature = "plots")]
         pictures::add_map(&mut files, plan, &map, &origin)?;
     }
+    // Again: a file may have come while the run computed.
+    let names: Vec<String> = files.names().map(str::to_owned).collect();
+    refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
     Ok(files.commit()?)
 }
 
@@ -112,155 +160,46 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
     })
 }
 
-/// The raw signals of a plan's first realisation.
-fn raw_signals(plan: &Plan, current_a: ndarray::Array2<f64>, quadrature_a: Option<ndarray::Array2<f64>>) -> RawSignals {
+/// The raw signals of a run, with what makes them readable.
+fn raw_signals(plan: &Plan, result: &RunResult) -> Option<RawSignals> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let pulses = scene.scan.pulses_per_line;
     let first_s = 2.0 * g.first_range_m / crate::SPEED_OF_LIGHT_M_S;
-    RawSignals {
-        current_a,
-        quadrature_a,
+    let first_pulse_s = plan.wind.start_s;
+    let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
+    Some(RawSignals {
+        recording: recording(plan),
+        truth: LineVelocities {
+            range_m: g.layer_range_m().collect(),
+            radial_velocity_m_s: result.line_velocity_m_s.clone()?,
+        },
+        pulse_time_s: (0..g.elevation_rad.len() * pulses).map(|i| first_pulse_s + i as f64 * prt_s).collect(),
+        current_a: result.signals_a.clone()?,
+        quadrature_a: result.quadrature_a.clone(),
         elevation_rad: g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect(),
         time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
         pulses_per_line: pulses,
-    }
+    })
 }
 
-/// The map of a run in the form that files and pictures take.
-pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
-    let (scene, g) = (&plan.scene.scene, &plan.geometry);
-    let azimuth_rad = scene.scan.azimuth_rad;
-    let start_s = plan.wind.start_s;
-    let away = |what: &str| format!("{what}, positive away from the lidar");
-    let speed = |name: &str, text: String, values: &ndarray::Array2<f64>| {
-        Field::float(name, Unit::MetrePerSecond, &text, values.clone())
+fn recording(plan: &Plan) -> Recording {
+    let scene = &plan.scene.scene;
+    let (d, receiver) = (&scene.detector, join::receiver(scene));
+    let is_baseband = d.signal == DetectorSignal::Baseband;
+    // (13) in the band; white noise goes to half the sampling frequency, and to both sides of zero in two quadratures.
+    let noise_band_hz = match d.noise {
+        NoiseKind::None => 0.0,
+        NoiseKind::Band => d.bandwidth_hz,
+        NoiseKind::White if is_baseband => d.sampling_hz,
+        NoiseKind::White => 0.5 * d.sampling_hz,
     };
-    let number =
-        |name: &str, text: &str, values: &ndarray::Array2<f64>| Field::float(name, Unit::One, text, values.clone());
-    VelocityMap {
-        title: "Radial velocity of a wake-vortex scan".into(),
-        rays: (0..g.elevation_rad.len())
-            .map(|i| Ray {
-                sweep: 0,
-                time_s: start_s + g.line_time_s[i],
-                elevation_rad: g.elevation_rad[i],
-                azimuth_rad,
-            })
-            .collect(),
-        range_m: e.range_m.clone(),
-        sweeps: vec![Sweep { tau: plan.wind.tau, azimuth_rad }],
-        pulse: PulseInfo {
-            prt_s: 1.0 / scene.laser.pulse_repetition_hz,
-            pulse_width_s: scene.pulse.duration_s,
-            nyquist_velocity_m_s: 0.25 * scene.laser.wavelength_m * scene.detector.sampling_hz,
-            samples: scene.scan.pulses_per_line as u32,
-            frequency_hz: crate::SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m,
-        },
-        fields: vec![
-            speed("v_exact", away("radial velocity of the air at the gate's centre"), &e.v_exact_m_s),
-            speed("v_pulse", away("radial velocity weighted with the pulse"), &e.v_pulse_m_s),
-            speed("v_gate", away("radial velocity weighted with pulse and window"), &e.v_gate_m_s),
-            speed("radial_velocity", away("mean estimated radial velocity"), &e.v_mean_m_s),
-            speed("velocity_standard_deviation", "standard deviation of one estimate".into(), &e.std_m_s),
-            speed("rms", "root mean square error against v_pulse".into(), &e.rms_m_s),
-            number("level", "windows accumulated for one estimate", &e.level),
-            number("n_eff", "independent windows that these are worth", &e.n_eff),
-            speed("bias", "mean error against v_pulse".into(), &e.bias_m_s),
-            speed("standard_error", "standard error of the root mean square error".into(), &e.standard_error_m_s),
-            number("flagged", "fraction of the realisations whose estimate was flagged", &e.flagged),
-            number("count", "realisations with a velocity", &e.count),
-            speed("width", "mean spectral width beyond that of the window".into(), &e.width_m_s),
-            Field::float(
-                "signal_to_noise_ratio",
-                Unit::Decibel,
-                "signal-to-noise ratio in the detector band that the spectra show",
-                e.snr_db.clone(),
-            ),
-            number("quality", "density of the peak over the mean density in the band", &e.quality),
-        ],
-        lidar_y_m: 0.0,
-        lidar_height_m: scene.scan.lidar_height_m,
-    }
-}
-
-/// The pictures of a run.
-#[cfg(feature = "plots")]
-mod pictures {
-    use super::{Error, FileGroup, Plan, Provenance, RangeProfile, VelocityMap};
-    use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
-    use crate::scene::Flow;
-    use wakescope_optics::EfficiencyProfile;
-
-    /// Adds a figure in the formats that the scene asks for.
-    pub(super) fn add(
-        files: &mut FileGroup,
-        plan: &Plan,
-        name: &str,
-        figure: &Figure,
-        origin: &Provenance,
-    ) -> Result<(), Error> {
-        let outputs = plan.scene.scene.outputs;
-        if outputs.svg {
-            files.add(&format!("{name}.svg"), figure.svg(origin)?)?;
-        }
-        if outputs.png {
-            files.add(&format!("{name}.png"), figure.png(origin)?)?;
-        }
-        Ok(())
-    }
-
-    /// Signal-to-noise ratio and efficiency against range, with the standard error as a band.
-    pub(super) fn profile(profile: &RangeProfile) -> Figure {
-        let e = &profile.efficiency;
-        let range = || Axis::linear("range [m]");
-        let points = |y: &[f64]| e.range_m.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
-        let curve = |label: &str, style: Style, profile: &EfficiencyProfile| {
-            let series = Series::new(label, style, points(&profile.mean));
-            match profile.standard_error.iter().any(|&error| error > 0.0) {
-                true => series.with_band(&profile.standard_error),
-                false => series,
-            }
-        };
-        let mut efficiency = CurvePlot::new("System efficiency", range(), Axis::linear("efficiency"));
-        if profile.others.is_empty() {
-            efficiency = efficiency.with(curve("", Style::Line, e));
-        }
-        let styles = [Style::Line, Style::Dash, Style::DashDot, Style::Dot];
-        for ((name, other), style) in profile.others.iter().zip(styles) {
-            efficiency = efficiency.with(curve(&name.replace("efficiency_", "").replace('_', " "), style, other));
-        }
-        Figure::side_by_side([
-            CurvePlot::new("Signal-to-noise ratio", range(), Axis::linear("SNR [dB]")).with(Series::new(
-                "",
-                Style::Line,
-                points(&profile.snr_db),
-            )),
-            efficiency,
-        ])
-    }
-
-    /// The map of the estimates, and that of their errors, each over the truth where it helps.
-    pub(super) fn add_map(
-        files: &mut FileGroup,
-        plan: &Plan,
-        map: &VelocityMap,
-        origin: &Provenance,
-    ) -> Result<(), Error> {
-        let centres_m = match &plan.scene.scene.flow {
-            Flow::VortexPair(pair) => {
-                let c = crate::join::vortex_pair(pair).centres(plan.wind.start_s);
-                vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
-            }
-            _ => Vec::new(),
-        };
-        let panel = |field: &str, title: &str, label: &str| -> Result<MapPlot, Error> {
-            let mut plot = MapPlot::new(map, 0, field)?.titled(title).labelled(label);
-            plot.points_m.clone_from(&centres_m);
-            Ok(plot)
-        };
-        let truth = panel("v_pulse", "Radial velocity weighted with the pulse", "v_pulse [m/s]")?;
-        let estimate = panel("radial_velocity", "Mean estimated radial velocity", "v [m/s]")?.coloured(truth.colours);
-        let error = panel("rms", "Root mean square error", "rms [m/s]")?;
-        add(files, plan, "map", &Figure::stacked([truth, estimate, error]), origin)
+    Recording {
+        sampling_hz: d.sampling_hz,
+        intermediate_frequency_hz: if is_baseband { 0.0 } else { d.intermediate_frequency_hz },
+        bandwidth_hz: d.bandwidth_hz,
+        wavelength_m: scene.laser.wavelength_m,
+        pulse_repetition_hz: scene.laser.pulse_repetition_hz,
+        pulse_sigma_s: scene.pulse_sigma_s(),
+        noise_power_a2: receiver.noise_density_a2_hz() * noise_band_hz,
     }
 }

@@ -155,6 +155,71 @@ fn a_written_scene_runs_again_to_the_same_files() {
 }
 
 #[test]
+fn files_of_others_are_not_replaced_unless_asked_for() {
+    let temp = tempfile::tempdir().unwrap();
+    let (folder, out) = (temp.path(), temp.path().join("o"));
+    std::fs::write(folder.join("s.toml"), SMALL).unwrap();
+    let run = |words: &[&str]| wakescope(folder, &[&["run", "s.toml", "--out", "o", "--quiet"], words].concat());
+    assert!(run(&[]).status.success());
+    assert!(run(&[]).status.success(), "its own files are replaced");
+    let measured = "# my own measurement\nrange_m,v_m_s\n1,2\n";
+    for (name, foreign) in [("map.csv", measured), ("scene.toml", SMALL), ("map.png", "not a picture")] {
+        let own = std::fs::read(out.join(name)).unwrap();
+        std::fs::write(out.join(name), foreign).unwrap();
+        let refused = run(&[]);
+        assert_eq!(refused.status.code(), Some(2), "{name}");
+        let message = String::from_utf8(refused.stderr).unwrap();
+        assert!(message.contains(name) && message.contains("--overwrite"), "{message}");
+        assert_eq!(std::fs::read_to_string(out.join(name)).unwrap(), foreign, "untouched");
+        assert!(run(&["--overwrite"]).status.success());
+        assert_eq!(std::fs::read(out.join(name)).unwrap(), own, "{name}");
+    }
+    // A scene that was edited where the program wrote it is no longer the program's.
+    let edited = std::fs::read_to_string(out.join("scene.toml")).unwrap().replace("seed = 5", "seed = 6");
+    std::fs::write(out.join("scene.toml"), edited).unwrap();
+    assert_eq!(run(&[]).status.code(), Some(2));
+    // A folder in the way is found before the computing, and no option removes it.
+    std::fs::remove_file(out.join("map.csv")).unwrap();
+    std::fs::create_dir(out.join("map.csv")).unwrap();
+    let blocked = run(&["--overwrite"]);
+    assert!(String::from_utf8_lossy(&blocked.stderr).contains("a folder of that name"), "{blocked:?}");
+    std::fs::write(folder.join("bound.csv"), measured).unwrap();
+    let bound = wakescope(folder, &["bound", "s.toml", "--out", "bound.csv"]);
+    assert_eq!(bound.status.code(), Some(2));
+    // The case file itself, in the folder of the run.
+    let case = "# mine\n[case]\nkind = \"taylor_green_plane\"\ncells = 8\n[time]\nend_s = 0.01\n";
+    std::fs::write(folder.join("case.toml"), case).unwrap();
+    let flow = wakescope(folder, &["flow", "case.toml", "--out", ".", "--quiet"]);
+    assert_eq!(flow.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&flow.stderr).contains("case.toml"), "{flow:?}");
+    assert_eq!(std::fs::read_to_string(folder.join("case.toml")).unwrap(), case);
+}
+
+#[test]
+fn the_files_of_a_run_are_those_that_it_announces() {
+    use wakescope_sim::plan::{Plan, Target};
+    let temp = tempfile::tempdir().unwrap();
+    let all =
+        SMALL.replace("[outputs]", "[estimator]\ngate_step_samples = 64\n[outputs]\nhpl = true\nsignals_of = \"all\"");
+    let all = all.replace("range_min_m = 330.0", "range_min_m = 345.3609").replace("430.0", "480.0");
+    std::fs::write(temp.path().join("s.toml"), &all).unwrap();
+    for (word, target) in [("run", Target::Run), ("map", Target::Map), ("signal", Target::Signal)] {
+        let out = wakescope(temp.path(), &[word, "s.toml", "--out", word, "--quiet"]);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let file = wakescope_sim::scene::SceneFile::read(&temp.path().join("s.toml")).unwrap();
+        let mut announced = wakescope_sim::write::names(&Plan::new(file, target).unwrap());
+        announced.sort();
+        assert_eq!(names(&temp.path().join(word)), announced, "{word}");
+    }
+    // Nine lines of two pulses, three times; the table has the first pulses of the first.
+    let length = |word: &str| std::fs::metadata(temp.path().join(word).join("signals.nc")).unwrap().len();
+    let samples = 225;
+    assert!(length("run") > 9 * 2 * 3 * samples * 8, "{}", length("run"));
+    let (run, signal) = ("run/signals.nc", "signal/signals.nc");
+    assert_eq!(std::fs::read(temp.path().join(run)).unwrap(), std::fs::read(temp.path().join(signal)).unwrap());
+}
+
+#[test]
 fn extreme_scenes_run_to_the_end() {
     let nothing_returns = "[atmosphere]\nbackscatter_per_m_sr = 0.0\n";
     let short_pulse = "[pulse]\nduration_s = 1e-9\n";

@@ -3,7 +3,7 @@
 
 use ndarray::{Array2, Array3};
 use wakescope_sim::export::{
-    CrossPlanes, Field, FieldKind, OPEN_EDGES, Provenance, PulseInfo, Ray, Sweep, Unit, VelocityMap,
+    CrossPlanes, Field, FieldKind, OPEN_EDGES, Provenance, PulseInfo, Ray, Site, Sweep, Unit, VelocityMap,
 };
 
 /// Origin written into the sample files.
@@ -54,6 +54,7 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         fields: Vec::new(),
         lidar_y_m: -400.0,
         lidar_height_m: 2.0,
+        site: Site::default(),
     };
     let exact = Array2::from_shape_fn((map.rays.len(), gates), |(r, g)| {
         let (v, w) = wind(map.y_m(r, g), map.z_m(r, g), map.sweeps[map.rays[r].sweep].tau);
@@ -80,6 +81,8 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
             unit: Unit::One,
             long_name: "quality of the estimate".into(),
             standard_name: None,
+            cell_methods: None,
+            ancillary: Vec::new(),
             values: flag,
             kind: FieldKind::Flag { meanings: vec![(0, "good".into()), (1, "missing".into())] },
         },

@@ -1,12 +1,14 @@
 //! `wakescope bound`: the Cramer-Rao bound for a scene.
 
 use super::{Cli, load, say, with_threads};
+use crate::export::Existing;
+use crate::export::own::refuse_foreign;
 use crate::plan::{Plan, Target};
 use crate::progress::Silent;
 use crate::{Error, bound, write};
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Words of `wakescope bound`.
 #[derive(Debug, Args)]
@@ -16,10 +18,18 @@ pub(super) struct BoundWords {
     /// File for the whole table, as CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Replace the file although this program did not write it, or it was changed since.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
     let plan = Plan::new(load(&words.scene, cli)?, Target::Map)?;
+    if let Some(path) = &words.out {
+        let existing = if words.overwrite { Existing::Any } else { Existing::Own };
+        let name = path.file_name().and_then(|name| name.to_str());
+        refuse_foreign(path.parent().unwrap_or(Path::new("")), name, existing)?;
+    }
     let found = with_threads(cli, || bound::bound(&plan, &Silent))??;
     let mut text = found.text();
     if let Some(path) = &words.out {

@@ -28,10 +28,10 @@ pub fn cf_field_bytes(field: &VelocityField, provenance: &Provenance) -> OutputR
         axis("z", &["z"], &field.z_m, "height of the cell centre above the ground").text("positive", "up"),
         axis("y", &["y"], &field.y_m, "position of the cell centre across the flight direction"),
         axis("x", &["x"], &field.x_m, "position of the cell centre along the flight direction"),
-        data("u", u, "m s-1", "wind along the flight direction"),
-        data("v", v, "m s-1", "horizontal wind across the flight direction"),
+        data("u", u, "m s-1", "wind along the flight direction").text("standard_name", "x_wind"),
+        data("v", v, "m s-1", "horizontal wind across the flight direction").text("standard_name", "y_wind"),
         data("w", w, "m s-1", "vertical wind").text("standard_name", "upward_air_velocity"),
-        data("pressure", &field.pressure_m2_s2, "m2 s-2", "pressure over density, up to a constant"),
+        data("pressure_m2_s2", &field.pressure_m2_s2, "m2 s-2", "pressure over density, up to a constant"),
     ];
     if let Some(vorticity) = &field.vorticity_per_s {
         variables.push(data("vorticity_magnitude", vorticity, "s-1", "magnitude of the vorticity"));
@@ -80,6 +80,7 @@ pub fn cf_faces_bytes(faces: &FaceVelocities, provenance: &Provenance) -> Output
     }
     for (d, (name, values)) in ["u", "v", "w"].into_iter().zip(&faces.velocity_m_s).enumerate() {
         let variable = Variable::new(name, DIMS[d], Data::F64(values.clone()))
+            .text("standard_name", ["x_wind", "y_wind", "upward_air_velocity"][d])
             .text("long_name", ["wind along the flight direction", "horizontal wind across it", "vertical wind"][d])
             .text("units", "m s-1");
         variables.push(variable);

@@ -36,7 +36,7 @@ pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputR
             .text("axis", "Y"),
         // Not "seconds since": the run has no date.
         axis("time", &["tau"], &planes.time_s).text("long_name", "time since the start of the flow").text("units", "s"),
-        wind("v", &planes.v_m_s, "horizontal wind across the flight direction"),
+        wind("v", &planes.v_m_s, "horizontal wind across the flight direction").text("standard_name", "y_wind"),
         wind("w", &planes.w_m_s, "vertical wind").text("standard_name", "upward_air_velocity"),
     ];
     let layout = Layout {

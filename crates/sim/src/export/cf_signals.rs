@@ -1,8 +1,9 @@
-//! Raw heterodyne signals as CF NetCDF (classic): the current over (pulse, time after the pulse).
-//! Check: the tests read the bytes back and compare values and axes.
+//! Raw heterodyne signals as CF NetCDF (classic): the current over (pulse, time after the pulse), with what an estimator
+//! must know of the recording, and the true velocities that its results are to be held against.
+//! Check: the tests read the bytes back and compare values, axes and units.
 
 use super::error::OutputResult;
-use super::netcdf::{Data, Layout, Variable};
+use super::netcdf::{Attr, Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
 use super::signals::RawSignals;
 
@@ -13,27 +14,153 @@ use super::signals::RawSignals;
 pub fn cf_signals_bytes(signals: &RawSignals, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     signals.check()?;
     let (rays, samples) = signals.current_a.dim();
-    let ray_numbers: Vec<i32> = (0..rays as i32).collect();
     let mut variables = vec![
-        Variable::new("ray", &["ray"], Data::I32(ray_numbers))
-            .text("long_name", "number of the pulse")
-            .text("units", "1"),
-        Variable::new("time", &["time"], Data::F64(signals.time_s.clone()))
-            .text("long_name", "time after the middle of the pulse left the telescope")
-            .text("units", "s"),
-        Variable::new("elevation", &["ray"], Data::F64(signals.elevation_rad.clone()))
-            .text("long_name", "elevation of the line of sight above the horizon")
-            .text("units", "rad"),
-        Variable::new("current_a", &["ray", "time"], Data::F64(signals.current_a.iter().copied().collect()))
-            .text("long_name", "heterodyne current of the detector")
-            .text("units", "A"),
+        variable("time", &["time"], Data::F64(signals.time_s.clone()), "s")
+            .text("long_name", "time after the middle of the pulse left the telescope"),
     ];
+    variables.extend(of_rays(signals, rays));
+    variables.push(current("current_a", signals.current_a.iter(), "heterodyne current of the detector"));
     if let Some(quadrature) = &signals.quadrature_a {
-        let values = Data::F64(quadrature.iter().copied().collect());
         let text = "second quadrature of the baseband signal; the first is current_a";
-        variables
-            .push(Variable::new("quadrature_a", &["ray", "time"], values).text("long_name", text).text("units", "A"));
+        variables.push(current("quadrature_a", quadrature.iter(), text));
     }
-    let globals = vec![("Conventions", "CF-1.10".to_owned()), ("title", "Raw heterodyne signals".to_owned())];
-    Layout { dims: vec![("ray", rays), ("time", samples)], globals, variables }.to_bytes(provenance)
+    variables.extend(recording(signals));
+    variables.extend(truth(signals));
+    let globals = vec![
+        ("Conventions", "CF-1.10".to_owned()),
+        ("title", "Raw heterodyne signals".to_owned()),
+        ("history", format!("written by {}", provenance.program)),
+    ];
+    let (lines, ranges) = signals.truth.radial_velocity_m_s.dim();
+    let dims = vec![("ray", rays), ("time", samples), ("line", lines), ("range", ranges)];
+    Layout { dims, globals, variables }.to_bytes(provenance)
+}
+
+/// Bytes of data that the file has with so many pulses of so many samples, of one or two quadratures, and lines of so many
+/// ranges.
+pub(crate) fn data_bytes([pulses, samples, quadratures]: [f64; 3], [lines, ranges]: [f64; 2]) -> f64 {
+    8.0 * pulses * samples * quadratures + 28.0 * pulses + 4.0 * lines * ranges
+}
+
+fn variable(name: &str, dims: &'static [&'static str], data: Data, units: &str) -> Variable {
+    Variable::new(name, dims, data).text("units", units)
+}
+
+fn current<'a>(name: &str, values: impl Iterator<Item = &'a f64>, long_name: &str) -> Variable {
+    variable(name, &["ray", "time"], Data::F64(values.copied().collect()), "A").text("long_name", long_name)
+}
+
+/// Which line, pulse and realisation each record belongs to.
+fn of_rays(signals: &RawSignals, rays: usize) -> Vec<Variable> {
+    let (scan, per_line) = (signals.elevation_rad.len().max(1), signals.pulses_per_line.max(1));
+    let number = |name: &str, of: &dyn Fn(usize) -> usize, text: &str| {
+        let values = (0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX)).collect();
+        variable(name, &["ray"], Data::I32(values), "1").text("long_name", text)
+    };
+    let value = |name: &str, of: &[f64], units: &str, text: &str| {
+        let values = (0..rays).map(|ray| of[ray % scan]).collect();
+        variable(name, &["ray"], Data::F64(values), units).text("long_name", text)
+    };
+    vec![
+        number("ray", &|ray| ray, "number of the record"),
+        number("ray_line", &|ray| ray % scan / per_line, "line of sight of the pulse, a place along dimension line"),
+        number("ray_pulse", &|ray| ray % scan % per_line, "number of the pulse on its line of sight"),
+        number("realization", &|ray| ray / scan, "number of the repetition of the scan")
+            .text("standard_name", "realization"),
+        value("elevation", &signals.elevation_rad, "rad", "elevation of the line of sight above the horizon"),
+        value("pulse_time", &signals.pulse_time_s, "s", "time of the pulse from the start of the flow"),
+    ]
+}
+
+fn recording(signals: &RawSignals) -> Vec<Variable> {
+    let r = &signals.recording;
+    let scalar = |name: &str, value: f64, units: &str, text: &str| {
+        variable(name, &[], Data::F64(vec![value]), units).text("long_name", text)
+    };
+    vec![
+        scalar("sampling_frequency", r.sampling_hz, "Hz", "sampling frequency"),
+        scalar(
+            "intermediate_frequency",
+            r.intermediate_frequency_hz,
+            "Hz",
+            "frequency of air at rest; a velocity v away from the lidar lowers it by 2 v/wavelength",
+        ),
+        scalar("bandwidth", r.bandwidth_hz, "Hz", "width of the detector band about the intermediate frequency"),
+        scalar("wavelength", r.wavelength_m, "m", "wavelength of the laser")
+            .text("standard_name", "radiation_wavelength"),
+        scalar("pulse_repetition_frequency", r.pulse_repetition_hz, "Hz", "pulses per second"),
+        scalar("pulse_sigma", r.pulse_sigma_s, "s", "half width of the power of the pulse at 1/e of its largest"),
+        scalar(
+            "noise_power",
+            r.noise_power_a2,
+            "A2",
+            "mean square of the shot noise of a sample, both quadratures together",
+        ),
+    ]
+}
+
+fn truth(signals: &RawSignals) -> Vec<Variable> {
+    let pulses = signals.elevation_rad.iter().step_by(signals.pulses_per_line.max(1));
+    vec![
+        variable("range", &["range"], Data::F64(signals.truth.range_m.clone()), "m")
+            .text("long_name", "range of the true velocities"),
+        variable("line_elevation", &["line"], Data::F64(pulses.copied().collect()), "rad")
+            .text("long_name", "elevation of the line of sight above the horizon"),
+        variable("radial_velocity", &["line", "range"], Data::filled(&signals.truth.radial_velocity_m_s), "m s-1")
+            .text("standard_name", "radial_velocity_of_scatterers_away_from_instrument")
+            .text("long_name", "true radial velocity of the air on the line of sight, positive away from the lidar")
+            .attr("_FillValue", Attr::F32(FILL)),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::provenance::example;
+    use super::super::signals;
+    use super::*;
+    use netcdf3::FileReader;
+
+    fn reopened(signals: &RawSignals) -> (tempfile::TempDir, FileReader) {
+        let temp = tempfile::tempdir().unwrap();
+        let path = temp.path().join("signals.nc");
+        std::fs::write(&path, cf_signals_bytes(signals, &example()).unwrap()).unwrap();
+        let file = FileReader::open(&path).unwrap();
+        (temp, file)
+    }
+
+    #[test]
+    fn all_that_an_estimator_needs_is_in_the_file() {
+        let signals = signals::example();
+        let (_temp, mut file) = reopened(&signals);
+        for (name, value, units) in [
+            ("sampling_frequency", 1e6, "Hz"),
+            ("intermediate_frequency", 8e5, "Hz"),
+            ("bandwidth", 5e5, "Hz"),
+            ("wavelength", 1.5e-6, "m"),
+            ("pulse_repetition_frequency", 400.0, "Hz"),
+            ("pulse_sigma", 1.2e-7, "s"),
+            ("noise_power", 3e-13, "A2"),
+        ] {
+            assert_eq!(file.read_var_f64(name).unwrap(), [value], "{name}");
+            assert_eq!(file.data_set().get_var_attr_as_string(name, "units").as_deref(), Some(units), "{name}");
+        }
+        assert!(file.data_set().get_global_attr_as_string("history").is_some());
+        assert_eq!(file.read_var_f32("radial_velocity").unwrap(), [1.5, -2.5, FILL, 0.5]);
+        assert_eq!(file.read_var_f64("range").unwrap(), [100.0, 130.0]);
+        assert_eq!(file.read_var_f64("line_elevation").unwrap(), [0.0, 0.1]);
+        assert_eq!(file.data_set().get_var("radial_velocity").unwrap().dim_names(), ["line", "range"]);
+    }
+
+    #[test]
+    fn records_know_their_line_pulse_and_realisation() {
+        let signals = signals::example();
+        let (_temp, mut file) = reopened(&signals);
+        assert_eq!(file.read_var_i32("ray_line").unwrap(), [0, 0, 1, 1, 0, 0, 1, 1]);
+        assert_eq!(file.read_var_i32("ray_pulse").unwrap(), [0, 1, 0, 1, 0, 1, 0, 1]);
+        assert_eq!(file.read_var_i32("realization").unwrap(), [0, 0, 0, 0, 1, 1, 1, 1]);
+        let times = file.read_var_f64("pulse_time").unwrap();
+        assert_eq!((times.len(), times[5]), (8, signals.pulse_time_s[1]));
+        let current = file.read_var_f64("current_a").unwrap();
+        assert_eq!(current, signals.current_a.iter().copied().collect::<Vec<_>>());
+    }
 }

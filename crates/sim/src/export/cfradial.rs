@@ -1,6 +1,6 @@
 //! A scanned map as CfRadial 1.4 in classic NetCDF: rays along `time`, gates along `range`, sweeps of mode `rhi`.
 //! Opens in Py-ART (`pyart.io.read_cfradial`), xradar (`open_cfradial1_datatree(f, first_dim="time")`), wradlib, xarray, scipy.
-//! A simulation has no date: ray times count from 2024-01-01T00:00:00Z, the start of the flow.
+//! Ray times count from the start of the flow, whose date is that of the map's site: a synthetic one where none was given.
 //! Check: the tests read the bytes back with an independent reader and hold them to the list that the clients need.
 
 use super::error::{OutputError, OutputResult};
@@ -10,10 +10,8 @@ use super::provenance::Provenance;
 
 /// Length of all text variables; unused bytes are NUL, since blanks stay in the strings of xarray and Py-ART.
 const TEXT: usize = 32;
-/// Synthetic start of the flow.
-const EPOCH: &str = "2024-01-01T00:00:00Z";
-/// Ray times stay within the month of the epoch.
-const MAX_TIME_S: f64 = 31.0 * 86_400.0;
+/// Ray times stay within some thirty years of the start of the flow, which keeps dates in the calendars of the clients.
+pub(crate) const MAX_TIME_S: f64 = 1e9;
 
 /// The file's bytes.
 ///
@@ -21,17 +19,22 @@ const MAX_TIME_S: f64 = 31.0 * 86_400.0;
 /// (its `comment` says so), because no client opens a file without it.
 ///
 /// # Errors
-/// What [`VelocityMap::check`] finds, ray times outside 0 to 31 days, no velocity at all, a result too large for one file.
+/// What [`VelocityMap::check`] finds, ray times beyond 1e9 s, no velocity at all, a result too large for one file.
 pub fn cfradial_bytes(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     layout(map, provenance)?.to_bytes(provenance)
 }
 
+/// Bytes of data of a run's map with so many rays and gates, rounded up: 16 fields, and what each ray has.
+pub(crate) fn data_bytes(rays: f64, gates: f64) -> f64 {
+    64.0 * rays * gates + 64.0 * rays + 4.0 * gates + 4096.0
+}
+
 fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
     map.check()?;
-    let outside = |t: &&f64| !(0.0..MAX_TIME_S).contains(*t);
+    let outside = |t: &&f64| t.abs() > MAX_TIME_S;
     let times: Vec<f64> = map.rays.iter().map(|r| r.time_s).collect();
     if let Some(bad) = times.iter().find(outside) {
-        return Err(OutputError::value("ray time_s", bad, "0 to 31 days"));
+        return Err(OutputError::value("ray time_s", bad, format!("within {MAX_TIME_S:?} s of the start of the flow")));
     }
     let mut variables = axes(map, times);
     variables.extend(site(map));
@@ -60,17 +63,20 @@ fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, Str
         ("references", "CfRadial data file format, version 1.4, NCAR (2016)"),
         (
             "comment",
-            "Simulated measurement: date, latitude and longitude are synthetic; velocity is positive away from the lidar",
+            "Simulated measurement: date, latitude and longitude are those of the scene, or synthetic; velocity is positive away from the lidar",
         ),
         ("instrument_name", "wakescope lidar"),
-        ("site_name", "simulated runway"),
         ("scan_name", "rhi"),
         ("platform_is_mobile", "false"),
         ("n_gates_vary", "false"),
         ("ray_times_increase", "true"),
         ("simulated", "true"),
     ];
-    let made = [("title", map.title.clone()), ("history", format!("written by {}", provenance.program))];
+    let made = [
+        ("title", map.title.clone()),
+        ("site_name", map.site.name.clone()),
+        ("history", format!("written by {}", provenance.program)),
+    ];
     let fixed = fixed.map(|(name, text)| (name, text.to_owned()));
     fixed.into_iter().chain(made).collect()
 }
@@ -86,7 +92,7 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
         Variable::new("time", &["time"], Data::F64(times))
             .text("standard_name", "time")
             .text("long_name", "time since the start of the flow")
-            .text("units", &format!("seconds since {EPOCH}"))
+            .text("units", &format!("seconds since {}", map.site.start))
             .text("calendar", "gregorian"),
         Variable::new("range", &["range"], single(gates))
             .text("standard_name", "projection_range_coordinate")
@@ -111,15 +117,15 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
 
 fn site(map: &VelocityMap) -> Vec<Variable> {
     vec![
-        Variable::new("latitude", &[], Data::F64(vec![0.0]))
+        Variable::new("latitude", &[], Data::F64(vec![map.site.latitude_deg]))
             .text("standard_name", "latitude")
             .text("units", "degrees_north"),
-        Variable::new("longitude", &[], Data::F64(vec![0.0]))
+        Variable::new("longitude", &[], Data::F64(vec![map.site.longitude_deg]))
             .text("standard_name", "longitude")
             .text("units", "degrees_east"),
-        Variable::new("altitude", &[], Data::F64(vec![map.lidar_height_m]))
+        Variable::new("altitude", &[], Data::F64(vec![map.site.altitude_m + map.lidar_height_m]))
             .text("standard_name", "altitude")
-            .text("long_name", "height of the telescope above the ground")
+            .text("long_name", "height of the telescope above the sea")
             .text("units", "meters")
             .text("positive", "up"),
     ]
@@ -149,13 +155,14 @@ fn sweeps(map: &VelocityMap) -> Vec<Variable> {
 fn texts(map: &VelocityMap) -> Vec<Variable> {
     const ONE: &[&str] = &["string_length_32"];
     const EACH: &[&str] = &["sweep", "string_length_32"];
-    let time = |ray: Option<&super::map::Ray>| iso_time(ray.map_or(0.0, |r| r.time_s));
+    let start = map.site.start;
+    let time = |ray: Option<&super::map::Ray>| start.after_s(ray.map_or(0.0, |r| r.time_s)).to_string();
     let one = |name: &str, text: &str| Variable::new(name, ONE, Data::Char(padded(text)));
     let each = |name: &str, text: &str| Variable::new(name, EACH, Data::Char(padded(text).repeat(map.sweeps.len())));
     vec![
         one("time_coverage_start", &time(map.rays.first())),
         one("time_coverage_end", &time(map.rays.last())),
-        one("time_reference", EPOCH),
+        one("time_reference", &start.to_string()),
         one("platform_type", "fixed"),
         one("instrument_type", "lidar"),
         one("primary_axis", "axis_z"),
@@ -218,6 +225,12 @@ fn field_variable(field: &Field) -> Variable {
     if let Some(name) = &field.standard_name {
         out = out.text("standard_name", name);
     }
+    if let Some(methods) = &field.cell_methods {
+        out = out.text("cell_methods", methods);
+    }
+    if !field.ancillary.is_empty() {
+        out = out.text("ancillary_variables", &field.ancillary.join(" "));
+    }
     match &field.kind {
         FieldKind::Float => out.attr("_FillValue", Attr::F32(FILL)),
         // A fill value would make xarray turn the flags into floats.
@@ -242,13 +255,6 @@ fn padded(text: &str) -> Vec<u8> {
     let mut bytes = text.as_bytes().to_vec();
     bytes.resize(TEXT, 0);
     bytes
-}
-
-/// Date and time of a number of seconds after the epoch, whole seconds, rounded down; within January 2024.
-fn iso_time(time_s: f64) -> String {
-    let s = time_s as u64;
-    let (day, h, m) = (s / 86_400 + 1, s / 3600 % 24, s / 60 % 60);
-    format!("2024-01-{day:02}T{h:02}:{m:02}:{:02}Z", s % 60)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::super::provenance::example;
 use super::super::samples;
+use super::super::site::{Site, UtcTime};
 use super::*;
 use netcdf3::FileReader;
 
@@ -139,11 +140,49 @@ fn a_map_without_estimate_shows_the_gate_velocity() {
 }
 
 #[test]
-fn times_outside_the_synthetic_month_are_refused() {
+fn place_and_date_are_those_of_the_site() {
+    let mut map = samples::map();
+    map.site = Site {
+        name: "Toulouse".into(),
+        latitude_deg: 43.6293,
+        longitude_deg: 1.3638,
+        altitude_m: 151.5,
+        start: UtcTime::parse("2023-12-31T23:59:00Z").unwrap(),
+    };
+    let (_temp, mut file) = reopened(&map);
+    for (name, expected) in [("latitude", 43.6293), ("longitude", 1.3638), ("altitude", 151.5 + map.lidar_height_m)] {
+        assert_eq!(file.read_var_f64(name).unwrap(), [expected]);
+    }
+    let units = file.data_set().get_var_attr_as_string("time", "units").unwrap();
+    assert_eq!(units, "seconds since 2023-12-31T23:59:00Z");
+    assert_eq!(file.data_set().get_global_attr_as_string("site_name").unwrap(), "Toulouse");
+    let first = file.read_var_u8("time_coverage_start").unwrap();
+    assert_eq!(&first[..20], b"2023-12-31T23:59:40Z");
+    let last = file.read_var_u8("time_coverage_end").unwrap();
+    assert_eq!(&last[..20], b"2024-01-01T00:00:22Z");
+}
+
+#[test]
+fn a_time_beyond_every_calendar_is_refused() {
     let mut map = samples::map();
     map.rays[0].time_s = -1.0;
-    assert!(cfradial_bytes(&map, &example()).is_err());
-    assert_eq!(iso_time(90_061.9), "2024-01-02T01:01:01Z");
+    assert!(cfradial_bytes(&map, &example()).is_ok(), "a flow may begin before its time 0");
+    map.rays[0].time_s = -2e9;
+    assert!(matches!(cfradial_bytes(&map, &example()), Err(OutputError::Value { .. })));
+}
+
+#[test]
+fn fields_say_what_they_are_and_which_others_judge_them() {
+    let mut map = samples::map();
+    let velocity = map.fields.iter_mut().find(|f| f.name == "radial_velocity").unwrap();
+    *velocity = velocity.clone().over_realisations("mean").with_ancillary(&["rms", "n_eff"]);
+    let (_temp, file) = reopened(&map);
+    let text = |name: &str, attribute: &str| file.data_set().get_var_attr_as_string(name, attribute);
+    assert_eq!(text("radial_velocity", "ancillary_variables").as_deref(), Some("rms n_eff"));
+    assert_eq!(text("radial_velocity", "cell_methods").as_deref(), Some("realization: mean"));
+    let name = Some("radial_velocity_of_scatterers_away_from_instrument");
+    assert_eq!(text("v_exact", "standard_name").as_deref(), name);
+    assert_eq!(text("level", "standard_name"), None);
 }
 
 #[test]

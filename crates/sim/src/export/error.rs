@@ -63,6 +63,15 @@ pub enum OutputError {
         /// The system's answer.
         source: std::io::Error,
     },
+    /// A file in the way that this program did not write.
+    #[error(
+        "{} was not written by this program, or was changed since: --overwrite replaces it, or choose another --out",
+        path.display()
+    )]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
     /// An encoder (NetCDF, PNG, VTK, NPZ) refused.
     #[error("{format} encoder: {message}")]
     Encode {

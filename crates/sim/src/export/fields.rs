@@ -49,10 +49,10 @@ impl VelocityField {
         let [u, v, w] = &self.velocity_m_s;
         let always: [(&'static str, &[f64]); 4] =
             [("u_m_s", u), ("v_m_s", v), ("w_m_s", w), ("pressure_m2_s2", &self.pressure_m2_s2)];
-        always.into_iter().chain(self.vorticity_per_s.as_deref().map(|values| ("vorticity_per_s", values)))
+        always.into_iter().chain(self.vorticity_per_s.as_deref().map(|values| ("vorticity_magnitude_hz", values)))
     }
 
-    /// The table `time_s, z_m, y_m, x_m, u_m_s, v_m_s, w_m_s, pressure_m2_s2`, and `vorticity_per_s` where
+    /// The table `time_s, z_m, y_m, x_m, u_m_s, v_m_s, w_m_s, pressure_m2_s2`, and `vorticity_magnitude_hz` (1/s) where
     /// it is there, x running fastest.
     ///
     /// # Errors

@@ -1,14 +1,15 @@
 //! One sweep of a map as a HALO Photonics raw file (`.hpl`), which doppy, halo-reader and xradar read. A lossy
 //! export: velocity to 5e-5 m/s, angles to 0.005 degrees, no place for errors or for the scene (the table beside it
-//! has both), and no code for a missing value, which becomes velocity 0 at intensity 1 (no signal). Check: the tests
-//! read the text back line by line.
+//! has both), and no code for a missing value, which becomes velocity 0 at intensity 1 (no signal). A velocity without a
+//! signal-to-noise ratio has intensity 1. Check: the tests read the text back line by line.
 
+use super::csv::Table;
 use super::error::{OutputError, OutputResult};
 use super::map::VelocityMap;
+use super::provenance::Provenance;
+use super::site::DAY_S;
 use crate::SPEED_OF_LIGHT_M_S;
 use std::fmt::Write as _;
-
-const DAY_S: f64 = 86_400.0;
 
 /// The bytes of the file called `file_name` (the header repeats it) with the rays of sweep `sweep`.
 ///
@@ -17,30 +18,16 @@ const DAY_S: f64 = 86_400.0;
 /// # Errors
 /// What [`VelocityMap::check`] finds; no such sweep; no field `radial_velocity` or `signal_to_noise_ratio`; gates
 /// that overlap or leave gaps, or do not start a whole number of gates from the lidar (the format derives the range
-/// from the gate number); a sweep across midnight of the synthetic day.
-pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResult<Vec<u8>> {
+/// from the gate number); a sweep across midnight UTC.
+pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     map.check()?;
-    let bounds = map.sweep_bounds();
-    let &(first, last) =
-        bounds.get(sweep).ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))?;
+    let (first, last) = rays_of(map, sweep)?;
     let (gate_m, before) = gate_grid(&map.range_m)?;
-    let times = (map.rays[first].time_s, map.rays[last].time_s);
-    if times.0 < 0.0 || (times.0 / DAY_S).floor() != (times.1 / DAY_S).floor() {
-        return Err(OutputError::value(
-            "ray time_s",
-            format!("{} to {}", times.0, times.1),
-            "from 0 on, and a sweep within one day",
-        ));
-    }
-    let need = |name: &str| {
-        map.field(name).ok_or_else(|| OutputError::Missing {
-            what: format!("field {name}"),
-            needed: "an .hpl file holds velocity and intensity".into(),
-        })
-    };
-    let velocity = &need("radial_velocity")?.values;
-    let snr_db = &need("signal_to_noise_ratio")?.values;
+    within_a_day(map.rays[first].time_s, map.rays[last].time_s, map.site.start)?;
+    let (velocity, snr_db) = (&need(map, "radial_velocity")?.values, &need(map, "signal_to_noise_ratio")?.values);
     let mut out = header(map, file_name, gate_m, before + map.range_m.len(), (first, last));
+    // The end of the last line is free; readers look at its asterisks only.
+    let _ = write!(out, "**** {}, scene {}\r\n", provenance.program, provenance.scene_hash);
     for ray in first..=last {
         push_ray_line(map, ray, &mut out);
         for gate in 0..before {
@@ -52,6 +39,56 @@ pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResu
         }
     }
     Ok(out.into_bytes())
+}
+
+/// What the file of a sweep holds, as a table: `time_s, elevation_rad, range_m, v_mean_m_s, snr_db, ray`, a row for each
+/// velocity that is there; the ratio is minus infinity where the file has intensity 1.
+///
+/// # Errors
+/// As [`hpl_bytes`].
+pub fn hpl_table(map: &VelocityMap, sweep: usize) -> OutputResult<Table> {
+    map.check()?;
+    let (first, last) = rays_of(map, sweep)?;
+    let (velocity, snr_db) = (&need(map, "radial_velocity")?.values, &need(map, "signal_to_noise_ratio")?.values);
+    let all = (first..=last).flat_map(|ray| (0..map.range_m.len()).map(move |gate| (ray, gate)));
+    let cells: Vec<(usize, usize)> = all.filter(|cell| velocity[*cell].is_finite()).collect();
+    let of_ray = |get: &dyn Fn(usize) -> f64| cells.iter().map(|c| get(c.0)).collect::<Vec<_>>();
+    let ratio = |cell: &(usize, usize)| if snr_db[*cell].is_nan() { f64::NEG_INFINITY } else { snr_db[*cell] };
+    Ok(Table::new()
+        .float("time_s", of_ray(&|ray| map.rays[ray].time_s))
+        .float("elevation_rad", of_ray(&|ray| map.rays[ray].elevation_rad))
+        .float("range_m", cells.iter().map(|c| map.range_m[c.1]))
+        .float("v_mean_m_s", cells.iter().map(|c| velocity[*c]))
+        .float("snr_db", cells.iter().map(ratio))
+        .int("ray", cells.iter().map(|c| (c.0 - first) as i64)))
+}
+
+fn rays_of(map: &VelocityMap, sweep: usize) -> OutputResult<(usize, usize)> {
+    let bounds = map.sweep_bounds();
+    bounds.get(sweep).copied().ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))
+}
+
+fn need<'a>(map: &'a VelocityMap, name: &str) -> OutputResult<&'a super::map::Field> {
+    map.field(name).ok_or_else(|| OutputError::Missing {
+        what: format!("field {name}"),
+        needed: "an .hpl file holds velocity and intensity".into(),
+    })
+}
+
+/// The format counts hours of one day.
+///
+/// # Errors
+/// A sweep that begins on one day and ends on the next, with both times.
+pub fn within_a_day(first_s: f64, last_s: f64, start: super::UtcTime) -> OutputResult<()> {
+    let (first, last) = (start.after_s(first_s), start.after_s(last_s));
+    if first.date() == last.date() {
+        return Ok(());
+    }
+    Err(OutputError::value(
+        "time of the rays",
+        format!("{first} to {last}"),
+        "an .hpl file holds a sweep within one day",
+    ))
 }
 
 /// Gate length in metres, and number of gates between the lidar and the first one.
@@ -85,14 +122,15 @@ fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize
         format!("Filename:\t{name}"),
         "System ID:\t0".into(),
         format!("Number of gates:\t{gates}"),
-        format!("Range gate length (m):\t{gate_m:.4}"),
+        // Readers multiply it with the number of a gate.
+        format!("Range gate length (m):\t{gate_m:.6}"),
         format!("Gate length (pts):\t{points}"),
         format!("Pulses/ray:\t{}", pulse.samples),
         format!("No. of rays in file:\t{}", rays.1 - rays.0 + 1),
         "Scan type:\tRHI".into(),
         // 65535 stands for a collimated beam; readers ask for an integer.
         "Focus range:\t65535".into(),
-        format!("Start time:\t{}", start_time(map.rays[rays.0].time_s)),
+        format!("Start time:\t{}", start_time(map, rays.0)),
         format!("Resolution (m/s):\t{resolution_m_s:.4}"),
         "Range of measurement (center of gate) = (range gate + 0.5) * Gate length".into(),
         "Data line 1: Decimal time (hours)  Azimuth (degrees)  Elevation (degrees) Pitch (degrees) Roll (degrees)"
@@ -100,23 +138,27 @@ fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize
         "f9.6,1x,f6.2,1x,f6.2".into(),
         "Data line 2: Range Gate  Doppler (m/s)  Intensity (SNR + 1)  Beta (m-1 sr-1)".into(),
         "i3,1x,f6.4,1x,f8.6,1x,e12.6 - repeat for no. gates".into(),
-        "****".into(),
     ];
     lines.join("\r\n") + "\r\n"
 }
 
-fn start_time(time_s: f64) -> String {
-    let s = time_s % DAY_S;
+/// Seconds since midnight UTC of a ray.
+fn second_of_day(map: &VelocityMap, ray: usize) -> f64 {
+    (map.site.start.second_of_day() as f64 + map.rays[ray].time_s).rem_euclid(DAY_S)
+}
+
+fn start_time(map: &VelocityMap, ray: usize) -> String {
+    let (year, month, day) = map.site.start.after_s(map.rays[ray].time_s).date();
+    let s = second_of_day(map, ray);
     let (h, m) = ((s / 3600.0) as u32, (s / 60.0) as u32 % 60);
     // Hundredths are cut, not rounded: 59.999 s must not become 60.00.
     let rest = ((s % 60.0) * 100.0).floor() / 100.0;
-    let day = (time_s / DAY_S) as u32 + 1;
-    format!("202401{day:02} {h:02}:{m:02}:{rest:05.2}")
+    format!("{year:04}{month:02}{day:02} {h:02}:{m:02}:{rest:05.2}")
 }
 
 fn push_ray_line(map: &VelocityMap, ray: usize, out: &mut String) {
     let r = &map.rays[ray];
-    let hours = r.time_s % DAY_S / 3600.0;
+    let hours = second_of_day(map, ray) / 3600.0;
     let azimuth = r.azimuth_rad.rem_euclid(std::f64::consts::TAU).to_degrees();
     let elevation = r.elevation_rad.to_degrees();
     // Writing to a String cannot fail.
@@ -124,19 +166,21 @@ fn push_ray_line(map: &VelocityMap, ray: usize, out: &mut String) {
 }
 
 fn push_gate(gate: usize, velocity_m_s: f64, snr_db: f64, out: &mut String) {
-    let missing = velocity_m_s.is_nan() || snr_db.is_nan();
-    let (velocity, intensity) = if missing { (0.0, 1.0) } else { (velocity_m_s, 1.0 + 10_f64.powf(snr_db / 10.0)) };
+    let velocity = if velocity_m_s.is_nan() { 0.0 } else { velocity_m_s };
+    let has_ratio = velocity_m_s.is_finite() && snr_db.is_finite();
+    let intensity = if has_ratio { 1.0 + 10_f64.powf(snr_db / 10.0) } else { 1.0 };
     let backscatter = format!("{:.6E}", 0.0);
     let _ = write!(out, "{gate:3} {velocity:.4} {intensity:.6} {backscatter:>13}\r\n");
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::provenance::example;
     use super::super::samples;
     use super::*;
 
     fn lines(map: &VelocityMap, sweep: usize) -> Vec<String> {
-        let text = String::from_utf8(hpl_bytes(map, sweep, "x_1.hpl").unwrap()).unwrap();
+        let text = String::from_utf8(hpl_bytes(map, sweep, "x_1.hpl", &example()).unwrap()).unwrap();
         assert_eq!(text.matches('\n').count(), text.matches("\r\n").count());
         text.split("\r\n").map(str::to_owned).collect()
     }
@@ -148,7 +192,7 @@ mod tests {
         assert_eq!(lines[0], "Filename:\tx_1.hpl");
         assert_eq!(lines[2], "Number of gates:\t6", "one empty gate before the first at 45 m");
         assert_eq!(lines[9], "Start time:\t20240101 00:01:20.00");
-        assert_eq!(lines[16], "****");
+        assert_eq!(lines[16], "**** wakescope 0.1.0, scene 00ff");
         assert_eq!(lines.len(), 17 + 6 * 7 + 1);
         let ray: Vec<f64> = lines[17].split_whitespace().map(|c| c.parse().unwrap()).collect();
         assert_eq!(ray.len(), 5);
@@ -174,7 +218,30 @@ mod tests {
     fn gates_that_the_format_cannot_place_are_refused() {
         let mut map = samples::map();
         map.range_m.iter_mut().for_each(|r| *r += 7.0);
-        assert!(matches!(hpl_bytes(&map, 0, "x.hpl"), Err(OutputError::Unsupported { .. })));
-        assert!(matches!(hpl_bytes(&samples::map(), 2, "x.hpl"), Err(OutputError::Value { .. })));
+        assert!(matches!(hpl_bytes(&map, 0, "x.hpl", &example()), Err(OutputError::Unsupported { .. })));
+        assert!(matches!(hpl_bytes(&samples::map(), 2, "x.hpl", &example()), Err(OutputError::Value { .. })));
+    }
+
+    #[test]
+    fn a_date_of_ones_own_is_in_the_header_and_in_the_hours_and_ends_at_midnight() {
+        let mut map = samples::map();
+        map.site.start = super::super::UtcTime::parse("2023-12-31T23:58:00Z").unwrap();
+        let lines = lines(&map, 0);
+        assert_eq!(lines[9], "Start time:\t20231231 23:58:40.00", "the sweep begins 40 s after the flow");
+        let hours: f64 = lines[17].split_whitespace().next().unwrap().parse().unwrap();
+        approx::assert_abs_diff_eq!(hours, 23.0 + 58.0 / 60.0 + 40.0 / 3600.0, epsilon = 1e-8);
+        map.site.start = map.site.start.after_s(79.0);
+        let error = hpl_bytes(&map, 0, "x.hpl", &example()).unwrap_err().to_string();
+        assert!(error.contains("2023-12-31T23:59:59Z to 2024-01-01T00:00:01Z"), "{error}");
+    }
+
+    #[test]
+    fn the_table_has_the_rows_that_the_file_has() {
+        let map = samples::map();
+        let table = hpl_table(&map, 1).unwrap();
+        assert_eq!(table.columns()[0].1, {
+            let times = (6..12).flat_map(|ray| vec![map.rays[ray].time_s; if ray == 11 { 4 } else { 5 }]);
+            super::super::csv::Column::Float(times.collect())
+        });
     }
 }

@@ -3,6 +3,7 @@
 //! Check: each rule of `check` is broken once by a test; positions follow from ray geometry.
 
 use super::error::{OutputError, OutputResult, increasing, same_length};
+use super::site::Site;
 use ndarray::{Array2, Array3};
 use wakescope_les::{Edges, Side};
 
@@ -73,6 +74,10 @@ pub struct Field {
     pub long_name: String,
     /// CF or CfRadial standard name, where one exists.
     pub standard_name: Option<String>,
+    /// How the value was made of several realisations, in the words of CF.
+    pub cell_methods: Option<String>,
+    /// Names of the fields that say how good this one is.
+    pub ancillary: Vec<String>,
     /// Values `[ray, gate]`; NaN = missing. Infinite values are refused.
     pub values: Array2<f64>,
     /// Storage type.
@@ -87,9 +92,25 @@ impl Field {
             unit,
             long_name: long_name.into(),
             standard_name: standard_name_of(name).map(str::to_owned),
+            cell_methods: None,
+            ancillary: Vec::new(),
             values,
             kind: FieldKind::Float,
         }
+    }
+
+    /// The same field with the statistic over the realisations that it is, such as `mean` or `standard_deviation`.
+    #[must_use]
+    pub fn over_realisations(mut self, statistic: &str) -> Self {
+        self.cell_methods = Some(format!("realization: {statistic}"));
+        self
+    }
+
+    /// The same field with the names of those that say how good it is.
+    #[must_use]
+    pub fn with_ancillary(mut self, names: &[&str]) -> Self {
+        self.ancillary = names.iter().map(|name| (*name).to_owned()).collect();
+        self
     }
 
     /// Column name in a CSV table: name and unit tag, with the short names `v_mean_m_s` and `std_m_s` of the estimate and `snr_db`.
@@ -106,7 +127,11 @@ impl Field {
 
 fn standard_name_of(name: &str) -> Option<&'static str> {
     match name {
-        "radial_velocity" => Some("radial_velocity_of_scatterers_away_from_instrument"),
+        "radial_velocity" | "velocity_standard_deviation" | "v_scan" | "v_exact" | "v_pulse" | "v_gate" => {
+            Some("radial_velocity_of_scatterers_away_from_instrument")
+        }
+        "width" => Some("doppler_spectrum_width"),
+        "count" => Some("number_of_observations"),
         "signal_to_noise_ratio" => Some("signal_to_noise_ratio"),
         _ => None,
     }
@@ -168,6 +193,8 @@ pub struct VelocityMap {
     pub lidar_y_m: f64,
     /// Height of the telescope above the ground, m.
     pub lidar_height_m: f64,
+    /// Place and date.
+    pub site: Site,
 }
 
 impl VelocityMap {

@@ -8,6 +8,8 @@
 //! | [`map`] | (data) [`VelocityMap`], [`CrossPlanes`] | - |
 //! | [`fields`] | (data) [`VelocityField`] | - |
 //! | [`provenance`] | (data) where a file comes from | - |
+//! | [`site`] | (data) place and date of a measurement | - |
+//! | [`own`] | which files this program wrote, so that no other is replaced | - |
 //! | [`csv`] | any table | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
@@ -36,8 +38,10 @@ pub mod map;
 pub(crate) mod netcdf;
 #[cfg(feature = "npz")]
 pub mod npz;
+pub mod own;
 pub mod provenance;
 pub mod signals;
+pub mod site;
 pub mod tables;
 #[cfg(feature = "vtk")]
 pub mod vtr;
@@ -49,7 +53,9 @@ pub(crate) use error::same_length;
 pub use error::{OutputError, OutputResult};
 pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+pub use own::Existing;
 pub use provenance::Provenance;
+pub use site::{Site, UtcTime};
 
 #[cfg(test)]
 pub(crate) mod samples;

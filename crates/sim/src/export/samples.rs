@@ -1,6 +1,7 @@
 //! Small made-up results for the tests of the writers: two sweeps, missing values, a stretched mesh.
 
 use super::map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+use super::site::Site;
 use ndarray::{Array2, Array3};
 
 /// Two sweeps of 6 rays, 5 gates; NaN in a corner.
@@ -75,12 +76,15 @@ pub(crate) fn map() -> VelocityMap {
                 unit: Unit::One,
                 long_name: "quality of the estimate".into(),
                 standard_name: None,
+                cell_methods: None,
+                ancillary: Vec::new(),
                 values: Array2::from_shape_fn(shape, |(r, g)| ((r + g) % 2) as f64),
                 kind: FieldKind::Flag { meanings: vec![(0, "good".into()), (1, "low_signal".into())] },
             },
         ],
         lidar_y_m: -150.0,
         lidar_height_m: 2.0,
+        site: Site::default(),
     }
 }
 

@@ -5,14 +5,48 @@ use super::csv::Table;
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use ndarray::Array2;
 
-/// The signals of a scan, pulse by pulse.
+/// How the signals of a scan were recorded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recording {
+    /// Sampling frequency, Hz.
+    pub sampling_hz: f64,
+    /// Frequency of air at rest in the records, Hz: 0 for baseband signals.
+    pub intermediate_frequency_hz: f64,
+    /// Width of the detector band about that frequency, Hz.
+    pub bandwidth_hz: f64,
+    /// Wavelength, m.
+    pub wavelength_m: f64,
+    /// Pulse repetition frequency, Hz.
+    pub pulse_repetition_hz: f64,
+    /// Half width of the pulse's power where it is 1/e of its largest, or that of the Gaussian with the same spread, s.
+    pub pulse_sigma_s: f64,
+    /// Mean square of the noise of a sample, of both quadratures together, A^2.
+    pub noise_power_a2: f64,
+}
+
+/// The air along the lines of sight: what an estimate is to be held against.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineVelocities {
+    /// Ranges, m, increasing.
+    pub range_m: Vec<f64>,
+    /// Radial velocity `[line, range]`, m/s, positive away from the lidar; NaN where nothing returns light.
+    pub radial_velocity_m_s: Array2<f64>,
+}
+
+/// The signals of a scan, pulse by pulse, one realisation after the other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawSignals {
+    /// How they were recorded.
+    pub recording: Recording,
+    /// The air along the lines.
+    pub truth: LineVelocities,
+    /// Time of each pulse of one realisation from the start of the flow, s.
+    pub pulse_time_s: Vec<f64>,
     /// Current of the detector `[pulse, sample]`, A.
     pub current_a: Array2<f64>,
     /// Second quadrature of a complex baseband signal, whose first is `current_a`.
     pub quadrature_a: Option<Array2<f64>>,
-    /// Elevation of each pulse, rad.
+    /// Elevation of each pulse of one realisation, rad.
     pub elevation_rad: Vec<f64>,
     /// Time of each sample after the middle of the pulse left, s; increasing.
     pub time_s: Vec<f64>,
@@ -28,24 +62,35 @@ impl RawSignals {
     pub fn check(&self) -> OutputResult<()> {
         increasing("time_s", &self.time_s)?;
         same_length("current_a", self.current_a.ncols(), "time_s", self.time_s.len())?;
-        same_length("current_a", self.current_a.nrows(), "elevation_rad", self.elevation_rad.len())?;
+        let pulses = self.elevation_rad.len();
+        same_length("current_a", self.current_a.nrows(), "elevation_rad", pulses * self.realisations())?;
+        same_length("pulse_time_s", self.pulse_time_s.len(), "elevation_rad", pulses)?;
         if let Some(quadrature) = &self.quadrature_a {
-            same_length("quadrature_a", quadrature.nrows(), "elevation_rad", self.elevation_rad.len())?;
+            same_length("quadrature_a", quadrature.nrows(), "current_a", self.current_a.nrows())?;
             same_length("quadrature_a", quadrature.ncols(), "time_s", self.time_s.len())?;
         }
+        increasing("range_m", &self.truth.range_m)?;
+        let (lines, ranges) = self.truth.radial_velocity_m_s.dim();
+        same_length("radial_velocity_m_s", ranges, "range_m", self.truth.range_m.len())?;
+        same_length("radial_velocity_m_s", lines, "the lines", pulses.div_ceil(self.pulses_per_line.max(1)))?;
         match self.current_a.iter().chain(self.quadrature_a.iter().flatten()).find(|a| !a.is_finite()) {
             Some(bad) => Err(OutputError::value("current_a", bad, "must be finite")),
             None => Ok(()),
         }
     }
 
-    /// The first pulse of each line as a long table; the NetCDF file holds all pulses.
+    /// Realisations of the scan, one after the other.
+    pub fn realisations(&self) -> usize {
+        self.current_a.nrows() / self.elevation_rad.len().max(1)
+    }
+
+    /// The first pulse of each line of the first realisation as a long table; the NetCDF file holds all pulses.
     ///
     /// # Errors
     /// As [`RawSignals::check`].
     pub fn table(&self) -> OutputResult<Table> {
         self.check()?;
-        let rays: Vec<usize> = (0..self.current_a.nrows()).step_by(self.pulses_per_line.max(1)).collect();
+        let rays: Vec<usize> = (0..self.elevation_rad.len()).step_by(self.pulses_per_line.max(1)).collect();
         let samples = self.time_s.len();
         let cells = || rays.iter().flat_map(|&ray| (0..samples).map(move |k| (ray, k)));
         let table = Table::new()
@@ -65,16 +110,40 @@ mod tests {
 
     #[test]
     fn the_table_holds_the_first_pulse_of_each_line() {
-        let signals = RawSignals {
-            current_a: Array2::from_shape_fn((4, 3), |(i, k)| (10 * i + k) as f64),
-            quadrature_a: None,
-            elevation_rad: vec![0.0, 0.0, 0.1, 0.1],
-            time_s: vec![1e-6, 2e-6, 3e-6],
-            pulses_per_line: 2,
-        };
+        let signals = example();
         let table = signals.table().unwrap();
         let current = &table.columns()[2].1;
         assert_eq!(*current, crate::export::csv::Column::Float(vec![0.0, 1.0, 2.0, 20.0, 21.0, 22.0]));
-        assert!(RawSignals { time_s: vec![1.0], ..signals }.check().is_err());
+        assert_eq!(signals.realisations(), 2);
+        assert!(RawSignals { time_s: vec![1.0], ..signals.clone() }.check().is_err());
+        assert!(RawSignals { pulse_time_s: vec![1.0], ..signals.clone() }.check().is_err());
+        let odd = signals.current_a.slice(ndarray::s![..7, ..]).to_owned();
+        assert!(RawSignals { current_a: odd, ..signals }.check().is_err(), "half a realisation");
+    }
+}
+
+/// Two realisations of two lines of two pulses.
+#[cfg(test)]
+pub(crate) fn example() -> RawSignals {
+    RawSignals {
+        recording: Recording {
+            sampling_hz: 1e6,
+            intermediate_frequency_hz: 8e5,
+            bandwidth_hz: 5e5,
+            wavelength_m: 1.5e-6,
+            pulse_repetition_hz: 400.0,
+            pulse_sigma_s: 1.2e-7,
+            noise_power_a2: 3e-13,
+        },
+        truth: LineVelocities {
+            range_m: vec![100.0, 130.0],
+            radial_velocity_m_s: ndarray::arr2(&[[1.5, -2.5], [f64::NAN, 0.5]]),
+        },
+        pulse_time_s: vec![8.0, 8.0025, 8.005, 8.0075],
+        current_a: Array2::from_shape_fn((8, 3), |(i, k)| (10 * i + k) as f64),
+        quadrature_a: None,
+        elevation_rad: vec![0.0, 0.0, 0.1, 0.1],
+        time_s: vec![1e-6, 2e-6, 3e-6],
+        pulses_per_line: 2,
     }
 }

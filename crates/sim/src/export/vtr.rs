@@ -44,8 +44,8 @@ fn collection(entries: &str, provenance: &Provenance) -> Vec<u8> {
     .into_bytes()
 }
 
-/// A whole field as a rectilinear grid with points at the centres: vectors `velocity` in m/s, scalars `pressure` in m^2/s^2
-/// and, where it is there, `vorticity` in 1/s.
+/// A whole field as a rectilinear grid with points at the centres: vectors `velocity` in m/s, scalars `pressure_m2_s2`
+/// and, where it is there, `vorticity_magnitude` in 1/s.
 ///
 /// # Errors
 /// What [`VelocityField::check`] finds, or a refusal of the encoder.
@@ -54,11 +54,13 @@ pub fn field_bytes(field: &VelocityField, provenance: &Provenance) -> OutputResu
     let [u, v, w] = &field.velocity_m_s;
     let velocity: Vec<f32> = u.iter().zip(v).zip(w).flat_map(|((u, v), w)| [*u as f32, *v as f32, *w as f32]).collect();
     let pressure: Vec<f32> = field.pressure_m2_s2.iter().map(|p| *p as f32).collect();
-    let mut point =
-        vec![Attribute::vectors("velocity").with_data(velocity), Attribute::scalars("pressure", 1).with_data(pressure)];
+    let mut point = vec![
+        Attribute::vectors("velocity").with_data(velocity),
+        Attribute::scalars("pressure_m2_s2", 1).with_data(pressure),
+    ];
     if let Some(vorticity) = &field.vorticity_per_s {
         let vorticity: Vec<f32> = vorticity.iter().map(|w| *w as f32).collect();
-        point.push(Attribute::scalars("vorticity", 1).with_data(vorticity));
+        point.push(Attribute::scalars("vorticity_magnitude", 1).with_data(vorticity));
     }
     grid_bytes(&field.title, [&field.x_m, &field.y_m, &field.z_m], point, provenance)
 }

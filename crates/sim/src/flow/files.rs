@@ -1,12 +1,23 @@
 //! What a run writes at its output times: whole fields, planes, initial fields, collections.
 
+use super::Begin;
 use super::case::{FileFormat, Output};
-use super::wake::Due;
+use super::wake::{self, Due};
 use crate::Error;
-use crate::export::{CrossPlanes, FileGroup, Provenance, VelocityField, tables};
+use crate::export::own::refuse_foreign;
+use crate::export::{CrossPlanes, Existing, FileGroup, Provenance, VelocityField, tables};
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
 use wakescope_les::Flow;
+
+/// The case with every default.
+pub(super) const CASE: &str = "case.toml";
+/// The table of the steps.
+const STEPS: &str = "steps.csv";
+
+fn numbered(stem: &str, index: usize, extension: &str) -> String {
+    format!("{stem}_{:04}.{extension}", index + 1)
+}
 
 /// The plan of the files.
 #[derive(Debug)]
@@ -25,6 +36,42 @@ pub(super) struct Files {
 }
 
 impl Files {
+    /// Names of all files of a run, but for its checkpoints.
+    pub(super) fn names(&self, due: &[Due], is_wake: bool) -> Vec<String> {
+        let mut out = vec![CASE.to_owned()];
+        out.extend(self.output.steps.then(|| STEPS.to_owned()));
+        if is_wake {
+            out.extend(wake::file_names().into_iter().map(str::to_owned));
+        }
+        let mut add = |stem: &str, index: usize, format: FileFormat| match format {
+            FileFormat::Csv => out.push(numbered(stem, index, "csv")),
+            FileFormat::Netcdf => out.push(numbered(stem, index, "nc")),
+            FileFormat::Vtr => {
+                out.push(numbered(stem, index, "vtr"));
+                out.push(format!("{stem}.pvd"));
+            }
+            FileFormat::InitialNetcdf => out.push(numbered("initial", index, "nc")),
+        };
+        for due in due {
+            for (index, format) in due.fields.iter().flat_map(|i| self.output.fields.iter().map(move |f| (*i, *f))) {
+                add("fields", index, format);
+            }
+            for (index, format) in due.planes.iter().flat_map(|i| self.output.planes.iter().map(move |f| (*i, *f))) {
+                (1..=self.output.planes_x_m.len()).for_each(|n| add(&format!("plane{n}"), index, format));
+            }
+        }
+        out
+    }
+
+    /// Refuses a folder with files in the way that this program did not write. On a restart the case may have been edited: its
+    /// end and its outputs may change.
+    pub(super) fn refuse_foreign(&self, due: &[Due], is_wake: bool, begin: Begin) -> Result<(), Error> {
+        let existing = if begin == Begin::Overwrite { Existing::Any } else { Existing::Own };
+        let mut names = self.names(due, is_wake);
+        names.retain(|name| begin != Begin::Restart || name != CASE);
+        Ok(refuse_foreign(&self.folder, names.iter().map(String::as_str), existing)?)
+    }
+
     /// Writes all files that are due, or none of them; returns their paths.
     pub(super) fn write(&self, flow: &Flow, due: Due) -> Result<Vec<PathBuf>, Error> {
         let mut group = FileGroup::new(&self.folder);
@@ -40,7 +87,7 @@ impl Files {
     }
 
     fn add_fields(&self, group: &mut FileGroup, flow: &Flow, index: usize) -> Result<(), Error> {
-        let name = |extension: &str| format!("fields_{:04}.{extension}", index + 1);
+        let name = |extension: &str| numbered("fields", index, extension);
         let formats = &self.output.fields;
         if formats.iter().any(|format| *format != FileFormat::InitialNetcdf) {
             let field = self.field(flow)?;
@@ -64,7 +111,7 @@ impl Files {
         #[cfg(feature = "netcdf")]
         if formats.contains(&FileFormat::InitialNetcdf) {
             let bytes = crate::export::cf_fields::cf_faces_bytes(&self.faces(flow), &self.origin)?;
-            group.add(&format!("initial_{:04}.nc", index + 1), bytes)?;
+            group.add(&numbered("initial", index, "nc"), bytes)?;
         }
         Ok(())
     }
@@ -75,17 +122,17 @@ impl Files {
             match format {
                 FileFormat::Csv => {
                     let table = tables::planes_table(&plane)?.to_csv(&self.origin)?;
-                    group.add(&format!("{stem}_{:04}.csv", index + 1), table)?;
+                    group.add(&numbered(stem, index, "csv"), table)?;
                 }
                 #[cfg(feature = "netcdf")]
                 FileFormat::Netcdf => {
                     let bytes = crate::export::cf_planes::cf_planes_bytes(&plane, &self.origin)?;
-                    group.add(&format!("{stem}_{:04}.nc", index + 1), bytes)?;
+                    group.add(&numbered(stem, index, "nc"), bytes)?;
                 }
                 #[cfg(feature = "vtk")]
                 FileFormat::Vtr => {
                     let bytes = crate::export::vtr::plane_file(&plane, &self.origin)?;
-                    group.add(&format!("{stem}_{:04}.vtr", index + 1), bytes)?;
+                    group.add(&numbered(stem, index, "vtr"), bytes)?;
                     group
                         .add(&format!("{stem}.pvd"), self.collection(stem, index, &self.times_s[1], self.tau_per_s))?;
                 }
@@ -98,7 +145,7 @@ impl Files {
     /// The collection of all outputs up to this one.
     #[cfg(feature = "vtk")]
     fn collection(&self, stem: &str, index: usize, times_s: &[f64], per_s: f64) -> Vec<u8> {
-        let names: Vec<String> = (0..=index).map(|i| format!("{stem}_{:04}.vtr", i + 1)).collect();
+        let names: Vec<String> = (0..=index).map(|i| numbered(stem, i, "vtr")).collect();
         let members = times_s.iter().map(|t| t * per_s).zip(names.iter().map(String::as_str));
         crate::export::vtr::pvd_bytes(members, &self.origin)
     }
@@ -157,7 +204,7 @@ impl Files {
 
     /// The table of the steps.
     pub(super) fn steps_path(&self) -> PathBuf {
-        self.folder.join("steps.csv")
+        self.folder.join(STEPS)
     }
 }
 

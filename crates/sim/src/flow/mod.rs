@@ -36,7 +36,7 @@ pub use read::{FieldInSpace, read_field, read_planes};
 pub use wake::{PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile};
 
 use crate::Error;
-use crate::export::{Provenance, write_atomic};
+use crate::export::{Existing, Provenance, write_atomic};
 use crate::scene::{Problem, SceneError, hash_of, located, parsed};
 use crate::text_file;
 use files::{Files, checkpoint_paths};
@@ -201,7 +201,8 @@ pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) 
     }
     let mut setup = Setup::new(&file.case, file.path.parent().unwrap_or(Path::new("")))?;
     let (plan, files, schedule) = plan(file, &setup, folder)?;
-    crate::write::prepare(folder)?;
+    files.refuse_foreign(&schedule.due, setup.wake.is_some(), begin)?;
+    crate::write::prepare(folder, [], Existing::Own)?;
     std::fs::create_dir_all(folder).map_err(|source| Error::Io {
         action: "make the folder",
         path: folder.to_owned(),
@@ -231,7 +232,7 @@ pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) 
         wake.restore(&kept.wake)
             .ok_or_else(|| Error::Flow(wakescope_les::Error::CheckpointDamaged { path: checkpoint.clone(), what }))?;
     }
-    let case_toml = folder.join("case.toml");
+    let case_toml = folder.join(files::CASE);
     write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
     let steps_path = files.steps_path();
     let steps = match (files.output.steps, begin) {

@@ -153,12 +153,17 @@ fn an_interrupted_wake_leaves_the_same_histories_fields_and_planes() {
     if cfg!(feature = "netcdf") {
         assert!(whole["wake.nc"] == parts["wake.nc"]);
     }
-    let text = String::from_utf8(whole["wake.csv"].clone()).unwrap();
-    let rows: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
-    assert_eq!(rows.len(), 7, "a header and the ages 0, 0.04, ..., 0.2");
+    let text = |file: &str| {
+        let text = String::from_utf8(whole[file].clone()).unwrap();
+        let rows: Vec<String> = text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect();
+        assert_eq!(rows.len(), 7, "a header and the ages 0, 0.04, ..., 0.2");
+        rows
+    };
+    let (si, scaled) = (text("wake.csv"), text("wake_scaled.csv"));
     let of = |row: usize, name: &str| -> f64 {
-        let at = rows[0].split(',').position(|n| n == name).unwrap_or_else(|| panic!("{name} in {}", rows[0]));
-        rows[row].split(',').nth(at).unwrap().parse().unwrap()
+        let find = |rows: &[String]| rows[0].split(',').position(|n| n == name).map(|at| (rows[row].clone(), at));
+        let (row, at) = find(&si).or_else(|| find(&scaled)).unwrap_or_else(|| panic!("{name}"));
+        row.split(',').nth(at).unwrap().parse().unwrap()
     };
     // The A340's pair: b0 = pi b/4.
     let spacing_m = std::f64::consts::PI * 60.3 / 4.0;
@@ -183,6 +188,19 @@ fn the_history_of_a_wake_opens_with_its_axes() {
     let share = gamma[24 + 15] / scales.circulation_m2_s;
     assert!((share - 0.16 / 0.17).abs() < 0.03, "{share}");
     assert_eq!(file.read_var_f64("y_centre").unwrap().len(), 6 * 2 * 6);
+    // Each column of the table is a variable: its name less the tag of its unit.
+    let table = std::fs::read_to_string(folder.path().join("wake.csv")).unwrap();
+    let mut rows = table.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(',').collect::<Vec<_>>());
+    let (names, last) = (rows.next().unwrap(), rows.next_back().unwrap());
+    assert!(names.contains(&"gamma_ratio_left") && names.contains(&"gamma_ratio_right"));
+    for (name, cell) in names.iter().zip(last) {
+        let tags = ["_m2_s", "_m", "_s", "_hz"];
+        let bare = tags.iter().find_map(|tag| name.strip_suffix(tag)).unwrap_or(name);
+        let values =
+            file.read_var_f64(bare).or_else(|_| file.read_var_f64(name)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+        let value = cell.parse::<f64>().unwrap_or(f64::NAN);
+        assert!(values[5] == value || values[5].is_nan() && value.is_nan(), "{name}: {} and {cell}", values[5]);
+    }
     let mut field = netcdf3::FileReader::open(folder.path().join("fields_0001.nc")).unwrap();
     let vorticity = field.read_var_f32("vorticity_magnitude").unwrap();
     let largest = vorticity.iter().fold(0.0_f32, |a, b| a.max(*b));

@@ -90,6 +90,14 @@ impl Scale {
         self.paper.0 + part.clamp(-20.0, 20.0) * (self.paper.1 - self.paper.0)
     }
 
+    /// End of a range that is longer by so large a part of itself, as seen on the paper.
+    pub(crate) fn above(&self, part: f64) -> f64 {
+        let part = part.clamp(0.0, 0.7);
+        let (low, high) = self.range;
+        let grow = |low: f64, high: f64| low + (high - low) / (1.0 - part);
+        if self.log { 10_f64.powf(grow(low.log10(), high.log10())) } else { grow(low, high) }
+    }
+
     /// Labelled ticks, about `gap` drawing units apart.
     pub(crate) fn ticks(&self, gap: f64) -> Vec<Tick> {
         let count = ((self.paper.1 - self.paper.0).abs() / gap).clamp(2.0, 12.0);
@@ -153,8 +161,11 @@ fn linear_ticks((low, high): (f64, f64), count: f64) -> Vec<Tick> {
     let power = 10_f64.powf(raw.log10().floor());
     // The step whose number of ticks is nearest to the wanted one, in ratio.
     let distance = |step: &f64| (step / raw).ln().abs();
-    let steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * power);
-    let step = steps.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(raw);
+    let steps = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0].map(|m| m * power);
+    // Two ticks do not show a scale: then the next finer step.
+    let held = |step: &f64| (high / step + 1e-6).floor() - (low / step - 1e-6).ceil() + 1.0;
+    let enough = steps.into_iter().filter(|step| held(step) >= 3.0);
+    let step = enough.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(raw);
     let (first, last) = ((low / step - 1e-6).ceil() as i64, (high / step + 1e-6).floor() as i64);
     let largest = low.abs().max(high.abs());
     let exponent = (step.log10() + 1e-9).floor() as i32;
@@ -203,6 +214,16 @@ mod tests {
         assert_eq!(labels((-0.23, 0.31), false), ["−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3"]);
         assert_eq!(labels((0.0, 2e-14), false)[1..3], ["0.5·10^{−14}", "1.0·10^{−14}"]);
         assert_eq!(labels((0.0, 3e6), false)[1], "0.5·10^{6}");
+    }
+
+    #[test]
+    fn even_a_low_panel_has_three_ticks() {
+        for (low, high) in [(9.0, 11.0), (-3.7, 12.1), (0.02, 0.29), (-41.0, -39.5), (0.0, 0.99), (1e-3, 1.04e-3)] {
+            let low_panel = Scale { range: (low, high), log: false, paper: (0.0, 100.0) };
+            let ticks = low_panel.ticks(48.0);
+            assert!((3..=5).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
+            assert!(ticks.windows(2).all(|w| w[0].label != w[1].label), "{ticks:?}");
+        }
     }
 
     #[test]

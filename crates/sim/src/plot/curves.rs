@@ -1,4 +1,4 @@
-//! Curves over one pair of axes: lines, markers, uncertainty bands and error bars, with a legend in the emptiest corner.
+//! Curves over one pair of axes: lines, markers, uncertainty bands and error bars, with a legend that covers none of them.
 //! Check: a line breaks at a missing value, and a value lands at its coordinate; the rest is for the eye.
 
 use super::axis::{Axis, Scale};
@@ -6,7 +6,7 @@ use super::colour::curve_colour;
 use super::drawing::{Frame, Pen, Shape};
 use super::font::Font;
 use super::frame::{BOTTOM, Decor, LEFT, top_room};
-use super::legend::{Entry, legend};
+use super::legend::{self, Entry};
 use crate::export::{OutputResult, same_length};
 
 const RIGHT: f64 = 24.0;
@@ -149,32 +149,52 @@ impl CurvePlot {
         if self.equal_scales && !self.x.log && !self.y.log {
             widen(&mut x_range, &mut y_range, &frame);
         }
+        let entries = self.entries();
         let x = Scale { range: x_range, log: self.x.log, paper: (frame.left, frame.right()) };
-        let y = Scale { range: y_range, log: self.y.log, paper: (frame.bottom(), frame.top) };
+        let mut y = Scale { range: y_range, log: self.y.log, paper: (frame.bottom(), frame.top) };
+        let (mut content, mut occupied) = self.content(&x, &y);
+        let size = legend::size(&entries, font);
+        if !entries.is_empty() && !self.equal_scales && legend::place(frame, size, &occupied).1 > 0 {
+            // Room above the highest point, as high as the legend.
+            y.range.1 = y.above((size.1 + 3.0 * legend::INSET) / frame.height);
+            (content, occupied) = self.content(&x, &y);
+        }
         let decor = Decor { frame, x, y, x_label: &self.x.label, y_label: &self.y.label, title: &self.title };
         decor.grid(out);
-        let mut content = Vec::new();
-        let mut entries = Vec::new();
-        let mut occupied = Vec::new();
-        for (i, series) in self.series.iter().enumerate() {
-            let index = series.colour.unwrap_or(i);
-            let place = |p: &(f64, f64)| (x.place(p.0), y.place(p.1));
-            let points: Vec<(f64, f64)> = series.points.iter().map(place).collect();
-            push_series(series, index, &points, &y, &mut content);
-            occupied.extend(along(&points, series.style.has_line()));
-            if !series.label.is_empty() {
-                entries.push(Entry {
-                    label: &series.label,
-                    pen: series.style.has_line().then(|| pen(series, index)),
-                    marker: series.style.has_markers().then_some(index),
-                    colour: curve_colour(index),
-                });
-            }
-        }
         out.push(Shape::Clip { frame, shapes: content });
         decor.axes(font, out);
-        legend(&entries, frame, &occupied, font, out);
+        legend::legend(&entries, frame, &occupied, font, out);
         Ok(())
+    }
+
+    /// Lines of the legend.
+    fn entries(&self) -> Vec<Entry<'_>> {
+        fn entry((i, series): (usize, &Series)) -> Entry<'_> {
+            let index = series.colour.unwrap_or(i);
+            Entry {
+                label: &series.label,
+                pen: series.style.has_line().then(|| pen(series, index)),
+                marker: series.style.has_markers().then_some(index),
+                colour: curve_colour(index),
+            }
+        }
+        // Not filtered before they are numbered: a series without name has a colour, too.
+        self.series.iter().enumerate().map(entry).filter(|e| !e.label.is_empty()).collect()
+    }
+
+    /// The curves on the paper, and where their ink is.
+    fn content(&self, x: &Scale, y: &Scale) -> (Vec<Shape>, Vec<(f64, f64)>) {
+        let (mut content, mut occupied) = (Vec::new(), Vec::new());
+        for (i, series) in self.series.iter().enumerate() {
+            let place = |p: &(f64, f64)| (x.place(p.0), y.place(p.1));
+            let points: Vec<(f64, f64)> = series.points.iter().map(place).collect();
+            push_series(series, series.colour.unwrap_or(i), &points, y, &mut content);
+            occupied.extend(along(&points, series.style.has_line()));
+            for (p, band) in points.iter().zip(series.band.iter().flatten()) {
+                occupied.extend(along(&[(p.0, y.place(band.0)), (p.0, y.place(band.1))], true));
+            }
+        }
+        (content, occupied)
     }
 }
 
@@ -339,6 +359,28 @@ mod tests {
         let Shape::Line { points, .. } = &content(&plot)[0] else { panic!("no line") };
         let (dx, dy) = (points[1].0 - points[0].0, points[0].1 - points[1].1);
         approx::assert_relative_eq!(dx / 100.0, dy / 40.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_legend_that_finds_no_free_place_gets_room_above_the_curves() {
+        // Error bars from bottom to top all over the panel, as those of a hundred scans.
+        let bars = Series::new("scans", Style::Markers, (0..=100).map(|i| (0.1 * f64::from(i), 0.5)));
+        let mut full = plot(Vec::new(), Style::Line);
+        full.y.range = None;
+        full.series = vec![bars.with_band(&[0.45; 101])];
+        let drawn = shapes(&full);
+        let Some(Shape::Area { points: box_of_legend, .. }) =
+            drawn.iter().rfind(|s| matches!(s, Shape::Area { fill, .. } if *fill == [255; 3]))
+        else {
+            panic!("no legend")
+        };
+        let bottom = box_of_legend.iter().map(|p| p.1).fold(0.0, f64::max);
+        let content = content(&full);
+        let highest = content.iter().flat_map(|s| match s {
+            Shape::Line { points, .. } => points.iter().map(|p| p.1).collect(),
+            _ => vec![f64::INFINITY],
+        });
+        assert!(highest.fold(f64::INFINITY, f64::min) > bottom, "the bars begin below the legend");
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! The legend of a curve plot, put where it covers least: a corner, else the middle of an edge.
-//! Check: a test fills three corners and finds the legend in the fourth.
+//! The legend of a curve plot, put where it covers least: a corner, the middle of an edge, else anywhere. Where no place is
+//! free the plot makes room above its curves.
+//! Check: tests fill all places but one and find the legend there.
 
 use super::colour::Rgb;
 use super::curves::marker;
@@ -10,6 +11,12 @@ use super::frame::{GRID, TICK_SIZE, label};
 const SAMPLE: f64 = 34.0;
 const LINE: f64 = 21.0;
 const PAD: f64 = 9.0;
+/// Between legend and frame.
+pub(crate) const INSET: f64 = 8.0;
+/// Half of the largest marker.
+const REACH: f64 = 6.5;
+/// Steps of the places that are tried along each side.
+const GRID_PLACES: usize = 12;
 
 /// One line of the legend.
 pub(crate) struct Entry<'a> {
@@ -20,15 +27,19 @@ pub(crate) struct Entry<'a> {
     pub(crate) colour: Rgb,
 }
 
+/// Room that the entries need.
+pub(crate) fn size(entries: &[Entry], font: &Font) -> (f64, f64) {
+    let widest = entries.iter().map(|e| font.width(e.label, TICK_SIZE)).fold(0.0, f64::max);
+    // A seventh more than the letters need: the font of an SVG viewer may run wider.
+    (SAMPLE + 3.0 * PAD + 1.15 * widest, LINE * entries.len() as f64 + PAD)
+}
+
 /// Draws the entries; `occupied` are points with ink.
 pub(crate) fn legend(entries: &[Entry], frame: Frame, occupied: &[(f64, f64)], font: &Font, out: &mut Vec<Shape>) {
     if entries.is_empty() {
         return;
     }
-    let widest = entries.iter().map(|e| font.width(e.label, TICK_SIZE)).fold(0.0, f64::max);
-    // A seventh more than the letters need: the font of an SVG viewer may run wider.
-    let (width, height) = (SAMPLE + 3.0 * PAD + 1.15 * widest, LINE * entries.len() as f64 + PAD);
-    let place = place(frame, (width, height), occupied);
+    let (place, _) = place(frame, size(entries, font), occupied);
     out.push(Shape::Area { points: place.corners(), fill: [255, 255, 255], opacity: 0.88 });
     let mut outline = place.corners();
     outline.push(outline[0]);
@@ -46,24 +57,34 @@ pub(crate) fn legend(entries: &[Entry], frame: Frame, occupied: &[(f64, f64)], f
     }
 }
 
-/// The place with the fewest points under the legend; the first of the list where equal, the upper right corner before all.
-fn place(frame: Frame, (width, height): (f64, f64), occupied: &[(f64, f64)]) -> Frame {
-    let inset = 8.0;
-    let (left, right) = (frame.left + inset, frame.right() - inset - width);
-    let (top, bottom) = (frame.top + inset, frame.bottom() - inset - height);
+/// The place with the fewest points under the legend, and how many these are. Of equal ones it is the first: the corners
+/// from the upper right on, the middles of the edges, then all over the frame.
+pub(crate) fn place(frame: Frame, (width, height): (f64, f64), occupied: &[(f64, f64)]) -> (Frame, usize) {
+    let (left, right) = (frame.left + INSET, frame.right() - INSET - width);
+    let (top, bottom) = (frame.top + INSET, frame.bottom() - INSET - height);
     let (centre, middle) = (0.5 * (left + right), 0.5 * (top + bottom));
     let corners = [(right, top), (left, top), (right, bottom), (left, bottom)];
     let edges = [(centre, top), (centre, bottom), (right, middle), (left, middle)];
-    let frames: Vec<Frame> =
-        corners.into_iter().chain(edges).map(|(left, top)| Frame { left, top, width, height }).collect();
+    let part = |from: f64, to: f64, i: usize| from + (to - from) * i as f64 / GRID_PLACES as f64;
+    let all = (0..=GRID_PLACES)
+        .flat_map(|row| (0..=GRID_PLACES).map(move |column| (row, column)))
+        .map(|(row, column)| (part(right, left, column), part(top, bottom, row)));
+    // Markers and the width of lines reach beyond their points.
     let covered = |f: &Frame| {
-        let inside = |p: &&(f64, f64)| p.0 > f.left && p.0 < f.right() && p.1 > f.top && p.1 < f.bottom();
+        let inside = |p: &&(f64, f64)| {
+            p.0 > f.left - REACH && p.0 < f.right() + REACH && p.1 > f.top - REACH && p.1 < f.bottom() + REACH
+        };
         occupied.iter().filter(inside).count()
     };
-    let mut best = frames[0];
-    for f in &frames[1..] {
-        if covered(f) < covered(&best) {
-            best = *f;
+    let mut best = (Frame { left: right, top, width, height }, usize::MAX);
+    for (left, top) in corners.into_iter().chain(edges).chain(all) {
+        let frame = Frame { left, top, width, height };
+        let count = covered(&frame);
+        if count < best.1 {
+            best = (frame, count);
+        }
+        if count == 0 {
+            break;
         }
     }
     best
@@ -80,9 +101,24 @@ mod tests {
         for empty in 0..4 {
             let ink: Vec<(f64, f64)> =
                 corners.iter().enumerate().filter(|(i, _)| *i != empty).map(|(_, p)| *p).collect();
-            let found = place(frame, (100.0, 60.0), &ink);
+            let (found, covered) = place(frame, (100.0, 60.0), &ink);
+            assert_eq!(covered, 0);
             let expected = corners[empty];
             assert!((found.left < 200.0) == (expected.0 < 200.0) && (found.top < 150.0) == (expected.1 < 150.0));
         }
+    }
+
+    #[test]
+    fn the_only_free_place_is_found_away_from_corners_and_edges() {
+        let frame = Frame { left: 0.0, top: 0.0, width: 400.0, height: 300.0 };
+        let grid = (0..=80).flat_map(|i| (0..=60).map(move |j| (5.0 * f64::from(i), 5.0 * f64::from(j))));
+        // A hole off the middle, a little larger than the legend.
+        let ink: Vec<(f64, f64)> =
+            grid.filter(|(x, y)| !(70.0..=210.0).contains(x) || !(60.0..=150.0).contains(y)).collect();
+        let (found, covered) = place(frame, (80.0, 40.0), &ink);
+        assert_eq!(covered, 0, "{found:?}");
+        assert!(found.left > 70.0 && found.right() < 210.0 && found.top > 60.0 && found.bottom() < 150.0);
+        let (_, covered) = place(frame, (200.0, 100.0), &ink);
+        assert!(covered > 0, "too large for the hole");
     }
 }

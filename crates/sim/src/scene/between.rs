@@ -17,6 +17,9 @@ impl Scene {
         self.check_band(c);
         self.check_lines(c);
         self.check_ranges(c);
+        if self.outputs.hpl {
+            self.check_hpl(c);
+        }
         let o = &self.outputs;
         let (first_m, last_m) = (o.profile_range_min_m, o.profile_range_max_m);
         c.between(

@@ -90,6 +90,7 @@ impl Scene {
         self.check_scan(&mut c);
         check_estimator(self, &mut c);
         self.check_outputs(&mut c);
+        self.check_site(&mut c);
         // Limits between keys make sense only once each key does.
         if c.found.is_empty() {
             self.check_between(&mut c);
@@ -203,16 +204,6 @@ impl Scene {
                 c.within(&format!("scan.{key}.radial_velocity_m_s"), radial_velocity_m_s, -1e3, 1e3, "m/s");
             }
         }
-    }
-
-    fn check_outputs(&self, c: &mut Checker<'_>) {
-        let o = &self.outputs;
-        c.within("outputs.profile_range_min_m", o.profile_range_min_m, 1.0, 1e6, "m");
-        c.within("outputs.profile_range_max_m", o.profile_range_max_m, 1.0, 1e6, "m");
-        c.count("outputs.profile_points", o.profile_points, 2, 100_000);
-        let any = o.csv || o.netcdf || o.svg || o.png;
-        let allowed = "true, or else one of csv, netcdf, svg and png: nothing would be written";
-        c.require(any, "outputs.csv", o.csv, allowed);
     }
 
     /// Samples recorded of each pulse: from `range_min_m` to `range_max_m`, ends included.

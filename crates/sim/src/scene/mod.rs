@@ -23,6 +23,7 @@ mod atmosphere;
 mod between;
 mod check;
 mod check_estimator;
+mod check_outputs;
 mod estimator;
 mod flow;
 mod idle;
@@ -81,6 +82,8 @@ section! {
         estimator: Estimator = Estimator::default(),
         /// What is written.
         outputs: Outputs = Outputs::default(),
+        /// Place and date, for the files.
+        site: Site = Site::default(),
     }
 }
 
@@ -126,14 +129,44 @@ section! {
         png: bool = true,
         /// The wind on a cross-plane around the scan.
         flow: bool = true,
-        /// The raw signals of the first realisation.
+        /// The map as a HALO Photonics raw file.
+        hpl: bool = false,
+        /// The raw signals.
         signals: bool = false,
+        /// Of which realisations.
+        signals_of: SignalsOf = SignalsOf::First,
         /// First range of the efficiency and SNR profile, m.
         profile_range_min_m: f64 = 100.0,
         /// Last range of the profile, m.
         profile_range_max_m: f64 = 3000.0,
         /// Ranges in the profile.
         profile_points: usize = 59,
+    }
+}
+
+/// Which realisations of the raw signals are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SignalsOf {
+    /// The first.
+    First,
+    /// Every one.
+    All,
+}
+
+section! {
+    /// Where the lidar stands and when the flow began; only written to the files.
+    Site {
+        /// Name of the place.
+        name: String = "simulated runway".into(),
+        /// Latitude, degrees north.
+        latitude_deg: f64 = 0.0,
+        /// Longitude, degrees east.
+        longitude_deg: f64 = 0.0,
+        /// Height of the ground above the sea, m.
+        altitude_m: f64 = 0.0,
+        /// Date of the start of the flow, UTC.
+        start_utc: String = "2024-01-01T00:00:00Z".into(),
     }
 }
 
@@ -157,22 +190,29 @@ mod tests {
     use super::*;
 
     /// Keys that `wakescope init` does not write.
-    const RARE_KEYS: [&str; 15] = [
+    const RARE_KEYS: [&str; 22] = [
+        "altitude_m",
         "chirp_hz_s",
         "correlogram",
         "follow_wind",
         "gradient_max_per_s",
         "gradients",
+        "hpl",
         "kind",
         "kind",
         "kind",
         "lag_window_lags",
+        "latitude_deg",
+        "longitude_deg",
         "moment_reach",
+        "name",
         "order",
         "order_choice",
         "policy",
         "policy",
         "signal",
+        "signals_of",
+        "start_utc",
     ];
 
     #[test]

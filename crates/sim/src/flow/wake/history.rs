@@ -25,10 +25,33 @@ impl Kind {
         match self {
             Self::Length => "_m",
             Self::Gamma => "_m2_s",
-            Self::Rate => "_per_s",
+            // The tag of 1/s in column names, which readers of tables know: `_per_s` would read as seconds.
+            Self::Rate => "_hz",
             Self::Energy => "_m4_s2",
             Self::Enstrophy => "_m2_s2",
             Self::Number => "",
+        }
+    }
+
+    /// Its unit in NetCDF.
+    #[cfg(feature = "netcdf")]
+    fn udunits(self) -> &'static str {
+        match self {
+            Self::Length => "m",
+            Self::Gamma => "m2 s-1",
+            Self::Rate => "s-1",
+            Self::Energy => "m4 s-2",
+            Self::Enstrophy => "m2 s-2",
+            Self::Number => "1",
+        }
+    }
+
+    /// What its NetCDF variable is called: a unit that is no tag of column names stays in the name.
+    #[cfg(feature = "netcdf")]
+    fn variable(self, name: &str) -> String {
+        match self {
+            Self::Energy | Self::Enstrophy => format!("{name}{}", self.suffix()),
+            _ => name.into(),
         }
     }
 
@@ -46,35 +69,64 @@ impl Kind {
     }
 }
 
-type OfVortex = (&'static str, Kind, fn(&VortexRecord) -> f64);
-type OfFlow = (&'static str, Kind, fn(&WakeRecord) -> f64);
+type OfVortex = (&'static str, Kind, &'static str, fn(&VortexRecord) -> f64);
+type OfFlow = (&'static str, Kind, &'static str, fn(&WakeRecord) -> f64);
 
-/// Numbers of each vortex; the first is the one whose ratio to its start is given, too.
+/// Numbers of each vortex with what they are; the first is the one whose ratio to its start is given, too.
 const VORTEX: [OfVortex; 12] = [
-    ("gamma_5_15", Kind::Gamma, |v| v.gamma_5_15_m2_s),
-    ("y", Kind::Length, |v| v.y_m),
-    ("z", Kind::Length, |v| v.z_m),
-    ("y_spread", Kind::Length, |v| v.y_spread_m),
-    ("z_spread", Kind::Length, |v| v.z_spread_m),
-    ("gamma_opposite", Kind::Gamma, |v| v.gamma_opposite_m2_s),
-    ("secondary_gamma", Kind::Gamma, |v| v.secondary.gamma_m2_s),
-    ("secondary_y", Kind::Length, |v| v.secondary.y_m),
-    ("secondary_z", Kind::Length, |v| v.secondary.z_m),
-    ("secondary_y_spread", Kind::Length, |v| v.secondary.y_spread_m),
-    ("secondary_z_spread", Kind::Length, |v| v.secondary.z_spread_m),
-    ("outward_shear", Kind::Rate, |v| v.outward_shear_per_s),
+    ("gamma_5_15", Kind::Gamma, "circulation averaged over radii from 5 to 15 m", |v| v.gamma_5_15_m2_s),
+    ("y", Kind::Length, "lateral position of the centroid of axial vorticity", |v| v.y_m),
+    ("z", Kind::Length, "height of the centroid of axial vorticity", |v| v.z_m),
+    ("y_spread", Kind::Length, "standard deviation along x of the lateral position", |v| v.y_spread_m),
+    ("z_spread", Kind::Length, "standard deviation along x of the height", |v| v.z_spread_m),
+    ("gamma_opposite", Kind::Gamma, "vorticity of the other sign on this side", |v| v.gamma_opposite_m2_s),
+    ("secondary_gamma", Kind::Gamma, "circulation of the secondary vortex", |v| v.secondary.gamma_m2_s),
+    ("secondary_y", Kind::Length, "lateral position of the secondary vortex", |v| v.secondary.y_m),
+    ("secondary_z", Kind::Length, "height of the secondary vortex", |v| v.secondary.z_m),
+    ("secondary_y_spread", Kind::Length, "standard deviation along x of its lateral position", |v| {
+        v.secondary.y_spread_m
+    }),
+    ("secondary_z_spread", Kind::Length, "standard deviation along x of its height", |v| v.secondary.z_spread_m),
+    ("outward_shear", Kind::Rate, "least shear at the ground of the outward velocity", |v| v.outward_shear_per_s),
 ];
-/// Numbers of the flow.
+/// Numbers of the flow with what they are.
 const FLOW: [OfFlow; 5] = [
-    ("energy", Kind::Energy, |r| r.energy_m4_s2),
-    ("energy_3d", Kind::Energy, WakeRecord::energy_3d_m4_s2),
-    ("enstrophy", Kind::Enstrophy, |r| r.enstrophy_m2_s2),
-    ("wall_shear", Kind::Rate, |r| r.wall_shear_per_s),
-    ("wall_units", Kind::Number, |r| r.wall_units),
+    ("energy", Kind::Energy, "kinetic energy per length of x", |r| r.energy_m4_s2),
+    ("energy_3d", Kind::Energy, "kinetic energy of all that varies along x, per length of x", |r| r.energy_3d_m4_s2()),
+    ("enstrophy", Kind::Enstrophy, "half the integral of the squared vorticity, per length of x", |r| {
+        r.enstrophy_m2_s2
+    }),
+    ("wall_shear", Kind::Rate, "largest shear at the ground", |r| r.wall_shear_per_s),
+    ("wall_units", Kind::Number, "height of the first centre in wall units of that shear", |r| r.wall_units),
 ];
 const SIDES: [&str; 2] = ["left", "right"];
-/// Axial modes in the table; NetCDF has all.
+/// Axial modes as columns of the table and variables of the same names; the list in NetCDF has all.
 const TABLE_MODES: usize = 8;
+/// Files of the history.
+const TABLE: &str = "wake.csv";
+const SCALED_TABLE: &str = "wake_scaled.csv";
+#[cfg(feature = "netcdf")]
+const NETCDF: &str = "wake.nc";
+
+/// Names of the files of a history.
+pub(in super::super) fn file_names() -> Vec<&'static str> {
+    vec![
+        TABLE,
+        SCALED_TABLE,
+        #[cfg(feature = "netcdf")]
+        NETCDF,
+    ]
+}
+
+/// One number of a record.
+struct Single {
+    name: String,
+    kind: Kind,
+    /// What it is, in words.
+    text: String,
+    /// Its place in a row.
+    place: usize,
+}
 
 /// Lengths of the lists of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -156,23 +208,22 @@ impl WakeRun {
 
     /// The files of the history.
     pub(in super::super) fn paths(&self) -> Vec<PathBuf> {
-        let netcdf = cfg!(feature = "netcdf").then(|| self.folder.join("wake.nc"));
-        std::iter::once(self.folder.join("wake.csv")).chain(netcdf).collect()
+        file_names().into_iter().map(|name| self.folder.join(name)).collect()
     }
 
     /// Writes the files of the whole history.
     pub(in super::super) fn finish(&self) -> Result<(), Error> {
         self.write_table()?;
         #[cfg(feature = "netcdf")]
-        write_atomic(&self.folder.join("wake.nc"), self.netcdf()?)?;
+        write_atomic(&self.folder.join(NETCDF), self.netcdf()?)?;
         Ok(())
     }
 
     fn row(&self, record: &WakeRecord) -> Vec<f64> {
         let vortices = [&record.left, &record.right];
         let mut row = vec![record.time_s];
-        row.extend(vortices.iter().flat_map(|v| VORTEX.map(|(_, _, of)| of(v))));
-        row.extend(FLOW.map(|(_, _, of)| of(record)));
+        row.extend(vortices.iter().flat_map(|v| VORTEX.map(|(_, _, _, of)| of(v))));
+        row.extend(FLOW.map(|(_, _, _, of)| of(record)));
         row.extend(vortices.iter().flat_map(|v| v.gamma_m2_s.iter()));
         for c in 0..2 {
             row.extend(vortices.iter().flat_map(|v| v.slices_m.iter().map(move |slice| slice[c])));
@@ -181,17 +232,23 @@ impl WakeRun {
         row
     }
 
-    /// Names, kinds and places of the single numbers.
-    fn singles() -> impl Iterator<Item = (String, Kind, usize)> {
-        let vortex = |side: usize| {
-            let named = move |(i, (name, kind, _)): (usize, &OfVortex)| {
-                (format!("{name}_{}", SIDES[side]), *kind, 1 + side * VORTEX.len() + i)
-            };
-            VORTEX.iter().enumerate().map(named).collect::<Vec<_>>()
+    /// The single numbers.
+    fn singles() -> Vec<Single> {
+        let of_vortex = |side: usize| {
+            VORTEX.iter().enumerate().map(move |(i, (name, kind, text, _))| Single {
+                name: format!("{name}_{}", SIDES[side]),
+                kind: *kind,
+                text: format!("{} vortex: {text}", SIDES[side]),
+                place: 1 + side * VORTEX.len() + i,
+            })
         };
-        let flow =
-            FLOW.iter().enumerate().map(|(i, (name, kind, _))| (String::from(*name), *kind, 1 + 2 * VORTEX.len() + i));
-        vortex(0).into_iter().chain(vortex(1)).chain(flow)
+        let of_flow = FLOW.iter().enumerate().map(|(i, (name, kind, text, _))| Single {
+            name: (*name).into(),
+            kind: *kind,
+            text: (*text).into(),
+            place: 1 + 2 * VORTEX.len() + i,
+        });
+        of_vortex(0).chain(of_vortex(1)).chain(of_flow).collect()
     }
 
     fn column(&self, place: usize, unit: f64) -> Vec<f64> {
@@ -202,37 +259,52 @@ impl WakeRun {
         self.column(0, self.scales.time_unit_s())
     }
 
-    /// SI columns with their units, then the same in the scales of the pair without.
-    fn table(&self) -> Table {
-        let [.., modes, _] = self.lengths.starts();
-        let shown = self.lengths.modes.min(TABLE_MODES + 1);
-        let mut table = Table::new().float("tau", self.tau()).float("time_s", self.column(0, 1.0));
-        for (side, name) in SIDES.iter().enumerate() {
+    /// Circulation of each vortex over its first value.
+    fn gamma_ratios(&self) -> [(String, Vec<f64>); 2] {
+        [0, 1].map(|side| {
             let gamma = self.column(1 + side * VORTEX.len(), 1.0);
             let first = gamma.first().copied().unwrap_or(f64::NAN);
-            table = table.float(&format!("gamma_ratio_{name}"), gamma.iter().map(|g| g / first));
+            (format!("gamma_ratio_{}", SIDES[side]), gamma.iter().map(|g| g / first).collect())
+        })
+    }
+
+    /// Names and energies of the axial modes that the tables have, in a unit.
+    fn modes(&self, suffix: &str, unit: f64) -> Vec<(String, Vec<f64>)> {
+        let [.., modes, _] = self.lengths.starts();
+        let shown = self.lengths.modes.min(TABLE_MODES + 1);
+        (0..shown).map(|mode| (format!("energy_mode_{mode}{suffix}"), self.column(modes + mode, unit))).collect()
+    }
+
+    /// The history in SI units: the columns of which NetCDF has a variable each.
+    fn table(&self) -> Table {
+        let mut table = Table::new().float("tau", self.tau()).float("time_s", self.column(0, 1.0));
+        for (name, values) in self.gamma_ratios() {
+            table = table.float(&name, values);
         }
-        for (name, kind, place) in Self::singles() {
-            table = table.float(&format!("{name}{}", kind.suffix()), self.column(place, 1.0));
+        for single in Self::singles() {
+            table = table.float(&format!("{}{}", single.name, single.kind.suffix()), self.column(single.place, 1.0));
         }
-        for mode in 0..shown {
-            table = table.float(&format!("energy_mode_{mode}_m4_s2"), self.column(modes + mode, 1.0));
+        self.modes(Kind::Energy.suffix(), 1.0)
+            .into_iter()
+            .fold(table, |table, (name, values)| table.float(&name, values))
+    }
+
+    /// The history in the scales of the pair, circulations in `Gamma0`.
+    fn scaled_table(&self) -> Table {
+        let mut table = Table::new().float("tau", self.tau());
+        for single in Self::singles() {
+            table = table.float(&single.name, self.column(single.place, single.kind.unit(&self.scales)));
         }
-        for (name, kind, place) in Self::singles().filter(|(_, kind, _)| *kind != Kind::Number) {
-            table = table.float(&name, self.column(place, kind.unit(&self.scales)));
-        }
-        for mode in 0..shown {
-            table =
-                table.float(&format!("energy_mode_{mode}"), self.column(modes + mode, Kind::Energy.unit(&self.scales)));
-        }
-        table
+        let energy = Kind::Energy.unit(&self.scales);
+        self.modes("", energy).into_iter().fold(table, |table, (name, values)| table.float(&name, values))
     }
 
     fn write_table(&self) -> Result<(), Error> {
-        Ok(write_atomic(&self.folder.join("wake.csv"), self.table().to_csv(&self.origin)?)?)
+        write_atomic(&self.folder.join(TABLE), self.table().to_csv(&self.origin)?)?;
+        Ok(write_atomic(&self.folder.join(SCALED_TABLE), self.scaled_table().to_csv(&self.origin)?)?)
     }
 
-    /// All lists over their axes, in SI units.
+    /// All columns of the table and all lists over their axes, in SI units.
     #[cfg(feature = "netcdf")]
     fn netcdf(&self) -> Result<Vec<u8>, Error> {
         use crate::export::netcdf::{Data, Layout, Variable};
@@ -273,17 +345,7 @@ impl WakeRun {
                 "kinetic energy of an axial mode, per length of x",
             ),
         ];
-        for (name, kind, place) in Self::singles() {
-            let units = match kind {
-                Kind::Length => "m",
-                Kind::Gamma => "m2 s-1",
-                Kind::Rate => "s-1",
-                Kind::Energy => "m4 s-2",
-                Kind::Enstrophy => "m2 s-2",
-                Kind::Number => "1",
-            };
-            variables.push(Variable::new(&name, &["tau"], Data::F64(self.column(place, 1.0))).text("units", units));
-        }
+        variables.extend(self.series());
         let dims = vec![
             ("tau", self.rows.len()),
             ("vortex", 2),
@@ -299,5 +361,30 @@ impl WakeRun {
             ("circulation_m2_s", format!("{:?}", self.scales.circulation_m2_s)),
         ];
         Ok(Layout { dims, globals, variables }.to_bytes(&self.origin)?)
+    }
+
+    /// The columns of the table over `tau`.
+    #[cfg(feature = "netcdf")]
+    fn series(&self) -> Vec<crate::export::netcdf::Variable> {
+        use crate::export::netcdf::{Data, Variable};
+        let variable = |name: &str, values: Vec<f64>, units: &str, long_name: &str| {
+            Variable::new(name, &["tau"], Data::F64(values))
+                .text("units", units)
+                .text("long_name", long_name)
+                .text("coordinates", "time")
+        };
+        let ratio = |(name, values): (String, Vec<f64>)| {
+            variable(&name, values, "1", "circulation averaged over radii from 5 to 15 m, over its first value")
+        };
+        let mut out: Vec<Variable> = self.gamma_ratios().into_iter().map(ratio).collect();
+        for single in Self::singles() {
+            let (name, units) = (single.kind.variable(&single.name), single.kind.udunits());
+            out.push(variable(&name, self.column(single.place, 1.0), units, &single.text));
+        }
+        for (mode, (name, values)) in self.modes(Kind::Energy.suffix(), 1.0).into_iter().enumerate() {
+            let text = format!("kinetic energy of axial mode {mode}, per length of x");
+            out.push(variable(&name, values, Kind::Energy.udunits(), &text));
+        }
+        out
     }
 }

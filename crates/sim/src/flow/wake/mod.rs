@@ -8,7 +8,7 @@
 mod history;
 mod schedule;
 
-pub(super) use history::WakeRun;
+pub(super) use history::{WakeRun, file_names};
 pub(super) use schedule::{Due, Schedule};
 
 use super::case::{CaseKind, Checkpoint, FORMAT, FileFormat, FlowCase, Output, Problems, Solver, Subgrid, Time};

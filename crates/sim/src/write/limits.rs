@@ -1,0 +1,113 @@
+//! What the files of a plan can hold, found before anything is computed.
+//! Check: scenes whose results no file can hold are refused, with the key and what would do.
+
+use crate::Error;
+use crate::export::UtcTime;
+use crate::export::hpl::within_a_day;
+use crate::plan::{Plan, Stage};
+#[cfg(feature = "netcdf")]
+use crate::scene::DetectorSignal;
+
+/// Refuses a plan whose results do not fit into the files that its scene asks for.
+///
+/// # Errors
+/// The key, the size or the times, and what is allowed.
+pub fn check(plan: &Plan) -> Result<(), Error> {
+    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let rays = g.elevation_rad.len() as f64;
+    #[cfg(feature = "netcdf")]
+    if scene.outputs.netcdf {
+        if plan.keeps_signals() {
+            let pulses = rays * (scene.scan.pulses_per_line * plan.kept_realisations()) as f64;
+            let quadratures = if scene.detector.signal == DetectorSignal::Baseband { 2.0 } else { 1.0 };
+            let bytes =
+                crate::export::cf_signals::data_bytes([pulses, g.samples as f64, quadratures], [rays, g.layers as f64]);
+            fits(
+                "outputs.signals",
+                "signals.nc",
+                bytes,
+                "keep fewer pulses, lines or realisations, or set it to false",
+            )?;
+        }
+        if plan.runs(Stage::Estimates) {
+            let bytes = crate::export::cfradial::data_bytes(rays, g.gate_range_m.len() as f64);
+            fits("estimator.gate_step_samples", "map.nc", bytes, "make it larger, or scan fewer lines")?;
+            let last_s = last_s(plan);
+            let most_s = crate::export::cfradial::MAX_TIME_S;
+            if plan.wind.start_s.abs() > most_s || last_s > most_s {
+                let reason = format!("the rays end {last_s:e} s after the start of the flow; files hold {most_s:e} s");
+                return Err(refusal("scan", reason));
+            }
+        }
+    }
+    if scene.outputs.hpl && plan.runs(Stage::Estimates) {
+        let start = UtcTime::parse(&scene.site.start_utc).unwrap_or(UtcTime::SYNTHETIC);
+        within_a_day(plan.wind.start_s, last_s(plan), start)
+            .map_err(|e| refusal("outputs.hpl", format!("{e}: choose another site.start_utc")))?;
+    }
+    Ok(())
+}
+
+/// Time of the last line from the start of the flow, s.
+pub(super) fn last_s(plan: &Plan) -> f64 {
+    plan.wind.start_s + plan.geometry.line_time_s.last().copied().unwrap_or(0.0)
+}
+
+#[cfg(feature = "netcdf")]
+fn fits(key: &str, file: &str, bytes: f64, remedy: &str) -> Result<(), Error> {
+    let most = crate::export::netcdf::MAX_BYTES as f64;
+    if bytes <= most {
+        return Ok(());
+    }
+    let reason = format!("{file} would have {:.0} MB, and may have {:.0} MB: {remedy}", bytes / 1e6, most / 1e6);
+    Err(refusal(key, reason))
+}
+
+fn refusal(key: &str, reason: String) -> Error {
+    Error::Input { path: key.into(), reason }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::plan::{Plan, Target};
+    use crate::scene::{Scene, SceneFile, SignalsOf};
+
+    fn refused(change: impl FnOnce(&mut Scene)) -> String {
+        let mut scene = Scene::default();
+        change(&mut scene);
+        Plan::new(SceneFile::new(scene).unwrap(), Target::Run).map_or_else(|e| e.to_string(), |_| String::new())
+    }
+
+    #[cfg(feature = "netcdf")]
+    #[test]
+    fn signals_that_no_file_can_hold_are_refused_before_the_run() {
+        let many = |of: SignalsOf| {
+            refused(|s| {
+                (s.outputs.signals, s.outputs.signals_of) = (true, of);
+                s.scan.realisations = 100;
+            })
+        };
+        assert_eq!(many(SignalsOf::First), "");
+        let message = many(SignalsOf::All);
+        assert!(message.contains("outputs.signals") && message.contains("537 MB"), "{message}");
+        let without = refused(|s| {
+            (s.outputs.signals, s.outputs.signals_of, s.outputs.netcdf) = (true, SignalsOf::All, false);
+            s.scan.realisations = 100;
+        });
+        assert_eq!(without, "", "tables have no such limit");
+    }
+
+    #[test]
+    fn a_halo_file_across_midnight_is_refused_before_the_run() {
+        let at = |start_utc: &str| {
+            refused(|s| {
+                s.outputs.hpl = true;
+                (s.estimator.gate_step_samples, s.scan.range_min_m) = (64, 306.9875);
+                s.site.start_utc = start_utc.into();
+            })
+        };
+        assert_eq!(at("2024-01-01T23:59:50Z"), "");
+        let message = at("2024-01-01T23:59:58Z");
+        assert!(message.contains("outputs.hpl") && message.contains("site.start_utc"), "{message}");
+    }
+}
