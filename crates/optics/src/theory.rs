@@ -8,7 +8,6 @@ use crate::Error;
 use crate::beam::{Misalignment, Telescope};
 use crate::error::{not_negative, positive};
 use crate::overlap::efficiency_with;
-use crate::quadrature::GaussLegendre;
 use crate::structure::StructureTable;
 use crate::turbulence::{self, Cn2Path, Turbulence};
 use std::f64::consts::PI;
@@ -112,16 +111,8 @@ pub fn bistatic_efficiency_with(
         return free_space_efficiency_misaligned(telescope, misalignment, range_m);
     }
     let k2 = telescope.validated()?.wavenumber_rad_m().powi(2);
-    let rule = GaussLegendre::new(16);
-    let panels = if matches!(cn2, Cn2Path::Uniform { .. }) { 1 } else { 8 };
-    let mut weights = Vec::new();
-    for panel in 0..panels {
-        let h = range_m / f64::from(panels);
-        let start = h * f64::from(panel);
-        for (z, dz) in rule.mapped(start, start + h) {
-            weights.push((1.0 - z / range_m, k2 * cn2.at(z)? * dz));
-        }
-    }
+    let places = cn2.quadrature(range_m)?;
+    let weights: Vec<(f64, f64)> = places.into_iter().map(|(z, w)| (1.0 - z / range_m, k2 * w)).collect();
     efficiency_with(telescope, misalignment, range_m, &|rho| weights.iter().map(|(g, w)| w * table.at(rho * g)).sum())
 }
 
@@ -235,5 +226,28 @@ mod tests {
         assert!(screens(10, 0.5).abs() < 2e-3, "{}", screens(10, 0.5));
         assert!(screens(40, 0.5).abs() < 2e-4);
         assert!((screens(10, 0.0) + 0.067).abs() < 0.005, "{}", screens(10, 0.0));
+    }
+
+    #[test]
+    fn path_through_a_thin_strong_layer_is_that_of_thousands_of_slices() {
+        let t = Telescope::chapter();
+        let cn2 = Cn2Path::Heights {
+            height_m: vec![0.0, 20.0, 21.0, 3000.0],
+            cn2_m_m23: vec![1e-13, 1e-13, 1e-16, 1e-17],
+            telescope_height_m: 2.0,
+            elevation_rad: 10f64.to_radians(),
+        };
+        let range_m = 3000.0;
+        let turbulence = Turbulence { cn2: cn2.clone(), ..Turbulence::chapter(1e-13).unwrap() };
+        let found = bistatic_efficiency(&t, &Misalignment::NONE, &turbulence, range_m).unwrap();
+        let dz = range_m / 6000.0;
+        let slices: Vec<_> = (0..6000)
+            .map(|i| (f64::from(i) + 0.5) * dz)
+            .map(|z| ScreenStrength { position_m: z, cn2_thickness_m13: cn2.at(z).unwrap() * dz })
+            .collect();
+        let table = StructureTable::new(&*turbulence.spectrum);
+        let sum = bistatic_efficiency_screens(&t, &Misalignment::NONE, &slices, &table, range_m).unwrap();
+        assert!((found / sum - 1.0).abs() < 1e-5, "{found} {sum}");
+        assert!((found / 0.13243 - 1.0).abs() < 1e-4, "{found}");
     }
 }
