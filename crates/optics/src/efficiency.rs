@@ -14,9 +14,11 @@ pub struct EfficiencyProfile {
     pub range_m: Vec<f64>,
     /// Mean efficiency at each range.
     pub mean: Vec<f64>,
-    /// Standard deviation of the efficiency of one realisation, `sqrt(<eta^2> - <eta>^2)`; 0 for exact theory.
+    /// Standard deviation of the efficiency of one realisation, `sqrt(<eta^2> - <eta>^2)`; 0 for exact theory, NaN where it is
+    /// not known (one realisation).
     pub standard_deviation: Vec<f64>,
-    /// Standard error of `mean`; 0 for exact theory.
+    /// Standard error of `mean`; 0 for exact theory, NaN where it is not known: the monostatic mean needs two independent
+    /// samples, the bistatic one three (an antithetic pair is one sample).
     pub standard_error: Vec<f64>,
 }
 
@@ -55,7 +57,10 @@ impl EfficiencyProfile {
                 return Err(Error::Length { field, found: list.len(), expected });
             }
             for &value in list {
-                not_negative(field, value)?;
+                // A scatter that nobody knows is no mistake; a mean is always known.
+                if !value.is_nan() || field == "mean" {
+                    not_negative(field, value)?;
+                }
             }
         }
         check_increasing("range_m", &self.range_m)?;
@@ -73,17 +78,23 @@ impl EfficiencyProfile {
     /// Standard deviation of one realisation at `range_m` \[m\], interpolated as the mean is.
     ///
     /// # Errors
-    /// As [`EfficiencyProfile::interpolated`].
+    /// As [`EfficiencyProfile::interpolated`]; [`Error::NotKnown`] where one realisation leaves it open.
     pub fn interpolated_standard_deviation(&self, range_m: f64) -> Result<f64, Error> {
-        self.interpolate(&self.standard_deviation, range_m)
+        let value = self.interpolate(&self.standard_deviation, range_m)?;
+        known(value, "standard_deviation", "two realisations have a scatter, one has none")
     }
 
     /// Standard error of the mean at `range_m` \[m\], interpolated as the mean is.
     ///
     /// # Errors
-    /// As [`EfficiencyProfile::interpolated`].
+    /// As [`EfficiencyProfile::interpolated`]; [`Error::NotKnown`] where too few realisations leave it open.
     pub fn interpolated_standard_error(&self, range_m: f64) -> Result<f64, Error> {
-        self.interpolate(&self.standard_error, range_m)
+        let value = self.interpolate(&self.standard_error, range_m)?;
+        known(
+            value,
+            "standard_error",
+            "two independent samples give that of the monostatic mean, three that of the bistatic one",
+        )
     }
 
     fn interpolate(&self, y: &[f64], range_m: f64) -> Result<f64, Error> {
@@ -109,6 +120,10 @@ impl EfficiencyProfile {
             + (3.0 * t2 - 2.0 * t3) * y[i + 1]
             + (t3 - t2) * h * m1)
     }
+}
+
+fn known(value: f64, field: &'static str, needed: &'static str) -> Result<f64, Error> {
+    if value.is_nan() { Err(Error::NotKnown { field, needed }) } else { Ok(value) }
 }
 
 /// Slope at point `i` which keeps monotone data monotone (weighted harmonic mean of the two secants).
@@ -168,6 +183,9 @@ pub struct EfficiencyEstimate {
     pub bistatic_realisations: Vec<Vec<f64>>,
     /// Realisations done (1 without turbulence).
     pub realisations: usize,
+    /// Independent samples among them, from which the errors are taken: an antithetic pair is one. Two are needed for the
+    /// error of the monostatic mean, three for that of the bistatic one; below, these are NaN.
+    pub independent_samples: usize,
     /// Free-space efficiency of the same steps on the same grid.
     pub grid_free_space: Vec<f64>,
     /// Exact free-space efficiency.
@@ -242,5 +260,10 @@ mod tests {
             Err(Error::NotIncreasing { index: 1, .. })
         ));
         assert!(profile(&[100.0], &[f64::NAN]).validated().is_err());
+        let mut p = profile(&[100.0, 200.0], &[0.1, 0.2]);
+        p.standard_error = vec![f64::NAN; 2];
+        let p = p.validated().unwrap();
+        assert!(matches!(p.interpolated_standard_error(150.0), Err(Error::NotKnown { field: "standard_error", .. })));
+        p.interpolated(150.0).unwrap();
     }
 }

@@ -72,6 +72,27 @@ pub enum Error {
         /// Realisations that were done.
         realisations: usize,
     },
+    /// The beam has so many Fresnel zones that no quadrature follows them.
+    #[error(
+        "the Fresnel number a^2 |1/R - 1/F| / lambda is {found:.4e} at {range_m} m, {largest} at most: the range must be nearer to \
+         the focus, or the aperture smaller"
+    )]
+    FresnelNumber {
+        /// Range at which it was found \[m\].
+        range_m: f64,
+        /// The Fresnel number there.
+        found: f64,
+        /// The largest that is allowed.
+        largest: f64,
+    },
+    /// A scatter or error was asked for that too few realisations leave unknown.
+    #[error("{field} is not known: {needed}")]
+    NotKnown {
+        /// Which number.
+        field: &'static str,
+        /// What would make it known.
+        needed: &'static str,
+    },
     /// A quadrature did not reach its tolerance.
     #[error("quadrature of {quantity} stopped at a relative error of {error:.1e}, {tolerance:.1e} was asked for")]
     Convergence {

@@ -7,11 +7,12 @@
 use crate::Error;
 use crate::beam::Telescope;
 use crate::error::{not_negative, positive};
+use crate::overlap::check_fresnel_number;
 use crate::quadrature::GaussLegendre;
 use std::f64::consts::PI;
 
 /// Nodes and weights of the aperture integral with everything that does not depend on the target point.
-struct Aperture {
+pub(crate) struct Aperture {
     /// Radius \[m\] and the complex weighted field (k/R) E(r') r' dr' exp(j ...).
     node: Vec<(f64, f64, f64)>,
     /// k/R \[rad/m^2\].
@@ -20,7 +21,7 @@ struct Aperture {
 
 impl Aperture {
     /// `largest_radius_m` is the largest target radius at which the field will be asked for.
-    fn new(telescope: &Telescope, range_m: f64, largest_radius_m: f64) -> Self {
+    pub(crate) fn new(telescope: &Telescope, range_m: f64, largest_radius_m: f64) -> Self {
         let k = telescope.wavenumber_rad_m();
         let chirp = 0.5 * k * (1.0 / range_m - telescope.focus.curvature_per_m());
         let (b, a) = (telescope.obscuration_radius_m, telescope.aperture_radius_m);
@@ -45,13 +46,19 @@ impl Aperture {
         Self { node, scale_rad_m2: k / range_m }
     }
 
-    fn irradiance_per_m2(&self, radius_m: f64) -> f64 {
+    /// Field U(r) \[1/m\] at distance `radius_m` from the axis, real and imaginary part.
+    pub(crate) fn field_per_m(&self, radius_m: f64) -> [f64; 2] {
         let (mut re, mut im) = (0.0, 0.0);
         for &(r, wre, wim) in &self.node {
             let j0 = libm::j0(self.scale_rad_m2 * radius_m * r);
             re += wre * j0;
             im += wim * j0;
         }
+        [re, im]
+    }
+
+    fn irradiance_per_m2(&self, radius_m: f64) -> f64 {
+        let [re, im] = self.field_per_m(radius_m);
         re * re + im * im
     }
 }
@@ -59,7 +66,8 @@ impl Aperture {
 /// Irradiance of the transmitted beam at `range_m` in free space \[1/m^2\], for unit power before truncation.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] for a telescope, range (<= 0) or radius (< 0) that is not allowed.
+/// [`Error::OutOfRange`] for a telescope, range (<= 0) or radius (< 0) that is not allowed, [`Error::FresnelNumber`] where the
+/// quadrature would need too many nodes.
 pub fn free_space_irradiance_per_m2(telescope: &Telescope, range_m: f64, radius_m: &[f64]) -> Result<Vec<f64>, Error> {
     let telescope = telescope.validated()?;
     let range_m = positive("range_m", range_m)?;
@@ -67,6 +75,7 @@ pub fn free_space_irradiance_per_m2(telescope: &Telescope, range_m: f64, radius_
     for &r in radius_m {
         largest = largest.max(not_negative("radius_m", r)?);
     }
+    check_fresnel_number(&telescope, range_m)?;
     let aperture = Aperture::new(&telescope, range_m, largest);
     Ok(radius_m.iter().map(|&r| aperture.irradiance_per_m2(r)).collect())
 }
@@ -75,10 +84,11 @@ pub fn free_space_irradiance_per_m2(telescope: &Telescope, range_m: f64, radius_
 /// [`crate::theory::free_space_efficiency`], slower, limited to about 1e-8 by the cut of its tail.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] for a telescope or range that is not allowed.
+/// [`Error::OutOfRange`] for a telescope or range that is not allowed, [`Error::FresnelNumber`] as there.
 pub fn free_space_efficiency_hankel(telescope: &Telescope, range_m: f64) -> Result<f64, Error> {
     let telescope = telescope.validated()?;
     let range_m = positive("range_m", range_m)?;
+    check_fresnel_number(&telescope, range_m)?;
     let (k, a) = (telescope.wavenumber_rad_m(), telescope.aperture_radius_m.min(9.0 * telescope.intensity_radius_m()));
     let geometric = a * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
     let lobe = range_m / (k * a);

@@ -23,7 +23,7 @@
 //! | module | what is in it |
 //! |---|---|
 //! | [`beam`] | telescope, focus, obscuration, misalignment of the two beams |
-//! | [`theory`] | exact efficiency: free space, bistatic at any strength, closed forms |
+//! | [`theory`] | exact efficiency: free space, bistatic at any strength, closed forms; monostatic in weak turbulence |
 //! | [`hankel`] | free space by an independent Fresnel-Hankel quadrature; free-space irradiance |
 //! | [`spectrum`], [`structure`] | spectra of the refractive index and their structure functions |
 //! | [`turbulence`] | Cn2 along the path, Rytov variance, coherence radius |
@@ -37,6 +37,7 @@
 //! (default) runs realisations in parallel, with the same bits.
 
 pub mod beam;
+mod descent;
 pub mod efficiency;
 mod error;
 #[cfg(feature = "screens")]
@@ -71,6 +72,7 @@ pub mod theory;
 pub mod turbulence;
 #[cfg(feature = "screens")]
 mod walk;
+mod weak;
 
 pub use beam::{Focus, Misalignment, RadiusDefinition, Telescope};
 #[cfg(feature = "screens")]

@@ -302,6 +302,7 @@ impl MonteCarlo {
             monostatic_realisations: single,
             bistatic_realisations: pairs,
             realisations: if prepared.screens.is_some() { realisations } else { 1 },
+            independent_samples: sums.samples.first().map_or(0, Vec::len),
             grid_free_space,
             exact_free_space,
             lost_power_fraction,

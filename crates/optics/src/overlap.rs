@@ -10,6 +10,7 @@
 //! quadrature gives the same efficiency.
 
 use crate::beam::Telescope;
+use crate::descent::{Arc, Descent};
 use crate::quadrature::{GaussLegendre, adaptive};
 use crate::{Error, Misalignment};
 use std::f64::consts::PI;
@@ -17,10 +18,39 @@ use std::f64::consts::PI;
 /// Beyond this many 1/e radii a Gaussian is below the last bit of its peak.
 const GAUSSIAN_REACH: f64 = 6.2;
 
+/// Largest Fresnel number at which quadratures are done: a second on one core.
+pub const LARGEST_FRESNEL_NUMBER: f64 = 3000.0;
+
+/// Fresnel number a^2 |1/R - 1/F| / lambda of the lit aperture at `range_m`: the number of half waves by which its edge and its
+/// centre differ. Large values are the geometric near field, far from any focus.
+pub fn fresnel_number(telescope: &Telescope, range_m: f64) -> f64 {
+    let lit_m = telescope.aperture_radius_m.min(GAUSSIAN_REACH * telescope.intensity_radius_m());
+    lit_m * lit_m * (1.0 / range_m - telescope.focus.curvature_per_m()).abs() / telescope.wavelength_m
+}
+
+/// Forecast of the time of one quadrature of the efficiency at `range_m` on one core of 2023 \[s\]; `screens` is the number of
+/// phase screens, 0 in free space, 16 for a continuous path of constant strength, 64 for a profile over height.
+pub fn quadrature_cost_s(telescope: &Telescope, screens: usize, range_m: f64) -> f64 {
+    let fresnel = fresnel_number(telescope, range_m);
+    // Nodes grow with the Fresnel number, and so do those of M(rho) at each until steepest descent takes over.
+    let overlaps = 1e-4 + (fresnel * (4e-4 + 1.5e-5 * fresnel)).min(0.03 + 3.2e-4 * fresnel);
+    let annulus = if telescope.obscuration_radius_m > 0.0 { 2.5 } else { 1.0 };
+    overlaps * annulus + (60.0 + 126.0 * fresnel) * 1e-7 * screens as f64
+}
+
+pub(crate) fn check_fresnel_number(telescope: &Telescope, range_m: f64) -> Result<(), Error> {
+    let found = fresnel_number(telescope, range_m);
+    if found <= LARGEST_FRESNEL_NUMBER {
+        return Ok(());
+    }
+    Err(Error::FresnelNumber { range_m, found, largest: LARGEST_FRESNEL_NUMBER })
+}
+
 /// Evaluates M(rho) of one telescope for one wave-front curvature.
 pub(crate) struct Overlap {
     telescope: Telescope,
     rule: GaussLegendre,
+    descent: Descent,
     /// k (1/R - 1/F) \[rad/m^2\].
     phase_rad_m2: f64,
 }
@@ -31,6 +61,7 @@ impl Overlap {
         Self {
             telescope: *telescope,
             rule: GaussLegendre::new(20),
+            descent: Descent::new(),
             phase_rad_m2: telescope.wavenumber_rad_m() * curvature_per_m,
         }
     }
@@ -61,17 +92,16 @@ impl Overlap {
         // Right of the crossing the first disc bounds y, left of it the second.
         let crossing = if rho > 0.0 {
             ((p * p - q * q) / (2.0 * rho)).clamp(low, high)
-        } else if p > q {
-            high
         } else {
-            low
+            [low, 0.0, high][1 + usize::from(p > q) - usize::from(p < q)]
         };
-        self.strip(low, crossing, rho, |x| q * q - (x - 0.5 * rho).powi(2))
-            + self.strip(crossing, high, rho, |x| p * p - (x + 0.5 * rho).powi(2))
+        let right = self.strip(crossing, high, rho, -0.5 * rho, p);
+        // Equal discs: the left strip is the mirror image of the right one.
+        if p == q { 2.0 * right } else { self.strip(low, crossing, rho, 0.5 * rho, q) + right }
     }
 
-    /// One strip of the lens. x = middle + half sin(theta) removes the square-root ends of the half height.
-    fn strip(&self, low: f64, high: f64, rho: f64, height2: impl Fn(f64) -> f64) -> f64 {
+    /// One strip of the lens, under the arc of radius `radius` about `centre`.
+    fn strip(&self, low: f64, high: f64, rho: f64, centre: f64, radius: f64) -> f64 {
         let half = 0.5 * (high - low);
         if half <= 0.0 {
             return 0.0;
@@ -79,12 +109,17 @@ impl Overlap {
         let middle = 0.5 * (high + low);
         let s = self.telescope.intensity_radius_m();
         let kappa = self.phase_rad_m2 * rho;
-        // 20 nodes carry about 10 rad, and about two 1/e radii of the Gaussian.
+        let arc = Arc { centre_m: centre, radius_m: radius, intensity_radius_m: s };
+        if let Some(integral) = self.descent.integral(arc, low, high, kappa) {
+            return integral;
+        }
+        // 20 nodes carry up to 16 rad (in the middle of the arc), and about two 1/e radii of the Gaussian.
         let panels = 1 + (kappa.abs() * half / 5.0) as usize + (half / s) as usize;
+        // x = middle + half sin(theta) removes the square-root ends of the half height.
         self.rule.composite(-0.5 * PI, 0.5 * PI, panels, |theta| {
             let (sin, cos) = theta.sin_cos();
             let x = middle + half * sin;
-            let y = height2(x).max(0.0).sqrt();
+            let y = (radius * radius - (x - centre).powi(2)).max(0.0).sqrt();
             half * cos * self.chord(x, y, s) * (kappa * x).cos()
         })
     }
@@ -95,7 +130,7 @@ impl Overlap {
     }
 
     /// End points of smooth pieces of |M|^2, fine enough for its oscillation.
-    fn breaks(&self) -> Vec<f64> {
+    pub(crate) fn breaks(&self) -> Vec<f64> {
         let t = &self.telescope;
         let (a, b, s) = (t.aperture_radius_m, t.obscuration_radius_m, t.intensity_radius_m());
         let end = (2.0 * a).min(2.0 * GAUSSIAN_REACH * s);
@@ -107,7 +142,7 @@ impl Overlap {
         let mut breaks = vec![0.0];
         for pair in kinks.windows(2) {
             let phase = 2.0 * self.phase_rad_m2.abs() * reach * (pair[1] - pair[0]);
-            let n = 1 + (phase / 8.0) as usize;
+            let n = 1 + (phase / 12.0) as usize;
             let h = (pair[1] - pair[0]) / n as f64;
             breaks.extend((1..=n).map(|i| pair[0] + h * i as f64));
         }
@@ -128,6 +163,7 @@ pub(crate) fn efficiency_with(
     let telescope = telescope.validated()?;
     let misalignment = misalignment.validated()?;
     let range_m = crate::error::positive("range_m", range_m)?;
+    check_fresnel_number(&telescope, range_m)?;
     let overlap = Overlap::new(&telescope, range_m);
     let shift = telescope.wavenumber_rad_m() * misalignment.separation_m(range_m) / range_m;
     let integral = adaptive(&overlap.rule, &overlap.breaks(), 2e-13, "efficiency", &mut |rho| {
@@ -165,5 +201,32 @@ mod tests {
             let exact = 2.0 / PI * (v.acos() - v * (1.0 - v * v).sqrt());
             assert!((overlap.at(2.0 * 0.05 * v) - exact).abs() < 1e-13);
         }
+    }
+
+    #[test]
+    fn fresnel_number_without_bound_is_an_error_that_names_it() {
+        let focus = crate::Focus::At(1.777e-4);
+        let t = Telescope { focus, ..Telescope::chapter() };
+        match efficiency_with(&t, &Misalignment::NONE, 1000.0, &|_| 0.0) {
+            Err(Error::FresnelNumber { range_m, found, largest }) => {
+                assert_eq!((range_m, largest), (1000.0, LARGEST_FRESNEL_NUMBER));
+                assert!((found / 9.07e6 - 1.0).abs() < 1e-2, "{found}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn shadow_of_geometry_is_the_limit_of_a_large_fresnel_number() {
+        // M(rho) is then the transform of the irradiance: eta = (lambda R)^2/A_R integral of j^2 with j the shadow of the
+        // aperture. What the edge diffracts is of the order of the reciprocal of the Fresnel number.
+        let t = Telescope { wavelength_m: 1.62e-7, ..Telescope::chapter() };
+        let range_m = 50.0;
+        assert!(fresnel_number(&t, range_m) > 300.0);
+        let eta = efficiency_with(&t, &Misalignment::NONE, range_m, &|_| 0.0).unwrap();
+        let (a, s) = (0.05f64, 0.03f64);
+        let squared = (1.0 - (-2.0 * (a / s).powi(2)).exp()) / (2.0 * PI * s * s);
+        let shadow = (t.wavelength_m * range_m).powi(2) / (PI * a * a) * squared;
+        assert!((eta / shadow - 1.0).abs() < 1e-3, "{eta} {shadow}");
     }
 }

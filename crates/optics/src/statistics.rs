@@ -133,7 +133,7 @@ pub(crate) struct Sample {
     pub(crate) lost: f64,
 }
 
-/// Mean and variance of a list.
+/// Mean and variance of a list; the variance of fewer than two values is NaN, as nothing is known of it.
 pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let (mut n, mut sum) = (0.0, 0.0);
     for v in values.clone() {
@@ -142,10 +142,10 @@ pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f
     }
     let mean = sum / n;
     let squares: f64 = values.map(|v| (v - mean) * (v - mean)).sum();
-    (mean, if n > 1.0 { squares / (n - 1.0) } else { 0.0 })
+    (mean, if n > 1.0 { squares / (n - 1.0) } else { f64::NAN })
 }
 
-/// Bistatic efficiency of all pairs and its jackknife standard error.
+/// Bistatic efficiency of all pairs and its jackknife standard error, NaN for fewer than three samples.
 ///
 /// `total` is the overlap of the two summed planes, `scale` turns a product of ring sums (per point) into an efficiency.
 pub(crate) fn bistatic(samples: &[&Sample], total: f64, folding: &Folding, scale: f64) -> (f64, f64) {

@@ -60,25 +60,67 @@ impl Cn2Path {
         }
     }
 
-    /// Mean of Cn2 \[m^(-2/3)\] from `start_m` to `end_m` along the path.
+    /// Mean of Cn2 \[m^(-2/3)\] from `start_m` to `end_m` along the path, exact: the profile is straight between its knots.
     ///
     /// # Errors
     /// As [`Cn2Path::at`].
     pub fn mean(&self, start_m: f64, end_m: f64) -> Result<f64, Error> {
-        if !matches!(self, Self::Heights { .. }) {
+        if !matches!(self, Self::Heights { .. }) || start_m == end_m {
             return self.at(start_m);
         }
-        let rule = GaussLegendre::new(4);
-        const PANELS: usize = 16;
-        let mut failure = None;
-        let integral = rule.composite(start_m, end_m, PANELS, |z| match self.at(z) {
-            Ok(value) => value,
-            Err(error) => {
-                failure = Some(error);
-                0.0
+        let edges = self.edges_m(start_m, end_m);
+        let values = edges.iter().map(|&z| self.at(z)).collect::<Result<Vec<_>, _>>()?;
+        let pieces = edges.windows(2).zip(values.windows(2));
+        let integral: f64 = pieces.map(|(z, cn2)| 0.5 * (cn2[0] + cn2[1]) * (z[1] - z[0])).sum();
+        Ok(integral / (end_m - start_m))
+    }
+
+    /// `start_m`, the ranges between at which the profile has a knot, `end_m`.
+    fn edges_m(&self, start_m: f64, end_m: f64) -> Vec<f64> {
+        let mut edges = vec![start_m];
+        if let Self::Heights { height_m, telescope_height_m, elevation_rad, .. } = self {
+            let climb = elevation_rad.sin();
+            let ranges = height_m.iter().map(|h| (h - telescope_height_m) / climb);
+            // A horizontal path gives infinity or NaN, which is between nothing.
+            edges.extend(ranges.filter(|&z| z > start_m && z < end_m));
+            edges.sort_by(f64::total_cmp);
+        }
+        edges.push(end_m);
+        edges
+    }
+
+    /// Places z \[m\] and weights \[m^(1/3)\] by which the integral of Cn2(z) f(z) from 0 to `range_m` is a sum, for any f
+    /// that is smooth along the path or a power of its rest.
+    ///
+    /// f is interpolated on panels that halve towards the end; its products with the straight pieces of the profile are
+    /// then exact, so that the number of places does not grow with the number of knots.
+    ///
+    /// # Errors
+    /// As [`Cn2Path::at`].
+    pub(crate) fn quadrature(&self, range_m: f64) -> Result<Vec<(f64, f64)>, Error> {
+        const HALVED: [f64; 5] = [0.0, 0.5, 0.75, 0.875, 1.0];
+        // Between 16 places f is a polynomial of degree 15; times a straight line, 9 nodes integrate it exactly.
+        let (places, exact) = (GaussLegendre::new(16), GaussLegendre::new(9));
+        let mut out = Vec::new();
+        match self {
+            Self::None => {}
+            Self::Uniform { cn2_m_m23 } => out.extend(places.mapped(0.0, range_m).map(|(z, w)| (z, cn2_m_m23 * w))),
+            Self::Heights { .. } => {
+                for panel in HALVED.windows(2) {
+                    let (start, end) = (panel[0] * range_m, panel[1] * range_m);
+                    let at: Vec<f64> = places.mapped(start, end).map(|(z, _)| z).collect();
+                    let mut weight = vec![0.0; at.len()];
+                    for piece in self.edges_m(start, end).windows(2) {
+                        for (z, dz) in exact.mapped(piece[0], piece[1]) {
+                            let cn2_dz = self.at(z)? * dz;
+                            weight.iter_mut().enumerate().for_each(|(j, w)| *w += cn2_dz * lagrange(&at, j, z));
+                        }
+                    }
+                    out.extend(at.into_iter().zip(weight));
+                }
             }
-        });
-        failure.map_or(Ok(integral / (end_m - start_m)), Err)
+        }
+        Ok(out)
     }
 
     /// Whether the path is free of turbulence.
@@ -170,6 +212,38 @@ pub fn coherence_radius_m(cn2_m_m23: f64, wavelength_m: f64, range_m: f64) -> Re
     Ok((1.4572 * k * k * cn2 * positive("range_m", range_m)? * 0.375).powf(-0.6))
 }
 
+/// Rytov variance of a plane wave along a path of changing strength, 2.25 k^(7/6) integral of Cn2(z) (R - z)^(5/6) dz: that of
+/// [`rytov_variance`] for a constant Cn2.
+///
+/// # Errors
+/// [`Error`] names the argument that is not allowed; as [`Cn2Path::at`].
+pub fn path_rytov_variance(cn2: &Cn2Path, wavelength_m: f64, range_m: f64) -> Result<f64, Error> {
+    // For a constant Cn2 the integral is 6/11 R^(11/6) Cn2; the printed 1.23 is 6/11 of this number.
+    const CONSTANT: f64 = 1.23 * 11.0 / 6.0;
+    let k = 2.0 * std::f64::consts::PI / positive("wavelength_m", wavelength_m)?;
+    let rest = positive("range_m", range_m)?;
+    let places = cn2.clone().validated()?.quadrature(range_m)?;
+    Ok(CONSTANT * k.powf(7.0 / 6.0) * places.iter().map(|(z, w)| w * (rest - z).powf(5.0 / 6.0)).sum::<f64>())
+}
+
+/// Coherence radius \[m\] at the telescope of a spherical wave from `range_m` along a path of changing strength,
+/// \[1.4572 k^2 integral of Cn2(z) (1 - z/R)^(5/3) dz\]^(-3/5): that of [`coherence_radius_m`] for a constant Cn2.
+///
+/// # Errors
+/// [`Error`] names the argument that is not allowed; as [`Cn2Path::at`].
+pub fn path_coherence_radius_m(cn2: &Cn2Path, wavelength_m: f64, range_m: f64) -> Result<f64, Error> {
+    let k = 2.0 * std::f64::consts::PI / positive("wavelength_m", wavelength_m)?;
+    let whole = positive("range_m", range_m)?;
+    let places = cn2.clone().validated()?.quadrature(range_m)?;
+    let weighted: f64 = places.iter().map(|(z, w)| w * (1.0 - z / whole).powf(5.0 / 3.0)).sum();
+    Ok((1.4572 * k * k * weighted).powf(-0.6))
+}
+
+/// Value at `x` of the polynomial that is 1 at `at[j]` and 0 at the other places.
+fn lagrange(at: &[f64], j: usize, x: f64) -> f64 {
+    at.iter().enumerate().filter(|(i, _)| *i != j).map(|(_, z)| (x - z) / (at[j] - z)).product()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -202,6 +276,69 @@ mod tests {
         for cn2 in [-1e-15, f64::NAN, f64::INFINITY] {
             let error = Turbulence::chapter(cn2).unwrap_err().to_string();
             assert!(error.contains("cn2_m_m23"), "{error}");
+        }
+    }
+
+    /// Hufnagel-Valley 5/7 with knots dense near the ground, seen at `elevation_rad` from the ground.
+    fn hufnagel_valley(elevation_rad: f64) -> Cn2Path {
+        let height_m: Vec<f64> = (0..=2000).map(|i| 20_000.0 * (f64::from(i) / 2000.0).powi(2)).collect();
+        let at = |h: f64| {
+            0.00594 * (21f64 / 27.0).powi(2) * (1e-5 * h).powi(10) * (-h / 1000.0).exp()
+                + 2.7e-16 * (-h / 1500.0).exp()
+                + 1.7e-14 * (-h / 100.0).exp()
+        };
+        let cn2_m_m23 = height_m.iter().map(|&h| at(h)).collect();
+        Cn2Path::Heights { height_m, cn2_m_m23, telescope_height_m: 0.0, elevation_rad }
+    }
+
+    #[test]
+    fn mean_of_hufnagel_valley_is_its_integral() {
+        let path = hufnagel_valley(std::f64::consts::FRAC_PI_2);
+        let mean = path.mean(0.0, 20_000.0).unwrap();
+        // Integral from 0 to infinity: 10! x 1000^11 and two exponentials; what lies above 20 km is below 1e-3 of it.
+        let high = 0.00594 * (21f64 / 27.0).powi(2) * 1e-50 * 3_628_800.0 * 1e33;
+        let exact = (high + 2.7e-16 * 1500.0 + 1.7e-14 * 100.0) / 20_000.0;
+        assert!((mean / exact - 1.0).abs() < 1e-3, "{mean:e} {exact:e}");
+        assert!((mean - 1.118e-16).abs() < 1e-19, "{mean:e}");
+    }
+
+    #[test]
+    fn weighted_means_see_every_knot() {
+        // A thin strong layer at the ground: nothing may step over it.
+        let path = Cn2Path::Heights {
+            height_m: vec![0.0, 20.0, 21.0, 3000.0],
+            cn2_m_m23: vec![1e-13, 1e-13, 1e-16, 1e-17],
+            telescope_height_m: 2.0,
+            elevation_rad: 10f64.to_radians(),
+        };
+        let range_m = 3000.0;
+        let slices = 200_000;
+        let sum = |f: &dyn Fn(f64) -> f64| {
+            let dz = range_m / f64::from(slices);
+            (0..slices).map(|i| (f64::from(i) + 0.5) * dz).map(|z| path.at(z).unwrap() * f(z) * dz).sum::<f64>()
+        };
+        assert!((path.mean(0.0, range_m).unwrap() * range_m / sum(&|_| 1.0) - 1.0).abs() < 1e-6);
+        for power in [5.0 / 6.0, 5.0 / 3.0] {
+            let f = |z: f64| (1.0 - z / range_m).powf(power);
+            let found: f64 = path.quadrature(range_m).unwrap().iter().map(|&(z, w)| w * f(z)).sum();
+            assert!((found / sum(&f) - 1.0).abs() < 1e-6, "{power}");
+        }
+    }
+
+    #[test]
+    fn weighted_means_of_a_constant_strength_are_the_printed_ones() {
+        let uniform = Cn2Path::Uniform { cn2_m_m23: 3e-14 };
+        let level = Cn2Path::Heights {
+            height_m: vec![0.0, 7.0, 50.0],
+            cn2_m_m23: vec![3e-14; 3],
+            telescope_height_m: 7.0,
+            elevation_rad: 0.0,
+        };
+        for path in [uniform, level] {
+            let rytov = path_rytov_variance(&path, 1.55e-6, 900.0).unwrap();
+            assert!((rytov / rytov_variance(3e-14, 1.55e-6, 900.0).unwrap() - 1.0).abs() < 1e-4, "{rytov}");
+            let radius = path_coherence_radius_m(&path, 1.55e-6, 900.0).unwrap();
+            assert!((radius / coherence_radius_m(3e-14, 1.55e-6, 900.0).unwrap() - 1.0).abs() < 1e-6, "{radius}");
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use wakescope_optics::hankel::free_space_efficiency_hankel;
 use wakescope_optics::theory::{
-    free_space_antenna_efficiency, free_space_efficiency, free_space_efficiency_misaligned, untruncated_efficiency,
+    self, free_space_antenna_efficiency, free_space_efficiency, free_space_efficiency_misaligned,
+    untruncated_efficiency,
 };
 use wakescope_optics::{Focus, Misalignment, RadiusDefinition, SnrModel, Telescope};
 
@@ -141,4 +142,13 @@ fn bad_range_is_an_error_that_names_it() {
         let error = free_space_efficiency(&Telescope::chapter(), range_m).unwrap_err();
         assert!(error.to_string().contains("range_m"), "{error}");
     }
+}
+
+#[test]
+fn forecast_of_a_quadrature_grows_no_faster_than_the_fresnel_number() {
+    // Ten times the Fresnel number, ten times the nodes: not a hundred times the time.
+    let at = |range_m| theory::quadrature_cost_s(&Telescope::chapter(), 0, range_m);
+    assert!(at(1.0) / at(10.0) < 11.0 && at(1.0) > at(10.0) && at(10.0) > at(1000.0));
+    let far = theory::fresnel_number(&Telescope::chapter(), 1000.0);
+    assert!((far - 2.5e-3 / (1000.0 * 1.55e-6)).abs() < 1e-12);
 }
