@@ -5,6 +5,7 @@
 //! line of sight. Check: against the plain mean of the windows, its independence of the order of rays and of the
 //! number of threads, and that a window with a NaN is left out without harm to its neighbours.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use ndarray::ArrayView2;
@@ -12,12 +13,16 @@ use num_complex::Complex;
 
 use crate::error::{Error, length};
 use crate::gates::Gates;
-use crate::parallel::{for_each_chunk, map_indexed};
+use crate::parallel::map_indexed;
 use crate::region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, effective};
-use crate::sample::{Sample, Scratch, SignalKind, binary_scale};
+use crate::sample::{Sample, Scratch, SignalKind};
 use crate::sampling::Sampling;
 use crate::statistic::{Estimator, Statistic};
 use crate::velocity::{GateVelocity, Quality};
+
+mod streamed;
+
+pub use streamed::ScanSums;
 
 /// Prefix sums start afresh this often, which bounds their rounding by the loudest of so many windows.
 const BLOCK: usize = 64;
@@ -71,9 +76,9 @@ pub struct Scan {
     numbers: usize,
     sums: Vec<f64>,
     /// Valid windows before each gate, `gates + 1` per line.
-    counts: Vec<u32>,
-    /// Validity of the windows of a ray, only where one is not.
-    invalid: Vec<Option<Vec<bool>>>,
+    counts: Vec<usize>,
+    /// Validity of the windows of the rays with one that is not.
+    invalid: BTreeMap<usize, Vec<bool>>,
     scale: f64,
 }
 
@@ -94,32 +99,10 @@ impl Scan {
     ) -> Result<Self, Error> {
         let (rays, samples) = records.dim();
         length("elevation_rad", rays, elevation_rad.len())?;
-        length("window", statistic.window_samples(), gates.window_samples)?;
         let geometry = ScanGeometry::new(sampling, gates, elevation_rad, samples)?;
-        let count = geometry.gates();
-        let numbers = statistic.statistic_len();
-        let scale = binary_scale(records.iter().copied());
-        let invalid =
-            map_indexed(rays, || (), |(), ray| invalid_windows(records.row(ray).iter().copied(), gates, count));
-        let mut sums = vec![0.0; geometry.line_rays().len() * count * numbers];
-        for_each_chunk(
-            &mut sums,
-            count * numbers,
-            || (Scratch::new(), Vec::with_capacity(samples)),
-            |(scratch, row), line, chunk| {
-                for &ray in &geometry.line_rays()[line] {
-                    row.clear();
-                    row.extend(records.row(ray).iter().map(|s| s.scaled(scale.recip())));
-                    let valid = |gate: usize| !invalid[ray].as_ref().is_some_and(|invalid| invalid[gate]);
-                    statistic.evaluate_record(row, gates.step_samples, &valid, scratch, &mut |gate, one| {
-                        add(&mut chunk[gate * numbers..(gate + 1) * numbers], one);
-                    });
-                }
-                prefix_in_blocks(chunk, numbers);
-            },
-        );
-        let counts = valid_before(&geometry, &invalid);
-        Ok(Self { geometry, numbers, sums, counts, invalid, scale })
+        let mut sums = ScanSums::new(statistic, gates, geometry, samples)?;
+        sums.add(0, records)?;
+        Ok(sums.finish())
     }
 
     /// Where the windows are.
@@ -285,9 +268,10 @@ impl Scan {
         let (mut level, mut pairs) = (0, 0.0);
         for chord in self.geometry.chords(point, radius_m) {
             level += self.valid(chord);
-            for &ray in &self.geometry.line_rays()[chord.line] {
-                pairs += match &self.invalid[ray] {
-                    None => correlation.pair_sum(chord.gates()),
+            let whole = correlation.pair_sum(chord.gates());
+            for ray in self.geometry.line_rays(chord.line) {
+                pairs += match self.invalid.get(&ray) {
+                    None => whole,
                     Some(invalid) => valid_pairs(&invalid[chord.first..=chord.last], correlation),
                 };
             }
@@ -298,7 +282,7 @@ impl Scan {
     /// Valid windows of a chord.
     fn valid(&self, chord: Chord) -> usize {
         let row = chord.line * (self.geometry.gates() + 1);
-        (self.counts[row + chord.last + 1] - self.counts[row + chord.first]) as usize
+        self.counts[row + chord.last + 1] - self.counts[row + chord.first]
     }
 
     /// Adds the sum over a chord to `out`, block by block.
@@ -327,42 +311,6 @@ fn add(sum: &mut [f64], term: &[f64]) {
     for (sum, term) in sum.iter_mut().zip(term) {
         *sum += term;
     }
-}
-
-/// Turns the rows of one line into running sums that start afresh every [`BLOCK`] gates.
-fn prefix_in_blocks(line: &mut [f64], numbers: usize) {
-    for block in line.chunks_mut(BLOCK * numbers) {
-        for index in numbers..block.len() {
-            block[index] += block[index - numbers];
-        }
-    }
-}
-
-/// Which windows of a ray hold a sample that is not finite; `None` if no one does.
-fn invalid_windows<S: Sample>(samples: impl Iterator<Item = S>, gates: &Gates, count: usize) -> Option<Vec<bool>> {
-    let bad: Vec<usize> =
-        samples.enumerate().filter(|(_, sample)| !sample.is_finite()).map(|(index, _)| index).collect();
-    let invalid = |gate: usize| {
-        let start = gate * gates.step_samples;
-        let next = bad.partition_point(|index| *index < start);
-        bad.get(next).is_some_and(|index| *index < start + gates.window_samples)
-    };
-    (!bad.is_empty()).then(|| (0..count).map(invalid).collect())
-}
-
-/// Valid windows before each gate, for all lines.
-fn valid_before(geometry: &ScanGeometry, invalid: &[Option<Vec<bool>>]) -> Vec<u32> {
-    let mut counts = Vec::with_capacity(geometry.line_rays().len() * (geometry.gates() + 1));
-    for rays in geometry.line_rays() {
-        let mut before = 0;
-        counts.push(0);
-        for gate in 0..geometry.gates() {
-            let valid = rays.iter().filter(|ray| !invalid[**ray].as_ref().is_some_and(|list| list[gate])).count();
-            before += valid as u32;
-            counts.push(before);
-        }
-    }
-    counts
 }
 
 /// Sum of gamma^2 over the ordered pairs of valid windows of one ray.

@@ -81,6 +81,7 @@ mod parallel;
 mod peak;
 mod periodogram;
 mod poles;
+mod rays;
 mod region;
 mod sample;
 mod sampling;
@@ -96,7 +97,7 @@ pub mod vortex_fit;
 mod weighting;
 mod zoom;
 
-pub use accumulate::{MapPoint, Radius, Scan};
+pub use accumulate::{MapPoint, Radius, Scan, ScanSums};
 pub use autoregressive::{Autoregression, OrderChoice};
 pub use bound::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s, information_complex, information_real};
 pub use correlogram::{Correlogram, Taper, correlogram_by_sum};

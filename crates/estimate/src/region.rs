@@ -4,8 +4,9 @@
 //! Check: against the distance of every window; the accumulation levels 11, 43, 169 for 1, 2, 4 m
 //! at 400 m with 0.5 m between lines and 0.6 m between windows.
 
-use crate::error::{Error, finite, length};
+use crate::error::{Error, length};
 use crate::gates::Gates;
+use crate::rays::{Rays, check_angles};
 use crate::sampling::Sampling;
 
 /// A place in the scan plane.
@@ -49,7 +50,7 @@ impl Chord {
 #[derive(Debug, Clone)]
 pub struct ScanGeometry {
     lines: Vec<f64>,
-    rays: Vec<Vec<usize>>,
+    pub(crate) rays: Rays,
     first_range_m: f64,
     spacing_m: f64,
     gates: usize,
@@ -66,39 +67,47 @@ impl ScanGeometry {
         elevation_rad: &[f64],
         record_samples: usize,
     ) -> Result<Self, Error> {
+        check_angles(elevation_rad)?;
+        let (lines, rays) = Rays::grouped(elevation_rad);
+        Self::of(lines, rays, sampling, gates, record_samples)
+    }
+
+    /// Geometry of lines of sight at `elevation_rad`, increasing, each with `rays_per_line` records that stand together, one
+    /// line after the other. It takes no memory for the rays.
+    ///
+    /// # Errors
+    /// As [`ScanGeometry::new`]; [`Error::OutOfRange`] for angles that do not increase or lines without rays.
+    pub fn regular(
+        sampling: &Sampling,
+        gates: &Gates,
+        elevation_rad: &[f64],
+        rays_per_line: usize,
+        record_samples: usize,
+    ) -> Result<Self, Error> {
+        check_angles(elevation_rad)?;
+        if let Some(pair) = elevation_rad.windows(2).find(|pair| pair[1] <= pair[0]) {
+            return Err(Error::OutOfRange { field: "elevation_rad", value: pair[1], allowed: "increasing" });
+        }
+        if rays_per_line == 0 {
+            return Err(Error::OutOfRange { field: "rays_per_line", value: 0.0, allowed: "at least 1" });
+        }
+        Self::of(elevation_rad.to_vec(), Rays::Regular { per_line: rays_per_line }, sampling, gates, record_samples)
+    }
+
+    fn of(
+        lines: Vec<f64>,
+        rays: Rays,
+        sampling: &Sampling,
+        gates: &Gates,
+        record_samples: usize,
+    ) -> Result<Self, Error> {
         sampling.validate()?;
-        let count = gates.count(record_samples)?;
-        if elevation_rad.is_empty() {
-            return Err(Error::Empty { field: "elevation_rad" });
-        }
-        for &angle_rad in elevation_rad {
-            finite("elevation_rad", angle_rad)?;
-            if angle_rad.abs() > std::f64::consts::PI {
-                return Err(Error::OutOfRange {
-                    field: "elevation_rad",
-                    value: angle_rad,
-                    allowed: "between -pi and pi",
-                });
-            }
-        }
-        let mut order: Vec<usize> = (0..elevation_rad.len()).collect();
-        order.sort_by(|&a, &b| elevation_rad[a].total_cmp(&elevation_rad[b]).then(a.cmp(&b)));
-        let (mut lines, mut rays) = (Vec::<f64>::new(), Vec::<Vec<usize>>::new());
-        for ray in order {
-            match (lines.last(), rays.last_mut()) {
-                (Some(&line), Some(members)) if line == elevation_rad[ray] => members.push(ray),
-                _ => {
-                    lines.push(elevation_rad[ray]);
-                    rays.push(vec![ray]);
-                }
-            }
-        }
         Ok(Self {
             lines,
             rays,
             first_range_m: gates.range_m(0, sampling),
             spacing_m: gates.spacing_m(sampling),
-            gates: count,
+            gates: gates.count(record_samples)?,
         })
     }
 
@@ -108,10 +117,9 @@ impl ScanGeometry {
         &self.lines
     }
 
-    /// Rays (rows of the records) of every line of sight.
-    #[must_use]
-    pub fn line_rays(&self) -> &[Vec<usize>] {
-        &self.rays
+    /// Rays (rows of the records) of a line of sight, increasing.
+    pub fn line_rays(&self, line: usize) -> impl Iterator<Item = usize> + '_ {
+        self.rays.within(line, &(0..usize::MAX))
     }
 
     /// Number of windows along a ray.
@@ -161,7 +169,7 @@ impl ScanGeometry {
     pub fn level(&self, point: PolarPoint, radius_m: f64, correlation: &WindowCorrelation) -> (usize, f64) {
         let (mut level, mut pairs) = (0, 0.0);
         for chord in self.chords(point, radius_m) {
-            let rays = self.rays[chord.line].len();
+            let rays = self.rays.count(chord.line);
             level += rays * chord.gates();
             pairs += rays as f64 * correlation.pair_sum(chord.gates());
         }
@@ -337,7 +345,7 @@ mod tests {
         let elevation_rad = [0.3, 0.1, -0.2, 0.1, 0.05, 3.0, 1.2];
         let geometry = ScanGeometry::new(&sampling(), &gates, &elevation_rad, 300).unwrap();
         assert_eq!(geometry.line_elevation_rad().len(), 6);
-        assert_eq!(geometry.line_rays()[2], vec![1, 3]);
+        assert_eq!(geometry.line_rays(2).collect::<Vec<_>>(), [1, 3]);
         let ranges_m = geometry.gate_ranges_m();
         for (range_m, elevation_rad, radius_m) in
             [(50.0, 0.07, 6.3), (20.0, 0.2, 25.0), (90.0, 0.1, 0.0), (ranges_m[5], 0.1, 0.0), (500.0, 0.0, 2.0)]

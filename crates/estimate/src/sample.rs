@@ -125,14 +125,15 @@ impl Sample for Complex<f64> {
 ///
 /// Dividing by it is exact and brings the samples to order one, so that squares neither overflow nor vanish.
 pub(crate) fn binary_scale<S: Sample>(samples: impl Iterator<Item = S>) -> f64 {
+    largest_binary_scale(samples).unwrap_or(1.0)
+}
+
+/// The same; `None` if there is no sample above 0.
+pub(crate) fn largest_binary_scale<S: Sample>(samples: impl Iterator<Item = S>) -> Option<f64> {
     let largest =
         samples.filter(|sample| sample.is_finite()).fold(0.0_f64, |largest, sample| largest.max(sample.largest_part()));
-    if largest > 0.0 {
-        // clamped so that the scale and its inverse are both normal numbers
-        largest.log2().floor().clamp(-1000.0, 1000.0).exp2()
-    } else {
-        1.0
-    }
+    // clamped so that the scale and its inverse are both normal numbers
+    (largest > 0.0).then(|| largest.log2().floor().clamp(-1000.0, 1000.0).exp2())
 }
 
 /// Work space owned by the caller; buffers grow on first use and are then reused without allocation.

@@ -98,6 +98,37 @@ fn order_of_rays_does_not_matter() {
     }
 }
 
+#[test]
+fn records_that_come_in_pieces_give_the_same_bits() {
+    let mut records = noise_records(12);
+    // louder and louder, and one sample is missing
+    records.row_mut(4).mapv_inplace(|x| 5.0 * x);
+    records.row_mut(7).mapv_inplace(|x| 3e4 * x);
+    records[[5, 200]] = f64::NAN;
+    let (statistic, point) = (plan().statistic, PolarPoint { range_m: 400.0, elevation_rad: 0.01 });
+    let correlation = WindowCorrelation::from_gate_lags(&[1.0, 0.9, 0.7, 0.4]).unwrap();
+    let lines_rad = [0.0, 0.004, 0.01, 0.013];
+    let rays_rad: Vec<f64> = lines_rad.iter().flat_map(|&el| [el, el]).collect();
+    let numbers = |scan: &Scan| {
+        let mut mean = vec![0.0; 64];
+        let level = scan.region_mean(point, 5.0, &mut mean).unwrap();
+        let unit = scan.scale().powi(2);
+        let bits: Vec<u64> = mean.iter().map(|m| (m * unit).to_bits()).collect();
+        (bits, level, scan.n_eff(point, 5.0, &correlation).to_bits())
+    };
+    let whole = numbers(&scan(&records, &rays_rad));
+    for piece in [1, 2, 3, 5, 8] {
+        let geometry = ScanGeometry::regular(&sampling(), &gates(), &lines_rad, 2, SAMPLES).unwrap();
+        let mut sums = ScanSums::new(&statistic, &gates(), geometry, SAMPLES).unwrap();
+        for (index, rays) in records.axis_chunks_iter(Axis(0), piece).enumerate() {
+            sums.add(piece * index, rays).unwrap();
+        }
+        assert_eq!(numbers(&sums.finish()), whole, "pieces of {piece}");
+    }
+    let falling = ScanGeometry::regular(&sampling(), &gates(), &[0.1, 0.1], 2, SAMPLES).unwrap_err();
+    assert!(falling.to_string().contains("increasing"), "{falling}");
+}
+
 fn points() -> Vec<PolarPoint> {
     let ranges_m: Vec<f64> = (0..40).map(|i| 330.0 + 3.0 * i as f64).collect();
     polar_points(&[0.001, 0.008, 0.0125], &ranges_m)
