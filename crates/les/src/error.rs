@@ -58,7 +58,7 @@ pub enum Error {
     },
     /// A simulation has produced values that are not finite.
     #[error(
-        "the {field} {component} is not finite at step {step} (t = {time_s} s), cell {cell:?}, x, y, z = {position_m:?} m: \
+        "the {field} {component} is not finite at step {step} (t = {time_s:?} s), cell {cell:?}, x, y, z = {position_m:?} m: \
          the time step is too long, the mesh too coarse for the viscosity, or the initial field was not finite"
     )]
     Diverged {
@@ -77,7 +77,7 @@ pub enum Error {
     },
     /// A time step is so long that the scheme would be unstable.
     #[error(
-        "step {step} of {step_s} s at t = {time_s} s has Courant number {courant}, above {limit}: fastest is {component} in cell \
+        "step {step} of {step_s:?} s at t = {time_s:?} s has Courant number {courant}, above {limit}: fastest is {component} in cell \
          {cell:?}, x, y, z = {position_m:?} m; shorten the step or let a Courant number control it"
     )]
     CourantTooLarge {
@@ -97,6 +97,32 @@ pub enum Error {
         cell: [usize; 3],
         /// Position of that cell \[m\].
         position_m: [f64; 3],
+    },
+    /// A flow has more kinetic energy than it started with and force or moving walls can have given it.
+    #[error(
+        "step {step} (t = {time_s:?} s): the kinetic energy has grown to {energy_m5_s2:.6e} m^5/s^2, at most {allowed_m5_s2:.6e} \
+         can have come from the start, a force or walls that move; it grows at {rate_per_s:.3e} 1/s, most in {component} near cell \
+         {cell:?}, x, y, z = {position_m:?} m: {cause}"
+    )]
+    EnergyGrew {
+        /// Number of the step.
+        step: u64,
+        /// Time reached \[s\].
+        time_s: f64,
+        /// Kinetic energy, integral of `u^2/2` \[m^5/s^2\].
+        energy_m5_s2: f64,
+        /// The most that the flow may have.
+        allowed_m5_s2: f64,
+        /// Growth rate of the energy in this step \[1/s\].
+        rate_per_s: f64,
+        /// Velocity component whose shortest waves are strongest.
+        component: &'static str,
+        /// Cell where they are, indices along x, y, z.
+        cell: [usize; 3],
+        /// Its position \[m\].
+        position_m: [f64; 3],
+        /// The likeliest cause, and what to do.
+        cause: String,
     },
     /// The system refused to read or write a file.
     #[error("cannot {action} {}: {reason}", path.display())]
@@ -147,7 +173,7 @@ pub enum Error {
         wanted: String,
     },
     /// Who watches a run has stopped it, such as an output that cannot be written.
-    #[error("the run was stopped after step {step} (t = {time_s} s): {reason}")]
+    #[error("the run was stopped after step {step} (t = {time_s:?} s): {reason}")]
     Stopped {
         /// Last step made.
         step: u64,
@@ -157,7 +183,9 @@ pub enum Error {
         reason: String,
     },
     /// The time step that the Courant number allows has become so short that the run would not end.
-    #[error("step {step} at t = {time_s} s is {step_s} s long, too short to reach {end_s} s: the flow is blowing up")]
+    #[error(
+        "step {step} at t = {time_s:?} s is {step_s:?} s long, too short to reach {end_s:?} s: the flow is blowing up"
+    )]
     StepTooShort {
         /// Number of the step.
         step: u64,

@@ -67,8 +67,8 @@ pub use solver::{
 #[cfg(feature = "solver")]
 pub use solver::{
     Direction, Ends, Flow, FlowSettings, Mapping, MappingFn, Mesh, PressureEquation, PressureMethod, PressureSolved,
-    SecondaryRecord, StartReport, StepReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment, VortexRecord,
-    WakeMeter, WakeRecord, WakeScales, Wall, cases,
+    SecondaryRecord, StartReport, StepReport, SubgridModel, TimeScheme, TimeStep, UndampedGrowth, ViscousTreatment,
+    VortexRecord, WakeMeter, WakeRecord, WakeScales, Wall, cases,
 };
 pub use two_scale::TwoScale;
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};

@@ -9,6 +9,7 @@ mod control;
 mod convection;
 mod fields;
 mod flow;
+mod growth;
 mod implicit;
 mod layout;
 mod line;
@@ -28,6 +29,7 @@ mod wake;
 
 pub use checkpoint::check_checkpoint;
 pub use flow::Flow;
+pub use growth::UndampedGrowth;
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
 pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
 pub use report::{StartReport, StepReport};

@@ -18,8 +18,9 @@ use super::settings::FlowSettings;
 use crate::Error;
 use container::{Content, Reader, Tag};
 
-/// Version of the content. Raise it with every change of the sections or of the words in [`identity`].
-const VERSION: u32 = 1;
+/// Version of the content. Raise it with every change of the sections, of the words in [`identity`], or of what a run keeps
+/// beside the flow.
+const VERSION: u32 = 2;
 
 const IDENTITY: &Tag = b"IDENTITY";
 const METRICS: [&Tag; 3] = [b"METRIC X", b"METRIC Y", b"METRIC Z"];

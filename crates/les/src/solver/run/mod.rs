@@ -4,17 +4,23 @@
 //! Every decision follows from the state and the plan, so that a run resumed from a checkpoint makes the same steps, records
 //! and outputs, bit for bit, as one that was not interrupted.
 //!
+//! A state whose energy is more than the flow can have ends the run before anything is written of it.
+//!
 //! Check: resumed against uninterrupted runs, times hit, the energy budget against a flow with known decay, runs that blow
 //! up, observers that fail.
+
+mod energy;
 
 use std::path::{Path, PathBuf};
 
 use super::flow::Flow;
+use super::growth::UndampedGrowth;
 use super::mesh::Mesh;
 use super::report::StepReport;
 use super::settings::FlowSettings;
 use crate::Error;
 use crate::error::check;
+use energy::EnergyBound;
 
 /// Share of the largest Courant number beyond which the run warns.
 const WARNING_SHARE: f64 = 0.6;
@@ -22,6 +28,10 @@ const WARNING_SHARE: f64 = 0.6;
 const SHORTEST_SHARE: f64 = 1e-10;
 /// Times closer than this share of the time of the run are the same.
 const SAME_TIME: f64 = 1e-12;
+/// Steps between looks for waves that grow.
+const STEPS_PER_LOOK: u64 = 64;
+/// Growth of the worst wave over the rest of the run, as an exponent, that is worth a word.
+const NOTICED_GROWTH: f64 = 0.1;
 
 /// How often.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,6 +109,13 @@ pub enum RunWarning {
         /// Courant number beyond which a step is refused.
         limit: f64,
     },
+    /// Adams-Bashforth lets waves of the mesh grow, for all that viscosity takes from them.
+    UndampedGrowth {
+        /// Steps made.
+        step: u64,
+        /// The waves.
+        growth: UndampedGrowth,
+    },
 }
 
 /// Who watches a run. An `Err` with a reason stops it; the last checkpoint stays.
@@ -163,8 +180,16 @@ pub struct Run {
     flow: Flow,
     plan: RunPlan,
     open: Option<OpenBudget>,
-    has_warned: bool,
+    energy: EnergyBound,
+    has_warned: HasWarned,
     is_fresh: bool,
+}
+
+/// What has been warned of.
+#[derive(Debug, Default)]
+struct HasWarned {
+    courant: bool,
+    growth: bool,
 }
 
 impl Run {
@@ -174,7 +199,8 @@ impl Run {
     /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty intervals.
     pub fn new(flow: Flow, plan: RunPlan) -> Result<Self, Error> {
         plan.check(flow.time_s())?;
-        Ok(Self { flow, plan, open: None, has_warned: false, is_fresh: true })
+        let energy = EnergyBound::new(&flow);
+        Ok(Self { flow, plan, open: None, energy, has_warned: HasWarned::default(), is_fresh: true })
     }
 
     /// A run that continues from a checkpoint written by a run, with the bytes that the observer had given.
@@ -190,11 +216,12 @@ impl Run {
         let path = path.as_ref();
         let (flow, bytes) = Flow::restore(path, mesh, settings)?;
         let what = "it was written by another kind of program";
-        let Some((open, user_data)) = read_open(&bytes) else {
+        let Some((open, energy, user_data)) = read_own(&bytes) else {
             return Err(Error::CheckpointDamaged { path: path.to_owned(), what });
         };
         plan.check(f64::NEG_INFINITY)?;
-        Ok((Self { flow, plan, open, has_warned: false, is_fresh: false }, user_data.to_vec()))
+        let has_warned = HasWarned::default();
+        Ok((Self { flow, plan, open, energy, has_warned, is_fresh: false }, user_data.to_vec()))
     }
 
     /// The simulation.
@@ -210,8 +237,8 @@ impl Run {
     /// Runs to the end, or to the pause.
     ///
     /// # Errors
-    /// What [`Flow::step`] refuses, [`Error::StepTooShort`], [`Error::Stopped`] by the observer, [`Error::File`] for a
-    /// checkpoint. The last good checkpoint stays as it was.
+    /// What [`Flow::step`] refuses, [`Error::EnergyGrew`], [`Error::StepTooShort`], [`Error::Stopped`] by the observer,
+    /// [`Error::File`] for a checkpoint. The last good checkpoint stays as it was.
     pub fn to_end(&mut self, observer: &mut dyn RunObserver) -> Result<RunSummary, Error> {
         let (start_s, end_s) = (self.flow.time_s(), self.plan.end_s);
         // A fresh run gives the output of its start; a resumed one gave it before its checkpoint.
@@ -226,6 +253,7 @@ impl Run {
             let target_s = self.plan.output_times_s.get(next_output).map_or(end_s, |t| t.min(end_s));
             let before_s = self.flow.time_s();
             let energy = self.flow.kinetic_energy_m5_s2();
+            self.look_for_growth(observer);
             let report = self.flow.step_towards(target_s)?;
             if report.step_s < SHORTEST_SHARE * (end_s - start_s) && !self.is_reached(target_s) {
                 let (step, step_s) = (report.step, report.step_s);
@@ -234,6 +262,7 @@ impl Run {
             self.warn(&report, observer);
             let record = self.record(report, energy);
             observer.step(&self.flow, &record).map_err(|reason| self.stopped(reason))?;
+            self.energy.pass(&self.flow, energy, report.step_s)?;
             self.give_outputs(&mut next_output, observer)?;
             if self.checkpoint_is_due(before_s, &report) {
                 self.write_checkpoint(observer)?;
@@ -262,9 +291,21 @@ impl Run {
 
     fn warn(&mut self, report: &StepReport, observer: &mut dyn RunObserver) {
         let limit = self.flow.settings().scheme.largest_courant();
-        if report.courant > WARNING_SHARE * limit && !self.has_warned {
-            self.has_warned = true;
+        if report.courant > WARNING_SHARE * limit && !self.has_warned.courant {
+            self.has_warned.courant = true;
             observer.warning(&RunWarning::Courant { step: report.step, courant: report.courant, limit });
+        }
+    }
+
+    fn look_for_growth(&mut self, observer: &mut dyn RunObserver) {
+        let step = self.flow.steps();
+        if self.has_warned.growth || !step.is_multiple_of(STEPS_PER_LOOK) {
+            return;
+        }
+        let left_s = self.plan.end_s - self.flow.time_s();
+        if let Some(growth) = self.flow.undamped_growth().filter(|g| g.rate_per_s * left_s > NOTICED_GROWTH) {
+            self.has_warned.growth = true;
+            observer.warning(&RunWarning::UndampedGrowth { step, growth });
         }
     }
 
@@ -300,7 +341,7 @@ impl Run {
         let Some(plan) = &self.plan.checkpoint else { return Ok(()) };
         let mut previous = plan.path.clone().into_os_string();
         previous.push(".previous");
-        let bytes = [open_bytes(self.open), observer.user_data()].concat();
+        let bytes = [own_bytes(self.open, self.energy), observer.user_data()].concat();
         self.flow.save_and_keep(&plan.path, Some(Path::new(&previous)), &bytes)
     }
 }
@@ -324,20 +365,22 @@ impl RunPlan {
     }
 }
 
-/// An open budget as bytes: its presence, then its numbers.
-fn open_bytes(open: Option<OpenBudget>) -> Vec<u8> {
-    let words = open.map_or([0; 4], |b| [1, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]);
-    words.into_iter().flat_map(u64::to_le_bytes).collect()
+/// What a run keeps in its checkpoints beside the flow: the open budget (its presence, then its numbers) and the bound.
+fn own_bytes(open: Option<OpenBudget>, energy: EnergyBound) -> Vec<u8> {
+    let open = open.map_or([0; 4], |b| [1, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]);
+    let energy = [energy.bound_m5_s2, energy.largest_m5_s2].map(f64::to_bits);
+    open.into_iter().chain(energy).flat_map(u64::to_le_bytes).collect()
 }
 
-fn read_open(bytes: &[u8]) -> Option<(Option<OpenBudget>, &[u8])> {
-    let (own, rest) = bytes.split_at_checked(32)?;
+fn read_own(bytes: &[u8]) -> Option<(Option<OpenBudget>, EnergyBound, &[u8])> {
+    let (own, rest) = bytes.split_at_checked(48)?;
     let words: Vec<u64> = own.as_chunks::<8>().0.iter().map(|w| u64::from_le_bytes(*w)).collect();
-    let [present, step, rate, power] = words[..] else { return None };
+    let [present, step, rate, power, bound, largest] = words[..] else { return None };
     let (rate_m5_s3, power_m5_s3) = (f64::from_bits(rate), f64::from_bits(power));
+    let energy = EnergyBound { bound_m5_s2: f64::from_bits(bound), largest_m5_s2: f64::from_bits(largest) };
     match present {
-        0 => Some((None, rest)),
-        1 => Some((Some(OpenBudget { step, rate_m5_s3, power_m5_s3 }), rest)),
+        0 => Some((None, energy, rest)),
+        1 => Some((Some(OpenBudget { step, rate_m5_s3, power_m5_s3 }), energy, rest)),
         _ => None,
     }
 }

@@ -143,7 +143,8 @@ fn high_courant_numbers_warn_once_and_too_high_ones_stop_the_run() {
     assert!(result.is_ok() && witness.warnings.is_empty());
     let (result, witness) = run(0.06);
     assert!(result.is_ok() && witness.records.len() == 3);
-    let [RunWarning::Courant { step: 1, courant, limit: 1.0 }] = witness.warnings[..] else { panic!("{witness:?}") };
+    let [RunWarning::Courant { step: 1, courant, limit: 1.0 }] = witness.warnings[1..] else { panic!("{witness:?}") };
+    assert!(matches!(witness.warnings[0], RunWarning::UndampedGrowth { step: 0, .. }), "{witness:?}");
     assert!(courant > 0.6 && courant < 1.0, "{courant}");
     let (result, _) = run(0.11);
     assert!(matches!(result, Err(Error::CourantTooLarge { step: 1, .. })), "{result:?}");
@@ -172,6 +173,69 @@ fn a_flow_that_blows_up_stops_with_its_place_and_leaves_a_checkpoint_that_can_be
     let slower = FlowSettings { time_step: TimeStep::Courant { courant: 0.5, longest_s: 1.0 }, ..settings };
     let (mut run, _) = Run::resume(&path, mesh, slower, plan(flow.time_s() + 0.1, &[])).unwrap();
     run.to_end(&mut Silent).unwrap();
+}
+
+/// Vortices without viscosity, which keep their energy for ever.
+fn inviscid(time_step: TimeStep, scheme: TimeScheme) -> Flow {
+    let mut case = taylor_green_plane(16, [0.0, 0.2], 0.0, 0.01).unwrap();
+    (case.settings.time_step, case.settings.scheme) = (time_step, scheme);
+    case.start().unwrap().0
+}
+
+#[test]
+fn energy_that_nothing_gave_stops_the_run_and_no_checkpoint_holds_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.ckpt");
+    let checkpoint = Some(CheckpointPlan { path: path.clone(), every: Interval::Steps(10) });
+    let plan = RunPlan { checkpoint, ..plan(1000.0, &[]) };
+    let flow = inviscid(courant(1.0), TimeScheme::AdamsBashforth2);
+    let (mesh, settings, start) = (flow.mesh().clone(), flow.settings().clone(), flow.kinetic_energy_m5_s2());
+    let mut witness = Witness::default();
+    let error = Run::new(flow, plan.clone()).unwrap().to_end(&mut witness).unwrap_err();
+    let text = error.to_string();
+    let Error::EnergyGrew { step, energy_m5_s2, allowed_m5_s2, rate_per_s, ref cause, .. } = error else {
+        panic!("{error}")
+    };
+    // At its first percent, not after many orders of magnitude; the fastest waves double in a few steps.
+    assert!(allowed_m5_s2 <= start * (1.0 + 1e-9) && energy_m5_s2 > 1.01 * allowed_m5_s2, "{text}");
+    assert!(energy_m5_s2 < 2.0 * start && rate_per_s > 0.0, "{text}");
+    assert!(cause.contains("Runge-Kutta") && text.contains("near cell") && text.contains("1/s"), "{text}");
+    assert_eq!(step, witness.records.len() as u64, "the step that failed is recorded");
+    assert!(matches!(witness.warnings[0], RunWarning::UndampedGrowth { step: 0, .. }), "{:?}", witness.warnings);
+    for name in ["run.ckpt", "run.ckpt.previous"] {
+        let (kept, _) = Flow::restore(folder.path().join(name), mesh.clone(), settings.clone()).unwrap();
+        assert!(kept.kinetic_energy_m5_s2() <= 1.01 * start, "{name}: {} of {start}", kept.kinetic_energy_m5_s2());
+    }
+    // A resumed run remembers what the flow may have, and stops at the same step.
+    let (mut resumed, _) = Run::resume(&path, mesh, settings, plan).unwrap();
+    let error = resumed.to_end(&mut Silent).unwrap_err();
+    assert!(matches!(error, Error::EnergyGrew { step: again, .. } if again == step), "{error}");
+}
+
+#[test]
+fn steady_forced_dragged_and_fading_flows_keep_within_the_energy_that_they_may_have() {
+    use super::super::cases::{couette, decaying_layer, lid_driven_cavity, poiseuille, rayleigh_plate};
+    let mut flows = vec![
+        inviscid(courant(1.0), TimeScheme::RungeKutta3),
+        // Viscosity takes what the scheme gives.
+        vortices(courant(0.35), TimeScheme::AdamsBashforth2),
+    ];
+    for case in [
+        poiseuille(16, 1.5, 0.1, 0.0, 0.5),
+        couette(16, 1.5, 0.1, 0.0, 2.0),
+        rayleigh_plate(16, 1.5, 0.1, 0.05),
+        lid_driven_cavity(16, 1.5, 100.0),
+        // Decays to round-off.
+        decaying_layer(16, 1.5, 1.0, 1.0),
+    ] {
+        flows.push(case.unwrap().start().unwrap().0);
+    }
+    for flow in flows {
+        let settings = flow.settings().clone();
+        let steps = RunPlan { pause_after_steps: Some(300), ..plan(1e6, &[]) };
+        let summary = Run::new(flow, steps).unwrap().to_end(&mut Silent);
+        assert_eq!(summary.unwrap_or_else(|e| panic!("{e}: {settings:?}")).steps, 300);
+    }
 }
 
 #[test]
