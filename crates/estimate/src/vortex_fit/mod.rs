@@ -32,6 +32,7 @@
 //! To measure again: `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
 //! (signals) or `circulation_from_many_maps` (maps).
 
+mod ascent;
 mod band;
 mod baseband;
 mod estimator_response;
@@ -47,6 +48,7 @@ mod scan_model;
 mod signal_fit;
 mod small;
 mod tangent;
+mod tops;
 mod wake;
 mod wake_map;
 
@@ -61,5 +63,6 @@ pub use map_fit::{
 pub use pulse::PulseShape;
 pub use range_kernel::RangeKernel;
 pub use scan_model::{ScanModel, ScanSetup};
-pub use signal_fit::{SignalFit, SignalFitOptions, fit_signals};
+pub use tops::LikelihoodTop;
+pub use signal_fit::{SignalFit, SignalFitOptions, Starts, fit_signals};
 pub use wake::{CoreProfile, PARAMETERS, Parameter, Vortex, Wake, WakeModel};

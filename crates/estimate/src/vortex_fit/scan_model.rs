@@ -87,6 +87,16 @@ impl ScanModel {
     /// [`Error::Empty`] without rays; [`Error::OutOfRange`] for an impossible guess, angle or SNR, or one that is 0
     /// everywhere; [`Error::WindowLongerThanRecord`] for records shorter than the filter; as [`Baseband::new`].
     pub fn new(setup: &ScanSetup, snr: impl Fn(f64, f64) -> f64, guess: &Wake) -> Result<Self, Error> {
+        Self::with_layers(setup, snr, guess, 1.0)
+    }
+
+    /// The same with layers `thicker` times as thick as the rule allows.
+    pub(super) fn with_layers(
+        setup: &ScanSetup,
+        snr: impl Fn(f64, f64) -> f64,
+        guess: &Wake,
+        thicker: f64,
+    ) -> Result<Self, Error> {
         guess.validate()?;
         finite("first_sample_time_s", setup.first_sample_time_s)?;
         setup.elevation_rad.iter().try_for_each(|e| finite("elevation_rad", *e))?;
@@ -102,6 +112,7 @@ impl ScanModel {
         let cutter = Cutter {
             setup,
             guess,
+            thicker,
             first_range_m: 0.5 * SPEED_OF_LIGHT_M_S * (setup.first_sample_time_s + baseband.delay_s()),
             spacing_m: 0.25 * SPEED_OF_LIGHT_M_S * interval_s,
             samples,
@@ -153,7 +164,27 @@ impl ScanModel {
         let near = |a: &super::wake::Vortex, b: &super::wake::Vortex| {
             (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m) <= MARGIN_M
         };
-        near(&wake.left, &self.guess.left) && near(&wake.right, &self.guess.right)
+        // steeper cores are those smaller than the third to spare
+        let wide = |a: &super::wake::Vortex, b: &super::wake::Vortex| a.core_radius_m >= b.core_radius_m * 2.0 / 3.0;
+        let covers = |a, b| near(a, b) && wide(a, b);
+        covers(&wake.left, &self.guess.left) && covers(&wake.right, &self.guess.right)
+    }
+
+    /// The model of some of the lines alone.
+    pub(super) fn of_lines(&self, keep: impl Fn(&Line) -> bool) -> Self {
+        let lines: Vec<Line> = self.lines.iter().filter(|line| keep(line)).cloned().collect();
+        Self { rays: lines.iter().map(|line| line.rays.len()).sum(), lines, ..self.clone() }
+    }
+
+    /// Whether a line of another model of the same scan is one of this model.
+    pub(super) fn has(&self, line: &Line) -> bool {
+        self.lines.iter().any(|own| own.rays == line.rays)
+    }
+
+    /// Distance at which a line passes the nearer vortex \[m\].
+    pub(super) fn passes_m(&self, line: &Line, wake: &Wake) -> f64 {
+        let to = |vortex: &super::wake::Vortex| self.wake.passes_m(line.ray, vortex);
+        to(&wake.left).min(to(&wake.right))
     }
 }
 
@@ -161,6 +192,7 @@ impl ScanModel {
 struct Cutter<'a> {
     setup: &'a ScanSetup,
     guess: &'a Wake,
+    thicker: f64,
     /// Range of the first baseband sample.
     first_range_m: f64,
     /// Distance of the nodes.
@@ -197,7 +229,7 @@ impl Cutter<'_> {
             })
             .sum();
         let limit_m = self.setup.sampling.wavelength_m / (16.0 * self.setup.pulse.sigma_s() * gradient_per_s);
-        (self.spacing_m / limit_m).ceil().clamp(1.0, MOST_LAYERS)
+        (self.spacing_m / (self.thicker * limit_m)).ceil().clamp(1.0, MOST_LAYERS)
     }
 
     fn layers(

@@ -6,12 +6,13 @@
 
 use ndarray::{Array2, ArrayView2};
 
-use super::band::dot;
-use super::free::{FreeParameters, gathered, moved, spread};
+use super::ascent::{Ascent, State};
+use super::free::{FreeParameters, Sharing, spread};
 use super::likelihood::{Powers, ScanSignals};
 use super::scan_model::{ScanModel, ScanSetup};
-use super::small::{Normal, Stop, descend, inverse};
-use super::wake::{Parameter, Wake};
+use super::small::inverse;
+use super::tops::{CORES_OVER_SPACING, LikelihoodTop, near_lines, other_tops, same};
+use super::wake::{PARAMETERS, Parameter, Wake};
 use crate::error::Error;
 use crate::sample::Sample;
 
@@ -19,6 +20,10 @@ use crate::sample::Sample;
 const ROUNDS: usize = 4;
 /// Where the first, rough ascent ends, in standard deviations.
 const ROUGH_SIGMAS: f64 = 0.3;
+/// Layers of the lines on which tops are looked for, over those that the rule allows.
+const ROUGH_LAYERS: f64 = 2.0;
+/// Core radius of the first start over the spacing.
+const FIRST_CORE_OVER_SPACING: f64 = 0.06;
 
 /// How the signals are fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,10 +38,22 @@ pub struct SignalFitOptions {
     pub max_iterations: usize,
     /// The fit ends when the step that is left is below this part of its standard deviations.
     pub tolerance_sigmas: f64,
+    /// Where the fit begins.
+    pub starts: Starts,
+}
+
+/// Where a fit of signals begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Starts {
+    /// The guess alone: the top that is found depends on it.
+    Guess,
+    /// The guess, then core radii from 1.5 to 12 % of the spacing and heights about the first top.
+    Several,
 }
 
 impl Default for SignalFitOptions {
-    /// All parameters and powers; the information of every fourth line; at most 60 evaluations; to 0.01 standard deviations.
+    /// All parameters and powers; the information of every fourth line; at most 60 evaluations; to 0.01 standard deviations;
+    /// several starts.
     fn default() -> Self {
         Self {
             free: FreeParameters::default(),
@@ -44,6 +61,7 @@ impl Default for SignalFitOptions {
             information_stride: 4,
             max_iterations: 60,
             tolerance_sigmas: 1e-2,
+            starts: Starts::Several,
         }
     }
 }
@@ -56,8 +74,12 @@ pub struct SignalFit {
     /// The most likely powers relative to the model.
     pub powers: Powers,
     /// Covariance \[10, 10\] of the parameters in the order of [`Parameter`]; zeros where one is fixed. It is the Cramer-Rao
-    /// bound at the fitted wake.
+    /// bound at the tops of the likelihood and their distances from the highest, weighted with the likelihood.
     pub covariance: Array2<f64>,
+    /// Cramer-Rao bound \[10, 10\] at the fitted wake.
+    pub bound: Array2<f64>,
+    /// All tops that were found, the highest (the fitted wake) first.
+    pub tops: Vec<LikelihoodTop>,
     /// Log-likelihood, but for a constant.
     pub log_likelihood: f64,
     /// How much of it the vortices give: the difference to the same wind without vortices.
@@ -101,7 +123,8 @@ impl ScanModel {
 /// missing samples are left out.
 ///
 /// # Errors
-/// As [`ScanModel::new`] and [`ScanSignals::new`]; [`Error::NotConverged`]; [`Error::Linalg`] if a free parameter does not show.
+/// As [`ScanModel::new`] and [`ScanSignals::new`]; [`Error::NotConverged`] if no start leads to a top; [`Error::Linalg`] if a
+/// free parameter does not show.
 pub fn fit_signals<S: Sample>(
     setup: &ScanSetup,
     snr: impl Fn(f64, f64) -> f64,
@@ -110,123 +133,138 @@ pub fn fit_signals<S: Sample>(
     guess: &Wake,
     options: &SignalFitOptions,
 ) -> Result<SignalFit, Error> {
-    let mut state = (options.free.start(guess), Powers::default());
-    let mut evaluations = 0;
-    for round in 0..ROUNDS {
-        let model = ScanModel::new(setup, &snr, &state.0)?;
-        let signals = ScanSignals::new(&model, records, noise_power)?;
-        // The likelihood of a strong signal has many tops; that of the same signal said to be weak leads to the highest.
-        let rough = |wake: Wake, snr: f64, evaluations: &mut usize| {
-            let weak = Powers { log_signal: (snr / model.largest_snr).ln(), log_noise: 0.0 };
-            let rough = SignalFitOptions { fit_powers: false, tolerance_sigmas: ROUGH_SIGMAS, ..*options };
-            climb(&model, &signals, (wake, weak), &rough, evaluations).map(|(wake, _)| (wake, Powers::default()))
-        };
-        if round == 0 && model.largest_snr > 1.0 {
-            state = rough(state.0, 1.0, &mut evaluations)?;
-        }
-        state = match climb(&model, &signals, state, options, &mut evaluations) {
-            // astray between two tops: once more, from where a weaker signal leads
-            Err(Error::NotConverged { .. }) if round == 0 => {
-                let start = rough(state.0, 0.3 * model.largest_snr.min(1.0), &mut evaluations)?;
-                climb(&model, &signals, start, options, &mut evaluations)?
+    let mut start = options.free.start(guess);
+    if options.starts == Starts::Several && options.free.core_radius != Sharing::Fixed {
+        // wide cores make few tops
+        let core_m = FIRST_CORE_OVER_SPACING * start.spacing_m();
+        (start.left.core_radius_m, start.right.core_radius_m) = (core_m, core_m);
+    }
+    let model = ScanModel::new(setup, &snr, &start)?;
+    let signals = ScanSignals::new(&model, records, noise_power)?;
+    let mut search = Search { setup, snr: &snr, signals: &signals, options, evaluations: 0 };
+    let mut tops = vec![search.settle((start, Powers::default()), true)?];
+    if options.starts == Starts::Several {
+        for start in search.others(&tops[0])? {
+            // a start that leads nowhere is no top
+            if let Ok(top) = search.settle(start, false) {
+                tops.push(top);
             }
-            end => end?,
-        };
-        if model.covers(&state.0) {
-            return finish(&model, &signals, state, options, evaluations);
         }
     }
-    Err(Error::NotConverged { iterations: evaluations, sigmas_left: f64::INFINITY })
+    search.finish(tops)
 }
 
-/// Goes to the top of the likelihood.
-///
-/// The few lines through the cores make the likelihood of one scan curve quite differently from its mean over scans, so the
-/// information serves only as the first curvature; it is then corrected from gradient to gradient.
-fn climb(
-    model: &ScanModel,
-    signals: &ScanSignals,
-    start: (Wake, Powers),
-    options: &SignalFitOptions,
-    evaluations: &mut usize,
-) -> Result<(Wake, Powers), Error> {
-    let groups = options.free.groups();
-    let powers_free = options.fit_powers;
-    let order = groups.len() + if powers_free { 2 } else { 0 };
-    let at = |x: &[f64]| {
-        let mut powers = start.1;
-        if powers_free {
-            powers.log_signal += x[order - 2];
-            powers.log_noise += x[order - 1];
-        }
-        (moved(&groups, &start.0, x), powers)
-    };
-    let stride = options.information_stride.max(1);
-    let mut curvature = model.information(&start.0, start.1, &options.free, powers_free, stride)?;
-    let mut last: Option<(Vec<f64>, Vec<f64>)> = None;
-    let evaluate = |x: &Vec<f64>| {
-        *evaluations += 1;
-        let (wake, powers) = at(x);
-        let value = model.log_likelihood(signals, &wake, powers)?;
-        let mut gradient = vec![0.0; order];
-        gathered(&groups, &value.by_wake, &mut gradient);
-        if powers_free {
-            gradient[order - 2] = value.by_log_signal;
-            gradient[order - 1] = value.by_log_noise;
-        }
-        gradient.iter_mut().for_each(|g| *g = -*g);
-        if let Some((x_before, gradient_before)) = &last {
-            let difference = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
-            learn(&mut curvature, &difference(x, x_before), &difference(&gradient, gradient_before));
-        }
-        last = Some((x.clone(), gradient.clone()));
-        Some(Normal { cost: -value.log_likelihood, gradient, curvature: curvature.clone() })
-    };
-    let step = |x: &Vec<f64>, step: &[f64]| x.iter().zip(step).map(|(x, s)| x + s).collect();
-    let stop = Stop { iterations: options.max_iterations, sigmas: options.tolerance_sigmas, learns: true };
-    let (end, _, _) = descend(vec![0.0; order], stop, evaluate, step)?;
-    Ok(at(&end))
+/// A top and the model that was cut for it.
+struct Settled {
+    model: ScanModel,
+    state: State,
+    log_likelihood: f64,
 }
 
-/// Corrects the curvature so that it explains the change `y` of the gradient over the step `s`: the update of Broyden, Fletcher,
-/// Goldfarb and Shanno, damped after Powell (1978) so that it stays positive definite.
-fn learn(curvature: &mut Array2<f64>, s: &[f64], y: &[f64]) {
-    let n = s.len();
-    let hs: Vec<f64> = (0..n).map(|i| dot(curvature.row(i).as_slice().unwrap_or(&[]), s)).collect();
-    let (shs, sy) = (dot(s, &hs), dot(s, y));
-    if shs <= 0.0 {
-        return;
-    }
-    let part = if sy >= 0.2 * shs { 1.0 } else { 0.8 * shs / (shs - sy) };
-    let r: Vec<f64> = y.iter().zip(&hs).map(|(y, h)| part * y + (1.0 - part) * h).collect();
-    let sr = dot(s, &r);
-    for ((i, j), c) in curvature.indexed_iter_mut() {
-        *c += r[i] * r[j] / sr - hs[i] * hs[j] / shs;
-    }
-}
-
-fn finish(
-    model: &ScanModel,
-    signals: &ScanSignals,
-    (wake, powers): (Wake, Powers),
-    options: &SignalFitOptions,
+/// The search for tops in one scan.
+struct Search<'a, F> {
+    setup: &'a ScanSetup,
+    snr: &'a F,
+    signals: &'a ScanSignals,
+    options: &'a SignalFitOptions,
     evaluations: usize,
-) -> Result<SignalFit, Error> {
-    let failed = Error::NotConverged { iterations: evaluations, sigmas_left: f64::NAN };
-    let value = model.log_likelihood(signals, &wake, powers).ok_or(failed.clone())?;
-    let mut calm = wake;
-    (calm.left.circulation_m2_s, calm.right.circulation_m2_s) = (0.0, 0.0);
-    let without = model.log_likelihood(signals, &calm, powers).ok_or(failed)?;
-    let mut information = model.information(&wake, powers, &options.free, options.fit_powers, 1)?;
-    information *= signals.used_rays() as f64 / model.rays as f64;
-    let covariance = inverse("information on the wake", &information)?;
-    Ok(SignalFit {
-        wake,
-        powers,
-        covariance: spread(&options.free.groups(), &covariance),
-        log_likelihood: value.log_likelihood,
-        log_likelihood_gain: value.log_likelihood - without.log_likelihood,
-        used_rays: signals.used_rays(),
-        evaluations,
-    })
+}
+
+impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
+    /// The top that a start leads to; with `rough` through ascents with a weaker signal if it is strong, or if the first goes astray.
+    fn settle(&mut self, start: State, rough: bool) -> Result<Settled, Error> {
+        let (mut state, signals, options) = (start, self.signals, self.options);
+        for round in 0..ROUNDS {
+            let model = ScanModel::new(self.setup, self.snr, &state.0)?;
+            let evaluations = &mut self.evaluations;
+            let ascent = Ascent { model: &model, signals, options, others: None };
+            // The likelihood of a strong signal has many tops; that of the same signal said to be weak leads to the highest.
+            let weaker = |wake: Wake, snr: f64, evaluations: &mut usize| {
+                let weak = Powers { log_signal: (snr / model.largest_snr).ln(), log_noise: 0.0 };
+                let options = SignalFitOptions { fit_powers: false, tolerance_sigmas: ROUGH_SIGMAS, ..*options };
+                let ascent = Ascent { model: &model, signals, options: &options, others: None };
+                ascent.climb((wake, weak), evaluations).map(|((wake, _), _)| (wake, Powers::default()))
+            };
+            if rough && round == 0 && model.largest_snr > 1.0 {
+                state = weaker(state.0, 1.0, evaluations)?;
+            }
+            let end = match ascent.climb(state, evaluations) {
+                // astray between two tops: once more, from where a weaker signal leads
+                Err(Error::NotConverged { .. }) if rough && round == 0 => {
+                    let start = weaker(state.0, 0.3 * model.largest_snr.min(1.0), evaluations)?;
+                    ascent.climb(start, evaluations)?
+                }
+                end => end?,
+            };
+            state = end.0;
+            if model.covers(&state.0) {
+                return Ok(Settled { model, state, log_likelihood: end.1 });
+            }
+        }
+        Err(Error::NotConverged { iterations: self.evaluations, sigmas_left: f64::INFINITY })
+    }
+
+    /// States near other tops than the first.
+    fn others(&mut self, first: &Settled) -> Result<Vec<State>, Error> {
+        let mut guess = first.state.0;
+        if self.options.free.core_radius != Sharing::Fixed {
+            let core_m = CORES_OVER_SPACING[1] * guess.spacing_m();
+            (guess.left.core_radius_m, guess.right.core_radius_m) = (core_m, core_m);
+        }
+        let rough = ScanModel::with_layers(self.setup, self.snr, &guess, ROUGH_LAYERS)?;
+        let near = near_lines(&rough, &first.state.0);
+        other_tops((&first.model, &near), self.signals, first.state, self.options, &mut self.evaluations)
+    }
+
+    /// The highest top, and what the others add to its errors.
+    fn finish(self, mut settled: Vec<Settled>) -> Result<SignalFit, Error> {
+        let (options, signals) = (self.options, self.signals);
+        settled.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
+        let failed = Error::NotConverged { iterations: self.evaluations, sigmas_left: f64::NAN };
+        let mut tops: Vec<&Settled> = Vec::new();
+        let mut informations = Vec::new();
+        for next in &settled {
+            let ascent = Ascent { model: &next.model, signals, options, others: None };
+            let known = tops.iter().zip(&informations).any(|(top, information)| same(&ascent, information, &top.state, &next.state));
+            if !known {
+                let stride = if tops.is_empty() { 1 } else { options.information_stride };
+                let share = signals.used_rays() as f64 / next.model.rays as f64;
+                informations.push(ascent.information(&next.state, stride)? * share);
+                tops.push(next);
+            }
+        }
+        let best = *tops.first().ok_or(failed.clone())?;
+        let (wake, powers) = best.state;
+        let mut calm = wake;
+        (calm.left.circulation_m2_s, calm.right.circulation_m2_s) = (0.0, 0.0);
+        let without = best.model.log_likelihood(signals, &calm, powers).ok_or(failed)?;
+        let (mut covariance, mut bound, mut weights) = (Array2::zeros((PARAMETERS, PARAMETERS)), None, 0.0);
+        for (top, information) in tops.iter().zip(&informations) {
+            let within = spread(&options.free.groups(), &inverse("information on the wake", information)?);
+            let weight = (top.log_likelihood - best.log_likelihood).exp();
+            weights += weight;
+            let (a, b) = (top.state.0.to_array(), wake.to_array());
+            for ((i, j), c) in covariance.indexed_iter_mut() {
+                *c += weight * (within[[i, j]] + (a[i] - b[i]) * (a[j] - b[j]));
+            }
+            bound.get_or_insert(within);
+        }
+        covariance /= weights;
+        let top = |top: &&Settled| LikelihoodTop {
+            wake: top.state.0,
+            powers: top.state.1,
+            log_likelihood: top.log_likelihood,
+        };
+        Ok(SignalFit {
+            wake,
+            powers,
+            covariance,
+            bound: bound.unwrap_or_default(),
+            tops: tops.iter().map(top).collect(),
+            log_likelihood: best.log_likelihood,
+            log_likelihood_gain: best.log_likelihood - without.log_likelihood,
+            used_rays: signals.used_rays(),
+            evaluations: self.evaluations,
+        })
+    }
 }

@@ -220,6 +220,13 @@ impl WakeModel {
         self.gradient_on(wake, range_m, Ray::new(elevation_rad))
     }
 
+    /// Distance at which a line of sight passes the centre of a vortex \[m\].
+    pub(super) fn passes_m(&self, ray: Ray, vortex: &Vortex) -> f64 {
+        let (dy, dz) =
+            (vortex.lateral_position_m - self.lidar_lateral_position_m, vortex.height_m - self.lidar_height_m);
+        (dy * ray.sin - dz * ray.cos).abs()
+    }
+
     /// (vortex, index of its circulation, y, z and core, height of the centre over its sign, sense of turning).
     fn sources<'w>(&self, wake: &'w Wake) -> impl Iterator<Item = (&'w Vortex, [usize; 4], f64, f64)> + use<'w> {
         let vortices = [(&wake.left, [0, 2, 3, 6], -1.0), (&wake.right, [1, 4, 5, 7], 1.0)];
