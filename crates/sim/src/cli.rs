@@ -1,10 +1,11 @@
 //! The command line program `wakescope`: words in, files and exit codes out.
 //!
-//! Exit codes: 0 done, 2 wrong input or unusable output. Progress and plans go to standard error,
-//! results to standard output; `--json` makes the result one JSON object.
+//! Exit codes: 0 done, 2 wrong input or unusable output. Progress, plans and errors go to standard error,
+//! results to standard output; `--json` makes the result one JSON object, and so an error.
 
 mod bound;
 mod flow;
+mod output;
 mod progress;
 mod wake;
 
@@ -14,6 +15,7 @@ use crate::progress::{Observer, Silent};
 use crate::scene::{SceneFile, TABLE2_TOML};
 use crate::{Error, run, write};
 use clap::{Args, Parser, Subcommand};
+use output::say;
 use serde_json::{Value, json};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -28,12 +30,12 @@ struct Cli {
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     /// Seed to use instead of the scene's.
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     seed: Option<u64>,
-    /// Show neither plan nor progress.
+    /// Show neither plan nor progress; `check` prints nothing of a good scene.
     #[arg(long, global = true)]
     quiet: bool,
-    /// Print the result as one JSON object.
+    /// Print the result as one JSON object, and an error as one on standard error.
     #[arg(long, global = true)]
     json: bool,
 }
@@ -86,16 +88,12 @@ struct Io {
 pub fn main() -> u8 {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(e) => {
-            // Help and version are no errors and go to standard output; clap knows which is which.
-            let _ = e.print();
-            return e.exit_code() as u8;
-        }
+        Err(e) => return output::explain(&e),
     };
     match dispatch(&cli) {
         Ok(()) => 0,
         Err(e) => {
-            let _ = writeln!(std::io::stderr(), "error: {e}");
+            output::complain(&e, cli.json);
             2
         }
     }
@@ -126,14 +124,15 @@ fn init(path: &Path, force: bool, cli: &Cli) -> Result<(), Error> {
         return Err(Error::Io { action: "write", path: path.to_owned(), source });
     }
     crate::export::write_atomic(path, text.as_bytes())?;
-    say(cli, json!({ "scene": path }), &format!("wrote {}\nnext: wakescope check {0}", path.display()));
-    Ok(())
+    say(cli, &json!({ "scene": path }), &format!("wrote {}\nnext: wakescope check {0}", path.display()))
 }
 
 fn check(path: &Path, cli: &Cli) -> Result<(), Error> {
     let plan = Plan::new(load(path, cli)?, Target::Run)?;
-    say(cli, plan_json(&plan), &format!("{}: good\n{plan}", path.display()));
-    Ok(())
+    if cli.quiet && !cli.json {
+        return Ok(());
+    }
+    say(cli, &plan_json(&plan), &format!("{}: good\n{plan}", path.display()))
 }
 
 fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
@@ -157,8 +156,7 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     let mut object = plan_json(&plan);
     object["results"] = Value::Object(values);
     object["files"] = json!(files);
-    say(cli, object, &text.join("\n"));
-    Ok(())
+    say(cli, &object, &text.join("\n"))
 }
 
 fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
@@ -208,10 +206,4 @@ fn shown(value: f64) -> String {
         v if v != 0.0 && !(1e-3..1e5).contains(&v.abs()) => format!("{v:.3e}"),
         v => format!("{v:.4}"),
     }
-}
-
-/// Prints the result; a closed pipe is no error.
-fn say(cli: &Cli, object: Value, text: &str) {
-    let mut out = std::io::stdout().lock();
-    let _ = if cli.json { writeln!(out, "{object:#}") } else { writeln!(out, "{}", text.trim_end()) };
 }

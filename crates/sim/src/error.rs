@@ -24,6 +24,14 @@ pub enum Error {
         /// What is wrong, with what is allowed.
         reason: String,
     },
+    /// A file that a key names cannot be used.
+    #[error("{key}: {source}")]
+    OfKey {
+        /// Path of the key.
+        key: &'static str,
+        /// What is wrong with the file.
+        source: Box<Error>,
+    },
     /// The folder holds the checkpoint of an earlier run.
     #[error("{} is the checkpoint of an earlier run: --restart continues it, --overwrite begins anew", path.display())]
     CheckpointInTheWay {

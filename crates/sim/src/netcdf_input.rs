@@ -155,21 +155,22 @@ impl ClassicFile {
     /// # Errors
     /// What to rename.
     pub(crate) fn roles<const N: usize>(&self, name: &str, roles: [Role; N]) -> Result<[String; N], String> {
-        let Some(dims) = self.dims(name) else { return Err(format!("it has no variable {name}")) };
+        let needed = roles.each_ref().map(|role| role.name).join(", ");
+        let Some(dims) = self.dims(name) else {
+            return Err(format!("it has no variable {name}: one over {needed} is needed"));
+        };
         let places: Vec<Option<usize>> = roles.iter().map(|role| self.find(&dims, *role)).collect();
         let spare: Vec<&str> = (0..dims.len()).filter(|i| !places.contains(&Some(*i))).map(|i| dims[i]).collect();
         let found: Vec<String> = places.iter().flatten().map(|place| dims[*place].to_owned()).collect();
         if let Some(missing) = places.iter().position(Option::is_none) {
-            let needed: Vec<&str> = roles.iter().map(|role| role.name).collect();
             let role = roles[missing];
             let known = spare.iter().find_map(|dim| presentable(dim));
             let rename = known.map_or(String::new(), |dim| {
                 format!(": rename {dim}, in xarray with ds.rename({dim}=\"{}\"), or", role.name)
             });
             return Err(format!(
-                "{name} needs dimensions for {} (in any order), and none of its {} is {}{rename} give its coordinate the attribute \
+                "{name} needs dimensions for {needed} (in any order), and none of its {} is {}{rename} give its coordinate the attribute \
                  axis = \"{}\"",
-                needed.join(", "),
                 dims.len(),
                 role.name,
                 role.axis

@@ -159,10 +159,11 @@ mod planes {
             shift_y_m: flow.lateral_position_m,
         };
         let path = file.folder.join(&flow.planes);
+        let of_key = |e: Error| Error::OfKey { key: "flow.planes", source: Box::new(e) };
         let refuse = |reason: String| Error::Input { path: path.clone(), reason };
         let (mut times, mut snapshots, mut fastest) = (Vec::new(), Vec::new(), 0.0_f64);
-        for path in files(&path)? {
-            let planes = read(&path)?;
+        for path in files(&path).map_err(of_key)? {
+            let planes = read(&path).map_err(of_key)?;
             let of_file = |e: LesError| Error::Input { path: path.clone(), reason: e.to_string() };
             snapshots.extend(scale.snapshots(&planes).map_err(of_file)?);
             times.extend(

@@ -49,6 +49,5 @@ pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr),
         "by_range": points(&found.by_range), "files": words.out,
     });
-    say(cli, object, &text);
-    Ok(())
+    say(cli, &object, &text)
 }

@@ -1,11 +1,11 @@
 //! `wakescope flow`: simulations from case files.
 
+use super::output::print;
 use super::{Cli, progress, say, with_threads};
 use crate::Error;
 use crate::flow::{Begin, CaseFile, EXAMPLES, Unwatched, Watch, example, run};
 use clap::Args;
 use serde_json::json;
-use std::io::Write as _;
 use std::path::PathBuf;
 
 /// Words of `wakescope flow`.
@@ -37,8 +37,7 @@ pub(super) struct RunWords {
 
 pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
     if let Some(text) = words.example.as_deref().and_then(example) {
-        let _ = std::io::stdout().lock().write_all(text.as_bytes());
-        return Ok(());
+        return print(text);
     }
     // The words were checked: without an example there is a case.
     let Some(case) = &words.case else { return Ok(()) };
@@ -82,6 +81,5 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
         outcome.files.len(),
         out.display()
     );
-    say(cli, object, &text);
-    Ok(())
+    say(cli, &object, &text)
 }

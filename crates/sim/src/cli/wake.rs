@@ -2,10 +2,10 @@
 
 use super::Cli;
 use super::flow::{RunWords, simulate};
+use super::output::print;
 use crate::Error;
 use crate::flow::{CaseFile, CaseKind, WakePreset};
 use clap::Args;
-use std::io::Write as _;
 use std::path::PathBuf;
 
 /// Words of `wakescope wake`.
@@ -30,8 +30,7 @@ pub(super) fn wake(words: &WakeWords, cli: &Cli) -> Result<(), Error> {
         return Err(Error::Input { path, reason: "case.kind is not \"wake\": wakescope flow runs it".into() });
     }
     if words.print {
-        let _ = std::io::stdout().lock().write_all(file.toml.as_bytes());
-        return Ok(());
+        return print(&file.toml);
     }
     simulate(&file, &words.run, cli)
 }
@@ -41,10 +40,5 @@ fn case_file(words: &WakeWords) -> Result<CaseFile, Error> {
         return Ok(CaseFile::preset(words.preset.unwrap_or(WakePreset::Coarse))?);
     };
     let Some(preset) = words.preset else { return CaseFile::read(path) };
-    let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
-        action: "read the case",
-        path: path.clone(),
-        source,
-    })?;
-    Ok(CaseFile::parse_over(preset, &text, path)?)
+    CaseFile::read_over(preset, path)
 }

@@ -236,7 +236,8 @@ impl Free {
 
 #[cfg(feature = "netcdf")]
 fn from_file(path: &Path, mesh: &Mesh) -> Result<Initial, Error> {
-    super::initial_file::read(path, mesh).map(Initial::Faces)
+    let of_key = |e| Error::OfKey { key: "case.initial.path", source: Box::new(e) };
+    super::initial_file::read(path, mesh).map(Initial::Faces).map_err(of_key)
 }
 
 #[cfg(not(feature = "netcdf"))]

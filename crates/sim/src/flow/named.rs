@@ -159,7 +159,7 @@ impl CaseKind {
                 p.positive("case.viscosity_m2_s", c.viscosity_m2_s);
                 p.require(c.initial_share.is_finite(), "case.initial_share", c.initial_share, "finite");
                 let has_share = matches!(self, Self::Poiseuille(_) | Self::Couette(_));
-                let allowed = "absent: this key is for case.kind = \"poiseuille\" or \"couette\"";
+                let allowed = "this key is for case.kind = \"poiseuille\" or \"couette\"";
                 p.require(has_share || c.initial_share == 0.0, "case.initial_share", c.initial_share, allowed);
             }
             Self::OrrSommerfeld(c) => {

@@ -108,11 +108,11 @@ mod tests {
             ),
             (
                 "[case]\nkind = \"wake\"\ncells = [24, -1, 80]\n",
-                "c.toml:3: case.cells[1] = -1 is not allowed: a whole number, 0 or more, e.g. 24",
+                "c.toml:3: case.cells[1] = -1 is not allowed: a whole number that is not negative, e.g. 24",
             ),
             (
                 "[case]\nkind = \"dipole\"\nend_tau = 1\n",
-                "c.toml:3: case.end_tau = 1 is not allowed: there is no such key; it is a key of [wake]",
+                "c.toml:3: case.end_tau = 1 is not allowed: there is no such key; it is a key of [wake].",
             ),
             (
                 "[case]\nkind = \"wake\"\n[time]\nscheme = \"rk3\"\n",

@@ -22,6 +22,8 @@ pub(crate) struct Format<'a> {
 pub(crate) struct Document<'a> {
     text: &'a str,
     table: DeTable<'a>,
+    /// Where the lines end: a long list asks for the line of each of its values.
+    breaks: Vec<usize>,
 }
 
 impl<'a> Document<'a> {
@@ -30,18 +32,28 @@ impl<'a> Document<'a> {
     /// # Errors
     /// The line and what is wrong, without the text that is there.
     pub(crate) fn parse(text: &'a str) -> Result<Self, (usize, String)> {
+        let breaks: Vec<usize> = text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(at, _)| at).collect();
         match DeTable::parse(text) {
-            Ok(table) => Ok(Self { text, table: table.into_inner() }),
+            Ok(table) => Ok(Self { text, table: table.into_inner(), breaks }),
             Err(e) => {
                 let at = e.span().map_or(0, |span| span.start);
-                Err((line_of(text, at), format!("this is no valid TOML: {}", e.message().replace('\n', " "))))
+                let before = text.get(..at).unwrap_or_default().lines().next_back().unwrap_or_default();
+                let key = before.split_once('=').map(|(key, _)| key.trim());
+                let is_bare = |key: &&str| key.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b));
+                let place = key.filter(is_bare).map(|key| format!("{}: ", quote(key))).unwrap_or_default();
+                Err((line_of(&breaks, at), format!("{place}this is no valid TOML: {}", e.message().replace('\n', " "))))
             }
         }
     }
 
     /// The line of a key, from 1; none if the text does not state it.
     pub(crate) fn line(&self, path: &str) -> Option<usize> {
-        find(&self.table, path).map(|(span, _)| line_of(self.text, span.start))
+        find(&self.table, path).map(|(span, _)| line_of(&self.breaks, span.start))
+    }
+
+    /// The line of a key, or of the table that would have it.
+    pub(crate) fn line_near(&self, path: &str) -> Option<usize> {
+        self.line(path).or_else(|| self.line_near(path.rsplit_once('.')?.0))
     }
 
     /// The value of a key.
@@ -75,8 +87,9 @@ impl<'a> Document<'a> {
     }
 }
 
-fn line_of(text: &str, offset: usize) -> usize {
-    text.bytes().take(offset).filter(|&b| b == b'\n').count() + 1
+/// The line of a place, from 1.
+fn line_of(breaks: &[usize], offset: usize) -> usize {
+    breaks.partition_point(|end| *end < offset) + 1
 }
 
 /// Where the key with this path stands, and its value.
@@ -118,7 +131,16 @@ struct Walk<'w> {
 
 impl Walk<'_> {
     fn refuse(&mut self, key: String, value: String, allowed: String, at: usize) {
-        self.refuse_on(key, value, allowed, line_of(self.document.text, at));
+        self.refuse_on(key, value, allowed, line_of(&self.document.breaks, at));
+    }
+
+    /// A value as the text writes it; nothing for tables, which no line can show.
+    fn shown(&self, value: &Spanned<DeValue<'_>>) -> String {
+        let is_table = match value.get_ref() {
+            DeValue::Array(values) => values.first().is_some_and(|first| first.get_ref().is_table()),
+            other => other.is_table(),
+        };
+        if is_table { String::new() } else { self.document.quote(value.span()) }
     }
 
     fn refuse_on(&mut self, key: String, value: String, allowed: String, line: usize) {
@@ -175,7 +197,7 @@ impl Walk<'_> {
         default: Option<&Value>,
         at: usize,
     ) -> Option<Value> {
-        let line = line_of(self.document.text, at);
+        let line = line_of(&self.document.breaks, at);
         let defaults = default.and_then(Value::as_table);
         let inner = value.get_ref();
         let read = match (kind, inner) {
@@ -212,8 +234,7 @@ impl Walk<'_> {
             {
                 allowed += &format!("; did you mean \"{name}\"?");
             }
-            // A table has no value that a line could show.
-            let shown = if inner.is_table() { String::new() } else { self.document.quote(value.span()) };
+            let shown = self.shown(value);
             self.refuse(path.to_owned(), shown, allowed, at);
         }
         read
@@ -267,8 +288,7 @@ impl Walk<'_> {
         kinds: &[Kinds<'_>],
     ) {
         let here = name.get_ref().as_ref();
-        let shown = if value.get_ref().is_table() { String::new() } else { self.document.quote(value.span()) };
-        let place = if path.is_empty() { "the file".to_owned() } else { format!("[{path}]") };
+        let shown = self.shown(value);
         for (tag, chosen, all) in kinds {
             let others: Vec<&str> =
                 all.iter().filter(|(_, keys)| keys.iter().any(|key| key.name == here)).map(|(name, _)| *name).collect();
@@ -284,13 +304,13 @@ impl Walk<'_> {
         let elsewhere = tables_with(self.format.keys, here, "");
         let hint = match (meant, elsewhere.first()) {
             (Some(meant), _) => format!("; did you mean {meant}?"),
-            (None, Some(table)) if table.is_empty() => "; it stands before the first [section]".into(),
-            (None, Some(table)) => format!("; it is a key of [{table}]"),
-            (None, None) => String::new(),
+            (None, Some(table)) if table.is_empty() => "; it stands before the first [section].".into(),
+            (None, Some(table)) => format!("; it is a key of [{table}]."),
+            (None, None) => ".".into(),
         };
         let tags = kinds.iter().map(|(tag, ..)| *tag);
         let known: Vec<&str> = tags.chain(keys.iter().map(|key| key.name)).collect();
-        let allowed = format!("there is no such key{hint}; {place} has {}", known.join(", "));
+        let allowed = format!("there is no such key{hint} Known here: {}", known.join(", "));
         self.refuse(join(path, &quote(here)), shown, allowed, name.span().start);
     }
 

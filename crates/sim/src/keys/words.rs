@@ -42,7 +42,7 @@ pub(super) fn wanted(key: &str, kind: &Kind) -> String {
     match kind {
         Kind::Number => format!("a number{}", in_unit(key)),
         Kind::Whole { largest } if *largest < u64::from(u32::MAX) => format!("a whole number from 0 to {largest}"),
-        Kind::Whole { .. } => "a whole number, 0 or more".into(),
+        Kind::Whole { .. } => "a whole number that is not negative".into(),
         Kind::Switch => "true or false".into(),
         Kind::Text => "a text in quotation marks".into(),
         Kind::Choice(names) => one_of(names),
@@ -50,7 +50,7 @@ pub(super) fn wanted(key: &str, kind: &Kind) -> String {
             let many = len.map(|len| format!("{len} ")).unwrap_or_default();
             match &**of {
                 Kind::Number => format!("a list of {many}numbers{}", in_unit(key)),
-                Kind::Whole { .. } => format!("a list of {many}whole numbers, 0 or more"),
+                Kind::Whole { .. } => format!("a list of {many}whole numbers that are not negative"),
                 Kind::Choice(names) => format!("a list of {many}names out of {}", list(names)),
                 _ => format!("a list of {many}values"),
             }

@@ -137,7 +137,8 @@ impl Scene {
             format!(
                 "at least {} rad; at scan.range_max_m the lowest line is {:.3} m below the ground, which \
                  scan.below_ground.policy = \"mask\" allows",
-                (-s.lidar_height_m / s.range_max_m).asin(),
+                // Not -0.
+                (-s.lidar_height_m / s.range_max_m).asin() + 0.0,
                 -lowest_m
             ),
         );

@@ -105,15 +105,11 @@ impl Scene {
         c.within("pulse.duration_s", self.pulse.duration_s, 1e-9, 1e-4, "s");
         c.within("pulse.chirp_hz_s", self.pulse.chirp_hz_s, -1e18, 1e18, "Hz/s");
         if let PulseShape::Sampled(shape) = &self.pulse.shape {
-            let phases = shape.phase_rad.len();
-            let (times, powers) = (shape.time_s.len(), shape.power.len());
-            let ok = times == powers && (phases == 0 || phases == times);
-            let allowed =
-                "as many values as the other lists of pulse.shape have: time_s, power, and phase_rad if it is given";
-            let lists = [("time_s", times), ("power", powers), ("phase_rad", phases)];
-            let keys = lists.map(|(name, count)| (format!("pulse.shape.{name}"), format!("{count} values")));
-            let sides: Vec<Side<'_>> = keys.iter().map(|(k, v)| (k.as_str(), v.clone(), allowed.to_owned())).collect();
-            c.between(ok, &sides);
+            let lists = [("pulse.shape.time_s", &shape.time_s), ("pulse.shape.power", &shape.power)];
+            let phase = ("pulse.shape.phase_rad", &shape.phase_rad);
+            let lists = lists.into_iter().chain((!phase.1.is_empty()).then_some(phase));
+            let counts: Vec<(&str, usize)> = lists.map(|(key, list)| (key, list.len())).collect();
+            check_lengths(&counts, "pulse.shape", c);
         }
         let d = &self.detector;
         c.within("detector.bandwidth_hz", d.bandwidth_hz, 1e3, 1e11, "Hz");
@@ -151,11 +147,22 @@ impl Scene {
         let a = &self.atmosphere;
         c.within("atmosphere.backscatter_per_m_sr", a.backscatter_per_m_sr, 0.0, 1.0, "1/(m sr)");
         c.within("atmosphere.extinction_per_m", a.extinction_per_m, 0.0, 1.0, "1/m");
+        if let Some(profile) = &a.profile {
+            let counts = [
+                ("atmosphere.profile.range_m", profile.range_m.len()),
+                ("atmosphere.profile.backscatter_per_m_sr", profile.backscatter_per_m_sr.len()),
+                ("atmosphere.profile.extinction_per_m", profile.extinction_per_m.len()),
+            ];
+            check_lengths(&counts, "atmosphere.profile", c);
+        }
         // What is a profile of the air, or a sampled pulse, the simulation of signals knows best.
-        if let Err(e) = crate::join::medium(self) {
+        if c.found.is_empty()
+            && let Err(e) = crate::join::medium(self)
+        {
             c.require(false, "atmosphere.profile", "", e.to_string());
         }
-        if matches!(self.pulse.shape, PulseShape::Sampled(_))
+        if c.found.is_empty()
+            && matches!(self.pulse.shape, PulseShape::Sampled(_))
             && let Err(e) = crate::join::pulse(self)
         {
             c.require(false, "pulse.shape", "", e.to_string());
@@ -232,11 +239,21 @@ impl Scene {
     }
 }
 
+/// Lists of a table that belong together have the same length; the one that differs from the first is blamed.
+fn check_lengths(counts: &[(&str, usize)], table: &str, c: &mut Checker<'_>) {
+    let Some((first, count)) = counts.first() else { return };
+    if let Some((key, other)) = counts.iter().find(|(_, other)| other != count) {
+        let allowed = format!("as many values as {first} has, {count}");
+        c.require(false, key, format!("a list of {other}"), allowed);
+    }
+    c.require(counts.iter().any(|(_, n)| *n > 0), table, "", "a table with at least one value in each list");
+}
+
 fn check_simulated(flow: &super::SimulatedFlow, c: &mut Checker<'_>) {
     c.require(
         !flow.planes.is_empty(),
         "flow.planes",
-        "\"\"",
+        Problem::ABSENT,
         "a file of cross-planes, or the beginning of the names of numbered ones",
     );
     if let Some(time_s) = flow.time_s {

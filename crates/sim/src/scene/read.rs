@@ -44,19 +44,26 @@ pub enum SceneError {
     Invalid {
         /// The file.
         path: PathBuf,
-        /// All of them, in the order of the scene's sections.
+        /// All of them, in the order of their lines.
         problems: Vec<Located>,
     },
 }
 
+/// Most problems that a message lists.
+const MOST_LINES: usize = 50;
+
 fn list(path: &Path, problems: &[Located]) -> String {
-    let lines: Vec<String> = problems
+    let mut lines: Vec<String> = problems
         .iter()
+        .take(MOST_LINES)
         .map(|p| match p.line {
             Some(line) => format!("{}:{line}: {}", path.display(), p.problem),
             None => format!("{}: {}", path.display(), p.problem),
         })
         .collect();
+    if problems.len() > MOST_LINES {
+        lines.push(format!("and {} more", problems.len() - MOST_LINES));
+    }
     lines.join("\n")
 }
 
@@ -122,7 +129,7 @@ fn scene_format() -> Format<'static> {
     static KEYS: LazyLock<Vec<Key>> = LazyLock::new(keys_of::<Scene>);
     static DEFAULTS: LazyLock<toml::Table> =
         LazyLock::new(|| toml::Table::try_from(Scene::default()).unwrap_or_default());
-    Format { keys: &KEYS, defaults: &DEFAULTS, examples: &[TABLE2_TOML, SCENE_EXAMPLES] }
+    Format { keys: &KEYS, defaults: &DEFAULTS, examples: &[SCENE_EXAMPLES, TABLE2_TOML] }
 }
 
 /// A text as TOML.
@@ -135,10 +142,14 @@ pub(crate) fn located(document: &Document<'_>, path: &Path, problems: Vec<Proble
     let locate = |mut problem: Problem| {
         if let Some(written) = document.written(&problem.key) {
             problem.value = written;
+        } else if document.line(&problem.key).is_none() && problem.value != Problem::ABSENT {
+            problem.value += " (the default)";
         }
-        Located { line: document.line(&problem.key), problem }
+        Located { line: document.line_near(&problem.key), problem }
     };
-    SceneError::Invalid { path: path.to_owned(), problems: problems.into_iter().map(locate).collect() }
+    let mut problems: Vec<Located> = problems.into_iter().map(locate).collect();
+    problems.sort_by_key(|located| located.line);
+    SceneError::Invalid { path: path.to_owned(), problems }
 }
 
 /// A table whose keys all fit, and that is refused nevertheless.
@@ -172,8 +183,8 @@ mod tests {
     fn unknown_keys_are_refused_where_they_stand() {
         assert_eq!(
             message("[laser]\nwavelength_m = 1.5e-6\nwavelenght_m = 1.5e-6\n"),
-            "s.toml:3: laser.wavelenght_m = 1.5e-6 is not allowed: there is no such key; did you mean wavelength_m?; [laser] \
-             has wavelength_m, pulse_repetition_hz"
+            "s.toml:3: laser.wavelenght_m = 1.5e-6 is not allowed: there is no such key; did you mean wavelength_m? Known \
+             here: wavelength_m, pulse_repetition_hz"
         );
         let elsewhere = message("wavelength_m = 1.5e-6\n");
         assert!(elsewhere.starts_with("s.toml:1: wavelength_m = 1.5e-6 is not allowed"), "{elsewhere}");
@@ -224,13 +235,23 @@ mod tests {
                 "s.toml:2: pulse.energy_j = \"much\" is not allowed: a number in J, e.g. 150e-6",
                 "s.toml:3: pulse.definition = \"hwhm\" is not allowed: one of \"fwhm\", \"one_over_e_half_width\"; did you mean \
                  \"fwhm\"?",
-                "s.toml:5: scan.realisations = -1 is not allowed: a whole number, 0 or more, e.g. 4",
+                "s.toml:5: scan.realisations = -1 is not allowed: a whole number that is not negative, e.g. 4",
                 "s.toml:7: outputs.csv = 1 is not allowed: true or false",
                 "s.toml:8: flow.vertical_m_s is missing: a number in m/s, e.g. 0.0",
             ]
         );
         assert!(message("[pulse]\nenergy_j = nan\n").contains("s.toml:2: pulse.energy_j = nan is"));
         assert!(message("[pulse\n").starts_with("s.toml:1: this is no valid TOML: "));
+    }
+
+    #[test]
+    fn a_long_list_is_read_in_time_and_many_problems_are_counted() {
+        let values = "1.0,\n".repeat(200_000);
+        let text = format!("[pulse.shape]\nkind = \"sampled\"\ntime_s = [{values}\"x\"]\npower = [1.0]\n");
+        assert!(message(&text).starts_with("s.toml:200003: pulse.shape.time_s[200000] = \"x\" is not allowed"));
+        let many: String = (0..1000).map(|i| format!("key{i} = 1\n")).collect();
+        let m = message(&many);
+        assert!(m.lines().count() == 51 && m.ends_with("\nand 950 more"), "{m}");
     }
 
     /// Each key of each kind, with a value that no key takes.

@@ -1,0 +1,82 @@
+//! What the program prints: results to standard output, errors to standard error, as text or as JSON.
+
+use super::Cli;
+use crate::Error;
+use crate::scene::{Problem, SceneError};
+use serde_json::{Value, json};
+use std::io::{ErrorKind, Write as _};
+
+/// Prints a text to standard output; a pipe that nobody reads any more is no error, a full disk is.
+///
+/// # Errors
+/// What the system says.
+pub(super) fn print(text: &str) -> Result<(), Error> {
+    let mut out = std::io::stdout().lock();
+    // What is still in the buffer at the end of the program would be lost without a word.
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(source) if source.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::Io { action: "write to", path: "standard output".into(), source })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints a result: the object with `--json`, else the text.
+///
+/// # Errors
+/// As [`print()`].
+pub(super) fn say(cli: &Cli, object: &Value, text: &str) -> Result<(), Error> {
+    print(&if cli.json { format!("{object:#}\n") } else { format!("{}\n", text.trim_end()) })
+}
+
+/// Prints an error to standard error; nothing can be done where that fails.
+pub(super) fn complain(error: &Error, as_json: bool) {
+    let text = if as_json { format!("{:#}", as_object(error)) } else { format!("error: {error}") };
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// Words that the command line does not know, or help; returns the exit code.
+pub(super) fn explain(error: &clap::Error) -> u8 {
+    let as_json = error.use_stderr() && std::env::args_os().any(|word| word == "--json");
+    let printed = if as_json {
+        let text = error.render().to_string();
+        let object = json!({ "error": text.trim_end().trim_start_matches("error: "), "problems": [] });
+        writeln!(std::io::stderr(), "{object:#}")
+    } else {
+        // Help and version are no errors and go to standard output; clap knows which is which.
+        error.print()
+    };
+    match printed {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => 2,
+        _ => error.exit_code() as u8,
+    }
+}
+
+/// An error as an object: the whole message, and each problem with its file, line, key, value and what is allowed.
+fn as_object(error: &Error) -> Value {
+    json!({ "error": error.to_string(), "problems": problems(error) })
+}
+
+fn problems(error: &Error) -> Vec<Value> {
+    let problem = |file: &std::path::Path, line: Option<usize>, allowed: &str| json!({ "file": file, "line": line, "key": null, "value": null, "allowed": allowed });
+    match error {
+        Error::Scene(SceneError::Invalid { path, problems }) => problems
+            .iter()
+            .map(|located| {
+                let Problem { key, value, allowed } = &located.problem;
+                json!({ "file": path, "line": located.line, "key": key, "value": value, "allowed": allowed })
+            })
+            .collect(),
+        Error::Scene(SceneError::Malformed { path, line, message }) => vec![problem(path, Some(*line), message)],
+        Error::Input { path, reason } => vec![problem(path, None, reason)],
+        Error::Scene(SceneError::Unreadable { path, source }) | Error::Io { path, source, .. } => {
+            vec![problem(path, None, &source.to_string())]
+        }
+        Error::OfKey { key, source } => {
+            let mut found = problems(source);
+            found.iter_mut().for_each(|problem| problem["key"] = json!(key));
+            found
+        }
+        _ => Vec::new(),
+    }
+}
