@@ -20,7 +20,7 @@ fn main() -> OutputResult<()> {
     files.add("map.csv", map_table(&both)?.to_csv(&origin)?)?;
     let one = map(&[2.5], false);
     files.add("one.csv", halo_table(&one)?.to_csv(&origin)?)?;
-    files.add("one.hpl", wakescope_sim::export::hpl::hpl_bytes(&one, 0, "one.hpl", &origin)?)?;
+    files.add("one.hpl", wakescope_sim::export::hpl::hpl_bytes(&one, 0, "one.hpl")?)?;
     let wind = planes();
     for stem in ["planes", "wake"] {
         files.add(&format!("{stem}.csv"), planes_table(&wind)?.to_csv(&origin)?)?;

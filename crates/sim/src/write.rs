@@ -113,7 +113,7 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing)
             files.add("map.nc", crate::export::cfradial::cfradial_bytes(&map, &origin)?)?;
         }
         if outputs.hpl {
-            files.add(HALO, hpl::hpl_bytes(&map, 0, HALO, &origin)?)?;
+            files.add(HALO, hpl::hpl_bytes(&map, 0, HALO)?)?;
             if outputs.csv {
                 files.add("halo.csv", hpl::hpl_table(&map, 0)?.to_csv(&origin)?)?;
             }

@@ -2,6 +2,7 @@
 
 use super::{Claim, Context, Rendered};
 use crate::Failure;
+use crate::validate::interpolate;
 use crate::wakes::Wake;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::export::{Table, VelocityMap};
@@ -12,6 +13,39 @@ use wakescope_sim::scene::{Flow, Outside, Scene, SceneFile, SimulatedFlow, Simul
 use wakescope_sim::{run, write};
 
 const AGES: [(f64, &str); 2] = [(2.5, "early"), (5.0, "late")];
+/// Air about the centre of a vortex that belongs to it, in spacings: half of the way between the two at the start.
+const REACH: f64 = 0.5;
+
+/// Smallest and largest distance from the middle and largest height of a vortex centre at the ages shown \[m\].
+fn extent_m(wake: &Wake) -> Result<[f64; 3], Failure> {
+    let mut extent_m = [f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    for (tau, _) in AGES {
+        for side in ["left", "right"] {
+            let at = |name: &str| -> Result<f64, Failure> {
+                Ok(interpolate(&wake.curve(&format!("{name}_{side}_m"))?, tau))
+            };
+            let (y_m, z_m) = (at("y")?, at("z")?);
+            extent_m = [extent_m[0].min(y_m), extent_m[1].max(y_m), extent_m[2].max(z_m)];
+        }
+    }
+    Ok(extent_m)
+}
+
+/// A sector from the ground up, as a lidar on the ground scans it.
+struct Sector {
+    range_m: [f64; 2],
+    elevation_max_rad: f64,
+}
+
+impl Sector {
+    /// The smallest about the boxes that reach `reach_m` beyond the centres of vortices, which lie from `low_m` to `high_m` about
+    /// `middle_m` and at most `top_m` high.
+    fn about([low_m, high_m, top_m]: [f64; 3], middle_m: f64, reach_m: f64) -> Self {
+        let (near_m, far_m, top_m) = (middle_m + low_m - reach_m, middle_m + high_m + reach_m, top_m + reach_m);
+        // The far upper corner is a range away, not a distance along the ground.
+        Self { range_m: [near_m, far_m.hypot(top_m)], elevation_max_rad: top_m.atan2(near_m) }
+    }
+}
 
 fn scene(context: &Context, wake: &Wake, tau: f64) -> Result<Scene, Failure> {
     let b0_m = wake.flow.pair.scales()?.spacing_m;
@@ -22,11 +56,13 @@ fn scene(context: &Context, wake: &Wake, tau: f64) -> Result<Scene, Failure> {
         ..SimulatedFlow::default()
     };
     let mut scene = Scene { seed: context.seed, ..Scene::default() };
-    // The box of the flow, as far as the vortices go.
-    let half_m = 0.5 * wake.flow.size[1] * b0_m - 10.0;
-    scene.scan.range_min_m = flow.lateral_position_m - half_m;
-    scene.scan.range_max_m = flow.lateral_position_m + half_m;
-    scene.scan.elevation_max_rad = (1.6 * b0_m / flow.lateral_position_m).atan();
+    // Both vortices whole at both ages, with the same sector: air beyond the box of the flow is masked.
+    let sector = Sector::about(extent_m(wake)?, flow.lateral_position_m, REACH * b0_m);
+    // Gates begin and end half a window inside the samples.
+    let half_window_m = 0.5 * scene.estimator.window_samples as f64 * scene.sample_spacing_m();
+    scene.scan.range_min_m = sector.range_m[0] - half_window_m;
+    scene.scan.range_max_m = sector.range_m[1] + half_window_m;
+    scene.scan.elevation_max_rad = sector.elevation_max_rad;
     scene.scan.pulses_per_line = 1;
     scene.scan.realisations = context.choose(4, 32, 128);
     scene.scan.outside_flow = Outside::Mask {};
@@ -87,4 +123,27 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 fn extreme(map: &VelocityMap, pick: fn(f64, f64) -> f64) -> Result<f64, Failure> {
     let field = map.field("v_exact").ok_or_else(|| Failure::new("the map has no exact velocity".into()))?;
     Ok(field.values.iter().copied().fold(f64::NAN, pick))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sector_holds_a_box_about_each_vortex() {
+        // The coarse wake: the late vortices are 1.2 spacings from the middle, the early ones 0.9 and lower.
+        for (extent_m, reach_m) in [([-56.0, 57.0, 45.0], 23.5), ([-80.0, 75.0, 30.0], 30.0)] {
+            let sector = Sector::about(extent_m, 400.0, reach_m);
+            let [low_m, high_m, top_m] = extent_m;
+            for (y_m, z_m) in [low_m, high_m].into_iter().flat_map(|y_m| [(y_m, 0.5 * top_m), (y_m, top_m)]) {
+                for (dy, dz) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+                    let corner = (400.0 + y_m + dy * reach_m, (z_m + dz * reach_m).max(0.0));
+                    let (range_m, elevation_rad) = (corner.0.hypot(corner.1), corner.1.atan2(corner.0));
+                    let slack = 1e-9;
+                    assert!(range_m > sector.range_m[0] - slack && range_m < sector.range_m[1] + slack, "{corner:?}");
+                    assert!(elevation_rad < sector.elevation_max_rad + slack, "{corner:?}");
+                }
+            }
+        }
+    }
 }

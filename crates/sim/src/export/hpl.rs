@@ -6,10 +6,13 @@
 use super::csv::Table;
 use super::error::{OutputError, OutputResult};
 use super::map::VelocityMap;
-use super::provenance::Provenance;
 use super::site::DAY_S;
 use crate::SPEED_OF_LIGHT_M_S;
 use std::fmt::Write as _;
+
+/// No instrument has the number 0: with the file's own name it is all by which this program's files can be told, for readers
+/// refuse every other remark.
+pub(super) const SYSTEM_ID: &str = "System ID:\t0";
 
 /// The bytes of the file called `file_name` (the header repeats it) with the rays of sweep `sweep`.
 ///
@@ -19,15 +22,13 @@ use std::fmt::Write as _;
 /// What [`VelocityMap::check`] finds; no such sweep; no field `radial_velocity` or `signal_to_noise_ratio`; gates
 /// that overlap or leave gaps, or do not start a whole number of gates from the lidar (the format derives the range
 /// from the gate number); a sweep across midnight UTC.
-pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResult<Vec<u8>> {
     map.check()?;
     let (first, last) = rays_of(map, sweep)?;
     let (gate_m, before) = gate_grid(&map.range_m)?;
     within_a_day(map.rays[first].time_s, map.rays[last].time_s, map.site.start)?;
     let (velocity, snr_db) = (&need(map, "radial_velocity")?.values, &need(map, "signal_to_noise_ratio")?.values);
     let mut out = header(map, file_name, gate_m, before + map.range_m.len(), (first, last));
-    // The end of the last line is free; readers look at its asterisks only.
-    let _ = write!(out, "**** {}, scene {}\r\n", provenance.program, provenance.scene_hash);
     for ray in first..=last {
         push_ray_line(map, ray, &mut out);
         for gate in 0..before {
@@ -120,7 +121,7 @@ fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize
     let resolution_m_s = 2.0 * pulse.nyquist_velocity_m_s / points;
     let lines = [
         format!("Filename:\t{name}"),
-        "System ID:\t0".into(),
+        SYSTEM_ID.into(),
         format!("Number of gates:\t{gates}"),
         // Readers multiply it with the number of a gate.
         format!("Range gate length (m):\t{gate_m:.6}"),
@@ -138,6 +139,7 @@ fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize
         "f9.6,1x,f6.2,1x,f6.2".into(),
         "Data line 2: Range Gate  Doppler (m/s)  Intensity (SNR + 1)  Beta (m-1 sr-1)".into(),
         "i3,1x,f6.4,1x,f8.6,1x,e12.6 - repeat for no. gates".into(),
+        "****".into(),
     ];
     lines.join("\r\n") + "\r\n"
 }
@@ -175,12 +177,11 @@ fn push_gate(gate: usize, velocity_m_s: f64, snr_db: f64, out: &mut String) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::provenance::example;
     use super::super::samples;
     use super::*;
 
     fn lines(map: &VelocityMap, sweep: usize) -> Vec<String> {
-        let text = String::from_utf8(hpl_bytes(map, sweep, "x_1.hpl", &example()).unwrap()).unwrap();
+        let text = String::from_utf8(hpl_bytes(map, sweep, "x_1.hpl").unwrap()).unwrap();
         assert_eq!(text.matches('\n').count(), text.matches("\r\n").count());
         text.split("\r\n").map(str::to_owned).collect()
     }
@@ -192,7 +193,7 @@ mod tests {
         assert_eq!(lines[0], "Filename:\tx_1.hpl");
         assert_eq!(lines[2], "Number of gates:\t6", "one empty gate before the first at 45 m");
         assert_eq!(lines[9], "Start time:\t20240101 00:01:20.00");
-        assert_eq!(lines[16], "**** wakescope 0.1.0, scene 00ff");
+        assert_eq!(lines[16], "****");
         assert_eq!(lines.len(), 17 + 6 * 7 + 1);
         let ray: Vec<f64> = lines[17].split_whitespace().map(|c| c.parse().unwrap()).collect();
         assert_eq!(ray.len(), 5);
@@ -218,8 +219,8 @@ mod tests {
     fn gates_that_the_format_cannot_place_are_refused() {
         let mut map = samples::map();
         map.range_m.iter_mut().for_each(|r| *r += 7.0);
-        assert!(matches!(hpl_bytes(&map, 0, "x.hpl", &example()), Err(OutputError::Unsupported { .. })));
-        assert!(matches!(hpl_bytes(&samples::map(), 2, "x.hpl", &example()), Err(OutputError::Value { .. })));
+        assert!(matches!(hpl_bytes(&map, 0, "x.hpl"), Err(OutputError::Unsupported { .. })));
+        assert!(matches!(hpl_bytes(&samples::map(), 2, "x.hpl"), Err(OutputError::Value { .. })));
     }
 
     #[test]
@@ -231,7 +232,7 @@ mod tests {
         let hours: f64 = lines[17].split_whitespace().next().unwrap().parse().unwrap();
         approx::assert_abs_diff_eq!(hours, 23.0 + 58.0 / 60.0 + 40.0 / 3600.0, epsilon = 1e-8);
         map.site.start = map.site.start.after_s(79.0);
-        let error = hpl_bytes(&map, 0, "x.hpl", &example()).unwrap_err().to_string();
+        let error = hpl_bytes(&map, 0, "x.hpl").unwrap_err().to_string();
         assert!(error.contains("2023-12-31T23:59:59Z to 2024-01-01T00:00:01Z"), "{error}");
     }
 

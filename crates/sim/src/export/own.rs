@@ -3,6 +3,7 @@
 //! Check: each format is recognised from its own writer; other files of the same names are not.
 
 use super::error::{OutputError, OutputResult};
+use super::hpl::SYSTEM_ID;
 use crate::scene::hash_of;
 use std::fs::File;
 use std::io::Read;
@@ -55,7 +56,8 @@ pub fn is_own(path: &Path) -> bool {
     }
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
-    read.is_ok() && is_own_head(extension, &head)
+    let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+    read.is_ok() && is_own_head(name, extension, &head)
 }
 
 /// A scene or case with all defaults: the first line has the hash of the rest.
@@ -66,11 +68,11 @@ fn is_own_toml(text: &str) -> bool {
     stated == Some(hash_of(rest).as_str())
 }
 
-fn is_own_head(extension: &str, head: &[u8]) -> bool {
+fn is_own_head(name: &str, extension: &str, head: &[u8]) -> bool {
     let begins = |with: &str| head.starts_with(with.as_bytes());
     match extension {
         "csv" => begins(&format!("# source: {NAME}")),
-        "hpl" => begins("Filename:") && find(head, &format!("\r\n**** {NAME}")).is_some(),
+        "hpl" => begins(&format!("Filename:\t{name}\r\n{SYSTEM_ID}\r\n")),
         "nc" => begins("CDF") && has_source(head),
         "png" => head.starts_with(b"\x89PNG") && has_source(head),
         "svg" => begins("<svg") && has_source(head),
@@ -99,7 +101,7 @@ mod tests {
         let (origin, map) = (example(), samples::map());
         let mut files: Vec<(String, Vec<u8>)> = vec![
             ("map.csv".into(), tables::map_table(&map).unwrap().to_csv(&origin).unwrap().into_bytes()),
-            ("halo.hpl".into(), super::super::hpl::hpl_bytes(&map, 0, "halo.hpl", &origin).unwrap()),
+            ("halo.hpl".into(), super::super::hpl::hpl_bytes(&map, 0, "halo.hpl").unwrap()),
             (
                 "scene.toml".into(),
                 format!("# {}, scene {}\nseed = 1\n", crate::PROGRAM, hash_of("seed = 1\n")).into_bytes(),
@@ -132,8 +134,10 @@ mod tests {
             let own = std::fs::read(&path).unwrap();
             // What a user may have there: another file of that kind, with or without the word in it.
             let mut other = own.clone();
-            let at = find(&other, NAME).unwrap();
-            other[at..at + NAME.len()].copy_from_slice(b"somebodys ");
+            match find(&other, NAME) {
+                Some(at) => other[at..at + NAME.len()].copy_from_slice(b"somebodys "),
+                None => other[find(&own, SYSTEM_ID).unwrap() + SYSTEM_ID.len() - 1] = b'7',
+            }
             for foreign in [other, b"# notes on wakescope 0.1.0\nmine\n".to_vec(), Vec::new()] {
                 std::fs::write(&path, foreign).unwrap();
                 let error = refused(Existing::Own).unwrap_err();

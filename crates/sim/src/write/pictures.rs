@@ -46,7 +46,7 @@ pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
     }
     let styles = [Style::Line, Style::Dash, Style::DashDot, Style::Dot];
     for ((name, other), style) in profile.others.iter().zip(styles) {
-        efficiency = efficiency.with(curve(&name.replace("efficiency_", "").replace('_', " "), style, other));
+        efficiency = efficiency.with(curve(&label_of(name), style, other));
     }
     let mut snr = Series::new("", Style::Line, points(&profile.snr_db));
     let is_fixed = matches!(plan.scene.scene.detector.snr, SnrReference::Fixed { .. });
@@ -57,6 +57,11 @@ pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
     let mut figure = Figure::side_by_side([snr, efficiency].map(|plot| CurvePlot { shape: 0.75, ..plot }));
     figure.width = 1120.0;
     figure
+}
+
+/// The column of a model in words.
+fn label_of(column: &str) -> String {
+    column.replace("efficiency_", "").replace('_', " ").replace("monte carlo", "Monte Carlo")
 }
 
 fn has_error(profile: &EfficiencyProfile) -> bool {
@@ -87,14 +92,14 @@ pub(super) fn add_map(files: &mut FileGroup, plan: &Plan, map: &VelocityMap, ori
     let colours = exact.colours;
     let scan = panel("v_scan", "one scan, estimated")?.coloured(colours);
     let panels = if realisations == 1 {
-        vec![exact, scan, panel("bias", "error against the pulse-weighted velocity")?]
+        vec![exact, scan, panel("bias", "its error")?]
     } else {
         let mean = panel("radial_velocity", &format!("mean of {realisations} realisations"))?.coloured(colours);
         vec![
             exact,
             scan,
             mean,
-            panel("bias", "mean error against the pulse-weighted velocity")?,
+            panel("bias", "mean error (bias)")?,
             panel("velocity_standard_deviation", "standard deviation of one scan")?,
             panel("rms", "root mean square error")?,
         ]
@@ -110,7 +115,7 @@ fn title(plan: &Plan, has_gaps: bool) -> String {
     let mut words = vec!["Radial velocity [m/s], positive away from the lidar".to_owned()];
     if matches!(plan.scene.scene.flow, Flow::VortexPair(_) | Flow::Simulated(_)) {
         let scan_s = last_s(plan) - plan.wind.start_s;
-        words.push(format!("age τ = {:.2} at the start of the scan, which takes {scan_s:.1} s", plan.wind.tau));
+        words.push(format!("age τ = {:.2} at the start of the scan, which takes {scan_s:.2} s", plan.wind.tau));
     }
     words.push(match plan.scene.scene.scan.realisations {
         1 => "one realisation".into(),
