@@ -12,6 +12,7 @@ mod flow;
 mod implicit;
 mod layout;
 mod line;
+mod mapping;
 mod mesh;
 mod momentum;
 mod pressure;
