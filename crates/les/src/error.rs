@@ -242,15 +242,17 @@ pub enum Error {
     },
     /// The pressure equation was not solved to the tolerance asked for.
     #[error(
-        "the {method} did not reach the tolerance {tolerance:.1e} of the pressure equation; \
+        "the {method} did not reach the tolerance {tolerance:.1e} of the pressure equation: {reason}; \
          relative residuals after each pass: {}",
         listed(history)
     )]
     PressureNotSolved {
         /// Which solver.
         method: &'static str,
-        /// Largest relative residual allowed.
+        /// Largest relative residual allowed (2-norm).
         tolerance: f64,
+        /// Why it went no further.
+        reason: PressureFailure,
         /// Relative residual after each pass or iteration.
         history: Vec<f64>,
     },
@@ -262,6 +264,36 @@ pub enum Error {
         /// Height of the point.
         z_m: f64,
     },
+}
+
+/// Why a pressure solver went no further.
+#[non_exhaustive]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PressureFailure {
+    /// The last digit of the solution leaves as much: waves much longer than the cells are high make it large against its
+    /// differences.
+    RoundOff {
+        /// Relative residual that round-off of the solution leaves, about.
+        attainable: f64,
+    },
+    /// The iteration no longer reduces the residual.
+    Stalled,
+    /// The right side holds a value that is not finite.
+    NotFinite,
+}
+
+impl std::fmt::Display for PressureFailure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::RoundOff { attainable } => write!(
+                f,
+                "round-off of so large a solution leaves about {attainable:.0e}, so ask for a tolerance above that, or for a \
+                 mesh that is shorter in units of its finest cell"
+            ),
+            Self::Stalled => write!(f, "the residual no longer falls; take the direct solver"),
+            Self::NotFinite => write!(f, "the right side holds a value that is not finite"),
+        }
+    }
 }
 
 /// Residuals, one after the other.

@@ -113,6 +113,21 @@ fn plane_vortices_converge_with_fourth_order_on_a_mesh_stretched_both_ways() {
 }
 
 #[test]
+fn plane_vortices_converge_with_fourth_order_on_periodic_directions_refined_about_a_place() {
+    let nu = 0.01;
+    let error = |n: usize, step_s: f64, steps: usize| {
+        let mut case = cases::taylor_green_plane(n, [0.0; 2], nu, step_s).unwrap();
+        let cluster = |strength, place| Mapping::Cluster { strength, place };
+        let [x, y, z] = case.mesh.directions().clone();
+        case.mesh = Mesh::new(x, y.stretched(cluster(0.5, 0.5)), z.stretched(cluster(0.4, 0.15))).unwrap();
+        case.settings.scheme = TimeScheme::RungeKutta3;
+        plane_error(&run(&case, steps), nu)
+    };
+    let order = (error(64, 2e-3, 50) / error(128, 5e-4, 200)).log2();
+    assert!(order > 3.9, "order {order}");
+}
+
+#[test]
 fn both_schemes_are_of_second_order_in_time() {
     // Vortices that a mean flow carries along: the convection then has to follow in time.
     let nu = 0.01;

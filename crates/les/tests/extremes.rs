@@ -6,8 +6,8 @@
 use std::f64::consts::TAU;
 
 use wakescope_les::{
-    Direction, Error, Flow, FlowSettings, Mapping, Mesh, SubgridModel, TimeScheme, TimeStep, ViscousTreatment, Wall,
-    cases,
+    Direction, Error, Flow, FlowSettings, Mapping, Mesh, PressureMethod, SubgridModel, TimeScheme, TimeStep,
+    ViscousTreatment, Wall, cases,
 };
 
 /// A flow without symmetries between a no-slip wall and a slip wall, all lengths in `length` and velocities in `speed`.
@@ -152,6 +152,41 @@ fn flat_domains_and_single_cells_run() {
         let flow = steps(flow, 5);
         assert!(flow.kinetic_energy_m5_s2() <= report.kinetic_energy_m5_s2 * (1.0 + 0.01), "{cells:?}");
         assert!(flow.relative_divergence() < 1e-9, "{cells:?}: divergence {}", flow.relative_divergence());
+    }
+}
+
+#[test]
+fn divergence_after_the_start_is_round_off_on_stretched_meshes_flat_cells_and_long_domains() {
+    let slip = |n, length| Direction::between(n, 0.0, length, Wall::Slip, Wall::Slip);
+    let sinh = slip(64, 6.0).stretched(Mapping::SinhMiddle { strength: 5.0 });
+    let tanh =
+        Direction::between(64, 0.0, 3.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 5.0 });
+    let sticky = Direction::between(48, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST);
+    let meshes = [
+        ("sinh 5 x tanh 5", [Direction::periodic(8, 0.0, 2.0), sinh, tanh]),
+        ("cells of aspect 1e4", [Direction::periodic(8, 0.0, 2.0), slip(32, 1e4), slip(32, 1.0)]),
+        ("1e5 times longer than high", [Direction::thin(1.0), slip(64, 1e5), sticky]),
+        ("long and periodic", [Direction::thin(1.0), Direction::periodic(64, 0.0, 1e4), slip(48, 1.0)]),
+    ];
+    for (name, [x, y, z]) in meshes {
+        for pressure in [PressureMethod::Direct, PressureMethod::Multigrid] {
+            let length_m = y.length_m();
+            let height_m = z.length_m();
+            let field = move |[x, y, z]: [f64; 3]| {
+                let (s, c) = (TAU * y / length_m + 0.3).sin_cos();
+                let (sz, cz) = (TAU * z / height_m + 0.5).sin_cos();
+                [0.2 * s * cz, c * sz + 0.3 * (5.0 * s).cos() * cz, s * cz + 0.1 * (TAU * x).sin()]
+            };
+            let mesh = Mesh::new(x.clone(), y.clone(), z.clone()).unwrap();
+            let time_step = TimeStep::Courant { courant: 0.3, longest_s: 1e-3 };
+            let settings = FlowSettings { pressure, ..FlowSettings::new(1e-4, time_step) };
+            let (flow, _) = Flow::new(mesh, settings, field).unwrap();
+            let start = flow.relative_divergence();
+            assert!(start < 1e-14, "{name}, {pressure:?}: {start:e} at the start");
+            let flow = steps(flow, 3);
+            let then = flow.relative_divergence();
+            assert!(then < 1e-10, "{name}, {pressure:?}: {then:e} after three steps");
+        }
     }
 }
 

@@ -10,6 +10,8 @@
 
 use rayon::prelude::*;
 
+mod project;
+
 use super::control::refuse_sticking_without_viscosity;
 use super::implicit::LineSolver;
 use super::layout::Layout;
@@ -148,6 +150,7 @@ impl Flow {
         self.work.star = velocity;
         self.state.velocity = std::array::from_fn(|_| vec![0.0; self.layout.shape.len()]);
         self.project(1.0)?;
+        self.repeat(1.0, 0.0)?;
         self.state.implicit = self.choose_implicit();
         // The pressure that belongs to the field: that which keeps its acceleration free of divergence.
         let velocity = self.state.velocity.clone();
@@ -232,7 +235,7 @@ impl Flow {
             subgrid_viscosity_m2_s: self.model.as_ref().map_or(0.0, Subgrid::max_viscosity_m2_s),
             subgrid_decay: step_s * self.model.as_ref().map_or(0.0, Subgrid::max_decay_per_s),
             pressure_iterations: solved.map_or(0, |s| s.iterations),
-            pressure_residual: solved.and_then(|s| s.residual),
+            pressure_residual: solved.map(|s| s.residual),
             pressure_factor: solved.and_then(|s| s.factor),
         })
     }
@@ -313,23 +316,6 @@ impl Flow {
                 }
             });
         }
-    }
-
-    /// Projects `star` to the new velocity; `phi` is left in the work array.
-    fn project(&mut self, stage_s: f64) -> Result<Solved, Error> {
-        let star = self.work.star.each_ref().map(Vec::as_slice);
-        self.divergence.apply(star, 1.0 / stage_s, &mut self.work.phi);
-        if self.settings.rotational {
-            self.work.divergence.copy_from_slice(&self.work.phi);
-            // The pressure takes the plain divergence of u*.
-            divide_by_volume(&self.layout, stage_s, &mut self.work.divergence);
-        }
-        let solved = self.pressure_solver.solve(&mut self.work.phi, self.settings.pressure_tolerance)?;
-        let velocity = self.state.velocity.each_mut().map(Vec::as_mut_slice);
-        let summary = correct(&self.ops, &self.layout, star, &self.work.phi, stage_s, velocity);
-        self.state.energy = summary.energy;
-        self.state.courant_per_s = summary.courant_per_s;
-        Ok(solved)
     }
 
     /// (25), or the rotational form.

@@ -52,10 +52,12 @@ fn production(flow: &Flow) -> (f64, [f64; 3]) {
 #[test]
 fn convection_makes_no_energy_and_no_momentum_on_stretched_meshes_with_and_without_walls() {
     let sine = |n, a| Direction::periodic(n, 0.0, 1.0).stretched(Mapping::Sine { amplitude: a });
+    let cluster = |n, strength, place| Direction::periodic(n, 0.0, 1.0).stretched(Mapping::Cluster { strength, place });
     let walls = |n, low, high, mapping| Direction::between(n, 0.0, 1.0, low, high).stretched(mapping);
     let tanh = Mapping::TanhBoth { strength: 1.2 };
     let meshes = [
         [sine(16, 0.5), sine(14, 0.4), sine(15, 0.3)],
+        [cluster(16, 0.8, 0.5), cluster(21, 0.6, 0.1), sine(15, 0.3)],
         [
             sine(12, 0.3),
             walls(15, Wall::Slip, Wall::Slip, tanh.clone()),

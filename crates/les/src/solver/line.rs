@@ -342,13 +342,19 @@ mod tests {
     fn laplacians_are_of_fourth_order_on_stretched_meshes() {
         let sine = Mapping::Sine { amplitude: 0.5 };
         let tanh = Mapping::TanhBoth { strength: 1.5 };
+        let cluster = Mapping::Cluster { strength: 0.7, place: 0.3 };
         for make in [
             |n, m| Direction::periodic(n, 0.0, 2.0).stretched(m),
             |n, m| Direction::between(n, 0.0, 2.0, Wall::Slip, Wall::Slip).stretched(m),
         ] {
-            for mapping in [sine.clone(), tanh.clone()] {
-                let fold = matches!(mapping, Mapping::TanhBoth { .. });
-                if fold && make(8, Mapping::Uniform).ends == Ends::Periodic {
+            for mapping in [sine.clone(), tanh.clone(), cluster.clone()] {
+                let periodic = make(8, Mapping::Uniform).ends == Ends::Periodic;
+                let fits = match mapping {
+                    Mapping::TanhBoth { .. } => !periodic,
+                    Mapping::Cluster { .. } => periodic,
+                    _ => true,
+                };
+                if !fits {
                     continue;
                 }
                 let coarse = errors(&make(128, mapping.clone()));

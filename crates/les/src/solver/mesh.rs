@@ -6,100 +6,8 @@
 //!
 //! Check: metrics against finite differences of the positions; refusal of folds and of jumps between neighbouring cells.
 
-use std::fmt;
-use std::sync::Arc;
-
+pub use super::mapping::{Mapping, MappingFn};
 use crate::Error;
-
-/// Position and its derivative, both for a direction scaled to length 1: `s -> (x, dx/ds)` with `x(0) = 0`, `x(1) = 1`.
-pub type MappingFn = Arc<dyn Fn(f64) -> (f64, f64) + Send + Sync>;
-
-/// How the cells of one direction are spread. All formulas map `s` in `[0, 1]` to the fraction of the length.
-#[derive(Clone, Default)]
-pub enum Mapping {
-    /// Equal cells.
-    #[default]
-    Uniform,
-    /// `x = s + a sin(2 pi s)/(2 pi)`, for periodic directions; `|a| < 1`.
-    Sine {
-        /// Amplitude `a`: cells vary between `1 - |a|` and `1 + |a|` times the mean.
-        amplitude: f64,
-    },
-    /// Fine cells at the low end: `x = 1 + tanh(a (s - 1))/tanh(a)`.
-    TanhLow {
-        /// Strength `a > 0`.
-        strength: f64,
-    },
-    /// Fine cells at the high end: `x = tanh(a s)/tanh(a)`.
-    TanhHigh {
-        /// Strength `a > 0`.
-        strength: f64,
-    },
-    /// Fine cells at both ends: `x = (1 + tanh(a (2 s - 1))/tanh(a))/2`.
-    TanhBoth {
-        /// Strength `a > 0`.
-        strength: f64,
-    },
-    /// Fine cells in the middle: `x = (1 + sinh(a (2 s - 1))/sinh(a))/2`.
-    SinhMiddle {
-        /// Strength `a > 0`.
-        strength: f64,
-    },
-    /// Any other mapping, with its derivative.
-    Custom(MappingFn),
-}
-
-impl fmt::Debug for Mapping {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Uniform => write!(f, "Uniform"),
-            Self::Sine { amplitude } => write!(f, "Sine({amplitude})"),
-            Self::TanhLow { strength } => write!(f, "TanhLow({strength})"),
-            Self::TanhHigh { strength } => write!(f, "TanhHigh({strength})"),
-            Self::TanhBoth { strength } => write!(f, "TanhBoth({strength})"),
-            Self::SinhMiddle { strength } => write!(f, "SinhMiddle({strength})"),
-            Self::Custom(_) => write!(f, "Custom"),
-        }
-    }
-}
-
-impl Mapping {
-    /// Position and derivative at `s`, both as fractions of the length.
-    fn at(&self, s: f64) -> (f64, f64) {
-        use std::f64::consts::TAU;
-        let sech2 = |t: f64| 1.0 / t.cosh().powi(2);
-        match *self {
-            Self::Uniform => (s, 1.0),
-            Self::Sine { amplitude: a } => (s + a * (TAU * s).sin() / TAU, 1.0 + a * (TAU * s).cos()),
-            Self::TanhLow { strength: a } => {
-                let t = a * (s - 1.0);
-                (1.0 + t.tanh() / a.tanh(), a * sech2(t) / a.tanh())
-            }
-            Self::TanhHigh { strength: a } => ((a * s).tanh() / a.tanh(), a * sech2(a * s) / a.tanh()),
-            Self::TanhBoth { strength: a } => {
-                let t = a * (2.0 * s - 1.0);
-                (0.5 * (1.0 + t.tanh() / a.tanh()), a * sech2(t) / a.tanh())
-            }
-            Self::SinhMiddle { strength: a } => {
-                let t = a * (2.0 * s - 1.0);
-                (0.5 * (1.0 + t.sinh() / a.sinh()), a * t.cosh() / a.sinh())
-            }
-            Self::Custom(ref map) => map(s),
-        }
-    }
-
-    /// The parameter of the formula, if it has one.
-    fn parameter(&self) -> Option<(&'static str, f64)> {
-        match *self {
-            Self::Uniform | Self::Custom(_) => None,
-            Self::Sine { amplitude } => Some(("amplitude", amplitude)),
-            Self::TanhLow { strength }
-            | Self::TanhHigh { strength }
-            | Self::TanhBoth { strength }
-            | Self::SinhMiddle { strength } => Some(("strength", strength)),
-        }
-    }
-}
 
 /// What bounds a direction at one of its ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -198,8 +106,20 @@ impl Direction {
                 return Err(bad(what, value, if sine { "between -1 and 1" } else { "above 0 and at most 20" }));
             }
         }
+        if let Mapping::Cluster { place, .. } = self.mapping
+            && !(0.0..=1.0).contains(&place)
+        {
+            return Err(bad("place", place, "a fraction of the length, 0 to 1"));
+        }
         self.check_cells(axis)?;
-        self.check_spacing(name)
+        self.check_spacing(name)?;
+        if self.ends == Ends::Periodic && !self.mapping.is_periodic() {
+            let ratio = self.at(self.cells as f64).1 / self.at(0.0).1;
+            let allowed =
+                "1, with the same growth on both sides: a periodic direction takes equal cells, a sine or a cluster";
+            return Err(bad("metric dx/dxi at its high end over that at its low end", ratio, allowed));
+        }
+        Ok(())
     }
 
     fn check_cells(&self, axis: usize) -> Result<(), Error> {
@@ -304,6 +224,8 @@ impl Mesh {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
 
     fn all() -> Vec<Mapping> {
@@ -315,6 +237,8 @@ mod tests {
             Mapping::TanhHigh { strength: 2.5 },
             Mapping::TanhBoth { strength: 2.0 },
             Mapping::SinhMiddle { strength: 3.0 },
+            Mapping::Cluster { strength: 0.8, place: 0.5 },
+            Mapping::Cluster { strength: 1.2, place: 0.15 },
             Mapping::Custom(custom),
         ]
     }
@@ -334,6 +258,26 @@ mod tests {
     }
 
     #[test]
+    fn a_cluster_is_finest_at_its_place_and_repeats_itself() {
+        for (strength, place) in [(0.5, 0.5), (1.0, 0.2), (1.5, 0.0), (0.7, 0.93)] {
+            let direction = Direction::periodic(200, 0.0, 1.0).stretched(Mapping::Cluster { strength, place });
+            direction.check(1).unwrap();
+            let finest = (0..200).min_by(|&i, &j| {
+                let h = |i: usize| direction.at(i as f64 + 0.5).1;
+                h(i).total_cmp(&h(j))
+            });
+            let (x, h) = direction.at(finest.unwrap() as f64 + 0.5);
+            let apart = (x - place - (x - place).round()).abs();
+            assert!(apart <= h, "{strength} at {place}: finest at {x}");
+            assert!((h * 200.0 / (-strength).exp() - 1.0).abs() < 0.01, "{strength} at {place}: {h}");
+            for xi in [0.0, 0.5, 3.0, 77.5] {
+                let (a, b) = (direction.at(xi), direction.at(xi + 200.0));
+                assert!((a.0 + 1.0 - b.0).abs() < 1e-13 && (a.1 / b.1 - 1.0).abs() < 1e-12, "{a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
     fn folds_jumps_and_too_few_cells_are_refused() {
         let fold: MappingFn = Arc::new(|s| (2.0 * s * s - s, 4.0 * s - 1.0));
         let refused = |d: Direction| Mesh::new(Direction::thin(1.0), d, Direction::thin(1.0)).unwrap_err().to_string();
@@ -341,6 +285,12 @@ mod tests {
         assert!(message.contains("metric"), "{message}");
         let message = refused(Direction::periodic(8, 0.0, 1.0).stretched(Mapping::TanhLow { strength: 4.0 }));
         assert!(message.contains("differ by a factor"), "{message}");
+        let message = refused(Direction::periodic(64, 0.0, 1.0).stretched(Mapping::TanhLow { strength: 1.0 }));
+        assert!(message.contains("periodic direction takes"), "{message}");
+        let cluster =
+            |strength, place| Direction::periodic(64, 0.0, 1.0).stretched(Mapping::Cluster { strength, place });
+        assert!(refused(cluster(1.0, 1.5)).contains("place = 1.5"));
+        assert!(refused(cluster(0.0, 0.5)).contains("above 0"));
         assert!(refused(Direction::periodic(3, 0.0, 1.0)).contains("at least 4"));
         assert!(refused(Direction::between(15, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST)).contains("at least 16"));
         assert!(refused(Direction::periodic(8, 1.0, 1.0)).contains("positive"));

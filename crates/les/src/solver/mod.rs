@@ -13,6 +13,7 @@ mod growth;
 mod implicit;
 mod layout;
 mod line;
+mod mapping;
 mod mesh;
 mod momentum;
 mod pressure;

@@ -26,7 +26,7 @@ pub struct StepReport {
     pub subgrid_decay: f64,
     /// Iterations of the last pressure solve; 0 of the direct solver.
     pub pressure_iterations: usize,
-    /// Relative residual of the last pressure solve, where it was measured.
+    /// Residual of the last pressure solve, 2-norm, relative to its right side.
     pub pressure_residual: Option<f64>,
     /// Mean reduction of the residual per iteration.
     pub pressure_factor: Option<f64>,

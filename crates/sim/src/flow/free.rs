@@ -26,6 +26,8 @@ pub enum MappingName {
     TanhBoth,
     /// Fine in the middle.
     SinhMiddle,
+    /// Fine about `place`, for periodic directions: the finest cell is `exp(-stretch)` times the mean.
+    Cluster,
 }
 
 /// What bounds a direction at one end.
@@ -54,6 +56,9 @@ section! {
         mapping: MappingName = MappingName::Uniform,
         /// Strength of the mapping, or amplitude of the sine.
         stretch: f64 = 0.0,
+        /// Where a cluster is finest, as a fraction of the length.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        place: Option<f64> = None,
         /// What bounds it at the low end.
         low_end: EndName = EndName::Periodic,
         /// What bounds it at the high end.
@@ -144,7 +149,18 @@ impl Axis {
                 "above 0 and at most 20 for this mapping",
             ),
         }
+        let place = self.place.is_none_or(|place| (0.0..=1.0).contains(&place) && self.mapping == MappingName::Cluster);
+        p.require(
+            place,
+            &key("place"),
+            self.place,
+            "a fraction of the length, 0 to 1, and only with mapping = \"cluster\"",
+        );
         let periodic = [self.low_end, self.high_end].map(|end| end == EndName::Periodic);
+        let repeats = matches!(self.mapping, MappingName::Uniform | MappingName::Sine | MappingName::Cluster);
+        let allowed = "uniform, sine or cluster in a periodic direction, and no cluster between planes";
+        let fits = if periodic[0] { repeats } else { self.mapping != MappingName::Cluster };
+        p.require(fits, &key("mapping"), self.mapping, allowed);
         p.require(periodic[0] == periodic[1], &key("high_end"), self.high_end, "periodic at both ends or at none");
         for (field, end, velocity) in [
             ("low_velocity_m_s", self.low_end, self.low_velocity_m_s),
@@ -172,6 +188,7 @@ impl Axis {
                 MappingName::TanhHigh => Mapping::TanhHigh { strength },
                 MappingName::TanhBoth => Mapping::TanhBoth { strength },
                 MappingName::SinhMiddle => Mapping::SinhMiddle { strength },
+                MappingName::Cluster => Mapping::Cluster { strength, place: self.place.unwrap_or(0.5) },
             },
             ends: match self.low_end {
                 EndName::Periodic => Ends::Periodic,

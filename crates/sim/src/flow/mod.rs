@@ -208,7 +208,7 @@ pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) 
         path: folder.to_owned(),
         source,
     })?;
-    let mut warnings = Vec::new();
+    let mut warnings = file.case.case.unresolved(&setup.mesh);
     let meter = setup.wake.take().map(|wake| wake.meter);
     let (mut run, kept) = if begin == Begin::Restart {
         let path = readable(&checkpoint, &previous, &mut warnings);

@@ -6,8 +6,8 @@ use crate::scene::{VortexProfile, section};
 use crate::{Error, join};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use wakescope_les::cases::{self, Case, TollmienSchlichting, VortexPairCase};
-use wakescope_les::{TimeScheme, TimeStep};
+use wakescope_les::cases::{self, Case, Resolution, TollmienSchlichting, VortexLengths, VortexPairCase};
+use wakescope_les::{Mesh, TimeScheme, TimeStep};
 
 /// Steps from start to end that the longest step gives where a case states none.
 const LEAST_STEPS: f64 = 200.0;
@@ -78,6 +78,10 @@ section! {
         cells: [usize; 2] = [384, 384],
         /// Strength of the stretching towards the walls.
         stretch: f64 = 1.5,
+        /// Strength of the refinement of y about its middle: the finest cell is `exp(-strength)` times the mean where y is
+        /// periodic; 0 for equal cells. If absent 0 where y is periodic, else as `stretch`.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        lateral_stretch: Option<f64> = None,
         /// Reynolds number.
         reynolds: f64 = 625.0,
         /// Whether walls stand at the sides too; else y is periodic.
@@ -173,6 +177,7 @@ impl CaseKind {
             Self::Dipole(c) => {
                 p.cells("case.cells", &c.cells);
                 p.stretch("case.stretch", c.stretch);
+                p.stretch("case.lateral_stretch", c.lateral_stretch());
                 p.positive("case.reynolds", c.reynolds);
             }
             Self::LidDrivenCavity(c) => {
@@ -189,6 +194,20 @@ impl CaseKind {
             Self::Wake(c) => c.check(p),
             Self::Free(c) => c.check(p),
         }
+    }
+
+    /// What `mesh` does not resolve of the vortices and of the boundary layer under them, in sentences.
+    pub(super) fn unresolved(&self, mesh: &Mesh) -> Vec<String> {
+        let lengths = match self {
+            Self::Dipole(c) => Some(VortexLengths::dipole(c.reynolds)),
+            Self::VortexPair(c) => Some(VortexLengths::pair(c.core_radius, c.height, c.reynolds, 1.0)),
+            Self::Wake(c) => {
+                let scales = c.pair.scales().ok();
+                scales.map(|scales| VortexLengths::pair(c.core_radius, c.height, c.reynolds, scales.spacing_m))
+            }
+            _ => None,
+        };
+        lengths.map_or_else(Vec::new, |lengths| Resolution::new(mesh, &lengths).warnings())
     }
 
     /// Mesh, settings and initial field; `folder` is that of the case file.
@@ -218,7 +237,9 @@ impl CaseKind {
                 TollmienSchlichting::new(c.reynolds, c.wave_number)
                     .and_then(|wave| wave.case(c.cells, c.stretch, c.amplitude, ANY_STEP_S)),
             ),
-            Self::Dipole(ref c) => cases::dipole_against_wall(c.cells, c.stretch, c.reynolds, c.closed_sides),
+            Self::Dipole(ref c) => {
+                cases::dipole_against_wall(c.cells, [c.lateral_stretch(), c.stretch], c.reynolds, c.closed_sides)
+            }
             Self::LidDrivenCavity(ref c) => cases::lid_driven_cavity(c.cells, c.stretch, c.reynolds),
             Self::Channel(ref c) => cases::channel(c.cells, c.stretch, c.reynolds_tau),
             Self::VortexPair(ref c) => c.case(),
@@ -227,6 +248,12 @@ impl CaseKind {
         };
         let Case { mesh, settings, initial, end_s } = case.map_err(Error::Flow)?;
         Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0, wake: None })
+    }
+}
+
+impl Dipole {
+    fn lateral_stretch(&self) -> f64 {
+        self.lateral_stretch.unwrap_or(if self.closed_sides { self.stretch } else { 0.0 })
     }
 }
 

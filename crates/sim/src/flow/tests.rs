@@ -287,6 +287,21 @@ fn a_flow_that_blows_up_names_step_and_place() {
 }
 
 #[test]
+fn a_mesh_that_does_not_resolve_core_and_boundary_layer_is_said_to() {
+    let warnings = |keys: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let text = format!(
+            "[case]\nkind = \"dipole\"\n{keys}\n[time]\nend_s = 1e-3\nstep_s = 5e-4\n[checkpoint]\nwrite = false\n"
+        );
+        run(&parse(&text), folder.path(), Begin::New, &mut Unwatched).unwrap().warnings
+    };
+    let found = warnings("cells = [48, 48]\nreynolds = 2500.0");
+    assert!(found.iter().any(|text| text.contains("core radius along y has 2.4 cells, at least 2.5")), "{found:?}");
+    assert!(found.iter().any(|text| text.contains("along the wall, where it rolls up")), "{found:?}");
+    assert_eq!(warnings("cells = [96, 96]\nlateral_stretch = 0.7\nreynolds = 200.0"), Vec::<String>::new());
+}
+
+#[test]
 fn wrong_cases_are_refused_with_key_value_and_what_is_allowed() {
     let dipole = |rest: &str| refused(&format!("[case]\nkind = \"dipole\"\n{rest}"));
     for (message, wanted) in [
@@ -308,6 +323,14 @@ fn wrong_cases_are_refused_with_key_value_and_what_is_allowed() {
         (
             refused("[case]\nkind = \"free\"\n[case.z]\ncells = 16\nlow_end = \"slip\"\n"),
             ["case.z.high_end", "periodic at both ends"],
+        ),
+        (
+            refused("[case]\nkind = \"free\"\n[case.y]\ncells = 16\nmapping = \"tanh_low\"\nstretch = 1.0\n"),
+            ["case.y.mapping = TanhLow", "sine or cluster in a periodic direction"],
+        ),
+        (
+            refused("[case]\nkind = \"free\"\n[case.y]\ncells = 16\nmapping = \"sine\"\nplace = 0.5\n"),
+            ["case.y.place", "only with mapping = \"cluster\""],
         ),
     ] {
         for part in wanted {

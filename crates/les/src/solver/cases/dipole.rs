@@ -8,26 +8,25 @@ use crate::Error;
 /// Vorticity at the centres of the two vortices \[1/s\]: makes the energy of the box 2 and its enstrophy 800.
 const CENTRE_VORTICITY_PER_S: f64 = 299.528_385_375_226;
 /// Radius of the vortices \[m\].
-const RADIUS_M: f64 = 0.1;
-
-/// Refinement of the middle of a closed box.
-const MIDDLE_STRENGTH: f64 = 1.5;
+pub(super) const RADIUS_M: f64 = 0.1;
 
 /// The dipole in the plane y, z of the box `[-1, 1]^2`, running along z; `1/reynolds` is the viscosity. The walls at z = -1
-/// and 1 are no-slip; those at y = -1 and 1 too if `closed`, else y is periodic with equal cells. `strength` refines z towards
-/// its walls; in a closed box y is refined in the middle, where the vortices stay.
+/// and 1 are no-slip; those at y = -1 and 1 too if `closed`, else y is periodic. `strength` refines y in its middle, where the
+/// vortices stay ([`Mapping::SinhMiddle`] between walls, else [`Mapping::Cluster`]), and z towards its walls; 0 for equal cells.
 ///
 /// # Errors
 /// Cells, stretching or Reynolds number out of range.
-pub fn dipole_against_wall(cells: [usize; 2], strength: f64, reynolds: f64, closed: bool) -> Result<Case, Error> {
+pub fn dipole_against_wall(cells: [usize; 2], strength: [f64; 2], reynolds: f64, closed: bool) -> Result<Case, Error> {
     let walls = |n| Direction::between(n, -1.0, 1.0, Wall::AT_REST, Wall::AT_REST);
-    let stretched = |d: Direction, mapping| if strength == 0.0 { d } else { d.stretched(mapping) };
+    let stretched = |d: Direction, strength, mapping| if strength == 0.0 { d } else { d.stretched(mapping) };
+    let [lateral, wall] = strength;
     let y = if closed {
-        stretched(walls(cells[0]), Mapping::SinhMiddle { strength: MIDDLE_STRENGTH })
+        stretched(walls(cells[0]), lateral, Mapping::SinhMiddle { strength: lateral })
     } else {
-        Direction::periodic(cells[0], -1.0, 1.0)
+        let middle = Mapping::Cluster { strength: lateral, place: 0.5 };
+        stretched(Direction::periodic(cells[0], -1.0, 1.0), lateral, middle)
     };
-    let z = stretched(walls(cells[1]), Mapping::TanhBoth { strength });
+    let z = stretched(walls(cells[1]), wall, Mapping::TanhBoth { strength: wall });
     let mesh = Mesh::new(Direction::thin(1.0), y, z)?;
     let settings = FlowSettings::new(1.0 / reynolds, TimeStep::Courant { courant: 0.35, longest_s: 1e-3 });
     let initial = |at_m: [f64; 3]| {

@@ -7,6 +7,7 @@ mod channel;
 mod dipole;
 mod orr_sommerfeld;
 mod perturbation;
+mod resolution;
 mod taylor_green;
 mod vortex_pair;
 
@@ -14,6 +15,7 @@ pub use cavity::lid_driven_cavity;
 pub use channel::{channel, couette, decaying_layer, poiseuille, rayleigh_plate};
 pub use dipole::dipole_against_wall;
 pub use orr_sommerfeld::TollmienSchlichting;
+pub use resolution::{Resolution, VortexLengths};
 pub use taylor_green::{taylor_green_3d, taylor_green_eighth, taylor_green_plane, taylor_green_plane_exact};
 pub use vortex_pair::VortexPairCase;
 

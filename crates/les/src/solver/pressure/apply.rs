@@ -2,28 +2,50 @@
 //!
 //! Check: symmetry, constants, products of the directions' own operators.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
 use super::super::line::{Line, Taps};
+use super::super::rows::{self, Columns, HALO, pad};
 use super::kernel;
 
 /// `sum_b (prod_{d != b} m_d) Dw_b f_b^-1 Dw_b^T`.
+///
+/// Every row is applied to the differences from its own cell: a constant leaves exactly nothing, however large it is.
 #[derive(Debug)]
 pub(crate) struct Operator {
     shape: Shape,
     mass_m: [Vec<f64>; 3],
-    /// `Dw_b f_b^-1 Dw_b^T` of the three axes by rows.
-    stiffness: [Vec<Taps>; 3],
+    /// `Dw_0 f_0^-1 Dw_0^T` by columns.
+    along: Columns,
+    periodic: bool,
+    /// `Dw_b f_b^-1 Dw_b^T` of the other two axes by rows, without the diagonals.
+    across: [Vec<Taps>; 2],
+    /// Ratio of the largest eigenvalue to the smallest that is not zero, about.
+    condition: f64,
 }
+
+/// Rows that are treated at a time.
+const ROWS: usize = 64;
 
 impl Operator {
     /// The operator of a mesh.
     pub(crate) fn new(layout: &Layout) -> Self {
+        let rows: [Vec<Taps>; 3] = std::array::from_fn(|b| stiffness(&layout.line[b]));
+        let condition = condition(layout, &rows);
+        let periodic = layout.line[0].is_periodic();
+        let neighbours = |rows: &[Taps]| -> Vec<Taps> {
+            let others = |(i, row): (usize, &Taps)| row.iter().copied().filter(|tap| tap.0 != i).collect();
+            rows.iter().enumerate().map(others).collect()
+        };
         Self {
             shape: layout.shape,
             mass_m: std::array::from_fn(|b| layout.line[b].cell_mass_m.clone()),
-            stiffness: std::array::from_fn(|b| stiffness(&layout.line[b])),
+            along: Columns::new(&rows[0], periodic),
+            periodic,
+            across: [neighbours(&rows[1]), neighbours(&rows[2])],
+            condition,
         }
     }
 
@@ -32,40 +54,67 @@ impl Operator {
         self.shape
     }
 
-    /// Places in `residual` what `phi` leaves of the right side: `-g - A phi`.
-    pub(crate) fn residual(&self, g: &[f64], phi: &[f64], residual: &mut [f64]) {
+    /// Ratio of the largest eigenvalue to the smallest that is not zero, about: what round-off of the solution is multiplied
+    /// by in the residual of the longest waves.
+    pub(crate) fn condition(&self) -> f64 {
+        self.condition
+    }
+
+    /// Places in `residual` what `phi` leaves of the right side, `-g - A phi`, and returns its 2-norm.
+    pub(crate) fn residual(&self, g: &[f64], phi: &[f64], residual: &mut [f64]) -> f64 {
+        let n0 = self.shape.n[0];
+        let chunks = residual.par_chunks_mut(ROWS * n0).enumerate();
+        let squares: Vec<f64> = chunks
+            .map_init(
+                || vec![0.0; n0 + 2 * HALO],
+                |padded, (c, chunk)| {
+                    let rows = chunk.chunks_mut(n0).enumerate();
+                    rows.map(|(r, out)| residual_row(self, g, phi, c * ROWS + r, out, padded)).sum()
+                },
+            )
+            .collect();
+        squares.iter().sum::<f64>().sqrt()
+    }
+
+    /// 2-norm of what the last digit of `phi` leaves.
+    pub(crate) fn round_off(&self, phi: &[f64]) -> f64 {
         let [n0, n1, _] = self.shape.n;
-        residual.par_chunks_mut(n0).enumerate().for_each(|(r, out)| {
+        let sum = |taps: &Taps| {
+            taps.iter().map(|tap| tap.1 * tap.1).sum::<f64>() + taps.iter().map(|tap| tap.1).sum::<f64>().powi(2)
+        };
+        let own: [Vec<f64>; 3] = [
+            self.along.squares(n0),
+            self.across[0].iter().map(sum).collect(),
+            self.across[1].iter().map(sum).collect(),
+        ];
+        let squares = phi.par_chunks(n0).enumerate().map(|(r, row)| {
             let (j, k) = (r % n1, r / n1);
-            let at = self.shape.row(j, k);
-            for (out, g) in out.iter_mut().zip(&g[at.clone()]) {
-                *out = -g;
-            }
-            let (m1, m2) = (self.mass_m[1][j], self.mass_m[2][k]);
-            self.subtract_along_row(&phi[at], m1 * m2, out);
-            for &(other, c) in &self.stiffness[1][j] {
-                kernel::subtract_weighted(&phi[self.shape.row(other, k)], &self.mass_m[0], c * m2, out);
-            }
-            for &(other, c) in &self.stiffness[2][k] {
-                kernel::subtract_weighted(&phi[self.shape.row(j, other)], &self.mass_m[0], c * m1, out);
-            }
+            let mass = |b: usize, i: usize| self.mass_m[b][i];
+            let terms = row.iter().enumerate().map(|(i, phi)| {
+                let [a, b, c] = [mass(1, j) * mass(2, k), mass(0, i) * mass(2, k), mass(0, i) * mass(1, j)];
+                (a * a * own[0][i] + b * b * own[1][j] + c * c * own[2][k]) * phi * phi
+            });
+            terms.sum::<f64>()
         });
+        0.5 * f64::EPSILON * squares.collect::<Vec<f64>>().iter().sum::<f64>().sqrt()
     }
 
     /// 2-norm of the residual over that of the right side `g`.
     pub(crate) fn relative_residual(&self, g: &[f64], phi: &[f64]) -> f64 {
-        let mut left = vec![0.0; g.len()];
-        self.residual(g, phi, &mut left);
+        let left = self.residual(g, phi, &mut vec![0.0; g.len()]);
         let size = norm(self.shape, g);
-        if size > 0.0 { norm(self.shape, &left) / size } else { 0.0 }
+        if size > 0.0 { left / size } else { 0.0 }
     }
 
-    /// Subtracts from a right side the multiple of the cells' masses that makes its sum zero; returns the sum over the sum of
-    /// the moduli.
+    /// Subtracts from a right side the multiple of the cells' masses that makes its sum zero, if that is more than round-off;
+    /// returns the sum over the sum of the moduli.
     pub(crate) fn remove_imbalance(&self, g: &mut [f64]) -> f64 {
         let [n0, n1, _] = self.shape.n;
-        let rows: Vec<[f64; 2]> = g.par_chunks(n0).map(kernel::sum_and_moduli).collect();
+        let rows: Vec<[f64; 2]> = g.par_chunks(ROWS * n0).map(kernel::sum_and_moduli).collect();
         let [sum, moduli] = rows.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        if sum.abs() <= BALANCED * moduli {
+            return if moduli > 0.0 { sum / moduli } else { 0.0 };
+        }
         let volume: f64 = self.mass_m.iter().map(|mass| mass.iter().sum::<f64>()).product();
         g.par_chunks_mut(n0).enumerate().for_each(|(r, row)| {
             let mass = self.mass_m[1][r % n1] * self.mass_m[2][r / n1] * sum / volume;
@@ -73,7 +122,7 @@ impl Operator {
                 *g -= mass * m0;
             }
         });
-        if moduli > 0.0 { sum / moduli } else { 0.0 }
+        sum / moduli
     }
 
     /// Multiplies each value by the mass of its cell.
@@ -86,12 +135,62 @@ impl Operator {
             }
         });
     }
+}
 
-    fn subtract_along_row(&self, phi: &[f64], mass: f64, out: &mut [f64]) {
-        for (out, row) in out.iter_mut().zip(&self.stiffness[0]) {
-            *out -= mass * row.iter().map(|&(i, c)| c * phi[i]).sum::<f64>();
+/// Sum of a right side, relative to that of its moduli, that is round-off.
+const BALANCED: f64 = 4.0 * f64::EPSILON;
+
+/// Residual of row `r` of memory; returns the sum of its squares, in eight lanes.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+fn residual_row(op: &Operator, g: &[f64], phi: &[f64], r: usize, out: &mut [f64], padded: &mut [f64]) -> f64 {
+    let [n0, n1, _] = op.shape.n;
+    let (j, k) = (r % n1, r / n1);
+    let at = op.shape.row(j, k);
+    let own = &phi[at.clone()];
+    let (m1, m2) = (op.mass_m[1][j], op.mass_m[2][k]);
+    out.fill(0.0);
+    let mut taps = [(0, 0.0); MOST_TAPS];
+    let mut count = 0;
+    let below = op.across[0][j].iter().map(|&(i, c)| (op.shape.row(i, k).start, c * m2));
+    let aside = op.across[1][k].iter().map(|&(i, c)| (op.shape.row(j, i).start, c * m1));
+    for (tap, new) in taps.iter_mut().zip(below.chain(aside)) {
+        *tap = new;
+        count += 1;
+    }
+    rows::add_row_differences(out, own, phi, &taps[..count]);
+    pad(padded, own, op.periodic);
+    let mass = m1 * m2;
+    for (out, m0) in out.iter_mut().zip(&op.mass_m[0]) {
+        *out *= m0 / mass;
+    }
+    op.along.add_differences(out, own, padded);
+    let mut sums = [0.0; LANES];
+    for (out, g) in out.chunks_mut(LANES).zip(g[at].chunks(LANES)) {
+        for ((out, g), sum) in out.iter_mut().zip(g).zip(&mut sums) {
+            *out = -(mass.mul_add(*out, *g));
+            *sum = out.mul_add(*out, *sum);
         }
     }
+    debug_assert_eq!(out.len(), n0);
+    sums.iter().sum()
+}
+
+/// Largest number of neighbours of a cell along two axes: seven bands and the entry that closes a no-slip wall.
+const MOST_TAPS: usize = 16;
+/// Partial sums of a row.
+const LANES: usize = 8;
+
+/// Largest over smallest eigenvalue: bounds of the rows' sums of moduli over the masses, and the longest wave of the longest axis.
+fn condition(layout: &Layout, rows: &[Vec<Taps>; 3]) -> f64 {
+    let (mut largest, mut longest_m) = (0.0, 0.0_f64);
+    for (line, rows) in layout.line.iter().zip(rows).filter(|(line, _)| !line.is_thin()) {
+        let moduli =
+            rows.iter().zip(&line.cell_mass_m).map(|(row, mass)| row.iter().map(|tap| tap.1.abs()).sum::<f64>() / mass);
+        largest += moduli.fold(0.0, f64::max);
+        let length_m = line.cell_mass_m.iter().sum::<f64>();
+        longest_m = longest_m.max(if line.is_periodic() { 0.5 * length_m } else { length_m });
+    }
+    (largest * (longest_m / std::f64::consts::PI).powi(2)).max(1.0)
 }
 
 /// Rows of `Dw F^-1 Dw^T`.
@@ -113,52 +212,6 @@ pub(crate) fn stiffness(line: &Line) -> Vec<Taps> {
         sums.into_iter().enumerate().filter(|(_, c)| *c != 0.0).collect()
     };
     divergence.iter().map(row).collect()
-}
-
-/// The weighted divergence of a flow with eddies of all sizes and one per cent of noise at the grid scale: what the time step
-/// asks the solvers for.
-pub(crate) fn turbulent_right_side(layout: &Layout) -> Vec<f64> {
-    let shape = layout.shape;
-    let n = shape.n;
-    let mut g = vec![0.0; shape.len()];
-    for b in 0..3 {
-        let divergence = layout.line[b].stored_divergence();
-        let velocity = eddies(shape, b);
-        let mass = |d: usize, i: usize| if d == b { 1.0 } else { layout.line[d].cell_mass_m[i] };
-        g.par_chunks_mut(n[0]).enumerate().for_each(|(r, row)| {
-            let (j, k) = (r % n[1], r / n[1]);
-            for (i, g) in row.iter_mut().enumerate() {
-                let at = [i, j, k];
-                let stride = [1, n[0], n[0] * n[1]][b];
-                let line = (k * n[1] + j) * n[0] + i - at[b] * stride;
-                let sum: f64 = divergence[at[b]].iter().map(|&(face, c)| c * velocity[line + face * stride]).sum();
-                *g += mass(0, i) * mass(1, j) * mass(2, k) * sum;
-            }
-        });
-    }
-    g
-}
-
-/// Velocity along axis `b`: five octaves of `k^-5/3`, and noise.
-fn eddies(shape: Shape, b: usize) -> Vec<f64> {
-    use std::f64::consts::TAU;
-    let n = shape.n;
-    let wave = |d: usize, octave: usize| -> Vec<f64> {
-        let k = f64::from(1 << octave);
-        let angle = |i: usize| TAU * k * i as f64 / n[d] as f64 + 1.7 * (b + octave) as f64 + 0.9 * d as f64;
-        (0..n[d]).map(|i| k.powf(-1.0 / 9.0) * angle(i).sin()).collect()
-    };
-    let waves: Vec<[Vec<f64>; 3]> = (0..5).map(|octave| std::array::from_fn(|d| wave(d, octave))).collect();
-    let mut velocity = vec![0.0; shape.len()];
-    velocity.par_chunks_mut(n[0]).enumerate().for_each(|(r, row)| {
-        let (j, k) = (r % n[1], r / n[1]);
-        for (i, velocity) in row.iter_mut().enumerate() {
-            let hash = (i * 73_856_093 + j * 19_349_663 + k * 83_492_791 + b * 2_654_435) % 1_000_003;
-            let eddies: f64 = waves.iter().map(|[x, y, z]| x[i] * y[j] * z[k]).sum();
-            *velocity = eddies + 0.01 * (hash as f64 / 500_001.5 - 1.0);
-        }
-    });
-    velocity
 }
 
 /// 2-norm of a field, by rows in their order.

@@ -2,8 +2,55 @@
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::*;
-use apply::{Operator, turbulent_right_side};
+use apply::Operator;
 use direct::Direct;
+use rayon::prelude::*;
+
+/// The weighted divergence of a flow with eddies of all sizes and one per cent of noise at the grid scale: what the time step
+/// asks the solvers for.
+pub(super) fn turbulent_right_side(layout: &Layout) -> Vec<f64> {
+    let shape = layout.shape;
+    let n = shape.n;
+    let mut g = vec![0.0; shape.len()];
+    for b in 0..3 {
+        let divergence = layout.line[b].stored_divergence();
+        let velocity = eddies(shape, b);
+        let mass = |d: usize, i: usize| if d == b { 1.0 } else { layout.line[d].cell_mass_m[i] };
+        g.par_chunks_mut(n[0]).enumerate().for_each(|(r, row)| {
+            let (j, k) = (r % n[1], r / n[1]);
+            for (i, g) in row.iter_mut().enumerate() {
+                let at = [i, j, k];
+                let stride = [1, n[0], n[0] * n[1]][b];
+                let line = (k * n[1] + j) * n[0] + i - at[b] * stride;
+                let sum: f64 = divergence[at[b]].iter().map(|&(face, c)| c * velocity[line + face * stride]).sum();
+                *g += mass(0, i) * mass(1, j) * mass(2, k) * sum;
+            }
+        });
+    }
+    g
+}
+
+/// Velocity along axis `b`: five octaves of `k^-5/3`, and noise.
+fn eddies(shape: Shape, b: usize) -> Vec<f64> {
+    use std::f64::consts::TAU;
+    let n = shape.n;
+    let wave = |d: usize, octave: usize| -> Vec<f64> {
+        let k = f64::from(1 << octave);
+        let angle = |i: usize| TAU * k * i as f64 / n[d] as f64 + 1.7 * (b + octave) as f64 + 0.9 * d as f64;
+        (0..n[d]).map(|i| k.powf(-1.0 / 9.0) * angle(i).sin()).collect()
+    };
+    let waves: Vec<[Vec<f64>; 3]> = (0..5).map(|octave| std::array::from_fn(|d| wave(d, octave))).collect();
+    let mut velocity = vec![0.0; shape.len()];
+    velocity.par_chunks_mut(n[0]).enumerate().for_each(|(r, row)| {
+        let (j, k) = (r % n[1], r / n[1]);
+        for (i, velocity) in row.iter_mut().enumerate() {
+            let hash = (i * 73_856_093 + j * 19_349_663 + k * 83_492_791 + b * 2_654_435) % 1_000_003;
+            let eddies: f64 = waves.iter().map(|[x, y, z]| x[i] * y[j] * z[k]).sum();
+            *velocity = eddies + 0.01 * (hash as f64 / 500_001.5 - 1.0);
+        }
+    });
+    velocity
+}
 
 /// Equal cells, periodic.
 fn waves(n: usize) -> Direction {
@@ -163,7 +210,7 @@ fn refinement_reaches_what_one_solve_does_not_and_says_where_it_ends() {
     let mut phi = g.clone();
     let solved = solver.solve(&mut phi, 0.5 * once).unwrap();
     let refined = operator.relative_residual(&g, &phi);
-    assert!(refined < 0.5 * once && (solved.residual.unwrap() / refined - 1.0).abs() < 0.2, "{once:e} {refined:e}");
+    assert!(refined < 0.5 * once && (solved.residual / refined - 1.0).abs() < 0.2, "{once:e} {refined:e}");
     match solver.solve(&mut g.clone(), 1e-17).unwrap_err() {
         Error::PressureNotSolved { history, tolerance, .. } => {
             assert!(history.len() > 1 && tolerance == 1e-17, "{history:?}");
@@ -266,8 +313,10 @@ fn multigrid_agrees_with_the_direct_solver_and_converges_as_fast_on_every_mesh()
         let solved = multigrid.solve(&mut phi, 1e-6).unwrap();
         let (factor, residual) = (solved.factor.unwrap_or(0.0), operator.relative_residual(&g, &phi));
         let found = format!("{name}: {} iterations, factor {factor:.3}, residual {residual:.1e}", solved.iterations);
-        assert!(residual <= 1e-6 && (solved.residual.unwrap() - residual).abs() <= 1e-6 * residual + 1e-14, "{found}");
-        assert!(solved.iterations <= 7 && factor <= 0.14, "{found}");
+        assert!(residual <= 1e-6 && (solved.residual - residual).abs() <= 1e-6 * residual + 1e-14, "{found}");
+        // The mean over the iterations is 0.107 where seven are needed.
+        let bar = if name == "aspect 1e4" { 0.11 } else { 0.1 };
+        assert!(solved.iterations <= 7 && factor <= bar, "{found}");
         let mut phi = g.clone();
         multigrid.solve(&mut phi, 1e-10).unwrap();
         let mean = mean_of(&layout, &phi);

@@ -17,12 +17,15 @@ mod transform;
 
 #[cfg(test)]
 mod checks;
+#[cfg(test)]
+mod long_waves;
 
 use super::layout::{Layout, Shape};
 use crate::Error;
 use crate::error::check;
 use multigrid::Multigrid;
 
+pub(crate) use apply::norm;
 pub(crate) use direct::direct;
 pub use equation::PressureEquation;
 
@@ -72,8 +75,8 @@ fn check_length(shape: Shape, field: &[f64]) -> Result<(), Error> {
 /// What a solve did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solved {
-    /// Norm of the residual over that of the right side; `None` where a direct solve has not measured it.
-    pub residual: Option<f64>,
+    /// 2-norm of the residual over that of the right side less its imbalance, measured on the solution.
+    pub residual: f64,
     /// Iterations, 0 for a direct solve.
     pub iterations: usize,
     /// Mean factor by which an iteration reduced the residual.
@@ -87,7 +90,8 @@ pub(crate) trait PressureSolver: Send + std::fmt::Debug {
     /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean.
     ///
     /// # Errors
-    /// If the residual does not reach `tolerance` (relative, of the 2-norm).
+    /// If the residual does not reach `tolerance` (2-norm, relative to the right side); `field` is then the best solution
+    /// found.
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error>;
 
     /// The method and what it is made of, for the log.

@@ -5,6 +5,7 @@
 use rayon::prelude::*;
 
 use super::apply::{Operator, norm};
+use crate::error::PressureFailure;
 
 /// Relative residuals that a pass saw after its iterations; none if it has none.
 #[derive(Debug)]
@@ -26,37 +27,40 @@ pub(crate) struct Refinement {
 }
 
 /// Passes after which the residual no longer falls.
-const MAX_PASSES: usize = 5;
+const MAX_PASSES: usize = 8;
 /// A pass that leaves more than this has stalled.
 const STALLED: f64 = 0.5;
 /// Part of the tolerance asked of a pass: the residual it sees is not exactly the field's.
 const SAFETY: f64 = 0.999;
+/// A solution that improves no more is held up by round-off if it leaves at most this multiple of the last digit's share.
+const ROUND_OFF: f64 = 4.0;
+/// Values that are copied at a time.
+const CHUNK: usize = 1 << 14;
 
 impl Refinement {
     /// Replaces the right side in `field` by the solution. `solve` replaces a right side of the given norm by a solution of
     /// about the given relative residual.
     ///
     /// # Errors
-    /// The residuals, if they do not reach `tolerance`.
+    /// The residuals and the reason, if they do not reach `tolerance`; the field is then the last solution found.
     pub(crate) fn run(
         &mut self,
         operator: &Operator,
         field: &mut [f64],
         tolerance: f64,
         mut solve: impl FnMut(&mut [f64], f64, f64) -> Pass,
-    ) -> Result<Done, Vec<f64>> {
+    ) -> Result<Done, (Vec<f64>, PressureFailure)> {
         let imbalance = operator.remove_imbalance(field);
-        self.right.clear();
-        self.right.extend_from_slice(field);
-        self.left.resize(field.len(), 0.0);
-        let size = norm(operator.shape(), field);
-        let relative = |length: f64| if size > 0.0 { length / size } else { length };
+        let size = self.keep(operator, field);
+        if size == 0.0 {
+            return Ok(Done { residual: 0.0, iterations: 0, imbalance });
+        }
         let (mut iterations, mut history) = (0, Vec::new());
-        let mut last = 1.0;
+        let (mut last, mut attainable) = (1.0, 0.0);
         for pass in 0..MAX_PASSES {
             // Of a later pass the right side is what the field so far leaves.
             let right = if pass == 0 { &mut *field } else { &mut self.left };
-            let Pass(seen) = solve(right, last * size, SAFETY * tolerance / last);
+            let Pass(seen) = solve(right, last * size, f64::max(SAFETY * tolerance, 0.25 * attainable) / last);
             iterations += seen.len();
             history.extend(seen.iter().map(|residual| residual * last));
             if !seen.is_empty() {
@@ -66,19 +70,33 @@ impl Refinement {
             if pass > 0 {
                 field.par_iter_mut().zip(&self.left).for_each(|(phi, more)| *phi += more);
             }
-            operator.residual(&self.right, field, &mut self.left);
-            let residual = relative(norm(operator.shape(), &self.left));
+            let residual = operator.residual(&self.right, field, &mut self.left) / size;
             history.push(residual);
             if residual <= tolerance {
                 return Ok(Done { residual, iterations, imbalance });
             }
-            if residual.is_nan() || residual > STALLED * last {
+            if residual.is_nan() {
+                return Err((history, PressureFailure::NotFinite));
+            }
+            attainable = operator.round_off(field) / size;
+            if residual > STALLED * last {
                 break;
             }
             last = residual;
             // The solvers take the negative of their right side.
             self.left.par_iter_mut().for_each(|value| *value = -*value);
         }
-        Err(history)
+        let reached = history.last().copied().unwrap_or(f64::NAN);
+        let at_round_off = reached.min(last) <= ROUND_OFF * attainable;
+        let reason = if at_round_off { PressureFailure::RoundOff { attainable } } else { PressureFailure::Stalled };
+        Err((history, reason))
+    }
+
+    /// Keeps the right side; returns its norm.
+    fn keep(&mut self, operator: &Operator, field: &[f64]) -> f64 {
+        self.left.resize(field.len(), 0.0);
+        self.right.resize(field.len(), 0.0);
+        self.right.par_chunks_mut(CHUNK).zip(field.par_chunks(CHUNK)).for_each(|(to, from)| to.copy_from_slice(from));
+        norm(operator.shape(), field)
     }
 }

@@ -1,7 +1,7 @@
 //! One V-cycle on the second-order operator, for 16 modes side by side.
 //!
-//! Before and after the coarse mesh the lines along both axes are relaxed once, afterwards in reverse order, which makes the
-//! cycle symmetric. Restriction is the transpose of the interpolation.
+//! Before and after the coarse mesh the lines along both axes are relaxed, once on the finest mesh and twice on the others,
+//! afterwards in reverse order, which makes the cycle symmetric. Restriction is the transpose of the interpolation.
 //!
 //! Check: that the cycle is symmetric; the factor per iteration of the whole solver.
 
@@ -41,6 +41,12 @@ pub(crate) struct Work {
     coarse_row: Vec<Lanes>,
 }
 
+/// Weight of the correction from the second mesh. The fourth-order operator exceeds that of the cycle by up to 1.37 for the
+/// waves that only the finest mesh has, and hardly for those that the second one corrects: raising these narrows the spectrum
+/// that conjugate gradients see, at no cost.
+const COARSE_SHARE: f32 = 1.35;
+/// Relaxations of both directions on the meshes between the finest and the coarsest.
+const COARSE_SWEEPS: usize = 2;
 /// Relaxations on the coarsest mesh.
 const COARSEST_SWEEPS: usize = 4;
 
@@ -98,17 +104,22 @@ impl Hierarchy {
             level.coarsest(mode, u, f, scratch);
             return;
         };
-        relax((first, second), mode, u, f, false, scratch);
-        relax((second, first), mode, u, f, false, scratch);
+        let sweeps = if l == 0 { 1 } else { COARSE_SWEEPS };
+        for _ in 0..sweeps {
+            relax((first, second), mode, u, f, false, scratch);
+            relax((second, first), mode, u, f, false, scratch);
+        }
         coarse.f.fill([0.0; LANES]);
         restrict(level, mode, u, f, &mut coarse.f, row, coarse_row);
         self.descend(l + 1, mode, work);
         let Work { fields, scratch, coarse_row, .. } = work;
         let (fine, coarse) = fields.split_at_mut(l + 1);
         let (Some(Fields { u, f }), Some(coarse)) = (fine.last_mut(), coarse.first()) else { return };
-        interpolate(level, &coarse.u, u, coarse_row);
-        relax((second, first), mode, u, f, true, scratch);
-        relax((first, second), mode, u, f, true, scratch);
+        interpolate(level, &coarse.u, u, coarse_row, if l == 0 { COARSE_SHARE } else { 1.0 });
+        for _ in 0..sweeps {
+            relax((second, first), mode, u, f, true, scratch);
+            relax((first, second), mode, u, f, true, scratch);
+        }
     }
 }
 
@@ -123,11 +134,34 @@ impl Level {
             relax((first, second), mode, u, f, false, scratch);
             return;
         }
+        self.solve_mean(mode, u, f);
         for _ in 0..COARSEST_SWEEPS {
             relax((second, first), mode, u, f, false, scratch);
             relax((first, second), mode, u, f, false, scratch);
             relax((first, second), mode, u, f, true, scratch);
             relax((second, first), mode, u, f, true, scratch);
+        }
+        self.solve_mean(mode, u, f);
+    }
+
+    /// Adds the constant that leaves no sum: relaxation hardly moves it in modes that almost ignore constants.
+    fn solve_mean(&self, mode: &Lanes, u: &mut [Lanes], f: &[Lanes]) {
+        let [first, second] = &self.side;
+        let n = first.len();
+        let (mut left, mut volume) = ([0.0; LANES], 0.0);
+        for (p, (u, f)) in u.iter().zip(f).enumerate() {
+            let mass = first.mass(p % n) * second.mass(p / n);
+            volume += mass;
+            for l in 0..LANES {
+                left[l] += f[l] - mode[l] * mass * u[l];
+            }
+        }
+        for u in u {
+            for l in 0..LANES {
+                if mode[l] != 0.0 {
+                    u[l] += left[l] / (mode[l] * volume);
+                }
+            }
         }
     }
 
@@ -190,9 +224,9 @@ fn residual_row(level: &Level, mode: &Lanes, u: &[Lanes], f: &[Lanes], k: usize,
     }
 }
 
-/// Adds the interpolated coarse solution to `u`.
+/// Adds `share` times the interpolated coarse solution to `u`.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
-fn interpolate(level: &Level, coarse: &[Lanes], u: &mut [Lanes], coarse_row: &mut [Lanes]) {
+fn interpolate(level: &Level, coarse: &[Lanes], u: &mut [Lanes], coarse_row: &mut [Lanes], share: f32) {
     let (n, coarse_n) = (level.side[0].len(), level.coarse_len());
     for (u, [a, b]) in u.chunks_mut(n).zip(&level.weights[1]) {
         let rows = [a, b].map(|w| &coarse[w.0 * coarse_n..][..coarse_n]);
@@ -203,7 +237,7 @@ fn interpolate(level: &Level, coarse: &[Lanes], u: &mut [Lanes], coarse_row: &mu
         }
         for (u, weights) in u.iter_mut().zip(&level.weights[0]) {
             for &(from, weight) in weights {
-                add(u, weight, &coarse_row[from]);
+                add(u, share * weight, &coarse_row[from]);
             }
         }
     }

@@ -173,9 +173,14 @@ impl PressureSolver for Multigrid {
         let done = refinement
             .run(&self.operator, field, tolerance, |field, size, tolerance| self.pass(field, size, tolerance));
         self.refinement = refinement;
-        let done = done.map_err(|history| Error::PressureNotSolved { method: "multigrid", tolerance, history })?;
+        let done = done.map_err(|(history, reason)| Error::PressureNotSolved {
+            method: "multigrid",
+            tolerance,
+            reason,
+            history,
+        })?;
         let factor = (done.iterations > 0).then(|| done.residual.powf(1.0 / done.iterations as f64));
-        Ok(Solved { residual: Some(done.residual), iterations: done.iterations, factor, imbalance: done.imbalance })
+        Ok(Solved { residual: done.residual, iterations: done.iterations, factor, imbalance: done.imbalance })
     }
 
     fn describe(&self) -> String {
