@@ -1,6 +1,7 @@
 //! Writes what a run gives: all files of a run appear together, or none.
 
 use crate::Error;
+use crate::export::lock::FolderLock;
 use crate::export::signals::RawSignals;
 use crate::export::{Field, FileGroup, Provenance, PulseInfo, Ray, Sweep, Table, Unit, VelocityMap, tables};
 use crate::map::VelocityEstimates;
@@ -12,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Finds out, before any computing, whether files can be written to a folder; leaves no trace.
 ///
 /// # Errors
-/// The folder cannot be made, is a file, or cannot be written to.
+/// The folder cannot be made, is a file, cannot be written to, or another run writes to it.
 pub fn prepare(folder: &Path) -> Result<(), Error> {
     let io = |action, source| Error::Io { action, path: folder.to_owned(), source };
     let missing: Vec<&Path> =
@@ -20,7 +21,8 @@ pub fn prepare(folder: &Path) -> Result<(), Error> {
     let made = std::fs::create_dir_all(folder).map_err(|e| io("make the folder", e));
     let probe = folder.join(".wakescope-probe");
     let tried = made.and_then(|()| {
-        std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(|e| io("write to", e))
+        std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(|e| io("write to", e))?;
+        Ok(drop(FolderLock::take(folder)?))
     });
     for path in missing {
         // Innermost first; one that was not made cannot be removed, which is what is wanted.
@@ -76,7 +78,16 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Vec<PathB
         #[cfg(feature = "plots")]
         pictures::add_map(&mut files, plan, &map, &origin)?;
     }
-    Ok(files.commit()?)
+    put(files, folder)
+}
+
+/// Puts the files of a run into their folder, where no other run may be writing.
+fn put(files: FileGroup, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let there = folder.exists();
+    let lock = there.then(|| FolderLock::take(folder)).transpose()?;
+    let written = files.commit()?;
+    drop(lock);
+    Ok(written)
 }
 
 /// Where the files of a run come from.
