@@ -68,8 +68,13 @@ impl Wake {
         if scaled.exists() {
             columns.extend(table(&text(&scaled)?)?);
         }
-        let wake =
-            Self { folder, flow: *flow, case_toml: file.toml.clone(), fields_tau: output.fields_tau.clone(), columns };
+        let wake = Self {
+            folder,
+            flow: *flow,
+            case_toml: file.toml.clone(),
+            fields_tau: output.fields_tau.clone().unwrap_or_default(),
+            columns,
+        };
         let reached = wake.column("tau")?.last().copied().unwrap_or(0.0);
         if reached < output.end_tau - 1e-9 {
             let place = wake.folder.display();

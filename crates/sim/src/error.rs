@@ -78,6 +78,21 @@ pub enum Error {
         /// What the system says.
         source: std::io::Error,
     },
+    /// The run needs more memory than the machine has.
+    #[error(
+        "the run needs {needed} of memory, most of it for {stage}, and {available} are available: {remedy}; --allow-large \
+         runs it all the same"
+    )]
+    TooLarge {
+        /// Forecast of the memory, in words.
+        needed: String,
+        /// Memory that the machine has available, in words.
+        available: String,
+        /// The stage that takes most of it.
+        stage: &'static str,
+        /// Keys and values that would make it fit.
+        remedy: String,
+    },
     /// The number of threads cannot be had.
     #[error("--threads {threads}: {reason}")]
     Threads {

@@ -51,6 +51,7 @@ pub mod flow;
 pub mod geometry;
 pub mod join;
 mod keys;
+mod machine;
 pub mod map;
 #[cfg(feature = "netcdf")]
 mod netcdf_header;

@@ -303,7 +303,7 @@ impl fmt::Display for Plan {
     }
 }
 
-fn seconds(s: f64) -> String {
+pub(crate) fn seconds(s: f64) -> String {
     match s {
         s if s < 1e-3 => "< 1 ms".into(),
         s if s < 1.0 => format!("{:.0} ms", s * 1e3),
@@ -313,7 +313,7 @@ fn seconds(s: f64) -> String {
     }
 }
 
-fn bytes(b: f64) -> String {
+pub(crate) fn bytes(b: f64) -> String {
     match b {
         b if b < 1e5 => format!("{:.1} kB", b / 1e3),
         b if b < 1e9 => format!("{:.1} MB", b / 1e6),

@@ -8,6 +8,7 @@ mod pictures;
 pub use limits::check;
 pub use map::velocity_map;
 
+use crate::export::lock::FolderLock;
 use crate::export::own::refuse_foreign;
 use crate::export::signals::{LineVelocities, RawSignals, Recording};
 use crate::export::{Existing, FileGroup, Provenance, Table, hpl, tables};
@@ -24,8 +25,8 @@ const HALO: &str = "halo.hpl";
 /// Finds out, before any computing, whether files of these names can be written to a folder; leaves no trace.
 ///
 /// # Errors
-/// The folder cannot be made, is a file, or cannot be written to; a folder is in the way of a file, or a file that this
-/// program did not write and may not replace.
+/// The folder cannot be made, is a file, cannot be written to, or another run writes to it; a folder is in the way of a file,
+/// or a file that this program did not write and may not replace.
 pub fn prepare<'a>(folder: &Path, names: impl IntoIterator<Item = &'a str>, existing: Existing) -> Result<(), Error> {
     refuse_foreign(folder, names, existing)?;
     let io = |action, source| Error::Io { action, path: folder.to_owned(), source };
@@ -34,7 +35,8 @@ pub fn prepare<'a>(folder: &Path, names: impl IntoIterator<Item = &'a str>, exis
     let made = std::fs::create_dir_all(folder).map_err(|e| io("make the folder", e));
     let probe = folder.join(".wakescope-probe");
     let tried = made.and_then(|()| {
-        std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(|e| io("write to", e))
+        std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(|e| io("write to", e))?;
+        Ok(drop(FolderLock::take(folder)?))
     });
     for path in missing {
         // Innermost first; one that was not made cannot be removed, which is what is wanted.
@@ -121,10 +123,19 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing)
         #[cfg(feature = "plots")]
         pictures::add_map(&mut files, plan, &map, &origin)?;
     }
+    put(files, folder, existing)
+}
+
+/// Puts the files of a run into their folder, where no other run may be writing.
+fn put(files: FileGroup, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+    let there = folder.exists();
+    let lock = there.then(|| FolderLock::take(folder)).transpose()?;
     // Again: a file may have come while the run computed.
     let names: Vec<String> = files.names().map(str::to_owned).collect();
     refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
-    Ok(files.commit()?)
+    let written = files.commit()?;
+    drop(lock);
+    Ok(written)
 }
 
 /// Where the files of a run come from.

@@ -63,6 +63,6 @@ pub use map_fit::{
 pub use pulse::PulseShape;
 pub use range_kernel::RangeKernel;
 pub use scan_model::{ScanModel, ScanSetup};
-pub use tops::LikelihoodTop;
 pub use signal_fit::{SignalFit, SignalFitOptions, Starts, fit_signals};
+pub use tops::LikelihoodTop;
 pub use wake::{CoreProfile, PARAMETERS, Parameter, Vortex, Wake, WakeModel};

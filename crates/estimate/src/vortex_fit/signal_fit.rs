@@ -225,7 +225,10 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
         let mut informations = Vec::new();
         for next in &settled {
             let ascent = Ascent { model: &next.model, signals, options, others: None };
-            let known = tops.iter().zip(&informations).any(|(top, information)| same(&ascent, information, &top.state, &next.state));
+            let known = tops
+                .iter()
+                .zip(&informations)
+                .any(|(top, information)| same(&ascent, information, &top.state, &next.state));
             if !known {
                 let stride = if tops.is_empty() { 1 } else { options.information_stride };
                 let share = signals.used_rays() as f64 / next.model.rays as f64;

@@ -53,16 +53,7 @@ impl UndampedGrowth {
         if settings.scheme != TimeScheme::AdamsBashforth2 || settings.subgrid != SubgridModel::None {
             return None;
         }
-        let rates = Rates::new(mesh);
-        let [nx, ny, nz] = mesh.cells();
-        let plane = |k: usize| {
-            (0..nx * ny).fold([0.0_f64; 2], |worst, at| {
-                let cell = [at % nx, at / nx, k];
-                larger(worst, rates.of(cell, velocity_m_s(cell)))
-            })
-        };
-        let inside = (0..nz).into_par_iter().map(plane).reduce(|| [0.0; 2], larger);
-        let [courant_per_s, worst] = larger(inside, rates.of_walls(mesh));
+        let [courant_per_s, worst] = largest_rates(mesh, velocity_m_s);
         let step_s = match settings.time_step {
             TimeStep::Fixed { step_s } => step_s,
             TimeStep::Courant { courant, longest_s } => longest_s.min(courant / courant_per_s),
@@ -83,6 +74,28 @@ impl UndampedGrowth {
     pub fn damped_courant(&self) -> f64 {
         halve(0.0, self.courant, |courant| largest_reynolds(self.transport, courant) > self.cell_reynolds)
     }
+}
+
+impl Mesh {
+    /// Largest `sum |u_i|/h_i` of a flow whose velocity in the cell of the indices along x, y, z is `velocity_m_s`, walls that
+    /// move included \[1/s\]: a Courant number over it is a time step.
+    pub fn courant_rate_per_s(&self, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> f64 {
+        largest_rates(self, velocity_m_s)[0]
+    }
+}
+
+/// The largest of [`Rates::of`] over all cells and walls.
+fn largest_rates(mesh: &Mesh, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> [f64; 2] {
+    let rates = Rates::new(mesh);
+    let [nx, ny, nz] = mesh.cells();
+    let plane = |k: usize| {
+        (0..nx * ny).fold([0.0_f64; 2], |worst, at| {
+            let cell = [at % nx, at / nx, k];
+            larger(worst, rates.of(cell, velocity_m_s(cell)))
+        })
+    };
+    let inside = (0..nz).into_par_iter().map(plane).reduce(|| [0.0; 2], larger);
+    larger(inside, rates.of_walls(mesh))
 }
 
 /// The end of the low part of an interval, in which `holds`.

@@ -147,6 +147,16 @@ impl FlowSettings {
         }
     }
 
+    /// Refuses what a flow on `mesh` would refuse, before anything is allocated.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a setting, [`Error::BadDirection`] for no-slip walls without viscosity.
+    pub fn validate(&self, mesh: &super::Mesh) -> Result<(), Error> {
+        self.check()?;
+        super::subgrid::check_constants(self.subgrid)?;
+        super::control::refuse_sticking_without_viscosity(mesh, self.viscosity_m2_s)
+    }
+
     pub(crate) fn check(&self) -> Result<(), Error> {
         check("viscosity_m2_s", self.viscosity_m2_s, "finite and not negative", |nu| nu >= 0.0)?;
         for force in self.force_m_s2 {

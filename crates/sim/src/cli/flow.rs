@@ -3,9 +3,9 @@
 use super::output::print;
 use super::{Cli, progress, say, with_threads};
 use crate::Error;
-use crate::flow::{Begin, CaseFile, EXAMPLES, Unwatched, Watch, example, run};
+use crate::flow::{Begin, CaseFile, EXAMPLES, FlowForecast, RunOptions, Watch, check, example, run_with};
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Words of `wakescope flow`.
@@ -33,6 +33,15 @@ pub(super) struct RunWords {
     /// Begin anew although the folder holds a checkpoint.
     #[arg(long)]
     overwrite: bool,
+    /// Print what the run would take and check it; nothing is computed or written.
+    #[arg(long)]
+    check: bool,
+    /// End of the run in place of the case's: the age tau of a wake, of other flows a time in seconds.
+    #[arg(long, value_name = "END")]
+    end: Option<f64>,
+    /// Run even if the forecast of the memory is more than the machine has.
+    #[arg(long)]
+    allow_large: bool,
 }
 
 pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
@@ -46,25 +55,32 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
 
 /// Runs a case and says what came of it.
 pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(), Error> {
-    let Some(out) = &words.out else {
-        let reason = "a run needs a folder to write to".into();
-        return Err(Error::Input { path: PathBuf::from("--out DIR"), reason });
-    };
+    let ended = words.end.map(|end| file.with_end(end)).transpose()?;
+    let file = ended.as_ref().unwrap_or(file);
     let begin = match (words.restart, words.overwrite) {
         (true, _) => Begin::Restart,
         (_, true) => Begin::Overwrite,
         _ => Begin::New,
     };
+    let options = RunOptions { begin, allow_large: words.allow_large };
+    if words.check {
+        let forecast = with_threads(cli, || check(file, words.out.as_deref(), options))??;
+        return say(cli, &forecast_json(&forecast), &format!("good\n{forecast}"));
+    }
+    let Some(out) = &words.out else {
+        let reason = "a run needs a folder to write to".into();
+        return Err(Error::Input { path: PathBuf::from("--out DIR"), reason });
+    };
     let outcome = with_threads(cli, || {
-        let mut unwatched = Unwatched;
+        let mut quiet = progress::NotesOnly;
         let mut bar;
         let watch: &mut dyn Watch = if cli.quiet {
-            &mut unwatched
+            &mut quiet
         } else {
             bar = progress::FlowBar::new();
             &mut bar
         };
-        run(file, out, begin, watch)
+        run_with(file, out, options, watch)
     })??;
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
@@ -73,7 +89,7 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
     });
     let state = if outcome.is_complete { "done" } else { "paused, --restart continues it" };
     let text = format!(
-        "{state}: step {}, t = {} s, energy {:.6e} m^5/s^2, relative divergence {:.1e}\nwrote {} files to {}",
+        "{state}: step {}, t = {:?} s, energy {:.6e} m^5/s^2, relative divergence {:.1e}\nwrote {} files to {}",
         outcome.steps,
         outcome.time_s,
         outcome.kinetic_energy_m5_s2,
@@ -82,4 +98,18 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
         out.display()
     );
     say(cli, &object, &text)
+}
+
+fn forecast_json(forecast: &FlowForecast) -> Value {
+    let files: Vec<Value> = forecast
+        .files
+        .iter()
+        .map(|kind| json!({ "name": kind.name, "count": kind.count, "bytes": kind.bytes }))
+        .collect();
+    json!({
+        "version": crate::VERSION, "case_hash": forecast.case_hash, "cells": forecast.cells, "scheme": forecast.scheme,
+        "scheme_reason": forecast.scheme_reason, "end_s": forecast.end_s, "end_tau": forecast.end_tau,
+        "step_s": forecast.step_s, "steps": forecast.steps, "core_s": forecast.core_s,
+        "memory_bytes": forecast.memory_bytes, "files": files,
+    })
 }

@@ -1,6 +1,6 @@
 //! Progress bars with the time left, on standard error; nothing where that is no terminal.
 
-use crate::flow::Watch;
+use crate::flow::{FlowForecast, Watch};
 use crate::plan::Stage;
 use crate::progress::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -59,17 +59,37 @@ impl FlowBar {
     }
 }
 
+/// Four decimals, or the exponent form of what these would not show.
+fn short(time_s: f64) -> String {
+    if (1e-2..1e9).contains(&time_s) { format!("{time_s:.4}") } else { format!("{time_s:.3e}") }
+}
+
+/// No bar, but what deserves attention is said even where quiet was asked for.
+pub(super) struct NotesOnly;
+
+impl Watch for NotesOnly {
+    fn note(&mut self, text: &str) {
+        note(text);
+    }
+}
+
+fn note(text: &str) {
+    let _ = writeln!(std::io::stderr(), "note: {text}");
+}
+
 impl Watch for FlowBar {
+    fn forecast(&mut self, forecast: &FlowForecast) {
+        let _ = write!(std::io::stderr(), "{forecast}");
+    }
+
     fn step(&mut self, share: f64, record: &StepRecord) {
         let r = &record.report;
-        self.0.set_message(format!("step {}, t = {:.4} s, Courant {:.2}", r.step, r.time_s, r.courant));
+        self.0.set_message(format!("step {}, t = {} s, Courant {:.2}", r.step, short(r.time_s), r.courant));
         self.0.set_position((share * FLOW_DIVISIONS) as u64);
     }
 
     fn note(&mut self, text: &str) {
-        self.0.suspend(|| {
-            let _ = writeln!(std::io::stderr(), "note: {text}");
-        });
+        self.0.suspend(|| note(text));
     }
 }
 

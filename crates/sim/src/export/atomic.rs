@@ -145,11 +145,32 @@ struct Stage {
     old: PathBuf,
 }
 
+/// How the names of stage folders begin.
+const STAGE: &str = ".wakescope-stage-";
+
+/// Removes the stages that crashed processes left in a folder, which nobody else may be writing to. A group that was not put
+/// into place as a whole is taken back as far as the files are still there.
+pub(super) fn sweep_stages(folder: &Path) {
+    let entries = |path: &Path| fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_stage = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(STAGE));
+    for root in entries(folder).filter(is_stage) {
+        let stage = Stage { new: root.join("new"), old: root.join("old"), root };
+        if entries(&stage.new).next().is_some() {
+            for kept in entries(&stage.old) {
+                if let Some(name) = kept.file_name() {
+                    drop(fs::rename(&kept, folder.join(name)));
+                }
+            }
+        }
+        // Dropping the stage removes it.
+    }
+}
+
 impl Stage {
     fn make(folder: &Path) -> OutputResult<Self> {
         let mut attempt = 0_u32;
         loop {
-            let root = folder.join(format!(".wakescope-stage-{}-{attempt}", std::process::id()));
+            let root = folder.join(format!("{STAGE}{}-{attempt}", std::process::id()));
             match fs::create_dir(&root) {
                 Ok(()) => {
                     let stage = Self { new: root.join("new"), old: root.join("old"), root };

@@ -72,6 +72,12 @@ pub enum OutputError {
         /// The file.
         path: PathBuf,
     },
+    /// Another run writes to the folder.
+    #[error("{} is in use: another run writes to it; wait for its end, or choose another folder", folder.display())]
+    InUse {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// An encoder (NetCDF, PNG, VTK, NPZ) refused.
     #[error("{format} encoder: {message}")]
     Encode {

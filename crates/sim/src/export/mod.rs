@@ -13,6 +13,7 @@
 //! | [`csv`] | any table | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
+//! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
 //! | `cfradial`, `cf_planes`, `cf_fields` (through `netcdf`) | classic NetCDF | `netcdf` |
 //! | `vtr` | VTK rectilinear grids and their collection | `vtk` |
@@ -33,6 +34,7 @@ pub(crate) mod edges;
 mod error;
 pub mod fields;
 pub mod hpl;
+pub(crate) mod lock;
 pub mod map;
 #[cfg(feature = "netcdf")]
 pub(crate) mod netcdf;

@@ -228,6 +228,10 @@ impl Free {
         }
     }
 
+    pub(super) fn starts_from_file(&self) -> bool {
+        matches!(self.initial, InitialName::Netcdf { .. })
+    }
+
     pub(super) fn setup(&self, folder: &Path) -> Result<Setup, Error> {
         let mesh = Mesh::new(self.x.direction(), self.y.direction(), self.z.direction()).map_err(Error::Flow)?;
         let (initial, tau_per_s) = self.initial(&mesh, folder)?;
@@ -236,7 +240,7 @@ impl Free {
         let longest_s = f64::MAX;
         let mut settings = FlowSettings::new(self.viscosity_m2_s, TimeStep::Courant { courant, longest_s });
         settings.force_m_s2 = self.force_m_s2;
-        Ok(Setup { mesh, settings, initial, end_s: None, tau_per_s, wake: None })
+        Ok(Setup { mesh, settings, initial, end_s: None, tau_per_s, wake: None, undamped: None })
     }
 
     fn initial(&self, mesh: &Mesh, folder: &Path) -> Result<(Initial, f64), Error> {

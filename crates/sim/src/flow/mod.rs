@@ -9,7 +9,9 @@
 
 mod case;
 mod examples;
+mod execute;
 mod files;
+mod forecast;
 mod free;
 #[cfg(feature = "netcdf")]
 mod initial_file;
@@ -26,6 +28,8 @@ pub use case::{
     AxisName, CaseKind, Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time,
 };
 pub use examples::{EXAMPLES, example};
+pub use execute::{RunOptions, check, run, run_with};
+pub use forecast::{FileForecast, FlowForecast};
 pub use free::{Axis, EndName, Free, InitialName, InitialPair, MappingName};
 pub use named::{
     Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
@@ -36,19 +40,11 @@ pub use read::{FieldInSpace, read_field, read_planes};
 pub use wake::{PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile};
 
 use crate::Error;
-use crate::export::{Existing, Provenance, write_atomic};
+use crate::export::Provenance;
 use crate::scene::{Problem, SceneError, hash_of, located, parsed};
 use crate::text_file;
-use files::{Files, checkpoint_paths};
-use setup::{Setup, WakeSetup};
 use std::path::{Path, PathBuf};
-use steps::StepTable;
-use wake::{Schedule, WakeRun};
-use wakescope_les::{CheckpointPlan, Ends, Interval, Run, RunPlan, StepRecord};
-use writer::{Kept, Writer};
-
-/// Steps between checkpoints where a case states nothing.
-const STEPS_PER_CHECKPOINT: u64 = 500;
+use wakescope_les::StepRecord;
 
 /// A valid case, with what names it.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,6 +75,27 @@ impl CaseFile {
     /// As [`CaseFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
         Ok(Self::of(text::read(text, path, None)?, text, path))
+    }
+
+    /// The same case with another end: the age `tau` of a wake, of other flows a time \[s\]. Outputs behind it are left out.
+    ///
+    /// # Errors
+    /// An end that is no finite number above 0.
+    pub fn with_end(&self, end: f64) -> Result<Self, SceneError> {
+        let mut case = self.case.clone();
+        case.time.end_s = None;
+        match &mut case.wake {
+            Some(wake) => wake.end_at(end),
+            None => {
+                case.time.end_s = Some(end);
+                case.output.times_s.retain(|time_s| *time_s <= end);
+            }
+        }
+        let problems = case.problems();
+        if problems.is_empty() {
+            return Ok(Self::of(case, &self.text, &self.path));
+        }
+        Err(located(&parsed(&self.text, &self.path)?, &self.path, problems))
     }
 
     /// A preset.
@@ -153,6 +170,11 @@ pub enum Begin {
 
 /// Told of the progress of a run.
 pub trait Watch {
+    /// Before anything is computed.
+    fn forecast(&mut self, forecast: &FlowForecast) {
+        let _ = forecast;
+    }
+
     /// After every step, with the share of the run that is done.
     fn step(&mut self, share: f64, record: &StepRecord) {
         let _ = (share, record);
@@ -187,142 +209,6 @@ pub struct FlowOutcome {
     pub files: Vec<PathBuf>,
     /// What deserves attention.
     pub warnings: Vec<String>,
-}
-
-/// Runs a case and writes its files to `folder`.
-///
-/// # Errors
-/// A case that the solver refuses, a checkpoint that does not fit, a flow that blows up, files that cannot be written. The
-/// last good checkpoint stays.
-pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) -> Result<FlowOutcome, Error> {
-    let [checkpoint, previous] = checkpoint_paths(folder);
-    if begin == Begin::New && checkpoint.exists() {
-        return Err(Error::CheckpointInTheWay { path: checkpoint });
-    }
-    let mut setup = Setup::new(&file.case, file.path.parent().unwrap_or(Path::new("")))?;
-    let (plan, files, schedule) = plan(file, &setup, folder)?;
-    files.refuse_foreign(&schedule.due, setup.wake.is_some(), begin)?;
-    crate::write::prepare(folder, [], Existing::Own)?;
-    std::fs::create_dir_all(folder).map_err(|source| Error::Io {
-        action: "make the folder",
-        path: folder.to_owned(),
-        source,
-    })?;
-    let mut warnings = file.case.case.unresolved(&setup.mesh);
-    let meter = setup.wake.take().map(|wake| wake.meter);
-    let (mut run, kept) = if begin == Begin::Restart {
-        let path = readable(&checkpoint, &previous, &mut warnings);
-        Run::resume(path, setup.mesh, setup.settings, plan).map_err(Error::Flow)?
-    } else {
-        let (flow, start) = setup.start()?;
-        let removed = 1.0 - start.kinetic_energy_m5_s2 / start.given_energy_m5_s2;
-        if removed > 0.01 {
-            warnings.push(format!(
-                "the projection of the initial field onto fields without divergence removed {:.3} % of its energy",
-                100.0 * removed
-            ));
-        }
-        (Run::new(flow, plan).map_err(Error::Flow)?, Vec::new())
-    };
-    warnings.iter().for_each(|text| watch.note(text));
-    let mut wake = meter.map(|meter| WakeRun::new(meter, run.flow(), folder.to_owned(), file.provenance()));
-    let kept = Kept::read(&kept, wake.is_some());
-    if let (Some(wake), true) = (&mut wake, begin == Begin::Restart) {
-        let what = "its history of the wake is not that of this case";
-        wake.restore(&kept.wake)
-            .ok_or_else(|| Error::Flow(wakescope_les::Error::CheckpointDamaged { path: checkpoint.clone(), what }))?;
-    }
-    let case_toml = folder.join(files::CASE);
-    write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
-    let steps_path = files.steps_path();
-    let steps = match (files.output.steps, begin) {
-        (false, _) => None,
-        (true, Begin::Restart) => Some(StepTable::resume(&steps_path, &files.origin, &kept.steps)?),
-        (true, _) => Some(StepTable::begin(&steps_path, &files.origin)?),
-    };
-    let mut written = vec![case_toml];
-    written.extend(steps.is_some().then_some(steps_path));
-    written.extend(wake.iter().flat_map(WakeRun::paths));
-    let (start_s, end_s) = (run.flow().time_s(), run.plan().end_s);
-    let mut writer = Writer { files, schedule, steps, wake, written, warnings, watch, start_s, end_s, error: None };
-    let result = run.to_end(&mut writer);
-    // Also of a run that failed: its last row is what one wants to see.
-    let finished = writer.finish();
-    let Writer { written, warnings, error, .. } = writer;
-    let summary = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
-    finished?;
-    let flow = run.flow();
-    Ok(FlowOutcome {
-        steps: summary.steps,
-        time_s: summary.time_s,
-        is_complete: summary.is_complete,
-        kinetic_energy_m5_s2: flow.kinetic_energy_m5_s2(),
-        relative_divergence: flow.relative_divergence(),
-        files: written,
-        warnings,
-    })
-}
-
-/// The newer checkpoint, or the one before it where that is gone or damaged.
-fn readable<'a>(checkpoint: &'a Path, previous: &'a Path, warnings: &mut Vec<String>) -> &'a Path {
-    match wakescope_les::check_checkpoint(checkpoint) {
-        Err(error) if wakescope_les::check_checkpoint(previous).is_ok() => {
-            warnings.push(format!("{error}: the one before it is used, {}", previous.display()));
-            previous
-        }
-        _ => checkpoint,
-    }
-}
-
-/// The plan of the run and of its files, with all that can be refused before the computing.
-fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files, Schedule), Error> {
-    let case = &file.case;
-    let wake_end_s = case.wake.as_ref().map(|wake| wake.end_tau / setup.tau_per_s);
-    let Some(end_s) = case.time.end_s.or(wake_end_s).or(setup.end_s) else {
-        let allowed = "a number in s, e.g. 30.0, is needed for a flow of one's own".into();
-        let problem = Problem { key: "time.end_s".into(), value: Problem::ABSENT.into(), allowed };
-        return Err(Error::Scene(file.located(problem)));
-    };
-    let mut output = case.output.clone();
-    let schedule = match (&case.wake, &setup.wake) {
-        (Some(wake), Some(WakeSetup { scales, .. })) => {
-            output.planes_x_m = wake.planes_x.iter().map(|x| x * scales.spacing_m).collect();
-            Schedule::of_wake(wake, setup.tau_per_s, end_s)
-        }
-        _ => Schedule::plain(case.output_times_s(end_s).map_err(|problem| Error::Scene(file.located(problem)))?),
-    };
-    if let Some(late) = schedule.times_s.iter().find(|t| **t > end_s) {
-        return Err(file.refuse("output.times_s", late, format!("at most the end, {end_s:?} s")));
-    }
-    let along = &setup.mesh.directions()[0];
-    let inside = |x: &f64| along.ends == Ends::Periodic || (along.low_m..=along.high_m).contains(x);
-    if let Some(bad) = case.output.planes_x_m.iter().find(|x| !inside(x)) {
-        let allowed = format!("within the mesh, {:?} to {:?} m", along.low_m, along.high_m);
-        return Err(file.refuse("output.planes_x_m", bad, allowed));
-    }
-    let every = match (case.checkpoint.every_steps, case.checkpoint.every_s) {
-        (Some(steps), _) => Interval::Steps(steps),
-        (None, Some(time_s)) => Interval::Time { time_s },
-        (None, None) => Interval::Steps(STEPS_PER_CHECKPOINT),
-    };
-    let [path, _] = checkpoint_paths(folder);
-    let run = RunPlan {
-        end_s,
-        output_times_s: schedule.times_s.clone(),
-        checkpoint: case.checkpoint.write.then_some(CheckpointPlan { path, every }),
-        pause_after_steps: case.time.pause_after_steps,
-    };
-    let files = Files {
-        folder: folder.to_owned(),
-        output,
-        origin: file.provenance(),
-        #[cfg(feature = "vtk")]
-        times_s: [schedule.times_of(|due| due.fields), schedule.times_of(|due| due.planes)],
-        with_vorticity: setup.wake.is_some(),
-        tau_per_s: setup.tau_per_s,
-        title: format!("Simulated flow, case {}", file.hash),
-    };
-    Ok((run, files, schedule))
 }
 
 #[cfg(test)]

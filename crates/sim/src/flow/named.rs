@@ -210,6 +210,24 @@ impl CaseKind {
         lengths.map_or_else(Vec::new, |lengths| Resolution::new(mesh, &lengths).warnings())
     }
 
+    /// Cells along x, y, z.
+    pub fn cells(&self) -> [usize; 3] {
+        match *self {
+            Self::TaylorGreenPlane(ref c) => [1, c.cells, c.cells],
+            Self::TaylorGreen(ref c) => [c.cells; 3],
+            Self::Poiseuille(ref c) | Self::Couette(ref c) | Self::StokesLayer(ref c) | Self::RayleighPlate(ref c) => {
+                [1, 1, c.cells]
+            }
+            Self::OrrSommerfeld(ref c) => [c.cells[0], 1, c.cells[1]],
+            Self::Dipole(ref c) => [1, c.cells[0], c.cells[1]],
+            Self::LidDrivenCavity(ref c) => [1, c.cells, c.cells],
+            Self::Channel(ref c) => c.cells,
+            Self::VortexPair(ref c) => c.cells,
+            Self::Wake(ref c) => c.cells,
+            Self::Free(ref c) => [c.x.cells, c.y.cells, c.z.cells],
+        }
+    }
+
     /// Mesh, settings and initial field; `folder` is that of the case file.
     pub(super) fn setup(&self, folder: &Path) -> Result<Setup, Error> {
         let steady = |case: Result<Case, wakescope_les::Error>| {
@@ -247,7 +265,7 @@ impl CaseKind {
             Self::Free(ref c) => return c.setup(folder),
         };
         let Case { mesh, settings, initial, end_s } = case.map_err(Error::Flow)?;
-        Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0, wake: None })
+        Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0, wake: None, undamped: None })
     }
 }
 

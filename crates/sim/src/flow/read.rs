@@ -58,8 +58,8 @@ mod tests {
         wake.cells = [4, 16, 12];
         if let Some(output) = &mut case.wake {
             output.end_tau = 0.02;
-            output.fields_tau = vec![0.02];
-            output.planes_tau = vec![0.0, 0.02];
+            output.fields_tau = Some(vec![0.02]);
+            output.planes_tau = Some(vec![0.0, 0.02]);
         }
         let file = CaseFile::parse(&toml::to_string(&case).unwrap(), Path::new("case.toml")).unwrap();
         let folder = tempfile::tempdir().unwrap();

@@ -5,8 +5,8 @@ use crate::Error;
 use std::path::Path;
 pub(super) use wakescope_les::cases::Initial;
 use wakescope_les::{
-    Flow, FlowSettings, Mesh, PressureMethod, StartReport, SubgridModel, TimeScheme, TimeStep, ViscousTreatment,
-    WakeMeter, WakeScales,
+    Flow, FlowSettings, Mesh, PressureMethod, StartReport, SubgridModel, TimeScheme, TimeStep, UndampedGrowth,
+    ViscousTreatment, WakeMeter, WakeScales,
 };
 
 /// All that a simulation is made of.
@@ -20,6 +20,8 @@ pub(super) struct Setup {
     pub(super) tau_per_s: f64,
     /// What a wake is measured by.
     pub(super) wake: Option<WakeSetup>,
+    /// Waves for which Runge-Kutta was taken in place of Adams-Bashforth.
+    pub(super) undamped: Option<UndampedGrowth>,
 }
 
 /// The meter of a wake and its scales.
@@ -33,13 +35,6 @@ impl Setup {
     pub(super) fn new(case: &FlowCase, folder: &Path) -> Result<Self, Error> {
         let mut setup = case.case.setup(folder)?;
         let (s, solver) = (&mut setup.settings, &case.solver);
-        let own_scheme = s.scheme;
-        s.scheme = match case.time.scheme {
-            None => own_scheme,
-            Some(Scheme::AdamsBashforth2) => TimeScheme::AdamsBashforth2,
-            Some(Scheme::RungeKutta3) => TimeScheme::RungeKutta3,
-        };
-        s.time_step = time_step(case, s.time_step, s.scheme != own_scheme, s.scheme);
         s.damped_steps = case.time.damped_steps;
         if let Some(axes) = &solver.implicit_viscosity {
             s.viscous =
@@ -53,7 +48,50 @@ impl Setup {
         s.pressure_tolerance = solver.pressure_tolerance;
         s.rotational = solver.rotational;
         s.subgrid = subgrid(solver.subgrid);
+        match case.time.scheme {
+            Some(Scheme::AdamsBashforth2) => setup.integrate(case, TimeScheme::AdamsBashforth2),
+            Some(Scheme::RungeKutta3) => setup.integrate(case, TimeScheme::RungeKutta3),
+            None => {
+                setup.integrate(case, setup.settings.scheme);
+                setup.undamped = setup.undamped_growth();
+                if setup.undamped.is_some() {
+                    setup.integrate(case, TimeScheme::RungeKutta3);
+                }
+            }
+        }
         Ok(setup)
+    }
+
+    /// Takes a scheme, with the steps that the case asks of it.
+    fn integrate(&mut self, case: &FlowCase, scheme: TimeScheme) {
+        let s = &mut self.settings;
+        s.time_step = time_step(case, s.time_step, s.scheme != scheme, scheme);
+        s.scheme = scheme;
+    }
+
+    /// The same flow with the other scheme.
+    pub(super) fn with_other_scheme(mut self, case: &FlowCase) -> Self {
+        let other = match self.settings.scheme {
+            TimeScheme::AdamsBashforth2 => TimeScheme::RungeKutta3,
+            TimeScheme::RungeKutta3 => TimeScheme::AdamsBashforth2,
+        };
+        self.integrate(case, other);
+        self
+    }
+
+    /// Waves that the scheme would let grow in the initial field.
+    fn undamped_growth(&self) -> Option<UndampedGrowth> {
+        UndampedGrowth::of(&self.mesh, &self.settings, self.initial_velocity())
+    }
+
+    /// Velocity of the initial field in the cell of the indices along x, y, z: at its centre, or at its low faces.
+    pub(super) fn initial_velocity(&self) -> impl Fn([usize; 3]) -> [f64; 3] + Sync {
+        let centre_m = [0, 1, 2].map(|axis| self.mesh.centre_m(axis));
+        let [nx, ny, _] = self.mesh.cells();
+        move |cell| match &self.initial {
+            Initial::Field(field) => field([0, 1, 2].map(|axis| centre_m[axis][cell[axis]])),
+            Initial::Faces(faces) => faces.each_ref().map(|face| face[(cell[2] * ny + cell[1]) * nx + cell[0]]),
+        }
     }
 
     pub(super) fn start(self) -> Result<(Flow, StartReport), Error> {

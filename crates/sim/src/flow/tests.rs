@@ -257,8 +257,6 @@ fn a_checkpoint_is_not_lost_by_mistake_and_a_damaged_one_gives_way_to_the_one_be
     let steps = |folder: &Path| fs::read(folder.join("steps.csv")).unwrap();
     assert!(steps(folder.path()) == steps(fresh.path()));
     run(&vortices(Some(1)), folder.path(), Begin::Overwrite, &mut Unwatched).unwrap();
-    let nothing = run(&vortices(None), &folder.path().join("none"), Begin::Restart, &mut Unwatched).unwrap_err();
-    assert!(nothing.to_string().contains("flow.checkpoint"), "{nothing}");
     // Another flow does not continue this one.
     let other = parse(&vortices(None).toml.replace("cells = 12", "cells = 14"));
     let error = run(&other, folder.path(), Begin::Restart, &mut Unwatched).unwrap_err().to_string();
@@ -281,7 +279,7 @@ fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
 #[test]
 fn a_flow_that_blows_up_names_step_and_place() {
     let folder = tempfile::tempdir().unwrap();
-    let text = "[case]\nkind = \"taylor_green_plane\"\ncells = 12\n[time]\nend_s = 1.0\nstep_s = 0.1\n";
+    let text = "[case]\nkind = \"taylor_green_plane\"\ncells = 12\n[time]\nend_s = 1.0\nstep_s = 0.2\n";
     let error = run(&parse(text), folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
     assert!(error.starts_with("flow: step 1 ") && error.contains("Courant number"), "{error}");
 }

@@ -34,7 +34,7 @@ pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<F
     };
     let mut case = FlowCase::deserialize(whole).map_err(|e| unlike(path, &e))?;
     if matches!(case.case, CaseKind::Wake(_)) {
-        case.wake.get_or_insert_default();
+        case.wake.get_or_insert_default().complete();
     }
     let problems = case.problems();
     if problems.is_empty() { Ok(case) } else { Err(located(&document, path, problems)) }

@@ -91,6 +91,11 @@ impl RunObserver for Writer<'_> {
             RunWarning::Courant { step, courant, limit } => {
                 format!("step {step} has Courant number {courant:.3}, near the limit {limit}: shorten the time step")
             }
+            RunWarning::UndampedGrowth { growth, .. } => format!(
+                "Adams-Bashforth lets short waves grow at {:.2e} 1/s, as viscosity is too small to damp them (cell Reynolds \
+                 number {:.3e}, at most {:.3e} at Courant number {:.2}): take time.scheme = \"runge_kutta3\"",
+                growth.rate_per_s, growth.cell_reynolds, growth.limit, growth.courant
+            ),
             _ => format!("{warning:?}"),
         };
         self.watch.note(&text);

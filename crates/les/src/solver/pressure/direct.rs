@@ -200,10 +200,15 @@ impl PressureSolver for Direct {
     }
 }
 
-/// Cells of the longest axis that the direct solver would treat by products with a dense matrix, axis 0 apart.
-pub(crate) fn dense_cells(layout: &Layout) -> usize {
+/// Axes that the direct solver treats by products with a dense matrix, axis 0 apart.
+pub(crate) fn dense_axes(layout: &Layout) -> Vec<usize> {
     let banded = banded_axis(layout);
-    [1, 2].into_iter().filter(|axis| Some(*axis) != banded).map(|axis| layout.shape.n[axis]).max().unwrap_or(0)
+    [1, 2].into_iter().filter(|axis| Some(*axis) != banded).collect()
+}
+
+/// Cells of the longest of these.
+pub(crate) fn dense_cells(layout: &Layout) -> usize {
+    dense_axes(layout).into_iter().map(|axis| layout.shape.n[axis]).max().unwrap_or(0)
 }
 
 /// The axis that is factorised: the longer of the bounded ones, axis 2 if they are about equal.

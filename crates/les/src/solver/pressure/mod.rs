@@ -5,6 +5,7 @@
 
 mod apply;
 mod banded;
+mod cost;
 mod direct;
 mod eigen;
 mod equation;

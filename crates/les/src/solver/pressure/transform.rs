@@ -47,14 +47,20 @@ const SMALL: usize = 150;
 const TINY: usize = 12;
 
 impl RowTransform {
-    /// The transform, the eigenvalues by place, and the factor that both ways together leave out.
-    pub(crate) fn new(line: &Line) -> (Self, Vec<f64>, f64) {
+    /// Whether a direction is transformed by products with a matrix.
+    pub(crate) fn is_dense(line: &Line) -> bool {
         let n = line.cells;
         // Powers of two add equal values exactly: a flow that does not vary stays as it is, whatever the number of cells.
         let fast = n.is_power_of_two() || n > TINY && (n > SMALL || largest_factor(n) <= SMOOTH);
+        !line.is_thin() && !(line.is_fourier() && fast)
+    }
+
+    /// The transform, the eigenvalues by place, and the factor that both ways together leave out.
+    pub(crate) fn new(line: &Line) -> (Self, Vec<f64>, f64) {
+        let n = line.cells;
         if line.is_thin() {
             (Self::Thin, vec![0.0], 1.0 / line.cell_mass_m[0])
-        } else if line.is_fourier() && fast {
+        } else if !Self::is_dense(line) {
             let mut planner = RealFftPlanner::new();
             let (forward, inverse) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
             let transform = Self::Fourier { cells: n, forward, inverse };

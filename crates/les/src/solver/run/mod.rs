@@ -347,7 +347,11 @@ impl Run {
 }
 
 impl RunPlan {
-    fn check(&self, start_s: f64) -> Result<(), Error> {
+    /// Refuses what a run that starts at `start_s` would refuse.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty intervals.
+    pub fn check(&self, start_s: f64) -> Result<(), Error> {
         check("end_s", self.end_s, "finite and not before the start", |t| t >= start_s)?;
         let mut last_s = start_s;
         for (i, &time_s) in self.output_times_s.iter().enumerate() {

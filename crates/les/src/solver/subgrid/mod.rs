@@ -102,15 +102,7 @@ impl Subgrid {
     /// # Errors
     /// [`Error::OutOfRange`] for a constant that is not positive and an order that is not 1 to 4.
     pub(crate) fn new(layout: &Layout, model: SubgridModel) -> Result<Option<Self>, Error> {
-        let (formula, order) = match model {
-            SubgridModel::None => return Ok(None),
-            SubgridModel::Smagorinsky { constant } => (Formula::Smagorinsky { square: square(constant)? }, None),
-            SubgridModel::Wale { constant } => (Formula::Wale { square: square(constant)? }, None),
-            SubgridModel::MultiscaleWale { constant, order } => {
-                check("order", order as f64, "1 to 4", |_| (1..=HIGHEST_ORDER).contains(&order))?;
-                (Formula::Wale { square: square(constant)? }, Some(order))
-            }
-        };
+        let Some((formula, order)) = formula_and_order(model)? else { return Ok(None) };
         let cells = layout.shape.len();
         let fields = || [vec![0.0; cells], vec![0.0; cells], vec![0.0; cells]];
         Ok(Some(Self {
@@ -158,6 +150,27 @@ impl Subgrid {
     pub(crate) fn viscosity_m2_s(&self) -> &[f64] {
         &self.viscosity
     }
+}
+
+/// Refuses what [`Subgrid::new`] would refuse.
+///
+/// # Errors
+/// As there.
+pub(super) fn check_constants(model: SubgridModel) -> Result<(), Error> {
+    formula_and_order(model).map(drop)
+}
+
+/// The formula of a model, and the order of its filter if it has one.
+fn formula_and_order(model: SubgridModel) -> Result<Option<(Formula, Option<usize>)>, Error> {
+    Ok(match model {
+        SubgridModel::None => None,
+        SubgridModel::Smagorinsky { constant } => Some((Formula::Smagorinsky { square: square(constant)? }, None)),
+        SubgridModel::Wale { constant } => Some((Formula::Wale { square: square(constant)? }, None)),
+        SubgridModel::MultiscaleWale { constant, order } => {
+            check("order", order as f64, "1 to 4", |_| (1..=HIGHEST_ORDER).contains(&order))?;
+            Some((Formula::Wale { square: square(constant)? }, Some(order)))
+        }
+    })
 }
 
 fn square(constant: f64) -> Result<f64, Error> {

@@ -39,9 +39,9 @@ impl Schedule {
             let count = ((to - from) / step + SAME).floor() as usize;
             (0..=count).map(move |i| from + i as f64 * step).collect::<Vec<f64>>()
         };
-        let mut planes = output.planes_tau.clone();
+        let mut planes = output.planes_tau.clone().unwrap_or_default();
         planes.extend(output.series_tau.map(|range| every(range, output.series_every_tau)).unwrap_or_default());
-        let lists = [every([0.0, end_tau], output.every_tau), output.fields_tau.clone(), planes];
+        let lists = [every([0.0, end_tau], output.every_tau), output.fields_tau.clone().unwrap_or_default(), planes];
         let mut all: Vec<(f64, usize)> =
             lists.iter().enumerate().flat_map(|(kind, list)| list.iter().map(move |tau| (*tau, kind))).collect();
         all.retain(|(tau, _)| *tau <= end_tau + SAME);
@@ -82,8 +82,8 @@ mod tests {
     fn lists_that_share_ages_are_joined_and_numbered() {
         let output = WakeOutput {
             every_tau: 0.5,
-            fields_tau: vec![1.0, 2.0],
-            planes_tau: vec![0.25, 1.5],
+            fields_tau: Some(vec![1.0, 2.0]),
+            planes_tau: Some(vec![0.25, 1.5]),
             series_tau: Some([1.0, 1.5]),
             series_every_tau: 0.25,
             ..WakeOutput::default()

@@ -1,0 +1,53 @@
+//! What a pressure solver needs for a mesh, before one is built.
+//!
+//! Check: the directions that a solver names as products with a matrix.
+
+use super::super::layout::Layout;
+use super::super::mesh::Mesh;
+use super::transform::RowTransform;
+use super::{DENSE_LIMIT, PressureMethod, direct};
+
+impl PressureMethod {
+    /// Cells of the directions that this method transforms by products with a dense matrix on `mesh`: a matrix of `n` x `n` takes
+    /// the time of `n^3` to find, and its products that of `n` per cell and solve.
+    pub fn dense_directions(self, mesh: &Mesh) -> Vec<usize> {
+        let layout = Layout::new(mesh, None);
+        let by_multigrid = match self {
+            Self::Auto => direct::dense_cells(&layout) > DENSE_LIMIT,
+            Self::Direct => false,
+            Self::Multigrid => true,
+        };
+        let mut dense = if by_multigrid { Vec::new() } else { direct::dense_axes(&layout) };
+        if RowTransform::is_dense(&layout.line[0]) {
+            dense.push(0);
+        }
+        dense.into_iter().map(|axis| layout.shape.n[axis]).filter(|n| *n > 1).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::mesh::{Direction, Mapping, Wall};
+    use super::*;
+
+    #[test]
+    fn directions_with_a_matrix_are_those_that_the_solvers_name() {
+        let periodic = |n| Direction::periodic(n, 0.0, 1.0);
+        let between = |n| Direction::between(n, 0.0, 1.0, Wall::Slip, Wall::Slip);
+        let sine = |n| periodic(n).stretched(Mapping::Sine { amplitude: 0.3 });
+        for [x, y, z] in [
+            [periodic(16), periodic(20), between(24)],
+            [periodic(1), sine(20), between(24)],
+            [periodic(1), between(20), between(24)],
+            [sine(14), periodic(20), between(24)],
+        ] {
+            let mesh = Mesh::new(x, y, z).unwrap();
+            for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
+                let dense = method.dense_directions(&mesh);
+                let named = super::super::build(&Layout::new(&mesh, None), method).unwrap().describe();
+                assert_eq!(named.matches("dense").count(), dense.len(), "{dense:?}: {named}");
+                assert!(dense.iter().all(|n| mesh.cells().contains(n)));
+            }
+        }
+    }
+}

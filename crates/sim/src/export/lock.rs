@@ -1,0 +1,117 @@
+//! One writer for a folder at a time.
+//!
+//! The lock is one of the operating system on a hidden file: a process that ends in any way gives it back. Who holds it sweeps
+//! what crashed writers have left.
+//!
+//! Check: a second lock is refused, a lock that was given back can be taken, nothing stays behind.
+
+use super::atomic::sweep_stages;
+use super::error::{OutputError, OutputResult};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::path::{Path, PathBuf};
+
+const NAME: &str = ".wakescope-lock";
+
+/// The right to write to a folder, until it is dropped.
+#[derive(Debug)]
+pub(crate) struct FolderLock {
+    path: PathBuf,
+    // Held open: closing it gives the lock back.
+    _file: File,
+}
+
+impl FolderLock {
+    /// Takes the lock of a folder, which must exist.
+    ///
+    /// # Errors
+    /// [`OutputError::InUse`] while another run has it; what the system says.
+    pub(crate) fn take(folder: &Path) -> OutputResult<Self> {
+        let path = folder.join(NAME);
+        let io = |source| OutputError::Io { action: "lock", path: path.clone(), source };
+        let file = loop {
+            let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path).map_err(io)?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Err(OutputError::InUse { folder: folder.to_owned() }),
+                // A file system without locks: nothing can be held there.
+                Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => break file,
+                Err(TryLockError::Error(error)) => return Err(io(error)),
+            }
+            if is_at(&file, &path) {
+                break file;
+            }
+            // The one before took its file away between our opening and our locking.
+        };
+        sweep_stages(folder);
+        Ok(Self { path, _file: file })
+    }
+}
+
+impl Drop for FolderLock {
+    fn drop(&mut self) {
+        // While the lock is held, so that nobody else holds one on the file that goes.
+        if cfg!(unix) {
+            drop(std::fs::remove_file(&self.path));
+        }
+    }
+}
+
+/// Whether the open file is still the one of that name.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let id = |m: std::fs::Metadata| (m.dev(), m.ino());
+    let [open, named] = [file.metadata(), path.metadata()].map(|m| m.ok().map(id));
+    open.is_some() && open == named
+}
+
+/// Elsewhere the file is never taken away.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_folder_has_one_writer_and_keeps_no_trace_of_it() {
+        let temp = tempfile::tempdir().unwrap();
+        let first = FolderLock::take(temp.path()).unwrap();
+        let second = FolderLock::take(temp.path()).unwrap_err();
+        assert!(matches!(second, OutputError::InUse { .. }), "{second}");
+        assert!(second.to_string().contains(temp.path().to_str().unwrap()), "{second}");
+        drop(first);
+        drop(FolderLock::take(temp.path()).unwrap());
+        if cfg!(unix) {
+            assert_eq!(fs::read_dir(temp.path()).unwrap().count(), 0);
+        }
+        assert!(FolderLock::take(&temp.path().join("none")).is_err());
+        // The file of a writer that crashed is no obstacle.
+        fs::write(temp.path().join(NAME), "").unwrap();
+        drop(FolderLock::take(temp.path()).unwrap());
+    }
+
+    #[test]
+    fn what_crashed_writers_left_is_swept_and_a_file_they_had_taken_away_comes_back() {
+        let temp = tempfile::tempdir().unwrap();
+        let stage = |name: &str| temp.path().join(format!(".wakescope-stage-{name}"));
+        for name in ["1-0", "1-1"] {
+            for part in ["old", "new"] {
+                fs::create_dir_all(stage(name).join(part)).unwrap();
+            }
+        }
+        // Killed between taking the old file away and putting the new one into its place, with another still to come.
+        fs::write(stage("1-0").join("old/map.csv"), "old").unwrap();
+        fs::write(stage("1-0").join("new/map.csv"), "new").unwrap();
+        // Killed when all were in place.
+        fs::write(temp.path().join("profile.csv"), "new").unwrap();
+        fs::write(stage("1-1").join("old/profile.csv"), "old").unwrap();
+        drop(FolderLock::take(temp.path()).unwrap());
+        let read = |name: &str| fs::read_to_string(temp.path().join(name)).unwrap();
+        assert_eq!([read("map.csv"), read("profile.csv")], ["old", "new"]);
+        assert!(!stage("1-0").exists() && !stage("1-1").exists());
+    }
+}

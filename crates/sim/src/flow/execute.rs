@@ -1,0 +1,249 @@
+//! Running a case: from its file to the files of the run.
+//!
+//! Check: the tests of `flow` interrupt runs, kill them and let two of them meet in one folder.
+
+use super::files::{CASE, Files, checkpoint_paths};
+use super::forecast::{FlowForecast, refuse_too_large};
+use super::setup::{Setup, WakeSetup};
+use super::steps::StepTable;
+use super::wake::{Schedule, WakeRun};
+use super::writer::{Kept, Writer};
+use super::{Begin, CaseFile, FlowCase, FlowOutcome, Watch};
+use crate::export::lock::FolderLock;
+use crate::export::{Existing, write_atomic};
+use crate::scene::Problem;
+use crate::{Error, machine};
+use std::path::Path;
+use wakescope_les::{CheckpointPlan, Ends, Interval, Run, RunPlan};
+
+/// Steps between checkpoints where a case states nothing.
+const STEPS_PER_CHECKPOINT: u64 = 500;
+
+/// How a run begins.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RunOptions {
+    /// Anew, or from a checkpoint.
+    pub begin: Begin,
+    /// Whether a case is run whose forecast exceeds the memory of the machine.
+    pub allow_large: bool,
+}
+
+/// All that a run needs, found without computing.
+struct Prepared {
+    setup: Setup,
+    plan: RunPlan,
+    files: Files,
+    schedule: Schedule,
+    forecast: FlowForecast,
+}
+
+/// What a run would take; nothing is written. With the folder that it would write to this is checked, too.
+///
+/// # Errors
+/// All that [`run_with`] refuses before it computes.
+pub fn check(file: &CaseFile, folder: Option<&Path>, options: RunOptions) -> Result<FlowForecast, Error> {
+    if let Some(folder) = folder {
+        refuse_folder(folder, options.begin)?;
+    }
+    prepare(file, folder.unwrap_or(Path::new("")), options).map(|prepared| prepared.forecast)
+}
+
+/// As [`run_with`], for a case that fits into the memory of the machine.
+///
+/// # Errors
+/// As there.
+pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) -> Result<FlowOutcome, Error> {
+    run_with(file, folder, RunOptions { begin, allow_large: false }, watch)
+}
+
+/// Runs a case and writes its files to `folder`, in which no other run may be writing.
+///
+/// # Errors
+/// A case that the solver refuses or that needs more memory than there is, a checkpoint that does not fit, a flow that blows
+/// up, files that cannot be written. The last good checkpoint stays.
+pub fn run_with(
+    file: &CaseFile,
+    folder: &Path,
+    options: RunOptions,
+    watch: &mut dyn Watch,
+) -> Result<FlowOutcome, Error> {
+    let begin = options.begin;
+    let [checkpoint, previous] = checkpoint_paths(folder);
+    refuse_folder(folder, begin)?;
+    let Prepared { mut setup, plan, files, schedule, forecast } = prepare(file, folder, options)?;
+    files.refuse_foreign(&schedule.due, setup.wake.is_some(), begin)?;
+    watch.forecast(&forecast);
+    std::fs::create_dir_all(folder).map_err(|source| Error::Io {
+        action: "make the folder",
+        path: folder.to_owned(),
+        source,
+    })?;
+    let _lock = FolderLock::take(folder)?;
+    let mut warnings = file.case.case.unresolved(&setup.mesh);
+    let begin = match begin {
+        // Killed before there was anything to continue from.
+        Begin::Restart if !checkpoint.exists() && !previous.exists() => {
+            warnings.push(format!("there is no checkpoint in {}: the run begins anew", folder.display()));
+            Begin::New
+        }
+        other => other,
+    };
+    let meter = setup.wake.take().map(|wake| wake.meter);
+    let (mut run, kept) = if begin == Begin::Restart {
+        let path = readable(&checkpoint, &previous, &mut warnings);
+        resume(path, setup, plan, &file.case)?
+    } else {
+        let (flow, start) = setup.start()?;
+        let removed = 1.0 - start.kinetic_energy_m5_s2 / start.given_energy_m5_s2;
+        if removed > 0.01 {
+            warnings.push(format!(
+                "the projection of the initial field onto fields without divergence removed {:.3} % of its energy",
+                100.0 * removed
+            ));
+        }
+        (Run::new(flow, plan).map_err(Error::Flow)?, Vec::new())
+    };
+    warnings.iter().for_each(|text| watch.note(text));
+    let mut wake = meter.map(|meter| WakeRun::new(meter, run.flow(), folder.to_owned(), file.provenance()));
+    let kept = Kept::read(&kept, wake.is_some());
+    if let (Some(wake), true) = (&mut wake, begin == Begin::Restart) {
+        let what = "its history of the wake is not that of this case";
+        wake.restore(&kept.wake)
+            .ok_or_else(|| Error::Flow(wakescope_les::Error::CheckpointDamaged { path: checkpoint.clone(), what }))?;
+    }
+    let case_toml = folder.join(CASE);
+    write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
+    let steps_path = files.steps_path();
+    let steps = match (files.output.steps, begin) {
+        (false, _) => None,
+        (true, Begin::Restart) => Some(StepTable::resume(&steps_path, &files.origin, &kept.steps)?),
+        (true, _) => Some(StepTable::begin(&steps_path, &files.origin)?),
+    };
+    let mut written = vec![case_toml];
+    written.extend(steps.is_some().then_some(steps_path));
+    written.extend(wake.iter().flat_map(WakeRun::paths));
+    let (start_s, end_s) = (run.flow().time_s(), run.plan().end_s);
+    let mut writer = Writer { files, schedule, steps, wake, written, warnings, watch, start_s, end_s, error: None };
+    let result = run.to_end(&mut writer);
+    // Also of a run that failed: its last row is what one wants to see.
+    let finished = writer.finish();
+    let Writer { written, warnings, error, .. } = writer;
+    let summary = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
+    finished?;
+    let flow = run.flow();
+    Ok(FlowOutcome {
+        steps: summary.steps,
+        time_s: summary.time_s,
+        is_complete: summary.is_complete,
+        kinetic_energy_m5_s2: flow.kinetic_energy_m5_s2(),
+        relative_divergence: flow.relative_divergence(),
+        files: written,
+        warnings,
+    })
+}
+
+/// Refuses a folder that holds a run that is not to be overwritten, that cannot be written to, or that is in use.
+fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
+    if begin == Begin::New
+        && let Some(path) = checkpoint_paths(folder).into_iter().find(|path| path.exists())
+    {
+        return Err(Error::CheckpointInTheWay { path });
+    }
+    crate::write::prepare(folder, [], Existing::Own)
+}
+
+/// The setup and the plan of a case, with all that can be refused before the computing.
+fn prepare(file: &CaseFile, folder: &Path, options: RunOptions) -> Result<Prepared, Error> {
+    let available = if options.allow_large { None } else { machine::available_memory_bytes() };
+    // Before the setup, which holds the initial field.
+    refuse_too_large(&file.case, file.case.case.cells(), &[], available)?;
+    let setup = Setup::new(&file.case, file.path.parent().unwrap_or(Path::new("")))?;
+    let dense = setup.settings.pressure.dense_directions(&setup.mesh);
+    refuse_too_large(&file.case, setup.mesh.cells(), &dense, available)?;
+    setup.settings.validate(&setup.mesh).map_err(Error::Flow)?;
+    let (plan, files, schedule) = plan(file, &setup, folder)?;
+    plan.check(if options.begin == Begin::Restart { f64::NEG_INFINITY } else { 0.0 }).map_err(Error::Flow)?;
+    let forecast = FlowForecast::new(file, &setup, &plan, &files, &schedule);
+    Ok(Prepared { setup, plan, files, schedule, forecast })
+}
+
+/// The run of a checkpoint. Which scheme suits a flow depends on the step, which may be changed: where the case does not name
+/// one, that of the checkpoint goes on.
+fn resume(path: &Path, setup: Setup, plan: RunPlan, case: &FlowCase) -> Result<(Run, Vec<u8>), Error> {
+    let try_with = |setup: &Setup| Run::resume(path, setup.mesh.clone(), setup.settings.clone(), plan.clone());
+    let resumed = match try_with(&setup) {
+        Err(wakescope_les::Error::CheckpointMismatch { what, .. })
+            if what == "the time scheme" && case.time.scheme.is_none() =>
+        {
+            try_with(&setup.with_other_scheme(case))
+        }
+        other => other,
+    };
+    resumed.map_err(Error::Flow)
+}
+
+/// The newer checkpoint, or the one before it where that is gone or damaged.
+fn readable<'a>(checkpoint: &'a Path, previous: &'a Path, warnings: &mut Vec<String>) -> &'a Path {
+    match wakescope_les::check_checkpoint(checkpoint) {
+        Err(error) if wakescope_les::check_checkpoint(previous).is_ok() => {
+            warnings.push(format!("{error}: the one before it is used, {}", previous.display()));
+            previous
+        }
+        _ => checkpoint,
+    }
+}
+
+/// The plan of the run and of its files, with all that can be refused before the computing.
+fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files, Schedule), Error> {
+    let case = &file.case;
+    let wake_end_s = case.wake.as_ref().map(|wake| wake.end_tau / setup.tau_per_s);
+    let Some(end_s) = case.time.end_s.or(wake_end_s).or(setup.end_s) else {
+        let allowed = "a number in s, e.g. 30.0, is needed for a flow of one's own".into();
+        let problem = Problem { key: "time.end_s".into(), value: Problem::ABSENT.into(), allowed };
+        return Err(Error::Scene(file.located(problem)));
+    };
+    let mut output = case.output.clone();
+    let schedule = match (&case.wake, &setup.wake) {
+        (Some(wake), Some(WakeSetup { scales, .. })) => {
+            output.planes_x_m = wake.planes_x.iter().map(|x| x * scales.spacing_m).collect();
+            Schedule::of_wake(wake, setup.tau_per_s, end_s)
+        }
+        _ => Schedule::plain(case.output_times_s(end_s).map_err(|problem| Error::Scene(file.located(problem)))?),
+    };
+    if let Some(late) = schedule.times_s.iter().find(|t| **t > end_s) {
+        return Err(file.refuse("output.times_s", late, format!("at most the end, {end_s:?} s")));
+    }
+    let along = &setup.mesh.directions()[0];
+    let inside = |x: &f64| along.ends == Ends::Periodic || (along.low_m..=along.high_m).contains(x);
+    if let Some(bad) = case.output.planes_x_m.iter().find(|x| !inside(x)) {
+        let allowed = format!("within the mesh, {:?} to {:?} m", along.low_m, along.high_m);
+        return Err(file.refuse("output.planes_x_m", bad, allowed));
+    }
+    let every = match (case.checkpoint.every_steps, case.checkpoint.every_s) {
+        (Some(steps), _) => Interval::Steps(steps),
+        (None, Some(time_s)) => Interval::Time { time_s },
+        (None, None) => Interval::Steps(STEPS_PER_CHECKPOINT),
+    };
+    let [path, _] = checkpoint_paths(folder);
+    let run = RunPlan {
+        end_s,
+        output_times_s: schedule.times_s.clone(),
+        checkpoint: case.checkpoint.write.then_some(CheckpointPlan { path, every }),
+        pause_after_steps: case.time.pause_after_steps,
+    };
+    let files = Files {
+        folder: folder.to_owned(),
+        output,
+        origin: file.provenance(),
+        #[cfg(feature = "vtk")]
+        times_s: [schedule.times_of(|due| due.fields), schedule.times_of(|due| due.planes)],
+        with_vorticity: setup.wake.is_some(),
+        tau_per_s: setup.tau_per_s,
+        title: format!("Simulated flow, case {}", file.hash),
+    };
+    Ok((run, files, schedule))
+}
+
+#[cfg(test)]
+#[path = "execute_tests.rs"]
+mod tests;

@@ -1,0 +1,131 @@
+//! Runs that meet, that were killed early, that end elsewhere, that gain energy.
+
+use super::*;
+use crate::flow::{Unwatched, WakePreset};
+use std::fs;
+
+/// Keeps what it is told.
+#[derive(Default)]
+struct Notes(Vec<String>);
+
+impl Watch for Notes {
+    fn note(&mut self, text: &str) {
+        self.0.push(text.to_owned());
+    }
+}
+
+fn parse(text: &str) -> CaseFile {
+    CaseFile::parse(text, Path::new("case.toml")).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// Vortices that turn for ever where nothing damps them.
+fn vortices(case: &str, time: &str) -> CaseFile {
+    parse(&format!(
+        "[case]\nkind = \"taylor_green_plane\"\ncells = 16\n{case}[time]\nlongest_step_s = 1.0\n{time}[checkpoint]\nevery_steps = 10\n"
+    ))
+}
+
+#[test]
+fn a_second_run_in_a_folder_is_refused_and_what_a_crashed_one_left_is_swept() {
+    let folder = tempfile::tempdir().unwrap();
+    let stage = folder.path().join(".wakescope-stage-1-0");
+    fs::create_dir_all(stage.join("new")).unwrap();
+    fs::create_dir_all(stage.join("old")).unwrap();
+    let case = vortices("", "end_s = 0.05\n");
+    let lock = FolderLock::take(folder.path()).unwrap();
+    let error = run(&case, folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
+    assert!(error.contains(folder.path().to_str().unwrap()) && error.contains("another run"), "{error}");
+    drop(lock);
+    assert!(run(&case, folder.path(), Begin::New, &mut Unwatched).unwrap().is_complete);
+    assert!(!stage.exists() && fs::read_dir(folder.path()).unwrap().count() >= 3);
+}
+
+#[test]
+fn a_run_killed_before_its_first_checkpoint_begins_anew_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    // What such a run leaves: the head of its table and half a row.
+    fs::write(folder.path().join("steps.csv"), "# x\nstep,time_s\n1,0.0").unwrap();
+    let case = vortices("", "end_s = 0.05\n");
+    let mut notes = Notes::default();
+    let outcome = run(&case, folder.path(), Begin::Restart, &mut notes).unwrap();
+    assert!(outcome.is_complete && notes.0[0].contains("begins anew"), "{:?}", notes.0);
+    let fresh = tempfile::tempdir().unwrap();
+    run(&case, fresh.path(), Begin::New, &mut Unwatched).unwrap();
+    let steps = |folder: &Path| fs::read(folder.join("steps.csv")).unwrap();
+    assert!(steps(folder.path()) == steps(fresh.path()));
+}
+
+#[test]
+fn the_ages_of_outputs_follow_the_end_of_a_wake() {
+    let wake = |keys: &str| parse(&format!("[case]\nkind = \"wake\"\n[wake]\n{keys}")).case.wake.unwrap();
+    let lists = |keys: &str| {
+        let wake = wake(keys);
+        (wake.fields_tau.unwrap(), wake.planes_tau.unwrap())
+    };
+    assert_eq!(lists(""), (vec![0.5, 1.0, 2.0, 3.0, 4.0, 5.0], vec![2.5, 5.0]));
+    assert_eq!(lists("end_tau = 0.5\n"), (vec![0.5], vec![0.25, 0.5]));
+    assert_eq!(lists("end_tau = 1.7\n"), (vec![0.5, 1.0, 1.7], vec![0.85, 1.7]));
+    assert_eq!(lists("end_tau = 1.7\nfields_tau = []\n"), (vec![], vec![0.85, 1.7]));
+    let own = "[case]\nkind = \"wake\"\n[wake]\nend_tau = 0.5\n";
+    let over = CaseFile::parse_over(WakePreset::Medium, own, Path::new("case.toml")).unwrap();
+    assert_eq!(over.case.wake.unwrap().fields_tau, Some(vec![0.5]));
+    // An end from the command line: lists of the case lose what lies behind it.
+    let ended = |keys: &str, end: f64| {
+        let file = parse(&format!("[case]\nkind = \"wake\"\n[wake]\n{keys}")).with_end(end).unwrap();
+        assert_eq!(parse(&file.toml).case, file.case);
+        let wake = file.case.wake.unwrap();
+        assert_eq!(wake.end_tau, end);
+        (wake.fields_tau.unwrap(), wake.planes_tau.unwrap(), wake.series_tau)
+    };
+    assert_eq!(ended("", 1.5), (vec![0.5, 1.0, 1.5], vec![0.75, 1.5], None));
+    let own = "fields_tau = [0.2, 0.9]\nseries_tau = [0.1, 0.8]\n";
+    assert_eq!(ended(own, 0.4), (vec![0.2], vec![0.2, 0.4], Some([0.1, 0.4])));
+    let plane = vortices("", "end_s = 0.5\n").with_end(0.25).unwrap();
+    assert_eq!(plane.case.time.end_s, Some(0.25));
+    let refused = plane.with_end(-1.0).unwrap_err().to_string();
+    assert!(refused.contains("time.end_s = -1.0") && refused.contains("above 0"), "{refused}");
+}
+
+#[test]
+fn energy_from_nowhere_stops_a_run_whose_checkpoints_are_good() {
+    let folder = tempfile::tempdir().unwrap();
+    let inviscid = "viscosity_m2_s = 0.0\n";
+    let case = vortices(inviscid, "end_s = 1000.0\nscheme = \"adams_bashforth2\"\ncourant = 1.0\n");
+    let mut notes = Notes::default();
+    let error = run(&case, folder.path(), Begin::New, &mut notes).unwrap_err();
+    assert!(matches!(error, Error::Flow(wakescope_les::Error::EnergyGrew { .. })), "{error}");
+    assert!(notes.0[0].contains("runge_kutta3"), "{:?}", notes.0);
+    let steps = fs::read_to_string(folder.path().join("steps.csv")).unwrap();
+    let energies: Vec<f64> = steps
+        .lines()
+        .skip_while(|l| !l.starts_with("1,"))
+        .map(|l| l.split(',').nth(4).unwrap().parse().unwrap())
+        .collect();
+    let last = energies.last().unwrap() / energies[0];
+    assert!((1.01..2.0).contains(&last), "stopped at {last} times the energy of the start");
+    // Where the case names no scheme, one is taken that loses energy, if anything.
+    let long = vortices(inviscid, "end_s = 20.0\ncourant = 0.35\n");
+    let folder = tempfile::tempdir().unwrap();
+    let outcome = run(&long, folder.path(), Begin::New, &mut Unwatched).unwrap();
+    let kept = outcome.kinetic_energy_m5_s2 / energies[0];
+    assert!(kept < 1.0 && kept > 0.99 && outcome.warnings.is_empty(), "{kept}, {:?}", outcome.warnings);
+}
+
+#[test]
+fn a_run_goes_on_with_the_scheme_of_its_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    // Cells of Reynolds number 42: damped at a Courant number of 0.2, not at 0.35.
+    let case = |time: &str| vortices("viscosity_m2_s = 0.0015\nstretch = [0.0, 0.0]\n", time);
+    let scheme = |file: &CaseFile| Setup::new(&file.case, Path::new("")).unwrap().settings.scheme;
+    let [slow, fast] = ["end_s = 0.1\ncourant = 0.2\n", "end_s = 0.2\ncourant = 0.35\n"].map(case);
+    assert_eq!(
+        [scheme(&slow), scheme(&fast)],
+        [wakescope_les::TimeScheme::AdamsBashforth2, wakescope_les::TimeScheme::RungeKutta3]
+    );
+    run(&slow, folder.path(), Begin::New, &mut Unwatched).unwrap();
+    assert!(run(&fast, folder.path(), Begin::Restart, &mut Unwatched).unwrap().is_complete);
+    // One that is named must be the same.
+    let named = case("end_s = 0.3\nscheme = \"runge_kutta3\"\n");
+    let error = run(&named, folder.path(), Begin::Restart, &mut Unwatched).unwrap_err().to_string();
+    assert!(error.contains("time scheme"), "{error}");
+}

@@ -1,0 +1,322 @@
+//! What a run will take, before anything of its size is allocated: cells, steps, time, memory, files.
+//!
+//! Memory is counted in arrays of one number for each cell, time in passes over the cells; the unit costs at the end of this
+//! file are those of the book's table. Steps follow from the Courant number of the initial field: flows that speed up take more.
+//!
+//! Check: memory against the arrays of a run, sizes that fit, cases too large are refused at once.
+
+use super::case::{FileFormat, FlowCase, Scheme, Subgrid};
+use super::files::Files;
+use super::setup::Setup;
+use super::wake::Schedule;
+use super::{CaseFile, CaseKind};
+use crate::plan::{bytes, seconds};
+use crate::{Error, machine};
+use std::fmt;
+use wakescope_les::{RunPlan, TimeScheme, TimeStep};
+
+/// Forecast of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlowForecast {
+    /// Name of the case by its hash.
+    pub case_hash: String,
+    /// Cells along x, y, z.
+    pub cells: [usize; 3],
+    /// Time integration.
+    pub scheme: Scheme,
+    /// Why, where it is not that of the case.
+    pub scheme_reason: Option<String>,
+    /// End of the run \[s\].
+    pub end_s: f64,
+    /// Age of the wake at the end; the time in seconds where there is none.
+    pub end_tau: f64,
+    /// Length of the first steps \[s\].
+    pub step_s: f64,
+    /// Steps to the end, or to the pause.
+    pub steps: f64,
+    /// Computing time on one core \[s\].
+    pub core_s: f64,
+    /// Memory held at once \[bytes\].
+    pub memory_bytes: f64,
+    /// Files, by kind.
+    pub files: Vec<FileForecast>,
+}
+
+/// Files of one kind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileForecast {
+    /// Name, `*` standing for the number of the output.
+    pub name: String,
+    /// How many.
+    pub count: usize,
+    /// All of them \[bytes\].
+    pub bytes: f64,
+}
+
+impl FlowForecast {
+    pub(super) fn new(file: &CaseFile, setup: &Setup, plan: &RunPlan, files: &Files, schedule: &Schedule) -> Self {
+        let case = &file.case;
+        let dense = setup.settings.pressure.dense_directions(&setup.mesh);
+        let step_s = first_step_s(setup, plan.end_s);
+        let to_end = (plan.end_s / step_s).ceil();
+        let steps = plan.pause_after_steps.map_or(to_end, |pause| to_end.min(pause as f64));
+        let cells = setup.mesh.cells();
+        let (scheme, passes) = match setup.settings.scheme {
+            TimeScheme::AdamsBashforth2 => (Scheme::AdamsBashforth2, 1.0),
+            TimeScheme::RungeKutta3 => (Scheme::RungeKutta3, 3.0),
+        };
+        let model = if case.solver.subgrid == (Subgrid::None {}) { 0.0 } else { MODEL_S };
+        let matrices: f64 = dense.iter().map(|n| *n as f64).sum();
+        let start_s: f64 = dense.iter().map(|n| (*n as f64).powi(3) * EIGEN_S).sum();
+        let pass_s = count(cells) * (CELL_S + model + matrices * MATRIX_S);
+        Self {
+            case_hash: file.hash.clone(),
+            cells,
+            scheme,
+            scheme_reason: setup.undamped.map(|growth| {
+                format!(
+                    "as viscosity is too small to damp what Adams-Bashforth feeds (cell Reynolds number {:.3e}, at most {:.3e})",
+                    growth.cell_reynolds, growth.limit
+                )
+            }),
+            end_s: plan.end_s,
+            end_tau: plan.end_s * setup.tau_per_s,
+            step_s,
+            steps,
+            core_s: start_s + (steps * passes + 2.0) * pass_s,
+            memory_bytes: memory_bytes(case, cells, &dense),
+            files: file_forecasts(case, files, schedule, cells, steps),
+        }
+    }
+
+    /// Size of all files \[bytes\].
+    pub fn file_bytes(&self) -> f64 {
+        self.files.iter().map(|kind| kind.bytes).sum()
+    }
+}
+
+impl fmt::Display for FlowForecast {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [nx, ny, nz] = self.cells;
+        writeln!(f, "case {}", self.case_hash)?;
+        writeln!(f, "  cells    {nx} x {ny} x {nz} = {}", count(self.cells))?;
+        let age =
+            if self.end_tau == self.end_s { String::new() } else { format!(", tau = {:?}", rounded(self.end_tau)) };
+        writeln!(f, "  end      t = {:?} s{age}", rounded(self.end_s))?;
+        let scheme = match self.scheme {
+            Scheme::AdamsBashforth2 => "adams_bashforth2",
+            Scheme::RungeKutta3 => "runge_kutta3",
+        };
+        let reason = self.scheme_reason.as_ref().map_or(String::new(), |reason| format!(", {reason}"));
+        writeln!(f, "  steps    about {:.0} of {:.3e} s, {scheme}{reason}", self.steps, self.step_s)?;
+        writeln!(f, "  time     about {} on one core", seconds(self.core_s))?;
+        let available = machine::available_memory_bytes().map_or(String::new(), |b| format!(" of {}", bytes(b)));
+        writeln!(f, "  memory   about {}{available}", bytes(self.memory_bytes))?;
+        writeln!(f, "  files    about {}", bytes(self.file_bytes()))?;
+        for kind in &self.files {
+            writeln!(f, "           {:<28} {:>6} {:>10}", kind.name, kind.count, bytes(kind.bytes))?;
+        }
+        Ok(())
+    }
+}
+
+/// Six digits of a number.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+fn count(cells: [usize; 3]) -> f64 {
+    cells.iter().map(|n| *n as f64).product()
+}
+
+/// Length of the first step, or of the longest if the flow starts from rest.
+fn first_step_s(setup: &Setup, end_s: f64) -> f64 {
+    let step_s = match setup.settings.time_step {
+        TimeStep::Fixed { step_s } => step_s,
+        TimeStep::Courant { courant, longest_s } => {
+            let velocity_m_s = setup.initial_velocity();
+            longest_s.min(courant / setup.mesh.courant_rate_per_s(velocity_m_s))
+        }
+    };
+    step_s.min(end_s)
+}
+
+/// Refuses a case whose fields and matrices do not fit into `available_bytes`.
+///
+/// # Errors
+/// [`Error::TooLarge`], with cells that would fit.
+pub(super) fn refuse_too_large(
+    case: &FlowCase,
+    cells: [usize; 3],
+    dense: &[usize],
+    available_bytes: Option<f64>,
+) -> Result<(), Error> {
+    let needed = memory_bytes(case, cells, dense);
+    let Some(available) = available_bytes.filter(|available| needed > *available) else { return Ok(()) };
+    let matrices = dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>();
+    let (stage, remedy) = if matrices > 0.5 * needed {
+        let longest = dense.iter().max().copied().unwrap_or_default();
+        let remedy = format!(
+            "a direction of {longest} cells that are not equal and periodic is transformed by a matrix; take fewer, or \
+             solver.pressure = \"auto\""
+        );
+        ("the pressure solver", remedy)
+    } else {
+        let [nx, ny, nz] = fitting(case, cells, dense, available);
+        ("the fields of the flow", format!("case.cells of about {nx} x {ny} x {nz} would fit"))
+    };
+    Err(Error::TooLarge { needed: bytes(needed), available: bytes(available), stage, remedy })
+}
+
+/// Cells in the same proportions that fit.
+fn fitting(case: &FlowCase, cells: [usize; 3], dense: &[usize], available_bytes: f64) -> [usize; 3] {
+    let scaled = |factor: f64| cells.map(|n| if n == 1 { 1 } else { ((n as f64 * factor) as usize).max(4) });
+    let fits = |factor: f64| {
+        let dense: Vec<usize> = dense.iter().map(|n| (*n as f64 * factor) as usize).collect();
+        memory_bytes(case, scaled(factor), &dense) <= available_bytes
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if fits(middle) { low = middle } else { high = middle }
+    }
+    // Two digits, rounded down.
+    scaled(low).map(|n| {
+        let unit = 10_usize.pow(n.max(1).ilog10().saturating_sub(1));
+        n / unit * unit
+    })
+}
+
+/// Memory that a run holds at once \[bytes\].
+fn memory_bytes(case: &FlowCase, cells: [usize; 3], dense: &[usize]) -> f64 {
+    let model = match case.solver.subgrid {
+        Subgrid::None {} => 0.0,
+        Subgrid::MultiscaleWale { .. } => 10.0,
+        Subgrid::Smagorinsky { .. } | Subgrid::Wale { .. } => 7.0,
+    };
+    let given = match &case.case {
+        CaseKind::Wake(_) | CaseKind::VortexPair(_) => 3.0,
+        CaseKind::Free(free) if free.starts_from_file() => 3.0,
+        _ => 0.0,
+    };
+    // At the start the given field and a copy of the velocity; later what the outputs gather.
+    let start = given + 3.0;
+    let outputs = case.output.fields.iter().map(|format| output_arrays(*format)).fold(0.0, f64::max);
+    let meter = if matches!(case.case, CaseKind::Wake(_)) { METER_ARRAYS } else { 0.0 };
+    let rotational = f64::from(u8::from(case.solver.rotational));
+    let arrays = FLOW_ARRAYS + rotational + model + f64::max(start, f64::max(outputs, meter));
+    8.0 * count(cells) * arrays + dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>() + PROGRAM_BYTES
+}
+
+/// The eigenvectors of a direction and its two transforms.
+fn matrix_bytes(n: usize) -> f64 {
+    3.0 * 8.0 * (n as f64).powi(2)
+}
+
+/// Arrays that an output of the whole field needs while it is written.
+fn output_arrays(format: FileFormat) -> f64 {
+    match format {
+        FileFormat::Csv => 55.0,
+        FileFormat::Netcdf | FileFormat::Vtr => 10.0,
+        FileFormat::InitialNetcdf => 9.0,
+    }
+}
+
+fn file_forecasts(
+    case: &FlowCase,
+    files: &Files,
+    schedule: &Schedule,
+    cells: [usize; 3],
+    steps: f64,
+) -> Vec<FileForecast> {
+    let all = count(cells);
+    let plane = cells[1] as f64 * cells[2] as f64;
+    let due = |of: fn(&super::wake::Due) -> bool| schedule.due.iter().filter(|due| of(due)).count();
+    let [fields, planes] = [due(|due| due.fields.is_some()), due(|due| due.planes.is_some())];
+    let mut out = Vec::new();
+    let mut add = |name: String, count: usize, bytes: f64| {
+        if count > 0 {
+            out.push(FileForecast { name, count, bytes });
+        }
+    };
+    let variables = if files.with_vorticity { 5.0 } else { 4.0 };
+    for format in &case.output.fields {
+        let (name, each) = match format {
+            FileFormat::Csv => ("fields_*.csv", all * CSV_CELL_BYTES),
+            FileFormat::Netcdf => ("fields_*.nc", all * variables * 4.0),
+            FileFormat::Vtr => ("fields_*.vtr", all * variables * 4.0),
+            FileFormat::InitialNetcdf => ("initial_*.nc", all * 24.0),
+        };
+        add(name.into(), fields, fields as f64 * each);
+    }
+    let positions = files.output.planes_x_m.len();
+    for format in case.output.planes.iter().filter(|_| positions > 0) {
+        let (end, each) = match format {
+            FileFormat::Csv => ("csv", plane * CSV_PLANE_BYTES),
+            _ => ("nc", plane * 8.0),
+        };
+        let end = if *format == FileFormat::Vtr { "vtr" } else { end };
+        add(format!("plane*_*.{end}"), planes * positions, (planes * positions) as f64 * each);
+    }
+    if case.output.steps {
+        add("steps.csv".into(), 1, steps * STEP_ROW_BYTES);
+    }
+    if case.wake.is_some() {
+        let records = due(|due| due.record);
+        let histories = if cfg!(feature = "netcdf") { 2 } else { 1 };
+        add("wake.*".into(), histories, records as f64 * (RECORD_BYTES + 40.0 * cells[0] as f64));
+    }
+    if case.checkpoint.write {
+        add("flow.checkpoint*".into(), 2, 2.0 * 7.0 * 8.0 * all);
+    }
+    out
+}
+
+/// Arrays of a flow: velocity, history, pressure; the velocity before the projection, the increment; two of the refinement.
+const FLOW_ARRAYS: f64 = 13.0;
+/// Arrays that the record of a wake needs.
+const METER_ARRAYS: f64 = 4.0;
+/// The program without a flow \[bytes\].
+const PROGRAM_BYTES: f64 = 1.5e7;
+/// Row of a field as a table, of a plane, of `steps.csv`, of a record of a wake but for its centres \[bytes\].
+const CSV_CELL_BYTES: f64 = 140.0;
+const CSV_PLANE_BYTES: f64 = 90.0;
+const STEP_ROW_BYTES: f64 = 220.0;
+const RECORD_BYTES: f64 = 2500.0;
+
+// Unit costs on one core: a cell of one stage of a step, the subgrid model, a cell of a dense direction, the eigenvectors.
+const CELL_S: f64 = 1.0e-7;
+const MODEL_S: f64 = 6.0e-8;
+const MATRIX_S: f64 = 1.5e-10;
+const EIGEN_S: f64 = 5e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn case(text: &str) -> FlowCase {
+        CaseFile::parse(text, Path::new("case.toml")).unwrap().case
+    }
+
+    #[test]
+    fn cells_that_are_said_to_fit_do_and_a_few_more_do_not() {
+        for text in [
+            "[case]\nkind = \"taylor_green\"\ncells = 4000\n",
+            "[case]\nkind = \"wake\"\ncells = [100, 20000, 9000]\n[output]\nfields = [\"csv\"]\n",
+        ] {
+            let case = case(text);
+            let cells = case.case.cells();
+            let error = refuse_too_large(&case, cells, &[], Some(8e9)).unwrap_err();
+            assert!(matches!(error, Error::TooLarge { .. }), "{error}");
+            let fits = fitting(&case, cells, &[], 8e9);
+            assert!(error.to_string().contains(&format!("{} x {} x {}", fits[0], fits[1], fits[2])), "{error}");
+            refuse_too_large(&case, fits, &[], Some(8e9)).unwrap();
+            assert!(refuse_too_large(&case, fits.map(|n| n * 5 / 4), &[], Some(8e9)).is_err());
+            refuse_too_large(&case, cells, &[], None).unwrap();
+        }
+        let direct = case("[case]\nkind = \"lid_driven_cavity\"\ncells = 30000\n[solver]\npressure = \"direct\"\n");
+        let error = refuse_too_large(&direct, [1, 30, 30_000], &[30_000], Some(8e9)).unwrap_err().to_string();
+        assert!(error.contains("30000 cells") && error.contains("pressure solver"), "{error}");
+    }
+}
