@@ -61,6 +61,36 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// A covariance is so near a singular one that its inverse means nothing in double precision.
+    #[error(
+        "{what} of order {order} is too near a singular one: its reciprocal condition is {reciprocal_condition:.1e}, \
+         at least {least:.1e} is needed: more noise against the signal, or a shorter window"
+    )]
+    IllConditioned {
+        /// Name of the matrix.
+        what: &'static str,
+        /// Its order.
+        order: usize,
+        /// Smallest over largest eigenvalue.
+        reciprocal_condition: f64,
+        /// Least ratio that is accepted.
+        least: f64,
+    },
+    /// The noise outside the detector band is too small for the covariance of a window to be inverted.
+    #[error(
+        "floor = {floor}: with so little noise outside the band the covariance of {window_samples} samples is singular \
+         in double precision (reciprocal condition {reciprocal_condition:.1e}); a floor of at least {least:e} works here"
+    )]
+    NoiseFloor {
+        /// Density of the noise outside the band over that inside.
+        floor: f64,
+        /// Samples of the window.
+        window_samples: usize,
+        /// Smallest over largest eigenvalue of the covariance.
+        reciprocal_condition: f64,
+        /// A floor just large enough, to two digits; it was tried.
+        least: f64,
+    },
     /// A fit did not come to its end.
     #[error(
         "the fit is not converged after {iterations} iterations, {sigmas_left:.2e} standard deviations are left: \

@@ -9,7 +9,7 @@
 use ndarray::Array2;
 use num_complex::Complex;
 
-use crate::bound::{Noise, information_complex, information_real};
+use crate::bound::{Noise, information_complex, information_real, turned, with_floor_named};
 use crate::error::{Error, finite, positive};
 use crate::sample::SignalKind;
 use crate::sampling::{SPEED_OF_LIGHT_M_S, Sampling};
@@ -107,14 +107,15 @@ impl GradientModel {
         finite("velocity_m_s", velocity_m_s)?;
         finite("gradient_per_s", gradient_per_s)?;
         self.sampling.validate_for(kind)?;
-        let angle = std::f64::consts::TAU * self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
+        let cycles = self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
         let slope = -4.0 * std::f64::consts::PI * self.sampling.period_s() / self.sampling.wavelength_m;
         let bandwidth = (self.sampling.band_hz.1 - self.sampling.band_hz.0) / self.sampling.sample_rate_hz;
         let density = 1.0 / (snr * bandwidth);
         let lag = |(n, m): (usize, usize)| n as f64 - m as f64;
         let [mut signal, mut by_gradient] = self.envelope(gradient_per_s);
         for part in [&mut signal, &mut by_gradient] {
-            part.indexed_iter_mut().for_each(|(place, value)| *value *= Complex::from_polar(1.0, angle * lag(place)));
+            part.indexed_iter_mut()
+                .for_each(|(place, value)| *value *= Complex::from_polar(1.0, turned(cycles, lag(place))));
         }
         let by_velocity =
             Array2::from_shape_fn(signal.dim(), |place| signal[place] * Complex::new(0.0, slope * lag(place)));
@@ -127,8 +128,22 @@ impl GradientModel {
     /// Bounds for `windows` independent windows.
     ///
     /// # Errors
-    /// As [`GradientModel::covariance`] and [`information_complex`].
+    /// As [`GradientModel::covariance`] and [`information_complex`]; [`Error::NoiseFloor`] for too small a floor of the noise.
     pub fn bound(
+        &self,
+        velocity_m_s: f64,
+        gradient_per_s: f64,
+        snr: f64,
+        kind: SignalKind,
+        windows: f64,
+    ) -> Result<GradientBound, Error> {
+        with_floor_named(self.noise, self.window_samples, |noise| {
+            let model = Self { noise, ..self.clone() };
+            model.bound_with_noise(velocity_m_s, gradient_per_s, snr, kind, windows)
+        })
+    }
+
+    fn bound_with_noise(
         &self,
         velocity_m_s: f64,
         gradient_per_s: f64,
@@ -147,7 +162,9 @@ impl GradientModel {
         } * windows;
         let [vv, vg, gg] = [information[[0, 0]], information[[0, 1]], information[[1, 1]]];
         let determinant = vv * gg - vg * vg;
-        positive("information on velocity and gradient", determinant)?;
+        positive("information on velocity", vv)?;
+        // what is left after rounding of the two products
+        positive("information on velocity and gradient apart", determinant - 8.0 * f64::EPSILON * vv * gg)?;
         Ok(GradientBound {
             velocity_m_s: (gg / determinant).sqrt(),
             gradient_per_s: (vv / determinant).sqrt(),

@@ -1,16 +1,22 @@
-//! Dense linear algebra for covariances: solve and Hermitian eigenproblem, with residual checks.
+//! Dense linear algebra for covariances: solve, condition and Hermitian eigenproblem, with residual checks.
 //!
 //! The only module that meets ndarray-linalg. Each result is checked against its matrix before it is handed out. In
 //! particular ndarray-linalg returns the eigenvectors of the conjugate for complex row-major matrices, whatever the
 //! LAPACK; here a matrix goes in column-major. Check: random, singular and ill-conditioned matrices.
 
-use ndarray::{Array1, Array2, ArrayView2, ShapeBuilder};
-use ndarray_linalg::{Eigh, Factorize, Lapack, Scalar, Solve, UPLO};
+use ndarray::{Array1, Array2, ArrayView2, OwnedRepr, ShapeBuilder};
+use ndarray_linalg::{Eigh, FactorizeInto, LUFactorized, Lapack, Scalar, Solve, UPLO};
 
 use crate::error::Error;
 
 /// Residual allowed per unit of the matrix's norm and order.
 const RESIDUAL: f64 = 1e-12;
+
+/// Why a matrix has no factors.
+pub(crate) const SINGULAR: &str = "is singular";
+
+/// Steps of the power method for a condition number.
+const POWER_STEPS: usize = 12;
 
 /// Column-major copy of a square, finite matrix that is not empty.
 fn columns<T: Scalar<Real = f64> + Lapack>(field: &'static str, a: ArrayView2<'_, T>) -> Result<Array2<T>, Error> {
@@ -31,29 +37,92 @@ fn norm<T: Scalar<Real = f64>>(a: &ArrayView2<'_, T>) -> f64 {
     a.iter().map(|value| value.square()).sum::<f64>().sqrt()
 }
 
+/// LU factors of a square matrix, and how far the matrix is from a singular one.
+pub(crate) struct Factors<'a, T: Scalar<Real = f64> + Lapack> {
+    field: &'static str,
+    matrix: ArrayView2<'a, T>,
+    lu: LUFactorized<OwnedRepr<T>>,
+}
+
+impl<'a, T: Scalar<Real = f64> + Lapack> Factors<'a, T> {
+    /// Factorises `a`.
+    ///
+    /// # Errors
+    /// [`Error::Linalg`] if it is singular or not finite, [`Error::Length`] unless it is square.
+    pub(crate) fn new(field: &'static str, a: ArrayView2<'a, T>) -> Result<Self, Error> {
+        let columns = columns(field, a)?;
+        let order = columns.nrows();
+        let lu = columns.factorize_into().map_err(|_| Error::Linalg { what: field, order, reason: SINGULAR })?;
+        Ok(Self { field, matrix: a, lu })
+    }
+
+    fn column(&self, b: &Array1<T>) -> Result<Array1<T>, Error> {
+        let (what, order) = (self.field, self.matrix.nrows());
+        self.lu.solve(b).map_err(|_| Error::Linalg { what, order, reason: "cannot be solved with" })
+    }
+
+    /// X = A^-1 B.
+    ///
+    /// # Errors
+    /// [`Error::Linalg`] if A is singular to working precision, [`Error::Length`] if the shapes differ.
+    pub(crate) fn solve(&self, b: ArrayView2<'_, T>) -> Result<Array2<T>, Error> {
+        let (a, order) = (&self.matrix, self.matrix.nrows());
+        crate::error::length("right-hand side", order, b.nrows())?;
+        let mut x = Array2::zeros(b.raw_dim());
+        for (target, column) in x.columns_mut().into_iter().zip(b.columns()) {
+            let mut target: ndarray::ArrayViewMut1<'_, T> = target;
+            target.assign(&self.column(&column.to_owned())?);
+        }
+        let residual = norm(&(a.dot(&x) - b).view());
+        let size = norm(a) * norm(&x.view()) + norm(&b);
+        if residual <= RESIDUAL * order as f64 * size {
+            return Ok(x);
+        }
+        Err(Error::Linalg { what: self.field, order, reason: "is singular to working precision" })
+    }
+
+    /// Smallest over largest eigenvalue by absolute value of a Hermitian matrix, each by steps of the power method.
+    ///
+    /// The steps approach both from the safe side: the smallest from above by a per cent or so, which is plenty.
+    pub(crate) fn reciprocal_condition(&self) -> f64 {
+        let largest = growth(self.matrix.nrows(), |x| Some(self.matrix.dot(x)));
+        let inverse = growth(self.matrix.nrows(), |x| self.column(x).ok());
+        let ratio = (largest * inverse).recip();
+        if ratio.is_finite() { ratio } else { 0.0 }
+    }
+}
+
+/// How much a matrix stretches the vector that it stretches most, nearly; infinite where it cannot be told.
+fn growth<T: Scalar<Real = f64> + Lapack>(order: usize, times: impl Fn(&Array1<T>) -> Option<Array1<T>>) -> f64 {
+    let size = |x: &Array1<T>| x.iter().map(|value| value.square()).sum::<f64>().sqrt();
+    // no eigenvector of a covariance is orthogonal to numbers without order
+    let mut x: Array1<T> = (0..order).map(|k| T::from_real((1.0 + (k * k) as f64 * 0.7).sin())).collect();
+    let mut stretch = 0.0;
+    for _ in 0..POWER_STEPS {
+        let before = size(&x);
+        let Some(y) = times(&x.mapv(|value| value.div_real(before))) else {
+            return f64::INFINITY;
+        };
+        stretch = size(&y);
+        if !(stretch.is_finite() && stretch > 0.0) {
+            return f64::INFINITY;
+        }
+        x = y;
+    }
+    stretch
+}
+
 /// X = A^-1 B for a square A.
 ///
 /// # Errors
-/// [`Error::Linalg`] if A is singular to working precision, [`Error::Length`] if the shapes differ.
+/// As [`Factors::new`] and [`Factors::solve`].
+#[cfg(test)]
 pub(crate) fn solve<T: Scalar<Real = f64> + Lapack>(
     field: &'static str,
     a: ArrayView2<'_, T>,
     b: ArrayView2<'_, T>,
 ) -> Result<Array2<T>, Error> {
-    let columns = columns(field, a)?;
-    let order = columns.nrows();
-    crate::error::length("right-hand side", order, b.nrows())?;
-    let failed = |reason| Error::Linalg { what: field, order, reason };
-    let factors = columns.factorize().map_err(|_| failed("is singular"))?;
-    let mut x = Array2::zeros(b.raw_dim());
-    for (target, column) in x.columns_mut().into_iter().zip(b.columns()) {
-        let mut target: ndarray::ArrayViewMut1<'_, T> = target;
-        let solution: Array1<T> = factors.solve(&column.to_owned()).map_err(|_| failed("cannot be solved with"))?;
-        target.assign(&solution);
-    }
-    let residual = norm(&(a.dot(&x) - b).view());
-    let size = norm(&a) * norm(&x.view()) + norm(&b);
-    if residual <= RESIDUAL * order as f64 * size { Ok(x) } else { Err(failed("is singular to working precision")) }
+    Factors::new(field, a)?.solve(b)
 }
 
 /// Eigenvalues, increasing, and eigenvectors (columns) of a Hermitian matrix; its lower triangle is read.
@@ -123,6 +192,19 @@ mod tests {
         {
             assert!(norm(&(found - &x).view()) < 1e-10);
         }
+    }
+
+    #[test]
+    fn reciprocal_condition_is_the_ratio_of_the_extreme_eigenvalues() {
+        for floor in [1.0, 1e-3, 1e-9] {
+            let a = hermitian(24) + Array2::<C64>::eye(24) * C64::from(floor);
+            let (values, _) = hermitian_eigen("test", a.view()).unwrap();
+            let ratio = Factors::new("test", a.view()).unwrap().reciprocal_condition() / (values[0] / values[23]);
+            assert!((0.98..1.5).contains(&ratio), "{floor}: {ratio}");
+        }
+        // singular to working precision: nothing but rounding is left of the smallest
+        let found = Factors::new("test", hermitian(64).view()).map_or(0.0, |factors| factors.reciprocal_condition());
+        assert!(found < 1e-14, "{found}");
     }
 
     #[test]

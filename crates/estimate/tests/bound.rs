@@ -79,6 +79,56 @@ fn band_noise_lowers_the_bound_by_one_to_eleven_percent() {
     }
 }
 
+/// The bound at 0 dB for a 200 ns pulse, 64 samples and noise with that floor outside the band.
+fn with_floor(floor: f64, kind: SignalKind) -> Result<f64, Error> {
+    let sampling = if kind == SignalKind::Real { table_2() } else { Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap() };
+    WindowModel::gaussian_pulse(&sampling, 64, sigma_s(200e-9), Noise::Band { floor })
+        .unwrap()
+        .bound_m_s(0.0, 1.0, kind, 1.0)
+}
+
+#[test]
+fn bounds_with_little_noise_outside_the_band_are_right_or_refused() {
+    // m/s, from 60 digits
+    for (floor, real_m_s, complex_m_s, tolerance) in [
+        (1e-3, 0.652_089_14, 0.645_980_71, 1e-8),
+        (1e-6, 0.619_951_18, 0.609_384_74, 1e-8),
+        (1e-10, 0.586_767_90, 0.570_439_77, 1e-6),
+        (1e-11, 0.580_261_27, 0.561_124_03, 1e-4),
+    ] {
+        for (kind, expected_m_s) in [(SignalKind::Real, real_m_s), (SignalKind::Complex, complex_m_s)] {
+            assert_relative_eq!(with_floor(floor, kind).unwrap(), expected_m_s, max_relative = tolerance);
+        }
+    }
+    for kind in [SignalKind::Real, SignalKind::Complex] {
+        for refused in [1e-12, 1e-15, 0.0] {
+            let error = with_floor(refused, kind).unwrap_err();
+            let Error::NoiseFloor { floor, window_samples: 64, least, .. } = error else {
+                panic!("{kind} {refused}: {error}");
+            };
+            assert!(floor == refused && (1e-12..1e-11).contains(&least), "{error}");
+            assert!(error.to_string().contains(&format!("floor = {refused}")), "{error}");
+            assert!(with_floor(least, kind).is_ok(), "{error}");
+            assert!(with_floor(0.5 * least, kind).is_err(), "{error}");
+        }
+    }
+}
+
+#[test]
+fn joint_bounds_are_refused_by_the_same_rule_and_so_is_noise_that_is_too_small_everywhere() {
+    let joint = |floor: f64| {
+        let noise = Noise::Band { floor };
+        GradientModel::new(&table_2(), 64, sigma_s(200e-9), noise).unwrap().bound(0.0, 0.1, 1.0, SignalKind::Real, 1.0)
+    };
+    assert!(joint(1e-10).is_ok());
+    let Err(Error::NoiseFloor { least, .. }) = joint(0.0) else { panic!("{:?}", joint(0.0)) };
+    assert!(joint(least).is_ok());
+    let white = WindowModel::gaussian_pulse(&table_2(), 64, sigma_s(200e-9), Noise::White).unwrap();
+    assert!(white.bound_m_s(0.0, 1e6, SignalKind::Complex, 1.0).is_ok());
+    let refused = white.bound_m_s(0.0, 1e16, SignalKind::Complex, 1.0);
+    assert!(matches!(refused, Err(Error::IllConditioned { order: 64, .. })), "{refused:?}");
+}
+
 #[test]
 fn point_target_bound_is_its_closed_form() {
     // R = u u^H + q I: information per (m/s)^2 = 2 gain^2 / (1 + gain) * spread * (4 pi / lambda)^2, with gain = |u|^2 / q and

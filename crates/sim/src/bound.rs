@@ -56,7 +56,7 @@ impl Setting {
         let (level, n_eff) = self.places.level(point, self.radius.at_m(range_m)?, &self.correlation);
         // Without any return there is no information.
         let window_m_s = match snr > 0.0 {
-            true => self.model.bound_m_s(0.0, snr, self.kind, 1.0)?,
+            true => join::bound_m_s(&self.model, snr, self.kind)?,
             false => f64::NAN,
         };
         let snr_db = if snr > 0.0 { 10.0 * snr.log10() } else { f64::NAN };

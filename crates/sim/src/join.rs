@@ -3,7 +3,8 @@
 mod estimators;
 
 pub use estimators::{
-    Toolkit, WindowStatistics, gates, refinement, sampling, signal_kind, weighting, window_correlation, window_model,
+    Toolkit, WindowStatistics, bound_m_s, gates, refinement, sampling, signal_kind, weighting, window_correlation,
+    window_model,
 };
 
 use crate::Error;

@@ -10,6 +10,7 @@ use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, SceneFile, Sign
 use crate::wind::SceneWind;
 use std::fmt;
 
+mod ambiguity;
 mod optics;
 
 /// What the user asked for.
@@ -121,6 +122,7 @@ impl Plan {
             return Err(Error::Input { path: "flow.planes".into(), reason });
         }
         let mut warnings = warnings(&scene.scene, &wind);
+        warnings.extend(ambiguity::warning(&scene.scene)?);
         let optics = optics::stages(&scene.scene, target, &geometry, &mut warnings)?;
         let stages = stages(&scene.scene, target, &geometry, &wind.source, optics);
         let plan = Self { scene, target, stages, geometry, wind, warnings };

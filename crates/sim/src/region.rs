@@ -56,7 +56,7 @@ fn bound_by_range(
             crate::scene::NoiseKind::None => NO_NOISE_SNR,
             _ => of_table(&layer_m, &snr, *at_m).clamp(1e-8, NO_NOISE_SNR),
         };
-        Ok(model.bound_m_s(0.0, snr, join::signal_kind(scene), 1.0)?)
+        join::bound_m_s(&model, snr, join::signal_kind(scene))
     };
     let bound_m_s = range_m.iter().map(bound).collect::<Result<_, Error>>()?;
     Ok((range_m, bound_m_s))

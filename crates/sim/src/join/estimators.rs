@@ -113,6 +113,23 @@ pub fn window_model(scene: &Scene) -> Result<Option<estimate::WindowModel>, Erro
     Ok(Some(estimate::WindowModel::with_envelope(&sampling(scene)?, envelope, noise)?))
 }
 
+/// The bound of one window at rest, m/s. Where the noise of the model is too small outside the band for double precision, at
+/// high signal-to-noise ratios and in long windows, that of the smallest floor which is not.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn bound_m_s(model: &estimate::WindowModel, snr: f64, kind: SignalKind) -> Result<f64, Error> {
+    match model.bound_m_s(0.0, snr, kind, 1.0) {
+        Err(estimate::Error::NoiseFloor { least, .. }) => {
+            let noise = estimate::Noise::Band { floor: least };
+            let envelope = model.envelope().to_owned();
+            let model = estimate::WindowModel::with_envelope(model.sampling(), envelope, noise)?;
+            Ok(model.bound_m_s(0.0, snr, kind, 1.0)?)
+        }
+        bound => Ok(bound?),
+    }
+}
+
 /// Correlation between windows of one pulse: of the speckle, and of the noise at a signal-to-noise ratio `snr`.
 ///
 /// # Errors
