@@ -1,9 +1,10 @@
 //! Accumulation over circular regions: Table 3, for any statistic and any estimator.
 //!
 //! Computes the mean of the statistics I_k of all windows within rho of a point, then the velocity of that mean.
-//! Sums along each line of sight are kept as prefix sums, so a region costs two rows per
-//! line of sight. Check: against the plain mean of the windows, its independence of the order of rays and of the
-//! number of threads, and that a window with a NaN is left out without harm to its neighbours.
+//! Along each line of sight the statistics are kept, and their sums over blocks of eight gates, so that a wide region
+//! adds few rows. Nothing is subtracted: a region knows of no window but its own. Check: against the plain mean of the
+//! windows, its independence of the order of rays and of the number of threads, and that windows with a missing sample
+//! are left out and leave every bit of the other regions.
 
 use std::f64::consts::TAU;
 
@@ -12,15 +13,16 @@ use num_complex::Complex;
 
 use crate::error::{Error, length};
 use crate::gates::Gates;
+use crate::missing::{MissingSamples, invalid_windows};
 use crate::parallel::{for_each_chunk, map_indexed};
 use crate::region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, effective};
-use crate::sample::{Sample, Scratch, SignalKind, binary_scale};
+use crate::sample::{Sample, Scratch, SignalKind};
 use crate::sampling::Sampling;
 use crate::statistic::{Estimator, Statistic};
 use crate::velocity::{GateVelocity, Quality};
 
-/// Prefix sums start afresh this often, which bounds their rounding by the loudest of so many windows.
-const BLOCK: usize = 64;
+/// Gates whose sum is kept.
+const BLOCK: usize = 8;
 
 /// Radius rho of the region of a map point \[m\].
 pub enum Radius {
@@ -58,18 +60,23 @@ pub struct MapPoint {
     pub estimate: GateVelocity,
     /// Number of valid windows in the region.
     pub level: usize,
+    /// Number of windows of the region that were left out because of a missing sample.
+    pub left_out: usize,
     /// Number of independent windows that they are worth; NaN if no correlation was given.
     pub n_eff: f64,
 }
 
 /// Statistics of all windows of a scan, ready to be averaged over any region.
 ///
-/// Memory: 8 bytes x lines of sight x gates x numbers per window
-/// (185 lines, 937 gates, 64 lags: 89 MB). Pulses of equal elevation share a line.
+/// Memory: 9 bytes x lines of sight x gates x numbers per window
+/// (185 lines, 937 gates, 64 lags: 100 MB). Pulses of equal elevation share a line.
 pub struct Scan {
     geometry: ScanGeometry,
     numbers: usize,
-    sums: Vec<f64>,
+    /// Statistics of each gate, the pulses of a line added.
+    rows: Vec<f64>,
+    /// Sums over [`BLOCK`] gates, the last of a line over what is left.
+    blocks: Vec<f64>,
     /// Valid windows before each gate, `gates + 1` per line.
     counts: Vec<u32>,
     /// Validity of the windows of a ray, only where one is not.
@@ -80,8 +87,8 @@ pub struct Scan {
 impl Scan {
     /// Statistics of all windows of `records` \[ray, sample\]; ray i has elevation `elevation_rad[i]` \[rad\].
     ///
-    /// Several pulses along one line of sight are rays of equal elevation. Windows with a sample that is
-    /// not finite are left out.
+    /// Several pulses along one line of sight are rays of equal elevation. Windows with a missing sample are left out:
+    /// one that is not finite, a fill value, or one that dwarfs all others ([`MissingSamples::default`]).
     ///
     /// # Errors
     /// [`Error::Length`] if lengths do not match; as [`ScanGeometry::new`].
@@ -92,18 +99,34 @@ impl Scan {
         elevation_rad: &[f64],
         records: ArrayView2<'_, S>,
     ) -> Result<Self, Error> {
+        Self::without_missing(statistic, sampling, gates, elevation_rad, records, &MissingSamples::default())
+    }
+
+    /// The same with a rule of one's own for missing samples.
+    ///
+    /// # Errors
+    /// As [`Scan::new`].
+    pub fn without_missing<S: Sample>(
+        statistic: &(impl Statistic<S> + ?Sized),
+        sampling: &Sampling,
+        gates: &Gates,
+        elevation_rad: &[f64],
+        records: ArrayView2<'_, S>,
+        missing: &MissingSamples,
+    ) -> Result<Self, Error> {
         let (rays, samples) = records.dim();
         length("elevation_rad", rays, elevation_rad.len())?;
         length("window", statistic.window_samples(), gates.window_samples)?;
         let geometry = ScanGeometry::new(sampling, gates, elevation_rad, samples)?;
         let count = geometry.gates();
         let numbers = statistic.statistic_len();
-        let scale = binary_scale(records.iter().copied());
+        let rule = missing.rule(records.iter().copied());
+        let scale = rule.binary_scale(records.iter().copied());
         let invalid =
-            map_indexed(rays, || (), |(), ray| invalid_windows(records.row(ray).iter().copied(), gates, count));
-        let mut sums = vec![0.0; geometry.line_rays().len() * count * numbers];
+            map_indexed(rays, || (), |(), ray| invalid_windows(records.row(ray).iter().copied(), &rule, gates, count));
+        let mut rows = vec![0.0; geometry.line_rays().len() * count * numbers];
         for_each_chunk(
-            &mut sums,
+            &mut rows,
             count * numbers,
             || (Scratch::new(), Vec::with_capacity(samples)),
             |(scratch, row), line, chunk| {
@@ -115,11 +138,22 @@ impl Scan {
                         add(&mut chunk[gate * numbers..(gate + 1) * numbers], one);
                     });
                 }
-                prefix_in_blocks(chunk, numbers);
+            },
+        );
+        let mut blocks = vec![0.0; geometry.line_rays().len() * count.div_ceil(BLOCK) * numbers];
+        for_each_chunk(
+            &mut blocks,
+            count.div_ceil(BLOCK) * numbers,
+            || (),
+            |(), line, chunk| {
+                let rows = &rows[line * count * numbers..(line + 1) * count * numbers];
+                for (sum, rows) in chunk.chunks_mut(numbers).zip(rows.chunks(BLOCK * numbers)) {
+                    rows.chunks(numbers).for_each(|row| add(sum, row));
+                }
             },
         );
         let counts = valid_before(&geometry, &invalid);
-        Ok(Self { geometry, numbers, sums, counts, invalid, scale })
+        Ok(Self { geometry, numbers, rows, blocks, counts, invalid, scale })
     }
 
     /// Where the windows are.
@@ -184,9 +218,10 @@ impl Scan {
                 let mut estimate = GateVelocity::none(Quality::Empty);
                 if level > 0 {
                     estimate = estimator.estimate(mean, scratch);
-                    estimate.power *= self.scale * self.scale;
+                    estimate.scale_power(self.scale * self.scale);
                 }
-                Ok(MapPoint { estimate, level, n_eff })
+                let left_out = self.windows(point, radius_m) - level;
+                Ok(MapPoint { estimate, level, left_out, n_eff })
             },
         )
         .into_iter()
@@ -270,9 +305,10 @@ impl Scan {
                 let mut estimate = GateVelocity::none(Quality::Empty);
                 if level > 0 {
                     estimate = estimator.estimate(mean, scratch);
-                    estimate.power *= self.scale * self.scale;
+                    estimate.scale_power(self.scale * self.scale);
                 }
-                Ok(MapPoint { estimate, level, n_eff: f64::NAN })
+                let left_out = self.windows(point, radius_m) - level;
+                Ok(MapPoint { estimate, level, left_out, n_eff: f64::NAN })
             },
         )
         .into_iter()
@@ -295,30 +331,33 @@ impl Scan {
         effective(level, pairs)
     }
 
+    /// Windows of a region, valid or not.
+    fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
+        let of = |chord: Chord| chord.gates() * self.geometry.line_rays()[chord.line].len();
+        self.geometry.chords(point, radius_m).map(of).sum()
+    }
+
     /// Valid windows of a chord.
     fn valid(&self, chord: Chord) -> usize {
         let row = chord.line * (self.geometry.gates() + 1);
         (self.counts[row + chord.last + 1] - self.counts[row + chord.first]) as usize
     }
 
-    /// Adds the sum over a chord to `out`, block by block.
+    /// Adds the sum over a chord to `out`: whole blocks, and the gates before and behind them.
     fn add_chord(&self, chord: Chord, out: &mut [f64]) {
-        let row = |gate: usize| {
-            let start = (chord.line * self.geometry.gates() + gate) * self.numbers;
-            &self.sums[start..start + self.numbers]
+        let gates = self.geometry.gates();
+        let of = |table: &'_ [f64], place: usize, out: &mut [f64]| {
+            add(out, &table[place * self.numbers..(place + 1) * self.numbers]);
         };
-        let mut first = chord.first;
-        while first <= chord.last {
-            let last = chord.last.min(first - first % BLOCK + BLOCK - 1);
-            if first.is_multiple_of(BLOCK) {
-                add(out, row(last));
+        let mut gate = chord.first;
+        while gate <= chord.last {
+            if gate.is_multiple_of(BLOCK) && gate + BLOCK <= chord.last + 1 {
+                of(&self.blocks, chord.line * gates.div_ceil(BLOCK) + gate / BLOCK, out);
+                gate += BLOCK;
             } else {
-                let pairs = row(last).iter().zip(row(first - 1));
-                for (sum, (upper, lower)) in out.iter_mut().zip(pairs) {
-                    *sum += upper - lower;
-                }
+                of(&self.rows, chord.line * gates + gate, out);
+                gate += 1;
             }
-            first = last + 1;
         }
     }
 }
@@ -327,27 +366,6 @@ fn add(sum: &mut [f64], term: &[f64]) {
     for (sum, term) in sum.iter_mut().zip(term) {
         *sum += term;
     }
-}
-
-/// Turns the rows of one line into running sums that start afresh every [`BLOCK`] gates.
-fn prefix_in_blocks(line: &mut [f64], numbers: usize) {
-    for block in line.chunks_mut(BLOCK * numbers) {
-        for index in numbers..block.len() {
-            block[index] += block[index - numbers];
-        }
-    }
-}
-
-/// Which windows of a ray hold a sample that is not finite; `None` if no one does.
-fn invalid_windows<S: Sample>(samples: impl Iterator<Item = S>, gates: &Gates, count: usize) -> Option<Vec<bool>> {
-    let bad: Vec<usize> =
-        samples.enumerate().filter(|(_, sample)| !sample.is_finite()).map(|(index, _)| index).collect();
-    let invalid = |gate: usize| {
-        let start = gate * gates.step_samples;
-        let next = bad.partition_point(|index| *index < start);
-        bad.get(next).is_some_and(|index| *index < start + gates.window_samples)
-    };
-    (!bad.is_empty()).then(|| (0..count).map(invalid).collect())
 }
 
 /// Valid windows before each gate, for all lines.
