@@ -63,10 +63,9 @@ pub struct GateVelocity {
     pub width_m_s: f64,
     /// Signal power over noise power in the detector band; the noise is the mean density away from the main peak.
     ///
-    /// 0 where the band holds no more than that, NaN where unknown. Noise alone has a highest peak too, so that weak signals read
-    /// too much: means over 7.5 independent windows at -14 dB read about -4 dB. Believe it where the peak stands out of
-    /// noise, or take `power`. The sidelobes of an unweighted window count as noise, so that above 5 dB it reads too low;
-    /// a Gaussian weighting is good to 20 dB.
+    /// 0 where the band holds no more than that, NaN where unknown. Noise alone has a highest peak too, so that weak signals
+    /// read too much: believe it where the peak stands out of noise, or take `power`. The sidelobes of an unweighted
+    /// window count as noise, so that above 5 dB it reads too low; a Gaussian weighting is good to 20 dB.
     pub snr: f64,
     /// The second peak, if there is one.
     pub runner_up: Option<RunnerUp>,
