@@ -1,9 +1,10 @@
 //! Accumulation over circular regions: Table 3, for any statistic and any estimator.
 //!
 //! Computes the mean of the statistics I_k of all windows within rho of a point, then the velocity of that mean.
-//! Sums along each line of sight are kept as prefix sums, so a region costs two rows per
-//! line of sight. Check: against the plain mean of the windows, its independence of the order of rays and of the
-//! number of threads, and that a window with a NaN is left out without harm to its neighbours.
+//! Along each line of sight the statistics are kept, and their sums over blocks of eight gates, so that a wide region
+//! adds few rows. Nothing is subtracted: a region knows of no window but its own. Check: against the plain mean of the
+//! windows, its independence of the order of rays and of the number of threads, and that windows with a missing sample
+//! are left out and leave every bit of the other regions.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -13,6 +14,7 @@ use num_complex::Complex;
 
 use crate::error::{Error, length};
 use crate::gates::Gates;
+use crate::missing::MissingSamples;
 use crate::parallel::map_indexed;
 use crate::region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, effective};
 use crate::sample::{Sample, Scratch, SignalKind};
@@ -24,8 +26,8 @@ mod streamed;
 
 pub use streamed::ScanSums;
 
-/// Prefix sums start afresh this often, which bounds their rounding by the loudest of so many windows.
-const BLOCK: usize = 64;
+/// Gates whose sum is kept.
+const BLOCK: usize = 8;
 
 /// Radius rho of the region of a map point \[m\].
 pub enum Radius {
@@ -63,18 +65,23 @@ pub struct MapPoint {
     pub estimate: GateVelocity,
     /// Number of valid windows in the region.
     pub level: usize,
+    /// Number of windows of the region that were left out because of a missing sample.
+    pub left_out: usize,
     /// Number of independent windows that they are worth; NaN if no correlation was given.
     pub n_eff: f64,
 }
 
 /// Statistics of all windows of a scan, ready to be averaged over any region.
 ///
-/// Memory: 8 bytes x lines of sight x gates x numbers per window
-/// (185 lines, 937 gates, 64 lags: 89 MB). Pulses of equal elevation share a line.
+/// Memory: 9 bytes x lines of sight x gates x numbers per window
+/// (185 lines, 937 gates, 64 lags: 100 MB). Pulses of equal elevation share a line.
 pub struct Scan {
     geometry: ScanGeometry,
     numbers: usize,
-    sums: Vec<f64>,
+    /// Statistics of each gate, the pulses of a line added.
+    rows: Vec<f64>,
+    /// Sums over [`BLOCK`] gates, the last of a line over what is left.
+    blocks: Vec<f64>,
     /// Valid windows before each gate, `gates + 1` per line.
     counts: Vec<usize>,
     /// Validity of the windows of the rays with one that is not.
@@ -85,8 +92,8 @@ pub struct Scan {
 impl Scan {
     /// Statistics of all windows of `records` \[ray, sample\]; ray i has elevation `elevation_rad[i]` \[rad\].
     ///
-    /// Several pulses along one line of sight are rays of equal elevation. Windows with a sample that is
-    /// not finite are left out.
+    /// Several pulses along one line of sight are rays of equal elevation. Windows with a missing sample are left out:
+    /// one that is not finite, a fill value, or one that dwarfs all others ([`MissingSamples::default`]).
     ///
     /// # Errors
     /// [`Error::Length`] if lengths do not match; as [`ScanGeometry::new`].
@@ -97,10 +104,26 @@ impl Scan {
         elevation_rad: &[f64],
         records: ArrayView2<'_, S>,
     ) -> Result<Self, Error> {
+        Self::without_missing(statistic, sampling, gates, elevation_rad, records, &MissingSamples::default())
+    }
+
+    /// The same with a rule of one's own for missing samples.
+    ///
+    /// # Errors
+    /// As [`Scan::new`].
+    pub fn without_missing<S: Sample>(
+        statistic: &(impl Statistic<S> + ?Sized),
+        sampling: &Sampling,
+        gates: &Gates,
+        elevation_rad: &[f64],
+        records: ArrayView2<'_, S>,
+        missing: &MissingSamples,
+    ) -> Result<Self, Error> {
         let (rays, samples) = records.dim();
         length("elevation_rad", rays, elevation_rad.len())?;
         let geometry = ScanGeometry::new(sampling, gates, elevation_rad, samples)?;
-        let mut sums = ScanSums::new(statistic, gates, geometry, samples)?;
+        let rule = missing.rule(records.iter().copied());
+        let mut sums = ScanSums::with_rule(statistic, gates, geometry, samples, rule)?;
         sums.add(0, records)?;
         Ok(sums.finish())
     }
@@ -167,9 +190,10 @@ impl Scan {
                 let mut estimate = GateVelocity::none(Quality::Empty);
                 if level > 0 {
                     estimate = estimator.estimate(mean, scratch);
-                    estimate.power *= self.scale * self.scale;
+                    estimate.scale_power(self.scale * self.scale);
                 }
-                Ok(MapPoint { estimate, level, n_eff })
+                let left_out = self.windows(point, radius_m) - level;
+                Ok(MapPoint { estimate, level, left_out, n_eff })
             },
         )
         .into_iter()
@@ -253,9 +277,10 @@ impl Scan {
                 let mut estimate = GateVelocity::none(Quality::Empty);
                 if level > 0 {
                     estimate = estimator.estimate(mean, scratch);
-                    estimate.power *= self.scale * self.scale;
+                    estimate.scale_power(self.scale * self.scale);
                 }
-                Ok(MapPoint { estimate, level, n_eff: f64::NAN })
+                let left_out = self.windows(point, radius_m) - level;
+                Ok(MapPoint { estimate, level, left_out, n_eff: f64::NAN })
             },
         )
         .into_iter()
@@ -279,30 +304,33 @@ impl Scan {
         effective(level, pairs)
     }
 
+    /// Windows of a region, valid or not.
+    fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
+        let of = |chord: Chord| chord.gates() * self.geometry.rays.count(chord.line);
+        self.geometry.chords(point, radius_m).map(of).sum()
+    }
+
     /// Valid windows of a chord.
     fn valid(&self, chord: Chord) -> usize {
         let row = chord.line * (self.geometry.gates() + 1);
         self.counts[row + chord.last + 1] - self.counts[row + chord.first]
     }
 
-    /// Adds the sum over a chord to `out`, block by block.
+    /// Adds the sum over a chord to `out`: whole blocks, and the gates before and behind them.
     fn add_chord(&self, chord: Chord, out: &mut [f64]) {
-        let row = |gate: usize| {
-            let start = (chord.line * self.geometry.gates() + gate) * self.numbers;
-            &self.sums[start..start + self.numbers]
+        let gates = self.geometry.gates();
+        let of = |table: &'_ [f64], place: usize, out: &mut [f64]| {
+            add(out, &table[place * self.numbers..(place + 1) * self.numbers]);
         };
-        let mut first = chord.first;
-        while first <= chord.last {
-            let last = chord.last.min(first - first % BLOCK + BLOCK - 1);
-            if first.is_multiple_of(BLOCK) {
-                add(out, row(last));
+        let mut gate = chord.first;
+        while gate <= chord.last {
+            if gate.is_multiple_of(BLOCK) && gate + BLOCK <= chord.last + 1 {
+                of(&self.blocks, chord.line * gates.div_ceil(BLOCK) + gate / BLOCK, out);
+                gate += BLOCK;
             } else {
-                let pairs = row(last).iter().zip(row(first - 1));
-                for (sum, (upper, lower)) in out.iter_mut().zip(pairs) {
-                    *sum += upper - lower;
-                }
+                of(&self.rows, chord.line * gates + gate, out);
+                gate += 1;
             }
-            first = last + 1;
         }
     }
 }

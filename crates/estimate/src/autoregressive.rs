@@ -13,8 +13,9 @@ use num_complex::Complex;
 
 use crate::error::Error;
 use crate::levinson::reflect;
+use crate::missing::MissingSamples;
 use crate::poles::roots;
-use crate::sample::{Sample, SignalKind, binary_scale};
+use crate::sample::{Sample, SignalKind};
 use crate::sampling::Sampling;
 
 /// How the order of a model is found, from the prediction errors of all orders up to a largest one.
@@ -177,7 +178,7 @@ impl Autoregression {
     /// [`Error::OutOfRange`] if the order is 0 or not below the number of samples, or if there is no power.
     pub fn burg<S: Sample>(window: &[S], order: usize) -> Result<Self, Error> {
         check_order(order, window.len())?;
-        let scale = binary_scale(window.iter().copied());
+        let scale = MissingSamples::not_finite().rule(window.iter().copied()).binary_scale(window.iter().copied());
         let scaled = |sample: &S| sample.scaled(scale.recip()).to_complex();
         let mut forward: Vec<Complex<f64>> = window.iter().map(scaled).collect();
         let mut backward = forward.clone();

@@ -9,7 +9,8 @@
 //! both for real ones: the side of the band); in band-limited noise both are those of the band.
 //!
 //! What is left of the mirror image shifts the peak by a known amount, a smooth function of the velocity, which is
-//! tabulated from the expected statistic and taken away. Check: the bound of [`GradientModel::bound`]; with the
+//! tabulated from the expected statistic and taken away. So is what the parabola through the likelihoods of three gradients
+//! of the list reads beside the true one. Check: the bound of [`GradientModel::bound`]; with the
 //! gradient 0 alone, that of [`WindowModel::bound_m_s`](crate::WindowModel::bound_m_s).
 
 use std::sync::Arc;
@@ -19,9 +20,11 @@ use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 use crate::bound::Noise;
+use crate::detection::NoiseTest;
 use crate::error::{Error, finite, positive};
+use crate::gates::Gates;
 use crate::gradient::GradientModel;
-use crate::linalg::hermitian_eigen;
+use crate::gradient_tapers::{Tapers, band_lag, expected_lags, tapers};
 use crate::sample::{Sample, Scratch, SignalKind};
 use crate::sampling::Sampling;
 use crate::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
@@ -31,8 +34,8 @@ use crate::zoom::ZoomSpectrum;
 
 type C64 = Complex<f64>;
 
-/// Tapers with less than this share of the largest weight are left out.
-const LEAST_WEIGHT: f64 = 1e-3;
+/// True gradients between two of the list whose readings are tabulated.
+const READINGS: u32 = 16;
 
 /// Velocity, gradient and the rest of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,14 +44,6 @@ pub struct GradientVelocity {
     pub velocity: GateVelocity,
     /// Gradient of the radial velocity along the line of sight, dv/dR \[1/s\]; NaN without a velocity.
     pub gradient_per_s: f64,
-}
-
-/// The tapers of one gradient, each conjugated and times the root of its weight.
-#[derive(Debug, Clone)]
-struct Tapers {
-    weights: Vec<Vec<C64>>,
-    /// Sum of ln(1 + P mu).
-    spread: f64,
 }
 
 /// The tapered correlograms of all gradients and the energy in the band.
@@ -67,6 +62,8 @@ pub struct GradientStatistic<S> {
 #[derive(Debug, Clone)]
 pub struct GradientPeak {
     gradient_per_s: Vec<f64>,
+    /// The one nearest to 0, whose spectrum is tested against noise.
+    slowest: usize,
     spread: Vec<f64>,
     samples_in_band: f64,
     numbers: usize,
@@ -76,6 +73,8 @@ pub struct GradientPeak {
     search: PeakSearch,
     /// For each gradient what the peak reads for increasing true velocities \[m/s\]: (read, true); empty for complex samples.
     corrections: Vec<Vec<(f64, f64)>>,
+    /// What the parabola through the likelihoods reads for increasing true gradients \[1/s\]: (read, true).
+    gradient_readings: Vec<(f64, f64)>,
 }
 
 /// Statistic and estimator of the likelihood, planned together.
@@ -90,8 +89,8 @@ pub struct GradientLikelihood<S> {
 impl<S: Sample> GradientLikelihood<S> {
     /// Plans the estimator for windows like those of `model` at signal-to-noise ratio `snr` (in the detector band).
     ///
-    /// The gradients \[1/s\] increase; between them the likelihood is interpolated, so that a spacing of twice the
-    /// bound on the gradient will do. With a single gradient only the velocity is sought. Each gradient costs some
+    /// The gradients \[1/s\] increase; between them the likelihood is interpolated, and what that reads for known gradients
+    /// is tabulated, so that 0.2 1/s apart will do for a pulse of 200 ns. With a single gradient only the velocity is sought. Each gradient costs some
     /// complex transforms of 2 N samples per window.
     ///
     /// # Errors
@@ -119,10 +118,14 @@ impl<S: Sample> GradientLikelihood<S> {
             false => (0..n).map(|m| band_lag(sampling, m, share)).collect(),
         };
         let grid_hz: Vec<f64> = (0..4 * n).map(|k| k as f64 * sampling.sample_rate_hz / (4 * n) as f64).collect();
+        let size = |&k: &usize| gradient_per_s[k].abs();
+        let slowest = (0..tapers.len()).min_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
         let mut planner = FftPlanner::new();
         let mut estimator = GradientPeak {
             corrections: Vec::new(),
+            gradient_readings: Vec::new(),
             gradient_per_s: gradient_per_s.to_vec(),
+            slowest,
             spread: tapers.iter().map(|tapers| tapers.spread).collect(),
             samples_in_band: if white { sides * n as f64 } else { share * n as f64 },
             numbers: 2 * n,
@@ -132,12 +135,9 @@ impl<S: Sample> GradientLikelihood<S> {
             search,
         };
         // Tapers of other gradients are these with a chirp, which takes out that of the wind.
-        let slowest = (0..tapers.len()).min_by(|&a, &b| gradient_per_s[a].abs().total_cmp(&gradient_per_s[b].abs()));
-        if let Some(slowest) = slowest {
-            let tone = expected_lags(&Array2::ones((n, n)), &tapers[slowest]);
-            let weights: Vec<f64> = tone.iter().step_by(2).map(|weight| weight / tone[0]).collect();
-            estimator.search.own_width = own_width_cycles(&weights) * padded_samples as f64;
-        }
+        let tone = expected_lags(&Array2::ones((n, n)), &tapers[slowest]);
+        let weights: Vec<f64> = tone.iter().step_by(2).map(|weight| weight / tone[0]).collect();
+        estimator.search.own_width = own_width_cycles(&weights) * padded_samples as f64;
         if S::KIND == SignalKind::Real {
             let read = gradient_per_s.iter().zip(&tapers).map(|(&g, tapers)| estimator.readings(model, g, snr, tapers));
             estimator.corrections = read.collect::<Result<_, _>>()?;
@@ -150,78 +150,36 @@ impl<S: Sample> GradientLikelihood<S> {
             inverse: planner.plan_fft_inverse(2 * n),
             sample: std::marker::PhantomData,
         };
+        estimator.gradient_readings = statistic.gradient_readings(&estimator, model, snr)?;
         Ok(Self { statistic, estimator })
     }
 }
 
-/// Expected lags of the tapered correlogram for windows of that covariance.
-fn expected_lags(covariance: &Array2<f64>, tapers: &Tapers) -> Vec<f64> {
-    let n = covariance.nrows();
-    let lag = |m: usize| -> C64 {
-        let of = |taper: &Vec<C64>| -> C64 {
-            (0..n - m).map(|k| taper[k + m] * taper[k].conj() * covariance[[k + m, k]]).sum()
-        };
-        tapers.weights.iter().map(of).sum()
-    };
-    (0..n).map(lag).flat_map(|value| [value.re, value.im]).collect()
-}
-
-/// Weight of lag m in the energy inside the band: the integral of exp(-j 2 pi f m / F_s) over the band, twice for m > 0.
-fn band_lag(sampling: &Sampling, m: usize, share: f64) -> C64 {
-    if m == 0 {
-        return Complex::from(share);
+impl<S: Sample> GradientLikelihood<S> {
+    /// The test of its estimates against noise: of the spectrum of the gradient nearest to 0.
+    ///
+    /// # Errors
+    /// As [`NoiseTest::new`].
+    pub fn noise_test(&self, gates: &Gates) -> Result<NoiseTest, Error> {
+        let (estimator, padded) = (&self.estimator, self.estimator.search.padded());
+        let tapers = &self.statistic.tapers[estimator.slowest].weights;
+        NoiseTest::of_complex(&estimator.sampling, gates, tapers, None, padded)
     }
-    let turn = std::f64::consts::PI * m as f64 / sampling.sample_rate_hz;
-    let (low_hz, high_hz) = sampling.band_hz;
-    let size = (turn * (high_hz - low_hz)).sin() / (std::f64::consts::PI * m as f64);
-    Complex::from_polar(2.0 * size, -turn * (high_hz + low_hz))
-}
 
-/// Tapers of one gradient, `power` the signal power over the noise density.
-fn tapers(model: &GradientModel, gradient_per_s: f64, power: f64, kind: SignalKind) -> Result<Tapers, Error> {
-    let [signal, _] = model.envelope(gradient_per_s);
-    let n = model.window_samples();
-    let whitener = match kind {
-        SignalKind::Complex => None,
-        SignalKind::Real => Some(whitener(model.sampling(), &signal, power)?),
-    };
-    let whitened = whitener.as_ref().map_or_else(|| signal.clone(), |root| root.dot(&signal).dot(root));
-    let (values, vectors) = hermitian_eigen("signal covariance", whitened.view())?;
-    let weight = |k: usize| {
-        let gain = (power * values[k]).max(0.0);
-        gain / (1.0 + gain)
-    };
-    let kept = (0..n).rev().filter(|&k| weight(k) > LEAST_WEIGHT * weight(n - 1));
-    let weights = kept.map(|k| {
-        let vector = vectors.column(k).to_owned();
-        let taper = whitener.as_ref().map_or_else(|| vector.clone(), |root| root.dot(&vector));
-        let root = weight(k).sqrt();
-        taper.iter().map(|value| value.conj() * root).collect()
-    });
-    let weights = weights.collect();
-    let spread = values.iter().map(|value| (power * value).max(0.0).ln_1p()).sum();
-    Ok(Tapers { weights, spread })
-}
-
-/// M^-1/2 for white noise of density 1 and the mirror image of the signal, spread over the places that the band allows.
-fn whitener(sampling: &Sampling, signal: &Array2<C64>, power: f64) -> Result<Array2<C64>, Error> {
-    let (low_hz, high_hz) = sampling.band_hz;
-    let turn = std::f64::consts::TAU / sampling.sample_rate_hz;
-    let interference = Array2::from_shape_fn(signal.dim(), |(n, m)| {
-        let lag = n as f64 - m as f64;
-        // the image of a line at f lies at -f, and after the carrier is removed at -2 f
-        let spread = turn * (high_hz - low_hz) * lag;
-        let sinc = if lag == 0.0 { 1.0 } else { spread.sin() / spread };
-        let image = signal[[n, m]].conj() * Complex::from_polar(power * sinc, -turn * (low_hz + high_hz) * lag);
-        image + if n == m { 1.0 } else { 0.0 }
-    });
-    let (values, vectors) = hermitian_eigen("noise covariance", interference.view())?;
-    let mut scaled = vectors.clone();
-    for (mut column, value) in scaled.columns_mut().into_iter().zip(&values) {
-        // at least the noise, whatever the rounding
-        column.mapv_inplace(|element| element * value.max(0.5).sqrt().recip());
+    /// The mean statistic of noise of that `power` in the detector band: the `power` that the estimator finds in it is that
+    /// of the noise.
+    ///
+    /// # Errors
+    /// As [`Noise::expected_correlogram`].
+    pub fn noise_statistic(&self, noise: Noise, power: f64) -> Result<Vec<f64>, Error> {
+        let n = self.statistic.window_samples;
+        let lags = noise.expected_correlogram(&self.estimator.sampling, S::KIND, power, &vec![1.0; n])?;
+        let covariance = Array2::from_shape_fn((n, n), |(i, j)| {
+            let lag = S::KIND.lag(&lags, i.abs_diff(j));
+            if i >= j { lag } else { lag.conj() }
+        });
+        Ok(self.statistic.expected(&covariance))
     }
-    Ok(scaled.dot(&vectors.t().mapv(|value| value.conj())))
 }
 
 impl<S: Sample> Statistic<S> for GradientStatistic<S> {
@@ -263,6 +221,43 @@ impl<S: Sample> Statistic<S> for GradientStatistic<S> {
 }
 
 impl<S: Sample> GradientStatistic<S> {
+    /// The mean statistic of windows of that covariance.
+    fn expected(&self, covariance: &Array2<C64>) -> Vec<f64> {
+        let n = self.window_samples;
+        let mut numbers: Vec<f64> = self.tapers.iter().flat_map(|tapers| expected_lags(covariance, tapers)).collect();
+        let lag = |m: usize| (0..n - m).map(|k| covariance[[k + m, k]]).sum::<C64>();
+        numbers.push(self.band_lags.iter().enumerate().map(|(m, weight)| (lag(m) * weight).re).sum());
+        numbers
+    }
+
+    /// What the estimator reads for true gradients between the first and the last, in the middle of the band.
+    fn gradient_readings(
+        &self,
+        estimator: &GradientPeak,
+        model: &GradientModel,
+        snr: f64,
+    ) -> Result<Vec<(f64, f64)>, Error> {
+        let middle_hz = 0.5 * (estimator.sampling.band_hz.0 + estimator.sampling.band_hz.1);
+        let velocity_m_s = estimator.sampling.velocity_m_s(middle_hz);
+        let mut readings = Vec::<(f64, f64)>::new();
+        for pair in estimator.gradient_per_s.windows(2) {
+            for part in 0..=READINGS {
+                let gradient_per_s = pair[0] + (pair[1] - pair[0]) * f64::from(part) / f64::from(READINGS);
+                let [mut covariance, ..] = model.covariance(velocity_m_s, gradient_per_s, snr, S::KIND)?;
+                if S::KIND == SignalKind::Real {
+                    covariance.mapv_inplace(|value| C64::from(value.re));
+                }
+                let found = estimator.velocity_and_gradient(&self.expected(&covariance), &mut Scratch::new());
+                // the ends of the list read themselves however far off the wind: only increasing readings can be inverted
+                if found.gradient_per_s.is_finite() && readings.last().is_none_or(|last| last.0 < found.gradient_per_s)
+                {
+                    readings.push((found.gradient_per_s, gradient_per_s));
+                }
+            }
+        }
+        Ok(readings)
+    }
+
     /// Energy of the window inside the band.
     fn energy(&self, window: &[S], scratch: &mut Scratch) -> f64 {
         let padded = 2 * self.window_samples;
@@ -296,7 +291,7 @@ impl GradientPeak {
         for k in 0..=steps as usize {
             let velocity_m_s = low_m_s + (high_m_s - low_m_s) * k as f64 / steps;
             let [covariance, ..] = model.covariance(velocity_m_s, gradient_per_s, snr, SignalKind::Real)?;
-            let lags = expected_lags(&covariance.mapv(|value| value.re), tapers);
+            let lags = expected_lags(&covariance.mapv(|value| C64::from(value.re)), tapers);
             self.zoom.density_into(&lags, &mut density)?;
             let found = self.search.locate(&density, Refinement::Parabola, |_, _| None);
             let read_m_s = self.sampling.velocity_m_s(self.search.band.frequency_hz(found.bin));
@@ -310,15 +305,7 @@ impl GradientPeak {
 
     /// The true velocity that reads `velocity_m_s` with gradient number `k`.
     fn corrected(&self, k: usize, velocity_m_s: f64) -> f64 {
-        let Some(readings) = self.corrections.get(k) else {
-            return velocity_m_s;
-        };
-        let above = readings.partition_point(|(read, _)| *read < velocity_m_s);
-        match (readings.get(above.wrapping_sub(1)), readings.get(above)) {
-            (Some(low), Some(high)) => low.1 + (high.1 - low.1) * (velocity_m_s - low.0) / (high.0 - low.0),
-            (Some(edge), None) | (None, Some(edge)) => velocity_m_s + edge.1 - edge.0,
-            (None, None) => velocity_m_s,
-        }
+        self.corrections.get(k).map_or(velocity_m_s, |readings| truth(readings, velocity_m_s))
     }
 
     /// Velocity and gradient for the mean statistic `mean`.
@@ -332,6 +319,7 @@ impl GradientPeak {
         }
         let energy = mean[mean.len() - 1];
         let mut best: Option<(usize, f64, GateVelocity)> = None;
+        let mut at_rest = (f64::NAN, f64::NAN);
         let mut found = Vec::with_capacity(self.spread.len());
         for (k, (lags, spread)) in mean.chunks_exact(self.numbers).zip(&self.spread).enumerate() {
             if self.zoom.density_into(lags, &mut scratch.band).is_err() {
@@ -345,6 +333,9 @@ impl GradientPeak {
                 Some((highest(&scratch.density).1, 0.5))
             });
             let estimate = self.search.velocity(&located, self.search.band.frequency_hz(located.bin));
+            if k == self.slowest {
+                at_rest = (estimate.power, estimate.detection);
+            }
             // a window of a noise-free line leaves no energy: the logarithm stays finite
             let rest = (energy - located.peak).max(1e-12 * energy).max(f64::MIN_POSITIVE);
             let likelihood = -self.samples_in_band * rest.ln() - spread;
@@ -356,8 +347,10 @@ impl GradientPeak {
         let Some((k, _, estimate)) = best else {
             return none(Quality::Invalid);
         };
-        let (gradient_per_s, velocity_m_s) = self.between(&found, k);
-        GradientVelocity { velocity: GateVelocity { velocity_m_s, ..estimate }, gradient_per_s }
+        let (read_per_s, velocity_m_s) = self.between(&found, k);
+        let gradient_per_s = truth(&self.gradient_readings, read_per_s);
+        let (power, detection) = at_rest;
+        GradientVelocity { velocity: GateVelocity { velocity_m_s, power, detection, ..estimate }, gradient_per_s }
     }
 
     /// Gradient and velocity at the top of the parabola through three gradients.
@@ -381,6 +374,16 @@ impl GradientPeak {
         let resolution_m_s = 0.5 * self.sampling.wavelength_m * self.sampling.sample_rate_hz / self.numbers as f64;
         let moved_m_s = if moved_m_s.abs() < resolution_m_s { moved_m_s } else { 0.0 };
         (at + step, found[k].1 + moved_m_s)
+    }
+}
+
+/// The true value of which `value` is read, linear between the (read, true) of a table; beyond its ends as at the ends.
+fn truth(readings: &[(f64, f64)], value: f64) -> f64 {
+    let above = readings.partition_point(|(read, _)| *read < value);
+    match (readings.get(above.wrapping_sub(1)), readings.get(above)) {
+        (Some(low), Some(high)) => low.1 + (high.1 - low.1) * (value - low.0) / (high.0 - low.0),
+        (Some(edge), None) | (None, Some(edge)) => value + edge.1 - edge.0,
+        (None, None) => value,
     }
 }
 

@@ -28,17 +28,18 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `sampling`, `gates`, `sample` | frequencies and velocities, windows and ranges, real and complex samples |
+//! | `sampling`, `gates`, `sample`, `missing` | frequencies and velocities, windows and ranges, real and complex samples, which of them are missing |
 //! | `weighting`, `transform`, `periodogram` | window weights, their transform, (29) and (30) |
 //! | `correlogram`, `sliding`, `unbiased` | biased correlogram of all lags; of the first lags, slid along a record; the unbiased form |
 //! | `spectrum`, `zoom` | the density that belongs to a correlogram, on a whole grid and at chosen frequencies |
 //! | `velocity`, `statistic` | velocity with width, SNR, runner-up and flags; the traits for estimators of one's own |
-//! | `search`, `peak`, `detection` | the peak in the detector band and what it tells; how high that of pure noise stands |
+//! | `search`, `peak` | the peak in the detector band and what it tells |
+//! | `detection`, `special` | how high the peak of pure noise stands, for any tapers and lag windows |
 //! | `region`, `accumulate`, `auto_radius` | circular regions, accumulation level and n_eff; Table 3, also following the wind; rho(R) for a target variance |
 //! | `autoregressive`, `levinson`, `poles` | (31), (32): models, the choice of their order, their poles |
 //! | `model_peaks`, `correlogram_estimators` | estimators of the accumulated correlogram: CA, pole, Capon; lag window, pulse pair |
 //! | `likelihood` | tapers that make the accumulated periodogram the likelihood of a known pulse |
-//! | `gradient`, `gradient_likelihood` | a linear wind in the window; likelihood of velocity and gradient, for real windows too |
+//! | `gradient`, `gradient_likelihood`, `gradient_tapers` | a linear wind in the window; likelihood of velocity and gradient, for real windows too |
 //! | `first_moment` | the mean of a skewed spectrum, which (28) asks for |
 //! | `bound`, `linalg` | Cramer-Rao bound; solve and eigenvectors with residual checks |
 //! | `shrinkage` | a map drawn towards a guess of the wind as far as it does not contradict it |
@@ -69,11 +70,13 @@ mod first_moment;
 mod gates;
 mod gradient;
 mod gradient_likelihood;
+mod gradient_tapers;
 #[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
 mod lapack;
 mod levinson;
 mod likelihood;
 mod linalg;
+mod missing;
 mod model_peaks;
 #[cfg(feature = "openblas-system")]
 mod openblas;
@@ -88,6 +91,7 @@ mod sampling;
 mod search;
 mod shrinkage;
 mod sliding;
+mod special;
 mod spectrum;
 mod statistic;
 mod transform;
@@ -102,7 +106,7 @@ pub use autoregressive::{Autoregression, OrderChoice};
 pub use bound::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s, information_complex, information_real};
 pub use correlogram::{Correlogram, Taper, correlogram_by_sum};
 pub use correlogram_estimators::{LagWindowPeak, PulsePair};
-pub use detection::noise_quality;
+pub use detection::NoiseTest;
 pub use error::Error;
 pub use error_map::{ErrorMap, ErrorStatistics};
 pub use first_moment::FirstMoment;
@@ -110,7 +114,8 @@ pub use gates::Gates;
 pub use gradient::{GradientBound, GradientModel};
 pub use gradient_likelihood::{GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity};
 pub use likelihood::likelihood_tapers;
-pub use model_peaks::{AutoregressivePeak, AutoregressivePole, CaponPeak};
+pub use missing::MissingSamples;
+pub use model_peaks::{AutoregressivePeak, AutoregressivePole, CaponPeak, model_lag_weights};
 pub use peak::SpectralPeak;
 pub use periodogram::{Periodogram, PeriodogramOptions, PeriodogramPlan};
 pub use region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, polar_points};

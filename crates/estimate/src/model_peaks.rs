@@ -37,6 +37,15 @@ struct ModelPeak {
     padded: usize,
     search: PeakSearch,
     refinement: Refinement,
+    /// Weights of the lags for the test against noise.
+    lag_weights: Vec<f64>,
+}
+
+/// Hann weights of the lags 0 .. `order` of a model: those of the spectrum whose peak its test against noise takes.
+#[must_use]
+pub fn model_lag_weights(order: usize) -> Vec<f64> {
+    let turn = std::f64::consts::PI / (order + 1) as f64;
+    (0..=order).map(|m| 0.5 + 0.5 * (turn * m as f64).cos()).collect()
 }
 
 impl ModelPeak {
@@ -69,6 +78,7 @@ impl ModelPeak {
             padded,
             search,
             refinement,
+            lag_weights: model_lag_weights(order),
         })
     }
 
@@ -80,10 +90,20 @@ impl ModelPeak {
         let mut numbers = std::mem::take(&mut scratch.numbers);
         let mut band = std::mem::take(&mut scratch.band);
         let solved = model.solve(mean, self.kind, self.order, &mut numbers).and_then(|()| self.choose(&mut model));
-        let estimate = match solved {
+        let mut estimate = match solved {
             Ok(()) => self.read(&model, mean, &mut numbers, &mut band, &mut scratch.density),
             Err(_) => GateVelocity::none(Quality::Invalid),
         };
+        // the density of a model is not linear in the correlogram: power and detection are those of its lags
+        numbers.clear();
+        numbers.extend(
+            mean.chunks(self.kind.lag_numbers(1))
+                .zip(&self.lag_weights)
+                .flat_map(|(lag, w)| lag.iter().map(move |r| r * w)),
+        );
+        if self.zoom.density_into(&numbers, &mut band).is_ok() {
+            (estimate.power, estimate.detection) = self.search.power_and_detection(&band);
+        }
         scratch.model = model;
         scratch.numbers = numbers;
         scratch.band = band;

@@ -1,7 +1,6 @@
 //! Real and complex samples behind one trait, and the work space that the caller owns.
 //!
-//! Check: scaling is exact because scales are powers of two, so amplitudes of 1e-200 and 1e200 keep
-//! their velocity to the last bit.
+//! Check: in the tests of the statistics, for both kinds of samples.
 
 use crate::autoregressive::Autoregression;
 use num_complex::Complex;
@@ -62,12 +61,11 @@ pub trait Sample: Copy + Send + Sync + sealed::Sealed + 'static {
     fn largest_part(self) -> f64;
     /// Whether all parts are finite.
     fn is_finite(self) -> bool;
-    /// Adds the products of a sample that enters a window with itself and those before it, and takes away those of
-    /// one that leaves it.
-    ///
-    /// `entering` ends with the new sample, `leaving` begins with the old one; both are as long as `sums` has lags.
+    /// Whether one of the parts is `value`.
+    fn has_part(self, value: f64) -> bool;
+    /// Products `ahead[k]` conj `behind[k]`, real and imaginary parts apart; those of real samples have no imaginary part.
     #[doc(hidden)]
-    fn slide(sums: &mut [f64], entering: &[Self], leaving: &[Self]);
+    fn products(ahead: &[Self], behind: &[Self], parts: &mut [Vec<f64>; 2]);
 }
 
 impl Sample for f64 {
@@ -84,13 +82,12 @@ impl Sample for f64 {
     fn is_finite(self) -> bool {
         f64::is_finite(self)
     }
-    fn slide(sums: &mut [f64], entering: &[Self], leaving: &[Self]) {
-        let (Some(&new), Some(&old)) = (entering.last(), leaving.first()) else {
-            return;
-        };
-        for ((sum, before), after) in sums.iter_mut().zip(entering.iter().rev()).zip(leaving) {
-            *sum += new * before - old * after;
-        }
+    fn has_part(self, value: f64) -> bool {
+        self == value
+    }
+    fn products(ahead: &[Self], behind: &[Self], parts: &mut [Vec<f64>; 2]) {
+        parts[0].clear();
+        parts[0].extend(ahead.iter().zip(behind).map(|(a, b)| a * b));
     }
 }
 
@@ -108,32 +105,16 @@ impl Sample for Complex<f64> {
     fn is_finite(self) -> bool {
         Complex::is_finite(self)
     }
-    fn slide(sums: &mut [f64], entering: &[Self], leaving: &[Self]) {
-        let (Some(&new), Some(&old)) = (entering.last(), leaving.first()) else {
-            return;
-        };
-        let (sums, _) = sums.as_chunks_mut::<2>();
-        for ((sum, before), after) in sums.iter_mut().zip(entering.iter().rev()).zip(leaving) {
-            let change = new * before.conj() - after * old.conj();
-            sum[0] += change.re;
-            sum[1] += change.im;
-        }
+    fn has_part(self, value: f64) -> bool {
+        self.re == value || self.im == value
     }
-}
-
-/// Power of two next to the largest finite part of the samples; 1 if there is none above 0.
-///
-/// Dividing by it is exact and brings the samples to order one, so that squares neither overflow nor vanish.
-pub(crate) fn binary_scale<S: Sample>(samples: impl Iterator<Item = S>) -> f64 {
-    largest_binary_scale(samples).unwrap_or(1.0)
-}
-
-/// The same; `None` if there is no sample above 0.
-pub(crate) fn largest_binary_scale<S: Sample>(samples: impl Iterator<Item = S>) -> Option<f64> {
-    let largest =
-        samples.filter(|sample| sample.is_finite()).fold(0.0_f64, |largest, sample| largest.max(sample.largest_part()));
-    // clamped so that the scale and its inverse are both normal numbers
-    (largest > 0.0).then(|| largest.log2().floor().clamp(-1000.0, 1000.0).exp2())
+    fn products(ahead: &[Self], behind: &[Self], parts: &mut [Vec<f64>; 2]) {
+        let [re, im] = parts;
+        re.clear();
+        re.extend(ahead.iter().zip(behind).map(|(a, b)| a.re * b.re + a.im * b.im));
+        im.clear();
+        im.extend(ahead.iter().zip(behind).map(|(a, b)| a.im * b.re - a.re * b.im));
+    }
 }
 
 /// Work space owned by the caller; buffers grow on first use and are then reused without allocation.
@@ -169,18 +150,5 @@ impl Scratch {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn scale_is_a_power_of_two_next_to_the_largest_sample() {
-        assert_eq!(binary_scale([0.3, -5.0, f64::NAN].into_iter()), 4.0);
-        assert_eq!(binary_scale([Complex::new(0.0, 0.25)].into_iter()), 0.25);
-        assert_eq!(binary_scale([0.0].into_iter()), 1.0);
-        assert!(binary_scale([1e-320].into_iter()).recip().is_finite());
     }
 }

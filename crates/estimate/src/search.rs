@@ -58,7 +58,7 @@ pub(crate) struct Located {
     /// Fractional bin of the peak in the band.
     pub(crate) bin: f64,
     pub(crate) peak: f64,
-    sum: f64,
+    pub(crate) sum: f64,
     lobe: Lobe,
     pub(crate) flag: Quality,
 }
@@ -81,6 +81,11 @@ impl PeakSearch {
         // half the maximum of the spectrum of n equal weights is 0.443 / n from its centre
         let own_width = 0.886 / FULL_WIDTH * constant * padded as f64;
         Ok(Self { sampling: *sampling, band, kind, padded, constant, own_width })
+    }
+
+    /// Frequencies of the grid over 0 .. F_s.
+    pub(crate) fn padded(&self) -> usize {
+        self.padded
     }
 
     /// Highest density in the band, by bin or by parabola through its logarithm.
@@ -120,6 +125,7 @@ impl PeakSearch {
             velocity_m_s: self.sampling.velocity_m_s(frequency_hz),
             power: sides * found.sum / self.padded as f64,
             quality: found.peak * bins / found.sum,
+            detection: found.peak,
             width_m_s: width * bin_m_s,
             snr: (found.sum / (bins * lobe.floor.max(0.0)) - 1.0).max(0.0),
             runner_up: lobe.second.map(|(bin, density)| RunnerUp {
@@ -128,6 +134,14 @@ impl PeakSearch {
             }),
             flag: found.flag,
         }
+    }
+
+    /// Power and highest density in the band; `density` as for [`PeakSearch::locate`].
+    pub(crate) fn power_and_detection(&self, density: &[f64]) -> (f64, f64) {
+        let inside = &density[1..=self.band.bins];
+        let sum = lanes_sum(inside);
+        let sides = if self.kind == SignalKind::Real { 2.0 } else { 1.0 };
+        (sides * sum / self.padded as f64, highest(inside).1)
     }
 
     /// Flag of a search whose highest density in the band is `peak`, in bin `top`.

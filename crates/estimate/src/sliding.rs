@@ -1,19 +1,16 @@
 //! The first lags of the biased correlogram of unweighted windows, slid along a record.
 //!
-//! Computes r_m = (1/N) sum over n of s(n+m) conj(s(n)) for m = 0 .. L-1, what CA of order L - 1 needs. From one
-//! window to the next a sample enters and one leaves: 2 L products instead of N L. Check: against the sum written
-//! out, also after a missing sample and after a burst.
-//!
-//! Rounding cannot build up: the sums start afresh every 256 windows, and after windows that were left out.
+//! Computes r_m = (1/N) sum over n of s(n+m) conj(s(n)) for m = 0 .. L-1, what CA of order L - 1 needs. The products of
+//! a lag are summed in blocks as long as a window has products, from each place to the end of its block and from the
+//! start to each place; every window is the sum of two of these (van Herk 1992). Three operations a product instead
+//! of N, and nothing is ever subtracted: a window knows of no sample but its own, so that neither rounding nor a burst
+//! nor a missing sample reaches another one. Check: against the sum written out, beside bursts and fill values.
 
 use std::marker::PhantomData;
 
 use crate::error::Error;
 use crate::sample::{Sample, Scratch, SignalKind};
 use crate::statistic::Statistic;
-
-/// Windows after which the sums are formed anew.
-const AFRESH: usize = 256;
 
 /// The first `lags` lags of the biased correlogram of unweighted windows.
 #[derive(Debug, Clone)]
@@ -72,6 +69,24 @@ impl<S: Sample> ShortCorrelogram<S> {
             }
         }
     }
+
+    /// The same of all windows of a record, `step` samples apart, each after the other.
+    fn sums_of_all(&self, record: &[S], step: usize, out: &mut [f64]) {
+        let numbers = S::KIND.lag_numbers(self.lags);
+        let per_lag = S::KIND.lag_numbers(1);
+        let mut parts = [Vec::new(), Vec::new()];
+        let mut running = Running::default();
+        for m in 0..self.lags {
+            let length = self.window_samples - m;
+            S::products(&record[m..], record, &mut parts);
+            for (part, products) in parts.iter().take(per_lag).enumerate() {
+                running.form(products, length);
+                for (gate, sums) in out.chunks_mut(numbers).enumerate() {
+                    sums[per_lag * m + part] = running.of(gate * step, length);
+                }
+            }
+        }
+    }
 }
 
 impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
@@ -97,36 +112,60 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
         _: &mut Scratch,
         each: &mut dyn FnMut(usize, &[f64]),
     ) {
-        let (n, lags) = (self.window_samples, self.lags);
+        let n = self.window_samples;
         if record.len() < n {
             return;
         }
-        let share = 1.0 / n as f64;
-        let (mut sums, mut mean) = (vec![0.0; self.statistic_len()], vec![0.0; self.statistic_len()]);
-        // windows since the sums were formed; none yet
-        let mut age = None;
-        for gate in 0..=(record.len() - n) / step_samples {
-            let start = gate * step_samples;
-            if !valid(gate) {
-                age = None;
-                continue;
-            }
-            match age {
-                Some(windows) if windows < AFRESH && 2 * step_samples <= n => {
-                    for first in start - step_samples..start {
-                        let end = first + n + 1;
-                        // a sample pairs with those of its own window only: the new one with the window's last lags
-                        S::slide(&mut sums, &record[end - lags..end], &record[first..first + lags]);
-                    }
-                    age = Some(windows + 1);
-                }
-                _ => {
-                    self.sums(&record[start..start + n], &mut sums);
-                    age = Some(1);
-                }
-            }
-            mean.iter_mut().zip(&sums).for_each(|(mean, sum)| *mean = sum * share);
-            each(gate, &mean);
+        let gates = (record.len() - n) / step_samples + 1;
+        let numbers = self.statistic_len();
+        // far apart, windows are cheaper one by one
+        let mut means = vec![0.0; gates * numbers];
+        if 3 * step_samples <= n {
+            self.sums_of_all(record, step_samples, &mut means);
+        } else {
+            let windows = record.windows(n).step_by(step_samples);
+            windows.zip(means.chunks_mut(numbers)).for_each(|(window, sums)| self.sums(window, sums));
         }
+        let share = 1.0 / n as f64;
+        for (gate, mean) in means.chunks_mut(numbers).enumerate().filter(|(gate, _)| valid(*gate)) {
+            mean.iter_mut().for_each(|value| *value *= share);
+            each(gate, mean);
+        }
+    }
+}
+
+/// Running sums of the products of one lag.
+#[derive(Default)]
+struct Running {
+    /// From the start of the block to each place.
+    to: Vec<f64>,
+    /// From each place to the end of the block.
+    from: Vec<f64>,
+}
+
+impl Running {
+    /// Forms the sums in blocks of `length` products.
+    fn form(&mut self, products: &[f64], length: usize) {
+        self.to.clear();
+        self.from.clear();
+        self.from.resize(products.len(), 0.0);
+        for (block, from) in products.chunks(length).zip(self.from.chunks_mut(length)) {
+            let mut sum = 0.0;
+            self.to.extend(block.iter().map(|product| {
+                sum += product;
+                sum
+            }));
+            let mut sum = 0.0;
+            for (from, product) in from.iter_mut().zip(block).rev() {
+                sum += product;
+                *from = sum;
+            }
+        }
+    }
+
+    /// Sum of the `length` products from `start` on.
+    fn of(&self, start: usize, length: usize) -> f64 {
+        let end = self.to[start + length - 1];
+        if start.is_multiple_of(length) { end } else { self.from[start] + end }
     }
 }

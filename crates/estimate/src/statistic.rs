@@ -5,7 +5,8 @@
 //! Check: the mean over a region equals the mean of the statistics of its windows.
 
 use crate::error::{Error, length};
-use crate::sample::{Sample, Scratch, binary_scale};
+use crate::missing::MissingSamples;
+use crate::sample::{Sample, Scratch};
 use crate::velocity::{GateVelocity, Quality};
 
 /// Numbers drawn from one window, to be averaged over windows: I_k of Table 3.
@@ -22,7 +23,7 @@ pub trait Statistic<S: Sample>: Sync {
 
     /// Hands the numbers of all valid windows of a record, `step_samples` apart, to `each` with the index of the window.
     ///
-    /// `valid` says which windows are to be used: those with finite samples. The form given here calls
+    /// `valid` says which windows are to be used: those without a missing sample, which may be anything. The form given here calls
     /// [`Statistic::evaluate`] for every window; a statistic that can go on from the window before replaces it.
     fn evaluate_record(
         &self,
@@ -48,12 +49,13 @@ pub trait Estimator: Sync {
     fn statistic_len(&self) -> usize;
     /// The velocity for the mean statistic `mean`.
     ///
-    /// The samples behind `mean` were scaled by a power of two, so nothing but `power` may depend on
-    /// their scale; the caller scales `power` back.
+    /// The samples behind `mean` were scaled by a power of two, so nothing but `power` and `detection` may depend on
+    /// their scale; the caller scales these back.
     fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity;
 }
 
-/// Velocity of a single window, without accumulation.
+/// Velocity of a single window, without accumulation; [`Quality::Invalid`] if it holds a missing sample
+/// ([`MissingSamples::default`]).
 ///
 /// # Errors
 /// [`Error::Length`] if the window has the wrong length or statistic and estimator do not match.
@@ -65,14 +67,16 @@ pub fn estimate_window<S: Sample>(
 ) -> Result<GateVelocity, Error> {
     length("window", statistic.window_samples(), window.len())?;
     length("statistic", estimator.statistic_len(), statistic.statistic_len())?;
-    if !window.iter().all(|sample| sample.is_finite()) {
+    let missing = MissingSamples::default();
+    let rule = missing.rule(window.iter().copied());
+    if !window.iter().all(|sample| rule.is_measured(*sample)) {
         return Ok(GateVelocity::none(Quality::Invalid));
     }
-    let scale = binary_scale(window.iter().copied());
+    let scale = rule.binary_scale(window.iter().copied());
     let scaled: Vec<S> = window.iter().map(|sample| sample.scaled(scale.recip())).collect();
     let mut numbers = vec![0.0; statistic.statistic_len()];
     statistic.evaluate(&scaled, scratch, &mut numbers);
     let mut estimate = estimator.estimate(&numbers, scratch);
-    estimate.power *= scale * scale;
+    estimate.scale_power(scale * scale);
     Ok(estimate)
 }

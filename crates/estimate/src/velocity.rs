@@ -45,19 +45,27 @@ pub struct GateVelocity {
     pub velocity_m_s: f64,
     /// Mean power inside the detector band, signal and noise, in signal units squared.
     ///
+    /// Linear in the statistic, so that its mean over windows is unbiased: over the power that the expected statistic of
+    /// noise gives, less one, it is the signal-to-noise ratio at any level.
     /// Not in a unit of its own: it overflows to infinity or vanishes where the square of the samples does.
     pub power: f64,
     /// Density of the peak over the mean density in the band; 1 for a flat spectrum.
-    ///
-    /// [`noise_quality`](crate::noise_quality) tells what noise alone reaches.
     pub quality: f64,
+    /// Highest density in the band of a spectrum that is linear in the statistic, in signal units squared, for the test
+    /// against noise; NaN where unknown.
+    ///
+    /// It is the peak itself, but for models, which take that of their lags under a Hann window
+    /// ([`model_lag_weights`](crate::model_lag_weights)), and for the likelihood with gradient, which takes that of the
+    /// gradient nearest to 0. [`NoiseTest`](crate::NoiseTest) tells what noise alone reaches.
+    pub detection: f64,
     /// Standard deviation of the velocities that the main peak stands for \[m/s\]: its width at half height above the
     /// floor as that of a Gaussian, less the resolution of the window; 0 where that is all, NaN where unknown.
     pub width_m_s: f64,
     /// Signal power over noise power in the detector band; the noise is the mean density away from the main peak.
     ///
-    /// 0 where the band holds no more than that, NaN where unknown. The sidelobes of an unweighted window count as
-    /// noise, so that above 5 dB it reads too low; a Gaussian weighting is good to 20 dB.
+    /// 0 where the band holds no more than that, NaN where unknown. Noise alone has a highest peak too, so that weak signals
+    /// read too much: believe it where the peak stands out of noise, or take `power`. The sidelobes of an unweighted
+    /// window count as noise, so that above 5 dB it reads too low; a Gaussian weighting is good to 20 dB.
     pub snr: f64,
     /// The second peak, if there is one.
     pub runner_up: Option<RunnerUp>,
@@ -73,11 +81,18 @@ impl GateVelocity {
             velocity_m_s: f64::NAN,
             power: 0.0,
             quality: f64::NAN,
+            detection: f64::NAN,
             width_m_s: f64::NAN,
             snr: f64::NAN,
             runner_up: None,
             flag,
         }
+    }
+
+    /// Multiplies what has the unit of a power.
+    pub(crate) fn scale_power(&mut self, factor: f64) {
+        self.power *= factor;
+        self.detection *= factor;
     }
 
     /// Whether the flag is [`Quality::Good`].
@@ -86,12 +101,13 @@ impl GateVelocity {
         self.flag == Quality::Good
     }
 
-    /// Whether the peak stands out of noise: the flag is good and the quality above `threshold`.
+    /// Whether the peak stands out of noise: the flag is good and the detection above `threshold`.
     ///
-    /// [`noise_quality`](crate::noise_quality) gives the threshold for a rate of false alarms.
+    /// That is [`NoiseTest::threshold`](crate::NoiseTest::threshold) times the density of the noise: the detection in the
+    /// mean statistic of noise.
     #[must_use]
     pub fn exceeds(&self, threshold: f64) -> bool {
-        self.is_good() && self.quality > threshold
+        self.is_good() && self.detection > threshold
     }
 }
 

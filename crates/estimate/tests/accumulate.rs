@@ -188,6 +188,85 @@ fn uniform_wind_maps_to_itself_whatever_the_radius_and_a_missing_sample() {
     }
 }
 
+/// Maps of regions of 7 m and of single windows, with the all-lag and the sliding correlogram.
+fn maps<S: Sample>(records: &Array2<S>) -> Vec<MapPoint> {
+    let elevation_rad = elevations_rad();
+    let sampling = match S::KIND {
+        SignalKind::Real => sampling(),
+        SignalKind::Complex => Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap(),
+    };
+    let whole = PeriodogramPlan::<S>::new(&sampling, 64, &PeriodogramOptions::default()).unwrap();
+    let short = ShortCorrelogram::<S>::new(64, 17).unwrap();
+    let model = AutoregressivePeak::new(&sampling, S::KIND, 17, 16, 512, Refinement::Parabola).unwrap();
+    let scans: [(Scan, &dyn Estimator); 2] = [
+        (Scan::new(&whole.statistic, &sampling, &gates(), &elevation_rad, records.view()).unwrap(), &whole.estimator),
+        (Scan::new(&short, &sampling, &gates(), &elevation_rad, records.view()).unwrap(), &model),
+    ];
+    let map = |radius_m: f64| {
+        let radius = Radius::Fixed { radius_m };
+        scans.iter().flat_map(|(scan, estimator)| scan.map(&points(), &radius, None, *estimator).unwrap()).collect()
+    };
+    let (mut all, wide): (Vec<MapPoint>, Vec<MapPoint>) = (map(0.7), map(7.0));
+    all.extend(wide);
+    all
+}
+
+/// Regions without a bad sample have the bits of the clean record, those with nothing else have no velocity.
+fn assert_only_their_own_windows(clean: &[MapPoint], holed: &[MapPoint], what: &str) {
+    let (mut touched, mut empty) = (0, 0);
+    for (clean, holed) in clean.iter().zip(holed) {
+        assert_eq!(holed.level + holed.left_out, clean.level, "{what}");
+        if holed.left_out == 0 {
+            let bits = |point: &MapPoint| {
+                let e = &point.estimate;
+                [e.velocity_m_s, e.quality, e.snr, e.width_m_s, e.power].map(f64::to_bits)
+            };
+            assert_eq!(bits(clean), bits(holed), "{what}");
+            assert_eq!(clean.estimate.flag, holed.estimate.flag, "{what}");
+        } else {
+            touched += 1;
+            if holed.level == 0 {
+                empty += 1;
+                assert!(holed.estimate.flag == Quality::Empty && holed.estimate.velocity_m_s.is_nan(), "{what}");
+            }
+        }
+    }
+    assert!(touched > empty && empty > 0 && touched < clean.len(), "{what}: {touched} {empty} {}", clean.len());
+}
+
+#[test]
+fn fill_values_and_huge_samples_are_left_out_counted_and_leave_every_bit_of_the_other_windows() {
+    // currents of a microampere, at a small scale that squares must not lose beside 1e308
+    let real = uniform_wind().mapv(|sample| 1e-6 * sample);
+    let complex = real.mapv(|sample| Complex::new(sample, 0.3 * sample));
+    let (clean, clean_complex) = (maps(&real), maps(&complex));
+    let sections = [s![1..2, 170..171], s![1..3, 150..260]];
+    for value in [1e308, -9999.0, 9.97e36, 9.969_209_968_386_869e36, f64::NAN, f64::INFINITY] {
+        for (kind, section) in ["single", "block"].iter().zip(sections) {
+            let mut holed = real.clone();
+            holed.slice_mut(section).fill(value);
+            assert_only_their_own_windows(&clean, &maps(&holed), &format!("{value:e}, {kind}"));
+            let mut holed = complex.clone();
+            holed.slice_mut(section).mapv_inplace(|sample| Complex::new(sample.re, value));
+            assert_only_their_own_windows(&clean_complex, &maps(&holed), &format!("complex {value:e}, {kind}"));
+        }
+    }
+}
+
+#[test]
+fn raw_counts_keep_minus_9999_if_the_rule_says_so() {
+    let mut counts = noise_records(5).mapv(|sample| (3000.0 * sample).round());
+    counts[[1, 170]] = -9999.0;
+    let of = |missing: &MissingSamples| {
+        Scan::without_missing(&plan().statistic, &sampling(), &gates(), &elevations_rad(), counts.view(), missing)
+            .unwrap()
+    };
+    let map = |scan: &Scan| scan.map(&points(), &Radius::Fixed { radius_m: 2.0 }, None, &plan().estimator).unwrap();
+    let left_out = |scan: &Scan| map(scan).iter().map(|point| point.left_out).sum::<usize>();
+    assert!(left_out(&of(&MissingSamples::default())) > 0);
+    assert_eq!(left_out(&of(&MissingSamples::not_finite())), 0);
+}
+
 #[test]
 fn regions_without_windows_are_empty_and_say_so() {
     let scan = scan(&uniform_wind(), &elevations_rad());

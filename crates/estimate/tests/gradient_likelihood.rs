@@ -139,6 +139,35 @@ fn velocity_and_gradient_together_reach_their_bound() {
     }
 }
 
+/// Mean error of the gradient and its standard error at 10 dB, with the list of a scene: seven from -0.6 to 0.6 1/s.
+fn gradient_bias<S: Draw>(
+    model: &GradientModel,
+    gradient_per_s: f64,
+    draw: impl Fn(f64, &mut Xoshiro256PlusPlus) -> Vec<S>,
+) -> (f64, f64) {
+    let gradients: Vec<f64> = (-3..=3).map(|k| 0.2 * f64::from(k)).collect();
+    let plan = GradientLikelihood::<S>::new(model, 10.0, &gradients, 1024).unwrap();
+    let errors: Vec<f64> = errors(&plan, gradient_per_s, 40, 40, draw).iter().map(|error| error.1).collect();
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    (mean, rms(errors.iter().map(|error| error - mean)) / (errors.len() as f64).sqrt())
+}
+
+#[test]
+fn gradients_between_those_of_the_list_come_out_without_a_bias() {
+    for gradient_per_s in [0.05, 0.1, -0.15, 0.3] {
+        let complex_wind = Wind::new(&baseband(), gradient_per_s, 10.0, Noise::White);
+        let real_wind = Wind::new(&table_2(), gradient_per_s, 10.0, Noise::White);
+        let found = [
+            gradient_bias(&model(&baseband(), Noise::White), gradient_per_s, |v, rng| complex_wind.complex(v, rng)),
+            gradient_bias(&model(&table_2(), Noise::White), gradient_per_s, |v, rng| real_wind.real(v, rng)),
+        ];
+        for (bias_per_s, error_per_s) in found {
+            assert!(bias_per_s.abs() < 0.002 + 3.0 * error_per_s, "{gradient_per_s}: {bias_per_s} {error_per_s}");
+            assert!(error_per_s < 2e-3, "{gradient_per_s}: {error_per_s}");
+        }
+    }
+}
+
 #[test]
 fn periodogram_is_several_times_the_bound_in_a_gradient() {
     let wind = Wind::new(&baseband(), 0.2, 10.0, Noise::White);

@@ -1,4 +1,4 @@
-//! The sliding correlogram against the sum written out: drift, missing samples, bursts, steps, complex samples.
+//! The sliding correlogram against the sum written out: missing samples, bursts, steps, complex samples.
 
 #![allow(clippy::unwrap_used)]
 
@@ -52,18 +52,44 @@ fn a_missing_sample_spoils_its_windows_only() {
     assert!(error < 1e-12 && seen.len() == 737 - 64, "{error}");
 }
 
-#[test]
-fn rounding_of_a_burst_is_gone_after_256_windows() {
-    let mut record = noise(2000, 3);
-    record[100..140].iter_mut().for_each(|x| *x *= 1e4);
-    // windows 0..255 start together, those from 256 on are formed anew and have not seen the burst
-    let statistic = ShortCorrelogram::<f64>::new(64, 17).unwrap();
-    statistic.evaluate_record(&record, 1, &|_| true, &mut Scratch::new(), &mut |gate, found| {
-        let direct = correlogram_by_sum(&record[gate..gate + 64], &[1.0; 64]);
-        let error = (found[0] - direct[0]).abs() / direct[0];
-        let allowed = if (37..256).contains(&gate) { 1e-6 } else { 1e-12 };
-        assert!(error < allowed, "{gate}: {error}");
+/// All windows of a record without the samples of `bad`, each with its number and its bits.
+fn windows_without<S: Sample>(record: &[S], step: usize, bad: &[usize]) -> Vec<(usize, Vec<u64>)> {
+    let statistic = ShortCorrelogram::<S>::new(64, 17).unwrap();
+    let (mut seen, valid) = (vec![], |gate: usize| !bad.iter().any(|b| (gate * step..gate * step + 64).contains(b)));
+    statistic.evaluate_record(record, step, &valid, &mut Scratch::new(), &mut |gate, found| {
+        seen.push((gate, found.iter().map(|value| value.to_bits()).collect()));
     });
+    seen
+}
+
+#[test]
+fn samples_of_any_size_leave_every_bit_of_the_windows_without_them() {
+    let clean = noise(900, 3);
+    let complex: Vec<_> = clean.chunks(2).map(|pair| Complex::new(pair[0], pair[1])).collect();
+    for value in [1e308, -9999.0, 9.97e36, f64::NAN, f64::INFINITY, 1e4] {
+        for bad in [vec![200], (200..240).collect(), vec![0, 63, 130, 131, 449]] {
+            for step in [1, 7, 40] {
+                let mut record = clean.clone();
+                bad.iter().for_each(|&k| record[k] = value);
+                assert_eq!(windows_without(&record, step, &bad), windows_without(&clean, step, &bad), "{value} {step}");
+                let mut record = complex.clone();
+                bad.iter().for_each(|&k| record[k].im = value);
+                assert_eq!(
+                    windows_without(&record, step, &bad),
+                    windows_without(&complex, step, &bad),
+                    "{value} {step}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_burst_costs_its_neighbours_no_digit() {
+    let mut record = noise(2000, 3);
+    record[100..140].iter_mut().for_each(|x| *x *= 1e10);
+    let (error, seen) = worst(&record, 1, &|_| true);
+    assert!(error < 1e-14 && seen.len() == 2000 - 63, "{error}");
 }
 
 #[test]

@@ -8,8 +8,8 @@ use crate::scan::{Scanner, radial_velocity_m_s};
 use crate::{Error, join};
 use ndarray::{Array2, ArrayView1};
 use wakescope_estimate::{
-    ErrorMap, Gates, MapPoint, PolarPoint, Radius, Sample, Sampling, Scan, ScanGeometry, WindowCorrelation,
-    noise_quality, polar_points,
+    ErrorMap, GateVelocity, Gates, MapPoint, NoiseTest, PolarPoint, Radius, Sample, Sampling, Scan, ScanGeometry,
+    WindowCorrelation, polar_points,
 };
 use wakescope_signal::{Clipped, RangeFilter};
 
@@ -42,13 +42,14 @@ pub struct VelocityEstimates {
     pub level: Array2<f64>,
     /// Independent windows that they are worth.
     pub n_eff: Array2<f64>,
-    /// Fraction of the realisations whose estimate was flagged.
+    /// Fraction of the realisations whose estimate was flagged: a flag of its own, or a peak that does not stand out of noise.
     pub flagged: Array2<f64>,
     /// Realisations with a velocity, flagged ones included.
     pub count: Array2<f64>,
     /// Mean spectral width beyond that of the window, m/s; NaN where the estimator gives none.
     pub width_m_s: Array2<f64>,
-    /// Signal-to-noise ratio in the detector band that the spectra show, of the mean power ratio, dB; NaN where there is none.
+    /// Signal-to-noise ratio in the detector band, dB: the mean power of the spectra in the band over that which the noise
+    /// alone has there, less 1. Unbiased at any ratio; NaN where it is below twice its standard deviation, and without noise.
     pub snr_db: Array2<f64>,
     /// Mean density of the peak over the mean density in the band; 1 for a flat spectrum.
     pub quality: Array2<f64>,
@@ -60,7 +61,7 @@ pub struct VelocityEstimates {
 struct Figures {
     flagged: Array2<f64>,
     count: Array2<f64>,
-    /// Sum and number of the finite values: width, power ratio, quality.
+    /// Sum and number of the finite values: width, power in the band, quality.
     sums: [Array2<(f64, f64)>; 3],
 }
 
@@ -74,7 +75,8 @@ impl Figures {
         let e = &point.estimate;
         self.flagged[place] += f64::from(u8::from(is_flagged));
         self.count[place] += f64::from(u8::from(e.velocity_m_s.is_finite()));
-        for (sums, value) in self.sums.iter_mut().zip([e.width_m_s, e.snr, e.quality]) {
+        let power_a2 = if e.velocity_m_s.is_finite() { e.power } else { f64::NAN };
+        for (sums, value) in self.sums.iter_mut().zip([e.width_m_s, power_a2, e.quality]) {
             if value.is_finite() {
                 sums[place].0 += value;
                 sums[place].1 += 1.0;
@@ -97,8 +99,10 @@ pub(crate) struct Mapper<S> {
     tools: Toolkit<S>,
     correlation: WindowCorrelation,
     radius: Radius,
-    /// Probability that noise passes for a signal, and independent frequencies of the band.
-    detection: Option<(f64, f64)>,
+    /// Density in the band, A^2, that noise exceeds with the probability of the scene, for each point; none without a test.
+    threshold: Option<Vec<f64>>,
+    /// Standard deviation of the power ratio of noise, for each point.
+    deviation: Vec<f64>,
     truth: Truth,
     first_m_s: Array2<f64>,
     errors: ErrorMap<ndarray::Ix2>,
@@ -108,6 +112,52 @@ pub(crate) struct Mapper<S> {
     clipped: Clipped,
     samples: f64,
     realisations: usize,
+}
+
+/// What noise alone gives at each point of a map.
+struct NoiseLevels<'a> {
+    test: &'a NoiseTest,
+    /// Density of the noise, A^2.
+    density_a2: f64,
+    /// Independent windows of noise at each point.
+    n_eff: Vec<f64>,
+}
+
+impl<'a> NoiseLevels<'a> {
+    fn new(
+        test: &'a NoiseTest,
+        noise: &GateVelocity,
+        places: &ScanGeometry,
+        points: &[PolarPoint],
+        radius: &Radius,
+    ) -> Result<Self, Error> {
+        let of = |point: &PolarPoint| Ok(places.level(*point, radius.at_m(point.range_m)?, test.correlation()).1);
+        Ok(Self { test, density_a2: noise.detection, n_eff: points.iter().map(of).collect::<Result<_, Error>>()? })
+    }
+
+    /// Densities, A^2, that noise exceeds with probability `rate`; NaN where there is no window.
+    fn thresholds(&self, rate: f64) -> Result<Vec<f64>, Error> {
+        // Many points share their number of windows; a thousandth of it changes nothing.
+        let mut known = std::collections::HashMap::new();
+        let mut of = |n_eff: f64| -> Result<f64, Error> {
+            let step = (1e3 * n_eff.ln()).round();
+            if n_eff.is_nan() || n_eff <= 0.0 {
+                return Ok(f64::NAN);
+            }
+            match known.entry(step as i64) {
+                std::collections::hash_map::Entry::Occupied(level) => Ok(*level.get()),
+                std::collections::hash_map::Entry::Vacant(place) => {
+                    Ok(*place.insert(self.density_a2 * self.test.threshold((1e-3 * step).exp(), rate)?))
+                }
+            }
+        };
+        self.n_eff.iter().map(|n_eff| of(*n_eff)).collect()
+    }
+
+    /// Standard deviations of the power in the band over its mean.
+    fn deviations(&self) -> Vec<f64> {
+        self.n_eff.iter().map(|n_eff| self.test.band_deviation(*n_eff)).collect()
+    }
 }
 
 struct Truth {
@@ -133,17 +183,25 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
         };
         let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
         let known = WindowStatistics { snr: scanner.mean_snr(), n_eff };
-        let cells = scene.detector.bandwidth_hz * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
+        let points = polar_points(&g.elevation_rad, &g.gate_range_m);
+        let tools = Toolkit::new(scene, &known)?;
+        let noise = match (&tools.test, &tools.noise) {
+            (Some(test), Some(noise)) => Some(NoiseLevels::new(test, noise, &places, &points, &radius)?),
+            _ => None,
+        };
+        let rate = scene.estimator.false_alarm;
+        let threshold = noise.as_ref().filter(|_| rate > 0.0).map(|levels| levels.thresholds(rate)).transpose()?;
         Ok(Self {
             sampling,
             gates,
-            points: polar_points(&g.elevation_rad, &g.gate_range_m),
+            deviation: noise.map_or_else(|| vec![0.0; points.len()], |levels| levels.deviations()),
+            points,
             shape,
             elevation_of_ray_rad,
-            tools: Toolkit::new(scene, &known)?,
+            tools,
             correlation,
             radius,
-            detection: scene.estimator.false_alarm.map(|rate| (rate, cells)),
+            threshold,
             truth: truth(plan, scanner)?,
             first_m_s: Array2::from_elem(shape, f64::NAN),
             errors: ErrorMap::new(ndarray::Dim(shape)),
@@ -158,7 +216,7 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
 
     /// Estimates the velocities of one realisation.
     fn map(&self, records: &Array2<S>) -> Result<Vec<MapPoint>, Error> {
-        let Toolkit { statistic, estimator, following } = &self.tools;
+        let Toolkit { statistic, estimator, following, .. } = &self.tools;
         let scan = Scan::new(&**statistic, &self.sampling, &self.gates, &self.elevation_of_ray_rad, records.view())?;
         let first = scan.map(&self.points, &self.radius, Some(&self.correlation), &**estimator)?;
         let Some(following) = following else { return Ok(first) };
@@ -183,12 +241,9 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
         }
         for (index, point) in map.iter().enumerate() {
             let place = (index / columns, index % columns);
-            let is_flagged = match self.detection {
-                Some((rate, cells)) if point.estimate.is_good() => {
-                    let threshold = noise_quality(point.n_eff.max(1e-3), cells, rate)?;
-                    !point.estimate.exceeds(threshold)
-                }
-                _ => !point.estimate.is_good(),
+            let is_flagged = match &self.threshold {
+                Some(threshold) => !point.estimate.exceeds(threshold[index]),
+                None => !point.estimate.is_good(),
             };
             self.figures.add(place, point, is_flagged);
             // The level is the same for all realisations: a matter of geometry.
@@ -203,7 +258,12 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
     pub(crate) fn finish(self, plan: &Plan) -> VelocityEstimates {
         let statistics = self.errors.statistics();
         let bias_m_s = statistics.mapv(|s| s.bias_m_s);
-        let [width_m_s, snr, quality] = self.figures.means();
+        let [width_m_s, power_a2, quality] = self.figures.means();
+        let mut snr_db = power_a2 / self.tools.noise.map_or(f64::NAN, |noise| noise.power) - 1.0;
+        for ((place, snr), deviation) in snr_db.indexed_iter_mut().zip(&self.deviation) {
+            let seen = *snr > 2.0 * deviation / self.figures.count[place].sqrt();
+            *snr = if seen { 10.0 * snr.log10() } else { f64::NAN };
+        }
         VelocityEstimates {
             elevation_rad: plan.geometry.elevation_rad.clone(),
             range_m: plan.geometry.gate_range_m.clone(),
@@ -221,7 +281,7 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
             flagged: self.figures.flagged / self.realisations.max(1) as f64,
             count: self.figures.count,
             width_m_s,
-            snr_db: snr.mapv(|snr| if snr > 0.0 { 10.0 * snr.log10() } else { f64::NAN }),
+            snr_db,
             quality,
             clipped_fraction: self.clipped.total() as f64 / self.samples.max(1.0),
         }

@@ -12,9 +12,10 @@ use ndarray::ArrayView2;
 use super::{BLOCK, Scan, add};
 use crate::error::{Error, length};
 use crate::gates::Gates;
+use crate::missing::{Rule, invalid_windows};
 use crate::parallel::{for_each_chunk, map_indexed};
 use crate::region::ScanGeometry;
-use crate::sample::{Sample, Scratch, largest_binary_scale};
+use crate::sample::{Sample, Scratch};
 use crate::statistic::Statistic;
 
 /// Statistics of the windows of a scan, as far as its records have come.
@@ -26,7 +27,9 @@ pub struct ScanSums<'s, S, T: ?Sized> {
     geometry: ScanGeometry,
     record_samples: usize,
     numbers: usize,
-    sums: Vec<f64>,
+    /// Statistics of each gate, the pulses of a line added.
+    rows: Vec<f64>,
+    rule: Rule<'s>,
     invalid: BTreeMap<usize, Vec<bool>>,
     /// Power of two by which the samples were divided; none before the first that is not 0.
     scale: Option<f64>,
@@ -34,22 +37,45 @@ pub struct ScanSums<'s, S, T: ?Sized> {
 }
 
 impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
-    /// No record yet; the rays of `geometry` will have records of `record_samples` samples.
+    /// No record yet; the rays of `geometry` will have records of `record_samples` samples. Missing are samples that are not
+    /// finite; to find those that dwarf all others takes all records, as [`Scan::new`] has them.
     ///
     /// # Errors
     /// [`Error::Length`] if statistic and gates have windows of different lengths; as [`Gates::count`].
     pub fn new(statistic: &'s T, gates: &Gates, geometry: ScanGeometry, record_samples: usize) -> Result<Self, Error> {
+        Self::with_rule(statistic, gates, geometry, record_samples, Rule::NOT_FINITE)
+    }
+
+    /// The same with a rule for missing samples.
+    pub(super) fn with_rule(
+        statistic: &'s T,
+        gates: &Gates,
+        geometry: ScanGeometry,
+        record_samples: usize,
+        rule: Rule<'s>,
+    ) -> Result<Self, Error> {
         length("window", statistic.window_samples(), gates.window_samples)?;
         length("windows of a record", geometry.gates(), gates.count(record_samples)?)?;
         let numbers = statistic.statistic_len();
-        let sums = vec![0.0; geometry.line_elevation_rad().len() * geometry.gates() * numbers];
+        let rows = vec![0.0; geometry.line_elevation_rad().len() * geometry.gates() * numbers];
         let (invalid, sample) = (BTreeMap::new(), PhantomData);
-        Ok(Self { statistic, gates: *gates, geometry, record_samples, numbers, sums, invalid, scale: None, sample })
+        Ok(Self {
+            statistic,
+            gates: *gates,
+            geometry,
+            record_samples,
+            numbers,
+            rows,
+            rule,
+            invalid,
+            scale: None,
+            sample,
+        })
     }
 
     /// Adds the `records` \[ray, sample\] of the rays `first_ray`, `first_ray + 1`, ...
     ///
-    /// The rays of a line must come in their order. Windows with a sample that is not finite are left out.
+    /// The rays of a line must come in their order. Windows with a missing sample are left out.
     ///
     /// # Errors
     /// [`Error::Length`] for records of another length.
@@ -57,14 +83,15 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         let (rays, samples) = records.dim();
         length("samples of a record", self.record_samples, samples)?;
         let scale = self.rescale(records);
-        let (gates, count) = (&self.gates, self.geometry.gates());
-        let found = map_indexed(rays, || (), |(), ray| invalid_windows(records.row(ray).iter().copied(), gates, count));
+        let (gates, rule, count) = (&self.gates, &self.rule, self.geometry.gates());
+        let found =
+            map_indexed(rays, || (), |(), ray| invalid_windows(records.row(ray).iter().copied(), rule, gates, count));
         let found = found.into_iter().enumerate().filter_map(|(ray, invalid)| Some((first_ray + ray, invalid?)));
         self.invalid.extend(found);
         let (statistic, invalid, lines, numbers) = (self.statistic, &self.invalid, &self.geometry.rays, self.numbers);
         let piece = first_ray..first_ray + rays;
         for_each_chunk(
-            &mut self.sums,
+            &mut self.rows,
             count * numbers,
             || (Scratch::new(), Vec::with_capacity(samples)),
             |(scratch, row), line, chunk| {
@@ -84,11 +111,11 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
 
     /// The scale for these records and those before; the sums are brought to it.
     fn rescale(&mut self, records: ArrayView2<'_, S>) -> f64 {
-        let here = largest_binary_scale(records.iter().copied());
+        let here = self.rule.largest_binary_scale(records.iter().copied());
         let scale = match (self.scale, here) {
             (Some(before), Some(here)) if here > before => {
                 let share = (before / here).powi(2);
-                self.sums.iter_mut().for_each(|sum| *sum *= share);
+                self.rows.iter_mut().for_each(|sum| *sum *= share);
                 here
             }
             (Some(before), _) => before,
@@ -102,33 +129,23 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     /// The scan of the records that have come, ready to be averaged over any region.
     #[must_use]
     pub fn finish(self) -> Scan {
-        let Self { geometry, numbers, mut sums, invalid, scale, .. } = self;
-        let row = geometry.gates() * numbers;
-        for_each_chunk(&mut sums, row, || (), |(), _, line| prefix_in_blocks(line, numbers));
+        let Self { geometry, numbers, rows, invalid, scale, .. } = self;
+        let (line_numbers, line_blocks) = (geometry.gates() * numbers, geometry.gates().div_ceil(BLOCK) * numbers);
+        let mut blocks = vec![0.0; geometry.line_elevation_rad().len() * line_blocks];
+        for_each_chunk(
+            &mut blocks,
+            line_blocks,
+            || (),
+            |(), line, chunk| {
+                let rows = &rows[line * line_numbers..(line + 1) * line_numbers];
+                for (sum, rows) in chunk.chunks_mut(numbers).zip(rows.chunks(BLOCK * numbers)) {
+                    rows.chunks(numbers).for_each(|row| add(sum, row));
+                }
+            },
+        );
         let counts = valid_before(&geometry, &invalid);
-        Scan { geometry, numbers, sums, counts, invalid, scale: scale.unwrap_or(1.0) }
+        Scan { geometry, numbers, rows, blocks, counts, invalid, scale: scale.unwrap_or(1.0) }
     }
-}
-
-/// Turns the rows of one line into running sums that start afresh every [`BLOCK`] gates.
-fn prefix_in_blocks(line: &mut [f64], numbers: usize) {
-    for block in line.chunks_mut(BLOCK * numbers) {
-        for index in numbers..block.len() {
-            block[index] += block[index - numbers];
-        }
-    }
-}
-
-/// Which windows of a ray hold a sample that is not finite; `None` if no one does.
-fn invalid_windows<S: Sample>(samples: impl Iterator<Item = S>, gates: &Gates, count: usize) -> Option<Vec<bool>> {
-    let bad: Vec<usize> =
-        samples.enumerate().filter(|(_, sample)| !sample.is_finite()).map(|(index, _)| index).collect();
-    let invalid = |gate: usize| {
-        let start = gate * gates.step_samples;
-        let next = bad.partition_point(|index| *index < start);
-        bad.get(next).is_some_and(|index| *index < start + gates.window_samples)
-    };
-    (!bad.is_empty()).then(|| (0..count).map(invalid).collect())
 }
 
 /// Valid windows before each gate, for all lines.

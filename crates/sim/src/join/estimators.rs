@@ -169,6 +169,10 @@ pub struct Toolkit<S> {
     pub estimator: Box<dyn Estimator>,
     /// The same for the complex mean of lines that were shifted, if the scene follows the wind.
     pub following: Option<Box<dyn Estimator>>,
+    /// The test against noise, if the scene has noise and the method one.
+    pub test: Option<estimate::NoiseTest>,
+    /// What the estimator finds in the mean statistic of the scene's noise: its power and its density, A^2.
+    pub noise: Option<estimate::GateVelocity>,
 }
 
 impl<S: Sample> Toolkit<S> {
@@ -186,21 +190,23 @@ impl<S: Sample> Toolkit<S> {
                 let mut white = scene.clone();
                 white.detector.noise = NoiseKind::White;
                 let model = window_model(&white)?.ok_or(estimate::Error::Empty { field: "noise" })?;
-                let statistic = estimate::Correlogram::<S>::with_tapers(estimate::likelihood_tapers(&model, snr)?)?;
+                let tapers = estimate::likelihood_tapers(&model, snr)?;
+                let statistic = estimate::Correlogram::<S>::with_tapers(tapers.clone())?;
                 let weights = statistic.lag_weights();
-                Self::planned(scene, Box::new(statistic), &weights, known)
+                Self::planned(scene, Box::new(statistic), &weights, &tapers, known)
             }
             Method::Autoregressive | Method::AutoregressivePole | Method::Capon
                 if e.weighting == Weighting::Rectangular =>
             {
                 let statistic = estimate::ShortCorrelogram::<S>::new(e.window_samples, e.order + 1)?;
                 let weights = statistic.lag_weights();
-                Self::planned(scene, Box::new(statistic), &weights, known)
+                let taper = estimate::Taper::unit(vec![1.0; e.window_samples])?;
+                Self::planned(scene, Box::new(statistic), &weights, &[taper], known)
             }
             _ => {
                 let statistic = estimate::Correlogram::<S>::new(weighting(scene), e.window_samples)?;
-                let weights = statistic.lag_weights();
-                Self::planned(scene, Box::new(statistic), &weights, known)
+                let (weights, tapers) = (statistic.lag_weights(), statistic.tapers().to_vec());
+                Self::planned(scene, Box::new(statistic), &weights, &tapers, known)
             }
         }
     }
@@ -209,6 +215,7 @@ impl<S: Sample> Toolkit<S> {
         scene: &Scene,
         statistic: Box<dyn Statistic<S>>,
         lag_weights: &[f64],
+        tapers: &[estimate::Taper],
         known: &WindowStatistics,
     ) -> Result<Self, Error> {
         let estimator = of_correlogram(scene, S::KIND, lag_weights, known)?;
@@ -216,8 +223,60 @@ impl<S: Sample> Toolkit<S> {
             true => Some(of_correlogram(scene, SignalKind::Complex, lag_weights, known)?),
             false => None,
         };
-        Ok(Self { statistic, estimator, following })
+        let noise = match noise(scene) {
+            None => None,
+            Some((noise, power_a2)) => {
+                let mean = noise.expected_correlogram(&sampling(scene)?, S::KIND, power_a2, lag_weights)?;
+                Some(scaled_estimate(&*estimator, mean))
+            }
+        };
+        let test = noise_test(scene, tapers, lag_weights)?;
+        Ok(Self { statistic, estimator, following, test, noise })
     }
+}
+
+/// Spectrum and power in the band, A^2, of a scene's noise.
+fn noise(scene: &Scene) -> Option<(estimate::Noise, f64)> {
+    let noise = match scene.detector.noise {
+        NoiseKind::White => estimate::Noise::White,
+        NoiseKind::Band => estimate::Noise::Band { floor: 0.0 },
+        NoiseKind::None => return None,
+    };
+    Some((noise, super::receiver(scene).noise_variance_a2()))
+}
+
+/// What an estimator finds in a mean statistic, A^2, that is far from order one.
+fn scaled_estimate(estimator: &dyn Estimator, mut mean: Vec<f64>) -> estimate::GateVelocity {
+    let unit = mean.first().copied().filter(|power| *power > 0.0).unwrap_or(1.0);
+    mean.iter_mut().for_each(|number| *number /= unit);
+    let found = estimator.estimate(&mean, &mut estimate::Scratch::new());
+    estimate::GateVelocity { power: found.power * unit, detection: found.detection * unit, ..found }
+}
+
+/// The test against noise of an estimator of correlograms; none without noise, and none of the spectrum of an unbiased
+/// correlogram with all its lags, which need not be positive.
+fn noise_test(
+    scene: &Scene,
+    tapers: &[estimate::Taper],
+    lag_weights: &[f64],
+) -> Result<Option<estimate::NoiseTest>, Error> {
+    let e = &scene.estimator;
+    let window = match e.method {
+        Method::Autoregressive | Method::AutoregressivePole | Method::Capon => {
+            Some(estimate::model_lag_weights(e.order))
+        }
+        Method::LagWindow => Some(estimate::model_lag_weights(e.lag_window_lags - 1)),
+        _ => None,
+    };
+    let unbiased = e.correlogram == CorrelogramForm::Unbiased;
+    if scene.detector.noise == NoiseKind::None || (unbiased && window.is_none()) {
+        return Ok(None);
+    }
+    let seen = |(at, gain): (&f64, &f64)| if unbiased { at / gain } else { *at };
+    let window = window.map(|at| at.iter().zip(lag_weights).map(seen).collect::<Vec<f64>>());
+    let padded = if e.method == Method::PulsePair { 4 * lag_weights.len() } else { e.padded_samples };
+    let (sampling, gates) = (sampling(scene)?, gates(scene)?);
+    Ok(Some(estimate::NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded)?))
 }
 
 /// The estimator of a mean correlogram whose lags carry `lag_weights`.
@@ -293,5 +352,13 @@ fn gradient_likelihood<S: Sample>(scene: &Scene, snr: f64) -> Result<Toolkit<S>,
     let gradient = |k: usize| if half > 0.0 { e.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
     let gradients: Vec<f64> = (0..e.gradients).map(gradient).collect();
     let plan = estimate::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
-    Ok(Toolkit { statistic: Box::new(plan.statistic), estimator: Box::new(plan.estimator), following: None })
+    let (test, noise) = match self::noise(scene) {
+        None => (None, None),
+        Some((noise, power_a2)) => {
+            let found = scaled_estimate(&plan.estimator, plan.noise_statistic(noise, power_a2)?);
+            (Some(plan.noise_test(&gates(scene)?)?), Some(found))
+        }
+    };
+    let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
+    Ok(Toolkit { statistic, estimator, following: None, test, noise })
 }

@@ -32,9 +32,9 @@ pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
     c.within("estimator.gradient_max_per_s", e.gradient_max_per_s, 1e-6, 1e3, "1/s");
     c.count("estimator.gradients", e.gradients, 1, 999);
     c.require(e.gradients % 2 == 1, "estimator.gradients", e.gradients, "an odd number, so that 0 is among them");
-    if let Some(rate) = e.false_alarm {
-        c.require(rate > 0.0 && rate < 1.0, "estimator.false_alarm", rate, "between 0 and 1, both excluded");
-    }
+    let rate = e.false_alarm;
+    let allowed = "0 for no test, or from 1e-12 to 0.5: the probability that noise passes at a gate, for example 0.01";
+    c.require(rate == 0.0 || (1e-12..=0.5).contains(&rate), "estimator.false_alarm", rate, allowed);
     check_radius(e, c);
     check_combinations(scene, c);
 }
@@ -133,7 +133,7 @@ mod tests {
         assert_eq!(with(Method::GradientLikelihood, |e| e.gradients = 4), ["estimator.gradients"]);
         assert_eq!(with(Method::GradientLikelihood, |e| e.follow_wind = true), ["estimator.follow_wind"]);
         assert_eq!(with(Method::FirstMoment, |e| e.correlogram = CorrelogramForm::Unbiased), ["estimator.correlogram"]);
-        assert_eq!(with(Method::Autoregressive, |e| e.false_alarm = Some(1.0)), ["estimator.false_alarm"]);
+        assert_eq!(with(Method::Autoregressive, |e| e.false_alarm = 1.0), ["estimator.false_alarm"]);
         let table = |e: &mut Estimator| {
             e.radius = RegionRadius::OfRange { range_m: vec![300.0, 200.0], radius_m: vec![1.0, 2.0] };
         };

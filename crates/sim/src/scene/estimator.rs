@@ -40,9 +40,9 @@ section! {
         gradients: usize = 7,
         /// Whether the lines of a region are shifted to the velocity of its centre before they are added, by a first map.
         follow_wind: bool = false,
-        /// Probability that noise alone passes for a signal; estimates whose peak is not above it are flagged. Absent: no test.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        false_alarm: Option<f64> = None,
+        /// Probability that noise alone passes for a signal at a gate; estimates whose peak is not above what noise reaches
+        /// that often are flagged. 0: no test.
+        false_alarm: f64 = 0.01,
         /// How the radius depends on range.
         radius: RegionRadius = RegionRadius::Fixed {},
     }
