@@ -4,6 +4,7 @@
 //! order x bandwidth^2 (Takahashi, Fagan and Chen 1973 for the inverse). Real and imaginary parts are kept apart so that
 //! the compiler can use vector instructions. Check: against dense matrices of random numbers.
 
+use multiversion::multiversion;
 use num_complex::Complex;
 
 /// Lower triangle of a Hermitian banded matrix, column by column: entry (j + d, j) at `j (width + 1) + d`.
@@ -17,6 +18,7 @@ pub(super) struct Band {
 }
 
 /// target -= source * conj(factor), in split parts.
+#[inline(always)]
 fn subtract(target: (&mut [f64], &mut [f64]), source: (&[f64], &[f64]), (a, b): (f64, f64)) {
     let n = target.0.len();
     let (tr, ti, sr, si) = (&mut target.0[..n], &mut target.1[..n], &source.0[..n], &source.1[..n]);
@@ -48,34 +50,7 @@ impl Band {
 
     /// Replaces the matrix by its Cholesky factor L (A = L L^H) and returns ln det A; nothing if not positive definite.
     pub(super) fn factorize(&mut self) -> Option<f64> {
-        let mut log_determinant = 0.0;
-        for j in 0..self.order {
-            let (start, height) = (self.at(j, 0), self.height(j));
-            let pivot = self.re[start];
-            // also false for NaN
-            if !(pivot > 0.0 && pivot.is_finite()) {
-                return None;
-            }
-            log_determinant += pivot.ln();
-            let scale = pivot.sqrt().recip();
-            for i in start..start + height {
-                self.re[i] *= scale;
-                self.im[i] *= scale;
-            }
-            let (re_head, re_tail) = self.re.split_at_mut(start + self.width + 1);
-            let (im_head, im_tail) = self.im.split_at_mut(start + self.width + 1);
-            for k in 1..height {
-                let factor = (re_head[start + k], im_head[start + k]);
-                let target = (k - 1) * (self.width + 1);
-                let count = height - k;
-                subtract(
-                    (&mut re_tail[target..target + count], &mut im_tail[target..target + count]),
-                    (&re_head[start + k..start + height], &im_head[start + k..start + height]),
-                    factor,
-                );
-            }
-        }
-        Some(log_determinant)
+        factorize(self)
     }
 
     /// Replaces rows `from` .. `to` of x by those of L^-1 x, for an x that is 0 above `from`.
@@ -110,41 +85,78 @@ impl Band {
 
     /// Entries of A^-1 in the band, from the factor L.
     pub(super) fn inverse_into(&self, out: &mut Band) {
-        out.reset(self.order, self.width);
-        let stride = self.width + 1;
-        let (mut lr, mut li, mut xr, mut xi) =
-            (vec![0.0; stride], vec![0.0; stride], vec![0.0; stride], vec![0.0; stride]);
-        for j in (0..self.order).rev() {
-            let (start, count) = (self.at(j, 0), self.height(j) - 1);
-            let scale = self.re[start].recip();
-            for d in 0..count {
-                lr[d] = self.re[start + 1 + d] * scale;
-                li[d] = self.im[start + 1 + d] * scale;
-            }
-            xr[..count].fill(0.0);
-            xi[..count].fill(0.0);
-            // x = V l, V the known block of the inverse below and right of j, of which the lower triangle is stored
-            for k in 0..count {
-                let column = (j + 1 + k) * stride;
-                let rows = count - k;
-                let (vr, vi) = (&out.re[column..column + rows], &out.im[column..column + rows]);
-                subtract((&mut xr[k..count], &mut xi[k..count]), (vr, vi), (-lr[k], li[k]));
-                let (sum_re, sum_im) = conjugate_dot(&vr[1..], &vi[1..], &lr[k + 1..count], &li[k + 1..count]);
-                xr[k] += sum_re;
-                xi[k] += sum_im;
-            }
-            let mut pivot = scale * scale;
-            for d in 0..count {
-                out.re[start + 1 + d] = -xr[d];
-                out.im[start + 1 + d] = -xi[d];
-                pivot += lr[d] * xr[d] + li[d] * xi[d];
-            }
-            out.re[start] = pivot;
+        inverse_into(self, out);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn factorize(band: &mut Band) -> Option<f64> {
+    let mut log_determinant = 0.0;
+    for j in 0..band.order {
+        let (start, height) = (band.at(j, 0), band.height(j));
+        let pivot = band.re[start];
+        // also false for NaN
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return None;
         }
+        log_determinant += pivot.ln();
+        let scale = pivot.sqrt().recip();
+        for i in start..start + height {
+            band.re[i] *= scale;
+            band.im[i] *= scale;
+        }
+        let (re_head, re_tail) = band.re.split_at_mut(start + band.width + 1);
+        let (im_head, im_tail) = band.im.split_at_mut(start + band.width + 1);
+        for k in 1..height {
+            let factor = (re_head[start + k], im_head[start + k]);
+            let target = (k - 1) * (band.width + 1);
+            let count = height - k;
+            subtract(
+                (&mut re_tail[target..target + count], &mut im_tail[target..target + count]),
+                (&re_head[start + k..start + height], &im_head[start + k..start + height]),
+                factor,
+            );
+        }
+    }
+    Some(log_determinant)
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn inverse_into(band: &Band, out: &mut Band) {
+    out.reset(band.order, band.width);
+    let stride = band.width + 1;
+    let (mut lr, mut li, mut xr, mut xi) = (vec![0.0; stride], vec![0.0; stride], vec![0.0; stride], vec![0.0; stride]);
+    for j in (0..band.order).rev() {
+        let (start, count) = (band.at(j, 0), band.height(j) - 1);
+        let scale = band.re[start].recip();
+        for d in 0..count {
+            lr[d] = band.re[start + 1 + d] * scale;
+            li[d] = band.im[start + 1 + d] * scale;
+        }
+        xr[..count].fill(0.0);
+        xi[..count].fill(0.0);
+        // x = V l, V the known block of the inverse below and right of j, of which the lower triangle is stored
+        for k in 0..count {
+            let column = (j + 1 + k) * stride;
+            let rows = count - k;
+            let (vr, vi) = (&out.re[column..column + rows], &out.im[column..column + rows]);
+            subtract((&mut xr[k..count], &mut xi[k..count]), (vr, vi), (-lr[k], li[k]));
+            let (sum_re, sum_im) = conjugate_dot(&vr[1..], &vi[1..], &lr[k + 1..count], &li[k + 1..count]);
+            xr[k] += sum_re;
+            xi[k] += sum_im;
+        }
+        let mut pivot = scale * scale;
+        for d in 0..count {
+            out.re[start + 1 + d] = -xr[d];
+            out.im[start + 1 + d] = -xi[d];
+            pivot += lr[d] * xr[d] + li[d] * xi[d];
+        }
+        out.re[start] = pivot;
     }
 }
 
 /// Sum of conj(v) l, in four partial sums that the compiler keeps in vector registers.
+#[inline(always)]
 fn conjugate_dot(vr: &[f64], vi: &[f64], lr: &[f64], li: &[f64]) -> (f64, f64) {
     let n = vr.len();
     let (vi, lr, li) = (&vi[..n], &lr[..n], &li[..n]);

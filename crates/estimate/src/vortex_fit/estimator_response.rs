@@ -13,6 +13,7 @@
 //! uniform wind; a wide line shows the mean over the gate; the correlogram of signals summed over layers; fits of
 //! simulated scans.
 
+use multiversion::multiversion;
 use ndarray::Array2;
 use std::f64::consts::TAU;
 
@@ -246,16 +247,23 @@ impl Prepared<'_> {
             for (shift, share) in [(0, 1.0 - part), (1, part)] {
                 if share > 1e-6 {
                     let seen = &turns[(index as usize + shift) * self.numbers..];
-                    for (weights, turns) in self.weights.chunks_exact(self.numbers).zip(seen.chunks_exact(self.numbers))
-                    {
-                        for ((lag, weight), turn) in lags.iter_mut().zip(weights).zip(turns) {
-                            *lag += share * weight * turn;
-                        }
-                    }
+                    add_seen(lags, &self.weights, seen, share);
                 }
             }
         }
         lags
+    }
+}
+
+/// lags += share weights turns, summed over nodes; all three have rows of the length of `lags`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn add_seen(lags: &mut [f64], weights: &[f64], turns: &[f64], share: f64) {
+    let count = lags.len();
+    for (weights, turns) in weights.chunks_exact(count).zip(turns.chunks_exact(count)) {
+        let (weights, turns) = (&weights[..count], &turns[..count]);
+        for i in 0..count {
+            lags[i] += share * weights[i] * turns[i];
+        }
     }
 }
 

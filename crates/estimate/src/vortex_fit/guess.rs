@@ -6,6 +6,7 @@
 //! noise and among outliers, come out near enough for the fit; maps of noise hold no vortex.
 
 use super::map_fit::{VelocityMap, median};
+use super::map_starts::CORE_OVER_SPACING;
 use super::range_kernel::{LineScratch, RangeKernel};
 use super::wake::{Ray, Vortex, Wake, WakeModel};
 use crate::error::Error;
@@ -19,8 +20,6 @@ const PLACES: usize = 26;
 const NEEDED: usize = 100;
 /// Least significance: explained sum of squares over the variance of what is left, per number of the pair.
 const SIGNIFICANT: f64 = 60.0;
-/// Core radius of a wake over its spacing, for a start (the chapter: 3 to 5 % of the span).
-const CORE_OVER_SPACING: f64 = 0.045;
 
 /// The thinned map: one number per block.
 struct Thinned {

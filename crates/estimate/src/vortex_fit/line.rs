@@ -7,6 +7,7 @@
 //! both, which gives the derivative of a scalar with respect to the velocities of all layers at the price of one
 //! covariance. Check: the plain double sum; backward against forward derivatives; difference quotients.
 
+use multiversion::multiversion;
 use num_complex::Complex;
 
 use super::band::Band;
@@ -114,17 +115,8 @@ impl ScanModel {
             work.sums.clear();
             work.sums.resize(2 * count, 0.0);
             let (sum_re, sum_im) = work.sums.split_at_mut(count);
-            // the weight of a node at distance d from the middle is that of the middle at -d from the node
-            for offset in 0..=2 * self.weights.half {
-                let node = (first + offset) * 2 * lags;
-                let weights = &self.weights.row(2 * self.weights.half - offset)[places.clone()];
-                let re = &work.nodes[node..][places.clone()];
-                let im = &work.nodes[node + lags..][places.clone()];
-                for i in 0..count {
-                    sum_re[i] += weights[i] * re[i];
-                    sum_im[i] += weights[i] * im[i];
-                }
-            }
+            let row = (lags, places.start);
+            sum_nodes(self.weights.rows(), &work.nodes[first * 2 * lags..], row, sum_re, sum_im);
             for i in 0..count {
                 let lag = 2 * i + twice % 2;
                 let place = out.at((twice - lag) / 2, lag);
@@ -148,16 +140,8 @@ impl ScanModel {
                 let place = weight.at((twice - lag) / 2, lag);
                 (sum_re[i], sum_im[i]) = (weight.re[place], weight.im[place]);
             }
-            for offset in 0..=2 * self.weights.half {
-                let node = (first + offset) * 2 * lags;
-                let weights = &self.weights.row(2 * self.weights.half - offset)[places.clone()];
-                let (re, im) = work.nodes[node..node + 2 * lags].split_at_mut(lags);
-                let (re, im) = (&mut re[places.clone()], &mut im[places.clone()]);
-                for i in 0..count {
-                    re[i] += weights[i] * sum_re[i];
-                    im[i] += weights[i] * sum_im[i];
-                }
-            }
+            let row = (lags, places.start);
+            spread_to_nodes(self.weights.rows(), &mut work.nodes[first * 2 * lags..], row, sum_re, sum_im);
         }
         let turns = self.lag_turns();
         let mut seen = vec![0.0; 2 * lags];
@@ -181,7 +165,39 @@ impl ScanModel {
     }
 }
 
+/// Sums over nodes with the weights of one middle. The weight of a node at distance d from the middle is that of the middle at
+/// -d from the node: rows of `lags` weights run against the nodes. Lags are taken from place `start` of each row on.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn sum_nodes(weights: &[f64], nodes: &[f64], (lags, start): (usize, usize), sum_re: &mut [f64], sum_im: &mut [f64]) {
+    let count = sum_re.len().min(sum_im.len());
+    let (sum_re, sum_im) = (&mut sum_re[..count], &mut sum_im[..count]);
+    for (weights, node) in weights.chunks_exact(lags).rev().zip(nodes.chunks_exact(2 * lags)) {
+        let (re, im) = node.split_at(lags);
+        let (weights, re, im) = (&weights[start..][..count], &re[start..][..count], &im[start..][..count]);
+        for i in 0..count {
+            sum_re[i] += weights[i] * re[i];
+            sum_im[i] += weights[i] * im[i];
+        }
+    }
+}
+
+/// The transpose of [`sum_nodes`]: adds the sums to the nodes.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn spread_to_nodes(weights: &[f64], nodes: &mut [f64], (lags, start): (usize, usize), sum_re: &[f64], sum_im: &[f64]) {
+    let count = sum_re.len().min(sum_im.len());
+    let (sum_re, sum_im) = (&sum_re[..count], &sum_im[..count]);
+    for (weights, node) in weights.chunks_exact(lags).rev().zip(nodes.chunks_exact_mut(2 * lags)) {
+        let (re, im) = node.split_at_mut(lags);
+        let (weights, re, im) = (&weights[start..][..count], &mut re[start..][..count], &mut im[start..][..count]);
+        for i in 0..count {
+            re[i] += weights[i] * sum_re[i];
+            im[i] += weights[i] * sum_im[i];
+        }
+    }
+}
+
 /// nodes += factor share phasor, for the four nodes of a layer.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 fn add_to_nodes(nodes: &mut [f64], phasor: &[f64], first: usize, share: [f64; 4], factor: f64) {
     let numbers = phasor.len();
     for (i, share) in share.iter().enumerate() {

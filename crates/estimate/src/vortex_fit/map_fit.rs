@@ -2,31 +2,23 @@
 //!
 //! Weighted least squares with a robust loss. What a wake shows is either the mean over the gate ([`fit_map`], by the
 //! iteration of Levenberg and Marquardt) or what the estimator of the map itself makes of the wake's spectra
-//! ([`fit_map_of_estimator`], by damped steps of Gauss and Newton with difference quotients). The scale of the
+//! ([`fit_map_of_estimator`](super::fit_map_of_estimator)). The scale of the
 //! residuals is their median, taken anew in each of a few rounds. Check: exact maps; noise; outliers; the spread of
 //! fits over many maps.
 
 use ndarray::{Array2, ArrayView2};
 
-use super::estimator_response::EstimatorResponse;
-use super::free::{FreeParameters, Sharing, spread};
+use super::free::{FreeParameters, spread};
 use super::guess::first_guess;
 use super::map_problem::{Expected, Problem};
+use super::map_starts::{best_of, starts};
 use super::range_kernel::RangeKernel;
 use super::small::Stop;
-use super::tangent::Tangent;
-use super::wake::{PARAMETERS, Parameter, Wake, WakeModel};
+use super::wake::{Parameter, Wake, WakeModel};
 use crate::error::{Error, finite, length, positive};
 
 /// The scale of residuals from means is taken anew this often.
 const ROUNDS: usize = 5;
-/// Most steps of Gauss and Newton, and halvings of one.
-const STEPS: usize = 40;
-const HALVINGS: i32 = 6;
-/// Core radii below this part of a region's radius, or of the distance of lines, do not show in a map.
-const SMALLEST_CORE: f64 = 0.25;
-/// They end at a step of this many standard deviations at the latest: estimators round.
-const NEAR_SIGMAS: f64 = 0.03;
 
 /// A map of radial velocities, such as accumulation gives.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +53,7 @@ impl VelocityMap<'_> {
     }
 
     /// Distance of neighbouring lines in the middle of the map.
-    fn line_spacing_m(&self) -> f64 {
+    pub(super) fn line_spacing_m(&self) -> f64 {
         let length = |axis: &[f64]| axis.last().copied().unwrap_or(0.0) - axis.first().copied().unwrap_or(0.0);
         let middle_m = self.range_m.first().copied().unwrap_or(0.0) + 0.5 * length(self.range_m);
         middle_m * length(self.elevation_rad) / self.elevation_rad.len() as f64
@@ -110,6 +102,16 @@ impl Loss {
     }
 }
 
+/// An end of the fit of a map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapTop {
+    /// The wake there.
+    pub wake: Wake,
+    /// Logarithm of the likelihood that the loss stands for, but for a constant; velocities that say the same as their neighbours
+    /// are counted once.
+    pub log_likelihood: f64,
+}
+
 /// How a map is fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapFitOptions {
@@ -143,7 +145,8 @@ impl Default for MapFitOptions {
 pub struct MapFit {
     /// The fitted wake.
     pub wake: Wake,
-    /// Covariance \[10, 10\] of the parameters in the order of [`Parameter`]; zeros where one is fixed. It tells of scatter, not of
+    /// Covariance \[10, 10\] of the parameters in the order of [`Parameter`]; zeros where one is fixed: the sandwich with the
+    /// correlation of the residuals, and the distances of other tops, weighted with their likelihood. It tells of scatter, not of
     /// what an estimator of velocity adds to all maps alike.
     pub covariance: Array2<f64>,
     /// Whether core radii were fitted to the end. A core that the map does not resolve keeps the value of the round before, with
@@ -160,6 +163,8 @@ pub struct MapFit {
     pub explained_fraction: f64,
     /// Evaluations of the map in the last round; steps of Gauss and Newton for the map of an estimator.
     pub iterations: usize,
+    /// All ends of the fit from its starts that are not the same, the best (the fitted wake) first.
+    pub tops: Vec<MapTop>,
 }
 
 impl MapFit {
@@ -171,7 +176,7 @@ impl MapFit {
 }
 
 /// Fits the wake to a map whose velocities are means over gates, without any prior knowledge: a search for the best pair, then
-/// [`refine_map_fit`].
+/// [`refine_map_fit`] from there with each of a few core radii, if they are fitted.
 ///
 /// # Errors
 /// [`Error::NoVortex`] if no pair stands out; [`Error::TooFewVelocities`]; as [`refine_map_fit`].
@@ -182,7 +187,7 @@ pub fn fit_map(
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
     let guess = first_guess(map, model, kernel)?;
-    refine_map_fit(map, model, kernel, &guess, options)
+    best_of(&starts(&guess, options), |start| refine_map_fit(map, model, kernel, start, options))
 }
 
 /// Fits the wake to a map from a given start on. `kernel` is what each velocity sees of the air about its range.
@@ -218,93 +223,19 @@ pub fn refine_map_fit(
     fit.outcome(&problem, wake, scale, iterations)
 }
 
-/// Fits the wake to a map that an estimator of this crate made, without any prior knowledge: as [`fit_map`] with its
-/// mean gate, then [`refine_map_fit_of_estimator`].
-///
-/// # Errors
-/// As [`fit_map`] and [`refine_map_fit_of_estimator`].
-pub fn fit_map_of_estimator(
-    map: &VelocityMap<'_>,
-    model: &WakeModel,
-    response: &EstimatorResponse<'_>,
-    options: &MapFitOptions,
-) -> Result<MapFit, Error> {
-    map.validate()?;
-    let kernel = response.kernel(map.range_m)?;
-    let guess = first_guess(map, model, &kernel)?;
-    // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
-    let free = FreeParameters { core_radius: Sharing::Fixed, ..options.free };
-    let start = refine_map_fit(map, model, &kernel, &guess, &MapFitOptions { free, ..*options });
-    let start = start.map_or(guess, |fit| fit.wake);
-    refine_map_fit_of_estimator(map, model, response, &start, options)
-}
-
-/// Fits the wake to a map that an estimator made, from a given start on: what is expected of a wake is the estimate from its
-/// expected correlograms.
-///
-/// # Errors
-/// As [`refine_map_fit`].
-pub fn refine_map_fit_of_estimator(
-    map: &VelocityMap<'_>,
-    model: &WakeModel,
-    response: &EstimatorResponse<'_>,
-    guess: &Wake,
-    options: &MapFitOptions,
-) -> Result<MapFit, Error> {
-    map.validate()?;
-    let kernel = response.kernel(map.range_m)?;
-    let fit = Fit::new(map, model, &kernel, guess, options)?;
-    let prepared = response.prepared(map.range_m);
-    let least_core_m = SMALLEST_CORE * map.line_spacing_m().max(response.radius_m());
-    let coreless = fit.coreless();
-    let mut groups = &fit.groups;
-    let mut wake = options.free.start(guess);
-    let (mut turns, mut last, mut sigmas_left) = (0, [0.0; PARAMETERS], f64::INFINITY);
-    for step in 1..=STEPS {
-        let here = prepared.velocities(model, &wake, map.elevation_rad);
-        let tangent = Tangent::new((&prepared, model), wake, here.view(), groups, map);
-        let learnt = Some(&tangent.deviation);
-        let problem = Problem { learnt, ..fit.problem(groups, Expected::Shown(&tangent)) };
-        let scale = problem.scale(&wake)?;
-        let near = problem.reweighted(wake, scale, fit.stop)?;
-        let (from, to) = (wake.to_array(), near.to_array());
-        let way: [f64; PARAMETERS] = std::array::from_fn(|i| to[i] - from[i]);
-        // where peaks jump the map is not smooth: each time the steps turn round they are shortened, so that their
-        // ends are averaged (Kesten 1958)
-        turns += usize::from(problem.product(&wake, &way, &last, scale) < 0.0);
-        let share = ((1 + turns) as f64).recip();
-        sigmas_left = share * problem.product(&wake, &way, &way, scale).sqrt();
-        if sigmas_left <= NEAR_SIGMAS.max(options.tolerance_sigmas) {
-            return fit.outcome(&problem, wake, scale, step);
-        }
-        let part = share.min(tangent.reach(&near));
-        let trial = |halving: i32| {
-            let part = part * 0.5_f64.powi(halving);
-            let trial = Wake::from_array(&std::array::from_fn(|i| from[i] + part * way[i]));
-            fit.allows(&trial).then_some(trial)
-        };
-        wake = (0..=HALVINGS).find_map(trial).ok_or(Error::NotConverged { iterations: step, sigmas_left })?;
-        last = way;
-        if groups.len() > coreless.len() && raised(&mut wake, least_core_m) {
-            groups = &coreless;
-        }
-    }
-    Err(Error::NotConverged { iterations: STEPS, sigmas_left })
-}
-
 /// What both fits share.
-struct Fit<'a, 'm> {
+pub(super) struct Fit<'a, 'm> {
     map: &'a VelocityMap<'m>,
     model: &'a WakeModel,
     kernel: &'a RangeKernel,
     options: &'a MapFitOptions,
-    groups: Vec<Vec<usize>>,
-    stop: Stop,
+    pub(super) groups: Vec<Vec<usize>>,
+    pub(super) stop: Stop,
     used: usize,
 }
 
 impl<'a, 'm> Fit<'a, 'm> {
-    fn new(
+    pub(super) fn new(
         map: &'a VelocityMap<'m>,
         model: &'a WakeModel,
         kernel: &'a RangeKernel,
@@ -322,22 +253,28 @@ impl<'a, 'm> Fit<'a, 'm> {
         Ok(Self { map, model, kernel, options, groups, stop, used })
     }
 
-    fn coreless(&self) -> Vec<Vec<usize>> {
+    pub(super) fn coreless(&self) -> Vec<Vec<usize>> {
         self.groups.iter().filter(|group| !is_core(group)).cloned().collect()
     }
 
-    fn problem<'p>(&'p self, groups: &'p [Vec<usize>], expected: Expected<'p>) -> Problem<'p, 'm> {
+    pub(super) fn problem<'p>(&'p self, groups: &'p [Vec<usize>], expected: Expected<'p>) -> Problem<'p, 'm> {
         Problem { map: self.map, model: self.model, expected, groups, loss: self.options.loss, learnt: None }
     }
 
     /// Whether the model exists there: with images, above the ground only.
-    fn allows(&self, wake: &Wake) -> bool {
+    pub(super) fn allows(&self, wake: &Wake) -> bool {
         let above = wake.left.height_m > 0.0 && wake.right.height_m > 0.0;
         wake.validate().is_ok() && (above || !self.model.images)
     }
 
-    fn outcome(&self, problem: &Problem<'_, '_>, wake: Wake, scale: f64, iterations: usize) -> Result<MapFit, Error> {
-        let covariance = problem.covariance(&wake, scale, self.options.correlated_lines)?;
+    pub(super) fn outcome(
+        &self,
+        problem: &Problem<'_, '_>,
+        wake: Wake,
+        scale: f64,
+        iterations: usize,
+    ) -> Result<MapFit, Error> {
+        let (covariance, alike) = problem.covariance(&wake, scale, self.options.correlated_lines)?;
         let residuals = problem.residuals(&wake);
         let cost = |residuals: &[f64]| residuals.iter().map(|r| self.options.loss.at(r / scale).0).sum::<f64>();
         // without vortices a gate shows its mean
@@ -352,22 +289,13 @@ impl<'a, 'm> Fit<'a, 'm> {
             residual_scale: scale,
             explained_fraction: 1.0 - cost(&residuals) / calm_cost,
             iterations,
+            tops: vec![MapTop { wake, log_likelihood: problem.log_likelihood(&wake, scale) / alike }],
         })
     }
 }
 
-/// Raises core radii below the least one, and tells whether there were any.
-fn raised(wake: &mut Wake, least_m: f64) -> bool {
-    let mut any = false;
-    for core_m in [&mut wake.left.core_radius_m, &mut wake.right.core_radius_m] {
-        any |= *core_m < least_m;
-        *core_m = core_m.max(least_m);
-    }
-    any
-}
-
 /// Whether a free number moves core radii.
-fn is_core(group: &[usize]) -> bool {
+pub(super) fn is_core(group: &[usize]) -> bool {
     group.iter().all(|&place| place == Parameter::LeftCore as usize || place == Parameter::RightCore as usize)
 }
 

@@ -1,14 +1,13 @@
 //! Robust cost of a wake given a map: residuals, sums over lines, the sandwich.
 //!
-//! Velocities of one line share air and noise, and neighbouring lines share windows where
-//! a map is accumulated, so the covariance is the sandwich A^-1 B A^-1 (Huber 1967), with B from the sums of the gradients over
-//! lines, neighbours tapered (Newey and West 1987). Check: the spread of fits over many maps.
+//! Check: exact maps; the spread of fits over many maps.
 
 use ndarray::{Array1, Array2};
 
 use super::free::{gathered, moved};
 use super::map_fit::{Loss, VelocityMap, median};
 use super::range_kernel::{LineScratch, RangeKernel};
+use super::residual_covariance::{Cell, filling};
 use super::small::{Normal, Stop, descend, inverse, solve};
 use super::tangent::Tangent;
 use super::wake::{PARAMETERS, Parameter, Ray, Wake, WakeModel};
@@ -196,30 +195,52 @@ impl Problem<'_, '_> {
         Some(normal)
     }
 
-    /// The sandwich, with gradients of lines up to `correlated` apart taken together.
-    pub(super) fn covariance(&self, wake: &Wake, scale: f64, correlated: usize) -> Result<Array2<f64>, Error> {
+    /// The sandwich, with residuals of lines up to `correlated` apart taken together, and the number of velocities that count
+    /// as one.
+    pub(super) fn covariance(&self, wake: &Wake, scale: f64, correlated: usize) -> Result<(Array2<f64>, f64), Error> {
         let order = self.groups.len();
-        let lines = self.lines(|line, scratch| self.line_sums(wake, scale, line, scratch));
         let (mut bread, mut weighted) = (Array2::zeros((order, order)), Array2::zeros((order, order)));
-        let mut filling = Array2::<f64>::zeros((order, order));
-        for (a, line) in lines.iter().enumerate() {
+        for line in self.lines(|line, scratch| self.line_sums(wake, scale, line, scratch)) {
             bread += &line.curved;
             weighted += &line.weighted;
-            for (b, other) in lines.iter().enumerate().skip(a.saturating_sub(correlated)).take(2 * correlated + 1) {
-                let distance = a.abs_diff(b);
-                if distance <= correlated {
-                    let taper = 1.0 - distance as f64 / (correlated + 1) as f64;
-                    for ((i, j), f) in filling.indexed_iter_mut() {
-                        *f += taper * line.gradient[i] * other.gradient[j];
-                    }
-                }
-            }
         }
         mirror(&mut bread);
         mirror(&mut weighted);
+        let cells = self.lines(|line, scratch| self.line_cells(wake, scale, line, scratch));
+        let (filling, alike) = filling(&cells, order, correlated);
         // with many outliers the second derivatives need not be positive: their weights are, and are larger
         let bread = inverse("curvature of the fit", &bread).or_else(|_| inverse("curvature of the fit", &weighted))?;
-        Ok(bread.dot(&filling).dot(&bread))
+        Ok((bread.dot(&filling).dot(&bread), alike))
+    }
+
+    /// Residuals and slopes of a line.
+    fn line_cells(&self, wake: &Wake, scale: f64, line: usize, scratch: &mut LineScratch) -> Vec<Option<Cell>> {
+        let mut cells = vec![None; self.map.range_m.len()];
+        self.each_gate((wake, line), true, scratch, |gate, velocity, slope| {
+            let measured = self.map.velocity_m_s[[line, gate]];
+            if measured.is_finite() {
+                let unit = scale * self.deviation(line, gate);
+                let residual = (measured - velocity) / unit;
+                let slopes = slope.iter().map(|s| s / unit).collect();
+                cells[gate] = Some(Cell { residual: self.loss.at(residual).1 * residual, slopes });
+            }
+        });
+        cells
+    }
+
+    /// ln p of the residuals but for a constant, as if all were independent: losses and logarithms of the deviations.
+    pub(super) fn log_likelihood(&self, wake: &Wake, scale: f64) -> f64 {
+        let lines = self.lines(|line, scratch| {
+            let mut sum = 0.0;
+            self.each_gate((wake, line), false, scratch, |gate, velocity, _| {
+                let (measured, unit) = (self.map.velocity_m_s[[line, gate]], scale * self.deviation(line, gate));
+                if measured.is_finite() {
+                    sum -= self.loss.at((measured - velocity) / unit).0 + unit.ln();
+                }
+            });
+            sum
+        });
+        lines.iter().sum()
     }
 
     /// The best wind without vortices.

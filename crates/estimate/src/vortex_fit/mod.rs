@@ -35,6 +35,7 @@
 mod ascent;
 mod band;
 mod baseband;
+mod estimator_fit;
 mod estimator_response;
 mod free;
 mod guess;
@@ -42,8 +43,10 @@ mod likelihood;
 mod line;
 mod map_fit;
 mod map_problem;
+mod map_starts;
 mod pulse;
 mod range_kernel;
+mod residual_covariance;
 mod scan_model;
 mod signal_fit;
 mod small;
@@ -53,13 +56,11 @@ mod wake;
 mod wake_map;
 
 pub use baseband::Baseband;
+pub use estimator_fit::{fit_map_of_estimator, refine_map_fit_of_estimator};
 pub use estimator_response::EstimatorResponse;
 pub use free::{FreeParameters, Sharing, WindFit};
 pub use likelihood::{LikelihoodValue, Powers, ScanSignals};
-pub use map_fit::{
-    Loss, MapFit, MapFitOptions, VelocityMap, fit_map, fit_map_of_estimator, refine_map_fit,
-    refine_map_fit_of_estimator,
-};
+pub use map_fit::{Loss, MapFit, MapFitOptions, MapTop, VelocityMap, fit_map, refine_map_fit};
 pub use pulse::PulseShape;
 pub use range_kernel::RangeKernel;
 pub use scan_model::{ScanModel, ScanSetup};

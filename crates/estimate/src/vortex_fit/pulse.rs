@@ -120,7 +120,13 @@ impl PairWeights {
         Self { lags: longest, half, even, rows }
     }
 
+    /// All rows: those of the nodes from `-half` to `half` from the middle.
+    pub(super) fn rows(&self) -> &[f64] {
+        &self.rows
+    }
+
     /// Weights of all lags for the node `offset - half` from the middle.
+    #[cfg(test)]
     pub(super) fn row(&self, offset: usize) -> &[f64] {
         let width = self.lags + 1;
         &self.rows[offset * width..(offset + 1) * width]

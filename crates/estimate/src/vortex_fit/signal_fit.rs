@@ -5,13 +5,14 @@
 //! Cramer-Rao bound. Check: standard deviation and bias over scans against the bound.
 
 use ndarray::{Array2, ArrayView2};
+use std::rc::Rc;
 
 use super::ascent::{Ascent, State};
 use super::free::{FreeParameters, Sharing, spread};
 use super::likelihood::{Powers, ScanSignals};
 use super::scan_model::{ScanModel, ScanSetup};
 use super::small::inverse;
-use super::tops::{CORES_OVER_SPACING, LikelihoodTop, near_lines, other_tops, same};
+use super::tops::{CORES_OVER_SPACING, Candidate, LikelihoodTop, near_lines, other_tops, same};
 use super::wake::{PARAMETERS, Parameter, Wake};
 use crate::error::Error;
 use crate::sample::Sample;
@@ -78,7 +79,8 @@ pub struct SignalFit {
     pub covariance: Array2<f64>,
     /// Cramer-Rao bound \[10, 10\] at the fitted wake.
     pub bound: Array2<f64>,
-    /// All tops that were found, the highest (the fitted wake) first.
+    /// All tops that were found within 6 of the highest (the fitted wake), which is the first. Those that the lines near the
+    /// vortices put more than 2 below it are theirs: ln p to some tenths.
     pub tops: Vec<LikelihoodTop>,
     /// Log-likelihood, but for a constant.
     pub log_likelihood: f64,
@@ -144,11 +146,15 @@ pub fn fit_signals<S: Sample>(
     let mut search = Search { setup, snr: &snr, signals: &signals, options, evaluations: 0 };
     let mut tops = vec![search.settle((start, Powers::default()), true)?];
     if options.starts == Starts::Several {
-        for start in search.others(&tops[0])? {
+        for other in search.others(&tops[0])? {
+            let settled = if other.close {
+                search.settle(other.state, false)
+            } else {
+                let log_likelihood = tops[0].log_likelihood + other.gain;
+                Ok(Settled { model: Rc::clone(&tops[0].model), state: other.state, log_likelihood })
+            };
             // a start that leads nowhere is no top
-            if let Ok(top) = search.settle(start, false) {
-                tops.push(top);
-            }
+            tops.extend(settled);
         }
     }
     search.finish(tops)
@@ -156,7 +162,7 @@ pub fn fit_signals<S: Sample>(
 
 /// A top and the model that was cut for it.
 struct Settled {
-    model: ScanModel,
+    model: Rc<ScanModel>,
     state: State,
     log_likelihood: f64,
 }
@@ -198,14 +204,14 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
             };
             state = end.0;
             if model.covers(&state.0) {
-                return Ok(Settled { model, state, log_likelihood: end.1 });
+                return Ok(Settled { model: Rc::new(model), state, log_likelihood: end.1 });
             }
         }
         Err(Error::NotConverged { iterations: self.evaluations, sigmas_left: f64::INFINITY })
     }
 
     /// States near other tops than the first.
-    fn others(&mut self, first: &Settled) -> Result<Vec<State>, Error> {
+    fn others(&mut self, first: &Settled) -> Result<Vec<Candidate>, Error> {
         let mut guess = first.state.0;
         if self.options.free.core_radius != Sharing::Fixed {
             let core_m = CORES_OVER_SPACING[1] * guess.spacing_m();

@@ -23,26 +23,37 @@ pub(super) struct Tangent {
 }
 
 impl Tangent {
-    /// About `at`, where `here` is the map, by difference quotients with respect to the groups of parameters.
+    /// About `at`, where `here` is the map, with slopes about it or about a wake near by.
     pub(super) fn new(
         (prepared, model): (&Prepared<'_>, &WakeModel),
         at: Wake,
         here: ArrayView2<'_, f64>,
-        groups: &[Vec<usize>],
+        slopes: &[Array2<f64>],
         map: &VelocityMap<'_>,
     ) -> Self {
         let elevation_rad = map.elevation_rad;
-        let quotients = groups.iter().map(|group| {
-            let step = step(&at, group[0]);
+        let mut tangent =
+            Self { at, velocity_m_s: here.to_owned(), slopes: slopes.to_vec(), deviation: Array2::ones(here.dim()) };
+        tangent.learn_deviations(&prepared.variances(model, &at, elevation_rad), map);
+        tangent
+    }
+
+    /// Difference quotients of the map about `at` with respect to the groups of parameters.
+    pub(super) fn slopes(
+        (prepared, model): (&Prepared<'_>, &WakeModel),
+        at: &Wake,
+        here: ArrayView2<'_, f64>,
+        groups: &[Vec<usize>],
+        elevation_rad: &[f64],
+    ) -> Vec<Array2<f64>> {
+        let quotient = |group: &Vec<usize>| {
+            let step = step(at, group[0]);
             let mut parameters = at.to_array();
             group.iter().for_each(|&place| parameters[place] += step);
             let there = prepared.velocities(model, &Wake::from_array(&parameters), elevation_rad);
             (there - here) / step
-        });
-        let slopes = quotients.collect();
-        let mut tangent = Self { at, velocity_m_s: here.to_owned(), slopes, deviation: Array2::ones(here.dim()) };
-        tangent.learn_deviations(&prepared.variances(model, &at, elevation_rad), map);
-        tangent
+        };
+        groups.iter().map(quotient).collect()
     }
 
     /// Learns from the residuals how they grow with the variance of the air: ln|r| is a straight line over ln(1 +
@@ -72,6 +83,14 @@ impl Tangent {
     }
 }
 
+/// Whether slopes about one wake serve for another: no parameter is more than so many steps away.
+pub(super) fn near(a: &Wake, b: &Wake) -> bool {
+    let (from, to) = (a.to_array(), b.to_array());
+    (0..from.len()).all(|place| (to[place] - from[place]).abs() <= NEAR * step(a, place))
+}
+
+/// A step is a third of an error.
+const NEAR: f64 = 3.0;
 /// The map is linear enough over this many steps.
 const REACH: f64 = 12.0;
 

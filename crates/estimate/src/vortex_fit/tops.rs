@@ -27,10 +27,12 @@ const STEPS: i32 = 4;
 const STEP_SIGMAS: f64 = 1.5;
 /// Places from which the near lines are climbed.
 const PLACES: usize = 8;
-/// Tops of the near lines this far below the best are not looked at again with all lines; weight exp(-6).
+/// Tops this far below the best do not count: weight exp(-6).
 const FAR_BELOW: f64 = 6.0;
-/// And at most so many are.
-const MOST: usize = 4;
+/// Of the others, at most so many are reported.
+const MOST: usize = 6;
+/// Tops of the near lines within this of the best are climbed with all lines; the others keep what the near lines say.
+const CLOSE_BELOW: f64 = 2.0;
 /// Tops closer than this many standard deviations are one.
 const SAME_SIGMAS: f64 = 0.3;
 
@@ -45,6 +47,15 @@ pub struct LikelihoodTop {
     pub log_likelihood: f64,
 }
 
+/// Another top, judged by the near lines.
+pub(super) struct Candidate {
+    pub(super) state: State,
+    /// ln p over that of the first top.
+    pub(super) gain: f64,
+    /// Whether it may be the highest when judged by all lines.
+    pub(super) close: bool,
+}
+
 /// States near other tops than `top`, the best first, judged by the lines near the vortices.
 ///
 /// `model` is the model of all lines, `near` one of the near lines ([`near_lines`]).
@@ -57,10 +68,10 @@ pub(super) fn other_tops(
     top: State,
     options: &SignalFitOptions,
     evaluations: &mut usize,
-) -> Result<Vec<State>, Error> {
+) -> Result<Vec<Candidate>, Error> {
     let rough = SignalFitOptions { tolerance_sigmas: 0.1, information_stride: 2, ..*options };
     let mut ascent = Ascent { model: near, signals, options: &rough, others: None };
-    let Some((_, at_top)) = ascent.value(&top) else { return Ok(Vec::new()) };
+    let Some((value_at_top, at_top)) = ascent.value(&top) else { return Ok(Vec::new()) };
     let far = model.of_lines(|line| !near.has(line));
     let information = far.information(&top.0, top.1, &options.free, options.fit_powers, options.information_stride)?;
     // at the top of all lines those far pull as the near ones do, the other way
@@ -74,10 +85,15 @@ pub(super) fn other_tops(
             found.push(end);
         }
     }
-    let best = found.iter().map(|(_, log_likelihood)| *log_likelihood).fold(f64::NEG_INFINITY, f64::max);
+    let best = found.iter().map(|(_, log_likelihood)| *log_likelihood).fold(value_at_top, f64::max);
     found.retain(|(state, value)| *value > best - FAR_BELOW && !same(&ascent, &information, state, &top));
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
-    Ok(found.into_iter().take(MOST).map(|(state, _)| state).collect())
+    let candidate = |(state, value): (State, f64)| Candidate {
+        state,
+        gain: value - value_at_top,
+        close: value > best - CLOSE_BELOW,
+    };
+    Ok(found.into_iter().take(MOST).map(candidate).collect())
 }
 
 /// The lines near the vortices of a wake.
