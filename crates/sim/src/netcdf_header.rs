@@ -142,9 +142,9 @@ fn lay_out(header: &mut Header, records: Option<u64>, length: u64) -> Result<(),
     let growing: Vec<bool> = variables.iter().map(grows).collect();
     for (variable, grows) in variables.iter_mut().zip(&growing) {
         // Only the first dimension may be the one that grows.
-        let sizes = variable.dims.iter().skip(usize::from(*grows)).map(|dim| dims[*dim].1);
+        let mut sizes = variable.dims.iter().skip(usize::from(*grows)).map(|dim| dims[*dim].1);
         let product = |run: u64, size: u64| run.checked_mul(size).filter(|_| size > 0);
-        variable.run = sizes.fold(Some(1), |run, size| product(run?, size)).ok_or(BROKEN)?;
+        variable.run = sizes.try_fold(1, product).ok_or(BROKEN)?;
         variable.run.checked_mul(variable.number.bytes()).filter(|bytes| *bytes <= length).ok_or(TRUNCATED)?;
     }
     let of_records = || variables.iter().zip(&growing).filter(|(_, grows)| **grows).map(|(variable, _)| variable);

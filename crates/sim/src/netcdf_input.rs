@@ -147,7 +147,7 @@ impl ClassicFile {
             let dim = dim.to_ascii_lowercase();
             dim == role.name || role.others.contains(&dim.as_str())
         };
-        dims.iter().position(|dim| of_name(dim)).or_else(|| dims.iter().position(|dim| of_axis(dim)))
+        dims.iter().position(of_name).or_else(|| dims.iter().position(of_axis))
     }
 
     /// The dimensions of a variable that have these roles, in their order; dimensions of length 1 may be left over.

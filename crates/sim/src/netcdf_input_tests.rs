@@ -3,12 +3,15 @@
 use super::*;
 use crate::planes_input;
 
-/// The bytes of a classic file: dimensions (0 grows), variables with dimensions, text attributes and values.
-pub(crate) struct Sketch<'a> {
-    pub(crate) version: u8,
-    pub(crate) dims: &'a [(&'a str, u32)],
-    pub(crate) records: u32,
-    pub(crate) variables: Vec<(&'a str, &'a [u32], &'a [(&'a str, &'a str)], Vec<f64>)>,
+/// Name, dimensions, text attributes and values of a variable.
+type Sketched<'a> = (&'a str, &'a [u32], &'a [(&'a str, &'a str)], Vec<f64>);
+
+/// The bytes of a classic file: dimensions (0 grows) and variables.
+struct Sketch<'a> {
+    version: u8,
+    dims: &'a [(&'a str, u32)],
+    records: u32,
+    variables: Vec<Sketched<'a>>,
 }
 
 impl Sketch<'_> {
@@ -57,7 +60,7 @@ impl Sketch<'_> {
         out
     }
 
-    pub(crate) fn bytes(&self) -> Vec<u8> {
+    fn bytes(&self) -> Vec<u8> {
         let mut at = self.header(&vec![0; self.variables.len()]).len() as u64;
         let grows = |dims: &[u32]| dims.first().is_some_and(|dim| self.dims[*dim as usize].1 == 0);
         let mut begin = Vec::new();
