@@ -1,6 +1,6 @@
 //! What can go wrong in a run.
 
-use crate::scene::SceneError;
+use crate::scene::{Problem, SceneError};
 use std::path::PathBuf;
 
 /// Why a run could not be made or finished.
@@ -69,6 +69,27 @@ pub enum Error {
         path: PathBuf,
         /// What the system says.
         source: std::io::Error,
+    },
+    /// The keys of the scene are each allowed, but a run would fail.
+    #[error("{}", .problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Impossible {
+        /// What would make it fail.
+        problems: Vec<Problem>,
+    },
+    /// The run needs more memory than the machine has.
+    #[error(
+        "the run needs {needed} of memory, most of it for {stage}, and {available} are available: {remedy}; --allow-large \
+         runs it all the same"
+    )]
+    TooLarge {
+        /// Forecast of the memory, in words.
+        needed: String,
+        /// Memory that the machine has available, in words.
+        available: String,
+        /// The stage that takes most of it.
+        stage: &'static str,
+        /// Keys and values that would make it fit.
+        remedy: String,
     },
     /// The number of threads cannot be had.
     #[error("--threads {threads}: {reason}")]

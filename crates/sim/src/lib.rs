@@ -50,6 +50,7 @@ pub mod export;
 pub mod flow;
 pub mod geometry;
 pub mod join;
+mod machine;
 pub mod map;
 #[cfg(feature = "netcdf")]
 mod netcdf_input;

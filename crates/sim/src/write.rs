@@ -4,7 +4,7 @@ use crate::Error;
 use crate::export::signals::RawSignals;
 use crate::export::{Field, FileGroup, Provenance, PulseInfo, Ray, Sweep, Table, Unit, VelocityMap, tables};
 use crate::map::VelocityEstimates;
-use crate::plan::Plan;
+use crate::plan::{Plan, Stage, Target};
 use crate::profile::RangeProfile;
 use crate::run::RunResult;
 use std::path::{Path, PathBuf};
@@ -29,11 +29,53 @@ pub fn prepare(folder: &Path) -> Result<(), Error> {
     tried
 }
 
+/// The same for the files of a plan, of which each could meet a folder of its name.
+///
+/// # Errors
+/// As [`prepare`]; a folder that has the name of a file.
+pub fn prepare_for(plan: &Plan, folder: &Path) -> Result<(), Error> {
+    prepare(folder)?;
+    match names(plan).into_iter().map(|name| folder.join(name)).find(|path| path.is_dir()) {
+        Some(path) => {
+            let source = std::io::Error::new(std::io::ErrorKind::IsADirectory, "a folder of that name is in the way");
+            Err(Error::Io { action: "write", path, source })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Names of the files that a run of the plan writes, in the order in which [`write()`] writes them.
+pub fn names(plan: &Plan) -> Vec<String> {
+    let o = plan.scene.scene.outputs;
+    let netcdf = o.netcdf && cfg!(feature = "netcdf");
+    let (svg, png) = (o.svg && cfg!(feature = "plots"), o.png && cfg!(feature = "plots"));
+    let tables = [(o.csv, "csv"), (netcdf, "nc")];
+    let pictures = [(svg, "svg"), (png, "png")];
+    let profile = matches!(plan.target, Target::Run | Target::Efficiency);
+    let mut out = vec!["scene.toml".to_owned()];
+    let mut add = |is_made: bool, stem: &str, kinds: &[(bool, &str)]| {
+        let kinds = kinds.iter().filter(|(wanted, _)| is_made && *wanted);
+        out.extend(kinds.map(|(_, ending)| format!("{stem}.{ending}")));
+    };
+    add(profile, "profile", &tables[..1]);
+    add(profile, "profile", &pictures);
+    add(plan.runs(Stage::CrossPlane), "flow", &tables);
+    add(plan.keeps_signals(), "signals", &tables);
+    add(plan.runs(Stage::Estimates), "map", &tables);
+    add(plan.runs(Stage::Estimates), "map", &pictures);
+    out
+}
+
 /// Writes the results that the plan's scene asks for; returns the paths of the files.
 ///
 /// # Errors
 /// A result that a format cannot hold, or what the system says. Nothing is left half-written.
 pub fn write(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    Ok(files(plan, result, folder)?.commit()?)
+}
+
+/// The files of a run, still in memory.
+pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<FileGroup, Error> {
     let outputs = plan.scene.scene.outputs;
     let origin = provenance(plan);
     let mut files = FileGroup::new(folder);
@@ -76,7 +118,7 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Vec<PathB
         #[cfg(feature = "plots")]
         pictures::add_map(&mut files, plan, &map, &origin)?;
     }
-    Ok(files.commit()?)
+    Ok(files)
 }
 
 /// Where the files of a run come from.

@@ -50,7 +50,7 @@ pub use error::{OutputError, OutputResult};
 pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 #[cfg(feature = "netcdf")]
-pub(crate) use netcdf::FILL;
+pub(crate) use netcdf::{FILL, MAX_BYTES as NETCDF_MAX_BYTES};
 pub use provenance::Provenance;
 
 #[cfg(test)]

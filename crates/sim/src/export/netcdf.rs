@@ -7,7 +7,7 @@ use super::provenance::Provenance;
 use netcdf_writer::{DimensionId, NcAttrValue, NcFileBuilder, NcWriteOptions};
 
 /// The encoder holds several copies of the data in memory; a larger result belongs in one file per time.
-const MAX_BYTES: usize = 512 << 20;
+pub(crate) const MAX_BYTES: usize = 512 << 20;
 
 /// Stored in place of a missing float.
 pub(crate) const FILL: f32 = -9999.0;

@@ -256,10 +256,10 @@ impl Scene {
         ) {
             let n = self.samples_per_record();
             c.require(
-                n <= 100_000_000,
+                n <= 10_000_000,
                 "scan.range_max_m",
                 s.range_max_m,
-                format!("records of at most 100000000 samples; this one has {n}"),
+                format!("records of at most 10000000 samples; this one has {n}"),
             );
             c.require(
                 self.estimator.window_samples <= n,
