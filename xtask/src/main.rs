@@ -7,6 +7,9 @@ mod bless;
 mod ci;
 mod curves;
 mod figures;
+mod forecast;
+mod fuzz_scenes;
+mod process;
 mod regress;
 mod reproduce;
 mod tidy;
@@ -63,6 +66,10 @@ enum Task {
     WorkPrecision(work_precision::Options),
     /// Run the flows with known answers and draw them beside their references.
     Validate(validate::Options),
+    /// Hold the forecasts of time and memory against what ten diverse scenes take.
+    Forecast(forecast::Options),
+    /// Change the default scene at random: what `check` passes must run, and nothing may abort or hang.
+    FuzzScenes(fuzz_scenes::Options),
     /// Check the rules of the house.
     Tidy,
     /// Everything that continuous integration runs.
@@ -76,6 +83,8 @@ fn main() -> std::process::ExitCode {
         Task::Bless(options) => bless::run(&options),
         Task::WorkPrecision(options) => work_precision::run(&options),
         Task::Validate(options) => validate::run(&options),
+        Task::Forecast(options) => forecast::run(&options),
+        Task::FuzzScenes(options) => fuzz_scenes::run(&options),
         Task::Tidy => tidy::run(),
         Task::Ci(options) => ci::run(&options),
     };

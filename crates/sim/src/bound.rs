@@ -72,9 +72,8 @@ pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> 
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let model = join::window_model(scene)?.ok_or(Error::NoBound)?;
     let scanner = Scanner::new(plan, observer)?;
-    let rays: Vec<f64> =
-        g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, scene.scan.pulses_per_line)).collect();
-    let places = ScanGeometry::new(&join::sampling(scene)?, &join::gates(scene)?, &rays, g.samples)?;
+    let (sampling, gates, pulses) = (join::sampling(scene)?, join::gates(scene)?, scene.scan.pulses_per_line);
+    let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
     let correlation = join::window_correlation(scene, scanner.mean_snr())?;
     let radius = region_radius(scene, &scanner, &places, &correlation)?;
     let elevation_rad = g.elevation_rad[g.elevation_rad.len() / 2];

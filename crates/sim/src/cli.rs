@@ -52,10 +52,7 @@ enum Command {
         force: bool,
     },
     /// Check a scene and print the plan: what will run, what is left out and why, at what cost.
-    Check {
-        /// The scene.
-        scene: PathBuf,
-    },
+    Check(CheckWords),
     /// Run the whole measurement and write everything that the scene asks for.
     Run(Io),
     /// Heterodyne efficiency and signal-to-noise ratio against range.
@@ -82,6 +79,22 @@ struct Io {
     /// Replace files in the folder that this program did not write, or that were changed since.
     #[arg(long)]
     overwrite: bool,
+    /// Run even if the forecast of the memory is more than the machine has.
+    #[arg(long)]
+    allow_large: bool,
+}
+
+/// Words of `wakescope check`.
+#[derive(Debug, Args)]
+struct CheckWords {
+    /// The scene.
+    scene: PathBuf,
+    /// Folder that a run is to write to: check it, too.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Accept a scene that needs more memory than the machine has.
+    #[arg(long)]
+    allow_large: bool,
 }
 
 /// Runs the program with the words of the command line; returns its exit code.
@@ -102,7 +115,7 @@ pub fn main() -> u8 {
 fn dispatch(cli: &Cli) -> Result<(), Error> {
     match &cli.command {
         Command::Init { scene, force } => init(scene, *force, cli),
-        Command::Check { scene } => check(scene, cli),
+        Command::Check(words) => check(words, cli),
         Command::Run(io) => execute(io, Target::Run, cli),
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
         Command::Signal(io) => execute(io, Target::Signal, cli),
@@ -127,20 +140,39 @@ fn init(path: &Path, force: bool, cli: &Cli) -> Result<(), Error> {
     say(cli, &json!({ "scene": path }), &format!("wrote {}\nnext: wakescope check {0}", path.display()))
 }
 
-fn check(path: &Path, cli: &Cli) -> Result<(), Error> {
-    let plan = Plan::new(load(path, cli)?, Target::Run)?;
+fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
+    // What is in the way of a run is in the way of it here, too.
+    let out = words.out.as_deref().map(|folder| (folder, Existing::Own));
+    let plan = planned(&words.scene, Target::Run, out, words.allow_large, cli)?;
     if cli.quiet && !cli.json {
         return Ok(());
     }
-    say(cli, &plan_json(&plan), &format!("{}: good\n{plan}", path.display()))
+    say(cli, &plan_json(&plan), &format!("{}: good\n{plan}", words.scene.display()))
+}
+
+/// The plan of a scene, with all that can be known before the computing: limits, memory, a small rehearsal, the folder.
+fn planned(
+    scene: &Path,
+    target: Target,
+    out: Option<(&Path, Existing)>,
+    allow_large: bool,
+    cli: &Cli,
+) -> Result<Plan, Error> {
+    let plan = Plan::new(load(scene, cli)?, target)?;
+    if !allow_large {
+        plan.fits()?;
+    }
+    if let Some((folder, existing)) = out {
+        let names = write::names(&plan);
+        write::prepare(folder, names.iter().map(String::as_str), existing)?;
+    }
+    with_threads(cli, || plan.rehearse())??;
+    Ok(plan)
 }
 
 fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
-    let plan = Plan::new(load(&io.scene, cli)?, target)?;
-    // An output that cannot be used is found before the computing, not after it.
     let existing = if io.overwrite { Existing::Any } else { Existing::Own };
-    let names = write::names(&plan);
-    write::prepare(&io.out, names.iter().map(String::as_str), existing)?;
+    let plan = planned(&io.scene, target, Some((&io.out, existing)), io.allow_large, cli)?;
     let outcome = if cli.quiet {
         with_threads(cli, || run::run(&plan, &Silent))??
     } else {

@@ -70,8 +70,11 @@ impl Geometry {
             gate_first_sample,
             layer_thickness_m,
             first_layer_range_m: scan.range_min_m - near as f64 * layer_thickness_m,
-            layers: (record_m / layer_thickness_m).ceil() as usize + near + far + 1,
-            layers_per_sample: near + far + 1,
+            layers: ((record_m / layer_thickness_m).ceil() as usize)
+                .saturating_add(near)
+                .saturating_add(far)
+                .saturating_add(1),
+            layers_per_sample: near.saturating_add(far).saturating_add(1),
         })
     }
 

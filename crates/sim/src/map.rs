@@ -6,10 +6,10 @@ use crate::progress::Observer;
 use crate::region::{interpolated, region_radius};
 use crate::scan::{Scanner, radial_velocity_m_s};
 use crate::{Error, join};
-use ndarray::{Array2, ArrayView1};
+use ndarray::{Array2, ArrayView1, ArrayView2};
 use wakescope_estimate::{
     ErrorMap, GateVelocity, Gates, MapPoint, NoiseTest, PolarPoint, Radius, Sample, Sampling, Scan, ScanGeometry,
-    WindowCorrelation, polar_points,
+    ScanSums, Statistic, WindowCorrelation, polar_points,
 };
 use wakescope_signal::{Clipped, RangeFilter};
 
@@ -95,7 +95,10 @@ pub(crate) struct Mapper<S> {
     gates: Gates,
     points: Vec<PolarPoint>,
     shape: (usize, usize),
-    elevation_of_ray_rad: Vec<f64>,
+    places: ScanGeometry,
+    record_samples: usize,
+    /// Real numbers that the converter sees in one realisation.
+    samples_of_realisation: f64,
     tools: Toolkit<S>,
     correlation: WindowCorrelation,
     radius: Radius,
@@ -173,9 +176,7 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let pulses = scene.scan.pulses_per_line;
         let correlation = join::window_correlation(scene, scanner.mean_snr())?;
-        let elevation_of_ray_rad: Vec<f64> =
-            g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect();
-        let places = ScanGeometry::new(&sampling, &gates, &elevation_of_ray_rad, g.samples)?;
+        let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
         let radius = region_radius(scene, scanner, &places, &correlation)?;
         let middle = PolarPoint {
             range_m: g.gate_range_m[g.gate_range_m.len() / 2],
@@ -197,7 +198,9 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
             deviation: noise.map_or_else(|| vec![0.0; points.len()], |levels| levels.deviations()),
             points,
             shape,
-            elevation_of_ray_rad,
+            places,
+            record_samples: g.samples,
+            samples_of_realisation: (scanner.pulses() * g.samples * S::KIND.lag_numbers(1)) as f64,
             tools,
             correlation,
             radius,
@@ -215,9 +218,8 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
     }
 
     /// Estimates the velocities of one realisation.
-    fn map(&self, records: &Array2<S>) -> Result<Vec<MapPoint>, Error> {
-        let Toolkit { statistic, estimator, following, .. } = &self.tools;
-        let scan = Scan::new(&**statistic, &self.sampling, &self.gates, &self.elevation_of_ray_rad, records.view())?;
+    fn map(&self, scan: &Scan) -> Result<Vec<MapPoint>, Error> {
+        let Toolkit { estimator, following, .. } = &self.tools;
         let first = scan.map(&self.points, &self.radius, Some(&self.correlation), &**estimator)?;
         let Some(following) = following else { return Ok(first) };
         let velocity_m_s =
@@ -229,9 +231,14 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
         Ok(second)
     }
 
+    /// The sums of a realisation, still without any record.
+    fn sums(&self) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
+        Ok(ScanSums::new(&*self.tools.statistic, &self.gates, self.places.clone(), self.record_samples)?)
+    }
+
     /// Estimates the velocities of one realisation and adds their errors.
-    pub(crate) fn add(&mut self, records: &Array2<S>, clipped: Clipped) -> Result<(), Error> {
-        let map = self.map(records)?;
+    pub(crate) fn add(&mut self, scan: &Scan, clipped: Clipped) -> Result<(), Error> {
+        let map = self.map(scan)?;
         let columns = self.shape.1;
         let velocity = Array2::from_shape_fn(self.shape, |(i, j)| map[i * columns + j].estimate.velocity_m_s);
         self.errors.add(velocity.view(), self.truth.pulse_m_s.view())?;
@@ -250,7 +257,7 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
             (self.level[place], self.n_eff[place]) = (point.level as f64, point.n_eff);
         }
         self.clipped += clipped;
-        self.samples += (records.len() * S::KIND.lag_numbers(1)) as f64;
+        self.samples += self.samples_of_realisation;
         self.realisations += 1;
         Ok(())
     }
@@ -309,21 +316,25 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     Ok(truth)
 }
 
-/// Runs the estimates of all realisations; `keep` is given the records that the files will have.
+/// Runs the estimates of all realisations; the records of those that the files will have go to `kept`, too, piece after piece.
 pub(crate) fn estimate<S: Sample + wakescope_signal::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
-    mut keep: impl FnMut(&Array2<S>),
+    mut kept: impl FnMut(ArrayView2<'_, S>),
 ) -> Result<VelocityEstimates, Error> {
     let mut mapper = Mapper::new(plan, scanner)?;
     observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
     for realisation in 0..plan.realisations() {
-        let (records, clipped) = scanner.samples(realisation, observer)?;
-        if realisation < plan.kept_realisations() {
-            keep(&records);
-        }
-        mapper.add(&records, clipped)?;
+        let mut sums = mapper.sums()?;
+        let clipped = scanner.in_pieces(realisation, observer, |first, records| {
+            if realisation < plan.kept_realisations() {
+                kept(records);
+            }
+            Ok(sums.add(first, records)?)
+        })?;
+        let scan = sums.finish();
+        mapper.add(&scan, clipped)?;
     }
     observer.end();
     Ok(mapper.finish(plan))

@@ -1,17 +1,24 @@
 //! From a scene to a plan: which stages run, which are left out and why, what each will cost.
 //!
-//! Nothing is computed but sizes; the planes of a simulated flow are read. The cost figures are the products of
-//! counts with the unit costs at the end of this file, which `cargo bench` measures; they are forecasts, good to a
-//! factor of two or three on another machine.
+//! Nothing is computed but sizes; the planes of a simulated flow are read. What a run would refuse, the plan refuses. The
+//! forecasts are products of counts with unit costs; `cargo xtask forecast` holds them against what runs take.
 
 use crate::Error;
 use crate::geometry::Geometry;
-use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, SceneFile, SignalsOf, Weighting};
+use crate::scene::{Method, Scene, SceneFile, Weighting};
 use crate::wind::SceneWind;
 use std::fmt;
 
 mod ambiguity;
+mod fit;
 mod optics;
+mod possible;
+mod rehearsal;
+mod sizes;
+mod stages;
+mod units;
+
+pub(crate) use units::{bytes, seconds};
 
 /// What the user asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +54,8 @@ pub enum Stage {
     Estimates,
     /// Estimates against the truth.
     Errors,
+    /// Tables and pictures.
+    Files,
 }
 
 impl Stage {
@@ -62,6 +71,7 @@ impl Stage {
             Stage::Noise => "noise",
             Stage::Estimates => "estimates",
             Stage::Errors => "errors",
+            Stage::Files => "files",
         }
     }
 }
@@ -107,8 +117,8 @@ impl Plan {
     /// Plans a run; reads the planes of a simulated flow.
     ///
     /// # Errors
-    /// Planes that cannot be read or end before the scan; what a crate refuses of the scene, such as phase screens
-    /// too coarse for the turbulence.
+    /// Planes that cannot be read, end before the scan or are left by a line of sight; what a crate refuses of the scene,
+    /// such as phase screens too coarse for the turbulence; results that a file cannot hold.
     pub fn new(scene: SceneFile, target: Target) -> Result<Self, Error> {
         let wind = SceneWind::new(&scene)?;
         let geometry = Geometry::new(&scene.scene, &wind)?;
@@ -124,10 +134,20 @@ impl Plan {
         let mut warnings = warnings(&scene.scene, &wind);
         warnings.extend(ambiguity::warning(&scene.scene)?);
         let optics = optics::stages(&scene.scene, target, &geometry, &mut warnings)?;
-        let stages = stages(&scene.scene, target, &geometry, &wind.source, optics);
+        let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
         let plan = Self { scene, target, stages, geometry, wind, warnings };
+        possible::check(&plan)?;
         crate::write::check(&plan)?;
         Ok(plan)
+    }
+
+    /// Forecast of the whole: computing time on one core, s, and memory, bytes.
+    pub fn total(&self) -> Cost {
+        let none = Cost { core_s: 0.0, memory_bytes: 0.0 };
+        self.stages.iter().filter_map(|s| s.cost).fold(none, |sum, c| Cost {
+            core_s: sum.core_s + c.core_s,
+            memory_bytes: sum.memory_bytes + c.memory_bytes,
+        })
     }
 
     /// Whether a stage runs.
@@ -137,112 +157,18 @@ impl Plan {
 
     /// Realisations whose raw signals are kept for the files.
     pub fn kept_realisations(&self) -> usize {
-        match (self.keeps_signals(), self.scene.scene.outputs.signals_of) {
-            (false, _) => 0,
-            (true, SignalsOf::First) => 1,
-            (true, SignalsOf::All) => self.scene.scene.scan.realisations,
-        }
+        stages::kept_realisations(&self.scene.scene, self.target)
     }
 
     /// Whether raw signals are kept for the files.
     pub fn keeps_signals(&self) -> bool {
-        match self.target {
-            Target::Signal => true,
-            Target::Run => self.scene.scene.outputs.signals,
-            Target::Efficiency | Target::Map => false,
-        }
+        self.kept_realisations() > 0
     }
 
     /// Realisations to run: the raw signals alone need those that are kept.
     pub fn realisations(&self) -> usize {
         if self.runs(Stage::Estimates) { self.scene.scene.scan.realisations } else { self.kept_realisations() }
     }
-}
-
-fn stages(scene: &Scene, target: Target, g: &Geometry, wind: &str, optics: [PlannedStage; 2]) -> Vec<PlannedStage> {
-    let run = |stage, reason: String, core_s: f64, memory_bytes: f64| PlannedStage {
-        stage,
-        reason,
-        cost: Some(Cost { core_s, memory_bytes }),
-    };
-    let skip = |stage, reason: &str| PlannedStage { stage, reason: reason.into(), cost: None };
-
-    let lines = g.elevation_rad.len();
-    let signals = target != Target::Efficiency;
-    let maps = matches!(target, Target::Run | Target::Map);
-    let keeps = target == Target::Signal || (target == Target::Run && scene.outputs.signals);
-    let keeps_all = keeps && scene.outputs.signals_of == SignalsOf::All;
-    let realisations = if maps || keeps_all { scene.scan.realisations } else { 1 };
-    // Those that are worked on, and those that wait for the files.
-    let held = if keeps_all { 1 + realisations } else { 1 + usize::from(keeps) };
-    let records = (lines * scene.scan.pulses_per_line) as f64;
-    let samples = g.samples as f64;
-    let layers = (lines * g.layers) as f64;
-    let calm = matches!(scene.flow, Flow::Calm {});
-
-    let mut out = vec![skip(Stage::FlowSimulation, wind)];
-    out.push(if target != Target::Run || !scene.outputs.flow {
-        skip(Stage::CrossPlane, "not asked for")
-    } else if calm {
-        skip(Stage::CrossPlane, "flow.kind is \"calm\"")
-    } else {
-        let (ny, nz) = crate::plane::POINTS;
-        let points = (ny * nz) as f64;
-        run(Stage::CrossPlane, format!("{ny} x {nz} points"), points * WIND_POINT_S, points * 48.0)
-    });
-    out.extend(optics);
-    out.push(if signals {
-        let reason = format!("{lines} lines of {} layers of {:.3} m", g.layers, g.layer_thickness_m);
-        run(Stage::LinesOfSight, reason, if calm { 0.0 } else { layers * WIND_POINT_S }, layers * 16.0)
-    } else {
-        skip(Stage::LinesOfSight, "not asked for")
-    });
-    out.push(if signals {
-        let reason =
-            format!("{realisations} x {records} records of {} samples, {} layers each", g.samples, g.layers_per_sample);
-        let terms = realisations as f64 * records * samples * g.layers_per_sample as f64;
-        run(Stage::Signals, reason, terms * LAYER_SAMPLE_S, held as f64 * records * samples * 8.0)
-    } else {
-        skip(Stage::Signals, "not asked for")
-    });
-    out.push(match scene.detector.noise {
-        _ if !signals => skip(Stage::Noise, "not asked for"),
-        NoiseKind::None => skip(Stage::Noise, "detector.noise is \"none\""),
-        _ => {
-            let values = realisations as f64 * records * samples;
-            run(Stage::Noise, format!("{values} samples"), values * NOISE_SAMPLE_S, samples * 64.0)
-        }
-    });
-    let gates = g.gate_range_m.len();
-    out.push(if maps {
-        let windows = ((g.samples - scene.estimator.window_samples) / scene.estimator.window_step_samples + 1) as f64;
-        let region = match scene.estimator.method {
-            Method::Periodogram => "no region".to_owned(),
-            _ => match &scene.estimator.radius {
-                RegionRadius::Fixed {} => format!("regions of {} m", scene.estimator.radius_m),
-                RegionRadius::OfRange { .. } => "regions whose radius depends on range".to_owned(),
-                RegionRadius::Target { standard_deviation_m_s, .. } => {
-                    format!("regions for a standard deviation of {standard_deviation_m_s} m/s")
-                }
-            },
-        };
-        let reason = format!("{lines} x {gates} gates, {region}");
-        let lags = scene.estimator.window_samples as f64;
-        let core_s = realisations as f64
-            * (records * windows * lags * WINDOW_LAG_S
-                + (lines * gates) as f64 * scene.estimator.padded_samples as f64 * SPECTRUM_POINT_S);
-        run(Stage::Estimates, reason, core_s, lines as f64 * windows * lags * 8.0)
-    } else {
-        skip(Stage::Estimates, "not asked for")
-    });
-    out.push(if maps {
-        let cells = (lines * gates) as f64;
-        let reason = format!("against v_pulse (28) and v_gate over {realisations} realisations");
-        run(Stage::Errors, reason, cells * TRUTH_CELL_S, cells * 80.0)
-    } else {
-        skip(Stage::Errors, "not asked for")
-    });
-    out
 }
 
 /// What is allowed but probably not meant.
@@ -279,25 +205,18 @@ fn warnings(scene: &Scene, wind: &SceneWind) -> Vec<String> {
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "scene {}, seed {}", self.scene.hash, self.scene.scene.seed)?;
-        let (mut total_s, mut peak_bytes) = (0.0, 0.0);
         for s in &self.stages {
             match s.cost {
                 Some(c) => {
-                    let name = s.stage.name();
-                    writeln!(
-                        f,
-                        "  run   {name:<16} {:>9} {:>10}   {}",
-                        seconds(c.core_s),
-                        bytes(c.memory_bytes),
-                        s.reason
-                    )?;
-                    total_s += c.core_s;
-                    peak_bytes += c.memory_bytes;
+                    let (time, memory) = (units::seconds(c.core_s), units::bytes(c.memory_bytes));
+                    writeln!(f, "  run   {:<16} {time:>10} {memory:>10}   {}", s.stage.name(), s.reason)?;
                 }
-                None => writeln!(f, "  skip  {:<16} {:>9} {:>10}   {}", s.stage.name(), "", "", s.reason)?,
+                None => writeln!(f, "  skip  {:<16} {:>10} {:>10}   {}", s.stage.name(), "", "", s.reason)?,
             }
         }
-        writeln!(f, "  total {:<16} {:>9} {:>10}   forecast for one core", "", seconds(total_s), bytes(peak_bytes))?;
+        let Cost { core_s, memory_bytes } = self.total();
+        let (time, memory) = (units::seconds(core_s), units::bytes(memory_bytes));
+        writeln!(f, "  total {:<16} {time:>10} {memory:>10}   forecast for one core", "")?;
         for w in &self.warnings {
             writeln!(f, "  warning: {w}")?;
         }
@@ -305,36 +224,10 @@ impl fmt::Display for Plan {
     }
 }
 
-pub(crate) fn seconds(s: f64) -> String {
-    match s {
-        s if s < 1e-3 => "< 1 ms".into(),
-        s if s < 1.0 => format!("{:.0} ms", s * 1e3),
-        s if s < 120.0 => format!("{s:.1} s"),
-        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
-    }
-}
-
-pub(crate) fn bytes(b: f64) -> String {
-    match b {
-        b if b < 1e5 => format!("{:.1} kB", b / 1e3),
-        b if b < 1e9 => format!("{:.1} MB", b / 1e6),
-        b => format!("{:.1} GB", b / 1e9),
-    }
-}
-
-// Unit costs on one core.
-const WIND_POINT_S: f64 = 3e-8;
-const LAYER_SAMPLE_S: f64 = 7.5e-10;
-const NOISE_SAMPLE_S: f64 = 4e-8;
-const WINDOW_LAG_S: f64 = 5e-9;
-const SPECTRUM_POINT_S: f64 = 1e-8;
-const TRUTH_CELL_S: f64 = 1e-6;
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{SnrReference, VortexPair};
+    use crate::scene::{Flow, NoiseKind, SnrReference, VortexPair};
 
     fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
         let mut scene = Scene::default();
@@ -349,10 +242,11 @@ mod tests {
     #[test]
     fn each_target_runs_only_what_it_needs() {
         let stages = |target| run_stages(&plan(target, |_| {}));
-        assert_eq!(stages(Target::Efficiency), ["efficiency"]);
-        assert_eq!(stages(Target::Signal), ["efficiency", "lines of sight", "signals", "noise"]);
-        assert_eq!(stages(Target::Map), ["efficiency", "lines of sight", "signals", "noise", "estimates", "errors"]);
-        assert_eq!(stages(Target::Run).len(), 7);
+        assert_eq!(stages(Target::Efficiency), ["efficiency", "files"]);
+        let signal = ["efficiency", "lines of sight", "signals", "noise"];
+        assert_eq!(stages(Target::Signal), [&signal[..], &["files"]].concat());
+        assert_eq!(stages(Target::Map), [&signal[..], &["estimates", "errors", "files"]].concat());
+        assert_eq!(stages(Target::Run).len(), 8);
     }
 
     #[test]
@@ -361,7 +255,7 @@ mod tests {
             s.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
             s.detector.noise = NoiseKind::None;
         });
-        assert_eq!(run_stages(&lean), ["lines of sight", "signals", "estimates", "errors"]);
+        assert_eq!(run_stages(&lean), ["lines of sight", "signals", "estimates", "errors", "files"]);
         assert!(lean.stages.iter().filter(|s| s.cost.is_none()).all(|s| !s.reason.is_empty()));
         let calm = plan(Target::Run, |s| s.flow = Flow::Calm {});
         assert!(!calm.runs(Stage::CrossPlane));
@@ -369,11 +263,8 @@ mod tests {
 
     #[test]
     fn forecasts_grow_with_the_work() {
-        let cost = |change: fn(&mut Scene)| {
-            plan(Target::Map, change).stages.iter().filter_map(|s| s.cost).map(|c| c.core_s).sum::<f64>()
-        };
-        let once = cost(|s| s.scan.realisations = 10);
-        let twice = cost(|s| s.scan.realisations = 20);
+        let once = plan(Target::Map, |s| s.scan.realisations = 100).total().core_s;
+        let twice = plan(Target::Map, |s| s.scan.realisations = 200).total().core_s;
         assert!((1.9..2.0).contains(&(twice / once)), "{}", twice / once);
     }
 

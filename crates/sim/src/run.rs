@@ -7,11 +7,12 @@ use crate::plan::{Plan, Stage, Target};
 use crate::plane;
 use crate::profile::{RangeProfile, range_profile};
 use crate::progress::Observer;
+use crate::region::of_table;
 use crate::scan::Scanner;
 use crate::scene::DetectorSignal;
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 use num_complex::Complex;
-use wakescope_estimate::Sample;
+use wakescope_estimate::{Sample, SignalKind};
 
 /// What a run gives; absent is what was not asked for.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -28,6 +29,40 @@ pub struct RunResult {
     pub line_velocity_m_s: Option<Array2<f64>>,
     /// The velocity map with its errors.
     pub map: Option<VelocityEstimates>,
+    /// What comes back from the middle of the scan.
+    pub middle: Option<ScanMiddle>,
+}
+
+/// Efficiency and signal-to-noise ratio at the range in the middle of the scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScanMiddle {
+    /// The range, m.
+    pub range_m: f64,
+    /// Efficiency; NaN if the profile does not reach there.
+    pub efficiency: f64,
+    /// Mean signal-to-noise ratio (14) in the detector band, dB; that of the signals where there are any.
+    pub snr_db: f64,
+}
+
+impl ScanMiddle {
+    /// From the profile, and from the layers of the signals where there are any.
+    fn of(plan: &Plan, profile: Option<&RangeProfile>, scanner: Option<&Scanner<'_>>) -> Option<Self> {
+        let scan = &plan.scene.scene.scan;
+        let range_m = 0.5 * (scan.range_min_m + scan.range_max_m);
+        let of_profile = |values: &dyn Fn(&RangeProfile) -> Vec<f64>| {
+            let profile = profile?;
+            let (first, last) = (profile.efficiency.range_m.first()?, profile.efficiency.range_m.last()?);
+            let inside = (*first..=*last).contains(&range_m);
+            inside.then(|| of_table(&profile.efficiency.range_m, &values(profile), range_m))
+        };
+        let of_signals = scanner.map(|scanner| {
+            let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
+            10.0 * of_table(&layer_m, &snr, range_m).log10()
+        });
+        let efficiency = of_profile(&|p| p.efficiency.mean.clone());
+        let snr_db = of_signals.or_else(|| of_profile(&|p| p.snr_db.clone()))?;
+        Some(Self { range_m, efficiency: efficiency.unwrap_or(f64::NAN), snr_db })
+    }
 }
 
 /// One line of the summary that a person or a program reads.
@@ -49,6 +84,7 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let mut result = RunResult::default();
     if matches!(plan.target, Target::Run | Target::Efficiency) {
         result.profile = Some(range_profile(&plan.scene.scene, observer)?);
+        result.middle = ScanMiddle::of(plan, result.profile.as_ref(), None);
     }
     if plan.runs(Stage::CrossPlane) {
         observer.begin(Stage::CrossPlane, 1);
@@ -57,60 +93,50 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     }
     if plan.runs(Stage::Signals) {
         let scanner = Scanner::new(plan, observer)?;
+        result.middle = ScanMiddle::of(plan, result.profile.as_ref(), Some(&scanner));
         match plan.scene.scene.detector.signal {
-            DetectorSignal::IntermediateFrequency => {
-                signals_and_map(plan, &scanner, observer, &mut result, |records: &Array2<f64>| {
-                    (records.clone(), None)
-                })?;
-            }
-            DetectorSignal::Baseband => {
-                let parts = |records: &Array2<Complex<f64>>| (records.mapv(|s| s.re), Some(records.mapv(|s| s.im)));
-                signals_and_map(plan, &scanner, observer, &mut result, parts)?;
-            }
+            DetectorSignal::IntermediateFrequency => signals_and_map::<f64>(plan, &scanner, observer, &mut result)?,
+            DetectorSignal::Baseband => signals_and_map::<Complex<f64>>(plan, &scanner, observer, &mut result)?,
         }
     }
     Ok(result)
 }
 
-/// Current and second quadrature of one realisation.
-type Parts = (Array2<f64>, Option<Array2<f64>>);
-
-/// Signals and the map, as the plan has them; `parts` takes records apart for the files.
+/// Signals and the map, as the plan has them.
 fn signals_and_map<S: Sample + wakescope_signal::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
     result: &mut RunResult,
-    parts: impl Fn(&Array2<S>) -> Parts,
 ) -> Result<(), Error> {
-    let mut kept: Vec<Parts> = Vec::new();
+    let realisations = plan.kept_realisations();
+    let mut kept =
+        (realisations > 0).then(|| Kept::new(realisations * scanner.pulses() * plan.geometry.samples, S::KIND));
+    let mut keep = |records: ArrayView2<'_, S>| {
+        if let Some(kept) = &mut kept {
+            kept.add(records);
+        }
+    };
     if plan.runs(Stage::Estimates) {
-        result.map = Some(map::estimate(plan, scanner, observer, |records| kept.push(parts(records)))?);
+        result.map = Some(map::estimate(plan, scanner, observer, keep)?);
     } else {
         let steps = (plan.realisations() * plan.geometry.elevation_rad.len()) as u64;
         observer.begin(Stage::Signals, steps);
         for realisation in 0..plan.realisations() {
-            kept.push(parts(&scanner.samples(realisation, observer)?.0));
+            scanner.in_pieces(realisation, observer, |_, records| {
+                keep(records);
+                Ok(())
+            })?;
         }
         observer.end();
     }
-    if !kept.is_empty() {
-        let (current, quadrature): (Vec<_>, Vec<_>) = kept.into_iter().unzip();
-        let quadrature: Option<Vec<Array2<f64>>> = quadrature.into_iter().collect();
-        result.signals_a = Some(joined(&current));
-        result.quadrature_a = quadrature.map(|parts| joined(&parts));
+    if let Some(Kept { in_phase, quadrature }) = kept {
+        let shape = (realisations * scanner.pulses(), plan.geometry.samples);
+        result.signals_a = Array2::from_shape_vec(shape, in_phase).ok();
+        result.quadrature_a = quadrature.and_then(|values| Array2::from_shape_vec(shape, values).ok());
         result.line_velocity_m_s = Some(line_velocities(scanner));
     }
     Ok(())
-}
-
-/// Arrays of equal rows below each other.
-fn joined(parts: &[Array2<f64>]) -> Array2<f64> {
-    let columns = parts.first().map_or(0, Array2::ncols);
-    let mut out = Array2::zeros((parts.iter().map(Array2::nrows).sum(), columns));
-    let all = parts.iter().flat_map(|part| part.outer_iter());
-    out.outer_iter_mut().zip(all).for_each(|(mut row, from)| row.assign(&from));
-    out
 }
 
 fn line_velocities(scanner: &Scanner<'_>) -> Array2<f64> {
@@ -119,16 +145,37 @@ fn line_velocities(scanner: &Scanner<'_>) -> Array2<f64> {
     Array2::from_shape_fn((lines.len(), layers), |(i, l)| lines[i].radial_velocity_m_s[l])
 }
 
+/// The records that are kept for the files, as real numbers.
+struct Kept {
+    in_phase: Vec<f64>,
+    quadrature: Option<Vec<f64>>,
+}
+
+impl Kept {
+    fn new(samples: usize, kind: SignalKind) -> Self {
+        let quadrature = (kind == SignalKind::Complex).then(|| Vec::with_capacity(samples));
+        Self { in_phase: Vec::with_capacity(samples), quadrature }
+    }
+
+    fn add<S: Sample>(&mut self, records: ArrayView2<'_, S>) {
+        self.in_phase.extend(records.iter().map(|sample| sample.to_complex().re));
+        if let Some(quadrature) = &mut self.quadrature {
+            quadrature.extend(records.iter().map(|sample| sample.to_complex().im));
+        }
+    }
+}
+
 impl RunResult {
     /// The results in a few numbers.
     pub fn summary(&self) -> Vec<SummaryLine> {
         let mut out = Vec::new();
         let mut line = |key, text, value| out.push(SummaryLine { key, text, value });
+        if let Some(middle) = &self.middle {
+            line("scan_range_m", "middle of the scan [m]", middle.range_m);
+            line("scan_efficiency", "efficiency there", middle.efficiency);
+            line("scan_snr_db", "signal-to-noise ratio there [dB]", middle.snr_db);
+        }
         if let Some(p) = &self.profile {
-            let middle = p.snr_db.len() / 2;
-            line("profile_range_m", "middle of the profile [m]", p.efficiency.range_m[middle]);
-            line("efficiency", "efficiency there", p.efficiency.mean[middle]);
-            line("snr_db", "signal-to-noise ratio there [dB]", p.snr_db[middle]);
             if let Some(fraction) = p.lost_power_fraction {
                 line("lost_power_fraction", "power lost at the screens' border (< 0.01)", fraction);
             }

@@ -7,8 +7,9 @@ use crate::progress::Observer;
 use crate::scene::{Outside, Scene, SnrReference};
 use crate::streams::stream;
 use crate::{Error, join};
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
+use std::ops::Range;
 use wakescope_optics::plan::Model;
 use wakescope_signal::{
     Clipped, Digitiser, EfficiencyTable, LayerEfficiency, LineOfSight, PulseKey, Sample, Scan, Shot, Simulator,
@@ -92,35 +93,63 @@ impl<'a> Scanner<'a> {
     /// The signals of one realisation \[pulse, sample\], A; the pulses of a line stand together.
     ///
     /// # Errors
-    /// As [`Scanner::samples`].
+    /// As [`Scanner::in_pieces`].
     pub fn records(&self, realisation: usize, observer: &dyn Observer) -> Result<Array2<f64>, Error> {
-        Ok(self.samples(realisation, observer)?.0)
+        Ok(self.piece(realisation, 0..self.pulses(), observer)?.0)
     }
 
-    /// The signals of one realisation \[pulse, sample\], A, real at the intermediate frequency or complex about zero, and how
-    /// many samples the converter clipped.
+    /// Pulses of one realisation.
+    pub fn pulses(&self) -> usize {
+        self.lines.len() * self.scene.scan.pulses_per_line
+    }
+
+    /// Hands the signals of one realisation to `sink`, piece after piece: the number of the first pulse and the records
+    /// \[pulse, sample\], A, real at the intermediate frequency or complex about zero. The pulses of a line stand together.
+    /// Returns how many samples the converter clipped.
     ///
-    /// Every pulse has its own random stream, keyed by realisation, line and pulse.
+    /// A piece has [`records_at_once`] records, however many pulses there are. Every pulse has its own random stream, keyed by
+    /// realisation, line and pulse.
     ///
     /// # Errors
-    /// What the signal simulation refuses; a checked scene gives none.
-    pub fn samples<T: Sample>(
+    /// What the signal simulation refuses; a checked scene gives none; and the errors of `sink`.
+    pub fn in_pieces<T: Sample>(
         &self,
         realisation: usize,
         observer: &dyn Observer,
+        mut sink: impl FnMut(usize, ArrayView2<'_, T>) -> Result<(), Error>,
+    ) -> Result<Clipped, Error> {
+        let size = records_at_once::<T>(self.simulator.record().samples, self.pulses());
+        let mut clipped = Clipped::default();
+        for first in (0..self.pulses()).step_by(size) {
+            let last = (first + size).min(self.pulses());
+            let (records, here) = self.piece(realisation, first..last, observer)?;
+            clipped += here;
+            sink(first, records.view())?;
+        }
+        Ok(clipped)
+    }
+
+    /// The records of some pulses of a realisation.
+    fn piece<T: Sample>(
+        &self,
+        realisation: usize,
+        pulses: Range<usize>,
+        observer: &dyn Observer,
     ) -> Result<(Array2<T>, Clipped), Error> {
-        let (lines, pulses_per_line) = (self.lines.len(), self.scene.scan.pulses_per_line);
-        let index = |key: PulseKey| (realisation * lines + key.line) * pulses_per_line + key.pulse;
+        let per_line = self.scene.scan.pulses_per_line;
+        let index = |key: PulseKey| realisation * self.pulses() + pulses.start + key.pulse;
         let scan = Scan {
             simulator: &self.simulator,
-            lines,
-            pulses_per_line,
+            // One line after the other, which the simulation of signals need not know.
+            lines: 1,
+            pulses_per_line: pulses.len(),
             shot: |key: PulseKey| {
-                if key.pulse == 0 {
+                let pulse = pulses.start + key.pulse;
+                if pulse.is_multiple_of(per_line) {
                     observer.advance(1);
                 }
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
-                Shot { line: &self.lines[key.line], efficiency }
+                Shot { line: &self.lines[pulse / per_line], efficiency }
             },
             generator: |key| stream(self.scene.seed, "signal", index(key) as u64),
             digitiser: self.digitiser,
@@ -128,6 +157,15 @@ impl<'a> Scanner<'a> {
         Ok(scan.collect()?)
     }
 }
+
+/// Records that are in memory at a time: some ten megabytes of them, and enough for every thread.
+pub(crate) fn records_at_once<T>(samples: usize, pulses: usize) -> usize {
+    let record_bytes = samples.max(1) * size_of::<T>();
+    (PIECE_BYTES / record_bytes).max(rayon::current_num_threads()).min(pulses.max(1))
+}
+
+/// Size of a piece of records, bytes.
+const PIECE_BYTES: usize = 16 << 20;
 
 /// Return per metre of each layer, K^2 beta A_R eta_s/R^2; the efficiency is interpolated. It is left out if each pulse brings
 /// its own.

@@ -76,6 +76,11 @@ pub fn names(plan: &Plan) -> Vec<String> {
 /// A result that a format cannot hold, a file in the way that may not be replaced, or what the system says. Nothing is
 /// left half-written.
 pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+    put(files(plan, result, folder)?, folder, existing)
+}
+
+/// The files of a run, still in memory.
+pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<FileGroup, Error> {
     let outputs = &plan.scene.scene.outputs;
     let origin = provenance(plan);
     let mut files = FileGroup::new(folder);
@@ -123,7 +128,7 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing)
         #[cfg(feature = "plots")]
         pictures::add_map(&mut files, plan, &map, &origin)?;
     }
-    put(files, folder, existing)
+    Ok(files)
 }
 
 /// Puts the files of a run into their folder, where no other run may be writing.

@@ -7,6 +7,10 @@
 use std::fs::{self, OpenOptions};
 use std::path::Path;
 use std::process::{Command, Output};
+use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::progress::Silent;
+use wakescope_sim::scene::SceneFile;
+use wakescope_sim::write;
 
 /// A scene small enough to run in a moment.
 const SMALL: &str = r#"
@@ -86,6 +90,77 @@ fn missing_files_and_unusable_outputs_are_refused() {
     assert!(refused("", &["run", "s.toml"]).contains("--out"));
     assert!(refused("", &["run", "s.toml", "--out", "o", "--threads", "0"]).contains("--threads"));
     assert!(refused("", &["check", "s.toml", "--seed", "18446744073709551615"]).contains("seed"));
+}
+
+#[test]
+fn a_folder_in_the_way_of_a_file_is_found_before_the_computing() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
+    std::fs::create_dir_all(temp.path().join("o/map.csv")).unwrap();
+    for words in [&["check", "s.toml", "--out", "o"][..], &RUN] {
+        let out = wakescope(temp.path(), words);
+        let message = String::from_utf8(out.stderr).unwrap();
+        assert_eq!(out.status.code(), Some(2), "{message}");
+        assert!(message.contains("o/map.csv") && !message.contains("phase screens"), "{words:?}: {message}");
+    }
+    assert!(wakescope(temp.path(), &["check", "s.toml"]).status.success());
+    // Each file that a run writes is among those that are looked for.
+    for (target, left_out) in [
+        (Target::Efficiency, "none"),
+        (Target::Signal, "none"),
+        (Target::Map, "none"),
+        (Target::Run, "csv"),
+        (Target::Run, "netcdf"),
+        (Target::Run, "svg"),
+        (Target::Run, "png"),
+        (Target::Run, "flow"),
+    ] {
+        let kinds = ["csv", "netcdf", "svg", "png", "flow"].map(|kind| format!("{kind} = {}\n", kind != left_out));
+        let scene = SMALL.replace("realisations = 3", "realisations = 1") + &kinds.concat();
+        let plan = Plan::new(SceneFile::parse(&scene, Path::new("s.toml")).unwrap(), target).unwrap();
+        let result = wakescope_sim::run::run(&plan, &Silent).unwrap();
+        let written = write::write(&plan, &result, &temp.path().join("w")).unwrap();
+        let written: Vec<_> = written.iter().map(|p| p.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(write::names(&plan), written, "{target:?} without {left_out}");
+    }
+}
+
+#[test]
+fn what_is_larger_than_the_machine_is_refused_unless_asked_for() {
+    let scene = "[scan]\npulses_per_line = 1000000\nrealisations = 1000\n[outputs]\nsignals = true\nnetcdf = false\n";
+    for words in [&["check", "s.toml"][..], &RUN] {
+        let message = refused(scene, words);
+        for part in ["TB of memory", "are available", "outputs.signals = false", "--allow-large"] {
+            assert!(message.contains(part), "{part} is not in: {message}");
+        }
+    }
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("s.toml"), scene).unwrap();
+    let out = wakescope(temp.path(), &["check", "s.toml", "--allow-large"]);
+    let text = String::from_utf8(out.stdout).unwrap();
+    assert!(out.status.success() && text.contains(" years") && text.contains(" TB"), "{text}");
+    let too_large_for_a_file = scene.replace("netcdf = false", "netcdf = true");
+    assert!(refused(&too_large_for_a_file, &["check", "s.toml", "--allow-large"]).contains("outputs.netcdf = true"));
+}
+
+#[test]
+fn the_summary_speaks_of_the_middle_of_the_scan() {
+    let temp = tempfile::tempdir().unwrap();
+    let scene = SMALL.replace("reference = \"fixed\"\nsnr_db = 10.0", "reference = \"physical\"")
+        + "profile_range_min_m = 340.0\nprofile_range_max_m = 420.0\nsvg = false\npng = false\n";
+    std::fs::write(temp.path().join("s.toml"), scene).unwrap();
+    let mut found = Vec::new();
+    for stage in ["run", "efficiency", "map"] {
+        let out = wakescope(temp.path(), &[stage, "s.toml", "--out", stage, "--json"]);
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert_eq!(json["results"]["scan_range_m"], 380.0);
+        found.push(json["results"]["scan_snr_db"].as_f64().unwrap());
+    }
+    let text = std::fs::read_to_string(temp.path().join("run/profile.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').collect()).collect();
+    let column = rows[0].iter().position(|name| *name == "snr_db").unwrap();
+    let at_380: f64 = rows.iter().find(|r| r[0] == "380.0").unwrap()[column].parse().unwrap();
+    assert!(found.iter().all(|snr_db| (snr_db - at_380).abs() < 0.01), "{found:?} {at_380}");
 }
 
 #[test]

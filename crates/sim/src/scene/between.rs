@@ -187,9 +187,9 @@ impl Scene {
         let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
         let sampling_hz = self.detector.sampling_hz;
         let (samples, spacing_m) = (self.samples_per_record(), self.sample_spacing_m());
-        let many = format!("records of at most 100000000 samples; this one has {samples}");
+        let many = format!("records of at most 10000000 samples; this one has {samples}");
         c.between(
-            samples <= 100_000_000,
+            samples <= 10_000_000,
             &[
                 side("scan.range_max_m", last_m, many.clone()),
                 side("scan.range_min_m", first_m, many.clone()),

@@ -1,0 +1,42 @@
+//! What a run would refuse after it has begun to compute, found from the sizes and a few points of the wind.
+//!
+//! Check: scenes that only a run used to refuse are refused by the plan, with the words of the run.
+
+use super::{Plan, Target};
+use crate::Error;
+use crate::scan::radial_velocity_m_s;
+use crate::scene::{Flow, Outside};
+
+/// Refuses what a run of the plan would refuse: lines that leave a simulated flow.
+///
+/// # Errors
+/// The first place outside, in the words of the run.
+pub(super) fn check(plan: &Plan) -> Result<(), Error> {
+    if plan.target == Target::Efficiency { Ok(()) } else { lines_stay_inside(plan) }
+}
+
+/// Layers of a line that are looked at one by one.
+const LAYERS_LOOKED_AT: usize = 1_000_000;
+
+/// A simulated flow is known in a rectangle, so a line is inside if both its ends above the ground are; the line of which one
+/// is not is looked at layer by layer.
+fn lines_stay_inside(plan: &Plan) -> Result<(), Error> {
+    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    if !matches!(scene.flow, Flow::Simulated(_)) || scene.scan.outside_flow != (Outside::Error {}) {
+        return Ok(());
+    }
+    let last_m = g.first_layer_range_m + g.layers.saturating_sub(1) as f64 * g.layer_thickness_m;
+    for (line, elevation_rad) in g.elevation_rad.iter().enumerate() {
+        // Where a line that points down meets the ground.
+        let sin = elevation_rad.sin();
+        let ground_m = if sin < 0.0 { -scene.scan.lidar_height_m / sin } else { f64::INFINITY };
+        let ends_m = [g.first_layer_range_m, last_m.min(ground_m)];
+        if g.first_layer_range_m <= ground_m && radial_velocity_m_s(plan, line, &ends_m).is_err() {
+            // The words of the run: the first layer outside.
+            let ranges_m: Vec<f64> = g.layer_range_m().take(LAYERS_LOOKED_AT).collect();
+            radial_velocity_m_s(plan, line, &ranges_m)?;
+            radial_velocity_m_s(plan, line, &ends_m)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,100 @@
+//! How many there are of everything that a run works on, from the scene alone.
+//!
+//! All are floating-point numbers: products of what a scene may say go far beyond what an integer holds.
+
+use super::Target;
+use super::stages::kept_realisations;
+use crate::geometry::Geometry;
+use crate::scene::{DetectorSignal, Flow, Method, Scene, Weighting};
+
+/// Numbers of things in one run.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sizes {
+    /// Lines of sight.
+    pub(super) lines: f64,
+    /// Records of one realisation.
+    pub(super) records: f64,
+    /// Samples of a record.
+    pub(super) samples: f64,
+    /// Real numbers of a sample: 2 for two quadratures.
+    pub(super) parts: f64,
+    /// Scattering layers of a line.
+    pub(super) layers: f64,
+    /// Layers that contribute to one sample.
+    pub(super) layers_per_sample: f64,
+    /// Realisations.
+    pub(super) realisations: f64,
+    /// Samples of a window.
+    pub(super) window: f64,
+    /// Windows of a record.
+    pub(super) windows: f64,
+    /// Real numbers that are kept of a window.
+    pub(super) numbers: f64,
+    /// Points of the map.
+    pub(super) cells: f64,
+    /// Frequencies at which a spectrum is sought for its peak.
+    pub(super) frequencies: f64,
+    /// Lines of sight that a region touches in the middle of the scan.
+    pub(super) chords: f64,
+}
+
+impl Sizes {
+    pub(super) fn new(scene: &Scene, target: Target, g: &Geometry) -> Self {
+        let (e, d) = (&scene.estimator, &scene.detector);
+        let lines = g.elevation_rad.len() as f64;
+        let parts = if d.signal == DetectorSignal::Baseband { 2.0 } else { 1.0 };
+        let window = e.window_samples as f64;
+        let maps = matches!(target, Target::Run | Target::Map);
+        let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
+        let radius_m = if e.method == Method::Periodogram { 0.0 } else { largest_radius_m(scene) };
+        let half_rad = if radius_m < middle_m { (radius_m / middle_m).asin() } else { std::f64::consts::PI };
+        Self {
+            lines,
+            records: lines * scene.scan.pulses_per_line as f64,
+            samples: g.samples as f64,
+            parts,
+            layers: g.layers as f64,
+            layers_per_sample: g.layers_per_sample as f64,
+            realisations: if maps { scene.scan.realisations } else { kept_realisations(scene, target) } as f64,
+            window,
+            windows: ((g.samples - e.window_samples) / e.window_step_samples + 1) as f64,
+            numbers: numbers(scene, parts),
+            cells: lines * g.gate_range_m.len() as f64,
+            frequencies: e.padded_samples as f64 * d.bandwidth_hz / d.sampling_hz,
+            chords: (2.0 * half_rad / scene.scan.elevation_step_rad + 1.0).min(lines),
+        }
+    }
+}
+
+/// Real numbers that the statistic keeps of a window.
+fn numbers(scene: &Scene, parts: f64) -> f64 {
+    let e = &scene.estimator;
+    let window = e.window_samples as f64;
+    match e.method {
+        Method::GradientLikelihood => 2.0 * e.gradients as f64 * window + 1.0,
+        _ if keeps_few_lags(scene) => parts * (e.order as f64 + 1.0),
+        _ => parts * window,
+    }
+}
+
+/// Whether the statistic is the few lags that a model of the scene's order needs.
+pub(super) fn keeps_few_lags(scene: &Scene) -> bool {
+    let e = &scene.estimator;
+    matches!(e.method, Method::Autoregressive | Method::AutoregressivePole | Method::Capon)
+        && e.weighting == Weighting::Rectangular
+}
+
+/// The largest radius of a region, m.
+fn largest_radius_m(scene: &Scene) -> f64 {
+    use crate::scene::RegionRadius;
+    match &scene.estimator.radius {
+        RegionRadius::Fixed {} => scene.estimator.radius_m,
+        RegionRadius::OfRange { radius_m, .. } => radius_m.iter().copied().fold(0.0, f64::max),
+        RegionRadius::Target { largest_m, .. } => *largest_m,
+    }
+}
+
+/// Whether the air is at rest everywhere.
+pub(super) fn is_calm(scene: &Scene) -> bool {
+    matches!(scene.flow, Flow::Calm {})
+}

@@ -1,0 +1,156 @@
+//! `cargo xtask forecast`: the time and memory that `wakescope check` forecasts, and what the runs take.
+//!
+//! Ten diverse scenes, each a run of the release program in a process of its own with one thread, drawing and writing
+//! included. Memory is the largest resident set less that of a run that does next to nothing.
+
+use crate::process::{program, watch};
+use crate::{Failure, Outcome};
+use std::path::Path;
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// The program to run, instead of the release build.
+    #[arg(long, value_name = "FILE")]
+    program: Option<std::path::PathBuf>,
+    /// Only the scenes whose name contains this.
+    #[arg(long, value_name = "WORD")]
+    only: Option<String>,
+}
+
+/// Largest ratio of forecast and time, either way, and of forecast and memory.
+const TIME: f64 = 2.0;
+const MEMORY: f64 = 1.5;
+
+/// A run that does next to nothing.
+const EMPTY: &str = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 0.0\n[flow]\nkind = \"calm\"\n[scan]\n\
+    elevation_max_rad = 0.0\nrange_max_m = 320.0\npulses_per_line = 1\nrealisations = 1\n[outputs]\nnetcdf = false\n\
+    svg = false\npng = false\nprofile_points = 2\n";
+
+const FIXED: &str = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n";
+
+/// Name, scene, command.
+fn scenes() -> Vec<(&'static str, String, &'static str)> {
+    let fixed = |rest: &str| format!("{FIXED}{rest}");
+    vec![
+        ("default", String::new(), "run"),
+        ("raw signals kept", fixed("[scan]\nrealisations = 1\n[outputs]\nsignals = true\n"), "run"),
+        (
+            "fine map",
+            fixed(
+                "[scan]\nelevation_step_rad = 6e-4\nrealisations = 1\npulses_per_line = 2\n[estimator]\n\
+                 gate_step_samples = 1\nwindow_step_samples = 2\nradius_m = 6.0\n",
+            ),
+            "run",
+        ),
+        (
+            "many pulses, autoregressive",
+            fixed(
+                "[scan]\nelevation_max_rad = 0.05\npulses_per_line = 400\n[estimator]\nmethod = \"autoregressive\"\n\
+                 weighting = \"rectangular\"\n",
+            ),
+            "run",
+        ),
+        (
+            "baseband, following",
+            "[detector]\nsignal = \"baseband\"\n[scan]\npulses_per_line = 8\n[estimator]\nfollow_wind = true\n".into(),
+            "run",
+        ),
+        (
+            "long windows, poles",
+            fixed(
+                "[scan]\nrange_max_m = 900.0\npulses_per_line = 4\n[estimator]\nmethod = \"autoregressive_pole\"\n\
+                 window_samples = 128\nweighting = \"rectangular\"\norder = 24\n",
+            ),
+            "run",
+        ),
+        (
+            "gradients",
+            fixed(
+                "[scan]\npulses_per_line = 2\nrealisations = 1\nelevation_step_rad = 5e-3\n[estimator]\n\
+                 method = \"gradient_likelihood\"\nwindow_step_samples = 2\n",
+            ),
+            "run",
+        ),
+        (
+            "short pulses, fast sampling",
+            "[pulse]\nduration_s = 50e-9\n[detector]\nsampling_hz = 500e6\n[scan]\nrange_max_m = 1000.0\n\
+             elevation_max_rad = 0.1\n[estimator]\nwindow_samples = 32\n"
+                .into(),
+            "run",
+        ),
+        ("efficiency at 2000 ranges", "[outputs]\nprofile_points = 2000\n".into(), "efficiency"),
+        (
+            "phase screens",
+            "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-14\ngrid_points = 256\n\
+             grid_spacing_m = 0.003\nrealisations = 60\n[scan]\nelevation_max_rad = 0.05\n[outputs]\n\
+             profile_range_max_m = 1000.0\nprofile_points = 10\n"
+                .into(),
+            "run",
+        ),
+    ]
+}
+
+pub(crate) fn run(options: &Options) -> Outcome {
+    let (program, folder) = (program(options.program.as_deref())?, std::env::temp_dir().join("wakescope-forecast"));
+    std::fs::create_dir_all(&folder)?;
+    let empty = measured(&program, &folder, EMPTY, "run")?;
+    println!("a run of next to nothing: {:.1} MB", empty.actual.1 / 1e6);
+    println!("{:<28} {:>21} {:>6}   {:>21} {:>6}", "scene", "time [s]", "", "memory [MB]", "");
+    println!(
+        "{:<28} {:>10} {:>10} {:>6}   {:>10} {:>10} {:>6}",
+        "", "forecast", "run", "ratio", "forecast", "run", "ratio"
+    );
+    let mut beyond = Vec::new();
+    let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
+    for (name, scene, command) in scenes().into_iter().filter(|s| wanted(s.0)) {
+        let found = measured(&program, &folder, &scene, command)?;
+        let (time, memory) = (found.actual.0, (found.actual.1 - empty.actual.1).max(1e5));
+        let ratios = (found.forecast.0 / time, found.forecast.1 / memory);
+        println!(
+            "{name:<28} {:>10.2} {time:>10.2} {:>6.2}   {:>10.1} {:>10.1} {:>6.2}",
+            found.forecast.0,
+            ratios.0,
+            found.forecast.1 / 1e6,
+            memory / 1e6,
+            ratios.1
+        );
+        let inside = |ratio: f64, limit: f64| (1.0 / limit..=limit).contains(&ratio);
+        if !inside(ratios.0, TIME) || !inside(ratios.1, MEMORY) {
+            beyond.push(name);
+        }
+    }
+    std::fs::remove_dir_all(&folder)?;
+    match beyond.is_empty() {
+        true => Ok(()),
+        false => Err(Failure::new(format!("beyond {TIME} in time or {MEMORY} in memory: {}", beyond.join(", ")))),
+    }
+}
+
+/// Time \[s\] and memory \[bytes\], forecast and found.
+struct Measured {
+    forecast: (f64, f64),
+    actual: (f64, f64),
+}
+
+fn measured(program: &Path, folder: &Path, scene: &str, command: &str) -> Result<Measured, Failure> {
+    std::fs::write(folder.join("s.toml"), scene)?;
+    let out = folder.join("out");
+    if out.exists() {
+        std::fs::remove_dir_all(&out)?;
+    }
+    let words = [command, "s.toml", "--out", "out", "--quiet", "--json", "--threads", "1"];
+    let run = watch(program, &words, folder, 600.0)?;
+    if run.code != Some(0) {
+        return Err(Failure::new(format!("{command} of\n{scene}ended with {:?}: {}", run.code, run.stderr)));
+    }
+    // The plan is part of what a run tells.
+    let sum = |key: &str| run.stdout.lines().filter_map(|l| number(l, key)).sum::<f64>();
+    Ok(Measured { forecast: (sum("core_s"), sum("memory_bytes")), actual: (run.cpu_s, run.peak_bytes) })
+}
+
+/// The number of a line `"key": number,`.
+fn number(line: &str, key: &str) -> Option<f64> {
+    let rest = line.trim().strip_prefix(&format!("\"{key}\":"))?;
+    rest.trim().trim_end_matches(',').parse().ok()
+}

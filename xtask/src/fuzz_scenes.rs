@@ -1,0 +1,120 @@
+//! `cargo xtask fuzz-scenes`: random changes of the default scene through `check` and short runs.
+//!
+//! What `check` passes must run; nothing may panic, abort or hang. Each scene is checked and run in a process of its own, with
+//! its time limited. The scenes follow from the seed and their number alone.
+
+mod change;
+
+use crate::process::{Watched, program, watch};
+use crate::{Failure, Outcome};
+use change::scene;
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// The program to run, instead of the release build.
+    #[arg(long, value_name = "FILE")]
+    program: Option<std::path::PathBuf>,
+    /// Number of the first scene.
+    #[arg(long, default_value_t = 0)]
+    first: u64,
+    /// How many scenes.
+    #[arg(long, default_value_t = 2000)]
+    count: u64,
+    /// Seed of the changes.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Longest processor time of a check, and of a run that was forecast to be short, s.
+    #[arg(long, default_value_t = 10.0)]
+    limit_s: f64,
+    /// Longest forecast of a scene that is run, s of processor.
+    #[arg(long, default_value_t = 1.0)]
+    run_below_s: f64,
+}
+
+pub(crate) fn run(options: &Options) -> Outcome {
+    let (program, folder) = (program(options.program.as_deref())?, std::env::temp_dir().join("wakescope-fuzz"));
+    std::fs::create_dir_all(&folder)?;
+    let (mut good, mut ran, mut faults) = (0, 0, Vec::new());
+    for index in options.first..options.first + options.count {
+        let text = scene(options.seed, index);
+        std::fs::write(folder.join("s.toml"), &text)?;
+        let check = watch(&program, &["check", "s.toml", "--json", "--threads", "1"], &folder, options.limit_s)?;
+        good += u64::from(check.code == Some(0));
+        let is_short = check.code == Some(0) && forecast_s(&check.stdout) < options.run_below_s;
+        ran += u64::from(is_short);
+        let fault = match (fault_of(&check, &[Some(0), Some(2)]), is_short) {
+            (None, true) => {
+                let words = ["run", "s.toml", "--out", "out", "--quiet", "--threads", "1"];
+                let run = watch(&program, &words, &folder, options.limit_s)?;
+                std::fs::remove_dir_all(folder.join("out")).ok();
+                fault_of(&run, &[Some(0)]).map(|fault| format!("check passes it, run {fault}"))
+            }
+            (fault, _) => fault.map(|fault| format!("check {fault}")),
+        };
+        if let Some(fault) = fault {
+            println!("scene {index}: {fault}\n{text}");
+            faults.push(index);
+        }
+    }
+    std::fs::remove_dir_all(&folder)?;
+    let refused = options.count - good;
+    println!("{} scenes: {refused} refused, {good} good, {ran} of these run; {} faults", options.count, faults.len());
+    match faults.is_empty() {
+        true => Ok(()),
+        false => Err(Failure::new(format!("faults in the scenes {faults:?} of seed {}", options.seed))),
+    }
+}
+
+/// What is wrong with an end that is not among the `allowed` ones.
+fn fault_of(found: &Watched, allowed: &[Option<i32>]) -> Option<String> {
+    match found.hung {
+        true => Some(format!("takes more than {:.1} s", found.cpu_s)),
+        false if allowed.contains(&found.code) => None,
+        false => Some(format!("ends with {:?}: {}", found.code, found.stderr.trim_end())),
+    }
+}
+
+/// Time that a plan forecasts, s.
+fn forecast_s(json: &str) -> f64 {
+    json.lines()
+        .filter_map(|l| l.trim().strip_prefix("\"core_s\":")?.trim().trim_end_matches(',').parse::<f64>().ok())
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+    use wakescope_sim::export::Existing;
+    use wakescope_sim::plan::{Plan, Target};
+    use wakescope_sim::progress::Silent;
+    use wakescope_sim::scene::SceneFile;
+    use wakescope_sim::{run, write};
+
+    /// Scenes of which all are planned, and one of so many good ones is run.
+    const SCENES: u64 = 2000;
+    const RUN_ONE_OF: usize = 8;
+
+    #[test]
+    fn changed_scenes_are_refused_or_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut good, mut ran) = (0, 0);
+        for index in 0..SCENES {
+            let text = scene(1, index);
+            let Ok(file) = SceneFile::parse(&text, Path::new("s.toml")) else { continue };
+            let Ok(plan) = Plan::new(file, Target::Run) else { continue };
+            let total = plan.total();
+            assert!(total.core_s >= 0.0 && total.memory_bytes >= 0.0, "{index}: {total:?}\n{text}");
+            good += 1;
+            if good % RUN_ONE_OF > 0 || total.core_s > 0.1 || total.memory_bytes > 2e8 || plan.rehearse().is_err() {
+                continue;
+            }
+            let result = run::run(&plan, &Silent).unwrap_or_else(|e| panic!("scene {index}: {e}\n{text}"));
+            write::write(&plan, &result, folder.path(), Existing::Own)
+                .unwrap_or_else(|e| panic!("scene {index}: {e}\n{text}"));
+            ran += 1;
+        }
+        assert!(good > 400 && ran > 25, "{good} {ran}");
+    }
+}

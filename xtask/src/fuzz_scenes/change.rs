@@ -1,0 +1,185 @@
+//! Random changes of the default scene: numbers scaled and driven to extremes, other kinds and methods, several keys at once.
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use toml::{Table, Value};
+use wakescope_sim::scene::Scene;
+
+/// Words that a key takes.
+const WORDS: [(&str, &[&str]); 10] = [
+    (
+        "method",
+        &[
+            "periodogram",
+            "periodogram_accumulation",
+            "autoregressive",
+            "autoregressive_pole",
+            "capon",
+            "lag_window",
+            "pulse_pair",
+            "first_moment",
+            "likelihood",
+            "gradient_likelihood",
+        ],
+    ),
+    ("weighting", &["gaussian", "rectangular", "hann"]),
+    ("refinement", &["parabola", "exact", "none"]),
+    ("order_choice", &["fixed", "aic", "mdl"]),
+    ("correlogram", &["biased", "unbiased"]),
+    ("noise", &["band", "white", "none"]),
+    ("signal", &["intermediate_frequency", "baseband"]),
+    ("definition", &["fwhm", "one_over_e_half_width"]),
+    ("receiver", &["monostatic", "bistatic"]),
+    ("beam_radius_definition", &["intensity", "field"]),
+];
+
+/// Tables of other kinds: section, key in it, table.
+const KINDS: [(&str, &str, &str); 21] = [
+    ("", "flow", "kind = \"calm\""),
+    ("", "flow", "kind = \"uniform\"\nlateral_m_s = 5.0\nvertical_m_s = -1.0"),
+    ("", "flow", "kind = \"vortex_pair\"\nmotion = \"inviscid\"\nage_tau = 1.0"),
+    ("", "flow", "kind = \"vortex_pair\"\nprofile = \"lamb_oseen\"\ncross_wind_m_s = 3.0"),
+    ("", "flow", "kind = \"simulated\"\nplanes = \"none\""),
+    ("detector", "snr", "reference = \"fixed\"\nsnr_db = 5.0"),
+    ("detector", "snr", "reference = \"chapter\""),
+    ("detector", "digitiser", "kind = \"quantised\"\nbits = 8\nfull_scale_over_noise = 10.0"),
+    ("detector", "digitiser", "kind = \"quantised\"\nbits = 1\nfull_scale_over_noise = 1e-6"),
+    (
+        "pulse",
+        "shape",
+        "kind = \"sampled\"\ntime_s = [-2e-7, -1e-7, 0.0, 1e-7, 2e-7]\npower = [0.0, 0.3, 1.0, 0.3, 0.0]",
+    ),
+    ("pulse", "shape", "kind = \"sampled\"\ntime_s = [0.0, 1e-9]\npower = [1.0, 1.0]\nresampling = \"linear\""),
+    ("scan", "below_ground", "policy = \"mask\""),
+    ("scan", "below_ground", "policy = \"constant\"\nradial_velocity_m_s = 2.0"),
+    ("scan", "outside_flow", "policy = \"mask\""),
+    ("estimator", "radius", "kind = \"of_range\"\nrange_m = [300.0, 500.0]\nradius_m = [1.0, 4.0]"),
+    ("estimator", "radius", "kind = \"target\"\nstandard_deviation_m_s = 0.3\nlargest_m = 10.0"),
+    (
+        "atmosphere",
+        "profile",
+        "range_m = [100.0, 500.0]\nbackscatter_per_m_sr = [1e-7, 1e-6]\nextinction_per_m = [1e-4, 1e-5]",
+    ),
+    ("atmosphere", "turbulence", "kind = \"refractive\"\ngrid_points = 128\ngrid_spacing_m = 4e-3\nrealisations = 4"),
+    ("atmosphere", "turbulence", "kind = \"refractive\"\nsampling = \"derived\"\nrealisations = 3"),
+    (
+        "atmosphere",
+        "turbulence",
+        "kind = \"refractive\"\nefficiency = \"realisation\"\nrealisations = 3\ngrid_points = 128\ngrid_spacing_m = 4e-3",
+    ),
+    (
+        "atmosphere",
+        "turbulence",
+        "kind = \"refractive\"\nspectrum = \"hill_andrews\"\ncn2_m_m23 = 1e-17\nrealisations = 3",
+    ),
+];
+
+/// Keys that the default scene does not have.
+const ABSENT: [(&str, &str, f64); 3] =
+    [("estimator", "false_alarm", 1e-3), ("estimator", "likelihood_snr_db", 3.0), ("pulse", "chirp_hz_s", 1e13)];
+
+/// The scene of that number.
+pub(super) fn scene(seed: u64, index: u64) -> String {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index));
+    let mut scene = Table::try_from(Scene::default()).unwrap_or_default();
+    shorten(&mut scene);
+    // Mostly one or two changes, now and then many.
+    let changes = 1 + pick(&mut rng, 3) * pick(&mut rng, 2) + 6 * (pick(&mut rng, 12) / 11);
+    for _ in 0..changes {
+        match pick(&mut rng, 10) {
+            0..2 => other_kind(&mut scene, &mut rng),
+            2 => {
+                let (section, key, value) = ABSENT[pick(&mut rng, ABSENT.len())];
+                let value = changed(&Value::Float(value), key, &mut rng);
+                table_at(&mut scene, section).insert(key.into(), value);
+            }
+            _ => change_a_key(&mut scene, &mut rng),
+        }
+    }
+    toml::to_string(&scene).unwrap_or_default()
+}
+
+/// A short scan, so that a change may make it longer and yet let it end soon.
+fn shorten(scene: &mut Table) {
+    let scan = table_at(scene, "scan");
+    scan.insert("elevation_min_rad".into(), Value::Float(0.1));
+    scan.insert("elevation_max_rad".into(), Value::Float(0.11));
+    scan.insert("pulses_per_line".into(), Value::Integer(2));
+    scan.insert("realisations".into(), Value::Integer(2));
+    let outputs = table_at(scene, "outputs");
+    outputs.insert("profile_points".into(), Value::Integer(5));
+    for picture in ["svg", "png"] {
+        outputs.insert(picture.into(), Value::Boolean(false));
+    }
+}
+
+fn pick(rng: &mut Xoshiro256PlusPlus, below: usize) -> usize {
+    (rng.next_u64() % below.max(1) as u64) as usize
+}
+
+/// A section, or the scene itself.
+fn table_at<'a>(scene: &'a mut Table, section: &str) -> &'a mut Table {
+    if section.is_empty() {
+        return scene;
+    }
+    let entry = scene.entry(section).or_insert_with(|| Value::Table(Table::new()));
+    if !entry.is_table() {
+        *entry = Value::Table(Table::new());
+    }
+    match entry {
+        Value::Table(table) => table,
+        _ => unreachable!("it was made a table"),
+    }
+}
+
+fn other_kind(scene: &mut Table, rng: &mut Xoshiro256PlusPlus) {
+    let (section, key, text) = KINDS[pick(rng, KINDS.len())];
+    let table: Table = toml::from_str(text).unwrap_or_default();
+    table_at(scene, section).insert(key.into(), Value::Table(table));
+}
+
+/// Goes down the tables at random until it meets a value.
+fn change_a_key(table: &mut Table, rng: &mut Xoshiro256PlusPlus) {
+    let chosen = pick(rng, table.len());
+    match table.iter_mut().nth(chosen) {
+        Some((_, Value::Table(inner))) if !inner.is_empty() => change_a_key(inner, rng),
+        Some((key, value)) => *value = changed(value, &key.clone(), rng),
+        None => {}
+    }
+}
+
+fn changed(value: &Value, key: &str, rng: &mut Xoshiro256PlusPlus) -> Value {
+    match value {
+        Value::Float(x) => Value::Float(changed_number(*x, rng)),
+        Value::Integer(n) => Value::Integer(changed_count(*n, rng)),
+        Value::Boolean(is_on) => Value::Boolean(!is_on),
+        Value::String(_) => {
+            let words = WORDS.iter().find(|(k, _)| *k == key).map_or(&["nonsense"][..], |(_, words)| words);
+            Value::String(words[pick(rng, words.len())].into())
+        }
+        Value::Array(list) => Value::Array(list.iter().map(|v| changed(v, key, rng)).collect()),
+        other => other.clone(),
+    }
+}
+
+fn changed_number(x: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
+    const EXTREMES: [f64; 12] =
+        [0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, 5e-324, 1e-300, -1.0, 1.0, 1e9, 1e-9];
+    let unit = (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    match pick(rng, 8) {
+        0 => EXTREMES[pick(rng, EXTREMES.len())],
+        1 => -x,
+        2 | 3 => x * 10f64.powi(pick(rng, 13) as i32 - 6),
+        // Near the value, where most scenes are good.
+        _ => x * 10f64.powf(1.2 * unit - 0.6),
+    }
+}
+
+fn changed_count(n: i64, rng: &mut Xoshiro256PlusPlus) -> i64 {
+    const EXTREMES: [i64; 8] = [0, 1, -1, 2, 3, i64::MAX, 1 << 31, 1_000_000];
+    match pick(rng, 4) {
+        0 => EXTREMES[pick(rng, EXTREMES.len())],
+        1 => n.saturating_mul(1 << pick(rng, 12)),
+        _ => n.saturating_sub(n / 2).saturating_add(pick(rng, 2 * n.clamp(1, 1 << 40) as usize) as i64),
+    }
+}

@@ -1,0 +1,89 @@
+//! A run of the program `wakescope` as another process, watched: its time, its memory, its end.
+//!
+//! Linux only: the figures come from /proc.
+
+use crate::Failure;
+use crate::workspace::root;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// What became of a process.
+pub(crate) struct Watched {
+    /// Exit code; `None` after a signal.
+    pub(crate) code: Option<i32>,
+    /// It was stopped because it took too long.
+    pub(crate) hung: bool,
+    /// Processor time, s.
+    pub(crate) cpu_s: f64,
+    /// Largest resident set that was seen, bytes.
+    pub(crate) peak_bytes: f64,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+}
+
+/// The program to run: the given one, or the release build, made anew.
+pub(crate) fn program(given: Option<&Path>) -> Result<PathBuf, Failure> {
+    if let Some(given) = given {
+        return Ok(given.canonicalize()?);
+    }
+    let words = ["build", "--release", "--quiet", "--package", "wakescope-sim"];
+    let built = Command::new(env!("CARGO")).args(words).current_dir(root()).status();
+    match built.map_err(|e| Failure::new(format!("cannot run cargo: {e}")))?.success() {
+        true => Ok(root().join("target/release/wakescope")),
+        false => Err(Failure::new("wakescope does not build".into())),
+    }
+}
+
+/// Runs `program` with `words` in `folder` for at most `seconds` of processor or six times as much of the clock.
+pub(crate) fn watch(program: &Path, words: &[&str], folder: &Path, seconds: f64) -> Result<Watched, Failure> {
+    let io = |e: std::io::Error| Failure::new(format!("cannot run {}: {e}", program.display()));
+    // Output to files: a pipe that nobody reads would stop the process.
+    let (out, err) = (folder.join("stdout"), folder.join("stderr"));
+    let to = |path: &Path| std::fs::File::create(path).map(Stdio::from).map_err(io);
+    let mut child = Command::new(program)
+        .args(words)
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .stdout(to(&out)?)
+        .stderr(to(&err)?)
+        .spawn()
+        .map_err(io)?;
+    let begun = Instant::now();
+    let (mut cpu_s, mut peak_bytes, mut hung) = (0.0, 0.0_f64, false);
+    loop {
+        // A process that has ended keeps its times until it is waited for.
+        let ended = sample(&child, &mut cpu_s, &mut peak_bytes);
+        if ended {
+            break;
+        }
+        if cpu_s > seconds || begun.elapsed().as_secs_f64() > 6.0 * seconds {
+            hung = true;
+            child.kill().map_err(io)?;
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let code = child.wait().map_err(io)?.code();
+    let read = |path: &Path| {
+        let mut bytes = Vec::new();
+        std::fs::File::open(path).and_then(|mut f| f.read_to_end(&mut bytes)).map_err(io)?;
+        Ok::<_, Failure>(String::from_utf8_lossy(&bytes).into_owned())
+    };
+    Ok(Watched { code, hung, cpu_s, peak_bytes, stdout: read(&out)?, stderr: read(&err)? })
+}
+
+/// Brings time and memory up to date; whether the process has ended.
+fn sample(child: &Child, cpu_s: &mut f64, peak_bytes: &mut f64) -> bool {
+    let read = |name: &str| std::fs::read_to_string(format!("/proc/{}/{name}", child.id())).unwrap_or_default();
+    let status = read("status");
+    let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse::<f64>().ok());
+    *peak_bytes = peak_bytes.max(1024.0 * peak.unwrap_or(0.0));
+    let stat = read("stat");
+    // Behind the name in brackets: state, then utime and stime at places 11 and 12, in hundredths of a second.
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or("").split_whitespace().collect();
+    let ticks = |place: usize| fields.get(place).and_then(|t| t.parse::<f64>().ok()).unwrap_or(0.0);
+    *cpu_s = cpu_s.max((ticks(11) + ticks(12)) / 100.0);
+    matches!(fields.first(), None | Some(&"Z" | &"X"))
+}
