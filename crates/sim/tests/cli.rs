@@ -196,7 +196,8 @@ fn files_of_others_are_not_replaced_unless_asked_for() {
 fn the_files_of_a_run_are_those_that_it_announces() {
     use wakescope_sim::plan::{Plan, Target};
     let temp = tempfile::tempdir().unwrap();
-    let all = SMALL.replace("[outputs]", "[estimator]\ngate_step_samples = 64\n[outputs]\nhpl = true\nsignals_of = \"all\"");
+    let all =
+        SMALL.replace("[outputs]", "[estimator]\ngate_step_samples = 64\n[outputs]\nhpl = true\nsignals_of = \"all\"");
     let all = all.replace("range_min_m = 330.0", "range_min_m = 345.3609").replace("430.0", "480.0");
     std::fs::write(temp.path().join("s.toml"), &all).unwrap();
     for (word, target) in [("run", Target::Run), ("map", Target::Map), ("signal", Target::Signal)] {

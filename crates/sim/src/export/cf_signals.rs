@@ -86,7 +86,8 @@ fn recording(signals: &RawSignals) -> Vec<Variable> {
             "frequency of air at rest; a velocity v away from the lidar lowers it by 2 v/wavelength",
         ),
         scalar("bandwidth", r.bandwidth_hz, "Hz", "width of the detector band about the intermediate frequency"),
-        scalar("wavelength", r.wavelength_m, "m", "wavelength of the laser").text("standard_name", "radiation_wavelength"),
+        scalar("wavelength", r.wavelength_m, "m", "wavelength of the laser")
+            .text("standard_name", "radiation_wavelength"),
         scalar("pulse_repetition_frequency", r.pulse_repetition_hz, "Hz", "pulses per second"),
         scalar("pulse_sigma", r.pulse_sigma_s, "s", "half width of the power of the pulse at 1/e of its largest"),
         scalar(

@@ -63,7 +63,8 @@ pub fn is_own(path: &Path) -> bool {
 /// A scene or case with all defaults: the first line has the hash of the rest.
 fn is_own_toml(text: &str) -> bool {
     let Some((first, rest)) = text.split_once('\n') else { return false };
-    let stated = first.strip_prefix("# ").filter(|line| line.starts_with(NAME)).and_then(|line| line.rsplit(' ').next());
+    let stated =
+        first.strip_prefix("# ").filter(|line| line.starts_with(NAME)).and_then(|line| line.rsplit(' ').next());
     stated == Some(hash_of(rest).as_str())
 }
 

@@ -196,7 +196,8 @@ fn the_history_of_a_wake_opens_with_its_axes() {
     for (name, cell) in names.iter().zip(last) {
         let tags = ["_m2_s", "_m", "_s", "_hz"];
         let bare = tags.iter().find_map(|tag| name.strip_suffix(tag)).unwrap_or(name);
-        let values = file.read_var_f64(bare).or_else(|_| file.read_var_f64(name)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+        let values =
+            file.read_var_f64(bare).or_else(|_| file.read_var_f64(name)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         let value = cell.parse::<f64>().unwrap_or(f64::NAN);
         assert!(values[5] == value || values[5].is_nan() && value.is_nan(), "{name}: {} and {cell}", values[5]);
     }

@@ -369,7 +369,8 @@ mod tests {
         full.y.range = None;
         full.series = vec![bars.with_band(&[0.45; 101])];
         let drawn = shapes(&full);
-        let Some(Shape::Area { points: box_of_legend, .. }) = drawn.iter().rfind(|s| matches!(s, Shape::Area { fill, .. } if *fill == [255; 3]))
+        let Some(Shape::Area { points: box_of_legend, .. }) =
+            drawn.iter().rfind(|s| matches!(s, Shape::Area { fill, .. } if *fill == [255; 3]))
         else {
             panic!("no legend")
         };

@@ -1,10 +1,10 @@
 //! What the files of a plan can hold, found before anything is computed.
 //! Check: scenes whose results no file can hold are refused, with the key and what would do.
 
+use crate::Error;
 use crate::export::UtcTime;
 use crate::export::hpl::within_a_day;
 use crate::plan::{Plan, Stage};
-use crate::Error;
 #[cfg(feature = "netcdf")]
 use crate::scene::DetectorSignal;
 
@@ -20,11 +20,14 @@ pub fn check(plan: &Plan) -> Result<(), Error> {
         if plan.keeps_signals() {
             let pulses = rays * (scene.scan.pulses_per_line * plan.kept_realisations()) as f64;
             let quadratures = if scene.detector.signal == DetectorSignal::Baseband { 2.0 } else { 1.0 };
-            let bytes = crate::export::cf_signals::data_bytes(
-                [pulses, g.samples as f64, quadratures],
-                [rays, g.layers as f64],
-            );
-            fits("outputs.signals", "signals.nc", bytes, "keep fewer pulses, lines or realisations, or set it to false")?;
+            let bytes =
+                crate::export::cf_signals::data_bytes([pulses, g.samples as f64, quadratures], [rays, g.layers as f64]);
+            fits(
+                "outputs.signals",
+                "signals.nc",
+                bytes,
+                "keep fewer pulses, lines or realisations, or set it to false",
+            )?;
         }
         if plan.runs(Stage::Estimates) {
             let bytes = crate::export::cfradial::data_bytes(rays, g.gate_range_m.len() as f64);

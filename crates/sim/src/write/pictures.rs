@@ -80,12 +80,7 @@ fn snr_band_db(profile: &RangeProfile) -> Vec<(f64, f64)> {
 }
 
 /// The air, one scan of it and the mean of all; below them the errors. One scan alone has its error beside it.
-pub(super) fn add_map(
-    files: &mut FileGroup,
-    plan: &Plan,
-    map: &VelocityMap,
-    origin: &Provenance,
-) -> Result<(), Error> {
+pub(super) fn add_map(files: &mut FileGroup, plan: &Plan, map: &VelocityMap, origin: &Provenance) -> Result<(), Error> {
     let centres_m = centres_m(plan);
     let panel = |field: &str, title: &str| -> Result<MapPlot, Error> {
         let mut plot = MapPlot::new(map, 0, field)?.titled(title).labelled("m/s");

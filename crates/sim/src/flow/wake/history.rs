@@ -93,7 +93,9 @@ const VORTEX: [OfVortex; 12] = [
 const FLOW: [OfFlow; 5] = [
     ("energy", Kind::Energy, "kinetic energy per length of x", |r| r.energy_m4_s2),
     ("energy_3d", Kind::Energy, "kinetic energy of all that varies along x, per length of x", |r| r.energy_3d_m4_s2()),
-    ("enstrophy", Kind::Enstrophy, "half the integral of the squared vorticity, per length of x", |r| r.enstrophy_m2_s2),
+    ("enstrophy", Kind::Enstrophy, "half the integral of the squared vorticity, per length of x", |r| {
+        r.enstrophy_m2_s2
+    }),
     ("wall_shear", Kind::Rate, "largest shear at the ground", |r| r.wall_shear_per_s),
     ("wall_units", Kind::Number, "height of the first centre in wall units of that shear", |r| r.wall_units),
 ];
@@ -280,10 +282,11 @@ impl WakeRun {
             table = table.float(&name, values);
         }
         for single in Self::singles() {
-            table =
-                table.float(&format!("{}{}", single.name, single.kind.suffix()), self.column(single.place, 1.0));
+            table = table.float(&format!("{}{}", single.name, single.kind.suffix()), self.column(single.place, 1.0));
         }
-        self.modes(Kind::Energy.suffix(), 1.0).into_iter().fold(table, |table, (name, values)| table.float(&name, values))
+        self.modes(Kind::Energy.suffix(), 1.0)
+            .into_iter()
+            .fold(table, |table, (name, values)| table.float(&name, values))
     }
 
     /// The history in the scales of the pair, circulations in `Gamma0`.
