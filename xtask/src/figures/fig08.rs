@@ -97,7 +97,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         }
     }
     out.csv(Table::stack(tables)?.to_csv(&origin)?);
-    let mut figure = Figure::stacked(panels);
+    let realisations = scene(context, &wake, AGES[0].0)?.scan.realisations;
+    let title =
+        format!("Radial velocity, positive away from the lidar; estimated: mean of {realisations} realisations");
+    let mut figure = Figure::stacked(panels).titled(&title);
     (figure.columns, figure.width) = (2, 1300.0);
     out.picture(figure.svg(&origin)?, figure.png(&origin)?);
     out.caption = format!(

@@ -104,24 +104,6 @@ impl RawSignals {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_table_holds_the_first_pulse_of_each_line() {
-        let signals = example();
-        let table = signals.table().unwrap();
-        let current = &table.columns()[2].1;
-        assert_eq!(*current, crate::export::csv::Column::Float(vec![0.0, 1.0, 2.0, 20.0, 21.0, 22.0]));
-        assert_eq!(signals.realisations(), 2);
-        assert!(RawSignals { time_s: vec![1.0], ..signals.clone() }.check().is_err());
-        assert!(RawSignals { pulse_time_s: vec![1.0], ..signals.clone() }.check().is_err());
-        let odd = signals.current_a.slice(ndarray::s![..7, ..]).to_owned();
-        assert!(RawSignals { current_a: odd, ..signals }.check().is_err(), "half a realisation");
-    }
-}
-
 /// Two realisations of two lines of two pulses.
 #[cfg(test)]
 pub(crate) fn example() -> RawSignals {
@@ -145,5 +127,23 @@ pub(crate) fn example() -> RawSignals {
         elevation_rad: vec![0.0, 0.0, 0.1, 0.1],
         time_s: vec![1e-6, 2e-6, 3e-6],
         pulses_per_line: 2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_holds_the_first_pulse_of_each_line() {
+        let signals = example();
+        let table = signals.table().unwrap();
+        let current = &table.columns()[2].1;
+        assert_eq!(*current, crate::export::csv::Column::Float(vec![0.0, 1.0, 2.0, 20.0, 21.0, 22.0]));
+        assert_eq!(signals.realisations(), 2);
+        assert!(RawSignals { time_s: vec![1.0], ..signals.clone() }.check().is_err());
+        assert!(RawSignals { pulse_time_s: vec![1.0], ..signals.clone() }.check().is_err());
+        let odd = signals.current_a.slice(ndarray::s![..7, ..]).to_owned();
+        assert!(RawSignals { current_a: odd, ..signals }.check().is_err(), "half a realisation");
     }
 }
