@@ -7,6 +7,7 @@
 use std::fs::{self, OpenOptions};
 use std::path::Path;
 use std::process::{Command, Output};
+use wakescope_sim::export::Existing;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::SceneFile;
@@ -119,7 +120,7 @@ fn a_folder_in_the_way_of_a_file_is_found_before_the_computing() {
         let scene = SMALL.replace("realisations = 3", "realisations = 1") + &kinds.concat();
         let plan = Plan::new(SceneFile::parse(&scene, Path::new("s.toml")).unwrap(), target).unwrap();
         let result = wakescope_sim::run::run(&plan, &Silent).unwrap();
-        let written = write::write(&plan, &result, &temp.path().join("w")).unwrap();
+        let written = write::write(&plan, &result, &temp.path().join("w"), Existing::Own).unwrap();
         let written: Vec<_> = written.iter().map(|p| p.file_name().unwrap().to_str().unwrap()).collect();
         assert_eq!(write::names(&plan), written, "{target:?} without {left_out}");
     }

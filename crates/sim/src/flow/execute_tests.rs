@@ -44,7 +44,8 @@ fn a_second_run_in_a_folder_is_refused_and_what_a_crashed_one_left_is_swept() {
 fn a_run_killed_before_its_first_checkpoint_begins_anew_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
     // What such a run leaves: the head of its table and half a row.
-    fs::write(folder.path().join("steps.csv"), "# x\nstep,time_s\n1,0.0").unwrap();
+    let half = format!("# source: {}\nstep,time_s\n1,0.0", crate::PROGRAM);
+    fs::write(folder.path().join("steps.csv"), half).unwrap();
     let case = vortices("", "end_s = 0.05\n");
     let mut notes = Notes::default();
     let outcome = run(&case, folder.path(), Begin::Restart, &mut notes).unwrap();
@@ -83,7 +84,7 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
     let plane = vortices("", "end_s = 0.5\n").with_end(0.25).unwrap();
     assert_eq!(plane.case.time.end_s, Some(0.25));
     let refused = plane.with_end(-1.0).unwrap_err().to_string();
-    assert!(refused.contains("time.end_s = -1.0") && refused.contains("above 0"), "{refused}");
+    assert!(refused.contains("--end = -1.0") && refused.contains("above 0"), "{refused}");
 }
 
 #[test]

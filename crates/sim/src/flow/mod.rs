@@ -41,7 +41,7 @@ pub use wake::{PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile};
 
 use crate::Error;
 use crate::export::Provenance;
-use crate::scene::{Problem, SceneError, hash_of, located, parsed};
+use crate::scene::{Located, Problem, SceneError, hash_of, located, parsed};
 use crate::text_file;
 use std::path::{Path, PathBuf};
 use wakescope_les::StepRecord;
@@ -95,7 +95,14 @@ impl CaseFile {
         if problems.is_empty() {
             return Ok(Self::of(case, &self.text, &self.path));
         }
-        Err(located(&parsed(&self.text, &self.path)?, &self.path, problems))
+        // The end is of the command line, whatever the file says of it.
+        let of_command = |problem: Problem| match problem.key.as_str() {
+            "time.end_s" | "wake.end_tau" => Problem { key: "--end".into(), ..problem },
+            _ => problem,
+        };
+        let problems =
+            problems.into_iter().map(|problem| Located { problem: of_command(problem), line: None }).collect();
+        Err(SceneError::Invalid { path: self.path.clone(), problems })
     }
 
     /// A preset.

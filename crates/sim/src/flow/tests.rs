@@ -265,10 +265,16 @@ fn a_checkpoint_is_not_lost_by_mistake_and_a_damaged_one_gives_way_to_the_one_be
 
 #[test]
 fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
+    /// Puts a folder where the second output will go, once the run has begun; before, it would be found at once.
+    struct InTheWay(std::path::PathBuf);
+    impl Watch for InTheWay {
+        fn step(&mut self, _: f64, _: &StepRecord) {
+            fs::create_dir_all(&self.0).unwrap();
+        }
+    }
     let folder = tempfile::tempdir().unwrap();
-    // A folder stands where the second output would go.
-    fs::create_dir_all(folder.path().join("fields_0002.csv")).unwrap();
-    let error = run(&vortices(None), folder.path(), Begin::New, &mut Unwatched).unwrap_err();
+    let mut watch = InTheWay(folder.path().join("fields_0002.csv"));
+    let error = run(&vortices(None), folder.path(), Begin::New, &mut watch).unwrap_err();
     assert!(matches!(error, Error::Export(_)), "{error}");
     assert!(wakescope_les::check_checkpoint(folder.path().join("flow.checkpoint")).is_ok());
     fs::remove_dir(folder.path().join("fields_0002.csv")).unwrap();
@@ -324,7 +330,7 @@ fn wrong_cases_are_refused_with_key_value_and_what_is_allowed() {
         ),
         (
             refused("[case]\nkind = \"free\"\n[case.y]\ncells = 16\nmapping = \"tanh_low\"\nstretch = 1.0\n"),
-            ["case.y.mapping = TanhLow", "sine or cluster in a periodic direction"],
+            ["case.y.mapping = \"tanh_low\"", "sine or cluster in a periodic direction"],
         ),
         (
             refused("[case]\nkind = \"free\"\n[case.y]\ncells = 16\nmapping = \"sine\"\nplace = 0.5\n"),
