@@ -55,16 +55,16 @@ impl Columns {
         (0..n).map(|i| self.bands.iter().map(|band| band.1[i] * band.1[i]).sum()).collect()
     }
 
-    /// `out += self (padded - own)`, `own` being the middle of `padded`: nothing at all for a constant if the rows sum to
+    /// `out -= mass self (padded - own)`, `own` being the middle of `padded`: nothing at all for a constant if the rows sum to
     /// zero. The operations are fused, on every machine.
     #[inline(always)]
-    pub(crate) fn add_differences(&self, out: &mut [f64], own: &[f64], padded: &[f64]) {
+    pub(crate) fn subtract_differences(&self, out: &mut [f64], mass: f64, own: &[f64], padded: &[f64]) {
         let n = out.len();
         let own = &own[..n];
         for (offset, coefficient) in self.bands.iter().filter(|band| band.0 != HALO) {
             let (c, x) = (&coefficient[..n], &padded[*offset..offset + n]);
             for i in 0..n {
-                out[i] = c[i].mul_add(x[i] - own[i], out[i]);
+                out[i] = (-mass * c[i]).mul_add(x[i] - own[i], out[i]);
             }
         }
     }
@@ -118,29 +118,6 @@ pub(crate) fn add_rows(out: &mut [f64], field: &[f64], taps: &[(usize, f64)]) {
     for &(start, c) in taps {
         for (out, x) in out.iter_mut().zip(&field[start..start + n]) {
             *out += c * x;
-        }
-    }
-}
-
-/// `out += sum c (row - own)`, the rows of `field` starting at the given places. The operations are fused, on every machine.
-#[inline(always)]
-pub(crate) fn add_row_differences(out: &mut [f64], own: &[f64], field: &[f64], taps: &[(usize, f64)]) {
-    let n = out.len();
-    let own = &own[..n];
-    let mut taps = taps;
-    while let [a, b, c, d, rest @ ..] = taps {
-        let [x0, x1, x2, x3] = [a.0, b.0, c.0, d.0].map(|start| &field[start..start + n]);
-        for i in 0..n {
-            let sum = a.1.mul_add(x0[i] - own[i], out[i]);
-            let sum = b.1.mul_add(x1[i] - own[i], sum);
-            let sum = c.1.mul_add(x2[i] - own[i], sum);
-            out[i] = d.1.mul_add(x3[i] - own[i], sum);
-        }
-        taps = rest;
-    }
-    for &(start, c) in taps {
-        for ((out, x), own) in out.iter_mut().zip(&field[start..start + n]).zip(own) {
-            *out = c.mul_add(x - own, *out);
         }
     }
 }

@@ -2,12 +2,14 @@
 //!
 //! Check: symmetry, constants, products of the directions' own operators.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
 use super::super::line::{Line, Taps};
-use super::super::rows::{self, Columns, HALO, pad};
+use super::super::rows::{Columns, HALO, pad};
 use super::kernel;
 
 /// `sum_b (prod_{d != b} m_d) Dw_b f_b^-1 Dw_b^T`.
@@ -19,6 +21,8 @@ pub(crate) struct Operator {
     mass_m: [Vec<f64>; 3],
     /// `Dw_0 f_0^-1 Dw_0^T` by columns.
     along: Columns,
+    /// The same where all cells of the row are equal.
+    even: Option<[f64; 3]>,
     periodic: bool,
     /// `Dw_b f_b^-1 Dw_b^T` of the other two axes by rows, without the diagonals.
     across: [Vec<Taps>; 2],
@@ -43,6 +47,7 @@ impl Operator {
             shape: layout.shape,
             mass_m: std::array::from_fn(|b| layout.line[b].cell_mass_m.clone()),
             along: Columns::new(&rows[0], periodic),
+            even: even(&layout.line[0], &rows[0]),
             periodic,
             across: [neighbours(&rows[1]), neighbours(&rows[2])],
             condition,
@@ -76,6 +81,50 @@ impl Operator {
         squares.iter().sum::<f64>().sqrt()
     }
 
+    /// 2-norm of what `phi` leaves of the right side, which is nowhere stored.
+    pub(crate) fn residual_norm(&self, g: &[f64], phi: &[f64]) -> f64 {
+        let n0 = self.shape.n[0];
+        let rows = self.shape.len() / n0;
+        let squares: Vec<f64> = (0..rows.div_ceil(ROWS))
+            .into_par_iter()
+            .map_init(
+                || (vec![0.0; n0], vec![0.0; n0 + 2 * HALO]),
+                |(out, padded), c| {
+                    let chunk = c * ROWS..rows.min((c + 1) * ROWS);
+                    chunk.map(|r| residual_row(self, g, phi, r, out, padded)).sum()
+                },
+            )
+            .collect();
+        squares.iter().sum::<f64>().sqrt()
+    }
+
+    /// Copies the right side `from` to `to`; returns its 2-norm and its sum over the sum of its moduli. If the sum, which
+    /// nothing can balance, is more than `share` of the norm, it is taken out of the copy.
+    pub(crate) fn copy_balanced(&self, from: &[f64], to: &mut [f64], share: f64) -> [f64; 2] {
+        let chunk = ROWS * self.shape.n[0];
+        let parts: Vec<[f64; 3]> = to
+            .par_chunks_mut(chunk)
+            .zip(from.par_chunks(chunk))
+            .map(|(to, from)| {
+                to.copy_from_slice(from);
+                let [sum, moduli] = kernel::sum_and_moduli(to);
+                [sum, moduli, kernel::dot(to, to)]
+            })
+            .collect();
+        let [sum, moduli, squares] = parts.iter().fold([0.0; 3], |a, b| std::array::from_fn(|i| a[i] + b[i]));
+        let imbalance = if moduli > 0.0 { sum / moduli } else { 0.0 };
+        let (mut volume, mut mass) = (1.0, 1.0);
+        for axis in &self.mass_m {
+            volume *= axis.iter().sum::<f64>();
+            mass *= kernel::dot(axis, axis).sqrt();
+        }
+        if (sum / volume).abs() * mass <= share * squares.sqrt() {
+            return [squares.sqrt(), imbalance];
+        }
+        self.subtract_mean(to, sum / volume);
+        [norm(self.shape, to), imbalance]
+    }
+
     /// 2-norm of what the last digit of `phi` leaves.
     pub(crate) fn round_off(&self, phi: &[f64]) -> f64 {
         let [n0, n1, _] = self.shape.n;
@@ -101,28 +150,20 @@ impl Operator {
 
     /// 2-norm of the residual over that of the right side `g`.
     pub(crate) fn relative_residual(&self, g: &[f64], phi: &[f64]) -> f64 {
-        let left = self.residual(g, phi, &mut vec![0.0; g.len()]);
+        let left = self.residual_norm(g, phi);
         let size = norm(self.shape, g);
         if size > 0.0 { left / size } else { 0.0 }
     }
 
-    /// Subtracts from a right side the multiple of the cells' masses that makes its sum zero, if that is more than round-off;
-    /// returns the sum over the sum of the moduli.
-    pub(crate) fn remove_imbalance(&self, g: &mut [f64]) -> f64 {
+    /// Subtracts `mean` times the cells' masses.
+    fn subtract_mean(&self, g: &mut [f64], mean: f64) {
         let [n0, n1, _] = self.shape.n;
-        let rows: Vec<[f64; 2]> = g.par_chunks(ROWS * n0).map(kernel::sum_and_moduli).collect();
-        let [sum, moduli] = rows.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-        if sum.abs() <= BALANCED * moduli {
-            return if moduli > 0.0 { sum / moduli } else { 0.0 };
-        }
-        let volume: f64 = self.mass_m.iter().map(|mass| mass.iter().sum::<f64>()).product();
         g.par_chunks_mut(n0).enumerate().for_each(|(r, row)| {
-            let mass = self.mass_m[1][r % n1] * self.mass_m[2][r / n1] * sum / volume;
+            let mass = self.mass_m[1][r % n1] * self.mass_m[2][r / n1] * mean;
             for (g, m0) in row.iter_mut().zip(&self.mass_m[0]) {
                 *g -= mass * m0;
             }
         });
-        sum / moduli
     }
 
     /// Multiplies each value by the mass of its cell.
@@ -137,48 +178,94 @@ impl Operator {
     }
 }
 
-/// Sum of a right side, relative to that of its moduli, that is round-off.
-const BALANCED: f64 = 4.0 * f64::EPSILON;
-
-/// Residual of row `r` of memory; returns the sum of its squares, in eight lanes.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+/// Residual of row `r` of memory; returns the sum of its squares.
 fn residual_row(op: &Operator, g: &[f64], phi: &[f64], r: usize, out: &mut [f64], padded: &mut [f64]) -> f64 {
-    let [n0, n1, _] = op.shape.n;
+    let n1 = op.shape.n[1];
     let (j, k) = (r % n1, r / n1);
     let at = op.shape.row(j, k);
     let own = &phi[at.clone()];
     let (m1, m2) = (op.mass_m[1][j], op.mass_m[2][k]);
-    out.fill(0.0);
-    let mut taps = [(0, 0.0); MOST_TAPS];
-    let mut count = 0;
+    // Places that are not needed see the row itself.
+    let mut taps = [(at.start, 0.0); MOST_TAPS];
     let below = op.across[0][j].iter().map(|&(i, c)| (op.shape.row(i, k).start, c * m2));
     let aside = op.across[1][k].iter().map(|&(i, c)| (op.shape.row(j, i).start, c * m1));
     for (tap, new) in taps.iter_mut().zip(below.chain(aside)) {
         *tap = new;
-        count += 1;
     }
-    rows::add_row_differences(out, own, phi, &taps[..count]);
+    let (first, rest) = taps.split_at(INNER_TAPS);
     pad(padded, own, op.periodic);
-    let mass = m1 * m2;
-    for (out, m0) in out.iter_mut().zip(&op.mass_m[0]) {
-        *out *= m0 / mass;
+    let along = op.even.map_or([0.0; 3], |even| even.map(|c| c * m1 * m2));
+    row_differences(out, g, phi, at, first, (&op.mass_m[0], along), padded);
+    if op.even.is_none() || rest.iter().any(|tap| tap.1 != 0.0) {
+        other_differences(op, out, own, phi, rest, m1 * m2, padded);
     }
-    op.along.add_differences(out, own, padded);
-    let mut sums = [0.0; LANES];
-    for (out, g) in out.chunks_mut(LANES).zip(g[at].chunks(LANES)) {
-        for ((out, g), sum) in out.iter_mut().zip(g).zip(&mut sums) {
-            *out = -(mass.mul_add(*out, *g));
-            *sum = out.mul_add(*out, *sum);
-        }
-    }
-    debug_assert_eq!(out.len(), n0);
-    sums.iter().sum()
+    kernel::dot(out, out)
 }
 
-/// Largest number of neighbours of a cell along two axes: seven bands and the entry that closes a no-slip wall.
+/// `out = -g - sum c mass (row - own)` over twelve rows, less the even differences along the row itself.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+fn row_differences(
+    out: &mut [f64],
+    g: &[f64],
+    phi: &[f64],
+    at: Range<usize>,
+    taps: &[(usize, f64)],
+    (mass, along): (&[f64], [f64; 3]),
+    padded: &[f64],
+) {
+    let n = out.len();
+    let c: [f64; INNER_TAPS] = std::array::from_fn(|t| taps[t].1);
+    let row = |t: usize| &phi[taps[t].0..taps[t].0 + n];
+    let [x0, x1, x2, x3, x4, x5] = [0, 1, 2, 3, 4, 5].map(row);
+    let [x6, x7, x8, x9, x10, x11] = [6, 7, 8, 9, 10, 11].map(row);
+    let (own, g, mass) = (&phi[at.clone()][..n], &g[at][..n], &mass[..n]);
+    let [p3, p2, p1, q1, q2, q3] = [1, 2, 3, 5, 6, 7].map(|offset: usize| &padded[offset..offset + n]);
+    for i in 0..n {
+        let o = own[i];
+        let a = c[0].mul_add(x0[i] - o, c[1].mul_add(x1[i] - o, c[2] * (x2[i] - o)));
+        let a = c[3].mul_add(x3[i] - o, c[4].mul_add(x4[i] - o, c[5].mul_add(x5[i] - o, a)));
+        let b = c[6].mul_add(x6[i] - o, c[7].mul_add(x7[i] - o, c[8] * (x8[i] - o)));
+        let b = c[9].mul_add(x9[i] - o, c[10].mul_add(x10[i] - o, c[11].mul_add(x11[i] - o, b)));
+        let e = along[0].mul_add((p1[i] - o) + (q1[i] - o), g[i]);
+        let e = along[1].mul_add((p2[i] - o) + (q2[i] - o), e);
+        let e = along[2].mul_add((p3[i] - o) + (q3[i] - o), e);
+        out[i] = -mass[i].mul_add(a + b, e);
+    }
+}
+
+/// Subtracts the rows that only cells at walls see, and the differences along a row whose cells are not all equal.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+fn other_differences(
+    op: &Operator,
+    out: &mut [f64],
+    own: &[f64],
+    phi: &[f64],
+    taps: &[(usize, f64)],
+    mass: f64,
+    padded: &mut [f64],
+) {
+    let n = out.len();
+    for &(start, c) in taps.iter().filter(|tap| tap.1 != 0.0) {
+        for (((out, x), own), m0) in out.iter_mut().zip(&phi[start..start + n]).zip(own).zip(&op.mass_m[0]) {
+            *out = (-c * m0).mul_add(x - own, *out);
+        }
+    }
+    if op.even.is_none() {
+        op.along.subtract_differences(out, mass, own, padded);
+    }
+}
+
+/// Neighbours of a cell along two axes away from walls: six of seven bands each.
+const INNER_TAPS: usize = 12;
+/// Largest number of neighbours along two axes: the entries that close no-slip walls besides.
 const MOST_TAPS: usize = 16;
-/// Partial sums of a row.
-const LANES: usize = 8;
+
+/// Coefficients of the pairs of neighbours at 1, 2 and 3 where all rows are equal and even.
+fn even(line: &Line, rows: &[Taps]) -> Option<[f64; 3]> {
+    let middle = line.cells / 2;
+    let at = |offset: usize| rows[middle].iter().find(|tap| tap.0 == middle + offset).map_or(0.0, |tap| tap.1);
+    (line.is_fourier() && line.cells >= 8).then(|| [at(1), at(2), at(3)])
+}
 
 /// Largest over smallest eigenvalue: bounds of the rows' sums of moduli over the masses, and the longest wave of the longest axis.
 fn condition(layout: &Layout, rows: &[Vec<Taps>; 3]) -> f64 {

@@ -24,8 +24,9 @@ fn right_side(layout: &Layout, divergence: impl Fn([f64; 3]) -> f64) -> Vec<f64>
     let mut g: Vec<f64> = (0..layout.shape.len()).map(|p| divergence(fraction(p))).collect();
     let operator = Operator::new(layout);
     operator.weigh(&mut g);
-    operator.remove_imbalance(&mut g);
-    g
+    let mut balanced = g.clone();
+    operator.copy_balanced(&g, &mut balanced, 0.0);
+    balanced
 }
 
 /// Waves as long as the domain, and some shorter.

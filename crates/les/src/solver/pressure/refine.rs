@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::apply::{Operator, norm};
+use super::apply::Operator;
 use crate::error::PressureFailure;
 
 /// Relative residuals that a pass saw after its iterations; none if it has none.
@@ -34,8 +34,8 @@ const STALLED: f64 = 0.5;
 const SAFETY: f64 = 0.999;
 /// A solution that improves no more is held up by round-off if it leaves at most this multiple of the last digit's share.
 const ROUND_OFF: f64 = 4.0;
-/// Values that are copied at a time.
-const CHUNK: usize = 1 << 14;
+/// Part of the tolerance that an imbalance may add to the residual.
+const BALANCED: f64 = 0.01;
 
 impl Refinement {
     /// Replaces the right side in `field` by the solution. `solve` replaces a right side of the given norm by a solution of
@@ -50,9 +50,11 @@ impl Refinement {
         tolerance: f64,
         mut solve: impl FnMut(&mut [f64], f64, f64) -> Pass,
     ) -> Result<Done, (Vec<f64>, PressureFailure)> {
-        let imbalance = operator.remove_imbalance(field);
-        let size = self.keep(operator, field);
+        // The solvers ignore what no pressure can balance; only the residual must not hold it against them.
+        self.right.resize(field.len(), 0.0);
+        let [size, imbalance] = operator.copy_balanced(field, &mut self.right, BALANCED * tolerance);
         if size == 0.0 {
+            field.fill(0.0);
             return Ok(Done { residual: 0.0, iterations: 0, imbalance });
         }
         let (mut iterations, mut history) = (0, Vec::new());
@@ -70,7 +72,7 @@ impl Refinement {
             if pass > 0 {
                 field.par_iter_mut().zip(&self.left).for_each(|(phi, more)| *phi += more);
             }
-            let residual = operator.residual(&self.right, field, &mut self.left) / size;
+            let residual = operator.residual_norm(&self.right, field) / size;
             history.push(residual);
             if residual <= tolerance {
                 return Ok(Done { residual, iterations, imbalance });
@@ -83,6 +85,8 @@ impl Refinement {
                 break;
             }
             last = residual;
+            self.left.resize(field.len(), 0.0);
+            operator.residual(&self.right, field, &mut self.left);
             // The solvers take the negative of their right side.
             self.left.par_iter_mut().for_each(|value| *value = -*value);
         }
@@ -90,13 +94,5 @@ impl Refinement {
         let at_round_off = reached.min(last) <= ROUND_OFF * attainable;
         let reason = if at_round_off { PressureFailure::RoundOff { attainable } } else { PressureFailure::Stalled };
         Err((history, reason))
-    }
-
-    /// Keeps the right side; returns its norm.
-    fn keep(&mut self, operator: &Operator, field: &[f64]) -> f64 {
-        self.left.resize(field.len(), 0.0);
-        self.right.resize(field.len(), 0.0);
-        self.right.par_chunks_mut(CHUNK).zip(field.par_chunks(CHUNK)).for_each(|(to, from)| to.copy_from_slice(from));
-        norm(operator.shape(), field)
     }
 }
