@@ -9,7 +9,7 @@ mod progress;
 mod wake;
 
 use crate::plan::{Plan, Target};
-use crate::progress::{Observer, Silent};
+use crate::progress::Observer;
 use crate::scene::{SceneFile, TABLE2_TOML};
 use crate::{Error, run, write};
 use clap::{Args, Parser, Subcommand};
@@ -137,7 +137,7 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     // An output that cannot be used is found before the computing, not after it.
     write::prepare(&io.out)?;
     let outcome = if cli.quiet {
-        with_threads(cli, || run::run(&plan, &Silent))??
+        with_threads(cli, || run::run(&plan, &progress::Quiet))??
     } else {
         let _ = write!(std::io::stderr(), "{plan}");
         let bars = progress::Bars::new();
@@ -159,12 +159,9 @@ fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
     let mut file = SceneFile::read(path)?;
     if let Some(seed) = cli.seed {
         file.scene.seed = seed;
-        let folder = file.folder;
-        file = SceneFile::new(file.scene).map_err(|problems| crate::scene::SceneError::Invalid {
-            path: path.to_owned(),
-            problems: problems.into_iter().map(|problem| crate::scene::Located { problem, line: None }).collect(),
-        })?;
-        file.folder = folder;
+        let origin = file.clone();
+        file = SceneFile::new(file.scene).map_err(|problems| origin.located(problems))?;
+        file = file.from_the_file_of(origin);
     }
     Ok(file)
 }

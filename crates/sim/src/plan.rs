@@ -121,7 +121,7 @@ impl Plan {
             return Err(Error::Input { path: "flow.planes".into(), reason });
         }
         let mut warnings = warnings(&scene.scene, &wind);
-        let optics = optics::stages(&scene.scene, target, &geometry, &mut warnings)?;
+        let optics = optics::stages(&scene, target, &geometry, &mut warnings)?;
         let stages = stages(&scene.scene, target, &geometry, &wind.source, optics);
         Ok(Self { scene, target, stages, geometry, wind, warnings })
     }
