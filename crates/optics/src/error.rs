@@ -1,5 +1,6 @@
 //! The one error type of the crate: each variant names the field, the value that was given and what is allowed.
 
+use crate::sampling::{self, SetUp, Violation};
 use thiserror::Error;
 
 /// Everything that can go wrong in this crate.
@@ -48,15 +49,19 @@ pub enum Error {
         /// Last range of the profile \[m\].
         last_m: f64,
     },
-    /// A grid or layering cannot hold what it is asked to hold.
-    #[error("sampling: {limit}: {needed:.4e} is needed, the set-up has {available:.4e}")]
+    /// A grid cannot hold what it is asked to hold: every limit that it violates, and a set-up that does not.
+    #[error("sampling: {}", sampling::in_words(violations, would_do.as_ref()))]
     Sampling {
-        /// The limit that is violated, with its unit.
-        limit: &'static str,
-        /// Smallest (or, for a spacing, largest) value that works.
-        needed: f64,
-        /// The value of the set-up.
-        available: f64,
+        /// The limits, one at least.
+        violations: Vec<Violation>,
+        /// A set-up that was tried and holds, if one of at most 4096 points does.
+        would_do: Option<SetUp>,
+    },
+    /// Turbulence so strong that layers cannot be made thin enough.
+    #[error("more than {most} layers are needed to keep the Rytov variance of each below 0.1")]
+    TooManyLayers {
+        /// The most that are tried.
+        most: usize,
     },
     /// The absorbing border took so much power that the result means nothing.
     #[error("the absorbing border took {fraction:.3} of the power before {range_m} m, 0.05 at most: use a wider grid")]

@@ -32,6 +32,7 @@
 //! | `grid`, `screen`, `propagate`, `source` | transverse grid, phase screens, split step, field at the telescope |
 //! | `path`, `monte_carlo` | layers of the path; efficiency by Monte Carlo |
 //! | `plan` | grid, layers, memory, time; refusals that name the limit |
+//! | [`sampling`] | limits of a grid, what violates them, what would do |
 //!
 //! Features: `screens` (default) compiles the modules without a link above, with their FFT and random numbers; `rayon`
 //! (default) runs realisations in parallel, with the same bits.
@@ -39,6 +40,7 @@
 pub mod beam;
 mod descent;
 pub mod efficiency;
+mod encircled;
 mod error;
 #[cfg(feature = "screens")]
 pub mod grid;
@@ -59,6 +61,7 @@ pub mod plan;
 #[cfg(feature = "screens")]
 pub mod propagate;
 mod quadrature;
+pub mod sampling;
 #[cfg(feature = "screens")]
 pub mod screen;
 pub mod snr;

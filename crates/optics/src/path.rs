@@ -9,6 +9,7 @@ use crate::efficiency::check_increasing;
 use crate::grid::Grid;
 use crate::theory::ScreenStrength;
 use crate::turbulence::Cn2Path;
+use std::collections::BTreeMap;
 
 /// Ends of the layers along the path \[m\]; the first layer begins at the telescope.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,6 +96,8 @@ pub(crate) struct Program {
     pub(crate) distance_m: Vec<f64>,
     /// sqrt(k^2 Cn2 dz) of each layer; empty without turbulence.
     pub(crate) strength: Vec<f64>,
+    /// Index of each distance by its logarithm in steps of rounding: paths of thousands of layers and ranges are compiled too.
+    known: BTreeMap<i64, usize>,
 }
 
 struct Compiler<'a> {
@@ -142,7 +145,7 @@ impl Program {
                 return Err(Error::OutOfRange { field: "range_m", value: r, allowed: "within the layers of the path" });
             }
         }
-        let program = Program { ops: Vec::new(), distance_m: Vec::new(), strength: Vec::new() };
+        let program = Program { ops: Vec::new(), distance_m: Vec::new(), strength: Vec::new(), known: BTreeMap::new() };
         let mut c = Compiler { program, position_m: 0.0, pending: None, grid, wavelength_m };
         if cn2.is_none() {
             for output in order {
@@ -213,10 +216,14 @@ impl Program {
 
     /// Index of the transfer function of a distance, new if need be.
     fn transfer_index(&mut self, distance_m: f64) -> usize {
-        self.distance_m.iter().position(|&d| same(d, distance_m)).unwrap_or_else(|| {
-            self.distance_m.push(distance_m);
-            self.distance_m.len() - 1
-        })
+        let key = (distance_m.ln() * 1e9).round() as i64;
+        let near = self.known.range(key - 1..=key + 1).find(|(_, i)| same(self.distance_m[**i], distance_m));
+        if let Some((_, index)) = near {
+            return *index;
+        }
+        self.distance_m.push(distance_m);
+        self.known.insert(key, self.distance_m.len() - 1);
+        self.distance_m.len() - 1
     }
 
     /// Fourier transform pairs of one realisation.

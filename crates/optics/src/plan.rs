@@ -1,24 +1,30 @@
-//! What a run needs: grid, spacing, layers, memory and time, derived from the scene - or a refusal that names the limit.
+//! What a run needs: grid, spacing, layers, memory and time, derived from the scene - or a refusal that names the limits.
 //!
-//! Rules: at least 25 points across the aperture radius and l0 >= 2 dx; coherence radius at the target resolved; room
-//! for beam and turbulent spread inside the absorbing border; Rytov variance of a layer at most 0.1. Check: the
-//! chapter's set-up passes for Cn2 up to 1e-13 at 1 km, 1e-12 beyond 1 km on 512 points is refused, and what the plan
-//! proposes passes its own test.
+//! Rules: at least 25 points across the aperture radius (4 where every range is in the far field); l0 >= 2 dx; coherence radius
+//! at the target resolved; the border takes at most 0.0075 of the mean beam's light, tails of diffraction and turbulence included;
+//! Rytov variance of a layer at most 0.1; the exact mean for the screens within a third of the standard error of that for the
+//! continuous path, at every range. Check: the chapter's set-up passes for Cn2 up to 1e-13 at 1 km, 1e-12 beyond 1 km on 512
+//! points is refused, what the plan proposes passes its own test, and runs of derived set-ups lose less than 0.01 of the light.
+
+mod layers;
+mod light;
+mod limits;
+
+pub use layers::{LARGEST_GAP_SHARE, LARGEST_LAYER_RYTOV, LayerGap};
 
 use crate::grid::Grid;
 use crate::path::{Layers, Program};
-use crate::source::check_grid;
 use crate::turbulence::{self, Cn2Path};
 use crate::{Error, Misalignment, Telescope, Turbulence};
+use layers::{Gaps, thin_layers, worst_rytov};
+use limits::{Case, Verdict, last};
 
-/// Largest Rytov variance (plane wave) of one layer.
-pub const LARGEST_LAYER_RYTOV: f64 = 0.1;
 /// CPU time of one f32 layer per point, transforms included \[s\]; f64 takes twice as long. Measured, one core of 2023.
 const LAYER_S: f64 = 9e-9;
 /// CPU time of one f32 screen per point \[s\].
 const SCREEN_S: f64 = 9e-9;
-/// Largest number of points along an axis that a plan proposes.
-const LARGEST_POINTS: usize = 4096;
+/// Share of the light above which its loss at the border is doubtful.
+pub const DOUBTFUL_LOSS: f64 = 0.01;
 
 /// The cheapest model that is valid for a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,6 +64,10 @@ pub struct Plan {
     pub layers: Layers,
     /// Largest Rytov variance of a layer.
     pub layer_rytov_variance: f64,
+    /// Forecast of the largest mean fraction of the light that the border takes.
+    pub light_lost: f64,
+    /// What the layers do to the mean at the ranges of the run (at 64 of them at most); empty without turbulence.
+    pub gaps: Vec<LayerGap>,
     /// Memory of a run with eight groups at a time in f32 \[bytes\].
     pub memory_bytes: usize,
     /// CPU time of one realisation in f32 \[s\], an estimate within a factor of two on current machines.
@@ -82,6 +92,20 @@ pub enum Warning {
         /// Number of equal layers that would do.
         layers_needed: usize,
     },
+    /// The layers shift the mean by more than a third of its standard error.
+    LayerGap {
+        /// The worst of the ranges.
+        worst: LayerGap,
+        /// Number of equal layers that would do, if one of at most 1000 does.
+        layers_needed: Option<usize>,
+    },
+    /// The border takes more than 0.01 of the light.
+    LightLost {
+        /// Forecast of the fraction.
+        fraction: f64,
+        /// Width of a grid that is wide enough \[m\].
+        width_m: f64,
+    },
     /// The turbulence is so weak that Monte Carlo differs from free space by less than its own error.
     WeakTurbulence {
         /// Rytov variance of the whole path.
@@ -89,52 +113,7 @@ pub enum Warning {
     },
 }
 
-/// Rytov variance of a layer of the mean Cn2 from `start_m` to `end_m`.
-fn layer_rytov(cn2: &Cn2Path, wavelength_m: f64, start_m: f64, end_m: f64) -> Result<f64, Error> {
-    if cn2.is_none() {
-        return Ok(0.0);
-    }
-    turbulence::rytov_variance(cn2.mean(start_m, end_m)?, wavelength_m, end_m - start_m)
-}
-
-/// Equal layers to `range_m`, as many as keep each below [`LARGEST_LAYER_RYTOV`].
-fn enough_layers(cn2: &Cn2Path, wavelength_m: f64, range_m: f64) -> Result<usize, Error> {
-    const MOST: usize = 1000;
-    for count in 1..=MOST {
-        let step = range_m / count as f64;
-        let mut worst = 0f64;
-        for i in 0..count {
-            worst = worst.max(layer_rytov(cn2, wavelength_m, i as f64 * step, (i + 1) as f64 * step)?);
-        }
-        if worst <= LARGEST_LAYER_RYTOV {
-            return Ok(count);
-        }
-    }
-    Err(Error::Sampling { limit: "number of layers", needed: f64::INFINITY, available: MOST as f64 })
-}
-
-/// Width \[m\] and spacing \[m\] that the beam needs at `range_m` in this turbulence (Schmidt 2010).
-fn needs(telescope: &Telescope, misalignment: &Misalignment, cn2: &Cn2Path, range_m: f64) -> Result<(f64, f64), Error> {
-    let lambda = telescope.wavelength_m;
-    let reach = telescope.aperture_radius_m.min(3.0 * telescope.intensity_radius_m());
-    let curvature = telescope.focus.curvature_per_m();
-    let tilt = misalignment.tilt_rad[0].hypot(misalignment.tilt_rad[1]);
-    let offset = misalignment.offset_m[0].hypot(misalignment.offset_m[1]);
-    // Angular spread of turbulence: lambda/(pi rho_0), rho_0 seen from the telescope and from the target.
-    let spread_rad = if cn2.is_none() {
-        0.0
-    } else {
-        let rho_0 = turbulence::coherence_radius_m(cn2.mean(0.0, range_m)?, lambda, range_m)?;
-        lambda / (std::f64::consts::PI * rho_0)
-    };
-    let radius = reach * (1.0 - range_m * curvature).abs() + lambda * range_m / (2.0 * reach);
-    let width = 2.0 * (radius + 2.0 * spread_rad * range_m + offset + tilt * range_m) / 0.9;
-    let slope = reach * curvature.abs() + tilt + 2.0 * spread_rad;
-    let spacing = (telescope.aperture_radius_m / 25.0).min(0.5 * lambda / slope.max(1e-30));
-    Ok((width.max(2.5 * (telescope.aperture_radius_m + offset)), spacing))
-}
-
-/// Derives grid and layers for ranges \[m\] (increasing; layers end at the largest).
+/// Derives grid and layers for ranges \[m\] (increasing; layers end at the largest) and a number of realisations.
 ///
 /// # Errors
 /// [`Error::Sampling`] when more than 4096 points along an axis are needed; [`Error`] for a scene that is not allowed.
@@ -143,37 +122,24 @@ pub fn plan(
     misalignment: &Misalignment,
     turbulence: &Turbulence,
     range_m: &[f64],
+    realisations: usize,
 ) -> Result<Plan, Error> {
     crate::efficiency::check_increasing("range_m", range_m)?;
-    let furthest = *range_m.last().ok_or(Error::Length { field: "range_m", found: 0, expected: 1 })?;
-    let telescope = telescope.validated()?;
-    let cn2 = turbulence.cn2.clone().validated()?;
-    let (width, mut spacing) = needs(&telescope, misalignment, &cn2, furthest)?;
-    let inner = turbulence.spectrum.inner_wavenumber_rad_m();
-    if inner.is_finite() && !cn2.is_none() {
-        // Half the inner scale if that costs no more than a factor of two.
-        let fine = 2.96 / inner;
-        if fine < spacing && fine >= 0.5 * spacing {
-            spacing = fine;
-        }
+    let case = Case::new(telescope, misalignment, turbulence)?;
+    let grid = case.grid(range_m)?;
+    let gaps = Gaps::new(&case.telescope, &case.cn2, &case.table, range_m, realisations)?;
+    let layers = gaps.refined(thin_layers(&case.cn2, telescope.wavelength_m, last(range_m)?)?)?;
+    let verdict = case.verdict(&grid, range_m)?;
+    if !verdict.violations.is_empty() {
+        return Err(Error::Sampling { violations: verdict.violations, would_do: None });
     }
-    let points = good_size((width / spacing).ceil() as usize);
-    if points > LARGEST_POINTS {
-        return Err(Error::Sampling {
-            limit: "points along an axis",
-            needed: points as f64,
-            available: LARGEST_POINTS as f64,
-        });
-    }
-    let grid = Grid::square(points.max(128), width.max(128.0 * spacing) / points.max(128) as f64)?;
-    let layers = Layers::equal(enough_layers(&cn2, telescope.wavelength_m, furthest)?, furthest)?;
-    examine(&telescope, misalignment, turbulence, &grid, &layers, range_m)
+    case.judge(&grid, &layers, range_m, &gaps, &verdict)
 }
 
 /// Examines a set-up that someone else chose, the chapter's 512 x 2 mm and 10 layers for example.
 ///
 /// # Errors
-/// [`Error::Sampling`] names the limit that is violated and the smallest (for a spacing: largest) value that works.
+/// As [`examine_runs`].
 pub fn examine(
     telescope: &Telescope,
     misalignment: &Misalignment,
@@ -181,65 +147,130 @@ pub fn examine(
     grid: &Grid,
     layers: &Layers,
     range_m: &[f64],
+    realisations: usize,
 ) -> Result<Plan, Error> {
-    crate::efficiency::check_increasing("range_m", range_m)?;
-    let furthest = *range_m.last().ok_or(Error::Length { field: "range_m", found: 0, expected: 1 })?;
-    let lambda = telescope.validated()?.wavelength_m;
-    let cn2 = turbulence.cn2.clone().validated()?;
-    check_grid(telescope, misalignment, grid, furthest)?;
-    let program = Program::compile(layers, range_m, &cn2, grid, lambda)?;
-    let (width, spacing) = needs(telescope, misalignment, &cn2, furthest)?;
-    // The rules keep a margin of two: what lies within it is left to the monitored border.
-    if !cn2.is_none() && grid.smallest_width_m() < 0.5 * width {
-        return Err(Error::Sampling {
-            limit: "grid width [m] for the turbulent spread of the beam",
-            needed: 0.5 * width,
-            available: grid.smallest_width_m(),
-        });
-    }
-    if !cn2.is_none() && grid.dx_m.max(grid.dy_m) > 2.0 * spacing {
-        return Err(Error::Sampling {
-            limit: "grid spacing [m] for the angles into which turbulence scatters",
-            needed: 2.0 * spacing,
-            available: grid.dx_m.max(grid.dy_m),
-        });
-    }
-    let mut worst = 0f64;
-    for i in 0..layers.end_m().len() {
-        let (start, end) = layers.bounds_m(i);
-        if start < furthest {
-            worst = worst.max(layer_rytov(&cn2, lambda, start, end.min(furthest))?);
-        }
-    }
-    let mut warnings = Vec::new();
-    if worst > LARGEST_LAYER_RYTOV {
-        let layers_needed = enough_layers(&cn2, lambda, furthest)?;
-        warnings.push(Warning::ThickLayers { rytov_variance: worst, layers_needed });
-    }
-    if !cn2.is_none() {
-        let whole = layer_rytov(&cn2, lambda, 0.0, furthest)?;
-        if whole < 1e-3 {
-            warnings.push(Warning::WeakTurbulence { rytov_variance: whole });
-        }
-        if turbulence.spectrum.inner_wavenumber_rad_m() * grid.dx_m.max(grid.dy_m) > 2.97 {
-            warnings.push(Warning::InnerScale { missing: missing_at_one_spacing(turbulence, grid)? });
-        }
-    }
-    let beams = if *misalignment == Misalignment::NONE { 1 } else { 2 };
-    Ok(Plan {
-        grid: *grid,
-        layers: layers.clone(),
-        layer_rytov_variance: worst,
-        memory_bytes: memory_bytes(grid, range_m.len(), beams),
-        realisation_cpu_s: grid.points() as f64
-            * (LAYER_S * program.transform_pairs() * beams as f64 + SCREEN_S * program.strength.len() as f64),
-        warnings,
+    let case = Case::new(telescope, misalignment, turbulence)?;
+    case.examine(grid, &[(layers.clone(), range_m)], realisations)?.pop().ok_or(Error::Length {
+        field: "range_m",
+        found: 0,
+        expected: 1,
     })
 }
 
-/// Relative deficit of the screens' structure function at one grid spacing.
+/// As [`examine`] for several runs on one grid, each with `layers` equal layers to its last range: what one refuses is told
+/// for all of them at once, and what would do does for all.
+///
+/// # Errors
+/// [`Error::Sampling`] names every limit that is violated with the smallest (for a spacing: largest) value that works, and a
+/// whole set-up that was tried and works.
+pub fn examine_runs(
+    telescope: &Telescope,
+    misalignment: &Misalignment,
+    turbulence: &Turbulence,
+    grid: &Grid,
+    layers: usize,
+    runs: &[&[f64]],
+    realisations: usize,
+) -> Result<Vec<Plan>, Error> {
+    let case = Case::new(telescope, misalignment, turbulence)?;
+    let mut set_ups = Vec::new();
+    for range_m in runs {
+        set_ups.push((Layers::equal(layers, last(range_m)?)?, *range_m));
+    }
+    case.examine(grid, &set_ups, realisations)
+}
+
+impl Case<'_> {
+    fn examine(&self, grid: &Grid, runs: &[(Layers, &[f64])], realisations: usize) -> Result<Vec<Plan>, Error> {
+        let mut verdicts: Vec<Verdict> = Vec::new();
+        for (_, range_m) in runs {
+            crate::efficiency::check_increasing("range_m", range_m)?;
+            verdicts.push(self.verdict(grid, range_m)?);
+        }
+        let violations: Vec<_> = verdicts.iter().flat_map(|v| v.violations.iter().copied()).collect();
+        if !violations.is_empty() {
+            let ranges: Vec<&[f64]> = runs.iter().map(|(_, range_m)| *range_m).collect();
+            return Err(Error::Sampling { violations, would_do: self.set_up(&ranges, realisations) });
+        }
+        let mut plans = Vec::new();
+        for ((layers, range_m), verdict) in runs.iter().zip(&verdicts) {
+            let gaps = Gaps::new(&self.telescope, &self.cn2, &self.table, range_m, realisations)?;
+            plans.push(self.judge(grid, layers, range_m, &gaps, verdict)?);
+        }
+        Ok(plans)
+    }
+
+    /// Cost and warnings of a set-up whose grid is accepted.
+    fn judge(
+        &self,
+        grid: &Grid,
+        layers: &Layers,
+        range_m: &[f64],
+        gaps: &Gaps<'_>,
+        verdict: &Verdict,
+    ) -> Result<Plan, Error> {
+        let (lambda, furthest) = (self.telescope.wavelength_m, last(range_m)?);
+        let program = Program::compile(layers, range_m, &self.cn2, grid, lambda)?;
+        let layer_rytov_variance = worst_rytov(&self.cn2, lambda, layers, furthest)?;
+        let gap_list = gaps.of(layers)?;
+        let beams = if self.misalignment == Misalignment::NONE { 1 } else { 2 };
+        let warnings = self.warnings(grid, layer_rytov_variance, &gap_list, range_m, gaps, verdict)?;
+        let pairs = program.transform_pairs() * beams as f64;
+        let transfers = program.distance_m.len() * (grid.nx + grid.ny) * 8;
+        Ok(Plan {
+            grid: *grid,
+            layers: layers.clone(),
+            layer_rytov_variance,
+            light_lost: verdict.light_lost,
+            gaps: gap_list,
+            memory_bytes: memory_bytes(grid, range_m.len(), beams) + transfers,
+            realisation_cpu_s: grid.points() as f64 * (LAYER_S * pairs + SCREEN_S * program.strength.len() as f64),
+            warnings,
+        })
+    }
+
+    fn warnings(
+        &self,
+        grid: &Grid,
+        layer_rytov_variance: f64,
+        gap_list: &[LayerGap],
+        range_m: &[f64],
+        gaps: &Gaps<'_>,
+        verdict: &Verdict,
+    ) -> Result<Vec<Warning>, Error> {
+        let mut warnings = Vec::new();
+        let (lambda, furthest) = (self.telescope.wavelength_m, last(range_m)?);
+        if layer_rytov_variance > LARGEST_LAYER_RYTOV {
+            let layers_needed = thin_layers(&self.cn2, lambda, furthest)?.end_m().len();
+            warnings.push(Warning::ThickLayers { rytov_variance: layer_rytov_variance, layers_needed });
+        }
+        let worst = gap_list.iter().filter(|g| g.is_large()).max_by(|a, b| a.excess().total_cmp(&b.excess()));
+        if let Some(&worst) = worst {
+            let layers_needed = gaps.equal_layers(1, furthest)?;
+            warnings.push(Warning::LayerGap { worst, layers_needed });
+        }
+        if verdict.light_lost > DOUBTFUL_LOSS {
+            let width_m = self.width_for_light_m(grid, range_m)?;
+            warnings.push(Warning::LightLost { fraction: verdict.light_lost, width_m });
+        }
+        if !self.cn2.is_none() {
+            let whole = turbulence::path_rytov_variance(&self.cn2, lambda, furthest)?;
+            if whole < 1e-3 {
+                warnings.push(Warning::WeakTurbulence { rytov_variance: whole });
+            }
+            if self.turbulence.spectrum.inner_wavenumber_rad_m() * grid.dx_m.max(grid.dy_m) > 2.97 {
+                warnings.push(Warning::InnerScale { missing: missing_at_one_spacing(self.turbulence, grid)? });
+            }
+        }
+        Ok(warnings)
+    }
+}
+
+/// Relative deficit of the screens' structure function at one grid spacing. It hardly depends on the width of the grid: a
+/// part of a large grid shows it.
 fn missing_at_one_spacing(turbulence: &Turbulence, grid: &Grid) -> Result<f64, Error> {
-    let generator = crate::screen::ScreenGenerator::<f64>::new(*grid, turbulence.spectrum.clone())?;
+    let part = Grid { nx: grid.nx.min(256), ny: grid.ny.min(256), ..*grid };
+    let generator = crate::screen::ScreenGenerator::<f64>::new(part, turbulence.spectrum.clone())?;
     let exact = crate::structure::structure_function_m53(&*turbulence.spectrum, grid.dx_m)?;
     Ok(1.0 - generator.expected_structure_m53(1, 0) / exact)
 }
@@ -253,21 +284,6 @@ fn memory_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
     8 * (per_group + 4 * plane * beams * (ranges + 4)) + (12 + complex / points) * points
 }
 
-/// The next size with only the factors 2, 3 and 5, even.
-fn good_size(at_least: usize) -> usize {
-    (at_least.max(2)..)
-        .find(|&n| {
-            let mut rest = n;
-            for prime in [2, 3, 5] {
-                while rest % prime == 0 {
-                    rest /= prime;
-                }
-            }
-            rest == 1 && n % 2 == 0
-        })
-        .unwrap_or(at_least)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -275,7 +291,7 @@ mod tests {
     fn chapter(cn2: f64, range_m: f64) -> Result<Plan, Error> {
         let layers = Layers::equal(10, range_m).unwrap();
         let turbulence = Turbulence::chapter(cn2).unwrap();
-        examine(&Telescope::chapter(), &Misalignment::NONE, &turbulence, &Grid::chapter(), &layers, &[range_m])
+        examine(&Telescope::chapter(), &Misalignment::NONE, &turbulence, &Grid::chapter(), &layers, &[range_m], 400)
     }
 
     #[test]
@@ -301,7 +317,7 @@ mod tests {
         for (cn2, range_m) in [(0.0, 2000.0), (1e-15, 3000.0), (1e-13, 1000.0), (1e-12, 1500.0)] {
             let t = Telescope::chapter();
             let turbulence = Turbulence::chapter(cn2).unwrap();
-            let p = plan(&t, &Misalignment::NONE, &turbulence, &[0.5 * range_m, range_m]).unwrap();
+            let p = plan(&t, &Misalignment::NONE, &turbulence, &[0.5 * range_m, range_m], 400).unwrap();
             assert!(p.layer_rytov_variance <= LARGEST_LAYER_RYTOV);
             assert!(!p.warnings.iter().any(|w| matches!(w, Warning::ThickLayers { .. })));
             assert!(p.realisation_cpu_s > 0.0);
@@ -323,8 +339,9 @@ mod tests {
             cn2: Cn2Path::Uniform { cn2_m_m23: 1e-14 },
         };
         let grid = Grid::square(128, 4e-3).unwrap();
-        let layers = Layers::equal(4, 800.0).unwrap();
-        let p = examine(&Telescope::chapter(), &Misalignment::NONE, &turbulence, &grid, &layers, &[800.0]).unwrap();
+        let layers = Layers::equal(6, 800.0).unwrap();
+        let p =
+            examine(&Telescope::chapter(), &Misalignment::NONE, &turbulence, &grid, &layers, &[800.0], 400).unwrap();
         assert!(
             matches!(p.warnings[..], [Warning::InnerScale { missing }] if missing > 0.02 && missing < 0.3),
             "{p:?}"

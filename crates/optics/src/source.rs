@@ -9,6 +9,7 @@ use crate::beam::Telescope;
 use crate::grid::{Fft2, Grid};
 use crate::kernel::Real;
 use crate::quadrature::GaussLegendre;
+use crate::sampling::{Limit, Violation};
 use crate::{Error, Misalignment};
 use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
@@ -128,39 +129,41 @@ pub(crate) fn aperture_field<T: Real>(
 /// Whether the grid can hold the telescope and its beam out to `range_m`.
 ///
 /// # Errors
-/// [`Error::Sampling`] names the limit that is violated, the value that is needed and the one the grid has.
+/// [`Error::Sampling`] names every limit that is violated, with the value that is needed and the one the grid has.
 pub fn check_grid(telescope: &Telescope, misalignment: &Misalignment, grid: &Grid, range_m: f64) -> Result<(), Error> {
+    let violations = grid_violations(telescope, misalignment, grid, range_m)?;
+    if violations.is_empty() { Ok(()) } else { Err(Error::Sampling { violations, would_do: None }) }
+}
+
+/// What [`check_grid`] refuses.
+///
+/// # Errors
+/// [`Error::OutOfRange`] for a telescope, misalignment or grid that is none.
+pub(crate) fn grid_violations(
+    telescope: &Telescope,
+    misalignment: &Misalignment,
+    grid: &Grid,
+    range_m: f64,
+) -> Result<Vec<Violation>, Error> {
     let telescope = telescope.validated()?;
     let misalignment = misalignment.validated()?;
     let grid = grid.validated()?;
-    let spacing = grid.dx_m.max(grid.dy_m);
+    let (spacing, width) = (grid.dx_m.max(grid.dy_m), grid.smallest_width_m());
     let (a, lambda) = (telescope.aperture_radius_m, telescope.wavelength_m);
-    let refuse = |limit, needed, available| Err(Error::Sampling { limit, needed, available });
     let resolved = (0.5 * (a - telescope.obscuration_radius_m)).min(a / 3.0).min(telescope.intensity_radius_m());
-    if spacing > resolved {
-        return refuse(
-            "grid spacing [m] at most a third of the aperture radius and one beam radius",
-            resolved,
-            spacing,
-        );
-    }
     let offset = misalignment.offset_m[0].hypot(misalignment.offset_m[1]);
-    let width = grid.smallest_width_m();
-    if 2.0 * (a + offset) > 0.8 * width {
-        return refuse("grid width [m] for the aperture inside the absorbing border", 2.5 * (a + offset), width);
-    }
     let tilt = misalignment.tilt_rad[0].hypot(misalignment.tilt_rad[1]);
     let reach = a.min(3.0 * telescope.intensity_radius_m());
     let slope = tilt + reach * telescope.focus.curvature_per_m().abs();
-    if slope * 2.0 * spacing > lambda {
-        return refuse("grid spacing [m] for the slope of the wave front (focus, tilt)", 0.5 * lambda / slope, spacing);
-    }
     let geometric = reach * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
     let beam = geometric + lambda * range_m / (2.0 * reach) + offset + tilt * range_m;
-    if 2.0 * beam > 0.9 * width {
-        return refuse("grid width [m] for the beam at the largest range", 2.0 * beam / 0.9, width);
-    }
-    Ok(())
+    let found = [
+        Violation::too_large(Limit::Aperture, resolved, spacing),
+        Violation::too_large(Limit::WaveFront, 0.5 * lambda / slope, spacing),
+        Violation::too_small(Limit::Border, 2.5 * (a + offset), width),
+        Violation::too_small(Limit::Beam, 2.0 * beam / 0.9, width),
+    ];
+    Ok(found.into_iter().flatten().collect())
 }
 
 #[cfg(test)]
@@ -185,19 +188,24 @@ mod tests {
         let none = Misalignment::NONE;
         let t = Telescope::chapter();
         assert!(check_grid(&t, &none, &grid, 3000.0).is_ok());
-        let limit = |t: Telescope, grid: Grid, range_m: f64| match check_grid(&t, &none, &grid, range_m) {
-            Err(Error::Sampling { limit, needed, .. }) => (limit, needed),
+        let first = |t: Telescope, range_m: f64| match check_grid(&t, &none, &grid, range_m) {
+            Err(Error::Sampling { violations, .. }) => (violations[0].limit, violations[0].needed),
             other => panic!("{other:?}"),
         };
         let tiny = Telescope { aperture_radius_m: 5e-3, beam_radius_m: 3e-3, ..t };
-        assert!(limit(tiny, grid, 100.0).0.contains("spacing"));
+        assert_eq!(first(tiny, 100.0), (Limit::Aperture, 1.666e-3));
         let huge = Telescope { aperture_radius_m: 0.6, ..t };
-        let (name, needed) = limit(huge, grid, 100.0);
-        assert!(name.contains("aperture") && needed > 1.2);
+        assert_eq!(first(huge, 100.0), (Limit::Border, 1.5));
         // Focus far in front of the target: the beam outgrows the grid.
         let short = Telescope { focus: crate::Focus::At(150.0), ..t };
-        assert!(limit(short, grid, 3000.0).0.contains("largest range"));
+        assert_eq!(first(short, 3000.0).0, Limit::Beam);
         let steep = Telescope { focus: crate::Focus::At(50.0), ..t };
-        assert!(limit(steep, grid, 60.0).0.contains("slope"));
+        assert_eq!(first(steep, 60.0).0, Limit::WaveFront);
+        // All of them at once.
+        let both = Telescope { focus: crate::Focus::At(50.0), ..t };
+        match check_grid(&both, &none, &grid, 3000.0) {
+            Err(Error::Sampling { violations, .. }) => assert_eq!(violations.len(), 2, "{violations:?}"),
+            other => panic!("{other:?}"),
+        }
     }
 }

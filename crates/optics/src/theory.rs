@@ -12,6 +12,7 @@ use crate::structure::StructureTable;
 use crate::turbulence::{Cn2Path, Turbulence};
 use std::f64::consts::PI;
 
+pub use crate::encircled::mean_power_beyond;
 pub use crate::overlap::{LARGEST_FRESNEL_NUMBER, fresnel_number, quadrature_cost_s};
 pub use crate::weak::{WeakTurbulence, square_law_efficiency, weak_turbulence_efficiency};
 

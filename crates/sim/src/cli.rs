@@ -11,7 +11,7 @@ mod wake;
 
 use crate::export::Existing;
 use crate::plan::{Plan, Target};
-use crate::progress::{Observer, Silent};
+use crate::progress::Observer;
 use crate::scene::{SceneFile, TABLE2_TOML};
 use crate::{Error, run, write};
 use clap::{Args, Parser, Subcommand};
@@ -174,7 +174,7 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     let existing = if io.overwrite { Existing::Any } else { Existing::Own };
     let plan = planned(&io.scene, target, Some((&io.out, existing)), io.allow_large, cli)?;
     let outcome = if cli.quiet {
-        with_threads(cli, || run::run(&plan, &Silent))??
+        with_threads(cli, || run::run(&plan, &progress::Quiet))??
     } else {
         let _ = write!(std::io::stderr(), "{plan}");
         let bars = progress::Bars::new();
@@ -195,12 +195,9 @@ fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
     let mut file = SceneFile::read(path)?;
     if let Some(seed) = cli.seed {
         file.scene.seed = seed;
-        let folder = file.folder;
-        file = SceneFile::new(file.scene).map_err(|problems| crate::scene::SceneError::Invalid {
-            path: path.to_owned(),
-            problems: problems.into_iter().map(|problem| crate::scene::Located { problem, line: None }).collect(),
-        })?;
-        file.folder = folder;
+        let origin = file.clone();
+        file = SceneFile::new(file.scene).map_err(|problems| origin.located(problems))?;
+        file = file.from_the_file_of(origin);
     }
     Ok(file)
 }

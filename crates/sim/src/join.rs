@@ -79,8 +79,12 @@ pub fn start_time_s(scene: &Scene) -> f64 {
 /// # Errors
 /// What the optics refuse; a checked scene gives none.
 pub fn telescope(scene: &Scene) -> Result<optics::Telescope, Error> {
+    Ok(unchecked_telescope(scene).validated()?)
+}
+
+fn unchecked_telescope(scene: &Scene) -> optics::Telescope {
     let t = &scene.telescope;
-    let telescope = optics::Telescope {
+    optics::Telescope {
         wavelength_m: scene.laser.wavelength_m,
         aperture_radius_m: t.aperture_radius_m,
         obscuration_radius_m: t.obscuration_radius_m,
@@ -90,15 +94,14 @@ pub fn telescope(scene: &Scene) -> Result<optics::Telescope, Error> {
             BeamRadiusDefinition::Field => optics::RadiusDefinition::Field,
         },
         focus: if t.focus_m.is_infinite() { optics::Focus::Collimated } else { optics::Focus::At(t.focus_m) },
-    };
-    Ok(telescope.validated()?)
+    }
 }
 
 /// The turbulence of a scene.
 ///
 /// # Errors
 /// What the optics refuse; a checked scene gives none.
-pub fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, Error> {
+pub fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Error> {
     let convention = match t.outer_scale_wavenumber {
         OuterScaleWavenumber::Inverse => optics::OuterScaleConvention::Inverse,
         OuterScaleWavenumber::TwoPiOver => optics::OuterScaleConvention::TwoPiOver,
@@ -125,20 +128,35 @@ pub fn receiver_path(scene: &Scene) -> optics::plan::Receiver {
     }
 }
 
-/// Grid and layers of a scene's phase screens for given ranges, m, increasing, with their cost.
+/// Grid and layers of a scene's phase screens for several runs, each with its ranges, m, increasing; with their cost.
 ///
 /// # Errors
-/// What cannot be resolved, with the limit and what would do.
-pub fn screen_plan(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> Result<optics::plan::Plan, Error> {
-    let (telescope, turbulence, none) = (telescope(scene)?, turbulence(t)?, optics::Misalignment::NONE);
-    Ok(match t.sampling {
-        ScreenSampling::Derived => optics::plan::plan(&telescope, &none, &turbulence, range_m)?,
+/// What cannot be resolved, with every limit and what would do for all of the runs.
+pub fn screen_plans(
+    scene: &Scene,
+    t: &RefractiveTurbulence,
+    runs: &[&[f64]],
+) -> Result<Vec<optics::plan::Plan>, optics::Error> {
+    let (telescope, turbulence, none) = (unchecked_telescope(scene), turbulence(t)?, optics::Misalignment::NONE);
+    match t.sampling {
+        ScreenSampling::Derived => {
+            let plan = |range_m: &&[f64]| optics::plan::plan(&telescope, &none, &turbulence, range_m, t.realisations);
+            runs.iter().map(plan).collect()
+        }
         ScreenSampling::Explicit => {
             let grid = optics::Grid::square(t.grid_points, t.grid_spacing_m)?;
-            let layers = optics::Layers::equal(t.layers, range_m.last().copied().unwrap_or(0.0))?;
-            optics::plan::examine(&telescope, &none, &turbulence, &grid, &layers, range_m)?
+            optics::plan::examine_runs(&telescope, &none, &turbulence, &grid, t.layers, runs, t.realisations)
         }
-    })
+    }
+}
+
+/// As [`screen_plans`] for one run.
+///
+/// # Errors
+/// As there.
+pub fn screen_plan(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> Result<optics::plan::Plan, Error> {
+    let plan = screen_plans(scene, t, &[range_m])?.pop();
+    Ok(plan.ok_or(optics::Error::Length { field: "range_m", found: 0, expected: 1 })?)
 }
 
 /// The Monte Carlo of a scene's turbulence for given ranges, m, increasing.

@@ -133,7 +133,7 @@ impl Plan {
         }
         let mut warnings = warnings(&scene.scene, &wind);
         warnings.extend(ambiguity::warning(&scene.scene)?);
-        let optics = optics::stages(&scene.scene, target, &geometry, &mut warnings)?;
+        let optics = optics::stages(&scene, target, &geometry, &mut warnings)?;
         let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
         let plan = Self { scene, target, stages, geometry, wind, warnings };
         possible::check(&plan)?;

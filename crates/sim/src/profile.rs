@@ -8,7 +8,7 @@ use crate::progress::Observer;
 use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence};
 use crate::{Error, join};
 use std::ops::ControlFlow;
-use wakescope_optics::plan::{Model, cheapest_model};
+use wakescope_optics::plan::{DOUBTFUL_LOSS, Model, cheapest_model};
 use wakescope_optics::structure::StructureTable;
 use wakescope_optics::theory::{bistatic_efficiency_with, free_space_efficiency};
 use wakescope_optics::{Cn2Path, EfficiencyProfile, Misalignment, Stop};
@@ -160,6 +160,13 @@ fn monte_carlo(
         ControlFlow::Continue(())
     })?;
     observer.end();
+    let lost = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
+    if lost > DOUBTFUL_LOSS {
+        observer.warn(&format!(
+            "the border of the phase screens took {lost:.3} of the light, 0.01 at most is good: a wider grid is needed, more \
+             atmosphere.turbulence.grid_points or sampling = \"derived\""
+        ));
+    }
     // A checked scene has at least two realisations, and so pairs of them.
     let bistatic =
         estimate.bistatic.ok_or(wakescope_optics::Error::Length { field: "realisations", found: 1, expected: 2 })?;
@@ -168,7 +175,7 @@ fn monte_carlo(
         bistatic,
         monostatic_realisations: estimate.monostatic_realisations,
         bistatic_realisations: estimate.bistatic_realisations,
-        lost_power_fraction: estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max),
+        lost_power_fraction: lost,
     })
 }
 

@@ -10,6 +10,8 @@ pub trait Observer: Sync {
     fn advance(&self, steps: u64);
     /// The current stage is done.
     fn end(&self);
+    /// Something that makes a result doubtful; to be shown even where progress is not.
+    fn warn(&self, _text: &str) {}
 }
 
 /// An observer that looks away.

@@ -42,6 +42,22 @@ impl Observer for Bars {
     fn end(&self) {
         self.bar().finish();
     }
+
+    fn warn(&self, text: &str) {
+        self.bar().suspend(|| Quiet.warn(text));
+    }
+}
+
+/// Shows warnings and no progress.
+pub(super) struct Quiet;
+
+impl Observer for Quiet {
+    fn begin(&self, _: Stage, _: u64) {}
+    fn advance(&self, _: u64) {}
+    fn end(&self) {}
+    fn warn(&self, text: &str) {
+        let _ = writeln!(std::io::stderr(), "warning: {text}");
+    }
 }
 
 /// Divisions of the bar of a flow.

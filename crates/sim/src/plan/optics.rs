@@ -4,23 +4,23 @@ use super::{Cost, PlannedStage, Stage, Target};
 use crate::geometry::Geometry;
 use crate::profile::{drawn_turbulence, model, spaced, turbulence};
 use crate::scan::profile_ranges_m;
-use crate::scene::{RefractiveTurbulence, Scene, SnrReference};
+use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
 use crate::{Error, join};
 use wakescope_optics::plan::{Model, Warning};
-
-/// Time of one quadrature on one core, s.
-const QUADRATURE_S: f64 = 2e-3;
+use wakescope_optics::sampling::{Limit, SetUp, Violation};
+use wakescope_optics::{Focus, Telescope, theory};
 
 /// Phase screens and efficiency; adds what is doubtful about the screens to `warnings`.
 ///
 /// # Errors
-/// Screens that cannot resolve the scene, with the limit and what would do.
+/// Screens that cannot resolve the scene, with every limit and what would do; a beam that no quadrature follows.
 pub(super) fn stages(
-    scene: &Scene,
+    file: &SceneFile,
     target: Target,
     geometry: &Geometry,
     warnings: &mut Vec<String>,
 ) -> Result<[PlannedStage; 2], Error> {
+    let scene = &file.scene;
     let fixed = match scene.detector.snr {
         SnrReference::Fixed { snr_db } => Some(snr_db),
         _ => None,
@@ -31,7 +31,12 @@ pub(super) fn stages(
     let table = matches!(target, Target::Run | Target::Efficiency)
         .then(|| spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points));
     let layers = (target != Target::Efficiency && fixed.is_none()).then(|| profile_ranges_m(scene, geometry));
-    let quadratures = (table.as_ref().map_or(0, Vec::len) + layers.as_ref().map_or(0, Vec::len)) as f64;
+    let ranges_m: Vec<f64> = table.iter().chain(&layers).flatten().copied().collect();
+    let telescope = join::telescope(scene)?;
+    refuse_fresnel_numbers(file, &telescope, &ranges_m)?;
+    // A table through turbulence has the free-space and the exact bistatic curves beside the Monte Carlo.
+    let places = if turbulence(scene).is_some() { 16 } else { 0 };
+    let quadratures_s: f64 = ranges_m.iter().map(|&r| theory::quadrature_cost_s(&telescope, places, r)).sum();
     let planned = |stage, reason: String, cost| PlannedStage { stage, reason, cost };
 
     let screens = match turbulence(scene) {
@@ -40,7 +45,7 @@ pub(super) fn stages(
             let drawn = layers.filter(|_| model == Model::MonteCarlo || drawn_turbulence(scene).is_some());
             let runs: Vec<Vec<f64>> = [table, drawn].into_iter().flatten().collect();
             match (runs.is_empty(), model) {
-                (false, _) => screens(scene, &t, &runs, warnings)?,
+                (false, _) => screens(file, &t, &runs, warnings)?,
                 (true, Model::ExactBistatic) => {
                     planned(Stage::PhaseScreens, "the bistatic efficiency has an exact theory".into(), None)
                 }
@@ -49,7 +54,7 @@ pub(super) fn stages(
         }
     };
     let efficiency = match fixed {
-        Some(snr_db) if quadratures == 0.0 => {
+        Some(snr_db) if ranges_m.is_empty() => {
             planned(Stage::Efficiency, format!("detector.snr fixes {snr_db} dB at every range"), None)
         }
         _ => {
@@ -58,42 +63,138 @@ pub(super) fn stages(
                 Model::ExactBistatic => "independent paths, exact by quadrature",
                 Model::MonteCarlo => "one path out and back, by phase screens",
             };
-            let cost = Cost { core_s: quadratures * QUADRATURE_S, memory_bytes: quadratures * 64.0 };
-            planned(Stage::Efficiency, format!("{how}, at {quadratures} ranges"), Some(cost))
+            let cost = Cost { core_s: quadratures_s, memory_bytes: ranges_m.len() as f64 * 64.0 };
+            planned(Stage::Efficiency, format!("{how}, at {} ranges", ranges_m.len()), Some(cost))
         }
     };
     Ok([screens, efficiency])
 }
 
+/// Refuses a beam whose Fresnel number is too large for the quadratures, in the words of the scene.
+fn refuse_fresnel_numbers(file: &SceneFile, telescope: &Telescope, ranges_m: &[f64]) -> Result<(), Error> {
+    let worst = ranges_m.iter().map(|&r| (theory::fresnel_number(telescope, r), r)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((found, range_m)) = worst.filter(|(n, _)| *n > theory::LARGEST_FRESNEL_NUMBER) else { return Ok(()) };
+    let t = &file.scene.telescope;
+    let most = theory::LARGEST_FRESNEL_NUMBER;
+    let excess = format!(
+        "a Fresnel number a^2 |1/R - 1/F| / lambda of at most {most}, for which the efficiency has a quadrature; it is {found:.0} at \
+         {range_m} m"
+    );
+    // Without the focus the number would be this.
+    let collimated = Telescope { focus: Focus::Collimated, ..*telescope };
+    let rest = theory::fresnel_number(&collimated, range_m);
+    let problem = if rest < most {
+        // |1/R - 1/F| <= limit from F = 1/(1/R + limit) upwards, of either sign.
+        let shortest_m = range_m * rest / (most + if t.focus_m > 0.0 { rest } else { -rest });
+        let example = format!("{}{:.2}", if t.focus_m > 0.0 { "from " } else { "to -" }, 1.01 * shortest_m + 0.01);
+        Problem {
+            key: "telescope.focus_m".into(),
+            value: t.focus_m.to_string(),
+            allowed: format!("{excess}: {example} m"),
+        }
+    } else {
+        let largest_m = 0.99 * t.aperture_radius_m * (most / found).sqrt();
+        let allowed = format!("{excess}: to {largest_m:.4} m");
+        Problem { key: "telescope.aperture_radius_m".into(), value: t.aperture_radius_m.to_string(), allowed }
+    };
+    Err(file.located(vec![problem]).into())
+}
+
 /// The phase screens of all runs, each for its own ranges.
 fn screens(
-    scene: &Scene,
+    file: &SceneFile,
     t: &RefractiveTurbulence,
     runs: &[Vec<f64>],
     warnings: &mut Vec<String>,
 ) -> Result<PlannedStage, Error> {
     let mut cost = Cost { core_s: 0.0, memory_bytes: 0.0 };
     let mut what = Vec::new();
-    for range_m in runs {
-        let plan = join::screen_plan(scene, t, range_m)?;
+    let lists: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
+    let plans = join::screen_plans(&file.scene, t, &lists).map_err(|e| refused(file, t, e))?;
+    for (range_m, plan) in runs.iter().zip(plans) {
         cost.core_s += plan.realisation_cpu_s * t.realisations as f64;
         cost.memory_bytes = cost.memory_bytes.max(plan.memory_bytes as f64);
         let last_m = range_m.last().copied().unwrap_or(0.0);
         let g = plan.grid;
-        what.push(format!(
+        let mut words = format!(
             "{} screens to {last_m:.0} m of {} x {} points of {:.3} mm",
             plan.layers.end_m().len(),
             g.nx,
             g.ny,
             1e3 * g.dx_m
-        ));
-        warnings.extend(plan.warnings.iter().map(|w| in_words(w, last_m)));
+        );
+        if let Some(worst) = plan.gaps.iter().max_by(|a, b| a.relative.abs().total_cmp(&b.relative.abs())) {
+            // The layers' own error, known without random numbers, beside the one that the realisations leave.
+            words += &format!(
+                " (layers shift the mean by {:+.2} % at {:.0} m, where its error is {:.2} %)",
+                100.0 * worst.relative,
+                worst.range_m,
+                100.0 * worst.standard_error
+            );
+        }
+        what.push(words);
+        warnings.extend(plan.warnings.iter().map(|w| in_words(w, last_m, t)));
     }
     let reason = format!("{} realisations of {}", t.realisations, what.join("; "));
     Ok(PlannedStage { stage: Stage::PhaseScreens, reason, cost: Some(cost) })
 }
 
-fn in_words(warning: &Warning, range_m: f64) -> String {
+/// A refusal of the optics in the keys of the scene; the strongest limit of each key is named.
+fn refused(file: &SceneFile, t: &RefractiveTurbulence, error: wakescope_optics::Error) -> Error {
+    let (violations, would_do) = match error {
+        wakescope_optics::Error::Sampling { violations, would_do } => (violations, would_do),
+        other => return other.into(),
+    };
+    let key = |name: &str| format!("atmosphere.turbulence.{name}");
+    let strongest = |which: fn(&Violation) -> bool, sign: f64| {
+        violations.iter().filter(|v| which(v)).max_by(|a, b| (sign * a.needed).total_cmp(&(sign * b.needed)))
+    };
+    let mut problems = Vec::new();
+    if let Some(v) = strongest(|v| v.limit == Limit::Points, 1.0) {
+        let allowed = format!(
+            "beam and turbulence that at most {} points along an axis resolve and hold, not {}: shorter ranges, a longer focus, or \
+             telescope.receiver = \"bistatic\", which needs no screens for signals",
+            v.found, v.needed
+        );
+        problems.push(Problem { key: key("sampling"), value: "\"derived\"".into(), allowed });
+    } else if t.sampling == ScreenSampling::Derived {
+        let words: Vec<String> = violations.iter().map(ToString::to_string).collect();
+        problems.push(Problem { key: key("sampling"), value: "\"derived\"".into(), allowed: words.join("; ") });
+    } else {
+        if let Some(v) = strongest(|v| !v.limit.is_spacing(), 1.0) {
+            let mut points = (v.needed / t.grid_spacing_m).ceil() as usize;
+            while (points as f64) * t.grid_spacing_m < v.needed {
+                points += 1;
+            }
+            let allowed = format!(
+                "at least {points} at atmosphere.turbulence.grid_spacing_m = {}, a width of {} m {}",
+                t.grid_spacing_m,
+                v.needed,
+                v.limit.in_words()
+            );
+            problems.push(Problem { key: key("grid_points"), value: t.grid_points.to_string(), allowed });
+        }
+        if let Some(v) = strongest(|v| v.limit.is_spacing(), -1.0) {
+            let allowed = format!("at most {} m {}", v.needed, v.limit.in_words());
+            problems.push(Problem { key: key("grid_spacing_m"), value: t.grid_spacing_m.to_string(), allowed });
+        }
+    }
+    if let Some(last) = problems.last_mut() {
+        last.allowed += &match would_do {
+            Some(SetUp { points, spacing_m, layers }) => format!(
+                "; together, grid_points = {points}, grid_spacing_m = {spacing_m}, layers = {layers} hold, and so does sampling = \
+                 \"derived\""
+            ),
+            None if t.sampling == ScreenSampling::Explicit => {
+                "; no grid of at most 4096 points holds all: shorter ranges or a longer focus".into()
+            }
+            None => String::new(),
+        };
+    }
+    file.located(problems).into()
+}
+
+fn in_words(warning: &Warning, range_m: f64, t: &RefractiveTurbulence) -> String {
     match warning {
         Warning::InnerScale { missing } => format!(
             "the screens miss {:.1} % of the structure function at one grid spacing: atmosphere.turbulence.grid_spacing_m is \
@@ -104,10 +205,107 @@ fn in_words(warning: &Warning, range_m: f64) -> String {
             "layers to {range_m:.0} m have a Rytov variance of {rytov_variance:.2}, above 0.1: \
              atmosphere.turbulence.layers = {layers_needed} would do"
         ),
+        Warning::LayerGap { worst, layers_needed } => {
+            let remedy = match (t.sampling, layers_needed) {
+                (ScreenSampling::Explicit, Some(count)) => {
+                    format!("atmosphere.turbulence.layers = {count} would do, or sampling = \"derived\"")
+                }
+                _ => "more than 1000 layers would be needed".into(),
+            };
+            format!(
+                "the layers to {range_m:.0} m shift the mean efficiency by {:+.2} % at {:.0} m, more than a third of its standard \
+                 error of {:.2} %: {remedy}",
+                100.0 * worst.relative,
+                worst.range_m,
+                100.0 * worst.standard_error
+            )
+        }
+        Warning::LightLost { fraction, width_m } => format!(
+            "the border of the screens to {range_m:.0} m will take {:.1} % of the light, 1 % at most is good: \
+             atmosphere.turbulence.grid_points = {} would do",
+            100.0 * fraction,
+            (width_m / t.grid_spacing_m).ceil()
+        ),
         Warning::WeakTurbulence { rytov_variance } => format!(
             "turbulence of Rytov variance {rytov_variance:.1e} changes less than the error of phase screens: \
              atmosphere.turbulence.kind = \"none\" is as good"
         ),
         other => format!("{other:?}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::plan::{Plan, Target};
+    use crate::scene::SceneFile;
+    use std::path::Path;
+
+    fn plan(text: &str) -> Result<Plan, String> {
+        let file = SceneFile::parse(text, Path::new("s.toml")).map_err(|e| e.to_string())?;
+        Plan::new(file, Target::Efficiency).map_err(|e| e.to_string())
+    }
+
+    /// The number that follows `words`.
+    fn number(message: &str, words: &str) -> String {
+        let (_, rest) = message.split_once(words).unwrap_or_else(|| panic!("{words} is not in {message}"));
+        rest.chars().take_while(|c| c.is_ascii_digit() || ['.', 'e', '-'].contains(c)).collect()
+    }
+
+    fn turbulent(cn2: &str, keys: &str) -> String {
+        format!("[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = {cn2}\n{keys}")
+    }
+
+    #[test]
+    fn screens_that_do_not_hold_are_refused_in_keys_with_numbers_that_are_then_accepted() {
+        // Width and spacing at once, at the lines that state them.
+        let message = plan(&turbulent("1e-12", "grid_points = 128\ngrid_spacing_m = 0.004\n")).unwrap_err();
+        assert!(message.contains("s.toml:4: atmosphere.turbulence.grid_points = 128"), "{message}");
+        assert!(message.contains("s.toml:5: atmosphere.turbulence.grid_spacing_m = 0.004"), "{message}");
+        let [points, spacing, layers] = ["together, grid_points = ", "grid_spacing_m = ", "layers = "]
+            .map(|w| number(message.split_at(message.find("together").unwrap()).1, w.trim_start_matches("together, ")));
+        let good = format!("grid_points = {points}\ngrid_spacing_m = {spacing}\nlayers = {layers}\n");
+        let accepted = plan(&turbulent("1e-12", &good)).unwrap();
+        assert!(accepted.warnings.is_empty(), "{:?}", accepted.warnings);
+        // Each number alone mends its own limit.
+        let least = number(&message, "at least ");
+        let message =
+            plan(&turbulent("1e-12", &format!("grid_points = {least}\ngrid_spacing_m = 0.004\n"))).unwrap_err();
+        assert!(!message.contains("turbulence.grid_points = "), "{message}");
+        let most = number(&message, "at most ");
+        plan(&turbulent("1e-12", &format!("grid_points = 4000\ngrid_spacing_m = {most}\n"))).unwrap();
+    }
+
+    #[test]
+    fn beam_of_too_many_fresnel_zones_is_refused_by_its_key() {
+        let message = plan("[telescope]\nfocus_m = 1.777e-4\n").unwrap_err();
+        assert!(message.starts_with("s.toml:2: telescope.focus_m = 0.0001777"), "{message}");
+        plan(&format!("[telescope]\nfocus_m = {}\n", number(&message, "from "))).unwrap();
+        let message = plan("[telescope]\nfocus_m = -1e-3\n").unwrap_err();
+        plan(&format!("[telescope]\nfocus_m = {}\n", number(&message, "to "))).unwrap();
+        let message = plan("[telescope]\naperture_radius_m = 10.0\nbeam_radius_m = 6.0\n").unwrap_err();
+        assert!(message.starts_with("s.toml:2: telescope.aperture_radius_m = 10"), "{message}");
+        plan(&format!("[telescope]\naperture_radius_m = {}\nbeam_radius_m = 6.0\n", number(&message, ": to ")))
+            .unwrap();
+    }
+
+    #[test]
+    fn largest_counts_that_a_scene_may_state_are_planned() {
+        let text = turbulent("1e-15", "grid_points = 16384\nlayers = 10000\nspectrum = \"kolmogorov\"\n")
+            + "[outputs]\nprofile_points = 100000\n";
+        let plan = plan(&text).unwrap();
+        assert!(plan.stages.iter().filter_map(|s| s.cost).any(|c| c.memory_bytes > 1e10));
+    }
+
+    #[test]
+    fn error_of_the_layers_is_told_and_a_plan_of_its_own_has_enough() {
+        let ranges = "[outputs]\nprofile_range_min_m = 200.0\nprofile_range_max_m = 600.0\nprofile_points = 3\n";
+        let few = plan(&(turbulent("1e-13", "layers = 3\n") + ranges)).unwrap();
+        let warning = few.warnings.iter().find(|w| w.contains("shift the mean")).unwrap();
+        let layers = number(warning, "layers = ");
+        let enough = plan(&(turbulent("1e-13", &format!("layers = {layers}\n")) + ranges)).unwrap();
+        assert!(enough.warnings.is_empty(), "{:?}", enough.warnings);
+        let derived = plan(&(turbulent("1e-13", "sampling = \"derived\"\n") + ranges)).unwrap();
+        assert!(derived.warnings.is_empty(), "{:?}", derived.warnings);
+        assert!(derived.to_string().contains("layers shift the mean"), "{derived}");
     }
 }

@@ -78,6 +78,8 @@ pub struct SceneFile {
     pub hash: String,
     /// Folder to which names of files in the scene are relative.
     pub folder: PathBuf,
+    /// The file and its text, by which problems that a plan finds are given their lines; empty for a scene made in memory.
+    origin: (PathBuf, String),
 }
 
 impl SceneFile {
@@ -106,7 +108,8 @@ impl SceneFile {
             return Err(located(&document, path, problems));
         }
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        Ok(Self { folder, ..Self::new(scene).map_err(|problems| located(&document, path, problems))? })
+        let origin = (path.to_owned(), text.to_owned());
+        Ok(Self { folder, origin, ..Self::new(scene).map_err(|problems| located(&document, path, problems))? })
     }
 
     /// Checks a scene that was made in memory; its files are relative to the working folder.
@@ -120,7 +123,22 @@ impl SceneFile {
         }
         let toml = scene.to_toml();
         let hash = super::hash_of(&toml);
-        Ok(Self { scene, toml, hash, folder: PathBuf::new() })
+        Ok(Self { scene, toml, hash, folder: PathBuf::new(), origin: (PathBuf::from("scene"), String::new()) })
+    }
+
+    /// Problems that only a plan could find, with the lines of the file that this scene was read from.
+    pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
+        let (path, text) = &self.origin;
+        match parsed(text, path) {
+            Ok(document) => located(&document, path, problems),
+            Err(error) => error,
+        }
+    }
+
+    /// The same scene with the folder and the lines of the file that `other` was read from.
+    #[cfg(feature = "cli")]
+    pub(crate) fn from_the_file_of(self, other: Self) -> Self {
+        Self { folder: other.folder, origin: other.origin, ..self }
     }
 }
 
