@@ -96,7 +96,8 @@ section! {
         /// Time at which the run ends \[s\]; that of the literature if absent.
         #[serde(skip_serializing_if = "Option::is_none")]
         end_s: Option<f64> = None,
-        /// Time integration of convection; that of the case if absent.
+        /// Time integration of convection; if absent that of the case, or Runge-Kutta where viscosity is too small to damp what
+        /// Adams-Bashforth feeds.
         #[serde(skip_serializing_if = "Option::is_none")]
         scheme: Option<Scheme> = None,
         /// Fixed time step \[s\]; if absent, a Courant number controls it.

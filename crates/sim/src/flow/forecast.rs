@@ -1,7 +1,7 @@
 //! What a run will take, before anything of its size is allocated: cells, steps, time, memory, files.
 //!
 //! Memory is counted in arrays of one number for each cell, time in passes over the cells; the unit costs at the end of this
-//! file are those of the book's table. Steps follow from the Courant number of the initial field: flows that speed up take more.
+//! file are good to a factor of two or so. Steps follow from the Courant number of the initial field: flows that speed up take more.
 //!
 //! Check: memory against the arrays of a run, sizes that fit, cases too large are refused at once.
 
@@ -208,17 +208,17 @@ fn memory_bytes(case: &FlowCase, cells: [usize; 3], dense: &[usize]) -> f64 {
     8.0 * count(cells) * arrays + dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>() + PROGRAM_BYTES
 }
 
-/// The eigenvectors of a direction and its two transforms.
+/// The eigenvectors of a direction, what finds them, and its two transforms.
 fn matrix_bytes(n: usize) -> f64 {
-    3.0 * 8.0 * (n as f64).powi(2)
+    6.0 * 8.0 * (n as f64).powi(2)
 }
 
 /// Arrays that an output of the whole field needs while it is written.
 fn output_arrays(format: FileFormat) -> f64 {
     match format {
-        FileFormat::Csv => 55.0,
+        FileFormat::Csv => 28.0,
         FileFormat::Netcdf | FileFormat::Vtr => 10.0,
-        FileFormat::InitialNetcdf => 9.0,
+        FileFormat::InitialNetcdf => 10.0,
     }
 }
 
