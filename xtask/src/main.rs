@@ -7,6 +7,7 @@ mod bless;
 mod ci;
 mod curves;
 mod figures;
+mod fit_trials;
 mod regress;
 mod reproduce;
 mod tidy;
@@ -61,6 +62,8 @@ enum Task {
     Bless(bless::Options),
     /// Measure error against run time.
     WorkPrecision(work_precision::Options),
+    /// Fit many scans of a vortex pair: bias, scatter, stated error, bound, competing tops.
+    FitTrials(fit_trials::Options),
     /// Run the flows with known answers and draw them beside their references.
     Validate(validate::Options),
     /// Check the rules of the house.
@@ -75,6 +78,7 @@ fn main() -> std::process::ExitCode {
         Task::Regress(options) => regress::run(&options),
         Task::Bless(options) => bless::run(&options),
         Task::WorkPrecision(options) => work_precision::run(&options),
+        Task::FitTrials(options) => fit_trials::run(&options),
         Task::Validate(options) => validate::run(&options),
         Task::Tidy => tidy::run(),
         Task::Ci(options) => ci::run(&options),
