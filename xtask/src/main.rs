@@ -7,6 +7,7 @@ mod bless;
 mod ci;
 mod curves;
 mod figures;
+mod fit_trials;
 mod forecast;
 mod fuzz_scenes;
 mod process;
@@ -64,6 +65,8 @@ enum Task {
     Bless(bless::Options),
     /// Measure error against run time.
     WorkPrecision(work_precision::Options),
+    /// Fit many scans of a vortex pair: bias, scatter, stated error, bound, competing tops.
+    FitTrials(fit_trials::Options),
     /// Run the flows with known answers and draw them beside their references.
     Validate(validate::Options),
     /// Hold the forecasts of time and memory against what ten diverse scenes take.
@@ -82,6 +85,7 @@ fn main() -> std::process::ExitCode {
         Task::Regress(options) => regress::run(&options),
         Task::Bless(options) => bless::run(&options),
         Task::WorkPrecision(options) => work_precision::run(&options),
+        Task::FitTrials(options) => fit_trials::run(&options),
         Task::Validate(options) => validate::run(&options),
         Task::Forecast(options) => forecast::run(&options),
         Task::FuzzScenes(options) => fuzz_scenes::run(&options),

@@ -2,6 +2,7 @@
 //!
 //! Figures and work-precision share these, so that both speak of the same signals.
 
+pub(crate) mod fits;
 pub(crate) mod methods;
 pub(crate) mod mixture;
 pub(crate) mod pair;

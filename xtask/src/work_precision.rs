@@ -61,6 +61,11 @@ impl Cost {
     /// Of what was not timed.
     pub(crate) const NONE: Self = Self { cpu_s: f64::NAN, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
 
+    /// Processor time of all threads \[s\].
+    pub(crate) fn cpu_s(&self) -> f64 {
+        self.cpu_s
+    }
+
     /// The same for one of `count` equal pieces of work.
     pub(crate) fn per(self, count: usize) -> Self {
         let n = count as f64;

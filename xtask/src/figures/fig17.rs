@@ -2,21 +2,15 @@
 
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
-use crate::trials::methods::WINDOW;
+use crate::trials::fits::{FitTrial, RADIUS_M};
 use crate::trials::pair::{CIRCULATION_M2_S, PairScan, truth};
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 use rayon::prelude::*;
-use wakescope_estimate::vortex_fit::{
-    EstimatorResponse, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, SignalFitOptions,
-    VelocityMap, Wake, fit_map_of_estimator, fit_signals,
-};
-use wakescope_estimate::{Correlogram, Noise, Refinement, SignalKind, SpectralPeak, WindowModel, likelihood_tapers};
+use wakescope_estimate::vortex_fit::{FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake};
 use wakescope_signal::NoiseModel;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
-/// Radius of the regions of the maps \[m\].
-const RADIUS_M: f64 = 2.0;
 const METHODS: [&str; 4] = ["map, typical core", "map, core fitted", "signals, core known", "signals, core fitted"];
 
 /// A fitted wake with its covariance; nothing where a fit failed.
@@ -67,37 +61,22 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
 /// The four fits of one scan.
 fn fit(pair: &PairScan, scan: usize) -> Result<[Found; 4], Failure> {
-    let records = pair.records(scan)?;
-    let (kind, setup) = (SignalKind::Real, pair.setup()?);
-    let window = WindowModel::gaussian_pulse(&pair.sampling, WINDOW, pair.sigma_s(), Noise::White)?;
-    let tapered = Correlogram::with_tapers(likelihood_tapers(&window, pair.snr)?)?;
-    let peak = SpectralPeak::new(&pair.sampling, kind, WINDOW, 1024, Refinement::Parabola)?;
-    let velocities = pair.velocities(&pair.statistics(&records, &tapered)?, &pair.points, RADIUS_M, &peak)?;
-    let map = VelocityMap {
-        elevation_rad: &pair.elevation_rad,
-        range_m: &pair.range_m,
-        velocity_m_s: ArrayView2::from_shape((pair.elevation_rad.len(), pair.range_m.len()), &velocities)?,
-        standard_deviation_m_s: None,
+    let trial = FitTrial::new(pair, scan)?;
+    let from_map = |core_radius: Sharing| -> Result<Found, Failure> {
+        let fit = trial.map(FreeParameters { core_radius, ..free() })?;
+        Ok(fit.ok().map(|fit| (fit.wake, fit.covariance)))
     };
-    let noise = (setup.noise, pair.snr);
-    let shown = EstimatorResponse::new(&tapered, &peak, &setup.sampling, &setup.pulse, noise, RADIUS_M)?;
-    let from_map = |core_radius: Sharing| -> Found {
-        let options = MapFitOptions { free: FreeParameters { core_radius, ..free() }, ..Default::default() };
-        let fit = fit_map_of_estimator(&map, &setup.wake, &shown, &options).ok()?;
-        Some((fit.wake, fit.covariance))
-    };
-    let (typical, resolved) = (from_map(Sharing::Fixed), from_map(Sharing::Common));
-    let from_signals = |core: Sharing| -> Found {
-        let (mut guess, _) = typical.clone()?;
-        if core == Sharing::Fixed {
+    let (typical, resolved) = (from_map(Sharing::Fixed)?, from_map(Sharing::Common)?);
+    let from_signals = |core_radius: Sharing| -> Result<Found, Failure> {
+        let Some((mut guess, _)) = typical.clone() else { return Ok(None) };
+        if core_radius == Sharing::Fixed {
             guess.left.core_radius_m = truth().left.core_radius_m;
             guess.right.core_radius_m = truth().right.core_radius_m;
         }
-        let options = SignalFitOptions { free: FreeParameters { core_radius: core, ..free() }, ..Default::default() };
-        let fit = fit_signals(&setup, |_, _| pair.snr, records.view(), pair.noise_power_a2(), &guess, &options).ok()?;
-        Some((fit.wake, fit.covariance))
+        let fit = trial.signals(FreeParameters { core_radius, ..free() }, &guess, Starts::Several)?;
+        Ok(fit.ok().map(|fit| (fit.wake, fit.covariance)))
     };
-    let (known, fitted) = (from_signals(Sharing::Fixed), from_signals(Sharing::Common));
+    let (known, fitted) = (from_signals(Sharing::Fixed)?, from_signals(Sharing::Common)?);
     Ok([typical, resolved, known, fitted])
 }
 

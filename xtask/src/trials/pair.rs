@@ -1,6 +1,7 @@
-//! Scans of the analytic vortex pair: one pulse along each of 185 lines, and what pulse and gate see of the wind.
+//! Scans of an analytic vortex pair: one pulse along each of 185 lines, and what pulse and gate see of the wind.
 //!
-//! Gamma0 500 m^2/s, 47 m apart and 47 m high, cores of 2.35 m, 376.5 and 423.5 m away; 0 to 13.2 degrees in steps of
+//! The pair of the figures has Gamma0 500 m^2/s, 47 m apart and 47 m high, cores of 2.35 m, 376.5 and 423.5 m away; the low pair
+//! is narrow, uneven, with wide cores, near the ground and in a wind. 0 to 13.2 degrees in steps of
 //! 1.25 mrad; layers thin enough for the cores. Scans differ in their speckle and noise only.
 
 use super::methods::WINDOW;
@@ -13,7 +14,7 @@ use wakescope_estimate::{
     Estimator, Gates, Noise, PolarPoint, Radius, SPEED_OF_LIGHT_M_S, Sampling, Scan, SignalKind, Statistic,
     polar_points,
 };
-use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
+use wakescope_les::{CirculationProfile, Ground, Motion, Sum, Uniform, VortexPair, Wind};
 use wakescope_signal::{
     GaussianPulse, LineOfSight, NoiseModel, PulseDuration, PulseKey, RangeFilter, Receiver, Record, Scratch, Simulator,
     pulse_generator,
@@ -27,28 +28,83 @@ const SAMPLES: usize = 400;
 /// Circulation of both vortices \[m^2/s\].
 pub(crate) const CIRCULATION_M2_S: f64 = 500.0;
 
-fn pair() -> VortexPair {
-    VortexPair {
-        circulation_m2_s: CIRCULATION_M2_S,
+/// A pair at 400 m, as it is scanned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PairCase {
+    /// Of the left and of the right vortex.
+    circulation_m2_s: [f64; 2],
+    spacing_m: f64,
+    core_radius_m: f64,
+    height_m: f64,
+    wind_m_s: f64,
+}
+
+/// Far enough for a vortex not to be felt \[m\].
+const AWAY_M: f64 = 1e6;
+
+impl PairCase {
+    /// The pair of the figures.
+    pub(crate) const FIGURES: Self = Self {
+        circulation_m2_s: [CIRCULATION_M2_S; 2],
         spacing_m: 47.0,
         core_radius_m: 2.35,
-        lateral_position_m: 400.0,
         height_m: 47.0,
-        ground: Ground::Image,
-        profile: CirculationProfile::Algebraic,
-        motion: Motion::Frozen,
+        wind_m_s: 0.0,
+    };
+    /// Cores of 7.5 % of the spacing, unequal circulations.
+    pub(crate) const LOW: Self =
+        Self { circulation_m2_s: [380.0, 340.0], spacing_m: 40.0, core_radius_m: 3.0, height_m: 30.0, wind_m_s: 2.0 };
+    /// Cores of 2 % of the spacing, smaller than the distance of lines resolves.
+    pub(crate) const SMALL_CORES: Self = Self { core_radius_m: 0.8, ..Self::LOW };
+
+    /// The wind: a pair as strong as the right vortex, and what the left one has more, its partner far away.
+    fn wind(&self) -> Result<Sum, Failure> {
+        let [left_m2_s, right_m2_s] = self.circulation_m2_s;
+        let even = VortexPair {
+            circulation_m2_s: right_m2_s,
+            spacing_m: self.spacing_m,
+            core_radius_m: self.core_radius_m,
+            lateral_position_m: 400.0,
+            height_m: self.height_m,
+            ground: Ground::Image,
+            profile: CirculationProfile::Algebraic,
+            motion: Motion::Frozen,
+        };
+        let mut winds: Vec<Box<dyn Wind>> = vec![Box::new(even.wind()?)];
+        if left_m2_s > right_m2_s {
+            let left_m = 400.0 - 0.5 * self.spacing_m;
+            let more = VortexPair {
+                circulation_m2_s: left_m2_s - right_m2_s,
+                spacing_m: AWAY_M,
+                lateral_position_m: left_m + 0.5 * AWAY_M,
+                ..even
+            };
+            winds.push(Box::new(more.wind()?));
+        }
+        winds.push(Box::new(Uniform::new([0.0, self.wind_m_s, 0.0])?));
+        Ok(Sum { winds })
+    }
+
+    /// The pair in the words of the fits.
+    pub(crate) fn truth(&self) -> Wake {
+        let vortex = |circulation_m2_s, side: f64| Vortex {
+            circulation_m2_s,
+            lateral_position_m: 400.0 + side * 0.5 * self.spacing_m,
+            height_m: self.height_m,
+            core_radius_m: self.core_radius_m,
+        };
+        Wake {
+            left: vortex(self.circulation_m2_s[0], -1.0),
+            right: vortex(self.circulation_m2_s[1], 1.0),
+            lateral_wind_m_s: self.wind_m_s,
+            wind_shear_per_s: 0.0,
+        }
     }
 }
 
-/// The pair in the words of the fits.
+/// The pair of the figures in the words of the fits.
 pub(crate) fn truth() -> Wake {
-    let vortex = |lateral_position_m| Vortex {
-        circulation_m2_s: CIRCULATION_M2_S,
-        lateral_position_m,
-        height_m: 47.0,
-        core_radius_m: 2.35,
-    };
-    Wake { left: vortex(376.5), right: vortex(423.5), lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }
+    PairCase::FIGURES.truth()
 }
 
 /// How the pair is scanned, and the truth.
@@ -74,11 +130,22 @@ pub(crate) struct PairScan {
 impl PairScan {
     /// Scans with that pulse (full width at half maximum), noise and signal-to-noise ratio; the map has every `every`th gate.
     pub(crate) fn new(noise: NoiseModel, pulse_s: f64, snr_db: f64, every: usize, seed: u64) -> Result<Self, Failure> {
+        Self::of(&PairCase::FIGURES, noise, (pulse_s, snr_db), every, seed)
+    }
+
+    /// The same of another pair; (pulse, signal-to-noise ratio).
+    pub(crate) fn of(
+        case: &PairCase,
+        noise: NoiseModel,
+        (pulse_s, snr_db): (f64, f64),
+        every: usize,
+        seed: u64,
+    ) -> Result<Self, Failure> {
         let (receiver, sampling) = (receiver(noise), sampling()?);
         let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(pulse_s), ENERGY_J)?;
         let first_s = 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S;
         let simulator = Simulator::new(pulse, receiver, Record { time_of_first_sample_s: first_s, samples: SAMPLES })?;
-        let wind = pair().wind()?;
+        let (wind, centres) = (case.wind()?, case.truth());
         let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * sampling.period_s();
         // lambda / (16 sigma g_max): 0.22 m at 200 ns, 0.11 m at 400 ns
         let parts = (3.0 * pulse_s / 200e-9).ceil();
@@ -116,8 +183,10 @@ impl PairScan {
         };
         let distance = |p: &PolarPoint| {
             let (sin, cos) = p.elevation_rad.sin_cos();
-            let to = |y_m: f64| (p.range_m * cos - y_m).hypot(p.range_m * sin - 47.0);
-            to(376.5).min(to(423.5))
+            let to = |vortex: &Vortex| {
+                (p.range_m * cos - vortex.lateral_position_m).hypot(p.range_m * sin - vortex.height_m)
+            };
+            to(&centres.left).min(to(&centres.right))
         };
         Ok(Self {
             v_pulse_m_s: truth(RangeFilter::pulse(pulse, thickness_m)?)?,

@@ -11,7 +11,7 @@ use super::free::{FreeParameters, Sharing};
 use super::guess::first_guess;
 use super::map_fit::{Fit, MapFit, MapFitOptions, VelocityMap, refine_map_fit};
 use super::map_problem::{Expected, Problem};
-use super::map_starts::{best_of, starts};
+use super::map_starts::{best_of, starts, with_typical_core};
 use super::tangent::{Tangent, near};
 use super::wake::{PARAMETERS, Wake, WakeModel};
 use crate::error::Error;
@@ -46,10 +46,11 @@ pub fn fit_map_of_estimator(
     let refine = |start: &Wake| refine_map_fit_of_estimator(map, model, response, start, options);
     let by_means = refine_map_fit(map, model, &kernel, &guess, &rough).map(|fit| fit.wake);
     let first = best_of(&starts(by_means.as_ref().unwrap_or(&guess), options), refine);
-    match (first, by_means) {
+    let fit = match (first, by_means) {
         (Err(Error::NotConverged { .. }), Ok(_)) => best_of(&starts(&guess, options), refine),
         (first, _) => first,
-    }
+    };
+    with_typical_core(fit?, options, refine)
 }
 
 /// Fits the wake to a map that an estimator made, from a given start on: what is expected of a wake is the estimate from its

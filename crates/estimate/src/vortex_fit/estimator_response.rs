@@ -10,8 +10,7 @@
 //! samples keep the real part. The correlograms of a region's lines are added, and the estimator itself turns the sum
 //! into a velocity. So whatever it makes of the skewed and broad spectra of a core is part of what is expected of it:
 //! nothing is taken for a mean. Left out is the extent of a region along the line, short against a gate. Check:
-//! uniform wind; a wide line shows the mean over the gate; the correlogram of signals summed over layers; fits of
-//! simulated scans.
+//! uniform wind; a wide line shows the mean over the gate; the correlogram of signals summed over layers; simulated scans.
 
 use multiversion::multiversion;
 use ndarray::Array2;
@@ -260,7 +259,6 @@ impl Prepared<'_> {
 fn add_seen(lags: &mut [f64], weights: &[f64], turns: &[f64], share: f64) {
     let count = lags.len();
     for (weights, turns) in weights.chunks_exact(count).zip(turns.chunks_exact(count)) {
-        let (weights, turns) = (&weights[..count], &turns[..count]);
         for i in 0..count {
             lags[i] += share * weights[i] * turns[i];
         }

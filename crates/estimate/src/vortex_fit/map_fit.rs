@@ -11,7 +11,7 @@ use ndarray::{Array2, ArrayView2};
 use super::free::{FreeParameters, spread};
 use super::guess::first_guess;
 use super::map_problem::{Expected, Problem};
-use super::map_starts::{best_of, starts};
+use super::map_starts::{best_of, starts, with_typical_core};
 use super::range_kernel::RangeKernel;
 use super::small::Stop;
 use super::wake::{Parameter, Wake, WakeModel};
@@ -187,7 +187,8 @@ pub fn fit_map(
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
     let guess = first_guess(map, model, kernel)?;
-    best_of(&starts(&guess, options), |start| refine_map_fit(map, model, kernel, start, options))
+    let refine = |start: &Wake| refine_map_fit(map, model, kernel, start, options);
+    with_typical_core(best_of(&starts(&guess, options), refine)?, options, refine)
 }
 
 /// Fits the wake to a map from a given start on. `kernel` is what each velocity sees of the air about its range.

@@ -12,6 +12,9 @@ use crate::error::Error;
 pub(super) const CORE_OVER_SPACING: f64 = 0.045;
 /// Core radii of the starts over the spacing, if they are fitted.
 const CORES_OVER_SPACING: [f64; 2] = [CORE_OVER_SPACING, 0.1];
+/// A typical core is known to this part of itself, after at most so many rounds.
+const TYPICAL: f64 = 0.05;
+const ROUNDS: usize = 3;
 /// Ends closer than this many standard deviations in every parameter are one.
 const SAME_SIGMAS: f64 = 0.3;
 
@@ -37,6 +40,24 @@ pub(super) fn best_of(starts: &[Wake], fit: impl Fn(&Wake) -> Result<MapFit, Err
         }
     }
     merged(ends).ok_or(failed.unwrap_or(Error::Empty { field: "starts" }))
+}
+
+/// A fit that keeps the typical core begins again until that is the one of the spacing that it ends with, which the search for
+/// the best pair knows only as well as its grid is fine.
+pub(super) fn with_typical_core(
+    mut end: MapFit,
+    options: &MapFitOptions,
+    fit: impl Fn(&Wake) -> Result<MapFit, Error>,
+) -> Result<MapFit, Error> {
+    for _ in 0..ROUNDS {
+        let next = starts(&end.wake, options);
+        let off = |wake: &Wake| (end.wake.left.core_radius_m / wake.left.core_radius_m - 1.0).abs() > TYPICAL;
+        match next.first() {
+            Some(wake) if options.free.core_radius == Sharing::Fixed && off(wake) => end = fit(wake)?,
+            _ => break,
+        }
+    }
+    Ok(end)
 }
 
 /// The best of some ends with the others as its competing tops.

@@ -6,9 +6,10 @@
 //! | `range_kernel`, `wake_map` | what a range gate and a region see of it in the mean |
 //! | `estimator_response`, `tangent` | what an estimator makes of its spectra: the map of very many pulses, and that of wakes near by |
 //! | `guess`, `map_fit`, `map_problem` | fit to a map: search for the best pair, then robust least squares |
+//! | `estimator_fit`, `map_starts`, `residual_covariance` | the same for the map of an estimator; several starts; correlated residuals |
 //! | `baseband`, `pulse`, `scan_model` | raw signals at the rate of the detector band; lines cut into layers |
 //! | `line`, `band`, `likelihood` | covariance of a line, its factor and derivatives; likelihood and Fisher information |
-//! | `signal_fit`, `small` | fit to all raw signals; the damped Newton iteration of both fits |
+//! | `signal_fit`, `ascent`, `tops`, `small` | fit to all raw signals, the tops of its likelihood; the damped Newton iteration of both fits |
 //!
 //! A map is fitted first, without prior knowledge ([`fit_map_of_estimator`]; [`fit_map`] if its velocities are means
 //! over gates); its outcome starts the fit of the signals ([`fit_signals`]). The bound on any unbiased fit of the
@@ -27,7 +28,8 @@
 //! `cargo xtask reproduce-figs --profile standard --only 17` measures them again.
 //!
 //! The likelihood of one scan has several tops near the highest, since few lines cross a core and each has its speckle;
-//! they lie within one or two standard deviations of each other, and which one is found depends on the start.
+//! which one is found depends on the start. So fits of signals begin with several core radii and heights ([`Starts`]), keep the
+//! highest top and report the others; `cargo xtask fit-trials` measures that against a start at the truth.
 //!
 //! To measure again: `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
 //! (signals) or `circulation_from_many_maps` (maps).

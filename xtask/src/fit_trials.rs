@@ -1,0 +1,183 @@
+//! `cargo xtask fit-trials`: fits to many scans of a pair against the truth, their bound and a start at the truth.
+//!
+//! Every scan is fitted from its map on: the map with the core typical and with it fitted, then all signals with one core radius
+//! fitted or the true one, and once more from the truth on. Each row has its standard error; one thread tells the processor time.
+
+use crate::trials::fits::FitTrial;
+use crate::trials::pair::{PairCase, PairScan};
+use crate::work_precision::measured;
+use crate::{Failure, Outcome};
+use wakescope_estimate::Error;
+use wakescope_estimate::vortex_fit::{
+    FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
+};
+use wakescope_signal::NoiseModel;
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// The pair that is scanned.
+    #[arg(long, value_enum, default_value_t = Case::Low)]
+    case: Case,
+    /// Number of scans.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(2..=10_000))]
+    scans: u32,
+    /// Signal-to-noise ratio in the detector band, dB.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    snr_db: f64,
+    /// Seed of speckle and noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Fit the signals with the true core radius, which is then not fitted.
+    #[arg(long)]
+    known_core: bool,
+    /// Fit the maps only, which takes seconds instead of minutes.
+    #[arg(long)]
+    maps_only: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Case {
+    /// 500 m^2/s, 47 m apart and high, cores of 2.35 m: that of the figures.
+    Figures,
+    /// 380 and 340 m^2/s, 40 m apart, cores of 3 m, 30 m high, 2 m/s of wind.
+    Low,
+    /// The same with cores of 0.8 m.
+    SmallCores,
+}
+
+/// What is told of each fit.
+const TOLD: [(&str, Parameter); 7] = [
+    ("left circulation, m^2/s", Parameter::LeftCirculation),
+    ("right circulation, m^2/s", Parameter::RightCirculation),
+    ("left lateral, m", Parameter::LeftLateral),
+    ("right lateral, m", Parameter::RightLateral),
+    ("left height, m", Parameter::LeftHeight),
+    ("right height, m", Parameter::RightHeight),
+    ("core radius, m", Parameter::LeftCore),
+];
+
+/// Fits of one kind over the scans.
+#[derive(Default)]
+struct Fits {
+    name: &'static str,
+    /// Wake and standard deviations.
+    found: Vec<(Wake, [f64; PARAMETERS])>,
+    failures: Vec<String>,
+    cpu_s: f64,
+}
+
+impl Fits {
+    fn of(name: &'static str) -> Self {
+        Self { name, ..Default::default() }
+    }
+
+    fn take(&mut self, (wake, deviation): (Wake, impl Fn(usize) -> f64), cpu_s: f64) {
+        self.found.push((wake, std::array::from_fn(deviation)));
+        self.cpu_s += cpu_s;
+    }
+
+    /// Keeps a fit of a map, or why there is none.
+    fn map(&mut self, scan: usize, (fit, cpu_s): (Result<MapFit, Error>, f64)) -> Option<MapFit> {
+        match fit {
+            Ok(fit) => {
+                self.take((fit.wake, |i| fit.covariance[[i, i]].sqrt()), cpu_s);
+                Some(fit)
+            }
+            Err(error) => {
+                self.failures.push(format!("scan {scan}: {error}"));
+                None
+            }
+        }
+    }
+
+    fn signals(&mut self, scan: usize, (fit, cpu_s): (Result<SignalFit, Error>, f64)) -> Option<SignalFit> {
+        match fit {
+            Ok(fit) => {
+                self.take((fit.wake, |i| fit.covariance[[i, i]].sqrt()), cpu_s);
+                Some(fit)
+            }
+            Err(error) => {
+                self.failures.push(format!("scan {scan}: {error}"));
+                None
+            }
+        }
+    }
+
+    fn show(&self, truth: &Wake, bound: &[f64; PARAMETERS]) {
+        let n = self.found.len() as f64;
+        println!(
+            "{}: {} fits, {} failed, {:.2} s of processor each",
+            self.name,
+            self.found.len(),
+            self.failures.len(),
+            self.cpu_s / n
+        );
+        self.failures.iter().for_each(|why| println!("  {why}"));
+        for (label, parameter) in TOLD {
+            let place = parameter as usize;
+            let errors: Vec<f64> =
+                self.found.iter().map(|(w, _)| w.to_array()[place] - truth.to_array()[place]).collect();
+            let mean = errors.iter().sum::<f64>() / n;
+            let scatter = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+            let stated = (self.found.iter().map(|(_, s)| s[place].powi(2)).sum::<f64>() / n).sqrt();
+            println!(
+                "  {label:<25} bias {mean:8.3} +- {:.3}, scatter {scatter:7.3} +- {:.3}, stated {stated:7.3}, bound {:.3}",
+                scatter / n.sqrt(),
+                scatter / (2.0 * (n - 1.0)).sqrt(),
+                bound[place]
+            );
+        }
+    }
+}
+
+pub(crate) fn run(options: &Options) -> Outcome {
+    let (case, circulation) = match options.case {
+        Case::Figures => (PairCase::FIGURES, Sharing::Common),
+        Case::Low => (PairCase::LOW, Sharing::Separate),
+        Case::SmallCores => (PairCase::SMALL_CORES, Sharing::Separate),
+    };
+    let truth = case.truth();
+    let pair = PairScan::of(&case, NoiseModel::BandLimited, (200e-9, options.snr_db), 8, options.seed)?;
+    let free = |core_radius| FreeParameters { circulation, core_radius, ..Default::default() };
+    let of_signals = free(if options.known_core { Sharing::Fixed } else { Sharing::Common });
+    let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth)?;
+    let covariance = model.bound(&truth, Powers::default(), &of_signals, true)?;
+    let bound: [f64; PARAMETERS] = std::array::from_fn(|i| covariance[[i, i]].sqrt());
+    let mut maps = [Fits::of("map, typical core"), Fits::of("map, one core fitted")];
+    let mut signals = [Fits::of("signals"), Fits::of("signals, started at the truth")];
+    let mut below = Vec::new();
+    for scan in 0..options.scans as usize {
+        let trial = FitTrial::new(&pair, scan)?;
+        let mut guess = None;
+        for (fits, core) in maps.iter_mut().zip([Sharing::Fixed, Sharing::Common]) {
+            let (fit, cost) = measured(|| trial.map(free(core)))?;
+            guess = guess.or(fits.map(scan, (fit, cost.cpu_s())).map(|fit| fit.wake));
+        }
+        let (false, Some(mut guess)) = (options.maps_only, guess) else { continue };
+        if options.known_core {
+            (guess.left.core_radius_m, guess.right.core_radius_m) =
+                (truth.left.core_radius_m, truth.right.core_radius_m);
+        }
+        let mut fit = |place: usize, guess: &Wake, starts| -> Result<Option<SignalFit>, Failure> {
+            let (fit, cost) = measured(|| trial.signals(of_signals, guess, starts))?;
+            Ok(signals[place].signals(scan, (fit, cost.cpu_s())))
+        };
+        let (found, at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?);
+        if let (Some(found), Some(at_truth)) = (found, at_truth) {
+            let less = at_truth.log_likelihood - found.log_likelihood;
+            println!(
+                "scan {scan}: ln p {less:+.2} below that of the start at the truth; tops {:.2?}",
+                found.tops.iter().map(|top| top.log_likelihood - found.log_likelihood).collect::<Vec<_>>()
+            );
+            below.push(less);
+        }
+    }
+    maps.iter().chain(&signals).filter(|fits| fits.found.len() > 1).for_each(|fits| fits.show(&truth, &bound));
+    if !below.is_empty() {
+        let lower = below.iter().filter(|less| **less > 0.1).count();
+        let most = below.iter().fold(f64::NEG_INFINITY, |most, less| most.max(*less));
+        println!("{lower} of {} fits of signals end on a top lower by 0.1 or more; the most is {most:.2}", below.len());
+    }
+    Ok(())
+}

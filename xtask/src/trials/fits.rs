@@ -1,0 +1,64 @@
+//! Fits to scans of a pair: to the map of the likelihood with tapers, and to all raw signals.
+
+use super::methods::WINDOW;
+use super::pair::PairScan;
+use crate::Failure;
+use ndarray::{Array2, ArrayView2};
+use wakescope_estimate::vortex_fit::{
+    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, SignalFit, SignalFitOptions, Starts, VelocityMap, Wake,
+    fit_map_of_estimator, fit_signals,
+};
+use wakescope_estimate::{
+    Correlogram, Error, Noise, Refinement, SignalKind, SpectralPeak, WindowModel, likelihood_tapers,
+};
+
+/// Radius of the regions of the maps \[m\].
+pub(crate) const RADIUS_M: f64 = 2.0;
+
+/// One scan of a pair and what fits need of it.
+pub(crate) struct FitTrial<'a> {
+    pair: &'a PairScan,
+    records: Array2<f64>,
+    tapered: Correlogram<f64>,
+    peak: SpectralPeak,
+    velocities: Vec<f64>,
+}
+
+impl<'a> FitTrial<'a> {
+    pub(crate) fn new(pair: &'a PairScan, scan: usize) -> Result<Self, Failure> {
+        let records = pair.records(scan)?;
+        let window = WindowModel::gaussian_pulse(&pair.sampling, WINDOW, pair.sigma_s(), Noise::White)?;
+        let tapered = Correlogram::with_tapers(likelihood_tapers(&window, pair.snr)?)?;
+        let peak = SpectralPeak::new(&pair.sampling, SignalKind::Real, WINDOW, 1024, Refinement::Parabola)?;
+        let velocities = pair.velocities(&pair.statistics(&records, &tapered)?, &pair.points, RADIUS_M, &peak)?;
+        Ok(Self { pair, records, tapered, peak, velocities })
+    }
+
+    /// The fit of the map, without prior knowledge.
+    pub(crate) fn map(&self, free: FreeParameters) -> Result<Result<MapFit, Error>, Failure> {
+        let (pair, setup) = (self.pair, self.pair.setup()?);
+        let map = VelocityMap {
+            elevation_rad: &pair.elevation_rad,
+            range_m: &pair.range_m,
+            velocity_m_s: ArrayView2::from_shape((pair.elevation_rad.len(), pair.range_m.len()), &self.velocities)?,
+            standard_deviation_m_s: None,
+        };
+        let noise = (setup.noise, pair.snr);
+        let shown = EstimatorResponse::new(&self.tapered, &self.peak, &setup.sampling, &setup.pulse, noise, RADIUS_M)?;
+        let options = MapFitOptions { free, ..Default::default() };
+        Ok(fit_map_of_estimator(&map, &setup.wake, &shown, &options))
+    }
+
+    /// The fit of all signals from a guess on.
+    pub(crate) fn signals(
+        &self,
+        free: FreeParameters,
+        guess: &Wake,
+        starts: Starts,
+    ) -> Result<Result<SignalFit, Error>, Failure> {
+        let (pair, setup) = (self.pair, self.pair.setup()?);
+        let options = SignalFitOptions { free, starts, ..Default::default() };
+        let (records, noise_a2) = (self.records.view(), pair.noise_power_a2());
+        Ok(fit_signals(&setup, |_, _| pair.snr, records, noise_a2, guess, &options))
+    }
+}
