@@ -134,12 +134,9 @@ mod tests {
             let own = std::fs::read(&path).unwrap();
             // What a user may have there: another file of that kind, with or without the word in it.
             let mut other = own.clone();
-            match find(&other, NAME) {
-                Some(_) => {
-                    while let Some(at) = find(&other, NAME) {
-                        other[at..at + NAME.len()].copy_from_slice(b"somebodys ");
-                    }
-                }
+            let from = find(&other, "source").unwrap_or(0);
+            match find(&other[from..], NAME).map(|at| from + at) {
+                Some(at) => other[at..at + NAME.len()].copy_from_slice(b"somebodys "),
                 None => other[find(&own, SYSTEM_ID).unwrap() + SYSTEM_ID.len() - 1] = b'7',
             }
             for foreign in [other, b"# notes on wakescope 0.1.0\nmine\n".to_vec(), Vec::new()] {

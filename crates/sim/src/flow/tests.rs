@@ -265,16 +265,23 @@ fn a_checkpoint_is_not_lost_by_mistake_and_a_damaged_one_gives_way_to_the_one_be
 
 #[test]
 fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
-    /// Puts a folder where the second output will go, once the run has begun; before, it would be found at once.
-    struct InTheWay(std::path::PathBuf);
-    impl Watch for InTheWay {
+    /// Puts a folder where an output will go while the flow runs.
+    struct Mischief(PathBuf);
+    impl Watch for Mischief {
         fn step(&mut self, _: f64, _: &StepRecord) {
             fs::create_dir_all(&self.0).unwrap();
         }
     }
     let folder = tempfile::tempdir().unwrap();
-    let mut watch = InTheWay(folder.path().join("fields_0002.csv"));
-    let error = run(&vortices(None), folder.path(), Begin::New, &mut watch).unwrap_err();
+    let in_the_way = folder.path().join("fields_0002.csv");
+    // Before the run it is found before any computing.
+    fs::create_dir_all(&in_the_way).unwrap();
+    let error = run(&vortices(None), folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
+    assert!(error.contains("fields_0002.csv") && error.contains("folder"), "{error}");
+    fs::remove_dir(&in_the_way).unwrap();
+    assert!(contents(folder.path()).is_empty(), "nothing was written");
+    let mut mischief = Mischief(in_the_way);
+    let error = run(&vortices(None), folder.path(), Begin::New, &mut mischief).unwrap_err();
     assert!(matches!(error, Error::Export(_)), "{error}");
     assert!(wakescope_les::check_checkpoint(folder.path().join("flow.checkpoint")).is_ok());
     fs::remove_dir(folder.path().join("fields_0002.csv")).unwrap();
