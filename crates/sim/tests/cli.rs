@@ -123,7 +123,7 @@ fn a_folder_in_the_way_of_a_file_is_found_before_the_computing() {
 
 #[test]
 fn what_is_larger_than_the_machine_is_refused_unless_asked_for() {
-    let scene = "[scan]\npulses_per_line = 1000000\nrealisations = 1000\n[outputs]\nsignals = true\nnetcdf = false\n";
+    let scene = "[scan]\npulses_per_line = 1000000\nrealisations = 10000\n[outputs]\nsignals = true\nnetcdf = false\n";
     for words in [&["check", "s.toml"][..], &RUN] {
         let message = refused(scene, words);
         for part in ["TB of memory", "are available", "outputs.signals = false", "--allow-large"] {
