@@ -86,20 +86,14 @@ fn forecast_s(json: &str) -> f64 {
 mod tests {
     use super::*;
     use std::path::Path;
-    use wakescope_sim::export::Existing;
     use wakescope_sim::plan::{Plan, Target};
-    use wakescope_sim::progress::Silent;
     use wakescope_sim::scene::SceneFile;
-    use wakescope_sim::{run, write};
 
-    /// Scenes of which all are planned, and one of so many good ones is run.
     const SCENES: u64 = 2000;
-    const RUN_ONE_OF: usize = 8;
 
     #[test]
-    fn changed_scenes_are_refused_or_run() {
-        let folder = tempfile::tempdir().unwrap();
-        let (mut good, mut ran) = (0, 0);
+    fn changed_scenes_are_refused_or_planned() {
+        let mut good = 0;
         for index in 0..SCENES {
             let text = scene(1, index);
             let Ok(file) = SceneFile::parse(&text, Path::new("s.toml")) else { continue };
@@ -107,14 +101,7 @@ mod tests {
             let total = plan.total();
             assert!(total.core_s >= 0.0 && total.memory_bytes >= 0.0, "{index}: {total:?}\n{text}");
             good += 1;
-            if good % RUN_ONE_OF > 0 || total.core_s > 0.1 || total.memory_bytes > 2e8 || plan.rehearse().is_err() {
-                continue;
-            }
-            let result = run::run(&plan, &Silent).unwrap_or_else(|e| panic!("scene {index}: {e}\n{text}"));
-            write::write(&plan, &result, folder.path(), Existing::Own)
-                .unwrap_or_else(|e| panic!("scene {index}: {e}\n{text}"));
-            ran += 1;
         }
-        assert!(good > 400 && ran > 25, "{good} {ran}");
+        assert!(good > 400, "{good}");
     }
 }

@@ -2,6 +2,41 @@
 
 use std::path::PathBuf;
 
+/// A kinetic energy that nothing can have given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnergyGrowth {
+    /// Number of the step.
+    pub step: u64,
+    /// Time reached \[s\].
+    pub time_s: f64,
+    /// Kinetic energy, integral of `u^2/2` \[m^5/s^2\].
+    pub energy_m5_s2: f64,
+    /// The most that the flow may have.
+    pub allowed_m5_s2: f64,
+    /// Growth rate of the energy in this step \[1/s\].
+    pub rate_per_s: f64,
+    /// Velocity component whose shortest waves are strongest.
+    pub component: &'static str,
+    /// Cell where they are, indices along x, y, z.
+    pub cell: [usize; 3],
+    /// Its position \[m\].
+    pub position_m: [f64; 3],
+    /// The likeliest cause, and what to do.
+    pub cause: String,
+}
+
+impl std::fmt::Display for EnergyGrowth {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { step, time_s, energy_m5_s2, allowed_m5_s2, rate_per_s, component, cell, position_m, cause } = self;
+        write!(
+            f,
+            "step {step} (t = {time_s:?} s): the kinetic energy has grown to {energy_m5_s2:.6e} m^5/s^2, at most \
+             {allowed_m5_s2:.6e} can have come from the start, a force or walls that move; it grows at {rate_per_s:.3e} 1/s, \
+             most in {component} near cell {cell:?}, x, y, z = {position_m:?} m: {cause}"
+        )
+    }
+}
+
 /// Why a wind could not be built or sampled, or a flow not simulated. Every variant carries the values and what is allowed.
 #[non_exhaustive]
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -99,31 +134,8 @@ pub enum Error {
         position_m: [f64; 3],
     },
     /// A flow has more kinetic energy than it started with and force or moving walls can have given it.
-    #[error(
-        "step {step} (t = {time_s:?} s): the kinetic energy has grown to {energy_m5_s2:.6e} m^5/s^2, at most {allowed_m5_s2:.6e} \
-         can have come from the start, a force or walls that move; it grows at {rate_per_s:.3e} 1/s, most in {component} near cell \
-         {cell:?}, x, y, z = {position_m:?} m: {cause}"
-    )]
-    EnergyGrew {
-        /// Number of the step.
-        step: u64,
-        /// Time reached \[s\].
-        time_s: f64,
-        /// Kinetic energy, integral of `u^2/2` \[m^5/s^2\].
-        energy_m5_s2: f64,
-        /// The most that the flow may have.
-        allowed_m5_s2: f64,
-        /// Growth rate of the energy in this step \[1/s\].
-        rate_per_s: f64,
-        /// Velocity component whose shortest waves are strongest.
-        component: &'static str,
-        /// Cell where they are, indices along x, y, z.
-        cell: [usize; 3],
-        /// Its position \[m\].
-        position_m: [f64; 3],
-        /// The likeliest cause, and what to do.
-        cause: String,
-    },
+    #[error("{0}")]
+    EnergyGrew(Box<EnergyGrowth>),
     /// The system refused to read or write a file.
     #[error("cannot {action} {}: {reason}", path.display())]
     File {

@@ -54,7 +54,7 @@ mod wind;
 
 pub use axis::{Edges, Side};
 pub use diagnose::{circulation_m2_s, mean_circulation_5_15_m2_s};
-pub use error::{Error, PressureFailure};
+pub use error::{EnergyGrowth, Error, PressureFailure};
 pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
 pub use kernel::{m4_prime, m4_prime_weights};
 pub use profile::CirculationProfile;

@@ -1,7 +1,7 @@
 //! A run in small before the run: one pulse along one line, with the receiver, the windows and the estimator of the scene.
 //!
 //! What only the computing shows - a window that no estimator can be planned for, values that a file cannot hold - shows
-//! here within moments. Check: the command `cargo xtask fuzz-scenes` finds no scene that passes and does not run.
+//! here within moments. `cargo xtask fuzz-scenes` looks for scenes that pass and do not run.
 
 use super::{Plan, Stage, Target};
 use crate::progress::Silent;

@@ -52,7 +52,7 @@ impl RowTransform {
         let n = line.cells;
         // Powers of two add equal values exactly: a flow that does not vary stays as it is, whatever the number of cells.
         let fast = n.is_power_of_two() || n > TINY && (n > SMALL || largest_factor(n) <= SMOOTH);
-        !line.is_thin() && !(line.is_fourier() && fast)
+        !(line.is_thin() || line.is_fourier() && fast)
     }
 
     /// The transform, the eigenvalues by place, and the factor that both ways together leave out.

@@ -10,7 +10,7 @@
 use super::super::flow::Flow;
 use super::super::mesh::{Ends, Wall};
 use super::super::settings::TimeScheme;
-use crate::Error;
+use crate::error::{EnergyGrowth, Error};
 
 /// Share of the energy by which a flow may exceed what it may have. A stable step errs by much less; where errors of the time
 /// step have added this much the solution is theirs.
@@ -70,7 +70,7 @@ fn sources(flow: &Flow) -> [f64; 2] {
 
 fn grew(flow: &Flow, allowed_m5_s2: f64, rate_per_s: f64) -> Error {
     let (axis, place) = flow.strongest_short_wave();
-    Error::EnergyGrew {
+    Error::EnergyGrew(Box::new(EnergyGrowth {
         step: flow.steps(),
         time_s: flow.time_s(),
         energy_m5_s2: flow.kinetic_energy_m5_s2(),
@@ -80,7 +80,7 @@ fn grew(flow: &Flow, allowed_m5_s2: f64, rate_per_s: f64) -> Error {
         cell: flow.cell(place),
         position_m: flow.position_m(place),
         cause: cause(flow),
-    }
+    }))
 }
 
 /// The likeliest cause, and what to do.
