@@ -197,7 +197,7 @@ fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
         file.scene.seed = seed;
         let origin = file.clone();
         file = SceneFile::new(file.scene).map_err(|problems| origin.located(problems))?;
-        file = file.from_the_file_of(origin);
+        file = file.with_file_of(origin);
     }
     Ok(file)
 }

@@ -175,10 +175,8 @@ impl RunResult {
             line("scan_efficiency", "efficiency there", middle.efficiency);
             line("scan_snr_db", "signal-to-noise ratio there [dB]", middle.snr_db);
         }
-        if let Some(p) = &self.profile {
-            if let Some(fraction) = p.lost_power_fraction {
-                line("lost_power_fraction", "power lost at the screens' border (< 0.01)", fraction);
-            }
+        if let Some(fraction) = self.profile.as_ref().and_then(|profile| profile.lost_power_fraction) {
+            line("lost_power_fraction", "power lost at the screens' border (< 0.01)", fraction);
         }
         if let Some(a) = &self.signals_a {
             line("signal_rms_a", "rms of the raw signals [A]", (a.mapv(|x| x * x).sum() / a.len() as f64).sqrt());

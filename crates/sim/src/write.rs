@@ -36,7 +36,8 @@ pub fn prepare<'a>(folder: &Path, names: impl IntoIterator<Item = &'a str>, exis
     let probe = folder.join(".wakescope-probe");
     let tried = made.and_then(|()| {
         std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(|e| io("write to", e))?;
-        Ok(drop(FolderLock::take(folder)?))
+        FolderLock::take(folder)?;
+        Ok(())
     });
     for path in missing {
         // Innermost first; one that was not made cannot be removed, which is what is wanted.

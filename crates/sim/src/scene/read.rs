@@ -137,7 +137,7 @@ impl SceneFile {
 
     /// The same scene with the folder and the lines of the file that `other` was read from.
     #[cfg(feature = "cli")]
-    pub(crate) fn from_the_file_of(self, other: Self) -> Self {
+    pub(crate) fn with_file_of(self, other: Self) -> Self {
         Self { folder: other.folder, origin: other.origin, ..self }
     }
 }
