@@ -1,7 +1,7 @@
 //! What a run will take, before anything of its size is allocated: cells, steps, time, memory, files.
 //!
 //! Memory is counted in arrays of one number for each cell, time in passes over the cells; the unit costs at the end of this
-//! file are good to a factor of two or so. Steps follow from the Courant number of the initial field: flows that speed up take more.
+//! file are good to a factor of two, but that of multigrid, which takes twice as long. Steps follow from the Courant number of the initial field: flows that speed up take more.
 //!
 //! Check: memory against the arrays of a run, sizes that fit, cases too large are refused at once.
 
