@@ -19,8 +19,8 @@ const MAY_DEPEND_ON: [(&str, &[&str]); 7] = [
     ("tests", &["optics", "les", "signal", "estimate", "sim"]),
 ];
 
-/// Longest source file, in lines.
-const MAX_LINES: usize = 400;
+/// Longest source file, in lines of code: what explains them may take the room that it needs.
+const MAX_CODE_LINES: usize = 500;
 
 /// Files and folders that may stand at the top.
 const TOP_LEVEL: [&str; 15] = [
@@ -180,9 +180,10 @@ fn check_source(file: &str, text: &str, found: &mut Vec<String>) {
     if !text.starts_with("//!") && !text.starts_with("#![") {
         found.push(format!("{file}:1: begin with `//!`: what the file is for"));
     }
-    let lines = text.lines().count();
-    if lines > MAX_LINES {
-        found.push(format!("{file}: {lines} lines, at most {MAX_LINES}: split it by subject"));
+    let is_code = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with("//");
+    let lines = text.lines().filter(is_code).count();
+    if lines > MAX_CODE_LINES {
+        found.push(format!("{file}: {lines} lines of code, at most {MAX_CODE_LINES}: split it by subject"));
     }
     for (i, line) in text.lines().enumerate() {
         let unfinished = ["TODO", "FIXME", "todo!(", "unimplemented!("].iter().any(|word| line.contains(word));

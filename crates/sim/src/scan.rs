@@ -107,7 +107,7 @@ impl<'a> Scanner<'a> {
     /// \[pulse, sample\], A, real at the intermediate frequency or complex about zero. The pulses of a line stand together.
     /// Returns how many samples the converter clipped.
     ///
-    /// A piece has [`records_at_once`] records, however many pulses there are. Every pulse has its own random stream, keyed by
+    /// A piece has some ten megabytes of records, however many pulses there are. Every pulse has its own random stream, keyed by
     /// realisation, line and pulse.
     ///
     /// # Errors
