@@ -16,9 +16,7 @@ mod possible;
 mod rehearsal;
 mod sizes;
 mod stages;
-mod units;
-
-pub(crate) use units::{bytes, seconds};
+pub(crate) mod units;
 
 /// What the user asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

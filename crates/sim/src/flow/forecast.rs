@@ -10,7 +10,7 @@ use super::files::Files;
 use super::setup::Setup;
 use super::wake::Schedule;
 use super::{CaseFile, CaseKind};
-use crate::plan::{bytes, seconds};
+use crate::plan::units::{bytes, seconds};
 use crate::{Error, machine};
 use std::fmt;
 use wakescope_les::{RunPlan, TimeScheme, TimeStep};

@@ -13,10 +13,11 @@ use crate::scene::DetectorSignal;
 /// # Errors
 /// The key, the size or the times, and what is allowed.
 pub fn check(plan: &Plan) -> Result<(), Error> {
-    let (scene, g) = (&plan.scene.scene, &plan.geometry);
-    let rays = g.elevation_rad.len() as f64;
+    let scene = &plan.scene.scene;
     #[cfg(feature = "netcdf")]
     if scene.outputs.netcdf {
+        let g = &plan.geometry;
+        let rays = g.elevation_rad.len() as f64;
         if plan.keeps_signals() {
             let pulses = rays * (scene.scan.pulses_per_line * plan.kept_realisations()) as f64;
             let quadratures = if scene.detector.signal == DetectorSignal::Baseband { 2.0 } else { 1.0 };
