@@ -96,7 +96,24 @@ pub(super) fn scene(seed: u64, index: u64) -> String {
             _ => change_a_key(&mut scene, &mut rng),
         }
     }
-    toml::to_string(&scene).unwrap_or_default()
+    let usual = Table::try_from(Scene::default()).unwrap_or_default();
+    toml::to_string(&stated(&scene, &usual)).unwrap_or_default()
+}
+
+/// What differs from the defaults: keys that a method has no use for may not be stated, even with their defaults.
+fn stated(scene: &Table, usual: &Table) -> Table {
+    let mut out = Table::new();
+    for (key, value) in scene {
+        match (value, usual.get(key)) {
+            (Value::Table(inner), Some(Value::Table(usual))) if inner.get("kind") == usual.get("kind") => {
+                let inner = stated(inner, usual);
+                out.extend((!inner.is_empty()).then(|| (key.clone(), Value::Table(inner))));
+            }
+            (value, Some(usual)) if value == usual => {}
+            _ => out.extend([(key.clone(), value.clone())]),
+        }
+    }
+    out
 }
 
 /// A short scan, so that a change may make it longer and yet let it end soon.
