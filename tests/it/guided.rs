@@ -7,7 +7,8 @@ use wakescope_estimate::vortex_fit::{
     VelocityMap, Wake, WakeModel, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::*;
-use wakescope_les::{CirculationProfile, Ground, Motion, Sum, VortexPair, Wind};
+use wakescope_les::winds::Sum;
+use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::NoiseModel;
 
 /// Radius of the regions \[m\].

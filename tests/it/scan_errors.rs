@@ -3,7 +3,8 @@
 
 use crate::pair_scene::{Scene, WINDOW};
 use wakescope_estimate::*;
-use wakescope_les::{CirculationProfile, Ground, Motion, Sum, Uniform, VortexPair, Wind};
+use wakescope_les::winds::{Sum, Uniform};
+use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::NoiseModel;
 
 /// Root-mean-square errors of an estimator: against the velocity of the pulse within 8 m of a core and beyond 30 m from

@@ -2,7 +2,7 @@
 
 use super::{Claim, Context, Rendered};
 use crate::Failure;
-use wakescope_les::m4_prime;
+use wakescope_les::winds::m4_prime;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

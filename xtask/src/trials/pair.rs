@@ -14,7 +14,8 @@ use wakescope_estimate::{
     Estimator, Gates, Noise, PolarPoint, Radius, SPEED_OF_LIGHT_M_S, Sampling, Scan, SignalKind, Statistic,
     polar_points,
 };
-use wakescope_les::{CirculationProfile, Ground, Motion, Sum, Uniform, VortexPair, Wind};
+use wakescope_les::winds::{Sum, Uniform};
+use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::{
     GaussianPulse, LineOfSight, NoiseModel, PulseDuration, PulseKey, RangeFilter, Receiver, Record, Scratch, Simulator,
     pulse_generator,

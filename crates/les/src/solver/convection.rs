@@ -1,14 +1,23 @@
-//! Convection of one row of a velocity component; the formulas stand in `momentum`, the pairs in `transport`.
+//! Convection of one row of a velocity component: what `literal` does point by point, the formulas of which stand there.
+//!
+//! Check: the literal form on every kind of mesh.
 
 use multiversion::multiversion;
 
-use super::momentum::Momentum;
+use super::momentum::{Momentum, Scratch};
 use super::rows::{HALO, add_product, add_rows, add_transport, even_mean, pad};
 use super::transport::{MEAN, Transport};
 
+impl Scratch {
+    /// Convection of one row into `self.convection`.
+    pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
+        convection_row(ops, velocity, j, k, &mut self.convection, &mut self.padded, &mut self.flux);
+    }
+}
+
 /// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn convection_row(
+fn convection_row(
     ops: &Momentum,
     velocity: [&[f64]; 3],
     j: usize,

@@ -117,11 +117,11 @@ fn largest_reynolds(transport: [f64; 3], courant: f64) -> f64 {
 fn largest_growth(transport: [f64; 3], courant: f64, viscous: f64) -> f64 {
     let growth = |wave: usize| {
         let theta = PI * wave as f64 / WAVES as f64;
-        let turn = (1..=3).map(|m| transport[m - 1] * (m as f64 * theta).sin()).sum::<f64>();
+        let symbol = (1..=3).map(|m| transport[m - 1] * (m as f64 * theta).sin()).sum::<f64>();
         let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
         let half = 0.5 * viscous * kappa * kappa;
         // G^2 - (a + 3/2 z) G + z/2 = 0.
-        let (a, z) = ((1.0 - half) / (1.0 + half), Complex::new(0.0, courant * turn / (1.0 + half)));
+        let (a, z) = ((1.0 - half) / (1.0 + half), Complex::new(0.0, courant * symbol / (1.0 + half)));
         let b = a + 1.5 * z;
         let root = (b * b - 2.0 * z).sqrt();
         (0.5 * (b + root)).norm().max((0.5 * (b - root)).norm()).ln()

@@ -8,9 +8,8 @@
 
 use multiversion::multiversion;
 
-use super::convection::convection_row;
 use super::layout::Layout;
-use super::line::{DIFFERENCE, Taps};
+use super::operators_1d::{DIFFERENCE, Taps};
 use super::rows::{Columns, HALO, add_even, add_rows, pad};
 use super::transport::{Stencil, Transport};
 
@@ -54,8 +53,8 @@ const SECOND_DIFFERENCE: [f64; 3] = [
 /// Rows that a task reuses.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    padded: [Vec<f64>; 2],
-    flux: [Vec<f64>; 4],
+    pub(super) padded: [Vec<f64>; 2],
+    pub(super) flux: [Vec<f64>; 4],
     pub(crate) convection: Vec<f64>,
     pub(crate) explicit: Vec<f64>,
     pub(crate) implicit: Vec<f64>,
@@ -236,11 +235,6 @@ pub(crate) fn gradient_row(ops: &Momentum, field: &[f64], j: usize, k: usize, ou
 }
 
 impl Scratch {
-    /// Convection of one row into `self.convection`.
-    pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
-        convection_row(ops, velocity, j, k, &mut self.convection, &mut self.padded, &mut self.flux);
-    }
-
     /// Laplacians of one row: those along the implicit axes into `self.implicit`, the others into `self.explicit`.
     pub(crate) fn laplacians(&mut self, ops: &Momentum, field: &[f64], implicit: [bool; 3], j: usize, k: usize) {
         self.implicit.fill(0.0);

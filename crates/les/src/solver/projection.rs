@@ -6,8 +6,8 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::layout::{Layout, Shape};
-use super::line::Taps;
 use super::momentum::{Momentum, Scratch};
+use super::operators_1d::Taps;
 use super::rows::{Columns, HALO, add_rows, wrap};
 
 /// The weighted divergence `sum_b (prod_{d != b} m_d) Dw_b u_b` \[m^3/s\].

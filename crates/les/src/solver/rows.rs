@@ -1,7 +1,7 @@
 //! Kernels on rows of memory axis 0. They are inlined into functions that are compiled for several instruction sets;
 //! products and sums are kept apart, so that each version gives the same bits.
 
-use super::line::Taps;
+use super::operators_1d::Taps;
 use super::transport::{MEAN, Stencil};
 
 /// Values before and after a padded row.

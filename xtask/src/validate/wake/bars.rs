@@ -180,7 +180,7 @@ fn turbulent(flow: &History, plane: &History, stored: &Stored, bars: &Bars) -> V
 }
 
 fn table(flow: &History) -> Table {
-    let column = |table: Table, name: &str, of: &dyn Fn(&wakescope_les::WakeRecord) -> f64| {
+    let column = |table: Table, name: &str, of: &dyn Fn(&wakescope_les::analysis::WakeRecord) -> f64| {
         table.float(name, flow.records.iter().map(of))
     };
     let mut table = Table::new()

@@ -5,7 +5,7 @@ use crate::Failure;
 use crate::validate::{Check, Profile, Shown, interpolate};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
-use wakescope_les::WakeRecord;
+use wakescope_les::analysis::WakeRecord;
 use wakescope_les::cases::VortexPairCase;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};

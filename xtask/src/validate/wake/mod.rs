@@ -15,7 +15,7 @@ use super::{interpolate, numbers};
 use crate::Failure;
 use std::f64::consts::TAU;
 use wakescope_les::cases::VortexPairCase;
-use wakescope_les::{WakeMeter, WakeRecord, WakeScales};
+use wakescope_les::analysis::{WakeMeter, WakeRecord, WakeScales};
 
 /// Records per unit of tau.
 pub(super) const PER_TAU: usize = 20;

@@ -3,7 +3,7 @@
 //! Check: adjointness through the energy identity, linear and wall-bounded profiles (tests of the model).
 
 use super::super::layout::{Layout, Shape};
-use super::super::line::{Line, Taps};
+use super::super::operators_1d::{Operators1d, Taps};
 use super::super::rows::{Columns, add_rows, pad};
 
 /// Most values that one derivative reads: two neighbouring gradients at a no-slip wall.
@@ -123,7 +123,7 @@ impl Operators {
 }
 
 /// Rows of `m^-1 Dw` over the stored faces.
-fn divergence(line: &Line) -> Vec<Taps> {
+fn divergence(line: &Operators1d) -> Vec<Taps> {
     let mut rows = line.stored_divergence();
     for (row, mass) in rows.iter_mut().zip(&line.cell_mass_m) {
         for tap in row {
@@ -135,7 +135,7 @@ fn divergence(line: &Line) -> Vec<Taps> {
 
 /// Half the mean of the gradients at the two faces of each cell: rows over the cells, and the coefficients of the velocities
 /// of the low and of the high wall. At a slip wall the gradient of what flows along it is zero.
-fn half_mean_gradient(line: &Line) -> (Vec<Taps>, Vec<[f64; 2]>) {
+fn half_mean_gradient(line: &Operators1d) -> (Vec<Taps>, Vec<[f64; 2]>) {
     let n = line.cells;
     let adjoint = line.adjoint();
     let sticks = line.no_slip();

@@ -253,8 +253,8 @@ fn add(out: &mut Lanes, weight: f32, value: &Lanes) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::super::line::Line;
     use super::super::super::super::mesh::{Direction, Mapping, Wall};
+    use super::super::super::super::operators_1d::Operators1d;
     use super::*;
 
     fn cycled(hierarchy: &Hierarchy, mode: &Lanes, wave: impl Fn(usize, usize) -> f32) -> (Vec<Lanes>, Vec<Lanes>) {
@@ -272,7 +272,7 @@ mod tests {
         let ground =
             Direction::between(25, 0.0, 25.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 2.0 });
         let sides = [ground, Direction::periodic(14, 0.0, 14.0)];
-        let hierarchy = Hierarchy::new(sides.each_ref().map(|d| Axis::new(&Line::new(d), 1.0)));
+        let hierarchy = Hierarchy::new(sides.each_ref().map(|d| Axis::new(&Operators1d::new(d), 1.0)));
         let mode: Lanes = std::array::from_fn(|l| 0.02 * (l + 1) as f32);
         let (f, bf) = cycled(&hierarchy, &mode, |p, l| ((p * 16 + l) as f32 * 0.71).sin());
         let (g, bg) = cycled(&hierarchy, &mode, |p, l| ((p * 16 + l) as f32 * 1.3).cos());

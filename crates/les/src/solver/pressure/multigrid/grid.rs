@@ -7,7 +7,7 @@
 //!
 //! Check: interpolation of constants and of straight lines, masses, colours.
 
-use super::super::super::line::Line;
+use super::super::super::operators_1d::Operators1d;
 
 /// One direction of one mesh.
 #[derive(Debug, Clone)]
@@ -30,7 +30,7 @@ const COARSEST: usize = 3;
 
 impl Axis {
     /// The finest mesh, in units of `unit_m` \[m\].
-    pub(crate) fn new(line: &Line, unit_m: f64) -> Self {
+    pub(crate) fn new(line: &Operators1d, unit_m: f64) -> Self {
         let n = line.cells;
         let distance: Vec<f64> = line.face_mass_m[1..].iter().map(|f| f / unit_m).collect();
         let mut centre = vec![0.0; n];
@@ -120,7 +120,7 @@ mod tests {
     use super::super::super::super::mesh::{Direction, Mapping, Wall};
     use super::*;
 
-    fn lines() -> Vec<Line> {
+    fn lines() -> Vec<Operators1d> {
         let walls = |n| Direction::between(n, 0.0, 4.0, Wall::AT_REST, Wall::Slip);
         [
             walls(24),
@@ -128,7 +128,7 @@ mod tests {
             Direction::periodic(19, 0.0, 4.0).stretched(Mapping::Sine { amplitude: 0.5 }),
         ]
         .iter()
-        .map(Line::new)
+        .map(Operators1d::new)
         .collect()
     }
 

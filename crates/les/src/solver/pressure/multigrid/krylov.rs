@@ -6,7 +6,7 @@
 
 use multiversion::multiversion;
 
-use super::super::super::line::Taps;
+use super::super::super::operators_1d::Taps;
 use super::cycle::{self, Hierarchy};
 use super::{LANES, Lanes, Wide};
 

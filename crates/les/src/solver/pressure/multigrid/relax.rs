@@ -238,8 +238,8 @@ fn substitute<const GROUP: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::super::line::Line;
     use super::super::super::super::mesh::{Direction, Mapping, Wall};
+    use super::super::super::super::operators_1d::Operators1d;
     use super::*;
 
     fn wave(n: usize, f: f32) -> Vec<Lanes> {
@@ -277,7 +277,7 @@ mod tests {
         let mode: Lanes = std::array::from_fn(|l| if l == 0 { 0.0 } else { 0.1 * l as f32 });
         for a in &kinds {
             for b in &kinds {
-                let axes = [a, b].map(|d| Axis::new(&Line::new(d), 1.0));
+                let axes = [a, b].map(|d| Axis::new(&Operators1d::new(d), 1.0));
                 let along = Side::new(&axes[0], axes[1].len());
                 let across = Side::new(&axes[1], 1);
                 let n = along.len() * across.len();
@@ -292,8 +292,8 @@ mod tests {
     #[test]
     fn a_single_line_of_a_constant_mode_is_solved_up_to_its_level() {
         for direction in [Direction::periodic(9, 0.0, 9.0), Direction::between(9, 0.0, 9.0, Wall::Slip, Wall::Slip)] {
-            let along = Side::new(&Axis::new(&Line::new(&direction), 1.0), 1);
-            let across = Side::new(&Axis::new(&Line::new(&Direction::thin(1.0)), 1.0), 9);
+            let along = Side::new(&Axis::new(&Operators1d::new(&direction), 1.0), 1);
+            let across = Side::new(&Axis::new(&Operators1d::new(&Direction::thin(1.0)), 1.0), 9);
             let mode = [0.0; LANES];
             let mut f = wave(9, 0.7);
             for l in 0..LANES {

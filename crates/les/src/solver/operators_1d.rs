@@ -30,7 +30,7 @@ pub(crate) const DIFFERENCE: [f64; 4] = [1.0 / 24.0, -9.0 / 8.0, 9.0 / 8.0, -1.0
 
 /// One direction of the mesh with its operators.
 #[derive(Debug, Clone)]
-pub(crate) struct Line {
+pub(crate) struct Operators1d {
     /// Number of cells, and of stored faces.
     pub(crate) cells: usize,
     /// What lies at the two ends.
@@ -47,7 +47,7 @@ pub(crate) struct Line {
     pub(crate) divergence: Vec<Taps>,
 }
 
-impl Line {
+impl Operators1d {
     pub(crate) fn new(direction: &Direction) -> Self {
         let n = direction.cells;
         let cell_metric_m: Vec<f64> = (0..n).map(|k| direction.at(k as f64 + 0.5).1).collect();
@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn the_weighted_divergence_lets_no_flux_appear_inside() {
         for direction in every_kind() {
-            let line = Line::new(&direction);
+            let line = Operators1d::new(&direction);
             let columns = line.adjoint();
             let inner = if line.is_periodic() { 0..line.cells } else { 1..line.cells };
             for face in inner {
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn divergence_and_gradient_are_exact_for_parabolas_at_a_wall() {
-        let line = Line::new(&walls(24));
+        let line = Operators1d::new(&walls(24));
         let h = 2.0 / 24.0;
         let face: Vec<f64> = (0..=24).map(|i| h * f64::from(i)).collect();
         let square: Vec<f64> = face.iter().map(|z| z * z).collect();
@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn laplacians_are_symmetric_and_dissipate() {
         for direction in every_kind() {
-            let line = Line::new(&direction);
+            let line = Operators1d::new(&direction);
             let n = line.cells;
             for (rows, mass) in
                 [(line.laplacian_at_cells().0, &line.cell_mass_m), (line.laplacian_at_faces(), &line.face_mass_m)]
@@ -326,7 +326,7 @@ mod tests {
 
     /// Largest errors of the Laplacians of `cos` at the centres and `sin` at the faces, interior and all.
     fn errors(direction: &Direction) -> [f64; 2] {
-        let line = Line::new(direction);
+        let line = Operators1d::new(direction);
         let wave = std::f64::consts::PI;
         let centre: Vec<f64> = (0..line.cells).map(|k| direction.at(k as f64 + 0.5).0).collect();
         let face: Vec<f64> = (0..line.cells).map(|k| direction.at(k as f64).0).collect();
