@@ -8,7 +8,7 @@
 
 use crate::Error;
 use crate::solver::flow::Flow;
-use crate::solver::mesh::{AXIS_NAMES, Direction, Ends, Wall};
+use crate::solver::mesh::{AXIS_NAMES, Direction, Ends, Mesh, Wall};
 use crate::winds::axis::{Axis, Edges, GHOSTS, Ghost, Side};
 use crate::winds::grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh, ghost_places, ghost_value};
 
@@ -30,6 +30,14 @@ pub struct CrossPlane {
     pub y_edges: Edges,
     /// The same in z.
     pub z_edges: Edges,
+}
+
+impl CrossPlane {
+    fn at(x_m: f64, mesh: &Mesh, velocity_m_s: Vec<[f64; 3]>) -> Self {
+        let (y_m, z_m) = (mesh.centre_m(1), mesh.centre_m(2));
+        let [_, y, z] = mesh.directions();
+        Self { x_m, y_m, z_m, velocity_m_s, y_edges: edges(y), z_edges: edges(z) }
+    }
 }
 
 impl Flow {
@@ -69,15 +77,7 @@ impl Flow {
                 sum
             })
             .collect();
-        let [_, y, z] = mesh.directions();
-        Ok(CrossPlane {
-            x_m,
-            y_m: mesh.centre_m(1),
-            z_m: mesh.centre_m(2),
-            velocity_m_s,
-            y_edges: edges(y),
-            z_edges: edges(z),
-        })
+        Ok(CrossPlane::at(x_m, mesh, velocity_m_s))
     }
 
     /// The cross-plane at `x_m` \[m\] as a wind at the present time, with the walls and periods of the mesh.
@@ -102,16 +102,7 @@ impl Flow {
                 mean[component] = sum / along.length_m();
             }
         }
-        let x_m = 0.5 * (along.low_m + along.high_m);
-        let [_, y, z] = mesh.directions();
-        CrossPlane {
-            x_m,
-            y_m: mesh.centre_m(1),
-            z_m: mesh.centre_m(2),
-            velocity_m_s,
-            y_edges: edges(y),
-            z_edges: edges(z),
-        }
+        CrossPlane::at(0.5 * (along.low_m + along.high_m), mesh, velocity_m_s)
     }
 
     /// A plane of this flow as a wind.
@@ -169,7 +160,7 @@ fn nodes(direction: &Direction, centre_m: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::mesh::{Mapping, Mesh};
+    use crate::solver::mesh::Mapping;
     use crate::solver::settings::{FlowSettings, TimeStep};
     use crate::winds::Wind;
     use std::f64::consts::TAU;

@@ -21,6 +21,7 @@ mod operators_1d;
 mod pressure;
 mod projection;
 mod report;
+mod row_operator;
 mod rows;
 mod run;
 pub(crate) mod settings;

@@ -173,18 +173,12 @@ impl PressureSolver for Direct {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
         super::check_request(self.shape(), field, tolerance)?;
         let mut refinement = std::mem::take(&mut self.refinement);
-        let done = refinement.run(&self.operator, field, tolerance, |field, _, _| {
+        let solved = refinement.run(&self.operator, field, tolerance, "direct solver", |field, _, _| {
             self.solve_once(field);
             Pass(Vec::new())
         });
         self.refinement = refinement;
-        let done = done.map_err(|(history, reason)| Error::PressureNotSolved {
-            method: "direct solver",
-            tolerance,
-            reason,
-            history,
-        })?;
-        Ok(Solved { residual: done.residual, iterations: 0, factor: None, imbalance: done.imbalance })
+        solved
     }
 
     fn describe(&self) -> String {

@@ -8,8 +8,8 @@
 use multiversion::multiversion;
 
 use super::grid::{Axis, Weights};
+use super::lanes::{LANES, Lanes};
 use super::relax::{Scratch, Side, relax};
-use super::{LANES, Lanes};
 
 /// One mesh of the hierarchy: axis 1 is contiguous, axis 2 has its length as stride.
 #[derive(Debug)]

@@ -15,6 +15,7 @@
 mod cycle;
 mod grid;
 mod krylov;
+mod lanes;
 mod relax;
 
 use rayon::prelude::*;
@@ -30,13 +31,7 @@ use crate::Error;
 use cycle::Hierarchy;
 use grid::Axis;
 use krylov::Plane;
-
-/// Modes that are solved side by side.
-const LANES: usize = 16;
-/// One value of each mode, in the precision of the cycle.
-type Lanes = [f32; LANES];
-/// One value of each mode.
-type Wide = [f64; LANES];
+use lanes::{LANES, Wide};
 
 /// Part of the tolerance that is shared in proportion to the right side of each group of modes.
 const PROPORTIONAL: f64 = 0.99;
@@ -170,17 +165,11 @@ impl PressureSolver for Multigrid {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
         check_request(self.shape(), field, tolerance)?;
         let mut refinement = std::mem::take(&mut self.refinement);
-        let done = refinement
-            .run(&self.operator, field, tolerance, |field, size, tolerance| self.pass(field, size, tolerance));
+        let solved = refinement.run(&self.operator, field, tolerance, "multigrid", |field, size, tolerance| {
+            self.pass(field, size, tolerance)
+        });
         self.refinement = refinement;
-        let done = done.map_err(|(history, reason)| Error::PressureNotSolved {
-            method: "multigrid",
-            tolerance,
-            reason,
-            history,
-        })?;
-        let factor = (done.iterations > 0).then(|| done.residual.powf(1.0 / done.iterations as f64));
-        Ok(Solved { residual: done.residual, iterations: done.iterations, factor, imbalance: done.imbalance })
+        solved
     }
 
     fn describe(&self) -> String {

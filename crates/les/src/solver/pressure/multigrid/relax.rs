@@ -9,7 +9,7 @@
 use multiversion::multiversion;
 
 use super::grid::Axis;
-use super::{LANES, Lanes};
+use super::lanes::{LANES, Lanes};
 
 /// Lines that are solved together, to hide the delay of a division.
 const TOGETHER: usize = 4;
