@@ -71,11 +71,14 @@ fn an_impulsively_started_plate_is_followed_at_any_viscous_number() {
     // nu dt/h^2 reaches 1e4 at the wall; the ringing of Crank and Nicolson's scheme must decay, nothing may blow up.
     let plain = cases::Plates { cells: 64, strength: 2.5, viscosity_m2_s: 1.0, step_s: 0.01 }.rayleigh_plate().unwrap();
     // After four viscous times the profile is Couette's: 1 at z = -1, 0 at z = 1.
-    let steady = |case: &Case| profile_error(&run(case, 400), |z| 0.5 * (1.0 - z));
-    assert!(steady(&plain) < 1.0, "{}", steady(&plain));
+    let off = |case: &Case, steps: usize| profile_error(&run(case, steps), |z| 0.5 * (1.0 - z));
+    // Crank and Nicolson's scheme turns the sign of the stiffest wave in every step and takes off 4/(nu dt k^2) of it: by 3600
+    // steps at the 1.2e4 of the cell at the wall to about a third.
+    let (early, late) = (off(&plain, 400), off(&plain, 4000));
+    assert!(early < 1.0 && (0.1..0.7).contains(&(late / early)), "{early} {late}");
     let mut damped = plain;
     damped.settings.damped_steps = 4;
-    assert!(steady(&damped) < 1e-4, "{}", steady(&damped));
+    assert!(off(&damped, 400) < 1e-4, "{}", off(&damped, 400));
     let nu = 0.01;
     let flow = run(
         &cases::Plates { cells: 96, strength: 2.0, viscosity_m2_s: nu, step_s: 0.002 }.rayleigh_plate().unwrap(),

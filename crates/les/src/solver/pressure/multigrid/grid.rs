@@ -1,13 +1,14 @@
 //! The hierarchy of meshes of the two directions that multigrid treats, and what carries fields between them.
 //!
-//! Each mesh has the second-order operator `K u = sum of links times differences` with the masses of the fourth-order one:
-//! then the two have the same eigenvectors of long wavelength, and eigenvalues within a factor 1.37 everywhere. Coarse cells
+//! Each coarse mesh has the second-order operator `K u = sum of links times differences` with the masses of the fourth-order one:
+//! then the two have the same eigenvectors of long wavelength, and eigenvalues within a factor 1.37 everywhere; on the finest
+//! mesh the links serve the lines' own problems. Coarse cells
 //! are pairs; of an odd number the last stays alone. Lengths are in units of the mean cell, so that single precision holds
 //! any mesh.
 //!
 //! Check: interpolation of constants and of straight lines, masses, colours.
 
-use super::super::super::operators_1d::Operators1d;
+use super::super::super::operators_1d::{Operators1d, Taps};
 
 /// One direction of one mesh.
 #[derive(Debug, Clone)]
@@ -58,6 +59,14 @@ impl Axis {
     /// Number of cells.
     pub(crate) fn len(&self) -> usize {
         self.mass.len()
+    }
+
+    /// The cells linked to each cell and the links.
+    pub(crate) fn couplings(&self) -> Vec<Taps> {
+        let last = self.len() - 1;
+        let before = |i: usize| if i > 0 { (i - 1, self.link[i - 1]) } else { (last, self.link[last]) };
+        let behind = |i: usize| if i < last { (i + 1, self.link[i]) } else { (0, self.link[last]) };
+        (0..=last).map(|i| [before(i), behind(i)].into_iter().filter(|tap| tap.1 != 0.0).collect()).collect()
     }
 
     /// Whether the last cell is linked to the first.

@@ -3,8 +3,8 @@
 //! The transform along axis 0 leaves one problem in two dimensions for each mode. There, line relaxation in both directions
 //! with the transposed interpolation as restriction converges at the same rate for any stretching; in three dimensions it
 //! does not, because errors that are smooth along two strong couplings and rough along a weak third escape all lines. The
-//! cycle works on the second-order operator in single precision and preconditions flexible conjugate gradients on the
-//! fourth-order one.
+//! cycle works in single precision, with the fourth-order operator on the finest mesh and second-order ones on the others, and
+//! preconditions flexible conjugate gradients.
 //!
 //! Modes are solved 16 at a time, each group by one thread from beginning to end, till its share of the tolerance is reached:
 //! short waves take two or three iterations. Nothing is summed across groups but the report, in their order, so the result
@@ -82,8 +82,8 @@ impl Multigrid {
             weight: lanes(&|m| rows.weight(m, mean_mass)),
             rows,
             scale: -factor,
+            hierarchy: Hierarchy::new([Axis::new(first, unit_m), Axis::new(second, unit_m)], &plane.stiffness),
             plane,
-            hierarchy: Hierarchy::new([Axis::new(first, unit_m), Axis::new(second, unit_m)]),
             refinement: Refinement::default(),
         }
     }
