@@ -13,7 +13,7 @@ use rayon::prelude::*;
 mod project;
 
 use super::implicit::LineSolver;
-use super::layout::Layout;
+use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
 use super::momentum::{Momentum, Scratch};
 use super::pressure::{self, PressureSolver, Solved};
@@ -321,33 +321,17 @@ impl Flow {
         for (component, solver) in solvers {
             solver.solve(self.layout.shape, &mut self.work.star[*component]);
         }
-        let plane = self.layout.shape.plane();
         for (star, velocity) in self.work.star.iter_mut().zip(&self.state.velocity) {
-            star.par_chunks_mut(plane).zip(velocity.par_chunks(plane)).for_each(|(star, velocity)| {
-                for (star, velocity) in star.iter_mut().zip(velocity) {
-                    *star += velocity;
-                }
-            });
+            add_multiple(star, 1.0, velocity, self.layout.shape);
         }
     }
 
     /// (25), or the rotational form.
     fn update_pressure(&mut self) {
-        let plane = self.layout.shape.plane();
-        let phi = &self.work.phi;
-        self.state.pressure.par_chunks_mut(plane).zip(phi.par_chunks(plane)).for_each(|(p, phi)| {
-            for (p, phi) in p.iter_mut().zip(phi) {
-                *p += phi;
-            }
-        });
+        add_multiple(&mut self.state.pressure, 1.0, &self.work.phi, self.layout.shape);
         if self.settings.rotational {
-            let half = 0.5 * self.settings.viscosity_m2_s;
-            let divergence = &self.work.divergence;
-            self.state.pressure.par_chunks_mut(plane).zip(divergence.par_chunks(plane)).for_each(|(p, divergence)| {
-                for (p, divergence) in p.iter_mut().zip(divergence) {
-                    *p -= half * divergence;
-                }
-            });
+            let share_m2_s = -0.5 * self.settings.viscosity_m2_s;
+            add_multiple(&mut self.state.pressure, share_m2_s, &self.work.divergence, self.layout.shape);
         }
     }
 
@@ -365,6 +349,12 @@ impl Flow {
         }
         energy
     }
+}
+
+/// `to += factor from`, plane by plane.
+fn add_multiple(to: &mut [f64], factor: f64, from: &[f64], shape: Shape) {
+    let planes = to.par_chunks_mut(shape.plane()).zip(from.par_chunks(shape.plane()));
+    planes.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from));
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::flow::Flow;
 use super::layout::Layout;
-use super::mesh::{Ends, Mesh, Wall};
+use super::mesh::{Mesh, Wall};
 use super::settings::{FlowSettings, TimeScheme, TimeStep};
 use super::subgrid::SubgridModel;
 
@@ -62,7 +62,7 @@ impl UndampedGrowth {
         if courant == 0.0 || !courant.is_finite() {
             return None;
         }
-        let sticks = mesh.directions().iter().any(|d| walls(d.ends).iter().any(|w| matches!(w, Wall::NoSlip { .. })));
+        let sticks = mesh.directions().iter().any(|d| d.ends.no_slip() != [false; 2]);
         let transport = TRANSPORT[usize::from(sticks)];
         let cell_reynolds = worst / (courant_per_s.powi(3) * settings.viscosity_m2_s);
         let rate_per_s = largest_growth(transport, courant, courant / cell_reynolds) / step_s;
@@ -134,13 +134,6 @@ fn larger(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].max(b[0]), a[1].max(b[1])]
 }
 
-fn walls(ends: Ends) -> Vec<Wall> {
-    match ends {
-        Ends::Periodic => Vec::new(),
-        Ends::Walls { low, high } => vec![low, high],
-    }
-}
-
 /// Metrics of the cells, for the rates at which their flow carries waves.
 struct Rates {
     metric_m: [Vec<f64>; 3],
@@ -174,7 +167,7 @@ impl Rates {
     fn of_walls(&self, mesh: &Mesh) -> [f64; 2] {
         let smallest =
             self.metric_m.each_ref().map(|m| (0..m.len()).min_by(|&a, &b| m[a].total_cmp(&m[b])).unwrap_or(0));
-        mesh.directions().iter().flat_map(|d| walls(d.ends)).fold([0.0; 2], |worst, wall| match wall {
+        mesh.directions().iter().flat_map(|d| d.ends.walls()).fold([0.0; 2], |worst, wall| match wall {
             Wall::Slip => worst,
             Wall::NoSlip { velocity_m_s } => larger(worst, self.of(smallest, velocity_m_s)),
         })

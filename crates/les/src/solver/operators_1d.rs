@@ -10,7 +10,7 @@
 //!
 //! Check: column sums, adjointness, exactness for polynomials, order on stretched meshes.
 
-use super::mesh::{Direction, Ends, Wall};
+use super::mesh::{Direction, Ends};
 
 /// One weighted sum: indices and coefficients.
 pub(crate) type Taps = Vec<(usize, f64)>;
@@ -54,7 +54,7 @@ impl Operators1d {
         let face_metric_m: Vec<f64> = (0..=n).map(|k| direction.at(k as f64).1).collect();
         let mut cell_mass_m = cell_metric_m.clone();
         let mut face_mass_m = face_metric_m.clone();
-        let sticks = no_slip(direction.ends);
+        let sticks = direction.ends.no_slip();
         for (side, sticks) in sticks.into_iter().enumerate() {
             let inward = |i: usize, last: usize| if side == 0 { i } else { last - i };
             if sticks {
@@ -88,7 +88,7 @@ impl Operators1d {
 
     /// Whether the low and the high end are no-slip walls.
     pub(crate) fn no_slip(&self) -> [bool; 2] {
-        no_slip(self.ends)
+        self.ends.no_slip()
     }
 
     /// First stored face that carries a velocity: face 0 of a bounded direction is a wall.
@@ -182,14 +182,6 @@ fn nonzero(sums: &[f64]) -> Taps {
     sums.iter().enumerate().filter(|(_, c)| **c != 0.0).map(|(i, c)| (i, *c)).collect()
 }
 
-/// Whether the low and the high end are no-slip walls.
-fn no_slip(ends: Ends) -> [bool; 2] {
-    match ends {
-        Ends::Periodic => [false; 2],
-        Ends::Walls { low, high } => [low, high].map(|wall| matches!(wall, Wall::NoSlip { .. })),
-    }
-}
-
 /// One row of the weighted divergence.
 fn divergence_row(n: usize, ends: Ends, sticks: [bool; 2], k: usize) -> Taps {
     if n == 1 {
@@ -241,7 +233,7 @@ pub(crate) fn resolve_cell(n: usize, ends: Ends, index: isize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mesh::Mapping;
+    use super::super::mesh::{Mapping, Wall};
     use super::*;
 
     fn apply(rows: &[Taps], x: &[f64]) -> Vec<f64> {

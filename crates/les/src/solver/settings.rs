@@ -1,6 +1,6 @@
 //! What a simulation is told beside its mesh and its initial field.
 
-use super::mesh::{AXIS_NAMES, Ends, Mesh, Wall};
+use super::mesh::{AXIS_NAMES, Mesh};
 use super::pressure::PressureMethod;
 use super::subgrid::{self, SubgridModel};
 use crate::Error;
@@ -189,11 +189,7 @@ impl FlowSettings {
 
 /// Without viscosity nothing can stick to a wall.
 pub(super) fn refuse_sticking_without_viscosity(mesh: &Mesh, viscosity_m2_s: f64) -> Result<(), Error> {
-    let sticks = |ends: Ends| match ends {
-        Ends::Periodic => false,
-        Ends::Walls { low, high } => [low, high].iter().any(|w| matches!(w, Wall::NoSlip { .. })),
-    };
-    let found = (0..3).find(|&axis| sticks(mesh.directions()[axis].ends));
+    let found = (0..3).find(|&axis| mesh.directions()[axis].ends.no_slip() != [false; 2]);
     match found {
         Some(axis) if viscosity_m2_s == 0.0 => Err(Error::BadDirection {
             axis: AXIS_NAMES[axis],
