@@ -20,7 +20,7 @@ const MAP_COLUMNS: f64 = 25.0;
 const NUMBER_BYTES: f64 = 8.0;
 const TEXT_BYTES: f64 = 15.0;
 /// Program that drawing brings into memory, letters included.
-const DRAWING_BYTES: f64 = 1e6;
+const DRAWING_BYTES: f64 = 1.5e6;
 /// Pixels of the picture of a profile.
 const PROFILE_PIXELS: f64 = 1344.0 * 520.0;
 
@@ -50,11 +50,11 @@ impl Memory {
 
     /// A picture of so many pixels, with rasters of so many in it.
     fn picture(&mut self, [svg, png]: [bool; 2], pixels: f64, raster_pixels: f64) {
-        // Rasters are in the drawing, four bytes a pixel, and one at a time is coded or fitted; the painted picture has four, and
+        // Rasters are in the drawing, four bytes a pixel, and one at a time is coded or fitted, in growing buffers; the painted picture has four, and
         // one where its panels are cut out.
         let mask = if raster_pixels > 0.0 { 1.0 } else { 0.0 };
-        self.add(svg, raster_pixels * 0.5, raster_pixels * 4.0 * 1.2 + DRAWING_BYTES);
-        self.add(png, pixels * 0.2, raster_pixels * 4.0 * 1.2 + pixels * (4.0 + mask) + DRAWING_BYTES);
+        self.add(svg, raster_pixels * 0.5, raster_pixels * 4.0 * 1.5 + DRAWING_BYTES);
+        self.add(png, pixels * 0.2, raster_pixels * 4.0 * 1.5 + pixels * (4.0 + mask) + DRAWING_BYTES);
     }
 }
 
