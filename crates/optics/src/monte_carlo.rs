@@ -21,9 +21,9 @@ use rustfft::num_complex::Complex;
 use std::ops::ControlFlow;
 
 /// Realisations of one unit of work; their sums are added in order.
-const GROUP: usize = 8;
+pub(crate) const GROUP: usize = 8;
 /// Groups between two calls of the progress function (and two tests for the end).
-const GROUPS_PER_WAVE: usize = 8;
+pub(crate) const GROUPS_PER_WAVE: usize = 8;
 
 /// How realisations are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
