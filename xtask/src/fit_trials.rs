@@ -9,7 +9,7 @@ use crate::work_precision::measured;
 use crate::{Failure, Outcome};
 use wakescope_estimate::Error;
 use wakescope_estimate::vortex_fit::{
-    FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
+    CorePrior, FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
 };
 use wakescope_signal::NoiseModel;
 
@@ -144,14 +144,16 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth)?;
     let covariance = model.bound(&truth, Powers::default(), &of_signals, true)?;
     let bound: [f64; PARAMETERS] = std::array::from_fn(|i| covariance[[i, i]].sqrt());
-    let mut maps = [Fits::of("map, typical core"), Fits::of("map, one core fitted")];
+    let mut maps =
+        [Fits::of("map, core kept"), Fits::of("map, core about the typical one"), Fits::of("map, core fitted freely")];
     let mut signals = [Fits::of("signals"), Fits::of("signals, started at the truth")];
     let mut below = Vec::new();
     for scan in 0..options.scans as usize {
         let trial = FitTrial::new(&pair, scan)?;
         let mut guess = None;
-        for (fits, core) in maps.iter_mut().zip([Sharing::Fixed, Sharing::Common]) {
-            let (fit, cost) = measured(|| trial.map(free(core)))?;
+        let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
+        for (fits, (core, prior)) in maps.iter_mut().zip(cores) {
+            let (fit, cost) = measured(|| trial.map(free(core), prior))?;
             guess = guess.or(fits.map(scan, (fit, cost.cpu_s())).map(|fit| fit.wake));
         }
         let (false, Some(mut guess)) = (options.maps_only, guess) else { continue };

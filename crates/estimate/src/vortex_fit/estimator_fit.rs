@@ -74,18 +74,23 @@ pub fn refine_map_fit_of_estimator(
     let mut groups = &fit.groups;
     let mut wake = options.free.start(guess);
     let (mut turns, mut last, mut sigmas_left) = (0, [0.0; PARAMETERS], f64::INFINITY);
-    let mut slopes: Option<(Wake, Vec<Array2<f64>>)> = None;
+    let (mut slopes, mut prior): (Option<(Wake, Vec<Array2<f64>>)>, _) = (None, None);
     for step in 1..=STEPS {
         let here = prepared.velocities(model, &wake, map.elevation_rad);
         let known = slopes.take().filter(|(at, slopes)| near(at, &wake) && slopes.len() == groups.len());
+        let moved = known.is_none();
         let known = known.unwrap_or_else(|| {
             (wake, Tangent::slopes((&prepared, model), &wake, here.view(), groups, map.elevation_rad))
         });
         let tangent = Tangent::new((&prepared, model), wake, here.view(), &known.1, map);
         slopes = Some(known);
         let learnt = Some(&tangent.deviation);
-        let problem = Problem { learnt, ..fit.problem(groups, Expected::Shown(&tangent)) };
+        let mut problem = Problem { learnt, ..fit.problem(groups, Expected::Shown(&tangent)) };
         let scale = problem.scale(&wake)?;
+        if moved {
+            prior = fit.prior(&problem, &wake, scale);
+        }
+        problem.prior = prior;
         let next = problem.reweighted(wake, scale, fit.stop)?;
         let (from, to) = (wake.to_array(), next.to_array());
         let way: [f64; PARAMETERS] = std::array::from_fn(|i| to[i] - from[i]);

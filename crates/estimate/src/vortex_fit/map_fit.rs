@@ -8,6 +8,7 @@
 
 use ndarray::{Array2, ArrayView2};
 
+use super::core_prior::{CorePrior, is_core};
 use super::free::{FreeParameters, spread};
 use super::guess::first_guess;
 use super::map_problem::{Expected, Problem};
@@ -108,7 +109,7 @@ pub struct MapTop {
     /// The wake there.
     pub wake: Wake,
     /// Logarithm of the likelihood that the loss stands for, but for a constant; velocities that say the same as their neighbours
-    /// are counted once.
+    /// are counted once. With what is known of the cores.
     pub log_likelihood: f64,
 }
 
@@ -117,6 +118,8 @@ pub struct MapTop {
 pub struct MapFitOptions {
     /// What may change.
     pub free: FreeParameters,
+    /// What is known of the core radii that may change.
+    pub core_prior: Option<CorePrior>,
     /// What residuals cost.
     pub loss: Loss,
     /// Neighbouring lines that share windows: 2 rho over their distance for an accumulated map, 0 for independent lines.
@@ -128,10 +131,11 @@ pub struct MapFitOptions {
 }
 
 impl Default for MapFitOptions {
-    /// All parameters, the loss of Cauchy, 8 correlated lines, at most 200 evaluations, to 0.01 standard deviations.
+    /// All parameters, core radii as they typically are, the loss of Cauchy, 8 correlated lines, at most 200 evaluations, to 0.01 standard deviations.
     fn default() -> Self {
         Self {
             free: FreeParameters::default(),
+            core_prior: Some(CorePrior::TYPICAL),
             loss: Loss::Cauchy { width: 2.385 },
             correlated_lines: 8,
             max_iterations: 200,
@@ -211,6 +215,7 @@ pub fn refine_map_fit(
     let mut scale = problem.scale(&wake)?;
     let mut iterations = 0;
     for round in 0..ROUNDS {
+        problem.prior = fit.prior(&problem, &wake, scale);
         (wake, iterations) = match problem.descend(wake, scale, fit.stop) {
             // a core that the map does not resolve may run away to nothing: it keeps what the last round gave
             Err(Error::NotConverged { .. }) if round > 0 && coreless.len() < problem.groups.len() => {
@@ -245,6 +250,7 @@ impl<'a, 'm> Fit<'a, 'm> {
     ) -> Result<Self, Error> {
         let used = map.validate()?;
         guess.validate()?;
+        options.core_prior.as_ref().map_or(Ok(()), CorePrior::validate)?;
         let groups = options.free.groups();
         let needed = 10 * groups.len().max(1);
         if used < needed {
@@ -259,7 +265,14 @@ impl<'a, 'm> Fit<'a, 'm> {
     }
 
     pub(super) fn problem<'p>(&'p self, groups: &'p [Vec<usize>], expected: Expected<'p>) -> Problem<'p, 'm> {
-        Problem { map: self.map, model: self.model, expected, groups, loss: self.options.loss, learnt: None }
+        let (map, model, loss) = (self.map, self.model, self.options.loss);
+        Problem { map, model, expected, groups, loss, learnt: None, prior: None }
+    }
+
+    /// What is known of the cores, if any may change, and how often it counts.
+    pub(super) fn prior(&self, problem: &Problem<'_, '_>, wake: &Wake, scale: f64) -> Option<(CorePrior, f64)> {
+        let known = self.options.core_prior.filter(|_| problem.groups.iter().any(|group| is_core(group)))?;
+        Some((known, problem.alike(wake, scale, self.options.correlated_lines)))
     }
 
     /// Whether the model exists there: with images, above the ground only.
@@ -293,11 +306,6 @@ impl<'a, 'm> Fit<'a, 'm> {
             tops: vec![MapTop { wake, log_likelihood: problem.log_likelihood(&wake, scale) / alike }],
         })
     }
-}
-
-/// Whether a free number moves core radii.
-pub(super) fn is_core(group: &[usize]) -> bool {
-    group.iter().all(|&place| place == Parameter::LeftCore as usize || place == Parameter::RightCore as usize)
 }
 
 /// Median of the numbers, which are reordered; NaN if there are none.

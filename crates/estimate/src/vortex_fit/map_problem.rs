@@ -4,10 +4,11 @@
 
 use ndarray::{Array1, Array2};
 
+use super::core_prior::CorePrior;
 use super::free::{gathered, moved};
 use super::map_fit::{Loss, VelocityMap, median};
 use super::range_kernel::{LineScratch, RangeKernel};
-use super::residual_covariance::{Cell, filling};
+use super::residual_covariance::{Cell, alike, filling};
 use super::small::{Normal, Stop, descend, inverse, solve};
 use super::tangent::Tangent;
 use super::wake::{PARAMETERS, Parameter, Ray, Wake, WakeModel};
@@ -35,6 +36,9 @@ pub(super) struct Problem<'a, 'm> {
     pub(super) loss: Loss,
     /// Standard deviations beyond those of the map.
     pub(super) learnt: Option<&'a Array2<f64>>,
+    /// What is known of cores, and the number of velocities that count as one: as the losses of all of them are added up, so
+    /// many times it must count.
+    pub(super) prior: Option<(CorePrior, f64)>,
 }
 
 /// Sums over one line.
@@ -192,7 +196,32 @@ impl Problem<'_, '_> {
             normal.curvature += &sums.weighted;
         }
         mirror(&mut normal.curvature);
+        for (away, slope, weight) in self.known(wake) {
+            normal.cost += 0.5 * weight * away * away;
+            normal.gradient.iter_mut().zip(&slope).for_each(|(n, s)| *n += weight * away * s);
+            add_square(&mut normal.curvature, &slope, weight);
+        }
         Some(normal)
+    }
+
+    /// Terms of what is known before: distance in deviations, its slopes, how often it counts.
+    fn known(&self, wake: &Wake) -> Vec<(f64, Vec<f64>, f64)> {
+        let Some((prior, weight)) = self.prior else { return Vec::new() };
+        let at = match self.expected {
+            Expected::Means(_) => wake,
+            Expected::Shown(tangent) => &tangent.at,
+        };
+        let (from, to) = (at.to_array(), wake.to_array());
+        let term = |(away, slope): (f64, Vec<f64>)| {
+            let moved: f64 = self.groups.iter().zip(&slope).map(|(group, s)| s * (to[group[0]] - from[group[0]])).sum();
+            (away + moved, slope, weight)
+        };
+        prior.terms(at, self.groups).into_iter().map(term).collect()
+    }
+
+    /// Number of velocities that count as one.
+    pub(super) fn alike(&self, wake: &Wake, scale: f64, correlated: usize) -> f64 {
+        alike(&self.lines(|line, scratch| self.line_cells(wake, scale, line, scratch)), correlated)
     }
 
     /// The sandwich, with residuals of lines up to `correlated` apart taken together, and the number of velocities that count
@@ -207,7 +236,12 @@ impl Problem<'_, '_> {
         mirror(&mut bread);
         mirror(&mut weighted);
         let cells = self.lines(|line, scratch| self.line_cells(wake, scale, line, scratch));
-        let (filling, alike) = filling(&cells, order, correlated);
+        let (mut filling, alike) = filling(&cells, order, correlated);
+        for (_, slope, weight) in self.known(wake) {
+            add_square(&mut bread, &slope, weight);
+            add_square(&mut weighted, &slope, weight);
+            add_square(&mut filling, &slope, weight * weight);
+        }
         // with many outliers the second derivatives need not be positive: their weights are, and are larger
         let bread = inverse("curvature of the fit", &bread).or_else(|_| inverse("curvature of the fit", &weighted))?;
         Ok((bread.dot(&filling).dot(&bread), alike))
@@ -228,7 +262,8 @@ impl Problem<'_, '_> {
         cells
     }
 
-    /// ln p of the residuals but for a constant, as if all were independent: losses and logarithms of the deviations.
+    /// ln p of the residuals but for a constant, as if all were independent: losses and logarithms of the deviations; with what is
+    /// known of cores as often as it counts.
     pub(super) fn log_likelihood(&self, wake: &Wake, scale: f64) -> f64 {
         let lines = self.lines(|line, scratch| {
             let mut sum = 0.0;
@@ -240,7 +275,8 @@ impl Problem<'_, '_> {
             });
             sum
         });
-        lines.iter().sum()
+        let known: f64 = self.known(wake).iter().map(|(away, _, weight)| 0.5 * weight * away * away).sum();
+        lines.iter().sum::<f64>() - known
     }
 
     /// The best wind without vortices.
@@ -252,10 +288,15 @@ impl Problem<'_, '_> {
         if groups.is_empty() {
             return Some(calm);
         }
-        let wind = Problem { groups: &groups, ..*self };
+        let wind = Problem { groups: &groups, prior: None, ..*self };
         let step = |wake: &Wake, step: &[f64]| moved(&groups, wake, step);
         descend(calm, stop, |wake| wind.normal(wake, scale, false), step).ok().map(|(calm, _, _)| calm)
     }
+}
+
+/// a += weight v v^T.
+fn add_square(a: &mut Array2<f64>, v: &[f64], weight: f64) {
+    a.indexed_iter_mut().for_each(|((i, j), a)| *a += weight * v[i] * v[j]);
 }
 
 /// Copies the lower triangle to the upper one.

@@ -37,6 +37,7 @@
 mod ascent;
 mod band;
 mod baseband;
+mod core_prior;
 mod estimator_fit;
 mod estimator_response;
 mod free;
@@ -58,6 +59,7 @@ mod wake;
 mod wake_map;
 
 pub use baseband::Baseband;
+pub use core_prior::CorePrior;
 pub use estimator_fit::{fit_map_of_estimator, refine_map_fit_of_estimator};
 pub use estimator_response::EstimatorResponse;
 pub use free::{FreeParameters, Sharing, WindFit};

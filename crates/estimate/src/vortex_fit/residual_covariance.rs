@@ -26,41 +26,72 @@ pub(super) struct Cell {
 /// Correlations below this part do not count.
 const LEAST: f64 = 0.05;
 
+/// Correlation of the residuals with those of their neighbours.
+struct Correlation {
+    /// Mean square of the residuals.
+    variance: f64,
+    /// (lines, gates, correlation) of the distances that count, of each pair of opposite ones one; itself first.
+    at: Vec<(i64, i64, f64)>,
+}
+
+impl Correlation {
+    /// Of cells \[line\]\[gate\] with nothing where a velocity is missing; it reaches over at most so many `lines`.
+    fn new(field: &Field<'_>, lines: usize) -> Option<Self> {
+        let (count, gates) = (field.cells.len() as i64, field.gates);
+        let variance = field.correlation(0, 0)?;
+        let share = |line: i64, gate: i64| field.correlation(line, gate).map_or(0.0, |c| c / variance);
+        let last = |most: i64, of: &dyn Fn(i64) -> f64| (1..=most).find(|&k| of(k) < LEAST).map_or(most, |k| k - 1);
+        let last_line = last((lines as i64).min(count / 3), &|m| share(m, 0));
+        let last_gate = last(gates / 3, &|k| share(0, k));
+        let mut at = Vec::new();
+        for line in 0..=last_line {
+            for gate in if line == 0 { 0 } else { -last_gate }..=last_gate {
+                let c = share(line, gate);
+                if c.abs() >= LEAST {
+                    at.push((line, gate, c));
+                }
+            }
+        }
+        Some(Self { variance, at })
+    }
+
+    /// Number of cells that count as one.
+    fn alike(&self) -> f64 {
+        self.at.iter().map(|&(line, gate, c)| both(line, gate) * c).sum::<f64>().max(1.0)
+    }
+}
+
+/// Distances that a stored one stands for.
+fn both(line: i64, gate: i64) -> f64 {
+    if line == 0 && gate == 0 { 1.0 } else { 2.0 }
+}
+
+/// Number of cells \[line\]\[gate\] that count as one.
+pub(super) fn alike(cells: &[Vec<Option<Cell>>], lines: usize) -> f64 {
+    Correlation::new(&Field::new(cells), lines).map_or(1.0, |correlation| correlation.alike())
+}
+
 /// Sum over all pairs of cells of C j j^T, with cells \[line\]\[gate\] and nothing where a velocity is missing, and the number of
 /// cells that count as one; correlation reaches over at most so many `lines`.
 pub(super) fn filling(cells: &[Vec<Option<Cell>>], order: usize, lines: usize) -> (Array2<f64>, f64) {
-    let gates = cells.first().map_or(0, Vec::len);
-    let field = Field { cells, gates: gates as i64 };
-    let Some(variance) = field.correlation(0, 0) else { return (Array2::zeros((order, order)), 1.0) };
-    let share = |line: i64, gate: i64| field.correlation(line, gate).map_or(0.0, |c| c / variance);
-    let last = |most: i64, of: &dyn Fn(i64) -> f64| (1..=most).find(|&k| of(k) < LEAST).map_or(most, |k| k - 1);
-    let most_lines = (lines as i64).min(cells.len() as i64 / 3);
-    let (last_line, last_gate) = (last(most_lines, &|m| share(m, 0)), last(gates as i64 / 3, &|k| share(0, k)));
+    let field = Field::new(cells);
     let mut filling = Array2::<f64>::zeros((order, order));
-    let mut sum = 0.0;
-    for line in 0..=last_line {
-        // of each pair of opposite distances one
-        let from = if line == 0 { 0 } else { -last_gate };
-        for gate in from..=last_gate {
-            let c = share(line, gate);
-            if c.abs() < LEAST {
-                continue;
-            }
-            let both = if line == 0 && gate == 0 { 1.0 } else { 2.0 };
-            sum += both * c;
-            field.pairs(line, gate, |a, b| {
-                for (i, x) in a.slopes.iter().enumerate() {
-                    for (j, y) in b.slopes.iter().enumerate() {
-                        filling[[i, j]] += 0.5 * both * c * x * y;
-                        filling[[j, i]] += 0.5 * both * c * x * y;
-                    }
+    let Some(correlation) = Correlation::new(&field, lines) else { return (filling, 1.0) };
+    for &(line, gate, c) in &correlation.at {
+        let weight = 0.5 * both(line, gate) * c;
+        field.pairs(line, gate, |a, b| {
+            for (i, x) in a.slopes.iter().enumerate() {
+                for (j, y) in b.slopes.iter().enumerate() {
+                    filling[[i, j]] += weight * x * y;
+                    filling[[j, i]] += weight * x * y;
                 }
-            });
-        }
+            }
+        });
     }
-    let independent = cells.iter().flatten().flatten().count() as f64 / sum.max(1.0);
+    let alike = correlation.alike();
+    let independent = cells.iter().flatten().flatten().count() as f64 / alike;
     let given_back = independent / (independent - order as f64).max(1.0);
-    (filling * (variance * given_back), sum.max(1.0))
+    (filling * (correlation.variance * given_back), alike)
 }
 
 /// Cells of a map.
@@ -69,7 +100,11 @@ struct Field<'a> {
     gates: i64,
 }
 
-impl Field<'_> {
+impl<'a> Field<'a> {
+    fn new(cells: &'a [Vec<Option<Cell>>]) -> Self {
+        Self { cells, gates: cells.first().map_or(0, Vec::len) as i64 }
+    }
+
     /// All pairs of cells that far apart.
     fn pairs(&self, line: i64, gate: i64, mut take: impl FnMut(&Cell, &Cell)) {
         let line = line as usize;

@@ -229,11 +229,10 @@ impl WakeModel {
 
     /// (vortex, index of its circulation, y, z and core, height of the centre over its sign, sense of turning).
     fn sources<'w>(&self, wake: &'w Wake) -> impl Iterator<Item = (&'w Vortex, [usize; 4], f64, f64)> + use<'w> {
-        let vortices = [(&wake.left, [0, 2, 3, 6], -1.0), (&wake.right, [1, 4, 5, 7], 1.0)];
-        let images = if self.images { 2 } else { 1 };
-        vortices.into_iter().flat_map(move |(vortex, places, sense)| {
-            [(vortex, places, 1.0, sense), (vortex, places, -1.0, -sense)].into_iter().take(images)
-        })
+        let (left, right, images) = ((&wake.left, [0, 2, 3, 6]), (&wake.right, [1, 4, 5, 7]), self.images);
+        let of = move |((vortex, places), side, sense)| (vortex, places, side, sense);
+        let all = [(left, 1.0, -1.0), (left, -1.0, 1.0), (right, 1.0, 1.0), (right, -1.0, -1.0)];
+        all.into_iter().filter(move |source| images || source.1 > 0.0).map(of)
     }
 
     pub(super) fn velocity_on(&self, wake: &Wake, range_m: f64, ray: Ray) -> f64 {
