@@ -6,7 +6,7 @@ use wakescope_estimate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFitOptions, PulseShape, RangeKernel, ScanSetup, Sharing, SignalFitOptions,
     VelocityMap, Wake, WakeModel, fit_map_of_estimator, fit_signals,
 };
-use wakescope_estimate::*;
+use wakescope_estimate::{Correlogram, Error, bound::*, estimators::*, map::*, window::*};
 use wakescope_les::{CirculationProfile, Ground, Motion, Sum, VortexPair, Wind};
 use wakescope_signal::NoiseModel;
 

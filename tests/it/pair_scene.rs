@@ -4,7 +4,7 @@
 use ndarray::Array2;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
-use wakescope_estimate::*;
+use wakescope_estimate::{map::*, window::*};
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::{
     GaussianPulse, LineOfSight, NoiseModel, PlanckConvention, PulseDuration, RangeFilter, Receiver, Record, Simulator,

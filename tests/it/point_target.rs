@@ -3,7 +3,8 @@
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use wakescope_estimate::{
-    Correlogram, Estimator, Noise, Sampling, Scratch, SignalKind, SpectralPeak, Statistic, Weighting, WindowModel,
+    Correlogram, Estimator, Sampling, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
+    bound::{Noise, WindowModel},
 };
 use wakescope_signal::{
     GaussianPulse, LineOfSight, NoiseModel, PlanckConvention, PulseDuration, Receiver, Record, Simulator,

@@ -2,7 +2,7 @@
 //! pulse and window.
 
 use crate::pair_scene::{Scene, WINDOW};
-use wakescope_estimate::*;
+use wakescope_estimate::{Correlogram, Scratch, SignalKind, Weighting, estimators::*, map::*};
 use wakescope_les::{CirculationProfile, Ground, Motion, Sum, Uniform, VortexPair, Wind};
 use wakescope_signal::NoiseModel;
 

@@ -6,8 +6,9 @@ use crate::Failure;
 use crate::trials::methods::WINDOW;
 use crate::trials::pair::PairScan;
 use wakescope_estimate::{
-    AutoregressivePeak, Correlogram, Estimator, LagWindowPeak, PolarPoint, Refinement, SignalKind, SpectralPeak,
-    Weighting,
+    Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Weighting,
+    estimators::{AutoregressivePeak, LagWindowPeak},
+    map::PolarPoint,
 };
 use wakescope_signal::NoiseModel;
 use wakescope_sim::export::Table;

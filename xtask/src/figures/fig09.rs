@@ -2,7 +2,7 @@
 
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
-use wakescope_estimate::{PolarPoint, ScanGeometry, WindowCorrelation};
+use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use wakescope_sim::export::Table;
 use wakescope_sim::geometry::Geometry;
 use wakescope_sim::join;

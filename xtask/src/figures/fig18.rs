@@ -6,7 +6,10 @@ use crate::trials::methods::{Known, WINDOW};
 use crate::trials::mixture::{Mixture, mixture};
 use crate::trials::uniform::{Air, BAND_M_S, errors};
 use crate::trials::{noise_name, sampling};
-use wakescope_estimate::{Noise, SignalKind, WindowModel};
+use wakescope_estimate::{
+    SignalKind,
+    bound::{Noise, WindowModel},
+};
 use wakescope_signal::NoiseModel;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};

@@ -5,11 +5,13 @@ use super::pair::PairScan;
 use crate::Failure;
 use ndarray::{Array2, ArrayView2};
 use wakescope_estimate::vortex_fit::{
-    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, SignalFit, SignalFitOptions, Starts, VelocityMap, Wake,
-    fit_map_of_estimator, fit_signals,
+    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, SignalFit, SignalFitOptions, Starts,
+    VelocityMap, Wake, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
-    Correlogram, Error, Noise, Refinement, SignalKind, SpectralPeak, WindowModel, likelihood_tapers,
+    Correlogram, Error, Refinement, SignalKind, SpectralPeak,
+    bound::{Noise, WindowModel},
+    estimators::likelihood_tapers,
 };
 
 /// Radius of the regions of the maps \[m\].
@@ -35,7 +37,11 @@ impl<'a> FitTrial<'a> {
     }
 
     /// The fit of the map, with nothing known but what typical cores are.
-    pub(crate) fn map(&self, free: FreeParameters, core_prior: Option<CorePrior>) -> Result<Result<MapFit, Error>, Failure> {
+    pub(crate) fn map(
+        &self,
+        free: FreeParameters,
+        core_prior: Option<CorePrior>,
+    ) -> Result<Result<MapFit, Error>, Failure> {
         let (pair, setup) = (self.pair, self.pair.setup()?);
         let map = VelocityMap {
             elevation_rad: &pair.elevation_rad,

@@ -11,8 +11,8 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use wakescope_estimate::vortex_fit::{PulseShape, ScanSetup, Vortex, Wake, WakeModel};
 use wakescope_estimate::{
-    Estimator, Gates, Noise, PolarPoint, Radius, SPEED_OF_LIGHT_M_S, Sampling, Scan, SignalKind, Statistic,
-    polar_points,
+    Estimator, Gates, Radius, Sampling, Scan, SignalKind, Statistic, bound::Noise, map::PolarPoint, polar_points,
+    window::SPEED_OF_LIGHT_M_S,
 };
 use wakescope_les::{CirculationProfile, Ground, Motion, Sum, Uniform, VortexPair, Wind};
 use wakescope_signal::{

@@ -12,8 +12,9 @@ use crate::trials::pair::PairScan;
 use crate::trials::sampling;
 use crate::trials::uniform::{Air, BAND_M_S};
 use wakescope_estimate::{
-    AutoregressivePeak, CaponPeak, Correlogram, Estimator, FirstMoment, GradientLikelihood, GradientModel,
-    LagWindowPeak, Noise, Refinement, Scratch, SignalKind, SpectralPeak, Statistic, Weighting, WindowModel,
+    Correlogram, Estimator, Refinement, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
+    bound::{GradientModel, Noise, WindowModel},
+    estimators::{AutoregressivePeak, CaponPeak, FirstMoment, GradientLikelihood, LagWindowPeak},
 };
 use wakescope_signal::NoiseModel;
 
