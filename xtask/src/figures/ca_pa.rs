@@ -1,10 +1,11 @@
 //! The chapter's claim that CA errs less than PA, measured against signal-to-noise ratio, radius of the region and
 //! duration of the pulse.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::trials::methods::WINDOW;
-use crate::trials::pair::PairScan;
+use crate::claim::{Claim, Verdict};
+use fixtures::WINDOW;
+use fixtures::pair::PairScan;
 use wakescope_estimate::{
     Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Weighting,
     estimators::{AutoregressivePeak, LagWindowPeak},

@@ -1,9 +1,10 @@
 //! Figure 17: circulation and positions of the vortices, retrieved from maps and from all raw signals, against the truth.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use crate::trials::fits::{FitTrial, RADIUS_M};
-use crate::trials::pair::{CIRCULATION_M2_S, PairScan, truth};
+use fixtures::pair::{CIRCULATION_M2_S, PairScan, truth};
 use ndarray::Array2;
 use rayon::prelude::*;
 use wakescope_estimate::vortex_fit::{CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake};

@@ -9,10 +9,10 @@
 use ndarray::Array2;
 use num_complex::Complex;
 
-use crate::bound::window_model::{Noise, information_complex, information_real, turned, with_floor_named};
+use crate::bound::window_model::{turned, with_floor_named};
+use crate::bound::{Noise, information_complex, information_real};
 use crate::error::{Error, finite, positive};
-use crate::window::sampling::{SPEED_OF_LIGHT_M_S, Sampling};
-use crate::window::signal_kind::SignalKind;
+use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 
 /// Second-order model of a window of a Gaussian pulse in a wind with a constant gradient along the line of sight.
 #[derive(Debug, Clone)]

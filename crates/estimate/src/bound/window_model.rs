@@ -11,8 +11,7 @@ use num_complex::Complex;
 
 use crate::error::{Error, length, positive};
 use crate::linalg;
-use crate::window::sampling::Sampling;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{Sampling, SignalKind};
 
 /// Bound on the standard deviation of velocity \[m/s\] from one or more independent circular complex windows.
 ///

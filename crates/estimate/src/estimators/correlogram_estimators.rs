@@ -6,13 +6,9 @@
 use num_complex::Complex;
 
 use crate::error::Error;
-use crate::estimators::peak::SpectralPeak;
-use crate::estimators::statistic::Estimator;
-use crate::estimators::velocity::{GateVelocity, Quality, Refinement};
+use crate::estimators::{Estimator, GateVelocity, Quality, Refinement, SpectralPeak};
 use crate::models::autoregressive::check_order;
-use crate::window::sampling::Sampling;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Peak of the transform of the accumulated correlogram times a Hann lag window (Blackman and Tukey 1958).
 #[derive(Clone)]

@@ -19,10 +19,9 @@ use num_complex::Complex;
 
 use crate::error::{Error, positive};
 use crate::estimators::gamma_functions::{gamma_tail, ln_gamma};
-use crate::map::region::WindowCorrelation;
-use crate::spectrum::correlogram::Taper;
-use crate::window::gates::Gates;
-use crate::window::sampling::Sampling;
+use crate::map::WindowCorrelation;
+use crate::spectrum::Taper;
+use crate::window::{Gates, Sampling};
 
 /// Distances between windows at which the correlation of their densities is computed; between them it is linear.
 const DISTANCES: usize = 48;
@@ -192,7 +191,7 @@ fn between(places: &[usize], values: &[f64], at: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::window::weighting::Weighting;
+    use crate::window::Weighting;
 
     fn table_2() -> Sampling {
         Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap()

@@ -11,14 +11,8 @@
 //! 0.2 m/s in a vortex and halves that. The book has the numbers.
 
 use crate::error::{Error, positive};
-use crate::estimators::correlogram_estimators::LagWindowPeak;
-use crate::estimators::peak::SpectralPeak;
-use crate::estimators::search;
-use crate::estimators::statistic::Estimator;
-use crate::estimators::velocity::{GateVelocity, Quality, Refinement};
-use crate::window::sampling::Sampling;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::estimators::{Estimator, GateVelocity, LagWindowPeak, Quality, Refinement, SpectralPeak, search};
+use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Iterations of the window about the centroid.
 const ITERATIONS: usize = 6;

@@ -19,20 +19,13 @@ use ndarray::Array2;
 use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
-use crate::bound::gradient::GradientModel;
-use crate::bound::window_model::Noise;
+use crate::bound::{GradientModel, Noise};
 use crate::error::{Error, finite, positive};
-use crate::estimators::detection::NoiseTest;
 use crate::estimators::gradient_tapers::{Tapers, band_lag, expected_lags, tapers};
 use crate::estimators::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
-use crate::estimators::statistic::{Estimator, Statistic};
-use crate::estimators::velocity::{GateVelocity, Quality, Refinement};
-use crate::spectrum::zoom::ZoomSpectrum;
-use crate::window::gates::Gates;
-use crate::window::sample::Sample;
-use crate::window::sampling::Sampling;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::estimators::{Estimator, GateVelocity, NoiseTest, Quality, Refinement, Statistic};
+use crate::spectrum::ZoomSpectrum;
+use crate::window::{Gates, Sample, Sampling, Scratch, SignalKind};
 
 type C64 = Complex<f64>;
 

@@ -6,11 +6,10 @@
 use ndarray::Array2;
 use num_complex::Complex;
 
-use crate::bound::gradient::GradientModel;
+use crate::bound::GradientModel;
 use crate::error::Error;
 use crate::linalg::hermitian_eigen;
-use crate::window::sampling::Sampling;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{Sampling, SignalKind};
 
 type C64 = Complex<f64>;
 

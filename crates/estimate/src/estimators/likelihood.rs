@@ -6,10 +6,10 @@
 //! accumulates over windows like any other. Nothing is inverted, so any SNR is safe. Check: the
 //! quadratic form itself, and the standard deviation of its estimates against the Cramer-Rao bound.
 
-use crate::bound::window_model::WindowModel;
+use crate::bound::WindowModel;
 use crate::error::{Error, positive};
 use crate::linalg::hermitian_eigen;
-use crate::spectrum::correlogram::Taper;
+use crate::spectrum::Taper;
 
 /// Tapers with less than this share of the largest weight are left out.
 const LEAST_WEIGHT: f64 = 1e-3;

@@ -8,13 +8,11 @@
 
 use crate::error::Error;
 use crate::estimators::search::{PeakSearch, unusable};
-use crate::estimators::statistic::Estimator;
-use crate::estimators::velocity::{GateVelocity, Quality, Refinement};
-use crate::models::autoregressive::{Autoregression, OrderChoice, check_order};
-use crate::spectrum::zoom::ZoomSpectrum;
-use crate::window::sampling::Sampling;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::estimators::{Estimator, GateVelocity, Quality, Refinement};
+use crate::models::autoregressive::check_order;
+use crate::models::{Autoregression, OrderChoice};
+use crate::spectrum::ZoomSpectrum;
+use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Which spectrum a model is read by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

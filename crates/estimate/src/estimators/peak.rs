@@ -6,13 +6,9 @@
 
 use crate::error::{Error, length};
 use crate::estimators::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
-use crate::estimators::statistic::Estimator;
-use crate::estimators::velocity::{GateVelocity, Quality, Refinement};
-use crate::spectrum::lag_spectrum::{LagSpectrum, density_at};
-use crate::spectrum::zoom::ZoomSpectrum;
-use crate::window::sampling::Sampling;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::estimators::{Estimator, GateVelocity, Quality, Refinement};
+use crate::spectrum::{LagSpectrum, ZoomSpectrum, density_at};
+use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Highest peak of the spectrum of an accumulated correlogram inside the detector band.
 ///

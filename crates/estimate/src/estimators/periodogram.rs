@@ -6,16 +6,10 @@
 //! [`PeriodogramOptions::literal`] does neither and stays on a grid of 3 m/s, as the equations are printed.
 
 use crate::error::{Error, length};
-use crate::estimators::peak::SpectralPeak;
-use crate::estimators::statistic::estimate_window;
-use crate::estimators::velocity::{GateVelocity, Refinement};
-use crate::spectrum::correlogram::Correlogram;
+use crate::estimators::{GateVelocity, Refinement, SpectralPeak, estimate_window};
+use crate::spectrum::Correlogram;
 use crate::spectrum::transform::WindowTransform;
-use crate::window::sample::Sample;
-use crate::window::sampling::Sampling;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
-use crate::window::weighting::Weighting;
+use crate::window::{Sample, Sampling, Scratch, SignalKind, Weighting};
 
 /// Choices of the periodogram estimator.
 #[derive(Debug, Clone, Copy, PartialEq)]

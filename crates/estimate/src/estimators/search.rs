@@ -4,10 +4,9 @@
 //! out-of-band signals are flagged; width and SNR of simulated wind (in the tests of the estimators).
 
 use crate::error::Error;
-use crate::estimators::velocity::{GateVelocity, Quality, Refinement, RunnerUp};
+use crate::estimators::{GateVelocity, Quality, Refinement, RunnerUp};
 use crate::spectrum::lag_spectrum::Band;
-use crate::window::sampling::Sampling;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{Sampling, SignalKind};
 
 /// Below this fraction of the highest density outside, the band may hold nothing but sidelobes: the
 /// first sidelobe of an unweighted window is 0.047 of its main lobe.

@@ -5,10 +5,8 @@
 //! Check: the mean over a region equals the mean of the statistics of its windows.
 
 use crate::error::{Error, length};
-use crate::estimators::velocity::{GateVelocity, Quality};
-use crate::window::missing::MissingSamples;
-use crate::window::sample::Sample;
-use crate::window::scratch::Scratch;
+use crate::estimators::{GateVelocity, Quality};
+use crate::window::{MissingSamples, Sample, Scratch};
 
 /// Numbers drawn from one window, to be averaged over windows: I_k of Table 3.
 pub trait Statistic<S: Sample>: Sync {

@@ -8,10 +8,8 @@
 //! over noise of known covariance; how often a model fails.
 
 use crate::error::{Error, length};
-use crate::estimators::statistic::Estimator;
-use crate::estimators::velocity::GateVelocity;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::estimators::{Estimator, GateVelocity};
+use crate::window::{Scratch, SignalKind};
 
 /// The unbiased correlogram that belongs to a biased one (both stored as [`SignalKind::lag_numbers`] says).
 ///

@@ -13,16 +13,11 @@ use ndarray::ArrayView2;
 use num_complex::Complex;
 
 use crate::error::{Error, length};
-use crate::estimators::statistic::{Estimator, Statistic};
-use crate::estimators::velocity::{GateVelocity, Quality};
-use crate::map::region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, effective};
+use crate::estimators::{Estimator, GateVelocity, Quality, Statistic};
+use crate::map::region::effective;
+use crate::map::{Chord, PolarPoint, ScanGeometry, WindowCorrelation};
 use crate::parallel::map_indexed;
-use crate::window::gates::Gates;
-use crate::window::missing::MissingSamples;
-use crate::window::sample::Sample;
-use crate::window::sampling::Sampling;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{Gates, MissingSamples, Sample, Sampling, Scratch, SignalKind};
 
 mod streamed;
 

@@ -6,8 +6,7 @@
 //! not by much more; the radius grows with range.
 
 use crate::error::{Error, positive};
-use crate::map::accumulate::Radius;
-use crate::map::region::{PolarPoint, ScanGeometry, WindowCorrelation};
+use crate::map::{PolarPoint, Radius, ScanGeometry, WindowCorrelation};
 
 /// Bisections of the radius: to a thousandth of the largest.
 const BISECTIONS: usize = 10;

@@ -6,8 +6,7 @@
 
 use crate::error::{Error, length};
 use crate::map::rays::{Rays, check_angles};
-use crate::window::gates::Gates;
-use crate::window::sampling::Sampling;
+use crate::window::{Gates, Sampling};
 
 /// A place in the scan plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -293,7 +292,7 @@ impl WindowCorrelation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::window::weighting::Weighting;
+    use crate::window::Weighting;
     use approx::assert_relative_eq;
 
     fn sampling() -> Sampling {

@@ -14,10 +14,7 @@ use num_complex::Complex;
 use crate::error::Error;
 use crate::models::levinson::reflect;
 use crate::models::poles::roots;
-use crate::window::missing::MissingSamples;
-use crate::window::sample::Sample;
-use crate::window::sampling::Sampling;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{MissingSamples, Sample, Sampling, SignalKind};
 
 /// How the order of a model is found, from the prediction errors of all orders up to a largest one.
 ///

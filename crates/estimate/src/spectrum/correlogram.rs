@@ -7,12 +7,9 @@
 //! With several weightings (tapers) it is the weighted sum of their correlograms.
 
 use crate::error::{Error, length, positive};
-use crate::estimators::statistic::Statistic;
+use crate::estimators::Statistic;
 use crate::spectrum::transform::WindowTransform;
-use crate::window::sample::Sample;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
-use crate::window::weighting::Weighting;
+use crate::window::{Sample, Scratch, SignalKind, Weighting};
 
 /// One weighting and its share in the sum.
 #[derive(Debug, Clone, PartialEq)]

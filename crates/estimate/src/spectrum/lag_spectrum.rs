@@ -10,9 +10,7 @@ use num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner};
 
 use crate::error::{Error, length};
-use crate::window::sampling::Sampling;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Transform of a correlogram to `padded_samples` equidistant frequencies.
 #[derive(Clone)]

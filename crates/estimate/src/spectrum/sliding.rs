@@ -9,10 +9,8 @@
 use std::marker::PhantomData;
 
 use crate::error::Error;
-use crate::estimators::statistic::Statistic;
-use crate::window::sample::Sample;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::estimators::Statistic;
+use crate::window::{Sample, Scratch, SignalKind};
 
 /// The first `lags` lags of the biased correlogram of unweighted windows.
 #[derive(Debug, Clone)]

@@ -9,9 +9,7 @@ use num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
 
-use crate::window::sample::Sample;
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{Sample, Scratch, SignalKind};
 
 /// Forward and inverse transforms of one length, for real or complex samples.
 #[derive(Clone)]

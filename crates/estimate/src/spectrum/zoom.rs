@@ -10,8 +10,7 @@
 use multiversion::multiversion;
 
 use crate::error::{Error, length};
-use crate::window::sampling::Sampling;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{Sampling, SignalKind};
 
 /// Frequencies that are worked on together; tables are padded to a multiple of it.
 const LANES: usize = 32;
@@ -119,7 +118,7 @@ fn horner(lags: &[f64], cos: &[f64], sin: &[f64], out: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectrum::lag_spectrum::density_at;
+    use crate::spectrum::density_at;
 
     #[test]
     fn chosen_frequencies_have_the_density_of_the_sum_written_out() {

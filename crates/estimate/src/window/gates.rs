@@ -4,7 +4,7 @@
 //! has left. Check: the centre lies half a gate, 19.2 m for 64 samples at 250 MHz, beyond the start.
 
 use crate::error::{Error, finite};
-use crate::window::sampling::{SPEED_OF_LIGHT_M_S, Sampling};
+use crate::window::{SPEED_OF_LIGHT_M_S, Sampling};
 
 /// Windows of `window_samples` samples, `step_samples` apart, in every record of a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,8 +3,7 @@
 //! A window that holds one is left out. What is left is scaled by a power of two, so that amplitudes of 1e-200 and 1e200
 //! keep their velocity to the last bit. Check: windows without such a sample keep every bit of a record without it.
 
-use crate::window::gates::Gates;
-use crate::window::sample::Sample;
+use crate::window::{Gates, Sample};
 
 /// Binary orders of magnitude without a sample above which the larger samples are no signal, if they are the fewer ones.
 ///

@@ -2,7 +2,7 @@
 //!
 //! Check: in the tests of the statistics, for both kinds of samples.
 
-use crate::window::signal_kind::SignalKind;
+use crate::window::SignalKind;
 use num_complex::Complex;
 
 mod sealed {

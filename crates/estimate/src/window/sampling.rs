@@ -5,7 +5,7 @@
 //! unambiguous interval reads as its folded alias (63 m/s reads 61.0 m/s at 250 MHz, 80 MHz, 1.55 um).
 
 use crate::error::{Error, finite, positive};
-use crate::window::signal_kind::SignalKind;
+use crate::window::SignalKind;
 
 /// Speed of light in vacuum \[m/s\].
 pub const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;

@@ -2,7 +2,7 @@
 //!
 //! Check: in the tests of the estimators, which reuse one for all windows.
 
-use crate::models::autoregressive::Autoregression;
+use crate::models::Autoregression;
 use num_complex::Complex;
 
 /// Work space owned by the caller; buffers grow on first use and are then reused without allocation.

@@ -100,7 +100,11 @@ fn bounds_with_little_noise_outside_the_band_are_right_or_refused() {
             assert!(floor == refused && (1e-12..1e-11).contains(&least), "{error}");
             assert!(error.to_string().contains(&format!("floor = {refused}")), "{error}");
             // the bound goes on falling slowly
-            assert_relative_eq!(with_floor(least, kind).unwrap(), with_floor(1e-11, kind).unwrap(), max_relative = 0.05);
+            assert_relative_eq!(
+                with_floor(least, kind).unwrap(),
+                with_floor(1e-11, kind).unwrap(),
+                max_relative = 0.05
+            );
             assert!(matches!(with_floor(0.5 * least, kind), Err(Error::NoiseFloor { .. })), "{error}");
         }
     }

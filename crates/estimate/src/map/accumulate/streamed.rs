@@ -11,13 +11,11 @@ use ndarray::ArrayView2;
 
 use super::{BLOCK, Scan, add};
 use crate::error::{Error, length};
-use crate::estimators::statistic::Statistic;
-use crate::map::region::ScanGeometry;
+use crate::estimators::Statistic;
+use crate::map::ScanGeometry;
 use crate::parallel::{for_each_chunk, map_indexed};
-use crate::window::gates::Gates;
 use crate::window::missing::{Rule, invalid_windows};
-use crate::window::sample::Sample;
-use crate::window::scratch::Scratch;
+use crate::window::{Gates, Sample, Scratch};
 
 /// Statistics of the windows of a scan, as far as its records have come.
 ///

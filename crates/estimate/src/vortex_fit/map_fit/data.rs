@@ -5,9 +5,7 @@
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, finite, length, positive};
-use crate::vortex_fit::wake::core_prior::CorePrior;
-use crate::vortex_fit::wake::free_parameters::FreeParameters;
-use crate::vortex_fit::wake::pair::{Parameter, Wake};
+use crate::vortex_fit::{CorePrior, FreeParameters, Parameter, Wake};
 
 /// A map of radial velocities, such as accumulation gives.
 #[derive(Debug, Clone, Copy)]

@@ -7,15 +7,15 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::vortex_fit::map_fit::data::{MapFit, MapFitOptions, VelocityMap};
-use crate::vortex_fit::map_fit::estimator_response::EstimatorResponse;
 use crate::vortex_fit::map_fit::guess::first_guess;
-use crate::vortex_fit::map_fit::means::{Fit, refine_map_fit};
+use crate::vortex_fit::map_fit::means::Fit;
 use crate::vortex_fit::map_fit::problem::{Expected, Problem};
 use crate::vortex_fit::map_fit::starts::{best_of, starts, with_typical_core};
 use crate::vortex_fit::map_fit::tangent::{Tangent, near};
-use crate::vortex_fit::wake::free_parameters::{FreeParameters, Sharing};
-use crate::vortex_fit::wake::pair::{PARAMETERS, Wake, WakeModel};
+use crate::vortex_fit::{
+    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, PARAMETERS, Sharing, VelocityMap, Wake, WakeModel,
+    refine_map_fit,
+};
 
 /// Most steps of Gauss and Newton, and halvings of one.
 const STEPS: usize = 40;

@@ -16,20 +16,16 @@ use multiversion::multiversion;
 use ndarray::Array2;
 use std::f64::consts::TAU;
 
-use crate::bound::window_model::Noise;
+use crate::bound::Noise;
 use crate::error::{Error, length, positive};
-use crate::estimators::statistic::Estimator;
+use crate::estimators::Estimator;
 use crate::parallel::map_indexed;
-use crate::spectrum::correlogram::{Correlogram, Taper};
+use crate::spectrum::{Correlogram, Taper};
 use crate::vortex_fit::signal_fit::banded_cholesky::dot;
-use crate::vortex_fit::wake::pair::{Ray, Wake, WakeModel};
-use crate::vortex_fit::wake::pulse::PulseShape;
-use crate::vortex_fit::wake::range_kernel::RangeKernel;
+use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::wake_map::region;
-use crate::window::sample::Sample;
-use crate::window::sampling::{SPEED_OF_LIGHT_M_S, Sampling};
-use crate::window::scratch::Scratch;
-use crate::window::signal_kind::SignalKind;
+use crate::vortex_fit::{PulseShape, RangeKernel, Wake, WakeModel};
+use crate::window::{SPEED_OF_LIGHT_M_S, Sample, Sampling, Scratch, SignalKind};
 
 /// Air nodes are at most this far apart \[m\]: half of a small core.
 const NODE_M: f64 = 1.25;
@@ -270,8 +266,8 @@ fn add_seen(lags: &mut [f64], weights: &[f64], turns: &[f64], share: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::{LagWindowPeak, PulsePair};
-    use crate::{Refinement, SpectralPeak, Weighting};
+    use crate::estimators::{LagWindowPeak, PulsePair, Refinement, SpectralPeak};
+    use crate::window::Weighting;
 
     const SIGMA_S: f64 = 120.112e-9;
     const RANGES_M: [f64; 3] = [372.0, 377.7, 400.0];

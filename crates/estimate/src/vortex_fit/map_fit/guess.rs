@@ -7,10 +7,11 @@
 
 use crate::error::Error;
 use crate::parallel::map_indexed;
-use crate::vortex_fit::map_fit::data::{VelocityMap, median};
+use crate::vortex_fit::map_fit::data::median;
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
-use crate::vortex_fit::wake::pair::{Ray, Vortex, Wake, WakeModel};
-use crate::vortex_fit::wake::range_kernel::{LineScratch, RangeKernel};
+use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::wake::range_kernel::LineScratch;
+use crate::vortex_fit::{RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
 
 /// Blocks of the thinned map along each axis, at most.
 const BLOCKS: usize = 48;

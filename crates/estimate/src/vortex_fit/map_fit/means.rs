@@ -8,14 +8,12 @@
 
 use crate::error::Error;
 use crate::vortex_fit::damped_newton::Stop;
-use crate::vortex_fit::map_fit::data::{MapFit, MapFitOptions, MapTop, VelocityMap};
 use crate::vortex_fit::map_fit::guess::first_guess;
 use crate::vortex_fit::map_fit::problem::{Expected, Problem};
 use crate::vortex_fit::map_fit::starts::{best_of, starts, with_typical_core};
-use crate::vortex_fit::wake::core_prior::{CorePrior, is_core};
+use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::wake::free_parameters::spread;
-use crate::vortex_fit::wake::pair::{Wake, WakeModel};
-use crate::vortex_fit::wake::range_kernel::RangeKernel;
+use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, MapTop, RangeKernel, VelocityMap, Wake, WakeModel};
 
 /// The scale of residuals from means is taken anew this often.
 const ROUNDS: usize = 5;

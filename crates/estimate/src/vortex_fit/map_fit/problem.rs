@@ -7,13 +7,13 @@ use ndarray::{Array1, Array2};
 use crate::error::{Error, finite};
 use crate::parallel::map_indexed;
 use crate::vortex_fit::damped_newton::{Normal, Stop, descend, inverse, solve};
-use crate::vortex_fit::map_fit::data::{Loss, VelocityMap, median};
+use crate::vortex_fit::map_fit::data::median;
 use crate::vortex_fit::map_fit::residual_covariance::{Cell, alike, filling};
 use crate::vortex_fit::map_fit::tangent::Tangent;
-use crate::vortex_fit::wake::core_prior::CorePrior;
 use crate::vortex_fit::wake::free_parameters::{gathered, moved};
-use crate::vortex_fit::wake::pair::{PARAMETERS, Parameter, Ray, Wake, WakeModel};
-use crate::vortex_fit::wake::range_kernel::{LineScratch, RangeKernel};
+use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::wake::range_kernel::LineScratch;
+use crate::vortex_fit::{CorePrior, Loss, PARAMETERS, Parameter, RangeKernel, VelocityMap, Wake, WakeModel};
 
 /// Median of the absolute value of a normal number.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;

@@ -4,9 +4,7 @@
 //! not the best add their distance to the covariance, weighted with their likelihood. Check: made-up ends; fits of many maps.
 
 use crate::error::Error;
-use crate::vortex_fit::map_fit::data::{MapFit, MapFitOptions};
-use crate::vortex_fit::wake::free_parameters::Sharing;
-use crate::vortex_fit::wake::pair::Wake;
+use crate::vortex_fit::{MapFit, MapFitOptions, Sharing, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span).
 pub(crate) const CORE_OVER_SPACING: f64 = 0.045;

@@ -8,9 +8,9 @@
 
 use ndarray::{Array2, ArrayView2};
 
-use crate::vortex_fit::map_fit::data::{VelocityMap, median};
+use crate::vortex_fit::map_fit::data::median;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
-use crate::vortex_fit::wake::pair::{Wake, WakeModel};
+use crate::vortex_fit::{VelocityMap, Wake, WakeModel};
 
 /// Map and slopes about a wake: the velocities of wakes near it to first order.
 pub(crate) struct Tangent {

@@ -10,11 +10,8 @@ use ndarray::Array2;
 use crate::error::Error;
 use crate::vortex_fit::damped_newton::{Normal, Stop, descend};
 use crate::vortex_fit::signal_fit::banded_cholesky::dot;
-use crate::vortex_fit::signal_fit::likelihood::{Powers, ScanSignals};
-use crate::vortex_fit::signal_fit::options::SignalFitOptions;
-use crate::vortex_fit::signal_fit::scan_model::ScanModel;
 use crate::vortex_fit::wake::free_parameters::{gathered, moved};
-use crate::vortex_fit::wake::pair::Wake;
+use crate::vortex_fit::{Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
 
 /// A wake and the powers of signal and noise.
 pub(crate) type State = (Wake, Powers);

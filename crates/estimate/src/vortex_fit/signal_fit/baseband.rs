@@ -10,11 +10,9 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 
 use num_complex::Complex;
 
-use crate::bound::window_model::Noise;
+use crate::bound::Noise;
 use crate::error::Error;
-use crate::window::sample::Sample;
-use crate::window::sampling::Sampling;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{Sample, Sampling, SignalKind};
 
 /// Attenuation of the stop band \[dB\].
 const STOP_DB: f64 = 60.0;

@@ -10,13 +10,13 @@ use std::rc::Rc;
 use crate::error::Error;
 use crate::vortex_fit::damped_newton::inverse;
 use crate::vortex_fit::signal_fit::ascent::{Ascent, State};
-use crate::vortex_fit::signal_fit::likelihood::{Powers, ScanSignals};
-use crate::vortex_fit::signal_fit::options::{SignalFitOptions, Starts};
-use crate::vortex_fit::signal_fit::scan_model::{ScanModel, ScanSetup};
-use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, Candidate, LikelihoodTop, near_lines, other_tops, same};
-use crate::vortex_fit::wake::free_parameters::{FreeParameters, Sharing, spread};
-use crate::vortex_fit::wake::pair::{PARAMETERS, Parameter, Wake};
-use crate::window::sample::Sample;
+use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, Candidate, near_lines, other_tops, same};
+use crate::vortex_fit::wake::free_parameters::spread;
+use crate::vortex_fit::{
+    FreeParameters, LikelihoodTop, PARAMETERS, Parameter, Powers, ScanModel, ScanSetup, ScanSignals, Sharing,
+    SignalFitOptions, Starts, Wake,
+};
+use crate::window::Sample;
 
 /// Fits that leave the surroundings of their guess start again from where they are, this often at most.
 const ROUNDS: usize = 4;

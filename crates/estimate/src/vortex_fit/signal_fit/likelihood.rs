@@ -13,10 +13,10 @@ use crate::error::{Error, positive};
 use crate::parallel::map_indexed;
 use crate::vortex_fit::signal_fit::banded_cholesky::{Band, dot};
 use crate::vortex_fit::signal_fit::line_covariance::Work;
-use crate::vortex_fit::signal_fit::scan_model::{Line, ScanModel};
-use crate::vortex_fit::wake::free_parameters::{FreeParameters, gathered};
-use crate::vortex_fit::wake::pair::{PARAMETERS, Wake};
-use crate::window::sample::Sample;
+use crate::vortex_fit::signal_fit::scan_model::Line;
+use crate::vortex_fit::wake::free_parameters::gathered;
+use crate::vortex_fit::{FreeParameters, PARAMETERS, ScanModel, Wake};
+use crate::window::Sample;
 
 /// Powers of signal and noise relative to the model.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,12 +1,10 @@
 //! The likelihood against plain sums over layers, dense matrices, difference quotients and its own draws.
 
 use super::*;
-use crate::bound::window_model::Noise;
+use crate::bound::Noise;
 use crate::linalg;
 use crate::vortex_fit::{CoreProfile, PulseShape, ScanSetup, Vortex, WakeModel, WindFit};
-use crate::window::SPEED_OF_LIGHT_M_S;
-use crate::window::sampling::Sampling;
-use crate::window::signal_kind::SignalKind;
+use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 use rand::{RngExt, SeedableRng};
 use std::f64::consts::{PI, SQRT_2};
 

@@ -11,8 +11,8 @@ use multiversion::multiversion;
 use num_complex::Complex;
 
 use crate::vortex_fit::signal_fit::banded_cholesky::Band;
-use crate::vortex_fit::signal_fit::scan_model::{Line, ScanModel};
-use crate::vortex_fit::wake::pair::{PARAMETERS, Wake};
+use crate::vortex_fit::signal_fit::scan_model::Line;
+use crate::vortex_fit::{PARAMETERS, ScanModel, Wake};
 
 /// Buffers of one worker.
 #[derive(Debug, Default)]

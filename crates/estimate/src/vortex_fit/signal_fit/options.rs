@@ -2,7 +2,7 @@
 //!
 //! Check: fits with and without several starts.
 
-use crate::vortex_fit::wake::free_parameters::FreeParameters;
+use crate::vortex_fit::FreeParameters;
 
 /// How the signals are fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]

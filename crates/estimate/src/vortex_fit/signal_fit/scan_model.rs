@@ -7,13 +7,13 @@
 
 use std::f64::consts::PI;
 
-use crate::bound::window_model::Noise;
+use crate::bound::Noise;
 use crate::error::{Error, finite};
-use crate::vortex_fit::signal_fit::baseband::{Baseband, PowerGain};
-use crate::vortex_fit::wake::pair::{CoreProfile, Ray, Wake, WakeModel};
-use crate::vortex_fit::wake::pulse::{PairWeights, PulseShape};
-use crate::window::sampling::{SPEED_OF_LIGHT_M_S, Sampling};
-use crate::window::signal_kind::SignalKind;
+use crate::vortex_fit::signal_fit::baseband::PowerGain;
+use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::wake::pulse::PairWeights;
+use crate::vortex_fit::{Baseband, CoreProfile, PulseShape, Wake, WakeModel};
+use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 
 /// Covariances below this part of the noise are left out.
 const CUT: f64 = 1e-6;

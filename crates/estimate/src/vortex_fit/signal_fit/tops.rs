@@ -12,10 +12,7 @@ use crate::error::Error;
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::signal_fit::ascent::{Ascent, Parabola, State};
 use crate::vortex_fit::signal_fit::banded_cholesky::dot;
-use crate::vortex_fit::signal_fit::likelihood::{Powers, ScanSignals};
-use crate::vortex_fit::signal_fit::options::SignalFitOptions;
-use crate::vortex_fit::signal_fit::scan_model::ScanModel;
-use crate::vortex_fit::wake::pair::{Parameter, Wake};
+use crate::vortex_fit::{Parameter, Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
 
 /// Core radii that are tried, over the spacing of the vortices.
 pub(crate) const CORES_OVER_SPACING: [f64; 5] = [0.015, 0.025, 0.042, 0.07, 0.12];

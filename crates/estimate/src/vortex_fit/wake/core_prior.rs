@@ -6,7 +6,7 @@
 
 use crate::error::{Error, positive};
 use crate::vortex_fit::wake::free_parameters::gathered;
-use crate::vortex_fit::wake::pair::{PARAMETERS, Parameter, Wake};
+use crate::vortex_fit::{PARAMETERS, Parameter, Wake};
 
 /// Log-normal density of the core radius over the spacing of the vortices.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +52,8 @@ pub(crate) fn is_core(group: &[usize]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vortex_fit::wake::free_parameters::{FreeParameters, Sharing, moved};
+    use crate::vortex_fit::wake::free_parameters::moved;
+    use crate::vortex_fit::{FreeParameters, Sharing};
 
     #[test]
     fn terms_are_distances_in_deviations_and_their_slopes_difference_quotients() {

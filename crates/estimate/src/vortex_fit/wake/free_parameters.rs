@@ -5,7 +5,7 @@
 
 use ndarray::Array2;
 
-use crate::vortex_fit::wake::pair::{PARAMETERS, Wake};
+use crate::vortex_fit::{PARAMETERS, Wake};
 
 /// How a quantity that both vortices have is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

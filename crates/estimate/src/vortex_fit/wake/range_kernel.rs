@@ -6,8 +6,9 @@
 
 use crate::error::{Error, finite, positive};
 use crate::vortex_fit::signal_fit::banded_cholesky::dot;
-use crate::vortex_fit::wake::pair::{PARAMETERS, Ray, Wake, WakeModel};
-use crate::window::sampling::SPEED_OF_LIGHT_M_S;
+use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::{PARAMETERS, Wake, WakeModel};
+use crate::window::SPEED_OF_LIGHT_M_S;
 
 /// Weights of the air about the range of a gate.
 #[derive(Debug, Clone, PartialEq)]

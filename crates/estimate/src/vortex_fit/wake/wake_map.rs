@@ -7,8 +7,9 @@ use ndarray::Array2;
 
 use crate::error::{Error, finite};
 use crate::parallel::map_indexed;
-use crate::vortex_fit::wake::pair::{Ray, Wake, WakeModel};
-use crate::vortex_fit::wake::range_kernel::{LineScratch, RangeKernel};
+use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::wake::range_kernel::LineScratch;
+use crate::vortex_fit::{RangeKernel, Wake, WakeModel};
 
 impl WakeModel {
     /// Radial velocities \[m/s\] \[line, gate\] of `wake` at `elevation_rad` \[rad\] and `range_m` \[m\], both
