@@ -11,7 +11,7 @@ use num_complex::Complex;
 
 use crate::bound::window_model::{turned, with_floor_named};
 use crate::bound::{Noise, information_complex, information_real};
-use crate::error::{Error, finite, positive};
+use crate::error::{Error, at_least_one, finite, positive};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 
 /// Second-order model of a window of a Gaussian pulse in a wind with a constant gradient along the line of sight.
@@ -43,9 +43,7 @@ impl GradientModel {
         sampling.validate()?;
         positive("pulse_sigma_s", pulse_sigma_s)?;
         noise.validate()?;
-        if window_samples == 0 {
-            return Err(Error::OutOfRange { field: "window_samples", value: 0.0, allowed: "at least 1" });
-        }
+        at_least_one("window_samples", window_samples)?;
         Ok(Self { sampling: *sampling, window_samples, pulse_sigma_s, noise })
     }
 

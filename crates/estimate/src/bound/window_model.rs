@@ -9,7 +9,7 @@ use ndarray::{Array2, ArrayView2};
 use ndarray_linalg::{Lapack, Scalar};
 use num_complex::Complex;
 
-use crate::error::{Error, length, positive};
+use crate::error::{Error, finite, length, positive};
 use crate::linalg;
 use crate::window::{Sampling, SignalKind};
 
@@ -318,7 +318,7 @@ impl WindowModel {
         kind: SignalKind,
     ) -> Result<[Array2<Complex<f64>>; 2], Error> {
         positive("snr", snr)?;
-        crate::error::finite("velocity_m_s", velocity_m_s)?;
+        finite("velocity_m_s", velocity_m_s)?;
         self.sampling.validate_for(kind)?;
         let cycles = self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
         let slope = -4.0 * std::f64::consts::PI * self.sampling.period_s() / self.sampling.wavelength_m;
