@@ -18,17 +18,15 @@ const FRAME_S: f64 = 0.15;
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = Wake::of(context)?;
     let origin = context.provenance_of_formula(&wake.case_toml);
-    let mut out = Rendered::default();
     let mut table = Table::new();
     for name in ["tau".into(), "energy".into(), "energy_3d".into()].into_iter().chain((0..=8).map(mode_name)) {
         table = table.float(&name, wake.column(&name)?.iter().copied());
     }
-    out.csv(table.to_csv(&origin)?);
     let panels = wake.fields_tau.iter().enumerate().map(|(i, tau)| surfaces(&wake, i, *tau));
     let mut figure = Figure::stacked(panels.collect::<Result<Vec<_>, _>>()?);
     figure.columns = 2;
     figure.width = 1200.0;
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table, &figure, &origin)?;
     out.files.push(("apng".into(), animation::apng(&frames(&wake)?, FRAME_S, &origin)?));
     out.caption = format!(
         "Surfaces where |ω| b₀²/Γ₀ is 1 and 10, at τ = {:?}; {}, box repeated {REPEATS} times along the flight. The animation \
