@@ -341,19 +341,14 @@ impl WindowModel {
     /// As [`WindowModel::covariance`] and [`bound_complex_m_s`]; [`Error::NoiseFloor`] for too small a floor of the noise.
     pub fn bound_m_s(&self, velocity_m_s: f64, snr: f64, kind: SignalKind, windows: f64) -> Result<f64, Error> {
         with_floor_named(self.noise, self.envelope.nrows(), |noise| {
-            let model = Self { noise, ..self.clone() };
-            model.bound_with_noise(velocity_m_s, snr, kind, windows)
-        })
-    }
-
-    fn bound_with_noise(&self, velocity_m_s: f64, snr: f64, kind: SignalKind, windows: f64) -> Result<f64, Error> {
-        let [covariance, derivative] = self.covariance(velocity_m_s, snr, kind)?;
-        match kind {
-            SignalKind::Complex => bound_complex_m_s(covariance.view(), derivative.view(), windows),
-            SignalKind::Real => {
-                let (covariance, derivative) = (covariance.mapv(|value| value.re), derivative.mapv(|value| value.re));
-                bound_real_m_s(covariance.view(), derivative.view(), windows)
+            let parts = Self { noise, ..self.clone() }.covariance(velocity_m_s, snr, kind)?;
+            match kind {
+                SignalKind::Complex => bound_complex_m_s(parts[0].view(), parts[1].view(), windows),
+                SignalKind::Real => {
+                    let [covariance, derivative] = parts.map(|x| x.mapv(|value| value.re));
+                    bound_real_m_s(covariance.view(), derivative.view(), windows)
+                }
             }
-        }
+        })
     }
 }
