@@ -26,15 +26,17 @@ use wakescope_signal as signal;
 /// What the wind refuses; a checked scene gives none.
 pub fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
     Ok(match &scene.flow {
-        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::Calm),
-        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?),
+        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::winds::Calm),
+        Flow::Uniform { lateral_m_s, vertical_m_s } => {
+            Box::new(les::winds::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?)
+        }
         Flow::VortexPair(pair) => {
             let vortices = Box::new(vortex_pair(pair).wind()?);
             if pair.cross_wind_m_s == 0.0 {
                 return Ok(vortices);
             }
-            let cross = Box::new(les::Uniform::new([0.0, pair.cross_wind_m_s, 0.0])?);
-            Box::new(les::Sum { winds: vec![vortices, cross] })
+            let cross = Box::new(les::winds::Uniform::new([0.0, pair.cross_wind_m_s, 0.0])?);
+            Box::new(les::winds::Sum { winds: vec![vortices, cross] })
         }
     })
 }

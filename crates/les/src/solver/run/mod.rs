@@ -28,9 +28,9 @@ const WARNING_SHARE: f64 = 0.6;
 const SHORTEST_SHARE: f64 = 1e-10;
 /// Times closer than this share of the time of the run are the same.
 const SAME_TIME: f64 = 1e-12;
-/// Steps between looks for waves that grow.
-const STEPS_PER_LOOK: u64 = 64;
-/// Growth of the worst wave over the rest of the run, as an exponent, that is worth a word.
+/// Steps between checks for waves that grow.
+const STEPS_PER_CHECK: u64 = 64;
+/// Growth of the worst wave over the rest of the run, as an exponent, that is warned of.
 const NOTICED_GROWTH: f64 = 0.1;
 
 /// How often.
@@ -149,7 +149,7 @@ pub trait RunObserver {
     }
 }
 
-/// An observer that looks away.
+/// An observer that takes no notice.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 
@@ -299,7 +299,7 @@ impl Run {
 
     fn look_for_growth(&mut self, observer: &mut dyn RunObserver) {
         let step = self.flow.steps();
-        if self.has_warned.growth || !step.is_multiple_of(STEPS_PER_LOOK) {
+        if self.has_warned.growth || !step.is_multiple_of(STEPS_PER_CHECK) {
             return;
         }
         let left_s = self.plan.end_s - self.flow.time_s();
@@ -378,8 +378,8 @@ fn own_bytes(open: Option<OpenBudget>, energy: EnergyBound) -> Vec<u8> {
 
 fn read_own(bytes: &[u8]) -> Option<(Option<OpenBudget>, EnergyBound, &[u8])> {
     let (own, rest) = bytes.split_at_checked(48)?;
-    let words: Vec<u64> = own.as_chunks::<8>().0.iter().map(|w| u64::from_le_bytes(*w)).collect();
-    let [present, step, rate, power, bound, largest] = words[..] else { return None };
+    let numbers: Vec<u64> = own.as_chunks::<8>().0.iter().map(|w| u64::from_le_bytes(*w)).collect();
+    let [present, step, rate, power, bound, largest] = numbers[..] else { return None };
     let (rate_m5_s3, power_m5_s3) = (f64::from_bits(rate), f64::from_bits(power));
     let energy = EnergyBound { bound_m5_s2: f64::from_bits(bound), largest_m5_s2: f64::from_bits(largest) };
     match present {
