@@ -124,8 +124,8 @@ const UNITS: [&str; 36] = [
 /// Public numbers that name a quantity but have no unit of the SI: the path begins with the first word.
 const WITHOUT_UNIT: [(&str, &str); 5] = [
     // In the square of whatever unit the caller's samples have.
-    ("crates/estimate/src/velocity.rs", "power"),
-    ("crates/estimate/src/autoregressive.rs", "noise_power"),
+    ("crates/estimate/src/estimators/velocity.rs", "power"),
+    ("crates/estimate/src/models/autoregressive.rs", "noise_power"),
     // In spacings of the pair.
     ("crates/les/src/solver/cases/vortex_pair.rs", "height"),
     ("crates/les/src/solver/cases/vortex_pair.rs", "core_radius"),

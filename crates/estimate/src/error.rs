@@ -134,6 +134,28 @@ pub(crate) fn finite(field: &'static str, value: f64) -> Result<(), Error> {
     if value.is_finite() { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed: "finite" }) }
 }
 
+/// Checks that a number is finite and not negative.
+pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<(), Error> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(())
+    } else {
+        Err(Error::OutOfRange { field, value, allowed: "finite and at least 0" })
+    }
+}
+
+/// Checks that there is at least one.
+pub(crate) fn at_least_one(field: &'static str, count: usize) -> Result<(), Error> {
+    if count > 0 { Ok(()) } else { Err(Error::OutOfRange { field, value: 0.0, allowed: "at least 1" }) }
+}
+
+/// Checks that finite numbers increase.
+pub(crate) fn increasing(field: &'static str, numbers: &[f64]) -> Result<(), Error> {
+    match numbers.windows(2).find(|pair| pair[1] <= pair[0]) {
+        Some(pair) => Err(Error::OutOfRange { field, value: pair[1], allowed: "increasing" }),
+        None => Ok(()),
+    }
+}
+
 /// Checks the length of an array.
 pub(crate) fn length(field: &'static str, expected: usize, found: usize) -> Result<(), Error> {
     if expected == found { Ok(()) } else { Err(Error::Length { field, expected, found }) }

@@ -8,7 +8,7 @@ use super::methods::{Known, Methods};
 use crate::Failure;
 use fixtures::{ENERGY_J, WINDOW, receiver, sampling};
 use rayon::prelude::*;
-use wakescope_estimate::{Autoregression, SPEED_OF_LIGHT_M_S, Scratch};
+use wakescope_estimate::{Scratch, models::Autoregression, window::SPEED_OF_LIGHT_M_S};
 use wakescope_signal::{
     GaussianPulse, LineOfSight, NoiseModel, PulseDuration, PulseKey, Record, Simulator, pulse_generator,
 };
