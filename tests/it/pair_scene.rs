@@ -7,7 +7,7 @@ use rand_xoshiro::rand_core::SeedableRng;
 use wakescope_estimate::*;
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::{
-    GaussianPulse, LineOfSight, NoiseModel, PlanckConvention, PulseDuration, RangeFilter, Receiver, Record, Simulator,
+    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, RangeFilter, Receiver, Record, Simulator,
 };
 
 pub(crate) const WINDOW: usize = 64;
@@ -52,16 +52,7 @@ impl Scene {
 
     /// The same scan of another wind, no steeper than the pair.
     pub(crate) fn of_wind(pulse_s: f64, snr_db: f64, noise: NoiseModel, wind: &dyn Wind) -> Self {
-        let receiver = Receiver {
-            wavelength_m: 1.55e-6,
-            sample_rate_hz: 250e6,
-            intermediate_frequency_hz: 80e6,
-            bandwidth_hz: 50e6,
-            quantum_efficiency: 1.0,
-            local_oscillator_w: 1e-3,
-            planck: PlanckConvention::H,
-            noise,
-        };
+        let receiver = Receiver { noise, ..Receiver::table2() };
         let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(pulse_s), 150e-6).unwrap();
         let weight_per_m = 10f64.powf(0.1 * snr_db) / receiver.slowly_varying_snr(150e-6, 1.0);
         let first_s = 2.0 * FIRST_SAMPLE_M / SPEED_OF_LIGHT_M_S;

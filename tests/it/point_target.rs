@@ -5,9 +5,7 @@ use rand_xoshiro::rand_core::SeedableRng;
 use wakescope_estimate::{
     Correlogram, Estimator, Noise, Sampling, Scratch, SignalKind, SpectralPeak, Statistic, Weighting, WindowModel,
 };
-use wakescope_signal::{
-    GaussianPulse, LineOfSight, NoiseModel, PlanckConvention, PulseDuration, Receiver, Record, Simulator,
-};
+use wakescope_signal::{GaussianPulse, LineOfSight, NoiseModel, Receiver, Record, Simulator};
 
 const SPEED_M_S: f64 = 3.0;
 const SNR_DB: f64 = 20.0;
@@ -26,17 +24,8 @@ struct Target {
 
 /// A layer in the middle of the window whose return, averaged over the window, is [`SNR_DB`] above the noise.
 fn target() -> Target {
-    let receiver = Receiver {
-        wavelength_m: 1.55e-6,
-        sample_rate_hz: 250e6,
-        intermediate_frequency_hz: 80e6,
-        bandwidth_hz: 50e6,
-        quantum_efficiency: 1.0,
-        local_oscillator_w: 1e-3,
-        planck: PlanckConvention::H,
-        noise: NoiseModel::White,
-    };
-    let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6).unwrap();
+    let receiver = Receiver { noise: NoiseModel::White, ..Receiver::table2() };
+    let pulse = GaussianPulse::table2();
     let first_s = 2.0 * 400.0 / SPEED_OF_LIGHT_M_S;
     let record = Record { time_of_first_sample_s: first_s, samples: WINDOW };
     let simulator = Simulator::new(pulse, receiver, record).unwrap();

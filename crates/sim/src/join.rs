@@ -213,16 +213,16 @@ pub fn pulse(scene: &Scene) -> Result<signal::Pulse, Error> {
         }
         PulseShape::Sampled(shape) => {
             let resampling = match shape.resampling {
-                PulseResampling::CubicSpline => signal::Resampling::CubicSpline,
-                PulseResampling::BandLimited => signal::Resampling::BandLimited,
-                PulseResampling::Linear => signal::Resampling::Linear,
+                PulseResampling::CubicSpline => signal::sampled::Resampling::CubicSpline,
+                PulseResampling::BandLimited => signal::sampled::Resampling::BandLimited,
+                PulseResampling::Linear => signal::sampled::Resampling::Linear,
             };
             let sampled = if shape.phase_rad.is_empty() {
-                signal::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
+                signal::sampled::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
             } else {
                 let polar = |(power, phase): (&f64, &f64)| Complex::from_polar(power.sqrt(), *phase);
                 let envelope: Vec<_> = shape.power.iter().zip(&shape.phase_rad).map(polar).collect();
-                signal::SampledPulse::new(&shape.time_s, &envelope, resampling, p.energy_j)?
+                signal::sampled::SampledPulse::new(&shape.time_s, &envelope, resampling, p.energy_j)?
             };
             signal::Pulse::from(if shape.centred { sampled.centred() } else { sampled })
         }
@@ -260,12 +260,12 @@ pub fn return_per_m(scene: &Scene) -> Result<impl Fn(f64) -> Result<f64, Error>,
 ///
 /// # Errors
 /// What the signal simulation refuses; a checked scene gives none.
-pub fn digitiser(scene: &Scene) -> Result<Option<signal::Digitiser>, Error> {
+pub fn digitiser(scene: &Scene) -> Result<Option<signal::digitise::Digitiser>, Error> {
     match scene.detector.digitiser {
         Digitiser::None {} => Ok(None),
         Digitiser::Quantised { bits, full_scale_over_noise } => {
             let full_scale_a = full_scale_over_noise * receiver(scene).noise_variance_a2().sqrt();
-            Ok(Some(signal::Digitiser::new(bits, full_scale_a)?))
+            Ok(Some(signal::digitise::Digitiser::new(bits, full_scale_a)?))
         }
     }
 }
@@ -281,8 +281,8 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
         quantum_efficiency: d.quantum_efficiency,
         local_oscillator_w: d.local_oscillator_w,
         planck: match d.snr {
-            SnrReference::Chapter {} => signal::PlanckConvention::Hbar,
-            _ => signal::PlanckConvention::H,
+            SnrReference::Chapter {} => signal::receiver::PlanckConvention::Hbar,
+            _ => signal::receiver::PlanckConvention::H,
         },
         noise: match d.noise {
             NoiseKind::Band => signal::NoiseModel::BandLimited,

@@ -15,9 +15,9 @@ use wakescope_estimate::{
     polar_points,
 };
 use wakescope_les::{CirculationProfile, Ground, Motion, Sum, Uniform, VortexPair, Wind};
+use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, PulseKey, RangeFilter, Receiver, Record, Scratch, Simulator,
-    pulse_generator,
+    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, RangeFilter, Receiver, Record, Scratch, Simulator,
 };
 
 const LINES: usize = 185;
