@@ -4,9 +4,10 @@
 //! fitted or the true one, and once more from the truth on. Each row has its standard error; one thread tells the processor time.
 
 use crate::trials::fits::FitTrial;
-use crate::trials::pair::{PairCase, PairScan};
 use crate::work_precision::measured;
 use crate::{Failure, Outcome};
+use fixtures::pair::{PairCase, PairScan};
+use ndarray::Array2;
 use wakescope_estimate::Error;
 use wakescope_estimate::vortex_fit::{
     FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
@@ -72,36 +73,22 @@ impl Fits {
         Self { name, ..Default::default() }
     }
 
-    fn take(&mut self, (wake, deviation): (Wake, impl Fn(usize) -> f64), cpu_s: f64) {
-        self.found.push((wake, std::array::from_fn(deviation)));
-        self.cpu_s += cpu_s;
-    }
-
-    /// Keeps a fit of a map, or why there is none.
-    fn map(&mut self, scan: usize, (fit, cpu_s): (Result<MapFit, Error>, f64)) -> Option<MapFit> {
-        match fit {
+    /// Keeps a fit, of which `read` tells wake and covariance, or why there is none.
+    fn keep<F>(
+        &mut self,
+        scan: usize,
+        (fit, cpu_s): (Result<F, Error>, f64),
+        read: impl Fn(&F) -> (Wake, &Array2<f64>),
+    ) -> Option<F> {
+        match &fit {
             Ok(fit) => {
-                self.take((fit.wake, |i| fit.covariance[[i, i]].sqrt()), cpu_s);
-                Some(fit)
+                let (wake, covariance) = read(fit);
+                self.found.push((wake, std::array::from_fn(|i| covariance[[i, i]].sqrt())));
+                self.cpu_s += cpu_s;
             }
-            Err(error) => {
-                self.failures.push(format!("scan {scan}: {error}"));
-                None
-            }
+            Err(error) => self.failures.push(format!("scan {scan}: {error}")),
         }
-    }
-
-    fn signals(&mut self, scan: usize, (fit, cpu_s): (Result<SignalFit, Error>, f64)) -> Option<SignalFit> {
-        match fit {
-            Ok(fit) => {
-                self.take((fit.wake, |i| fit.covariance[[i, i]].sqrt()), cpu_s);
-                Some(fit)
-            }
-            Err(error) => {
-                self.failures.push(format!("scan {scan}: {error}"));
-                None
-            }
-        }
+        fit.ok()
     }
 
     fn show(&self, truth: &Wake, bound: &[f64; PARAMETERS]) {
@@ -152,7 +139,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let mut guess = None;
         for (fits, core) in maps.iter_mut().zip([Sharing::Fixed, Sharing::Common]) {
             let (fit, cost) = measured(|| trial.map(free(core)))?;
-            guess = guess.or(fits.map(scan, (fit, cost.cpu_s())).map(|fit| fit.wake));
+            let kept = fits.keep(scan, (fit, cost.cpu_s()), |fit: &MapFit| (fit.wake, &fit.covariance));
+            guess = guess.or(kept.map(|fit| fit.wake));
         }
         let (false, Some(mut guess)) = (options.maps_only, guess) else { continue };
         if options.known_core {
@@ -161,7 +149,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
         let mut fit = |place: usize, guess: &Wake, starts| -> Result<Option<SignalFit>, Failure> {
             let (fit, cost) = measured(|| trial.signals(of_signals, guess, starts))?;
-            Ok(signals[place].signals(scan, (fit, cost.cpu_s())))
+            Ok(signals[place].keep(scan, (fit, cost.cpu_s()), |fit: &SignalFit| (fit.wake, &fit.covariance)))
         };
         let (found, at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?);
         if let (Some(found), Some(at_truth)) = (found, at_truth) {

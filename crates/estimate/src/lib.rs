@@ -43,7 +43,7 @@
 //! | `first_moment` | the mean of a skewed spectrum, which (28) asks for |
 //! | `bound`, `linalg` | Cramer-Rao bound; solve and eigenvectors with residual checks |
 //! | `shrinkage` | a map drawn towards a guess of the wind as far as it does not contradict it |
-//! | `error_map` | bias, standard deviation, root mean square with standard errors, (33) |
+//! | `error_map`, `mixture` | bias, standard deviation, root mean square with standard errors, (33); good estimates told from bad ones |
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
 //!
 //! Features:
@@ -77,6 +77,7 @@ mod levinson;
 mod likelihood;
 mod linalg;
 mod missing;
+mod mixture;
 mod model_peaks;
 #[cfg(feature = "openblas-system")]
 mod openblas;
@@ -115,6 +116,7 @@ pub use gradient::{GradientBound, GradientModel};
 pub use gradient_likelihood::{GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity};
 pub use likelihood::likelihood_tapers;
 pub use missing::MissingSamples;
+pub use mixture::{GoodAndBad, good_and_bad};
 pub use model_peaks::{AutoregressivePeak, AutoregressivePole, CaponPeak, model_lag_weights};
 pub use peak::SpectralPeak;
 pub use periodogram::{Periodogram, PeriodogramOptions, PeriodogramPlan};

@@ -1,8 +1,8 @@
 //! Fits to scans of a pair: to the map of the likelihood with tapers, and to all raw signals.
 
-use super::methods::WINDOW;
-use super::pair::PairScan;
 use crate::Failure;
+use fixtures::WINDOW;
+use fixtures::pair::PairScan;
 use ndarray::{Array2, ArrayView2};
 use wakescope_estimate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFit, MapFitOptions, SignalFit, SignalFitOptions, Starts, VelocityMap, Wake,

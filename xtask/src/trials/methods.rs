@@ -1,7 +1,7 @@
 //! Every estimator of the crate as it is tried on windows of 64 real samples: its name, its statistic, its settings.
 
-use super::sampling;
 use crate::Failure;
+use fixtures::{WINDOW, sampling};
 use std::sync::Arc;
 use wakescope_estimate::{
     AutoregressivePeak, AutoregressivePole, CaponPeak, Correlogram, Estimator, FirstMoment, GradientLikelihood,
@@ -9,9 +9,6 @@ use wakescope_estimate::{
     Unbiased, Weighting, WindowModel, likelihood_tapers,
 };
 use wakescope_signal::NoiseModel;
-
-/// Samples of a window.
-pub(crate) const WINDOW: usize = 64;
 
 /// Gradients \[1/s\] among which velocity and gradient are sought together.
 pub(crate) const GRADIENTS_PER_S: [f64; 5] = [-0.4, -0.2, 0.0, 0.2, 0.4];

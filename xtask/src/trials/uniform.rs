@@ -4,9 +4,9 @@
 //! one window of 64 samples per pulse. All estimators see the same windows. The generator is keyed by trial and pulse, so the
 //! errors do not depend on the number of threads.
 
-use super::methods::{Known, Methods, WINDOW};
-use super::{ENERGY_J, receiver, sampling};
+use super::methods::{Known, Methods};
 use crate::Failure;
+use fixtures::{ENERGY_J, WINDOW, receiver, sampling};
 use rayon::prelude::*;
 use wakescope_estimate::{Autoregression, SPEED_OF_LIGHT_M_S, Scratch};
 use wakescope_signal::scan::{PulseKey, pulse_generator};

@@ -4,7 +4,7 @@
 
 use super::{Row, measured};
 use crate::Failure;
-use crate::trials::{ENERGY_J, receiver};
+use fixtures::{ENERGY_J, receiver};
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::literal::literal_envelope;
 use wakescope_signal::scan::{PulseKey, pulse_generator};

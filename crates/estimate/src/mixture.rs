@@ -1,16 +1,23 @@
 //! Good and bad estimates told apart: Gaussian errors in a flat floor over the band (Frehlich and Yadlowsky 1994).
 //!
-//! Fitted by expectation maximisation. Check: the parameters of drawn mixtures come back within their standard errors.
+//! Fitted by expectation maximisation: the density of an error e is s N(e; b, sigma) + (1 - s)/B over a band of width B.
+//! Check: the parameters of drawn mixtures come back within their standard errors.
 
-/// The fitted mixture with standard errors; NaN where too few good estimates are left to tell.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Mixture {
-    pub(crate) std_good_m_s: f64,
-    pub(crate) std_good_error_m_s: f64,
-    pub(crate) bad_fraction: f64,
-    pub(crate) bad_fraction_error: f64,
-    pub(crate) bias_m_s: f64,
-    pub(crate) bias_error_m_s: f64,
+/// The fitted mixture with standard errors; NaN where fewer than 20 good estimates are left to tell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GoodAndBad {
+    /// Standard deviation of the good estimates, m/s.
+    pub std_good_m_s: f64,
+    /// Its standard error, m/s.
+    pub std_good_error_m_s: f64,
+    /// Share of the bad estimates, those without a velocity among them.
+    pub bad_fraction: f64,
+    /// Its standard error.
+    pub bad_fraction_error: f64,
+    /// Mean error of the good estimates, m/s.
+    pub bias_m_s: f64,
+    /// Its standard error, m/s.
+    pub bias_error_m_s: f64,
 }
 
 /// Fewest good estimates that a standard deviation is made of.
@@ -19,8 +26,10 @@ const LEAST_GOOD: f64 = 20.0;
 /// Steps of the iteration; it settles within some ten where good and bad are apart.
 const STEPS: usize = 300;
 
-/// Fits the mixture to errors \[m/s\], NaN for an estimate that says itself that it is none; the floor is `band_m_s` wide.
-pub(crate) fn mixture(errors_m_s: &[f64], band_m_s: f64) -> Mixture {
+/// Tells good errors \[m/s\] from bad ones; NaN stands for an estimate that says itself that it is none, and the floor is
+/// `band_m_s` wide. Without any error all is NaN.
+#[must_use]
+pub fn good_and_bad(errors_m_s: &[f64], band_m_s: f64) -> GoodAndBad {
     let found: Vec<f64> = errors_m_s.iter().copied().filter(|e| e.is_finite()).collect();
     let mut sizes: Vec<f64> = found.iter().map(|e| e.abs()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -46,7 +55,7 @@ pub(crate) fn mixture(errors_m_s: &[f64], band_m_s: f64) -> Mixture {
     let resolved = good >= LEAST_GOOD && std < 0.25 * band_m_s;
     let bad = if resolved { (all - good).max(0.0) } else { all };
     let only = |value: f64| if resolved { value } else { f64::NAN };
-    Mixture {
+    GoodAndBad {
         std_good_m_s: only(std),
         std_good_error_m_s: only(std / (2.0 * good).sqrt()),
         bad_fraction: bad / all,
@@ -77,15 +86,15 @@ mod tests {
 
     #[test]
     fn a_mixture_of_known_shares_comes_back() {
-        let found = mixture(&drawn(900, 100), 40.0);
+        let found = good_and_bad(&drawn(900, 100), 40.0);
         assert!((found.std_good_m_s - 0.3).abs() < 3.0 * found.std_good_error_m_s, "{found:?}");
         assert!((found.bad_fraction - 0.1).abs() < 0.01 && (found.bias_m_s - 0.1).abs() < 0.02, "{found:?}");
     }
 
     #[test]
     fn estimates_all_over_the_band_have_no_standard_deviation() {
-        let found = mixture(&drawn(0, 500), 40.0);
+        let found = good_and_bad(&drawn(0, 500), 40.0);
         assert!(found.std_good_m_s.is_nan() && found.bad_fraction == 1.0, "{found:?}");
-        assert!(mixture(&[f64::NAN; 30], 40.0).bad_fraction == 1.0);
+        assert!(good_and_bad(&[f64::NAN; 30], 40.0).bad_fraction == 1.0);
     }
 }

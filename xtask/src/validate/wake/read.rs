@@ -1,6 +1,6 @@
 //! The history of a run that `wakescope wake` made, read from its files.
 
-use super::History;
+use super::history::History;
 use crate::Failure;
 use crate::wakes::{Wake, table, text};
 use std::f64::consts::TAU;
