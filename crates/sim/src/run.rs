@@ -103,7 +103,7 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
 }
 
 /// Signals and the map, as the plan has them.
-fn signals_and_map<S: Sample + wakescope_signal::Sample>(
+fn signals_and_map<S: Sample + wakescope_signal::scan::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
