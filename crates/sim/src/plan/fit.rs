@@ -229,7 +229,9 @@ mod tests {
     #[test]
     fn bound_of_windows_whose_matrices_do_not_fit_is_refused_and_the_remedy_fits() {
         let text = |window: &str| {
-            format!("[scan]\nrange_max_m = 9000.0\n[estimator]\nwindow_samples = {window}\npadded_samples = 16384\n")
+            format!(
+                "[scan]\nrange_max_m = 9000.0\nelevation_max_rad = 0.01\n[estimator]\nwindow_samples = {window}\npadded_samples = 16384\n"
+            )
         };
         let long = plan(&text("8192"));
         long.fits_in(8e9).unwrap();
