@@ -1,6 +1,7 @@
 //! `cargo xtask ci`: every check that continuous integration makes, in its order.
 //!
-//! `.ci/run` calls it, so that a person can run the same before a commit.
+//! `.ci/run` calls it, so that a person can run the same before a commit. Examples are compiled with the tests, benchmarks
+//! are checked with clippy: neither is built once more.
 
 use crate::workspace::{read, root};
 use crate::{Failure, Outcome};
@@ -29,6 +30,10 @@ const FEATURES: [(&str, &[&str]); 4] = [
     ("wakescope-sim", &["", "cli", "flow", "netcdf", "plots", "vtk", "npz"]),
 ];
 
+/// The wake that the figures show in continuous integration, and where it is put.
+const WAKE: &str = "xtask/small_wake.toml";
+const WAKE_OUT: &str = "target/small-wake";
+
 fn steps() -> Result<Vec<Step>, Failure> {
     let plain = |name, command: String| Step { name, command, environment: &[] };
     let mut out = vec![
@@ -47,10 +52,18 @@ fn steps() -> Result<Vec<Step>, Failure> {
             out.push(plain("features", command));
         }
     }
-    out.push(plain("examples", "cargo build --workspace --examples --benches".into()));
-    out.push(plain("tidy", "cargo xtask tidy".into()));
-    out.push(plain("regress", "cargo xtask regress".into()));
-    out.push(plain("figures", "cargo xtask reproduce-figs --profile quick --no-cache".into()));
+    // Whether each crate can be taken by others: its files, its dependencies with versions; built they are above.
+    out.push(plain("package", "cargo package --workspace --no-verify --allow-dirty --quiet".into()));
+    // This very program: in another profile the workspace would be compiled once more.
+    let own = std::env::current_exe()?.display().to_string();
+    out.push(plain("tidy", format!("'{own}' tidy")));
+    out.push(plain("regress", format!("'{own}' regress")));
+    // On a wake of a few cells: that of the profile takes several minutes and shows no other fault of the program.
+    out.push(plain(
+        "wake",
+        format!("cargo run --quiet --bin wakescope -- wake {WAKE} --out {WAKE_OUT} --overwrite --quiet"),
+    ));
+    out.push(plain("figures", format!("'{own}' reproduce-figs --profile quick --no-cache --wake {WAKE_OUT}")));
     Ok(out)
 }
 

@@ -1,13 +1,15 @@
 //! The chapter's claim that CA errs less than PA, measured against signal-to-noise ratio, radius of the region and
 //! duration of the pulse.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::trials::methods::WINDOW;
-use crate::trials::pair::PairScan;
+use crate::claim::{Claim, Verdict};
+use fixtures::WINDOW;
+use fixtures::pair::PairScan;
 use wakescope_estimate::{
-    AutoregressivePeak, Correlogram, Estimator, LagWindowPeak, PolarPoint, Refinement, SignalKind, SpectralPeak,
-    Weighting,
+    Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Weighting,
+    estimators::{AutoregressivePeak, LagWindowPeak},
+    map::PolarPoint,
 };
 use wakescope_signal::NoiseModel;
 use wakescope_sim::export::Table;
@@ -71,11 +73,8 @@ fn cases(context: &Context) -> Vec<Case> {
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let scans = context.choose(4, 24, 100);
     let all = cases(context).into_iter().map(|case| measure(context, case, scans)).collect::<Result<Vec<_>, _>>()?;
-    let mut out = Rendered::default();
     let origin = context.provenance_of_formula(&format!("profile = \"{}\"\nscans = {scans}\n", context.profile_name()));
-    out.csv(table(&all).to_csv(&origin)?);
-    let figure = picture(&all);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table(&all), &picture(&all), &origin)?;
     out.marks = vec!["analytic pair".into()];
     out.caption = format!(
         "ANALYTIC PAIR, not a simulated flow: root mean square error against the pulse-weighted velocity over that of PA, below 1 where CA \

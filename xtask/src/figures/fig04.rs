@@ -1,12 +1,13 @@
 //! Figure 4: signal-to-noise ratio and system efficiency against range, in free space and through turbulence.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use std::ops::ControlFlow;
-use wakescope_optics::structure::StructureTable;
+use wakescope_optics::air::StructureTable;
+use wakescope_optics::monte_carlo::EfficiencyEstimate;
 use wakescope_optics::{
-    EfficiencyEstimate, EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Stop, Telescope, Turbulence,
-    theory,
+    EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Stop, Telescope, Turbulence, theory,
 };
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -30,9 +31,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let range_m: Vec<f64> = (1..=20).map(|i| 150.0 * f64::from(i)).collect();
     let weak = monte_carlo(WEAK_M_M23, &range_m, realisations, context.seed)?;
     let medium = monte_carlo(MEDIUM_M_M23, &range_m, realisations, context.seed)?;
-    let telescope = Telescope::chapter();
+    let telescope = Telescope::table2();
     let free = EfficiencyProfile::from_theory(&range_m, |r| theory::free_space_efficiency(&telescope, r))?;
-    let turbulence = Turbulence::chapter(MEDIUM_M_M23)?;
+    let turbulence = Turbulence::table2(MEDIUM_M_M23)?;
     let exact = EfficiencyProfile::from_theory(&range_m, |r| {
         theory::bistatic_efficiency(&telescope, &Misalignment::NONE, &turbulence, r)
     })?;
@@ -54,16 +55,14 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         },
     ];
 
-    let mut out = Rendered::default();
     let parameters =
         format!("set_up = \"chapter: 512 x 512 points of 2 mm, 10 layers\"\nrealisations = {realisations}\n");
     let origin = context.provenance_of_formula(&parameters);
-    out.csv(table(&curves)?.to_csv(&origin)?);
     let figure = Figure::side_by_side([
         plot("Signal-to-noise ratio", "SNR [dB]", &curves, |c| decibels(&c.profile, &c.profile.mean))?,
         plot("System efficiency", "efficiency", &curves, |c| Ok(c.profile.mean.clone()))?,
     ]);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table(&curves)?, &figure, &origin)?;
     out.caption = format!(
         "Signal-to-noise ratio (14) with h nu, and system efficiency (19), for the parameters of Table 2; {realisations} realisations \
          of 10 phase screens, bands of one standard error. Cn2 in m^(-2/3); bistatic means independent paths."
@@ -73,7 +72,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 }
 
 fn monte_carlo(cn2_m_m23: f64, range_m: &[f64], realisations: usize, seed: u64) -> Result<EfficiencyEstimate, Failure> {
-    let set_up = MonteCarlo { range_m: range_m.to_vec(), ..MonteCarlo::chapter(cn2_m_m23, seed)? };
+    let set_up = MonteCarlo { range_m: range_m.to_vec(), ..MonteCarlo::table2(cn2_m_m23, seed)? };
     Ok(set_up.run::<f32>(Stop::after(realisations), |_| ControlFlow::Continue(()))?)
 }
 
@@ -81,7 +80,7 @@ fn monte_carlo(cn2_m_m23: f64, range_m: &[f64], realisations: usize, seed: u64) 
 fn exact_for_screens(range_m: &[f64], turbulence: &Turbulence) -> Result<EfficiencyProfile, Failure> {
     let layers = Layers::equal(10, 3000.0)?;
     let table = StructureTable::new(&*turbulence.spectrum);
-    let telescope = Telescope::chapter();
+    let telescope = Telescope::table2();
     Ok(EfficiencyProfile::from_theory(range_m, |r| {
         let screens = layers.screens_to(r, &turbulence.cn2)?;
         theory::bistatic_efficiency_screens(&telescope, &Misalignment::NONE, &screens, &table, r)
@@ -89,7 +88,7 @@ fn exact_for_screens(range_m: &[f64], turbulence: &Turbulence) -> Result<Efficie
 }
 
 fn decibels(profile: &EfficiencyProfile, efficiency: &[f64]) -> Result<Vec<f64>, Failure> {
-    let model = SnrModel::chapter();
+    let model = SnrModel::table2();
     profile.range_m.iter().zip(efficiency).map(|(&r, &e)| Ok(10.0 * model.snr(r, e)?.log10())).collect()
 }
 
@@ -241,6 +240,6 @@ fn free_space_claim() -> Result<Claim, Failure> {
         "the free-space efficiency agrees with the reference curve",
         &format!("within {:e}", curve.tolerance),
         format!("within {:.1e} at {} ranges", compared.worst_error, compared.x.len()),
-        compared.passes(curve),
+        compared.claim(curve).passes(),
     ))
 }

@@ -1,9 +1,11 @@
 //! Figure 6: surfaces of equal vorticity of the wake, and an animation of a cross-plane.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use crate::wakes::Wake;
 use std::sync::Arc;
+use wakescope_les::analysis::decay::{amplitude_growth, value_at};
 use wakescope_sim::export::{CrossPlanes, Table};
 use wakescope_sim::flow::{read_field, read_planes};
 use wakescope_sim::plot::polar::PlaneCells;
@@ -16,17 +18,15 @@ const FRAME_S: f64 = 0.15;
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = Wake::of(context)?;
     let origin = context.provenance_of_formula(&wake.case_toml);
-    let mut out = Rendered::default();
     let mut table = Table::new();
     for name in ["tau".into(), "energy".into(), "energy_3d".into()].into_iter().chain((0..=8).map(mode_name)) {
         table = table.float(&name, wake.column(&name)?.iter().copied());
     }
-    out.csv(table.to_csv(&origin)?);
     let panels = wake.fields_tau.iter().enumerate().map(|(i, tau)| surfaces(&wake, i, *tau));
     let mut figure = Figure::stacked(panels.collect::<Result<Vec<_>, _>>()?);
     figure.columns = 2;
     figure.width = 1200.0;
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table, &figure, &origin)?;
     out.files.push(("apng".into(), animation::apng(&frames(&wake)?, FRAME_S, &origin)?));
     out.caption = format!(
         "Surfaces where |ω| b₀²/Γ₀ is 1 and 10, at τ = {:?}; {}, box repeated {REPEATS} times along the flight. The animation \
@@ -134,8 +134,8 @@ fn short_waves(wake: &Wake) -> Result<Claim, Failure> {
     let mut best = (0, f64::NEG_INFINITY, 0.0);
     for mode in modes {
         let curve = wake.curve(&mode_name(mode))?;
-        let at = |tau: f64| crate::validate::interpolate(&curve, tau);
-        let rate = 0.5 * (at(2.0) / at(1.0)).ln();
+        let at = |tau: f64| value_at(&curve, tau);
+        let rate = amplitude_growth(&curve, 1.0, 2.0);
         if rate > best.1 {
             best = (mode, rate, at(3.0) / at(1.0));
         }

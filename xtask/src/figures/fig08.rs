@@ -1,9 +1,10 @@
 //! Figure 8: radial velocity of the simulated wake, early and late, and what the lidar makes of it.
 
-use super::{Claim, Context, Rendered};
+use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::validate::interpolate;
+use crate::claim::Claim;
 use crate::wakes::Wake;
+use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::export::{Table, VelocityMap};
 use wakescope_sim::plan::{Plan, Target};
@@ -21,9 +22,8 @@ fn extent_m(wake: &Wake) -> Result<[f64; 3], Failure> {
     let mut extent_m = [f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     for (tau, _) in AGES {
         for side in ["left", "right"] {
-            let at = |name: &str| -> Result<f64, Failure> {
-                Ok(interpolate(&wake.curve(&format!("{name}_{side}_m"))?, tau))
-            };
+            let at =
+                |name: &str| -> Result<f64, Failure> { Ok(value_at(&wake.curve(&format!("{name}_{side}_m"))?, tau)) };
             let (y_m, z_m) = (at("y")?, at("z")?);
             extent_m = [extent_m[0].min(y_m), extent_m[1].max(y_m), extent_m[2].max(z_m)];
         }
@@ -74,7 +74,6 @@ fn scene(context: &Context, wake: &Wake, tau: f64) -> Result<Scene, Failure> {
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = Wake::of(context)?;
-    let mut out = Rendered::default();
     let mut panels = Vec::new();
     let mut tables = Vec::new();
     let mut extremes = Vec::new();
@@ -96,13 +95,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             panels.push(plot.coloured(shared));
         }
     }
-    out.csv(Table::stack(tables)?.to_csv(&origin)?);
     let realisations = scene(context, &wake, AGES[0].0)?.scan.realisations;
     let title =
         format!("Radial velocity, positive away from the lidar; estimated: mean of {realisations} realisations");
     let mut figure = Figure::stacked(panels).titled(&title);
     (figure.columns, figure.width) = (2, 1300.0);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&Table::stack(tables)?, &figure, &origin)?;
     out.caption = format!(
         "Radial velocity early and late (left: exact, right: mean of the estimates by periodogram accumulation, one pulse a line, 0 dB, \
          rho = 2 m); {}.",

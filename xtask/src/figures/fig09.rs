@@ -1,8 +1,9 @@
 //! Figure 9: accumulation level against range for three radii of the region.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
-use wakescope_estimate::{PolarPoint, ScanGeometry, WindowCorrelation};
+use crate::claim::{Claim, Verdict};
+use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use wakescope_sim::export::Table;
 use wakescope_sim::geometry::Geometry;
 use wakescope_sim::join;
@@ -57,18 +58,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("range_m", rows.iter().map(|r| r.1))
         .int("level", rows.iter().map(|r| r.2 as i64))
         .float("n_eff", rows.iter().map(|r| r.3));
-    let mut out = Rendered::default();
     let origin = wakescope_sim::export::Provenance {
         program: wakescope_sim::PROGRAM.into(),
         scene_toml: file.toml.clone(),
         scene_hash: file.hash.clone(),
         seed: context.seed,
     };
-    out.csv(table.to_csv(&origin)?);
     let (x, y) = (Axis::linear("range [m]"), Axis::log("windows accumulated"));
     let plot = CurvePlot { series, ..CurvePlot::new("Accumulation level", x, y) };
-    let figure = Figure::stacked([plot]);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
     out.caption =
         "Windows that one velocity estimate accumulates: one pulse a line every 1.25 mrad, one window a sample.".into();
 

@@ -1,8 +1,9 @@
 //! Figure 11: estimated map and its error, late, 400 ns, Cn2 = 1e-15, windows of 64 samples.
 
+use super::context::{Context, Rendered};
 use super::study::{Age, REFERENCES, Sight, Study, early_scene, stacked, with_method, with_turbulence};
-use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::plot::{Figure, MapPlot};
@@ -37,7 +38,6 @@ struct Measured {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let mut out = Rendered::default();
     let (mut tables, mut panels, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     let mut origin = None;
     let sight = Sight::of(context, Age::Late)?;
@@ -59,9 +59,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         origin.get_or_insert_with(|| study.provenance());
     }
     let origin = origin.ok_or_else(|| Failure::new("no map was made".into()))?;
-    out.csv(stacked("snr_reference", &tables).to_csv(&origin)?);
-    let figure = Figure::stacked(panels);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
     out.caption = format!(
         "Late: 400 ns, Cn2 = 1e-15, N = 64 (a gate of 38.4 m), periodogram \

@@ -1,8 +1,10 @@
 //! Figure 14: correlogram against periodogram accumulation at 200 and 400 ns, Cn2 = 1e-15, about the vortex centre.
 
+use super::context::{Context, Rendered};
+use super::profiles;
 use super::study::{Age, REFERENCES, Sight, Study, near_scene, with_method, with_turbulence};
-use super::{Claim, Context, Rendered, Verdict, profiles};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use profiles::{Profiles, peak, width_m};
 use wakescope_sim::plot::Figure;
 
@@ -24,15 +26,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         }
     }
     let origin = context.provenance_of_formula(&sight.scene(context, near_scene(realisations)).to_toml());
-    let mut out = Rendered::default();
     let every: Vec<&Profiles> = all.iter().collect();
-    out.csv(profiles::table(&every).to_csv(&origin)?);
     let panels = all.chunks(4).map(|of| {
         let four: Vec<&Profiles> = of.iter().collect();
         profiles::plot(&format!("{} signal-to-noise ratio", of[0].name), &four)
     });
-    let figure = Figure::stacked(panels);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&profiles::table(&every), &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
     out.caption = format!(
         "Root mean square error against the range from the vortex centre, over the lines within 4 m of a core, less its \

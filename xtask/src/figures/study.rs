@@ -1,14 +1,14 @@
-//! What figures 10 to 14 share: scans of the simulated wake or of the analytic pair, regions about the cores,
-//! averages with their standard errors.
+//! What figures 10 to 14 share: scans of the simulated wake or of the analytic pair, regions about the cores.
 //!
 //! Maps of neighbouring cells share their windows: as independent counts one line of sight in [`SHARED_LINES`] and one gate in
 //! [`SHARED_GATES`].
 
-use super::Context;
+use super::context::Context;
 use crate::Failure;
-use crate::validate::interpolate;
 use crate::wakes::Wake;
 use std::path::PathBuf;
+use wakescope_les::analysis::decay::value_at;
+use wakescope_sim::cell_average::CellAverage;
 use wakescope_sim::export::csv::Column;
 use wakescope_sim::export::{Provenance, Table};
 use wakescope_sim::map::VelocityEstimates;
@@ -107,7 +107,7 @@ impl Sight {
         };
         let core = |side: &str| -> Result<(f64, f64), Failure> {
             let at =
-                |name: &str| Ok::<f64, Failure>(b0_m * interpolate(&wake.curve(&format!("{name}_{side}"))?, age.tau()));
+                |name: &str| Ok::<f64, Failure>(b0_m * value_at(&wake.curve(&format!("{name}_{side}"))?, age.tau()));
             Ok((flow.lateral_position_m + at("y")?, at("z")?))
         };
         let cores = vec![core("left")?, core("right")?];
@@ -178,60 +178,22 @@ impl Study {
     }
 
     /// Averages over the cells whose distance to the nearer core, m, is accepted.
-    pub(super) fn over(&self, accept: impl Fn(f64) -> bool) -> Average {
+    pub(super) fn over(&self, accept: impl Fn(f64) -> bool) -> CellAverage {
         let mut cells = Vec::new();
         for (i, row) in self.distance_m.iter().enumerate() {
             cells.extend(row.iter().enumerate().filter(|(_, d)| accept(**d)).map(|(j, _)| (i, j)));
         }
-        self.average(&cells, SHARED_LINES * SHARED_GATES)
+        self.over_cells(&cells)
     }
 
     /// Averages over some cells, whose neighbours share lines and gates.
-    pub(super) fn over_cells(&self, cells: &[(usize, usize)]) -> Average {
-        self.average(cells, SHARED_LINES * SHARED_GATES)
+    pub(super) fn over_cells(&self, cells: &[(usize, usize)]) -> CellAverage {
+        CellAverage::over(&self.map, cells, SHARED_LINES * SHARED_GATES)
     }
 
     /// Averages over cells of a profile: at one gate, or at one for each vortex.
-    pub(super) fn over_profile(&self, cells: &[(usize, usize)]) -> Average {
-        self.average(cells, SHARED_LINES)
-    }
-
-    fn average(&self, cells: &[(usize, usize)], shared: f64) -> Average {
-        let m = &self.map;
-        let known: Vec<(usize, usize)> = cells.iter().copied().filter(|c| m.rms_m_s[*c].is_finite()).collect();
-        let n = known.len() as f64;
-        let mean = |field: &ndarray::Array2<f64>| known.iter().map(|c| field[*c]).sum::<f64>() / n;
-        let square = |field: &ndarray::Array2<f64>| (known.iter().map(|c| field[*c].powi(2)).sum::<f64>() / n).sqrt();
-        Average {
-            bias_m_s: mean(&m.bias_m_s),
-            std_m_s: square(&m.std_m_s),
-            rms_m_s: square(&m.rms_m_s),
-            standard_error_m_s: square(&m.standard_error_m_s) / (n / shared).max(1.0).sqrt(),
-        }
-    }
-}
-
-/// Errors over a set of cells: the mean bias, and root means of squares.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Average {
-    pub(super) bias_m_s: f64,
-    pub(super) std_m_s: f64,
-    pub(super) rms_m_s: f64,
-    /// Of `rms_m_s`.
-    pub(super) standard_error_m_s: f64,
-}
-
-impl Average {
-    /// Averages of independent batches of equal size as one.
-    pub(super) fn joined(batches: impl ExactSizeIterator<Item = Self>) -> Self {
-        let n = batches.len() as f64;
-        let mut sums = [0.0; 4];
-        for b in batches {
-            let squares = [b.bias_m_s, b.std_m_s.powi(2), b.rms_m_s.powi(2), b.standard_error_m_s.powi(2)];
-            sums.iter_mut().zip(squares).for_each(|(sum, value)| *sum += value / n);
-        }
-        let [bias_m_s, std, rms, error] = sums;
-        Self { bias_m_s, std_m_s: std.sqrt(), rms_m_s: rms.sqrt(), standard_error_m_s: (error / n).sqrt() }
+    pub(super) fn over_profile(&self, cells: &[(usize, usize)]) -> CellAverage {
+        CellAverage::over(&self.map, cells, SHARED_LINES)
     }
 }
 
@@ -246,42 +208,17 @@ fn cores_of(scene: &Scene) -> Vec<(f64, f64)> {
     }
 }
 
-/// Tables of the same columns one below the other, with a first column that tells them apart.
-pub(super) fn stacked(name: &str, parts: &[(&str, Table)]) -> Table {
-    let labels = parts.iter().flat_map(|(label, table)| {
+/// Tables of the same columns one below the other, with a last column that tells them apart.
+pub(super) fn stacked(name: &str, parts: Vec<(&str, Table)>) -> Result<Table, Failure> {
+    let labelled = parts.into_iter().map(|(label, table)| {
         let rows = table.columns().first().map_or(0, |(_, column)| match column {
             Column::Float(v) => v.len(),
             Column::Int(v) => v.len(),
             Column::Text(v) => v.len(),
         });
-        std::iter::repeat_n(*label, rows)
+        table.text(name, std::iter::repeat_n(label, rows))
     });
-    let mut out = Vec::new();
-    if let Some((_, first)) = parts.first() {
-        for (place, (column_name, kind)) in first.columns().iter().enumerate() {
-            let columns = parts.iter().map(|(_, table)| &table.columns()[place].1);
-            let joined = match kind {
-                Column::Float(_) => Column::Float(columns.flat_map(floats).collect()),
-                Column::Int(_) => Column::Int(columns.flat_map(ints).collect()),
-                Column::Text(_) => Column::Text(columns.flat_map(texts).collect()),
-            };
-            out.push((column_name.clone(), joined));
-        }
-    }
-    let table = out.into_iter().fold(Table::new(), |table, (column_name, column)| table.column(&column_name, column));
-    table.text(name, labels)
-}
-
-fn floats(column: &Column) -> Vec<f64> {
-    if let Column::Float(values) = column { values.clone() } else { Vec::new() }
-}
-
-fn ints(column: &Column) -> Vec<i64> {
-    if let Column::Int(values) = column { values.clone() } else { Vec::new() }
-}
-
-fn texts(column: &Column) -> Vec<String> {
-    if let Column::Text(values) = column { values.clone() } else { Vec::new() }
+    Ok(Table::stack(labelled)?)
 }
 
 /// Mean of some numbers and its standard error.
@@ -299,14 +236,8 @@ mod tests {
     #[test]
     fn stacked_tables_keep_their_rows_and_say_which_is_which() {
         let part = |x: f64| Table::new().float("x_m", [x, x + 1.0]).int("n", [1, 2]).text("t", ["a", "b"]);
-        let both = stacked("which", &[("one", part(1.0)), ("two", part(5.0))]);
-        let text = both.to_csv(&Provenance {
-            program: String::new(),
-            scene_toml: String::new(),
-            scene_hash: String::new(),
-            seed: 0,
-        });
-        let text = text.unwrap();
+        let both = stacked("which", vec![("one", part(1.0)), ("two", part(5.0))]).unwrap();
+        let text = both.to_csv(&crate::workspace::provenance("", 0)).unwrap();
         assert!(text.ends_with("x_m,n,t,which\n1.0,1,a,one\n2.0,2,b,one\n5.0,1,a,two\n6.0,2,b,two\n"), "{text}");
     }
 

@@ -4,11 +4,13 @@
 //! |---|---|
 //! | `circulation` | circulation on circles, (1), and `Gamma_5-15` |
 //! | `cross_plane` | planes of a simulated flow, as values and as a wind |
+//! | [`decay`] | when the fast decay of a wake begins, how fast its waves grow |
 //! | `wake` | [`WakeMeter`]: centres, circulations, secondary vortices, spectra, enstrophy of a simulated wake |
 
 mod circulation;
 #[cfg(feature = "solver")]
 mod cross_plane;
+pub mod decay;
 #[cfg(feature = "solver")]
 mod wake;
 

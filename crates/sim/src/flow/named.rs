@@ -243,16 +243,10 @@ impl CaseKind {
                 steady(cases::taylor_green_plane(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S))
             }
             Self::TaylorGreen(ref c) => cases::taylor_green_3d(c.cells, c.reynolds),
-            Self::Poiseuille(ref c) => {
-                steady(plates(c.cells, c.stretch, c.viscosity_m2_s).poiseuille(c.initial_share))
-            }
-            Self::Couette(ref c) => {
-                steady(plates(c.cells, c.stretch, c.viscosity_m2_s).couette(c.initial_share))
-            }
+            Self::Poiseuille(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).poiseuille(c.initial_share)),
+            Self::Couette(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).couette(c.initial_share)),
             Self::StokesLayer(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).decaying_layer()),
-            Self::RayleighPlate(ref c) => {
-                steady(plates(c.cells, c.stretch, c.viscosity_m2_s).rayleigh_plate())
-            }
+            Self::RayleighPlate(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).rayleigh_plate()),
             Self::OrrSommerfeld(ref c) => steady(
                 TollmienSchlichting::new(c.reynolds, c.wave_number)
                     .and_then(|wave| wave.case(c.cells, c.stretch, c.amplitude, ANY_STEP_S)),

@@ -3,8 +3,8 @@
 use super::case::{AxisName, FlowCase, Pressure, Scheme, Subgrid};
 use crate::Error;
 use std::path::Path;
-pub(super) use wakescope_les::cases::Initial;
 use wakescope_les::analysis::{WakeMeter, WakeScales};
+pub(super) use wakescope_les::cases::Initial;
 use wakescope_les::solver::{PressureMethod, StartReport, UndampedGrowth, ViscousTreatment};
 use wakescope_les::{Flow, FlowSettings, Mesh, SubgridModel, TimeScheme, TimeStep};
 
