@@ -51,7 +51,7 @@ mod tests {
     /// Meshes of all kinds: periodic and bounded, equal and stretched, thin, in both orders of memory.
     fn layouts() -> Vec<Layout> {
         let waves = |n| Direction::periodic(n, 0.0, 1.3);
-        let sine = |n| waves(n).stretched(Mapping::Sine { amplitude: 0.4 });
+        let sine = |n| waves(n).stretched(Mapping::Sine { amplitude: 0.25 });
         let slip = |n| Direction::between(n, 0.0, 0.9, Wall::Slip, Wall::Slip);
         let tanh = |strength| Mapping::TanhLow { strength };
         let ground = |n| Direction::between(n, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(tanh(1.5));

@@ -148,7 +148,7 @@ fn an_iteration_of_multigrid_gains_a_factor_of_ten_on_odd_sizes_strong_stretchin
         ("sinh 5 x tanh 5", [waves(32, 2.0), sinh(128, 5.0), ground(96, 5.0)]),
         ("sinh 3 x tanh 3", [waves(13, 2.0), sinh(127, 3.0), ground(131, 3.0)]),
         ("equal cells", [waves(13, 2.0), slip(127, 6.0), slip(131, 3.0)]),
-        ("equal cells in a plane", [Direction::thin(1.0), slip(96, 6.0), slip(97, 3.0)]),
+        ("uniform x tanh 2, a plane", [Direction::thin(1.0), slip(384, 6.0), ground(384, 2.0)]),
         ("cells 1e4 wide", [waves(16, 2.0), slip(64, 1e4), slip(64, 1.0)]),
         ("cells 1e4 high", [waves(16, 2.0), slip(64, 1.0), slip(64, 1e4)]),
         ("cells 1e4 long", [waves(16, 2e4), slip(64, 6.0), slip(64, 3.0)]),

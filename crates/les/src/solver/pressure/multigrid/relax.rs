@@ -94,7 +94,10 @@ pub(crate) fn residual_at(
     let at = a * first.stride + b * second.stride;
     let own = u[at];
     let right = &f[at];
-    let mut sum: Lanes = std::array::from_fn(|l| mode[l].mul_add(-m1 * m2 * own[l], right[l]));
+    let mut sum = [0.0; LANES];
+    for l in 0..LANES {
+        sum[l] = mode[l].mul_add(-m1 * m2 * own[l], right[l]);
+    }
     let (row, column) = (b * second.stride, a * first.stride);
     for &(i, c) in &first.taps[a] {
         add_difference(&mut sum, c * m2, &u[i * first.stride + row], &own);
@@ -182,7 +185,10 @@ fn relax_lines<const GROUP: usize>(
         // The link ahead; that of the last cell of a cut line leads to the cut.
         let ahead = if k + 1 < n { along.link[k] } else { 0.0 };
         for g in 0..GROUP {
-            let right = residual_at([along, across], [k, lines[g]], mode, u, f).map(|r| r * inverse_mass[g]);
+            let mut right = residual_at([along, across], [k, lines[g]], mode, u, f);
+            for right in &mut right {
+                *right *= inverse_mass[g];
+            }
             if k >= inner {
                 scratch.solution[k][g] = right;
                 continue;
