@@ -9,8 +9,10 @@ use wakescope_estimate::vortex_fit::{
     ScanSetup, Sharing, SignalFit, SignalFitOptions, VelocityMap, WakeModel, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
-    Correlogram, Estimator, LagWindowPeak, Noise, Radius, Refinement, Scan, SignalKind, SpectralPeak, Weighting,
-    WindowModel, likelihood_tapers, polar_points,
+    Correlogram, Estimator, Radius, Refinement, Scan, SignalKind, SpectralPeak, Weighting,
+    bound::{Noise, WindowModel},
+    estimators::{LagWindowPeak, likelihood_tapers},
+    polar_points,
 };
 use wakescope_sim::join;
 use wakescope_sim::plan::{Plan, Target};
@@ -45,7 +47,7 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
         pulse: PulseShape::gaussian(join::pulse(scene).unwrap().sigma_s()).unwrap(),
         wake: WakeModel::default(),
         elevation_rad: plan.geometry.elevation_rad.clone(),
-        first_sample_time_s: 2.0 * plan.geometry.first_range_m / wakescope_estimate::SPEED_OF_LIGHT_M_S,
+        first_sample_time_s: 2.0 * plan.geometry.first_range_m / wakescope_estimate::window::SPEED_OF_LIGHT_M_S,
         record_samples: plan.geometry.samples,
     };
     let noise_power_a2 = join::receiver(scene).noise_variance_a2();

@@ -7,8 +7,9 @@ use wakescope_estimate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFitOptions, RangeKernel, Sharing, SignalFitOptions, VelocityMap, Wake,
     WakeModel, fit_map_of_estimator, fit_signals,
 };
-use wakescope_estimate::*;
-use wakescope_les::{Sum, VortexPair, Wind};
+use wakescope_estimate::{Correlogram, Error, estimators::*, map::*, window::*};
+use wakescope_les::winds::Sum;
+use wakescope_les::{VortexPair, Wind};
 use wakescope_signal::NoiseModel;
 
 /// Radius of the regions \[m\].

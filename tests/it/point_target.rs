@@ -4,8 +4,9 @@ use fixtures::{ENERGY_J, WINDOW, receiver, sampling};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use wakescope_estimate::{
-    Correlogram, Estimator, Noise, SPEED_OF_LIGHT_M_S, Sampling, Scratch, SignalKind, SpectralPeak, Statistic,
-    Weighting, WindowModel,
+    Correlogram, Estimator, Sampling, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
+    bound::{Noise, WindowModel},
+    window::SPEED_OF_LIGHT_M_S,
 };
 use wakescope_signal::{GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, Simulator};
 

@@ -3,7 +3,7 @@
 
 use fixtures::WINDOW;
 use fixtures::pair::{PairCase, PairScan};
-use wakescope_estimate::*;
+use wakescope_estimate::{Correlogram, Scratch, SignalKind, Weighting, estimators::*, map::*};
 use wakescope_signal::NoiseModel;
 
 /// Root-mean-square errors of an estimator: against the velocity of the pulse within 8 m of a core and beyond 30 m from

@@ -1,6 +1,6 @@
 //! `cargo xtask fit-trials`: fits to many scans of a pair against the truth, their bound and a start at the truth.
 //!
-//! Every scan is fitted from its map on: the map with the core typical and with it fitted, then all signals with one core radius
+//! Every scan is fitted from its map on: the map with the core kept at the typical one, about it and free, then all signals with one core radius
 //! fitted or the true one, and once more from the truth on. Each row has its standard error; one thread tells the processor time.
 
 use crate::trials::fits::FitTrial;
@@ -10,7 +10,7 @@ use fixtures::pair::{PairCase, PairScan};
 use ndarray::Array2;
 use wakescope_estimate::Error;
 use wakescope_estimate::vortex_fit::{
-    FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
+    CorePrior, FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
 };
 use wakescope_signal::NoiseModel;
 
@@ -131,14 +131,16 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth)?;
     let covariance = model.bound(&truth, Powers::default(), &of_signals, true)?;
     let bound: [f64; PARAMETERS] = std::array::from_fn(|i| covariance[[i, i]].sqrt());
-    let mut maps = [Fits::of("map, typical core"), Fits::of("map, one core fitted")];
+    let mut maps =
+        [Fits::of("map, core kept"), Fits::of("map, core about the typical one"), Fits::of("map, core fitted freely")];
     let mut signals = [Fits::of("signals"), Fits::of("signals, started at the truth")];
     let mut below = Vec::new();
     for scan in 0..options.scans as usize {
         let trial = FitTrial::new(&pair, scan)?;
         let mut guess = None;
-        for (fits, core) in maps.iter_mut().zip([Sharing::Fixed, Sharing::Common]) {
-            let (fit, cost) = measured(|| trial.map(free(core)))?;
+        let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
+        for (fits, (core, prior)) in maps.iter_mut().zip(cores) {
+            let (fit, cost) = measured(|| trial.map(free(core), prior))?;
             let kept = fits.keep(scan, (fit, cost.cpu_s()), |fit: &MapFit| (fit.wake, &fit.covariance));
             guess = guess.or(kept.map(|fit| fit.wake));
         }

@@ -1,6 +1,7 @@
 //! The one error type of the crate: each variant names the field, the value that was given and what is allowed.
 
-use crate::sampling::{self, SetUp, Violation};
+#[cfg(feature = "screens")]
+use crate::plan::violation::{SetUp, Violation, listed};
 use thiserror::Error;
 
 /// Everything that can go wrong in this crate.
@@ -8,7 +9,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum Error {
     /// A number lies outside its allowed interval, or is not a number.
-    #[error("{field} = {value} is not allowed: {allowed}")]
+    #[error("{field} = {value:?} is not allowed: {allowed}")]
     OutOfRange {
         /// Name of the field or parameter, with its unit suffix.
         field: &'static str,
@@ -28,7 +29,7 @@ pub enum Error {
         expected: usize,
     },
     /// A list that must increase strictly does not.
-    #[error("{field} must increase strictly, but entry {index} = {value} does not exceed the one before")]
+    #[error("{field} must increase strictly, but entry {index} = {value:?} does not exceed the one before")]
     NotIncreasing {
         /// Name of the list.
         field: &'static str,
@@ -39,7 +40,7 @@ pub enum Error {
     },
     /// A profile was asked for a range that it does not cover.
     #[error(
-        "range {range_m} m lies outside the profile, which covers {first_m} m to {last_m} m: nothing is extrapolated"
+        "range {range_m:?} m lies outside the profile, which covers {first_m:?} m to {last_m:?} m: nothing is extrapolated"
     )]
     Extrapolation {
         /// The range that was asked for \[m\].
@@ -50,7 +51,8 @@ pub enum Error {
         last_m: f64,
     },
     /// A grid cannot hold what it is asked to hold: every limit that it violates, and a set-up that does not.
-    #[error("sampling: {}", sampling::in_words(violations, would_do.as_ref()))]
+    #[cfg(feature = "screens")]
+    #[error("sampling: {}", listed(violations, would_do.as_ref()))]
     Sampling {
         /// The limits, one at least.
         violations: Vec<Violation>,
@@ -64,7 +66,9 @@ pub enum Error {
         most: usize,
     },
     /// The absorbing border took so much power that the result means nothing.
-    #[error("the absorbing border took {fraction:.3} of the power before {range_m} m, 0.05 at most: use a wider grid")]
+    #[error(
+        "the absorbing border took {fraction:.3} of the power before {range_m:?} m, 0.05 at most: use a wider grid"
+    )]
     PowerLost {
         /// Range at which it was noticed \[m\].
         range_m: f64,
@@ -79,7 +83,7 @@ pub enum Error {
     },
     /// The beam has so many Fresnel zones that no quadrature follows them.
     #[error(
-        "the Fresnel number a^2 |1/R - 1/F| / lambda is {found:.4e} at {range_m} m, {largest} at most: the range must be nearer to \
+        "the Fresnel number a^2 |1/R - 1/F| / lambda is {found:.4e} at {range_m:?} m, {largest:?} at most: the range must be nearer to \
          the focus, or the aperture smaller"
     )]
     FresnelNumber {
@@ -131,4 +135,28 @@ pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<f64, Error
 /// `value` when it is finite, else an error that names `field`.
 pub(crate) fn finite(field: &'static str, value: f64) -> Result<f64, Error> {
     if value.is_finite() { Ok(value) } else { Err(Error::OutOfRange { field, value, allowed: "a finite number" }) }
+}
+
+/// The field that an error names.
+#[cfg(test)]
+pub(crate) fn refused<T>(result: Result<T, Error>) -> &'static str {
+    match result.err() {
+        Some(Error::OutOfRange { field, .. } | Error::Length { field, .. } | Error::NotIncreasing { field, .. }) => {
+            field
+        }
+        other => panic!("a refusal by name, not {other:?}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiny_and_huge_values_are_told_in_few_digits() {
+        let told = |value| Error::OutOfRange { field: "a_m", value, allowed: "positive" }.to_string();
+        for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
+            assert_eq!(told(value), format!("a_m = {text} is not allowed: positive"));
+        }
+    }
 }

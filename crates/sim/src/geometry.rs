@@ -6,6 +6,7 @@ use crate::SPEED_OF_LIGHT_M_S;
 use crate::scene::Scene;
 use crate::wind::SceneWind;
 use crate::{Error, join};
+use wakescope_signal::LayerLimits;
 
 /// The sampling of one scan in angle, range and time.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,8 +54,9 @@ impl Geometry {
         // Windows are indexed by their centre, R = c (t_p + N T_s/2)/2.
         let centre_m = |first: &usize| scan.range_min_m + (*first as f64 + 0.5 * window as f64) * sample_spacing_m;
         let pulse = join::pulse(scene)?;
+        let (sample_rate_hz, wavelength_m) = (scene.detector.sampling_hz, scene.laser.wavelength_m);
         let layer_thickness_m =
-            pulse.layer_thickness_m(scene.detector.sampling_hz, scene.laser.wavelength_m, max_gradient_per_s)?;
+            pulse.layer_thickness_m(LayerLimits { sample_rate_hz, wavelength_m, max_gradient_per_s })?;
         // Layers before and behind the range of a sample that the pulse lights.
         let (first_s, last_s) = pulse.support_s();
         let reach = |time_s: f64| (time_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m).max(0.0).ceil() as usize;

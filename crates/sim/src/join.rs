@@ -26,15 +26,17 @@ use wakescope_signal as signal;
 /// What the wind refuses; a checked scene gives none.
 pub fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
     Ok(match &scene.flow {
-        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::Calm),
-        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?),
+        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::winds::Calm),
+        Flow::Uniform { lateral_m_s, vertical_m_s } => {
+            Box::new(les::winds::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?)
+        }
         Flow::VortexPair(pair) => {
             let vortices = Box::new(vortex_pair(pair).wind()?);
             if pair.cross_wind_m_s == 0.0 {
                 return Ok(vortices);
             }
-            let cross = Box::new(les::Uniform::new([0.0, pair.cross_wind_m_s, 0.0])?);
-            Box::new(les::Sum { winds: vec![vortices, cross] })
+            let cross = Box::new(les::winds::Uniform::new([0.0, pair.cross_wind_m_s, 0.0])?);
+            Box::new(les::winds::Sum { winds: vec![vortices, cross] })
         }
     })
 }
@@ -103,19 +105,15 @@ fn unchecked_telescope(scene: &Scene) -> optics::Telescope {
 /// What the optics refuse; a checked scene gives none.
 pub fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Error> {
     let convention = match t.outer_scale_wavenumber {
-        OuterScaleWavenumber::Inverse => optics::OuterScaleConvention::Inverse,
-        OuterScaleWavenumber::TwoPiOver => optics::OuterScaleConvention::TwoPiOver,
+        OuterScaleWavenumber::Inverse => optics::air::OuterScaleConvention::Inverse,
+        OuterScaleWavenumber::TwoPiOver => optics::air::OuterScaleConvention::TwoPiOver,
     };
+    let scales = optics::air::Scales { outer_scale_m: t.outer_scale_m, inner_scale_m: t.inner_scale_m, convention };
     let spectrum: Arc<dyn optics::Spectrum> = match t.spectrum {
-        SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(
-            t.outer_scale_m,
-            t.inner_scale_m,
-            convention,
-            optics::spectrum::CHAPTER_CONSTANT,
-        )?),
+        SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(scales, optics::air::CHAPTER_CONSTANT)?),
         SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
         SpectrumKind::Tatarskii => Arc::new(optics::VonKarman::tatarskii(t.inner_scale_m)?),
-        SpectrumKind::HillAndrews => Arc::new(optics::HillAndrews::new(t.outer_scale_m, t.inner_scale_m, convention)?),
+        SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
     };
     Ok(optics::Turbulence { spectrum, cn2: optics::Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 }.validated()? })
 }
@@ -137,15 +135,17 @@ pub fn screen_plans(
     t: &RefractiveTurbulence,
     runs: &[&[f64]],
 ) -> Result<Vec<optics::plan::Plan>, optics::Error> {
-    let (telescope, turbulence, none) = (unchecked_telescope(scene), turbulence(t)?, optics::Misalignment::NONE);
+    let case = optics::plan::Case {
+        telescope: unchecked_telescope(scene),
+        misalignment: optics::Misalignment::NONE,
+        turbulence: turbulence(t)?,
+        realisations: t.realisations,
+    };
     match t.sampling {
-        ScreenSampling::Derived => {
-            let plan = |range_m: &&[f64]| optics::plan::plan(&telescope, &none, &turbulence, range_m, t.realisations);
-            runs.iter().map(plan).collect()
-        }
+        ScreenSampling::Derived => runs.iter().map(|range_m| case.plan(range_m)).collect(),
         ScreenSampling::Explicit => {
             let grid = optics::Grid::square(t.grid_points, t.grid_spacing_m)?;
-            optics::plan::examine_runs(&telescope, &none, &turbulence, &grid, t.layers, runs, t.realisations)
+            case.examine_runs(&grid, t.layers, runs)
         }
     }
 }
@@ -172,10 +172,9 @@ pub fn monte_carlo(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> 
         grid: plan.grid,
         layers: plan.layers,
         range_m: range_m.to_vec(),
-        transfer: optics::propagate::TransferKind::Paraxial,
+        transfer: optics::screens::TransferKind::Paraxial,
         seed: scene.seed,
-        sampling: optics::Sampling::Antithetic,
-        correct_grid: true,
+        sampling: optics::monte_carlo::Sampling::Antithetic,
     })
 }
 
@@ -193,8 +192,8 @@ pub fn snr_model(scene: &Scene) -> Result<optics::SnrModel, Error> {
         backscatter_per_m_sr: scene.atmosphere.backscatter_per_m_sr,
         extinction_per_m: scene.atmosphere.extinction_per_m,
         planck: match scene.detector.snr {
-            SnrReference::Chapter {} => optics::PlanckConvention::Hbar,
-            _ => optics::PlanckConvention::H,
+            SnrReference::Chapter {} => optics::snr::PlanckConvention::Hbar,
+            _ => optics::snr::PlanckConvention::H,
         },
     };
     Ok(model.validated()?)
@@ -216,16 +215,16 @@ pub fn pulse(scene: &Scene) -> Result<signal::Pulse, Error> {
         }
         PulseShape::Sampled(shape) => {
             let resampling = match shape.resampling {
-                PulseResampling::CubicSpline => signal::Resampling::CubicSpline,
-                PulseResampling::BandLimited => signal::Resampling::BandLimited,
-                PulseResampling::Linear => signal::Resampling::Linear,
+                PulseResampling::CubicSpline => signal::sampled::Resampling::CubicSpline,
+                PulseResampling::BandLimited => signal::sampled::Resampling::BandLimited,
+                PulseResampling::Linear => signal::sampled::Resampling::Linear,
             };
             let sampled = if shape.phase_rad.is_empty() {
-                signal::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
+                signal::sampled::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
             } else {
                 let polar = |(power, phase): (&f64, &f64)| Complex::from_polar(power.sqrt(), *phase);
                 let envelope: Vec<_> = shape.power.iter().zip(&shape.phase_rad).map(polar).collect();
-                signal::SampledPulse::new(&shape.time_s, &envelope, resampling, p.energy_j)?
+                signal::sampled::SampledPulse::new(&shape.time_s, &envelope, resampling, p.energy_j)?
             };
             signal::Pulse::from(if shape.centred { sampled.centred() } else { sampled })
         }
@@ -263,12 +262,12 @@ pub fn return_per_m(scene: &Scene) -> Result<impl Fn(f64) -> Result<f64, Error>,
 ///
 /// # Errors
 /// What the signal simulation refuses; a checked scene gives none.
-pub fn digitiser(scene: &Scene) -> Result<Option<signal::Digitiser>, Error> {
+pub fn digitiser(scene: &Scene) -> Result<Option<signal::digitise::Digitiser>, Error> {
     match scene.detector.digitiser {
         Digitiser::None {} => Ok(None),
         Digitiser::Quantised { bits, full_scale_over_noise } => {
             let full_scale_a = full_scale_over_noise * receiver(scene).noise_variance_a2().sqrt();
-            Ok(Some(signal::Digitiser::new(bits, full_scale_a)?))
+            Ok(Some(signal::digitise::Digitiser::new(bits, full_scale_a)?))
         }
     }
 }
@@ -284,8 +283,8 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
         quantum_efficiency: d.quantum_efficiency,
         local_oscillator_w: d.local_oscillator_w,
         planck: match d.snr {
-            SnrReference::Chapter {} => signal::PlanckConvention::Hbar,
-            _ => signal::PlanckConvention::H,
+            SnrReference::Chapter {} => signal::receiver::PlanckConvention::Hbar,
+            _ => signal::receiver::PlanckConvention::H,
         },
         noise: match d.noise {
             NoiseKind::Band => signal::NoiseModel::BandLimited,

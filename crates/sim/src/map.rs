@@ -8,10 +8,14 @@ use crate::scan::{Scanner, radial_velocity_m_s};
 use crate::{Error, join};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use wakescope_estimate::{
-    ErrorMap, GateVelocity, Gates, MapPoint, NoiseTest, PolarPoint, Radius, Sample, Sampling, Scan, ScanGeometry,
-    ScanSums, Statistic, WindowCorrelation, polar_points,
+    GateVelocity, Gates, Radius, Sampling, Scan, Statistic,
+    estimators::NoiseTest,
+    map::{ErrorMap, MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCorrelation},
+    polar_points,
+    window::Sample,
 };
-use wakescope_signal::{Clipped, RangeFilter};
+use wakescope_signal::RangeFilter;
+use wakescope_signal::digitise::Clipped;
 
 /// Estimates of the radial velocity and their errors, each \[line, gate\].
 #[derive(Debug, Clone, PartialEq)]
@@ -169,7 +173,7 @@ struct Truth {
     gate_m_s: Array2<f64>,
 }
 
-impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
+impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
     pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let (sampling, gates) = (join::sampling(scene)?, join::gates(scene)?);
@@ -317,7 +321,7 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
 }
 
 /// Runs the estimates of all realisations; the records of those that the files will have go to `kept`, too, piece after piece.
-pub(crate) fn estimate<S: Sample + wakescope_signal::Sample>(
+pub(crate) fn estimate<S: Sample + wakescope_signal::scan::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,

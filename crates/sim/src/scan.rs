@@ -11,9 +11,10 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 use std::ops::Range;
 use wakescope_optics::plan::Model;
-use wakescope_signal::{
-    Clipped, Digitiser, EfficiencyTable, LayerEfficiency, LineOfSight, PulseKey, Sample, Scan, Shot, Simulator,
-};
+use wakescope_signal::digitise::{Clipped, Digitiser};
+use wakescope_signal::efficiency::{EfficiencyTable, LayerEfficiency};
+use wakescope_signal::scan::{PulseKey, Sample};
+use wakescope_signal::{LineOfSight, Scan, Shot, Simulator};
 
 /// Ranges of the efficiency profile from which the layers take theirs, m: dense where it is a quadrature, few
 /// where each costs transforms and the errors of neighbours are alike.

@@ -92,7 +92,8 @@ mod planes {
     use crate::export::CrossPlanes;
     use crate::planes_input::{files, read};
     use crate::scene::{SimulatedFlow, SimulatedMotion};
-    use wakescope_les::{Edges, Error as LesError, GridSeries, GridSnapshot, OutsidePolicy, PlaneMesh, Side};
+    use wakescope_les::winds::{Edges, GridSeries, OutsidePolicy, PlaneMesh, Side};
+    use wakescope_les::{Error as LesError, GridSnapshot};
 
     /// A wind that stands still as it was at one time.
     struct Frozen {

@@ -7,8 +7,9 @@ use crate::claim::{Claim, Verdict};
 use fixtures::WINDOW;
 use fixtures::pair::PairScan;
 use wakescope_estimate::{
-    AutoregressivePeak, Correlogram, Estimator, LagWindowPeak, PolarPoint, Refinement, SignalKind, SpectralPeak,
-    Weighting,
+    Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Weighting,
+    estimators::{AutoregressivePeak, LagWindowPeak},
+    map::PolarPoint,
 };
 use wakescope_signal::NoiseModel;
 use wakescope_sim::export::Table;

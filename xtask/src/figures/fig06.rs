@@ -5,7 +5,7 @@ use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use crate::wakes::Wake;
 use std::sync::Arc;
-use wakescope_les::decay::{amplitude_growth, value_at};
+use wakescope_les::analysis::decay::{amplitude_growth, value_at};
 use wakescope_sim::export::{CrossPlanes, Table};
 use wakescope_sim::flow::{read_field, read_planes};
 use wakescope_sim::plot::polar::PlaneCells;

@@ -3,7 +3,7 @@
 use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
-use wakescope_estimate::{PolarPoint, ScanGeometry, WindowCorrelation};
+use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use wakescope_sim::export::Table;
 use wakescope_sim::geometry::Geometry;
 use wakescope_sim::join;

@@ -7,7 +7,11 @@ use crate::trials::methods::Known;
 use crate::trials::noise_name;
 use crate::trials::uniform::{Air, BAND_M_S, errors};
 use fixtures::{WINDOW, sampling};
-use wakescope_estimate::{GoodAndBad, Noise, SignalKind, WindowModel, good_and_bad};
+use wakescope_estimate::{
+    SignalKind,
+    bound::{Noise, WindowModel},
+    map::{GoodAndBad, good_and_bad},
+};
 use wakescope_signal::NoiseModel;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};

@@ -4,9 +4,13 @@ use crate::Failure;
 use fixtures::{WINDOW, sampling};
 use std::sync::Arc;
 use wakescope_estimate::{
-    AutoregressivePeak, AutoregressivePole, CaponPeak, Correlogram, Estimator, FirstMoment, GradientLikelihood,
-    GradientModel, LagWindowPeak, Noise, OrderChoice, PulsePair, Refinement, SignalKind, SpectralPeak, Statistic,
-    Unbiased, Weighting, WindowModel, likelihood_tapers,
+    Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Statistic, Weighting,
+    bound::{GradientModel, Noise, WindowModel},
+    estimators::{
+        AutoregressivePeak, AutoregressivePole, CaponPeak, FirstMoment, GradientLikelihood, LagWindowPeak, PulsePair,
+        Unbiased, likelihood_tapers,
+    },
+    models::OrderChoice,
 };
 use wakescope_signal::NoiseModel;
 

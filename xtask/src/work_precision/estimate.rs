@@ -11,9 +11,10 @@ use crate::trials::uniform::{Air, BAND_M_S};
 use fixtures::pair::PairScan;
 use fixtures::{WINDOW, sampling};
 use wakescope_estimate::{
-    AutoregressivePeak, CaponPeak, Correlogram, Estimator, FirstMoment, GradientLikelihood, GradientModel,
-    LagWindowPeak, Noise, Refinement, Scratch, SignalKind, SpectralPeak, Statistic, Weighting, WindowModel,
-    good_and_bad,
+    Correlogram, Estimator, Refinement, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
+    bound::{GradientModel, Noise, WindowModel},
+    estimators::{AutoregressivePeak, CaponPeak, FirstMoment, GradientLikelihood, LagWindowPeak},
+    map::good_and_bad,
 };
 use wakescope_signal::NoiseModel;
 

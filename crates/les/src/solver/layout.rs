@@ -6,8 +6,8 @@
 //!
 //! Check: the order of plane and spatial flows.
 
-use super::line::Line;
 use super::mesh::{Ends, Mesh, Wall};
+use super::operators_1d::Operators1d;
 
 /// Number of values along the three memory axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,9 +27,19 @@ impl Shape {
         self.n[0] * self.n[1]
     }
 
+    /// Indices along the axes of a place in memory.
+    pub(crate) fn index(self, place: usize) -> [usize; 3] {
+        [place % self.n[0], place / self.n[0] % self.n[1], place / self.plane()]
+    }
+
+    /// Place in memory of indices along the axes.
+    pub(crate) fn place(self, [i, j, k]: [usize; 3]) -> usize {
+        (k * self.n[1] + j) * self.n[0] + i
+    }
+
     /// Places of the row at indices `j` of axis 1 and `k` of axis 2.
     pub(crate) fn row(self, j: usize, k: usize) -> std::ops::Range<usize> {
-        let start = (k * self.n[1] + j) * self.n[0];
+        let start = self.place([0, j, k]);
         start..start + self.n[0]
     }
 }
@@ -38,7 +48,7 @@ impl Shape {
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     /// Operators of each memory axis.
-    pub(crate) line: [Line; 3],
+    pub(crate) line: [Operators1d; 3],
     /// The direction (0, 1, 2 for x, y, z) of each memory axis.
     pub(crate) direction: [usize; 3],
     /// Number of values.
@@ -54,7 +64,7 @@ impl Layout {
             [1, _, nz] if nz > 1 => [2, 0, 1],
             _ => [0, 1, 2],
         });
-        let line = direction.map(|d| Line::new(&mesh.directions()[d]));
+        let line = direction.map(|d| Operators1d::new(&mesh.directions()[d]));
         let shape = Shape { n: direction.map(|d| cells[d]) };
         Self { line, direction, shape }
     }

@@ -1,7 +1,7 @@
 //! `wakescope flow`: simulations from case files.
 
 use super::output::print;
-use super::{Cli, progress, say, with_threads};
+use super::{Cli, progress, say};
 use crate::Error;
 use crate::flow::{Begin, CaseFile, EXAMPLES, FlowForecast, RunOptions, Watch, check, example, run_with};
 use clap::Args;
@@ -64,24 +64,22 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
     };
     let options = RunOptions { begin, allow_large: words.allow_large };
     if words.check {
-        let forecast = with_threads(cli, || check(file, words.out.as_deref(), options))??;
-        return say(cli, &forecast_json(&forecast), &format!("good\n{forecast}"));
+        let forecast = check(file, words.out.as_deref(), options)?;
+        return say(cli.json, &forecast_json(&forecast), &format!("good\n{forecast}"));
     }
     let Some(out) = &words.out else {
         let reason = "a run needs a folder to write to".into();
         return Err(Error::Input { path: PathBuf::from("--out DIR"), reason });
     };
-    let outcome = with_threads(cli, || {
-        let mut quiet = progress::NotesOnly;
-        let mut bar;
-        let watch: &mut dyn Watch = if cli.quiet {
-            &mut quiet
-        } else {
-            bar = progress::FlowBar::new();
-            &mut bar
-        };
-        run_with(file, out, options, watch)
-    })??;
+    let mut quiet = progress::NotesOnly;
+    let mut bar;
+    let watch: &mut dyn Watch = if cli.quiet {
+        &mut quiet
+    } else {
+        bar = progress::FlowBar::new();
+        &mut bar
+    };
+    let outcome = run_with(file, out, options, watch)?;
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
         "is_complete": outcome.is_complete, "kinetic_energy_m5_s2": outcome.kinetic_energy_m5_s2,
@@ -97,7 +95,7 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
         outcome.files.len(),
         out.display()
     );
-    say(cli, &object, &text)
+    say(cli.json, &object, &text)
 }
 
 fn forecast_json(forecast: &FlowForecast) -> Value {

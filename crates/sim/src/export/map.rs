@@ -5,7 +5,7 @@
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use super::site::Site;
 use ndarray::{Array2, Array3};
-use wakescope_les::{Edges, Side};
+use wakescope_les::winds::{Edges, Side};
 
 /// Unit of a field: its tag in a CSV column name and its text in NetCDF (UDUNITS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -234,7 +234,7 @@ impl VelocityMap {
         let times: Vec<f64> = self.rays.iter().map(|r| r.time_s).collect();
         increasing("ray time_s", &times)?;
         if self.range_m[0] <= 0.0 {
-            return Err(OutputError::value("range_m", self.range_m[0], "must be positive"));
+            return Err(OutputError::value("range_m", format!("{:?}", self.range_m[0]), "must be positive"));
         }
         self.check_rays()?;
         for (i, field) in self.fields.iter().enumerate() {

@@ -6,8 +6,9 @@ use crate::scene::{VortexProfile, section};
 use crate::{Error, join};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use wakescope_les::solver::Ends;
 use wakescope_les::{
-    Direction, Ends, FlowSettings, Ground, Mapping, Mesh, Motion, TimeScheme, TimeStep, VortexPair, Wall, Wind,
+    Direction, FlowSettings, Ground, Mapping, Mesh, Motion, TimeScheme, TimeStep, VortexPair, Wall, Wind,
 };
 
 /// How the cells of a direction are spread.

@@ -44,7 +44,7 @@ use crate::export::Provenance;
 use crate::scene::{Located, Problem, SceneError, hash_of, located, parsed};
 use crate::text_file;
 use std::path::{Path, PathBuf};
-use wakescope_les::StepRecord;
+use wakescope_les::solver::StepRecord;
 
 /// A valid case, with what names it.
 #[derive(Debug, Clone, PartialEq)]

@@ -236,27 +236,24 @@ impl CaseKind {
             case.settings.time_step = TimeStep::Courant { courant, longest_s: case.end_s / LEAST_STEPS };
             Ok(case)
         };
+        let plates =
+            |cells, strength, viscosity_m2_s| cases::Plates { cells, strength, viscosity_m2_s, step_s: ANY_STEP_S };
         let case = match *self {
             Self::TaylorGreenPlane(ref c) => {
                 steady(cases::taylor_green_plane(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S))
             }
             Self::TaylorGreen(ref c) => cases::taylor_green_3d(c.cells, c.reynolds),
-            Self::Poiseuille(ref c) => {
-                steady(cases::poiseuille(c.cells, c.stretch, c.viscosity_m2_s, c.initial_share, ANY_STEP_S))
-            }
-            Self::Couette(ref c) => {
-                steady(cases::couette(c.cells, c.stretch, c.viscosity_m2_s, c.initial_share, ANY_STEP_S))
-            }
-            Self::StokesLayer(ref c) => steady(cases::decaying_layer(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S)),
-            Self::RayleighPlate(ref c) => {
-                steady(cases::rayleigh_plate(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S))
-            }
+            Self::Poiseuille(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).poiseuille(c.initial_share)),
+            Self::Couette(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).couette(c.initial_share)),
+            Self::StokesLayer(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).decaying_layer()),
+            Self::RayleighPlate(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).rayleigh_plate()),
             Self::OrrSommerfeld(ref c) => steady(
                 TollmienSchlichting::new(c.reynolds, c.wave_number)
                     .and_then(|wave| wave.case(c.cells, c.stretch, c.amplitude, ANY_STEP_S)),
             ),
             Self::Dipole(ref c) => {
-                cases::dipole_against_wall(c.cells, [c.lateral_stretch(), c.stretch], c.reynolds, c.closed_sides)
+                let dipole = if c.closed_sides { cases::dipole_in_a_box } else { cases::dipole_between_walls };
+                dipole(c.cells, [c.lateral_stretch(), c.stretch], c.reynolds)
             }
             Self::LidDrivenCavity(ref c) => cases::lid_driven_cavity(c.cells, c.stretch, c.reynolds),
             Self::Channel(ref c) => cases::channel(c.cells, c.stretch, c.reynolds_tau),

@@ -3,11 +3,10 @@
 use super::case::{AxisName, FlowCase, Pressure, Scheme, Subgrid};
 use crate::Error;
 use std::path::Path;
+use wakescope_les::analysis::{WakeMeter, WakeScales};
 pub(super) use wakescope_les::cases::Initial;
-use wakescope_les::{
-    Flow, FlowSettings, Mesh, PressureMethod, StartReport, SubgridModel, TimeScheme, TimeStep, UndampedGrowth,
-    ViscousTreatment, WakeMeter, WakeScales,
-};
+use wakescope_les::solver::{PressureMethod, StartReport, UndampedGrowth, ViscousTreatment};
+use wakescope_les::{Flow, FlowSettings, Mesh, SubgridModel, TimeScheme, TimeStep};
 
 /// All that a simulation is made of.
 pub(super) struct Setup {

@@ -1,13 +1,12 @@
 //! The optics of a plan: phase screens only where no theory is valid, or where they are asked for beside it.
 
-use super::{Cost, PlannedStage, Stage, Target};
+use super::stage::{Cost, PlannedStage, Stage, Target};
 use crate::geometry::Geometry;
 use crate::profile::{drawn_turbulence, model, spaced, turbulence};
 use crate::scan::profile_ranges_m;
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
 use crate::{Error, join};
-use wakescope_optics::plan::{Model, Warning};
-use wakescope_optics::sampling::{Limit, SetUp, Violation};
+use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
 use wakescope_optics::{Focus, Telescope, theory};
 
 /// Phase screens and efficiency; adds what is doubtful about the screens to `warnings`.
@@ -63,7 +62,10 @@ pub(super) fn stages(
                 Model::ExactBistatic => "independent paths, exact by quadrature",
                 Model::MonteCarlo => "one path out and back, by phase screens",
             };
-            let cost = Cost { core_s: quadratures_s, memory_bytes: ranges_m.len() as f64 * 64.0 };
+            // Mean, scatter and error of each model.
+            let models = if turbulence(scene).is_some() { 5.0 } else { 1.0 };
+            let kept_bytes = ranges_m.len() as f64 * (16.0 + 24.0 * models);
+            let cost = Cost { core_s: quadratures_s, working_bytes: 0.0, kept_bytes };
             planned(Stage::Efficiency, format!("{how}, at {} ranges", ranges_m.len()), Some(cost))
         }
     };
@@ -107,13 +109,14 @@ fn screens(
     runs: &[Vec<f64>],
     warnings: &mut Vec<String>,
 ) -> Result<PlannedStage, Error> {
-    let mut cost = Cost { core_s: 0.0, memory_bytes: 0.0 };
+    let mut cost = Cost::default();
     let mut what = Vec::new();
     let lists: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
     let plans = join::screen_plans(&file.scene, t, &lists).map_err(|e| refused(file, t, e))?;
     for (range_m, plan) in runs.iter().zip(plans) {
         cost.core_s += plan.realisation_cpu_s * t.realisations as f64;
-        cost.memory_bytes = cost.memory_bytes.max(plan.memory_bytes as f64);
+        let memory_bytes = plan.memory_bytes_of(t.realisations, rayon::current_num_threads());
+        cost.working_bytes = cost.working_bytes.max(memory_bytes as f64);
         let last_m = range_m.last().copied().unwrap_or(0.0);
         let g = plan.grid;
         let mut words = format!(
@@ -170,12 +173,12 @@ fn refused(file: &SceneFile, t: &RefractiveTurbulence, error: wakescope_optics::
                 "at least {points} at atmosphere.turbulence.grid_spacing_m = {}, a width of {} m {}",
                 t.grid_spacing_m,
                 v.needed,
-                v.limit.in_words()
+                v.limit.purpose()
             );
             problems.push(Problem { key: key("grid_points"), value: t.grid_points.to_string(), allowed });
         }
         if let Some(v) = strongest(|v| v.limit.is_spacing(), -1.0) {
-            let allowed = format!("at most {} m {}", v.needed, v.limit.in_words());
+            let allowed = format!("at most {} m {}", v.needed, v.limit.purpose());
             problems.push(Problem { key: key("grid_spacing_m"), value: t.grid_spacing_m.to_string(), allowed });
         }
     }
@@ -293,7 +296,7 @@ mod tests {
         let text = turbulent("1e-15", "grid_points = 16384\nlayers = 10000\nspectrum = \"kolmogorov\"\n")
             + "[outputs]\nprofile_points = 100000\n";
         let plan = plan(&text).unwrap();
-        assert!(plan.stages.iter().filter_map(|s| s.cost).any(|c| c.memory_bytes > 1e10));
+        assert!(plan.stages.iter().filter_map(|s| s.cost).any(|c| c.working_bytes > 1e10));
     }
 
     #[test]

@@ -3,9 +3,9 @@
 use crate::Failure;
 use crate::references::numbers;
 use std::f64::consts::TAU;
+use wakescope_les::analysis::decay::value_at;
+use wakescope_les::analysis::{WakeMeter, WakeRecord, WakeScales};
 use wakescope_les::cases::VortexPairCase;
-use wakescope_les::decay::value_at;
-use wakescope_les::{WakeMeter, WakeRecord, WakeScales};
 
 /// Records per unit of tau.
 pub(crate) const PER_TAU: usize = 20;

@@ -4,7 +4,7 @@ use super::history::History;
 use crate::Failure;
 use crate::wakes::{Wake, table, text};
 use std::f64::consts::TAU;
-use wakescope_les::{SecondaryRecord, VortexRecord, WakeRecord};
+use wakescope_les::analysis::{SecondaryRecord, VortexRecord, WakeRecord};
 
 /// Modes whose energy is in the table.
 const MODES: usize = 9;

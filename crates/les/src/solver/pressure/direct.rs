@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use super::super::layout::{Layout, Shape};
 use super::super::mesh::AXIS_NAMES;
 use super::apply::Operator;
-use super::banded::{Band, Scratch};
+use super::banded_cholesky::{BandedCholesky, Scratch};
 use super::lines::bundles;
 use super::refine::{Pass, Refinement};
 use super::transform::{LineTransform, RowTransform, Work};
@@ -30,7 +30,7 @@ use crate::Error;
 #[derive(Debug)]
 enum Along {
     Transformed(LineTransform),
-    Factorised(Band),
+    Factorised(BandedCholesky),
 }
 
 /// The direct solver of one mesh.
@@ -63,7 +63,7 @@ impl Direct {
         let banded = banded_axis(layout);
         let mut along = |axis: usize| {
             let line = &layout.line[axis];
-            if let Some(band) = Band::new(line).filter(|_| banded == Some(axis)) {
+            if let Some(band) = BandedCholesky::new(line).filter(|_| banded == Some(axis)) {
                 return Along::Factorised(band);
             }
             let (transform, values) = LineTransform::new(line);
@@ -90,13 +90,13 @@ impl Direct {
     fn solve_once(&self, field: &mut [f64]) {
         self.rows_forward(field);
         if !self.by_planes() {
-            self.lines(0, field, true);
+            self.lines(0, field, LineTransform::forward);
         }
-        self.lines(1, field, true);
+        self.lines(1, field, LineTransform::forward);
         self.divide(field);
-        self.lines(1, field, false);
+        self.lines(1, field, LineTransform::inverse);
         if !self.by_planes() {
-            self.lines(0, field, false);
+            self.lines(0, field, LineTransform::inverse);
         }
         self.rows_inverse(field);
     }
@@ -134,16 +134,17 @@ impl Direct {
         });
     }
 
-    /// Transforms along axis `which + 1`, if it is transformed.
-    fn lines(&self, which: usize, field: &mut [f64], forward: bool) {
+    /// Transforms along axis `which + 1`, there or back, if it is transformed.
+    fn lines(
+        &self,
+        which: usize,
+        field: &mut [f64],
+        apply: impl Fn(&LineTransform, &mut [&mut [f64]], &mut Work) + Sync,
+    ) {
         let Along::Transformed(transform) = &self.along[which] else { return };
-        bundles(field, self.shape(), which + 1).par_iter_mut().for_each_init(Work::default, |work, bundle| {
-            if forward {
-                transform.forward(&mut bundle.rows, work);
-            } else {
-                transform.inverse(&mut bundle.rows, work);
-            }
-        });
+        let mut bundles = bundles(field, self.shape(), which + 1);
+        let each = bundles.par_iter_mut();
+        each.for_each_init(Work::default, |work, bundle| apply(transform, &mut bundle.rows, work));
     }
 
     /// Solves for the coefficients of the eigenvectors.
@@ -173,18 +174,12 @@ impl PressureSolver for Direct {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
         super::check_request(self.shape(), field, tolerance)?;
         let mut refinement = std::mem::take(&mut self.refinement);
-        let done = refinement.run(&self.operator, field, tolerance, |field, _, _| {
+        let solved = refinement.run(&self.operator, field, tolerance, "direct solver", |field, _, _| {
             self.solve_once(field);
             Pass(Vec::new())
         });
         self.refinement = refinement;
-        let done = done.map_err(|(history, reason)| Error::PressureNotSolved {
-            method: "direct solver",
-            tolerance,
-            reason,
-            history,
-        })?;
-        Ok(Solved { residual: done.residual, iterations: 0, factor: None, imbalance: done.imbalance })
+        solved
     }
 
     fn describe(&self) -> String {

@@ -7,7 +7,8 @@
 use crate::Error;
 use crate::export::{Provenance, Table, write_atomic};
 use std::path::PathBuf;
-use wakescope_les::{Flow, VortexRecord, WakeMeter, WakeRecord, WakeScales};
+use wakescope_les::Flow;
+use wakescope_les::analysis::{VortexRecord, WakeMeter, WakeRecord, WakeScales};
 
 /// What a number is, for its unit and its scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -360,7 +361,7 @@ impl WakeRun {
             ("spacing_m", format!("{:?}", self.scales.spacing_m)),
             ("circulation_m2_s", format!("{:?}", self.scales.circulation_m2_s)),
         ];
-        Ok(Layout { dims, globals, variables }.to_bytes(&self.origin)?)
+        Ok(Layout { dims, globals, variables }.into_bytes(&self.origin)?)
     }
 
     /// The columns of the table over `tau`.

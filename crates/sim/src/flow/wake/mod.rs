@@ -16,8 +16,10 @@ use super::setup::{Setup, WakeSetup};
 use crate::Error;
 use crate::scene::section;
 use serde::{Deserialize, Serialize};
+use wakescope_les::analysis::WakeScales;
 use wakescope_les::cases::{Case, VortexPairCase};
-use wakescope_les::{Aircraft, CirculationProfile, SubgridModel, WakeScales};
+use wakescope_les::winds::Aircraft;
+use wakescope_les::{CirculationProfile, SubgridModel};
 
 /// Longest step, in `tau`.
 const LONGEST_STEP: f64 = 0.01;

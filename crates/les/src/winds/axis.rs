@@ -1,0 +1,262 @@
+//! One direction of a mesh: its nodes, what lies at its two ends, and the index coordinate of a position.
+//!
+//! On a stretched mesh the kernel (27) acts in the index coordinate `xi`, in which the nodes are one apart. Between nodes
+//! the position is taken as the M'4 interpolant of the node positions, and `xi` is its inverse (Newton's method on one
+//! cubic). So a linear function of the position is reproduced exactly, and on a smoothly stretched mesh the
+//! interpolation keeps its third order; the fraction `(x - x_i)/(x_{i+1} - x_i)` would give second order.
+//!
+//! Check: linear functions to round-off on a strongly stretched mesh; order 3 of a sampled vortex.
+
+use super::kernel::m4_prime_weights;
+use crate::Error;
+
+/// What lies beyond one end of a direction.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Side {
+    /// Nothing is known: the mesh ends at its last node. The stencil of the last cell is completed by the parabola
+    /// through the last three nodes (Keys 1981), which keeps third order.
+    #[default]
+    Open,
+    /// A frictionless wall: the image has the opposite velocity across the wall and the same along it.
+    SlipWall {
+        /// Position of the wall \[m\], at the last node or beyond it by less than a cell.
+        position_m: f64,
+    },
+    /// A wall at rest or moving along itself, to which the air sticks: all components are odd about the wall's velocity.
+    NoSlipWall {
+        /// Position of the wall \[m\], at the last node or beyond it by less than a cell.
+        position_m: f64,
+        /// Velocity of the wall `(u, v, w)` \[m/s\].
+        velocity_m_s: [f64; 3],
+    },
+}
+
+/// The two ends of one direction of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Edges {
+    /// The flow repeats itself; the mesh then holds every point.
+    Periodic {
+        /// Length after which it does \[m\], longer than the distance from the first to the last node.
+        period_m: f64,
+    },
+    /// Two ends of their own.
+    Bounded {
+        /// End at the first node.
+        low: Side,
+        /// End at the last node.
+        high: Side,
+    },
+}
+
+/// Nodes beyond each end that the stencil may need.
+pub(crate) const GHOSTS: usize = 2;
+
+/// Largest ratio of neighbouring cells: up to 5 the slopes at the nodes are at most 3 times that of the cell, which makes
+/// the interpolated position monotone (Fritsch and Carlson 1980).
+const MAX_CELL_RATIO: f64 = 5.0;
+
+/// Largest ratio of the second cell to the first at an open end: from 3 on the slope of the parabola turns round.
+const MAX_OPEN_RATIO: f64 = 2.5;
+
+/// Where the value of a ghost node comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Ghost {
+    /// The value of an interior node.
+    Copy(usize),
+    /// The image of an interior node in a wall.
+    Image(usize, Side),
+    /// The parabola through three interior nodes, `3 a - 3 b + c`.
+    Parabola([usize; 3]),
+}
+
+/// One direction of a mesh with its ghost nodes.
+#[derive(Debug, Clone)]
+pub(crate) struct Axis {
+    name: &'static str,
+    /// Positions of all nodes, ghosts included.
+    position_m: Vec<f64>,
+    /// Range of positions that the mesh holds; unbounded if periodic.
+    span_m: Option<(f64, f64)>,
+    period_m: Option<f64>,
+    /// Last padded cell that may hold a point; at an open end there is none beyond the last node.
+    last_cell: usize,
+    /// Sources of the ghosts: below from the nearest outwards, then above likewise.
+    pub(crate) ghosts: [[Ghost; GHOSTS]; 2],
+}
+
+impl Axis {
+    pub(crate) fn new(name: &'static str, node_m: &[f64], edges: Edges) -> Result<Self, Error> {
+        let nodes = node_m.len();
+        if nodes < 4 {
+            return Err(Error::TooFewNodes { axis: name, nodes, needed: 4 });
+        }
+        for (index, &value_m) in node_m.iter().enumerate() {
+            if !value_m.is_finite() || (index > 0 && value_m <= node_m[index - 1]) {
+                return Err(Error::NodesNotIncreasing { axis: name, index, value_m });
+            }
+        }
+        let high_is_open = matches!(edges, Edges::Bounded { high: Side::Open, .. });
+        let (ghosts, below, above, span_m, period_m) = match edges {
+            Edges::Periodic { period_m } => {
+                if !(period_m.is_finite() && period_m > node_m[nodes - 1] - node_m[0]) {
+                    return Err(misplaced(name, "period", period_m, "longer than the mesh from first to last node"));
+                }
+                let ghosts = [[Ghost::Copy(nodes - 1), Ghost::Copy(nodes - 2)], [Ghost::Copy(0), Ghost::Copy(1)]];
+                let below = [node_m[nodes - 1] - period_m, node_m[nodes - 2] - period_m];
+                let above = [node_m[0] + period_m, node_m[1] + period_m];
+                (ghosts, below, above, None, Some(period_m))
+            }
+            Edges::Bounded { low, high } => {
+                let low = End::new(name, "low wall", node_m, low, false)?;
+                let high = End::new(name, "high wall", node_m, high, true)?;
+                let span_m = Some((low.end_m, high.end_m));
+                ([low.ghosts, high.ghosts], low.position_m, high.position_m, span_m, None)
+            }
+        };
+        let mut position_m = vec![below[1], below[0]];
+        position_m.extend_from_slice(node_m);
+        position_m.extend_from_slice(&above);
+        let last_cell = nodes + usize::from(!high_is_open);
+        let axis = Self { name, position_m, span_m, period_m, last_cell, ghosts };
+        axis.check_stretch(edges)?;
+        Ok(axis)
+    }
+
+    /// Neighbouring cells differ by no more than the inversion of the index coordinate allows.
+    fn check_stretch(&self, edges: Edges) -> Result<(), Error> {
+        let cell_m = |i: usize| self.position_m[i + 1] - self.position_m[i];
+        let refuse = |node: usize, ratio: f64, allowed: f64| {
+            let index = node.saturating_sub(GHOSTS).min(self.nodes() - 1);
+            Err(Error::StretchTooAbrupt { axis: self.name, index, ratio, allowed })
+        };
+        let (low_is_open, high_is_open) = match edges {
+            Edges::Periodic { .. } => (false, false),
+            Edges::Bounded { low, high } => (low == Side::Open, high == Side::Open),
+        };
+        let first = if low_is_open { GHOSTS } else { 1 };
+        for i in first..self.last_cell {
+            let ratio = cell_m(i).max(cell_m(i + 1)) / cell_m(i).min(cell_m(i + 1));
+            if ratio > MAX_CELL_RATIO {
+                return refuse(i + 1, ratio, MAX_CELL_RATIO);
+            }
+        }
+        let ends = [(low_is_open, GHOSTS, GHOSTS + 1), (high_is_open, self.last_cell, self.last_cell - 1)];
+        for (_, end, inner) in ends.into_iter().filter(|end| end.0) {
+            let ratio = cell_m(inner) / cell_m(end);
+            if ratio > MAX_OPEN_RATIO {
+                return refuse(end.max(inner), ratio, MAX_OPEN_RATIO);
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of nodes without ghosts.
+    pub(crate) fn nodes(&self) -> usize {
+        self.position_m.len() - 2 * GHOSTS
+    }
+
+    /// Number of nodes with ghosts.
+    pub(crate) fn padded_nodes(&self) -> usize {
+        self.position_m.len()
+    }
+
+    /// Padded indices of the cells between nodes, with the cell that closes a period.
+    pub(crate) fn cells(&self) -> std::ops::Range<usize> {
+        GHOSTS..GHOSTS + self.nodes() - usize::from(self.period_m.is_none())
+    }
+
+    /// Positions of the nodes with ghosts \[m\].
+    pub(crate) fn padded_position_m(&self) -> &[f64] {
+        &self.position_m
+    }
+
+    /// Index (in the padded nodes) of the first node of the four-point stencil of `x_m`, and the four weights; `None`
+    /// outside the mesh or for NaN.
+    pub(crate) fn stencil(&self, x_m: f64) -> Option<(usize, [f64; 4])> {
+        let node_m = &self.position_m[GHOSTS..GHOSTS + self.nodes()];
+        let x_m = match (self.span_m, self.period_m) {
+            (Some((low_m, high_m)), _) if low_m <= x_m && x_m <= high_m => x_m,
+            (None, Some(period_m)) if x_m.is_finite() => node_m[0] + (x_m - node_m[0]).rem_euclid(period_m),
+            _ => return None,
+        };
+        let cell = (node_m.partition_point(|&p| p <= x_m) + 1).min(self.last_cell);
+        let nodes = [cell - 1, cell, cell + 1, cell + 2].map(|i| self.position_m[i]);
+        Some((cell - 1, m4_prime_weights(fraction(nodes, x_m))))
+    }
+}
+
+/// Fraction `s` in the index coordinate of the point `x_m` between the two middle nodes: the root of the M'4 interpolant
+/// of the four positions, by Newton's method kept within the bracket.
+fn fraction(nodes_m: [f64; 4], x_m: f64) -> f64 {
+    let width_m = nodes_m[2] - nodes_m[1];
+    let target = (x_m - nodes_m[1]) / width_m;
+    // In units of the cell: the position is s (m0 + s (c2 + s c3)) with end slopes m0 and m1.
+    let m0 = 0.5 * (nodes_m[2] - nodes_m[0]) / width_m;
+    let m1 = 0.5 * (nodes_m[3] - nodes_m[1]) / width_m;
+    let (c2, c3) = (3.0 - 2.0 * m0 - m1, m0 + m1 - 2.0);
+    let (mut low, mut high) = (0.0, 1.0);
+    let mut s = target.clamp(0.0, 1.0);
+    for _ in 0..60 {
+        let excess = s * (m0 + s * (c2 + s * c3)) - target;
+        if excess > 0.0 {
+            high = s;
+        } else {
+            low = s;
+        }
+        let slope = m0 + s * (2.0 * c2 + 3.0 * s * c3);
+        let newton = s - excess / slope;
+        let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
+        if (next - s).abs() <= 2.0 * f64::EPSILON {
+            return next;
+        }
+        s = next;
+    }
+    s
+}
+
+fn misplaced(axis: &'static str, boundary: &'static str, value_m: f64, allowed: &'static str) -> Error {
+    Error::MisplacedBoundary { axis, boundary, value_m, allowed }
+}
+
+/// The ghosts of one bounded end, nearest first.
+struct End {
+    ghosts: [Ghost; GHOSTS],
+    position_m: [f64; GHOSTS],
+    /// Where the mesh ends.
+    end_m: f64,
+}
+
+impl End {
+    fn new(
+        axis: &'static str,
+        boundary: &'static str,
+        node_m: &[f64],
+        side: Side,
+        is_high: bool,
+    ) -> Result<Self, Error> {
+        // Node counted from this end.
+        let inner = |i: usize| if is_high { node_m.len() - 1 - i } else { i };
+        let at = |i: usize| node_m[inner(i)];
+        let wall_m = match side {
+            Side::Open => {
+                // Beyond the last node only the cell next to it is completed, by its first ghost.
+                let first = 3.0 * at(0) - 3.0 * at(1) + at(2);
+                let ghost = Ghost::Parabola([inner(0), inner(1), inner(2)]);
+                return Ok(Self { ghosts: [ghost; 2], position_m: [first, 2.0 * first - at(0)], end_m: at(0) });
+            }
+            Side::SlipWall { position_m } | Side::NoSlipWall { position_m, .. } => position_m,
+        };
+        let gap_m = if is_high { wall_m - at(0) } else { at(0) - wall_m };
+        let cell_m = (at(1) - at(0)).abs();
+        if !(0.0..cell_m).contains(&gap_m) {
+            return Err(misplaced(axis, boundary, wall_m, "at the last node or less than a cell beyond it"));
+        }
+        // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
+        let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };
+        Ok(Self {
+            ghosts: mirrored.map(|i| Ghost::Image(inner(i), side)),
+            position_m: mirrored.map(|i| 2.0 * wall_m - at(i)),
+            end_m: wall_m,
+        })
+    }
+}
