@@ -1,6 +1,6 @@
 //! What can go wrong in a run.
 
-use crate::scene::SceneError;
+use crate::keys::SceneError;
 use std::path::PathBuf;
 
 /// Why a run could not be made or finished.

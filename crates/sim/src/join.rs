@@ -8,7 +8,6 @@ pub use estimators::{
 };
 
 use crate::Error;
-use crate::geometry::Geometry;
 use crate::scene::{
     AirProfile, BeamRadiusDefinition, Digitiser, Flow, NoiseKind, OuterScaleWavenumber, PulseDefinition,
     PulseResampling, PulseShape, ReceiverPath, RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind,
@@ -293,39 +292,4 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
             NoiseKind::None => signal::NoiseModel::None,
         },
     }
-}
-
-/// The simulator of the records of a scene.
-///
-/// # Errors
-/// What the signal simulation refuses; a checked scene gives none.
-pub fn simulator(scene: &Scene, geometry: &Geometry) -> Result<signal::Simulator, Error> {
-    let record = signal::Record {
-        time_of_first_sample_s: 2.0 * geometry.first_range_m / crate::SPEED_OF_LIGHT_M_S,
-        samples: geometry.samples,
-    };
-    Ok(signal::Simulator::new(pulse(scene)?, receiver(scene), record)?)
-}
-
-/// Return per metre K^2 beta A_R eta_s/R^2 of each layer, (9); without an efficiency, that for eta_s = 1.
-///
-/// # Errors
-/// What the optics refuse, such as a layer outside the efficiency profile.
-pub fn layer_weights_per_m(
-    scene: &Scene,
-    geometry: &Geometry,
-    efficiency: Option<&optics::EfficiencyProfile>,
-) -> Result<Vec<f64>, Error> {
-    let return_per_m = return_per_m(scene)?;
-    let weight = |range_m: f64| {
-        let eta = efficiency.map_or(Ok(1.0), |e| e.interpolated(range_m))?;
-        Ok(return_per_m(range_m)? * eta)
-    };
-    geometry.layer_range_m().map(weight).collect()
-}
-
-/// The constant return per metre of each layer that gives the signal-to-noise ratio `snr_db`.
-pub fn fixed_weights_per_m(scene: &Scene, geometry: &Geometry, snr_db: f64) -> Vec<f64> {
-    let unit = receiver(scene).slowly_varying_snr(scene.pulse.energy_j, 1.0);
-    vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers]
 }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use wakescope_optics::plan::Model;
 use wakescope_signal::{
-    Clipped, Digitiser, EfficiencyTable, LayerEfficiency, LineOfSight, PulseKey, Sample, Scan, Shot, Simulator,
+    Clipped, Digitiser, EfficiencyTable, LayerEfficiency, LineOfSight, PulseKey, Record, Sample, Scan, Shot, Simulator,
 };
 
 /// Ranges of the efficiency profile from which the layers take theirs, m: dense where it is a quadrature, few
@@ -61,7 +61,12 @@ impl<'a> Scanner<'a> {
             .collect::<Result<Vec<_>, Error>>()?;
         observer.end();
         let efficiency = drawn_efficiency(scene, geometry, &lines, observer)?;
-        let (simulator, digitiser) = (join::simulator(scene, geometry)?, join::digitiser(scene)?);
+        let record = Record {
+            time_of_first_sample_s: 2.0 * geometry.first_range_m / crate::SPEED_OF_LIGHT_M_S,
+            samples: geometry.samples,
+        };
+        let simulator = Simulator::new(join::pulse(scene)?, join::receiver(scene), record)?;
+        let digitiser = join::digitiser(scene)?;
         Ok(Self { scene, simulator, lines, efficiency, digitiser })
     }
 
@@ -167,20 +172,28 @@ pub(crate) fn records_at_once<T>(samples: usize, pulses: usize) -> usize {
 /// Size of a piece of records, bytes.
 const PIECE_BYTES: usize = 16 << 20;
 
-/// Return per metre of each layer, K^2 beta A_R eta_s/R^2; the efficiency is interpolated. It is left out if each pulse brings
-/// its own.
+/// Return per metre of each layer, K^2 beta A_R eta_s/R^2, (9); the efficiency is interpolated, and left out if each pulse
+/// brings its own. A signal-to-noise ratio that the scene states takes the place of all of it.
 fn layer_weights(scene: &Scene, geometry: &Geometry, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
-        return Ok(join::fixed_weights_per_m(scene, geometry, snr_db));
+        let unit = join::receiver(scene).slowly_varying_snr(scene.pulse.energy_j, 1.0);
+        return Ok(vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers]);
     }
-    if drawn_turbulence(scene).is_some() {
-        return join::layer_weights_per_m(scene, geometry, None);
-    }
-    observer.begin(Stage::Efficiency, 1);
-    let ranges_m = profile_ranges_m(scene, geometry);
-    let profile = efficiency_at(scene, &ranges_m, observer)?;
-    observer.end();
-    join::layer_weights_per_m(scene, geometry, Some(&profile))
+    let profile = match drawn_turbulence(scene) {
+        Some(_) => None,
+        None => {
+            observer.begin(Stage::Efficiency, 1);
+            let profile = efficiency_at(scene, &profile_ranges_m(scene, geometry), observer)?;
+            observer.end();
+            Some(profile)
+        }
+    };
+    let return_per_m = join::return_per_m(scene)?;
+    let weight = |range_m: f64| {
+        let eta = profile.as_ref().map_or(Ok(1.0), |profile| profile.interpolated(range_m))?;
+        Ok(return_per_m(range_m)? * eta)
+    };
+    geometry.layer_range_m().map(weight).collect()
 }
 
 /// Efficiencies of the layers, one set for each realisation of the turbulence, if the pulses have their own.

@@ -11,7 +11,7 @@ use super::writer::{Kept, Writer};
 use super::{Begin, CaseFile, FlowCase, FlowOutcome, Watch};
 use crate::export::lock::FolderLock;
 use crate::export::{Existing, write_atomic};
-use crate::scene::Problem;
+use crate::keys::Problem;
 use crate::{Error, machine};
 use std::path::Path;
 use wakescope_les::{CheckpointPlan, Ends, Interval, Run, RunPlan};
@@ -157,7 +157,7 @@ fn prepare(file: &CaseFile, folder: &Path, options: RunOptions) -> Result<Prepar
     let available = if options.allow_large { None } else { machine::available_memory_bytes() };
     // Before the setup, which holds the initial field.
     refuse_too_large(&file.case, file.case.case.cells(), &[], available)?;
-    let setup = Setup::new(&file.case, file.path.parent().unwrap_or(Path::new("")))?;
+    let setup = Setup::new(&file.case, file.source.folder())?;
     let dense = setup.settings.pressure.dense_directions(&setup.mesh);
     refuse_too_large(&file.case, setup.mesh.cells(), &dense, available)?;
     setup.settings.validate(&setup.mesh).map_err(Error::Flow)?;

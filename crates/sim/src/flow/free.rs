@@ -1,7 +1,7 @@
 //! A flow of one's own: mesh, walls, viscosity and initial field, in SI units.
 
-use super::case::Problems;
 use super::setup::{Initial, Setup};
+use crate::keys::Checker;
 use crate::scene::{VortexProfile, section};
 use crate::{Error, join};
 use serde::{Deserialize, Serialize};
@@ -130,7 +130,7 @@ section! {
 }
 
 impl Axis {
-    fn check(&self, name: &str, p: &mut Problems) {
+    fn check(&self, name: &str, p: &mut Checker<'_>) {
         let key = |field: &str| format!("case.{name}.{field}");
         p.cells(&key("cells"), &[self.cells]);
         let ordered = self.low_m.is_finite() && self.high_m.is_finite() && self.high_m > self.low_m;
@@ -142,12 +142,10 @@ impl Axis {
             MappingName::Sine => {
                 p.require(self.stretch.abs() < 1.0, &key("stretch"), self.stretch, "between -1 and 1 for a sine");
             }
-            _ => p.require(
-                self.stretch > 0.0 && self.stretch <= 20.0,
-                &key("stretch"),
-                self.stretch,
-                "above 0 and at most 20 for this mapping",
-            ),
+            _ => {
+                let ok = self.stretch > 0.0 && self.stretch <= 20.0;
+                p.require(ok, &key("stretch"), self.stretch, "above 0 and at most 20 for this mapping");
+            }
         }
         let place = self.place.is_none_or(|place| (0.0..=1.0).contains(&place) && self.mapping == MappingName::Cluster);
         p.require(
@@ -202,7 +200,7 @@ impl Axis {
 }
 
 impl Free {
-    pub(super) fn check(&self, p: &mut Problems) {
+    pub(super) fn check(&self, p: &mut Checker<'_>) {
         for (name, axis) in [("x", self.x), ("y", self.y), ("z", self.z)] {
             axis.check(name, p);
         }

@@ -3,7 +3,7 @@
 //! Serde gives structures, enumerations and tables with a tag no description of themselves, but the errors that they make
 //! carry the names of their keys and variants.
 
-use super::{Key, Kind};
+use super::key::{Key, Kind};
 use serde::de::value::{BorrowedStrDeserializer, MapDeserializer, SeqDeserializer};
 use serde::de::{DeserializeOwned, Deserializer, Expected, IntoDeserializer, Unexpected, Visitor};
 use std::fmt::Display;

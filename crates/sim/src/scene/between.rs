@@ -1,12 +1,9 @@
 //! Limits between the keys of a scene. Each blames a key that the file states, not the default beside it.
 
-use super::check::Checker;
 use super::{Flow, Outside, PulseShape, Scene, Turbulence};
+use crate::keys::{Checker, Side};
 
-/// One side of a limit between keys: the key, its value, what is allowed beside the others.
-pub(super) type Side<'a> = (&'a str, String, String);
-
-pub(super) fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
+fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
     (key, format!("{value:?}"), allowed)
 }
 

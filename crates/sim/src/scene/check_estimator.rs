@@ -1,8 +1,7 @@
 //! What the estimator of a scene may say.
 
-use super::between::Side;
-use super::check::Checker;
 use super::{CorrelogramForm, Estimator, Method, PulseShape, RegionRadius, Scene};
+use crate::keys::{Checker, Side};
 
 /// Every limit of the estimator's keys, and those between them.
 pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
@@ -59,13 +58,13 @@ fn check_radius(e: &Estimator, c: &mut Checker<'_>) {
             c.require(
                 !range_m.is_empty() && increasing,
                 "estimator.radius.range_m",
-                format!("{range_m:?}"),
+                range_m,
                 "at least one range, finite and increasing",
             );
             c.require(
                 radius_m.len() == range_m.len() && radius_m.iter().all(|r| (0.0..=1e5).contains(r)),
                 "estimator.radius.radius_m",
-                format!("{radius_m:?}"),
+                radius_m,
                 "one number from 0 to 1e5 m for each of estimator.radius.range_m",
             );
         }
@@ -77,7 +76,7 @@ fn check_radius(e: &Estimator, c: &mut Checker<'_>) {
     c.require(
         e.method != Method::Periodogram || e.radius == (RegionRadius::Fixed {}),
         "estimator.method",
-        "\"periodogram\"",
+        "periodogram",
         "another one with estimator.radius: \"periodogram\" has no region",
     );
 }
@@ -89,7 +88,7 @@ fn check_combinations(scene: &Scene, c: &mut Checker<'_>) {
     c.require(
         e.correlogram == CorrelogramForm::Biased || !(likelihood || e.method == Method::FirstMoment),
         "estimator.correlogram",
-        "\"unbiased\"",
+        "unbiased",
         "\"biased\" with first_moment and the likelihoods, whose statistic has no unbiased form",
     );
     c.require(
@@ -102,7 +101,7 @@ fn check_combinations(scene: &Scene, c: &mut Checker<'_>) {
         e.method != Method::GradientLikelihood
             || (scene.pulse.shape == (PulseShape::Gaussian {}) && scene.pulse.chirp_hz_s == 0.0),
         "estimator.method",
-        "\"gradient_likelihood\"",
+        "gradient_likelihood",
         "another one for a pulse that is sampled or has a chirp: its covariance is that of a Gaussian pulse",
     );
 }

@@ -83,6 +83,16 @@ fn of_turbulence(turbulence: &RefractiveTurbulence, mut unused: impl FnMut(bool,
     unused(endless && !unset, &OUTER[1..], "atmosphere.turbulence.outer_scale_m = inf is no outer scale".into());
 }
 
+impl Scene {
+    /// The scene with every default written out, as TOML; keys that it has no use for are left out.
+    ///
+    /// Equal scenes give equal text; the hash of it names the scene.
+    pub fn to_toml(&self) -> String {
+        let whole = toml::to_string(self).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
+        without_idle(self, &whole)
+    }
+}
+
 /// A variant as the file writes it.
 fn name(variant: &impl serde::Serialize) -> String {
     toml::Value::try_from(variant).map(|value| value.to_string()).unwrap_or_default()
@@ -110,7 +120,7 @@ pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
 }
 
 /// The text of a scene without the keys that it has no use for.
-pub(super) fn without_idle(scene: &Scene, toml: &str) -> String {
+fn without_idle(scene: &Scene, toml: &str) -> String {
     let idle = idle(scene);
     let mut section = String::new();
     let mut out = String::with_capacity(toml.len());

@@ -30,20 +30,18 @@ mod idle;
 mod instrument;
 mod read;
 
+pub use crate::keys::{Located, Problem, SceneError};
 pub use atmosphere::{
     AirProfile, Atmosphere, EfficiencyOfPulse, OuterScaleWavenumber, RefractiveTurbulence, ScreenSampling,
     SpectrumKind, Turbulence,
 };
-pub use check::Problem;
 pub use estimator::{CorrelogramForm, Estimator, Method, OrderChoice, Refinement, RegionRadius, Weighting};
 pub use flow::{Flow, Outside, SimulatedFlow, SimulatedMotion, VortexMotion, VortexPair, VortexProfile};
 pub use instrument::{
     BeamRadiusDefinition, Detector, DetectorSignal, Digitiser, Laser, NoiseKind, Pulse, PulseDefinition,
     PulseResampling, PulseShape, ReceiverPath, SampledShape, SnrReference, Telescope,
 };
-pub use read::{Located, SceneError, SceneFile};
-#[cfg(feature = "flow")]
-pub(crate) use read::{located, parsed, unlike};
+pub use read::SceneFile;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -173,16 +171,6 @@ section! {
 /// The short name of a text: the first 16 hexadecimal digits of its SHA-256.
 pub fn hash_of(text: &str) -> String {
     Sha256::digest(text.as_bytes()).iter().take(8).map(|b| format!("{b:02x}")).collect()
-}
-
-impl Scene {
-    /// The scene with every default written out, as TOML; keys that it has no use for are left out.
-    ///
-    /// Equal scenes give equal text; the hash of it names the scene.
-    pub fn to_toml(&self) -> String {
-        let whole = toml::to_string(self).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
-        idle::without_idle(self, &whole)
-    }
 }
 
 #[cfg(test)]
