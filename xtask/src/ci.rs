@@ -26,7 +26,7 @@ const FEATURES: [(&str, &[&str]); 4] = [
     ("wakescope-optics", &["", "rayon", "screens"]),
     ("wakescope-les", &["", "solver"]),
     ("wakescope-estimate", &["", "rayon", "bundled-lapack"]),
-    ("wakescope-sim", &["", "cli", "flow", "netcdf", "plots", "vtk", "npz"]),
+    ("wakescope-sim", &["", "cli", "flow", "netcdf", "plots", "vtk"]),
 ];
 
 fn steps() -> Result<Vec<Step>, Failure> {

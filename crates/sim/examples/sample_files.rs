@@ -1,6 +1,6 @@
 //! Writes one small file of each format, with the table that the conformance check compares it with, into a folder:
 //!
-//! `cargo run -p wakescope-sim --features vtk,npz --example sample_files -- FOLDER`
+//! `cargo run -p wakescope-sim --features vtk --example sample_files -- FOLDER`
 //!
 //! The content is a made-up vortex pair seen by a noiseless lidar; it exercises two sweeps, missing values and a stretched mesh.
 
@@ -35,8 +35,6 @@ fn main() -> OutputResult<()> {
         files.add("exact.nc", cfradial_bytes(&exact, &origin)?)?;
         files.add("exact.csv", map_table(&exact)?.to_csv(&origin)?)?;
     }
-    #[cfg(feature = "npz")]
-    files.add("planes.npz", wakescope_sim::export::npz::npz_bytes(&wind, &origin)?)?;
     #[cfg(feature = "vtk")]
     for (name, bytes) in wakescope_sim::export::vtr::vtr_series(&wind, "wake", &origin)? {
         files.add(&name, bytes)?;

@@ -206,10 +206,10 @@ pub fn snr_model(scene: &Scene) -> Result<optics::SnrModel, Error> {
 pub fn pulse(scene: &Scene) -> Result<signal::Pulse, Error> {
     let p = &scene.pulse;
     let pulse = match &p.shape {
-        PulseShape::Gaussian {} => {
-            let duration = match p.definition {
-                PulseDefinition::Fwhm => signal::PulseDuration::FullWidthHalfMaximum(p.duration_s),
-                PulseDefinition::OneOverEHalfWidth => signal::PulseDuration::OneOverEHalfWidth(p.duration_s),
+        PulseShape::Gaussian(shape) => {
+            let duration = match shape.definition {
+                PulseDefinition::Fwhm => signal::PulseDuration::FullWidthHalfMaximum(shape.duration_s),
+                PulseDefinition::OneOverEHalfWidth => signal::PulseDuration::OneOverEHalfWidth(shape.duration_s),
             };
             signal::Pulse::from(signal::GaussianPulse::new(duration, p.energy_j)?)
         }

@@ -41,8 +41,8 @@
 //! | [`export`], [`plot`] | file formats, pictures |
 //! | [`cli`] | the program `wakescope` |
 //!
-//! Features, all but the last two on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
-//! PNG, the report page), `vtk` and `npz` (more formats for fields).
+//! Features, all but the last on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
+//! PNG, the report page), `vtk` (fields for ParaView).
 
 pub mod bound;
 pub mod export;

@@ -186,9 +186,9 @@ fn warnings(scene: &Scene, wind: &SceneWind) -> Vec<String> {
             "estimator.padded_samples gives a spectrum in steps of {bin_m_s:.2} m/s: expect a bias of that order"
         ));
     }
-    let models =
-        [Method::Autoregressive, Method::AutoregressivePole, Method::Capon, Method::FirstMoment, Method::LagWindow];
-    if models.contains(&scene.estimator.method) && scene.estimator.weighting != Weighting::Rectangular {
+    let method = scene.estimator.method;
+    let is_model = method.order().is_some() || matches!(method, Method::FirstMoment(_) | Method::LagWindow(_));
+    if is_model && scene.estimator.weighting != Weighting::Rectangular {
         out.push(
             "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\""
                 .into(),

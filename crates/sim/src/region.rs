@@ -23,7 +23,7 @@ pub(crate) fn region_radius(
 ) -> Result<Radius, Error> {
     let e = &scene.estimator;
     match &e.radius {
-        _ if e.method == Method::Periodogram => Ok(Radius::Fixed { radius_m: 0.0 }),
+        _ if e.method == (Method::Periodogram {}) => Ok(Radius::Fixed { radius_m: 0.0 }),
         RegionRadius::Fixed {} => Ok(Radius::Fixed { radius_m: e.radius_m }),
         RegionRadius::OfRange { range_m, radius_m } => {
             let (range_m, radius_m) = (range_m.clone(), radius_m.clone());

@@ -6,7 +6,7 @@ use crate::Failure;
 use ndarray::Array2;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::plot::{Figure, MapPlot};
-use wakescope_sim::scene::Scene;
+use wakescope_sim::scene::{PulseShape, Scene};
 use wakescope_sim::write;
 
 /// Cells that count as those of a vortex, m from its centre.
@@ -21,7 +21,7 @@ fn scene(context: &Context, sight: &Sight) -> Scene {
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.0, highest_rad);
     (scene.scan.range_min_m, scene.scan.range_max_m) = ((near_m - 45.0).max(140.0), far_m + 45.0);
     scene.estimator.gate_step_samples = context.choose(8, 5, 1);
-    scene.pulse.duration_s = 400e-9;
+    scene.pulse.shape = PulseShape::gaussian(400e-9);
     with_turbulence(context, scene, 1e-15)
 }
 

@@ -57,7 +57,7 @@ impl Profiles {
         Ok(Self {
             method,
             name,
-            pulse_s: study.plan.scene.scene.pulse.duration_s,
+            pulse_s: study.plan.scene.scene.pulse_width_s(),
             snr_db: snr_db(study)?,
             gate_m,
             range_m,

@@ -7,7 +7,7 @@
 use super::Context;
 use crate::Failure;
 use crate::validate::interpolate;
-use crate::wakes::Wake;
+use crate::wakes;
 use std::path::PathBuf;
 use wakescope_sim::export::csv::Column;
 use wakescope_sim::export::{Provenance, Table};
@@ -15,8 +15,8 @@ use wakescope_sim::map::VelocityEstimates;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::{
-    Flow, Method, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion, SnrReference,
-    Turbulence, VortexPair, Weighting,
+    Flow, Method, ModelOrder, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
+    SnrReference, Turbulence, VortexPair, Weighting,
 };
 use wakescope_sim::{join, run, write};
 
@@ -45,7 +45,10 @@ pub(super) fn early_scene(realisations: usize) -> Scene {
 
 /// The scene with the chapter's periodogram accumulation (PA) or correlogram accumulation (CA).
 pub(super) fn with_method(mut scene: Scene, method: &str) -> Scene {
-    scene.estimator.method = if method == "CA" { Method::Autoregressive } else { Method::PeriodogramAccumulation };
+    scene.estimator.method = match method {
+        "CA" => Method::Autoregressive(ModelOrder::default()),
+        _ => Method::PeriodogramAccumulation {},
+    };
     scene.estimator.padded_samples = if method == "CA" { 2048 } else { 1024 };
     scene
 }
@@ -97,7 +100,7 @@ impl Sight {
             let cores = cores_of(&scene);
             return Ok(Self { flow: scene.flow, folder: PathBuf::new(), cores, words, mark: "analytic pair".into() });
         }
-        let wake = Wake::of(context)?;
+        let wake = wakes::of(context)?;
         let b0_m = wake.flow.pair.scales()?.spacing_m;
         let flow = SimulatedFlow {
             planes: "plane1".into(),

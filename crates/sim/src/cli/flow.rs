@@ -3,6 +3,8 @@
 use super::output::print;
 use super::{Cli, progress, say, with_threads};
 use crate::Error;
+#[cfg(feature = "plots")]
+use crate::flow::FinishedWake;
 use crate::flow::{Begin, CaseFile, EXAMPLES, FlowForecast, RunOptions, Watch, check, example, run_with};
 use clap::Args;
 use serde_json::{Value, json};
@@ -71,7 +73,8 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
         let reason = "a run needs a folder to write to".into();
         return Err(Error::Input { path: PathBuf::from("--out DIR"), reason });
     };
-    let outcome = with_threads(cli, || {
+    #[cfg_attr(not(feature = "plots"), expect(unused_mut, reason = "there is nothing to draw with"))]
+    let mut outcome = with_threads(cli, || {
         let mut quiet = progress::NotesOnly;
         let mut bar;
         let watch: &mut dyn Watch = if cli.quiet {
@@ -82,6 +85,10 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
         };
         run_with(file, out, options, watch)
     })??;
+    #[cfg(feature = "plots")]
+    if outcome.is_complete && file.case.wake.is_some() {
+        outcome.files.extend(with_threads(cli, || FinishedWake::read(out)?.draw())??);
+    }
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
         "is_complete": outcome.is_complete, "kinetic_energy_m5_s2": outcome.kinetic_energy_m5_s2,

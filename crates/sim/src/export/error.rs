@@ -78,7 +78,7 @@ pub enum OutputError {
         /// The folder.
         folder: PathBuf,
     },
-    /// An encoder (NetCDF, PNG, VTK, NPZ) refused.
+    /// An encoder (NetCDF, PNG, VTK) refused.
     #[error("{format} encoder: {message}")]
     Encode {
         /// Name of the format.
@@ -92,7 +92,7 @@ pub enum OutputError {
 pub type OutputResult<T> = Result<T, OutputError>;
 
 impl OutputError {
-    #[cfg(any(feature = "netcdf", feature = "npz", feature = "plots", feature = "vtk"))]
+    #[cfg(any(feature = "netcdf", feature = "plots", feature = "vtk"))]
     pub(crate) fn encode(format: &'static str, error: impl std::fmt::Display) -> Self {
         Self::Encode { format, message: error.to_string() }
     }

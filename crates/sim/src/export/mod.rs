@@ -1,4 +1,4 @@
-//! Output writers: tables as CSV, maps as CfRadial 1.4 and HALO `.hpl`, cross-planes as CF NetCDF, VTR and NPZ.
+//! Output writers: tables as CSV, maps as CfRadial 1.4 and HALO `.hpl`, cross-planes as CF NetCDF and VTR.
 //! Every writer turns plain data and a [`Provenance`] into bytes (no clock, so the same run gives the same bytes);
 //! [`FileGroup`] puts a run's files on disk, all or none.
 //! Check: each format is read back by an independent reader in the tests.
@@ -17,7 +17,6 @@
 //! | [`hpl`] | one sweep as HALO raw file | - |
 //! | `cfradial`, `cf_planes`, `cf_fields` (through `netcdf`) | classic NetCDF | `netcdf` |
 //! | `vtr` | VTK rectilinear grids and their collection | `vtk` |
-//! | `npz` | NumPy archive | `npz` |
 
 pub mod atomic;
 #[cfg(feature = "netcdf")]
@@ -38,8 +37,6 @@ pub(crate) mod lock;
 pub mod map;
 #[cfg(feature = "netcdf")]
 pub(crate) mod netcdf;
-#[cfg(feature = "npz")]
-pub mod npz;
 pub mod own;
 pub mod provenance;
 pub mod signals;

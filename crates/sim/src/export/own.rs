@@ -74,7 +74,7 @@ fn is_own_head(name: &str, extension: &str, head: &[u8]) -> bool {
         "csv" => begins(&format!("# source: {NAME}")),
         "hpl" => begins(&format!("Filename:\t{name}\r\n{SYSTEM_ID}\r\n")),
         "nc" => begins("CDF") && has_source(head),
-        "png" => head.starts_with(b"\x89PNG") && has_source(head),
+        "png" | "apng" => head.starts_with(b"\x89PNG") && has_source(head),
         "svg" => begins("<svg") && has_source(head),
         "vtr" | "pvd" => begins("<") && has_source(head),
         _ => false,

@@ -42,6 +42,8 @@ impl Files {
         out.extend(self.output.steps.then(|| STEPS.to_owned()));
         if is_wake {
             out.extend(wake::file_names().into_iter().map(str::to_owned));
+            #[cfg(feature = "plots")]
+            out.extend(wake::PICTURES.map(str::to_owned));
         }
         let mut add = |stem: &str, index: usize, format: FileFormat| match format {
             FileFormat::Csv => out.push(numbered(stem, index, "csv")),

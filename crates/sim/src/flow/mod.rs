@@ -38,7 +38,9 @@ pub use named::{
 
 #[cfg(feature = "netcdf")]
 pub use read::{FieldInSpace, read_field, read_planes};
-pub use wake::{PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile};
+#[cfg(all(feature = "netcdf", feature = "plots"))]
+pub use wake::REPEATS;
+pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};
 
 use crate::Error;
 use crate::export::Provenance;

@@ -3,8 +3,8 @@
 use super::pulse;
 use crate::Error;
 use crate::scene::{
-    CorrelogramForm, DetectorSignal, Estimator as Words, Method, NoiseKind, OrderChoice, PulseShape, Refinement, Scene,
-    Weighting,
+    CorrelogramForm, DetectorSignal, Estimator as Words, GradientLikelihood, Method, ModelOrder, NoiseKind,
+    OrderChoice, PulseShape, Refinement, Scene, Weighting,
 };
 use ndarray::Array2;
 use num_complex::Complex;
@@ -70,7 +70,7 @@ pub fn refinement(scene: &Scene) -> estimate::Refinement {
 fn pulse_correlation(scene: &Scene) -> Result<Vec<f64>, Error> {
     let (count, period_s) = (scene.samples_per_record(), 1.0 / scene.detector.sampling_hz);
     let pulse = pulse(scene)?;
-    let plain = scene.pulse.shape == (PulseShape::Gaussian {}) && scene.pulse.chirp_hz_s == 0.0;
+    let plain = matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
     if plain {
         let lag = |m: usize| m as f64 * period_s / pulse.sigma_s();
         return Ok((0..count).map(|m| (-0.25 * lag(m).powi(2)).exp()).collect());
@@ -182,10 +182,10 @@ impl<S: Sample> Toolkit<S> {
     /// What the estimators refuse, such as a covariance that cannot be diagonalised.
     pub fn new(scene: &Scene, known: &WindowStatistics) -> Result<Self, Error> {
         let e = &scene.estimator;
-        let snr = e.likelihood_snr_db.map_or(known.snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8);
+        let snr = e.method.likelihood_snr_db().map_or(known.snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8);
         match e.method {
-            Method::GradientLikelihood => gradient_likelihood(scene, snr),
-            Method::Likelihood => {
+            Method::GradientLikelihood(own) => gradient_likelihood(scene, &own, snr),
+            Method::Likelihood(_) => {
                 // The tapers are those of white noise and need no inverse, whatever the noise.
                 let mut white = scene.clone();
                 white.detector.noise = NoiseKind::White;
@@ -195,10 +195,10 @@ impl<S: Sample> Toolkit<S> {
                 let weights = statistic.lag_weights();
                 Self::planned(scene, Box::new(statistic), &weights, &tapers, known)
             }
-            Method::Autoregressive | Method::AutoregressivePole | Method::Capon
+            Method::Autoregressive(model) | Method::AutoregressivePole(model) | Method::Capon(model)
                 if e.weighting == Weighting::Rectangular =>
             {
-                let statistic = estimate::ShortCorrelogram::<S>::new(e.window_samples, e.order + 1)?;
+                let statistic = estimate::ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
                 let weights = statistic.lag_weights();
                 let taper = estimate::Taper::unit(vec![1.0; e.window_samples])?;
                 Self::planned(scene, Box::new(statistic), &weights, &[taper], known)
@@ -262,11 +262,8 @@ fn noise_test(
 ) -> Result<Option<estimate::NoiseTest>, Error> {
     let e = &scene.estimator;
     let window = match e.method {
-        Method::Autoregressive | Method::AutoregressivePole | Method::Capon => {
-            Some(estimate::model_lag_weights(e.order))
-        }
-        Method::LagWindow => Some(estimate::model_lag_weights(e.lag_window_lags - 1)),
-        _ => None,
+        Method::LagWindow(window) => Some(estimate::model_lag_weights(window.lag_window_lags - 1)),
+        method => method.order().map(|model| estimate::model_lag_weights(model.order)),
     };
     let unbiased = e.correlogram == CorrelogramForm::Unbiased;
     if scene.detector.noise == NoiseKind::None || (unbiased && window.is_none()) {
@@ -274,7 +271,7 @@ fn noise_test(
     }
     let seen = |(at, gain): (&f64, &f64)| if unbiased { at / gain } else { *at };
     let window = window.map(|at| at.iter().zip(lag_weights).map(seen).collect::<Vec<f64>>());
-    let padded = if e.method == Method::PulsePair { 4 * lag_weights.len() } else { e.padded_samples };
+    let padded = if e.method == (Method::PulsePair {}) { 4 * lag_weights.len() } else { e.padded_samples };
     let (sampling, gates) = (sampling(scene)?, gates(scene)?);
     Ok(Some(estimate::NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded)?))
 }
@@ -288,31 +285,33 @@ fn of_correlogram(
 ) -> Result<Box<dyn Estimator>, Error> {
     let (e, sampling, refine) = (&scene.estimator, sampling(scene)?, refinement(scene));
     let (lags, padded) = (lag_weights.len(), e.padded_samples);
-    let choice = order_choice(e, known);
     match e.method {
-        Method::Periodogram | Method::PeriodogramAccumulation | Method::Likelihood | Method::GradientLikelihood => {
+        Method::Periodogram {}
+        | Method::PeriodogramAccumulation {}
+        | Method::Likelihood(_)
+        | Method::GradientLikelihood(_) => {
             let peak = estimate::SpectralPeak::new(&sampling, kind, lags, padded, refine)?;
             finish(e, kind, lag_weights, peak.with_lag_weights(lag_weights)?)
         }
-        Method::Autoregressive => {
-            let peak = estimate::AutoregressivePeak::new(&sampling, kind, lags, e.order, padded, refine)?;
-            finish(e, kind, lag_weights, peak.choosing(choice))
+        Method::Autoregressive(model) => {
+            let peak = estimate::AutoregressivePeak::new(&sampling, kind, lags, model.order, padded, refine)?;
+            finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
         }
-        Method::AutoregressivePole => {
-            let pole = estimate::AutoregressivePole::new(&sampling, kind, lags, e.order, padded, refine)?;
-            finish(e, kind, lag_weights, pole.choosing(choice))
+        Method::AutoregressivePole(model) => {
+            let pole = estimate::AutoregressivePole::new(&sampling, kind, lags, model.order, padded, refine)?;
+            finish(e, kind, lag_weights, pole.choosing(order_choice(e, &model, known)))
         }
-        Method::Capon => {
-            let peak = estimate::CaponPeak::new(&sampling, kind, lags, e.order, padded, refine)?;
-            finish(e, kind, lag_weights, peak.choosing(choice))
+        Method::Capon(model) => {
+            let peak = estimate::CaponPeak::new(&sampling, kind, lags, model.order, padded, refine)?;
+            finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
         }
-        Method::LagWindow => {
-            let peak = estimate::LagWindowPeak::new(&sampling, kind, lags, e.lag_window_lags, padded, refine)?;
+        Method::LagWindow(window) => {
+            let peak = estimate::LagWindowPeak::new(&sampling, kind, lags, window.lag_window_lags, padded, refine)?;
             finish(e, kind, lag_weights, peak)
         }
-        Method::PulsePair => finish(e, kind, lag_weights, estimate::PulsePair::new(&sampling, kind, lags)?),
-        Method::FirstMoment => {
-            let moment = estimate::FirstMoment::new(&sampling, kind, lags, padded, e.moment_reach)?;
+        Method::PulsePair {} => finish(e, kind, lag_weights, estimate::PulsePair::new(&sampling, kind, lags)?),
+        Method::FirstMoment(own) => {
+            let moment = estimate::FirstMoment::new(&sampling, kind, lags, padded, own.moment_reach)?;
             finish(e, kind, lag_weights, moment)
         }
     }
@@ -331,16 +330,16 @@ fn finish<E: Estimator + 'static>(
     })
 }
 
-fn order_choice(e: &Words, known: &WindowStatistics) -> estimate::OrderChoice {
+fn order_choice(e: &Words, model: &ModelOrder, known: &WindowStatistics) -> estimate::OrderChoice {
     let samples = e.window_samples as f64 * known.n_eff.max(1.0);
-    match e.order_choice {
+    match model.order_choice {
         OrderChoice::Fixed => estimate::OrderChoice::Fixed,
         OrderChoice::Aic => estimate::OrderChoice::Akaike { samples },
         OrderChoice::Mdl => estimate::OrderChoice::DescriptionLength { samples },
     }
 }
 
-fn gradient_likelihood<S: Sample>(scene: &Scene, snr: f64) -> Result<Toolkit<S>, Error> {
+fn gradient_likelihood<S: Sample>(scene: &Scene, own: &GradientLikelihood, snr: f64) -> Result<Toolkit<S>, Error> {
     let e = &scene.estimator;
     let noise = match scene.detector.noise {
         NoiseKind::White => estimate::Noise::White,
@@ -348,9 +347,9 @@ fn gradient_likelihood<S: Sample>(scene: &Scene, snr: f64) -> Result<Toolkit<S>,
     };
     let sampling = sampling(scene)?;
     let model = estimate::GradientModel::new(&sampling, e.window_samples, pulse(scene)?.sigma_s(), noise)?;
-    let half = (e.gradients / 2) as f64;
-    let gradient = |k: usize| if half > 0.0 { e.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
-    let gradients: Vec<f64> = (0..e.gradients).map(gradient).collect();
+    let half = (own.gradients / 2) as f64;
+    let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
+    let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
     let plan = estimate::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
     let (test, noise) = match self::noise(scene) {
         None => (None, None),

@@ -239,7 +239,8 @@ mod tests {
         assert!(kinds[2].1.iter().all(|key| !key.is_required));
         let Kind::Table(estimator) = &find(&scene, "estimator").kind else { panic!("a table") };
         assert_eq!(find(estimator, "false_alarm").kind, Kind::Number, "what may be absent");
-        assert_eq!(find(estimator, "order").kind, Kind::Whole { largest: i64::MAX as u64 });
+        let Kind::Tagged { kinds, .. } = &find(estimator, "method").kind else { panic!("tagged") };
+        assert_eq!(find(&kinds[2].1, "order").kind, Kind::Whole { largest: i64::MAX as u64 });
         let Kind::Tagged { kinds, .. } = &find(estimator, "radius").kind else { panic!("tagged") };
         let list = Kind::List { of: Box::new(Kind::Number), len: None };
         assert_eq!(find(&kinds[1].1, "range_m").kind, list);

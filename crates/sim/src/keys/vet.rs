@@ -66,7 +66,7 @@ impl<'a> Document<'a> {
     }
 
     /// A plain value as the text writes it; none for lists and tables, of which a message knows the part that matters.
-    fn written(&self, path: &str) -> Option<String> {
+    pub(crate) fn written(&self, path: &str) -> Option<String> {
         let (_, value) = find(&self.table, path)?;
         let is_plain = !matches!(value.get_ref(), DeValue::Array(_) | DeValue::Table(_));
         is_plain.then(|| self.quote(value.span()))

@@ -128,7 +128,7 @@ fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {
 fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let e = &scene.estimator;
     let region = match (&e.method, &e.radius) {
-        (Method::Periodogram, _) => "no region".to_owned(),
+        (Method::Periodogram {}, _) => "no region".to_owned(),
         (_, RegionRadius::Fixed {}) => format!("regions of {} m", e.radius_m),
         (_, RegionRadius::OfRange { .. }) => "regions whose radius depends on range".to_owned(),
         (_, RegionRadius::Target { standard_deviation_m_s, .. }) => {
@@ -149,10 +149,10 @@ fn window_s(scene: &Scene, n: &Sizes) -> f64 {
     let e = &scene.estimator;
     let transform_s = n.parts * TRANSFORM_POINT_S * 2.0 * n.window * (2.0 * n.window).log2();
     match e.method {
-        Method::GradientLikelihood => {
-            e.gradients as f64 * GRADIENT_PAIR_S * n.window * n.window + n.numbers * SUMMED_NUMBER_S
+        Method::GradientLikelihood(g) => {
+            g.gradients as f64 * GRADIENT_PAIR_S * n.window * n.window + n.numbers * SUMMED_NUMBER_S
         }
-        Method::Likelihood => transform_s * (2.0 + 0.5 * tapers(scene, n)),
+        Method::Likelihood(_) => transform_s * (2.0 + 0.5 * tapers(scene, n)),
         _ if keeps_few_lags(scene) => {
             let pairs = (2.0 * e.window_step_samples as f64).min(n.window);
             pairs * n.numbers * SLIDING_LAG_S
@@ -169,16 +169,16 @@ fn tapers(scene: &Scene, n: &Sizes) -> f64 {
 /// Time of the velocity at one point of the map, s.
 fn point_s(scene: &Scene, n: &Sizes) -> f64 {
     let e = &scene.estimator;
-    let order = e.order as f64;
+    let order = e.method.order().map_or(0.0, |model| model.order as f64);
     let lags = n.numbers.min(n.parts * n.window);
     let spectrum_s = n.frequencies * (lags * SPECTRUM_LAG_S + SPECTRUM_POINT_S);
     let estimate_s = match e.method {
-        Method::GradientLikelihood => 2.0 * e.gradients as f64 * spectrum_s,
-        Method::Autoregressive => spectrum_s + order * order * 1.5e-9,
-        Method::Capon => spectrum_s + order * order * 2e-9,
-        Method::AutoregressivePole => order * order * 7.5e-8,
-        Method::FirstMoment => 2.0 * spectrum_s,
-        Method::PulsePair => 1e-7,
+        Method::GradientLikelihood(g) => 2.0 * g.gradients as f64 * spectrum_s,
+        Method::Autoregressive(_) => spectrum_s + order * order * 1.5e-9,
+        Method::Capon(_) => spectrum_s + order * order * 2e-9,
+        Method::AutoregressivePole(_) => order * order * 7.5e-8,
+        Method::FirstMoment(_) => 2.0 * spectrum_s,
+        Method::PulsePair {} => 1e-7,
         _ => spectrum_s,
     };
     let pulses = scene.scan.pulses_per_line as f64;
@@ -193,8 +193,8 @@ fn point_s(scene: &Scene, n: &Sizes) -> f64 {
 fn planning(scene: &Scene, n: &Sizes) -> Cost {
     let (squared, cubed) = (n.window.powi(2), n.window.powi(3));
     let (core_s, matrices) = match scene.estimator.method {
-        Method::Likelihood => (3.5e-8 * cubed, 8.0),
-        Method::GradientLikelihood => (2.5e-7 * cubed * scene.estimator.gradients as f64, 24.0),
+        Method::Likelihood(_) => (3.5e-8 * cubed, 8.0),
+        Method::GradientLikelihood(g) => (2.5e-7 * cubed * g.gradients as f64, 24.0),
         _ => (0.0, 0.0),
     };
     let model = match scene.estimator.radius {

@@ -150,20 +150,20 @@ impl Scene {
             first_m,
             format!("above {reach_m:.3} m, half the length of the pulse in the air"),
         )];
-        match self.pulse.shape {
+        match &self.pulse.shape {
             PulseShape::Sampled(_) => {
                 let allowed = format!(
                     "that ends so early that half its length in the air, {reach_m:.3} m, is below scan.range_min_m"
                 );
                 sides.push(("pulse.shape", String::new(), format!("a pulse {allowed}, {first_m} m")));
             }
-            PulseShape::Gaussian {} => {
+            PulseShape::Gaussian(shape) => {
                 // A little less, so that rounding it is safe.
-                let longest_s = self.pulse.duration_s * first_m / reach_m * (1.0 - 1e-4);
+                let longest_s = shape.duration_s * first_m / reach_m * (1.0 - 1e-4);
                 let allowed = format!(
                     "below {longest_s:.4e} s, so that half the length of the pulse in the air is below scan.range_min_m, {first_m} m"
                 );
-                sides.push(side("pulse.duration_s", self.pulse.duration_s, allowed));
+                sides.push(side("pulse.shape.duration_s", shape.duration_s, allowed));
             }
         }
         c.between(first_m > reach_m, &sides);
@@ -239,7 +239,10 @@ mod tests {
             ),
             ("[detector]\nbandwidth_hz = 95e6\n", "detector.bandwidth_hz = 95e6 is not allowed: below 9e7 Hz"),
             ("[scan]\nrange_max_m = 300\n", "s.toml:2: scan.range_max_m = 300 is not allowed: at least 317.774 m"),
-            ("[pulse]\nduration_s = 1.2e-6\n", "s.toml:2: pulse.duration_s = 1.2e-6 is not allowed: below 8.36"),
+            (
+                "[pulse.shape]\nduration_s = 1.2e-6\n",
+                "s.toml:2: pulse.shape.duration_s = 1.2e-6 is not allowed: below 8.36",
+            ),
             ("[flow]\nspacing_m = 3\n", "flow.spacing_m = 3 is not allowed: above twice flow.core_radius_m, 4.7 m"),
             (
                 "[telescope]\naperture_radius_m = 0.01\nobscuration_radius_m = 0.02\n",
@@ -251,8 +254,8 @@ mod tests {
             ),
             ("[outputs]\nprofile_range_min_m = 4000\n", "outputs.profile_range_min_m = 4000 is not allowed: below"),
             (
-                "[estimator]\nmethod = \"capon\"\nwindow_samples = 10\n",
-                "estimator.window_samples = 10 is not allowed: above estimator.order, 16",
+                "[estimator]\nmethod.kind = \"capon\"\nwindow_samples = 10\n",
+                "estimator.window_samples = 10 is not allowed: above estimator.method.order, 16",
             ),
         ] {
             let m = message(text);
@@ -263,7 +266,7 @@ mod tests {
     #[test]
     fn what_a_limit_names_is_accepted() {
         let good = |text: &str| SceneFile::parse(text, Path::new("s.toml")).map(|_| ()).map_err(|e| e.to_string());
-        assert_eq!(good("[pulse]\nduration_s = 8.36e-7\n"), Ok(()));
+        assert_eq!(good("[pulse.shape]\nduration_s = 8.36e-7\n"), Ok(()));
         assert_eq!(good("[scan]\nrange_max_m = 317.774\n"), Ok(()));
         assert_eq!(good("[scan]\nrange_min_m = 482.226\n"), Ok(()));
         assert_eq!(good("[detector]\nsampling_hz = 210000001\n"), Ok(()));

@@ -39,14 +39,18 @@ impl Scene {
         c.within("laser.wavelength_m", self.laser.wavelength_m, 1e-7, 2e-5, "m");
         c.within("laser.pulse_repetition_hz", self.laser.pulse_repetition_hz, 1e-3, 1e6, "Hz");
         c.within("pulse.energy_j", self.pulse.energy_j, 1e-12, 1e3, "J");
-        c.within("pulse.duration_s", self.pulse.duration_s, 1e-9, 1e-4, "s");
         c.within("pulse.chirp_hz_s", self.pulse.chirp_hz_s, -1e18, 1e18, "Hz/s");
-        if let PulseShape::Sampled(shape) = &self.pulse.shape {
-            let lists = [("pulse.shape.time_s", &shape.time_s), ("pulse.shape.power", &shape.power)];
-            let phase = ("pulse.shape.phase_rad", &shape.phase_rad);
-            let lists = lists.into_iter().chain((!phase.1.is_empty()).then_some(phase));
-            let counts: Vec<(&str, usize)> = lists.map(|(key, list)| (key, list.len())).collect();
-            check_lengths(&counts, "pulse.shape", c);
+        match &self.pulse.shape {
+            PulseShape::Gaussian(shape) => {
+                c.within("pulse.shape.duration_s", shape.duration_s, 1e-9, 1e-4, "s");
+            }
+            PulseShape::Sampled(shape) => {
+                let lists = [("pulse.shape.time_s", &shape.time_s), ("pulse.shape.power", &shape.power)];
+                let phase = ("pulse.shape.phase_rad", &shape.phase_rad);
+                let lists = lists.into_iter().chain((!phase.1.is_empty()).then_some(phase));
+                let counts: Vec<(&str, usize)> = lists.map(|(key, list)| (key, list.len())).collect();
+                check_lengths(&counts, "pulse.shape", c);
+            }
         }
         let d = &self.detector;
         c.within("detector.bandwidth_hz", d.bandwidth_hz, 1e3, 1e11, "Hz");
@@ -163,10 +167,21 @@ impl Scene {
 
     /// The 1/e half width sigma of |f|^2 in (7), s; for a sampled pulse that of the Gaussian with the same spread.
     pub fn pulse_sigma_s(&self) -> f64 {
-        match (&self.pulse.shape, self.pulse.definition) {
-            (PulseShape::Sampled(_), _) => crate::join::pulse(self).map_or(f64::NAN, |pulse| pulse.sigma_s()),
-            (_, super::PulseDefinition::Fwhm) => self.pulse.duration_s / (2.0 * std::f64::consts::LN_2.sqrt()),
-            (_, super::PulseDefinition::OneOverEHalfWidth) => self.pulse.duration_s,
+        match &self.pulse.shape {
+            PulseShape::Sampled(_) => crate::join::pulse(self).map_or(f64::NAN, |pulse| pulse.sigma_s()),
+            PulseShape::Gaussian(shape) => match shape.definition {
+                super::PulseDefinition::Fwhm => shape.duration_s / (2.0 * std::f64::consts::LN_2.sqrt()),
+                super::PulseDefinition::OneOverEHalfWidth => shape.duration_s,
+            },
+        }
+    }
+
+    /// The duration of the pulse as the scene states it, s; of a sampled one the full width at half maximum of the Gaussian
+    /// with the same spread.
+    pub fn pulse_width_s(&self) -> f64 {
+        match &self.pulse.shape {
+            PulseShape::Gaussian(shape) => shape.duration_s,
+            PulseShape::Sampled(_) => 2.0 * std::f64::consts::LN_2.sqrt() * self.pulse_sigma_s(),
         }
     }
 
@@ -237,7 +252,7 @@ mod tests {
     #[test]
     fn impossible_values_are_named() {
         assert_eq!(keys(|s| s.telescope.beam_radius_m = -0.03), ["telescope.beam_radius_m"]);
-        assert_eq!(keys(|s| s.pulse.duration_s = f64::NAN), ["pulse.duration_s"]);
+        assert_eq!(keys(|s| s.pulse.shape = PulseShape::gaussian(f64::NAN)), ["pulse.shape.duration_s"]);
         assert_eq!(keys(|s| s.telescope.focus_m = 0.0), ["telescope.focus_m"]);
         assert_eq!(keys(|s| s.scan.elevation_min_rad = -0.01), ["scan.elevation_min_rad"]);
         assert_eq!(keys(|s| s.scan.range_max_m = 281.0), ["estimator.window_samples"]);

@@ -1,6 +1,6 @@
 //! Reading a scene file, with errors that name the key, the value, what is allowed and the line.
 
-use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
+use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, format1, idle};
 use crate::keys::{Document, Format, Key, Source, keys_of};
 use crate::text_file;
 use std::path::{Path, PathBuf};
@@ -37,6 +37,7 @@ impl SceneFile {
     /// As [`SceneFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
         let document = Document::parse(text, path)?;
+        format1::refuse(&document)?;
         let scene: Scene = document.read(document.vet(&scene_format())?)?;
         let mut problems = scene.problems_where(&|key| document.line(key).is_some());
         problems.extend(idle::problems(&scene, &document));
@@ -145,14 +146,14 @@ mod tests {
     fn values_of_the_wrong_kind_are_named_all_at_once_with_an_example() {
         assert_eq!(
             message(
-                "[pulse]\nenergy_j = \"much\"\ndefinition = \"hwhm\"\n[scan]\nrealisations = -1\n[outputs]\ncsv = 1\n[flow]\n\
+                "[pulse]\nenergy_j = \"much\"\nshape.definition = \"hwhm\"\n[scan]\nrealisations = -1\n[outputs]\ncsv = 1\n[flow]\n\
                  kind = \"uniform\"\nlateral_m_s = 1\n"
             )
             .lines()
             .collect::<Vec<_>>(),
             [
                 "s.toml:2: pulse.energy_j = \"much\" is not allowed: a number in J, e.g. 150e-6",
-                "s.toml:3: pulse.definition = \"hwhm\" is not allowed: one of \"fwhm\", \"one_over_e_half_width\"; did you mean \
+                "s.toml:3: pulse.shape.definition = \"hwhm\" is not allowed: one of \"fwhm\", \"one_over_e_half_width\"; did you mean \
                  \"fwhm\"?",
                 "s.toml:5: scan.realisations = -1 is not allowed: a whole number that is not negative, e.g. 4",
                 "s.toml:7: outputs.csv = 1 is not allowed: true or false",

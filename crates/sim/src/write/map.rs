@@ -44,7 +44,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         sweeps: vec![Sweep { tau: plan.wind.tau, azimuth_rad }],
         pulse: PulseInfo {
             prt_s: 1.0 / scene.laser.pulse_repetition_hz,
-            pulse_width_s: scene.pulse.duration_s,
+            pulse_width_s: scene.pulse_width_s(),
             nyquist_velocity_m_s: 0.25 * scene.laser.wavelength_m * scene.detector.sampling_hz,
             samples: scene.scan.pulses_per_line as u32,
             frequency_hz: crate::SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m,

@@ -3,11 +3,11 @@
 use super::{History, PER_TAU, Stored, growth, onset, run, worst};
 use crate::Failure;
 use crate::validate::{Check, Profile, Shown, interpolate};
-use crate::wakes::Wake;
 use std::path::Path;
 use wakescope_les::SubgridModel;
 use wakescope_les::cases::VortexPairCase;
 use wakescope_sim::export::Table;
+use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const END: f64 = 5.0;
@@ -74,7 +74,7 @@ pub(crate) fn show_medium(_: Profile) -> Result<Shown, Failure> {
 
 /// A finished run of the flow of either preset on its own or a finer mesh, instead of one made here.
 pub(crate) fn show_files(folder: &Path) -> Result<Shown, Failure> {
-    let wake = Wake::read(folder)?;
+    let wake = FinishedWake::read(folder)?;
     let f = &wake.flow;
     let like = |pair: &VortexPairCase| {
         f.reynolds == pair.reynolds

@@ -6,13 +6,23 @@
 //! Check: presets are those of the solver; tests of `flow` interrupt runs and compare the bytes.
 
 mod case;
+mod finished;
 mod history;
 mod output;
+#[cfg(feature = "plots")]
+mod pictures;
 mod preset;
 mod schedule;
+#[cfg(all(feature = "netcdf", feature = "plots"))]
+mod space;
 
 pub use case::{PairScale, WakeFlow, WakeProfile};
+pub use finished::{FinishedWake, table};
 pub(super) use history::{WakeRun, file_names};
 pub use output::WakeOutput;
+#[cfg(feature = "plots")]
+pub(super) use pictures::PICTURES;
 pub use preset::WakePreset;
 pub(super) use schedule::{Due, Schedule};
+#[cfg(all(feature = "netcdf", feature = "plots"))]
+pub use space::REPEATS;

@@ -1,22 +1,15 @@
 //! The program from outside: what a user types, what files come, and what wrong input gives.
 
-#![cfg(feature = "cli")]
-// A test that cannot set up its files has failed.
-#![allow(clippy::unwrap_used)]
-
+use super::wakescope;
 use std::path::Path;
-use std::process::{Command, Output};
 use wakescope_sim::export::Existing;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::SceneFile;
 use wakescope_sim::write;
 
-#[path = "cli/messages.rs"]
-mod messages;
-
 /// A scene small enough to run in a moment.
-const SMALL: &str = r#"
+pub(super) const SMALL: &str = r#"
 seed = 5
 [detector.snr]
 reference = "fixed"
@@ -34,11 +27,7 @@ signals = true
 profile_points = 5
 "#;
 
-fn wakescope(folder: &Path, words: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wakescope")).args(words).current_dir(folder).output().unwrap()
-}
-
-fn names(folder: &Path) -> Vec<String> {
+pub(super) fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> =
         std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
@@ -69,7 +58,7 @@ fn wrong_scenes_are_refused_with_key_value_range_and_line() {
             "[telescope]\naperture_radius_m = -0.05\n",
             ["s.toml:2", "telescope.aperture_radius_m = -0.05", "from 0.0001 to 10.0 m"],
         ),
-        ("[pulse]\nduration_s = nan\n", ["s.toml:2", "pulse.duration_s = nan", "1e-9"]),
+        ("[pulse.shape]\nduration_s = nan\n", ["s.toml:2", "pulse.shape.duration_s = nan", "1e-9"]),
         ("[scan]\nelevation_min_rad = -0.1\n", ["s.toml:2", "scan.elevation_min_rad = -0.1", "below the ground"]),
         ("[scan]\nrange_max_m = 300.0\n", ["s.toml:2: scan.range_max_m = 300.0", "at least 317.774 m", "34 samples"]),
         (
@@ -302,8 +291,8 @@ fn the_files_of_a_run_are_those_that_it_announces() {
 #[test]
 fn extreme_scenes_run_to_the_end() {
     let nothing_returns = "[atmosphere]\nbackscatter_per_m_sr = 0.0\n";
-    let short_pulse = "[pulse]\nduration_s = 1e-9\n";
-    let long_pulse = "[pulse]\nduration_s = 1.2e-6\n[scan]\nrange_min_m = 500.0\nrange_max_m = 560.0\n";
+    let short_pulse = "[pulse.shape]\nduration_s = 1e-9\n";
+    let long_pulse = "[pulse.shape]\nduration_s = 1.2e-6\n[scan]\nrange_min_m = 500.0\nrange_max_m = 560.0\n";
     let faint = "[detector.snr]\nreference = \"fixed\"\nsnr_db = -40.0\n";
     let loud = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 60.0\n";
     let silent = "[detector]\nnoise = \"none\"\n[flow]\nkind = \"calm\"\n";

@@ -1,11 +1,8 @@
 //! `wakescope wake` from outside: presets, a run that is killed and continued.
 
-#![cfg(feature = "cli")]
-// A test that cannot set up its files has failed.
-#![allow(clippy::unwrap_used)]
-
+use super::wakescope;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 /// A wake of few cells whose run takes a second or so.
 const SMALL: &str = r#"
@@ -20,10 +17,6 @@ planes_tau = [0.6]
 [checkpoint]
 every_steps = 10
 "#;
-
-fn wakescope(folder: &Path, words: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_wakescope")).args(words).current_dir(folder).output().unwrap()
-}
 
 #[test]
 fn a_run_that_is_killed_and_continued_ends_with_the_same_bits() {

@@ -1,6 +1,7 @@
 //! What the program says: the message of each bad input, errors as JSON, a standard output that cannot be written.
 
-use super::{SMALL, names, wakescope};
+use super::cli::{SMALL, names};
+use super::wakescope;
 use std::fs;
 use std::path::Path;
 use std::process::Command;

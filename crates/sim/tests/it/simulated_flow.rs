@@ -1,9 +1,5 @@
 //! From a simulated flow to a map: `wakescope flow` writes planes, a scene reads them, the map shows the flow that was sampled.
 
-#![cfg(all(feature = "flow", feature = "netcdf"))]
-// A test that cannot set up its files has failed.
-#![allow(clippy::unwrap_used)]
-
 use netcdf3::FileReader;
 use std::path::Path;
 use wakescope_les::{Edges, GridSnapshot, OutsidePolicy, PlaneMesh, Side, Wind};

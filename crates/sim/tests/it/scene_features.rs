@@ -1,8 +1,5 @@
 //! What a scene can say about estimators, pulses, air and the receiver, seen through whole runs.
 
-// A test that cannot set up its input has failed.
-#![allow(clippy::unwrap_used)]
-
 use ndarray::Array2;
 use std::path::Path;
 use wakescope_sim::map::VelocityEstimates;
@@ -100,7 +97,7 @@ const METHODS: [&str; 10] = [
 fn every_method_reads_a_uniform_wind_from_real_and_from_complex_samples() {
     for method in METHODS {
         for signal in ["intermediate_frequency", "baseband"] {
-            let estimator = format!("method = \"{method}\"\nweighting = \"rectangular\"\n");
+            let estimator = format!("method.kind = \"{method}\"\nweighting = \"rectangular\"\n");
             let detector = format!("signal = \"{signal}\"\nsnr = {{ reference = \"fixed\", snr_db = 10.0 }}\n");
             let found = map(Words { estimator: estimator.leak(), detector: detector.leak(), ..PLAIN });
             let error_m_s = mean(&(&found.v_mean_m_s - &found.v_pulse_m_s));
@@ -127,23 +124,30 @@ fn the_periodogram_shows_the_signal_to_noise_ratio_and_the_width_of_the_pulse() 
 #[test]
 fn knobs_of_the_estimators_reach_them() {
     let velocities = |estimator| with_estimator(estimator).v_mean_m_s;
-    let base = "method = \"autoregressive\"\nweighting = \"rectangular\"\n";
+    let base = "method.kind = \"autoregressive\"\nweighting = \"rectangular\"\n";
     let model = velocities(base);
-    for knob in
-        ["order = 4", "order_choice = \"aic\"", "order_choice = \"mdl\"", "padded_samples = 256", "follow_wind = true"]
-    {
+    for knob in [
+        "method.order = 4",
+        "method.order_choice = \"aic\"",
+        "method.order_choice = \"mdl\"",
+        "padded_samples = 256",
+        "follow_wind = true",
+    ] {
         let other = velocities(format!("{base}{knob}\n").leak());
         assert_ne!(model, other, "{knob}");
         assert!((mean(&other) - mean(&model)).abs() < 0.2, "{knob}: {} {}", mean(&other), mean(&model));
     }
-    let lags = |knob: &str| velocities(format!("method = \"lag_window\"\nweighting = \"rectangular\"\n{knob}").leak());
-    assert_ne!(lags(""), lags("lag_window_lags = 30\n"));
+    let lags =
+        |knob: &str| velocities(format!("method.kind = \"lag_window\"\nweighting = \"rectangular\"\n{knob}").leak());
+    assert_ne!(lags(""), lags("method.lag_window_lags = 30\n"));
     assert_ne!(lags(""), lags("correlogram = \"unbiased\"\n"));
-    let moment = |reach| velocities(format!("method = \"first_moment\"\nmoment_reach = {reach:?}\n").leak());
+    let moment =
+        |reach| velocities(format!("method.kind = \"first_moment\"\nmethod.moment_reach = {reach:?}\n").leak());
     assert_ne!(moment(1.5), moment(3.5));
-    let likelihood = |snr_db| velocities(format!("method = \"likelihood\"\nlikelihood_snr_db = {snr_db:?}\n").leak());
+    let likelihood =
+        |snr_db| velocities(format!("method.kind = \"likelihood\"\nmethod.likelihood_snr_db = {snr_db:?}\n").leak());
     assert_ne!(likelihood(-10.0), likelihood(30.0));
-    assert_eq!(likelihood(10.0), velocities("method = \"likelihood\"\n"), "the scene's own ratio is 10 dB");
+    assert_eq!(likelihood(10.0), velocities("method.kind = \"likelihood\"\n"), "the scene's own ratio is 10 dB");
 }
 
 #[test]
@@ -187,10 +191,13 @@ fn by_default_noise_passes_one_time_in_a_hundred_and_estimates_at_minus_14_db_ar
     assert!(flagged > 0.9 && rms_m_s > 6.0, "{flagged} {rms_m_s}");
     for (detector, estimator) in [
         ("", ""),
-        ("noise = \"white\"\n", "method = \"autoregressive\"\nweighting = \"rectangular\"\n"),
-        ("signal = \"baseband\"\n", "method = \"lag_window\"\nweighting = \"rectangular\"\n"),
-        ("noise = \"white\"\n", "method = \"likelihood\"\nlikelihood_snr_db = 0.0\n"),
-        ("", "method = \"gradient_likelihood\"\nlikelihood_snr_db = 0.0\ngradients = 3\npadded_samples = 256\n"),
+        ("noise = \"white\"\n", "method.kind = \"autoregressive\"\nweighting = \"rectangular\"\n"),
+        ("signal = \"baseband\"\n", "method.kind = \"lag_window\"\nweighting = \"rectangular\"\n"),
+        ("noise = \"white\"\n", "method.kind = \"likelihood\"\nmethod.likelihood_snr_db = 0.0\n"),
+        (
+            "",
+            "method.kind = \"gradient_likelihood\"\nmethod.likelihood_snr_db = 0.0\nmethod.gradients = 3\npadded_samples = 256\n",
+        ),
     ] {
         let estimator = format!("false_alarm = 0.1\n{estimator}");
         let noise = single_pulses(-60.0, 60, detector, &estimator);
@@ -207,9 +214,9 @@ fn by_default_noise_passes_one_time_in_a_hundred_and_estimates_at_minus_14_db_ar
 fn the_ratio_that_a_map_shows_is_unbiased_or_missing() {
     for (detector, estimator) in [
         ("", ""),
-        ("signal = \"baseband\"\n", "method = \"likelihood\"\n"),
-        ("noise = \"white\"\n", "method = \"capon\"\nweighting = \"rectangular\"\n"),
-        ("", "method = \"gradient_likelihood\"\ngradients = 3\npadded_samples = 256\n"),
+        ("signal = \"baseband\"\n", "method.kind = \"likelihood\"\n"),
+        ("noise = \"white\"\n", "method.kind = \"capon\"\nweighting = \"rectangular\"\n"),
+        ("", "method.kind = \"gradient_likelihood\"\nmethod.gradients = 3\npadded_samples = 256\n"),
     ] {
         for (snr_db, realisations) in [(-14.0, 120), (0.0, 40), (10.0, 40)] {
             let found = single_pulses(snr_db, realisations, detector, estimator);
