@@ -10,19 +10,19 @@ pub(crate) mod uniform;
 
 use wakescope_estimate::Sampling;
 use wakescope_signal::{NoiseModel, Receiver};
-use wakescope_sim::{join, scene::Scene};
+use wakescope_sim::{estimators, instrument, scene::Scene};
 
 /// Energy of the pulses \[J\]; only the signal-to-noise ratio matters here.
 pub(crate) const ENERGY_J: f64 = 150e-6;
 
 /// The receiver of Table 2 with the given noise.
 pub(crate) fn receiver(noise: NoiseModel) -> Receiver {
-    Receiver { noise, ..join::receiver(&Scene::default()) }
+    Receiver { noise, ..instrument::receiver(&Scene::default()) }
 }
 
 /// The same in the words of the estimators.
 pub(crate) fn sampling() -> Result<Sampling, wakescope_sim::Error> {
-    join::sampling(&Scene::default())
+    estimators::sampling(&Scene::default())
 }
 
 /// Name of a noise in tables.

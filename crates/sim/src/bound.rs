@@ -8,7 +8,7 @@ use crate::plan::Plan;
 use crate::progress::Observer;
 use crate::region::{of_table, region_radius};
 use crate::scan::Scanner;
-use crate::{Error, join};
+use crate::{Error, estimators};
 use wakescope_estimate::{PolarPoint, Radius, ScanGeometry, SignalKind, WindowCorrelation, WindowModel};
 
 /// Signal-to-noise ratios of the curve, dB.
@@ -56,7 +56,7 @@ impl Setting {
         let (level, n_eff) = self.places.level(point, self.radius.at_m(range_m)?, &self.correlation);
         // Without any return there is no information.
         let window_m_s = match snr > 0.0 {
-            true => join::bound_m_s(&self.model, snr, self.kind)?,
+            true => estimators::bound_m_s(&self.model, snr, self.kind)?,
             false => f64::NAN,
         };
         let snr_db = if snr > 0.0 { 10.0 * snr.log10() } else { f64::NAN };
@@ -70,14 +70,15 @@ impl Setting {
 /// [`Error::NoBound`] for a scene without noise; what the crates refuse.
 pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
-    let model = join::window_model(scene)?.ok_or(Error::NoBound)?;
+    let model = estimators::window_model(scene, scene.detector.noise, &plan.instrument.pulse)?.ok_or(Error::NoBound)?;
     let scanner = Scanner::new(plan, observer)?;
-    let (sampling, gates, pulses) = (join::sampling(scene)?, join::gates(scene)?, scene.scan.pulses_per_line);
+    let (sampling, gates, pulses) =
+        (estimators::sampling(scene)?, estimators::gates(scene)?, scene.scan.pulses_per_line);
     let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
-    let correlation = join::window_correlation(scene, scanner.mean_snr())?;
+    let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
     let radius = region_radius(scene, &scanner, &places, &correlation)?;
     let elevation_rad = g.elevation_rad[g.elevation_rad.len() / 2];
-    let setting = Setting { model, kind: join::signal_kind(scene), places, correlation, radius, elevation_rad };
+    let setting = Setting { model, kind: estimators::signal_kind(scene), places, correlation, radius, elevation_rad };
     let middle_m = g.gate_range_m[g.gate_range_m.len() / 2];
     let by_snr = SNR_DB.map(|db| setting.at(middle_m, 10f64.powf(0.1 * f64::from(db)))).collect::<Result<_, _>>()?;
     let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();

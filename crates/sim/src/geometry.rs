@@ -2,10 +2,11 @@
 //!
 //! Only arithmetic on the scene, so that the plan can state sizes before anything is allocated.
 
+use crate::Error;
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::scene::Scene;
 use crate::wind::SceneWind;
-use crate::{Error, join};
+use wakescope_signal::Pulse;
 
 /// The sampling of one scan in angle, range and time.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +40,7 @@ impl Geometry {
     ///
     /// # Errors
     /// What the wind or the layers refuse; a checked scene gives none.
-    pub fn new(scene: &Scene, wind: &SceneWind) -> Result<Self, Error> {
+    pub fn new(scene: &Scene, pulse: &Pulse, wind: &SceneWind) -> Result<Self, Error> {
         let scan = &scene.scan;
         let lines = ((scan.elevation_max_rad - scan.elevation_min_rad) / scan.elevation_step_rad + 1e-9) as usize + 1;
         let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
@@ -52,7 +53,6 @@ impl Geometry {
         let gate_first_sample: Vec<usize> = (0..=samples - window).step_by(scene.estimator.gate_step_samples).collect();
         // Windows are indexed by their centre, R = c (t_p + N T_s/2)/2.
         let centre_m = |first: &usize| scan.range_min_m + (*first as f64 + 0.5 * window as f64) * sample_spacing_m;
-        let pulse = join::pulse(scene)?;
         let layer_thickness_m =
             pulse.layer_thickness_m(scene.detector.sampling_hz, scene.laser.wavelength_m, max_gradient_per_s)?;
         // Layers before and behind the range of a sample that the pulse lights.

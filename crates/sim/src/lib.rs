@@ -29,7 +29,7 @@
 //! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
 //! | [`geometry`] | lines of sight, samples, gates, layers |
-//! | [`join`] | the only place where the types of two crates meet |
+//! | [`instrument`], [`estimators`] | a scene in the words of the other crates, made once for a plan |
 //! | [`wind`] | the wind: analytic, or the planes of a simulated flow |
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | [`scan`] | air along the lines of sight, and their records |
@@ -45,11 +45,12 @@
 //! PNG, the report page), `vtk` (fields for ParaView).
 
 pub mod bound;
+pub mod estimators;
 pub mod export;
 #[cfg(feature = "flow")]
 pub mod flow;
 pub mod geometry;
-pub mod join;
+pub mod instrument;
 mod keys;
 mod machine;
 pub mod map;

@@ -1,11 +1,11 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
-use crate::join::{Toolkit, WindowStatistics};
+use crate::Error;
+use crate::estimators::{self, Toolkit, WindowStatistics};
 use crate::plan::{Plan, Stage};
 use crate::progress::Observer;
 use crate::region::{interpolated, region_radius};
 use crate::scan::{Scanner, radial_velocity_m_s};
-use crate::{Error, join};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use wakescope_estimate::{
     ErrorMap, GateVelocity, Gates, MapPoint, NoiseTest, PolarPoint, Radius, Sample, Sampling, Scan, ScanGeometry,
@@ -172,10 +172,10 @@ struct Truth {
 impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
     pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
-        let (sampling, gates) = (join::sampling(scene)?, join::gates(scene)?);
+        let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let pulses = scene.scan.pulses_per_line;
-        let correlation = join::window_correlation(scene, scanner.mean_snr())?;
+        let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
         let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
         let radius = region_radius(scene, scanner, &places, &correlation)?;
         let middle = PolarPoint {
@@ -185,7 +185,7 @@ impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
         let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
         let known = WindowStatistics { snr: scanner.mean_snr(), n_eff };
         let points = polar_points(&g.elevation_rad, &g.gate_range_m);
-        let tools = Toolkit::new(scene, &known)?;
+        let tools = Toolkit::new(scene, &plan.instrument, &known)?;
         let noise = match (&tools.test, &tools.noise) {
             (Some(test), Some(noise)) => Some(NoiseLevels::new(test, noise, &places, &points, &radius)?),
             _ => None,
@@ -300,10 +300,10 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     let shape = (g.elevation_rad.len(), g.gate_range_m.len());
     let mut truth =
         Truth { exact_m_s: Array2::zeros(shape), pulse_m_s: Array2::zeros(shape), gate_m_s: Array2::zeros(shape) };
-    let pulse = join::pulse(scene)?;
-    let window = join::weighting(scene).weights(scene.estimator.window_samples)?;
-    let by_pulse = RangeFilter::pulse(&pulse, g.layer_thickness_m)?;
-    let by_gate = RangeFilter::gate(&pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
+    let pulse = &plan.instrument.pulse;
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
+    let by_gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
     for (i, line) in scanner.lines().iter().enumerate() {
         let exact_m_s = radial_velocity_m_s(plan, i, &g.gate_range_m)?;
         truth.exact_m_s.row_mut(i).assign(&ArrayView1::from(&exact_m_s));

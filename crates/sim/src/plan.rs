@@ -5,6 +5,7 @@
 
 use crate::Error;
 use crate::geometry::Geometry;
+use crate::instrument::Instrument;
 use crate::scene::{Method, Scene, SceneFile, Weighting};
 use crate::wind::SceneWind;
 use std::fmt;
@@ -103,6 +104,8 @@ pub struct Plan {
     pub target: Target,
     /// All stages, in the order in which they run.
     pub stages: Vec<PlannedStage>,
+    /// The instrument and its air.
+    pub instrument: Instrument,
     /// Sampling in angle, range and time.
     pub geometry: Geometry,
     /// The wind.
@@ -119,7 +122,8 @@ impl Plan {
     /// such as phase screens too coarse for the turbulence; results that a file cannot hold.
     pub fn new(scene: SceneFile, target: Target) -> Result<Self, Error> {
         let wind = SceneWind::new(&scene)?;
-        let geometry = Geometry::new(&scene.scene, &wind)?;
+        let instrument = Instrument::new(&scene.scene)?;
+        let geometry = Geometry::new(&scene.scene, &instrument.pulse, &wind)?;
         let last_s = wind.start_s + geometry.line_time_s.last().copied().unwrap_or(0.0);
         if last_s > wind.end_s {
             let reason = format!(
@@ -130,10 +134,10 @@ impl Plan {
             return Err(Error::Input { path: "flow.planes".into(), reason });
         }
         let mut warnings = warnings(&scene.scene, &wind);
-        warnings.extend(ambiguity::warning(&scene.scene)?);
-        let optics = optics::stages(&scene, target, &geometry, &mut warnings)?;
+        warnings.extend(ambiguity::warning(&scene.scene, &instrument.pulse));
+        let optics = optics::stages(&scene, &instrument, target, &geometry, &mut warnings)?;
         let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
-        let plan = Self { scene, target, stages, geometry, wind, warnings };
+        let plan = Self { scene, target, stages, instrument, geometry, wind, warnings };
         possible::check(&plan)?;
         crate::write::check(&plan)?;
         Ok(plan)

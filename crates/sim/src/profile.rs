@@ -3,10 +3,11 @@
 //! Free space is a quadrature. Turbulence on independent paths (bistatic) has an exact mean at any strength.
 //! Only turbulence that both beams share (monostatic) needs phase screens.
 
+use crate::Error;
+use crate::instrument::{Instrument, receiver_path};
 use crate::plan::Stage;
 use crate::progress::Observer;
 use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence};
-use crate::{Error, join};
 use std::ops::ControlFlow;
 use wakescope_optics::plan::{DOUBTFUL_LOSS, Model, cheapest_model};
 use wakescope_optics::structure::StructureTable;
@@ -19,7 +20,7 @@ pub fn model(scene: &Scene) -> Model {
         None => Cn2Path::None,
         Some(t) => Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 },
     };
-    cheapest_model(join::receiver_path(scene), &cn2)
+    cheapest_model(receiver_path(scene), &cn2)
 }
 
 /// The turbulence of a scene, if there is any.
@@ -56,34 +57,35 @@ pub struct RangeProfile {
 ///
 /// # Errors
 /// What the optics refuse, such as a grid too small for the beam.
-pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProfile, Error> {
+pub fn range_profile(scene: &Scene, instrument: &Instrument, observer: &dyn Observer) -> Result<RangeProfile, Error> {
     let o = &scene.outputs;
     let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
     let model = self::model(scene);
     let mut others = Vec::new();
     let mut lost_power_fraction = None;
     let efficiency = match turbulence(scene) {
-        None => free_space(scene, &range_m)?,
+        None => free_space(instrument, &range_m)?,
         Some(t) => {
-            let exact = exact_bistatic(scene, &t, &range_m)?;
+            let exact = exact_bistatic(instrument, &range_m)?;
             let Paths { monostatic, bistatic, lost_power_fraction: lost, .. } =
-                monte_carlo(scene, &t, &range_m, observer)?;
+                monte_carlo(scene, instrument, &t, &range_m, observer)?;
             lost_power_fraction = Some(lost);
-            others.push(("efficiency_free_space", free_space(scene, &range_m)?));
+            others.push(("efficiency_free_space", free_space(instrument, &range_m)?));
             others.push(("efficiency_bistatic_exact", exact.clone()));
             others.push(("efficiency_monostatic_monte_carlo", monostatic.clone()));
             others.push(("efficiency_bistatic_monte_carlo", bistatic));
             if model == Model::MonteCarlo { monostatic } else { exact }
         }
     };
-    let (receiver, return_per_m) = (join::receiver(scene), join::return_per_m(scene)?);
+    let receiver = &instrument.receiver;
     let snr_db = efficiency
         .range_m
         .iter()
         .zip(&efficiency.mean)
         .map(|(&range_m, &mean)| match scene.detector.snr {
             SnrReference::Fixed { snr_db } => Ok(snr_db),
-            _ => Ok(10.0 * receiver.slowly_varying_snr(scene.pulse.energy_j, return_per_m(range_m)? * mean).log10()),
+            _ => Ok(10.0
+                * receiver.slowly_varying_snr(scene.pulse.energy_j, instrument.return_per_m(range_m)? * mean).log10()),
         })
         .collect::<Result<_, Error>>()?;
     Ok(RangeProfile { model, efficiency, snr_db, others, lost_power_fraction })
@@ -93,25 +95,28 @@ pub fn range_profile(scene: &Scene, observer: &dyn Observer) -> Result<RangeProf
 ///
 /// # Errors
 /// What the optics refuse, such as a range of 0 or a grid too small for the beam.
-pub fn efficiency_at(scene: &Scene, range_m: &[f64], observer: &dyn Observer) -> Result<EfficiencyProfile, Error> {
+pub fn efficiency_at(
+    scene: &Scene,
+    instrument: &Instrument,
+    range_m: &[f64],
+    observer: &dyn Observer,
+) -> Result<EfficiencyProfile, Error> {
     match (turbulence(scene), model(scene)) {
-        (Some(t), Model::ExactBistatic) => exact_bistatic(scene, &t, range_m),
-        (Some(t), Model::MonteCarlo) => Ok(monte_carlo(scene, &t, range_m, observer)?.monostatic),
-        _ => free_space(scene, range_m),
+        (Some(_), Model::ExactBistatic) => exact_bistatic(instrument, range_m),
+        (Some(t), Model::MonteCarlo) => Ok(monte_carlo(scene, instrument, &t, range_m, observer)?.monostatic),
+        _ => free_space(instrument, range_m),
     }
 }
 
-fn free_space(scene: &Scene, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
-    let telescope = join::telescope(scene)?;
-    Ok(EfficiencyProfile::from_theory(range_m, |range_m| free_space_efficiency(&telescope, range_m))?)
+fn free_space(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
+    Ok(EfficiencyProfile::from_theory(range_m, |range_m| free_space_efficiency(&instrument.telescope, range_m))?)
 }
 
-fn exact_bistatic(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
-    let telescope = join::telescope(scene)?;
-    let turbulence = join::turbulence(t)?;
+fn exact_bistatic(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
+    let Some(turbulence) = &instrument.turbulence else { return free_space(instrument, range_m) };
     let table = StructureTable::new(&*turbulence.spectrum);
     Ok(EfficiencyProfile::from_theory(range_m, |range_m| {
-        bistatic_efficiency_with(&telescope, &Misalignment::NONE, &turbulence.cn2, &table, range_m)
+        bistatic_efficiency_with(&instrument.telescope, &Misalignment::NONE, &turbulence.cn2, &table, range_m)
     })?)
 }
 
@@ -121,11 +126,12 @@ fn exact_bistatic(scene: &Scene, t: &RefractiveTurbulence, range_m: &[f64]) -> R
 /// As [`efficiency_at`].
 pub fn efficiency_realisations(
     scene: &Scene,
+    instrument: &Instrument,
     t: &RefractiveTurbulence,
     range_m: &[f64],
     observer: &dyn Observer,
 ) -> Result<Vec<Vec<f64>>, Error> {
-    let paths = monte_carlo(scene, t, range_m, observer)?;
+    let paths = monte_carlo(scene, instrument, t, range_m, observer)?;
     let by_range = match scene.telescope.receiver {
         ReceiverPath::Monostatic => paths.monostatic_realisations,
         ReceiverPath::Bistatic => paths.bistatic_realisations,
@@ -147,6 +153,7 @@ struct Paths {
 /// Monostatic and bistatic efficiency by phase screens, from one set of realisations.
 fn monte_carlo(
     scene: &Scene,
+    instrument: &Instrument,
     t: &RefractiveTurbulence,
     range_m: &[f64],
     observer: &dyn Observer,
@@ -154,11 +161,12 @@ fn monte_carlo(
     observer.begin(Stage::PhaseScreens, t.realisations as u64);
     let mut seen = 0;
     // Single precision: its rounding is far below the error of any number of realisations.
-    let estimate = join::monte_carlo(scene, t, range_m)?.run::<f32>(Stop::after(t.realisations), |progress| {
-        observer.advance((progress.done - seen) as u64);
-        seen = progress.done;
-        ControlFlow::Continue(())
-    })?;
+    let estimate =
+        instrument.monte_carlo(t, range_m, scene.seed)?.run::<f32>(Stop::after(t.realisations), |progress| {
+            observer.advance((progress.done - seen) as u64);
+            seen = progress.done;
+            ControlFlow::Continue(())
+        })?;
     observer.end();
     let lost = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
     if lost > DOUBTFUL_LOSS {

@@ -3,8 +3,8 @@
 //! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
 
 use crate::scan::Scanner;
-use crate::scene::{Method, RegionRadius, Scene};
-use crate::{Error, join};
+use crate::scene::{Method, NoiseKind, RegionRadius, Scene};
+use crate::{Error, estimators};
 use ndarray::Array2;
 use wakescope_estimate::{PolarPoint, Radius, ScanGeometry, WindowCorrelation};
 
@@ -43,20 +43,21 @@ fn bound_by_range(
     scanner: &Scanner<'_>,
     geometry: &ScanGeometry,
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
-    let mut noisy = scene.clone();
-    if scene.detector.noise == crate::scene::NoiseKind::None {
-        noisy.detector.noise = crate::scene::NoiseKind::White;
-    }
-    let model = join::window_model(&noisy)?.ok_or(wakescope_estimate::Error::Empty { field: "noise" })?;
+    let noise = match scene.detector.noise {
+        NoiseKind::None => NoiseKind::White,
+        noise => noise,
+    };
+    let model = estimators::window_model(scene, noise, scanner.pulse())?
+        .ok_or(wakescope_estimate::Error::Empty { field: "noise" })?;
     let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
     let all_m = geometry.gate_ranges_m();
     let range_m: Vec<f64> = all_m.iter().copied().step_by(all_m.len().div_ceil(16)).collect();
     let bound = |at_m: &f64| {
         let snr = match scene.detector.noise {
-            crate::scene::NoiseKind::None => NO_NOISE_SNR,
+            NoiseKind::None => NO_NOISE_SNR,
             _ => of_table(&layer_m, &snr, *at_m).clamp(1e-8, NO_NOISE_SNR),
         };
-        join::bound_m_s(&model, snr, join::signal_kind(scene))
+        estimators::bound_m_s(&model, snr, estimators::signal_kind(scene))
     };
     let bound_m_s = range_m.iter().map(bound).collect::<Result<_, Error>>()?;
     Ok((range_m, bound_m_s))

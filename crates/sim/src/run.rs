@@ -83,7 +83,7 @@ pub struct SummaryLine {
 pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let mut result = RunResult::default();
     if matches!(plan.target, Target::Run | Target::Efficiency) {
-        result.profile = Some(range_profile(&plan.scene.scene, observer)?);
+        result.profile = Some(range_profile(&plan.scene.scene, &plan.instrument, observer)?);
         result.middle = ScanMiddle::of(plan, result.profile.as_ref(), None);
     }
     if plan.runs(Stage::CrossPlane) {

@@ -1,18 +1,19 @@
 //! One scan: the air along each line of sight, and the signals that it returns.
 
+use crate::Error;
 use crate::geometry::Geometry;
+use crate::instrument::Instrument;
 use crate::plan::{Plan, Stage};
 use crate::profile::{drawn_turbulence, efficiency_at, efficiency_realisations, model, spaced};
 use crate::progress::Observer;
 use crate::scene::{Outside, Scene, SnrReference};
 use crate::streams::stream;
-use crate::{Error, join};
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 use std::ops::Range;
 use wakescope_optics::plan::Model;
 use wakescope_signal::{
-    Clipped, Digitiser, EfficiencyTable, LayerEfficiency, LineOfSight, PulseKey, Record, Sample, Scan, Shot, Simulator,
+    Clipped, EfficiencyTable, LayerEfficiency, LineOfSight, Pulse, PulseKey, Record, Sample, Scan, Shot, Simulator,
 };
 
 /// Ranges of the efficiency profile from which the layers take theirs, m: dense where it is a quadrature, few
@@ -29,11 +30,11 @@ pub(crate) fn profile_ranges_m(scene: &Scene, geometry: &Geometry) -> Vec<f64> {
 /// The lines of sight of a scan, and what makes signals of them.
 pub struct Scanner<'a> {
     scene: &'a Scene,
+    instrument: &'a Instrument,
     simulator: Simulator,
     lines: Vec<LineOfSight>,
     /// What each pulse brings instead of the mean efficiency.
     efficiency: Option<LayerEfficiency>,
-    digitiser: Option<Digitiser>,
 }
 
 impl<'a> Scanner<'a> {
@@ -42,8 +43,8 @@ impl<'a> Scanner<'a> {
     /// # Errors
     /// What the crates refuse; a checked scene gives none.
     pub fn new(plan: &'a Plan, observer: &dyn Observer) -> Result<Self, Error> {
-        let (scene, geometry) = (&plan.scene.scene, &plan.geometry);
-        let weight_per_m = layer_weights(scene, geometry, observer)?;
+        let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
+        let weight_per_m = layer_weights(plan, observer)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
         let lines = (0..geometry.elevation_rad.len())
             .into_par_iter()
@@ -60,14 +61,13 @@ impl<'a> Scanner<'a> {
             })
             .collect::<Result<Vec<_>, Error>>()?;
         observer.end();
-        let efficiency = drawn_efficiency(scene, geometry, &lines, observer)?;
+        let efficiency = drawn_efficiency(plan, &lines, observer)?;
         let record = Record {
             time_of_first_sample_s: 2.0 * geometry.first_range_m / crate::SPEED_OF_LIGHT_M_S,
             samples: geometry.samples,
         };
-        let simulator = Simulator::new(join::pulse(scene)?, join::receiver(scene), record)?;
-        let digitiser = join::digitiser(scene)?;
-        Ok(Self { scene, simulator, lines, efficiency, digitiser })
+        let simulator = Simulator::new(instrument.pulse.clone(), instrument.receiver, record)?;
+        Ok(Self { scene, instrument, simulator, lines, efficiency })
     }
 
     /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
@@ -80,7 +80,7 @@ impl<'a> Scanner<'a> {
     /// mean.
     pub fn layer_snr(&self) -> Vec<(f64, f64)> {
         let Some(line) = self.lines.first() else { return Vec::new() };
-        let receiver = join::receiver(self.scene);
+        let receiver = &self.instrument.receiver;
         let mut mean = vec![1.0; line.layers()];
         if let Some(efficiency) = &self.efficiency {
             // As many places as layers: the efficiencies were made for this line.
@@ -88,6 +88,11 @@ impl<'a> Scanner<'a> {
         }
         let snr = |l: usize| receiver.slowly_varying_snr(self.scene.pulse.energy_j, line.weight_per_m[l] * mean[l]);
         (0..line.layers()).map(|l| (line.range_m(l), snr(l))).collect()
+    }
+
+    /// The pulse that is sent along them.
+    pub fn pulse(&self) -> &Pulse {
+        &self.instrument.pulse
     }
 
     /// The air along each line of sight, in the order of the geometry's elevations.
@@ -157,7 +162,7 @@ impl<'a> Scanner<'a> {
                 Shot { line: &self.lines[pulse / per_line], efficiency }
             },
             generator: |key| stream(self.scene.seed, "signal", index(key) as u64),
-            digitiser: self.digitiser,
+            digitiser: self.instrument.digitiser,
         };
         Ok(scan.collect()?)
     }
@@ -174,38 +179,38 @@ const PIECE_BYTES: usize = 16 << 20;
 
 /// Return per metre of each layer, K^2 beta A_R eta_s/R^2, (9); the efficiency is interpolated, and left out if each pulse
 /// brings its own. A signal-to-noise ratio that the scene states takes the place of all of it.
-fn layer_weights(scene: &Scene, geometry: &Geometry, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
+fn layer_weights(plan: &Plan, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
+    let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
-        let unit = join::receiver(scene).slowly_varying_snr(scene.pulse.energy_j, 1.0);
+        let unit = instrument.receiver.slowly_varying_snr(scene.pulse.energy_j, 1.0);
         return Ok(vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers]);
     }
     let profile = match drawn_turbulence(scene) {
         Some(_) => None,
         None => {
             observer.begin(Stage::Efficiency, 1);
-            let profile = efficiency_at(scene, &profile_ranges_m(scene, geometry), observer)?;
+            let profile = efficiency_at(scene, instrument, &profile_ranges_m(scene, geometry), observer)?;
             observer.end();
             Some(profile)
         }
     };
-    let return_per_m = join::return_per_m(scene)?;
     let weight = |range_m: f64| {
         let eta = profile.as_ref().map_or(Ok(1.0), |profile| profile.interpolated(range_m))?;
-        Ok(return_per_m(range_m)? * eta)
+        Ok(instrument.return_per_m(range_m)? * eta)
     };
     geometry.layer_range_m().map(weight).collect()
 }
 
 /// Efficiencies of the layers, one set for each realisation of the turbulence, if the pulses have their own.
 fn drawn_efficiency(
-    scene: &Scene,
-    geometry: &Geometry,
+    plan: &Plan,
     lines: &[LineOfSight],
     observer: &dyn Observer,
 ) -> Result<Option<LayerEfficiency>, Error> {
+    let scene = &plan.scene.scene;
     let (Some(t), Some(line)) = (drawn_turbulence(scene), lines.first()) else { return Ok(None) };
-    let ranges_m = profile_ranges_m(scene, geometry);
-    let realisations = efficiency_realisations(scene, &t, &ranges_m, observer)?;
+    let ranges_m = profile_ranges_m(scene, &plan.geometry);
+    let realisations = efficiency_realisations(scene, &plan.instrument, &t, &ranges_m, observer)?;
     Ok(Some(EfficiencyTable::new(ranges_m, &realisations)?.onto_layers(line)?))
 }
 

@@ -5,10 +5,9 @@
 //! treats as the scene says. Check: a scanned map shows the flow as sampled from the planes, frozen and moving.
 
 use crate::Error;
-use crate::join;
-use crate::scene::{Flow, Scene, SceneFile};
+use crate::scene::{Flow, Scene, SceneFile, VortexMotion, VortexPair, VortexProfile};
 use std::fmt;
-use wakescope_les::Wind;
+use wakescope_les::{self as les, Wind};
 
 /// The wind of a scene, with what the run needs to know of it.
 pub struct SceneWind {
@@ -56,8 +55,8 @@ impl SceneWind {
             _ => 0.0,
         };
         Ok(Self {
-            wind: join::analytic_wind(scene)?,
-            start_s: join::start_time_s(scene),
+            wind: analytic_wind(scene)?,
+            start_s: start_time_s(scene),
             tau,
             end_s: f64::INFINITY,
             max_speed_m_s,
@@ -75,6 +74,60 @@ impl SceneWind {
     /// The wind itself.
     pub fn wind(&self) -> &dyn Wind {
         &*self.wind
+    }
+}
+
+/// The wind of a scene whose flow is analytic, and calm air for another.
+///
+/// # Errors
+/// What the wind refuses; a checked scene gives none.
+fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
+    Ok(match &scene.flow {
+        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::Calm),
+        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?),
+        Flow::VortexPair(pair) => {
+            let vortices = Box::new(vortex_pair(pair).wind()?);
+            if pair.cross_wind_m_s == 0.0 {
+                return Ok(vortices);
+            }
+            let cross = Box::new(les::Uniform::new([0.0, pair.cross_wind_m_s, 0.0])?);
+            Box::new(les::Sum { winds: vec![vortices, cross] })
+        }
+    })
+}
+
+/// The vortex pair of a scene.
+pub fn vortex_pair(pair: &VortexPair) -> les::VortexPair {
+    les::VortexPair {
+        circulation_m2_s: pair.circulation_m2_s,
+        spacing_m: pair.spacing_m,
+        core_radius_m: pair.core_radius_m,
+        lateral_position_m: pair.lateral_position_m,
+        height_m: pair.height_m,
+        ground: les::Ground::Image,
+        profile: circulation_profile(pair.profile),
+        motion: match pair.motion {
+            VortexMotion::Frozen => les::Motion::Frozen,
+            VortexMotion::Inviscid => les::Motion::Inviscid,
+        },
+    }
+}
+
+/// The circulation profile of a scene or a flow case.
+pub(crate) fn circulation_profile(profile: VortexProfile) -> les::CirculationProfile {
+    match profile {
+        VortexProfile::Algebraic => les::CirculationProfile::Algebraic,
+        VortexProfile::LambOseen => les::CirculationProfile::LambOseen,
+    }
+}
+
+/// Age of an analytic flow when the scan begins, s.
+pub fn start_time_s(scene: &Scene) -> f64 {
+    match &scene.flow {
+        Flow::VortexPair(pair) if pair.age_tau > 0.0 && pair.circulation_m2_s > 0.0 => {
+            vortex_pair(pair).time_s(pair.age_tau)
+        }
+        _ => 0.0,
     }
 }
 

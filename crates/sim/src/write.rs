@@ -8,6 +8,7 @@ mod pictures;
 pub use limits::check;
 pub use map::velocity_map;
 
+use crate::Error;
 use crate::export::lock::FolderLock;
 use crate::export::own::refuse_foreign;
 use crate::export::signals::{LineVelocities, RawSignals, Recording};
@@ -16,7 +17,6 @@ use crate::plan::{Plan, Stage, Target};
 use crate::profile::RangeProfile;
 use crate::run::RunResult;
 use crate::scene::{DetectorSignal, NoiseKind};
-use crate::{Error, join};
 use std::path::{Path, PathBuf};
 
 /// The table of the HALO file has its name.
@@ -201,7 +201,7 @@ fn raw_signals(plan: &Plan, result: &RunResult) -> Option<RawSignals> {
 
 fn recording(plan: &Plan) -> Recording {
     let scene = &plan.scene.scene;
-    let (d, receiver) = (&scene.detector, join::receiver(scene));
+    let (d, receiver) = (&scene.detector, &plan.instrument.receiver);
     let is_baseband = d.signal == DetectorSignal::Baseband;
     // (13) in the band; white noise goes to half the sampling frequency, and to both sides of zero in two quadratures.
     let noise_band_hz = match d.noise {

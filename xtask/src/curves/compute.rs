@@ -109,7 +109,7 @@ pub(super) fn pair_z(tau: &[f64]) -> Values {
 /// gives the SNR in 50 MHz.
 fn bound_m_s(snr_db: &[f64], kind: SignalKind) -> Values {
     let scene = Scene::default();
-    let sampling = wakescope_sim::join::sampling(&scene)?;
+    let sampling = wakescope_sim::estimators::sampling(&scene)?;
     let model = WindowModel::gaussian_pulse(&sampling, 64, scene.pulse_sigma_s(), Noise::White)?;
     each(snr_db, |snr_db| model.bound_m_s(0.0, 10f64.powf(0.1 * snr_db), kind, 1.0))
 }
@@ -160,5 +160,6 @@ pub(super) fn profile_ranges() -> Vec<f64> {
 }
 
 pub(super) fn profile_snr(_: &[f64]) -> Values {
-    Ok(profile::range_profile(&Scene::default(), &Silent)?.snr_db)
+    let scene = Scene::default();
+    Ok(profile::range_profile(&scene, &wakescope_sim::instrument::Instrument::new(&scene)?, &Silent)?.snr_db)
 }

@@ -3,10 +3,10 @@
 use super::{Context, Rendered};
 use crate::Failure;
 use wakescope_sim::export::Table;
-use wakescope_sim::join;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::{Flow, Scene};
+use wakescope_sim::wind;
 
 /// Every so many lines are drawn; the table has all.
 const DRAWN: usize = 8;
@@ -45,7 +45,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         Series::new("ground", Style::Line, vec![(0.0, 0.0), (1.05 * far_m, 0.0)]),
     ];
     if let Flow::VortexPair(pair) = &scene.flow {
-        let c = join::vortex_pair(pair).centres(join::start_time_s(scene));
+        let c = wind::vortex_pair(pair).centres(wind::start_time_s(scene));
         let centres = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
         series.push(Series::new("vortices", Style::Markers, centres));
     }

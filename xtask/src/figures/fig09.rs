@@ -3,9 +3,10 @@
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
 use wakescope_estimate::{PolarPoint, ScanGeometry, WindowCorrelation};
+use wakescope_sim::estimators;
 use wakescope_sim::export::Table;
 use wakescope_sim::geometry::Geometry;
-use wakescope_sim::join;
+use wakescope_sim::instrument::Instrument;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::Scene;
 use wakescope_sim::wind::SceneWind;
@@ -23,11 +24,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     scene.scan.range_max_m = 650.0;
     let file = context.scene_file(scene)?;
     let scene = &file.scene;
-    let gates = join::gates(scene)?;
-    let elevation_rad = Geometry::new(scene, &SceneWind::new(&file)?)?.elevation_rad;
+    let gates = estimators::gates(scene)?;
+    let elevation_rad = Geometry::new(scene, &Instrument::new(scene)?.pulse, &SceneWind::new(&file)?)?.elevation_rad;
     let samples = scene.samples_per_record();
-    let geometry = ScanGeometry::new(&join::sampling(scene)?, &gates, &elevation_rad, samples)?;
-    let window = join::weighting(scene).weights(scene.estimator.window_samples)?;
+    let geometry = ScanGeometry::new(&estimators::sampling(scene)?, &gates, &elevation_rad, samples)?;
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     // n_eff as the speckle has it: independent of the noise within a few per cent.
     let correlation = WindowCorrelation::gaussian_pulse(
         &window,

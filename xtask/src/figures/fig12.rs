@@ -6,7 +6,7 @@ use super::study::{
 use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
 use wakescope_sim::export::Table;
-use wakescope_sim::join;
+use wakescope_sim::instrument::Instrument;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::{Scene, SnrReference};
 
@@ -185,8 +185,8 @@ fn ratio_claim() -> Result<Claim, Failure> {
     let snr = |change: fn(&mut Scene)| -> Result<f64, Failure> {
         let mut scene = Scene::default();
         change(&mut scene);
-        let return_per_m = join::return_per_m(&scene)?(400.0)?;
-        Ok(join::receiver(&scene).slowly_varying_snr(scene.pulse.energy_j, return_per_m))
+        let instrument = Instrument::new(&scene)?;
+        Ok(instrument.receiver.slowly_varying_snr(scene.pulse.energy_j, instrument.return_per_m(400.0)?))
     };
     let plain = snr(|_| {})?;
     let others = [

@@ -18,7 +18,7 @@ use wakescope_sim::scene::{
     Flow, Method, ModelOrder, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
     SnrReference, Turbulence, VortexPair, Weighting,
 };
-use wakescope_sim::{join, run, write};
+use wakescope_sim::{run, wind, write};
 
 /// Lines of sight 0.5 m apart that a region of 2 m shares.
 const SHARED_LINES: f64 = 9.0;
@@ -242,7 +242,7 @@ impl Average {
 fn cores_of(scene: &Scene) -> Vec<(f64, f64)> {
     match &scene.flow {
         Flow::VortexPair(pair) => {
-            let c = join::vortex_pair(pair).centres(join::start_time_s(scene));
+            let c = wind::vortex_pair(pair).centres(wind::start_time_s(scene));
             vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
         }
         _ => Vec::new(),

@@ -1,9 +1,9 @@
 //! A flow of one's own: mesh, walls, viscosity and initial field, in SI units.
 
 use super::setup::{Initial, Setup};
+use crate::Error;
 use crate::keys::Checker;
 use crate::scene::{VortexProfile, section};
-use crate::{Error, join};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use wakescope_les::{
@@ -274,7 +274,7 @@ impl InitialPair {
             lateral_position_m: self.lateral_position_m,
             height_m: self.height_m,
             ground: Ground::Image,
-            profile: join::circulation_profile(self.profile),
+            profile: crate::wind::circulation_profile(self.profile),
             motion: Motion::Frozen,
         };
         let (wind, cross_m_s) = (pair.wind().map_err(Error::Flow)?, self.cross_wind_m_s);

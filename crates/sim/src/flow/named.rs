@@ -1,6 +1,5 @@
 //! The parameters of the flows with known answers.
 
-use crate::join;
 use crate::keys::Checker;
 use crate::scene::{VortexProfile, section};
 use serde::{Deserialize, Serialize};
@@ -160,7 +159,7 @@ impl VortexPairFlow {
 
     pub(super) fn case(&self) -> Result<Case, wakescope_les::Error> {
         let Self { cells, size, ground_stretch, height, core_radius, reynolds, .. } = *self;
-        let profile = join::circulation_profile(self.profile);
+        let profile = crate::wind::circulation_profile(self.profile);
         VortexPairCase {
             cells,
             size,

@@ -74,7 +74,7 @@ impl Plan {
     /// Forecast of the memory with another scan or estimator, bytes; `None` for a scene that cannot be planned. The optics
     /// stay as they are.
     fn memory_with(&self, scene: &Scene) -> Option<f64> {
-        let geometry = Geometry::new(scene, &self.wind).ok()?;
+        let geometry = Geometry::new(scene, &self.instrument.pulse, &self.wind).ok()?;
         let optics =
             [Stage::PhaseScreens, Stage::Efficiency].map(|stage| self.stages.iter().find(|s| s.stage == stage));
         let optics = [optics[0]?.clone(), optics[1]?.clone()];

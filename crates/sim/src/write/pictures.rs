@@ -131,7 +131,7 @@ fn title(plan: &Plan, has_gaps: bool) -> String {
 fn centres_m(plan: &Plan) -> Vec<(f64, f64)> {
     match &plan.scene.scene.flow {
         Flow::VortexPair(pair) => {
-            let c = crate::join::vortex_pair(pair).centres(plan.wind.start_s);
+            let c = crate::wind::vortex_pair(pair).centres(plan.wind.start_s);
             vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
         }
         _ => Vec::new(),

@@ -1,7 +1,7 @@
 //! The estimator of a scene in the words of `estimate`: statistic of the windows, estimator of their mean, models of both.
 
-use super::pulse;
 use crate::Error;
+use crate::instrument::Instrument;
 use crate::scene::{
     CorrelogramForm, DetectorSignal, Estimator as Words, GradientLikelihood, Method, ModelOrder, NoiseKind,
     OrderChoice, PulseShape, Refinement, Scene, Weighting,
@@ -10,6 +10,7 @@ use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate as estimate;
 use wakescope_estimate::{Estimator, Sample, SignalKind, Statistic};
+use wakescope_signal::Pulse;
 
 /// The sampling of the records, in the words of the estimators.
 ///
@@ -67,13 +68,12 @@ pub fn refinement(scene: &Scene) -> estimate::Refinement {
 /// Real part of the autocorrelation of the pulse at a lag of its samples, its mean frequency taken out; 1 at lag 0.
 ///
 /// `exp(-tau^2/(4 sigma^2))` for a Gaussian.
-fn pulse_correlation(scene: &Scene) -> Result<Vec<f64>, Error> {
+fn pulse_correlation(scene: &Scene, pulse: &Pulse) -> Vec<f64> {
     let (count, period_s) = (scene.samples_per_record(), 1.0 / scene.detector.sampling_hz);
-    let pulse = pulse(scene)?;
     let plain = matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
     if plain {
         let lag = |m: usize| m as f64 * period_s / pulse.sigma_s();
-        return Ok((0..count).map(|m| (-0.25 * lag(m).powi(2)).exp()).collect());
+        return (0..count).map(|m| (-0.25 * lag(m).powi(2)).exp()).collect();
     }
     // Fine enough for the spectrum of the pulse; the sum over a smooth pulse that ends at 0 converges fast.
     let parts = (16.0 * pulse.spectral_width_hz() * period_s).ceil().max(1.0) as usize;
@@ -90,23 +90,23 @@ fn pulse_correlation(scene: &Scene) -> Result<Vec<f64>, Error> {
         envelope.iter().skip(m * parts).zip(&envelope).map(|(late, early)| (late * early.conj()).re).sum()
     };
     let energy = lag(0);
-    Ok((0..count).map(|m| if m * parts <= steps { lag(m) / energy } else { 0.0 }).collect())
+    (0..count).map(|m| if m * parts <= steps { lag(m) / energy } else { 0.0 }).collect()
 }
 
-/// Second-order model of a window of the scene in a uniform wind, for likelihood and bound.
+/// Second-order model of a window of the scene in a uniform wind and a noise, for likelihood and bound.
 ///
 /// `None` without noise: no bound is above 0 then.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn window_model(scene: &Scene) -> Result<Option<estimate::WindowModel>, Error> {
-    let noise = match scene.detector.noise {
+pub fn window_model(scene: &Scene, noise: NoiseKind, pulse: &Pulse) -> Result<Option<estimate::WindowModel>, Error> {
+    let noise = match noise {
         NoiseKind::White => estimate::Noise::White,
         // A floor of a millionth keeps the covariance regular.
         NoiseKind::Band => estimate::Noise::Band { floor: 1e-6 },
         NoiseKind::None => return Ok(None),
     };
-    let correlation = pulse_correlation(scene)?;
+    let correlation = pulse_correlation(scene, pulse);
     let n = scene.estimator.window_samples;
     let at = |m: usize| correlation.get(m).copied().unwrap_or(0.0);
     let envelope = Array2::from_shape_fn((n, n), |(a, b)| at(a.abs_diff(b)));
@@ -134,7 +134,7 @@ pub fn bound_m_s(model: &estimate::WindowModel, snr: f64, kind: SignalKind) -> R
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn window_correlation(scene: &Scene, snr: f64) -> Result<estimate::WindowCorrelation, Error> {
+pub fn window_correlation(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<estimate::WindowCorrelation, Error> {
     let e = &scene.estimator;
     let window = weighting(scene).weights(e.window_samples)?;
     let d = &scene.detector;
@@ -146,7 +146,7 @@ pub fn window_correlation(scene: &Scene, snr: f64) -> Result<estimate::WindowCor
     let snr = if d.noise == NoiseKind::None { f64::INFINITY } else { snr };
     // Without any return there is only noise, which a large finite ratio says as well.
     let noise_to_signal = (in_band_hz / d.bandwidth_hz / snr).min(1e12);
-    let correlation = pulse_correlation(scene)?;
+    let correlation = pulse_correlation(scene, pulse);
     let covariance = |m: usize| correlation.get(m).copied().unwrap_or(0.0) + if m == 0 { noise_to_signal } else { 0.0 };
     let samples = scene.samples_per_record();
     Ok(estimate::WindowCorrelation::from_covariance(&window, e.window_step_samples, samples, covariance)?)
@@ -180,20 +180,19 @@ impl<S: Sample> Toolkit<S> {
     ///
     /// # Errors
     /// What the estimators refuse, such as a covariance that cannot be diagonalised.
-    pub fn new(scene: &Scene, known: &WindowStatistics) -> Result<Self, Error> {
+    pub fn new(scene: &Scene, instrument: &Instrument, known: &WindowStatistics) -> Result<Self, Error> {
         let e = &scene.estimator;
         let snr = e.method.likelihood_snr_db().map_or(known.snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8);
         match e.method {
-            Method::GradientLikelihood(own) => gradient_likelihood(scene, &own, snr),
+            Method::GradientLikelihood(own) => gradient_likelihood(scene, instrument, &own, snr),
             Method::Likelihood(_) => {
                 // The tapers are those of white noise and need no inverse, whatever the noise.
-                let mut white = scene.clone();
-                white.detector.noise = NoiseKind::White;
-                let model = window_model(&white)?.ok_or(estimate::Error::Empty { field: "noise" })?;
+                let model = window_model(scene, NoiseKind::White, &instrument.pulse)?
+                    .ok_or(estimate::Error::Empty { field: "noise" })?;
                 let tapers = estimate::likelihood_tapers(&model, snr)?;
                 let statistic = estimate::Correlogram::<S>::with_tapers(tapers.clone())?;
                 let weights = statistic.lag_weights();
-                Self::planned(scene, Box::new(statistic), &weights, &tapers, known)
+                Self::planned(scene, instrument, Box::new(statistic), &weights, &tapers, known)
             }
             Method::Autoregressive(model) | Method::AutoregressivePole(model) | Method::Capon(model)
                 if e.weighting == Weighting::Rectangular =>
@@ -201,18 +200,19 @@ impl<S: Sample> Toolkit<S> {
                 let statistic = estimate::ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
                 let weights = statistic.lag_weights();
                 let taper = estimate::Taper::unit(vec![1.0; e.window_samples])?;
-                Self::planned(scene, Box::new(statistic), &weights, &[taper], known)
+                Self::planned(scene, instrument, Box::new(statistic), &weights, &[taper], known)
             }
             _ => {
                 let statistic = estimate::Correlogram::<S>::new(weighting(scene), e.window_samples)?;
                 let (weights, tapers) = (statistic.lag_weights(), statistic.tapers().to_vec());
-                Self::planned(scene, Box::new(statistic), &weights, &tapers, known)
+                Self::planned(scene, instrument, Box::new(statistic), &weights, &tapers, known)
             }
         }
     }
 
     fn planned(
         scene: &Scene,
+        instrument: &Instrument,
         statistic: Box<dyn Statistic<S>>,
         lag_weights: &[f64],
         tapers: &[estimate::Taper],
@@ -223,7 +223,7 @@ impl<S: Sample> Toolkit<S> {
             true => Some(of_correlogram(scene, SignalKind::Complex, lag_weights, known)?),
             false => None,
         };
-        let noise = match noise(scene) {
+        let noise = match noise(scene, instrument) {
             None => None,
             Some((noise, power_a2)) => {
                 let mean = noise.expected_correlogram(&sampling(scene)?, S::KIND, power_a2, lag_weights)?;
@@ -236,13 +236,13 @@ impl<S: Sample> Toolkit<S> {
 }
 
 /// Spectrum and power in the band, A^2, of a scene's noise.
-fn noise(scene: &Scene) -> Option<(estimate::Noise, f64)> {
+fn noise(scene: &Scene, instrument: &Instrument) -> Option<(estimate::Noise, f64)> {
     let noise = match scene.detector.noise {
         NoiseKind::White => estimate::Noise::White,
         NoiseKind::Band => estimate::Noise::Band { floor: 0.0 },
         NoiseKind::None => return None,
     };
-    Some((noise, super::receiver(scene).noise_variance_a2()))
+    Some((noise, instrument.receiver.noise_variance_a2()))
 }
 
 /// What an estimator finds in a mean statistic, A^2, that is far from order one.
@@ -339,19 +339,24 @@ fn order_choice(e: &Words, model: &ModelOrder, known: &WindowStatistics) -> esti
     }
 }
 
-fn gradient_likelihood<S: Sample>(scene: &Scene, own: &GradientLikelihood, snr: f64) -> Result<Toolkit<S>, Error> {
+fn gradient_likelihood<S: Sample>(
+    scene: &Scene,
+    instrument: &Instrument,
+    own: &GradientLikelihood,
+    snr: f64,
+) -> Result<Toolkit<S>, Error> {
     let e = &scene.estimator;
     let noise = match scene.detector.noise {
         NoiseKind::White => estimate::Noise::White,
         NoiseKind::Band | NoiseKind::None => estimate::Noise::Band { floor: 0.0 },
     };
     let sampling = sampling(scene)?;
-    let model = estimate::GradientModel::new(&sampling, e.window_samples, pulse(scene)?.sigma_s(), noise)?;
+    let model = estimate::GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
     let half = (own.gradients / 2) as f64;
     let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
     let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
     let plan = estimate::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
-    let (test, noise) = match self::noise(scene) {
+    let (test, noise) = match self::noise(scene, instrument) {
         None => (None, None),
         Some((noise, power_a2)) => {
             let found = scaled_estimate(&plan.estimator, plan.noise_statistic(noise, power_a2)?);
