@@ -7,6 +7,14 @@ fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
     (key, format!("{value:?}"), allowed)
 }
 
+/// Two lengths, m, of which the first is `words[0]` the second, and the second `words[1]` the first.
+fn apart(c: &mut Checker<'_>, keys: [&str; 2], values_m: [f64; 2], words: [&str; 2]) -> bool {
+    let [a_m, b_m] = values_m;
+    let ok = if words[0] == "above" { a_m > b_m } else { a_m < b_m };
+    let allowed = |i: usize| format!("{} {}, {} m", words[i], keys[1 - i], values_m[1 - i]);
+    c.between(ok, &[side(keys[0], a_m, allowed(0)), side(keys[1], b_m, allowed(1))])
+}
+
 impl Scene {
     /// Limits that make sense only where each key is within its own.
     pub(super) fn check_between(&self, c: &mut Checker<'_>) {
@@ -18,52 +26,17 @@ impl Scene {
             self.check_hpl(c);
         }
         let o = &self.outputs;
-        let (first_m, last_m) = (o.profile_range_min_m, o.profile_range_max_m);
-        c.between(
-            last_m > first_m,
-            &[
-                side("outputs.profile_range_max_m", last_m, format!("above outputs.profile_range_min_m, {first_m} m")),
-                side("outputs.profile_range_min_m", first_m, format!("below outputs.profile_range_max_m, {last_m} m")),
-            ],
-        );
+        let ends = [o.profile_range_max_m, o.profile_range_min_m];
+        apart(c, ["outputs.profile_range_max_m", "outputs.profile_range_min_m"], ends, ["above", "below"]);
     }
 
     fn check_instrument_between(&self, c: &mut Checker<'_>) {
         let t = &self.telescope;
-        let (inner_m, outer_m) = (t.obscuration_radius_m, t.aperture_radius_m);
-        c.between(
-            inner_m < outer_m,
-            &[
-                side(
-                    "telescope.obscuration_radius_m",
-                    inner_m,
-                    format!("below telescope.aperture_radius_m, {outer_m} m"),
-                ),
-                side(
-                    "telescope.aperture_radius_m",
-                    outer_m,
-                    format!("above telescope.obscuration_radius_m, {inner_m} m"),
-                ),
-            ],
-        );
+        let radii = [t.obscuration_radius_m, t.aperture_radius_m];
+        apart(c, ["telescope.obscuration_radius_m", "telescope.aperture_radius_m"], radii, ["below", "above"]);
         if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
-            const SECTION: &str = "atmosphere.turbulence";
-            let (inner_m, outer_m) = (t.inner_scale_m, t.outer_scale_m);
-            c.between(
-                outer_m > inner_m,
-                &[
-                    side(
-                        "atmosphere.turbulence.outer_scale_m",
-                        outer_m,
-                        format!("above {SECTION}.inner_scale_m, {inner_m} m"),
-                    ),
-                    side(
-                        "atmosphere.turbulence.inner_scale_m",
-                        inner_m,
-                        format!("below {SECTION}.outer_scale_m, {outer_m} m"),
-                    ),
-                ],
-            );
+            let keys = ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.inner_scale_m"];
+            apart(c, keys, [t.outer_scale_m, t.inner_scale_m], ["above", "below"]);
         }
         if let Flow::VortexPair(p) = &self.flow {
             let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
@@ -167,13 +140,7 @@ impl Scene {
             }
         }
         c.between(first_m > reach_m, &sides);
-        let ordered = c.between(
-            last_m > first_m,
-            &[
-                side("scan.range_max_m", last_m, format!("above scan.range_min_m, {first_m} m")),
-                side("scan.range_min_m", first_m, format!("below scan.range_max_m, {last_m} m")),
-            ],
-        );
+        let ordered = apart(c, ["scan.range_max_m", "scan.range_min_m"], [last_m, first_m], ["above", "below"]);
         if ordered {
             self.check_record(c);
         }
