@@ -87,7 +87,15 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
     })??;
     #[cfg(feature = "plots")]
     if outcome.is_complete && file.case.wake.is_some() {
-        outcome.files.extend(with_threads(cli, || FinishedWake::read(out)?.draw())??);
+        match with_threads(cli, || FinishedWake::read(out)?.draw())? {
+            Ok(files) => outcome.files.extend(files),
+            // The run is done all the same.
+            Err(error) => {
+                let text = format!("the wake is not drawn: {error}");
+                progress::NotesOnly.note(&text);
+                outcome.warnings.push(text);
+            }
+        }
     }
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
