@@ -2,15 +2,17 @@
 //!
 //! The scan is that of an analytic pair of 500 m^2/s at 47 m height, 376.5 and 423.5 m away, seen once by each line.
 
+use fixtures::pair::{CIRCULATION_M2_S, truth};
 use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
     EstimatorResponse, FreeParameters, Loss, MapFit, MapFitOptions, Parameter, Powers, PulseShape, ScanModel,
-    ScanSetup, Sharing, SignalFit, SignalFitOptions, VelocityMap, Vortex, Wake, WakeModel, fit_map_of_estimator,
-    fit_signals,
+    ScanSetup, Sharing, SignalFit, SignalFitOptions, VelocityMap, WakeModel, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
-    Correlogram, Estimator, LagWindowPeak, Noise, Radius, Refinement, Scan, SignalKind, SpectralPeak, Weighting,
-    WindowModel, likelihood_tapers, polar_points,
+    Correlogram, Estimator, Radius, Refinement, Scan, SignalKind, SpectralPeak, Weighting,
+    bound::{Noise, WindowModel},
+    estimators::{LagWindowPeak, likelihood_tapers},
+    polar_points,
 };
 use wakescope_sim::estimators;
 use wakescope_sim::plan::{Plan, Target};
@@ -18,19 +20,8 @@ use wakescope_sim::progress::Silent;
 use wakescope_sim::run;
 use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 
-const CIRCULATION_M2_S: f64 = 500.0;
 /// Radius of the regions \[m\].
 const RADIUS_M: f64 = 2.0;
-
-fn truth() -> Wake {
-    let vortex = |lateral_position_m| Vortex {
-        circulation_m2_s: CIRCULATION_M2_S,
-        lateral_position_m,
-        height_m: 47.0,
-        core_radius_m: 2.35,
-    };
-    Wake { left: vortex(376.5), right: vortex(423.5), lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }
-}
 
 /// One scan: how it was taken, and its signals.
 struct Taken {
@@ -56,7 +47,7 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
         pulse: PulseShape::gaussian(plan.instrument.pulse.sigma_s()).unwrap(),
         wake: WakeModel::default(),
         elevation_rad: plan.geometry.elevation_rad.clone(),
-        first_sample_time_s: 2.0 * plan.geometry.first_range_m / wakescope_estimate::SPEED_OF_LIGHT_M_S,
+        first_sample_time_s: 2.0 * plan.geometry.first_range_m / wakescope_estimate::window::SPEED_OF_LIGHT_M_S,
         record_samples: plan.geometry.samples,
     };
     let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();

@@ -1,13 +1,14 @@
 //! Maps drawn towards a fitted wake, against the velocity weighted with the pulse and with pulse and window.
 
-use crate::pair_scene::{FIRST_SAMPLE_M, SAMPLES, STEP_RAD, Scene, WINDOW};
+use fixtures::WINDOW;
+use fixtures::pair::{PairCase, PairScan, STEP_RAD, truth};
 use ndarray::{Array2, Axis};
 use wakescope_estimate::vortex_fit::{
-    EstimatorResponse, FreeParameters, MapFitOptions, PulseShape, RangeKernel, ScanSetup, Sharing, SignalFitOptions,
-    VelocityMap, Wake, WakeModel, fit_map_of_estimator, fit_signals,
+    EstimatorResponse, FreeParameters, MapFitOptions, RangeKernel, Sharing, SignalFitOptions, VelocityMap, Wake,
+    WakeModel, fit_map_of_estimator, fit_signals,
 };
-use wakescope_estimate::*;
-use wakescope_les::{CirculationProfile, Ground, Motion, Sum, VortexPair, Wind};
+use wakescope_estimate::{Correlogram, Error, estimators::*, map::*, window::*};
+use wakescope_les::{Sum, VortexPair, Wind};
 use wakescope_signal::NoiseModel;
 
 /// Radius of the regions \[m\].
@@ -24,7 +25,7 @@ struct Errors {
 }
 
 impl Errors {
-    fn add(&mut self, scene: &Scene, pulse_m_s: &Array2<f64>, gate_m_s: &Array2<f64>) {
+    fn add(&mut self, scene: &PairScan, pulse_m_s: &Array2<f64>, gate_m_s: &Array2<f64>) {
         let all = pulse_m_s.iter().zip(gate_m_s).enumerate();
         for (i, (pulse, gate)) in all {
             let mut take = |place: usize, error: f64| {
@@ -46,26 +47,21 @@ impl Errors {
 }
 
 struct Guided<'s> {
-    scene: &'s Scene,
-    snr: f64,
+    scene: &'s PairScan,
     gate: RangeKernel,
     pulse: RangeKernel,
 }
 
-fn sigma_s(pulse_s: f64) -> f64 {
-    pulse_s / (2.0 * 2.0_f64.ln().sqrt())
-}
-
 impl<'s> Guided<'s> {
-    fn new(scene: &'s Scene, snr: f64) -> Self {
-        let period_s = scene.sampling.period_s();
-        let gate = RangeKernel::gaussian_gate(sigma_s(200e-9), &[1.0; WINDOW], period_s, GRID_M).unwrap();
+    fn new(scene: &'s PairScan) -> Self {
+        let (period_s, sigma_s) = (scene.sampling.period_s(), scene.sigma_s());
+        let gate = RangeKernel::gaussian_gate(sigma_s, &[1.0; WINDOW], period_s, GRID_M).unwrap();
         // a window of one sample lies c T_s / 4 before the range of its gate
-        let reach = (0.5 * SPEED_OF_LIGHT_M_S * 4.0 * sigma_s(200e-9) / GRID_M).ceil() as i64;
-        let weight = |i: i64| (-(2.0 * i as f64 * GRID_M / SPEED_OF_LIGHT_M_S / sigma_s(200e-9)).powi(2)).exp();
+        let reach = (0.5 * SPEED_OF_LIGHT_M_S * 4.0 * sigma_s / GRID_M).ceil() as i64;
+        let weight = |i: i64| (-(2.0 * i as f64 * GRID_M / SPEED_OF_LIGHT_M_S / sigma_s).powi(2)).exp();
         let weights: Vec<f64> = (-reach..=reach).map(weight).collect();
         let pulse = RangeKernel::new(-(reach as f64) * GRID_M, GRID_M, &weights).unwrap();
-        Self { scene, snr, gate, pulse }
+        Self { scene, gate, pulse }
     }
 
     fn scan(&self, records: &Array2<f64>, weighting: Weighting, lines: &[usize]) -> Scan {
@@ -85,7 +81,7 @@ impl<'s> Guided<'s> {
     fn wake(&self, records: &Array2<f64>, signals: bool) -> Result<Wake, Error> {
         let all: Vec<usize> = (0..self.scene.elevation_rad.len()).collect();
         let (sampling, kind) = (&self.scene.sampling, SignalKind::Real);
-        let (pulse, noise) = (PulseShape::gaussian(sigma_s(200e-9)).unwrap(), Noise::Band { floor: 0.0 });
+        let setup = self.scene.setup().unwrap();
         let lag_window = LagWindowPeak::new(sampling, kind, WINDOW, 16, 1024, Refinement::Parabola).unwrap();
         let velocity_m_s = self.map(&self.scan(records, Weighting::default(), &all), &lag_window);
         let map = VelocityMap {
@@ -97,22 +93,19 @@ impl<'s> Guided<'s> {
         let free = FreeParameters { core_radius: Sharing::Common, ..FreeParameters::common_circulation() };
         let options = MapFitOptions { free, ..Default::default() };
         let statistic = Correlogram::<f64>::new(Weighting::default(), WINDOW).unwrap();
-        let shown = EstimatorResponse::new(&statistic, &lag_window, sampling, &pulse, (noise, self.snr), RADIUS_M)?;
+        let shown = EstimatorResponse::new(
+            &statistic,
+            &lag_window,
+            sampling,
+            &setup.pulse,
+            (setup.noise, self.scene.snr),
+            RADIUS_M,
+        )?;
         let mut found = fit_map_of_estimator(&map, &WakeModel::default(), &shown, &options)?.wake;
         if signals {
-            let setup = ScanSetup {
-                sampling: *sampling,
-                kind,
-                noise,
-                pulse,
-                wake: WakeModel::default(),
-                elevation_rad: self.scene.elevation_rad.clone(),
-                first_sample_time_s: 2.0 * FIRST_SAMPLE_M / SPEED_OF_LIGHT_M_S,
-                record_samples: SAMPLES,
-            };
-            let noise = self.scene.receiver.noise_variance_a2();
+            let (snr, noise_a2) = (self.scene.snr, self.scene.noise_power_a2());
             let options = SignalFitOptions { free, ..Default::default() };
-            found = fit_signals(&setup, |_, _| self.snr, records.view(), noise, &found, &options)?.wake;
+            found = fit_signals(&setup, |_, _| snr, records.view(), noise_a2, &found, &options)?.wake;
         }
         Ok(found)
     }
@@ -141,20 +134,24 @@ impl<'s> Guided<'s> {
     }
 }
 
-fn options(scene: &Scene) -> ShrinkageOptions {
+fn scene(snr_db: f64) -> PairScan {
+    PairScan::new(NoiseModel::BandLimited, 200e-9, snr_db, 3, 1).unwrap()
+}
+
+fn options(scene: &PairScan) -> ShrinkageOptions {
     let gate_spacing_m = scene.range_m[1] - scene.range_m[0];
     ShrinkageOptions::for_map(400.0 * STEP_RAD, gate_spacing_m, RADIUS_M, 15.0).unwrap()
 }
 
 /// Errors over scans of maps guided by a fit of the map, by one of all signals, by that fit alone, and of CA.
-fn measured(scene: &Scene, snr: f64, seeds: std::ops::Range<u64>, signals: bool) -> Vec<(&'static str, Errors)> {
-    let guided = Guided::new(scene, snr);
+fn measured(scene: &PairScan, scans: std::ops::Range<usize>, signals: bool) -> Vec<(&'static str, Errors)> {
+    let guided = Guided::new(scene);
     let shrunk = options(scene);
     let mut all = ["guided by the map", "guided by the signals", "wake alone", "first moment", "CA"]
         .map(|name| (name, Errors::default()))
         .to_vec();
-    for seed in seeds {
-        let records = scene.records(seed);
+    for scan in scans {
+        let records = scene.records(scan).unwrap();
         let by_map = guided.wake(&records, false).ok();
         let by_signals = if signals { guided.wake(&records, true).ok() } else { by_map };
         let unguided = ShrinkageOptions { factor: 0.0, ..shrunk };
@@ -174,8 +171,8 @@ fn measured(scene: &Scene, snr: f64, seeds: std::ops::Range<u64>, signals: bool)
 
 #[test]
 fn a_map_guided_by_the_fit_of_its_signals_is_within_1_3_m_s_inside_and_better_than_ca_outside() {
-    let scene = Scene::new(200e-9, 0.0, NoiseModel::BandLimited);
-    let found = measured(&scene, 1.0, 0..1, true);
+    let scene = scene(0.0);
+    let found = measured(&scene, 0..1, true);
     let ([inside, outside, gate], [.., ca_outside, _]) = (found[1].1.rms(), found[4].1.rms());
     assert!(inside < 1.3 && outside < ca_outside && gate < 0.9, "{found:?}");
 }
@@ -184,7 +181,7 @@ fn a_map_guided_by_the_fit_of_its_signals_is_within_1_3_m_s_inside_and_better_th
 /// has nothing there.
 #[test]
 fn vortices_that_no_fit_knows_of_come_out_of_the_data() {
-    let found = measured(&distorted(10.0), 10.0, 0..1, false);
+    let found = measured(&distorted(10.0), 0..1, false);
     let [guided, _, alone, data, ca] = [0, 1, 2, 3, 4].map(|k| found[k].1.rms());
     assert!(guided[0] < 0.65 * alone[0] && guided[0] < 0.65 * ca[0] && guided[0] < 2.0 * data[0], "{found:?}");
     assert!(guided[1] < data[1] && guided[1] < ca[1] && guided[2] < 0.5 * alone[2], "{found:?}");
@@ -198,21 +195,21 @@ fn vortices_that_no_fit_knows_of_come_out_of_the_data() {
 #[ignore = "minutes: measures errors over scans"]
 fn errors_of_guided_maps_over_scans() {
     let number = |name, default: f64| std::env::var(name).map_or(default, |text| text.parse().unwrap());
-    let (scans, snr_db) = (number("SCANS", 4.0) as u64, number("SNR_DB", 0.0));
+    let (scans, snr_db) = (number("SCANS", 4.0) as usize, number("SNR_DB", 0.0));
     let scene = match std::env::var("UNKNOWN") {
         Ok(_) => distorted(snr_db),
-        Err(_) => Scene::new(200e-9, snr_db, NoiseModel::BandLimited),
+        Err(_) => scene(snr_db),
     };
     let mut means = vec![(0.0, 0.0); 15];
-    for seed in 0..scans {
-        let found = measured(&scene, 10f64.powf(0.1 * snr_db), seed..seed + 1, true);
+    for scan in 0..scans {
+        let found = measured(&scene, scan..scan + 1, true);
         for (k, (_, errors)) in found.iter().enumerate() {
             for (j, rms) in errors.rms().into_iter().enumerate() {
                 means[3 * k + j].0 += rms * rms;
                 means[3 * k + j].1 += rms.powi(4);
             }
         }
-        let n = (seed + 1) as f64;
+        let n = (scan + 1) as f64;
         for (k, (name, _)) in found.iter().enumerate() {
             let show = |j: usize| {
                 let (mean, squares) = (means[3 * k + j].0 / n, means[3 * k + j].1 / n);
@@ -225,21 +222,13 @@ fn errors_of_guided_maps_over_scans() {
 }
 
 /// The pair with a second, smaller one above it that no fit knows of; distances are those to the smaller one's cores.
-fn distorted(snr_db: f64) -> Scene {
-    let pair = VortexPair {
-        circulation_m2_s: 500.0,
-        spacing_m: 47.0,
-        core_radius_m: 2.35,
-        lateral_position_m: 400.0,
-        height_m: 47.0,
-        ground: Ground::Image,
-        profile: CirculationProfile::Algebraic,
-        motion: Motion::Frozen,
-    };
+fn distorted(snr_db: f64) -> PairScan {
+    let pair = PairCase::FIGURES.even();
     let small =
         VortexPair { circulation_m2_s: 250.0, spacing_m: 25.0, lateral_position_m: 420.0, height_m: 80.0, ..pair };
     let winds: Vec<Box<dyn Wind>> = vec![Box::new(pair.wind().unwrap()), Box::new(small.wind().unwrap())];
-    let mut scene = Scene::of_wind(200e-9, snr_db, NoiseModel::BandLimited, &Sum { winds });
+    let (wind, noise) = (Sum { winds }, NoiseModel::BandLimited);
+    let mut scene = PairScan::of_wind(&wind, &truth(), noise, (200e-9, snr_db), 3, 1).unwrap();
     for (point, distance_m) in scene.points.iter().zip(&mut scene.distance_m) {
         let (sin, cos) = point.elevation_rad.sin_cos();
         let to = |y_m: f64| (point.range_m * cos - y_m).hypot(point.range_m * sin - 80.0);

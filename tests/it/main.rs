@@ -5,7 +5,6 @@
 
 mod circulation;
 mod guided;
-mod pair_scene;
 mod point_target;
 mod power;
 mod scan_errors;

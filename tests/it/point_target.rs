@@ -1,18 +1,17 @@
 //! A point target: one thin layer that returns the pulse, at a known speed.
 
+use fixtures::{ENERGY_J, WINDOW, receiver, sampling};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use wakescope_estimate::{
-    Correlogram, Estimator, Noise, Sampling, Scratch, SignalKind, SpectralPeak, Statistic, Weighting, WindowModel,
+    Correlogram, Estimator, Sampling, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
+    bound::{Noise, WindowModel},
+    window::SPEED_OF_LIGHT_M_S,
 };
-use wakescope_signal::{
-    GaussianPulse, LineOfSight, NoiseModel, PlanckConvention, PulseDuration, Receiver, Record, Simulator,
-};
+use wakescope_signal::{GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, Simulator};
 
 const SPEED_M_S: f64 = 3.0;
 const SNR_DB: f64 = 20.0;
-const WINDOW: usize = 64;
-const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
 /// Pulses averaged for one estimate.
 const PULSES: usize = 20;
 /// Estimates.
@@ -26,17 +25,8 @@ struct Target {
 
 /// A layer in the middle of the window whose return, averaged over the window, is [`SNR_DB`] above the noise.
 fn target() -> Target {
-    let receiver = Receiver {
-        wavelength_m: 1.55e-6,
-        sample_rate_hz: 250e6,
-        intermediate_frequency_hz: 80e6,
-        bandwidth_hz: 50e6,
-        quantum_efficiency: 1.0,
-        local_oscillator_w: 1e-3,
-        planck: PlanckConvention::H,
-        noise: NoiseModel::White,
-    };
-    let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6).unwrap();
+    let receiver = receiver(NoiseModel::White);
+    let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), ENERGY_J).unwrap();
     let first_s = 2.0 * 400.0 / SPEED_OF_LIGHT_M_S;
     let record = Record { time_of_first_sample_s: first_s, samples: WINDOW };
     let simulator = Simulator::new(pulse, receiver, record).unwrap();
@@ -81,7 +71,7 @@ fn estimates_m_s(target: &Target, sampling: &Sampling) -> Vec<f64> {
 #[test]
 fn point_target_at_3_m_s_comes_out_within_twice_the_cramer_rao_bound() {
     let target = target();
-    let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();
+    let sampling = sampling().unwrap();
     let amplitude: Vec<f64> = (0..WINDOW)
         .map(|k| {
             let t_s = target.simulator.time_s(k) - 2.0 * target.line.first_range_m / SPEED_OF_LIGHT_M_S;

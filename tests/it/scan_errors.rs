@@ -1,9 +1,9 @@
 //! Errors of the velocity estimators on a scan of the analytic vortex pair, against the velocity weighted with the pulse and with
 //! pulse and window.
 
-use crate::pair_scene::{Scene, WINDOW};
-use wakescope_estimate::*;
-use wakescope_les::{CirculationProfile, Ground, Motion, Sum, Uniform, VortexPair, Wind};
+use fixtures::WINDOW;
+use fixtures::pair::{PairCase, PairScan};
+use wakescope_estimate::{Correlogram, Scratch, SignalKind, Weighting, estimators::*, map::*};
 use wakescope_signal::NoiseModel;
 
 /// Root-mean-square errors of an estimator: against the velocity of the pulse within 8 m of a core and beyond 30 m from
@@ -15,7 +15,7 @@ struct Errors {
     gate_inside_m_s: f64,
 }
 
-fn errors(scene: &Scene, scans: &[Scan], estimator: &dyn Estimator) -> Errors {
+fn errors(scene: &PairScan, scans: &[Scan], estimator: &dyn Estimator) -> Errors {
     let inside = |i: &usize| scene.distance_m[*i] < 8.0;
     let chosen: Vec<usize> =
         (0..scene.points.len()).filter(|i| inside(i) || (scene.distance_m[*i] > 30.0 && i % 23 == 0)).collect();
@@ -40,15 +40,11 @@ fn errors(scene: &Scene, scans: &[Scan], estimator: &dyn Estimator) -> Errors {
 
 /// PA, CA, CA-BT and the first moment on the scan, rho = 2 m, one pulse per line.
 fn all_errors(snr_db: f64) -> [Errors; 4] {
-    let scene = Scene::new(200e-9, snr_db, NoiseModel::BandLimited);
+    let scene = PairScan::new(NoiseModel::BandLimited, 200e-9, snr_db, 3, 1).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW).unwrap();
     let (sampling, kind, refinement) = (&scene.sampling, SignalKind::Real, Refinement::Parabola);
-    let scans: Vec<Scan> = (0..2)
-        .map(|seed| {
-            let records = scene.records(seed);
-            Scan::new(&statistic, sampling, &scene.gates, &scene.elevation_rad, records.view()).unwrap()
-        })
-        .collect();
+    let scans: Vec<Scan> =
+        (0..2).map(|scan| scene.statistics(&scene.records(scan).unwrap(), &statistic).unwrap()).collect();
     let estimators: [Box<dyn Estimator>; 4] = [
         Box::new(SpectralPeak::new(sampling, kind, WINDOW, 1024, refinement).unwrap()),
         Box::new(AutoregressivePeak::new(sampling, kind, WINDOW, 16, 2048, refinement).unwrap()),
@@ -103,23 +99,11 @@ impl Estimator for AboveMedian {
 /// Errors outside the vortices at 0 dB in a wind across the runway: of the first moment with two reaches, and of the mean
 /// above the median.
 fn moments_outside_m_s(wind_m_s: f64) -> [f64; 3] {
-    let pair = VortexPair {
-        circulation_m2_s: 500.0,
-        spacing_m: 47.0,
-        core_radius_m: 2.35,
-        lateral_position_m: 400.0,
-        height_m: 47.0,
-        ground: Ground::Image,
-        profile: CirculationProfile::Algebraic,
-        motion: Motion::Frozen,
-    };
-    let across = Uniform::new([0.0, wind_m_s, 0.0]).unwrap();
-    let wind = Sum { winds: vec![Box::new(pair.wind().unwrap()) as Box<dyn Wind>, Box::new(across)] };
-    let scene = Scene::of_wind(200e-9, 0.0, NoiseModel::BandLimited, &wind);
+    let case = PairCase { wind_m_s, ..PairCase::FIGURES };
+    let scene = PairScan::of(&case, NoiseModel::BandLimited, (200e-9, 0.0), 3, 1).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW).unwrap();
     let (sampling, kind) = (&scene.sampling, SignalKind::Real);
-    let records = scene.records(0);
-    let scan = Scan::new(&statistic, sampling, &scene.gates, &scene.elevation_rad, records.view()).unwrap();
+    let scan = scene.statistics(&scene.records(0).unwrap(), &statistic).unwrap();
     let moment = |reach| Box::new(FirstMoment::new(sampling, kind, WINDOW, 512, reach).unwrap());
     let peak = SpectralPeak::new(sampling, kind, WINDOW, 512, Refinement::Parabola).unwrap();
     let estimators: [Box<dyn Estimator>; 3] = [moment(3.5), moment(2.0), Box::new(AboveMedian(peak))];

@@ -1,6 +1,7 @@
 //! `cargo xtask ci`: every check that continuous integration makes, in its order.
 //!
-//! `.ci/run` calls it, so that a person can run the same before a commit.
+//! `.ci/run` calls it, so that a person can run the same before a commit. Examples are compiled with the tests, benchmarks
+//! are checked with clippy: neither is built once more.
 
 use crate::workspace::{read, root};
 use crate::{Failure, Outcome};
@@ -47,10 +48,13 @@ fn steps() -> Result<Vec<Step>, Failure> {
             out.push(plain("features", command));
         }
     }
-    out.push(plain("examples", "cargo build --workspace --examples --benches".into()));
-    out.push(plain("tidy", "cargo xtask tidy".into()));
-    out.push(plain("regress", "cargo xtask regress".into()));
-    out.push(plain("figures", "cargo xtask reproduce-figs --profile quick --no-cache".into()));
+    // Whether each crate can be taken by others: its files, its dependencies with versions; built they are above.
+    out.push(plain("package", "cargo package --workspace --no-verify --allow-dirty --quiet".into()));
+    // This very program: in another profile the workspace would be compiled once more.
+    let own = std::env::current_exe()?.display().to_string();
+    out.push(plain("tidy", format!("'{own}' tidy")));
+    out.push(plain("regress", format!("'{own}' regress")));
+    out.push(plain("figures", format!("'{own}' reproduce-figs --profile quick --no-cache")));
     Ok(out)
 }
 

@@ -1,6 +1,7 @@
 //! The stored curves and how each is computed now.
 
 use crate::Failure;
+use crate::claim::Claim;
 use crate::workspace::read;
 
 mod compute;
@@ -46,8 +47,8 @@ pub(crate) struct Comparison {
 }
 
 impl Comparison {
-    pub(crate) fn passes(&self, curve: &Curve) -> bool {
-        self.worst_error <= curve.tolerance
+    pub(crate) fn claim(&self, curve: &Curve) -> Claim {
+        Claim::at_most(curve.name, self.worst_error, curve.tolerance)
     }
 }
 
@@ -194,11 +195,11 @@ mod tests {
     #[test]
     fn a_wrong_curve_fails() {
         let right = curve(compute::eta_intensity_radius);
-        assert!(right.compare().unwrap().passes(&right));
+        assert!(right.compare().unwrap().claim(&right).passes());
         let wrong = curve(|x| Ok(compute::eta_intensity_radius(x)?.into_iter().map(|y| y * (1.0 + 1e-8)).collect()));
-        assert!(!wrong.compare().unwrap().passes(&wrong));
+        assert!(!wrong.compare().unwrap().claim(&wrong).passes());
         let nan = curve(|x| Ok(vec![f64::NAN; x.len()]));
-        assert!(!nan.compare().unwrap().passes(&nan));
+        assert!(!nan.compare().unwrap().claim(&nan).passes());
     }
 
     #[test]

@@ -1,15 +1,16 @@
 //! `cargo xtask fit-trials`: fits to many scans of a pair against the truth, their bound and a start at the truth.
 //!
-//! Every scan is fitted from its map on: the map with the core typical and with it fitted, then all signals with one core radius
+//! Every scan is fitted from its map on: the map with the core kept at the typical one, about it and free, then all signals with one core radius
 //! fitted or the true one, and once more from the truth on. Each row has its standard error; one thread tells the processor time.
 
 use crate::trials::fits::FitTrial;
-use crate::trials::pair::{PairCase, PairScan};
 use crate::work_precision::measured;
 use crate::{Failure, Outcome};
+use fixtures::pair::{PairCase, PairScan};
+use ndarray::Array2;
 use wakescope_estimate::Error;
 use wakescope_estimate::vortex_fit::{
-    FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
+    CorePrior, FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
 };
 use wakescope_signal::NoiseModel;
 
@@ -72,36 +73,22 @@ impl Fits {
         Self { name, ..Default::default() }
     }
 
-    fn take(&mut self, (wake, deviation): (Wake, impl Fn(usize) -> f64), cpu_s: f64) {
-        self.found.push((wake, std::array::from_fn(deviation)));
-        self.cpu_s += cpu_s;
-    }
-
-    /// Keeps a fit of a map, or why there is none.
-    fn map(&mut self, scan: usize, (fit, cpu_s): (Result<MapFit, Error>, f64)) -> Option<MapFit> {
-        match fit {
+    /// Keeps a fit, of which `read` tells wake and covariance, or why there is none.
+    fn keep<F>(
+        &mut self,
+        scan: usize,
+        (fit, cpu_s): (Result<F, Error>, f64),
+        read: impl Fn(&F) -> (Wake, &Array2<f64>),
+    ) -> Option<F> {
+        match &fit {
             Ok(fit) => {
-                self.take((fit.wake, |i| fit.covariance[[i, i]].sqrt()), cpu_s);
-                Some(fit)
+                let (wake, covariance) = read(fit);
+                self.found.push((wake, std::array::from_fn(|i| covariance[[i, i]].sqrt())));
+                self.cpu_s += cpu_s;
             }
-            Err(error) => {
-                self.failures.push(format!("scan {scan}: {error}"));
-                None
-            }
+            Err(error) => self.failures.push(format!("scan {scan}: {error}")),
         }
-    }
-
-    fn signals(&mut self, scan: usize, (fit, cpu_s): (Result<SignalFit, Error>, f64)) -> Option<SignalFit> {
-        match fit {
-            Ok(fit) => {
-                self.take((fit.wake, |i| fit.covariance[[i, i]].sqrt()), cpu_s);
-                Some(fit)
-            }
-            Err(error) => {
-                self.failures.push(format!("scan {scan}: {error}"));
-                None
-            }
-        }
+        fit.ok()
     }
 
     fn show(&self, truth: &Wake, bound: &[f64; PARAMETERS]) {
@@ -144,15 +131,18 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth)?;
     let covariance = model.bound(&truth, Powers::default(), &of_signals, true)?;
     let bound: [f64; PARAMETERS] = std::array::from_fn(|i| covariance[[i, i]].sqrt());
-    let mut maps = [Fits::of("map, typical core"), Fits::of("map, one core fitted")];
+    let mut maps =
+        [Fits::of("map, core kept"), Fits::of("map, core about the typical one"), Fits::of("map, core fitted freely")];
     let mut signals = [Fits::of("signals"), Fits::of("signals, started at the truth")];
     let mut below = Vec::new();
     for scan in 0..options.scans as usize {
         let trial = FitTrial::new(&pair, scan)?;
         let mut guess = None;
-        for (fits, core) in maps.iter_mut().zip([Sharing::Fixed, Sharing::Common]) {
-            let (fit, cost) = measured(|| trial.map(free(core)))?;
-            guess = guess.or(fits.map(scan, (fit, cost.cpu_s())).map(|fit| fit.wake));
+        let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
+        for (fits, (core, prior)) in maps.iter_mut().zip(cores) {
+            let (fit, cost) = measured(|| trial.map(free(core), prior))?;
+            let kept = fits.keep(scan, (fit, cost.cpu_s()), |fit: &MapFit| (fit.wake, &fit.covariance));
+            guess = guess.or(kept.map(|fit| fit.wake));
         }
         let (false, Some(mut guess)) = (options.maps_only, guess) else { continue };
         if options.known_core {
@@ -161,7 +151,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
         let mut fit = |place: usize, guess: &Wake, starts| -> Result<Option<SignalFit>, Failure> {
             let (fit, cost) = measured(|| trial.signals(of_signals, guess, starts))?;
-            Ok(signals[place].signals(scan, (fit, cost.cpu_s())))
+            Ok(signals[place].keep(scan, (fit, cost.cpu_s()), |fit: &SignalFit| (fit.wake, &fit.covariance)))
         };
         let (found, at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?);
         if let (Some(found), Some(at_truth)) = (found, at_truth) {

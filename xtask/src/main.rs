@@ -4,15 +4,20 @@
 #![allow(clippy::print_stdout)]
 
 mod bless;
+mod cause;
 mod ci;
+mod claim;
 mod curves;
 mod figures;
 mod fit_trials;
 mod forecast;
 mod fuzz_scenes;
 mod process;
+mod profile;
+mod references;
 mod regress;
 mod reproduce;
+mod sources;
 mod tidy;
 mod trials;
 mod validate;

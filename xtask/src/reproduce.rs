@@ -1,13 +1,15 @@
 //! `cargo xtask reproduce-figs`: draws the figures, measures the claims, writes one report.
 //!
-//! Each figure is written as soon as it is made, and kept in a cache whose key is the content of
-//! this program, the figure, the profile and the seed: a second run draws only what has changed,
-//! and an interrupted one goes on where it was.
+//! Each figure is written as soon as it is made, and kept in a cache whose key is what it depends on: a second run draws
+//! only what has changed, and an interrupted one goes on where it was.
 
 mod cache;
 mod report;
 
-use crate::figures::{self, Claim, Context, Figure, Profile, Rendered, Verdict};
+use crate::claim::{Claim, Verdict};
+use crate::figures::context::{Context, Rendered};
+use crate::figures::{self, Figure};
+use crate::profile::Profile;
 use crate::workspace::root;
 use crate::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -53,26 +55,23 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let out = options.out.clone().unwrap_or_else(|| root().join("target/figures"));
     std::fs::create_dir_all(&out).map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
-    let cache = cache::Cache::new(options.profile, options.seed)?;
     let context = Context {
         profile: options.profile,
         seed: options.seed,
-        stages: cache.stages(),
+        stages: cache::folder().join("stages"),
+        anew: options.no_cache,
         wake: options.wake.clone(),
         analytic: options.analytic,
     };
-    // The key of the cache knows nothing of these.
-    let is_other = options.wake.is_some() || options.analytic;
-    let anew = options.no_cache || is_other;
-    if options.no_cache && context.stages.exists() {
-        std::fs::remove_dir_all(&context.stages)?;
-    }
+    // The key of the cache knows nothing of a wake from elsewhere.
+    let is_other = options.wake.is_some();
     let bar = progress_bar(chosen.len() as u64);
 
     let mut done = Vec::new();
     for figure in chosen {
         bar.set_message(figure.id);
-        let cached = if anew { None } else { cache.load(figure.id) };
+        let place = cache::Place::new(figure.id, &context)?;
+        let cached = if options.no_cache || is_other { None } else { place.load() };
         let from_cache = cached.is_some();
         let rendered = match cached {
             Some(rendered) => rendered,
@@ -81,7 +80,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
                 let mut rendered = pool.install(|| (figure.make)(&context))?;
                 rendered.timings.push(("total".into(), start.elapsed().as_secs_f64()));
                 if !is_other {
-                    cache.store(figure.id, &rendered)?;
+                    place.store(&rendered)?;
                 }
                 rendered
             }

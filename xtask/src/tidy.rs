@@ -1,11 +1,12 @@
 //! `cargo xtask tidy`: the rules of the house that no compiler checks.
 //!
-//! Who may depend on whom, one line of documentation at the head of each file, file lengths, units
-//! in public names, reference curves with a header, and no stray files or private paths.
+//! Who may depend on whom, no circles of imports, one line of documentation at the head of each file, file lengths, units
+//! in public names, reference curves with a header, tests that pages name, and no stray files or private paths.
 
+use crate::sources::{Modules, circles, code_lines, declared_tests, is_test_file};
 use crate::workspace::{read, root, tracked_files};
 use crate::{Failure, Outcome};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Crates of the workspace that each crate may depend on.
@@ -21,6 +22,9 @@ const MAY_DEPEND_ON: [(&str, &[&str]); 7] = [
 
 /// Longest source file, in lines of code: what explains them may take the room that it needs.
 const MAX_CODE_LINES: usize = 500;
+
+/// Crates whose circles of imports are being opened.
+const CIRCLES_STAND_IN: [&str; 4] = ["crates/estimate/", "crates/les/", "crates/optics/", "crates/sim/"];
 
 /// Files and folders that may stand at the top.
 const TOP_LEVEL: [&str; 15] = [
@@ -120,8 +124,8 @@ const UNITS: [&str; 36] = [
 /// Public numbers that name a quantity but have no unit of the SI: the path begins with the first word.
 const WITHOUT_UNIT: [(&str, &str); 5] = [
     // In the square of whatever unit the caller's samples have.
-    ("crates/estimate/src/velocity.rs", "power"),
-    ("crates/estimate/src/autoregressive.rs", "noise_power"),
+    ("crates/estimate/src/estimators/velocity.rs", "power"),
+    ("crates/estimate/src/models/autoregressive.rs", "noise_power"),
     // In spacings of the pair.
     ("crates/les/src/solver/cases/vortex_pair.rs", "height"),
     ("crates/les/src/solver/cases/vortex_pair.rs", "core_radius"),
@@ -136,28 +140,50 @@ const WITHOUT_UNIT: [(&str, &str); 5] = [
 pub(crate) fn run() -> Outcome {
     let mut found = Vec::new();
     let files = tracked_files()?;
+    let mut sources = Vec::new();
+    let mut pages = Vec::new();
     for file in &files {
         check_place(file, &mut found);
-        match Path::new(file).extension().and_then(|e| e.to_str()) {
-            Some("rs") => check_source(file, &read(file)?, &mut found),
-            Some("csv") if file.starts_with("tests/reference/") => check_reference(file, &read(file)?, &mut found),
-            _ => {}
+        let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("");
+        if !["rs", "md", "toml", "csv"].contains(&extension) {
+            continue;
         }
-        if file.ends_with(".rs") || file.ends_with(".md") || file.ends_with(".toml") || file.ends_with(".csv") {
-            check_private(file, &read(file)?, &mut found);
+        let text = read(file)?;
+        check_private(file, &text, &mut found);
+        match extension {
+            "rs" => {
+                check_source(file, &text, &mut found);
+                sources.push((file.as_str(), text));
+            }
+            "csv" if file.starts_with("tests/reference/") => check_reference(file, &text, &mut found),
+            "md" if file == "README.md" || file.starts_with("docs/src/") => pages.push((file.as_str(), text)),
+            _ => {}
         }
     }
     for (folder, allowed) in MAY_DEPEND_ON {
         check_manifest(folder, allowed, &read(&format!("{folder}/Cargo.toml"))?, &mut found);
     }
+    check_circles(&sources, &mut found);
+    check_names(&pages, &sources, &mut found);
     if found.is_empty() {
-        println!("tidy: {} files, nothing to complain of", files.len());
+        let lines = crate_code_lines(&sources);
+        println!("tidy: {} files, {lines} lines of code in crates/*/src, nothing to complain of", files.len());
         return Ok(());
     }
     for line in &found {
         println!("tidy: {line}");
     }
     Err(Failure::new(format!("tidy: {} violations", found.len())))
+}
+
+/// Lines of code of the libraries: neither blank, nor comment, nor of tests.
+fn crate_code_lines(sources: &[(&str, String)]) -> usize {
+    let of_crates = sources.iter().filter(|(file, _)| file.starts_with("crates/") && file.contains("/src/"));
+    let tests: Vec<String> = sources.iter().flat_map(|(file, text)| declared_tests(file, text)).collect();
+    let below =
+        |file: &str, place: &str| file.strip_prefix(place).is_some_and(|rest| rest == ".rs" || rest.starts_with('/'));
+    let is_test = |file: &str| is_test_file(file) || tests.iter().any(|place| below(file, place));
+    of_crates.filter(|(file, _)| !is_test(file)).map(|(_, text)| code_lines(text).len()).sum()
 }
 
 fn check_place(file: &str, found: &mut Vec<String>) {
@@ -193,6 +219,43 @@ fn check_source(file: &str, text: &str, found: &mut Vec<String>) {
         let bare = public_number(line).filter(|name| lacks_unit(name) && !excused(file, name));
         if let Some(name) = bare.filter(|_| file.starts_with("crates/")) {
             found.push(format!("{file}:{}: `{name}` needs its unit, as in `{name}_m`", i + 1));
+        }
+    }
+}
+
+/// Files that import one another in a circle: neither can be read, tested or moved without the other.
+fn check_circles(sources: &[(&str, String)], found: &mut Vec<String>) {
+    let of_crates: Vec<(&str, &str)> = sources
+        .iter()
+        .filter(|(file, _)| !is_test_file(file) && !CIRCLES_STAND_IN.iter().any(|open| file.starts_with(open)))
+        .map(|(file, text)| (*file, text.as_str()))
+        .collect();
+    let imports = Modules::new(&of_crates).imports(true);
+    for circle in circles(&imports) {
+        for from in &circle {
+            for (to, names) in imports[from].iter().filter(|(to, _)| circle.contains(to)) {
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                found.push(format!(
+                    "{from}: in a circle of imports of {} files: {} from {to}",
+                    circle.len(),
+                    names.join(", ")
+                ));
+            }
+        }
+    }
+}
+
+/// Names of four words and more that a page sets as code, tests above all, are names in some source.
+fn check_names(pages: &[(&str, String)], sources: &[(&str, String)], found: &mut Vec<String>) {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let known: BTreeSet<&str> = sources.iter().flat_map(|(_, text)| text.split(move |c| !is_word(c))).collect();
+    for (page, text) in pages {
+        for (i, line) in text.lines().enumerate() {
+            let names = line.split('`').skip(1).step_by(2);
+            let long = names.filter(|n| n.matches('_').count() >= 3 && n.chars().all(is_word));
+            found.extend(
+                long.filter(|n| !known.contains(n)).map(|n| format!("{page}:{}: no source has a `{n}`", i + 1)),
+            );
         }
     }
 }
@@ -293,5 +356,36 @@ mod tests {
         assert!(!complaints(|f| check_source("crates/les/src/a.rs", "fn a() {}\n", f)).is_empty());
         assert!(!complaints(|f| check_reference("tests/reference/a.csv", "x,y\n", f)).is_empty());
         assert!(!complaints(|f| check_private("docs/a.md", "see /home/me\n", f)).is_empty());
+    }
+
+    #[test]
+    fn a_test_that_a_page_names_must_be_there() {
+        let sources = [("crates/les/src/a.rs", "#[test]\nfn no_air_crosses_the_ground() {}\n".to_owned())];
+        let page = "held by `no_air_crosses_the_ground` and `no_air_crosses_a_wall`, `scan.range_max_m`\n".to_owned();
+        let found = complaints(|f| check_names(&[("docs/src/a.md", page)], &sources, f));
+        assert_eq!(found, ["docs/src/a.md:1: no source has a `no_air_crosses_a_wall`"]);
+    }
+
+    #[test]
+    fn code_is_neither_comment_nor_test() {
+        let source = |file, text: &str| (file, text.to_owned());
+        let sources = [
+            source("crates/les/src/a/mod.rs", "//! A.\n#[cfg(test)]\nmod checks;\nmod b;\n"),
+            source("crates/les/src/a/checks.rs", "fn f() {}\n"),
+            source("crates/les/src/a/b.rs", "fn f() {\n\n}\n\n#[cfg(test)]\nmod tests {\n}\n"),
+            source("xtask/src/a.rs", "fn f() {}\n"),
+        ];
+        assert_eq!(crate_code_lines(&sources), 3);
+    }
+
+    #[test]
+    fn a_circle_is_told_with_the_names_that_close_it() {
+        let source = |file, text: &str| (file, text.to_owned());
+        let sources = [
+            source("xtask/src/a.rs", "use crate::b::f;\nfn g() {}\n"),
+            source("xtask/src/b.rs", "use super::a::g;\nfn f() {}\n"),
+        ];
+        let found = complaints(|found| check_circles(&sources, found));
+        assert_eq!(found[0], "xtask/src/a.rs: in a circle of imports of 2 files: b, f from xtask/src/b.rs");
     }
 }

@@ -8,11 +8,11 @@ mod les;
 mod optics;
 mod signal;
 
-use crate::workspace::root;
+use crate::workspace::{provenance, root};
 use crate::{Failure, Outcome};
 use std::path::PathBuf;
 use std::time::Instant;
-use wakescope_sim::export::{FileGroup, Provenance, Table};
+use wakescope_sim::export::{FileGroup, Table};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Options of the task.
@@ -127,12 +127,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         Measured::Estimate => "estimate",
     };
     let parameters = format!("crate = \"{name}\"\neffort = {}\n", options.effort);
-    let origin = Provenance {
-        program: wakescope_sim::PROGRAM.into(),
-        scene_hash: wakescope_sim::scene::hash_of(&parameters),
-        scene_toml: parameters,
-        seed: optics::SEED,
-    };
+    let origin = provenance(&parameters, optics::SEED);
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/work-precision"));
     let mut files = FileGroup::new(&folder);
     files.add(&format!("{name}.csv"), table(&rows).to_csv(&origin)?)?;

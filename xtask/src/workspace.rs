@@ -1,8 +1,15 @@
-//! The files of the workspace.
+//! The files of the workspace, and what is written about those that a task makes.
 
 use crate::Failure;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use wakescope_sim::export::Provenance;
+
+/// Provenance of what follows from formulas and the parameters given as TOML.
+pub(crate) fn provenance(parameters: &str, seed: u64) -> Provenance {
+    let (program, scene_hash) = (wakescope_sim::PROGRAM.into(), wakescope_sim::scene::hash_of(parameters));
+    Provenance { program, scene_toml: parameters.into(), scene_hash, seed }
+}
 
 /// The root folder of the workspace.
 pub(crate) fn root() -> PathBuf {

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
     FreeParameters, Powers, PulseShape, ScanModel, ScanSetup, ScanSignals, Wake, WakeModel,
 };
-use wakescope_estimate::{Noise, Sampling, SignalKind};
+use wakescope_estimate::{Sampling, SignalKind, bound::Noise};
 
 /// 185 lines of 1000 real samples at 250 MHz: 281 to 881 m.
 fn likelihood(criterion: &mut Criterion) {

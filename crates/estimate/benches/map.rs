@@ -4,7 +4,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
-use wakescope_estimate::*;
+use wakescope_estimate::{Gates, PeriodogramOptions, PeriodogramPlan, Sampling, map::*};
 
 fn map(criterion: &mut Criterion) {
     let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();

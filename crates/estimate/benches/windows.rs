@@ -5,7 +5,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use num_complex::Complex;
 use std::hint::black_box;
-use wakescope_estimate::*;
+use wakescope_estimate::{Sampling, Scratch, SignalKind, Weighting, bound::*, estimators::*, models::*, spectrum::*};
 
 fn window() -> Vec<f64> {
     let turn = std::f64::consts::TAU * 80e6 / 250e6;

@@ -9,8 +9,8 @@
 use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate::{
-    Error, Estimator, GateVelocity, Gates, PeriodogramOptions, PeriodogramPlan, Quality, Radius, Sampling, Scan,
-    Scratch, Statistic, polar_points,
+    Error, Estimator, GateVelocity, Gates, PeriodogramOptions, PeriodogramPlan, Radius, Sampling, Scan, Scratch,
+    Statistic, estimators::Quality, polar_points,
 };
 
 /// Lags 1 and 2 of complex windows: the phase of the second is finer, the first says in which turn it is.

@@ -10,7 +10,8 @@ use std::error::Error;
 use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate::{
-    Gates, PeriodogramOptions, PeriodogramPlan, Radius, Sample, Sampling, Scan, WindowCorrelation, polar_points,
+    Gates, PeriodogramOptions, PeriodogramPlan, Radius, Sampling, Scan, map::WindowCorrelation, polar_points,
+    window::Sample,
 };
 
 /// What an instrument's data sheet says: adapt these lines to your own.

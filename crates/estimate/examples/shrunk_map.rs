@@ -5,7 +5,8 @@
 #![allow(clippy::print_stdout)]
 
 use ndarray::Array2;
-use wakescope_estimate::{Error, ShrinkageOptions, shrink_to_guess};
+use wakescope_estimate::Error;
+use wakescope_estimate::map::{ShrinkageOptions, shrink_to_guess};
 
 fn main() -> Result<(), Error> {
     // A vortex in 64 lines of 64 gates, 1 m apart, and noise of 1 m/s that differs from gate to gate.

@@ -28,23 +28,14 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `sampling`, `gates`, `sample`, `missing` | frequencies and velocities, windows and ranges, real and complex samples, which of them are missing |
-//! | `weighting`, `transform`, `periodogram` | window weights, their transform, (29) and (30) |
-//! | `correlogram`, `sliding`, `unbiased` | biased correlogram of all lags; of the first lags, slid along a record; the unbiased form |
-//! | `spectrum`, `zoom` | the density that belongs to a correlogram, on a whole grid and at chosen frequencies |
-//! | `velocity`, `statistic` | velocity with width, SNR, runner-up and flags; the traits for estimators of one's own |
-//! | `search`, `peak` | the peak in the detector band and what it tells |
-//! | `detection`, `special` | how high the peak of pure noise stands, for any tapers and lag windows |
-//! | `region`, `accumulate`, `auto_radius` | circular regions, accumulation level and n_eff; Table 3, also following the wind; rho(R) for a target variance |
-//! | `autoregressive`, `levinson`, `poles` | (31), (32): models, the choice of their order, their poles |
-//! | `model_peaks`, `correlogram_estimators` | estimators of the accumulated correlogram: CA, pole, Capon; lag window, pulse pair |
-//! | `likelihood` | tapers that make the accumulated periodogram the likelihood of a known pulse |
-//! | `gradient`, `gradient_likelihood`, `gradient_tapers` | a linear wind in the window; likelihood of velocity and gradient, for real windows too |
-//! | `first_moment` | the mean of a skewed spectrum, which (28) asks for |
-//! | `bound`, `linalg` | Cramer-Rao bound; solve and eigenvectors with residual checks |
-//! | `shrinkage` | a map drawn towards a guess of the wind as far as it does not contradict it |
-//! | `error_map` | bias, standard deviation, root mean square with standard errors, (33) |
+//! | [`window`] | frequencies and velocities, windows and ranges, real and complex samples, missing ones, weightings |
+//! | [`spectrum`] | biased correlogram, also slid along a record; its power density on a whole grid and at chosen frequencies |
+//! | [`models`] | autoregressive models (31), their spectrum (32), order and poles |
+//! | [`estimators`] | periodogram (29), (30), lag window, pulse pair, autoregressive and Capon peaks, likelihood with tapers, with a gradient; their traits; when a peak is noise |
+//! | [`map`] | regions, accumulation (Table 3) and n_eff, the radius that a variance needs; errors against the truth, (33); good estimates told from bad ones; a map drawn towards a guess |
+//! | [`bound`] | Cramer-Rao bound on the velocity, and on velocity and gradient |
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
+//! | `linalg`, `parallel` | solve and eigenvectors with residual checks, the bundled LAPACK; loops on the caller's threads |
 //!
 //! Features:
 //! - `rayon` (default) works on lines of sight and map points in the caller's thread pool; the bits of the result
@@ -55,77 +46,21 @@
 //!   features such a library must be there at link time.
 //! - `openblas-system` links a system OpenBLAS instead; the build stops with the remedy if there is none.
 
-mod accumulate;
-mod auto_radius;
-mod autoregressive;
-mod bound;
-mod correlogram;
-mod correlogram_estimators;
-#[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
-mod dense;
-mod detection;
+pub mod bound;
 mod error;
-mod error_map;
-mod first_moment;
-mod gates;
-mod gradient;
-mod gradient_likelihood;
-mod gradient_tapers;
-#[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
-mod lapack;
-mod levinson;
-mod likelihood;
+pub mod estimators;
 mod linalg;
-mod missing;
-mod model_peaks;
-#[cfg(feature = "openblas-system")]
-mod openblas;
+pub mod map;
+pub mod models;
 mod parallel;
-mod peak;
-mod periodogram;
-mod poles;
-mod rays;
-mod region;
-mod sample;
-mod sampling;
-mod search;
-mod shrinkage;
-mod sliding;
-mod special;
-mod spectrum;
-mod statistic;
-mod transform;
-mod unbiased;
-mod velocity;
+pub mod spectrum;
 pub mod vortex_fit;
-mod weighting;
-mod zoom;
+pub mod window;
 
-pub use accumulate::{MapPoint, Radius, Scan, ScanSums};
-pub use autoregressive::{Autoregression, OrderChoice};
-pub use bound::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s, information_complex, information_real};
-pub use correlogram::{Correlogram, Taper, correlogram_by_sum};
-pub use correlogram_estimators::{LagWindowPeak, PulsePair};
-pub use detection::NoiseTest;
 pub use error::Error;
-pub use error_map::{ErrorMap, ErrorStatistics};
-pub use first_moment::FirstMoment;
-pub use gates::Gates;
-pub use gradient::{GradientBound, GradientModel};
-pub use gradient_likelihood::{GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity};
-pub use likelihood::likelihood_tapers;
-pub use missing::MissingSamples;
-pub use model_peaks::{AutoregressivePeak, AutoregressivePole, CaponPeak, model_lag_weights};
-pub use peak::SpectralPeak;
-pub use periodogram::{Periodogram, PeriodogramOptions, PeriodogramPlan};
-pub use region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, polar_points};
-pub use sample::{Sample, Scratch, SignalKind};
-pub use sampling::{SPEED_OF_LIGHT_M_S, Sampling};
-pub use shrinkage::{ShrinkageOptions, ShrunkMap, shrink_to_guess};
-pub use sliding::ShortCorrelogram;
-pub use spectrum::{LagSpectrum, density_at};
-pub use statistic::{Estimator, Statistic, estimate_window};
-pub use unbiased::{Unbiased, unbiased_correlogram};
-pub use velocity::{GateVelocity, Quality, Refinement, RunnerUp};
-pub use weighting::Weighting;
-pub use zoom::ZoomSpectrum;
+pub use estimators::{
+    Estimator, GateVelocity, PeriodogramOptions, PeriodogramPlan, Refinement, SpectralPeak, Statistic,
+};
+pub use map::{Radius, Scan, polar_points};
+pub use spectrum::Correlogram;
+pub use window::{Gates, Sampling, Scratch, SignalKind, Weighting};

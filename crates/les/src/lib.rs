@@ -36,10 +36,12 @@
 //! | `axis` | one direction of a mesh: stretching, walls, periods |
 //! | `kernel` | the M'4 kernel, (27) |
 //! | `diagnose` | circulation on circles, (1), and `Gamma_5-15` |
+//! | [`decay`] | when the fast decay of a wake begins, how fast its waves grow |
 //!
 //! Feature `solver` (default): the large-eddy simulation, see [`Flow`]. Without it neither threads nor transforms are compiled.
 
 mod axis;
+pub mod decay;
 mod diagnose;
 mod error;
 mod grid_wind;

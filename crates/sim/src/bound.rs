@@ -9,7 +9,11 @@ use crate::progress::Observer;
 use crate::region::{of_table, region_radius};
 use crate::scan::Scanner;
 use crate::{Error, estimators};
-use wakescope_estimate::{PolarPoint, Radius, ScanGeometry, SignalKind, WindowCorrelation, WindowModel};
+use wakescope_estimate::{
+    Radius, SignalKind,
+    bound::WindowModel,
+    map::{PolarPoint, ScanGeometry, WindowCorrelation},
+};
 
 /// Signal-to-noise ratios of the curve, dB.
 const SNR_DB: std::ops::RangeInclusive<i32> = -30..=60;

@@ -9,7 +9,7 @@ use crate::scene::{
 use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate as estimate;
-use wakescope_estimate::{Estimator, Sample, SignalKind, Statistic};
+use wakescope_estimate::{Estimator, SignalKind, Statistic, window::Sample};
 use wakescope_signal::Pulse;
 
 /// The sampling of the records, in the words of the estimators.
@@ -99,18 +99,18 @@ fn pulse_correlation(scene: &Scene, pulse: &Pulse) -> Vec<f64> {
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn window_model(scene: &Scene, noise: NoiseKind, pulse: &Pulse) -> Result<Option<estimate::WindowModel>, Error> {
+pub fn window_model(scene: &Scene, noise: NoiseKind, pulse: &Pulse) -> Result<Option<estimate::bound::WindowModel>, Error> {
     let noise = match noise {
-        NoiseKind::White => estimate::Noise::White,
+        NoiseKind::White => estimate::bound::Noise::White,
         // A floor of a millionth keeps the covariance regular.
-        NoiseKind::Band => estimate::Noise::Band { floor: 1e-6 },
+        NoiseKind::Band => estimate::bound::Noise::Band { floor: 1e-6 },
         NoiseKind::None => return Ok(None),
     };
     let correlation = pulse_correlation(scene, pulse);
     let n = scene.estimator.window_samples;
     let at = |m: usize| correlation.get(m).copied().unwrap_or(0.0);
     let envelope = Array2::from_shape_fn((n, n), |(a, b)| at(a.abs_diff(b)));
-    Ok(Some(estimate::WindowModel::with_envelope(&sampling(scene)?, envelope, noise)?))
+    Ok(Some(estimate::bound::WindowModel::with_envelope(&sampling(scene)?, envelope, noise)?))
 }
 
 /// The bound of one window at rest, m/s. Where the noise of the model is too small outside the band for double precision, at
@@ -118,12 +118,12 @@ pub fn window_model(scene: &Scene, noise: NoiseKind, pulse: &Pulse) -> Result<Op
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn bound_m_s(model: &estimate::WindowModel, snr: f64, kind: SignalKind) -> Result<f64, Error> {
+pub fn bound_m_s(model: &estimate::bound::WindowModel, snr: f64, kind: SignalKind) -> Result<f64, Error> {
     match model.bound_m_s(0.0, snr, kind, 1.0) {
         Err(estimate::Error::NoiseFloor { least, .. }) => {
-            let noise = estimate::Noise::Band { floor: least };
+            let noise = estimate::bound::Noise::Band { floor: least };
             let envelope = model.envelope().to_owned();
-            let model = estimate::WindowModel::with_envelope(model.sampling(), envelope, noise)?;
+            let model = estimate::bound::WindowModel::with_envelope(model.sampling(), envelope, noise)?;
             Ok(model.bound_m_s(0.0, snr, kind, 1.0)?)
         }
         bound => Ok(bound?),
@@ -134,7 +134,7 @@ pub fn bound_m_s(model: &estimate::WindowModel, snr: f64, kind: SignalKind) -> R
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn window_correlation(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<estimate::WindowCorrelation, Error> {
+pub fn window_correlation(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<estimate::map::WindowCorrelation, Error> {
     let e = &scene.estimator;
     let window = weighting(scene).weights(e.window_samples)?;
     let d = &scene.detector;
@@ -149,7 +149,7 @@ pub fn window_correlation(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<esti
     let correlation = pulse_correlation(scene, pulse);
     let covariance = |m: usize| correlation.get(m).copied().unwrap_or(0.0) + if m == 0 { noise_to_signal } else { 0.0 };
     let samples = scene.samples_per_record();
-    Ok(estimate::WindowCorrelation::from_covariance(&window, e.window_step_samples, samples, covariance)?)
+    Ok(estimate::map::WindowCorrelation::from_covariance(&window, e.window_step_samples, samples, covariance)?)
 }
 
 /// What is known of the windows before any is seen, for estimators that are planned for it.
@@ -170,7 +170,7 @@ pub struct Toolkit<S> {
     /// The same for the complex mean of lines that were shifted, if the scene follows the wind.
     pub following: Option<Box<dyn Estimator>>,
     /// The test against noise, if the scene has noise and the method one.
-    pub test: Option<estimate::NoiseTest>,
+    pub test: Option<estimate::estimators::NoiseTest>,
     /// What the estimator finds in the mean statistic of the scene's noise: its power and its density, A^2.
     pub noise: Option<estimate::GateVelocity>,
 }
@@ -189,7 +189,7 @@ impl<S: Sample> Toolkit<S> {
                 // The tapers are those of white noise and need no inverse, whatever the noise.
                 let model = window_model(scene, NoiseKind::White, &instrument.pulse)?
                     .ok_or(estimate::Error::Empty { field: "noise" })?;
-                let tapers = estimate::likelihood_tapers(&model, snr)?;
+                let tapers = estimate::estimators::likelihood_tapers(&model, snr)?;
                 let statistic = estimate::Correlogram::<S>::with_tapers(tapers.clone())?;
                 let weights = statistic.lag_weights();
                 Self::planned(scene, instrument, Box::new(statistic), &weights, &tapers, known)
@@ -197,9 +197,9 @@ impl<S: Sample> Toolkit<S> {
             Method::Autoregressive(model) | Method::AutoregressivePole(model) | Method::Capon(model)
                 if e.weighting == Weighting::Rectangular =>
             {
-                let statistic = estimate::ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
+                let statistic = estimate::spectrum::ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
                 let weights = statistic.lag_weights();
-                let taper = estimate::Taper::unit(vec![1.0; e.window_samples])?;
+                let taper = estimate::spectrum::Taper::unit(vec![1.0; e.window_samples])?;
                 Self::planned(scene, instrument, Box::new(statistic), &weights, &[taper], known)
             }
             _ => {
@@ -215,7 +215,7 @@ impl<S: Sample> Toolkit<S> {
         instrument: &Instrument,
         statistic: Box<dyn Statistic<S>>,
         lag_weights: &[f64],
-        tapers: &[estimate::Taper],
+        tapers: &[estimate::spectrum::Taper],
         known: &WindowStatistics,
     ) -> Result<Self, Error> {
         let estimator = of_correlogram(scene, S::KIND, lag_weights, known)?;
@@ -236,10 +236,10 @@ impl<S: Sample> Toolkit<S> {
 }
 
 /// Spectrum and power in the band, A^2, of a scene's noise.
-fn noise(scene: &Scene, instrument: &Instrument) -> Option<(estimate::Noise, f64)> {
+fn noise(scene: &Scene, instrument: &Instrument) -> Option<(estimate::bound::Noise, f64)> {
     let noise = match scene.detector.noise {
-        NoiseKind::White => estimate::Noise::White,
-        NoiseKind::Band => estimate::Noise::Band { floor: 0.0 },
+        NoiseKind::White => estimate::bound::Noise::White,
+        NoiseKind::Band => estimate::bound::Noise::Band { floor: 0.0 },
         NoiseKind::None => return None,
     };
     Some((noise, instrument.receiver.noise_variance_a2()))
@@ -257,13 +257,13 @@ fn scaled_estimate(estimator: &dyn Estimator, mut mean: Vec<f64>) -> estimate::G
 /// correlogram with all its lags, which need not be positive.
 fn noise_test(
     scene: &Scene,
-    tapers: &[estimate::Taper],
+    tapers: &[estimate::spectrum::Taper],
     lag_weights: &[f64],
-) -> Result<Option<estimate::NoiseTest>, Error> {
+) -> Result<Option<estimate::estimators::NoiseTest>, Error> {
     let e = &scene.estimator;
     let window = match e.method {
-        Method::LagWindow(window) => Some(estimate::model_lag_weights(window.lag_window_lags - 1)),
-        method => method.order().map(|model| estimate::model_lag_weights(model.order)),
+        Method::LagWindow(window) => Some(estimate::estimators::model_lag_weights(window.lag_window_lags - 1)),
+        method => method.order().map(|model| estimate::estimators::model_lag_weights(model.order)),
     };
     let unbiased = e.correlogram == CorrelogramForm::Unbiased;
     if scene.detector.noise == NoiseKind::None || (unbiased && window.is_none()) {
@@ -273,7 +273,7 @@ fn noise_test(
     let window = window.map(|at| at.iter().zip(lag_weights).map(seen).collect::<Vec<f64>>());
     let padded = if e.method == (Method::PulsePair {}) { 4 * lag_weights.len() } else { e.padded_samples };
     let (sampling, gates) = (sampling(scene)?, gates(scene)?);
-    Ok(Some(estimate::NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded)?))
+    Ok(Some(estimate::estimators::NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded)?))
 }
 
 /// The estimator of a mean correlogram whose lags carry `lag_weights`.
@@ -294,24 +294,24 @@ fn of_correlogram(
             finish(e, kind, lag_weights, peak.with_lag_weights(lag_weights)?)
         }
         Method::Autoregressive(model) => {
-            let peak = estimate::AutoregressivePeak::new(&sampling, kind, lags, model.order, padded, refine)?;
+            let peak = estimate::estimators::AutoregressivePeak::new(&sampling, kind, lags, model.order, padded, refine)?;
             finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
         }
         Method::AutoregressivePole(model) => {
-            let pole = estimate::AutoregressivePole::new(&sampling, kind, lags, model.order, padded, refine)?;
+            let pole = estimate::estimators::AutoregressivePole::new(&sampling, kind, lags, model.order, padded, refine)?;
             finish(e, kind, lag_weights, pole.choosing(order_choice(e, &model, known)))
         }
         Method::Capon(model) => {
-            let peak = estimate::CaponPeak::new(&sampling, kind, lags, model.order, padded, refine)?;
+            let peak = estimate::estimators::CaponPeak::new(&sampling, kind, lags, model.order, padded, refine)?;
             finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
         }
         Method::LagWindow(window) => {
-            let peak = estimate::LagWindowPeak::new(&sampling, kind, lags, window.lag_window_lags, padded, refine)?;
+            let peak = estimate::estimators::LagWindowPeak::new(&sampling, kind, lags, window.lag_window_lags, padded, refine)?;
             finish(e, kind, lag_weights, peak)
         }
-        Method::PulsePair {} => finish(e, kind, lag_weights, estimate::PulsePair::new(&sampling, kind, lags)?),
+        Method::PulsePair {} => finish(e, kind, lag_weights, estimate::estimators::PulsePair::new(&sampling, kind, lags)?),
         Method::FirstMoment(own) => {
-            let moment = estimate::FirstMoment::new(&sampling, kind, lags, padded, own.moment_reach)?;
+            let moment = estimate::estimators::FirstMoment::new(&sampling, kind, lags, padded, own.moment_reach)?;
             finish(e, kind, lag_weights, moment)
         }
     }
@@ -326,16 +326,16 @@ fn finish<E: Estimator + 'static>(
 ) -> Result<Box<dyn Estimator>, Error> {
     Ok(match words.correlogram {
         CorrelogramForm::Biased => Box::new(estimator),
-        CorrelogramForm::Unbiased => Box::new(estimate::Unbiased::new(estimator, kind, lag_weights)?),
+        CorrelogramForm::Unbiased => Box::new(estimate::estimators::Unbiased::new(estimator, kind, lag_weights)?),
     })
 }
 
-fn order_choice(e: &Words, model: &ModelOrder, known: &WindowStatistics) -> estimate::OrderChoice {
+fn order_choice(e: &Words, model: &ModelOrder, known: &WindowStatistics) -> estimate::models::OrderChoice {
     let samples = e.window_samples as f64 * known.n_eff.max(1.0);
     match model.order_choice {
-        OrderChoice::Fixed => estimate::OrderChoice::Fixed,
-        OrderChoice::Aic => estimate::OrderChoice::Akaike { samples },
-        OrderChoice::Mdl => estimate::OrderChoice::DescriptionLength { samples },
+        OrderChoice::Fixed => estimate::models::OrderChoice::Fixed,
+        OrderChoice::Aic => estimate::models::OrderChoice::Akaike { samples },
+        OrderChoice::Mdl => estimate::models::OrderChoice::DescriptionLength { samples },
     }
 }
 
@@ -347,15 +347,15 @@ fn gradient_likelihood<S: Sample>(
 ) -> Result<Toolkit<S>, Error> {
     let e = &scene.estimator;
     let noise = match scene.detector.noise {
-        NoiseKind::White => estimate::Noise::White,
-        NoiseKind::Band | NoiseKind::None => estimate::Noise::Band { floor: 0.0 },
+        NoiseKind::White => estimate::bound::Noise::White,
+        NoiseKind::Band | NoiseKind::None => estimate::bound::Noise::Band { floor: 0.0 },
     };
     let sampling = sampling(scene)?;
-    let model = estimate::GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
+    let model = estimate::bound::GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
     let half = (own.gradients / 2) as f64;
     let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
     let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
-    let plan = estimate::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
+    let plan = estimate::estimators::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
     let (test, noise) = match self::noise(scene, instrument) {
         None => (None, None),
         Some((noise, power_a2)) => {

@@ -33,7 +33,7 @@
 //! | [`wind`] | the wind: analytic, or the planes of a simulated flow |
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | [`scan`] | air along the lines of sight, and their records |
-//! | [`map`] | estimates and their errors against the truth |
+//! | [`map`], [`cell_average`] | estimates and their errors against the truth, averages over cells |
 //! | [`mod@bound`] | the Cramer-Rao bound for a scene |
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
@@ -45,6 +45,7 @@
 //! PNG, the report page), `vtk` (fields for ParaView).
 
 pub mod bound;
+pub mod cell_average;
 pub mod estimators;
 pub mod export;
 #[cfg(feature = "flow")]

@@ -8,8 +8,11 @@ use crate::region::{interpolated, region_radius};
 use crate::scan::{Scanner, radial_velocity_m_s};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use wakescope_estimate::{
-    ErrorMap, GateVelocity, Gates, MapPoint, NoiseTest, PolarPoint, Radius, Sample, Sampling, Scan, ScanGeometry,
-    ScanSums, Statistic, WindowCorrelation, polar_points,
+    GateVelocity, Gates, Radius, Sampling, Scan, Statistic,
+    estimators::NoiseTest,
+    map::{ErrorMap, MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCorrelation},
+    polar_points,
+    window::Sample,
 };
 use wakescope_signal::{Clipped, RangeFilter};
 

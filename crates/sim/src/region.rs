@@ -6,7 +6,10 @@ use crate::scan::Scanner;
 use crate::scene::{Method, NoiseKind, RegionRadius, Scene};
 use crate::{Error, estimators};
 use ndarray::Array2;
-use wakescope_estimate::{PolarPoint, Radius, ScanGeometry, WindowCorrelation};
+use wakescope_estimate::{
+    Radius,
+    map::{PolarPoint, ScanGeometry, WindowCorrelation},
+};
 
 /// Signal-to-noise ratio that stands for no noise where a bound is asked for.
 const NO_NOISE_SNR: f64 = 1e6;

@@ -12,7 +12,7 @@ use crate::scan::Scanner;
 use crate::scene::DetectorSignal;
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex;
-use wakescope_estimate::{Sample, SignalKind};
+use wakescope_estimate::{SignalKind, window::Sample};
 
 /// What a run gives; absent is what was not asked for.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,7 +1,10 @@
 //! The curves as the crates compute them now, one function for each.
 
 use crate::Failure;
-use wakescope_estimate::{Noise, SignalKind, WindowModel};
+use wakescope_estimate::{
+    SignalKind,
+    bound::{Noise, WindowModel},
+};
 use wakescope_les::cases::{TollmienSchlichting, VortexPairCase};
 use wakescope_les::{Flow, Ground, Motion, VortexPair, m4_prime as kernel};
 use wakescope_optics::{RadiusDefinition, SnrModel, Telescope, hankel, theory};

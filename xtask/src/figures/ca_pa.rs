@@ -1,13 +1,15 @@
 //! The chapter's claim that CA errs less than PA, measured against signal-to-noise ratio, radius of the region and
 //! duration of the pulse.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::trials::methods::WINDOW;
-use crate::trials::pair::PairScan;
+use crate::claim::{Claim, Verdict};
+use fixtures::WINDOW;
+use fixtures::pair::PairScan;
 use wakescope_estimate::{
-    AutoregressivePeak, Correlogram, Estimator, LagWindowPeak, PolarPoint, Refinement, SignalKind, SpectralPeak,
-    Weighting,
+    Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Weighting,
+    estimators::{AutoregressivePeak, LagWindowPeak},
+    map::PolarPoint,
 };
 use wakescope_signal::NoiseModel;
 use wakescope_sim::export::Table;

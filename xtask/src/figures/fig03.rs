@@ -1,6 +1,6 @@
 //! Figure 3: the scan pattern on the runway, with the vortices and the lines of sight.
 
-use super::{Context, Rendered};
+use super::context::{Context, Rendered};
 use crate::Failure;
 use wakescope_sim::export::Table;
 use wakescope_sim::plan::{Plan, Target};

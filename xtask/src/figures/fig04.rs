@@ -1,7 +1,8 @@
 //! Figure 4: signal-to-noise ratio and system efficiency against range, in free space and through turbulence.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use std::ops::ControlFlow;
 use wakescope_optics::structure::StructureTable;
 use wakescope_optics::{
@@ -241,6 +242,6 @@ fn free_space_claim() -> Result<Claim, Failure> {
         "the free-space efficiency agrees with the reference curve",
         &format!("within {:e}", curve.tolerance),
         format!("within {:.1e} at {} ranges", compared.worst_error, compared.x.len()),
-        compared.passes(curve),
+        compared.claim(curve).passes(),
     ))
 }

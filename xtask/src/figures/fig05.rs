@@ -1,7 +1,8 @@
 //! Figure 5: the M'4 stencil of a point on a line of sight.
 
-use super::{Claim, Context, Rendered};
+use super::context::{Context, Rendered};
 use crate::Failure;
+use crate::claim::Claim;
 use wakescope_les::m4_prime;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};

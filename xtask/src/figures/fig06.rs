@@ -1,8 +1,10 @@
 //! Figure 6: surfaces of equal vorticity of the wake, and an animation of a cross-plane.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use crate::wakes;
+use wakescope_les::decay::{amplitude_growth, value_at};
 use wakescope_sim::export::Table;
 use wakescope_sim::flow::{FinishedWake, REPEATS};
 use wakescope_sim::plot::animation;
@@ -66,8 +68,8 @@ fn short_waves(wake: &FinishedWake) -> Result<Claim, Failure> {
     let mut best = (0, f64::NEG_INFINITY, 0.0);
     for mode in modes {
         let curve = wake.curve(&mode_name(mode))?;
-        let at = |tau: f64| crate::validate::interpolate(&curve, tau);
-        let rate = 0.5 * (at(2.0) / at(1.0)).ln();
+        let at = |tau: f64| value_at(&curve, tau);
+        let rate = amplitude_growth(&curve, 1.0, 2.0);
         if rate > best.1 {
             best = (mode, rate, at(3.0) / at(1.0));
         }

@@ -1,9 +1,11 @@
 //! Figure 7: circulation and paths of the two vortices of the simulated wake.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::validate::{interpolate, knee, numbers, onset};
+use crate::claim::{Claim, Verdict};
+use crate::references::numbers;
 use crate::wakes;
+use wakescope_les::decay::{knee, onset, value_at};
 use wakescope_sim::export::Table;
 use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::plot::{CurvePlot, Figure, Series, Style};
@@ -78,7 +80,7 @@ fn mean(wake: &FinishedWake, name: &str, sign: f64) -> Result<Vec<(f64, f64)>, F
 
 fn claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {
     let gamma = mean(wake, "gamma_ratio", 1.0)?;
-    let at = |tau: f64| interpolate(&gamma, tau);
+    let at = |tau: f64| value_at(&gamma, tau);
     let onset = onset(&gamma);
     let noise = format!("noise {} V₀, Γ₀/ν = {}", wake.flow.perturbation, wake.flow.reynolds);
     let like_chapter = wake.flow.reynolds >= CHAPTER.0 && wake.flow.core_radius <= CHAPTER.1;
@@ -126,8 +128,8 @@ fn inviscid_path(wake: &FinishedWake, y: &[(f64, f64)], z: &[(f64, f64)]) -> Res
     let separation = turned.map_or(f64::NAN, |(p, _)| p.0);
     let hyperbola = numbers("vortex_pair_inviscid_ground_h1.csv")?;
     let exact =
-        |column: usize, tau: f64| interpolate(&hyperbola.iter().map(|r| (r[0], r[column])).collect::<Vec<_>>(), tau);
-    let distance = |tau: f64| (interpolate(y, tau) - exact(1, tau)).hypot(interpolate(z, tau) - exact(2, tau));
+        |column: usize, tau: f64| value_at(&hyperbola.iter().map(|r| (r[0], r[column])).collect::<Vec<_>>(), tau);
+    let distance = |tau: f64| (value_at(y, tau) - exact(1, tau)).hypot(value_at(z, tau) - exact(2, tau));
     let worst = y.iter().map(|p| p.0).filter(|tau| *tau <= separation).map(distance).fold(0.0, f64::max);
     let statement = "the path is the inviscid one until the boundary layer separates";
     let measured = format!("{worst:.4} b₀ until tau = {separation:.2}, where the shear at the ground turns");

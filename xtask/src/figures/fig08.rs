@@ -1,9 +1,10 @@
 //! Figure 8: radial velocity of the simulated wake, early and late, and what the lidar makes of it.
 
-use super::{Claim, Context, Rendered};
+use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::validate::interpolate;
+use crate::claim::Claim;
 use crate::wakes;
+use wakescope_les::decay::value_at;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::export::{Table, VelocityMap};
 use wakescope_sim::flow::FinishedWake;
@@ -22,9 +23,8 @@ fn extent_m(wake: &FinishedWake) -> Result<[f64; 3], Failure> {
     let mut extent_m = [f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     for (tau, _) in AGES {
         for side in ["left", "right"] {
-            let at = |name: &str| -> Result<f64, Failure> {
-                Ok(interpolate(&wake.curve(&format!("{name}_{side}_m"))?, tau))
-            };
+            let at =
+                |name: &str| -> Result<f64, Failure> { Ok(value_at(&wake.curve(&format!("{name}_{side}_m"))?, tau)) };
             let (y_m, z_m) = (at("y")?, at("z")?);
             extent_m = [extent_m[0].min(y_m), extent_m[1].max(y_m), extent_m[2].max(z_m)];
         }

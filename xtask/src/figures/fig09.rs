@@ -1,8 +1,9 @@
 //! Figure 9: accumulation level against range for three radii of the region.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
-use wakescope_estimate::{PolarPoint, ScanGeometry, WindowCorrelation};
+use crate::claim::{Claim, Verdict};
+use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use wakescope_sim::estimators;
 use wakescope_sim::export::Table;
 use wakescope_sim::geometry::Geometry;

@@ -2,9 +2,10 @@
 //!
 //! Some independent batches of realisations give the correlation its confidence interval.
 
+use super::context::{Context, Rendered};
 use super::study::{Age, REFERENCES, Sight, Study, early_scene, mean_and_error, stacked, with_method};
-use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::plot::{Figure, MapPlot};

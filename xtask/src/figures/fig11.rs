@@ -1,8 +1,9 @@
 //! Figure 11: estimated map and its error, late, 400 ns, Cn2 = 1e-15, windows of 64 samples.
 
+use super::context::{Context, Rendered};
 use super::study::{Age, REFERENCES, Sight, Study, early_scene, stacked, with_method, with_turbulence};
-use super::{Claim, Context, Rendered, Verdict};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::plot::{Figure, MapPlot};

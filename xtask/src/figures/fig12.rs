@@ -1,10 +1,10 @@
 //! Figure 12: error of correlogram accumulation against range for four pulse energies, Cn2 = 1e-13, 200 ns.
 
-use super::study::{
-    Age, Average, INSIDE_M, OUTSIDE_M, REFERENCES, Sight, Study, early_scene, with_method, with_turbulence,
-};
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
+use super::study::{Age, INSIDE_M, OUTSIDE_M, REFERENCES, Sight, Study, early_scene, with_method, with_turbulence};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
+use wakescope_sim::cell_average::CellAverage;
 use wakescope_sim::export::Table;
 use wakescope_sim::instrument::Instrument;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -18,12 +18,12 @@ struct Curve {
     energy_j: f64,
     range_m: Vec<f64>,
     /// Over all lines, at each range.
-    over_lines: Vec<Average>,
+    over_lines: Vec<CellAverage>,
     /// Over the cells inside and outside of the vortices.
-    inside: Average,
-    outside: Average,
+    inside: CellAverage,
+    outside: CellAverage,
     /// Outside, the nearer and the farther half of the ranges.
-    halves: [Average; 2],
+    halves: [CellAverage; 2],
 }
 
 fn scene(context: &Context) -> Scene {
@@ -105,7 +105,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
 fn table(curves: &[Curve]) -> Table {
     let rows: Vec<(&Curve, usize)> = curves.iter().flat_map(|c| (0..c.range_m.len()).map(move |j| (c, j))).collect();
-    let of = |get: fn(&Average) -> f64| rows.iter().map(move |(c, j)| get(&c.over_lines[*j])).collect::<Vec<_>>();
+    let of = |get: fn(&CellAverage) -> f64| rows.iter().map(move |(c, j)| get(&c.over_lines[*j])).collect::<Vec<_>>();
     Table::new()
         .float("pulse_energy_j", rows.iter().map(|(c, _)| c.energy_j))
         .text("snr_reference", rows.iter().map(|(c, _)| c.reference))
@@ -117,7 +117,7 @@ fn table(curves: &[Curve]) -> Table {
 }
 
 /// `a` above `b`, in standard errors of their difference.
-fn above(a: &Average, b: &Average) -> f64 {
+fn above(a: &CellAverage, b: &CellAverage) -> f64 {
     (a.rms_m_s - b.rms_m_s) / a.standard_error_m_s.hypot(b.standard_error_m_s)
 }
 
@@ -154,7 +154,7 @@ fn outside_claim(curves: &[Curve]) -> Claim {
 fn inside_claim(curves: &[Curve]) -> Claim {
     let (mut words, mut verdicts, mut error) = (Vec::new(), Vec::new(), 0.0_f64);
     for (name, _) in REFERENCES {
-        let of: Vec<Average> = curves.iter().filter(|c| c.reference == name).map(|c| c.inside).collect();
+        let of: Vec<CellAverage> = curves.iter().filter(|c| c.reference == name).map(|c| c.inside).collect();
         let largest = of.iter().map(|a| a.rms_m_s).fold(0.0, f64::max);
         let least = of.iter().map(|a| a.rms_m_s).fold(f64::INFINITY, f64::min);
         let standard_error = of.iter().map(|a| a.standard_error_m_s).fold(0.0, f64::max);

@@ -1,8 +1,10 @@
 //! Figure 13: correlogram against periodogram accumulation on the early pair, 200 ns, and how it depends on the SNR.
 
+use super::context::{Context, Rendered};
+use super::profiles;
 use super::study::{Age, INSIDE_M, REFERENCES, Sight, Study, mean_and_error, near_scene, with_method};
-use super::{Claim, Context, Rendered, Verdict, profiles};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use profiles::{Profiles, edge_level};
 use wakescope_sim::plot::Figure;
 use wakescope_sim::scene::SnrReference;

@@ -1,8 +1,10 @@
 //! Figure 14: correlogram against periodogram accumulation at 200 and 400 ns, Cn2 = 1e-15, about the vortex centre.
 
+use super::context::{Context, Rendered};
+use super::profiles;
 use super::study::{Age, REFERENCES, Sight, Study, near_scene, with_method, with_turbulence};
-use super::{Claim, Context, Rendered, Verdict, profiles};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use profiles::{Profiles, peak, width_m};
 use wakescope_sim::plot::Figure;
 use wakescope_sim::scene::PulseShape;

@@ -1,12 +1,13 @@
 //! Figure 17: circulation and positions of the vortices, retrieved from maps and from all raw signals, against the truth.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
+use crate::claim::{Claim, Verdict};
 use crate::trials::fits::{FitTrial, RADIUS_M};
-use crate::trials::pair::{CIRCULATION_M2_S, PairScan, truth};
+use fixtures::pair::{CIRCULATION_M2_S, PairScan, truth};
 use ndarray::Array2;
 use rayon::prelude::*;
-use wakescope_estimate::vortex_fit::{FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake};
+use wakescope_estimate::vortex_fit::{CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake};
 use wakescope_signal::NoiseModel;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -63,7 +64,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 fn fit(pair: &PairScan, scan: usize) -> Result<[Found; 4], Failure> {
     let trial = FitTrial::new(pair, scan)?;
     let from_map = |core_radius: Sharing| -> Result<Found, Failure> {
-        let fit = trial.map(FreeParameters { core_radius, ..free() })?;
+        let fit = trial.map(FreeParameters { core_radius, ..free() }, Some(CorePrior::TYPICAL))?;
         Ok(fit.ok().map(|fit| (fit.wake, fit.covariance)))
     };
     let (typical, resolved) = (from_map(Sharing::Fixed)?, from_map(Sharing::Common)?);

@@ -1,12 +1,17 @@
 //! Figure 18: velocity error of every estimator against the Cramer-Rao bound, in a uniform random wind.
 
-use super::{Claim, Context, Rendered, Verdict};
+use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::trials::methods::{Known, WINDOW};
-use crate::trials::mixture::{Mixture, mixture};
+use crate::claim::{Claim, Verdict};
+use crate::trials::methods::Known;
+use crate::trials::noise_name;
 use crate::trials::uniform::{Air, BAND_M_S, errors};
-use crate::trials::{noise_name, sampling};
-use wakescope_estimate::{Noise, SignalKind, WindowModel};
+use fixtures::{WINDOW, sampling};
+use wakescope_estimate::{
+    SignalKind,
+    bound::{Noise, WindowModel},
+    map::{GoodAndBad, good_and_bad},
+};
 use wakescope_signal::NoiseModel;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -25,7 +30,7 @@ struct Row {
     pulses: usize,
     snr_db: f64,
     bound_m_s: f64,
-    found: Mixture,
+    found: GoodAndBad,
 }
 
 impl Row {
@@ -51,7 +56,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
                 for errors in errors(&air, &known, &counts, trials)? {
                     let bound_m_s = model.bound_m_s(0.0, snr, SignalKind::Real, errors.pulses as f64)?;
                     let (method, pulses) = (errors.method, errors.pulses);
-                    let found = mixture(&errors.errors_m_s, BAND_M_S);
+                    let found = good_and_bad(&errors.errors_m_s, BAND_M_S);
                     rows.push(Row { method, noise, pulse_s, pulses, snr_db, bound_m_s, found });
                 }
             }
@@ -97,7 +102,7 @@ fn table(rows: &[Row]) -> Table {
 
 fn picture(rows: &[Row]) -> Figure {
     let mut panels = Vec::new();
-    type Read = fn(&Mixture) -> (f64, f64);
+    type Read = fn(&GoodAndBad) -> (f64, f64);
     let kinds: [(&str, Axis, Read); 3] = [
         ("good estimates", Axis::log("std [m/s]").between(0.03, 4.0), |m| (m.std_good_m_s, m.std_good_error_m_s)),
         ("bad estimates", Axis::linear("fraction").between(0.0, 1.0), |m| (m.bad_fraction, m.bad_fraction_error)),

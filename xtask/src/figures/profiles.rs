@@ -1,7 +1,8 @@
 //! Errors along the lines of sight that pass a core, against the range from its centre: figures 13 and 14.
 
-use super::study::{Average, INSIDE_M, Study};
+use super::study::{INSIDE_M, Study};
 use crate::Failure;
+use wakescope_sim::cell_average::CellAverage;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Series, Style};
 
@@ -22,9 +23,9 @@ pub(super) struct Profiles {
     pub(super) gate_m: f64,
     /// Range from the centre, m, increasing, and the errors there, both vortices together.
     pub(super) range_m: Vec<f64>,
-    pub(super) errors: Vec<Average>,
+    pub(super) errors: Vec<CellAverage>,
     /// Over all cells inside the vortices.
-    pub(super) inside: Average,
+    pub(super) inside: CellAverage,
 }
 
 impl Profiles {
@@ -69,8 +70,9 @@ impl Profiles {
     /// Batches of the same scene as one.
     pub(super) fn joined(batches: &[Self]) -> Result<Self, Failure> {
         let first = batches.first().ok_or_else(|| Failure::new("no batch of scans".into()))?;
-        let errors = (0..first.errors.len()).map(|k| Average::joined(batches.iter().map(|b| b.errors[k]))).collect();
-        let inside = Average::joined(batches.iter().map(|b| b.inside));
+        let errors =
+            (0..first.errors.len()).map(|k| CellAverage::joined(batches.iter().map(|b| b.errors[k]))).collect();
+        let inside = CellAverage::joined(batches.iter().map(|b| b.inside));
         Ok(Self { range_m: first.range_m.clone(), errors, inside, ..*first })
     }
 
@@ -119,7 +121,7 @@ pub(super) fn width_m(p: &Profiles) -> f64 {
 /// All profiles as one table.
 pub(super) fn table(all: &[&Profiles]) -> Table {
     let rows: Vec<(&Profiles, usize)> = all.iter().flat_map(|&p| (0..p.range_m.len()).map(move |k| (p, k))).collect();
-    let of = |get: fn(&Average) -> f64| rows.iter().map(move |(p, k)| get(&p.errors[*k])).collect::<Vec<_>>();
+    let of = |get: fn(&CellAverage) -> f64| rows.iter().map(move |(p, k)| get(&p.errors[*k])).collect::<Vec<_>>();
     Table::new()
         .text("method", rows.iter().map(|(p, _)| p.method))
         .float("pulse_s", rows.iter().map(|(p, _)| p.pulse_s))
@@ -157,13 +159,13 @@ mod tests {
     /// A Gaussian of height 2 and standard deviation 8 m on a level of 0.5.
     fn bell() -> Profiles {
         let range_m: Vec<f64> = (-14..=14).map(|k| 3.0 * f64::from(k)).collect();
-        let average = |r: &f64| Average {
+        let average = |r: &f64| CellAverage {
             bias_m_s: 0.0,
             std_m_s: 0.0,
             rms_m_s: 0.5 + 2.0 * (-0.5 * (r / 8.0).powi(2)).exp(),
             standard_error_m_s: 0.1,
         };
-        let errors: Vec<Average> = range_m.iter().map(average).collect();
+        let errors: Vec<CellAverage> = range_m.iter().map(average).collect();
         let inside = errors[14];
         Profiles { method: "PA", name: "fixed", pulse_s: 2e-7, snr_db: 0.0, gate_m: 3.0, range_m, errors, inside }
     }

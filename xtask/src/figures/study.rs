@@ -1,14 +1,14 @@
-//! What figures 10 to 14 share: scans of the simulated wake or of the analytic pair, regions about the cores,
-//! averages with their standard errors.
+//! What figures 10 to 14 share: scans of the simulated wake or of the analytic pair, regions about the cores.
 //!
 //! Maps of neighbouring cells share their windows: as independent counts one line of sight in [`SHARED_LINES`] and one gate in
 //! [`SHARED_GATES`].
 
-use super::Context;
+use super::context::Context;
 use crate::Failure;
-use crate::validate::interpolate;
 use crate::wakes;
 use std::path::PathBuf;
+use wakescope_les::decay::value_at;
+use wakescope_sim::cell_average::CellAverage;
 use wakescope_sim::export::csv::Column;
 use wakescope_sim::export::{Provenance, Table};
 use wakescope_sim::map::VelocityEstimates;
@@ -110,7 +110,7 @@ impl Sight {
         };
         let core = |side: &str| -> Result<(f64, f64), Failure> {
             let at =
-                |name: &str| Ok::<f64, Failure>(b0_m * interpolate(&wake.curve(&format!("{name}_{side}"))?, age.tau()));
+                |name: &str| Ok::<f64, Failure>(b0_m * value_at(&wake.curve(&format!("{name}_{side}"))?, age.tau()));
             Ok((flow.lateral_position_m + at("y")?, at("z")?))
         };
         let cores = vec![core("left")?, core("right")?];
@@ -181,60 +181,22 @@ impl Study {
     }
 
     /// Averages over the cells whose distance to the nearer core, m, is accepted.
-    pub(super) fn over(&self, accept: impl Fn(f64) -> bool) -> Average {
+    pub(super) fn over(&self, accept: impl Fn(f64) -> bool) -> CellAverage {
         let mut cells = Vec::new();
         for (i, row) in self.distance_m.iter().enumerate() {
             cells.extend(row.iter().enumerate().filter(|(_, d)| accept(**d)).map(|(j, _)| (i, j)));
         }
-        self.average(&cells, SHARED_LINES * SHARED_GATES)
+        self.over_cells(&cells)
     }
 
     /// Averages over some cells, whose neighbours share lines and gates.
-    pub(super) fn over_cells(&self, cells: &[(usize, usize)]) -> Average {
-        self.average(cells, SHARED_LINES * SHARED_GATES)
+    pub(super) fn over_cells(&self, cells: &[(usize, usize)]) -> CellAverage {
+        CellAverage::over(&self.map, cells, SHARED_LINES * SHARED_GATES)
     }
 
     /// Averages over cells of a profile: at one gate, or at one for each vortex.
-    pub(super) fn over_profile(&self, cells: &[(usize, usize)]) -> Average {
-        self.average(cells, SHARED_LINES)
-    }
-
-    fn average(&self, cells: &[(usize, usize)], shared: f64) -> Average {
-        let m = &self.map;
-        let known: Vec<(usize, usize)> = cells.iter().copied().filter(|c| m.rms_m_s[*c].is_finite()).collect();
-        let n = known.len() as f64;
-        let mean = |field: &ndarray::Array2<f64>| known.iter().map(|c| field[*c]).sum::<f64>() / n;
-        let square = |field: &ndarray::Array2<f64>| (known.iter().map(|c| field[*c].powi(2)).sum::<f64>() / n).sqrt();
-        Average {
-            bias_m_s: mean(&m.bias_m_s),
-            std_m_s: square(&m.std_m_s),
-            rms_m_s: square(&m.rms_m_s),
-            standard_error_m_s: square(&m.standard_error_m_s) / (n / shared).max(1.0).sqrt(),
-        }
-    }
-}
-
-/// Errors over a set of cells: the mean bias, and root means of squares.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Average {
-    pub(super) bias_m_s: f64,
-    pub(super) std_m_s: f64,
-    pub(super) rms_m_s: f64,
-    /// Of `rms_m_s`.
-    pub(super) standard_error_m_s: f64,
-}
-
-impl Average {
-    /// Averages of independent batches of equal size as one.
-    pub(super) fn joined(batches: impl ExactSizeIterator<Item = Self>) -> Self {
-        let n = batches.len() as f64;
-        let mut sums = [0.0; 4];
-        for b in batches {
-            let squares = [b.bias_m_s, b.std_m_s.powi(2), b.rms_m_s.powi(2), b.standard_error_m_s.powi(2)];
-            sums.iter_mut().zip(squares).for_each(|(sum, value)| *sum += value / n);
-        }
-        let [bias_m_s, std, rms, error] = sums;
-        Self { bias_m_s, std_m_s: std.sqrt(), rms_m_s: rms.sqrt(), standard_error_m_s: (error / n).sqrt() }
+    pub(super) fn over_profile(&self, cells: &[(usize, usize)]) -> CellAverage {
+        CellAverage::over(&self.map, cells, SHARED_LINES)
     }
 }
 

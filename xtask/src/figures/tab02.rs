@@ -1,7 +1,8 @@
 //! Table 2: the lidar's parameters, read back from a scene that went through a file.
 
-use super::{Claim, Context, Rendered};
+use super::context::{Context, Rendered};
 use crate::Failure;
+use crate::claim::Claim;
 use std::path::Path;
 use wakescope_sim::export::Table;
 use wakescope_sim::plan::{Plan, Target};

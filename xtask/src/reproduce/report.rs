@@ -1,7 +1,9 @@
 //! The report of a run: one page with all figures, claims and run times.
 
 use crate::Failure;
-use crate::figures::{Context, Figure, Rendered};
+use crate::claim::Claim;
+use crate::figures::Figure;
+use crate::figures::context::{Context, Rendered};
 use std::process::Command;
 use wakescope_sim::plot::html::HtmlTable;
 use wakescope_sim::plot::{Report, ReportEntry};
@@ -81,7 +83,7 @@ fn words(list: &[&str]) -> Vec<String> {
 }
 
 fn claims(done: &[(&Figure, Rendered)]) -> HtmlTable {
-    let row = |c: &crate::figures::Claim| {
+    let row = |c: &Claim| {
         let error = if c.standard_error.is_nan() { String::new() } else { format!("{:.3}", c.standard_error) };
         vec![c.id.clone(), c.statement.clone(), c.expected.clone(), c.measured.clone(), error, c.verdict.name().into()]
     };

@@ -1,15 +1,17 @@
 //! Fits to scans of a pair: to the map of the likelihood with tapers, and to all raw signals.
 
-use super::methods::WINDOW;
-use super::pair::PairScan;
 use crate::Failure;
+use fixtures::WINDOW;
+use fixtures::pair::PairScan;
 use ndarray::{Array2, ArrayView2};
 use wakescope_estimate::vortex_fit::{
-    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, SignalFit, SignalFitOptions, Starts, VelocityMap, Wake,
-    fit_map_of_estimator, fit_signals,
+    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, SignalFit, SignalFitOptions, Starts,
+    VelocityMap, Wake, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
-    Correlogram, Error, Noise, Refinement, SignalKind, SpectralPeak, WindowModel, likelihood_tapers,
+    Correlogram, Error, Refinement, SignalKind, SpectralPeak,
+    bound::{Noise, WindowModel},
+    estimators::likelihood_tapers,
 };
 
 /// Radius of the regions of the maps \[m\].
@@ -34,8 +36,12 @@ impl<'a> FitTrial<'a> {
         Ok(Self { pair, records, tapered, peak, velocities })
     }
 
-    /// The fit of the map, without prior knowledge.
-    pub(crate) fn map(&self, free: FreeParameters) -> Result<Result<MapFit, Error>, Failure> {
+    /// The fit of the map, with nothing known but what typical cores are.
+    pub(crate) fn map(
+        &self,
+        free: FreeParameters,
+        core_prior: Option<CorePrior>,
+    ) -> Result<Result<MapFit, Error>, Failure> {
         let (pair, setup) = (self.pair, self.pair.setup()?);
         let map = VelocityMap {
             elevation_rad: &pair.elevation_rad,
@@ -45,7 +51,7 @@ impl<'a> FitTrial<'a> {
         };
         let noise = (setup.noise, pair.snr);
         let shown = EstimatorResponse::new(&self.tapered, &self.peak, &setup.sampling, &setup.pulse, noise, RADIUS_M)?;
-        let options = MapFitOptions { free, ..Default::default() };
+        let options = MapFitOptions { free, core_prior, ..Default::default() };
         Ok(fit_map_of_estimator(&map, &setup.wake, &shown, &options))
     }
 

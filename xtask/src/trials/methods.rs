@@ -1,17 +1,18 @@
 //! Every estimator of the crate as it is tried on windows of 64 real samples: its name, its statistic, its settings.
 
-use super::sampling;
 use crate::Failure;
+use fixtures::{WINDOW, sampling};
 use std::sync::Arc;
 use wakescope_estimate::{
-    AutoregressivePeak, AutoregressivePole, CaponPeak, Correlogram, Estimator, FirstMoment, GradientLikelihood,
-    GradientModel, LagWindowPeak, Noise, OrderChoice, PulsePair, Refinement, SignalKind, SpectralPeak, Statistic,
-    Unbiased, Weighting, WindowModel, likelihood_tapers,
+    Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Statistic, Weighting,
+    bound::{GradientModel, Noise, WindowModel},
+    estimators::{
+        AutoregressivePeak, AutoregressivePole, CaponPeak, FirstMoment, GradientLikelihood, LagWindowPeak, PulsePair,
+        Unbiased, likelihood_tapers,
+    },
+    models::OrderChoice,
 };
 use wakescope_signal::NoiseModel;
-
-/// Samples of a window.
-pub(crate) const WINDOW: usize = 64;
 
 /// Gradients \[1/s\] among which velocity and gradient are sought together.
 pub(crate) const GRADIENTS_PER_S: [f64; 5] = [-0.4, -0.2, 0.0, 0.2, 0.4];

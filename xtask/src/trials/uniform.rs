@@ -4,11 +4,11 @@
 //! one window of 64 samples per pulse. All estimators see the same windows. The generator is keyed by trial and pulse, so the
 //! errors do not depend on the number of threads.
 
-use super::methods::{Known, Methods, WINDOW};
-use super::{ENERGY_J, receiver, sampling};
+use super::methods::{Known, Methods};
 use crate::Failure;
+use fixtures::{ENERGY_J, WINDOW, receiver, sampling};
 use rayon::prelude::*;
-use wakescope_estimate::{Autoregression, SPEED_OF_LIGHT_M_S, Scratch};
+use wakescope_estimate::{Scratch, models::Autoregression, window::SPEED_OF_LIGHT_M_S};
 use wakescope_signal::{
     GaussianPulse, LineOfSight, NoiseModel, PulseDuration, PulseKey, Record, Simulator, pulse_generator,
 };

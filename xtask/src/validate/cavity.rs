@@ -1,7 +1,10 @@
 //! The lid-driven cavity at Re 1000 against Ghia, Ghia and Shin (1982) and Botella and Peyret (1998).
 
-use super::{Check, Profile, Shown, numbers, parabola_vertex};
+use super::shown::Shown;
 use crate::Failure;
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::references::{numbers, parabola_vertex};
 use wakescope_les::cases;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -26,8 +29,8 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
     let (u_min, v_max, v_min) = (extremum(&column, -1.0), extremum(&row, 1.0), extremum(&row, -1.0));
     let mut checks = Vec::new();
     for (name, found, expected) in [("least u", u_min, U_MIN), ("largest v", v_max, V_MAX), ("least v", v_min, V_MIN)] {
-        checks.push(Check::relative(name, found.1, expected.1, share));
-        checks.push(Check::relative(&format!("place of the {name}"), found.0, expected.0, 2.0 * share));
+        checks.push(Claim::relative(name, found.1, expected.1, share));
+        checks.push(Claim::relative(&format!("place of the {name}"), found.0, expected.0, 2.0 * share));
     }
     let stored = numbers("ghia_cavity_u.csv")?;
     let ghia: Vec<(f64, f64)> = stored.iter().map(|r| (r[0], r[3])).collect();

@@ -1,7 +1,11 @@
 //! Turbulent channel flow at Re_tau 178 against Moser, Kim and Mansour (1999): the longest of the cases.
 
-use super::{Check, Profile, Shown, interpolate, numbers};
+use super::shown::Shown;
 use crate::Failure;
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::references::numbers;
+use wakescope_les::decay::value_at;
 use wakescope_les::{SubgridModel, cases};
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -34,8 +38,8 @@ pub(super) fn show(_: Profile) -> Result<Shown, Failure> {
     let at = |k: usize| 0.5 * (mean[k] + mean[cells[2] - 1 - k]) / samples;
     let profile: Vec<(f64, f64)> = (0..half).map(|k| ((1.0 + z_m[k]) * REYNOLDS_TAU, at(k))).collect();
     let stored: Vec<(f64, f64)> = numbers("channel_retau180_mean.csv")?.iter().map(|r| (r[0], r[1])).collect();
-    let worst = stored.iter().map(|p| (interpolate(&profile, p.0) / p.1 - 1.0).abs()).fold(0.0, f64::max);
-    let checks = vec![Check::at_most("largest error of the mean velocity, relative", worst, 0.05)];
+    let worst = stored.iter().map(|p| (value_at(&profile, p.0) / p.1 - 1.0).abs()).fold(0.0, f64::max);
+    let checks = vec![Claim::at_most("largest error of the mean velocity, relative", worst, 0.05)];
     let table = Table::new()
         .float("z_plus", profile.iter().map(|p| p.0))
         .float("mean_velocity_plus", profile.iter().map(|p| p.1));

@@ -1,7 +1,10 @@
 //! A dipole against a wall: enstrophy in time against Clercx and Bruneau (2006) and a spectral code, vorticity at the wall.
 
-use super::{Check, Profile, Shown, numbers, parabola_vertex};
+use super::shown::Shown;
 use crate::Failure;
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::references::{numbers, parabola_vertex};
 use crate::workspace::read;
 use wakescope_les::cases;
 use wakescope_sim::export::Table;
@@ -41,10 +44,10 @@ fn show(reynolds: f64, profile: Profile) -> Result<Shown, Failure> {
     let share = if profile == Profile::Quick { 0.1 } else { 0.01 };
     let peak = |i: usize| peaks.get(i).copied().unwrap_or((f64::NAN, f64::NAN));
     let checks = vec![
-        Check::relative("time of the first maximum [s]", peak(0).0, first.0, 0.5 * share),
-        Check::relative("first maximum of the enstrophy", peak(0).1, first.1, share),
-        Check::relative("time of the second maximum [s]", peak(1).0, second.0, 0.5 * share),
-        Check::relative("second maximum of the enstrophy", peak(1).1, second.1, share),
+        Claim::relative("time of the first maximum [s]", peak(0).0, first.0, 0.5 * share),
+        Claim::relative("first maximum of the enstrophy", peak(0).1, first.1, share),
+        Claim::relative("time of the second maximum [s]", peak(1).0, second.0, 0.5 * share),
+        Claim::relative("second maximum of the enstrophy", peak(1).1, second.1, share),
     ];
     let table = Table::new()
         .float("time_s", history.iter().map(|p| p.0))

@@ -1,7 +1,9 @@
 //! Order of the scheme: plane vortices on meshes stretched both ways, and a layer between walls.
 
-use super::{Check, Profile, Shown};
+use super::shown::Shown;
 use crate::Failure;
+use crate::claim::Claim;
+use crate::profile::Profile;
 use wakescope_les::TimeScheme;
 use wakescope_les::cases;
 use wakescope_sim::export::Table;
@@ -18,8 +20,8 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
         (points[last - 1].1 / points[last].1).log2()
     };
     let checks = vec![
-        Check::at_least("order inside, both directions stretched", order(&inside), 3.9),
-        Check::at_least("order between no-slip walls", order(&walls), 2.8),
+        Claim::at_least("order inside, both directions stretched", order(&inside), 3.9),
+        Claim::at_least("order between no-slip walls", order(&walls), 2.8),
     ];
     let table = Table::new()
         .float("cells", inside.iter().map(|p| p.0))

@@ -1,8 +1,11 @@
 //! The plane vortex pair above ground at Re 2500 against a spectral code; over a frictionless ground against the hyperbola.
 
-use super::wake::{run, run_with, worst};
-use super::{Check, Profile, Shown, numbers};
+use super::shown::Shown;
+use super::wake::history::{run, run_with, worst};
 use crate::Failure;
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::references::numbers;
 use std::f64::consts::TAU;
 use wakescope_les::cases::VortexPairCase;
 use wakescope_les::{CirculationProfile, WakeScales};
@@ -38,15 +41,15 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
     let asymmetry = flow.records.iter().map(|r| (r.left.y_m + r.right.y_m).abs()).fold(0.0, f64::max);
     let wide = if profile == Profile::Quick { 4.0 } else { 1.0 };
     let checks = vec![
-        Check::at_most("largest error of the path, b0", off, 0.01 * wide),
-        Check::at_most("largest error of Gamma(0.1..0.3), relative", worst(&gamma, &column(4), range, relative), 0.02),
-        Check::at_most("largest error of the energy, relative", worst(&energy, &column(6), range, relative), 0.005),
-        Check::at_most(
+        Claim::at_most("largest error of the path, b0", off, 0.01 * wide),
+        Claim::at_most("largest error of Gamma(0.1..0.3), relative", worst(&gamma, &column(4), range, relative), 0.02),
+        Claim::at_most("largest error of the energy, relative", worst(&energy, &column(6), range, relative), 0.005),
+        Claim::at_most(
             "largest error of the enstrophy, relative",
             worst(&enstrophy, &column(5), range, relative),
             0.02,
         ),
-        Check::at_most("left against right, y", asymmetry, 1e-9),
+        Claim::at_most("left against right, y", asymmetry, 1e-9),
     ];
     let table = Table::new()
         .float("tau", y.iter().map(|p| p.0))
@@ -94,9 +97,9 @@ pub(super) fn show_hyperbola(profile: Profile) -> Result<Shown, Failure> {
     let energy = flow.curve(|r| r.energy_m4_s2);
     let lost = 1.0 - energy[energy.len() - 1].1 / energy[0].1;
     let checks = vec![
-        Check::at_most("largest error of y to tau = 4, b0", off[0], 0.01),
-        Check::at_most("largest error of z to tau = 4, b0", off[1], 0.01),
-        Check::at_most("energy lost, relative", lost.abs(), 1e-3),
+        Claim::at_most("largest error of y to tau = 4, b0", off[0], 0.01),
+        Claim::at_most("largest error of z to tau = 4, b0", off[1], 0.01),
+        Claim::at_most("energy lost, relative", lost.abs(), 1e-3),
     ];
     let table = Table::new()
         .float("tau", y.iter().map(|p| p.0))

@@ -1,8 +1,12 @@
 //! The vortices of Taylor and Green at Re 1600: direct simulation against a stored one, and the subgrid models.
 
-use super::{Check, Profile, Shown, interpolate, numbers};
+use super::shown::Shown;
 use crate::Failure;
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::references::numbers;
 use std::f64::consts::PI;
+use wakescope_les::decay::value_at;
 use wakescope_les::{SubgridModel, cases};
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -41,19 +45,19 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
     }
     let bar = if profile == Profile::Quick { 0.1 } else { 0.02 };
     let mut checks = vec![
-        Check::at_most(&format!("{fine}^3, no model: rms error over peak"), errors[0], bar),
-        Check::at_most(&format!("{fine}^3, multiscale: rms error over peak"), errors[1], bar),
+        Claim::at_most(&format!("{fine}^3, no model: rms error over peak"), errors[0], bar),
+        Claim::at_most(&format!("{fine}^3, multiscale: rms error over peak"), errors[1], bar),
     ];
     for (i, (name, _)) in MODELS.iter().enumerate().skip(1) {
-        checks.push(Check::at_most(&format!("{coarse}^3: {name} against no model"), errors[2 + i], errors[2]));
+        checks.push(Claim::at_most(&format!("{coarse}^3: {name} against no model"), errors[2 + i], errors[2]));
     }
-    checks.push(Check::at_most(&format!("{coarse}^3: multiscale against WALE 0.5"), errors[5], errors[3]));
-    checks.push(Check::at_most(&format!("{coarse}^3: multiscale against WALE 0.325"), errors[5], errors[4]));
+    checks.push(Claim::at_most(&format!("{coarse}^3: multiscale against WALE 0.5"), errors[5], errors[3]));
+    checks.push(Claim::at_most(&format!("{coarse}^3: multiscale against WALE 0.325"), errors[5], errors[4]));
     Ok(Shown { checks, table, figure: Figure::stacked([plot]) })
 }
 
 fn error(curve: &[(f64, f64)], stored: &[(f64, f64)], peak: f64) -> f64 {
-    let squares: f64 = curve.iter().map(|p| (p.1 - interpolate(stored, p.0)).powi(2)).sum();
+    let squares: f64 = curve.iter().map(|p| (p.1 - value_at(stored, p.0)).powi(2)).sum();
     (squares / curve.len() as f64).sqrt() / peak
 }
 

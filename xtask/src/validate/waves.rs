@@ -1,10 +1,14 @@
 //! Growth of Tollmien-Schlichting waves at Re 7500, alpha 1, against linear theory.
 
-use super::{Check, Profile, Shown, numbers};
+use super::shown::Shown;
 use crate::Failure;
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::references::numbers;
 use std::f64::consts::TAU;
 use wakescope_les::Flow;
 use wakescope_les::cases::TollmienSchlichting;
+use wakescope_les::decay::value_at;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
@@ -16,7 +20,7 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
     let stored = numbers("orr_sommerfeld.csv")?;
     let expected = stored.first().and_then(|row| row.get(3)).copied().unwrap_or(f64::NAN);
     let coarse = amplitudes([64, 128], 0.01)?;
-    let mut checks = vec![Check::relative("growth rate on 64 x 128 [1/s]", rate(&coarse), expected, 0.01)];
+    let mut checks = vec![Claim::relative("growth rate on 64 x 128 [1/s]", rate(&coarse), expected, 0.01)];
     let mut plot = CurvePlot::new("Amplitude of the wave", Axis::linear("time [s]"), Axis::linear("ln a/a(5 s)"))
         .with(Series::new("linear theory", Style::Line, [(FROM_S, 0.0), (TO_S, expected * (TO_S - FROM_S))]))
         .with(Series::new("64 x 128", Style::Markers, coarse.iter().copied().step_by(10)));
@@ -24,9 +28,9 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
         Table::new().float("time_s", coarse.iter().map(|p| p.0)).float("log_amplitude_64", coarse.iter().map(|p| p.1));
     if profile != Profile::Quick {
         let fine = amplitudes([128, 256], 0.005)?;
-        checks.push(Check::relative("growth rate on 128 x 256 [1/s]", rate(&fine), expected, 0.002));
+        checks.push(Claim::relative("growth rate on 128 x 256 [1/s]", rate(&fine), expected, 0.002));
         let every: Vec<(f64, f64)> = fine.into_iter().skip(1).step_by(2).collect();
-        table = table.float("log_amplitude_128", coarse.iter().map(|p| super::interpolate(&every, p.0)));
+        table = table.float("log_amplitude_128", coarse.iter().map(|p| value_at(&every, p.0)));
         plot = plot.with(Series::new("128 x 256", Style::Dash, every));
     }
     Ok(Shown { checks, table, figure: Figure::stacked([plot]) })

@@ -6,14 +6,15 @@
 
 use super::{Row, measured};
 use crate::Failure;
-use crate::trials::methods::{Known, Methods, WINDOW};
-use crate::trials::mixture::mixture;
-use crate::trials::pair::PairScan;
-use crate::trials::sampling;
+use crate::trials::methods::{Known, Methods};
 use crate::trials::uniform::{Air, BAND_M_S};
+use fixtures::pair::PairScan;
+use fixtures::{WINDOW, sampling};
 use wakescope_estimate::{
-    AutoregressivePeak, CaponPeak, Correlogram, Estimator, FirstMoment, GradientLikelihood, GradientModel,
-    LagWindowPeak, Noise, Refinement, Scratch, SignalKind, SpectralPeak, Statistic, Weighting, WindowModel,
+    Correlogram, Estimator, Refinement, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
+    bound::{GradientModel, Noise, WindowModel},
+    estimators::{AutoregressivePeak, CaponPeak, FirstMoment, GradientLikelihood, LagWindowPeak},
+    map::good_and_bad,
 };
 use wakescope_signal::NoiseModel;
 
@@ -87,7 +88,7 @@ impl Uniform {
             }
             Ok(errors)
         })?;
-        let found = mixture(&errors, BAND_M_S);
+        let found = good_and_bad(&errors, BAND_M_S);
         let failed = found.bad_fraction > 0.2;
         Ok(Row {
             case: self.case,

@@ -4,7 +4,7 @@
 
 use super::{Row, measured};
 use crate::Failure;
-use crate::trials::{ENERGY_J, receiver};
+use fixtures::{ENERGY_J, receiver};
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::{
     GaussianPulse, LineOfSight, NoiseModel, PulseDuration, PulseKey, Record, SPEED_OF_LIGHT_M_S, Scratch, Simulator,

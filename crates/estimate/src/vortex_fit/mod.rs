@@ -1,15 +1,11 @@
 //! Circulation, position and core of a wake's two vortices, from a map of radial velocities or from all raw signals.
 //!
-//! | file | content |
+//! | module | content |
 //! |---|---|
-//! | `wake`, `free` | the vortex pair with its images and the wind, derivatives; which parameters a fit may change |
-//! | `range_kernel`, `wake_map` | what a range gate and a region see of it in the mean |
-//! | `estimator_response`, `tangent` | what an estimator makes of its spectra: the map of very many pulses, and that of wakes near by |
-//! | `guess`, `map_fit`, `map_problem` | fit to a map: search for the best pair, then robust least squares |
-//! | `estimator_fit`, `map_starts`, `residual_covariance` | the same for the map of an estimator; several starts; correlated residuals |
-//! | `baseband`, `pulse`, `scan_model` | raw signals at the rate of the detector band; lines cut into layers |
-//! | `line`, `band`, `likelihood` | covariance of a line, its factor and derivatives; likelihood and Fisher information |
-//! | `signal_fit`, `ascent`, `tops`, `small` | fit to all raw signals, the tops of its likelihood; the damped Newton iteration of both fits |
+//! | `wake` | `pair`: the vortices with their images and the wind, derivatives; `free_parameters`: which a fit may change; `core_prior`: what is known of cores; `range_kernel`, `wake_map`: what a range gate and a region see in the mean; `pulse` |
+//! | `map_fit` | `data`: the map; `guess`: search for the best pair; `means`, `problem`: robust least squares; `starts`; `residual_covariance`: correlated residuals; `estimator_response`, `tangent`, `estimates`: the same for what an estimator makes of the spectra |
+//! | `signal_fit` | `baseband`, `scan_model`: signals at the rate of the detector band, lines cut into layers; `line_covariance`, `banded_cholesky`, `likelihood`: covariance of a line, its factor and derivatives, Fisher information; `fit`, `ascent`, `tops`: the fit and the tops of its likelihood |
+//! | `damped_newton` | the iteration of Levenberg and Marquardt that both fits share |
 //!
 //! A map is fitted first, without prior knowledge ([`fit_map_of_estimator`]; [`fit_map`] if its velocities are means
 //! over gates); its outcome starts the fit of the signals ([`fit_signals`]). The bound on any unbiased fit of the
@@ -34,38 +30,23 @@
 //! To measure again: `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
 //! (signals) or `circulation_from_many_maps` (maps).
 
-mod ascent;
-mod band;
-mod baseband;
-mod estimator_fit;
-mod estimator_response;
-mod free;
-mod guess;
-mod likelihood;
-mod line;
+mod damped_newton;
 mod map_fit;
-mod map_problem;
-mod map_starts;
-mod pulse;
-mod range_kernel;
-mod residual_covariance;
-mod scan_model;
 mod signal_fit;
-mod small;
-mod tangent;
-mod tops;
 mod wake;
-mod wake_map;
 
-pub use baseband::Baseband;
-pub use estimator_fit::{fit_map_of_estimator, refine_map_fit_of_estimator};
-pub use estimator_response::EstimatorResponse;
-pub use free::{FreeParameters, Sharing, WindFit};
-pub use likelihood::{LikelihoodValue, Powers, ScanSignals};
-pub use map_fit::{Loss, MapFit, MapFitOptions, MapTop, VelocityMap, fit_map, refine_map_fit};
-pub use pulse::PulseShape;
-pub use range_kernel::RangeKernel;
-pub use scan_model::{ScanModel, ScanSetup};
-pub use signal_fit::{SignalFit, SignalFitOptions, Starts, fit_signals};
-pub use tops::LikelihoodTop;
-pub use wake::{CoreProfile, PARAMETERS, Parameter, Vortex, Wake, WakeModel};
+pub use map_fit::data::{Loss, MapFit, MapFitOptions, MapTop, VelocityMap};
+pub use map_fit::estimates::{fit_map_of_estimator, refine_map_fit_of_estimator};
+pub use map_fit::estimator_response::EstimatorResponse;
+pub use map_fit::means::{fit_map, refine_map_fit};
+pub use signal_fit::baseband::Baseband;
+pub use signal_fit::fit::{SignalFit, fit_signals};
+pub use signal_fit::likelihood::{LikelihoodValue, Powers, ScanSignals};
+pub use signal_fit::options::{SignalFitOptions, Starts};
+pub use signal_fit::scan_model::{ScanModel, ScanSetup};
+pub use signal_fit::tops::LikelihoodTop;
+pub use wake::core_prior::CorePrior;
+pub use wake::free_parameters::{FreeParameters, Sharing, WindFit};
+pub use wake::pair::{CoreProfile, PARAMETERS, Parameter, Vortex, Wake, WakeModel};
+pub use wake::pulse::PulseShape;
+pub use wake::range_kernel::RangeKernel;

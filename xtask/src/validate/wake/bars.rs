@@ -1,11 +1,14 @@
 //! The pair in space against the independent code, row by row: coarse and medium mesh, without and with the multiscale model.
 
-use super::{History, PER_TAU, Stored, growth, onset, run, worst};
+use super::history::{History, PER_TAU, Stored, run, worst};
 use crate::Failure;
-use crate::validate::{Check, Profile, Shown, interpolate};
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::validate::shown::Shown;
 use std::path::Path;
 use wakescope_les::SubgridModel;
 use wakescope_les::cases::VortexPairCase;
+use wakescope_les::decay::{amplitude_growth, onset, value_at};
 use wakescope_sim::export::Table;
 use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -105,13 +108,13 @@ fn show(pair: VortexPairCase, bars: &Bars, model: Option<VortexPairCase>) -> Res
         let modelled = run(&model, LAMINAR)?;
         checks.extend(laminar("multiscale: ", &modelled, &stored, bars));
         let apart = |right| worst(&modelled.gamma(right), &flow.gamma(right), [0.0, LAMINAR], |a, b| (a - b).abs());
-        checks.push(Check::at_most("multiscale: Gamma against no model", apart(false).max(apart(true)), 0.005));
+        checks.push(Claim::at_most("multiscale: Gamma against no model", apart(false).max(apart(true)), 0.005));
     }
     let figure = figure(&flow, &plane, &stored);
     Ok(Shown { checks, table: table(&flow), figure })
 }
 
-fn laminar(name: &str, flow: &History, stored: &Stored, bars: &Bars) -> Vec<Check> {
+fn laminar(name: &str, flow: &History, stored: &Stored, bars: &Bars) -> Vec<Claim> {
     let apart = |measured: &[(f64, f64)], column: usize, to: f64| {
         worst(measured, &stored.curve(column), [0.0, to], |a, b| (a - b).abs())
     };
@@ -127,7 +130,7 @@ fn laminar(name: &str, flow: &History, stored: &Stored, bars: &Bars) -> Vec<Chec
     });
     let waves = flow.curve(|r| r.energy_3d_m4_s2());
     let logarithm = worst(&waves, &stored.curve(Stored::ENERGY_3D), [0.5, LAMINAR], |a, b| (a / b).ln().abs());
-    let check = |what: &str, measured: f64, bar: f64| Check::at_most(&format!("{name}{what}"), measured, bar);
+    let check = |what: &str, measured: f64, bar: f64| Claim::at_most(&format!("{name}{what}"), measured, bar);
     let mut checks = vec![
         check("y, z to 2", position.into_iter().fold(0.0, f64::max), bars.position),
         check("Gamma ratio to 2.2", gamma[0].max(gamma[1]), bars.gamma),
@@ -137,45 +140,44 @@ fn laminar(name: &str, flow: &History, stored: &Stored, bars: &Bars) -> Vec<Chec
         check("ln E_3d, 0.5 to 2.2", logarithm, bars.log_energy_3d),
     ];
     for (mode, column) in [(2, Stored::MODE_2), (3, Stored::MODE_3)] {
-        let measured = growth(&flow.curve(|r| r.mode_energy_m4_s2[mode]), 1.0, 2.0);
-        let reference = growth(&stored.curve(column), 1.0, 2.0);
-        checks.push(Check::relative(&format!("{name}growth of mode {mode}, 1 to 2"), measured, reference, bars.growth));
+        let measured = amplitude_growth(&flow.curve(|r| r.mode_energy_m4_s2[mode]), 1.0, 2.0);
+        let reference = amplitude_growth(&stored.curve(column), 1.0, 2.0);
+        checks.push(Claim::relative(&format!("{name}growth of mode {mode}, 1 to 2"), measured, reference, bars.growth));
     }
     checks
 }
 
-fn turbulent(flow: &History, plane: &History, stored: &Stored, bars: &Bars) -> Vec<Check> {
+fn turbulent(flow: &History, plane: &History, stored: &Stored, bars: &Bars) -> Vec<Claim> {
     let mean_onset = |curves: [Vec<(f64, f64)>; 2]| {
         let [a, b] = curves.map(|curve| onset(&curve).unwrap_or(f64::NAN));
         0.5 * (a + b)
     };
-    let within = |what: &str, measured, reference, bar| Check {
-        quantity: what.into(),
-        measured,
-        reference,
-        bar: crate::validate::Bar::Within(bar),
-    };
-    let mut checks = vec![within(
+    let mut checks = vec![Claim::within(
         "onset of the fast decay",
         mean_onset([flow.gamma(false), flow.gamma(true)]),
         mean_onset(Stored::GAMMA.map(|column| stored.curve(column))),
         bars.onset,
     )];
     for (tau, reference, bar) in bars.late {
-        checks.push(within(&format!("Gamma ratio at {tau}"), flow.mean_gamma(tau), reference, bar));
+        checks.push(Claim::within(&format!("Gamma ratio at {tau}"), flow.mean_gamma(tau), reference, bar));
     }
     let (ratio, ratio_bar) = bars.ratio_to_plane;
-    checks.push(within("3-D over 2-D Gamma at 5", flow.mean_gamma(END) / plane.mean_gamma(END), ratio, ratio_bar));
+    checks.push(Claim::within(
+        "3-D over 2-D Gamma at 5",
+        flow.mean_gamma(END) / plane.mean_gamma(END),
+        ratio,
+        ratio_bar,
+    ));
     let energy = flow.curve(|r| r.energy_m4_s2);
-    checks.push(within("energy at 5", interpolate(&energy, END), bars.last_energy.0, bars.last_energy.1));
+    checks.push(Claim::within("energy at 5", value_at(&energy, END), bars.last_energy.0, bars.last_energy.1));
     let enstrophy = flow.curve(|r| r.enstrophy_m2_s2);
     let late = enstrophy.iter().filter(|p| p.0 > LAMINAR);
     let peak = late.fold((0.0, 0.0), |best, p| if p.1 > best.1 { *p } else { best });
     let middle = |[low, high]: [f64; 2]| (0.5 * (low + high), 0.5 * (high - low));
     let (value, value_bar) = middle(bars.peak);
     let (tau, tau_bar) = middle(bars.peak_tau);
-    checks.push(within("second enstrophy peak", peak.1, value, value_bar));
-    checks.push(within("its tau", peak.0, tau, tau_bar + 0.5 / PER_TAU as f64));
+    checks.push(Claim::within("second enstrophy peak", peak.1, value, value_bar));
+    checks.push(Claim::within("its tau", peak.0, tau, tau_bar + 0.5 / PER_TAU as f64));
     checks
 }
 

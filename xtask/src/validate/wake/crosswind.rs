@@ -1,12 +1,15 @@
 //! The pair in a cross wind: drift, and secondary vortices of different strength.
 
-use super::{History, run};
+use super::history::{History, run};
 use crate::Failure;
-use crate::validate::{Check, Profile, Shown, interpolate};
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::validate::shown::Shown;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use wakescope_les::WakeRecord;
 use wakescope_les::cases::VortexPairCase;
+use wakescope_les::decay::value_at;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
@@ -38,16 +41,16 @@ pub(crate) fn show(profile: Profile) -> Result<Shown, Failure> {
         flow.curve(|r| if right { r.right.secondary.gamma_m2_s } else { r.left.secondary.gamma_m2_s } / TAU)
     };
     let middle = |r: &WakeRecord| 0.5 * (r.left.y_m + r.right.y_m);
-    let strength = |flow: &History, right: bool| interpolate(&second(flow, right), COMPARED).abs();
+    let strength = |flow: &History, right: bool| value_at(&second(flow, right), COMPARED).abs();
     let unequal = |flow: &History| strength(flow, false) / strength(flow, true);
-    let drift = |flow: &History| interpolate(&flow.curve(middle), COMPARED);
+    let drift = |flow: &History| value_at(&flow.curve(middle), COMPARED);
     let (still, windy) = (&runs[0].1, &runs[2].1);
     let checks = vec![
-        Check::at_most("no wind: drift to 1.5", drift(still).abs(), 1e-3),
-        Check::relative("no wind: left over right secondary", unequal(still), 1.0, 0.01),
-        Check::at_least("wind V0: drift to 1.5", drift(windy), 0.8),
-        Check::at_least("wind V0: drift twice that of V0/2, share", drift(windy) / drift(&runs[1].1), 1.8),
-        Check::at_least("wind V0: stronger over weaker secondary", unequal(windy).max(1.0 / unequal(windy)), 1.1),
+        Claim::at_most("no wind: drift to 1.5", drift(still).abs(), 1e-3),
+        Claim::relative("no wind: left over right secondary", unequal(still), 1.0, 0.01),
+        Claim::at_least("wind V0: drift to 1.5", drift(windy), 0.8),
+        Claim::at_least("wind V0: drift twice that of V0/2, share", drift(windy) / drift(&runs[1].1), 1.8),
+        Claim::at_least("wind V0: stronger over weaker secondary", unequal(windy).max(1.0 / unequal(windy)), 1.1),
     ];
     let mut table = Table::new().float("tau", still.records.iter().map(|r| r.time_s));
     let mut drifts = CurvePlot::new("Middle of the pair", Axis::linear("tau"), Axis::linear("y / b0"));

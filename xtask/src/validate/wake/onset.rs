@@ -1,10 +1,13 @@
 //! When the fast decay begins: against the level of the noise and the Reynolds number, on 16 x 96 x 64 cells.
 
-use super::{History, onset, run};
+use super::history::{History, run};
 use crate::Failure;
-use crate::validate::{Check, Profile, Shown};
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::validate::shown::Shown;
 use rayon::prelude::*;
 use wakescope_les::cases::VortexPairCase;
+use wakescope_les::decay::onset;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
@@ -38,13 +41,9 @@ pub(crate) fn show(profile: Profile) -> Result<Shown, Failure> {
         let place = runs.iter().position(|(l, r, _)| *l == level && *r == re);
         place.map_or(f64::NAN, |i| 0.5 * (times[i][0] + times[i][1]))
     };
-    let checks = vec![Check {
-        quantity: "onset, noise 1e-3 after 1e-2".into(),
-        measured: mean(1e-3, 5000.0) - mean(1e-2, 5000.0),
-        // The independent code: 0.7 per decade.
-        reference: 0.7,
-        bar: crate::validate::Bar::Within(0.25),
-    }];
+    // The independent code: 0.7 per decade.
+    let later = mean(1e-3, 5000.0) - mean(1e-2, 5000.0);
+    let checks = vec![Claim::within("onset, noise 1e-3 after 1e-2", later, 0.7, 0.25)];
     let table = Table::new()
         .float("noise_rms", runs.iter().map(|r| r.0))
         .float("reynolds", runs.iter().map(|r| r.1))

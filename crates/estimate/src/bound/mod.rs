@@ -1,0 +1,7 @@
+//! The Cramer-Rao bound: covariances of windows and the information in them.
+
+pub(crate) mod gradient;
+pub(crate) mod window_model;
+
+pub use gradient::{GradientBound, GradientModel};
+pub use window_model::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s, information_complex, information_real};

@@ -1,0 +1,28 @@
+//! From an accumulated correlogram to a velocity with width, SNR and flags; the traits for estimators of one's own.
+
+pub(crate) mod correlogram_estimators;
+pub(crate) mod detection;
+pub(crate) mod first_moment;
+pub(crate) mod gamma_functions;
+pub(crate) mod gradient_likelihood;
+pub(crate) mod gradient_tapers;
+pub(crate) mod likelihood;
+pub(crate) mod model_peaks;
+pub(crate) mod peak;
+pub(crate) mod periodogram;
+pub(crate) mod search;
+pub(crate) mod statistic;
+pub(crate) mod unbiased;
+pub(crate) mod velocity;
+
+pub use correlogram_estimators::{LagWindowPeak, PulsePair};
+pub use detection::NoiseTest;
+pub use first_moment::FirstMoment;
+pub use gradient_likelihood::{GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity};
+pub use likelihood::likelihood_tapers;
+pub use model_peaks::{AutoregressivePeak, AutoregressivePole, CaponPeak, model_lag_weights};
+pub use peak::SpectralPeak;
+pub use periodogram::{Periodogram, PeriodogramOptions, PeriodogramPlan};
+pub use statistic::{Estimator, Statistic, estimate_window};
+pub use unbiased::{Unbiased, unbiased_correlogram};
+pub use velocity::{GateVelocity, Quality, Refinement, RunnerUp};

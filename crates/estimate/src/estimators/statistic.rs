@@ -1,0 +1,81 @@
+//! The two traits that an estimator is made of, so that others can plug in their own.
+//!
+//! A [`Statistic`] turns a window into numbers whose mean over windows makes sense; an
+//! [`Estimator`] turns such a mean into a velocity. Accumulation stands between the two and knows neither.
+//! Check: the mean over a region equals the mean of the statistics of its windows.
+
+use crate::error::{Error, length};
+use crate::estimators::{GateVelocity, Quality};
+use crate::window::{MissingSamples, Sample, Scratch};
+
+/// Numbers drawn from one window, to be averaged over windows: I_k of Table 3.
+pub trait Statistic<S: Sample>: Sync {
+    /// Samples of one window.
+    fn window_samples(&self) -> usize;
+    /// How many numbers one window gives.
+    fn statistic_len(&self) -> usize;
+    /// Writes the numbers of `window` into `out`.
+    ///
+    /// The caller passes exactly [`Statistic::window_samples`] finite samples, scaled to order one,
+    /// and [`Statistic::statistic_len`] places. The result must be quadratic in the samples.
+    fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]);
+
+    /// Hands the numbers of all valid windows of a record, `step_samples` apart, to `each` with the index of the window.
+    ///
+    /// `valid` says which windows are to be used: those without a missing sample, which may be anything. The form given here calls
+    /// [`Statistic::evaluate`] for every window; a statistic that can go on from the window before replaces it.
+    fn evaluate_record(
+        &self,
+        record: &[S],
+        step_samples: usize,
+        valid: &dyn Fn(usize) -> bool,
+        scratch: &mut Scratch,
+        each: &mut dyn FnMut(usize, &[f64]),
+    ) {
+        let mut one = vec![0.0; self.statistic_len()];
+        for (gate, window) in record.windows(self.window_samples()).step_by(step_samples).enumerate() {
+            if valid(gate) {
+                self.evaluate(window, scratch, &mut one);
+                each(gate, &one);
+            }
+        }
+    }
+}
+
+/// Velocity from the mean of a [`Statistic`].
+pub trait Estimator: Sync {
+    /// How many numbers the mean has.
+    fn statistic_len(&self) -> usize;
+    /// The velocity for the mean statistic `mean`.
+    ///
+    /// The samples behind `mean` were scaled by a power of two, so nothing but `power` and `detection` may depend on
+    /// their scale; the caller scales these back.
+    fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity;
+}
+
+/// Velocity of a single window, without accumulation; [`Quality::Invalid`] if it holds a missing sample
+/// ([`MissingSamples::default`]).
+///
+/// # Errors
+/// [`Error::Length`] if the window has the wrong length or statistic and estimator do not match.
+pub fn estimate_window<S: Sample>(
+    statistic: &impl Statistic<S>,
+    estimator: &impl Estimator,
+    window: &[S],
+    scratch: &mut Scratch,
+) -> Result<GateVelocity, Error> {
+    length("window", statistic.window_samples(), window.len())?;
+    length("statistic", estimator.statistic_len(), statistic.statistic_len())?;
+    let missing = MissingSamples::default();
+    let rule = missing.rule(window.iter().copied());
+    if !window.iter().all(|sample| rule.is_measured(*sample)) {
+        return Ok(GateVelocity::none(Quality::Invalid));
+    }
+    let scale = rule.binary_scale(window.iter().copied());
+    let scaled: Vec<S> = window.iter().map(|sample| sample.scaled(scale.recip())).collect();
+    let mut numbers = vec![0.0; statistic.statistic_len()];
+    statistic.evaluate(&scaled, scratch, &mut numbers);
+    let mut estimate = estimator.estimate(&numbers, scratch);
+    estimate.scale_power(scale * scale);
+    Ok(estimate)
+}

@@ -1,0 +1,68 @@
+//! The unbiased correlogram: the biased one over the weights that the window gives its lags.
+//!
+//! Computes r_m / w_m, w_m = 1 - m / N without weighting: its mean is the autocovariance of the signal. It is offered
+//! for comparison and for the pulse pair; CA takes the biased form. Dividing raises the last lags, which few products
+//! support, and the result need not be positive semi-definite: the noise of a band-limited receiver has next to no
+//! power outside its band, so that small errors there make the density negative, the reflection coefficients leave
+//! the unit circle and no model of order 16 exists ([`Quality::Invalid`](crate::estimators::Quality::Invalid)). Check: its mean
+//! over noise of known covariance; how often a model fails.
+
+use crate::error::{Error, length};
+use crate::estimators::{Estimator, GateVelocity};
+use crate::window::{Scratch, SignalKind};
+
+/// The unbiased correlogram that belongs to a biased one (both stored as [`SignalKind::lag_numbers`] says).
+///
+/// `lag_weights` are those of the window: [`Correlogram::lag_weights`](crate::Correlogram::lag_weights).
+///
+/// # Errors
+/// [`Error::Length`] unless there is one weight per lag, [`Error::OutOfRange`] for a weight that is 0 or not finite.
+pub fn unbiased_correlogram(biased: &[f64], kind: SignalKind, lag_weights: &[f64]) -> Result<Vec<f64>, Error> {
+    length("correlogram", kind.lag_numbers(lag_weights.len()), biased.len())?;
+    check_weights(lag_weights)?;
+    let per_lag = kind.lag_numbers(1);
+    Ok(biased.iter().enumerate().map(|(place, value)| value / lag_weights[place / per_lag]).collect())
+}
+
+fn check_weights(lag_weights: &[f64]) -> Result<(), Error> {
+    match lag_weights.iter().find(|weight| !weight.is_finite() || **weight == 0.0) {
+        Some(&value) => Err(Error::OutOfRange { field: "lag_weights", value, allowed: "finite and not 0" }),
+        None => Ok(()),
+    }
+}
+
+/// Any estimator, on the unbiased correlogram instead of the biased one that was accumulated.
+#[derive(Debug, Clone)]
+pub struct Unbiased<E> {
+    estimator: E,
+    kind: SignalKind,
+    gains: Vec<f64>,
+}
+
+impl<E: Estimator> Unbiased<E> {
+    /// Wraps an estimator of correlograms; `lag_weights` are those of the window, one per lag.
+    ///
+    /// # Errors
+    /// As [`unbiased_correlogram`].
+    pub fn new(estimator: E, kind: SignalKind, lag_weights: &[f64]) -> Result<Self, Error> {
+        length("lag_weights", estimator.statistic_len(), kind.lag_numbers(lag_weights.len()))?;
+        check_weights(lag_weights)?;
+        Ok(Self { estimator, kind, gains: lag_weights.iter().map(|weight| weight.recip()).collect() })
+    }
+}
+
+impl<E: Estimator> Estimator for Unbiased<E> {
+    fn statistic_len(&self) -> usize {
+        self.estimator.statistic_len()
+    }
+
+    fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
+        let per_lag = self.kind.lag_numbers(1);
+        let mut numbers = std::mem::take(&mut scratch.unbiased);
+        numbers.clear();
+        numbers.extend(mean.iter().enumerate().map(|(place, value)| value * self.gains[place / per_lag]));
+        let estimate = self.estimator.estimate(&numbers, scratch);
+        scratch.unbiased = numbers;
+        estimate
+    }
+}

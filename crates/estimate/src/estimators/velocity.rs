@@ -1,0 +1,125 @@
+//! Velocity of one gate with its width, SNR, quality and flag: what every estimator returns.
+//!
+//! Check: zero, constant and out-of-band signals are flagged, never silently 0 m/s; width and SNR of simulated wind
+//! (in the tests of the estimators).
+//!
+//! A velocity beyond the unambiguous interval folds before any estimator sees it:
+//! [`Sampling::folded_velocity_m_s`](crate::Sampling::folded_velocity_m_s) tells what it reads.
+
+/// What a velocity estimate is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Quality {
+    /// A peak inside the band.
+    Good,
+    /// Nothing in the band: zero power, or less than the sidelobes of a constant. Velocity is NaN.
+    NoSignal,
+    /// The peak sits on an edge of the band, or what the band holds can be sidelobes of a line
+    /// outside. The velocity is that of the highest density in the band and should not be used.
+    OutOfBand,
+    /// Samples or spectrum are not finite. Velocity is NaN.
+    Invalid,
+    /// No valid window in the region. Velocity is NaN.
+    Empty,
+}
+
+/// The second peak of a spectrum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunnerUp {
+    /// Radial velocity of the highest density beyond the valleys on both sides of the main peak \[m/s\].
+    pub velocity_m_s: f64,
+    /// Its density over that of the main peak, at most 1.
+    ///
+    /// An unweighted window alone has sidelobes of 0.047; two targets of like strength come near 1, and so does noise
+    /// without a signal.
+    pub relative_density: f64,
+}
+
+/// Velocity estimate of one gate or map point.
+///
+/// Estimators of one's own fill in what they know and take the rest from [`GateVelocity::none`]:
+/// `GateVelocity { velocity_m_s, flag: Quality::Good, ..GateVelocity::none(Quality::Good) }`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GateVelocity {
+    /// Radial velocity, positive away from the lidar \[m/s\]; NaN where `flag` says that there is none.
+    pub velocity_m_s: f64,
+    /// Mean power inside the detector band, signal and noise, in signal units squared.
+    ///
+    /// Linear in the statistic, so that its mean over windows is unbiased: over the power that the expected statistic of
+    /// noise gives, less one, it is the signal-to-noise ratio at any level.
+    /// Not in a unit of its own: it overflows to infinity or vanishes where the square of the samples does.
+    pub power: f64,
+    /// Density of the peak over the mean density in the band; 1 for a flat spectrum.
+    pub quality: f64,
+    /// Highest density in the band of a spectrum that is linear in the statistic, in signal units squared, for the test
+    /// against noise; NaN where unknown.
+    ///
+    /// It is the peak itself, but for models, which take that of their lags under a Hann window
+    /// ([`model_lag_weights`](crate::estimators::model_lag_weights)), and for the likelihood with gradient, which takes that of the
+    /// gradient nearest to 0. [`NoiseTest`](crate::estimators::NoiseTest) tells what noise alone reaches.
+    pub detection: f64,
+    /// Standard deviation of the velocities that the main peak stands for \[m/s\]: its width at half height above the
+    /// floor as that of a Gaussian, less the resolution of the window; 0 where that is all, NaN where unknown.
+    pub width_m_s: f64,
+    /// Signal power over noise power in the detector band; the noise is the mean density away from the main peak.
+    ///
+    /// 0 where the band holds no more than that, NaN where unknown. Noise alone has a highest peak too, so that weak signals
+    /// read too much: believe it where the peak stands out of noise, or take `power`. The sidelobes of an unweighted
+    /// window count as noise, so that above 5 dB it reads too low; a Gaussian weighting is good to 20 dB.
+    pub snr: f64,
+    /// The second peak, if there is one.
+    pub runner_up: Option<RunnerUp>,
+    /// What the estimate is worth.
+    pub flag: Quality,
+}
+
+impl GateVelocity {
+    /// An estimate without velocity, for the stated reason.
+    #[must_use]
+    pub fn none(flag: Quality) -> Self {
+        Self {
+            velocity_m_s: f64::NAN,
+            power: 0.0,
+            quality: f64::NAN,
+            detection: f64::NAN,
+            width_m_s: f64::NAN,
+            snr: f64::NAN,
+            runner_up: None,
+            flag,
+        }
+    }
+
+    /// Multiplies what has the unit of a power.
+    pub(crate) fn scale_power(&mut self, factor: f64) {
+        self.power *= factor;
+        self.detection *= factor;
+    }
+
+    /// Whether the flag is [`Quality::Good`].
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        self.flag == Quality::Good
+    }
+
+    /// Whether the peak stands out of noise: the flag is good and the detection above `threshold`.
+    ///
+    /// That is [`NoiseTest::threshold`](crate::estimators::NoiseTest::threshold) times the density of the noise: the detection in the
+    /// mean statistic of noise.
+    #[must_use]
+    pub fn exceeds(&self, threshold: f64) -> bool {
+        self.is_good() && self.detection > threshold
+    }
+}
+
+/// How the peak is placed between the frequencies of the grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum Refinement {
+    /// Not at all: the frequency of the highest bin, as (30) is printed.
+    None,
+    /// Parabola through the logarithm of the highest bin and its neighbours.
+    #[default]
+    Parabola,
+    /// Maximum of the exact spectrum, by Newton steps from the parabola, to round-off.
+    Exact,
+}

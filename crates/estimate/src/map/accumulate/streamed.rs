@@ -1,0 +1,168 @@
+//! The sums over the windows of a scan whose records come piece by piece: memory does not grow with the number of pulses.
+//!
+//! The windows of a line are added in the order of its rays, whatever the pieces, and all scales are powers of two, so the
+//! sums have the same bits as if all records were there at once. Check: that, for pieces of several sizes, with the loudest
+//! record last and with samples that are missing.
+
+use std::collections::BTreeMap;
+use std::marker::PhantomData;
+
+use ndarray::ArrayView2;
+
+use super::{BLOCK, Scan, add};
+use crate::error::{Error, length};
+use crate::estimators::Statistic;
+use crate::map::ScanGeometry;
+use crate::parallel::{for_each_chunk, map_indexed};
+use crate::window::missing::{Rule, invalid_windows};
+use crate::window::{Gates, Sample, Scratch};
+
+/// Statistics of the windows of a scan, as far as its records have come.
+///
+/// Memory: that of [`Scan`], and a few bytes for each window of a record with a sample that is not finite.
+pub struct ScanSums<'s, S, T: ?Sized> {
+    statistic: &'s T,
+    gates: Gates,
+    geometry: ScanGeometry,
+    record_samples: usize,
+    numbers: usize,
+    /// Statistics of each gate, the pulses of a line added.
+    rows: Vec<f64>,
+    rule: Rule<'s>,
+    invalid: BTreeMap<usize, Vec<bool>>,
+    /// Power of two by which the samples were divided; none before the first that is not 0.
+    scale: Option<f64>,
+    sample: PhantomData<fn(S)>,
+}
+
+impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
+    /// No record yet; the rays of `geometry` will have records of `record_samples` samples. Missing are samples that are not
+    /// finite; to find those that dwarf all others takes all records, as [`Scan::new`] has them.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if statistic and gates have windows of different lengths; as [`Gates::count`].
+    pub fn new(statistic: &'s T, gates: &Gates, geometry: ScanGeometry, record_samples: usize) -> Result<Self, Error> {
+        Self::with_rule(statistic, gates, geometry, record_samples, Rule::NOT_FINITE)
+    }
+
+    /// The same with a rule for missing samples.
+    pub(super) fn with_rule(
+        statistic: &'s T,
+        gates: &Gates,
+        geometry: ScanGeometry,
+        record_samples: usize,
+        rule: Rule<'s>,
+    ) -> Result<Self, Error> {
+        length("window", statistic.window_samples(), gates.window_samples)?;
+        length("windows of a record", geometry.gates(), gates.count(record_samples)?)?;
+        let numbers = statistic.statistic_len();
+        let rows = vec![0.0; geometry.line_elevation_rad().len() * geometry.gates() * numbers];
+        let (invalid, sample) = (BTreeMap::new(), PhantomData);
+        Ok(Self {
+            statistic,
+            gates: *gates,
+            geometry,
+            record_samples,
+            numbers,
+            rows,
+            rule,
+            invalid,
+            scale: None,
+            sample,
+        })
+    }
+
+    /// Adds the `records` \[ray, sample\] of the rays `first_ray`, `first_ray + 1`, ...
+    ///
+    /// The rays of a line must come in their order. Windows with a missing sample are left out.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for records of another length.
+    pub fn add(&mut self, first_ray: usize, records: ArrayView2<'_, S>) -> Result<(), Error> {
+        let (rays, samples) = records.dim();
+        length("samples of a record", self.record_samples, samples)?;
+        let scale = self.rescale(records);
+        let (gates, rule, count) = (&self.gates, &self.rule, self.geometry.gates());
+        let found =
+            map_indexed(rays, || (), |(), ray| invalid_windows(records.row(ray).iter().copied(), rule, gates, count));
+        let found = found.into_iter().enumerate().filter_map(|(ray, invalid)| Some((first_ray + ray, invalid?)));
+        self.invalid.extend(found);
+        let (statistic, invalid, lines, numbers) = (self.statistic, &self.invalid, &self.geometry.rays, self.numbers);
+        let piece = first_ray..first_ray + rays;
+        for_each_chunk(
+            &mut self.rows,
+            count * numbers,
+            || (Scratch::new(), Vec::with_capacity(samples)),
+            |(scratch, row), line, chunk| {
+                for ray in lines.within(line, &piece) {
+                    row.clear();
+                    row.extend(records.row(ray - first_ray).iter().map(|s| s.scaled(scale.recip())));
+                    let invalid = invalid.get(&ray);
+                    let valid = |gate: usize| !invalid.is_some_and(|invalid| invalid[gate]);
+                    statistic.evaluate_record(row, gates.step_samples, &valid, scratch, &mut |gate, one| {
+                        add(&mut chunk[gate * numbers..(gate + 1) * numbers], one);
+                    });
+                }
+            },
+        );
+        Ok(())
+    }
+
+    /// The scale for these records and those before; the sums are brought to it.
+    fn rescale(&mut self, records: ArrayView2<'_, S>) -> f64 {
+        let here = self.rule.largest_binary_scale(records.iter().copied());
+        let scale = match (self.scale, here) {
+            (Some(before), Some(here)) if here > before => {
+                let share = (before / here).powi(2);
+                self.rows.iter_mut().for_each(|sum| *sum *= share);
+                here
+            }
+            (Some(before), _) => before,
+            (None, Some(here)) => here,
+            (None, None) => return 1.0,
+        };
+        self.scale = Some(scale);
+        scale
+    }
+
+    /// The scan of the records that have come, ready to be averaged over any region.
+    #[must_use]
+    pub fn finish(self) -> Scan {
+        let Self { geometry, numbers, rows, invalid, scale, .. } = self;
+        let (line_numbers, line_blocks) = (geometry.gates() * numbers, geometry.gates().div_ceil(BLOCK) * numbers);
+        let mut blocks = vec![0.0; geometry.line_elevation_rad().len() * line_blocks];
+        for_each_chunk(
+            &mut blocks,
+            line_blocks,
+            || (),
+            |(), line, chunk| {
+                let rows = &rows[line * line_numbers..(line + 1) * line_numbers];
+                for (sum, rows) in chunk.chunks_mut(numbers).zip(rows.chunks(BLOCK * numbers)) {
+                    rows.chunks(numbers).for_each(|row| add(sum, row));
+                }
+            },
+        );
+        let counts = valid_before(&geometry, &invalid);
+        Scan { geometry, numbers, rows, blocks, counts, invalid, scale: scale.unwrap_or(1.0) }
+    }
+}
+
+/// Valid windows before each gate, for all lines.
+fn valid_before(geometry: &ScanGeometry, invalid: &BTreeMap<usize, Vec<bool>>) -> Vec<usize> {
+    let lines = geometry.line_elevation_rad().len();
+    let mut counts = Vec::with_capacity(lines * (geometry.gates() + 1));
+    for line in 0..lines {
+        let broken: Vec<&Vec<bool>> = match invalid.is_empty() {
+            true => Vec::new(),
+            false => geometry.line_rays(line).filter_map(|ray| invalid.get(&ray)).collect(),
+        };
+        let rays = geometry.rays.count(line);
+        let mut before = 0;
+        counts.push(0);
+        for gate in 0..geometry.gates() {
+            before += rays - broken.iter().filter(|list| list[gate]).count();
+            counts.push(before);
+        }
+    }
+    counts
+}

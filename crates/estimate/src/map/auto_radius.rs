@@ -1,0 +1,90 @@
+//! The radius rho(R) that a target variance needs: small where the signal is strong or the lines are close, larger
+//! where they are not.
+//!
+//! A large region averages noise away and blurs the vortex; this takes the smallest that is enough. The variance of a
+//! mean of n_eff independent windows is that of one window over n_eff. Check: the variance asked for is reached and
+//! not by much more; the radius grows with range.
+
+use crate::error::{Error, positive};
+use crate::map::{PolarPoint, Radius, ScanGeometry, WindowCorrelation};
+
+/// Bisections of the radius: to a thousandth of the largest.
+const BISECTIONS: usize = 10;
+
+impl ScanGeometry {
+    /// Smallest radius \[m\] about `point` whose region is worth `n_eff` independent windows, to a thousandth of `largest_m`.
+    ///
+    /// `None` if even `largest_m` is not enough.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] unless `n_eff` and `largest_m` are above 0.
+    pub fn radius_for(
+        &self,
+        point: PolarPoint,
+        n_eff: f64,
+        correlation: &WindowCorrelation,
+        largest_m: f64,
+    ) -> Result<Option<f64>, Error> {
+        positive("n_eff", n_eff)?;
+        positive("largest_m", largest_m)?;
+        let enough = |radius_m: f64| self.level(point, radius_m, correlation).1 >= n_eff;
+        if !enough(largest_m) {
+            return Ok(None);
+        }
+        let (mut low_m, mut high_m) = (0.0, largest_m);
+        if enough(low_m) {
+            return Ok(Some(low_m));
+        }
+        for _ in 0..BISECTIONS {
+            let middle_m = 0.5 * (low_m + high_m);
+            if enough(middle_m) {
+                high_m = middle_m;
+            } else {
+                low_m = middle_m;
+            }
+        }
+        Ok(Some(high_m))
+    }
+}
+
+impl Radius {
+    /// rho(R) for a target standard deviation `target_m_s` \[m/s\] of velocity: the smallest region in the middle of
+    /// the scan that is enough, at most `largest_m`.
+    ///
+    /// `single_m_s` gives the standard deviation of one window \[m/s\] at a range \[m\]: the bound for the
+    /// signal-to-noise ratio there ([`WindowModel::bound_m_s`](crate::bound::WindowModel::bound_m_s)) times what the
+    /// estimator loses. Between the ranges of a table of 65, increasing, the radius is interpolated. Where
+    /// `largest_m` is not enough it is taken all the same: n_eff of the map tells.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a target, radius or standard deviation that is not above 0.
+    pub fn for_standard_deviation(
+        geometry: &ScanGeometry,
+        correlation: &WindowCorrelation,
+        single_m_s: impl Fn(f64) -> f64,
+        target_m_s: f64,
+        largest_m: f64,
+    ) -> Result<Self, Error> {
+        positive("target_m_s", target_m_s)?;
+        let ranges_m = geometry.gate_ranges_m();
+        let lines = geometry.line_elevation_rad();
+        let elevation_rad = lines[lines.len() / 2];
+        let (first_m, last_m) = (ranges_m[0], ranges_m[ranges_m.len() - 1]);
+        let step_m = (last_m - first_m) / 64.0;
+        let table_m: Vec<f64> = (0..=64)
+            .map(|k| {
+                let range_m = first_m + f64::from(k) * step_m;
+                let single = single_m_s(range_m);
+                positive("single_m_s", single)?;
+                let point = PolarPoint { range_m, elevation_rad };
+                let radius_m = geometry.radius_for(point, (single / target_m_s).powi(2), correlation, largest_m)?;
+                Ok(radius_m.unwrap_or(largest_m))
+            })
+            .collect::<Result<_, Error>>()?;
+        Ok(Self::OfRange(Box::new(move |range_m| {
+            let place = if step_m > 0.0 { ((range_m - first_m) / step_m).clamp(0.0, 64.0) } else { 0.0 };
+            let below = (place as usize).min(63);
+            table_m[below] + (table_m[below + 1] - table_m[below]) * (place - below as f64)
+        })))
+    }
+}

@@ -1,0 +1,396 @@
+//! Circular regions in a scan: which windows of which lines of sight lie within a distance of a point.
+//!
+//! Computes the set {k : dist(p, k) <= rho} of Table 3 as one interval of gates (a chord) per line of sight.
+//! Check: against the distance of every window; the accumulation levels 11, 43, 169 for 1, 2, 4 m
+//! at 400 m with 0.5 m between lines and 0.6 m between windows.
+
+use crate::error::{Error, length};
+use crate::map::rays::{Rays, check_angles};
+use crate::window::{Gates, Sampling};
+
+/// A place in the scan plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PolarPoint {
+    /// Distance from the lidar \[m\].
+    pub range_m: f64,
+    /// Elevation of the line of sight \[rad\].
+    pub elevation_rad: f64,
+}
+
+/// All pairs of elevation \[rad\] and range \[m\], ranges running fastest: a map \[elevation, range\].
+#[must_use]
+pub fn polar_points(elevation_rad: &[f64], range_m: &[f64]) -> Vec<PolarPoint> {
+    elevation_rad
+        .iter()
+        .flat_map(|&elevation_rad| range_m.iter().map(move |&range_m| PolarPoint { range_m, elevation_rad }))
+        .collect()
+}
+
+/// Gates `first` ..= `last` of line of sight `line` that lie in a region.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Chord {
+    /// Index of the line of sight, by increasing elevation.
+    pub line: usize,
+    /// First gate.
+    pub first: usize,
+    /// Last gate.
+    pub last: usize,
+}
+
+impl Chord {
+    /// Number of gates of the chord, at least 1.
+    #[must_use]
+    pub fn gates(&self) -> usize {
+        self.last - self.first + 1
+    }
+}
+
+/// Where the windows of a scan are. Rays (pulses) of equal elevation form one line of sight.
+#[derive(Debug, Clone)]
+pub struct ScanGeometry {
+    lines: Vec<f64>,
+    pub(crate) rays: Rays,
+    first_range_m: f64,
+    spacing_m: f64,
+    gates: usize,
+}
+
+impl ScanGeometry {
+    /// Geometry of rays at `elevation_rad`, in any order, with records of `record_samples` samples.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without rays, [`Error::OutOfRange`] for an angle beyond +-pi, and as [`Gates::count`].
+    pub fn new(
+        sampling: &Sampling,
+        gates: &Gates,
+        elevation_rad: &[f64],
+        record_samples: usize,
+    ) -> Result<Self, Error> {
+        check_angles(elevation_rad)?;
+        let (lines, rays) = Rays::grouped(elevation_rad);
+        Self::of(lines, rays, sampling, gates, record_samples)
+    }
+
+    /// Geometry of lines of sight at `elevation_rad`, increasing, each with `rays_per_line` records that stand together, one
+    /// line after the other. It takes no memory for the rays.
+    ///
+    /// # Errors
+    /// As [`ScanGeometry::new`]; [`Error::OutOfRange`] for angles that do not increase or lines without rays.
+    pub fn regular(
+        sampling: &Sampling,
+        gates: &Gates,
+        elevation_rad: &[f64],
+        rays_per_line: usize,
+        record_samples: usize,
+    ) -> Result<Self, Error> {
+        check_angles(elevation_rad)?;
+        if let Some(pair) = elevation_rad.windows(2).find(|pair| pair[1] <= pair[0]) {
+            return Err(Error::OutOfRange { field: "elevation_rad", value: pair[1], allowed: "increasing" });
+        }
+        if rays_per_line == 0 {
+            return Err(Error::OutOfRange { field: "rays_per_line", value: 0.0, allowed: "at least 1" });
+        }
+        Self::of(elevation_rad.to_vec(), Rays::Regular { per_line: rays_per_line }, sampling, gates, record_samples)
+    }
+
+    fn of(
+        lines: Vec<f64>,
+        rays: Rays,
+        sampling: &Sampling,
+        gates: &Gates,
+        record_samples: usize,
+    ) -> Result<Self, Error> {
+        sampling.validate()?;
+        Ok(Self {
+            lines,
+            rays,
+            first_range_m: gates.range_m(0, sampling),
+            spacing_m: gates.spacing_m(sampling),
+            gates: gates.count(record_samples)?,
+        })
+    }
+
+    /// Elevations of the lines of sight \[rad\], increasing, each once.
+    #[must_use]
+    pub fn line_elevation_rad(&self) -> &[f64] {
+        &self.lines
+    }
+
+    /// Rays (rows of the records) of a line of sight, increasing.
+    pub fn line_rays(&self, line: usize) -> impl Iterator<Item = usize> + '_ {
+        self.rays.within(line, &(0..usize::MAX))
+    }
+
+    /// Number of windows along a ray.
+    #[must_use]
+    pub fn gates(&self) -> usize {
+        self.gates
+    }
+
+    /// Ranges of the window centres \[m\].
+    #[must_use]
+    pub fn gate_ranges_m(&self) -> Vec<f64> {
+        (0..self.gates).map(|gate| self.first_range_m + gate as f64 * self.spacing_m).collect()
+    }
+
+    /// The middle of a chord.
+    pub(crate) fn middle(&self, chord: Chord) -> PolarPoint {
+        let gate = 0.5 * (chord.first + chord.last) as f64;
+        PolarPoint { range_m: self.first_range_m + gate * self.spacing_m, elevation_rad: self.lines[chord.line] }
+    }
+
+    /// Chords of the disc of radius `radius_m` \[m\] about `point`, by increasing elevation.
+    ///
+    /// A window on the circle counts as inside (up to a millionth of the gate spacing).
+    pub fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
+        let slack_m = 1e-6 * self.spacing_m;
+        let radius_m = radius_m + slack_m;
+        let reach_rad = if radius_m < point.range_m { (radius_m / point.range_m).asin() } else { std::f64::consts::PI };
+        let start = self.lines.partition_point(|line| *line < point.elevation_rad - reach_rad);
+        self.lines[start..]
+            .iter()
+            .take_while(move |line| **line <= point.elevation_rad + reach_rad)
+            .enumerate()
+            .filter_map(move |(offset, line)| {
+                let (sin, cos) = (line - point.elevation_rad).sin_cos();
+                let (across_m, along_m) = (point.range_m * sin, point.range_m * cos);
+                let half_m = (radius_m * radius_m - across_m * across_m).sqrt();
+                let place = |range_m: f64| (range_m - self.first_range_m) / self.spacing_m;
+                let first = place(along_m - half_m).ceil().max(0.0);
+                let last = place(along_m + half_m).floor().min(self.gates as f64 - 1.0);
+                // false also for the NaN of a line that misses the disc
+                (first <= last).then_some(Chord { line: start + offset, first: first as usize, last: last as usize })
+            })
+    }
+
+    /// Accumulation level and n_eff of a region when all samples are valid (figure 9), without any signal.
+    #[must_use]
+    pub fn level(&self, point: PolarPoint, radius_m: f64, correlation: &WindowCorrelation) -> (usize, f64) {
+        let (mut level, mut pairs) = (0, 0.0);
+        for chord in self.chords(point, radius_m) {
+            let rays = self.rays.count(chord.line);
+            level += rays * chord.gates();
+            pairs += rays as f64 * correlation.pair_sum(chord.gates());
+        }
+        (level, effective(level, pairs))
+    }
+}
+
+/// (sum n)^2 / sum over pairs of gamma^2; 0 for an empty region.
+pub(crate) fn effective(level: usize, pairs: f64) -> f64 {
+    if level == 0 { 0.0 } else { (level as f64).powi(2) / pairs }
+}
+
+/// Correlation gamma between the windowed signals of one pulse against their distance in gates.
+///
+/// Their powers have the correlation gamma^2. Windows of different pulses are independent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WindowCorrelation {
+    squared: Vec<f64>,
+}
+
+impl WindowCorrelation {
+    /// From gamma for windows 0, 1, 2, ... gates apart; 0 beyond the last. gamma(0) must be 1.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if gamma(0) is not 1 or another is beyond 0 .. 1.
+    pub fn from_gate_lags(gamma: &[f64]) -> Result<Self, Error> {
+        if gamma.first().is_none_or(|first| (first - 1.0).abs() > 1e-9) {
+            return Err(Error::OutOfRange {
+                field: "gamma[0]",
+                value: gamma.first().copied().unwrap_or(f64::NAN),
+                allowed: "1",
+            });
+        }
+        for &value in gamma {
+            if !(0.0..=1.0 + 1e-9).contains(&value) {
+                return Err(Error::OutOfRange { field: "gamma", value, allowed: "between 0 and 1" });
+            }
+        }
+        Ok(Self { squared: gamma.iter().map(|value| value * value).collect() })
+    }
+
+    /// From the covariance of the samples of one pulse (phase of the carrier removed) and the weights of the window.
+    ///
+    /// `covariance(lag_samples)` need not be normalised. gamma(k) = |sum over n, m of h_n h_m c(k step + n - m)| over
+    /// the same at k = 0: the correlation of the two windows' Fourier coefficients at the peak.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without weights, [`Error::OutOfRange`] if the window's power is not above 0.
+    pub fn from_covariance(
+        weights: &[f64],
+        step_samples: usize,
+        gates: usize,
+        covariance: impl Fn(usize) -> f64,
+    ) -> Result<Self, Error> {
+        if weights.is_empty() {
+            return Err(Error::Empty { field: "weights" });
+        }
+        let overlap: Vec<f64> =
+            (0..weights.len()).map(|d| weights[d..].iter().zip(weights).map(|(a, b)| a * b).sum()).collect();
+        let at = |gate: usize| -> f64 {
+            let shift = (gate * step_samples) as i64;
+            let reach = overlap.len() as i64 - 1;
+            (-reach..=reach)
+                .map(|d| overlap[d.unsigned_abs() as usize] * covariance((shift + d).unsigned_abs() as usize))
+                .sum()
+        };
+        let power = at(0);
+        crate::error::positive("power of the window", power)?;
+        let gamma: Vec<f64> =
+            (0..gates.max(1)).map(|gate| (at(gate) / power).abs()).take_while(|gamma| *gamma > 1e-8).collect();
+        Self::from_gate_lags(&gamma)
+    }
+
+    /// For a Gaussian pulse, |f|^2 ~ exp(-t^2 / sigma^2), in uniform wind with white noise.
+    ///
+    /// `pulse_sigma_s` is the half-width of |f|^2 at 1/e \[s\]; `noise_to_signal` the variance of the white noise over the
+    /// signal power, per sample (2.5 / SNR for real samples when the band is 2/5 of half the rate).
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a pulse or noise that is not positive, and as [`WindowCorrelation::from_covariance`].
+    pub fn gaussian_pulse(
+        weights: &[f64],
+        gates: &Gates,
+        count: usize,
+        sample_rate_hz: f64,
+        pulse_sigma_s: f64,
+        noise_to_signal: f64,
+    ) -> Result<Self, Error> {
+        crate::error::positive("pulse_sigma_s", pulse_sigma_s)?;
+        crate::error::positive("sample_rate_hz", sample_rate_hz)?;
+        if !(noise_to_signal >= 0.0 && noise_to_signal.is_finite()) {
+            return Err(Error::OutOfRange {
+                field: "noise_to_signal",
+                value: noise_to_signal,
+                allowed: "finite and at least 0",
+            });
+        }
+        length("weights", gates.window_samples, weights.len())?;
+        Self::from_covariance(weights, gates.step_samples, count, |lag_samples| {
+            let lag = lag_samples as f64 / (sample_rate_hz * pulse_sigma_s);
+            let noise = if lag_samples == 0 { noise_to_signal } else { 0.0 };
+            (-0.25 * lag * lag).exp() + noise
+        })
+    }
+
+    /// gamma^2 of two windows of one pulse `gates` apart.
+    #[must_use]
+    pub fn squared(&self, gates: usize) -> f64 {
+        self.squared.get(gates).copied().unwrap_or(0.0)
+    }
+
+    /// Sum of gamma^2 over all ordered pairs of `gates` consecutive windows.
+    #[must_use]
+    pub fn pair_sum(&self, gates: usize) -> f64 {
+        let diagonal = gates as f64 * self.squared(0);
+        let off: f64 = (1..gates.min(self.squared.len())).map(|k| (gates - k) as f64 * self.squared[k]).sum();
+        diagonal + 2.0 * off
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::window::Weighting;
+    use approx::assert_relative_eq;
+
+    fn sampling() -> Sampling {
+        Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap()
+    }
+
+    /// Lines 0.5 m apart at 400 m, windows every sample, one window centred on exactly 400 m.
+    fn around_400_m() -> (ScanGeometry, PolarPoint) {
+        let centre_s = 2.0 * 400.0 / crate::window::SPEED_OF_LIGHT_M_S;
+        let gates = Gates::new(64, 1, centre_s - 132.0 / 250e6).unwrap();
+        let elevation_rad: Vec<f64> = (0..81).map(|i| (i as f64 - 40.0) * 0.5 / 400.0).collect();
+        let geometry = ScanGeometry::new(&sampling(), &gates, &elevation_rad, 264).unwrap();
+        let point = PolarPoint { range_m: 400.0, elevation_rad: 0.0 };
+        (geometry, point)
+    }
+
+    #[test]
+    fn accumulation_levels_at_400_m_are_11_43_169() {
+        let (geometry, point) = around_400_m();
+        let alone = WindowCorrelation::from_gate_lags(&[1.0]).unwrap();
+        for (radius_m, level) in [(1.0, 11), (2.0, 43), (4.0, 169)] {
+            let (found, n_eff) = geometry.level(point, radius_m, &alone);
+            assert_eq!(found, level);
+            // without correlation every window counts
+            assert_relative_eq!(n_eff, level as f64, max_relative = 1e-12);
+        }
+    }
+
+    #[test]
+    fn forty_three_windows_of_nine_pulses_are_worth_seven_and_a_half() {
+        let (geometry, point) = around_400_m();
+        let gates = Gates::new(64, 1, 0.0).unwrap();
+        let weights = Weighting::Rectangular.weights(64).unwrap();
+        let sigma_s = 200e-9 / (2.0 * 2.0_f64.ln().sqrt());
+        for noise_to_signal in [0.0, 2.5, 25.0] {
+            let correlation =
+                WindowCorrelation::gaussian_pulse(&weights, &gates, 100, 250e6, sigma_s, noise_to_signal).unwrap();
+            let (_, n_eff) = geometry.level(point, 2.0, &correlation);
+            assert!((n_eff - 7.5).abs() < 0.15, "{n_eff}");
+        }
+        let identical = WindowCorrelation::from_gate_lags(&[1.0; 20]).unwrap();
+        let (_, n_eff) = geometry.level(point, 2.0, &identical);
+        assert_relative_eq!(n_eff, 43.0 * 43.0 / 249.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn chords_hold_exactly_the_windows_within_the_radius() {
+        let gates = Gates::new(64, 3, 0.0).unwrap();
+        let elevation_rad = [0.3, 0.1, -0.2, 0.1, 0.05, 3.0, 1.2];
+        let geometry = ScanGeometry::new(&sampling(), &gates, &elevation_rad, 300).unwrap();
+        assert_eq!(geometry.line_elevation_rad().len(), 6);
+        assert_eq!(geometry.line_rays(2).collect::<Vec<_>>(), [1, 3]);
+        let ranges_m = geometry.gate_ranges_m();
+        for (range_m, elevation_rad, radius_m) in
+            [(50.0, 0.07, 6.3), (20.0, 0.2, 25.0), (90.0, 0.1, 0.0), (ranges_m[5], 0.1, 0.0), (500.0, 0.0, 2.0)]
+        {
+            let point = PolarPoint { range_m, elevation_rad };
+            let mut inside = vec![];
+            for (line, angle_rad) in geometry.line_elevation_rad().iter().enumerate() {
+                for (gate, r_m) in ranges_m.iter().enumerate() {
+                    let (dx_m, dy_m) = (
+                        r_m * angle_rad.cos() - range_m * elevation_rad.cos(),
+                        r_m * angle_rad.sin() - range_m * elevation_rad.sin(),
+                    );
+                    if dx_m.hypot(dy_m) <= radius_m + 1e-6 {
+                        inside.push((line, gate));
+                    }
+                }
+            }
+            let found: Vec<_> = geometry
+                .chords(point, radius_m)
+                .flat_map(|chord| (chord.first..=chord.last).map(move |gate| (chord.line, gate)))
+                .collect();
+            assert_eq!(found, inside, "{point:?} {radius_m}");
+        }
+    }
+
+    #[test]
+    fn pair_sum_is_the_double_sum() {
+        let correlation = WindowCorrelation::from_gate_lags(&[1.0, 0.8, 0.5, 0.1]).unwrap();
+        for gates in 1..9_usize {
+            let direct: f64 = (0..gates)
+                .flat_map(|i| (0..gates).map(move |j| i.abs_diff(j)))
+                .map(|lag| correlation.squared(lag))
+                .sum();
+            assert_relative_eq!(correlation.pair_sum(gates), direct, max_relative = 1e-12);
+        }
+    }
+
+    #[test]
+    fn impossible_geometry_and_correlation_are_refused() {
+        let gates = Gates::new(64, 1, 0.0).unwrap();
+        assert!(ScanGeometry::new(&sampling(), &gates, &[], 100).is_err());
+        assert!(ScanGeometry::new(&sampling(), &gates, &[f64::NAN], 100).is_err());
+        assert!(ScanGeometry::new(&sampling(), &gates, &[4.0], 100).is_err());
+        assert!(ScanGeometry::new(&sampling(), &gates, &[0.0], 63).is_err());
+        assert!(WindowCorrelation::from_gate_lags(&[0.5]).is_err());
+        assert!(WindowCorrelation::from_gate_lags(&[1.0, f64::NAN]).is_err());
+        assert!(WindowCorrelation::from_covariance(&[], 1, 5, |_| 1.0).is_err());
+    }
+}

@@ -1,0 +1,135 @@
+//! Biased correlogram of a weighted window, the statistic that is accumulated.
+//!
+//! Computes r_m = (1 / sum h^2) sum over n of h(n+m) s(n+m) h(n) conj(s(n)) for m = 0 .. N-1, by two transforms of 2 N
+//! points. Its Fourier transform with all lags is the zero-padded periodogram (29), corrected,
+//! at every frequency, so PA and CA share it. Check: against the sum written out, and that identity to 1e-12.
+//!
+//! With several weightings (tapers) it is the weighted sum of their correlograms.
+
+use crate::error::{Error, length, positive};
+use crate::estimators::Statistic;
+use crate::spectrum::transform::WindowTransform;
+use crate::window::{Sample, Scratch, SignalKind, Weighting};
+
+/// One weighting and its share in the sum.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Taper {
+    /// Weights h(n) of the samples.
+    pub weights: Vec<f64>,
+    /// Factor of its correlogram; 1 / sum h^2 makes white noise read its variance.
+    pub factor: f64,
+}
+
+impl Taper {
+    /// Taper whose factor is 1 / sum h^2.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the sum of squares is not finite and above 0.
+    pub fn unit(weights: Vec<f64>) -> Result<Self, Error> {
+        let energy: f64 = weights.iter().map(|h| h * h).sum();
+        positive("sum of weights squared", energy)?;
+        Ok(Self { weights, factor: energy.recip() })
+    }
+}
+
+/// Biased correlogram with all lags, of one or several weightings.
+#[derive(Clone)]
+pub struct Correlogram<S> {
+    tapers: Vec<Taper>,
+    transform: WindowTransform<S>,
+}
+
+impl<S: Sample> Correlogram<S> {
+    /// Correlogram of windows of `window_samples` samples with one weighting.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for an empty window or an impossible weighting.
+    pub fn new(weighting: Weighting, window_samples: usize) -> Result<Self, Error> {
+        Self::with_tapers(vec![Taper::unit(weighting.weights(window_samples)?)?])
+    }
+
+    /// Weighted sum of the correlograms of several tapers of equal length.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without tapers or samples, [`Error::Length`] if their lengths differ.
+    pub fn with_tapers(tapers: Vec<Taper>) -> Result<Self, Error> {
+        let window_samples = tapers.first().map_or(0, |taper| taper.weights.len());
+        if window_samples == 0 {
+            return Err(Error::Empty { field: "tapers" });
+        }
+        for taper in &tapers {
+            length("taper", window_samples, taper.weights.len())?;
+        }
+        Ok(Self { tapers, transform: WindowTransform::new(2 * window_samples) })
+    }
+
+    /// The tapers.
+    #[must_use]
+    pub fn tapers(&self) -> &[Taper] {
+        &self.tapers
+    }
+
+    /// Weights of the lags of white data, w_m = sum over tapers of factor times the tapers' correlogram, w_0 = 1: 1 -
+    /// m / N without weighting.
+    ///
+    /// [`SpectralPeak::with_lag_weights`](crate::SpectralPeak::with_lag_weights) takes them to tell spectral width from resolution.
+    #[must_use]
+    pub fn lag_weights(&self) -> Vec<f64> {
+        let at = |m: usize| -> f64 {
+            let of = |h: &[f64]| h[m..].iter().zip(h).map(|(a, b)| a * b).sum::<f64>();
+            self.tapers.iter().map(|taper| taper.factor * of(&taper.weights)).sum()
+        };
+        (0..self.lags()).map(|m| at(m) / at(0)).collect()
+    }
+
+    /// Number of lags N, lag 0 included.
+    #[must_use]
+    pub fn lags(&self) -> usize {
+        self.tapers[0].weights.len()
+    }
+
+    /// Kind of the samples.
+    #[must_use]
+    pub fn kind(&self) -> SignalKind {
+        S::KIND
+    }
+}
+
+impl<S: Sample> Statistic<S> for Correlogram<S> {
+    fn window_samples(&self) -> usize {
+        self.lags()
+    }
+
+    fn statistic_len(&self) -> usize {
+        S::KIND.lag_numbers(self.lags())
+    }
+
+    fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]) {
+        self.transform.reset(scratch);
+        for taper in &self.tapers {
+            self.transform.add_power(window, &taper.weights, taper.factor, scratch);
+        }
+        self.transform.lags_of_power(scratch, out);
+    }
+}
+
+/// The biased correlogram written out as a double sum: slow, the oracle of [`Correlogram`].
+#[must_use]
+pub fn correlogram_by_sum<S: Sample>(window: &[S], weights: &[f64]) -> Vec<f64> {
+    let energy: f64 = weights.iter().map(|h| h * h).sum();
+    let weighted: Vec<_> = window.iter().zip(weights).map(|(sample, h)| sample.to_complex() * h).collect();
+    let mut numbers = Vec::with_capacity(S::KIND.lag_numbers(weighted.len()));
+    for m in 0..weighted.len() {
+        let lag = weighted[m..]
+            .iter()
+            .zip(&weighted)
+            .map(|(ahead, behind)| ahead * behind.conj())
+            .sum::<num_complex::Complex<f64>>()
+            / energy;
+        numbers.push(lag.re);
+        if S::KIND == SignalKind::Complex {
+            numbers.push(lag.im);
+        }
+    }
+    numbers
+}

@@ -1,0 +1,12 @@
+//! Correlograms of windows and the spectra that belong to them.
+
+pub(crate) mod correlogram;
+pub(crate) mod lag_spectrum;
+pub(crate) mod sliding;
+pub(crate) mod transform;
+pub(crate) mod zoom;
+
+pub use correlogram::{Correlogram, Taper, correlogram_by_sum};
+pub use lag_spectrum::{LagSpectrum, density_at};
+pub use sliding::ShortCorrelogram;
+pub use zoom::ZoomSpectrum;

@@ -1,0 +1,184 @@
+//! Damped Newton steps on a handful of parameters: Cholesky of a small symmetric matrix and the iteration of Levenberg and
+//! Marquardt (Marquardt 1963), shared by the fit of a map and the fit of signals.
+//!
+//! Check: inverse times matrix; a curved valley (Rosenbrock) is followed to its end; a point that cannot be evaluated is
+//! stepped back from.
+
+use ndarray::Array2;
+
+use crate::error::Error;
+
+/// Cost, gradient and a positive approximation of the second derivatives at one point.
+#[derive(Debug, Clone)]
+pub(crate) struct Normal {
+    pub(crate) cost: f64,
+    pub(crate) gradient: Vec<f64>,
+    pub(crate) curvature: Array2<f64>,
+}
+
+/// Lower Cholesky factor, or nothing if the matrix is not positive definite to working precision.
+fn cholesky(a: &Array2<f64>) -> Option<Array2<f64>> {
+    let n = a.nrows();
+    let mut l = Array2::zeros((n, n));
+    for j in 0..n {
+        let pivot = a[[j, j]] - (0..j).map(|k| l[[j, k]] * l[[j, k]]).sum::<f64>();
+        // also false for NaN
+        if !(pivot > 1e-14 * a[[j, j]] && pivot.is_finite()) {
+            return None;
+        }
+        l[[j, j]] = pivot.sqrt();
+        for i in j + 1..n {
+            let sum: f64 = (0..j).map(|k| l[[i, k]] * l[[j, k]]).sum();
+            l[[i, j]] = (a[[i, j]] - sum) / l[[j, j]];
+        }
+    }
+    Some(l)
+}
+
+/// x of a x = b for a symmetric positive definite a.
+pub(crate) fn solve(a: &Array2<f64>, b: &[f64]) -> Option<Vec<f64>> {
+    // rows and columns scaled to a unit diagonal: parameters have units of very different size
+    let n = b.len();
+    let scale: Vec<f64> = (0..n).map(|i| a[[i, i]].sqrt().recip()).collect();
+    if scale.iter().any(|s| !s.is_finite()) {
+        return None;
+    }
+    let l = cholesky(&Array2::from_shape_fn((n, n), |(i, j)| a[[i, j]] * scale[i] * scale[j]))?;
+    let mut x: Vec<f64> = b.iter().zip(&scale).map(|(b, s)| b * s).collect();
+    for i in 0..n {
+        let sum: f64 = (0..i).map(|k| l[[i, k]] * x[k]).sum();
+        x[i] = (x[i] - sum) / l[[i, i]];
+    }
+    for i in (0..n).rev() {
+        let sum: f64 = (i + 1..n).map(|k| l[[k, i]] * x[k]).sum();
+        x[i] = (x[i] - sum) / l[[i, i]];
+    }
+    x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
+    Some(x)
+}
+
+/// Inverse of a symmetric positive definite matrix.
+///
+/// # Errors
+/// [`Error::Linalg`] named `what` if it is singular to working precision.
+pub(crate) fn inverse(what: &'static str, a: &Array2<f64>) -> Result<Array2<f64>, Error> {
+    let n = a.nrows();
+    let mut inverse = Array2::zeros((n, n));
+    for j in 0..n {
+        let unit: Vec<f64> = (0..n).map(|i| if i == j { 1.0 } else { 0.0 }).collect();
+        let column = solve(a, &unit).ok_or(Error::Linalg {
+            what,
+            order: n,
+            reason: "is singular to working precision: a free parameter does not show in the data",
+        })?;
+        (0..n).for_each(|i| inverse[[i, j]] = column[i]);
+    }
+    Ok(inverse)
+}
+
+/// With a learnt curvature, longer steps than this many standard deviations are cut short.
+const LONGEST_SIGMAS: f64 = 4.0;
+
+/// When to stop.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stop {
+    pub(crate) iterations: usize,
+    /// The step that is left, in standard deviations of the fit.
+    pub(crate) sigmas: f64,
+    /// Whether the curvature that `evaluate` returns is learnt from all points, so that a refused step improves it too.
+    pub(crate) learns: bool,
+}
+
+/// Goes downhill from `start` until the step that is left is below `stop.sigmas` standard deviations (the curvature taken
+/// as the inverse covariance). `evaluate` returns nothing where the model does not exist, `moved` adds a step.
+///
+/// # Errors
+/// [`Error::NotConverged`] after `stop.iterations` evaluations, or where no step goes downhill.
+pub(crate) fn descend<P: Clone>(
+    start: P,
+    stop: Stop,
+    mut evaluate: impl FnMut(&P) -> Option<Normal>,
+    moved: impl Fn(&P, &[f64]) -> P,
+) -> Result<(P, Normal, usize), Error> {
+    let failed = |iterations, sigmas_left| Error::NotConverged { iterations, sigmas_left };
+    let mut at = start;
+    let mut here = evaluate(&at).ok_or(failed(0, f64::INFINITY))?;
+    let (mut damping, mut left) = (1e-3, f64::INFINITY);
+    for iteration in 1..=stop.iterations {
+        let down: Vec<f64> = here.gradient.iter().map(|g| -g).collect();
+        if let Some(newton) = solve(&here.curvature, &down) {
+            left = newton.iter().zip(&down).map(|(s, d)| s * d).sum::<f64>().max(0.0).sqrt();
+            if left <= stop.sigmas {
+                return Ok((at, here, iteration));
+            }
+        }
+        let mut damped = here.curvature.clone();
+        damped.diag_mut().mapv_inplace(|d| d * (1.0 + damping));
+        let mut step = solve(&damped, &down);
+        if let (true, Some(step)) = (stop.learns && left > LONGEST_SIGMAS, &mut step) {
+            step.iter_mut().for_each(|s| *s *= LONGEST_SIGMAS / left);
+        }
+        let trial = step.as_ref().map(|step| moved(&at, step));
+        let there = trial.as_ref().and_then(&mut evaluate);
+        // gain promised by the quadratic model
+        let promised = step.map_or(0.0, |s| 0.5 * s.iter().zip(&down).map(|(s, d)| s * d).sum::<f64>());
+        match (trial, there) {
+            (Some(trial), Some(there)) if here.cost - there.cost > 1e-4 * promised => {
+                let ratio = (here.cost - there.cost) / promised;
+                damping = if ratio > 0.75 { (damping * 0.1).max(1e-9) } else { damping };
+                (at, here) = (trial, there);
+            }
+            (_, refused) => {
+                if let (true, Some(refused)) = (stop.learns, refused) {
+                    here.curvature = refused.curvature;
+                }
+                damping = (damping * 10.0).max(1e-4);
+            }
+        }
+        if damping > 1e12 {
+            return Err(failed(iteration, left));
+        }
+    }
+    Err(failed(stop.iterations, left))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn inverse_times_matrix_is_one_in_spite_of_units_of_different_size() {
+        let a = array![[4e12, 1e5, 2e-1], [1e5, 3e-1, 1e-8], [2e-1, 1e-8, 5e-12]];
+        let product = inverse("test", &a).unwrap().dot(&a);
+        for ((i, j), value) in product.indexed_iter() {
+            let scale = (a[[j, j]] / a[[i, i]]).sqrt();
+            assert!((value - f64::from(u8::from(i == j))).abs() < 1e-11 * scale.max(1.0), "{product}");
+        }
+        assert!(inverse("test", &array![[1.0, 1.0], [1.0, 1.0]]).is_err());
+        assert!(inverse("test", &array![[1.0, 0.0], [0.0, 0.0]]).is_err());
+    }
+
+    /// Rosenbrock's valley as a sum of squares, which does not exist beyond a wall.
+    fn valley(p: &[f64; 2]) -> Option<Normal> {
+        if p[0] > 1.5 {
+            return None;
+        }
+        let residual = [1.0 - p[0], 10.0 * (p[1] - p[0] * p[0])];
+        let jacobian = array![[-1.0, 0.0], [-20.0 * p[0], 10.0]];
+        let gradient = jacobian.t().dot(&ndarray::arr1(&residual)).to_vec();
+        let cost = 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
+        Some(Normal { cost, gradient, curvature: jacobian.t().dot(&jacobian) })
+    }
+
+    #[test]
+    fn a_curved_valley_is_followed_to_its_end() {
+        let moved = |p: &[f64; 2], s: &[f64]| [p[0] + s[0], p[1] + s[1]];
+        let stop = Stop { iterations: 100, sigmas: 1e-9, learns: false };
+        let (end, normal, _) = descend([-1.2, 1.0], stop, valley, moved).unwrap();
+        assert!((end[0] - 1.0).abs() < 1e-8 && (end[1] - 1.0).abs() < 1e-8 && normal.cost < 1e-16);
+        let error = descend([-1.2, 1.0], Stop { iterations: 3, ..stop }, valley, moved).unwrap_err();
+        assert!(matches!(error, Error::NotConverged { iterations: 3, .. }));
+        assert!(descend([2.0, 1.0], stop, valley, moved).is_err());
+    }
+}

@@ -1,0 +1,175 @@
+//! A map of radial velocities, how it is fitted, and what comes out.
+//!
+//! Check: exact maps, impossible maps; the two losses agree on clean maps.
+
+use ndarray::{Array2, ArrayView2};
+
+use crate::error::{Error, finite, length, positive};
+use crate::vortex_fit::{CorePrior, FreeParameters, Parameter, Wake};
+
+/// A map of radial velocities, such as accumulation gives.
+#[derive(Debug, Clone, Copy)]
+pub struct VelocityMap<'a> {
+    /// Elevation of the lines \[rad\], increasing.
+    pub elevation_rad: &'a [f64],
+    /// Ranges of the gates \[m\], increasing.
+    pub range_m: &'a [f64],
+    /// Radial velocities \[m/s\] \[line, gate\], positive away from the lidar; NaN where there is none.
+    pub velocity_m_s: ArrayView2<'a, f64>,
+    /// Their standard deviations \[m/s\], up to a common factor; equal ones if absent.
+    pub standard_deviation_m_s: Option<ArrayView2<'a, f64>>,
+}
+
+impl VelocityMap<'_> {
+    /// Checks shapes and axes, and counts the velocities.
+    pub(crate) fn validate(&self) -> Result<usize, Error> {
+        let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
+        length("lines of velocity_m_s", lines, self.velocity_m_s.nrows())?;
+        length("gates of velocity_m_s", gates, self.velocity_m_s.ncols())?;
+        validate_axes(self.elevation_rad, self.range_m)?;
+        if let Some(deviation) = &self.standard_deviation_m_s {
+            length("lines of standard_deviation_m_s", lines, deviation.nrows())?;
+            length("gates of standard_deviation_m_s", gates, deviation.ncols())?;
+            for (value, velocity) in deviation.iter().zip(&self.velocity_m_s) {
+                if velocity.is_finite() {
+                    positive("standard_deviation_m_s", *value)?;
+                }
+            }
+        }
+        Ok(self.velocity_m_s.iter().filter(|v| v.is_finite()).count())
+    }
+
+    /// Distance of neighbouring lines in the middle of the map.
+    pub(crate) fn line_spacing_m(&self) -> f64 {
+        let length = |axis: &[f64]| axis.last().copied().unwrap_or(0.0) - axis.first().copied().unwrap_or(0.0);
+        let middle_m = self.range_m.first().copied().unwrap_or(0.0) + 0.5 * length(self.range_m);
+        middle_m * length(self.elevation_rad) / self.elevation_rad.len() as f64
+    }
+
+    /// Standard deviation of one velocity, 1 if none was given.
+    pub(crate) fn deviation(&self, line: usize, gate: usize) -> f64 {
+        self.standard_deviation_m_s.as_ref().map_or(1.0, |d| d[[line, gate]])
+    }
+}
+
+/// Both axes are finite and increase.
+pub(crate) fn validate_axes(elevation_rad: &[f64], range_m: &[f64]) -> Result<(), Error> {
+    for (field, axis) in [("elevation_rad", elevation_rad), ("range_m", range_m)] {
+        axis.iter().try_for_each(|value| finite(field, *value))?;
+        if let Some(pair) = axis.windows(2).find(|pair| pair[1] <= pair[0]) {
+            return Err(Error::OutOfRange { field, value: pair[1], allowed: "increasing along its axis" });
+        }
+    }
+    Ok(())
+}
+
+/// What a residual costs, in units of the scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Loss {
+    /// r^2/2: least squares.
+    Squares,
+    /// (c^2/2) ln(1 + (r/c)^2): large residuals hardly count (Cauchy).
+    Cauchy {
+        /// c, in units of the scale; 2.385 costs 5 % of the efficiency on normal residuals.
+        width: f64,
+    },
+}
+
+impl Loss {
+    /// Cost, its slope over the residual (the weight), and its second derivative.
+    pub(crate) fn at(self, residual: f64) -> (f64, f64, f64) {
+        match self {
+            Self::Squares => (0.5 * residual * residual, 1.0, 1.0),
+            Self::Cauchy { width } => {
+                let square = (residual / width).powi(2);
+                let weight = 1.0 / (1.0 + square);
+                (0.5 * width * width * square.ln_1p(), weight, (1.0 - square) * weight * weight)
+            }
+        }
+    }
+}
+
+/// An end of the fit of a map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapTop {
+    /// The wake there.
+    pub wake: Wake,
+    /// Logarithm of the likelihood that the loss stands for, but for a constant; velocities that say the same as their neighbours
+    /// are counted once. With what is known of the cores.
+    pub log_likelihood: f64,
+}
+
+/// How a map is fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapFitOptions {
+    /// What may change.
+    pub free: FreeParameters,
+    /// What is known of the core radii that may change.
+    pub core_prior: Option<CorePrior>,
+    /// What residuals cost.
+    pub loss: Loss,
+    /// Neighbouring lines that share windows: 2 rho over their distance for an accumulated map, 0 for independent lines.
+    pub correlated_lines: usize,
+    /// Most evaluations of the map in a round.
+    pub max_iterations: usize,
+    /// The fit ends when the step that is left is below this part of its standard deviations.
+    pub tolerance_sigmas: f64,
+}
+
+impl Default for MapFitOptions {
+    /// All parameters, core radii as they typically are, the loss of Cauchy, 8 correlated lines, at most 200 evaluations, to 0.01 standard deviations.
+    fn default() -> Self {
+        Self {
+            free: FreeParameters::default(),
+            core_prior: Some(CorePrior::TYPICAL),
+            loss: Loss::Cauchy { width: 2.385 },
+            correlated_lines: 8,
+            max_iterations: 200,
+            tolerance_sigmas: 1e-2,
+        }
+    }
+}
+
+/// Outcome of a fit to a map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapFit {
+    /// The fitted wake.
+    pub wake: Wake,
+    /// Covariance \[10, 10\] of the parameters in the order of [`Parameter`]; zeros where one is fixed: the sandwich with the
+    /// correlation of the residuals, and the distances of other tops, weighted with their likelihood. It tells of scatter, not of
+    /// what an estimator of velocity adds to all maps alike.
+    pub covariance: Array2<f64>,
+    /// Whether core radii were fitted to the end. A core that the map does not resolve keeps the value of the round before, with
+    /// zeros in the covariance.
+    pub cores_fitted: bool,
+    /// Velocities that were used.
+    pub used: usize,
+    /// Those with a residual above 3 scales.
+    pub outliers: usize,
+    /// Scale of the residuals over the given standard deviations, from their median; \[m/s\] if none were given. In
+    /// uniform wind, for the map of an estimator.
+    pub residual_scale: f64,
+    /// Part of the robust cost of the best wind without vortices that the vortices take away: near 1 for a good fit.
+    pub explained_fraction: f64,
+    /// Evaluations of the map in the last round; steps of Gauss and Newton for the map of an estimator.
+    pub iterations: usize,
+    /// All ends of the fit from its starts that are not the same, the best (the fitted wake) first.
+    pub tops: Vec<MapTop>,
+}
+
+impl MapFit {
+    /// Standard deviation of a parameter, in its unit; 0 if it was fixed.
+    #[must_use]
+    pub fn standard_deviation(&self, parameter: Parameter) -> f64 {
+        self.covariance[[parameter as usize; 2]].sqrt()
+    }
+}
+
+/// Median of the numbers, which are reordered; NaN if there are none.
+pub(crate) fn median(numbers: &mut [f64]) -> f64 {
+    if numbers.is_empty() {
+        return f64::NAN;
+    }
+    let middle = numbers.len() / 2;
+    *numbers.select_nth_unstable_by(middle, f64::total_cmp).1
+}

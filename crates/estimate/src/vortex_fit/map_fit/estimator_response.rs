@@ -1,0 +1,399 @@
+//! The map that an estimator shows of a wake in the mean of very many pulses.
+//!
+//! The air at range R + x adds to the expected correlogram of the gate at R
+//!
+//! ```text
+//! W_m(x) exp(j 2 pi f(v_R(R + x)) m T_s),   W_m(x) = sum over tapers a, n of a h(n+m) h(n) f(t_(n+m) - 2x/c) f(t_n - 2x/c)
+//! ```
+//!
+//! with t_n counted from the middle of the window, f(v) from (30) and f(t) the pulse; noise adds its own lags, real
+//! samples keep the real part. The correlograms of a region's lines are added, and the estimator itself turns the sum
+//! into a velocity. So whatever it makes of the skewed and broad spectra of a core is part of what is expected of it:
+//! nothing is taken for a mean. Left out is the extent of a region along the line, short against a gate. Check:
+//! uniform wind; a wide line shows the mean over the gate; the correlogram of signals summed over layers; simulated scans.
+
+use multiversion::multiversion;
+use ndarray::Array2;
+use std::f64::consts::TAU;
+
+use crate::bound::Noise;
+use crate::error::{Error, length, positive};
+use crate::estimators::Estimator;
+use crate::parallel::map_indexed;
+use crate::spectrum::{Correlogram, Taper};
+use crate::vortex_fit::signal_fit::banded_cholesky::dot;
+use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::wake::wake_map::region;
+use crate::vortex_fit::{PulseShape, RangeKernel, Wake, WakeModel};
+use crate::window::{SPEED_OF_LIGHT_M_S, Sample, Sampling, Scratch, SignalKind};
+
+/// Air nodes are at most this far apart \[m\]: half of a small core.
+const NODE_M: f64 = 1.25;
+/// And at most this part of the pulse's length, c sigma / 2.
+const NODE_OVER_PULSE: f64 = 0.25;
+
+/// How the velocities of a map were estimated: correlogram, estimator, pulse, noise and regions.
+#[derive(Clone)]
+pub struct EstimatorResponse<'a> {
+    estimator: &'a dyn Estimator,
+    kind: SignalKind,
+    tapers: Vec<Taper>,
+    sampling: Sampling,
+    pulse: PulseShape,
+    /// Lags of the noise over the power of the signal.
+    noise: Vec<f64>,
+    radius_m: f64,
+}
+
+impl<'a> EstimatorResponse<'a> {
+    /// Of a map that `estimator` made of the correlograms `statistic`, accumulated over regions of radius `radius_m`
+    /// \[m\] (0: each line for itself), with a backscatter that changes little along a gate. `snr` is the
+    /// signal-to-noise ratio in the detector band.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if statistic and estimator do not match; [`Error::OutOfRange`], [`Error::Band`] for impossible
+    /// numbers.
+    pub fn new<S: Sample>(
+        statistic: &Correlogram<S>,
+        estimator: &'a dyn Estimator,
+        sampling: &Sampling,
+        pulse: &PulseShape,
+        (noise, snr): (Noise, f64),
+        radius_m: f64,
+    ) -> Result<Self, Error> {
+        sampling.validate_for(S::KIND)?;
+        noise.validate()?;
+        positive("snr", snr)?;
+        let lags = statistic.lags();
+        length("statistic", estimator.statistic_len(), S::KIND.lag_numbers(lags))?;
+        if !(radius_m >= 0.0 && radius_m.is_finite()) {
+            return Err(Error::OutOfRange { field: "radius_m", value: radius_m, allowed: "finite and at least 0" });
+        }
+        let in_band = Noise::Band { floor: 0.0 }.covariance(sampling, 0.0, S::KIND).re;
+        let numbers = statistic.lag_weights().into_iter().enumerate().flat_map(|(m, weight)| {
+            let lag = noise.covariance(sampling, m as f64, S::KIND) * (weight / in_band / snr);
+            [lag.re, lag.im]
+        });
+        let noise = match S::KIND {
+            SignalKind::Real => numbers.step_by(2).collect(),
+            SignalKind::Complex => numbers.collect(),
+        };
+        Ok(Self {
+            estimator,
+            kind: S::KIND,
+            tapers: statistic.tapers().to_vec(),
+            sampling: *sampling,
+            pulse: pulse.clone(),
+            noise,
+            radius_m,
+        })
+    }
+
+    /// The map \[line, gate\] of velocities \[m/s\] at `elevation_rad` \[rad\] and `range_m` \[m\], both increasing;
+    /// NaN where the estimator finds none.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for an impossible wake or axis.
+    pub fn map(
+        &self,
+        model: &WakeModel,
+        wake: &Wake,
+        elevation_rad: &[f64],
+        range_m: &[f64],
+    ) -> Result<Array2<f64>, Error> {
+        wake.validate()?;
+        crate::vortex_fit::map_fit::data::validate_axes(elevation_rad, range_m)?;
+        Ok(self.prepared(range_m).velocities(model, wake, elevation_rad))
+    }
+
+    /// The mean over a gate, which a wide line would show.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the weights have no power.
+    pub(crate) fn kernel(&self, range_m: &[f64]) -> Result<RangeKernel, Error> {
+        let prepared = self.prepared(range_m);
+        let weights: Vec<f64> = prepared.weights.iter().step_by(prepared.numbers).copied().collect();
+        RangeKernel::new(prepared.first_offset_m, prepared.spacing_m, &weights)
+    }
+
+    /// Radius of the regions \[m\].
+    pub(crate) fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
+    /// The weights of the air on nodes that fit the gates.
+    pub(crate) fn prepared<'r>(&'r self, range_m: &'r [f64]) -> Prepared<'r> {
+        let (period_s, sigma_s) = (self.sampling.period_s(), self.pulse.sigma_s());
+        let lags = self.tapers[0].weights.len();
+        let gap_m = range_m.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+        let widest_m = NODE_M.min(NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
+        // gates fall on nodes unless they are so close that this would take many more
+        let fits = gap_m.is_finite() && gap_m > 0.25 * widest_m;
+        let spacing_m = if fits { gap_m / (gap_m / widest_m).ceil() } else { widest_m };
+        let half_s = 0.5 * lags as f64 * period_s;
+        let reach = (0.5 * SPEED_OF_LIGHT_M_S * (half_s + self.pulse.reach_s()) / spacing_m).ceil() as i64;
+        let numbers = self.kind.lag_numbers(lags);
+        let mut weights = Vec::with_capacity((2 * reach + 1) as usize * numbers);
+        for node in -reach..=reach {
+            let away_s = 2.0 * node as f64 * spacing_m / SPEED_OF_LIGHT_M_S;
+            let seen: Vec<f64> = (0..lags).map(|n| self.pulse.at(n as f64 * period_s - half_s - away_s)).collect();
+            let tapered: Vec<Vec<f64>> =
+                self.tapers.iter().map(|taper| taper.weights.iter().zip(&seen).map(|(h, f)| h * f).collect()).collect();
+            for m in 0..lags {
+                let of = |(taper, g): (&Taper, &Vec<f64>)| taper.factor * dot(&g[m..], &g[..lags - m]);
+                let weight: f64 = self.tapers.iter().zip(&tapered).map(of).sum();
+                weights.extend(std::iter::repeat_n(weight, numbers / lags));
+            }
+        }
+        let power: f64 = weights.iter().step_by(numbers).sum();
+        weights.iter_mut().for_each(|weight| *weight /= power);
+        Prepared { response: self, range_m, first_offset_m: -(reach as f64) * spacing_m, spacing_m, numbers, weights }
+    }
+}
+
+/// A response with its weights on nodes.
+pub(crate) struct Prepared<'r> {
+    response: &'r EstimatorResponse<'r>,
+    range_m: &'r [f64],
+    first_offset_m: f64,
+    spacing_m: f64,
+    /// Numbers of one correlogram.
+    numbers: usize,
+    /// \[node, number\]
+    weights: Vec<f64>,
+}
+
+impl Prepared<'_> {
+    /// The map of a wake.
+    pub(crate) fn velocities(&self, model: &WakeModel, wake: &Wake, elevation_rad: &[f64]) -> Array2<f64> {
+        let (lines, gates) = (elevation_rad.len(), self.range_m.len());
+        let correlograms =
+            map_indexed(lines, Vec::new, |turns, line| self.line(model, wake, Ray::new(elevation_rad[line]), turns));
+        let state = || (Scratch::new(), vec![0.0; self.numbers]);
+        let rows = map_indexed(lines, state, |(scratch, mean), line| {
+            let one = |gate: usize| {
+                mean.copy_from_slice(&self.response.noise);
+                for (other, share) in region(elevation_rad, line, self.range_m[gate], self.response.radius_m) {
+                    let lags = &correlograms[other][gate * self.numbers..][..self.numbers];
+                    mean.iter_mut().zip(lags).for_each(|(sum, lag)| *sum += share * lag);
+                }
+                self.response.estimator.estimate(mean, scratch).velocity_m_s
+            };
+            (0..gates).map(one).collect::<Vec<f64>>()
+        });
+        Array2::from_shape_fn((lines, gates), |(line, gate)| rows[line][gate])
+    }
+
+    /// Variance of the velocities \[m^2/s^2\] of the air that each place of the map sees.
+    pub(crate) fn variances(&self, model: &WakeModel, wake: &Wake, elevation_rad: &[f64]) -> Array2<f64> {
+        let (lines, gates) = (elevation_rad.len(), self.range_m.len());
+        let nodes = self.weights.len() / self.numbers;
+        let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
+        let moments = map_indexed(lines, Vec::new, |velocities: &mut Vec<f64>, line| {
+            let ray = Ray::new(elevation_rad[line]);
+            velocities.clear();
+            let one = |range_m: &f64| {
+                let index = ((range_m - nearest_m) / self.spacing_m).round() as usize;
+                while velocities.len() < index + nodes {
+                    let at_m = nearest_m + self.first_offset_m + velocities.len() as f64 * self.spacing_m;
+                    velocities.push(model.velocity_on(wake, at_m, ray));
+                }
+                let seen = self.weights.iter().step_by(self.numbers).zip(&velocities[index..]);
+                seen.fold([0.0, 0.0], |[mean, square], (w, v)| [mean + w * v, square + w * v * v])
+            };
+            self.range_m.iter().map(one).collect::<Vec<[f64; 2]>>()
+        });
+        Array2::from_shape_fn((lines, gates), |(line, gate)| {
+            let lines = region(elevation_rad, line, self.range_m[gate], self.response.radius_m);
+            let [mean, square] = lines.fold([0.0, 0.0], |[mean, square], (other, share)| {
+                let [m, s] = moments[other][gate];
+                [mean + share * m, square + share * s]
+            });
+            (square - mean * mean).max(0.0)
+        })
+    }
+
+    /// Expected correlograms of the signal at all gates of a line, of power 1.
+    fn line(&self, model: &WakeModel, wake: &Wake, ray: Ray, turns: &mut Vec<f64>) -> Vec<f64> {
+        let sampling = &self.response.sampling;
+        let (Some(&nearest_m), Some(&farthest_m)) = (self.range_m.first(), self.range_m.last()) else {
+            return Vec::new();
+        };
+        let nodes = self.weights.len() / self.numbers;
+        let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + nodes + 1;
+        turns.clear();
+        for point in 0..points {
+            let at_m = nearest_m + self.first_offset_m + point as f64 * self.spacing_m;
+            let cycles = sampling.frequency_hz(model.velocity_on(wake, at_m, ray)) * sampling.period_s();
+            let (sin, cos) = (TAU * cycles).sin_cos();
+            let (mut re, mut im) = (1.0, 0.0);
+            while turns.len() < (point + 1) * self.numbers {
+                turns.push(re);
+                if self.response.kind == SignalKind::Complex {
+                    turns.push(im);
+                }
+                (re, im) = (re * cos - im * sin, im * cos + re * sin);
+            }
+        }
+        let mut lags = vec![0.0; self.range_m.len() * self.numbers];
+        for (range_m, lags) in self.range_m.iter().zip(lags.chunks_exact_mut(self.numbers)) {
+            let place = (range_m - nearest_m) / self.spacing_m;
+            let index = (place + 1e-9).floor();
+            let part = (place - index).max(0.0);
+            // ranges between two nodes see something of both
+            for (shift, share) in [(0, 1.0 - part), (1, part)] {
+                if share > 1e-6 {
+                    let seen = &turns[(index as usize + shift) * self.numbers..];
+                    add_seen(lags, &self.weights, seen, share);
+                }
+            }
+        }
+        lags
+    }
+}
+
+/// lags += share weights turns, summed over nodes; all three have rows of the length of `lags`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn add_seen(lags: &mut [f64], weights: &[f64], turns: &[f64], share: f64) {
+    let count = lags.len();
+    for (weights, turns) in weights.chunks_exact(count).zip(turns.chunks_exact(count)) {
+        for i in 0..count {
+            lags[i] += share * weights[i] * turns[i];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimators::{LagWindowPeak, PulsePair, Refinement, SpectralPeak};
+    use crate::window::Weighting;
+
+    const SIGMA_S: f64 = 120.112e-9;
+    const RANGES_M: [f64; 3] = [372.0, 377.7, 400.0];
+    const LINES_RAD: [f64; 3] = [0.112, 0.115, 0.1175];
+
+    fn sampling() -> Sampling {
+        Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap()
+    }
+
+    fn wake() -> Wake {
+        Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02])
+    }
+
+    fn response<'a>(
+        statistic: &Correlogram<f64>,
+        estimator: &'a dyn Estimator,
+        noise: (Noise, f64),
+        radius_m: f64,
+    ) -> EstimatorResponse<'a> {
+        let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
+        EstimatorResponse::new(statistic, estimator, &sampling(), &pulse, noise, radius_m).unwrap()
+    }
+
+    #[test]
+    fn uniform_wind_is_shown_as_it_is() {
+        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 6.0, 0.0]);
+        let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
+        let peak = SpectralPeak::new(&sampling(), SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+        let shown = response(&statistic, &peak, (Noise::White, 1.0), 2.0)
+            .map(&WakeModel::default(), &calm, &LINES_RAD, &RANGES_M)
+            .unwrap();
+        for ((line, _), velocity) in shown.indexed_iter() {
+            assert!((velocity - 6.0 * LINES_RAD[line].cos()).abs() < 0.01, "{shown}");
+        }
+    }
+
+    /// The phase of lag 1 is that of the mean velocity but for the third moment, which is small in a weak wake.
+    #[test]
+    fn a_pulse_pair_of_complex_samples_shows_the_mean_over_the_gate() {
+        let sampling = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
+        let statistic = Correlogram::<num_complex::Complex<f64>>::new(Weighting::Rectangular, 64).unwrap();
+        let pair = PulsePair::new(&sampling, SignalKind::Complex, 64).unwrap();
+        let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
+        let response = EstimatorResponse::new(&statistic, &pair, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();
+        let weak = Wake::from_array(&[96.0, 104.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02]);
+        let shown = response.map(&WakeModel::default(), &weak, &LINES_RAD, &RANGES_M).unwrap();
+        let kernel = RangeKernel::gaussian_gate(SIGMA_S, &[1.0; 64], 4e-9, 0.5).unwrap();
+        let means = WakeModel::default().map(&weak, &kernel, &LINES_RAD, &RANGES_M, 2.0).unwrap();
+        for (shown, mean) in shown.iter().zip(&means) {
+            // a window has one pair less than samples
+            assert!((shown - mean).abs() < 0.01, "{shown} {mean}");
+        }
+        assert!(means.iter().any(|v| (v - means[[0, 0]]).abs() > 0.2), "{means}");
+    }
+
+    /// Covariance of real samples summed over layers of 5 cm, its correlogram pair by pair, the lines of a region added.
+    #[test]
+    fn velocities_are_those_of_the_mean_correlogram_of_thin_layers() {
+        let (model, sampling) = (WakeModel::default(), sampling());
+        let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
+        let lags = LagWindowPeak::new(&sampling, SignalKind::Real, 64, 16, 1024, Refinement::Parabola).unwrap();
+        let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+        let (snr, radius_m) = (2.0, 1.5);
+        let h = &statistic.tapers()[0].weights;
+        let correlogram = |line: usize, range_m: f64| -> Vec<f64> {
+            let mut sum = vec![0.0; 64];
+            for layer in -1600..1600 {
+                let away_m = f64::from(layer) * 0.05;
+                let velocity = model.radial_velocity_m_s(&wake(), range_m + away_m, LINES_RAD[line]);
+                let seen: Vec<f64> = (0..64)
+                    .map(|n| (f64::from(n) - 32.0) * 4e-9 - 2.0 * away_m / SPEED_OF_LIGHT_M_S)
+                    .map(|t_s| (-0.5 * (t_s / SIGMA_S).powi(2)).exp() / (std::f64::consts::PI.sqrt() * SIGMA_S).sqrt())
+                    .collect();
+                for m in 0..64 {
+                    let turn = TAU * sampling.frequency_hz(velocity) * m as f64 * 4e-9;
+                    let pairs: f64 = (0..64 - m).map(|n| h[n] * h[n + m] * seen[n] * seen[n + m]).sum();
+                    sum[m] += pairs * turn.cos() * 0.05 * 2.0 / SPEED_OF_LIGHT_M_S;
+                }
+            }
+            for (m, sum) in sum.iter_mut().enumerate() {
+                let pairs: f64 = (0..64 - m).map(|n| h[n] * h[n + m]).sum();
+                *sum += pairs * Noise::White.covariance(&sampling, m as f64, SignalKind::Real).re / 0.2 / snr;
+            }
+            sum
+        };
+        for (name, estimator) in [("lag window", &lags as &dyn Estimator), ("peak", &peak)] {
+            let shown = response(&statistic, estimator, (Noise::White, snr), radius_m)
+                .map(&model, &wake(), &LINES_RAD, &RANGES_M)
+                .unwrap();
+            // ranges between nodes
+            let close = [RANGES_M[0], RANGES_M[1], RANGES_M[1] + 1e-9, RANGES_M[2]];
+            let between = response(&statistic, estimator, (Noise::White, snr), radius_m)
+                .map(&model, &wake(), &LINES_RAD, &close)
+                .unwrap();
+            for (gate, place) in [(0, 0), (1, 1), (1, 2), (2, 3)] {
+                assert!((between[[1, place]] - shown[[1, gate]]).abs() < 0.02, "{name} {between} {shown}");
+            }
+            for (gate, &range_m) in RANGES_M.iter().enumerate() {
+                // the other lines are 1.1 and 0.93 m away at 372 m
+                let chord = |line: usize| (radius_m.powi(2) - (range_m * (LINES_RAD[line] - 0.115)).powi(2)).sqrt();
+                let mut mean = vec![0.0; 64];
+                for line in 0..3 {
+                    let one = correlogram(line, range_m);
+                    mean.iter_mut().zip(one).for_each(|(mean, one)| *mean += chord(line) * one);
+                }
+                let expected = estimator.estimate(&mean, &mut Scratch::new()).velocity_m_s;
+                assert!((shown[[1, gate]] - expected).abs() < 0.01, "{name} {range_m} {} {expected}", shown[[1, gate]]);
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_match_is_refused() {
+        let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
+        let peak = SpectralPeak::new(&sampling(), SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+        let short = SpectralPeak::new(&sampling(), SignalKind::Real, 32, 1024, Refinement::Parabola).unwrap();
+        let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
+        let new = |estimator: &SpectralPeak, snr, radius_m| {
+            let noise = (Noise::White, snr);
+            EstimatorResponse::new(&statistic, estimator, &sampling(), &pulse, noise, radius_m).map(|_| ())
+        };
+        assert!(matches!(new(&short, 1.0, 2.0), Err(Error::Length { .. })));
+        assert!(matches!(new(&peak, 0.0, 2.0), Err(Error::OutOfRange { field: "snr", .. })));
+        assert!(matches!(new(&peak, 1.0, f64::NAN), Err(Error::OutOfRange { field: "radius_m", .. })));
+        let response = response(&statistic, &peak, (Noise::White, 1.0), 2.0);
+        let map = response.map(&WakeModel::default(), &wake(), &LINES_RAD, &[400.0, 390.0]);
+        assert!(matches!(map, Err(Error::OutOfRange { field: "range_m", .. })));
+    }
+}

@@ -1,0 +1,84 @@
+//! Where fits of maps begin, and which of their ends is taken.
+//!
+//! Core radii are tried small and large; what they end at is compared by the likelihood that the loss stands for. Ends that are
+//! not the best add their distance to the covariance, weighted with their likelihood. Check: made-up ends; fits of many maps.
+
+use crate::error::Error;
+use crate::vortex_fit::{MapFit, MapFitOptions, Sharing, Wake};
+
+/// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span).
+pub(crate) const CORE_OVER_SPACING: f64 = 0.045;
+/// Core radii of the starts over the spacing, if they are fitted.
+const CORES_OVER_SPACING: [f64; 2] = [CORE_OVER_SPACING, 0.1];
+/// A typical core is known to this part of itself, after at most so many rounds.
+const TYPICAL: f64 = 0.05;
+const ROUNDS: usize = 3;
+/// Ends closer than this many standard deviations in every parameter are one.
+const SAME_SIGMAS: f64 = 0.3;
+
+/// The starts about a wake: its core radii are the typical one, and others if they are fitted.
+pub(crate) fn starts(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
+    let fitted = options.free.core_radius != Sharing::Fixed;
+    let of = |over_spacing: f64| {
+        let mut wake = *about;
+        let core_m = over_spacing * wake.spacing_m();
+        (wake.left.core_radius_m, wake.right.core_radius_m) = (core_m, core_m);
+        wake
+    };
+    CORES_OVER_SPACING.into_iter().take(if fitted { CORES_OVER_SPACING.len() } else { 1 }).map(of).collect()
+}
+
+/// The best end of the fits from some starts; the first error if none comes to an end.
+pub(crate) fn best_of(starts: &[Wake], fit: impl Fn(&Wake) -> Result<MapFit, Error>) -> Result<MapFit, Error> {
+    let (mut ends, mut failed) = (Vec::new(), None);
+    for start in starts {
+        match fit(start) {
+            Ok(end) => ends.push(end),
+            Err(error) => failed = failed.or(Some(error)),
+        }
+    }
+    merged(ends).ok_or(failed.unwrap_or(Error::Empty { field: "starts" }))
+}
+
+/// A fit that keeps the typical core begins again until that is the one of the spacing that it ends with, which the search for
+/// the best pair knows only as well as its grid is fine.
+pub(crate) fn with_typical_core(
+    mut end: MapFit,
+    options: &MapFitOptions,
+    fit: impl Fn(&Wake) -> Result<MapFit, Error>,
+) -> Result<MapFit, Error> {
+    for _ in 0..ROUNDS {
+        let next = starts(&end.wake, options);
+        let off = |wake: &Wake| (end.wake.left.core_radius_m / wake.left.core_radius_m - 1.0).abs() > TYPICAL;
+        match next.first() {
+            Some(wake) if options.free.core_radius == Sharing::Fixed && off(wake) => end = fit(wake)?,
+            _ => break,
+        }
+    }
+    Ok(end)
+}
+
+/// The best of some ends with the others as its competing tops.
+fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
+    let height = |end: &MapFit| end.tops.first().map_or(f64::NEG_INFINITY, |top| top.log_likelihood);
+    ends.sort_by(|a, b| height(b).total_cmp(&height(a)));
+    let mut ends = ends.into_iter();
+    let mut best = ends.next()?;
+    let (within, highest, mut weights) = (best.covariance.clone(), height(&best), 1.0);
+    for end in ends {
+        let (a, b) = (end.wake.to_array(), best.wake.to_array());
+        let apart: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+        let same = apart.iter().enumerate().all(|(i, d)| d.powi(2) <= SAME_SIGMAS.powi(2) * within[[i, i]]);
+        if same {
+            continue;
+        }
+        let weight = (height(&end) - highest).exp();
+        weights += weight;
+        for ((i, j), c) in best.covariance.indexed_iter_mut() {
+            *c += weight * (end.covariance[[i, j]] + apart[i] * apart[j]);
+        }
+        best.tops.extend(end.tops);
+    }
+    best.covariance /= weights;
+    Some(best)
+}

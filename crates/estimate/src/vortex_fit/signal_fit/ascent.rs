@@ -1,0 +1,136 @@
+//! The ascent to a top of the likelihood of raw signals.
+//!
+//! The few lines through the cores make the likelihood of one scan curve quite differently from its mean over scans, so the
+//! information serves only as the first curvature; it is then corrected from gradient to gradient.
+//! Check: fits of signals against the bound; the ascent with lines far from the vortices replaced by a parabola ends where
+//! that with all lines does.
+
+use ndarray::Array2;
+
+use crate::error::Error;
+use crate::vortex_fit::damped_newton::{Normal, Stop, descend};
+use crate::vortex_fit::signal_fit::banded_cholesky::dot;
+use crate::vortex_fit::wake::free_parameters::{gathered, moved};
+use crate::vortex_fit::{Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
+
+/// A wake and the powers of signal and noise.
+pub(crate) type State = (Wake, Powers);
+
+/// What lines that are left out of a model would add to ln p about a state, to second order.
+#[derive(Debug, Clone)]
+pub(crate) struct Parabola {
+    pub(crate) about: State,
+    /// Derivatives by the free numbers.
+    pub(crate) gradient: Vec<f64>,
+    /// Information on them.
+    pub(crate) information: Array2<f64>,
+}
+
+/// ln p of the free numbers, and how they are climbed.
+pub(crate) struct Ascent<'a> {
+    pub(crate) model: &'a ScanModel,
+    pub(crate) signals: &'a ScanSignals,
+    pub(crate) options: &'a SignalFitOptions,
+    /// The lines that the model leaves out.
+    pub(crate) others: Option<Parabola>,
+}
+
+impl Ascent<'_> {
+    /// Number of free numbers: those of the wake, then the logarithms of the powers.
+    fn order(&self) -> usize {
+        self.options.free.groups().len() + if self.options.fit_powers { 2 } else { 0 }
+    }
+
+    /// The state after a step of the free numbers.
+    pub(crate) fn stepped(&self, (wake, powers): &State, step: &[f64]) -> State {
+        let mut powers = *powers;
+        if self.options.fit_powers {
+            powers.log_signal += step[step.len() - 2];
+            powers.log_noise += step[step.len() - 1];
+        }
+        (moved(&self.options.free.groups(), wake, step), powers)
+    }
+
+    /// The free numbers of `to`, counted from `from`.
+    pub(crate) fn steps(&self, (from, from_powers): &State, (to, powers): &State) -> Vec<f64> {
+        let (a, b) = (from.to_array(), to.to_array());
+        let mut steps: Vec<f64> = self.options.free.groups().iter().map(|group| b[group[0]] - a[group[0]]).collect();
+        if self.options.fit_powers {
+            steps.extend([powers.log_signal - from_powers.log_signal, powers.log_noise - from_powers.log_noise]);
+        }
+        steps
+    }
+
+    /// ln p and its gradient by the free numbers; nothing where the model does not exist.
+    pub(crate) fn value(&self, state: &State) -> Option<(f64, Vec<f64>)> {
+        let value = self.model.log_likelihood(self.signals, &state.0, state.1)?;
+        let groups = self.options.free.groups();
+        let mut gradient = vec![0.0; self.order()];
+        gathered(&groups, &value.by_wake, &mut gradient);
+        if self.options.fit_powers {
+            gradient[groups.len()] = value.by_log_signal;
+            gradient[groups.len() + 1] = value.by_log_noise;
+        }
+        let mut log_likelihood = value.log_likelihood;
+        if let Some(others) = &self.others {
+            let away = self.steps(&others.about, state);
+            let pull: Vec<f64> = others.information.rows().into_iter().map(|row| dot(&row.to_vec(), &away)).collect();
+            log_likelihood += dot(&others.gradient, &away) - 0.5 * dot(&pull, &away);
+            gradient.iter_mut().zip(&others.gradient).zip(&pull).for_each(|((g, o), p)| *g += o - p);
+        }
+        Some((log_likelihood, gradient))
+    }
+
+    /// Information on the free numbers, from every so-manyth line of the model.
+    pub(crate) fn information(&self, (wake, powers): &State, stride: usize) -> Result<Array2<f64>, Error> {
+        let options = self.options;
+        let mut information =
+            self.model.information(wake, *powers, &options.free, options.fit_powers, stride.max(1))?;
+        if let Some(others) = &self.others {
+            information += &others.information;
+        }
+        Ok(information)
+    }
+
+    /// Goes to the top of the likelihood, which `evaluations` counts on.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`]; [`Error::Linalg`] if a covariance is not positive definite.
+    pub(crate) fn climb(&self, start: State, evaluations: &mut usize) -> Result<(State, f64), Error> {
+        let mut curvature = self.information(&start, self.options.information_stride)?;
+        let mut last: Option<(Vec<f64>, Vec<f64>)> = None;
+        let evaluate = |x: &Vec<f64>| {
+            *evaluations += 1;
+            let (log_likelihood, mut gradient) = self.value(&self.stepped(&start, x))?;
+            gradient.iter_mut().for_each(|g| *g = -*g);
+            if let Some((x_before, gradient_before)) = &last {
+                let difference = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+                learn(&mut curvature, &difference(x, x_before), &difference(&gradient, gradient_before));
+            }
+            last = Some((x.clone(), gradient.clone()));
+            Some(Normal { cost: -log_likelihood, gradient, curvature: curvature.clone() })
+        };
+        let step = |x: &Vec<f64>, step: &[f64]| x.iter().zip(step).map(|(x, s)| x + s).collect();
+        let (iterations, sigmas) = (self.options.max_iterations, self.options.tolerance_sigmas);
+        let stop = Stop { iterations, sigmas, learns: true };
+        let (end, normal, _) = descend(vec![0.0; self.order()], stop, evaluate, step)?;
+        Ok((self.stepped(&start, &end), -normal.cost))
+    }
+}
+
+/// Corrects the curvature so that it explains the change `y` of the gradient over the step `s`: the update of Broyden, Fletcher,
+/// Goldfarb and Shanno, damped after Powell (1978) so that it stays positive definite.
+fn learn(curvature: &mut Array2<f64>, s: &[f64], y: &[f64]) {
+    let n = s.len();
+    let hs: Vec<f64> = (0..n).map(|i| dot(curvature.row(i).as_slice().unwrap_or(&[]), s)).collect();
+    let (shs, sy) = (dot(s, &hs), dot(s, y));
+    if shs <= 0.0 {
+        return;
+    }
+    let part = if sy >= 0.2 * shs { 1.0 } else { 0.8 * shs / (shs - sy) };
+    let r: Vec<f64> = y.iter().zip(&hs).map(|(y, h)| part * y + (1.0 - part) * h).collect();
+    let sr = dot(s, &r);
+    for ((i, j), c) in curvature.indexed_iter_mut() {
+        *c += r[i] * r[j] / sr - hs[i] * hs[j] / shs;
+    }
+}

@@ -1,0 +1,336 @@
+//! Likelihood of all raw signals of a scan, its gradient, and the Fisher information: the bound on any unbiased fit.
+//!
+//! The baseband z of a ray is circular Gaussian with the covariance R of its line, so that, but for a constant,
+//! ln p = -ln det R - z^H R^-1 z (Frehlich and Sharman 2005), with the gradient Re tr((x x^H - R^-1) dR), x = R^-1 z, and the
+//! information tr(R^-1 dR_i R^-1 dR_j) (Kay 1993, section 3.9). Rays are independent. Besides the wake there are two
+//! numbers: the logarithms of the power of signal and noise over what the model states.
+//! Check: against dense matrices and the plain sum over layers; the covariance of the gradient over draws is the information.
+
+use ndarray::{Array2, ArrayView2};
+use num_complex::Complex;
+
+use crate::error::{Error, positive};
+use crate::parallel::map_indexed;
+use crate::vortex_fit::signal_fit::banded_cholesky::{Band, dot};
+use crate::vortex_fit::signal_fit::line_covariance::Work;
+use crate::vortex_fit::signal_fit::scan_model::Line;
+use crate::vortex_fit::wake::free_parameters::gathered;
+use crate::vortex_fit::{FreeParameters, PARAMETERS, ScanModel, Wake};
+use crate::window::Sample;
+
+/// Powers of signal and noise relative to the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Powers {
+    /// Natural logarithm of the signal power over the SNR of the model times its unit noise power.
+    pub log_signal: f64,
+    /// Natural logarithm of the noise power over that by which the records were scaled.
+    pub log_noise: f64,
+}
+
+impl Default for Powers {
+    /// As the model states.
+    fn default() -> Self {
+        Self { log_signal: 0.0, log_noise: 0.0 }
+    }
+}
+
+/// Log-likelihood and its derivatives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LikelihoodValue {
+    /// Log-likelihood, but for a constant.
+    pub log_likelihood: f64,
+    /// Derivatives in the order of [`Parameter`](crate::vortex_fit::Parameter).
+    pub by_wake: [f64; PARAMETERS],
+    /// Derivative with respect to the logarithm of the signal power.
+    pub by_log_signal: f64,
+    /// Derivative with respect to the logarithm of the noise power.
+    pub by_log_noise: f64,
+}
+
+/// The records of a scan in complex baseband, in units of the root of the noise power.
+#[derive(Debug, Clone)]
+pub struct ScanSignals {
+    rays: Vec<Option<Vec<Complex<f64>>>>,
+}
+
+impl ScanSignals {
+    /// From `records` \[ray, sample\], whose noise in the detector band has the power `noise_power` (mean square, in the
+    /// square of the unit of the samples).
+    ///
+    /// Rays with a sample that is not finite are left out.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if rays or samples are not those of the model, [`Error::OutOfRange`] for a power that is not positive,
+    /// [`Error::Empty`] if no ray is left.
+    pub fn new<S: Sample>(model: &ScanModel, records: ArrayView2<'_, S>, noise_power: f64) -> Result<Self, Error> {
+        crate::error::length("rays of the records", model.rays, records.nrows())?;
+        crate::error::length("samples of a record", model.record_samples, records.ncols())?;
+        positive("noise_power", noise_power)?;
+        let scale = noise_power.sqrt().recip();
+        positive("1 / sqrt(noise_power)", scale)?;
+        let rays: Vec<_> = map_indexed(records.nrows(), Vec::new, |row: &mut Vec<S>, ray| {
+            row.clear();
+            row.extend(records.row(ray).iter().map(|sample| sample.scaled(scale)));
+            if row.iter().all(|sample| sample.is_finite()) { model.baseband.convert(row).map(Some) } else { Ok(None) }
+        })
+        .into_iter()
+        .collect::<Result<_, _>>()?;
+        if rays.iter().all(Option::is_none) {
+            return Err(Error::Empty { field: "rays without missing samples" });
+        }
+        Ok(Self { rays })
+    }
+
+    /// Number of rays that are used.
+    #[must_use]
+    pub fn used_rays(&self) -> usize {
+        self.rays.iter().flatten().count()
+    }
+}
+
+/// Work space of one worker.
+#[derive(Debug, Default)]
+struct Space {
+    work: Work,
+    signal: Band,
+    factor: Band,
+    inverse: Band,
+}
+
+impl ScanModel {
+    /// Log-likelihood and gradient of a wake; nothing where the model does not exist (a core without radius, or a
+    /// covariance that is not positive definite).
+    #[must_use]
+    pub fn log_likelihood(&self, signals: &ScanSignals, wake: &Wake, powers: Powers) -> Option<LikelihoodValue> {
+        wake.validate().ok()?;
+        let lines = map_indexed(self.lines.len(), Space::default, |space, index| {
+            self.line_likelihood(&self.lines[index], signals, wake, powers, space)
+        });
+        let mut sum =
+            LikelihoodValue { log_likelihood: 0.0, by_wake: [0.0; PARAMETERS], by_log_signal: 0.0, by_log_noise: 0.0 };
+        // in the order of the lines, whoever computed them
+        for line in lines {
+            let line = line?;
+            sum.log_likelihood += line.log_likelihood;
+            sum.by_wake.iter_mut().zip(line.by_wake).for_each(|(s, l)| *s += l);
+            sum.by_log_signal += line.by_log_signal;
+            sum.by_log_noise += line.by_log_noise;
+        }
+        sum.log_likelihood.is_finite().then_some(sum)
+    }
+
+    fn line_likelihood(
+        &self,
+        line: &Line,
+        signals: &ScanSignals,
+        wake: &Wake,
+        powers: Powers,
+        space: &mut Space,
+    ) -> Option<LikelihoodValue> {
+        let mut value =
+            LikelihoodValue { log_likelihood: 0.0, by_wake: [0.0; PARAMETERS], by_log_signal: 0.0, by_log_noise: 0.0 };
+        let rays: Vec<&Vec<Complex<f64>>> = line.rays.iter().filter_map(|&ray| signals.rays[ray].as_ref()).collect();
+        if rays.is_empty() {
+            return Some(value);
+        }
+        let count = rays.len() as f64;
+        self.covariance_into(line, wake, powers, space);
+        let log_determinant = space.factor.factorize()?;
+        space.factor.inverse_into(&mut space.inverse);
+        // the inverse becomes the weight of the gradient: sum of x x^H - R^-1, off the diagonal for both triangles
+        let Space { work, signal, factor, inverse: weight } = space;
+        weight.re.iter_mut().chain(&mut weight.im).for_each(|v| *v *= -count);
+        for z in rays {
+            let x = solve(factor, z);
+            let quadratic: f64 = x.iter().zip(z).map(|(x, z)| x.re * z.re + x.im * z.im).sum();
+            value.log_likelihood -= log_determinant + quadratic;
+            add_outer(weight, &x);
+        }
+        double_off_diagonal(weight);
+        let (signal_power, noise_power) = (powers.log_signal.exp(), powers.log_noise.exp());
+        value.by_log_signal = signal_power * product(weight, signal);
+        value.by_log_noise = noise_power * self.noise_product(weight);
+        weight.re.iter_mut().chain(&mut weight.im).for_each(|v| *v *= signal_power);
+        self.pull_back(line, weight, work, &mut value.by_wake);
+        Some(value)
+    }
+
+    /// Covariance of a line in `space.factor`, that of its signal for unit noise power in `space.signal`.
+    fn covariance_into(&self, line: &Line, wake: &Wake, powers: Powers, space: &mut Space) {
+        let Space { work, signal, factor, .. } = space;
+        self.wind_into(line, wake, work);
+        self.signal_into(line, work, signal);
+        factor.clone_from(signal);
+        let power = powers.log_signal.exp();
+        factor.re.iter_mut().chain(&mut factor.im).for_each(|v| *v *= power);
+        let noise_power = powers.log_noise.exp();
+        for column in 0..factor.order {
+            for lag in 0..=factor.width.min(factor.order - 1 - column) {
+                let place = factor.at(column, lag);
+                factor.re[place] += noise_power * self.noise[lag];
+            }
+        }
+    }
+
+    /// Sum of the weights times the covariance of the noise.
+    fn noise_product(&self, weight: &Band) -> f64 {
+        let columns = weight.re.chunks_exact(weight.width + 1);
+        columns.map(|column| column.iter().zip(&self.noise).map(|(w, n)| w * n).sum::<f64>()).sum()
+    }
+
+    /// Fisher information \[n, n\] of all rays of the scan on the free parameters of a wake; with `powers_free` the logarithms of
+    /// signal and noise power stand behind them.
+    ///
+    /// `stride` above 1 takes every `stride`-th line for all.
+    ///
+    /// # Errors
+    /// [`Error::Linalg`] if a covariance is not positive definite; [`Error::OutOfRange`] for an impossible wake or a stride of 0.
+    pub fn information(
+        &self,
+        wake: &Wake,
+        powers: Powers,
+        free: &FreeParameters,
+        powers_free: bool,
+        stride: usize,
+    ) -> Result<Array2<f64>, Error> {
+        wake.validate()?;
+        positive("stride", stride as f64)?;
+        let groups = free.groups();
+        let lines: Vec<&Line> = self.lines.iter().step_by(stride).collect();
+        let parts = map_indexed(lines.len(), Space::default, |space, index| {
+            self.line_information(lines[index], wake, powers, &groups, powers_free, space)
+        });
+        let order = groups.len() + if powers_free { 2 } else { 0 };
+        let mut sum = Array2::zeros((order, order));
+        for part in parts {
+            sum += &part?;
+        }
+        let rays: usize = lines.iter().map(|line| line.rays.len()).sum();
+        Ok(sum * (self.rays as f64 / rays as f64))
+    }
+
+    fn line_information(
+        &self,
+        line: &Line,
+        wake: &Wake,
+        powers: Powers,
+        groups: &[Vec<usize>],
+        powers_free: bool,
+        space: &mut Space,
+    ) -> Result<Array2<f64>, Error> {
+        self.covariance_into(line, wake, powers, space);
+        let order = space.factor.order;
+        let indefinite =
+            Error::Linalg { what: "covariance of a line of sight", order, reason: "is not positive definite" };
+        space.factor.factorize().ok_or(indefinite)?;
+        let signal_power = powers.log_signal.exp();
+        let mut whitened = Vec::new();
+        for group in groups {
+            let change = &mut space.inverse;
+            let slope = |slopes: &[f64; PARAMETERS]| {
+                let mut sum = [0.0];
+                gathered(std::slice::from_ref(group), slopes, &mut sum);
+                signal_power * sum[0]
+            };
+            self.change_into(line, &mut space.work, slope, change);
+            whitened.push(whiten(&space.factor, change));
+        }
+        if powers_free {
+            let change = &mut space.inverse;
+            change.clone_from(&space.signal);
+            change.re.iter_mut().chain(&mut change.im).for_each(|v| *v *= signal_power);
+            whitened.push(whiten(&space.factor, change));
+            change.reset(order, space.signal.width);
+            let noise_power = powers.log_noise.exp();
+            for column in change.re.chunks_exact_mut(self.noise.len().min(order)) {
+                column.iter_mut().zip(&self.noise).for_each(|(c, n)| *c = noise_power * n);
+            }
+            whitened.push(whiten(&space.factor, change));
+        }
+        let rays = line.rays.len() as f64;
+        let count = whitened.len();
+        let mut information = Array2::zeros((count, count));
+        for i in 0..count {
+            for j in 0..=i {
+                information[[i, j]] = rays * dot(&whitened[i], &whitened[j]);
+                information[[j, i]] = information[[i, j]];
+            }
+        }
+        Ok(information)
+    }
+}
+
+/// R^-1 z from the factor of R.
+fn solve(factor: &Band, z: &[Complex<f64>]) -> Vec<Complex<f64>> {
+    let (mut re, mut im): (Vec<f64>, Vec<f64>) = z.iter().map(|z| (z.re, z.im)).unzip();
+    factor.forward(&mut re, &mut im, 0, z.len());
+    let mut x: Vec<_> = re.iter().zip(&im).map(|(re, im)| Complex::new(*re, *im)).collect();
+    factor.backward(&mut x);
+    x
+}
+
+/// band += x x^H.
+fn add_outer(band: &mut Band, x: &[Complex<f64>]) {
+    for column in 0..band.order {
+        let conjugate = x[column].conj();
+        for down in 0..=band.width.min(band.order - 1 - column) {
+            let (place, value) = (band.at(column, down), x[column + down] * conjugate);
+            band.re[place] += value.re;
+            band.im[place] += value.im;
+        }
+    }
+}
+
+/// Counts the entries below the diagonal for those above it too.
+fn double_off_diagonal(band: &mut Band) {
+    let stride = band.width + 1;
+    for part in [&mut band.re, &mut band.im] {
+        for column in part.chunks_exact_mut(stride) {
+            column[1..].iter_mut().for_each(|v| *v *= 2.0);
+        }
+    }
+}
+
+/// Re sum of conj(a) b over the stored entries.
+fn product(a: &Band, b: &Band) -> f64 {
+    dot(&a.re, &b.re) + dot(&a.im, &b.im)
+}
+
+/// L^-1 D L^-H of a Hermitian D as real numbers whose scalar product is the trace of a product: the upper triangle, real
+/// and imaginary parts, off-diagonal entries times sqrt 2.
+fn whiten(factor: &Band, d: &Band) -> Vec<f64> {
+    let n = factor.order;
+    let (mut half_re, mut half_im) = (vec![0.0; n * n], vec![0.0; n * n]);
+    let (mut re, mut im) = (vec![0.0; n], vec![0.0; n]);
+    for column in 0..n {
+        let first = column.saturating_sub(d.width);
+        re.fill(0.0);
+        im.fill(0.0);
+        for row in first..column {
+            let place = d.at(row, column - row);
+            (re[row], im[row]) = (d.re[place], -d.im[place]);
+        }
+        for row in column..n.min(column + d.width + 1) {
+            let place = d.at(column, row - column);
+            (re[row], im[row]) = (d.re[place], d.im[place]);
+        }
+        factor.forward(&mut re, &mut im, first, n);
+        // stored as the column of the adjoint
+        for row in first..n {
+            half_re[row * n + column] = re[row];
+            half_im[row * n + column] = -im[row];
+        }
+    }
+    let mut out = Vec::with_capacity(n * (n + 1));
+    for column in 0..n {
+        let (re, im) = (&mut half_re[column * n..(column + 1) * n], &mut half_im[column * n..(column + 1) * n]);
+        factor.forward(re, im, 0, column + 1);
+        out.extend(re[..column].iter().chain(&im[..column]).map(|v| v * std::f64::consts::SQRT_2));
+        out.push(re[column]);
+    }
+    out
+}
+
+#[cfg(test)]
+#[path = "likelihood_tests.rs"]
+mod tests;

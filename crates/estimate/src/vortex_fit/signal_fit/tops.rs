@@ -1,0 +1,224 @@
+//! The tops of the likelihood of raw signals: where they may be, and what the lower ones mean for the error of the highest.
+//!
+//! Few lines cross a core, and each has its speckle: ln p has several tops that differ in the core radius and in the heights
+//! by about the distance of lines. Lines far from the vortices know nothing of that; near one top they are a parabola. So core
+//! radii and heights are tried on the near lines alone: what a height does is added up for the two vortices, the numbers that
+//! ln p is nearly a parabola in (circulations, lateral positions, wind, powers) take the step that the information says, and the
+//! best places are climbed from. Check: the top that a start at the truth finds is found.
+
+use ndarray::Array2;
+
+use crate::error::Error;
+use crate::vortex_fit::damped_newton::solve;
+use crate::vortex_fit::signal_fit::ascent::{Ascent, Parabola, State};
+use crate::vortex_fit::signal_fit::banded_cholesky::dot;
+use crate::vortex_fit::{Parameter, Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
+
+/// Core radii that are tried, over the spacing of the vortices.
+pub(crate) const CORES_OVER_SPACING: [f64; 5] = [0.015, 0.025, 0.042, 0.07, 0.12];
+/// Lines that pass a vortex within this part of the spacing are near.
+const NEAR_OVER_SPACING: f64 = 0.2;
+/// Heights are tried so many steps up and down.
+const STEPS: i32 = 4;
+/// A step of height over its standard deviation.
+const STEP_SIGMAS: f64 = 1.5;
+/// Places from which the near lines are climbed.
+const PLACES: usize = 8;
+/// Tops this far below the best do not count: weight exp(-6).
+const FAR_BELOW: f64 = 6.0;
+/// Of the others, at most so many are reported.
+const MOST: usize = 6;
+/// Tops of the near lines within this of the best are climbed with all lines; the others keep what the near lines say.
+const CLOSE_BELOW: f64 = 2.0;
+/// Tops closer than this many standard deviations are one.
+const SAME_SIGMAS: f64 = 0.3;
+
+/// A top of the likelihood.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LikelihoodTop {
+    /// The wake there.
+    pub wake: Wake,
+    /// The powers there, relative to the model.
+    pub powers: Powers,
+    /// Log-likelihood, but for the constant of the fit.
+    pub log_likelihood: f64,
+}
+
+/// Another top, judged by the near lines.
+pub(crate) struct Candidate {
+    pub(crate) state: State,
+    /// ln p over that of the first top.
+    pub(crate) gain: f64,
+    /// Whether it may be the highest when judged by all lines.
+    pub(crate) close: bool,
+}
+
+/// States near other tops than `top`, the best first, judged by the lines near the vortices.
+///
+/// `model` is the model of all lines, `near` one of the near lines ([`near_lines`]).
+///
+/// # Errors
+/// As [`ScanModel::information`].
+pub(crate) fn other_tops(
+    (model, near): (&ScanModel, &ScanModel),
+    signals: &ScanSignals,
+    top: State,
+    options: &SignalFitOptions,
+    evaluations: &mut usize,
+) -> Result<Vec<Candidate>, Error> {
+    let rough = SignalFitOptions { tolerance_sigmas: 0.1, information_stride: 2, ..*options };
+    let mut ascent = Ascent { model: near, signals, options: &rough, others: None };
+    let Some((value_at_top, at_top)) = ascent.value(&top) else { return Ok(Vec::new()) };
+    let far = model.of_lines(|line| !near.has(line));
+    let information = far.information(&top.0, top.1, &options.free, options.fit_powers, options.information_stride)?;
+    // at the top of all lines those far pull as the near ones do, the other way
+    let gradient = at_top.iter().map(|g| -g).collect();
+    ascent.others = Some(Parabola { about: top, gradient, information });
+    let information = ascent.information(&top, 1)?;
+    let mut found: Vec<(State, f64)> = Vec::new();
+    for start in places(&ascent, &top, &information, evaluations) {
+        let Ok(end) = ascent.climb(start, evaluations) else { continue };
+        if !found.iter().any(|other| same(&ascent, &information, &end.0, &other.0)) {
+            found.push(end);
+        }
+    }
+    let best = found.iter().map(|(_, log_likelihood)| *log_likelihood).fold(value_at_top, f64::max);
+    found.retain(|(state, value)| *value > best - FAR_BELOW && !same(&ascent, &information, state, &top));
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let candidate = |(state, value): (State, f64)| Candidate {
+        state,
+        gain: value - value_at_top,
+        close: value > best - CLOSE_BELOW,
+    };
+    Ok(found.into_iter().take(MOST).map(candidate).collect())
+}
+
+/// The lines near the vortices of a wake.
+pub(crate) fn near_lines(model: &ScanModel, wake: &Wake) -> ScanModel {
+    let reach_m = NEAR_OVER_SPACING * wake.spacing_m();
+    model.of_lines(|line| model.passes_m(line, wake) < reach_m)
+}
+
+/// Whether two states are the same top.
+pub(crate) fn same(ascent: &Ascent<'_>, information: &Array2<f64>, a: &State, b: &State) -> bool {
+    let apart = ascent.steps(a, b);
+    let image: Vec<f64> = information.rows().into_iter().map(|row| dot(&row.to_vec(), &apart)).collect();
+    dot(&image, &apart) < SAME_SIGMAS * SAME_SIGMAS
+}
+
+/// The free numbers that move heights, and those that move core radii.
+fn axes(options: &SignalFitOptions) -> (Vec<usize>, Vec<usize>) {
+    let groups = options.free.groups();
+    let of = |places: [Parameter; 2]| {
+        (0..groups.len()).filter(|&g| groups[g].iter().all(|p| places.iter().any(|q| *q as usize == *p))).collect()
+    };
+    (of([Parameter::LeftHeight, Parameter::RightHeight]), of([Parameter::LeftCore, Parameter::RightCore]))
+}
+
+/// Places to climb from, the most promising first: no two of them are neighbours.
+fn places(ascent: &Ascent<'_>, top: &State, information: &Array2<f64>, evaluations: &mut usize) -> Vec<State> {
+    let (heights, cores) = axes(ascent.options);
+    let Some(deviations) = deviations(information) else { return Vec::new() };
+    let core_m = |k: usize| CORES_OVER_SPACING[k] * top.0.spacing_m();
+    let rows = if cores.is_empty() { 1 } else { CORES_OVER_SPACING.len() };
+    let quick: Vec<usize> = (0..information.nrows()).filter(|i| !heights.contains(i) && !cores.contains(i)).collect();
+    let mut scores: Vec<(f64, usize, Vec<i32>, State)> = Vec::new();
+    for row in 0..rows {
+        let mut at = *top;
+        if !cores.is_empty() {
+            (at.0.left.core_radius_m, at.0.right.core_radius_m) = (core_m(row), core_m(row));
+        }
+        let mut score = |ascent: &Ascent<'_>, state: State| {
+            *evaluations += 1;
+            stepped_quickly(ascent, state, information, &quick)
+        };
+        let Some(middle) = score(ascent, at) else { continue };
+        // what each height does alone, the other where it is
+        let alone: Vec<Vec<Option<(f64, State)>>> = heights
+            .iter()
+            .map(|&axis| {
+                let of = |step: i32| {
+                    if step == 0 {
+                        return Some(middle);
+                    }
+                    let mut by = vec![0.0; deviations.len()];
+                    by[axis] = f64::from(step) * STEP_SIGMAS * deviations[axis];
+                    score(ascent, ascent.stepped(&middle.1, &by))
+                };
+                (-STEPS..=STEPS).map(of).collect()
+            })
+            .collect();
+        combine(ascent, &heights, (row, middle), &alone, &mut scores);
+    }
+    chosen(scores)
+}
+
+/// Adds up what the heights do, for all pairs of them.
+fn combine(
+    ascent: &Ascent<'_>,
+    heights: &[usize],
+    (row, middle): (usize, (f64, State)),
+    alone: &[Vec<Option<(f64, State)>>],
+    scores: &mut Vec<(f64, usize, Vec<i32>, State)>,
+) {
+    let count = 2 * STEPS as usize + 1;
+    for index in 0..count.pow(heights.len() as u32) {
+        let steps: Vec<usize> = (0..heights.len()).map(|axis| index / count.pow(axis as u32) % count).collect();
+        let mut value = middle.0;
+        let mut by = vec![0.0; ascent.steps(&middle.1, &middle.1).len()];
+        for (axis, &step) in steps.iter().enumerate() {
+            let Some((score, state)) = &alone[axis][step] else { continue };
+            value += score - middle.0;
+            by.iter_mut().zip(ascent.steps(&middle.1, state)).for_each(|(b, s)| *b += s);
+        }
+        let steps = steps.iter().map(|&step| step as i32 - STEPS).collect();
+        scores.push((value, row, steps, ascent.stepped(&middle.1, &by)));
+    }
+}
+
+/// The best of the scored places, without neighbours of a better one.
+fn chosen(mut scores: Vec<(f64, usize, Vec<i32>, State)>) -> Vec<State> {
+    scores.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut taken: Vec<(usize, Vec<i32>, State)> = Vec::new();
+    for (_, row, steps, state) in scores {
+        let near = |other: &(usize, Vec<i32>, State)| {
+            other.0.abs_diff(row) <= 1 && other.1.iter().zip(&steps).all(|(a, b)| (a - b).abs() <= 1)
+        };
+        if !taken.iter().any(near) {
+            taken.push((row, steps, state));
+        }
+        if taken.len() == PLACES {
+            break;
+        }
+    }
+    taken.into_iter().map(|(_, _, state)| state).collect()
+}
+
+/// Standard deviations of the free numbers.
+fn deviations(information: &Array2<f64>) -> Option<Vec<f64>> {
+    let n = information.nrows();
+    let variance = |i: usize| {
+        let unit: Vec<f64> = (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect();
+        solve(information, &unit).map(|column| column[i].max(0.0).sqrt())
+    };
+    (0..n).map(variance).collect()
+}
+
+/// The step of Newton of the numbers `quick` alone, at most 3 standard deviations long, with the ln p that it promises.
+fn stepped_quickly(
+    ascent: &Ascent<'_>,
+    state: State,
+    information: &Array2<f64>,
+    quick: &[usize],
+) -> Option<(f64, State)> {
+    let (value, gradient) = ascent.value(&state)?;
+    let n = quick.len();
+    let part = Array2::from_shape_fn((n, n), |(i, j)| information[[quick[i], quick[j]]]);
+    let pull: Vec<f64> = quick.iter().map(|&i| gradient[i]).collect();
+    let step = solve(&part, &pull)?;
+    let promised = dot(&step, &pull);
+    let share = (3.0 / promised.max(0.0).sqrt()).min(1.0);
+    let mut by = vec![0.0; gradient.len()];
+    quick.iter().zip(&step).for_each(|(&i, s)| by[i] = share * s);
+    Some((value + (share - 0.5 * share * share) * promised, ascent.stepped(&state, &by)))
+}

@@ -1,0 +1,79 @@
+//! What is known of core radii before a fit: the logarithm of the core radius over the spacing of the vortices is normal.
+//!
+//! A map that does not resolve the cores tells little of them, and the circulation depends on them: kept at a typical value they
+//! shift it without a word, fitted freely they run away. With the density of what is known the fit takes as much from either as
+//! it tells, and the covariance holds what neither does. Check: difference quotients; the spread of fits over many maps.
+
+use crate::error::{Error, positive};
+use crate::vortex_fit::wake::free_parameters::gathered;
+use crate::vortex_fit::{PARAMETERS, Parameter, Wake};
+
+/// Log-normal density of the core radius over the spacing of the vortices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CorePrior {
+    /// Its median.
+    pub median_over_spacing: f64,
+    /// Standard deviation of its natural logarithm.
+    pub log_deviation: f64,
+}
+
+impl CorePrior {
+    /// Median 4.5 % (the chapter: 3 to 5 % of the span); 2.5 and 8 % are 1.2 standard deviations away.
+    pub const TYPICAL: Self = Self { median_over_spacing: 0.045, log_deviation: 0.5 };
+
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        positive("median_over_spacing", self.median_over_spacing)?;
+        positive("log_deviation", self.log_deviation)
+    }
+
+    /// For each free number that moves core radii: how many deviations the core is away, and the derivatives of that by all
+    /// free numbers.
+    pub(crate) fn terms(&self, wake: &Wake, groups: &[Vec<usize>]) -> Vec<(f64, Vec<f64>)> {
+        let (p, spacing_m) = (wake.to_array(), wake.spacing_m());
+        let term = |place: usize| {
+            let away = (p[place] / (self.median_over_spacing * spacing_m)).ln() / self.log_deviation;
+            let mut all = [0.0; PARAMETERS];
+            all[place] = (self.log_deviation * p[place]).recip();
+            all[Parameter::LeftLateral as usize] = (self.log_deviation * spacing_m).recip();
+            all[Parameter::RightLateral as usize] = -all[Parameter::LeftLateral as usize];
+            let mut slope = vec![0.0; groups.len()];
+            gathered(groups, &all, &mut slope);
+            (away, slope)
+        };
+        groups.iter().filter(|group| is_core(group)).map(|group| term(group[0])).collect()
+    }
+}
+
+/// Whether a free number moves core radii.
+pub(crate) fn is_core(group: &[usize]) -> bool {
+    group.iter().all(|&place| place == Parameter::LeftCore as usize || place == Parameter::RightCore as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vortex_fit::wake::free_parameters::moved;
+    use crate::vortex_fit::{FreeParameters, Sharing};
+
+    #[test]
+    fn terms_are_distances_in_deviations_and_their_slopes_difference_quotients() {
+        let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.3, 0.02]);
+        for core_radius in [Sharing::Common, Sharing::Separate] {
+            let groups = FreeParameters { core_radius, ..Default::default() }.groups();
+            let terms = CorePrior::TYPICAL.terms(&wake, &groups);
+            assert_eq!(terms.len(), if core_radius == Sharing::Common { 1 } else { 2 });
+            for (index, (away, slope)) in terms.iter().enumerate() {
+                assert!((away - (2.0 / 47.0 / 0.045_f64).ln() / 0.5).abs() < 1e-12);
+                for number in 0..groups.len() {
+                    let at = |by: f64| {
+                        let step: Vec<f64> = (0..groups.len()).map(|i| if i == number { by } else { 0.0 }).collect();
+                        CorePrior::TYPICAL.terms(&moved(&groups, &wake, &step), &groups)[index].0
+                    };
+                    assert!((slope[number] - (at(1e-4) - at(-1e-4)) / 2e-4).abs() < 1e-7, "{number}");
+                }
+            }
+        }
+        let fixed = FreeParameters { core_radius: Sharing::Fixed, ..Default::default() }.groups();
+        assert!(CorePrior::TYPICAL.terms(&wake, &fixed).is_empty());
+    }
+}

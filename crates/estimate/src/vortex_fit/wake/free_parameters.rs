@@ -1,0 +1,171 @@
+//! Which parameters of the wake a fit may change, and how they are tied together.
+//!
+//! A free number moves one parameter or two by the same amount; derivatives are summed accordingly.
+//! Check: spreading a step and gathering a gradient are transposes of each other.
+
+use ndarray::Array2;
+
+use crate::vortex_fit::{PARAMETERS, Wake};
+
+/// How a quantity that both vortices have is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sharing {
+    /// It keeps its value.
+    Fixed,
+    /// Both vortices change by the same amount (and start from their mean, lateral positions apart).
+    Common,
+    /// Each vortex has its own.
+    Separate,
+}
+
+/// The background wind of a fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WindFit {
+    /// Keeps its value.
+    Fixed,
+    /// The wind at the ground is fitted, the shear keeps its value.
+    Uniform,
+    /// Wind and shear are fitted.
+    Linear,
+}
+
+/// What a fit may change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FreeParameters {
+    /// Circulations.
+    pub circulation: Sharing,
+    /// Lateral positions; `Common` shifts the pair and keeps its spacing.
+    pub lateral_position: Sharing,
+    /// Heights.
+    pub height: Sharing,
+    /// Core radii.
+    pub core_radius: Sharing,
+    /// Background wind.
+    pub wind: WindFit,
+}
+
+impl Default for FreeParameters {
+    /// Circulations, positions and core radii of each vortex and a uniform wind: nine numbers.
+    fn default() -> Self {
+        Self {
+            circulation: Sharing::Separate,
+            lateral_position: Sharing::Separate,
+            height: Sharing::Separate,
+            core_radius: Sharing::Separate,
+            wind: WindFit::Uniform,
+        }
+    }
+}
+
+impl FreeParameters {
+    /// The same with one circulation for both vortices.
+    #[must_use]
+    pub fn common_circulation() -> Self {
+        Self { circulation: Sharing::Common, ..Self::default() }
+    }
+
+    /// Places of the parameters that each free number moves.
+    pub(crate) fn groups(&self) -> Vec<Vec<usize>> {
+        let mut groups = Vec::new();
+        for (sharing, places) in [
+            (self.circulation, [0, 1]),
+            (self.lateral_position, [2, 4]),
+            (self.height, [3, 5]),
+            (self.core_radius, [6, 7]),
+        ] {
+            match sharing {
+                Sharing::Fixed => {}
+                Sharing::Common => groups.push(places.to_vec()),
+                Sharing::Separate => groups.extend(places.map(|place| vec![place])),
+            }
+        }
+        match self.wind {
+            WindFit::Fixed => {}
+            WindFit::Uniform => groups.push(vec![8]),
+            WindFit::Linear => groups.extend([vec![8], vec![9]]),
+        }
+        groups
+    }
+
+    /// A start that obeys the ties: common quantities at their mean.
+    pub(crate) fn start(&self, wake: &Wake) -> Wake {
+        let mut p = wake.to_array();
+        for (sharing, [a, b]) in [(self.circulation, [0, 1]), (self.height, [3, 5]), (self.core_radius, [6, 7])] {
+            if sharing == Sharing::Common {
+                let mean = 0.5 * (p[a] + p[b]);
+                (p[a], p[b]) = (mean, mean);
+            }
+        }
+        Wake::from_array(&p)
+    }
+}
+
+/// The wake after a step of the free numbers.
+pub(crate) fn moved(groups: &[Vec<usize>], wake: &Wake, step: &[f64]) -> Wake {
+    let mut p = wake.to_array();
+    for (places, by) in groups.iter().zip(step) {
+        places.iter().for_each(|&place| p[place] += by);
+    }
+    Wake::from_array(&p)
+}
+
+/// Derivatives with respect to the free numbers.
+pub(crate) fn gathered(groups: &[Vec<usize>], slope: &[f64; PARAMETERS], out: &mut [f64]) {
+    for (places, out) in groups.iter().zip(out) {
+        *out = places.iter().map(|&place| slope[place]).sum();
+    }
+}
+
+/// Covariance of all parameters \[10, 10\] from that of the free numbers; fixed parameters have zeros.
+pub(crate) fn spread(groups: &[Vec<usize>], covariance: &Array2<f64>) -> Array2<f64> {
+    let mut all = Array2::zeros((PARAMETERS, PARAMETERS));
+    for (i, rows) in groups.iter().enumerate() {
+        for (j, columns) in groups.iter().enumerate() {
+            for &row in rows {
+                for &column in columns {
+                    all[[row, column]] = covariance[[i, j]];
+                }
+            }
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gathering_a_gradient_is_the_transpose_of_spreading_a_step() {
+        let free = FreeParameters {
+            circulation: Sharing::Common,
+            lateral_position: Sharing::Separate,
+            height: Sharing::Common,
+            core_radius: Sharing::Fixed,
+            wind: WindFit::Linear,
+        };
+        let groups = free.groups();
+        assert_eq!(groups.len(), 6);
+        let origin = Wake::from_array(&[0.0; PARAMETERS]);
+        let step: Vec<f64> = (0..6).map(|i| 1.0 + i as f64).collect();
+        let slope: [f64; PARAMETERS] = std::array::from_fn(|i| (i as f64 * 1.7).sin());
+        let mut gradient = vec![0.0; 6];
+        gathered(&groups, &slope, &mut gradient);
+        let spread_step = moved(&groups, &origin, &step).to_array();
+        let a: f64 = spread_step.iter().zip(&slope).map(|(x, y)| x * y).sum();
+        let b: f64 = step.iter().zip(&gradient).map(|(x, y)| x * y).sum();
+        assert!((a - b).abs() < 1e-12);
+        assert_eq!(spread_step[6], 0.0);
+    }
+
+    #[test]
+    fn tied_parameters_share_their_variance_and_fixed_ones_have_none() {
+        let groups = FreeParameters::common_circulation().groups();
+        let covariance = Array2::from_diag(&ndarray::Array1::from_iter((0..groups.len()).map(|i| 1.0 + i as f64)));
+        let all = spread(&groups, &covariance);
+        assert_eq!(all[[0, 0]], 1.0);
+        assert_eq!(all[[0, 1]], 1.0);
+        assert_eq!(all[[9, 9]], 0.0);
+        assert_eq!(all[[2, 4]], 0.0);
+    }
+}

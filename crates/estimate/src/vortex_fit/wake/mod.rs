@@ -1,0 +1,8 @@
+//! The wake that the lidar looks at, what of it may be fitted, and what gates and regions see of it.
+
+pub(crate) mod core_prior;
+pub(crate) mod free_parameters;
+pub(crate) mod pair;
+pub(crate) mod pulse;
+pub(crate) mod range_kernel;
+pub(crate) mod wake_map;

@@ -1,0 +1,359 @@
+//! The wake that the lidar looks at: two vortices, their images below the ground, a background wind; its radial
+//! velocity and the derivatives of that with respect to every parameter.
+//!
+//! A vortex turns the air about it with the angular velocity Omega(r^2) = Gamma(r) / (2 pi r^2), (3) and (4). Seen along a line
+//! of elevation phi its radial velocity is s Omega (dy sin phi - dz cos phi), (dy, dz) the point seen from the centre, s = -1
+//! for the left vortex (clockwise) and +1 for the right one, so that positive circulations move the air between them down.
+//! Check: derivatives against difference quotients; the ground is a streamline; the peak of (4).
+
+use std::f64::consts::PI;
+
+use crate::error::{Error, finite, positive};
+
+/// Root of 2 s + 1 = exp(s): makes the core radius that of the largest speed of a Lamb-Oseen vortex.
+const LAMB_OSEEN_BETA: f64 = 1.256_431_208_626_169_6;
+
+/// Number of parameters of a [`Wake`].
+pub const PARAMETERS: usize = 10;
+
+/// One parameter of a [`Wake`]; `as usize` is its place in gradients and covariances.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parameter {
+    /// Circulation of the left vortex \[m^2/s\].
+    LeftCirculation,
+    /// Circulation of the right vortex \[m^2/s\].
+    RightCirculation,
+    /// Lateral coordinate of the left vortex \[m\].
+    LeftLateral,
+    /// Height of the left vortex \[m\].
+    LeftHeight,
+    /// Lateral coordinate of the right vortex \[m\].
+    RightLateral,
+    /// Height of the right vortex \[m\].
+    RightHeight,
+    /// Core radius of the left vortex \[m\].
+    LeftCore,
+    /// Core radius of the right vortex \[m\].
+    RightCore,
+    /// Lateral wind at the ground \[m/s\].
+    Wind,
+    /// Change of the lateral wind with height \[1/s\].
+    Shear,
+}
+
+/// One vortex.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vortex {
+    /// Circulation \[m^2/s\]; positive is clockwise for the left vortex and anticlockwise for the right one (y to the
+    /// right, z up).
+    pub circulation_m2_s: f64,
+    /// Lateral coordinate y of the centre \[m\].
+    pub lateral_position_m: f64,
+    /// Height z of the centre over the ground \[m\].
+    pub height_m: f64,
+    /// Radius of the largest tangential velocity \[m\].
+    pub core_radius_m: f64,
+}
+
+/// Two vortices and the background wind u(z) = `lateral_wind_m_s` + z `wind_shear_per_s`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wake {
+    /// The vortex at smaller y.
+    pub left: Vortex,
+    /// The vortex at larger y.
+    pub right: Vortex,
+    /// Lateral wind at the ground \[m/s\], positive to larger y.
+    pub lateral_wind_m_s: f64,
+    /// Change of the lateral wind with height \[1/s\].
+    pub wind_shear_per_s: f64,
+}
+
+impl Wake {
+    /// The parameters in the order of [`Parameter`].
+    #[must_use]
+    pub fn to_array(&self) -> [f64; PARAMETERS] {
+        let (l, r) = (&self.left, &self.right);
+        [
+            l.circulation_m2_s,
+            r.circulation_m2_s,
+            l.lateral_position_m,
+            l.height_m,
+            r.lateral_position_m,
+            r.height_m,
+            l.core_radius_m,
+            r.core_radius_m,
+            self.lateral_wind_m_s,
+            self.wind_shear_per_s,
+        ]
+    }
+
+    /// The wake of parameters in the order of [`Parameter`].
+    #[must_use]
+    pub fn from_array(p: &[f64; PARAMETERS]) -> Self {
+        let vortex = |circulation_m2_s, lateral_position_m, height_m, core_radius_m| Vortex {
+            circulation_m2_s,
+            lateral_position_m,
+            height_m,
+            core_radius_m,
+        };
+        Self {
+            left: vortex(p[0], p[2], p[3], p[6]),
+            right: vortex(p[1], p[4], p[5], p[7]),
+            lateral_wind_m_s: p[8],
+            wind_shear_per_s: p[9],
+        }
+    }
+
+    /// Checks that all numbers are finite, cores positive, the left vortex left of the right one.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] with the field at fault.
+    pub fn validate(&self) -> Result<(), Error> {
+        for vortex in [&self.left, &self.right] {
+            finite("circulation_m2_s", vortex.circulation_m2_s)?;
+            finite("lateral_position_m", vortex.lateral_position_m)?;
+            finite("height_m", vortex.height_m)?;
+            positive("core_radius_m", vortex.core_radius_m)?;
+        }
+        positive("distance of the right vortex from the left one", self.spacing_m())?;
+        finite("lateral_wind_m_s", self.lateral_wind_m_s)?;
+        finite("wind_shear_per_s", self.wind_shear_per_s)
+    }
+
+    /// Lateral distance of the vortices \[m\].
+    #[must_use]
+    pub fn spacing_m(&self) -> f64 {
+        self.right.lateral_position_m - self.left.lateral_position_m
+    }
+}
+
+/// Circulation of a vortex as a function of the distance from its centre.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum CoreProfile {
+    /// Gamma r^2 / (r^2 + r_c^2), equation (3).
+    #[default]
+    Algebraic,
+    /// Gamma (1 - exp(-1.2564 r^2 / r_c^2)), Lamb (1932), section 334a.
+    LambOseen,
+}
+
+impl CoreProfile {
+    /// Omega, its derivative with respect to r^2 and to the core radius, for unit circulation.
+    fn angular(self, r2: f64, core_m: f64) -> (f64, f64, f64) {
+        let core2 = core_m * core_m;
+        match self {
+            Self::Algebraic => {
+                let omega = 1.0 / (2.0 * PI * (r2 + core2));
+                let slope = -2.0 * PI * omega * omega;
+                (omega, slope, 2.0 * core_m * slope)
+            }
+            Self::LambOseen => {
+                let s = LAMB_OSEEN_BETA * r2 / core2;
+                let decay = (-s).exp();
+                // (1 - exp(-s))/s and its slope, by their series where the quotients would cancel
+                let (ratio, slope) = if s < 1e-3 {
+                    (1.0 - s / 2.0 + s * s / 6.0, -0.5 + s / 3.0 - s * s / 8.0)
+                } else {
+                    (-(-s).exp_m1() / s, (decay * (1.0 + s) - 1.0) / (s * s))
+                };
+                let scale = LAMB_OSEEN_BETA / (2.0 * PI * core2);
+                (scale * ratio, scale * slope * LAMB_OSEEN_BETA / core2, -2.0 * scale * decay / core_m)
+            }
+        }
+    }
+}
+
+/// What is known of the scene and not fitted: profile, ground, and where the lidar stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WakeModel {
+    /// Circulation against radius.
+    pub profile: CoreProfile,
+    /// Whether the ground z = 0 is a streamline, made so by image vortices.
+    pub images: bool,
+    /// Lateral coordinate of the lidar \[m\].
+    pub lidar_lateral_position_m: f64,
+    /// Height of the lidar over the ground \[m\].
+    pub lidar_height_m: f64,
+}
+
+impl Default for WakeModel {
+    /// Profile (3), images, the lidar at the origin on the ground.
+    fn default() -> Self {
+        Self { profile: CoreProfile::Algebraic, images: true, lidar_lateral_position_m: 0.0, lidar_height_m: 0.0 }
+    }
+}
+
+/// A line of sight with its sine and cosine.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ray {
+    sin: f64,
+    cos: f64,
+}
+
+impl Ray {
+    pub(crate) fn new(elevation_rad: f64) -> Self {
+        let (sin, cos) = elevation_rad.sin_cos();
+        Self { sin, cos }
+    }
+}
+
+impl WakeModel {
+    /// Lateral coordinate and height \[m\] of a point.
+    #[must_use]
+    pub fn position_m(&self, range_m: f64, elevation_rad: f64) -> (f64, f64) {
+        self.place(range_m, Ray::new(elevation_rad))
+    }
+
+    fn place(&self, range_m: f64, ray: Ray) -> (f64, f64) {
+        (self.lidar_lateral_position_m + range_m * ray.cos, self.lidar_height_m + range_m * ray.sin)
+    }
+
+    /// Radial velocity \[m/s\], positive away from the lidar.
+    #[must_use]
+    pub fn radial_velocity_m_s(&self, wake: &Wake, range_m: f64, elevation_rad: f64) -> f64 {
+        self.velocity_on(wake, range_m, Ray::new(elevation_rad))
+    }
+
+    /// Radial velocity \[m/s\] and its derivatives, in the order of [`Parameter`].
+    #[must_use]
+    pub fn gradient(&self, wake: &Wake, range_m: f64, elevation_rad: f64) -> (f64, [f64; PARAMETERS]) {
+        self.gradient_on(wake, range_m, Ray::new(elevation_rad))
+    }
+
+    /// Distance at which a line of sight passes the centre of a vortex \[m\].
+    pub(crate) fn passes_m(&self, ray: Ray, vortex: &Vortex) -> f64 {
+        let (dy, dz) =
+            (vortex.lateral_position_m - self.lidar_lateral_position_m, vortex.height_m - self.lidar_height_m);
+        (dy * ray.sin - dz * ray.cos).abs()
+    }
+
+    /// (vortex, index of its circulation, y, z and core, height of the centre over its sign, sense of turning).
+    fn sources<'w>(&self, wake: &'w Wake) -> impl Iterator<Item = (&'w Vortex, [usize; 4], f64, f64)> + use<'w> {
+        let (left, right, images) = ((&wake.left, [0, 2, 3, 6]), (&wake.right, [1, 4, 5, 7]), self.images);
+        let of = move |((vortex, places), side, sense)| (vortex, places, side, sense);
+        let all = [(left, 1.0, -1.0), (left, -1.0, 1.0), (right, 1.0, 1.0), (right, -1.0, -1.0)];
+        all.into_iter().filter(move |source| images || source.1 > 0.0).map(of)
+    }
+
+    pub(crate) fn velocity_on(&self, wake: &Wake, range_m: f64, ray: Ray) -> f64 {
+        let (y_m, z_m) = self.place(range_m, ray);
+        let mut velocity_m_s = (wake.lateral_wind_m_s + wake.wind_shear_per_s * z_m) * ray.cos;
+        for (vortex, _, side, sense) in self.sources(wake) {
+            let (dy, dz) = (y_m - vortex.lateral_position_m, z_m - side * vortex.height_m);
+            let (omega, _, _) = self.profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
+            velocity_m_s += sense * vortex.circulation_m2_s * omega * (dy * ray.sin - dz * ray.cos);
+        }
+        velocity_m_s
+    }
+
+    pub(crate) fn gradient_on(&self, wake: &Wake, range_m: f64, ray: Ray) -> (f64, [f64; PARAMETERS]) {
+        let (y_m, z_m) = self.place(range_m, ray);
+        let mut slope = [0.0; PARAMETERS];
+        slope[Parameter::Wind as usize] = ray.cos;
+        slope[Parameter::Shear as usize] = z_m * ray.cos;
+        let mut velocity_m_s = (wake.lateral_wind_m_s + wake.wind_shear_per_s * z_m) * ray.cos;
+        for (vortex, [circulation, lateral, height, core], side, sense) in self.sources(wake) {
+            let (dy, dz) = (y_m - vortex.lateral_position_m, z_m - side * vortex.height_m);
+            let (omega, by_r2, by_core) = self.profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
+            let arm = dy * ray.sin - dz * ray.cos;
+            let strength = sense * vortex.circulation_m2_s;
+            velocity_m_s += strength * omega * arm;
+            slope[circulation] += sense * omega * arm;
+            slope[lateral] -= strength * (2.0 * dy * by_r2 * arm + omega * ray.sin);
+            slope[height] += side * strength * (omega * ray.cos - 2.0 * dz * by_r2 * arm);
+            slope[core] += strength * by_core * arm;
+        }
+        (velocity_m_s, slope)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn wake() -> Wake {
+        let vortex = |circulation_m2_s, lateral_position_m, height_m, core_radius_m| Vortex {
+            circulation_m2_s,
+            lateral_position_m,
+            height_m,
+            core_radius_m,
+        };
+        Wake {
+            left: vortex(480.0, 376.5, 45.0, 2.0),
+            right: vortex(520.0, 423.5, 49.0, 2.7),
+            lateral_wind_m_s: 1.3,
+            wind_shear_per_s: 0.02,
+        }
+    }
+
+    #[test]
+    fn derivatives_are_difference_quotients_for_both_profiles_with_and_without_ground() {
+        for profile in [CoreProfile::Algebraic, CoreProfile::LambOseen] {
+            for images in [true, false] {
+                let model = WakeModel { profile, images, lidar_lateral_position_m: -20.0, lidar_height_m: 1.5 };
+                // the last two are inside a core, one within the series of the Lamb-Oseen profile
+                for (range_m, elevation_rad) in [(300.0, 0.05), (420.0, 0.2), (399.0, 0.109_3), (398.923_6, 0.109_261)]
+                {
+                    let (velocity, slope) = model.gradient(&wake(), range_m, elevation_rad);
+                    assert_eq!(velocity, model.radial_velocity_m_s(&wake(), range_m, elevation_rad));
+                    for index in 0..PARAMETERS {
+                        let moved = |by: f64| {
+                            let mut p = wake().to_array();
+                            p[index] += by;
+                            model.radial_velocity_m_s(&Wake::from_array(&p), range_m, elevation_rad)
+                        };
+                        let h = 1e-4;
+                        let quotient = (8.0 * (moved(h) - moved(-h)) - (moved(2.0 * h) - moved(-2.0 * h))) / (12.0 * h);
+                        assert_relative_eq!(slope[index], quotient, max_relative = 1e-8, epsilon = 1e-9);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_ground_is_a_streamline_and_the_air_between_the_vortices_moves_down() {
+        let model = WakeModel { lidar_lateral_position_m: 410.0, ..Default::default() };
+        let wake = Wake { lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0, ..wake() };
+        let up = std::f64::consts::FRAC_PI_2;
+        assert!(model.radial_velocity_m_s(&wake, 0.0, up).abs() < 1e-12);
+        assert!(model.radial_velocity_m_s(&wake, 47.0, up) < -5.0);
+    }
+
+    #[test]
+    fn a_vertical_line_through_a_core_sees_the_peak_velocity_at_the_core_radius() {
+        // beside a lone right vortex, r_c to its right, the air rises at Gamma/(4 pi r_c)
+        let wake = Wake {
+            left: Vortex { circulation_m2_s: 0.0, ..wake().left },
+            lateral_wind_m_s: 0.0,
+            wind_shear_per_s: 0.0,
+            ..wake()
+        };
+        let right = wake.right;
+        for (profile, peak_m_s) in [
+            (CoreProfile::Algebraic, 520.0 / (4.0 * PI * 2.7)),
+            (CoreProfile::LambOseen, 520.0 * (1.0 - (-LAMB_OSEEN_BETA).exp()) / (2.0 * PI * 2.7)),
+        ] {
+            let model = WakeModel {
+                profile,
+                images: false,
+                lidar_lateral_position_m: right.lateral_position_m + right.core_radius_m,
+                ..Default::default()
+            };
+            let velocity = model.radial_velocity_m_s(&wake, right.height_m, std::f64::consts::FRAC_PI_2);
+            assert_relative_eq!(velocity, peak_m_s, max_relative = 1e-12);
+        }
+    }
+
+    #[test]
+    fn impossible_wakes_are_refused_with_the_field_name() {
+        assert!(wake().validate().is_ok());
+        let mut bad = wake();
+        bad.left.core_radius_m = 0.0;
+        assert!(bad.validate().unwrap_err().to_string().contains("core_radius_m"));
+        let mut bad = wake();
+        std::mem::swap(&mut bad.left, &mut bad.right);
+        assert!(bad.validate().unwrap_err().to_string().contains("right vortex"));
+    }
+}

@@ -1,0 +1,217 @@
+//! Radial velocity as a range gate reports it: the wind along a line weighted by pulse and window, with derivatives.
+//!
+//! v(R) = sum over i of w_i v_R(R + offset_i), the weights summing to 1: (28), corrected, on a grid.
+//! Check: a linear wind is kept but for the mean offset; gates between grid points are interpolated; derivatives against
+//! difference quotients.
+
+use crate::error::{Error, finite, positive};
+use crate::vortex_fit::signal_fit::banded_cholesky::dot;
+use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::{PARAMETERS, Wake, WakeModel};
+use crate::window::SPEED_OF_LIGHT_M_S;
+
+/// Weights of the air about the range of a gate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RangeKernel {
+    first_offset_m: f64,
+    spacing_m: f64,
+    weights: Vec<f64>,
+}
+
+impl RangeKernel {
+    /// `weights` of the air at R + `first_offset_m`, `spacing_m` apart; they are scaled to the sum 1.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for an offset or weight that is not finite, a spacing or a sum that is not positive.
+    pub fn new(first_offset_m: f64, spacing_m: f64, weights: &[f64]) -> Result<Self, Error> {
+        finite("first_offset_m", first_offset_m)?;
+        positive("spacing_m", spacing_m)?;
+        weights.iter().try_for_each(|w| finite("weights", *w))?;
+        let sum: f64 = weights.iter().sum();
+        positive("sum of the weights", sum)?;
+        let weights = weights.iter().map(|w| w / sum).collect();
+        Ok(Self { first_offset_m, spacing_m, weights })
+    }
+
+    /// The weights of a Gaussian pulse of 1/e half-width `pulse_sigma_s` \[s\] seen through the window `window`, h_n, of samples
+    /// `period_s` \[s\] apart: |f|^2 convolved with h^2, on a grid of `spacing_m` \[m\]. A window of one sample gives the
+    /// weights of the pulse alone (whose range is then c T_s/4 before that of the window, as [`Gates`](crate::Gates) place it).
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for numbers that are not positive or a window without power.
+    pub fn gaussian_gate(pulse_sigma_s: f64, window: &[f64], period_s: f64, spacing_m: f64) -> Result<Self, Error> {
+        positive("pulse_sigma_s", pulse_sigma_s)?;
+        positive("period_s", period_s)?;
+        positive("spacing_m", spacing_m)?;
+        positive("power of the window", window.iter().map(|h| h * h).sum())?;
+        let half_s = 0.5 * window.len() as f64 * period_s;
+        let reach = (0.5 * SPEED_OF_LIGHT_M_S * (half_s + 4.0 * pulse_sigma_s) / spacing_m).ceil() as i64;
+        let weights: Vec<f64> = (-reach..=reach)
+            .map(|i| {
+                let time_s = 2.0 * i as f64 * spacing_m / SPEED_OF_LIGHT_M_S;
+                let away = |n: usize| (time_s - n as f64 * period_s + half_s) / pulse_sigma_s;
+                window.iter().enumerate().map(|(n, h)| h * h * (-away(n) * away(n)).exp()).sum()
+            })
+            .collect();
+        Self::new(-(reach as f64) * spacing_m, spacing_m, &weights)
+    }
+
+    /// The same kernel on a grid about `factor` times as coarse.
+    pub(crate) fn coarser(&self, factor: usize) -> Self {
+        if factor <= 1 || self.weights.len() <= factor {
+            return self.clone();
+        }
+        let weights: Vec<f64> = self.weights.chunks(factor).map(|chunk| chunk.iter().sum()).collect();
+        Self {
+            first_offset_m: self.first_offset_m + 0.5 * (factor - 1) as f64 * self.spacing_m,
+            spacing_m: factor as f64 * self.spacing_m,
+            weights,
+        }
+    }
+}
+
+/// Wind on the grid of one line.
+#[derive(Debug, Default)]
+pub(crate) struct LineScratch {
+    rows: Vec<Vec<f64>>,
+}
+
+impl RangeKernel {
+    /// Mean velocity of the gate whose first weight falls on grid point `index`, and the means of the other rows.
+    fn means(&self, rows: &[Vec<f64>], index: usize) -> [f64; PARAMETERS + 1] {
+        let mut found = [0.0; PARAMETERS + 1];
+        for (found, row) in found.iter_mut().zip(rows) {
+            *found = dot(&self.weights, &row[index..index + self.weights.len()]);
+        }
+        found
+    }
+
+    /// Gate velocities of a line, and with `slopes` their derivatives: `out(gate, velocity, derivatives)` for each range.
+    pub(crate) fn apply(
+        &self,
+        (model, wake, ray): (&WakeModel, &Wake, Ray),
+        range_m: &[f64],
+        slopes: bool,
+        scratch: &mut LineScratch,
+        mut out: impl FnMut(usize, f64, &[f64; PARAMETERS]),
+    ) {
+        let nearest_m = range_m.iter().copied().fold(f64::INFINITY, f64::min);
+        let farthest_m = range_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + self.weights.len() + 1;
+        let numbers = if slopes { PARAMETERS + 1 } else { 1 };
+        scratch.rows.resize_with(PARAMETERS + 1, Vec::new);
+        for row in &mut scratch.rows {
+            row.clear();
+        }
+        for i in 0..points {
+            let at_m = nearest_m + self.first_offset_m + i as f64 * self.spacing_m;
+            if slopes {
+                let (velocity, slope) = model.gradient_on(wake, at_m, ray);
+                scratch.rows[0].push(velocity);
+                scratch.rows[1..].iter_mut().zip(slope).for_each(|(row, s)| row.push(s));
+            } else {
+                scratch.rows[0].push(model.velocity_on(wake, at_m, ray));
+            }
+        }
+        for (gate, &r_m) in range_m.iter().enumerate() {
+            let place = (r_m - nearest_m) / self.spacing_m;
+            let index = (place + 1e-9).floor();
+            let part = (place - index).max(0.0);
+            let index = index as usize;
+            let mut found = self.means(&scratch.rows[..numbers], index);
+            if part > 1e-6 {
+                let next = self.means(&scratch.rows[..numbers], index + 1);
+                found.iter_mut().zip(next).for_each(|(f, n)| *f += part * (n - *f));
+            }
+            let mut slope = [0.0; PARAMETERS];
+            slope.copy_from_slice(&found[1..]);
+            out(gate, found[0], &slope);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    impl RangeKernel {
+        /// Root mean square width of the weights \[m\].
+        fn width_m(&self) -> f64 {
+            let moment = |power: i32, centre_m: f64| -> f64 {
+                let offsets =
+                    (0..self.weights.len()).map(|i| self.first_offset_m + i as f64 * self.spacing_m - centre_m);
+                offsets.zip(&self.weights).map(|(offset_m, w)| offset_m.powi(power) * w).sum()
+            };
+            moment(2, moment(1, 0.0)).max(0.0).sqrt()
+        }
+    }
+
+    fn wake() -> Wake {
+        Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02])
+    }
+
+    fn gate() -> RangeKernel {
+        let window: Vec<f64> = (0..64).map(|n| (-0.5 * ((f64::from(n) - 31.5) / 16.0).powi(2)).exp()).collect();
+        RangeKernel::gaussian_gate(120e-9, &window, 4e-9, 0.6).unwrap()
+    }
+
+    #[test]
+    fn a_linear_wind_is_seen_a_quarter_sample_before_the_range_of_the_gate() {
+        let model = WakeModel::default();
+        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1]);
+        let elevation_rad = 0.3_f64;
+        let ranges = [300.0, 300.25, 412.3];
+        gate().apply(
+            (&model, &calm, Ray::new(elevation_rad)),
+            &ranges,
+            false,
+            &mut LineScratch::default(),
+            |i, v, _| {
+                let at_m = ranges[i] - 0.25 * SPEED_OF_LIGHT_M_S * 4e-9;
+                let expected = (1.0 + 0.1 * at_m * elevation_rad.sin()) * elevation_rad.cos();
+                assert_relative_eq!(v, expected, max_relative = 1e-9);
+            },
+        );
+    }
+
+    #[test]
+    fn weights_have_the_width_of_pulse_and_window_and_a_coarser_grid_keeps_it() {
+        // variance of |f|^2: sigma^2 / 2; of h^2: 8^2 * 2 samples^2
+        let expected = 0.5 * SPEED_OF_LIGHT_M_S * (120e-9_f64.powi(2) / 2.0 + (16.0 * 4e-9_f64).powi(2) / 2.0).sqrt();
+        assert_relative_eq!(gate().width_m(), expected, max_relative = 2e-2);
+        assert_relative_eq!(gate().coarser(4).width_m(), expected, max_relative = 3e-2);
+        assert!(gate().coarser(4).weights.len() < gate().weights.len() / 3);
+    }
+
+    #[test]
+    fn derivatives_of_gate_velocities_are_difference_quotients() {
+        let (model, kernel, ray) = (WakeModel::default(), gate(), Ray::new(0.12));
+        let ranges = [377.7, 400.0];
+        let values = |wake: &Wake| {
+            let mut values = vec![];
+            kernel.apply((&model, wake, ray), &ranges, false, &mut LineScratch::default(), |_, v, _| values.push(v));
+            values
+        };
+        kernel.apply((&model, &wake(), ray), &ranges, true, &mut LineScratch::default(), |gate, velocity, slope| {
+            assert_eq!(velocity, values(&wake())[gate]);
+            for (index, slope) in slope.iter().enumerate() {
+                let moved = |by: f64| {
+                    let mut p = wake().to_array();
+                    p[index] += by;
+                    values(&Wake::from_array(&p))[gate]
+                };
+                let quotient = (moved(1e-4) - moved(-1e-4)) / 2e-4;
+                assert_relative_eq!(*slope, quotient, max_relative = 1e-6, epsilon = 1e-8);
+            }
+        });
+    }
+
+    #[test]
+    fn kernels_without_weight_or_spacing_are_refused() {
+        assert!(RangeKernel::new(0.0, 1.0, &[]).is_err());
+        assert!(RangeKernel::new(0.0, 0.0, &[1.0]).is_err());
+        assert!(RangeKernel::new(0.0, 1.0, &[1.0, f64::NAN]).is_err());
+        assert!(RangeKernel::gaussian_gate(120e-9, &[0.0; 4], 4e-9, 1.0).is_err());
+    }
+}

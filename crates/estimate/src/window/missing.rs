@@ -1,0 +1,176 @@
+//! Which samples are no measurements: not finite, fill values, and those that dwarf all others.
+//!
+//! A window that holds one is left out. What is left is scaled by a power of two, so that amplitudes of 1e-200 and 1e200
+//! keep their velocity to the last bit. Check: windows without such a sample keep every bit of a record without it.
+
+use crate::window::{Gates, Sample};
+
+/// Binary orders of magnitude without a sample above which the larger samples are no signal, if they are the fewer ones.
+///
+/// 2^20 in amplitude are 120 dB in power: more than lies between the noise of a detector and a hard target.
+const GAP: usize = 20;
+
+/// What counts as a missing sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MissingSamples {
+    /// Values that stand for a sample that was not taken; one part of a complex sample is enough.
+    pub fill: Vec<f64>,
+    /// Whether samples count as missing that are more than 2^20 times larger than the next smaller ones, where they are
+    /// less than half of all that are not 0.
+    ///
+    /// A single 1e308 or an unknown fill value would otherwise outweigh all windows of its region.
+    pub outsized: bool,
+}
+
+impl Default for MissingSamples {
+    /// The fill values -9999 and that of NetCDF, 9.97e36, and outsized samples.
+    ///
+    /// Raw counts of a converter may well be -9999: they need [`MissingSamples::not_finite`].
+    fn default() -> Self {
+        // the default fill of NetCDF's floats and doubles is 15 x 2^119
+        Self { fill: vec![-9999.0, 15.0 * 119f64.exp2()], outsized: true }
+    }
+}
+
+impl MissingSamples {
+    /// Only samples that are not finite are missing.
+    #[must_use]
+    pub fn not_finite() -> Self {
+        Self { fill: Vec::new(), outsized: false }
+    }
+
+    /// The rule for a set of samples.
+    pub(crate) fn rule<S: Sample>(&self, samples: impl Iterator<Item = S>) -> Rule<'_> {
+        let mut rule = Rule { fill: &self.fill, limit: f64::INFINITY };
+        if self.outsized {
+            let mut counts = vec![0_usize; 2048];
+            for sample in samples.filter(|sample| rule.is_measured(*sample) && sample.largest_part() > 0.0) {
+                counts[order(sample.largest_part())] += 1;
+            }
+            rule.limit = limit(&counts);
+        }
+        rule
+    }
+}
+
+/// Tells measured samples from missing ones.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rule<'a> {
+    fill: &'a [f64],
+    /// Samples of this size and above are missing.
+    limit: f64,
+}
+
+impl Rule<'_> {
+    /// Only samples that are not finite are missing.
+    pub(crate) const NOT_FINITE: Rule<'static> = Rule { fill: &[], limit: f64::INFINITY };
+
+    pub(crate) fn is_measured<S: Sample>(&self, sample: S) -> bool {
+        sample.is_finite() && sample.largest_part() < self.limit && !self.fill.iter().any(|fill| sample.has_part(*fill))
+    }
+
+    /// Power of two next to the largest part of the measured samples; 1 if there is none above 0.
+    ///
+    /// Dividing by it is exact and brings the samples to order one, so that squares neither overflow nor vanish.
+    pub(crate) fn binary_scale<S: Sample>(&self, samples: impl Iterator<Item = S>) -> f64 {
+        self.largest_binary_scale(samples).unwrap_or(1.0)
+    }
+
+    /// The same; `None` if there is no sample above 0.
+    pub(crate) fn largest_binary_scale<S: Sample>(&self, samples: impl Iterator<Item = S>) -> Option<f64> {
+        let measured = samples.filter(|sample| self.is_measured(*sample));
+        let largest = measured.fold(0.0_f64, |largest, sample| largest.max(sample.largest_part()));
+        // clamped so that the scale and its inverse are both normal numbers
+        (largest > 0.0).then(|| largest.log2().floor().clamp(-1000.0, 1000.0).exp2())
+    }
+}
+
+/// Which windows of a ray hold a missing sample; `None` if no one does.
+pub(crate) fn invalid_windows<S: Sample>(
+    samples: impl Iterator<Item = S>,
+    rule: &Rule<'_>,
+    gates: &Gates,
+    count: usize,
+) -> Option<Vec<bool>> {
+    let missing = samples.enumerate().filter(|(_, sample)| !rule.is_measured(*sample));
+    let bad: Vec<usize> = missing.map(|(index, _)| index).collect();
+    let invalid = |gate: usize| {
+        let start = gate * gates.step_samples;
+        let next = bad.partition_point(|index| *index < start);
+        bad.get(next).is_some_and(|index| *index < start + gates.window_samples)
+    };
+    (!bad.is_empty()).then(|| (0..count).map(invalid).collect())
+}
+
+/// Binary order of magnitude of a number from 0 on, as its exponent is stored.
+fn order(value: f64) -> usize {
+    (value.to_bits() >> 52) as usize & 0x7ff
+}
+
+/// Size from which on samples are outsized; `counts` holds how many there are of each order.
+fn limit(counts: &[usize]) -> f64 {
+    let all: usize = counts.iter().sum();
+    let (mut above, mut last, mut limit) = (0, None, f64::INFINITY);
+    for (order, count) in counts.iter().enumerate().rev().filter(|(_, count)| **count > 0) {
+        if let Some(last) = last
+            && last - order > GAP
+            && 2 * above < all
+        {
+            limit = f64::from_bits((last as u64) << 52);
+        }
+        above += count;
+        last = Some(order);
+    }
+    limit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_complex::Complex;
+
+    fn measured(samples: &[f64]) -> Vec<bool> {
+        let missing = MissingSamples::default();
+        let rule = missing.rule(samples.iter().copied());
+        samples.iter().map(|sample| rule.is_measured(*sample)).collect()
+    }
+
+    #[test]
+    fn fill_values_and_the_few_that_dwarf_the_others_are_missing() {
+        assert_eq!(measured(&[0.3, f64::NAN, -0.1, 1e308, 0.0]), [true, false, true, false, true]);
+        assert_eq!(measured(&[1.0, -9999.0, 2.0, 9.969_209_968_386_869e36]), [true, false, true, false]);
+        assert_eq!(measured(&[1e-6, -9999.0, 9999.0, 1e-6, 2e-6]), [true, false, false, true, true]);
+        // several unlike ones, each far above the next
+        assert_eq!(
+            measured(&[1e-6, 1e300, 1e30, 3e-6, 1e-6, 2e-6, 1e6]),
+            [true, false, false, true, true, true, false]
+        );
+    }
+
+    #[test]
+    fn what_a_detector_can_see_is_measured() {
+        // 100 dB between noise and target, and amplitudes without any scale
+        assert_eq!(measured(&[1.0, 1e5, -2.0]), [true; 3]);
+        assert_eq!(measured(&[1e200, -3e200, 0.0]), [true; 3]);
+        // the larger ones are the more: the small ones are residues of rounding
+        assert_eq!(measured(&[1e-17, 1.0, -1.0, 0.5]), [true; 4]);
+        assert_eq!(measured(&[0.0, 5.0]), [true; 2]);
+        let all = MissingSamples::not_finite();
+        assert!(
+            all.rule([1.0, 1e308].into_iter()).is_measured(1e308) && !all.rule([1.0].into_iter()).is_measured(f64::NAN)
+        );
+    }
+
+    #[test]
+    fn scale_is_a_power_of_two_next_to_the_largest_sample() {
+        fn scale<S: Sample>(samples: &[S]) -> f64 {
+            let missing = MissingSamples::default();
+            missing.rule(samples.iter().copied()).binary_scale(samples.iter().copied())
+        }
+        assert_eq!(scale(&[0.3, -5.0, f64::NAN, 1e300, 2.0]), 4.0);
+        assert_eq!(scale(&[Complex::new(0.0, 0.25)]), 0.25);
+        assert_eq!(scale(&[Complex::new(0.5, -9999.0), Complex::new(1.0, 1.0)]), 1.0);
+        assert_eq!(scale(&[0.0]), 1.0);
+        assert!(scale(&[1e-320]).recip().is_finite());
+    }
+}

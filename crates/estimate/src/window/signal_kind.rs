@@ -1,0 +1,43 @@
+//! Whether samples are real or complex, and how the lags of their correlograms are stored.
+//!
+//! Check: in the tests of the statistics, for both kinds of samples.
+
+use num_complex::Complex;
+use std::fmt;
+
+/// Whether samples are real (intermediate frequency) or complex (analytic signal or baseband).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum SignalKind {
+    /// Real samples; the spectrum is even and only frequencies 0 .. F_s/2 count.
+    Real,
+    /// Complex samples; frequencies -F_s/2 .. F_s/2 are distinct.
+    Complex,
+}
+
+impl SignalKind {
+    /// How many `f64` hold `lags` lags of a correlogram: one each if real, (re, im) pairs if complex.
+    #[must_use]
+    pub fn lag_numbers(self, lags: usize) -> usize {
+        match self {
+            Self::Real => lags,
+            Self::Complex => 2 * lags,
+        }
+    }
+
+    /// Lag `index` out of a stored correlogram.
+    pub(crate) fn lag(self, numbers: &[f64], index: usize) -> Complex<f64> {
+        match self {
+            Self::Real => Complex::new(numbers[index], 0.0),
+            Self::Complex => Complex::new(numbers[2 * index], numbers[2 * index + 1]),
+        }
+    }
+}
+
+impl fmt::Display for SignalKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Real => "real",
+            Self::Complex => "complex",
+        })
+    }
+}

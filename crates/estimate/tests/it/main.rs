@@ -1,0 +1,18 @@
+//! What the estimators promise, one module for each subject.
+
+// A test that cannot set up its case has failed.
+#![allow(clippy::unwrap_used)]
+
+mod accumulate;
+mod bound;
+mod correlogram_estimators;
+mod draw;
+mod extremes;
+mod fixtures;
+mod gradient_likelihood;
+mod likelihood;
+mod models;
+mod periodogram;
+mod quality;
+mod sliding;
+mod vortex_fit;

@@ -1,0 +1,135 @@
+//! Statements about results, measured: those of the chapter about its figures, bars of flows, tolerances of stored curves.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// How a claim came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Verdict {
+    Pass,
+    Fail,
+    /// The uncertainty, or the resolution of the profile, does not allow a verdict.
+    NotResolved,
+}
+
+impl Verdict {
+    /// Pass or fail.
+    pub(crate) fn of(pass: bool) -> Self {
+        if pass { Self::Pass } else { Self::Fail }
+    }
+
+    /// Of differences in standard errors: pass if all are above `limit`, fail if one is below its negative.
+    pub(crate) fn of_differences(z: &[f64], limit: f64) -> Self {
+        match (z.iter().all(|z| *z > limit), z.iter().any(|z| *z < -limit)) {
+            (true, _) => Self::Pass,
+            (_, true) => Self::Fail,
+            _ => Self::NotResolved,
+        }
+    }
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Fail => "fail",
+            Self::NotResolved => "not_resolved",
+        }
+    }
+}
+
+/// A statement, measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Claim {
+    /// A number of its own, such as F7a; a flow's bar has none.
+    pub(crate) id: String,
+    /// What it is about: a figure; empty where the task says it.
+    pub(crate) figure: String,
+    pub(crate) statement: String,
+    pub(crate) expected: String,
+    pub(crate) measured: String,
+    /// NaN where the measurement is deterministic.
+    pub(crate) standard_error: f64,
+    pub(crate) verdict: Verdict,
+}
+
+impl Claim {
+    /// A claim that a computation without random numbers decides.
+    pub(crate) fn exact(id: &str, figure: &str, statement: &str, expected: &str, measured: String, pass: bool) -> Self {
+        Self {
+            id: id.into(),
+            figure: figure.into(),
+            statement: statement.into(),
+            expected: expected.into(),
+            measured,
+            standard_error: f64::NAN,
+            verdict: Verdict::of(pass),
+        }
+    }
+
+    /// A quantity that may be `allowed` from its reference, in its own unit; what is not a number passes no bar.
+    pub(crate) fn within(quantity: &str, measured: f64, reference: f64, allowed: f64) -> Self {
+        let expected = format!("{} +- {allowed:.2e}", number(reference));
+        Self::exact("", "", quantity, &expected, number(measured), (measured - reference).abs() <= allowed)
+    }
+
+    /// Within `share` of the reference.
+    pub(crate) fn relative(quantity: &str, measured: f64, reference: f64, share: f64) -> Self {
+        Self::within(quantity, measured, reference, share * reference.abs())
+    }
+
+    /// At least `reference`.
+    pub(crate) fn at_least(quantity: &str, measured: f64, reference: f64) -> Self {
+        let expected = format!("at least {}", number(reference));
+        Self::exact("", "", quantity, &expected, number(measured), measured >= reference)
+    }
+
+    /// At most `reference`.
+    pub(crate) fn at_most(quantity: &str, measured: f64, reference: f64) -> Self {
+        let expected = format!("at most {}", number(reference));
+        Self::exact("", "", quantity, &expected, number(measured), measured <= reference)
+    }
+
+    pub(crate) fn passes(&self) -> bool {
+        self.verdict == Verdict::Pass
+    }
+}
+
+/// Six digits after the point, or of a small number.
+fn number(x: f64) -> String {
+    if x == 0.0 || x.abs() >= 1e-3 { format!("{x:.6}") } else { format!("{x:.6e}") }
+}
+
+impl fmt::Display for Claim {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { id, statement, expected, measured, .. } = self;
+        write!(f, "{:<12} {id:<4} {statement}: expected {expected}, measured {measured}", self.verdict.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_hold_their_ends_and_nothing_that_is_no_number() {
+        assert!(Claim::relative("q", 1.01, 1.0, 0.0101).passes() && !Claim::relative("q", 1.02, 1.0, 0.01).passes());
+        assert!(Claim::at_least("q", 2.0, 2.0).passes() && !Claim::at_least("q", 1.9, 2.0).passes());
+        assert!(Claim::at_most("q", 2.0, 2.0).passes() && !Claim::at_most("q", 2.1, 2.0).passes());
+        for claim in [Claim::within("q", f64::NAN, 0.0, 1.0), Claim::at_least("q", f64::NAN, 0.0)] {
+            assert!(!claim.passes() && claim.measured == "NaN");
+        }
+        assert_eq!(
+            Claim::at_most("q", 2e-9, 0.5).to_string(),
+            "pass              q: expected at most 0.500000, measured 2.000000e-9"
+        );
+    }
+
+    #[test]
+    fn differences_decide_only_beyond_their_errors() {
+        let of = |z: &[f64]| Verdict::of_differences(z, 2.0);
+        assert_eq!(
+            [of(&[2.1, 3.0]), of(&[3.0, -2.1]), of(&[3.0, 0.5])],
+            [Verdict::Pass, Verdict::Fail, Verdict::NotResolved]
+        );
+    }
+}

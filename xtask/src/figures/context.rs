@@ -1,0 +1,83 @@
+//! What every figure takes, and what it gives.
+
+use crate::Failure;
+use crate::claim::Claim;
+use crate::profile::Profile;
+use crate::workspace::provenance;
+use std::path::PathBuf;
+use wakescope_sim::export::Provenance;
+use wakescope_sim::scene::Scene;
+
+/// What a figure may depend on.
+#[derive(Debug, Clone)]
+pub(crate) struct Context {
+    pub(crate) profile: Profile,
+    pub(crate) seed: u64,
+    /// Folder for runs that several figures share, and whether they are made anew.
+    pub(crate) stages: PathBuf,
+    pub(crate) anew: bool,
+    /// Folder of a wake that is to be shown instead of that of the profile.
+    pub(crate) wake: Option<PathBuf>,
+    /// Whether figures 10 to 14 look at the analytic pair instead of the simulated wake.
+    pub(crate) analytic: bool,
+}
+
+impl Context {
+    /// One of three values, by profile.
+    pub(crate) fn choose<T>(&self, quick: T, standard: T, full: T) -> T {
+        self.profile.choose(quick, standard, full)
+    }
+
+    pub(crate) fn profile_name(&self) -> &'static str {
+        self.profile.name()
+    }
+
+    /// The scene of a figure as a checked file, with this run's seed.
+    pub(crate) fn scene_file(&self, mut scene: Scene) -> Result<wakescope_sim::scene::SceneFile, Failure> {
+        scene.seed = self.seed;
+        wakescope_sim::scene::SceneFile::new(scene)
+            .map_err(|problems| Failure::new(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")))
+    }
+
+    /// Provenance of what belongs to no scene: the tables over all figures.
+    pub(crate) fn provenance_of_run(&self) -> Provenance {
+        self.provenance_of_formula(&format!("profile = \"{}\"\n", self.profile_name()))
+    }
+
+    /// Provenance of a figure that follows from formulas and the parameters given as TOML.
+    pub(crate) fn provenance_of_formula(&self, parameters: &str) -> Provenance {
+        provenance(parameters, self.seed)
+    }
+}
+
+/// What a figure gives.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Rendered {
+    /// Extension and content of each file.
+    pub(crate) files: Vec<(String, Vec<u8>)>,
+    /// What is drawn, for the report.
+    pub(crate) caption: String,
+    /// Short notes beside the name, such as what is not the real thing.
+    pub(crate) marks: Vec<String>,
+    /// Claims measured on the data of the run.
+    pub(crate) claims: Vec<Claim>,
+    /// Stage and wall-clock time, s.
+    pub(crate) timings: Vec<(String, f64)>,
+}
+
+impl Rendered {
+    /// A table, as the figure's CSV.
+    pub(crate) fn csv(&mut self, text: String) {
+        self.files.push(("csv".into(), text.into_bytes()));
+    }
+
+    /// A picture, as SVG and PNG.
+    pub(crate) fn picture(&mut self, svg: String, png: Vec<u8>) {
+        self.files.push(("svg".into(), svg.into_bytes()));
+        self.files.push(("png".into(), png));
+    }
+
+    pub(crate) fn file(&self, extension: &str) -> Option<&[u8]> {
+        self.files.iter().find(|(e, _)| e == extension).map(|(_, bytes)| bytes.as_slice())
+    }
+}

@@ -1,0 +1,31 @@
+//! How much a task computes.
+
+/// Resolution and sample counts of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Profile {
+    /// Minutes: every component, coarse meshes and small samples; most bars of flows are then wider.
+    Quick,
+    /// Up to hours: what the documentation shows.
+    Standard,
+    /// The chapter's own numbers, and the turbulent channel.
+    Full,
+}
+
+impl Profile {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Quick => "quick",
+            Self::Standard => "standard",
+            Self::Full => "full",
+        }
+    }
+
+    /// One of three values.
+    pub(crate) fn choose<T>(self, quick: T, standard: T, full: T) -> T {
+        match self {
+            Self::Quick => quick,
+            Self::Standard => standard,
+            Self::Full => full,
+        }
+    }
+}
