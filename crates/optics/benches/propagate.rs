@@ -4,8 +4,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::hint::black_box;
-use wakescope_optics::propagate::{Propagator, TransferKind};
-use wakescope_optics::{Grid, Real};
+use wakescope_optics::Grid;
+use wakescope_optics::screens::{Propagator, Real, TransferKind};
 
 const N: usize = 512;
 
@@ -46,7 +46,7 @@ fn transform_pair<T: Real>(c: &mut Criterion, name: &str) {
 }
 
 fn layer<T: Real>(c: &mut Criterion, name: &str) {
-    let grid = Grid::chapter();
+    let grid = Grid::table2();
     let Ok(propagator) = Propagator::<T>::new(grid, 1.55e-6, TransferKind::Paraxial) else { return };
     let Ok(transfer) = propagator.transfer(150.0) else { return };
     let mut work = propagator.work();

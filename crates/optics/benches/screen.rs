@@ -3,12 +3,12 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::sync::Arc;
-use wakescope_optics::screen::{ScreenGenerator, stream};
-use wakescope_optics::{Grid, Real, VonKarman};
+use wakescope_optics::screens::{Real, ScreenGenerator, stream};
+use wakescope_optics::{Grid, VonKarman};
 
 fn pair<T: Real>(c: &mut Criterion, name: &str) {
-    let grid = Grid::chapter();
-    let Ok(generator) = ScreenGenerator::<T>::new(grid, Arc::new(VonKarman::chapter())) else { return };
+    let grid = Grid::table2();
+    let Ok(generator) = ScreenGenerator::<T>::new(grid, Arc::new(VonKarman::table2())) else { return };
     let mut work = generator.work();
     let mut first = vec![T::zero(); grid.points()];
     let mut second = first.clone();

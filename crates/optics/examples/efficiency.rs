@@ -6,7 +6,7 @@
 
 use std::ops::ControlFlow;
 use std::time::Instant;
-use wakescope_optics::structure::StructureTable;
+use wakescope_optics::air::StructureTable;
 use wakescope_optics::{MonteCarlo, Stop, theory};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let realisations: usize = arguments.next().map_or(Ok(400), |a| a.parse())?;
     let seed: u64 = arguments.next().map_or(Ok(1), |a| a.parse())?;
 
-    let run = MonteCarlo::chapter(cn2_m_m23, seed)?;
+    let run = MonteCarlo::table2(cn2_m_m23, seed)?;
     let start = Instant::now();
     let estimate = run.run::<f32>(Stop::after(realisations), |_| ControlFlow::Continue(()))?;
     let seconds = start.elapsed().as_secs_f64();

@@ -1,6 +1,7 @@
 //! The one error type of the crate: each variant names the field, the value that was given and what is allowed.
 
-use crate::sampling::{self, SetUp, Violation};
+#[cfg(feature = "screens")]
+use crate::plan::violation::{SetUp, Violation, listed};
 use thiserror::Error;
 
 /// Everything that can go wrong in this crate.
@@ -50,7 +51,8 @@ pub enum Error {
         last_m: f64,
     },
     /// A grid cannot hold what it is asked to hold: every limit that it violates, and a set-up that does not.
-    #[error("sampling: {}", sampling::in_words(violations, would_do.as_ref()))]
+    #[cfg(feature = "screens")]
+    #[error("sampling: {}", listed(violations, would_do.as_ref()))]
     Sampling {
         /// The limits, one at least.
         violations: Vec<Violation>,
@@ -131,4 +133,15 @@ pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<f64, Error
 /// `value` when it is finite, else an error that names `field`.
 pub(crate) fn finite(field: &'static str, value: f64) -> Result<f64, Error> {
     if value.is_finite() { Ok(value) } else { Err(Error::OutOfRange { field, value, allowed: "a finite number" }) }
+}
+
+/// The field that an error names.
+#[cfg(test)]
+pub(crate) fn refused<T>(result: Result<T, Error>) -> &'static str {
+    match result.err() {
+        Some(Error::OutOfRange { field, .. } | Error::Length { field, .. } | Error::NotIncreasing { field, .. }) => {
+            field
+        }
+        other => panic!("a refusal by name, not {other:?}"),
+    }
 }

@@ -150,6 +150,7 @@ mod tests {
     #[test]
     fn nan_integrand_is_an_error() {
         let rule = GaussLegendre::new(4);
-        assert!(adaptive(&rule, &[0.0, 1.0], 1e-9, "test", &mut |_| f64::NAN).is_err());
+        let error = adaptive(&rule, &[0.0, 1.0], 1e-9, "test", &mut |_| f64::NAN);
+        assert!(matches!(error, Err(Error::Convergence { quantity: "test", .. })));
     }
 }

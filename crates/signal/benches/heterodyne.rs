@@ -7,27 +7,19 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use num_complex::Complex;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use wakescope_signal::literal::literal_envelope;
+use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    Error, GaussianPulse, LineOfSight, NoiseModel, PlanckConvention, Pulse, PulseDuration, PulseKey, Receiver, Record,
-    SPEED_OF_LIGHT_M_S, Scan, Scratch, Shot, Simulator, literal_envelope, pulse_generator,
+    Error, GaussianPulse, LineOfSight, NoiseModel, Pulse, Receiver, Record, SPEED_OF_LIGHT_M_S, Scan, Scratch, Shot,
+    Simulator,
 };
 
 const SAMPLES: usize = 1000;
 const LINES: usize = 185;
 
 fn simulator(noise: NoiseModel, chirp_hz_s: f64) -> Result<Simulator, Error> {
-    let receiver = Receiver {
-        wavelength_m: 1.55e-6,
-        sample_rate_hz: 250e6,
-        intermediate_frequency_hz: 80e6,
-        bandwidth_hz: 50e6,
-        quantum_efficiency: 1.0,
-        local_oscillator_w: 1e-3,
-        planck: PlanckConvention::H,
-        noise,
-    };
-    let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6)?;
-    let pulse = Pulse::from(pulse).with_chirp(chirp_hz_s)?;
+    let pulse = Pulse::from(GaussianPulse::table2()).with_chirp(chirp_hz_s)?;
+    let receiver = Receiver { noise, ..Receiver::table2() };
     Simulator::new(pulse, receiver, Record { time_of_first_sample_s: 1.0e-6, samples: SAMPLES })
 }
 

@@ -10,9 +10,13 @@
 use std::f64::consts::PI;
 
 use num_complex::Complex;
+use wakescope_signal::digitise::Digitiser;
+use wakescope_signal::efficiency::EfficiencyTable;
+use wakescope_signal::sampled::{Resampling, SampledPulse};
+use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    Digitiser, EfficiencyTable, Error, LineOfSight, Medium, NoiseModel, PlanckConvention, Pulse, PulseKey, RangeFilter,
-    Receiver, Record, Resampling, SPEED_OF_LIGHT_M_S, SampledPulse, Scan, Shot, Simulator, pulse_generator,
+    Error, LayerLimits, LineOfSight, Medium, Pulse, RangeFilter, Receiver, Record, SPEED_OF_LIGHT_M_S, Scan, Shot,
+    Simulator,
 };
 
 const LINES: usize = 9;
@@ -22,16 +26,7 @@ const FIRST_M: f64 = 360.0;
 /// Samples averaged for one velocity.
 const GATE: std::ops::Range<usize> = 60..76;
 
-const RECEIVER: Receiver = Receiver {
-    wavelength_m: 1.55e-6,
-    sample_rate_hz: 250e6,
-    intermediate_frequency_hz: 80e6,
-    bandwidth_hz: 50e6,
-    quantum_efficiency: 0.8,
-    local_oscillator_w: 1e-3,
-    planck: PlanckConvention::H,
-    noise: NoiseModel::BandLimited,
-};
+const RECEIVER: Receiver = Receiver { quantum_efficiency: 0.8, ..Receiver::table2() };
 
 /// Power of a pulse with a fast rise and a slow fall, every 4 ns, in any unit.
 fn measured_pulse() -> Result<Pulse, Error> {
@@ -52,7 +47,8 @@ fn main() -> Result<(), Error> {
     let record = Record { time_of_first_sample_s: 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S, samples: SAMPLES };
     let simulator = Simulator::new(&pulse, RECEIVER, record)?;
 
-    let thickness_m = pulse.layer_thickness_m(RECEIVER.sample_rate_hz, RECEIVER.wavelength_m, 3.0)?;
+    let (sample_rate_hz, wavelength_m) = (RECEIVER.sample_rate_hz, RECEIVER.wavelength_m);
+    let thickness_m = pulse.layer_thickness_m(LayerLimits { sample_rate_hz, wavelength_m, max_gradient_per_s: 3.0 })?;
     let haze = Medium::new(vec![0.0, 300.0, 700.0], vec![8e-7, 5e-7, 2e-7], vec![5e-4, 3e-4, 1e-4])?;
     let distances_m: Vec<f64> = (0..LINES).map(|i| 5.0 * (i as f64 - 4.0)).collect();
     let mut lines = Vec::new();

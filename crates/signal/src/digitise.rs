@@ -178,7 +178,8 @@ mod tests {
         let mut samples = [0.123, f64::NAN];
         assert!(matches!(digitiser.digitise(&mut samples), Err(Error::ElementOutOfRange { index: 1, .. })));
         assert_eq!(samples[0], 0.123);
-        assert!(digitiser.code(f64::NAN).is_err());
-        assert!(digitiser.digitise_complex(&mut [Complex::new(0.0, f64::NAN)]).is_err());
+        assert!(matches!(digitiser.code(f64::NAN), Err(Error::OutOfRange { field: "current_a", .. })));
+        let complex = digitiser.digitise_complex(&mut [Complex::new(0.0, f64::NAN)]);
+        assert!(matches!(complex, Err(Error::ElementOutOfRange { index: 0, .. })));
     }
 }

@@ -42,14 +42,6 @@ pub enum Error {
         /// Name of the list.
         field: &'static str,
     },
-    /// The wind of a layer is not known, and the policy is [`OutsideDomain::Error`](crate::OutsideDomain::Error).
-    #[error("no wind at layer {index}, range {range_m} m: the line of sight leaves the domain of the flow")]
-    NoWind {
-        /// Index of the first such layer.
-        index: usize,
-        /// Its range \[m\].
-        range_m: f64,
-    },
     /// A sum is too large for a number of double precision.
     #[error("{field}[{index}] overflows: lower weight_per_m, energy_j or local_oscillator_w")]
     Overflow {

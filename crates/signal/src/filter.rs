@@ -182,13 +182,13 @@ fn weighted_mean(weights: &[f64], velocities_m_s: impl Iterator<Item = f64>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{GaussianPulse, PulseDuration};
+    use crate::GaussianPulse;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
 
     const STEP_M: f64 = SPEED_OF_LIGHT_M_S / 500e6;
 
     fn pulse() -> GaussianPulse {
-        GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6).unwrap()
+        GaussianPulse::table2()
     }
 
     fn hann(n: usize) -> Vec<f64> {
@@ -272,16 +272,19 @@ mod tests {
 
     #[test]
     fn input_that_makes_no_filter_is_refused() {
-        assert!(RangeFilter::pulse(pulse(), 0.0).is_err());
-        assert!(RangeFilter::pulse(pulse(), 1000.0).is_err());
-        assert!(RangeFilter::pulse(pulse(), 1e-9).is_err());
+        for thickness_m in [0.0, 1000.0, 1e-9] {
+            let filter = RangeFilter::pulse(pulse(), thickness_m);
+            assert!(matches!(filter, Err(Error::OutOfRange { field: "layer_thickness_m", .. })), "{thickness_m}");
+        }
         let gate = |window: &[f64]| RangeFilter::gate(pulse(), window, 250e6, 0.5);
         assert!(matches!(gate(&[]), Err(Error::Empty { .. })));
         assert!(matches!(gate(&[0.0; 3]), Err(Error::ElementOutOfRange { .. })));
         assert!(matches!(gate(&[1.0, f64::NAN]), Err(Error::ElementOutOfRange { index: 1, .. })));
         let filter = RangeFilter::pulse(pulse(), 0.5).unwrap();
-        assert!(filter.apply_into(0.0, &[], &[1.0], &mut [0.0]).is_err());
-        assert!(filter.apply_into(0.0, &[1.0], &[1.0], &mut [0.0; 2]).is_err());
-        assert!(filter.apply_into(0.0, &[1.0], &[f64::NAN], &mut [0.0]).is_err());
+        let apply = |profile: &[f64], range_m: f64, out: &mut [f64]| filter.apply_into(0.0, profile, &[range_m], out);
+        assert!(matches!(apply(&[], 1.0, &mut [0.0]), Err(Error::Empty { field: "radial_velocity_m_s" })));
+        assert!(matches!(apply(&[1.0], 1.0, &mut [0.0; 2]), Err(Error::LengthMismatch { field: "out_m_s", .. })));
+        let refused = apply(&[1.0], f64::NAN, &mut [0.0]);
+        assert!(matches!(refused, Err(Error::ElementOutOfRange { field: "range_m", index: 0, .. })));
     }
 }

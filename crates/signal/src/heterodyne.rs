@@ -5,10 +5,10 @@
 //! that sample k sees. `b_l` is circular complex normal of variance `weight_per_m`, drawn for each pulse and the same
 //! throughout it. Air moving away lowers the frequency, `f = f_c - 2 v/lambda`.
 //!
-//! Each layer is a phasor that is turned once per sample; it is computed afresh when the pulse reaches the layer and
+//! Each layer is a phasor that is rotated once per sample; it is computed afresh when the pulse reaches the layer and
 //! every 1024 samples.
 //!
-//! Check: [`literal_envelope`](crate::literal_envelope) is the sum as written; the mean power is (14), whatever the layer
+//! Check: [`literal_envelope`](crate::literal::literal_envelope) is the sum as written; the mean power is (14), whatever the layer
 //! thickness; the covariance in a uniform wind is `exp(-tau^2/(4 sigma^2)) exp(-j 4 pi v tau/lambda)`.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
@@ -220,7 +220,7 @@ impl Simulator {
             for (i, out) in outs.iter_mut().enumerate() {
                 let (first, _) = window.layers_at(start + i);
                 let envelope = window.amplitudes_at(&self.pulse, line.layer_thickness_m, start + i);
-                let (re, im) = phasors.sum_and_turn(first, envelope);
+                let (re, im) = phasors.sum_and_rotate(first, envelope);
                 *out = Complex::new(re, im);
             }
         }
@@ -278,9 +278,9 @@ impl Simulator {
         }
     }
 
-    /// Sets the phasor of one layer as it is at `time_s`, and its turn per sample; nothing returns from a masked layer.
+    /// Sets the phasor of one layer as it is at `time_s`, and its rotation per sample; nothing returns from a masked layer.
     fn set_phasor(&self, phasors: &mut Phasors, layer: usize, velocity_m_s: f64, amplitude: Complex<f64>, time_s: f64) {
-        let (phasor, turn) = if velocity_m_s.is_nan() {
+        let (phasor, rotation) = if velocity_m_s.is_nan() {
             (Complex::ZERO, Complex::ONE)
         } else {
             let rate = self.phase_rate_rad_s(velocity_m_s);
@@ -288,6 +288,6 @@ impl Simulator {
             (amplitude * Complex::cis(rate * time_s), Complex::cis(rate * interval_s))
         };
         (phasors.re[layer], phasors.im[layer]) = (phasor.re, phasor.im);
-        (phasors.turn_re[layer], phasors.turn_im[layer]) = (turn.re, turn.im);
+        (phasors.rotation_re[layer], phasors.rotation_im[layer]) = (rotation.re, rotation.im);
     }
 }

@@ -9,15 +9,13 @@
 //! use rand::SeedableRng;
 //! use wakescope_signal::*;
 //!
-//! let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6)?;
-//! let receiver = Receiver {
-//!     wavelength_m: 1.55e-6, sample_rate_hz: 250e6, intermediate_frequency_hz: 80e6, bandwidth_hz: 50e6,
-//!     quantum_efficiency: 0.8, local_oscillator_w: 1e-3,
-//!     planck: PlanckConvention::H, noise: NoiseModel::BandLimited,
+//! let (pulse, receiver) = (Pulse::from(GaussianPulse::table2()), Receiver::table2());
+//! let simulator = Simulator::new(&pulse, receiver, Record { time_of_first_sample_s: 2e-6, samples: 256 })?;
+//! let limits = LayerLimits {
+//!     sample_rate_hz: receiver.sample_rate_hz, wavelength_m: receiver.wavelength_m, max_gradient_per_s: 0.5,
 //! };
-//! let simulator = Simulator::new(pulse, receiver, Record { time_of_first_sample_s: 2e-6, samples: 256 })?;
 //! let line = LineOfSight {
-//!     first_range_m: 250.0, layer_thickness_m: layer_thickness_m(250e6, 1.55e-6, pulse.sigma_s(), 0.5)?,
+//!     first_range_m: 250.0, layer_thickness_m: pulse.layer_thickness_m(limits)?,
 //!     radial_velocity_m_s: vec![3.0; 500], weight_per_m: vec![4e-17; 500],
 //! };
 //! let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
@@ -27,68 +25,63 @@
 //! # Ok::<(), Error>(())
 //! ```
 //!
+//! **Read first** [`literal`]: (15) as it is written, in thirty lines.
+//!
 //! | module | what is in it |
 //! |---|---|
 //! | `pulse` | [`GaussianPulse`]: envelope (7), its range weight |
-//! | `sampled` | [`SampledPulse`]: any envelope given by samples, and how it is resampled |
+//! | [`sampled`] | [`SampledPulse`](sampled::SampledPulse): any envelope given by samples, and how it is resampled |
 //! | `transmitted` | [`Pulse`]: either of them, with chirp; its moments, and the layers it needs |
 //! | `piecewise` | the cubic pieces that a sampled envelope is kept in |
 //! | `medium` | [`Medium`]: backscatter and extinction by range |
-//! | `efficiency` | [`EfficiencyTable`]: heterodyne efficiency, one curve or one realisation per pulse |
+//! | [`efficiency`] | [`EfficiencyTable`](efficiency::EfficiencyTable): heterodyne efficiency, one curve or one realisation per pulse |
 //! | `table` | tables over range |
-//! | `line` | [`LineOfSight`]; how thin a layer must be; what to do outside the flow's domain |
+//! | `line` | [`LineOfSight`]; how thin a layer must be, [`LayerLimits`] |
 //! | `shot` | [`Shot`]: what one pulse meets |
-//! | `receiver` | sampling, responsivity, noise power (13), signal-to-noise ratio (14), folding |
+//! | [`receiver`] | sampling, responsivity, noise power (13), signal-to-noise ratio (14) |
 //! | `heterodyne` | [`Simulator`]: one record per pulse, (15), (12), fast form |
 //! | `window`, `kernel` | which layers are lit at a sample; the inner loop |
-//! | `literal` | the same sum term by term, as oracle |
+//! | [`literal`] | the same sum term by term, as oracle |
 //! | `noise` | band-limited or white shot noise, real or complex |
 //! | `expected` | mean power, (14), and covariance of the samples, without drawing any |
-//! | `digitise` | [`Digitiser`]: rounding and saturation |
-//! | `scan` | [`Scan`]: all pulses of a scan, in parallel and in bounded memory |
+//! | [`digitise`] | [`Digitiser`](digitise::Digitiser): rounding and saturation |
+//! | [`scan`] | [`Scan`]: all pulses of a scan, in parallel and in bounded memory |
 //! | `parallel` | loops on the caller's thread pool |
-//! | `series` | [`TimeSeries`]: records of many pulses |
 //! | `filter` | [`RangeFilter`]: velocity profiles weighted by pulse and gate, (28) |
 //!
 //! Feature `rayon` (default): the pulses of a scan in the caller's thread pool; the bits of the result do not depend on it.
 
-mod constants;
-mod digitise;
-mod efficiency;
+pub mod constants;
+pub mod digitise;
+pub mod efficiency;
 mod error;
 mod expected;
 mod filter;
 mod heterodyne;
 mod kernel;
 mod line;
-mod literal;
+pub mod literal;
 mod medium;
 mod noise;
 mod parallel;
 mod piecewise;
 mod pulse;
-mod receiver;
-mod sampled;
-mod scan;
-mod series;
+pub mod receiver;
+pub mod sampled;
+pub mod scan;
 mod shot;
 mod table;
 mod transmitted;
 mod window;
 
-pub use constants::{ELEMENTARY_CHARGE_C, PLANCK_J_S, SPEED_OF_LIGHT_M_S};
-pub use digitise::{Clipped, Digitiser};
-pub use efficiency::{EfficiencyTable, LayerEfficiency};
+pub use constants::SPEED_OF_LIGHT_M_S;
 pub use error::Error;
 pub use filter::RangeFilter;
 pub use heterodyne::{Record, Scratch, Simulator};
-pub use line::{BeyondBand, LineOfSight, OutsideDomain, layer_thickness_m};
-pub use literal::literal_envelope;
+pub use line::{LayerLimits, LineOfSight};
 pub use medium::Medium;
 pub use pulse::{GaussianPulse, PulseDuration};
-pub use receiver::{NoiseModel, PlanckConvention, Receiver};
-pub use sampled::{Resampling, SampledPulse};
-pub use scan::{PulseKey, Sample, Scan, pulse_generator};
-pub use series::TimeSeries;
+pub use receiver::{NoiseModel, Receiver};
+pub use scan::Scan;
 pub use shot::Shot;
 pub use transmitted::Pulse;

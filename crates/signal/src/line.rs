@@ -4,7 +4,7 @@
 //! Check: the thickness divides the range step of one sample and obeys the rule of the steepest gradient.
 
 use crate::error::{check, check_length, check_positive};
-use crate::{Error, Receiver, SPEED_OF_LIGHT_M_S};
+use crate::{Error, SPEED_OF_LIGHT_M_S};
 
 /// The air along one line of sight, cut into layers of equal thickness.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -20,71 +20,7 @@ pub struct LineOfSight {
     pub weight_per_m: Vec<f64>,
 }
 
-/// What to do where a line of sight leaves the domain in which the wind is known, marked by NaN velocities.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub enum OutsideDomain {
-    /// Refuse the line.
-    #[default]
-    Error,
-    /// Take this radial velocity \[m/s\].
-    Constant(f64),
-    /// No scatterers there: nothing returns.
-    Mask,
-}
-
-/// Layers that move too fast for the detector band.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BeyondBand {
-    /// Number of such layers.
-    pub layers: usize,
-    /// Range of the fastest \[m\].
-    pub range_m: f64,
-    /// Its radial velocity \[m/s\].
-    pub radial_velocity_m_s: f64,
-    /// The largest velocity of the band \[m/s\].
-    pub limit_m_s: f64,
-    /// The velocity that the sampled current shows for the fastest layer \[m/s\], folded if beyond 0 or `F_s/2`.
-    pub folded_m_s: f64,
-}
-
 impl LineOfSight {
-    /// Which layers return frequencies outside the detector band; `None` if all lie in it. Such returns are simulated as
-    /// they are (the band limits the noise only), but estimators that search the band do not find them.
-    pub fn beyond_band(&self, receiver: &Receiver) -> Option<BeyondBand> {
-        let limit_m_s = receiver.band_velocity_m_s();
-        let fast = |v: &f64| v.abs() > limit_m_s;
-        let layers = self.radial_velocity_m_s.iter().filter(|v| fast(v)).count();
-        let by_speed = |a: &(usize, &f64), b: &(usize, &f64)| a.1.abs().total_cmp(&b.1.abs());
-        let (index, velocity) =
-            self.radial_velocity_m_s.iter().enumerate().filter(|(_, v)| fast(v)).max_by(by_speed)?;
-        let (range_m, folded_m_s) = (self.range_m(index), receiver.folded_velocity_m_s(*velocity));
-        Some(BeyondBand { layers, range_m, radial_velocity_m_s: *velocity, limit_m_s, folded_m_s })
-    }
-
-    /// Applies a policy to the layers whose velocity is NaN, and says how many there are.
-    ///
-    /// [`Simulator`](crate::Simulator) takes NaN as [`OutsideDomain::Mask`] does. Parts of a line that are to be treated
-    /// differently (below the ground: masked; beyond a mesh: constant) are set one after the other.
-    ///
-    /// # Errors
-    /// [`Error::NoWind`] with the first such layer if the policy is `Error`; [`Error::OutOfRange`] for a constant that is
-    /// not finite.
-    pub fn resolve_outside(&mut self, policy: OutsideDomain) -> Result<usize, Error> {
-        let outside = self.radial_velocity_m_s.iter().filter(|v| v.is_nan()).count();
-        match policy {
-            OutsideDomain::Error => match self.radial_velocity_m_s.iter().position(|v| v.is_nan()) {
-                Some(index) => return Err(Error::NoWind { index, range_m: self.range_m(index) }),
-                None => return Ok(0),
-            },
-            OutsideDomain::Constant(velocity_m_s) => {
-                check("constant radial_velocity_m_s", velocity_m_s, "finite", |_| true)?;
-                self.radial_velocity_m_s.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = velocity_m_s);
-            }
-            OutsideDomain::Mask => {}
-        }
-        Ok(outside)
-    }
-
     /// Says what is wrong with the line, if anything.
     ///
     /// # Errors
@@ -122,37 +58,49 @@ impl LineOfSight {
     }
 }
 
-/// Thickness of the layers \[m\] for a given sampling and a flow whose radial velocity changes by at most
-/// `max_gradient_per_s` along any line: the largest that divides the range step of a sample, `c/(2 F_s)`, and is at most
-/// `lambda/(16 sigma g_max)` and `c sigma/2`.
-///
-/// The second limit makes the scatterers of neighbouring layers overlap in frequency: two layers then drift apart by
-/// less than an eighth of a turn while the pulse passes. Thicker layers give errors of up to 15 % inside a vortex core.
-/// With the third, the sum over the layers of a pulse is its integral within 1e-4, however short the pulse.
-/// The division makes the Gaussian weights repeat from sample to sample, which the fast summation uses.
-///
-/// # Errors
-/// [`Error::OutOfRange`] if a parameter is not positive (the gradient may be zero).
-pub fn layer_thickness_m(
-    sample_rate_hz: f64,
-    wavelength_m: f64,
-    sigma_s: f64,
-    max_gradient_per_s: f64,
-) -> Result<f64, Error> {
-    check_positive("sample_rate_hz", sample_rate_hz)?;
-    check_positive("wavelength_m", wavelength_m)?;
-    check_positive("sigma_s", sigma_s)?;
-    check("max_gradient_per_s", max_gradient_per_s, "finite and not negative", |g| g >= 0.0)?;
-    let step_m = SPEED_OF_LIGHT_M_S / (2.0 * sample_rate_hz);
-    let by_gradient = step_m * 16.0 * sigma_s * max_gradient_per_s / wavelength_m;
-    let by_pulse = step_m / (0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
-    Ok(step_m / by_gradient.max(by_pulse).ceil().max(1.0))
+/// What bounds the thickness of the layers, beside the pulse.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LayerLimits {
+    /// Sampling rate `F_s` \[Hz\].
+    pub sample_rate_hz: f64,
+    /// Wavelength of the laser \[m\].
+    pub wavelength_m: f64,
+    /// Largest change of the radial velocity along any line, `g_max` \[1/s\]; 0 for a uniform wind.
+    pub max_gradient_per_s: f64,
+}
+
+impl LayerLimits {
+    /// The largest thickness \[m\] that divides the range step of a sample, `c/(2 F_s)`, and is at most
+    /// `lambda/(16 sigma g_max)` and `c sigma/2`.
+    ///
+    /// The second limit makes the scatterers of neighbouring layers overlap in frequency: two layers then drift apart by
+    /// less than an eighth of a turn while the pulse passes. Thicker layers give errors of up to 15 % inside a vortex core.
+    /// With the third, the sum over the layers of a pulse is its integral within 1e-4, however short the pulse.
+    /// The division makes the Gaussian weights repeat from sample to sample, which the fast summation uses.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if a field or `sigma_s` is not positive (the gradient may be zero).
+    pub(crate) fn thickness_m(self, sigma_s: f64) -> Result<f64, Error> {
+        let Self { sample_rate_hz, wavelength_m, max_gradient_per_s } = self;
+        check_positive("sample_rate_hz", sample_rate_hz)?;
+        check_positive("wavelength_m", wavelength_m)?;
+        check_positive("sigma_s", sigma_s)?;
+        check("max_gradient_per_s", max_gradient_per_s, "finite and not negative", |g| g >= 0.0)?;
+        let step_m = SPEED_OF_LIGHT_M_S / (2.0 * sample_rate_hz);
+        let by_gradient = step_m * 16.0 * sigma_s * max_gradient_per_s / wavelength_m;
+        let by_pulse = step_m / (0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
+        Ok(step_m / by_gradient.max(by_pulse).ceil().max(1.0))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+
+    fn limits(max_gradient_per_s: f64) -> LayerLimits {
+        LayerLimits { sample_rate_hz: 250e6, wavelength_m: 1.55e-6, max_gradient_per_s }
+    }
 
     fn line() -> LineOfSight {
         LineOfSight {
@@ -164,22 +112,9 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_leaves_the_domain_is_refused_filled_or_masked_by_choice() {
-        assert_eq!(line().resolve_outside(OutsideDomain::Error), Err(Error::NoWind { index: 1, range_m: 100.5 }));
-        let mut filled = line();
-        assert_eq!(filled.resolve_outside(OutsideDomain::Constant(-2.0)), Ok(1));
-        assert_eq!(filled.radial_velocity_m_s, [1.0, -2.0, 3.0]);
-        assert_eq!(filled.resolve_outside(OutsideDomain::Error), Ok(0));
-        let mut masked = line();
-        assert_eq!(masked.resolve_outside(OutsideDomain::Mask), Ok(1));
-        assert!(masked.radial_velocity_m_s[1].is_nan());
-        assert!(matches!(masked.resolve_outside(OutsideDomain::Constant(f64::NAN)), Err(Error::OutOfRange { .. })));
-    }
-
-    #[test]
     fn layers_are_no_thicker_than_a_short_pulse() {
         let sigma_s = 0.6e-9;
-        let thickness_m = layer_thickness_m(250e6, 1.55e-6, sigma_s, 0.0).unwrap();
+        let thickness_m = limits(0.0).thickness_m(sigma_s).unwrap();
         assert!(thickness_m <= 0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
         let per_step = SPEED_OF_LIGHT_M_S / (2.0 * 250e6) / thickness_m;
         assert_relative_eq!(per_step, per_step.round(), max_relative = 1e-12);
@@ -189,7 +124,7 @@ mod tests {
     fn layers_obey_the_gradient_of_a_heavy_wake_and_divide_the_range_step() {
         let gradient = 500.0 / (8.0 * std::f64::consts::PI * 2.35 * 2.35);
         for (sigma_s, rule_m) in [(120.112e-9, 0.22), (240.224e-9, 0.11)] {
-            let thickness = layer_thickness_m(250e6, 1.55e-6, sigma_s, gradient).unwrap();
+            let thickness = limits(gradient).thickness_m(sigma_s).unwrap();
             let limit = 1.55e-6 / (16.0 * sigma_s * gradient);
             assert_relative_eq!(limit, rule_m, max_relative = 0.03);
             let parts = SPEED_OF_LIGHT_M_S / (2.0 * 250e6) / thickness;
@@ -201,7 +136,7 @@ mod tests {
 
     #[test]
     fn layers_of_a_uniform_wind_are_as_thick_as_the_range_step() {
-        let thickness = layer_thickness_m(250e6, 1.55e-6, 120e-9, 0.0).unwrap();
+        let thickness = limits(0.0).thickness_m(120e-9).unwrap();
         assert_relative_eq!(thickness, 0.599_584_916, max_relative = 1e-14);
     }
 

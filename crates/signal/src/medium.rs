@@ -181,6 +181,7 @@ mod tests {
         assert!(matches!(negative, Err(Error::ElementOutOfRange { field: "backscatter_per_m_sr", index: 1, .. })));
         let table = make(&[1.0, 2.0], &[1.0; 2], &[1.0; 2]).unwrap();
         assert!(matches!(table.return_per_m(2.1, 1.0), Err(Error::OutOfRange { field: "range_m", .. })));
-        assert!(table.return_per_m(0.0, 1.0).is_err() && table.return_per_m(1.5, 0.0).is_err());
+        assert!(matches!(table.return_per_m(0.0, 1.0), Err(Error::OutOfRange { field: "range_m", .. })));
+        assert!(matches!(table.return_per_m(1.5, 0.0), Err(Error::OutOfRange { field: "aperture_area_m2", .. })));
     }
 }

@@ -36,6 +36,11 @@ pub struct GaussianPulse {
 }
 
 impl GaussianPulse {
+    /// Table 2's 150 uJ in 200 ns (full width at half maximum), the shorter of the chapter's two pulses.
+    pub fn table2() -> Self {
+        Self { sigma_s: PulseDuration::FullWidthHalfMaximum(200e-9).sigma_s(), energy_j: 150e-6 }
+    }
+
     /// A pulse of the given duration and energy.
     ///
     /// # Errors
@@ -92,7 +97,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn pulse() -> GaussianPulse {
-        GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6).unwrap()
+        GaussianPulse::table2()
     }
 
     #[test]
@@ -135,8 +140,10 @@ mod tests {
     #[test]
     fn durations_and_energies_that_are_not_positive_are_refused() {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(bad), 1.0).is_err());
-            assert!(GaussianPulse::new(PulseDuration::OneOverEHalfWidth(1e-7), bad).is_err());
+            let duration = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(bad), 1.0);
+            assert!(matches!(duration, Err(Error::OutOfRange { field: "pulse duration_s", .. })));
+            let energy = GaussianPulse::new(PulseDuration::OneOverEHalfWidth(1e-7), bad);
+            assert!(matches!(energy, Err(Error::OutOfRange { field: "energy_j", .. })));
         }
     }
 }

@@ -187,11 +187,11 @@ fn band_limited(time_s: &[f64], values: &[Complex<f64>]) -> Result<Piecewise, Er
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{GaussianPulse, PulseDuration};
+    use crate::GaussianPulse;
     use approx::assert_relative_eq;
 
     fn gaussian() -> GaussianPulse {
-        GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6).unwrap()
+        GaussianPulse::table2()
     }
 
     /// Largest difference from the Gaussian, in parts of its peak, of one sampled at `times` and resampled.

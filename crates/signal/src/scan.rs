@@ -11,8 +11,9 @@ use num_complex::Complex;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::digitise::{Clipped, Digitiser};
 use crate::parallel::{map_chunks, map_indices};
-use crate::{Clipped, Digitiser, Error, Scratch, Shot, Simulator};
+use crate::{Error, Scratch, Shot, Simulator};
 
 /// Records that are in memory at a time.
 const BATCH: usize = 256;
@@ -67,14 +68,8 @@ mod sealed {
     }
 
     impl Make for f64 {
-        fn make<R: Rng>(
-            s: &Simulator,
-            shot: Shot<'_>,
-            mut rng: R,
-            w: &mut Scratch,
-            out: &mut [Self],
-        ) -> Result<(), Error> {
-            s.record_into(shot, &mut rng, w, out)
+        fn make<R: Rng>(s: &Simulator, shot: Shot<'_>, rng: R, w: &mut Scratch, out: &mut [Self]) -> Result<(), Error> {
+            s.record_into(shot, &mut { rng }, w, out)
         }
 
         fn digitise(digitiser: &Digitiser, samples: &mut [Self]) -> Result<Clipped, Error> {
@@ -83,14 +78,8 @@ mod sealed {
     }
 
     impl Make for Complex<f64> {
-        fn make<R: Rng>(
-            s: &Simulator,
-            shot: Shot<'_>,
-            mut rng: R,
-            w: &mut Scratch,
-            out: &mut [Self],
-        ) -> Result<(), Error> {
-            s.baseband_into(shot, &mut rng, w, out)
+        fn make<R: Rng>(s: &Simulator, shot: Shot<'_>, rng: R, w: &mut Scratch, out: &mut [Self]) -> Result<(), Error> {
+            s.baseband_into(shot, &mut { rng }, w, out)
         }
 
         fn digitise(digitiser: &Digitiser, samples: &mut [Self]) -> Result<Clipped, Error> {

@@ -9,7 +9,8 @@ use num_complex::Complex;
 
 use crate::error::check;
 use crate::piecewise::Moments;
-use crate::{Error, GaussianPulse, SPEED_OF_LIGHT_M_S, SampledPulse, layer_thickness_m};
+use crate::sampled::SampledPulse;
+use crate::{Error, GaussianPulse, LayerLimits, SPEED_OF_LIGHT_M_S};
 
 /// Half-length of the sum over a Gaussian in units of `sigma` (Frehlich 1997): outside lies `erfc(3.72)` = 1.4e-7 of the
 /// energy.
@@ -171,23 +172,18 @@ impl Pulse {
         (square - self.mean_frequency_hz().powi(2)).max(0.0).sqrt()
     }
 
-    /// Thickness of the layers \[m\] for this pulse: the largest that divides the range step of a sample, obeys the rule of
-    /// the steepest gradient as [`layer_thickness_m`] says, holds the energy of the pulse within 5e-4, and resolves its
-    /// chirp (`2 DeltaR/c` at most an eighth of the inverse spectral width).
+    /// Thickness of the layers \[m\] for this pulse: the largest that divides the range step of a sample, `c/(2 F_s)`, and is
+    /// at most `lambda/(16 sigma g_max)` and `c sigma/2`, holds the energy of the pulse within 5e-4, and resolves its chirp
+    /// (`2 DeltaR/c` at most an eighth of the inverse spectral width).
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] if a parameter is not positive (the gradient may be zero).
-    pub fn layer_thickness_m(
-        &self,
-        sample_rate_hz: f64,
-        wavelength_m: f64,
-        max_gradient_per_s: f64,
-    ) -> Result<f64, Error> {
-        let by_gradient_m = layer_thickness_m(sample_rate_hz, wavelength_m, self.sigma_s(), max_gradient_per_s)?;
+    /// [`Error::OutOfRange`] if a limit is not positive (the gradient may be zero).
+    pub fn layer_thickness_m(&self, limits: LayerLimits) -> Result<f64, Error> {
+        let by_gradient_m = limits.thickness_m(self.sigma_s())?;
         if matches!(self.shape, Shape::Gaussian(_)) && self.chirp_hz_s == 0.0 {
             return Ok(by_gradient_m);
         }
-        let step_m = SPEED_OF_LIGHT_M_S / (2.0 * sample_rate_hz);
+        let step_m = SPEED_OF_LIGHT_M_S / (2.0 * limits.sample_rate_hz);
         let limit_m = 0.5 * SPEED_OF_LIGHT_M_S * self.advised_s.min(0.125 / self.spectral_width_hz());
         let parts = (step_m / by_gradient_m).round().max((step_m / limit_m).ceil());
         Ok(step_m / parts)
@@ -249,11 +245,16 @@ fn thickest_layer_s(pulse: &SampledPulse, limit: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{PulseDuration, Resampling};
+    use crate::PulseDuration;
+    use crate::sampled::Resampling;
     use approx::assert_relative_eq;
 
+    fn limits(max_gradient_per_s: f64) -> LayerLimits {
+        LayerLimits { sample_rate_hz: 250e6, wavelength_m: 1.55e-6, max_gradient_per_s }
+    }
+
     fn gaussian() -> GaussianPulse {
-        GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(200e-9), 150e-6).unwrap()
+        GaussianPulse::table2()
     }
 
     /// A rise of 40 ns, a flat top, a long tail.
@@ -278,7 +279,7 @@ mod tests {
         assert_relative_eq!(plain.spectral_width_hz(), unchirped_hz, max_relative = 1e-14);
         let expected = unchirped_hz.hypot(chirp_hz_s * sigma_s / 2f64.sqrt());
         assert_relative_eq!(chirped.spectral_width_hz(), expected, max_relative = 1e-14);
-        assert!(plain.with_chirp(f64::INFINITY).is_err());
+        assert!(matches!(plain.with_chirp(f64::INFINITY), Err(Error::OutOfRange { field: "chirp_hz_s", .. })));
     }
 
     #[test]
@@ -313,7 +314,7 @@ mod tests {
         let box_shaped = SampledPulse::from_power(&corners, &[0.0, 1.0, 1.0, 0.0], Resampling::Linear, 1e-4).unwrap();
         let short = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(2e-9), 1e-4).unwrap();
         for pulse in [gaussian().into(), short.into(), skewed().into(), Pulse::from(box_shaped)] {
-            let thickness_m = pulse.layer_thickness_m(250e6, 1.55e-6, 0.0).unwrap();
+            let thickness_m = pulse.layer_thickness_m(limits(0.0)).unwrap();
             assert!(thickness_m <= pulse.max_layer_thickness_m());
             let layer_s = 2.0 * thickness_m / SPEED_OF_LIGHT_M_S;
             let (first_s, last_s) = pulse.support_s();
@@ -330,10 +331,9 @@ mod tests {
     #[test]
     fn a_gaussian_needs_the_layers_of_its_sigma_and_a_chirp_thinner_ones() {
         let plain = Pulse::from(gaussian());
-        let expected = layer_thickness_m(250e6, 1.55e-6, gaussian().sigma_s(), 3.6).unwrap();
-        assert_eq!(plain.layer_thickness_m(250e6, 1.55e-6, 3.6), Ok(expected));
+        assert_eq!(plain.layer_thickness_m(limits(3.6)), limits(3.6).thickness_m(gaussian().sigma_s()));
         let chirped = plain.with_chirp(8e14).unwrap();
-        let thickness_m = chirped.layer_thickness_m(250e6, 1.55e-6, 0.0).unwrap();
+        let thickness_m = chirped.layer_thickness_m(limits(0.0)).unwrap();
         assert!(2.0 * thickness_m / SPEED_OF_LIGHT_M_S <= 0.125 / chirped.spectral_width_hz());
         assert!(thickness_m <= chirped.max_layer_thickness_m());
     }

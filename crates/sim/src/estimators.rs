@@ -99,7 +99,11 @@ fn pulse_correlation(scene: &Scene, pulse: &Pulse) -> Vec<f64> {
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn window_model(scene: &Scene, noise: NoiseKind, pulse: &Pulse) -> Result<Option<estimate::bound::WindowModel>, Error> {
+pub fn window_model(
+    scene: &Scene,
+    noise: NoiseKind,
+    pulse: &Pulse,
+) -> Result<Option<estimate::bound::WindowModel>, Error> {
     let noise = match noise {
         NoiseKind::White => estimate::bound::Noise::White,
         // A floor of a millionth keeps the covariance regular.
@@ -294,11 +298,13 @@ fn of_correlogram(
             finish(e, kind, lag_weights, peak.with_lag_weights(lag_weights)?)
         }
         Method::Autoregressive(model) => {
-            let peak = estimate::estimators::AutoregressivePeak::new(&sampling, kind, lags, model.order, padded, refine)?;
+            let peak =
+                estimate::estimators::AutoregressivePeak::new(&sampling, kind, lags, model.order, padded, refine)?;
             finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
         }
         Method::AutoregressivePole(model) => {
-            let pole = estimate::estimators::AutoregressivePole::new(&sampling, kind, lags, model.order, padded, refine)?;
+            let pole =
+                estimate::estimators::AutoregressivePole::new(&sampling, kind, lags, model.order, padded, refine)?;
             finish(e, kind, lag_weights, pole.choosing(order_choice(e, &model, known)))
         }
         Method::Capon(model) => {
@@ -306,10 +312,19 @@ fn of_correlogram(
             finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
         }
         Method::LagWindow(window) => {
-            let peak = estimate::estimators::LagWindowPeak::new(&sampling, kind, lags, window.lag_window_lags, padded, refine)?;
+            let peak = estimate::estimators::LagWindowPeak::new(
+                &sampling,
+                kind,
+                lags,
+                window.lag_window_lags,
+                padded,
+                refine,
+            )?;
             finish(e, kind, lag_weights, peak)
         }
-        Method::PulsePair {} => finish(e, kind, lag_weights, estimate::estimators::PulsePair::new(&sampling, kind, lags)?),
+        Method::PulsePair {} => {
+            finish(e, kind, lag_weights, estimate::estimators::PulsePair::new(&sampling, kind, lags)?)
+        }
         Method::FirstMoment(own) => {
             let moment = estimate::estimators::FirstMoment::new(&sampling, kind, lags, padded, own.moment_reach)?;
             finish(e, kind, lag_weights, moment)

@@ -46,8 +46,8 @@ impl Instrument {
             backscatter_per_m_sr: scene.atmosphere.backscatter_per_m_sr,
             extinction_per_m: scene.atmosphere.extinction_per_m,
             planck: match scene.detector.snr {
-                SnrReference::Chapter {} => optics::PlanckConvention::Hbar,
-                _ => optics::PlanckConvention::H,
+                SnrReference::Chapter {} => optics::snr::PlanckConvention::Hbar,
+                _ => optics::snr::PlanckConvention::H,
             },
         };
         let digitiser = match scene.detector.digitiser {
@@ -93,15 +93,17 @@ impl Instrument {
         runs: &[&[f64]],
     ) -> Result<Vec<optics::plan::Plan>, optics::Error> {
         let Some(turbulence) = &self.turbulence else { return Ok(Vec::new()) };
-        let (telescope, none) = (&self.telescope, optics::Misalignment::NONE);
+        let case = optics::plan::Case {
+            telescope: self.telescope,
+            misalignment: optics::Misalignment::NONE,
+            turbulence: turbulence.clone(),
+            realisations: t.realisations,
+        };
         match t.sampling {
-            ScreenSampling::Derived => {
-                let plan = |range_m: &&[f64]| optics::plan::plan(telescope, &none, turbulence, range_m, t.realisations);
-                runs.iter().map(plan).collect()
-            }
+            ScreenSampling::Derived => runs.iter().map(|range_m| case.plan(range_m)).collect(),
             ScreenSampling::Explicit => {
                 let grid = optics::Grid::square(t.grid_points, t.grid_spacing_m)?;
-                optics::plan::examine_runs(telescope, &none, turbulence, &grid, t.layers, runs, t.realisations)
+                case.examine_runs(&grid, t.layers, runs)
             }
         }
     }
@@ -127,10 +129,9 @@ impl Instrument {
             grid: plan.grid,
             layers: plan.layers,
             range_m: range_m.to_vec(),
-            transfer: optics::propagate::TransferKind::Paraxial,
+            transfer: optics::screens::TransferKind::Paraxial,
             seed,
-            sampling: optics::Sampling::Antithetic,
-            correct_grid: true,
+            sampling: optics::monte_carlo::Sampling::Antithetic,
         })
     }
 }
@@ -152,19 +153,15 @@ fn telescope(scene: &Scene) -> optics::Telescope {
 
 fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Error> {
     let convention = match t.outer_scale_wavenumber {
-        OuterScaleWavenumber::Inverse => optics::OuterScaleConvention::Inverse,
-        OuterScaleWavenumber::TwoPiOver => optics::OuterScaleConvention::TwoPiOver,
+        OuterScaleWavenumber::Inverse => optics::air::OuterScaleConvention::Inverse,
+        OuterScaleWavenumber::TwoPiOver => optics::air::OuterScaleConvention::TwoPiOver,
     };
+    let scales = optics::air::Scales { outer_scale_m: t.outer_scale_m, inner_scale_m: t.inner_scale_m, convention };
     let spectrum: Arc<dyn optics::Spectrum> = match t.spectrum {
-        SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(
-            t.outer_scale_m,
-            t.inner_scale_m,
-            convention,
-            optics::spectrum::CHAPTER_CONSTANT,
-        )?),
+        SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(scales, optics::air::CHAPTER_CONSTANT)?),
         SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
         SpectrumKind::Tatarskii => Arc::new(optics::VonKarman::tatarskii(t.inner_scale_m)?),
-        SpectrumKind::HillAndrews => Arc::new(optics::HillAndrews::new(t.outer_scale_m, t.inner_scale_m, convention)?),
+        SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
     };
     Ok(optics::Turbulence { spectrum, cn2: optics::Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 }.validated()? })
 }

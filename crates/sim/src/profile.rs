@@ -9,8 +9,8 @@ use crate::plan::Stage;
 use crate::progress::Observer;
 use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence};
 use std::ops::ControlFlow;
+use wakescope_optics::air::StructureTable;
 use wakescope_optics::plan::{DOUBTFUL_LOSS, Model, cheapest_model};
-use wakescope_optics::structure::StructureTable;
 use wakescope_optics::theory::{bistatic_efficiency_with, free_space_efficiency};
 use wakescope_optics::{Cn2Path, EfficiencyProfile, Misalignment, Stop};
 

@@ -7,7 +7,7 @@ use wakescope_estimate::{
 };
 use wakescope_les::cases::{TollmienSchlichting, VortexPairCase};
 use wakescope_les::{Flow, Ground, Motion, VortexPair, m4_prime as kernel};
-use wakescope_optics::{RadiusDefinition, SnrModel, Telescope, hankel, theory};
+use wakescope_optics::{RadiusDefinition, SnrModel, Telescope, theory};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
@@ -20,25 +20,25 @@ fn each<E: Into<Failure>>(x: &[f64], f: impl Fn(f64) -> Result<f64, E>) -> Value
 }
 
 pub(super) fn eta_intensity_radius(range_m: &[f64]) -> Values {
-    each(range_m, |r| theory::free_space_efficiency(&Telescope::chapter(), r))
+    each(range_m, |r| theory::free_space_efficiency(&Telescope::table2(), r))
 }
 
 pub(super) fn eta_field_radius(range_m: &[f64]) -> Values {
-    let telescope = Telescope { radius_definition: RadiusDefinition::Field, ..Telescope::chapter() };
+    let telescope = Telescope { radius_definition: RadiusDefinition::Field, ..Telescope::table2() };
     each(range_m, |r| theory::free_space_efficiency(&telescope, r))
 }
 
 pub(super) fn eta_hankel(range_m: &[f64]) -> Values {
-    each(range_m, |r| hankel::free_space_efficiency_hankel(&Telescope::chapter(), r))
+    each(range_m, |r| theory::free_space_efficiency_hankel(&Telescope::table2(), r))
 }
 
 pub(super) fn eta_untruncated(range_m: &[f64]) -> Values {
-    each(range_m, |r| theory::untruncated_efficiency(&Telescope::chapter(), r))
+    each(range_m, |r| theory::untruncated_efficiency(&Telescope::table2(), r))
 }
 
 pub(super) fn snr_free_space(range_m: &[f64]) -> Values {
-    let model = SnrModel::chapter();
-    each(range_m, |r| model.snr(r, theory::free_space_efficiency(&Telescope::chapter(), r)?))
+    let model = SnrModel::table2();
+    each(range_m, |r| model.snr(r, theory::free_space_efficiency(&Telescope::table2(), r)?))
 }
 
 pub(super) fn m4_prime(x: &[f64]) -> Values {

@@ -4,10 +4,10 @@ use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use std::ops::ControlFlow;
-use wakescope_optics::structure::StructureTable;
+use wakescope_optics::air::StructureTable;
+use wakescope_optics::monte_carlo::EfficiencyEstimate;
 use wakescope_optics::{
-    EfficiencyEstimate, EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Stop, Telescope, Turbulence,
-    theory,
+    EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Stop, Telescope, Turbulence, theory,
 };
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -31,9 +31,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let range_m: Vec<f64> = (1..=20).map(|i| 150.0 * f64::from(i)).collect();
     let weak = monte_carlo(WEAK_M_M23, &range_m, realisations, context.seed)?;
     let medium = monte_carlo(MEDIUM_M_M23, &range_m, realisations, context.seed)?;
-    let telescope = Telescope::chapter();
+    let telescope = Telescope::table2();
     let free = EfficiencyProfile::from_theory(&range_m, |r| theory::free_space_efficiency(&telescope, r))?;
-    let turbulence = Turbulence::chapter(MEDIUM_M_M23)?;
+    let turbulence = Turbulence::table2(MEDIUM_M_M23)?;
     let exact = EfficiencyProfile::from_theory(&range_m, |r| {
         theory::bistatic_efficiency(&telescope, &Misalignment::NONE, &turbulence, r)
     })?;
@@ -74,7 +74,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 }
 
 fn monte_carlo(cn2_m_m23: f64, range_m: &[f64], realisations: usize, seed: u64) -> Result<EfficiencyEstimate, Failure> {
-    let set_up = MonteCarlo { range_m: range_m.to_vec(), ..MonteCarlo::chapter(cn2_m_m23, seed)? };
+    let set_up = MonteCarlo { range_m: range_m.to_vec(), ..MonteCarlo::table2(cn2_m_m23, seed)? };
     Ok(set_up.run::<f32>(Stop::after(realisations), |_| ControlFlow::Continue(()))?)
 }
 
@@ -82,7 +82,7 @@ fn monte_carlo(cn2_m_m23: f64, range_m: &[f64], realisations: usize, seed: u64) 
 fn exact_for_screens(range_m: &[f64], turbulence: &Turbulence) -> Result<EfficiencyProfile, Failure> {
     let layers = Layers::equal(10, 3000.0)?;
     let table = StructureTable::new(&*turbulence.spectrum);
-    let telescope = Telescope::chapter();
+    let telescope = Telescope::table2();
     Ok(EfficiencyProfile::from_theory(range_m, |r| {
         let screens = layers.screens_to(r, &turbulence.cn2)?;
         theory::bistatic_efficiency_screens(&telescope, &Misalignment::NONE, &screens, &table, r)
@@ -90,7 +90,7 @@ fn exact_for_screens(range_m: &[f64], turbulence: &Turbulence) -> Result<Efficie
 }
 
 fn decibels(profile: &EfficiencyProfile, efficiency: &[f64]) -> Result<Vec<f64>, Failure> {
-    let model = SnrModel::chapter();
+    let model = SnrModel::table2();
     profile.range_m.iter().zip(efficiency).map(|(&r, &e)| Ok(10.0 * model.snr(r, e)?.log10())).collect()
 }
 

@@ -3,10 +3,11 @@
 use super::{Cost, Row, measured};
 use crate::Failure;
 use std::ops::ControlFlow;
-use wakescope_optics::structure::{StructureTable, structure_function_m53};
+use wakescope_optics::air::{StructureTable, structure_function_m53};
+use wakescope_optics::monte_carlo::{EfficiencyEstimate, Sampling};
+use wakescope_optics::screens::{ScreenGenerator, stream};
 use wakescope_optics::{
-    EfficiencyEstimate, Grid, Layers, Misalignment, MonteCarlo, Sampling, Spectrum, Stop, Telescope, Turbulence,
-    VonKarman, hankel, screen::ScreenGenerator, theory,
+    Grid, Layers, Misalignment, MonteCarlo, Spectrum, Stop, Telescope, Turbulence, VonKarman, theory,
 };
 
 pub(super) const SEED: u64 = 1;
@@ -39,11 +40,11 @@ fn row(
 
 /// Two quadratures of the free-space efficiency against one another.
 fn free_space() -> Result<Vec<Row>, Failure> {
-    let telescope = Telescope::chapter();
+    let telescope = Telescope::table2();
     let mut rows = Vec::new();
     for range_m in [100.0, RANGE_M, 3000.0] {
         let (overlap, overlap_cost) = measured(|| Ok(theory::free_space_efficiency(&telescope, range_m)?))?;
-        let (hankel, hankel_cost) = measured(|| Ok(hankel::free_space_efficiency_hankel(&telescope, range_m)?))?;
+        let (hankel, hankel_cost) = measured(|| Ok(theory::free_space_efficiency_hankel(&telescope, range_m)?))?;
         let error = (hankel / overlap - 1.0).abs();
         let words = ["relative difference of the two methods", "each other"];
         rows.push(row("free space", "pupil overlap", "range_m", (range_m, error), words, overlap_cost));
@@ -57,7 +58,7 @@ fn set_up(layers: usize, grid: Grid) -> Result<MonteCarlo, Failure> {
         layers: Layers::equal(layers, RANGE_M)?,
         range_m: vec![RANGE_M],
         grid,
-        ..MonteCarlo::chapter(CN2_M_M23, SEED)?
+        ..MonteCarlo::table2(CN2_M_M23, SEED)?
     })
 }
 
@@ -69,7 +70,7 @@ fn estimate(set_up: &MonteCarlo, realisations: usize, double: bool) -> Result<Ef
 
 /// What a finite number of screens does to the exact bistatic efficiency, and what the screens cost.
 fn layers(effort: usize) -> Result<Vec<Row>, Failure> {
-    let (telescope, turbulence) = (Telescope::chapter(), Turbulence::chapter(CN2_M_M23)?);
+    let (telescope, turbulence) = (Telescope::table2(), Turbulence::table2(CN2_M_M23)?);
     let table = StructureTable::new(&*turbulence.spectrum);
     let none = Misalignment::NONE;
     let continuous = theory::bistatic_efficiency_with(&telescope, &none, &turbulence.cn2, &table, RANGE_M)?;
@@ -77,7 +78,7 @@ fn layers(effort: usize) -> Result<Vec<Row>, Failure> {
     for count in [1, 2, 5, 10, 20] {
         let screens = Layers::equal(count, RANGE_M)?.screens_to(RANGE_M, &turbulence.cn2)?;
         let exact = theory::bistatic_efficiency_screens(&telescope, &none, &screens, &table, RANGE_M)?;
-        let (_, cost) = measured(|| estimate(&set_up(count, Grid::chapter())?, 8 * effort, false))?;
+        let (_, cost) = measured(|| estimate(&set_up(count, Grid::table2())?, 8 * effort, false))?;
         let words = ["bistatic efficiency, relative", "exact theory of the continuous path"];
         rows.push(row(
             "layers",
@@ -93,7 +94,7 @@ fn layers(effort: usize) -> Result<Vec<Row>, Failure> {
 
 /// What the grid does to the free-space efficiency, before the correction.
 fn grids() -> Result<Vec<Row>, Failure> {
-    let exact = theory::free_space_efficiency(&Telescope::chapter(), RANGE_M)?;
+    let exact = theory::free_space_efficiency(&Telescope::table2(), RANGE_M)?;
     let mut rows = Vec::new();
     for (points, spacing_m) in [(256, 4e-3), (512, 2e-3), (1024, 1e-3)] {
         for (method, double) in [("f32", false), ("f64", true)] {
@@ -111,7 +112,7 @@ fn grids() -> Result<Vec<Row>, Failure> {
 /// Expected structure function of the screens against theory, beside plain Fourier synthesis and Lane's subharmonics:
 /// the worst from 2 dx to half the grid.
 fn screens() -> Result<Vec<Row>, Failure> {
-    let spectrum = VonKarman::chapter();
+    let spectrum = VonKarman::table2();
     let words = ["expected structure function, relative, worst", "quadrature of the spectrum"];
     let mut rows = Vec::new();
     for points in [256, 512, 1024] {
@@ -120,7 +121,7 @@ fn screens() -> Result<Vec<Row>, Failure> {
         let mut work = generator.work();
         let mut pair = [vec![0.0f32; points * points], vec![0.0f32; points * points]];
         let [first, second] = &mut pair;
-        let mut rng = wakescope_optics::screen::stream(SEED, 0, 0);
+        let mut rng = stream(SEED, 0, 0);
         let (_, cost) = measured(|| Ok(generator.fill_pair(&mut rng, &mut work, first, second)?))?;
         let own = worst_error(&spectrum, points, |steps| generator.expected_structure_m53(steps, 0))?;
         rows.push(row(
@@ -182,7 +183,7 @@ fn realisations(effort: usize) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for (method, sampling, double) in ways {
         for count in [32, 64, 128] {
-            let set_up = MonteCarlo { sampling, ..set_up(10, Grid::chapter())? };
+            let set_up = MonteCarlo { sampling, ..set_up(10, Grid::table2())? };
             let (found, cost) = measured(|| estimate(&set_up, count * effort, double))?;
             let error = found.monostatic.standard_error[0] / found.monostatic.mean[0];
             let words = ["relative standard error, monostatic", "itself"];

@@ -1,9 +1,10 @@
 //! How much light leaves a grid: the tails of the mean beam beyond the absorbing border, from exact theory.
 
-use crate::encircled::mean_power_beyond;
-use crate::grid::Grid;
-use crate::structure::StructureTable;
-use crate::turbulence::{self, Cn2Path};
+use crate::air::cn2::Cn2Path;
+use crate::air::structure::StructureTable;
+use crate::air::turbulence::path_coherence_radius_m;
+use crate::screens::grid::Grid;
+use crate::theory::encircled::mean_power_beyond;
 use crate::{Error, Misalignment, Telescope};
 
 /// The border takes what is beyond this share of the half width: its window falls there, and is passed again at every step.
@@ -110,6 +111,6 @@ pub(super) fn scatter_rad(telescope: &Telescope, cn2: &Cn2Path, range_m: f64) ->
     if cn2.is_none() {
         return Ok(0.0);
     }
-    let rho_0 = turbulence::path_coherence_radius_m(cn2, telescope.wavelength_m, range_m)?;
+    let rho_0 = path_coherence_radius_m(cn2, telescope.wavelength_m, range_m)?;
     Ok(telescope.wavelength_m / (std::f64::consts::PI * rho_0))
 }

@@ -1,13 +1,14 @@
 //! The limits of a grid for one telescope and one turbulence: what a set-up violates, and one that does not.
 
-use super::layers::{Gaps, thin_layers};
+use super::case::Case;
+use super::gaps::{Gaps, thin_layers};
 use super::light::{Light, scatter_rad};
-use crate::grid::Grid;
-use crate::sampling::{Limit, SetUp, Violation, not_above, not_below};
-use crate::source::grid_violations;
-use crate::structure::StructureTable;
+use super::violation::{Limit, SetUp, Violation, not_above, not_below};
+use crate::air::cn2::Cn2Path;
+use crate::air::structure::StructureTable;
+use crate::beam::source::grid_violations;
+use crate::screens::grid::Grid;
 use crate::theory::fresnel_number;
-use crate::turbulence::Cn2Path;
 use crate::{Error, Misalignment, Telescope, Turbulence};
 
 /// Largest number of points along an axis that a plan proposes.
@@ -19,13 +20,14 @@ const LARGEST_LOSS: f64 = 0.04;
 /// Fresnel number below which the whole path is in the far field of the aperture.
 const FAR_FIELD: f64 = 0.2;
 
-/// Telescope and turbulence of a plan.
-pub(super) struct Case<'a> {
+/// A case with what its limits need, computed once.
+pub(super) struct Limits<'a> {
     pub(super) telescope: Telescope,
     pub(super) misalignment: Misalignment,
     pub(super) turbulence: &'a Turbulence,
     pub(super) cn2: Cn2Path,
     pub(super) table: StructureTable,
+    realisations: usize,
 }
 
 /// What a grid violates, and the light that its border takes.
@@ -34,19 +36,21 @@ pub(super) struct Verdict {
     pub(super) light_lost: f64,
 }
 
-impl<'a> Case<'a> {
-    pub(super) fn new(
-        telescope: &Telescope,
-        misalignment: &Misalignment,
-        turbulence: &'a Turbulence,
-    ) -> Result<Self, Error> {
+impl<'a> Limits<'a> {
+    pub(super) fn new(case: &'a Case) -> Result<Self, Error> {
         Ok(Self {
-            telescope: telescope.validated()?,
-            misalignment: misalignment.validated()?,
-            turbulence,
-            cn2: turbulence.cn2.clone().validated()?,
-            table: StructureTable::new(&*turbulence.spectrum),
+            telescope: case.telescope.validated()?,
+            misalignment: case.misalignment.validated()?,
+            turbulence: &case.turbulence,
+            cn2: case.turbulence.cn2.clone().validated()?,
+            table: StructureTable::new(&*case.turbulence.spectrum),
+            realisations: case.realisations,
         })
+    }
+
+    /// What layers do to the mean at these ranges.
+    pub(super) fn gaps(&self, range_m: &[f64]) -> Result<Gaps<'_>, Error> {
+        Gaps::new(&self.telescope, &self.cn2, &self.table, range_m, self.realisations)
     }
 
     /// Tails of the beam out to the furthest range.
@@ -132,7 +136,7 @@ impl<'a> Case<'a> {
     }
 
     /// A set-up of equal layers that holds for every one of these lists of ranges, tried on each.
-    pub(super) fn set_up(&self, runs: &[&[f64]], realisations: usize) -> Option<SetUp> {
+    pub(super) fn set_up(&self, runs: &[&[f64]]) -> Option<SetUp> {
         let mut all: Vec<f64> = runs.concat();
         all.sort_by(f64::total_cmp);
         all.dedup();
@@ -141,8 +145,7 @@ impl<'a> Case<'a> {
         for range_m in runs {
             let furthest = last(range_m).ok()?;
             let thin = thin_layers(&self.cn2, self.telescope.wavelength_m, furthest).ok()?;
-            let gaps = Gaps::new(&self.telescope, &self.cn2, &self.table, range_m, realisations).ok()?;
-            count = count.max(gaps.equal_layers(thin.end_m().len(), furthest).ok()??);
+            count = count.max(self.gaps(range_m).ok()?.equal_layers(thin.end_m().len(), furthest).ok()??);
         }
         let good = |range_m: &&[f64]| self.verdict(&grid, range_m).is_ok_and(|v| v.violations.is_empty());
         runs.iter().all(good).then_some(SetUp { points: grid.nx, spacing_m: grid.dx_m, layers: count })

@@ -7,8 +7,7 @@ use crate::instrument::Instrument;
 use crate::profile::{drawn_turbulence, model, spaced, turbulence};
 use crate::scan::profile_ranges_m;
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
-use wakescope_optics::plan::{Model, Warning};
-use wakescope_optics::sampling::{Limit, SetUp, Violation};
+use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
 use wakescope_optics::{Focus, Telescope, theory};
 
 /// Phase screens and efficiency; adds what is doubtful about the screens to `warnings`.
@@ -173,12 +172,12 @@ fn refused(file: &SceneFile, t: &RefractiveTurbulence, error: wakescope_optics::
                 "at least {points} at atmosphere.turbulence.grid_spacing_m = {}, a width of {} m {}",
                 t.grid_spacing_m,
                 v.needed,
-                v.limit.in_words()
+                v.limit.purpose()
             );
             problems.push(Problem { key: key("grid_points"), value: t.grid_points.to_string(), allowed });
         }
         if let Some(v) = strongest(|v| v.limit.is_spacing(), -1.0) {
-            let allowed = format!("at most {} m {}", v.needed, v.limit.in_words());
+            let allowed = format!("at most {} m {}", v.needed, v.limit.purpose());
             problems.push(Problem { key: key("grid_spacing_m"), value: t.grid_spacing_m.to_string(), allowed });
         }
     }

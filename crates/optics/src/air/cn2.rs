@@ -1,0 +1,238 @@
+//! Cn2 along the line of sight, constant or a profile over height, and its integrals.
+//!
+//! Check: the profile integrates exactly on straight pieces, however thin.
+
+use crate::Error;
+use crate::error::{finite, not_negative};
+use crate::quadrature::GaussLegendre;
+
+/// Cn2 along the line of sight.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cn2Path {
+    /// No turbulence: nothing is drawn and nothing is computed for it.
+    None,
+    /// The same everywhere (a horizontal path).
+    Uniform {
+        /// Cn2 \[m^(-2/3)\], above 0.
+        cn2_m_m23: f64,
+    },
+    /// A profile over height, seen along a slanted line; linear between the points.
+    Heights {
+        /// Heights above ground \[m\], increasing strictly.
+        height_m: Vec<f64>,
+        /// Cn2 at these heights \[m^(-2/3)\].
+        cn2_m_m23: Vec<f64>,
+        /// Height of the telescope above ground \[m\].
+        telescope_height_m: f64,
+        /// Elevation of the line of sight \[rad\].
+        elevation_rad: f64,
+    },
+}
+
+impl Cn2Path {
+    /// Cn2 \[m^(-2/3)\] at distance `range_m` from the telescope.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a height outside the profile.
+    pub fn at(&self, range_m: f64) -> Result<f64, Error> {
+        match self {
+            Self::None => Ok(0.0),
+            Self::Uniform { cn2_m_m23 } => Ok(*cn2_m_m23),
+            Self::Heights { height_m, cn2_m_m23, telescope_height_m, elevation_rad } => {
+                let h = telescope_height_m + range_m * elevation_rad.sin();
+                let last = height_m.len() - 1;
+                // A horizontal path along the lowest or highest point must not fail by a rounding error.
+                let slack = 1e-9 * (height_m[last] - height_m[0]);
+                if !(h >= height_m[0] - slack && h <= height_m[last] + slack) {
+                    return Err(Error::OutOfRange {
+                        field: "height_m",
+                        value: h,
+                        allowed: "within the heights of the Cn2 profile along the whole path",
+                    });
+                }
+                let i = height_m.partition_point(|&v| v <= h).clamp(1, last) - 1;
+                let t = ((h - height_m[i]) / (height_m[i + 1] - height_m[i])).clamp(0.0, 1.0);
+                Ok(cn2_m_m23[i] * (1.0 - t) + cn2_m_m23[i + 1] * t)
+            }
+        }
+    }
+
+    /// Mean of Cn2 \[m^(-2/3)\] from `start_m` to `end_m` along the path, exact: the profile is straight between its knots.
+    ///
+    /// # Errors
+    /// As [`Cn2Path::at`].
+    pub fn mean(&self, start_m: f64, end_m: f64) -> Result<f64, Error> {
+        if !matches!(self, Self::Heights { .. }) || start_m == end_m {
+            return self.at(start_m);
+        }
+        let edges = self.edges_m(start_m, end_m);
+        let values = edges.iter().map(|&z| self.at(z)).collect::<Result<Vec<_>, _>>()?;
+        let pieces = edges.windows(2).zip(values.windows(2));
+        let integral: f64 = pieces.map(|(z, cn2)| 0.5 * (cn2[0] + cn2[1]) * (z[1] - z[0])).sum();
+        Ok(integral / (end_m - start_m))
+    }
+
+    /// `start_m`, the ranges between at which the profile has a knot, `end_m`.
+    fn edges_m(&self, start_m: f64, end_m: f64) -> Vec<f64> {
+        let mut edges = vec![start_m];
+        if let Self::Heights { height_m, telescope_height_m, elevation_rad, .. } = self {
+            let climb = elevation_rad.sin();
+            let ranges = height_m.iter().map(|h| (h - telescope_height_m) / climb);
+            // A horizontal path gives infinity or NaN, which is between nothing.
+            edges.extend(ranges.filter(|&z| z > start_m && z < end_m));
+            edges.sort_by(f64::total_cmp);
+        }
+        edges.push(end_m);
+        edges
+    }
+
+    /// Places z \[m\] and weights \[m^(1/3)\] by which the integral of Cn2(z) f(z) from 0 to `range_m` is a sum, for any f
+    /// that is smooth along the path or a power of its rest.
+    ///
+    /// f is interpolated on panels that halve towards the end; its products with the straight pieces of the profile are
+    /// then exact, so that the number of places does not grow with the number of knots.
+    ///
+    /// # Errors
+    /// As [`Cn2Path::at`].
+    pub(crate) fn quadrature(&self, range_m: f64) -> Result<Vec<(f64, f64)>, Error> {
+        const HALVED: [f64; 5] = [0.0, 0.5, 0.75, 0.875, 1.0];
+        // Between 16 places f is a polynomial of degree 15; times a straight line, 9 nodes integrate it exactly.
+        let (places, exact) = (GaussLegendre::new(16), GaussLegendre::new(9));
+        let mut out = Vec::new();
+        match self {
+            Self::None => {}
+            Self::Uniform { cn2_m_m23 } => out.extend(places.mapped(0.0, range_m).map(|(z, w)| (z, cn2_m_m23 * w))),
+            Self::Heights { .. } => {
+                for panel in HALVED.windows(2) {
+                    let (start, end) = (panel[0] * range_m, panel[1] * range_m);
+                    let at: Vec<f64> = places.mapped(start, end).map(|(z, _)| z).collect();
+                    let mut weight = vec![0.0; at.len()];
+                    for piece in self.edges_m(start, end).windows(2) {
+                        for (z, dz) in exact.mapped(piece[0], piece[1]) {
+                            let cn2_dz = self.at(z)? * dz;
+                            weight.iter_mut().enumerate().for_each(|(j, w)| *w += cn2_dz * lagrange(&at, j, z));
+                        }
+                    }
+                    out.extend(at.into_iter().zip(weight));
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    /// Whether the path is free of turbulence.
+    pub fn is_none(&self) -> bool {
+        match self {
+            Self::None => true,
+            Self::Uniform { cn2_m_m23 } => *cn2_m_m23 == 0.0,
+            Self::Heights { cn2_m_m23, .. } => cn2_m_m23.iter().all(|&c| c == 0.0),
+        }
+    }
+
+    /// The path itself when every number is allowed.
+    ///
+    /// # Errors
+    /// [`Error`] names the field.
+    pub fn validated(self) -> Result<Self, Error> {
+        match &self {
+            Self::None => {}
+            Self::Uniform { cn2_m_m23 } => {
+                not_negative("cn2_m_m23", *cn2_m_m23)?;
+            }
+            Self::Heights { height_m, cn2_m_m23, telescope_height_m, elevation_rad } => {
+                if height_m.len() < 2 || cn2_m_m23.len() != height_m.len() {
+                    return Err(Error::Length {
+                        field: "cn2_m_m23",
+                        found: cn2_m_m23.len(),
+                        expected: height_m.len().max(2),
+                    });
+                }
+                finite("height_m", height_m[0])?;
+                for index in 1..height_m.len() {
+                    if finite("height_m", height_m[index])? <= height_m[index - 1] {
+                        return Err(Error::NotIncreasing { field: "height_m", index, value: height_m[index] });
+                    }
+                }
+                for &value in cn2_m_m23 {
+                    not_negative("cn2_m_m23", value)?;
+                }
+                finite("telescope_height_m", *telescope_height_m)?;
+                finite("elevation_rad", *elevation_rad)?;
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// Value at `x` of the polynomial that is 1 at `at[j]` and 0 at the other places.
+fn lagrange(at: &[f64], j: usize, x: f64) -> f64 {
+    at.iter().enumerate().filter(|(i, _)| *i != j).map(|(_, z)| (x - z) / (at[j] - z)).product()
+}
+
+/// Hufnagel-Valley 5/7 up to `top_m`, with knots dense near the ground.
+#[cfg(test)]
+pub(crate) fn hufnagel_valley(top_m: f64, telescope_height_m: f64, elevation_rad: f64) -> Cn2Path {
+    let height_m: Vec<f64> = (0..=2000).map(|i| top_m * (f64::from(i) / 2000.0).powi(2)).collect();
+    let at = |h: f64| {
+        0.00594 * (21f64 / 27.0).powi(2) * (1e-5 * h).powi(10) * (-h / 1000.0).exp()
+            + 2.7e-16 * (-h / 1500.0).exp()
+            + 1.7e-14 * (-h / 100.0).exp()
+    };
+    let cn2_m_m23 = height_m.iter().map(|&h| at(h)).collect();
+    Cn2Path::Heights { height_m, cn2_m_m23, telescope_height_m, elevation_rad }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slanted_path_sees_the_profile_at_its_height() {
+        let path = Cn2Path::Heights {
+            height_m: vec![0.0, 100.0, 1000.0],
+            cn2_m_m23: vec![2e-13, 1e-13, 0.0],
+            telescope_height_m: 10.0,
+            elevation_rad: 30f64.to_radians(),
+        }
+        .validated()
+        .unwrap();
+        assert!((path.at(80.0).unwrap() / 1.5e-13 - 1.0).abs() < 1e-12);
+        assert!((path.mean(0.0, 160.0).unwrap() / 1.5e-13 - 1.0).abs() < 0.1);
+        assert!((path.mean(20.0, 100.0).unwrap() / 1.6e-13 - 1.0).abs() < 1e-12);
+        assert_eq!(crate::error::refused(path.at(2000.0)), "height_m");
+    }
+
+    #[test]
+    fn mean_of_hufnagel_valley_is_its_integral() {
+        let path = hufnagel_valley(20_000.0, 0.0, std::f64::consts::FRAC_PI_2);
+        let mean = path.mean(0.0, 20_000.0).unwrap();
+        // Integral from 0 to infinity: 10! x 1000^11 and two exponentials; what lies above 20 km is below 1e-3 of it.
+        let high = 0.00594 * (21f64 / 27.0).powi(2) * 1e-50 * 3_628_800.0 * 1e33;
+        let exact = (high + 2.7e-16 * 1500.0 + 1.7e-14 * 100.0) / 20_000.0;
+        assert!((mean / exact - 1.0).abs() < 1e-3, "{mean:e} {exact:e}");
+        assert!((mean - 1.118e-16).abs() < 1e-19, "{mean:e}");
+    }
+
+    #[test]
+    fn weighted_means_see_every_knot() {
+        // A thin strong layer at the ground: nothing may step over it.
+        let path = Cn2Path::Heights {
+            height_m: vec![0.0, 20.0, 21.0, 3000.0],
+            cn2_m_m23: vec![1e-13, 1e-13, 1e-16, 1e-17],
+            telescope_height_m: 2.0,
+            elevation_rad: 10f64.to_radians(),
+        };
+        let range_m = 3000.0;
+        let slices = 200_000;
+        let sum = |f: &dyn Fn(f64) -> f64| {
+            let dz = range_m / f64::from(slices);
+            (0..slices).map(|i| (f64::from(i) + 0.5) * dz).map(|z| path.at(z).unwrap() * f(z) * dz).sum::<f64>()
+        };
+        assert!((path.mean(0.0, range_m).unwrap() * range_m / sum(&|_| 1.0) - 1.0).abs() < 1e-6);
+        for power in [5.0 / 6.0, 5.0 / 3.0] {
+            let f = |z: f64| (1.0 - z / range_m).powf(power);
+            let found: f64 = path.quadrature(range_m).unwrap().iter().map(|&(z, w)| w * f(z)).sum();
+            assert!((found / sum(&f) - 1.0).abs() < 1e-6, "{power}");
+        }
+    }
+}

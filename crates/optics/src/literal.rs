@@ -1,0 +1,119 @@
+//! (16) to (19) as they are written: one path, term by term. Read this first; it is also the oracle of the fast walk.
+//!
+//! ```text
+//! field at the telescope -> for each layer: half of it in free space, its screen, the other half -> irradiance -> overlap
+//! ```
+//!
+//! Sums are done as printed (no fast transform), so that grids of some 50 points are what this is for. The fast form
+//! ([`MonteCarlo`](crate::MonteCarlo)) does the same with transforms of which one serves several ranges, screens that
+//! hold the eddies wider than the grid, many paths, and errors.
+//!
+//! Check: shares the field at the telescope with the fast form, and nothing else
+//! (`fast_walk_is_the_literal_loop_to_round_off`); screens have the structure function of (17)
+//! (`literal_screens_have_the_structure_function_of_their_spectrum`).
+
+use crate::air::Spectrum;
+use crate::beam::source::aperture_field;
+use crate::screens::low_frequency::normal_pair;
+use crate::{Error, Grid, Misalignment, Telescope};
+use rand::Rng;
+use rustfft::num_complex::Complex;
+use std::f64::consts::PI;
+
+type Field = Vec<Complex<f64>>;
+
+/// One layer of the path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    /// Thickness, Delta R' \[m\].
+    pub thickness_m: f64,
+    /// Phase psi that its air adds, at the points of the grid, `[y][x]` \[rad\].
+    pub phase_rad: Vec<f64>,
+}
+
+/// A phase screen \[rad\], `[y][x]`, (18), corrected: psi(r) = Re sum of c sqrt(Phi_psi(kappa)) dkappa exp(j kappa.r) over the
+/// frequencies of the grid, kappa in RADIANS per metre, Phi_psi = 2 pi k^2 Cn2 Delta R' Phi_n/Cn2 with Phi_n of (17), c
+/// complex normal with unit variance in each part. `cn2_thickness_m13` is Cn2 Delta R' \[m^(1/3)\].
+///
+/// Eddies wider than the grid are missing: [`ScreenGenerator`](crate::screens::ScreenGenerator) has them.
+pub fn phase_screen(
+    grid: &Grid,
+    spectrum: &dyn Spectrum,
+    wavelength_m: f64,
+    cn2_thickness_m13: f64,
+    rng: &mut impl Rng,
+) -> Vec<f64> {
+    let k_rad_m = 2.0 * PI / wavelength_m;
+    let cell = [2.0 * PI / (grid.nx as f64 * grid.dx_m), 2.0 * PI / (grid.ny as f64 * grid.dy_m)];
+    let mut waves = Vec::new();
+    for (nx, ny) in frequencies(grid).filter(|f| *f != (0.0, 0.0)) {
+        let kappa = [nx * cell[0], ny * cell[1]];
+        let density =
+            2.0 * PI * k_rad_m.powi(2) * cn2_thickness_m13 * spectrum.density_per_cn2(kappa[0].hypot(kappa[1]));
+        waves.push((kappa, normal_pair(rng) * (density * cell[0] * cell[1]).sqrt()));
+    }
+    let psi = |(x_m, y_m): (f64, f64)| {
+        waves.iter().map(|(kappa, c)| (c * Complex::cis(kappa[0] * x_m + kappa[1] * y_m)).re).sum()
+    };
+    (0..grid.points()).map(|i| ((i % grid.nx) as f64 * grid.dx_m, (i / grid.nx) as f64 * grid.dy_m)).map(psi).collect()
+}
+
+/// Irradiance \[1/m^2\] of the telescope's beam at the end of the layers, `[y][x]`, for unit power before truncation: (16),
+/// with the screen in the middle of its layer.
+///
+/// # Errors
+/// [`Error`] for a telescope or a grid that is none; [`Error::Length`] for a screen that has not the size of the grid.
+pub fn irradiance_per_m2(telescope: &Telescope, grid: &Grid, layers: &[Layer]) -> Result<Vec<f64>, Error> {
+    let (telescope, grid) = (telescope.validated()?, grid.validated()?);
+    let mut field = aperture_field(&telescope, &Misalignment::NONE, &grid);
+    let (mut here_m, mut start_m) = (0.0, 0.0);
+    for Layer { thickness_m, phase_rad } in layers {
+        let (found, expected) = (phase_rad.len(), field.len());
+        if found != expected {
+            return Err(Error::Length { field: "phase_rad", found, expected });
+        }
+        let middle_m = start_m + 0.5 * thickness_m;
+        field = step(&grid, &field, telescope.wavelength_m, middle_m - here_m);
+        field.iter_mut().zip(phase_rad).for_each(|(e, psi)| *e *= Complex::cis(*psi));
+        (here_m, start_m) = (middle_m, start_m + thickness_m);
+    }
+    let field = step(&grid, &field, telescope.wavelength_m, start_m - here_m);
+    Ok(field.iter().map(|e| e.norm_sqr()).collect())
+}
+
+/// Efficiency eta_s of one realisation, (19): lambda^2 R^2/A_R times the integral of j_T j_BPLO, the irradiances at `range_m`
+/// of the transmitted beam and of the local oscillator. Monostatic: both of one path; bistatic: of two different ones.
+pub fn efficiency(telescope: &Telescope, grid: &Grid, range_m: f64, sent: &[f64], received: &[f64]) -> f64 {
+    let overlap: f64 = sent.iter().zip(received).map(|(t, b)| t * b * grid.dx_m * grid.dy_m).sum();
+    (telescope.wavelength_m * range_m).powi(2) / telescope.aperture_area_m2() * overlap
+}
+
+/// Free space over `distance_m`, (16): F^-1 { exp(-j pi lambda Delta R' f^2) F \[E\] }, f in CYCLES per metre; then the border
+/// that takes what would come back from the other side of the grid.
+fn step(grid: &Grid, field: &Field, wavelength_m: f64, distance_m: f64) -> Field {
+    let mut spectrum = transform(grid, field, -1.0);
+    for (value, (nx, ny)) in spectrum.iter_mut().zip(frequencies(grid)) {
+        let f2 = (nx / (grid.nx as f64 * grid.dx_m)).powi(2) + (ny / (grid.ny as f64 * grid.dy_m)).powi(2);
+        *value *= Complex::cis(-PI * wavelength_m * distance_m * f2) / grid.points() as f64;
+    }
+    let border = |i: usize, n: usize| (-((2.0 * i as f64 + 1.0 - n as f64).abs() / (0.95 * n as f64)).powi(40)).exp();
+    let mut field = transform(grid, &spectrum, 1.0);
+    field.iter_mut().enumerate().for_each(|(i, e)| *e *= border(i % grid.nx, grid.nx) * border(i / grid.nx, grid.ny));
+    field
+}
+
+/// Whole numbers of waves across the grid along x and y of each frequency, in the order of a transform.
+fn frequencies(grid: &Grid) -> impl Iterator<Item = (f64, f64)> {
+    let Grid { nx, ny, .. } = *grid;
+    (0..nx * ny).map(move |i| (Grid::frequency_index(nx, i % nx), Grid::frequency_index(ny, i / nx)))
+}
+
+/// Fourier sums along x, then along y, with the factors exp(`sign` 2 pi j m i/n).
+fn transform(grid: &Grid, field: &Field, sign: f64) -> Field {
+    let Grid { nx, ny, .. } = *grid;
+    let wave = |m: usize, i: usize, n: usize| Complex::cis(sign * 2.0 * PI * (m * i % n) as f64 / n as f64);
+    let along_x = |k: usize| (0..nx).map(|x| field[k / nx * nx + x] * wave(k % nx, x, nx)).sum();
+    let rows: Field = (0..nx * ny).map(along_x).collect();
+    let along_y = |k: usize| (0..ny).map(|y| rows[y * nx + k % nx] * wave(k / nx, y, ny)).sum();
+    (0..nx * ny).map(along_y).collect()
+}

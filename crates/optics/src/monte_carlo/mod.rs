@@ -1,0 +1,359 @@
+//! Efficiency (19) through turbulence by Monte Carlo: both receivers, every range, from one set of realisations.
+//!
+//! Monostatic: transmitted beam and BPLO cross the same screens; bistatic: independent ones, taken as all pairs of different
+//! realisations. Realisations run in parallel in groups of fixed size, each screen with a random stream of its own, so
+//! that the result has the same bits for any number of threads.
+//!
+//! Means, scatter and errors are multiplied with the ratio of exact to grid free-space efficiency.
+//!
+//! Check: bistatic against exact theory for the very screens used, as a z-score; no turbulence gives free space with an
+//! error of exactly 0.
+
+#[cfg(test)]
+mod mutation;
+pub(crate) mod path;
+mod prepared;
+mod statistics;
+mod walk;
+
+pub use path::Layers;
+pub use walk::Sampling;
+
+use crate::beam::source::{aperture_field, check_grid};
+use crate::efficiency::EfficiencyProfile;
+use crate::monte_carlo::path::Program;
+use crate::monte_carlo::prepared::Prepared;
+use crate::monte_carlo::statistics::{Folding, Sample, bistatic, mean_and_variance};
+use crate::monte_carlo::walk::{GroupSums, Walker};
+use crate::screens::generator::ScreenGenerator;
+use crate::screens::grid::Grid;
+use crate::screens::kernel::Real;
+use crate::screens::propagate::{Propagator, TransferKind};
+use crate::{Error, Misalignment, Telescope, Turbulence, theory};
+use rustfft::num_complex::Complex;
+use std::ops::ControlFlow;
+
+/// Realisations of one unit of work; their sums are added in order.
+const GROUP: usize = 8;
+/// Groups between two calls of the progress function (and two tests for the end).
+const GROUPS_PER_WAVE: usize = 8;
+
+/// When the Monte Carlo ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stop {
+    /// Largest number of realisations.
+    pub realisations: usize,
+    /// Ends earlier when the relative standard error of the monostatic mean is at most this at every range.
+    pub relative_standard_error: Option<f64>,
+}
+
+impl Stop {
+    /// A fixed number of realisations.
+    pub fn after(realisations: usize) -> Self {
+        Self { realisations, relative_standard_error: None }
+    }
+}
+
+/// What the progress function is told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Realisations done.
+    pub done: usize,
+    /// Realisations at which it ends at the latest.
+    pub total: usize,
+    /// Largest relative standard error of the monostatic mean over the ranges, so far.
+    pub relative_standard_error: f64,
+}
+
+/// A Monte-Carlo run: everything it depends on.
+#[derive(Debug, Clone)]
+pub struct MonteCarlo {
+    /// Telescope of both beams.
+    pub telescope: Telescope,
+    /// Displacement of the BPLO against the transmitted beam; none costs nothing.
+    pub misalignment: Misalignment,
+    /// Turbulence along the path.
+    pub turbulence: Turbulence,
+    /// Transverse grid.
+    pub grid: Grid,
+    /// Layers of the path, one screen each.
+    pub layers: Layers,
+    /// Ranges at which the efficiency is wanted \[m\], in any order, within the layers; results come in increasing
+    /// order, each range once.
+    pub range_m: Vec<f64>,
+    /// Transfer function of the steps.
+    pub transfer: TransferKind,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// How realisations are drawn.
+    pub sampling: Sampling,
+}
+
+/// Result of a Monte-Carlo run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EfficiencyEstimate {
+    /// Both beams through the same path.
+    pub monostatic: EfficiencyProfile,
+    /// Beams through independent paths; none from a single realisation, which has no pairs.
+    pub bistatic: Option<EfficiencyProfile>,
+    /// Efficiency of each realisation at each range, `[range][realisation]`, both beams through the same path; a realisation
+    /// has the same index at every range. One without turbulence.
+    pub monostatic_realisations: Vec<Vec<f64>>,
+    /// The same for beams through the independent paths of two realisations each; empty without pairs.
+    pub bistatic_realisations: Vec<Vec<f64>>,
+    /// Realisations done (1 without turbulence).
+    pub realisations: usize,
+    /// Independent samples among them, from which the errors are taken: an antithetic pair is one. Two are needed for the
+    /// error of the monostatic mean, three for that of the bistatic one; below, these are NaN.
+    pub independent_samples: usize,
+    /// Free-space efficiency of the same steps on the same grid; times this over `exact_free_space`, the means are those of
+    /// the grid as it is.
+    pub grid_free_space: Vec<f64>,
+    /// Exact free-space efficiency.
+    pub exact_free_space: Vec<f64>,
+    /// Mean fraction of the power that the absorbing border took before each range. Above 0.01 the result is doubtful;
+    /// above 0.05 it is refused.
+    pub lost_power_fraction: Vec<f64>,
+}
+
+impl MonteCarlo {
+    /// The chapter's set-up: 512 x 512 points of 2 mm, 10 layers out to 3 km with a range at the end of each, Table 2.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a Cn2 \[m^(-2/3)\] that is not allowed.
+    pub fn table2(cn2_m_m23: f64, seed: u64) -> Result<Self, Error> {
+        let layers = Layers::equal(10, 3000.0)?;
+        Ok(Self {
+            telescope: Telescope::table2(),
+            misalignment: Misalignment::NONE,
+            turbulence: Turbulence::table2(cn2_m_m23)?,
+            grid: Grid::table2(),
+            range_m: layers.end_m().to_vec(),
+            layers,
+            transfer: TransferKind::Paraxial,
+            seed,
+            sampling: Sampling::Independent,
+        })
+    }
+
+    /// Runs in the number type `T` (f32 is twice as fast; its rounding is far below a Monte-Carlo error).
+    ///
+    /// `progress` is called between groups of realisations; `ControlFlow::Break` cancels.
+    ///
+    /// # Errors
+    /// [`Error`] for a set-up that is not allowed, [`Error::PowerLost`], [`Error::Cancelled`].
+    pub fn run<T: Real>(
+        &self,
+        stop: Stop,
+        mut progress: impl FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<EfficiencyEstimate, Error> {
+        let set_up = self.in_order();
+        let prepared = set_up.prepare::<T>()?;
+        set_up.run_prepared(&prepared, stop, &mut progress)
+    }
+
+    /// Mean irradiance overlap without turbulence on this very grid, at each range: the grid's free-space efficiency.
+    ///
+    /// # Errors
+    /// As [`MonteCarlo::run`].
+    pub fn grid_free_space<T: Real>(&self) -> Result<Vec<f64>, Error> {
+        let calm = Self { turbulence: Turbulence::none(), ..self.in_order() };
+        let prepared = calm.prepare::<T>()?;
+        let sums = Walker::new(&prepared, calm.seed, calm.sampling).group(0, 1)?;
+        Ok(sums.samples.iter().map(|s| s[0].same_path).collect())
+    }
+
+    /// The same run with its ranges in increasing order; one that is not a number is refused later, by name.
+    fn in_order(&self) -> Self {
+        let mut range_m = self.range_m.clone();
+        range_m.sort_by(f64::total_cmp);
+        range_m.dedup();
+        Self { range_m, ..self.clone() }
+    }
+
+    pub(crate) fn prepare<T: Real>(&self) -> Result<Prepared<T>, Error> {
+        let telescope = self.telescope.validated()?;
+        let misalignment = self.misalignment.validated()?;
+        let cn2 = self.turbulence.cn2.clone().validated()?;
+        crate::efficiency::check_increasing("range_m", &self.range_m)?;
+        let furthest = *self.range_m.last().ok_or(Error::Length { field: "range_m", found: 0, expected: 1 })?;
+        check_grid(&telescope, &misalignment, &self.grid, furthest)?;
+        let lambda = telescope.wavelength_m;
+        let program = Program::compile(&self.layers, &self.range_m, &cn2, &self.grid, lambda)?;
+        let propagator = Propagator::new(self.grid, lambda, self.transfer)?;
+        let transfers = program.distance_m.iter().map(|&d| propagator.transfer(d)).collect::<Result<_, _>>()?;
+        let screens = if program.strength.is_empty() {
+            None
+        } else {
+            Some(ScreenGenerator::new(self.grid, self.turbulence.spectrum.clone())?)
+        };
+        let mut start: Vec<Vec<Complex<T>>> = vec![aperture_field(&telescope, &Misalignment::NONE, &self.grid)];
+        let displaced = misalignment != Misalignment::NONE;
+        if displaced {
+            start.push(aperture_field(&telescope, &misalignment, &self.grid));
+        }
+        let pixel = self.grid.dx_m * self.grid.dy_m;
+        let scale = self.range_m.iter().map(|r| (lambda * r).powi(2) / telescope.aperture_area_m2() * pixel).collect();
+        let power = start[0].iter().map(|e| e.norm_sqr().wide()).sum::<f64>() * pixel;
+        Ok(Prepared {
+            program,
+            propagator,
+            transfers,
+            screens,
+            start,
+            folding: if displaced { Folding::none(&self.grid) } else { Folding::onto_quadrant(&self.grid) },
+            scale,
+            power,
+        })
+    }
+
+    pub(crate) fn run_prepared<T: Real>(
+        &self,
+        prepared: &Prepared<T>,
+        stop: Stop,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<EfficiencyEstimate, Error> {
+        if stop.realisations == 0 {
+            return Err(Error::OutOfRange { field: "realisations", value: 0.0, allowed: "at least 1" });
+        }
+        if let Some(target) = stop.relative_standard_error {
+            crate::error::positive("relative_standard_error", target)?;
+        }
+        // Without turbulence every realisation is the same.
+        let total = if prepared.screens.is_some() { stop.realisations } else { 1 };
+        let mut sums: Option<GroupSums<T>> = None;
+        let mut done = 0;
+        while done < total {
+            let wave: Vec<(usize, usize)> = (0..GROUPS_PER_WAVE)
+                .map(|g| (done + g * GROUP, (done + (g + 1) * GROUP).min(total)))
+                .filter(|(a, b)| a < b)
+                .collect();
+            done = wave.last().map_or(total, |w| w.1);
+            let walk = |&(first, end): &(usize, usize)| {
+                Walker::new(prepared, self.seed, self.sampling).group(first, end - first)
+            };
+            for group in in_parallel(&wave, walk) {
+                let group = group?;
+                match &mut sums {
+                    None => sums = Some(group),
+                    Some(all) => all.add(group),
+                }
+            }
+            let error = sums.as_ref().map_or(f64::INFINITY, worst_error);
+            let flow = progress(Progress { done, total, relative_standard_error: error });
+            if flow.is_break() {
+                return Err(Error::Cancelled { realisations: done });
+            }
+            if stop.relative_standard_error.is_some_and(|target| error <= target) {
+                break;
+            }
+        }
+        let sums = sums.ok_or(Error::Cancelled { realisations: 0 })?;
+        self.estimate(prepared, &sums, done)
+    }
+
+    fn estimate<T: Real>(
+        &self,
+        prepared: &Prepared<T>,
+        sums: &GroupSums<T>,
+        realisations: usize,
+    ) -> Result<EfficiencyEstimate, Error> {
+        let grid_free_space = if prepared.screens.is_some() {
+            self.grid_free_space::<T>()?
+        } else {
+            sums.samples.iter().map(|s| s[0].same_path).collect()
+        };
+        let exact_free_space = self
+            .range_m
+            .iter()
+            .map(|&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut lost_power_fraction = Vec::new();
+        let (mut mono, mut bi) = (Columns::default(), Columns::default());
+        let [mut single, mut pairs] = [Vec::new(), Vec::new()];
+        for (i, samples) in sums.samples.iter().enumerate() {
+            let (fraction, _) = mean_and_variance(samples.iter().map(|s| s.lost));
+            if fraction.is_nan() || fraction > 0.05 {
+                return Err(Error::PowerLost { range_m: self.range_m[i], fraction });
+            }
+            lost_power_fraction.push(fraction);
+            let factor = exact_free_space[i] / grid_free_space[i];
+            single.push(samples.iter().flat_map(|s| s.single.iter().map(|eta| factor * eta)).collect());
+            pairs.push(sums.products[i].iter().map(|eta| factor * eta).collect());
+            if prepared.screens.is_none() {
+                mono.push(factor * grid_free_space[i], 0.0, 0.0);
+                bi.push(factor * grid_free_space[i], 0.0, 0.0);
+                continue;
+            }
+            let (mean, variance) = mean_and_variance(samples.iter().map(|s| s.same_path));
+            let spread = mean_and_variance(samples.iter().flat_map(|s| s.single.iter().copied())).1.sqrt();
+            mono.push(factor * mean, factor * spread, factor * (variance / samples.len() as f64).sqrt());
+            if samples.len() > 1 {
+                let list: Vec<&Sample> = samples.iter().collect();
+                let second = if prepared.start.len() > 1 { &sums.planes[1][i] } else { &sums.planes[0][i] };
+                let total = prepared.folding.overlap(&sums.planes[0][i], second) * prepared.scale[i];
+                let (mean, error) = bistatic(&list, total, &prepared.folding, prepared.scale[i]);
+                let spread = mean_and_variance(sums.products[i].iter().copied()).1.sqrt();
+                bi.push(factor * mean, factor * spread, factor * error);
+            }
+        }
+        let has_pairs = !bi.mean.is_empty();
+        Ok(EfficiencyEstimate {
+            monostatic: mono.profile(&self.range_m),
+            bistatic: has_pairs.then(|| bi.profile(&self.range_m)),
+            monostatic_realisations: single,
+            bistatic_realisations: pairs,
+            realisations: if prepared.screens.is_some() { realisations } else { 1 },
+            independent_samples: sums.samples.first().map_or(0, Vec::len),
+            grid_free_space,
+            exact_free_space,
+            lost_power_fraction,
+        })
+    }
+}
+
+#[derive(Default)]
+struct Columns {
+    mean: Vec<f64>,
+    standard_deviation: Vec<f64>,
+    standard_error: Vec<f64>,
+}
+
+impl Columns {
+    fn push(&mut self, mean: f64, standard_deviation: f64, standard_error: f64) {
+        self.mean.push(mean);
+        self.standard_deviation.push(standard_deviation);
+        self.standard_error.push(standard_error);
+    }
+
+    fn profile(self, range_m: &[f64]) -> EfficiencyProfile {
+        EfficiencyProfile {
+            range_m: range_m.to_vec(),
+            mean: self.mean,
+            standard_deviation: self.standard_deviation,
+            standard_error: self.standard_error,
+        }
+    }
+}
+
+/// Largest relative standard error of the monostatic mean over the ranges.
+fn worst_error<T>(sums: &GroupSums<T>) -> f64 {
+    sums.samples.iter().fold(0.0, |worst, samples| {
+        let (mean, variance) = mean_and_variance(samples.iter().map(|s| s.same_path));
+        let relative = (variance / samples.len() as f64).sqrt() / mean;
+        if samples.len() > 1 { worst.max(relative) } else { f64::INFINITY }
+    })
+}
+
+/// The results of `work` in the order of `items`.
+#[cfg(feature = "rayon")]
+fn in_parallel<I: Sync, R: Send>(items: &[I], work: impl Fn(&I) -> R + Sync + Send) -> Vec<R> {
+    use rayon::prelude::*;
+    items.par_iter().map(work).collect()
+}
+
+/// The results of `work` in the order of `items`.
+#[cfg(not(feature = "rayon"))]
+fn in_parallel<I, R>(items: &[I], work: impl Fn(&I) -> R) -> Vec<R> {
+    items.iter().map(work).collect()
+}

@@ -1,0 +1,276 @@
+//! Sums from which the efficiencies and their errors follow, for both receivers from one set of realisations.
+//!
+//! Monostatic: mean of q_i = integral of j_i^2. Bistatic: all pairs of different realisations,
+//! \[integral of (sum j)^2 - sum of integral j_i^2\] / (n (n - 1)). The irradiance is folded onto one quadrant, which
+//! is exact for beams symmetric about the axes; its error is the jackknife over realisations, for which
+//! the overlap of one realisation with all is taken on rings.
+//! Check: against the double sum over pairs and the full jackknife.
+
+use crate::screens::grid::Grid;
+use crate::screens::kernel::Real;
+
+/// Width of a ring in grid spacings.
+const RING: f64 = 2.0;
+
+/// Folding of a grid onto the quadrant x, y >= 0 (or no folding for displaced beams), and rings about the axis.
+#[derive(Debug)]
+pub(crate) struct Folding {
+    nx: usize,
+    ny: usize,
+    folded: bool,
+    /// Points of the folded grid along x and y.
+    pub(crate) size: [usize; 2],
+    /// Ring of each folded point.
+    ring: Vec<u16>,
+    pub(crate) rings: usize,
+    /// Points of the full grid in each ring.
+    pub(crate) ring_points: Vec<f64>,
+}
+
+impl Folding {
+    /// Onto the quadrant: for beams symmetric about both axes.
+    pub(crate) fn onto_quadrant(grid: &Grid) -> Self {
+        Self::of_size(grid, [grid.nx / 2 + 1, grid.ny / 2 + 1], true)
+    }
+
+    /// The grid as it is: for displaced beams.
+    pub(crate) fn none(grid: &Grid) -> Self {
+        Self::of_size(grid, [grid.nx, grid.ny], false)
+    }
+
+    fn of_size(grid: &Grid, size: [usize; 2], folded: bool) -> Self {
+        let (nx, ny) = (grid.nx, grid.ny);
+        let unit = RING * grid.dx_m.min(grid.dy_m);
+        let largest = 0.5 * grid.smallest_width_m();
+        let rings = (largest / unit).ceil() as usize + 1;
+        let mut ring = Vec::with_capacity(size[0] * size[1]);
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let px = if folded { x as f64 * grid.dx_m } else { Grid::offset_m(nx, grid.dx_m, x) };
+                let py = if folded { y as f64 * grid.dy_m } else { Grid::offset_m(ny, grid.dy_m, y) };
+                ring.push(((px.hypot(py) / unit) as usize).min(rings - 1) as u16);
+            }
+        }
+        let mut this = Self { nx, ny, folded, size, ring, rings, ring_points: vec![0.0; rings] };
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                this.ring_points[usize::from(this.ring[y * size[0] + x])] += this.multiplicity(x, y);
+            }
+        }
+        this
+    }
+
+    pub(crate) fn points(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// Points of the full grid that fold onto (x, y).
+    fn multiplicity(&self, x: usize, y: usize) -> f64 {
+        if !self.folded {
+            return 1.0;
+        }
+        let along = |i: usize, n: usize| if i > 0 && i < n.div_ceil(2) { 2.0 } else { 1.0 };
+        along(x, self.nx) * along(y, self.ny)
+    }
+
+    /// Adds row `y` of the full grid to the folded plane.
+    pub(crate) fn add_row<T: Real>(&self, y: usize, row: &[T], plane: &mut [T]) {
+        let width = self.size[0];
+        if !self.folded {
+            let target = &mut plane[y * width..(y + 1) * width];
+            for (t, r) in target.iter_mut().zip(row) {
+                *t = *t + *r;
+            }
+            return;
+        }
+        let fy = y.abs_diff(self.ny / 2);
+        let target = &mut plane[fy * width..(fy + 1) * width];
+        let centre = self.nx / 2;
+        for (t, r) in target.iter_mut().zip(&row[centre..]) {
+            *t = *t + *r;
+        }
+        for (t, r) in target[1..].iter_mut().zip(row[..centre].iter().rev()) {
+            *t = *t + *r;
+        }
+    }
+
+    /// Integral over the full grid of the product of two symmetrised planes (in points, without the area).
+    pub(crate) fn overlap<T: Real>(&self, a: &[T], b: &[T]) -> f64 {
+        let width = self.size[0];
+        let mut sum = 0.0;
+        for y in 0..self.size[1] {
+            let row = y * width..(y + 1) * width;
+            let (a, b) = (&a[row.clone()], &b[row]);
+            let whole = T::dot(a, b);
+            if !self.folded {
+                sum += whole;
+                continue;
+            }
+            // Most columns stand for two; the first and, for even sizes, the last stand for one.
+            let mut line = 0.5 * whole + 0.5 * (a[0] * b[0]).wide();
+            let last = width - 1;
+            if self.nx.is_multiple_of(2) {
+                line += 0.5 * (a[last] * b[last]).wide();
+            }
+            sum += line / self.multiplicity(0, y);
+        }
+        sum
+    }
+
+    /// Sums of a folded plane over the rings.
+    pub(crate) fn ring_sums<T: Real>(&self, plane: &[T]) -> Vec<f64> {
+        let mut sums = vec![0.0; self.rings];
+        for (value, &ring) in plane.iter().zip(&self.ring) {
+            sums[usize::from(ring)] += value.wide();
+        }
+        sums
+    }
+}
+
+/// What one realisation leaves at one output range. Overlaps are in units of the efficiency.
+#[derive(Debug, Clone)]
+pub(crate) struct Sample {
+    /// eta of the same path, integral of j_T j_B.
+    pub(crate) same_path: f64,
+    /// Its values for the single realisations of this sample (two if antithetic).
+    pub(crate) single: Vec<f64>,
+    /// The same for the symmetrised planes: what the square of the sum must be freed of.
+    pub(crate) folded: f64,
+    /// Ring sums of j_T and (displaced beams only) j_B.
+    pub(crate) rings: [Vec<f32>; 2],
+    /// Fraction of the power that the border took.
+    pub(crate) lost: f64,
+}
+
+/// Mean and variance of a list; the variance of fewer than two values is NaN, as nothing is known of it.
+pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let (mut n, mut sum) = (0.0, 0.0);
+    for v in values.clone() {
+        n += 1.0;
+        sum += v;
+    }
+    let mean = sum / n;
+    let squares: f64 = values.map(|v| (v - mean) * (v - mean)).sum();
+    (mean, if n > 1.0 { squares / (n - 1.0) } else { f64::NAN })
+}
+
+/// Bistatic efficiency of all pairs and its jackknife standard error, NaN for fewer than three samples.
+///
+/// `total` is the overlap of the two summed planes, `scale` turns a product of ring sums (per point) into an efficiency.
+pub(crate) fn bistatic(samples: &[&Sample], total: f64, folding: &Folding, scale: f64) -> (f64, f64) {
+    let n = samples.len() as f64;
+    let own: f64 = samples.iter().map(|s| s.folded).sum();
+    let mean = (total - own) / (n * (n - 1.0));
+    if samples.len() < 3 {
+        return (mean, f64::NAN);
+    }
+    let mut sums = [vec![0.0; folding.rings], vec![0.0; folding.rings]];
+    for sample in samples {
+        for (sum, rings) in sums.iter_mut().zip(&sample.rings) {
+            for (s, r) in sum.iter_mut().zip(rings) {
+                *s += f64::from(*r);
+            }
+        }
+    }
+    let symmetric = samples[0].rings[1].is_empty();
+    let with_all = |s: &Sample| -> f64 {
+        let mut sum = 0.0;
+        for (i, points) in folding.ring_points.iter().enumerate() {
+            if *points > 0.0 {
+                let t = f64::from(s.rings[0][i]);
+                let product = if symmetric {
+                    2.0 * t * sums[0][i]
+                } else {
+                    t * sums[1][i] + f64::from(s.rings[1][i]) * sums[0][i]
+                };
+                sum += product / points;
+            }
+        }
+        sum * scale
+    };
+    let left_out: Vec<f64> =
+        samples.iter().map(|s| (total - with_all(s) + s.folded - (own - s.folded)) / ((n - 1.0) * (n - 2.0))).collect();
+    let (_, variance) = mean_and_variance(left_out.iter().copied());
+    // Jackknife: (n - 1)/n sum (theta_i - mean)^2 = (n - 1)^2/n variance.
+    (mean, (variance / n).sqrt() * (n - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plane(grid: &Grid, width: f64, height: f64) -> Vec<f64> {
+        let mut out = Vec::new();
+        for y in 0..grid.ny {
+            for x in 0..grid.nx {
+                let px = Grid::offset_m(grid.nx, grid.dx_m, x);
+                let py = Grid::offset_m(grid.ny, grid.dy_m, y);
+                out.push(height * (-(px * px + py * py) / (width * width)).exp());
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn folded_overlap_is_the_overlap_for_symmetric_planes() {
+        for (nx, ny) in [(32, 24), (31, 25)] {
+            let grid = Grid { nx, ny, dx_m: 1.0, dy_m: 1.0 };
+            let (a, b) = (plane(&grid, 6.0, 1.0), plane(&grid, 9.0, 2.0));
+            let exact: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
+            for folding in [Folding::onto_quadrant(&grid), Folding::none(&grid)] {
+                let mut planes = [vec![0.0; folding.points()], vec![0.0; folding.points()]];
+                for (full, plane) in [&a, &b].iter().zip(&mut planes) {
+                    for y in 0..ny {
+                        folding.add_row(y, &full[y * nx..(y + 1) * nx], plane);
+                    }
+                }
+                let found = folding.overlap(&planes[0], &planes[1]);
+                assert!((found / exact - 1.0).abs() < 1e-12, "{nx} {:?}: {found} {exact}", folding.size);
+                assert_eq!(folding.ring_points.iter().sum::<f64>(), (nx * ny) as f64);
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_and_jackknife_agree_with_the_double_sums() {
+        let grid = Grid { nx: 48, ny: 48, dx_m: 1.0, dy_m: 1.0 };
+        let folding = Folding::onto_quadrant(&grid);
+        let planes: Vec<Vec<f64>> =
+            (0..7).map(|i| plane(&grid, 9.0 + 0.7 * f64::from(i), 1.0 + 0.2 * f64::from(i % 3))).collect();
+        let mut total = vec![0.0; folding.points()];
+        let mut samples = Vec::new();
+        for p in &planes {
+            let mut own = vec![0.0; folding.points()];
+            for y in 0..48 {
+                folding.add_row(y, &p[y * 48..(y + 1) * 48], &mut own);
+                folding.add_row(y, &p[y * 48..(y + 1) * 48], &mut total);
+            }
+            let rings = folding.ring_sums(&own).iter().map(|&v| v as f32).collect();
+            let folded = folding.overlap(&own, &own);
+            samples.push(Sample {
+                same_path: folded,
+                single: vec![folded],
+                folded,
+                rings: [rings, Vec::new()],
+                lost: 0.0,
+            });
+        }
+        let list: Vec<&Sample> = samples.iter().collect();
+        let (mean, error) = bistatic(&list, folding.overlap(&total, &total), &folding, 1.0);
+        let pairs = |left_out: Option<usize>| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for i in (0..7).filter(|i| Some(*i) != left_out) {
+                for j in (0..7).filter(|j| Some(*j) != left_out && *j != i) {
+                    sum += planes[i].iter().zip(&planes[j]).map(|(a, b)| a * b).sum::<f64>();
+                    count += 1.0;
+                }
+            }
+            sum / count
+        };
+        assert!((mean / pairs(None) - 1.0).abs() < 1e-12);
+        let left_out: Vec<f64> = (0..7).map(|i| pairs(Some(i))).collect();
+        let centre = left_out.iter().sum::<f64>() / 7.0;
+        let exact = (left_out.iter().map(|v| (v - centre).powi(2)).sum::<f64>() * 6.0 / 7.0).sqrt();
+        assert!((error / exact - 1.0).abs() < 0.02, "{error} {exact}");
+    }
+}

@@ -1,0 +1,334 @@
+//! What a run needs: grid, spacing, layers, memory and time, derived from the scene - or a refusal that names the limits.
+//!
+//! Rules: at least 25 points across the aperture radius (4 where every range is in the far field); l0 >= 2 dx; coherence radius
+//! at the target resolved; the border takes at most 0.0075 of the mean beam's light, tails of diffraction and turbulence included;
+//! Rytov variance of a layer at most 0.1; the exact mean for the screens within a third of the standard error of that for the
+//! continuous path, at every range. Check: the chapter's set-up passes for Cn2 up to 1e-13 at 1 km, 1e-12 beyond 1 km on 512
+//! points is refused, what the plan proposes passes its own test, and runs of derived set-ups lose less than 0.01 of the light.
+
+mod case;
+mod gaps;
+mod light;
+mod limits;
+pub(crate) mod violation;
+
+pub use case::Case;
+pub use gaps::{LARGEST_GAP_SHARE, LARGEST_LAYER_RYTOV, LayerGap};
+pub use violation::{Limit, SetUp, Violation};
+
+use crate::air::cn2::Cn2Path;
+use crate::air::turbulence::path_rytov_variance;
+use crate::monte_carlo::path::{Layers, Program};
+use crate::screens::grid::Grid;
+use crate::{Error, Misalignment, Turbulence};
+use gaps::{Gaps, thin_layers, worst_rytov};
+use limits::{Limits, Verdict, last};
+
+/// CPU time of one f32 layer per point, transforms included \[s\]; f64 takes twice as long. Measured, one core of 2023.
+const LAYER_S: f64 = 9e-9;
+/// CPU time of one f32 screen per point \[s\].
+const SCREEN_S: f64 = 9e-9;
+/// Share of the light above which its loss at the border is doubtful.
+pub const DOUBTFUL_LOSS: f64 = 0.01;
+
+/// The cheapest model that is valid for a receiver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Model {
+    /// No turbulence: exact quadrature.
+    FreeSpace,
+    /// Bistatic: exact quadrature at any strength, no Monte Carlo.
+    ExactBistatic,
+    /// Monostatic through turbulence: Monte Carlo.
+    MonteCarlo,
+}
+
+/// Which paths the two beams take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Receiver {
+    /// Both beams through the same turbulence.
+    Monostatic,
+    /// Beams through independent turbulence.
+    Bistatic,
+}
+
+/// The cheapest valid model for a receiver and a path.
+pub fn cheapest_model(receiver: Receiver, cn2: &Cn2Path) -> Model {
+    match receiver {
+        _ if cn2.is_none() => Model::FreeSpace,
+        Receiver::Bistatic => Model::ExactBistatic,
+        Receiver::Monostatic => Model::MonteCarlo,
+    }
+}
+
+/// A set-up for the Monte Carlo, with what it costs and what is doubtful about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Transverse grid.
+    pub grid: Grid,
+    /// Layers of the path.
+    pub layers: Layers,
+    /// Largest Rytov variance of a layer.
+    pub layer_rytov_variance: f64,
+    /// Forecast of the largest mean fraction of the light that the border takes.
+    pub light_lost: f64,
+    /// What the layers do to the mean at the ranges of the run (at 64 of them at most); empty without turbulence.
+    pub gaps: Vec<LayerGap>,
+    /// Memory of a run with eight groups at a time in f32 \[bytes\].
+    pub memory_bytes: usize,
+    /// CPU time of one realisation in f32 \[s\], an estimate within a factor of two on current machines.
+    pub realisation_cpu_s: f64,
+    /// What is allowed but deserves a word.
+    pub warnings: Vec<Warning>,
+}
+
+/// Something about a plan that is allowed but costs accuracy.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// The inner scale is below two grid spacings: the screens miss this fraction of D at one spacing.
+    InnerScale {
+        /// Fraction of the structure function that is missing at one grid spacing.
+        missing: f64,
+    },
+    /// Layers are thicker than a Rytov variance of 0.1 allows.
+    ThickLayers {
+        /// Largest Rytov variance of a layer.
+        rytov_variance: f64,
+        /// Number of equal layers that would do.
+        layers_needed: usize,
+    },
+    /// The layers shift the mean by more than a third of its standard error.
+    LayerGap {
+        /// The worst of the ranges.
+        worst: LayerGap,
+        /// Number of equal layers that would do, if one of at most 1000 does.
+        layers_needed: Option<usize>,
+    },
+    /// The border takes more than 0.01 of the light.
+    LightLost {
+        /// Forecast of the fraction.
+        fraction: f64,
+        /// Width of a grid that is wide enough \[m\].
+        width_m: f64,
+    },
+    /// The turbulence is so weak that Monte Carlo differs from free space by less than its own error.
+    WeakTurbulence {
+        /// Rytov variance of the whole path.
+        rytov_variance: f64,
+    },
+}
+
+impl Case {
+    /// Derives grid and layers for ranges \[m\], increasing; layers end at the largest.
+    ///
+    /// # Errors
+    /// [`Error::Sampling`] when more than 4096 points along an axis are needed; [`Error`] for a case that is not allowed.
+    pub fn plan(&self, range_m: &[f64]) -> Result<Plan, Error> {
+        crate::efficiency::check_increasing("range_m", range_m)?;
+        let limits = Limits::new(self)?;
+        let grid = limits.grid(range_m)?;
+        let gaps = limits.gaps(range_m)?;
+        let layers = gaps.refined(thin_layers(&limits.cn2, limits.telescope.wavelength_m, last(range_m)?)?)?;
+        let verdict = limits.verdict(&grid, range_m)?;
+        if !verdict.violations.is_empty() {
+            return Err(Error::Sampling { violations: verdict.violations, would_do: None });
+        }
+        limits.judge(&grid, &layers, range_m, &gaps, &verdict)
+    }
+
+    /// Examines a set-up that someone else chose, the chapter's 512 x 2 mm and 10 layers for example.
+    ///
+    /// # Errors
+    /// As [`Case::examine_runs`].
+    pub fn examine(&self, grid: &Grid, layers: &Layers, range_m: &[f64]) -> Result<Plan, Error> {
+        let plan = Limits::new(self)?.examine(grid, &[(layers.clone(), range_m)])?.pop();
+        plan.ok_or(Error::Length { field: "range_m", found: 0, expected: 1 })
+    }
+
+    /// As [`Case::examine`] for several runs on one grid, each with `layers` equal layers to its last range: what one
+    /// refuses is told for all of them at once, and what would do does for all.
+    ///
+    /// # Errors
+    /// [`Error::Sampling`] names every limit that is violated with the smallest (for a spacing: largest) value that works,
+    /// and a whole set-up that was tried and works.
+    pub fn examine_runs(&self, grid: &Grid, layers: usize, runs: &[&[f64]]) -> Result<Vec<Plan>, Error> {
+        let mut set_ups = Vec::new();
+        for range_m in runs {
+            set_ups.push((Layers::equal(layers, last(range_m)?)?, *range_m));
+        }
+        Limits::new(self)?.examine(grid, &set_ups)
+    }
+}
+
+impl Limits<'_> {
+    fn examine(&self, grid: &Grid, runs: &[(Layers, &[f64])]) -> Result<Vec<Plan>, Error> {
+        let mut verdicts: Vec<Verdict> = Vec::new();
+        for (_, range_m) in runs {
+            crate::efficiency::check_increasing("range_m", range_m)?;
+            verdicts.push(self.verdict(grid, range_m)?);
+        }
+        let violations: Vec<_> = verdicts.iter().flat_map(|v| v.violations.iter().copied()).collect();
+        if !violations.is_empty() {
+            let ranges: Vec<&[f64]> = runs.iter().map(|(_, range_m)| *range_m).collect();
+            return Err(Error::Sampling { violations, would_do: self.set_up(&ranges) });
+        }
+        let mut plans = Vec::new();
+        for ((layers, range_m), verdict) in runs.iter().zip(&verdicts) {
+            plans.push(self.judge(grid, layers, range_m, &self.gaps(range_m)?, verdict)?);
+        }
+        Ok(plans)
+    }
+
+    /// Cost and warnings of a set-up whose grid is accepted.
+    fn judge(
+        &self,
+        grid: &Grid,
+        layers: &Layers,
+        range_m: &[f64],
+        gaps: &Gaps<'_>,
+        verdict: &Verdict,
+    ) -> Result<Plan, Error> {
+        let (lambda, furthest) = (self.telescope.wavelength_m, last(range_m)?);
+        let program = Program::compile(layers, range_m, &self.cn2, grid, lambda)?;
+        let layer_rytov_variance = worst_rytov(&self.cn2, lambda, layers, furthest)?;
+        let gap_list = gaps.of(layers)?;
+        let beams = if self.misalignment == Misalignment::NONE { 1 } else { 2 };
+        let warnings = self.warnings(grid, layer_rytov_variance, &gap_list, range_m, gaps, verdict)?;
+        let pairs = program.transform_pairs() * beams as f64;
+        let transfers = program.distance_m.len() * (grid.nx + grid.ny) * 8;
+        Ok(Plan {
+            grid: *grid,
+            layers: layers.clone(),
+            layer_rytov_variance,
+            light_lost: verdict.light_lost,
+            gaps: gap_list,
+            memory_bytes: memory_bytes(grid, range_m.len(), beams) + transfers,
+            realisation_cpu_s: grid.points() as f64 * (LAYER_S * pairs + SCREEN_S * program.strength.len() as f64),
+            warnings,
+        })
+    }
+
+    fn warnings(
+        &self,
+        grid: &Grid,
+        layer_rytov_variance: f64,
+        gap_list: &[LayerGap],
+        range_m: &[f64],
+        gaps: &Gaps<'_>,
+        verdict: &Verdict,
+    ) -> Result<Vec<Warning>, Error> {
+        let mut warnings = Vec::new();
+        let (lambda, furthest) = (self.telescope.wavelength_m, last(range_m)?);
+        if layer_rytov_variance > LARGEST_LAYER_RYTOV {
+            let layers_needed = thin_layers(&self.cn2, lambda, furthest)?.end_m().len();
+            warnings.push(Warning::ThickLayers { rytov_variance: layer_rytov_variance, layers_needed });
+        }
+        let worst = gap_list.iter().filter(|g| g.is_large()).max_by(|a, b| a.excess().total_cmp(&b.excess()));
+        if let Some(&worst) = worst {
+            let layers_needed = gaps.equal_layers(1, furthest)?;
+            warnings.push(Warning::LayerGap { worst, layers_needed });
+        }
+        if verdict.light_lost > DOUBTFUL_LOSS {
+            let width_m = self.width_for_light_m(grid, range_m)?;
+            warnings.push(Warning::LightLost { fraction: verdict.light_lost, width_m });
+        }
+        if !self.cn2.is_none() {
+            let whole = path_rytov_variance(&self.cn2, lambda, furthest)?;
+            if whole < 1e-3 {
+                warnings.push(Warning::WeakTurbulence { rytov_variance: whole });
+            }
+            if self.turbulence.spectrum.inner_wavenumber_rad_m() * grid.dx_m.max(grid.dy_m) > 2.97 {
+                warnings.push(Warning::InnerScale { missing: missing_at_one_spacing(self.turbulence, grid)? });
+            }
+        }
+        Ok(warnings)
+    }
+}
+
+/// Relative deficit of the screens' structure function at one grid spacing. It hardly depends on the width of the grid: a
+/// part of a large grid shows it.
+fn missing_at_one_spacing(turbulence: &Turbulence, grid: &Grid) -> Result<f64, Error> {
+    let part = Grid { nx: grid.nx.min(256), ny: grid.ny.min(256), ..*grid };
+    let generator = crate::screens::generator::ScreenGenerator::<f64>::new(part, turbulence.spectrum.clone())?;
+    let exact = crate::air::structure::structure_function_m53(&*turbulence.spectrum, grid.dx_m)?;
+    Ok(1.0 - generator.expected_structure_m53(1, 0) / exact)
+}
+
+/// Buffers of eight groups (two realisations each, four screens) and their sums, f32.
+fn memory_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
+    let points = grid.points();
+    let complex = 8 * points;
+    let per_group = complex * (4 * beams + 2) + 4 * 4 * points;
+    let plane = if beams == 1 { (grid.nx / 2 + 1) * (grid.ny / 2 + 1) } else { points };
+    8 * (per_group + 4 * plane * beams * (ranges + 4)) + (12 + complex / points) * points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Telescope;
+
+    fn case(cn2: f64) -> Case {
+        Case {
+            telescope: Telescope::table2(),
+            misalignment: Misalignment::NONE,
+            turbulence: Turbulence::table2(cn2).unwrap(),
+            realisations: 400,
+        }
+    }
+
+    fn chapter(cn2: f64, range_m: f64) -> Result<Plan, Error> {
+        case(cn2).examine(&Grid::table2(), &Layers::equal(10, range_m).unwrap(), &[range_m])
+    }
+
+    #[test]
+    fn chapters_set_up_is_accepted_with_the_warning_it_deserves() {
+        assert!(chapter(1e-15, 3000.0).unwrap().warnings.is_empty());
+        let plan = chapter(1e-13, 3000.0).unwrap();
+        assert!(matches!(plan.warnings[..], [Warning::ThickLayers { layers_needed: 15..=17, .. }]), "{plan:?}");
+        assert!((plan.layer_rytov_variance - 0.22).abs() < 0.01);
+        assert!(plan.memory_bytes < 200 << 20, "{}", plan.memory_bytes);
+        let weak = chapter(1e-18, 1000.0).unwrap();
+        assert!(matches!(weak.warnings[..], [Warning::WeakTurbulence { .. }]), "{weak:?}");
+    }
+
+    #[test]
+    fn strong_turbulence_on_a_small_grid_is_refused_with_what_works() {
+        let error = chapter(1e-12, 3000.0).unwrap_err();
+        assert!(matches!(error, Error::Sampling { .. }), "{error}");
+        assert!(!chapter(1e-12, 500.0).unwrap().gaps.is_empty());
+    }
+
+    #[test]
+    fn what_a_plan_proposes_passes_its_own_test() {
+        for (cn2, range_m) in [(0.0, 2000.0), (1e-15, 3000.0), (1e-13, 1000.0), (1e-12, 1500.0)] {
+            let p = case(cn2).plan(&[0.5 * range_m, range_m]).unwrap();
+            assert!(p.layer_rytov_variance <= LARGEST_LAYER_RYTOV);
+            assert!(!p.warnings.iter().any(|w| matches!(w, Warning::ThickLayers { .. })));
+            assert!(p.realisation_cpu_s > 0.0);
+        }
+    }
+
+    #[test]
+    fn cheapest_model_needs_no_monte_carlo_for_bistatic_or_calm_air() {
+        let uniform = Cn2Path::Uniform { cn2_m_m23: 1e-13 };
+        assert_eq!(cheapest_model(Receiver::Bistatic, &uniform), Model::ExactBistatic);
+        assert_eq!(cheapest_model(Receiver::Monostatic, &uniform), Model::MonteCarlo);
+        assert_eq!(cheapest_model(Receiver::Monostatic, &Cn2Path::Uniform { cn2_m_m23: 0.0 }), Model::FreeSpace);
+    }
+
+    #[test]
+    fn unresolved_inner_scale_is_a_warning_with_its_size() {
+        let turbulence = Turbulence {
+            spectrum: std::sync::Arc::new(crate::VonKarman::kolmogorov()),
+            cn2: Cn2Path::Uniform { cn2_m_m23: 1e-14 },
+        };
+        let grid = Grid::square(128, 4e-3).unwrap();
+        let layers = Layers::equal(6, 800.0).unwrap();
+        let p = Case { turbulence, ..case(0.0) }.examine(&grid, &layers, &[800.0]).unwrap();
+        assert!(
+            matches!(p.warnings[..], [Warning::InnerScale { missing }] if missing > 0.02 && missing < 0.3),
+            "{p:?}"
+        );
+    }
+}

@@ -1,0 +1,147 @@
+//! What a transverse grid must hold, in numbers that a user can take over: limits, what violates them, a set-up that does not.
+
+use std::fmt;
+
+/// A limit on the grid of a Monte Carlo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Limit {
+    /// Spacing: enough points across the aperture, its ring and the beam.
+    Aperture,
+    /// Spacing: the slope of the wave front by focus and tilt.
+    WaveFront,
+    /// Spacing: the angles into which turbulence scatters.
+    Scatter,
+    /// Width: the aperture inside the absorbing border.
+    Border,
+    /// Width: the beam at the largest range.
+    Beam,
+    /// Width: the tails of the beam, by diffraction at its edge and by turbulence; beyond 0.05 a run ends.
+    Light,
+    /// Points along an axis of a grid that a plan derives.
+    Points,
+}
+
+impl Limit {
+    /// Whether it bounds the spacing from above; the others bound the width, or the number of points.
+    pub fn is_spacing(self) -> bool {
+        matches!(self, Self::Aperture | Self::WaveFront | Self::Scatter)
+    }
+
+    /// What the limit is for.
+    pub fn purpose(self) -> &'static str {
+        match self {
+            Self::Aperture => "to resolve the aperture and the beam",
+            Self::WaveFront => "for the slope of the wave front (focus, tilt)",
+            Self::Scatter => "for the angles into which turbulence scatters",
+            Self::Border => "for the aperture inside the absorbing border",
+            Self::Beam => "for the beam at the largest range",
+            Self::Light => "so that the border takes less than 0.05 of the light",
+            Self::Points => "to resolve and to hold the beam",
+        }
+    }
+}
+
+/// A violated limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Violation {
+    /// Which.
+    pub limit: Limit,
+    /// Least width \[m\] (or points), or largest spacing \[m\], that is accepted: rounded to the safe side.
+    pub needed: f64,
+    /// What the set-up has.
+    pub found: f64,
+}
+
+impl Violation {
+    /// A width or number of points below `needed`.
+    pub(crate) fn too_small(limit: Limit, needed: f64, found: f64) -> Option<Self> {
+        (found < needed).then(|| Self { limit, needed: not_below(needed), found })
+    }
+
+    /// A spacing above `needed`.
+    pub(crate) fn too_large(limit: Limit, needed: f64, found: f64) -> Option<Self> {
+        (found > needed).then(|| Self { limit, needed: not_above(needed), found })
+    }
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { limit, needed, found } = self;
+        let (what, most) = match limit {
+            Limit::Points => ("points along an axis", "at most"),
+            l if l.is_spacing() => ("grid spacing [m]", "at most"),
+            _ => ("grid width [m]", "at least"),
+        };
+        if *limit == Limit::Points {
+            return write!(f, "{needed} points along an axis are needed {}, {found} at most", limit.purpose());
+        }
+        write!(f, "{what} {found:.6}, {most} {needed} {}", limit.purpose())
+    }
+}
+
+/// A square grid with equal layers that was examined and found good.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SetUp {
+    /// Points along each axis.
+    pub points: usize,
+    /// Spacing \[m\].
+    pub spacing_m: f64,
+    /// Equal layers.
+    pub layers: usize,
+}
+
+/// All violations, and what would do.
+pub(crate) fn listed(violations: &[Violation], would_do: Option<&SetUp>) -> String {
+    let mut items: Vec<String> = violations.iter().map(Violation::to_string).collect();
+    if let Some(SetUp { points, spacing_m, layers }) = would_do {
+        items.push(format!("{points} x {points} points of {spacing_m} m with {layers} layers would do"));
+    }
+    items.join("; ")
+}
+
+/// The least number of four digits that is not below `value`, above 0.
+pub(crate) fn not_below(value: f64) -> f64 {
+    four_digits(value, 1)
+}
+
+/// The largest number of four digits that is not above `value`, above 0.
+pub(crate) fn not_above(value: f64) -> f64 {
+    four_digits(value, -1)
+}
+
+/// `value` to four digits, one unit of the last further in `direction` if that is on the wrong side.
+fn four_digits(value: f64, direction: i32) -> f64 {
+    let text = format!("{value:.3e}");
+    let Some((digits, exponent)) = text.split_once('e') else { return value };
+    let (Ok(rounded), Ok(digits), Ok(exponent)) = (text.parse::<f64>(), digits.parse::<f64>(), exponent.parse::<i32>())
+    else {
+        return value;
+    };
+    if f64::from(direction) * (rounded - value) >= 0.0 {
+        return rounded;
+    }
+    // Below a power of ten the digits are ten times finer.
+    let fine = if direction < 0 && digits == 1.0 { 4 } else { 3 };
+    let units = (digits * 10f64.powi(fine)).round() + f64::from(direction);
+    format!("{units}e{}", exponent - fine).parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn named_numbers_are_on_the_safe_side_of_the_limit() {
+        assert_eq!(not_below(1.604_51), 1.605);
+        assert_eq!(not_below(1.604), 1.604);
+        assert_eq!(not_below(9.9996), 10.0);
+        assert_eq!(not_above(1.998_13e-3), 1.998e-3);
+        assert_eq!(not_above(1.0e-3 - 1e-12), 9.999e-4);
+        for i in 1..2000 {
+            let value = f64::from(i).powf(1.37) * 1e-4;
+            assert!(not_below(value) >= value && not_below(value) <= 1.0011 * value);
+            assert!(not_above(value) <= value && not_above(value) >= 0.9989 * value);
+        }
+    }
+}

@@ -1,0 +1,295 @@
+//! The transverse grid and its two-dimensional Fourier transform with one transpose.
+//!
+//! Fields are row-major, `[y][x]`; spectra and the transposed fields `[x][y]`. A transform of the rows followed by a
+//! transposed store leaves the other axis contiguous, so that a forward and an inverse transform cost two transposes
+//! together. Check: against the direct sum, for odd and prime sizes too.
+
+use crate::Error;
+use crate::error::positive;
+use crate::screens::kernel::Real;
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+use std::sync::Arc;
+
+/// Rows transformed at a time before they are stored transposed: one cache line of f32 numbers.
+const ROWS: usize = 8;
+
+/// Rectangular transverse grid; the optical axis is at point (nx/2, ny/2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// Points along x.
+    pub nx: usize,
+    /// Points along y.
+    pub ny: usize,
+    /// Spacing along x \[m\].
+    pub dx_m: f64,
+    /// Spacing along y \[m\].
+    pub dy_m: f64,
+}
+
+impl Grid {
+    /// Smallest number of points along an axis.
+    pub const SMALLEST: usize = 16;
+
+    /// A square grid of n x n points.
+    ///
+    /// # Errors
+    /// As [`Grid::validated`].
+    pub fn square(n: usize, spacing_m: f64) -> Result<Self, Error> {
+        Self { nx: n, ny: n, dx_m: spacing_m, dy_m: spacing_m }.validated()
+    }
+
+    /// The chapter's grid, 512 x 512 points of 2 mm.
+    pub fn table2() -> Self {
+        Self { nx: 512, ny: 512, dx_m: 2e-3, dy_m: 2e-3 }
+    }
+
+    /// The grid itself when every field is allowed.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for fewer than 16 points along an axis, or a spacing that is not positive.
+    pub fn validated(self) -> Result<Self, Error> {
+        for (field, n) in [("nx", self.nx), ("ny", self.ny)] {
+            if !(Self::SMALLEST..=1 << 15).contains(&n) {
+                return Err(Error::OutOfRange { field, value: n as f64, allowed: "16 to 32768 points" });
+            }
+        }
+        positive("dx_m", self.dx_m)?;
+        positive("dy_m", self.dy_m)?;
+        Ok(self)
+    }
+
+    /// Number of points.
+    pub fn points(&self) -> usize {
+        self.nx * self.ny
+    }
+
+    /// Shorter side \[m\].
+    pub fn smallest_width_m(&self) -> f64 {
+        (self.nx as f64 * self.dx_m).min(self.ny as f64 * self.dy_m)
+    }
+
+    /// Largest step for which the transfer function of (16) is sampled: N dx^2 / lambda \[m\].
+    pub fn largest_step_m(&self, wavelength_m: f64) -> f64 {
+        let x = self.nx as f64 * self.dx_m.powi(2);
+        let y = self.ny as f64 * self.dy_m.powi(2);
+        x.min(y) / wavelength_m
+    }
+
+    /// Distance of point i of n from the axis \[m\].
+    pub(crate) fn offset_m(n: usize, spacing_m: f64, i: usize) -> f64 {
+        (i as f64 - (n / 2) as f64) * spacing_m
+    }
+
+    /// Signed index of frequency i of n.
+    pub(crate) fn frequency_index(n: usize, i: usize) -> f64 {
+        if i < n.div_ceil(2) { i as f64 } else { i as f64 - n as f64 }
+    }
+}
+
+/// Buffers of [`Fft2`].
+pub(crate) struct FftScratch<T> {
+    block: Vec<Complex<T>>,
+    spectrum: Vec<Complex<T>>,
+    inner: Vec<Complex<T>>,
+}
+
+/// Fourier transforms of the rows and columns of one grid, planned once.
+pub(crate) struct Fft2<T: Real> {
+    pub(crate) nx: usize,
+    pub(crate) ny: usize,
+    /// Along x and y, forward.
+    forward: [Arc<dyn Fft<T>>; 2],
+    /// Along x and y, inverse.
+    inverse: [Arc<dyn Fft<T>>; 2],
+    scratch: usize,
+}
+
+impl<T: Real> Fft2<T> {
+    pub(crate) fn new(grid: &Grid) -> Self {
+        let mut planner = FftPlanner::new();
+        let forward = [grid.nx, grid.ny].map(|n| planner.plan_fft_forward(n));
+        let inverse = [grid.nx, grid.ny].map(|n| planner.plan_fft_inverse(n));
+        let scratch = forward.iter().chain(&inverse).map(|f| f.get_inplace_scratch_len()).max().unwrap_or(0);
+        Self { nx: grid.nx, ny: grid.ny, forward, inverse, scratch }
+    }
+
+    /// Buffers of one transform: a block of rows, which stays in the fastest cache, and the transform's own.
+    pub(crate) fn scratch(&self) -> FftScratch<T> {
+        FftScratch {
+            block: vec![Complex::default(); ROWS * self.nx.max(self.ny)],
+            spectrum: vec![Complex::default(); ROWS * self.nx.max(self.ny)],
+            inner: vec![Complex::default(); self.scratch],
+        }
+    }
+
+    /// Calls `rows` on each block of `length`-point rows, with the index of its first row, and stores it transposed in `out`.
+    fn transposing(
+        out: &mut [Complex<T>],
+        length: usize,
+        block: &mut [Complex<T>],
+        mut rows: impl FnMut(usize, &mut [Complex<T>]),
+    ) {
+        let count = out.len() / length;
+        for first in (0..count).step_by(ROWS) {
+            let height = ROWS.min(count - first);
+            let block = &mut block[..height * length];
+            rows(first, block);
+            Self::store_transposed(out, length, first, block);
+        }
+    }
+
+    /// Stores a block of rows of `length` points, of which the first is row `first`, as columns of `out`.
+    fn store_transposed(out: &mut [Complex<T>], length: usize, first: usize, block: &[Complex<T>]) {
+        let count = out.len() / length;
+        let height = block.len() / length;
+        if height == ROWS {
+            for (i, column) in out.chunks_exact_mut(count).enumerate() {
+                let target = &mut column[first..first + ROWS];
+                for (b, value) in target.iter_mut().enumerate() {
+                    *value = block[b * length + i];
+                }
+            }
+        } else {
+            for (i, column) in out.chunks_exact_mut(count).enumerate() {
+                for b in 0..height {
+                    column[first + b] = block[b * length + i];
+                }
+            }
+        }
+    }
+
+    /// Rows `[y][x]`: `before` each block, forward transform along x, transposed into `out` `[kx][y]`.
+    pub(crate) fn forward_x(
+        &self,
+        field: &[Complex<T>],
+        out: &mut [Complex<T>],
+        scratch: &mut FftScratch<T>,
+        mut before: impl FnMut(usize, &mut [Complex<T>]),
+    ) {
+        let FftScratch { block, inner, .. } = scratch;
+        Self::transposing(out, self.nx, block, |first, block| {
+            let start = first * self.nx;
+            block.copy_from_slice(&field[start..start + block.len()]);
+            before(first, block);
+            self.forward[0].process_with_scratch(block, &mut inner[..self.forward[0].get_inplace_scratch_len()]);
+        });
+    }
+
+    /// Rows `[kx][y]`: forward along y, `middle` on the spectrum `[kx][ky]` of each block, inverse along y, transposed
+    /// into `out` `[y]\[kx\]`.
+    pub(crate) fn filter_y(
+        &self,
+        field: &[Complex<T>],
+        out: &mut [Complex<T>],
+        scratch: &mut FftScratch<T>,
+        mut middle: impl FnMut(usize, &mut [Complex<T>]),
+    ) {
+        let FftScratch { block, inner, .. } = scratch;
+        Self::transposing(out, self.ny, block, |first, block| {
+            let start = first * self.ny;
+            block.copy_from_slice(&field[start..start + block.len()]);
+            self.forward[1].process_with_scratch(block, &mut inner[..self.forward[1].get_inplace_scratch_len()]);
+            middle(first, block);
+            self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);
+        });
+    }
+
+    /// As [`Fft2::filter_y`] with two filters of the same spectrum into two fields: one forward transform serves both.
+    pub(crate) fn filter_y_twice(
+        &self,
+        field: &[Complex<T>],
+        outs: [&mut [Complex<T>]; 2],
+        scratch: &mut FftScratch<T>,
+        mut middle: impl FnMut(usize, usize, &mut [Complex<T>]),
+    ) {
+        let FftScratch { block, spectrum, inner } = scratch;
+        let [first_out, second_out] = outs;
+        for (index, rows) in field.chunks(ROWS * self.ny).enumerate() {
+            let first = index * ROWS;
+            let spectrum = &mut spectrum[..rows.len()];
+            spectrum.copy_from_slice(rows);
+            self.forward[1].process_with_scratch(spectrum, &mut inner[..self.forward[1].get_inplace_scratch_len()]);
+            for (which, out) in [&mut *first_out, &mut *second_out].into_iter().enumerate() {
+                let block = &mut block[..rows.len()];
+                block.copy_from_slice(spectrum);
+                middle(which, first, block);
+                self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);
+                Self::store_transposed(out, self.ny, first, block);
+            }
+        }
+    }
+
+    /// Rows `[kx][ky]`: `fill` makes each block, inverse along y, transposed into `out` `[y]\[kx\]`.
+    pub(crate) fn inverse_y(
+        &self,
+        out: &mut [Complex<T>],
+        scratch: &mut FftScratch<T>,
+        mut fill: impl FnMut(usize, &mut [Complex<T>]),
+    ) {
+        let FftScratch { block, inner, .. } = scratch;
+        Self::transposing(out, self.ny, block, |first, block| {
+            fill(first, block);
+            self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);
+        });
+    }
+
+    /// Rows `[y]\[kx\]`: inverse along x, then `after` on each block with the index of its first row.
+    pub(crate) fn inverse_x(
+        &self,
+        field: &mut [Complex<T>],
+        scratch: &mut FftScratch<T>,
+        mut after: impl FnMut(usize, &mut [Complex<T>]),
+    ) {
+        for (block_index, block) in field.chunks_mut(ROWS * self.nx).enumerate() {
+            self.inverse[0]
+                .process_with_scratch(block, &mut scratch.inner[..self.inverse[0].get_inplace_scratch_len()]);
+            after(block_index * ROWS, block);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_dimensional_transform_is_the_direct_sum_for_odd_sizes() {
+        let grid = Grid { nx: 17, ny: 23, dx_m: 1.0, dy_m: 1.0 };
+        let fft = Fft2::<f64>::new(&grid);
+        let mut scratch = fft.scratch();
+        let field: Vec<Complex<f64>> =
+            (0..grid.points()).map(|i| Complex::new((i as f64 * 0.7).sin(), (i as f64 * 1.3).cos())).collect();
+        let mut b = field.clone();
+        fft.forward_x(&field, &mut b, &mut scratch, |_, _| {});
+        let mut found = Complex::default();
+        let (kx, ky) = (5usize, 3usize);
+        let mut out = field.clone();
+        fft.filter_y(&b, &mut out, &mut scratch, |first, block| {
+            if (first..first + block.len() / 23).contains(&kx) {
+                found = block[(kx - first) * 23 + ky];
+            }
+        });
+        let mut exact = Complex::default();
+        for y in 0..23 {
+            for x in 0..17 {
+                let phase = -2.0 * std::f64::consts::PI * (kx as f64 * x as f64 / 17.0 + ky as f64 * y as f64 / 23.0);
+                exact += field[y * 17 + x] * Complex::from_polar(1.0, phase);
+            }
+        }
+        assert!((found - exact).norm() < 1e-11);
+        fft.inverse_x(&mut out, &mut scratch, |_, _| {});
+        for (o, f) in out.iter().zip(&field) {
+            assert!((o / 391.0 - f).norm() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn grids_too_small_or_without_spacing_are_refused() {
+        for (bad, field) in
+            [(Grid::square(1, 1e-3), "nx"), (Grid::square(512, 0.0), "dx_m"), (Grid::square(512, f64::NAN), "dx_m")]
+        {
+            assert_eq!(crate::error::refused(bad), field);
+        }
+    }
+}

@@ -1,0 +1,267 @@
+//! Weak turbulence: the monostatic efficiency to first order in Cn2 for the very beam.
+//!
+//! Both beams of a monostatic lidar cross the same air, so that eta = (C/..) <integral of j^2> exceeds the bistatic value by
+//! the variance of the irradiance j. A phase wave of wave vector kappa at distance z tilts a copy of the beam: at the target
+//! it arrives displaced by s = kappa (R - z)/k and late by kappa^2 (R - z)/(2k). To first order in Cn2 therefore
+//!
+//! integral of var(j) = integral dz 2 pi k^2 Cn2(z) integral d^2 kappa Phi_n 2 \[Q(s) - Re exp(-j kappa^2 (R - z) z/(k R)) X(s)\],
+//! Q(s) = integral of |U(w)|^2 |U(w - s)|^2 d^2 w, X(s) = integral of U*(w)^2 U(w - s) U(w + s) d^2 w,
+//!
+//! with U the free-space field at the target without its spherical phase (Born approximation; Ishimaru 1978, chapter 17). Truncation,
+//! obscuration, focus and spectrum enter as they are. Check: Q and X of a Gaussian beam in closed form; the variance of a plane
+//! wave for a wide beam; the Monte Carlo (`monostatic_enhancement_of_weak_turbulence_is_that_of_first_order_theory`).
+
+use crate::Error;
+use crate::air::spectrum::Spectrum;
+use crate::air::turbulence::{Turbulence, path_rytov_variance};
+use crate::beam::{Misalignment, Telescope};
+use crate::quadrature::GaussLegendre;
+use crate::theory::exact::bistatic_efficiency;
+use crate::theory::hankel::Aperture;
+use crate::theory::overlap::fresnel_number;
+use std::f64::consts::PI;
+
+/// Largest Fresnel number for which the overlaps Q and X are tabulated.
+const LARGEST_FRESNEL: f64 = 40.0;
+/// Largest Rytov variance of the path at which the first order is called valid.
+const LARGEST_RYTOV: f64 = 0.3;
+
+/// Efficiencies (19) in weak turbulence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeakTurbulence {
+    /// Bistatic efficiency, exact.
+    pub bistatic: f64,
+    /// Monostatic over bistatic efficiency less one, to first order in Cn2.
+    pub enhancement: f64,
+    /// Monostatic efficiency, (1 + enhancement) times the bistatic one.
+    pub monostatic: f64,
+    /// Rytov variance of a plane wave over the path.
+    pub rytov_variance: f64,
+    /// Whether the Rytov variance is below 0.3, up to where the first order was found to hold.
+    pub valid: bool,
+}
+
+/// Both efficiencies of a matched, aligned pair at `range_m` in weak turbulence, without random numbers.
+///
+/// # Errors
+/// [`Error::OutOfRange`] for arguments that are not allowed, [`Error::FresnelNumber`] above 40.
+pub fn weak_turbulence_efficiency(
+    telescope: &Telescope,
+    turbulence: &Turbulence,
+    range_m: f64,
+) -> Result<WeakTurbulence, Error> {
+    let telescope = telescope.validated()?;
+    let bistatic = bistatic_efficiency(&telescope, &Misalignment::NONE, turbulence, range_m)?;
+    let found = fresnel_number(&telescope, range_m);
+    if found > LARGEST_FRESNEL {
+        return Err(Error::FresnelNumber { range_m, found, largest: LARGEST_FRESNEL });
+    }
+    let rytov_variance = path_rytov_variance(&turbulence.cn2, telescope.wavelength_m, range_m)?;
+    let overlaps = DisplacedOverlaps::new(&telescope, range_m);
+    let mut enhancement = 0.0;
+    for (z, cn2_dz) in turbulence.cn2.quadrature(range_m)? {
+        enhancement += cn2_dz * overlaps.variance_of_layer(&*turbulence.spectrum, z);
+    }
+    Ok(WeakTurbulence {
+        bistatic,
+        enhancement,
+        monostatic: bistatic * (1.0 + enhancement),
+        rytov_variance,
+        valid: rytov_variance < LARGEST_RYTOV,
+    })
+}
+
+/// Overlaps Q(s) and X(s) of the beam at the target with displaced copies of itself, over their common value at s = 0.
+struct DisplacedOverlaps {
+    wavenumber_rad_m: f64,
+    range_m: f64,
+    /// Step of s \[m\].
+    step_m: f64,
+    /// Q, and X (real and imaginary part), at s = 0, one step, two steps, ...
+    values: Vec<[f64; 3]>,
+}
+
+impl DisplacedOverlaps {
+    fn new(telescope: &Telescope, range_m: f64) -> Self {
+        let wavenumber_rad_m = telescope.wavenumber_rad_m();
+        let lit_m = telescope.aperture_radius_m.min(6.0 * telescope.intensity_radius_m());
+        // U has no wave number above 1/lobe: sums over a lattice of less than 2 pi/(4 lobe) integrate products of four exactly.
+        let lobe_m = range_m / (wavenumber_rad_m * lit_m);
+        let step_m = 0.5 * lobe_m;
+        let shadow_m = lit_m * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
+        let reach = ((1.2 * shadow_m + 20.0 * lobe_m) / step_m).ceil() as usize;
+        let field = lattice(telescope, range_m, step_m, reach);
+        let at = |i: usize, j: usize| if i.max(j) <= reach { field[i * (reach + 1) + j] } else { [0.0; 2] };
+        let irradiance = |i: usize, j: usize| at(i, j).iter().map(|v| v * v).sum::<f64>();
+        let mut values = Vec::with_capacity(2 * reach + 1);
+        for s in 0..=2 * reach {
+            let mut sum = [0.0; 3];
+            for i in 0..=reach {
+                for j in 0..=reach {
+                    // Four quadrants; points on an axis belong to two, the origin to one.
+                    let copies = f64::from(if i > 0 { 2u8 } else { 1 }) * f64::from(if j > 0 { 2u8 } else { 1 });
+                    let (near, far) = (i.abs_diff(s), i + s);
+                    // The point and its mirror image across the y axis.
+                    sum[0] += copies * 0.5 * irradiance(i, j) * (irradiance(near, j) + irradiance(far, j));
+                    let (u, v) = (conjugate_square(at(i, j)), product(at(near, j), at(far, j)));
+                    let x = product(u, v);
+                    sum[1] += copies * x[0];
+                    sum[2] += copies * x[1];
+                }
+            }
+            values.push(sum);
+        }
+        let whole = values[0][0];
+        values.iter_mut().flatten().for_each(|v| *v /= whole);
+        Self { wavenumber_rad_m, range_m, step_m, values }
+    }
+
+    /// Q, Re X, Im X at displacement `s_m`: even functions, so polynomials in its square.
+    fn at(&self, s_m: f64) -> [f64; 3] {
+        let t = s_m / self.step_m;
+        if t >= (self.values.len() - 1) as f64 {
+            return [0.0; 3];
+        }
+        let start = (t as usize).saturating_sub(2).min(self.values.len() - 6);
+        let mut out = [0.0; 3];
+        for i in start..start + 6 {
+            let mut weight = 1.0;
+            for j in (start..start + 6).filter(|j| *j != i) {
+                let (i, j) = (i as f64, j as f64);
+                weight *= (t * t - j * j) / (i * i - j * j);
+            }
+            out.iter_mut().zip(&self.values[i]).for_each(|(o, v)| *o += weight * v);
+        }
+        out
+    }
+
+    /// Q(s) - Re exp(-j kappa^2 (R - z) z/(k R)) X(s).
+    fn bracket(&self, kappa: f64, z: f64) -> f64 {
+        let rest = self.range_m - z;
+        let [q, re, im] = self.at(kappa * rest / self.wavenumber_rad_m);
+        let (sin, cos) = (kappa * kappa * rest * z / (self.wavenumber_rad_m * self.range_m)).sin_cos();
+        q - (re * cos + im * sin)
+    }
+
+    /// Relative variance of the irradiance at the target, weighted with its square, for unit Cn2 dz at distance `z`.
+    fn variance_of_layer(&self, spectrum: &dyn Spectrum, z: f64) -> f64 {
+        let k = self.wavenumber_rad_m;
+        let rest = self.range_m - z;
+        // Wave numbers beyond which displaced copies do not meet, or the spectrum ends.
+        let end =
+            (k / rest * self.step_m * (self.values.len() - 1) as f64).min(7.0 * spectrum.inner_wavenumber_rad_m());
+        let late = rest * z / (k * self.range_m);
+        // Below this the bracket is quadratic in kappa.
+        let quadratic = (0.05 * k / rest * self.step_m).min(0.1 / late.sqrt()).min(end);
+        let curvature = self.bracket(quadratic, z) / (quadratic * quadratic);
+        let rule = GaussLegendre::new(8);
+        let density = |kappa: f64| kappa * spectrum.density_per_cn2(kappa);
+        let mut sum = 0.0;
+        let mut high = quadratic;
+        for _ in 0..60 {
+            sum += rule.integrate(0.5 * high, high, |kappa| density(kappa) * curvature * kappa * kappa);
+            high *= 0.5;
+        }
+        let mut low = quadratic;
+        while low < end {
+            // A third of an octave, or 4 rad of the delay.
+            let next = (1.26 * low).min((low * low + 4.0 / late).sqrt()).min(end);
+            // So late that the delay has averaged X away.
+            sum += if low * low * late > 1000.0 {
+                rule.integrate(low, end, |kappa| density(kappa) * self.at(kappa * rest / k)[0])
+            } else {
+                rule.integrate(low, next, |kappa| density(kappa) * self.bracket(kappa, z))
+            };
+            low = if low * low * late > 1000.0 { end } else { next };
+        }
+        8.0 * PI * PI * k * k * sum
+    }
+}
+
+/// Field at the target on the quadrant of a lattice, `[i][j]`, 0 to `reach` steps along each axis.
+fn lattice(telescope: &Telescope, range_m: f64, step_m: f64, reach: usize) -> Vec<[f64; 2]> {
+    const FINER: f64 = 8.0;
+    let end_m = step_m * (reach + 1) as f64 * std::f64::consts::SQRT_2;
+    let aperture = Aperture::new(telescope, range_m, end_m);
+    let count = (end_m / step_m * FINER) as usize + 4;
+    let radial: Vec<[f64; 2]> = (0..count).map(|i| aperture.field_per_m(step_m / FINER * i as f64)).collect();
+    let mut out = Vec::with_capacity((reach + 1) * (reach + 1));
+    for i in 0..=reach {
+        for j in 0..=reach {
+            let t = FINER * (i as f64).hypot(j as f64);
+            let at = (t as usize).clamp(1, count - 3);
+            let u = t - at as f64;
+            let (a, b, c) = (u + 1.0, u - 1.0, u - 2.0);
+            let weight = [-u * b * c / 6.0, a * b * c / 2.0, -a * u * c / 2.0, a * u * b / 6.0];
+            let part = |p: usize| weight.iter().zip(&radial[at - 1..]).map(|(w, v)| w * v[p]).sum();
+            out.push([part(0), part(1)]);
+        }
+    }
+    out
+}
+
+fn product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
+}
+
+fn conjugate_square(a: [f64; 2]) -> [f64; 2] {
+    [a[0] * a[0] - a[1] * a[1], -2.0 * a[0] * a[1]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Focus;
+    use crate::air::cn2::Cn2Path;
+    use crate::air::spectrum::VonKarman;
+
+    #[test]
+    fn overlaps_of_a_gaussian_beam_are_gaussians() {
+        // U = exp(-g w^2): Q = exp(-2 Re g ... ) in closed form. |U|^2 = exp(-2 a w^2), g = a + jb:
+        // Q(s)/Q(0) = exp(-a s^2); X(s) = exp(-2 g s^2) integral of exp(-(2 g* + 2 g) w^2) = exp(-2 g s^2) Q(0).
+        let s = 0.02;
+        let t = Telescope { aperture_radius_m: 0.2, beam_radius_m: s, focus: Focus::At(900.0), ..Telescope::table2() };
+        let range_m = 1500.0;
+        let k = t.wavenumber_rad_m();
+        let overlaps = DisplacedOverlaps::new(&t, range_m);
+        // Field at the aperture exp(-p r'^2), p = 1/(2 s^2) - j k (1/R - 1/F)/2; its transform is exp(-(k/R)^2 r^2/(4p)).
+        let (re, im) = (0.5 / (s * s), -0.5 * k * (1.0 / range_m - 1.0 / 900.0));
+        let scale = (k / range_m).powi(2) / (4.0 * (re * re + im * im));
+        let (a, b) = (scale * re, -scale * im);
+        for d in [0.0f64, 0.003, 0.011, 0.03, 0.05] {
+            let [q, x_re, x_im] = overlaps.at(d);
+            assert!((q - (-a * d * d).exp()).abs() < 1e-6, "{d}: {q}");
+            let size = (-2.0 * a * d * d).exp();
+            assert!((x_re - size * (2.0 * b * d * d).cos()).abs() < 1e-6, "{d}: {x_re}");
+            assert!((x_im + size * (2.0 * b * d * d).sin()).abs() < 1e-6, "{d}: {x_im}");
+        }
+    }
+
+    #[test]
+    fn wide_beam_has_the_rytov_variance_of_a_plane_wave_less_what_its_width_averages() {
+        let turbulence = |spectrum| Turbulence {
+            spectrum: std::sync::Arc::new(spectrum),
+            cn2: Cn2Path::Uniform { cn2_m_m23: 1e-16 },
+        };
+        let t = Telescope { aperture_radius_m: 0.25, beam_radius_m: 0.08, ..Telescope::table2() };
+        let weak = weak_turbulence_efficiency(&t, &turbulence(VonKarman::kolmogorov()), 1500.0).unwrap();
+        assert!((weak.enhancement / weak.rytov_variance - 1.0).abs() < 0.03, "{weak:?}");
+        // In its focus the spot wanders and breaks up: far more.
+        let focused = Telescope { focus: Focus::At(1500.0), ..t };
+        let weak = weak_turbulence_efficiency(&focused, &turbulence(VonKarman::table2()), 1500.0).unwrap();
+        assert!(weak.enhancement > 3.0 * weak.rytov_variance, "{weak:?}");
+    }
+
+    #[test]
+    fn validity_ends_where_the_first_order_does() {
+        let weak = |cn2| weak_turbulence_efficiency(&Telescope::table2(), &Turbulence::table2(cn2).unwrap(), 1000.0);
+        let (calm, weaker, strong) = (weak(0.0).unwrap(), weak(1e-16).unwrap(), weak(1e-13).unwrap());
+        assert_eq!((calm.enhancement, calm.valid), (0.0, true));
+        assert!(weaker.valid && !strong.valid);
+        assert!((strong.enhancement / weaker.enhancement / 1000.0 - 1.0).abs() < 1e-9);
+        assert!(matches!(
+            weak_turbulence_efficiency(&Telescope::table2(), &Turbulence::table2(1e-14).unwrap(), 20.0),
+            Err(Error::FresnelNumber { .. })
+        ));
+    }
+}
