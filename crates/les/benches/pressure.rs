@@ -6,7 +6,8 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main, measurement::WallTime};
 use realfft::RealFftPlanner;
-use wakescope_les::{Direction, Error, Mapping, Mesh, PressureEquation, PressureMethod, Wall};
+use wakescope_les::solver::{PressureEquation, PressureMethod};
+use wakescope_les::{Direction, Error, Mapping, Mesh, Wall};
 
 /// Periodic in x, slip planes in y, a no-slip wall below and a slip plane above in z.
 fn mesh([nx, ny, nz]: [usize; 3], strength: Option<f64>) -> Result<Mesh, Error> {

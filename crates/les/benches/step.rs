@@ -6,8 +6,10 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use wakescope_les::analysis::WakeScales;
 use wakescope_les::cases::{self, Case, VortexPairCase};
-use wakescope_les::{Error, Flow, PressureMethod, SubgridModel, TimeScheme, TimeStep, WakeScales};
+use wakescope_les::solver::PressureMethod;
+use wakescope_les::{Error, Flow, SubgridModel, TimeScheme, TimeStep};
 
 const MULTISCALE: SubgridModel = SubgridModel::MULTISCALE_WALE;
 

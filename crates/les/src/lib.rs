@@ -24,54 +24,28 @@
 //! # Ok::<(), wakescope_les::Error>(())
 //! ```
 //!
+//! What a first program needs stands here; the rest is in its module.
+//!
 //! | module | what is in it |
 //! |---|---|
-//! | `wind` | the trait [`Wind`]; [`Calm`], [`Uniform`], [`Sum`] |
-//! | `profile` | circulation against radius of one vortex, (3), (4) |
-//! | `two_scale` | the two-scale profile |
-//! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
-//! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
-//! | `series` | [`GridSeries`]: snapshots at several times, a wind that moves |
-//! | `solver` | [`Flow`], [`Mesh`], [`FlowSettings`]: the simulation; [`Run`]: a run with outputs and checkpoints; [`WakeMeter`]: what a wake is measured by; [`cases`] |
-//! | `axis` | one direction of a mesh: stretching, walls, periods |
-//! | `kernel` | the M'4 kernel, (27) |
-//! | `diagnose` | circulation on circles, (1), and `Gamma_5-15` |
-//! | [`decay`] | when the fast decay of a wake begins, how fast its waves grow |
+//! | [`winds`] | the trait [`Wind`]: analytic vortices, uniform winds, sums, fields on meshes |
+//! | [`solver`] | [`Flow`]: the large-eddy simulation, its mesh, settings, pressure equation, runs with checkpoints |
+//! | [`cases`] | flows with known solutions, and the wake above ground |
+//! | [`analysis`] | what is measured in a wind or a flow: circulations, cross-planes, the state of a wake |
 //!
 //! Feature `solver` (default): the large-eddy simulation, see [`Flow`]. Without it neither threads nor transforms are compiled.
 
-mod axis;
-pub mod decay;
-mod diagnose;
-mod error;
-mod grid_wind;
-mod kernel;
-mod profile;
-mod series;
-#[cfg(feature = "solver")]
-mod solver;
-mod two_scale;
-mod vortex;
-mod wind;
+#[cfg(all(doctest, feature = "solver"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
-pub use axis::{Edges, Side};
-pub use diagnose::{circulation_m2_s, mean_circulation_5_15_m2_s};
+pub mod analysis;
+mod error;
+#[cfg(feature = "solver")]
+pub mod solver;
+pub mod winds;
+
 pub use error::{EnergyGrowth, Error, PressureFailure};
-pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
-pub use kernel::{m4_prime, m4_prime_weights};
-pub use profile::CirculationProfile;
-pub use series::GridSeries;
 #[cfg(feature = "solver")]
-pub use solver::{
-    CheckpointPlan, CrossPlane, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent,
-    StepRecord, check_checkpoint,
-};
-#[cfg(feature = "solver")]
-pub use solver::{
-    Direction, Ends, Flow, FlowSettings, Mapping, MappingFn, Mesh, PressureEquation, PressureMethod, PressureSolved,
-    SecondaryRecord, StartReport, StepReport, SubgridModel, TimeScheme, TimeStep, UndampedGrowth, ViscousTreatment,
-    VortexRecord, WakeMeter, WakeRecord, WakeScales, Wall, cases,
-};
-pub use two_scale::TwoScale;
-pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};
-pub use wind::{Calm, Sum, Uniform, Wind};
+pub use solver::{Direction, Flow, FlowSettings, Mapping, Mesh, SubgridModel, TimeScheme, TimeStep, Wall, cases};
+pub use winds::{CirculationProfile, GridSnapshot, Ground, Motion, VortexPair, Wind};

@@ -9,7 +9,7 @@ use crate::export::{CrossPlanes, OPEN_EDGES, edges};
 use crate::netcdf_input::{ClassicFile, TIME, Y, Z, open};
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
-use wakescope_les::Edges;
+use wakescope_les::winds::Edges;
 
 /// The files that `planes` names: itself, or the numbered files `planes_0001.nc`, ... in the order of their names.
 ///
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
     use crate::export::cf_planes::cf_planes_bytes;
     use crate::export::samples;
-    use wakescope_les::Side;
+    use wakescope_les::winds::Side;
 
     fn written(planes: &CrossPlanes) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();

@@ -83,15 +83,15 @@ impl SceneWind {
 /// What the wind refuses; a checked scene gives none.
 fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
     Ok(match &scene.flow {
-        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::Calm),
-        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?),
+        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::winds::Calm),
+        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::winds::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?),
         Flow::VortexPair(pair) => {
             let vortices = Box::new(vortex_pair(pair).wind()?);
             if pair.cross_wind_m_s == 0.0 {
                 return Ok(vortices);
             }
-            let cross = Box::new(les::Uniform::new([0.0, pair.cross_wind_m_s, 0.0])?);
-            Box::new(les::Sum { winds: vec![vortices, cross] })
+            let cross = Box::new(les::winds::Uniform::new([0.0, pair.cross_wind_m_s, 0.0])?);
+            Box::new(les::winds::Sum { winds: vec![vortices, cross] })
         }
     })
 }
@@ -145,7 +145,8 @@ mod planes {
     use crate::export::CrossPlanes;
     use crate::planes_input::{files, read};
     use crate::scene::{SimulatedFlow, SimulatedMotion};
-    use wakescope_les::{Edges, Error as LesError, GridSeries, GridSnapshot, OutsidePolicy, PlaneMesh, Side};
+    use wakescope_les::winds::{Edges, GridSeries, OutsidePolicy, PlaneMesh, Side};
+    use wakescope_les::{Error as LesError, GridSnapshot};
 
     /// A wind that stands still as it was at one time.
     struct Frozen {

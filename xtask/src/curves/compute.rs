@@ -6,7 +6,7 @@ use wakescope_estimate::{
     bound::{Noise, WindowModel},
 };
 use wakescope_les::cases::{TollmienSchlichting, VortexPairCase};
-use wakescope_les::{Flow, Ground, Motion, VortexPair, m4_prime as kernel};
+use wakescope_les::{Flow, Ground, Motion, VortexPair, winds::m4_prime as kernel};
 use wakescope_optics::{RadiusDefinition, SnrModel, Telescope, theory};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::progress::Silent;

@@ -4,7 +4,7 @@ use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use crate::wakes;
-use wakescope_les::decay::{amplitude_growth, value_at};
+use wakescope_les::analysis::decay::{amplitude_growth, value_at};
 use wakescope_sim::export::Table;
 use wakescope_sim::flow::{FinishedWake, REPEATS};
 use wakescope_sim::plot::animation;

@@ -5,7 +5,7 @@ use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use crate::references::numbers;
 use crate::wakes;
-use wakescope_les::decay::{knee, onset, value_at};
+use wakescope_les::analysis::decay::{knee, onset, value_at};
 use wakescope_sim::export::Table;
 use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::plot::{CurvePlot, Figure, Series, Style};

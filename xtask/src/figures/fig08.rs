@@ -4,7 +4,7 @@ use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::Claim;
 use crate::wakes;
-use wakescope_les::decay::value_at;
+use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::export::tables::map_table;
 use wakescope_sim::export::{Table, VelocityMap};
 use wakescope_sim::flow::FinishedWake;

@@ -7,7 +7,7 @@ use super::context::Context;
 use crate::Failure;
 use crate::wakes;
 use std::path::PathBuf;
-use wakescope_les::decay::value_at;
+use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::cell_average::CellAverage;
 use wakescope_sim::export::csv::Column;
 use wakescope_sim::export::{Provenance, Table};

@@ -5,7 +5,7 @@ use crate::Failure;
 use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::references::numbers;
-use wakescope_les::decay::value_at;
+use wakescope_les::analysis::decay::value_at;
 use wakescope_les::{SubgridModel, cases};
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};

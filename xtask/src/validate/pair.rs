@@ -8,7 +8,8 @@ use crate::profile::Profile;
 use crate::references::numbers;
 use std::f64::consts::TAU;
 use wakescope_les::cases::VortexPairCase;
-use wakescope_les::{CirculationProfile, WakeScales};
+use wakescope_les::analysis::WakeScales;
+use wakescope_les::CirculationProfile;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

@@ -3,7 +3,8 @@
 use super::{Row, measured};
 use crate::Failure;
 use wakescope_les::cases::{self, Case, TollmienSchlichting};
-use wakescope_les::{Flow, PressureMethod, TimeScheme, TimeStep};
+use wakescope_les::solver::PressureMethod;
+use wakescope_les::{Flow, TimeScheme, TimeStep};
 
 /// All measurements; `effort` multiplies the length of the runs that have no fixed end.
 pub(super) fn rows(effort: usize) -> Result<Vec<Row>, Failure> {

@@ -1,7 +1,6 @@
 //! Control of the time step, and what is said of a flow that fails.
 
 use super::flow::Flow;
-use super::mesh::{AXIS_NAMES, Ends, Mesh, Wall};
 use super::settings::{TimeStep, ViscousTreatment};
 use crate::Error;
 
@@ -119,23 +118,5 @@ impl Flow {
     pub(super) fn position_m(&self, place: usize) -> [f64; 3] {
         let cell = self.cell(place);
         std::array::from_fn(|d| self.mesh.directions()[d].at(cell[d] as f64 + 0.5).0)
-    }
-}
-
-/// Without viscosity nothing can stick to a wall.
-pub(super) fn refuse_sticking_without_viscosity(mesh: &Mesh, viscosity_m2_s: f64) -> Result<(), Error> {
-    let sticks = |ends: Ends| match ends {
-        Ends::Periodic => false,
-        Ends::Walls { low, high } => [low, high].iter().any(|w| matches!(w, Wall::NoSlip { .. })),
-    };
-    let found = (0..3).find(|&axis| sticks(mesh.directions()[axis].ends));
-    match found {
-        Some(axis) if viscosity_m2_s == 0.0 => Err(Error::BadDirection {
-            axis: AXIS_NAMES[axis],
-            what: "no-slip wall with viscosity_m2_s",
-            value: 0.0,
-            allowed: "positive: an inviscid flow cannot stick to a wall, so make it a slip wall",
-        }),
-        _ => Ok(()),
     }
 }

@@ -1,14 +1,23 @@
-//! Convection of one row of a velocity component; the formulas stand in `momentum`, the pairs in `transport`.
+//! Convection of one row of a velocity component: what `literal` does point by point, the formulas of which stand there.
+//!
+//! Check: the literal form on every kind of mesh.
 
 use multiversion::multiversion;
 
-use super::momentum::Momentum;
-use super::rows::{HALO, add_product, add_rows, add_transport, even_mean, pad};
+use super::momentum::{Momentum, Scratch};
+use super::rows::{HALO, add_product, add_transport, even_mean, pad};
 use super::transport::{MEAN, Transport};
+
+impl Scratch {
+    /// Convection of one row into `self.convection`.
+    pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
+        convection_row(ops, velocity, j, k, &mut self.convection, &mut self.padded, &mut self.flux);
+    }
+}
 
 /// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn convection_row(
+fn convection_row(
     ops: &Momentum,
     velocity: [&[f64]; 3],
     j: usize,
@@ -187,13 +196,14 @@ fn flux_row(
     let n = out.len();
     if ops.axis == 0 {
         let start = ops.start_with(j, k, along, face);
-        pad(padded, &field[start..start + n], ops.periodic[0]);
+        let row = &field[start..start + n];
         if let Some(mass) = ops.equal_mass {
+            pad(padded, row, ops.periodic[0]);
             even_mean(out, mass, std::array::from_fn(|offset| &padded[HALO + offset - 2..]));
             return;
         }
         out.fill(0.0);
-        ops.flux_mean_columns.add(out, padded);
+        ops.flux_mean.add_along(out, row, padded);
         return;
     }
     let (mut j, mut k) = (j, k);
@@ -213,10 +223,5 @@ fn flux_row(
         return;
     }
     out.fill(0.0);
-    let taps = &ops.flux_mean[own];
-    let mut rows = [(0, 0.0); 6];
-    for (row, tap) in rows.iter_mut().zip(taps) {
-        *row = (ops.start_with(j, k, ops.axis, tap.0), tap.1);
-    }
-    add_rows(out, field, &rows[..taps.len().min(6)]);
+    ops.flux_mean.add_across(out, field, [j, k]);
 }

@@ -12,15 +12,14 @@ use rayon::prelude::*;
 
 mod project;
 
-use super::control::refuse_sticking_without_viscosity;
 use super::implicit::LineSolver;
-use super::layout::Layout;
+use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
 use super::momentum::{Momentum, Scratch};
 use super::pressure::{self, PressureSolver, Solved};
 use super::projection::{Divergence, correct, divide_by_volume, weighted_dot};
 use super::report::{StartReport, StepReport};
-use super::settings::{FlowSettings, Stage, TimeScheme};
+use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
 use super::stage::{Powers, Task};
 use super::subgrid::Subgrid;
 use crate::Error;
@@ -155,7 +154,7 @@ impl Flow {
         // The pressure that belongs to the field: that which keeps its acceleration free of divergence.
         let velocity = self.state.velocity.clone();
         let summary = (self.state.energy, self.state.courant_per_s);
-        self.momentum(&Stage { fraction: 1.0, new: 1.0, old: 0.0 }, 1.0, true);
+        self.accelerations();
         self.project(1.0)?;
         std::mem::swap(&mut self.state.pressure, &mut self.work.phi);
         self.state.velocity = velocity;
@@ -203,7 +202,7 @@ impl Flow {
         let mut solved = None;
         for stage in self.settings.scheme.stages(ratio) {
             let stage_s = stage.fraction * step_s;
-            let found = self.momentum(&stage, stage_s, false);
+            let found = self.increments(&stage, stage_s);
             if powers.is_none() && starting {
                 first_terms = Some(self.state.history.clone());
             }
@@ -240,53 +239,67 @@ impl Flow {
         })
     }
 
-    /// The right side of (22) into `star`: with the velocity added if no line solve follows; `acceleration_only` leaves out
-    /// the old pressure and the velocity.
-    fn momentum(&mut self, stage: &Stage, stage_s: f64, acceleration_only: bool) -> Powers {
-        let shape = self.layout.shape;
-        let n = shape.n[0];
+    /// The right side of (22) into `star`, with the velocity added if no line solve follows.
+    fn increments(&mut self, stage: &Stage, stage_s: f64) -> Powers {
         let explicit_per_s = self.settings.scheme.largest_decay() * stage.fraction / stage_s;
-        let subgrid_limit_per_s = (SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0);
-        let Self { ops, state, work, model, layout, settings, .. } = self;
-        let velocity = state.velocity.each_ref().map(Vec::as_slice);
-        if let Some(model) = model.as_mut() {
-            // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long.
-            let limit_per_s = if acceleration_only { f64::INFINITY } else { subgrid_limit_per_s };
-            model.update(velocity, limit_per_s);
+        self.update_model((SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0));
+        let (shape, mut total) = (self.layout.shape, Powers::default());
+        let (task, star, history) = self.task();
+        let keep = if task.implicit == [false; 3] { 1.0 } else { 0.0 };
+        for (axis, (star, history)) in star.iter_mut().zip(history).enumerate() {
+            let planes = (star.par_chunks_mut(shape.plane()), history.par_chunks_mut(shape.plane()));
+            let powers: Vec<Powers> = planes
+                .into_par_iter()
+                .enumerate()
+                .map_init(
+                    || Scratch::new(shape.n[0]),
+                    |scratch, (k, (star, history))| {
+                        task.increments([axis, k], (stage, stage_s, keep), star, history, scratch)
+                    },
+                )
+                .collect();
+            for plane in powers {
+                total.add(plane);
+            }
         }
+        total
+    }
+
+    /// The acceleration by everything but pressure into `star`.
+    fn accelerations(&mut self) {
+        // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long.
+        self.update_model(f64::INFINITY);
+        let shape = self.layout.shape;
+        let (task, star, _) = self.task();
+        for (axis, star) in star.iter_mut().enumerate() {
+            star.par_chunks_mut(shape.plane()).enumerate().for_each_init(
+                || Scratch::new(shape.n[0]),
+                |scratch, (k, star)| task.accelerations([axis, k], star, scratch),
+            );
+        }
+    }
+
+    /// The viscosity of the model for the present field, at most such that it decays by `limit_per_s`.
+    fn update_model(&mut self, limit_per_s: f64) {
+        if let Some(model) = self.model.as_mut() {
+            model.update(self.state.velocity.each_ref().map(Vec::as_slice), limit_per_s);
+        }
+    }
+
+    /// What the momentum equation reads, and what it writes: `star` and the history.
+    fn task(&mut self) -> (Task<'_>, &mut [Vec<f64>; 3], &mut [Vec<f64>; 3]) {
+        let Self { ops, state, work, model, layout, settings, .. } = self;
         let task = Task {
             layout,
             ops,
-            velocity,
+            velocity: state.velocity.each_ref().map(Vec::as_slice),
             pressure: &state.pressure,
             model: model.as_ref(),
             viscosity_m2_s: settings.viscosity_m2_s,
             force_m_s2: layout.direction.map(|d| settings.force_m_s2[d]),
             implicit: state.implicit,
-            stage: *stage,
-            stage_s,
-            add_velocity: !acceleration_only && state.implicit == [false; 3],
-            acceleration_only,
         };
-        let mut total = Powers::default();
-        for axis in 0..3 {
-            let star = work.star[axis].par_chunks_mut(shape.plane());
-            let history = state.history[axis].par_chunks_mut(shape.plane());
-            let planes: Vec<Powers> = (star, history)
-                .into_par_iter()
-                .enumerate()
-                .map_init(
-                    || Scratch::new(n),
-                    |scratch, (k, (star, history))| task.plane(axis, k, star, history, scratch),
-                )
-                .collect();
-            for plane in planes {
-                total.viscous += plane.viscous;
-                total.subgrid += plane.subgrid;
-                total.force += plane.force;
-            }
-        }
-        total
+        (task, &mut work.star, &mut state.history)
     }
 
     /// Solves for the increments along the implicit axes and adds the velocity.
@@ -308,33 +321,17 @@ impl Flow {
         for (component, solver) in solvers {
             solver.solve(self.layout.shape, &mut self.work.star[*component]);
         }
-        let plane = self.layout.shape.plane();
         for (star, velocity) in self.work.star.iter_mut().zip(&self.state.velocity) {
-            star.par_chunks_mut(plane).zip(velocity.par_chunks(plane)).for_each(|(star, velocity)| {
-                for (star, velocity) in star.iter_mut().zip(velocity) {
-                    *star += velocity;
-                }
-            });
+            add_multiple(star, 1.0, velocity, self.layout.shape);
         }
     }
 
     /// (25), or the rotational form.
     fn update_pressure(&mut self) {
-        let plane = self.layout.shape.plane();
-        let phi = &self.work.phi;
-        self.state.pressure.par_chunks_mut(plane).zip(phi.par_chunks(plane)).for_each(|(p, phi)| {
-            for (p, phi) in p.iter_mut().zip(phi) {
-                *p += phi;
-            }
-        });
+        add_multiple(&mut self.state.pressure, 1.0, &self.work.phi, self.layout.shape);
         if self.settings.rotational {
-            let half = 0.5 * self.settings.viscosity_m2_s;
-            let divergence = &self.work.divergence;
-            self.state.pressure.par_chunks_mut(plane).zip(divergence.par_chunks(plane)).for_each(|(p, divergence)| {
-                for (p, divergence) in p.iter_mut().zip(divergence) {
-                    *p -= half * divergence;
-                }
-            });
+            let share_m2_s = -0.5 * self.settings.viscosity_m2_s;
+            add_multiple(&mut self.state.pressure, share_m2_s, &self.work.divergence, self.layout.shape);
         }
     }
 
@@ -352,6 +349,12 @@ impl Flow {
         }
         energy
     }
+}
+
+/// `to += factor from`, plane by plane.
+fn add_multiple(to: &mut [f64], factor: f64, from: &[f64], shape: Shape) {
+    let planes = to.par_chunks_mut(shape.plane()).zip(from.par_chunks(shape.plane()));
+    planes.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from));
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::flow::Flow;
 use super::layout::Layout;
-use super::mesh::{Ends, Mesh, Wall};
+use super::mesh::{Mesh, Wall};
 use super::settings::{FlowSettings, TimeScheme, TimeStep};
 use super::subgrid::SubgridModel;
 
@@ -62,7 +62,7 @@ impl UndampedGrowth {
         if courant == 0.0 || !courant.is_finite() {
             return None;
         }
-        let sticks = mesh.directions().iter().any(|d| walls(d.ends).iter().any(|w| matches!(w, Wall::NoSlip { .. })));
+        let sticks = mesh.directions().iter().any(|d| d.ends.no_slip() != [false; 2]);
         let transport = TRANSPORT[usize::from(sticks)];
         let cell_reynolds = worst / (courant_per_s.powi(3) * settings.viscosity_m2_s);
         let rate_per_s = largest_growth(transport, courant, courant / cell_reynolds) / step_s;
@@ -117,11 +117,11 @@ fn largest_reynolds(transport: [f64; 3], courant: f64) -> f64 {
 fn largest_growth(transport: [f64; 3], courant: f64, viscous: f64) -> f64 {
     let growth = |wave: usize| {
         let theta = PI * wave as f64 / WAVES as f64;
-        let turn = (1..=3).map(|m| transport[m - 1] * (m as f64 * theta).sin()).sum::<f64>();
+        let symbol = (1..=3).map(|m| transport[m - 1] * (m as f64 * theta).sin()).sum::<f64>();
         let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
         let half = 0.5 * viscous * kappa * kappa;
         // G^2 - (a + 3/2 z) G + z/2 = 0.
-        let (a, z) = ((1.0 - half) / (1.0 + half), Complex::new(0.0, courant * turn / (1.0 + half)));
+        let (a, z) = ((1.0 - half) / (1.0 + half), Complex::new(0.0, courant * symbol / (1.0 + half)));
         let b = a + 1.5 * z;
         let root = (b * b - 2.0 * z).sqrt();
         (0.5 * (b + root)).norm().max((0.5 * (b - root)).norm()).ln()
@@ -132,13 +132,6 @@ fn largest_growth(transport: [f64; 3], courant: f64, viscous: f64) -> f64 {
 /// The larger of two, one by one.
 fn larger(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].max(b[0]), a[1].max(b[1])]
-}
-
-fn walls(ends: Ends) -> Vec<Wall> {
-    match ends {
-        Ends::Periodic => Vec::new(),
-        Ends::Walls { low, high } => vec![low, high],
-    }
 }
 
 /// Metrics of the cells, for the rates at which their flow carries waves.
@@ -174,7 +167,7 @@ impl Rates {
     fn of_walls(&self, mesh: &Mesh) -> [f64; 2] {
         let smallest =
             self.metric_m.each_ref().map(|m| (0..m.len()).min_by(|&a, &b| m[a].total_cmp(&m[b])).unwrap_or(0));
-        mesh.directions().iter().flat_map(|d| walls(d.ends)).fold([0.0; 2], |worst, wall| match wall {
+        mesh.directions().iter().flat_map(|d| d.ends.walls()).fold([0.0; 2], |worst, wall| match wall {
             Wall::Slip => worst,
             Wall::NoSlip { velocity_m_s } => larger(worst, self.of(smallest, velocity_m_s)),
         })

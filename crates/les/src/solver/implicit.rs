@@ -9,8 +9,8 @@
 use rayon::prelude::*;
 
 use super::layout::Shape;
-use super::line::Taps;
 use super::momentum::Momentum;
+use super::operators_1d::Taps;
 use super::rows::add_rows;
 
 /// Factors of `1 - a L` along one axis for one component.
@@ -99,7 +99,7 @@ impl LineSolver {
         }
     }
 
-    /// Lines along axis 0: a few rows are turned so that they lie side by side.
+    /// Lines along axis 0: a few rows are transposed so that they lie side by side.
     fn solve_tile(&self, rows: &mut [f64], n: usize) {
         let width = rows.len() / n;
         let mut block = vec![0.0; rows.len()];

@@ -6,8 +6,8 @@
 //!
 //! Check: the order of plane and spatial flows.
 
-use super::line::Line;
 use super::mesh::{Ends, Mesh, Wall};
+use super::operators_1d::Operators1d;
 
 /// Number of values along the three memory axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +38,7 @@ impl Shape {
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     /// Operators of each memory axis.
-    pub(crate) line: [Line; 3],
+    pub(crate) line: [Operators1d; 3],
     /// The direction (0, 1, 2 for x, y, z) of each memory axis.
     pub(crate) direction: [usize; 3],
     /// Number of values.
@@ -54,7 +54,7 @@ impl Layout {
             [1, _, nz] if nz > 1 => [2, 0, 1],
             _ => [0, 1, 2],
         });
-        let line = direction.map(|d| Line::new(&mesh.directions()[d]));
+        let line = direction.map(|d| Operators1d::new(&mesh.directions()[d]));
         let shape = Shape { n: direction.map(|d| cells[d]) };
         Self { line, direction, shape }
     }

@@ -40,6 +40,24 @@ pub enum Ends {
     },
 }
 
+impl Ends {
+    /// The planes at the two ends; none of a periodic direction.
+    pub(crate) fn walls(self) -> Vec<Wall> {
+        match self {
+            Self::Periodic => Vec::new(),
+            Self::Walls { low, high } => vec![low, high],
+        }
+    }
+
+    /// Whether the fluid sticks at the low and at the high end.
+    pub(crate) fn no_slip(self) -> [bool; 2] {
+        match self {
+            Self::Periodic => [false; 2],
+            Self::Walls { low, high } => [low, high].map(|wall| matches!(wall, Wall::NoSlip { .. })),
+        }
+    }
+}
+
 /// One direction of the mesh.
 #[derive(Debug, Clone)]
 pub struct Direction {
@@ -124,15 +142,8 @@ impl Direction {
 
     fn check_cells(&self, axis: usize) -> Result<(), Error> {
         let name = AXIS_NAMES[axis];
-        let walls = match self.ends {
-            Ends::Periodic => [None, None],
-            Ends::Walls { low, high } => [Some(low), Some(high)],
-        };
-        let sticking = walls.iter().flatten().filter(|w| matches!(w, Wall::NoSlip { .. })).count();
-        for velocity in walls.iter().flatten().filter_map(|w| match w {
-            Wall::NoSlip { velocity_m_s } => Some(velocity_m_s),
-            Wall::Slip => None,
-        }) {
+        for wall in self.ends.walls() {
+            let Wall::NoSlip { velocity_m_s: velocity } = wall else { continue };
             if !velocity.iter().all(|v| v.is_finite()) || velocity[axis] != 0.0 {
                 let allowed = "finite, and zero across the wall: the fluid cannot flow through it";
                 return Err(Error::BadDirection {
@@ -143,6 +154,7 @@ impl Direction {
                 });
             }
         }
+        let sticking = self.ends.no_slip().into_iter().filter(|sticks| *sticks).count();
         let (least, allowed) = match sticking {
             0 => (4, "1, or at least 4"),
             1 => (12, "at least 12 with a no-slip wall"),

@@ -8,25 +8,26 @@ mod checkpoint;
 mod control;
 mod convection;
 mod fields;
-mod flow;
+pub(crate) mod flow;
 mod growth;
 mod implicit;
 mod layout;
-mod line;
+#[cfg(test)]
+mod literal;
 mod mapping;
-mod mesh;
+pub(crate) mod mesh;
 mod momentum;
+mod operators_1d;
 mod pressure;
 mod projection;
 mod report;
+mod row_operator;
 mod rows;
 mod run;
-mod sample;
-mod settings;
+pub(crate) mod settings;
 mod stage;
 mod subgrid;
 mod transport;
-mod wake;
 
 pub use checkpoint::check_checkpoint;
 pub use flow::Flow;
@@ -37,7 +38,5 @@ pub use report::{StartReport, StepReport};
 pub use run::{
     CheckpointPlan, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent, StepRecord,
 };
-pub use sample::CrossPlane;
 pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};
 pub use subgrid::SubgridModel;
-pub use wake::{SecondaryRecord, VortexRecord, WakeMeter, WakeRecord, WakeScales};

@@ -8,10 +8,10 @@
 
 use multiversion::multiversion;
 
-use super::convection::convection_row;
 use super::layout::Layout;
-use super::line::{DIFFERENCE, Taps};
-use super::rows::{Columns, HALO, add_even, add_rows, pad};
+use super::operators_1d::{DIFFERENCE, Taps};
+use super::row_operator::RowOperator;
+use super::rows::{HALO, add_even, pad};
 use super::transport::{Stencil, Transport};
 
 /// The operators of one component.
@@ -24,8 +24,7 @@ pub(crate) struct Momentum {
     pub(super) periodic: [bool; 3],
     pub(super) thin: [bool; 3],
     /// Weighted flux along `axis` at its faces from the cells.
-    pub(super) flux_mean: Vec<Taps>,
-    pub(super) flux_mean_columns: Columns,
+    pub(super) flux_mean: RowOperator,
     /// Mass of the cells along `axis` where all are equal and the direction is periodic.
     pub(super) equal_mass: Option<f64>,
     pub(super) transport: [Transport; 3],
@@ -36,12 +35,10 @@ pub(crate) struct Momentum {
     /// Mass of the control volume of this component along each axis.
     mass: [Vec<f64>; 3],
     /// Laplacian along each axis, by its symmetric coefficients where all rows are the same, and the source from moving walls.
-    laplacian: [Vec<Taps>; 3],
+    laplacian: [RowOperator; 3],
     even_laplacian: [Option<[f64; 3]>; 3],
-    laplacian_columns: Columns,
     wall_source: [Vec<f64>; 3],
-    gradient: Vec<Taps>,
-    gradient_columns: Columns,
+    gradient: RowOperator,
 }
 
 /// The staggered difference of fourth order, twice: coefficients of the points at distance 1, 2, 3.
@@ -54,8 +51,8 @@ const SECOND_DIFFERENCE: [f64; 3] = [
 /// Rows that a task reuses.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    padded: [Vec<f64>; 2],
-    flux: [Vec<f64>; 4],
+    pub(super) padded: [Vec<f64>; 2],
+    pub(super) flux: [Vec<f64>; 4],
     pub(crate) convection: Vec<f64>,
     pub(crate) explicit: Vec<f64>,
     pub(crate) implicit: Vec<f64>,
@@ -90,28 +87,22 @@ impl Momentum {
         let mut wall_source: [Vec<f64>; 3] = std::array::from_fn(|b| vec![0.0; n[b]]);
         let laplacian = std::array::from_fn(|b| {
             if b == axis {
-                return line[b].laplacian_at_faces();
+                return RowOperator::new(layout, b, line[b].laplacian_at_faces());
             }
             let (rows, walls) = line[b].laplacian_at_cells();
             let [low, high] = layout.wall_velocity_m_s(b, axis);
             for (source, wall) in wall_source[b].iter_mut().zip(walls) {
                 *source = wall[0] * low + wall[1] * high;
             }
-            rows
+            RowOperator::new(layout, b, rows)
         });
-        let flux_mean = own.flux_mean();
         let stencil = Stencil::of(line);
-        let gradient = own.gradient();
-        let columns = |rows: &[Taps], of: usize| {
-            if of == 0 { Columns::new(rows, line[0].is_periodic()) } else { Columns::default() }
-        };
         Self {
             axis,
             n,
             periodic: std::array::from_fn(|b| line[b].is_periodic()),
             thin: std::array::from_fn(|b| line[b].is_thin()),
-            flux_mean_columns: columns(&flux_mean, axis),
-            flux_mean,
+            flux_mean: RowOperator::new(layout, axis, own.flux_mean()),
             equal_mass: own.is_fourier().then(|| own.cell_mass_m[0]),
             transport: std::array::from_fn(|b| {
                 if b == axis { line[b].transport_of_faces(stencil) } else { line[b].transport_of_cells(stencil) }
@@ -121,15 +112,13 @@ impl Momentum {
             mass: std::array::from_fn(|b| {
                 if b == axis { own.face_mass_m[..n[b]].to_vec() } else { line[b].cell_mass_m.clone() }
             }),
-            laplacian_columns: columns(&laplacian[0], 0),
             laplacian,
             even_laplacian: std::array::from_fn(|b| {
                 let per_h2 = line[b].cell_mass_m[0].powi(-2);
                 line[b].is_fourier().then(|| SECOND_DIFFERENCE.map(|c| c * per_h2))
             }),
             wall_source,
-            gradient_columns: columns(&gradient, axis),
-            gradient,
+            gradient: RowOperator::new(layout, axis, own.gradient()),
         }
     }
 
@@ -145,7 +134,7 @@ impl Momentum {
 
     /// Rows of the Laplacian along one axis.
     pub(crate) fn laplacian(&self, axis: usize) -> &[Taps] {
-        &self.laplacian[axis]
+        self.laplacian[axis].rows()
     }
 
     /// Whether row `(j, k)` lies on a wall, where this component is zero.
@@ -181,12 +170,13 @@ pub(crate) fn add_laplacian_row(
     let n = out.len();
     if axis == 0 {
         let start = ops.start(j, k);
-        pad(padded, &field[start..start + n], ops.periodic[0]);
+        let row = &field[start..start + n];
         if let Some(c) = ops.even_laplacian[0] {
+            pad(padded, row, ops.periodic[0]);
             add_even(out, c, std::array::from_fn(|offset| &padded[HALO + offset - 3..]));
             return;
         }
-        ops.laplacian_columns.add(out, padded);
+        ops.laplacian[0].add_along(out, row, padded);
         for (out, source) in out.iter_mut().zip(&ops.wall_source[0]) {
             *out += source;
         }
@@ -202,12 +192,7 @@ pub(crate) fn add_laplacian_row(
         add_even(out, c, std::array::from_fn(row));
         return;
     }
-    let taps = &ops.laplacian[axis][index];
-    let mut rows = [(0, 0.0); 12];
-    for (row, tap) in rows.iter_mut().zip(taps) {
-        *row = (ops.start_with(j, k, axis, tap.0), tap.1);
-    }
-    add_rows(out, field, &rows[..taps.len().min(12)]);
+    ops.laplacian[axis].add_across(out, field, [j, k]);
     let source = ops.wall_source[axis][index];
     if source != 0.0 {
         for out in out.iter_mut() {
@@ -218,29 +203,12 @@ pub(crate) fn add_laplacian_row(
 
 /// Gradient of a field at the centres for row `(j, k)` of the component.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn gradient_row(ops: &Momentum, field: &[f64], j: usize, k: usize, out: &mut [f64], padded: &mut [f64]) {
-    let n = out.len();
+fn gradient_row(ops: &Momentum, field: &[f64], j: usize, k: usize, out: &mut [f64], padded: &mut [f64]) {
     out.fill(0.0);
-    if ops.axis == 0 {
-        let start = ops.start(j, k);
-        pad(padded, &field[start..start + n], ops.periodic[0]);
-        ops.gradient_columns.add(out, padded);
-        return;
-    }
-    let taps = &ops.gradient[if ops.axis == 1 { j } else { k }];
-    let mut rows = [(0, 0.0); 6];
-    for (row, tap) in rows.iter_mut().zip(taps) {
-        *row = (ops.start_with(j, k, ops.axis, tap.0), tap.1);
-    }
-    add_rows(out, field, &rows[..taps.len().min(6)]);
+    ops.gradient.add(out, field, [j, k], padded);
 }
 
 impl Scratch {
-    /// Convection of one row into `self.convection`.
-    pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
-        convection_row(ops, velocity, j, k, &mut self.convection, &mut self.padded, &mut self.flux);
-    }
-
     /// Laplacians of one row: those along the implicit axes into `self.implicit`, the others into `self.explicit`.
     pub(crate) fn laplacians(&mut self, ops: &Momentum, field: &[f64], implicit: [bool; 3], j: usize, k: usize) {
         self.implicit.fill(0.0);

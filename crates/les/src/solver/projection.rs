@@ -6,9 +6,9 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::layout::{Layout, Shape};
-use super::line::Taps;
 use super::momentum::{Momentum, Scratch};
-use super::rows::{Columns, HALO, add_rows, wrap};
+use super::operators_1d::Taps;
+use super::rows::{Columns, HALO, add_across, wrap};
 
 /// The weighted divergence `sum_b (prod_{d != b} m_d) Dw_b u_b` \[m^3/s\].
 #[derive(Debug, Clone)]
@@ -86,15 +86,8 @@ fn divergence_row(
     let n = out.len();
     let (mass_1, mass_2) = (scale * ops.cell_mass[1][j], scale * ops.cell_mass[2][k]);
     out.fill(0.0);
-    let mut taps = [(0, 0.0); 6];
-    let mut add = |field: &[f64], own: &Taps, mass: f64, start: &dyn Fn(usize) -> usize| {
-        for (row, tap) in taps.iter_mut().zip(own) {
-            *row = (start(tap.0), mass * tap.1);
-        }
-        add_rows(out, field, &taps[..own.len().min(6)]);
-    };
-    add(velocity[1], &ops.rows[1][j], mass_2, &|i| ops.start(i, k));
-    add(velocity[2], &ops.rows[2][k], mass_1, &|i| ops.start(j, i));
+    add_across(out, velocity[1], mass_2, &ops.rows[1][j], |i| ops.start(i, k));
+    add_across(out, velocity[2], mass_1, &ops.rows[2][k], |i| ops.start(j, i));
     for (out, mass) in out.iter_mut().zip(&ops.cell_mass[0]) {
         *out *= mass;
     }

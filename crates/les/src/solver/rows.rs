@@ -1,7 +1,7 @@
 //! Kernels on rows of memory axis 0. They are inlined into functions that are compiled for several instruction sets;
 //! products and sums are kept apart, so that each version gives the same bits.
 
-use super::line::Taps;
+use super::operators_1d::Taps;
 use super::transport::{MEAN, Stencil};
 
 /// Values before and after a padded row.
@@ -120,6 +120,19 @@ pub(crate) fn add_rows(out: &mut [f64], field: &[f64], taps: &[(usize, f64)]) {
             *out += c * x;
         }
     }
+}
+
+/// Most neighbours of one row.
+const MOST_TAPS: usize = 12;
+
+/// `out += scale sum c row` over the taps of an operator across rows; those of index `i` start at `start(i)`.
+#[inline(always)]
+pub(crate) fn add_across(out: &mut [f64], field: &[f64], scale: f64, taps: &Taps, start: impl Fn(usize) -> usize) {
+    let mut rows = [(0, 0.0); MOST_TAPS];
+    for (row, tap) in rows.iter_mut().zip(taps) {
+        *row = (start(tap.0), scale * tap.1);
+    }
+    add_rows(out, field, &rows[..taps.len().min(MOST_TAPS)]);
 }
 
 /// `out += scale transport`, by the formula of the interior: fluxes `g` at -1, 0, 1, 2 and values `q` at -3 to 3.

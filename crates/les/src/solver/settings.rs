@@ -1,5 +1,8 @@
 //! What a simulation is told beside its mesh and its initial field.
 
+use super::mesh::{AXIS_NAMES, Mesh};
+use super::pressure::PressureMethod;
+use super::subgrid::{self, SubgridModel};
 use crate::Error;
 use crate::error::check;
 
@@ -117,14 +120,14 @@ pub struct FlowSettings {
     /// them and leave the order at two.
     pub damped_steps: u64,
     /// Which pressure solver.
-    pub pressure: super::PressureMethod,
+    pub pressure: PressureMethod,
     /// Relative residual at which the pressure equation counts as solved.
     pub pressure_tolerance: f64,
     /// Rotational form of the pressure update (Timmermans, Minev and Van de Vosse 1996): `p += phi - nu/2 div u*`, which
     /// removes the numerical boundary layer of the pressure at walls. It takes one more array.
     pub rotational: bool,
     /// Subgrid model.
-    pub subgrid: super::SubgridModel,
+    pub subgrid: SubgridModel,
     /// Order of the directions in memory, slowest last; `None` chooses. It changes rounding, nothing else.
     pub memory_order: Option<[usize; 3]>,
 }
@@ -139,10 +142,10 @@ impl FlowSettings {
             time_step,
             viscous: ViscousTreatment::default(),
             damped_steps: 0,
-            pressure: super::PressureMethod::Auto,
+            pressure: PressureMethod::Auto,
             pressure_tolerance: 1e-10,
             rotational: false,
-            subgrid: super::SubgridModel::None,
+            subgrid: SubgridModel::None,
             memory_order: None,
         }
     }
@@ -151,10 +154,10 @@ impl FlowSettings {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a setting, [`Error::BadDirection`] for no-slip walls without viscosity.
-    pub fn validate(&self, mesh: &super::Mesh) -> Result<(), Error> {
+    pub fn validate(&self, mesh: &Mesh) -> Result<(), Error> {
         self.check()?;
-        super::subgrid::check_constants(self.subgrid)?;
-        super::control::refuse_sticking_without_viscosity(mesh, self.viscosity_m2_s)
+        subgrid::check_constants(self.subgrid)?;
+        refuse_sticking_without_viscosity(mesh, self.viscosity_m2_s)
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
@@ -181,5 +184,19 @@ impl FlowSettings {
             return Err(Error::OutOfRange { field: "memory_order", value, allowed: "a permutation of 0, 1, 2" });
         }
         Ok(())
+    }
+}
+
+/// Without viscosity nothing can stick to a wall.
+pub(super) fn refuse_sticking_without_viscosity(mesh: &Mesh, viscosity_m2_s: f64) -> Result<(), Error> {
+    let found = (0..3).find(|&axis| mesh.directions()[axis].ends.no_slip() != [false; 2]);
+    match found {
+        Some(axis) if viscosity_m2_s == 0.0 => Err(Error::BadDirection {
+            axis: AXIS_NAMES[axis],
+            what: "no-slip wall with viscosity_m2_s",
+            value: 0.0,
+            allowed: "positive: an inviscid flow cannot stick to a wall, so make it a slip wall",
+        }),
+        _ => Ok(()),
     }
 }

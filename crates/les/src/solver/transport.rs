@@ -15,12 +15,12 @@
 //! all directions if one of them has a no-slip wall, whose closure belongs to the pairs: a vortex that turns is to meet the
 //! same errors in all directions.
 //!
-//! Check: skewness, row sums, speed of waves, exactness for parabolas, mirror symmetry of the two walls.
+//! Check: the tables are the solution of their conditions (`wall_closure`); skewness, row sums, speed of waves, exactness for parabolas, mirror symmetry of the two walls.
 
 // The tables are written as they were derived, with all digits.
 #![allow(clippy::excessive_precision)]
 
-use super::line::{Line, Taps, resolve_cell, resolve_face};
+use super::operators_1d::{Operators1d, Taps, resolve_cell, resolve_face};
 
 /// Weights of the pairs at distance 1 and 3 that Vasilyev's scheme has.
 pub(crate) const PAIR: [f64; 2] = [9.0 / 16.0, -1.0 / 48.0];
@@ -61,7 +61,7 @@ impl Stencil {
     pub(crate) const WIDE: Self = Self::with(SIXTH);
 
     /// That of a mesh with these directions.
-    pub(crate) fn of(lines: &[Line]) -> Self {
+    pub(crate) fn of(lines: &[Operators1d]) -> Self {
         if lines.iter().all(|line| line.no_slip() == [false; 2]) { Self::WIDE } else { Self::PLAIN }
     }
 
@@ -115,7 +115,7 @@ const WALL_SKEW: [&[(usize, usize, f64)]; 4] = [
       (4, 7, 1.0 / 768.0), (5, 6, -9.0 / 256.0)],
 ];
 
-impl Line {
+impl Operators1d {
     /// Mean of the weighted fluxes along a wall at the stored faces: cells and coefficients, the masses of the cells included.
     /// The rows of wall faces are empty.
     pub(crate) fn flux_mean(&self) -> Vec<Taps> {
@@ -230,6 +230,9 @@ fn interior_products(stencil: Stencil, m: isize) -> impl Iterator<Item = (isize,
 }
 
 #[cfg(test)]
+mod wall_closure;
+
+#[cfg(test)]
 mod tests {
     use super::super::mesh::{Direction, Mapping, Wall};
     use super::*;
@@ -245,7 +248,7 @@ mod tests {
     }
 
     /// What may be used along a direction.
-    fn stencils(line: &Line) -> Vec<Stencil> {
+    fn stencils(line: &Operators1d) -> Vec<Stencil> {
         if line.no_slip() == [false; 2] { vec![Stencil::PLAIN, Stencil::WIDE] } else { vec![Stencil::PLAIN] }
     }
 
@@ -263,7 +266,7 @@ mod tests {
     #[test]
     fn transport_is_skew_for_every_flux() {
         for direction in kinds() {
-            let line = Line::new(&direction);
+            let line = Operators1d::new(&direction);
             let both = |s| [line.transport_of_cells(s), line.transport_of_faces(s)];
             for transport in stencils(&line).into_iter().flat_map(both) {
                 for matrix in dense(&transport.rows, line.cells) {
@@ -280,7 +283,7 @@ mod tests {
     #[test]
     fn row_sums_are_half_the_divergence_that_the_flux_makes() {
         for direction in kinds() {
-            let line = Line::new(&direction);
+            let line = Operators1d::new(&direction);
             let n = line.cells;
             let first = line.first_face();
             for stencil in stencils(&line) {
@@ -299,7 +302,7 @@ mod tests {
     #[test]
     fn tables_of_the_normal_velocity_meet_their_row_sums() {
         let n = 24;
-        let line = Line::new(&Direction::between(n, 0.0, 24.0, Wall::AT_REST, Wall::AT_REST));
+        let line = Operators1d::new(&Direction::between(n, 0.0, 24.0, Wall::AT_REST, Wall::AT_REST));
         let mean = line.flux_mean();
         for face in 1..=4 {
             for row in 1..10 {
@@ -322,7 +325,7 @@ mod tests {
 
     #[test]
     fn the_flux_mean_keeps_constants_and_slopes_at_a_wall() {
-        let line = Line::new(&Direction::between(24, 0.0, 24.0, Wall::AT_REST, Wall::Slip));
+        let line = Operators1d::new(&Direction::between(24, 0.0, 24.0, Wall::AT_REST, Wall::Slip));
         for (face, row) in line.flux_mean().iter().enumerate().skip(1) {
             let sum: f64 = row.iter().map(|t| t.1).sum();
             assert!((sum - line.face_mass_m[face]).abs() < 1e-15, "face {face}: {sum}");
@@ -337,7 +340,7 @@ mod tests {
 
     #[test]
     fn transport_along_a_wall_is_exact_for_a_parabolic_flux() {
-        let line = Line::new(&Direction::between(24, 0.0, 24.0, Wall::AT_REST, Wall::AT_REST));
+        let line = Operators1d::new(&Direction::between(24, 0.0, 24.0, Wall::AT_REST, Wall::AT_REST));
         let transport = line.transport_of_cells(Stencil::PLAIN);
         // q = 1, F = z^2: the skew form gives half the derivative of F, and the same for F = z, q = z is exact to z^2.
         for (k, row) in transport.rows.iter().take(6).enumerate() {
@@ -367,8 +370,8 @@ mod tests {
 
     #[test]
     fn one_no_slip_wall_takes_the_wide_stencil_from_all_directions() {
-        let around = || Line::new(&Direction::periodic(20, 0.0, 1.0));
-        let between = |wall| Line::new(&Direction::between(20, 0.0, 1.0, wall, Wall::Slip));
+        let around = || Operators1d::new(&Direction::periodic(20, 0.0, 1.0));
+        let between = |wall| Operators1d::new(&Direction::between(20, 0.0, 1.0, wall, Wall::Slip));
         assert_eq!(Stencil::of(&[around(), around(), between(Wall::Slip)]), Stencil::WIDE);
         assert_eq!(Stencil::of(&[around(), around(), between(Wall::AT_REST)]), Stencil::PLAIN);
     }
@@ -376,7 +379,7 @@ mod tests {
     #[test]
     fn rows_called_regular_follow_the_formula_of_the_interior() {
         for direction in kinds() {
-            let line = Line::new(&direction);
+            let line = Operators1d::new(&direction);
             for (faces, m) in stencils(&line).into_iter().flat_map(|stencil| {
                 let faces = line.transport_of_faces(stencil);
                 faces.regular.clone().map(move |m| (faces.clone(), m))

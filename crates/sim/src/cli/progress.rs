@@ -6,7 +6,7 @@ use crate::progress::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write as _;
 use std::sync::Mutex;
-use wakescope_les::StepRecord;
+use wakescope_les::solver::StepRecord;
 
 /// One bar at a time, for the stage that runs.
 pub(super) struct Bars {

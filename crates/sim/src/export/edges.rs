@@ -3,7 +3,7 @@
 //! `periodic 250.0`; or two of `open`, `slip_wall 0.0` and `no_slip_wall 0.0 0.0 0.0 0.0` (position, then the velocity of the
 //! wall), for the low and the high end, with a comma between. Check: every form comes back.
 
-use wakescope_les::{Edges, Side};
+use wakescope_les::winds::{Edges, Side};
 
 /// The text of an axis' ends \[m, m/s\].
 pub(crate) fn to_text(edges: Edges) -> String {

@@ -5,7 +5,7 @@
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use super::site::Site;
 use ndarray::{Array2, Array3};
-use wakescope_les::{Edges, Side};
+use wakescope_les::winds::{Edges, Side};
 
 /// Unit of a field: its tag in a CSV column name and its text in NetCDF (UDUNITS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

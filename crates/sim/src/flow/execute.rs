@@ -14,7 +14,7 @@ use crate::export::{Existing, write_atomic};
 use crate::keys::Problem;
 use crate::{Error, machine};
 use std::path::Path;
-use wakescope_les::{CheckpointPlan, Ends, Interval, Run, RunPlan};
+use wakescope_les::solver::{CheckpointPlan, Ends, Interval, Run, RunPlan};
 
 /// Steps between checkpoints where a case states nothing.
 const STEPS_PER_CHECKPOINT: u64 = 500;
@@ -184,8 +184,8 @@ fn resume(path: &Path, setup: Setup, plan: RunPlan, case: &FlowCase) -> Result<(
 
 /// The newer checkpoint, or the one before it where that is gone or damaged.
 fn readable<'a>(checkpoint: &'a Path, previous: &'a Path, warnings: &mut Vec<String>) -> &'a Path {
-    match wakescope_les::check_checkpoint(checkpoint) {
-        Err(error) if wakescope_les::check_checkpoint(previous).is_ok() => {
+    match wakescope_les::solver::check_checkpoint(checkpoint) {
+        Err(error) if wakescope_les::solver::check_checkpoint(previous).is_ok() => {
             warnings.push(format!("{error}: the one before it is used, {}", previous.display()));
             previous
         }

@@ -13,7 +13,8 @@ use super::{CaseFile, CaseKind};
 use crate::plan::units::{bytes, seconds};
 use crate::{Error, machine};
 use std::fmt;
-use wakescope_les::{RunPlan, TimeScheme, TimeStep};
+use wakescope_les::solver::RunPlan;
+use wakescope_les::{TimeScheme, TimeStep};
 
 /// Forecast of a run.
 #[derive(Debug, Clone, PartialEq)]

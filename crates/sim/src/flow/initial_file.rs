@@ -9,7 +9,8 @@
 use crate::Error;
 use crate::netcdf_input::{ClassicFile, X, Y, Z, open};
 use std::path::Path;
-use wakescope_les::{Direction, Ends, Mesh};
+use wakescope_les::solver::Ends;
+use wakescope_les::{Direction, Mesh};
 
 /// A node of the target takes its value from these nodes of the source.
 type Taps = Vec<(usize, f64)>;

@@ -4,7 +4,7 @@ use super::case::{AxisName, FlowCase, Pressure, Scheme, Subgrid};
 use super::setup::Setup;
 use crate::Error;
 use std::path::Path;
-use wakescope_les::{PressureMethod, SubgridModel, TimeScheme, TimeStep, ViscousTreatment};
+use wakescope_les::{solver::PressureMethod, SubgridModel, TimeScheme, TimeStep, solver::ViscousTreatment};
 
 impl Setup {
     /// The setup of a case whose file lies in `folder`.

@@ -142,21 +142,17 @@ impl CaseKind {
             case.settings.time_step = TimeStep::Courant { courant, longest_s: case.end_s / LEAST_STEPS };
             Ok(case)
         };
+        let plates =
+            |c: &PlateDriven| cases::Plates { cells: c.cells, strength: c.stretch, viscosity_m2_s: c.viscosity_m2_s, step_s: ANY_STEP_S };
         let case = match *self {
             Self::TaylorGreenPlane(ref c) => {
                 steady(cases::taylor_green_plane(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S))
             }
             Self::TaylorGreen(ref c) => cases::taylor_green_3d(c.cells, c.reynolds),
-            Self::Poiseuille(ref c) => {
-                steady(cases::poiseuille(c.cells, c.stretch, c.viscosity_m2_s, c.initial_share, ANY_STEP_S))
-            }
-            Self::Couette(ref c) => {
-                steady(cases::couette(c.cells, c.stretch, c.viscosity_m2_s, c.initial_share, ANY_STEP_S))
-            }
-            Self::StokesLayer(ref c) => steady(cases::decaying_layer(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S)),
-            Self::RayleighPlate(ref c) => {
-                steady(cases::rayleigh_plate(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S))
-            }
+            Self::Poiseuille(ref c) => steady(plates(c).poiseuille(c.initial_share)),
+            Self::Couette(ref c) => steady(plates(c).couette(c.initial_share)),
+            Self::StokesLayer(ref c) => steady(plates(c).decaying_layer()),
+            Self::RayleighPlate(ref c) => steady(plates(c).rayleigh_plate()),
             Self::OrrSommerfeld(ref c) => steady(
                 TollmienSchlichting::new(c.reynolds, c.wave_number)
                     .and_then(|wave| wave.case(c.cells, c.stretch, c.amplitude, ANY_STEP_S)),

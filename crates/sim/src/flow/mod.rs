@@ -48,7 +48,7 @@ use crate::keys::{Located, Problem, SceneError, Source};
 use crate::scene::hash_of;
 use crate::text_file;
 use std::path::{Path, PathBuf};
-use wakescope_les::StepRecord;
+use wakescope_les::solver::StepRecord;
 
 /// A valid case, with what names it.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use crate::Error;
 pub(super) use wakescope_les::cases::Initial;
-use wakescope_les::{Flow, FlowSettings, Mesh, StartReport, UndampedGrowth, WakeMeter, WakeScales};
+use wakescope_les::{Flow, FlowSettings, Mesh, solver::StartReport, solver::UndampedGrowth, analysis::WakeMeter, analysis::WakeScales};
 
 /// All that a simulation is made of.
 pub(super) struct Setup {

@@ -11,7 +11,7 @@ use crate::export::{Provenance, write_atomic};
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use wakescope_les::{EnergyBudget, StepRecord};
+use wakescope_les::solver::{EnergyBudget, StepRecord};
 
 const HEADER: &str = "step,time_s,step_s,courant,kinetic_energy_m5_s2,viscous_power_m5_s3,subgrid_power_m5_s3,\
                       force_power_m5_s3,relative_divergence,subgrid_viscosity_m2_s,pressure_iterations,\

@@ -283,7 +283,7 @@ fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
     let mut mischief = Mischief(in_the_way);
     let error = run(&vortices(None), folder.path(), Begin::New, &mut mischief).unwrap_err();
     assert!(matches!(error, Error::Export(_)), "{error}");
-    assert!(wakescope_les::check_checkpoint(folder.path().join("flow.checkpoint")).is_ok());
+    assert!(wakescope_les::solver::check_checkpoint(folder.path().join("flow.checkpoint")).is_ok());
     fs::remove_dir(folder.path().join("fields_0002.csv")).unwrap();
     assert!(run(&vortices(None), folder.path(), Begin::Restart, &mut Unwatched).unwrap().is_complete);
     assert!(folder.path().join("fields_0002.csv").is_file());

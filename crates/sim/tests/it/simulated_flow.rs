@@ -2,7 +2,8 @@
 
 use netcdf3::FileReader;
 use std::path::Path;
-use wakescope_les::{Edges, GridSnapshot, OutsidePolicy, PlaneMesh, Side, Wind};
+use wakescope_les::winds::{Edges, OutsidePolicy, PlaneMesh, Side};
+use wakescope_les::{GridSnapshot, Wind};
 use wakescope_sim::flow::{Begin, CaseFile, Unwatched};
 use wakescope_sim::map::VelocityEstimates;
 use wakescope_sim::plan::{Plan, Target};

@@ -8,7 +8,7 @@ use crate::validate::shown::Shown;
 use std::path::Path;
 use wakescope_les::SubgridModel;
 use wakescope_les::cases::VortexPairCase;
-use wakescope_les::decay::{amplitude_growth, onset, value_at};
+use wakescope_les::analysis::decay::{amplitude_growth, onset, value_at};
 use wakescope_sim::export::Table;
 use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -182,7 +182,7 @@ fn turbulent(flow: &History, plane: &History, stored: &Stored, bars: &Bars) -> V
 }
 
 fn table(flow: &History) -> Table {
-    let column = |table: Table, name: &str, of: &dyn Fn(&wakescope_les::WakeRecord) -> f64| {
+    let column = |table: Table, name: &str, of: &dyn Fn(&wakescope_les::analysis::WakeRecord) -> f64| {
         table.float(name, flow.records.iter().map(of))
     };
     let mut table = Table::new()

@@ -7,7 +7,7 @@ use crate::profile::Profile;
 use crate::validate::shown::Shown;
 use rayon::prelude::*;
 use wakescope_les::cases::VortexPairCase;
-use wakescope_les::decay::onset;
+use wakescope_les::analysis::decay::onset;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

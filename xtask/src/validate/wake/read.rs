@@ -3,7 +3,7 @@
 use super::history::History;
 use crate::Failure;
 use std::f64::consts::TAU;
-use wakescope_les::{SecondaryRecord, VortexRecord, WakeRecord};
+use wakescope_les::{analysis::SecondaryRecord, analysis::VortexRecord, analysis::WakeRecord};
 use wakescope_sim::flow::{FinishedWake, table};
 
 /// Modes whose energy is in the table.

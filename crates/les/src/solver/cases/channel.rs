@@ -12,51 +12,67 @@ pub(super) fn between_plates(cells: usize, strength: f64, velocity_m_s: [f64; 2]
     if strength == 0.0 { uniform } else { uniform.stretched(Mapping::TanhBoth { strength }) }
 }
 
-/// Poiseuille's flow: a force `2 nu` drives `u = 1 - z^2`; it starts from rest plus `share` of that profile.
-///
-/// # Errors
-/// Cells, stretching or viscosity out of range.
-pub fn poiseuille(cells: usize, strength: f64, viscosity_m2_s: f64, share: f64, step_s: f64) -> Result<Case, Error> {
-    let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), between_plates(cells, strength, [0.0; 2]))?;
-    let mut settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
-    settings.force_m_s2 = [2.0 * viscosity_m2_s, 0.0, 0.0];
-    let initial = move |at_m: [f64; 3]| [share * (1.0 - at_m[2].powi(2)), 0.0, 0.0];
-    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 10.0 / viscosity_m2_s })
+/// A laminar flow between the plates at z = -1 and 1, one cell in x and y.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plates {
+    /// Cells between the plates.
+    pub cells: usize,
+    /// Strength of the stretching towards both, 0 for equal cells.
+    pub strength: f64,
+    /// Kinematic viscosity \[m^2/s\].
+    pub viscosity_m2_s: f64,
+    /// Fixed time step \[s\].
+    pub step_s: f64,
 }
 
-/// Couette's flow: plates at speeds -1 and 1 drag `u = z`; it starts from `share` of that profile.
-///
-/// # Errors
-/// Cells, stretching or viscosity out of range.
-pub fn couette(cells: usize, strength: f64, viscosity_m2_s: f64, share: f64, step_s: f64) -> Result<Case, Error> {
-    let plates = between_plates(cells, strength, [-1.0, 1.0]);
-    let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
-    let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
-    let initial = move |at_m: [f64; 3]| [share * at_m[2], 0.0, 0.0];
-    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 10.0 / viscosity_m2_s })
-}
+impl Plates {
+    /// Poiseuille's flow: a force `2 nu` drives `u = 1 - z^2`; it starts from rest plus `share` of that profile.
+    ///
+    /// # Errors
+    /// Cells, stretching or viscosity out of range.
+    pub fn poiseuille(self, share: f64) -> Result<Case, Error> {
+        let mut case = self.case([0.0; 2], 10.0, move |z| share * (1.0 - z.powi(2)))?;
+        case.settings.force_m_s2 = [2.0 * self.viscosity_m2_s, 0.0, 0.0];
+        Ok(case)
+    }
 
-/// Slowest decaying mode between plates at rest, `u = cos(pi z/2) exp(-nu pi^2 t/4)`, a Stokes layer without forcing.
-///
-/// # Errors
-/// Cells, stretching or viscosity out of range.
-pub fn decaying_layer(cells: usize, strength: f64, viscosity_m2_s: f64, step_s: f64) -> Result<Case, Error> {
-    let plates = between_plates(cells, strength, [0.0; 2]);
-    let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
-    let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
-    let initial = |at_m: [f64; 3]| [(0.5 * std::f64::consts::PI * at_m[2]).cos(), 0.0, 0.0];
-    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 1.0 / viscosity_m2_s })
-}
+    /// Couette's flow: plates at speeds -1 and 1 drag `u = z`; it starts from `share` of that profile.
+    ///
+    /// # Errors
+    /// As [`Self::poiseuille`].
+    pub fn couette(self, share: f64) -> Result<Case, Error> {
+        self.case([-1.0, 1.0], 10.0, move |z| share * z)
+    }
 
-/// Rayleigh's problem: the low plate starts with speed 1 under a fluid at rest; the high plate is far away.
-///
-/// # Errors
-/// Cells, stretching or viscosity out of range.
-pub fn rayleigh_plate(cells: usize, strength: f64, viscosity_m2_s: f64, step_s: f64) -> Result<Case, Error> {
-    let plates = between_plates(cells, strength, [1.0, 0.0]);
-    let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
-    let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
-    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(|_| [0.0; 3])), end_s: 0.05 / viscosity_m2_s })
+    /// Slowest decaying mode between plates at rest, `u = cos(pi z/2) exp(-nu pi^2 t/4)`, a Stokes layer without forcing.
+    ///
+    /// # Errors
+    /// As [`Self::poiseuille`].
+    pub fn decaying_layer(self) -> Result<Case, Error> {
+        self.case([0.0; 2], 1.0, |z| (0.5 * std::f64::consts::PI * z).cos())
+    }
+
+    /// Rayleigh's problem: the low plate starts with speed 1 under a fluid at rest; the high plate is far away.
+    ///
+    /// # Errors
+    /// As [`Self::poiseuille`].
+    pub fn rayleigh_plate(self) -> Result<Case, Error> {
+        self.case([1.0, 0.0], 0.05, |_| 0.0)
+    }
+
+    /// Walls of speeds `wall_m_s`, an initial `u(z)`, an end after so many viscous times.
+    fn case(
+        self,
+        wall_m_s: [f64; 2],
+        viscous_times: f64,
+        u: impl Fn(f64) -> f64 + Send + Sync + 'static,
+    ) -> Result<Case, Error> {
+        let plates = between_plates(self.cells, self.strength, wall_m_s);
+        let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
+        let settings = FlowSettings::new(self.viscosity_m2_s, TimeStep::Fixed { step_s: self.step_s });
+        let initial = Initial::Field(Box::new(move |at_m: [f64; 3]| [u(at_m[2]), 0.0, 0.0]));
+        Ok(Case { mesh, settings, initial, end_s: viscous_times / self.viscosity_m2_s })
+    }
 }
 
 /// Turbulent channel flow in a box of `2 pi x pi x 2`, driven by the force that balances the friction of

@@ -34,9 +34,9 @@ pub fn dipole_against_wall(cells: [usize; 2], strength: [f64; 2], reynolds: f64,
         for (y_m, sign) in [(RADIUS_M, 1.0), (-RADIUS_M, -1.0)] {
             let (y, z) = (at_m[1] - y_m, at_m[2]);
             // r times the tangential speed over r^2 of a shielded vortex.
-            let turn = 0.5 * sign * CENTRE_VORTICITY_PER_S * (-(y * y + z * z) / RADIUS_M.powi(2)).exp();
-            velocity[1] -= turn * z;
-            velocity[2] += turn * y;
+            let rotation_per_s = 0.5 * sign * CENTRE_VORTICITY_PER_S * (-(y * y + z * z) / RADIUS_M.powi(2)).exp();
+            velocity[1] -= rotation_per_s * z;
+            velocity[2] += rotation_per_s * y;
         }
         velocity
     };

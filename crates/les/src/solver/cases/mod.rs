@@ -12,16 +12,18 @@ mod taylor_green;
 mod vortex_pair;
 
 pub use cavity::lid_driven_cavity;
-pub use channel::{channel, couette, decaying_layer, poiseuille, rayleigh_plate};
+pub use channel::{Plates, channel};
 pub use dipole::dipole_against_wall;
 pub use orr_sommerfeld::TollmienSchlichting;
 pub use resolution::{Resolution, VortexLengths};
 pub use taylor_green::{taylor_green_3d, taylor_green_eighth, taylor_green_plane, taylor_green_plane_exact};
 pub use vortex_pair::VortexPairCase;
 
+use super::flow::Flow;
 use super::mesh::Mesh;
+use super::report::StartReport;
 use super::settings::FlowSettings;
-use crate::{Error, Flow, StartReport};
+use crate::Error;
 
 /// Velocity at a position \[m\], `(u, v, w)` \[m/s\].
 pub type InitialField = Box<dyn Fn([f64; 3]) -> [f64; 3] + Send + Sync>;

@@ -97,11 +97,11 @@ impl Perturbation {
         let wave = |n: usize| {
             let fraction = |which: u64| hashed(!seed, 8 * n as u64 + which);
             let total = TAU * 0.5 * 8.0_f64.powf(fraction(0));
-            let (rise, turn) = (2.0 * fraction(1) - 1.0, TAU * fraction(2));
+            let (rise, azimuth_rad) = (2.0 * fraction(1) - 1.0, TAU * fraction(2));
             let flat = total * (1.0 - rise * rise).sqrt();
             // Whole waves in the box.
-            let axial = (flat * turn.cos().abs() * length / TAU).round();
-            let lateral = (flat * turn.sin() * width / TAU).round();
+            let axial = (flat * azimuth_rad.cos().abs() * length / TAU).round();
+            let lateral = (flat * azimuth_rad.sin() * width / TAU).round();
             let vector = [TAU * axial / length, TAU * lateral / width, total * rise];
             let length = vector.iter().map(|k| k * k).sum::<f64>().sqrt().max(TAU * 0.1);
             Wave {

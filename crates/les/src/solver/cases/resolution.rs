@@ -3,7 +3,7 @@
 //! The bars are what the flows with known answers need. With 3.8 cells along the wall per layer the dipole at Re 2500 comes
 //! back 6 % too weak, with 5.1 (or 5.4 at Re 1250) about 1 %.
 
-use super::super::mesh::{Ends, Mesh, Wall};
+use super::super::mesh::Mesh;
 
 /// Lengths that a mesh must resolve, in the plane y, z.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,11 +46,7 @@ impl Resolution {
         };
         let core_cells = std::array::from_fn(|i| lengths.core_radius_m / width_m(i + 1, lengths.core_m[i]));
         let [_, _, z] = mesh.directions();
-        let sticks = |wall: Wall| matches!(wall, Wall::NoSlip { .. });
-        let [low, high] = match z.ends {
-            Ends::Periodic => [false; 2],
-            Ends::Walls { low, high } => [sticks(low), sticks(high)],
-        };
+        let [low, high] = z.ends.no_slip();
         // Cells, and the part of the last one, within the layer.
         let within = |from_wall_m: Vec<f64>| -> f64 {
             let part = |pair: &[f64]| ((lengths.layer_m - pair[0]) / (pair[1] - pair[0])).clamp(0.0, 1.0);

@@ -14,11 +14,13 @@ use rayon::prelude::*;
 
 use super::super::mesh::{Direction, Ends, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeScheme, TimeStep};
-use super::super::wake::WakeScales;
+use super::super::subgrid::SubgridModel;
 use super::perturbation::Perturbation;
 use super::{Case, Initial};
+use crate::Error;
+use crate::analysis::{WakeMeter, WakeScales};
 use crate::error::check;
-use crate::{CirculationProfile, Error, SubgridModel, TwoScale, WakeMeter};
+use crate::winds::{CirculationProfile, TwoScale};
 
 /// Where the pair is when the case ends, in `tau`.
 const END: f64 = 5.0;
@@ -69,7 +71,7 @@ impl Default for VortexPairCase {
 }
 
 impl VortexPairCase {
-    /// How the pair is stepped: over as many turns of the cores as a wake lives Adams-Bashforth, at the same cost, feeds
+    /// How the pair is stepped: over as many revolutions of the cores as a wake lives Adams-Bashforth, at the same cost, feeds
     /// energy to the shortest waves.
     pub const SCHEME: TimeScheme = TimeScheme::RungeKutta3;
     /// Courant number of [`VortexPairCase::steps`]: at it the scheme itself dissipates less than half a percent of what
@@ -261,9 +263,9 @@ impl VortexPairCase {
                 for copy in -NEAR_COPIES..=NEAR_COPIES {
                     let (dy, dz) = (y - y0 - f64::from(copy) * self.size[1], z - z0);
                     let r2 = dy * dy + dz * dz;
-                    let turn = sign * self.profile.angular_velocity_rad_s(TAU, self.core_radius, r2);
-                    velocity[1] -= turn * dz;
-                    velocity[2] += turn * dy;
+                    let rotation_per_s = sign * self.profile.angular_velocity_rad_s(TAU, self.core_radius, r2);
+                    velocity[1] -= rotation_per_s * dz;
+                    velocity[2] += rotation_per_s * dy;
                 }
                 let far = sign * far_copies(Complex::new(y - y0, z - z0), self.size[1]);
                 velocity[1] += far.im;

@@ -18,7 +18,7 @@ use super::settings::FlowSettings;
 use crate::Error;
 use container::{Content, Reader, Tag};
 
-/// Version of the content. Raise it with every change of the sections, of the words in [`identity`], or of what a run keeps
+/// Version of the content. Raise it with every change of the sections, of the texts in [`identity`], or of what a run keeps
 /// beside the flow.
 const VERSION: u32 = 2;
 
@@ -180,7 +180,7 @@ fn compare_metrics(path: &Path, axis: usize, stored: &[f64], wanted: &[f64]) -> 
 fn scalars(state: &State) -> Vec<u8> {
     let State { velocity: _, history: _, pressure: _, time_s, step, last_step_s, courant_per_s, energy, implicit } =
         state;
-    let words = [
+    let numbers = [
         time_s.to_bits(),
         *step,
         last_step_s.to_bits(),
@@ -190,13 +190,13 @@ fn scalars(state: &State) -> Vec<u8> {
         u64::from(implicit[1]),
         u64::from(implicit[2]),
     ];
-    words.into_iter().flat_map(u64::to_le_bytes).collect()
+    numbers.into_iter().flat_map(u64::to_le_bytes).collect()
 }
 
 fn read_scalars(bytes: &[u8], state: &mut State) -> Option<()> {
-    let (words, []) = bytes.as_chunks::<8>() else { return None };
-    let words: [u64; 8] = words.iter().map(|w| u64::from_le_bytes(*w)).collect::<Vec<_>>().try_into().ok()?;
-    let [time, step, last_step, courant, energy, implicit @ ..] = words;
+    let (numbers, []) = bytes.as_chunks::<8>() else { return None };
+    let numbers: [u64; 8] = numbers.iter().map(|w| u64::from_le_bytes(*w)).collect::<Vec<_>>().try_into().ok()?;
+    let [time, step, last_step, courant, energy, implicit @ ..] = numbers;
     state.time_s = f64::from_bits(time);
     state.step = step;
     state.last_step_s = f64::from_bits(last_step);

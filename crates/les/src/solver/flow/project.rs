@@ -7,7 +7,7 @@
 //!
 //! Check: divergence right after the start on strongly stretched meshes and flat cells; steps in a long domain.
 
-use super::{Flow, Solved, correct, divide_by_volume};
+use super::{Flow, Solved, add_multiple, correct, divide_by_volume};
 use crate::error::{Error, PressureFailure};
 use crate::solver::pressure::norm;
 
@@ -77,9 +77,7 @@ impl Flow {
             }
             std::mem::swap(&mut self.work.star, &mut self.state.velocity);
             self.correct(stage_s, &rest);
-            for (phi, more) in self.work.phi.iter_mut().zip(&rest) {
-                *phi += more;
-            }
+            add_multiple(&mut self.work.phi, 1.0, &rest, self.layout.shape);
         }
         Ok(last)
     }

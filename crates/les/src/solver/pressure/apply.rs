@@ -8,7 +8,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
-use super::super::line::{Line, Taps};
+use super::super::operators_1d::{Operators1d, Taps};
 use super::super::rows::{Columns, HALO, pad};
 use super::kernel;
 
@@ -261,7 +261,7 @@ const INNER_TAPS: usize = 12;
 const MOST_TAPS: usize = 16;
 
 /// Coefficients of the pairs of neighbours at 1, 2 and 3 where all rows are equal and even.
-fn even(line: &Line, rows: &[Taps]) -> Option<[f64; 3]> {
+fn even(line: &Operators1d, rows: &[Taps]) -> Option<[f64; 3]> {
     let middle = line.cells / 2;
     let at = |offset: usize| rows[middle].iter().find(|tap| tap.0 == middle + offset).map_or(0.0, |tap| tap.1);
     (line.is_fourier() && line.cells >= 8).then(|| [at(1), at(2), at(3)])
@@ -281,7 +281,7 @@ fn condition(layout: &Layout, rows: &[Vec<Taps>; 3]) -> f64 {
 }
 
 /// Rows of `Dw F^-1 Dw^T`.
-pub(crate) fn stiffness(line: &Line) -> Vec<Taps> {
+pub(crate) fn stiffness(line: &Operators1d) -> Vec<Taps> {
     let divergence = line.stored_divergence();
     let mut faces = vec![Taps::new(); line.cells];
     for (cell, row) in divergence.iter().enumerate() {

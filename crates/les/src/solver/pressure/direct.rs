@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use super::super::layout::{Layout, Shape};
 use super::super::mesh::AXIS_NAMES;
 use super::apply::Operator;
-use super::banded::{Band, Scratch};
+use super::banded_cholesky::{BandedCholesky, Scratch};
 use super::lines::bundles;
 use super::refine::{Pass, Refinement};
 use super::transform::{LineTransform, RowTransform, Work};
@@ -30,7 +30,7 @@ use crate::Error;
 #[derive(Debug)]
 enum Along {
     Transformed(LineTransform),
-    Factorised(Band),
+    Factorised(BandedCholesky),
 }
 
 /// The direct solver of one mesh.
@@ -63,7 +63,7 @@ impl Direct {
         let banded = banded_axis(layout);
         let mut along = |axis: usize| {
             let line = &layout.line[axis];
-            if let Some(band) = Band::new(line).filter(|_| banded == Some(axis)) {
+            if let Some(band) = BandedCholesky::new(line).filter(|_| banded == Some(axis)) {
                 return Along::Factorised(band);
             }
             let (transform, values) = LineTransform::new(line);
@@ -173,18 +173,12 @@ impl PressureSolver for Direct {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
         super::check_request(self.shape(), field, tolerance)?;
         let mut refinement = std::mem::take(&mut self.refinement);
-        let done = refinement.run(&self.operator, field, tolerance, |field, _, _| {
+        let solved = refinement.run(&self.operator, field, tolerance, "direct solver", |field, _, _| {
             self.solve_once(field);
             Pass(Vec::new())
         });
         self.refinement = refinement;
-        let done = done.map_err(|(history, reason)| Error::PressureNotSolved {
-            method: "direct solver",
-            tolerance,
-            reason,
-            history,
-        })?;
-        Ok(Solved { residual: done.residual, iterations: 0, factor: None, imbalance: done.imbalance })
+        solved
     }
 
     fn describe(&self) -> String {

@@ -12,8 +12,8 @@
 
 use std::f64::consts::PI;
 
-use super::super::line::Line;
 use super::super::mesh::{Ends, Wall};
+use super::super::operators_1d::Operators1d;
 use super::kernel;
 
 /// Eigenvalues and eigenvectors of one direction.
@@ -36,7 +36,7 @@ const NULL: f64 = 1e-13;
 
 impl Basis {
     /// The eigenvectors of `line`.
-    pub(crate) fn new(line: &Line) -> Self {
+    pub(crate) fn new(line: &Operators1d) -> Self {
         let slip = matches!(line.ends, Ends::Walls { low: Wall::Slip, high: Wall::Slip });
         let uniform = line.cell_metric_m.iter().all(|h| *h == line.cell_metric_m[0]);
         if line.is_thin() {
@@ -50,7 +50,7 @@ impl Basis {
         }
     }
 
-    fn waves(line: &Line) -> Self {
+    fn waves(line: &Operators1d) -> Self {
         let n = line.cells;
         let h = line.cell_mass_m[0];
         let length = n as f64 * h;
@@ -69,7 +69,7 @@ impl Basis {
         (0..n).map(|m| symbol(2.0 * PI * m.div_ceil(2) as f64 / n as f64, h)).collect()
     }
 
-    fn cosines(line: &Line) -> Self {
+    fn cosines(line: &Operators1d) -> Self {
         let n = line.cells;
         let h = line.cell_mass_m[0];
         let length = n as f64 * h;
@@ -83,7 +83,7 @@ impl Basis {
         }
     }
 
-    fn rotations(line: &Line) -> Self {
+    fn rotations(line: &Operators1d) -> Self {
         let n = line.cells;
         let mass = &line.cell_mass_m;
         let mut columns = scaled_columns(line);
@@ -116,7 +116,7 @@ pub(crate) fn symbol(theta: f64, h: f64) -> f64 {
 }
 
 /// The columns of `M^-1/2 Dw F^-1/2`, one for each face that carries a velocity.
-fn scaled_columns(line: &Line) -> Vec<Vec<f64>> {
+fn scaled_columns(line: &Operators1d) -> Vec<Vec<f64>> {
     let mut columns = vec![vec![0.0; line.cells]; line.cells];
     for (cell, row) in line.stored_divergence().iter().enumerate() {
         for &(face, c) in row {
@@ -159,7 +159,7 @@ mod tests {
     use super::*;
 
     /// `K = Dw F^-1 Dw^T`, dense.
-    fn stiffness(line: &Line) -> Vec<f64> {
+    fn stiffness(line: &Operators1d) -> Vec<f64> {
         let n = line.cells;
         let mut dense = vec![0.0; n * n];
         for (row, a) in line.stored_divergence().iter().enumerate() {
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn the_vectors_diagonalise_stiffness_and_mass_of_every_kind_of_direction() {
         for direction in every_kind() {
-            let line = Line::new(&direction);
+            let line = Operators1d::new(&direction);
             let n = line.cells;
             let Basis { value, vector } = Basis::new(&line);
             let dense = stiffness(&line);
@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn rotations_find_the_closed_forms() {
         for direction in [Direction::periodic(21, 0.0, 2.0), Direction::between(21, 0.0, 2.0, Wall::Slip, Wall::Slip)] {
-            let line = Line::new(&direction);
+            let line = Operators1d::new(&direction);
             let (closed, rotated) = (Basis::new(&line), Basis::rotations(&line));
             for (a, b) in closed.value.iter().zip(&rotated.value) {
                 assert!((a - b).abs() <= 1e-13 * a, "{direction:?}: {a} against {b}");

@@ -14,7 +14,8 @@ use crate::Error;
 /// divergence beyond its residual. A field has one value for each cell, `[z][y][x]` with x contiguous.
 ///
 /// ```
-/// use wakescope_les::{Direction, Mapping, Mesh, PressureEquation, PressureMethod, Wall};
+/// use wakescope_les::solver::{PressureEquation, PressureMethod};
+/// use wakescope_les::{Direction, Mapping, Mesh, Wall};
 ///
 /// let x = Direction::periodic(16, 0.0, 2.0);
 /// let y = Direction::between(20, -1.0, 1.0, Wall::Slip, Wall::Slip);

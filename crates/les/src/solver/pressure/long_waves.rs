@@ -135,8 +135,9 @@ fn waves_along_one_direction_alone_leave_round_off_however_long_they_are() {
     }
 }
 
+/// Prints the table of the book with `cargo test -p wakescope-les --lib an_iteration_of_multigrid -- --nocapture`.
 #[test]
-fn an_iteration_of_multigrid_gains_about_a_factor_of_ten_on_odd_sizes_strong_stretching_and_flat_cells() {
+fn an_iteration_of_multigrid_gains_a_factor_of_ten_on_odd_sizes_strong_stretching_and_flat_cells() {
     let sinh = |cells, strength| slip(cells, 6.0).stretched(Mapping::SinhMiddle { strength });
     let ground = |cells, strength| {
         let wall = Direction::between(cells, 0.0, 3.0, Wall::AT_REST, Wall::Slip);
@@ -144,31 +145,40 @@ fn an_iteration_of_multigrid_gains_about_a_factor_of_ten_on_odd_sizes_strong_str
     };
     let waves = |cells, length_m| Direction::periodic(cells, 0.0, length_m);
     let meshes = [
-        [waves(16, 2.0), sinh(96, 5.0), ground(120, 5.0)],
-        [waves(13, 2.0), sinh(127, 3.0), ground(131, 3.0)],
-        [waves(13, 2.0), slip(127, 6.0), slip(131, 3.0)],
-        [waves(16, 2.0), slip(64, 1e4), slip(64, 1.0)],
-        [waves(16, 2.0), slip(64, 1.0), slip(64, 1e4)],
-        [waves(16, 2e4), slip(64, 6.0), slip(64, 3.0)],
+        ("sinh 5 x tanh 5", [waves(16, 2.0), sinh(96, 5.0), ground(120, 5.0)]),
+        ("sinh 5 x tanh 5", [waves(32, 2.0), sinh(128, 5.0), ground(96, 5.0)]),
+        ("sinh 3 x tanh 3", [waves(13, 2.0), sinh(127, 3.0), ground(131, 3.0)]),
+        ("equal cells", [waves(13, 2.0), slip(127, 6.0), slip(131, 3.0)]),
+        ("equal cells in a plane", [Direction::thin(1.0), slip(96, 6.0), slip(97, 3.0)]),
+        ("cells 1e4 wide", [waves(16, 2.0), slip(64, 1e4), slip(64, 1.0)]),
+        ("cells 1e4 high", [waves(16, 2.0), slip(64, 1.0), slip(64, 1e4)]),
+        ("cells 1e4 long", [waves(16, 2e4), slip(64, 6.0), slip(64, 3.0)]),
     ];
-    for (m, mesh) in meshes.into_iter().enumerate() {
+    println!("| mesh | right side | tolerance | iterations | factor |");
+    for (name, mesh) in meshes {
+        let is_flat = name.starts_with("cells");
         let layout = layout(mesh);
-        let flat = m >= 3;
-        for (kind, g) in [("eddies", checks::turbulent_right_side(&layout)), ("rough", rough(&layout))] {
-            let mut solver = build(&layout, PressureMethod::Multigrid).unwrap();
-            let solved = solver.solve(&mut g.clone(), 1e-6).unwrap();
-            let bar = if flat && kind == "rough" { 0.11 } else { 0.1 };
-            assert!(solved.factor.unwrap() <= bar, "{:?}, {kind}: {solved:?}", layout.shape.n);
-        }
-        // Of long waves the first iteration lowers the energy of the error, not the residual.
-        let g = long_waves(&layout);
-        let mut solver = build(&layout, PressureMethod::Multigrid).unwrap();
-        match solver.solve(&mut g.clone(), 1e-10) {
-            Ok(solved) => assert!(solved.iterations <= 14, "{:?}: {solved:?}", layout.shape.n),
-            Err(Error::PressureNotSolved { reason: PressureFailure::RoundOff { .. }, history, .. }) => {
-                assert!(history.len() <= 24, "{:?}: {history:?}", layout.shape.n);
+        let about = format!("{name}, {:?}", layout.shape.n);
+        let sides = [
+            ("eddies", checks::turbulent_right_side(&layout), 1e-6),
+            ("rough", rough(&layout), 1e-6),
+            ("long waves", long_waves(&layout), 1e-10),
+        ];
+        for (kind, g, tolerance) in sides {
+            match build(&layout, PressureMethod::Multigrid).unwrap().solve(&mut g.clone(), tolerance) {
+                Ok(solved) => {
+                    let (n, factor) = (solved.iterations, solved.factor.unwrap());
+                    println!("| {about} | {kind} | {tolerance:.0e} | {n} | {factor:.3} |");
+                    assert!(factor <= 0.1, "{about}, {kind}: {solved:?}");
+                }
+                Err(Error::PressureNotSolved { reason: PressureFailure::RoundOff { .. }, history, .. })
+                    if is_flat && kind == "long waves" =>
+                {
+                    println!("| {about} | {kind} | {tolerance:.0e} | {} | at round-off |", history.len());
+                    assert!(history.len() <= 20, "{about}, {kind}: {history:?}");
+                }
+                Err(other) => panic!("{about}, {kind}: {other}"),
             }
-            Err(other) => panic!("{other}"),
         }
     }
 }

@@ -4,7 +4,7 @@
 //! the residual of the solution is the divergence left in the flow.
 
 mod apply;
-mod banded;
+mod banded_cholesky;
 mod cost;
 mod direct;
 mod eigen;

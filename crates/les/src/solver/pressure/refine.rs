@@ -4,20 +4,13 @@
 
 use rayon::prelude::*;
 
+use super::Solved;
 use super::apply::Operator;
-use crate::error::PressureFailure;
+use crate::error::{Error, PressureFailure};
 
 /// Relative residuals that a pass saw after its iterations; none if it has none.
 #[derive(Debug)]
 pub(crate) struct Pass(pub(crate) Vec<f64>);
-
-/// What was reached.
-#[derive(Debug)]
-pub(crate) struct Done {
-    pub(crate) residual: f64,
-    pub(crate) iterations: usize,
-    pub(crate) imbalance: f64,
-}
 
 /// Fields kept from solve to solve.
 #[derive(Debug, Default)]
@@ -39,23 +32,25 @@ const BALANCED: f64 = 0.01;
 
 impl Refinement {
     /// Replaces the right side in `field` by the solution. `solve` replaces a right side of the given norm by a solution of
-    /// about the given relative residual.
+    /// about the given relative residual; `method` is its name in errors.
     ///
     /// # Errors
-    /// The residuals and the reason, if they do not reach `tolerance`; the field is then the last solution found.
+    /// [`Error::PressureNotSolved`] if the residual does not reach `tolerance`; the field is then the last solution found.
     pub(crate) fn run(
         &mut self,
         operator: &Operator,
         field: &mut [f64],
         tolerance: f64,
+        method: &'static str,
         mut solve: impl FnMut(&mut [f64], f64, f64) -> Pass,
-    ) -> Result<Done, (Vec<f64>, PressureFailure)> {
+    ) -> Result<Solved, Error> {
+        let refused = |history, reason| Err(Error::PressureNotSolved { method, tolerance, reason, history });
         // The solvers ignore what no pressure can balance; only the residual must not hold it against them.
         self.right.resize(field.len(), 0.0);
         let [size, imbalance] = operator.copy_balanced(field, &mut self.right, BALANCED * tolerance);
         if size == 0.0 {
             field.fill(0.0);
-            return Ok(Done { residual: 0.0, iterations: 0, imbalance });
+            return Ok(Solved { residual: 0.0, iterations: 0, factor: None, imbalance });
         }
         let (mut iterations, mut history) = (0, Vec::new());
         let (mut last, mut attainable) = (1.0, 0.0);
@@ -75,10 +70,11 @@ impl Refinement {
             let residual = operator.residual_norm(&self.right, field) / size;
             history.push(residual);
             if residual <= tolerance {
-                return Ok(Done { residual, iterations, imbalance });
+                let factor = (iterations > 0).then(|| residual.powf(1.0 / iterations as f64));
+                return Ok(Solved { residual, iterations, factor, imbalance });
             }
             if residual.is_nan() {
-                return Err((history, PressureFailure::NotFinite));
+                return refused(history, PressureFailure::NotFinite);
             }
             attainable = operator.round_off(field) / size;
             if residual > STALLED * last {
@@ -93,6 +89,6 @@ impl Refinement {
         let reached = history.last().copied().unwrap_or(f64::NAN);
         let at_round_off = reached.min(last) <= ROUND_OFF * attainable;
         let reason = if at_round_off { PressureFailure::RoundOff { attainable } } else { PressureFailure::Stalled };
-        Err((history, reason))
+        refused(history, reason)
     }
 }

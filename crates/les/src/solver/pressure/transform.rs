@@ -11,7 +11,7 @@ use std::sync::Arc;
 use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
-use super::super::line::Line;
+use super::super::operators_1d::Operators1d;
 use super::eigen::Basis;
 use super::gemm::{Left, Packed, Right};
 
@@ -48,7 +48,7 @@ const TINY: usize = 12;
 
 impl RowTransform {
     /// Whether a direction is transformed by products with a matrix.
-    pub(crate) fn is_dense(line: &Line) -> bool {
+    pub(crate) fn is_dense(line: &Operators1d) -> bool {
         let n = line.cells;
         // Powers of two add equal values exactly: a flow that does not vary stays as it is, whatever the number of cells.
         let fast = n.is_power_of_two() || n > TINY && (n > SMALL || largest_factor(n) <= SMOOTH);
@@ -56,7 +56,7 @@ impl RowTransform {
     }
 
     /// The transform, the eigenvalues by place, and the factor that both ways together leave out.
-    pub(crate) fn new(line: &Line) -> (Self, Vec<f64>, f64) {
+    pub(crate) fn new(line: &Operators1d) -> (Self, Vec<f64>, f64) {
         let n = line.cells;
         if line.is_thin() {
             (Self::Thin, vec![0.0], 1.0 / line.cell_mass_m[0])
@@ -171,7 +171,7 @@ pub(crate) enum LineTransform {
 
 impl LineTransform {
     /// The transform and its eigenvalues.
-    pub(crate) fn new(line: &Line) -> (Self, Vec<f64>) {
+    pub(crate) fn new(line: &Operators1d) -> (Self, Vec<f64>) {
         let n = line.cells;
         let Basis { value, vector } = Basis::new(line);
         let transform = if line.is_thin() {
@@ -234,7 +234,7 @@ mod tests {
     #[test]
     fn the_fourier_transform_and_the_matrix_of_waves_give_the_same_modes() {
         for n in [4, 16, 27, 60] {
-            let line = Line::new(&Direction::periodic(n, 0.0, 3.0));
+            let line = Operators1d::new(&Direction::periodic(n, 0.0, 3.0));
             let (transform, value, factor) = RowTransform::new(&line);
             assert_eq!(transform.name(), "Fourier");
             let basis = Basis::new(&line);

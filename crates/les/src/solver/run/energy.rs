@@ -8,7 +8,7 @@
 //! Check: growing flows are stopped; forced, dragged and decaying ones are not.
 
 use super::super::flow::Flow;
-use super::super::mesh::{Ends, Wall};
+use super::super::mesh::Wall;
 use super::super::settings::TimeScheme;
 use crate::error::{EnergyGrowth, Error};
 
@@ -57,10 +57,7 @@ impl EnergyBound {
 fn sources(flow: &Flow) -> [f64; 2] {
     let volume_m3: f64 = flow.layout.line.iter().map(|line| line.cell_mass_m.iter().sum::<f64>()).product();
     let length = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
-    let walls = flow.mesh().directions().iter().flat_map(|d| match d.ends {
-        Ends::Periodic => Vec::new(),
-        Ends::Walls { low, high } => vec![low, high],
-    });
+    let walls = flow.mesh().directions().iter().flat_map(|d| d.ends.walls());
     let fastest_m_s = walls.fold(0.0, |fastest: f64, wall| match wall {
         Wall::Slip => fastest,
         Wall::NoSlip { velocity_m_s } => fastest.max(length(velocity_m_s)),

@@ -214,19 +214,19 @@ fn energy_that_nothing_gave_stops_the_run_and_no_checkpoint_holds_it() {
 
 #[test]
 fn steady_forced_dragged_and_fading_flows_keep_within_the_energy_that_they_may_have() {
-    use super::super::cases::{couette, decaying_layer, lid_driven_cavity, poiseuille, rayleigh_plate};
+    use super::super::cases::{Plates, lid_driven_cavity};
     let mut flows = vec![
         inviscid(courant(1.0), TimeScheme::RungeKutta3),
         // Viscosity takes what the scheme gives.
         vortices(courant(0.35), TimeScheme::AdamsBashforth2),
     ];
     for case in [
-        poiseuille(16, 1.5, 0.1, 0.0, 0.5),
-        couette(16, 1.5, 0.1, 0.0, 2.0),
-        rayleigh_plate(16, 1.5, 0.1, 0.05),
+        Plates { cells: 16, strength: 1.5, viscosity_m2_s: 0.1, step_s: 0.5 }.poiseuille(0.0),
+        Plates { cells: 16, strength: 1.5, viscosity_m2_s: 0.1, step_s: 2.0 }.couette(0.0),
+        Plates { cells: 16, strength: 1.5, viscosity_m2_s: 0.1, step_s: 0.05 }.rayleigh_plate(),
         lid_driven_cavity(16, 1.5, 100.0),
         // Decays to round-off.
-        decaying_layer(16, 1.5, 1.0, 1.0),
+        Plates { cells: 16, strength: 1.5, viscosity_m2_s: 1.0, step_s: 1.0 }.decaying_layer(),
     ] {
         flows.push(case.unwrap().start().unwrap().0);
     }

@@ -11,8 +11,8 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
-use super::super::line::{Line, resolve_cell, resolve_face};
 use super::super::mesh::Ends;
+use super::super::operators_1d::{Operators1d, resolve_cell, resolve_face};
 use super::super::rows::HALO;
 
 /// Highest order: the stencil must fit the halo of a padded row.
@@ -85,7 +85,7 @@ impl Filter {
 }
 
 impl AxisFilter {
-    fn new(line: &Line, normal: bool, wall_m_s: [f64; 2], order: usize) -> Self {
+    fn new(line: &Operators1d, normal: bool, wall_m_s: [f64; 2], order: usize) -> Self {
         if line.is_thin() {
             return Self { neighbours: Vec::new(), plain: Vec::new() };
         }
@@ -107,7 +107,7 @@ impl AxisFilter {
 }
 
 /// What stands for the value at `index`, which may lie beyond the ends.
-fn ghost(line: &Line, normal: bool, wall_m_s: [f64; 2], index: isize) -> Ghost {
+fn ghost(line: &Operators1d, normal: bool, wall_m_s: [f64; 2], index: isize) -> Ghost {
     let n = line.cells;
     if normal && line.ends != Ends::Periodic {
         let (face, sign) = resolve_face(n, line.ends, index);

@@ -3,58 +3,8 @@
 //! Check: adjointness through the energy identity, linear and wall-bounded profiles (tests of the model).
 
 use super::super::layout::{Layout, Shape};
-use super::super::line::{Line, Taps};
-use super::super::rows::{Columns, add_rows, pad};
-
-/// Most values that one derivative reads: two neighbouring gradients at a no-slip wall.
-const MOST_TAPS: usize = 8;
-
-/// A linear operator along one axis.
-#[derive(Debug, Clone)]
-pub(super) struct Operator {
-    axis: usize,
-    shape: Shape,
-    periodic: bool,
-    rows: Vec<Taps>,
-    columns: Columns,
-}
-
-impl Operator {
-    fn new(layout: &Layout, axis: usize, rows: Vec<Taps>) -> Self {
-        let periodic = layout.line[axis].is_periodic();
-        let columns = if axis == 0 { Columns::new(&rows, periodic) } else { Columns::default() };
-        Self { axis, shape: layout.shape, periodic, rows, columns }
-    }
-
-    /// `out +=` the operator on `field` at the targets of the row `at` (its indices along the axes 1 and 2).
-    #[inline(always)]
-    pub(super) fn add(&self, out: &mut [f64], field: &[f64], at: [usize; 2], padded: &mut [f64]) {
-        if self.axis == 0 {
-            self.add_along(out, &field[self.shape.row(at[0], at[1])], padded);
-        } else {
-            self.add_across(out, field, at);
-        }
-    }
-
-    /// `out +=` an operator of axis 1 or 2 on `field` at the targets of the row `at`.
-    #[inline(always)]
-    pub(super) fn add_across(&self, out: &mut [f64], field: &[f64], at: [usize; 2]) {
-        let own = &self.rows[at[self.axis - 1]];
-        let mut taps = [(0, 0.0); MOST_TAPS];
-        for (tap, &(index, c)) in taps.iter_mut().zip(own) {
-            let row = if self.axis == 1 { self.shape.row(index, at[1]) } else { self.shape.row(at[0], index) };
-            *tap = (row.start, c);
-        }
-        add_rows(out, field, &taps[..own.len().min(MOST_TAPS)]);
-    }
-
-    /// `out +=` an operator of axis 0 on one row.
-    #[inline(always)]
-    pub(super) fn add_along(&self, out: &mut [f64], row: &[f64], padded: &mut [f64]) {
-        pad(padded, row, self.periodic);
-        self.columns.add(out, padded);
-    }
-}
+use super::super::operators_1d::{Operators1d, Taps};
+use super::super::row_operator::RowOperator;
 
 /// The operators of a layout.
 #[derive(Debug, Clone)]
@@ -62,11 +12,11 @@ pub(super) struct Operators {
     pub(super) shape: Shape,
     pub(super) periodic: [bool; 3],
     /// From the faces of each axis to the centres, `m^-1 Dw`.
-    pub(super) to_cells: [Operator; 3],
+    pub(super) to_cells: [RowOperator; 3],
     /// From the centres of each axis to the faces, `-f^-1 Dw^T`; nothing on walls.
-    pub(super) to_faces: [Operator; 3],
+    pub(super) to_faces: [RowOperator; 3],
     /// Half the mean of the gradients at the two faces of each cell, walls included.
-    pub(super) half_mean_gradient: [Operator; 3],
+    pub(super) half_mean_gradient: [RowOperator; 3],
     /// What the walls of an axis add to it for each component: `[axis][component]`.
     pub(super) wall_source: [[Vec<f64>; 3]; 3],
     /// `h^(2/3)` of the cells of each axis: their product is the square of the filter width.
@@ -80,7 +30,7 @@ const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
 
 impl Operators {
     pub(super) fn new(layout: &Layout) -> Self {
-        let operator = |axis: usize, rows| Operator::new(layout, axis, rows);
+        let operator = |axis: usize, rows| RowOperator::new(layout, axis, rows);
         Self {
             shape: layout.shape,
             periodic: std::array::from_fn(|axis| layout.line[axis].is_periodic()),
@@ -123,7 +73,7 @@ impl Operators {
 }
 
 /// Rows of `m^-1 Dw` over the stored faces.
-fn divergence(line: &Line) -> Vec<Taps> {
+fn divergence(line: &Operators1d) -> Vec<Taps> {
     let mut rows = line.stored_divergence();
     for (row, mass) in rows.iter_mut().zip(&line.cell_mass_m) {
         for tap in row {
@@ -135,7 +85,7 @@ fn divergence(line: &Line) -> Vec<Taps> {
 
 /// Half the mean of the gradients at the two faces of each cell: rows over the cells, and the coefficients of the velocities
 /// of the low and of the high wall. At a slip wall the gradient of what flows along it is zero.
-fn half_mean_gradient(line: &Line) -> (Vec<Taps>, Vec<[f64; 2]>) {
+fn half_mean_gradient(line: &Operators1d) -> (Vec<Taps>, Vec<[f64; 2]>) {
     let n = line.cells;
     let adjoint = line.adjoint();
     let sticks = line.no_slip();

@@ -13,8 +13,9 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use super::super::row_operator::RowOperator;
 use super::super::rows::{HALO, pad};
-use super::operators::{Operator, Operators};
+use super::operators::Operators;
 
 /// What the divergence needs of the stress.
 #[derive(Debug, Clone)]
@@ -77,7 +78,7 @@ impl Stress {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn add_divergence_row(operator: &Operator, in_plane: &[f64], across: &[f64], at: [usize; 2], out: &mut [f64]) {
+fn add_divergence_row(operator: &RowOperator, in_plane: &[f64], across: &[f64], at: [usize; 2], out: &mut [f64]) {
     for (out, value) in out.iter_mut().zip(in_plane) {
         *out += value;
     }

@@ -1,4 +1,4 @@
-//! One V-cycle on the second-order operator, for 16 modes side by side.
+//! One V-cycle, for 16 modes side by side: the fourth-order operator on the finest mesh, second-order ones below.
 //!
 //! Before and after the coarse mesh the lines along both axes are relaxed, once on the finest mesh and twice on the others,
 //! afterwards in reverse order, which makes the cycle symmetric. Restriction is the transpose of the interpolation.
@@ -7,9 +7,10 @@
 
 use multiversion::multiversion;
 
+use super::super::super::operators_1d::Taps;
 use super::grid::{Axis, Weights};
-use super::relax::{Scratch, Side, relax};
-use super::{LANES, Lanes};
+use super::lanes::{LANES, Lanes};
+use super::relax::{Scratch, Side, relax, residual_at};
 
 /// One mesh of the hierarchy: axis 1 is contiguous, axis 2 has its length as stride.
 #[derive(Debug)]
@@ -44,18 +45,23 @@ pub(crate) struct Work {
 /// Weight of the correction from the second mesh. The fourth-order operator exceeds that of the cycle by up to 1.37 for the
 /// waves that only the finest mesh has, and hardly for those that the second one corrects: raising these narrows the spectrum
 /// that conjugate gradients see, at no cost.
-const COARSE_SHARE: f32 = 1.35;
+const COARSE_SHARE: f32 = 1.0;
 /// Relaxations of both directions on the meshes between the finest and the coarsest.
 const COARSE_SWEEPS: usize = 2;
 /// Relaxations on the coarsest mesh.
 const COARSEST_SWEEPS: usize = 4;
 
 impl Hierarchy {
-    pub(crate) fn new(axes: [Axis; 2]) -> Self {
-        let mut levels = Vec::new();
+    /// The hierarchy under the mesh with `axes` and the rows of the fourth-order operator along them.
+    pub(crate) fn new(axes: [Axis; 2], stiffness: &[Vec<Taps>; 2]) -> Self {
+        let mut levels: Vec<Level> = Vec::new();
         let mut axes = axes;
         loop {
-            let side = [Side::new(&axes[0], 1), Side::new(&axes[1], axes[0].len())];
+            let stride = [1, axes[0].len()];
+            let side = std::array::from_fn(|a| match levels.is_empty() {
+                true => Side::finest(&axes[a], stride[a], &stiffness[a]),
+                false => Side::new(&axes[a], stride[a]),
+            });
             // A single line is solved exactly.
             let single = axes.iter().any(|axis| axis.len() == 1);
             if single || !axes.iter().any(Axis::is_fine) {
@@ -126,12 +132,11 @@ impl Hierarchy {
 impl Level {
     fn coarsest(&self, mode: &Lanes, u: &mut [Lanes], f: &[Lanes], scratch: &mut Scratch) {
         let [first, second] = &self.side;
-        if first.len() == 1 {
-            relax((second, first), mode, u, f, false, scratch);
-            return;
-        }
-        if second.len() == 1 {
-            relax((first, second), mode, u, f, false, scratch);
+        let single =
+            if first.len() == 1 { Some((second, first)) } else { (second.len() == 1).then_some((first, second)) };
+        if let Some(sides) = single {
+            relax(sides, mode, u, f, false, scratch);
+            relax(sides, mode, u, f, true, scratch);
             return;
         }
         self.solve_mean(mode, u, f);
@@ -205,22 +210,8 @@ fn restrict(
 #[inline(always)]
 fn residual_row(level: &Level, mode: &Lanes, u: &[Lanes], f: &[Lanes], k: usize, row: &mut [Lanes]) {
     let [first, second] = &level.side;
-    let n = first.len();
-    let [below, above] = second.neighbours(k);
-    for (j, out) in row.iter_mut().enumerate().take(n) {
-        let [before, behind] = first.neighbours(j);
-        let (m1, m2) = (first.mass(j), second.mass(k));
-        let own = &u[k * n + j];
-        let across = [&u[below.0 * n + j], &u[above.0 * n + j]];
-        let along = [&u[k * n + before.0], &u[k * n + behind.0]];
-        let (ca, cb) = (m1 * below.1, m1 * above.1);
-        let (cc, cd) = (m2 * before.1, m2 * behind.1);
-        let right = &f[k * n + j];
-        for l in 0..LANES {
-            let sum = mode[l].mul_add(-m1 * m2 * own[l], right[l]);
-            let sum = ca.mul_add(across[0][l] - own[l], cb.mul_add(across[1][l] - own[l], sum));
-            out[l] = cc.mul_add(along[0][l] - own[l], cd.mul_add(along[1][l] - own[l], sum));
-        }
+    for (j, out) in row.iter_mut().enumerate().take(first.len()) {
+        *out = residual_at([first, second], [j, k], mode, u, f);
     }
 }
 
@@ -253,8 +244,9 @@ fn add(out: &mut Lanes, weight: f32, value: &Lanes) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::super::line::Line;
     use super::super::super::super::mesh::{Direction, Mapping, Wall};
+    use super::super::super::super::operators_1d::Operators1d;
+    use super::super::super::apply::stiffness;
     use super::*;
 
     fn cycled(hierarchy: &Hierarchy, mode: &Lanes, wave: impl Fn(usize, usize) -> f32) -> (Vec<Lanes>, Vec<Lanes>) {
@@ -272,7 +264,9 @@ mod tests {
         let ground =
             Direction::between(25, 0.0, 25.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 2.0 });
         let sides = [ground, Direction::periodic(14, 0.0, 14.0)];
-        let hierarchy = Hierarchy::new(sides.each_ref().map(|d| Axis::new(&Line::new(d), 1.0)));
+        let lines = sides.each_ref().map(Operators1d::new);
+        let hierarchy =
+            Hierarchy::new(lines.each_ref().map(|line| Axis::new(line, 1.0)), &lines.each_ref().map(stiffness));
         let mode: Lanes = std::array::from_fn(|l| 0.02 * (l + 1) as f32);
         let (f, bf) = cycled(&hierarchy, &mode, |p, l| ((p * 16 + l) as f32 * 0.71).sin());
         let (g, bg) = cycled(&hierarchy, &mode, |p, l| ((p * 16 + l) as f32 * 1.3).cos());

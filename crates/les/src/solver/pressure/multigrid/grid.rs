@@ -1,13 +1,14 @@
 //! The hierarchy of meshes of the two directions that multigrid treats, and what carries fields between them.
 //!
-//! Each mesh has the second-order operator `K u = sum of links times differences` with the masses of the fourth-order one:
-//! then the two have the same eigenvectors of long wavelength, and eigenvalues within a factor 1.37 everywhere. Coarse cells
+//! Each coarse mesh has the second-order operator `K u = sum of links times differences` with the masses of the fourth-order one:
+//! then the two have the same eigenvectors of long wavelength, and eigenvalues within a factor 1.37 everywhere; on the finest
+//! mesh the links serve the lines' own problems. Coarse cells
 //! are pairs; of an odd number the last stays alone. Lengths are in units of the mean cell, so that single precision holds
 //! any mesh.
 //!
 //! Check: interpolation of constants and of straight lines, masses, colours.
 
-use super::super::super::line::Line;
+use super::super::super::operators_1d::{Operators1d, Taps};
 
 /// One direction of one mesh.
 #[derive(Debug, Clone)]
@@ -30,7 +31,7 @@ const COARSEST: usize = 3;
 
 impl Axis {
     /// The finest mesh, in units of `unit_m` \[m\].
-    pub(crate) fn new(line: &Line, unit_m: f64) -> Self {
+    pub(crate) fn new(line: &Operators1d, unit_m: f64) -> Self {
         let n = line.cells;
         let distance: Vec<f64> = line.face_mass_m[1..].iter().map(|f| f / unit_m).collect();
         let mut centre = vec![0.0; n];
@@ -58,6 +59,14 @@ impl Axis {
     /// Number of cells.
     pub(crate) fn len(&self) -> usize {
         self.mass.len()
+    }
+
+    /// The cells linked to each cell and the links.
+    pub(crate) fn couplings(&self) -> Vec<Taps> {
+        let last = self.len() - 1;
+        let before = |i: usize| if i > 0 { (i - 1, self.link[i - 1]) } else { (last, self.link[last]) };
+        let behind = |i: usize| if i < last { (i + 1, self.link[i]) } else { (0, self.link[last]) };
+        (0..=last).map(|i| [before(i), behind(i)].into_iter().filter(|tap| tap.1 != 0.0).collect()).collect()
     }
 
     /// Whether the last cell is linked to the first.
@@ -120,7 +129,7 @@ mod tests {
     use super::super::super::super::mesh::{Direction, Mapping, Wall};
     use super::*;
 
-    fn lines() -> Vec<Line> {
+    fn lines() -> Vec<Operators1d> {
         let walls = |n| Direction::between(n, 0.0, 4.0, Wall::AT_REST, Wall::Slip);
         [
             walls(24),
@@ -128,7 +137,7 @@ mod tests {
             Direction::periodic(19, 0.0, 4.0).stretched(Mapping::Sine { amplitude: 0.5 }),
         ]
         .iter()
-        .map(Line::new)
+        .map(Operators1d::new)
         .collect()
     }
 

@@ -6,9 +6,9 @@
 
 use multiversion::multiversion;
 
-use super::super::super::line::Taps;
+use super::super::super::operators_1d::Taps;
 use super::cycle::{self, Hierarchy};
-use super::{LANES, Lanes, Wide};
+use super::lanes::{LANES, Lanes, Wide};
 
 /// The fourth-order operator `K1 M2 + M1 K2 + lambda M1 M2`.
 #[derive(Debug)]

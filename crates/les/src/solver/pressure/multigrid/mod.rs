@@ -3,8 +3,8 @@
 //! The transform along axis 0 leaves one problem in two dimensions for each mode. There, line relaxation in both directions
 //! with the transposed interpolation as restriction converges at the same rate for any stretching; in three dimensions it
 //! does not, because errors that are smooth along two strong couplings and rough along a weak third escape all lines. The
-//! cycle works on the second-order operator in single precision and preconditions flexible conjugate gradients on the
-//! fourth-order one.
+//! cycle works in single precision, with the fourth-order operator on the finest mesh and second-order ones on the others, and
+//! preconditions flexible conjugate gradients.
 //!
 //! Modes are solved 16 at a time, each group by one thread from beginning to end, till its share of the tolerance is reached:
 //! short waves take two or three iterations. Nothing is summed across groups but the report, in their order, so the result
@@ -15,6 +15,7 @@
 mod cycle;
 mod grid;
 mod krylov;
+mod lanes;
 mod relax;
 
 use rayon::prelude::*;
@@ -30,13 +31,7 @@ use crate::Error;
 use cycle::Hierarchy;
 use grid::Axis;
 use krylov::Plane;
-
-/// Modes that are solved side by side.
-const LANES: usize = 16;
-/// One value of each mode, in the precision of the cycle.
-type Lanes = [f32; LANES];
-/// One value of each mode.
-type Wide = [f64; LANES];
+use lanes::{LANES, Wide};
 
 /// Part of the tolerance that is shared in proportion to the right side of each group of modes.
 const PROPORTIONAL: f64 = 0.99;
@@ -87,8 +82,8 @@ impl Multigrid {
             weight: lanes(&|m| rows.weight(m, mean_mass)),
             rows,
             scale: -factor,
+            hierarchy: Hierarchy::new([Axis::new(first, unit_m), Axis::new(second, unit_m)], &plane.stiffness),
             plane,
-            hierarchy: Hierarchy::new([Axis::new(first, unit_m), Axis::new(second, unit_m)]),
             refinement: Refinement::default(),
         }
     }
@@ -170,17 +165,11 @@ impl PressureSolver for Multigrid {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
         check_request(self.shape(), field, tolerance)?;
         let mut refinement = std::mem::take(&mut self.refinement);
-        let done = refinement
-            .run(&self.operator, field, tolerance, |field, size, tolerance| self.pass(field, size, tolerance));
+        let solved = refinement.run(&self.operator, field, tolerance, "multigrid", |field, size, tolerance| {
+            self.pass(field, size, tolerance)
+        });
         self.refinement = refinement;
-        let done = done.map_err(|(history, reason)| Error::PressureNotSolved {
-            method: "multigrid",
-            tolerance,
-            reason,
-            history,
-        })?;
-        let factor = (done.iterations > 0).then(|| done.residual.powf(1.0 / done.iterations as f64));
-        Ok(Solved { residual: done.residual, iterations: done.iterations, factor, imbalance: done.imbalance })
+        solved
     }
 
     fn describe(&self) -> String {

@@ -4,8 +4,8 @@ mod budget;
 mod laminar;
 mod vortex;
 
-use super::super::line::Line;
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::super::operators_1d::Operators1d;
 use super::*;
 
 const MODELS: [SubgridModel; 3] = [SubgridModel::SMAGORINSKY, SubgridModel::WALE, SubgridModel::MULTISCALE_WALE];
@@ -116,8 +116,8 @@ fn faces(mesh: &Mesh, layout: &Layout, field: impl Fn([f64; 3]) -> [f64; 3]) -> 
 /// Strain of a field at the places of the stress, from the rows of the operators.
 fn strain(layout: &Layout, velocity: &[Vec<f64>; 3]) -> [Vec<f64>; 6] {
     let shape = layout.shape;
-    let divergence = layout.line.each_ref().map(Line::stored_divergence);
-    let gradient = layout.line.each_ref().map(Line::gradient);
+    let divergence = layout.line.each_ref().map(Operators1d::stored_divergence);
+    let gradient = layout.line.each_ref().map(Operators1d::gradient);
     let derivative = |component: usize, axis: usize, place: usize| -> f64 {
         let index = index(layout, place);
         let (row, scale) = if component == axis {

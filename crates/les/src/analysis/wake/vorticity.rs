@@ -7,10 +7,10 @@
 
 use rayon::prelude::*;
 
-use super::super::flow::Flow;
-use super::super::mesh::{AXIS_NAMES, Ends, Mesh};
 use super::slope::Slope;
 use crate::Error;
+use crate::solver::flow::Flow;
+use crate::solver::mesh::{AXIS_NAMES, Ends, Mesh};
 
 /// Weights of the first faces over those of the trapezoidal rule: 3/8, 7/6, 23/24 for 1/2, 1, 1.
 const GREGORY: [f64; 3] = [0.75, 7.0 / 6.0, 23.0 / 24.0];
@@ -204,9 +204,9 @@ impl Flow {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::mesh::{Direction, Wall};
-    use super::super::super::settings::{FlowSettings, TimeStep};
     use super::*;
+    use crate::solver::mesh::{Direction, Wall};
+    use crate::solver::settings::{FlowSettings, TimeStep};
     use std::f64::consts::{PI, TAU};
 
     fn start(cells: usize, viscosity: f64, field: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Flow {

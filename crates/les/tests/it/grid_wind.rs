@@ -1,11 +1,8 @@
 //! Interpolation on meshes: exactness, order, boundaries and what happens outside.
-#![allow(clippy::unwrap_used)] // a helper of a test may panic as the test may
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
-use wakescope_les::{
-    CirculationProfile, Edges, Error, GridSnapshot, Ground, Motion, OutsidePolicy, PlaneMesh, Side, Uniform,
-    VortexPair, Wind,
-};
+use wakescope_les::winds::{Edges, OutsidePolicy, PlaneMesh, Side, Uniform};
+use wakescope_les::{CirculationProfile, Error, GridSnapshot, Ground, Motion, VortexPair, Wind};
 
 const OPEN: Edges = Edges::Bounded { low: Side::Open, high: Side::Open };
 

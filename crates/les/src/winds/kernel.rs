@@ -7,8 +7,8 @@
 /// The kernel `W` of (27) at `x` cells from its node; zero beyond two cells.
 ///
 /// ```
-/// assert_eq!(wakescope_les::m4_prime(0.0), 1.0);
-/// assert_eq!(wakescope_les::m4_prime(0.5), 0.5625);
+/// assert_eq!(wakescope_les::winds::m4_prime(0.0), 1.0);
+/// assert_eq!(wakescope_les::winds::m4_prime(0.5), 0.5625);
 /// ```
 pub fn m4_prime(x: f64) -> f64 {
     let a = x.abs();

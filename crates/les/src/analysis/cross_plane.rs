@@ -6,11 +6,11 @@
 //!
 //! Check: an analytic field on a stretched mesh with the kernel's order, walls, one-cell directions.
 
-use super::flow::Flow;
-use super::mesh::{AXIS_NAMES, Direction, Ends, Wall};
-use crate::axis::{Axis, GHOSTS, Ghost};
-use crate::grid_wind::{ghost_places, ghost_value};
-use crate::{Edges, Error, GridSnapshot, OutsidePolicy, PlaneMesh, Side};
+use crate::Error;
+use crate::solver::flow::Flow;
+use crate::solver::mesh::{AXIS_NAMES, Direction, Ends, Mesh, Wall};
+use crate::winds::axis::{Axis, Edges, GHOSTS, Ghost, Side};
+use crate::winds::grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh, ghost_places, ghost_value};
 
 /// Nodes that stand for a direction of one cell: the kernel's stencil.
 const THIN_NODES: usize = 4;
@@ -30,6 +30,14 @@ pub struct CrossPlane {
     pub y_edges: Edges,
     /// The same in z.
     pub z_edges: Edges,
+}
+
+impl CrossPlane {
+    fn at(x_m: f64, mesh: &Mesh, velocity_m_s: Vec<[f64; 3]>) -> Self {
+        let (y_m, z_m) = (mesh.centre_m(1), mesh.centre_m(2));
+        let [_, y, z] = mesh.directions();
+        Self { x_m, y_m, z_m, velocity_m_s, y_edges: edges(y), z_edges: edges(z) }
+    }
 }
 
 impl Flow {
@@ -69,15 +77,7 @@ impl Flow {
                 sum
             })
             .collect();
-        let [_, y, z] = mesh.directions();
-        Ok(CrossPlane {
-            x_m,
-            y_m: mesh.centre_m(1),
-            z_m: mesh.centre_m(2),
-            velocity_m_s,
-            y_edges: edges(y),
-            z_edges: edges(z),
-        })
+        Ok(CrossPlane::at(x_m, mesh, velocity_m_s))
     }
 
     /// The cross-plane at `x_m` \[m\] as a wind at the present time, with the walls and periods of the mesh.
@@ -102,16 +102,7 @@ impl Flow {
                 mean[component] = sum / along.length_m();
             }
         }
-        let x_m = 0.5 * (along.low_m + along.high_m);
-        let [_, y, z] = mesh.directions();
-        CrossPlane {
-            x_m,
-            y_m: mesh.centre_m(1),
-            z_m: mesh.centre_m(2),
-            velocity_m_s,
-            y_edges: edges(y),
-            z_edges: edges(z),
-        }
+        CrossPlane::at(0.5 * (along.low_m + along.high_m), mesh, velocity_m_s)
     }
 
     /// A plane of this flow as a wind.
@@ -168,10 +159,10 @@ fn nodes(direction: &Direction, centre_m: &[f64]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mesh::{Mapping, Mesh};
-    use super::super::settings::{FlowSettings, TimeStep};
     use super::*;
-    use crate::Wind;
+    use crate::solver::mesh::Mapping;
+    use crate::solver::settings::{FlowSettings, TimeStep};
+    use crate::winds::Wind;
     use std::f64::consts::TAU;
 
     /// The flow of Arnold, Beltrami and Childress, free of divergence and different in all directions.
@@ -246,7 +237,7 @@ mod tests {
         let (thin, wide) = (|| Direction::thin(0.5), || Direction::periodic(12, 0.0, 1.0));
         let plane = start(thin(), wide(), wide(), |[_, y, z]| [1.0, (TAU * z).sin(), (TAU * y).sin()]);
         assert_eq!(plane.cross_plane(-7.0).unwrap().velocity_m_s, plane.cross_plane(0.1).unwrap().velocity_m_s);
-        assert!(plane.cross_plane(f64::INFINITY).is_err());
+        assert!(matches!(plane.cross_plane(f64::INFINITY), Err(Error::OutOfRange { field: "x_m", .. })));
         let shear = start(wide(), thin(), wide(), |[_, _, z]| [(TAU * z).sin(), 2.0, 0.0]);
         let wind = shear.snapshot(0.3, OutsidePolicy::Error).unwrap();
         let [a, b] = [0.0, 0.37].map(|y| probe(&wind, [0.3, y, 0.21]));

@@ -8,7 +8,7 @@
 
 use multiversion::multiversion;
 
-use super::super::line::Line;
+use super::super::operators_1d::Operators1d;
 
 /// Lines that are solved side by side.
 const LANES: usize = 16;
@@ -17,7 +17,7 @@ const ZERO: Lanes = [0.0; LANES];
 
 /// The operator of one direction, by columns.
 #[derive(Debug)]
-pub(crate) struct Band {
+pub(crate) struct BandedCholesky {
     columns: Vec<Column>,
 }
 
@@ -45,9 +45,9 @@ pub(crate) struct Scratch {
     right: Vec<Lanes>,
 }
 
-impl Band {
+impl BandedCholesky {
     /// The operator of `line`, or `None` if it is not banded (periodic directions).
-    pub(crate) fn new(line: &Line) -> Option<Self> {
+    pub(crate) fn new(line: &Operators1d) -> Option<Self> {
         let n = line.cells;
         let mut columns: Vec<Column> =
             line.cell_mass_m.iter().map(|mass| Column { mass: *mass, ..Column::default() }).collect();
@@ -216,8 +216,8 @@ mod tests {
         for (n, low, high) in [(4, slip, slip), (12, rest, slip), (13, slip, rest), (16, rest, rest), (40, rest, rest)]
         {
             let mapping = Mapping::TanhLow { strength: 0.8 };
-            let line = Line::new(&Direction::between(n, 0.0, n as f64, low, high).stretched(mapping));
-            let band = Band::new(&line).unwrap();
+            let line = Operators1d::new(&Direction::between(n, 0.0, n as f64, low, high).stretched(mapping));
+            let band = BandedCholesky::new(&line).unwrap();
             let shifts: Vec<f64> = (0..19).map(|l| 0.05 * f64::from(l)).collect();
             let mut right: Vec<Vec<f64>> =
                 (0..n).map(|k| (0..19).map(|l| ((k * 19 + l) as f64 * 0.7).sin()).collect()).collect();
@@ -241,6 +241,6 @@ mod tests {
 
     #[test]
     fn a_periodic_direction_is_not_banded() {
-        assert!(Band::new(&Line::new(&Direction::periodic(12, 0.0, 1.0))).is_none());
+        assert!(BandedCholesky::new(&Operators1d::new(&Direction::periodic(12, 0.0, 1.0))).is_none());
     }
 }

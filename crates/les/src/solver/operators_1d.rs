@@ -10,7 +10,7 @@
 //!
 //! Check: column sums, adjointness, exactness for polynomials, order on stretched meshes.
 
-use super::mesh::{Direction, Ends, Wall};
+use super::mesh::{Direction, Ends};
 
 /// One weighted sum: indices and coefficients.
 pub(crate) type Taps = Vec<(usize, f64)>;
@@ -30,7 +30,7 @@ pub(crate) const DIFFERENCE: [f64; 4] = [1.0 / 24.0, -9.0 / 8.0, 9.0 / 8.0, -1.0
 
 /// One direction of the mesh with its operators.
 #[derive(Debug, Clone)]
-pub(crate) struct Line {
+pub(crate) struct Operators1d {
     /// Number of cells, and of stored faces.
     pub(crate) cells: usize,
     /// What lies at the two ends.
@@ -47,14 +47,14 @@ pub(crate) struct Line {
     pub(crate) divergence: Vec<Taps>,
 }
 
-impl Line {
+impl Operators1d {
     pub(crate) fn new(direction: &Direction) -> Self {
         let n = direction.cells;
         let cell_metric_m: Vec<f64> = (0..n).map(|k| direction.at(k as f64 + 0.5).1).collect();
         let face_metric_m: Vec<f64> = (0..=n).map(|k| direction.at(k as f64).1).collect();
         let mut cell_mass_m = cell_metric_m.clone();
         let mut face_mass_m = face_metric_m.clone();
-        let sticks = no_slip(direction.ends);
+        let sticks = direction.ends.no_slip();
         for (side, sticks) in sticks.into_iter().enumerate() {
             let inward = |i: usize, last: usize| if side == 0 { i } else { last - i };
             if sticks {
@@ -88,7 +88,7 @@ impl Line {
 
     /// Whether the low and the high end are no-slip walls.
     pub(crate) fn no_slip(&self) -> [bool; 2] {
-        no_slip(self.ends)
+        self.ends.no_slip()
     }
 
     /// First stored face that carries a velocity: face 0 of a bounded direction is a wall.
@@ -182,14 +182,6 @@ fn nonzero(sums: &[f64]) -> Taps {
     sums.iter().enumerate().filter(|(_, c)| **c != 0.0).map(|(i, c)| (i, *c)).collect()
 }
 
-/// Whether the low and the high end are no-slip walls.
-fn no_slip(ends: Ends) -> [bool; 2] {
-    match ends {
-        Ends::Periodic => [false; 2],
-        Ends::Walls { low, high } => [low, high].map(|wall| matches!(wall, Wall::NoSlip { .. })),
-    }
-}
-
 /// One row of the weighted divergence.
 fn divergence_row(n: usize, ends: Ends, sticks: [bool; 2], k: usize) -> Taps {
     if n == 1 {
@@ -241,7 +233,7 @@ pub(crate) fn resolve_cell(n: usize, ends: Ends, index: isize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mesh::Mapping;
+    use super::super::mesh::{Mapping, Wall};
     use super::*;
 
     fn apply(rows: &[Taps], x: &[f64]) -> Vec<f64> {
@@ -266,7 +258,7 @@ mod tests {
     #[test]
     fn the_weighted_divergence_lets_no_flux_appear_inside() {
         for direction in every_kind() {
-            let line = Line::new(&direction);
+            let line = Operators1d::new(&direction);
             let columns = line.adjoint();
             let inner = if line.is_periodic() { 0..line.cells } else { 1..line.cells };
             for face in inner {
@@ -278,7 +270,7 @@ mod tests {
 
     #[test]
     fn divergence_and_gradient_are_exact_for_parabolas_at_a_wall() {
-        let line = Line::new(&walls(24));
+        let line = Operators1d::new(&walls(24));
         let h = 2.0 / 24.0;
         let face: Vec<f64> = (0..=24).map(|i| h * f64::from(i)).collect();
         let square: Vec<f64> = face.iter().map(|z| z * z).collect();
@@ -300,7 +292,7 @@ mod tests {
     #[test]
     fn laplacians_are_symmetric_and_dissipate() {
         for direction in every_kind() {
-            let line = Line::new(&direction);
+            let line = Operators1d::new(&direction);
             let n = line.cells;
             for (rows, mass) in
                 [(line.laplacian_at_cells().0, &line.cell_mass_m), (line.laplacian_at_faces(), &line.face_mass_m)]
@@ -326,7 +318,7 @@ mod tests {
 
     /// Largest errors of the Laplacians of `cos` at the centres and `sin` at the faces, interior and all.
     fn errors(direction: &Direction) -> [f64; 2] {
-        let line = Line::new(direction);
+        let line = Operators1d::new(direction);
         let wave = std::f64::consts::PI;
         let centre: Vec<f64> = (0..line.cells).map(|k| direction.at(k as f64 + 0.5).0).collect();
         let face: Vec<f64> = (0..line.cells).map(|k| direction.at(k as f64).0).collect();

@@ -9,8 +9,10 @@
 
 use std::f64::consts::PI;
 
+use super::profile::CirculationProfile;
+use super::wind::Wind;
+use crate::Error;
 use crate::error::{check, check_lengths};
-use crate::{CirculationProfile, Error, Wind};
 
 /// Standard acceleration of gravity (exact by definition).
 const GRAVITY_M_S2: f64 = 9.806_65;

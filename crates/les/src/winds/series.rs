@@ -6,8 +6,10 @@
 //!
 //! Check: fields linear in time are exact, the error of a curved one falls with the square of the time between snapshots.
 
+use super::grid_wind::GridSnapshot;
+use super::wind::Wind;
+use crate::Error;
 use crate::error::{check, check_lengths};
-use crate::{Error, GridSnapshot, Wind};
 
 /// Points handled at once, so that the scratch stays on the stack.
 const BATCH: usize = 256;
@@ -93,8 +95,8 @@ impl Wind for GridSeries {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Edges, OutsidePolicy, PlaneMesh, Side};
     use super::*;
-    use crate::{Edges, OutsidePolicy, PlaneMesh, Side};
 
     /// A uniform velocity on a small mesh.
     fn uniform(velocity_m_s: [f64; 3]) -> GridSnapshot {

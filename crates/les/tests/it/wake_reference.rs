@@ -1,12 +1,10 @@
 //! The wake near the ground against the stored run of an independent code, in its plane phase: the fast part of
 //! `cargo xtask validate --only les_wake_coarse`.
 
-// A test that cannot set up its flow has failed.
-#![allow(clippy::unwrap_used)]
-
 use std::f64::consts::TAU;
+use wakescope_les::SubgridModel;
+use wakescope_les::analysis::{WakeRecord, WakeScales};
 use wakescope_les::cases::VortexPairCase;
-use wakescope_les::{SubgridModel, WakeRecord, WakeScales};
 
 /// Rows of the stored run: tau first.
 fn stored() -> Vec<Vec<f64>> {

@@ -9,11 +9,12 @@ use super::record::{SecondaryRecord, VortexRecord, WakeRecord};
 use super::scales::WakeScales;
 use super::spectrum::mode_energies_m4_s2;
 use super::vorticity::{Curl, Faces};
-use crate::diagnose::circulation_m2_s;
+use crate::Error;
+use crate::analysis::circulation::circulation_m2_s;
 use crate::error::check;
 use crate::solver::flow::Flow;
 use crate::solver::mesh::{Ends, Mesh};
-use crate::{Error, GridSnapshot, OutsidePolicy};
+use crate::winds::{GridSnapshot, OutsidePolicy};
 
 /// Radius of the circle of a centroid, in `b0`.
 const CORE_RADIUS: f64 = 0.15;

@@ -4,8 +4,9 @@
 
 use std::f64::consts::TAU;
 
+use crate::Error;
 use crate::error::check;
-use crate::{Aircraft, Error};
+use crate::winds::Aircraft;
 
 /// Initial spacing and circulation of a pair: its units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,15 +54,15 @@ mod tests {
     #[test]
     fn scales_are_those_of_the_analytic_pair_and_of_the_aircraft() {
         let scales = WakeScales { spacing_m: 47.0, circulation_m2_s: 500.0 };
-        let pair = crate::VortexPair {
+        let pair = crate::winds::VortexPair {
             circulation_m2_s: 500.0,
             spacing_m: 47.0,
             core_radius_m: 2.0,
             lateral_position_m: 0.0,
             height_m: 47.0,
-            ground: crate::Ground::Image,
-            profile: crate::CirculationProfile::Algebraic,
-            motion: crate::Motion::Frozen,
+            ground: crate::winds::Ground::Image,
+            profile: crate::winds::CirculationProfile::Algebraic,
+            motion: crate::winds::Motion::Frozen,
         };
         assert_eq!(scales.descent_speed_m_s(), pair.descent_speed_m_s());
         assert!((scales.time_unit_s() - pair.time_s(1.0)).abs() < 1e-12);

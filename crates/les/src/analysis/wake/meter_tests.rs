@@ -1,10 +1,10 @@
 //! An analytic pair on a mesh, cost, memory of the meter.
 
 use super::*;
-use crate::CirculationProfile;
-use crate::cases::VortexPairCase;
+use crate::solver::cases::VortexPairCase;
 use crate::solver::mesh::{Direction, Mapping, Wall};
 use crate::solver::settings::{FlowSettings, TimeStep};
+use crate::winds::CirculationProfile;
 use std::f64::consts::TAU;
 
 const PAIR: [[f64; 2]; 2] = [[-0.5, 1.0], [0.5, 1.0]];
@@ -25,9 +25,9 @@ fn vortices(
                 for (z0, sign) in [(z0, 1.0), (-z0, -1.0)] {
                     let (dy, dz) = (y - y0 - bend(x) - 4.0 * f64::from(copy), z - z0);
                     let r2 = dy * dy + dz * dz;
-                    let turn = sign * gamma / TAU * (1.0 - (-r2 / (core * core)).exp()) / r2.max(1e-12);
-                    out[1] -= turn * dz;
-                    out[2] += turn * dy;
+                    let rotation_per_s = sign * gamma / TAU * (1.0 - (-r2 / (core * core)).exp()) / r2.max(1e-12);
+                    out[1] -= rotation_per_s * dz;
+                    out[2] += rotation_per_s * dy;
                 }
             }
         }

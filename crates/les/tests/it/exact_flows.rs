@@ -1,12 +1,10 @@
 //! Flows with exact solutions: plates, Taylor and Green's vortices, waves of Tollmien and Schlichting.
 
-// A flow that cannot be set up or stepped has failed the test.
-#![allow(clippy::unwrap_used)]
-
 use std::f64::consts::{PI, TAU};
 
 use wakescope_les::cases::{self, Case, TollmienSchlichting};
-use wakescope_les::{Direction, Flow, FlowSettings, Mapping, Mesh, TimeScheme, TimeStep, ViscousTreatment};
+use wakescope_les::solver::ViscousTreatment;
+use wakescope_les::{Direction, Flow, FlowSettings, Mapping, Mesh, TimeScheme, TimeStep};
 
 fn run(case: &Case, steps: usize) -> Flow {
     let (mut flow, _) = case.start().unwrap();
@@ -26,10 +24,14 @@ fn profile_error(flow: &Flow, exact: impl Fn(f64) -> f64) -> f64 {
 
 #[test]
 fn poiseuilles_parabola_and_couettes_line_are_steady_to_round_off_on_equal_cells() {
-    let poiseuille = run(&cases::poiseuille(24, 0.0, 0.1, 1.0, 0.05).unwrap(), 200);
+    let poiseuille = run(
+        &cases::Plates { cells: 24, strength: 0.0, viscosity_m2_s: 0.1, step_s: 0.05 }.poiseuille(1.0).unwrap(),
+        200,
+    );
     let error = profile_error(&poiseuille, |z| 1.0 - z * z);
     assert!(error < 1e-12, "Poiseuille {error}");
-    let couette = run(&cases::couette(24, 0.0, 0.1, 1.0, 0.05).unwrap(), 200);
+    let couette =
+        run(&cases::Plates { cells: 24, strength: 0.0, viscosity_m2_s: 0.1, step_s: 0.05 }.couette(1.0).unwrap(), 200);
     let error = profile_error(&couette, |z| z);
     assert!(error < 1e-12, "Couette {error}");
 }
@@ -37,9 +39,13 @@ fn poiseuilles_parabola_and_couettes_line_are_steady_to_round_off_on_equal_cells
 #[test]
 fn plates_drag_a_fluid_at_rest_to_the_steady_profile() {
     let error = |flow: &Flow, exact: fn(f64) -> f64| profile_error(flow, exact);
-    let couette = run(&cases::couette(32, 1.5, 0.1, 0.0, 0.2).unwrap(), 1000);
+    let couette =
+        run(&cases::Plates { cells: 32, strength: 1.5, viscosity_m2_s: 0.1, step_s: 0.2 }.couette(0.0).unwrap(), 1000);
     assert!(error(&couette, |z| z) < 5e-5, "Couette {}", error(&couette, |z| z));
-    let poiseuille = run(&cases::poiseuille(32, 1.5, 0.1, 0.0, 0.2).unwrap(), 1000);
+    let poiseuille = run(
+        &cases::Plates { cells: 32, strength: 1.5, viscosity_m2_s: 0.1, step_s: 0.2 }.poiseuille(0.0).unwrap(),
+        1000,
+    );
     let found = error(&poiseuille, |z| 1.0 - z * z);
     assert!(found < 5e-5, "Poiseuille {found}");
 }
@@ -48,7 +54,7 @@ fn plates_drag_a_fluid_at_rest_to_the_steady_profile() {
 fn a_layer_between_plates_decays_with_third_order_in_space_and_second_in_time() {
     let nu = 0.1;
     let error = |cells: usize, step_s: f64| {
-        let case = cases::decaying_layer(cells, 1.5, nu, step_s).unwrap();
+        let case = cases::Plates { cells, strength: 1.5, viscosity_m2_s: nu, step_s }.decaying_layer().unwrap();
         let steps = (2.0 / step_s).round() as usize;
         let flow = run(&case, steps);
         profile_error(&flow, |z| (0.5 * PI * z).cos() * (-nu * PI * PI / 4.0 * 2.0).exp())
@@ -63,15 +69,21 @@ fn a_layer_between_plates_decays_with_third_order_in_space_and_second_in_time() 
 #[test]
 fn an_impulsively_started_plate_is_followed_at_any_viscous_number() {
     // nu dt/h^2 reaches 1e4 at the wall; the ringing of Crank and Nicolson's scheme must decay, nothing may blow up.
-    let plain = cases::rayleigh_plate(64, 2.5, 1.0, 0.01).unwrap();
+    let plain = cases::Plates { cells: 64, strength: 2.5, viscosity_m2_s: 1.0, step_s: 0.01 }.rayleigh_plate().unwrap();
     // After four viscous times the profile is Couette's: 1 at z = -1, 0 at z = 1.
-    let steady = |case: &Case| profile_error(&run(case, 400), |z| 0.5 * (1.0 - z));
-    assert!(steady(&plain) < 1.0, "{}", steady(&plain));
+    let off = |case: &Case, steps: usize| profile_error(&run(case, steps), |z| 0.5 * (1.0 - z));
+    // Crank and Nicolson's scheme turns the sign of the stiffest wave in every step and takes off 4/(nu dt k^2) of it: by 3600
+    // steps at the 1.2e4 of the cell at the wall to about a third.
+    let (early, late) = (off(&plain, 400), off(&plain, 4000));
+    assert!(early < 1.0 && (0.1..0.7).contains(&(late / early)), "{early} {late}");
     let mut damped = plain;
     damped.settings.damped_steps = 4;
-    assert!(steady(&damped) < 1e-4, "{}", steady(&damped));
+    assert!(off(&damped, 400) < 1e-4, "{}", off(&damped, 400));
     let nu = 0.01;
-    let flow = run(&cases::rayleigh_plate(96, 2.0, nu, 0.002).unwrap(), 1000);
+    let flow = run(
+        &cases::Plates { cells: 96, strength: 2.0, viscosity_m2_s: nu, step_s: 0.002 }.rayleigh_plate().unwrap(),
+        1000,
+    );
     let error = profile_error(&flow, |z| erfc((z + 1.0) / (2.0 * (nu * 2.0).sqrt())));
     assert!(error < 2e-3, "{error}");
 }

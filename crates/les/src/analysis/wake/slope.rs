@@ -5,7 +5,7 @@
 //!
 //! Check: cubics, mirror images, periods.
 
-use super::super::mesh::{Direction, Ends, Wall};
+use crate::solver::mesh::{Direction, Ends, Wall};
 
 /// Values used for one derivative.
 const TAPS: usize = 4;
@@ -106,8 +106,8 @@ fn derivative_weights(position_m: [f64; TAPS], at_m: f64) -> [f64; TAPS] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::mesh::Mapping;
     use super::*;
+    use crate::solver::mesh::Mapping;
 
     fn derive(direction: &Direction, component: usize, field: impl Fn(f64) -> f64) -> Vec<f64> {
         let slope = Slope::new(direction, component);

@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use crate::TwoScale;
+use super::two_scale::TwoScale;
 
 /// Root of `2 s + 1 = exp(s)`: makes `r_c` the radius of the largest tangential velocity of a Lamb-Oseen vortex.
 const LAMB_OSEEN_BETA: f64 = 1.256_431_208_626_169_6;

@@ -7,8 +7,8 @@
 //!
 //! Check: linear functions to round-off on a strongly stretched mesh; order 3 of a sampled vortex.
 
+use super::kernel::m4_prime_weights;
 use crate::Error;
-use crate::kernel::m4_prime_weights;
 
 /// What lies beyond one end of a direction.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -48,8 +48,8 @@ pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::mesh::{Direction, Mapping, Mesh, Wall};
     use super::*;
+    use crate::solver::mesh::{Direction, Mapping, Mesh, Wall};
     use std::f64::consts::TAU;
 
     #[test]

@@ -1,12 +1,11 @@
 //! The analytic vortex pair against closed forms, conservation and an independent integration of its path.
-#![allow(clippy::unwrap_used)] // a helper of a test may panic as the test may
 
 use std::f64::consts::PI;
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
-use wakescope_les::{
-    Aircraft, CirculationProfile, Error, Ground, Motion, VortexPair, Wind, circulation_m2_s, mean_circulation_5_15_m2_s,
-};
+use wakescope_les::analysis::{circulation_m2_s, mean_circulation_5_15_m2_s};
+use wakescope_les::winds::Aircraft;
+use wakescope_les::{CirculationProfile, Error, Ground, Motion, VortexPair, Wind};
 
 fn heavy() -> VortexPair {
     VortexPair {
@@ -204,6 +203,7 @@ fn values_that_make_no_vortex_are_refused_by_name() {
     let wind = heavy().wind().unwrap();
     let wrong = wind.velocity_into(&[[0.0; 3]; 2], 0.0, &mut [[0.0; 3]; 1]);
     assert_eq!(wrong, Err(Error::LengthMismatch { points: 2, out: 1 }));
-    assert!(circulation_m2_s(&wind, [0.0, 0.0], -1.0, 0.0, 64).is_err());
-    assert!(circulation_m2_s(&wind, [0.0, 0.0], 1.0, 0.0, 2).is_err());
+    let circulation = |radius_m, samples| circulation_m2_s(&wind, [0.0, 0.0], radius_m, 0.0, samples);
+    assert!(matches!(circulation(-1.0, 64), Err(Error::OutOfRange { field: "radius_m", .. })));
+    assert!(matches!(circulation(1.0, 2), Err(Error::OutOfRange { field: "samples", .. })));
 }

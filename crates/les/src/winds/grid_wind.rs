@@ -7,9 +7,10 @@
 //! Check: linear functions are exact, the error of a sampled vortex falls with the third power of the cell, no air
 //! crosses a wall.
 
-use crate::axis::{Axis, Edges, GHOSTS, Ghost, Side};
+use super::axis::{Axis, Edges, GHOSTS, Ghost, Side};
+use super::wind::Wind;
+use crate::Error;
 use crate::error::{check, check_lengths};
-use crate::{Error, Wind};
 
 /// What a point outside the mesh gets. A periodic direction has no outside.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -1,0 +1,105 @@
+//! Convection as it is written, point by point from the tables of `transport`: to be read first, and the oracle of the fast form.
+//!
+//! Check: `convection` gives the same on every kind of mesh; what the tables meet is checked in `transport`.
+
+use super::layout::Layout;
+use super::transport::Stencil;
+
+/// `(u . grad) u_a` \[m/s^2\] at the faces of memory axis `a`, as on the left of the momentum equation: the sum over the directions
+/// `b` of `(f_a m_b)^-1 sum_n G_n S^n u_a`, where `m` are the masses of the cells and `f` those of the faces.
+///
+/// `G_n` is the flux `u_b` through face `n` of direction `b`, weighted with the cells along `a` and brought to the faces of `a`.
+/// For `b = a` the flux is `u_a` itself, whose mean the tables hold, and `m_b` is not there. Walls have no row: zero.
+pub(crate) fn literal_convection(layout: &Layout, velocity: [&[f64]; 3], a: usize) -> Vec<f64> {
+    let n = layout.shape.n;
+    let place = |at: [usize; 3]| (at[2] * n[1] + at[1]) * n[0] + at[0];
+    let moved = |at: [usize; 3], axis: usize, index: usize| -> [usize; 3] {
+        std::array::from_fn(|d| if d == axis { index } else { at[d] })
+    };
+    let stencil = Stencil::of(&layout.line);
+    let mean = layout.line[a].flux_mean();
+    let tables: [_; 3] = std::array::from_fn(|b| {
+        let line = &layout.line[b];
+        if b == a { line.transport_of_faces(stencil).rows } else { line.transport_of_cells(stencil).rows }
+    });
+    let convection = |at: [usize; 3]| -> f64 {
+        let mut sum = 0.0;
+        for b in 0..3 {
+            for &(face, value, coefficient) in &tables[b][at[b]] {
+                let through = moved(at, b, face);
+                let flux: f64 = if b == a {
+                    velocity[a][place(through)]
+                } else {
+                    let weighted =
+                        |&(cell, weight): &(usize, f64)| weight * velocity[b][place(moved(through, a, cell))];
+                    mean[at[a]].iter().map(weighted).sum()
+                };
+                let mass_m = if b == a { 1.0 } else { layout.line[b].cell_mass_m[at[b]] };
+                sum += coefficient * flux * velocity[a][place(moved(at, b, value))] / mass_m;
+            }
+        }
+        if at[a] < layout.line[a].first_face() { 0.0 } else { sum / layout.line[a].face_mass_m[at[a]] }
+    };
+    (0..layout.shape.len()).map(|p| convection([p % n[0], p / n[0] % n[1], p / (n[0] * n[1])])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+    use super::super::momentum::{Momentum, Scratch};
+    use super::*;
+
+    /// Meshes of all kinds: periodic and bounded, equal and stretched, thin, in both orders of memory.
+    fn layouts() -> Vec<Layout> {
+        let waves = |n| Direction::periodic(n, 0.0, 1.3);
+        let sine = |n| waves(n).stretched(Mapping::Sine { amplitude: 0.4 });
+        let slip = |n| Direction::between(n, 0.0, 0.9, Wall::Slip, Wall::Slip);
+        let tanh = |strength| Mapping::TanhLow { strength };
+        let ground = |n| Direction::between(n, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(tanh(1.5));
+        let closed = |n| Direction::between(n, 0.0, 2.0, Wall::AT_REST, Wall::AT_REST);
+        let meshes = [
+            [waves(8), waves(7), waves(9)],
+            [sine(8), waves(4), slip(9)],
+            [waves(6), slip(8), ground(18)],
+            [ground(17), sine(6), closed(16)],
+            [slip(5), closed(18), waves(5)],
+            [Direction::thin(1.0), sine(12), ground(18)],
+        ];
+        let orders = [None, Some([2, 1, 0])];
+        let both = |[x, y, z]: [Direction; 3]| {
+            let mesh = Mesh::new(x, y, z).unwrap();
+            orders.map(|order| Layout::new(&mesh, order))
+        };
+        meshes.into_iter().flat_map(both).collect()
+    }
+
+    #[test]
+    fn the_fast_convection_is_the_literal_one_on_every_kind_of_mesh() {
+        for layout in layouts() {
+            let [n0, n1, n2] = layout.shape.n;
+            let velocity: [Vec<f64>; 3] = std::array::from_fn(|a| {
+                let first = layout.line[a].first_face();
+                let index = |p: usize| [p % n0, p / n0 % n1, p / (n0 * n1)][a];
+                let rough = |p: usize| ((p * p + 17 * a) as f64 * 0.37).sin() + 0.3;
+                (0..layout.shape.len()).map(|p| if index(p) < first { 0.0 } else { rough(p) }).collect()
+            });
+            let velocity = velocity.each_ref().map(Vec::as_slice);
+            for a in 0..3 {
+                let literal = literal_convection(&layout, velocity, a);
+                let largest = literal.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+                let (ops, mut scratch) = (Momentum::new(&layout, a), Scratch::new(n0));
+                for (j, k) in (0..n2).flat_map(|k| (0..n1).map(move |j| (j, k))) {
+                    scratch.convection(&ops, velocity, j, k);
+                    for (found, expected) in scratch.convection.iter().zip(&literal[layout.shape.row(j, k)]) {
+                        let apart = (found - expected).abs();
+                        assert!(
+                            apart <= 1e-14 * largest,
+                            "{:?}, axis {a}, row {j} {k}: {found} {expected}",
+                            layout.shape.n
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

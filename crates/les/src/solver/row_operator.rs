@@ -1,0 +1,53 @@
+//! A linear operator along one memory axis, applied to one row at a time.
+
+use super::layout::{Layout, Shape};
+use super::operators_1d::Taps;
+use super::rows::{Columns, add_across, pad};
+
+/// A linear operator along one axis.
+#[derive(Debug, Clone)]
+pub(crate) struct RowOperator {
+    axis: usize,
+    shape: Shape,
+    periodic: bool,
+    rows: Vec<Taps>,
+    columns: Columns,
+}
+
+impl RowOperator {
+    /// The operator with the rows `rows` along memory axis `axis`.
+    pub(crate) fn new(layout: &Layout, axis: usize, rows: Vec<Taps>) -> Self {
+        let periodic = layout.line[axis].is_periodic();
+        let columns = if axis == 0 { Columns::new(&rows, periodic) } else { Columns::default() };
+        Self { axis, shape: layout.shape, periodic, rows, columns }
+    }
+
+    /// Its rows: for each target the places and their coefficients.
+    pub(crate) fn rows(&self) -> &[Taps] {
+        &self.rows
+    }
+
+    /// `out +=` the operator on `field` at the targets of the row `at` (its indices along the axes 1 and 2).
+    #[inline(always)]
+    pub(crate) fn add(&self, out: &mut [f64], field: &[f64], at: [usize; 2], padded: &mut [f64]) {
+        if self.axis == 0 {
+            self.add_along(out, &field[self.shape.row(at[0], at[1])], padded);
+        } else {
+            self.add_across(out, field, at);
+        }
+    }
+
+    /// `out +=` an operator of axis 1 or 2 on `field` at the targets of the row `at`.
+    #[inline(always)]
+    pub(crate) fn add_across(&self, out: &mut [f64], field: &[f64], at: [usize; 2]) {
+        let row = |i: usize| if self.axis == 1 { self.shape.row(i, at[1]) } else { self.shape.row(at[0], i) };
+        add_across(out, field, 1.0, &self.rows[at[self.axis - 1]], |i| row(i).start);
+    }
+
+    /// `out +=` an operator of axis 0 on one row.
+    #[inline(always)]
+    pub(crate) fn add_along(&self, out: &mut [f64], row: &[f64], padded: &mut [f64]) {
+        pad(padded, row, self.periodic);
+        self.columns.add(out, padded);
+    }
+}
