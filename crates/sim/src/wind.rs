@@ -84,7 +84,9 @@ impl SceneWind {
 fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
     Ok(match &scene.flow {
         Flow::Calm {} | Flow::Simulated(_) => Box::new(les::winds::Calm),
-        Flow::Uniform { lateral_m_s, vertical_m_s } => Box::new(les::winds::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?),
+        Flow::Uniform { lateral_m_s, vertical_m_s } => {
+            Box::new(les::winds::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?)
+        }
         Flow::VortexPair(pair) => {
             let vortices = Box::new(vortex_pair(pair).wind()?);
             if pair.cross_wind_m_s == 0.0 {

@@ -54,7 +54,9 @@ fn vortices(n: usize) -> Result<f64, Failure> {
 fn layer(n: usize) -> Result<f64, Failure> {
     let (nu, end_s) = (0.1, 1.0);
     let steps = 20 * n;
-    let (mut flow, _) = cases::Plates { cells: n, strength: 1.5, viscosity_m2_s: nu, step_s: end_s / steps as f64 }.decaying_layer()?.start()?;
+    let (mut flow, _) = cases::Plates { cells: n, strength: 1.5, viscosity_m2_s: nu, step_s: end_s / steps as f64 }
+        .decaying_layer()?
+        .start()?;
     for _ in 0..steps {
         flow.step()?;
     }

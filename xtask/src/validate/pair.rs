@@ -7,9 +7,9 @@ use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::references::numbers;
 use std::f64::consts::TAU;
-use wakescope_les::cases::VortexPairCase;
-use wakescope_les::analysis::WakeScales;
 use wakescope_les::CirculationProfile;
+use wakescope_les::analysis::WakeScales;
+use wakescope_les::cases::VortexPairCase;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

@@ -7,8 +7,8 @@ use crate::profile::Profile;
 use crate::references::numbers;
 use std::f64::consts::TAU;
 use wakescope_les::Flow;
-use wakescope_les::cases::TollmienSchlichting;
 use wakescope_les::analysis::decay::value_at;
+use wakescope_les::cases::TollmienSchlichting;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use wakescope_les::solver::{PressureMethod, ViscousTreatment};
-use wakescope_les::{Direction, Error, Flow, FlowSettings, Mapping, Mesh, SubgridModel, TimeScheme, TimeStep, Wall, cases};
+use wakescope_les::{
+    Direction, Error, Flow, FlowSettings, Mapping, Mesh, SubgridModel, TimeScheme, TimeStep, Wall, cases,
+};
 
 /// A flow without symmetries between a no-slip wall and a slip wall, all lengths in `length` and velocities in `speed`.
 fn layered(length: f64, speed: f64, change: impl Fn(&mut FlowSettings)) -> Flow {

@@ -7,7 +7,9 @@ use crate::scene::{VortexProfile, section};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use wakescope_les::solver::Ends;
-use wakescope_les::{Direction, FlowSettings, Ground, Mapping, Mesh, Motion, TimeScheme, TimeStep, VortexPair, Wall, Wind};
+use wakescope_les::{
+    Direction, FlowSettings, Ground, Mapping, Mesh, Motion, TimeScheme, TimeStep, VortexPair, Wall, Wind,
+};
 
 /// How the cells of a direction are spread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use super::case::{AxisName, FlowCase, Pressure, Scheme, Subgrid};
 use super::setup::Setup;
 use crate::Error;
 use std::path::Path;
-use wakescope_les::{solver::PressureMethod, SubgridModel, TimeScheme, TimeStep, solver::ViscousTreatment};
+use wakescope_les::{SubgridModel, TimeScheme, TimeStep, solver::PressureMethod, solver::ViscousTreatment};
 
 impl Setup {
     /// The setup of a case whose file lies in `folder`.

@@ -142,8 +142,12 @@ impl CaseKind {
             case.settings.time_step = TimeStep::Courant { courant, longest_s: case.end_s / LEAST_STEPS };
             Ok(case)
         };
-        let plates =
-            |c: &PlateDriven| cases::Plates { cells: c.cells, strength: c.stretch, viscosity_m2_s: c.viscosity_m2_s, step_s: ANY_STEP_S };
+        let plates = |c: &PlateDriven| cases::Plates {
+            cells: c.cells,
+            strength: c.stretch,
+            viscosity_m2_s: c.viscosity_m2_s,
+            step_s: ANY_STEP_S,
+        };
         let case = match *self {
             Self::TaylorGreenPlane(ref c) => {
                 steady(cases::taylor_green_plane(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S))

@@ -2,7 +2,9 @@
 
 use crate::Error;
 pub(super) use wakescope_les::cases::Initial;
-use wakescope_les::{Flow, FlowSettings, Mesh, solver::StartReport, solver::UndampedGrowth, analysis::WakeMeter, analysis::WakeScales};
+use wakescope_les::{
+    Flow, FlowSettings, Mesh, analysis::WakeMeter, analysis::WakeScales, solver::StartReport, solver::UndampedGrowth,
+};
 
 /// All that a simulation is made of.
 pub(super) struct Setup {

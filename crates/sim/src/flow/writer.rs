@@ -8,8 +8,8 @@ use super::steps::StepTable;
 use super::wake::{Schedule, WakeRun};
 use crate::Error;
 use std::path::PathBuf;
-use wakescope_les::solver::{RunObserver, RunWarning, StepRecord};
 use wakescope_les::Flow;
+use wakescope_les::solver::{RunObserver, RunWarning, StepRecord};
 
 /// What a checkpoint keeps for the files.
 #[derive(Debug, Default)]

@@ -8,8 +8,8 @@ use crate::validate::shown::Shown;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use wakescope_les::analysis::WakeRecord;
-use wakescope_les::cases::VortexPairCase;
 use wakescope_les::analysis::decay::value_at;
+use wakescope_les::cases::VortexPairCase;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

@@ -6,8 +6,8 @@ use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::validate::shown::Shown;
 use rayon::prelude::*;
-use wakescope_les::cases::VortexPairCase;
 use wakescope_les::analysis::decay::onset;
+use wakescope_les::cases::VortexPairCase;
 use wakescope_sim::export::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

@@ -6,7 +6,7 @@ use crate::keys::Checker;
 use crate::scene::section;
 use serde::{Deserialize, Serialize};
 use wakescope_les::cases::{Case, VortexPairCase};
-use wakescope_les::{winds::Aircraft, CirculationProfile, analysis::WakeScales};
+use wakescope_les::{CirculationProfile, analysis::WakeScales, winds::Aircraft};
 
 /// Longest step, in `tau`.
 const LONGEST_STEP: f64 = 0.01;

@@ -7,8 +7,8 @@
 use crate::Error;
 use crate::export::{Provenance, Table, write_atomic};
 use std::path::PathBuf;
-use wakescope_les::analysis::{VortexRecord, WakeMeter, WakeRecord, WakeScales};
 use wakescope_les::Flow;
+use wakescope_les::analysis::{VortexRecord, WakeMeter, WakeRecord, WakeScales};
 
 /// What a number is, for its unit and its scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
