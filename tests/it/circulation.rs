@@ -14,10 +14,10 @@ use wakescope_estimate::{
     estimators::{LagWindowPeak, likelihood_tapers},
     polar_points,
 };
-use wakescope_sim::estimators;
+use wakescope_sim::measure::estimators;
+use wakescope_sim::measure::progress::Silent;
+use wakescope_sim::measure::run;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::progress::Silent;
-use wakescope_sim::run;
 use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 
 /// Radius of the regions \[m\].

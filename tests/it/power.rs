@@ -1,9 +1,9 @@
 //! The power of the simulated signal against (14), through all crates that have a part in it.
 
 use wakescope_optics::theory::free_space_efficiency;
+use wakescope_sim::measure::progress::Silent;
+use wakescope_sim::measure::run;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::progress::Silent;
-use wakescope_sim::run;
 use wakescope_sim::scene::{Flow, NoiseKind, Scene, SceneFile};
 
 fn plan(change: impl Fn(&mut Scene)) -> Plan {

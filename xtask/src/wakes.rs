@@ -13,7 +13,7 @@ use wakescope_sim::flow::{self, Begin, CaseFile, FinishedWake, Unwatched, WakePr
 /// Ages of the cross-planes that are kept, for pictures that move.
 const SERIES_EVERY: f64 = 0.1;
 /// What computes and writes a wake.
-const COMPUTED_BY: [&str; 3] = ["crates/les", "crates/sim/src/flow", "crates/sim/src/export"];
+const COMPUTED_BY: [&str; 3] = ["crates/les", "crates/sim/src/flow", "crates/sim/src/io"];
 /// Folders of the wakes that this process has made: two figures must not run the same one at the same time, nor twice.
 static MADE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 

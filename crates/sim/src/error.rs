@@ -67,7 +67,7 @@ pub enum Error {
     Estimate(#[from] wakescope_estimate::Error),
     /// A file could not be written.
     #[error(transparent)]
-    Export(#[from] crate::export::OutputError),
+    Export(#[from] crate::io::OutputError),
     /// A file or folder could not be used.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {

@@ -5,7 +5,7 @@ use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::workspace::provenance;
 use std::path::PathBuf;
-use wakescope_sim::export::Provenance;
+use wakescope_sim::io::Provenance;
 use wakescope_sim::scene::Scene;
 
 /// What a figure may depend on.

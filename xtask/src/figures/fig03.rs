@@ -2,11 +2,11 @@
 
 use super::context::{Context, Rendered};
 use crate::Failure;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
+use wakescope_sim::measure::wind;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::{Flow, Scene};
-use wakescope_sim::wind;
 
 /// Every so many lines are drawn; the table has all.
 const DRAWN: usize = 8;
@@ -28,7 +28,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("y_last_sample_m", column(|p| p.0, far_m))
         .float("z_last_sample_m", column(|p| p.1, far_m));
     let mut out = Rendered::default();
-    let origin = wakescope_sim::write::provenance(&plan);
+    let origin = wakescope_sim::measure::write::provenance(&plan);
     out.csv(table.to_csv(&origin)?);
 
     let mut fan = Vec::new();

@@ -5,8 +5,8 @@ use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use crate::wakes;
 use wakescope_les::analysis::decay::{amplitude_growth, value_at};
-use wakescope_sim::export::Table;
 use wakescope_sim::flow::{FinishedWake, REPEATS};
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::animation;
 
 const FRAME_S: f64 = 0.15;

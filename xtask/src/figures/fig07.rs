@@ -6,8 +6,8 @@ use crate::claim::{Claim, Verdict};
 use crate::references::numbers;
 use crate::wakes;
 use wakescope_les::analysis::decay::{knee, onset, value_at};
-use wakescope_sim::export::Table;
 use wakescope_sim::flow::FinishedWake;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{CurvePlot, Figure, Series, Style};
 
 /// The Reynolds number and core of the chapter.

@@ -4,13 +4,13 @@ use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
-use wakescope_sim::estimators;
-use wakescope_sim::export::Table;
-use wakescope_sim::geometry::Geometry;
-use wakescope_sim::instrument::Instrument;
+use wakescope_sim::io::Table;
+use wakescope_sim::measure::estimators;
+use wakescope_sim::measure::geometry::Geometry;
+use wakescope_sim::measure::instrument::Instrument;
+use wakescope_sim::measure::wind::SceneWind;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::Scene;
-use wakescope_sim::wind::SceneWind;
 
 const RADII_M: [f64; 3] = [1.0, 2.0, 4.0];
 /// Where the chapter gives the levels.
@@ -60,7 +60,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .int("level", rows.iter().map(|r| r.2 as i64))
         .float("n_eff", rows.iter().map(|r| r.3));
     let mut out = Rendered::default();
-    let origin = wakescope_sim::export::Provenance {
+    let origin = wakescope_sim::io::Provenance {
         program: wakescope_sim::PROGRAM.into(),
         scene_toml: file.toml.clone(),
         scene_hash: file.hash.clone(),

@@ -5,10 +5,10 @@ use super::study::{Age, REFERENCES, Sight, Study, early_scene, stacked, with_met
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
-use wakescope_sim::export::tables::map_table;
+use wakescope_sim::io::tables::map_table;
+use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
 use wakescope_sim::scene::{PulseShape, Scene};
-use wakescope_sim::write;
 
 /// Cells that count as those of a vortex, m from its centre.
 const NEAR_M: f64 = 15.0;

@@ -4,9 +4,9 @@ use super::context::{Context, Rendered};
 use super::study::{Age, INSIDE_M, OUTSIDE_M, REFERENCES, Sight, Study, early_scene, with_method, with_turbulence};
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
-use wakescope_sim::cell_average::CellAverage;
-use wakescope_sim::export::Table;
-use wakescope_sim::instrument::Instrument;
+use wakescope_sim::io::Table;
+use wakescope_sim::measure::cell_average::CellAverage;
+use wakescope_sim::measure::instrument::Instrument;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::{Scene, SnrReference};
 

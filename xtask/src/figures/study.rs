@@ -8,17 +8,17 @@ use crate::Failure;
 use crate::wakes;
 use std::path::PathBuf;
 use wakescope_les::analysis::decay::value_at;
-use wakescope_sim::cell_average::CellAverage;
-use wakescope_sim::export::csv::Column;
-use wakescope_sim::export::{Provenance, Table};
-use wakescope_sim::map::VelocityEstimates;
+use wakescope_sim::io::csv::Column;
+use wakescope_sim::io::{Provenance, Table};
+use wakescope_sim::measure::cell_average::CellAverage;
+use wakescope_sim::measure::map::VelocityEstimates;
+use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::{
     Flow, Method, ModelOrder, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
     SnrReference, Turbulence, VortexPair, Weighting,
 };
-use wakescope_sim::{run, wind, write};
+use wakescope_sim::{measure::run, measure::wind, measure::write};
 
 /// Lines of sight 0.5 m apart that a region of 2 m shares.
 const SHARED_LINES: f64 = 9.0;

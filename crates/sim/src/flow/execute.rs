@@ -9,8 +9,8 @@ use super::steps::StepTable;
 use super::wake::{Schedule, WakeRun};
 use super::writer::{Kept, Writer};
 use super::{Begin, CaseFile, FlowCase, FlowOutcome, Watch};
-use crate::export::lock::FolderLock;
-use crate::export::{Existing, write_atomic};
+use crate::io::lock::FolderLock;
+use crate::io::{Existing, write_atomic};
 use crate::keys::Problem;
 use crate::{Error, machine};
 use std::path::Path;
@@ -149,7 +149,7 @@ fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
     {
         return Err(Error::CheckpointInTheWay { path });
     }
-    crate::write::prepare(folder, [], Existing::Own)
+    crate::measure::write::prepare(folder, [], Existing::Own)
 }
 
 /// The setup and the plan of a case, with all that can be refused before the computing.

@@ -43,10 +43,10 @@ pub use wake::REPEATS;
 pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};
 
 use crate::Error;
-use crate::export::Provenance;
+use crate::io::Provenance;
+use crate::io::text_file;
 use crate::keys::{Located, Problem, SceneError, Source};
 use crate::scene::hash_of;
-use crate::text_file;
 use std::path::{Path, PathBuf};
 use wakescope_les::solver::StepRecord;
 

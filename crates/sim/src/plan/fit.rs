@@ -5,7 +5,7 @@
 use super::stages::stages;
 use super::units::bytes;
 use super::{Cost, Plan, Stage};
-use crate::geometry::Geometry;
+use crate::measure::geometry::Geometry;
 use crate::scene::{Scene, ScreenSampling, Turbulence};
 use crate::{Error, machine};
 

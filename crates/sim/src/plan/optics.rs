@@ -2,10 +2,10 @@
 
 use super::{Cost, PlannedStage, Stage, Target};
 use crate::Error;
-use crate::geometry::Geometry;
-use crate::instrument::Instrument;
-use crate::profile::{drawn_turbulence, model, spaced, turbulence};
-use crate::scan::profile_ranges_m;
+use crate::measure::geometry::Geometry;
+use crate::measure::instrument::Instrument;
+use crate::measure::profile::{drawn_turbulence, model, spaced, turbulence};
+use crate::measure::scan::profile_ranges_m;
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
 use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
 use wakescope_optics::{Focus, Telescope, theory};

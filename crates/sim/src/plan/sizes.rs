@@ -4,7 +4,7 @@
 
 use super::Target;
 use super::stages::kept_realisations;
-use crate::geometry::Geometry;
+use crate::measure::geometry::Geometry;
 use crate::scene::{DetectorSignal, Flow, Method, Scene, Weighting};
 
 /// Numbers of things in one run.

@@ -4,10 +4,10 @@
 
 use super::sizes::{Sizes, is_calm, keeps_few_lags};
 use super::{Cost, PlannedStage, Stage, Target};
-use crate::geometry::Geometry;
-use crate::scan::records_at_once;
+use crate::measure::geometry::Geometry;
+use crate::measure::scan::records_at_once;
+use crate::measure::wind::SceneWind;
 use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, SignalsOf};
-use crate::wind::SceneWind;
 
 // Unit costs on one core, s.
 const ANALYTIC_WIND_S: f64 = 7e-8;
@@ -79,7 +79,7 @@ fn cross_plane(scene: &Scene, target: Target) -> PlannedStage {
     if is_calm(scene) {
         return skip(Stage::CrossPlane, "flow.kind is \"calm\"");
     }
-    let (ny, nz) = crate::plane::POINTS;
+    let (ny, nz) = crate::measure::plane::POINTS;
     let points = (ny * nz) as f64;
     run(Stage::CrossPlane, format!("{ny} x {nz} points"), points * wind_point_s(scene), points * 64.0)
 }

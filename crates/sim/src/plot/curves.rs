@@ -8,7 +8,7 @@ use super::font::Font;
 use super::frame::{BOTTOM, Decor, LEFT, top_room};
 use super::legend::{self, Entry};
 use super::marker::marker;
-use crate::export::{OutputResult, same_length};
+use crate::io::{OutputResult, same_length};
 
 const RIGHT: f64 = 24.0;
 const LINE_WIDTH: f64 = 2.2;

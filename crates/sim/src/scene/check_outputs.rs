@@ -2,7 +2,7 @@
 //! Check: impossible values are named with what is allowed.
 
 use super::Scene;
-use crate::export::UtcTime;
+use crate::io::UtcTime;
 use crate::keys::Checker;
 
 impl Scene {

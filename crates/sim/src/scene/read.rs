@@ -1,8 +1,8 @@
 //! Reading a scene file, with errors that name the key, the value, what is allowed and the line.
 
 use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, format1, idle};
+use crate::io::text_file;
 use crate::keys::{Document, Format, Key, Source, keys_of};
-use crate::text_file;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 

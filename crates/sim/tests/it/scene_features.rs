@@ -2,10 +2,10 @@
 
 use ndarray::Array2;
 use std::path::Path;
-use wakescope_sim::map::VelocityEstimates;
+use wakescope_sim::measure::map::VelocityEstimates;
+use wakescope_sim::measure::progress::Silent;
+use wakescope_sim::measure::run::{RunResult, run};
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::progress::Silent;
-use wakescope_sim::run::{RunResult, run};
 use wakescope_sim::scene::SceneFile;
 
 /// A scene with a few lines; the pieces replace the words in capitals.

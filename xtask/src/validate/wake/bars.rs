@@ -9,8 +9,8 @@ use std::path::Path;
 use wakescope_les::SubgridModel;
 use wakescope_les::analysis::decay::{amplitude_growth, onset, value_at};
 use wakescope_les::cases::VortexPairCase;
-use wakescope_sim::export::Table;
 use wakescope_sim::flow::FinishedWake;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const END: f64 = 5.0;

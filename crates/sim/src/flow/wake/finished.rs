@@ -6,7 +6,7 @@ use super::super::CaseFile;
 use super::super::kind::CaseKind;
 use super::case::WakeFlow;
 use crate::Error;
-use crate::export::Provenance;
+use crate::io::Provenance;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,7 @@
 
 use super::finished::FinishedWake;
 use crate::Error;
-use crate::export::FileGroup;
+use crate::io::FileGroup;
 #[cfg(feature = "netcdf")]
 use crate::plot::animation::apng;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};

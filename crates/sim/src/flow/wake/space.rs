@@ -2,8 +2,8 @@
 
 use super::finished::FinishedWake;
 use crate::Error;
-use crate::export::CrossPlanes;
 use crate::flow::read::{read_field, read_planes};
+use crate::io::CrossPlanes;
 use crate::plot::polar::PlaneCells;
 use crate::plot::{ColourMap, Figure, IsosurfacePlot, MapPlot, Surface, Volume};
 use std::sync::Arc;

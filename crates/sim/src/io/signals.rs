@@ -139,7 +139,7 @@ mod tests {
         let signals = example();
         let table = signals.table().unwrap();
         let current = &table.columns()[2].1;
-        assert_eq!(*current, crate::export::csv::Column::Float(vec![0.0, 1.0, 2.0, 20.0, 21.0, 22.0]));
+        assert_eq!(*current, crate::io::csv::Column::Float(vec![0.0, 1.0, 2.0, 20.0, 21.0, 22.0]));
         assert_eq!(signals.realisations(), 2);
         assert!(RawSignals { time_s: vec![1.0], ..signals.clone() }.check().is_err());
         assert!(RawSignals { pulse_time_s: vec![1.0], ..signals.clone() }.check().is_err());

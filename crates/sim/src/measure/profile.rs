@@ -4,9 +4,9 @@
 //! Only turbulence that both beams share (monostatic) needs phase screens.
 
 use crate::Error;
-use crate::instrument::{Instrument, receiver_path};
+use crate::measure::instrument::{Instrument, receiver_path};
+use crate::measure::progress::Observer;
 use crate::plan::Stage;
-use crate::progress::Observer;
 use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence};
 use std::ops::ControlFlow;
 use wakescope_optics::air::StructureTable;

@@ -2,7 +2,7 @@
 //!
 //! Estimates of neighbouring cells share their windows: so many cells count as one where a standard error is made.
 
-use crate::map::VelocityEstimates;
+use crate::measure::map::VelocityEstimates;
 use ndarray::Array2;
 
 /// Errors over a set of cells: the mean bias, and root means of squares; NaN for no cells.

@@ -2,9 +2,9 @@
 //!
 //! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
 
-use crate::scan::Scanner;
+use crate::measure::scan::Scanner;
 use crate::scene::{Method, NoiseKind, RegionRadius, Scene};
-use crate::{Error, estimators};
+use crate::{Error, measure::estimators};
 use ndarray::Array2;
 use wakescope_estimate::{
     Radius,

@@ -9,11 +9,11 @@ mod output;
 mod progress;
 mod wake;
 
-use crate::export::Existing;
+use crate::io::Existing;
+use crate::measure::progress::Observer;
 use crate::plan::{Plan, Target};
-use crate::progress::Observer;
 use crate::scene::{SceneFile, TABLE2_TOML};
-use crate::{Error, run, write};
+use crate::{Error, measure::run, measure::write};
 use clap::{Args, Parser, Subcommand};
 use output::say;
 use serde_json::{Value, json};
@@ -136,7 +136,7 @@ fn init(path: &Path, force: bool, cli: &Cli) -> Result<(), Error> {
         let source = std::io::Error::new(std::io::ErrorKind::AlreadyExists, "it exists; --force replaces it");
         return Err(Error::Io { action: "write", path: path.to_owned(), source });
     }
-    crate::export::write_atomic(path, text.as_bytes())?;
+    crate::io::write_atomic(path, text.as_bytes())?;
     say(cli, &json!({ "scene": path }), &format!("wrote {}\nnext: wakescope check {0}", path.display()))
 }
 

@@ -48,7 +48,7 @@ impl UtcTime {
     /// Reads a date of the form [`Self::FORM`], from 1900 to 2199; `None` for any other text.
     ///
     /// ```
-    /// use wakescope_sim::export::UtcTime;
+    /// use wakescope_sim::io::UtcTime;
     /// let noon = UtcTime::parse("2024-02-29T12:00:00Z").expect("a leap year");
     /// assert_eq!(noon.after_s(86_400.9).to_string(), "2024-03-01T12:00:00Z");
     /// assert_eq!(UtcTime::parse("2023-02-29T12:00:00Z"), None);

@@ -144,8 +144,8 @@ use planes::simulated;
 #[cfg(feature = "netcdf")]
 mod planes {
     use super::{Error, SceneFile, SceneWind, Wind};
-    use crate::export::CrossPlanes;
-    use crate::planes_input::{files, read};
+    use crate::io::CrossPlanes;
+    use crate::io::planes_input::{files, read};
     use crate::scene::{SimulatedFlow, SimulatedMotion};
     use wakescope_les::winds::{Edges, GridSeries, OutsidePolicy, PlaneMesh, Side};
     use wakescope_les::{Error as LesError, GridSnapshot};

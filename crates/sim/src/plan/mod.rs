@@ -4,10 +4,10 @@
 //! forecasts are products of counts with unit costs; `cargo xtask forecast` holds them against what runs take.
 
 use crate::Error;
-use crate::geometry::Geometry;
-use crate::instrument::Instrument;
+use crate::measure::geometry::Geometry;
+use crate::measure::instrument::Instrument;
+use crate::measure::wind::SceneWind;
 use crate::scene::{Method, Scene, SceneFile, Weighting};
-use crate::wind::SceneWind;
 use std::fmt;
 
 mod ambiguity;
@@ -139,7 +139,7 @@ impl Plan {
         let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
         let plan = Self { scene, target, stages, instrument, geometry, wind, warnings };
         possible::check(&plan)?;
-        crate::write::check(&plan)?;
+        crate::measure::write::check(&plan)?;
         Ok(plan)
     }
 

@@ -1,14 +1,14 @@
 //! Runs a plan: each stage once, nothing that the plan leaves out.
 
 use crate::Error;
-use crate::export::CrossPlanes;
-use crate::map::{self, VelocityEstimates};
+use crate::io::CrossPlanes;
+use crate::measure::map::{self, VelocityEstimates};
+use crate::measure::plane;
+use crate::measure::profile::{RangeProfile, range_profile};
+use crate::measure::progress::Observer;
+use crate::measure::region::of_table;
+use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage, Target};
-use crate::plane;
-use crate::profile::{RangeProfile, range_profile};
-use crate::progress::Observer;
-use crate::region::of_table;
-use crate::scan::Scanner;
 use crate::scene::DetectorSignal;
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex;

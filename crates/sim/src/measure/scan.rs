@@ -1,13 +1,13 @@
 //! One scan: the air along each line of sight, and the signals that it returns.
 
 use crate::Error;
-use crate::geometry::Geometry;
-use crate::instrument::Instrument;
+use crate::measure::geometry::Geometry;
+use crate::measure::instrument::Instrument;
+use crate::measure::profile::{drawn_turbulence, efficiency_at, efficiency_realisations, model, spaced};
+use crate::measure::progress::Observer;
+use crate::measure::streams::stream;
 use crate::plan::{Plan, Stage};
-use crate::profile::{drawn_turbulence, efficiency_at, efficiency_realisations, model, spaced};
-use crate::progress::Observer;
 use crate::scene::{Outside, Scene, SnrReference};
-use crate::streams::stream;
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 use std::ops::Range;

@@ -37,14 +37,14 @@ impl Column {
 /// A table under construction: columns of one length, written in the order in which they were added.
 ///
 /// ```
-/// use wakescope_sim::export::{Provenance, Table};
+/// use wakescope_sim::io::{Provenance, Table};
 /// let origin = Provenance { program: "wakescope".into(), scene_toml: String::new(), scene_hash: "0".into(), seed: 1 };
 /// let text = Table::new()
 ///     .float("range_m", [100.0, 200.0])
 ///     .float("snr_db", [12.5, f64::NAN])
 ///     .to_csv(&origin)?;
 /// assert!(text.ends_with("range_m,snr_db\n100.0,12.5\n200.0,\n"));
-/// # Ok::<(), wakescope_sim::export::OutputError>(())
+/// # Ok::<(), wakescope_sim::io::OutputError>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {

@@ -89,7 +89,7 @@ pub(crate) fn example() -> VelocityField {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::csv::Column;
+    use crate::io::csv::Column;
 
     #[test]
     fn a_row_of_the_table_holds_the_values_of_its_place() {

@@ -1,4 +1,4 @@
-//! Output writers: tables as CSV, maps as CfRadial 1.4 and HALO `.hpl`, cross-planes as CF NetCDF and VTR.
+//! Files in and out: readers of NetCDF and text; tables as CSV, maps as CfRadial 1.4 and HALO `.hpl`, cross-planes as CF NetCDF and VTR.
 //! Every writer turns plain data and a [`Provenance`] into bytes (no clock, so the same run gives the same bytes);
 //! [`FileGroup`] puts a run's files on disk, all or none.
 //! Check: each format is read back by an independent reader in the tests.
@@ -13,12 +13,21 @@
 //! | [`csv`] | any table | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
+//! | `text_file`, `netcdf_header`, `netcdf_input`, `planes_input` | (readers) texts, classic NetCDF, cross-planes in it | `netcdf` but for texts |
 //! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
 //! | `cfradial`, `cf_planes`, `cf_fields` (through `netcdf`) | classic NetCDF | `netcdf` |
 //! | `vtr` | VTK rectilinear grids and their collection | `vtk` |
 
 pub mod atomic;
+#[cfg(feature = "netcdf")]
+pub(crate) mod netcdf_header;
+#[cfg(feature = "netcdf")]
+pub(crate) mod netcdf_input;
+#[cfg(feature = "netcdf")]
+pub(crate) mod planes_input;
+pub(crate) mod text_file;
+
 #[cfg(feature = "netcdf")]
 pub mod cf_fields;
 #[cfg(feature = "netcdf")]

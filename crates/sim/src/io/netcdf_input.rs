@@ -4,8 +4,8 @@
 //! unpacked (`scale_factor`, `add_offset`), missing ones are NaN. Check: the readers of initial fields and of cross-planes read
 //! back what the writers wrote; files of another hand and damaged ones in the tests below.
 
-use crate::netcdf_header::{self as header, Attribute, Header, NumberType, Variable};
-use crate::{Error, text_file};
+use crate::io::netcdf_header::{self as header, Attribute, Header, NumberType, Variable};
+use crate::{Error, io::text_file};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};

@@ -3,12 +3,12 @@
 //! For the scene's pulse, window, sampling and noise in a uniform wind; a region is worth n_eff independent windows, which
 //! divides the bound by their root. Check: the stored curve of independent origin for one window of Table 2.
 
-use crate::export::Table;
+use crate::io::Table;
+use crate::measure::progress::Observer;
+use crate::measure::region::{of_table, region_radius};
+use crate::measure::scan::Scanner;
 use crate::plan::Plan;
-use crate::progress::Observer;
-use crate::region::{of_table, region_radius};
-use crate::scan::Scanner;
-use crate::{Error, estimators};
+use crate::{Error, measure::estimators};
 use wakescope_estimate::{
     Radius, SignalKind,
     bound::WindowModel,
@@ -128,8 +128,8 @@ impl SceneBound {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::progress::Silent;
     use crate::plan::Target;
-    use crate::progress::Silent;
     use crate::scene::{DetectorSignal, NoiseKind, Scene, SceneFile, SnrReference};
 
     fn of(change: impl FnOnce(&mut Scene)) -> Result<SceneBound, Error> {

@@ -1,7 +1,7 @@
 //! Tests of the reader: files of other hands, and files that lie.
 
 use super::*;
-use crate::planes_input;
+use crate::io::planes_input;
 
 /// Name, dimensions, text attributes and values of a variable.
 type Sketched<'a> = (&'a str, &'a [u32], &'a [(&'a str, &'a str)], Vec<f64>);
@@ -87,7 +87,7 @@ impl Sketch<'_> {
     }
 }
 
-fn planes_of(bytes: &[u8]) -> Result<crate::export::CrossPlanes, String> {
+fn planes_of(bytes: &[u8]) -> Result<crate::io::CrossPlanes, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("p.nc");
     std::fs::write(&path, bytes).unwrap();

@@ -3,10 +3,10 @@
 
 use super::limits::last_s;
 use crate::Error;
-use crate::export::{FileGroup, Provenance, VelocityMap};
+use crate::io::{FileGroup, Provenance, VelocityMap};
+use crate::measure::profile::RangeProfile;
 use crate::plan::Plan;
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
-use crate::profile::RangeProfile;
 use crate::scene::{Flow, SnrReference};
 use wakescope_optics::EfficiencyProfile;
 
@@ -131,7 +131,7 @@ fn title(plan: &Plan, has_gaps: bool) -> String {
 fn centres_m(plan: &Plan) -> Vec<(f64, f64)> {
     match &plan.scene.scene.flow {
         Flow::VortexPair(pair) => {
-            let c = crate::wind::vortex_pair(pair).centres(plan.wind.start_s);
+            let c = crate::measure::wind::vortex_pair(pair).centres(plan.wind.start_s);
             vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
         }
         _ => Vec::new(),

@@ -1,8 +1,8 @@
 //! The estimates of a run as a map for files and pictures.
 //! Check: the tests of the program read the files.
 
-use crate::export::{Field, PulseInfo, Ray, Site, Sweep, Unit, UtcTime, VelocityMap};
-use crate::map::VelocityEstimates;
+use crate::io::{Field, PulseInfo, Ray, Site, Sweep, Unit, UtcTime, VelocityMap};
+use crate::measure::map::VelocityEstimates;
 use crate::plan::Plan;
 use crate::scene::Scene;
 

@@ -2,8 +2,8 @@
 //! Check: scenes whose results no file can hold are refused, with the key and what would do.
 
 use crate::Error;
-use crate::export::UtcTime;
-use crate::export::hpl::within_a_day;
+use crate::io::UtcTime;
+use crate::io::hpl::within_a_day;
 use crate::plan::{Plan, Stage};
 #[cfg(feature = "netcdf")]
 use crate::scene::DetectorSignal;
@@ -22,7 +22,7 @@ pub fn check(plan: &Plan) -> Result<(), Error> {
             let pulses = rays * (scene.scan.pulses_per_line * plan.kept_realisations()) as f64;
             let quadratures = if scene.detector.signal == DetectorSignal::Baseband { 2.0 } else { 1.0 };
             let bytes =
-                crate::export::cf_signals::data_bytes([pulses, g.samples as f64, quadratures], [rays, g.layers as f64]);
+                crate::io::cf_signals::data_bytes([pulses, g.samples as f64, quadratures], [rays, g.layers as f64]);
             fits(
                 "outputs.signals",
                 "signals.nc",
@@ -31,10 +31,10 @@ pub fn check(plan: &Plan) -> Result<(), Error> {
             )?;
         }
         if plan.runs(Stage::Estimates) {
-            let bytes = crate::export::cfradial::data_bytes(rays, g.gate_range_m.len() as f64);
+            let bytes = crate::io::cfradial::data_bytes(rays, g.gate_range_m.len() as f64);
             fits("estimator.gate_step_samples", "map.nc", bytes, "make it larger, or scan fewer lines")?;
             let last_s = last_s(plan);
-            let most_s = crate::export::cfradial::MAX_TIME_S;
+            let most_s = crate::io::cfradial::MAX_TIME_S;
             if plan.wind.start_s.abs() > most_s || last_s > most_s {
                 let reason = format!("the rays end {last_s:e} s after the start of the flow; files hold {most_s:e} s");
                 return Err(refusal("scan", reason));
@@ -56,7 +56,7 @@ pub(super) fn last_s(plan: &Plan) -> f64 {
 
 #[cfg(feature = "netcdf")]
 fn fits(key: &str, file: &str, bytes: f64, remedy: &str) -> Result<(), Error> {
-    let most = crate::export::netcdf::MAX_BYTES as f64;
+    let most = crate::io::netcdf::MAX_BYTES as f64;
     if bytes <= most {
         return Ok(());
     }

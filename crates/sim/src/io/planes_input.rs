@@ -5,8 +5,8 @@
 //! Check: what was written comes back; files that lack something are refused by name.
 
 use crate::Error;
-use crate::export::{CrossPlanes, OPEN_EDGES, edges};
-use crate::netcdf_input::{ClassicFile, TIME, Y, Z, open};
+use crate::io::netcdf_input::{ClassicFile, TIME, Y, Z, open};
+use crate::io::{CrossPlanes, OPEN_EDGES, edges};
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
 use wakescope_les::winds::Edges;
@@ -115,14 +115,14 @@ fn ends(file: &ClassicFile, axis: &str) -> Result<Edges, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::cf_planes::cf_planes_bytes;
-    use crate::export::samples;
+    use crate::io::cf_planes::cf_planes_bytes;
+    use crate::io::samples;
     use wakescope_les::winds::Side;
 
     fn written(planes: &CrossPlanes) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("plane1_0001.nc");
-        let origin = crate::export::provenance::example();
+        let origin = crate::io::provenance::example();
         std::fs::write(&path, cf_planes_bytes(planes, &origin).unwrap()).unwrap();
         (folder, path)
     }

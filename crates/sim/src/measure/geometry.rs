@@ -4,8 +4,8 @@
 
 use crate::Error;
 use crate::SPEED_OF_LIGHT_M_S;
+use crate::measure::wind::SceneWind;
 use crate::scene::Scene;
-use crate::wind::SceneWind;
 use wakescope_signal::Pulse;
 
 /// The sampling of one scan in angle, range and time.

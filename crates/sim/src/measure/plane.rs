@@ -1,9 +1,9 @@
 //! The wind on a cross-plane around the scan, for the files.
 
 use crate::Error;
-use crate::export::{CrossPlanes, OPEN_EDGES};
+use crate::io::{CrossPlanes, OPEN_EDGES};
+use crate::measure::profile::spaced;
 use crate::plan::Plan;
-use crate::profile::spaced;
 use ndarray::Array3;
 
 /// Points of the plane across and up.

@@ -9,13 +9,13 @@ pub use limits::check;
 pub use map::velocity_map;
 
 use crate::Error;
-use crate::export::lock::FolderLock;
-use crate::export::own::refuse_foreign;
-use crate::export::signals::{LineVelocities, RawSignals, Recording};
-use crate::export::{Existing, FileGroup, Provenance, Table, hpl, tables};
+use crate::io::lock::FolderLock;
+use crate::io::own::refuse_foreign;
+use crate::io::signals::{LineVelocities, RawSignals, Recording};
+use crate::io::{Existing, FileGroup, Provenance, Table, hpl, tables};
+use crate::measure::profile::RangeProfile;
+use crate::measure::run::RunResult;
 use crate::plan::{Plan, Stage, Target};
-use crate::profile::RangeProfile;
-use crate::run::RunResult;
 use crate::scene::{DetectorSignal, NoiseKind};
 use std::path::{Path, PathBuf};
 
@@ -99,7 +99,7 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
         }
         #[cfg(feature = "netcdf")]
         if outputs.netcdf {
-            files.add("flow.nc", crate::export::cf_planes::cf_planes_bytes(plane, &origin)?)?;
+            files.add("flow.nc", crate::io::cf_planes::cf_planes_bytes(plane, &origin)?)?;
         }
     }
     if let Some(signals) = raw_signals(plan, result) {
@@ -108,7 +108,7 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
         }
         #[cfg(feature = "netcdf")]
         if outputs.netcdf {
-            files.add("signals.nc", crate::export::cf_signals::cf_signals_bytes(&signals, &origin)?)?;
+            files.add("signals.nc", crate::io::cf_signals::cf_signals_bytes(&signals, &origin)?)?;
         }
     }
     if let Some(estimates) = &result.map {
@@ -118,7 +118,7 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
         }
         #[cfg(feature = "netcdf")]
         if outputs.netcdf {
-            files.add("map.nc", crate::export::cfradial::cfradial_bytes(&map, &origin)?)?;
+            files.add("map.nc", crate::io::cfradial::cfradial_bytes(&map, &origin)?)?;
         }
         if outputs.hpl {
             files.add(HALO, hpl::hpl_bytes(&map, 0, HALO)?)?;

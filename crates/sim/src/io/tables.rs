@@ -59,7 +59,7 @@ pub fn planes_table(planes: &CrossPlanes) -> OutputResult<Table> {
 mod tests {
     use super::super::samples;
     use super::*;
-    use crate::export::OutputError;
+    use crate::io::OutputError;
 
     fn floats<'a>(table: &'a Table, name: &str) -> &'a [f64] {
         match table.columns().iter().find(|(n, _)| n == name) {

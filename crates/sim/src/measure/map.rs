@@ -1,11 +1,11 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
 use crate::Error;
-use crate::estimators::{self, Toolkit, WindowStatistics};
+use crate::measure::estimators::{self, Toolkit, WindowStatistics};
+use crate::measure::progress::Observer;
+use crate::measure::region::{interpolated, region_radius};
+use crate::measure::scan::{Scanner, radial_velocity_m_s};
 use crate::plan::{Plan, Stage};
-use crate::progress::Observer;
-use crate::region::{interpolated, region_radius};
-use crate::scan::{Scanner, radial_velocity_m_s};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use wakescope_estimate::{
     GateVelocity, Gates, Radius, Sampling, Scan, Statistic,

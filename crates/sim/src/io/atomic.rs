@@ -11,14 +11,14 @@ use std::path::{Path, PathBuf};
 /// Files of one run, collected in memory and committed together.
 ///
 /// ```
-/// use wakescope_sim::export::FileGroup;
+/// use wakescope_sim::io::FileGroup;
 /// let folder = std::env::temp_dir().join("wakescope-doc-group");
 /// let mut group = FileGroup::new(&folder);
 /// group.add("map.csv", "range_m\n100.0\n")?;
 /// let written = group.commit()?;
 /// assert_eq!(std::fs::read_to_string(&written[0]).unwrap(), "range_m\n100.0\n");
 /// # std::fs::remove_dir_all(&folder).ok();
-/// # Ok::<(), wakescope_sim::export::OutputError>(())
+/// # Ok::<(), wakescope_sim::io::OutputError>(())
 /// ```
 #[derive(Debug)]
 pub struct FileGroup {

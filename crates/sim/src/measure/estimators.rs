@@ -1,7 +1,7 @@
 //! The estimator of a scene in the words of `estimate`: statistic of the windows, estimator of their mean, models of both.
 
 use crate::Error;
-use crate::instrument::Instrument;
+use crate::measure::instrument::Instrument;
 use crate::scene::{
     CorrelogramForm, DetectorSignal, Estimator as Words, GradientLikelihood, Method, ModelOrder, NoiseKind,
     OrderChoice, PulseShape, Refinement, Scene, Weighting,
