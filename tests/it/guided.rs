@@ -8,7 +8,8 @@ use wakescope_estimate::vortex_fit::{
     WakeModel, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{Correlogram, Error, estimators::*, map::*, window::*};
-use wakescope_les::{VortexPair, Wind, winds::Sum};
+use wakescope_les::winds::Sum;
+use wakescope_les::{VortexPair, Wind};
 use wakescope_signal::NoiseModel;
 
 /// Radius of the regions \[m\].

@@ -30,6 +30,10 @@ const FEATURES: [(&str, &[&str]); 4] = [
     ("wakescope-sim", &["", "cli", "flow", "netcdf", "plots", "vtk"]),
 ];
 
+/// The wake that the figures show in continuous integration, and where it is put.
+const WAKE: &str = "xtask/small_wake.toml";
+const WAKE_OUT: &str = "target/small-wake";
+
 fn steps() -> Result<Vec<Step>, Failure> {
     let plain = |name, command: String| Step { name, command, environment: &[] };
     let mut out = vec![
@@ -54,7 +58,12 @@ fn steps() -> Result<Vec<Step>, Failure> {
     let own = std::env::current_exe()?.display().to_string();
     out.push(plain("tidy", format!("'{own}' tidy")));
     out.push(plain("regress", format!("'{own}' regress")));
-    out.push(plain("figures", format!("'{own}' reproduce-figs --profile quick --no-cache")));
+    // On a wake of a few cells: that of the profile takes several minutes and shows no other fault of the program.
+    out.push(plain(
+        "wake",
+        format!("cargo run --quiet --bin wakescope -- wake {WAKE} --out {WAKE_OUT} --overwrite --quiet"),
+    ));
+    out.push(plain("figures", format!("'{own}' reproduce-figs --profile quick --no-cache --wake {WAKE_OUT}")));
     Ok(out)
 }
 

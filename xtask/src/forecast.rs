@@ -144,13 +144,12 @@ fn measured(program: &Path, folder: &Path, scene: &str, command: &str) -> Result
     if run.code != Some(0) {
         return Err(Failure::new(format!("{command} of\n{scene}ended with {:?}: {}", run.code, run.stderr)));
     }
-    // The plan is part of what a run tells.
-    let sum = |key: &str| run.stdout.lines().filter_map(|l| number(l, key)).sum::<f64>();
-    Ok(Measured { forecast: (sum("core_s"), sum("memory_bytes")), actual: (run.cpu_s, run.peak_bytes) })
-}
-
-/// The number of a line `"key": number,`.
-fn number(line: &str, key: &str) -> Option<f64> {
-    let rest = line.trim().strip_prefix(&format!("\"{key}\":"))?;
-    rest.trim().trim_end_matches(',').parse().ok()
+    // The plan is part of what a run tells; the numbers of the whole are those at the first level of the object.
+    let number = |key: &str| {
+        let line = run.stdout.lines().find_map(|l| l.strip_prefix(&format!("  \"{key}\": ")));
+        let value = line.and_then(|l| l.trim_end_matches(',').parse::<f64>().ok());
+        value.ok_or_else(|| Failure::new(format!("{command} tells no {key}: {}", run.stdout)))
+    };
+    let forecast = (number("core_s")?, number("memory_bytes")?);
+    Ok(Measured { forecast, actual: (run.cpu_s, run.peak_bytes) })
 }

@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum Error {
     /// A number lies outside what is allowed.
-    #[error("{field} = {value}: must be {allowed}")]
+    #[error("{field} = {value:?}: must be {allowed}")]
     OutOfRange {
         /// Name of the field or parameter, with its unit suffix.
         field: &'static str,
@@ -15,7 +15,7 @@ pub enum Error {
         allowed: &'static str,
     },
     /// The detector band is empty, reversed or not contained in the spectrum of the samples.
-    #[error("band_hz = ({low_hz}, {high_hz}): must be {allowed}")]
+    #[error("band_hz = ({low_hz:?}, {high_hz:?}): must be {allowed}")]
     Band {
         /// Lower edge \[Hz\].
         low_hz: f64,
@@ -78,7 +78,7 @@ pub enum Error {
     },
     /// The noise outside the detector band is too small for the covariance of a window to be inverted.
     #[error(
-        "floor = {floor}: with so little noise outside the band the covariance of {window_samples} samples is singular \
+        "floor = {floor:?}: with so little noise outside the band the covariance of {window_samples} samples is singular \
          in double precision (reciprocal condition {reciprocal_condition:.1e}); a floor of at least {least:e} works here"
     )]
     NoiseFloor {
@@ -134,7 +134,42 @@ pub(crate) fn finite(field: &'static str, value: f64) -> Result<(), Error> {
     if value.is_finite() { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed: "finite" }) }
 }
 
+/// Checks that a number is finite and not negative.
+pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<(), Error> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(())
+    } else {
+        Err(Error::OutOfRange { field, value, allowed: "finite and at least 0" })
+    }
+}
+
+/// Checks that there is at least one.
+pub(crate) fn at_least_one(field: &'static str, count: usize) -> Result<(), Error> {
+    if count > 0 { Ok(()) } else { Err(Error::OutOfRange { field, value: 0.0, allowed: "at least 1" }) }
+}
+
+/// Checks that finite numbers increase.
+pub(crate) fn increasing(field: &'static str, numbers: &[f64]) -> Result<(), Error> {
+    match numbers.windows(2).find(|pair| pair[1] <= pair[0]) {
+        Some(pair) => Err(Error::OutOfRange { field, value: pair[1], allowed: "increasing" }),
+        None => Ok(()),
+    }
+}
+
 /// Checks the length of an array.
 pub(crate) fn length(field: &'static str, expected: usize, found: usize) -> Result<(), Error> {
     if expected == found { Ok(()) } else { Err(Error::Length { field, expected, found }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiny_and_huge_values_are_told_in_few_digits() {
+        let told = |value| Error::OutOfRange { field: "a_m", value, allowed: "positive" }.to_string();
+        for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
+            assert_eq!(told(value), format!("a_m = {text}: must be positive"));
+        }
+    }
 }

@@ -26,6 +26,8 @@
 //! A map is made in two steps: [`Scan::new`] computes a [`Statistic`] of all windows of a scan,
 //! [`Scan::map`] averages it over the region of each point and hands the mean to an [`Estimator`].
 //!
+//! What a first program needs stands here; the rest is in its module.
+//!
 //! | module | content |
 //! |---|---|
 //! | [`window`] | frequencies and velocities, windows and ranges, real and complex samples, missing ones, weightings |
@@ -45,6 +47,10 @@
 //!   takes this crate without default features, else two definitions of one symbol meet; with neither of the two
 //!   features such a library must be there at link time.
 //! - `openblas-system` links a system OpenBLAS instead; the build stops with the remedy if there is none.
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 pub mod bound;
 mod error;

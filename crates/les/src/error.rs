@@ -42,7 +42,7 @@ impl std::fmt::Display for EnergyGrowth {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
     /// A number is outside its range, or is not finite.
-    #[error("{field} = {value}: must be {allowed}")]
+    #[error("{field} = {value:?}: must be {allowed}")]
     OutOfRange {
         /// Name of the field or parameter, with its unit suffix.
         field: &'static str,
@@ -70,7 +70,7 @@ pub enum Error {
         needed: usize,
     },
     /// Node coordinates are not finite or do not increase.
-    #[error("{axis}_m[{index}] = {value_m} m: node coordinates must be finite and strictly increasing")]
+    #[error("{axis}_m[{index}] = {value_m:?} m: node coordinates must be finite and strictly increasing")]
     NodesNotIncreasing {
         /// `"y"` or `"z"`.
         axis: &'static str,
@@ -80,7 +80,7 @@ pub enum Error {
         value_m: f64,
     },
     /// A direction of the flow's mesh that the schemes cannot take.
-    #[error("{axis} direction: {what} = {value}: must be {allowed}")]
+    #[error("{axis} direction: {what} = {value:?}: must be {allowed}")]
     BadDirection {
         /// `"x"`, `"y"` or `"z"`.
         axis: &'static str,
@@ -112,7 +112,7 @@ pub enum Error {
     },
     /// A time step is so long that the scheme would be unstable.
     #[error(
-        "step {step} of {step_s:?} s at t = {time_s:?} s has Courant number {courant}, above {limit}: fastest is {component} in cell \
+        "step {step} of {step_s:?} s at t = {time_s:?} s has Courant number {courant:?}, above {limit:?}: fastest is {component} in cell \
          {cell:?}, x, y, z = {position_m:?} m; shorten the step or let a Courant number control it"
     )]
     CourantTooLarge {
@@ -210,7 +210,7 @@ pub enum Error {
     },
     /// Two neighbouring cells differ so much that the index coordinate is not monotone between them.
     #[error(
-        "the cells beside node {index} of the {axis} axis differ by a factor {ratio}: at most {allowed} is allowed"
+        "the cells beside node {index} of the {axis} axis differ by a factor {ratio:?}: at most {allowed} is allowed"
     )]
     StretchTooAbrupt {
         /// `"y"` or `"z"`.
@@ -233,7 +233,7 @@ pub enum Error {
         nodes_z: usize,
     },
     /// A boundary lies inside the mesh, or too far from it.
-    #[error("{boundary} of the {axis} axis at {value_m} m: must be {allowed}")]
+    #[error("{boundary} of the {axis} axis at {value_m:?} m: must be {allowed}")]
     MisplacedBoundary {
         /// `"y"` or `"z"`.
         axis: &'static str,
@@ -269,7 +269,7 @@ pub enum Error {
         history: Vec<f64>,
     },
     /// A point is outside the mesh and the policy is to refuse it.
-    #[error("the point y = {y_m} m, z = {z_m} m is outside the mesh")]
+    #[error("the point y = {y_m:?} m, z = {z_m:?} m is outside the mesh")]
     OutsideMesh {
         /// Lateral coordinate of the point.
         y_m: f64,
@@ -326,4 +326,19 @@ pub(crate) fn check(
 /// Equal lengths of points and outputs, or [`Error::LengthMismatch`].
 pub(crate) fn check_lengths(points: usize, out: usize) -> Result<(), Error> {
     if points == out { Ok(()) } else { Err(Error::LengthMismatch { points, out }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiny_and_huge_values_are_told_in_few_digits() {
+        for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
+            let error = Error::OutOfRange { field: "a_m", value, allowed: "positive" };
+            assert_eq!(error.to_string(), format!("a_m = {text}: must be positive"));
+            let error = Error::BadDirection { axis: "y", what: "length_m", value, allowed: "positive" };
+            assert_eq!(error.to_string(), format!("y direction: length_m = {text}: must be positive"));
+        }
+    }
 }

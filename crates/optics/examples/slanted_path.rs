@@ -1,31 +1,55 @@
-//! A slanted path through turbulence that weakens with height, beams that miss each other by 20 microradians, ended at an error
-//! of 2 %.
+//! A slanted path through Cn2 over height (Hufnagel-Valley 5/7), beams out of line by 5 urad, until the error is 2 %.
 //!
-//! `cargo run --release -p wakescope-optics --example slanted_path`
+//! `cargo run --release -p wakescope-optics --example slanted_path -- [elevation_deg] [tilt_rad] [relative_error]`
 
 #![allow(clippy::print_stdout)]
 
 use std::ops::ControlFlow;
-use wakescope_optics::{Cn2Path, Misalignment, MonteCarlo, Stop, Turbulence};
+use wakescope_optics::monte_carlo::Sampling;
+use wakescope_optics::plan::Case;
+use wakescope_optics::theory::{bistatic_efficiency, free_space_efficiency_misaligned};
+use wakescope_optics::{Cn2Path, Misalignment, MonteCarlo, Stop, Telescope, Turbulence};
+
+/// Cn2 \[m^(-2/3)\] of Hufnagel and Valley, 5/7.
+fn hufnagel_valley(height_m: f64) -> f64 {
+    let high = 0.00594 * (21f64 / 27.0).powi(2) * (1e-5 * height_m).powi(10) * (-height_m / 1000.0).exp();
+    high + 2.7e-16 * (-height_m / 1500.0).exp() + 1.7e-14 * (-height_m / 100.0).exp()
+}
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let cn2 = Cn2Path::Heights {
-        height_m: vec![0.0, 50.0, 500.0],
-        cn2_m_m23: vec![1e-13, 1e-14, 1e-15],
-        telescope_height_m: 2.0,
-        elevation_rad: 0.1,
-    };
-    let chapter = MonteCarlo::chapter(1e-13, 1)?;
+    let mut arguments = std::env::args().skip(1);
+    let mut next = |default: f64| arguments.next().map_or(Ok(default), |a| a.parse::<f64>());
+    let (elevation_deg, tilt_rad, relative_error) = (next(30.0)?, next(5e-6)?, next(0.02)?);
+
+    let height_m: Vec<f64> = (0..=200).map(|i| 3100.0 * (f64::from(i) / 200.0).powi(2)).collect();
+    let cn2_m_m23 = height_m.iter().map(|&h| hufnagel_valley(h)).collect();
+    let elevation_rad = elevation_deg.to_radians();
+    let cn2 = Cn2Path::Heights { height_m, cn2_m_m23, telescope_height_m: 2.0, elevation_rad };
+    let turbulence = Turbulence { cn2, ..Turbulence::none() };
+    let (telescope, misalignment) =
+        (Telescope::table2(), Misalignment { tilt_rad: [tilt_rad, 0.0], ..Misalignment::NONE });
+
+    let range_m = vec![500.0, 1000.0, 2000.0];
+    let case = Case { telescope, misalignment, turbulence: turbulence.clone(), realisations: 400 };
+    let plan = case.plan(&range_m)?;
     let run = MonteCarlo {
-        turbulence: Turbulence { cn2: cn2.validated()?, ..chapter.turbulence.clone() },
-        misalignment: Misalignment { tilt_rad: [2e-5, 0.0], ..Misalignment::NONE },
-        ..chapter
+        misalignment,
+        turbulence: turbulence.clone(),
+        grid: plan.grid,
+        layers: plan.layers,
+        range_m: range_m.clone(),
+        sampling: Sampling::Antithetic,
+        ..MonteCarlo::table2(0.0, 1)?
     };
-    let stop = Stop { realisations: 1000, relative_standard_error: Some(0.02) };
+    let stop = Stop { realisations: 4000, relative_standard_error: Some(relative_error) };
     let found = run.run::<f32>(stop, |_| ControlFlow::Continue(()))?;
-    println!("{} realisations", found.realisations);
-    for (range_m, mean) in found.monostatic.range_m.iter().zip(&found.monostatic.mean) {
-        println!("{range_m:5.0} m: {mean:.4}");
+    println!("{} realisations on {} x {} points", found.realisations, run.grid.nx, run.grid.ny);
+    println!("  R/m  free space  independent paths  one path out and back");
+    for (i, &range_m) in range_m.iter().enumerate() {
+        let free = free_space_efficiency_misaligned(&telescope, &misalignment, range_m)?;
+        let bistatic = bistatic_efficiency(&telescope, &misalignment, &turbulence, range_m)?;
+        let (mean, error) = (found.monostatic.mean[i], found.monostatic.standard_error[i]);
+        println!("{range_m:6.0} {free:10.6} {bistatic:18.6}  {mean:.6} +- {error:.6}");
     }
     Ok(())
 }

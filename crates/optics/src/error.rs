@@ -9,7 +9,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum Error {
     /// A number lies outside its allowed interval, or is not a number.
-    #[error("{field} = {value} is not allowed: {allowed}")]
+    #[error("{field} = {value:?} is not allowed: {allowed}")]
     OutOfRange {
         /// Name of the field or parameter, with its unit suffix.
         field: &'static str,
@@ -29,7 +29,7 @@ pub enum Error {
         expected: usize,
     },
     /// A list that must increase strictly does not.
-    #[error("{field} must increase strictly, but entry {index} = {value} does not exceed the one before")]
+    #[error("{field} must increase strictly, but entry {index} = {value:?} does not exceed the one before")]
     NotIncreasing {
         /// Name of the list.
         field: &'static str,
@@ -40,7 +40,7 @@ pub enum Error {
     },
     /// A profile was asked for a range that it does not cover.
     #[error(
-        "range {range_m} m lies outside the profile, which covers {first_m} m to {last_m} m: nothing is extrapolated"
+        "range {range_m:?} m lies outside the profile, which covers {first_m:?} m to {last_m:?} m: nothing is extrapolated"
     )]
     Extrapolation {
         /// The range that was asked for \[m\].
@@ -66,7 +66,9 @@ pub enum Error {
         most: usize,
     },
     /// The absorbing border took so much power that the result means nothing.
-    #[error("the absorbing border took {fraction:.3} of the power before {range_m} m, 0.05 at most: use a wider grid")]
+    #[error(
+        "the absorbing border took {fraction:.3} of the power before {range_m:?} m, 0.05 at most: use a wider grid"
+    )]
     PowerLost {
         /// Range at which it was noticed \[m\].
         range_m: f64,
@@ -81,7 +83,7 @@ pub enum Error {
     },
     /// The beam has so many Fresnel zones that no quadrature follows them.
     #[error(
-        "the Fresnel number a^2 |1/R - 1/F| / lambda is {found:.4e} at {range_m} m, {largest} at most: the range must be nearer to \
+        "the Fresnel number a^2 |1/R - 1/F| / lambda is {found:.4e} at {range_m:?} m, {largest:?} at most: the range must be nearer to \
          the focus, or the aperture smaller"
     )]
     FresnelNumber {
@@ -143,5 +145,18 @@ pub(crate) fn refused<T>(result: Result<T, Error>) -> &'static str {
             field
         }
         other => panic!("a refusal by name, not {other:?}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiny_and_huge_values_are_told_in_few_digits() {
+        let told = |value| Error::OutOfRange { field: "a_m", value, allowed: "positive" }.to_string();
+        for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
+            assert_eq!(told(value), format!("a_m = {text} is not allowed: positive"));
+        }
     }
 }

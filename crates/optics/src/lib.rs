@@ -71,3 +71,8 @@ pub use monte_carlo::{Layers, MonteCarlo, Stop};
 #[cfg(feature = "screens")]
 pub use screens::Grid;
 pub use snr::SnrModel;
+
+/// The example of the README is run as a test.
+#[cfg(all(doctest, feature = "screens"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

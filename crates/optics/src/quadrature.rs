@@ -54,6 +54,12 @@ impl GaussLegendre {
         (0..panels).map(|i| self.integrate(a + h * i as f64, a + h * (i + 1) as f64, &mut f)).sum()
     }
 
+    /// Nodes and weights on `panels` equal panels of \[a, b\].
+    pub(crate) fn on_panels(&self, a: f64, b: f64, panels: usize) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let h = (b - a) / panels as f64;
+        (0..panels).map(move |i| a + h * i as f64).flat_map(move |low| self.mapped(low, low + h))
+    }
+
     /// Nodes and weights mapped to \[a, b\].
     pub(crate) fn mapped(&self, a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let (mid, half) = (0.5 * (a + b), 0.5 * (b - a));

@@ -5,7 +5,7 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
     /// A number is outside its range, or is not finite.
-    #[error("{field} = {value}: must be {allowed}")]
+    #[error("{field} = {value:?}: must be {allowed}")]
     OutOfRange {
         /// Name of the field or parameter, with its unit suffix.
         field: &'static str,
@@ -15,7 +15,7 @@ pub enum Error {
         allowed: &'static str,
     },
     /// One element of a list is outside its range.
-    #[error("{field}[{index}] = {value}: must be {allowed}")]
+    #[error("{field}[{index}] = {value:?}: must be {allowed}")]
     ElementOutOfRange {
         /// Name of the list, with its unit suffix.
         field: &'static str,
@@ -52,7 +52,7 @@ pub enum Error {
     },
     /// The detector band does not fit between zero and half the sampling rate.
     #[error(
-        "the detector band {low_hz} to {high_hz} Hz (intermediate_frequency_hz -+ bandwidth_hz/2) \
+        "the detector band {low_hz:?} to {high_hz:?} Hz (intermediate_frequency_hz -+ bandwidth_hz/2) \
          must lie between 0 and half the sampling rate, {nyquist_hz} Hz"
     )]
     BandBeyondNyquist {
@@ -83,4 +83,17 @@ pub(crate) fn check_positive(field: &'static str, value: f64) -> Result<(), Erro
 /// A slice of the expected length, or [`Error::LengthMismatch`].
 pub(crate) fn check_length(field: &'static str, found: usize, expected: usize) -> Result<(), Error> {
     if found == expected { Ok(()) } else { Err(Error::LengthMismatch { field, found, expected }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiny_and_huge_values_are_told_in_few_digits() {
+        let told = |value| Error::OutOfRange { field: "a_m", value, allowed: "positive" }.to_string();
+        for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
+            assert_eq!(told(value), format!("a_m = {text}: must be positive"));
+        }
+    }
 }

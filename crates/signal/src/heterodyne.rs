@@ -72,9 +72,9 @@ impl Simulator {
         let carrier = (0..record.samples)
             .map(|k| {
                 let time_s = record.time_of_first_sample_s + k as f64 * interval_s;
-                // A whole turn is taken off before the multiplication, which keeps the phase exact for late samples.
-                let turns = receiver.intermediate_frequency_hz * time_s;
-                Complex::cis(2.0 * PI * (turns - turns.floor()))
+                // Whole cycles are taken off before the multiplication, which keeps the phase exact for late samples.
+                let cycles = receiver.intermediate_frequency_hz * time_s;
+                Complex::cis(2.0 * PI * (cycles - cycles.floor()))
             })
             .collect();
         let noise = NoiseSource::new(&receiver, record.samples);

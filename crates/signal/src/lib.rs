@@ -85,3 +85,8 @@ pub use receiver::{NoiseModel, Receiver};
 pub use scan::Scan;
 pub use shot::Shot;
 pub use transmitted::Pulse;
+
+/// The example of the README is run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -74,7 +74,7 @@ impl LayerLimits {
     /// `lambda/(16 sigma g_max)` and `c sigma/2`.
     ///
     /// The second limit makes the scatterers of neighbouring layers overlap in frequency: two layers then drift apart by
-    /// less than an eighth of a turn while the pulse passes. Thicker layers give errors of up to 15 % inside a vortex core.
+    /// less than an eighth of a cycle while the pulse passes. Thicker layers give errors of up to 15 % inside a vortex core.
     /// With the third, the sum over the layers of a pulse is its integral within 1e-4, however short the pulse.
     /// The division makes the Gaussian weights repeat from sample to sample, which the fast summation uses.
     ///

@@ -6,7 +6,8 @@ use wakescope_estimate::{
     bound::{Noise, WindowModel},
 };
 use wakescope_les::cases::{TollmienSchlichting, VortexPairCase};
-use wakescope_les::{Flow, Ground, Motion, VortexPair, winds::m4_prime as kernel};
+use wakescope_les::winds::m4_prime as kernel;
+use wakescope_les::{Flow, Ground, Motion, VortexPair};
 use wakescope_optics::{RadiusDefinition, SnrModel, Telescope, theory};
 use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::plan::{Plan, Target};

@@ -73,11 +73,8 @@ fn cases(context: &Context) -> Vec<Case> {
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let scans = context.choose(4, 24, 100);
     let all = cases(context).into_iter().map(|case| measure(context, case, scans)).collect::<Result<Vec<_>, _>>()?;
-    let mut out = Rendered::default();
     let origin = context.provenance_of_formula(&format!("profile = \"{}\"\nscans = {scans}\n", context.profile_name()));
-    out.csv(table(&all).to_csv(&origin)?);
-    let figure = picture(&all);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table(&all), &picture(&all), &origin)?;
     out.marks = vec!["analytic pair".into()];
     out.caption = format!(
         "ANALYTIC PAIR, not a simulated flow: root mean square error against the pulse-weighted velocity over that of PA, below 1 where CA \

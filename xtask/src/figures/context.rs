@@ -5,7 +5,8 @@ use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::workspace::provenance;
 use std::path::PathBuf;
-use wakescope_sim::io::Provenance;
+use wakescope_sim::io::{Provenance, Table};
+use wakescope_sim::plot::Figure;
 use wakescope_sim::scene::Scene;
 
 /// What a figure may depend on.
@@ -66,15 +67,17 @@ pub(crate) struct Rendered {
 }
 
 impl Rendered {
-    /// A table, as the figure's CSV.
-    pub(crate) fn csv(&mut self, text: String) {
-        self.files.push(("csv".into(), text.into_bytes()));
+    /// A table as CSV, and the picture as SVG and PNG.
+    pub(crate) fn new(table: &Table, figure: &Figure, origin: &Provenance) -> Result<Self, Failure> {
+        let mut out = Self::of_table(table, origin)?;
+        out.files.push(("svg".into(), figure.svg(origin)?.into_bytes()));
+        out.files.push(("png".into(), figure.png(origin)?));
+        Ok(out)
     }
 
-    /// A picture, as SVG and PNG.
-    pub(crate) fn picture(&mut self, svg: String, png: Vec<u8>) {
-        self.files.push(("svg".into(), svg.into_bytes()));
-        self.files.push(("png".into(), png));
+    /// A table as CSV.
+    pub(crate) fn of_table(table: &Table, origin: &Provenance) -> Result<Self, Failure> {
+        Ok(Self { files: vec![("csv".into(), table.to_csv(origin)?.into_bytes())], ..Self::default() })
     }
 
     pub(crate) fn file(&self, extension: &str) -> Option<&[u8]> {

@@ -36,11 +36,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("y_m", y_m.iter().copied())
         .float("w_m_s", w_m_s.iter().copied())
         .float("w_potential_m_s", potential_m_s.iter().copied());
-    let mut out = Rendered::default();
     let parameters =
         format!("circulation_m2_s = {GAMMA_M2_S:?}\nspacing_m = {SPACING_M:?}\ncore_radius_m = {CORE_M:?}\n");
     let origin = context.provenance_of_formula(&parameters);
-    out.csv(table.to_csv(&origin)?);
 
     let top_m_s = GAMMA_M2_S / (4.0 * PI * CORE_M);
     let scaled = |v: &[f64]| y_m.iter().map(|y| y / SPACING_M).zip(v.iter().map(|v| v / top_m_s)).collect::<Vec<_>>();
@@ -52,8 +50,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let plot = CurvePlot::new("Vertical velocity through the cores", x, y)
         .with(Series::new("algebraic profile (3)", Style::Line, scaled(&w_m_s)))
         .with(Series::new("potential vortices", Style::DashDot, scaled(&drawn_m_s)));
-    let figure = Figure::stacked([plot]);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
     out.caption = format!(
         "Vertical velocity through the two cores of a pair with Gamma0 = {GAMMA_M2_S} m2/s, b0 = {SPACING_M} m, rc = {CORE_M} m, \
          in units of the largest tangential velocity of one vortex, and the profiles of potential vortices."

@@ -27,9 +27,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("z_first_sample_m", column(|p| p.1, near_m))
         .float("y_last_sample_m", column(|p| p.0, far_m))
         .float("z_last_sample_m", column(|p| p.1, far_m));
-    let mut out = Rendered::default();
     let origin = wakescope_sim::measure::write::provenance(&plan);
-    out.csv(table.to_csv(&origin)?);
 
     let mut fan = Vec::new();
     for &el in elevation_rad.iter().step_by(DRAWN) {
@@ -51,8 +49,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     }
     let (x, y) = (Axis::linear("distance from the lidar [m]"), Axis::linear("height [m]"));
     let plot = CurvePlot { series, equal_scales: true, ..CurvePlot::new("Scan across the runway", x, y) };
-    let figure = Figure::stacked([plot]);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
     out.caption = format!(
         "Vertical scan of {} lines of sight in steps of {} mrad; one in {DRAWN} is drawn.",
         elevation_rad.len(),

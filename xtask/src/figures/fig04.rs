@@ -55,16 +55,14 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         },
     ];
 
-    let mut out = Rendered::default();
     let parameters =
         format!("set_up = \"chapter: 512 x 512 points of 2 mm, 10 layers\"\nrealisations = {realisations}\n");
     let origin = context.provenance_of_formula(&parameters);
-    out.csv(table(&curves)?.to_csv(&origin)?);
     let figure = Figure::side_by_side([
         plot("Signal-to-noise ratio", "SNR [dB]", &curves, |c| decibels(&c.profile, &c.profile.mean))?,
         plot("System efficiency", "efficiency", &curves, |c| Ok(c.profile.mean.clone()))?,
     ]);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table(&curves)?, &figure, &origin)?;
     out.caption = format!(
         "Signal-to-noise ratio (14) with h nu, and system efficiency (19), for the parameters of Table 2; {realisations} realisations \
          of 10 phase screens, bands of one standard error. Cn2 in m^(-2/3); bistatic means independent paths."

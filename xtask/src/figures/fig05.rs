@@ -51,11 +51,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("y_m", nodes.iter().map(|n| n.y_m))
         .float("z_m", nodes.iter().map(|n| n.z_m))
         .float("weight", nodes.iter().map(|n| n.weight));
-    let mut out = Rendered::default();
     let parameters =
         format!("spacing_m = {SPACING_M:?}\ntarget_y_m = {:?}\ntarget_z_m = {:?}\n", TARGET_M.0, TARGET_M.1);
     let origin = context.provenance_of_formula(&parameters);
-    out.csv(table.to_csv(&origin)?);
 
     let grid = |inside: bool| {
         let (j0, k0) = (TARGET_M.0.floor() as i32, TARGET_M.1.floor() as i32);
@@ -73,8 +71,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .with(Series::new("stencil", Style::Markers, grid(true)))
         .with(Series::new("target", Style::Markers, [TARGET_M]));
     plot.equal_scales = true;
-    let figure = Figure::stacked([plot]);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
     out.caption = "The 16 grid points (26) that give the velocity at one point of a line of sight; their weights, \
                    products of the kernel (27), are in the table."
         .into();

@@ -14,14 +14,12 @@ const FRAME_S: f64 = 0.15;
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
     let origin = context.provenance_of_formula(&wake.case_toml);
-    let mut out = Rendered::default();
     let mut table = Table::new();
     for name in ["tau".into(), "energy".into(), "energy_3d".into()].into_iter().chain((0..=8).map(mode_name)) {
         table = table.float(&name, wake.column(&name)?.iter().copied());
     }
-    out.csv(table.to_csv(&origin)?);
     let figure = wake.surfaces_figure()?.ok_or_else(|| Failure::new("the wake has no fields as NetCDF".into()))?;
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table, &figure, &origin)?;
     out.files.push(("apng".into(), animation::apng(&wake.frames()?, FRAME_S, &origin)?));
     out.caption = format!(
         "Surfaces where |ω| b₀²/Γ₀ is 1 and 10, at τ = {:?}; {}, box repeated {REPEATS} times along the flight. The animation \

@@ -17,11 +17,9 @@ const SIDES: [&str; 2] = ["left", "right"];
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
     let origin = context.provenance_of_formula(&wake.case_toml);
-    let mut out = Rendered::default();
-    out.csv(table(&wake)?.to_csv(&origin)?);
     let figure = Figure::side_by_side([circulation(&wake)?, paths(&wake)?]);
     let figure = Figure { width: 1200.0, ..figure };
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table(&wake)?, &figure, &origin)?;
     out.caption = format!(
         "Circulation averaged over 5 to 15 m (left) and paths of both vortices (right) beside the inviscid hyperbola and an independent \
          simulation at Γ₀/ν = 5000; {}. The noise sets when the fast decay begins.",

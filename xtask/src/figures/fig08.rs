@@ -75,7 +75,6 @@ fn scene(context: &Context, wake: &FinishedWake, tau: f64) -> Result<Scene, Fail
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
-    let mut out = Rendered::default();
     let mut panels = Vec::new();
     let mut tables = Vec::new();
     let mut extremes = Vec::new();
@@ -97,13 +96,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             panels.push(plot.coloured(shared));
         }
     }
-    out.csv(Table::stack(tables)?.to_csv(&origin)?);
     let realisations = scene(context, &wake, AGES[0].0)?.scan.realisations;
     let title =
         format!("Radial velocity, positive away from the lidar; estimated: mean of {realisations} realisations");
     let mut figure = Figure::stacked(panels).titled(&title);
     (figure.columns, figure.width) = (2, 1300.0);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&Table::stack(tables)?, &figure, &origin)?;
     out.caption = format!(
         "Radial velocity early and late (left: exact, right: mean of the estimates by periodogram accumulation, one pulse a line, 0 dB, \
          rho = 2 m); {}.",

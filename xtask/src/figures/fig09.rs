@@ -59,18 +59,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("range_m", rows.iter().map(|r| r.1))
         .int("level", rows.iter().map(|r| r.2 as i64))
         .float("n_eff", rows.iter().map(|r| r.3));
-    let mut out = Rendered::default();
     let origin = wakescope_sim::io::Provenance {
         program: wakescope_sim::PROGRAM.into(),
         scene_toml: file.toml.clone(),
         scene_hash: file.hash.clone(),
         seed: context.seed,
     };
-    out.csv(table.to_csv(&origin)?);
     let (x, y) = (Axis::linear("range [m]"), Axis::log("windows accumulated"));
     let plot = CurvePlot { series, ..CurvePlot::new("Accumulation level", x, y) };
-    let figure = Figure::stacked([plot]);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
     out.caption =
         "Windows that one velocity estimate accumulates: one pulse a line every 1.25 mrad, one window a sample.".into();
 

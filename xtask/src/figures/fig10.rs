@@ -18,7 +18,6 @@ const STUDENT: f64 = 3.182;
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let realisations = context.choose(4, 32, 100);
     let sight = Sight::of(context, Age::Early)?;
-    let mut out = Rendered::default();
     let (mut tables, mut panels, mut shown) = (Vec::new(), Vec::new(), Vec::new());
     let mut origin = None;
     for (name, reference) in REFERENCES {
@@ -49,9 +48,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         shown.push((name, mean_and_error(&of_rms), mean_and_error(&of_std)));
     }
     let origin = origin.ok_or_else(|| Failure::new("no map was made".into()))?;
-    out.csv(stacked("snr_reference", &tables).to_csv(&origin)?);
-    let figure = Figure::stacked(panels);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
     out.caption = format!(
         "Radial velocity (top) and standard deviation of its estimates by periodogram accumulation over \

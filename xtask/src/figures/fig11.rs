@@ -38,7 +38,6 @@ struct Measured {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let mut out = Rendered::default();
     let (mut tables, mut panels, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     let mut origin = None;
     let sight = Sight::of(context, Age::Late)?;
@@ -60,9 +59,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         origin.get_or_insert_with(|| study.provenance());
     }
     let origin = origin.ok_or_else(|| Failure::new("no map was made".into()))?;
-    out.csv(stacked("snr_reference", &tables).to_csv(&origin)?);
-    let figure = Figure::stacked(panels);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
     out.caption = format!(
         "Late: 400 ns, Cn2 = 1e-15, N = 64 (a gate of 38.4 m), periodogram \

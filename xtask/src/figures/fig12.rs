@@ -73,8 +73,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         }
     }
     let origin = context.provenance_of_formula(&sight.scene(context, scene(context)).to_toml());
-    let mut out = Rendered::default();
-    out.csv(table(&curves).to_csv(&origin)?);
     let styles = [Style::Dash, Style::Dot, Style::DashDot, Style::Line];
     let panel = |reference: &str| {
         let title = format!("Correlogram accumulation, {reference} signal-to-noise ratio");
@@ -90,8 +88,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             .collect();
         plot
     };
-    let figure = Figure::stacked(REFERENCES.map(|(name, _)| panel(name)));
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table(&curves), &Figure::stacked(REFERENCES.map(|(name, _)| panel(name))), &origin)?;
     out.marks = vec![sight.mark];
     out.caption = format!(
         "Root mean square over the lines of sight of the error (33) of correlogram accumulation, rho = 2 m, \

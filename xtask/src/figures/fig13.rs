@@ -57,13 +57,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .map(|(name, reference)| pair(context, &sight, name, reference, realisations))
         .collect::<Result<_, _>>()?;
     let origin = context.provenance_of_formula(&sight.scene(context, near_scene(realisations)).to_toml());
-    let mut out = Rendered::default();
     let all: Vec<&Profiles> = pairs.iter().flat_map(|p| [&p.pa, &p.ca]).collect();
-    out.csv(profiles::table(&all).to_csv(&origin)?);
     let shown = |p: &&Pair| p.pa.name != "fixed" || [0.0, 20.0].iter().any(|db| (p.pa.snr_db - db).abs() < 0.1);
     let panels = pairs.iter().filter(shown).map(|p| profiles::plot(&p.pa.title(), &[&p.pa, &p.ca]));
-    let figure = Figure::stacked(panels);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&profiles::table(&all), &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
     out.caption = format!(
         "Root mean square error against the range from the vortex centre, over the lines within 4 m of a core, less its \

@@ -27,15 +27,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         }
     }
     let origin = context.provenance_of_formula(&sight.scene(context, near_scene(realisations)).to_toml());
-    let mut out = Rendered::default();
     let every: Vec<&Profiles> = all.iter().collect();
-    out.csv(profiles::table(&every).to_csv(&origin)?);
     let panels = all.chunks(4).map(|of| {
         let four: Vec<&Profiles> = of.iter().collect();
         profiles::plot(&format!("{} signal-to-noise ratio", of[0].name), &four)
     });
-    let figure = Figure::stacked(panels);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&profiles::table(&every), &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
     out.caption = format!(
         "Root mean square error against the range from the vortex centre, over the lines within 4 m of a core, less its \

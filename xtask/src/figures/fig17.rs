@@ -43,12 +43,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             .map_err(Failure::new)?;
         fits.extend(found);
     }
-    let mut out = Rendered::default();
     let parameters = format!("profile = \"{}\"\nscans = {scans}\nsnr_db = {levels_db:?}\n", context.profile_name());
     let origin = context.provenance_of_formula(&parameters);
-    out.csv(table(&fits).to_csv(&origin)?);
-    let figure = picture(&fits);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table(&fits), &picture(&fits), &origin)?;
     out.marks = vec!["analytic pair".into()];
     out.caption = format!(
         "ANALYTIC PAIR, not a simulated flow: circulation of the vortices (one for both) and position of the left one from single \

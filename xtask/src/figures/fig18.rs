@@ -62,15 +62,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             }
         }
     }
-    let mut out = Rendered::default();
     let parameters = format!(
         "profile = \"{}\"\ntrials = {trials}\nwindow_samples = {WINDOW}\npulses = {counts:?}\n",
         context.profile_name()
     );
     let origin = context.provenance_of_formula(&parameters);
-    out.csv(table(&rows).to_csv(&origin)?);
-    let figure = picture(&rows);
-    out.picture(figure.svg(&origin)?, figure.png(&origin)?);
+    let mut out = Rendered::new(&table(&rows), &picture(&rows), &origin)?;
     out.caption = format!(
         "Every estimator in a uniform random wind, 200 ns, windows of {WINDOW} real samples, {trials} trials: standard deviation of \
          the good estimates, fraction of bad ones (Gaussian errors in a flat floor over the band) and bias, {DRAWN_PULSES} \

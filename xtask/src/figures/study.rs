@@ -211,42 +211,17 @@ fn cores_of(scene: &Scene) -> Vec<(f64, f64)> {
     }
 }
 
-/// Tables of the same columns one below the other, with a first column that tells them apart.
-pub(super) fn stacked(name: &str, parts: &[(&str, Table)]) -> Table {
-    let labels = parts.iter().flat_map(|(label, table)| {
+/// Tables of the same columns one below the other, with a last column that tells them apart.
+pub(super) fn stacked(name: &str, parts: Vec<(&str, Table)>) -> Result<Table, Failure> {
+    let labelled = parts.into_iter().map(|(label, table)| {
         let rows = table.columns().first().map_or(0, |(_, column)| match column {
             Column::Float(v) => v.len(),
             Column::Int(v) => v.len(),
             Column::Text(v) => v.len(),
         });
-        std::iter::repeat_n(*label, rows)
+        table.text(name, std::iter::repeat_n(label, rows))
     });
-    let mut out = Vec::new();
-    if let Some((_, first)) = parts.first() {
-        for (place, (column_name, kind)) in first.columns().iter().enumerate() {
-            let columns = parts.iter().map(|(_, table)| &table.columns()[place].1);
-            let joined = match kind {
-                Column::Float(_) => Column::Float(columns.flat_map(floats).collect()),
-                Column::Int(_) => Column::Int(columns.flat_map(ints).collect()),
-                Column::Text(_) => Column::Text(columns.flat_map(texts).collect()),
-            };
-            out.push((column_name.clone(), joined));
-        }
-    }
-    let table = out.into_iter().fold(Table::new(), |table, (column_name, column)| table.column(&column_name, column));
-    table.text(name, labels)
-}
-
-fn floats(column: &Column) -> Vec<f64> {
-    if let Column::Float(values) = column { values.clone() } else { Vec::new() }
-}
-
-fn ints(column: &Column) -> Vec<i64> {
-    if let Column::Int(values) = column { values.clone() } else { Vec::new() }
-}
-
-fn texts(column: &Column) -> Vec<String> {
-    if let Column::Text(values) = column { values.clone() } else { Vec::new() }
+    Ok(Table::stack(labelled)?)
 }
 
 /// Mean of some numbers and its standard error.
@@ -264,14 +239,8 @@ mod tests {
     #[test]
     fn stacked_tables_keep_their_rows_and_say_which_is_which() {
         let part = |x: f64| Table::new().float("x_m", [x, x + 1.0]).int("n", [1, 2]).text("t", ["a", "b"]);
-        let both = stacked("which", &[("one", part(1.0)), ("two", part(5.0))]);
-        let text = both.to_csv(&Provenance {
-            program: String::new(),
-            scene_toml: String::new(),
-            scene_hash: String::new(),
-            seed: 0,
-        });
-        let text = text.unwrap();
+        let both = stacked("which", vec![("one", part(1.0)), ("two", part(5.0))]).unwrap();
+        let text = both.to_csv(&crate::workspace::provenance("", 0)).unwrap();
         assert!(text.ends_with("x_m,n,t,which\n1.0,1,a,one\n2.0,2,b,one\n5.0,1,a,two\n6.0,2,b,two\n"), "{text}");
     }
 

@@ -24,9 +24,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("separation_m", ROWS.iter().map(|r| r.2 * NAUTICAL_MILE_M))
         .float("delay_s", ROWS.iter().map(|r| delay_s(r.2)))
         .float("delay_chapter_s", ROWS.iter().map(|r| r.3));
-    let mut out = Rendered::default();
     let parameters = format!("approach_speed_m_s = {APPROACH_SPEED_M_S:?}\n");
-    out.csv(table.to_csv(&context.provenance_of_formula(&parameters))?);
+    let mut out = Rendered::of_table(&table, &context.provenance_of_formula(&parameters))?;
     out.caption = "Separations behind a landing aircraft (ICAO) and the time that they take at 70 m/s.".into();
     let measured: Vec<String> = ROWS.iter().map(|r| format!("{:.1}", delay_s(r.2))).collect();
     // The chapter prints whole seconds.

@@ -73,7 +73,7 @@ mod tests {
         let temp = tempfile::tempdir().unwrap();
         let place = Place { id: "fig00", folder: temp.path().to_owned() };
         let mut rendered = Rendered { caption: "a caption".into(), ..Rendered::default() };
-        rendered.csv("a\n1\n".into());
+        rendered.files.push(("csv".into(), b"a\n1\n".to_vec()));
         rendered
             .claims
             .push(Claim { standard_error: 0.25, ..Claim::exact("F0", "fig00", "statement", "1", "2".into(), false) });

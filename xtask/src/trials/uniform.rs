@@ -9,9 +9,8 @@ use crate::Failure;
 use fixtures::{ENERGY_J, WINDOW, receiver, sampling};
 use rayon::prelude::*;
 use wakescope_estimate::{Scratch, models::Autoregression, window::SPEED_OF_LIGHT_M_S};
-use wakescope_signal::{
-    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, PulseKey, Record, Simulator, pulse_generator,
-};
+use wakescope_signal::scan::{PulseKey, pulse_generator};
+use wakescope_signal::{GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, Simulator};
 
 /// Velocities lie within this distance of rest \[m/s\]: the band ends at 19.4.
 const FASTEST_M_S: f64 = 14.0;

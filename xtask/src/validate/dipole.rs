@@ -20,7 +20,7 @@ pub(super) fn show_1250(profile: Profile) -> Result<Shown, Failure> {
 
 fn show(reynolds: f64, profile: Profile) -> Result<Shown, Failure> {
     let cells = if profile == Profile::Quick { 128 } else { 384 };
-    let case = cases::dipole_against_wall([cells, cells], [1.5; 2], reynolds, true)?;
+    let case = cases::dipole_in_a_box([cells, cells], [1.5; 2], reynolds)?;
     let (mut flow, _) = case.start()?;
     let mut history: Vec<(f64, f64, f64)> = Vec::new();
     let (mut peaks, mut wall) = (Vec::new(), Vec::new());

@@ -125,7 +125,7 @@ fn dipole(effort: usize) -> Result<Vec<Row>, Failure> {
     let words = ["first maximum of the enstrophy, relative", "Clercx and Bruneau 2006"];
     for cells in [96, 128, 192].into_iter().chain((effort > 1).then_some(384)) {
         for (name, scheme) in SCHEMES {
-            let mut case = cases::dipole_against_wall([cells, cells], [1.5; 2], 625.0, true)?;
+            let mut case = cases::dipole_in_a_box([cells, cells], [1.5; 2], 625.0)?;
             case.settings.scheme = scheme;
             case.settings.time_step = TimeStep::Courant { courant: scheme.default_courant(), longest_s: 1e-2 };
             let (largest, cost) = measured(|| {

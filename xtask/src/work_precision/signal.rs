@@ -6,9 +6,10 @@ use super::{Row, measured};
 use crate::Failure;
 use fixtures::{ENERGY_J, receiver};
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
+use wakescope_signal::literal::literal_envelope;
+use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, PulseKey, Record, SPEED_OF_LIGHT_M_S, Scratch, Simulator,
-    literal_envelope, pulse_generator,
+    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, SPEED_OF_LIGHT_M_S, Scratch, Simulator,
 };
 
 const SEED: u64 = 1;

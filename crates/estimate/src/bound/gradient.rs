@@ -11,7 +11,7 @@ use num_complex::Complex;
 
 use crate::bound::window_model::{turned, with_floor_named};
 use crate::bound::{Noise, information_complex, information_real};
-use crate::error::{Error, finite, positive};
+use crate::error::{Error, at_least_one, finite, positive};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 
 /// Second-order model of a window of a Gaussian pulse in a wind with a constant gradient along the line of sight.
@@ -43,9 +43,7 @@ impl GradientModel {
         sampling.validate()?;
         positive("pulse_sigma_s", pulse_sigma_s)?;
         noise.validate()?;
-        if window_samples == 0 {
-            return Err(Error::OutOfRange { field: "window_samples", value: 0.0, allowed: "at least 1" });
-        }
+        at_least_one("window_samples", window_samples)?;
         Ok(Self { sampling: *sampling, window_samples, pulse_sigma_s, noise })
     }
 
@@ -138,34 +136,29 @@ impl GradientModel {
         windows: f64,
     ) -> Result<GradientBound, Error> {
         with_floor_named(self.noise, self.window_samples, |noise| {
+            positive("windows", windows)?;
             let model = Self { noise, ..self.clone() };
-            model.bound_with_noise(velocity_m_s, gradient_per_s, snr, kind, windows)
+            let parts = model.covariance(velocity_m_s, gradient_per_s, snr, kind)?;
+            let information = match kind {
+                SignalKind::Complex => information_complex(parts[0].view(), &[parts[1].view(), parts[2].view()])?,
+                SignalKind::Real => {
+                    let [covariance, a, b] = parts.map(|x| x.mapv(|value| value.re));
+                    information_real(covariance.view(), &[a.view(), b.view()])?
+                }
+            };
+            GradientBound::of(&(information * windows))
         })
     }
+}
 
-    fn bound_with_noise(
-        &self,
-        velocity_m_s: f64,
-        gradient_per_s: f64,
-        snr: f64,
-        kind: SignalKind,
-        windows: f64,
-    ) -> Result<GradientBound, Error> {
-        positive("windows", windows)?;
-        let [covariance, by_velocity, by_gradient] = self.covariance(velocity_m_s, gradient_per_s, snr, kind)?;
-        let information = match kind {
-            SignalKind::Complex => information_complex(covariance.view(), &[by_velocity.view(), by_gradient.view()])?,
-            SignalKind::Real => {
-                let [covariance, a, b] = [covariance, by_velocity, by_gradient].map(|x| x.mapv(|value| value.re));
-                information_real(covariance.view(), &[a.view(), b.view()])?
-            }
-        } * windows;
+impl GradientBound {
+    fn of(information: &Array2<f64>) -> Result<Self, Error> {
         let [vv, vg, gg] = [information[[0, 0]], information[[0, 1]], information[[1, 1]]];
         let determinant = vv * gg - vg * vg;
         positive("information on velocity", vv)?;
         // what is left after rounding of the two products
         positive("information on velocity and gradient apart", determinant - 8.0 * f64::EPSILON * vv * gg)?;
-        Ok(GradientBound {
+        Ok(Self {
             velocity_m_s: (gg / determinant).sqrt(),
             gradient_per_s: (vv / determinant).sqrt(),
             velocity_alone_m_s: vv.sqrt().recip(),

@@ -9,7 +9,7 @@ use ndarray::{Array2, ArrayView2};
 use ndarray_linalg::{Lapack, Scalar};
 use num_complex::Complex;
 
-use crate::error::{Error, length, positive};
+use crate::error::{Error, finite, length, positive};
 use crate::linalg;
 use crate::window::{Sampling, SignalKind};
 
@@ -318,7 +318,7 @@ impl WindowModel {
         kind: SignalKind,
     ) -> Result<[Array2<Complex<f64>>; 2], Error> {
         positive("snr", snr)?;
-        crate::error::finite("velocity_m_s", velocity_m_s)?;
+        finite("velocity_m_s", velocity_m_s)?;
         self.sampling.validate_for(kind)?;
         let cycles = self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
         let slope = -4.0 * std::f64::consts::PI * self.sampling.period_s() / self.sampling.wavelength_m;
@@ -341,19 +341,14 @@ impl WindowModel {
     /// As [`WindowModel::covariance`] and [`bound_complex_m_s`]; [`Error::NoiseFloor`] for too small a floor of the noise.
     pub fn bound_m_s(&self, velocity_m_s: f64, snr: f64, kind: SignalKind, windows: f64) -> Result<f64, Error> {
         with_floor_named(self.noise, self.envelope.nrows(), |noise| {
-            let model = Self { noise, ..self.clone() };
-            model.bound_with_noise(velocity_m_s, snr, kind, windows)
-        })
-    }
-
-    fn bound_with_noise(&self, velocity_m_s: f64, snr: f64, kind: SignalKind, windows: f64) -> Result<f64, Error> {
-        let [covariance, derivative] = self.covariance(velocity_m_s, snr, kind)?;
-        match kind {
-            SignalKind::Complex => bound_complex_m_s(covariance.view(), derivative.view(), windows),
-            SignalKind::Real => {
-                let (covariance, derivative) = (covariance.mapv(|value| value.re), derivative.mapv(|value| value.re));
-                bound_real_m_s(covariance.view(), derivative.view(), windows)
+            let parts = Self { noise, ..self.clone() }.covariance(velocity_m_s, snr, kind)?;
+            match kind {
+                SignalKind::Complex => bound_complex_m_s(parts[0].view(), parts[1].view(), windows),
+                SignalKind::Real => {
+                    let [covariance, derivative] = parts.map(|x| x.mapv(|value| value.re));
+                    bound_real_m_s(covariance.view(), derivative.view(), windows)
+                }
             }
-        }
+        })
     }
 }

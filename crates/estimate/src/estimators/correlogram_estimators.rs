@@ -34,8 +34,8 @@ impl LagWindowPeak {
         refinement: Refinement,
     ) -> Result<Self, Error> {
         check_order(reach_lags, lags)?;
-        let turn = std::f64::consts::PI / reach_lags as f64;
-        let weights: Vec<f64> = (0..reach_lags).map(|m| 0.5 + 0.5 * (turn * m as f64).cos()).collect();
+        let step_rad = std::f64::consts::PI / reach_lags as f64;
+        let weights: Vec<f64> = (0..reach_lags).map(|m| 0.5 + 0.5 * (step_rad * m as f64).cos()).collect();
         let triangle = |m: usize| 1.0 - m as f64 / lags as f64;
         let seen: Vec<f64> = weights.iter().enumerate().map(|(m, weight)| weight * triangle(m)).collect();
         let peak =
@@ -76,7 +76,7 @@ pub struct PulsePair {
     lags: usize,
     band: SpectralPeak,
     /// exp(2 pi i f / F_s) at the frequencies of the band.
-    turns: Vec<Complex<f64>>,
+    phasors: Vec<Complex<f64>>,
 }
 
 impl PulsePair {
@@ -87,15 +87,16 @@ impl PulsePair {
     pub fn new(sampling: &Sampling, kind: SignalKind, lags: usize) -> Result<Self, Error> {
         check_order(1, lags)?;
         let band = SpectralPeak::new(sampling, kind, lags, 4 * lags, Refinement::None)?;
-        let turn = std::f64::consts::TAU * sampling.period_s();
-        let turns = band.band_frequencies_hz().iter().map(|f_hz| Complex::from_polar(1.0, turn * f_hz)).collect();
-        Ok(Self { sampling: *sampling, kind, lags, band, turns })
+        let rad_per_hz = std::f64::consts::TAU * sampling.period_s();
+        let phasors =
+            band.band_frequencies_hz().iter().map(|f_hz| Complex::from_polar(1.0, rad_per_hz * f_hz)).collect();
+        Ok(Self { sampling: *sampling, kind, lags, band, phasors })
     }
 
     /// Lag 1 of the band-limited analytic signal.
     fn band_limited(&self, mean: &[f64], scratch: &mut Scratch) -> Option<Complex<f64>> {
         let density = self.band.band_density(mean, scratch).ok()?;
-        Some(density.iter().zip(&self.turns).map(|(s, turn)| turn * s).sum())
+        Some(density.iter().zip(&self.phasors).map(|(s, phasor)| phasor * s).sum())
     }
 }
 

@@ -20,7 +20,7 @@ use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 use crate::bound::{GradientModel, Noise};
-use crate::error::{Error, finite, positive};
+use crate::error::{Error, finite, increasing, positive};
 use crate::estimators::gradient_tapers::{Tapers, band_lag, expected_lags, tapers};
 use crate::estimators::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
 use crate::estimators::{Estimator, GateVelocity, NoiseTest, Quality, Refinement, Statistic};
@@ -97,9 +97,7 @@ impl<S: Sample> GradientLikelihood<S> {
             return Err(Error::Empty { field: "gradient_per_s" });
         }
         gradient_per_s.iter().try_for_each(|&g| finite("gradient_per_s", g))?;
-        if let Some(pair) = gradient_per_s.windows(2).find(|pair| pair[1] <= pair[0]) {
-            return Err(Error::OutOfRange { field: "gradient_per_s", value: pair[1], allowed: "increasing" });
-        }
+        increasing("gradient_per_s", gradient_per_s)?;
         let (sampling, n) = (model.sampling(), model.window_samples());
         let search = PeakSearch::new(sampling, SignalKind::Complex, padded_samples, n)?;
         sampling.validate_for(S::KIND)?;

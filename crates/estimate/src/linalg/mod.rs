@@ -14,7 +14,7 @@ mod openblas;
 use ndarray::{Array1, Array2, ArrayView2, OwnedRepr, ShapeBuilder};
 use ndarray_linalg::{Eigh, FactorizeInto, LUFactorized, Lapack, Scalar, Solve, UPLO};
 
-use crate::error::Error;
+use crate::error::{Error, length};
 
 /// Residual allowed per unit of the matrix's norm and order.
 const RESIDUAL: f64 = 1e-12;
@@ -31,7 +31,7 @@ fn columns<T: Scalar<Real = f64> + Lapack>(field: &'static str, a: ArrayView2<'_
     if order == 0 {
         return Err(Error::Empty { field });
     }
-    crate::error::length(field, order, rows)?;
+    length(field, order, rows)?;
     if a.iter().any(|value| !value.abs().is_finite()) {
         return Err(Error::Linalg { what: field, order, reason: "holds a value that is not finite" });
     }
@@ -74,7 +74,7 @@ impl<'a, T: Scalar<Real = f64> + Lapack> Factors<'a, T> {
     /// [`Error::Linalg`] if A is singular to working precision, [`Error::Length`] if the shapes differ.
     pub(crate) fn solve(&self, b: ArrayView2<'_, T>) -> Result<Array2<T>, Error> {
         let (a, order) = (&self.matrix, self.matrix.nrows());
-        crate::error::length("right-hand side", order, b.nrows())?;
+        length("right-hand side", order, b.nrows())?;
         let mut x = Array2::zeros(b.raw_dim());
         for (target, column) in x.columns_mut().into_iter().zip(b.columns()) {
             let mut target: ndarray::ArrayViewMut1<'_, T> = target;
@@ -154,6 +154,19 @@ pub(crate) fn hermitian_eigen<T: Scalar<Real = f64> + Lapack>(
     } else {
         Err(failed("is not Hermitian, or its eigenvectors are those of the conjugate"))
     }
+}
+
+/// Scalar product, in eight partial sums that the compiler keeps in vector registers.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a.zip(b) {
+        for lane in 0..8 {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use ndarray::ArrayView2;
 use num_complex::Complex;
 
-use crate::error::{Error, length};
+use crate::error::{Error, length, not_negative};
 use crate::estimators::{Estimator, GateVelocity, Quality, Statistic};
 use crate::map::region::effective;
 use crate::map::{Chord, PolarPoint, ScanGeometry, WindowCorrelation};
@@ -47,11 +47,8 @@ impl Radius {
             Self::Fixed { radius_m } => *radius_m,
             Self::OfRange(radius_m) => radius_m(range_m),
         };
-        if radius_m.is_finite() && radius_m >= 0.0 {
-            Ok(radius_m)
-        } else {
-            Err(Error::OutOfRange { field: "radius_m", value: radius_m, allowed: "finite and at least 0" })
-        }
+        not_negative("radius_m", radius_m)?;
+        Ok(radius_m)
     }
 }
 

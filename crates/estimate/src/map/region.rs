@@ -4,7 +4,7 @@
 //! Check: against the distance of every window; the accumulation levels 11, 43, 169 for 1, 2, 4 m
 //! at 400 m with 0.5 m between lines and 0.6 m between windows.
 
-use crate::error::{Error, length};
+use crate::error::{Error, at_least_one, increasing, length, not_negative, positive};
 use crate::map::rays::{Rays, check_angles};
 use crate::window::{Gates, Sampling};
 
@@ -84,12 +84,8 @@ impl ScanGeometry {
         record_samples: usize,
     ) -> Result<Self, Error> {
         check_angles(elevation_rad)?;
-        if let Some(pair) = elevation_rad.windows(2).find(|pair| pair[1] <= pair[0]) {
-            return Err(Error::OutOfRange { field: "elevation_rad", value: pair[1], allowed: "increasing" });
-        }
-        if rays_per_line == 0 {
-            return Err(Error::OutOfRange { field: "rays_per_line", value: 0.0, allowed: "at least 1" });
-        }
+        increasing("elevation_rad", elevation_rad)?;
+        at_least_one("rays_per_line", rays_per_line)?;
         Self::of(elevation_rad.to_vec(), Rays::Regular { per_line: rays_per_line }, sampling, gates, record_samples)
     }
 
@@ -236,7 +232,7 @@ impl WindowCorrelation {
                 .sum()
         };
         let power = at(0);
-        crate::error::positive("power of the window", power)?;
+        positive("power of the window", power)?;
         let gamma: Vec<f64> =
             (0..gates.max(1)).map(|gate| (at(gate) / power).abs()).take_while(|gamma| *gamma > 1e-8).collect();
         Self::from_gate_lags(&gamma)
@@ -257,15 +253,9 @@ impl WindowCorrelation {
         pulse_sigma_s: f64,
         noise_to_signal: f64,
     ) -> Result<Self, Error> {
-        crate::error::positive("pulse_sigma_s", pulse_sigma_s)?;
-        crate::error::positive("sample_rate_hz", sample_rate_hz)?;
-        if !(noise_to_signal >= 0.0 && noise_to_signal.is_finite()) {
-            return Err(Error::OutOfRange {
-                field: "noise_to_signal",
-                value: noise_to_signal,
-                allowed: "finite and at least 0",
-            });
-        }
+        positive("pulse_sigma_s", pulse_sigma_s)?;
+        positive("sample_rate_hz", sample_rate_hz)?;
+        not_negative("noise_to_signal", noise_to_signal)?;
         length("weights", gates.window_samples, weights.len())?;
         Self::from_covariance(weights, gates.step_samples, count, |lag_samples| {
             let lag = lag_samples as f64 / (sample_rate_hz * pulse_sigma_s);

@@ -17,7 +17,7 @@
 
 use ndarray::{Array2, ArrayView2};
 
-use crate::error::{Error, length, positive};
+use crate::error::{Error, length, not_negative, positive};
 
 /// Cubic B-spline at the integers.
 const SPLINE: [f64; 5] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
@@ -93,18 +93,16 @@ pub fn shrink_to_guess(
     }
     positive("line_step", options.line_step as f64)?;
     positive("gate_step", options.gate_step as f64)?;
-    if !(options.factor >= 0.0 && options.factor.is_finite()) {
-        return Err(Error::OutOfRange { field: "factor", value: options.factor, allowed: "finite and at least 0" });
-    }
+    not_negative("factor", options.factor)?;
     let mut residual = Layer::new(&measured_m_s - &seen_m_s);
     let mut noise = Layer::new(half_difference_m_s.to_owned());
     let mut correction = Array2::zeros(measured_m_s.dim());
     let (mut line_step, mut gate_step) = (options.line_step, options.gate_step);
     for _ in 0..options.scales {
         let (smooth, quiet) = (residual.smoothed(line_step, gate_step), noise.smoothed(line_step, gate_step));
-        let (detail, rustle) = (residual.less(&smooth), noise.less(&quiet));
+        let (detail, noise_detail) = (residual.less(&smooth), noise.less(&quiet));
         let energy = |layer: &Layer| layer.squared().smoothed(line_step, gate_step);
-        let (total, own) = (energy(&detail), energy(&rustle));
+        let (total, own) = (energy(&detail), energy(&noise_detail));
         for ((place, sum), detail) in correction.indexed_iter_mut().zip(&detail.values) {
             let share = 1.0 - options.factor * own.values[place] / total.values[place];
             // no noise known or nothing there: 0/0 and what has no weight count as noise

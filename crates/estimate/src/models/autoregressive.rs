@@ -11,7 +11,7 @@
 
 use num_complex::Complex;
 
-use crate::error::Error;
+use crate::error::{Error, positive};
 use crate::models::levinson::reflect;
 use crate::models::poles::roots;
 use crate::window::{MissingSamples, Sample, Sampling, SignalKind};
@@ -48,7 +48,7 @@ impl OrderChoice {
             Self::Akaike { samples } => (samples, 2.0),
             Self::DescriptionLength { samples } => (samples, samples.ln()),
         };
-        crate::error::positive("samples", samples)?;
+        positive("samples", samples)?;
         if reflection.is_empty() {
             return Err(Error::Empty { field: "reflection" });
         }
@@ -85,9 +85,8 @@ impl Autoregression {
     /// [`Error::OutOfRange`] if the order is 0 or not below the number of lags, if there is no power, or if the
     /// correlogram is not positive definite.
     pub fn yule_walker(correlogram: &[f64], kind: SignalKind, order: usize) -> Result<Self, Error> {
-        check_order(order, correlogram.len() / kind.lag_numbers(1))?;
         let mut model = Self::default();
-        model.solve(correlogram, kind, order, &mut Vec::with_capacity(4 * order))?;
+        model.fit(correlogram, kind, order, &mut Vec::with_capacity(4 * order))?;
         Ok(model)
     }
 
@@ -117,7 +116,7 @@ impl Autoregression {
         self.coefficients.clear();
         self.reflection.clear();
         self.noise_power = kind.lag(correlogram, 0).re;
-        crate::error::positive("lag 0 of the correlogram", self.noise_power)?;
+        positive("lag 0 of the correlogram", self.noise_power)?;
         match kind {
             SignalKind::Real => {
                 let found = reflect(correlogram, order, work).map_err(unstable)?;
@@ -181,7 +180,7 @@ impl Autoregression {
         let mut forward: Vec<Complex<f64>> = window.iter().map(scaled).collect();
         let mut backward = forward.clone();
         let power = forward.iter().map(|x| x.norm_sqr()).sum::<f64>() / window.len() as f64;
-        crate::error::positive("power of the window", power)?;
+        positive("power of the window", power)?;
         let mut model = Self { noise_power: power, ..Self::default() };
         for m in 1..=order {
             let pairs = || forward[m..].iter().zip(&backward[m - 1..window.len() - 1]);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner};
 
-use crate::error::{Error, length};
+use crate::error::{Error, at_least_one, length};
 use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Transform of a correlogram to `padded_samples` equidistant frequencies.
@@ -28,11 +28,8 @@ impl LagSpectrum {
     /// # Errors
     /// [`Error::OutOfRange`] if one of the two numbers is 0.
     pub fn new(kind: SignalKind, lags: usize, padded_samples: usize) -> Result<Self, Error> {
-        for (field, value) in [("lags", lags), ("padded_samples", padded_samples)] {
-            if value == 0 {
-                return Err(Error::OutOfRange { field, value: 0.0, allowed: "at least 1" });
-            }
-        }
+        at_least_one("lags", lags)?;
+        at_least_one("padded_samples", padded_samples)?;
         let inverse = RealFftPlanner::new().plan_fft_inverse(padded_samples);
         Ok(Self { kind, lags, inverse })
     }

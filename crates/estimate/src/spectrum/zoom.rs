@@ -9,7 +9,7 @@
 
 use multiversion::multiversion;
 
-use crate::error::{Error, length};
+use crate::error::{Error, at_least_one, finite, length};
 use crate::window::{Sampling, SignalKind};
 
 /// Frequencies that are worked on together; tables are padded to a multiple of it.
@@ -32,13 +32,11 @@ impl ZoomSpectrum {
     /// [`Error::OutOfRange`] without lags or for a frequency that is not finite, [`Error::Empty`] without frequencies.
     pub fn new(kind: SignalKind, lags: usize, sampling: &Sampling, frequency_hz: &[f64]) -> Result<Self, Error> {
         sampling.validate()?;
-        if lags == 0 {
-            return Err(Error::OutOfRange { field: "lags", value: 0.0, allowed: "at least 1" });
-        }
+        at_least_one("lags", lags)?;
         let Some(last_hz) = frequency_hz.last() else {
             return Err(Error::Empty { field: "frequency_hz" });
         };
-        frequency_hz.iter().try_for_each(|&f_hz| crate::error::finite("frequency_hz", f_hz))?;
+        frequency_hz.iter().try_for_each(|&f_hz| finite("frequency_hz", f_hz))?;
         let padding = frequency_hz.len().next_multiple_of(LANES) - frequency_hz.len();
         let padded = frequency_hz.iter().chain(std::iter::repeat_n(last_hz, padding));
         let (sin, cos) = padded.map(|f_hz| (std::f64::consts::TAU * f_hz / sampling.sample_rate_hz).sin_cos()).unzip();

@@ -3,7 +3,7 @@
 //! Computes R = c (t_p + N T_s / 2) / 2 for a window that starts at t_p after the centre of the pulse
 //! has left. Check: the centre lies half a gate, 19.2 m for 64 samples at 250 MHz, beyond the start.
 
-use crate::error::{Error, finite};
+use crate::error::{Error, at_least_one, finite};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sampling};
 
 /// Windows of `window_samples` samples, `step_samples` apart, in every record of a scan.
@@ -33,11 +33,8 @@ impl Gates {
     /// # Errors
     /// [`Error::OutOfRange`] with the field at fault.
     pub fn validate(&self) -> Result<(), Error> {
-        for (field, samples) in [("window_samples", self.window_samples), ("step_samples", self.step_samples)] {
-            if samples == 0 {
-                return Err(Error::OutOfRange { field, value: 0.0, allowed: "at least 1" });
-            }
-        }
+        at_least_one("window_samples", self.window_samples)?;
+        at_least_one("step_samples", self.step_samples)?;
         finite("first_sample_time_s", self.first_sample_time_s)
     }
 

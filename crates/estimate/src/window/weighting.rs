@@ -3,7 +3,7 @@
 //! All are symmetric about the centre of the window, (N - 1)/2 samples after its first one.
 //! Check: dividing a periodogram by the sum of h^2 makes white noise read its variance for each of them.
 
-use crate::error::{Error, positive};
+use crate::error::{Error, at_least_one, positive};
 
 /// Weighting h(n T_s) of (29).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,9 +33,7 @@ impl Weighting {
     /// # Errors
     /// [`Error::OutOfRange`] for an empty window or a Gaussian without positive width.
     pub fn weights(&self, window_samples: usize) -> Result<Vec<f64>, Error> {
-        if window_samples == 0 {
-            return Err(Error::OutOfRange { field: "window_samples", value: 0.0, allowed: "at least 1" });
-        }
+        at_least_one("window_samples", window_samples)?;
         let length = window_samples as f64;
         let centre = 0.5 * (length - 1.0);
         let index = (0..window_samples).map(|n| n as f64);

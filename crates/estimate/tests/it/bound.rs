@@ -98,7 +98,7 @@ fn bounds_with_little_noise_outside_the_band_are_right_or_refused() {
                 panic!("{kind} {refused}: {error}");
             };
             assert!(floor == refused && (1e-12..1e-11).contains(&least), "{error}");
-            assert!(error.to_string().contains(&format!("floor = {refused}")), "{error}");
+            assert!(error.to_string().contains(&format!("floor = {refused:?}")), "{error}");
             // the bound goes on falling slowly
             assert_relative_eq!(
                 with_floor(least, kind).unwrap(),

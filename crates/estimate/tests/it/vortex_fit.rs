@@ -1,6 +1,6 @@
 //! Fits of the vortex pair: to maps that are exact, noisy or hold nothing, and to raw signals against the bound.
 
-use crate::fixtures::normal;
+use crate::fixtures::{normal, table_2};
 use approx::assert_relative_eq;
 use ndarray::Array2;
 use num_complex::Complex;
@@ -8,8 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::vortex_fit::{
     CoreProfile, EstimatorResponse, FreeParameters, Loss, MapFit, MapFitOptions, Parameter, Powers, PulseShape,
-    RangeKernel, ScanModel, ScanSetup, Sharing, SignalFitOptions, Starts, VelocityMap, Vortex, Wake, WakeModel,
-    WindFit, fit_map, fit_map_of_estimator, fit_signals,
+    RangeKernel, ScanModel, ScanSetup, Sharing, SignalFitOptions, Starts, VelocityMap, Wake, WakeModel, WindFit,
+    fit_map, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
     Correlogram, Error, Refinement, Sampling, SignalKind, SpectralPeak, Weighting, bound::Noise,
@@ -19,18 +19,8 @@ use wakescope_estimate::{
 const SIGMA_S: f64 = 120.112e-9;
 
 fn wake(left_m: f64, spacing_m: f64, height_m: f64) -> Wake {
-    let vortex = |circulation_m2_s, lateral_position_m, height_m, core_radius_m| Vortex {
-        circulation_m2_s,
-        lateral_position_m,
-        height_m,
-        core_radius_m,
-    };
-    Wake {
-        left: vortex(480.0, left_m, height_m, 2.0),
-        right: vortex(510.0, left_m + spacing_m, height_m + 3.0, 2.6),
-        lateral_wind_m_s: 1.5,
-        wind_shear_per_s: 0.02,
-    }
+    let right_m = left_m + spacing_m;
+    Wake::from_array(&[480.0, 510.0, left_m, height_m, right_m, height_m + 3.0, 2.0, 2.6, 1.5, 0.02])
 }
 
 fn kernel() -> RangeKernel {
@@ -98,7 +88,7 @@ fn exact_maps_give_the_wake_back_without_prior_knowledge() {
 /// The peak of a periodogram follows the fast side of a core: taken for a mean it gives far too much circulation.
 #[test]
 fn exact_maps_of_peaks_give_the_wake_back_where_means_mislead() {
-    let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();
+    let sampling = table_2();
     let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, 64).unwrap();
     let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
@@ -126,7 +116,7 @@ fn exact_maps_of_peaks_give_the_wake_back_where_means_mislead() {
 
 #[test]
 fn a_core_that_the_regions_do_not_resolve_keeps_the_least_radius_and_says_so() {
-    let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();
+    let sampling = table_2();
     let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
     let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
@@ -234,6 +224,20 @@ fn least_squares_and_the_robust_loss_agree_on_clean_maps() {
     assert!((robust.wake.left.circulation_m2_s - squares.wake.left.circulation_m2_s).abs() < sigma);
 }
 
+/// So many lines from an elevation on, so far apart; complex records at 50 MHz from a range on.
+fn scan((lines, first_rad, step_rad): (u32, f64, f64), first_m: f64, record_samples: usize) -> ScanSetup {
+    ScanSetup {
+        sampling: Sampling::baseband(50e6, 1.55e-6, 50e6).unwrap(),
+        kind: SignalKind::Complex,
+        noise: Noise::White,
+        pulse: PulseShape::gaussian(SIGMA_S).unwrap(),
+        wake: WakeModel::default(),
+        elevation_rad: (0..lines).map(|i| first_rad + step_rad * f64::from(i)).collect(),
+        first_sample_time_s: 2.0 * first_m / SPEED_OF_LIGHT_M_S,
+        record_samples,
+    }
+}
+
 /// Signals of one scan as a sum over layers of 20 cm, complex at 50 MHz, with white noise of power 1.
 fn signals(setup: &ScanSetup, wake: &Wake, snr: f64, rng: &mut Xoshiro256PlusPlus) -> Array2<Complex<f64>> {
     let samples = setup.record_samples;
@@ -268,22 +272,8 @@ fn signals(setup: &ScanSetup, wake: &Wake, snr: f64, rng: &mut Xoshiro256PlusPlu
 /// scans allow 1.5 x 1.64), without bias.
 #[test]
 fn likelihood_fits_of_raw_signals_are_unbiased_and_near_the_bound() {
-    let truth = Wake {
-        left: Vortex { circulation_m2_s: 500.0, lateral_position_m: 376.5, height_m: 47.0, core_radius_m: 2.35 },
-        right: Vortex { circulation_m2_s: 500.0, lateral_position_m: 423.5, height_m: 47.0, core_radius_m: 2.35 },
-        lateral_wind_m_s: 0.0,
-        wind_shear_per_s: 0.0,
-    };
-    let setup = ScanSetup {
-        sampling: Sampling::baseband(50e6, 1.55e-6, 50e6).unwrap(),
-        kind: SignalKind::Complex,
-        noise: Noise::White,
-        pulse: PulseShape::gaussian(SIGMA_S).unwrap(),
-        wake: WakeModel::default(),
-        elevation_rad: (0..45).map(|i| 0.085 + 0.001_5 * f64::from(i)).collect(),
-        first_sample_time_s: 2.0 * 340.0 / SPEED_OF_LIGHT_M_S,
-        record_samples: 42,
-    };
+    let truth = Wake::from_array(&[500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.35, 2.35, 0.0, 0.0]);
+    let setup = scan((45, 0.085, 0.001_5), 340.0, 42);
     let snr = 4.0;
     let free =
         FreeParameters { core_radius: Sharing::Fixed, wind: WindFit::Fixed, ..FreeParameters::common_circulation() };
@@ -329,28 +319,8 @@ fn likelihood_fits_of_raw_signals_are_unbiased_and_near_the_bound() {
 /// Cores of 7.5 % of the spacing: an ascent from the usual 4.5 % alone ends on a lower top, with other cores.
 #[test]
 fn several_starts_find_a_higher_top_than_the_usual_core_alone() {
-    let vortex = |circulation_m2_s, lateral_position_m, core_radius_m| Vortex {
-        circulation_m2_s,
-        lateral_position_m,
-        height_m: 30.0,
-        core_radius_m,
-    };
-    let pair = |core_m| Wake {
-        left: vortex(380.0, 380.0, core_m),
-        right: vortex(340.0, 420.0, core_m),
-        lateral_wind_m_s: 2.0,
-        wind_shear_per_s: 0.0,
-    };
-    let setup = ScanSetup {
-        sampling: Sampling::baseband(50e6, 1.55e-6, 50e6).unwrap(),
-        kind: SignalKind::Complex,
-        noise: Noise::White,
-        pulse: PulseShape::gaussian(SIGMA_S).unwrap(),
-        wake: WakeModel::default(),
-        elevation_rad: (0..40).map(|i| 0.05 + 0.001_25 * f64::from(i)).collect(),
-        first_sample_time_s: 2.0 * 345.0 / SPEED_OF_LIGHT_M_S,
-        record_samples: 38,
-    };
+    let pair = |core_m| Wake::from_array(&[380.0, 340.0, 380.0, 30.0, 420.0, 30.0, core_m, core_m, 2.0, 0.0]);
+    let setup = scan((40, 0.05, 0.001_25), 345.0, 38);
     let snr = 1.0;
     let free = FreeParameters { core_radius: Sharing::Common, ..Default::default() };
     let records = signals(&setup, &pair(3.0), snr, &mut Xoshiro256PlusPlus::seed_from_u64(0));
@@ -369,16 +339,7 @@ fn several_starts_find_a_higher_top_than_the_usual_core_alone() {
 #[test]
 fn fits_have_the_same_bits_when_repeated_and_say_when_they_do_not_converge() {
     let truth = wake(376.5, 47.0, 45.0);
-    let setup = ScanSetup {
-        sampling: Sampling::baseband(50e6, 1.55e-6, 50e6).unwrap(),
-        kind: SignalKind::Complex,
-        noise: Noise::White,
-        pulse: PulseShape::gaussian(SIGMA_S).unwrap(),
-        wake: WakeModel::default(),
-        elevation_rad: (0..12).map(|i| 0.09 + 0.005 * f64::from(i)).collect(),
-        first_sample_time_s: 2.0 * 350.0 / SPEED_OF_LIGHT_M_S,
-        record_samples: 36,
-    };
+    let setup = scan((12, 0.09, 0.005), 350.0, 36);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
     let records = signals(&setup, &truth, 4.0, &mut rng);
     let free = FreeParameters { core_radius: Sharing::Fixed, ..FreeParameters::common_circulation() };

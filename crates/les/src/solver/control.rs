@@ -106,10 +106,8 @@ impl Flow {
 
     /// Indices along x, y, z of a place in memory.
     pub(super) fn cell(&self, place: usize) -> [usize; 3] {
-        let [n0, n1, _] = self.layout.shape.n;
-        let index = [place % n0, place / n0 % n1, place / (n0 * n1)];
         let mut cell = [0; 3];
-        for (axis, index) in index.into_iter().enumerate() {
+        for (axis, index) in self.layout.shape.index(place).into_iter().enumerate() {
             cell[self.layout.direction[axis]] = index;
         }
         cell

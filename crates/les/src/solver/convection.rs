@@ -8,31 +8,33 @@ use super::momentum::{Momentum, Scratch};
 use super::rows::{HALO, add_product, add_transport, even_mean, pad};
 use super::transport::{MEAN, Transport};
 
+/// The row that is computed: indices `j` and `k` along the axes 1 and 2.
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    ops: &'a Momentum,
+    velocity: [&'a [f64]; 3],
+    j: usize,
+    k: usize,
+}
+
 impl Scratch {
     /// Convection of one row into `self.convection`.
     pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
-        convection_row(ops, velocity, j, k, &mut self.convection, &mut self.padded, &mut self.flux);
+        convection_row(Row { ops, velocity, j, k }, &mut self.convection, &mut self.padded, &mut self.flux);
     }
 }
 
 /// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn convection_row(
-    ops: &Momentum,
-    velocity: [&[f64]; 3],
-    j: usize,
-    k: usize,
-    out: &mut [f64],
-    padded: &mut [Vec<f64>; 2],
-    flux: &mut [Vec<f64>; 4],
-) {
+fn convection_row(row: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux: &mut [Vec<f64>; 4]) {
+    let Row { ops, j, k, .. } = row;
     out.fill(0.0);
     if !ops.thin[0] {
-        along_row(ops, velocity, j, k, out, padded, flux);
+        along_row(row, out, padded, flux);
     }
     for axis in 1..3 {
         if !ops.thin[axis] {
-            across_rows(ops, velocity, j, k, axis, out, padded, flux);
+            across_rows(row, axis, out, padded, flux);
         }
     }
     match ops.axis {
@@ -52,15 +54,8 @@ fn convection_row(
 
 /// The part of the convection along axis 0.
 #[inline(always)]
-fn along_row(
-    ops: &Momentum,
-    velocity: [&[f64]; 3],
-    j: usize,
-    k: usize,
-    out: &mut [f64],
-    padded: &mut [Vec<f64>; 2],
-    flux: &mut [Vec<f64>; 4],
-) {
+fn along_row(target: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux: &mut [Vec<f64>; 4]) {
+    let Row { ops, velocity, j, k } = target;
     let n = out.len();
     let periodic = ops.periodic[0];
     let start = ops.start(j, k);
@@ -81,7 +76,7 @@ fn along_row(
             irregular_columns(transport, out, &velocity[0][start..start + n]);
         }
     } else {
-        flux_row(ops, velocity, 0, j, k, 0, &mut flux[0], fluxes);
+        flux_row(target, 0, 0, &mut flux[0], fluxes);
         pad(fluxes, &flux[0], periodic);
         let at = |offset: usize| &fluxes[HALO + offset - 1..];
         let q = |offset: usize| &values[HALO + offset - 3..];
@@ -120,16 +115,8 @@ fn irregular(transport: &Transport, n: usize) -> impl Iterator<Item = usize> + u
 
 /// The part of the convection along axis 1 or 2.
 #[inline(always)]
-fn across_rows(
-    ops: &Momentum,
-    velocity: [&[f64]; 3],
-    j: usize,
-    k: usize,
-    axis: usize,
-    out: &mut [f64],
-    padded: &mut [Vec<f64>; 2],
-    flux: &mut [Vec<f64>; 4],
-) {
+fn across_rows(target: Row<'_>, axis: usize, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux: &mut [Vec<f64>; 4]) {
+    let Row { ops, velocity, j, k } = target;
     let length = out.len();
     let index = if axis == 1 { j } else { k };
     let count = ops.n[axis];
@@ -151,7 +138,7 @@ fn across_rows(
             mean_rows(flux, q);
         } else {
             for (slot, out) in flux.iter_mut().enumerate() {
-                flux_row(ops, velocity, axis, j, k, at(slot + 2), out, &mut padded[0]);
+                flux_row(target, axis, at(slot + 2), out, &mut padded[0]);
             }
         }
         add_transport(out, scale, transport.stencil, flux.each_ref().map(Vec::as_slice), q);
@@ -160,7 +147,7 @@ fn across_rows(
             if axis == ops.axis {
                 add_product(out, scale * c, row(face), row(cell));
             } else {
-                flux_row(ops, velocity, axis, j, k, face, &mut flux[0], &mut padded[0]);
+                flux_row(target, axis, face, &mut flux[0], &mut padded[0]);
                 add_product(out, scale * c, &flux[0], row(cell));
             }
         }
@@ -182,16 +169,8 @@ fn mean_rows(flux: &mut [Vec<f64>; 4], rows: [&[f64]; 7]) {
 
 /// The flux along `along` through its face `face`, weighted along the component's axis and brought to its faces.
 #[inline(always)]
-fn flux_row(
-    ops: &Momentum,
-    velocity: [&[f64]; 3],
-    along: usize,
-    j: usize,
-    k: usize,
-    face: usize,
-    out: &mut [f64],
-    padded: &mut [f64],
-) {
+fn flux_row(target: Row<'_>, along: usize, face: usize, out: &mut [f64], padded: &mut [f64]) {
+    let Row { ops, velocity, mut j, mut k } = target;
     let field = velocity[along];
     let n = out.len();
     if ops.axis == 0 {
@@ -206,7 +185,6 @@ fn flux_row(
         ops.flux_mean.add_along(out, row, padded);
         return;
     }
-    let (mut j, mut k) = (j, k);
     match along {
         1 => j = face,
         2 => k = face,

@@ -27,9 +27,19 @@ impl Shape {
         self.n[0] * self.n[1]
     }
 
+    /// Indices along the axes of a place in memory.
+    pub(crate) fn index(self, place: usize) -> [usize; 3] {
+        [place % self.n[0], place / self.n[0] % self.n[1], place / self.plane()]
+    }
+
+    /// Place in memory of indices along the axes.
+    pub(crate) fn place(self, [i, j, k]: [usize; 3]) -> usize {
+        (k * self.n[1] + j) * self.n[0] + i
+    }
+
     /// Places of the row at indices `j` of axis 1 and `k` of axis 2.
     pub(crate) fn row(self, j: usize, k: usize) -> std::ops::Range<usize> {
-        let start = (k * self.n[1] + j) * self.n[0];
+        let start = self.place([0, j, k]);
         start..start + self.n[0]
     }
 }

@@ -32,14 +32,10 @@ impl Transform {
         let rule = GaussLegendre::new(16);
         let panels = 2 + (largest_rad_m * (a - b) / 8.0) as usize;
         let peak = telescope.peak_irradiance_per_m2().sqrt();
-        let h = (a - b) / panels as f64;
-        let mut nodes = Vec::with_capacity(16 * panels);
-        for i in 0..panels {
-            let low = b + h * i as f64;
-            for (r, w) in rule.mapped(low, low + h) {
-                nodes.push((r, 2.0 * PI * w * r * peak * telescope.relative_irradiance(r).sqrt()));
-            }
-        }
+        let nodes: Vec<(f64, f64)> = rule
+            .on_panels(b, a, panels)
+            .map(|(r, w)| (r, 2.0 * PI * w * r * peak * telescope.relative_irradiance(r).sqrt()))
+            .collect();
         let count = (largest_rad_m / step_rad_m) as usize + 4;
         let value = (0..count)
             .map(|i| {

@@ -34,9 +34,9 @@ use rustfft::num_complex::Complex;
 use std::ops::ControlFlow;
 
 /// Realisations of one unit of work; their sums are added in order.
-const GROUP: usize = 8;
+pub(crate) const GROUP: usize = 8;
 /// Groups between two calls of the progress function (and two tests for the end).
-const GROUPS_PER_WAVE: usize = 8;
+pub(crate) const GROUPS_PER_WAVE: usize = 8;
 
 /// When the Monte Carlo ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -269,7 +269,14 @@ impl MonteCarlo {
             .map(|&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r))
             .collect::<Result<Vec<_>, _>>()?;
         let mut lost_power_fraction = Vec::new();
-        let (mut mono, mut bi) = (Columns::default(), Columns::default());
+        let none = Vec::new;
+        let mut mono = EfficiencyProfile {
+            range_m: self.range_m.clone(),
+            mean: none(),
+            standard_deviation: none(),
+            standard_error: none(),
+        };
+        let mut bi = mono.clone();
         let [mut single, mut pairs] = [Vec::new(), Vec::new()];
         for (i, samples) in sums.samples.iter().enumerate() {
             let (fraction, _) = mean_and_variance(samples.iter().map(|s| s.lost));
@@ -281,26 +288,26 @@ impl MonteCarlo {
             single.push(samples.iter().flat_map(|s| s.single.iter().map(|eta| factor * eta)).collect());
             pairs.push(sums.products[i].iter().map(|eta| factor * eta).collect());
             if prepared.screens.is_none() {
-                mono.push(factor * grid_free_space[i], 0.0, 0.0);
-                bi.push(factor * grid_free_space[i], 0.0, 0.0);
+                push(&mut mono, factor * grid_free_space[i], 0.0, 0.0);
+                push(&mut bi, factor * grid_free_space[i], 0.0, 0.0);
                 continue;
             }
             let (mean, variance) = mean_and_variance(samples.iter().map(|s| s.same_path));
             let spread = mean_and_variance(samples.iter().flat_map(|s| s.single.iter().copied())).1.sqrt();
-            mono.push(factor * mean, factor * spread, factor * (variance / samples.len() as f64).sqrt());
+            push(&mut mono, factor * mean, factor * spread, factor * (variance / samples.len() as f64).sqrt());
             if samples.len() > 1 {
                 let list: Vec<&Sample> = samples.iter().collect();
                 let second = if prepared.start.len() > 1 { &sums.planes[1][i] } else { &sums.planes[0][i] };
                 let total = prepared.folding.overlap(&sums.planes[0][i], second) * prepared.scale[i];
                 let (mean, error) = bistatic(&list, total, &prepared.folding, prepared.scale[i]);
                 let spread = mean_and_variance(sums.products[i].iter().copied()).1.sqrt();
-                bi.push(factor * mean, factor * spread, factor * error);
+                push(&mut bi, factor * mean, factor * spread, factor * error);
             }
         }
         let has_pairs = !bi.mean.is_empty();
         Ok(EfficiencyEstimate {
-            monostatic: mono.profile(&self.range_m),
-            bistatic: has_pairs.then(|| bi.profile(&self.range_m)),
+            monostatic: mono,
+            bistatic: has_pairs.then_some(bi),
             monostatic_realisations: single,
             bistatic_realisations: pairs,
             realisations: if prepared.screens.is_some() { realisations } else { 1 },
@@ -312,28 +319,11 @@ impl MonteCarlo {
     }
 }
 
-#[derive(Default)]
-struct Columns {
-    mean: Vec<f64>,
-    standard_deviation: Vec<f64>,
-    standard_error: Vec<f64>,
-}
-
-impl Columns {
-    fn push(&mut self, mean: f64, standard_deviation: f64, standard_error: f64) {
-        self.mean.push(mean);
-        self.standard_deviation.push(standard_deviation);
-        self.standard_error.push(standard_error);
-    }
-
-    fn profile(self, range_m: &[f64]) -> EfficiencyProfile {
-        EfficiencyProfile {
-            range_m: range_m.to_vec(),
-            mean: self.mean,
-            standard_deviation: self.standard_deviation,
-            standard_error: self.standard_error,
-        }
-    }
+/// Adds the next range to a profile.
+fn push(profile: &mut EfficiencyProfile, mean: f64, standard_deviation: f64, standard_error: f64) {
+    profile.mean.push(mean);
+    profile.standard_deviation.push(standard_deviation);
+    profile.standard_error.push(standard_error);
 }
 
 /// Largest relative standard error of the monostatic mean over the ranges.
@@ -346,14 +336,12 @@ fn worst_error<T>(sums: &GroupSums<T>) -> f64 {
 }
 
 /// The results of `work` in the order of `items`.
-#[cfg(feature = "rayon")]
 fn in_parallel<I: Sync, R: Send>(items: &[I], work: impl Fn(&I) -> R + Sync + Send) -> Vec<R> {
-    use rayon::prelude::*;
-    items.par_iter().map(work).collect()
-}
-
-/// The results of `work` in the order of `items`.
-#[cfg(not(feature = "rayon"))]
-fn in_parallel<I, R>(items: &[I], work: impl Fn(&I) -> R) -> Vec<R> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        items.par_iter().map(work).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
     items.iter().map(work).collect()
 }

@@ -177,6 +177,7 @@ impl<'a, T: Real> Walker<'a, T> {
     }
 
     fn execute(&mut self, op: Op, active: usize) -> Result<Option<Measured<T>>, Error> {
+        let strength = &self.prepared.program.strength;
         match op {
             Op::Step { screen, transfer, times } => {
                 for lane in 0..active {
@@ -186,10 +187,8 @@ impl<'a, T: Real> Walker<'a, T> {
                     let state = &mut self.lanes[lane];
                     for (field, power) in state.fields.iter_mut().zip(&mut state.power) {
                         for time in 0..times {
-                            let phase = screen.filter(|_| time == 0).map(|layer| {
-                                let strength = state.sign * self.prepared.program.strength[layer];
-                                (state.screens[layer % 2].as_slice(), T::of(strength))
-                            });
+                            let at_hand = screen.filter(|_| time == 0);
+                            let phase = at_hand.map(|layer| phase(&state.screens, layer, state.sign * strength[layer]));
                             let transfer = &self.prepared.transfers[transfer];
                             *power = self.prepared.propagator.step(field, phase, transfer, &mut self.work)?;
                         }
@@ -222,14 +221,12 @@ impl<'a, T: Real> Walker<'a, T> {
         if let Some(layer) = screen {
             self.fetch_screen(lane, layer)?;
         }
+        let strength = &self.prepared.program.strength;
         let state = &mut self.lanes[lane];
         let mut ends = Vec::with_capacity(state.fields.len());
         let steps = transfers.map(|t| &self.prepared.transfers[t]);
         for ((field, tap), power) in state.fields.iter_mut().zip(&mut state.taps).zip(&mut state.power) {
-            let phase = screen.map(|layer| {
-                let strength = state.sign * self.prepared.program.strength[layer];
-                (state.screens[layer % 2].as_slice(), T::of(strength))
-            });
+            let phase = screen.map(|layer| phase(&state.screens, layer, state.sign * strength[layer]));
             let [at_tap, at_end] = self.prepared.propagator.step_with_tap(field, tap, phase, steps, &mut self.work)?;
             *power = at_tap;
             ends.push(at_end);
@@ -245,12 +242,12 @@ impl<'a, T: Real> Walker<'a, T> {
         for lane in 0..active {
             self.fetch_screen(lane, layer)?;
             let state = &mut self.lanes[lane];
-            let strength = T::of(state.sign * weight * self.prepared.program.strength[layer]);
+            let strength = state.sign * weight * self.prepared.program.strength[layer];
             kept.push((state.fields.clone(), state.power.clone()));
             let step = &self.prepared.transfers[transfer];
             for (field, power) in state.fields.iter_mut().zip(&mut state.power) {
                 for time in 0..2 * times {
-                    let phase = (time == times).then(|| (state.screens[layer % 2].as_slice(), strength));
+                    let phase = (time == times).then(|| phase(&state.screens, layer, strength));
                     *power = self.prepared.propagator.step(field, phase, step, &mut self.work)?;
                 }
             }
@@ -337,4 +334,9 @@ impl<'a, T: Real> Walker<'a, T> {
             }
         }
     }
+}
+
+/// The screen of a layer with its strength.
+fn phase<T: Real>(screens: &[Vec<T>; 2], layer: usize, strength: f64) -> (&[T], T) {
+    (&screens[layer % 2], T::of(strength))
 }

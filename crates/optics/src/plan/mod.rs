@@ -19,6 +19,7 @@ pub use violation::{Limit, SetUp, Violation};
 use crate::air::cn2::Cn2Path;
 use crate::air::turbulence::path_rytov_variance;
 use crate::monte_carlo::path::{Layers, Program};
+use crate::monte_carlo::{GROUP, GROUPS_PER_WAVE};
 use crate::screens::grid::Grid;
 use crate::{Error, Misalignment, Turbulence};
 use gaps::{Gaps, thin_layers, worst_rytov};
@@ -75,10 +76,21 @@ pub struct Plan {
     pub gaps: Vec<LayerGap>,
     /// Memory of a run with eight groups at a time in f32 \[bytes\].
     pub memory_bytes: usize,
+    /// What of it each of the groups has while it runs \[bytes\].
+    pub group_bytes: usize,
     /// CPU time of one realisation in f32 \[s\], an estimate within a factor of two on current machines.
     pub realisation_cpu_s: f64,
     /// What is allowed but deserves a word.
     pub warnings: Vec<Warning>,
+}
+
+impl Plan {
+    /// Memory of so many realisations with so many threads in f32 \[bytes\]: as many groups run at a time as there are threads.
+    #[must_use]
+    pub fn memory_bytes_of(&self, realisations: usize, threads: usize) -> usize {
+        let at_once = realisations.div_ceil(GROUP).clamp(1, GROUPS_PER_WAVE).min(threads.max(1));
+        self.memory_bytes - (GROUPS_PER_WAVE - at_once) * self.group_bytes
+    }
 }
 
 /// Something about a plan that is allowed but costs accuracy.
@@ -196,13 +208,15 @@ impl Limits<'_> {
         let warnings = self.warnings(grid, layer_rytov_variance, &gap_list, range_m, gaps, verdict)?;
         let pairs = program.transform_pairs() * beams as f64;
         let transfers = program.distance_m.len() * (grid.nx + grid.ny) * 8;
+        let group_bytes = group_bytes(grid, range_m.len(), beams);
         Ok(Plan {
             grid: *grid,
             layers: layers.clone(),
             layer_rytov_variance,
             light_lost: verdict.light_lost,
             gaps: gap_list,
-            memory_bytes: memory_bytes(grid, range_m.len(), beams) + transfers,
+            memory_bytes: GROUPS_PER_WAVE * group_bytes + shared_bytes(grid, range_m.len(), beams) + transfers,
+            group_bytes,
             realisation_cpu_s: grid.points() as f64 * (LAYER_S * pairs + SCREEN_S * program.strength.len() as f64),
             warnings,
         })
@@ -254,13 +268,23 @@ fn missing_at_one_spacing(turbulence: &Turbulence, grid: &Grid) -> Result<f64, E
     Ok(1.0 - generator.expected_structure_m53(1, 0) / exact)
 }
 
-/// Buffers of eight groups (two realisations each, four screens) and their sums, f32.
-fn memory_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
-    let points = grid.points();
-    let complex = 8 * points;
-    let per_group = complex * (4 * beams + 2) + 4 * 4 * points;
-    let plane = if beams == 1 { (grid.nx / 2 + 1) * (grid.ny / 2 + 1) } else { points };
-    8 * (per_group + 4 * plane * beams * (ranges + 4)) + (12 + complex / points) * points
+/// Points of the plane onto which a field folds.
+fn folded_points(grid: &Grid, beams: usize) -> usize {
+    if beams == 1 { (grid.nx / 2 + 1) * (grid.ny / 2 + 1) } else { grid.points() }
+}
+
+/// Buffers of a group under way in f32: fields and taps of two realisations, what steps and screens work with, four screens;
+/// planes that wait for their antithetic partners at each range.
+fn group_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
+    let complex = 8 * grid.points();
+    complex * (4 * beams + 2) + 4 * 4 * grid.points() + 4 * folded_points(grid, beams) * beams * (2 * ranges + 4)
+}
+
+/// What all groups share, in f32: the sums of a wave of groups and of all before them, the spectrum of the screens, the
+/// field at the telescope, places of the folded points.
+fn shared_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
+    let folded = folded_points(grid, beams);
+    (GROUPS_PER_WAVE + 1) * 4 * folded * beams * ranges + (4 + 8 * beams) * grid.points() + 2 * folded
 }
 
 #[cfg(test)]

@@ -240,7 +240,7 @@ impl<T: Real> ScreenGenerator<T> {
                 let low =
                     LowRow { coefficient: &coefficient, basis: &self.low.basis[0], ramp: shifted(ny, shift[1], y) };
                 let span = y * nx..(y + 1) * nx;
-                T::finish_screen(line, ramp, &low, &mut first[span.clone()], &mut second[span]);
+                T::finish_screen(line, ramp, &low, [&mut first[span.clone()], &mut second[span]]);
             }
         });
         Ok(())

@@ -51,13 +51,7 @@ pub trait Real: sealed::Sealed + FftNum + Default + PartialOrd {
     fn dot(a: &[Self], b: &[Self]) -> f64;
     /// Real and imaginary part of row * ramp + the low-frequency polynomial, into two rows.
     #[doc(hidden)]
-    fn finish_screen(
-        row: &[Complex<Self>],
-        ramp: &[Complex<Self>],
-        low: &LowRow<'_, Self>,
-        first: &mut [Self],
-        second: &mut [Self],
-    );
+    fn finish_screen(row: &[Complex<Self>], ramp: &[Complex<Self>], low: &LowRow<'_, Self>, outs: [&mut [Self]; 2]);
 }
 
 /// Low-frequency part of one row: coefficients times the polynomials sampled along the row.
@@ -221,8 +215,7 @@ macro_rules! kernels {
                 row: &[Complex<$real>],
                 ramp: &[Complex<$real>],
                 low: &LowRow<'_, $real>,
-                first: &mut [$real],
-                second: &mut [$real],
+                [first, second]: [&mut [$real]; 2],
             ) {
                 let factor = low.ramp;
                 let mut start = 0;
@@ -274,14 +267,8 @@ macro_rules! kernels {
             fn dot(a: &[Self], b: &[Self]) -> f64 {
                 $module::dot(a, b)
             }
-            fn finish_screen(
-                row: &[Complex<Self>],
-                ramp: &[Complex<Self>],
-                low: &LowRow<'_, Self>,
-                first: &mut [Self],
-                second: &mut [Self],
-            ) {
-                $module::finish_screen(row, ramp, low, first, second);
+            fn finish_screen(r: &[Complex<Self>], ramp: &[Complex<Self>], low: &LowRow<'_, Self>, o: [&mut [Self]; 2]) {
+                $module::finish_screen(r, ramp, low, o);
             }
         }
     };

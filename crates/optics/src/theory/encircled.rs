@@ -48,15 +48,11 @@ pub fn mean_power_beyond(
     for pair in overlap.breaks().windows(2) {
         // Waves of J1 at the largest radius; the breaks follow those of M.
         let panels = 2 + (k * largest_m / range_m * (pair[1] - pair[0]) / 6.0) as usize;
-        let h = (pair[1] - pair[0]) / panels as f64;
-        for panel in 0..panels {
-            let low = pair[0] + h * panel as f64;
-            for (rho, weight) in rule.mapped(low, low + h) {
-                let half_d: f64 = places.iter().map(|(g, w)| w * table.at(rho * g)).sum();
-                let damping = (-half_d).exp();
-                if damping > 1e-16 {
-                    nodes.push((rho, weight * damping * overlap.at(rho)));
-                }
+        for (rho, weight) in rule.on_panels(pair[0], pair[1], panels) {
+            let half_d: f64 = places.iter().map(|(g, w)| w * table.at(rho * g)).sum();
+            let damping = (-half_d).exp();
+            if damping > 1e-16 {
+                nodes.push((rho, weight * damping * overlap.at(rho)));
             }
         }
     }

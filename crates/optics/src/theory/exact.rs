@@ -15,7 +15,8 @@ use std::f64::consts::PI;
 
 /// Free-space efficiency eta_s (19) of a matched, aligned pair at `range_m`, by pupil overlap.
 ///
-/// Relative error below 1e-9. The cost grows with the [`fresnel_number`](crate::theory::fresnel_number); [`quadrature_cost_s`](crate::theory::quadrature_cost_s) forecasts it.
+/// Relative error below 1e-9. The cost grows with the [`fresnel_number`](crate::theory::fresnel_number);
+/// [`quadrature_cost_s`](crate::theory::quadrature_cost_s) forecasts it.
 ///
 /// # Errors
 /// [`Error::OutOfRange`] for a telescope or range that is not allowed, [`Error::FresnelNumber`] above

@@ -9,12 +9,13 @@ use crate::beam::Telescope;
 use crate::error::{not_negative, positive};
 use crate::quadrature::GaussLegendre;
 use crate::theory::overlap::check_fresnel_number;
+use num_complex::Complex;
 use std::f64::consts::PI;
 
 /// Nodes and weights of the aperture integral with everything that does not depend on the target point.
 pub(crate) struct Aperture {
     /// Radius \[m\] and the complex weighted field (k/R) E(r') r' dr' exp(j ...).
-    node: Vec<(f64, f64, f64)>,
+    node: Vec<(f64, Complex<f64>)>,
     /// k/R \[rad/m^2\].
     scale_rad_m2: f64,
 }
@@ -29,37 +30,26 @@ impl Aperture {
         let phase = chirp.abs() * a * a + k * a * largest_radius_m / range_m;
         let panels = 4 + (phase / 6.0) as usize;
         let rule = GaussLegendre::new(16);
-        let h = (a - b).max(0.0) / panels as f64;
         let peak = telescope.peak_irradiance_per_m2().sqrt();
-        let node = (0..panels)
-            .flat_map(|i| {
-                let low = b + h * i as f64;
-                rule.mapped(low, low + h).collect::<Vec<_>>()
-            })
+        let node = rule
+            .on_panels(b, a.max(b), panels)
             .map(|(r, w)| {
                 let field = peak * telescope.relative_irradiance(r).sqrt();
                 let weight = k / range_m * field * r * w;
                 let (sin, cos) = (chirp * r * r).sin_cos();
-                (r, weight * cos, weight * sin)
+                (r, Complex::new(weight * cos, weight * sin))
             })
             .collect();
         Self { node, scale_rad_m2: k / range_m }
     }
 
-    /// Field U(r) \[1/m\] at distance `radius_m` from the axis, real and imaginary part.
-    pub(crate) fn field_per_m(&self, radius_m: f64) -> [f64; 2] {
-        let (mut re, mut im) = (0.0, 0.0);
-        for &(r, wre, wim) in &self.node {
-            let j0 = libm::j0(self.scale_rad_m2 * radius_m * r);
-            re += wre * j0;
-            im += wim * j0;
-        }
-        [re, im]
+    /// Field U(r) \[1/m\] at distance `radius_m` from the axis.
+    pub(crate) fn field_per_m(&self, radius_m: f64) -> Complex<f64> {
+        self.node.iter().map(|(r, weight)| weight * libm::j0(self.scale_rad_m2 * radius_m * r)).sum()
     }
 
     fn irradiance_per_m2(&self, radius_m: f64) -> f64 {
-        let [re, im] = self.field_per_m(radius_m);
-        re * re + im * im
+        self.field_per_m(radius_m).norm_sqr()
     }
 }
 

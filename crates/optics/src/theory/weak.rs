@@ -19,6 +19,7 @@ use crate::quadrature::GaussLegendre;
 use crate::theory::exact::bistatic_efficiency;
 use crate::theory::hankel::Aperture;
 use crate::theory::overlap::fresnel_number;
+use num_complex::Complex;
 use std::f64::consts::PI;
 
 /// Largest Fresnel number for which the overlaps Q and X are tabulated.
@@ -91,8 +92,8 @@ impl DisplacedOverlaps {
         let shadow_m = lit_m * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
         let reach = ((1.2 * shadow_m + 20.0 * lobe_m) / step_m).ceil() as usize;
         let field = lattice(telescope, range_m, step_m, reach);
-        let at = |i: usize, j: usize| if i.max(j) <= reach { field[i * (reach + 1) + j] } else { [0.0; 2] };
-        let irradiance = |i: usize, j: usize| at(i, j).iter().map(|v| v * v).sum::<f64>();
+        let at = |i: usize, j: usize| if i.max(j) <= reach { field[i * (reach + 1) + j] } else { Complex::default() };
+        let irradiance = |i: usize, j: usize| at(i, j).norm_sqr();
         let mut values = Vec::with_capacity(2 * reach + 1);
         for s in 0..=2 * reach {
             let mut sum = [0.0; 3];
@@ -103,10 +104,9 @@ impl DisplacedOverlaps {
                     let (near, far) = (i.abs_diff(s), i + s);
                     // The point and its mirror image across the y axis.
                     sum[0] += copies * 0.5 * irradiance(i, j) * (irradiance(near, j) + irradiance(far, j));
-                    let (u, v) = (conjugate_square(at(i, j)), product(at(near, j), at(far, j)));
-                    let x = product(u, v);
-                    sum[1] += copies * x[0];
-                    sum[2] += copies * x[1];
+                    let x = (at(i, j) * at(i, j)).conj() * (at(near, j) * at(far, j));
+                    sum[1] += copies * x.re;
+                    sum[2] += copies * x.im;
                 }
             }
             values.push(sum);
@@ -179,12 +179,12 @@ impl DisplacedOverlaps {
 }
 
 /// Field at the target on the quadrant of a lattice, `[i][j]`, 0 to `reach` steps along each axis.
-fn lattice(telescope: &Telescope, range_m: f64, step_m: f64, reach: usize) -> Vec<[f64; 2]> {
+fn lattice(telescope: &Telescope, range_m: f64, step_m: f64, reach: usize) -> Vec<Complex<f64>> {
     const FINER: f64 = 8.0;
     let end_m = step_m * (reach + 1) as f64 * std::f64::consts::SQRT_2;
     let aperture = Aperture::new(telescope, range_m, end_m);
     let count = (end_m / step_m * FINER) as usize + 4;
-    let radial: Vec<[f64; 2]> = (0..count).map(|i| aperture.field_per_m(step_m / FINER * i as f64)).collect();
+    let radial: Vec<Complex<f64>> = (0..count).map(|i| aperture.field_per_m(step_m / FINER * i as f64)).collect();
     let mut out = Vec::with_capacity((reach + 1) * (reach + 1));
     for i in 0..=reach {
         for j in 0..=reach {
@@ -193,19 +193,10 @@ fn lattice(telescope: &Telescope, range_m: f64, step_m: f64, reach: usize) -> Ve
             let u = t - at as f64;
             let (a, b, c) = (u + 1.0, u - 1.0, u - 2.0);
             let weight = [-u * b * c / 6.0, a * b * c / 2.0, -a * u * c / 2.0, a * u * b / 6.0];
-            let part = |p: usize| weight.iter().zip(&radial[at - 1..]).map(|(w, v)| w * v[p]).sum();
-            out.push([part(0), part(1)]);
+            out.push(weight.iter().zip(&radial[at - 1..]).map(|(w, v)| v * w).sum());
         }
     }
     out
-}
-
-fn product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
-}
-
-fn conjugate_square(a: [f64; 2]) -> [f64; 2] {
-    [a[0] * a[0] - a[1] * a[1], -2.0 * a[0] * a[1]]
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! `wakescope bound`: the Cramer-Rao bound for a scene.
 
-use super::{Cli, load, say, with_threads};
+use super::{Cli, load, say};
 use crate::io::Existing;
 use crate::io::own::refuse_foreign;
 use crate::measure::progress::Silent;
@@ -21,16 +21,22 @@ pub(super) struct BoundWords {
     /// Replace the file although this program did not write it, or it was changed since.
     #[arg(long)]
     overwrite: bool,
+    /// Compute even if the forecast of the memory is more than the machine has.
+    #[arg(long)]
+    allow_large: bool,
 }
 
 pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
     let plan = Plan::new(load(&words.scene, cli)?, Target::Map)?;
+    if !words.allow_large {
+        plan.bound_fits()?;
+    }
     if let Some(path) = &words.out {
         let existing = if words.overwrite { Existing::Any } else { Existing::Own };
         let name = path.file_name().and_then(|name| name.to_str());
         refuse_foreign(path.parent().unwrap_or(Path::new("")), name, existing)?;
     }
-    let found = with_threads(cli, || bound::bound(&plan, &Silent))??;
+    let found = bound::bound(&plan, &Silent)?;
     let mut text = found.text();
     if let Some(path) = &words.out {
         crate::io::write_atomic(path, found.table().to_csv(&write::provenance(&plan))?)?;
@@ -49,5 +55,5 @@ pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr),
         "by_range": points(&found.by_range), "files": words.out,
     });
-    say(cli, &object, &text)
+    say(cli.json, &object, &text)
 }

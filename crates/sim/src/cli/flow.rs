@@ -1,7 +1,7 @@
 //! `wakescope flow`: simulations from case files.
 
 use super::output::print;
-use super::{Cli, progress, say, with_threads};
+use super::{Cli, progress, say};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
@@ -66,28 +66,26 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
     };
     let options = RunOptions { begin, allow_large: words.allow_large };
     if words.check {
-        let forecast = with_threads(cli, || check(file, words.out.as_deref(), options))??;
-        return say(cli, &forecast_json(&forecast), &format!("good\n{forecast}"));
+        let forecast = check(file, words.out.as_deref(), options)?;
+        return say(cli.json, &forecast_json(&forecast), &format!("good\n{forecast}"));
     }
     let Some(out) = &words.out else {
         let reason = "a run needs a folder to write to".into();
         return Err(Error::Input { path: PathBuf::from("--out DIR"), reason });
     };
+    let mut quiet = progress::NotesOnly;
+    let mut bar;
+    let watch: &mut dyn Watch = if cli.quiet {
+        &mut quiet
+    } else {
+        bar = progress::FlowBar::new();
+        &mut bar
+    };
     #[cfg_attr(not(feature = "plots"), expect(unused_mut, reason = "there is nothing to draw with"))]
-    let mut outcome = with_threads(cli, || {
-        let mut quiet = progress::NotesOnly;
-        let mut bar;
-        let watch: &mut dyn Watch = if cli.quiet {
-            &mut quiet
-        } else {
-            bar = progress::FlowBar::new();
-            &mut bar
-        };
-        run_with(file, out, options, watch)
-    })??;
+    let mut outcome = run_with(file, out, options, watch)?;
     #[cfg(feature = "plots")]
     if outcome.is_complete && file.case.wake.is_some() {
-        match with_threads(cli, || FinishedWake::read(out)?.draw())? {
+        match FinishedWake::read(out).and_then(|wake| wake.draw()) {
             Ok(files) => outcome.files.extend(files),
             // The run is done all the same.
             Err(error) => {
@@ -112,7 +110,7 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
         outcome.files.len(),
         out.display()
     );
-    say(cli, &object, &text)
+    say(cli.json, &object, &text)
 }
 
 fn forecast_json(forecast: &FlowForecast) -> Value {

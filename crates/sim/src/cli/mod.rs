@@ -103,7 +103,8 @@ pub fn main() -> u8 {
         Ok(cli) => cli,
         Err(e) => return output::explain(&e),
     };
-    match dispatch(&cli) {
+    // All in one pool: forecasts count its threads, and files reuse the memory that the computing freed.
+    match with_threads(&cli, || dispatch(&cli)).flatten() {
         Ok(()) => 0,
         Err(e) => {
             output::complain(&e, cli.json);
@@ -137,7 +138,7 @@ fn init(path: &Path, force: bool, cli: &Cli) -> Result<(), Error> {
         return Err(Error::Io { action: "write", path: path.to_owned(), source });
     }
     crate::io::write_atomic(path, text.as_bytes())?;
-    say(cli, &json!({ "scene": path }), &format!("wrote {}\nnext: wakescope check {0}", path.display()))
+    say(cli.json, &json!({ "scene": path }), &format!("wrote {}\nnext: wakescope check {0}", path.display()))
 }
 
 fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
@@ -147,7 +148,7 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     if cli.quiet && !cli.json {
         return Ok(());
     }
-    say(cli, &plan_json(&plan), &format!("{}: good\n{plan}", words.scene.display()))
+    say(cli.json, &plan_json(&plan), &format!("{}: good\n{plan}", words.scene.display()))
 }
 
 /// The plan of a scene, with all that can be known before the computing: limits, memory, a small rehearsal, the folder.
@@ -166,7 +167,7 @@ fn planned(
         let names = write::names(&plan);
         write::prepare(folder, names.iter().map(String::as_str), existing)?;
     }
-    with_threads(cli, || plan.rehearse())??;
+    plan.rehearse()?;
     Ok(plan)
 }
 
@@ -174,11 +175,11 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     let existing = if io.overwrite { Existing::Any } else { Existing::Own };
     let plan = planned(&io.scene, target, Some((&io.out, existing)), io.allow_large, cli)?;
     let outcome = if cli.quiet {
-        with_threads(cli, || run::run(&plan, &progress::Quiet))??
+        run::run(&plan, &progress::Quiet)?
     } else {
         let _ = write!(std::io::stderr(), "{plan}");
         let bars = progress::Bars::new();
-        with_threads(cli, || run::run(&plan, &bars as &dyn Observer))??
+        run::run(&plan, &bars)?
     };
     let files = write::write(&plan, &outcome, &io.out, existing)?;
     let summary = outcome.summary();
@@ -188,7 +189,7 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     let mut object = plan_json(&plan);
     object["results"] = Value::Object(values);
     object["files"] = json!(files);
-    say(cli, &object, &text.join("\n"))
+    say(cli.json, &object, &text.join("\n"))
 }
 
 fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
@@ -218,13 +219,15 @@ fn plan_json(plan: &Plan) -> Value {
         .map(|s| {
             json!({
                 "stage": s.stage.name(), "runs": s.cost.is_some(), "reason": s.reason,
-                "core_s": s.cost.map(|c| c.core_s), "memory_bytes": s.cost.map(|c| c.memory_bytes),
+                "core_s": s.cost.map(|c| c.core_s), "memory_bytes": s.cost.map(|c| c.memory_bytes()),
+                "kept_bytes": s.cost.map(|c| c.kept_bytes),
             })
         })
         .collect();
+    let total = plan.total();
     json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.scene.seed,
-        "stages": stages, "warnings": plan.warnings,
+        "stages": stages, "core_s": total.core_s, "memory_bytes": total.memory_bytes, "warnings": plan.warnings,
     })
 }
 

@@ -1,6 +1,5 @@
 //! What the program prints: results to standard output, errors to standard error, as text or as JSON.
 
-use super::Cli;
 use crate::Error;
 use crate::scene::{Problem, SceneError};
 use serde_json::{Value, json};
@@ -21,12 +20,12 @@ pub(super) fn print(text: &str) -> Result<(), Error> {
     }
 }
 
-/// Prints a result: the object with `--json`, else the text.
+/// Prints a result: as the object, or as the text.
 ///
 /// # Errors
 /// As [`print()`].
-pub(super) fn say(cli: &Cli, object: &Value, text: &str) -> Result<(), Error> {
-    print(&if cli.json { format!("{object:#}\n") } else { format!("{}\n", text.trim_end()) })
+pub(super) fn say(as_json: bool, object: &Value, text: &str) -> Result<(), Error> {
+    print(&if as_json { format!("{object:#}\n") } else { format!("{}\n", text.trim_end()) })
 }
 
 /// Prints an error to standard error; nothing can be done where that fails.

@@ -114,7 +114,7 @@ fn file(
         ("title", title.to_owned()),
         ("history", format!("written by {}", provenance.program)),
     ];
-    Layout { dims, globals, variables }.to_bytes(provenance)
+    Layout { dims, globals, variables }.into_bytes(provenance)
 }
 
 #[cfg(test)]

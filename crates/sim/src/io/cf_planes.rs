@@ -48,7 +48,7 @@ pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputR
         ],
         variables,
     };
-    layout.to_bytes(provenance)
+    layout.into_bytes(provenance)
 }
 
 fn wind(name: &str, values: &Array3<f64>, long_name: &str) -> Variable {

@@ -11,7 +11,7 @@ use super::signals::RawSignals;
 ///
 /// # Errors
 /// What [`RawSignals::check`] finds, or a result too large for one file.
-pub fn cf_signals_bytes(signals: &RawSignals, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     signals.check()?;
     let (rays, samples) = signals.current_a.dim();
     let mut variables = vec![
@@ -33,7 +33,7 @@ pub fn cf_signals_bytes(signals: &RawSignals, provenance: &Provenance) -> Output
     ];
     let (lines, ranges) = signals.truth.radial_velocity_m_s.dim();
     let dims = vec![("ray", rays), ("time", samples), ("line", lines), ("range", ranges)];
-    Layout { dims, globals, variables }.to_bytes(provenance)
+    Layout { dims, globals, variables }.into_bytes(provenance)
 }
 
 /// Bytes of data that the file has with so many pulses of so many samples, of one or two quadratures, and lines of so many
@@ -51,7 +51,7 @@ fn current<'a>(name: &str, values: impl Iterator<Item = &'a f64>, long_name: &st
 }
 
 /// Which line, pulse and realisation each record belongs to.
-fn of_rays(signals: &RawSignals, rays: usize) -> Vec<Variable> {
+fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
     let (scan, per_line) = (signals.elevation_rad.len().max(1), signals.pulses_per_line.max(1));
     let number = |name: &str, of: &dyn Fn(usize) -> usize, text: &str| {
         let values = (0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX)).collect();
@@ -72,7 +72,7 @@ fn of_rays(signals: &RawSignals, rays: usize) -> Vec<Variable> {
     ]
 }
 
-fn recording(signals: &RawSignals) -> Vec<Variable> {
+fn recording(signals: &RawSignals<'_>) -> Vec<Variable> {
     let r = &signals.recording;
     let scalar = |name: &str, value: f64, units: &str, text: &str| {
         variable(name, &[], Data::F64(vec![value]), units).text("long_name", text)
@@ -99,7 +99,7 @@ fn recording(signals: &RawSignals) -> Vec<Variable> {
     ]
 }
 
-fn truth(signals: &RawSignals) -> Vec<Variable> {
+fn truth(signals: &RawSignals<'_>) -> Vec<Variable> {
     let pulses = signals.elevation_rad.iter().step_by(signals.pulses_per_line.max(1));
     vec![
         variable("range", &["range"], Data::F64(signals.truth.range_m.clone()), "m")
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
     use netcdf3::FileReader;
 
-    fn reopened(signals: &RawSignals) -> (tempfile::TempDir, FileReader) {
+    fn reopened(signals: &RawSignals<'_>) -> (tempfile::TempDir, FileReader) {
         let temp = tempfile::tempdir().unwrap();
         let path = temp.path().join("signals.nc");
         std::fs::write(&path, cf_signals_bytes(signals, &example()).unwrap()).unwrap();

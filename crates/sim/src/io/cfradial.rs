@@ -21,7 +21,7 @@ pub(crate) const MAX_TIME_S: f64 = 1e9;
 /// # Errors
 /// What [`VelocityMap::check`] finds, ray times beyond 1e9 s, no velocity at all, a result too large for one file.
 pub fn cfradial_bytes(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-    layout(map, provenance)?.to_bytes(provenance)
+    layout(map, provenance)?.into_bytes(provenance)
 }
 
 /// Bytes of data of a run's map with so many rays and gates, rounded up: 16 fields, and what each ray has.
@@ -34,7 +34,11 @@ fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
     let outside = |t: &&f64| t.abs() > MAX_TIME_S;
     let times: Vec<f64> = map.rays.iter().map(|r| r.time_s).collect();
     if let Some(bad) = times.iter().find(outside) {
-        return Err(OutputError::value("ray time_s", bad, format!("within {MAX_TIME_S:?} s of the start of the flow")));
+        return Err(OutputError::value(
+            "ray time_s",
+            format!("{bad:?}"),
+            format!("within {MAX_TIME_S:?} s of the start of the flow"),
+        ));
     }
     let mut variables = axes(map, times);
     variables.extend(site(map));

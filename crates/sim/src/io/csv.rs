@@ -25,6 +25,15 @@ impl Column {
         }
     }
 
+    /// Bytes of a usual cell with its separator.
+    fn usual_width(&self) -> usize {
+        match self {
+            Self::Float(_) => 20,
+            Self::Int(_) => 7,
+            Self::Text(_) => 16,
+        }
+    }
+
     fn push_cell(&self, row: usize, out: &mut String) {
         match self {
             Self::Float(v) => out.push_str(&float_text(v[row])),
@@ -122,6 +131,8 @@ impl Table {
     pub fn to_csv(&self, provenance: &Provenance) -> OutputResult<String> {
         self.check()?;
         let mut out = provenance.comment_lines();
+        // Room for most texts at once, so that growing does not copy what is there.
+        out.reserve(self.columns.iter().map(|(_, column)| column.len() * column.usual_width()).sum());
         let header: Vec<String> = self.columns.iter().map(|(n, _)| quoted(n)).collect();
         out.push_str(&header.join(","));
         out.push('\n');
@@ -134,6 +145,7 @@ impl Table {
             }
             out.push('\n');
         }
+        out.shrink_to_fit();
         Ok(out)
     }
 

@@ -119,7 +119,7 @@ pub(crate) fn increasing(field: &str, values: &[f64]) -> OutputResult<()> {
         return Err(OutputError::value(field, bad, "must be finite"));
     }
     if let Some(pair) = values.windows(2).find(|w| w[1] <= w[0]) {
-        return Err(OutputError::value(field, format!("{}, {}", pair[0], pair[1]), "must increase strictly"));
+        return Err(OutputError::value(field, format!("{:?}, {:?}", pair[0], pair[1]), "must increase strictly"));
     }
     Ok(())
 }

@@ -234,7 +234,7 @@ impl VelocityMap {
         let times: Vec<f64> = self.rays.iter().map(|r| r.time_s).collect();
         increasing("ray time_s", &times)?;
         if self.range_m[0] <= 0.0 {
-            return Err(OutputError::value("range_m", self.range_m[0], "must be positive"));
+            return Err(OutputError::value("range_m", format!("{:?}", self.range_m[0]), "must be positive"));
         }
         self.check_rays()?;
         for (i, field) in self.fields.iter().enumerate() {

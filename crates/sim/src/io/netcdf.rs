@@ -106,26 +106,31 @@ pub(crate) struct Layout {
 
 impl Layout {
     /// The bytes of the file. The provenance follows the global attributes, each entry as text.
-    pub(crate) fn to_bytes(&self, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-        self.check()?;
+    ///
+    /// Each variable is freed as soon as the encoder has its copy; the encoder makes three more before the file.
+    pub(crate) fn into_bytes(self, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+        let size = self.check()?;
         let refuse = |e: netcdf_writer::Error| OutputError::encode("NetCDF", e);
         let mut file = NcFileBuilder::new();
         let mut ids: Vec<(&str, DimensionId)> = Vec::new();
         for (name, size) in &self.dims {
             ids.push((name, file.add_dimension(*name, *size as u64).map_err(refuse)?));
         }
-        let own = self.globals.iter().cloned();
+        let own = self.globals.into_iter();
         for (name, text) in own.chain(provenance.entries()) {
             file.add_attribute(name, NcAttrValue::Chars(text)).map_err(refuse)?;
         }
-        for variable in &self.variables {
-            add_variable(&mut file, &ids, variable).map_err(refuse)?;
+        for variable in self.variables {
+            add_variable(&mut file, &ids, &variable).map_err(refuse)?;
         }
-        let (_, bytes) = file.to_vec(NcWriteOptions::offset64()).map_err(refuse)?;
+        // Room for the head; it may grow beyond.
+        let mut bytes = Vec::with_capacity(size + (16 << 10));
+        file.write(&mut bytes, NcWriteOptions::offset64()).map_err(refuse)?;
         Ok(bytes)
     }
 
-    fn check(&self) -> OutputResult<()> {
+    /// Checks the lengths; the bytes of the data.
+    fn check(&self) -> OutputResult<usize> {
         let size = |dim: &str| {
             let found = self.dims.iter().find(|(name, _)| *name == dim);
             found.map_or(0, |(_, size)| *size)
@@ -142,7 +147,7 @@ impl Layout {
                 reason: format!("{total} bytes in one file, at most {MAX_BYTES}: write one file per time or sweep"),
             });
         }
-        Ok(())
+        Ok(total)
     }
 }
 
@@ -187,7 +192,7 @@ mod tests {
             globals: vec![],
             variables: vec![Variable::new("v", &["time", "range"], Data::F32(vec![0.0; 5]))],
         };
-        let error = layout.to_bytes(&example()).unwrap_err();
+        let error = layout.into_bytes(&example()).unwrap_err();
         assert!(matches!(error, OutputError::Length { expected: 6, actual: 5, .. }), "{error}");
     }
 }

@@ -3,7 +3,7 @@
 
 use super::csv::Table;
 use super::error::{OutputError, OutputResult, increasing, same_length};
-use ndarray::Array2;
+use ndarray::ArrayView2;
 
 /// How the signals of a scan were recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,26 +26,26 @@ pub struct Recording {
 
 /// The air along the lines of sight: what an estimate is to be held against.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LineVelocities {
+pub struct LineVelocities<'a> {
     /// Ranges, m, increasing.
     pub range_m: Vec<f64>,
     /// Radial velocity `[line, range]`, m/s, positive away from the lidar; NaN where nothing returns light.
-    pub radial_velocity_m_s: Array2<f64>,
+    pub radial_velocity_m_s: ArrayView2<'a, f64>,
 }
 
-/// The signals of a scan, pulse by pulse, one realisation after the other.
+/// The signals of a scan, pulse by pulse, one realisation after the other; the large arrays are borrowed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RawSignals {
+pub struct RawSignals<'a> {
     /// How they were recorded.
     pub recording: Recording,
     /// The air along the lines.
-    pub truth: LineVelocities,
+    pub truth: LineVelocities<'a>,
     /// Time of each pulse of one realisation from the start of the flow, s.
     pub pulse_time_s: Vec<f64>,
     /// Current of the detector `[pulse, sample]`, A.
-    pub current_a: Array2<f64>,
+    pub current_a: ArrayView2<'a, f64>,
     /// Second quadrature of a complex baseband signal, whose first is `current_a`.
-    pub quadrature_a: Option<Array2<f64>>,
+    pub quadrature_a: Option<ArrayView2<'a, f64>>,
     /// Elevation of each pulse of one realisation, rad.
     pub elevation_rad: Vec<f64>,
     /// Time of each sample after the middle of the pulse left, s; increasing.
@@ -54,7 +54,7 @@ pub struct RawSignals {
     pub pulses_per_line: usize,
 }
 
-impl RawSignals {
+impl RawSignals<'_> {
     /// Checks the shapes.
     ///
     /// # Errors
@@ -92,7 +92,7 @@ impl RawSignals {
         self.check()?;
         let rays: Vec<usize> = (0..self.elevation_rad.len()).step_by(self.pulses_per_line.max(1)).collect();
         let samples = self.time_s.len();
-        let cells = || rays.iter().flat_map(|&ray| (0..samples).map(move |k| (ray, k)));
+        let cells = || (0..rays.len() * samples).map(|cell| (rays[cell / samples], cell % samples));
         let table = Table::new()
             .int("ray", cells().map(|(ray, _)| ray as i64))
             .float("time_s", cells().map(|(_, k)| self.time_s[k]))
@@ -106,7 +106,17 @@ impl RawSignals {
 
 /// Two realisations of two lines of two pulses.
 #[cfg(test)]
-pub(crate) fn example() -> RawSignals {
+pub(crate) fn example() -> RawSignals<'static> {
+    const CURRENT_A: [[f64; 3]; 8] = [
+        [0.0, 1.0, 2.0],
+        [10.0, 11.0, 12.0],
+        [20.0, 21.0, 22.0],
+        [30.0, 31.0, 32.0],
+        [40.0, 41.0, 42.0],
+        [50.0, 51.0, 52.0],
+        [60.0, 61.0, 62.0],
+        [70.0, 71.0, 72.0],
+    ];
     RawSignals {
         recording: Recording {
             sampling_hz: 1e6,
@@ -119,10 +129,10 @@ pub(crate) fn example() -> RawSignals {
         },
         truth: LineVelocities {
             range_m: vec![100.0, 130.0],
-            radial_velocity_m_s: ndarray::arr2(&[[1.5, -2.5], [f64::NAN, 0.5]]),
+            radial_velocity_m_s: ndarray::aview2(&[[1.5, -2.5], [f64::NAN, 0.5]]),
         },
         pulse_time_s: vec![8.0, 8.0025, 8.005, 8.0075],
-        current_a: Array2::from_shape_fn((8, 3), |(i, k)| (10 * i + k) as f64),
+        current_a: ndarray::aview2(&CURRENT_A),
         quadrature_a: None,
         elevation_rad: vec![0.0, 0.0, 0.1, 0.1],
         time_s: vec![1e-6, 2e-6, 3e-6],
@@ -143,7 +153,7 @@ mod tests {
         assert_eq!(signals.realisations(), 2);
         assert!(RawSignals { time_s: vec![1.0], ..signals.clone() }.check().is_err());
         assert!(RawSignals { pulse_time_s: vec![1.0], ..signals.clone() }.check().is_err());
-        let odd = signals.current_a.slice(ndarray::s![..7, ..]).to_owned();
+        let odd = signals.current_a.slice_move(ndarray::s![..7, ..]);
         assert!(RawSignals { current_a: odd, ..signals }.check().is_err(), "half a realisation");
     }
 }

@@ -13,7 +13,7 @@ use super::map::{CrossPlanes, Field, FieldKind, VelocityMap};
 pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
     map.check()?;
     let gates = map.range_m.len();
-    let cells = || (0..map.rays.len()).flat_map(|ray| (0..gates).map(move |gate| (ray, gate)));
+    let cells = || (0..map.rays.len() * gates).map(|cell| (cell / gates, cell % gates));
     let per_ray = |get: &dyn Fn(usize) -> f64| -> Vec<f64> { cells().map(|(r, _)| get(r)).collect() };
     let mut table = Table::new()
         .float("tau", per_ray(&|r| map.sweeps[map.rays[r].sweep].tau))

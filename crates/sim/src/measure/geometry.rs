@@ -6,7 +6,7 @@ use crate::Error;
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::measure::wind::SceneWind;
 use crate::scene::Scene;
-use wakescope_signal::Pulse;
+use wakescope_signal::{LayerLimits, Pulse};
 
 /// The sampling of one scan in angle, range and time.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,8 +53,9 @@ impl Geometry {
         let gate_first_sample: Vec<usize> = (0..=samples - window).step_by(scene.estimator.gate_step_samples).collect();
         // Windows are indexed by their centre, R = c (t_p + N T_s/2)/2.
         let centre_m = |first: &usize| scan.range_min_m + (*first as f64 + 0.5 * window as f64) * sample_spacing_m;
+        let (sample_rate_hz, wavelength_m) = (scene.detector.sampling_hz, scene.laser.wavelength_m);
         let layer_thickness_m =
-            pulse.layer_thickness_m(scene.detector.sampling_hz, scene.laser.wavelength_m, max_gradient_per_s)?;
+            pulse.layer_thickness_m(LayerLimits { sample_rate_hz, wavelength_m, max_gradient_per_s })?;
         // Layers before and behind the range of a sample that the pulse lights.
         let (first_s, last_s) = pulse.support_s();
         let reach = |time_s: f64| (time_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m).max(0.0).ceil() as usize;

@@ -21,7 +21,7 @@ pub struct Instrument {
     /// The receiver.
     pub receiver: signal::Receiver,
     /// The converter, if the scene has one.
-    pub digitiser: Option<signal::Digitiser>,
+    pub digitiser: Option<signal::digitise::Digitiser>,
     /// The turbulence, if there is any.
     pub turbulence: Option<optics::Turbulence>,
     /// Everything of (14) but the efficiency, for air that is the same at every range.
@@ -54,7 +54,7 @@ impl Instrument {
             Digitiser::None {} => None,
             Digitiser::Quantised { bits, full_scale_over_noise } => {
                 let full_scale_a = full_scale_over_noise * receiver.noise_variance_a2().sqrt();
-                Some(signal::Digitiser::new(bits, full_scale_a)?)
+                Some(signal::digitise::Digitiser::new(bits, full_scale_a)?)
             }
         };
         let turbulence = match &scene.atmosphere.turbulence {
@@ -189,16 +189,16 @@ pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
         }
         PulseShape::Sampled(shape) => {
             let resampling = match shape.resampling {
-                PulseResampling::CubicSpline => signal::Resampling::CubicSpline,
-                PulseResampling::BandLimited => signal::Resampling::BandLimited,
-                PulseResampling::Linear => signal::Resampling::Linear,
+                PulseResampling::CubicSpline => signal::sampled::Resampling::CubicSpline,
+                PulseResampling::BandLimited => signal::sampled::Resampling::BandLimited,
+                PulseResampling::Linear => signal::sampled::Resampling::Linear,
             };
             let sampled = if shape.phase_rad.is_empty() {
-                signal::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
+                signal::sampled::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
             } else {
                 let polar = |(power, phase): (&f64, &f64)| Complex::from_polar(power.sqrt(), *phase);
                 let envelope: Vec<_> = shape.power.iter().zip(&shape.phase_rad).map(polar).collect();
-                signal::SampledPulse::new(&shape.time_s, &envelope, resampling, p.energy_j)?
+                signal::sampled::SampledPulse::new(&shape.time_s, &envelope, resampling, p.energy_j)?
             };
             signal::Pulse::from(if shape.centred { sampled.centred() } else { sampled })
         }
@@ -231,8 +231,8 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
         quantum_efficiency: d.quantum_efficiency,
         local_oscillator_w: d.local_oscillator_w,
         planck: match d.snr {
-            SnrReference::Chapter {} => signal::PlanckConvention::Hbar,
-            _ => signal::PlanckConvention::H,
+            SnrReference::Chapter {} => signal::receiver::PlanckConvention::Hbar,
+            _ => signal::receiver::PlanckConvention::H,
         },
         noise: match d.noise {
             NoiseKind::Band => signal::NoiseModel::BandLimited,

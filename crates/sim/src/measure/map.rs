@@ -14,7 +14,8 @@ use wakescope_estimate::{
     polar_points,
     window::Sample,
 };
-use wakescope_signal::{Clipped, RangeFilter};
+use wakescope_signal::RangeFilter;
+use wakescope_signal::digitise::Clipped;
 
 /// Estimates of the radial velocity and their errors, each \[line, gate\].
 #[derive(Debug, Clone, PartialEq)]
@@ -172,7 +173,7 @@ struct Truth {
     gate_m_s: Array2<f64>,
 }
 
-impl<S: Sample + wakescope_signal::Sample> Mapper<S> {
+impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
     pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
@@ -320,7 +321,7 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
 }
 
 /// Runs the estimates of all realisations; the records of those that the files will have go to `kept`, too, piece after piece.
-pub(crate) fn estimate<S: Sample + wakescope_signal::Sample>(
+pub(crate) fn estimate<S: Sample + wakescope_signal::scan::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,

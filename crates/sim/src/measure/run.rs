@@ -103,7 +103,7 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
 }
 
 /// Signals and the map, as the plan has them.
-fn signals_and_map<S: Sample + wakescope_signal::Sample>(
+fn signals_and_map<S: Sample + wakescope_signal::scan::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
@@ -179,7 +179,11 @@ impl RunResult {
             line("lost_power_fraction", "power lost at the screens' border (< 0.01)", fraction);
         }
         if let Some(a) = &self.signals_a {
-            line("signal_rms_a", "rms of the raw signals [A]", (a.mapv(|x| x * x).sum() / a.len() as f64).sqrt());
+            line(
+                "signal_rms_a",
+                "rms of the raw signals [A]",
+                (a.iter().map(|x| x * x).sum::<f64>() / a.len() as f64).sqrt(),
+            );
         }
         if let Some(m) = &self.map {
             line("v_max_m_s", "largest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::max));

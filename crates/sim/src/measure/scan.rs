@@ -12,9 +12,10 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 use std::ops::Range;
 use wakescope_optics::plan::Model;
-use wakescope_signal::{
-    Clipped, EfficiencyTable, LayerEfficiency, LineOfSight, Pulse, PulseKey, Record, Sample, Scan, Shot, Simulator,
-};
+use wakescope_signal::digitise::Clipped;
+use wakescope_signal::efficiency::{EfficiencyTable, LayerEfficiency};
+use wakescope_signal::scan::{PulseKey, Sample};
+use wakescope_signal::{LineOfSight, Pulse, Record, Scan, Shot, Simulator};
 
 /// Ranges of the efficiency profile from which the layers take theirs, m: dense where it is a quadrature, few
 /// where each costs transforms and the errors of neighbours are alike.

@@ -5,7 +5,7 @@ mod map;
 #[cfg(feature = "plots")]
 mod pictures;
 
-pub use limits::check;
+pub use limits::{Contents, check};
 pub use map::velocity_map;
 
 use crate::Error;
@@ -178,7 +178,7 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 }
 
 /// The raw signals of a run, with what makes them readable.
-fn raw_signals(plan: &Plan, result: &RunResult) -> Option<RawSignals> {
+fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let pulses = scene.scan.pulses_per_line;
     let first_s = 2.0 * g.first_range_m / crate::SPEED_OF_LIGHT_M_S;
@@ -188,11 +188,11 @@ fn raw_signals(plan: &Plan, result: &RunResult) -> Option<RawSignals> {
         recording: recording(plan),
         truth: LineVelocities {
             range_m: g.layer_range_m().collect(),
-            radial_velocity_m_s: result.line_velocity_m_s.clone()?,
+            radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
         },
         pulse_time_s: (0..g.elevation_rad.len() * pulses).map(|i| first_pulse_s + i as f64 * prt_s).collect(),
-        current_a: result.signals_a.clone()?,
-        quadrature_a: result.quadrature_a.clone(),
+        current_a: result.signals_a.as_ref()?.view(),
+        quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),
         elevation_rad: g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect(),
         time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
         pulses_per_line: pulses,

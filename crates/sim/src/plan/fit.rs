@@ -2,9 +2,11 @@
 //!
 //! Check: a scene that needs far more than the machine has is refused with keys and values that, set, are accepted.
 
-use super::stages::stages;
+use super::Plan;
+use super::sizes::Sizes;
+use super::stage::{Forecast, PlannedStage, Stage, total};
+use super::stages::{of_bound, stages};
 use super::units::bytes;
-use super::{Cost, Plan, Stage};
 use crate::measure::geometry::Geometry;
 use crate::scene::{Scene, ScreenSampling, Turbulence};
 use crate::{Error, machine};
@@ -14,6 +16,13 @@ const SHARE: f64 = 0.9;
 
 /// So often a key may be halved before raw signals are better left out.
 const FEW_HALVINGS: u32 = 3;
+
+/// What is to be done with a plan.
+#[derive(Clone, Copy)]
+enum Work {
+    Run,
+    Bound,
+}
 
 impl Plan {
     /// Whether the memory of the forecast is there.
@@ -29,24 +38,43 @@ impl Plan {
     /// # Errors
     /// As [`Plan::fits`].
     pub fn fits_in(&self, available_bytes: f64) -> Result<(), Error> {
-        let Cost { memory_bytes, .. } = self.total();
+        self.work_fits(Work::Run, available_bytes)
+    }
+
+    /// Whether the memory for the Cramer-Rao bound of the scene is there: matrices of a window's samples by as many.
+    ///
+    /// # Errors
+    /// As [`Plan::fits`].
+    pub fn bound_fits(&self) -> Result<(), Error> {
+        machine::available_memory_bytes().map_or(Ok(()), |available_bytes| self.bound_fits_in(available_bytes))
+    }
+
+    /// The same for a given amount of memory, bytes.
+    ///
+    /// # Errors
+    /// As [`Plan::fits`].
+    pub fn bound_fits_in(&self, available_bytes: f64) -> Result<(), Error> {
+        self.work_fits(Work::Bound, available_bytes)
+    }
+
+    fn work_fits(&self, work: Work, available_bytes: f64) -> Result<(), Error> {
+        let Forecast { memory_bytes, largest, .. } = total(&self.stages_of(work));
         let room_bytes = SHARE * available_bytes;
         if memory_bytes <= room_bytes {
             return Ok(());
         }
         let mut scene = self.scene.scene.clone();
-        let mut remedies = self.remedies(&scene, room_bytes);
+        let mut remedies = self.remedies(work, &scene, room_bytes);
         let mut before = "";
         if scene.outputs.signals && remedies.first().is_none_or(|(halvings, _)| *halvings > FEW_HALVINGS) {
             scene.outputs.signals = false;
-            remedies = self.remedies(&scene, room_bytes);
+            remedies = self.remedies(work, &scene, room_bytes);
             before = "outputs.signals = false with ";
         }
-        let largest = self.stages.iter().filter_map(|s| Some((s.cost?.memory_bytes, s.stage.name())));
         Err(Error::TooLarge {
             needed: bytes(memory_bytes),
             available: bytes(available_bytes),
-            stage: largest.max_by(|a, b| a.0.total_cmp(&b.0)).map_or("", |(_, name)| name),
+            stage: largest.map_or("", Stage::name),
             remedy: match remedies.is_empty() {
                 true => "no single key makes it fit: make several smaller, such as scan.elevation_max_rad, \
                          scan.range_max_m and estimator.window_samples"
@@ -60,34 +88,49 @@ impl Plan {
     }
 
     /// Up to three single keys, the smallest changes first, that make a scene fit.
-    fn remedies(&self, scene: &Scene, room_bytes: f64) -> Vec<(u32, String)> {
-        let memory = |scene: &Scene| self.memory_with(scene);
+    fn remedies(&self, work: Work, scene: &Scene, room_bytes: f64) -> Vec<(u32, String)> {
+        let memory = |scene: &Scene| Some(total(&self.stages_with(work, scene)?).memory_bytes);
         let mut found: Vec<_> = REMEDIES.iter().filter_map(|r| r.found(scene, &memory, room_bytes)).collect();
-        found.extend(self.smaller_screens(room_bytes));
+        found.extend(self.smaller_screens(work, room_bytes));
         found.sort_by_key(|(halvings, _)| *halvings);
         found.truncate(3);
         found
     }
-}
 
-impl Plan {
-    /// Forecast of the memory with another scan or estimator, bytes; `None` for a scene that cannot be planned. The optics
-    /// stay as they are.
-    fn memory_with(&self, scene: &Scene) -> Option<f64> {
+    fn stages_of(&self, work: Work) -> Vec<PlannedStage> {
+        match work {
+            Work::Run => self.stages.clone(),
+            Work::Bound => of_bound(&self.stages, &self.sizes(&self.scene.scene, &self.geometry)),
+        }
+    }
+
+    fn sizes(&self, scene: &Scene, geometry: &Geometry) -> Sizes {
+        Sizes::new(scene, self.target, geometry)
+    }
+
+    /// The stages with another scan or estimator; `None` for a scene that cannot be planned. The optics stay as they are.
+    fn stages_with(&self, work: Work, scene: &Scene) -> Option<Vec<PlannedStage>> {
         let geometry = Geometry::new(scene, &self.instrument.pulse, &self.wind).ok()?;
         let optics =
             [Stage::PhaseScreens, Stage::Efficiency].map(|stage| self.stages.iter().find(|s| s.stage == stage));
         let optics = [optics[0]?.clone(), optics[1]?.clone()];
         let planned = stages(scene, self.target, &geometry, &self.wind, optics);
-        Some(planned.iter().filter_map(|s| s.cost).map(|c| c.memory_bytes).sum())
+        Some(match work {
+            Work::Run => planned,
+            Work::Bound => of_bound(&planned, &self.sizes(scene, &geometry)),
+        })
     }
 
     /// The grid whose screens fit: their memory goes with the square of the points along a side.
-    fn smaller_screens(&self, room_bytes: f64) -> Option<(u32, String)> {
-        let screens = self.stages.iter().find(|s| s.stage == Stage::PhaseScreens)?.cost?.memory_bytes;
+    fn smaller_screens(&self, work: Work, room_bytes: f64) -> Option<(u32, String)> {
         let Turbulence::Refractive(t) = self.scene.scene.atmosphere.turbulence else { return None };
-        let others = self.total().memory_bytes - screens;
-        let halvings = (1..=10).find(|k| others + screens * 0.25_f64.powi(*k) <= room_bytes)?;
+        let with = |halvings: i32| {
+            let mut stages = self.stages_of(work);
+            let screens = stages.iter_mut().find(|s| s.stage == Stage::PhaseScreens)?.cost.as_mut()?;
+            screens.working_bytes *= 0.25_f64.powi(halvings);
+            Some(total(&stages).memory_bytes)
+        };
+        let halvings = (1..=10).find(|k| with(*k).is_some_and(|bytes| bytes <= room_bytes))?;
         let points = t.grid_points >> halvings;
         (t.sampling == ScreenSampling::Explicit && points >= 16)
             .then(|| (halvings as u32, format!("atmosphere.turbulence.grid_points = {points}")))
@@ -119,7 +162,7 @@ impl Remedy {
     }
 }
 
-const REMEDIES: [Remedy; 6] = [
+const REMEDIES: [Remedy; 7] = [
     Remedy { key: "outputs.signals", halve: |s| std::mem::take(&mut s.outputs.signals).then(|| "false".into()) },
     Remedy {
         key: "scan.elevation_step_rad",
@@ -131,6 +174,7 @@ const REMEDIES: [Remedy; 6] = [
     Remedy { key: "scan.pulses_per_line", halve: |s| halved(&mut s.scan.pulses_per_line) },
     Remedy { key: "estimator.window_step_samples", halve: |s| doubled(&mut s.estimator.window_step_samples) },
     Remedy { key: "estimator.gate_step_samples", halve: |s| doubled(&mut s.estimator.gate_step_samples) },
+    Remedy { key: "estimator.window_samples", halve: |s| halved(&mut s.estimator.window_samples) },
     Remedy {
         key: "scan.range_max_m",
         halve: |s| {
@@ -180,5 +224,19 @@ mod tests {
         let (few, many) = (memory(100, ""), memory(1_000_000, ""));
         assert!(many < 1.01 * few && many < 2e8, "{few} {many}");
         assert!(memory(10_000, "signals = true\n") > 1e10);
+    }
+
+    #[test]
+    fn bound_of_windows_whose_matrices_do_not_fit_is_refused_and_the_remedy_fits() {
+        let text = |window: &str| {
+            format!("[scan]\nrange_max_m = 9000.0\n[estimator]\nwindow_samples = {window}\npadded_samples = 16384\n")
+        };
+        let long = plan(&text("8192"));
+        long.fits_in(8e9).unwrap();
+        let refused = long.bound_fits_in(8e9).unwrap_err().to_string();
+        // Some fourteen matrices of 8192 x 8192 numbers.
+        assert!(refused.contains("needs 7.") && refused.contains("--allow-large"), "{refused}");
+        let window = refused.split("estimator.window_samples = ").nth(1).unwrap();
+        plan(&text(window.split([',', ' ']).next().unwrap())).bound_fits_in(8e9).unwrap();
     }
 }

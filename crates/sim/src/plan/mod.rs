@@ -7,93 +7,23 @@ use crate::Error;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
 use crate::measure::wind::SceneWind;
+use crate::measure::wind::SceneWind;
+use crate::measure::write::Contents;
 use crate::scene::{Method, Scene, SceneFile, Weighting};
 use std::fmt;
 
 mod ambiguity;
+mod files;
 mod fit;
 mod optics;
 mod possible;
 mod rehearsal;
 mod sizes;
+mod stage;
 mod stages;
 pub(crate) mod units;
 
-/// What the user asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Target {
-    /// Everything that the scene asks for.
-    Run,
-    /// Heterodyne efficiency and signal-to-noise ratio against range.
-    Efficiency,
-    /// The raw signals.
-    Signal,
-    /// The radial-velocity map with its errors.
-    Map,
-}
-
-/// A part of the measurement that can run alone or be left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
-    /// Large-eddy simulation of the flow.
-    FlowSimulation,
-    /// Wind on a cross-plane, for the files.
-    CrossPlane,
-    /// Phase screens and beam propagation.
-    PhaseScreens,
-    /// Efficiency and SNR against range.
-    Efficiency,
-    /// Wind along the lines of sight.
-    LinesOfSight,
-    /// Heterodyne signals.
-    Signals,
-    /// Shot noise.
-    Noise,
-    /// Velocity estimates.
-    Estimates,
-    /// Estimates against the truth.
-    Errors,
-    /// Tables and pictures.
-    Files,
-}
-
-impl Stage {
-    /// The name that plans, progress and summaries use.
-    pub fn name(self) -> &'static str {
-        match self {
-            Stage::FlowSimulation => "flow simulation",
-            Stage::CrossPlane => "cross-plane",
-            Stage::PhaseScreens => "phase screens",
-            Stage::Efficiency => "efficiency",
-            Stage::LinesOfSight => "lines of sight",
-            Stage::Signals => "signals",
-            Stage::Noise => "noise",
-            Stage::Estimates => "estimates",
-            Stage::Errors => "errors",
-            Stage::Files => "files",
-        }
-    }
-}
-
-/// A stage with its decision.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlannedStage {
-    /// Which stage.
-    pub stage: Stage,
-    /// What will be done, or why nothing is.
-    pub reason: String,
-    /// Forecast, for the stages that run.
-    pub cost: Option<Cost>,
-}
-
-/// Forecast of one stage.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cost {
-    /// Computing time on one core, s.
-    pub core_s: f64,
-    /// Memory held at once, bytes.
-    pub memory_bytes: f64,
-}
+pub use stage::{Cost, Forecast, PlannedStage, Stage, Target};
 
 /// What a run will do.
 #[derive(Debug)]
@@ -124,7 +54,7 @@ impl Plan {
         let wind = SceneWind::new(&scene)?;
         let instrument = Instrument::new(&scene.scene)?;
         let geometry = Geometry::new(&scene.scene, &instrument.pulse, &wind)?;
-        let last_s = wind.start_s + geometry.line_time_s.last().copied().unwrap_or(0.0);
+        let last_s = end_s(&wind, &geometry);
         if last_s > wind.end_s {
             let reason = format!(
                 "the scan ends at {last_s:.3} s of the flow, the planes at {:.3} s: begin earlier, scan faster, or set \
@@ -139,17 +69,24 @@ impl Plan {
         let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
         let plan = Self { scene, target, stages, instrument, geometry, wind, warnings };
         possible::check(&plan)?;
-        crate::measure::write::check(&plan)?;
+        crate::measure::write::check(&Contents {
+            scene: &plan.scene.scene,
+            geometry: &plan.geometry,
+            scan_s: (plan.wind.start_s, plan.scan_end_s()),
+            kept_realisations: plan.kept_realisations(),
+            has_map: plan.runs(Stage::Estimates),
+        })?;
         Ok(plan)
     }
 
-    /// Forecast of the whole: computing time on one core, s, and memory, bytes.
-    pub fn total(&self) -> Cost {
-        let none = Cost { core_s: 0.0, memory_bytes: 0.0 };
-        self.stages.iter().filter_map(|s| s.cost).fold(none, |sum, c| Cost {
-            core_s: sum.core_s + c.core_s,
-            memory_bytes: sum.memory_bytes + c.memory_bytes,
-        })
+    /// Time of the last line from the start of the flow, s.
+    pub fn scan_end_s(&self) -> f64 {
+        end_s(&self.wind, &self.geometry)
+    }
+
+    /// Forecast of the whole, with the threads of the pool in which it was planned.
+    pub fn total(&self) -> Forecast {
+        stage::total(&self.stages)
     }
 
     /// Whether a stage runs.
@@ -159,7 +96,7 @@ impl Plan {
 
     /// Realisations whose raw signals are kept for the files.
     pub fn kept_realisations(&self) -> usize {
-        stages::kept_realisations(&self.scene.scene, self.target)
+        sizes::kept_realisations(&self.scene.scene, self.target)
     }
 
     /// Whether raw signals are kept for the files.
@@ -171,6 +108,10 @@ impl Plan {
     pub fn realisations(&self) -> usize {
         if self.runs(Stage::Estimates) { self.scene.scene.scan.realisations } else { self.kept_realisations() }
     }
+}
+
+fn end_s(wind: &SceneWind, geometry: &Geometry) -> f64 {
+    wind.start_s + geometry.line_time_s.last().copied().unwrap_or(0.0)
 }
 
 /// What is allowed but probably not meant.
@@ -210,15 +151,15 @@ impl fmt::Display for Plan {
         for s in &self.stages {
             match s.cost {
                 Some(c) => {
-                    let (time, memory) = (units::seconds(c.core_s), units::bytes(c.memory_bytes));
+                    let (time, memory) = (units::seconds(c.core_s), units::bytes(c.memory_bytes()));
                     writeln!(f, "  run   {:<16} {time:>10} {memory:>10}   {}", s.stage.name(), s.reason)?;
                 }
                 None => writeln!(f, "  skip  {:<16} {:>10} {:>10}   {}", s.stage.name(), "", "", s.reason)?,
             }
         }
-        let Cost { core_s, memory_bytes } = self.total();
+        let Forecast { core_s, memory_bytes, .. } = self.total();
         let (time, memory) = (units::seconds(core_s), units::bytes(memory_bytes));
-        writeln!(f, "  total {:<16} {time:>10} {memory:>10}   forecast for one core", "")?;
+        writeln!(f, "  total {:<16} {time:>10} {memory:>10}   at once, forecast for one core", "")?;
         for w in &self.warnings {
             writeln!(f, "  warning: {w}")?;
         }
@@ -229,7 +170,7 @@ impl fmt::Display for Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Flow, NoiseKind, SnrReference, VortexPair};
+    use crate::scene::{Flow, NoiseKind, RefractiveTurbulence, SnrReference, Turbulence, VortexPair};
 
     fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
         let mut scene = Scene::default();
@@ -268,6 +209,23 @@ mod tests {
         let once = plan(Target::Map, |s| s.scan.realisations = 100).total().core_s;
         let twice = plan(Target::Map, |s| s.scan.realisations = 200).total().core_s;
         assert!((1.9..2.0).contains(&(twice / once)), "{}", twice / once);
+    }
+
+    #[test]
+    fn memory_is_that_of_the_threads_of_the_pool() {
+        let with = |threads: usize, of: fn(&mut Scene)| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| plan(Target::Run, of).total().memory_bytes)
+        };
+        let screens = |s: &mut Scene| {
+            let t = RefractiveTurbulence { grid_points: 512, realisations: 64, ..RefractiveTurbulence::default() };
+            s.atmosphere.turbulence = Turbulence::Refractive(t);
+        };
+        // Eight groups of realisations at most run at a time, each with some 80 bytes a point.
+        let [one, two, eight, more] = [1, 2, 8, 16].map(|threads| with(threads, screens));
+        let group = 512.0 * 512.0 * 80.0;
+        assert!(two - one > 0.9 * group && (6.9..7.1).contains(&((eight - one) / (two - one))), "{one} {two} {eight}");
+        assert!(more - eight < 0.2 * group, "{eight} {more}");
     }
 
     #[test]

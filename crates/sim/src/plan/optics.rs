@@ -1,6 +1,6 @@
 //! The optics of a plan: phase screens only where no theory is valid, or where they are asked for beside it.
 
-use super::{Cost, PlannedStage, Stage, Target};
+use super::stage::{Cost, PlannedStage, Stage, Target};
 use crate::Error;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
@@ -64,7 +64,10 @@ pub(super) fn stages(
                 Model::ExactBistatic => "independent paths, exact by quadrature",
                 Model::MonteCarlo => "one path out and back, by phase screens",
             };
-            let cost = Cost { core_s: quadratures_s, memory_bytes: ranges_m.len() as f64 * 64.0 };
+            // Mean, scatter and error of each model.
+            let models = if turbulence(scene).is_some() { 5.0 } else { 1.0 };
+            let kept_bytes = ranges_m.len() as f64 * (16.0 + 24.0 * models);
+            let cost = Cost { core_s: quadratures_s, working_bytes: 0.0, kept_bytes };
             planned(Stage::Efficiency, format!("{how}, at {} ranges", ranges_m.len()), Some(cost))
         }
     };
@@ -109,13 +112,14 @@ fn screens(
     runs: &[Vec<f64>],
     warnings: &mut Vec<String>,
 ) -> Result<PlannedStage, Error> {
-    let mut cost = Cost { core_s: 0.0, memory_bytes: 0.0 };
+    let mut cost = Cost::default();
     let mut what = Vec::new();
     let lists: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
     let plans = instrument.screen_plans(t, &lists).map_err(|e| refused(file, t, e))?;
     for (range_m, plan) in runs.iter().zip(plans) {
         cost.core_s += plan.realisation_cpu_s * t.realisations as f64;
-        cost.memory_bytes = cost.memory_bytes.max(plan.memory_bytes as f64);
+        let memory_bytes = plan.memory_bytes_of(t.realisations, rayon::current_num_threads());
+        cost.working_bytes = cost.working_bytes.max(memory_bytes as f64);
         let last_m = range_m.last().copied().unwrap_or(0.0);
         let g = plan.grid;
         let mut words = format!(
@@ -295,7 +299,7 @@ mod tests {
         let text = turbulent("1e-15", "grid_points = 16384\nlayers = 10000\nspectrum = \"kolmogorov\"\n")
             + "[outputs]\nprofile_points = 100000\n";
         let plan = plan(&text).unwrap();
-        assert!(plan.stages.iter().filter_map(|s| s.cost).any(|c| c.memory_bytes > 1e10));
+        assert!(plan.stages.iter().filter_map(|s| s.cost).any(|c| c.working_bytes > 1e10));
     }
 
     #[test]

@@ -2,10 +2,13 @@
 //!
 //! All are floating-point numbers: products of what a scene may say go far beyond what an integer holds.
 
-use super::Target;
-use super::stages::kept_realisations;
+use super::stage::Target;
 use crate::measure::geometry::Geometry;
-use crate::scene::{DetectorSignal, Flow, Method, Scene, Weighting};
+use crate::measure::profile::drawn_turbulence;
+use crate::scene::{DetectorSignal, Flow, Method, Scene, SignalsOf, Weighting};
+
+/// Fields of a map of estimates.
+pub(super) const MAP_FIELDS: f64 = 16.0;
 
 /// Numbers of things in one run.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +39,12 @@ pub(super) struct Sizes {
     pub(super) frequencies: f64,
     /// Lines of sight that a region touches in the middle of the scan.
     pub(super) chords: f64,
+    /// Realisations whose raw signals are kept for the files.
+    pub(super) kept: f64,
+    /// Realisations of the efficiency from which pulses take theirs.
+    pub(super) drawn: f64,
+    /// Threads of the pool in which the run is planned.
+    pub(super) threads: f64,
 }
 
 impl Sizes {
@@ -62,7 +71,24 @@ impl Sizes {
             cells: lines * g.gate_range_m.len() as f64,
             frequencies: e.padded_samples as f64 * d.bandwidth_hz / d.sampling_hz,
             chords: (2.0 * half_rad / scene.scan.elevation_step_rad + 1.0).min(lines),
+            kept: kept_realisations(scene, target) as f64,
+            drawn: drawn_turbulence(scene).map_or(0.0, |t| t.realisations as f64),
+            threads: rayon::current_num_threads() as f64,
         }
+    }
+}
+
+/// Realisations whose raw signals are kept for the files.
+pub(super) fn kept_realisations(scene: &Scene, target: Target) -> usize {
+    let keeps = match target {
+        Target::Signal => true,
+        Target::Run => scene.outputs.signals,
+        Target::Efficiency | Target::Map => false,
+    };
+    match scene.outputs.signals_of {
+        _ if !keeps => 0,
+        SignalsOf::First => 1,
+        SignalsOf::All => scene.scan.realisations,
     }
 }
 

@@ -1,13 +1,15 @@
-//! The stages of a run but the optics: what each does, and its cost as a product of sizes and unit costs.
+//! The stages of a run but the optics and the files: what each does, and its cost as a product of sizes and unit costs.
 //!
-//! The unit costs are those of one core; `cargo xtask forecast` compares the sums with what whole runs take.
+//! The unit costs are those of one core, memory is counted in numbers held; `cargo xtask forecast` compares both with what
+//! whole runs take.
 
-use super::sizes::{Sizes, is_calm, keeps_few_lags};
-use super::{Cost, PlannedStage, Stage, Target};
+use super::files::files;
+use super::sizes::{MAP_FIELDS, Sizes, is_calm, keeps_few_lags};
+use super::stage::{PlannedStage, Stage, Target, run, skip};
 use crate::measure::geometry::Geometry;
 use crate::measure::scan::records_at_once;
 use crate::measure::wind::SceneWind;
-use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, SignalsOf};
+use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene};
 
 // Unit costs on one core, s.
 const ANALYTIC_WIND_S: f64 = 7e-8;
@@ -25,10 +27,6 @@ const NEW_BYTE_S: f64 = 2.5e-10;
 const SPECTRUM_LAG_S: f64 = 6e-11;
 const SPECTRUM_POINT_S: f64 = 6e-9;
 const TRUTH_LAYER_S: f64 = 5e-10;
-const TABLE_NUMBER_S: f64 = 7e-8;
-const NETCDF_NUMBER_S: f64 = 2e-8;
-const MAP_PIXEL_S: f64 = 2.5e-7;
-const PICTURE_S: f64 = 2.5e-2;
 
 /// All stages, in the order in which they run.
 pub(super) fn stages(
@@ -45,7 +43,7 @@ pub(super) fn stages(
         let rest = [Stage::LinesOfSight, Stage::Signals, Stage::Noise, Stage::Estimates, Stage::Errors];
         out.extend(rest.map(|stage| skip(stage, "not asked for")));
     } else {
-        out.extend([lines_of_sight(scene, g, &n), signals(scene, target, g, &n), noise(scene, &n)]);
+        out.extend([lines_of_sight(scene, g, &n), signals(g, &n), noise(scene, &n)]);
         out.extend(match target {
             Target::Signal => [skip(Stage::Estimates, "not asked for"), skip(Stage::Errors, "not asked for")],
             _ => [estimates(scene, g, &n), errors(scene, g, &n)],
@@ -53,14 +51,6 @@ pub(super) fn stages(
     }
     out.push(files(scene, target, g, &n));
     out
-}
-
-fn run(stage: Stage, reason: String, core_s: f64, memory_bytes: f64) -> PlannedStage {
-    PlannedStage { stage, reason, cost: Some(Cost { core_s, memory_bytes }) }
-}
-
-fn skip(stage: Stage, reason: &str) -> PlannedStage {
-    PlannedStage { stage, reason: reason.into(), cost: None }
 }
 
 /// Time of the wind at one point, s.
@@ -81,40 +71,41 @@ fn cross_plane(scene: &Scene, target: Target) -> PlannedStage {
     }
     let (ny, nz) = crate::measure::plane::POINTS;
     let points = (ny * nz) as f64;
-    run(Stage::CrossPlane, format!("{ny} x {nz} points"), points * wind_point_s(scene), points * 64.0)
+    // Places and velocities are at work; two components are kept.
+    run(Stage::CrossPlane, format!("{ny} x {nz} points"), points * wind_point_s(scene), [points * 48.0, points * 16.0])
 }
 
 fn lines_of_sight(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let reason = format!("{} lines of {} layers of {:.3} m", n.lines, g.layers, g.layer_thickness_m);
     let points = n.lines * n.layers;
-    // Velocity and weight are kept; places and velocities of one line are at work.
-    run(Stage::LinesOfSight, reason, points * wind_point_s(scene), points * 16.0 + n.layers * 48.0)
+    // Places and velocities of the lines at work.
+    let bytes = air_bytes(n) + n.threads * n.layers * 64.0;
+    run(Stage::LinesOfSight, reason, points * wind_point_s(scene), [bytes, 0.0])
 }
 
-/// Realisations whose raw signals are kept for the files.
-pub(super) fn kept_realisations(scene: &Scene, target: Target) -> usize {
-    let keeps = match target {
-        Target::Signal => true,
-        Target::Run => scene.outputs.signals,
-        Target::Efficiency | Target::Map => false,
-    };
-    match scene.outputs.signals_of {
-        _ if !keeps => 0,
-        SignalsOf::First => 1,
-        SignalsOf::All => scene.scan.realisations,
-    }
+/// What signals are made of, held while they are made: velocity and weight of each layer, and efficiencies where pulses have
+/// their own.
+fn air_bytes(n: &Sizes) -> f64 {
+    8.0 * n.layers * (2.0 * n.lines + n.drawn)
 }
 
-fn signals(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> PlannedStage {
+/// What is held while signals are made: the air, the plans of carrier and noise, and for each thread the layers and the
+/// transforms of a record; a piece of records.
+fn scan_bytes(g: &Geometry, n: &Sizes) -> f64 {
+    let of_thread = n.layers * 48.0 + n.samples * 100.0;
+    let at_once = records_at_once::<f64>(g.samples * n.parts as usize, n.records.min(1e15) as usize) as f64;
+    air_bytes(n) + n.samples * 80.0 + n.threads * of_thread + at_once * (n.samples * n.parts * 8.0 + 64.0)
+}
+
+fn signals(g: &Geometry, n: &Sizes) -> PlannedStage {
     let reason = format!(
         "{} x {} records of {} samples, {} layers each",
         n.realisations, n.records, g.samples, g.layers_per_sample
     );
     let record_s = n.layers * LAYER_OF_RECORD_S + n.samples * (n.layers_per_sample * LAYER_OF_SAMPLE_S + SAMPLE_S);
-    let at_once = records_at_once::<f64>(g.samples * n.parts as usize, n.records.min(1e15) as usize) as f64;
-    let kept = n.records * kept_realisations(scene, target) as f64;
-    let bytes = (at_once + kept) * n.samples * n.parts * 8.0 + n.layers * 48.0 + n.samples * 200.0;
-    run(Stage::Signals, reason, n.realisations * n.records * record_s, bytes)
+    let kept =
+        n.kept * n.records * n.samples * n.parts * 8.0 + if n.kept > 0.0 { n.lines * n.layers * 8.0 } else { 0.0 };
+    run(Stage::Signals, reason, n.realisations * n.records * record_s, [scan_bytes(g, n), kept])
 }
 
 fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {
@@ -122,7 +113,7 @@ fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {
         return skip(Stage::Noise, "detector.noise is \"none\"");
     }
     let values = n.realisations * n.records * n.samples * n.parts;
-    run(Stage::Noise, format!("{values} samples"), values * NOISE_SAMPLE_S, n.samples * 64.0)
+    run(Stage::Noise, format!("{values} samples"), values * NOISE_SAMPLE_S, [0.0, 0.0])
 }
 
 fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
@@ -136,13 +127,26 @@ fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
         }
     };
     let reason = format!("{} x {} gates, {region}", n.lines, g.gate_range_m.len());
-    let sums_bytes = n.lines * n.windows * (n.numbers + 1.0) * 9.0;
+    let sums_bytes = n.lines * n.windows * n.numbers * 8.0;
     let realisation_s =
         n.records * n.windows * window_s(scene, n) + n.cells * point_s(scene, n) + sums_bytes * NEW_BYTE_S;
-    let planning = planning(scene, n);
-    let core_s = n.realisations * realisation_s + planning.core_s;
-    run(Stage::Estimates, reason, core_s, sums_bytes + n.cells * 250.0 + planning.memory_bytes)
+    let (planning_s, planned_bytes, planning_bytes) = planning(scene, n);
+    // Of each point: sums over the realisations, truth and thresholds; then the velocities of one realisation.
+    let points_bytes = n.cells * MAPPER_POINT_BYTES;
+    let maps = if e.follow_wind { 2.0 } else { 1.0 };
+    // While windows are added there is a piece of records, while velocities are sought there are sums over blocks of windows.
+    let air = air_bytes(n);
+    let adding = scan_bytes(g, n) + sums_bytes;
+    let seeking = air + sums_bytes * 1.125 + n.lines * n.windows * 8.0 + n.cells * MAP_POINT_BYTES * maps;
+    let at_work = adding.max(seeking) + points_bytes + planned_bytes;
+    let working = at_work.max(air + planning_bytes);
+    run(Stage::Estimates, reason, n.realisations * realisation_s + planning_s, [working, n.cells * MAP_FIELDS * 8.0])
 }
+
+/// Of a point of the map: sums over the realisations, truth, thresholds.
+const MAPPER_POINT_BYTES: f64 = 200.0;
+/// Of a point of the map of one realisation: the estimate.
+const MAP_POINT_BYTES: f64 = 88.0;
 
 /// Time of the statistic of one window, s.
 fn window_s(scene: &Scene, n: &Sizes) -> f64 {
@@ -189,22 +193,40 @@ fn point_s(scene: &Scene, n: &Sizes) -> f64 {
     }
 }
 
-/// What is prepared once: tapers from a covariance, weights of the lags, correlation of the windows.
-fn planning(scene: &Scene, n: &Sizes) -> Cost {
+/// What is prepared once: tapers from a covariance, weights of the lags, correlation of the windows. Its time, s, the memory
+/// of what comes of it, and that which it takes, bytes.
+fn planning(scene: &Scene, n: &Sizes) -> (f64, f64, f64) {
     let (squared, cubed) = (n.window.powi(2), n.window.powi(3));
-    let (core_s, matrices) = match scene.estimator.method {
-        Method::Likelihood(_) => (3.5e-8 * cubed, 8.0),
-        Method::GradientLikelihood(g) => (2.5e-7 * cubed * g.gradients as f64, 24.0),
-        _ => (0.0, 0.0),
+    let (core_s, kept_matrices, matrices) = match scene.estimator.method {
+        Method::Likelihood(_) => (3.5e-8 * cubed, 1.0, 8.0),
+        Method::GradientLikelihood(g) => {
+            let gradients = g.gradients as f64;
+            (2.5e-7 * cubed * gradients, 2.0 * gradients, 2.0 * gradients + 24.0)
+        }
+        _ => (0.0, 0.0, 0.0),
     };
-    let model = match scene.estimator.radius {
-        RegionRadius::Target { .. } => 16.0 * 5e-9 * cubed,
-        _ => 0.0,
+    let (model_s, model_matrices) = match scene.estimator.radius {
+        RegionRadius::Target { .. } => (16.0 * 5e-9 * cubed, BOUND_MATRICES),
+        _ => (0.0, 0.0),
     };
     // The windows of a record that share samples or the pulse.
     let reach = (n.window + 2.0 * n.layers_per_sample).min(n.samples);
     let correlation_s = squared * 1e-9 + reach * n.window * 2e-9;
-    Cost { core_s: core_s + model + correlation_s, memory_bytes: matrices * squared * 8.0 + n.frequencies * 32.0 }
+    let kept_bytes = kept_matrices * squared * 8.0 + n.frequencies * 32.0;
+    (core_s + model_s + correlation_s, kept_bytes, kept_bytes + matrices.max(model_matrices) * squared * 8.0)
+}
+
+/// Real numbers of the bound of one window over its samples squared: the covariance and its derivative, complex and as the
+/// solver takes them, its factors, solution and residual, the envelope and its copies.
+const BOUND_MATRICES: f64 = 14.0;
+
+/// What is held for the Cramer-Rao bound in place of a run of these stages: that of the air and the matrices of a window.
+pub(super) fn of_bound(stages: &[PlannedStage], n: &Sizes) -> Vec<PlannedStage> {
+    let first = [Stage::PhaseScreens, Stage::Efficiency, Stage::LinesOfSight];
+    let mut out: Vec<PlannedStage> = stages.iter().filter(|s| first.contains(&s.stage)).cloned().collect();
+    let matrices_bytes = 8.0 * BOUND_MATRICES * n.window.powi(2);
+    out.push(run(Stage::Estimates, String::new(), 0.0, [air_bytes(n) + matrices_bytes, 0.0]));
+    out
 }
 
 fn errors(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
@@ -212,53 +234,5 @@ fn errors(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let window_layers = n.window * g.sample_spacing_m / g.layer_thickness_m;
     let seen = 3.0 * n.layers_per_sample + window_layers;
     let core_s = n.cells * (seen * TRUTH_LAYER_S + wind_point_s(scene)) + n.window * n.layers_per_sample * 1e-8;
-    run(Stage::Errors, reason, core_s, n.cells * 24.0)
-}
-
-/// Columns of the table of a map, and fields of its NetCDF file.
-const MAP_COLUMNS: f64 = 24.0;
-const MAP_FIELDS: f64 = 15.0;
-
-fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> PlannedStage {
-    let o = &scene.outputs;
-    let maps = matches!(target, Target::Run | Target::Map);
-    let kept = kept_realisations(scene, target) as f64;
-    let on = |wanted: bool| f64::from(u8::from(wanted));
-    let mut core_s = 5e-3;
-    let mut memory = 0.0;
-    if maps {
-        core_s += n.cells * (on(o.csv) * MAP_COLUMNS * TABLE_NUMBER_S + on(o.netcdf) * MAP_FIELDS * NETCDF_NUMBER_S);
-        memory += n.cells * (250.0 + on(o.csv) * 400.0 + on(o.netcdf) * 120.0);
-        let pixels = 3.0 * map_pixels(scene, g);
-        core_s += pixels * (on(o.svg) + on(o.png)) * MAP_PIXEL_S + (on(o.svg) + on(o.png)) * PICTURE_S;
-        memory += pixels * (on(o.svg) * 5.0 + on(o.png) * 12.0);
-    }
-    if kept > 0.0 {
-        let numbers = kept * n.records * n.samples * n.parts;
-        core_s += on(o.csv) * n.lines * n.samples * (2.0 + n.parts) * TABLE_NUMBER_S;
-        core_s += on(o.netcdf) * numbers * 1.5 * NETCDF_NUMBER_S;
-        memory += 8.0 * numbers * (1.0 + on(o.netcdf) * 4.7) + on(o.csv) * n.lines * n.samples * 90.0;
-    }
-    if target == Target::Run && o.flow && !is_calm(scene) {
-        core_s += on(o.csv) * 8e-3 + on(o.netcdf) * 1e-3;
-        memory += on(o.csv) * 2.5e6 + on(o.netcdf) * 1e6;
-    }
-    if matches!(target, Target::Run | Target::Efficiency) {
-        let points = o.profile_points as f64;
-        core_s += on(o.csv) * points * 10.0 * TABLE_NUMBER_S + (on(o.svg) + on(o.png)) * (PICTURE_S + points * 1e-6);
-        memory += points * 400.0 + on(o.png) * 3e6;
-    }
-    let kinds = [(o.csv, "CSV"), (o.netcdf, "NetCDF"), (o.svg, "SVG"), (o.png, "PNG")];
-    let kinds: Vec<&str> = kinds.into_iter().filter(|k| k.0).map(|k| k.1).collect();
-    run(Stage::Files, kinds.join(", "), core_s, memory)
-}
-
-/// Pixels of one panel of a map: some 1300 across, and as high as the scan.
-fn map_pixels(scene: &Scene, g: &Geometry) -> f64 {
-    let far_m = g.gate_range_m.last().copied().unwrap_or(1.0);
-    let (low, high) = (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad);
-    let top_m = (scene.scan.lidar_height_m + far_m * high.sin()).max(0.0);
-    let bottom_m = (scene.scan.lidar_height_m + far_m * low.sin()).min(0.0);
-    let shape = ((top_m - bottom_m) / far_m).clamp(0.07, 1.5);
-    1300.0 * 1300.0 * shape
+    run(Stage::Errors, reason, core_s, [0.0, 0.0])
 }

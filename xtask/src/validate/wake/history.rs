@@ -4,8 +4,8 @@ use crate::Failure;
 use crate::references::numbers;
 use std::f64::consts::TAU;
 use wakescope_les::analysis::decay::value_at;
+use wakescope_les::analysis::{WakeMeter, WakeRecord, WakeScales};
 use wakescope_les::cases::VortexPairCase;
-use wakescope_les::{analysis::WakeMeter, analysis::WakeRecord, analysis::WakeScales};
 
 /// Records per unit of tau.
 pub(crate) const PER_TAU: usize = 20;

@@ -4,7 +4,7 @@
 
 use ndarray::{Array2, ArrayView2};
 
-use crate::error::{Error, finite, length, positive};
+use crate::error::{Error, finite, increasing, length, positive};
 use crate::vortex_fit::{CorePrior, FreeParameters, Parameter, Wake};
 
 /// A map of radial velocities, such as accumulation gives.
@@ -56,9 +56,7 @@ impl VelocityMap<'_> {
 pub(crate) fn validate_axes(elevation_rad: &[f64], range_m: &[f64]) -> Result<(), Error> {
     for (field, axis) in [("elevation_rad", elevation_rad), ("range_m", range_m)] {
         axis.iter().try_for_each(|value| finite(field, *value))?;
-        if let Some(pair) = axis.windows(2).find(|pair| pair[1] <= pair[0]) {
-            return Err(Error::OutOfRange { field, value: pair[1], allowed: "increasing along its axis" });
-        }
+        increasing(field, axis)?;
     }
     Ok(())
 }

@@ -45,7 +45,7 @@ pub fn fit_map_of_estimator(
     let free = FreeParameters { core_radius: Sharing::Fixed, ..options.free };
     let rough = MapFitOptions { free, tolerance_sigmas: ROUGH_SIGMAS, ..*options };
     let refine = |start: &Wake| refine_map_fit_of_estimator(map, model, response, start, options);
-    let by_means = refine_map_fit(map, model, &kernel, &guess, &rough).map(|fit| fit.wake);
+    let by_means = refine_map_fit(map, model, &kernel.coarser(2), &guess, &rough).map(|fit| fit.wake);
     let first = best_of(&starts(by_means.as_ref().unwrap_or(&guess), options), refine);
     let fit = match (first, by_means) {
         (Err(Error::NotConverged { .. }), Ok(_)) => best_of(&starts(&guess, options), refine),
@@ -75,7 +75,8 @@ pub fn refine_map_fit_of_estimator(
     let mut groups = &fit.groups;
     let mut wake = options.free.start(guess);
     let (mut turns, mut last, mut sigmas_left) = (0, [0.0; PARAMETERS], f64::INFINITY);
-    let (mut slopes, mut prior): (Option<(Wake, Vec<Array2<f64>>)>, _) = (None, None);
+    let mut slopes: Option<(Wake, Vec<Array2<f64>>)> = None;
+    let mut prior = None;
     for step in 1..=STEPS {
         let here = prepared.velocities(model, &wake, map.elevation_rad);
         let known = slopes.take().filter(|(at, slopes)| near(at, &wake) && slopes.len() == groups.len());

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! with t_n counted from the middle of the window, f(v) from (30) and f(t) the pulse; noise adds its own lags, real
-//! samples keep the real part. The correlograms of a region's lines are added, and the estimator itself turns the sum
+//! samples keep the real part. The correlograms of a region's lines are added, and the estimator itself phasors the sum
 //! into a velocity. So whatever it makes of the skewed and broad spectra of a core is part of what is expected of it:
 //! nothing is taken for a mean. Left out is the extent of a region along the line, short against a gate. Check:
 //! uniform wind; a wide line shows the mean over the gate; the correlogram of signals summed over layers; simulated scans.
@@ -17,11 +17,11 @@ use ndarray::Array2;
 use std::f64::consts::TAU;
 
 use crate::bound::Noise;
-use crate::error::{Error, length, positive};
+use crate::error::{Error, length, not_negative, positive};
 use crate::estimators::Estimator;
+use crate::linalg::dot;
 use crate::parallel::map_indexed;
 use crate::spectrum::{Correlogram, Taper};
-use crate::vortex_fit::signal_fit::banded_cholesky::dot;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::wake_map::region;
 use crate::vortex_fit::{PulseShape, RangeKernel, Wake, WakeModel};
@@ -66,9 +66,7 @@ impl<'a> EstimatorResponse<'a> {
         positive("snr", snr)?;
         let lags = statistic.lags();
         length("statistic", estimator.statistic_len(), S::KIND.lag_numbers(lags))?;
-        if !(radius_m >= 0.0 && radius_m.is_finite()) {
-            return Err(Error::OutOfRange { field: "radius_m", value: radius_m, allowed: "finite and at least 0" });
-        }
+        not_negative("radius_m", radius_m)?;
         let in_band = Noise::Band { floor: 0.0 }.covariance(sampling, 0.0, S::KIND).re;
         let numbers = statistic.lag_weights().into_iter().enumerate().flat_map(|(m, weight)| {
             let lag = noise.covariance(sampling, m as f64, S::KIND) * (weight / in_band / snr);
@@ -167,8 +165,9 @@ impl Prepared<'_> {
     /// The map of a wake.
     pub(crate) fn velocities(&self, model: &WakeModel, wake: &Wake, elevation_rad: &[f64]) -> Array2<f64> {
         let (lines, gates) = (elevation_rad.len(), self.range_m.len());
-        let correlograms =
-            map_indexed(lines, Vec::new, |turns, line| self.line(model, wake, Ray::new(elevation_rad[line]), turns));
+        let correlograms = map_indexed(lines, Vec::new, |phasors, line| {
+            self.line(model, wake, Ray::new(elevation_rad[line]), phasors)
+        });
         let state = || (Scratch::new(), vec![0.0; self.numbers]);
         let rows = map_indexed(lines, state, |(scratch, mean), line| {
             let one = |gate: usize| {
@@ -214,23 +213,23 @@ impl Prepared<'_> {
     }
 
     /// Expected correlograms of the signal at all gates of a line, of power 1.
-    fn line(&self, model: &WakeModel, wake: &Wake, ray: Ray, turns: &mut Vec<f64>) -> Vec<f64> {
+    fn line(&self, model: &WakeModel, wake: &Wake, ray: Ray, phasors: &mut Vec<f64>) -> Vec<f64> {
         let sampling = &self.response.sampling;
         let (Some(&nearest_m), Some(&farthest_m)) = (self.range_m.first(), self.range_m.last()) else {
             return Vec::new();
         };
         let nodes = self.weights.len() / self.numbers;
         let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + nodes + 1;
-        turns.clear();
+        phasors.clear();
         for point in 0..points {
             let at_m = nearest_m + self.first_offset_m + point as f64 * self.spacing_m;
             let cycles = sampling.frequency_hz(model.velocity_on(wake, at_m, ray)) * sampling.period_s();
             let (sin, cos) = (TAU * cycles).sin_cos();
             let (mut re, mut im) = (1.0, 0.0);
-            while turns.len() < (point + 1) * self.numbers {
-                turns.push(re);
+            while phasors.len() < (point + 1) * self.numbers {
+                phasors.push(re);
                 if self.response.kind == SignalKind::Complex {
-                    turns.push(im);
+                    phasors.push(im);
                 }
                 (re, im) = (re * cos - im * sin, im * cos + re * sin);
             }
@@ -243,7 +242,7 @@ impl Prepared<'_> {
             // ranges between two nodes see something of both
             for (shift, share) in [(0, 1.0 - part), (1, part)] {
                 if share > 1e-6 {
-                    let seen = &turns[(index as usize + shift) * self.numbers..];
+                    let seen = &phasors[(index as usize + shift) * self.numbers..];
                     add_seen(lags, &self.weights, seen, share);
                 }
             }
@@ -252,14 +251,21 @@ impl Prepared<'_> {
     }
 }
 
-/// lags += share weights turns, summed over nodes; all three have rows of the length of `lags`.
+/// lags += share weights phasors, summed over nodes; all three have rows of the length of `lags`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn add_seen(lags: &mut [f64], weights: &[f64], turns: &[f64], share: f64) {
+fn add_seen(lags: &mut [f64], weights: &[f64], phasors: &[f64], share: f64) {
     let count = lags.len();
-    for (weights, turns) in weights.chunks_exact(count).zip(turns.chunks_exact(count)) {
+    // two nodes at a time: the sums are loaded and stored half as often
+    let (pairs, nodes) = (weights.chunks_exact(2 * count), phasors.chunks_exact(2 * count));
+    let last = weights.len() / (2 * count) * 2 * count;
+    for (weights, phasors) in pairs.zip(nodes) {
+        let ((w, x), (t, u)) = (weights.split_at(count), phasors.split_at(count));
         for i in 0..count {
-            lags[i] += share * weights[i] * turns[i];
+            lags[i] += share * (w[i] * t[i] + x[i] * u[i]);
         }
+    }
+    for ((lag, weight), turn) in lags.iter_mut().zip(&weights[last..]).zip(&phasors[last..]) {
+        *lag += share * weight * turn;
     }
 }
 

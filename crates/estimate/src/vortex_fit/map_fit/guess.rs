@@ -168,9 +168,9 @@ fn orthonormal(shapes: [Vec<f64>; 2], known: &[bool]) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut shape in shapes {
         shape.iter_mut().zip(known).filter(|(_, known)| !**known).for_each(|(s, _)| *s = 0.0);
-        let before = crate::vortex_fit::signal_fit::banded_cholesky::dot(&shape, &shape);
+        let before = crate::linalg::dot(&shape, &shape);
         remove(&basis, &mut shape);
-        let norm = crate::vortex_fit::signal_fit::banded_cholesky::dot(&shape, &shape);
+        let norm = crate::linalg::dot(&shape, &shape);
         if norm > 1e-12 * before {
             shape.iter_mut().for_each(|s| *s /= norm.sqrt());
             basis.push(shape);
@@ -182,17 +182,15 @@ fn orthonormal(shapes: [Vec<f64>; 2], known: &[bool]) -> Vec<Vec<f64>> {
 /// Takes the part along the basis away.
 fn remove(basis: &[Vec<f64>], shape: &mut [f64]) {
     for direction in basis {
-        let part = crate::vortex_fit::signal_fit::banded_cholesky::dot(direction, shape);
+        let part = crate::linalg::dot(direction, shape);
         shape.iter_mut().zip(direction).for_each(|(s, d)| *s -= part * d);
     }
 }
 
 /// (explained sum of squares, left place, right place, circulations) of the best pair with positive circulations.
 fn best_pair(places: &[Place], shapes: &[Vec<f64>], data: &[f64]) -> Option<(f64, usize, usize, (f64, f64))> {
-    let towards: Vec<f64> =
-        shapes.iter().map(|shape| crate::vortex_fit::signal_fit::banded_cholesky::dot(shape, data)).collect();
-    let squares: Vec<f64> =
-        shapes.iter().map(|shape| crate::vortex_fit::signal_fit::banded_cholesky::dot(shape, shape)).collect();
+    let towards: Vec<f64> = shapes.iter().map(|shape| crate::linalg::dot(shape, data)).collect();
+    let squares: Vec<f64> = shapes.iter().map(|shape| crate::linalg::dot(shape, shape)).collect();
     let best = map_indexed(
         places.len(),
         || (),
@@ -208,7 +206,7 @@ fn best_pair(places: &[Place], shapes: &[Vec<f64>], data: &[f64]) -> Option<(f64
                 if a <= 0.0 && b <= 0.0 {
                     continue;
                 }
-                let ab = -crate::vortex_fit::signal_fit::banded_cholesky::dot(&shapes[left], &shapes[right]);
+                let ab = -crate::linalg::dot(&shapes[left], &shapes[right]);
                 let determinant = aa * bb - ab * ab;
                 let strength = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
                 if !(strength.0 > 0.0 && strength.1 > 0.0 && determinant > 1e-6 * aa * bb) {

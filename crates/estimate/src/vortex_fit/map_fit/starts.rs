@@ -4,10 +4,10 @@
 //! not the best add their distance to the covariance, weighted with their likelihood. Check: made-up ends; fits of many maps.
 
 use crate::error::Error;
-use crate::vortex_fit::{MapFit, MapFitOptions, Sharing, Wake};
+use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span).
-pub(crate) const CORE_OVER_SPACING: f64 = 0.045;
+pub(crate) const CORE_OVER_SPACING: f64 = CorePrior::TYPICAL.median_over_spacing;
 /// Core radii of the starts over the spacing, if they are fitted.
 const CORES_OVER_SPACING: [f64; 2] = [CORE_OVER_SPACING, 0.1];
 /// A typical core is known to this part of itself, after at most so many rounds.

@@ -8,8 +8,8 @@
 use ndarray::Array2;
 
 use crate::error::Error;
+use crate::linalg::dot;
 use crate::vortex_fit::damped_newton::{Normal, Stop, descend};
-use crate::vortex_fit::signal_fit::banded_cholesky::dot;
 use crate::vortex_fit::wake::free_parameters::{gathered, moved};
 use crate::vortex_fit::{Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
 

@@ -9,7 +9,7 @@ use num_complex::Complex;
 
 /// Lower triangle of a Hermitian banded matrix, column by column: entry (j + d, j) at `j (width + 1) + d`.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Band {
+pub(crate) struct Banded {
     pub(crate) order: usize,
     /// Number of subdiagonals.
     pub(crate) width: usize,
@@ -28,7 +28,7 @@ fn subtract(target: (&mut [f64], &mut [f64]), source: (&[f64], &[f64]), (a, b): 
     }
 }
 
-impl Band {
+impl Banded {
     /// Makes room for an order and a number of subdiagonals; all entries 0.
     pub(crate) fn reset(&mut self, order: usize, width: usize) {
         (self.order, self.width) = (order, width.min(order.saturating_sub(1)));
@@ -84,13 +84,13 @@ impl Band {
     }
 
     /// Entries of A^-1 in the band, from the factor L.
-    pub(crate) fn inverse_into(&self, out: &mut Band) {
+    pub(crate) fn inverse_into(&self, out: &mut Banded) {
         inverse_into(self, out);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn factorize(band: &mut Band) -> Option<f64> {
+fn factorize(band: &mut Banded) -> Option<f64> {
     let mut log_determinant = 0.0;
     for j in 0..band.order {
         let (start, height) = (band.at(j, 0), band.height(j));
@@ -122,7 +122,7 @@ fn factorize(band: &mut Band) -> Option<f64> {
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn inverse_into(band: &Band, out: &mut Band) {
+fn inverse_into(band: &Banded, out: &mut Banded) {
     out.reset(band.order, band.width);
     let stride = band.width + 1;
     let (mut lr, mut li, mut xr, mut xi) = (vec![0.0; stride], vec![0.0; stride], vec![0.0; stride], vec![0.0; stride]);
@@ -176,19 +176,6 @@ fn conjugate_dot(vr: &[f64], vi: &[f64], lr: &[f64], li: &[f64]) -> (f64, f64) {
     ((re[0] + re[1]) + (re[2] + re[3]), (im[0] + im[1]) + (im[2] + im[3]))
 }
 
-/// Scalar product, in eight partial sums that the compiler keeps in vector registers.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a.zip(b) {
-        for lane in 0..8 {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -198,10 +185,10 @@ mod tests {
     type C64 = Complex<f64>;
 
     /// A diagonally dominant banded matrix and its dense form.
-    fn random(order: usize, width: usize) -> (Band, Array2<C64>) {
+    fn random(order: usize, width: usize) -> (Banded, Array2<C64>) {
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(order as u64);
         let mut normal = || rng.sample::<f64, _>(rand_distr::StandardNormal);
-        let mut band = Band::default();
+        let mut band = Banded::default();
         band.reset(order, width);
         let mut dense = Array2::zeros((order, order));
         for j in 0..order {
@@ -226,7 +213,7 @@ mod tests {
             let inverse = crate::linalg::solve("test", dense.view(), eye.view()).unwrap();
             let (values, _) = crate::linalg::hermitian_eigen("test", dense.view()).unwrap();
             assert!((log_determinant - values.mapv(f64::ln).sum()).abs() < 1e-10);
-            let mut out = Band::default();
+            let mut out = Banded::default();
             band.inverse_into(&mut out);
             for j in 0..order {
                 for d in 0..=out.width.min(order - 1 - j) {

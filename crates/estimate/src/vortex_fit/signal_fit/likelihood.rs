@@ -9,9 +9,10 @@
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex;
 
-use crate::error::{Error, positive};
+use crate::error::{Error, length, positive};
+use crate::linalg::dot;
 use crate::parallel::map_indexed;
-use crate::vortex_fit::signal_fit::banded_cholesky::{Band, dot};
+use crate::vortex_fit::signal_fit::banded_cholesky::Banded;
 use crate::vortex_fit::signal_fit::line_covariance::Work;
 use crate::vortex_fit::signal_fit::scan_model::Line;
 use crate::vortex_fit::wake::free_parameters::gathered;
@@ -63,8 +64,8 @@ impl ScanSignals {
     /// [`Error::Length`] if rays or samples are not those of the model, [`Error::OutOfRange`] for a power that is not positive,
     /// [`Error::Empty`] if no ray is left.
     pub fn new<S: Sample>(model: &ScanModel, records: ArrayView2<'_, S>, noise_power: f64) -> Result<Self, Error> {
-        crate::error::length("rays of the records", model.rays, records.nrows())?;
-        crate::error::length("samples of a record", model.record_samples, records.ncols())?;
+        length("rays of the records", model.rays, records.nrows())?;
+        length("samples of a record", model.record_samples, records.ncols())?;
         positive("noise_power", noise_power)?;
         let scale = noise_power.sqrt().recip();
         positive("1 / sqrt(noise_power)", scale)?;
@@ -92,9 +93,9 @@ impl ScanSignals {
 #[derive(Debug, Default)]
 struct Space {
     work: Work,
-    signal: Band,
-    factor: Band,
-    inverse: Band,
+    signal: Banded,
+    factor: Banded,
+    inverse: Banded,
 }
 
 impl ScanModel {
@@ -173,7 +174,7 @@ impl ScanModel {
     }
 
     /// Sum of the weights times the covariance of the noise.
-    fn noise_product(&self, weight: &Band) -> f64 {
+    fn noise_product(&self, weight: &Banded) -> f64 {
         let columns = weight.re.chunks_exact(weight.width + 1);
         columns.map(|column| column.iter().zip(&self.noise).map(|(w, n)| w * n).sum::<f64>()).sum()
     }
@@ -261,7 +262,7 @@ impl ScanModel {
 }
 
 /// R^-1 z from the factor of R.
-fn solve(factor: &Band, z: &[Complex<f64>]) -> Vec<Complex<f64>> {
+fn solve(factor: &Banded, z: &[Complex<f64>]) -> Vec<Complex<f64>> {
     let (mut re, mut im): (Vec<f64>, Vec<f64>) = z.iter().map(|z| (z.re, z.im)).unzip();
     factor.forward(&mut re, &mut im, 0, z.len());
     let mut x: Vec<_> = re.iter().zip(&im).map(|(re, im)| Complex::new(*re, *im)).collect();
@@ -270,7 +271,7 @@ fn solve(factor: &Band, z: &[Complex<f64>]) -> Vec<Complex<f64>> {
 }
 
 /// band += x x^H.
-fn add_outer(band: &mut Band, x: &[Complex<f64>]) {
+fn add_outer(band: &mut Banded, x: &[Complex<f64>]) {
     for column in 0..band.order {
         let conjugate = x[column].conj();
         for down in 0..=band.width.min(band.order - 1 - column) {
@@ -282,7 +283,7 @@ fn add_outer(band: &mut Band, x: &[Complex<f64>]) {
 }
 
 /// Counts the entries below the diagonal for those above it too.
-fn double_off_diagonal(band: &mut Band) {
+fn double_off_diagonal(band: &mut Banded) {
     let stride = band.width + 1;
     for part in [&mut band.re, &mut band.im] {
         for column in part.chunks_exact_mut(stride) {
@@ -292,13 +293,13 @@ fn double_off_diagonal(band: &mut Band) {
 }
 
 /// Re sum of conj(a) b over the stored entries.
-fn product(a: &Band, b: &Band) -> f64 {
+fn product(a: &Banded, b: &Banded) -> f64 {
     dot(&a.re, &b.re) + dot(&a.im, &b.im)
 }
 
 /// L^-1 D L^-H of a Hermitian D as real numbers whose scalar product is the trace of a product: the upper triangle, real
 /// and imaginary parts, off-diagonal entries times sqrt 2.
-fn whiten(factor: &Band, d: &Band) -> Vec<f64> {
+fn whiten(factor: &Banded, d: &Banded) -> Vec<f64> {
     let n = factor.order;
     let (mut half_re, mut half_im) = (vec![0.0; n * n], vec![0.0; n * n]);
     let (mut re, mut im) = (vec![0.0; n], vec![0.0; n]);

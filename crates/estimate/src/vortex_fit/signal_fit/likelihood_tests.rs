@@ -183,7 +183,7 @@ fn covariance_of_the_gradient_over_draws_is_the_information() {
     // samples of the model itself: z = L w
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(17);
     let mut normal = || rng.sample::<f64, _>(rand_distr::StandardNormal) / SQRT_2;
-    let factors: Vec<Band> = model
+    let factors: Vec<Banded> = model
         .lines
         .iter()
         .map(|line| {

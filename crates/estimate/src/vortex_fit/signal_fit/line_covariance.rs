@@ -10,7 +10,7 @@
 use multiversion::multiversion;
 use num_complex::Complex;
 
-use crate::vortex_fit::signal_fit::banded_cholesky::Band;
+use crate::vortex_fit::signal_fit::banded_cholesky::Banded;
 use crate::vortex_fit::signal_fit::scan_model::Line;
 use crate::vortex_fit::{PARAMETERS, ScanModel, Wake};
 
@@ -52,13 +52,13 @@ impl ScanModel {
     }
 
     /// m T d omega / dv of each place.
-    pub(crate) fn lag_turns(&self) -> Vec<f64> {
+    pub(crate) fn lag_phase_slopes(&self) -> Vec<f64> {
         let per_lag = self.baseband.turn_per_velocity_rad_m() * self.baseband.interval_s();
         self.weights.lag_of_place().map(|lag| lag as f64 * per_lag).collect()
     }
 
     /// Covariance of the signal of a line for unit noise power, without the noise.
-    pub(crate) fn signal_into(&self, line: &Line, work: &mut Work, out: &mut Band) {
+    pub(crate) fn signal_into(&self, line: &Line, work: &mut Work, out: &mut Banded) {
         self.clear_nodes(work);
         for (layer, (velocity, _)) in line.layers.iter().zip(&work.wind) {
             self.phasors(*velocity, &mut work.phasor);
@@ -74,15 +74,15 @@ impl ScanModel {
         line: &Line,
         work: &mut Work,
         slope: impl Fn(&[f64; PARAMETERS]) -> f64,
-        out: &mut Band,
+        out: &mut Banded,
     ) {
         self.clear_nodes(work);
-        let turns = self.lag_turns();
+        let phase_slopes = self.lag_phase_slopes();
         for (layer, (velocity, slopes)) in line.layers.iter().zip(&work.wind) {
             self.phasors(*velocity, &mut work.phasor);
             let (gain, gain_slope) = self.gain.at(*velocity);
-            let (re, im) = work.phasor.split_at_mut(turns.len());
-            for ((re, im), turn) in re.iter_mut().zip(im).zip(&turns) {
+            let (re, im) = work.phasor.split_at_mut(phase_slopes.len());
+            for ((re, im), turn) in re.iter_mut().zip(im).zip(&phase_slopes) {
                 let (a, b) = (*re, *im);
                 (*re, *im) = (gain_slope * a - gain * turn * b, gain_slope * b + gain * turn * a);
             }
@@ -106,7 +106,7 @@ impl ScanModel {
     }
 
     /// The pulse's weights applied to the sums on the nodes.
-    fn weigh_into(&self, work: &mut Work, out: &mut Band) {
+    fn weigh_into(&self, work: &mut Work, out: &mut Banded) {
         out.reset(self.samples, self.weights.lags);
         let lags = self.weights.lags + 1;
         for twice in 0..2 * self.samples - 1 {
@@ -126,7 +126,7 @@ impl ScanModel {
     }
 
     /// Adds to `gradient` the derivatives of the scalar whose change is Re sum of conj(weight(k, l)) dR(k, l) over k >= l.
-    pub(crate) fn pull_back(&self, line: &Line, weight: &Band, work: &mut Work, gradient: &mut [f64; PARAMETERS]) {
+    pub(crate) fn pull_back(&self, line: &Line, weight: &Banded, work: &mut Work, gradient: &mut [f64; PARAMETERS]) {
         self.clear_nodes(work);
         let lags = self.weights.lags + 1;
         for twice in 0..2 * self.samples - 1 {
@@ -143,7 +143,7 @@ impl ScanModel {
             let row = (lags, places.start);
             spread_to_nodes(self.weights.rows(), &mut work.nodes[first * 2 * lags..], row, sum_re, sum_im);
         }
-        let turns = self.lag_turns();
+        let phase_slopes = self.lag_phase_slopes();
         let mut seen = vec![0.0; 2 * lags];
         for (layer, (velocity, slopes)) in line.layers.iter().zip(&work.wind) {
             self.phasors(*velocity, &mut work.phasor);
@@ -157,7 +157,7 @@ impl ScanModel {
             let (seen_re, seen_im) = seen.split_at(lags);
             let mut by_velocity = 0.0;
             for m in 0..lags {
-                by_velocity += gain * turns[m] * (re[m] * seen_im[m] - im[m] * seen_re[m])
+                by_velocity += gain * phase_slopes[m] * (re[m] * seen_im[m] - im[m] * seen_re[m])
                     + gain_slope * (re[m] * seen_re[m] + im[m] * seen_im[m]);
             }
             gradient.iter_mut().zip(slopes).for_each(|(g, s)| *g += by_velocity * s);

@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 
 use crate::bound::Noise;
-use crate::error::{Error, finite};
+use crate::error::{Error, finite, not_negative, positive};
 use crate::vortex_fit::signal_fit::baseband::PowerGain;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::pulse::PairWeights;
@@ -129,7 +129,7 @@ impl ScanModel {
                 }
             }
         }
-        crate::error::positive("largest SNR", largest)?;
+        positive("largest SNR", largest)?;
         let weights = weights_of(CUT / largest.max(1.0));
         Ok(Self {
             wake: setup.wake,
@@ -250,9 +250,7 @@ impl Cutter<'_> {
                 let s = (part as f64 + 0.5) / parts;
                 let range_m = self.first_range_m + (interval as f64 + s) * self.spacing_m;
                 let ratio = snr(range_m, elevation_rad);
-                if !(ratio >= 0.0 && ratio.is_finite()) {
-                    return Err(Error::OutOfRange { field: "snr", value: ratio, allowed: "finite and at least 0" });
-                }
+                not_negative("snr", ratio)?;
                 *largest = largest.max(ratio);
                 if range_m > 0.0 && ratio > 0.0 {
                     let node = (interval + self.pad() as i64 - 1) as usize;

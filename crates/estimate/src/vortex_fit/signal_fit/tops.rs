@@ -9,9 +9,9 @@
 use ndarray::Array2;
 
 use crate::error::Error;
+use crate::linalg::dot;
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::signal_fit::ascent::{Ascent, Parabola, State};
-use crate::vortex_fit::signal_fit::banded_cholesky::dot;
 use crate::vortex_fit::{Parameter, Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
 
 /// Core radii that are tried, over the spacing of the vortices.

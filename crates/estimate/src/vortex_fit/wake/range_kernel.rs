@@ -5,7 +5,7 @@
 //! difference quotients.
 
 use crate::error::{Error, finite, positive};
-use crate::vortex_fit::signal_fit::banded_cholesky::dot;
+use crate::linalg::dot;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::{PARAMETERS, Wake, WakeModel};
 use crate::window::SPEED_OF_LIGHT_M_S;

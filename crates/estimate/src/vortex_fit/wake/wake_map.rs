@@ -5,7 +5,7 @@
 
 use ndarray::Array2;
 
-use crate::error::{Error, finite};
+use crate::error::{Error, finite, not_negative};
 use crate::parallel::map_indexed;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
@@ -29,9 +29,7 @@ impl WakeModel {
         wake.validate()?;
         elevation_rad.iter().try_for_each(|value| finite("elevation_rad", *value))?;
         range_m.iter().try_for_each(|value| finite("range_m", *value))?;
-        if !(radius_m >= 0.0 && radius_m.is_finite()) {
-            return Err(Error::OutOfRange { field: "radius_m", value: radius_m, allowed: "finite and at least 0" });
-        }
+        not_negative("radius_m", radius_m)?;
         let rows = map_indexed(elevation_rad.len(), LineScratch::default, |scratch, line| {
             let ray = Ray::new(elevation_rad[line]);
             let mut velocities = vec![0.0; range_m.len()];

@@ -10,23 +10,36 @@ const CENTRE_VORTICITY_PER_S: f64 = 299.528_385_375_226;
 /// Radius of the vortices \[m\].
 pub(super) const RADIUS_M: f64 = 0.1;
 
-/// The dipole in the plane y, z of the box `[-1, 1]^2`, running along z; `1/reynolds` is the viscosity. The walls at z = -1
-/// and 1 are no-slip; those at y = -1 and 1 too if `closed`, else y is periodic. `strength` refines y in its middle, where the
-/// vortices stay ([`Mapping::SinhMiddle`] between walls, else [`Mapping::Cluster`]), and z towards its walls; 0 for equal cells.
+/// The dipole in the plane y, z of the box `[-1, 1]^2`, running along z between no-slip walls at z = -1 and 1, with y periodic;
+/// `1/reynolds` is the viscosity. `strength` refines y in its middle, where the vortices stay ([`Mapping::Cluster`]), and z
+/// towards its walls; 0 for equal cells.
 ///
 /// # Errors
 /// Cells, stretching or Reynolds number out of range.
-pub fn dipole_against_wall(cells: [usize; 2], strength: [f64; 2], reynolds: f64, closed: bool) -> Result<Case, Error> {
-    let walls = |n| Direction::between(n, -1.0, 1.0, Wall::AT_REST, Wall::AT_REST);
-    let stretched = |d: Direction, strength, mapping| if strength == 0.0 { d } else { d.stretched(mapping) };
-    let [lateral, wall] = strength;
-    let y = if closed {
-        stretched(walls(cells[0]), lateral, Mapping::SinhMiddle { strength: lateral })
-    } else {
-        let middle = Mapping::Cluster { strength: lateral, place: 0.5 };
-        stretched(Direction::periodic(cells[0], -1.0, 1.0), lateral, middle)
-    };
-    let z = stretched(walls(cells[1]), wall, Mapping::TanhBoth { strength: wall });
+pub fn dipole_between_walls(cells: [usize; 2], strength: [f64; 2], reynolds: f64) -> Result<Case, Error> {
+    let middle = Mapping::Cluster { strength: strength[0], place: 0.5 };
+    dipole(stretched(Direction::periodic(cells[0], -1.0, 1.0), strength[0], middle), cells[1], strength[1], reynolds)
+}
+
+/// The same in a box closed by no-slip walls at y = -1 and 1 as well; y is refined by [`Mapping::SinhMiddle`].
+///
+/// # Errors
+/// As [`dipole_between_walls`].
+pub fn dipole_in_a_box(cells: [usize; 2], strength: [f64; 2], reynolds: f64) -> Result<Case, Error> {
+    let middle = Mapping::SinhMiddle { strength: strength[0] };
+    dipole(stretched(walls(cells[0]), strength[0], middle), cells[1], strength[1], reynolds)
+}
+
+fn walls(cells: usize) -> Direction {
+    Direction::between(cells, -1.0, 1.0, Wall::AT_REST, Wall::AT_REST)
+}
+
+fn stretched(direction: Direction, strength: f64, mapping: Mapping) -> Direction {
+    if strength == 0.0 { direction } else { direction.stretched(mapping) }
+}
+
+fn dipole(y: Direction, cells: usize, strength: f64, reynolds: f64) -> Result<Case, Error> {
+    let z = stretched(walls(cells), strength, Mapping::TanhBoth { strength });
     let mesh = Mesh::new(Direction::thin(1.0), y, z)?;
     let settings = FlowSettings::new(1.0 / reynolds, TimeStep::Courant { courant: 0.35, longest_s: 1e-3 });
     let initial = |at_m: [f64; 3]| {

@@ -13,7 +13,7 @@ mod vortex_pair;
 
 pub use cavity::lid_driven_cavity;
 pub use channel::{Plates, channel};
-pub use dipole::dipole_against_wall;
+pub use dipole::{dipole_between_walls, dipole_in_a_box};
 pub use orr_sommerfeld::TollmienSchlichting;
 pub use resolution::{Resolution, VortexLengths};
 pub use taylor_green::{taylor_green_3d, taylor_green_eighth, taylor_green_plane, taylor_green_plane_exact};

@@ -104,11 +104,11 @@ impl VortexLengths {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{VortexPairCase, dipole_against_wall};
+    use super::super::{VortexPairCase, dipole_between_walls};
     use super::*;
 
     fn dipole(cells: usize, lateral: f64, reynolds: f64) -> Vec<String> {
-        let case = dipole_against_wall([cells, cells], [lateral, 1.5], reynolds, false).unwrap();
+        let case = dipole_between_walls([cells, cells], [lateral, 1.5], reynolds).unwrap();
         let lengths = VortexLengths::dipole(reynolds);
         Resolution::new(&case.mesh, &lengths).warnings()
     }

@@ -179,7 +179,7 @@ fn the_operator_is_the_divergence_of_the_gradient() {
     for (b, stride) in [1, n0, n0 * n1].into_iter().enumerate() {
         let (gradient, divergence) = (layout.line[b].gradient(), layout.line[b].stored_divergence());
         for (p, expected) in expected.iter_mut().enumerate() {
-            let at = [p % n0, p / n0 % n1, p / n0 / n1];
+            let at = layout.shape.index(p);
             let first = p - at[b] * stride;
             let slope = |face: usize| gradient[face].iter().map(|(i, c)| c * phi[first + i * stride]).sum::<f64>();
             let sum: f64 = divergence[at[b]].iter().map(|&(face, c)| c * slope(face)).sum();

@@ -12,16 +12,24 @@ impl PressureMethod {
     /// the time of `n^3` to find, and its products that of `n` per cell and solve.
     pub fn dense_directions(self, mesh: &Mesh) -> Vec<usize> {
         let layout = Layout::new(mesh, None);
-        let by_multigrid = match self {
-            Self::Auto => direct::dense_cells(&layout) > DENSE_LIMIT,
-            Self::Direct => false,
-            Self::Multigrid => true,
-        };
-        let mut dense = if by_multigrid { Vec::new() } else { direct::dense_axes(&layout) };
+        let mut dense = if self.takes_multigrid(&layout) { Vec::new() } else { direct::dense_axes(&layout) };
         if RowTransform::is_dense(&layout.line[0]) {
             dense.push(0);
         }
         dense.into_iter().map(|axis| layout.shape.n[axis]).filter(|n| *n > 1).collect()
+    }
+
+    /// Whether this method solves the planes of `mesh` by multigrid, in passes over all cells.
+    pub fn is_multigrid(self, mesh: &Mesh) -> bool {
+        self.takes_multigrid(&Layout::new(mesh, None))
+    }
+
+    fn takes_multigrid(self, layout: &Layout) -> bool {
+        match self {
+            Self::Auto => direct::dense_cells(layout) > DENSE_LIMIT,
+            Self::Direct => false,
+            Self::Multigrid => true,
+        }
     }
 }
 
@@ -46,6 +54,7 @@ mod tests {
                 let dense = method.dense_directions(&mesh);
                 let named = super::super::build(&Layout::new(&mesh, None), method).unwrap().describe();
                 assert_eq!(named.matches("dense").count(), dense.len(), "{dense:?}: {named}");
+                assert_eq!(named.contains("multigrid"), method.is_multigrid(&mesh), "{named}");
                 assert!(dense.iter().all(|n| mesh.cells().contains(n)));
             }
         }

@@ -90,13 +90,13 @@ impl Direct {
     fn solve_once(&self, field: &mut [f64]) {
         self.rows_forward(field);
         if !self.by_planes() {
-            self.lines(0, field, true);
+            self.lines(0, field, LineTransform::forward);
         }
-        self.lines(1, field, true);
+        self.lines(1, field, LineTransform::forward);
         self.divide(field);
-        self.lines(1, field, false);
+        self.lines(1, field, LineTransform::inverse);
         if !self.by_planes() {
-            self.lines(0, field, false);
+            self.lines(0, field, LineTransform::inverse);
         }
         self.rows_inverse(field);
     }
@@ -134,16 +134,17 @@ impl Direct {
         });
     }
 
-    /// Transforms along axis `which + 1`, if it is transformed.
-    fn lines(&self, which: usize, field: &mut [f64], forward: bool) {
+    /// Transforms along axis `which + 1`, there or back, if it is transformed.
+    fn lines(
+        &self,
+        which: usize,
+        field: &mut [f64],
+        apply: impl Fn(&LineTransform, &mut [&mut [f64]], &mut Work) + Sync,
+    ) {
         let Along::Transformed(transform) = &self.along[which] else { return };
-        bundles(field, self.shape(), which + 1).par_iter_mut().for_each_init(Work::default, |work, bundle| {
-            if forward {
-                transform.forward(&mut bundle.rows, work);
-            } else {
-                transform.inverse(&mut bundle.rows, work);
-            }
-        });
+        let mut bundles = bundles(field, self.shape(), which + 1);
+        let each = bundles.par_iter_mut();
+        each.for_each_init(Work::default, |work, bundle| apply(transform, &mut bundle.rows, work));
     }
 
     /// Solves for the coefficients of the eigenvectors.

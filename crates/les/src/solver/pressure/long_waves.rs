@@ -19,8 +19,7 @@ fn layout([x, y, z]: [Direction; 3]) -> Layout {
 /// A balanced right side from a divergence at the places of the cells, as fractions of the three lengths.
 fn right_side(layout: &Layout, divergence: impl Fn([f64; 3]) -> f64) -> Vec<f64> {
     let n = layout.shape.n;
-    let place = |p: usize| [p % n[0], p / n[0] % n[1], p / n[0] / n[1]];
-    let fraction = |p: usize| std::array::from_fn(|b| (place(p)[b] as f64 + 0.5) / n[b] as f64);
+    let fraction = |p: usize| std::array::from_fn(|b| (layout.shape.index(p)[b] as f64 + 0.5) / n[b] as f64);
     let mut g: Vec<f64> = (0..layout.shape.len()).map(|p| divergence(fraction(p))).collect();
     let operator = Operator::new(layout);
     operator.weigh(&mut g);
@@ -50,7 +49,7 @@ fn residual_by_parts(layout: &Layout, g: &[f64], phi: &[f64]) -> f64 {
         let line = &layout.line[b];
         let (gradient, divergence) = (line.gradient(), line.stored_divergence());
         for (p, left) in left.iter_mut().enumerate() {
-            let at = [p % n[0], p / n[0] % n[1], p / n[0] / n[1]];
+            let at = layout.shape.index(p);
             let first = p - at[b] * stride;
             let across: f64 = (0..3).filter(|&d| d != b).map(|d| layout.line[d].cell_mass_m[at[d]]).product();
             let slope = |face: usize| {

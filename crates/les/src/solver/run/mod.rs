@@ -28,9 +28,9 @@ const WARNING_SHARE: f64 = 0.6;
 const SHORTEST_SHARE: f64 = 1e-10;
 /// Times closer than this share of the time of the run are the same.
 const SAME_TIME: f64 = 1e-12;
-/// Steps between looks for waves that grow.
-const STEPS_PER_LOOK: u64 = 64;
-/// Growth of the worst wave over the rest of the run, as an exponent, that is worth a word.
+/// Steps between checks for waves that grow.
+const STEPS_PER_CHECK: u64 = 64;
+/// Growth of the worst wave over the rest of the run, as an exponent, that is warned of.
 const NOTICED_GROWTH: f64 = 0.1;
 
 /// How often.
@@ -149,7 +149,7 @@ pub trait RunObserver {
     }
 }
 
-/// An observer that looks away.
+/// An observer that takes no notice.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 
@@ -166,20 +166,13 @@ pub struct RunSummary {
     pub is_complete: bool,
 }
 
-/// A step whose energy budget waits for the powers at its end.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct OpenBudget {
-    step: u64,
-    rate_m5_s3: f64,
-    power_m5_s3: f64,
-}
-
 /// A simulation with its plan.
 #[derive(Debug)]
 pub struct Run {
     flow: Flow,
     plan: RunPlan,
-    open: Option<OpenBudget>,
+    /// The budget of the last step, which waits for the powers at its end: those at its start.
+    open: Option<EnergyBudget>,
     energy: EnergyBound,
     has_warned: HasWarned,
     is_fresh: bool,
@@ -299,7 +292,7 @@ impl Run {
 
     fn look_for_growth(&mut self, observer: &mut dyn RunObserver) {
         let step = self.flow.steps();
-        if self.has_warned.growth || !step.is_multiple_of(STEPS_PER_LOOK) {
+        if self.has_warned.growth || !step.is_multiple_of(STEPS_PER_CHECK) {
             return;
         }
         let left_s = self.plan.end_s - self.flow.time_s();
@@ -311,13 +304,10 @@ impl Run {
 
     fn record(&mut self, report: StepReport, energy_before: f64) -> StepRecord {
         let power_m5_s3 = report.viscous_power_m5_s3 + report.subgrid_power_m5_s3 + report.force_power_m5_s3;
-        let budget_before = self.open.map(|open| EnergyBudget {
-            step: open.step,
-            rate_m5_s3: open.rate_m5_s3,
-            power_m5_s3: 0.5 * (open.power_m5_s3 + power_m5_s3),
-        });
+        let mean = |open: EnergyBudget| EnergyBudget { power_m5_s3: 0.5 * (open.power_m5_s3 + power_m5_s3), ..open };
+        let budget_before = self.open.map(mean);
         let rate_m5_s3 = (report.kinetic_energy_m5_s2 - energy_before) / report.step_s;
-        self.open = Some(OpenBudget { step: report.step, rate_m5_s3, power_m5_s3 });
+        self.open = Some(EnergyBudget { step: report.step, rate_m5_s3, power_m5_s3 });
         StepRecord { report, relative_divergence: self.flow.relative_divergence(), budget_before }
     }
 
@@ -370,21 +360,21 @@ impl RunPlan {
 }
 
 /// What a run keeps in its checkpoints beside the flow: the open budget (its presence, then its numbers) and the bound.
-fn own_bytes(open: Option<OpenBudget>, energy: EnergyBound) -> Vec<u8> {
+fn own_bytes(open: Option<EnergyBudget>, energy: EnergyBound) -> Vec<u8> {
     let open = open.map_or([0; 4], |b| [1, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]);
     let energy = [energy.bound_m5_s2, energy.largest_m5_s2].map(f64::to_bits);
     open.into_iter().chain(energy).flat_map(u64::to_le_bytes).collect()
 }
 
-fn read_own(bytes: &[u8]) -> Option<(Option<OpenBudget>, EnergyBound, &[u8])> {
+fn read_own(bytes: &[u8]) -> Option<(Option<EnergyBudget>, EnergyBound, &[u8])> {
     let (own, rest) = bytes.split_at_checked(48)?;
-    let words: Vec<u64> = own.as_chunks::<8>().0.iter().map(|w| u64::from_le_bytes(*w)).collect();
-    let [present, step, rate, power, bound, largest] = words[..] else { return None };
+    let numbers: Vec<u64> = own.as_chunks::<8>().0.iter().map(|w| u64::from_le_bytes(*w)).collect();
+    let [present, step, rate, power, bound, largest] = numbers[..] else { return None };
     let (rate_m5_s3, power_m5_s3) = (f64::from_bits(rate), f64::from_bits(power));
     let energy = EnergyBound { bound_m5_s2: f64::from_bits(bound), largest_m5_s2: f64::from_bits(largest) };
     match present {
         0 => Some((None, energy, rest)),
-        1 => Some((Some(OpenBudget { step, rate_m5_s3, power_m5_s3 }), energy, rest)),
+        1 => Some((Some(EnergyBudget { step, rate_m5_s3, power_m5_s3 }), energy, rest)),
         _ => None,
     }
 }

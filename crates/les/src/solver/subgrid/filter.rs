@@ -11,7 +11,6 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
-use super::super::mesh::Ends;
 use super::super::operators_1d::{Operators1d, resolve_cell, resolve_face};
 use super::super::rows::HALO;
 
@@ -56,8 +55,12 @@ impl Filter {
     pub(super) fn new(layout: &Layout, order: usize) -> Self {
         let axes = std::array::from_fn(|component| {
             std::array::from_fn(|axis| {
+                let line = &layout.line[axis];
+                if component == axis {
+                    return AxisFilter::new(line, order, |index| face_ghost(line, index));
+                }
                 let wall_m_s = layout.wall_velocity_m_s(axis, component);
-                AxisFilter::new(&layout.line[axis], component == axis, wall_m_s, order)
+                AxisFilter::new(line, order, |index| cell_ghost(line, wall_m_s, index))
             })
         });
         Self { shape: layout.shape, order, axes }
@@ -85,7 +88,8 @@ impl Filter {
 }
 
 impl AxisFilter {
-    fn new(line: &Operators1d, normal: bool, wall_m_s: [f64; 2], order: usize) -> Self {
+    /// The filter whose values at any index, also beyond the ends, are given by `ghost`.
+    fn new(line: &Operators1d, order: usize, ghost: impl Fn(isize) -> Ghost) -> Self {
         if line.is_thin() {
             return Self { neighbours: Vec::new(), plain: Vec::new() };
         }
@@ -95,7 +99,7 @@ impl AxisFilter {
                 let mut near = [[own; 2]; HIGHEST_ORDER];
                 for (m, pair) in near.iter_mut().enumerate().take(order) {
                     let distance = m as isize + 1;
-                    *pair = [-distance, distance].map(|d| ghost(line, normal, wall_m_s, place as isize + d));
+                    *pair = [-distance, distance].map(|d| ghost(place as isize + d));
                 }
                 near
             })
@@ -106,18 +110,17 @@ impl AxisFilter {
     }
 }
 
-/// What stands for the value at `index`, which may lie beyond the ends.
-fn ghost(line: &Operators1d, normal: bool, wall_m_s: [f64; 2], index: isize) -> Ghost {
+/// What stands for the normal velocity at face `index`, which may lie beyond the ends.
+fn face_ghost(line: &Operators1d, index: isize) -> Ghost {
+    let (face, sign) = resolve_face(line.cells, line.ends, index);
+    // The face on the high wall is not stored, and nothing flows through it.
+    let at_high_wall = face == line.cells;
+    Ghost { index: if at_high_wall { 0 } else { face }, sign: if at_high_wall { 0.0 } else { sign }, offset: 0.0 }
+}
+
+/// What stands for the velocity along the walls at cell `index`, which may lie beyond the ends.
+fn cell_ghost(line: &Operators1d, wall_m_s: [f64; 2], index: isize) -> Ghost {
     let n = line.cells;
-    if normal && line.ends != Ends::Periodic {
-        let (face, sign) = resolve_face(n, line.ends, index);
-        // The face on the high wall is not stored, and nothing flows through it.
-        return if face == n {
-            Ghost { index: 0, sign: 0.0, offset: 0.0 }
-        } else {
-            Ghost { index: face, sign, offset: 0.0 }
-        };
-    }
     let side = usize::from(index >= 0);
     let beyond = !line.is_periodic() && (index < 0 || index >= n as isize);
     let odd = beyond && line.no_slip()[side];

@@ -361,7 +361,7 @@ impl WakeRun {
             ("spacing_m", format!("{:?}", self.scales.spacing_m)),
             ("circulation_m2_s", format!("{:?}", self.scales.circulation_m2_s)),
         ];
-        Ok(Layout { dims, globals, variables }.to_bytes(&self.origin)?)
+        Ok(Layout { dims, globals, variables }.into_bytes(&self.origin)?)
     }
 
     /// The columns of the table over `tau`.

@@ -4,22 +4,38 @@
 use crate::Error;
 use crate::io::UtcTime;
 use crate::io::hpl::within_a_day;
-use crate::plan::{Plan, Stage};
+use crate::measure::geometry::Geometry;
 #[cfg(feature = "netcdf")]
 use crate::scene::DetectorSignal;
+use crate::scene::Scene;
 
-/// Refuses a plan whose results do not fit into the files that its scene asks for.
+/// What of a run goes into files.
+#[derive(Debug, Clone, Copy)]
+pub struct Contents<'a> {
+    /// The scene, checked.
+    pub scene: &'a Scene,
+    /// Its lines, samples and gates.
+    pub geometry: &'a Geometry,
+    /// Times of the first and the last line from the start of the flow, s.
+    pub scan_s: (f64, f64),
+    /// Realisations whose raw signals are kept.
+    pub kept_realisations: usize,
+    /// Whether there is a map.
+    pub has_map: bool,
+}
+
+/// Refuses results that do not fit into the files that their scene asks for.
 ///
 /// # Errors
 /// The key, the size or the times, and what is allowed.
-pub fn check(plan: &Plan) -> Result<(), Error> {
-    let scene = &plan.scene.scene;
+pub fn check(contents: &Contents<'_>) -> Result<(), Error> {
+    let Contents { scene, scan_s: (first_s, last_s), has_map, .. } = *contents;
     #[cfg(feature = "netcdf")]
     if scene.outputs.netcdf {
-        let g = &plan.geometry;
+        let (g, kept_realisations) = (contents.geometry, contents.kept_realisations);
         let rays = g.elevation_rad.len() as f64;
-        if plan.keeps_signals() {
-            let pulses = rays * (scene.scan.pulses_per_line * plan.kept_realisations()) as f64;
+        if kept_realisations > 0 {
+            let pulses = rays * (scene.scan.pulses_per_line * kept_realisations) as f64;
             let quadratures = if scene.detector.signal == DetectorSignal::Baseband { 2.0 } else { 1.0 };
             let bytes =
                 crate::io::cf_signals::data_bytes([pulses, g.samples as f64, quadratures], [rays, g.layers as f64]);
@@ -30,28 +46,22 @@ pub fn check(plan: &Plan) -> Result<(), Error> {
                 "keep fewer pulses, lines or realisations, or set it to false",
             )?;
         }
-        if plan.runs(Stage::Estimates) {
+        if has_map {
             let bytes = crate::io::cfradial::data_bytes(rays, g.gate_range_m.len() as f64);
             fits("estimator.gate_step_samples", "map.nc", bytes, "make it larger, or scan fewer lines")?;
-            let last_s = last_s(plan);
             let most_s = crate::io::cfradial::MAX_TIME_S;
-            if plan.wind.start_s.abs() > most_s || last_s > most_s {
+            if first_s.abs() > most_s || last_s > most_s {
                 let reason = format!("the rays end {last_s:e} s after the start of the flow; files hold {most_s:e} s");
                 return Err(refusal("scan", reason));
             }
         }
     }
-    if scene.outputs.hpl && plan.runs(Stage::Estimates) {
+    if scene.outputs.hpl && has_map {
         let start = UtcTime::parse(&scene.site.start_utc).unwrap_or(UtcTime::SYNTHETIC);
-        within_a_day(plan.wind.start_s, last_s(plan), start)
+        within_a_day(first_s, last_s, start)
             .map_err(|e| refusal("outputs.hpl", format!("{e}: choose another site.start_utc")))?;
     }
     Ok(())
-}
-
-/// Time of the last line from the start of the flow, s.
-pub(super) fn last_s(plan: &Plan) -> f64 {
-    plan.wind.start_s + plan.geometry.line_time_s.last().copied().unwrap_or(0.0)
 }
 
 #[cfg(feature = "netcdf")]

@@ -1,7 +1,6 @@
 //! The pictures of a run: what the tables of the same names hold, nothing else.
 //! Check: by eye; a test of the program compares the names of the files.
 
-use super::limits::last_s;
 use crate::Error;
 use crate::io::{FileGroup, Provenance, VelocityMap};
 use crate::measure::profile::RangeProfile;
@@ -114,7 +113,7 @@ pub(super) fn add_map(files: &mut FileGroup, plan: &Plan, map: &VelocityMap, ori
 fn title(plan: &Plan, has_gaps: bool) -> String {
     let mut words = vec!["Radial velocity [m/s], positive away from the lidar".to_owned()];
     if matches!(plan.scene.scene.flow, Flow::VortexPair(_) | Flow::Simulated(_)) {
-        let scan_s = last_s(plan) - plan.wind.start_s;
+        let scan_s = plan.scan_end_s() - plan.wind.start_s;
         words.push(format!("age τ = {:.2} at the start of the scan, which takes {scan_s:.2} s", plan.wind.tau));
     }
     words.push(match plan.scene.scene.scan.realisations {

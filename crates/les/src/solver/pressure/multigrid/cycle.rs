@@ -42,10 +42,6 @@ pub(crate) struct Work {
     coarse_row: Vec<Lanes>,
 }
 
-/// Weight of the correction from the second mesh. The fourth-order operator exceeds that of the cycle by up to 1.37 for the
-/// waves that only the finest mesh has, and hardly for those that the second one corrects: raising these narrows the spectrum
-/// that conjugate gradients see, at no cost.
-const COARSE_SHARE: f32 = 1.0;
 /// Relaxations of both directions on the meshes between the finest and the coarsest.
 const COARSE_SWEEPS: usize = 2;
 /// Relaxations on the coarsest mesh.
@@ -121,7 +117,7 @@ impl Hierarchy {
         let Work { fields, scratch, coarse_row, .. } = work;
         let (fine, coarse) = fields.split_at_mut(l + 1);
         let (Some(Fields { u, f }), Some(coarse)) = (fine.last_mut(), coarse.first()) else { return };
-        interpolate(level, &coarse.u, u, coarse_row, if l == 0 { COARSE_SHARE } else { 1.0 });
+        interpolate(level, &coarse.u, u, coarse_row);
         for _ in 0..sweeps {
             relax((second, first), mode, u, f, true, scratch);
             relax((first, second), mode, u, f, true, scratch);
@@ -215,9 +211,9 @@ fn residual_row(level: &Level, mode: &Lanes, u: &[Lanes], f: &[Lanes], k: usize,
     }
 }
 
-/// Adds `share` times the interpolated coarse solution to `u`.
+/// Adds the interpolated coarse solution to `u`.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
-fn interpolate(level: &Level, coarse: &[Lanes], u: &mut [Lanes], coarse_row: &mut [Lanes], share: f32) {
+fn interpolate(level: &Level, coarse: &[Lanes], u: &mut [Lanes], coarse_row: &mut [Lanes]) {
     let (n, coarse_n) = (level.side[0].len(), level.coarse_len());
     for (u, [a, b]) in u.chunks_mut(n).zip(&level.weights[1]) {
         let rows = [a, b].map(|w| &coarse[w.0 * coarse_n..][..coarse_n]);
@@ -228,7 +224,7 @@ fn interpolate(level: &Level, coarse: &[Lanes], u: &mut [Lanes], coarse_row: &mu
         }
         for (u, weights) in u.iter_mut().zip(&level.weights[0]) {
             for &(from, weight) in weights {
-                add(u, share * weight, &coarse_row[from]);
+                add(u, weight, &coarse_row[from]);
             }
         }
     }

@@ -94,14 +94,14 @@ impl Multigrid {
 
     /// Solves for the right side in `field`, of norm `size`, to about `tolerance`.
     fn pass(&self, field: &mut [f64], size: f64, tolerance: f64) -> Pass {
-        self.transform(field, true);
+        self.transform(field, RowTransform::forward);
         let allowed = (tolerance * size * self.scale).powi(2);
         let histories: Vec<Vec<f64>> = columns(field, self.shape(), LANES)
             .par_iter_mut()
             .enumerate()
             .map_init(krylov::Work::default, |work, (group, rows)| self.group(group, rows, allowed, tolerance, work))
             .collect();
-        self.transform(field, false);
+        self.transform(field, RowTransform::inverse);
         let longest = histories.iter().map(Vec::len).max().unwrap_or(1);
         let total =
             |t: usize| -> f64 { histories.iter().filter_map(|history| history.get(t).or(history.last())).sum::<f64>() };
@@ -147,17 +147,12 @@ impl Multigrid {
         history
     }
 
-    /// Transforms the rows.
-    fn transform(&self, field: &mut [f64], forward: bool) {
+    /// Transforms the rows, there or back.
+    fn transform(&self, field: &mut [f64], apply: impl Fn(&RowTransform, &mut [f64], &mut transform::Work) + Sync) {
         let n0 = self.shape().n[0];
         let rows = (field.len() / n0).div_ceil(64).next_multiple_of(6);
-        field.par_chunks_mut(rows * n0).for_each_init(transform::Work::default, |work, slab| {
-            if forward {
-                self.rows.forward(slab, work);
-            } else {
-                self.rows.inverse(slab, work);
-            }
-        });
+        let slabs = field.par_chunks_mut(rows * n0);
+        slabs.for_each_init(transform::Work::default, |work, slab| apply(&self.rows, slab, work));
     }
 }
 

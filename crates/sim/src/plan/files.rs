@@ -1,0 +1,120 @@
+//! The files of a run: what they take to be made, one after the other, in memory until all are there.
+//!
+//! Each format has its numbers in it as it writes them: a float of a table has some 15 letters, and the encoder of NetCDF holds
+//! its data and two plans of the file, each with a copy. `cargo xtask forecast` compares the sums with what whole runs take.
+
+use super::sizes::{MAP_FIELDS, Sizes, is_calm};
+use super::stage::{PlannedStage, Stage, Target, run};
+use crate::measure::geometry::Geometry;
+use crate::scene::Scene;
+
+// Unit costs on one core, s.
+const TABLE_NUMBER_S: f64 = 7e-8;
+const NETCDF_NUMBER_S: f64 = 2e-8;
+const MAP_PIXEL_S: f64 = 2.5e-7;
+const PICTURE_S: f64 = 2.5e-2;
+
+/// Columns of the table of a map.
+const MAP_COLUMNS: f64 = 25.0;
+/// A number of a table, and its text.
+const NUMBER_BYTES: f64 = 8.0;
+const TEXT_BYTES: f64 = 15.0;
+/// Program that drawing brings into memory, letters included.
+const DRAWING_BYTES: f64 = 1.5e6;
+/// Pixels of the picture of a profile.
+const PROFILE_PIXELS: f64 = 1344.0 * 520.0;
+
+/// Memory of files that are made one after the other: what is there already, and the most that was held.
+#[derive(Default)]
+struct Memory {
+    done_bytes: f64,
+    most_bytes: f64,
+}
+
+impl Memory {
+    /// A file, and what is held beside it until it is there.
+    fn add(&mut self, wanted: bool, file_bytes: f64, beside_bytes: f64) {
+        if wanted {
+            self.most_bytes = self.most_bytes.max(self.done_bytes + file_bytes + beside_bytes);
+            self.done_bytes += file_bytes;
+        }
+    }
+
+    fn table(&mut self, wanted: bool, rows: f64, columns: f64) {
+        self.add(wanted, rows * columns * TEXT_BYTES, rows * columns * NUMBER_BYTES);
+    }
+
+    fn netcdf(&mut self, wanted: bool, file_bytes: f64) {
+        self.add(wanted, file_bytes, 3.0 * file_bytes);
+    }
+
+    /// A picture of so many pixels, with rasters of so many in it.
+    fn picture(&mut self, [svg, png]: [bool; 2], pixels: f64, raster_pixels: f64) {
+        // Rasters are in the drawing, four bytes a pixel, and one at a time is coded or fitted, in growing buffers; the painted picture has four, and
+        // one where its panels are cut out.
+        let mask = if raster_pixels > 0.0 { 1.0 } else { 0.0 };
+        self.add(svg, raster_pixels * 0.5, raster_pixels * 4.0 * 1.5 + DRAWING_BYTES);
+        self.add(png, pixels * 0.2, raster_pixels * 4.0 * 1.5 + pixels * (4.0 + mask) + DRAWING_BYTES);
+    }
+}
+
+pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> PlannedStage {
+    let o = &scene.outputs;
+    let (netcdf, plots) = (o.netcdf && cfg!(feature = "netcdf"), cfg!(feature = "plots"));
+    let pictures = [o.svg && plots, o.png && plots];
+    let on = |wanted: bool| f64::from(u8::from(wanted));
+    let (mut core_s, mut memory) = (5e-3, Memory::default());
+    if matches!(target, Target::Run | Target::Efficiency) {
+        let points = o.profile_points as f64;
+        core_s += on(o.csv) * points * 10.0 * TABLE_NUMBER_S + on(pictures != [false; 2]) * (PICTURE_S + points * 1e-6);
+        memory.table(o.csv, points, 10.0);
+        memory.picture(pictures, PROFILE_PIXELS, 0.0);
+    }
+    if target == Target::Run && o.flow && !is_calm(scene) {
+        let (ny, nz) = crate::measure::plane::POINTS;
+        let points = (ny * nz) as f64;
+        core_s += on(o.csv) * 8e-3 + on(netcdf) * 1e-3;
+        memory.table(o.csv, points, 6.0);
+        memory.netcdf(netcdf, points * 8.0);
+    }
+    if n.kept > 0.0 {
+        let numbers = n.kept * n.records * n.samples * n.parts;
+        core_s += on(o.csv) * n.lines * n.samples * (2.0 + n.parts) * TABLE_NUMBER_S;
+        core_s += on(netcdf) * numbers * 1.5 * NETCDF_NUMBER_S;
+        memory.table(o.csv, n.lines * n.samples, 2.0 + n.parts);
+        let others = n.kept * n.records * 28.0 + n.lines * n.layers * 4.0;
+        memory.netcdf(netcdf, numbers * 8.0 + others);
+    }
+    if matches!(target, Target::Run | Target::Map) {
+        let copied = n.cells * MAP_FIELDS * 8.0;
+        memory.done_bytes += copied;
+        core_s += n.cells * (on(o.csv) * MAP_COLUMNS * TABLE_NUMBER_S + on(netcdf) * MAP_FIELDS * NETCDF_NUMBER_S);
+        memory.table(o.csv, n.cells, MAP_COLUMNS);
+        memory.netcdf(netcdf, n.cells * MAP_FIELDS * 4.0);
+        memory.add(o.hpl, n.cells * 40.0, 0.0);
+        memory.table(o.hpl && o.csv, n.cells, 6.0);
+        let (panels, pixels, whole_pixels) = map_pixels(scene, g);
+        core_s += (on(pictures[0]) + on(pictures[1])) * (pixels * MAP_PIXEL_S + PICTURE_S);
+        memory.done_bytes += panels * n.cells * 8.0;
+        memory.picture(pictures, whole_pixels, pixels);
+    }
+    let kinds = [(o.csv, "CSV"), (o.netcdf, "NetCDF"), (o.svg, "SVG"), (o.png, "PNG")];
+    let kinds: Vec<&str> = kinds.into_iter().filter(|k| k.0).map(|k| k.1).collect();
+    run(Stage::Files, kinds.join(", "), core_s, [memory.most_bytes, 0.0])
+}
+
+/// Panels of the picture of a map, the pixels of their rasters and those of the whole: three panels side by side, each as high
+/// as the scan, with room for letters around it.
+fn map_pixels(scene: &Scene, g: &Geometry) -> (f64, f64, f64) {
+    const BOX: f64 = 307.0;
+    let (low, high) = (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad);
+    let far_m = g.gate_range_m.last().copied().unwrap_or(1.0);
+    let near_m = g.gate_range_m.first().copied().unwrap_or(0.0) * high.abs().max(low.abs()).cos();
+    let top_m = (scene.scan.lidar_height_m + far_m * high.sin()).max(0.0);
+    let bottom_m = (scene.scan.lidar_height_m + far_m * low.sin()).min(0.0);
+    // The lidar is shown where that takes less than half as much again.
+    let across_m = if near_m < 0.5 * (far_m - near_m) { far_m } else { far_m - near_m };
+    let height = (BOX * (top_m - bottom_m) / across_m).clamp(90.0, 780.0);
+    let panels = if scene.scan.realisations == 1 { 3.0 } else { 6.0 };
+    (panels, panels * 4.0 * BOX * height, 1872.0 * (72.0 + 1.2 * panels / 3.0 * (height + 92.0)))
+}

@@ -1,0 +1,150 @@
+//! The words of a plan: what may be asked for, the stages, and what each of them takes.
+//!
+//! Stages run one after another and free what they worked with, so memory is the largest over the stages of what the earlier
+//! ones keep and the stage itself holds. Check: sums by hand.
+
+/// What the user asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// Everything that the scene asks for.
+    Run,
+    /// Heterodyne efficiency and signal-to-noise ratio against range.
+    Efficiency,
+    /// The raw signals.
+    Signal,
+    /// The radial-velocity map with its errors.
+    Map,
+}
+
+/// A part of the measurement that can run alone or be left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Large-eddy simulation of the flow.
+    FlowSimulation,
+    /// Wind on a cross-plane, for the files.
+    CrossPlane,
+    /// Phase screens and beam propagation.
+    PhaseScreens,
+    /// Efficiency and SNR against range.
+    Efficiency,
+    /// Wind along the lines of sight.
+    LinesOfSight,
+    /// Heterodyne signals.
+    Signals,
+    /// Shot noise.
+    Noise,
+    /// Velocity estimates.
+    Estimates,
+    /// Estimates against the truth.
+    Errors,
+    /// Tables and pictures.
+    Files,
+}
+
+impl Stage {
+    /// The name that plans, progress and summaries use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::FlowSimulation => "flow simulation",
+            Stage::CrossPlane => "cross-plane",
+            Stage::PhaseScreens => "phase screens",
+            Stage::Efficiency => "efficiency",
+            Stage::LinesOfSight => "lines of sight",
+            Stage::Signals => "signals",
+            Stage::Noise => "noise",
+            Stage::Estimates => "estimates",
+            Stage::Errors => "errors",
+            Stage::Files => "files",
+        }
+    }
+}
+
+/// A stage with its decision.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedStage {
+    /// Which stage.
+    pub stage: Stage,
+    /// What will be done, or why nothing is.
+    pub reason: String,
+    /// Forecast, for the stages that run.
+    pub cost: Option<Cost>,
+}
+
+/// Forecast of one stage.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Cost {
+    /// Computing time on one core, s.
+    pub core_s: f64,
+    /// Memory held while the stage runs and free after it, bytes.
+    pub working_bytes: f64,
+    /// Memory of its results, held to the end of the run, bytes.
+    pub kept_bytes: f64,
+}
+
+impl Cost {
+    /// Memory that the stage holds at once, its results among it, bytes.
+    pub fn memory_bytes(&self) -> f64 {
+        self.working_bytes + self.kept_bytes
+    }
+}
+
+/// Forecast of a whole run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Forecast {
+    /// Computing time on one core, s.
+    pub core_s: f64,
+    /// Largest memory held at once, bytes.
+    pub memory_bytes: f64,
+    /// The stage in which it is held.
+    pub largest: Option<Stage>,
+}
+
+/// A stage that runs: its time, and the memory that it works with and keeps.
+pub(super) fn run(stage: Stage, reason: String, core_s: f64, [working_bytes, kept_bytes]: [f64; 2]) -> PlannedStage {
+    PlannedStage { stage, reason, cost: Some(Cost { core_s, working_bytes, kept_bytes }) }
+}
+
+/// A stage that is left out.
+pub(super) fn skip(stage: Stage, reason: &str) -> PlannedStage {
+    PlannedStage { stage, reason: reason.into(), cost: None }
+}
+
+/// Forecast of stages that run one after another.
+pub(super) fn total(stages: &[PlannedStage]) -> Forecast {
+    let mut forecast = Forecast { core_s: 0.0, memory_bytes: 0.0, largest: None };
+    let mut kept_bytes = 0.0;
+    for (stage, cost) in stages.iter().filter_map(|s| Some((s.stage, s.cost?))) {
+        forecast.core_s += cost.core_s;
+        if kept_bytes + cost.memory_bytes() > forecast.memory_bytes {
+            (forecast.memory_bytes, forecast.largest) = (kept_bytes + cost.memory_bytes(), Some(stage));
+        }
+        kept_bytes += cost.kept_bytes;
+    }
+    forecast
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_the_largest_of_what_is_held_at_once() {
+        let planned = |stage, cost: Option<[f64; 3]>| PlannedStage {
+            stage,
+            reason: String::new(),
+            cost: cost.map(|[core_s, working_bytes, kept_bytes]| Cost { core_s, working_bytes, kept_bytes }),
+        };
+        let stages = [
+            planned(Stage::FlowSimulation, None),
+            planned(Stage::CrossPlane, Some([1.0, 50.0, 10.0])),
+            planned(Stage::Signals, Some([2.0, 40.0, 30.0])),
+            planned(Stage::Files, Some([4.0, 35.0, 0.0])),
+        ];
+        let of = |count: usize| total(&stages[..count]);
+        assert_eq!((of(1).memory_bytes, of(1).largest), (0.0, None));
+        assert_eq!((of(2).memory_bytes, of(2).largest), (60.0, Some(Stage::CrossPlane)));
+        // 10 kept before, 40 at work and 30 of its own; the files then find 40 kept.
+        assert_eq!((of(3).memory_bytes, of(3).largest), (80.0, Some(Stage::Signals)));
+        assert_eq!((of(4).memory_bytes, of(4).core_s), (80.0, 7.0));
+    }
+}
