@@ -232,7 +232,8 @@ mod tests {
         let scene = keys_of::<Scene>();
         let Kind::Table(pulse) = &find(&scene, "pulse").kind else { panic!("a table") };
         assert_eq!(find(pulse, "energy_j").kind, Kind::Number);
-        assert_eq!(find(pulse, "definition").kind, Kind::Choice(&["fwhm", "one_over_e_half_width"]));
+        let Kind::Tagged { kinds, .. } = &find(pulse, "shape").kind else { panic!("tagged") };
+        assert_eq!(find(&kinds[0].1, "definition").kind, Kind::Choice(&["fwhm", "one_over_e_half_width"]));
         let Kind::Tagged { tag: "kind", kinds } = &find(&scene, "flow").kind else { panic!("tagged") };
         assert_eq!(kinds.iter().map(|k| k.0).collect::<Vec<_>>(), ["calm", "uniform", "vortex_pair", "simulated"]);
         assert!(kinds[1].1.iter().all(|key| key.is_required && key.kind == Kind::Number) && kinds[1].1.len() == 2);

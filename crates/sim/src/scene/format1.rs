@@ -33,8 +33,9 @@ pub(super) fn refuse(document: &Document<'_>) -> Result<(), SceneError> {
             .filter(|(of, ..)| *of == section)
             .filter_map(|(_, name, table)| {
                 let key = format!("{section}.{name}");
-                // A table is the method of format 2.
-                document.written(&key).map(|value| (*name, *table, key, value))
+                // The method of format 2 is a table.
+                let is_old = *name != "method" || document.value(&key).is_some_and(|value| value.is_str());
+                document.written(&key).filter(|_| is_old).map(|value| (*name, *table, key, value))
             })
             .collect();
         let Some((_, table, key, value)) = stated.first() else { continue };

@@ -114,7 +114,7 @@ mod tests {
         let CaseKind::Wake(wake) = &mut case.case else { panic!("a wake") };
         wake.cells = [4, 16, 12];
         if let Some(output) = &mut case.wake {
-            output.end_tau = 0.04;
+            (output.end_tau, output.every_tau) = (0.04, 0.02);
             output.fields_tau = Some(vec![0.04]);
             output.planes_tau = Some(vec![0.0, 0.04]);
         }
