@@ -7,7 +7,7 @@ use super::sizes::Sizes;
 use super::stage::{Forecast, PlannedStage, Stage, total};
 use super::stages::{of_bound, stages};
 use super::units::bytes;
-use crate::geometry::Geometry;
+use crate::measure::geometry::Geometry;
 use crate::scene::{Scene, ScreenSampling, Turbulence};
 use crate::{Error, machine};
 
@@ -110,7 +110,7 @@ impl Plan {
 
     /// The stages with another scan or estimator; `None` for a scene that cannot be planned. The optics stay as they are.
     fn stages_with(&self, work: Work, scene: &Scene) -> Option<Vec<PlannedStage>> {
-        let geometry = Geometry::new(scene, &self.wind).ok()?;
+        let geometry = Geometry::new(scene, &self.instrument.pulse, &self.wind).ok()?;
         let optics =
             [Stage::PhaseScreens, Stage::Efficiency].map(|stage| self.stages.iter().find(|s| s.stage == stage));
         let optics = [optics[0]?.clone(), optics[1]?.clone()];
