@@ -14,10 +14,10 @@ use wakescope_estimate::{
     estimators::{LagWindowPeak, likelihood_tapers},
     polar_points,
 };
-use wakescope_sim::join;
+use wakescope_sim::measure::estimators;
+use wakescope_sim::measure::progress::Silent;
+use wakescope_sim::measure::run;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::progress::Silent;
-use wakescope_sim::run;
 use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 
 /// Radius of the regions \[m\].
@@ -41,16 +41,16 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
     let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Signal).unwrap();
     let scene = &plan.scene.scene;
     let setup = ScanSetup {
-        sampling: join::sampling(scene).unwrap(),
+        sampling: estimators::sampling(scene).unwrap(),
         kind: SignalKind::Real,
         noise: Noise::Band { floor: 0.0 },
-        pulse: PulseShape::gaussian(join::pulse(scene).unwrap().sigma_s()).unwrap(),
+        pulse: PulseShape::gaussian(plan.instrument.pulse.sigma_s()).unwrap(),
         wake: WakeModel::default(),
         elevation_rad: plan.geometry.elevation_rad.clone(),
         first_sample_time_s: 2.0 * plan.geometry.first_range_m / wakescope_estimate::window::SPEED_OF_LIGHT_M_S,
         record_samples: plan.geometry.samples,
     };
-    let noise_power_a2 = join::receiver(scene).noise_variance_a2();
+    let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
     let records_a = run::run(&plan, &Silent).unwrap().signals_a.unwrap();
     Taken { setup, snr: 10f64.powf(0.1 * snr_db), noise_power_a2, records_a, plan }
 }
@@ -67,8 +67,8 @@ enum Velocities {
 /// Accumulated map with regions of 2 m, and the fit to it without prior knowledge.
 fn map_fit(taken: &Taken, velocities: Velocities, options: &MapFitOptions) -> MapFit {
     let (sampling, kind) = (taken.setup.sampling, SignalKind::Real);
-    let gates = join::gates(&taken.plan.scene.scene).unwrap();
-    let pulse = join::pulse(&taken.plan.scene.scene).unwrap();
+    let gates = estimators::gates(&taken.plan.scene.scene).unwrap();
+    let pulse = &taken.plan.instrument.pulse;
     let window = WindowModel::gaussian_pulse(&sampling, 64, pulse.sigma_s(), Noise::White).unwrap();
     let (statistic, estimator): (Correlogram<f64>, Box<dyn Estimator>) = match velocities {
         Velocities::Likelihood => (

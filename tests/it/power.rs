@@ -1,10 +1,9 @@
 //! The power of the simulated signal against (14), through all crates that have a part in it.
 
 use wakescope_optics::theory::free_space_efficiency;
-use wakescope_sim::join;
+use wakescope_sim::measure::progress::Silent;
+use wakescope_sim::measure::run;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::progress::Silent;
-use wakescope_sim::run;
 use wakescope_sim::scene::{Flow, NoiseKind, Scene, SceneFile};
 
 fn plan(change: impl Fn(&mut Scene)) -> Plan {
@@ -30,14 +29,13 @@ fn mean_square_a2(plan: &Plan) -> (f64, f64) {
 fn mean_signal_power_over_noise_power_is_the_snr_of_14() {
     let plan = plan(|s| s.detector.noise = NoiseKind::None);
     let (power_a2, error_a2) = mean_square_a2(&plan);
-    let noise_a2 = join::receiver(&plan.scene.scene).noise_variance_a2();
-    let model = join::snr_model(&plan.scene.scene).unwrap();
-    let telescope = join::telescope(&plan.scene.scene).unwrap();
+    let noise_a2 = plan.instrument.receiver.noise_variance_a2();
+    let (model, telescope) = (&plan.instrument.snr, &plan.instrument.telescope);
     // The mean over the samples of the record.
     let g = &plan.geometry;
     let expected = (0..g.samples)
         .map(|k| g.first_range_m + k as f64 * g.sample_spacing_m)
-        .map(|r| model.snr(r, free_space_efficiency(&telescope, r).unwrap()).unwrap())
+        .map(|r| model.snr(r, free_space_efficiency(telescope, r).unwrap()).unwrap())
         .sum::<f64>()
         / g.samples as f64;
     let (snr, error) = (power_a2 / noise_a2, error_a2 / noise_a2);
@@ -53,7 +51,7 @@ fn noise_power_is_13_in_the_band_and_two_and_a_half_times_that_if_white() {
             s.atmosphere.backscatter_per_m_sr = 0.0;
         });
         let (power_a2, error_a2) = mean_square_a2(&plan);
-        let expected_a2 = factor * join::receiver(&plan.scene.scene).noise_variance_a2();
+        let expected_a2 = factor * plan.instrument.receiver.noise_variance_a2();
         assert!(
             (power_a2 - expected_a2).abs() < 3.5 * error_a2,
             "{kind:?}: {power_a2} +- {error_a2}, not {expected_a2}"

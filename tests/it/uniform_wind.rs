@@ -1,9 +1,9 @@
 //! A uniform wind comes out as it is, at any speed in the band.
 
-use wakescope_sim::map::VelocityEstimates;
+use wakescope_sim::measure::map::VelocityEstimates;
+use wakescope_sim::measure::progress::Silent;
+use wakescope_sim::measure::run;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::progress::Silent;
-use wakescope_sim::run;
 use wakescope_sim::scene::{Flow, Refinement, Scene, SceneFile, SnrReference};
 
 /// Errors of the map of a uniform wind.

@@ -5,7 +5,7 @@
 use crate::curves::{ALL, Origin};
 use crate::workspace::root;
 use crate::{Failure, Outcome};
-use wakescope_sim::export::write_atomic;
+use wakescope_sim::io::write_atomic;
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]

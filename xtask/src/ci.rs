@@ -27,7 +27,7 @@ const FEATURES: [(&str, &[&str]); 4] = [
     ("wakescope-optics", &["", "rayon", "screens"]),
     ("wakescope-les", &["", "solver"]),
     ("wakescope-estimate", &["", "rayon", "bundled-lapack"]),
-    ("wakescope-sim", &["", "cli", "flow", "netcdf", "plots", "vtk", "npz"]),
+    ("wakescope-sim", &["", "cli", "flow", "netcdf", "plots", "vtk"]),
 ];
 
 /// The wake that the figures show in continuous integration, and where it is put.

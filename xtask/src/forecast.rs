@@ -46,7 +46,7 @@ fn scenes() -> Vec<(&'static str, String, &'static str)> {
         (
             "many pulses, autoregressive",
             fixed(
-                "[scan]\nelevation_max_rad = 0.05\npulses_per_line = 400\n[estimator]\nmethod = \"autoregressive\"\n\
+                "[scan]\nelevation_max_rad = 0.05\npulses_per_line = 400\n[estimator]\nmethod.kind = \"autoregressive\"\n\
                  weighting = \"rectangular\"\n",
             ),
             "run",
@@ -59,8 +59,8 @@ fn scenes() -> Vec<(&'static str, String, &'static str)> {
         (
             "long windows, poles",
             fixed(
-                "[scan]\nrange_max_m = 900.0\npulses_per_line = 4\n[estimator]\nmethod = \"autoregressive_pole\"\n\
-                 window_samples = 128\nweighting = \"rectangular\"\norder = 24\n",
+                "[scan]\nrange_max_m = 900.0\npulses_per_line = 4\n[estimator]\nmethod = { kind = \"autoregressive_pole\", order = 24 }\n\
+                 window_samples = 128\nweighting = \"rectangular\"\n",
             ),
             "run",
         ),
@@ -68,13 +68,13 @@ fn scenes() -> Vec<(&'static str, String, &'static str)> {
             "gradients",
             fixed(
                 "[scan]\npulses_per_line = 2\nrealisations = 1\nelevation_step_rad = 5e-3\n[estimator]\n\
-                 method = \"gradient_likelihood\"\nwindow_step_samples = 2\n",
+                 method.kind = \"gradient_likelihood\"\nwindow_step_samples = 2\n",
             ),
             "run",
         ),
         (
             "short pulses, fast sampling",
-            "[pulse]\nduration_s = 50e-9\n[detector]\nsampling_hz = 500e6\n[scan]\nrange_max_m = 1000.0\n\
+            "[pulse.shape]\nduration_s = 50e-9\n[detector]\nsampling_hz = 500e6\n[scan]\nrange_max_m = 1000.0\n\
              elevation_max_rad = 0.1\n[estimator]\nwindow_samples = 32\n"
                 .into(),
             "run",

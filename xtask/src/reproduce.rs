@@ -15,7 +15,7 @@ use crate::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use wakescope_sim::export::{FileGroup, Table, write_atomic};
+use wakescope_sim::io::{FileGroup, Table, write_atomic};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]

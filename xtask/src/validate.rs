@@ -20,7 +20,7 @@ use crate::{Failure, Outcome};
 use shown::Shown;
 use std::path::PathBuf;
 use std::time::Instant;
-use wakescope_sim::export::{FileGroup, Table};
+use wakescope_sim::io::{FileGroup, Table};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]

@@ -12,7 +12,7 @@ use crate::workspace::{provenance, root};
 use crate::{Failure, Outcome};
 use std::path::PathBuf;
 use std::time::Instant;
-use wakescope_sim::export::{FileGroup, Table};
+use wakescope_sim::io::{FileGroup, Table};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Options of the task.

@@ -3,7 +3,7 @@
 use crate::Failure;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use wakescope_sim::export::Provenance;
+use wakescope_sim::io::Provenance;
 
 /// Provenance of what follows from formulas and the parameters given as TOML.
 pub(crate) fn provenance(parameters: &str, seed: u64) -> Provenance {

@@ -9,7 +9,7 @@ mod sample_data;
 
 use sample_data::{map, origin, wind};
 use std::path::Path;
-use wakescope_sim::export::{FileGroup, OutputResult};
+use wakescope_sim::io::{FileGroup, OutputResult};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, HtmlTable, MapPlot, Report, ReportEntry, Series, Style};
 
 fn main() -> OutputResult<()> {

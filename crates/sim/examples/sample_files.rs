@@ -1,6 +1,6 @@
 //! Writes one small file of each format, with the table that the conformance check compares it with, into a folder:
 //!
-//! `cargo run -p wakescope-sim --features vtk,npz --example sample_files -- FOLDER`
+//! `cargo run -p wakescope-sim --features vtk --example sample_files -- FOLDER`
 //!
 //! The content is a made-up vortex pair seen by a noiseless lidar; it exercises two sweeps, missing values and a stretched mesh.
 
@@ -9,8 +9,8 @@ mod sample_data;
 
 use sample_data::{map, origin, planes};
 use std::path::Path;
-use wakescope_sim::export::tables::{map_table, planes_table};
-use wakescope_sim::export::{FileGroup, OutputResult, Table, VelocityMap};
+use wakescope_sim::io::tables::{map_table, planes_table};
+use wakescope_sim::io::{FileGroup, OutputResult, Table, VelocityMap};
 
 fn main() -> OutputResult<()> {
     let folder = std::env::args().nth(1).unwrap_or_else(|| "target/sample-files".into());
@@ -20,14 +20,14 @@ fn main() -> OutputResult<()> {
     files.add("map.csv", map_table(&both)?.to_csv(&origin)?)?;
     let one = map(&[2.5], false);
     files.add("one.csv", halo_table(&one)?.to_csv(&origin)?)?;
-    files.add("one.hpl", wakescope_sim::export::hpl::hpl_bytes(&one, 0, "one.hpl")?)?;
+    files.add("one.hpl", wakescope_sim::io::hpl::hpl_bytes(&one, 0, "one.hpl")?)?;
     let wind = planes();
     for stem in ["planes", "wake"] {
         files.add(&format!("{stem}.csv"), planes_table(&wind)?.to_csv(&origin)?)?;
     }
     #[cfg(feature = "netcdf")]
     {
-        use wakescope_sim::export::{cf_planes::cf_planes_bytes, cfradial::cfradial_bytes};
+        use wakescope_sim::io::{cf_planes::cf_planes_bytes, cfradial::cfradial_bytes};
         files.add("map.nc", cfradial_bytes(&both, &origin)?)?;
         files.add("planes.nc", cf_planes_bytes(&wind, &origin)?)?;
         let mut exact = map(&[2.5], true);
@@ -35,10 +35,8 @@ fn main() -> OutputResult<()> {
         files.add("exact.nc", cfradial_bytes(&exact, &origin)?)?;
         files.add("exact.csv", map_table(&exact)?.to_csv(&origin)?)?;
     }
-    #[cfg(feature = "npz")]
-    files.add("planes.npz", wakescope_sim::export::npz::npz_bytes(&wind, &origin)?)?;
     #[cfg(feature = "vtk")]
-    for (name, bytes) in wakescope_sim::export::vtr::vtr_series(&wind, "wake", &origin)? {
+    for (name, bytes) in wakescope_sim::io::vtr::vtr_series(&wind, "wake", &origin)? {
         files.add(&name, bytes)?;
     }
     files.commit()?;

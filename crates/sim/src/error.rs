@@ -1,6 +1,6 @@
 //! What can go wrong in a run.
 
-use crate::scene::SceneError;
+use crate::keys::SceneError;
 use std::path::PathBuf;
 
 /// Why a run could not be made or finished.
@@ -67,7 +67,7 @@ pub enum Error {
     Estimate(#[from] wakescope_estimate::Error),
     /// A file could not be written.
     #[error(transparent)]
-    Export(#[from] crate::export::OutputError),
+    Export(#[from] crate::io::OutputError),
     /// A file or folder could not be used.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {

@@ -2,12 +2,12 @@
 //!
 //! This crate joins the four others, which know nothing of each other: the wind of `les`, the efficiency
 //! of `optics`, the records of `signal` and the velocities of `estimate`. A [`scene::Scene`] becomes a
-//! [`plan::Plan`], which says what will run and what is left out and why; [`run::run`] runs it; [`write()`](write::write)
+//! [`plan::Plan`], which says what will run and what is left out and why; [`run`](measure::run::run) runs it; [`write()`](measure::write::write)
 //! puts the results on disk, all files or none.
 //!
 //! ```
 //! use wakescope_sim::plan::{Plan, Stage, Target};
-//! use wakescope_sim::progress::Silent;
+//! use wakescope_sim::measure::progress::Silent;
 //! use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 //!
 //! # fn main() -> Result<(), wakescope_sim::Error> {
@@ -18,7 +18,7 @@
 //! scene.scan.pulses_per_line = 1;
 //! let plan = Plan::new(SceneFile::new(scene).expect("a good scene"), Target::Map)?;
 //! assert!(!plan.runs(Stage::PhaseScreens)); // no turbulence, no screens
-//! let map = wakescope_sim::run::run(&plan, &Silent)?.map.expect("a map was asked for");
+//! let map = wakescope_sim::measure::run::run(&plan, &Silent)?.map.expect("a map was asked for");
 //! assert_eq!(map.v_mean_m_s.dim(), (9, map.range_m.len()));
 //! # Ok(())
 //! # }
@@ -28,50 +28,22 @@
 //! |---|---|
 //! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
-//! | [`geometry`] | lines of sight, samples, gates, layers |
-//! | [`join`] | the only place where the types of two crates meet |
-//! | [`wind`] | the wind: analytic, or the planes of a simulated flow |
-//! | [`profile`] | efficiency and signal-to-noise ratio against range |
-//! | [`scan`] | air along the lines of sight, and their records |
-//! | [`map`], [`cell_average`] | estimates and their errors against the truth, averages over cells |
-//! | [`mod@bound`] | the Cramer-Rao bound for a scene |
-//! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
+//! | [`measure`] | instrument, wind, signals, velocities and their errors; running a plan and writing its results |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
-//! | [`streams`] | one random stream for each pulse |
-//! | [`export`], [`plot`] | file formats, pictures |
+//! | [`io`], [`plot`] | file formats, pictures |
 //! | [`cli`] | the program `wakescope` |
 //!
-//! Features, all but the last two on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
-//! PNG, the report page), `vtk` and `npz` (more formats for fields).
+//! Features, all but the last on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
+//! PNG, the report page), `vtk` (fields for ParaView).
 
-pub mod bound;
-pub mod cell_average;
-pub mod export;
 #[cfg(feature = "flow")]
 pub mod flow;
-pub mod geometry;
-pub mod join;
+pub mod io;
 mod keys;
 mod machine;
-pub mod map;
-#[cfg(feature = "netcdf")]
-mod netcdf_header;
-#[cfg(feature = "netcdf")]
-mod netcdf_input;
+pub mod measure;
 pub mod plan;
-mod plane;
-#[cfg(feature = "netcdf")]
-mod planes_input;
-pub mod profile;
-pub mod progress;
-mod region;
-pub mod run;
-pub mod scan;
 pub mod scene;
-pub mod streams;
-mod text_file;
-pub mod wind;
-pub mod write;
 
 #[cfg(feature = "cli")]
 pub mod cli;
@@ -81,6 +53,15 @@ pub mod plot;
 mod error;
 
 pub use error::Error;
+pub use measure::progress::Silent;
+pub use measure::run::{RunResult, run};
+pub use measure::write::write;
+pub use plan::{Plan, Target};
+pub use scene::{Scene, SceneFile};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 /// Version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

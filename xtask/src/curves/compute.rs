@@ -9,10 +9,10 @@ use wakescope_les::cases::{TollmienSchlichting, VortexPairCase};
 use wakescope_les::winds::m4_prime as kernel;
 use wakescope_les::{Flow, Ground, Motion, VortexPair};
 use wakescope_optics::{RadiusDefinition, SnrModel, Telescope, theory};
+use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
-use wakescope_sim::{profile, run};
+use wakescope_sim::{measure::profile, measure::run};
 
 type Values = Result<Vec<f64>, Failure>;
 
@@ -113,7 +113,7 @@ pub(super) fn pair_z(tau: &[f64]) -> Values {
 /// gives the SNR in 50 MHz.
 fn bound_m_s(snr_db: &[f64], kind: SignalKind) -> Values {
     let scene = Scene::default();
-    let sampling = wakescope_sim::join::sampling(&scene)?;
+    let sampling = wakescope_sim::measure::estimators::sampling(&scene)?;
     let model = WindowModel::gaussian_pulse(&sampling, 64, scene.pulse_sigma_s(), Noise::White)?;
     each(snr_db, |snr_db| model.bound_m_s(0.0, 10f64.powf(0.1 * snr_db), kind, 1.0))
 }
@@ -141,7 +141,7 @@ fn line_scene() -> Scene {
     scene
 }
 
-fn line_map() -> Result<wakescope_sim::map::VelocityEstimates, Failure> {
+fn line_map() -> Result<wakescope_sim::measure::map::VelocityEstimates, Failure> {
     let plan = Plan::new(checked(line_scene())?, Target::Map)?;
     run::run(&plan, &Silent)?.map.ok_or_else(|| Failure::new("the plan gave no map".into()))
 }
@@ -164,5 +164,6 @@ pub(super) fn profile_ranges() -> Vec<f64> {
 }
 
 pub(super) fn profile_snr(_: &[f64]) -> Values {
-    Ok(profile::range_profile(&Scene::default(), &Silent)?.snr_db)
+    let scene = Scene::default();
+    Ok(profile::range_profile(&scene, &wakescope_sim::measure::instrument::Instrument::new(&scene)?, &Silent)?.snr_db)
 }

@@ -12,7 +12,7 @@ use wakescope_estimate::{
     map::PolarPoint,
 };
 use wakescope_signal::NoiseModel;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const METHODS: [&str; 3] = ["PA", "CA, AR(16)", "CA-BT, 16 lags"];

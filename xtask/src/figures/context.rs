@@ -5,7 +5,7 @@ use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::workspace::provenance;
 use std::path::PathBuf;
-use wakescope_sim::export::{Provenance, Table};
+use wakescope_sim::io::{Provenance, Table};
 use wakescope_sim::plot::Figure;
 use wakescope_sim::scene::Scene;
 

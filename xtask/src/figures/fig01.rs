@@ -5,7 +5,7 @@ use crate::Failure;
 use crate::claim::Claim;
 use std::f64::consts::PI;
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const GAMMA_M2_S: f64 = 500.0;

@@ -2,8 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::Failure;
-use wakescope_sim::export::Table;
-use wakescope_sim::join;
+use wakescope_sim::io::Table;
+use wakescope_sim::measure::wind;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::{Flow, Scene};
@@ -27,7 +27,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("z_first_sample_m", column(|p| p.1, near_m))
         .float("y_last_sample_m", column(|p| p.0, far_m))
         .float("z_last_sample_m", column(|p| p.1, far_m));
-    let origin = wakescope_sim::write::provenance(&plan);
+    let origin = wakescope_sim::measure::write::provenance(&plan);
 
     let mut fan = Vec::new();
     for &el in elevation_rad.iter().step_by(DRAWN) {
@@ -43,7 +43,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         Series::new("ground", Style::Line, vec![(0.0, 0.0), (1.05 * far_m, 0.0)]),
     ];
     if let Flow::VortexPair(pair) = &scene.flow {
-        let c = join::vortex_pair(pair).centres(join::start_time_s(scene));
+        let c = wind::vortex_pair(pair).centres(wind::start_time_s(scene));
         let centres = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
         series.push(Series::new("vortices", Style::Markers, centres));
     }

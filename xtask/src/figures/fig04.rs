@@ -9,7 +9,7 @@ use wakescope_optics::monte_carlo::EfficiencyEstimate;
 use wakescope_optics::{
     EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Stop, Telescope, Turbulence, theory,
 };
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const WEAK_M_M23: f64 = 1e-15;

@@ -4,7 +4,7 @@ use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::Claim;
 use wakescope_les::winds::m4_prime;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Spacing of the grid, m.

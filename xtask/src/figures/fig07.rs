@@ -4,17 +4,18 @@ use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use crate::references::numbers;
-use crate::wakes::Wake;
+use crate::wakes;
 use wakescope_les::analysis::decay::{knee, onset, value_at};
-use wakescope_sim::export::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_sim::flow::FinishedWake;
+use wakescope_sim::io::Table;
+use wakescope_sim::plot::{CurvePlot, Figure, Series, Style};
 
 /// The Reynolds number and core of the chapter.
 const CHAPTER: (f64, f64) = (2e4, 0.05);
 const SIDES: [&str; 2] = ["left", "right"];
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let wake = Wake::of(context)?;
+    let wake = wakes::of(context)?;
     let origin = context.provenance_of_formula(&wake.case_toml);
     let figure = Figure::side_by_side([circulation(&wake)?, paths(&wake)?]);
     let figure = Figure { width: 1200.0, ..figure };
@@ -28,7 +29,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     Ok(out)
 }
 
-fn table(wake: &Wake) -> Result<Table, Failure> {
+fn table(wake: &FinishedWake) -> Result<Table, Failure> {
     let mut table = Table::new();
     let names =
         ["tau", "gamma_5_15_left_m2_s", "gamma_5_15_right_m2_s", "y_left_m", "z_left_m", "y_right_m", "z_right_m"];
@@ -39,33 +40,27 @@ fn table(wake: &Wake) -> Result<Table, Failure> {
 }
 
 /// The independent simulation in the box of this profile.
-fn reference(wake: &Wake) -> Result<Vec<Vec<f64>>, Failure> {
+fn reference(wake: &FinishedWake) -> Result<Vec<Vec<f64>>, Failure> {
     let narrow = wake.flow.size[1] < 4.5;
     numbers(if narrow { "wake_3d_ground_re5000_coarse_box4_cans.csv" } else { "wake_3d_ground_re5000_cans.csv" })
 }
 
-fn circulation(wake: &Wake) -> Result<CurvePlot, Failure> {
-    let mut plot = CurvePlot::new("", Axis::linear("τ"), Axis::linear("Γ_{5-15}(τ)/Γ_{5-15}(0)"));
+fn circulation(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
     let stored = reference(wake)?;
+    let mut plot = wake.circulation_plot()?;
     for (place, side) in SIDES.iter().enumerate() {
-        plot = plot.with(Series::new(side, Style::Line, wake.curve(&format!("gamma_ratio_{side}"))?)).with(
-            Series::new(&format!("independent, {side}"), Style::Markers, stored.iter().map(|r| (r[0], r[1 + place]))),
-        );
+        let points = stored.iter().map(|r| (r[0], r[1 + place]));
+        plot = plot.with(Series::new(&format!("independent, {side}"), Style::Markers, points).in_colour(place));
     }
     Ok(plot)
 }
 
-fn paths(wake: &Wake) -> Result<CurvePlot, Failure> {
-    let mut plot = CurvePlot::new("", Axis::linear("y/b₀"), Axis::linear("z/b₀"));
+fn paths(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
+    let mut plot = wake.path_plot()?;
     let stored = reference(wake)?;
     for (place, side) in SIDES.iter().enumerate() {
-        let y = wake.column(&format!("y_{side}"))?.iter().copied();
-        let path = y.zip(wake.column(&format!("z_{side}"))?.iter().copied());
-        plot = plot.with(Series::new(side, Style::Line, path.collect::<Vec<_>>())).with(Series::new(
-            &format!("independent, {side}"),
-            Style::Markers,
-            stored.iter().map(|r| (r[3 + 2 * place], r[4 + 2 * place])),
-        ));
+        let points = stored.iter().map(|r| (r[3 + 2 * place], r[4 + 2 * place]));
+        plot = plot.with(Series::new(&format!("independent, {side}"), Style::Markers, points).in_colour(place));
     }
     for (name, sign) in [("inviscid", 1.0), ("", -1.0)] {
         let hyperbola = numbers("vortex_pair_inviscid_ground_h1.csv")?;
@@ -76,12 +71,12 @@ fn paths(wake: &Wake) -> Result<CurvePlot, Failure> {
 }
 
 /// Mean of both vortices against tau.
-fn mean(wake: &Wake, name: &str, sign: f64) -> Result<Vec<(f64, f64)>, Failure> {
+fn mean(wake: &FinishedWake, name: &str, sign: f64) -> Result<Vec<(f64, f64)>, Failure> {
     let (left, right) = (wake.curve(&format!("{name}_left"))?, wake.curve(&format!("{name}_right"))?);
     Ok(left.iter().zip(right).map(|(l, r)| (l.0, 0.5 * (sign * l.1 + r.1))).collect())
 }
 
-fn claims(wake: &Wake) -> Result<Vec<Claim>, Failure> {
+fn claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {
     let gamma = mean(wake, "gamma_ratio", 1.0)?;
     let at = |tau: f64| value_at(&gamma, tau);
     let onset = onset(&gamma);
@@ -123,7 +118,7 @@ fn claims(wake: &Wake) -> Result<Vec<Claim>, Failure> {
     ])
 }
 
-fn inviscid_path(wake: &Wake, y: &[(f64, f64)], z: &[(f64, f64)]) -> Result<Claim, Failure> {
+fn inviscid_path(wake: &FinishedWake, y: &[(f64, f64)], z: &[(f64, f64)]) -> Result<Claim, Failure> {
     let shear = mean(wake, "outward_shear", 1.0)?;
     let largest = wake.column("wall_shear")?;
     // On the lines of symmetry the shear is zero to round-off and noise from the start.

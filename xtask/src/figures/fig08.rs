@@ -3,22 +3,23 @@
 use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::Claim;
-use crate::wakes::Wake;
+use crate::wakes;
 use wakescope_les::analysis::decay::value_at;
-use wakescope_sim::export::tables::map_table;
-use wakescope_sim::export::{Table, VelocityMap};
+use wakescope_sim::flow::FinishedWake;
+use wakescope_sim::io::tables::map_table;
+use wakescope_sim::io::{Table, VelocityMap};
+use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::plot::{ColourMap, Figure, MapPlot};
-use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::{Flow, Outside, Scene, SceneFile, SimulatedFlow, SimulatedMotion, SnrReference};
-use wakescope_sim::{run, write};
+use wakescope_sim::{measure::run, measure::write};
 
 const AGES: [(f64, &str); 2] = [(2.5, "early"), (5.0, "late")];
 /// Air about the centre of a vortex that belongs to it, in spacings: half of the way between the two at the start.
 const REACH: f64 = 0.5;
 
 /// Smallest and largest distance from the middle and largest height of a vortex centre at the ages shown \[m\].
-fn extent_m(wake: &Wake) -> Result<[f64; 3], Failure> {
+fn extent_m(wake: &FinishedWake) -> Result<[f64; 3], Failure> {
     let mut extent_m = [f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     for (tau, _) in AGES {
         for side in ["left", "right"] {
@@ -47,7 +48,7 @@ impl Sector {
     }
 }
 
-fn scene(context: &Context, wake: &Wake, tau: f64) -> Result<Scene, Failure> {
+fn scene(context: &Context, wake: &FinishedWake, tau: f64) -> Result<Scene, Failure> {
     let b0_m = wake.flow.pair.scales()?.spacing_m;
     let flow = SimulatedFlow {
         planes: "plane1".into(),
@@ -73,7 +74,7 @@ fn scene(context: &Context, wake: &Wake, tau: f64) -> Result<Scene, Failure> {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let wake = Wake::of(context)?;
+    let wake = wakes::of(context)?;
     let mut panels = Vec::new();
     let mut tables = Vec::new();
     let mut extremes = Vec::new();

@@ -4,12 +4,13 @@ use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
-use wakescope_sim::export::Table;
-use wakescope_sim::geometry::Geometry;
-use wakescope_sim::join;
+use wakescope_sim::io::Table;
+use wakescope_sim::measure::estimators;
+use wakescope_sim::measure::geometry::Geometry;
+use wakescope_sim::measure::instrument::Instrument;
+use wakescope_sim::measure::wind::SceneWind;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::Scene;
-use wakescope_sim::wind::SceneWind;
 
 const RADII_M: [f64; 3] = [1.0, 2.0, 4.0];
 /// Where the chapter gives the levels.
@@ -24,11 +25,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     scene.scan.range_max_m = 650.0;
     let file = context.scene_file(scene)?;
     let scene = &file.scene;
-    let gates = join::gates(scene)?;
-    let elevation_rad = Geometry::new(scene, &SceneWind::new(&file)?)?.elevation_rad;
+    let gates = estimators::gates(scene)?;
+    let elevation_rad = Geometry::new(scene, &Instrument::new(scene)?.pulse, &SceneWind::new(&file)?)?.elevation_rad;
     let samples = scene.samples_per_record();
-    let geometry = ScanGeometry::new(&join::sampling(scene)?, &gates, &elevation_rad, samples)?;
-    let window = join::weighting(scene).weights(scene.estimator.window_samples)?;
+    let geometry = ScanGeometry::new(&estimators::sampling(scene)?, &gates, &elevation_rad, samples)?;
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     // n_eff as the speckle has it: independent of the noise within a few per cent.
     let correlation = WindowCorrelation::gaussian_pulse(
         &window,
@@ -58,7 +59,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("range_m", rows.iter().map(|r| r.1))
         .int("level", rows.iter().map(|r| r.2 as i64))
         .float("n_eff", rows.iter().map(|r| r.3));
-    let origin = wakescope_sim::export::Provenance {
+    let origin = wakescope_sim::io::Provenance {
         program: wakescope_sim::PROGRAM.into(),
         scene_toml: file.toml.clone(),
         scene_hash: file.hash.clone(),

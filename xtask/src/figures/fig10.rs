@@ -7,9 +7,9 @@ use super::study::{Age, REFERENCES, Sight, Study, early_scene, mean_and_error, s
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
-use wakescope_sim::export::tables::map_table;
+use wakescope_sim::io::tables::map_table;
+use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
-use wakescope_sim::write;
 
 /// Batches, and Student's factor of a 95 % interval for their mean.
 const BATCHES: u64 = 4;

@@ -5,10 +5,10 @@ use super::study::{Age, REFERENCES, Sight, Study, early_scene, stacked, with_met
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
-use wakescope_sim::export::tables::map_table;
+use wakescope_sim::io::tables::map_table;
+use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
-use wakescope_sim::scene::Scene;
-use wakescope_sim::write;
+use wakescope_sim::scene::{PulseShape, Scene};
 
 /// Cells that count as those of a vortex, m from its centre.
 const NEAR_M: f64 = 15.0;
@@ -22,7 +22,7 @@ fn scene(context: &Context, sight: &Sight) -> Scene {
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.0, highest_rad);
     (scene.scan.range_min_m, scene.scan.range_max_m) = ((near_m - 45.0).max(140.0), far_m + 45.0);
     scene.estimator.gate_step_samples = context.choose(8, 5, 1);
-    scene.pulse.duration_s = 400e-9;
+    scene.pulse.shape = PulseShape::gaussian(400e-9);
     with_turbulence(context, scene, 1e-15)
 }
 

@@ -4,9 +4,9 @@ use super::context::{Context, Rendered};
 use super::study::{Age, INSIDE_M, OUTSIDE_M, REFERENCES, Sight, Study, early_scene, with_method, with_turbulence};
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
-use wakescope_sim::cell_average::CellAverage;
-use wakescope_sim::export::Table;
-use wakescope_sim::join;
+use wakescope_sim::io::Table;
+use wakescope_sim::measure::cell_average::CellAverage;
+use wakescope_sim::measure::instrument::Instrument;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::{Scene, SnrReference};
 
@@ -182,8 +182,8 @@ fn ratio_claim() -> Result<Claim, Failure> {
     let snr = |change: fn(&mut Scene)| -> Result<f64, Failure> {
         let mut scene = Scene::default();
         change(&mut scene);
-        let return_per_m = join::return_per_m(&scene)?(400.0)?;
-        Ok(join::receiver(&scene).slowly_varying_snr(scene.pulse.energy_j, return_per_m))
+        let instrument = Instrument::new(&scene)?;
+        Ok(instrument.receiver.slowly_varying_snr(scene.pulse.energy_j, instrument.return_per_m(400.0)?))
     };
     let plain = snr(|_| {})?;
     let others = [

@@ -7,6 +7,7 @@ use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use profiles::{Profiles, peak, width_m};
 use wakescope_sim::plot::Figure;
+use wakescope_sim::scene::PulseShape;
 
 const DURATIONS_S: [f64; 2] = [200e-9, 400e-9];
 
@@ -19,7 +20,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             for method in ["PA", "CA"] {
                 let mut scene = with_method(near_scene(realisations), method);
                 scene.detector.snr = reference;
-                scene.pulse.duration_s = duration_s;
+                scene.pulse.shape = PulseShape::gaussian(duration_s);
                 let scene = with_turbulence(context, scene, 1e-15);
                 all.push(Profiles::of(method, name, &Study::run(context, &sight, scene)?)?);
             }

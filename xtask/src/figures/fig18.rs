@@ -13,7 +13,7 @@ use wakescope_estimate::{
     map::{GoodAndBad, good_and_bad},
 };
 use wakescope_signal::NoiseModel;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const NOISES: [NoiseModel; 2] = [NoiseModel::White, NoiseModel::BandLimited];

@@ -2,8 +2,8 @@
 
 use super::study::{INSIDE_M, Study};
 use crate::Failure;
-use wakescope_sim::cell_average::CellAverage;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
+use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::plot::{Axis, CurvePlot, Series, Style};
 
 /// Lines of sight count that pass a centre within this distance, m.
@@ -58,7 +58,7 @@ impl Profiles {
         Ok(Self {
             method,
             name,
-            pulse_s: study.plan.scene.scene.pulse.duration_s,
+            pulse_s: study.plan.scene.scene.pulse_width_s(),
             snr_db: snr_db(study)?,
             gate_m,
             range_m,
@@ -83,7 +83,7 @@ impl Profiles {
 
 /// Mean signal-to-noise ratio of the scene at the vortices, dB.
 fn snr_db(study: &Study) -> Result<f64, Failure> {
-    let scanner = wakescope_sim::scan::Scanner::new(&study.plan, &wakescope_sim::progress::Silent)?;
+    let scanner = wakescope_sim::measure::scan::Scanner::new(&study.plan, &wakescope_sim::measure::progress::Silent)?;
     let near: Vec<f64> =
         scanner.layer_snr().into_iter().filter(|(r, _)| (350.0..450.0).contains(r)).map(|(_, snr)| snr).collect();
     Ok(10.0 * (near.iter().sum::<f64>() / near.len() as f64).log10())

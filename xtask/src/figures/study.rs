@@ -5,20 +5,20 @@
 
 use super::context::Context;
 use crate::Failure;
-use crate::wakes::Wake;
+use crate::wakes;
 use std::path::PathBuf;
 use wakescope_les::analysis::decay::value_at;
-use wakescope_sim::cell_average::CellAverage;
-use wakescope_sim::export::csv::Column;
-use wakescope_sim::export::{Provenance, Table};
-use wakescope_sim::map::VelocityEstimates;
+use wakescope_sim::io::csv::Column;
+use wakescope_sim::io::{Provenance, Table};
+use wakescope_sim::measure::cell_average::CellAverage;
+use wakescope_sim::measure::map::VelocityEstimates;
+use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::progress::Silent;
 use wakescope_sim::scene::{
-    Flow, Method, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion, SnrReference,
-    Turbulence, VortexPair, Weighting,
+    Flow, Method, ModelOrder, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
+    SnrReference, Turbulence, VortexPair, Weighting,
 };
-use wakescope_sim::{join, run, write};
+use wakescope_sim::{measure::run, measure::wind, measure::write};
 
 /// Lines of sight 0.5 m apart that a region of 2 m shares.
 const SHARED_LINES: f64 = 9.0;
@@ -45,7 +45,10 @@ pub(super) fn early_scene(realisations: usize) -> Scene {
 
 /// The scene with the chapter's periodogram accumulation (PA) or correlogram accumulation (CA).
 pub(super) fn with_method(mut scene: Scene, method: &str) -> Scene {
-    scene.estimator.method = if method == "CA" { Method::Autoregressive } else { Method::PeriodogramAccumulation };
+    scene.estimator.method = match method {
+        "CA" => Method::Autoregressive(ModelOrder::default()),
+        _ => Method::PeriodogramAccumulation {},
+    };
     scene.estimator.padded_samples = if method == "CA" { 2048 } else { 1024 };
     scene
 }
@@ -97,7 +100,7 @@ impl Sight {
             let cores = cores_of(&scene);
             return Ok(Self { flow: scene.flow, folder: PathBuf::new(), cores, words, mark: "analytic pair".into() });
         }
-        let wake = Wake::of(context)?;
+        let wake = wakes::of(context)?;
         let b0_m = wake.flow.pair.scales()?.spacing_m;
         let flow = SimulatedFlow {
             planes: "plane1".into(),
@@ -201,7 +204,7 @@ impl Study {
 fn cores_of(scene: &Scene) -> Vec<(f64, f64)> {
     match &scene.flow {
         Flow::VortexPair(pair) => {
-            let c = join::vortex_pair(pair).centres(join::start_time_s(scene));
+            let c = wind::vortex_pair(pair).centres(wind::start_time_s(scene));
             vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
         }
         _ => Vec::new(),

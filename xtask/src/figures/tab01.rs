@@ -3,7 +3,7 @@
 use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::Claim;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 
 const NAUTICAL_MILE_M: f64 = 1852.0;
 const APPROACH_SPEED_M_S: f64 = 70.0;

@@ -4,7 +4,7 @@ use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::Claim;
 use std::path::Path;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::scene::{Scene, SceneFile, TABLE2_TOML};
 
@@ -35,7 +35,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .text("parameter", ROWS.iter().map(|r| r.0))
         .float("chapter", ROWS.iter().map(|r| r.1))
         .float("scene", values.iter().copied());
-    let mut out = Rendered::of_table(&table, &wakescope_sim::write::provenance(&plan))?;
+    let mut out = Rendered::of_table(&table, &wakescope_sim::measure::write::provenance(&plan))?;
     out.caption =
         "The chapter's Table 2 and the same parameters in the scene that a run writes beside its results.".into();
     let equal = ROWS.iter().zip(&values).filter(|(r, v)| r.1 == **v).count();

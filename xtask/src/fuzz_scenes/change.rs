@@ -6,22 +6,7 @@ use toml::{Table, Value};
 use wakescope_sim::scene::Scene;
 
 /// Words that a key takes.
-const WORDS: [(&str, &[&str]); 10] = [
-    (
-        "method",
-        &[
-            "periodogram",
-            "periodogram_accumulation",
-            "autoregressive",
-            "autoregressive_pole",
-            "capon",
-            "lag_window",
-            "pulse_pair",
-            "first_moment",
-            "likelihood",
-            "gradient_likelihood",
-        ],
-    ),
+const WORDS: [(&str, &[&str]); 9] = [
     ("weighting", &["gaussian", "rectangular", "hann"]),
     ("refinement", &["parabola", "exact", "none"]),
     ("order_choice", &["fixed", "aic", "mdl"]),
@@ -34,7 +19,7 @@ const WORDS: [(&str, &[&str]); 10] = [
 ];
 
 /// Tables of other kinds: section, key in it, table.
-const KINDS: [(&str, &str, &str); 21] = [
+const KINDS: [(&str, &str, &str); 30] = [
     ("", "flow", "kind = \"calm\""),
     ("", "flow", "kind = \"uniform\"\nlateral_m_s = 5.0\nvertical_m_s = -1.0"),
     ("", "flow", "kind = \"vortex_pair\"\nmotion = \"inviscid\"\nage_tau = 1.0"),
@@ -53,6 +38,15 @@ const KINDS: [(&str, &str, &str); 21] = [
     ("scan", "below_ground", "policy = \"mask\""),
     ("scan", "below_ground", "policy = \"constant\"\nradial_velocity_m_s = 2.0"),
     ("scan", "outside_flow", "policy = \"mask\""),
+    ("estimator", "method", "kind = \"periodogram\""),
+    ("estimator", "method", "kind = \"autoregressive\"\norder = 16\norder_choice = \"fixed\""),
+    ("estimator", "method", "kind = \"autoregressive_pole\"\norder = 16\norder_choice = \"aic\""),
+    ("estimator", "method", "kind = \"capon\"\norder = 16"),
+    ("estimator", "method", "kind = \"lag_window\"\nlag_window_lags = 16"),
+    ("estimator", "method", "kind = \"pulse_pair\""),
+    ("estimator", "method", "kind = \"first_moment\"\nmoment_reach = 3.5"),
+    ("estimator", "method", "kind = \"likelihood\"\nlikelihood_snr_db = 3.0"),
+    ("estimator", "method", "kind = \"gradient_likelihood\"\ngradient_max_per_s = 0.6\ngradients = 7"),
     ("estimator", "radius", "kind = \"of_range\"\nrange_m = [300.0, 500.0]\nradius_m = [1.0, 4.0]"),
     ("estimator", "radius", "kind = \"target\"\nstandard_deviation_m_s = 0.3\nlargest_m = 10.0"),
     (
@@ -75,8 +69,7 @@ const KINDS: [(&str, &str, &str); 21] = [
 ];
 
 /// Keys that the default scene does not have.
-const ABSENT: [(&str, &str, f64); 3] =
-    [("estimator", "false_alarm", 1e-3), ("estimator", "likelihood_snr_db", 3.0), ("pulse", "chirp_hz_s", 1e13)];
+const ABSENT: [(&str, &str, f64); 2] = [("estimator", "false_alarm", 1e-3), ("pulse", "chirp_hz_s", 1e13)];
 
 /// The scene of that number.
 pub(super) fn scene(seed: u64, index: u64) -> String {

@@ -11,7 +11,7 @@ use crate::workspace::root;
 use crate::{Failure, Outcome};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-use wakescope_sim::export::FileGroup;
+use wakescope_sim::io::FileGroup;
 
 /// Folder of the figures and of the stages that several share.
 pub(super) fn folder() -> PathBuf {

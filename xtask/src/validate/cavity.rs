@@ -6,7 +6,7 @@ use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::references::{numbers, parabola_vertex};
 use wakescope_les::cases;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Extrema of Botella and Peyret: velocity along the lid's direction on the vertical centre line, and across on the other.

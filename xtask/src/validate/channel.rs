@@ -7,7 +7,7 @@ use crate::profile::Profile;
 use crate::references::numbers;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_les::{SubgridModel, cases};
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const REYNOLDS_TAU: f64 = 178.12;

@@ -7,7 +7,7 @@ use crate::profile::Profile;
 use crate::references::{numbers, parabola_vertex};
 use crate::workspace::read;
 use wakescope_les::cases;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 pub(super) fn show_625(profile: Profile) -> Result<Shown, Failure> {

@@ -6,7 +6,7 @@ use crate::claim::Claim;
 use crate::profile::Profile;
 use wakescope_les::TimeScheme;
 use wakescope_les::cases;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const VISCOSITY_M2_S: f64 = 0.01;

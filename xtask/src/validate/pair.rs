@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use wakescope_les::CirculationProfile;
 use wakescope_les::analysis::WakeScales;
 use wakescope_les::cases::VortexPairCase;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const END: f64 = 3.0;

@@ -1,7 +1,7 @@
 //! What the comparison of a flow with its reference gives.
 
 use crate::claim::Claim;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::Figure;
 
 /// What a case shows.

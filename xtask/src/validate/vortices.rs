@@ -8,7 +8,7 @@ use crate::references::numbers;
 use std::f64::consts::PI;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_les::{SubgridModel, cases};
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const REYNOLDS: f64 = 1600.0;

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use wakescope_les::Flow;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_les::cases::TollmienSchlichting;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// The wave is followed from here, when what is not the wave has died, to the end.

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each example uses a part")]
 
 use ndarray::{Array2, Array3};
-use wakescope_sim::export::{
+use wakescope_sim::io::{
     CrossPlanes, Field, FieldKind, OPEN_EDGES, Provenance, PulseInfo, Ray, Site, Sweep, Unit, VelocityMap,
 };
 

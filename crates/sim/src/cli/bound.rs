@@ -1,11 +1,11 @@
 //! `wakescope bound`: the Cramer-Rao bound for a scene.
 
 use super::{Cli, load, say};
-use crate::export::Existing;
-use crate::export::own::refuse_foreign;
+use crate::io::Existing;
+use crate::io::own::refuse_foreign;
+use crate::measure::progress::Silent;
 use crate::plan::{Plan, Target};
-use crate::progress::Silent;
-use crate::{Error, bound, write};
+use crate::{Error, measure::bound, measure::write};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -39,7 +39,7 @@ pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
     let found = bound::bound(&plan, &Silent)?;
     let mut text = found.text();
     if let Some(path) = &words.out {
-        crate::export::write_atomic(path, found.table().to_csv(&write::provenance(&plan))?)?;
+        crate::io::write_atomic(path, found.table().to_csv(&write::provenance(&plan))?)?;
         text += &format!("wrote {}\n", path.display());
     }
     let points = |points: &[bound::BoundPoint]| -> Vec<serde_json::Value> {

@@ -3,6 +3,8 @@
 use super::output::print;
 use super::{Cli, progress, say};
 use crate::Error;
+#[cfg(feature = "plots")]
+use crate::flow::FinishedWake;
 use crate::flow::{Begin, CaseFile, EXAMPLES, FlowForecast, RunOptions, Watch, check, example, run_with};
 use clap::Args;
 use serde_json::{Value, json};
@@ -79,7 +81,20 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
         bar = progress::FlowBar::new();
         &mut bar
     };
-    let outcome = run_with(file, out, options, watch)?;
+    #[cfg_attr(not(feature = "plots"), expect(unused_mut, reason = "there is nothing to draw with"))]
+    let mut outcome = run_with(file, out, options, watch)?;
+    #[cfg(feature = "plots")]
+    if outcome.is_complete && file.case.wake.is_some() {
+        match FinishedWake::read(out).and_then(|wake| wake.draw()) {
+            Ok(files) => outcome.files.extend(files),
+            // The run is done all the same.
+            Err(error) => {
+                let text = format!("the wake is not drawn: {error}");
+                progress::NotesOnly.note(&text);
+                outcome.warnings.push(text);
+            }
+        }
+    }
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
         "is_complete": outcome.is_complete, "kinetic_energy_m5_s2": outcome.kinetic_energy_m5_s2,

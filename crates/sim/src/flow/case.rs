@@ -3,12 +3,10 @@
 //! Every key but `case.kind` has a default; unknown keys are refused. Units are in the key names; a key without a unit has
 //! none, or is in the units of the case's literature.
 
-use super::free::Free;
-use super::named::{
-    Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
-};
-use super::wake::{WakeFlow, WakeOutput};
-use crate::scene::{Problem, section};
+use super::kind::CaseKind;
+use super::wake::WakeOutput;
+use crate::keys::{Checker, Problem};
+use crate::scene::section;
 use serde::{Deserialize, Serialize};
 
 /// The version of the case format that this program reads and writes.
@@ -45,38 +43,6 @@ pub struct FlowCase {
 
 fn format() -> u32 {
     FORMAT
-}
-
-/// Which flow. The first ones have known answers and are in the units of their literature.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum CaseKind {
-    /// Decaying vortices of the plane, an exact solution.
-    TaylorGreenPlane(TaylorGreenPlane),
-    /// Vortices of space that become turbulent.
-    TaylorGreen(TaylorGreen),
-    /// Pressure-driven flow between plates.
-    Poiseuille(PlateDriven),
-    /// Flow between plates that move.
-    Couette(PlateDriven),
-    /// The slowest mode between plates, which decays.
-    StokesLayer(PlateDriven),
-    /// A plate that starts suddenly.
-    RayleighPlate(PlateDriven),
-    /// A wave of Tollmien and Schlichting on Poiseuille's flow.
-    OrrSommerfeld(OrrSommerfeld),
-    /// A dipole that runs against a wall.
-    Dipole(Dipole),
-    /// A cavity whose lid moves.
-    LidDrivenCavity(LidDrivenCavity),
-    /// Turbulent flow between plates.
-    Channel(Channel),
-    /// A vortex pair above ground, in plane or space.
-    VortexPair(VortexPairFlow),
-    /// The wake of an aircraft near the ground, measured while it runs.
-    Wake(Box<WakeFlow>),
-    /// A mesh, viscosity and initial field of one's own, in SI units.
-    Free(Box<Free>),
 }
 
 /// Time integration of convection.
@@ -235,49 +201,14 @@ section! {
     }
 }
 
-/// Collects what is wrong with a case.
-#[derive(Debug, Default)]
-pub(super) struct Problems(pub(super) Vec<Problem>);
-
-impl Problems {
-    pub(super) fn require(&mut self, ok: bool, key: &str, value: impl std::fmt::Debug, allowed: &str) {
-        if !ok {
-            self.0.push(Problem { key: key.into(), value: format!("{value:?}"), allowed: allowed.into() });
-        }
-    }
-
-    pub(super) fn positive(&mut self, key: &str, value: f64) {
-        self.require(value.is_finite() && value > 0.0, key, value, "a finite number above 0");
-    }
-
-    pub(super) fn not_negative(&mut self, key: &str, value: f64) {
-        self.require(value.is_finite() && value >= 0.0, key, value, "a finite number, 0 or more");
-    }
-
-    pub(super) fn cells(&mut self, key: &str, cells: &[usize]) {
-        let ok = cells.iter().all(|n| (1..=100_000).contains(n));
-        self.require(ok, key, cells, "whole numbers from 1 to 100000");
-    }
-
-    pub(super) fn stretch(&mut self, key: &str, value: f64) {
-        self.require((0.0..=20.0).contains(&value), key, value, "a number from 0 (equal cells) to 20");
-    }
-}
-
 impl FlowCase {
     /// Everything in this case that is out of its limits; what depends on the mesh is found when the flow starts.
     pub fn problems(&self) -> Vec<Problem> {
-        let mut p = Problems::default();
+        let mut p = Checker::new(&|_| true);
         p.require(self.format == FORMAT, "format", self.format, "1, the format of this program");
         self.case.check(&mut p);
         self.check_time(&mut p);
-        let tolerance = self.solver.pressure_tolerance;
-        p.require(
-            (1e-15..=0.1).contains(&tolerance),
-            "solver.pressure_tolerance",
-            tolerance,
-            "a number from 1e-15 to 0.1",
-        );
+        p.within("solver.pressure_tolerance", self.solver.pressure_tolerance, 1e-15, 0.1, "");
         self.check_output(&mut p);
         self.check_wake(&mut p);
         let c = self.checkpoint;
@@ -286,10 +217,10 @@ impl FlowCase {
             p.positive("checkpoint.every_s", every_s);
             p.require(c.every_steps.is_none(), "checkpoint.every_s", every_s, "absent beside checkpoint.every_steps");
         }
-        p.0
+        p.into_problems()
     }
 
-    fn check_wake(&self, p: &mut Problems) {
+    fn check_wake(&self, p: &mut Checker<'_>) {
         let is_wake = matches!(self.case, CaseKind::Wake(_));
         if let Some(wake) = &self.wake {
             p.require(is_wake, "wake.end_tau", wake.end_tau, "absent: the section is for case.kind = \"wake\"");
@@ -302,7 +233,7 @@ impl FlowCase {
         p.require(planes, "output.planes_x_m", &o.planes_x_m, "absent: see wake.planes_x");
     }
 
-    fn check_time(&self, p: &mut Problems) {
+    fn check_time(&self, p: &mut Checker<'_>) {
         let t = self.time;
         let keys = [
             ("time.end_s", t.end_s),
@@ -318,7 +249,7 @@ impl FlowCase {
         }
     }
 
-    fn check_output(&self, p: &mut Problems) {
+    fn check_output(&self, p: &mut Checker<'_>) {
         let o = &self.output;
         let increasing =
             o.times_s.windows(2).all(|w| w[1] > w[0]) && o.times_s.iter().all(|t| t.is_finite() && *t >= 0.0);
@@ -332,7 +263,7 @@ impl FlowCase {
         p.require(!initial, "output.planes", &o.planes, "csv, netcdf, vtr: an initial field is a whole field");
         for (key, formats) in [("output.fields", &o.fields), ("output.planes", &o.planes)] {
             if let Some(missing) = formats.iter().find_map(|f| f.missing_feature()) {
-                p.require(false, key, formats, &format!("formats of this build, which lacks the feature `{missing}`"));
+                p.require(false, key, formats, format!("formats of this build, which lacks the feature `{missing}`"));
             }
         }
     }

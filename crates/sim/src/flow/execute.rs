@@ -9,9 +9,9 @@ use super::steps::StepTable;
 use super::wake::{Schedule, WakeRun};
 use super::writer::{Kept, Writer};
 use super::{Begin, CaseFile, FlowCase, FlowOutcome, Watch};
-use crate::export::lock::FolderLock;
-use crate::export::{Existing, write_atomic};
-use crate::scene::Problem;
+use crate::io::lock::FolderLock;
+use crate::io::{Existing, write_atomic};
+use crate::keys::Problem;
 use crate::{Error, machine};
 use std::path::Path;
 use wakescope_les::solver::{CheckpointPlan, Ends, Interval, Run, RunPlan};
@@ -149,7 +149,7 @@ fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
     {
         return Err(Error::CheckpointInTheWay { path });
     }
-    crate::write::prepare(folder, [], Existing::Own)
+    crate::measure::write::prepare(folder, [], Existing::Own)
 }
 
 /// The setup and the plan of a case, with all that can be refused before the computing.
@@ -157,7 +157,7 @@ fn prepare(file: &CaseFile, folder: &Path, options: RunOptions) -> Result<Prepar
     let available = if options.allow_large { None } else { machine::available_memory_bytes() };
     // Before the setup, which holds the initial field.
     refuse_too_large(&file.case, file.case.case.cells(), &[], available)?;
-    let setup = Setup::new(&file.case, file.path.parent().unwrap_or(Path::new("")))?;
+    let setup = Setup::new(&file.case, file.source.folder())?;
     let dense = setup.settings.pressure.dense_directions(&setup.mesh);
     refuse_too_large(&file.case, setup.mesh.cells(), &dense, available)?;
     setup.settings.validate(&setup.mesh).map_err(Error::Flow)?;

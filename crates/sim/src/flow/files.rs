@@ -4,8 +4,8 @@ use super::Begin;
 use super::case::{FileFormat, Output};
 use super::wake::{self, Due};
 use crate::Error;
-use crate::export::own::refuse_foreign;
-use crate::export::{CrossPlanes, Existing, FileGroup, Provenance, VelocityField, tables};
+use crate::io::own::refuse_foreign;
+use crate::io::{CrossPlanes, Existing, FileGroup, Provenance, VelocityField, tables};
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
 use wakescope_les::Flow;
@@ -42,6 +42,8 @@ impl Files {
         out.extend(self.output.steps.then(|| STEPS.to_owned()));
         if is_wake {
             out.extend(wake::file_names().into_iter().map(str::to_owned));
+            #[cfg(feature = "plots")]
+            out.extend(wake::PICTURES.map(str::to_owned));
         }
         let mut add = |stem: &str, index: usize, format: FileFormat| match format {
             FileFormat::Csv => out.push(numbered(stem, index, "csv")),
@@ -96,11 +98,11 @@ impl Files {
                     FileFormat::Csv => group.add(&name("csv"), field.table()?.to_csv(&self.origin)?)?,
                     #[cfg(feature = "netcdf")]
                     FileFormat::Netcdf => {
-                        group.add(&name("nc"), crate::export::cf_fields::cf_field_bytes(&field, &self.origin)?)?;
+                        group.add(&name("nc"), crate::io::cf_fields::cf_field_bytes(&field, &self.origin)?)?;
                     }
                     #[cfg(feature = "vtk")]
                     FileFormat::Vtr => {
-                        group.add(&name("vtr"), crate::export::vtr::field_bytes(&field, &self.origin)?)?;
+                        group.add(&name("vtr"), crate::io::vtr::field_bytes(&field, &self.origin)?)?;
                         group.add("fields.pvd", self.collection("fields", index, &self.times_s[0], 1.0))?;
                     }
                     // A case that names a format which this build lacks was refused.
@@ -110,7 +112,7 @@ impl Files {
         }
         #[cfg(feature = "netcdf")]
         if formats.contains(&FileFormat::InitialNetcdf) {
-            let bytes = crate::export::cf_fields::cf_faces_bytes(&self.faces(flow), &self.origin)?;
+            let bytes = crate::io::cf_fields::cf_faces_bytes(&self.faces(flow), &self.origin)?;
             group.add(&numbered("initial", index, "nc"), bytes)?;
         }
         Ok(())
@@ -126,12 +128,12 @@ impl Files {
                 }
                 #[cfg(feature = "netcdf")]
                 FileFormat::Netcdf => {
-                    let bytes = crate::export::cf_planes::cf_planes_bytes(&plane, &self.origin)?;
+                    let bytes = crate::io::cf_planes::cf_planes_bytes(&plane, &self.origin)?;
                     group.add(&numbered(stem, index, "nc"), bytes)?;
                 }
                 #[cfg(feature = "vtk")]
                 FileFormat::Vtr => {
-                    let bytes = crate::export::vtr::plane_file(&plane, &self.origin)?;
+                    let bytes = crate::io::vtr::plane_file(&plane, &self.origin)?;
                     group.add(&numbered(stem, index, "vtr"), bytes)?;
                     group
                         .add(&format!("{stem}.pvd"), self.collection(stem, index, &self.times_s[1], self.tau_per_s))?;
@@ -147,7 +149,7 @@ impl Files {
     fn collection(&self, stem: &str, index: usize, times_s: &[f64], per_s: f64) -> Vec<u8> {
         let names: Vec<String> = (0..=index).map(|i| numbered(stem, i, "vtr")).collect();
         let members = times_s.iter().map(|t| t * per_s).zip(names.iter().map(String::as_str));
-        crate::export::vtr::pvd_bytes(members, &self.origin)
+        crate::io::vtr::pvd_bytes(members, &self.origin)
     }
 
     fn field(&self, flow: &Flow) -> Result<VelocityField, Error> {
@@ -167,9 +169,9 @@ impl Files {
     }
 
     #[cfg(feature = "netcdf")]
-    fn faces(&self, flow: &Flow) -> crate::export::cf_fields::FaceVelocities {
+    fn faces(&self, flow: &Flow) -> crate::io::cf_fields::FaceVelocities {
         let mesh = flow.mesh();
-        crate::export::cf_fields::FaceVelocities {
+        crate::io::cf_fields::FaceVelocities {
             title: self.title.clone(),
             time_s: flow.time_s(),
             centre_m: [0, 1, 2].map(|axis| mesh.centre_m(axis)),

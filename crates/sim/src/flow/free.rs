@@ -1,9 +1,9 @@
 //! A flow of one's own: mesh, walls, viscosity and initial field, in SI units.
 
-use super::case::Problems;
 use super::setup::{Initial, Setup};
+use crate::Error;
+use crate::keys::Checker;
 use crate::scene::{VortexProfile, section};
-use crate::{Error, join};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use wakescope_les::solver::Ends;
@@ -131,7 +131,7 @@ section! {
 }
 
 impl Axis {
-    fn check(&self, name: &str, p: &mut Problems) {
+    fn check(&self, name: &str, p: &mut Checker<'_>) {
         let key = |field: &str| format!("case.{name}.{field}");
         p.cells(&key("cells"), &[self.cells]);
         let ordered = self.low_m.is_finite() && self.high_m.is_finite() && self.high_m > self.low_m;
@@ -143,12 +143,10 @@ impl Axis {
             MappingName::Sine => {
                 p.require(self.stretch.abs() < 1.0, &key("stretch"), self.stretch, "between -1 and 1 for a sine");
             }
-            _ => p.require(
-                self.stretch > 0.0 && self.stretch <= 20.0,
-                &key("stretch"),
-                self.stretch,
-                "above 0 and at most 20 for this mapping",
-            ),
+            _ => {
+                let ok = self.stretch > 0.0 && self.stretch <= 20.0;
+                p.require(ok, &key("stretch"), self.stretch, "above 0 and at most 20 for this mapping");
+            }
         }
         let place = self.place.is_none_or(|place| (0.0..=1.0).contains(&place) && self.mapping == MappingName::Cluster);
         p.require(
@@ -203,7 +201,7 @@ impl Axis {
 }
 
 impl Free {
-    pub(super) fn check(&self, p: &mut Problems) {
+    pub(super) fn check(&self, p: &mut Checker<'_>) {
         for (name, axis) in [("x", self.x), ("y", self.y), ("z", self.z)] {
             axis.check(name, p);
         }
@@ -277,7 +275,7 @@ impl InitialPair {
             lateral_position_m: self.lateral_position_m,
             height_m: self.height_m,
             ground: Ground::Image,
-            profile: join::circulation_profile(self.profile),
+            profile: crate::measure::wind::circulation_profile(self.profile),
             motion: Motion::Frozen,
         };
         let (wind, cross_m_s) = (pair.wind().map_err(Error::Flow)?, self.cross_wind_m_s);

@@ -15,6 +15,8 @@ mod forecast;
 mod free;
 #[cfg(feature = "netcdf")]
 mod initial_file;
+mod integration;
+mod kind;
 mod named;
 #[cfg(feature = "netcdf")]
 mod read;
@@ -24,25 +26,27 @@ mod text;
 mod wake;
 mod writer;
 
-pub use case::{
-    AxisName, CaseKind, Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time,
-};
+pub use case::{AxisName, Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time};
 pub use examples::{EXAMPLES, example};
 pub use execute::{RunOptions, check, run, run_with};
 pub use forecast::{FileForecast, FlowForecast};
 pub use free::{Axis, EndName, Free, InitialName, InitialPair, MappingName};
+pub use kind::CaseKind;
 pub use named::{
     Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
 };
 
 #[cfg(feature = "netcdf")]
 pub use read::{FieldInSpace, read_field, read_planes};
-pub use wake::{PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile};
+#[cfg(all(feature = "netcdf", feature = "plots"))]
+pub use wake::REPEATS;
+pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};
 
 use crate::Error;
-use crate::export::Provenance;
-use crate::scene::{Located, Problem, SceneError, hash_of, located, parsed};
-use crate::text_file;
+use crate::io::Provenance;
+use crate::io::text_file;
+use crate::keys::{Located, Problem, SceneError, Source};
+use crate::scene::hash_of;
 use std::path::{Path, PathBuf};
 use wakescope_les::solver::StepRecord;
 
@@ -55,8 +59,7 @@ pub struct CaseFile {
     pub toml: String,
     /// First 16 hexadecimal digits of the SHA-256 of `toml`.
     pub hash: String,
-    path: PathBuf,
-    text: String,
+    source: Source,
 }
 
 impl CaseFile {
@@ -74,7 +77,7 @@ impl CaseFile {
     /// # Errors
     /// As [`CaseFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        Ok(Self::of(text::read(text, path, None)?, text, path))
+        Ok(Self::of(text::read(text, path, None)?, Source::new(path, text)))
     }
 
     /// The same case with another end: the age `tau` of a wake, of other flows a time \[s\]. Outputs behind it are left out.
@@ -93,7 +96,7 @@ impl CaseFile {
         }
         let problems = case.problems();
         if problems.is_empty() {
-            return Ok(Self::of(case, &self.text, &self.path));
+            return Ok(Self::of(case, self.source.clone()));
         }
         // The end is of the command line, whatever the file says of it.
         let of_command = |problem: Problem| match problem.key.as_str() {
@@ -102,7 +105,7 @@ impl CaseFile {
         };
         let problems =
             problems.into_iter().map(|problem| Located { problem: of_command(problem), line: None }).collect();
-        Err(SceneError::Invalid { path: self.path.clone(), problems })
+        Err(SceneError::Invalid { path: self.source.path().to_owned(), problems })
     }
 
     /// A preset.
@@ -127,13 +130,13 @@ impl CaseFile {
     /// # Errors
     /// As [`CaseFile::parse`].
     pub fn parse_over(preset: WakePreset, text: &str, path: &Path) -> Result<Self, SceneError> {
-        Ok(Self::of(text::read(text, path, Some(&preset.case()))?, text, path))
+        Ok(Self::of(text::read(text, path, Some(&preset.case()))?, Source::new(path, text)))
     }
 
-    fn of(case: FlowCase, text: &str, path: &Path) -> Self {
+    fn of(case: FlowCase, source: Source) -> Self {
         let toml = toml::to_string(&case).unwrap_or_else(|e| unreachable!("a case is plain data: {e}"));
         let hash = hash_of(&toml);
-        Self { case, toml, hash, path: path.to_owned(), text: text.to_owned() }
+        Self { case, toml, hash, source }
     }
 
     fn refuse(&self, key: &str, value: impl std::fmt::Debug, allowed: String) -> Error {
@@ -142,10 +145,7 @@ impl CaseFile {
 
     /// A problem with the line of its key.
     fn located(&self, problem: Problem) -> SceneError {
-        match parsed(&self.text, &self.path) {
-            Ok(document) => located(&document, &self.path, vec![problem]),
-            Err(error) => error,
-        }
+        self.source.located(vec![problem])
     }
 
     fn provenance(&self) -> Provenance {

@@ -1,18 +1,9 @@
-//! The flows with known answers: their parameters, and the cases of the solver that these select.
+//! The parameters of the flows with known answers.
 
-use super::case::{CaseKind, Problems};
-use super::setup::Setup;
+use crate::keys::Checker;
 use crate::scene::{VortexProfile, section};
-use crate::{Error, join};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
-use wakescope_les::cases::{self, Case, Resolution, TollmienSchlichting, VortexLengths, VortexPairCase};
-use wakescope_les::{Mesh, TimeScheme, TimeStep};
-
-/// Steps from start to end that the longest step gives where a case states none.
-const LEAST_STEPS: f64 = 200.0;
-/// A step for the constructors of cases with a fixed one; replaced by the case file's.
-const ANY_STEP_S: f64 = 1.0;
+use wakescope_les::cases::{Case, VortexPairCase};
 
 section! {
     /// `v = sin(2 pi y) cos(2 pi z) exp(-8 pi^2 nu t)` on the unit square.
@@ -144,136 +135,14 @@ section! {
     }
 }
 
-impl CaseKind {
-    pub(super) fn check(&self, p: &mut Problems) {
-        match self {
-            Self::TaylorGreenPlane(c) => {
-                p.cells("case.cells", &[c.cells]);
-                p.not_negative("case.viscosity_m2_s", c.viscosity_m2_s);
-                let ok = c.stretch.iter().all(|a| a.abs() < 1.0);
-                p.require(ok, "case.stretch", c.stretch, "two numbers between -1 and 1");
-            }
-            Self::TaylorGreen(c) => {
-                p.cells("case.cells", &[c.cells]);
-                p.positive("case.reynolds", c.reynolds);
-            }
-            Self::Poiseuille(c) | Self::Couette(c) | Self::StokesLayer(c) | Self::RayleighPlate(c) => {
-                p.cells("case.cells", &[c.cells]);
-                p.stretch("case.stretch", c.stretch);
-                p.positive("case.viscosity_m2_s", c.viscosity_m2_s);
-                p.require(c.initial_share.is_finite(), "case.initial_share", c.initial_share, "finite");
-                let has_share = matches!(self, Self::Poiseuille(_) | Self::Couette(_));
-                let allowed = "this key is for case.kind = \"poiseuille\" or \"couette\"";
-                p.require(has_share || c.initial_share == 0.0, "case.initial_share", c.initial_share, allowed);
-            }
-            Self::OrrSommerfeld(c) => {
-                p.cells("case.cells", &c.cells);
-                p.stretch("case.stretch", c.stretch);
-                let (re, wave) = (c.reynolds, c.wave_number);
-                p.require((500.0..=1e6).contains(&re), "case.reynolds", re, "a number from 500 to 1e6");
-                p.require((0.3..=2.0).contains(&wave), "case.wave_number", wave, "a number from 0.3 to 2");
-                p.require(c.amplitude.is_finite(), "case.amplitude", c.amplitude, "finite");
-            }
-            Self::Dipole(c) => {
-                p.cells("case.cells", &c.cells);
-                p.stretch("case.stretch", c.stretch);
-                p.stretch("case.lateral_stretch", c.lateral_stretch());
-                p.positive("case.reynolds", c.reynolds);
-            }
-            Self::LidDrivenCavity(c) => {
-                p.cells("case.cells", &[c.cells]);
-                p.stretch("case.stretch", c.stretch);
-                p.positive("case.reynolds", c.reynolds);
-            }
-            Self::Channel(c) => {
-                p.cells("case.cells", &c.cells);
-                p.stretch("case.stretch", c.stretch);
-                p.positive("case.reynolds_tau", c.reynolds_tau);
-            }
-            Self::VortexPair(c) => c.check(p),
-            Self::Wake(c) => c.check(p),
-            Self::Free(c) => c.check(p),
-        }
-    }
-
-    /// What `mesh` does not resolve of the vortices and of the boundary layer under them, in sentences.
-    pub(super) fn unresolved(&self, mesh: &Mesh) -> Vec<String> {
-        let lengths = match self {
-            Self::Dipole(c) => Some(VortexLengths::dipole(c.reynolds)),
-            Self::VortexPair(c) => Some(VortexLengths::pair(c.core_radius, c.height, c.reynolds, 1.0)),
-            Self::Wake(c) => {
-                let scales = c.pair.scales().ok();
-                scales.map(|scales| VortexLengths::pair(c.core_radius, c.height, c.reynolds, scales.spacing_m))
-            }
-            _ => None,
-        };
-        lengths.map_or_else(Vec::new, |lengths| Resolution::new(mesh, &lengths).warnings())
-    }
-
-    /// Cells along x, y, z.
-    pub fn cells(&self) -> [usize; 3] {
-        match *self {
-            Self::TaylorGreenPlane(ref c) => [1, c.cells, c.cells],
-            Self::TaylorGreen(ref c) => [c.cells; 3],
-            Self::Poiseuille(ref c) | Self::Couette(ref c) | Self::StokesLayer(ref c) | Self::RayleighPlate(ref c) => {
-                [1, 1, c.cells]
-            }
-            Self::OrrSommerfeld(ref c) => [c.cells[0], 1, c.cells[1]],
-            Self::Dipole(ref c) => [1, c.cells[0], c.cells[1]],
-            Self::LidDrivenCavity(ref c) => [1, c.cells, c.cells],
-            Self::Channel(ref c) => c.cells,
-            Self::VortexPair(ref c) => c.cells,
-            Self::Wake(ref c) => c.cells,
-            Self::Free(ref c) => [c.x.cells, c.y.cells, c.z.cells],
-        }
-    }
-
-    /// Mesh, settings and initial field; `folder` is that of the case file.
-    pub(super) fn setup(&self, folder: &Path) -> Result<Setup, Error> {
-        let steady = |case: Result<Case, wakescope_les::Error>| {
-            let mut case = case?;
-            let courant = TimeScheme::AdamsBashforth2.default_courant();
-            case.settings.time_step = TimeStep::Courant { courant, longest_s: case.end_s / LEAST_STEPS };
-            Ok(case)
-        };
-        let plates =
-            |cells, strength, viscosity_m2_s| cases::Plates { cells, strength, viscosity_m2_s, step_s: ANY_STEP_S };
-        let case = match *self {
-            Self::TaylorGreenPlane(ref c) => {
-                steady(cases::taylor_green_plane(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S))
-            }
-            Self::TaylorGreen(ref c) => cases::taylor_green_3d(c.cells, c.reynolds),
-            Self::Poiseuille(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).poiseuille(c.initial_share)),
-            Self::Couette(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).couette(c.initial_share)),
-            Self::StokesLayer(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).decaying_layer()),
-            Self::RayleighPlate(ref c) => steady(plates(c.cells, c.stretch, c.viscosity_m2_s).rayleigh_plate()),
-            Self::OrrSommerfeld(ref c) => steady(
-                TollmienSchlichting::new(c.reynolds, c.wave_number)
-                    .and_then(|wave| wave.case(c.cells, c.stretch, c.amplitude, ANY_STEP_S)),
-            ),
-            Self::Dipole(ref c) => {
-                let dipole = if c.closed_sides { cases::dipole_in_a_box } else { cases::dipole_between_walls };
-                dipole(c.cells, [c.lateral_stretch(), c.stretch], c.reynolds)
-            }
-            Self::LidDrivenCavity(ref c) => cases::lid_driven_cavity(c.cells, c.stretch, c.reynolds),
-            Self::Channel(ref c) => cases::channel(c.cells, c.stretch, c.reynolds_tau),
-            Self::VortexPair(ref c) => c.case(),
-            Self::Wake(ref c) => return c.setup(),
-            Self::Free(ref c) => return c.setup(folder),
-        };
-        let Case { mesh, settings, initial, end_s } = case.map_err(Error::Flow)?;
-        Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0, wake: None, undamped: None })
-    }
-}
-
 impl Dipole {
-    fn lateral_stretch(&self) -> f64 {
+    pub(super) fn lateral_stretch(&self) -> f64 {
         self.lateral_stretch.unwrap_or(if self.closed_sides { self.stretch } else { 0.0 })
     }
 }
 
 impl VortexPairFlow {
-    fn check(&self, p: &mut Problems) {
+    pub(super) fn check(&self, p: &mut Checker<'_>) {
         p.cells("case.cells", &self.cells);
         let ok = self.size.iter().all(|l| l.is_finite() && *l > 0.0);
         p.require(ok, "case.size", self.size, "three finite numbers above 0");
@@ -288,9 +157,9 @@ impl VortexPairFlow {
         p.require(wind, "case.cross_wind", self.cross_wind, "finite, and 0 between frictionless sides");
     }
 
-    fn case(&self) -> Result<Case, wakescope_les::Error> {
+    pub(super) fn case(&self) -> Result<Case, wakescope_les::Error> {
         let Self { cells, size, ground_stretch, height, core_radius, reynolds, .. } = *self;
-        let profile = join::circulation_profile(self.profile);
+        let profile = crate::measure::wind::circulation_profile(self.profile);
         VortexPairCase {
             cells,
             size,

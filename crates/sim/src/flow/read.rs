@@ -3,9 +3,9 @@
 //! Check: what a run wrote comes back, axes and values.
 
 use crate::Error;
-use crate::export::CrossPlanes;
-use crate::netcdf_input::{TIME, X, Y, Z, open};
-use crate::planes_input;
+use crate::io::CrossPlanes;
+use crate::io::netcdf_input::{TIME, X, Y, Z, open};
+use crate::io::planes_input;
 use std::path::Path;
 
 /// One variable of a flow in space at one time.

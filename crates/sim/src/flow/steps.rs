@@ -6,8 +6,8 @@
 //! Check: the tests of `flow` interrupt runs and compare the bytes.
 
 use crate::Error;
-use crate::export::csv::float_text;
-use crate::export::{Provenance, write_atomic};
+use crate::io::csv::float_text;
+use crate::io::{Provenance, write_atomic};
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! The text of a case file: what it may say, with the defaults of its kind.
 
-use super::case::{CaseKind, FlowCase};
+use super::case::FlowCase;
 use super::examples::EXAMPLES;
-use crate::keys::{Document, Format, Key, keys_of};
-use crate::scene::{SceneError, located, parsed, unlike};
+use super::kind::CaseKind;
+use crate::keys::{Document, Format, Key, SceneError, keys_of};
 use serde::Deserialize;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -20,30 +20,30 @@ const TAGS: [&str; 3] = ["kind", "from", "model"];
 /// # Errors
 /// The file, the line, the key, the value and what is allowed.
 pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<FlowCase, SceneError> {
-    let document = parsed(text, path)?;
+    let document = Document::parse(text, path)?;
     let kind = document.value("case.kind").and_then(|kind| kind.as_str());
     let defaults = match (base, kind) {
         (Some(base), _) => table_of(base),
         (None, Some(kind)) => defaults_of(kind),
         (None, None) => Table::new(),
     };
-    let table = vetted(&document, path, kind, &defaults)?;
+    let table = vetted(&document, kind, &defaults)?;
     let whole = match base {
         Some(_) => over(defaults, table),
         None => table,
     };
-    let mut case = FlowCase::deserialize(whole).map_err(|e| unlike(path, &e))?;
+    let mut case = document.read::<FlowCase>(whole)?;
     if matches!(case.case, CaseKind::Wake(_)) {
         case.wake.get_or_insert_default().complete();
     }
     let problems = case.problems();
-    if problems.is_empty() { Ok(case) } else { Err(located(&document, path, problems)) }
+    if problems.is_empty() { Ok(case) } else { Err(document.located(problems)) }
 }
 
-fn vetted(document: &Document<'_>, path: &Path, kind: Option<&str>, defaults: &Table) -> Result<Table, SceneError> {
+fn vetted(document: &Document<'_>, kind: Option<&str>, defaults: &Table) -> Result<Table, SceneError> {
     static KEYS: LazyLock<Vec<Key>> = LazyLock::new(keys_of::<FlowCase>);
     let format = Format { keys: &KEYS, defaults, examples: &examples_of(kind) };
-    document.vet(&format).map_err(|problems| SceneError::Invalid { path: path.to_owned(), problems })
+    document.vet(&format)
 }
 
 /// Texts with values of keys, that of the same kind first.

@@ -3,7 +3,7 @@
 //! Serde gives structures, enumerations and tables with a tag no description of themselves, but the errors that they make
 //! carry the names of their keys and variants.
 
-use super::{Key, Kind};
+use super::key::{Key, Kind};
 use serde::de::value::{BorrowedStrDeserializer, MapDeserializer, SeqDeserializer};
 use serde::de::{DeserializeOwned, Deserializer, Expected, IntoDeserializer, Unexpected, Visitor};
 use std::fmt::Display;
@@ -232,14 +232,16 @@ mod tests {
         let scene = keys_of::<Scene>();
         let Kind::Table(pulse) = &find(&scene, "pulse").kind else { panic!("a table") };
         assert_eq!(find(pulse, "energy_j").kind, Kind::Number);
-        assert_eq!(find(pulse, "definition").kind, Kind::Choice(&["fwhm", "one_over_e_half_width"]));
+        let Kind::Tagged { kinds, .. } = &find(pulse, "shape").kind else { panic!("tagged") };
+        assert_eq!(find(&kinds[0].1, "definition").kind, Kind::Choice(&["fwhm", "one_over_e_half_width"]));
         let Kind::Tagged { tag: "kind", kinds } = &find(&scene, "flow").kind else { panic!("tagged") };
         assert_eq!(kinds.iter().map(|k| k.0).collect::<Vec<_>>(), ["calm", "uniform", "vortex_pair", "simulated"]);
         assert!(kinds[1].1.iter().all(|key| key.is_required && key.kind == Kind::Number) && kinds[1].1.len() == 2);
         assert!(kinds[2].1.iter().all(|key| !key.is_required));
         let Kind::Table(estimator) = &find(&scene, "estimator").kind else { panic!("a table") };
         assert_eq!(find(estimator, "false_alarm").kind, Kind::Number, "what may be absent");
-        assert_eq!(find(estimator, "order").kind, Kind::Whole { largest: i64::MAX as u64 });
+        let Kind::Tagged { kinds, .. } = &find(estimator, "method").kind else { panic!("tagged") };
+        assert_eq!(find(&kinds[2].1, "order").kind, Kind::Whole { largest: i64::MAX as u64 });
         let Kind::Tagged { kinds, .. } = &find(estimator, "radius").kind else { panic!("tagged") };
         let list = Kind::List { of: Box::new(Kind::Number), len: None };
         assert_eq!(find(&kinds[1].1, "range_m").kind, list);

@@ -1,9 +1,11 @@
 //! A text beside the description of its keys: what does not fit, and the table that it stands for.
 
+use super::key::{Key, Kind, join};
+use super::problem::{Located, Problem, SceneError};
 use super::words::{near, one_of, quote, tables_with, wanted};
-use super::{Key, Kind, join};
-use crate::scene::{Located, Problem};
+use serde::de::DeserializeOwned;
 use std::ops::Range;
+use std::path::Path;
 use toml::Spanned;
 use toml::Value;
 use toml::de::{DeTable, DeValue};
@@ -21,27 +23,29 @@ pub(crate) struct Format<'a> {
 /// A text that is TOML.
 pub(crate) struct Document<'a> {
     text: &'a str,
+    path: &'a Path,
     table: DeTable<'a>,
     /// Where the lines end: a long list asks for the line of each of its values.
     breaks: Vec<usize>,
 }
 
 impl<'a> Document<'a> {
-    /// Reads a text.
+    /// Reads the text of the file `path`.
     ///
     /// # Errors
     /// The line and what is wrong, without the text that is there.
-    pub(crate) fn parse(text: &'a str) -> Result<Self, (usize, String)> {
+    pub(crate) fn parse(text: &'a str, path: &'a Path) -> Result<Self, SceneError> {
         let breaks: Vec<usize> = text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(at, _)| at).collect();
         match DeTable::parse(text) {
-            Ok(table) => Ok(Self { text, table: table.into_inner(), breaks }),
+            Ok(table) => Ok(Self { text, path, table: table.into_inner(), breaks }),
             Err(e) => {
                 let at = e.span().map_or(0, |span| span.start);
                 let before = text.get(..at).unwrap_or_default().lines().next_back().unwrap_or_default();
                 let key = before.split_once('=').map(|(key, _)| key.trim());
                 let is_bare = |key: &&str| key.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b));
                 let place = key.filter(is_bare).map(|key| format!("{}: ", quote(key))).unwrap_or_default();
-                Err((line_of(&breaks, at), format!("{place}this is no valid TOML: {}", e.message().replace('\n', " "))))
+                let message = format!("{place}this is no valid TOML: {}", e.message().replace('\n', " "));
+                Err(SceneError::Malformed { path: path.to_owned(), line: line_of(&breaks, at), message })
             }
         }
     }
@@ -52,7 +56,7 @@ impl<'a> Document<'a> {
     }
 
     /// The line of a key, or of the table that would have it.
-    pub(crate) fn line_near(&self, path: &str) -> Option<usize> {
+    fn line_near(&self, path: &str) -> Option<usize> {
         self.line(path).or_else(|| self.line_near(path.rsplit_once('.')?.0))
     }
 
@@ -72,14 +76,43 @@ impl<'a> Document<'a> {
     ///
     /// # Errors
     /// Every key that is not known, has a value of the wrong kind or is missing, in the order of the lines.
-    pub(crate) fn vet(&self, format: &Format<'_>) -> Result<toml::Table, Vec<Located>> {
+    pub(crate) fn vet(&self, format: &Format<'_>) -> Result<toml::Table, SceneError> {
         let mut walk = Walk { document: self, format, found: Vec::new() };
         let table = walk.table(format.keys, &self.table, "", &[], Some(format.defaults), 1);
         if walk.found.is_empty() {
             return Ok(table);
         }
-        walk.found.sort_by_key(|located| located.line);
-        Err(walk.found)
+        Err(self.invalid(walk.found))
+    }
+
+    /// A table whose keys all fit as what it stands for.
+    ///
+    /// # Errors
+    /// What the type says that refuses it nevertheless.
+    pub(crate) fn read<T: DeserializeOwned>(&self, table: toml::Table) -> Result<T, SceneError> {
+        T::deserialize(table).map_err(|e| SceneError::Malformed {
+            path: self.path.to_owned(),
+            line: 1,
+            message: e.message().replace('\n', " "),
+        })
+    }
+
+    /// Problems with the lines where the text states their keys, and values as it writes them.
+    pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
+        let locate = |mut problem: Problem| {
+            if let Some(written) = self.written(&problem.key) {
+                problem.value = written;
+            } else if self.line(&problem.key).is_none() && problem.value != Problem::ABSENT {
+                problem.value += " (the default)";
+            }
+            Located { line: self.line_near(&problem.key), problem }
+        };
+        self.invalid(problems.into_iter().map(locate).collect())
+    }
+
+    fn invalid(&self, mut problems: Vec<Located>) -> SceneError {
+        problems.sort_by_key(|located| located.line);
+        SceneError::Invalid { path: self.path.to_owned(), problems }
     }
 
     fn quote(&self, span: Range<usize>) -> String {
@@ -351,7 +384,7 @@ impl Format<'_> {
         let (whole, element) = path.split_once('[').map_or((path, false), |(whole, _)| (whole, true));
         let is_list = matches!(kind, Kind::List { .. });
         let of_text = |text: &&str| {
-            let document = Document::parse(text).ok()?;
+            let document = Document::parse(text, Path::new("")).ok()?;
             let (_, value) = find(&document.table, whole)?;
             let span = match value.get_ref() {
                 DeValue::Array(values) if element => values.first()?.span(),

@@ -1,6 +1,6 @@
 //! What a key may hold, in words: the kind of value, its unit, names that are near.
 
-use super::{Key, Kind, join};
+use super::key::{Key, Kind, join};
 
 /// Longest piece of a file that a message repeats, in characters.
 const LONGEST_QUOTE: usize = 60;

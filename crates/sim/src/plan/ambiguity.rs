@@ -3,21 +3,19 @@
 //! A pulse that leaves a time T after another one has its light come back with that from c T/2 farther away. The signals of a
 //! scene hold one pulse each, as if the one before were long gone. Check: 1 MHz leaves 150 m.
 
+use crate::SPEED_OF_LIGHT_M_S;
 use crate::scene::Scene;
-use crate::{Error, SPEED_OF_LIGHT_M_S, join};
+use wakescope_signal::Pulse;
 
 /// A warning if light of the pulse before comes back from the ranges of the scan, or a later one is sent meanwhile.
-///
-/// # Errors
-/// What the signals refuse of the pulse; a checked scene gives none.
-pub(super) fn warning(scene: &Scene) -> Result<Option<String>, Error> {
+pub(super) fn warning(scene: &Scene, pulse: &Pulse) -> Option<String> {
     let rate_hz = scene.laser.pulse_repetition_hz;
     let apart_m = 0.5 * SPEED_OF_LIGHT_M_S / rate_hz;
-    let (first_s, _) = join::pulse(scene)?.support_s();
+    let (first_s, _) = pulse.support_s();
     // the front of the pulse lights air beyond the range of the last sample
     let reach_m = 0.5 * SPEED_OF_LIGHT_M_S * (-first_s).max(0.0);
     let farthest_m = scene.scan.range_max_m + reach_m;
-    Ok((apart_m < farthest_m).then(|| {
+    (apart_m < farthest_m).then(|| {
         let most_hz = 0.5 * SPEED_OF_LIGHT_M_S / farthest_m;
         // rounded down, so that the number given is good
         let digit = 10f64.powf(most_hz.log10().floor() - 2.0);
@@ -27,7 +25,7 @@ pub(super) fn warning(scene: &Scene) -> Result<Option<String>, Error> {
              the simulated one leaves out; up to {:.0} Hz they do not",
             (most_hz / digit).floor() * digit
         )
-    }))
+    })
 }
 
 #[cfg(test)]

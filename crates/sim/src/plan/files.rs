@@ -5,7 +5,7 @@
 
 use super::sizes::{MAP_FIELDS, Sizes, is_calm};
 use super::stage::{PlannedStage, Stage, Target, run};
-use crate::geometry::Geometry;
+use crate::measure::geometry::Geometry;
 use crate::scene::Scene;
 
 // Unit costs on one core, s.
@@ -71,7 +71,7 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
         memory.picture(pictures, PROFILE_PIXELS, 0.0);
     }
     if target == Target::Run && o.flow && !is_calm(scene) {
-        let (ny, nz) = crate::plane::POINTS;
+        let (ny, nz) = crate::measure::plane::POINTS;
         let points = (ny * nz) as f64;
         core_s += on(o.csv) * 8e-3 + on(netcdf) * 1e-3;
         memory.table(o.csv, points, 6.0);

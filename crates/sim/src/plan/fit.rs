@@ -7,7 +7,7 @@ use super::sizes::Sizes;
 use super::stage::{Forecast, PlannedStage, Stage, total};
 use super::stages::{of_bound, stages};
 use super::units::bytes;
-use crate::geometry::Geometry;
+use crate::measure::geometry::Geometry;
 use crate::scene::{Scene, ScreenSampling, Turbulence};
 use crate::{Error, machine};
 
@@ -110,7 +110,7 @@ impl Plan {
 
     /// The stages with another scan or estimator; `None` for a scene that cannot be planned. The optics stay as they are.
     fn stages_with(&self, work: Work, scene: &Scene) -> Option<Vec<PlannedStage>> {
-        let geometry = Geometry::new(scene, &self.wind).ok()?;
+        let geometry = Geometry::new(scene, &self.instrument.pulse, &self.wind).ok()?;
         let optics =
             [Stage::PhaseScreens, Stage::Efficiency].map(|stage| self.stages.iter().find(|s| s.stage == stage));
         let optics = [optics[0]?.clone(), optics[1]?.clone()];
@@ -229,7 +229,9 @@ mod tests {
     #[test]
     fn bound_of_windows_whose_matrices_do_not_fit_is_refused_and_the_remedy_fits() {
         let text = |window: &str| {
-            format!("[scan]\nrange_max_m = 9000.0\n[estimator]\nwindow_samples = {window}\npadded_samples = 16384\n")
+            format!(
+                "[scan]\nrange_max_m = 9000.0\nelevation_max_rad = 0.01\n[estimator]\nwindow_samples = {window}\npadded_samples = 16384\n"
+            )
         };
         let long = plan(&text("8192"));
         long.fits_in(8e9).unwrap();

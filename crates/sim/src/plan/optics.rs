@@ -1,11 +1,12 @@
 //! The optics of a plan: phase screens only where no theory is valid, or where they are asked for beside it.
 
 use super::stage::{Cost, PlannedStage, Stage, Target};
-use crate::geometry::Geometry;
-use crate::profile::{drawn_turbulence, model, spaced, turbulence};
-use crate::scan::profile_ranges_m;
+use crate::Error;
+use crate::measure::geometry::Geometry;
+use crate::measure::instrument::Instrument;
+use crate::measure::profile::{drawn_turbulence, model, spaced, turbulence};
+use crate::measure::scan::profile_ranges_m;
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
-use crate::{Error, join};
 use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
 use wakescope_optics::{Focus, Telescope, theory};
 
@@ -15,6 +16,7 @@ use wakescope_optics::{Focus, Telescope, theory};
 /// Screens that cannot resolve the scene, with every limit and what would do; a beam that no quadrature follows.
 pub(super) fn stages(
     file: &SceneFile,
+    instrument: &Instrument,
     target: Target,
     geometry: &Geometry,
     warnings: &mut Vec<String>,
@@ -31,11 +33,11 @@ pub(super) fn stages(
         .then(|| spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points));
     let layers = (target != Target::Efficiency && fixed.is_none()).then(|| profile_ranges_m(scene, geometry));
     let ranges_m: Vec<f64> = table.iter().chain(&layers).flatten().copied().collect();
-    let telescope = join::telescope(scene)?;
-    refuse_fresnel_numbers(file, &telescope, &ranges_m)?;
+    let telescope = &instrument.telescope;
+    refuse_fresnel_numbers(file, telescope, &ranges_m)?;
     // A table through turbulence has the free-space and the exact bistatic curves beside the Monte Carlo.
     let places = if turbulence(scene).is_some() { 16 } else { 0 };
-    let quadratures_s: f64 = ranges_m.iter().map(|&r| theory::quadrature_cost_s(&telescope, places, r)).sum();
+    let quadratures_s: f64 = ranges_m.iter().map(|&r| theory::quadrature_cost_s(telescope, places, r)).sum();
     let planned = |stage, reason: String, cost| PlannedStage { stage, reason, cost };
 
     let screens = match turbulence(scene) {
@@ -44,7 +46,7 @@ pub(super) fn stages(
             let drawn = layers.filter(|_| model == Model::MonteCarlo || drawn_turbulence(scene).is_some());
             let runs: Vec<Vec<f64>> = [table, drawn].into_iter().flatten().collect();
             match (runs.is_empty(), model) {
-                (false, _) => screens(file, &t, &runs, warnings)?,
+                (false, _) => screens(file, instrument, &t, &runs, warnings)?,
                 (true, Model::ExactBistatic) => {
                     planned(Stage::PhaseScreens, "the bistatic efficiency has an exact theory".into(), None)
                 }
@@ -105,6 +107,7 @@ fn refuse_fresnel_numbers(file: &SceneFile, telescope: &Telescope, ranges_m: &[f
 /// The phase screens of all runs, each for its own ranges.
 fn screens(
     file: &SceneFile,
+    instrument: &Instrument,
     t: &RefractiveTurbulence,
     runs: &[Vec<f64>],
     warnings: &mut Vec<String>,
@@ -112,7 +115,7 @@ fn screens(
     let mut cost = Cost::default();
     let mut what = Vec::new();
     let lists: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
-    let plans = join::screen_plans(&file.scene, t, &lists).map_err(|e| refused(file, t, e))?;
+    let plans = instrument.screen_plans(t, &lists).map_err(|e| refused(file, t, e))?;
     for (range_m, plan) in runs.iter().zip(plans) {
         cost.core_s += plan.realisation_cpu_s * t.realisations as f64;
         let memory_bytes = plan.memory_bytes_of(t.realisations, rayon::current_num_threads());

@@ -4,9 +4,9 @@
 //! here within moments. `cargo xtask fuzz-scenes` looks for scenes that pass and do not run.
 
 use super::{Plan, Stage, Target};
-use crate::progress::Silent;
+use crate::measure::progress::Silent;
 use crate::scene::{Flow, Scene, SceneFile, Turbulence};
-use crate::{Error, run, write};
+use crate::{Error, measure::run, measure::write};
 
 /// Longest forecast of a rehearsal, s.
 const LONGEST_S: f64 = 0.5;

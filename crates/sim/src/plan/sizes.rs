@@ -3,8 +3,8 @@
 //! All are floating-point numbers: products of what a scene may say go far beyond what an integer holds.
 
 use super::stage::Target;
-use crate::geometry::Geometry;
-use crate::profile::drawn_turbulence;
+use crate::measure::geometry::Geometry;
+use crate::measure::profile::drawn_turbulence;
 use crate::scene::{DetectorSignal, Flow, Method, Scene, SignalsOf, Weighting};
 
 /// Fields of a map of estimates.
@@ -55,7 +55,7 @@ impl Sizes {
         let window = e.window_samples as f64;
         let maps = matches!(target, Target::Run | Target::Map);
         let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
-        let radius_m = if e.method == Method::Periodogram { 0.0 } else { largest_radius_m(scene) };
+        let radius_m = if e.method == (Method::Periodogram {}) { 0.0 } else { largest_radius_m(scene) };
         let half_rad = if radius_m < middle_m { (radius_m / middle_m).asin() } else { std::f64::consts::PI };
         Self {
             lines,
@@ -97,8 +97,8 @@ fn numbers(scene: &Scene, parts: f64) -> f64 {
     let e = &scene.estimator;
     let window = e.window_samples as f64;
     match e.method {
-        Method::GradientLikelihood => 2.0 * e.gradients as f64 * window + 1.0,
-        _ if keeps_few_lags(scene) => parts * (e.order as f64 + 1.0),
+        Method::GradientLikelihood(g) => 2.0 * g.gradients as f64 * window + 1.0,
+        _ if keeps_few_lags(scene) => parts * (e.method.order().map_or(0.0, |model| model.order as f64) + 1.0),
         _ => parts * window,
     }
 }
@@ -106,8 +106,7 @@ fn numbers(scene: &Scene, parts: f64) -> f64 {
 /// Whether the statistic is the few lags that a model of the scene's order needs.
 pub(super) fn keeps_few_lags(scene: &Scene) -> bool {
     let e = &scene.estimator;
-    matches!(e.method, Method::Autoregressive | Method::AutoregressivePole | Method::Capon)
-        && e.weighting == Weighting::Rectangular
+    e.method.order().is_some() && e.weighting == Weighting::Rectangular
 }
 
 /// The largest radius of a region, m.

@@ -6,10 +6,10 @@
 use super::files::files;
 use super::sizes::{MAP_FIELDS, Sizes, is_calm, keeps_few_lags};
 use super::stage::{PlannedStage, Stage, Target, run, skip};
-use crate::geometry::Geometry;
-use crate::scan::records_at_once;
+use crate::measure::geometry::Geometry;
+use crate::measure::scan::records_at_once;
+use crate::measure::wind::SceneWind;
 use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene};
-use crate::wind::SceneWind;
 
 // Unit costs on one core, s.
 const ANALYTIC_WIND_S: f64 = 7e-8;
@@ -69,7 +69,7 @@ fn cross_plane(scene: &Scene, target: Target) -> PlannedStage {
     if is_calm(scene) {
         return skip(Stage::CrossPlane, "flow.kind is \"calm\"");
     }
-    let (ny, nz) = crate::plane::POINTS;
+    let (ny, nz) = crate::measure::plane::POINTS;
     let points = (ny * nz) as f64;
     // Places and velocities are at work; two components are kept.
     run(Stage::CrossPlane, format!("{ny} x {nz} points"), points * wind_point_s(scene), [points * 48.0, points * 16.0])
@@ -119,7 +119,7 @@ fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {
 fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let e = &scene.estimator;
     let region = match (&e.method, &e.radius) {
-        (Method::Periodogram, _) => "no region".to_owned(),
+        (Method::Periodogram {}, _) => "no region".to_owned(),
         (_, RegionRadius::Fixed {}) => format!("regions of {} m", e.radius_m),
         (_, RegionRadius::OfRange { .. }) => "regions whose radius depends on range".to_owned(),
         (_, RegionRadius::Target { standard_deviation_m_s, .. }) => {
@@ -153,10 +153,10 @@ fn window_s(scene: &Scene, n: &Sizes) -> f64 {
     let e = &scene.estimator;
     let transform_s = n.parts * TRANSFORM_POINT_S * 2.0 * n.window * (2.0 * n.window).log2();
     match e.method {
-        Method::GradientLikelihood => {
-            e.gradients as f64 * GRADIENT_PAIR_S * n.window * n.window + n.numbers * SUMMED_NUMBER_S
+        Method::GradientLikelihood(g) => {
+            g.gradients as f64 * GRADIENT_PAIR_S * n.window * n.window + n.numbers * SUMMED_NUMBER_S
         }
-        Method::Likelihood => transform_s * (2.0 + 0.5 * tapers(scene, n)),
+        Method::Likelihood(_) => transform_s * (2.0 + 0.5 * tapers(scene, n)),
         _ if keeps_few_lags(scene) => {
             let pairs = (2.0 * e.window_step_samples as f64).min(n.window);
             pairs * n.numbers * SLIDING_LAG_S
@@ -173,16 +173,16 @@ fn tapers(scene: &Scene, n: &Sizes) -> f64 {
 /// Time of the velocity at one point of the map, s.
 fn point_s(scene: &Scene, n: &Sizes) -> f64 {
     let e = &scene.estimator;
-    let order = e.order as f64;
+    let order = e.method.order().map_or(0.0, |model| model.order as f64);
     let lags = n.numbers.min(n.parts * n.window);
     let spectrum_s = n.frequencies * (lags * SPECTRUM_LAG_S + SPECTRUM_POINT_S);
     let estimate_s = match e.method {
-        Method::GradientLikelihood => 2.0 * e.gradients as f64 * spectrum_s,
-        Method::Autoregressive => spectrum_s + order * order * 1.5e-9,
-        Method::Capon => spectrum_s + order * order * 2e-9,
-        Method::AutoregressivePole => order * order * 7.5e-8,
-        Method::FirstMoment => 2.0 * spectrum_s,
-        Method::PulsePair => 1e-7,
+        Method::GradientLikelihood(g) => 2.0 * g.gradients as f64 * spectrum_s,
+        Method::Autoregressive(_) => spectrum_s + order * order * 1.5e-9,
+        Method::Capon(_) => spectrum_s + order * order * 2e-9,
+        Method::AutoregressivePole(_) => order * order * 7.5e-8,
+        Method::FirstMoment(_) => 2.0 * spectrum_s,
+        Method::PulsePair {} => 1e-7,
         _ => spectrum_s,
     };
     let pulses = scene.scan.pulses_per_line as f64;
@@ -197,10 +197,12 @@ fn point_s(scene: &Scene, n: &Sizes) -> f64 {
 /// of what comes of it, and that which it takes, bytes.
 fn planning(scene: &Scene, n: &Sizes) -> (f64, f64, f64) {
     let (squared, cubed) = (n.window.powi(2), n.window.powi(3));
-    let gradients = scene.estimator.gradients as f64;
     let (core_s, kept_matrices, matrices) = match scene.estimator.method {
-        Method::Likelihood => (3.5e-8 * cubed, 1.0, 8.0),
-        Method::GradientLikelihood => (2.5e-7 * cubed * gradients, 2.0 * gradients, 2.0 * gradients + 24.0),
+        Method::Likelihood(_) => (3.5e-8 * cubed, 1.0, 8.0),
+        Method::GradientLikelihood(g) => {
+            let gradients = g.gradients as f64;
+            (2.5e-7 * cubed * gradients, 2.0 * gradients, 2.0 * gradients + 24.0)
+        }
         _ => (0.0, 0.0, 0.0),
     };
     let (model_s, model_matrices) = match scene.estimator.radius {

@@ -3,7 +3,7 @@
 
 use super::figure::Figure;
 use super::png_file::paint;
-use crate::export::{OutputError, OutputResult, Provenance};
+use crate::io::{OutputError, OutputResult, Provenance};
 
 /// The figures as one animated PNG, each shown for `frame_s` \[s\], over and over.
 ///
@@ -46,7 +46,7 @@ pub fn apng(figures: &[Figure], frame_s: f64, provenance: &Provenance) -> Output
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::provenance::example;
+    use crate::io::provenance::example;
     use crate::plot::{Axis, CurvePlot, Series, Style};
 
     fn figure(slope: f64, width: f64) -> Figure {

@@ -1,7 +1,7 @@
 //! Axes: range from the data, round ticks, labels, and the place of a value on the paper. Check: ticks are multiples
 //! of 1, 2 or 5 times a power of ten inside the range; a logarithmic axis puts decades at equal distances.
 
-use crate::export::{OutputError, OutputResult};
+use crate::io::{OutputError, OutputResult};
 
 /// One axis of a plot, as the caller asks for it.
 #[derive(Debug, Clone, PartialEq)]

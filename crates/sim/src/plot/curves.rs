@@ -7,7 +7,8 @@ use super::drawing::{Frame, Pen, Shape};
 use super::font::Font;
 use super::frame::{BOTTOM, Decor, LEFT, top_room};
 use super::legend::{self, Entry};
-use crate::export::{OutputResult, same_length};
+use super::marker::marker;
+use crate::io::{OutputResult, same_length};
 
 const RIGHT: f64 = 24.0;
 const LINE_WIDTH: f64 = 2.2;
@@ -286,22 +287,6 @@ fn along(points: &[(f64, f64)], joined: bool) -> Vec<(f64, f64)> {
         }
     }
     out
-}
-
-/// Corners of the marker of a series: its shape differs as well as its colour.
-pub(crate) fn marker(at: (f64, f64), index: usize) -> Vec<(f64, f64)> {
-    let (corners, radius, turn): (u32, f64, f64) = match index % 4 {
-        0 => (24, 4.6, 0.0),
-        1 => (4, 5.6, 0.125),
-        2 => (3, 6.2, -0.25),
-        _ => (4, 5.8, 0.0),
-    };
-    (0..corners)
-        .map(|i| {
-            let angle = std::f64::consts::TAU * (f64::from(i) / f64::from(corners) + turn);
-            (at.0 + radius * angle.cos(), at.1 + radius * angle.sin())
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::frame::INK;
 use super::isosurface::IsosurfacePlot;
 use super::map::MapPlot;
 use super::{png_file, svg};
-use crate::export::{OutputError, OutputResult, Provenance};
+use crate::io::{OutputError, OutputResult, Provenance};
 
 const TITLE_ROOM: f64 = 40.0;
 const MARGIN: f64 = 10.0;
@@ -45,7 +45,7 @@ impl From<MapPlot> for Panel {
 /// Panels, filled row by row.
 ///
 /// ```
-/// use wakescope_sim::export::Provenance;
+/// use wakescope_sim::io::Provenance;
 /// use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 /// let origin = Provenance { program: "wakescope".into(), scene_toml: String::new(), scene_hash: "0".into(), seed: 1 };
 /// let curve = Series::new("pair", Style::Line, (0..50).map(|i| (f64::from(i), f64::from(i).sin())));
@@ -53,7 +53,7 @@ impl From<MapPlot> for Panel {
 /// let figure = Figure::stacked([plot]);
 /// assert!(figure.svg(&origin)?.starts_with("<svg"));
 /// assert_eq!(figure.png(&origin)?[1..4], *b"PNG");
-/// # Ok::<(), wakescope_sim::export::OutputError>(())
+/// # Ok::<(), wakescope_sim::io::OutputError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
@@ -160,8 +160,8 @@ impl Figure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::provenance::example;
-    use crate::export::samples;
+    use crate::io::provenance::example;
+    use crate::io::samples;
     use crate::plot::{Axis, Series, Style};
 
     fn figure() -> Figure {

@@ -2,7 +2,7 @@
 //! Check: widths add up, and a raised part is narrower than the same letters on the line.
 
 use super::drawing::{Text, runs};
-use crate::export::{OutputError, OutputResult};
+use crate::io::{OutputError, OutputResult};
 use tiny_skia::{Path, PathBuilder, Transform};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 

@@ -2,7 +2,7 @@
 //! Check: every text is escaped, the page names nothing outside itself, verdicts are marked by colour and by word.
 
 use super::svg::escape;
-use crate::export::{OutputError, OutputResult, same_length};
+use crate::io::{OutputError, OutputResult, same_length};
 
 /// A table of the page.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -6,7 +6,7 @@ use super::drawing::{Anchor, Frame, Pen, Raster, Shape};
 use super::font::Font;
 use super::frame::{TICK_SIZE, label, top_room};
 use super::volume::Volume;
-use crate::export::{OutputError, OutputResult};
+use crate::io::{OutputError, OutputResult};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -213,7 +213,7 @@ mod tests {
     use super::super::volume::tests::cone;
     use super::super::{Figure, Panel};
     use super::*;
-    use crate::export::provenance::example;
+    use crate::io::provenance::example;
 
     fn plot(surfaces: &[(f64, Rgb, f64)]) -> IsosurfacePlot {
         let surface =

@@ -3,10 +3,10 @@
 //! Check: tests fill all places but one and find the legend there.
 
 use super::colour::Rgb;
-use super::curves::marker;
 use super::drawing::{Anchor, Frame, Pen, Shape};
 use super::font::Font;
 use super::frame::{GRID, TICK_SIZE, label};
+use super::marker::marker;
 
 const SAMPLE: f64 = 34.0;
 const LINE: f64 = 21.0;

@@ -7,7 +7,7 @@ use super::drawing::{Anchor, Frame, Pen, Raster, Shape};
 use super::font::Font;
 use super::frame::{BOTTOM, Decor, INK, LEFT, TICK_SIZE, label, tick_mark, top_room, upward};
 use super::polar::{MapCells, PlaneCells, PolarCells};
-use crate::export::{OutputError, OutputResult, Unit, VelocityMap};
+use crate::io::{OutputError, OutputResult, Unit, VelocityMap};
 
 /// Room to the right of the box, for the colour bar and its label.
 const RIGHT: f64 = 118.0;
@@ -250,7 +250,7 @@ fn bar_label(long_name: &str, unit: Unit) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::samples;
+    use crate::io::samples;
 
     #[test]
     fn velocities_get_symmetric_colours_and_errors_do_not() {

@@ -26,6 +26,7 @@ pub mod html;
 pub mod isosurface;
 mod legend;
 pub mod map;
+mod marker;
 mod png_file;
 pub mod polar;
 mod svg;

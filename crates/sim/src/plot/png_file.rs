@@ -3,7 +3,7 @@
 
 use super::drawing::{Anchor, Drawing, Frame, Pen, Raster, Shape, Text};
 use super::font::Font;
-use crate::export::{OutputError, OutputResult, Provenance};
+use crate::io::{OutputError, OutputResult, Provenance};
 use tiny_skia::{
     Color, FillRule, FilterQuality, IntSize, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, PixmapPaint, Stroke,
     StrokeDash, Transform,
@@ -162,7 +162,7 @@ pub(crate) fn encode(raster: &Raster, provenance: Option<&Provenance>) -> Output
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::provenance::example;
+    use crate::io::provenance::example;
 
     fn pixel(raster: &Raster, x: f64, y: f64) -> [u8; 3] {
         let (i, j) = ((x * SCALE) as u32, (y * SCALE) as u32);

@@ -4,7 +4,7 @@
 
 use super::colour::ColourMap;
 use super::drawing::Raster;
-use crate::export::VelocityMap;
+use crate::io::VelocityMap;
 
 /// Cells of one sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -173,7 +173,7 @@ fn cell(edges: &[f64], value: f64) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::samples;
+    use crate::io::samples;
     use crate::plot::colour::MISSING;
 
     #[test]

@@ -4,7 +4,7 @@
 
 use super::drawing::{Anchor, Drawing, Frame, Pen, Raster, Shape, Text, runs};
 use super::png_file::encode;
-use crate::export::{OutputResult, Provenance};
+use crate::io::{OutputResult, Provenance};
 use std::fmt::Write as _;
 
 /// The compiled-in font of the PNG files first, then what systems have.
@@ -166,7 +166,7 @@ fn base64(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::provenance::example;
+    use crate::io::provenance::example;
 
     #[test]
     fn base64_matches_the_vectors_of_rfc_4648() {

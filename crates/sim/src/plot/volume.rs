@@ -4,7 +4,7 @@
 //! bisection. Rays need no list of triangles, and the surfaces are those of the interpolant itself.
 //! Check: the interpolant is exact for products of lines; a sphere is met at its radius with its own normal.
 
-use crate::export::{OutputError, OutputResult};
+use crate::io::{OutputError, OutputResult};
 
 /// A field on a rectilinear mesh.
 #[derive(Debug, Clone, PartialEq)]

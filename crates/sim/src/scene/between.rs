@@ -1,13 +1,18 @@
 //! Limits between the keys of a scene. Each blames a key that the file states, not the default beside it.
 
-use super::check::Checker;
 use super::{Flow, Outside, PulseShape, Scene, Turbulence};
+use crate::keys::{Checker, Side};
 
-/// One side of a limit between keys: the key, its value, what is allowed beside the others.
-pub(super) type Side<'a> = (&'a str, String, String);
-
-pub(super) fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
+fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
     (key, format!("{value:?}"), allowed)
+}
+
+/// Two lengths, m, of which the first is `words[0]` the second, and the second `words[1]` the first.
+fn apart(c: &mut Checker<'_>, keys: [&str; 2], values_m: [f64; 2], words: [&str; 2]) -> bool {
+    let [a_m, b_m] = values_m;
+    let ok = if words[0] == "above" { a_m > b_m } else { a_m < b_m };
+    let allowed = |i: usize| format!("{} {}, {} m", words[i], keys[1 - i], values_m[1 - i]);
+    c.between(ok, &[side(keys[0], a_m, allowed(0)), side(keys[1], b_m, allowed(1))])
 }
 
 impl Scene {
@@ -21,52 +26,17 @@ impl Scene {
             self.check_hpl(c);
         }
         let o = &self.outputs;
-        let (first_m, last_m) = (o.profile_range_min_m, o.profile_range_max_m);
-        c.between(
-            last_m > first_m,
-            &[
-                side("outputs.profile_range_max_m", last_m, format!("above outputs.profile_range_min_m, {first_m} m")),
-                side("outputs.profile_range_min_m", first_m, format!("below outputs.profile_range_max_m, {last_m} m")),
-            ],
-        );
+        let ends = [o.profile_range_max_m, o.profile_range_min_m];
+        apart(c, ["outputs.profile_range_max_m", "outputs.profile_range_min_m"], ends, ["above", "below"]);
     }
 
     fn check_instrument_between(&self, c: &mut Checker<'_>) {
         let t = &self.telescope;
-        let (inner_m, outer_m) = (t.obscuration_radius_m, t.aperture_radius_m);
-        c.between(
-            inner_m < outer_m,
-            &[
-                side(
-                    "telescope.obscuration_radius_m",
-                    inner_m,
-                    format!("below telescope.aperture_radius_m, {outer_m} m"),
-                ),
-                side(
-                    "telescope.aperture_radius_m",
-                    outer_m,
-                    format!("above telescope.obscuration_radius_m, {inner_m} m"),
-                ),
-            ],
-        );
+        let radii = [t.obscuration_radius_m, t.aperture_radius_m];
+        apart(c, ["telescope.obscuration_radius_m", "telescope.aperture_radius_m"], radii, ["below", "above"]);
         if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
-            const SECTION: &str = "atmosphere.turbulence";
-            let (inner_m, outer_m) = (t.inner_scale_m, t.outer_scale_m);
-            c.between(
-                outer_m > inner_m,
-                &[
-                    side(
-                        "atmosphere.turbulence.outer_scale_m",
-                        outer_m,
-                        format!("above {SECTION}.inner_scale_m, {inner_m} m"),
-                    ),
-                    side(
-                        "atmosphere.turbulence.inner_scale_m",
-                        inner_m,
-                        format!("below {SECTION}.outer_scale_m, {outer_m} m"),
-                    ),
-                ],
-            );
+            let keys = ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.inner_scale_m"];
+            apart(c, keys, [t.outer_scale_m, t.inner_scale_m], ["above", "below"]);
         }
         if let Flow::VortexPair(p) = &self.flow {
             let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
@@ -153,30 +123,24 @@ impl Scene {
             first_m,
             format!("above {reach_m:.3} m, half the length of the pulse in the air"),
         )];
-        match self.pulse.shape {
+        match &self.pulse.shape {
             PulseShape::Sampled(_) => {
                 let allowed = format!(
                     "that ends so early that half its length in the air, {reach_m:.3} m, is below scan.range_min_m"
                 );
                 sides.push(("pulse.shape", String::new(), format!("a pulse {allowed}, {first_m} m")));
             }
-            PulseShape::Gaussian {} => {
+            PulseShape::Gaussian(shape) => {
                 // A little less, so that rounding it is safe.
-                let longest_s = self.pulse.duration_s * first_m / reach_m * (1.0 - 1e-4);
+                let longest_s = shape.duration_s * first_m / reach_m * (1.0 - 1e-4);
                 let allowed = format!(
                     "below {longest_s:.4e} s, so that half the length of the pulse in the air is below scan.range_min_m, {first_m} m"
                 );
-                sides.push(side("pulse.duration_s", self.pulse.duration_s, allowed));
+                sides.push(side("pulse.shape.duration_s", shape.duration_s, allowed));
             }
         }
         c.between(first_m > reach_m, &sides);
-        let ordered = c.between(
-            last_m > first_m,
-            &[
-                side("scan.range_max_m", last_m, format!("above scan.range_min_m, {first_m} m")),
-                side("scan.range_min_m", first_m, format!("below scan.range_max_m, {last_m} m")),
-            ],
-        );
+        let ordered = apart(c, ["scan.range_max_m", "scan.range_min_m"], [last_m, first_m], ["above", "below"]);
         if ordered {
             self.check_record(c);
         }
@@ -242,7 +206,10 @@ mod tests {
             ),
             ("[detector]\nbandwidth_hz = 95e6\n", "detector.bandwidth_hz = 95e6 is not allowed: below 9e7 Hz"),
             ("[scan]\nrange_max_m = 300\n", "s.toml:2: scan.range_max_m = 300 is not allowed: at least 317.774 m"),
-            ("[pulse]\nduration_s = 1.2e-6\n", "s.toml:2: pulse.duration_s = 1.2e-6 is not allowed: below 8.36"),
+            (
+                "[pulse.shape]\nduration_s = 1.2e-6\n",
+                "s.toml:2: pulse.shape.duration_s = 1.2e-6 is not allowed: below 8.36",
+            ),
             ("[flow]\nspacing_m = 3\n", "flow.spacing_m = 3 is not allowed: above twice flow.core_radius_m, 4.7 m"),
             (
                 "[telescope]\naperture_radius_m = 0.01\nobscuration_radius_m = 0.02\n",
@@ -254,8 +221,8 @@ mod tests {
             ),
             ("[outputs]\nprofile_range_min_m = 4000\n", "outputs.profile_range_min_m = 4000 is not allowed: below"),
             (
-                "[estimator]\nmethod = \"capon\"\nwindow_samples = 10\n",
-                "estimator.window_samples = 10 is not allowed: above estimator.order, 16",
+                "[estimator]\nmethod.kind = \"capon\"\nwindow_samples = 10\n",
+                "estimator.window_samples = 10 is not allowed: above estimator.method.order, 16",
             ),
         ] {
             let m = message(text);
@@ -266,7 +233,7 @@ mod tests {
     #[test]
     fn what_a_limit_names_is_accepted() {
         let good = |text: &str| SceneFile::parse(text, Path::new("s.toml")).map(|_| ()).map_err(|e| e.to_string());
-        assert_eq!(good("[pulse]\nduration_s = 8.36e-7\n"), Ok(()));
+        assert_eq!(good("[pulse.shape]\nduration_s = 8.36e-7\n"), Ok(()));
         assert_eq!(good("[scan]\nrange_max_m = 317.774\n"), Ok(()));
         assert_eq!(good("[scan]\nrange_min_m = 482.226\n"), Ok(()));
         assert_eq!(good("[detector]\nsampling_hz = 210000001\n"), Ok(()));

@@ -3,75 +3,12 @@
 //! [`Scene::problems`] collects all violations, so that one run of `wakescope check` shows them
 //! all. Each names the key, the value and what is allowed.
 
-use super::between::Side;
 use super::check_estimator::check_estimator;
 use super::{
     Digitiser, EfficiencyOfPulse, FORMAT, Flow, PulseShape, Scan, Scene, SnrReference, Turbulence, VortexMotion,
 };
+use crate::keys::{Checker, Problem};
 use std::f64::consts::FRAC_PI_2;
-use std::fmt::Display;
-
-/// A value that a scene may not have.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
-    /// Path of the key, `section.key`.
-    pub key: String,
-    /// The value found.
-    pub value: String,
-    /// What is allowed, with the unit.
-    pub allowed: String,
-}
-
-impl Problem {
-    /// The value of a key that is not there.
-    pub const ABSENT: &str = "absent";
-}
-
-impl Display for Problem {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.value.as_str() {
-            Self::ABSENT => write!(f, "{} is missing: {}", self.key, self.allowed),
-            // A table is not repeated.
-            "" => write!(f, "{} is not allowed: {}", self.key, self.allowed),
-            value => write!(f, "{} = {value} is not allowed: {}", self.key, self.allowed),
-        }
-    }
-}
-
-/// Collects what is wrong; `is_stated` says which keys the file states.
-pub(super) struct Checker<'s> {
-    found: Vec<Problem>,
-    is_stated: &'s dyn Fn(&str) -> bool,
-}
-
-impl Checker<'_> {
-    pub(super) fn require(&mut self, ok: bool, key: &str, value: impl Display, allowed: impl Into<String>) -> bool {
-        if !ok {
-            self.found.push(Problem { key: key.into(), value: value.to_string(), allowed: allowed.into() });
-        }
-        ok
-    }
-
-    /// A limit between keys: the first that the file states has to give way, or else the first.
-    pub(super) fn between(&mut self, ok: bool, sides: &[Side<'_>]) -> bool {
-        let blamed = sides.iter().find(|(key, ..)| (self.is_stated)(key)).or(sides.first());
-        if let Some((key, value, allowed)) = blamed.filter(|_| !ok) {
-            self.found.push(Problem { key: (*key).into(), value: value.clone(), allowed: allowed.clone() });
-        }
-        ok
-    }
-
-    /// Finite and in `[low, high]`.
-    pub(super) fn within(&mut self, key: &str, value: f64, low: f64, high: f64, unit: &str) -> bool {
-        let ok = value >= low && value <= high && value.is_finite();
-        // `{:?}` writes 1e-9 where `{}` would write all the zeros.
-        self.require(ok, key, format!("{value:?}"), format!("a number from {low:?} to {high:?} {unit}").trim_end())
-    }
-
-    pub(super) fn count(&mut self, key: &str, value: usize, low: usize, high: usize) -> bool {
-        self.require((low..=high).contains(&value), key, value, format!("a whole number from {low} to {high}"))
-    }
-}
 
 impl Scene {
     /// Everything in this scene that cannot be simulated; empty for a good scene.
@@ -81,7 +18,7 @@ impl Scene {
 
     /// The same for a file that states only some keys: limits between keys blame those.
     pub(super) fn problems_where(&self, is_stated: &dyn Fn(&str) -> bool) -> Vec<Problem> {
-        let mut c = Checker { found: Vec::new(), is_stated };
+        let mut c = Checker::new(is_stated);
         c.require(self.format == FORMAT, "format", self.format, format!("{FORMAT}, the format of this program"));
         // TOML integers are signed 64-bit: a larger seed could not be written back.
         c.require(self.seed <= i64::MAX as u64, "seed", self.seed, format!("a whole number from 0 to {}", i64::MAX));
@@ -92,24 +29,28 @@ impl Scene {
         self.check_outputs(&mut c);
         self.check_site(&mut c);
         // Limits between keys make sense only once each key does.
-        if c.found.is_empty() {
+        if c.is_good() {
             self.check_between(&mut c);
         }
-        c.found
+        c.into_problems()
     }
 
     fn check_instrument(&self, c: &mut Checker<'_>) {
         c.within("laser.wavelength_m", self.laser.wavelength_m, 1e-7, 2e-5, "m");
         c.within("laser.pulse_repetition_hz", self.laser.pulse_repetition_hz, 1e-3, 1e6, "Hz");
         c.within("pulse.energy_j", self.pulse.energy_j, 1e-12, 1e3, "J");
-        c.within("pulse.duration_s", self.pulse.duration_s, 1e-9, 1e-4, "s");
         c.within("pulse.chirp_hz_s", self.pulse.chirp_hz_s, -1e18, 1e18, "Hz/s");
-        if let PulseShape::Sampled(shape) = &self.pulse.shape {
-            let lists = [("pulse.shape.time_s", &shape.time_s), ("pulse.shape.power", &shape.power)];
-            let phase = ("pulse.shape.phase_rad", &shape.phase_rad);
-            let lists = lists.into_iter().chain((!phase.1.is_empty()).then_some(phase));
-            let counts: Vec<(&str, usize)> = lists.map(|(key, list)| (key, list.len())).collect();
-            check_lengths(&counts, "pulse.shape", c);
+        match &self.pulse.shape {
+            PulseShape::Gaussian(shape) => {
+                c.within("pulse.shape.duration_s", shape.duration_s, 1e-9, 1e-4, "s");
+            }
+            PulseShape::Sampled(shape) => {
+                let lists = [("pulse.shape.time_s", &shape.time_s), ("pulse.shape.power", &shape.power)];
+                let phase = ("pulse.shape.phase_rad", &shape.phase_rad);
+                let lists = lists.into_iter().chain((!phase.1.is_empty()).then_some(phase));
+                let counts: Vec<(&str, usize)> = lists.map(|(key, list)| (key, list.len())).collect();
+                check_lengths(&counts, "pulse.shape", c);
+            }
         }
         let d = &self.detector;
         c.within("detector.bandwidth_hz", d.bandwidth_hz, 1e3, 1e11, "Hz");
@@ -140,7 +81,7 @@ impl Scene {
             c.require(
                 t.efficiency == EfficiencyOfPulse::Mean || !matches!(d.snr, SnrReference::Fixed { .. }),
                 "atmosphere.turbulence.efficiency",
-                "\"realisation\"",
+                "realisation",
                 "\"mean\" with detector.snr.reference = \"fixed\", which asks for no efficiency",
             );
         }
@@ -156,16 +97,16 @@ impl Scene {
             check_lengths(&counts, "atmosphere.profile", c);
         }
         // What is a profile of the air, or a sampled pulse, the simulation of signals knows best.
-        if c.found.is_empty()
-            && let Err(e) = crate::join::medium(self)
+        if c.is_good()
+            && let Err(e) = crate::measure::instrument::medium(&self.atmosphere)
         {
-            c.require(false, "atmosphere.profile", "", e.to_string());
+            c.refuse("atmosphere.profile", "", e.to_string());
         }
-        if c.found.is_empty()
+        if c.is_good()
             && matches!(self.pulse.shape, PulseShape::Sampled(_))
-            && let Err(e) = crate::join::pulse(self)
+            && let Err(e) = crate::measure::instrument::pulse(&self.pulse)
         {
-            c.require(false, "pulse.shape", "", e.to_string());
+            c.refuse("pulse.shape", "", e.to_string());
         }
     }
 
@@ -226,16 +167,30 @@ impl Scene {
 
     /// The 1/e half width sigma of |f|^2 in (7), s; for a sampled pulse that of the Gaussian with the same spread.
     pub fn pulse_sigma_s(&self) -> f64 {
-        match (&self.pulse.shape, self.pulse.definition) {
-            (PulseShape::Sampled(_), _) => crate::join::pulse(self).map_or(f64::NAN, |pulse| pulse.sigma_s()),
-            (_, super::PulseDefinition::Fwhm) => self.pulse.duration_s / (2.0 * std::f64::consts::LN_2.sqrt()),
-            (_, super::PulseDefinition::OneOverEHalfWidth) => self.pulse.duration_s,
+        match &self.pulse.shape {
+            PulseShape::Sampled(_) => {
+                crate::measure::instrument::pulse(&self.pulse).map_or(f64::NAN, |pulse| pulse.sigma_s())
+            }
+            PulseShape::Gaussian(shape) => match shape.definition {
+                super::PulseDefinition::Fwhm => shape.duration_s / (2.0 * std::f64::consts::LN_2.sqrt()),
+                super::PulseDefinition::OneOverEHalfWidth => shape.duration_s,
+            },
+        }
+    }
+
+    /// The duration of the pulse as the scene states it, s; of a sampled one the full width at half maximum of the Gaussian
+    /// with the same spread.
+    pub fn pulse_width_s(&self) -> f64 {
+        match &self.pulse.shape {
+            PulseShape::Gaussian(shape) => shape.duration_s,
+            PulseShape::Sampled(_) => 2.0 * std::f64::consts::LN_2.sqrt() * self.pulse_sigma_s(),
         }
     }
 
     /// How far before the range of a sample air contributes to it, c/2 times the last time of the pulse, m.
     pub fn pulse_reach_m(&self) -> f64 {
-        crate::join::pulse(self).map_or(f64::NAN, |pulse| 0.5 * crate::SPEED_OF_LIGHT_M_S * pulse.support_s().1)
+        crate::measure::instrument::pulse(&self.pulse)
+            .map_or(f64::NAN, |pulse| 0.5 * crate::SPEED_OF_LIGHT_M_S * pulse.support_s().1)
     }
 }
 
@@ -244,18 +199,18 @@ fn check_lengths(counts: &[(&str, usize)], table: &str, c: &mut Checker<'_>) {
     let Some((first, count)) = counts.first() else { return };
     if let Some((key, other)) = counts.iter().find(|(_, other)| other != count) {
         let allowed = format!("as many values as {first} has, {count}");
-        c.require(false, key, format!("a list of {other}"), allowed);
+        c.refuse(key, &format!("a list of {other}"), allowed);
     }
-    c.require(counts.iter().any(|(_, n)| *n > 0), table, "", "a table with at least one value in each list");
+    if counts.iter().all(|(_, n)| *n == 0) {
+        c.refuse(table, "", "a table with at least one value in each list");
+    }
 }
 
 fn check_simulated(flow: &super::SimulatedFlow, c: &mut Checker<'_>) {
-    c.require(
-        !flow.planes.is_empty(),
-        "flow.planes",
-        Problem::ABSENT,
-        "a file of cross-planes, or the beginning of the names of numbered ones",
-    );
+    if flow.planes.is_empty() {
+        let allowed = "a file of cross-planes, or the beginning of the names of numbered ones";
+        c.refuse("flow.planes", Problem::ABSENT, allowed);
+    }
     if let Some(time_s) = flow.time_s {
         c.within("flow.time_s", time_s, -1e9, 1e9, "s");
         c.require(flow.age_tau.is_none(), "flow.time_s", time_s, "absent beside flow.age_tau");
@@ -300,7 +255,7 @@ mod tests {
     #[test]
     fn impossible_values_are_named() {
         assert_eq!(keys(|s| s.telescope.beam_radius_m = -0.03), ["telescope.beam_radius_m"]);
-        assert_eq!(keys(|s| s.pulse.duration_s = f64::NAN), ["pulse.duration_s"]);
+        assert_eq!(keys(|s| s.pulse.shape = PulseShape::gaussian(f64::NAN)), ["pulse.shape.duration_s"]);
         assert_eq!(keys(|s| s.telescope.focus_m = 0.0), ["telescope.focus_m"]);
         assert_eq!(keys(|s| s.scan.elevation_min_rad = -0.01), ["scan.elevation_min_rad"]);
         assert_eq!(keys(|s| s.scan.range_max_m = 281.0), ["estimator.window_samples"]);

@@ -2,8 +2,8 @@
 //! Check: impossible values are named with what is allowed.
 
 use super::Scene;
-use super::check::Checker;
-use crate::export::UtcTime;
+use crate::io::UtcTime;
+use crate::keys::Checker;
 
 impl Scene {
     pub(super) fn check_outputs(&self, c: &mut Checker<'_>) {
@@ -19,13 +19,13 @@ impl Scene {
     pub(super) fn check_site(&self, c: &mut Checker<'_>) {
         let site = &self.site;
         let fits = site.name.chars().count() <= 80 && !site.name.chars().any(char::is_control);
-        c.require(fits, "site.name", format!("{:?}", site.name), "one line of at most 80 characters");
+        c.require(fits, "site.name", &site.name, "one line of at most 80 characters");
         c.within("site.latitude_deg", site.latitude_deg, -90.0, 90.0, "degrees north");
         c.within("site.longitude_deg", site.longitude_deg, -180.0, 180.0, "degrees east");
         c.within("site.altitude_m", site.altitude_m, -1e3, 1e4, "m above the sea");
         let is_date = UtcTime::parse(&site.start_utc).is_some();
         let allowed = format!("a date from 1900 to 2199 like \"{}\"", UtcTime::FORM);
-        c.require(is_date, "site.start_utc", format!("{:?}", site.start_utc), allowed);
+        c.require(is_date, "site.start_utc", &site.start_utc, allowed);
     }
 
     /// A HALO raw file counts gates from the lidar and knows their length alone.

@@ -1,12 +1,10 @@
-//! From signals to velocities: the estimator of a scene and its knobs.
+//! From signals to velocities: the estimator of a scene, its method with its own keys, and what all methods share.
 
 use serde::{Deserialize, Serialize};
 
 section! {
     /// From signals to velocities.
     Estimator {
-        /// Which estimator.
-        method: Method = Method::PeriodogramAccumulation,
         /// Samples N of a window.
         window_samples: usize = 64,
         /// Weighting h of the window, (29).
@@ -21,57 +19,116 @@ section! {
         refinement: Refinement = Refinement::Parabola,
         /// Radius of the circular region of accumulation, m.
         radius_m: f64 = 2.0,
-        /// Order of autoregressive models and of Capon's filter; the largest one if it is chosen.
-        order: usize = 16,
-        /// How the order is found.
-        order_choice: OrderChoice = OrderChoice::Fixed,
         /// Which correlogram the estimator is given.
         correlogram: CorrelogramForm = CorrelogramForm::Biased,
-        /// Lag at which the window of `lag_window` falls to 0.
-        lag_window_lags: usize = 16,
-        /// Half width of the part of the spectrum that `first_moment` averages, in its standard deviations.
-        moment_reach: f64 = 3.5,
-        /// Signal-to-noise ratio for which the likelihoods are planned, dB; the scene's own if absent.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        likelihood_snr_db: Option<f64> = None,
-        /// Gradients of `gradient_likelihood` reach from minus to plus this, 1/s.
-        gradient_max_per_s: f64 = 0.6,
-        /// How many there are; odd, so that 0 is among them.
-        gradients: usize = 7,
         /// Whether the lines of a region are shifted to the velocity of its centre before they are added, by a first map.
         follow_wind: bool = false,
         /// Probability that noise alone passes for a signal at a gate; estimates whose peak is not above what noise reaches
         /// that often are flagged. 0: no test.
         false_alarm: f64 = 0.01,
+        /// Which estimator, with the keys that are its own.
+        method: Method = Method::PeriodogramAccumulation {},
         /// How the radius depends on range.
         radius: RegionRadius = RegionRadius::Fixed {},
     }
 }
 
-/// Which estimator makes the map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+/// Which estimator makes the map, with the keys that only it has.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Method {
     /// Mean periodogram of the pulses of one line at one range, no region.
-    Periodogram,
+    Periodogram {},
     /// PA: mean periodogram of all windows of the region (Table 3).
-    PeriodogramAccumulation,
+    PeriodogramAccumulation {},
     /// CA: peak of the autoregressive spectrum of the mean correlogram (Table 3).
-    Autoregressive,
+    Autoregressive(ModelOrder),
     /// Pole of the same model that is nearest to the unit circle.
-    AutoregressivePole,
+    AutoregressivePole(ModelOrder),
     /// Peak of Capon's spectrum of the mean correlogram.
-    Capon,
+    Capon(ModelOrder),
     /// Peak of the transform of the mean correlogram times a Hann window of lags.
-    LagWindow,
+    LagWindow(LagWindow),
     /// Phase of the first lag.
-    PulsePair,
+    PulsePair {},
     /// Mean of the main peak of the spectrum.
-    FirstMoment,
+    FirstMoment(FirstMoment),
     /// Maximum likelihood of the velocity for the known pulse, by tapers.
-    Likelihood,
+    Likelihood(Likelihood),
     /// Maximum likelihood of velocity and gradient along the line of sight.
-    GradientLikelihood,
+    GradientLikelihood(GradientLikelihood),
+}
+
+section! {
+    /// The order of autoregressive models and of Capon's filter.
+    #[derive(Copy)]
+    ModelOrder {
+        /// The order; the largest one if it is chosen.
+        order: usize = 16,
+        /// How the order is found.
+        order_choice: OrderChoice = OrderChoice::Fixed,
+    }
+}
+
+section! {
+    /// The window of lags.
+    #[derive(Copy)]
+    LagWindow {
+        /// Lag at which it falls to 0.
+        lag_window_lags: usize = 16,
+    }
+}
+
+section! {
+    /// The first moment of a peak.
+    #[derive(Copy)]
+    FirstMoment {
+        /// Half width of the part of the spectrum that is averaged, in its standard deviations.
+        moment_reach: f64 = 3.5,
+    }
+}
+
+section! {
+    /// The likelihood of the velocity.
+    #[derive(Copy)]
+    Likelihood {
+        /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        likelihood_snr_db: Option<f64> = None,
+    }
+}
+
+section! {
+    /// The likelihood of velocity and gradient.
+    #[derive(Copy)]
+    GradientLikelihood {
+        /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        likelihood_snr_db: Option<f64> = None,
+        /// Gradients reach from minus to plus this, 1/s.
+        gradient_max_per_s: f64 = 0.6,
+        /// How many there are; odd, so that 0 is among them.
+        gradients: usize = 7,
+    }
+}
+
+impl Method {
+    /// The order of the model that the method fits, if it fits one.
+    pub fn order(&self) -> Option<ModelOrder> {
+        match self {
+            Self::Autoregressive(model) | Self::AutoregressivePole(model) | Self::Capon(model) => Some(*model),
+            _ => None,
+        }
+    }
+
+    /// Signal-to-noise ratio for which a likelihood is planned, dB, if the scene states one.
+    pub fn likelihood_snr_db(&self) -> Option<f64> {
+        match self {
+            Self::Likelihood(Likelihood { likelihood_snr_db })
+            | Self::GradientLikelihood(GradientLikelihood { likelihood_snr_db, .. }) => *likelihood_snr_db,
+            _ => None,
+        }
+    }
 }
 
 /// How the order of a model is found.

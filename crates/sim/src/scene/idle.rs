@@ -3,7 +3,7 @@
 //! They are refused, so that nobody turns a knob that turns nothing. Keys that stand in the file of `wakescope init` may stay
 //! there with their default.
 
-use super::{Method, OuterScaleWavenumber, PulseShape, RefractiveTurbulence, RegionRadius, Scene};
+use super::{Method, OuterScaleWavenumber, RefractiveTurbulence, RegionRadius, Scene};
 use super::{Problem, ScreenSampling, SpectrumKind, Turbulence};
 use crate::keys::Document;
 
@@ -12,51 +12,28 @@ struct Idle {
     key: &'static str,
     /// What the key is for, and what the scene has instead.
     purpose: String,
-    /// Whether even its default is refused.
-    even_default: bool,
 }
-
-/// Keys that belong to methods, each with these methods.
-const OF_METHODS: [(&str, &[Method]); 7] = [
-    ("estimator.order", &[Method::Autoregressive, Method::AutoregressivePole, Method::Capon]),
-    ("estimator.order_choice", &[Method::Autoregressive, Method::AutoregressivePole, Method::Capon]),
-    ("estimator.lag_window_lags", &[Method::LagWindow]),
-    ("estimator.moment_reach", &[Method::FirstMoment]),
-    ("estimator.likelihood_snr_db", &[Method::Likelihood, Method::GradientLikelihood]),
-    ("estimator.gradient_max_per_s", &[Method::GradientLikelihood]),
-    ("estimator.gradients", &[Method::GradientLikelihood]),
-];
 
 /// Keys of a scene without use.
 fn idle(scene: &Scene) -> Vec<Idle> {
-    let method = name(&scene.estimator.method);
-    let mut found: Vec<Idle> = OF_METHODS
-        .iter()
-        .filter(|(_, methods)| !methods.contains(&scene.estimator.method))
-        .map(|(key, methods)| {
-            let needed: Vec<String> = methods.iter().map(name).collect();
-            let needed = needed.join(" or ");
-            let purpose = format!("this key is for estimator.method = {needed}, and estimator.method is {method}");
-            Idle { key, purpose, even_default: true }
-        })
-        .collect();
+    let method = &scene.estimator.method;
+    let kind = toml::Value::try_from(method).ok().and_then(|table| table.get("kind").map(ToString::to_string));
+    let kind = format!("estimator.method.kind = {}", kind.unwrap_or_default());
+    let mut found = Vec::new();
     let mut unused = |is_idle: bool, keys: &[&'static str], purpose: String| {
         if is_idle {
-            let idle = |key: &&'static str| Idle { key, purpose: purpose.clone(), even_default: false };
+            let idle = |key: &&'static str| Idle { key, purpose: purpose.clone() };
             found.extend(keys.iter().map(idle));
         }
     };
-    let without_peak = matches!(scene.estimator.method, Method::PulsePair | Method::FirstMoment);
-    unused(without_peak, &["estimator.refinement"], format!("estimator.method = {method} refines no peak"));
-    let without_spectrum = scene.estimator.method == Method::PulsePair;
-    unused(without_spectrum, &["estimator.padded_samples"], format!("estimator.method = {method} has no spectrum"));
-    let without_region = scene.estimator.method == Method::Periodogram;
-    unused(without_region, &["estimator.radius_m"], format!("estimator.method = {method} has no region"));
+    let without_peak = matches!(method, Method::PulsePair {} | Method::FirstMoment(_));
+    unused(without_peak, &["estimator.refinement"], format!("{kind} refines no peak"));
+    let without_spectrum = *method == (Method::PulsePair {});
+    unused(without_spectrum, &["estimator.padded_samples"], format!("{kind} has no spectrum"));
+    let without_region = *method == (Method::Periodogram {});
+    unused(without_region, &["estimator.radius_m"], format!("{kind} has no region"));
     let own_radius = !without_region && scene.estimator.radius != RegionRadius::Fixed {};
     unused(own_radius, &["estimator.radius_m"], "this key is for estimator.radius.kind = \"fixed\"".into());
-    let sampled = matches!(scene.pulse.shape, PulseShape::Sampled(_));
-    let purpose = "a pulse with pulse.shape.kind = \"sampled\" has the duration of its samples";
-    unused(sampled, &["pulse.duration_s", "pulse.definition"], purpose.into());
     let air = ["atmosphere.backscatter_per_m_sr", "atmosphere.extinction_per_m"];
     unused(scene.atmosphere.profile.is_some(), &air, "atmosphere.profile takes its place".into());
     if let Turbulence::Refractive(turbulence) = &scene.atmosphere.turbulence {
@@ -83,6 +60,16 @@ fn of_turbulence(turbulence: &RefractiveTurbulence, mut unused: impl FnMut(bool,
     unused(endless && !unset, &OUTER[1..], "atmosphere.turbulence.outer_scale_m = inf is no outer scale".into());
 }
 
+impl Scene {
+    /// The scene with every default written out, as TOML; keys that it has no use for are left out.
+    ///
+    /// Equal scenes give equal text; the hash of it names the scene.
+    pub fn to_toml(&self) -> String {
+        let whole = toml::to_string(self).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
+        without_idle(self, &whole)
+    }
+}
+
 /// A variant as the file writes it.
 fn name(variant: &impl serde::Serialize) -> String {
     toml::Value::try_from(variant).map(|value| value.to_string()).unwrap_or_default()
@@ -101,7 +88,7 @@ pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
         key.split('.').try_fold(whole, |table, name| table.get(name).cloned())
     };
     idle.into_iter()
-        .filter(|idle| idle.even_default || value(scene, idle.key) != value(&usual, idle.key))
+        .filter(|idle| value(scene, idle.key) != value(&usual, idle.key))
         .map(|idle| {
             let value = value(scene, idle.key).map(|value| value.to_string()).unwrap_or_default();
             Problem { key: idle.key.into(), value, allowed: format!("{}: take the line out", idle.purpose) }
@@ -110,7 +97,7 @@ pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
 }
 
 /// The text of a scene without the keys that it has no use for.
-pub(super) fn without_idle(scene: &Scene, toml: &str) -> String {
+fn without_idle(scene: &Scene, toml: &str) -> String {
     let idle = idle(scene);
     let mut section = String::new();
     let mut out = String::with_capacity(toml.len());
@@ -139,16 +126,16 @@ mod tests {
     #[test]
     fn a_key_of_another_method_is_refused_and_says_what_it_is_for() {
         assert_eq!(
-            parse("[estimator]\nmethod = \"periodogram\"\norder = 8\n").unwrap_err(),
-            "s.toml:3: estimator.order = 8 is not allowed: this key is for estimator.method = \"autoregressive\" or \
-             \"autoregressive_pole\" or \"capon\", and estimator.method is \"periodogram\": take the line out"
+            parse("[estimator.method]\nkind = \"periodogram\"\norder = 8\n").unwrap_err(),
+            "s.toml:3: estimator.method.order = 8 is not allowed: this key is for estimator.method.kind = \
+             \"autoregressive\" or \"autoregressive_pole\" or \"capon\", and estimator.method.kind is \"periodogram\""
         );
         for (text, key) in [
-            ("[estimator]\norder = 16\n", "estimator.order = 16"),
-            ("[estimator]\nmethod = \"capon\"\nmoment_reach = 2.0\n", "estimator.moment_reach = 2.0"),
-            ("[estimator]\nlikelihood_snr_db = 3\n", "estimator.likelihood_snr_db = 3"),
-            ("[estimator]\nmethod = \"periodogram\"\nradius_m = 5.0\n", "estimator.radius_m = 5.0"),
-            ("[estimator]\nmethod = \"pulse_pair\"\nrefinement = \"none\"\n", "estimator.refinement = \"none\""),
+            ("[estimator.method]\norder = 16\n", "estimator.method.order = 16"),
+            ("[estimator.method]\nkind = \"capon\"\nmoment_reach = 2.0\n", "estimator.method.moment_reach = 2.0"),
+            ("[estimator.method]\nlikelihood_snr_db = 3\n", "estimator.method.likelihood_snr_db = 3"),
+            ("[estimator]\nmethod.kind = \"periodogram\"\nradius_m = 5.0\n", "estimator.radius_m = 5.0"),
+            ("[estimator]\nmethod.kind = \"pulse_pair\"\nrefinement = \"none\"\n", "estimator.refinement = \"none\""),
             (
                 "[atmosphere]\nextinction_per_m = 1e-3\nprofile = { range_m = [0.0], backscatter_per_m_sr = [1e-7], \
                  extinction_per_m = [1e-4] }\n",
@@ -171,7 +158,7 @@ mod tests {
             let file = parse(&text).unwrap();
             assert_eq!(parse(&file.toml).unwrap().toml, file.toml);
         }
-        let fitted = parse("[estimator]\nmethod = \"capon\"\norder = 8\n").unwrap();
+        let fitted = parse("[estimator.method]\nkind = \"capon\"\norder = 8\n").unwrap();
         assert!(fitted.toml.contains("\norder = 8\n") && !fitted.toml.contains("gradients"), "{}", fitted.toml);
         assert_eq!(parse(&fitted.toml).unwrap().scene, fitted.scene);
     }

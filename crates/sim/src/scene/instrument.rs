@@ -17,14 +17,10 @@ section! {
     Pulse {
         /// Pulse energy at the telescope, before its aperture truncates the beam, J.
         energy_j: f64 = 150e-6,
-        /// Pulse duration, s, as [`PulseDefinition`] has it.
-        duration_s: f64 = 200e-9,
-        /// What `duration_s` means.
-        definition: PulseDefinition = PulseDefinition::Fwhm,
         /// Rate of the linear chirp, Hz/s: the frequency rises by it.
         chirp_hz_s: f64 = 0.0,
-        /// Shape of |f|^2; one that is sampled has its own duration.
-        shape: PulseShape = PulseShape::Gaussian {},
+        /// Shape of |f|^2, with its duration.
+        shape: PulseShape = PulseShape::Gaussian(GaussianShape::default()),
     }
 }
 
@@ -32,10 +28,28 @@ section! {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum PulseShape {
-    /// The Gaussian (7) of `duration_s`.
-    Gaussian {},
+    /// The Gaussian (7).
+    Gaussian(GaussianShape),
     /// A table.
     Sampled(SampledShape),
+}
+
+impl PulseShape {
+    /// The Gaussian of a full width at half maximum \[s\].
+    pub fn gaussian(duration_s: f64) -> Self {
+        Self::Gaussian(GaussianShape { duration_s, ..GaussianShape::default() })
+    }
+}
+
+section! {
+    /// The Gaussian pulse (7).
+    #[derive(Copy)]
+    GaussianShape {
+        /// Pulse duration, s, as [`PulseDefinition`] has it.
+        duration_s: f64 = 200e-9,
+        /// What `duration_s` means.
+        definition: PulseDefinition = PulseDefinition::Fwhm,
+    }
 }
 
 section! {

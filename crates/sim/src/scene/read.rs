@@ -1,71 +1,10 @@
 //! Reading a scene file, with errors that name the key, the value, what is allowed and the line.
 
-use super::{Problem, SCENE_EXAMPLES, Scene, TABLE2_TOML, idle};
-use crate::keys::{Document, Format, Key, keys_of};
-use crate::text_file;
-use serde::Deserialize;
-use std::fmt;
+use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, format1, idle};
+use crate::io::text_file;
+use crate::keys::{Document, Format, Key, Source, keys_of};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
-
-/// A problem of a scene and the line where the file states it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Located {
-    /// What is wrong.
-    pub problem: Problem,
-    /// Line of the key in the file, from 1; `None` where the value is a default.
-    pub line: Option<usize>,
-}
-
-/// Why a scene file was refused.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SceneError {
-    /// The file cannot be read.
-    #[error("cannot read the scene {}: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The text is no TOML.
-    #[error("{}:{line}: {message}", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// What is wrong and what is allowed.
-        message: String,
-    },
-    /// Unknown or missing keys, values of the wrong kind or out of their limits.
-    #[error("{}", list(path, problems))]
-    Invalid {
-        /// The file.
-        path: PathBuf,
-        /// All of them, in the order of their lines.
-        problems: Vec<Located>,
-    },
-}
-
-/// Most problems that a message lists.
-const MOST_LINES: usize = 50;
-
-fn list(path: &Path, problems: &[Located]) -> String {
-    let mut lines: Vec<String> = problems
-        .iter()
-        .take(MOST_LINES)
-        .map(|p| match p.line {
-            Some(line) => format!("{}:{line}: {}", path.display(), p.problem),
-            None => format!("{}: {}", path.display(), p.problem),
-        })
-        .collect();
-    if problems.len() > MOST_LINES {
-        lines.push(format!("and {} more", problems.len() - MOST_LINES));
-    }
-    lines.join("\n")
-}
 
 /// A valid scene, with what names it.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,8 +17,7 @@ pub struct SceneFile {
     pub hash: String,
     /// Folder to which names of files in the scene are relative.
     pub folder: PathBuf,
-    /// The file and its text, by which problems that a plan finds are given their lines; empty for a scene made in memory.
-    origin: (PathBuf, String),
+    source: Source,
 }
 
 impl SceneFile {
@@ -98,18 +36,17 @@ impl SceneFile {
     /// # Errors
     /// As [`SceneFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        let document = parsed(text, path)?;
-        let refuse = |problems| SceneError::Invalid { path: path.to_owned(), problems };
-        let table = document.vet(&scene_format()).map_err(refuse)?;
-        let scene = Scene::deserialize(table).map_err(|e| unlike(path, &e))?;
+        let document = Document::parse(text, path)?;
+        format1::refuse(&document)?;
+        let scene: Scene = document.read(document.vet(&scene_format())?)?;
         let mut problems = scene.problems_where(&|key| document.line(key).is_some());
         problems.extend(idle::problems(&scene, &document));
         if !problems.is_empty() {
-            return Err(located(&document, path, problems));
+            return Err(document.located(problems));
         }
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let origin = (path.to_owned(), text.to_owned());
-        Ok(Self { folder, origin, ..Self::new(scene).map_err(|problems| located(&document, path, problems))? })
+        let source = Source::new(path, text);
+        let file = Self::new(scene).map_err(|problems| document.located(problems))?;
+        Ok(Self { folder: source.folder().to_owned(), source, ..file })
     }
 
     /// Checks a scene that was made in memory; its files are relative to the working folder.
@@ -123,22 +60,18 @@ impl SceneFile {
         }
         let toml = scene.to_toml();
         let hash = super::hash_of(&toml);
-        Ok(Self { scene, toml, hash, folder: PathBuf::new(), origin: (PathBuf::from("scene"), String::new()) })
+        Ok(Self { scene, toml, hash, folder: PathBuf::new(), source: Source::new(Path::new("scene"), "") })
     }
 
     /// Problems that only a plan could find, with the lines of the file that this scene was read from.
     pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
-        let (path, text) = &self.origin;
-        match parsed(text, path) {
-            Ok(document) => located(&document, path, problems),
-            Err(error) => error,
-        }
+        self.source.located(problems)
     }
 
     /// The same scene with the folder and the lines of the file that `other` was read from.
     #[cfg(feature = "cli")]
     pub(crate) fn with_file_of(self, other: Self) -> Self {
-        Self { folder: other.folder, origin: other.origin, ..self }
+        Self { folder: other.folder, source: other.source, ..self }
     }
 }
 
@@ -148,37 +81,6 @@ fn scene_format() -> Format<'static> {
     static DEFAULTS: LazyLock<toml::Table> =
         LazyLock::new(|| toml::Table::try_from(Scene::default()).unwrap_or_default());
     Format { keys: &KEYS, defaults: &DEFAULTS, examples: &[SCENE_EXAMPLES, TABLE2_TOML] }
-}
-
-/// A text as TOML.
-pub(crate) fn parsed<'a>(text: &'a str, path: &Path) -> Result<Document<'a>, SceneError> {
-    Document::parse(text).map_err(|(line, message)| SceneError::Malformed { path: path.to_owned(), line, message })
-}
-
-/// Problems with the lines where the text states their keys, and values as it writes them.
-pub(crate) fn located(document: &Document<'_>, path: &Path, problems: Vec<Problem>) -> SceneError {
-    let locate = |mut problem: Problem| {
-        if let Some(written) = document.written(&problem.key) {
-            problem.value = written;
-        } else if document.line(&problem.key).is_none() && problem.value != Problem::ABSENT {
-            problem.value += " (the default)";
-        }
-        Located { line: document.line_near(&problem.key), problem }
-    };
-    let mut problems: Vec<Located> = problems.into_iter().map(locate).collect();
-    problems.sort_by_key(|located| located.line);
-    SceneError::Invalid { path: path.to_owned(), problems }
-}
-
-/// A table whose keys all fit, and that is refused nevertheless.
-pub(crate) fn unlike(path: &Path, error: &toml::de::Error) -> SceneError {
-    SceneError::Malformed { path: path.to_owned(), line: 1, message: error.message().replace('\n', " ") }
-}
-
-impl fmt::Display for Located {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.problem.fmt(f)
-    }
 }
 
 #[cfg(test)]
@@ -244,14 +146,14 @@ mod tests {
     fn values_of_the_wrong_kind_are_named_all_at_once_with_an_example() {
         assert_eq!(
             message(
-                "[pulse]\nenergy_j = \"much\"\ndefinition = \"hwhm\"\n[scan]\nrealisations = -1\n[outputs]\ncsv = 1\n[flow]\n\
+                "[pulse]\nenergy_j = \"much\"\nshape.definition = \"hwhm\"\n[scan]\nrealisations = -1\n[outputs]\ncsv = 1\n[flow]\n\
                  kind = \"uniform\"\nlateral_m_s = 1\n"
             )
             .lines()
             .collect::<Vec<_>>(),
             [
                 "s.toml:2: pulse.energy_j = \"much\" is not allowed: a number in J, e.g. 150e-6",
-                "s.toml:3: pulse.definition = \"hwhm\" is not allowed: one of \"fwhm\", \"one_over_e_half_width\"; did you mean \
+                "s.toml:3: pulse.shape.definition = \"hwhm\" is not allowed: one of \"fwhm\", \"one_over_e_half_width\"; did you mean \
                  \"fwhm\"?",
                 "s.toml:5: scan.realisations = -1 is not allowed: a whole number that is not negative, e.g. 4",
                 "s.toml:7: outputs.csv = 1 is not allowed: true or false",

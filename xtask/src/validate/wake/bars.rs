@@ -5,12 +5,12 @@ use crate::Failure;
 use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::validate::shown::Shown;
-use crate::wakes::Wake;
 use std::path::Path;
 use wakescope_les::SubgridModel;
 use wakescope_les::analysis::decay::{amplitude_growth, onset, value_at};
 use wakescope_les::cases::VortexPairCase;
-use wakescope_sim::export::Table;
+use wakescope_sim::flow::FinishedWake;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const END: f64 = 5.0;
@@ -77,7 +77,7 @@ pub(crate) fn show_medium(_: Profile) -> Result<Shown, Failure> {
 
 /// A finished run of the flow of either preset on its own or a finer mesh, instead of one made here.
 pub(crate) fn show_files(folder: &Path) -> Result<Shown, Failure> {
-    let wake = Wake::read(folder)?;
+    let wake = FinishedWake::read(folder)?;
     let f = &wake.flow;
     let like = |pair: &VortexPairCase| {
         f.reynolds == pair.reynolds

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use wakescope_les::analysis::WakeRecord;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_les::cases::VortexPairCase;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Logarithmic winds at the height of the vortices, in `V0`.

@@ -8,7 +8,7 @@ use crate::validate::shown::Shown;
 use rayon::prelude::*;
 use wakescope_les::analysis::decay::onset;
 use wakescope_les::cases::VortexPairCase;
-use wakescope_sim::export::Table;
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const LEVELS: [f64; 4] = [1e-3, 3e-3, 1e-2, 3e-2];

@@ -2,16 +2,16 @@
 
 use super::history::History;
 use crate::Failure;
-use crate::wakes::{Wake, table, text};
 use std::f64::consts::TAU;
-use wakescope_les::analysis::{SecondaryRecord, VortexRecord, WakeRecord};
+use wakescope_les::{analysis::SecondaryRecord, analysis::VortexRecord, analysis::WakeRecord};
+use wakescope_sim::flow::{FinishedWake, table};
 
 /// Modes whose energy is in the table.
 const MODES: usize = 9;
 
 impl History {
     /// That of a run, in the units of the pair.
-    pub(super) fn read(wake: &Wake) -> Result<Self, Failure> {
+    pub(super) fn read(wake: &FinishedWake) -> Result<Self, Failure> {
         let rows = wake.column("tau")?.len();
         let records: Vec<WakeRecord> = (0..rows).map(|row| record(wake, row)).collect::<Result<_, _>>()?;
         let [budget_error, dissipation_error] = errors(wake, &records)?;
@@ -19,7 +19,7 @@ impl History {
     }
 }
 
-fn record(wake: &Wake, row: usize) -> Result<WakeRecord, Failure> {
+fn record(wake: &FinishedWake, row: usize) -> Result<WakeRecord, Failure> {
     let number = |name: &str| Ok::<f64, Failure>(wake.column(name)?[row]);
     let vortex = |side: &str| {
         let of = |name: &str| number(&format!("{name}_{side}"));
@@ -55,8 +55,8 @@ fn record(wake: &Wake, row: usize) -> Result<WakeRecord, Failure> {
 }
 
 /// Largest relative errors of the energy budget of a step, and of the dissipation of a record by its vorticity.
-fn errors(wake: &Wake, records: &[WakeRecord]) -> Result<[f64; 2], Failure> {
-    let steps = table(&text(&wake.folder.join("steps.csv"))?)?;
+fn errors(wake: &FinishedWake, records: &[WakeRecord]) -> Result<[f64; 2], Failure> {
+    let steps = table(&wake.folder.join("steps.csv"))?;
     let column = |name: &str| steps.get(name).ok_or_else(|| Failure::new(format!("steps.csv has no column {name}")));
     let (time, step) = (column("time_s")?, column("step_s")?);
     let (rate, residual) = (column("energy_rate_m5_s3")?, column("energy_residual_m5_s3")?);

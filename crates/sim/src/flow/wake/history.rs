@@ -5,7 +5,7 @@
 //! Check: tests of `flow` interrupt runs and compare the bytes; rows against the record they came from.
 
 use crate::Error;
-use crate::export::{Provenance, Table, write_atomic};
+use crate::io::{Provenance, Table, write_atomic};
 use std::path::PathBuf;
 use wakescope_les::Flow;
 use wakescope_les::analysis::{VortexRecord, WakeMeter, WakeRecord, WakeScales};
@@ -308,7 +308,7 @@ impl WakeRun {
     /// All columns of the table and all lists over their axes, in SI units.
     #[cfg(feature = "netcdf")]
     fn netcdf(&self) -> Result<Vec<u8>, Error> {
-        use crate::export::netcdf::{Data, Layout, Variable};
+        use crate::io::netcdf::{Data, Layout, Variable};
         let [gamma, slices, modes, end] = self.lengths.starts();
         let part =
             |from: usize, to: usize| self.rows.iter().flat_map(|row| row[from..to].to_vec()).collect::<Vec<f64>>();
@@ -366,8 +366,8 @@ impl WakeRun {
 
     /// The columns of the table over `tau`.
     #[cfg(feature = "netcdf")]
-    fn series(&self) -> Vec<crate::export::netcdf::Variable> {
-        use crate::export::netcdf::{Data, Variable};
+    fn series(&self) -> Vec<crate::io::netcdf::Variable> {
+        use crate::io::netcdf::{Data, Variable};
         let variable = |name: &str, values: Vec<f64>, units: &str, long_name: &str| {
             Variable::new(name, &["tau"], Data::F64(values))
                 .text("units", units)

@@ -2,7 +2,7 @@
 //!
 //! Check: lists that share times, the series, the numbers of the files.
 
-use super::WakeOutput;
+use super::output::WakeOutput;
 
 /// Ages closer than this are the same.
 const SAME: f64 = 1e-6;

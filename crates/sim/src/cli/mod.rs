@@ -1,0 +1,241 @@
+//! The command line program `wakescope`: words in, files and exit codes out.
+//!
+//! Exit codes: 0 done, 2 wrong input or unusable output. Progress, plans and errors go to standard error,
+//! results to standard output; `--json` makes the result one JSON object, and so an error.
+
+mod bound;
+mod flow;
+mod output;
+mod progress;
+mod wake;
+
+use crate::io::Existing;
+use crate::measure::progress::Observer;
+use crate::plan::{Plan, Target};
+use crate::scene::{SceneFile, TABLE2_TOML};
+use crate::{Error, measure::run, measure::write};
+use clap::{Args, Parser, Subcommand};
+use output::say;
+use serde_json::{Value, json};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Simulator of coherent Doppler lidar measurements of aircraft wake vortices.
+#[derive(Debug, Parser)]
+#[command(name = "wakescope", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Threads to compute with; the default is one for each core. Results do not depend on it.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Seed to use instead of the scene's.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
+    seed: Option<u64>,
+    /// Show neither plan nor progress; `check` prints nothing of a good scene.
+    #[arg(long, global = true)]
+    quiet: bool,
+    /// Print the result as one JSON object, and an error as one on standard error.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Write a commented scene: the lidar of the chapter's Table 2 and an analytic vortex pair.
+    Init {
+        /// The file to write.
+        #[arg(default_value = "scene.toml")]
+        scene: PathBuf,
+        /// Replace the file if it exists.
+        #[arg(long)]
+        force: bool,
+    },
+    /// Check a scene and print the plan: what will run, what is left out and why, at what cost.
+    Check(CheckWords),
+    /// Run the whole measurement and write everything that the scene asks for.
+    Run(Io),
+    /// Heterodyne efficiency and signal-to-noise ratio against range.
+    Efficiency(Io),
+    /// The raw signals of one realisation of the scan, or of all.
+    Signal(Io),
+    /// The radial-velocity map with its errors.
+    Map(Io),
+    /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
+    Bound(bound::BoundWords),
+    /// Simulate a flow: a case file goes in, fields and checkpoints come out.
+    Flow(flow::FlowWords),
+    /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
+    Wake(wake::WakeWords),
+}
+
+#[derive(Debug, Args)]
+struct Io {
+    /// The scene.
+    scene: PathBuf,
+    /// Folder to write to; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Replace files in the folder that this program did not write, or that were changed since.
+    #[arg(long)]
+    overwrite: bool,
+    /// Run even if the forecast of the memory is more than the machine has.
+    #[arg(long)]
+    allow_large: bool,
+}
+
+/// Words of `wakescope check`.
+#[derive(Debug, Args)]
+struct CheckWords {
+    /// The scene.
+    scene: PathBuf,
+    /// Folder that a run is to write to: check it, too.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Accept a scene that needs more memory than the machine has.
+    #[arg(long)]
+    allow_large: bool,
+}
+
+/// Runs the program with the words of the command line; returns its exit code.
+pub fn main() -> u8 {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => return output::explain(&e),
+    };
+    // All in one pool: forecasts count its threads, and files reuse the memory that the computing freed.
+    match with_threads(&cli, || dispatch(&cli)).flatten() {
+        Ok(()) => 0,
+        Err(e) => {
+            output::complain(&e, cli.json);
+            2
+        }
+    }
+}
+
+fn dispatch(cli: &Cli) -> Result<(), Error> {
+    match &cli.command {
+        Command::Init { scene, force } => init(scene, *force, cli),
+        Command::Check(words) => check(words, cli),
+        Command::Run(io) => execute(io, Target::Run, cli),
+        Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
+        Command::Signal(io) => execute(io, Target::Signal, cli),
+        Command::Map(io) => execute(io, Target::Map, cli),
+        Command::Bound(words) => bound::bound(words, cli),
+        Command::Flow(words) => flow::flow(words, cli),
+        Command::Wake(words) => wake::wake(words, cli),
+    }
+}
+
+fn init(path: &Path, force: bool, cli: &Cli) -> Result<(), Error> {
+    let text = match cli.seed {
+        Some(seed) => TABLE2_TOML.replacen("seed = 1 ", &format!("seed = {seed} "), 1),
+        None => TABLE2_TOML.to_owned(),
+    };
+    SceneFile::parse(&text, path)?;
+    if !force && path.exists() {
+        let source = std::io::Error::new(std::io::ErrorKind::AlreadyExists, "it exists; --force replaces it");
+        return Err(Error::Io { action: "write", path: path.to_owned(), source });
+    }
+    crate::io::write_atomic(path, text.as_bytes())?;
+    say(cli.json, &json!({ "scene": path }), &format!("wrote {}\nnext: wakescope check {0}", path.display()))
+}
+
+fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
+    // What is in the way of a run is in the way of it here, too.
+    let out = words.out.as_deref().map(|folder| (folder, Existing::Own));
+    let plan = planned(&words.scene, Target::Run, out, words.allow_large, cli)?;
+    if cli.quiet && !cli.json {
+        return Ok(());
+    }
+    say(cli.json, &plan_json(&plan), &format!("{}: good\n{plan}", words.scene.display()))
+}
+
+/// The plan of a scene, with all that can be known before the computing: limits, memory, a small rehearsal, the folder.
+fn planned(
+    scene: &Path,
+    target: Target,
+    out: Option<(&Path, Existing)>,
+    allow_large: bool,
+    cli: &Cli,
+) -> Result<Plan, Error> {
+    let plan = Plan::new(load(scene, cli)?, target)?;
+    if !allow_large {
+        plan.fits()?;
+    }
+    if let Some((folder, existing)) = out {
+        let names = write::names(&plan);
+        write::prepare(folder, names.iter().map(String::as_str), existing)?;
+    }
+    plan.rehearse()?;
+    Ok(plan)
+}
+
+fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
+    let existing = if io.overwrite { Existing::Any } else { Existing::Own };
+    let plan = planned(&io.scene, target, Some((&io.out, existing)), io.allow_large, cli)?;
+    let outcome = if cli.quiet {
+        run::run(&plan, &progress::Quiet)?
+    } else {
+        let _ = write!(std::io::stderr(), "{plan}");
+        let bars = progress::Bars::new();
+        run::run(&plan, &bars)?
+    };
+    let files = write::write(&plan, &outcome, &io.out, existing)?;
+    let summary = outcome.summary();
+    let mut text: Vec<String> = summary.iter().map(|line| format!("{:<44} {}", line.text, shown(line.value))).collect();
+    text.push(format!("wrote {} files to {}", files.len(), io.out.display()));
+    let values: serde_json::Map<String, Value> = summary.iter().map(|l| (l.key.to_owned(), json!(l.value))).collect();
+    let mut object = plan_json(&plan);
+    object["results"] = Value::Object(values);
+    object["files"] = json!(files);
+    say(cli.json, &object, &text.join("\n"))
+}
+
+fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
+    let mut file = SceneFile::read(path)?;
+    if let Some(seed) = cli.seed {
+        file.scene.seed = seed;
+        let origin = file.clone();
+        file = SceneFile::new(file.scene).map_err(|problems| origin.located(problems))?;
+        file = file.with_file_of(origin);
+    }
+    Ok(file)
+}
+
+fn with_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> T + Send) -> Result<T, Error> {
+    let threads = usize::from(cli.threads.unwrap_or(0));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| Error::Threads { threads, reason: e.to_string() })?;
+    Ok(pool.install(work))
+}
+
+fn plan_json(plan: &Plan) -> Value {
+    let stages: Vec<Value> = plan
+        .stages
+        .iter()
+        .map(|s| {
+            json!({
+                "stage": s.stage.name(), "runs": s.cost.is_some(), "reason": s.reason,
+                "core_s": s.cost.map(|c| c.core_s), "memory_bytes": s.cost.map(|c| c.memory_bytes()),
+                "kept_bytes": s.cost.map(|c| c.kept_bytes),
+            })
+        })
+        .collect();
+    let total = plan.total();
+    json!({
+        "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.scene.seed,
+        "stages": stages, "core_s": total.core_s, "memory_bytes": total.memory_bytes, "warnings": plan.warnings,
+    })
+}
+
+/// Four digits; what cannot be given is a dash.
+fn shown(value: f64) -> String {
+    match value {
+        v if v.is_nan() => "-".into(),
+        v if v != 0.0 && !(1e-3..1e5).contains(&v.abs()) => format!("{v:.3e}"),
+        v => format!("{v:.4}"),
+    }
+}

@@ -1,0 +1,176 @@
+//! Which flow a case is: the flows with known answers, the wake, a flow of one's own; their limits and their setups.
+
+use super::free::Free;
+use super::named::{
+    Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
+};
+use super::setup::Setup;
+use super::wake::WakeFlow;
+use crate::Error;
+use crate::keys::Checker;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use wakescope_les::cases::{self, Case, Resolution, TollmienSchlichting, VortexLengths};
+use wakescope_les::{Mesh, TimeScheme, TimeStep};
+
+/// Steps from start to end that the longest step gives where a case states none.
+const LEAST_STEPS: f64 = 200.0;
+/// A step for the constructors of cases with a fixed one; replaced by the case file's.
+const ANY_STEP_S: f64 = 1.0;
+
+/// Which flow. The first ones have known answers and are in the units of their literature.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum CaseKind {
+    /// Decaying vortices of the plane, an exact solution.
+    TaylorGreenPlane(TaylorGreenPlane),
+    /// Vortices of space that become turbulent.
+    TaylorGreen(TaylorGreen),
+    /// Pressure-driven flow between plates.
+    Poiseuille(PlateDriven),
+    /// Flow between plates that move.
+    Couette(PlateDriven),
+    /// The slowest mode between plates, which decays.
+    StokesLayer(PlateDriven),
+    /// A plate that starts suddenly.
+    RayleighPlate(PlateDriven),
+    /// A wave of Tollmien and Schlichting on Poiseuille's flow.
+    OrrSommerfeld(OrrSommerfeld),
+    /// A dipole that runs against a wall.
+    Dipole(Dipole),
+    /// A cavity whose lid moves.
+    LidDrivenCavity(LidDrivenCavity),
+    /// Turbulent flow between plates.
+    Channel(Channel),
+    /// A vortex pair above ground, in plane or space.
+    VortexPair(VortexPairFlow),
+    /// The wake of an aircraft near the ground, measured while it runs.
+    Wake(Box<WakeFlow>),
+    /// A mesh, viscosity and initial field of one's own, in SI units.
+    Free(Box<Free>),
+}
+
+impl CaseKind {
+    pub(super) fn check(&self, p: &mut Checker<'_>) {
+        match self {
+            Self::TaylorGreenPlane(c) => {
+                p.cells("case.cells", &[c.cells]);
+                p.not_negative("case.viscosity_m2_s", c.viscosity_m2_s);
+                let ok = c.stretch.iter().all(|a| a.abs() < 1.0);
+                p.require(ok, "case.stretch", c.stretch, "two numbers between -1 and 1");
+            }
+            Self::TaylorGreen(c) => {
+                p.cells("case.cells", &[c.cells]);
+                p.positive("case.reynolds", c.reynolds);
+            }
+            Self::Poiseuille(c) | Self::Couette(c) | Self::StokesLayer(c) | Self::RayleighPlate(c) => {
+                p.cells("case.cells", &[c.cells]);
+                p.stretch("case.stretch", c.stretch);
+                p.positive("case.viscosity_m2_s", c.viscosity_m2_s);
+                p.require(c.initial_share.is_finite(), "case.initial_share", c.initial_share, "finite");
+                let has_share = matches!(self, Self::Poiseuille(_) | Self::Couette(_));
+                let allowed = "this key is for case.kind = \"poiseuille\" or \"couette\"";
+                p.require(has_share || c.initial_share == 0.0, "case.initial_share", c.initial_share, allowed);
+            }
+            Self::OrrSommerfeld(c) => {
+                p.cells("case.cells", &c.cells);
+                p.stretch("case.stretch", c.stretch);
+                let (re, wave) = (c.reynolds, c.wave_number);
+                p.within("case.reynolds", re, 500.0, 1e6, "");
+                p.within("case.wave_number", wave, 0.3, 2.0, "");
+                p.require(c.amplitude.is_finite(), "case.amplitude", c.amplitude, "finite");
+            }
+            Self::Dipole(c) => {
+                p.cells("case.cells", &c.cells);
+                p.stretch("case.stretch", c.stretch);
+                p.stretch("case.lateral_stretch", c.lateral_stretch());
+                p.positive("case.reynolds", c.reynolds);
+            }
+            Self::LidDrivenCavity(c) => {
+                p.cells("case.cells", &[c.cells]);
+                p.stretch("case.stretch", c.stretch);
+                p.positive("case.reynolds", c.reynolds);
+            }
+            Self::Channel(c) => {
+                p.cells("case.cells", &c.cells);
+                p.stretch("case.stretch", c.stretch);
+                p.positive("case.reynolds_tau", c.reynolds_tau);
+            }
+            Self::VortexPair(c) => c.check(p),
+            Self::Wake(c) => c.check(p),
+            Self::Free(c) => c.check(p),
+        }
+    }
+
+    /// What `mesh` does not resolve of the vortices and of the boundary layer under them, in sentences.
+    pub(super) fn unresolved(&self, mesh: &Mesh) -> Vec<String> {
+        let lengths = match self {
+            Self::Dipole(c) => Some(VortexLengths::dipole(c.reynolds)),
+            Self::VortexPair(c) => Some(VortexLengths::pair(c.core_radius, c.height, c.reynolds, 1.0)),
+            Self::Wake(c) => {
+                let scales = c.pair.scales().ok();
+                scales.map(|scales| VortexLengths::pair(c.core_radius, c.height, c.reynolds, scales.spacing_m))
+            }
+            _ => None,
+        };
+        lengths.map_or_else(Vec::new, |lengths| Resolution::new(mesh, &lengths).warnings())
+    }
+
+    /// Cells along x, y, z.
+    pub fn cells(&self) -> [usize; 3] {
+        match *self {
+            Self::TaylorGreenPlane(ref c) => [1, c.cells, c.cells],
+            Self::TaylorGreen(ref c) => [c.cells; 3],
+            Self::Poiseuille(ref c) | Self::Couette(ref c) | Self::StokesLayer(ref c) | Self::RayleighPlate(ref c) => {
+                [1, 1, c.cells]
+            }
+            Self::OrrSommerfeld(ref c) => [c.cells[0], 1, c.cells[1]],
+            Self::Dipole(ref c) => [1, c.cells[0], c.cells[1]],
+            Self::LidDrivenCavity(ref c) => [1, c.cells, c.cells],
+            Self::Channel(ref c) => c.cells,
+            Self::VortexPair(ref c) => c.cells,
+            Self::Wake(ref c) => c.cells,
+            Self::Free(ref c) => [c.x.cells, c.y.cells, c.z.cells],
+        }
+    }
+
+    /// Mesh, settings and initial field; `folder` is that of the case file.
+    pub(super) fn setup(&self, folder: &Path) -> Result<Setup, Error> {
+        let steady = |case: Result<Case, wakescope_les::Error>| {
+            let mut case = case?;
+            let courant = TimeScheme::AdamsBashforth2.default_courant();
+            case.settings.time_step = TimeStep::Courant { courant, longest_s: case.end_s / LEAST_STEPS };
+            Ok(case)
+        };
+        let plates = |c: &PlateDriven| cases::Plates {
+            cells: c.cells,
+            strength: c.stretch,
+            viscosity_m2_s: c.viscosity_m2_s,
+            step_s: ANY_STEP_S,
+        };
+        let case = match *self {
+            Self::TaylorGreenPlane(ref c) => {
+                steady(cases::taylor_green_plane(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S))
+            }
+            Self::TaylorGreen(ref c) => cases::taylor_green_3d(c.cells, c.reynolds),
+            Self::Poiseuille(ref c) => steady(plates(c).poiseuille(c.initial_share)),
+            Self::Couette(ref c) => steady(plates(c).couette(c.initial_share)),
+            Self::StokesLayer(ref c) => steady(plates(c).decaying_layer()),
+            Self::RayleighPlate(ref c) => steady(plates(c).rayleigh_plate()),
+            Self::OrrSommerfeld(ref c) => steady(
+                TollmienSchlichting::new(c.reynolds, c.wave_number)
+                    .and_then(|wave| wave.case(c.cells, c.stretch, c.amplitude, ANY_STEP_S)),
+            ),
+            Self::Dipole(ref c) => {
+                cases::dipole_against_wall(c.cells, [c.lateral_stretch(), c.stretch], c.reynolds, c.closed_sides)
+            }
+            Self::LidDrivenCavity(ref c) => cases::lid_driven_cavity(c.cells, c.stretch, c.reynolds),
+            Self::Channel(ref c) => cases::channel(c.cells, c.stretch, c.reynolds_tau),
+            Self::VortexPair(ref c) => c.case(),
+            Self::Wake(ref c) => return c.setup(),
+            Self::Free(ref c) => return c.setup(folder),
+        };
+        let Case { mesh, settings, initial, end_s } = case.map_err(Error::Flow)?;
+        Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0, wake: None, undamped: None })
+    }
+}

@@ -1,0 +1,110 @@
+//! A finished run of a wake, read from its files.
+//!
+//! Check: the test of the pictures reads a run that the program made.
+
+use super::super::CaseFile;
+use super::super::kind::CaseKind;
+use super::case::WakeFlow;
+use crate::Error;
+use crate::io::Provenance;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// A finished run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FinishedWake {
+    /// Where its files are.
+    pub folder: PathBuf,
+    /// The flow.
+    pub flow: WakeFlow,
+    /// The case as TOML.
+    pub case_toml: String,
+    /// Ages of the whole fields, in the order of the files.
+    pub fields_tau: Vec<f64>,
+    /// Whom pictures of it name as their source.
+    pub origin: Provenance,
+    columns: HashMap<String, Vec<f64>>,
+}
+
+impl FinishedWake {
+    /// The run in a folder, by its `case.toml` and its history.
+    ///
+    /// # Errors
+    /// Files that are not there or not those of a wake; a run that has not come to its end.
+    pub fn read(folder: &Path) -> Result<Self, Error> {
+        let refuse = |reason: String| Error::Input { path: folder.to_owned(), reason };
+        let file = CaseFile::read(&folder.join("case.toml"))?;
+        let (CaseKind::Wake(flow), Some(output)) = (file.case.case.clone(), &file.case.wake) else {
+            return Err(refuse("the case is no wake".into()));
+        };
+        let mut columns = table(&folder.join("wake.csv"))?;
+        let scaled = folder.join("wake_scaled.csv");
+        // Runs of earlier versions have all columns in one file.
+        if scaled.exists() {
+            columns.extend(table(&scaled)?);
+        }
+        let wake = Self {
+            folder: folder.to_owned(),
+            flow: *flow,
+            origin: file.provenance(),
+            case_toml: file.toml.clone(),
+            fields_tau: output.fields_tau.clone().unwrap_or_default(),
+            columns,
+        };
+        let reached = wake.column("tau")?.last().copied().unwrap_or(0.0);
+        // The last record need not be at the end.
+        let last = (output.end_tau / output.every_tau + 1e-6).floor() * output.every_tau;
+        if reached < last - 1e-9 {
+            return Err(refuse(format!("the run stands at tau = {reached} of {}", output.end_tau)));
+        }
+        Ok(wake)
+    }
+
+    /// A column of the history.
+    ///
+    /// # Errors
+    /// There is none of that name.
+    pub fn column(&self, name: &str) -> Result<&[f64], Error> {
+        self.columns.get(name).map(Vec::as_slice).ok_or_else(|| Error::Input {
+            path: self.folder.clone(),
+            reason: format!("the history of the wake has no column {name}"),
+        })
+    }
+
+    /// A column against `tau`.
+    ///
+    /// # Errors
+    /// As [`FinishedWake::column`].
+    pub fn curve(&self, name: &str) -> Result<Vec<(f64, f64)>, Error> {
+        Ok(self.column("tau")?.iter().copied().zip(self.column(name)?.iter().copied()).collect())
+    }
+
+    /// The run in words, its noise among them.
+    pub fn words(&self) -> String {
+        let [x, y, z] = self.flow.cells;
+        format!(
+            "simulated flow, {x} x {y} x {z} cells, Γ₀/ν = {}, core {} b₀, noise {} V₀",
+            self.flow.reynolds, self.flow.core_radius, self.flow.perturbation
+        )
+    }
+}
+
+/// Columns of a table by name; empty places are NaN.
+///
+/// # Errors
+/// A file that cannot be read; a value that is no number.
+pub fn table(path: &Path) -> Result<HashMap<String, Vec<f64>>, Error> {
+    let text =
+        std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let mut columns = vec![Vec::new(); names.len()];
+    for line in lines {
+        for (column, value) in columns.iter_mut().zip(line.split(',')) {
+            let number = if value.is_empty() { Ok(f64::NAN) } else { value.parse() };
+            let refuse = |_| Error::Input { path: path.to_owned(), reason: format!("{value} is no number") };
+            column.push(number.map_err(refuse)?);
+        }
+    }
+    Ok(names.into_iter().map(String::from).zip(columns).collect())
+}

@@ -1,0 +1,79 @@
+//! What is measured and written of a wake, by its age.
+
+use crate::keys::Checker;
+use crate::scene::section;
+use serde::{Deserialize, Serialize};
+
+section! {
+    /// What is measured and written of a wake, by its age `tau`.
+    WakeOutput {
+        /// Age at which the run ends.
+        end_tau: f64 = 5.0,
+        /// Time between rows of `wake.csv`, and between the records of `wake.nc`.
+        every_tau: f64 = 0.05,
+        /// Ages of whole fields; 0.5, the whole numbers and the end if absent.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        fields_tau: Option<Vec<f64>> = None,
+        /// Ages of cross-planes; half the end and the end if absent.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        planes_tau: Option<Vec<f64>> = None,
+        /// First and last age of a series of cross-planes, for scans during which the flow moves.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        series_tau: Option<[f64; 2]> = None,
+        /// Time between the planes of the series.
+        series_every_tau: f64 = 0.02,
+        /// Positions of the planes along the flight, in `b0`.
+        planes_x: Vec<f64> = vec![0.5],
+    }
+}
+
+/// Most whole ages at which fields are written where a case states none.
+const WHOLE_AGES: usize = 100;
+
+impl WakeOutput {
+    /// Writes the lists out that follow from the end where the case does not have them.
+    pub(in super::super) fn complete(&mut self) {
+        let end = self.end_tau;
+        if !end.is_finite() || end <= 0.0 {
+            return;
+        }
+        self.fields_tau.get_or_insert_with(|| {
+            let whole = (1..=WHOLE_AGES).map(|tau| tau as f64);
+            let ages = std::iter::once(0.5).chain(whole).take_while(|tau| *tau < end);
+            ages.chain(std::iter::once(end)).collect()
+        });
+        self.planes_tau.get_or_insert_with(|| vec![0.5 * end, end]);
+    }
+
+    /// Ends at another age: lists that followed from the old end follow the new one, others lose what lies behind it.
+    pub(in super::super) fn end_at(&mut self, end_tau: f64) {
+        let mut own = Self { fields_tau: None, planes_tau: None, ..self.clone() };
+        own.complete();
+        let kept = |list: &Option<Vec<f64>>, own: &Option<Vec<f64>>| {
+            let list = list.as_ref().filter(|_| list != own)?;
+            Some(list.iter().copied().filter(|tau| *tau <= end_tau).collect())
+        };
+        (self.fields_tau, self.planes_tau) =
+            (kept(&self.fields_tau, &own.fields_tau), kept(&self.planes_tau, &own.planes_tau));
+        self.series_tau = self.series_tau.map(|[from, to]| [from, to.min(end_tau)]).filter(|[from, to]| to > from);
+        self.end_tau = end_tau;
+        self.complete();
+    }
+
+    pub(in super::super) fn check(&self, p: &mut Checker<'_>) {
+        p.positive("wake.end_tau", self.end_tau);
+        p.positive("wake.every_tau", self.every_tau);
+        p.positive("wake.series_every_tau", self.series_every_tau);
+        let end = self.end_tau;
+        let within =
+            |list: &[f64]| list.windows(2).all(|w| w[1] > w[0]) && list.iter().all(|tau| (0.0..=end).contains(tau));
+        for (key, list) in [("wake.fields_tau", &self.fields_tau), ("wake.planes_tau", &self.planes_tau)] {
+            let list = list.as_deref().unwrap_or_default();
+            p.require(within(list), key, list, "increasing, from 0 to wake.end_tau");
+        }
+        if let Some(range) = self.series_tau {
+            p.require(within(&range), "wake.series_tau", range, "two ages that increase, from 0 to wake.end_tau");
+        }
+        p.require(self.planes_x.iter().all(|x| x.is_finite()), "wake.planes_x", &self.planes_x, "finite");
+    }
+}

@@ -1,0 +1,336 @@
+//! Puts files on disk so that none is ever seen half-written, and a run's files appear all together or not at all.
+//! A group is staged in a hidden folder inside the target folder (same file system), each file synced, then renamed into place;
+//! if a rename fails, the earlier ones are undone and replaced files come back.
+//! Check: the tests provoke a failure at each step and list the folder afterwards.
+
+use super::error::{OutputError, OutputResult};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Files of one run, collected in memory and committed together.
+///
+/// ```
+/// use wakescope_sim::io::FileGroup;
+/// let folder = std::env::temp_dir().join("wakescope-doc-group");
+/// let mut group = FileGroup::new(&folder);
+/// group.add("map.csv", "range_m\n100.0\n")?;
+/// let written = group.commit()?;
+/// assert_eq!(std::fs::read_to_string(&written[0]).unwrap(), "range_m\n100.0\n");
+/// # std::fs::remove_dir_all(&folder).ok();
+/// # Ok::<(), wakescope_sim::io::OutputError>(())
+/// ```
+#[derive(Debug)]
+pub struct FileGroup {
+    folder: PathBuf,
+    files: Vec<(String, Vec<u8>)>,
+}
+
+impl FileGroup {
+    /// A group for this folder, which is made by [`Self::commit`] where it does not exist.
+    pub fn new(folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), files: Vec::new() }
+    }
+
+    /// Adds a file.
+    ///
+    /// # Errors
+    /// A name that is not a plain file name (empty, with a separator, `.`, `..`), or one already in the group.
+    pub fn add(&mut self, name: &str, content: impl Into<Vec<u8>>) -> OutputResult<()> {
+        if Path::new(name).file_name() != Some(name.as_ref()) {
+            return Err(OutputError::value("file name", name, "must be a plain name without folders"));
+        }
+        if self.files.iter().any(|(n, _)| n == name) {
+            return Err(OutputError::Duplicate { what: "file", name: name.into() });
+        }
+        self.files.push((name.into(), content.into()));
+        Ok(())
+    }
+
+    /// Names in the order in which they were added.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.files.iter().map(|(n, _)| n.as_str())
+    }
+
+    /// Writes all files, replacing older ones of the same names; returns their paths in the order in which they were added.
+    ///
+    /// # Errors
+    /// The first refusal of the system. The folder is then as it was before, and a folder made by this call is gone again.
+    pub fn commit(self) -> OutputResult<Vec<PathBuf>> {
+        let made = make_folders(&self.folder)?;
+        let result = self.commit_inside();
+        if result.is_err() {
+            // Deepest first; `remove_dir` leaves a folder that somebody else has used meanwhile.
+            made.iter().rev().for_each(|f| drop(fs::remove_dir(f)));
+        }
+        result
+    }
+
+    fn commit_inside(&self) -> OutputResult<Vec<PathBuf>> {
+        let stage = Stage::make(&self.folder)?;
+        for (name, content) in &self.files {
+            write_synced(&stage.new.join(name), content)?;
+        }
+        let mut swapped: Vec<Swap> = Vec::new();
+        for (name, _) in &self.files {
+            match Swap::into_place(&stage, &self.folder, name) {
+                Ok(swap) => swapped.push(swap),
+                Err(error) => {
+                    swapped.iter().rev().for_each(Swap::undo);
+                    return Err(error);
+                }
+            }
+        }
+        sync_folder(&self.folder);
+        Ok(swapped.into_iter().map(|s| s.target).collect())
+    }
+}
+
+/// Writes one file, replacing an older one of that name; its folder must exist.
+///
+/// # Errors
+/// The refusal of the system; nothing is left behind and an older file is untouched.
+pub fn write_atomic(path: &Path, content: impl Into<Vec<u8>>) -> OutputResult<()> {
+    let name = path
+        .file_name()
+        .and_then(|n| n.to_str())
+        .ok_or_else(|| OutputError::value("file name", path.display(), "must end with a UTF-8 file name"))?;
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let folder = parent.unwrap_or(Path::new("."));
+    let mut group = FileGroup::new(folder);
+    group.add(name, content)?;
+    group.commit_inside().map(drop)
+}
+
+/// One renamed file, and where the older file of that name waits.
+struct Swap {
+    target: PathBuf,
+    backup: Option<PathBuf>,
+}
+
+impl Swap {
+    fn into_place(stage: &Stage, folder: &Path, name: &str) -> OutputResult<Self> {
+        let target = folder.join(name);
+        if target.is_dir() {
+            let source = std::io::Error::new(std::io::ErrorKind::IsADirectory, "a folder of that name is in the way");
+            return Err(io_error("write", &target, source));
+        }
+        let mut backup = None;
+        if target.symlink_metadata().is_ok() {
+            let kept = stage.old.join(name);
+            fs::rename(&target, &kept).map_err(|e| io_error("replace", &target, e))?;
+            backup = Some(kept);
+        }
+        let swap = Self { target, backup };
+        if let Err(source) = fs::rename(stage.new.join(name), &swap.target) {
+            let error = io_error("write", &swap.target, source);
+            swap.undo();
+            return Err(error);
+        }
+        Ok(swap)
+    }
+
+    fn undo(&self) {
+        match &self.backup {
+            Some(kept) => drop(fs::rename(kept, &self.target)),
+            None => drop(fs::remove_file(&self.target)),
+        }
+    }
+}
+
+/// Hidden folder for the new and the replaced files; removed when dropped.
+struct Stage {
+    root: PathBuf,
+    new: PathBuf,
+    old: PathBuf,
+}
+
+/// How the names of stage folders begin.
+const STAGE: &str = ".wakescope-stage-";
+
+/// Removes the stages that crashed processes left in a folder, which nobody else may be writing to. A group that was not put
+/// into place as a whole is taken back as far as the files are still there.
+pub(super) fn sweep_stages(folder: &Path) {
+    let entries = |path: &Path| fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_stage = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(STAGE));
+    for root in entries(folder).filter(is_stage) {
+        let stage = Stage { new: root.join("new"), old: root.join("old"), root };
+        if entries(&stage.new).next().is_some() {
+            for kept in entries(&stage.old) {
+                if let Some(name) = kept.file_name() {
+                    drop(fs::rename(&kept, folder.join(name)));
+                }
+            }
+        }
+        // Dropping the stage removes it.
+    }
+}
+
+impl Stage {
+    fn make(folder: &Path) -> OutputResult<Self> {
+        let mut attempt = 0_u32;
+        loop {
+            let root = folder.join(format!("{STAGE}{}-{attempt}", std::process::id()));
+            match fs::create_dir(&root) {
+                Ok(()) => {
+                    let stage = Self { new: root.join("new"), old: root.join("old"), root };
+                    for part in [&stage.new, &stage.old] {
+                        fs::create_dir(part).map_err(|e| io_error("create folder", part, e))?;
+                    }
+                    return Ok(stage);
+                }
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && attempt < 10_000 => {
+                    attempt += 1;
+                }
+                Err(e) => return Err(io_error("write into", folder, e)),
+            }
+        }
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        drop(fs::remove_dir_all(&self.root));
+    }
+}
+
+/// Makes the folder and its parents; returns those that did not exist, outermost first.
+fn make_folders(folder: &Path) -> OutputResult<Vec<PathBuf>> {
+    let mut missing: Vec<PathBuf> = folder
+        .ancestors()
+        .filter(|p| !p.as_os_str().is_empty())
+        .take_while(|p| !p.exists())
+        .map(Path::to_owned)
+        .collect();
+    missing.reverse();
+    fs::create_dir_all(folder).map_err(|e| {
+        missing.iter().rev().for_each(|f| drop(fs::remove_dir(f)));
+        io_error("create folder", folder, e)
+    })?;
+    Ok(missing)
+}
+
+fn write_synced(path: &Path, content: &[u8]) -> OutputResult<()> {
+    let write = || {
+        let mut file = fs::File::create_new(path)?;
+        file.write_all(content)?;
+        file.sync_all()
+    };
+    write().map_err(|e| io_error("write", path, e))
+}
+
+/// Asks for the renames to reach the disk. Not every system can sync a folder; the files themselves are complete either way.
+fn sync_folder(folder: &Path) {
+    if let Ok(handle) = fs::File::open(folder) {
+        drop(handle.sync_all());
+    }
+}
+
+fn io_error(action: &'static str, path: &Path, source: std::io::Error) -> OutputError {
+    OutputError::Io { action, path: path.to_owned(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn listing(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    fn group(folder: &Path, names: &[&str]) -> FileGroup {
+        let mut group = FileGroup::new(folder);
+        for name in names {
+            group.add(name, format!("new {name}")).unwrap();
+        }
+        group
+    }
+
+    #[test]
+    fn a_group_appears_complete_and_replaces_older_files() {
+        let temp = tempfile::tempdir().unwrap();
+        let folder = temp.path().join("deep/er");
+        group(&folder, &["a", "b"]).commit().unwrap();
+        fs::write(folder.join("a"), "old").unwrap();
+        let written = group(&folder, &["a", "b", "c"]).commit().unwrap();
+        assert_eq!(listing(&folder), ["a", "b", "c"]);
+        for path in written {
+            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+            assert_eq!(fs::read_to_string(path).unwrap(), format!("new {name}"));
+        }
+    }
+
+    #[test]
+    fn a_folder_in_the_way_leaves_everything_as_it_was() {
+        let temp = tempfile::tempdir().unwrap();
+        fs::write(temp.path().join("a"), "old a").unwrap();
+        fs::create_dir(temp.path().join("c")).unwrap();
+        let error = group(temp.path(), &["a", "b", "c"]).commit().unwrap_err();
+        assert!(error.to_string().contains('c'), "{error}");
+        assert_eq!(listing(temp.path()), ["a", "c"]);
+        assert_eq!(fs::read_to_string(temp.path().join("a")).unwrap(), "old a", "the replaced file must come back");
+    }
+
+    #[test]
+    fn a_file_in_place_of_the_folder_is_an_error_and_no_folder_stays() {
+        let temp = tempfile::tempdir().unwrap();
+        let file = temp.path().join("file");
+        fs::write(&file, "x").unwrap();
+        for folder in [file.clone(), file.join("sub/folder")] {
+            assert!(matches!(group(&folder, &["a"]).commit(), Err(OutputError::Io { .. })));
+        }
+        assert_eq!(listing(temp.path()), ["file"]);
+        assert_eq!(fs::read_to_string(file).unwrap(), "x");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn an_unwritable_folder_is_an_error_and_stays_empty() {
+        use std::os::unix::fs::PermissionsExt;
+        let temp = tempfile::tempdir().unwrap();
+        let folder = temp.path().join("locked");
+        fs::create_dir(&folder).unwrap();
+        fs::set_permissions(&folder, fs::Permissions::from_mode(0o555)).unwrap();
+        let privileged = fs::write(folder.join("probe"), "x").is_ok();
+        let result = group(&folder, &["a"]).commit();
+        fs::set_permissions(&folder, fs::Permissions::from_mode(0o755)).unwrap();
+        if !privileged {
+            assert!(matches!(result, Err(OutputError::Io { .. })));
+            assert!(listing(&folder).is_empty());
+        }
+    }
+
+    #[test]
+    fn a_new_folder_is_removed_again_after_a_failure() {
+        let temp = tempfile::tempdir().unwrap();
+        let folder = temp.path().join("new/folder");
+        // 300 characters are longer than any usual file system allows, so the failure comes after the folder was made.
+        let long = "x".repeat(300);
+        assert!(group(&folder, &["a", &long]).commit().is_err());
+        assert!(listing(temp.path()).is_empty());
+    }
+
+    #[test]
+    fn one_file_is_replaced_whole_or_not_at_all() {
+        let temp = tempfile::tempdir().unwrap();
+        let path = temp.path().join("one.csv");
+        write_atomic(&path, "first").unwrap();
+        write_atomic(&path, "second").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "second");
+        assert!(write_atomic(&temp.path().join("none/one.csv"), "x").is_err());
+        assert_eq!(listing(temp.path()), ["one.csv"]);
+    }
+
+    #[test]
+    fn names_that_leave_the_folder_are_refused() {
+        let mut group = FileGroup::new(Path::new("x"));
+        for name in ["", ".", "..", "a/b", "/etc/x", "a/"] {
+            assert!(group.add(name, "").is_err(), "{name:?}");
+        }
+        group.add("a", "").unwrap();
+        assert!(matches!(group.add("a", ""), Err(OutputError::Duplicate { .. })));
+    }
+}

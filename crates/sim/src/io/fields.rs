@@ -1,0 +1,118 @@
+//! A whole velocity field at one time, at the centres of a stretched mesh, as data and as a table.
+//! Check: the table's rows are looked up at their places; the formats' tests read them back.
+
+use super::csv::Table;
+use super::error::{OutputError, OutputResult, increasing, same_length};
+
+/// Velocity and pressure at the centres of the cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VelocityField {
+    /// Title of the file.
+    pub title: String,
+    /// Time, s.
+    pub time_s: f64,
+    /// Centres along the flight, m, increasing.
+    pub x_m: Vec<f64>,
+    /// Centres across it, m, increasing.
+    pub y_m: Vec<f64>,
+    /// Heights of the centres, m, increasing.
+    pub z_m: Vec<f64>,
+    /// Velocities u, v, w, each `[z][y][x]`, m/s.
+    pub velocity_m_s: [Vec<f64>; 3],
+    /// Pressure over density, `[z][y][x]`, m^2/s^2, up to a constant.
+    pub pressure_m2_s2: Vec<f64>,
+    /// Magnitude of the vorticity, `[z][y][x]`, 1/s; where it is wanted.
+    pub vorticity_per_s: Option<Vec<f64>>,
+}
+
+impl VelocityField {
+    /// Checks axes and shapes.
+    ///
+    /// # Errors
+    /// An axis that is empty or does not increase, an array of another length, a value that is not finite.
+    pub fn check(&self) -> OutputResult<()> {
+        increasing("x_m", &self.x_m)?;
+        increasing("y_m", &self.y_m)?;
+        increasing("z_m", &self.z_m)?;
+        let cells = self.x_m.len() * self.y_m.len() * self.z_m.len();
+        for (name, values) in self.named() {
+            same_length(name, values.len(), "z_m x y_m x x_m", cells)?;
+            if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
+                return Err(OutputError::value(name, bad, "must be finite"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The fields with their names.
+    pub(crate) fn named(&self) -> impl Iterator<Item = (&'static str, &[f64])> {
+        let [u, v, w] = &self.velocity_m_s;
+        let always: [(&'static str, &[f64]); 4] =
+            [("u_m_s", u), ("v_m_s", v), ("w_m_s", w), ("pressure_m2_s2", &self.pressure_m2_s2)];
+        always.into_iter().chain(self.vorticity_per_s.as_deref().map(|values| ("vorticity_magnitude_hz", values)))
+    }
+
+    /// The table `time_s, z_m, y_m, x_m, u_m_s, v_m_s, w_m_s, pressure_m2_s2`, and `vorticity_magnitude_hz` (1/s) where
+    /// it is there, x running fastest.
+    ///
+    /// # Errors
+    /// What [`Self::check`] finds.
+    pub fn table(&self) -> OutputResult<Table> {
+        self.check()?;
+        let (nx, ny) = (self.x_m.len(), self.y_m.len());
+        let cells = || 0..self.velocity_m_s[0].len();
+        let table = Table::new()
+            .float("time_s", cells().map(|_| self.time_s))
+            .float("z_m", cells().map(|i| self.z_m[i / (nx * ny)]))
+            .float("y_m", cells().map(|i| self.y_m[i / nx % ny]))
+            .float("x_m", cells().map(|i| self.x_m[i % nx]));
+        Ok(self.named().fold(table, |table, (name, values)| table.float(name, values.iter().copied())))
+    }
+}
+
+#[cfg(test)]
+pub(crate) fn example() -> VelocityField {
+    let (x_m, y_m, z_m) = (vec![0.5, 1.5, 3.0], vec![-1.0, 0.5], vec![0.1, 0.3, 0.7, 1.5]);
+    let field = |a: f64| (0..24).map(|i| a + f64::from(i)).collect::<Vec<f64>>();
+    VelocityField {
+        title: "A flow".into(),
+        time_s: 2.5,
+        x_m,
+        y_m,
+        z_m,
+        velocity_m_s: [field(0.25), field(100.5), field(-300.0)],
+        pressure_m2_s2: field(0.125),
+        vorticity_per_s: Some(field(7.5)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::csv::Column;
+
+    #[test]
+    fn a_row_of_the_table_holds_the_values_of_its_place() {
+        let field = example();
+        let table = field.table().unwrap();
+        let column = |name: &str| match table.columns().iter().find(|(n, _)| n == name) {
+            Some((_, Column::Float(values))) => values.clone(),
+            other => panic!("{other:?}"),
+        };
+        let (i, j, k) = (2, 1, 3);
+        let row = (k * 2 + j) * 3 + i;
+        let place = [column("x_m")[row], column("y_m")[row], column("z_m")[row]];
+        assert_eq!(place, [field.x_m[i], field.y_m[j], field.z_m[k]]);
+        assert_eq!(column("w_m_s")[row], field.velocity_m_s[2][row]);
+    }
+
+    #[test]
+    fn wrong_lengths_and_values_are_refused() {
+        let mut short = example();
+        short.velocity_m_s[1].pop();
+        assert!(matches!(short.check(), Err(OutputError::Length { .. })));
+        let mut bad = example();
+        bad.pressure_m2_s2[3] = f64::NAN;
+        assert!(matches!(bad.check(), Err(OutputError::Value { .. })));
+    }
+}

@@ -1,0 +1,69 @@
+//! Files in and out: readers of NetCDF and text; tables as CSV, maps as CfRadial 1.4 and HALO `.hpl`, cross-planes as CF NetCDF and VTR.
+//! Every writer turns plain data and a [`Provenance`] into bytes (no clock, so the same run gives the same bytes);
+//! [`FileGroup`] puts a run's files on disk, all or none.
+//! Check: each format is read back by an independent reader in the tests.
+//!
+//! | module | writes | feature |
+//! |---|---|---|
+//! | [`map`] | (data) [`VelocityMap`], [`CrossPlanes`] | - |
+//! | [`fields`] | (data) [`VelocityField`] | - |
+//! | [`provenance`] | (data) where a file comes from | - |
+//! | [`site`] | (data) place and date of a measurement | - |
+//! | [`own`] | which files this program wrote, so that no other is replaced | - |
+//! | [`csv`] | any table | - |
+//! | [`tables`] | a map or planes as a table | - |
+//! | [`atomic`] | files to disk, all or none | - |
+//! | `text_file`, `netcdf_header`, `netcdf_input`, `planes_input` | (readers) texts, classic NetCDF, cross-planes in it | `netcdf` but for texts |
+//! | `lock` | nothing: one writer for a folder at a time | - |
+//! | [`hpl`] | one sweep as HALO raw file | - |
+//! | `cfradial`, `cf_planes`, `cf_fields` (through `netcdf`) | classic NetCDF | `netcdf` |
+//! | `vtr` | VTK rectilinear grids and their collection | `vtk` |
+
+pub mod atomic;
+#[cfg(feature = "netcdf")]
+pub(crate) mod netcdf_header;
+#[cfg(feature = "netcdf")]
+pub(crate) mod netcdf_input;
+#[cfg(feature = "netcdf")]
+pub(crate) mod planes_input;
+pub(crate) mod text_file;
+
+#[cfg(feature = "netcdf")]
+pub mod cf_fields;
+#[cfg(feature = "netcdf")]
+pub mod cf_planes;
+#[cfg(feature = "netcdf")]
+pub mod cf_signals;
+#[cfg(feature = "netcdf")]
+pub mod cfradial;
+pub mod csv;
+#[cfg(feature = "netcdf")]
+pub(crate) mod edges;
+mod error;
+pub mod fields;
+pub mod hpl;
+pub(crate) mod lock;
+pub mod map;
+#[cfg(feature = "netcdf")]
+pub(crate) mod netcdf;
+pub mod own;
+pub mod provenance;
+pub mod signals;
+pub mod site;
+pub mod tables;
+#[cfg(feature = "vtk")]
+pub mod vtr;
+
+pub use atomic::{FileGroup, write_atomic};
+pub use csv::Table;
+#[cfg(feature = "plots")]
+pub(crate) use error::same_length;
+pub use error::{OutputError, OutputResult};
+pub use fields::VelocityField;
+pub use map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+pub use own::Existing;
+pub use provenance::Provenance;
+pub use site::{Site, UtcTime};
+
+#[cfg(test)]
+pub(crate) mod samples;

@@ -1,0 +1,243 @@
+//! Reading classic NetCDF files: variables as `f64`, with their dimensions in a wanted order.
+//!
+//! Dimensions are found by what they are for: by the attribute `axis` of their coordinate, or by their name. Values are
+//! unpacked (`scale_factor`, `add_offset`), missing ones are NaN. Check: the readers of initial fields and of cross-planes read
+//! back what the writers wrote; files of another hand and damaged ones in the tests below.
+
+use crate::io::netcdf_header::{self as header, Attribute, Header, NumberType, Variable};
+use crate::{Error, io::text_file};
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// Longest header that is read \[bytes\].
+const LONGEST_HEADER_BYTES: u64 = 16 << 20;
+
+/// Largest variable that is read \[bytes\].
+const LARGEST_VARIABLE_BYTES: u64 = 4 << 30;
+
+/// What the library of NetCDF stores where nothing was written.
+const DEFAULT_FILL: f64 = 9.969_209_968_386_869e36;
+
+/// What a dimension is for: its name here, its letter in the attribute `axis`, and other names for it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Role {
+    name: &'static str,
+    axis: &'static str,
+    others: &'static [&'static str],
+}
+
+/// Time, or the age of a wake.
+pub(crate) const TIME: Role = Role { name: "time", axis: "T", others: &["tau", "t", "age"] };
+/// Along the flight.
+pub(crate) const X: Role = Role { name: "x", axis: "X", others: &["x_face", "xc", "xf", "xu"] };
+/// Across the flight.
+pub(crate) const Y: Role = Role { name: "y", axis: "Y", others: &["y_face", "yc", "yf", "yv", "lateral"] };
+/// Up.
+pub(crate) const Z: Role = Role { name: "z", axis: "Z", others: &["z_face", "zc", "zf", "zw", "height", "altitude"] };
+
+/// A classic NetCDF file, open.
+pub(crate) struct ClassicFile {
+    path: PathBuf,
+    file: File,
+    header: Header,
+}
+
+/// Opens a classic NetCDF file and reads its header.
+///
+/// # Errors
+/// What the system says; a file of another kind, or one whose header does not fit its length.
+pub(crate) fn open(path: &Path) -> Result<ClassicFile, Error> {
+    let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
+    let (mut file, length) = text_file::open(path).map_err(unreadable)?;
+    let mut beginning = Vec::new();
+    Read::by_ref(&mut file).take(LONGEST_HEADER_BYTES).read_to_end(&mut beginning).map_err(unreadable)?;
+    let header = header::read(&beginning, length)
+        .map_err(|reason| Error::Input { path: path.to_owned(), reason: reason.into() })?;
+    Ok(ClassicFile { path: path.to_owned(), file, header })
+}
+
+impl ClassicFile {
+    /// An error of this file.
+    pub(crate) fn refuse(&self, reason: String) -> Error {
+        Error::Input { path: self.path.clone(), reason }
+    }
+
+    fn variable(&self, name: &str) -> Option<&Variable> {
+        self.header.variables.iter().find(|variable| variable.name == name)
+    }
+
+    /// Whether it has a variable of this name.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.variable(name).is_some()
+    }
+
+    /// Names of the dimensions of a variable, slowest first; none if there is no such variable.
+    pub(crate) fn dims(&self, name: &str) -> Option<Vec<&str>> {
+        let dims = &self.variable(name)?.dims;
+        Some(dims.iter().map(|dim| self.header.dims[*dim].0.as_str()).collect())
+    }
+
+    /// A text attribute of a variable.
+    pub(crate) fn text(&self, variable: &str, name: &str) -> Option<&str> {
+        match self.attribute(variable, name)? {
+            Attribute::Text(text) => Some(text),
+            Attribute::Number(_) => None,
+        }
+    }
+
+    fn number(&self, variable: &str, name: &str) -> Option<f64> {
+        match self.attribute(variable, name)? {
+            Attribute::Number(value) => Some(*value),
+            Attribute::Text(_) => None,
+        }
+    }
+
+    fn attribute(&self, variable: &str, name: &str) -> Option<&Attribute> {
+        self.variable(variable)?.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value)
+    }
+
+    /// A variable as `f64`, whatever its type of number; NaN where a value is missing.
+    ///
+    /// # Errors
+    /// A variable that is not there, not made of numbers, too large, or not readable.
+    pub(crate) fn floats(&mut self, name: &str) -> Result<Vec<f64>, String> {
+        let Some(variable) = self.variable(name) else {
+            return Err(format!("it has no variable {name}"));
+        };
+        if variable.number == NumberType::Text {
+            return Err(format!("variable {name} is not made of numbers"));
+        }
+        let (number, begin, runs) = (variable.number, variable.begin, variable.runs);
+        let run_bytes = variable.run_bytes();
+        let bytes = run_bytes.saturating_mul(runs);
+        if bytes > LARGEST_VARIABLE_BYTES {
+            return Err(format!("variable {name} has more than {LARGEST_VARIABLE_BYTES} bytes: use one file per time"));
+        }
+        let fills = ["_FillValue", "missing_value"].map(|fill| self.number(name, fill));
+        let scale = self.number(name, "scale_factor").unwrap_or(1.0);
+        let offset = self.number(name, "add_offset").unwrap_or(0.0);
+        let packed = scale != 1.0 || offset != 0.0;
+        let unpack = |value: f64| {
+            let missing = fills.contains(&Some(value)) || (value / DEFAULT_FILL - 1.0).abs() < 1e-6;
+            match (missing, packed) {
+                (true, _) => f64::NAN,
+                (_, true) => value * scale + offset,
+                (_, false) => value,
+            }
+        };
+        let mut values = Vec::new();
+        values.try_reserve_exact((bytes / number.bytes()) as usize).map_err(|e| format!("variable {name}: {e}"))?;
+        let mut raw = vec![0; run_bytes as usize];
+        for run in 0..runs {
+            let at = SeekFrom::Start(begin + run * self.header.record_bytes);
+            self.file
+                .seek(at)
+                .and_then(|_| self.file.read_exact(&mut raw))
+                .map_err(|e| format!("variable {name} cannot be read: {e}"))?;
+            values.extend(raw.chunks_exact(number.bytes() as usize).map(|bytes| unpack(number.value(bytes))));
+        }
+        Ok(values)
+    }
+
+    /// The dimension of `variable` that has a role.
+    fn find(&self, dims: &[&str], role: Role) -> Option<usize> {
+        let of_axis = |dim: &&str| self.text(dim, "axis").is_some_and(|axis| axis.eq_ignore_ascii_case(role.axis));
+        let of_name = |dim: &&str| {
+            let dim = dim.to_ascii_lowercase();
+            dim == role.name || role.others.contains(&dim.as_str())
+        };
+        dims.iter().position(of_name).or_else(|| dims.iter().position(of_axis))
+    }
+
+    /// The dimensions of a variable that have these roles, in their order; dimensions of length 1 may be left over.
+    ///
+    /// # Errors
+    /// What to rename.
+    pub(crate) fn roles<const N: usize>(&self, name: &str, roles: [Role; N]) -> Result<[String; N], String> {
+        let needed = roles.each_ref().map(|role| role.name).join(", ");
+        let Some(dims) = self.dims(name) else {
+            return Err(format!("it has no variable {name}: one over {needed} is needed"));
+        };
+        let places: Vec<Option<usize>> = roles.iter().map(|role| self.find(&dims, *role)).collect();
+        let spare: Vec<&str> = (0..dims.len()).filter(|i| !places.contains(&Some(*i))).map(|i| dims[i]).collect();
+        let found: Vec<String> = places.iter().flatten().map(|place| dims[*place].to_owned()).collect();
+        if let Some(missing) = places.iter().position(Option::is_none) {
+            let role = roles[missing];
+            let known = spare.iter().find_map(|dim| presentable(dim));
+            let rename = known.map_or(String::new(), |dim| {
+                format!(": rename {dim}, in xarray with ds.rename({dim}=\"{}\"), or", role.name)
+            });
+            return Err(format!(
+                "{name} needs dimensions for {needed} (in any order), and none of its {} is {}{rename} give its coordinate the attribute \
+                 axis = \"{}\"",
+                dims.len(),
+                role.name,
+                role.axis
+            ));
+        }
+        if let Some(long) = spare.iter().find(|dim| self.length(dim) != Some(1)) {
+            let which = presentable(long).unwrap_or("dimension");
+            return Err(format!("{name} has a further {which} of more than one value: select one of them first"));
+        }
+        found.try_into().map_err(|_| format!("{name} has one dimension for two of its axes"))
+    }
+
+    fn length(&self, dim: &str) -> Option<u64> {
+        self.header.dims.iter().find(|(name, _)| name == dim).map(|(_, length)| *length)
+    }
+
+    /// The coordinate of a dimension.
+    ///
+    /// # Errors
+    /// There is none, or it has another length.
+    pub(crate) fn coordinate(&mut self, dim: &str) -> Result<Vec<f64>, String> {
+        let shown = presentable(dim).unwrap_or("a dimension").to_owned();
+        if !self.has(dim) {
+            return Err(format!("{shown} has no coordinate: a variable of that name with its positions is needed"));
+        }
+        let values = self.floats(dim).map_err(|_| format!("the coordinate of {shown} cannot be read"))?;
+        if self.length(dim) != Some(values.len() as u64) {
+            return Err(format!("the coordinate of {shown} has not the length of its dimension"));
+        }
+        Ok(values)
+    }
+
+    /// Values of a variable with its dimensions in this order, the last one fastest.
+    ///
+    /// # Errors
+    /// As [`Self::floats`].
+    pub(crate) fn ordered(&mut self, name: &str, order: &[String]) -> Result<Vec<f64>, String> {
+        let dims: Vec<String> = self.dims(name).unwrap_or_default().into_iter().map(str::to_owned).collect();
+        let values = self.floats(name)?;
+        if dims == order {
+            return Ok(values);
+        }
+        let lengths: Vec<usize> = dims.iter().map(|dim| self.length(dim).unwrap_or(1) as usize).collect();
+        let stride = |dim: &String| {
+            let place = dims.iter().position(|d| d == dim);
+            place.map_or((1, 0), |i| (lengths[i], lengths[i + 1..].iter().product::<usize>()))
+        };
+        let axes: Vec<(usize, usize)> = order.iter().map(stride).collect();
+        let mut out = Vec::with_capacity(values.len());
+        for at in 0..values.len() {
+            let (mut rest, mut from) = (at, 0);
+            for (length, step) in axes.iter().rev() {
+                from += rest % length * step;
+                rest /= length;
+            }
+            out.extend(values.get(from));
+        }
+        Ok(out)
+    }
+}
+
+/// A name that may be shown: a short word of letters, digits and underscores. Nothing else of a file is.
+fn presentable(name: &str) -> Option<&str> {
+    let plain = name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
+    (plain && !name.is_empty() && name.len() <= 32).then_some(name)
+}
+
+#[cfg(test)]
+#[path = "netcdf_input_tests.rs"]
+mod tests;

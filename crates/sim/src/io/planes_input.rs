@@ -1,0 +1,173 @@
+//! Cross-planes of a simulated flow, read back from the files that `wakescope flow` writes.
+//!
+//! A file has the variables `v` and `w` in m/s over (`tau`, `z`, `y`), the coordinates of the same names, and `time`; attributes
+//! `edges` of `y` and `z` say what lies beyond their ends. Files of others may have `time` in place of `tau`, and any order.
+//! Check: what was written comes back; files that lack something are refused by name.
+
+use crate::Error;
+use crate::io::netcdf_input::{ClassicFile, TIME, Y, Z, open};
+use crate::io::{CrossPlanes, OPEN_EDGES, edges};
+use ndarray::Array3;
+use std::path::{Path, PathBuf};
+use wakescope_les::winds::Edges;
+
+/// The files that `planes` names: itself, or the numbered files `planes_0001.nc`, ... in the order of their names.
+///
+/// # Errors
+/// There is neither.
+pub(crate) fn files(planes: &Path) -> Result<Vec<PathBuf>, Error> {
+    if planes.is_file() {
+        return Ok(vec![planes.to_owned()]);
+    }
+    let folder = planes.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let stem = planes.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let numbered = |path: &PathBuf| {
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let number = name.strip_prefix(&format!("{stem}_")).and_then(|rest| rest.strip_suffix(".nc"));
+        number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    let listed = std::fs::read_dir(folder).map(|entries| entries.filter_map(|e| Some(e.ok()?.path())));
+    let mut found: Vec<PathBuf> = listed.map(|paths| paths.filter(numbered).collect()).unwrap_or_default();
+    // Longer numbers behind shorter ones.
+    found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
+    if found.is_empty() {
+        let reason = format!("neither a file nor the beginning of files {stem}_0001.nc, ... in {}", folder.display());
+        return Err(Error::Input { path: planes.to_owned(), reason });
+    }
+    Ok(found)
+}
+
+/// Reads one file.
+///
+/// # Errors
+/// A file that cannot be read, lacks a variable, or has values that are missing.
+pub(crate) fn read(path: &Path) -> Result<CrossPlanes, Error> {
+    let mut file = open(path)?;
+    planes(&mut file).map_err(|reason| file.refuse(reason))
+}
+
+fn planes(file: &mut ClassicFile) -> Result<CrossPlanes, String> {
+    let dims = file.roles("v", [TIME, Z, Y])?;
+    let others = file.roles("w", [TIME, Z, Y])?;
+    if dims != others {
+        return Err("v and w have not the same dimensions".into());
+    }
+    let [time, z, y] = &dims;
+    let (z_m, y_m) = (file.coordinate(z)?, file.coordinate(y)?);
+    let [tau, time_s] = times(file, time)?;
+    for (name, values) in [("tau", &tau), ("time", &time_s), ("z", &z_m), ("y", &y_m)] {
+        let increases = values.windows(2).all(|pair| pair[1] > pair[0]) && values.iter().all(|v| v.is_finite());
+        if !increases || values.is_empty() {
+            return Err(format!("{name} must have at least one value, be finite and increase from value to value"));
+        }
+    }
+    let shape = (tau.len(), z_m.len(), y_m.len());
+    let mut component = |name: &str| -> Result<Array3<f64>, String> {
+        let values = file.ordered(name, &dims)?;
+        if let Some(place) = values.iter().position(|v| !v.is_finite()) {
+            return Err(format!("{name} is missing or not finite at place {place}"));
+        }
+        Array3::from_shape_vec(shape, values).map_err(|_| format!("{name} has not the lengths of its coordinates"))
+    };
+    let (v_m_s, w_m_s) = (component("v")?, component("w")?);
+    let (y_edges, z_edges) = (ends(file, y)?, ends(file, z)?);
+    let planes = CrossPlanes { title: String::new(), tau, time_s, y_m, z_m, v_m_s, w_m_s, y_edges, z_edges };
+    planes.check().map_err(|e| e.to_string())?;
+    Ok(planes)
+}
+
+/// Ages and times \[s\] of the planes: each from the variable of its name, or else from the coordinate of the planes.
+fn times(file: &mut ClassicFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
+    let count = file.coordinate(dim)?.len();
+    let is_age = ["tau", "age"].contains(&dim.to_ascii_lowercase().as_str());
+    let mut values = |name: &str| -> Result<Vec<f64>, String> {
+        if name == "time" && is_age && !file.has(name) {
+            return Err("it has no variable time, the times of the planes in s".into());
+        }
+        let source = if file.has(name) { name } else { dim };
+        if name == "time" {
+            in_seconds(file, source)?;
+        }
+        let values = file.floats(source)?;
+        if values.len() == count { Ok(values) } else { Err(format!("{name} has not one value for each plane")) }
+    };
+    Ok([values("tau")?, values("time")?])
+}
+
+/// Times have no unit, or seconds.
+fn in_seconds(file: &ClassicFile, name: &str) -> Result<(), String> {
+    let unit = file.text(name, "units").and_then(|units| units.split_whitespace().next());
+    match unit {
+        None | Some("s" | "sec" | "secs" | "second" | "seconds" | "1") => Ok(()),
+        Some(_) => Err("time is not in seconds: its attribute units must be s, or begin with seconds".into()),
+    }
+}
+
+/// The ends of an axis; open if the file does not say.
+fn ends(file: &ClassicFile, axis: &str) -> Result<Edges, String> {
+    match file.text(axis, "edges") {
+        Some(text) => edges::from_text(text)
+            .ok_or_else(|| "an attribute edges must be as `wakescope flow` writes it, or be taken out".to_owned()),
+        None => Ok(OPEN_EDGES),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::cf_planes::cf_planes_bytes;
+    use crate::io::samples;
+    use wakescope_les::winds::Side;
+
+    fn written(planes: &CrossPlanes) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("plane1_0001.nc");
+        let origin = crate::io::provenance::example();
+        std::fs::write(&path, cf_planes_bytes(planes, &origin).unwrap()).unwrap();
+        (folder, path)
+    }
+
+    fn whole() -> CrossPlanes {
+        let mut planes = samples::planes();
+        planes.v_m_s[[0, 0, 0]] = 0.25;
+        planes.y_edges = Edges::Periodic { period_m: 100.0 };
+        let ground = Side::NoSlipWall { position_m: 0.0, velocity_m_s: [0.0; 3] };
+        planes.z_edges = Edges::Bounded { low: ground, high: Side::Open };
+        planes
+    }
+
+    #[test]
+    fn planes_come_back_with_their_walls_and_periods() {
+        let planes = whole();
+        let (_folder, path) = written(&planes);
+        let found = read(&path).unwrap();
+        let single = |field: &Array3<f64>| field.mapv(|v| f64::from(v as f32));
+        assert_eq!((found.v_m_s, found.w_m_s), (single(&planes.v_m_s), single(&planes.w_m_s)));
+        assert_eq!((found.y_m, found.z_m, found.time_s), (planes.y_m, planes.z_m, planes.time_s));
+        assert_eq!((found.tau, found.y_edges, found.z_edges), (planes.tau, planes.y_edges, planes.z_edges));
+    }
+
+    #[test]
+    fn missing_values_and_missing_files_are_refused_by_name() {
+        let (_folder, path) = written(&samples::planes());
+        let message = read(&path).unwrap_err().to_string();
+        assert!(message.contains("plane1_0001.nc: v is missing"), "{message}");
+        let folder = tempfile::tempdir().unwrap();
+        let message = files(&folder.path().join("plane1")).unwrap_err().to_string();
+        assert!(message.contains("plane1_0001.nc"), "{message}");
+        std::fs::write(folder.path().join("other.nc"), b"no such file").unwrap();
+        let message = read(&folder.path().join("other.nc")).unwrap_err().to_string();
+        assert!(message.contains("no NetCDF file"), "{message}");
+    }
+
+    #[test]
+    fn numbered_files_come_in_the_order_of_their_numbers() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["plane1_0002.nc", "plane1_10000.nc", "plane1_0001.nc", "plane1_x.nc", "plane10_0001.nc"] {
+            std::fs::write(folder.path().join(name), b"").unwrap();
+        }
+        let found = files(&folder.path().join("plane1")).unwrap();
+        let names: Vec<_> = found.iter().map(|p| p.file_name().unwrap().to_string_lossy().into_owned()).collect();
+        assert_eq!(names, ["plane1_0001.nc", "plane1_0002.nc", "plane1_10000.nc"]);
+    }
+}

@@ -1,0 +1,159 @@
+//! Raw signals at the border to files, and their table.
+//! Check: the tests compare the table with the array.
+
+use super::csv::Table;
+use super::error::{OutputError, OutputResult, increasing, same_length};
+use ndarray::ArrayView2;
+
+/// How the signals of a scan were recorded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recording {
+    /// Sampling frequency, Hz.
+    pub sampling_hz: f64,
+    /// Frequency of air at rest in the records, Hz: 0 for baseband signals.
+    pub intermediate_frequency_hz: f64,
+    /// Width of the detector band about that frequency, Hz.
+    pub bandwidth_hz: f64,
+    /// Wavelength, m.
+    pub wavelength_m: f64,
+    /// Pulse repetition frequency, Hz.
+    pub pulse_repetition_hz: f64,
+    /// Half width of the pulse's power where it is 1/e of its largest, or that of the Gaussian with the same spread, s.
+    pub pulse_sigma_s: f64,
+    /// Mean square of the noise of a sample, of both quadratures together, A^2.
+    pub noise_power_a2: f64,
+}
+
+/// The air along the lines of sight: what an estimate is to be held against.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineVelocities<'a> {
+    /// Ranges, m, increasing.
+    pub range_m: Vec<f64>,
+    /// Radial velocity `[line, range]`, m/s, positive away from the lidar; NaN where nothing returns light.
+    pub radial_velocity_m_s: ArrayView2<'a, f64>,
+}
+
+/// The signals of a scan, pulse by pulse, one realisation after the other; the large arrays are borrowed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawSignals<'a> {
+    /// How they were recorded.
+    pub recording: Recording,
+    /// The air along the lines.
+    pub truth: LineVelocities<'a>,
+    /// Time of each pulse of one realisation from the start of the flow, s.
+    pub pulse_time_s: Vec<f64>,
+    /// Current of the detector `[pulse, sample]`, A.
+    pub current_a: ArrayView2<'a, f64>,
+    /// Second quadrature of a complex baseband signal, whose first is `current_a`.
+    pub quadrature_a: Option<ArrayView2<'a, f64>>,
+    /// Elevation of each pulse of one realisation, rad.
+    pub elevation_rad: Vec<f64>,
+    /// Time of each sample after the middle of the pulse left, s; increasing.
+    pub time_s: Vec<f64>,
+    /// Pulses of one line of sight, which stand together.
+    pub pulses_per_line: usize,
+}
+
+impl RawSignals<'_> {
+    /// Checks the shapes.
+    ///
+    /// # Errors
+    /// Lengths that do not match, times that do not increase, values that are not finite.
+    pub fn check(&self) -> OutputResult<()> {
+        increasing("time_s", &self.time_s)?;
+        same_length("current_a", self.current_a.ncols(), "time_s", self.time_s.len())?;
+        let pulses = self.elevation_rad.len();
+        same_length("current_a", self.current_a.nrows(), "elevation_rad", pulses * self.realisations())?;
+        same_length("pulse_time_s", self.pulse_time_s.len(), "elevation_rad", pulses)?;
+        if let Some(quadrature) = &self.quadrature_a {
+            same_length("quadrature_a", quadrature.nrows(), "current_a", self.current_a.nrows())?;
+            same_length("quadrature_a", quadrature.ncols(), "time_s", self.time_s.len())?;
+        }
+        increasing("range_m", &self.truth.range_m)?;
+        let (lines, ranges) = self.truth.radial_velocity_m_s.dim();
+        same_length("radial_velocity_m_s", ranges, "range_m", self.truth.range_m.len())?;
+        same_length("radial_velocity_m_s", lines, "the lines", pulses.div_ceil(self.pulses_per_line.max(1)))?;
+        match self.current_a.iter().chain(self.quadrature_a.iter().flatten()).find(|a| !a.is_finite()) {
+            Some(bad) => Err(OutputError::value("current_a", bad, "must be finite")),
+            None => Ok(()),
+        }
+    }
+
+    /// Realisations of the scan, one after the other.
+    pub fn realisations(&self) -> usize {
+        self.current_a.nrows() / self.elevation_rad.len().max(1)
+    }
+
+    /// The first pulse of each line of the first realisation as a long table; the NetCDF file holds all pulses.
+    ///
+    /// # Errors
+    /// As [`RawSignals::check`].
+    pub fn table(&self) -> OutputResult<Table> {
+        self.check()?;
+        let rays: Vec<usize> = (0..self.elevation_rad.len()).step_by(self.pulses_per_line.max(1)).collect();
+        let samples = self.time_s.len();
+        let cells = || (0..rays.len() * samples).map(|cell| (rays[cell / samples], cell % samples));
+        let table = Table::new()
+            .int("ray", cells().map(|(ray, _)| ray as i64))
+            .float("time_s", cells().map(|(_, k)| self.time_s[k]))
+            .float("current_a", cells().map(|(ray, k)| self.current_a[[ray, k]]));
+        Ok(match &self.quadrature_a {
+            Some(quadrature) => table.float("quadrature_a", cells().map(|(ray, k)| quadrature[[ray, k]])),
+            None => table,
+        })
+    }
+}
+
+/// Two realisations of two lines of two pulses.
+#[cfg(test)]
+pub(crate) fn example() -> RawSignals<'static> {
+    const CURRENT_A: [[f64; 3]; 8] = [
+        [0.0, 1.0, 2.0],
+        [10.0, 11.0, 12.0],
+        [20.0, 21.0, 22.0],
+        [30.0, 31.0, 32.0],
+        [40.0, 41.0, 42.0],
+        [50.0, 51.0, 52.0],
+        [60.0, 61.0, 62.0],
+        [70.0, 71.0, 72.0],
+    ];
+    RawSignals {
+        recording: Recording {
+            sampling_hz: 1e6,
+            intermediate_frequency_hz: 8e5,
+            bandwidth_hz: 5e5,
+            wavelength_m: 1.5e-6,
+            pulse_repetition_hz: 400.0,
+            pulse_sigma_s: 1.2e-7,
+            noise_power_a2: 3e-13,
+        },
+        truth: LineVelocities {
+            range_m: vec![100.0, 130.0],
+            radial_velocity_m_s: ndarray::aview2(&[[1.5, -2.5], [f64::NAN, 0.5]]),
+        },
+        pulse_time_s: vec![8.0, 8.0025, 8.005, 8.0075],
+        current_a: ndarray::aview2(&CURRENT_A),
+        quadrature_a: None,
+        elevation_rad: vec![0.0, 0.0, 0.1, 0.1],
+        time_s: vec![1e-6, 2e-6, 3e-6],
+        pulses_per_line: 2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_holds_the_first_pulse_of_each_line() {
+        let signals = example();
+        let table = signals.table().unwrap();
+        let current = &table.columns()[2].1;
+        assert_eq!(*current, crate::io::csv::Column::Float(vec![0.0, 1.0, 2.0, 20.0, 21.0, 22.0]));
+        assert_eq!(signals.realisations(), 2);
+        assert!(RawSignals { time_s: vec![1.0], ..signals.clone() }.check().is_err());
+        assert!(RawSignals { pulse_time_s: vec![1.0], ..signals.clone() }.check().is_err());
+        let odd = signals.current_a.slice_move(ndarray::s![..7, ..]);
+        assert!(RawSignals { current_a: odd, ..signals }.check().is_err(), "half a realisation");
+    }
+}

@@ -1,0 +1,140 @@
+//! A scanned map or a set of cross-planes as a table in long form, one row per value, slowest axis first.
+//! Check: positions are recomputed from angles, and a value is looked up at its (ray, gate).
+
+use super::csv::{Column, Table};
+use super::error::OutputResult;
+use super::map::{CrossPlanes, Field, FieldKind, VelocityMap};
+
+/// The table of a map: `tau, range_m, elevation_rad, y_m, z_m`, then the fields in order, then `azimuth_rad, time_s, sweep, ray`.
+/// One row per (ray, gate), the gate running fastest.
+///
+/// # Errors
+/// What [`VelocityMap::check`] finds.
+pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
+    map.check()?;
+    let gates = map.range_m.len();
+    let cells = || (0..map.rays.len() * gates).map(|cell| (cell / gates, cell % gates));
+    let per_ray = |get: &dyn Fn(usize) -> f64| -> Vec<f64> { cells().map(|(r, _)| get(r)).collect() };
+    let mut table = Table::new()
+        .float("tau", per_ray(&|r| map.sweeps[map.rays[r].sweep].tau))
+        .float("range_m", cells().map(|(_, g)| map.range_m[g]))
+        .float("elevation_rad", per_ray(&|r| map.rays[r].elevation_rad))
+        .float("y_m", cells().map(|(r, g)| map.y_m(r, g)))
+        .float("z_m", cells().map(|(r, g)| map.z_m(r, g)));
+    for field in &map.fields {
+        table = table.column(&field.column(), field_column(field));
+    }
+    Ok(table
+        .float("azimuth_rad", per_ray(&|r| map.rays[r].azimuth_rad))
+        .float("time_s", per_ray(&|r| map.rays[r].time_s))
+        .int("sweep", cells().map(|(r, _)| map.rays[r].sweep as i64))
+        .int("ray", cells().map(|(r, _)| r as i64)))
+}
+
+fn field_column(field: &Field) -> Column {
+    match field.kind {
+        FieldKind::Float => Column::Float(field.values.iter().copied().collect()),
+        FieldKind::Flag { .. } => Column::Int(field.values.iter().map(|v| *v as i64).collect()),
+    }
+}
+
+/// The table of cross-planes: `tau, z_m, y_m, v_m_s, w_m_s, time_s`, with `y_m` running fastest.
+///
+/// # Errors
+/// What [`CrossPlanes::check`] finds.
+pub fn planes_table(planes: &CrossPlanes) -> OutputResult<Table> {
+    planes.check()?;
+    let (ny, nz) = (planes.y_m.len(), planes.z_m.len());
+    let cells = || 0..planes.tau.len() * nz * ny;
+    Ok(Table::new()
+        .float("tau", cells().map(|i| planes.tau[i / (nz * ny)]))
+        .float("z_m", cells().map(|i| planes.z_m[i / ny % nz]))
+        .float("y_m", cells().map(|i| planes.y_m[i % ny]))
+        .float("v_m_s", planes.v_m_s.iter().copied())
+        .float("w_m_s", planes.w_m_s.iter().copied())
+        .float("time_s", cells().map(|i| planes.time_s[i / (nz * ny)])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples;
+    use super::*;
+    use crate::io::OutputError;
+
+    fn floats<'a>(table: &'a Table, name: &str) -> &'a [f64] {
+        match table.columns().iter().find(|(n, _)| n == name) {
+            Some((_, Column::Float(v))) => v,
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_map_row_holds_the_value_and_place_of_its_cell() {
+        let map = samples::map();
+        let table = map_table(&map).unwrap();
+        let (ray, gate) = (7, 3);
+        let row = ray * map.range_m.len() + gate;
+        assert_eq!(floats(&table, "v_mean_m_s")[row], map.field("radial_velocity").unwrap().values[[ray, gate]]);
+        let (y, z) = (floats(&table, "y_m")[row], floats(&table, "z_m")[row]);
+        let range = (y - map.lidar_y_m).hypot(z - map.lidar_height_m);
+        approx::assert_relative_eq!(range, map.range_m[gate], max_relative = 1e-14);
+        approx::assert_relative_eq!(
+            (z - map.lidar_height_m).atan2(y - map.lidar_y_m),
+            map.rays[ray].elevation_rad,
+            max_relative = 1e-12
+        );
+        let names: Vec<&str> = table.columns().iter().map(|(n, _)| n.as_str()).collect();
+        assert_eq!(names[..6], ["tau", "range_m", "elevation_rad", "y_m", "z_m", "v_exact_m_s"]);
+        for name in ["v_mean_m_s", "std_m_s", "rms_m_s", "level", "n_eff", "snr_db"] {
+            assert!(names.contains(&name), "{name} missing in {names:?}");
+        }
+    }
+
+    #[test]
+    fn planes_run_fastest_along_y() {
+        let planes = samples::planes();
+        let table = planes_table(&planes).unwrap();
+        let (ny, nz) = (planes.y_m.len(), planes.z_m.len());
+        let row = (ny * nz) + 2 * ny + 3;
+        assert_eq!(floats(&table, "w_m_s")[row], planes.w_m_s[[1, 2, 3]]);
+        assert_eq!(floats(&table, "y_m")[row], planes.y_m[3]);
+        assert_eq!(floats(&table, "z_m")[row], planes.z_m[2]);
+        assert_eq!(floats(&table, "tau")[row], planes.tau[1]);
+    }
+
+    #[test]
+    fn broken_maps_are_refused() {
+        let refused = |spoil: &dyn Fn(&mut VelocityMap)| {
+            let mut map = samples::map();
+            spoil(&mut map);
+            map_table(&map).unwrap_err()
+        };
+        assert!(matches!(refused(&|m| m.range_m[1] = m.range_m[0]), OutputError::Value { .. }));
+        assert!(matches!(refused(&|m| m.rays[1].time_s = m.rays[0].time_s), OutputError::Value { .. }));
+        assert!(matches!(refused(&|m| m.rays[2].sweep = 1), OutputError::Value { .. }));
+        assert!(matches!(
+            refused(&|m| {
+                m.sweeps.pop();
+            }),
+            OutputError::Length { .. }
+        ));
+        assert!(matches!(refused(&|m| m.fields[0].values[[0, 0]] = f64::INFINITY), OutputError::Value { .. }));
+        assert!(matches!(refused(&|m| m.fields[1].name = m.fields[0].name.clone()), OutputError::Duplicate { .. }));
+        assert!(matches!(
+            refused(&|m| {
+                m.range_m.pop();
+            }),
+            OutputError::Length { .. }
+        ));
+        assert!(matches!(
+            refused(&|m| {
+                for f in &mut m.fields {
+                    if matches!(f.kind, FieldKind::Flag { .. }) {
+                        f.values[[0, 0]] = 9.0;
+                    }
+                }
+            }),
+            OutputError::Value { .. }
+        ));
+    }
+}

@@ -1,0 +1,35 @@
+//! A text and the file that it came from, by which problems that are found later are given their lines.
+
+use super::problem::{Problem, SceneError};
+use super::vet::Document;
+use std::path::{Path, PathBuf};
+
+/// The text of a scene or a case; empty for one that was made in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Source {
+    path: PathBuf,
+    text: String,
+}
+
+impl Source {
+    pub(crate) fn new(path: &Path, text: &str) -> Self {
+        Self { path: path.to_owned(), text: text.to_owned() }
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The folder from which files that the text names are looked for.
+    pub(crate) fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Problems with the lines of the text.
+    pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
+        match Document::parse(&self.text, &self.path) {
+            Ok(document) => document.located(problems),
+            Err(error) => error,
+        }
+    }
+}

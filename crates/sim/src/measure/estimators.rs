@@ -1,0 +1,383 @@
+//! The estimator of a scene in the words of `estimate`: statistic of the windows, estimator of their mean, models of both.
+
+use crate::Error;
+use crate::measure::instrument::Instrument;
+use crate::scene::{
+    CorrelogramForm, DetectorSignal, Estimator as Words, GradientLikelihood, Method, ModelOrder, NoiseKind,
+    OrderChoice, PulseShape, Refinement, Scene, Weighting,
+};
+use ndarray::Array2;
+use num_complex::Complex;
+use wakescope_estimate as estimate;
+use wakescope_estimate::{Estimator, SignalKind, Statistic, window::Sample};
+use wakescope_signal::Pulse;
+
+/// The sampling of the records, in the words of the estimators.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn sampling(scene: &Scene) -> Result<estimate::Sampling, Error> {
+    let d = &scene.detector;
+    let lambda_m = scene.laser.wavelength_m;
+    let half_hz = 0.5 * d.bandwidth_hz;
+    let band_hz = (d.intermediate_frequency_hz - half_hz, d.intermediate_frequency_hz + half_hz);
+    Ok(match d.signal {
+        DetectorSignal::IntermediateFrequency => {
+            estimate::Sampling::new(d.sampling_hz, d.intermediate_frequency_hz, lambda_m, band_hz)?
+        }
+        DetectorSignal::Baseband => estimate::Sampling::baseband(d.sampling_hz, lambda_m, d.bandwidth_hz)?,
+    })
+}
+
+/// Whether the records are real or complex.
+pub fn signal_kind(scene: &Scene) -> SignalKind {
+    match scene.detector.signal {
+        DetectorSignal::IntermediateFrequency => SignalKind::Real,
+        DetectorSignal::Baseband => SignalKind::Complex,
+    }
+}
+
+/// The windows that are accumulated.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn gates(scene: &Scene) -> Result<estimate::Gates, Error> {
+    let e = &scene.estimator;
+    let first_sample_time_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
+    Ok(estimate::Gates::new(e.window_samples, e.window_step_samples, first_sample_time_s)?)
+}
+
+/// The weighting of the windows.
+pub fn weighting(scene: &Scene) -> estimate::Weighting {
+    match scene.estimator.weighting {
+        Weighting::Gaussian => estimate::Weighting::default(),
+        Weighting::Rectangular => estimate::Weighting::Rectangular,
+        Weighting::Hann => estimate::Weighting::Hann,
+    }
+}
+
+/// How a peak is refined.
+pub fn refinement(scene: &Scene) -> estimate::Refinement {
+    match scene.estimator.refinement {
+        Refinement::Parabola => estimate::Refinement::Parabola,
+        Refinement::Exact => estimate::Refinement::Exact,
+        Refinement::None => estimate::Refinement::None,
+    }
+}
+
+/// Real part of the autocorrelation of the pulse at a lag of its samples, its mean frequency taken out; 1 at lag 0.
+///
+/// `exp(-tau^2/(4 sigma^2))` for a Gaussian.
+fn pulse_correlation(scene: &Scene, pulse: &Pulse) -> Vec<f64> {
+    let (count, period_s) = (scene.samples_per_record(), 1.0 / scene.detector.sampling_hz);
+    let plain = matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
+    if plain {
+        let lag = |m: usize| m as f64 * period_s / pulse.sigma_s();
+        return (0..count).map(|m| (-0.25 * lag(m).powi(2)).exp()).collect();
+    }
+    // Fine enough for the spectrum of the pulse; the sum over a smooth pulse that ends at 0 converges fast.
+    let parts = (16.0 * pulse.spectral_width_hz() * period_s).ceil().max(1.0) as usize;
+    let step_s = period_s / parts as f64;
+    let (first_s, last_s) = pulse.support_s();
+    let steps = ((last_s - first_s) / step_s).ceil() as usize;
+    let turn = -std::f64::consts::TAU * pulse.mean_frequency_hz();
+    let at = |i: usize| {
+        let time_s = first_s + i as f64 * step_s;
+        pulse.envelope_per_sqrt_s(time_s) * Complex::from_polar(1.0, turn * time_s)
+    };
+    let envelope: Vec<Complex<f64>> = (0..=steps).map(at).collect();
+    let lag = |m: usize| -> f64 {
+        envelope.iter().skip(m * parts).zip(&envelope).map(|(late, early)| (late * early.conj()).re).sum()
+    };
+    let energy = lag(0);
+    (0..count).map(|m| if m * parts <= steps { lag(m) / energy } else { 0.0 }).collect()
+}
+
+/// Second-order model of a window of the scene in a uniform wind and a noise, for likelihood and bound.
+///
+/// `None` without noise: no bound is above 0 then.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn window_model(
+    scene: &Scene,
+    noise: NoiseKind,
+    pulse: &Pulse,
+) -> Result<Option<estimate::bound::WindowModel>, Error> {
+    let noise = match noise {
+        NoiseKind::White => estimate::bound::Noise::White,
+        // A floor of a millionth keeps the covariance regular.
+        NoiseKind::Band => estimate::bound::Noise::Band { floor: 1e-6 },
+        NoiseKind::None => return Ok(None),
+    };
+    let correlation = pulse_correlation(scene, pulse);
+    let n = scene.estimator.window_samples;
+    let at = |m: usize| correlation.get(m).copied().unwrap_or(0.0);
+    let envelope = Array2::from_shape_fn((n, n), |(a, b)| at(a.abs_diff(b)));
+    Ok(Some(estimate::bound::WindowModel::with_envelope(&sampling(scene)?, envelope, noise)?))
+}
+
+/// The bound of one window at rest, m/s. Where the noise of the model is too small outside the band for double precision, at
+/// high signal-to-noise ratios and in long windows, that of the smallest floor which is not.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn bound_m_s(model: &estimate::bound::WindowModel, snr: f64, kind: SignalKind) -> Result<f64, Error> {
+    match model.bound_m_s(0.0, snr, kind, 1.0) {
+        Err(estimate::Error::NoiseFloor { least, .. }) => {
+            let noise = estimate::bound::Noise::Band { floor: least };
+            let envelope = model.envelope().to_owned();
+            let model = estimate::bound::WindowModel::with_envelope(model.sampling(), envelope, noise)?;
+            Ok(model.bound_m_s(0.0, snr, kind, 1.0)?)
+        }
+        bound => Ok(bound?),
+    }
+}
+
+/// Correlation between windows of one pulse: of the speckle, and of the noise at a signal-to-noise ratio `snr`.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub fn window_correlation(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<estimate::map::WindowCorrelation, Error> {
+    let e = &scene.estimator;
+    let window = weighting(scene).weights(e.window_samples)?;
+    let d = &scene.detector;
+    let in_band_hz = match (d.noise, d.signal) {
+        (NoiseKind::White, DetectorSignal::IntermediateFrequency) => 0.5 * d.sampling_hz,
+        (NoiseKind::White, DetectorSignal::Baseband) => d.sampling_hz,
+        (NoiseKind::Band | NoiseKind::None, _) => d.bandwidth_hz,
+    };
+    let snr = if d.noise == NoiseKind::None { f64::INFINITY } else { snr };
+    // Without any return there is only noise, which a large finite ratio says as well.
+    let noise_to_signal = (in_band_hz / d.bandwidth_hz / snr).min(1e12);
+    let correlation = pulse_correlation(scene, pulse);
+    let covariance = |m: usize| correlation.get(m).copied().unwrap_or(0.0) + if m == 0 { noise_to_signal } else { 0.0 };
+    let samples = scene.samples_per_record();
+    Ok(estimate::map::WindowCorrelation::from_covariance(&window, e.window_step_samples, samples, covariance)?)
+}
+
+/// What is known of the windows before any is seen, for estimators that are planned for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowStatistics {
+    /// Signal-to-noise ratio in the detector band, a power ratio.
+    pub snr: f64,
+    /// Independent windows of a region in the middle of the scan.
+    pub n_eff: f64,
+}
+
+/// Statistic and estimator of a scene.
+pub struct Toolkit<S> {
+    /// Numbers of each window.
+    pub statistic: Box<dyn Statistic<S>>,
+    /// Velocity of their mean.
+    pub estimator: Box<dyn Estimator>,
+    /// The same for the complex mean of lines that were shifted, if the scene follows the wind.
+    pub following: Option<Box<dyn Estimator>>,
+    /// The test against noise, if the scene has noise and the method one.
+    pub test: Option<estimate::estimators::NoiseTest>,
+    /// What the estimator finds in the mean statistic of the scene's noise: its power and its density, A^2.
+    pub noise: Option<estimate::GateVelocity>,
+}
+
+impl<S: Sample> Toolkit<S> {
+    /// Plans the estimator of a scene for samples of its kind.
+    ///
+    /// # Errors
+    /// What the estimators refuse, such as a covariance that cannot be diagonalised.
+    pub fn new(scene: &Scene, instrument: &Instrument, known: &WindowStatistics) -> Result<Self, Error> {
+        let e = &scene.estimator;
+        let snr = e.method.likelihood_snr_db().map_or(known.snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8);
+        match e.method {
+            Method::GradientLikelihood(own) => gradient_likelihood(scene, instrument, &own, snr),
+            Method::Likelihood(_) => {
+                // The tapers are those of white noise and need no inverse, whatever the noise.
+                let model = window_model(scene, NoiseKind::White, &instrument.pulse)?
+                    .ok_or(estimate::Error::Empty { field: "noise" })?;
+                let tapers = estimate::estimators::likelihood_tapers(&model, snr)?;
+                let statistic = estimate::Correlogram::<S>::with_tapers(tapers.clone())?;
+                let weights = statistic.lag_weights();
+                Self::planned(scene, instrument, Box::new(statistic), &weights, &tapers, known)
+            }
+            Method::Autoregressive(model) | Method::AutoregressivePole(model) | Method::Capon(model)
+                if e.weighting == Weighting::Rectangular =>
+            {
+                let statistic = estimate::spectrum::ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
+                let weights = statistic.lag_weights();
+                let taper = estimate::spectrum::Taper::unit(vec![1.0; e.window_samples])?;
+                Self::planned(scene, instrument, Box::new(statistic), &weights, &[taper], known)
+            }
+            _ => {
+                let statistic = estimate::Correlogram::<S>::new(weighting(scene), e.window_samples)?;
+                let (weights, tapers) = (statistic.lag_weights(), statistic.tapers().to_vec());
+                Self::planned(scene, instrument, Box::new(statistic), &weights, &tapers, known)
+            }
+        }
+    }
+
+    fn planned(
+        scene: &Scene,
+        instrument: &Instrument,
+        statistic: Box<dyn Statistic<S>>,
+        lag_weights: &[f64],
+        tapers: &[estimate::spectrum::Taper],
+        known: &WindowStatistics,
+    ) -> Result<Self, Error> {
+        let estimator = of_correlogram(scene, S::KIND, lag_weights, known)?;
+        let following = match scene.estimator.follow_wind {
+            true => Some(of_correlogram(scene, SignalKind::Complex, lag_weights, known)?),
+            false => None,
+        };
+        let noise = match noise(scene, instrument) {
+            None => None,
+            Some((noise, power_a2)) => {
+                let mean = noise.expected_correlogram(&sampling(scene)?, S::KIND, power_a2, lag_weights)?;
+                Some(scaled_estimate(&*estimator, mean))
+            }
+        };
+        let test = noise_test(scene, tapers, lag_weights)?;
+        Ok(Self { statistic, estimator, following, test, noise })
+    }
+}
+
+/// Spectrum and power in the band, A^2, of a scene's noise.
+fn noise(scene: &Scene, instrument: &Instrument) -> Option<(estimate::bound::Noise, f64)> {
+    let noise = match scene.detector.noise {
+        NoiseKind::White => estimate::bound::Noise::White,
+        NoiseKind::Band => estimate::bound::Noise::Band { floor: 0.0 },
+        NoiseKind::None => return None,
+    };
+    Some((noise, instrument.receiver.noise_variance_a2()))
+}
+
+/// What an estimator finds in a mean statistic, A^2, that is far from order one.
+fn scaled_estimate(estimator: &dyn Estimator, mut mean: Vec<f64>) -> estimate::GateVelocity {
+    let unit = mean.first().copied().filter(|power| *power > 0.0).unwrap_or(1.0);
+    mean.iter_mut().for_each(|number| *number /= unit);
+    let found = estimator.estimate(&mean, &mut estimate::Scratch::new());
+    estimate::GateVelocity { power: found.power * unit, detection: found.detection * unit, ..found }
+}
+
+/// The test against noise of an estimator of correlograms; none without noise, and none of the spectrum of an unbiased
+/// correlogram with all its lags, which need not be positive.
+fn noise_test(
+    scene: &Scene,
+    tapers: &[estimate::spectrum::Taper],
+    lag_weights: &[f64],
+) -> Result<Option<estimate::estimators::NoiseTest>, Error> {
+    let e = &scene.estimator;
+    let window = match e.method {
+        Method::LagWindow(window) => Some(estimate::estimators::model_lag_weights(window.lag_window_lags - 1)),
+        method => method.order().map(|model| estimate::estimators::model_lag_weights(model.order)),
+    };
+    let unbiased = e.correlogram == CorrelogramForm::Unbiased;
+    if scene.detector.noise == NoiseKind::None || (unbiased && window.is_none()) {
+        return Ok(None);
+    }
+    let seen = |(at, gain): (&f64, &f64)| if unbiased { at / gain } else { *at };
+    let window = window.map(|at| at.iter().zip(lag_weights).map(seen).collect::<Vec<f64>>());
+    let padded = if e.method == (Method::PulsePair {}) { 4 * lag_weights.len() } else { e.padded_samples };
+    let (sampling, gates) = (sampling(scene)?, gates(scene)?);
+    Ok(Some(estimate::estimators::NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded)?))
+}
+
+/// The estimator of a mean correlogram whose lags carry `lag_weights`.
+fn of_correlogram(
+    scene: &Scene,
+    kind: SignalKind,
+    lag_weights: &[f64],
+    known: &WindowStatistics,
+) -> Result<Box<dyn Estimator>, Error> {
+    let (e, sampling, refine) = (&scene.estimator, sampling(scene)?, refinement(scene));
+    let (lags, padded) = (lag_weights.len(), e.padded_samples);
+    match e.method {
+        Method::Periodogram {}
+        | Method::PeriodogramAccumulation {}
+        | Method::Likelihood(_)
+        | Method::GradientLikelihood(_) => {
+            let peak = estimate::SpectralPeak::new(&sampling, kind, lags, padded, refine)?;
+            finish(e, kind, lag_weights, peak.with_lag_weights(lag_weights)?)
+        }
+        Method::Autoregressive(model) => {
+            let peak =
+                estimate::estimators::AutoregressivePeak::new(&sampling, kind, lags, model.order, padded, refine)?;
+            finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
+        }
+        Method::AutoregressivePole(model) => {
+            let pole =
+                estimate::estimators::AutoregressivePole::new(&sampling, kind, lags, model.order, padded, refine)?;
+            finish(e, kind, lag_weights, pole.choosing(order_choice(e, &model, known)))
+        }
+        Method::Capon(model) => {
+            let peak = estimate::estimators::CaponPeak::new(&sampling, kind, lags, model.order, padded, refine)?;
+            finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
+        }
+        Method::LagWindow(window) => {
+            let peak = estimate::estimators::LagWindowPeak::new(
+                &sampling,
+                kind,
+                lags,
+                window.lag_window_lags,
+                padded,
+                refine,
+            )?;
+            finish(e, kind, lag_weights, peak)
+        }
+        Method::PulsePair {} => {
+            finish(e, kind, lag_weights, estimate::estimators::PulsePair::new(&sampling, kind, lags)?)
+        }
+        Method::FirstMoment(own) => {
+            let moment = estimate::estimators::FirstMoment::new(&sampling, kind, lags, padded, own.moment_reach)?;
+            finish(e, kind, lag_weights, moment)
+        }
+    }
+}
+
+/// The estimator itself, or on the unbiased correlogram.
+fn finish<E: Estimator + 'static>(
+    words: &Words,
+    kind: SignalKind,
+    lag_weights: &[f64],
+    estimator: E,
+) -> Result<Box<dyn Estimator>, Error> {
+    Ok(match words.correlogram {
+        CorrelogramForm::Biased => Box::new(estimator),
+        CorrelogramForm::Unbiased => Box::new(estimate::estimators::Unbiased::new(estimator, kind, lag_weights)?),
+    })
+}
+
+fn order_choice(e: &Words, model: &ModelOrder, known: &WindowStatistics) -> estimate::models::OrderChoice {
+    let samples = e.window_samples as f64 * known.n_eff.max(1.0);
+    match model.order_choice {
+        OrderChoice::Fixed => estimate::models::OrderChoice::Fixed,
+        OrderChoice::Aic => estimate::models::OrderChoice::Akaike { samples },
+        OrderChoice::Mdl => estimate::models::OrderChoice::DescriptionLength { samples },
+    }
+}
+
+fn gradient_likelihood<S: Sample>(
+    scene: &Scene,
+    instrument: &Instrument,
+    own: &GradientLikelihood,
+    snr: f64,
+) -> Result<Toolkit<S>, Error> {
+    let e = &scene.estimator;
+    let noise = match scene.detector.noise {
+        NoiseKind::White => estimate::bound::Noise::White,
+        NoiseKind::Band | NoiseKind::None => estimate::bound::Noise::Band { floor: 0.0 },
+    };
+    let sampling = sampling(scene)?;
+    let model = estimate::bound::GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
+    let half = (own.gradients / 2) as f64;
+    let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
+    let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
+    let plan = estimate::estimators::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
+    let (test, noise) = match self::noise(scene, instrument) {
+        None => (None, None),
+        Some((noise, power_a2)) => {
+            let found = scaled_estimate(&plan.estimator, plan.noise_statistic(noise, power_a2)?);
+            (Some(plan.noise_test(&gates(scene)?)?), Some(found))
+        }
+    };
+    let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
+    Ok(Toolkit { statistic, estimator, following: None, test, noise })
+}

@@ -1,0 +1,86 @@
+//! Where and when the lidar looks: lines of sight, samples, gates and scattering layers of a scene.
+//!
+//! Only arithmetic on the scene, so that the plan can state sizes before anything is allocated.
+
+use crate::Error;
+use crate::SPEED_OF_LIGHT_M_S;
+use crate::measure::wind::SceneWind;
+use crate::scene::Scene;
+use wakescope_signal::{LayerLimits, Pulse};
+
+/// The sampling of one scan in angle, range and time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Geometry {
+    /// Elevation of each line of sight, rad.
+    pub elevation_rad: Vec<f64>,
+    /// Time of the middle of the pulses of each line, s from the start of the scan.
+    pub line_time_s: Vec<f64>,
+    /// Samples recorded of each pulse.
+    pub samples: usize,
+    /// Range of the first sample, m.
+    pub first_range_m: f64,
+    /// Distance between samples c T_s/2, m.
+    pub sample_spacing_m: f64,
+    /// Index of the first sample of the window of each gate of the map.
+    pub gate_first_sample: Vec<usize>,
+    /// Range of each gate of the map, that is of the centre of its window, m.
+    pub gate_range_m: Vec<f64>,
+    /// Thickness of the scattering layers, m.
+    pub layer_thickness_m: f64,
+    /// Range of the first layer, m.
+    pub first_layer_range_m: f64,
+    /// Number of layers of a line.
+    pub layers: usize,
+    /// Layers that contribute to one sample, 2 L_c + 1 for a Gaussian pulse.
+    pub layers_per_sample: usize,
+}
+
+impl Geometry {
+    /// The sampling of a checked scene; the layers are as thin as its steepest wind needs.
+    ///
+    /// # Errors
+    /// What the wind or the layers refuse; a checked scene gives none.
+    pub fn new(scene: &Scene, pulse: &Pulse, wind: &SceneWind) -> Result<Self, Error> {
+        let scan = &scene.scan;
+        let lines = ((scan.elevation_max_rad - scan.elevation_min_rad) / scan.elevation_step_rad + 1e-9) as usize + 1;
+        let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
+        let pulses = scan.pulses_per_line as f64;
+        let line_time_s: Vec<f64> = (0..lines).map(|i| (i as f64 * pulses + 0.5 * (pulses - 1.0)) * prt_s).collect();
+        let max_gradient_per_s = wind.max_gradient_per_s(&line_time_s);
+        let sample_spacing_m = scene.sample_spacing_m();
+        let samples = scene.samples_per_record();
+        let window = scene.estimator.window_samples;
+        let gate_first_sample: Vec<usize> = (0..=samples - window).step_by(scene.estimator.gate_step_samples).collect();
+        // Windows are indexed by their centre, R = c (t_p + N T_s/2)/2.
+        let centre_m = |first: &usize| scan.range_min_m + (*first as f64 + 0.5 * window as f64) * sample_spacing_m;
+        let (sample_rate_hz, wavelength_m) = (scene.detector.sampling_hz, scene.laser.wavelength_m);
+        let layer_thickness_m =
+            pulse.layer_thickness_m(LayerLimits { sample_rate_hz, wavelength_m, max_gradient_per_s })?;
+        // Layers before and behind the range of a sample that the pulse lights.
+        let (first_s, last_s) = pulse.support_s();
+        let reach = |time_s: f64| (time_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m).max(0.0).ceil() as usize;
+        let (near, far) = (reach(last_s), reach(-first_s));
+        let record_m = (samples - 1) as f64 * sample_spacing_m;
+        Ok(Self {
+            elevation_rad: (0..lines).map(|i| scan.elevation_min_rad + i as f64 * scan.elevation_step_rad).collect(),
+            line_time_s,
+            samples,
+            first_range_m: scan.range_min_m,
+            sample_spacing_m,
+            gate_range_m: gate_first_sample.iter().map(centre_m).collect(),
+            gate_first_sample,
+            layer_thickness_m,
+            first_layer_range_m: scan.range_min_m - near as f64 * layer_thickness_m,
+            layers: ((record_m / layer_thickness_m).ceil() as usize)
+                .saturating_add(near)
+                .saturating_add(far)
+                .saturating_add(1),
+            layers_per_sample: near.saturating_add(far).saturating_add(1),
+        })
+    }
+
+    /// Centre of each layer along a line, m.
+    pub fn layer_range_m(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.layers).map(|l| self.first_layer_range_m + l as f64 * self.layer_thickness_m)
+    }
+}

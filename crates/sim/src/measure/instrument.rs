@@ -1,0 +1,243 @@
+//! The instrument of a scene and the air that it looks through, in the words of optics and signals: made once, and handed on.
+
+use crate::Error;
+use crate::scene::{
+    AirProfile, Atmosphere, BeamRadiusDefinition, Digitiser, NoiseKind, OuterScaleWavenumber, Pulse, PulseDefinition,
+    PulseResampling, PulseShape, ReceiverPath, RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind,
+    Turbulence,
+};
+use num_complex::Complex;
+use std::sync::Arc;
+use wakescope_optics as optics;
+use wakescope_signal as signal;
+
+/// Telescope, pulse, receiver and air.
+#[derive(Debug, Clone)]
+pub struct Instrument {
+    /// The telescope.
+    pub telescope: optics::Telescope,
+    /// The pulse.
+    pub pulse: signal::Pulse,
+    /// The receiver.
+    pub receiver: signal::Receiver,
+    /// The converter, if the scene has one.
+    pub digitiser: Option<signal::digitise::Digitiser>,
+    /// The turbulence, if there is any.
+    pub turbulence: Option<optics::Turbulence>,
+    /// Everything of (14) but the efficiency, for air that is the same at every range.
+    pub snr: optics::SnrModel,
+    /// Air that changes with range.
+    pub air: Option<signal::Medium>,
+}
+
+impl Instrument {
+    /// The instrument of a scene.
+    ///
+    /// # Errors
+    /// What optics or signals refuse, such as samples that are no pulse.
+    pub fn new(scene: &Scene) -> Result<Self, Error> {
+        let (telescope, receiver) = (telescope(scene).validated()?, receiver(scene));
+        let snr = optics::SnrModel {
+            wavelength_m: scene.laser.wavelength_m,
+            aperture_area_m2: telescope.aperture_area_m2(),
+            pulse_energy_j: scene.pulse.energy_j,
+            quantum_efficiency: scene.detector.quantum_efficiency,
+            bandwidth_hz: scene.detector.bandwidth_hz,
+            backscatter_per_m_sr: scene.atmosphere.backscatter_per_m_sr,
+            extinction_per_m: scene.atmosphere.extinction_per_m,
+            planck: match scene.detector.snr {
+                SnrReference::Chapter {} => optics::snr::PlanckConvention::Hbar,
+                _ => optics::snr::PlanckConvention::H,
+            },
+        };
+        let digitiser = match scene.detector.digitiser {
+            Digitiser::None {} => None,
+            Digitiser::Quantised { bits, full_scale_over_noise } => {
+                let full_scale_a = full_scale_over_noise * receiver.noise_variance_a2().sqrt();
+                Some(signal::digitise::Digitiser::new(bits, full_scale_a)?)
+            }
+        };
+        let turbulence = match &scene.atmosphere.turbulence {
+            Turbulence::Refractive(t) if t.cn2_m_m23 > 0.0 => Some(turbulence(t)?),
+            _ => None,
+        };
+        Ok(Self {
+            telescope,
+            pulse: pulse(&scene.pulse)?,
+            receiver,
+            digitiser,
+            turbulence,
+            snr: snr.validated()?,
+            air: medium(&scene.atmosphere)?,
+        })
+    }
+
+    /// Return per metre of range K^2 beta A_R/R^2 of the air, (9) without the efficiency, 1/m.
+    ///
+    /// # Errors
+    /// What optics or signals refuse of a range.
+    pub fn return_per_m(&self, range_m: f64) -> Result<f64, Error> {
+        match &self.air {
+            Some(air) => Ok(air.return_per_m(range_m, self.snr.aperture_area_m2)?),
+            None => Ok(self.snr.return_per_m(range_m)?),
+        }
+    }
+
+    /// Grid and layers of the phase screens for several runs, each with its ranges, m, increasing; with their cost.
+    ///
+    /// # Errors
+    /// What cannot be resolved, with every limit and what would do for all of the runs.
+    pub fn screen_plans(
+        &self,
+        t: &RefractiveTurbulence,
+        runs: &[&[f64]],
+    ) -> Result<Vec<optics::plan::Plan>, optics::Error> {
+        let Some(turbulence) = &self.turbulence else { return Ok(Vec::new()) };
+        let case = optics::plan::Case {
+            telescope: self.telescope,
+            misalignment: optics::Misalignment::NONE,
+            turbulence: turbulence.clone(),
+            realisations: t.realisations,
+        };
+        match t.sampling {
+            ScreenSampling::Derived => runs.iter().map(|range_m| case.plan(range_m)).collect(),
+            ScreenSampling::Explicit => {
+                let grid = optics::Grid::square(t.grid_points, t.grid_spacing_m)?;
+                case.examine_runs(&grid, t.layers, runs)
+            }
+        }
+    }
+
+    /// The Monte Carlo of the turbulence for given ranges, m, increasing.
+    ///
+    /// # Errors
+    /// As [`Instrument::screen_plans`]; air without turbulence.
+    pub fn monte_carlo(
+        &self,
+        t: &RefractiveTurbulence,
+        range_m: &[f64],
+        seed: u64,
+    ) -> Result<optics::MonteCarlo, Error> {
+        let plan = self.screen_plans(t, &[range_m])?.pop();
+        let (Some(plan), Some(turbulence)) = (plan, &self.turbulence) else {
+            return Err(optics::Error::Length { field: "range_m", found: 0, expected: 1 }.into());
+        };
+        Ok(optics::MonteCarlo {
+            telescope: self.telescope,
+            misalignment: optics::Misalignment::NONE,
+            turbulence: turbulence.clone(),
+            grid: plan.grid,
+            layers: plan.layers,
+            range_m: range_m.to_vec(),
+            transfer: optics::screens::TransferKind::Paraxial,
+            seed,
+            sampling: optics::monte_carlo::Sampling::Antithetic,
+        })
+    }
+}
+
+fn telescope(scene: &Scene) -> optics::Telescope {
+    let t = &scene.telescope;
+    optics::Telescope {
+        wavelength_m: scene.laser.wavelength_m,
+        aperture_radius_m: t.aperture_radius_m,
+        obscuration_radius_m: t.obscuration_radius_m,
+        beam_radius_m: t.beam_radius_m,
+        radius_definition: match t.beam_radius_definition {
+            BeamRadiusDefinition::Intensity => optics::RadiusDefinition::Intensity,
+            BeamRadiusDefinition::Field => optics::RadiusDefinition::Field,
+        },
+        focus: if t.focus_m.is_infinite() { optics::Focus::Collimated } else { optics::Focus::At(t.focus_m) },
+    }
+}
+
+fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Error> {
+    let convention = match t.outer_scale_wavenumber {
+        OuterScaleWavenumber::Inverse => optics::air::OuterScaleConvention::Inverse,
+        OuterScaleWavenumber::TwoPiOver => optics::air::OuterScaleConvention::TwoPiOver,
+    };
+    let scales = optics::air::Scales { outer_scale_m: t.outer_scale_m, inner_scale_m: t.inner_scale_m, convention };
+    let spectrum: Arc<dyn optics::Spectrum> = match t.spectrum {
+        SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(scales, optics::air::CHAPTER_CONSTANT)?),
+        SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
+        SpectrumKind::Tatarskii => Arc::new(optics::VonKarman::tatarskii(t.inner_scale_m)?),
+        SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
+    };
+    Ok(optics::Turbulence { spectrum, cn2: optics::Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 }.validated()? })
+}
+
+/// Which paths the two beams of a scene take.
+pub fn receiver_path(scene: &Scene) -> optics::plan::Receiver {
+    match scene.telescope.receiver {
+        ReceiverPath::Monostatic => optics::plan::Receiver::Monostatic,
+        ReceiverPath::Bistatic => optics::plan::Receiver::Bistatic,
+    }
+}
+
+/// The pulse of a scene.
+///
+/// # Errors
+/// What the signal simulation refuses, such as samples that are no pulse.
+pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
+    let pulse = match &p.shape {
+        PulseShape::Gaussian(shape) => {
+            let duration = match shape.definition {
+                PulseDefinition::Fwhm => signal::PulseDuration::FullWidthHalfMaximum(shape.duration_s),
+                PulseDefinition::OneOverEHalfWidth => signal::PulseDuration::OneOverEHalfWidth(shape.duration_s),
+            };
+            signal::Pulse::from(signal::GaussianPulse::new(duration, p.energy_j)?)
+        }
+        PulseShape::Sampled(shape) => {
+            let resampling = match shape.resampling {
+                PulseResampling::CubicSpline => signal::sampled::Resampling::CubicSpline,
+                PulseResampling::BandLimited => signal::sampled::Resampling::BandLimited,
+                PulseResampling::Linear => signal::sampled::Resampling::Linear,
+            };
+            let sampled = if shape.phase_rad.is_empty() {
+                signal::sampled::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
+            } else {
+                let polar = |(power, phase): (&f64, &f64)| Complex::from_polar(power.sqrt(), *phase);
+                let envelope: Vec<_> = shape.power.iter().zip(&shape.phase_rad).map(polar).collect();
+                signal::sampled::SampledPulse::new(&shape.time_s, &envelope, resampling, p.energy_j)?
+            };
+            signal::Pulse::from(if shape.centred { sampled.centred() } else { sampled })
+        }
+    };
+    Ok(pulse.with_chirp(p.chirp_hz_s)?)
+}
+
+/// The air of a scene that changes with range; none where it is uniform.
+///
+/// # Errors
+/// What the signal simulation refuses, such as ranges that do not increase.
+pub(crate) fn medium(atmosphere: &Atmosphere) -> Result<Option<signal::Medium>, Error> {
+    let Some(profile) = &atmosphere.profile else { return Ok(None) };
+    let AirProfile { mut range_m, mut backscatter_per_m_sr, mut extinction_per_m } = profile.clone();
+    // Beyond the table the air is as at its end.
+    range_m.push(range_m.last().copied().unwrap_or(0.0).max(0.0) + 1e7);
+    backscatter_per_m_sr.extend(profile.backscatter_per_m_sr.last());
+    extinction_per_m.extend(profile.extinction_per_m.last());
+    Ok(Some(signal::Medium::new(range_m, backscatter_per_m_sr, extinction_per_m)?))
+}
+
+/// The receiver of a scene.
+pub fn receiver(scene: &Scene) -> signal::Receiver {
+    let d = &scene.detector;
+    signal::Receiver {
+        wavelength_m: scene.laser.wavelength_m,
+        sample_rate_hz: d.sampling_hz,
+        intermediate_frequency_hz: d.intermediate_frequency_hz,
+        bandwidth_hz: d.bandwidth_hz,
+        quantum_efficiency: d.quantum_efficiency,
+        local_oscillator_w: d.local_oscillator_w,
+        planck: match d.snr {
+            SnrReference::Chapter {} => signal::receiver::PlanckConvention::Hbar,
+            _ => signal::receiver::PlanckConvention::H,
+        },
+        noise: match d.noise {
+            NoiseKind::Band => signal::NoiseModel::BandLimited,
+            NoiseKind::White => signal::NoiseModel::White,
+            NoiseKind::None => signal::NoiseModel::None,
+        },
+    }
+}

@@ -1,0 +1,345 @@
+//! The radial-velocity map: estimates of every realisation, and their errors against the truth.
+
+use crate::Error;
+use crate::measure::estimators::{self, Toolkit, WindowStatistics};
+use crate::measure::progress::Observer;
+use crate::measure::region::{interpolated, region_radius};
+use crate::measure::scan::{Scanner, radial_velocity_m_s};
+use crate::plan::{Plan, Stage};
+use ndarray::{Array2, ArrayView1, ArrayView2};
+use wakescope_estimate::{
+    GateVelocity, Gates, Radius, Sampling, Scan, Statistic,
+    estimators::NoiseTest,
+    map::{ErrorMap, MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCorrelation},
+    polar_points,
+    window::Sample,
+};
+use wakescope_signal::RangeFilter;
+use wakescope_signal::digitise::Clipped;
+
+/// Estimates of the radial velocity and their errors, each \[line, gate\].
+#[derive(Debug, Clone, PartialEq)]
+pub struct VelocityEstimates {
+    /// Elevation of each line, rad.
+    pub elevation_rad: Vec<f64>,
+    /// Range of each gate, m.
+    pub range_m: Vec<f64>,
+    /// Radial velocity of the air at the centre of the gate, m/s, positive away from the lidar.
+    pub v_exact_m_s: Array2<f64>,
+    /// The same weighted with the pulse, (28).
+    pub v_pulse_m_s: Array2<f64>,
+    /// The same weighted with pulse and window.
+    pub v_gate_m_s: Array2<f64>,
+    /// Estimate of the first realisation, m/s; NaN where there is no true velocity, as in the mean.
+    pub v_scan_m_s: Array2<f64>,
+    /// Mean estimate over the realisations, m/s.
+    pub v_mean_m_s: Array2<f64>,
+    /// Mean error against `v_pulse_m_s`, m/s.
+    pub bias_m_s: Array2<f64>,
+    /// Standard deviation of one realisation, m/s; NaN for one realisation.
+    pub std_m_s: Array2<f64>,
+    /// Root mean square error against `v_pulse_m_s`, m/s: the root of the mean of (33).
+    pub rms_m_s: Array2<f64>,
+    /// Standard error of `rms_m_s`, m/s; NaN for one realisation.
+    pub standard_error_m_s: Array2<f64>,
+    /// Windows accumulated for one estimate.
+    pub level: Array2<f64>,
+    /// Independent windows that they are worth.
+    pub n_eff: Array2<f64>,
+    /// Fraction of the realisations whose estimate was flagged: a flag of its own, or a peak that does not stand out of noise.
+    pub flagged: Array2<f64>,
+    /// Realisations with a velocity, flagged ones included.
+    pub count: Array2<f64>,
+    /// Mean spectral width beyond that of the window, m/s; NaN where the estimator gives none.
+    pub width_m_s: Array2<f64>,
+    /// Signal-to-noise ratio in the detector band, dB: the mean power of the spectra in the band over that which the noise
+    /// alone has there, less 1. Unbiased at any ratio; NaN where it is below twice its standard deviation, and without noise.
+    pub snr_db: Array2<f64>,
+    /// Mean density of the peak over the mean density in the band; 1 for a flat spectrum.
+    pub quality: Array2<f64>,
+    /// Fraction of the samples that the converter clipped.
+    pub clipped_fraction: f64,
+}
+
+/// Sums over the realisations of what an estimator says beside the velocity.
+struct Figures {
+    flagged: Array2<f64>,
+    count: Array2<f64>,
+    /// Sum and number of the finite values: width, power in the band, quality.
+    sums: [Array2<(f64, f64)>; 3],
+}
+
+impl Figures {
+    fn new(shape: (usize, usize)) -> Self {
+        let sums = || Array2::from_elem(shape, (0.0, 0.0));
+        Self { flagged: Array2::zeros(shape), count: Array2::zeros(shape), sums: [sums(), sums(), sums()] }
+    }
+
+    fn add(&mut self, place: (usize, usize), point: &MapPoint, is_flagged: bool) {
+        let e = &point.estimate;
+        self.flagged[place] += f64::from(u8::from(is_flagged));
+        self.count[place] += f64::from(u8::from(e.velocity_m_s.is_finite()));
+        let power_a2 = if e.velocity_m_s.is_finite() { e.power } else { f64::NAN };
+        for (sums, value) in self.sums.iter_mut().zip([e.width_m_s, power_a2, e.quality]) {
+            if value.is_finite() {
+                sums[place].0 += value;
+                sums[place].1 += 1.0;
+            }
+        }
+    }
+
+    fn means(&self) -> [Array2<f64>; 3] {
+        self.sums.each_ref().map(|sums| sums.mapv(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }))
+    }
+}
+
+/// Accumulates the errors of realisation after realisation.
+pub(crate) struct Mapper<S> {
+    sampling: Sampling,
+    gates: Gates,
+    points: Vec<PolarPoint>,
+    shape: (usize, usize),
+    places: ScanGeometry,
+    record_samples: usize,
+    /// Real numbers that the converter sees in one realisation.
+    samples_of_realisation: f64,
+    tools: Toolkit<S>,
+    correlation: WindowCorrelation,
+    radius: Radius,
+    /// Density in the band, A^2, that noise exceeds with the probability of the scene, for each point; none without a test.
+    threshold: Option<Vec<f64>>,
+    /// Standard deviation of the power ratio of noise, for each point.
+    deviation: Vec<f64>,
+    truth: Truth,
+    first_m_s: Array2<f64>,
+    errors: ErrorMap<ndarray::Ix2>,
+    figures: Figures,
+    level: Array2<f64>,
+    n_eff: Array2<f64>,
+    clipped: Clipped,
+    samples: f64,
+    realisations: usize,
+}
+
+/// What noise alone gives at each point of a map.
+struct NoiseLevels<'a> {
+    test: &'a NoiseTest,
+    /// Density of the noise, A^2.
+    density_a2: f64,
+    /// Independent windows of noise at each point.
+    n_eff: Vec<f64>,
+}
+
+impl<'a> NoiseLevels<'a> {
+    fn new(
+        test: &'a NoiseTest,
+        noise: &GateVelocity,
+        places: &ScanGeometry,
+        points: &[PolarPoint],
+        radius: &Radius,
+    ) -> Result<Self, Error> {
+        let of = |point: &PolarPoint| Ok(places.level(*point, radius.at_m(point.range_m)?, test.correlation()).1);
+        Ok(Self { test, density_a2: noise.detection, n_eff: points.iter().map(of).collect::<Result<_, Error>>()? })
+    }
+
+    /// Densities, A^2, that noise exceeds with probability `rate`; NaN where there is no window.
+    fn thresholds(&self, rate: f64) -> Result<Vec<f64>, Error> {
+        // Many points share their number of windows; a thousandth of it changes nothing.
+        let mut known = std::collections::HashMap::new();
+        let mut of = |n_eff: f64| -> Result<f64, Error> {
+            let step = (1e3 * n_eff.ln()).round();
+            if n_eff.is_nan() || n_eff <= 0.0 {
+                return Ok(f64::NAN);
+            }
+            match known.entry(step as i64) {
+                std::collections::hash_map::Entry::Occupied(level) => Ok(*level.get()),
+                std::collections::hash_map::Entry::Vacant(place) => {
+                    Ok(*place.insert(self.density_a2 * self.test.threshold((1e-3 * step).exp(), rate)?))
+                }
+            }
+        };
+        self.n_eff.iter().map(|n_eff| of(*n_eff)).collect()
+    }
+
+    /// Standard deviations of the power in the band over its mean.
+    fn deviations(&self) -> Vec<f64> {
+        self.n_eff.iter().map(|n_eff| self.test.band_deviation(*n_eff)).collect()
+    }
+}
+
+struct Truth {
+    exact_m_s: Array2<f64>,
+    pulse_m_s: Array2<f64>,
+    gate_m_s: Array2<f64>,
+}
+
+impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
+    pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
+        let (scene, g) = (&plan.scene.scene, &plan.geometry);
+        let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
+        let shape = (g.elevation_rad.len(), g.gate_range_m.len());
+        let pulses = scene.scan.pulses_per_line;
+        let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
+        let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
+        let radius = region_radius(scene, scanner, &places, &correlation)?;
+        let middle = PolarPoint {
+            range_m: g.gate_range_m[g.gate_range_m.len() / 2],
+            elevation_rad: g.elevation_rad[g.elevation_rad.len() / 2],
+        };
+        let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
+        let known = WindowStatistics { snr: scanner.mean_snr(), n_eff };
+        let points = polar_points(&g.elevation_rad, &g.gate_range_m);
+        let tools = Toolkit::new(scene, &plan.instrument, &known)?;
+        let noise = match (&tools.test, &tools.noise) {
+            (Some(test), Some(noise)) => Some(NoiseLevels::new(test, noise, &places, &points, &radius)?),
+            _ => None,
+        };
+        let rate = scene.estimator.false_alarm;
+        let threshold = noise.as_ref().filter(|_| rate > 0.0).map(|levels| levels.thresholds(rate)).transpose()?;
+        Ok(Self {
+            sampling,
+            gates,
+            deviation: noise.map_or_else(|| vec![0.0; points.len()], |levels| levels.deviations()),
+            points,
+            shape,
+            places,
+            record_samples: g.samples,
+            samples_of_realisation: (scanner.pulses() * g.samples * S::KIND.lag_numbers(1)) as f64,
+            tools,
+            correlation,
+            radius,
+            threshold,
+            truth: truth(plan, scanner)?,
+            first_m_s: Array2::from_elem(shape, f64::NAN),
+            errors: ErrorMap::new(ndarray::Dim(shape)),
+            figures: Figures::new(shape),
+            level: Array2::zeros(shape),
+            n_eff: Array2::zeros(shape),
+            clipped: Clipped::default(),
+            samples: 0.0,
+            realisations: 0,
+        })
+    }
+
+    /// Estimates the velocities of one realisation.
+    fn map(&self, scan: &Scan) -> Result<Vec<MapPoint>, Error> {
+        let Toolkit { estimator, following, .. } = &self.tools;
+        let first = scan.map(&self.points, &self.radius, Some(&self.correlation), &**estimator)?;
+        let Some(following) = following else { return Ok(first) };
+        let velocity_m_s =
+            Array2::from_shape_fn(self.shape, |(i, j)| first[i * self.shape.1 + j].estimate.velocity_m_s);
+        let guess = interpolated(&self.points, velocity_m_s);
+        let mut second =
+            scan.map_following(&self.points, &self.radius, S::KIND, &self.sampling, &guess, &**following)?;
+        second.iter_mut().zip(&first).for_each(|(point, first)| point.n_eff = first.n_eff);
+        Ok(second)
+    }
+
+    /// The sums of a realisation, still without any record.
+    fn sums(&self) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
+        Ok(ScanSums::new(&*self.tools.statistic, &self.gates, self.places.clone(), self.record_samples)?)
+    }
+
+    /// Estimates the velocities of one realisation and adds their errors.
+    pub(crate) fn add(&mut self, scan: &Scan, clipped: Clipped) -> Result<(), Error> {
+        let map = self.map(scan)?;
+        let columns = self.shape.1;
+        let velocity = Array2::from_shape_fn(self.shape, |(i, j)| map[i * columns + j].estimate.velocity_m_s);
+        self.errors.add(velocity.view(), self.truth.pulse_m_s.view())?;
+        if self.realisations == 0 {
+            let known = |estimate: &f64, truth: &f64| if truth.is_nan() { f64::NAN } else { *estimate };
+            self.first_m_s = ndarray::Zip::from(&velocity).and(&self.truth.pulse_m_s).map_collect(known);
+        }
+        for (index, point) in map.iter().enumerate() {
+            let place = (index / columns, index % columns);
+            let is_flagged = match &self.threshold {
+                Some(threshold) => !point.estimate.exceeds(threshold[index]),
+                None => !point.estimate.is_good(),
+            };
+            self.figures.add(place, point, is_flagged);
+            // The level is the same for all realisations: a matter of geometry.
+            (self.level[place], self.n_eff[place]) = (point.level as f64, point.n_eff);
+        }
+        self.clipped += clipped;
+        self.samples += self.samples_of_realisation;
+        self.realisations += 1;
+        Ok(())
+    }
+
+    pub(crate) fn finish(self, plan: &Plan) -> VelocityEstimates {
+        let statistics = self.errors.statistics();
+        let bias_m_s = statistics.mapv(|s| s.bias_m_s);
+        let [width_m_s, power_a2, quality] = self.figures.means();
+        let mut snr_db = power_a2 / self.tools.noise.map_or(f64::NAN, |noise| noise.power) - 1.0;
+        for ((place, snr), deviation) in snr_db.indexed_iter_mut().zip(&self.deviation) {
+            let seen = *snr > 2.0 * deviation / self.figures.count[place].sqrt();
+            *snr = if seen { 10.0 * snr.log10() } else { f64::NAN };
+        }
+        VelocityEstimates {
+            elevation_rad: plan.geometry.elevation_rad.clone(),
+            range_m: plan.geometry.gate_range_m.clone(),
+            v_scan_m_s: self.first_m_s,
+            v_mean_m_s: &self.truth.pulse_m_s + &bias_m_s,
+            bias_m_s,
+            std_m_s: statistics.mapv(|s| s.std_m_s),
+            rms_m_s: statistics.mapv(|s| s.rms_m_s),
+            standard_error_m_s: statistics.mapv(|s| s.rms_standard_error_m_s),
+            v_exact_m_s: self.truth.exact_m_s,
+            v_pulse_m_s: self.truth.pulse_m_s,
+            v_gate_m_s: self.truth.gate_m_s,
+            level: self.level,
+            n_eff: self.n_eff,
+            flagged: self.figures.flagged / self.realisations.max(1) as f64,
+            count: self.figures.count,
+            width_m_s,
+            snr_db,
+            quality,
+            clipped_fraction: self.clipped.total() as f64 / self.samples.max(1.0),
+        }
+    }
+}
+
+fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
+    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let shape = (g.elevation_rad.len(), g.gate_range_m.len());
+    let mut truth =
+        Truth { exact_m_s: Array2::zeros(shape), pulse_m_s: Array2::zeros(shape), gate_m_s: Array2::zeros(shape) };
+    let pulse = &plan.instrument.pulse;
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
+    let by_gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
+    for (i, line) in scanner.lines().iter().enumerate() {
+        let exact_m_s = radial_velocity_m_s(plan, i, &g.gate_range_m)?;
+        truth.exact_m_s.row_mut(i).assign(&ArrayView1::from(&exact_m_s));
+        let mut filtered_m_s = vec![0.0; g.gate_range_m.len()];
+        for (filter, cells) in [(&by_pulse, &mut truth.pulse_m_s), (&by_gate, &mut truth.gate_m_s)] {
+            filter.apply_into(line.first_range_m, &line.radial_velocity_m_s, &g.gate_range_m, &mut filtered_m_s)?;
+            cells.row_mut(i).assign(&ArrayView1::from(&filtered_m_s));
+        }
+    }
+    Ok(truth)
+}
+
+/// Runs the estimates of all realisations; the records of those that the files will have go to `kept`, too, piece after piece.
+pub(crate) fn estimate<S: Sample + wakescope_signal::scan::Sample>(
+    plan: &Plan,
+    scanner: &Scanner<'_>,
+    observer: &dyn Observer,
+    mut kept: impl FnMut(ArrayView2<'_, S>),
+) -> Result<VelocityEstimates, Error> {
+    let mut mapper = Mapper::new(plan, scanner)?;
+    observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
+    for realisation in 0..plan.realisations() {
+        let mut sums = mapper.sums()?;
+        let clipped = scanner.in_pieces(realisation, observer, |first, records| {
+            if realisation < plan.kept_realisations() {
+                kept(records);
+            }
+            Ok(sums.add(first, records)?)
+        })?;
+        let scan = sums.finish();
+        mapper.add(&scan, clipped)?;
+    }
+    observer.end();
+    Ok(mapper.finish(plan))
+}

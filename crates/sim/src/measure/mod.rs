@@ -1,0 +1,29 @@
+//! The measurement: from a scene's plan to signals, velocities, their errors and the files.
+//!
+//! | module | what is in it |
+//! |---|---|
+//! | [`instrument`], [`estimators`] | a scene in the words of the other crates, made once for a plan |
+//! | [`wind`] | the wind: analytic, or the planes of a simulated flow |
+//! | [`geometry`] | lines of sight, samples, gates, layers |
+//! | [`profile`] | efficiency and signal-to-noise ratio against range |
+//! | [`scan`] | air along the lines of sight, and their records |
+//! | [`map`], [`cell_average`] | estimates and their errors against the truth |
+//! | [`mod@bound`] | the Cramer-Rao bound for a scene |
+//! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
+//! | [`progress`], [`streams`] | who watches a run; one random stream for each pulse |
+
+pub mod bound;
+pub mod cell_average;
+pub mod estimators;
+pub mod geometry;
+pub mod instrument;
+pub mod map;
+mod plane;
+pub mod profile;
+pub mod progress;
+mod region;
+pub mod run;
+pub mod scan;
+pub mod streams;
+pub mod wind;
+pub mod write;

@@ -1,0 +1,129 @@
+//! The radius of the regions of a scene, and the wind of a first map between its points.
+//!
+//! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
+
+use crate::measure::scan::Scanner;
+use crate::scene::{Method, NoiseKind, RegionRadius, Scene};
+use crate::{Error, measure::estimators};
+use ndarray::Array2;
+use wakescope_estimate::{
+    Radius,
+    map::{PolarPoint, ScanGeometry, WindowCorrelation},
+};
+
+/// Signal-to-noise ratio that stands for no noise where a bound is asked for.
+const NO_NOISE_SNR: f64 = 1e6;
+
+/// The radius of a scene's regions.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub(crate) fn region_radius(
+    scene: &Scene,
+    scanner: &Scanner<'_>,
+    geometry: &ScanGeometry,
+    correlation: &WindowCorrelation,
+) -> Result<Radius, Error> {
+    let e = &scene.estimator;
+    match &e.radius {
+        _ if e.method == (Method::Periodogram {}) => Ok(Radius::Fixed { radius_m: 0.0 }),
+        RegionRadius::Fixed {} => Ok(Radius::Fixed { radius_m: e.radius_m }),
+        RegionRadius::OfRange { range_m, radius_m } => {
+            let (range_m, radius_m) = (range_m.clone(), radius_m.clone());
+            Ok(Radius::OfRange(Box::new(move |at_m| of_table(&range_m, &radius_m, at_m))))
+        }
+        RegionRadius::Target { standard_deviation_m_s, largest_m } => {
+            let (range_m, bound_m_s) = bound_by_range(scene, scanner, geometry)?;
+            let single_m_s = |at_m: f64| of_table(&range_m, &bound_m_s, at_m);
+            Ok(Radius::for_standard_deviation(geometry, correlation, single_m_s, *standard_deviation_m_s, *largest_m)?)
+        }
+    }
+}
+
+/// The bound of one window at ranges along the lines, m and m/s.
+fn bound_by_range(
+    scene: &Scene,
+    scanner: &Scanner<'_>,
+    geometry: &ScanGeometry,
+) -> Result<(Vec<f64>, Vec<f64>), Error> {
+    let noise = match scene.detector.noise {
+        NoiseKind::None => NoiseKind::White,
+        noise => noise,
+    };
+    let model = estimators::window_model(scene, noise, scanner.pulse())?
+        .ok_or(wakescope_estimate::Error::Empty { field: "noise" })?;
+    let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
+    let all_m = geometry.gate_ranges_m();
+    let range_m: Vec<f64> = all_m.iter().copied().step_by(all_m.len().div_ceil(16)).collect();
+    let bound = |at_m: &f64| {
+        let snr = match scene.detector.noise {
+            NoiseKind::None => NO_NOISE_SNR,
+            _ => of_table(&layer_m, &snr, *at_m).clamp(1e-8, NO_NOISE_SNR),
+        };
+        estimators::bound_m_s(&model, snr, estimators::signal_kind(scene))
+    };
+    let bound_m_s = range_m.iter().map(bound).collect::<Result<_, Error>>()?;
+    Ok((range_m, bound_m_s))
+}
+
+/// Straight lines between the points of a table that is not empty; beyond its ends as at the ends.
+pub(crate) fn of_table(range_m: &[f64], values: &[f64], at_m: f64) -> f64 {
+    let above = range_m.partition_point(|r| *r <= at_m);
+    match (values.get(above.wrapping_sub(1)), values.get(above)) {
+        (Some(low), Some(high)) => {
+            let part = (at_m - range_m[above - 1]) / (range_m[above] - range_m[above - 1]);
+            low + part * (high - low)
+        }
+        (Some(end), None) | (None, Some(end)) => *end,
+        (None, None) => f64::NAN,
+    }
+}
+
+/// The wind of a map \[line, gate\] anywhere, bilinear between its points; NaN outside and where a neighbour is NaN.
+pub(crate) fn interpolated(points: &[PolarPoint], velocity_m_s: Array2<f64>) -> impl Fn(PolarPoint) -> f64 + Sync {
+    let (lines, gates) = velocity_m_s.dim();
+    let range_m: Vec<f64> = points[..gates].iter().map(|p| p.range_m).collect();
+    let elevation_rad: Vec<f64> = (0..lines).map(|i| points[i * gates].elevation_rad).collect();
+    let place = |axis: &[f64], at: f64| -> Option<(usize, f64)> {
+        let (first, last) = (axis.first()?, axis.last()?);
+        if axis.len() == 1 || !(at >= *first && at <= *last) {
+            return (at == *first).then_some((0, 0.0));
+        }
+        let below = (axis.partition_point(|x| *x <= at) - 1).min(axis.len() - 2);
+        Some((below, (at - axis[below]) / (axis[below + 1] - axis[below])))
+    };
+    move |point: PolarPoint| {
+        let (Some((i, a)), Some((j, b))) = (place(&elevation_rad, point.elevation_rad), place(&range_m, point.range_m))
+        else {
+            return f64::NAN;
+        };
+        // A neighbour without weight may be missing.
+        let at = |di: usize, dj: usize, weight: f64| {
+            if weight == 0.0 { 0.0 } else { weight * velocity_m_s[[i + di, j + dj]] }
+        };
+        at(0, 0, (1.0 - a) * (1.0 - b)) + at(0, 1, (1.0 - a) * b) + at(1, 0, a * (1.0 - b)) + at(1, 1, a * b)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wakescope_estimate::polar_points;
+
+    #[test]
+    fn tables_and_maps_are_linear_between_their_points() {
+        let (x, y) = ([1.0, 2.0, 4.0], [10.0, 20.0, 0.0]);
+        for (at, expected) in [(0.0, 10.0), (1.0, 10.0), (1.5, 15.0), (3.0, 10.0), (4.0, 0.0), (9.0, 0.0)] {
+            assert_eq!(of_table(&x, &y, at), expected, "{at}");
+        }
+        let points = polar_points(&[0.1, 0.2, 0.4], &[100.0, 110.0, 130.0]);
+        let plane = |p: &PolarPoint| 3.0 * p.elevation_rad + 0.5 * p.range_m;
+        let values: Vec<f64> = points.iter().map(plane).collect();
+        let wind = interpolated(&points, Array2::from_shape_vec((3, 3), values).unwrap());
+        for (elevation_rad, range_m) in [(0.1, 100.0), (0.13, 128.0), (0.4, 130.0), (0.39, 105.0)] {
+            let p = PolarPoint { range_m, elevation_rad };
+            assert!((wind(p) - plane(&p)).abs() < 1e-12, "{p:?}");
+        }
+        assert!(wind(PolarPoint { range_m: 99.0, elevation_rad: 0.2 }).is_nan());
+    }
+}

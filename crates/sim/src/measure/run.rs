@@ -1,0 +1,216 @@
+//! Runs a plan: each stage once, nothing that the plan leaves out.
+
+use crate::Error;
+use crate::io::CrossPlanes;
+use crate::measure::map::{self, VelocityEstimates};
+use crate::measure::plane;
+use crate::measure::profile::{RangeProfile, range_profile};
+use crate::measure::progress::Observer;
+use crate::measure::region::of_table;
+use crate::measure::scan::Scanner;
+use crate::plan::{Plan, Stage, Target};
+use crate::scene::DetectorSignal;
+use ndarray::{Array2, ArrayView2};
+use num_complex::Complex;
+use wakescope_estimate::{SignalKind, window::Sample};
+
+/// What a run gives; absent is what was not asked for.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RunResult {
+    /// Efficiency and SNR against range.
+    pub profile: Option<RangeProfile>,
+    /// Wind on a cross-plane.
+    pub plane: Option<CrossPlanes>,
+    /// Raw signals \[pulse, sample\], A; one realisation after the other.
+    pub signals_a: Option<Array2<f64>>,
+    /// Their second quadrature, if the receiver delivers two.
+    pub quadrature_a: Option<Array2<f64>>,
+    /// True radial velocity of the layers of each line \[line, layer\], m/s, where there are signals.
+    pub line_velocity_m_s: Option<Array2<f64>>,
+    /// The velocity map with its errors.
+    pub map: Option<VelocityEstimates>,
+    /// What comes back from the middle of the scan.
+    pub middle: Option<ScanMiddle>,
+}
+
+/// Efficiency and signal-to-noise ratio at the range in the middle of the scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScanMiddle {
+    /// The range, m.
+    pub range_m: f64,
+    /// Efficiency; NaN if the profile does not reach there.
+    pub efficiency: f64,
+    /// Mean signal-to-noise ratio (14) in the detector band, dB; that of the signals where there are any.
+    pub snr_db: f64,
+}
+
+impl ScanMiddle {
+    /// From the profile, and from the layers of the signals where there are any.
+    fn of(plan: &Plan, profile: Option<&RangeProfile>, scanner: Option<&Scanner<'_>>) -> Option<Self> {
+        let scan = &plan.scene.scene.scan;
+        let range_m = 0.5 * (scan.range_min_m + scan.range_max_m);
+        let of_profile = |values: &dyn Fn(&RangeProfile) -> Vec<f64>| {
+            let profile = profile?;
+            let (first, last) = (profile.efficiency.range_m.first()?, profile.efficiency.range_m.last()?);
+            let inside = (*first..=*last).contains(&range_m);
+            inside.then(|| of_table(&profile.efficiency.range_m, &values(profile), range_m))
+        };
+        let of_signals = scanner.map(|scanner| {
+            let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
+            10.0 * of_table(&layer_m, &snr, range_m).log10()
+        });
+        let efficiency = of_profile(&|p| p.efficiency.mean.clone());
+        let snr_db = of_signals.or_else(|| of_profile(&|p| p.snr_db.clone()))?;
+        Some(Self { range_m, efficiency: efficiency.unwrap_or(f64::NAN), snr_db })
+    }
+}
+
+/// One line of the summary that a person or a program reads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SummaryLine {
+    /// Name for programs, with the unit.
+    pub key: &'static str,
+    /// Description for people.
+    pub text: &'static str,
+    /// The value; NaN if it cannot be given.
+    pub value: f64,
+}
+
+/// Runs a plan.
+///
+/// # Errors
+/// What the crates refuse; a checked scene gives none.
+pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
+    let mut result = RunResult::default();
+    if matches!(plan.target, Target::Run | Target::Efficiency) {
+        result.profile = Some(range_profile(&plan.scene.scene, &plan.instrument, observer)?);
+        result.middle = ScanMiddle::of(plan, result.profile.as_ref(), None);
+    }
+    if plan.runs(Stage::CrossPlane) {
+        observer.begin(Stage::CrossPlane, 1);
+        result.plane = Some(plane::cross_plane(plan)?);
+        observer.end();
+    }
+    if plan.runs(Stage::Signals) {
+        let scanner = Scanner::new(plan, observer)?;
+        result.middle = ScanMiddle::of(plan, result.profile.as_ref(), Some(&scanner));
+        match plan.scene.scene.detector.signal {
+            DetectorSignal::IntermediateFrequency => signals_and_map::<f64>(plan, &scanner, observer, &mut result)?,
+            DetectorSignal::Baseband => signals_and_map::<Complex<f64>>(plan, &scanner, observer, &mut result)?,
+        }
+    }
+    Ok(result)
+}
+
+/// Signals and the map, as the plan has them.
+fn signals_and_map<S: Sample + wakescope_signal::scan::Sample>(
+    plan: &Plan,
+    scanner: &Scanner<'_>,
+    observer: &dyn Observer,
+    result: &mut RunResult,
+) -> Result<(), Error> {
+    let realisations = plan.kept_realisations();
+    let mut kept =
+        (realisations > 0).then(|| Kept::new(realisations * scanner.pulses() * plan.geometry.samples, S::KIND));
+    let mut keep = |records: ArrayView2<'_, S>| {
+        if let Some(kept) = &mut kept {
+            kept.add(records);
+        }
+    };
+    if plan.runs(Stage::Estimates) {
+        result.map = Some(map::estimate(plan, scanner, observer, keep)?);
+    } else {
+        let steps = (plan.realisations() * plan.geometry.elevation_rad.len()) as u64;
+        observer.begin(Stage::Signals, steps);
+        for realisation in 0..plan.realisations() {
+            scanner.in_pieces(realisation, observer, |_, records| {
+                keep(records);
+                Ok(())
+            })?;
+        }
+        observer.end();
+    }
+    if let Some(Kept { in_phase, quadrature }) = kept {
+        let shape = (realisations * scanner.pulses(), plan.geometry.samples);
+        result.signals_a = Array2::from_shape_vec(shape, in_phase).ok();
+        result.quadrature_a = quadrature.and_then(|values| Array2::from_shape_vec(shape, values).ok());
+        result.line_velocity_m_s = Some(line_velocities(scanner));
+    }
+    Ok(())
+}
+
+fn line_velocities(scanner: &Scanner<'_>) -> Array2<f64> {
+    let lines = scanner.lines();
+    let layers = lines.first().map_or(0, |line| line.radial_velocity_m_s.len());
+    Array2::from_shape_fn((lines.len(), layers), |(i, l)| lines[i].radial_velocity_m_s[l])
+}
+
+/// The records that are kept for the files, as real numbers.
+struct Kept {
+    in_phase: Vec<f64>,
+    quadrature: Option<Vec<f64>>,
+}
+
+impl Kept {
+    fn new(samples: usize, kind: SignalKind) -> Self {
+        let quadrature = (kind == SignalKind::Complex).then(|| Vec::with_capacity(samples));
+        Self { in_phase: Vec::with_capacity(samples), quadrature }
+    }
+
+    fn add<S: Sample>(&mut self, records: ArrayView2<'_, S>) {
+        self.in_phase.extend(records.iter().map(|sample| sample.to_complex().re));
+        if let Some(quadrature) = &mut self.quadrature {
+            quadrature.extend(records.iter().map(|sample| sample.to_complex().im));
+        }
+    }
+}
+
+impl RunResult {
+    /// The results in a few numbers.
+    pub fn summary(&self) -> Vec<SummaryLine> {
+        let mut out = Vec::new();
+        let mut line = |key, text, value| out.push(SummaryLine { key, text, value });
+        if let Some(middle) = &self.middle {
+            line("scan_range_m", "middle of the scan [m]", middle.range_m);
+            line("scan_efficiency", "efficiency there", middle.efficiency);
+            line("scan_snr_db", "signal-to-noise ratio there [dB]", middle.snr_db);
+        }
+        if let Some(fraction) = self.profile.as_ref().and_then(|profile| profile.lost_power_fraction) {
+            line("lost_power_fraction", "power lost at the screens' border (< 0.01)", fraction);
+        }
+        if let Some(a) = &self.signals_a {
+            line(
+                "signal_rms_a",
+                "rms of the raw signals [A]",
+                (a.iter().map(|x| x * x).sum::<f64>() / a.len() as f64).sqrt(),
+            );
+        }
+        if let Some(m) = &self.map {
+            line("v_max_m_s", "largest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::max));
+            line("v_min_m_s", "smallest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::min));
+            line("bias_mean_m_s", "mean bias against v_pulse [m/s]", mean(&m.bias_m_s));
+            line(
+                "rms_mean_m_s",
+                "root mean square error against v_pulse [m/s]",
+                mean(&m.rms_m_s.mapv(|x| x * x)).sqrt(),
+            );
+            line("std_mean_m_s", "standard deviation of one estimate [m/s]", mean(&m.std_m_s));
+            line("flagged_fraction", "fraction of flagged estimates", mean(&m.flagged));
+            if m.clipped_fraction > 0.0 {
+                line("clipped_fraction", "fraction of clipped samples", m.clipped_fraction);
+            }
+            line("level_mean", "windows accumulated, mean", mean(&m.level));
+        }
+        out
+    }
+}
+
+/// Mean of the values that are numbers; NaN if there is none.
+fn mean(values: &Array2<f64>) -> f64 {
+    let numbers: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    numbers.iter().sum::<f64>() / numbers.len() as f64
+}
+
+fn fold(values: &Array2<f64>, pick: fn(f64, f64) -> f64) -> f64 {
+    values.iter().copied().fold(f64::NAN, pick)
+}

@@ -1,0 +1,243 @@
+//! One scan: the air along each line of sight, and the signals that it returns.
+
+use crate::Error;
+use crate::measure::geometry::Geometry;
+use crate::measure::instrument::Instrument;
+use crate::measure::profile::{drawn_turbulence, efficiency_at, efficiency_realisations, model, spaced};
+use crate::measure::progress::Observer;
+use crate::measure::streams::stream;
+use crate::plan::{Plan, Stage};
+use crate::scene::{Outside, Scene, SnrReference};
+use ndarray::{Array2, ArrayView2};
+use rayon::prelude::*;
+use std::ops::Range;
+use wakescope_optics::plan::Model;
+use wakescope_signal::digitise::Clipped;
+use wakescope_signal::efficiency::{EfficiencyTable, LayerEfficiency};
+use wakescope_signal::scan::{PulseKey, Sample};
+use wakescope_signal::{LineOfSight, Pulse, Record, Scan, Shot, Simulator};
+
+/// Ranges of the efficiency profile from which the layers take theirs, m: dense where it is a quadrature, few
+/// where each costs transforms and the errors of neighbours are alike.
+pub(crate) fn profile_ranges_m(scene: &Scene, geometry: &Geometry) -> Vec<f64> {
+    let points = match model(scene) {
+        Model::FreeSpace | Model::ExactBistatic if drawn_turbulence(scene).is_none() => 65,
+        _ => 9,
+    };
+    let last_m = geometry.first_layer_range_m + geometry.layers as f64 * geometry.layer_thickness_m;
+    spaced(geometry.first_layer_range_m, last_m, points)
+}
+
+/// The lines of sight of a scan, and what makes signals of them.
+pub struct Scanner<'a> {
+    scene: &'a Scene,
+    instrument: &'a Instrument,
+    simulator: Simulator,
+    lines: Vec<LineOfSight>,
+    /// What each pulse brings instead of the mean efficiency.
+    efficiency: Option<LayerEfficiency>,
+}
+
+impl<'a> Scanner<'a> {
+    /// Samples the wind along every line of sight.
+    ///
+    /// # Errors
+    /// What the crates refuse; a checked scene gives none.
+    pub fn new(plan: &'a Plan, observer: &dyn Observer) -> Result<Self, Error> {
+        let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
+        let weight_per_m = layer_weights(plan, observer)?;
+        observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
+        let lines = (0..geometry.elevation_rad.len())
+            .into_par_iter()
+            .map(|i| {
+                let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
+                let radial_velocity_m_s = radial_velocity_m_s(plan, i, &ranges_m)?;
+                observer.advance(1);
+                Ok(LineOfSight {
+                    first_range_m: geometry.first_layer_range_m,
+                    layer_thickness_m: geometry.layer_thickness_m,
+                    radial_velocity_m_s,
+                    weight_per_m: weight_per_m.clone(),
+                })
+            })
+            .collect::<Result<Vec<_>, Error>>()?;
+        observer.end();
+        let efficiency = drawn_efficiency(plan, &lines, observer)?;
+        let record = Record {
+            time_of_first_sample_s: 2.0 * geometry.first_range_m / crate::SPEED_OF_LIGHT_M_S,
+            samples: geometry.samples,
+        };
+        let simulator = Simulator::new(instrument.pulse.clone(), instrument.receiver, record)?;
+        Ok(Self { scene, instrument, simulator, lines, efficiency })
+    }
+
+    /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
+    pub fn mean_snr(&self) -> f64 {
+        let layers = self.layer_snr();
+        layers.iter().map(|(_, snr)| snr).sum::<f64>() / layers.len().max(1) as f64
+    }
+
+    /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; the efficiency is its
+    /// mean.
+    pub fn layer_snr(&self) -> Vec<(f64, f64)> {
+        let Some(line) = self.lines.first() else { return Vec::new() };
+        let receiver = &self.instrument.receiver;
+        let mut mean = vec![1.0; line.layers()];
+        if let Some(efficiency) = &self.efficiency {
+            // As many places as layers: the efficiencies were made for this line.
+            let _ = efficiency.mean_into(&mut mean);
+        }
+        let snr = |l: usize| receiver.slowly_varying_snr(self.scene.pulse.energy_j, line.weight_per_m[l] * mean[l]);
+        (0..line.layers()).map(|l| (line.range_m(l), snr(l))).collect()
+    }
+
+    /// The pulse that is sent along them.
+    pub fn pulse(&self) -> &Pulse {
+        &self.instrument.pulse
+    }
+
+    /// The air along each line of sight, in the order of the geometry's elevations.
+    pub fn lines(&self) -> &[LineOfSight] {
+        &self.lines
+    }
+
+    /// The signals of one realisation \[pulse, sample\], A; the pulses of a line stand together.
+    ///
+    /// # Errors
+    /// As [`Scanner::in_pieces`].
+    pub fn records(&self, realisation: usize, observer: &dyn Observer) -> Result<Array2<f64>, Error> {
+        Ok(self.piece(realisation, 0..self.pulses(), observer)?.0)
+    }
+
+    /// Pulses of one realisation.
+    pub fn pulses(&self) -> usize {
+        self.lines.len() * self.scene.scan.pulses_per_line
+    }
+
+    /// Hands the signals of one realisation to `sink`, piece after piece: the number of the first pulse and the records
+    /// \[pulse, sample\], A, real at the intermediate frequency or complex about zero. The pulses of a line stand together.
+    /// Returns how many samples the converter clipped.
+    ///
+    /// A piece has some ten megabytes of records, however many pulses there are. Every pulse has its own random stream, keyed by
+    /// realisation, line and pulse.
+    ///
+    /// # Errors
+    /// What the signal simulation refuses; a checked scene gives none; and the errors of `sink`.
+    pub fn in_pieces<T: Sample>(
+        &self,
+        realisation: usize,
+        observer: &dyn Observer,
+        mut sink: impl FnMut(usize, ArrayView2<'_, T>) -> Result<(), Error>,
+    ) -> Result<Clipped, Error> {
+        let size = records_at_once::<T>(self.simulator.record().samples, self.pulses());
+        let mut clipped = Clipped::default();
+        for first in (0..self.pulses()).step_by(size) {
+            let last = (first + size).min(self.pulses());
+            let (records, here) = self.piece(realisation, first..last, observer)?;
+            clipped += here;
+            sink(first, records.view())?;
+        }
+        Ok(clipped)
+    }
+
+    /// The records of some pulses of a realisation.
+    fn piece<T: Sample>(
+        &self,
+        realisation: usize,
+        pulses: Range<usize>,
+        observer: &dyn Observer,
+    ) -> Result<(Array2<T>, Clipped), Error> {
+        let per_line = self.scene.scan.pulses_per_line;
+        let index = |key: PulseKey| realisation * self.pulses() + pulses.start + key.pulse;
+        let scan = Scan {
+            simulator: &self.simulator,
+            // One line after the other, which the simulation of signals need not know.
+            lines: 1,
+            pulses_per_line: pulses.len(),
+            shot: |key: PulseKey| {
+                let pulse = pulses.start + key.pulse;
+                if pulse.is_multiple_of(per_line) {
+                    observer.advance(1);
+                }
+                let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
+                Shot { line: &self.lines[pulse / per_line], efficiency }
+            },
+            generator: |key| stream(self.scene.seed, "signal", index(key) as u64),
+            digitiser: self.instrument.digitiser,
+        };
+        Ok(scan.collect()?)
+    }
+}
+
+/// Records that are in memory at a time: some ten megabytes of them, and enough for every thread.
+pub(crate) fn records_at_once<T>(samples: usize, pulses: usize) -> usize {
+    let record_bytes = samples.max(1) * size_of::<T>();
+    (PIECE_BYTES / record_bytes).max(rayon::current_num_threads()).min(pulses.max(1))
+}
+
+/// Size of a piece of records, bytes.
+const PIECE_BYTES: usize = 16 << 20;
+
+/// Return per metre of each layer, K^2 beta A_R eta_s/R^2, (9); the efficiency is interpolated, and left out if each pulse
+/// brings its own. A signal-to-noise ratio that the scene states takes the place of all of it.
+fn layer_weights(plan: &Plan, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
+    let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
+    if let SnrReference::Fixed { snr_db } = scene.detector.snr {
+        let unit = instrument.receiver.slowly_varying_snr(scene.pulse.energy_j, 1.0);
+        return Ok(vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers]);
+    }
+    let profile = match drawn_turbulence(scene) {
+        Some(_) => None,
+        None => {
+            observer.begin(Stage::Efficiency, 1);
+            let profile = efficiency_at(scene, instrument, &profile_ranges_m(scene, geometry), observer)?;
+            observer.end();
+            Some(profile)
+        }
+    };
+    let weight = |range_m: f64| {
+        let eta = profile.as_ref().map_or(Ok(1.0), |profile| profile.interpolated(range_m))?;
+        Ok(instrument.return_per_m(range_m)? * eta)
+    };
+    geometry.layer_range_m().map(weight).collect()
+}
+
+/// Efficiencies of the layers, one set for each realisation of the turbulence, if the pulses have their own.
+fn drawn_efficiency(
+    plan: &Plan,
+    lines: &[LineOfSight],
+    observer: &dyn Observer,
+) -> Result<Option<LayerEfficiency>, Error> {
+    let scene = &plan.scene.scene;
+    let (Some(t), Some(line)) = (drawn_turbulence(scene), lines.first()) else { return Ok(None) };
+    let ranges_m = profile_ranges_m(scene, &plan.geometry);
+    let realisations = efficiency_realisations(scene, &plan.instrument, &t, &ranges_m, observer)?;
+    Ok(Some(EfficiencyTable::new(ranges_m, &realisations)?.onto_layers(line)?))
+}
+
+/// Radial velocity, m/s, positive away from the lidar, at ranges along line of sight `line`; NaN where nothing returns light:
+/// below the ground or outside the flow, if the scene masks that.
+pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+    let scan = &plan.scene.scene.scan;
+    let elevation_rad = plan.geometry.elevation_rad[line];
+    let time_s = plan.wind.start_s + plan.geometry.line_time_s[line];
+    let (sin, cos) = elevation_rad.sin_cos();
+    let points_m: Vec<[f64; 3]> = range_m.iter().map(|r| [0.0, r * cos, scan.lidar_height_m + r * sin]).collect();
+    let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
+    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
+    let project = |((&[_, y_m, z_m], v), &range_m): ((&[f64; 3], &[f64; 3]), &f64)| {
+        let known_m_s = v[1] * cos + v[2] * sin;
+        let outside = match (z_m < 0.0, known_m_s.is_nan()) {
+            (true, _) => scan.below_ground,
+            (false, true) => scan.outside_flow,
+            (false, false) => return Ok(known_m_s),
+        };
+        match outside {
+            Outside::Constant { radial_velocity_m_s } => Ok(radial_velocity_m_s),
+            // A scene with lines below the ground was refused, but for air behind its last sample.
+            Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow { elevation_rad, range_m, y_m, z_m }),
+            Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
+        }
+    };
+    points_m.iter().zip(&velocity_m_s).zip(range_m).map(project).collect()
+}

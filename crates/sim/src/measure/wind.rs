@@ -1,0 +1,272 @@
+//! The wind of a scene, made once for a run: analytic, or read from the cross-planes of a simulated flow.
+//!
+//! A simulated flow is scaled from its own units to metres and seconds and shifted to its place in front of the lidar; between
+//! the nodes it is interpolated by (26), between the times linearly. Outside its mesh the velocity is NaN, which the scan
+//! treats as the scene says. Check: a scanned map shows the flow as sampled from the planes, frozen and moving.
+
+use crate::Error;
+use crate::scene::{Flow, Scene, SceneFile, VortexMotion, VortexPair, VortexProfile};
+use std::fmt;
+use wakescope_les::{self as les, Wind};
+
+/// The wind of a scene, with what the run needs to know of it.
+pub struct SceneWind {
+    wind: Box<dyn Wind>,
+    /// Time of the flow when the scan begins, s.
+    pub start_s: f64,
+    /// Age of the wake then, in tau; 0 where there is no wake.
+    pub tau: f64,
+    /// Last time that the wind can be asked for, s; infinite if there is none.
+    pub end_s: f64,
+    /// Largest speed of the air that is known, m/s.
+    pub max_speed_m_s: f64,
+    /// Where the wind comes from, in words.
+    pub source: String,
+}
+
+impl fmt::Debug for SceneWind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SceneWind({} from {} s)", self.source, self.start_s)
+    }
+}
+
+impl SceneWind {
+    /// The wind of a checked scene; files are looked for relative to the folder of the scene.
+    ///
+    /// # Errors
+    /// What the wind refuses; planes that cannot be read, or do not hold the time that is asked for.
+    pub fn new(file: &SceneFile) -> Result<Self, Error> {
+        match &file.scene.flow {
+            Flow::Simulated(flow) => simulated(flow, file),
+            _ => Self::analytic(&file.scene),
+        }
+    }
+
+    fn analytic(scene: &Scene) -> Result<Self, Error> {
+        let max_speed_m_s = match &scene.flow {
+            Flow::Uniform { lateral_m_s, vertical_m_s } => lateral_m_s.hypot(*vertical_m_s),
+            Flow::VortexPair(p) => {
+                p.circulation_m2_s / (4.0 * std::f64::consts::PI * p.core_radius_m) + p.cross_wind_m_s.abs()
+            }
+            Flow::Calm {} | Flow::Simulated(_) => 0.0,
+        };
+        let tau = match &scene.flow {
+            Flow::VortexPair(pair) => pair.age_tau,
+            _ => 0.0,
+        };
+        Ok(Self {
+            wind: analytic_wind(scene)?,
+            start_s: start_time_s(scene),
+            tau,
+            end_s: f64::INFINITY,
+            max_speed_m_s,
+            source: "the flow is analytic".into(),
+        })
+    }
+
+    /// Largest gradient of the radial velocity at times from the start of the scan, s; what lies beyond the end of the flow
+    /// counts as its last time.
+    pub fn max_gradient_per_s(&self, after_start_s: &[f64]) -> f64 {
+        let at = |after_s: &f64| self.wind.max_gradient_per_s((self.start_s + after_s).min(self.end_s));
+        after_start_s.iter().map(at).fold(self.wind.max_gradient_per_s(self.start_s), f64::max)
+    }
+
+    /// The wind itself.
+    pub fn wind(&self) -> &dyn Wind {
+        &*self.wind
+    }
+}
+
+/// The wind of a scene whose flow is analytic, and calm air for another.
+///
+/// # Errors
+/// What the wind refuses; a checked scene gives none.
+fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
+    Ok(match &scene.flow {
+        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::winds::Calm),
+        Flow::Uniform { lateral_m_s, vertical_m_s } => {
+            Box::new(les::winds::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?)
+        }
+        Flow::VortexPair(pair) => {
+            let vortices = Box::new(vortex_pair(pair).wind()?);
+            if pair.cross_wind_m_s == 0.0 {
+                return Ok(vortices);
+            }
+            let cross = Box::new(les::winds::Uniform::new([0.0, pair.cross_wind_m_s, 0.0])?);
+            Box::new(les::winds::Sum { winds: vec![vortices, cross] })
+        }
+    })
+}
+
+/// The vortex pair of a scene.
+pub fn vortex_pair(pair: &VortexPair) -> les::VortexPair {
+    les::VortexPair {
+        circulation_m2_s: pair.circulation_m2_s,
+        spacing_m: pair.spacing_m,
+        core_radius_m: pair.core_radius_m,
+        lateral_position_m: pair.lateral_position_m,
+        height_m: pair.height_m,
+        ground: les::Ground::Image,
+        profile: circulation_profile(pair.profile),
+        motion: match pair.motion {
+            VortexMotion::Frozen => les::Motion::Frozen,
+            VortexMotion::Inviscid => les::Motion::Inviscid,
+        },
+    }
+}
+
+/// The circulation profile of a scene or a flow case.
+pub(crate) fn circulation_profile(profile: VortexProfile) -> les::CirculationProfile {
+    match profile {
+        VortexProfile::Algebraic => les::CirculationProfile::Algebraic,
+        VortexProfile::LambOseen => les::CirculationProfile::LambOseen,
+    }
+}
+
+/// Age of an analytic flow when the scan begins, s.
+pub fn start_time_s(scene: &Scene) -> f64 {
+    match &scene.flow {
+        Flow::VortexPair(pair) if pair.age_tau > 0.0 && pair.circulation_m2_s > 0.0 => {
+            vortex_pair(pair).time_s(pair.age_tau)
+        }
+        _ => 0.0,
+    }
+}
+
+#[cfg(not(feature = "netcdf"))]
+fn simulated(_: &crate::scene::SimulatedFlow, _: &SceneFile) -> Result<SceneWind, Error> {
+    Err(Error::Input { path: "flow.planes".into(), reason: "this build lacks the feature `netcdf`".into() })
+}
+
+#[cfg(feature = "netcdf")]
+use planes::simulated;
+
+#[cfg(feature = "netcdf")]
+mod planes {
+    use super::{Error, SceneFile, SceneWind, Wind};
+    use crate::io::CrossPlanes;
+    use crate::io::planes_input::{files, read};
+    use crate::scene::{SimulatedFlow, SimulatedMotion};
+    use wakescope_les::winds::{Edges, GridSeries, OutsidePolicy, PlaneMesh, Side};
+    use wakescope_les::{Error as LesError, GridSnapshot};
+
+    /// A wind that stands still as it was at one time.
+    struct Frozen {
+        wind: GridSeries,
+        time_s: f64,
+    }
+
+    impl Wind for Frozen {
+        fn velocity_into(&self, points_m: &[[f64; 3]], _: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), LesError> {
+            self.wind.velocity_into(points_m, self.time_s, out_m_s)
+        }
+
+        fn max_gradient_per_s(&self, _: f64) -> f64 {
+            self.wind.max_gradient_per_s(self.time_s)
+        }
+    }
+
+    /// From the units and the place of the flow to those of the scene.
+    struct Scale {
+        length_m: f64,
+        speed_m_s: f64,
+        shift_y_m: f64,
+    }
+
+    impl Scale {
+        fn edges(&self, edges: Edges, shift_m: f64) -> Edges {
+            let side = |side: Side| match side {
+                Side::Open => Side::Open,
+                Side::SlipWall { position_m } => Side::SlipWall { position_m: position_m * self.length_m + shift_m },
+                Side::NoSlipWall { position_m, velocity_m_s } => Side::NoSlipWall {
+                    position_m: position_m * self.length_m + shift_m,
+                    velocity_m_s: velocity_m_s.map(|v| v * self.speed_m_s),
+                },
+            };
+            match edges {
+                Edges::Periodic { period_m } => Edges::Periodic { period_m: period_m * self.length_m },
+                Edges::Bounded { low, high } => Edges::Bounded { low: side(low), high: side(high) },
+            }
+        }
+
+        fn snapshots(&self, planes: &CrossPlanes) -> Result<Vec<(f64, GridSnapshot)>, LesError> {
+            let mesh = PlaneMesh {
+                y_m: planes.y_m.iter().map(|y| y * self.length_m + self.shift_y_m).collect(),
+                z_m: planes.z_m.iter().map(|z| z * self.length_m).collect(),
+                y_edges: self.edges(planes.y_edges, self.shift_y_m),
+                z_edges: self.edges(planes.z_edges, 0.0),
+                outside: OutsidePolicy::Mask,
+            };
+            let fields = planes.v_m_s.outer_iter().zip(planes.w_m_s.outer_iter());
+            let snapshot = |(time, (v, w)): (&f64, (ndarray::ArrayView2<'_, f64>, ndarray::ArrayView2<'_, f64>))| {
+                let velocity_m_s: Vec<[f64; 3]> =
+                    v.iter().zip(w).map(|(v, w)| [0.0, v * self.speed_m_s, w * self.speed_m_s]).collect();
+                Ok((time * self.length_m / self.speed_m_s, GridSnapshot::new(&mesh, &velocity_m_s)?))
+            };
+            planes.time_s.iter().zip(fields).map(snapshot).collect()
+        }
+    }
+
+    /// Reads the planes of a simulated flow.
+    pub(super) fn simulated(flow: &SimulatedFlow, file: &SceneFile) -> Result<SceneWind, Error> {
+        let scale = Scale {
+            length_m: flow.length_unit_m,
+            speed_m_s: flow.velocity_unit_m_s,
+            shift_y_m: flow.lateral_position_m,
+        };
+        let path = file.folder.join(&flow.planes);
+        let of_key = |e: Error| Error::OfKey { key: "flow.planes", source: Box::new(e) };
+        let refuse = |reason: String| Error::Input { path: path.clone(), reason };
+        let (mut times, mut snapshots, mut fastest) = (Vec::new(), Vec::new(), 0.0_f64);
+        for path in files(&path).map_err(of_key)? {
+            let planes = read(&path).map_err(of_key)?;
+            let of_file = |e: LesError| Error::Input { path: path.clone(), reason: e.to_string() };
+            snapshots.extend(scale.snapshots(&planes).map_err(of_file)?);
+            times.extend(
+                planes.tau.iter().zip(&planes.time_s).map(|(tau, t)| (*tau, t * scale.length_m / scale.speed_m_s)),
+            );
+            fastest = planes.v_m_s.iter().zip(&planes.w_m_s).map(|(v, w)| v.hypot(*w)).fold(fastest, f64::max);
+        }
+        let count = snapshots.len();
+        let series = GridSeries::new(snapshots).map_err(|e| refuse(format!("the times of the planes: {e}")))?;
+        let (start_s, tau) = start(flow, &times).map_err(&refuse)?;
+        let (first_s, last_s) = (times[0].1, times[count - 1].1);
+        let source = format!("{count} planes of {first_s:.4} to {last_s:.4} s from {}", path.display());
+        let (wind, end_s): (Box<dyn Wind>, f64) = match flow.motion {
+            SimulatedMotion::Moving => (Box::new(series), last_s),
+            SimulatedMotion::Frozen => (Box::new(Frozen { wind: series, time_s: start_s }), f64::INFINITY),
+        };
+        Ok(SceneWind { wind, start_s, tau, end_s, max_speed_m_s: fastest * scale.speed_m_s, source })
+    }
+
+    /// Time \[s\] and age of the flow when the scan begins; `times` are (tau, s) of the planes.
+    fn start(flow: &SimulatedFlow, times: &[(f64, f64)]) -> Result<(f64, f64), String> {
+        let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
+            return Err("no plane at all".into());
+        };
+        let interpolated = |x: f64, from: fn(&(f64, f64)) -> f64, to: fn(&(f64, f64)) -> f64| {
+            let at = times.partition_point(|t| from(t) <= x).clamp(1, times.len().max(2) - 1) - 1;
+            match times.get(at + 1) {
+                Some(next) => {
+                    let part = (x - from(&times[at])) / (from(next) - from(&times[at]));
+                    // Rounding must not lead beyond the last plane.
+                    (to(&times[at]) + part * (to(next) - to(&times[at]))).min(to(&last))
+                }
+                None => to(&times[at]),
+            }
+        };
+        match (flow.time_s, flow.age_tau) {
+            (Some(time_s), _) if (first.1..=last.1).contains(&time_s) => {
+                Ok((time_s, interpolated(time_s, |t| t.1, |t| t.0)))
+            }
+            (Some(time_s), _) => {
+                Err(format!("flow.time_s = {time_s:?}: the planes are from {:?} to {:?} s", first.1, last.1))
+            }
+            (None, Some(tau)) if (first.0..=last.0).contains(&tau) => Ok((interpolated(tau, |t| t.0, |t| t.1), tau)),
+            (None, Some(tau)) => {
+                Err(format!("flow.age_tau = {tau:?}: the planes are from tau = {:?} to {:?}", first.0, last.0))
+            }
+            (None, None) => Ok((first.1, first.0)),
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! Writes what a run gives: all files of a run appear together, or none.
+
+mod limits;
+mod map;
+#[cfg(feature = "plots")]
+mod pictures;
+
+pub use limits::{Contents, check};
+pub use map::velocity_map;
+
+use crate::Error;
+use crate::io::lock::FolderLock;
+use crate::io::own::refuse_foreign;
+use crate::io::signals::{LineVelocities, RawSignals, Recording};
+use crate::io::{Existing, FileGroup, Provenance, Table, hpl, tables};
+use crate::measure::profile::RangeProfile;
+use crate::measure::run::RunResult;
+use crate::plan::{Plan, Stage, Target};
+use crate::scene::{DetectorSignal, NoiseKind};
+use std::path::{Path, PathBuf};
+
+/// The table of the HALO file has its name.
+const HALO: &str = "halo.hpl";
+
+/// Finds out, before any computing, whether files of these names can be written to a folder; leaves no trace.
+///
+/// # Errors
+/// The folder cannot be made, is a file, cannot be written to, or another run writes to it; a folder is in the way of a file,
+/// or a file that this program did not write and may not replace.
+pub fn prepare<'a>(folder: &Path, names: impl IntoIterator<Item = &'a str>, existing: Existing) -> Result<(), Error> {
+    refuse_foreign(folder, names, existing)?;
+    let io = |action, source| Error::Io { action, path: folder.to_owned(), source };
+    let missing: Vec<&Path> =
+        folder.ancestors().filter(|p| !p.as_os_str().is_empty()).take_while(|p| !p.exists()).collect();
+    let made = std::fs::create_dir_all(folder).map_err(|e| io("make the folder", e));
+    let probe = folder.join(".wakescope-probe");
+    let tried = made.and_then(|()| {
+        std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(|e| io("write to", e))?;
+        FolderLock::take(folder)?;
+        Ok(())
+    });
+    for path in missing {
+        // Innermost first; one that was not made cannot be removed, which is what is wanted.
+        let _ = std::fs::remove_dir(path);
+    }
+    tried
+}
+
+/// Names of the files that a plan will write.
+pub fn names(plan: &Plan) -> Vec<String> {
+    let o = &plan.scene.scene.outputs;
+    let mut out = vec!["scene.toml".to_owned()];
+    let mut add = |stem: &str, kinds: &[(bool, &str)]| {
+        out.extend(kinds.iter().filter(|kind| kind.0).map(|kind| format!("{stem}.{}", kind.1)));
+    };
+    let (netcdf, plots) = (o.netcdf && cfg!(feature = "netcdf"), cfg!(feature = "plots"));
+    let pictures = [(o.svg && plots, "svg"), (o.png && plots, "png")];
+    if matches!(plan.target, Target::Run | Target::Efficiency) {
+        add("profile", &[(o.csv, "csv"), pictures[0], pictures[1]]);
+    }
+    if plan.runs(Stage::CrossPlane) {
+        add("flow", &[(o.csv, "csv"), (netcdf, "nc")]);
+    }
+    if plan.keeps_signals() {
+        add("signals", &[(o.csv, "csv"), (netcdf, "nc")]);
+    }
+    if plan.runs(Stage::Estimates) {
+        add("map", &[(o.csv, "csv"), (netcdf, "nc"), pictures[0], pictures[1]]);
+        add("halo", &[(o.hpl, "hpl"), (o.hpl && o.csv, "csv")]);
+    }
+    out
+}
+
+/// Writes the results that the plan's scene asks for; returns the paths of the files.
+///
+/// # Errors
+/// A result that a format cannot hold, a file in the way that may not be replaced, or what the system says. Nothing is
+/// left half-written.
+pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+    put(files(plan, result, folder)?, folder, existing)
+}
+
+/// The files of a run, still in memory.
+pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<FileGroup, Error> {
+    let outputs = &plan.scene.scene.outputs;
+    let origin = provenance(plan);
+    let mut files = FileGroup::new(folder);
+    files.add("scene.toml", scene_text(&origin))?;
+    if let Some(profile) = &result.profile {
+        if outputs.csv {
+            files.add("profile.csv", profile_table(profile).to_csv(&origin)?)?;
+        }
+        #[cfg(feature = "plots")]
+        pictures::add(&mut files, plan, "profile", &pictures::profile(plan, profile), &origin)?;
+    }
+    if let Some(plane) = &result.plane {
+        if outputs.csv {
+            files.add("flow.csv", tables::planes_table(plane)?.to_csv(&origin)?)?;
+        }
+        #[cfg(feature = "netcdf")]
+        if outputs.netcdf {
+            files.add("flow.nc", crate::io::cf_planes::cf_planes_bytes(plane, &origin)?)?;
+        }
+    }
+    if let Some(signals) = raw_signals(plan, result) {
+        if outputs.csv {
+            files.add("signals.csv", signals.table()?.to_csv(&origin)?)?;
+        }
+        #[cfg(feature = "netcdf")]
+        if outputs.netcdf {
+            files.add("signals.nc", crate::io::cf_signals::cf_signals_bytes(&signals, &origin)?)?;
+        }
+    }
+    if let Some(estimates) = &result.map {
+        let map = velocity_map(plan, estimates);
+        if outputs.csv {
+            files.add("map.csv", tables::map_table(&map)?.to_csv(&origin)?)?;
+        }
+        #[cfg(feature = "netcdf")]
+        if outputs.netcdf {
+            files.add("map.nc", crate::io::cfradial::cfradial_bytes(&map, &origin)?)?;
+        }
+        if outputs.hpl {
+            files.add(HALO, hpl::hpl_bytes(&map, 0, HALO)?)?;
+            if outputs.csv {
+                files.add("halo.csv", hpl::hpl_table(&map, 0)?.to_csv(&origin)?)?;
+            }
+        }
+        #[cfg(feature = "plots")]
+        pictures::add_map(&mut files, plan, &map, &origin)?;
+    }
+    Ok(files)
+}
+
+/// Puts the files of a run into their folder, where no other run may be writing.
+fn put(files: FileGroup, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+    let there = folder.exists();
+    let lock = there.then(|| FolderLock::take(folder)).transpose()?;
+    // Again: a file may have come while the run computed.
+    let names: Vec<String> = files.names().map(str::to_owned).collect();
+    refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
+    let written = files.commit()?;
+    drop(lock);
+    Ok(written)
+}
+
+/// Where the files of a run come from.
+pub fn provenance(plan: &Plan) -> Provenance {
+    Provenance {
+        program: crate::PROGRAM.into(),
+        scene_toml: plan.scene.toml.clone(),
+        scene_hash: plan.scene.hash.clone(),
+        seed: plan.scene.scene.seed,
+    }
+}
+
+/// The scene with every default written out: running it again gives the same files.
+fn scene_text(origin: &Provenance) -> String {
+    format!("# {}, scene {}\n{}", origin.program, origin.scene_hash, origin.scene_toml)
+}
+
+/// Efficiency and SNR as a table.
+pub fn profile_table(profile: &RangeProfile) -> Table {
+    let e = &profile.efficiency;
+    let table = Table::new()
+        .float("range_m", e.range_m.clone())
+        .float("efficiency", e.mean.clone())
+        .float("efficiency_standard_deviation", e.standard_deviation.clone())
+        .float("efficiency_standard_error", e.standard_error.clone())
+        .float("snr_db", profile.snr_db.clone());
+    profile.others.iter().fold(table, |table, (name, other)| {
+        let table = table.float(name, other.mean.clone());
+        match other.standard_error.iter().any(|&error| error > 0.0) {
+            true => table.float(&format!("{name}_standard_error"), other.standard_error.clone()),
+            false => table,
+        }
+    })
+}
+
+/// The raw signals of a run, with what makes them readable.
+fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
+    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let pulses = scene.scan.pulses_per_line;
+    let first_s = 2.0 * g.first_range_m / crate::SPEED_OF_LIGHT_M_S;
+    let first_pulse_s = plan.wind.start_s;
+    let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
+    Some(RawSignals {
+        recording: recording(plan),
+        truth: LineVelocities {
+            range_m: g.layer_range_m().collect(),
+            radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
+        },
+        pulse_time_s: (0..g.elevation_rad.len() * pulses).map(|i| first_pulse_s + i as f64 * prt_s).collect(),
+        current_a: result.signals_a.as_ref()?.view(),
+        quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),
+        elevation_rad: g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect(),
+        time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
+        pulses_per_line: pulses,
+    })
+}
+
+fn recording(plan: &Plan) -> Recording {
+    let scene = &plan.scene.scene;
+    let (d, receiver) = (&scene.detector, &plan.instrument.receiver);
+    let is_baseband = d.signal == DetectorSignal::Baseband;
+    // (13) in the band; white noise goes to half the sampling frequency, and to both sides of zero in two quadratures.
+    let noise_band_hz = match d.noise {
+        NoiseKind::None => 0.0,
+        NoiseKind::Band => d.bandwidth_hz,
+        NoiseKind::White if is_baseband => d.sampling_hz,
+        NoiseKind::White => 0.5 * d.sampling_hz,
+    };
+    Recording {
+        sampling_hz: d.sampling_hz,
+        intermediate_frequency_hz: if is_baseband { 0.0 } else { d.intermediate_frequency_hz },
+        bandwidth_hz: d.bandwidth_hz,
+        wavelength_m: scene.laser.wavelength_m,
+        pulse_repetition_hz: scene.laser.pulse_repetition_hz,
+        pulse_sigma_s: scene.pulse_sigma_s(),
+        noise_power_a2: receiver.noise_density_a2_hz() * noise_band_hz,
+    }
+}

@@ -1,0 +1,124 @@
+//! What the files of a plan can hold, found before anything is computed.
+//! Check: scenes whose results no file can hold are refused, with the key and what would do.
+
+use crate::Error;
+use crate::io::UtcTime;
+use crate::io::hpl::within_a_day;
+use crate::measure::geometry::Geometry;
+#[cfg(feature = "netcdf")]
+use crate::scene::DetectorSignal;
+use crate::scene::Scene;
+
+/// What of a run goes into files.
+#[derive(Debug, Clone, Copy)]
+pub struct Contents<'a> {
+    /// The scene, checked.
+    pub scene: &'a Scene,
+    /// Its lines, samples and gates.
+    pub geometry: &'a Geometry,
+    /// Times of the first and the last line from the start of the flow, s.
+    pub scan_s: (f64, f64),
+    /// Realisations whose raw signals are kept.
+    pub kept_realisations: usize,
+    /// Whether there is a map.
+    pub has_map: bool,
+}
+
+/// Refuses results that do not fit into the files that their scene asks for.
+///
+/// # Errors
+/// The key, the size or the times, and what is allowed.
+pub fn check(contents: &Contents<'_>) -> Result<(), Error> {
+    let Contents { scene, scan_s: (first_s, last_s), has_map, .. } = *contents;
+    #[cfg(feature = "netcdf")]
+    if scene.outputs.netcdf {
+        let (g, kept_realisations) = (contents.geometry, contents.kept_realisations);
+        let rays = g.elevation_rad.len() as f64;
+        if kept_realisations > 0 {
+            let pulses = rays * (scene.scan.pulses_per_line * kept_realisations) as f64;
+            let quadratures = if scene.detector.signal == DetectorSignal::Baseband { 2.0 } else { 1.0 };
+            let bytes =
+                crate::io::cf_signals::data_bytes([pulses, g.samples as f64, quadratures], [rays, g.layers as f64]);
+            fits(
+                "outputs.signals",
+                "signals.nc",
+                bytes,
+                "keep fewer pulses, lines or realisations, or set it to false",
+            )?;
+        }
+        if has_map {
+            let bytes = crate::io::cfradial::data_bytes(rays, g.gate_range_m.len() as f64);
+            fits("estimator.gate_step_samples", "map.nc", bytes, "make it larger, or scan fewer lines")?;
+            let most_s = crate::io::cfradial::MAX_TIME_S;
+            if first_s.abs() > most_s || last_s > most_s {
+                let reason = format!("the rays end {last_s:e} s after the start of the flow; files hold {most_s:e} s");
+                return Err(refusal("scan", reason));
+            }
+        }
+    }
+    if scene.outputs.hpl && has_map {
+        let start = UtcTime::parse(&scene.site.start_utc).unwrap_or(UtcTime::SYNTHETIC);
+        within_a_day(first_s, last_s, start)
+            .map_err(|e| refusal("outputs.hpl", format!("{e}: choose another site.start_utc")))?;
+    }
+    Ok(())
+}
+
+#[cfg(feature = "netcdf")]
+fn fits(key: &str, file: &str, bytes: f64, remedy: &str) -> Result<(), Error> {
+    let most = crate::io::netcdf::MAX_BYTES as f64;
+    if bytes <= most {
+        return Ok(());
+    }
+    let reason = format!("{file} would have {:.0} MB, and may have {:.0} MB: {remedy}", bytes / 1e6, most / 1e6);
+    Err(refusal(key, reason))
+}
+
+fn refusal(key: &str, reason: String) -> Error {
+    Error::Input { path: key.into(), reason }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::plan::{Plan, Target};
+    use crate::scene::{Scene, SceneFile, SignalsOf};
+
+    fn refused(change: impl FnOnce(&mut Scene)) -> String {
+        let mut scene = Scene::default();
+        change(&mut scene);
+        Plan::new(SceneFile::new(scene).unwrap(), Target::Run).map_or_else(|e| e.to_string(), |_| String::new())
+    }
+
+    #[cfg(feature = "netcdf")]
+    #[test]
+    fn signals_that_no_file_can_hold_are_refused_before_the_run() {
+        let many = |of: SignalsOf| {
+            refused(|s| {
+                (s.outputs.signals, s.outputs.signals_of) = (true, of);
+                s.scan.realisations = 100;
+            })
+        };
+        assert_eq!(many(SignalsOf::First), "");
+        let message = many(SignalsOf::All);
+        assert!(message.contains("outputs.signals") && message.contains("537 MB"), "{message}");
+        let without = refused(|s| {
+            (s.outputs.signals, s.outputs.signals_of, s.outputs.netcdf) = (true, SignalsOf::All, false);
+            s.scan.realisations = 100;
+        });
+        assert_eq!(without, "", "tables have no such limit");
+    }
+
+    #[test]
+    fn a_halo_file_across_midnight_is_refused_before_the_run() {
+        let at = |start_utc: &str| {
+            refused(|s| {
+                s.outputs.hpl = true;
+                (s.estimator.gate_step_samples, s.scan.range_min_m) = (64, 306.9875);
+                s.site.start_utc = start_utc.into();
+            })
+        };
+        assert_eq!(at("2024-01-01T23:59:50Z"), "");
+        let message = at("2024-01-01T23:59:58Z");
+        assert!(message.contains("outputs.hpl") && message.contains("site.start_utc"), "{message}");
+    }
+}

@@ -1,0 +1,238 @@
+//! From a scene to a plan: which stages run, which are left out and why, what each will cost.
+//!
+//! Nothing is computed but sizes; the planes of a simulated flow are read. What a run would refuse, the plan refuses. The
+//! forecasts are products of counts with unit costs; `cargo xtask forecast` holds them against what runs take.
+
+use crate::Error;
+use crate::measure::geometry::Geometry;
+use crate::measure::instrument::Instrument;
+use crate::measure::wind::SceneWind;
+use crate::measure::wind::SceneWind;
+use crate::measure::write::Contents;
+use crate::scene::{Method, Scene, SceneFile, Weighting};
+use std::fmt;
+
+mod ambiguity;
+mod files;
+mod fit;
+mod optics;
+mod possible;
+mod rehearsal;
+mod sizes;
+mod stage;
+mod stages;
+pub(crate) mod units;
+
+pub use stage::{Cost, Forecast, PlannedStage, Stage, Target};
+
+/// What a run will do.
+#[derive(Debug)]
+pub struct Plan {
+    /// The scene, checked.
+    pub scene: SceneFile,
+    /// What was asked for.
+    pub target: Target,
+    /// All stages, in the order in which they run.
+    pub stages: Vec<PlannedStage>,
+    /// The instrument and its air.
+    pub instrument: Instrument,
+    /// Sampling in angle, range and time.
+    pub geometry: Geometry,
+    /// The wind.
+    pub wind: SceneWind,
+    /// What the user should know before the run.
+    pub warnings: Vec<String>,
+}
+
+impl Plan {
+    /// Plans a run; reads the planes of a simulated flow.
+    ///
+    /// # Errors
+    /// Planes that cannot be read, end before the scan or are left by a line of sight; what a crate refuses of the scene,
+    /// such as phase screens too coarse for the turbulence; results that a file cannot hold.
+    pub fn new(scene: SceneFile, target: Target) -> Result<Self, Error> {
+        let wind = SceneWind::new(&scene)?;
+        let instrument = Instrument::new(&scene.scene)?;
+        let geometry = Geometry::new(&scene.scene, &instrument.pulse, &wind)?;
+        let last_s = end_s(&wind, &geometry);
+        if last_s > wind.end_s {
+            let reason = format!(
+                "the scan ends at {last_s:.3} s of the flow, the planes at {:.3} s: begin earlier, scan faster, or set \
+                 flow.motion = \"frozen\"",
+                wind.end_s
+            );
+            return Err(Error::Input { path: "flow.planes".into(), reason });
+        }
+        let mut warnings = warnings(&scene.scene, &wind);
+        warnings.extend(ambiguity::warning(&scene.scene, &instrument.pulse));
+        let optics = optics::stages(&scene, &instrument, target, &geometry, &mut warnings)?;
+        let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
+        let plan = Self { scene, target, stages, instrument, geometry, wind, warnings };
+        possible::check(&plan)?;
+        crate::measure::write::check(&Contents {
+            scene: &plan.scene.scene,
+            geometry: &plan.geometry,
+            scan_s: (plan.wind.start_s, plan.scan_end_s()),
+            kept_realisations: plan.kept_realisations(),
+            has_map: plan.runs(Stage::Estimates),
+        })?;
+        Ok(plan)
+    }
+
+    /// Time of the last line from the start of the flow, s.
+    pub fn scan_end_s(&self) -> f64 {
+        end_s(&self.wind, &self.geometry)
+    }
+
+    /// Forecast of the whole, with the threads of the pool in which it was planned.
+    pub fn total(&self) -> Forecast {
+        stage::total(&self.stages)
+    }
+
+    /// Whether a stage runs.
+    pub fn runs(&self, stage: Stage) -> bool {
+        self.stages.iter().any(|s| s.stage == stage && s.cost.is_some())
+    }
+
+    /// Realisations whose raw signals are kept for the files.
+    pub fn kept_realisations(&self) -> usize {
+        sizes::kept_realisations(&self.scene.scene, self.target)
+    }
+
+    /// Whether raw signals are kept for the files.
+    pub fn keeps_signals(&self) -> bool {
+        self.kept_realisations() > 0
+    }
+
+    /// Realisations to run: the raw signals alone need those that are kept.
+    pub fn realisations(&self) -> usize {
+        if self.runs(Stage::Estimates) { self.scene.scene.scan.realisations } else { self.kept_realisations() }
+    }
+}
+
+fn end_s(wind: &SceneWind, geometry: &Geometry) -> f64 {
+    wind.start_s + geometry.line_time_s.last().copied().unwrap_or(0.0)
+}
+
+/// What is allowed but probably not meant.
+fn warnings(scene: &Scene, wind: &SceneWind) -> Vec<String> {
+    let mut out = Vec::new();
+    let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
+    let speed_m_s = wind.max_speed_m_s;
+    if speed_m_s > half_band_m_s {
+        out.push(format!(
+            "the flow reaches {speed_m_s:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster air is not seen"
+        ));
+    }
+    if scene.estimator.padded_samples < 4 * scene.estimator.window_samples {
+        let bin_m_s =
+            0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / scene.estimator.padded_samples as f64;
+        out.push(format!(
+            "estimator.padded_samples gives a spectrum in steps of {bin_m_s:.2} m/s: expect a bias of that order"
+        ));
+    }
+    let method = scene.estimator.method;
+    let is_model = method.order().is_some() || matches!(method, Method::FirstMoment(_) | Method::LagWindow(_));
+    if is_model && scene.estimator.weighting != Weighting::Rectangular {
+        out.push(
+            "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\""
+                .into(),
+        );
+    }
+    if scene.scan.realisations < 2 {
+        out.push("one realisation: no standard deviation can be given".into());
+    }
+    out
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "scene {}, seed {}", self.scene.hash, self.scene.scene.seed)?;
+        for s in &self.stages {
+            match s.cost {
+                Some(c) => {
+                    let (time, memory) = (units::seconds(c.core_s), units::bytes(c.memory_bytes()));
+                    writeln!(f, "  run   {:<16} {time:>10} {memory:>10}   {}", s.stage.name(), s.reason)?;
+                }
+                None => writeln!(f, "  skip  {:<16} {:>10} {:>10}   {}", s.stage.name(), "", "", s.reason)?,
+            }
+        }
+        let Forecast { core_s, memory_bytes, .. } = self.total();
+        let (time, memory) = (units::seconds(core_s), units::bytes(memory_bytes));
+        writeln!(f, "  total {:<16} {time:>10} {memory:>10}   at once, forecast for one core", "")?;
+        for w in &self.warnings {
+            writeln!(f, "  warning: {w}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Flow, NoiseKind, RefractiveTurbulence, SnrReference, Turbulence, VortexPair};
+
+    fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
+        let mut scene = Scene::default();
+        change(&mut scene);
+        Plan::new(SceneFile::new(scene).unwrap(), target).unwrap()
+    }
+
+    fn run_stages(plan: &Plan) -> Vec<&'static str> {
+        plan.stages.iter().filter(|s| s.cost.is_some()).map(|s| s.stage.name()).collect()
+    }
+
+    #[test]
+    fn each_target_runs_only_what_it_needs() {
+        let stages = |target| run_stages(&plan(target, |_| {}));
+        assert_eq!(stages(Target::Efficiency), ["efficiency", "files"]);
+        let signal = ["efficiency", "lines of sight", "signals", "noise"];
+        assert_eq!(stages(Target::Signal), [&signal[..], &["files"]].concat());
+        assert_eq!(stages(Target::Map), [&signal[..], &["estimates", "errors", "files"]].concat());
+        assert_eq!(stages(Target::Run).len(), 8);
+    }
+
+    #[test]
+    fn what_the_scene_does_not_need_is_left_out_with_a_reason() {
+        let lean = plan(Target::Map, |s| {
+            s.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
+            s.detector.noise = NoiseKind::None;
+        });
+        assert_eq!(run_stages(&lean), ["lines of sight", "signals", "estimates", "errors", "files"]);
+        assert!(lean.stages.iter().filter(|s| s.cost.is_none()).all(|s| !s.reason.is_empty()));
+        let calm = plan(Target::Run, |s| s.flow = Flow::Calm {});
+        assert!(!calm.runs(Stage::CrossPlane));
+    }
+
+    #[test]
+    fn forecasts_grow_with_the_work() {
+        let once = plan(Target::Map, |s| s.scan.realisations = 100).total().core_s;
+        let twice = plan(Target::Map, |s| s.scan.realisations = 200).total().core_s;
+        assert!((1.9..2.0).contains(&(twice / once)), "{}", twice / once);
+    }
+
+    #[test]
+    fn memory_is_that_of_the_threads_of_the_pool() {
+        let with = |threads: usize, of: fn(&mut Scene)| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| plan(Target::Run, of).total().memory_bytes)
+        };
+        let screens = |s: &mut Scene| {
+            let t = RefractiveTurbulence { grid_points: 512, realisations: 64, ..RefractiveTurbulence::default() };
+            s.atmosphere.turbulence = Turbulence::Refractive(t);
+        };
+        // Eight groups of realisations at most run at a time, each with some 80 bytes a point.
+        let [one, two, eight, more] = [1, 2, 8, 16].map(|threads| with(threads, screens));
+        let group = 512.0 * 512.0 * 80.0;
+        assert!(two - one > 0.9 * group && (6.9..7.1).contains(&((eight - one) / (two - one))), "{one} {two} {eight}");
+        assert!(more - eight < 0.2 * group, "{eight} {more}");
+    }
+
+    #[test]
+    fn air_faster_than_the_band_is_warned_of() {
+        let fast =
+            |s: &mut Scene| s.flow = Flow::VortexPair(VortexPair { core_radius_m: 1.0, ..VortexPair::default() });
+        assert!(plan(Target::Map, fast).warnings.iter().any(|w| w.contains("19.4 m/s")));
+        assert!(plan(Target::Map, |_| {}).warnings.is_empty());
+    }
+}

@@ -1,0 +1,20 @@
+//! The crate from outside: whole runs of scenes and flows, and the program as a user meets it.
+
+// A test that cannot set up its input has failed.
+#![allow(clippy::unwrap_used)]
+
+#[cfg(feature = "cli")]
+mod cli;
+#[cfg(feature = "cli")]
+mod messages;
+mod scene_features;
+#[cfg(all(feature = "flow", feature = "netcdf"))]
+mod simulated_flow;
+#[cfg(feature = "cli")]
+mod wake;
+
+/// The program, run in a folder.
+#[cfg(feature = "cli")]
+fn wakescope(folder: &std::path::Path, words: &[&str]) -> std::process::Output {
+    std::process::Command::new(env!("CARGO_BIN_EXE_wakescope")).args(words).current_dir(folder).output().unwrap()
+}
