@@ -23,9 +23,10 @@ struct Step {
 }
 
 /// Feature sets that must build: each crate with nothing, and each feature alone.
-const FEATURES: [(&str, &[&str]); 4] = [
+const FEATURES: [(&str, &[&str]); 5] = [
     ("wakescope-optics", &["", "rayon", "screens"]),
     ("wakescope-les", &["", "solver"]),
+    ("wakescope-signal", &["", "rayon"]),
     ("wakescope-estimate", &["", "rayon", "bundled-lapack"]),
     ("wakescope-sim", &["", "cli", "flow", "netcdf", "plots", "vtk"]),
 ];
