@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span).
-pub(crate) const CORE_OVER_SPACING: f64 = CorePrior::TYPICAL.median_over_spacing;
+pub(crate) const CORE_OVER_SPACING: f64 = CorePrior::TYPICAL.median_ratio;
 /// Core radii of the starts over the spacing, if they are fitted.
 const CORES_OVER_SPACING: [f64; 2] = [CORE_OVER_SPACING, 0.1];
 /// A typical core is known to this part of itself, after at most so many rounds.

@@ -11,18 +11,18 @@ use crate::vortex_fit::{PARAMETERS, Parameter, Wake};
 /// Log-normal density of the core radius over the spacing of the vortices.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CorePrior {
-    /// Its median.
-    pub median_over_spacing: f64,
+    /// Its median, a core radius over the spacing.
+    pub median_ratio: f64,
     /// Standard deviation of its natural logarithm.
     pub log_deviation: f64,
 }
 
 impl CorePrior {
     /// Median 4.5 % (the chapter: 3 to 5 % of the span); 2.5 and 8 % are 1.2 standard deviations away.
-    pub const TYPICAL: Self = Self { median_over_spacing: 0.045, log_deviation: 0.5 };
+    pub const TYPICAL: Self = Self { median_ratio: 0.045, log_deviation: 0.5 };
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        positive("median_over_spacing", self.median_over_spacing)?;
+        positive("median_ratio", self.median_ratio)?;
         positive("log_deviation", self.log_deviation)
     }
 
@@ -31,7 +31,7 @@ impl CorePrior {
     pub(crate) fn terms(&self, wake: &Wake, groups: &[Vec<usize>]) -> Vec<(f64, Vec<f64>)> {
         let (p, spacing_m) = (wake.to_array(), wake.spacing_m());
         let term = |place: usize| {
-            let away = (p[place] / (self.median_over_spacing * spacing_m)).ln() / self.log_deviation;
+            let away = (p[place] / (self.median_ratio * spacing_m)).ln() / self.log_deviation;
             let mut all = [0.0; PARAMETERS];
             all[place] = (self.log_deviation * p[place]).recip();
             all[Parameter::LeftLateral as usize] = (self.log_deviation * spacing_m).recip();
