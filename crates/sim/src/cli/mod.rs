@@ -10,7 +10,6 @@ mod progress;
 mod wake;
 
 use crate::io::Existing;
-use crate::measure::progress::Observer;
 use crate::plan::{Plan, Target};
 use crate::scene::{SceneFile, TABLE2_TOML};
 use crate::{Error, measure::run, measure::write};

@@ -162,7 +162,8 @@ impl CaseKind {
                     .and_then(|wave| wave.case(c.cells, c.stretch, c.amplitude, ANY_STEP_S)),
             ),
             Self::Dipole(ref c) => {
-                cases::dipole_against_wall(c.cells, [c.lateral_stretch(), c.stretch], c.reynolds, c.closed_sides)
+                let dipole = if c.closed_sides { cases::dipole_in_a_box } else { cases::dipole_between_walls };
+                dipole(c.cells, [c.lateral_stretch(), c.stretch], c.reynolds)
             }
             Self::LidDrivenCavity(ref c) => cases::lid_driven_cavity(c.cells, c.stretch, c.reynolds),
             Self::Channel(ref c) => cases::channel(c.cells, c.stretch, c.reynolds_tau),

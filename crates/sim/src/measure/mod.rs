@@ -18,7 +18,7 @@ pub mod estimators;
 pub mod geometry;
 pub mod instrument;
 pub mod map;
-mod plane;
+pub(crate) mod plane;
 pub mod profile;
 pub mod progress;
 mod region;

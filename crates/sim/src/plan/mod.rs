@@ -7,7 +7,6 @@ use crate::Error;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
 use crate::measure::wind::SceneWind;
-use crate::measure::wind::SceneWind;
 use crate::measure::write::Contents;
 use crate::scene::{Method, Scene, SceneFile, Weighting};
 use std::fmt;
