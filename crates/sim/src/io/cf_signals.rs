@@ -106,7 +106,7 @@ fn truth(signals: &RawSignals<'_>) -> Vec<Variable> {
             .text("long_name", "range of the true velocities"),
         variable("line_elevation", &["line"], Data::F64(pulses.copied().collect()), "rad")
             .text("long_name", "elevation of the line of sight above the horizon"),
-        variable("radial_velocity", &["line", "range"], Data::filled(&signals.truth.radial_velocity_m_s), "m s-1")
+        variable("radial_velocity", &["line", "range"], Data::filled(signals.truth.radial_velocity_m_s), "m s-1")
             .text("standard_name", "radial_velocity_of_scatterers_away_from_instrument")
             .text("long_name", "true radial velocity of the air on the line of sight, positive away from the lidar")
             .attr("_FillValue", Attr::F32(FILL)),
