@@ -63,7 +63,9 @@ fn errors_on_the_vortex_pair_at_0_db_are_those_of_an_independent_study() {
     {
         assert!((found_m_s / study_m_s - 1.0).abs() < 0.13, "{found_m_s} {study_m_s}");
     }
-    assert!(ca.inside_m_s < pa.inside_m_s && ca.outside_m_s < 0.85 * pa.outside_m_s, "{ca:?} {pa:?}");
+    // Inside the two are alike: claim CP1 of the figures measures their ratio over many scans.
+    assert!((ca.inside_m_s / pa.inside_m_s - 1.0).abs() < 0.1, "{ca:?} {pa:?}");
+    assert!(ca.outside_m_s < 0.85 * pa.outside_m_s, "{ca:?} {pa:?}");
     assert!(hann.inside_m_s < 0.75 * pa.inside_m_s && hann.outside_m_s < pa.outside_m_s, "{hann:?} {pa:?}");
 }
 

@@ -132,7 +132,9 @@ mod tests {
         assert_eq!(names, PICTURES[..count]);
         // The pair begins where the inviscid one does and has hardly sunk.
         let [left, right] = wake.inviscid_path().unwrap();
-        assert_eq!((left[0], right[0]), ((-0.5, 1.0), (0.5, 1.0)));
+        for (found, expected) in [(left[0], (-0.5, 1.0)), (right[0], (0.5, 1.0))] {
+            assert!((found.0 - expected.0).hypot(found.1 - expected.1) < 1e-12, "{found:?}");
+        }
         let sunk = 1.0 - right.last().unwrap().1;
         assert!((sunk - 0.04).abs() < 0.01, "{sunk}: about tau at first");
     }
