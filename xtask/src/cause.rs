@@ -13,7 +13,7 @@ use std::path::Path;
 const JOINED: [&str; 4] = ["optics", "les", "signal", "estimate"];
 
 /// What figures use of `sim` that brings none of the libraries into their numbers.
-const WITHOUT_LIBRARIES: [&str; 5] = ["export", "flow", "plot", "scene", "PROGRAM"];
+const WITHOUT_LIBRARIES: [&str; 5] = ["flow", "io", "plot", "scene", "PROGRAM"];
 
 /// What a file of this program depends on: the files that it imports, the libraries that these name, all of them where a
 /// whole scene is run, and the stored numbers.
