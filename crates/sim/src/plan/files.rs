@@ -114,7 +114,8 @@ fn map_pixels(scene: &Scene, g: &Geometry) -> (f64, f64, f64) {
     let bottom_m = (scene.scan.lidar_height_m + far_m * low.sin()).min(0.0);
     // The lidar is shown where that takes less than half as much again.
     let across_m = if near_m < 0.5 * (far_m - near_m) { far_m } else { far_m - near_m };
-    let height = (BOX * (top_m - bottom_m) / across_m).clamp(90.0, 780.0);
+    // A single gate has no width.
+    let height = (BOX * (top_m - bottom_m) / across_m.max(1e-9)).clamp(90.0, 780.0);
     let panels = if scene.scan.realisations == 1 { 3.0 } else { 6.0 };
     (panels, panels * 4.0 * BOX * height, 1872.0 * (72.0 + 1.2 * panels / 3.0 * (height + 92.0)))
 }

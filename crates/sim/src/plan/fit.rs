@@ -231,6 +231,12 @@ mod tests {
     }
 
     #[test]
+    fn a_single_gate_has_a_finite_forecast() {
+        let total = plan("[scan]\nelevation_max_rad = 0.0\nrange_max_m = 320.0\n").total();
+        assert!(total.core_s.is_finite() && total.memory_bytes.is_finite(), "{total:?}");
+    }
+
+    #[test]
     fn bound_of_windows_whose_matrices_do_not_fit_is_refused_and_the_remedy_fits() {
         let text = |window: &str| {
             format!(

@@ -1,5 +1,6 @@
 //! Checks that concern all solvers: residuals on the meshes of the table, null space, threads.
 
+use super::super::layout::Shape;
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::*;
 use crate::error::PressureFailure;

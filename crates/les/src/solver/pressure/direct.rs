@@ -20,10 +20,11 @@ use super::super::layout::{Layout, Shape};
 use super::super::mesh::AXIS_NAMES;
 use super::apply::Operator;
 use super::banded_cholesky::{BandedCholesky, Scratch};
+use super::kernel;
 use super::lines::bundles;
 use super::refine::{Pass, Refinement};
+use super::solver::{PressureSolver, Solved, check_request};
 use super::transform::{LineTransform, RowTransform, Work};
-use super::{PressureSolver, Solved, kernel};
 use crate::Error;
 
 /// What is done along axis 1 or 2.
@@ -172,7 +173,7 @@ impl Direct {
 
 impl PressureSolver for Direct {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
-        super::check_request(self.shape(), field, tolerance)?;
+        check_request(self.shape(), field, tolerance)?;
         let mut refinement = std::mem::take(&mut self.refinement);
         let solved = refinement.run(&self.operator, field, tolerance, "direct solver", |field, _, _| {
             self.solve_once(field);

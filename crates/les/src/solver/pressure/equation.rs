@@ -3,7 +3,8 @@
 use super::super::layout::Layout;
 use super::super::mesh::Mesh;
 use super::apply::Operator;
-use super::{PressureMethod, PressureSolver, Solved, build, check_length};
+use super::solver::{PressureSolver, Solved, check_length};
+use super::{PressureMethod, build};
 use crate::Error;
 
 /// Poisson's equation on a staggered mesh, `div grad phi = d` with zero normal gradient at the planes that bound the mesh, in

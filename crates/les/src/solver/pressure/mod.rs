@@ -14,6 +14,7 @@ mod kernel;
 mod lines;
 mod multigrid;
 mod refine;
+mod solver;
 mod transform;
 
 #[cfg(test)]
@@ -21,14 +22,15 @@ mod checks;
 #[cfg(test)]
 mod long_waves;
 
-use super::layout::{Layout, Shape};
+use super::layout::Layout;
 use crate::Error;
-use crate::error::check;
 use multigrid::Multigrid;
 
 pub(crate) use apply::norm;
 pub(crate) use direct::direct;
 pub use equation::PressureEquation;
+pub(crate) use solver::PressureSolver;
+pub use solver::Solved;
 
 /// How the pressure equation is solved.
 #[non_exhaustive]
@@ -56,45 +58,4 @@ pub(crate) fn build(layout: &Layout, method: PressureMethod) -> Result<Box<dyn P
         PressureMethod::Auto | PressureMethod::Direct => direct(layout),
         PressureMethod::Multigrid => Ok(Box::new(Multigrid::new(layout))),
     }
-}
-
-/// Refuses a field of another size and a tolerance that is no number.
-fn check_request(shape: Shape, field: &[f64], tolerance: f64) -> Result<(), Error> {
-    check_length(shape, field)?;
-    check("tolerance", tolerance, "above 0 and below 1", |t| t > 0.0 && t < 1.0)
-}
-
-/// Refuses a field of another size.
-fn check_length(shape: Shape, field: &[f64]) -> Result<(), Error> {
-    if field.len() == shape.len() {
-        Ok(())
-    } else {
-        Err(Error::WrongFieldLength { values: field.len(), cells: shape.n })
-    }
-}
-
-/// What a solve did.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solved {
-    /// 2-norm of the residual over that of the right side less its imbalance, measured on the solution.
-    pub residual: f64,
-    /// Iterations, 0 for a direct solve.
-    pub iterations: usize,
-    /// Mean factor by which an iteration reduced the residual.
-    pub factor: Option<f64>,
-    /// Sum of the right side over the sum of its moduli: what no pressure can balance, and was removed.
-    pub imbalance: f64,
-}
-
-/// A solver of the pressure equation of one mesh.
-pub(crate) trait PressureSolver: Send + std::fmt::Debug {
-    /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean.
-    ///
-    /// # Errors
-    /// If the residual does not reach `tolerance` (2-norm, relative to the right side); `field` is then the best solution
-    /// found.
-    fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error>;
-
-    /// The method and what it is made of, for the log.
-    fn describe(&self) -> String;
 }

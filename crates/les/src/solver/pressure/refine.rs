@@ -4,8 +4,8 @@
 
 use rayon::prelude::*;
 
-use super::Solved;
 use super::apply::Operator;
+use super::solver::Solved;
 use crate::error::{Error, PressureFailure};
 
 /// Relative residuals that a pass saw after its iterations; none if it has none.
