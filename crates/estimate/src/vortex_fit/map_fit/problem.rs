@@ -235,15 +235,18 @@ impl Problem<'_, '_> {
         }
         mirror(&mut bread);
         mirror(&mut weighted);
-        let cells = self.lines(|line, scratch| self.line_cells(wake, scale, line, scratch));
-        let (mut filling, alike) = filling(&cells, order, correlated);
-        for (_, slope, weight) in self.known(wake) {
-            add_square(&mut bread, &slope, weight);
-            add_square(&mut weighted, &slope, weight);
-            add_square(&mut filling, &slope, weight * weight);
+        let known = self.known(wake);
+        for (_, slope, weight) in &known {
+            add_square(&mut bread, slope, *weight);
+            add_square(&mut weighted, slope, *weight);
         }
         // with many outliers the second derivatives need not be positive: their weights are, and are larger
         let bread = inverse("curvature of the fit", &bread).or_else(|_| inverse("curvature of the fit", &weighted))?;
+        let cells = self.lines(|line, scratch| self.line_cells(wake, scale, line, scratch));
+        let (mut filling, alike) = filling(&cells, &bread, correlated);
+        for (_, slope, weight) in &known {
+            add_square(&mut filling, slope, weight * weight);
+        }
         Ok((bread.dot(&filling).dot(&bread), alike))
     }
 
