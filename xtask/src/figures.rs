@@ -1,6 +1,6 @@
 //! The figures: one file each, and what they have in common.
 //!
-//! A figure is a function from a [`Context`](context::Context) to the files it writes and the claims it measures.
+//! A figure is a function from a [`Context`] to the files it writes and the claims it measures.
 
 mod ca_pa;
 pub(crate) mod context;

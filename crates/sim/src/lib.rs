@@ -2,7 +2,7 @@
 //!
 //! This crate joins the four others, which know nothing of each other: the wind of `les`, the efficiency
 //! of `optics`, the records of `signal` and the velocities of `estimate`. A [`scene::Scene`] becomes a
-//! [`plan::Plan`], which says what will run and what is left out and why; [`run`](measure::run::run) runs it; [`write()`](measure::write::write)
+//! [`plan::Plan`], which says what will run and what is left out and why; [`run`] runs it; [`write()`](measure::write::write)
 //! puts the results on disk, all files or none.
 //!
 //! ```
