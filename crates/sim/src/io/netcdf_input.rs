@@ -30,6 +30,7 @@ pub(crate) struct Role {
 /// Time, or the age of a wake.
 pub(crate) const TIME: Role = Role { name: "time", axis: "T", others: &["tau", "t", "age"] };
 /// Along the flight.
+#[cfg(feature = "flow")]
 pub(crate) const X: Role = Role { name: "x", axis: "X", others: &["x_face", "xc", "xf", "xu"] };
 /// Across the flight.
 pub(crate) const Y: Role = Role { name: "y", axis: "Y", others: &["y_face", "yc", "yf", "yv", "lateral"] };

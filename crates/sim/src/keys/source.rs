@@ -16,6 +16,7 @@ impl Source {
         Self { path: path.to_owned(), text: text.to_owned() }
     }
 
+    #[cfg(feature = "flow")]
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }

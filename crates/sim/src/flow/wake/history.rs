@@ -124,6 +124,7 @@ struct Single {
     name: String,
     kind: Kind,
     /// What it is, in words.
+    #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
     text: String,
     /// Its place in a row.
     place: usize,
@@ -152,6 +153,7 @@ impl Lengths {
 pub(in super::super) struct WakeRun {
     meter: WakeMeter,
     scales: WakeScales,
+    #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
     radius_m: Vec<f64>,
     lengths: Lengths,
     #[cfg(feature = "netcdf")]
