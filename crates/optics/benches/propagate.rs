@@ -5,7 +5,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::hint::black_box;
 use wakescope_optics::Grid;
-use wakescope_optics::screens::{Propagator, Real, TransferKind};
+use wakescope_optics::screens::{Propagator, Real};
 
 const N: usize = 512;
 
@@ -47,7 +47,7 @@ fn transform_pair<T: Real>(c: &mut Criterion, name: &str) {
 
 fn layer<T: Real>(c: &mut Criterion, name: &str) {
     let grid = Grid::table2();
-    let Ok(propagator) = Propagator::<T>::new(grid, 1.55e-6, TransferKind::Paraxial) else { return };
+    let Ok(propagator) = Propagator::<T>::new(grid, 1.55e-6) else { return };
     let Ok(transfer) = propagator.transfer(150.0) else { return };
     let mut work = propagator.work();
     let phase: Vec<T> = (0..grid.points()).map(|i| T::of((i as f64 * 0.01).sin() * 7.0)).collect();

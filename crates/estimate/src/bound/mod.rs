@@ -1,5 +1,6 @@
 //! The Cramer-Rao bound: covariances of windows and the information in them.
 
+mod extended;
 pub(crate) mod gradient;
 pub(crate) mod window_model;
 

@@ -9,6 +9,7 @@ use ndarray::{Array2, ArrayView2};
 use ndarray_linalg::{Lapack, Scalar};
 use num_complex::Complex;
 
+use super::extended::GaussianWindow;
 use crate::error::{Error, finite, length, positive};
 use crate::linalg;
 use crate::window::{Sampling, SignalKind};
@@ -162,7 +163,8 @@ pub enum Noise {
     /// Flat in the detector band and `floor` times that density outside it.
     ///
     /// A floor so small that the covariance is singular in double precision has no bound ([`Error::NoiseFloor`]): for 64
-    /// samples at 0 dB about 1e-11 is the least.
+    /// samples at 0 dB about 1e-11 is the least, and 1e-14 for a Gaussian pulse, which is computed in numbers of twice the
+    /// length where it must.
     Band {
         /// Density outside the band over density inside, 0 .. 1.
         floor: f64,
@@ -243,6 +245,8 @@ pub(crate) fn turned(cycles: f64, lag: f64) -> f64 {
 pub struct WindowModel {
     sampling: Sampling,
     envelope: Array2<f64>,
+    /// Half-width at 1/e of a Gaussian pulse \[s\], whose covariance is known beyond double precision.
+    gaussian_sigma_s: Option<f64>,
     noise: Noise,
 }
 
@@ -264,7 +268,7 @@ impl WindowModel {
             let lag_s = (n as f64 - m as f64) * sampling.period_s();
             (-0.25 * (lag_s / pulse_sigma_s).powi(2)).exp()
         });
-        Self::with_envelope(sampling, envelope, noise)
+        Ok(Self { gaussian_sigma_s: Some(pulse_sigma_s), ..Self::with_envelope(sampling, envelope, noise)? })
     }
 
     /// Point target with a deterministic amplitude a(n) in the window and a random phase and strength: envelope a(n) a(m).
@@ -289,7 +293,7 @@ impl WindowModel {
         length("envelope", envelope.nrows(), envelope.ncols())?;
         positive("mean of the envelope's diagonal", envelope.diag().mean().unwrap_or(0.0))?;
         noise.validate()?;
-        Ok(Self { sampling: *sampling, envelope, noise })
+        Ok(Self { sampling: *sampling, envelope, gaussian_sigma_s: None, noise })
     }
 
     /// The envelope of the covariance \[n, m\].
@@ -321,7 +325,7 @@ impl WindowModel {
         finite("velocity_m_s", velocity_m_s)?;
         self.sampling.validate_for(kind)?;
         let cycles = self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
-        let slope = -4.0 * std::f64::consts::PI * self.sampling.period_s() / self.sampling.wavelength_m;
+        let slope = self.phase_slope();
         let power = self.envelope.diag().mean().unwrap_or(0.0);
         let bandwidth = (self.sampling.band_hz.1 - self.sampling.band_hz.0) / self.sampling.sample_rate_hz;
         let density = power / (snr * bandwidth);
@@ -341,14 +345,50 @@ impl WindowModel {
     /// As [`WindowModel::covariance`] and [`bound_complex_m_s`]; [`Error::NoiseFloor`] for too small a floor of the noise.
     pub fn bound_m_s(&self, velocity_m_s: f64, snr: f64, kind: SignalKind, windows: f64) -> Result<f64, Error> {
         with_floor_named(self.noise, self.envelope.nrows(), |noise| {
-            let parts = Self { noise, ..self.clone() }.covariance(velocity_m_s, snr, kind)?;
-            match kind {
-                SignalKind::Complex => bound_complex_m_s(parts[0].view(), parts[1].view(), windows),
+            let [covariance, derivative] = Self { noise, ..self.clone() }.covariance(velocity_m_s, snr, kind)?;
+            let (found, share) = match kind {
+                SignalKind::Complex => (bound_complex_m_s(covariance.view(), derivative.view(), windows), 1.0),
                 SignalKind::Real => {
-                    let [covariance, derivative] = parts.map(|x| x.mapv(|value| value.re));
-                    bound_real_m_s(covariance.view(), derivative.view(), windows)
+                    let [covariance, derivative] = [covariance, derivative].map(|x| x.mapv(|value| value.re));
+                    (bound_real_m_s(covariance.view(), derivative.view(), windows), 0.5)
                 }
+            };
+            match (found, noise, self.gaussian_sigma_s) {
+                (Err(refused @ Error::IllConditioned { .. }), Noise::Band { floor }, Some(sigma_s)) => {
+                    match self.gaussian_window(sigma_s, floor, velocity_m_s, snr, kind).information() {
+                        Some(information) => from_information(share * information, windows),
+                        None => Err(refused),
+                    }
+                }
+                (found, ..) => found,
             }
         })
+    }
+
+    fn gaussian_window(
+        &self,
+        sigma_s: f64,
+        floor: f64,
+        velocity_m_s: f64,
+        snr: f64,
+        kind: SignalKind,
+    ) -> GaussianWindow {
+        let (rate_hz, band_hz) = (self.sampling.sample_rate_hz, self.sampling.band_hz);
+        let band = (band_hz.0 / rate_hz, band_hz.1 / rate_hz);
+        GaussianWindow {
+            samples: self.envelope.nrows(),
+            sigma: sigma_s * rate_hz,
+            cycles: self.sampling.frequency_hz(velocity_m_s) / rate_hz,
+            slope: self.phase_slope(),
+            band,
+            density: 1.0 / (snr * (band.1 - band.0)),
+            floor,
+            kind,
+        }
+    }
+
+    /// Derivative of the phase from sample to sample with respect to velocity \[rad per m/s\].
+    fn phase_slope(&self) -> f64 {
+        -4.0 * std::f64::consts::PI * self.sampling.period_s() / self.sampling.wavelength_m
     }
 }

@@ -28,7 +28,7 @@ use crate::monte_carlo::walk::{GroupSums, Walker};
 use crate::screens::generator::ScreenGenerator;
 use crate::screens::grid::Grid;
 use crate::screens::kernel::Real;
-use crate::screens::propagate::{Propagator, TransferKind};
+use crate::screens::propagate::Propagator;
 use crate::{Error, Misalignment, Telescope, Turbulence, theory};
 use rustfft::num_complex::Complex;
 use std::ops::ControlFlow;
@@ -81,8 +81,6 @@ pub struct MonteCarlo {
     /// Ranges at which the efficiency is wanted \[m\], in any order, within the layers; results come in increasing
     /// order, each range once.
     pub range_m: Vec<f64>,
-    /// Transfer function of the steps.
-    pub transfer: TransferKind,
     /// Seed of all random numbers.
     pub seed: u64,
     /// How realisations are drawn.
@@ -130,7 +128,6 @@ impl MonteCarlo {
             grid: Grid::table2(),
             range_m: layers.end_m().to_vec(),
             layers,
-            transfer: TransferKind::Paraxial,
             seed,
             sampling: Sampling::Independent,
         })
@@ -180,7 +177,7 @@ impl MonteCarlo {
         check_grid(&telescope, &misalignment, &self.grid, furthest)?;
         let lambda = telescope.wavelength_m;
         let program = Program::compile(&self.layers, &self.range_m, &cn2, &self.grid, lambda)?;
-        let propagator = Propagator::new(self.grid, lambda, self.transfer)?;
+        let propagator = Propagator::new(self.grid, lambda)?;
         let transfers = program.distance_m.iter().map(|&d| propagator.transfer(d)).collect::<Result<_, _>>()?;
         let screens = if program.strength.is_empty() {
             None

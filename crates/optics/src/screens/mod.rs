@@ -9,4 +9,4 @@ pub(crate) mod propagate;
 pub use generator::{ScreenGenerator, ScreenWork, stream};
 pub use grid::Grid;
 pub use kernel::Real;
-pub use propagate::{Propagator, PropagatorWork, Transfer, TransferKind};
+pub use propagate::{Propagator, PropagatorWork, Transfer};

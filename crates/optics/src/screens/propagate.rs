@@ -11,29 +11,16 @@ use crate::screens::kernel::Real;
 use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
 
-/// Which transfer function a step uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum TransferKind {
-    /// exp(-j pi lambda dz f^2), as (16).
-    #[default]
-    Paraxial,
-    /// exp(j k dz (sqrt(1 - lambda^2 f^2) - 1)); evanescent waves are nil. Twice the memory traffic.
-    Exact,
-}
-
 /// Transfer function of one distance on one grid.
 pub struct Transfer<T: Real> {
     x: Vec<Complex<T>>,
     y: Vec<Complex<T>>,
-    /// `\[kx\]\[ky\]`, in place of `x` and `y`.
-    full: Option<Vec<Complex<T>>>,
 }
 
 /// Propagates fields on one grid at one wavelength.
 pub struct Propagator<T: Real> {
     grid: Grid,
     wavelength_m: f64,
-    kind: TransferKind,
     fft: Fft2<T>,
     window: [Vec<T>; 2],
 }
@@ -49,10 +36,10 @@ impl<T: Real> Propagator<T> {
     ///
     /// # Errors
     /// As [`Grid::validated`], and for a wavelength that is not positive.
-    pub fn new(grid: Grid, wavelength_m: f64, kind: TransferKind) -> Result<Self, Error> {
+    pub fn new(grid: Grid, wavelength_m: f64) -> Result<Self, Error> {
         let grid = grid.validated()?;
         positive("wavelength_m", wavelength_m)?;
-        Ok(Self { fft: Fft2::new(&grid), window: [grid.nx, grid.ny].map(window), grid, wavelength_m, kind })
+        Ok(Self { fft: Fft2::new(&grid), window: [grid.nx, grid.ny].map(window), grid, wavelength_m })
     }
 
     /// The grid.
@@ -90,28 +77,9 @@ impl<T: Real> Propagator<T> {
         let narrow = |c: Complex<f64>| Complex::new(T::of(c.re), T::of(c.im));
         let lambda = self.wavelength_m;
         let paraxial = |f: f64| Complex::cis(-PI * lambda * distance_m * f * f);
-        Ok(match self.kind {
-            TransferKind::Paraxial => Transfer {
-                x: (0..nx).map(|i| narrow(paraxial(frequency(nx, dx_m, i)) * scale)).collect(),
-                y: (0..ny).map(|i| narrow(paraxial(frequency(ny, dy_m, i)))).collect(),
-                full: None,
-            },
-            TransferKind::Exact => {
-                let mut full = Vec::with_capacity(nx * ny);
-                for ix in 0..nx {
-                    for iy in 0..ny {
-                        let s = (lambda * frequency(nx, dx_m, ix)).powi(2) + (lambda * frequency(ny, dy_m, iy)).powi(2);
-                        // sqrt(1 - s) - 1 without cancellation.
-                        let value = if s < 1.0 {
-                            Complex::cis(-2.0 * PI / lambda * distance_m * s / (1.0 + (1.0 - s).sqrt())) * scale
-                        } else {
-                            Complex::default()
-                        };
-                        full.push(narrow(value));
-                    }
-                }
-                Transfer { x: Vec::new(), y: Vec::new(), full: Some(full) }
-            }
+        Ok(Transfer {
+            x: (0..nx).map(|i| narrow(paraxial(frequency(nx, dx_m, i)) * scale)).collect(),
+            y: (0..ny).map(|i| narrow(paraxial(frequency(ny, dy_m, i)))).collect(),
         })
     }
 
@@ -187,12 +155,8 @@ impl<T: Real> Propagator<T> {
     /// Transfer function on a block of rows `[kx][ky]`.
     fn multiply(&self, transfer: &Transfer<T>, kx: usize, block: &mut [Complex<T>]) {
         let ny = self.grid.ny;
-        let one = Complex::new(T::one(), T::zero());
         for (i, line) in block.chunks_exact_mut(ny).enumerate() {
-            match &transfer.full {
-                None => T::multiply_scaled(line, transfer.x[kx + i], &transfer.y),
-                Some(full) => T::multiply_scaled(line, one, &full[(kx + i) * ny..(kx + i + 1) * ny]),
-            }
+            T::multiply_scaled(line, transfer.x[kx + i], &transfer.y);
         }
     }
 
@@ -231,9 +195,9 @@ mod tests {
     }
 
     /// Relative error of the field after 600 m against the closed form, phase (Gouy's too) and width included.
-    fn gaussian_error(grid: Grid, kind: TransferKind) -> f64 {
+    fn gaussian_error(grid: Grid) -> f64 {
         let (lambda, s, z) = (1.55e-6, 0.02, 600.0);
-        let propagator = Propagator::<f64>::new(grid, lambda, kind).unwrap();
+        let propagator = Propagator::<f64>::new(grid, lambda).unwrap();
         let mut work = propagator.work();
         let mut field = gaussian(&grid, s);
         let pieces = propagator.pieces(z);
@@ -257,16 +221,15 @@ mod tests {
     #[test]
     fn gaussian_beam_keeps_width_and_phase_on_any_grid() {
         for (nx, ny, dx_m, dy_m) in [(256, 256, 2e-3, 2e-3), (192, 256, 2e-3, 1.5e-3), (251, 243, 2e-3, 2e-3)] {
-            let error = gaussian_error(Grid { nx, ny, dx_m, dy_m }, TransferKind::Paraxial);
+            let error = gaussian_error(Grid { nx, ny, dx_m, dy_m });
             assert!(error < 1e-9, "{nx} {ny}: {error}");
         }
-        assert!(gaussian_error(Grid::square(256, 2e-3).unwrap(), TransferKind::Exact) < 1e-6);
     }
 
     #[test]
     fn step_forth_and_back_returns_the_field_and_keeps_the_power() {
         let grid = Grid::square(128, 2e-3).unwrap();
-        let propagator = Propagator::<f64>::new(grid, 1.55e-6, TransferKind::Paraxial).unwrap();
+        let propagator = Propagator::<f64>::new(grid, 1.55e-6).unwrap();
         let mut work = propagator.work();
         let start = gaussian(&grid, 0.015);
         let power: f64 = start.iter().map(|e| e.norm_sqr()).sum::<f64>() * 4e-6;
@@ -284,7 +247,7 @@ mod tests {
     #[test]
     fn step_beyond_the_sampling_limit_is_refused_and_cut() {
         let grid = Grid::table2();
-        let propagator = Propagator::<f32>::new(grid, 1.55e-6, TransferKind::Paraxial).unwrap();
+        let propagator = Propagator::<f32>::new(grid, 1.55e-6).unwrap();
         assert!((grid.largest_step_m(1.55e-6) - 1321.3).abs() < 0.1);
         assert_eq!(crate::error::refused(propagator.transfer(3000.0)), "distance_m");
         assert_eq!(propagator.pieces(3000.0), 3);

@@ -3,13 +3,13 @@
 
 use rustfft::num_complex::Complex;
 use std::sync::Arc;
-use wakescope_optics::screens::{Propagator, ScreenGenerator, TransferKind, stream};
+use wakescope_optics::screens::{Propagator, ScreenGenerator, stream};
 use wakescope_optics::{Grid, VonKarman};
 
 #[test]
 fn receiver_plane_overlap_is_the_oscillators_field_at_the_target() {
     let grid = Grid { nx: 96, ny: 80, dx_m: 4e-3, dy_m: 5e-3 };
-    let propagator = Propagator::<f64>::new(grid, 1.55e-6, TransferKind::Paraxial).expect("propagator");
+    let propagator = Propagator::<f64>::new(grid, 1.55e-6).expect("propagator");
     let mut work = propagator.work();
     let generator = ScreenGenerator::<f64>::new(grid, Arc::new(VonKarman::table2())).expect("generator");
     let mut screen_work = generator.work();

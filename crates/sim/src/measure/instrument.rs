@@ -129,7 +129,6 @@ impl Instrument {
             grid: plan.grid,
             layers: plan.layers,
             range_m: range_m.to_vec(),
-            transfer: optics::screens::TransferKind::Paraxial,
             seed,
             sampling: optics::monte_carlo::Sampling::Antithetic,
         })
