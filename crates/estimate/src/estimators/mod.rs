@@ -1,9 +1,9 @@
 //! From an accumulated correlogram to a velocity with width, SNR and flags; the traits for estimators of one's own.
 
+pub(crate) mod cell_test;
 pub(crate) mod correlogram_estimators;
 pub(crate) mod detection;
 pub(crate) mod first_moment;
-pub(crate) mod gamma_functions;
 pub(crate) mod gradient_likelihood;
 pub(crate) mod gradient_tapers;
 pub(crate) mod likelihood;
@@ -15,6 +15,7 @@ pub(crate) mod statistic;
 pub(crate) mod unbiased;
 pub(crate) mod velocity;
 
+pub use cell_test::CellTest;
 pub use correlogram_estimators::{LagWindowPeak, PulsePair};
 pub use detection::NoiseTest;
 pub use first_moment::FirstMoment;

@@ -5,6 +5,7 @@
 
 mod accumulate;
 mod bound;
+mod cell_test;
 mod correlogram_estimators;
 mod draw;
 mod extremes;
