@@ -50,3 +50,4 @@ pub use wake::free_parameters::{FreeParameters, Sharing, WindFit};
 pub use wake::pair::{CoreProfile, PARAMETERS, Parameter, Vortex, Wake, WakeModel};
 pub use wake::pulse::PulseShape;
 pub use wake::range_kernel::RangeKernel;
+pub use wake::rolling_moment::{Follower, LiftSlope};

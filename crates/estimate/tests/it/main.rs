@@ -15,5 +15,6 @@ mod likelihood;
 mod models;
 mod periodogram;
 mod quality;
+mod rolling_moment;
 mod sliding;
 mod vortex_fit;

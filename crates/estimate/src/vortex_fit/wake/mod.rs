@@ -2,7 +2,9 @@
 
 pub(crate) mod core_prior;
 pub(crate) mod free_parameters;
+pub(crate) mod mean_circulation;
 pub(crate) mod pair;
 pub(crate) mod pulse;
 pub(crate) mod range_kernel;
+pub(crate) mod rolling_moment;
 pub(crate) mod wake_map;

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use crate::error::{Error, finite, positive};
 
 /// Root of 2 s + 1 = exp(s): makes the core radius that of the largest speed of a Lamb-Oseen vortex.
-const LAMB_OSEEN_BETA: f64 = 1.256_431_208_626_169_6;
+pub(crate) const LAMB_OSEEN_BETA: f64 = 1.256_431_208_626_169_6;
 
 /// Number of parameters of a [`Wake`].
 pub const PARAMETERS: usize = 10;
@@ -228,7 +228,10 @@ impl WakeModel {
     }
 
     /// (vortex, index of its circulation, y, z and core, height of the centre over its sign, sense of turning).
-    fn sources<'w>(&self, wake: &'w Wake) -> impl Iterator<Item = (&'w Vortex, [usize; 4], f64, f64)> + use<'w> {
+    pub(crate) fn sources<'w>(
+        &self,
+        wake: &'w Wake,
+    ) -> impl Iterator<Item = (&'w Vortex, [usize; 4], f64, f64)> + use<'w> {
         let (left, right, images) = ((&wake.left, [0, 2, 3, 6]), (&wake.right, [1, 4, 5, 7]), self.images);
         let of = move |((vortex, places), side, sense)| (vortex, places, side, sense);
         let all = [(left, 1.0, -1.0), (left, -1.0, 1.0), (right, 1.0, 1.0), (right, -1.0, -1.0)];
