@@ -45,9 +45,9 @@ pub(crate) struct Problem<'a, 'm> {
 struct LineSums {
     cost: f64,
     gradient: Vec<f64>,
-    /// Sums of j j^T with the weights of the loss, and with its second derivative.
-    weighted: Array2<f64>,
-    curved: Array2<f64>,
+    /// Sums of j j^T with the weights of the loss, and with its second derivative: rows of the lower triangle.
+    weighted: Vec<f64>,
+    curved: Vec<f64>,
 }
 
 impl Problem<'_, '_> {
@@ -150,12 +150,9 @@ impl Problem<'_, '_> {
 
     fn line_sums(&self, wake: &Wake, scale: f64, line: usize, scratch: &mut LineScratch) -> LineSums {
         let order = self.groups.len();
-        let mut sums = LineSums {
-            cost: 0.0,
-            gradient: vec![0.0; order],
-            weighted: Array2::zeros((order, order)),
-            curved: Array2::zeros((order, order)),
-        };
+        let triangle = vec![0.0; order * (order + 1) / 2];
+        let mut sums = LineSums { cost: 0.0, gradient: vec![0.0; order], weighted: triangle.clone(), curved: triangle };
+        let mut scaled = vec![0.0; order];
         let take = |gate: usize, velocity: f64, slope: &[f64]| {
             let measured = self.map.velocity_m_s[[line, gate]];
             if !measured.is_finite() {
@@ -165,14 +162,18 @@ impl Problem<'_, '_> {
             let residual = (measured - velocity) / unit;
             let (cost, weight, second) = self.loss.at(residual);
             sums.cost += cost;
-            for i in 0..order {
-                let s = slope[i] / unit;
+            scaled.iter_mut().zip(slope).for_each(|(scaled, slope)| *scaled = slope / unit);
+            let (mut weighted, mut curved) = (&mut sums.weighted[..], &mut sums.curved[..]);
+            for (i, s) in scaled.iter().enumerate() {
                 sums.gradient[i] -= weight * residual * s;
-                for (j, other) in slope.iter().enumerate().take(i + 1) {
-                    let product = s * other / unit;
-                    sums.weighted[[i, j]] += weight * product;
-                    sums.curved[[i, j]] += second * product;
+                let (row, rest) = weighted.split_at_mut(i + 1);
+                let (curved_row, curved_rest) = curved.split_at_mut(i + 1);
+                for ((w, c), other) in row.iter_mut().zip(curved_row).zip(&scaled) {
+                    let product = s * other;
+                    *w += weight * product;
+                    *c += second * product;
                 }
+                (weighted, curved) = (rest, curved_rest);
             }
         };
         self.each_gate((wake, line), true, scratch, take);
@@ -193,9 +194,8 @@ impl Problem<'_, '_> {
         for sums in self.lines(|line, scratch| self.line_sums(wake, scale, line, scratch)) {
             normal.cost += sums.cost;
             normal.gradient.iter_mut().zip(sums.gradient).for_each(|(n, s)| *n += s);
-            normal.curvature += &sums.weighted;
+            add_triangle(&mut normal.curvature, &sums.weighted);
         }
-        mirror(&mut normal.curvature);
         for (away, slope, weight) in self.known(wake) {
             normal.cost += 0.5 * weight * away * away;
             normal.gradient.iter_mut().zip(&slope).for_each(|(n, s)| *n += weight * away * s);
@@ -230,11 +230,9 @@ impl Problem<'_, '_> {
         let order = self.groups.len();
         let (mut bread, mut weighted) = (Array2::zeros((order, order)), Array2::zeros((order, order)));
         for line in self.lines(|line, scratch| self.line_sums(wake, scale, line, scratch)) {
-            bread += &line.curved;
-            weighted += &line.weighted;
+            add_triangle(&mut bread, &line.curved);
+            add_triangle(&mut weighted, &line.weighted);
         }
-        mirror(&mut bread);
-        mirror(&mut weighted);
         let known = self.known(wake);
         for (_, slope, weight) in &known {
             add_square(&mut bread, slope, *weight);
@@ -302,11 +300,13 @@ fn add_square(a: &mut Array2<f64>, v: &[f64], weight: f64) {
     a.indexed_iter_mut().for_each(|((i, j), a)| *a += weight * v[i] * v[j]);
 }
 
-/// Copies the lower triangle to the upper one.
-fn mirror(a: &mut Array2<f64>) {
-    for i in 0..a.nrows() {
-        for j in 0..i {
-            a[[j, i]] = a[[i, j]];
+/// a += the symmetric matrix whose lower triangle `rows` holds row by row.
+fn add_triangle(a: &mut Array2<f64>, rows: &[f64]) {
+    let places = (0..a.nrows()).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    for ((i, j), value) in places.zip(rows) {
+        a[[i, j]] += value;
+        if i != j {
+            a[[j, i]] += value;
         }
     }
 }

@@ -76,16 +76,22 @@ pub(crate) fn filling(cells: &[Vec<Option<Cell>>], bread: &Array2<f64>, lines: u
     let (field, order) = (Field::new(cells), bread.nrows());
     let mut filling = Array2::<f64>::zeros((order, order));
     let Some(correlation) = Correlation::new(&field, lines) else { return (filling, 1.0) };
+    // first what each cell has about it, then one product per cell: the pairs are many
+    let mut about = vec![0.0; cells.len() * field.gates as usize * order];
     for &(line, gate, c) in &correlation.at {
         let weight = 0.5 * both(line, gate) * c;
-        field.pairs(line, gate, |a, b| {
-            for (i, x) in a.slopes.iter().enumerate() {
-                for (j, y) in b.slopes.iter().enumerate() {
-                    filling[[i, j]] += weight * x * y;
-                    filling[[j, i]] += weight * x * y;
-                }
+        field.pairs(line, gate, |(a, at_a), (b, at_b)| {
+            for (place, other) in [(at_a, b), (at_b, a)] {
+                let sums = &mut about[place * order..][..order];
+                sums.iter_mut().zip(&other.slopes).for_each(|(sum, slope)| *sum += weight * slope);
             }
         });
+    }
+    for (cell, sums) in cells.iter().flatten().zip(about.chunks_exact(order.max(1))) {
+        let Some(cell) = cell else { continue };
+        for (mut row, slope) in filling.rows_mut().into_iter().zip(&cell.slopes) {
+            row.iter_mut().zip(sums).for_each(|(entry, sum)| *entry += slope * sum);
+        }
     }
     let alike = correlation.alike();
     let (mut weights, mut weights2, mut squares) = (0.0, 0.0, 0.0);
@@ -115,15 +121,16 @@ impl<'a> Field<'a> {
         Self { cells, gates: cells.first().map_or(0, Vec::len) as i64 }
     }
 
-    /// All pairs of cells that far apart.
-    fn pairs(&self, line: i64, gate: i64, mut take: impl FnMut(&Cell, &Cell)) {
-        let line = line as usize;
-        for (a, b) in self.cells.iter().zip(self.cells.iter().skip(line)) {
+    /// All pairs of cells that far apart, each cell with its number in the map.
+    fn pairs<'c>(&'c self, line: i64, gate: i64, mut take: impl FnMut((&'c Cell, usize), (&'c Cell, usize))) {
+        let (line, gates) = (line as usize, self.gates as usize);
+        for (first_line, (a, b)) in self.cells.iter().zip(self.cells.iter().skip(line)).enumerate() {
             let first = (-gate).max(0);
             let last = self.gates.min(self.gates - gate);
             for from in first..last {
-                if let (Some(a), Some(b)) = (&a[from as usize], &b[(from + gate) as usize]) {
-                    take(a, b);
+                let (from, to) = (from as usize, (from + gate) as usize);
+                if let (Some(a), Some(b)) = (&a[from], &b[to]) {
+                    take((a, first_line * gates + from), (b, (first_line + line) * gates + to));
                 }
             }
         }
@@ -132,7 +139,7 @@ impl<'a> Field<'a> {
     /// Mean product of the residuals of all pairs that far apart; nothing without pairs.
     fn correlation(&self, line: i64, gate: i64) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0.0);
-        self.pairs(line, gate, |a, b| {
+        self.pairs(line, gate, |(a, _), (b, _)| {
             sum += a.residual * b.residual;
             count += 1.0;
         });
