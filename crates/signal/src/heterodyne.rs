@@ -156,9 +156,10 @@ impl Simulator {
         Ok(())
     }
 
-    /// Writes the complex envelope `s(t_k)` of one pulse, (15), corrected \[A\], without noise.
+    /// Writes the complex envelope `s(t_k)` of one pulse, (15), corrected \[A\], without noise; with the phases of the laser, the
+    /// reflex of the telescope and the echo of the pulse before, if the receiver or the shot has them.
     ///
-    /// Draws the speckle as [`Simulator::record_into`] does.
+    /// Draws the speckle as [`Simulator::record_into`] does; for the others the shot has a seed of its own.
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
@@ -173,13 +174,11 @@ impl Simulator {
         shot.validate()?;
         check_length("out_a", out_a.len(), self.record.samples)?;
         let mut speckle = std::mem::take(&mut scratch.speckle);
-        speckle.clear();
-        speckle.extend((0..shot.line.layers()).map(|_| {
-            let re: f64 = rng.sample(StandardNormal);
-            let im: f64 = rng.sample(StandardNormal);
-            Complex::new(re, im) * FRAC_1_SQRT_2
-        }));
-        let result = self.sum_into(shot, &speckle, scratch, out_a);
+        draw_speckle(shot.line.layers(), rng, &mut speckle);
+        let result = match self.is_plain(&shot) {
+            true => self.sum_into(shot, &speckle, scratch, out_a),
+            false => self.sum_with_asides_into(shot, &speckle, scratch, out_a),
+        };
         scratch.speckle = speckle;
         result
     }
@@ -210,8 +209,19 @@ impl Simulator {
         scratch: &mut Scratch,
         out_a: &mut [Complex<f64>],
     ) -> Result<(), Error> {
+        self.prepare(shot.line, scratch)?;
+        self.sum_prepared_into(shot, speckle, scratch, out_a)
+    }
+
+    /// The same with a window that is prepared for the line.
+    pub(crate) fn sum_prepared_into(
+        &self,
+        shot: Shot<'_>,
+        speckle: &[Complex<f64>],
+        scratch: &mut Scratch,
+        out_a: &mut [Complex<f64>],
+    ) -> Result<(), Error> {
         let line = shot.line;
-        self.prepare(line, scratch)?;
         let Scratch { window, phasors, .. } = scratch;
         phasors.resize(line.layers());
         for (block, outs) in out_a.chunks_mut(RENEWAL_SAMPLES).enumerate() {
@@ -290,4 +300,14 @@ impl Simulator {
         (phasors.re[layer], phasors.im[layer]) = (phasor.re, phasor.im);
         (phasors.rotation_re[layer], phasors.rotation_im[layer]) = (rotation.re, rotation.im);
     }
+}
+
+/// Circular complex normal numbers of mean square 1.
+pub(crate) fn draw_speckle<R: Rng + ?Sized>(layers: usize, rng: &mut R, out: &mut Vec<Complex<f64>>) {
+    out.clear();
+    out.extend((0..layers).map(|_| {
+        let re: f64 = rng.sample(StandardNormal);
+        let im: f64 = rng.sample(StandardNormal);
+        Complex::new(re, im) * FRAC_1_SQRT_2
+    }));
 }

@@ -239,5 +239,6 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
             NoiseKind::White => signal::NoiseModel::White,
             NoiseKind::None => signal::NoiseModel::None,
         },
+        front_end: signal::receiver::FrontEnd::IDEAL,
     }
 }

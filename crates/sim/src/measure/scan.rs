@@ -160,7 +160,7 @@ impl<'a> Scanner<'a> {
                     observer.advance(1);
                 }
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
-                Shot { line: &self.lines[pulse / per_line], efficiency }
+                Shot { efficiency, ..Shot::from(&self.lines[pulse / per_line]) }
             },
             generator: |key| stream(self.scene.seed, "signal", index(key) as u64),
             digitiser: self.instrument.digitiser,
