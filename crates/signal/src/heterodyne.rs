@@ -64,8 +64,20 @@ impl Simulator {
     /// # Errors
     /// As [`Receiver::validate`]; [`Error::OutOfRange`] for a record without samples or a first time that is not finite.
     pub fn new(pulse: impl Into<Pulse>, receiver: Receiver, record: Record) -> Result<Self, Error> {
-        let pulse = pulse.into();
         receiver.validate()?;
+        Self::planned(pulse.into(), receiver, record)
+    }
+
+    /// Plans complex records, [`Simulator::baseband_into`]: the band may be wider than a real current of this rate holds.
+    ///
+    /// # Errors
+    /// As [`Simulator::new`], with [`Receiver::validate_baseband`].
+    pub fn for_baseband(pulse: impl Into<Pulse>, receiver: Receiver, record: Record) -> Result<Self, Error> {
+        receiver.validate_baseband()?;
+        Self::planned(pulse.into(), receiver, record)
+    }
+
+    fn planned(pulse: Pulse, receiver: Receiver, record: Record) -> Result<Self, Error> {
         check("time_of_first_sample_s", record.time_of_first_sample_s, "finite", |_| true)?;
         check("samples", record.samples as f64, "1 or more", |n| n >= 1.0)?;
         let interval_s = 1.0 / receiver.sample_rate_hz;
@@ -111,7 +123,8 @@ impl Simulator {
     ///
     /// # Errors
     /// As [`Shot::validate`]; [`Error::LengthMismatch`] if `out_a` has not one place per sample;
-    /// [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any use; [`Error::Overflow`].
+    /// [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any use; [`Error::Overflow`];
+    /// [`Error::BandBeyondNyquist`] if the simulator was planned for complex records and a real one does not hold the band.
     pub fn record_into<'a, R: Rng + ?Sized>(
         &self,
         shot: impl Into<Shot<'a>>,
@@ -120,6 +133,7 @@ impl Simulator {
         out_a: &mut [f64],
     ) -> Result<(), Error> {
         check_length("out_a", out_a.len(), self.record.samples)?;
+        self.receiver.validate_band()?;
         let mut envelope = std::mem::take(&mut scratch.envelope);
         envelope.resize(self.record.samples, Complex::ZERO);
         let result = self.envelope_into(shot, rng, scratch, &mut envelope);

@@ -91,13 +91,37 @@ impl Receiver {
     /// [`Error::OutOfRange`] with the field that is not allowed; [`Error::BandBeyondNyquist`] if
     /// `f_c -+ B/2` is not within 0 and `F_s/2`.
     pub fn validate(&self) -> Result<(), Error> {
+        self.validate_values()?;
+        self.validate_band()
+    }
+
+    /// The same for a receiver that delivers two quadratures: its band is within `-F_s/2` and `F_s/2` about `f_c`, which lies
+    /// above half of it.
+    ///
+    /// # Errors
+    /// As [`Receiver::validate`].
+    pub fn validate_baseband(&self) -> Result<(), Error> {
+        self.validate_values()?;
+        let half_hz = 0.5 * self.bandwidth_hz;
+        let nyquist_hz = 0.5 * self.sample_rate_hz;
+        if half_hz >= nyquist_hz || half_hz > self.intermediate_frequency_hz {
+            return Err(Error::BandBeyondNyquist { low_hz: -half_hz, high_hz: half_hz, nyquist_hz });
+        }
+        Ok(())
+    }
+
+    fn validate_values(&self) -> Result<(), Error> {
         check_positive("wavelength_m", self.wavelength_m)?;
         check_positive("sample_rate_hz", self.sample_rate_hz)?;
         check_positive("intermediate_frequency_hz", self.intermediate_frequency_hz)?;
         check_positive("bandwidth_hz", self.bandwidth_hz)?;
         check("quantum_efficiency", self.quantum_efficiency, "above 0 and at most 1", |q| q > 0.0 && q <= 1.0)?;
         check_positive("local_oscillator_w", self.local_oscillator_w)?;
-        self.front_end.validate()?;
+        self.front_end.validate()
+    }
+
+    /// Whether a real current holds the band.
+    pub(crate) fn validate_band(&self) -> Result<(), Error> {
         let low_hz = self.intermediate_frequency_hz - 0.5 * self.bandwidth_hz;
         let high_hz = self.intermediate_frequency_hz + 0.5 * self.bandwidth_hz;
         let nyquist_hz = 0.5 * self.sample_rate_hz;

@@ -1,0 +1,158 @@
+//! What a real laser and a real receiver add to a scene; every part of it is off by default, and then not written.
+
+use super::Scene;
+use crate::keys::Checker;
+use crate::scene::SnrReference;
+use serde::{Deserialize, Serialize};
+use wakescope_signal::transmitter;
+
+section! {
+    /// What the receiver has beyond shot noise.
+    #[derive(Copy)]
+    FrontEnd {
+        /// Current noise of the amplifier, A/sqrt(Hz).
+        amplifier_noise_a_rthz: f64 = 0.0,
+        /// Resistor whose thermal noise the amplifier sees, ohm; `inf` for none.
+        load_ohm: f64 = f64::INFINITY,
+        /// Its temperature, K.
+        load_temperature_k: f64 = 290.0,
+        /// Dark current of the detector, A.
+        dark_current_a: f64 = 0.0,
+        /// Relative intensity noise of the local oscillator, dB/Hz; `-inf` for none.
+        intensity_noise_db_hz: f64 = f64::NEG_INFINITY,
+        /// Rejection of what both halves of a balanced detector see, electrical, dB.
+        rejection_db: f64 = 0.0,
+        /// Power at which the current has fallen to half of the linear one, W; `inf` for none.
+        saturation_w: f64 = f64::INFINITY,
+        /// Frequency at which the response of the detector has fallen to half the power, Hz; `inf` for none.
+        half_power_hz: f64 = f64::INFINITY,
+        /// Poles of this response, a Butterworth low pass.
+        poles: u32 = 1,
+    }
+}
+
+section! {
+    /// An amplifier that a steady pump fills between the pulses.
+    #[derive(Copy)]
+    LaserAmplifier {
+        /// Mean power at high repetition rates, W.
+        mean_power_w: f64 = 1.0,
+        /// Time over which the medium keeps its energy, s.
+        storage_time_s: f64 = 2e-4,
+        /// Largest energy of a pulse, J; `inf` for none.
+        largest_energy_j: f64 = f64::INFINITY,
+    }
+}
+
+section! {
+    /// The fibre of the power amplifier.
+    #[derive(Copy)]
+    AmplifierFibre {
+        /// Effective area of the mode, m^2.
+        effective_area_m2: f64 = 3e-10,
+        /// Length, m.
+        length_m: f64 = 2.0,
+        /// Gain from end to end, dB.
+        gain_db: f64 = 0.0,
+        /// Gain coefficient of the Brillouin scattering, m/W.
+        brillouin_gain_m_w: f64 = 2.5e-11,
+        /// Its width, Hz.
+        brillouin_width_hz: f64 = 50e6,
+    }
+}
+
+section! {
+    /// The echo of the pulse before, from c/(2 PRF) farther away.
+    #[derive(Copy)]
+    SecondTrip {
+        /// Radial velocity of the air there where the flow is not known, m/s.
+        radial_velocity_m_s: f64 = 0.0,
+    }
+}
+
+pub(super) fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+pub(super) fn is_nothing_db(value: &f64) -> bool {
+    *value == f64::NEG_INFINITY
+}
+
+impl AmplifierFibre {
+    /// The fibre in the words of the simulation of signals.
+    pub fn of_silica(&self) -> transmitter::Fibre {
+        transmitter::Fibre {
+            brillouin_gain_m_w: self.brillouin_gain_m_w,
+            brillouin_width_hz: self.brillouin_width_hz,
+            ..transmitter::Fibre::silica(self.effective_area_m2, self.length_m, self.gain_db)
+        }
+    }
+}
+
+impl Scene {
+    /// Energy of a pulse, J: that of the laser's amplifier at this repetition rate if the scene has one.
+    pub fn pulse_energy_j(&self) -> f64 {
+        let Some(LaserAmplifier { mean_power_w, storage_time_s, largest_energy_j }) = self.laser.amplifier else {
+            return self.pulse.energy_j;
+        };
+        transmitter::Amplifier { mean_power_w, storage_time_s, largest_energy_j }
+            .energy_j(self.laser.pulse_repetition_hz)
+    }
+
+    pub(super) fn check_receiver(&self, c: &mut Checker<'_>) {
+        c.within("laser.linewidth_hz", self.laser.linewidth_hz, 0.0, 1e12, "Hz");
+        if let Some(a) = &self.laser.amplifier {
+            c.within("laser.amplifier.mean_power_w", a.mean_power_w, 1e-9, 1e6, "W");
+            c.within("laser.amplifier.storage_time_s", a.storage_time_s, 1e-9, 1e3, "s");
+            positive_or_inf(c, "laser.amplifier.largest_energy_j", a.largest_energy_j, "J");
+            let energy_j = self.pulse_energy_j();
+            c.require(
+                (1e-12..=1e3).contains(&energy_j),
+                "laser.amplifier.mean_power_w",
+                a.mean_power_w,
+                format!("a power that gives pulses of 1e-12 to 1e3 J at this repetition rate, not of {energy_j:e} J"),
+            );
+        }
+        if let Some(f) = &self.laser.fibre {
+            c.within("laser.fibre.effective_area_m2", f.effective_area_m2, 1e-14, 1.0, "m^2");
+            c.within("laser.fibre.length_m", f.length_m, 1e-6, 1e6, "m");
+            c.within("laser.fibre.gain_db", f.gain_db, 0.0, 200.0, "dB");
+            c.within("laser.fibre.brillouin_gain_m_w", f.brillouin_gain_m_w, 1e-15, 1e-6, "m/W");
+            c.within("laser.fibre.brillouin_width_hz", f.brillouin_width_hz, 1e3, 1e12, "Hz");
+        }
+        let t = &self.telescope;
+        c.within("telescope.optics_loss_db", t.optics_loss_db, 0.0, 200.0, "dB");
+        c.within("telescope.polarisation_loss_db", t.polarisation_loss_db, 0.0, 200.0, "dB");
+        c.within("telescope.blind_range_m", t.blind_range_m, 0.0, 1e6, "m");
+        nothing_or_within(c, "telescope.reflection_db", t.reflection_db, [-300.0, 0.0], "dB");
+        if let Some(f) = &self.detector.front_end {
+            let key = |name: &str| format!("detector.front_end.{name}");
+            c.within(&key("amplifier_noise_a_rthz"), f.amplifier_noise_a_rthz, 0.0, 1.0, "A/sqrt(Hz)");
+            positive_or_inf(c, &key("load_ohm"), f.load_ohm, "ohm");
+            c.within(&key("load_temperature_k"), f.load_temperature_k, 1e-3, 1e4, "K");
+            c.within(&key("dark_current_a"), f.dark_current_a, 0.0, 1.0, "A");
+            nothing_or_within(c, &key("intensity_noise_db_hz"), f.intensity_noise_db_hz, [-400.0, 0.0], "dB/Hz");
+            c.within(&key("rejection_db"), f.rejection_db, 0.0, 200.0, "dB");
+            positive_or_inf(c, &key("saturation_w"), f.saturation_w, "W");
+            positive_or_inf(c, &key("half_power_hz"), f.half_power_hz, "Hz");
+            c.count(&key("poles"), f.poles as usize, 1, 20);
+        }
+        if let Some(s) = &self.scan.second_trip {
+            c.within("scan.second_trip.radial_velocity_m_s", s.radial_velocity_m_s, -1e3, 1e3, "m/s");
+        }
+        if matches!(self.detector.snr, SnrReference::Fixed { .. }) {
+            let absent = "absent with detector.snr.reference = \"fixed\", which states the ratio of the last pulse's echo to all noises";
+            c.require(self.detector.front_end.is_none(), "detector.front_end", "a table", absent);
+            c.require(self.scan.second_trip.is_none(), "scan.second_trip", "a table", absent);
+        }
+    }
+}
+
+fn positive_or_inf(c: &mut Checker<'_>, key: &str, value: f64, unit: &str) {
+    c.require(value > 0.0, key, value, format!("above 0 {unit}, or inf for none"));
+}
+
+fn nothing_or_within(c: &mut Checker<'_>, key: &str, value: f64, [low, high]: [f64; 2], unit: &str) {
+    let ok = value == f64::NEG_INFINITY || (low..=high).contains(&value);
+    c.require(ok, key, value, format!("a number from {low:?} to {high:?} {unit}, or -inf for none"));
+}
