@@ -2,7 +2,8 @@
 //!
 //! | module | what is in it |
 //! |---|---|
-//! | `front_end` | [`FrontEnd`]: what a real receiver has beyond shot noise, and what it costs |
+//! | `front_end` | [`FrontEnd`]: what a real receiver has beyond shot noise |
+//! | `penalties` | [`NoiseDensities`], [`Penalties`]: what it costs |
 //! | `converter` | [`Converter`]: noise of rounding and clipping |
 //! | [`phase_noise`] | effect of the laser's linewidth |
 //! | [`echoes`] | the telescope's own reflex, the pulse before |
@@ -12,10 +13,12 @@
 mod converter;
 pub mod echoes;
 mod front_end;
+mod penalties;
 pub mod phase_noise;
 
 pub use converter::{Clipping, Converter};
-pub use front_end::{Butterworth, FrontEnd, NoiseDensities, Penalties};
+pub use front_end::{Butterworth, FrontEnd};
+pub use penalties::{NoiseDensities, Penalties};
 
 use std::f64::consts::PI;
 

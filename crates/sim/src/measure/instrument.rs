@@ -92,6 +92,19 @@ impl Instrument {
             })
     }
 
+    /// Full width at half maximum of the Gaussian pulse with the same spread, s.
+    pub fn gaussian_fwhm_s(&self) -> f64 {
+        2.0 * std::f64::consts::LN_2.sqrt() * self.pulse.sigma_s()
+    }
+
+    /// Largest power of the pulse, W.
+    pub fn peak_power_w(&self) -> f64 {
+        const STEPS: u32 = 2000;
+        let (first_s, last_s) = self.pulse.support_s();
+        let time_s = |i: u32| first_s + (last_s - first_s) * f64::from(i) / f64::from(STEPS);
+        self.pulse.energy_j() * (0..=STEPS).map(|i| self.pulse.intensity_per_s(time_s(i))).fold(0.0, f64::max)
+    }
+
     /// One-way transmission K of the air to a range.
     ///
     /// # Errors

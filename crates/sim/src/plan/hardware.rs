@@ -2,7 +2,6 @@
 //!
 //! Check: each warning appears with what it warns of, and not without.
 
-use crate::measure::budget::limits::{gaussian_fwhm_s, peak_power_w};
 use crate::measure::instrument::Instrument;
 use crate::scene::Scene;
 
@@ -10,8 +9,8 @@ use crate::scene::Scene;
 pub(super) fn warnings(scene: &Scene, instrument: &Instrument) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(fibre) = &scene.laser.fibre {
-        let threshold_w = fibre.of_silica().brillouin_threshold_w(gaussian_fwhm_s(&instrument.pulse));
-        let peak_w = peak_power_w(&instrument.pulse);
+        let threshold_w = fibre.of_silica().brillouin_threshold_w(instrument.gaussian_fwhm_s());
+        let peak_w = instrument.peak_power_w();
         if peak_w > threshold_w {
             out.push(format!(
                 "the peak power, {peak_w:.0} W, is {:.1} times the Brillouin threshold of laser.fibre, {threshold_w:.0} W (good to a \

@@ -24,6 +24,7 @@ mod between;
 mod check;
 mod check_estimator;
 mod check_outputs;
+mod check_receiver;
 mod estimator;
 mod flow;
 mod format1;

@@ -1,11 +1,12 @@
 //! What bounds an instrument beside its signal-to-noise ratio: power, ranges, velocities, phase noise, local oscillator, resolution.
 
-use super::equal_to_shot_w;
-use super::text::{digits, si};
+use super::digits::{digits, si};
 use crate::measure::estimators;
+use crate::measure::instrument::Instrument;
 use crate::plan::Plan;
 use crate::scene::{DetectorSignal, Weighting};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
+use wakescope_signal::constants::ELEMENTARY_CHARGE_C;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::receiver::phase_noise::{mean_frequency_sd_m_s, peak_variance_factor};
 use wakescope_signal::{Pulse, RangeFilter};
@@ -32,11 +33,11 @@ impl Limits {
         let (receiver, pulse, d) = (&instrument.receiver, &instrument.pulse, &scene.detector);
         let mut found = Self { values: Vec::new(), lines: Vec::new() };
         let mean_w = scene.pulse_energy_j() * scene.laser.pulse_repetition_hz;
-        let peak_w = peak_power_w(pulse);
+        let peak_w = instrument.peak_power_w();
         let mut power = format!("mean power {}, peak {}", si(mean_w, "W"), si(peak_w, "W"));
         found.values.extend([("mean_power_w", mean_w), ("peak_power_w", peak_w)]);
         if let Some(fibre) = &scene.laser.fibre {
-            let threshold_w = fibre.of_silica().brillouin_threshold_w(gaussian_fwhm_s(pulse));
+            let threshold_w = fibre.of_silica().brillouin_threshold_w(instrument.gaussian_fwhm_s());
             found.values.push(("brillouin_threshold_w", threshold_w));
             power += &format!(
                 "; Brillouin threshold of {} um^2 x {}: {}",
@@ -149,22 +150,9 @@ impl Limits {
     }
 }
 
-/// Full width at half maximum of the Gaussian pulse with the same spread, s.
-pub(crate) fn gaussian_fwhm_s(pulse: &Pulse) -> f64 {
-    2.0 * std::f64::consts::LN_2.sqrt() * pulse.sigma_s()
-}
-
 fn pulse_length_m(pulse: &Pulse) -> f64 {
     let (first_s, last_s) = pulse.support_s();
     0.5 * SPEED_OF_LIGHT_M_S * (last_s - first_s)
-}
-
-/// Largest power of a pulse, W.
-pub(crate) fn peak_power_w(pulse: &Pulse) -> f64 {
-    const STEPS: u32 = 2000;
-    let (first_s, last_s) = pulse.support_s();
-    let time_s = |i: u32| first_s + (last_s - first_s) * f64::from(i) / f64::from(STEPS);
-    pulse.energy_j() * (0..=STEPS).map(|i| pulse.intensity_per_s(time_s(i))).fold(0.0, f64::max)
 }
 
 /// Full width at half maximum of a weight within some reach of 0, m.
@@ -185,4 +173,9 @@ fn full_width_m(weight: impl Fn(f64) -> f64, reach_m: f64) -> f64 {
     };
     let before = first.checked_sub(1).and_then(|i| values.get(i));
     step_m * ((last - first) as f64 + beyond(first, before) + beyond(last, values.get(last + 1)))
+}
+
+/// Power of a local oscillator at which shot noise equals a noise that does not depend on it, W.
+fn equal_to_shot_w(instrument: &Instrument, density_a2_hz: f64) -> f64 {
+    density_a2_hz / (2.0 * ELEMENTARY_CHARGE_C * instrument.receiver.responsivity_a_w())
 }

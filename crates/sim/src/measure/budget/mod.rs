@@ -3,7 +3,8 @@
 //! Check: the rows sum to the signal-to-noise ratio of the profile for every telescope, air and receiver; the stored budget of
 //! Table 2.
 
-pub(crate) mod limits;
+mod digits;
+mod limits;
 mod text;
 
 pub use limits::Limits;
@@ -14,11 +15,11 @@ use crate::measure::profile::{efficiency_at, efficiency_by_theory, free_space, m
 use crate::measure::progress::Observer;
 use crate::plan::Plan;
 use crate::scene::{Digitiser, FrontEnd, Scene, SnrReference};
+use digits::{scientific, si};
 use std::f64::consts::{LN_2, PI};
-use text::{scientific, si};
+
 use wakescope_optics::EfficiencyProfile;
 use wakescope_optics::plan::Model;
-use wakescope_signal::constants::ELEMENTARY_CHARGE_C;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 
 /// One factor of the signal-to-noise ratio, or one of its sums.
@@ -101,7 +102,7 @@ impl Budget {
         let total = rows.sums();
         let width_hz = 2.0 * (2.0 * LN_2).sqrt() * instrument.pulse.spectral_width_hz();
         let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
-        let fwhm_s = limits::gaussian_fwhm_s(&instrument.pulse);
+        let fwhm_s = instrument.gaussian_fwhm_s();
         // Of a Gaussian without chirp the product is 2 ln 2/pi.
         let value = match (width_hz * fwhm_s * PI - 2.0 * LN_2).abs() < 1e-9 {
             true => format!("0.44/{} = {}", si(fwhm_s, "s"), si(width_hz, "Hz")),
@@ -268,11 +269,6 @@ fn second_trip_db(scene: &Scene, instrument: &Instrument, range_m: f64) -> Resul
     let efficiency = efficiency_by_theory(instrument, &[range_m, far_m])?;
     let power = |r: f64| Ok::<_, Error>(instrument.return_per_m(r)? * efficiency.interpolated(r)?);
     Ok(decibels(power(far_m)? / power(range_m)?))
-}
-
-/// Power of a local oscillator at which shot noise equals a noise that does not depend on it, W.
-fn equal_to_shot_w(instrument: &Instrument, density_a2_hz: f64) -> f64 {
-    density_a2_hz / (2.0 * ELEMENTARY_CHARGE_C * instrument.receiver.responsivity_a_w())
 }
 
 #[cfg(test)]

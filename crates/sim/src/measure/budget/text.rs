@@ -42,36 +42,3 @@ impl Budget {
         format!("SNR in the band, one pulse, at {ranges} m: {snr} dB")
     }
 }
-
-/// A number in three digits with a prefix of its unit.
-pub(super) fn si(value: f64, unit: &str) -> String {
-    const PREFIXES: [(f64, &str); 9] = [
-        (1e9, "G"),
-        (1e6, "M"),
-        (1e3, "k"),
-        (1.0, ""),
-        (1e-3, "m"),
-        (1e-6, "u"),
-        (1e-9, "n"),
-        (1e-12, "p"),
-        (1e-15, "f"),
-    ];
-    // 999.6 is 1.00 of the next prefix.
-    match PREFIXES.iter().find(|(size, _)| value.abs() >= 0.9995 * size) {
-        Some((size, prefix)) if value.is_finite() => format!("{} {prefix}{unit}", digits(value / size)),
-        _ => format!("{} {unit}", scientific(value)),
-    }
-}
-
-/// Three digits of a number from 1 to 1000, without zeros behind the point.
-pub(super) fn digits(value: f64) -> String {
-    let places = if value.abs() >= 99.95 { 0 } else { 1 + usize::from(value.abs() < 9.995) };
-    let text = format!("{value:.places$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-/// Three digits and a power of ten, as few of them as it takes.
-pub(super) fn scientific(value: f64) -> String {
-    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    format!("{rounded:e}")
-}
