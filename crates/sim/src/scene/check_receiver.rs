@@ -94,7 +94,7 @@ mod tests {
         )
         .unwrap();
         assert_eq!(parse(&real.toml).unwrap().scene.to_toml(), real.toml);
-        assert!(!real.toml.contains("rejection_db") && !real.toml.contains("energy_j = "), "{}", real.toml);
+        assert!(!real.toml.contains("rejection_db") && !real.toml.contains("\nenergy_j = "), "{}", real.toml);
     }
 
     #[test]

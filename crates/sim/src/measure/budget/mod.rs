@@ -308,6 +308,17 @@ mod tests {
         }
     }
 
+    /// Turbulence with screens that take no time.
+    fn coarse() -> Turbulence {
+        Turbulence::Refractive(RefractiveTurbulence {
+            grid_points: 128,
+            grid_spacing_m: 4e-3,
+            layers: 4,
+            realisations: 5,
+            ..RefractiveTurbulence::default()
+        })
+    }
+
     #[test]
     fn rows_sum_to_the_profile_for_every_telescope_air_and_receiver() {
         type Change = fn(&mut Scene);
@@ -317,21 +328,8 @@ mod tests {
             |s| s.detector.snr = SnrReference::Chapter {},
             |s| s.detector.snr = SnrReference::Fixed { snr_db: 3.0 },
             |s| s.telescope.blind_range_m = 250.0,
-            |s| {
-                s.telescope.receiver = ReceiverPath::Bistatic;
-                s.atmosphere.turbulence =
-                    Turbulence::Refractive(RefractiveTurbulence { cn2_m_m23: 1e-13, ..Default::default() });
-            },
-            |s| {
-                let few = RefractiveTurbulence {
-                    grid_points: 128,
-                    grid_spacing_m: 4e-3,
-                    layers: 4,
-                    realisations: 5,
-                    ..Default::default()
-                };
-                s.atmosphere.turbulence = Turbulence::Refractive(few);
-            },
+            |s| (s.telescope.receiver, s.atmosphere.turbulence) = (ReceiverPath::Bistatic, coarse()),
+            |s| s.atmosphere.turbulence = coarse(),
             |s| {
                 let front_end = FrontEnd {
                     saturation_w: 4e-3,
