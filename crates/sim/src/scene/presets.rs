@@ -1,9 +1,9 @@
-//! Nominal set-ups of real lidars, as scenes: one table, `presets.txt`, and a text made of a line of it.
+//! Nominal set-ups of real lidars, as scenes: one table, `presets.csv`, and a text made of a line of it.
 //!
 //! Check: each is a good scene and says what the table says.
 
 /// One lidar a line; what the columns are stands in the file.
-const TABLE: &str = include_str!("presets.txt");
+const TABLE: &str = include_str!("presets.csv");
 
 fn rows() -> impl Iterator<Item = Vec<&'static str>> {
     TABLE.lines().filter(|line| !line.starts_with('#')).map(|line| line.split('|').collect())
