@@ -11,7 +11,7 @@ mod progress;
 mod wake;
 
 use crate::io::Existing;
-use crate::measure::budget::{Budget, scan_ranges_m};
+use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
 use crate::plan::{Plan, Stage, Target};
 use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::{Error, measure::run, measure::write};
@@ -157,12 +157,18 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
         return Ok(());
     }
     let ranges_m = scan_ranges_m(&plan.scene.scene);
-    let budget = Budget::without_screens(&plan, &ranges_m)?;
+    let snr_db = snr_without_screens_db(&plan, &ranges_m)?;
     let mut object = plan_json(&plan);
-    object["budget"] = json!({ "range_m": ranges_m, "snr_db": budget.snr_db() });
+    object["budget"] = json!({ "range_m": ranges_m, "snr_db": snr_db });
     // What only phase screens could tell is not told.
     let screens = if plan.runs(Stage::PhaseScreens) { ", turbulence as on independent paths" } else { "" };
-    say(cli.json, &object, &format!("{}: good\n{plan}  {}{screens}\n", words.scene.display(), budget.short()))
+    let joined = |cells: Vec<String>| cells.join(", ");
+    let short = format!(
+        "SNR in the band, one pulse, at {} m: {} dB{screens}",
+        joined(ranges_m.iter().map(f64::to_string).collect()),
+        joined(snr_db.iter().map(|db| format!("{db:.2}")).collect())
+    );
+    say(cli.json, &object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
 }
 
 /// The plan of a scene, with all that can be known before the computing: limits, memory, a small rehearsal, the folder.

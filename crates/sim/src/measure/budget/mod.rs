@@ -65,64 +65,37 @@ impl Budget {
     /// What the optics refuse, such as a range beyond the profile in turbulence.
     pub fn new(plan: &Plan, range_m: &[f64], observer: &dyn Observer) -> Result<Self, Error> {
         let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
-        let is_fixed = matches!(scene.detector.snr, SnrReference::Fixed { .. });
-        let efficiency = match model(scene) {
-            Model::MonteCarlo if !is_fixed => {
+        let mut rows = match model(scene) {
+            Model::MonteCarlo if !matches!(scene.detector.snr, SnrReference::Fixed { .. }) => {
                 let o = &scene.outputs;
                 let table_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
-                efficiency_at(scene, instrument, &table_m, observer)?
+                let efficiency = efficiency_at(scene, instrument, &table_m, observer)?;
+                Rows::new(plan, range_m, |_| Ok(efficiency))?
             }
-            _ => efficiency_by_theory(instrument, &increasing(range_m))?,
+            _ => Rows::new(plan, range_m, |sorted_m| efficiency_by_theory(instrument, sorted_m))?,
         };
-        Self::of(plan, range_m, &efficiency)
-    }
-
-    /// The same without phase screens: turbulence as that of independent paths.
-    ///
-    /// # Errors
-    /// What the optics refuse.
-    pub fn without_screens(plan: &Plan, range_m: &[f64]) -> Result<Self, Error> {
-        Self::of(plan, range_m, &efficiency_by_theory(&plan.instrument, &increasing(range_m))?)
-    }
-
-    fn of(plan: &Plan, range_m: &[f64], efficiency: &EfficiencyProfile) -> Result<Self, Error> {
-        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
-        let mut rows = Rows { rows: Vec::new(), ranges: range_m.len() };
-        match scene.detector.snr {
-            SnrReference::Fixed { snr_db } => {
-                rows.same("stated by the scene", "", "detector.snr".into(), snr_db);
-            }
-            _ => {
-                transmitter_and_path(&mut rows, scene, instrument, range_m, efficiency)?;
-                rows.sum("= shot-noise limit", "(14)", "(14)".into());
-                receiver(&mut rows, scene, instrument);
-            }
-        }
-        rows.sum(TOTAL, "", "one pulse".into());
-        let total = rows.sums();
-        let width_hz = 2.0 * (2.0 * LN_2).sqrt() * instrument.pulse.spectral_width_hz();
-        let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
-        let fwhm_s = instrument.gaussian_fwhm_s();
-        // Of a Gaussian without chirp the product is 2 ln 2/pi.
-        let value = match (width_hz * fwhm_s * PI - 2.0 * LN_2).abs() < 1e-9 {
-            true => format!("0.44/{} = {}", si(fwhm_s, "s"), si(width_hz, "Hz")),
-            false => si(width_hz, "Hz"),
-        };
-        rows.push("= in the width of the pulse", "", value, total.iter().map(|db| db + gain_db).collect());
-        if scene.scan.second_trip.is_some() {
-            let echoes = range_m.iter().map(|&range_m| second_trip_db(scene, instrument, range_m));
-            let echoes = echoes.collect::<Result<Vec<_>, _>>()?;
-            let value = format!("from {} farther", si(ambiguous_range_m(scene.laser.pulse_repetition_hz), "m"));
-            rows.push("= pulse before over echo", "", value, echoes);
-        }
+        rows.beside_the_ratio(scene, instrument, range_m)?;
         let limits = Limits::new(plan)?;
         Ok(Self { range_m: range_m.to_vec(), rows: rows.rows, limits, warnings: plan.warnings.clone() })
     }
 
     /// The signal-to-noise ratio in the detector band at each range, dB.
     pub fn snr_db(&self) -> &[f64] {
-        self.rows.iter().find(|row| row.name == TOTAL).map_or(&[], |row| &row.db)
+        snr_db(&self.rows)
     }
+}
+
+/// The signal-to-noise ratio of a planned scene at some ranges, dB, without phase screens: in turbulence that of independent paths.
+///
+/// # Errors
+/// What the optics refuse.
+pub fn snr_without_screens_db(plan: &Plan, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+    let rows = Rows::new(plan, range_m, |sorted_m| efficiency_by_theory(&plan.instrument, sorted_m))?;
+    Ok(snr_db(&rows.rows).to_vec())
+}
+
+fn snr_db(rows: &[Row]) -> &[f64] {
+    rows.iter().find(|row| row.name == TOTAL).map_or(&[], |row| &row.db)
 }
 
 fn increasing(range_m: &[f64]) -> Vec<f64> {
@@ -143,6 +116,48 @@ struct Rows {
 }
 
 impl Rows {
+    /// All that the signal-to-noise ratio is made of; `efficiency` is asked for increasing ranges, if the scene needs any.
+    fn new(
+        plan: &Plan,
+        range_m: &[f64],
+        efficiency: impl FnOnce(&[f64]) -> Result<EfficiencyProfile, Error>,
+    ) -> Result<Self, Error> {
+        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
+        let mut rows = Self { rows: Vec::new(), ranges: range_m.len() };
+        match scene.detector.snr {
+            SnrReference::Fixed { snr_db } => rows.same("stated by the scene", "", "detector.snr".into(), snr_db),
+            _ => {
+                let efficiency = efficiency(&increasing(range_m))?;
+                transmitter_and_path(&mut rows, scene, instrument, range_m, &efficiency)?;
+                rows.sum("= shot-noise limit", "(14)", "(14)".into());
+                receiver(&mut rows, scene, instrument);
+            }
+        }
+        rows.sum(TOTAL, "", "one pulse".into());
+        Ok(rows)
+    }
+
+    /// The ratio in the width of the pulse, and the echo of the pulse before.
+    fn beside_the_ratio(&mut self, scene: &Scene, instrument: &Instrument, range_m: &[f64]) -> Result<(), Error> {
+        let width_hz = 2.0 * (2.0 * LN_2).sqrt() * instrument.pulse.spectral_width_hz();
+        let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
+        let fwhm_s = instrument.gaussian_fwhm_s();
+        // Of a Gaussian without chirp the product is 2 ln 2/pi.
+        let value = match (width_hz * fwhm_s * PI - 2.0 * LN_2).abs() < 1e-9 {
+            true => format!("0.44/{} = {}", si(fwhm_s, "s"), si(width_hz, "Hz")),
+            false => si(width_hz, "Hz"),
+        };
+        let wide = self.sums().iter().map(|db| db + gain_db).collect();
+        self.push("= in the width of the pulse", "", value, wide);
+        if scene.scan.second_trip.is_some() {
+            let echoes = range_m.iter().map(|&range_m| second_trip_db(scene, instrument, range_m));
+            let echoes = echoes.collect::<Result<Vec<_>, _>>()?;
+            let value = format!("from {} farther", si(ambiguous_range_m(scene.laser.pulse_repetition_hz), "m"));
+            self.push("= pulse before over echo", "", value, echoes);
+        }
+        Ok(())
+    }
+
     fn push(&mut self, name: &'static str, symbol: &'static str, value: String, db: Vec<f64>) {
         self.rows.push(Row { name, symbol, value, db });
     }

@@ -33,12 +33,4 @@ impl Budget {
         }
         out
     }
-
-    /// The signal-to-noise ratio in one line.
-    pub fn short(&self) -> String {
-        let joined = |cells: Vec<String>| cells.join(", ");
-        let ranges = joined(self.range_m.iter().map(f64::to_string).collect());
-        let snr = joined(self.snr_db().iter().map(|db| format!("{db:.2}")).collect());
-        format!("SNR in the band, one pulse, at {ranges} m: {snr} dB")
-    }
 }
