@@ -74,8 +74,8 @@ fn main() -> Result<(), Error> {
         lines: LINES,
         pulses_per_line: PULSES,
         shot: |key: PulseKey| Shot {
-            line: &lines[key.line],
             efficiency: Some(efficiency.of_pulse(key.line * PULSES + key.pulse)),
+            ..Shot::from(&lines[key.line])
         },
         generator: |key| pulse_generator(2024, key),
         digitiser: Some(Digitiser::new(8, 4.0 * RECEIVER.noise_variance_a2().sqrt())?),
@@ -102,7 +102,7 @@ fn main() -> Result<(), Error> {
     println!("distance [m]  v_gate  expected of pulse pair  pulse pair");
     for ((distance_m, lag), line) in distances_m.iter().zip(lags).zip(&lines) {
         let seen = filter.at_range(range_m, |r| wind_m_s(*distance_m, r));
-        let covariance = simulator.covariance_a2(Shot { line, efficiency: Some(&mean_efficiency) })?;
+        let covariance = simulator.covariance_a2(Shot { efficiency: Some(&mean_efficiency), ..Shot::from(line) })?;
         let expected = velocity_m_s(GATE.map(|k| covariance[(k + 5, k)]).sum());
         println!("{distance_m:12.1}  {seen:6.2}  {expected:22.2}  {:10.2}", velocity_m_s(lag));
     }

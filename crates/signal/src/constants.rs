@@ -8,3 +8,6 @@ pub const PLANCK_J_S: f64 = 6.626_070_15e-34;
 
 /// Elementary charge `e` \[C\].
 pub const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
+
+/// Boltzmann constant `k` \[J/K\].
+pub const BOLTZMANN_J_K: f64 = 1.380_649e-23;

@@ -50,7 +50,7 @@ impl Simulator {
     /// As [`Simulator::record_into`].
     pub fn snr_into<'a>(&self, shot: impl Into<Shot<'a>>, scratch: &mut Scratch, out: &mut [f64]) -> Result<(), Error> {
         self.mean_power_into(shot, scratch, out)?;
-        let noise_a2 = self.receiver().noise_variance_a2();
+        let noise_a2 = self.receiver().snr_noise_a2();
         out.iter_mut().for_each(|power| *power /= noise_a2);
         Ok(())
     }

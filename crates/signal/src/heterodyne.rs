@@ -64,8 +64,20 @@ impl Simulator {
     /// # Errors
     /// As [`Receiver::validate`]; [`Error::OutOfRange`] for a record without samples or a first time that is not finite.
     pub fn new(pulse: impl Into<Pulse>, receiver: Receiver, record: Record) -> Result<Self, Error> {
-        let pulse = pulse.into();
         receiver.validate()?;
+        Self::planned(pulse.into(), receiver, record)
+    }
+
+    /// Plans complex records, [`Simulator::baseband_into`]: the band may be wider than a real current of this rate holds.
+    ///
+    /// # Errors
+    /// As [`Simulator::new`], with [`Receiver::validate_baseband`].
+    pub fn for_baseband(pulse: impl Into<Pulse>, receiver: Receiver, record: Record) -> Result<Self, Error> {
+        receiver.validate_baseband()?;
+        Self::planned(pulse.into(), receiver, record)
+    }
+
+    fn planned(pulse: Pulse, receiver: Receiver, record: Record) -> Result<Self, Error> {
         check("time_of_first_sample_s", record.time_of_first_sample_s, "finite", |_| true)?;
         check("samples", record.samples as f64, "1 or more", |n| n >= 1.0)?;
         let interval_s = 1.0 / receiver.sample_rate_hz;
@@ -111,7 +123,8 @@ impl Simulator {
     ///
     /// # Errors
     /// As [`Shot::validate`]; [`Error::LengthMismatch`] if `out_a` has not one place per sample;
-    /// [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any use; [`Error::Overflow`].
+    /// [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any use; [`Error::Overflow`];
+    /// [`Error::BandBeyondNyquist`] if the simulator was planned for complex records and a real one does not hold the band.
     pub fn record_into<'a, R: Rng + ?Sized>(
         &self,
         shot: impl Into<Shot<'a>>,
@@ -120,6 +133,7 @@ impl Simulator {
         out_a: &mut [f64],
     ) -> Result<(), Error> {
         check_length("out_a", out_a.len(), self.record.samples)?;
+        self.receiver.validate_band()?;
         let mut envelope = std::mem::take(&mut scratch.envelope);
         envelope.resize(self.record.samples, Complex::ZERO);
         let result = self.envelope_into(shot, rng, scratch, &mut envelope);
@@ -156,9 +170,10 @@ impl Simulator {
         Ok(())
     }
 
-    /// Writes the complex envelope `s(t_k)` of one pulse, (15), corrected \[A\], without noise.
+    /// Writes the complex envelope `s(t_k)` of one pulse, (15), corrected \[A\], without noise; with the phases of the laser, the
+    /// reflex of the telescope and the echo of the pulse before, if the receiver or the shot has them.
     ///
-    /// Draws the speckle as [`Simulator::record_into`] does.
+    /// Draws the speckle as [`Simulator::record_into`] does; for the others the shot has a seed of its own.
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
@@ -173,13 +188,11 @@ impl Simulator {
         shot.validate()?;
         check_length("out_a", out_a.len(), self.record.samples)?;
         let mut speckle = std::mem::take(&mut scratch.speckle);
-        speckle.clear();
-        speckle.extend((0..shot.line.layers()).map(|_| {
-            let re: f64 = rng.sample(StandardNormal);
-            let im: f64 = rng.sample(StandardNormal);
-            Complex::new(re, im) * FRAC_1_SQRT_2
-        }));
-        let result = self.sum_into(shot, &speckle, scratch, out_a);
+        draw_speckle(shot.line.layers(), rng, &mut speckle);
+        let result = match self.is_plain(&shot) {
+            true => self.sum_into(shot, &speckle, scratch, out_a),
+            false => self.sum_with_asides_into(shot, &speckle, scratch, out_a),
+        };
         scratch.speckle = speckle;
         result
     }
@@ -210,8 +223,19 @@ impl Simulator {
         scratch: &mut Scratch,
         out_a: &mut [Complex<f64>],
     ) -> Result<(), Error> {
+        self.prepare(shot.line, scratch)?;
+        self.sum_prepared_into(shot, speckle, scratch, out_a)
+    }
+
+    /// The same with a window that is prepared for the line.
+    pub(crate) fn sum_prepared_into(
+        &self,
+        shot: Shot<'_>,
+        speckle: &[Complex<f64>],
+        scratch: &mut Scratch,
+        out_a: &mut [Complex<f64>],
+    ) -> Result<(), Error> {
         let line = shot.line;
-        self.prepare(line, scratch)?;
         let Scratch { window, phasors, .. } = scratch;
         phasors.resize(line.layers());
         for (block, outs) in out_a.chunks_mut(RENEWAL_SAMPLES).enumerate() {
@@ -290,4 +314,14 @@ impl Simulator {
         (phasors.re[layer], phasors.im[layer]) = (phasor.re, phasor.im);
         (phasors.rotation_re[layer], phasors.rotation_im[layer]) = (rotation.re, rotation.im);
     }
+}
+
+/// Circular complex normal numbers of mean square 1.
+pub(crate) fn draw_speckle<R: Rng + ?Sized>(layers: usize, rng: &mut R, out: &mut Vec<Complex<f64>>) {
+    out.clear();
+    out.extend((0..layers).map(|_| {
+        let re: f64 = rng.sample(StandardNormal);
+        let im: f64 = rng.sample(StandardNormal);
+        Complex::new(re, im) * FRAC_1_SQRT_2
+    }));
 }

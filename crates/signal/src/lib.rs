@@ -38,8 +38,10 @@
 //! | `table` | tables over range |
 //! | `line` | [`LineOfSight`]; how thin a layer must be, [`LayerLimits`] |
 //! | `shot` | [`Shot`]: what one pulse meets |
-//! | [`receiver`] | sampling, responsivity, noise power (13), signal-to-noise ratio (14) |
+//! | [`receiver`] | sampling, responsivity, noise power (13), signal-to-noise ratio (14); what a real receiver adds |
+//! | [`transmitter`] | energy against repetition rate, Brillouin threshold |
 //! | `heterodyne` | [`Simulator`]: one record per pulse, (15), (12), fast form |
+//! | `asides` | what a signal holds beside (15): laser phases, reflex of the telescope, echo of the pulse before |
 //! | `window`, `kernel` | which layers are lit at a sample; the inner loop |
 //! | [`literal`] | the same sum term by term, as oracle |
 //! | `noise` | band-limited or white shot noise, real or complex |
@@ -51,6 +53,7 @@
 //!
 //! Feature `rayon` (default): the pulses of a scan in the caller's thread pool; the bits of the result do not depend on it.
 
+mod asides;
 pub mod constants;
 pub mod digitise;
 pub mod efficiency;
@@ -72,6 +75,7 @@ pub mod scan;
 mod shot;
 mod table;
 mod transmitted;
+pub mod transmitter;
 mod window;
 
 pub use constants::SPEED_OF_LIGHT_M_S;

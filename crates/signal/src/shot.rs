@@ -16,11 +16,16 @@ pub struct Shot<'a> {
     /// the heterodyne efficiency of this moment if the line's weights leave it out, or its ratio to the mean if they
     /// contain the mean. `None`: the line's weights as they are.
     pub efficiency: Option<&'a [f64]>,
+    /// The air that the pulse before lights meanwhile: what lies at `R + c/(2 PRF)` stands at `R`. `None`: it is long gone.
+    pub previous: Option<&'a LineOfSight>,
+    /// Seed of what is random beside speckle and noise: phases of the laser and of the telescope's reflex, speckle of
+    /// `previous`. Not used where the receiver has none of them.
+    pub aside_seed: u64,
 }
 
 impl<'a> From<&'a LineOfSight> for Shot<'a> {
     fn from(line: &'a LineOfSight) -> Self {
-        Self { line, efficiency: None }
+        Self { line, efficiency: None, previous: None, aside_seed: 0 }
     }
 }
 
@@ -32,6 +37,7 @@ impl Shot<'_> {
     /// [`Error::ElementOutOfRange`] for a factor that is negative or not finite.
     pub fn validate(&self) -> Result<(), Error> {
         self.line.validate()?;
+        self.previous.map_or(Ok(()), LineOfSight::validate)?;
         let Some(efficiency) = self.efficiency else { return Ok(()) };
         check_length("efficiency", efficiency.len(), self.line.layers())?;
         match efficiency.iter().position(|e| !(e.is_finite() && *e >= 0.0)) {

@@ -148,6 +148,14 @@ impl Pulse {
         }
     }
 
+    /// `sigma` of (7) \[s\], if the power is Gaussian.
+    pub(crate) fn gaussian_sigma_s(&self) -> Option<f64> {
+        match &self.shape {
+            Shape::Gaussian(pulse) => Some(pulse.sigma_s()),
+            Shape::Sampled(_) => None,
+        }
+    }
+
     /// Length scale of the pulse in range, `c sigma/2` \[m\].
     pub fn sigma_m(&self) -> f64 {
         0.5 * SPEED_OF_LIGHT_M_S * self.sigma_s()

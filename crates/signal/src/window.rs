@@ -6,8 +6,10 @@
 //! Check: the energy outside the sum is below 1e-6 of the whole.
 
 use num_complex::Complex;
+use rand::Rng;
 
 use crate::error::check;
+use crate::receiver::phase_noise::walk;
 use crate::{Error, LineOfSight, Pulse, SPEED_OF_LIGHT_M_S};
 
 /// Most layers to one side of the nearest one: a bound on memory, far beyond any useful layer thickness.
@@ -45,6 +47,8 @@ pub(crate) struct Window {
     aligned_step: Option<i64>,
     /// Amplitudes of the layers from `-near` to `far` about the nearest one.
     amplitude: Amplitude,
+    /// Factors `exp(j phase)` on them, the phase of the laser while it sent the pulse; empty for a quiet laser.
+    turns: Vec<Complex<f64>>,
 }
 
 /// Real and imaginary parts; the latter is empty if the envelope is real.
@@ -80,12 +84,37 @@ impl Window {
         let aligned = (self.step - whole).abs() * samples as f64 <= ALIGNMENT_TOLERANCE;
         self.aligned_step = aligned.then_some(whole as i64);
         let count = (self.near + self.far + 1).max(1) as usize;
+        self.turns.clear();
         self.amplitude.re.resize(count, 0.0);
         self.amplitude.im.resize(if pulse.is_real() { 0 } else { count }, 0.0);
         if aligned {
             self.fill_amplitudes(pulse, thickness_m, self.start - self.start.round());
         }
         Ok(())
+    }
+
+    /// Gives a prepared window the phases of a laser of finite linewidth, new for each pulse and the same for all its ranges.
+    pub(crate) fn draw_phases<R: Rng + ?Sized>(
+        &mut self,
+        pulse: &Pulse,
+        thickness_m: f64,
+        linewidth_hz: f64,
+        rng: &mut R,
+    ) {
+        let count = self.amplitude.re.len();
+        self.turns.resize(count, Complex::ONE);
+        walk(linewidth_hz, 2.0 * thickness_m / SPEED_OF_LIGHT_M_S, rng, &mut self.turns);
+        self.amplitude.im.resize(count, 0.0);
+        if self.aligned_step.is_some() {
+            self.fill_amplitudes(pulse, thickness_m, self.start - self.start.round());
+        }
+    }
+
+    /// Factor of the laser's phase `time_s` after the middle of the pulse; beyond its support that of the end.
+    pub(crate) fn turn_at(&self, thickness_m: f64, time_s: f64) -> Complex<f64> {
+        let layer = self.near as f64 - 0.5 * SPEED_OF_LIGHT_M_S * time_s / thickness_m;
+        let index = (layer.round().max(0.0) as usize).min(self.turns.len().saturating_sub(1));
+        self.turns.get(index).copied().unwrap_or(Complex::ONE)
     }
 
     /// Amplitudes for a sample whose range lies `offset` layers beyond the centre of the nearest layer.
@@ -98,7 +127,8 @@ impl Window {
             return;
         }
         for (j, (re, im)) in self.amplitude.re.iter_mut().zip(&mut self.amplitude.im).enumerate() {
-            Complex { re: *re, im: *im } = at(j);
+            let turn = self.turns.get(j).copied().unwrap_or(Complex::ONE);
+            Complex { re: *re, im: *im } = at(j) * turn;
         }
     }
 

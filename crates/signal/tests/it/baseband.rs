@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use num_complex::Complex;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wakescope_signal::{LineOfSight, NoiseModel, Scratch};
+use wakescope_signal::{Error, LineOfSight, NoiseModel, Receiver, Record, Scratch, Simulator};
 
-use crate::setup::{STEP_M, gaussian, line, receiver, simulator};
+use crate::setup::{C, STEP_M, gaussian, line, receiver, simulator};
 
 const RECORDS: usize = 400;
 
@@ -89,5 +89,28 @@ fn without_noise_the_current_is_sqrt_2_times_the_real_part_of_the_baseband_on_it
     for (k, (s, i)) in baseband.iter().zip(&current).enumerate() {
         let carrier = Complex::cis(2.0 * PI * 80e6 * simulator.time_s(k));
         assert!((i - 2.0_f64.sqrt() * (s * carrier).re).abs() < 1e-9 * largest);
+    }
+}
+
+#[test]
+fn quadratures_hold_a_band_as_wide_as_their_rate_and_a_real_current_of_it_is_refused() {
+    let record = Record { time_of_first_sample_s: 2.0 * 400.0 / C, samples: 400 };
+    let wide = Receiver { sample_rate_hz: 50e6, bandwidth_hz: 49e6, ..receiver(NoiseModel::BandLimited) };
+    assert!(matches!(Simulator::new(gaussian(200e-9), wide, record), Err(Error::BandBeyondNyquist { .. })));
+    let simulator = Simulator::for_baseband(gaussian(200e-9), wide, record).unwrap();
+    let (mut scratch, mut rng) = (Scratch::default(), Xoshiro256PlusPlus::seed_from_u64(21));
+    let air = LineOfSight { weight_per_m: vec![0.0; 100], ..line(400.0, 460.05, STEP_M, |_| 0.0) };
+    let refused = simulator.record_into(&air, &mut rng, &mut scratch, &mut [0.0; 400]);
+    assert!(matches!(refused, Err(Error::BandBeyondNyquist { .. })));
+    let mut sum = 0.0;
+    for _ in 0..50 {
+        let mut out = [Complex::ZERO; 400];
+        simulator.baseband_into(&air, &mut rng, &mut scratch, &mut out).unwrap();
+        sum += out.iter().map(|n| n.norm_sqr()).sum::<f64>();
+    }
+    let relative = sum / (50.0 * 400.0) / wide.noise_variance_a2() - 1.0;
+    assert!(relative.abs() < 3.0 / (50.0 * 400.0_f64).sqrt(), "{relative}");
+    for bad in [Receiver { bandwidth_hz: 50e6, ..wide }, Receiver { intermediate_frequency_hz: 20e6, ..wide }] {
+        assert!(matches!(Simulator::for_baseband(gaussian(200e-9), bad, record), Err(Error::BandBeyondNyquist { .. })));
     }
 }

@@ -157,7 +157,7 @@ fn factors_of_a_shot_that_are_no_efficiencies_are_refused() {
     let simulator = simulator(gaussian(200e-9), NoiseModel::None, 400.0, 8);
     let air = line(330.0, 500.0, STEP_M, |_| 5.0);
     let run = |efficiency: &[f64]| {
-        let shot = Shot { line: &air, efficiency: Some(efficiency) };
+        let shot = Shot { efficiency: Some(efficiency), ..Shot::from(&air) };
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         simulator.record_into(shot, &mut rng, &mut Scratch::default(), &mut [0.0; 8])
     };

@@ -2,6 +2,7 @@
 //! extreme cases.
 #![allow(clippy::unwrap_used)] // a helper of a test may panic as the test may
 
+mod asides;
 mod baseband;
 mod covariance;
 mod envelopes;
@@ -9,6 +10,7 @@ mod extremes;
 mod heterodyne;
 mod noise;
 mod power;
+mod receiver_tables;
 mod records;
 mod scan;
 mod setup;

@@ -179,7 +179,7 @@ fn an_efficiency_of_its_own_for_each_pulse_adds_its_variance_to_that_of_the_spec
             simulator: &simulator,
             lines: 1,
             pulses_per_line: 12_000,
-            shot: |key: PulseKey| Shot { line: &air, efficiency: own.then(|| layers.of_pulse(key.pulse)) },
+            shot: |key: PulseKey| Shot { efficiency: own.then(|| layers.of_pulse(key.pulse)), ..Shot::from(&air) },
             generator: |key| pulse_generator(4, key),
             digitiser: None,
         };

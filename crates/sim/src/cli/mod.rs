@@ -4,15 +4,18 @@
 //! results to standard output; `--json` makes the result one JSON object, and so an error.
 
 mod bound;
+mod budget;
 mod flow;
 mod output;
 mod progress;
 mod wake;
 
 use crate::io::Existing;
-use crate::plan::{Plan, Target};
-use crate::scene::{SceneFile, TABLE2_TOML};
+use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
+use crate::plan::{Plan, Stage, Target};
+use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::{Error, measure::run, measure::write};
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 use output::say;
 use serde_json::{Value, json};
@@ -49,6 +52,9 @@ enum Command {
         /// Replace the file if it exists.
         #[arg(long)]
         force: bool,
+        /// The lidar: a nominal set-up of a real one, with its sources.
+        #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(preset_names()))]
+        preset: Option<String>,
     },
     /// Check a scene and print the plan: what will run, what is left out and why, at what cost.
     Check(CheckWords),
@@ -62,6 +68,8 @@ enum Command {
     Map(Io),
     /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
     Bound(bound::BoundWords),
+    /// The power budget in dB, from the energy of a pulse to the signal-to-noise ratio, with what bounds the instrument.
+    Budget(budget::BudgetWords),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow(flow::FlowWords),
     /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
@@ -114,23 +122,24 @@ pub fn main() -> u8 {
 
 fn dispatch(cli: &Cli) -> Result<(), Error> {
     match &cli.command {
-        Command::Init { scene, force } => init(scene, *force, cli),
+        Command::Init { scene, force, preset } => init(scene, *force, preset.as_deref(), cli),
         Command::Check(words) => check(words, cli),
         Command::Run(io) => execute(io, Target::Run, cli),
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
         Command::Bound(words) => bound::bound(words, cli),
+        Command::Budget(words) => budget::budget(words, cli),
         Command::Flow(words) => flow::flow(words, cli),
         Command::Wake(words) => wake::wake(words, cli),
     }
 }
 
-fn init(path: &Path, force: bool, cli: &Cli) -> Result<(), Error> {
-    let text = match cli.seed {
-        Some(seed) => TABLE2_TOML.replacen("seed = 1 ", &format!("seed = {seed} "), 1),
-        None => TABLE2_TOML.to_owned(),
-    };
+fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(), Error> {
+    let mut text = preset.and_then(preset_toml).unwrap_or_else(|| TABLE2_TOML.to_owned());
+    if let Some(seed) = cli.seed {
+        text = text.replacen("seed = 1 ", &format!("seed = {seed} "), 1);
+    }
     SceneFile::parse(&text, path)?;
     if !force && path.exists() {
         let source = std::io::Error::new(std::io::ErrorKind::AlreadyExists, "it exists; --force replaces it");
@@ -147,7 +156,19 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     if cli.quiet && !cli.json {
         return Ok(());
     }
-    say(cli.json, &plan_json(&plan), &format!("{}: good\n{plan}", words.scene.display()))
+    let ranges_m = scan_ranges_m(&plan.scene.scene);
+    let snr_db = snr_without_screens_db(&plan, &ranges_m)?;
+    let mut object = plan_json(&plan);
+    object["budget"] = json!({ "range_m": ranges_m, "snr_db": snr_db });
+    // What only phase screens could tell is not told.
+    let screens = if plan.runs(Stage::PhaseScreens) { ", turbulence as on independent paths" } else { "" };
+    let joined = |cells: Vec<String>| cells.join(", ");
+    let short = format!(
+        "SNR in the band, one pulse, at {} m: {} dB{screens}",
+        joined(ranges_m.iter().map(f64::to_string).collect()),
+        joined(snr_db.iter().map(|db| format!("{db:.2}")).collect())
+    );
+    say(cli.json, &object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
 }
 
 /// The plan of a scene, with all that can be known before the computing: limits, memory, a small rehearsal, the folder.

@@ -6,7 +6,7 @@ use super::key::{Key, Kind, join};
 const LONGEST_QUOTE: usize = 60;
 
 /// Endings of names and the units that they stand for, longer ones first.
-const UNITS: [(&str, &str); 23] = [
+const UNITS: [(&str, &str); 28] = [
     ("_per_m_sr", "1/(m sr)"),
     ("_m2_s", "m^2/s"),
     ("_m_m23", "m^(-2/3)"),
@@ -14,6 +14,11 @@ const UNITS: [(&str, &str); 23] = [
     ("_per_m", "1/m"),
     ("_per_s", "1/s"),
     ("_hz_s", "Hz/s"),
+    ("_db_hz", "dB/Hz"),
+    ("_a_rthz", "A/sqrt(Hz)"),
+    ("_m_w", "m/W"),
+    ("_ohm", "ohm"),
+    ("_m2", "m^2"),
     ("_m_s2", "m/s^2"),
     ("_m_s", "m/s"),
     ("_rad", "rad"),

@@ -2,9 +2,9 @@
 
 use crate::Error;
 use crate::scene::{
-    AirProfile, Atmosphere, BeamRadiusDefinition, Digitiser, NoiseKind, OuterScaleWavenumber, Pulse, PulseDefinition,
-    PulseResampling, PulseShape, ReceiverPath, RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind,
-    Turbulence,
+    AirProfile, Atmosphere, BeamRadiusDefinition, DetectorSignal, Digitiser, NoiseKind, OuterScaleWavenumber, Pulse,
+    PulseDefinition, PulseResampling, PulseShape, ReceiverPath, RefractiveTurbulence, Scene, ScreenSampling,
+    SnrReference, SpectrumKind, Turbulence,
 };
 use num_complex::Complex;
 use std::sync::Arc;
@@ -28,6 +28,10 @@ pub struct Instrument {
     pub snr: optics::SnrModel,
     /// Air that changes with range.
     pub air: Option<signal::Medium>,
+    /// Part of the return that is left by optics and polarisation, out and back together.
+    pub transmission: f64,
+    /// Range up to which nothing is seen, m.
+    pub blind_range_m: f64,
 }
 
 impl Instrument {
@@ -40,7 +44,7 @@ impl Instrument {
         let snr = optics::SnrModel {
             wavelength_m: scene.laser.wavelength_m,
             aperture_area_m2: telescope.aperture_area_m2(),
-            pulse_energy_j: scene.pulse.energy_j,
+            pulse_energy_j: scene.pulse_energy_j(),
             quantum_efficiency: scene.detector.quantum_efficiency,
             bandwidth_hz: scene.detector.bandwidth_hz,
             backscatter_per_m_sr: scene.atmosphere.backscatter_per_m_sr,
@@ -63,23 +67,52 @@ impl Instrument {
         };
         Ok(Self {
             telescope,
-            pulse: pulse(&scene.pulse)?,
+            pulse: pulse(&Pulse { energy_j: scene.pulse_energy_j(), ..scene.pulse.clone() })?,
             receiver,
             digitiser,
             turbulence,
             snr: snr.validated()?,
             air: medium(&scene.atmosphere)?,
+            transmission: 10f64.powf(-0.1 * (scene.telescope.optics_loss_db + scene.telescope.polarisation_loss_db)),
+            blind_range_m: scene.telescope.blind_range_m,
         })
     }
 
-    /// Return per metre of range K^2 beta A_R/R^2 of the air, (9) without the efficiency, 1/m.
+    /// Return per metre of range K^2 beta A_R/R^2 of the air, (9) without the efficiency, less what the optics lose, 1/m;
+    /// nothing from where the receiver is blind.
     ///
     /// # Errors
     /// What optics or signals refuse of a range.
     pub fn return_per_m(&self, range_m: f64) -> Result<f64, Error> {
+        let seen = if range_m < self.blind_range_m { 0.0 } else { self.transmission };
+        Ok(seen
+            * match &self.air {
+                Some(air) => air.return_per_m(range_m, self.snr.aperture_area_m2)?,
+                None => self.snr.return_per_m(range_m)?,
+            })
+    }
+
+    /// Full width at half maximum of the Gaussian pulse with the same spread, s.
+    pub fn gaussian_fwhm_s(&self) -> f64 {
+        2.0 * std::f64::consts::LN_2.sqrt() * self.pulse.sigma_s()
+    }
+
+    /// Largest power of the pulse, W.
+    pub fn peak_power_w(&self) -> f64 {
+        const STEPS: u32 = 2000;
+        let (first_s, last_s) = self.pulse.support_s();
+        let time_s = |i: u32| first_s + (last_s - first_s) * f64::from(i) / f64::from(STEPS);
+        self.pulse.energy_j() * (0..=STEPS).map(|i| self.pulse.intensity_per_s(time_s(i))).fold(0.0, f64::max)
+    }
+
+    /// One-way transmission K of the air to a range.
+    ///
+    /// # Errors
+    /// What signals refuse of a range.
+    pub fn air_transmission(&self, range_m: f64) -> Result<f64, Error> {
         match &self.air {
-            Some(air) => Ok(air.return_per_m(range_m, self.snr.aperture_area_m2)?),
-            None => Ok(self.snr.return_per_m(range_m)?),
+            Some(air) => Ok(air.transmission(range_m)?),
+            None => Ok((-self.snr.extinction_per_m * range_m).exp()),
         }
     }
 
@@ -238,5 +271,39 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
             NoiseKind::White => signal::NoiseModel::White,
             NoiseKind::None => signal::NoiseModel::None,
         },
+        front_end: front_end(scene),
+    }
+}
+
+/// What the receiver of a scene has beyond shot noise.
+fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
+    let (d, words) = (&scene.detector, scene.detector.front_end.unwrap_or_default());
+    let converter = match d.digitiser {
+        Digitiser::None {} => None,
+        Digitiser::Quantised { bits, full_scale_over_noise } => Some(signal::receiver::Converter {
+            bits,
+            full_scale_over_noise,
+            bandwidth_hz: d.bandwidth_hz,
+            sample_rate_hz: d.sampling_hz,
+            input_over_noise: match (d.noise, d.signal) {
+                (NoiseKind::White, _) => (0.5 * d.sampling_hz / d.bandwidth_hz).sqrt(),
+                (_, DetectorSignal::IntermediateFrequency) => 1.0,
+                (_, DetectorSignal::Baseband) => std::f64::consts::FRAC_1_SQRT_2,
+            },
+        }),
+    };
+    signal::receiver::FrontEnd {
+        amplifier_noise_a_rthz: words.amplifier_noise_a_rthz,
+        load_ohm: words.load_ohm,
+        load_temperature_k: words.load_temperature_k,
+        dark_current_a: words.dark_current_a,
+        intensity_noise_db_hz: words.intensity_noise_db_hz,
+        rejection_db: words.rejection_db,
+        saturation_w: words.saturation_w,
+        response: signal::receiver::Butterworth { order: words.poles, half_power_hz: words.half_power_hz },
+        rounding_noise: converter.map_or(0.0, |converter| converter.rounding()),
+        clipping_noise: converter.map_or(0.0, |converter| converter.clipping_noise()),
+        linewidth_hz: scene.laser.linewidth_hz,
+        reflection: 10f64.powf(0.1 * scene.telescope.reflection_db),
     }
 }

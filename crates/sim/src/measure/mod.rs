@@ -9,10 +9,12 @@
 //! | [`scan`] | air along the lines of sight, and their records |
 //! | [`map`], [`cell_average`] | estimates and their errors against the truth |
 //! | [`mod@bound`] | the Cramer-Rao bound for a scene |
+//! | [`budget`] | the power budget, from the pulse to the signal-to-noise ratio |
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
 //! | [`progress`], [`streams`] | who watches a run; one random stream for each pulse |
 
 pub mod bound;
+pub mod budget;
 pub mod cell_average;
 pub mod estimators;
 pub mod geometry;

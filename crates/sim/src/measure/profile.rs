@@ -66,7 +66,7 @@ pub fn range_profile(scene: &Scene, instrument: &Instrument, observer: &dyn Obse
     let efficiency = match turbulence(scene) {
         None => free_space(instrument, &range_m)?,
         Some(t) => {
-            let exact = exact_bistatic(instrument, &range_m)?;
+            let exact = efficiency_by_theory(instrument, &range_m)?;
             let Paths { monostatic, bistatic, lost_power_fraction: lost, .. } =
                 monte_carlo(scene, instrument, &t, &range_m, observer)?;
             lost_power_fraction = Some(lost);
@@ -85,7 +85,9 @@ pub fn range_profile(scene: &Scene, instrument: &Instrument, observer: &dyn Obse
         .map(|(&range_m, &mean)| match scene.detector.snr {
             SnrReference::Fixed { snr_db } => Ok(snr_db),
             _ => Ok(10.0
-                * receiver.slowly_varying_snr(scene.pulse.energy_j, instrument.return_per_m(range_m)? * mean).log10()),
+                * receiver
+                    .slowly_varying_snr(scene.pulse_energy_j(), instrument.return_per_m(range_m)? * mean)
+                    .log10()),
         })
         .collect::<Result<_, Error>>()?;
     Ok(RangeProfile { model, efficiency, snr_db, others, lost_power_fraction })
@@ -102,17 +104,22 @@ pub fn efficiency_at(
     observer: &dyn Observer,
 ) -> Result<EfficiencyProfile, Error> {
     match (turbulence(scene), model(scene)) {
-        (Some(_), Model::ExactBistatic) => exact_bistatic(instrument, range_m),
+        (Some(_), Model::ExactBistatic) => efficiency_by_theory(instrument, range_m),
         (Some(t), Model::MonteCarlo) => Ok(monte_carlo(scene, instrument, &t, range_m, observer)?.monostatic),
         _ => free_space(instrument, range_m),
     }
 }
 
-fn free_space(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
+pub(crate) fn free_space(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
     Ok(EfficiencyProfile::from_theory(range_m, |range_m| free_space_efficiency(&instrument.telescope, range_m))?)
 }
 
-fn exact_bistatic(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
+/// The efficiency without phase screens: of free space, and in turbulence the exact mean of independent paths, which leaves out
+/// what a path out and back gains.
+///
+/// # Errors
+/// As [`efficiency_at`].
+pub(crate) fn efficiency_by_theory(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
     let Some(turbulence) = &instrument.turbulence else { return free_space(instrument, range_m) };
     let table = StructureTable::new(&*turbulence.spectrum);
     Ok(EfficiencyProfile::from_theory(range_m, |range_m| {

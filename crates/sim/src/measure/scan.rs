@@ -3,17 +3,21 @@
 use crate::Error;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
-use crate::measure::profile::{drawn_turbulence, efficiency_at, efficiency_realisations, model, spaced};
+use crate::measure::profile::{
+    drawn_turbulence, efficiency_at, efficiency_by_theory, efficiency_realisations, model, spaced,
+};
 use crate::measure::progress::Observer;
 use crate::measure::streams::stream;
 use crate::plan::{Plan, Stage};
-use crate::scene::{Outside, Scene, SnrReference};
+use crate::scene::{DetectorSignal, Outside, Scene, SecondTrip, SnrReference};
 use ndarray::{Array2, ArrayView2};
+use rand_xoshiro::rand_core::Rng;
 use rayon::prelude::*;
 use std::ops::Range;
 use wakescope_optics::plan::Model;
 use wakescope_signal::digitise::Clipped;
 use wakescope_signal::efficiency::{EfficiencyTable, LayerEfficiency};
+use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::scan::{PulseKey, Sample};
 use wakescope_signal::{LineOfSight, Pulse, Record, Scan, Shot, Simulator};
 
@@ -36,6 +40,8 @@ pub struct Scanner<'a> {
     lines: Vec<LineOfSight>,
     /// What each pulse brings instead of the mean efficiency.
     efficiency: Option<LayerEfficiency>,
+    /// The air that the pulse before lights meanwhile, if the scene asks for its echo.
+    previous: Option<Vec<LineOfSight>>,
 }
 
 impl<'a> Scanner<'a> {
@@ -67,8 +73,12 @@ impl<'a> Scanner<'a> {
             time_of_first_sample_s: 2.0 * geometry.first_range_m / crate::SPEED_OF_LIGHT_M_S,
             samples: geometry.samples,
         };
-        let simulator = Simulator::new(instrument.pulse.clone(), instrument.receiver, record)?;
-        Ok(Self { scene, instrument, simulator, lines, efficiency })
+        let simulator = match scene.detector.signal {
+            DetectorSignal::IntermediateFrequency => Simulator::new(&instrument.pulse, instrument.receiver, record)?,
+            DetectorSignal::Baseband => Simulator::for_baseband(&instrument.pulse, instrument.receiver, record)?,
+        };
+        let previous = previous_air(plan, &lines)?;
+        Ok(Self { scene, instrument, simulator, lines, efficiency, previous })
     }
 
     /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
@@ -87,8 +97,14 @@ impl<'a> Scanner<'a> {
             // As many places as layers: the efficiencies were made for this line.
             let _ = efficiency.mean_into(&mut mean);
         }
-        let snr = |l: usize| receiver.slowly_varying_snr(self.scene.pulse.energy_j, line.weight_per_m[l] * mean[l]);
+        let snr = |l: usize| receiver.slowly_varying_snr(self.scene.pulse_energy_j(), line.weight_per_m[l] * mean[l]);
         (0..line.layers()).map(|l| (line.range_m(l), snr(l))).collect()
+    }
+
+    /// Whether signals are (15) and noise: no phases of the laser, reflex of the telescope or echo of the pulse before.
+    fn is_plain(&self) -> bool {
+        let front = &self.instrument.receiver.front_end;
+        front.linewidth_hz == 0.0 && front.reflection == 0.0 && self.previous.is_none()
     }
 
     /// The pulse that is sent along them.
@@ -160,7 +176,11 @@ impl<'a> Scanner<'a> {
                     observer.advance(1);
                 }
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
-                Shot { line: &self.lines[pulse / per_line], efficiency }
+                let previous = self.previous.as_ref().map(|lines| &lines[pulse / per_line]);
+                let is_plain = self.is_plain();
+                let aside_seed =
+                    if is_plain { 0 } else { stream(self.scene.seed, "asides", index(key) as u64).next_u64() };
+                Shot { line: &self.lines[pulse / per_line], efficiency, previous, aside_seed }
             },
             generator: |key| stream(self.scene.seed, "signal", index(key) as u64),
             digitiser: self.instrument.digitiser,
@@ -183,7 +203,7 @@ const PIECE_BYTES: usize = 16 << 20;
 fn layer_weights(plan: &Plan, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
     let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
-        let unit = instrument.receiver.slowly_varying_snr(scene.pulse.energy_j, 1.0);
+        let unit = instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), 1.0);
         return Ok(vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers]);
     }
     let profile = match drawn_turbulence(scene) {
@@ -200,6 +220,24 @@ fn layer_weights(plan: &Plan, observer: &dyn Observer) -> Result<Vec<f64>, Error
         Ok(instrument.return_per_m(range_m)? * eta)
     };
     geometry.layer_range_m().map(weight).collect()
+}
+
+/// The air from which the pulse before comes back at the same time, c/(2 PRF) farther away, at the ranges of the lines.
+fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfSight>>, Error> {
+    let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
+    let Some(SecondTrip { radial_velocity_m_s: elsewhere_m_s }) = scene.scan.second_trip else { return Ok(None) };
+    let apart_m = ambiguous_range_m(scene.laser.pulse_repetition_hz);
+    let ranges_m: Vec<f64> = geometry.layer_range_m().map(|range_m| range_m + apart_m).collect();
+    let (first_m, last_m) = (ranges_m[0], ranges_m[ranges_m.len() - 1]);
+    let profile = efficiency_by_theory(instrument, &spaced(first_m, last_m, 65))?;
+    let weight = |&range_m: &f64| Ok(instrument.return_per_m(range_m)? * profile.interpolated(range_m)?);
+    let weight_per_m = ranges_m.iter().map(weight).collect::<Result<Vec<_>, Error>>()?;
+    let far = |(i, line): (usize, &LineOfSight)| {
+        let mut velocity_m_s = known_velocity_m_s(plan, i, &ranges_m)?.1;
+        velocity_m_s.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = elsewhere_m_s);
+        Ok(LineOfSight { radial_velocity_m_s: velocity_m_s, weight_per_m: weight_per_m.clone(), ..line.clone() })
+    };
+    Ok(Some(lines.iter().enumerate().map(far).collect::<Result<_, Error>>()?))
 }
 
 /// Efficiencies of the layers, one set for each realisation of the turbulence, if the pulses have their own.
@@ -220,13 +258,8 @@ fn drawn_efficiency(
 pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
     let scan = &plan.scene.scene.scan;
     let elevation_rad = plan.geometry.elevation_rad[line];
-    let time_s = plan.wind.start_s + plan.geometry.line_time_s[line];
-    let (sin, cos) = elevation_rad.sin_cos();
-    let points_m: Vec<[f64; 3]> = range_m.iter().map(|r| [0.0, r * cos, scan.lidar_height_m + r * sin]).collect();
-    let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
-    let project = |((&[_, y_m, z_m], v), &range_m): ((&[f64; 3], &[f64; 3]), &f64)| {
-        let known_m_s = v[1] * cos + v[2] * sin;
+    let (points_m, known_m_s) = known_velocity_m_s(plan, line, range_m)?;
+    let checked = |((&[_, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
         let outside = match (z_m < 0.0, known_m_s.is_nan()) {
             (true, _) => scan.below_ground,
             (false, true) => scan.outside_flow,
@@ -239,5 +272,17 @@ pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> 
             Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
         }
     };
-    points_m.iter().zip(&velocity_m_s).zip(range_m).map(project).collect()
+    points_m.iter().zip(known_m_s).zip(range_m).map(checked).collect()
+}
+
+/// Places along a line of sight, m, and the radial velocity of the flow there, m/s; NaN where it is not known.
+fn known_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<(Vec<[f64; 3]>, Vec<f64>), Error> {
+    let time_s = plan.wind.start_s + plan.geometry.line_time_s[line];
+    let (sin, cos) = plan.geometry.elevation_rad[line].sin_cos();
+    let lidar_m = plan.scene.scene.scan.lidar_height_m;
+    let points_m: Vec<[f64; 3]> = range_m.iter().map(|r| [0.0, r * cos, lidar_m + r * sin]).collect();
+    let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
+    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
+    let along = velocity_m_s.iter().map(|v| v[1] * cos + v[2] * sin).collect();
+    Ok((points_m, along))
 }

@@ -133,7 +133,7 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
 }
 
 /// Puts the files of a run into their folder, where no other run may be writing.
-fn put(files: FileGroup, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+pub(crate) fn put(files: FileGroup, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
     let there = folder.exists();
     let lock = there.then(|| FolderLock::take(folder)).transpose()?;
     // Again: a file may have come while the run computed.

@@ -22,7 +22,7 @@ pub(super) fn warning(scene: &Scene, pulse: &Pulse) -> Option<String> {
         format!(
             "laser.pulse_repetition_hz = {rate_hz}: the pulses are {apart_m:.0} m of range apart, the scan reaches to \
              {farthest_m:.0} m (scan.range_max_m and the pulse): returns of several pulses overlap in a real record, which \
-             the simulated one leaves out; up to {:.0} Hz they do not",
+             the simulated one leaves out, but for one with scan.second_trip; up to {:.0} Hz they do not",
             (most_hz / digit).floor() * digit
         )
     })

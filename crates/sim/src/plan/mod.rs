@@ -14,6 +14,7 @@ use std::fmt;
 mod ambiguity;
 mod files;
 mod fit;
+mod hardware;
 mod optics;
 mod possible;
 mod rehearsal;
@@ -64,6 +65,7 @@ impl Plan {
         }
         let mut warnings = warnings(&scene.scene, &wind);
         warnings.extend(ambiguity::warning(&scene.scene, &instrument.pulse));
+        warnings.extend(hardware::warnings(&scene.scene, &instrument));
         let optics = optics::stages(&scene, &instrument, target, &geometry, &mut warnings)?;
         let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
         let plan = Self { scene, target, stages, instrument, geometry, wind, warnings };

@@ -43,7 +43,7 @@ pub(super) fn stages(
         let rest = [Stage::LinesOfSight, Stage::Signals, Stage::Noise, Stage::Estimates, Stage::Errors];
         out.extend(rest.map(|stage| skip(stage, "not asked for")));
     } else {
-        out.extend([lines_of_sight(scene, g, &n), signals(g, &n), noise(scene, &n)]);
+        out.extend([lines_of_sight(scene, g, &n), signals(scene, g, &n), noise(scene, &n)]);
         out.extend(match target {
             Target::Signal => [skip(Stage::Estimates, "not asked for"), skip(Stage::Errors, "not asked for")],
             _ => [estimates(scene, g, &n), errors(scene, g, &n)],
@@ -97,7 +97,7 @@ fn scan_bytes(g: &Geometry, n: &Sizes) -> f64 {
     air_bytes(n) + n.samples * 80.0 + n.threads * of_thread + at_once * (n.samples * n.parts * 8.0 + 64.0)
 }
 
-fn signals(g: &Geometry, n: &Sizes) -> PlannedStage {
+fn signals(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let reason = format!(
         "{} x {} records of {} samples, {} layers each",
         n.realisations, n.records, g.samples, g.layers_per_sample
@@ -105,7 +105,9 @@ fn signals(g: &Geometry, n: &Sizes) -> PlannedStage {
     let record_s = n.layers * LAYER_OF_RECORD_S + n.samples * (n.layers_per_sample * LAYER_OF_SAMPLE_S + SAMPLE_S);
     let kept =
         n.kept * n.records * n.samples * n.parts * 8.0 + if n.kept > 0.0 { n.lines * n.layers * 8.0 } else { 0.0 };
-    run(Stage::Signals, reason, n.realisations * n.records * record_s, [scan_bytes(g, n), kept])
+    // The echo of the pulse before is a record of its own, made of lines of its own.
+    let (trips, more) = if scene.scan.second_trip.is_some() { (2.0, 16.0 * n.layers * n.lines) } else { (1.0, 0.0) };
+    run(Stage::Signals, reason, n.realisations * n.records * record_s * trips, [scan_bytes(g, n) + more, kept])
 }
 
 fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {

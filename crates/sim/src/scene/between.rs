@@ -1,6 +1,6 @@
 //! Limits between the keys of a scene. Each blames a key that the file states, not the default beside it.
 
-use super::{Flow, Outside, PulseShape, Scene, Turbulence};
+use super::{DetectorSignal, Flow, Outside, PulseShape, Scene, Turbulence};
 use crate::keys::{Checker, Side};
 
 fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
@@ -50,8 +50,28 @@ impl Scene {
         }
     }
 
+    /// The detector band of two quadratures lies within the sampling frequency, and before they are made above 0.
+    fn check_band_of_quadratures(&self, c: &mut Checker<'_>) {
+        let d = &self.detector;
+        let (width_hz, most_hz) = (d.bandwidth_hz, d.sampling_hz.min(2.0 * d.intermediate_frequency_hz));
+        let why = "so that two quadratures of the sampling frequency hold the band about the intermediate one";
+        let (below, above) = (format!("below {most_hz:e} Hz, {why}"), format!("above {width_hz:e} Hz, {why}"));
+        let middle = format!("above {:e} Hz, {why}", 0.5 * width_hz);
+        let mut sides = vec![side("detector.bandwidth_hz", width_hz, below)];
+        if d.sampling_hz <= width_hz {
+            sides.push(side("detector.sampling_hz", d.sampling_hz, above));
+        }
+        if d.intermediate_frequency_hz <= 0.5 * width_hz {
+            sides.push(side("detector.intermediate_frequency_hz", d.intermediate_frequency_hz, middle));
+        }
+        c.between(width_hz < most_hz, &sides);
+    }
+
     /// The detector band lies between 0 and half the sampling frequency.
     fn check_band(&self, c: &mut Checker<'_>) {
+        if self.detector.signal == DetectorSignal::Baseband {
+            return self.check_band_of_quadratures(c);
+        }
         let d = &self.detector;
         let (centre_hz, half_hz, nyquist_hz) = (d.intermediate_frequency_hz, 0.5 * d.bandwidth_hz, 0.5 * d.sampling_hz);
         let why = "so that the detector band lies between 0 and half of detector.sampling_hz";

@@ -23,6 +23,7 @@ impl Scene {
         // TOML integers are signed 64-bit: a larger seed could not be written back.
         c.require(self.seed <= i64::MAX as u64, "seed", self.seed, format!("a whole number from 0 to {}", i64::MAX));
         self.check_instrument(&mut c);
+        self.check_receiver(&mut c);
         self.check_flow(&mut c);
         self.check_scan(&mut c);
         check_estimator(self, &mut c);

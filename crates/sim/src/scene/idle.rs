@@ -3,7 +3,7 @@
 //! They are refused, so that nobody turns a knob that turns nothing. Keys that stand in the file of `wakescope init` may stay
 //! there with their default.
 
-use super::{Method, OuterScaleWavenumber, RefractiveTurbulence, RegionRadius, Scene};
+use super::{FrontEnd, Method, OuterScaleWavenumber, RefractiveTurbulence, RegionRadius, Scene, SnrReference};
 use super::{Problem, ScreenSampling, SpectrumKind, Turbulence};
 use crate::keys::Document;
 
@@ -36,6 +36,21 @@ fn idle(scene: &Scene) -> Vec<Idle> {
     unused(own_radius, &["estimator.radius_m"], "this key is for estimator.radius.kind = \"fixed\"".into());
     let air = ["atmosphere.backscatter_per_m_sr", "atmosphere.extinction_per_m"];
     unused(scene.atmosphere.profile.is_some(), &air, "atmosphere.profile takes its place".into());
+    unused(scene.laser.amplifier.is_some(), &["pulse.energy_j"], "laser.amplifier takes its place".into());
+    let losses = ["telescope.optics_loss_db", "telescope.polarisation_loss_db", "telescope.blind_range_m"];
+    let fixed = matches!(scene.detector.snr, SnrReference::Fixed { .. });
+    unused(fixed, &losses, "detector.snr.reference = \"fixed\" asks for no optics".into());
+    if let Some(f) = &scene.detector.front_end {
+        let beside =
+            |key: &str, value: f64| format!("detector.front_end.{key} = {value} leaves nothing for it to act on");
+        let without_load = f.load_ohm.is_infinite();
+        unused(without_load, &["detector.front_end.load_temperature_k"], beside("load_ohm", f.load_ohm));
+        let quiet = f.intensity_noise_db_hz == f64::NEG_INFINITY;
+        let level = beside("intensity_noise_db_hz", f.intensity_noise_db_hz);
+        unused(quiet, &["detector.front_end.rejection_db"], level);
+        let fast = f.half_power_hz.is_infinite();
+        unused(fast, &["detector.front_end.poles"], beside("half_power_hz", f.half_power_hz));
+    }
     if let Turbulence::Refractive(turbulence) = &scene.atmosphere.turbulence {
         of_turbulence(turbulence, unused);
     }
@@ -82,6 +97,7 @@ pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
         return Vec::new();
     }
     let mut usual = Scene::default();
+    usual.detector.front_end = Some(FrontEnd::default());
     usual.atmosphere.turbulence = Turbulence::Refractive(RefractiveTurbulence::default());
     let value = |scene: &Scene, key: &str| {
         let whole = toml::Value::try_from(scene).ok()?;

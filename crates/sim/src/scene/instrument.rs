@@ -1,5 +1,6 @@
 //! The instrument of a scene: laser, pulse, detector, telescope.
 
+use super::receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, is_nothing_db, is_zero};
 use serde::{Deserialize, Serialize};
 
 section! {
@@ -9,6 +10,15 @@ section! {
         wavelength_m: f64 = 1.55e-6,
         /// Pulse repetition frequency, Hz.
         pulse_repetition_hz: f64 = 400.0,
+        /// Full width at half maximum of the Lorentzian line, Hz; 0 for none.
+        #[serde(skip_serializing_if = "is_zero")]
+        linewidth_hz: f64 = 0.0,
+        /// What sets the energy of the pulses, in place of `pulse.energy_j`.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        amplifier: Option<LaserAmplifier> = None,
+        /// The fibre of the power amplifier, for a warning of Brillouin scattering.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        fibre: Option<AmplifierFibre> = None,
     }
 }
 
@@ -101,12 +111,15 @@ section! {
         sampling_hz: f64 = 250e6,
         /// Quantum efficiency eta_Q.
         quantum_efficiency: f64 = 1.0,
-        /// Power of the local oscillator on the detector, W. The SNR does not depend on it.
+        /// Power of the local oscillator on the detector, W. The SNR depends on it only through `front_end`.
         local_oscillator_w: f64 = 1e-3,
         /// Spectrum of the shot noise.
         noise: NoiseKind = NoiseKind::Band,
         /// What the receiver delivers.
         signal: DetectorSignal = DetectorSignal::IntermediateFrequency,
+        /// What the receiver has beyond shot noise.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        front_end: Option<FrontEnd> = None,
         /// The analogue-to-digital converter.
         digitiser: Digitiser = Digitiser::None {},
         /// What sets the signal-to-noise ratio.
@@ -134,7 +147,7 @@ pub enum Digitiser {
     Quantised {
         /// Bits of a sample.
         bits: u32,
-        /// Full scale over the root mean square (13) of the shot noise in the detector band.
+        /// Full scale over the root mean square of the noise in the detector band, (13).
         full_scale_over_noise: f64,
     },
 }
@@ -181,6 +194,18 @@ section! {
         focus_m: f64 = f64::INFINITY,
         /// Whether transmitted and received light cross the same turbulence.
         receiver: ReceiverPath = ReceiverPath::Monostatic,
+        /// Loss of the optics, out and back together, dB.
+        #[serde(skip_serializing_if = "is_zero")]
+        optics_loss_db: f64 = 0.0,
+        /// Loss of light whose polarisation does not beat, dB.
+        #[serde(skip_serializing_if = "is_zero")]
+        polarisation_loss_db: f64 = 0.0,
+        /// Part of the pulse that the telescope sends straight to the detector, dB; `-inf` for none.
+        #[serde(skip_serializing_if = "is_nothing_db")]
+        reflection_db: f64 = f64::NEG_INFINITY,
+        /// Range up to which nothing is seen, because the detector recovers from the reflection, m; 0 for none.
+        #[serde(skip_serializing_if = "is_zero")]
+        blind_range_m: f64 = 0.0,
     }
 }
 

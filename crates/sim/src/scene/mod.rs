@@ -24,12 +24,15 @@ mod between;
 mod check;
 mod check_estimator;
 mod check_outputs;
+mod check_receiver;
 mod estimator;
 mod flow;
 mod format1;
 mod idle;
 mod instrument;
+mod presets;
 mod read;
+mod receiver;
 
 pub use crate::keys::{Located, Problem, SceneError};
 pub use atmosphere::{
@@ -45,7 +48,9 @@ pub use instrument::{
     BeamRadiusDefinition, Detector, DetectorSignal, Digitiser, GaussianShape, Laser, NoiseKind, Pulse, PulseDefinition,
     PulseResampling, PulseShape, ReceiverPath, SampledShape, SnrReference, Telescope,
 };
+pub use presets::{preset_names, preset_toml};
 pub use read::SceneFile;
+pub use receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, SecondTrip};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -110,6 +115,9 @@ section! {
         pulses_per_line: usize = 16,
         /// Independent repetitions of the whole scan, for the errors.
         realisations: usize = 4,
+        /// The echo of the pulse before; absent: it is long gone.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        second_trip: Option<SecondTrip> = None,
         /// What lines below the ground meet.
         below_ground: Outside = Outside::Error {},
         /// What lines that leave a simulated flow meet.

@@ -7,6 +7,7 @@
 mod cli;
 #[cfg(feature = "cli")]
 mod messages;
+mod receiver;
 mod scene_features;
 #[cfg(all(feature = "flow", feature = "netcdf"))]
 mod simulated_flow;

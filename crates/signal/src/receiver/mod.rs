@@ -1,6 +1,24 @@
 //! The receiver: what it samples, its responsivity, its noise (13) and the reference of the signal-to-noise ratio (14).
 //!
+//! | module | what is in it |
+//! |---|---|
+//! | `front_end` | [`FrontEnd`]: what a real receiver has beyond shot noise |
+//! | `penalties` | [`NoiseDensities`], [`Penalties`]: what it costs |
+//! | `converter` | [`Converter`]: noise of rounding and clipping |
+//! | [`phase_noise`] | effect of the laser's linewidth |
+//! | [`echoes`] | the telescope's own reflex, the pulse before |
+//!
 //! Check: the variance of the noise, the ratio of the two Planck conventions (2 pi), the band inside Nyquist.
+
+mod converter;
+pub mod echoes;
+mod front_end;
+mod penalties;
+pub mod phase_noise;
+
+pub use converter::{Clipping, Converter};
+pub use front_end::{Butterworth, FrontEnd};
+pub use penalties::{NoiseDensities, Penalties};
 
 use std::f64::consts::PI;
 
@@ -43,12 +61,14 @@ pub struct Receiver {
     pub bandwidth_hz: f64,
     /// Electrons per photon, `eta_Q`, above 0 and at most 1.
     pub quantum_efficiency: f64,
-    /// Power of the local oscillator \[W\]. Signal and noise scale with it alike.
+    /// Power of the local oscillator \[W\]. Signal and shot noise scale with it alike.
     pub local_oscillator_w: f64,
     /// Reference of the signal-to-noise ratio.
     pub planck: PlanckConvention,
     /// Noise added to the signal.
     pub noise: NoiseModel,
+    /// What it has beyond shot noise.
+    pub front_end: FrontEnd,
 }
 
 impl Receiver {
@@ -64,6 +84,7 @@ impl Receiver {
             local_oscillator_w: 1e-3,
             planck: PlanckConvention::H,
             noise: NoiseModel::BandLimited,
+            front_end: FrontEnd::IDEAL,
         }
     }
 
@@ -73,12 +94,37 @@ impl Receiver {
     /// [`Error::OutOfRange`] with the field that is not allowed; [`Error::BandBeyondNyquist`] if
     /// `f_c -+ B/2` is not within 0 and `F_s/2`.
     pub fn validate(&self) -> Result<(), Error> {
+        self.validate_values()?;
+        self.validate_band()
+    }
+
+    /// The same for a receiver that delivers two quadratures: its band is within `-F_s/2` and `F_s/2` about `f_c`, which lies
+    /// above half of it.
+    ///
+    /// # Errors
+    /// As [`Receiver::validate`].
+    pub fn validate_baseband(&self) -> Result<(), Error> {
+        self.validate_values()?;
+        let half_hz = 0.5 * self.bandwidth_hz;
+        let nyquist_hz = 0.5 * self.sample_rate_hz;
+        if half_hz >= nyquist_hz || half_hz > self.intermediate_frequency_hz {
+            return Err(Error::BandBeyondNyquist { low_hz: -half_hz, high_hz: half_hz, nyquist_hz });
+        }
+        Ok(())
+    }
+
+    fn validate_values(&self) -> Result<(), Error> {
         check_positive("wavelength_m", self.wavelength_m)?;
         check_positive("sample_rate_hz", self.sample_rate_hz)?;
         check_positive("intermediate_frequency_hz", self.intermediate_frequency_hz)?;
         check_positive("bandwidth_hz", self.bandwidth_hz)?;
         check("quantum_efficiency", self.quantum_efficiency, "above 0 and at most 1", |q| q > 0.0 && q <= 1.0)?;
         check_positive("local_oscillator_w", self.local_oscillator_w)?;
+        self.front_end.validate()
+    }
+
+    /// Whether a real current holds the band.
+    pub(crate) fn validate_band(&self) -> Result<(), Error> {
         let low_hz = self.intermediate_frequency_hz - 0.5 * self.bandwidth_hz;
         let high_hz = self.intermediate_frequency_hz + 0.5 * self.bandwidth_hz;
         let nyquist_hz = 0.5 * self.sample_rate_hz;
@@ -98,32 +144,38 @@ impl Receiver {
         self.quantum_efficiency * ELEMENTARY_CHARGE_C / self.photon_energy_j()
     }
 
-    /// Variance of the shot noise in the detector band, `2 e S P_LO B`, (13) \[A^2\], whatever the noise model.
+    /// Variance of the noise in the detector band before the converter \[A^2\], `2 e S P_LO B`, (13), where there is only shot
+    /// noise; whatever the noise model.
     pub fn noise_variance_a2(&self) -> f64 {
         self.noise_density_a2_hz() * self.bandwidth_hz
     }
 
-    /// One-sided density of the shot noise, `2 e S P_LO` \[A^2/Hz\].
+    /// One-sided density of the noise before the converter, `2 e S P_LO` where there is only shot noise \[A^2/Hz\].
     pub fn noise_density_a2_hz(&self) -> f64 {
-        2.0 * ELEMENTARY_CHARGE_C * self.responsivity_a_w() * self.local_oscillator_w
+        self.noise_densities().total_a2_hz()
+    }
+
+    /// Variance of the noise that the signal-to-noise ratio counts: with that of the converter.
+    pub(crate) fn snr_noise_a2(&self) -> f64 {
+        self.noise_variance_a2() * (1.0 + self.front_end.rounding_noise + self.front_end.clipping_noise)
     }
 
     /// Power of the complex envelope per joule sent and per unit of returned fraction and `|f|^2`,
     /// `2 S^2 P_LO` \[A^2/W\], from (10), (11), (15), corrected by a further `sqrt 2` so that (14) holds; times `2 pi` with
-    /// [`PlanckConvention::Hbar`].
+    /// [`PlanckConvention::Hbar`], and what a saturated or slow detector leaves of it.
     pub fn heterodyne_gain_a2_w(&self) -> f64 {
         let responsivity = self.responsivity_a_w();
         let convention = match self.planck {
             PlanckConvention::H => 1.0,
             PlanckConvention::Hbar => 2.0 * PI,
         };
-        2.0 * responsivity * responsivity * self.local_oscillator_w * convention
+        2.0 * responsivity * responsivity * self.local_oscillator_w * convention * self.beat_gain()
     }
 
     /// Signal-to-noise ratio of a pulse of `energy_j` where the return `weight_per_m` changes slowly over the pulse:
     /// `(eta_Q E_t/(h nu B)) (c/2) weight`, (14), corrected (with `hbar` if the convention says so).
     pub fn slowly_varying_snr(&self, energy_j: f64, weight_per_m: f64) -> f64 {
-        self.heterodyne_gain_a2_w() * energy_j * 0.5 * SPEED_OF_LIGHT_M_S * weight_per_m / self.noise_variance_a2()
+        self.heterodyne_gain_a2_w() * energy_j * 0.5 * SPEED_OF_LIGHT_M_S * weight_per_m / self.snr_noise_a2()
     }
 }
 

@@ -1,0 +1,63 @@
+//! What a signal holds beside (15): phases of a laser of finite linewidth, the reflex of the telescope, the echo of the pulse
+//! before. Nothing of it is computed where it is off, and its random numbers are a stream of their own.
+//!
+//! Check: speckle and noise keep their numbers; power of the reflex and of the echo; velocities of a point target.
+
+use std::f64::consts::PI;
+
+use num_complex::Complex;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::heterodyne::draw_speckle;
+use crate::receiver::phase_noise::walk;
+use crate::{Error, Scratch, Shot, Simulator};
+
+impl Simulator {
+    /// Whether the envelope of a shot is (15) and nothing else.
+    pub(crate) fn is_plain(&self, shot: &Shot<'_>) -> bool {
+        let front = &self.receiver().front_end;
+        front.linewidth_hz == 0.0 && front.reflection == 0.0 && shot.previous.is_none()
+    }
+
+    /// The sum (15) with all that stands beside it, of a shot that is valid.
+    ///
+    /// Draws from the stream of the shot's own seed: phases of the local oscillator over the record and of the pulse, the phase of
+    /// the reflex, phases and speckle of the pulse before.
+    pub(crate) fn sum_with_asides_into(
+        &self,
+        shot: Shot<'_>,
+        speckle: &[Complex<f64>],
+        scratch: &mut Scratch,
+        out_a: &mut [Complex<f64>],
+    ) -> Result<(), Error> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(shot.aside_seed);
+        let front = self.receiver().front_end;
+        let thickness_m = shot.line.layer_thickness_m;
+        let mut oscillator = vec![Complex::ONE; out_a.len()];
+        walk(front.linewidth_hz, 1.0 / self.receiver().sample_rate_hz, &mut rng, &mut oscillator);
+        self.prepare(shot.line, scratch)?;
+        scratch.window.draw_phases(self.pulse(), thickness_m, front.linewidth_hz, &mut rng);
+        self.sum_prepared_into(shot, speckle, scratch, out_a)?;
+        let reflex_rad = 2.0 * PI * rng.random::<f64>();
+        if front.reflection > 0.0 {
+            let gain = self.receiver().heterodyne_gain_a2_w() * self.pulse().energy_j() * front.reflection;
+            let amplitude = Complex::from_polar(gain.sqrt(), reflex_rad);
+            for (k, out) in out_a.iter_mut().enumerate() {
+                let time_s = self.time_s(k);
+                let turn = scratch.window.turn_at(thickness_m, time_s);
+                *out += amplitude * turn * self.pulse().envelope_per_sqrt_s(time_s);
+            }
+        }
+        if let Some(previous) = shot.previous {
+            self.prepare(previous, scratch)?;
+            scratch.window.draw_phases(self.pulse(), previous.layer_thickness_m, front.linewidth_hz, &mut rng);
+            let (mut speckle, mut echo) = (Vec::new(), vec![Complex::ZERO; out_a.len()]);
+            draw_speckle(previous.layers(), &mut rng, &mut speckle);
+            self.sum_prepared_into(Shot::from(previous), &speckle, scratch, &mut echo)?;
+            out_a.iter_mut().zip(&echo).for_each(|(out, echo)| *out += echo);
+        }
+        out_a.iter_mut().zip(&oscillator).for_each(|(out, turn)| *out *= turn.conj());
+        Ok(())
+    }
+}

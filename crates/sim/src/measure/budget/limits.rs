@@ -1,0 +1,181 @@
+//! What bounds an instrument beside its signal-to-noise ratio: power, ranges, velocities, phase noise, local oscillator, resolution.
+
+use super::digits::{digits, si};
+use crate::measure::estimators;
+use crate::measure::instrument::Instrument;
+use crate::plan::Plan;
+use crate::scene::{DetectorSignal, Weighting};
+use crate::{Error, SPEED_OF_LIGHT_M_S};
+use wakescope_signal::constants::ELEMENTARY_CHARGE_C;
+use wakescope_signal::receiver::echoes::ambiguous_range_m;
+use wakescope_signal::receiver::phase_noise::{mean_frequency_sd_m_s, peak_variance_factor};
+use wakescope_signal::{Pulse, RangeFilter};
+
+/// Signal-to-noise ratio below which the telescope's reflex does no harm, -20 dB.
+const HARMLESS_SNR: f64 = 0.01;
+
+/// Numbers and words of what bounds an instrument.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Names with units, and values.
+    pub values: Vec<(&'static str, f64)>,
+    /// The same for people.
+    pub lines: Vec<String>,
+}
+
+impl Limits {
+    /// The limits of a planned scene.
+    ///
+    /// # Errors
+    /// What estimators and signals refuse; a checked scene gives none.
+    pub fn new(plan: &Plan) -> Result<Self, Error> {
+        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
+        let (receiver, pulse, d) = (&instrument.receiver, &instrument.pulse, &scene.detector);
+        let mut found = Self { values: Vec::new(), lines: Vec::new() };
+        let mean_w = scene.pulse_energy_j() * scene.laser.pulse_repetition_hz;
+        let peak_w = instrument.peak_power_w();
+        let mut power = format!("mean power {}, peak {}", si(mean_w, "W"), si(peak_w, "W"));
+        found.values.extend([("mean_power_w", mean_w), ("peak_power_w", peak_w)]);
+        if let Some(fibre) = &scene.laser.fibre {
+            let threshold_w = fibre.of_silica().brillouin_threshold_w(instrument.gaussian_fwhm_s());
+            found.values.push(("brillouin_threshold_w", threshold_w));
+            power += &format!(
+                "; Brillouin threshold of {} um^2 x {}: {}",
+                digits(fibre.effective_area_m2 * 1e12),
+                si(fibre.length_m, "m"),
+                si(threshold_w, "W")
+            );
+            if peak_w > threshold_w {
+                power += &format!(" -> WARNING {:.1} times above", peak_w / threshold_w);
+            }
+        }
+        found.lines.push(power);
+        let apart_m = ambiguous_range_m(scene.laser.pulse_repetition_hz);
+        let blind_m = 0.5 * SPEED_OF_LIGHT_M_S * receiver.blind_time_s(pulse, HARMLESS_SNR);
+        found.values.extend([("reflex_range_m", blind_m), ("ambiguous_range_m", apart_m)]);
+        let mut blind = Vec::new();
+        if receiver.front_end.reflection > 0.0 {
+            let reflection_db = scene.telescope.reflection_db;
+            blind.push(format!("blind to {} (reflection {reflection_db} dB, until -20 dB)", si(blind_m, "m")));
+        }
+        if instrument.blind_range_m > 0.0 {
+            blind.push(format!("blind to {} (key blind_range_m)", si(instrument.blind_range_m, "m")));
+        }
+        blind.push(format!("ambiguous from {}", si(apart_m, "m")));
+        found.lines.push(format!("range: {}", blind.join("; ")));
+        found.velocities(plan);
+        if scene.laser.linewidth_hz > 0.0 {
+            found.phase_noise(plan)?;
+        }
+        let n = receiver.noise_densities();
+        let mut oscillator = vec![format!("local oscillator {}", si(d.local_oscillator_w, "W"))];
+        if n.amplifier_a2_hz > 0.0 {
+            let equal_w = equal_to_shot_w(instrument, n.amplifier_a2_hz);
+            found.values.push(("amplifier_equals_shot_w", equal_w));
+            oscillator.push(format!("amplifier noise equals shot noise at {}", si(equal_w, "W")));
+        }
+        if n.intensity_a2_hz > 0.0 {
+            let equal_w = d.local_oscillator_w * n.shot_a2_hz / n.intensity_a2_hz;
+            found.values.push(("intensity_equals_shot_w", equal_w));
+            oscillator.push(format!("intensity noise equals it at {}", si(equal_w, "W")));
+        }
+        let best_w = receiver.best_local_oscillator_w();
+        if best_w > 0.0 && best_w.is_finite() {
+            found.values.push(("best_local_oscillator_w", best_w));
+            oscillator.push(format!("best at {}", si(best_w, "W")));
+        }
+        let (first, rest) = oscillator.split_at(1);
+        let rest = if rest.is_empty() { "shot noise alone".into() } else { rest.join("; ") };
+        found.lines.push(format!("{}: {rest}", first.concat()));
+        found.resolution(plan)?;
+        Ok(found)
+    }
+
+    fn velocities(&mut self, plan: &Plan) {
+        let (d, half_m) = (&plan.scene.scene.detector, 0.5 * plan.scene.scene.laser.wavelength_m);
+        let band_m_s = 0.5 * half_m * d.bandwidth_hz;
+        let (low_m_s, high_m_s) = match d.signal {
+            DetectorSignal::IntermediateFrequency => {
+                let highest_m_s = half_m * d.intermediate_frequency_hz;
+                (highest_m_s - 0.5 * half_m * d.sampling_hz, highest_m_s)
+            }
+            DetectorSignal::Baseband => (-0.5 * half_m * d.sampling_hz, 0.5 * half_m * d.sampling_hz),
+        };
+        let flow_m_s = plan.wind.max_speed_m_s;
+        self.values.extend([("band_m_s", band_m_s), ("sampled_from_m_s", low_m_s), ("sampled_to_m_s", high_m_s)]);
+        self.lines.push(format!(
+            "velocity: band +-{band_m_s:.1} m/s; sampled {low_m_s:+.1} to {high_m_s:+.1} m/s; flow reaches {flow_m_s:.0} m/s"
+        ));
+    }
+
+    fn phase_noise(&mut self, plan: &Plan) -> Result<(), Error> {
+        let scene = &plan.scene.scene;
+        let (wavelength_m, linewidth_hz) = (scene.laser.wavelength_m, scene.laser.linewidth_hz);
+        let window_s = scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
+        let delay_s = 2.0 * scene.scan.range_min_m / SPEED_OF_LIGHT_M_S;
+        let mean_m_s = mean_frequency_sd_m_s(wavelength_m, linewidth_hz, delay_s, window_s);
+        /// Places of the window between which its weights are joined by straight lines.
+        const PLACES: usize = 1000;
+        let weights = estimators::weighting(scene).weights(PLACES)?;
+        let at = |s: f64| weights[(((s + 0.5) * PLACES as f64) as usize).min(PLACES - 1)];
+        let peak_m_s = mean_m_s * peak_variance_factor(at).sqrt();
+        let spectrum_m_s = 0.5 * wavelength_m * plan.instrument.pulse.spectral_width_hz();
+        self.values.extend([("phase_noise_m_s", mean_m_s), ("phase_noise_of_peak_m_s", peak_m_s)]);
+        self.lines.push(format!(
+            "linewidth {}: {mean_m_s:.3} m/s a window, its peak {peak_m_s:.3} m/s (spectrum of one pulse {spectrum_m_s:.2} m/s)",
+            si(linewidth_hz, "Hz")
+        ));
+        Ok(())
+    }
+
+    fn resolution(&mut self, plan: &Plan) -> Result<(), Error> {
+        let scene = &plan.scene.scene;
+        let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+        let (pulse, thickness_m) = (&plan.instrument.pulse, plan.geometry.layer_thickness_m);
+        let gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, thickness_m)?;
+        let reach_m = window.len() as f64 * scene.sample_spacing_m() + pulse_length_m(pulse);
+        let gate_m = full_width_m(|offset_m| gate.weight_per_m(offset_m), reach_m);
+        let pulse_m = full_width_m(|offset_m| pulse.range_weight_per_m(offset_m), pulse_length_m(pulse));
+        let weighting = match scene.estimator.weighting {
+            Weighting::Gaussian => "Gaussian",
+            Weighting::Rectangular => "rectangular",
+            Weighting::Hann => "Hann",
+        };
+        self.values.extend([("pulse_resolution_m", pulse_m), ("gate_resolution_m", gate_m)]);
+        self.lines.push(format!(
+            "resolution: pulse {pulse_m:.1} m, gate (pulse and {weighting} window of {}) {gate_m:.1} m, full width at half maximum",
+            window.len()
+        ));
+        Ok(())
+    }
+}
+
+fn pulse_length_m(pulse: &Pulse) -> f64 {
+    let (first_s, last_s) = pulse.support_s();
+    0.5 * SPEED_OF_LIGHT_M_S * (last_s - first_s)
+}
+
+/// Full width at half maximum of a weight within some reach of 0, m.
+fn full_width_m(weight: impl Fn(f64) -> f64, reach_m: f64) -> f64 {
+    const STEPS: i32 = 1000;
+    let step_m = reach_m / f64::from(STEPS);
+    let values: Vec<f64> = (-STEPS..=STEPS).map(|i| weight(f64::from(i) * step_m)).collect();
+    let half = 0.5 * values.iter().copied().fold(0.0, f64::max);
+    let above = |(_, value): &(usize, &f64)| **value >= half;
+    let (Some((first, _)), Some((last, _))) =
+        (values.iter().enumerate().find(above), values.iter().enumerate().rfind(above))
+    else {
+        return 0.0;
+    };
+    // Between an end of the width and its neighbour outside, by a straight line.
+    let beyond = |at: usize, outside: Option<&f64>| {
+        outside.map_or(0.0, |outside| (values[at] - half) / (values[at] - outside).max(f64::MIN_POSITIVE))
+    };
+    let before = first.checked_sub(1).and_then(|i| values.get(i));
+    step_m * ((last - first) as f64 + beyond(first, before) + beyond(last, values.get(last + 1)))
+}
+
+/// Power of a local oscillator at which shot noise equals a noise that does not depend on it, W.
+fn equal_to_shot_w(instrument: &Instrument, density_a2_hz: f64) -> f64 {
+    density_a2_hz / (2.0 * ELEMENTARY_CHARGE_C * instrument.receiver.responsivity_a_w())
+}

@@ -1,0 +1,404 @@
+//! The power budget: from the photons of a pulse to the signal-to-noise ratio (14) at some ranges, factor by factor in decibels.
+//!
+//! Check: the rows sum to the signal-to-noise ratio of the profile for every telescope, air and receiver; the stored budget of
+//! Table 2.
+
+mod digits;
+mod limits;
+mod text;
+
+pub use limits::Limits;
+
+use crate::Error;
+use crate::measure::instrument::Instrument;
+use crate::measure::profile::{efficiency_at, efficiency_by_theory, free_space, model, spaced, turbulence};
+use crate::measure::progress::Observer;
+use crate::plan::Plan;
+use crate::scene::{Digitiser, FrontEnd, Scene, SnrReference};
+use digits::{scientific, si};
+use std::f64::consts::{LN_2, PI};
+
+use wakescope_optics::EfficiencyProfile;
+use wakescope_optics::plan::Model;
+use wakescope_signal::receiver::echoes::ambiguous_range_m;
+
+/// One factor of the signal-to-noise ratio, or one of its sums.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// What it is; sums begin with an equals sign.
+    pub name: &'static str,
+    /// The factor as a formula.
+    pub symbol: &'static str,
+    /// What it comes from, for people.
+    pub value: String,
+    /// Of each range, dB.
+    pub db: Vec<f64>,
+}
+
+/// The budget of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// Ranges, m.
+    pub range_m: Vec<f64>,
+    /// Factors, each sum below what it sums.
+    pub rows: Vec<Row>,
+    /// What bounds the instrument.
+    pub limits: Limits,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Name of the row of the signal-to-noise ratio.
+pub const TOTAL: &str = "= SNR in the band";
+
+/// The ranges of a scan at which a budget is of use, m: first, middle, last.
+pub fn scan_ranges_m(scene: &Scene) -> Vec<f64> {
+    let (first_m, last_m) = (scene.scan.range_min_m, scene.scan.range_max_m);
+    vec![first_m, 0.5 * (first_m + last_m), last_m]
+}
+
+impl Budget {
+    /// The budget of a planned scene at some ranges, m; through turbulence that both beams share it runs the phase screens of
+    /// the profile.
+    ///
+    /// # Errors
+    /// What the optics refuse, such as a range beyond the profile in turbulence.
+    pub fn new(plan: &Plan, range_m: &[f64], observer: &dyn Observer) -> Result<Self, Error> {
+        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
+        let mut rows = match model(scene) {
+            Model::MonteCarlo if !matches!(scene.detector.snr, SnrReference::Fixed { .. }) => {
+                let o = &scene.outputs;
+                let table_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
+                let efficiency = efficiency_at(scene, instrument, &table_m, observer)?;
+                Rows::new(plan, range_m, |_| Ok(efficiency))?
+            }
+            _ => Rows::new(plan, range_m, |sorted_m| efficiency_by_theory(instrument, sorted_m))?,
+        };
+        rows.beside_the_ratio(scene, instrument, range_m)?;
+        let limits = Limits::new(plan)?;
+        Ok(Self { range_m: range_m.to_vec(), rows: rows.rows, limits, warnings: plan.warnings.clone() })
+    }
+
+    /// The signal-to-noise ratio in the detector band at each range, dB.
+    pub fn snr_db(&self) -> &[f64] {
+        snr_db(&self.rows)
+    }
+}
+
+/// The signal-to-noise ratio of a planned scene at some ranges, dB, without phase screens: in turbulence that of independent paths.
+///
+/// # Errors
+/// What the optics refuse.
+pub fn snr_without_screens_db(plan: &Plan, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+    let rows = Rows::new(plan, range_m, |sorted_m| efficiency_by_theory(&plan.instrument, sorted_m))?;
+    Ok(snr_db(&rows.rows).to_vec())
+}
+
+fn snr_db(rows: &[Row]) -> &[f64] {
+    rows.iter().find(|row| row.name == TOTAL).map_or(&[], |row| &row.db)
+}
+
+fn increasing(range_m: &[f64]) -> Vec<f64> {
+    let mut sorted = range_m.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
+    sorted
+}
+
+fn decibels(ratio: f64) -> f64 {
+    10.0 * ratio.log10()
+}
+
+/// Rows under construction.
+struct Rows {
+    rows: Vec<Row>,
+    ranges: usize,
+}
+
+impl Rows {
+    /// All that the signal-to-noise ratio is made of; `efficiency` is asked for increasing ranges, if the scene needs any.
+    fn new(
+        plan: &Plan,
+        range_m: &[f64],
+        efficiency: impl FnOnce(&[f64]) -> Result<EfficiencyProfile, Error>,
+    ) -> Result<Self, Error> {
+        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
+        let mut rows = Self { rows: Vec::new(), ranges: range_m.len() };
+        match scene.detector.snr {
+            SnrReference::Fixed { snr_db } => rows.same("stated by the scene", "", "detector.snr".into(), snr_db),
+            _ => {
+                let efficiency = efficiency(&increasing(range_m))?;
+                transmitter_and_path(&mut rows, scene, instrument, range_m, &efficiency)?;
+                rows.sum("= shot-noise limit", "(14)", "(14)".into());
+                receiver(&mut rows, scene, instrument);
+            }
+        }
+        rows.sum(TOTAL, "", "one pulse".into());
+        Ok(rows)
+    }
+
+    /// The ratio in the width of the pulse, and the echo of the pulse before.
+    fn beside_the_ratio(&mut self, scene: &Scene, instrument: &Instrument, range_m: &[f64]) -> Result<(), Error> {
+        let width_hz = 2.0 * (2.0 * LN_2).sqrt() * instrument.pulse.spectral_width_hz();
+        let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
+        let fwhm_s = instrument.gaussian_fwhm_s();
+        // Of a Gaussian without chirp the product is 2 ln 2/pi.
+        let value = match (width_hz * fwhm_s * PI - 2.0 * LN_2).abs() < 1e-9 {
+            true => format!("0.44/{} = {}", si(fwhm_s, "s"), si(width_hz, "Hz")),
+            false => si(width_hz, "Hz"),
+        };
+        let wide = self.sums().iter().map(|db| db + gain_db).collect();
+        self.push("= in the width of the pulse", "", value, wide);
+        if scene.scan.second_trip.is_some() {
+            let echoes = range_m.iter().map(|&range_m| second_trip_db(scene, instrument, range_m));
+            let echoes = echoes.collect::<Result<Vec<_>, _>>()?;
+            let value = format!("from {} farther", si(ambiguous_range_m(scene.laser.pulse_repetition_hz), "m"));
+            self.push("= pulse before over echo", "", value, echoes);
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, name: &'static str, symbol: &'static str, value: String, db: Vec<f64>) {
+        self.rows.push(Row { name, symbol, value, db });
+    }
+
+    /// A factor that is the same at every range.
+    fn same(&mut self, name: &'static str, symbol: &'static str, value: String, db: f64) {
+        self.push(name, symbol, value, vec![db; self.ranges]);
+    }
+
+    /// A factor that a scene need not have.
+    fn optional(&mut self, is_there: bool, name: &'static str, symbol: &'static str, value: String, db: f64) {
+        if is_there {
+            self.same(name, symbol, value, db);
+        }
+    }
+
+    fn sums(&self) -> Vec<f64> {
+        let factors = self.rows.iter().filter(|row| !row.name.starts_with('='));
+        factors.fold(vec![0.0; self.ranges], |sums, row| sums.iter().zip(&row.db).map(|(a, b)| a + b).collect())
+    }
+
+    fn sum(&mut self, name: &'static str, symbol: &'static str, value: String) {
+        let db = self.sums();
+        self.push(name, symbol, value, db);
+    }
+}
+
+/// From the photons of the pulse to the electrons that it gives.
+fn transmitter_and_path(
+    rows: &mut Rows,
+    scene: &Scene,
+    instrument: &Instrument,
+    range_m: &[f64],
+    efficiency: &EfficiencyProfile,
+) -> Result<(), Error> {
+    let (telescope, receiver, t) = (&instrument.telescope, &instrument.receiver, &scene.telescope);
+    let (energy_j, photon_j) = (scene.pulse_energy_j(), receiver.photon_energy_j());
+    let by_range = |of: &dyn Fn(f64) -> Result<f64, Error>| -> Result<Vec<f64>, Error> {
+        range_m.iter().map(|&r| Ok(decibels(of(r)?))).collect()
+    };
+    let area_m2 = instrument.snr.aperture_area_m2;
+    let solid_angle = |r: f64| area_m2 / (r * r);
+    let sent = format!("{} / {photon_j:.2e} J", si(energy_j, "J"));
+    rows.same("photons sent", "E/(h nu)", sent, decibels(energy_j / photon_j));
+    let printed = scene.detector.snr == SnrReference::Chapter {};
+    rows.optional(printed, "hbar for h", "2 pi", "as the chapter prints (14)".into(), decibels(2.0 * PI));
+    let bandwidth_hz = receiver.bandwidth_hz;
+    rows.same("per bandwidth", "1/B", si(bandwidth_hz, "Hz"), -decibels(bandwidth_hz));
+    rows.same("range per time", "c/2", "c/2".into(), decibels(0.5 * crate::SPEED_OF_LIGHT_M_S));
+    let profile = || "profile".to_owned();
+    let (air, beta) = (scene.atmosphere.profile.as_ref(), scene.atmosphere.backscatter_per_m_sr);
+    let backscatter = by_range(&|r| {
+        let clear = Instrument { blind_range_m: 0.0, transmission: 1.0, ..instrument.clone() };
+        Ok(clear.return_per_m(r)? / (instrument.air_transmission(r)?.powi(2) * solid_angle(r)))
+    })?;
+    let value = air.map_or_else(|| format!("{} /(m sr)", scientific(beta)), |_| profile());
+    rows.push("backscatter", "beta", value, backscatter);
+    let value = format!("A_R/R^2, aperture {}", si(2.0 * telescope.aperture_radius_m, "m"));
+    rows.push("solid angle", "A_R/R^2", value, by_range(&|r| Ok(solid_angle(r)))?);
+    let value = air.map_or_else(|| format!("{} /m", scientific(scene.atmosphere.extinction_per_m)), |_| profile());
+    rows.push("air, out and back", "K^2", value, by_range(&|r| Ok(instrument.air_transmission(r)?.powi(2)))?);
+    let passed = telescope.transmitted_fraction();
+    rows.same("truncation, two beams", "T^2", format!("T = {passed:.4}"), 2.0 * decibels(passed));
+    let empty = free_space(instrument, &increasing(range_m))?;
+    let antenna = by_range(&|r| Ok(empty.interpolated(r)? / passed.powi(2)))?;
+    rows.push("antenna efficiency", "eta_a", "free space".into(), antenna);
+    if let Some(air) = turbulence(scene) {
+        let value = format!("Cn2 {} m^(-2/3)", scientific(air.cn2_m_m23));
+        let left = by_range(&|r| Ok(efficiency.interpolated(r)? / empty.interpolated(r)?))?;
+        rows.push("turbulence", "eta_s/eta_s(0)", value, left);
+    }
+    let lost = |db: f64| if db == 0.0 { 0.0 } else { -db };
+    rows.same("optics", "both ways", "key optics_loss_db".into(), lost(t.optics_loss_db));
+    rows.same("polarisation", "", "key polarisation_loss_db".into(), lost(t.polarisation_loss_db));
+    let efficiency = receiver.quantum_efficiency;
+    rows.same("quantum efficiency", "eta_Q", format!("{efficiency:.2}"), decibels(efficiency));
+    if range_m.iter().any(|r| *r < t.blind_range_m) {
+        let seen = by_range(&|r| Ok(f64::from(u8::from(r >= t.blind_range_m))))?;
+        rows.push("blind range", "", format!("to {}", si(t.blind_range_m, "m")), seen);
+    }
+    Ok(())
+}
+
+/// What the receiver loses against the shot-noise limit.
+fn receiver(rows: &mut Rows, scene: &Scene, instrument: &Instrument) {
+    let (receiver, front) = (&instrument.receiver, scene.detector.front_end.unwrap_or_default());
+    let (lost, n) = (receiver.penalties(), receiver.noise_densities());
+    let FrontEnd { saturation_w, half_power_hz, dark_current_a, intensity_noise_db_hz, rejection_db, .. } = front;
+    let off = || "none".to_owned();
+    let value = format!("{} of {}", si(receiver.local_oscillator_w, "W"), si(saturation_w, "W"));
+    rows.optional(saturation_w.is_finite(), "saturation", "(1 + P/Ps)^-3", value, -lost.saturation_db);
+    let value = match n.amplifier_a2_hz > 0.0 {
+        true => format!(
+            "{}: {:.1e} of shot {:.1e}",
+            si(n.amplifier_a2_hz.sqrt(), "A/rtHz"),
+            n.amplifier_a2_hz,
+            n.shot_a2_hz
+        ),
+        false => off(),
+    };
+    rows.same("amplifier noise", "", value, -lost.amplifier_db);
+    let value = if dark_current_a > 0.0 { si(dark_current_a, "A") } else { off() };
+    rows.same("dark current", "", value, -lost.dark_db);
+    let value = match n.intensity_a2_hz > 0.0 {
+        true => format!("{intensity_noise_db_hz} dB/Hz, {rejection_db} dB rejected"),
+        false => off(),
+    };
+    rows.same("intensity noise of the LO", "", value, -lost.intensity_db);
+    let value = format!("half power at {}", si(half_power_hz, "Hz"));
+    rows.optional(half_power_hz.is_finite(), "response of the detector", "|H|^2", value, -lost.response_db);
+    let (value, is_clipped) = match scene.detector.digitiser {
+        Digitiser::None {} => (off(), false),
+        Digitiser::Quantised { bits, full_scale_over_noise: k } => {
+            (format!("{bits} bits, {k} x noise"), lost.clipping_db > 0.0)
+        }
+    };
+    rows.same("converter", "", value, -lost.rounding_db);
+    rows.optional(is_clipped, "clipping", "", "beyond full scale".into(), -lost.clipping_db);
+}
+
+/// Echo of the pulse before over that of the last, dB.
+fn second_trip_db(scene: &Scene, instrument: &Instrument, range_m: f64) -> Result<f64, Error> {
+    let far_m = range_m + ambiguous_range_m(scene.laser.pulse_repetition_hz);
+    let efficiency = efficiency_by_theory(instrument, &[range_m, far_m])?;
+    let power = |r: f64| Ok::<_, Error>(instrument.return_per_m(r)? * efficiency.interpolated(r)?);
+    Ok(decibels(power(far_m)? / power(range_m)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::profile::range_profile;
+    use crate::measure::progress::Silent;
+    use crate::plan::Target;
+    use crate::scene::{ReceiverPath, RefractiveTurbulence, SceneFile, SecondTrip, Turbulence};
+
+    fn budget(text: &str, range_m: &[f64]) -> Budget {
+        let file = SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap();
+        Budget::new(&Plan::new(file, Target::Efficiency).unwrap(), range_m, &Silent).unwrap()
+    }
+
+    const REAL: &str = "[laser]\nlinewidth_hz = 1e3\nfibre = { effective_area_m2 = 3e-10, length_m = 2.0 }\n\
+        [telescope]\noptics_loss_db = 2.0\npolarisation_loss_db = 0.2\nreflection_db = -60.0\n\
+        [detector]\nquantum_efficiency = 0.8\ndigitiser = { kind = \"quantised\", bits = 8, full_scale_over_noise = 8.0 }\n\
+        [detector.front_end]\namplifier_noise_a_rthz = 10e-12\ndark_current_a = 5e-9\n\
+        intensity_noise_db_hz = -155.0\nrejection_db = 25.0\n";
+
+    #[test]
+    fn rows_of_table_2_and_of_a_real_receiver_are_the_stored_ones() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/receiver/budget.csv");
+        let stored = std::fs::read_to_string(path).unwrap();
+        for (case, text) in [("table2,", ""), ("table2_real,", REAL)] {
+            let found = budget(text, &[400.0]);
+            let expected: Vec<f64> = stored
+                .lines()
+                .filter(|line| line.starts_with(case))
+                .map(|line| line.rsplit(',').next().unwrap().parse().unwrap())
+                .collect();
+            assert_eq!(expected.len(), 17);
+            for (row, expected) in found.rows.iter().zip(expected) {
+                assert!((row.db[0] - expected).abs() < 1e-6, "{}: {} {expected}", row.name, row.db[0]);
+            }
+        }
+    }
+
+    /// Turbulence with screens that take no time.
+    fn coarse() -> Turbulence {
+        Turbulence::Refractive(RefractiveTurbulence {
+            grid_points: 128,
+            grid_spacing_m: 4e-3,
+            layers: 4,
+            realisations: 5,
+            ..RefractiveTurbulence::default()
+        })
+    }
+
+    #[test]
+    fn rows_sum_to_the_profile_for_every_telescope_air_and_receiver() {
+        type Change = fn(&mut Scene);
+        let changes: [Change; 9] = [
+            |s| s.telescope.focus_m = 500.0,
+            |s| s.telescope.obscuration_radius_m = 0.01,
+            |s| s.detector.snr = SnrReference::Chapter {},
+            |s| s.detector.snr = SnrReference::Fixed { snr_db: 3.0 },
+            |s| s.telescope.blind_range_m = 250.0,
+            |s| (s.telescope.receiver, s.atmosphere.turbulence) = (ReceiverPath::Bistatic, coarse()),
+            |s| s.atmosphere.turbulence = coarse(),
+            |s| {
+                let front_end = FrontEnd {
+                    saturation_w: 4e-3,
+                    half_power_hz: 90e6,
+                    poles: 2,
+                    load_ohm: 50.0,
+                    ..Default::default()
+                };
+                s.detector.front_end = Some(front_end);
+                s.detector.digitiser = Digitiser::Quantised { bits: 5, full_scale_over_noise: 1.5 };
+                s.scan.second_trip = Some(SecondTrip::default());
+            },
+            |s| {
+                s.atmosphere.profile = Some(crate::scene::AirProfile {
+                    range_m: vec![0.0, 300.0, 900.0],
+                    backscatter_per_m_sr: vec![2e-7, 1e-7, 4e-7],
+                    extinction_per_m: vec![1e-4, 5e-5, 2e-4],
+                });
+            },
+        ];
+        for (i, change) in changes.into_iter().enumerate() {
+            let mut scene = Scene::default();
+            (scene.outputs.profile_range_min_m, scene.outputs.profile_range_max_m) = (200.0, 600.0);
+            scene.outputs.profile_points = 3;
+            change(&mut scene);
+            let plan = Plan::new(SceneFile::new(scene.clone()).unwrap(), Target::Efficiency).unwrap();
+            let profile = range_profile(&scene, &plan.instrument, &Silent).unwrap();
+            let found = Budget::new(&plan, &profile.efficiency.range_m, &Silent).unwrap();
+            let sums: Vec<f64> = (0..3)
+                .map(|at| found.rows.iter().filter(|row| !row.name.starts_with('=')).map(|row| row.db[at]).sum())
+                .collect();
+            for (at, snr_db) in profile.snr_db.iter().enumerate() {
+                let close = |sum: f64| sum == *snr_db || (sum - snr_db).abs() < 1e-9;
+                assert!(close(sums[at]) && close(found.snr_db()[at]), "{i}: {} {snr_db}", sums[at]);
+            }
+        }
+    }
+
+    #[test]
+    fn the_text_has_the_columns_limits_and_warnings_that_designers_know() {
+        let text = budget(REAL, &[280.0, 400.0, 520.0]).text();
+        for line in [
+            "power budget, dB; range in m",
+            "  photons sent                150 uJ / 1.28e-19 J                      150.68     150.68     150.68",
+            "  amplifier noise             10 pA/rtHz: 1.0e-22 of shot 3.2e-22       -1.18      -1.18      -1.18",
+            "  = SNR in the band           one pulse                                -12.74     -12.80     -12.86",
+            "  = in the width of the pulse 0.44/200 ns = 2.21 MHz                     0.82       0.76       0.69",
+            "  velocity: band +-19.4 m/s; sampled -34.9 to +62.0 m/s; flow reaches 17 m/s",
+            "  resolution: pulse 30.0 m, gate (pulse and Gaussian window of 64) 33.9 m, full width at half maximum",
+        ] {
+            assert!(text.lines().any(|found| found == line), "{line}\n{text}");
+        }
+        for part in ["5.4 times", "blind to 85.6 m", "linewidth 1 kHz: 0.027 m/s", "equals it at 320 mW"] {
+            assert!(text.contains(part), "{part}\n{text}");
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Nominal set-ups of real lidars, as scenes: one table, `presets.csv`, and a text made of a line of it.
+//!
+//! Check: each is a good scene and says what the table says.
+
+/// One lidar a line; what the columns are stands in the file.
+const TABLE: &str = include_str!("presets.csv");
+
+fn rows() -> impl Iterator<Item = Vec<&'static str>> {
+    TABLE.lines().filter(|line| !line.starts_with('#')).map(|line| line.split('|').collect())
+}
+
+/// Names of the presets.
+pub fn preset_names() -> impl Iterator<Item = &'static str> {
+    rows().filter_map(|row| row.first().copied())
+}
+
+/// The scene of a preset: what differs from the defaults, with its sources as comments.
+pub fn preset_toml(name: &str) -> Option<String> {
+    let row = rows().find(|row| row.first() == Some(&name))?;
+    let [
+        name,
+        wavelength,
+        energy,
+        rate,
+        fwhm,
+        aperture,
+        beam,
+        sampling,
+        signal,
+        window,
+        pulses,
+        lines,
+        pair,
+        blind,
+        scans,
+        stated,
+        recalled,
+        source,
+    ] = row[..]
+    else {
+        return None;
+    };
+    let number = |text: &str| text.parse::<f64>().ok();
+    let (window_samples, lines, pair_m) = (number(window)?, number(lines)?, number(pair)?);
+    // As high above the pair as in the default scene, and as far before and behind it.
+    let highest_rad = (0.2304 * 400.0 / pair_m * 1e4).round() / 1e4;
+    // A little less than the last line takes, so that rounding does not lose it.
+    let step_rad = ((highest_rad / (lines - 1.0)) * 1e6).floor() / 1e6;
+    let (first_m, last_m) = (pair_m - 120.0, pair_m + 120.0);
+    let gate_step = (window_samples * 5.0 / 64.0).round().max(1.0);
+    let mut text = format!(
+        "# A wakescope scene with the lidar {name}. Nominal: a set-up like that of the instrument, not a calibrated one.\n\
+         # Stated by the source: {stated}.\n# Recalled or assumed: {recalled}.\n# Source: {source}.\n\
+         # Scans of the instrument: {scans}. This one is a vertical scan across a wake {pair} m away.\n\
+         # Every other key has the default of `wakescope init`.\n\n\
+         format = 2\nseed = 1 \n\n[laser]\nwavelength_m = {wavelength}\npulse_repetition_hz = {rate}\n\n\
+         [pulse]\nenergy_j = {energy}\nshape.duration_s = {fwhm}\n\n[detector]\nsampling_hz = {sampling}\nsignal = \"{signal}\"\n"
+    );
+    if signal == "baseband" {
+        // The quadratures see almost all of what their rate can hold.
+        text += &format!("bandwidth_hz = {:?} # assumed\n", 0.98 * number(sampling)?);
+    }
+    text += &format!("\n[telescope]\naperture_radius_m = {aperture}\nbeam_radius_m = {beam}\n");
+    if blind != "0" {
+        text += &format!("blind_range_m = {blind}\n");
+    }
+    text += &format!(
+        "\n[flow]\nlateral_position_m = {pair}\n\n[scan]\nelevation_max_rad = {highest_rad:?}\nelevation_step_rad = {step_rad:?}\n\
+         range_min_m = {first_m:?}\nrange_max_m = {last_m:?}\npulses_per_line = {pulses}\n\n\
+         [estimator]\nwindow_samples = {window}\ngate_step_samples = {gate_step}\n"
+    );
+    Some(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::budget::{Budget, scan_ranges_m};
+    use crate::measure::profile::range_profile;
+    use crate::measure::progress::Silent;
+    use crate::plan::{Plan, Target};
+    use crate::scene::{Scene, SceneFile};
+    use std::path::Path;
+
+    #[test]
+    fn every_preset_is_a_good_scene_with_the_numbers_of_its_line_and_a_budget_that_sums_to_its_profile() {
+        assert_eq!(preset_names().count(), 13);
+        for row in rows() {
+            let text = preset_toml(row[0]).unwrap();
+            assert!(text.contains("Nominal") && text.contains(row[17]), "{text}");
+            let file = SceneFile::parse(&text, Path::new(row[0])).unwrap();
+            let scene = file.scene.clone();
+            let found = [
+                scene.laser.wavelength_m,
+                scene.pulse_energy_j(),
+                scene.laser.pulse_repetition_hz,
+                scene.pulse_width_s(),
+                scene.telescope.aperture_radius_m,
+                scene.telescope.beam_radius_m,
+                scene.detector.sampling_hz,
+            ];
+            let stated: Vec<f64> = row[1..8].iter().map(|x| x.parse().unwrap()).collect();
+            assert_eq!(found.to_vec(), stated, "{}", row[0]);
+            assert_eq!(scene.estimator.window_samples.to_string(), row[9]);
+            assert_eq!(scene.scan.pulses_per_line.to_string(), row[10]);
+            let plan = Plan::new(file, Target::Run).unwrap();
+            assert_eq!(plan.geometry.elevation_rad.len().to_string(), row[11], "{}", row[0]);
+            let ranges_m = scan_ranges_m(&scene);
+            let budget = Budget::new(&plan, &ranges_m, &Silent).unwrap();
+            let mut at = scene;
+            (at.outputs.profile_range_min_m, at.outputs.profile_range_max_m) = (ranges_m[0], ranges_m[2]);
+            at.outputs.profile_points = 3;
+            let profile = range_profile(&at, &plan.instrument, &Silent).unwrap();
+            for (sum, snr_db) in budget.snr_db().iter().zip(&profile.snr_db) {
+                assert!((sum - snr_db).abs() < 1e-9, "{}: {sum} {snr_db}", row[0]);
+            }
+        }
+        let table2 = SceneFile::parse(&preset_toml("chapter_table2").unwrap(), Path::new("s")).unwrap().scene;
+        let same = Scene { scan: crate::scene::Scan { elevation_step_rad: 1.25e-3, ..table2.scan }, ..table2 };
+        assert_eq!(same, Scene::default());
+        assert_eq!(preset_toml("lidar"), None);
+    }
+}
