@@ -7,6 +7,7 @@ mod bound;
 mod flow;
 mod output;
 mod progress;
+mod sweep;
 mod wake;
 
 use crate::io::Existing;
@@ -62,6 +63,10 @@ enum Command {
     Map(Io),
     /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
     Bound(bound::BoundWords),
+    /// Run many scenes that differ in some keys: a table and pictures of what each gives.
+    Sweep(sweep::SweepWords),
+    /// The rows of a table that no other one beats.
+    Pareto(sweep::ParetoWords),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow(flow::FlowWords),
     /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
@@ -121,6 +126,8 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
         Command::Bound(words) => bound::bound(words, cli),
+        Command::Sweep(words) => sweep::sweep(words, cli),
+        Command::Pareto(words) => sweep::pareto(words, cli),
         Command::Flow(words) => flow::flow(words, cli),
         Command::Wake(words) => wake::wake(words, cli),
     }

@@ -15,10 +15,12 @@ mod vet;
 mod words;
 
 pub(crate) use checker::{Checker, Side};
-#[cfg(test)]
+#[cfg(any(test, feature = "cli"))]
 pub(crate) use key::Kind;
 pub(crate) use key::{Key, join};
 pub(crate) use probe::keys_of;
 pub use problem::{Located, Problem, SceneError};
 pub(crate) use source::Source;
 pub(crate) use vet::{Document, Format};
+#[cfg(feature = "cli")]
+pub(crate) use words::{near, one_of, unit_of};

@@ -133,7 +133,7 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
 }
 
 /// Puts the files of a run into their folder, where no other run may be writing.
-fn put(files: FileGroup, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+pub(crate) fn put(files: FileGroup, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
     let there = folder.exists();
     let lock = there.then(|| FolderLock::take(folder)).transpose()?;
     // Again: a file may have come while the run computed.
@@ -155,7 +155,7 @@ pub fn provenance(plan: &Plan) -> Provenance {
 }
 
 /// The scene with every default written out: running it again gives the same files.
-fn scene_text(origin: &Provenance) -> String {
+pub(crate) fn scene_text(origin: &Provenance) -> String {
     format!("# {}, scene {}\n{}", origin.program, origin.scene_hash, origin.scene_toml)
 }
 

@@ -10,6 +10,8 @@ mod messages;
 mod scene_features;
 #[cfg(all(feature = "flow", feature = "netcdf"))]
 mod simulated_flow;
+#[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
+mod sweep;
 #[cfg(feature = "cli")]
 mod wake;
 
