@@ -35,7 +35,7 @@
 //! | [`cli`] | the program `wakescope` |
 //!
 //! Features, all but the last on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
-//! PNG, the report page), `vtk` (fields for ParaView).
+//! PNG, the report page), `sweep` (design studies, with `cli`), `vtk` (fields for ParaView).
 
 #[cfg(feature = "flow")]
 pub mod flow;
@@ -45,7 +45,7 @@ mod machine;
 pub mod measure;
 pub mod plan;
 pub mod scene;
-#[cfg(feature = "cli")]
+#[cfg(feature = "sweep")]
 pub mod sweep;
 
 #[cfg(feature = "cli")]

@@ -100,6 +100,7 @@ pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> 
 ///
 /// # Errors
 /// As [`bound`].
+#[cfg(feature = "sweep")]
 pub(crate) fn bound_in_the_middle(plan: &Plan, scanner: &Scanner<'_>) -> Result<BoundPoint, Error> {
     let range_m = plan.geometry.gate_range_m[plan.geometry.gate_range_m.len() / 2];
     let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();

@@ -40,6 +40,7 @@ impl<T> Known<T> {
     }
 
     /// How many were made.
+    #[cfg(feature = "sweep")]
     pub(crate) fn len(&self) -> usize {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).len()
     }
@@ -83,6 +84,7 @@ impl Efficiencies {
     }
 
     /// How many were computed.
+    #[cfg(feature = "sweep")]
     pub(crate) fn computed(&self) -> usize {
         self.means.len() + self.realisations.len()
     }

@@ -46,7 +46,7 @@ pub use instrument::{
     PulseResampling, PulseShape, ReceiverPath, SampledShape, SnrReference, Telescope,
 };
 pub use read::SceneFile;
-#[cfg(feature = "cli")]
+#[cfg(feature = "sweep")]
 pub(crate) use read::scene_keys;
 
 use serde::{Deserialize, Serialize};

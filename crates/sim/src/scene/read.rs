@@ -53,7 +53,7 @@ impl SceneFile {
     ///
     /// # Errors
     /// Keys that do not exist, values of the wrong kind.
-    #[cfg(feature = "cli")]
+    #[cfg(feature = "sweep")]
     pub(crate) fn whole_table(text: &str, path: &Path) -> Result<toml::Table, SceneError> {
         let document = Document::parse(text, path)?;
         let scene: Scene = document.read(document.vet(&scene_format())?)?;

@@ -87,7 +87,7 @@ impl<'p> Retrieval<'p> {
         let (scene, g) = (&self.plan.scene.scene, &self.plan.geometry);
         let Response { correlogram, estimator } = self.response.as_ref()?;
         // Gates that share most of their window say the same.
-        let step = (scene.estimator.window_samples / 8).div_ceil(scene.estimator.gate_step_samples).max(1);
+        let step = (scene.estimator.window_samples / 4).div_ceil(scene.estimator.gate_step_samples).max(1);
         let some: Vec<usize> = (0..g.gate_range_m.len()).step_by(step).collect();
         let range_m: Vec<f64> = some.iter().map(|i| g.gate_range_m[*i]).collect();
         let velocity_m_s = velocity_m_s.select(ndarray::Axis(1), &some);
@@ -171,4 +171,58 @@ impl<'p> Retrieval<'p> {
 /// One circulation for both vortices; the core radius is not fitted.
 fn free() -> FreeParameters {
     FreeParameters { core_radius: Sharing::Fixed, ..FreeParameters::common_circulation() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Target;
+    use crate::scene::{Scene, SceneFile, SnrReference};
+    use crate::{Silent, measure::map};
+
+    fn plan(change: impl FnOnce(&mut Scene)) -> Plan {
+        let mut scene = Scene::default();
+        scene.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
+        (scene.scan.pulses_per_line, scene.scan.realisations) = (1, 2);
+        change(&mut scene);
+        Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap()
+    }
+
+    #[test]
+    fn bound_on_the_circulation_of_one_scan_of_table_2_is_that_of_an_independent_study() {
+        let plan = plan(|_| ());
+        let scanner = Scanner::new(&plan, &Silent).unwrap();
+        let bound_m2_s = Retrieval::new(&plan, &scanner).unwrap().bound_m2_s().unwrap();
+        assert!((bound_m2_s / 6.9 - 1.0).abs() < 0.06, "{bound_m2_s}");
+    }
+
+    #[test]
+    fn circulation_fitted_to_maps_is_that_of_the_pair_within_its_error() {
+        let plan = plan(|scene| {
+            scene.detector.snr = SnrReference::Fixed { snr_db: 10.0 };
+            (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.06, 0.18);
+            scene.scan.elevation_step_rad = 2.5e-3;
+            (scene.scan.range_min_m, scene.scan.range_max_m) = (310.0, 490.0);
+        });
+        let scanner = Scanner::new(&plan, &Silent).unwrap();
+        let mut retrieval = Retrieval::new(&plan, &scanner).unwrap();
+        map::estimates::<f64>(&[&plan], &scanner, &Silent, |_| (), |_, v_m_s| retrieval.add(v_m_s)).unwrap();
+        let found = retrieval.result();
+        assert_eq!(found.failed_fraction, 0.0);
+        // A map of one scan at 0 dB and twice the lines has 19 m^2/s; at 10 dB speckle is left.
+        assert!(found.rms_m2_s < 3.0 * 19.0 && found.bound_m2_s < 5.0, "{found:?}");
+        assert!(found.rms_m2_s > 0.2 * found.bound_m2_s, "no fit is so much better than the bound: {found:?}");
+    }
+
+    #[test]
+    fn air_without_a_pair_and_signals_without_noise_have_no_circulation() {
+        for change in [
+            (|scene| scene.flow = Flow::Calm {}) as fn(&mut Scene),
+            |scene| scene.detector.noise = NoiseKind::None,
+            |scene| scene.pulse.chirp_hz_s = 1e12,
+        ] {
+            let plan = plan(change);
+            assert!(Retrieval::new(&plan, &Scanner::new(&plan, &Silent).unwrap()).is_none());
+        }
+    }
 }

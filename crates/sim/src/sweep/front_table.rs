@@ -12,15 +12,18 @@ use serde_json::{Map, Value, json};
 
 /// What is wanted of a table.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Wanted<'a> {
-    pub(crate) min: &'a [String],
-    pub(crate) max: &'a [String],
-    pub(crate) conditions: &'a [String],
+pub struct Wanted<'a> {
+    /// Columns of which small values are better.
+    pub min: &'a [String],
+    /// Columns of which large values are better.
+    pub max: &'a [String],
+    /// Comparisons that a row must meet.
+    pub conditions: &'a [String],
 }
 
 /// A table with the place of each row.
 #[derive(Debug)]
-pub(crate) struct FrontTable {
+pub struct FrontTable {
     table: TextTable,
     objectives: Vec<String>,
     /// Rows for which the conditions hold, and their places.
@@ -32,7 +35,7 @@ impl FrontTable {
     ///
     /// # Errors
     /// Columns that are not there, no objective, conditions that cannot be read.
-    pub(crate) fn new(table: TextTable, wanted: &Wanted<'_>) -> Result<Self, String> {
+    pub fn new(table: TextTable, wanted: &Wanted<'_>) -> Result<Self, String> {
         let place = |name: &str| {
             table.column(name).ok_or_else(|| {
                 let known = || table.header.iter().map(String::as_str);
@@ -86,7 +89,7 @@ impl FrontTable {
     }
 
     /// The front for people.
-    pub(crate) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let shown = self.shown();
         let cell = |row: usize, column: usize| self.table.rows[row][column].clone();
         let mut lines = vec![shown.iter().map(|column| self.table.header[*column].clone()).collect::<Vec<_>>()];
@@ -110,7 +113,10 @@ impl FrontTable {
     }
 
     /// All columns of the front, and whether a row is doubtful.
-    pub(crate) fn csv(&self) -> Result<String, OutputError> {
+    ///
+    /// # Errors
+    /// A header that no table can have, such as a column twice.
+    pub fn csv(&self) -> Result<String, OutputError> {
         let members: Vec<(usize, bool)> = self.members().collect();
         let mut out = Table::new();
         for (column, name) in self.table.header.iter().enumerate() {
@@ -121,7 +127,7 @@ impl FrontTable {
     }
 
     /// The front for programs.
-    pub(crate) fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         let row = |(row, doubtful): (usize, bool)| {
             let cells = self.table.header.iter().cloned().zip(self.table.rows[row].iter().map(|cell| json!(cell)));
             json!({ "row": row, "doubtful": doubtful, "cells": cells.collect::<Map<_, _>>() })

@@ -80,7 +80,7 @@ fn of_samples<S: Sample + wakescope_signal::scan::Sample>(
     let maps = map::estimates::<S>(&of_plans, scanner, observer, |_| (), seen)?;
     let mut rows = Vec::with_capacity(plans.len());
     for ((plan, map), collected) in plans.iter().zip(&maps).zip(&collected) {
-        let truths_m_s = collected.apart.iter().map(|cell| map.v_pulse_m_s[*cell]).cycle();
+        let truths_m_s = collected.apart.iter().map(|cell| map.v_gate_m_s[*cell]).cycle();
         let known = collected.velocity_m_s.iter().zip(truths_m_s).filter(|(_, truth)| truth.is_finite());
         let errors_m_s: Vec<f64> = known.map(|(velocity, truth)| velocity - truth).collect();
         let e = &plan.scene.scene;

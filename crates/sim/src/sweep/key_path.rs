@@ -134,7 +134,10 @@ impl SceneKey {
         let unquoted = text.trim().trim_matches('"');
         let read = match &self.takes {
             Takes::Number | Takes::Whole { .. } => match text.trim().parse() {
-                Ok(number) => return self.of_number(number),
+                Ok(number) => {
+                    let as_written = |problem| Problem { value: text.trim().into(), ..problem };
+                    return self.of_number(number).map_err(as_written);
+                }
                 Err(_) => None,
             },
             Takes::Switch => unquoted.parse().ok().map(Value::Boolean),

@@ -7,12 +7,12 @@
 //! | `run` | checking all, running what is not there yet, sharing what cases have in common |
 //! | `group`, `circulation`, `results` | cases of the same signals measured together; their numbers |
 //! | `stored`, `tables`, `pictures` | a folder for each case; tables and pictures of all |
-//! | [`pareto`], `front_table` | set-ups that no other one beats; the rows of a table that are such |
+//! | [`pareto`], [`front_table`] | set-ups that no other one beats; the rows of a table that are such |
 
 mod cases;
 mod circulation;
 mod expression;
-pub(crate) mod front_table;
+pub mod front_table;
 mod group;
 mod key_path;
 pub mod pareto;

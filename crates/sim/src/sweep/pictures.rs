@@ -10,17 +10,18 @@ use crate::Error;
 use crate::io::FileGroup;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
 
-/// Panels of a picture: title, axis, results with their names in the legend.
-const PANELS: [(&str, &str, &[(&str, &str)]); 6] = [
-    ("Signal-to-noise ratio in the middle of the scan", "SNR [dB]", &[("snr_db", "")]),
-    ("Error outside the vortices", "error [m/s]", &[("rms_outside_m_s", "rms"), ("bound_m_s", "bound")]),
-    ("Error inside the vortices", "error [m/s]", &[("rms_inside_m_s", "rms")]),
-    ("Estimates outside that are spread over the band", "fraction", &[("bad_fraction", "bad")]),
-    ("Range resolution", "full width at half maximum [m]", &[("resolution_m", "")]),
+/// Panels of a picture: title, axis, whether it is logarithmic, the result and a bound, which is dashed.
+const PANELS: [(&str, &str, bool, [&str; 2]); 6] = [
+    ("Signal-to-noise ratio in the middle of the scan", "SNR [dB]", false, ["snr_db", ""]),
+    ("Error outside the vortices; dashed: bound", "rms [m/s]", true, ["rms_outside_m_s", "bound_m_s"]),
+    ("Error inside the vortices", "rms [m/s]", true, ["rms_inside_m_s", ""]),
+    ("Estimates outside that are spread over the band", "fraction", false, ["bad_fraction", ""]),
+    ("Range resolution", "full width at half maximum [m]", false, ["resolution_m", ""]),
     (
-        "Error of the circulation",
-        "error [m^{2}/s]",
-        &[("circulation_rms_m2_s", "map"), ("circulation_bound_m2_s", "bound")],
+        "Error of the circulation; dashed: bound",
+        "rms [m^{2}/s]",
+        true,
+        ["circulation_rms_m2_s", "circulation_bound_m2_s"],
     ),
 ];
 
@@ -60,41 +61,40 @@ pub(super) fn add(files: &mut FileGroup, definition: &Definition, rows: &[Row]) 
     put(FRONT, &Figure::stacked([of_front(rows)]))
 }
 
-/// A panel of results against a key; none where no case has any.
+/// A panel of a result against a key; none where no case has any.
 fn against(
     definition: &Definition,
     rows: &[Row],
     (place, key): (usize, &str),
-    (title, label, results): &(&str, &str, &[(&str, &str)]),
+    (title, label, is_log, [result, bound]): &(&str, &str, bool, [&str; 2]),
 ) -> Option<CurvePlot> {
-    let curves = curves(definition, rows, place);
     let x: Vec<f64> = rows.iter().map(|row| row.key(place)).filter(|x| x.is_finite()).collect();
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
     let axis = if low > 0.0 && high >= 8.0 * low { Axis::log(key) } else { Axis::linear(key) };
-    let mut plot = CurvePlot::new(title, axis, Axis::linear(label));
-    let (mut colour, mut any) = (0, false);
-    for (curve, members) in &curves {
-        for (result, word) in results.iter() {
-            let columns = RESULTS.iter().map(|(name, ..)| *name);
-            let error = standard_error_of(result, columns);
-            let mut points: Vec<(f64, f64, f64)> = members
-                .iter()
-                .map(|row| (row.key(place), row.result(result), error.map_or(0.0, |error| row.result(error))))
-                .filter(|(x, y, _)| x.is_finite() && y.is_finite())
-                .collect();
+    let mut plot = CurvePlot::new(title, axis, if *is_log { Axis::log(label) } else { Axis::linear(label) });
+    plot.shape = 0.6;
+    let error = standard_error_of(result, RESULTS.iter().map(|(name, ..)| *name));
+    let (curves, mut any) = (curves(definition, rows, place), false);
+    // Without a name either no other key varies, or there are too many curves.
+    let curves_are_whole = definition.keys.len() == 1;
+    for (colour, (curve, members)) in curves.iter().enumerate() {
+        let points = |name: &str| {
+            let found = members.iter().map(|row| (row.key(place), row.result(name)));
+            let mut points: Vec<(f64, f64)> = found.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            any |= !points.is_empty();
-            let xy = || points.iter().map(|(x, y, _)| (*x, *y));
-            if curves.len() <= MOST_CURVES && points.len() > 1 {
-                let style = if error.is_some() { Style::Line } else { Style::Dash };
-                plot = plot.with(Series::new("", style, xy()).in_colour(colour));
-            }
-            let label = [curve.as_str(), word].into_iter().filter(|w| !w.is_empty()).collect::<Vec<_>>().join(", ");
-            let bars: Vec<f64> =
-                points.iter().map(|(_, _, error)| if error.is_finite() { *error } else { 0.0 }).collect();
-            plot = plot.with(Series::new(&label, Style::Markers, xy()).with_band(&bars).in_colour(colour));
-            colour += 1;
+            points
+        };
+        let values = points(result);
+        any |= !values.is_empty();
+        if !curve.is_empty() || curves_are_whole {
+            plot = plot.with(Series::new("", Style::Line, values.clone()).in_colour(colour));
+            plot = plot.with(Series::new("", Style::Dash, points(bound)).in_colour(colour));
         }
+        // In the order of the values, whose x they share.
+        let bars: Vec<(f64, f64)> = error.map_or(Vec::new(), points);
+        let bar = |x: f64| bars.iter().find(|(at, _)| *at == x).map_or(0.0, |(_, error)| *error);
+        let half: Vec<f64> = values.iter().map(|(x, _)| bar(*x)).collect();
+        plot = plot.with(Series::new(curve, Style::Markers, values).with_band(&half).in_colour(colour));
     }
     any.then_some(plot)
 }
@@ -126,8 +126,8 @@ fn of_front(rows: &[Row]) -> CurvePlot {
     let mut best: Vec<(f64, f64)> = all().zip(&places).filter(|(_, p)| **p != Place::Off).map(|(xy, _)| xy).collect();
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
     let bars: Vec<f64> = error_m_s.iter().map(|error| if error.is_finite() { *error } else { 0.0 }).collect();
-    let axes = (Axis::linear("full width at half maximum in range [m]"), Axis::linear("standard deviation [m/s]"));
-    CurvePlot::new("Precision against resolution", axes.0, axes.1)
+    let x = Axis::linear("full width at half maximum in range [m]");
+    CurvePlot::new("Precision against resolution", x, Axis::log("standard deviation [m/s]"))
         .with(Series::new("front", Style::Line, best))
         .with(Series::new("cases", Style::Markers, all()).with_band(&bars))
 }

@@ -14,13 +14,15 @@ use crate::measure::wind::vortex_pair;
 use crate::plan::Plan;
 use crate::scene::{Flow, Method, RegionRadius, Scene};
 use ndarray::Array2;
-use wakescope_estimate::map::good_and_bad;
 use wakescope_signal::RangeFilter;
 
 /// Cells within this part of the spacing of a pair from a centre are inside its vortices: 8 m of 47.
 const INSIDE: f64 = 8.0 / 47.0;
 /// Cells beyond this part from both are outside: 30 m of 47.
 const OUTSIDE: f64 = 30.0 / 47.0;
+
+/// Estimates so many widths of a peak away from the air are no estimates of it.
+const BEYOND_WIDTHS: f64 = 3.0;
 
 /// Names, units and meanings of the results, in the order of the columns.
 pub const RESULTS: [(&str, &str, &str); 32] = [
@@ -94,9 +96,7 @@ pub(super) fn row(plan: &Plan, measured: &Measured<'_>) -> Result<Vec<f64>, Erro
     let known: Vec<f64> = measured.map.flagged.iter().copied().filter(|f| f.is_finite()).collect();
     let flagged = known.iter().sum::<f64>() / known.len() as f64;
     out.extend([flagged, error_of_fraction(flagged, independent)]);
-    let band_m_s = 0.5 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
-    let bad = good_and_bad(measured.errors_m_s, band_m_s);
-    out.extend([bad.bad_fraction, bad.bad_fraction_error]);
+    out.extend(bad_fraction(plan, measured.errors_m_s)?);
     out.extend(measured.circulation.map_or([f64::NAN; 6], |c| {
         let scatter_m2_s = (c.rms_m2_s.powi(2) - c.bias_m2_s.powi(2)).max(0.0).sqrt();
         let maps = (1.0 - c.failed_fraction) * scene.scan.realisations as f64;
@@ -112,6 +112,23 @@ fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let thickness_m = plan.geometry.layer_thickness_m;
     Ok(RangeFilter::gate(&plan.instrument.pulse, &window, scene.detector.sampling_hz, thickness_m)?)
+}
+
+/// Part of the estimates that say nothing of the air, and its standard error: those farther from it than any part of a peak, and
+/// as many of the others as a level floor over the band has there.
+fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
+    let (scene, pulse) = (&plan.scene.scene, &plan.instrument.pulse);
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let moment = |power: i32| window.iter().enumerate().map(|(n, h)| h * h * (n as f64).powi(power)).sum::<f64>();
+    let mean = moment(1) / moment(0);
+    let window_s = (moment(2) / moment(0) - mean * mean).max(1.0 / 12.0).sqrt() / scene.detector.sampling_hz;
+    // A window cannot be narrower in frequency than the inverse of its length.
+    let width_hz = pulse.spectral_width_hz().hypot(0.25 * std::f64::consts::FRAC_1_PI / window_s);
+    let part = (2.0 * BEYOND_WIDTHS * width_hz / scene.detector.bandwidth_hz).min(0.9);
+    let limit_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz * part;
+    let (of, share) = (errors_m_s.len() as f64, 1.0 - part);
+    let beyond = errors_m_s.iter().filter(|error| !(error.abs() <= limit_m_s)).count() as f64 / of;
+    Ok([(beyond / share).min(1.0), error_of_fraction(beyond, of) / share])
 }
 
 /// Standard error of a fraction of so many: not 0 where none was found.
