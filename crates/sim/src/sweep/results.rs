@@ -127,7 +127,7 @@ fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
     let part = (2.0 * BEYOND_WIDTHS * width_hz / scene.detector.bandwidth_hz).min(0.9);
     let limit_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz * part;
     let (of, share) = (errors_m_s.len() as f64, 1.0 - part);
-    let beyond = errors_m_s.iter().filter(|error| !(error.abs() <= limit_m_s)).count() as f64 / of;
+    let beyond = errors_m_s.iter().filter(|error| error.is_nan() || error.abs() > limit_m_s).count() as f64 / of;
     Ok([(beyond / share).min(1.0), error_of_fraction(beyond, of) / share])
 }
 

@@ -101,7 +101,7 @@ pub fn run<'s>(
     observer: &dyn Observer,
     told: Told<'_>,
 ) -> Result<Summary, Error> {
-    let definition = Definition::of(sweep);
+    let definition = Definition::of(sweep, settings.fits);
     let winds = Known::default();
     check(sweep, &winds, settings.allow_large)?;
     let times = settings.shard.map_or("times.csv".into(), |s| format!("times-{}-of-{}.csv", s.number, s.of));
@@ -125,7 +125,7 @@ pub fn run<'s>(
             signals += 1;
             let wall_s = begun.elapsed().as_secs_f64() / found.len() as f64;
             for (row, case) in found.iter().zip(&cases) {
-                store(out, sweep, case.index, row)?;
+                store(out, sweep, case.index, row, settings.fits)?;
                 walls.push((case.index, wall_s));
                 done += 1;
                 told(&sweep.described(case), done, due.len());
@@ -222,7 +222,7 @@ fn groups<'c>(cases: &[&'c Case]) -> Vec<Vec<&'c Case>> {
 }
 
 /// Cases in the same order, as many together as fit the memory.
-fn batches<'c>(planned: Vec<(&'c Case, Plan)>) -> Vec<Vec<(&'c Case, Plan)>> {
+fn batches(planned: Vec<(&Case, Plan)>) -> Vec<Vec<(&Case, Plan)>> {
     let room_bytes = machine::available_memory_bytes().map_or(f64::INFINITY, |bytes| SHARE * bytes);
     let mut batches: Vec<Vec<(&Case, Plan)>> = Vec::new();
     let mut held_bytes = 0.0;

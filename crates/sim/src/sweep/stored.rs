@@ -31,10 +31,12 @@ pub(super) struct Definition {
     pub(super) origin: Provenance,
     pub(super) keys: Vec<(String, Holds)>,
     pub(super) scene_hashes: Vec<String>,
+    /// Whether the circulation is fitted to each map.
+    pub(super) fits: bool,
 }
 
 impl Definition {
-    pub(super) fn of(sweep: &Sweep) -> Self {
+    pub(super) fn of(sweep: &Sweep, fits: bool) -> Self {
         let holds = |takes: &Takes| match takes {
             Takes::Number => Holds::Numbers,
             Takes::Whole { .. } => Holds::WholeNumbers,
@@ -44,6 +46,7 @@ impl Definition {
             origin: sweep.origin.clone(),
             keys: sweep.columns.iter().map(|column| (column.name.clone(), holds(&column.key.takes))).collect(),
             scene_hashes: sweep.cases.iter().map(|case| case.scene.hash.clone()).collect(),
+            fits,
         }
     }
 
@@ -56,7 +59,8 @@ impl Definition {
         let keys: Vec<Value> = self.keys.iter().map(|(name, of)| json!({ "key": name, "holds": holds(*of) })).collect();
         let object = json!({
             "source": self.origin.program, "seed": self.origin.seed, "sweep_hash": self.origin.scene_hash,
-            "scene": self.origin.scene_toml, "keys": keys, "scene_hashes": self.scene_hashes,
+            "scene": self.origin.scene_toml, "keys": keys, "circulation": self.fits,
+            "scene_hashes": self.scene_hashes,
         });
         format!("{object:#}\n")
     }
@@ -108,12 +112,13 @@ impl Definition {
             },
             keys: object.get("keys")?.as_array()?.iter().map(key).collect::<Option<_>>()?,
             scene_hashes: hashes.map(|hash| hash.as_str().map(str::to_owned)).collect::<Option<_>>()?,
+            fits: object.get("circulation")?.as_bool()?,
         })
     }
 
     fn is_same(&self, other: &Self) -> bool {
         (&self.origin.program, &self.origin.scene_hash) == (&other.origin.program, &other.origin.scene_hash)
-            && self.scene_hashes == other.scene_hashes
+            && (&self.scene_hashes, self.fits) == (&other.scene_hashes, other.fits)
     }
 }
 
@@ -126,7 +131,7 @@ fn folder_of(folder: &Path, case: usize) -> PathBuf {
 ///
 /// # Errors
 /// What the system says; a file of somebody else in the way.
-pub(super) fn store(folder: &Path, sweep: &Sweep, case: usize, results: &[f64]) -> Result<(), Error> {
+pub(super) fn store(folder: &Path, sweep: &Sweep, case: usize, results: &[f64], fits: bool) -> Result<(), Error> {
     let Some(of) = sweep.cases.get(case) else { return Ok(()) };
     let keys: Map<String, Value> = sweep.keys().map(str::to_owned).zip(of.values.iter().map(|v| json!(v))).collect();
     let names = RESULTS.iter().map(|(name, ..)| (*name).to_owned());
@@ -138,7 +143,8 @@ pub(super) fn store(folder: &Path, sweep: &Sweep, case: usize, results: &[f64]) 
         seed: of.scene.scene.seed,
     };
     let object = json!({
-        "source": crate::PROGRAM, "scene_hash": of.scene.hash, "case": case, "keys": keys, "results": results,
+        "source": crate::PROGRAM, "scene_hash": of.scene.hash, "case": case, "keys": keys, "circulation": fits,
+        "results": results,
     });
     let path = folder_of(folder, case);
     let mut files = FileGroup::new(&path);
@@ -154,7 +160,8 @@ pub(super) fn stored(folder: &Path, definition: &Definition, case: usize) -> Opt
     let hash = object.get("scene_hash")?.as_str()?;
     let is_this = definition.scene_hashes.get(case)? == hash
         && object.get("source")?.as_str()? == definition.origin.program
-        && object.get("case")?.as_u64()? == case as u64;
+        && object.get("case")?.as_u64()? == case as u64
+        && object.get("circulation")?.as_bool()? == definition.fits;
     let cell = |part: &str, name: &str| Some(object.get(part)?.get(name)?.as_str()?.to_owned());
     let keys = definition.keys.iter().map(|(name, _)| cell("keys", name)).collect::<Option<_>>()?;
     let results = RESULTS.iter().map(|(name, ..)| cell("results", name)).collect::<Option<_>>()?;
@@ -166,22 +173,23 @@ pub(super) fn stored(folder: &Path, definition: &Definition, case: usize) -> Opt
 /// # Errors
 /// Folders that are of different sweeps, or of another one than `sweep`; cases that none of them has; what the system says.
 pub fn merge(folders: &[PathBuf], sweep: Option<&Sweep>, out: &Path) -> Result<Vec<PathBuf>, Error> {
-    let mut definition = sweep.map(|sweep| (Definition::of(sweep), "the sweep that was asked for".to_owned()));
+    let mut first: Option<(Definition, String)> = None;
     for folder in folders {
         let found = Definition::read(folder)?;
-        match &definition {
-            Some((first, of)) if !first.is_same(&found) => {
+        let asked = sweep.map(|sweep| (Definition::of(sweep, found.fits), "the sweep that was asked for".to_owned()));
+        for (other, of) in first.iter().chain(&asked) {
+            if !other.is_same(&found) {
                 let reason = format!(
-                    "it is of sweep {} by {}, and {of} is {} by {}: only shards of one sweep by one version fit together",
-                    found.origin.scene_hash, found.origin.program, first.origin.scene_hash, first.origin.program
+                    "it is of sweep {} by {}, {of} is {} by {}: only shards of one sweep by one version, all with or all \
+                     without --no-circulation, fit together",
+                    found.origin.scene_hash, found.origin.program, other.origin.scene_hash, other.origin.program
                 );
                 return Err(Error::Input { path: folder.join(SWEEP), reason });
             }
-            Some(_) => {}
-            None => definition = Some((found, folder.display().to_string())),
         }
+        first = first.or(Some((found, folder.display().to_string())));
     }
-    let Some((definition, _)) = definition else {
+    let Some((definition, _)) = first else {
         return Err(Error::Input { path: "--merge".into(), reason: "at least one folder of a sweep is needed".into() });
     };
     let (mut rows, mut missing) = (Vec::new(), Vec::new());
