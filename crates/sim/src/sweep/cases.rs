@@ -41,6 +41,8 @@ pub(super) struct Column {
     /// As the user wrote it.
     pub(super) name: String,
     pub(super) key: SceneKey,
+    /// Whether others determine it.
+    pub(super) tied: bool,
 }
 
 /// One case.
@@ -209,7 +211,7 @@ fn axis(word: &str) -> Result<(Column, Vec<Value>), Problem> {
         }
         None => text.split(',').map(|value| key.read(value)).collect::<Result<_, _>>()?,
     };
-    Ok((Column { name: name.into(), key }, values))
+    Ok((Column { name: name.into(), key, tied: false }, values))
 }
 
 /// `a:b:n`: from a to b, both as written.
@@ -250,15 +252,16 @@ fn binding(word: &str) -> Result<(Column, Expression), Problem> {
         return Err(problem(name.trim(), text.trim(), "an expression is a number, and this key takes none"));
     }
     let expression = Expression::parse(text).map_err(|why| problem(name.trim(), text.trim(), why))?;
-    Ok((Column { name: name.trim().into(), key }, expression))
+    Ok((Column { name: name.trim().into(), key, tied: true }, expression))
 }
 
 /// The keys and rows of a list file.
 fn list(path: &Path) -> Result<(Vec<Column>, Vec<Vec<Value>>), Error> {
     let of_file = |problem: Problem| refused(&path.display().to_string(), problem);
     let table = TextTable::read(path)?;
-    let column =
-        |name: &String| Ok(Column { name: name.trim().into(), key: resolve(name.trim(), "").map_err(of_file)? });
+    let column = |name: &String| {
+        Ok(Column { name: name.trim().into(), key: resolve(name.trim(), "").map_err(of_file)?, tied: false })
+    };
     let columns: Vec<Column> = table.header.iter().map(column).collect::<Result<_, Error>>()?;
     if table.rows.is_empty() {
         return Err(of_file(problem("rows", "0", "at least one row below the names of the keys")));
@@ -317,7 +320,7 @@ impl Builder<'_> {
     /// The columns of the results: all keys that vary, and the seed if each case has its own.
     fn columns(&self) -> Vec<Column> {
         let seed = self.request.independent.then(|| resolve("seed", "").ok()).flatten();
-        let seed = seed.map(|key| Column { name: "seed".into(), key });
+        let seed = seed.map(|key| Column { name: "seed".into(), key, tied: true });
         self.grid.columns().cloned().chain(seed).collect()
     }
 

@@ -36,8 +36,7 @@ fn stem(key: &str) -> String {
 }
 
 fn drawn(definition: &Definition) -> impl Iterator<Item = (usize, &str)> {
-    let keys = definition.keys.iter().enumerate();
-    keys.filter(|(_, (_, holds))| *holds != Holds::Texts).map(|(place, (name, _))| (place, name.as_str()))
+    definition.free().filter(|(place, _)| definition.keys[*place].holds != Holds::Texts)
 }
 
 /// Names of the files.
@@ -76,7 +75,7 @@ fn against(
     let error = standard_error_of(result, RESULTS.iter().map(|(name, ..)| *name));
     let (curves, mut any) = (curves(definition, rows, place), false);
     // Without a name either no other key varies, or there are too many curves.
-    let curves_are_whole = definition.keys.len() == 1;
+    let curves_are_whole = definition.free().count() == 1;
     for (colour, (curve, members)) in curves.iter().enumerate() {
         let points = |name: &str| {
             let found = members.iter().map(|row| (row.key(place), row.result(name)));
@@ -103,9 +102,10 @@ fn against(
 fn curves<'r>(definition: &Definition, rows: &'r [Row], place: usize) -> Vec<(String, Vec<&'r Row>)> {
     let mut curves: Vec<(String, Vec<&Row>)> = Vec::new();
     for row in rows {
-        let others = definition.keys.iter().zip(&row.keys).enumerate().filter(|(i, _)| *i != place);
         let short = |name: &str| name.rsplit('.').next().unwrap_or_default().to_owned();
-        let label: Vec<String> = others.map(|(_, ((name, _), value))| format!("{} {value}", short(name))).collect();
+        let value = |place: usize| row.keys.get(place).map_or("", String::as_str);
+        let others = definition.free().filter(|(other, _)| *other != place);
+        let label: Vec<String> = others.map(|(other, name)| format!("{} {}", short(name), value(other))).collect();
         let label = label.join(", ");
         match curves.iter_mut().find(|(known, _)| *known == label) {
             Some((_, members)) => members.push(row),

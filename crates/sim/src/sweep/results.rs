@@ -207,12 +207,14 @@ impl Cells {
         let average = CellAverage::over(map, &cells, self.shared.0 * self.shared.1);
         let scans = cells.iter().map(|cell| map.count[*cell]).fold(0.0, f64::max);
         let CellAverage { bias_m_s, std_m_s, rms_m_s, standard_error_m_s } = average;
-        // From the scatter of the variances over the cells: rare bad estimates show there.
+        // Two bounds: from the mean squares, which a bias adds to, and from the scatter of the variances over the cells, to
+        // which true differences between them add.
         let variances: Vec<f64> =
             cells.iter().map(|cell| map.std_m_s[*cell].powi(2)).filter(|v| v.is_finite()).collect();
         let spread = variances.iter().map(|v| (v - std_m_s * std_m_s).powi(2)).sum::<f64>() / variances.len() as f64;
         let independent = self.independent(part);
-        let std_error_m_s = (spread / independent).sqrt() / (2.0 * std_m_s);
+        let by_squares_m_s = standard_error_m_s * rms_m_s / std_m_s;
+        let std_error_m_s = by_squares_m_s.min((spread / independent).sqrt() / (2.0 * std_m_s));
         let bias_error_m_s = std_m_s / (scans * independent).sqrt();
         [std_m_s, std_error_m_s, bias_m_s, bias_error_m_s, rms_m_s, standard_error_m_s]
     }

@@ -25,11 +25,20 @@ pub(super) enum Holds {
     Texts,
 }
 
+/// A key that varies.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct VaryingKey {
+    pub(super) name: String,
+    pub(super) holds: Holds,
+    /// Whether others determine it.
+    pub(super) tied: bool,
+}
+
 /// What a sweep is, as its folder says it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Definition {
     pub(super) origin: Provenance,
-    pub(super) keys: Vec<(String, Holds)>,
+    pub(super) keys: Vec<VaryingKey>,
     pub(super) scene_hashes: Vec<String>,
     /// Whether the circulation is fitted to each map.
     pub(super) fits: bool,
@@ -44,10 +53,24 @@ impl Definition {
         };
         Self {
             origin: sweep.origin.clone(),
-            keys: sweep.columns.iter().map(|column| (column.name.clone(), holds(&column.key.takes))).collect(),
+            keys: sweep
+                .columns
+                .iter()
+                .map(|column| VaryingKey {
+                    name: column.name.clone(),
+                    holds: holds(&column.key.takes),
+                    tied: column.tied,
+                })
+                .collect(),
             scene_hashes: sweep.cases.iter().map(|case| case.scene.hash.clone()).collect(),
             fits,
         }
+    }
+
+    /// Places and names of the keys that are free.
+    pub(super) fn free(&self) -> impl Iterator<Item = (usize, &str)> {
+        let keys = self.keys.iter().enumerate().filter(|(_, key)| !key.tied);
+        keys.map(|(place, key)| (place, key.name.as_str()))
     }
 
     fn to_json(&self) -> String {
@@ -56,7 +79,8 @@ impl Definition {
             Holds::WholeNumbers => "whole numbers",
             Holds::Texts => "texts",
         };
-        let keys: Vec<Value> = self.keys.iter().map(|(name, of)| json!({ "key": name, "holds": holds(*of) })).collect();
+        let key = |key: &VaryingKey| json!({ "key": key.name, "holds": holds(key.holds), "tied": key.tied });
+        let keys: Vec<Value> = self.keys.iter().map(key).collect();
         let object = json!({
             "source": self.origin.program, "seed": self.origin.seed, "sweep_hash": self.origin.scene_hash,
             "scene": self.origin.scene_toml, "keys": keys, "circulation": self.fits,
@@ -100,7 +124,7 @@ impl Definition {
                 "whole numbers" => Holds::WholeNumbers,
                 _ => Holds::Texts,
             };
-            Some((key.get("key")?.as_str()?.to_owned(), holds))
+            Some(VaryingKey { name: key.get("key")?.as_str()?.to_owned(), holds, tied: key.get("tied")?.as_bool()? })
         };
         let hashes = object.get("scene_hashes")?.as_array()?.iter();
         Some(Self {
@@ -163,7 +187,7 @@ pub(super) fn stored(folder: &Path, definition: &Definition, case: usize) -> Opt
         && object.get("case")?.as_u64()? == case as u64
         && object.get("circulation")?.as_bool()? == definition.fits;
     let cell = |part: &str, name: &str| Some(object.get(part)?.get(name)?.as_str()?.to_owned());
-    let keys = definition.keys.iter().map(|(name, _)| cell("keys", name)).collect::<Option<_>>()?;
+    let keys = definition.keys.iter().map(|key| cell("keys", &key.name)).collect::<Option<_>>()?;
     let results = RESULTS.iter().map(|(name, ..)| cell("results", name)).collect::<Option<_>>()?;
     is_this.then(|| Row { case, scene_hash: hash.to_owned(), keys, results })
 }

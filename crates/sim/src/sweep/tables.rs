@@ -3,7 +3,7 @@
 //! Check: the same rows give the same bytes; the NetCDF file is read back by an independent reader.
 
 use super::results::RESULTS;
-use super::stored::{Definition, Holds};
+use super::stored::{Definition, Holds, VaryingKey};
 use crate::Error;
 use crate::io::{FileGroup, Table};
 use std::path::Path;
@@ -60,7 +60,7 @@ pub(super) fn files(definition: &Definition, rows: &[Row], out: &Path) -> Result
 
 fn table(definition: &Definition, rows: &[Row]) -> Table {
     let mut table = Table::new().int("case", rows.iter().map(|row| row.case as i64));
-    for (place, (name, holds)) in definition.keys.iter().enumerate() {
+    for (place, VaryingKey { name, holds, .. }) in definition.keys.iter().enumerate() {
         table = match holds {
             Holds::Numbers => table.float(name, rows.iter().map(|row| row.key(place))),
             Holds::WholeNumbers | Holds::Texts => {
@@ -84,7 +84,7 @@ fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
     let width = texts.chain([1]).max().unwrap_or(1);
     let case = rows.iter().map(|row| i32::try_from(row.case).unwrap_or(i32::MAX)).collect();
     let mut variables = vec![Variable::new("case", &["case"], Data::I32(case)).text("long_name", "number of the case")];
-    for (place, (name, holds)) in definition.keys.iter().enumerate() {
+    for (place, VaryingKey { name, holds, .. }) in definition.keys.iter().enumerate() {
         variables.push(match holds {
             Holds::Texts => {
                 let padded = |row: &Row| format!("{:width$}", text(row, place)).into_bytes();
