@@ -16,6 +16,9 @@ use crate::{Error, Pulse, SPEED_OF_LIGHT_M_S};
 /// whatever the rounding of the range.
 const PARTS_OF_LAYER: f64 = (1_u64 << 24) as f64;
 
+/// Halvings of an interval, which exhaust double precision.
+const HALVINGS: usize = 60;
+
 /// Smallest part of the weight that must fall on air with a known velocity.
 const LEAST_KNOWN_WEIGHT: f64 = 0.5;
 
@@ -88,6 +91,46 @@ impl RangeFilter {
             weight * self.pulse.range_weight_per_m(sample_m - offset_m)
         };
         self.taps.iter().map(weight).sum()
+    }
+
+    /// Standard deviation of the weights in range \[m\]: that of the pulse and that of the window, squared and added.
+    pub fn standard_deviation_m(&self) -> f64 {
+        let moment = |power: i32| self.taps.iter().map(|&(time_s, weight)| weight * time_s.powi(power)).sum::<f64>();
+        let window_m = 0.5 * SPEED_OF_LIGHT_M_S * (moment(2) - moment(1).powi(2)).max(0.0).sqrt();
+        window_m.hypot(self.pulse.sigma_m() * std::f64::consts::FRAC_1_SQRT_2)
+    }
+
+    /// Full width of the weights at half their maximum \[m\], between the outermost ranges that have half of it: the range
+    /// resolution.
+    pub fn full_width_half_maximum_m(&self) -> f64 {
+        let (near_m, far_m) = self.pulse.weight_reach_m();
+        let sample_m = |tap: Option<&(f64, f64)>| 0.5 * SPEED_OF_LIGHT_M_S * tap.map_or(0.0, |&(time_s, _)| time_s);
+        let first_m = sample_m(self.taps.first()) + near_m;
+        let length_m = sample_m(self.taps.last()) + far_m - first_m;
+        // Half a sample at most, so that samples apart are not passed over.
+        let apart_m = sample_m(self.taps.get(1)) - sample_m(self.taps.first());
+        let fine_m = if apart_m > 0.0 { 0.5 * apart_m } else { length_m };
+        let step_m = fine_m.min(0.125 * self.pulse.sigma_m()).max(5e-5 * length_m);
+        let at_m = |i: usize| first_m + i as f64 * step_m;
+        let weights: Vec<f64> = (0..=(length_m / step_m).ceil() as usize).map(|i| self.weight_per_m(at_m(i))).collect();
+        let top = weights.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(i, _)| i);
+        // The maximum by halving, between the neighbours of the highest point.
+        let (mut low_m, mut high_m) = (at_m(top) - step_m, at_m(top) + step_m);
+        for _ in 0..HALVINGS {
+            let (a_m, b_m) = (low_m + (high_m - low_m) / 3.0, high_m - (high_m - low_m) / 3.0);
+            if self.weight_per_m(a_m) < self.weight_per_m(b_m) { low_m = a_m } else { high_m = b_m }
+        }
+        let half = 0.5 * self.weight_per_m(0.5 * (low_m + high_m));
+        let crossing_m = |mut outside_m: f64, mut inside_m: f64| {
+            for _ in 0..HALVINGS {
+                let middle_m = 0.5 * (outside_m + inside_m);
+                if self.weight_per_m(middle_m) < half { outside_m = middle_m } else { inside_m = middle_m }
+            }
+            inside_m
+        };
+        let first = weights.iter().position(|w| *w >= half).unwrap_or(top);
+        let last = weights.iter().rposition(|w| *w >= half).unwrap_or(top);
+        crossing_m(at_m(last) + step_m, at_m(last)) - crossing_m(at_m(first) - step_m, at_m(first))
     }
 
     /// Filtered velocity \[m/s\] at `range_m` of a profile given by a function of range \[m\], evaluated at the layer

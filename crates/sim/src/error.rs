@@ -32,6 +32,18 @@ pub enum Error {
         /// What is wrong with the file.
         source: Box<Error>,
     },
+    /// A case of a sweep was refused or could not be run.
+    #[error("case {case} of the sweep ({keys}): {source}{}", others_in_words(*.others))]
+    Case {
+        /// Number of the case, from 0.
+        case: usize,
+        /// Its keys and values.
+        keys: String,
+        /// Further cases that were refused.
+        others: usize,
+        /// What is wrong.
+        source: Box<Error>,
+    },
     /// The folder holds the checkpoint of an earlier run.
     #[error("{} is the checkpoint of an earlier run: --restart continues it, --overwrite begins anew", path.display())]
     CheckpointInTheWay {
@@ -101,4 +113,8 @@ pub enum Error {
         /// What the thread pool says.
         reason: String,
     },
+}
+
+fn others_in_words(others: usize) -> String {
+    if others == 0 { String::new() } else { format!("\nand {others} more cases are refused") }
 }

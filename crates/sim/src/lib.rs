@@ -29,12 +29,13 @@
 //! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
 //! | [`measure`] | instrument, wind, signals, velocities and their errors; running a plan and writing its results |
+//! | `sweep` | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |
 //! | [`cli`] | the program `wakescope` |
 //!
 //! Features, all but the last on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
-//! PNG, the report page), `vtk` (fields for ParaView).
+//! PNG, the report page), `sweep` (design studies, with `cli`), `vtk` (fields for ParaView).
 
 #[cfg(feature = "flow")]
 pub mod flow;
@@ -44,6 +45,8 @@ mod machine;
 pub mod measure;
 pub mod plan;
 pub mod scene;
+#[cfg(feature = "sweep")]
+pub mod sweep;
 
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -8,9 +8,12 @@ use wakescope_sim::io::Table;
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::instrument::Instrument;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
-use wakescope_sim::scene::{Scene, SnrReference};
+use wakescope_sim::scene::Scene;
 
 const ENERGIES_J: [f64; 4] = [50e-6, 150e-6, 300e-6, 600e-6];
+
+/// The same as a sweep, whose cases share the flow and the phase screens.
+const VARY: [&str; 2] = ["detector.snr.reference=physical,chapter", "pulse.energy_j=50e-6,150e-6,300e-6,600e-6"];
 
 /// One energy with one reference.
 struct Curve {
@@ -30,16 +33,7 @@ fn scene(context: &Context) -> Scene {
     with_turbulence(context, with_method(early_scene(context.choose(3, 24, 100)), "CA"), 1e-13)
 }
 
-fn curve(
-    context: &Context,
-    sight: &Sight,
-    reference: (&'static str, SnrReference),
-    energy_j: f64,
-) -> Result<Curve, Failure> {
-    let mut scene = scene(context);
-    scene.detector.snr = reference.1;
-    scene.pulse.energy_j = energy_j;
-    let study = Study::run(context, sight, scene)?;
+fn curve(study: &Study, reference: &'static str, energy_j: f64) -> Curve {
     let lines = study.map.elevation_rad.len();
     let at = |gate: usize| (0..lines).map(|line| (line, gate)).collect::<Vec<_>>();
     let over_lines = (0..study.map.range_m.len()).map(|gate| study.over_profile(&at(gate))).collect();
@@ -53,25 +47,23 @@ fn curve(
         }
         study.over_cells(&part)
     };
-    Ok(Curve {
-        reference: reference.0,
+    Curve {
+        reference,
         energy_j,
         over_lines,
         inside: study.over(|d| d < INSIDE_M),
         outside: study.over(|d| d > OUTSIDE_M),
         halves: [half(false), half(true)],
         range_m: study.map.range_m.clone(),
-    })
+    }
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let mut curves = Vec::new();
     let sight = Sight::of(context, Age::Early)?;
-    for reference in REFERENCES {
-        for energy_j in ENERGIES_J {
-            curves.push(curve(context, &sight, reference, energy_j)?);
-        }
-    }
+    let studies = Study::sweep(context, &sight, scene(context), &VARY)?;
+    let names = REFERENCES.iter().flat_map(|(name, _)| ENERGIES_J.map(|energy_j| (*name, energy_j)));
+    let curves: Vec<Curve> =
+        studies.iter().zip(names).map(|(study, (name, energy_j))| curve(study, name, energy_j)).collect();
     let origin = context.provenance_of_formula(&sight.scene(context, scene(context)).to_toml());
     let styles = [Style::Dash, Style::Dot, Style::DashDot, Style::Line];
     let panel = |reference: &str| {

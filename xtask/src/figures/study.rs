@@ -18,6 +18,7 @@ use wakescope_sim::scene::{
     Flow, Method, ModelOrder, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
     SnrReference, Turbulence, VortexPair, Weighting,
 };
+use wakescope_sim::sweep::{self, Request, Sweep};
 use wakescope_sim::{measure::run, measure::wind, measure::write};
 
 /// Lines of sight 0.5 m apart that a region of 2 m shares.
@@ -160,6 +161,18 @@ impl Study {
         let toml = sight.scene(context, scene).to_toml();
         let plan = Plan::new(SceneFile::parse(&toml, &sight.folder.join("scene.toml"))?, Target::Map)?;
         let map = run::run(&plan, &Silent)?.map.ok_or_else(|| Failure::new("the plan gave no map".into()))?;
+        Ok(Self::of(sight, plan, map))
+    }
+
+    /// Runs the maps of a scene with keys that vary, the last one fastest.
+    pub(super) fn sweep(context: &Context, sight: &Sight, scene: Scene, vary: &[&str]) -> Result<Vec<Self>, Failure> {
+        let toml = sight.scene(context, scene).to_toml();
+        let request = Request { vary: vary.iter().map(ToString::to_string).collect(), ..Request::default() };
+        let sweep = Sweep::parse(&toml, &sight.folder.join("scene.toml"), &request)?;
+        Ok(sweep::maps(&sweep, &Silent)?.into_iter().map(|(plan, map)| Self::of(sight, plan, map)).collect())
+    }
+
+    fn of(sight: &Sight, plan: Plan, map: VelocityEstimates) -> Self {
         let cores = sight.cores.clone();
         let distance = |el: f64, r: f64| {
             let (y, z) = (r * el.cos(), plan.scene.scene.scan.lidar_height_m + r * el.sin());
@@ -167,7 +180,7 @@ impl Study {
         };
         let row = |el: &f64| map.range_m.iter().map(|&r| distance(*el, r)).collect();
         let distance_m = map.elevation_rad.iter().map(row).collect();
-        Ok(Self { cores, plan, map, distance_m })
+        Self { cores, plan, map, distance_m }
     }
 
     pub(super) fn provenance(&self) -> Provenance {

@@ -8,6 +8,7 @@ mod budget;
 mod flow;
 mod output;
 mod progress;
+mod sweep;
 mod wake;
 
 use crate::io::Existing;
@@ -70,6 +71,10 @@ enum Command {
     Bound(bound::BoundWords),
     /// The power budget in dB, from the energy of a pulse to the signal-to-noise ratio, with what bounds the instrument.
     Budget(budget::BudgetWords),
+    /// Run many scenes that differ in some keys: a table and pictures of what each gives.
+    Sweep(sweep::SweepWords),
+    /// The rows of a table that no other one beats.
+    Pareto(sweep::ParetoWords),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow(flow::FlowWords),
     /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
@@ -130,6 +135,8 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Map(io) => execute(io, Target::Map, cli),
         Command::Bound(words) => bound::bound(words, cli),
         Command::Budget(words) => budget::budget(words, cli),
+        Command::Sweep(words) => sweep::sweep(words, cli),
+        Command::Pareto(words) => sweep::pareto(words, cli),
         Command::Flow(words) => flow::flow(words, cli),
         Command::Wake(words) => wake::wake(words, cli),
     }

@@ -71,6 +71,7 @@ fn problems(error: &Error) -> Vec<Value> {
         Error::Scene(SceneError::Unreadable { path, source }) | Error::Io { path, source, .. } => {
             vec![problem(path, None, &source.to_string())]
         }
+        Error::Case { source, .. } => problems(source),
         Error::OfKey { key, source } => {
             let mut found = problems(source);
             found.iter_mut().for_each(|problem| problem["key"] = json!(key));

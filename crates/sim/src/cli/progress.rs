@@ -60,6 +60,31 @@ impl Observer for Quiet {
     }
 }
 
+/// The bar of a sweep: cases that are done, the time left, the last one.
+pub(super) struct SweepBar(ProgressBar);
+
+impl SweepBar {
+    pub(super) fn new() -> Self {
+        let style = ProgressStyle::with_template("  cases [{bar:32}] {pos}/{len}  {elapsed} gone, {eta} left  {msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar())
+            .progress_chars("=> ");
+        Self(ProgressBar::no_length().with_style(style))
+    }
+
+    /// A case is done.
+    pub(super) fn done(&self, case: &str, done: usize, of: usize) {
+        self.0.set_length(of as u64);
+        self.0.set_position(done as u64);
+        self.0.set_message(case.to_owned());
+    }
+}
+
+impl Drop for SweepBar {
+    fn drop(&mut self) {
+        self.0.abandon();
+    }
+}
+
 /// Divisions of the bar of a flow.
 const FLOW_DIVISIONS: f64 = 10_000.0;
 

@@ -11,6 +11,7 @@
 //! | [`site`] | (data) place and date of a measurement | - |
 //! | [`own`] | which files this program wrote, so that no other is replaced | - |
 //! | [`csv`] | any table | - |
+//! | [`csv_input`] | (reader) tables of texts | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
 //! | `text_file`, `netcdf_header`, `netcdf_input`, `planes_input` | (readers) texts, classic NetCDF, cross-planes in it | `netcdf` but for texts |
@@ -37,6 +38,7 @@ pub mod cf_signals;
 #[cfg(feature = "netcdf")]
 pub mod cfradial;
 pub mod csv;
+pub mod csv_input;
 #[cfg(feature = "netcdf")]
 pub(crate) mod edges;
 mod error;

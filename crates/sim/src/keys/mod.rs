@@ -15,10 +15,14 @@ mod vet;
 mod words;
 
 pub(crate) use checker::{Checker, Side};
-#[cfg(test)]
+#[cfg(any(test, feature = "sweep"))]
 pub(crate) use key::Kind;
 pub(crate) use key::{Key, join};
 pub(crate) use probe::keys_of;
 pub use problem::{Located, Problem, SceneError};
 pub(crate) use source::Source;
 pub(crate) use vet::{Document, Format};
+#[cfg(all(feature = "sweep", feature = "netcdf"))]
+pub(crate) use words::unit_of;
+#[cfg(feature = "sweep")]
+pub(crate) use words::{near, one_of};

@@ -37,9 +37,14 @@ const UNITS: [(&str, &str); 28] = [
     ("_sr", "sr"),
 ];
 
+/// The unit of a key by its name.
+pub(crate) fn unit_of(key: &str) -> Option<&'static str> {
+    UNITS.iter().find(|(end, _)| key.ends_with(end)).map(|(_, unit)| *unit)
+}
+
 /// " in m", or nothing where the name has no unit.
 fn in_unit(key: &str) -> String {
-    UNITS.iter().find(|(end, _)| key.ends_with(end)).map(|(_, unit)| format!(" in {unit}")).unwrap_or_default()
+    unit_of(key).map(|unit| format!(" in {unit}")).unwrap_or_default()
 }
 
 /// The kind of value that a key of this name takes.
@@ -66,7 +71,7 @@ pub(super) fn wanted(key: &str, kind: &Kind) -> String {
 }
 
 /// `one of "a", "b"`.
-pub(super) fn one_of(names: &[&str]) -> String {
+pub(crate) fn one_of(names: &[&str]) -> String {
     format!("one of {}", list(names))
 }
 
@@ -75,7 +80,7 @@ fn list(names: &[&str]) -> String {
 }
 
 /// The name that is nearest to a word, if it is near enough to be meant.
-pub(super) fn near<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn near<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let word: Vec<char> = word.chars().take(LONGEST_QUOTE).map(|c| c.to_ascii_lowercase()).collect();
     let far = (word.len() / 3).max(1);
     names.map(|name| (distance(&word, name), name)).filter(|(d, _)| *d <= far).min_by_key(|(d, _)| *d).map(|(_, n)| n)

@@ -55,6 +55,19 @@ struct Setting {
 }
 
 impl Setting {
+    fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
+        let (scene, g) = (&plan.scene.scene, &plan.geometry);
+        let noise = scene.detector.noise;
+        let model = estimators::window_model(scene, noise, &plan.instrument.pulse)?.ok_or(Error::NoBound)?;
+        let (sampling, gates, pulses) =
+            (estimators::sampling(scene)?, estimators::gates(scene)?, scene.scan.pulses_per_line);
+        let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
+        let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
+        let radius = region_radius(scene, scanner, &places, &correlation)?;
+        let elevation_rad = g.elevation_rad[g.elevation_rad.len() / 2];
+        Ok(Self { model, kind: estimators::signal_kind(scene), places, correlation, radius, elevation_rad })
+    }
+
     fn at(&self, range_m: f64, snr: f64) -> Result<BoundPoint, Error> {
         let point = PolarPoint { range_m, elevation_rad: self.elevation_rad };
         let (level, n_eff) = self.places.level(point, self.radius.at_m(range_m)?, &self.correlation);
@@ -73,22 +86,25 @@ impl Setting {
 /// # Errors
 /// [`Error::NoBound`] for a scene without noise; what the crates refuse.
 pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> {
-    let (scene, g) = (&plan.scene.scene, &plan.geometry);
-    let model = estimators::window_model(scene, scene.detector.noise, &plan.instrument.pulse)?.ok_or(Error::NoBound)?;
     let scanner = Scanner::new(plan, observer)?;
-    let (sampling, gates, pulses) =
-        (estimators::sampling(scene)?, estimators::gates(scene)?, scene.scan.pulses_per_line);
-    let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
-    let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
-    let radius = region_radius(scene, &scanner, &places, &correlation)?;
-    let elevation_rad = g.elevation_rad[g.elevation_rad.len() / 2];
-    let setting = Setting { model, kind: estimators::signal_kind(scene), places, correlation, radius, elevation_rad };
+    let (setting, g) = (Setting::new(plan, &scanner)?, &plan.geometry);
     let middle_m = g.gate_range_m[g.gate_range_m.len() / 2];
     let by_snr = SNR_DB.map(|db| setting.at(middle_m, 10f64.powf(0.1 * f64::from(db)))).collect::<Result<_, _>>()?;
     let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
     let by_range =
         g.gate_range_m.iter().map(|&r| setting.at(r, of_table(&layer_m, &snr, r))).collect::<Result<_, _>>()?;
     Ok(SceneBound { by_snr, by_range })
+}
+
+/// The bound in the middle of the range of the gates of a scan.
+///
+/// # Errors
+/// As [`bound`].
+#[cfg(feature = "sweep")]
+pub(crate) fn bound_in_the_middle(plan: &Plan, scanner: &Scanner<'_>) -> Result<BoundPoint, Error> {
+    let range_m = plan.geometry.gate_range_m[plan.geometry.gate_range_m.len() / 2];
+    let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
+    Setting::new(plan, scanner)?.at(range_m, of_table(&layer_m, &snr, range_m))
 }
 
 impl SceneBound {

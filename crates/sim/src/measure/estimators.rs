@@ -239,6 +239,36 @@ impl<S: Sample> Toolkit<S> {
     }
 }
 
+/// Correlogram of all lags and the scene's estimator of it, for what a mean of very many pulses would show.
+#[cfg(feature = "sweep")]
+pub(crate) struct Response {
+    pub(crate) correlogram: estimate::Correlogram<f64>,
+    pub(crate) estimator: Box<dyn Estimator>,
+}
+
+/// The response of a scene at a signal-to-noise ratio `snr`; none for complex signals, for the likelihood of gradients, which
+/// knows no correlogram, and for lines that are shifted.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+#[cfg(feature = "sweep")]
+pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<Response>, Error> {
+    let e = &scene.estimator;
+    if signal_kind(scene) == SignalKind::Complex || e.follow_wind || matches!(e.method, Method::GradientLikelihood(_)) {
+        return Ok(None);
+    }
+    let correlogram = match (e.method, window_model(scene, NoiseKind::White, pulse)?) {
+        (Method::Likelihood(own), Some(model)) => {
+            let snr = own.likelihood_snr_db.map_or(snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8);
+            estimate::Correlogram::with_tapers(estimate::estimators::likelihood_tapers(&model, snr)?)?
+        }
+        _ => estimate::Correlogram::new(weighting(scene), e.window_samples)?,
+    };
+    let known = WindowStatistics { snr, n_eff: 1.0 };
+    let estimator = of_correlogram(scene, SignalKind::Real, &correlogram.lag_weights(), &known)?;
+    Ok(Some(Response { correlogram, estimator }))
+}
+
 /// Spectrum and power in the band, A^2, of a scene's noise.
 fn noise(scene: &Scene, instrument: &Instrument) -> Option<(estimate::bound::Noise, f64)> {
     let noise = match scene.detector.noise {

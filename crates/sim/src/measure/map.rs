@@ -240,8 +240,8 @@ impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
         Ok(ScanSums::new(&*self.tools.statistic, &self.gates, self.places.clone(), self.record_samples)?)
     }
 
-    /// Estimates the velocities of one realisation and adds their errors.
-    pub(crate) fn add(&mut self, scan: &Scan, clipped: Clipped) -> Result<(), Error> {
+    /// Estimates the velocities of one realisation and adds their errors; returns the velocities, m/s.
+    pub(crate) fn add(&mut self, scan: &Scan, clipped: Clipped) -> Result<Array2<f64>, Error> {
         let map = self.map(scan)?;
         let columns = self.shape.1;
         let velocity = Array2::from_shape_fn(self.shape, |(i, j)| map[i * columns + j].estimate.velocity_m_s);
@@ -263,7 +263,7 @@ impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
         self.clipped += clipped;
         self.samples += self.samples_of_realisation;
         self.realisations += 1;
-        Ok(())
+        Ok(velocity)
     }
 
     pub(crate) fn finish(self, plan: &Plan) -> VelocityEstimates {
@@ -325,21 +325,37 @@ pub(crate) fn estimate<S: Sample + wakescope_signal::scan::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
-    mut kept: impl FnMut(ArrayView2<'_, S>),
+    kept: impl FnMut(ArrayView2<'_, S>),
 ) -> Result<VelocityEstimates, Error> {
-    let mut mapper = Mapper::new(plan, scanner)?;
+    let map = estimates(&[plan], scanner, observer, kept, |_, _| ())?.pop();
+    Ok(map.ok_or(wakescope_estimate::Error::Empty { field: "plans" })?)
+}
+
+/// The same for several plans that differ in their estimators alone: the signals of each realisation are made once. `seen` is
+/// given the place of the plan and the velocities, m/s, of each map as it comes.
+pub(crate) fn estimates<S: Sample + wakescope_signal::scan::Sample>(
+    plans: &[&Plan],
+    scanner: &Scanner<'_>,
+    observer: &dyn Observer,
+    mut kept: impl FnMut(ArrayView2<'_, S>),
+    mut seen: impl FnMut(usize, &Array2<f64>),
+) -> Result<Vec<VelocityEstimates>, Error> {
+    let Some(plan) = plans.first() else { return Ok(Vec::new()) };
+    let mut mappers: Vec<Mapper<S>> = plans.iter().map(|plan| Mapper::new(plan, scanner)).collect::<Result<_, _>>()?;
     observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
     for realisation in 0..plan.realisations() {
-        let mut sums = mapper.sums()?;
+        let mut sums = mappers.iter().map(Mapper::sums).collect::<Result<Vec<_>, _>>()?;
         let clipped = scanner.in_pieces(realisation, observer, |first, records| {
             if realisation < plan.kept_realisations() {
                 kept(records);
             }
-            Ok(sums.add(first, records)?)
+            Ok(sums.iter_mut().try_for_each(|sums| sums.add(first, records))?)
         })?;
-        let scan = sums.finish();
-        mapper.add(&scan, clipped)?;
+        let scans: Vec<Scan> = sums.into_iter().map(ScanSums::finish).collect();
+        for (i, (mapper, scan)) in mappers.iter_mut().zip(&scans).enumerate() {
+            seen(i, &mapper.add(scan, clipped)?);
+        }
     }
     observer.end();
-    Ok(mapper.finish(plan))
+    Ok(mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan)).collect())
 }

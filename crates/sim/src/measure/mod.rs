@@ -6,6 +6,7 @@
 //! | [`wind`] | the wind: analytic, or the planes of a simulated flow |
 //! | [`geometry`] | lines of sight, samples, gates, layers |
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
+//! | `efficiencies` | efficiency curves that several scans share |
 //! | [`scan`] | air along the lines of sight, and their records |
 //! | [`map`], [`cell_average`] | estimates and their errors against the truth |
 //! | [`mod@bound`] | the Cramer-Rao bound for a scene |
@@ -16,6 +17,7 @@
 pub mod bound;
 pub mod budget;
 pub mod cell_average;
+pub(crate) mod efficiencies;
 pub mod estimators;
 pub mod geometry;
 pub mod instrument;
@@ -23,7 +25,7 @@ pub mod map;
 pub(crate) mod plane;
 pub mod profile;
 pub mod progress;
-mod region;
+pub(crate) mod region;
 pub mod run;
 pub mod scan;
 pub mod streams;

@@ -46,7 +46,7 @@ pub struct ScanMiddle {
 
 impl ScanMiddle {
     /// From the profile, and from the layers of the signals where there are any.
-    fn of(plan: &Plan, profile: Option<&RangeProfile>, scanner: Option<&Scanner<'_>>) -> Option<Self> {
+    pub(crate) fn of(plan: &Plan, profile: Option<&RangeProfile>, scanner: Option<&Scanner<'_>>) -> Option<Self> {
         let scan = &plan.scene.scene.scan;
         let range_m = 0.5 * (scan.range_min_m + scan.range_max_m);
         let of_profile = |values: &dyn Fn(&RangeProfile) -> Vec<f64>| {

@@ -1,11 +1,10 @@
 //! One scan: the air along each line of sight, and the signals that it returns.
 
 use crate::Error;
+use crate::measure::efficiencies::Efficiencies;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
-use crate::measure::profile::{
-    drawn_turbulence, efficiency_at, efficiency_by_theory, efficiency_realisations, model, spaced,
-};
+use crate::measure::profile::{drawn_turbulence, efficiency_by_theory, model, spaced};
 use crate::measure::progress::Observer;
 use crate::measure::streams::stream;
 use crate::plan::{Plan, Stage};
@@ -50,8 +49,16 @@ impl<'a> Scanner<'a> {
     /// # Errors
     /// What the crates refuse; a checked scene gives none.
     pub fn new(plan: &'a Plan, observer: &dyn Observer) -> Result<Self, Error> {
+        Self::with(plan, &Efficiencies::default(), observer)
+    }
+
+    /// The same with efficiencies that other scans may share.
+    ///
+    /// # Errors
+    /// As [`Scanner::new`].
+    pub(crate) fn with(plan: &'a Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Self, Error> {
         let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
-        let weight_per_m = layer_weights(plan, observer)?;
+        let weight_per_m = layer_weights(plan, known, observer)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
         let lines = (0..geometry.elevation_rad.len())
             .into_par_iter()
@@ -68,7 +75,7 @@ impl<'a> Scanner<'a> {
             })
             .collect::<Result<Vec<_>, Error>>()?;
         observer.end();
-        let efficiency = drawn_efficiency(plan, &lines, observer)?;
+        let efficiency = drawn_efficiency(plan, &lines, known, observer)?;
         let record = Record {
             time_of_first_sample_s: 2.0 * geometry.first_range_m / crate::SPEED_OF_LIGHT_M_S,
             samples: geometry.samples,
@@ -200,7 +207,7 @@ const PIECE_BYTES: usize = 16 << 20;
 
 /// Return per metre of each layer, K^2 beta A_R eta_s/R^2, (9); the efficiency is interpolated, and left out if each pulse
 /// brings its own. A signal-to-noise ratio that the scene states takes the place of all of it.
-fn layer_weights(plan: &Plan, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
+fn layer_weights(plan: &Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
     let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         let unit = instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), 1.0);
@@ -208,12 +215,7 @@ fn layer_weights(plan: &Plan, observer: &dyn Observer) -> Result<Vec<f64>, Error
     }
     let profile = match drawn_turbulence(scene) {
         Some(_) => None,
-        None => {
-            observer.begin(Stage::Efficiency, 1);
-            let profile = efficiency_at(scene, instrument, &profile_ranges_m(scene, geometry), observer)?;
-            observer.end();
-            Some(profile)
-        }
+        None => Some(known.mean(scene, instrument, &profile_ranges_m(scene, geometry), observer)?),
     };
     let weight = |range_m: f64| {
         let eta = profile.as_ref().map_or(Ok(1.0), |profile| profile.interpolated(range_m))?;
@@ -244,12 +246,13 @@ fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfS
 fn drawn_efficiency(
     plan: &Plan,
     lines: &[LineOfSight],
+    known: &Efficiencies,
     observer: &dyn Observer,
 ) -> Result<Option<LayerEfficiency>, Error> {
     let scene = &plan.scene.scene;
     let (Some(t), Some(line)) = (drawn_turbulence(scene), lines.first()) else { return Ok(None) };
     let ranges_m = profile_ranges_m(scene, &plan.geometry);
-    let realisations = efficiency_realisations(scene, &plan.instrument, &t, &ranges_m, observer)?;
+    let realisations = known.of_realisations(scene, &plan.instrument, &t, &ranges_m, observer)?;
     Ok(Some(EfficiencyTable::new(ranges_m, &realisations)?.onto_layers(line)?))
 }
 

@@ -155,7 +155,7 @@ pub fn provenance(plan: &Plan) -> Provenance {
 }
 
 /// The scene with every default written out: running it again gives the same files.
-fn scene_text(origin: &Provenance) -> String {
+pub(crate) fn scene_text(origin: &Provenance) -> String {
     format!("# {}, scene {}\n{}", origin.program, origin.scene_hash, origin.scene_toml)
 }
 

@@ -10,6 +10,7 @@ use crate::measure::wind::SceneWind;
 use crate::measure::write::Contents;
 use crate::scene::{Method, Scene, SceneFile, Weighting};
 use std::fmt;
+use std::sync::Arc;
 
 mod ambiguity;
 mod files;
@@ -39,7 +40,7 @@ pub struct Plan {
     /// Sampling in angle, range and time.
     pub geometry: Geometry,
     /// The wind.
-    pub wind: SceneWind,
+    pub wind: Arc<SceneWind>,
     /// What the user should know before the run.
     pub warnings: Vec<String>,
 }
@@ -51,7 +52,15 @@ impl Plan {
     /// Planes that cannot be read, end before the scan or are left by a line of sight; what a crate refuses of the scene,
     /// such as phase screens too coarse for the turbulence; results that a file cannot hold.
     pub fn new(scene: SceneFile, target: Target) -> Result<Self, Error> {
-        let wind = SceneWind::new(&scene)?;
+        let wind = Arc::new(SceneWind::new(&scene)?);
+        Self::with_wind(scene, target, wind)
+    }
+
+    /// Plans a run with the wind of the scene, which others may share.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub(crate) fn with_wind(scene: SceneFile, target: Target, wind: Arc<SceneWind>) -> Result<Self, Error> {
         let instrument = Instrument::new(&scene.scene)?;
         let geometry = Geometry::new(&scene.scene, &instrument.pulse, &wind)?;
         let last_s = end_s(&wind, &geometry);

@@ -49,6 +49,17 @@ impl SceneFile {
         Ok(Self { folder: source.folder().to_owned(), source, ..file })
     }
 
+    /// The table of a text with every default written out, whatever the limits of its values.
+    ///
+    /// # Errors
+    /// Keys that do not exist, values of the wrong kind.
+    #[cfg(feature = "sweep")]
+    pub(crate) fn whole_table(text: &str, path: &Path) -> Result<toml::Table, SceneError> {
+        let document = Document::parse(text, path)?;
+        let scene: Scene = document.read(document.vet(&scene_format())?)?;
+        Ok(toml::Table::try_from(scene).unwrap_or_default())
+    }
+
     /// Checks a scene that was made in memory; its files are relative to the working folder.
     ///
     /// # Errors
@@ -75,12 +86,17 @@ impl SceneFile {
     }
 }
 
+/// The keys that a scene may state.
+pub(crate) fn scene_keys() -> &'static [Key] {
+    static KEYS: LazyLock<Vec<Key>> = LazyLock::new(keys_of::<Scene>);
+    &KEYS
+}
+
 /// What a scene may say.
 fn scene_format() -> Format<'static> {
-    static KEYS: LazyLock<Vec<Key>> = LazyLock::new(keys_of::<Scene>);
     static DEFAULTS: LazyLock<toml::Table> =
         LazyLock::new(|| toml::Table::try_from(Scene::default()).unwrap_or_default());
-    Format { keys: &KEYS, defaults: &DEFAULTS, examples: &[SCENE_EXAMPLES, TABLE2_TOML] }
+    Format { keys: scene_keys(), defaults: &DEFAULTS, examples: &[SCENE_EXAMPLES, TABLE2_TOML] }
 }
 
 #[cfg(test)]

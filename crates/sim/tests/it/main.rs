@@ -11,6 +11,8 @@ mod receiver;
 mod scene_features;
 #[cfg(all(feature = "flow", feature = "netcdf"))]
 mod simulated_flow;
+#[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
+mod sweep;
 #[cfg(feature = "cli")]
 mod wake;
 

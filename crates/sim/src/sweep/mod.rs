@@ -1,0 +1,32 @@
+//! Design studies: many scenes that differ in some keys, what each gives, and which of them are best.
+//!
+//! | module | what is in it |
+//! |---|---|
+//! | `key_path`, `expression` | keys of a scene by their paths; arithmetic on them |
+//! | `cases` | grids and lists of values; all cases as checked scenes |
+//! | `run` | checking all, running what is not there yet, sharing what cases have in common |
+//! | `group`, `circulation`, `results` | cases of the same signals measured together; their numbers |
+//! | `stored`, `tables`, `pictures` | a folder for each case; tables and pictures of all |
+//! | [`pareto`], [`front_table`] | set-ups that no other one beats; the rows of a table that are such |
+
+mod cases;
+mod circulation;
+mod expression;
+pub mod front_table;
+mod group;
+mod key_path;
+pub mod pareto;
+#[cfg(feature = "plots")]
+mod pictures;
+mod results;
+mod run;
+mod stored;
+mod tables;
+
+pub use cases::{Case, MOST_CASES, Request, Sweep};
+pub use results::RESULTS;
+pub use run::{Settings, Shard, Shared, Summary, Told, maps, run};
+pub use stored::merge;
+
+#[cfg(test)]
+mod sweep_tests;

@@ -1,0 +1,82 @@
+//! Set-ups that no other one beats: the Pareto front of columns of a table, with what is doubtful within the errors.
+//!
+//! a dominates b if it is nowhere worse and somewhere better. Equal points all stay; what is not finite is never on the front
+//! and dominates nothing. Check: the stored fronts, and every pair of 1000 random points.
+
+/// Whether small or large values are better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sense {
+    /// Small ones.
+    Min,
+    /// Large ones.
+    Max,
+}
+
+/// Standard errors of the difference within which a point counts as nearly dominated.
+pub const NEAR: f64 = 2.0;
+
+/// A column that is to be small or large.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Objective {
+    /// What is better.
+    pub sense: Sense,
+    /// Value of each point.
+    pub values: Vec<f64>,
+    /// Standard error of each, in the same unit; empty or NaN where it is exact.
+    pub standard_errors: Vec<f64>,
+}
+
+impl Objective {
+    /// A column known exactly.
+    pub fn exact(sense: Sense, values: Vec<f64>) -> Self {
+        Self { sense, values, standard_errors: Vec::new() }
+    }
+
+    /// By how much point `a` is better than `b`; NaN for what is not there.
+    fn gain(&self, a: usize, b: usize) -> f64 {
+        let value = |i: usize| self.values.get(i).copied().unwrap_or(f64::NAN);
+        match self.sense {
+            Sense::Min => value(b) - value(a),
+            Sense::Max => value(a) - value(b),
+        }
+    }
+
+    /// Standard error of the difference of two points.
+    fn error(&self, a: usize, b: usize) -> f64 {
+        let error = |i: usize| self.standard_errors.get(i).copied().filter(|e| e.is_finite()).unwrap_or(0.0);
+        error(a).hypot(error(b))
+    }
+}
+
+/// What a front says of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Another point dominates it, or a value is not finite.
+    Off,
+    /// On the front.
+    On,
+    /// On the front, and with [`NEAR`] standard errors less luck another point would dominate it.
+    Doubtful,
+}
+
+/// The place of each point.
+#[must_use]
+pub fn front(objectives: &[Objective]) -> Vec<Place> {
+    let points = objectives.iter().map(|o| o.values.len()).min().unwrap_or(0);
+    let is_finite = |i: &usize| objectives.iter().all(|o| o.values[*i].is_finite());
+    let finite: Vec<usize> = (0..points).filter(is_finite).collect();
+    let dominates = |a: usize, b: usize, lenience: f64| {
+        let gains = || objectives.iter().map(|o| o.gain(a, b) + lenience * o.error(a, b));
+        a != b && gains().all(|gain| gain >= 0.0) && gains().any(|gain| gain > 0.0)
+    };
+    let mut places = vec![Place::Off; points];
+    for &point in &finite {
+        let beaten = |lenience: f64| finite.iter().any(|other| dominates(*other, point, lenience));
+        places[point] = match (beaten(0.0), beaten(NEAR)) {
+            (true, _) => Place::Off,
+            (false, true) => Place::Doubtful,
+            (false, false) => Place::On,
+        };
+    }
+    places
+}

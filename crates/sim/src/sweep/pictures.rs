@@ -1,0 +1,133 @@
+//! Pictures of a sweep: every result against each key that is a number, and the front of precision against resolution.
+//!
+//! Check: by eye; a test of the program compares the names of the files.
+
+use super::pareto::{Objective, Place, Sense, front};
+use super::results::{RESULTS, standard_error_of};
+use super::stored::{Definition, Holds};
+use super::tables::Row;
+use crate::Error;
+use crate::io::FileGroup;
+use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
+
+/// Panels of a picture: title, axis, whether it is logarithmic, the result and a bound, which is dashed.
+const PANELS: [(&str, &str, bool, [&str; 2]); 6] = [
+    ("Signal-to-noise ratio in the middle of the scan", "SNR [dB]", false, ["snr_db", ""]),
+    ("Error outside the vortices; dashed: bound", "rms [m/s]", true, ["rms_outside_m_s", "bound_m_s"]),
+    ("Error inside the vortices", "rms [m/s]", true, ["rms_inside_m_s", ""]),
+    ("Estimates outside that are spread over the band", "fraction", false, ["bad_fraction", ""]),
+    ("Range resolution", "full width at half maximum [m]", false, ["resolution_m", ""]),
+    (
+        "Error of the circulation; dashed: bound",
+        "rms [m^{2}/s]",
+        true,
+        ["circulation_rms_m2_s", "circulation_bound_m2_s"],
+    ),
+];
+
+/// Curves of a panel that a legend can tell apart; more are drawn as points alone.
+const MOST_CURVES: usize = 6;
+
+/// Name of the picture of the front.
+const FRONT: &str = "front";
+
+fn stem(key: &str) -> String {
+    format!("results_{}", key.replace('.', "_"))
+}
+
+fn drawn(definition: &Definition) -> impl Iterator<Item = (usize, &str)> {
+    definition.free().filter(|(place, _)| definition.keys[*place].holds != Holds::Texts)
+}
+
+/// Names of the files.
+pub(super) fn names(definition: &Definition) -> Vec<String> {
+    let stems = drawn(definition).map(|(_, name)| stem(name)).chain([FRONT.to_owned()]);
+    stems.flat_map(|stem| [format!("{stem}.svg"), format!("{stem}.png")]).collect()
+}
+
+/// Adds the pictures to the files of a sweep.
+pub(super) fn add(files: &mut FileGroup, definition: &Definition, rows: &[Row]) -> Result<(), Error> {
+    let mut put = |stem: &str, figure: &Figure| -> Result<(), Error> {
+        files.add(&format!("{stem}.svg"), figure.svg(&definition.origin)?)?;
+        Ok(files.add(&format!("{stem}.png"), figure.png(&definition.origin)?)?)
+    };
+    for (place, name) in drawn(definition) {
+        let panels = PANELS.map(|panel| against(definition, rows, (place, name), &panel));
+        let mut figure = Figure::stacked(panels.into_iter().flatten());
+        (figure.columns, figure.width) = (2, 1240.0);
+        put(&stem(name), &figure)?;
+    }
+    put(FRONT, &Figure::stacked([of_front(rows)]))
+}
+
+/// A panel of a result against a key; none where no case has any.
+fn against(
+    definition: &Definition,
+    rows: &[Row],
+    (place, key): (usize, &str),
+    (title, label, is_log, [result, bound]): &(&str, &str, bool, [&str; 2]),
+) -> Option<CurvePlot> {
+    let x: Vec<f64> = rows.iter().map(|row| row.key(place)).filter(|x| x.is_finite()).collect();
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+    let axis = if low > 0.0 && high >= 8.0 * low { Axis::log(key) } else { Axis::linear(key) };
+    let mut plot = CurvePlot::new(title, axis, if *is_log { Axis::log(label) } else { Axis::linear(label) });
+    plot.shape = 0.6;
+    let error = standard_error_of(result, RESULTS.iter().map(|(name, ..)| *name));
+    let (curves, mut any) = (curves(definition, rows, place), false);
+    // Without a name either no other key varies, or there are too many curves.
+    let curves_are_whole = definition.free().count() == 1;
+    for (colour, (curve, members)) in curves.iter().enumerate() {
+        let points = |name: &str| {
+            let found = members.iter().map(|row| (row.key(place), row.result(name)));
+            let mut points: Vec<(f64, f64)> = found.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            points
+        };
+        let values = points(result);
+        any |= !values.is_empty();
+        if !curve.is_empty() || curves_are_whole {
+            plot = plot.with(Series::new("", Style::Line, values.clone()).in_colour(colour));
+            plot = plot.with(Series::new("", Style::Dash, points(bound)).in_colour(colour));
+        }
+        // In the order of the values, whose x they share.
+        let bars: Vec<(f64, f64)> = error.map_or(Vec::new(), points);
+        let bar = |x: f64| bars.iter().find(|(at, _)| *at == x).map_or(0.0, |(_, error)| *error);
+        let half: Vec<f64> = values.iter().map(|(x, _)| bar(*x)).collect();
+        plot = plot.with(Series::new(curve, Style::Markers, values).with_band(&half).in_colour(colour));
+    }
+    any.then_some(plot)
+}
+
+/// Cases that differ in one key alone belong to one curve; all to one without a name where there are too many.
+fn curves<'r>(definition: &Definition, rows: &'r [Row], place: usize) -> Vec<(String, Vec<&'r Row>)> {
+    let mut curves: Vec<(String, Vec<&Row>)> = Vec::new();
+    for row in rows {
+        let short = |name: &str| name.rsplit('.').next().unwrap_or_default().to_owned();
+        let value = |place: usize| row.keys.get(place).map_or("", String::as_str);
+        let others = definition.free().filter(|(other, _)| *other != place);
+        let label: Vec<String> = others.map(|(other, name)| format!("{} {}", short(name), value(other))).collect();
+        let label = label.join(", ");
+        match curves.iter_mut().find(|(known, _)| *known == label) {
+            Some((_, members)) => members.push(row),
+            None => curves.push((label, vec![row])),
+        }
+    }
+    if curves.len() <= MOST_CURVES { curves } else { vec![(String::new(), rows.iter().collect())] }
+}
+
+/// Precision against resolution, with the front.
+fn of_front(rows: &[Row]) -> CurvePlot {
+    let column = |name: &str| rows.iter().map(|row| row.result(name)).collect::<Vec<_>>();
+    let (resolution_m, std_m_s, error_m_s) =
+        (column("resolution_m"), column("std_m_s"), column("std_standard_error_m_s"));
+    let precision = Objective { sense: Sense::Min, values: std_m_s.clone(), standard_errors: error_m_s.clone() };
+    let places = front(&[Objective::exact(Sense::Min, resolution_m.clone()), precision]);
+    let all = || resolution_m.iter().copied().zip(std_m_s.iter().copied());
+    let mut best: Vec<(f64, f64)> = all().zip(&places).filter(|(_, p)| **p != Place::Off).map(|(xy, _)| xy).collect();
+    best.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let bars: Vec<f64> = error_m_s.iter().map(|error| if error.is_finite() { *error } else { 0.0 }).collect();
+    let x = Axis::linear("full width at half maximum in range [m]");
+    CurvePlot::new("Precision against resolution", x, Axis::log("standard deviation [m/s]"))
+        .with(Series::new("front", Style::Line, best))
+        .with(Series::new("cases", Style::Markers, all()).with_band(&bars))
+}

@@ -1,0 +1,236 @@
+//! What a case gives in numbers: a row of the results.
+//!
+//! Errors are averages over cells of the map, of which those that share pulses and windows count as one where a standard error
+//! is made. Check: the columns of a run against its map; resolution against the stored table.
+
+use super::circulation::Circulation;
+use crate::Error;
+use crate::measure::bound::BoundPoint;
+use crate::measure::cell_average::CellAverage;
+use crate::measure::estimators;
+use crate::measure::map::VelocityEstimates;
+use crate::measure::run::ScanMiddle;
+use crate::measure::wind::vortex_pair;
+use crate::plan::Plan;
+use crate::scene::{Flow, Method, RegionRadius, Scene};
+use ndarray::Array2;
+use wakescope_signal::RangeFilter;
+
+/// Cells within this part of the spacing of a pair from a centre are inside its vortices: 8 m of 47.
+const INSIDE: f64 = 8.0 / 47.0;
+/// Cells beyond this part from both are outside: 30 m of 47.
+const OUTSIDE: f64 = 30.0 / 47.0;
+
+/// Estimates so many widths of a peak away from the air are no estimates of it.
+const BEYOND_WIDTHS: f64 = 3.0;
+
+/// Names, units and meanings of the results, in the order of the columns.
+pub const RESULTS: [(&str, &str, &str); 32] = [
+    ("snr_db", "dB", "signal-to-noise ratio in the detector band in the middle of the scan"),
+    ("resolution_m", "m", "full width at half maximum of the weight of pulse and window in range"),
+    ("resolution_sd_m", "m", "standard deviation of that weight"),
+    ("bound_m_s", "m s-1", "Cramer-Rao bound on the velocity of a region in the middle of the scan"),
+    ("std_m_s", "m s-1", "standard deviation of one estimate, over the map"),
+    ("std_standard_error_m_s", "m s-1", "standard error of std_m_s"),
+    ("bias_m_s", "m s-1", "mean error, over the map"),
+    ("bias_standard_error_m_s", "m s-1", "standard error of bias_m_s"),
+    ("rms_m_s", "m s-1", "root mean square error, over the map"),
+    ("rms_standard_error_m_s", "m s-1", "standard error of rms_m_s"),
+    ("std_inside_m_s", "m s-1", "standard deviation of one estimate, inside the vortices"),
+    ("std_inside_standard_error_m_s", "m s-1", "standard error of std_inside_m_s"),
+    ("bias_inside_m_s", "m s-1", "mean error, inside the vortices"),
+    ("bias_inside_standard_error_m_s", "m s-1", "standard error of bias_inside_m_s"),
+    ("rms_inside_m_s", "m s-1", "root mean square error, inside the vortices"),
+    ("rms_inside_standard_error_m_s", "m s-1", "standard error of rms_inside_m_s"),
+    ("std_outside_m_s", "m s-1", "standard deviation of one estimate, outside the vortices"),
+    ("std_outside_standard_error_m_s", "m s-1", "standard error of std_outside_m_s"),
+    ("bias_outside_m_s", "m s-1", "mean error, outside the vortices"),
+    ("bias_outside_standard_error_m_s", "m s-1", "standard error of bias_outside_m_s"),
+    ("rms_outside_m_s", "m s-1", "root mean square error, outside the vortices"),
+    ("rms_outside_standard_error_m_s", "m s-1", "standard error of rms_outside_m_s"),
+    ("flagged_fraction", "1", "part of the estimates that is flagged"),
+    ("flagged_standard_error_fraction", "1", "standard error of flagged_fraction"),
+    ("bad_fraction", "1", "part of the estimates outside the vortices that is spread over the band"),
+    ("bad_standard_error_fraction", "1", "standard error of bad_fraction"),
+    ("circulation_bias_m2_s", "m2 s-1", "mean error of the circulation fitted to a map"),
+    ("circulation_bias_standard_error_m2_s", "m2 s-1", "standard error of circulation_bias_m2_s"),
+    ("circulation_rms_m2_s", "m2 s-1", "root mean square error of the circulation fitted to a map"),
+    ("circulation_rms_standard_error_m2_s", "m2 s-1", "standard error of circulation_rms_m2_s"),
+    ("circulation_failed_fraction", "1", "part of the fits that did not come to an end"),
+    ("circulation_bound_m2_s", "m2 s-1", "Cramer-Rao bound on the circulation from all signals of a scan, known cores"),
+];
+
+/// Name of the column that has the standard error of a column: `std_m_s` has `std_standard_error_m_s`.
+pub(crate) fn standard_error_of<'a>(name: &str, mut columns: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    columns.find(|column| column.contains("_standard_error") && column.replacen("_standard_error", "", 1) == name)
+}
+
+/// What was measured in a case.
+pub(super) struct Measured<'a> {
+    pub(super) middle: ScanMiddle,
+    pub(super) bound: Option<BoundPoint>,
+    pub(super) map: &'a VelocityEstimates,
+    /// Errors of single estimates outside the vortices, m/s, one of each group of cells that share windows.
+    pub(super) errors_m_s: &'a [f64],
+    pub(super) circulation: Option<Circulation>,
+}
+
+/// The row of a case, in the order of [`RESULTS`].
+///
+/// # Errors
+/// What the crates refuse; a checked scene gives none.
+pub(super) fn row(plan: &Plan, measured: &Measured<'_>) -> Result<Vec<f64>, Error> {
+    let scene = &plan.scene.scene;
+    let filter = range_filter(plan)?;
+    let cells = Cells::new(plan)?;
+    let mut out = vec![
+        measured.middle.snr_db,
+        filter.full_width_half_maximum_m(),
+        filter.standard_deviation_m(),
+        measured.bound.map_or(f64::NAN, |bound| bound.region_m_s),
+    ];
+    for part in [Part::All, Part::Inside, Part::Outside] {
+        out.extend(cells.averages(measured.map, part));
+    }
+    let independent = cells.independent(Part::All) * scene.scan.realisations as f64;
+    let known: Vec<f64> = measured.map.flagged.iter().copied().filter(|f| f.is_finite()).collect();
+    let flagged = known.iter().sum::<f64>() / known.len() as f64;
+    out.extend([flagged, error_of_fraction(flagged, independent)]);
+    out.extend(bad_fraction(plan, measured.errors_m_s)?);
+    out.extend(measured.circulation.map_or([f64::NAN; 6], |c| {
+        let scatter_m2_s = (c.rms_m2_s.powi(2) - c.bias_m2_s.powi(2)).max(0.0).sqrt();
+        let maps = (1.0 - c.failed_fraction) * scene.scan.realisations as f64;
+        let bias_error_m2_s = if maps > 1.5 { scatter_m2_s / (maps - 1.0).sqrt() } else { f64::NAN };
+        [c.bias_m2_s, bias_error_m2_s, c.rms_m2_s, c.standard_error_m2_s, c.failed_fraction, c.bound_m2_s]
+    }));
+    Ok(out)
+}
+
+/// Weight of the air about the range of a gate: of the pulse and of the window.
+fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
+    let scene = &plan.scene.scene;
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let thickness_m = plan.geometry.layer_thickness_m;
+    Ok(RangeFilter::gate(&plan.instrument.pulse, &window, scene.detector.sampling_hz, thickness_m)?)
+}
+
+/// Part of the estimates that say nothing of the air, and its standard error: those farther from it than any part of a peak, and
+/// as many of the others as a level floor over the band has there.
+fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
+    let (scene, pulse) = (&plan.scene.scene, &plan.instrument.pulse);
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let moment = |power: i32| window.iter().enumerate().map(|(n, h)| h * h * (n as f64).powi(power)).sum::<f64>();
+    let mean = moment(1) / moment(0);
+    let window_s = (moment(2) / moment(0) - mean * mean).max(1.0 / 12.0).sqrt() / scene.detector.sampling_hz;
+    // A window cannot be narrower in frequency than the inverse of its length.
+    let width_hz = pulse.spectral_width_hz().hypot(0.25 * std::f64::consts::FRAC_1_PI / window_s);
+    let part = (2.0 * BEYOND_WIDTHS * width_hz / scene.detector.bandwidth_hz).min(0.9);
+    let limit_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz * part;
+    let (of, share) = (errors_m_s.len() as f64, 1.0 - part);
+    let beyond = errors_m_s.iter().filter(|error| error.is_nan() || error.abs() > limit_m_s).count() as f64 / of;
+    Ok([(beyond / share).min(1.0), error_of_fraction(beyond, of) / share])
+}
+
+/// Standard error of a fraction of so many: not 0 where none was found.
+fn error_of_fraction(fraction: f64, of: f64) -> f64 {
+    let found = fraction * of;
+    ((found + 1.0) * (of - found + 1.0) / ((of + 2.0).powi(2) * (of + 3.0))).sqrt()
+}
+
+/// Cells about which a column speaks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    All,
+    Inside,
+    Outside,
+}
+
+/// The cells of a map by their distance from the vortices.
+pub(super) struct Cells {
+    /// Distance from the nearer centre over the spacing, \[line, gate\]; infinite in air without vortices, NaN where centres are
+    /// not known.
+    distance: Array2<f64>,
+    /// Neighbouring lines and gates that share windows.
+    shared: (f64, f64),
+}
+
+impl Cells {
+    /// Of the map of a plan.
+    ///
+    /// # Errors
+    /// As [`row`].
+    pub(super) fn new(plan: &Plan) -> Result<Self, Error> {
+        let (scene, g) = (&plan.scene.scene, &plan.geometry);
+        let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
+        let line_m = scene.scan.elevation_step_rad * middle_m;
+        let gate_m = scene.estimator.gate_step_samples as f64 * g.sample_spacing_m;
+        let lines = (2.0 * radius_m(scene, middle_m) / line_m).floor() + 1.0;
+        let gates = (range_filter(plan)?.full_width_half_maximum_m() / gate_m).max(1.0);
+        let distance = Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
+            let (y_m, z_m) = position_m(scene, g.elevation_rad[i], g.gate_range_m[j]);
+            match &scene.flow {
+                Flow::VortexPair(pair) => {
+                    let centres = vortex_pair(pair).centres(plan.wind.start_s + g.line_time_s[i]);
+                    let to = |centre_m: f64| (y_m - centre_m).hypot(z_m - centres.height_m);
+                    to(centres.left_y_m).min(to(centres.right_y_m)) / pair.spacing_m
+                }
+                Flow::Simulated(_) => f64::NAN,
+                Flow::Calm {} | Flow::Uniform { .. } => f64::INFINITY,
+            }
+        });
+        Ok(Self { distance, shared: (lines.min(g.elevation_rad.len() as f64), gates.min(g.gate_range_m.len() as f64)) })
+    }
+
+    fn of(&self, part: Part) -> Vec<(usize, usize)> {
+        let belongs = |distance: f64| match part {
+            Part::All => true,
+            Part::Inside => distance < INSIDE,
+            Part::Outside => distance > OUTSIDE,
+        };
+        self.distance.indexed_iter().filter(|(_, distance)| belongs(**distance)).map(|(cell, _)| cell).collect()
+    }
+
+    /// Cells outside the vortices, all where these are not known, so far apart that they share no window.
+    pub(super) fn apart(&self) -> Vec<(usize, usize)> {
+        let (lines, gates) = (self.shared.0.ceil() as usize, self.shared.1.ceil() as usize);
+        let cells = if self.of(Part::Outside).is_empty() { self.of(Part::All) } else { self.of(Part::Outside) };
+        cells.into_iter().filter(|(i, j)| i.is_multiple_of(lines) && j.is_multiple_of(gates)).collect()
+    }
+
+    fn independent(&self, part: Part) -> f64 {
+        (self.of(part).len() as f64 / (self.shared.0 * self.shared.1)).max(1.0)
+    }
+
+    /// Standard deviation, bias and root mean square, each with its standard error, m/s.
+    fn averages(&self, map: &VelocityEstimates, part: Part) -> [f64; 6] {
+        let cells = self.of(part);
+        let average = CellAverage::over(map, &cells, self.shared.0 * self.shared.1);
+        let scans = cells.iter().map(|cell| map.count[*cell]).fold(0.0, f64::max);
+        let CellAverage { bias_m_s, std_m_s, rms_m_s, standard_error_m_s } = average;
+        // Two bounds: from the mean squares, which a bias adds to, and from the scatter of the variances over the cells, to
+        // which true differences between them add.
+        let variances: Vec<f64> =
+            cells.iter().map(|cell| map.std_m_s[*cell].powi(2)).filter(|v| v.is_finite()).collect();
+        let spread = variances.iter().map(|v| (v - std_m_s * std_m_s).powi(2)).sum::<f64>() / variances.len() as f64;
+        let independent = self.independent(part);
+        let by_squares_m_s = standard_error_m_s * rms_m_s / std_m_s;
+        let std_error_m_s = by_squares_m_s.min((spread / independent).sqrt() / (2.0 * std_m_s));
+        let bias_error_m_s = std_m_s / (scans * independent).sqrt();
+        [std_m_s, std_error_m_s, bias_m_s, bias_error_m_s, rms_m_s, standard_error_m_s]
+    }
+}
+
+/// Distance along the ground and height of a point of the scan, m.
+fn position_m(scene: &Scene, elevation_rad: f64, range_m: f64) -> (f64, f64) {
+    (range_m * elevation_rad.cos(), scene.scan.lidar_height_m + range_m * elevation_rad.sin())
+}
+
+/// Radius of the regions in the middle of the scan, m.
+fn radius_m(scene: &Scene, middle_m: f64) -> f64 {
+    match &scene.estimator.radius {
+        _ if scene.estimator.method == (Method::Periodogram {}) => 0.0,
+        RegionRadius::Fixed {} => scene.estimator.radius_m,
+        RegionRadius::OfRange { range_m, radius_m } => crate::measure::region::of_table(range_m, radius_m, middle_m),
+        RegionRadius::Target { largest_m, .. } => *largest_m,
+    }
+}

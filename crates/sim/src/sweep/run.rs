@@ -1,0 +1,254 @@
+//! Running a sweep: all cases are checked, then those without a result are run, what they have in common once.
+//!
+//! Check: counts of what is computed; the bytes of the results for threads, shards, kills.
+
+use super::cases::{Case, Sweep, without_lines};
+use super::group::{self, rows};
+use super::stored::{Definition, SWEEP, store, stored, write_tables};
+use super::tables;
+use crate::io::{Existing, Table};
+use crate::measure::efficiencies::{Efficiencies, Known};
+use crate::measure::map::VelocityEstimates;
+use crate::measure::progress::Observer;
+use crate::measure::wind::SceneWind;
+use crate::measure::write::prepare;
+use crate::plan::{Plan, Target};
+use crate::scene::{Estimator, Outputs, Scene, Site, hash_of};
+use crate::{Error, machine};
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Part of the memory that is available which cases that are measured together may take.
+const SHARE: f64 = 0.5;
+
+/// Some of the cases of a sweep: those whose number leaves `number - 1` when divided by `of`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// Which one, from 1.
+    pub number: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+impl Shard {
+    /// Whether a case is in it.
+    pub fn has(self, case: usize) -> bool {
+        case % self.of.max(1) == self.number.wrapping_sub(1)
+    }
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((number, of)) if (1..=of).contains(&number) => Ok(Self { number, of }),
+            _ => Err("a shard is NUMBER/COUNT with a number from 1 to the count, e.g. 2/8".into()),
+        }
+    }
+}
+
+/// How a sweep is run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// Only this part of the cases; no tables of all are written.
+    pub shard: Option<Shard>,
+    /// Cases whose result is there are left as they are.
+    pub resume: bool,
+    /// Cases may need more memory than the machine has.
+    pub allow_large: bool,
+    /// Whether the circulation is fitted to each map.
+    pub fits: bool,
+}
+
+/// What was computed once for all cases that have it in common.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Shared {
+    /// Winds, analytic or read.
+    pub flows: usize,
+    /// Efficiency curves.
+    pub efficiencies: usize,
+    /// Sets of signals.
+    pub signals: usize,
+}
+
+/// What became of a sweep.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Summary {
+    /// Cases that were run.
+    pub run: usize,
+    /// Cases whose result was there.
+    pub kept: usize,
+    /// What was computed for them.
+    pub shared: Shared,
+    /// Files that were written beside those of the cases.
+    pub files: Vec<PathBuf>,
+}
+
+/// Told of each case that is done: its description and how many of how many are.
+pub type Told<'t> = &'t mut dyn FnMut(&str, usize, usize);
+
+/// Checks all cases as `wakescope check` does, runs those of the shard that have no result, and writes the tables.
+///
+/// # Errors
+/// The first case that is refused, before anything is written; a case that cannot be run; what the system says.
+pub fn run<'s>(
+    sweep: &'s Sweep,
+    out: &Path,
+    settings: Settings,
+    observer: &dyn Observer,
+    told: Told<'_>,
+) -> Result<Summary, Error> {
+    let definition = Definition::of(sweep, settings.fits);
+    let winds = Known::default();
+    check(sweep, &winds, settings.allow_large)?;
+    let times = settings.shard.map_or("times.csv".into(), |s| format!("times-{}-of-{}.csv", s.number, s.of));
+    let mut names = vec![SWEEP.to_owned(), times.clone()];
+    if settings.shard.is_none() {
+        names.extend(tables::names(&definition));
+    }
+    prepare(out, names.iter().map(String::as_str), Existing::Own)?;
+    let mine: Vec<&Case> = sweep.cases.iter().filter(|c| settings.shard.is_none_or(|s| s.has(c.index))).collect();
+    let is_due = |case: &&Case| !(settings.resume && stored(out, &definition, case.index).is_some());
+    let due: Vec<&Case> = mine.iter().copied().filter(is_due).collect();
+    definition.write(out)?;
+    let known = Efficiencies::default();
+    let (mut signals, mut done, mut walls) = (0, 0, Vec::new());
+    for group in groups(&due) {
+        let planned = |case: &&'s Case| Ok((*case, plan(case, &winds).map_err(|e| failed(sweep, case, e))?));
+        for batch in batches(group.iter().map(planned).collect::<Result<_, Error>>()?) {
+            let begun = Instant::now();
+            let (cases, plans): (Vec<&Case>, Vec<Plan>) = batch.into_iter().unzip();
+            let found = rows(&plans, &known, observer, settings.fits).map_err(|e| of_batch(sweep, &cases, e))?;
+            signals += 1;
+            let wall_s = begun.elapsed().as_secs_f64() / found.len() as f64;
+            for (row, case) in found.iter().zip(&cases) {
+                store(out, sweep, case.index, row, settings.fits)?;
+                walls.push((case.index, wall_s));
+                done += 1;
+                told(&sweep.described(case), done, due.len());
+            }
+        }
+    }
+    let mut files = vec![write_times(out, &times, &definition, &mut walls)?];
+    if settings.shard.is_none() {
+        let all: Option<Vec<_>> = (0..sweep.cases.len()).map(|case| stored(out, &definition, case)).collect();
+        let gone = || Error::Input { path: out.join("cases"), reason: "a result that was written is gone".into() };
+        files.extend(write_tables(&definition, &all.ok_or_else(gone)?, out)?);
+    }
+    let shared = Shared { flows: winds.len(), efficiencies: known.computed(), signals };
+    Ok(Summary { run: due.len(), kept: mine.len() - due.len(), shared, files })
+}
+
+/// The plan and the map of every case, in their order, without any file; what they have in common is computed once.
+///
+/// # Errors
+/// The first case that is refused; a case that cannot be run.
+pub fn maps(sweep: &Sweep, observer: &dyn Observer) -> Result<Vec<(Plan, VelocityEstimates)>, Error> {
+    let (winds, known) = (Known::default(), Efficiencies::default());
+    check(sweep, &winds, false)?;
+    let mut out = Vec::with_capacity(sweep.cases.len());
+    for cases in groups(&sweep.cases.iter().collect::<Vec<_>>()) {
+        let planned = |case: &&Case| plan(case, &winds).map_err(|e| failed(sweep, case, e));
+        let plans: Vec<Plan> = cases.iter().map(planned).collect::<Result<_, _>>()?;
+        let found = group::maps(&plans.iter().collect::<Vec<_>>(), &known, observer);
+        let found = found.map_err(|e| of_batch(sweep, &cases, e))?;
+        out.extend(cases.iter().map(|case| case.index).zip(plans.into_iter().zip(found)));
+    }
+    out.sort_by_key(|(index, _)| *index);
+    Ok(out.into_iter().map(|(_, found)| found).collect())
+}
+
+/// Plans and rehearses every case, and finds out whether it fits the memory.
+fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<(), Error> {
+    let checked = |case: &Case| -> Result<(), Error> {
+        let plan = plan(case, winds)?;
+        if !allow_large {
+            plan.fits()?;
+        }
+        plan.rehearse()
+    };
+    let refused: Vec<(&Case, Error)> =
+        sweep.cases.par_iter().filter_map(|case| checked(case).err().map(|error| (case, error))).collect();
+    let others = refused.len().saturating_sub(1);
+    match refused.into_iter().next() {
+        None => Ok(()),
+        Some((case, error)) => match failed(sweep, case, error) {
+            Error::Case { case, keys, source, .. } => Err(Error::Case { case, keys, others, source }),
+            other => Err(other),
+        },
+    }
+}
+
+fn failed(sweep: &Sweep, case: &Case, source: Error) -> Error {
+    let source = Box::new(without_lines(source));
+    Error::Case { case: case.index, keys: sweep.described(case), others: 0, source }
+}
+
+/// What went wrong with cases that were measured together, told of the first of them.
+fn of_batch(sweep: &Sweep, cases: &[&Case], error: Error) -> Error {
+    match cases.first() {
+        Some(case) => failed(sweep, case, error),
+        None => error,
+    }
+}
+
+/// The plan of a case, with a wind that other cases may share.
+fn plan(case: &Case, winds: &Known<SceneWind>) -> Result<Plan, Error> {
+    let cause = hash_of(&format!("{:?}", case.scene.scene.flow));
+    let wind = winds.of(cause, || SceneWind::new(&case.scene))?;
+    Plan::with_wind(case.scene.clone(), Target::Map, wind)
+}
+
+/// Cases with the same signals: those whose scenes differ in what is done with the records alone.
+fn groups<'c>(cases: &[&'c Case]) -> Vec<Vec<&'c Case>> {
+    let mut groups: Vec<(String, Vec<&Case>)> = Vec::new();
+    for case in cases {
+        let signals = Scene {
+            estimator: Estimator::default(),
+            outputs: Outputs::default(),
+            site: Site::default(),
+            ..case.scene.scene.clone()
+        };
+        let cause = hash_of(&format!("{signals:?}"));
+        match groups.iter_mut().find(|(known, _)| *known == cause) {
+            Some((_, group)) => group.push(case),
+            None => groups.push((cause, vec![case])),
+        }
+    }
+    groups.into_iter().map(|(_, group)| group).collect()
+}
+
+/// Cases in the same order, as many together as fit the memory.
+fn batches(planned: Vec<(&Case, Plan)>) -> Vec<Vec<(&Case, Plan)>> {
+    let room_bytes = machine::available_memory_bytes().map_or(f64::INFINITY, |bytes| SHARE * bytes);
+    let mut batches: Vec<Vec<(&Case, Plan)>> = Vec::new();
+    let mut held_bytes = 0.0;
+    for (case, plan) in planned {
+        let bytes = plan.total().memory_bytes;
+        match batches.last_mut() {
+            Some(batch) if held_bytes + bytes <= room_bytes => {
+                held_bytes += bytes;
+                batch.push((case, plan));
+            }
+            _ => {
+                held_bytes = bytes;
+                batches.push(vec![(case, plan)]);
+            }
+        }
+    }
+    batches
+}
+
+/// Wall-clock times of the cases that were run, s; they differ from run to run and stand apart from the results.
+fn write_times(out: &Path, name: &str, definition: &Definition, walls: &mut [(usize, f64)]) -> Result<PathBuf, Error> {
+    walls.sort_by_key(|(case, _)| *case);
+    let table = Table::new()
+        .int("case", walls.iter().map(|(case, _)| *case as i64))
+        .float("wall_s", walls.iter().map(|(_, wall_s)| *wall_s))
+        .int("threads", walls.iter().map(|_| rayon::current_num_threads() as i64));
+    crate::io::write_atomic(&out.join(name), table.to_csv(&definition.origin)?)?;
+    Ok(out.join(name))
+}

@@ -1,0 +1,244 @@
+//! A sweep on disk: what it is, a folder for each case with its scene and result, and the tables of all.
+//!
+//! A result is there when `result.json` is: it is written last, and put into place by its name. Numbers stand in it as the
+//! texts of the table, so that a table has the same bytes whoever computed its cases. Check: shards, kills, edited files.
+
+use super::cases::Sweep;
+use super::key_path::Takes;
+use super::results::RESULTS;
+use super::tables::Row;
+use crate::Error;
+use crate::io::{Existing, FileGroup, Provenance, csv::float_text, write_atomic};
+use crate::measure::write::{put, scene_text};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+
+/// Name of the file that says what a sweep is.
+pub(super) const SWEEP: &str = "sweep.json";
+const RESULT: &str = "result.json";
+
+/// What a column of keys holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Holds {
+    Numbers,
+    WholeNumbers,
+    Texts,
+}
+
+/// A key that varies.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct VaryingKey {
+    pub(super) name: String,
+    pub(super) holds: Holds,
+    /// Whether others determine it.
+    pub(super) tied: bool,
+}
+
+/// What a sweep is, as its folder says it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Definition {
+    pub(super) origin: Provenance,
+    pub(super) keys: Vec<VaryingKey>,
+    pub(super) scene_hashes: Vec<String>,
+    /// Whether the circulation is fitted to each map.
+    pub(super) fits: bool,
+}
+
+impl Definition {
+    pub(super) fn of(sweep: &Sweep, fits: bool) -> Self {
+        let holds = |takes: &Takes| match takes {
+            Takes::Number => Holds::Numbers,
+            Takes::Whole { .. } => Holds::WholeNumbers,
+            _ => Holds::Texts,
+        };
+        Self {
+            origin: sweep.origin.clone(),
+            keys: sweep
+                .columns
+                .iter()
+                .map(|column| VaryingKey {
+                    name: column.name.clone(),
+                    holds: holds(&column.key.takes),
+                    tied: column.tied,
+                })
+                .collect(),
+            scene_hashes: sweep.cases.iter().map(|case| case.scene.hash.clone()).collect(),
+            fits,
+        }
+    }
+
+    /// Places and names of the keys that are free.
+    pub(super) fn free(&self) -> impl Iterator<Item = (usize, &str)> {
+        let keys = self.keys.iter().enumerate().filter(|(_, key)| !key.tied);
+        keys.map(|(place, key)| (place, key.name.as_str()))
+    }
+
+    fn to_json(&self) -> String {
+        let holds = |holds: Holds| match holds {
+            Holds::Numbers => "numbers",
+            Holds::WholeNumbers => "whole numbers",
+            Holds::Texts => "texts",
+        };
+        let key = |key: &VaryingKey| json!({ "key": key.name, "holds": holds(key.holds), "tied": key.tied });
+        let keys: Vec<Value> = self.keys.iter().map(key).collect();
+        let object = json!({
+            "source": self.origin.program, "seed": self.origin.seed, "sweep_hash": self.origin.scene_hash,
+            "scene": self.origin.scene_toml, "keys": keys, "circulation": self.fits,
+            "scene_hashes": self.scene_hashes,
+        });
+        format!("{object:#}\n")
+    }
+
+    /// Writes it into a folder, unless it is there: shards may begin at the same time.
+    pub(super) fn write(&self, folder: &Path) -> Result<(), Error> {
+        let (path, text) = (folder.join(SWEEP), self.to_json());
+        if std::fs::read_to_string(&path).is_ok_and(|there| there == text) {
+            return Ok(());
+        }
+        std::fs::create_dir_all(folder).map_err(|source| Error::Io {
+            action: "make the folder",
+            path: folder.to_owned(),
+            source,
+        })?;
+        Ok(write_atomic(&path, text)?)
+    }
+
+    fn read(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join(SWEEP);
+        let text = crate::io::text_file::read(&path).map_err(|source| Error::Io {
+            action: "read what was swept from",
+            path: path.clone(),
+            source,
+        })?;
+        serde_json::from_str(&text).ok().and_then(|object: Value| Self::of_json(&object)).ok_or_else(|| Error::Input {
+            path,
+            reason: "it does not say what was swept, as `wakescope sweep --out` writes it".into(),
+        })
+    }
+
+    fn of_json(object: &Value) -> Option<Self> {
+        let text = |name: &str| Some(object.get(name)?.as_str()?.to_owned());
+        let key = |key: &Value| {
+            let holds = match key.get("holds")?.as_str()? {
+                "numbers" => Holds::Numbers,
+                "whole numbers" => Holds::WholeNumbers,
+                _ => Holds::Texts,
+            };
+            Some(VaryingKey { name: key.get("key")?.as_str()?.to_owned(), holds, tied: key.get("tied")?.as_bool()? })
+        };
+        let hashes = object.get("scene_hashes")?.as_array()?.iter();
+        Some(Self {
+            origin: Provenance {
+                program: text("source")?,
+                scene_toml: text("scene")?,
+                scene_hash: text("sweep_hash")?,
+                seed: object.get("seed")?.as_u64()?,
+            },
+            keys: object.get("keys")?.as_array()?.iter().map(key).collect::<Option<_>>()?,
+            scene_hashes: hashes.map(|hash| hash.as_str().map(str::to_owned)).collect::<Option<_>>()?,
+            fits: object.get("circulation")?.as_bool()?,
+        })
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        (&self.origin.program, &self.origin.scene_hash) == (&other.origin.program, &other.origin.scene_hash)
+            && (&self.scene_hashes, self.fits) == (&other.scene_hashes, other.fits)
+    }
+}
+
+/// The folder of a case.
+fn folder_of(folder: &Path, case: usize) -> PathBuf {
+    folder.join("cases").join(format!("{case:05}"))
+}
+
+/// Puts the result of a case into its folder, all of it or nothing.
+///
+/// # Errors
+/// What the system says; a file of somebody else in the way.
+pub(super) fn store(folder: &Path, sweep: &Sweep, case: usize, results: &[f64], fits: bool) -> Result<(), Error> {
+    let Some(of) = sweep.cases.get(case) else { return Ok(()) };
+    let keys: Map<String, Value> = sweep.keys().map(str::to_owned).zip(of.values.iter().map(|v| json!(v))).collect();
+    let names = RESULTS.iter().map(|(name, ..)| (*name).to_owned());
+    let results: Map<String, Value> = names.zip(results.iter().map(|value| json!(float_text(*value)))).collect();
+    let scene = Provenance {
+        program: crate::PROGRAM.into(),
+        scene_toml: of.scene.toml.clone(),
+        scene_hash: of.scene.hash.clone(),
+        seed: of.scene.scene.seed,
+    };
+    let object = json!({
+        "source": crate::PROGRAM, "scene_hash": of.scene.hash, "case": case, "keys": keys, "circulation": fits,
+        "results": results,
+    });
+    let path = folder_of(folder, case);
+    let mut files = FileGroup::new(&path);
+    files.add("scene.toml", scene_text(&scene))?;
+    files.add(RESULT, format!("{object:#}\n"))?;
+    put(files, &path, Existing::Own).map(drop)
+}
+
+/// The result of a case in a folder; none where there is none of this scene by this version of the program.
+pub(super) fn stored(folder: &Path, definition: &Definition, case: usize) -> Option<Row> {
+    let text = crate::io::text_file::read(&folder_of(folder, case).join(RESULT)).ok()?;
+    let object: Value = serde_json::from_str(&text).ok()?;
+    let hash = object.get("scene_hash")?.as_str()?;
+    let is_this = definition.scene_hashes.get(case)? == hash
+        && object.get("source")?.as_str()? == definition.origin.program
+        && object.get("case")?.as_u64()? == case as u64
+        && object.get("circulation")?.as_bool()? == definition.fits;
+    let cell = |part: &str, name: &str| Some(object.get(part)?.get(name)?.as_str()?.to_owned());
+    let keys = definition.keys.iter().map(|key| cell("keys", &key.name)).collect::<Option<_>>()?;
+    let results = RESULTS.iter().map(|(name, ..)| cell("results", name)).collect::<Option<_>>()?;
+    is_this.then(|| Row { case, scene_hash: hash.to_owned(), keys, results })
+}
+
+/// Writes the tables of a sweep whose cases are all in some folders, of shards or of a whole run; returns the paths.
+///
+/// # Errors
+/// Folders that are of different sweeps, or of another one than `sweep`; cases that none of them has; what the system says.
+pub fn merge(folders: &[PathBuf], sweep: Option<&Sweep>, out: &Path) -> Result<Vec<PathBuf>, Error> {
+    let mut first: Option<(Definition, String)> = None;
+    for folder in folders {
+        let found = Definition::read(folder)?;
+        let asked = sweep.map(|sweep| (Definition::of(sweep, found.fits), "the sweep that was asked for".to_owned()));
+        for (other, of) in first.iter().chain(&asked) {
+            if !other.is_same(&found) {
+                let reason = format!(
+                    "it is of sweep {} by {}, {of} is {} by {}: only shards of one sweep by one version, all with or all \
+                     without --no-circulation, fit together",
+                    found.origin.scene_hash, found.origin.program, other.origin.scene_hash, other.origin.program
+                );
+                return Err(Error::Input { path: folder.join(SWEEP), reason });
+            }
+        }
+        first = first.or(Some((found, folder.display().to_string())));
+    }
+    let Some((definition, _)) = first else {
+        return Err(Error::Input { path: "--merge".into(), reason: "at least one folder of a sweep is needed".into() });
+    };
+    let (mut rows, mut missing) = (Vec::new(), Vec::new());
+    for case in 0..definition.scene_hashes.len() {
+        match folders.iter().find_map(|folder| stored(folder, &definition, case)) {
+            Some(row) => rows.push(row),
+            None => missing.push(case),
+        }
+    }
+    if !missing.is_empty() {
+        let first: Vec<String> = missing.iter().take(10).map(ToString::to_string).collect();
+        let more = if missing.len() > 10 { ", ..." } else { "" };
+        let reason = format!(
+            "{} of the {} cases have no result in the folders to merge, numbers {}{more}: run their shards, or those that were \
+             cut off with --resume",
+            missing.len(),
+            definition.scene_hashes.len(),
+            first.join(", ")
+        );
+        return Err(Error::Input { path: "--merge".into(), reason });
+    }
+    write_tables(&definition, &rows, out)
+}
+
+/// Writes the tables of all rows.
+pub(super) fn write_tables(definition: &Definition, rows: &[Row], out: &Path) -> Result<Vec<PathBuf>, Error> {
+    put(super::tables::files(definition, rows, out)?, out, Existing::Own)
+}

@@ -1,0 +1,109 @@
+//! The results of all cases as tables: CSV, NetCDF, and the pictures of them.
+//!
+//! Check: the same rows give the same bytes; the NetCDF file is read back by an independent reader.
+
+use super::results::RESULTS;
+use super::stored::{Definition, Holds, VaryingKey};
+use crate::Error;
+use crate::io::{FileGroup, Table};
+use std::path::Path;
+
+/// The result of a case, each value as the text of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Row {
+    pub(super) case: usize,
+    pub(super) scene_hash: String,
+    pub(super) keys: Vec<String>,
+    pub(super) results: Vec<String>,
+}
+
+impl Row {
+    /// A result as a number; NaN where it is none.
+    pub(super) fn result(&self, name: &str) -> f64 {
+        let place = RESULTS.iter().position(|(column, ..)| *column == name);
+        place.and_then(|place| self.results.get(place)).map_or(f64::NAN, |cell| number(cell))
+    }
+
+    /// A key that varies as a number.
+    pub(super) fn key(&self, place: usize) -> f64 {
+        self.keys.get(place).map_or(f64::NAN, |cell| number(cell))
+    }
+}
+
+fn number(cell: &str) -> f64 {
+    cell.parse().unwrap_or(f64::NAN)
+}
+
+/// Names of the files.
+pub(super) fn names(definition: &Definition) -> Vec<String> {
+    let mut out = vec!["results.csv".to_owned()];
+    if cfg!(feature = "netcdf") {
+        out.push("results.nc".into());
+    }
+    #[cfg(feature = "plots")]
+    out.extend(super::pictures::names(definition));
+    #[cfg(not(feature = "plots"))]
+    let _ = definition;
+    out
+}
+
+/// The files, still in memory.
+pub(super) fn files(definition: &Definition, rows: &[Row], out: &Path) -> Result<FileGroup, Error> {
+    let mut files = FileGroup::new(out);
+    files.add("results.csv", table(definition, rows).to_csv(&definition.origin)?)?;
+    #[cfg(feature = "netcdf")]
+    files.add("results.nc", netcdf(definition, rows)?)?;
+    #[cfg(feature = "plots")]
+    super::pictures::add(&mut files, definition, rows)?;
+    Ok(files)
+}
+
+fn table(definition: &Definition, rows: &[Row]) -> Table {
+    let mut table = Table::new().int("case", rows.iter().map(|row| row.case as i64));
+    for (place, VaryingKey { name, holds, .. }) in definition.keys.iter().enumerate() {
+        table = match holds {
+            Holds::Numbers => table.float(name, rows.iter().map(|row| row.key(place))),
+            Holds::WholeNumbers | Holds::Texts => {
+                table.text(name, rows.iter().map(|row| row.keys.get(place).cloned().unwrap_or_default()))
+            }
+        };
+    }
+    table = table.text("scene_hash", rows.iter().map(|row| row.scene_hash.clone()));
+    for (name, ..) in RESULTS {
+        table = table.float(name, rows.iter().map(|row| row.result(name)));
+    }
+    table
+}
+
+#[cfg(feature = "netcdf")]
+fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
+    use crate::io::netcdf::{Data, Layout, Variable};
+    use crate::keys::unit_of;
+    let text = |row: &Row, place: usize| row.keys.get(place).cloned().unwrap_or_default();
+    let texts = (0..definition.keys.len()).flat_map(|place| rows.iter().map(move |row| text(row, place).len()));
+    let width = texts.chain([1]).max().unwrap_or(1);
+    let case = rows.iter().map(|row| i32::try_from(row.case).unwrap_or(i32::MAX)).collect();
+    let mut variables = vec![Variable::new("case", &["case"], Data::I32(case)).text("long_name", "number of the case")];
+    for (place, VaryingKey { name, holds, .. }) in definition.keys.iter().enumerate() {
+        variables.push(match holds {
+            Holds::Texts => {
+                let padded = |row: &Row| format!("{:width$}", text(row, place)).into_bytes();
+                Variable::new(name, &["case", "string_length"], Data::Char(rows.iter().flat_map(padded).collect()))
+            }
+            _ => Variable::new(name, &["case"], Data::F64(rows.iter().map(|row| row.key(place)).collect()))
+                .text("units", unit_of(name).unwrap_or("1")),
+        });
+    }
+    for (name, unit, meaning) in RESULTS {
+        let values = rows.iter().map(|row| row.result(name)).collect();
+        let variable = Variable::new(name, &["case"], Data::F64(values));
+        variables.push(variable.text("units", unit).text("long_name", meaning));
+    }
+    let globals = vec![
+        ("Conventions", "CF-1.10".to_owned()),
+        ("title", "Results of a sweep over scenes".to_owned()),
+        ("history", format!("written by {}", definition.origin.program)),
+    ];
+    let dims = vec![("case", rows.len()), ("string_length", width)];
+    Ok(Layout { dims, globals, variables }.into_bytes(&definition.origin)?)
+}
