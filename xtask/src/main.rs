@@ -18,6 +18,7 @@ mod references;
 mod regress;
 mod reproduce;
 mod sources;
+mod stability;
 mod tidy;
 mod trials;
 mod validate;
@@ -78,6 +79,8 @@ enum Task {
     Forecast(forecast::Options),
     /// Change the default scene at random: what `check` passes must run, and nothing may abort or hang.
     FuzzScenes(fuzz_scenes::Options),
+    /// Run every stiff and extreme case of the crates: what it must come to, what it came to.
+    Stability(stability::Options),
     /// Check the rules of the house.
     Tidy,
     /// Everything that continuous integration runs.
@@ -94,6 +97,7 @@ fn main() -> std::process::ExitCode {
         Task::Validate(options) => validate::run(&options),
         Task::Forecast(options) => forecast::run(&options),
         Task::FuzzScenes(options) => fuzz_scenes::run(&options),
+        Task::Stability(options) => stability::run(&options),
         Task::Tidy => tidy::run(),
         Task::Ci(options) => ci::run(&options),
     };
