@@ -7,6 +7,7 @@ mod bless;
 mod cause;
 mod ci;
 mod claim;
+mod cost;
 mod curves;
 mod figures;
 mod fit_trials;

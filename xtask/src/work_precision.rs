@@ -8,10 +8,10 @@ mod les;
 mod optics;
 mod signal;
 
+use crate::Outcome;
+use crate::cost::Cost;
 use crate::workspace::{provenance, root};
-use crate::{Failure, Outcome};
 use std::path::PathBuf;
-use std::time::Instant;
 use wakescope_sim::io::{FileGroup, Table};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
@@ -47,55 +47,6 @@ pub(crate) struct Row {
     pub(crate) metric: &'static str,
     pub(crate) reference: &'static str,
     pub(crate) cost: Cost,
-}
-
-/// What a piece of work took.
-#[derive(Clone, Copy)]
-pub(crate) struct Cost {
-    cpu_s: f64,
-    wall_s: f64,
-    peak_mem_bytes: f64,
-}
-
-impl Cost {
-    /// Of what was not timed.
-    pub(crate) const NONE: Self = Self { cpu_s: f64::NAN, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
-
-    /// Processor time of all threads \[s\].
-    pub(crate) fn cpu_s(&self) -> f64 {
-        self.cpu_s
-    }
-
-    /// The same for one of `count` equal pieces of work.
-    pub(crate) fn per(self, count: usize) -> Self {
-        let n = count as f64;
-        Self { cpu_s: self.cpu_s / n, wall_s: self.wall_s / n, ..self }
-    }
-}
-
-/// Runs a piece of work and measures it.
-pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
-    let (cpu_s, start) = (cpu_s(), Instant::now());
-    let value = work()?;
-    let cost =
-        Cost { cpu_s: self::cpu_s() - cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: peak_mem_bytes() };
-    Ok((value, cost))
-}
-
-/// Processor time of all threads so far, s; NaN where the system does not tell.
-fn cpu_s() -> f64 {
-    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
-    let of = |path: PathBuf| -> Option<f64> {
-        std::fs::read_to_string(path.join("schedstat")).ok()?.split_whitespace().next()?.parse().ok()
-    };
-    tasks.flatten().filter_map(|task| of(task.path())).sum::<f64>() * 1e-9
-}
-
-/// Largest resident memory of this process so far, bytes; NaN where the system does not tell.
-fn peak_mem_bytes() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).map_or(f64::NAN, |kb| 1024.0 * kb)
 }
 
 /// Measures, prints and writes.

@@ -2,7 +2,7 @@
 
 use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::claim::{Claim, Verdict};
+use crate::claim::{Claim, Verdict, with_error};
 use crate::trials::fits::{FitTrial, RADIUS_M};
 use fixtures::pair::{CIRCULATION_M2_S, PairScan, truth};
 use ndarray::Array2;
@@ -172,7 +172,7 @@ fn claims(fits: &[Fits], [known_m2_s, fitted_m2_s]: [f64; 2]) -> Vec<Claim> {
                 "fig17",
                 statement,
                 &format!("at most {bar}{unit}"),
-                format!("{measured:.3} +- {error:.3}{unit}"),
+                format!("{}{unit}", with_error(measured, error)),
                 false,
             )
         }

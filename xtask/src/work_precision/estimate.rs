@@ -4,8 +4,9 @@
 //! which more than a fifth of the estimates are bad has failed, and its row says so. On a scan of the vortex pair it
 //! is the root mean square error against the velocity that the pulse sees.
 
-use super::{Row, measured};
+use super::Row;
 use crate::Failure;
+use crate::cost::measured;
 use crate::trials::methods::{Known, Methods};
 use crate::trials::uniform::{Air, BAND_M_S};
 use fixtures::pair::PairScan;

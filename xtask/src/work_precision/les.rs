@@ -1,7 +1,8 @@
 //! Error against run time of the flow solver: grid, time step, scheme, tolerance of the pressure solve, pressure solver.
 
-use super::{Row, measured};
+use super::Row;
 use crate::Failure;
+use crate::cost::measured;
 use wakescope_les::cases::{self, Case, TollmienSchlichting};
 use wakescope_les::solver::PressureMethod;
 use wakescope_les::{Flow, TimeScheme, TimeStep};
@@ -152,7 +153,7 @@ fn row(
     knob: &'static str,
     (value, error): (f64, f64),
     words: [&'static str; 2],
-    cost: super::Cost,
+    cost: crate::cost::Cost,
 ) -> Row {
     Row { case, method: method.into(), knob, value, error, metric: words[0], reference: words[1], cost }
 }

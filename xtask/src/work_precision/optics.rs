@@ -1,7 +1,8 @@
 //! Error against run time of the optics: quadrature, layers, grid, screens, realisations, precision, variance reduction.
 
-use super::{Cost, Row, measured};
+use super::Row;
 use crate::Failure;
+use crate::cost::{Cost, measured};
 use std::ops::ControlFlow;
 use wakescope_optics::air::{StructureTable, structure_function_m53};
 use wakescope_optics::monte_carlo::{EfficiencyEstimate, Sampling};

@@ -2,8 +2,9 @@
 //!
 //! All on one line of sight through the core of a vortex, the steepest of the chapter's scene.
 
-use super::{Row, measured};
+use super::Row;
 use crate::Failure;
+use crate::cost::measured;
 use fixtures::{ENERGY_J, receiver};
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::literal::literal_envelope;
