@@ -2,9 +2,9 @@
 
 use crate::Failure;
 use crate::claim::{Claim, Verdict, two_digits};
+use crate::cost::machine;
 use crate::figures::Figure;
 use crate::figures::context::{Context, Rendered};
-use std::process::Command;
 use wakescope_sim::plot::html::HtmlTable;
 use wakescope_sim::plot::{Finding, Report, ReportEntry};
 
@@ -65,27 +65,6 @@ fn facts(context: &Context) -> Vec<(String, String)> {
             format!("cargo xtask reproduce-figs --profile {} --seed {}", context.profile_name(), context.seed),
         ),
     ]
-}
-
-/// Kind of processor, number of cores and compiler, as far as the system tells.
-fn machine() -> String {
-    let cpu = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
-        let line = text.lines().find(|l| l.starts_with("model name"))?;
-        line.split_once(':').map(|(_, name)| name.trim().to_owned())
-    });
-    let cores = std::thread::available_parallelism().map_or(0, usize::from);
-    let compiler = Command::new("rustc")
-        .arg("--version")
-        .output()
-        .ok()
-        .map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned());
-    format!(
-        "{} ({}, {}), {cores} cores, {}",
-        cpu.unwrap_or_else(|| "processor unknown".into()),
-        std::env::consts::ARCH,
-        std::env::consts::OS,
-        compiler.unwrap_or_else(|| "compiler unknown".into())
-    )
 }
 
 fn entry(figure: &Figure, rendered: &Rendered) -> ReportEntry {

@@ -11,6 +11,7 @@ use crate::measure::write::Contents;
 use crate::scene::{Method, Scene, SceneFile, Weighting};
 use std::fmt;
 
+pub mod accuracy;
 mod ambiguity;
 mod files;
 mod fit;
