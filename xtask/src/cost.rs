@@ -52,11 +52,17 @@ fn peak_mem_bytes() -> f64 {
     line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).map_or(f64::NAN, |kb| 1024.0 * kb)
 }
 
-/// The same three times: the first value, the smallest times.
+/// Shortest piece of work that the system's clock of processor time tells to a few per cent \[s\].
+const TELLABLE_S: f64 = 0.1;
+
+/// The same three times: the first value, the smallest times; short work is repeated so that its time can be told.
 pub(crate) fn fastest<T>(mut work: impl FnMut() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
-    let (value, mut cost) = measured(&mut work)?;
+    let (value, first) = measured(&mut work)?;
+    let times = (TELLABLE_S / first.wall_s.max(1e-6)).ceil().clamp(1.0, 10_000.0) as usize;
+    let mut batch = || measured(|| (0..times).try_for_each(|_| work().map(drop))).map(|((), cost)| cost.per(times));
+    let mut cost = if times == 1 { first } else { batch()? };
     for _ in 0..2 {
-        let again = measured(&mut work)?.1;
+        let again = batch()?;
         cost = Cost { cpu_s: cost.cpu_s.min(again.cpu_s), wall_s: cost.wall_s.min(again.wall_s), ..again };
     }
     Ok((value, cost))

@@ -14,6 +14,7 @@ use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 
 /// A key of the scene, its values, the value of the reference, and what is compared.
 struct Knob {
+    case: &'static str,
     key: &'static str,
     values: &'static [usize],
     reference: usize,
@@ -25,6 +26,7 @@ struct Knob {
 
 const KNOBS: [Knob; 4] = [
     Knob {
+        case: "scene, padding",
         key: "estimator.padded_samples",
         values: &[128, 256, 512, 1024, 2048],
         reference: 8192,
@@ -33,6 +35,7 @@ const KNOBS: [Knob; 4] = [
         distance: of_maps,
     },
     Knob {
+        case: "scene, spacing of windows",
         key: "estimator.window_step_samples",
         values: &[16, 8, 4, 2],
         reference: 1,
@@ -41,6 +44,7 @@ const KNOBS: [Knob; 4] = [
         distance: of_maps,
     },
     Knob {
+        case: "scene, realisations",
         key: "scan.realisations",
         values: &[2, 4, 8, 16, 32],
         reference: 128,
@@ -49,6 +53,7 @@ const KNOBS: [Knob; 4] = [
         distance: of_errors,
     },
     Knob {
+        case: "scene, pulses",
         key: "scan.pulses_per_line",
         values: &[1, 4, 16, 64],
         reference: 256,
@@ -58,11 +63,11 @@ const KNOBS: [Knob; 4] = [
     },
 ];
 
-/// All measurements; the first values with one seed less if `quick`.
+/// All measurements; few keys, values and seeds if `quick`.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let seeds = if quick { 2 } else { 5 };
     let mut rows = Vec::new();
-    for knob in &KNOBS {
+    for knob in few(&KNOBS, quick) {
         let of = |value: usize, seed: u64| {
             let mut scene = scene(seed);
             (knob.set)(&mut scene, value);
@@ -76,14 +81,7 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
                 errors.push((knob.distance)(&of(value, seed as u64)?, fine));
             }
             let words = [knob.quantity, "the finest setting of the key, same seeds"];
-            rows.push(Row::new(
-                "scene to map",
-                knob.key,
-                (knob.key, value as f64),
-                mean_and_error(&errors),
-                words,
-                cost,
-            ));
+            rows.push(Row::new(knob.case, knob.key, (knob.key, value as f64), mean_and_error(&errors), words, cost));
         }
     }
     Ok(rows)

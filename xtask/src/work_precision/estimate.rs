@@ -28,7 +28,7 @@ const FAILED: &str = "FAILED: more than a fifth of the estimates are bad";
 
 /// All measurements; few trials if `quick`.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
-    let (trials, scans) = if quick { (60, 2) } else { (600, 6) };
+    let trials = if quick { 60 } else { 600 };
     let cases = [
         ("0 dB, white", NoiseModel::White, 0.0),
         ("0 dB, band", NoiseModel::BandLimited, 0.0),
@@ -38,7 +38,9 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     for &(case, noise, snr_db) in if quick { &cases[..1] } else { &cases[..] } {
         rows.extend(Uniform::new(case, noise, snr_db, trials)?.rows(quick)?);
     }
-    rows.extend(pair(scans)?);
+    if !quick {
+        rows.extend(pair(4)?);
+    }
     Ok(rows)
 }
 

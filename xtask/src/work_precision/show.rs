@@ -66,8 +66,12 @@ pub(super) fn settings(groups: &Groups<'_>) -> Table {
 
 /// Cases of a group in their order.
 fn cases(rows: &[Row]) -> Vec<&'static str> {
-    let mut cases: Vec<&str> = rows.iter().map(|r| r.case).collect();
-    cases.dedup();
+    let mut cases: Vec<&str> = Vec::new();
+    for row in rows {
+        if !cases.contains(&row.case) {
+            cases.push(row.case);
+        }
+    }
     cases
 }
 
