@@ -24,7 +24,7 @@ struct Knob {
     distance: fn(&VelocityEstimates, &VelocityEstimates) -> f64,
 }
 
-const KNOBS: [Knob; 4] = [
+const KNOBS: [Knob; 3] = [
     Knob {
         case: "scene, padding",
         key: "estimator.padded_samples",
@@ -51,15 +51,6 @@ const KNOBS: [Knob; 4] = [
         set: |scene, value| scene.scan.realisations = value,
         quantity: "root mean square error over the map, relative",
         distance: of_errors,
-    },
-    Knob {
-        case: "scene, pulses",
-        key: "scan.pulses_per_line",
-        values: &[1, 4, 16, 64],
-        reference: 256,
-        set: |scene, value| scene.scan.pulses_per_line = value,
-        quantity: "mean map, norm of the difference over the norm",
-        distance: of_maps,
     },
 ];
 

@@ -56,11 +56,11 @@ pub(super) fn settings(groups: &Groups<'_>) -> Table {
     let float = |get: fn(&Row) -> f64| rows.iter().map(|r| get(r)).collect::<Vec<_>>();
     Table::new()
         .text("key", rows.iter().map(|r| r.knob))
-        .text("method", rows.iter().map(|r| r.method.clone()))
         .float("value", float(|r| r.value))
         .float("error", float(|r| r.error))
         .float("standard_error", float(|r| r.standard_error))
         .float("core_s", float(|r| r.cost.cpu_s))
+        .text("method", rows.iter().map(|r| r.method.clone()))
         .text("metric", rows.iter().map(|r| r.metric))
 }
 
