@@ -15,6 +15,7 @@ use crate::profile::Profile;
 use crate::workspace::{provenance, root};
 use crate::{Failure, Outcome};
 use extreme::{Ended, Extreme};
+use rayon::prelude::*;
 use std::path::PathBuf;
 use std::time::Instant;
 use wakescope_sim::io::{FileGroup, Table};
@@ -64,18 +65,12 @@ impl Row {
     }
 }
 
-/// Runs the cases of a profile whose name is wanted; each is told as it ends.
-pub(crate) fn rows(profile: Profile, wanted: impl Fn(&str) -> bool, tell: impl Fn(&Row)) -> Vec<Row> {
-    let mut rows = Vec::new();
-    for (part, cases) in PARTS {
-        let chosen = |case: &Extreme| wanted(case.name) && (profile != Profile::Quick || !case.long);
-        for case in cases().into_iter().filter(chosen) {
-            let row = Row { part, ended: case.run(), case };
-            tell(&row);
-            rows.push(row);
-        }
-    }
-    rows
+/// Runs the cases of a profile whose name is wanted, in parallel.
+pub(crate) fn rows(profile: Profile, wanted: impl Fn(&str) -> bool) -> Vec<Row> {
+    let chosen = |case: &Extreme| wanted(case.name) && (profile != Profile::Quick || !case.long);
+    let of = |(part, cases): Part| cases().into_iter().filter(chosen).map(move |case| (part, case)).collect::<Vec<_>>();
+    let all: Vec<(&'static str, Extreme)> = PARTS.into_iter().flat_map(of).collect();
+    all.into_par_iter().map(|(part, case)| Row { part, ended: case.run(), case }).collect()
 }
 
 /// Runs the cases, prints and writes them.
@@ -85,14 +80,11 @@ pub(crate) fn rows(profile: Profile, wanted: impl Fn(&str) -> bool, tell: impl F
 pub(crate) fn run(options: &Options) -> Outcome {
     let start = Instant::now();
     println!("{:<8} {:<50} {:<7} {:>7}  {:<30} outcome", "crate", "case", "verdict", "time", "expected");
-    let rows = rows(
-        options.profile,
-        |name| options.only.as_ref().is_none_or(|word| name.contains(word.as_str())),
-        |Row { part, case, ended }| {
-            let (name, verdict, expected) = (case.name, ended.verdict.name(), case.expected.to_string());
-            println!("{part:<8} {name:<50} {verdict:<7} {:>5.1} s  {expected:<30} {}", ended.took_s, ended.outcome);
-        },
-    );
+    let rows = rows(options.profile, |name| options.only.as_ref().is_none_or(|word| name.contains(word.as_str())));
+    for Row { part, case, ended } in &rows {
+        let (name, verdict, expected) = (case.name, ended.verdict.name(), case.expected.to_string());
+        println!("{part:<8} {name:<50} {verdict:<7} {:>5.1} s  {expected:<30} {}", ended.took_s, ended.outcome);
+    }
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/stability"));
     let origin = provenance(&format!("profile = \"{}\"\n", options.profile.name()), 1);
     let mut files = FileGroup::new(&folder);

@@ -6,7 +6,7 @@ use crate::claim::Claim;
 use crate::stability::{self, Row};
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let rows = stability::rows(context.profile, |_| true, |_| ());
+    let rows = stability::rows(context.profile, |_| true);
     let origin = context.provenance_of_formula(&format!("profile = \"{}\"\n", context.profile_name()));
     let mut out = Rendered::new(&stability::table(&rows), &stability::picture(&rows), &origin)?;
     let missed: Vec<&str> = rows.iter().filter(|row| !row.passes()).map(Row::name).collect();
