@@ -94,6 +94,21 @@ impl Claim {
     }
 }
 
+/// An error as it is told: two digits.
+pub(crate) fn two_digits(error: f64) -> String {
+    format!("{error:.*}", decimals(error))
+}
+
+/// A value with as many decimals as its standard error has in two digits, and the error.
+pub(crate) fn with_error(value: f64, error: f64) -> String {
+    format!("{value:.*} +- {}", decimals(error), two_digits(error))
+}
+
+/// Decimals of a number of two digits; of what is zero or no number, three.
+fn decimals(error: f64) -> usize {
+    if error.is_finite() && error > 0.0 { (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize } else { 3 }
+}
+
 /// Six digits after the point, or of a small number.
 fn number(x: f64) -> String {
     if x == 0.0 || x.abs() >= 1e-3 { format!("{x:.6}") } else { format!("{x:.6e}") }
@@ -109,6 +124,13 @@ impl fmt::Display for Claim {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_have_the_digits_of_their_error() {
+        let found = [with_error(12.3456, 0.0321), with_error(-1.0, 4.56), with_error(1234.5, 67.0), two_digits(0.2)];
+        assert_eq!(found, ["12.346 +- 0.032", "-1.0 +- 4.6", "1234 +- 67", "0.20"]);
+        assert_eq!(with_error(0.5, f64::NAN), "0.500 +- NaN");
+    }
 
     #[test]
     fn bars_hold_their_ends_and_nothing_that_is_no_number() {

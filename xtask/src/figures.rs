@@ -17,6 +17,8 @@ mod fig11;
 mod fig12;
 mod fig13;
 mod fig14;
+mod fig15;
+mod fig16;
 mod fig17;
 mod fig18;
 mod profiles;
@@ -36,7 +38,7 @@ pub(crate) struct Figure {
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 18] = [
+pub(crate) const ALL: [Figure; 20] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
     Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
     Figure {
@@ -57,6 +59,8 @@ pub(crate) const ALL: [Figure; 18] = [
     Figure { id: "fig12", number: 12, title: "Error against pulse energy", make: fig12::make },
     Figure { id: "fig13", number: 13, title: "Correlogram against periodogram accumulation", make: fig13::make },
     Figure { id: "fig14", number: 14, title: "The same at 200 and 400 ns about the centre", make: fig14::make },
+    Figure { id: "fig15", number: 15, title: "Error against run time", make: fig15::make },
+    Figure { id: "fig16", number: 16, title: "Stiff and extreme cases", make: fig16::make },
     Figure { id: "fig17", number: 17, title: "Circulation and positions from single scans", make: fig17::make },
     Figure { id: "fig18", number: 18, title: "Velocity estimators against the Cramer-Rao bound", make: fig18::make },
     Figure { id: "ca_pa", number: 19, title: "CA against PA: where the claim holds", make: ca_pa::make },

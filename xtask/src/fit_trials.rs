@@ -3,8 +3,8 @@
 //! Every scan is fitted from its map on: the map with the core kept at the typical one, about it and free, then all signals with one core radius
 //! fitted or the true one, and once more from the truth on. Each row has its standard error; one thread tells the processor time.
 
+use crate::cost::measured;
 use crate::trials::fits::FitTrial;
-use crate::work_precision::measured;
 use crate::{Failure, Outcome};
 use fixtures::pair::{PairCase, PairScan};
 use ndarray::Array2;
@@ -141,7 +141,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
         for (fits, (core, prior)) in maps.iter_mut().zip(cores) {
             let (fit, cost) = measured(|| trial.map(free(core), prior))?;
-            let kept = fits.keep(scan, (fit, cost.cpu_s()), |fit: &MapFit| (fit.wake, &fit.covariance));
+            let kept = fits.keep(scan, (fit, cost.cpu_s), |fit: &MapFit| (fit.wake, &fit.covariance));
             guess = guess.or(kept.map(|fit| fit.wake));
         }
         let (false, Some(mut guess)) = (options.maps_only, guess) else { continue };
@@ -151,7 +151,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
         let mut fit = |place: usize, guess: &Wake, starts| -> Result<Option<SignalFit>, Failure> {
             let (fit, cost) = measured(|| trial.signals(of_signals, guess, starts))?;
-            Ok(signals[place].keep(scan, (fit, cost.cpu_s()), |fit: &SignalFit| (fit.wake, &fit.covariance)))
+            Ok(signals[place].keep(scan, (fit, cost.cpu_s), |fit: &SignalFit| (fit.wake, &fit.covariance)))
         };
         let (found, at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?);
         if let (Some(found), Some(at_truth)) = (found, at_truth) {

@@ -7,6 +7,7 @@ mod bless;
 mod cause;
 mod ci;
 mod claim;
+mod cost;
 mod curves;
 mod figures;
 mod fit_trials;
@@ -18,6 +19,7 @@ mod references;
 mod regress;
 mod reproduce;
 mod sources;
+mod stability;
 mod tidy;
 mod trials;
 mod validate;
@@ -78,6 +80,8 @@ enum Task {
     Forecast(forecast::Options),
     /// Change the default scene at random: what `check` passes must run, and nothing may abort or hang.
     FuzzScenes(fuzz_scenes::Options),
+    /// Run every stiff and extreme case of the crates: what it must come to, what it came to.
+    Stability(stability::Options),
     /// Check the rules of the house.
     Tidy,
     /// Everything that continuous integration runs.
@@ -94,6 +98,7 @@ fn main() -> std::process::ExitCode {
         Task::Validate(options) => validate::run(&options),
         Task::Forecast(options) => forecast::run(&options),
         Task::FuzzScenes(options) => fuzz_scenes::run(&options),
+        Task::Stability(options) => stability::run(&options),
         Task::Tidy => tidy::run(),
         Task::Ci(options) => ci::run(&options),
     };

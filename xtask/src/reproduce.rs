@@ -7,6 +7,7 @@ mod cache;
 mod report;
 
 use crate::claim::{Claim, Verdict};
+use crate::cost::measured;
 use crate::figures::context::{Context, Rendered};
 use crate::figures::{self, Figure};
 use crate::profile::Profile;
@@ -14,7 +15,6 @@ use crate::workspace::root;
 use crate::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 use wakescope_sim::io::{FileGroup, Table, write_atomic};
 
 /// Options of the task.
@@ -76,9 +76,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let rendered = match cached {
             Some(rendered) => rendered,
             None => {
-                let start = Instant::now();
-                let mut rendered = pool.install(|| (figure.make)(&context))?;
-                rendered.timings.push(("total".into(), start.elapsed().as_secs_f64()));
+                let (mut rendered, cost) = measured(|| pool.install(|| (figure.make)(&context)))?;
+                rendered.timings.push(("total".into(), [cost.wall_s, cost.cpu_s]));
                 if !is_other {
                     place.store(&rendered)?;
                 }
@@ -123,12 +122,13 @@ fn write_figure(out: &Path, figure: &Figure, rendered: &Rendered) -> Outcome {
 fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)]) -> Outcome {
     let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
     write_atomic(&out.join("claims.csv"), claims_table(&claims).to_csv(&context.provenance_of_run())?)?;
-    let timings: Vec<(&str, &str, f64)> =
+    let timings: Vec<(&str, &str, [f64; 2])> =
         done.iter().flat_map(|(f, r)| r.timings.iter().map(|(stage, s)| (f.id, stage.as_str(), *s))).collect();
     let table = Table::new()
         .text("figure", timings.iter().map(|t| t.0))
         .text("stage", timings.iter().map(|t| t.1))
-        .float("wall_s", timings.iter().map(|t| t.2));
+        .float("wall_s", timings.iter().map(|t| t.2[0]))
+        .float("core_s", timings.iter().map(|t| t.2[1]));
     write_atomic(&out.join("timings.csv"), table.to_csv(&context.provenance_of_run())?)?;
     write_atomic(&out.join("index.html"), report::html(context, done)?)?;
     for claim in &claims {

@@ -1,176 +1,165 @@
-//! `cargo xtask work-precision --crate les|optics|signal|estimate`: error against run time, knob by knob.
+//! `cargo xtask work-precision`: error against run time of every solver, every estimator and the whole chain, knob by knob.
 //!
-//! Every row is measured in this run, on one thread; the table and the picture go to
-//! `target/work-precision`. Errors are against exact theory, or are standard errors where the case says so.
+//! Every row is measured in this run, on one thread; the time is the smallest of three runs. Errors are relative, with their standard
+//! errors; a setting that fails is a row. Tables, pictures and the cheapest settings go to `target/work-precision`.
 
+mod chain;
 mod estimate;
 mod les;
 mod optics;
+mod show;
 mod signal;
 
+use crate::cost::{Cost, machine};
 use crate::workspace::{provenance, root};
 use crate::{Failure, Outcome};
 use std::path::PathBuf;
-use std::time::Instant;
-use wakescope_sim::io::{FileGroup, Table};
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_sim::io::FileGroup;
+use wakescope_sim::plan::accuracy::Measured;
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// Crate to measure.
-    #[arg(long = "crate", value_enum)]
-    name: Measured,
+    /// Group to measure; the default is all.
+    #[arg(long, value_enum)]
+    group: Option<Group>,
     /// Folder to write to.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Multiplies sample counts; 1 takes a few minutes.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    effort: u32,
+    /// Few and coarse settings: a minute instead of many.
+    #[arg(long)]
+    quick: bool,
+    /// Put the table of settings into the crate sim, where `check --accuracy` reads it, and that of the cheapest into the book.
+    #[arg(long)]
+    store: bool,
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum Measured {
-    Les,
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Group {
     Optics,
+    Les,
     Signal,
     Estimate,
+    /// The whole chain.
+    Chain,
+}
+
+impl Group {
+    pub(crate) const ALL: [Self; 5] = [Self::Optics, Self::Les, Self::Signal, Self::Estimate, Self::Chain];
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Optics => "optics",
+            Self::Les => "les",
+            Self::Signal => "signal",
+            Self::Estimate => "estimate",
+            Self::Chain => "chain",
+        }
+    }
+
+    /// What is measured of it.
+    fn rows(self, quick: bool) -> Result<Vec<Row>, Failure> {
+        match self {
+            Self::Optics => optics::rows(quick),
+            Self::Les => les::rows(quick),
+            Self::Signal => signal::rows(quick),
+            Self::Estimate => estimate::rows(quick),
+            Self::Chain => chain::rows(quick),
+        }
+    }
 }
 
 /// One measurement.
 pub(crate) struct Row {
-    pub(crate) case: &'static str,
-    pub(crate) method: String,
-    pub(crate) knob: &'static str,
-    pub(crate) value: f64,
-    pub(crate) error: f64,
-    pub(crate) metric: &'static str,
-    pub(crate) reference: &'static str,
-    pub(crate) cost: Cost,
+    case: &'static str,
+    method: String,
+    knob: &'static str,
+    value: f64,
+    /// Relative; NaN where the setting fails.
+    error: f64,
+    /// Zero where the error is exact.
+    standard_error: f64,
+    metric: &'static str,
+    reference: &'static str,
+    cost: Cost,
 }
 
-/// What a piece of work took.
-#[derive(Clone, Copy)]
-pub(crate) struct Cost {
-    cpu_s: f64,
-    wall_s: f64,
-    peak_mem_bytes: f64,
-}
-
-impl Cost {
-    /// Of what was not timed.
-    pub(crate) const NONE: Self = Self { cpu_s: f64::NAN, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
-
-    /// Processor time of all threads \[s\].
-    pub(crate) fn cpu_s(&self) -> f64 {
-        self.cpu_s
+impl Row {
+    /// A setting (knob, value) with its error and that one's standard error; words are metric and reference.
+    fn new(
+        case: &'static str,
+        method: &str,
+        (knob, value): (&'static str, f64),
+        (error, standard_error): (f64, f64),
+        [metric, reference]: [&'static str; 2],
+        cost: Cost,
+    ) -> Self {
+        Self { case, method: method.into(), knob, value, error, standard_error, metric, reference, cost }
     }
 
-    /// The same for one of `count` equal pieces of work.
-    pub(crate) fn per(self, count: usize) -> Self {
-        let n = count as f64;
-        Self { cpu_s: self.cpu_s / n, wall_s: self.wall_s / n, ..self }
+    fn measured(&self) -> Measured {
+        Measured { core_s: self.cost.cpu_s, error: self.error, standard_error: self.standard_error }
     }
 }
 
-/// Runs a piece of work and measures it.
-pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
-    let (cpu_s, start) = (cpu_s(), Instant::now());
-    let value = work()?;
-    let cost =
-        Cost { cpu_s: self::cpu_s() - cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: peak_mem_bytes() };
-    Ok((value, cost))
+/// The first two of the values if `quick`.
+fn few<T>(values: &[T], quick: bool) -> &[T] {
+    if quick { &values[..values.len().min(2)] } else { values }
 }
 
-/// Processor time of all threads so far, s; NaN where the system does not tell.
-fn cpu_s() -> f64 {
-    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
-    let of = |path: PathBuf| -> Option<f64> {
-        std::fs::read_to_string(path.join("schedstat")).ok()?.split_whitespace().next()?.parse().ok()
-    };
-    tasks.flatten().filter_map(|task| of(task.path())).sum::<f64>() * 1e-9
+/// Mean and its standard error.
+fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
 }
 
-/// Largest resident memory of this process so far, bytes; NaN where the system does not tell.
-fn peak_mem_bytes() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).map_or(f64::NAN, |kb| 1024.0 * kb)
+/// The rows of some groups, on one thread.
+pub(crate) fn measure(groups: &[Group], quick: bool) -> Result<Vec<(Group, Vec<Row>)>, Failure> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    groups.iter().map(|group| Ok((*group, pool.install(|| group.rows(quick))?))).collect()
 }
+
+pub(crate) use show::{cheapest_table, fronts, table};
+
+/// Where `check --accuracy` reads what was measured, and where the book does.
+const STORED: [&str; 2] = ["crates/sim/src/plan/accuracy.csv", "docs/src/work-precision-table.md"];
 
 /// Measures, prints and writes.
 ///
 /// # Errors
-/// What the crate refuses, or an unusable output.
+/// What a crate refuses, or an unusable output.
 pub(crate) fn run(options: &Options) -> Outcome {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let rows = match options.name {
-        Measured::Les => pool.install(|| les::rows(options.effort as usize))?,
-        Measured::Optics => pool.install(|| optics::rows(options.effort as usize))?,
-        Measured::Signal => pool.install(|| signal::rows(options.effort as usize))?,
-        Measured::Estimate => pool.install(|| estimate::rows(options.effort as usize))?,
-    };
-    println!(
-        "{:<22} {:<34} {:<14} {:>10} {:>11} {:>10} metric, reference",
-        "case", "method", "knob", "value", "error", "cpu"
-    );
-    for r in &rows {
-        println!(
-            "{:<22} {:<34} {:<14} {:>10} {:>11.3e} {:>8.1e} s {}, {}",
-            r.case, r.method, r.knob, r.value, r.error, r.cost.cpu_s, r.metric, r.reference
-        );
+    let groups = options.group.map_or(Group::ALL.to_vec(), |group| vec![group]);
+    if options.store && (options.quick || groups.len() < Group::ALL.len()) {
+        return Err(Failure::new("--store keeps a whole measurement: leave --quick and --group out".into()));
     }
-    let name = match options.name {
-        Measured::Les => "les",
-        Measured::Optics => "optics",
-        Measured::Signal => "signal",
-        Measured::Estimate => "estimate",
-    };
-    let parameters = format!("crate = \"{name}\"\neffort = {}\n", options.effort);
+    let measured = measure(&groups, options.quick)?;
+    let machine = machine();
+    let parameters = format!("machine = {machine:?}\nthreads = 1\nquick = {}\n", options.quick);
     let origin = provenance(&parameters, optics::SEED);
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/work-precision"));
     let mut files = FileGroup::new(&folder);
-    files.add(&format!("{name}.csv"), table(&rows).to_csv(&origin)?)?;
-    files.add(&format!("{name}.svg"), figure(&rows).svg(&origin)?)?;
+    for (group, rows) in &measured {
+        show::print(*group, rows);
+        let one = [(*group, rows.as_slice())];
+        files.add(&format!("{}.csv", group.name()), table(&one).to_csv(&origin)?)?;
+        files.add(&format!("{}.svg", group.name()), show::panels(rows).svg(&origin)?)?;
+    }
+    let all: Vec<(Group, &[Row])> = measured.iter().map(|(group, rows)| (*group, rows.as_slice())).collect();
+    let settings = show::settings(&all).to_csv(&origin)?;
+    let cheapest = show::cheapest_markdown(&all, &machine);
+    files.add("work_precision.csv", table(&all).to_csv(&origin)?)?;
+    files.add("work_precision.svg", fronts(&all).svg(&origin)?)?;
+    files.add("cheapest.csv", cheapest_table(&all).to_csv(&origin)?)?;
     files.commit()?;
-    println!("wrote {}", folder.join(format!("{name}.csv")).display());
-    Ok(())
-}
-
-fn table(rows: &[Row]) -> Table {
-    Table::new()
-        .text("case", rows.iter().map(|r| r.case))
-        .text("method", rows.iter().map(|r| r.method.clone()))
-        .text("knob", rows.iter().map(|r| r.knob))
-        .float("value", rows.iter().map(|r| r.value))
-        .float("error", rows.iter().map(|r| r.error))
-        .text("metric", rows.iter().map(|r| r.metric))
-        .text("reference", rows.iter().map(|r| r.reference))
-        .float("cpu_s", rows.iter().map(|r| r.cost.cpu_s))
-        .float("wall_s", rows.iter().map(|r| r.cost.wall_s))
-        .int("threads", rows.iter().map(|_| 1))
-        .float("peak_mem_bytes", rows.iter().map(|r| r.cost.peak_mem_bytes))
-}
-
-/// Error against processor time, a panel for each case.
-fn figure(rows: &[Row]) -> Figure {
-    let mut panels: Vec<CurvePlot> = Vec::new();
-    let mut cases: Vec<&str> = rows.iter().map(|r| r.case).collect();
-    cases.dedup();
-    for case in cases {
-        let mut plot = CurvePlot::new(case, Axis::log("processor time [s]"), Axis::log("error"));
-        let mut methods: Vec<&String> = rows.iter().filter(|r| r.case == case).map(|r| &r.method).collect();
-        methods.dedup();
-        for method in methods {
-            let of = |r: &&Row| r.case == case && r.method == *method && r.error > 0.0 && r.cost.cpu_s > 0.0;
-            let points: Vec<(f64, f64)> = rows.iter().filter(of).map(|r| (r.cost.cpu_s, r.error)).collect();
-            if !points.is_empty() {
-                plot = plot.with(Series::new(method, Style::LineMarkers, points));
-            }
-        }
-        if !plot.series.is_empty() {
-            panels.push(plot);
+    println!("{cheapest}\nwrote {}", folder.join("work_precision.csv").display());
+    if options.store {
+        for (place, text) in STORED.into_iter().zip([settings, cheapest]) {
+            wakescope_sim::io::write_atomic(&root().join(place), text.as_bytes())?;
+            println!("stored {place}");
         }
     }
-    Figure::stacked(panels)
+    Ok(())
 }

@@ -25,6 +25,7 @@ fn main() -> OutputResult<()> {
         files.add(&format!("{name}.png"), figure.png(&origin)?)?;
         report.entries.push(ReportEntry {
             id: name.into(),
+            title: name.into(),
             caption: "A made-up vortex pair, 400 m²/s at the start.".into(),
             svg: Some(svg),
             table: None,

@@ -3,7 +3,7 @@
 
 use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::claim::{Claim, Verdict};
+use crate::claim::{Claim, Verdict, with_error};
 use fixtures::WINDOW;
 use fixtures::pair::PairScan;
 use wakescope_estimate::{
@@ -173,7 +173,7 @@ fn claims(all: &[Measured]) -> Vec<Claim> {
             "ca_pa",
             statement,
             if below { "below 1" } else { "above 1" },
-            format!("{ratio:.3} +- {error:.3}"),
+            with_error(ratio, error),
             false,
         )
     };

@@ -62,8 +62,8 @@ pub(crate) struct Rendered {
     pub(crate) marks: Vec<String>,
     /// Claims measured on the data of the run.
     pub(crate) claims: Vec<Claim>,
-    /// Stage and wall-clock time, s.
-    pub(crate) timings: Vec<(String, f64)>,
+    /// Stage, wall-clock time and processor time, s.
+    pub(crate) timings: Vec<(String, [f64; 2])>,
 }
 
 impl Rendered {

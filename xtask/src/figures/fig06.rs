@@ -18,7 +18,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     for name in ["tau".into(), "energy".into(), "energy_3d".into()].into_iter().chain((0..=8).map(mode_name)) {
         table = table.float(&name, wake.column(&name)?.iter().copied());
     }
-    let figure = wake.surfaces_figure()?.ok_or_else(|| Failure::new("the wake has no fields as NetCDF".into()))?;
+    let figure = wake.surfaces_figure()?.ok_or_else(|| Failure::new(
+            "the wake has no fields as NetCDF: put `fields = [\"netcdf\"]` below `[output]` of its case and run it again".into(),
+        ))?;
     let mut out = Rendered::new(&table, &figure, &origin)?;
     out.files.push(("apng".into(), animation::apng(&wake.frames()?, FRAME_S, &origin)?));
     out.caption = format!(

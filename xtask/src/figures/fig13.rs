@@ -4,7 +4,7 @@ use super::context::{Context, Rendered};
 use super::profiles;
 use super::study::{Age, INSIDE_M, REFERENCES, Sight, Study, mean_and_error, near_scene, with_method};
 use crate::Failure;
-use crate::claim::{Claim, Verdict};
+use crate::claim::{Claim, Verdict, with_error};
 use profiles::{Profiles, edge_level};
 use wakescope_sim::plot::Figure;
 use wakescope_sim::scene::SnrReference;
@@ -79,8 +79,9 @@ fn claim(pairs: &[Pair]) -> Claim {
         z.push(-difference_m_s / standard_error);
         error = error.max(standard_error);
         words.push(format!(
-            "{}: CA - PA = {difference_m_s:+.2} +- {standard_error:.2} (with the evolution {:.2} and {:.2})",
+            "{}: CA - PA = {} (with the evolution {:.2} and {:.2})",
             pair.pa.title(),
+            with_error(difference_m_s, standard_error),
             pair.ca.inside.rms_m_s,
             pair.pa.inside.rms_m_s
         ));

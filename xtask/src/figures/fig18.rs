@@ -2,7 +2,7 @@
 
 use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::claim::{Claim, Verdict};
+use crate::claim::{Claim, Verdict, with_error};
 use crate::trials::methods::Known;
 use crate::trials::noise_name;
 use crate::trials::uniform::{Air, BAND_M_S, errors};
@@ -179,7 +179,7 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
             "F18a",
             "likelihood, 20 pulses, 200 ns, 0 to 15 dB, both noises: standard deviation of good estimates over the bound",
             "at most 1.05",
-            format!("{:.3} +- {:.3}", near.0, near.1),
+            with_error(near.0, near.1),
             near.1,
             below(1.05, near),
         ),
@@ -187,7 +187,7 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
             "F18b",
             "the same from -5 to 20 dB",
             "at most 1.15",
-            format!("{:.3} +- {:.3}", wide.0, wide.1),
+            with_error(wide.0, wide.1),
             wide.1,
             below(1.15, wide),
         ),
@@ -195,7 +195,7 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
             "F18c",
             "likelihood, 20 pulses at -10 dB: fraction of bad estimates",
             "at most 0.10",
-            format!("{:.3} +- {:.3}", few.0, few.1),
+            with_error(few.0, few.1),
             few.1,
             below(0.1, few),
         ),
@@ -203,7 +203,7 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
             "F18d",
             "likelihood, 60 pulses at -10 dB: fraction of bad estimates",
             "at most 0.005",
-            format!("{:.4} +- {:.4}", many.0, many.1),
+            with_error(many.0, many.1),
             many.1,
             below(0.005, many),
         ),

@@ -25,6 +25,8 @@ use wakescope_sim::{measure::run, measure::wind, measure::write};
 const SHARED_LINES: f64 = 9.0;
 /// Gates 3 m apart that share a window of 38.4 m and the pulse.
 const SHARED_GATES: f64 = 10.0;
+/// Cells of a map that are worth one that is independent.
+pub(super) const SHARED_CELLS: f64 = SHARED_LINES * SHARED_GATES;
 /// What counts as inside a vortex, m from its centre.
 pub(super) const INSIDE_M: f64 = 8.0;
 /// What counts as outside of both, m.
@@ -204,7 +206,7 @@ impl Study {
 
     /// Averages over some cells, whose neighbours share lines and gates.
     pub(super) fn over_cells(&self, cells: &[(usize, usize)]) -> CellAverage {
-        CellAverage::over(&self.map, cells, SHARED_LINES * SHARED_GATES)
+        CellAverage::over(&self.map, cells, SHARED_CELLS)
     }
 
     /// Averages over cells of a profile: at one gate, or at one for each vortex.

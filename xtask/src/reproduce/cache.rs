@@ -30,7 +30,7 @@ struct Index {
     marks: Vec<String>,
     extensions: Vec<String>,
     claims: Vec<Claim>,
-    timings: Vec<(String, f64)>,
+    timings: Vec<(String, [f64; 2])>,
 }
 
 impl Place {
@@ -77,7 +77,7 @@ mod tests {
         rendered
             .claims
             .push(Claim { standard_error: 0.25, ..Claim::exact("F0", "fig00", "statement", "1", "2".into(), false) });
-        rendered.timings.push(("total".into(), 1.5));
+        rendered.timings.push(("total".into(), [1.5, 2.5]));
         assert!(place.load().is_none());
         place.store(&rendered).unwrap();
         assert_eq!(place.load(), Some(rendered));

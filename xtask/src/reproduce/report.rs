@@ -1,23 +1,56 @@
 //! The report of a run: one page with all figures, claims and run times.
 
 use crate::Failure;
-use crate::claim::Claim;
+use crate::claim::{Claim, Verdict, two_digits};
+use crate::cost::machine;
 use crate::figures::Figure;
 use crate::figures::context::{Context, Rendered};
-use std::process::Command;
 use wakescope_sim::plot::html::HtmlTable;
-use wakescope_sim::plot::{Report, ReportEntry};
+use wakescope_sim::plot::{Finding, Report, ReportEntry};
 
 /// The page as HTML.
 pub(super) fn html(context: &Context, done: &[(&Figure, Rendered)]) -> Result<String, Failure> {
+    let of = |verdict: Verdict| done.iter().flat_map(|(_, r)| &r.claims).filter(move |c| c.verdict == verdict);
+    let findings = |verdict: Verdict| of(verdict).map(finding).collect();
     let report = Report {
         title: "wakescope: figures and claims".into(),
+        found: found(context, done),
+        findings: vec![
+            ("Claims that fail".into(), findings(Verdict::Fail)),
+            ("Claims that this run does not decide".into(), findings(Verdict::NotResolved)),
+        ],
         facts: facts(context),
         entries: done.iter().map(|(figure, rendered)| entry(figure, rendered)).collect(),
         claims: claims(done),
         timings: timings(done),
     };
     Ok(report.to_html()?)
+}
+
+/// How many claims hold, and what it took.
+fn found(context: &Context, done: &[(&Figure, Rendered)]) -> String {
+    let count = |verdict| done.iter().flat_map(|(_, r)| &r.claims).filter(|c| c.verdict == verdict).count();
+    let [holds, fails, open] = [Verdict::Pass, Verdict::Fail, Verdict::NotResolved].map(count);
+    let [wall_s, core_s] = [0, 1].map(|k| {
+        let total = |r: &Rendered| r.timings.iter().map(|(_, took)| took[k]).sum::<f64>();
+        done.iter().map(|(_, r)| total(r)).sum::<f64>()
+    });
+    format!(
+        "{holds} of {} claims hold, {fails} fail, {open} are not decided with the profile {}. {} figures and tables took {wall_s:.0} s, \
+         {core_s:.0} s of processor time.",
+        holds + fails + open,
+        context.profile_name(),
+        done.len()
+    )
+}
+
+fn finding(claim: &Claim) -> Finding {
+    Finding {
+        name: claim.id.clone(),
+        entry: claim.figure.clone(),
+        statement: claim.statement.clone(),
+        reason: format!("Expected: {}. Measured: {}.", claim.expected, claim.measured),
+    }
 }
 
 fn facts(context: &Context) -> Vec<(String, String)> {
@@ -34,27 +67,6 @@ fn facts(context: &Context) -> Vec<(String, String)> {
     ]
 }
 
-/// Kind of processor, number of cores and compiler, as far as the system tells.
-fn machine() -> String {
-    let cpu = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
-        let line = text.lines().find(|l| l.starts_with("model name"))?;
-        line.split_once(':').map(|(_, name)| name.trim().to_owned())
-    });
-    let cores = std::thread::available_parallelism().map_or(0, usize::from);
-    let compiler = Command::new("rustc")
-        .arg("--version")
-        .output()
-        .ok()
-        .map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned());
-    format!(
-        "{} ({}, {}), {cores} cores, {}",
-        cpu.unwrap_or_else(|| "processor unknown".into()),
-        std::env::consts::ARCH,
-        std::env::consts::OS,
-        compiler.unwrap_or_else(|| "compiler unknown".into())
-    )
-}
-
 fn entry(figure: &Figure, rendered: &Rendered) -> ReportEntry {
     let svg = rendered.file("svg").map(|bytes| String::from_utf8_lossy(bytes).into_owned());
     // A table shows its own rows; a figure's rows are in its file.
@@ -64,7 +76,8 @@ fn entry(figure: &Figure, rendered: &Rendered) -> ReportEntry {
     };
     ReportEntry {
         id: figure.id.into(),
-        caption: format!("{}. {}", figure.title, rendered.caption),
+        title: figure.title.into(),
+        caption: rendered.caption.clone(),
         svg,
         table,
         marks: rendered.marks.clone(),
@@ -84,7 +97,7 @@ fn words(list: &[&str]) -> Vec<String> {
 
 fn claims(done: &[(&Figure, Rendered)]) -> HtmlTable {
     let row = |c: &Claim| {
-        let error = if c.standard_error.is_nan() { String::new() } else { format!("{:.3}", c.standard_error) };
+        let error = if c.standard_error.is_nan() { String::new() } else { two_digits(c.standard_error) };
         vec![c.id.clone(), c.statement.clone(), c.expected.clone(), c.measured.clone(), error, c.verdict.name().into()]
     };
     HtmlTable {
@@ -94,8 +107,11 @@ fn claims(done: &[(&Figure, Rendered)]) -> HtmlTable {
 }
 
 fn timings(done: &[(&Figure, Rendered)]) -> HtmlTable {
-    let rows = done
-        .iter()
-        .flat_map(|(f, r)| r.timings.iter().map(|(stage, s)| vec![f.id.to_owned(), stage.clone(), format!("{s:.3}")]));
-    HtmlTable { header: words(&["figure", "stage", "wall-clock time [s]"]), rows: rows.collect() }
+    let row = |title: &str, (stage, [wall_s, core_s]): &(String, [f64; 2])| {
+        vec![title.to_owned(), stage.clone(), format!("{wall_s:.1}"), format!("{core_s:.1}")]
+    };
+    HtmlTable {
+        header: words(&["figure", "stage", "wall-clock time [s]", "processor time [s]"]),
+        rows: done.iter().flat_map(|(f, r)| r.timings.iter().map(|t| row(f.title, t))).collect(),
+    }
 }

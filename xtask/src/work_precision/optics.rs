@@ -1,7 +1,8 @@
 //! Error against run time of the optics: quadrature, layers, grid, screens, realisations, precision, variance reduction.
 
-use super::{Cost, Row, measured};
+use super::{Row, few};
 use crate::Failure;
+use crate::cost::{Cost, fastest};
 use std::ops::ControlFlow;
 use wakescope_optics::air::{StructureTable, structure_function_m53};
 use wakescope_optics::monte_carlo::{EfficiencyEstimate, Sampling};
@@ -17,38 +18,29 @@ const RANGE_M: f64 = 1000.0;
 /// Spacing of the chapter's screens.
 const SPACING_M: f64 = 2e-3;
 
-/// All measurements; `effort` multiplies the numbers of realisations.
-pub(super) fn rows(effort: usize) -> Result<Vec<Row>, Failure> {
+/// All measurements; few and coarse ones if `quick`.
+pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let mut rows = free_space()?;
-    rows.extend(layers(effort)?);
-    rows.extend(grids()?);
-    rows.extend(screens()?);
-    rows.extend(realisations(effort)?);
+    rows.extend(layers(quick)?);
+    rows.extend(grids(quick)?);
+    rows.extend(screens(quick)?);
+    rows.extend(realisations(quick)?);
     Ok(rows)
-}
-
-fn row(
-    case: &'static str,
-    method: &str,
-    knob: &'static str,
-    (value, error): (f64, f64),
-    words: [&'static str; 2],
-    cost: Cost,
-) -> Row {
-    Row { case, method: method.into(), knob, value, error, metric: words[0], reference: words[1], cost }
 }
 
 /// Two quadratures of the free-space efficiency against one another.
 fn free_space() -> Result<Vec<Row>, Failure> {
     let telescope = Telescope::table2();
     let mut rows = Vec::new();
-    for range_m in [100.0, RANGE_M, 3000.0] {
-        let (overlap, overlap_cost) = measured(|| Ok(theory::free_space_efficiency(&telescope, range_m)?))?;
-        let (hankel, hankel_cost) = measured(|| Ok(theory::free_space_efficiency_hankel(&telescope, range_m)?))?;
+    for (case, range_m) in
+        [("free space, 100 m", 100.0), ("free space, 1000 m", 1000.0), ("free space, 3000 m", 3000.0)]
+    {
+        let (overlap, overlap_cost) = fastest(|| Ok(theory::free_space_efficiency(&telescope, range_m)?))?;
+        let (hankel, hankel_cost) = fastest(|| Ok(theory::free_space_efficiency_hankel(&telescope, range_m)?))?;
         let error = (hankel / overlap - 1.0).abs();
         let words = ["relative difference of the two methods", "each other"];
-        rows.push(row("free space", "pupil overlap", "range_m", (range_m, error), words, overlap_cost));
-        rows.push(row("free space", "Fresnel-Hankel", "range_m", (range_m, error), words, hankel_cost));
+        rows.push(Row::new(case, "pupil overlap", ("none", 0.0), (error, 0.0), words, overlap_cost));
+        rows.push(Row::new(case, "Fresnel-Hankel", ("none", 0.0), (error, 0.0), words, hankel_cost));
     }
     Ok(rows)
 }
@@ -69,22 +61,22 @@ fn estimate(set_up: &MonteCarlo, realisations: usize, double: bool) -> Result<Ef
 }
 
 /// What a finite number of screens does to the exact bistatic efficiency, and what the screens cost.
-fn layers(effort: usize) -> Result<Vec<Row>, Failure> {
+fn layers(quick: bool) -> Result<Vec<Row>, Failure> {
     let (telescope, turbulence) = (Telescope::table2(), Turbulence::table2(CN2_M_M23)?);
     let table = StructureTable::new(&*turbulence.spectrum);
     let none = Misalignment::NONE;
     let continuous = theory::bistatic_efficiency_with(&telescope, &none, &turbulence.cn2, &table, RANGE_M)?;
     let mut rows = Vec::new();
-    for count in [1, 2, 5, 10, 20] {
+    for &count in few(&[1, 2, 5, 10, 20], quick) {
         let screens = Layers::equal(count, RANGE_M)?.screens_to(RANGE_M, &turbulence.cn2)?;
         let exact = theory::bistatic_efficiency_screens(&telescope, &none, &screens, &table, RANGE_M)?;
-        let (_, cost) = measured(|| estimate(&set_up(count, Grid::table2())?, 8 * effort, false))?;
+        let (_, cost) = fastest(|| estimate(&set_up(count, Grid::table2())?, 2, false))?;
         let words = ["bistatic efficiency, relative", "exact theory of the continuous path"];
-        rows.push(row(
+        rows.push(Row::new(
             "layers",
             "mid-layer screens",
-            "layers",
-            (count as f64, (exact / continuous - 1.0).abs()),
+            ("atmosphere.turbulence.layers", count as f64),
+            ((exact / continuous - 1.0).abs(), 0.0),
             words,
             cost,
         ));
@@ -93,17 +85,24 @@ fn layers(effort: usize) -> Result<Vec<Row>, Failure> {
 }
 
 /// What the grid does to the free-space efficiency, before the correction.
-fn grids() -> Result<Vec<Row>, Failure> {
+fn grids(quick: bool) -> Result<Vec<Row>, Failure> {
     let exact = theory::free_space_efficiency(&Telescope::table2(), RANGE_M)?;
     let mut rows = Vec::new();
-    for (points, spacing_m) in [(256, 4e-3), (512, 2e-3), (1024, 1e-3)] {
+    for &(points, spacing_m) in few(&[(128, 8e-3), (256, 4e-3), (512, 2e-3), (1024, 1e-3)], quick) {
         for (method, double) in [("f32", false), ("f64", true)] {
             let set_up = set_up(10, Grid::square(points, spacing_m)?)?;
-            let (eta, cost) = measured(|| {
+            let (eta, cost) = fastest(|| {
                 Ok(if double { set_up.grid_free_space::<f64>()? } else { set_up.grid_free_space::<f32>()? })
             })?;
             let words = ["free-space efficiency, relative, uncorrected", "exact theory"];
-            rows.push(row("grid", method, "points", (points as f64, (eta[0] / exact - 1.0).abs()), words, cost));
+            rows.push(Row::new(
+                "grid",
+                method,
+                ("atmosphere.turbulence.grid_points", points as f64),
+                ((eta[0] / exact - 1.0).abs(), 0.0),
+                words,
+                cost,
+            ));
         }
     }
     Ok(rows)
@@ -111,35 +110,35 @@ fn grids() -> Result<Vec<Row>, Failure> {
 
 /// Expected structure function of the screens against theory, beside plain Fourier synthesis and Lane's subharmonics:
 /// the worst from 2 dx to half the grid.
-fn screens() -> Result<Vec<Row>, Failure> {
+fn screens(quick: bool) -> Result<Vec<Row>, Failure> {
     let spectrum = VonKarman::table2();
     let words = ["expected structure function, relative, worst", "quadrature of the spectrum"];
     let mut rows = Vec::new();
-    for points in [256, 512, 1024] {
+    for &points in few(&[128, 256, 512], quick) {
         let grid = Grid::square(points, SPACING_M)?;
         let generator = ScreenGenerator::<f32>::new(grid, std::sync::Arc::new(spectrum))?;
         let mut work = generator.work();
         let mut pair = [vec![0.0f32; points * points], vec![0.0f32; points * points]];
         let [first, second] = &mut pair;
         let mut rng = stream(SEED, 0, 0);
-        let (_, cost) = measured(|| Ok(generator.fill_pair(&mut rng, &mut work, first, second)?))?;
+        let (_, cost) = fastest(|| Ok(generator.fill_pair(&mut rng, &mut work, first, second)?))?;
         let own = worst_error(&spectrum, points, |steps| generator.expected_structure_m53(steps, 0))?;
-        rows.push(row(
+        rows.push(Row::new(
             "screens (a pair)",
             "random shift and subharmonics",
-            "points",
-            (points as f64, own),
+            ("points", points as f64),
+            (own, 0.0),
             words,
             cost,
         ));
         for (method, levels) in [("plain synthesis (no cost taken)", 0), ("3 levels of Lane (no cost taken)", 3)] {
             // Only the expectation is computed: these screens are not part of the crate.
-            let (error, _) = measured(|| {
+            let (error, _) = fastest(|| {
                 worst_error(&spectrum, points, |steps| {
                     expected_lane_m53(&spectrum, points, levels, steps as f64 * SPACING_M)
                 })
             })?;
-            rows.push(row("screens (a pair)", method, "points", (points as f64, error), words, Cost::NONE));
+            rows.push(Row::new("screens (a pair)", method, ("points", points as f64), (error, 0.0), words, Cost::NONE));
         }
     }
     Ok(rows)
@@ -174,7 +173,7 @@ fn expected_lane_m53(spectrum: &VonKarman, points: usize, levels: i32, separatio
 }
 
 /// Standard errors of the monostatic efficiency against the work, for each way of drawing.
-fn realisations(effort: usize) -> Result<Vec<Row>, Failure> {
+fn realisations(quick: bool) -> Result<Vec<Row>, Failure> {
     let ways = [
         ("independent, f32", Sampling::Independent, false),
         ("independent, f64", Sampling::Independent, true),
@@ -182,12 +181,21 @@ fn realisations(effort: usize) -> Result<Vec<Row>, Failure> {
     ];
     let mut rows = Vec::new();
     for (method, sampling, double) in ways {
-        for count in [32, 64, 128] {
-            let set_up = MonteCarlo { sampling, ..set_up(10, Grid::table2())? };
-            let (found, cost) = measured(|| estimate(&set_up, count * effort, double))?;
+        for &count in few(&[32, 128, 512], quick) {
+            let set_up = MonteCarlo { sampling, ..set_up(5, Grid::square(256, 4e-3)?)? };
+            let (found, cost) = fastest(|| estimate(&set_up, count, double))?;
             let error = found.monostatic.standard_error[0] / found.monostatic.mean[0];
+            // A standard deviation of so many independent samples.
+            let of_error = error / (2.0 * (found.independent_samples.max(2) - 1) as f64).sqrt();
             let words = ["relative standard error, monostatic", "itself"];
-            rows.push(row("realisations", method, "realisations", ((count * effort) as f64, error), words, cost));
+            rows.push(Row::new(
+                "realisations",
+                method,
+                ("atmosphere.turbulence.realisations", count as f64),
+                (error, of_error),
+                words,
+                cost,
+            ));
         }
     }
     Ok(rows)

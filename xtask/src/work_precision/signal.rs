@@ -2,8 +2,9 @@
 //!
 //! All on one line of sight through the core of a vortex, the steepest of the chapter's scene.
 
-use super::{Row, measured};
+use super::{Row, few};
 use crate::Failure;
+use crate::cost::fastest;
 use fixtures::{ENERGY_J, receiver};
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::literal::literal_envelope;
@@ -18,14 +19,14 @@ const FIRST_M: f64 = 340.0;
 const SAMPLE_M: f64 = 0.5 * SPEED_OF_LIGHT_M_S / 250e6;
 const COVARIANCE: [&str; 2] = ["covariance of the samples, relative, worst", "layers of 7.5 cm"];
 
-/// All measurements; `effort` multiplies the numbers of pulses.
-pub(super) fn rows(effort: usize) -> Result<Vec<Row>, Failure> {
+/// All measurements; few and coarse ones if `quick`.
+pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for (case, pulse_s) in [("layers, 200 ns", 200e-9), ("layers, 400 ns", 400e-9)] {
-        rows.extend(layers(case, pulse_s, 40 * effort)?);
+        rows.extend(layers(case, pulse_s, quick)?);
     }
     rows.extend(sums()?);
-    rows.extend(pulses(effort)?);
+    rows.extend(pulses(quick)?);
     Ok(rows)
 }
 
@@ -67,18 +68,19 @@ fn line(simulator: &Simulator, samples: usize, parts: usize) -> Result<LineOfSig
 }
 
 /// What layers of that thickness do to the covariance of a gate in the core, and what a record of 300 samples costs with them.
-fn layers(case: &'static str, pulse_s: f64, records: usize) -> Result<Vec<Row>, Failure> {
+fn layers(case: &'static str, pulse_s: f64, quick: bool) -> Result<Vec<Row>, Failure> {
     const GATE: usize = 128;
     const LONG: usize = 300;
+    let records = if quick { 4 } else { 40 };
     let (gate, long) = (simulator(pulse_s, NoiseModel::None, GATE)?, simulator(pulse_s, NoiseModel::None, LONG)?);
     let exact = gate.covariance_a2(&line(&gate, GATE, 8)?)?;
     let largest = exact.iter().map(|value| value.norm()).fold(0.0, f64::max);
     let mut rows = Vec::new();
-    for parts in [1, 2, 3, 4, 6] {
+    for &parts in few(&[1, 2, 3, 4, 6], quick) {
         let found = gate.covariance_a2(&line(&gate, GATE, parts)?)?;
         let error = (&found - &exact).iter().map(|value| value.norm()).fold(0.0, f64::max) / largest;
         let air = line(&long, LONG, parts)?;
-        let ((), cost) = measured(|| {
+        let ((), cost) = fastest(|| {
             let (mut scratch, mut out_a) = (Scratch::default(), vec![0.0; LONG]);
             for pulse in 0..records {
                 let mut rng = pulse_generator(SEED, PulseKey { line: 0, pulse });
@@ -86,16 +88,8 @@ fn layers(case: &'static str, pulse_s: f64, records: usize) -> Result<Vec<Row>, 
             }
             Ok(())
         })?;
-        rows.push(Row {
-            case,
-            method: "record of 300 samples".into(),
-            knob: "layers for each sample",
-            value: parts as f64,
-            error,
-            metric: COVARIANCE[0],
-            reference: COVARIANCE[1],
-            cost: cost.per(records),
-        });
+        let knob = ("layers for each sample", parts as f64);
+        rows.push(Row::new(case, "record of 300 samples", knob, (error, 0.0), COVARIANCE, cost.per(records)));
     }
     Ok(rows)
 }
@@ -111,9 +105,9 @@ fn sums() -> Result<Vec<Row>, Failure> {
         let speckle: Vec<num_complex::Complex<f64>> =
             (0..air.layers()).map(|l| num_complex::Complex::from_polar(1.0, 2.4 * (l * l) as f64)).collect();
         let (literal_a, literal_cost): (Vec<num_complex::Complex<f64>>, _) =
-            measured(|| Ok(literal_envelope(&simulator, &air, &speckle)?))?;
+            fastest(|| Ok(literal_envelope(&simulator, &air, &speckle)?))?;
         const TIMES: usize = 20;
-        let (fast_a, fast_cost): (Vec<num_complex::Complex<f64>>, _) = measured(|| {
+        let (fast_a, fast_cost): (Vec<num_complex::Complex<f64>>, _) = fastest(|| {
             let (mut scratch, mut out_a) = (Scratch::default(), vec![num_complex::Complex::<f64>::default(); SAMPLES]);
             for _ in 0..TIMES {
                 simulator.envelope_of_speckle_into(&air, &speckle, &mut scratch, &mut out_a)?;
@@ -123,23 +117,16 @@ fn sums() -> Result<Vec<Row>, Failure> {
         let largest = literal_a.iter().map(|value| value.norm()).fold(0.0, f64::max);
         let error = literal_a.iter().zip(&fast_a).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) / largest;
         for (method, cost) in [("literal sum", literal_cost), ("phasors", fast_cost.per(TIMES))] {
-            rows.push(Row {
-                case: "sum over layers",
-                method: method.into(),
-                knob: "layers for each sample",
-                value: parts as f64,
-                error,
-                metric: "envelope, relative, worst: difference of the two",
-                reference: "each other",
-                cost,
-            });
+            let words = ["envelope, relative, worst: difference of the two", "each other"];
+            let knob = ("layers for each sample", parts as f64);
+            rows.push(Row::new("sum over layers", method, knob, (error, 0.0), words, cost));
         }
     }
     Ok(rows)
 }
 
 /// Mean power of so many pulses against its expectation, for each kind of noise.
-fn pulses(effort: usize) -> Result<Vec<Row>, Failure> {
+fn pulses(quick: bool) -> Result<Vec<Row>, Failure> {
     const SAMPLES: usize = 300;
     let mut rows = Vec::new();
     for (method, noise) in
@@ -156,27 +143,22 @@ fn pulses(effort: usize) -> Result<Vec<Row>, Failure> {
             NoiseModel::White => 0.5 * 250e6 * simulator.receiver().noise_density_a2_hz(),
         };
         let expected_a2 = expected_a2.iter().sum::<f64>() / SAMPLES as f64 + noise_a2;
-        for count in [100, 400, 1600].map(|count| count * effort) {
-            let (power_a2, cost) = measured(|| {
+        for &count in few(&[100, 400, 1600, 6400], quick) {
+            let ([power_a2, square_a4], cost) = fastest(|| {
                 let (mut scratch, mut out_a) = (Scratch::default(), vec![0.0; SAMPLES]);
-                let mut sum = 0.0;
+                let mut sums = [0.0; 2];
                 for pulse in 0..count {
                     let mut rng = pulse_generator(SEED, PulseKey { line: 1, pulse });
                     simulator.record_into(&air, &mut rng, &mut scratch, &mut out_a)?;
-                    sum += out_a.iter().map(|a| a * a).sum::<f64>() / SAMPLES as f64;
+                    let power_a2 = out_a.iter().map(|a| a * a).sum::<f64>() / SAMPLES as f64;
+                    sums = [sums[0] + power_a2, sums[1] + power_a2 * power_a2];
                 }
-                Ok(sum / count as f64)
+                Ok(sums.map(|sum| sum / count as f64))
             })?;
-            rows.push(Row {
-                case: "mean power",
-                method: method.into(),
-                knob: "pulses",
-                value: count as f64,
-                error: (power_a2 / expected_a2 - 1.0).abs(),
-                metric: "relative",
-                reference: "expected power of signal and noise",
-                cost,
-            });
+            let scatter_a2 = ((square_a4 - power_a2 * power_a2) / count as f64).sqrt();
+            let error = ((power_a2 / expected_a2 - 1.0).abs(), scatter_a2 / expected_a2);
+            let words = ["mean power, relative", "expected power of signal and noise"];
+            rows.push(Row::new("mean power", method, ("pulses", count as f64), error, words, cost));
         }
     }
     Ok(rows)

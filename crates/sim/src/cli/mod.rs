@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 2 wrong input or unusable output. Progress, plans and errors go to standard error,
 //! results to standard output; `--json` makes the result one JSON object, and so an error.
 
+mod accuracy;
 mod bound;
 mod budget;
 mod flow;
@@ -13,6 +14,7 @@ mod wake;
 
 use crate::io::Existing;
 use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
+use crate::plan::accuracy::proposals;
 use crate::plan::{Plan, Stage, Target};
 use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::{Error, measure::run, measure::write};
@@ -107,6 +109,9 @@ struct CheckWords {
     /// Accept a scene that needs more memory than the machine has.
     #[arg(long)]
     allow_large: bool,
+    /// Relative error, such as 3% or 0.03: name the cheapest settings that were measured to reach it, and what they cost.
+    #[arg(long, value_name = "ERROR", value_parser = accuracy::share)]
+    accuracy: Option<f64>,
 }
 
 /// Runs the program with the words of the command line; returns its exit code.
@@ -175,7 +180,13 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
         joined(ranges_m.iter().map(f64::to_string).collect()),
         joined(snr_db.iter().map(|db| format!("{db:.2}")).collect())
     );
-    say(cli.json, &object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
+    let mut text = format!("{}: good\n{plan}  {short}\n", words.scene.display());
+    if let Some(target) = words.accuracy {
+        let found = proposals(&plan, target)?;
+        object["accuracy"] = accuracy::as_json(&found, target);
+        text = format!("{}\n{}", text.trim_end(), accuracy::as_text(&plan, &found, target));
+    }
+    say(cli.json, &object, &text)
 }
 
 /// The plan of a scene, with all that can be known before the computing: limits, memory, a small rehearsal, the folder.

@@ -12,6 +12,7 @@ use crate::scene::{Method, Scene, SceneFile, Weighting};
 use std::fmt;
 use std::sync::Arc;
 
+pub mod accuracy;
 mod ambiguity;
 mod files;
 mod fit;

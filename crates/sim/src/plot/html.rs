@@ -4,7 +4,7 @@
 use super::svg::escape;
 use crate::io::{OutputError, OutputResult, same_length};
 
-/// A table of the page.
+/// A table of the page; on a narrow screen each row becomes a block of named cells.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct HtmlTable {
     /// Column names.
@@ -13,11 +13,26 @@ pub struct HtmlTable {
     pub rows: Vec<Vec<String>>,
 }
 
+/// A statement that does not hold, or is not decided, for the beginning of the page.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Finding {
+    /// Short name, such as `F9b`.
+    pub name: String,
+    /// The entry that shows it.
+    pub entry: String,
+    /// What is stated.
+    pub statement: String,
+    /// Why it does not hold: what was expected and what was found.
+    pub reason: String,
+}
+
 /// A figure or table of the report.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReportEntry {
     /// Short name and link target, such as `fig04`.
     pub id: String,
+    /// What it is called.
+    pub title: String,
     /// What is shown and how it was made.
     pub caption: String,
     /// The picture as SVG text; the scene's metadata may be in it.
@@ -33,6 +48,10 @@ pub struct ReportEntry {
 pub struct Report {
     /// Title of the page.
     pub title: String,
+    /// What was found, in a sentence or two.
+    pub found: String,
+    /// Headings and what stands below them: what fails, what is not decided. Empty lists are left out.
+    pub findings: Vec<(String, Vec<Finding>)>,
     /// Name and value of what holds for the whole run: version, seed, machine, profile, command.
     pub facts: Vec<(String, String)>,
     /// Figures and tables in order.
@@ -46,17 +65,23 @@ pub struct Report {
 const STYLE: &str = "\
 :root{color-scheme:light}
 body{font:16px/1.5 system-ui,'Segoe UI','Helvetica Neue',Arial,sans-serif;color:#222;background:#fff;max-width:1040px;margin:0 auto;padding:24px 20px 80px}
-h1{font-size:28px;margin:8px 0 4px}h2{font-size:21px;margin:44px 0 10px;border-bottom:1px solid #ddd;padding-bottom:4px}
-h3{font-size:17px;margin:0 0 6px}
-nav{font-size:14px;margin:14px 0}nav a{margin-right:12px;white-space:nowrap}a{color:#0063a6}
+h1{font-size:28px;line-height:1.25;margin:8px 0 4px}h2{font-size:21px;margin:44px 0 10px;border-bottom:1px solid #ddd;padding-bottom:4px}
+h3{font-size:17px;margin:0 0 6px}.found{font-size:18px;margin:14px 0}
+.finding{margin:10px 0;padding:8px 14px;border-left:4px solid #b8ab73;background:#faf8f0}.finding.first{border-color:#b03a00;background:#fdf3ee}
+.finding p{margin:2px 0}.reason{color:#444;font-size:14.5px;overflow-wrap:anywhere}
+nav ol{columns:2;font-size:14.5px;padding-left:22px;margin:14px 0}a{color:#0063a6}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 18px;font-size:14px;margin:14px 0}dt{color:#666}dd{margin:0;overflow-wrap:anywhere}
 figure{margin:26px 0;padding:16px;border:1px solid #e3e3e3;border-radius:6px;background:#fff}
-figure svg{display:block;width:100%;height:auto}figcaption{font-size:14.5px;color:#333;margin-top:10px;white-space:pre-line}
+figure svg{display:block;width:100%;height:auto}figcaption{font-size:14.5px;color:#333;margin-top:10px;white-space:pre-line;overflow-wrap:anywhere}
 .mark{display:inline-block;font-size:12px;font-weight:normal;background:#eef3f8;border:1px solid #cbd9e6;border-radius:10px;padding:1px 9px;margin-left:8px;vertical-align:2px}
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-size:14px;width:100%}
-th,td{border-bottom:1px solid #e6e6e6;padding:5px 10px;text-align:left;vertical-align:top}th{background:#f6f6f6;font-weight:600}
+th,td{border-bottom:1px solid #e6e6e6;padding:5px 10px;text-align:left;vertical-align:top;overflow-wrap:anywhere}th{background:#f6f6f6;font-weight:600}
 td.pass{color:#00643f;font-weight:600}td.fail{color:#b03a00;font-weight:600}td.not_resolved{color:#6b5a00;font-weight:600}
-@media print{figure{break-inside:avoid}}
+@media (max-width:700px){body{padding:12px 12px 60px}h1{font-size:23px}nav ol{columns:1}dl{grid-template-columns:1fr}dt{margin-top:6px}
+figure{padding:8px;margin:18px 0}thead{display:none}tr{display:block;border-bottom:2px solid #ccc;padding:6px 0}
+td{display:flex;gap:10px;border:0;padding:2px 4px}td::before{content:attr(data-label);flex:0 0 7.5em;color:#666;font-weight:normal}}
+@media print{body{max-width:none;padding:0;font-size:10.5pt}nav{display:none}a{color:inherit;text-decoration:none}
+figure,.finding,tr{break-inside:avoid}h2,h3{break-after:avoid}figure{border:0;padding:0}figure svg{max-height:22cm}thead{display:table-header-group}table{font-size:8.5pt}}
 ";
 
 impl Report {
@@ -69,25 +94,42 @@ impl Report {
         let mut out = format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n"
         );
-        out += "<dl>\n";
-        for (name, value) in &self.facts {
-            out += &format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value));
+        out += &format!("<p class=\"found\">{}</p>\n", escape(&self.found));
+        for (place, (heading, list)) in self.findings.iter().filter(|(_, list)| !list.is_empty()).enumerate() {
+            let class = if place == 0 { "finding first" } else { "finding" };
+            out += &format!("<h2>{}</h2>\n", escape(heading));
+            for finding in list {
+                let Finding { name, entry, statement, reason } = finding;
+                out += &format!(
+                    "<div class=\"{class}\"><p><a href=\"#{}\">{}</a> {}</p><p class=\"reason\">{}</p></div>\n",
+                    escape(entry),
+                    escape(name),
+                    escape(statement),
+                    escape(reason)
+                );
+            }
         }
-        out += "</dl>\n<nav>";
+        out += "<h2>Figures and tables</h2>\n<nav><ol>\n";
         for entry in &self.entries {
-            out += &format!("<a href=\"#{0}\">{0}</a>", escape(&entry.id));
+            out += &format!("<li><a href=\"#{}\">{}</a></li>\n", escape(&entry.id), escape(&entry.title));
         }
-        out += "<a href=\"#claims\">claims</a><a href=\"#timings\">timings</a></nav>\n";
+        out +=
+            "<li><a href=\"#claims\">All claims</a></li>\n<li><a href=\"#timings\">Run times</a></li>\n</ol></nav>\n";
         for (i, entry) in self.entries.iter().enumerate() {
             if self.entries[..i].iter().any(|e| e.id == entry.id) {
                 return Err(OutputError::Duplicate { what: "report entry", name: entry.id.clone() });
             }
             push_entry(entry, &mut out)?;
         }
-        out += "<h2 id=\"claims\">Claims</h2>\n";
+        out += "<h2 id=\"claims\">All claims</h2>\n";
         push_table("claims", &self.claims, &mut out)?;
-        out += "<h2 id=\"timings\">Timings</h2>\n";
+        out += "<h2 id=\"timings\">Run times</h2>\n";
         push_table("timings", &self.timings, &mut out)?;
+        out += "<h2>How it was made</h2>\n<dl>\n";
+        for (name, value) in &self.facts {
+            out += &format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value));
+        }
+        out += "</dl>\n";
         out += "</body>\n</html>\n";
         Ok(out)
     }
@@ -95,7 +137,7 @@ impl Report {
 
 fn push_entry(entry: &ReportEntry, out: &mut String) -> OutputResult<()> {
     let id = escape(&entry.id);
-    *out += &format!("<figure id=\"{id}\">\n<h3>{id}");
+    *out += &format!("<figure id=\"{id}\">\n<h3>{}", escape(&entry.title));
     for mark in &entry.marks {
         *out += &format!("<span class=\"mark\">{}</span>", escape(mark));
     }
@@ -123,12 +165,12 @@ fn push_table(name: &str, table: &HtmlTable, out: &mut String) -> OutputResult<(
     for row in &table.rows {
         same_length(&format!("row of table {name}"), row.len(), "its header", table.header.len())?;
         *out += "<tr>";
-        for cell in row {
+        for (cell, column) in row.iter().zip(&table.header) {
             let class = match cell.as_str() {
                 "pass" | "fail" | "not_resolved" => format!(" class=\"{cell}\""),
                 _ => String::new(),
             };
-            *out += &format!("<td{class}>{}</td>", escape(cell));
+            *out += &format!("<td{class} data-label=\"{}\">{}</td>", escape(column), escape(cell));
         }
         *out += "</tr>\n";
     }
@@ -146,9 +188,15 @@ mod tests {
         let row = |cell: &str| HtmlTable { header: vec![WILD.into()], rows: vec![vec![cell.into()]] };
         Report {
             title: WILD.into(),
+            found: WILD.into(),
+            findings: vec![
+                ("fails".into(), vec![Finding { name: WILD.into(), statement: WILD.into(), ..Finding::default() }]),
+                ("nothing".into(), Vec::new()),
+            ],
             facts: vec![(WILD.into(), WILD.into())],
             entries: vec![ReportEntry {
                 id: "fig01".into(),
+                title: WILD.into(),
                 caption: WILD.into(),
                 svg: Some("<svg xmlns=\"http://www.w3.org/2000/svg\"></svg>\n".into()),
                 table: Some(row(WILD)),
@@ -163,8 +211,12 @@ mod tests {
     fn every_text_is_escaped_and_nothing_is_fetched() {
         let page = report().to_html().unwrap();
         assert!(!page.contains("<script"), "{page}");
-        assert_eq!(page.matches("&lt;script&gt;").count(), 11);
-        assert!(page.contains("<td class=\"not_resolved\">not_resolved</td>"));
+        assert_eq!(page.matches("&lt;script&gt;").count(), 19);
+        assert!(page.contains("<td class=\"not_resolved\" data-label="));
+        // What does not hold stands before the figures, and an empty list has no heading.
+        assert!(
+            page.find("class=\"finding first\"").unwrap() < page.find("<figure").unwrap() && !page.contains("nothing")
+        );
         for outside in ["src=", "url(", "@import", "<link", "href=\"http"] {
             assert!(!page.contains(outside), "{outside}");
         }

@@ -36,7 +36,7 @@ pub use axis::Axis;
 pub use colour::ColourMap;
 pub use curves::{CurvePlot, Series, Style};
 pub use figure::{Figure, Panel};
-pub use html::{HtmlTable, Report, ReportEntry};
+pub use html::{Finding, HtmlTable, Report, ReportEntry};
 pub use isosurface::{IsosurfacePlot, Surface};
 pub use map::MapPlot;
 pub use volume::Volume;

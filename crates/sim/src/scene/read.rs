@@ -80,7 +80,6 @@ impl SceneFile {
     }
 
     /// The same scene with the folder and the lines of the file that `other` was read from.
-    #[cfg(feature = "cli")]
     pub(crate) fn with_file_of(self, other: Self) -> Self {
         Self { folder: other.folder, source: other.source, ..self }
     }

@@ -6,10 +6,10 @@ use crate::measure::instrument::Instrument;
 use crate::plan::Plan;
 use crate::scene::{DetectorSignal, Weighting};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
+use wakescope_signal::RangeFilter;
 use wakescope_signal::constants::ELEMENTARY_CHARGE_C;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::receiver::phase_noise::{mean_frequency_sd_m_s, peak_variance_factor};
-use wakescope_signal::{Pulse, RangeFilter};
 
 /// Signal-to-noise ratio below which the telescope's reflex does no harm, -20 dB.
 const HARMLESS_SNR: f64 = 0.01;
@@ -133,9 +133,8 @@ impl Limits {
         let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
         let (pulse, thickness_m) = (&plan.instrument.pulse, plan.geometry.layer_thickness_m);
         let gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, thickness_m)?;
-        let reach_m = window.len() as f64 * scene.sample_spacing_m() + pulse_length_m(pulse);
-        let gate_m = full_width_m(|offset_m| gate.weight_per_m(offset_m), reach_m);
-        let pulse_m = full_width_m(|offset_m| pulse.range_weight_per_m(offset_m), pulse_length_m(pulse));
+        let gate_m = gate.full_width_half_maximum_m();
+        let pulse_m = RangeFilter::pulse(pulse, thickness_m)?.full_width_half_maximum_m();
         let weighting = match scene.estimator.weighting {
             Weighting::Gaussian => "Gaussian",
             Weighting::Rectangular => "rectangular",
@@ -148,31 +147,6 @@ impl Limits {
         ));
         Ok(())
     }
-}
-
-fn pulse_length_m(pulse: &Pulse) -> f64 {
-    let (first_s, last_s) = pulse.support_s();
-    0.5 * SPEED_OF_LIGHT_M_S * (last_s - first_s)
-}
-
-/// Full width at half maximum of a weight within some reach of 0, m.
-fn full_width_m(weight: impl Fn(f64) -> f64, reach_m: f64) -> f64 {
-    const STEPS: i32 = 1000;
-    let step_m = reach_m / f64::from(STEPS);
-    let values: Vec<f64> = (-STEPS..=STEPS).map(|i| weight(f64::from(i) * step_m)).collect();
-    let half = 0.5 * values.iter().copied().fold(0.0, f64::max);
-    let above = |(_, value): &(usize, &f64)| **value >= half;
-    let (Some((first, _)), Some((last, _))) =
-        (values.iter().enumerate().find(above), values.iter().enumerate().rfind(above))
-    else {
-        return 0.0;
-    };
-    // Between an end of the width and its neighbour outside, by a straight line.
-    let beyond = |at: usize, outside: Option<&f64>| {
-        outside.map_or(0.0, |outside| (values[at] - half) / (values[at] - outside).max(f64::MIN_POSITIVE))
-    };
-    let before = first.checked_sub(1).and_then(|i| values.get(i));
-    step_m * ((last - first) as f64 + beyond(first, before) + beyond(last, values.get(last + 1)))
 }
 
 /// Power of a local oscillator at which shot noise equals a noise that does not depend on it, W.

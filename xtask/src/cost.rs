@@ -1,0 +1,90 @@
+//! What a piece of work takes: processor time, time on the clock, memory; and on which machine. Linux only: the figures come from /proc.
+
+use crate::Failure;
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::Instant;
+
+/// What a piece of work took.
+#[derive(Clone, Copy)]
+pub(crate) struct Cost {
+    /// Processor time of all threads \[s\].
+    pub(crate) cpu_s: f64,
+    /// Wall-clock time \[s\].
+    pub(crate) wall_s: f64,
+    /// Largest resident memory of the process so far \[bytes\].
+    pub(crate) peak_mem_bytes: f64,
+}
+
+impl Cost {
+    /// Of what was not timed.
+    pub(crate) const NONE: Self = Self { cpu_s: f64::NAN, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
+
+    /// The same for one of `count` equal pieces of work.
+    pub(crate) fn per(self, count: usize) -> Self {
+        let n = count as f64;
+        Self { cpu_s: self.cpu_s / n, wall_s: self.wall_s / n, ..self }
+    }
+}
+
+/// Runs a piece of work and measures it.
+pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
+    let (cpu_s, start) = (cpu_s(), Instant::now());
+    let value = work()?;
+    let cost =
+        Cost { cpu_s: self::cpu_s() - cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: peak_mem_bytes() };
+    Ok((value, cost))
+}
+
+/// Processor time of all threads so far, s; NaN where the system does not tell.
+fn cpu_s() -> f64 {
+    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
+    let of = |path: PathBuf| -> Option<f64> {
+        std::fs::read_to_string(path.join("schedstat")).ok()?.split_whitespace().next()?.parse().ok()
+    };
+    tasks.flatten().filter_map(|task| of(task.path())).sum::<f64>() * 1e-9
+}
+
+/// Largest resident memory of this process so far, bytes; NaN where the system does not tell.
+fn peak_mem_bytes() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).map_or(f64::NAN, |kb| 1024.0 * kb)
+}
+
+/// Shortest piece of work that the system's clock of processor time tells to a few per cent \[s\].
+const TELLABLE_S: f64 = 0.1;
+
+/// The same three times: the first value, the smallest times; short work is repeated so that its time can be told.
+pub(crate) fn fastest<T>(mut work: impl FnMut() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
+    let (value, first) = measured(&mut work)?;
+    let times = (TELLABLE_S / first.wall_s.max(1e-6)).ceil().clamp(1.0, 10_000.0) as usize;
+    let mut batch = || measured(|| (0..times).try_for_each(|_| work().map(drop))).map(|((), cost)| cost.per(times));
+    let mut cost = if times == 1 { first } else { batch()? };
+    for _ in 0..2 {
+        let again = batch()?;
+        cost = Cost { cpu_s: cost.cpu_s.min(again.cpu_s), wall_s: cost.wall_s.min(again.wall_s), ..again };
+    }
+    Ok((value, cost))
+}
+
+/// Kind of processor, number of cores and compiler, as far as the system tells.
+pub(crate) fn machine() -> String {
+    let cpu = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
+        let line = text.lines().find(|l| l.starts_with("model name"))?;
+        line.split_once(':').map(|(_, name)| name.trim().to_owned())
+    });
+    let cores = std::thread::available_parallelism().map_or(0, usize::from);
+    let compiler = Command::new("rustc")
+        .arg("--version")
+        .output()
+        .ok()
+        .map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned());
+    format!(
+        "{} ({}, {}), {cores} cores, {}",
+        cpu.unwrap_or_else(|| "processor unknown".into()),
+        std::env::consts::ARCH,
+        std::env::consts::OS,
+        compiler.unwrap_or_else(|| "compiler unknown".into())
+    )
+}

@@ -1,0 +1,30 @@
+//! Figure 16: stiff and extreme cases of the crates, what each must come to and what it came to.
+
+use super::context::{Context, Rendered};
+use crate::Failure;
+use crate::claim::Claim;
+use crate::stability::{self, Row};
+
+pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
+    let rows = stability::rows(context.profile, |_| true);
+    let origin = context.provenance_of_formula(&format!("profile = \"{}\"\n", context.profile_name()));
+    let mut out = Rendered::new(&stability::table(&rows), &stability::picture(&rows), &origin)?;
+    let missed: Vec<&str> = rows.iter().filter(|row| !row.passes()).map(Row::name).collect();
+    out.caption = format!(
+        "Each of {} stiff and extreme cases must come to a number within bounds, or be refused in stated words: how much of what \
+         is allowed it takes, 1 being the bar (dashed). Names, inputs and outcomes are in the table (fig16.csv).",
+        rows.len()
+    );
+    out.claims = vec![Claim::exact(
+        "F16",
+        "fig16",
+        "every stiff and extreme case ends as it must",
+        &format!("{} cases", rows.len()),
+        match missed.is_empty() {
+            true => format!("{} cases", rows.len()),
+            false => format!("{} cases; not: {}", rows.len() - missed.len(), missed.join(", ")),
+        },
+        missed.is_empty(),
+    )];
+    Ok(out)
+}
