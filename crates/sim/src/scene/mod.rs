@@ -46,8 +46,6 @@ pub use instrument::{
     PulseResampling, PulseShape, ReceiverPath, SampledShape, SnrReference, Telescope,
 };
 pub use read::SceneFile;
-#[cfg(feature = "sweep")]
-pub(crate) use read::scene_keys;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
