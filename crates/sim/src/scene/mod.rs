@@ -50,8 +50,6 @@ pub use instrument::{
 };
 pub use presets::{preset_names, preset_toml};
 pub use read::SceneFile;
-#[cfg(feature = "sweep")]
-pub(crate) use read::scene_keys;
 pub use receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, SecondTrip};
 
 use serde::{Deserialize, Serialize};

@@ -49,6 +49,12 @@ impl SceneFile {
         Ok(Self { folder: source.folder().to_owned(), source, ..file })
     }
 
+    /// The keys that a scene may state.
+    pub(crate) fn keys() -> &'static [Key] {
+        static KEYS: LazyLock<Vec<Key>> = LazyLock::new(keys_of::<Scene>);
+        &KEYS
+    }
+
     /// The table of a text with every default written out, whatever the limits of its values.
     ///
     /// # Errors
@@ -85,17 +91,11 @@ impl SceneFile {
     }
 }
 
-/// The keys that a scene may state.
-pub(crate) fn scene_keys() -> &'static [Key] {
-    static KEYS: LazyLock<Vec<Key>> = LazyLock::new(keys_of::<Scene>);
-    &KEYS
-}
-
 /// What a scene may say.
 fn scene_format() -> Format<'static> {
     static DEFAULTS: LazyLock<toml::Table> =
         LazyLock::new(|| toml::Table::try_from(Scene::default()).unwrap_or_default());
-    Format { keys: scene_keys(), defaults: &DEFAULTS, examples: &[SCENE_EXAMPLES, TABLE2_TOML] }
+    Format { keys: SceneFile::keys(), defaults: &DEFAULTS, examples: &[SCENE_EXAMPLES, TABLE2_TOML] }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! Check: every key that can vary is found by its whole path; those that cannot are refused with the reason.
 
 use crate::keys::{Key, Kind, Problem, join, near, one_of};
-use crate::scene::scene_keys;
+use crate::scene::SceneFile;
 use toml::Value;
 
 /// Sections that change no result.
@@ -60,7 +60,7 @@ fn leaves(keys: &[Key], path: &str, out: &mut Vec<Leaf>) {
 fn all() -> &'static [Leaf] {
     static ALL: std::sync::LazyLock<Vec<Leaf>> = std::sync::LazyLock::new(|| {
         let mut out = Vec::new();
-        leaves(scene_keys(), "", &mut out);
+        leaves(SceneFile::keys(), "", &mut out);
         out
     });
     &ALL

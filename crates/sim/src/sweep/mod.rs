@@ -6,7 +6,7 @@
 //! | `cases` | grids and lists of values; all cases as checked scenes |
 //! | `run` | checking all, running what is not there yet, sharing what cases have in common |
 //! | `group`, `circulation`, `results` | cases of the same signals measured together; their numbers |
-//! | `stored`, `tables`, `pictures` | a folder for each case; tables and pictures of all |
+//! | `stored`, `merge`, `tables`, `pictures` | a folder for each case; tables and pictures of all |
 //! | [`pareto`], [`front_table`] | set-ups that no other one beats; the rows of a table that are such |
 
 mod cases;
@@ -15,6 +15,7 @@ mod expression;
 pub mod front_table;
 mod group;
 mod key_path;
+mod merge;
 pub mod pareto;
 #[cfg(feature = "plots")]
 mod pictures;
@@ -24,9 +25,9 @@ mod stored;
 mod tables;
 
 pub use cases::{Case, MOST_CASES, Request, Sweep};
+pub use merge::merge;
 pub use results::RESULTS;
 pub use run::{Settings, Shard, Shared, Summary, Told, maps, run};
-pub use stored::merge;
 
 #[cfg(test)]
 mod sweep_tests;

@@ -4,8 +4,7 @@
 
 use super::pareto::{Objective, Place, Sense, front};
 use super::results::{RESULTS, standard_error_of};
-use super::stored::{Definition, Holds};
-use super::tables::Row;
+use super::stored::{Definition, Holds, Row};
 use crate::Error;
 use crate::io::FileGroup;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};

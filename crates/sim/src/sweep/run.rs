@@ -4,7 +4,8 @@
 
 use super::cases::{Case, Sweep, without_lines};
 use super::group::{self, rows};
-use super::stored::{Definition, SWEEP, store, stored, write_tables};
+use super::merge::write_tables;
+use super::stored::{Definition, SWEEP, store, stored};
 use super::tables;
 use crate::io::{Existing, Table};
 use crate::measure::efficiencies::{Efficiencies, Known};

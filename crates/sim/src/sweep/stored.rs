@@ -1,4 +1,4 @@
-//! A sweep on disk: what it is, a folder for each case with its scene and result, and the tables of all.
+//! A sweep on disk: what it is, and a folder for each case with its scene and result.
 //!
 //! A result is there when `result.json` is: it is written last, and put into place by its name. Numbers stand in it as the
 //! texts of the table, so that a table has the same bytes whoever computed its cases. Check: shards, kills, edited files.
@@ -6,7 +6,6 @@
 use super::cases::Sweep;
 use super::key_path::Takes;
 use super::results::RESULTS;
-use super::tables::Row;
 use crate::Error;
 use crate::io::{Existing, FileGroup, Provenance, csv::float_text, write_atomic};
 use crate::measure::write::{put, scene_text};
@@ -32,6 +31,32 @@ pub(super) struct VaryingKey {
     pub(super) holds: Holds,
     /// Whether others determine it.
     pub(super) tied: bool,
+}
+
+/// The result of a case, each value as the text of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Row {
+    pub(super) case: usize,
+    pub(super) scene_hash: String,
+    pub(super) keys: Vec<String>,
+    pub(super) results: Vec<String>,
+}
+
+impl Row {
+    /// A result as a number; NaN where it is none.
+    pub(super) fn result(&self, name: &str) -> f64 {
+        let place = RESULTS.iter().position(|(column, ..)| *column == name);
+        place.and_then(|place| self.results.get(place)).map_or(f64::NAN, |cell| number(cell))
+    }
+
+    /// A key that varies as a number.
+    pub(super) fn key(&self, place: usize) -> f64 {
+        self.keys.get(place).map_or(f64::NAN, |cell| number(cell))
+    }
+}
+
+fn number(cell: &str) -> f64 {
+    cell.parse().unwrap_or(f64::NAN)
 }
 
 /// What a sweep is, as its folder says it.
@@ -103,7 +128,7 @@ impl Definition {
         Ok(write_atomic(&path, text)?)
     }
 
-    fn read(folder: &Path) -> Result<Self, Error> {
+    pub(super) fn read(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(SWEEP);
         let text = crate::io::text_file::read(&path).map_err(|source| Error::Io {
             action: "read what was swept from",
@@ -140,7 +165,7 @@ impl Definition {
         })
     }
 
-    fn is_same(&self, other: &Self) -> bool {
+    pub(super) fn is_same(&self, other: &Self) -> bool {
         (&self.origin.program, &self.origin.scene_hash) == (&other.origin.program, &other.origin.scene_hash)
             && (&self.scene_hashes, self.fits) == (&other.scene_hashes, other.fits)
     }
@@ -190,55 +215,4 @@ pub(super) fn stored(folder: &Path, definition: &Definition, case: usize) -> Opt
     let keys = definition.keys.iter().map(|key| cell("keys", &key.name)).collect::<Option<_>>()?;
     let results = RESULTS.iter().map(|(name, ..)| cell("results", name)).collect::<Option<_>>()?;
     is_this.then(|| Row { case, scene_hash: hash.to_owned(), keys, results })
-}
-
-/// Writes the tables of a sweep whose cases are all in some folders, of shards or of a whole run; returns the paths.
-///
-/// # Errors
-/// Folders that are of different sweeps, or of another one than `sweep`; cases that none of them has; what the system says.
-pub fn merge(folders: &[PathBuf], sweep: Option<&Sweep>, out: &Path) -> Result<Vec<PathBuf>, Error> {
-    let mut first: Option<(Definition, String)> = None;
-    for folder in folders {
-        let found = Definition::read(folder)?;
-        let asked = sweep.map(|sweep| (Definition::of(sweep, found.fits), "the sweep that was asked for".to_owned()));
-        for (other, of) in first.iter().chain(&asked) {
-            if !other.is_same(&found) {
-                let reason = format!(
-                    "it is of sweep {} by {}, {of} is {} by {}: only shards of one sweep by one version, all with or all \
-                     without --no-circulation, fit together",
-                    found.origin.scene_hash, found.origin.program, other.origin.scene_hash, other.origin.program
-                );
-                return Err(Error::Input { path: folder.join(SWEEP), reason });
-            }
-        }
-        first = first.or(Some((found, folder.display().to_string())));
-    }
-    let Some((definition, _)) = first else {
-        return Err(Error::Input { path: "--merge".into(), reason: "at least one folder of a sweep is needed".into() });
-    };
-    let (mut rows, mut missing) = (Vec::new(), Vec::new());
-    for case in 0..definition.scene_hashes.len() {
-        match folders.iter().find_map(|folder| stored(folder, &definition, case)) {
-            Some(row) => rows.push(row),
-            None => missing.push(case),
-        }
-    }
-    if !missing.is_empty() {
-        let first: Vec<String> = missing.iter().take(10).map(ToString::to_string).collect();
-        let more = if missing.len() > 10 { ", ..." } else { "" };
-        let reason = format!(
-            "{} of the {} cases have no result in the folders to merge, numbers {}{more}: run their shards, or those that were \
-             cut off with --resume",
-            missing.len(),
-            definition.scene_hashes.len(),
-            first.join(", ")
-        );
-        return Err(Error::Input { path: "--merge".into(), reason });
-    }
-    write_tables(&definition, &rows, out)
-}
-
-/// Writes the tables of all rows.
-pub(super) fn write_tables(definition: &Definition, rows: &[Row], out: &Path) -> Result<Vec<PathBuf>, Error> {
-    put(super::tables::files(definition, rows, out)?, out, Existing::Own)
 }

@@ -3,36 +3,10 @@
 //! Check: the same rows give the same bytes; the NetCDF file is read back by an independent reader.
 
 use super::results::RESULTS;
-use super::stored::{Definition, Holds, VaryingKey};
+use super::stored::{Definition, Holds, Row, VaryingKey};
 use crate::Error;
 use crate::io::{FileGroup, Table};
 use std::path::Path;
-
-/// The result of a case, each value as the text of a cell.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Row {
-    pub(super) case: usize,
-    pub(super) scene_hash: String,
-    pub(super) keys: Vec<String>,
-    pub(super) results: Vec<String>,
-}
-
-impl Row {
-    /// A result as a number; NaN where it is none.
-    pub(super) fn result(&self, name: &str) -> f64 {
-        let place = RESULTS.iter().position(|(column, ..)| *column == name);
-        place.and_then(|place| self.results.get(place)).map_or(f64::NAN, |cell| number(cell))
-    }
-
-    /// A key that varies as a number.
-    pub(super) fn key(&self, place: usize) -> f64 {
-        self.keys.get(place).map_or(f64::NAN, |cell| number(cell))
-    }
-}
-
-fn number(cell: &str) -> f64 {
-    cell.parse().unwrap_or(f64::NAN)
-}
 
 /// Names of the files.
 pub(super) fn names(definition: &Definition) -> Vec<String> {
