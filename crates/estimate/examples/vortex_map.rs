@@ -2,14 +2,16 @@
 //!
 //! `cargo run --release --example vortex_map -p wakescope-estimate [FILE]` reads `elevation_rad,range_m,velocity_m_s`
 //! per line (a full grid, lines by increasing elevation, ranges running fastest; NaN where there is none) and prints
-//! both vortices with their standard deviations. Without a file it makes a noisy map itself.
+//! both vortices with their standard deviations, and what they would do to an aircraft that follows. Without a file it makes a noisy map itself.
 
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
 
 use ndarray::Array2;
-use wakescope_estimate::vortex_fit::{MapFitOptions, Parameter, RangeKernel, VelocityMap, Wake, WakeModel, fit_map};
+use wakescope_estimate::vortex_fit::{
+    Follower, LiftSlope, MapFitOptions, Parameter, RangeKernel, VelocityMap, Wake, WakeModel, fit_map,
+};
 
 /// Axes and velocities of a map.
 struct Map {
@@ -34,8 +36,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         standard_deviation_m_s: None,
     };
     let fit = fit_map(&view, &model, &kernel, &MapFitOptions::default())?;
-    println!("vortex,circulation_m2_s,std,lateral_position_m,std,height_m,std,core_radius_m,std");
-    for (name, vortex, [circulation, lateral, height, core]) in [
+    println!("vortex,circulation_m2_s,std,gamma_5_15_m2_s,std,lateral_position_m,std,height_m,std,core_radius_m,std");
+    let means = fit.wake.mean_circulations_5_15_m2_s(model.profile, fit.covariance.view());
+    for ((name, vortex, [circulation, lateral, height, core]), mean) in [
         (
             "left",
             fit.wake.left,
@@ -46,11 +49,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             fit.wake.right,
             [Parameter::RightCirculation, Parameter::RightLateral, Parameter::RightHeight, Parameter::RightCore],
         ),
-    ] {
+    ]
+    .into_iter()
+    .zip(means)
+    {
         println!(
-            "{name},{:.1},{:.1},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2}",
+            "{name},{:.1},{:.1},{:.1},{:.1},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2}",
             vortex.circulation_m2_s,
             fit.standard_deviation(circulation),
+            mean.0,
+            mean.1,
             vortex.lateral_position_m,
             fit.standard_deviation(lateral),
             vortex.height_m,
@@ -66,6 +74,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         fit.outliers,
         fit.used,
         100.0 * fit.explained_fraction
+    );
+    let follower = Follower { span_m: 34.0, aspect_ratio: 9.4, speed_m_s: 70.0, slope: LiftSlope::Span };
+    let at_m = (fit.wake.right.lateral_position_m, fit.wake.right.height_m);
+    println!(
+        "# rolling-moment coefficient of a wing of 34 m in the right vortex: {:.3} (slope of the lift 2 pi A/(A + 2))",
+        follower.rolling_moment(&model, &fit.wake, at_m)?
     );
     Ok(())
 }
