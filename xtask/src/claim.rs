@@ -101,7 +101,11 @@ pub(crate) fn two_digits(error: f64) -> String {
 
 /// A value with as many decimals as its standard error has in two digits, and the error.
 pub(crate) fn with_error(value: f64, error: f64) -> String {
-    format!("{value:.*} +- {}", decimals(error), two_digits(error))
+    match (value.is_finite(), error.is_finite()) {
+        (true, true) => format!("{value:.*} +- {}", decimals(error), two_digits(error)),
+        (true, false) => format!("{value:.3}, its error not known"),
+        (false, _) => "not known".into(),
+    }
 }
 
 /// Decimals of a number of two digits; of what is zero or no number, three.
@@ -129,7 +133,8 @@ mod tests {
     fn numbers_have_the_digits_of_their_error() {
         let found = [with_error(12.3456, 0.0321), with_error(-1.0, 4.56), with_error(1234.5, 67.0), two_digits(0.2)];
         assert_eq!(found, ["12.346 +- 0.032", "-1.0 +- 4.6", "1234 +- 67", "0.20"]);
-        assert_eq!(with_error(0.5, f64::NAN), "0.500 +- NaN");
+        assert_eq!(with_error(0.5, f64::NAN), "0.500, its error not known");
+        assert_eq!(with_error(f64::NAN, 0.1), "not known");
     }
 
     #[test]
