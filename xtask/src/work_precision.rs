@@ -7,7 +7,7 @@ mod chain;
 mod estimate;
 mod les;
 mod optics;
-mod show;
+pub(crate) mod show;
 mod signal;
 
 use crate::cost::{Cost, machine};
@@ -121,8 +121,6 @@ pub(crate) fn measure(groups: &[Group], quick: bool) -> Result<Vec<(Group, Vec<R
     groups.iter().map(|group| Ok((*group, pool.install(|| group.rows(quick))?))).collect()
 }
 
-pub(crate) use show::{cheapest_table, fronts, table};
-
 /// Where `check --accuracy` reads what was measured, and where the book does.
 const STORED: [&str; 2] = ["crates/sim/src/plan/accuracy.csv", "docs/src/work-precision-table.md"];
 
@@ -144,15 +142,15 @@ pub(crate) fn run(options: &Options) -> Outcome {
     for (group, rows) in &measured {
         show::print(*group, rows);
         let one = [(*group, rows.as_slice())];
-        files.add(&format!("{}.csv", group.name()), table(&one).to_csv(&origin)?)?;
+        files.add(&format!("{}.csv", group.name()), show::table(&one).to_csv(&origin)?)?;
         files.add(&format!("{}.svg", group.name()), show::panels(rows).svg(&origin)?)?;
     }
     let all: Vec<(Group, &[Row])> = measured.iter().map(|(group, rows)| (*group, rows.as_slice())).collect();
     let settings = show::settings(&all).to_csv(&origin)?;
     let cheapest = show::cheapest_markdown(&all, &machine);
-    files.add("work_precision.csv", table(&all).to_csv(&origin)?)?;
-    files.add("work_precision.svg", fronts(&all).svg(&origin)?)?;
-    files.add("cheapest.csv", cheapest_table(&all).to_csv(&origin)?)?;
+    files.add("work_precision.csv", show::table(&all).to_csv(&origin)?)?;
+    files.add("work_precision.svg", show::fronts(&all).svg(&origin)?)?;
+    files.add("cheapest.csv", show::cheapest_table(&all).to_csv(&origin)?)?;
     files.commit()?;
     println!("{cheapest}\nwrote {}", folder.join("work_precision.csv").display());
     if options.store {

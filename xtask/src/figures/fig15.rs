@@ -4,7 +4,8 @@ use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::cost::machine;
 use crate::profile::Profile;
-use crate::work_precision::{Group, Row, fronts, measure, table};
+use crate::work_precision::show::{fronts, table};
+use crate::work_precision::{Group, Row, measure};
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let quick = context.profile == Profile::Quick;
