@@ -32,6 +32,8 @@ fn free() -> FreeParameters {
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     // A fit of all signals takes as long as ten scans' maps; of the gates of 64 samples, which overlap, every third is taken in quick.
     let (scans, of_signals, every) = context.choose((8, 1, 24), (100, 100, 8), (100, 100, 8));
+    // One scan decides no claim on scatter, so that it does not matter there which of its tops is found.
+    let starts = context.choose(Starts::Guess, Starts::Several, Starts::Several);
     let levels_db = context.choose(vec![0.0], vec![0.0], vec![0.0, 10.0]);
     let mut fits = Vec::new();
     let mut bounds = Vec::new();
@@ -41,7 +43,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         let found: Vec<Fits> = (0..scans)
             .into_par_iter()
             .map(|scan| {
-                fit(&pair, scan, scan < of_signals)
+                fit(&pair, scan, (scan < of_signals).then_some(starts))
                     .map(|by_method| Fits { snr_db, scan, by_method })
                     .map_err(|e| e.to_string())
             })
@@ -67,23 +69,21 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 }
 
 /// The fits of one scan, of its signals too or of its map alone.
-fn fit(pair: &PairScan, scan: usize, with_signals: bool) -> Result<Vec<Found>, Failure> {
+fn fit(pair: &PairScan, scan: usize, signals: Option<Starts>) -> Result<Vec<Found>, Failure> {
     let trial = FitTrial::new(pair, scan)?;
     let from_map = |core_radius: Sharing| -> Result<Found, Failure> {
         let fit = trial.map(FreeParameters { core_radius, ..free() }, Some(CorePrior::TYPICAL))?;
         Ok(fit.ok().map(|fit| (fit.wake, fit.covariance)))
     };
     let (typical, resolved) = (from_map(Sharing::Fixed)?, from_map(Sharing::Common)?);
-    if !with_signals {
-        return Ok(vec![typical, resolved]);
-    }
+    let Some(starts) = signals else { return Ok(vec![typical, resolved]) };
     let from_signals = |core_radius: Sharing| -> Result<Found, Failure> {
         let Some((mut guess, _)) = typical.clone() else { return Ok(None) };
         if core_radius == Sharing::Fixed {
             guess.left.core_radius_m = truth().left.core_radius_m;
             guess.right.core_radius_m = truth().right.core_radius_m;
         }
-        let fit = trial.signals(FreeParameters { core_radius, ..free() }, &guess, Starts::Several)?;
+        let fit = trial.signals(FreeParameters { core_radius, ..free() }, &guess, starts)?;
         Ok(fit.ok().map(|fit| (fit.wake, fit.covariance)))
     };
     let (known, fitted) = (from_signals(Sharing::Fixed)?, from_signals(Sharing::Common)?);

@@ -98,7 +98,7 @@ fn all_cheapest<'a>(groups: &Groups<'a>) -> Vec<Cheapest<'a>> {
 }
 
 /// The cheapest settings as a table; "none" where no setting reaches the target.
-pub(crate) fn cheapest_table(groups: &Groups<'_>) -> Table {
+pub(super) fn cheapest_table(groups: &Groups<'_>) -> Table {
     let all = all_cheapest(groups);
     let float = |get: fn(&Row) -> f64| all.iter().map(|c| c.found.map_or(f64::NAN, get)).collect::<Vec<_>>();
     Table::new()
