@@ -30,7 +30,7 @@ fn free() -> FreeParameters {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    // A fit of all signals takes as long as ten scans' maps; of the gates of 64 samples, which overlap, every third is taken in quick.
+    // Eight scans decide the claims on maps; of gates every 8 samples, which overlap, every third is taken in quick.
     let (scans, of_signals, every) = context.choose((8, 1, 24), (100, 100, 8), (100, 100, 8));
     // One scan decides no claim on scatter, so that it does not matter there which of its tops is found.
     let starts = context.choose(Starts::Guess, Starts::Several, Starts::Several);

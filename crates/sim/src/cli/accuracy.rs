@@ -31,7 +31,7 @@ pub(super) fn as_text(plan: &Plan, found: &[Proposal], target: f64) -> String {
                 p.core_s
                     .map_or("which the rest of the scene does not allow".into(), |s| format!("the run then {s:.3} s"))
             ),
-            None => format!("none of the measured values reaches it (now {})", p.now),
+            None => format!("no measured value reaches it: keep {} or take a finer one", p.now),
         };
         out += &format!("  {:<36} {line}\n", p.key);
     }
