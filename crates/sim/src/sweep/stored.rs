@@ -93,6 +93,7 @@ impl Definition {
     }
 
     /// Places and names of the keys that are free.
+    #[cfg(feature = "plots")]
     pub(super) fn free(&self) -> impl Iterator<Item = (usize, &str)> {
         let keys = self.keys.iter().enumerate().filter(|(_, key)| !key.tied);
         keys.map(|(place, key)| (place, key.name.as_str()))
