@@ -103,7 +103,7 @@ pub(crate) fn two_digits(error: f64) -> String {
 pub(crate) fn with_error(value: f64, error: f64) -> String {
     match (value.is_finite(), error.is_finite()) {
         (true, true) => format!("{value:.*} +- {}", decimals(error), two_digits(error)),
-        (true, false) => format!("{value:.3}, its error not known"),
+        (true, false) => format!("{value:.3} +- unknown"),
         (false, _) => "not known".into(),
     }
 }
@@ -133,7 +133,7 @@ mod tests {
     fn numbers_have_the_digits_of_their_error() {
         let found = [with_error(12.3456, 0.0321), with_error(-1.0, 4.56), with_error(1234.5, 67.0), two_digits(0.2)];
         assert_eq!(found, ["12.346 +- 0.032", "-1.0 +- 4.6", "1234 +- 67", "0.20"]);
-        assert_eq!(with_error(0.5, f64::NAN), "0.500, its error not known");
+        assert_eq!(with_error(0.5, f64::NAN), "0.500 +- unknown");
         assert_eq!(with_error(f64::NAN, 0.1), "not known");
     }
 
