@@ -10,7 +10,7 @@ use crate::window::SignalKind;
 /// A number of some 31 digits.
 type Long = Complex<TwoFloat>;
 
-/// Most samples of a window for which it is done: the time grows by their cube, from some 20 ms for 64.
+/// Most samples of a window for which it is done: the time grows by their cube.
 const MOST_SAMPLES: usize = 256;
 
 /// Window of the signal of a Gaussian pulse in noise that is flat in a band and small outside it.

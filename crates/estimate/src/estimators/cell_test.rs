@@ -11,10 +11,11 @@
 //!
 //! Check: stored tables; draws.
 
-use statrs::function::beta::beta_reg;
-use statrs::function::gamma::gamma_ur;
-
 use crate::error::{Error, not_negative, positive};
+use crate::estimators::tails::{beta_below, gamma_tail};
+
+/// Most cells of noise, over all windows, for which the beta law is accurate.
+const MOST_REFERENCES: f64 = 1e4;
 
 /// The test of one cell: its mean power over that of the noise against a threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,9 +40,13 @@ impl CellTest {
     /// the noise.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] unless both are above 0.
+    /// [`Error::OutOfRange`] unless both are above 0 and their product at most 10 000: with more cells the noise is known.
     pub fn against_cells(windows: f64, reference_cells: f64) -> Result<Self, Error> {
         positive("reference_cells", reference_cells)?;
+        let (value, allowed) = (windows * reference_cells, "at most 10000: with more cells the noise is known");
+        if value > MOST_REFERENCES {
+            return Err(Error::OutOfRange { field: "windows times reference_cells", value, allowed });
+        }
         Ok(Self { reference_cells: Some(reference_cells), ..Self::known_noise(windows)? })
     }
 
@@ -57,8 +62,8 @@ impl CellTest {
 
     fn exceeds(&self, level: f64) -> f64 {
         match self.reference_cells {
-            None => gamma_ur(self.windows, self.windows * level),
-            Some(cells) => beta_reg(self.windows * cells, self.windows, cells / (cells + level)),
+            None => gamma_tail(self.windows, self.windows * level),
+            Some(cells) => beta_below(self.windows * cells, self.windows, cells / (cells + level)),
         }
     }
 

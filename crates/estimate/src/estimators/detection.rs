@@ -16,9 +16,10 @@
 //! single windows and whole regions (in the tests of the estimators).
 
 use num_complex::Complex;
-use statrs::function::gamma::{gamma_ur, ln_gamma};
+use statrs::function::gamma::ln_gamma;
 
 use crate::error::{Error, positive};
+use crate::estimators::tails::gamma_tail;
 use crate::map::WindowCorrelation;
 use crate::spectrum::Taper;
 use crate::window::{Gates, Sampling};
@@ -137,7 +138,7 @@ impl NoiseTest {
 
     fn probability(&self, shape: f64, level: f64) -> f64 {
         let sum = shape * level;
-        let single = gamma_ur(shape, sum);
+        let single = gamma_tail(shape, sum);
         let crossings = self.crossings * ((shape - 0.5) * sum.ln() - sum - ln_gamma(shape)).exp();
         // no more chances than frequencies looked at
         let chances = crossings.min(-(self.frequencies - 1.0) * (-single).ln_1p());

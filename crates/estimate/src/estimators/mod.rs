@@ -12,6 +12,7 @@ pub(crate) mod peak;
 pub(crate) mod periodogram;
 pub(crate) mod search;
 pub(crate) mod statistic;
+pub(crate) mod tails;
 pub(crate) mod unbiased;
 pub(crate) mod velocity;
 

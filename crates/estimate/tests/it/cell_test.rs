@@ -51,6 +51,15 @@ fn one_window_needs_its_closed_form_of_signal_and_the_best_of_many_cells_alarms_
     let needed = one.needed_snr(1e-4, 0.9).unwrap();
     assert!((needed - (1e-4_f64.ln() / 0.9_f64.ln() - 1.0)).abs() < 1e-9 * needed);
     assert!((CellTest::best_of(10.0, 0.01).unwrap() - (1.0 - 0.99_f64.powi(10))).abs() < 1e-14);
+    // numbers beyond what is of use are answered, too
+    for windows in [1e-3, 1e10, 1e200] {
+        let test = CellTest::known_noise(windows).unwrap();
+        for threshold in [1e-300, 1.0, 1e300] {
+            assert!((0.0..=1.0).contains(&test.probability(threshold, 0.0).unwrap()), "{windows} {threshold}");
+        }
+        assert!(test.threshold(1e-4).unwrap() > 0.0);
+    }
+    assert!(CellTest::against_cells(1e3, 1e2).is_err());
     assert!(CellTest::known_noise(0.0).is_err() && CellTest::against_cells(1.0, f64::NAN).is_err());
     assert!(one.threshold(0.0).is_err() && one.probability(-1.0, 0.0).is_err() && one.needed_snr(0.9, 0.1).is_err());
 }

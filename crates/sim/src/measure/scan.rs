@@ -230,7 +230,7 @@ fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfS
     let Some(SecondTrip { radial_velocity_m_s: elsewhere_m_s }) = scene.scan.second_trip else { return Ok(None) };
     let apart_m = ambiguous_range_m(scene.laser.pulse_repetition_hz);
     let ranges_m: Vec<f64> = geometry.layer_range_m().map(|range_m| range_m + apart_m).collect();
-    let (first_m, last_m) = (ranges_m[0], ranges_m[ranges_m.len() - 1]);
+    let (Some(&first_m), Some(&last_m)) = (ranges_m.first(), ranges_m.last()) else { return Ok(None) };
     let profile = efficiency_by_theory(instrument, &spaced(first_m, last_m, 65))?;
     let weight = |&range_m: &f64| Ok(instrument.return_per_m(range_m)? * profile.interpolated(range_m)?);
     let weight_per_m = ranges_m.iter().map(weight).collect::<Result<Vec<_>, Error>>()?;
