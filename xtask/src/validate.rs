@@ -109,8 +109,9 @@ fn write(name: &str, profile: Profile, shown: &Shown, folder: &std::path::Path) 
     let mut files = FileGroup::new(folder);
     files.add(&format!("{name}.csv"), shown.table.to_csv(&origin)?)?;
     files.add(&format!("{name}_checks.csv"), checks.to_csv(&origin)?)?;
-    files.add(&format!("{name}.svg"), shown.figure.svg(&origin)?)?;
-    files.add(&format!("{name}.png"), shown.figure.png(&origin)?)?;
+    let (svg, png) = shown.figure.svg_and_png(&origin)?;
+    files.add(&format!("{name}.svg"), svg)?;
+    files.add(&format!("{name}.png"), png)?;
     files.commit()?;
     Ok(())
 }

@@ -70,8 +70,9 @@ impl Rendered {
     /// A table as CSV, and the picture as SVG and PNG.
     pub(crate) fn new(table: &Table, figure: &Figure, origin: &Provenance) -> Result<Self, Failure> {
         let mut out = Self::of_table(table, origin)?;
-        out.files.push(("svg".into(), figure.svg(origin)?.into_bytes()));
-        out.files.push(("png".into(), figure.png(origin)?));
+        let (svg, png) = figure.svg_and_png(origin)?;
+        out.files.push(("svg".into(), svg.into_bytes()));
+        out.files.push(("png".into(), png));
         Ok(out)
     }
 

@@ -104,6 +104,15 @@ impl Figure {
         png_file::png_bytes(&self.draw()?, provenance)
     }
 
+    /// Both, drawn once: the SVG text and the PNG bytes.
+    ///
+    /// # Errors
+    /// As [`Self::svg`].
+    pub fn svg_and_png(&self, provenance: &Provenance) -> OutputResult<(String, Vec<u8>)> {
+        let drawing = self.draw()?;
+        Ok((svg::svg_text(&drawing, provenance)?, png_file::png_bytes(&drawing, provenance)?))
+    }
+
     pub(crate) fn draw(&self) -> OutputResult<Drawing> {
         if self.columns == 0 || !(200.0..=10_000.0).contains(&self.width) {
             let value = format!("{} columns, width {}", self.columns, self.width);
@@ -176,7 +185,7 @@ mod tests {
         let (figure, origin) = (figure(), example());
         let svg = figure.svg(&origin).unwrap();
         assert_eq!(svg, figure.svg(&origin).unwrap());
-        assert_eq!(figure.png(&origin).unwrap(), figure.png(&origin).unwrap());
+        assert_eq!((svg.clone(), figure.png(&origin).unwrap()), figure.svg_and_png(&origin).unwrap());
         assert_eq!(svg.matches("<image").count(), 2, "map and colour bar");
         assert_eq!(svg.matches("<svg").count(), svg.matches("</svg>").count());
         assert!(svg.contains("a &lt; b") && !svg.contains("NaN"));

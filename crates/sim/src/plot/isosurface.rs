@@ -10,8 +10,8 @@ use crate::io::{OutputError, OutputResult};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Pixels of the embedded picture per drawing unit.
-const DENSITY: f64 = 1.5;
+/// Pixels of the embedded picture per drawing unit, as those of a PNG file.
+const DENSITY: f64 = super::png_file::SCALE;
 const MARGIN: f64 = 26.0;
 const GROUND: Rgb = [232, 224, 212];
 const EDGE: Rgb = [150, 150, 150];

@@ -47,8 +47,9 @@ pub(super) fn names(definition: &Definition) -> Vec<String> {
 /// Adds the pictures to the files of a sweep.
 pub(super) fn add(files: &mut FileGroup, definition: &Definition, rows: &[Row]) -> Result<(), Error> {
     let mut put = |stem: &str, figure: &Figure| -> Result<(), Error> {
-        files.add(&format!("{stem}.svg"), figure.svg(&definition.origin)?)?;
-        Ok(files.add(&format!("{stem}.png"), figure.png(&definition.origin)?)?)
+        let (svg, png) = figure.svg_and_png(&definition.origin)?;
+        files.add(&format!("{stem}.svg"), svg)?;
+        Ok(files.add(&format!("{stem}.png"), png)?)
     };
     for (place, name) in drawn(definition) {
         let panels = PANELS.map(|panel| against(definition, rows, (place, name), &panel));

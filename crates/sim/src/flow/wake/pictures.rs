@@ -89,8 +89,9 @@ impl FinishedWake {
         pictures.extend(self.surfaces_figure()?.map(|figure| ("surfaces", figure)));
         let mut group = FileGroup::new(&self.folder);
         for (name, figure) in &pictures {
-            group.add(&format!("{name}.svg"), figure.svg(&self.origin)?)?;
-            group.add(&format!("{name}.png"), figure.png(&self.origin)?)?;
+            let (svg, png) = figure.svg_and_png(&self.origin)?;
+            group.add(&format!("{name}.svg"), svg)?;
+            group.add(&format!("{name}.png"), png)?;
         }
         #[cfg(feature = "netcdf")]
         if let frames = self.frames()?
