@@ -6,6 +6,7 @@ use crate::Failure;
 use crate::claim::{Claim, Verdict, with_error};
 use fixtures::WINDOW;
 use fixtures::pair::PairScan;
+use rayon::prelude::*;
 use wakescope_estimate::{
     Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Weighting,
     estimators::{AutoregressivePeak, LagWindowPeak},
@@ -72,7 +73,8 @@ fn cases(context: &Context) -> Vec<Case> {
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let scans = context.choose(4, 24, 100);
-    let all = cases(context).into_iter().map(|case| measure(context, case, scans)).collect::<Result<Vec<_>, _>>()?;
+    let all =
+        cases(context).into_par_iter().map(|case| measure(context, case, scans)).collect::<Result<Vec<_>, _>>()?;
     let origin = context.provenance_of_formula(&format!("profile = \"{}\"\nscans = {scans}\n", context.profile_name()));
     let mut out = Rendered::new(&table(&all), &picture(&all), &origin)?;
     out.marks = vec!["analytic pair".into()];

@@ -7,6 +7,7 @@ use super::study::{Age, REFERENCES, Sight, Study, early_scene, mean_and_error, s
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
+use rayon::prelude::*;
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
@@ -22,12 +23,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut origin = None;
     for (name, reference) in REFERENCES {
         let (mut of_rms, mut of_std) = (Vec::new(), Vec::new());
-        for batch in 0..BATCHES {
+        let study = |batch: u64| {
             let mut scene = with_method(early_scene(realisations), "PA");
             scene.detector.snr = reference;
             let batch_context = Context { seed: context.seed + 1_000_003 * batch, ..context.clone() };
-            let study = Study::run(&batch_context, &sight, scene)?;
-            let gradient = gradient_per_s(&study);
+            Study::run(&batch_context, &sight, scene)
+        };
+        let studies: Vec<Study> = (0..BATCHES).into_par_iter().map(study).collect::<Result<_, _>>()?;
+        for (batch, study) in studies.iter().enumerate() {
+            let gradient = gradient_per_s(study);
             of_rms.push(correlation(&study.map.rms_m_s, &gradient));
             of_std.push(correlation(&study.map.std_m_s, &gradient));
             if batch == 0 {

@@ -5,6 +5,7 @@ use super::study::{Age, REFERENCES, Sight, Study, early_scene, stacked, with_met
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
+use rayon::prelude::*;
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
@@ -41,10 +42,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let (mut tables, mut panels, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     let mut origin = None;
     let sight = Sight::of(context, Age::Late)?;
-    for (name, reference) in REFERENCES {
+    let study = |(_, reference)| {
         let mut scene = scene(context, &sight);
         scene.detector.snr = reference;
-        let study = Study::run(context, &sight, scene)?;
+        Study::run(context, &sight, scene)
+    };
+    let studies: Vec<Study> = REFERENCES.into_par_iter().map(study).collect::<Result<_, _>>()?;
+    for ((name, _), study) in REFERENCES.into_iter().zip(&studies) {
         let map = write::velocity_map(&study.plan, &study.map);
         tables.push((name, map_table(&map)?));
         let exact = MapPlot::new(&map, 0, "v_exact")?;
@@ -55,7 +59,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         panels.push(mean.titled(&format!("Mean estimate, {name} signal-to-noise ratio")).labelled("v_R [m/s]"));
         let error = MapPlot::new(&map, 0, "rms")?;
         panels.push(error.titled(&format!("Root mean square error, {name}")).labelled("rms [m/s]"));
-        measured.push(measure(name, &study));
+        measured.push(measure(name, study));
         origin.get_or_insert_with(|| study.provenance());
     }
     let origin = origin.ok_or_else(|| Failure::new("no map was made".into()))?;

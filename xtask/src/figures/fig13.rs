@@ -6,6 +6,7 @@ use super::study::{Age, INSIDE_M, REFERENCES, Sight, Study, mean_and_error, near
 use crate::Failure;
 use crate::claim::{Claim, Verdict, with_error};
 use profiles::{Profiles, edge_level};
+use rayon::prelude::*;
 use wakescope_sim::plot::Figure;
 use wakescope_sim::scene::SnrReference;
 
@@ -53,7 +54,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let sight = Sight::of(context, Age::Early)?;
     let fixed = FIXED_DB.map(|snr_db| ("fixed", SnrReference::Fixed { snr_db }));
     let pairs = REFERENCES.into_iter().chain(fixed);
+    let pairs: Vec<(&'static str, SnrReference)> = pairs.collect();
     let pairs: Vec<Pair> = pairs
+        .into_par_iter()
         .map(|(name, reference)| pair(context, &sight, name, reference, realisations))
         .collect::<Result<_, _>>()?;
     let origin = context.provenance_of_formula(&sight.scene(context, near_scene(realisations)).to_toml());

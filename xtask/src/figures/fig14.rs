@@ -6,26 +6,29 @@ use super::study::{Age, REFERENCES, Sight, Study, near_scene, with_method, with_
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use profiles::{Profiles, peak, width_m};
+use rayon::prelude::*;
 use wakescope_sim::plot::Figure;
-use wakescope_sim::scene::PulseShape;
+use wakescope_sim::scene::{PulseShape, SnrReference};
 
 const DURATIONS_S: [f64; 2] = [200e-9, 400e-9];
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let realisations = context.choose(3, 24, 100);
     let sight = Sight::of(context, Age::Early)?;
-    let mut all = Vec::new();
+    let mut cases = Vec::new();
     for (name, reference) in REFERENCES {
         for duration_s in DURATIONS_S {
-            for method in ["PA", "CA"] {
-                let mut scene = with_method(near_scene(realisations), method);
-                scene.detector.snr = reference;
-                scene.pulse.shape = PulseShape::gaussian(duration_s);
-                let scene = with_turbulence(context, scene, 1e-15);
-                all.push(Profiles::of(method, name, &Study::run(context, &sight, scene)?)?);
-            }
+            cases.extend(["PA", "CA"].map(|method| (name, reference, duration_s, method)));
         }
     }
+    let profiles_of = |(name, reference, duration_s, method): (&'static str, SnrReference, f64, &'static str)| {
+        let mut scene = with_method(near_scene(realisations), method);
+        scene.detector.snr = reference;
+        scene.pulse.shape = PulseShape::gaussian(duration_s);
+        let scene = with_turbulence(context, scene, 1e-15);
+        Profiles::of(method, name, &Study::run(context, &sight, scene)?)
+    };
+    let all: Vec<Profiles> = cases.into_par_iter().map(profiles_of).collect::<Result<_, Failure>>()?;
     let origin = context.provenance_of_formula(&sight.scene(context, near_scene(realisations)).to_toml());
     let every: Vec<&Profiles> = all.iter().collect();
     let panels = all.chunks(4).map(|of| {
