@@ -4,8 +4,9 @@
 
 use multiversion::multiversion;
 
+use super::kept_fluxes::{KeptFluxes, SLOTS};
 use super::momentum::{Momentum, Scratch};
-use super::rows::{HALO, add_product, add_transport, even_mean, pad};
+use super::rows::{HALO, add_product, add_transport, cut_rows, even_mean, from_places, pad};
 use super::transport::{MEAN, Transport};
 
 /// The row that is computed: indices `j` and `k` along the axes 1 and 2.
@@ -18,15 +19,23 @@ struct Row<'a> {
 }
 
 impl Scratch {
-    /// Convection of one row into `self.convection`.
+    /// Convection of one row into `self.convection`. A scratch belongs to one velocity field.
     pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
-        convection_row(Row { ops, velocity, j, k }, &mut self.convection, &mut self.padded, &mut self.flux);
+        self.kept.fit(ops.axis, ops.n);
+        let row = Row { ops, velocity, j, k };
+        convection_row(row, &mut self.convection, &mut self.padded, &mut self.flux, &mut self.kept);
     }
 }
 
 /// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn convection_row(row: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux: &mut [Vec<f64>; 4]) {
+fn convection_row(
+    row: Row<'_>,
+    out: &mut [f64],
+    padded: &mut [Vec<f64>; 2],
+    flux: &mut [Vec<f64>; 2],
+    kept: &mut KeptFluxes,
+) {
     let Row { ops, j, k, .. } = row;
     out.fill(0.0);
     if !ops.thin[0] {
@@ -34,7 +43,7 @@ fn convection_row(row: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flu
     }
     for axis in 1..3 {
         if !ops.thin[axis] {
-            across_rows(row, axis, out, padded, flux);
+            across_rows(row, axis, out, padded, (&mut flux[0], kept));
         }
     }
     match ops.axis {
@@ -54,7 +63,7 @@ fn convection_row(row: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flu
 
 /// The part of the convection along axis 0.
 #[inline(always)]
-fn along_row(target: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux: &mut [Vec<f64>; 4]) {
+fn along_row(target: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux: &mut [Vec<f64>; 2]) {
     let Row { ops, velocity, j, k } = target;
     let n = out.len();
     let periodic = ops.periodic[0];
@@ -115,7 +124,13 @@ fn irregular(transport: &Transport, n: usize) -> impl Iterator<Item = usize> + u
 
 /// The part of the convection along axis 1 or 2.
 #[inline(always)]
-fn across_rows(target: Row<'_>, axis: usize, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux: &mut [Vec<f64>; 4]) {
+fn across_rows(
+    target: Row<'_>,
+    axis: usize,
+    out: &mut [f64],
+    padded: &mut [Vec<f64>; 2],
+    (fresh, kept): (&mut [f64], &mut KeptFluxes),
+) {
     let Row { ops, velocity, j, k } = target;
     let length = out.len();
     let index = if axis == 1 { j } else { k };
@@ -128,42 +143,53 @@ fn across_rows(target: Row<'_>, axis: usize, out: &mut [f64], padded: &mut [Vec<
         &values[start..start + length]
     };
     if ops.periodic[axis] || transport.regular.contains(&index) {
+        // Offset 3 is the row itself; a regular row of a bounded direction never wraps.
+        let unwrapped = |offset: usize| index + offset + count - 3;
         let at = |offset: usize| {
-            // Offset 3 is the row itself; a regular row of a bounded direction never wraps.
-            let i = index + offset + count - 3;
+            let i = unwrapped(offset);
             if ops.periodic[axis] { i % count } else { i - count }
         };
-        let q = [0, 1, 2, 3, 4, 5, 6].map(|offset| row(at(offset)));
-        if axis == ops.axis {
-            mean_rows(flux, q);
-        } else {
-            for (slot, out) in flux.iter_mut().enumerate() {
-                flux_row(target, axis, at(slot + 2), out, &mut padded[0]);
+        let q = [row(at(0)), row(at(1)), row(at(2)), row(at(3)), row(at(4)), row(at(5)), row(at(6))];
+        let (values, starts) = (&mut kept.values[axis - 1], &mut kept.starts[axis - 1]);
+        // The flux at offset 2 to 5 from the row has the same place for all four rows on which it acts.
+        let place = |slot: usize| match axis {
+            1 => unwrapped(slot + 2) % SLOTS,
+            _ => unwrapped(slot + 2) % SLOTS * ops.n[1] + j,
+        };
+        for slot in 0..SLOTS {
+            let (face, place) = (at(slot + 2), place(slot));
+            let start = ops.start_with(j, k, axis, face);
+            if starts[place] != start {
+                starts[place] = start;
+                let flux = &mut values[place * length..][..length];
+                if axis == ops.axis {
+                    mean_row(flux, [q[slot], q[slot + 1], q[slot + 2], q[slot + 3]]);
+                } else {
+                    flux_row(target, axis, face, flux, &mut padded[0]);
+                }
             }
         }
-        add_transport(out, scale, transport.stencil, flux.each_ref().map(Vec::as_slice), q);
+        let flux = |slot: usize| &values[place(slot) * length..][..length];
+        add_transport(out, scale, transport.stencil, [flux(0), flux(1), flux(2), flux(3)], q);
     } else {
         for &(face, cell, c) in &transport.rows[index] {
             if axis == ops.axis {
                 add_product(out, scale * c, row(face), row(cell));
             } else {
-                flux_row(target, axis, face, &mut flux[0], &mut padded[0]);
-                add_product(out, scale * c, &flux[0], row(cell));
+                flux_row(target, axis, face, fresh, &mut padded[0]);
+                add_product(out, scale * c, fresh, row(cell));
             }
         }
     }
 }
 
-/// Mean fluxes of the four cells about a face from the fluxes at seven faces.
+/// Mean flux of a cell from the fluxes at the four faces about it.
 #[inline(always)]
-fn mean_rows(flux: &mut [Vec<f64>; 4], rows: [&[f64]; 7]) {
-    for (slot, out) in flux.iter_mut().enumerate() {
-        // Cell m - 2 + slot lies between the faces m - 2 + slot and m - 1 + slot.
-        let n = out.len();
-        let [a, b, c, d] = std::array::from_fn(|i| &rows[slot + i][..n]);
-        for i in 0..n {
-            out[i] = (MEAN[0] * a[i] + MEAN[1] * b[i]) + (MEAN[2] * c[i] + MEAN[3] * d[i]);
-        }
+fn mean_row(out: &mut [f64], rows: [&[f64]; 4]) {
+    let n = out.len();
+    let [a, b, c, d] = cut_rows!(rows, n, 0 1 2 3);
+    for i in 0..n {
+        out[i] = (MEAN[0] * a[i] + MEAN[1] * b[i]) + (MEAN[2] * c[i] + MEAN[3] * d[i]);
     }
 }
 
@@ -178,7 +204,8 @@ fn flux_row(target: Row<'_>, along: usize, face: usize, out: &mut [f64], padded:
         let row = &field[start..start + n];
         if let Some(mass) = ops.equal_mass {
             pad(padded, row, ops.periodic[0]);
-            even_mean(out, mass, std::array::from_fn(|offset| &padded[HALO + offset - 2..]));
+            let first = HALO - 2;
+            even_mean(out, mass, from_places!(padded, first, first + 1, first + 2, first + 3));
             return;
         }
         out.fill(0.0);
@@ -197,7 +224,7 @@ fn flux_row(target: Row<'_>, along: usize, face: usize, out: &mut [f64], padded:
             let start = ops.start_with(j, k, ops.axis, (own + offset + 2 * count - 2) % count);
             &field[start..start + n]
         };
-        even_mean(out, mass, std::array::from_fn(row));
+        even_mean(out, mass, [row(0), row(1), row(2), row(3)]);
         return;
     }
     out.fill(0.0);

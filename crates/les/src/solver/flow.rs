@@ -202,8 +202,10 @@ impl Flow {
         let mut solved = None;
         for stage in self.settings.scheme.stages(ratio) {
             let stage_s = stage.fraction * step_s;
-            let found = self.increments(&stage, stage_s);
-            if powers.is_none() && starting {
+            // The report tells the powers of the field that the step began with.
+            let first = powers.is_none();
+            let found = self.increments(&stage, stage_s, first);
+            if first && starting {
                 first_terms = Some(self.state.history.clone());
             }
             powers.get_or_insert(found);
@@ -239,8 +241,8 @@ impl Flow {
         })
     }
 
-    /// The right side of (22) into `star`, with the velocity added if no line solve follows.
-    fn increments(&mut self, stage: &Stage, stage_s: f64) -> Powers {
+    /// The right side of (22) into `star`, with the velocity added if no line solve follows; the work of its terms if `measured`.
+    fn increments(&mut self, stage: &Stage, stage_s: f64, measured: bool) -> Powers {
         let explicit_per_s = self.settings.scheme.largest_decay() * stage.fraction / stage_s;
         self.update_model((SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0));
         let (shape, mut total) = (self.layout.shape, Powers::default());
@@ -254,7 +256,7 @@ impl Flow {
                 .map_init(
                     || Scratch::new(shape.n[0]),
                     |scratch, (k, (star, history))| {
-                        task.increments([axis, k], (stage, stage_s, keep), star, history, scratch)
+                        task.increments([axis, k], (stage, stage_s, keep, measured), star, history, scratch)
                     },
                 )
                 .collect();

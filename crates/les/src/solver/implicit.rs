@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::layout::Shape;
 use super::momentum::Momentum;
 use super::operators_1d::Taps;
-use super::rows::add_rows;
+use super::rows::add_across;
 
 /// Factors of `1 - a L` along one axis for one component.
 #[derive(Debug, Clone)]
@@ -74,28 +74,8 @@ impl LineSolver {
     pub(crate) fn solve(&self, shape: Shape, field: &mut [f64]) {
         match self.axis {
             0 => field.par_chunks_mut(shape.n[0] * TILE).for_each(|rows| self.solve_tile(rows, shape.n[0])),
-            1 => field.par_chunks_mut(shape.plane()).for_each(|plane| self.solve_block(plane, shape.n[0])),
+            1 => field.par_chunks_mut(shape.plane()).for_each(|plane| solve_block(self, plane, shape.n[0])),
             _ => self.solve_across_planes(shape, field),
-        }
-    }
-
-    /// Solves lines that run across the rows of `block`, which are `width` long.
-    fn solve_block(&self, block: &mut [f64], width: usize) {
-        for i in 0..self.mass.len() {
-            let (before, rest) = block.split_at_mut(i * width);
-            let row = &mut rest[..width];
-            for value in row.iter_mut() {
-                *value *= self.mass[i];
-            }
-            add_taps(row, before, &self.lower[i], 0, width);
-        }
-        for i in (0..self.mass.len()).rev() {
-            let (head, after) = block.split_at_mut((i + 1) * width);
-            let row = &mut head[i * width..];
-            for value in row.iter_mut() {
-                *value *= self.inverse_pivot[i];
-            }
-            add_taps(row, after, &self.upper[i], i + 1, width);
         }
     }
 
@@ -108,7 +88,7 @@ impl LineSolver {
                 block[i * width + r] = *value;
             }
         }
-        self.solve_block(&mut block, width);
+        solve_block(self, &mut block, width);
         for (r, row) in rows.chunks_exact_mut(n).enumerate() {
             for (i, value) in row.iter_mut().enumerate() {
                 *value = block[i * width + r];
@@ -135,7 +115,7 @@ impl LineSolver {
             for (to, from) in block.chunks_mut(width).zip(strip.iter()) {
                 to.copy_from_slice(from);
             }
-            self.solve_block(&mut block, width);
+            solve_block(self, &mut block, width);
             for (from, to) in block.chunks(width).zip(strip.iter_mut()) {
                 to.copy_from_slice(from);
             }
@@ -155,27 +135,41 @@ fn cut(strips: Vec<Vec<&mut [f64]>>, width: usize) -> Vec<Vec<&mut [f64]>> {
     pieces
 }
 
-/// `row += sum c x_i`, `x_i` being the rows of `other`, the first of which has index `first`.
-fn add_taps(row: &mut [f64], other: &[f64], taps: &[(usize, f64)], first: usize, width: usize) {
-    for chunk in taps.chunks(4) {
-        let mut places = [(0, 0.0); 4];
-        for (place, &(i, c)) in places.iter_mut().zip(chunk) {
-            *place = ((i - first) * width, c);
+/// Solves lines that run across the rows of `block`, which are `width` long.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn solve_block(solver: &LineSolver, block: &mut [f64], width: usize) {
+    for i in 0..solver.mass.len() {
+        let (before, rest) = block.split_at_mut(i * width);
+        let row = &mut rest[..width];
+        for value in row.iter_mut() {
+            *value *= solver.mass[i];
         }
-        accumulate(row, other, &places[..chunk.len()]);
+        add_taps(row, before, &solver.lower[i], 0);
+    }
+    for i in (0..solver.mass.len()).rev() {
+        let (head, after) = block.split_at_mut((i + 1) * width);
+        let row = &mut head[i * width..];
+        for value in row.iter_mut() {
+            *value *= solver.inverse_pivot[i];
+        }
+        add_taps(row, after, &solver.upper[i], i + 1);
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn accumulate(row: &mut [f64], other: &[f64], places: &[(usize, f64)]) {
-    if let [a, b, c] = *places {
-        let n = row.len();
-        let [x, y, z] = [a.0, b.0, c.0].map(|start| &other[start..start + n]);
-        for i in 0..n {
-            row[i] += (a.1 * x[i] + b.1 * y[i]) + c.1 * z[i];
+/// `row += sum c x_i`, `x_i` being the rows of `other`, the first of which has index `first`.
+#[inline(always)]
+fn add_taps(row: &mut [f64], other: &[f64], taps: &[(usize, f64)], first: usize) {
+    let n = row.len();
+    for taps in taps.chunks(4) {
+        if let [a, b, c] = *taps {
+            let (x, y) = (&other[(a.0 - first) * n..][..n], &other[(b.0 - first) * n..][..n]);
+            let z = &other[(c.0 - first) * n..][..n];
+            for i in 0..n {
+                row[i] += (a.1 * x[i] + b.1 * y[i]) + c.1 * z[i];
+            }
+        } else {
+            add_across(row, other, 1.0, taps, |i| (i - first) * n);
         }
-    } else {
-        add_rows(row, other, places);
     }
 }
 

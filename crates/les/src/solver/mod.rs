@@ -11,6 +11,7 @@ mod fields;
 pub(crate) mod flow;
 mod growth;
 mod implicit;
+mod kept_fluxes;
 mod layout;
 #[cfg(test)]
 mod literal;

@@ -8,10 +8,11 @@
 
 use multiversion::multiversion;
 
+use super::kept_fluxes::KeptFluxes;
 use super::layout::Layout;
 use super::operators_1d::{DIFFERENCE, Taps};
 use super::row_operator::RowOperator;
-use super::rows::{HALO, add_even, pad};
+use super::rows::{HALO, add_even, from_places, pad};
 use super::transport::{Stencil, Transport};
 
 /// The operators of one component.
@@ -52,7 +53,8 @@ const SECOND_DIFFERENCE: [f64; 3] = [
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     pub(super) padded: [Vec<f64>; 2],
-    pub(super) flux: [Vec<f64>; 4],
+    pub(super) flux: [Vec<f64>; 2],
+    pub(super) kept: KeptFluxes,
     pub(crate) convection: Vec<f64>,
     pub(crate) explicit: Vec<f64>,
     pub(crate) implicit: Vec<f64>,
@@ -66,7 +68,8 @@ impl Scratch {
         let padded = || vec![0.0; n + 2 * HALO];
         Self {
             padded: [padded(), padded()],
-            flux: [row(), row(), row(), row()],
+            flux: [row(), row()],
+            kept: KeptFluxes::default(),
             convection: row(),
             explicit: row(),
             implicit: row(),
@@ -173,7 +176,9 @@ pub(crate) fn add_laplacian_row(
         let row = &field[start..start + n];
         if let Some(c) = ops.even_laplacian[0] {
             pad(padded, row, ops.periodic[0]);
-            add_even(out, c, std::array::from_fn(|offset| &padded[HALO + offset - 3..]));
+            let first = HALO - 3;
+            let places = from_places!(padded, first, first + 1, first + 2, first + 3, first + 4, first + 5, first + 6);
+            add_even(out, c, places);
             return;
         }
         ops.laplacian[0].add_along(out, row, padded);
@@ -189,7 +194,7 @@ pub(crate) fn add_laplacian_row(
             let start = ops.start_with(j, k, axis, (index + offset + 3 * count - 3) % count);
             &field[start..start + n]
         };
-        add_even(out, c, std::array::from_fn(row));
+        add_even(out, c, [row(0), row(1), row(2), row(3), row(4), row(5), row(6)]);
         return;
     }
     ops.laplacian[axis].add_across(out, field, [j, k]);

@@ -4,6 +4,19 @@
 use super::operators_1d::Taps;
 use super::transport::{MEAN, Stencil};
 
+/// Some rows of an array, cut to `n` values. Closures given to `map` or `from_fn` stay calls in functions that are compiled for
+/// several instruction sets.
+macro_rules! cut_rows {
+    ($rows:expr, $n:expr, $($place:literal)+) => { [$(&$rows[$place][..$n]),+] };
+}
+
+/// The parts of a row from some places on.
+macro_rules! from_places {
+    ($row:expr, $($place:expr),+) => { [$(&$row[$place..]),+] };
+}
+
+pub(crate) use {cut_rows, from_places};
+
 /// Values before and after a padded row.
 pub(crate) const HALO: usize = 4;
 
@@ -39,7 +52,7 @@ impl Columns {
     pub(crate) fn add(&self, out: &mut [f64], padded: &[f64]) {
         let mut bands = self.bands.as_slice();
         while let [a, b, c, d, rest @ ..] = bands {
-            add_products(out, [&a.1, &b.1, &c.1, &d.1], [a.0, b.0, c.0, d.0].map(|offset| &padded[offset..]));
+            add_products(out, [&a.1, &b.1, &c.1, &d.1], from_places!(padded, a.0, b.0, c.0, d.0));
             bands = rest;
         }
         for (offset, coefficient) in bands {
@@ -73,8 +86,8 @@ impl Columns {
 #[inline(always)]
 fn add_products(out: &mut [f64], c: [&[f64]; 4], x: [&[f64]; 4]) {
     let n = out.len();
-    let [c0, c1, c2, c3] = c.map(|c| &c[..n]);
-    let [x0, x1, x2, x3] = x.map(|x| &x[..n]);
+    let [c0, c1, c2, c3] = cut_rows!(c, n, 0 1 2 3);
+    let [x0, x1, x2, x3] = cut_rows!(x, n, 0 1 2 3);
     for i in 0..n {
         out[i] += (c0[i] * x0[i] + c1[i] * x1[i]) + (c2[i] * x2[i] + c3[i] * x3[i]);
     }
@@ -103,45 +116,41 @@ pub(crate) fn wrap(padded: &mut [f64], n: usize, periodic: bool) {
     }
 }
 
-/// `out += sum c row`, the rows of `field` starting at the given places.
+/// `out += scale sum c row` over the taps of an operator across rows; those of index `i` start at `start(i)`.
 #[inline(always)]
-pub(crate) fn add_rows(out: &mut [f64], field: &[f64], taps: &[(usize, f64)]) {
+pub(crate) fn add_across(
+    out: &mut [f64],
+    field: &[f64],
+    scale: f64,
+    mut taps: &[(usize, f64)],
+    start: impl Fn(usize) -> usize,
+) {
     let n = out.len();
-    let mut taps = taps;
     while let [a, b, c, d, rest @ ..] = taps {
-        let [x0, x1, x2, x3] = [a.0, b.0, c.0, d.0].map(|start| &field[start..start + n]);
+        let (x0, x1) = (&field[start(a.0)..][..n], &field[start(b.0)..][..n]);
+        let (x2, x3) = (&field[start(c.0)..][..n], &field[start(d.0)..][..n]);
+        let [a, b, c, d] = [scale * a.1, scale * b.1, scale * c.1, scale * d.1];
         for i in 0..n {
-            out[i] += (a.1 * x0[i] + b.1 * x1[i]) + (c.1 * x2[i] + d.1 * x3[i]);
+            out[i] += (a * x0[i] + b * x1[i]) + (c * x2[i] + d * x3[i]);
         }
         taps = rest;
     }
-    for &(start, c) in taps {
-        for (out, x) in out.iter_mut().zip(&field[start..start + n]) {
+    for tap in taps {
+        let c = scale * tap.1;
+        for (out, x) in out.iter_mut().zip(&field[start(tap.0)..][..n]) {
             *out += c * x;
         }
     }
-}
-
-/// Most neighbours of one row.
-const MOST_TAPS: usize = 12;
-
-/// `out += scale sum c row` over the taps of an operator across rows; those of index `i` start at `start(i)`.
-#[inline(always)]
-pub(crate) fn add_across(out: &mut [f64], field: &[f64], scale: f64, taps: &Taps, start: impl Fn(usize) -> usize) {
-    let mut rows = [(0, 0.0); MOST_TAPS];
-    for (row, tap) in rows.iter_mut().zip(taps) {
-        *row = (start(tap.0), scale * tap.1);
-    }
-    add_rows(out, field, &rows[..taps.len().min(MOST_TAPS)]);
 }
 
 /// `out += scale transport`, by the formula of the interior: fluxes `g` at -1, 0, 1, 2 and values `q` at -3 to 3.
 #[inline(always)]
 pub(crate) fn add_transport(out: &mut [f64], scale: f64, stencil: Stencil, g: [&[f64]; 4], q: [&[f64]; 7]) {
     let n = out.len();
-    let [g0, g1, g2, g3] = g.map(|g| &g[..n]);
-    let [q0, q1, q2, _, q4, q5, q6] = q.map(|q| &q[..n]);
-    let ([a, b, c], [d, e, f]) = (stencil.near.map(|c| scale * c), stencil.far.map(|c| scale * c));
+    let [g0, g1, g2, g3] = cut_rows!(g, n, 0 1 2 3);
+    let [q0, q1, q2, q4, q5, q6] = cut_rows!(q, n, 0 1 2 4 5 6);
+    let ([a, b, c], [d, e, f]) = (stencil.near, stencil.far);
+    let [a, b, c, d, e, f] = [scale * a, scale * b, scale * c, scale * d, scale * e, scale * f];
     if stencil.is_plain() {
         for i in 0..n {
             out[i] += b * (g2[i] * q4[i] - g1[i] * q2[i]) + f * (g3[i] * q6[i] - g0[i] * q0[i]);
@@ -159,7 +168,7 @@ pub(crate) fn add_transport(out: &mut [f64], scale: f64, stencil: Stencil, g: [&
 #[inline(always)]
 pub(crate) fn add_even(out: &mut [f64], c: [f64; 3], q: [&[f64]; 7]) {
     let n = out.len();
-    let [q0, q1, q2, q3, q4, q5, q6] = q.map(|q| &q[..n]);
+    let [q0, q1, q2, q3, q4, q5, q6] = cut_rows!(q, n, 0 1 2 3 4 5 6);
     for i in 0..n {
         let own = q3[i];
         let pair = |low: f64, high: f64| (low - own) + (high - own);
@@ -171,7 +180,7 @@ pub(crate) fn add_even(out: &mut [f64], c: [f64; 3], q: [&[f64]; 7]) {
 #[inline(always)]
 pub(crate) fn even_mean(out: &mut [f64], scale: f64, q: [&[f64]; 4]) {
     let n = out.len();
-    let [q0, q1, q2, q3] = q.map(|q| &q[..n]);
+    let [q0, q1, q2, q3] = cut_rows!(q, n, 0 1 2 3);
     let far = -MEAN[0];
     for i in 0..n {
         let (low, high) = (q1[i], q2[i]);

@@ -1,5 +1,7 @@
 //! The right side of the momentum equation, plane by plane.
 
+use multiversion::multiversion;
+
 use super::layout::Layout;
 use super::momentum::{Momentum, Scratch};
 use super::projection::weighted_dot;
@@ -35,11 +37,12 @@ pub(super) struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// `star = dt (c N + c' N' - grad p + nu L u) + keep u` in plane `k` of component `axis`, with the history; returns the work.
+    /// `star = dt (c N + c' N' - grad p + nu L u) + keep u` in plane `k` of component `axis`, with the history; returns the work
+    /// if `measured`.
     pub(super) fn increments(
         &self,
         [axis, k]: [usize; 2],
-        (stage, stage_s, keep): (&Stage, f64, f64),
+        (stage, stage_s, keep, measured): (&Stage, f64, f64, bool),
         star: &mut [f64],
         history: &mut [f64],
         scratch: &mut Scratch,
@@ -51,18 +54,16 @@ impl Task<'_> {
                 star.fill(0.0);
                 continue;
             }
-            self.terms([axis, j, k], star, scratch, &mut powers);
+            self.terms([axis, j, k], star, scratch, measured.then_some(&mut powers));
             scratch.gradient(&self.ops[axis], self.pressure, j, k);
             let own = &self.velocity[axis][self.layout.shape.row(j, k)];
             let nu = self.viscosity_m2_s;
-            let (implicit, pressure, own) = (&scratch.implicit[..n], &scratch.pressure[..n], &own[..n]);
-            let (star, history) = (&mut star[..n], &mut history[..n]);
-            for i in 0..n {
-                let term = star[i];
-                let total = stage.new * term + stage.old * history[i] - pressure[i] + nu * implicit[i];
-                history[i] = term;
-                star[i] = stage_s * total + keep * own[i];
-            }
+            advance_row(
+                [stage.new, stage.old, nu, stage_s, keep],
+                star,
+                history,
+                [&scratch.implicit, &scratch.pressure, own],
+            );
             self.hold_at_wall(axis, star);
         }
         powers
@@ -75,7 +76,7 @@ impl Task<'_> {
                 star.fill(0.0);
                 continue;
             }
-            self.terms([axis, j, k], star, scratch, &mut Powers::default());
+            self.terms([axis, j, k], star, scratch, None);
             for (star, implicit) in star.iter_mut().zip(&scratch.implicit) {
                 *star += self.viscosity_m2_s * implicit;
             }
@@ -84,36 +85,37 @@ impl Task<'_> {
     }
 
     /// `N`, the terms that are integrated explicitly, of one row into `out`; the Laplacian along the implicit axes into the scratch.
-    fn terms(&self, [axis, j, k]: [usize; 3], out: &mut [f64], scratch: &mut Scratch, powers: &mut Powers) {
+    fn terms(&self, [axis, j, k]: [usize; 3], out: &mut [f64], scratch: &mut Scratch, powers: Option<&mut Powers>) {
         let ops = &self.ops[axis];
+        scratch.convection(ops, self.velocity, j, k);
+        let (nu, force) = (self.viscosity_m2_s, self.force_m_s2[axis]);
+        if nu == 0.0 {
+            scratch.implicit.fill(0.0);
+            scratch.explicit.fill(0.0);
+        } else {
+            scratch.laplacians(ops, self.velocity[axis], self.implicit, j, k);
+        }
+        explicit_terms(out, nu, &scratch.explicit, &scratch.convection, force);
+        if let Some(model) = self.model {
+            scratch.model.fill(0.0);
+            model.add_divergence_row(axis, j, k, &mut scratch.model);
+            for (out, model) in out.iter_mut().zip(&scratch.model) {
+                *out += model;
+            }
+        }
+        let Some(powers) = powers else { return };
         let own = &self.velocity[axis][self.layout.shape.row(j, k)];
         let (across, along) = ops.row_mass(j, k);
-        scratch.convection(ops, self.velocity, j, k);
-        scratch.implicit.fill(0.0);
-        scratch.explicit.fill(0.0);
-        let nu = self.viscosity_m2_s;
         if nu > 0.0 {
-            scratch.laplacians(ops, self.velocity[axis], self.implicit, j, k);
             let work = weighted_dot(own, &scratch.implicit, along) + weighted_dot(own, &scratch.explicit, along);
             powers.viscous += across * nu * work;
         }
-        let force = self.force_m_s2[axis];
         if force != 0.0 {
             let momentum: f64 = own.iter().zip(along).map(|(u, mass)| u * mass).sum();
             powers.force += across * force * momentum;
         }
-        let n = out.len();
-        let (convection, explicit) = (&scratch.convection[..n], &scratch.explicit[..n]);
-        for i in 0..n {
-            out[i] = nu * explicit[i] - convection[i] + force;
-        }
-        if let Some(model) = self.model {
-            scratch.model.fill(0.0);
-            model.add_divergence_row(axis, j, k, &mut scratch.model);
+        if self.model.is_some() {
             powers.subgrid += across * weighted_dot(own, &scratch.model, along);
-            for (out, model) in out.iter_mut().zip(&scratch.model) {
-                *out += model;
-            }
         }
     }
 
@@ -122,5 +124,33 @@ impl Task<'_> {
         if axis == 0 && self.layout.line[0].first_face() == 1 {
             row[0] = 0.0;
         }
+    }
+}
+
+/// `out = nu explicit - convection + force`.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn explicit_terms(out: &mut [f64], nu: f64, explicit: &[f64], convection: &[f64], force: f64) {
+    let n = out.len();
+    let (explicit, convection) = (&explicit[..n], &convection[..n]);
+    for i in 0..n {
+        out[i] = nu * explicit[i] - convection[i] + force;
+    }
+}
+
+/// `star = dt (c N + c' N' - grad p + nu L u) + keep u`, `N` being what `star` held, which goes into the history.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn advance_row(
+    [new, old, nu, stage_s, keep]: [f64; 5],
+    star: &mut [f64],
+    history: &mut [f64],
+    [implicit, pressure, own]: [&[f64]; 3],
+) {
+    let n = star.len();
+    let (history, implicit, pressure, own) = (&mut history[..n], &implicit[..n], &pressure[..n], &own[..n]);
+    for i in 0..n {
+        let term = star[i];
+        let total = new * term + old * history[i] - pressure[i] + nu * implicit[i];
+        history[i] = term;
+        star[i] = stage_s * total + keep * own[i];
     }
 }

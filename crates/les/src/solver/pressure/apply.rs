@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
 use super::super::operators_1d::{Operators1d, Taps};
-use super::super::rows::{Columns, HALO, pad};
+use super::super::rows::{Columns, HALO, cut_rows, from_places, pad};
 use super::kernel;
 
 /// `sum_b (prod_{d != b} m_d) Dw_b f_b^-1 Dw_b^T`.
@@ -214,12 +214,16 @@ fn row_differences(
     padded: &[f64],
 ) {
     let n = out.len();
-    let c: [f64; INNER_TAPS] = std::array::from_fn(|t| taps[t].1);
+    let mut c = [0.0; INNER_TAPS];
+    for (c, tap) in c.iter_mut().zip(taps) {
+        *c = tap.1;
+    }
     let row = |t: usize| &phi[taps[t].0..taps[t].0 + n];
-    let [x0, x1, x2, x3, x4, x5] = [0, 1, 2, 3, 4, 5].map(row);
-    let [x6, x7, x8, x9, x10, x11] = [6, 7, 8, 9, 10, 11].map(row);
+    let [x0, x1, x2, x3, x4, x5] = [row(0), row(1), row(2), row(3), row(4), row(5)];
+    let [x6, x7, x8, x9, x10, x11] = [row(6), row(7), row(8), row(9), row(10), row(11)];
     let (own, g, mass) = (&phi[at.clone()][..n], &g[at][..n], &mass[..n]);
-    let [p3, p2, p1, q1, q2, q3] = [1, 2, 3, 5, 6, 7].map(|offset: usize| &padded[offset..offset + n]);
+    let [p3, p2, p1, q1, q2, q3] = from_places!(padded, 1, 2, 3, 5, 6, 7);
+    let [p3, p2, p1, q1, q2, q3] = cut_rows!([p3, p2, p1, q1, q2, q3], n, 0 1 2 3 4 5);
     for i in 0..n {
         let o = own[i];
         let a = c[0].mul_add(x0[i] - o, c[1].mul_add(x1[i] - o, c[2] * (x2[i] - o)));

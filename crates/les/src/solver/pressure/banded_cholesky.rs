@@ -126,27 +126,29 @@ struct Reach {
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
 fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratch) {
     let last = columns.len() - 1;
-    // Of the three columns before: entries before and after division by the pivot, and values of the right side.
+    // Of the three columns before, in the place of each modulo 3: entries before and after division by the pivot, and values of
+    // the right side.
     let (mut u1, mut u2, mut u3) = ([ZERO; 3], [ZERO; 3], [ZERO; 3]);
     let (mut l1, mut l2, mut l3) = ([ZERO; 3], [ZERO; 3], [ZERO; 3]);
     let mut y = [ZERO; 3];
     let mut reach: Option<Reach> = None;
     for (k, column) in columns.iter().enumerate() {
         let right = &mut scratch.right[k];
+        let (one, two, three) = ((k + 2) % 3, (k + 1) % 3, k % 3);
         let (mut d, mut e1, mut e2, mut e3) = (ZERO, ZERO, ZERO, ZERO);
         let mut r = ZERO;
         for l in 0..LANES {
             let a = shift[l].mul_add(column.mass, column.diagonal);
-            let a = (-u3[2][l]).mul_add(l3[2][l], a);
-            let a = (-u2[1][l]).mul_add(l2[1][l], a);
-            d[l] = (-u1[0][l]).mul_add(l1[0][l], a);
-            let b = (-u3[1][l]).mul_add(l2[1][l], column.below[0]);
-            e1[l] = (-u2[0][l]).mul_add(l1[0][l], b);
-            e2[l] = (-u3[0][l]).mul_add(l1[0][l], column.below[1]);
+            let a = (-u3[three][l]).mul_add(l3[three][l], a);
+            let a = (-u2[two][l]).mul_add(l2[two][l], a);
+            d[l] = (-u1[one][l]).mul_add(l1[one][l], a);
+            let b = (-u3[two][l]).mul_add(l2[two][l], column.below[0]);
+            e1[l] = (-u2[one][l]).mul_add(l1[one][l], b);
+            e2[l] = (-u3[one][l]).mul_add(l1[one][l], column.below[1]);
             e3[l] = column.below[2];
-            let b = (-l3[2][l]).mul_add(y[2][l], right[l] * scale);
-            let b = (-l2[1][l]).mul_add(y[1][l], b);
-            r[l] = (-l1[0][l]).mul_add(y[0][l], b);
+            let b = (-l3[three][l]).mul_add(y[three][l], right[l] * scale);
+            let b = (-l2[two][l]).mul_add(y[two][l], b);
+            r[l] = (-l1[one][l]).mul_add(y[one][l], b);
         }
         if let Some(reach) = &mut reach {
             reach.left -= 1;
@@ -178,13 +180,9 @@ fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratc
         if column.corner != 0.0 {
             reach = Some(Reach { left: 4, entry: [column.corner; LANES], factor, value: r });
         }
-        u1 = [e1, u1[0], u1[1]];
-        u2 = [e2, u2[0], u2[1]];
-        u3 = [e3, u3[0], u3[1]];
-        l1 = [factor.below[0], l1[0], l1[1]];
-        l2 = [factor.below[1], l2[0], l2[1]];
-        l3 = [factor.below[2], l3[0], l3[1]];
-        y = [r, y[0], y[1]];
+        (u1[three], u2[three], u3[three]) = (e1, e2, e3);
+        [l1[three], l2[three], l3[three]] = factor.below;
+        y[three] = r;
         scratch.factors[k] = factor;
     }
 }
