@@ -206,7 +206,10 @@ fn smooth_rows<'a, const N: usize>(
         out.copy_from_slice(own);
         return;
     };
-    let rows: [[&[f64]; 2]; N] = std::array::from_fn(|m| near[m].map(|ghost| &row(ghost.index)[..n]));
+    let mut rows: [[&[f64]; 2]; N] = [[&[]; 2]; N];
+    for (rows, [low, high]) in rows.iter_mut().zip(near) {
+        *rows = [&row(low.index)[..n], &row(high.index)[..n]];
+    }
     if axis.plain[index] {
         for i in 0..n {
             let mut sum = own[i];
@@ -219,7 +222,8 @@ fn smooth_rows<'a, const N: usize>(
         for i in 0..n {
             let mut sum = own[i];
             for ((weight, rows), ghosts) in weights.iter().zip(&rows).zip(near) {
-                let [low, high] = [0, 1].map(|side| ghosts[side].sign * rows[side][i] + ghosts[side].offset);
+                let low = ghosts[0].sign * rows[0][i] + ghosts[0].offset;
+                let high = ghosts[1].sign * rows[1][i] + ghosts[1].offset;
                 sum += weight * ((high - own[i]) + (low - own[i]));
             }
             out[i] = sum;
@@ -244,8 +248,11 @@ fn pad_with_ghosts<const N: usize>(padded: &mut [f64], row: &[f64], axis: &AxisF
 fn difference<const N: usize>(out: &mut [f64], own: &[f64], padded: &[f64], weights: &[f64; N]) {
     let n = out.len();
     let (own, centre) = (&own[..n], &padded[HALO..HALO + n]);
-    let low: [&[f64]; N] = std::array::from_fn(|m| &padded[HALO - 1 - m..][..n]);
-    let high: [&[f64]; N] = std::array::from_fn(|m| &padded[HALO + 1 + m..][..n]);
+    let (mut low, mut high): ([&[f64]; N], [&[f64]; N]) = ([&[]; N], [&[]; N]);
+    for m in 0..N {
+        low[m] = &padded[HALO - 1 - m..][..n];
+        high[m] = &padded[HALO + 1 + m..][..n];
+    }
     for i in 0..n {
         let mut sum = centre[i];
         for m in 0..N {

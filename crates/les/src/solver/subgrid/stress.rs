@@ -14,7 +14,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::row_operator::RowOperator;
-use super::super::rows::{HALO, pad};
+use super::super::rows::{HALO, cut_rows, pad};
 use super::operators::Operators;
 
 /// What the divergence needs of the stress.
@@ -98,8 +98,11 @@ fn stress_plane(
     let n = shape.n[0];
     for j in 0..shape.n[1] {
         let (at, place) = ([j, k], j * n..(j + 1) * n);
-        let [in_0, in_1, in_2] = planes.in_plane.each_mut().map(|plane| &mut plane[place.clone()]);
-        let [across_0, across_1, across_2] = planes.across.each_mut().map(|plane| &mut plane[place.clone()]);
+        let [in_0, in_1, in_2] = &mut planes.in_plane;
+        let (in_0, in_1, in_2) = (&mut in_0[place.clone()], &mut in_1[place.clone()], &mut in_2[place.clone()]);
+        let [across_0, across_1, across_2] = &mut planes.across;
+        let (across_0, across_1) = (&mut across_0[place.clone()], &mut across_1[place.clone()]);
+        let across_2 = &mut across_2[place.clone()];
         let Scratch { shear, normal, row, viscosity: sum, padded } = scratch;
         let (shear, normal) = (&mut shear[place.clone()], &mut normal[place]);
         let (before_j, before_k) = (operators.before(1, j), operators.before(2, k));
@@ -196,7 +199,7 @@ fn sum_of_two(out: &mut [f64], a: &[f64], b: &[f64]) {
 #[inline(always)]
 fn scale_by_mean(out: &mut [f64], rows: [&[f64]; 4]) {
     let n = out.len();
-    let [a, b, c, d] = rows.map(|row| &row[..n]);
+    let [a, b, c, d] = cut_rows!(rows, n, 0 1 2 3);
     for i in 0..n {
         out[i] *= 0.25 * ((a[i] + b[i]) + (c[i] + d[i]));
     }
