@@ -90,8 +90,7 @@ impl<'a> Scanner<'a> {
 
     /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
     pub fn mean_snr(&self) -> f64 {
-        let layers = self.layer_snr();
-        layers.iter().map(|(_, snr)| snr).sum::<f64>() / layers.len().max(1) as f64
+        mean_snr(&self.layer_snr())
     }
 
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; the efficiency is its
@@ -194,6 +193,11 @@ impl<'a> Scanner<'a> {
         };
         Ok(scan.collect()?)
     }
+}
+
+/// Mean signal-to-noise ratio of layers, given with their ranges.
+pub(crate) fn mean_snr(layer_snr: &[(f64, f64)]) -> f64 {
+    layer_snr.iter().map(|(_, snr)| snr).sum::<f64>() / layer_snr.len().max(1) as f64
 }
 
 /// Records that are in memory at a time: some ten megabytes of them, and enough for every thread.
