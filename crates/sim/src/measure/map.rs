@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::measure::estimators;
-use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints};
+use crate::measure::map_estimator::{self, MapEstimator, NoiseAtPoints};
 use crate::measure::progress::Observer;
 use crate::measure::scan::{Scanner, radial_velocity_m_s};
 use crate::plan::{Plan, Stage};
@@ -95,6 +95,7 @@ impl Figures {
 /// Accumulates the errors of realisation after realisation.
 pub(crate) struct Mapper<S> {
     estimator: MapEstimator<S>,
+    places: ScanGeometry,
     points: Vec<PolarPoint>,
     shape: (usize, usize),
     /// Real numbers that the converter sees in one realisation.
@@ -124,11 +125,12 @@ impl<S: Sample> Mapper<S> {
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let pulses = scene.scan.pulses_per_line;
         let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
-        let estimator = MapEstimator::new(plan, &scanner.layer_snr(), places)?;
+        let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
         let points = polar_points(&g.elevation_rad, &g.gate_range_m);
         Ok(Self {
-            noise: estimator.noise(&points)?,
+            noise: estimator.noise(&places, &points)?,
             estimator,
+            places,
             points,
             shape,
             samples_of_realisation: (scanner.pulses() * g.samples * S::KIND.lag_numbers(1)) as f64,
@@ -146,7 +148,7 @@ impl<S: Sample> Mapper<S> {
 
     /// The sums of a realisation, still without any record.
     fn sums(&self) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
-        self.estimator.sums(self.estimator.places().clone())
+        self.estimator.sums(self.places.clone())
     }
 
     /// Estimates the velocities of one realisation and adds their errors; returns the velocities, m/s.
@@ -178,7 +180,7 @@ impl<S: Sample> Mapper<S> {
         let noise_a2 = self.estimator.noise_power_a2();
         let mut snr_db = power_a2;
         for (index, (place, power)) in snr_db.indexed_iter_mut().enumerate() {
-            *power = self.noise.snr_db(index, *power / noise_a2, self.figures.count[place]);
+            *power = map_estimator::snr_db(*power / noise_a2, self.noise.deviation(index), self.figures.count[place]);
         }
         VelocityEstimates {
             elevation_rad: plan.geometry.elevation_rad.clone(),
@@ -263,4 +265,23 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::scan::Sample>(
     }
     observer.end();
     Ok(mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan)).collect())
+}
+
+/// What takes the records of pulses from a number on.
+pub(crate) type AddRecords<'a, S> = &'a mut dyn FnMut(usize, ArrayView2<'_, S>) -> Result<(), Error>;
+
+/// The estimates of a plan from records that `read` hands over for each realisation, piece after piece.
+pub(crate) fn of_records<S: Sample>(
+    plan: &Plan,
+    scanner: &Scanner<'_>,
+    mut read: impl FnMut(usize, AddRecords<'_, S>) -> Result<(), Error>,
+) -> Result<VelocityEstimates, Error> {
+    let mut mapper = Mapper::<S>::new(plan, scanner)?;
+    for realisation in 0..plan.realisations() {
+        let mut sums = mapper.sums()?;
+        read(realisation, &mut |first, records| Ok(sums.add(first, records)?))?;
+        let scan = sums.finish();
+        mapper.add(&scan, Clipped::default())?;
+    }
+    Ok(mapper.finish(plan))
 }

@@ -20,7 +20,6 @@ use wakescope_estimate::{
 pub(crate) struct MapEstimator<S> {
     sampling: Sampling,
     gates: Gates,
-    places: ScanGeometry,
     record_samples: usize,
     tools: Toolkit<S>,
     correlation: WindowCorrelation,
@@ -34,23 +33,20 @@ impl<S: Sample> MapEstimator<S> {
     ///
     /// # Errors
     /// What the estimators refuse; a checked scene gives none.
-    pub(crate) fn new(plan: &Plan, layer_snr: &[(f64, f64)], places: ScanGeometry) -> Result<Self, Error> {
+    pub(crate) fn new(plan: &Plan, layer_snr: &[(f64, f64)], places: &ScanGeometry) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let pulse = &plan.instrument.pulse;
         let snr = mean_snr(layer_snr);
         let correlation = estimators::window_correlation(scene, pulse, snr)?;
-        let radius = region_radius(scene, pulse, layer_snr, &places, &correlation)?;
+        let radius = region_radius(scene, pulse, layer_snr, places, &correlation)?;
         let lines = places.line_elevation_rad();
-        let middle = PolarPoint {
-            range_m: g.gate_range_m[g.gate_range_m.len() / 2],
-            elevation_rad: lines[lines.len() / 2],
-        };
+        let middle =
+            PolarPoint { range_m: g.gate_range_m[g.gate_range_m.len() / 2], elevation_rad: lines[lines.len() / 2] };
         let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
         let known = WindowStatistics { snr, n_eff };
         Ok(Self {
             sampling: estimators::sampling(scene)?,
             gates: estimators::gates(scene)?,
-            places,
             record_samples: g.samples,
             tools: Toolkit::new(scene, &plan.instrument, &known)?,
             correlation,
@@ -59,9 +55,25 @@ impl<S: Sample> MapEstimator<S> {
         })
     }
 
-    /// Where the windows of the whole scan are.
-    pub(crate) fn places(&self) -> &ScanGeometry {
-        &self.places
+    /// Numbers of a window.
+    pub(crate) fn numbers(&self) -> usize {
+        self.tools.statistic.statistic_len()
+    }
+
+    /// Radius of the region at a range, m.
+    pub(crate) fn radius_m(&self, range_m: f64) -> Result<f64, Error> {
+        Ok(self.radius.at_m(range_m)?)
+    }
+
+    /// Angle that the region at a range reaches from its line, rad.
+    pub(crate) fn reach_rad(&self, range_m: f64) -> Result<f64, Error> {
+        let share = self.radius_m(range_m)? / range_m;
+        Ok(if share < 1.0 { share.asin() } else { std::f64::consts::PI })
+    }
+
+    /// How many such angles away the windows are that an estimate depends on: estimates that follow the wind need those of others.
+    pub(crate) fn windows_reach(&self) -> f64 {
+        if self.tools.following.is_some() { 2.0 } else { 1.0 }
     }
 
     /// Sums over the windows of some lines, still without any record.
@@ -72,6 +84,11 @@ impl<S: Sample> MapEstimator<S> {
     /// Mean power, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
     pub(crate) fn noise_power_a2(&self) -> f64 {
         self.tools.noise.map_or(f64::NAN, |noise| noise.power)
+    }
+
+    /// Density, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
+    pub(crate) fn noise_density_a2(&self) -> f64 {
+        self.tools.noise.map_or(f64::NAN, |noise| noise.detection)
     }
 
     /// Velocities at points, the gates of a line together and lines by increasing elevation.
@@ -88,14 +105,13 @@ impl<S: Sample> MapEstimator<S> {
         Ok(second)
     }
 
-    /// What noise gives at points.
-    pub(crate) fn noise(&self, points: &[PolarPoint]) -> Result<NoiseAtPoints, Error> {
+    /// What noise gives at points of a scan.
+    pub(crate) fn noise(&self, places: &ScanGeometry, points: &[PolarPoint]) -> Result<NoiseAtPoints, Error> {
         let (Some(test), Some(noise)) = (&self.tools.test, &self.tools.noise) else {
             return Ok(NoiseAtPoints { threshold: None, deviation: vec![0.0; points.len()] });
         };
-        let windows = |point: &PolarPoint| {
-            Ok(self.places.level(*point, self.radius.at_m(point.range_m)?, test.correlation()).1)
-        };
+        let windows =
+            |point: &PolarPoint| Ok(places.level(*point, self.radius.at_m(point.range_m)?, test.correlation()).1);
         let n_eff = points.iter().map(windows).collect::<Result<Vec<f64>, Error>>()?;
         let threshold = match self.rate > 0.0 {
             true => Some(thresholds(test, noise, &n_eff, self.rate)?),
@@ -122,11 +138,22 @@ impl NoiseAtPoints {
         }
     }
 
-    /// Signal-to-noise ratio, dB, of a mean power over that of noise in `count` maps; NaN below twice its standard deviation.
-    pub(crate) fn snr_db(&self, point: usize, power_ratio: f64, count: f64) -> f64 {
-        let snr = power_ratio - 1.0;
-        if snr > 2.0 * self.deviation[point] / count.sqrt() { 10.0 * snr.log10() } else { f64::NAN }
+    /// Density of the peak over what noise exceeds with the rate of the scene; NaN without a test.
+    pub(crate) fn detection_ratio(&self, point: usize, estimate: &GateVelocity) -> f64 {
+        self.threshold.as_ref().map_or(f64::NAN, |threshold| estimate.detection / threshold[point])
     }
+
+    /// Standard deviation of the power of noise in the band over its mean.
+    pub(crate) fn deviation(&self, point: usize) -> f64 {
+        self.deviation[point]
+    }
+}
+
+/// Signal-to-noise ratio, dB, of a mean power over that of noise in `count` maps; NaN below twice its standard deviation, of one
+/// map `deviation`.
+pub(crate) fn snr_db(power_ratio: f64, deviation: f64, count: f64) -> f64 {
+    let snr = power_ratio - 1.0;
+    if snr > 2.0 * deviation / count.sqrt() { 10.0 * snr.log10() } else { f64::NAN }
 }
 
 /// Densities, A^2, that noise exceeds with probability `rate`; NaN where there is no window.

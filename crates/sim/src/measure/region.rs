@@ -52,8 +52,8 @@ fn bound_by_range(
         NoiseKind::None => NoiseKind::White,
         noise => noise,
     };
-    let model = estimators::window_model(scene, noise, pulse)?
-        .ok_or(wakescope_estimate::Error::Empty { field: "noise" })?;
+    let model =
+        estimators::window_model(scene, noise, pulse)?.ok_or(wakescope_estimate::Error::Empty { field: "noise" })?;
     let (layer_m, snr): (Vec<f64>, Vec<f64>) = layer_snr.iter().copied().unzip();
     let all_m = geometry.gate_ranges_m();
     let range_m: Vec<f64> = all_m.iter().copied().step_by(all_m.len().div_ceil(16)).collect();
