@@ -36,6 +36,18 @@ pub enum Covariance {
     Model,
 }
 
+/// Whether vortices move while a scan lasts, each with the velocity that the other one, the images and the wind give it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Movement {
+    /// They move or stand still, whichever fits better: the times of a file need not be those of the air (averaged scans, frozen
+    /// simulations).
+    Auto,
+    /// They move.
+    Moving,
+    /// They stand still.
+    Frozen,
+}
+
 /// Options of [`fit_scan`](crate::retrieval::fit_scan).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RetrievalOptions {
@@ -55,8 +67,8 @@ pub struct RetrievalOptions {
     pub turbulence: Option<Turbulence>,
     /// How the covariance is made.
     pub covariance: Covariance,
-    /// Whether the vortices move while the scan lasts, each with the velocity that the other, the images and the wind give it.
-    pub moves: bool,
+    /// Whether the vortices move while the scan lasts.
+    pub movement: Movement,
     /// Least statistic (see [`ScanResult::statistic`](crate::retrieval::ScanResult::statistic)) of a wake.
     pub threshold: f64,
     /// A wake to start from beside the blind search, such as the prediction of a track.
@@ -85,7 +97,7 @@ impl RetrievalOptions {
 }
 
 impl Default for RetrievalOptions {
-    /// Points, all ten parameters, the loss of Cauchy, the sandwich, moving vortices.
+    /// Points, all ten parameters, the loss of Cauchy, the sandwich, moving vortices if that fits.
     fn default() -> Self {
         Self {
             model: WakeModel::default(),
@@ -96,7 +108,7 @@ impl Default for RetrievalOptions {
             loss: Loss::Cauchy { width: 2.385 },
             turbulence: None,
             covariance: Covariance::Sandwich,
-            moves: true,
+            movement: Movement::Auto,
             threshold: Self::DEFAULT_THRESHOLD,
             start: None,
         }
