@@ -13,6 +13,7 @@
 //! | [`csv`] | any table | - |
 //! | [`csv_input`] | (reader) tables of texts | - |
 //! | [`raw`], [`number`] | (readers) raw signals in NetCDF, NPY, NPZ, tables and binary files | - |
+//! | [`scans`] | (readers) scans of radial velocity: CfRadial, `.hpl`, tables | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
 //! | `text_file`, `netcdf_header`, `netcdf_input`, `planes_input` | (readers) texts, classic NetCDF, cross-planes in it | `netcdf` but for texts |
@@ -55,6 +56,7 @@ pub mod number;
 pub mod own;
 pub mod provenance;
 pub mod raw;
+pub mod scans;
 pub mod signals;
 pub mod site;
 pub mod tables;

@@ -83,6 +83,11 @@ impl ClassicFile {
         self.variable(name).is_some()
     }
 
+    /// Names of all variables.
+    pub(crate) fn names(&self) -> Vec<String> {
+        self.header.variables.iter().map(|variable| variable.name.clone()).collect()
+    }
+
     /// Lengths of the dimensions of a variable, slowest first.
     pub(crate) fn shape(&self, name: &str) -> Option<Vec<u64>> {
         Some(self.variable(name)?.dims.iter().map(|dim| self.header.dims[*dim].1).collect())
