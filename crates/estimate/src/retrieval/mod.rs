@@ -6,6 +6,7 @@
 
 mod correlated_residuals;
 mod expected;
+mod expected_map;
 mod fit;
 mod hypotheses;
 mod motion;
@@ -16,6 +17,7 @@ mod result;
 mod scan_map;
 mod whitening;
 
+pub use expected_map::expected_velocities;
 pub use fit::fit_scan;
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use result::{Flag, Measured, ScanResult, Side, Top, VortexResult};
