@@ -11,6 +11,7 @@ mod hypotheses;
 mod motion;
 mod options;
 mod problem;
+mod radial_velocity;
 mod report;
 mod result;
 mod scan_map;
@@ -18,5 +19,6 @@ mod whitening;
 
 pub use fit::fit_scan;
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
+pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, Measured, ScanResult, Side, Top, VortexResult};
 pub use scan_map::ScanMap;
