@@ -33,12 +33,15 @@ pub fn gate_of(
             let window_m = scan.gate_length_m.map(|length_m| length_m / 12f64.sqrt());
             match (pulse_m, window_m) {
                 (Some(pulse_m), window_m) => Ok((of_std(pulse_m.hypot(window_m.unwrap_or(0.0))), None)),
-                (None, Some(window_m)) => {
-                    Ok((of_std(window_m), Some("the file says nothing of the pulse: --gate-std states the weight of a gate")))
-                }
+                (None, Some(window_m)) => Ok((
+                    of_std(window_m),
+                    Some("the file says nothing of the pulse: --gate-std states the weight of a gate"),
+                )),
                 (None, None) => Ok((
                     Gate::Point,
-                    Some("velocities are taken for those at points: --gate-std states the weight of a gate, or --scene the instrument"),
+                    Some(
+                        "velocities are taken for those at points: --gate-std states the weight of a gate, or --scene the instrument",
+                    ),
                 )),
             }
         }

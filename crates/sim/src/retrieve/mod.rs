@@ -19,9 +19,9 @@ pub use gate::gate_of;
 pub use own::{OwnScene, retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]
 pub use pictures::figure;
-pub use table::rows;
 #[cfg(feature = "sweep")]
 pub use table::json;
+pub use table::rows;
 
 use crate::Error;
 use crate::io::scans::ReadScan;

@@ -16,7 +16,8 @@ use ndarray::{Array2, Axis};
 use num_complex::Complex;
 use wakescope_estimate::retrieval::{Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
 use wakescope_estimate::vortex_fit::{
-    MapFitOptions, Parameter, Sharing, SignalFit, SignalFitOptions, VelocityMap, Wake, fit_map_of_estimator, fit_signals,
+    MapFitOptions, Parameter, Sharing, SignalFit, SignalFitOptions, VelocityMap, Wake, fit_map_of_estimator,
+    fit_signals,
 };
 
 /// A top so much above the least chi-square competes with it.
@@ -125,7 +126,10 @@ fn of_samples<S: FromParts>(
 
 /// The middle of both vortices, m.
 fn middle_m(wake: &Wake) -> (f64, f64) {
-    (0.5 * (wake.left.lateral_position_m + wake.right.lateral_position_m), 0.5 * (wake.left.height_m + wake.right.height_m))
+    (
+        0.5 * (wake.left.lateral_position_m + wake.right.lateral_position_m),
+        0.5 * (wake.left.height_m + wake.right.height_m),
+    )
 }
 
 /// A result with another wake of standing vortices.
@@ -201,7 +205,11 @@ pub fn scan_of_signals(path: &std::path::Path, sweep: usize, plan: &Plan, scan: 
     order.sort_by(|a, b| scan.lines.elevation_rad[*a].total_cmp(&scan.lines.elevation_rad[*b]));
     let mut velocity_m_s = scan.velocity_m_s.select(Axis(0), &order);
     let flagged = scan.flagged.select(Axis(0), &order);
-    velocity_m_s.zip_mut_with(&flagged, |velocity, flagged| if *flagged > 0.5 { *velocity = f64::NAN });
+    velocity_m_s.zip_mut_with(&flagged, |velocity, flagged| {
+        if *flagged > 0.5 {
+            *velocity = f64::NAN
+        }
+    });
     let of = |values: &[f64]| order.iter().map(|line| values[*line]).collect();
     ReadScan {
         path: path.to_owned(),

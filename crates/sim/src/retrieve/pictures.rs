@@ -34,7 +34,10 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         range_m: map.range_m.clone(),
         sweeps: vec![Sweep { tau: f64::NAN, azimuth_rad: 0.0 }],
         pulse: PulseInfo { prt_s: 1.0, pulse_width_s: 0.0, nyquist_velocity_m_s: 0.0, samples: 1, frequency_hz: 1.0 },
-        fields: fields.iter().map(|(name, text, values)| Field::float(name, Unit::MetrePerSecond, text, values.clone())).collect(),
+        fields: fields
+            .iter()
+            .map(|(name, text, values)| Field::float(name, Unit::MetrePerSecond, text, values.clone()))
+            .collect(),
         lidar_y_m: scan.options.model.lidar_lateral_position_m,
         lidar_height_m: scan.options.model.lidar_height_m,
         site: Site::default(),

@@ -21,7 +21,8 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
     let number = |get: &dyn Fn(&ScanResult, Option<&VortexResult>) -> f64| -> Vec<f64> {
         of.iter().map(|(_, scan, vortex)| get(&scan.result, *vortex)).collect()
     };
-    let time = |result: &ScanResult, vortex: Option<&VortexResult>| vortex.map_or(result.reference_time_s, |v| v.time_s);
+    let time =
+        |result: &ScanResult, vortex: Option<&VortexResult>| vortex.map_or(result.reference_time_s, |v| v.time_s);
     let mut table = Table::new()
         .int("scan", of.iter().map(|(number, ..)| *number as i64))
         .text("file", text(&|scan, _| scan.scan.path.file_name().unwrap_or_default().to_string_lossy().into_owned()))

@@ -10,8 +10,8 @@ use crate::plan::Plan;
 use crate::scene::{Flow, VortexPair, VortexProfile};
 use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
-    CoreProfile, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake, WakeModel,
-    fit_map_of_estimator,
+    CoreProfile, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake,
+    WakeModel, fit_map_of_estimator,
 };
 
 /// Circulation fitted to the maps of a case.
