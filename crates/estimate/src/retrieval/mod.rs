@@ -15,6 +15,7 @@ mod radial_velocity;
 mod report;
 mod result;
 mod scan_map;
+mod track;
 mod whitening;
 
 pub use fit::fit_scan;
@@ -22,3 +23,4 @@ pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, Measured, ScanResult, Side, Top, VortexResult};
 pub use scan_map::ScanMap;
+pub use track::{Track, TrackOptions, TrackPoint, TrackedVortex, track};
