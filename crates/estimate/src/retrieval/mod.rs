@@ -5,9 +5,11 @@
 //! | `scan_map`, `options`, `result` | what goes in, how, what comes out |
 
 mod correlated_residuals;
+mod envelope;
 mod expected;
 mod fit;
 mod hypotheses;
+mod integral;
 mod motion;
 mod options;
 mod problem;
@@ -18,7 +20,9 @@ mod scan_map;
 mod track;
 mod whitening;
 
+pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelopes};
 pub use fit::fit_scan;
+pub use integral::{ProfilePoint, circulation_profile};
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, Measured, ScanResult, Side, Top, VortexResult};
