@@ -6,7 +6,7 @@ use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
 use crate::io::{Existing, FileGroup, Provenance};
 use crate::measure::progress::{Observer, Silent};
-use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, record_shape};
+use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape};
 use crate::measure::write;
 use crate::plan::{Plan, Target};
 use crate::retrieve::{self, Method, OwnScene, RetrievedScan, gate_of};
@@ -14,8 +14,10 @@ use crate::scene::{SceneFile, VortexProfile};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use wakescope_estimate::retrieval::{Covariance, Flag, Gate, Movement, RetrievalOptions, Turbulence};
-use wakescope_estimate::vortex_fit::{CoreProfile, Loss, Sharing, WakeModel};
+use wakescope_estimate::retrieval::{
+    Covariance, EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track, Turbulence,
+};
+use wakescope_estimate::vortex_fit::{CoreProfile, Loss, Sharing, Wake, WakeModel};
 
 /// Words of `wakescope retrieve`.
 #[derive(Debug, Args)]
@@ -169,7 +171,23 @@ impl RetrieveWords {
 /// What is retrieved: maps, or signals with the maps of their scans.
 enum Input {
     Map(Box<ReadScan>),
-    Signals { path: PathBuf, records: Box<RawRecords>, plan: Box<Plan>, scans: Vec<MeasuredScan> },
+    Signals(Box<Signals>),
+}
+
+struct Signals {
+    path: PathBuf,
+    records: RawRecords,
+    plan: Plan,
+    scans: Vec<MeasuredScan>,
+    spectra: Option<Spectra>,
+}
+
+/// What was found in all scans.
+#[derive(Default)]
+struct Found {
+    scans: Vec<RetrievedScan>,
+    /// Circulations by envelopes, with the number of their scan.
+    envelopes: Vec<(usize, EnvelopeResult)>,
 }
 
 pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
@@ -179,34 +197,46 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     let mut inputs = Vec::new();
     for path in &words.data {
         if is_signals(path) {
-            inputs.push(signals(path, words, stated.clone())?);
+            inputs.push(Input::Signals(Box::new(signals(path, words, stated.clone())?)));
             continue;
         }
-        if words.method == Method::Signals {
-            let reason = "it is no file of raw signals, which --method signals needs: --method fit takes maps".into();
+        if matches!(words.method, Method::Signals | Method::Envelope) {
+            let reason = "it is no file of raw signals, which this method needs: --method fit takes maps".into();
             return Err(Error::Input { path: path.clone(), reason });
         }
         let (found, left_out) = scans::read(path, &format)?;
         left_out.iter().for_each(|text| told.warn(&format!("{}: {text}: left out", path.display())));
         inputs.extend(found.into_iter().map(|scan| Input::Map(Box::new(scan))));
     }
-    let count: usize =
-        inputs.iter().map(|input| if let Input::Signals { scans, .. } = input { scans.len() } else { 1 }).sum();
+    let scans_of = |input: &Input| if let Input::Signals(signals) = input { signals.scans.len() } else { 1 };
+    let count: usize = inputs.iter().map(scans_of).sum();
     let existing = if words.overwrite { Existing::Any } else { Existing::Own };
     write::prepare(&words.out, names(count).iter().map(String::as_str), existing)?;
-    let mut found = Vec::new();
+    let mut found = Found::default();
     for input in inputs {
         match input {
-            Input::Map(scan) => found.push(of_map(words, stated.as_ref(), *scan, told.as_mut())?),
-            Input::Signals { path, mut records, plan, scans } => {
-                found.extend(of_signals(words, &path, &mut records, &plan, &scans)?);
+            Input::Map(scan) => {
+                let start = prediction(&found.scans, &scan);
+                found.scans.push(of_map(words, stated.as_ref(), *scan, start, told.as_mut())?);
             }
+            Input::Signals(signals) => of_signals(words, *signals, &mut found)?,
         }
     }
-    same_origin(&mut found);
-    let files = files(words, stated.as_ref(), &found, existing)?;
-    let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found), "files": files });
-    say(cli.json, &object, &format!("{}wrote {} files to {}", text(&found), files.len(), words.out.display()))
+    same_origin(&mut found.scans);
+    let track = retrieve::track_of(&found.scans)?;
+    let files = files(words, stated.as_ref(), &found, track.as_ref(), existing)?;
+    let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found.scans), "files": files });
+    say(cli.json, &object, &format!("{}wrote {} files to {}", text(&found.scans), files.len(), words.out.display()))
+}
+
+/// Where the track of the scans so far says that the wake is, to start from beside the blind search.
+fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
+    let last = before.last()?;
+    let times = scan.map.time_s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+    let (reference, of_last) = (scan.reference.zip(last.scan.reference), 0.5 * (times.0 + times.1));
+    let time_s = of_last + reference.map_or(0.0, |(own, of_last)| own.seconds_since(of_last));
+    let core_m = last.result.wake.map_or(2.0, |wake| wake.left.core_radius_m);
+    retrieve::track_of(before).ok().flatten()?.prediction(time_s, core_m)
 }
 
 fn progress_of(cli: &Cli) -> Box<dyn Observer> {
@@ -226,7 +256,7 @@ fn is_signals(path: &Path) -> bool {
 }
 
 /// The map of signals first: it starts the fit.
-fn signals(path: &Path, words: &RetrieveWords, scene: Option<SceneFile>) -> Result<Input, Error> {
+fn signals(path: &Path, words: &RetrieveWords, scene: Option<SceneFile>) -> Result<Signals, Error> {
     let Some(scene) = scene else {
         let reason = "it holds raw signals: --scene says which instrument recorded them".into();
         return Err(Error::Input { path: path.to_owned(), reason });
@@ -235,11 +265,13 @@ fn signals(path: &Path, words: &RetrieveWords, scene: Option<SceneFile>) -> Resu
     let (plan, is_own) = recorded::plan(scene, &records)?;
     let noise = if is_own { NoiseLevel::OfScene } else { NoiseLevel::Quietest };
     // What is known of the air is not looked at: this is a retrieval.
-    let options = RecordedOptions { noise: Some(noise), ..RecordedOptions::default() };
-    let found = recorded::estimate((&plan, false), &mut records, &options, &Silent)?;
-    let scans = if let Recorded::Measured { scans, .. } = found { scans } else { Vec::new() };
-    debug_assert!(words.scene.is_some());
-    Ok(Input::Signals { path: path.to_owned(), records: Box::new(records), plan: Box::new(plan), scans })
+    let spectra = words.method == Method::Envelope;
+    let options = RecordedOptions { noise: Some(noise), spectra, ..RecordedOptions::default() };
+    let (scans, spectra) = match recorded::estimate((&plan, false), &mut records, &options, &Silent)? {
+        Recorded::Measured { scans, spectra } => (scans, spectra),
+        Recorded::OfRun(_) => (Vec::new(), None),
+    };
+    Ok(Signals { path: path.to_owned(), records, plan, scans, spectra })
 }
 
 /// The scene of a map of this program, if it is one.
@@ -251,49 +283,62 @@ fn of_map(
     words: &RetrieveWords,
     stated: Option<&SceneFile>,
     scan: ReadScan,
+    start: Option<Wake>,
     told: &mut dyn Observer,
 ) -> Result<RetrievedScan, Error> {
     let own = scene_of(&scan);
     let scene = stated.or(own.as_ref());
-    let (gate, remark) = gate_of(&scan, words.gate_std, scene.map(|file| &file.scene))?;
+    let (gate, mut remark) = gate_of(&scan, words.gate_std, scene.map(|file| &file.scene))?;
+    if scan.is_own && scene.is_none() {
+        remark = Some(
+            "it is a map of this program that has lost its scene, as some programs drop it: --scene gives the circulations of the \
+             original, which are tens of per cent off without it",
+        );
+    }
     if let Some(remark) = remark {
         told.warn(&format!("{}: {remark}", scan.path.display()));
     }
     // What the estimator of a scene makes of a wake is in its own maps alone.
-    let response = match (own.is_some() && words.gate_std.is_none(), scene) {
+    let response = match (scan.is_own && words.gate_std.is_none(), scene) {
         (true, Some(scene)) => own_scene(&Plan::new(scene.clone(), Target::Map)?)?,
         _ => None,
     };
-    retrieve::retrieve_map(scan, words.method, words.options(scene, gate), response.as_ref())
+    let options = RetrievalOptions { start, ..words.options(scene, gate) };
+    retrieve::retrieve_map(scan, words.method, options, response.as_ref())
 }
 
 fn own_scene(plan: &Plan) -> Result<Option<OwnScene>, Error> {
     OwnScene::new(plan, &Silent)
 }
 
-fn of_signals(
-    words: &RetrieveWords,
-    path: &Path,
-    records: &mut RawRecords,
-    plan: &Plan,
-    scans: &[MeasuredScan],
-) -> Result<Vec<RetrievedScan>, Error> {
-    let own = own_scene(plan)?;
-    let of_scan = |(sweep, measured): (usize, &MeasuredScan)| {
-        let scan = retrieve::scan_of_signals(path, sweep, plan, measured);
+fn of_signals(words: &RetrieveWords, signals: Signals, found: &mut Found) -> Result<(), Error> {
+    let Signals { path, mut records, plan, scans, spectra } = signals;
+    let own = own_scene(&plan)?;
+    let mut first_line = 0;
+    for (sweep, measured) in scans.iter().enumerate() {
+        let scan = retrieve::scan_of_signals(&path, sweep, &plan, measured);
         let (gate, _) = gate_of(&scan, words.gate_std, Some(&plan.scene.scene))?;
-        let map_method = if words.method == Method::Signals { Method::Fit } else { words.method };
-        let found = retrieve::retrieve_map(scan, map_method, words.options(Some(&plan.scene), gate), own.as_ref())?;
-        match &own {
-            Some(own) if words.method == Method::Signals => retrieve::retrieve_signals(own, records, measured, found),
-            None if words.method == Method::Signals => {
-                let reason = "--method signals needs noise and a Gaussian pulse without chirp in the scene".into();
-                Err(Error::Input { path: path.to_owned(), reason })
+        let mut one = retrieve::retrieve_map(scan, words.method, words.options(Some(&plan.scene), gate), own.as_ref())?;
+        let lines = first_line..first_line + measured.lines.elevation_rad.len();
+        first_line = lines.end;
+        match (&own, words.method) {
+            (Some(own), Method::Signals) => one = retrieve::retrieve_signals(own, &mut records, measured, one)?,
+            (Some(own), Method::Envelope) => {
+                if let (Some(spectra), Some(wake)) = (&spectra, one.result.wake) {
+                    let snr = own.snr_of(&wake);
+                    let results = retrieve::envelopes(&plan, spectra, lines, snr, &mut one)?;
+                    found.envelopes.extend(results.into_iter().map(|result| (found.scans.len() + 1, result)));
+                }
             }
-            _ => Ok(found),
+            (None, Method::Signals | Method::Envelope) => {
+                let reason = "this method needs noise and a Gaussian pulse without chirp in the scene".into();
+                return Err(Error::Input { path, reason });
+            }
+            _ => {}
         }
-    };
-    scans.iter().enumerate().map(of_scan).collect()
+        found.scans.push(one);
+    }
+    Ok(())
 }
 
 /// Times of all scans from the date of the first one, where all have a date.
@@ -313,7 +358,9 @@ fn same_origin(scans: &mut [RetrievedScan]) {
 
 /// Names of the files.
 fn names(scans: usize) -> Vec<String> {
-    let mut out = vec!["retrieval.csv".to_owned(), "retrieval.json".to_owned()];
+    let tables =
+        ["retrieval.csv", "retrieval.json", "envelopes.csv", "profiles.csv", "track.csv", "track.svg", "track.png"];
+    let mut out = tables.map(str::to_owned).to_vec();
     if cfg!(feature = "plots") {
         out.extend((1..=scans).flat_map(|number| ["svg", "png"].map(|kind| format!("scan_{number:03}.{kind}"))));
     }
@@ -323,7 +370,8 @@ fn names(scans: usize) -> Vec<String> {
 fn files(
     words: &RetrieveWords,
     scene: Option<&SceneFile>,
-    found: &[RetrievedScan],
+    Found { scans, envelopes }: &Found,
+    track: Option<&Track>,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, Error> {
     let origin = Provenance {
@@ -333,14 +381,32 @@ fn files(
         seed: scene.map_or(0, |scene| scene.scene.seed),
     };
     let mut files = FileGroup::new(&words.out);
-    files.add("retrieval.csv", retrieve::rows(found).to_csv(&origin)?)?;
-    let text = format!("{{\"source\": \"{}\", \"scans\": {:#}}}\n", crate::PROGRAM, retrieve::json(found));
-    files.add("retrieval.json", text)?;
+    files.add("retrieval.csv", retrieve::rows(scans).to_csv(&origin)?)?;
+    files.add(
+        "retrieval.json",
+        format!("{{\"source\": \"{}\", \"scans\": {}}}\n", crate::PROGRAM, retrieve::json(scans)),
+    )?;
+    if words.method == Method::Envelope {
+        files.add("envelopes.csv", retrieve::envelope_table(envelopes).to_csv(&origin)?)?;
+    }
+    if words.method == Method::Integral {
+        files.add("profiles.csv", retrieve::profile_table(scans)?.to_csv(&origin)?)?;
+    }
+    if let Some(track) = track {
+        files.add("track.csv", retrieve::track_table(track).to_csv(&origin)?)?;
+    }
     #[cfg(feature = "plots")]
-    for (number, scan) in found.iter().enumerate() {
-        let figure = retrieve::figure(scan, number + 1)?;
-        files.add(&format!("scan_{:03}.svg", number + 1), figure.svg(&origin)?)?;
-        files.add(&format!("scan_{:03}.png", number + 1), figure.png(&origin)?)?;
+    {
+        let mut add = |name: &str, figure: &crate::plot::Figure| -> Result<(), Error> {
+            files.add(&format!("{name}.svg"), figure.svg(&origin)?)?;
+            Ok(files.add(&format!("{name}.png"), figure.png(&origin)?)?)
+        };
+        for (number, scan) in scans.iter().enumerate() {
+            add(&format!("scan_{:03}", number + 1), &retrieve::figure(scan, number + 1)?)?;
+        }
+        if let Some(track) = track {
+            add("track", &retrieve::track_figure(track, scans))?;
+        }
     }
     write::put(files, &words.out, existing)
 }

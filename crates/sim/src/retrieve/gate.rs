@@ -84,6 +84,7 @@ mod tests {
             gate_length_m: None,
             pulse_width_s: None,
             scene_toml: None,
+            is_own: false,
         };
         let std_m = |scan: &ReadScan, stated| match gate_of(scan, stated, None).unwrap() {
             (Gate::Gaussian { std_m }, told) => (std_m, told.is_some()),

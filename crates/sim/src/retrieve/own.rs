@@ -43,6 +43,12 @@ impl OwnScene {
         Ok(response.map(|response| Self { scene, response, noise_power_a2 }))
     }
 
+    /// Expected signal-to-noise ratio in the band at the middle of a wake, a power ratio.
+    pub fn snr_of(&self, wake: &Wake) -> f64 {
+        let (y_m, z_m) = middle_m(wake);
+        self.response.snr_at(y_m.hypot(z_m - self.scene.scan.lidar_height_m))
+    }
+
     /// The fit to what the estimator of the scene shows, for a map in which `found` has both vortices; nothing where it has not, the
     /// estimator is one of those without such a model, or the fit does not come to an end.
     pub(super) fn refined(&self, map: &ScanMap, options: &RetrievalOptions, found: &ScanResult) -> Option<ScanResult> {
@@ -226,5 +232,6 @@ pub fn scan_of_signals(path: &std::path::Path, sweep: usize, plan: &Plan, scan: 
         gate_length_m: None,
         pulse_width_s: None,
         scene_toml: Some(plan.scene.toml.clone()),
+        is_own: true,
     }
 }

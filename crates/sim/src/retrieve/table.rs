@@ -69,7 +69,7 @@ fn with_std(name: &str) -> String {
     format!("{}_std{unit}", name.strip_suffix(unit).unwrap_or(name))
 }
 
-fn side(side: Side) -> &'static str {
+pub(super) fn side(side: Side) -> &'static str {
     match side {
         Side::Left => "left",
         Side::Right => "right",
