@@ -316,9 +316,7 @@ fn exact_scans_give_the_truth_to_a_thousandth_of_the_bound() {
         case.map.velocity_m_s = case.exact.clone();
         let found = fit_scan(&case.map, &case.options).unwrap();
         let errors = errors_over_bounds(&case, &found);
-        // the velocities that the wake induces are rounded in another way there: 0.002 m/s over some tenths of a second
-        let allowed = if name == "c" { 6e-3 } else { 1e-3 };
-        assert!(errors.iter().all(|e| e.abs() < allowed), "{name}: {errors:?}");
+        assert!(errors.iter().all(|e| e.abs() < 1e-3), "{name}: {errors:?}");
     }
 }
 
