@@ -213,7 +213,7 @@ impl Fits<'_> {
     }
 
     /// Ends of all starts; pairs also start fits of each of their vortices alone.
-    pub(crate) fn from_starts(&self, starts: &[(Kind, Wake)]) -> Vec<End> {
+    pub(crate) fn ends_of(&self, starts: &[(Kind, Wake)]) -> Vec<End> {
         let (mut nears, mut ends): (Vec<(Kind, Wake)>, Vec<End>) = (Vec::new(), Vec::new());
         for (kind, start) in starts {
             let Some(near) = self.near(*kind, start) else { continue };
@@ -256,6 +256,13 @@ pub(crate) fn best(ends: &[End], kind: Kind) -> Option<&End> {
     let circulations = [Parameter::LeftCirculation as usize, Parameter::RightCirculation as usize];
     let turns = |end: &&End| circulations.iter().all(|i| !kind.has(*i) || end.wake.to_array()[*i] > 0.0);
     ends.iter().filter(|end| end.kind == kind).filter(turns).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// The end with the least chi^2 + k ln N.
+pub(crate) fn least(ends: &[End], cells: usize) -> Option<&End> {
+    let cost = |end: &End| end.chi2 + end.groups.len() as f64 * (cells as f64).ln();
+    let bests = [Kind::Left, Kind::Right, Kind::Both].into_iter().filter_map(|kind| best(ends, kind));
+    bests.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
 /// All ends of the kind of the best one that are not the same, the best first, given its covariance.
