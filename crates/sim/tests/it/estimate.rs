@@ -73,7 +73,8 @@ fn every_format_and_order_gives_the_velocities_of_the_run() {
     let one = &all[..all.len() / 3];
     let rows = one.len() / samples;
     let bytes = |at: &dyn Fn(usize) -> f64| (0..one.len()).flat_map(|i| at(i).to_be_bytes()).collect::<Vec<u8>>();
-    let text: Vec<String> = one.chunks(samples).map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",")).collect();
+    let text: Vec<String> =
+        one.chunks(samples).map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",")).collect();
     let npy = {
         let header = format!("{{'descr': '>f8', 'fortran_order': False, 'shape': ({rows}, {samples}), }}\n");
         let length = (header.len() as u16).to_le_bytes();
@@ -83,13 +84,27 @@ fn every_format_and_order_gives_the_velocities_of_the_run() {
     for (name, content, words) in [
         ("a.bin", [b"head".to_vec(), bytes(&|i| one[i])].concat(), "--format f64 --byte-order big --header-bytes 4"),
         // [pulse, line, sample] and [sample, line, pulse] of [line, pulse, sample].
-        ("b.bin", bytes(&|i| one[(i / samples % lines * 2 + i / samples / lines) * samples + i % samples]), "--format f64 --byte-order big --order pulse-major"),
+        (
+            "b.bin",
+            bytes(&|i| one[(i / samples % lines * 2 + i / samples / lines) * samples + i % samples]),
+            "--format f64 --byte-order big --order pulse-major",
+        ),
         ("c.bin", bytes(&|i| one[i % rows * samples + i / rows]), "--format f64 --byte-order big --order sample-major"),
         ("d.csv", text.join("\n").into_bytes(), ""),
         ("e.npy", npy, ""),
     ] {
         fs::write(temp.path().join(name), content).unwrap();
-        let mut all = vec!["estimate", name, "--scene", "s.toml", "--out", name.split('.').next().unwrap(), "--quiet", "--noise", "scene"];
+        let mut all = vec![
+            "estimate",
+            name,
+            "--scene",
+            "s.toml",
+            "--out",
+            name.split('.').next().unwrap(),
+            "--quiet",
+            "--noise",
+            "scene",
+        ];
         all.extend(words.split_whitespace());
         let out = wakescope(temp.path(), &all);
         assert!(out.status.success(), "{name}: {out:?}");
@@ -142,7 +157,8 @@ fn blocks_of_lines_change_no_bit_of_velocities_that_follow_the_wind() {
 fn complex_signals_and_spectra_on_request() {
     let temp = recorded_run("[detector]\nsignal = \"baseband\"\n");
     let estimate = |words: &[&str]| {
-        let out = wakescope(temp.path(), &[&["estimate", "o/signals.nc", "--scene", "s.toml", "--quiet"], words].concat());
+        let out =
+            wakescope(temp.path(), &[&["estimate", "o/signals.nc", "--scene", "s.toml", "--quiet"], words].concat());
         assert!(out.status.success(), "{out:?}");
     };
     estimate(&["--out", "own"]);
@@ -157,7 +173,12 @@ fn complex_signals_and_spectra_on_request() {
     let step_m_s = velocity[1] - velocity[0];
     for (spectrum, found) in density.chunks(velocity.len()).zip(found) {
         let peak = (0..spectrum.len()).max_by(|a, b| spectrum[*a].total_cmp(&spectrum[*b])).unwrap();
-        assert!((velocity[peak] - f64::from_bits(found)).abs() < step_m_s, "{} {}", velocity[peak], f64::from_bits(found));
+        assert!(
+            (velocity[peak] - f64::from_bits(found)).abs() < step_m_s,
+            "{} {}",
+            velocity[peak],
+            f64::from_bits(found)
+        );
     }
 }
 
@@ -177,8 +198,13 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
     fs::write(folder.join("few.bin"), &counts[..2 * samples * 4]).unwrap();
     fs::write(folder.join("nan.csv"), vec![vec!["nan"; samples].join(","); 18].join("\n")).unwrap();
     fs::write(folder.join("ragged.csv"), "1,2,3\n1,2\n").unwrap();
-    fs::write(folder.join("word.csv"), format!("{}\n{}x\n", vec!["1"; samples].join(","), "1,".repeat(samples - 1))).unwrap();
-    fs::write(folder.join("short.npy"), b"\x93NUMPY\x01\x00\x46\x00{'descr': '<f8', 'fortran_order': False, 'shape': (18, 167), }         \n").unwrap();
+    fs::write(folder.join("word.csv"), format!("{}\n{}x\n", vec!["1"; samples].join(","), "1,".repeat(samples - 1)))
+        .unwrap();
+    fs::write(
+        folder.join("short.npy"),
+        b"\x93NUMPY\x01\x00\x46\x00{'descr': '<f8', 'fortran_order': False, 'shape': (18, 167), }         \n",
+    )
+    .unwrap();
     fs::write(folder.join("rays.csv"), "elevation_deg,time_s\n1,0\n2,1\n").unwrap();
     let scene = fs::read_to_string(folder.join("s.toml")).unwrap();
     fs::write(folder.join("fast.toml"), format!("{scene}[detector]\nsampling_hz = 200e6\n")).unwrap();
