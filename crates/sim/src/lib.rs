@@ -29,6 +29,7 @@
 //! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
 //! | [`measure`] | instrument, wind, signals, velocities and their errors; running a plan and writing its results |
+//! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
 //! | `sweep` | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |
@@ -44,6 +45,7 @@ mod keys;
 mod machine;
 pub mod measure;
 pub mod plan;
+pub mod retrieve;
 pub mod scene;
 #[cfg(feature = "sweep")]
 pub mod sweep;

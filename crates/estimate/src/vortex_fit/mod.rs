@@ -30,10 +30,10 @@
 //! To measure again: `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
 //! (signals) or `circulation_from_many_maps` (maps).
 
-mod damped_newton;
-mod map_fit;
+pub(crate) mod damped_newton;
+pub(crate) mod map_fit;
 mod signal_fit;
-mod wake;
+pub(crate) mod wake;
 
 pub use map_fit::data::{Loss, MapFit, MapFitOptions, MapTop, VelocityMap};
 pub use map_fit::estimates::{fit_map_of_estimator, refine_map_fit_of_estimator};

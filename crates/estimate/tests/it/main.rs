@@ -15,6 +15,8 @@ mod likelihood;
 mod models;
 mod periodogram;
 mod quality;
+mod retrieval;
+mod retrieval_methods;
 mod rolling_moment;
 mod sliding;
 mod vortex_fit;

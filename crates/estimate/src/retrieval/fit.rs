@@ -1,0 +1,160 @@
+//! Fit of one scan: the best wake, whether there is one, and what is known of it.
+//!
+//! Wind alone, a left vortex, a right one and both are fitted. Of the last three the one with the least chi^2 + k ln N is taken; it is
+//! a wake if the statistic, the least chi^2 of the wind alone minus its own, reaches the threshold, and so for each vortex.
+//! Check: the reference maps; scatter, bias and stated deviations over many maps.
+
+use crate::error::Error;
+use crate::retrieval::expected::Expected;
+use crate::retrieval::hypotheses::{End, Fits, least, rivals, starts};
+use crate::retrieval::problem::{Cell, Problem};
+use crate::retrieval::report::{OUTLIER, Report};
+use crate::retrieval::whitening::Whitening;
+use crate::retrieval::{Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
+use crate::vortex_fit::map_fit::data::median;
+use crate::vortex_fit::{Loss, Wake};
+
+/// Median of the absolute value of a normal number.
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+/// Most velocities that are whitened.
+const WHITENED: usize = 3000;
+
+/// Finds the vortices of one scan. No wake is a result, not an error.
+///
+/// # Errors
+/// [`Error::Length`], [`Error::OutOfRange`] for impossible input; [`Error::TooFewVelocities`] with less than a hundred;
+/// [`Error::Linalg`] if what is free does not show in the map or velocities are so correlated that they cannot be whitened.
+pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
+    options.validate()?;
+    map.validate()?;
+    let unfolded = unfolded(map);
+    let expected = Expected::rough(&unfolded, options)?;
+    let cells = cells(map);
+    let mut problem =
+        Problem { expected: &expected, cells, whitening: None, loss: options.loss, prior: options.core_prior };
+    let starts = starts(&unfolded, &problem, options)?;
+    let about = starts.first().map_or(Wake::from_array(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]), |s| s.1);
+    if map.sigma_m_s.is_none() {
+        // what the wind leaves, until fits are known
+        let wind = Fits { problem: &problem, options }.wind(&about)?;
+        rescale(&mut problem, &wind);
+    }
+    let mut ends = Fits { problem: &problem, options }.ends_of(&starts);
+    let (mut thinned, mut rejected) = (false, 0);
+    if let Some(turbulence) = &options.turbulence {
+        (rejected, thinned) = whiten(&mut problem, turbulence, least(&ends, map.velocity_m_s.len()))?;
+        ends = Fits { problem: &problem, options }.ends_of(&starts);
+    }
+    let mut scale = 1.0;
+    if let Some(end) = least(&ends, problem.cells.len()) {
+        if map.sigma_m_s.is_none() && problem.whitening.is_none() {
+            rescale(&mut problem, end);
+        } else {
+            scale = residual_scale(&problem, end).max(1.0);
+        }
+        problem.loss = match options.loss {
+            Loss::Cauchy { width } => Loss::Cauchy { width: width * scale },
+            loss => loss,
+        };
+    }
+    let fine = expected.fine(options)?;
+    problem.expected = &fine;
+    let mut ends = Fits { problem: &problem, options }.fine(&rivals(&ends, scale));
+    let frozen = fine.frozen();
+    let likely = least(&ends, problem.cells.len()).filter(|_| options.movement == Movement::Auto && fine.moves());
+    if let Some(likely) = likely {
+        problem.expected = &frozen;
+        let fits = Fits { problem: &problem, options };
+        let still = fits.fine(std::slice::from_ref(likely));
+        if still.first().is_some_and(|still| still.chi2 < likely.chi2) {
+            ends = fits.fine(&ends);
+        } else {
+            problem.expected = &fine;
+        }
+    }
+    let wind = Fits { problem: &problem, options }.wind(&about)?;
+    Report { map, options, problem: &problem, scale, rejected, thinned, wind: &wind, ends: &ends }.result()
+}
+
+/// Makes residuals white: the velocities far off a first fit are taken away, as whitening would spread them over their neighbours, and
+/// some of too many. Tells how many were rejected, and whether there were too many.
+fn whiten(problem: &mut Problem<'_>, turbulence: &Turbulence, first: Option<&End>) -> Result<(usize, bool), Error> {
+    let before = problem.cells.len();
+    reject(problem, turbulence, first);
+    let rejected = before - problem.cells.len();
+    let thinned = thin(problem);
+    let (map, model) = (problem.expected.map, problem.expected.model);
+    let place = |cell: &Cell| (model.position_m(map.range_m[cell.gate], map.elevation_rad[cell.line]), cell.sigma_m_s);
+    let places: Vec<_> = problem.cells.iter().map(place).collect();
+    problem.whitening = Some(Whitening::new(&places, turbulence).ok_or(Error::Linalg {
+        what: "covariance of the velocities",
+        order: places.len(),
+        reason: "is singular to working precision: state larger deviations of the velocities",
+    })?);
+    Ok((rejected, thinned))
+}
+
+/// The velocities that there are.
+pub(crate) fn cells(map: &ScanMap) -> Vec<Cell> {
+    let known = map.velocity_m_s.indexed_iter().filter(|(_, velocity)| velocity.is_finite());
+    known
+        .map(|((line, gate), _)| {
+            let sigma_m_s = map.sigma_m_s.as_ref().map_or(1.0, |sigma| sigma[[line, gate]]);
+            Cell { line, gate, sigma_m_s }
+        })
+        .collect()
+}
+
+/// Velocities that repeat are put about their median.
+pub(crate) fn unfolded(map: &ScanMap) -> ScanMap {
+    let mut unfolded = map.clone();
+    if let Some(fold) = map.fold_m_s {
+        let middle = median(&mut map.velocity_m_s.iter().copied().filter(|v| v.is_finite()).collect::<Vec<f64>>());
+        unfolded.velocity_m_s.mapv_inplace(|v| v - fold * ((v - middle) / fold).round());
+    }
+    unfolded
+}
+
+/// Scale of the residuals over their deviations, from their median.
+fn residual_scale(problem: &Problem<'_>, end: &End) -> f64 {
+    let mut sizes: Vec<f64> = problem.rows(&end.wake, &[]).residuals.iter().map(|r| r.abs()).collect();
+    median(&mut sizes) / NORMAL_MEDIAN
+}
+
+/// Where no deviations are stated, they are those of the residuals; a millionth of a metre per second where the fit is exact.
+pub(crate) fn rescale(problem: &mut Problem<'_>, end: &End) {
+    let scale = residual_scale(problem, end);
+    problem.cells.iter_mut().for_each(|cell| cell.sigma_m_s = (cell.sigma_m_s * scale).max(1e-6));
+}
+
+/// Takes away velocities far off a first fit, which whitening would spread over their neighbours.
+fn reject(problem: &mut Problem<'_>, turbulence: &Turbulence, end: Option<&End>) {
+    let Some(end) = end else { return };
+    let residuals = problem.rows(&end.wake, &[]).residuals;
+    let mut residuals = residuals.iter();
+    problem.cells.retain(|cell| {
+        let deviation_m_s = cell.sigma_m_s.hypot(turbulence.deviation_m_s);
+        residuals.next().is_none_or(|r| r.abs() * cell.sigma_m_s <= OUTLIER * deviation_m_s)
+    });
+}
+
+/// Leaves lines and gates out until there are not more velocities than can be whitened.
+fn thin(problem: &mut Problem<'_>) -> bool {
+    let map = problem.expected.map;
+    let view = map.view();
+    let gate_m = view.gate_spacing_m();
+    let (mut lines, mut gates, mut thinned) = (1, 1, false);
+    let count = |cells: &[Cell], lines: usize, gates: usize| {
+        cells.iter().filter(|cell| cell.line % lines == 0 && cell.gate % gates == 0).count()
+    };
+    while count(&problem.cells, lines, gates) > WHITENED {
+        if lines as f64 * view.line_spacing_m() < gates as f64 * gate_m {
+            lines += 1
+        } else {
+            gates += 1
+        }
+        thinned = true;
+    }
+    problem.cells.retain(|cell| cell.line % lines == 0 && cell.gate % gates == 0);
+    thinned
+}
