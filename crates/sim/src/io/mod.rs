@@ -12,6 +12,7 @@
 //! | [`own`] | which files this program wrote, so that no other is replaced | - |
 //! | [`csv`] | any table | - |
 //! | [`csv_input`] | (reader) tables of texts | - |
+//! | [`scan_list`] | (reader) lines of sight of a scan | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
 //! | `text_file`, `netcdf_header`, `netcdf_input`, `planes_input` | (readers) texts, classic NetCDF, cross-planes in it | `netcdf` but for texts |
@@ -50,6 +51,7 @@ pub mod map;
 pub(crate) mod netcdf;
 pub mod own;
 pub mod provenance;
+pub mod scan_list;
 pub mod signals;
 pub mod site;
 pub mod tables;

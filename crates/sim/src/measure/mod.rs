@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`instrument`], [`estimators`] | a scene in the words of the other crates, made once for a plan |
 //! | [`wind`] | the wind: analytic, or the planes of a simulated flow |
-//! | [`geometry`] | lines of sight, samples, gates, layers |
+//! | [`geometry`], `scan_lines` | lines of sight, samples, gates, layers |
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | `efficiencies` | efficiency curves that several scans share |
 //! | [`scan`] | air along the lines of sight, and their records |
@@ -28,6 +28,7 @@ pub mod progress;
 pub(crate) mod region;
 pub mod run;
 pub mod scan;
+pub(crate) mod scan_lines;
 pub mod streams;
 pub mod wind;
 pub mod write;

@@ -26,6 +26,7 @@ impl Scene {
         self.check_receiver(&mut c);
         self.check_flow(&mut c);
         self.check_scan(&mut c);
+        self.check_pattern(&mut c);
         check_estimator(self, &mut c);
         self.check_outputs(&mut c);
         self.check_site(&mut c);

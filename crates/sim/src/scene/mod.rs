@@ -24,12 +24,14 @@ mod between;
 mod check;
 mod check_estimator;
 mod check_outputs;
+mod check_pattern;
 mod check_receiver;
 mod estimator;
 mod flow;
 mod format1;
 mod idle;
 mod instrument;
+mod pattern;
 mod presets;
 mod read;
 mod receiver;
@@ -47,6 +49,9 @@ pub use flow::{Flow, Outside, SimulatedFlow, SimulatedMotion, VortexMotion, Vort
 pub use instrument::{
     BeamRadiusDefinition, Detector, DetectorSignal, Digitiser, GaussianShape, Laser, NoiseKind, Pulse, PulseDefinition,
     PulseResampling, PulseShape, ReceiverPath, SampledShape, SnrReference, Telescope,
+};
+pub use pattern::{
+    Axial, Dbs, HeadMotion, HeadMotionKeys, LidarPlace, Pattern, Ppi, Stare, SweepDirection, Towards, Vad, WindOfPulses,
 };
 pub use presets::{preset_names, preset_toml};
 pub use read::SceneFile;
@@ -95,7 +100,7 @@ section! {
 }
 
 section! {
-    /// Where the lidar looks: a vertical scan (RHI) across the runway.
+    /// Where the lidar looks: a vertical scan (RHI) across the runway, if no other pattern is stated.
     Scan {
         /// Height of the telescope above the ground, m.
         lidar_height_m: f64 = 0.0,
@@ -122,6 +127,18 @@ section! {
         below_ground: Outside = Outside::Error {},
         /// What lines that leave a simulated flow meet.
         outside_flow: Outside = Outside::Error {},
+        /// Which way the lidar looks, line after line.
+        #[serde(skip_serializing_if = "Pattern::is_default")]
+        pattern: Pattern = Pattern::default(),
+        /// How the lines follow each other.
+        #[serde(skip_serializing_if = "pattern::is_default")]
+        head: HeadMotionKeys = HeadMotionKeys::default(),
+        /// Where the lidar is.
+        #[serde(skip_serializing_if = "pattern::is_default")]
+        lidar: LidarPlace = LidarPlace::default(),
+        /// How many airs the pulses of a line meet.
+        #[serde(skip_serializing_if = "pattern::is_default")]
+        wind_of_pulses: WindOfPulses = WindOfPulses::default(),
     }
 }
 
