@@ -1,9 +1,10 @@
-//! A scanned map as CfRadial 1.4 in classic NetCDF: rays along `time`, gates along `range`, sweeps of mode `rhi`.
+//! A scanned map as CfRadial 1.4 in classic NetCDF: rays along `time`, gates along `range`, sweeps of one mode.
 //! Opens in Py-ART (`pyart.io.read_cfradial`), xradar (`open_cfradial1_datatree(f, first_dim="time")`), wradlib, xarray, scipy.
 //! Ray times count from the start of the flow, whose date is that of the map's site: a synthetic one where none was given.
 //! Check: the tests read the bytes back with an independent reader and hold them to the list that the clients need.
 
 use super::error::{OutputError, OutputResult};
+use crate::beams::SweepMode;
 use super::map::{Field, FieldKind, Unit, VelocityMap};
 use super::netcdf::{Attr, Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
@@ -70,7 +71,7 @@ fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, Str
             "Simulated measurement: date, latitude and longitude are those of the scene, or synthetic; velocity is positive away from the lidar",
         ),
         ("instrument_name", "wakescope lidar"),
-        ("scan_name", "rhi"),
+        ("scan_name", map.sweeps.first().map_or("rhi", |sweep| sweep.mode.name())),
         ("platform_is_mobile", "false"),
         ("n_gates_vary", "false"),
         ("ray_times_increase", "true"),
@@ -139,12 +140,18 @@ fn sweeps(map: &VelocityMap) -> Vec<Variable> {
     let bounds = map.sweep_bounds();
     let ints = |values: &mut dyn Iterator<Item = usize>| Data::I32(values.map(|v| v as i32).collect());
     let floats = |get: fn(&super::map::Sweep) -> f64| Data::F32(map.sweeps.iter().map(|s| get(s) as f32).collect());
+    let is_rhi = map.sweeps.iter().all(|sweep| sweep.mode == SweepMode::Rhi);
+    let fixed = floats(|s| {
+        let angle_rad = if s.mode == SweepMode::Rhi { turn(s.fixed_angle_rad) } else { s.fixed_angle_rad };
+        angle_rad.to_degrees()
+    });
+    let fixed_name = if is_rhi { "azimuth of the scan plane" } else { "angle that stays during the sweep" };
     vec![
         Variable::new("volume_number", &[], Data::I32(vec![0])).text("long_name", "volume number"),
         Variable::new("sweep_number", &["sweep"], ints(&mut (0..bounds.len())))
             .text("long_name", "sweep number, from 0"),
-        Variable::new("fixed_angle", &["sweep"], floats(|s| turn(s.azimuth_rad).to_degrees()))
-            .text("long_name", "azimuth of the scan plane")
+        Variable::new("fixed_angle", &["sweep"], fixed)
+            .text("long_name", fixed_name)
             .text("units", "degrees"),
         Variable::new("sweep_start_ray_index", &["sweep"], ints(&mut bounds.iter().map(|b| b.0)))
             .text("long_name", "index of the first ray of the sweep"),
@@ -170,7 +177,7 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
         one("platform_type", "fixed"),
         one("instrument_type", "lidar"),
         one("primary_axis", "axis_z"),
-        each("sweep_mode", "rhi"),
+        Variable::new("sweep_mode", EACH, Data::Char(map.sweeps.iter().flat_map(|s| padded(s.mode.name())).collect())),
         each("follow_mode", "none"),
         each("prt_mode", "fixed"),
     ]

@@ -4,7 +4,9 @@
 
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use super::site::Site;
+use crate::beams::{Direction, SweepMode};
 use ndarray::{Array2, Array3};
+use std::f64::consts::FRAC_PI_2;
 use wakescope_les::winds::{Edges, Side};
 
 /// Unit of a field: its tag in a CSV column name and its text in NetCDF (UDUNITS).
@@ -146,17 +148,26 @@ pub struct Ray {
     pub time_s: f64,
     /// Elevation above the horizontal, rad.
     pub elevation_rad: f64,
-    /// Azimuth of the scan plane, clockwise from north, rad.
+    /// Azimuth, clockwise from north, rad.
     pub azimuth_rad: f64,
 }
 
-/// One sweep in elevation (RHI) at one age of the wake.
+/// One sweep at one age of the wake.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sweep {
     /// Age of the wake, dimensionless (t Gamma0 / (2 pi b0^2)).
     pub tau: f64,
-    /// Azimuth of the scan plane, rad.
-    pub azimuth_rad: f64,
+    /// The angle that stays: azimuth of an RHI, else elevation, rad.
+    pub fixed_angle_rad: f64,
+    /// Its kind.
+    pub mode: SweepMode,
+}
+
+impl Sweep {
+    /// A sweep of elevation at one azimuth.
+    pub fn rhi(tau: f64, azimuth_rad: f64) -> Self {
+        Self { tau, fixed_angle_rad: azimuth_rad, mode: SweepMode::Rhi }
+    }
 }
 
 /// Pulse and acquisition, the same for all rays.
@@ -193,14 +204,28 @@ pub struct VelocityMap {
     pub lidar_y_m: f64,
     /// Height of the telescope above the ground, m.
     pub lidar_height_m: f64,
+    /// Where the lidar is along the flight, m, and the azimuth of +x, rad; absent where all rays are in one plane across the flight.
+    pub flight: Option<(f64, f64)>,
     /// Place and date.
     pub site: Site,
 }
 
 impl VelocityMap {
-    /// Horizontal position of a gate in the frame of the flow, m.
+    /// Horizontal position of a gate across the flight, m.
     pub fn y_m(&self, ray: usize, gate: usize) -> f64 {
-        self.lidar_y_m + self.range_m[gate] * self.rays[ray].elevation_rad.cos()
+        self.lidar_y_m + self.range_m[gate] * self.direction(ray)[1]
+    }
+
+    /// Position of a gate along the flight, m.
+    pub fn x_m(&self, ray: usize, gate: usize) -> f64 {
+        self.flight.map_or(0.0, |(x_m, _)| x_m) + self.range_m[gate] * self.direction(ray)[0]
+    }
+
+    /// Direction of a ray in the axes of the flow.
+    fn direction(&self, ray: usize) -> [f64; 3] {
+        let Ray { azimuth_rad, elevation_rad, .. } = self.rays[ray];
+        let from_x_rad = self.flight.map_or(FRAC_PI_2, |(_, x_rad)| azimuth_rad - x_rad);
+        Direction::new(from_x_rad, elevation_rad).0
     }
 
     /// Height of a gate above the ground, m.

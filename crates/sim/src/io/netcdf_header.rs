@@ -92,6 +92,8 @@ pub(crate) struct Header {
     /// Names and lengths of the dimensions.
     pub(crate) dims: Vec<(String, u64)>,
     pub(crate) variables: Vec<Variable>,
+    /// Attributes of the whole file.
+    pub(crate) attributes: Vec<(String, Attribute)>,
     /// Bytes from one record to the next.
     pub(crate) record_bytes: u64,
 }
@@ -127,7 +129,7 @@ pub(crate) fn read(beginning: &[u8], length: u64) -> Result<Header, Refused> {
     for _ in 0..words.list(0x0A)? {
         header.dims.push((words.name()?, words.count()?));
     }
-    words.attributes()?;
+    header.attributes = words.attributes()?;
     for _ in 0..words.list(0x0B)? {
         header.variables.push(words.variable(&header.dims)?);
     }
@@ -137,7 +139,7 @@ pub(crate) fn read(beginning: &[u8], length: u64) -> Result<Header, Refused> {
 
 /// Finds lengths and places of all values and holds them against the length of the file.
 fn lay_out(header: &mut Header, records: Option<u64>, length: u64) -> Result<(), Refused> {
-    let Header { dims, variables, record_bytes } = header;
+    let Header { dims, variables, record_bytes, .. } = header;
     let grows = |v: &Variable| v.dims.first().is_some_and(|dim| dims[*dim].1 == 0);
     let growing: Vec<bool> = variables.iter().map(grows).collect();
     for (variable, grows) in variables.iter_mut().zip(&growing) {

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::measure::estimators::{self, Toolkit, WindowStatistics};
 use crate::measure::progress::Observer;
-use crate::measure::region::{interpolated, region_radius};
+use crate::measure::region::{interpolated, places, region_radius};
 use crate::measure::scan::{Scanner, radial_velocity_m_s};
 use crate::plan::{Plan, Stage};
 use ndarray::{Array2, ArrayView1, ArrayView2};
@@ -30,6 +30,8 @@ pub struct VelocityEstimates {
     pub v_pulse_m_s: Array2<f64>,
     /// The same weighted with pulse and window.
     pub v_gate_m_s: Array2<f64>,
+    /// Standard deviation of `v_pulse_m_s` over the pulses of a line, m/s, where they have airs of their own: it widens spectra.
+    pub v_spread_m_s: Option<Array2<f64>>,
     /// Estimate of the first realisation, m/s; NaN where there is no true velocity, as in the mean.
     pub v_scan_m_s: Array2<f64>,
     /// Mean estimate over the realisations, m/s.
@@ -168,6 +170,7 @@ impl<'a> NoiseLevels<'a> {
 }
 
 struct Truth {
+    spread_m_s: Option<Array2<f64>>,
     exact_m_s: Array2<f64>,
     pulse_m_s: Array2<f64>,
     gate_m_s: Array2<f64>,
@@ -178,17 +181,15 @@ impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
-        let pulses = scene.scan.pulses_per_line;
         let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
-        let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
+        let places = places(scene, g)?;
         let radius = region_radius(scene, scanner, &places, &correlation)?;
-        let middle = PolarPoint {
-            range_m: g.gate_range_m[g.gate_range_m.len() / 2],
-            elevation_rad: g.elevation_rad[g.elevation_rad.len() / 2],
-        };
+        let lines = places.line_elevation_rad();
+        let middle =
+            PolarPoint { range_m: g.gate_range_m[g.gate_range_m.len() / 2], elevation_rad: lines[lines.len() / 2] };
         let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
         let known = WindowStatistics { snr: scanner.mean_snr(), n_eff };
-        let points = polar_points(&g.elevation_rad, &g.gate_range_m);
+        let points = polar_points(lines, &g.gate_range_m);
         let tools = Toolkit::new(scene, &plan.instrument, &known)?;
         let noise = match (&tools.test, &tools.noise) {
             (Some(test), Some(noise)) => Some(NoiseLevels::new(test, noise, &places, &points, &radius)?),
@@ -287,6 +288,7 @@ impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
             v_exact_m_s: self.truth.exact_m_s,
             v_pulse_m_s: self.truth.pulse_m_s,
             v_gate_m_s: self.truth.gate_m_s,
+            v_spread_m_s: self.truth.spread_m_s,
             level: self.level,
             n_eff: self.n_eff,
             flagged: self.figures.flagged / self.realisations.max(1) as f64,
@@ -302,8 +304,9 @@ impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
 fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let shape = (g.elevation_rad.len(), g.gate_range_m.len());
-    let mut truth =
-        Truth { exact_m_s: Array2::zeros(shape), pulse_m_s: Array2::zeros(shape), gate_m_s: Array2::zeros(shape) };
+    let zeros = || Array2::zeros(shape);
+    let spread_m_s = scanner.spread_m_s().cloned();
+    let mut truth = Truth { spread_m_s, exact_m_s: zeros(), pulse_m_s: zeros(), gate_m_s: zeros() };
     let pulse = &plan.instrument.pulse;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;

@@ -14,7 +14,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 ///
 /// # Errors
 /// A list that cannot be read or followed; beams that meet the ground where the scene does not allow it.
-pub fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
+pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
     let scene = &file.scene;
     let (s, head) = (&scene.scan, &scene.scan.head);
     let pace = Pace {

@@ -181,19 +181,22 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let pulses = scene.scan.pulses_per_line;
+    let all = || (0..g.schedule.pulses()).map(|pulse| (g.schedule.line_of(pulse), pulse));
+    let beam = |(line, pulse): (usize, usize)| g.schedule.beam_of_pulse(line, pulse - g.schedule.lines[line].first);
+    let is_plane = g.schedule.is_plane();
     let first_s = 2.0 * g.first_range_m / crate::SPEED_OF_LIGHT_M_S;
     let first_pulse_s = plan.wind.start_s;
-    let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
     Some(RawSignals {
         recording: recording(plan),
         truth: LineVelocities {
             range_m: g.layer_range_m().collect(),
             radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
         },
-        pulse_time_s: (0..g.elevation_rad.len() * pulses).map(|i| first_pulse_s + i as f64 * prt_s).collect(),
+        pulse_time_s: all().map(|at| first_pulse_s + beam(at).time_s).collect(),
         current_a: result.signals_a.as_ref()?.view(),
         quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),
-        elevation_rad: g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect(),
+        elevation_rad: all().map(|at| beam(at).elevation_rad).collect(),
+        azimuth_rad: if is_plane { Vec::new() } else { all().map(|at| beam(at).azimuth_rad).collect() },
         time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
         pulses_per_line: pulses,
     })

@@ -63,7 +63,7 @@ impl Plan {
     /// As [`Plan::new`].
     pub(crate) fn with_wind(scene: SceneFile, target: Target, wind: Arc<SceneWind>) -> Result<Self, Error> {
         let instrument = Instrument::new(&scene.scene)?;
-        let geometry = Geometry::new(&scene.scene, &instrument.pulse, &wind)?;
+        let geometry = Geometry::new(&scene, &instrument.pulse, &wind)?;
         let last_s = end_s(&wind, &geometry);
         if last_s > wind.end_s {
             let reason = format!(

@@ -23,6 +23,7 @@ mod atmosphere;
 mod between;
 mod check;
 mod check_estimator;
+mod check_flow;
 mod check_outputs;
 mod check_pattern;
 mod check_receiver;
@@ -45,7 +46,10 @@ pub use estimator::{
     CorrelogramForm, Estimator, FirstMoment, GradientLikelihood, LagWindow, Likelihood, Method, ModelOrder,
     OrderChoice, Refinement, RegionRadius, Weighting,
 };
-pub use flow::{Flow, Outside, SimulatedFlow, SimulatedMotion, VortexMotion, VortexPair, VortexProfile};
+pub use flow::{
+    Aircraft, FieldFlow, FieldGround, Flow, LinearWind, Outside, SimulatedFlow, SimulatedMotion, VortexLines, VortexMotion,
+    VortexPair, VortexProfile,
+};
 pub use instrument::{
     BeamRadiusDefinition, Detector, DetectorSignal, Digitiser, GaussianShape, Laser, NoiseKind, Pulse, PulseDefinition,
     PulseResampling, PulseShape, ReceiverPath, SampledShape, SnrReference, Telescope,
@@ -88,6 +92,9 @@ section! {
         atmosphere: Atmosphere = Atmosphere::default(),
         /// The wind that the lidar sees.
         flow: Flow = Flow::default(),
+        /// Further winds that are added to it.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        added_flows: Vec<Flow> = Vec::new(),
         /// Where the lidar looks.
         scan: Scan = Scan::default(),
         /// From signals to velocities.
@@ -298,7 +305,7 @@ mod tests {
     fn scene_survives_a_round_trip() {
         let mut scene = Scene::default();
         scene.detector.snr = SnrReference::Fixed { snr_db: 0.1 + 0.2 };
-        scene.flow = Flow::Uniform { lateral_m_s: 1.0 / 3.0, vertical_m_s: -0.0 };
+        scene.flow = Flow::Uniform { lateral_m_s: 1.0 / 3.0, vertical_m_s: -0.0, along_m_s: 0.0 };
         let back: Scene = toml::from_str(&scene.to_toml()).unwrap();
         assert_eq!(back, scene);
     }

@@ -3,11 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 /// Which way the lidar looks, line after line.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Pattern {
     /// Upwards in one vertical plane, by the elevations of `[scan]`.
-    #[default]
     Rhi {},
     /// Round at one elevation or several.
     Ppi(Ppi),
@@ -24,6 +23,12 @@ pub enum Pattern {
         /// The file, relative to the folder of the scene: CSV, or lines of HALO's step-stare scans.
         file: String,
     },
+}
+
+impl Default for Pattern {
+    fn default() -> Self {
+        Self::Rhi {}
+    }
 }
 
 impl Pattern {
@@ -176,11 +181,10 @@ section! {
 }
 
 /// How many airs the pulses of a line meet.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum WindOfPulses {
     /// One: that of the middle of the line.
-    #[default]
     Line {},
     /// Each its own.
     Pulse {},
@@ -189,6 +193,12 @@ pub enum WindOfPulses {
         /// How many.
         groups: usize,
     },
+}
+
+impl Default for WindOfPulses {
+    fn default() -> Self {
+        Self::Line {}
+    }
 }
 
 impl WindOfPulses {
