@@ -55,6 +55,8 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         lidar_y_m: -400.0,
         lidar_height_m: 2.0,
         flight: None,
+        ray_pulses: None,
+        places_m: None,
         site: Site::default(),
     };
     let exact = Array2::from_shape_fn((map.rays.len(), gates), |(r, g)| {

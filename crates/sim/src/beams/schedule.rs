@@ -287,7 +287,8 @@ impl Schedule {
     /// Whether all is one RHI upwards of equal lines that stand still: the scan that regions in a plane are for.
     pub fn is_plane(&self) -> bool {
         let pulses = self.lines.first().map_or(0, |line| line.pulses);
-        let alike = |line: &Line| line.pulses == pulses && line.velocity_m_s == [0.0; 3];
+        let here_m = self.mount.position_m;
+        let alike = |line: &Line| line.pulses == pulses && line.velocity_m_s == [0.0; 3] && line.position_m == here_m;
         let rises = |pair: &[Line]| pair[1].angles_rad[1] > pair[0].angles_rad[1];
         matches!(self.sweeps[..], [(SweepMode::Rhi, _)])
             && self.lines.iter().all(alike)

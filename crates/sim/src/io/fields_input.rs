@@ -50,7 +50,9 @@ fn times(file: &mut ClassicFile, name: &str) -> Result<Vec<(Option<usize>, f64)>
         return Err(format!("{name}: time must be its first dimension"));
     }
     let source = [dim.as_str(), "XTIME", "time"].into_iter().find(|n| file.has(n)).map(str::to_owned);
-    let Some(source) = source else { return Err("it has no times: a variable of the name of its time dimension is needed".into()) };
+    let Some(source) = source else {
+        return Err("it has no times: a variable of the name of its time dimension is needed".into());
+    };
     Ok(seconds(file, &source)?.into_iter().enumerate().map(|(i, t)| (Some(i), t)).collect())
 }
 
@@ -129,7 +131,8 @@ fn levels(file: &mut ClassicFile, staggered: bool, place: Option<usize>) -> Resu
     let height_m: Vec<f64> = disturbed.iter().zip(&base).map(|(a, b)| (a + b) / WRF_GRAVITY_M_S2).collect();
     let columns = height_m.len() / count;
     let mean_m: Vec<f64> = height_m.chunks_exact(columns).map(|l| l.iter().sum::<f64>() / columns as f64).collect();
-    let uneven_m = height_m.chunks_exact(columns).zip(&mean_m).flat_map(|(l, mean)| l.iter().map(move |h| (h - mean).abs()));
+    let uneven_m =
+        height_m.chunks_exact(columns).zip(&mean_m).flat_map(|(l, mean)| l.iter().map(move |h| (h - mean).abs()));
     let uneven_m = uneven_m.fold(0.0, f64::max);
     let (ground_m, top_m) = (mean_m[0], mean_m[count - 1]);
     if uneven_m > LEVEL * (top_m - ground_m) {

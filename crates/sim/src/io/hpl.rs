@@ -147,9 +147,9 @@ fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize
 
 /// The word of the instrument for a sweep, by its rays.
 fn scan_type(map: &VelocityMap, (first, last): (usize, usize)) -> &'static str {
-    let still = map.rays[first..=last].windows(2).all(|pair| {
-        pair[0].azimuth_rad == pair[1].azimuth_rad && pair[0].elevation_rad == pair[1].elevation_rad
-    });
+    let still = map.rays[first..=last]
+        .windows(2)
+        .all(|pair| pair[0].azimuth_rad == pair[1].azimuth_rad && pair[0].elevation_rad == pair[1].elevation_rad);
     match map.sweeps[map.rays[first].sweep].mode {
         SweepMode::Rhi => "RHI",
         SweepMode::AzimuthSurveillance | SweepMode::Sector => "VAD - stepped",

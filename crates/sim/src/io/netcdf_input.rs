@@ -33,17 +33,24 @@ pub(crate) const TIME: Role = Role { name: "time", axis: "T", others: &["tau", "
 pub(crate) const X: Role =
     Role { name: "x", axis: "X", others: &["x_face", "xc", "xf", "xu", "west_east", "west_east_stag"] };
 /// Across the flight.
-pub(crate) const Y: Role = Role {
-    name: "y",
-    axis: "Y",
-    others: &["y_face", "yc", "yf", "yv", "lateral", "south_north", "south_north_stag"],
-};
+pub(crate) const Y: Role =
+    Role { name: "y", axis: "Y", others: &["y_face", "yc", "yf", "yv", "lateral", "south_north", "south_north_stag"] };
 /// Up.
 pub(crate) const Z: Role = Role {
     name: "z",
     axis: "Z",
     others: &[
-        "z_face", "zc", "zf", "zw", "height", "altitude", "zu", "zu_3d", "zw_3d", "bottom_top", "bottom_top_stag",
+        "z_face",
+        "zc",
+        "zf",
+        "zw",
+        "height",
+        "altitude",
+        "zu",
+        "zu_3d",
+        "zw_3d",
+        "bottom_top",
+        "bottom_top_stag",
     ],
 };
 

@@ -85,6 +85,8 @@ pub(crate) fn map() -> VelocityMap {
         lidar_y_m: -150.0,
         lidar_height_m: 2.0,
         flight: None,
+        ray_pulses: None,
+        places_m: None,
         site: Site::default(),
     }
 }

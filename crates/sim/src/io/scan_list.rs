@@ -17,8 +17,20 @@ const MOST_ROWS: usize = 100_000;
 
 /// All columns that a list may have.
 const COLUMNS: [&str; 14] = [
-    "time_s", "azimuth_rad", "azimuth_deg", "elevation_rad", "elevation_deg", "pulses", "sweep", "mode", "x_m", "y_m", "z_m",
-    "u_m_s", "v_m_s", "w_m_s",
+    "time_s",
+    "azimuth_rad",
+    "azimuth_deg",
+    "elevation_rad",
+    "elevation_deg",
+    "pulses",
+    "sweep",
+    "mode",
+    "x_m",
+    "y_m",
+    "z_m",
+    "u_m_s",
+    "v_m_s",
+    "w_m_s",
 ];
 
 /// Reads a list.
@@ -64,7 +76,8 @@ fn stop(angles_rad: [f64; 2]) -> Stop {
 fn step_stare(line: &str) -> Option<[f64; 2]> {
     let (azimuth, elevation) = (line.get(..7)?, line.get(7..14).filter(|_| line.len() == 14)?);
     let angle = |text: &str| {
-        let digits = text.bytes().enumerate().all(|(i, b)| b.is_ascii_digit() || (i == 3 && b == b'.') || (i == 0 && b == b'-'));
+        let digits =
+            text.bytes().enumerate().all(|(i, b)| b.is_ascii_digit() || (i == 3 && b == b'.') || (i == 0 && b == b'-'));
         text.parse::<f64>().ok().filter(|_| digits).map(f64::to_radians)
     };
     Some([angle(azimuth)?, angle(elevation)?])

@@ -8,12 +8,14 @@
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | `efficiencies` | efficiency curves that several scans share |
 //! | [`scan`] | air along the lines of sight, and their records |
+//! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
 //! | [`map`], [`cell_average`] | estimates and their errors against the truth |
 //! | [`mod@bound`] | the Cramer-Rao bound for a scene |
 //! | [`budget`] | the power budget, from the pulse to the signal-to-noise ratio |
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
 //! | [`progress`], [`streams`] | who watches a run; one random stream for each pulse |
 
+pub mod beam_winds;
 pub mod bound;
 pub mod budget;
 pub mod cell_average;

@@ -68,11 +68,16 @@ impl<'a> Scanner<'a> {
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
         let airs = LineAirs::new(plan)?;
         let all: Vec<usize> = (0..geometry.schedule.lines.len()).collect();
-        let lines = in_time_order(plan, &all, |line| geometry.line_time_s[*line], |&line| {
-            let air = airs.of_line(line)?;
-            observer.advance(1);
-            Ok(air)
-        })?;
+        let lines = in_time_order(
+            plan,
+            &all,
+            |line| geometry.line_time_s[*line],
+            |&line| {
+                let air = airs.of_line(line)?;
+                observer.advance(1);
+                Ok(air)
+            },
+        )?;
         let (velocities, spreads): (Vec<_>, Vec<_>) = lines.into_iter().unzip();
         let of_velocity = |radial_velocity_m_s| LineOfSight {
             first_range_m: geometry.first_layer_range_m,
@@ -239,10 +244,19 @@ impl<'a> Scanner<'a> {
             })
             .collect();
         let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
-        let beams: Vec<(usize, Beam)> = wanted.iter().map(|&(line, air)| (line, beam_of_air(self.plan, line, air))).collect();
-        let airs = in_time_order(self.plan, &beams, |(_, beam)| beam.time_s, |(line, beam)| {
-            Ok(LineOfSight { radial_velocity_m_s: velocity_along(self.plan, beam, &ranges_m)?, ..self.lines[*line].clone() })
-        })?;
+        let beams: Vec<(usize, Beam)> =
+            wanted.iter().map(|&(line, air)| (line, beam_of_air(self.plan, line, air))).collect();
+        let airs = in_time_order(
+            self.plan,
+            &beams,
+            |(_, beam)| beam.time_s,
+            |(line, beam)| {
+                Ok(LineOfSight {
+                    radial_velocity_m_s: velocity_along(self.plan, beam, &ranges_m)?,
+                    ..self.lines[*line].clone()
+                })
+            },
+        )?;
         Ok((airs, air_of))
     }
 }
@@ -308,7 +322,10 @@ impl<'a> LineAirs<'a> {
             }
         }
         mean_m_s.iter_mut().zip(&first_m_s).for_each(|(mean, first)| *mean += first);
-        Ok((mean_m_s, Some(sums.into_iter().map(|(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt()).collect())))
+        Ok((
+            mean_m_s,
+            Some(sums.into_iter().map(|(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt()).collect()),
+        ))
     }
 }
 

@@ -63,13 +63,9 @@ fn sweeps(scene: &Scene) -> Vec<SweepPath> {
     let moving = s.head.motion == HeadMotion::Continuous;
     let rows = || path::steps(s.elevation_min_rad, s.elevation_max_rad, s.elevation_step_rad);
     let once = match &s.pattern {
-        Pattern::Rhi {} => vec![path::rhi(
-            s.azimuth_rad,
-            s.elevation_min_rad,
-            s.elevation_max_rad,
-            s.elevation_step_rad,
-            moving,
-        )],
+        Pattern::Rhi {} => {
+            vec![path::rhi(s.azimuth_rad, s.elevation_min_rad, s.elevation_max_rad, s.elevation_step_rad, moving)]
+        }
         Pattern::Ppi(p) => {
             let row = |el: &f64| path::ppi(*el, p.azimuth_min_rad, p.azimuth_max_rad, p.azimuth_step_rad, moving);
             p.elevations_rad.iter().map(row).collect()
@@ -87,7 +83,9 @@ fn sweeps(scene: &Scene) -> Vec<SweepPath> {
     };
     let all = (0..s.head.sweeps).flat_map(|_| once.iter().cloned());
     let back = |i: usize| s.head.direction == SweepDirection::Alternate && i % 2 == 1;
-    all.enumerate().map(|(i, sweep)| if back(i) { SweepPath { path: sweep.path.reversed(), ..sweep } } else { sweep }).collect()
+    all.enumerate()
+        .map(|(i, sweep)| if back(i) { SweepPath { path: sweep.path.reversed(), ..sweep } } else { sweep })
+        .collect()
 }
 
 /// Refuses beams below the ground.

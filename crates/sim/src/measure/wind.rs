@@ -40,7 +40,8 @@ impl SceneWind {
     pub fn new(file: &SceneFile) -> Result<Self, Error> {
         let mut whole = Self::of_flow(&file.scene.flow, file)?;
         for (i, flow) in file.scene.added_flows.iter().enumerate() {
-            let added = Self::of_flow(flow, file).map_err(|source| Error::OfAddedFlow { number: i, source: Box::new(source) })?;
+            let added = Self::of_flow(flow, file)
+                .map_err(|source| Error::OfAddedFlow { number: i, source: Box::new(source) })?;
             whole = whole.plus(added);
         }
         Ok(whole)
@@ -57,8 +58,7 @@ impl SceneWind {
     /// Both winds, each from its own start.
     fn plus(self, other: Self) -> Self {
         let by_s = other.start_s - self.start_s;
-        let later: Box<dyn Wind> =
-            if by_s == 0.0 { other.wind } else { Box::new(Later { wind: other.wind, by_s }) };
+        let later: Box<dyn Wind> = if by_s == 0.0 { other.wind } else { Box::new(Later { wind: other.wind, by_s }) };
         let mut field_times_s = self.field_times_s;
         field_times_s.extend(other.field_times_s.iter().map(|t| t - by_s));
         field_times_s.sort_by(f64::total_cmp);
@@ -74,7 +74,9 @@ impl SceneWind {
 
     fn analytic(flow: &Flow) -> Result<Self, Error> {
         let max_speed_m_s = match flow {
-            Flow::Uniform { lateral_m_s, vertical_m_s, along_m_s } => lateral_m_s.hypot(*vertical_m_s).hypot(*along_m_s),
+            Flow::Uniform { lateral_m_s, vertical_m_s, along_m_s } => {
+                lateral_m_s.hypot(*vertical_m_s).hypot(*along_m_s)
+            }
             Flow::VortexPair(p) => {
                 p.circulation_m2_s / (4.0 * std::f64::consts::PI * p.core_radius_m) + p.cross_wind_m_s.abs()
             }
@@ -334,7 +336,15 @@ mod planes {
             SimulatedMotion::Moving => (Box::new(series), last_s),
             SimulatedMotion::Frozen => (Box::new(Frozen { wind: series, time_s: start_s }), f64::INFINITY),
         };
-        Ok(SceneWind { wind, start_s, tau, end_s, max_speed_m_s: fastest * scale.speed_m_s, source, field_times_s: Vec::new() })
+        Ok(SceneWind {
+            wind,
+            start_s,
+            tau,
+            end_s,
+            max_speed_m_s: fastest * scale.speed_m_s,
+            source,
+            field_times_s: Vec::new(),
+        })
     }
 
     /// Time \[s\] and age of the flow when the scan begins; `times` are (tau, s) of the planes.

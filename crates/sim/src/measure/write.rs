@@ -9,18 +9,39 @@ pub use limits::{Contents, check};
 pub use map::velocity_map;
 
 use crate::Error;
+use crate::beams::{Schedule, SweepMode};
 use crate::io::lock::FolderLock;
 use crate::io::own::refuse_foreign;
 use crate::io::signals::{LineVelocities, RawSignals, Recording};
 use crate::io::{Existing, FileGroup, Provenance, Table, hpl, tables};
+use crate::measure::beam_winds;
 use crate::measure::profile::RangeProfile;
 use crate::measure::run::RunResult;
 use crate::plan::{Plan, Stage, Target};
-use crate::scene::{DetectorSignal, NoiseKind};
+use crate::scene::{DetectorSignal, NoiseKind, Pattern};
 use std::path::{Path, PathBuf};
 
-/// The table of the HALO file has its name.
-const HALO: &str = "halo.hpl";
+/// Names of the CfRadial files: one for each kind of sweep.
+fn map_stems(scan: &Schedule) -> Vec<String> {
+    let mut modes: Vec<SweepMode> = Vec::new();
+    for (mode, _) in &scan.sweeps {
+        if !modes.contains(mode) {
+            modes.push(*mode);
+        }
+    }
+    match modes.len() {
+        0 | 1 => vec!["map".into()],
+        _ => modes.iter().map(|mode| format!("map_{}", mode.name())).collect(),
+    }
+}
+
+/// Names of the HALO files, one for each sweep; their tables have the same.
+fn halo_stems(sweeps: usize) -> Vec<String> {
+    match sweeps {
+        0 | 1 => vec!["halo".into()],
+        _ => (1..=sweeps).map(|sweep| format!("halo_{sweep:04}")).collect(),
+    }
+}
 
 /// Finds out, before any computing, whether files of these names can be written to a folder; leaves no trace.
 ///
@@ -65,8 +86,19 @@ pub fn names(plan: &Plan) -> Vec<String> {
         add("signals", &[(o.csv, "csv"), (netcdf, "nc")]);
     }
     if plan.runs(Stage::Estimates) {
-        add("map", &[(o.csv, "csv"), (netcdf, "nc"), pictures[0], pictures[1]]);
-        add("halo", &[(o.hpl, "hpl"), (o.hpl && o.csv, "csv")]);
+        add("map", &[(o.csv, "csv")]);
+        for stem in map_stems(&plan.geometry.schedule) {
+            add(&stem, &[(netcdf, "nc")]);
+        }
+        add("map", &[pictures[0], pictures[1]]);
+        for stem in halo_stems(plan.geometry.schedule.sweeps.len()) {
+            add(&stem, &[(o.hpl, "hpl"), (o.hpl && o.csv, "csv")]);
+        }
+        let pattern = &plan.scene.scene.scan.pattern;
+        let tells_wind = matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_));
+        add("wind", &[(o.csv && tells_wind, "csv")]);
+        let plans = *pattern != Pattern::default();
+        add("scan", &[(pictures[0].0 && plans, "svg"), (pictures[1].0 && plans, "png")]);
     }
     out
 }
@@ -118,16 +150,36 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
         }
         #[cfg(feature = "netcdf")]
         if outputs.netcdf {
-            files.add("map.nc", crate::io::cfradial::cfradial_bytes(&map, &origin)?)?;
-        }
-        if outputs.hpl {
-            files.add(HALO, hpl::hpl_bytes(&map, 0, HALO)?)?;
-            if outputs.csv {
-                files.add("halo.csv", hpl::hpl_table(&map, 0)?.to_csv(&origin)?)?;
+            let stems = map_stems(&plan.geometry.schedule);
+            for (stem, mode) in stems.iter().zip(map.modes()) {
+                // Readers take the kind of a file from its first sweep.
+                let bytes = match stems.len() {
+                    1 => crate::io::cfradial::cfradial_bytes(&map, &origin)?,
+                    _ => crate::io::cfradial::cfradial_bytes(&map.of_mode(mode), &origin)?,
+                };
+                files.add(&format!("{stem}.nc"), bytes)?;
             }
         }
+        if outputs.hpl {
+            for (sweep, stem) in halo_stems(map.sweeps.len()).iter().enumerate() {
+                let name = format!("{stem}.hpl");
+                files.add(&name, hpl::hpl_bytes(&map, sweep, &name)?)?;
+                if outputs.csv {
+                    files.add(&format!("{stem}.csv"), hpl::hpl_table(&map, sweep)?.to_csv(&origin)?)?;
+                }
+            }
+        }
+        let winds = beam_winds::beam_winds(plan, estimates)?;
+        if let Some(winds) = winds.as_deref().filter(|_| outputs.csv) {
+            files.add("wind.csv", beam_winds::table(winds).to_csv(&origin)?)?;
+        }
         #[cfg(feature = "plots")]
-        pictures::add_map(&mut files, plan, &map, &origin)?;
+        {
+            pictures::add_map(&mut files, plan, &map, winds.as_deref(), &origin)?;
+            if plan.scene.scene.scan.pattern != Pattern::default() {
+                pictures::add(&mut files, plan, "scan", &pictures::scan(plan), &origin)?;
+            }
+        }
     }
     Ok(files)
 }

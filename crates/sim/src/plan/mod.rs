@@ -20,11 +20,13 @@ mod hardware;
 mod optics;
 mod possible;
 mod rehearsal;
+mod schedule;
 mod sizes;
 mod stage;
 mod stages;
 pub(crate) mod units;
 
+pub use schedule::ScanSchedule;
 pub use stage::{Cost, Forecast, PlannedStage, Stage, Target};
 
 /// What a run will do.
@@ -171,6 +173,9 @@ impl fmt::Display for Plan {
         let Forecast { core_s, memory_bytes, .. } = self.total();
         let (time, memory) = (units::seconds(core_s), units::bytes(memory_bytes));
         writeln!(f, "  total {:<16} {time:>10} {memory:>10}   at once, forecast for one core", "")?;
+        if self.target != Target::Efficiency {
+            writeln!(f, "  scan  {}", self.schedule())?;
+        }
         for w in &self.warnings {
             writeln!(f, "  warning: {w}")?;
         }

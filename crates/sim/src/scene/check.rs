@@ -5,9 +5,7 @@
 
 use super::check_estimator::check_estimator;
 use super::check_flow::check_flow;
-use super::{
-    Digitiser, EfficiencyOfPulse, FORMAT, PulseShape, Scan, Scene, SnrReference, Turbulence,
-};
+use super::{Digitiser, EfficiencyOfPulse, FORMAT, PulseShape, Scan, Scene, SnrReference, Turbulence};
 use crate::keys::{Checker, Problem};
 use std::f64::consts::FRAC_PI_2;
 
@@ -203,6 +201,7 @@ fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Flow;
 
     fn keys(change: impl FnOnce(&mut Scene)) -> Vec<String> {
         let mut scene = Scene::default();

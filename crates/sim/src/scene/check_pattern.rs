@@ -74,14 +74,20 @@ impl Scene {
         let HeadMotionKeys { motion, sweeps, direction, rate_rad_s, acceleration_rad_s2, dead_time_s, .. } =
             self.scan.head;
         let moves = motion == HeadMotion::Continuous;
-        c.require(rate_rad_s > 0.0, "scan.head.rate_rad_s", rate_rad_s, "a number above 0 in rad/s; inf for a head that jumps");
+        c.require(
+            rate_rad_s > 0.0,
+            "scan.head.rate_rad_s",
+            rate_rad_s,
+            "a number above 0 in rad/s; inf for a head that jumps",
+        );
         let fast = acceleration_rad_s2 > 0.0;
         c.require(fast, "scan.head.acceleration_rad_s2", acceleration_rad_s2, "a number above 0 in rad/s^2, or inf");
         c.within("scan.head.dead_time_s", dead_time_s, 0.0, 1e5, "s");
         c.count("scan.head.sweeps", sweeps, 1, 100_000);
         let pattern = self.scan.pattern.name();
         let turning = matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Ppi(_) | Pattern::Axial(_));
-        let allowed = format!("\"stepped\" with scan.pattern.kind = \"{pattern}\"; rhi, ppi and axial may be continuous");
+        let allowed =
+            format!("\"stepped\" with scan.pattern.kind = \"{pattern}\"; rhi, ppi and axial may be continuous");
         c.require(!moves || turning, "scan.head.motion", "continuous", allowed);
         let finite = "a finite rate in rad/s with scan.head.motion = \"continuous\"";
         c.require(!moves || rate_rad_s.is_finite(), "scan.head.rate_rad_s", rate_rad_s, finite);
@@ -95,7 +101,8 @@ impl Scene {
         let small = jitter.iter().all(|sd| (0.0..=0.5).contains(sd));
         c.require(small, "scan.head.pointing_jitter_rad", jitter, "two standard deviations from 0 to 0.5 rad");
         let each = self.scan.wind_of_pulses == WindOfPulses::Pulse {} || self.scan.pulses_per_line == 1;
-        let allowed = "[0.0, 0.0] unless scan.wind_of_pulses.kind = \"pulse\": pulses that share their air share their direction";
+        let allowed =
+            "[0.0, 0.0] unless scan.wind_of_pulses.kind = \"pulse\": pulses that share their air share their direction";
         c.require(each || jitter == [0.0; 2], "scan.head.pointing_jitter_rad", jitter, allowed);
     }
 

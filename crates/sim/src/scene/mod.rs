@@ -47,8 +47,8 @@ pub use estimator::{
     OrderChoice, Refinement, RegionRadius, Weighting,
 };
 pub use flow::{
-    Aircraft, FieldFlow, FieldGround, Flow, LinearWind, Outside, SimulatedFlow, SimulatedMotion, VortexLines, VortexMotion,
-    VortexPair, VortexProfile,
+    Aircraft, FieldFlow, FieldGround, Flow, LinearWind, Outside, SimulatedFlow, SimulatedMotion, VortexLines,
+    VortexMotion, VortexPair, VortexProfile,
 };
 pub use instrument::{
     BeamRadiusDefinition, Detector, DetectorSignal, Digitiser, GaussianShape, Laser, NoiseKind, Pulse, PulseDefinition,

@@ -112,7 +112,8 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
     let source = format!("{} fields of {first_s:.4} to {last_s:.4} s from {}", all.len(), path.display());
     let own = flow.clone();
     let reader = move |i: usize| {
-        let field = all.get(i).ok_or(LesError::OutOfRange { field: "field", value: i as f64, allowed: "in the series" })?;
+        let field =
+            all.get(i).ok_or(LesError::OutOfRange { field: "field", value: i as f64, allowed: "in the series" })?;
         let unreadable = |e: Error| LesError::File {
             action: "read",
             path: field.path.clone(),

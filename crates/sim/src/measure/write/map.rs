@@ -24,10 +24,12 @@ const JUDGES: [&str; 9] = [
 /// The map of a run in the form that files and pictures take.
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
-    let mount = &g.schedule.mount;
+    let (mount, lines) = (&g.schedule.mount, &g.schedule.lines);
+    let pulses = lines.iter().map(|line| u32::try_from(line.pulses).unwrap_or(u32::MAX)).collect();
     let (zero_rad, from_x_rad) = mount.reference_rad;
+    let moves = lines.iter().any(|line| line.velocity_m_s != [0.0; 3] || line.position_m != mount.position_m);
     let rhi = g.schedule.sweeps.iter().all(|(mode, _)| *mode == SweepMode::Rhi);
-    let stands = mount.position_m[0] == 0.0 && mount.velocity_m_s == [0.0; 3];
+    let stands = mount.position_m[0] == 0.0 && !moves;
     let across = rhi && stands && (zero_rad, from_x_rad) == (scene.scan.azimuth_rad, FRAC_PI_2);
     let start_s = plan.wind.start_s;
     let away = |what: &str| format!("{what}, positive away from the lidar");
@@ -36,9 +38,10 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     };
     let number =
         |name: &str, text: &str, values: &ndarray::Array2<f64>| Field::float(name, Unit::One, text, values.clone());
-    let spread = e.v_spread_m_s.as_ref().map(|values| {
-        speed("v_spread", "standard deviation of v_pulse over the pulses of a line".into(), values)
-    });
+    let spread = e
+        .v_spread_m_s
+        .as_ref()
+        .map(|values| speed("v_spread", "standard deviation of v_pulse over the pulses of a line".into(), values));
     VelocityMap {
         title: "Radial velocity of a wake-vortex scan".into(),
         rays: (0..g.elevation_rad.len())
@@ -50,7 +53,12 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             })
             .collect(),
         range_m: e.range_m.clone(),
-        sweeps: g.schedule.sweeps.iter().map(|&(mode, fixed_angle_rad)| Sweep { tau: plan.wind.tau, fixed_angle_rad, mode }).collect(),
+        sweeps: g
+            .schedule
+            .sweeps
+            .iter()
+            .map(|&(mode, fixed_angle_rad)| Sweep { tau: plan.wind.tau, fixed_angle_rad, mode })
+            .collect(),
         pulse: PulseInfo {
             prt_s: 1.0 / scene.laser.pulse_repetition_hz,
             pulse_width_s: scene.pulse_width_s(),
@@ -89,6 +97,8 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         .collect(),
         lidar_y_m: mount.position_m[1],
         lidar_height_m: scene.scan.lidar_height_m,
+        ray_pulses: lines.iter().any(|line| line.pulses != scene.scan.pulses_per_line).then_some(pulses),
+        places_m: moves.then(|| (0..lines.len()).map(|line| g.schedule.middle(line).position_m).collect()),
         flight: (!across).then_some((mount.position_m[0], zero_rad - from_x_rad)),
         site: site(scene),
     }
