@@ -18,9 +18,10 @@ fn rows(name: &str) -> Vec<impl Fn(&str) -> f64> {
             let table = table.clone();
             move |column: &str| {
                 let at = table.column(column).unwrap_or_else(|| panic!("{column}"));
-                // Names of cases count as numbers: their first letter.
+                // Names of cases count as numbers.
                 let value = table.number(row, at);
-                if value.is_nan() { f64::from(table.rows[row][at].as_bytes()[0]) } else { value }
+                let name = || table.rows[row][at].bytes().fold(0.0, |sum, b| 3.0 * sum + f64::from(b));
+                if value.is_nan() { name() } else { value }
             }
         })
         .collect()

@@ -8,6 +8,8 @@ mod cli;
 #[cfg(feature = "cli")]
 mod messages;
 mod receiver;
+#[cfg(all(feature = "netcdf", feature = "plots"))]
+mod scans;
 mod scene_features;
 #[cfg(all(feature = "flow", feature = "netcdf"))]
 mod simulated_flow;
