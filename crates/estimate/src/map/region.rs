@@ -185,10 +185,13 @@ impl ScanGeometry {
             };
             let (across_m, along_m) = (point.range_m * sin, point.range_m * cos);
             let half_m = (radius_m * radius_m - across_m * across_m).sqrt();
+            // A line that misses the disc: max and min below would leave out the NaN.
+            if half_m.is_nan() {
+                return None;
+            }
             let place = |range_m: f64| (range_m - self.first_range_m) / self.spacing_m;
             let first = place(along_m - half_m).ceil().max(0.0);
             let last = place(along_m + half_m).floor().min(self.gates as f64 - 1.0);
-            // false also for the NaN of a line that misses the disc
             (first <= last).then_some(Chord { line, first: first as usize, last: last as usize })
         })
     }

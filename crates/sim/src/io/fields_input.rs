@@ -40,12 +40,11 @@ pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> 
 }
 
 fn times(file: &mut ClassicFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
-    if file.roles(name, [TIME]).is_err() {
+    let Some(dim) = file.dim_of(name, TIME) else {
         // A field on its own: its time is a number beside it.
         let time = if file.has("time") { seconds(file, "time")?.first().copied() } else { None };
         return Ok(vec![(None, time.unwrap_or(0.0))]);
-    }
-    let [dim] = file.roles(name, [TIME])?;
+    };
     if file.dims(name).and_then(|dims| dims.first().copied()) != Some(dim.as_str()) {
         return Err(format!("{name}: time must be its first dimension"));
     }

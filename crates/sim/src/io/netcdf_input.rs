@@ -193,6 +193,12 @@ impl ClassicFile {
         dims.iter().position(of_name).or_else(|| dims.iter().position(of_axis))
     }
 
+    /// The dimension of a variable that has a role, if there is one.
+    pub(crate) fn dim_of(&self, name: &str, role: Role) -> Option<String> {
+        let dims = self.dims(name)?;
+        self.find(&dims, role).map(|place| dims[place].to_owned())
+    }
+
     /// The dimensions of a variable that have these roles, in their order; dimensions of length 1 may be left over.
     ///
     /// # Errors

@@ -211,7 +211,7 @@ fn sampled(nodes_m: [&[f64]; 3], component: usize, of: impl Fn([f64; 3]) -> [f64
 #[test]
 fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
     let folder = tempfile::tempdir().unwrap();
-    let centre_m = [axis(-60.0, 60.0, 41), axis(240.0, 480.0, 81), axis(0.0, 60.0, 31)];
+    let centre_m = [axis(-60.0, 60.0, 41), axis(220.0, 500.0, 95), axis(-4.0, 60.0, 33)];
     let face_m = centre_m.clone().map(|c| c.iter().map(|x| x - 0.5 * (c[1] - c[0])).collect::<Vec<f64>>());
     let velocity_m_s = std::array::from_fn(|d| {
         let nodes = std::array::from_fn(|k| if k == d { &face_m[k][..] } else { &centre_m[k][..] });
@@ -300,7 +300,7 @@ fn near_vortex(folder: &Path, flow: &str) {
 fn staggered_fields_of_palm_and_wrf_come_out_unmirrored() {
     let folder = tempfile::tempdir().unwrap();
     // PALM: right-handed, y to the left of x, so the scan at y > 0 of the scene is at y < 0 of the file.
-    let (x, y, z) = (axis(-100.0, 100.0, 6), axis(-492.0, -240.0, 64), axis(0.0, 80.0, 21));
+    let (x, y, z) = (axis(-100.0, 100.0, 6), axis(-500.0, -220.0, 71), axis(0.0, 80.0, 21));
     let half = |nodes: &[f64]| -> Vec<f64> { nodes.iter().map(|x| x - 0.5 * (nodes[1] - nodes[0])).collect() };
     let (xu, yv) = (half(&x), half(&y));
     let zw: Vec<f64> = z.iter().map(|z| z + 2.0).collect();
@@ -311,7 +311,7 @@ fn staggered_fields_of_palm_and_wrf_come_out_unmirrored() {
     let right = || vortex(-1.0);
     netcdf(
         &folder.path().join("palm.nc"),
-        &[("time", 2), ("zu_3d", 21), ("zw_3d", 21), ("y", 64), ("yv", 64), ("x", 6), ("xu", 6)],
+        &[("time", 2), ("zu_3d", 21), ("zw_3d", 21), ("y", 71), ("yv", 71), ("x", 6), ("xu", 6)],
         &[
             ("time", &["time"], vec![600.0, 660.0]),
             ("zu_3d", &["zu_3d"], z.clone()),
@@ -335,13 +335,13 @@ fn staggered_fields_of_palm_and_wrf_come_out_unmirrored() {
         plan_in(folder.path(), [&flow.replace("true", "false"), RHI, ""], Target::Map).unwrap_err().to_string();
     assert!(mirrored.contains("leaves the simulated flow"), "{mirrored}");
     // WRF: no coordinates but DX, DY and the geopotential; faces one more than centres. Moved to where the scan is.
-    let (nx, ny, nz) = (6, 64, 20);
+    let (nx, ny, nz) = (6, 71, 20);
     let faces = |count: usize, step: f64| -> Vec<f64> { (0..=count).map(|i| i as f64 * step).collect() };
     let centres = |count: usize, step: f64| -> Vec<f64> { (0..count).map(|i| (i as f64 + 0.5) * step).collect() };
     let (xs, xc, ys, yc) = (faces(nx, 40.0), centres(nx, 40.0), faces(ny, 4.0), centres(ny, 4.0));
     let (zs, zc) = (faces(nz, 4.0), centres(nz, 4.0));
-    // The file's y runs against the scene's: its origin is at y = 492 m, x = -120 m.
-    let moved = |[x, y, z]: [f64; 3]| vortex(-1.0)([x - 120.0, y - 492.0, z]);
+    // The file's y runs against the scene's: its origin is at y = 500 m, x = -120 m.
+    let moved = |[x, y, z]: [f64; 3]| vortex(-1.0)([x - 120.0, y - 500.0, z]);
     let geopotential: Vec<f64> = zs.iter().flat_map(|z| vec![9.81 * (z + 55.0); nx * ny]).collect();
     let mass = ["Time", "bottom_top_stag", "south_north", "west_east"];
     netcdf(
@@ -366,7 +366,7 @@ fn staggered_fields_of_palm_and_wrf_come_out_unmirrored() {
         &[("DX", 40.0), ("DY", 4.0)],
     );
     let flow = "kind = \"fields\"\nfiles = \"wrfout.nc\"\nnames = [\"U\", \"V\", \"W\"]\nmirror_y = true\n\
-                origin_m = [-120.0, 492.0, 0.0]\nmotion = \"frozen\"\n";
+                origin_m = [-120.0, 500.0, 0.0]\nmotion = \"frozen\"\n";
     near_vortex(folder.path(), flow);
     let turned = flow.replace("origin_m", "rotation_rad = 6.283185307179586\norigin_m");
     near_vortex(folder.path(), &turned);
