@@ -38,6 +38,7 @@
 //! | [`bound`] | Cramer-Rao bound on the velocity, and on velocity and gradient |
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
 //! | [`retrieval`] | from one scan of any instrument to its vortices, or none; tracks |
+//! | [`wind_profile`] | winds from beams in several directions: VAD with covariance, DBS |
 //! | `linalg`, `parallel` | solve and eigenvectors with residual checks, the bundled LAPACK; loops on the caller's threads |
 //!
 //! Features:
@@ -63,6 +64,7 @@ mod parallel;
 pub mod retrieval;
 pub mod spectrum;
 pub mod vortex_fit;
+pub mod wind_profile;
 pub mod window;
 
 pub use error::Error;

@@ -32,6 +32,14 @@ pub enum Error {
         /// What is wrong with the file.
         source: Box<Error>,
     },
+    /// One of the winds that are added to the flow cannot be made.
+    #[error("added_flows[{number}]: {source}")]
+    OfAddedFlow {
+        /// Its place in the list.
+        number: usize,
+        /// What is wrong with it.
+        source: Box<Error>,
+    },
     /// A case of a sweep was refused or could not be run.
     #[error("case {case} of the sweep ({keys}): {source}{}", others_in_words(*.others))]
     Case {

@@ -28,6 +28,7 @@
 //! |---|---|
 //! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
+//! | [`beams`] | when, whence and whither each pulse of a scan goes |
 //! | [`measure`] | instrument, wind, signals, velocities and their errors; running a plan and writing its results |
 //! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
 //! | `sweep` | design studies: many scenes, their results, the Pareto front |
@@ -38,6 +39,7 @@
 //! Features, all but the last on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
 //! PNG, the report page), `sweep` (design studies, with `cli`), `vtk` (fields for ParaView).
 
+pub mod beams;
 #[cfg(feature = "flow")]
 pub mod flow;
 pub mod io;

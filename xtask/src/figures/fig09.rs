@@ -26,7 +26,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let file = context.scene_file(scene)?;
     let scene = &file.scene;
     let gates = estimators::gates(scene)?;
-    let elevation_rad = Geometry::new(scene, &Instrument::new(scene)?.pulse, &SceneWind::new(&file)?)?.elevation_rad;
+    let elevation_rad = Geometry::new(&file, &Instrument::new(scene)?.pulse, &SceneWind::new(&file)?)?.elevation_rad;
     let samples = scene.samples_per_record();
     let geometry = ScanGeometry::new(&estimators::sampling(scene)?, &gates, &elevation_rad, samples)?;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;

@@ -1,6 +1,6 @@
-//! Which records (rays) belong to each line of sight: listed, or equally many for each line, one line after the other.
+//! Which records (rays) belong to each line of sight: listed, or one line after the other, equally many for each or not.
 //!
-//! The second form needs no memory, however many pulses a line has. Check: both forms of one scan give the same rays.
+//! Only the first form needs memory for each ray. Check: all forms of one scan give the same rays.
 
 use std::ops::Range;
 
@@ -10,6 +10,8 @@ use crate::error::{Error, finite};
 pub(crate) enum Rays {
     /// The rays of each line, increasing.
     Listed(Vec<Vec<usize>>),
+    /// One line after the other: the first ray of each, and one behind the last of all.
+    Bounds(Vec<usize>),
     /// So many for each line.
     Regular {
         /// Rays of a line.
@@ -39,6 +41,10 @@ impl Rays {
     pub(crate) fn count(&self, line: usize) -> usize {
         match self {
             Self::Listed(rays) => rays.get(line).map_or(0, Vec::len),
+            Self::Bounds(bounds) => {
+                let of_line = bounds.get(line..line + 2);
+                of_line.map_or(0, |ends| ends[1].saturating_sub(ends[0]))
+            }
             Self::Regular { per_line } => *per_line,
         }
     }
@@ -51,6 +57,10 @@ impl Rays {
                 let first = all.partition_point(|ray| *ray < range.start);
                 let end = all.partition_point(|ray| *ray < range.end);
                 (&all[first..end.max(first)], 0..0)
+            }
+            Self::Bounds(bounds) => {
+                let ends = bounds.get(line..line + 2).map_or(0..0, |ends| ends[0]..ends[1]);
+                (&[][..], ends.start.max(range.start)..ends.end.min(range.end))
             }
             Self::Regular { per_line } => {
                 (&[][..], (line * per_line).max(range.start)..((line + 1) * per_line).min(range.end))
@@ -79,14 +89,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_forms_give_the_same_rays() {
+    fn all_forms_give_the_same_rays() {
         let listed = Rays::Listed(vec![vec![0, 1, 2], vec![3, 4, 5], vec![6, 7, 8]]);
         let regular = Rays::Regular { per_line: 3 };
+        let bounds = Rays::Bounds(vec![0, 3, 6, 9]);
         for range in [0..9, 2..7, 4..5, 5..5, 8..20] {
             for line in 0..3 {
                 let of = |rays: &Rays| rays.within(line, &range).collect::<Vec<_>>();
-                assert_eq!(of(&listed), of(&regular), "{line} {range:?}");
-                assert_eq!((listed.count(line), regular.count(line)), (3, 3));
+                for other in [&regular, &bounds] {
+                    assert_eq!(of(&listed), of(other), "{line} {range:?}");
+                    assert_eq!((listed.count(line), other.count(line)), (3, 3));
+                }
             }
         }
     }

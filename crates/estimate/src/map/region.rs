@@ -49,6 +49,8 @@ impl Chord {
 #[derive(Debug, Clone)]
 pub struct ScanGeometry {
     lines: Vec<f64>,
+    /// Directions of the lines, if they are not all in one plane, and with each the lines that may share its regions.
+    sphere: Option<Vec<([f64; 3], std::ops::Range<usize>)>>,
     pub(crate) rays: Rays,
     first_range_m: f64,
     spacing_m: f64,
@@ -89,6 +91,38 @@ impl ScanGeometry {
         Self::of(elevation_rad.to_vec(), Rays::Regular { per_line: rays_per_line }, sampling, gates, record_samples)
     }
 
+    /// Geometry of lines of sight in any direction: unit vectors, one for each line. Their `elevation_rad` in points and maps is
+    /// their number, 0, 1, 2 and so on. Regions hold what is within a distance on lines that follow each other with the same
+    /// `group`: those of one sweep, not those of another time. Line `i` has the rays `first_ray[i] .. first_ray[i + 1]`.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without lines, [`Error::Length`] for lists that do not match, and as [`Gates::count`].
+    pub fn on_sphere(
+        sampling: &Sampling,
+        gates: &Gates,
+        direction: &[[f64; 3]],
+        group: &[usize],
+        first_ray: &[usize],
+        record_samples: usize,
+    ) -> Result<Self, Error> {
+        let lines = direction.len();
+        if lines == 0 {
+            return Err(Error::Empty { field: "direction" });
+        }
+        length("group", lines, group.len())?;
+        length("first_ray", lines + 1, first_ray.len())?;
+        let parts = group.chunk_by(|a, b| a == b).scan(0, |start, part| {
+            let range = *start..*start + part.len();
+            *start = range.end;
+            Some(range)
+        });
+        let shared = parts.flat_map(|range| range.clone().map(move |_| range.clone()));
+        let sphere = direction.iter().copied().zip(shared).collect();
+        let numbers = (0..lines).map(|line| line as f64).collect();
+        let rays = Rays::Bounds(first_ray.to_vec());
+        Ok(Self { sphere: Some(sphere), ..Self::of(numbers, rays, sampling, gates, record_samples)? })
+    }
+
     fn of(
         lines: Vec<f64>,
         rays: Rays,
@@ -99,6 +133,7 @@ impl ScanGeometry {
         sampling.validate()?;
         Ok(Self {
             lines,
+            sphere: None,
             rays,
             first_range_m: gates.range_m(0, sampling),
             spacing_m: gates.spacing_m(sampling),
@@ -141,22 +176,32 @@ impl ScanGeometry {
     pub fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
         let slack_m = 1e-6 * self.spacing_m;
         let radius_m = radius_m + slack_m;
+        let own = self.sphere.as_ref().and_then(|sphere| sphere.get(point.elevation_rad as usize));
+        let near = own.map_or_else(|| self.lines_within(point, radius_m), |(_, shared)| shared.clone());
+        near.filter_map(move |line| {
+            let (sin, cos) = match (own, self.sphere.as_ref().and_then(|sphere| sphere.get(line))) {
+                (Some((own, _)), Some((other, _))) => sin_cos_between(own, other),
+                _ => (self.lines[line] - point.elevation_rad).sin_cos(),
+            };
+            let (across_m, along_m) = (point.range_m * sin, point.range_m * cos);
+            let half_m = (radius_m * radius_m - across_m * across_m).sqrt();
+            // A line that misses the disc: max and min below would leave out the NaN.
+            if half_m.is_nan() {
+                return None;
+            }
+            let place = |range_m: f64| (range_m - self.first_range_m) / self.spacing_m;
+            let first = place(along_m - half_m).ceil().max(0.0);
+            let last = place(along_m + half_m).floor().min(self.gates as f64 - 1.0);
+            (first <= last).then_some(Chord { line, first: first as usize, last: last as usize })
+        })
+    }
+
+    /// Lines of a plane scan that may touch the disc.
+    fn lines_within(&self, point: PolarPoint, radius_m: f64) -> std::ops::Range<usize> {
         let reach_rad = if radius_m < point.range_m { (radius_m / point.range_m).asin() } else { std::f64::consts::PI };
         let start = self.lines.partition_point(|line| *line < point.elevation_rad - reach_rad);
-        self.lines[start..]
-            .iter()
-            .take_while(move |line| **line <= point.elevation_rad + reach_rad)
-            .enumerate()
-            .filter_map(move |(offset, line)| {
-                let (sin, cos) = (line - point.elevation_rad).sin_cos();
-                let (across_m, along_m) = (point.range_m * sin, point.range_m * cos);
-                let half_m = (radius_m * radius_m - across_m * across_m).sqrt();
-                let place = |range_m: f64| (range_m - self.first_range_m) / self.spacing_m;
-                let first = place(along_m - half_m).ceil().max(0.0);
-                let last = place(along_m + half_m).floor().min(self.gates as f64 - 1.0);
-                // false also for the NaN of a line that misses the disc
-                (first <= last).then_some(Chord { line: start + offset, first: first as usize, last: last as usize })
-            })
+        let end = self.lines.partition_point(|line| *line <= point.elevation_rad + reach_rad);
+        start..end.max(start)
     }
 
     /// Accumulation level and n_eff of a region when all samples are valid (figure 9), without any signal.
@@ -170,6 +215,12 @@ impl ScanGeometry {
         }
         (level, effective(level, pairs))
     }
+}
+
+/// Sine and cosine of the angle between two directions; the sine is not negative.
+fn sin_cos_between([a, b, c]: &[f64; 3], [d, e, f]: &[f64; 3]) -> (f64, f64) {
+    let cross = [b * f - c * e, c * d - a * f, a * e - b * d];
+    (cross.iter().map(|x| x * x).sum::<f64>().sqrt(), a * d + b * e + c * f)
 }
 
 /// (sum n)^2 / sum over pairs of gamma^2; 0 for an empty region.
@@ -326,6 +377,41 @@ mod tests {
         let identical = WindowCorrelation::from_gate_lags(&[1.0; 20]).unwrap();
         let (_, n_eff) = geometry.level(point, 2.0, &identical);
         assert_relative_eq!(n_eff, 43.0 * 43.0 / 249.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn regions_on_a_sphere_hold_the_windows_within_the_radius_of_their_group() {
+        let gates = Gates::new(64, 3, 0.0).unwrap();
+        // A cone of 40 lines, in two turns that do not see each other.
+        let cone = |i: u32| {
+            let (sin, cos) = (f64::from(i) * 0.02).sin_cos();
+            [0.8 * cos, 0.8 * sin, 0.6]
+        };
+        let direction: Vec<[f64; 3]> = (0..20).chain(0..20).map(cone).collect();
+        let group: Vec<usize> = (0..40).map(|i| i / 20).collect();
+        let bounds: Vec<usize> = (0..=40).map(|i| 3 * i).collect();
+        let geometry = ScanGeometry::on_sphere(&sampling(), &gates, &direction, &group, &bounds, 300).unwrap();
+        let ranges_m = geometry.gate_ranges_m();
+        for (line, gate, radius_m) in [(25, 10, 6.0), (0, 40, 3.0), (39, 70, 0.0)] {
+            let at = |line: usize, range_m: f64| direction[line].map(|e| e * range_m);
+            let centre = at(line, ranges_m[gate]);
+            let mut inside = vec![];
+            for other in 0..40 {
+                for (k, r_m) in ranges_m.iter().enumerate() {
+                    let apart: f64 = at(other, *r_m).iter().zip(centre).map(|(a, b)| (a - b).powi(2)).sum();
+                    if group[other] == group[line] && apart.sqrt() <= radius_m + 1e-6 {
+                        inside.push((other, k));
+                    }
+                }
+            }
+            let point = PolarPoint { range_m: ranges_m[gate], elevation_rad: line as f64 };
+            let found: Vec<_> = geometry
+                .chords(point, radius_m)
+                .flat_map(|chord| (chord.first..=chord.last).map(move |gate| (chord.line, gate)))
+                .collect();
+            assert_eq!(found, inside, "{line} {gate} {radius_m}");
+            assert_eq!(geometry.line_rays(line).collect::<Vec<_>>(), [3 * line, 3 * line + 1, 3 * line + 2]);
+        }
     }
 
     #[test]

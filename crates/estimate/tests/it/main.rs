@@ -20,3 +20,4 @@ mod retrieval_methods;
 mod rolling_moment;
 mod sliding;
 mod vortex_fit;
+mod wind_profile;

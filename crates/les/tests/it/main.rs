@@ -6,6 +6,7 @@ mod exact_flows;
 #[cfg(feature = "solver")]
 mod extremes;
 mod grid_wind;
+mod scan_winds;
 mod vortex;
 #[cfg(feature = "solver")]
 mod wake_reference;

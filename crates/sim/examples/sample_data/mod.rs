@@ -43,7 +43,7 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         title: "made-up vortex pair".into(),
         rays,
         range_m: (0..gates).map(|g| 300.0 + 5.0 * (g as f64 + 0.5)).collect(),
-        sweeps: taus.iter().map(|&tau| Sweep { tau, azimuth_rad }).collect(),
+        sweeps: taus.iter().map(|&tau| Sweep::rhi(tau, azimuth_rad)).collect(),
         pulse: PulseInfo {
             prt_s: 5e-5,
             pulse_width_s: 2e-7,
@@ -54,6 +54,9 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         fields: Vec::new(),
         lidar_y_m: -400.0,
         lidar_height_m: 2.0,
+        flight: None,
+        ray_pulses: None,
+        places_m: None,
         site: Site::default(),
         is_simulated: true,
     };

@@ -271,8 +271,14 @@ fn plan_json(plan: &Plan) -> Value {
         })
         .collect();
     let total = plan.total();
+    let scan = plan.schedule();
     json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.scene.seed,
+        "scan": {
+            "pattern": scan.pattern, "lines": scan.lines, "sweeps": scan.sweeps, "pulses": scan.pulses,
+            "duration_s": scan.duration_s, "revisit_s": scan.revisit_s, "wake_moves_m": scan.wake_moves_m,
+            "ambiguous_range_m": scan.ambiguous_range_m, "smear_rad": scan.smear_rad, "smear_m": scan.smear_m,
+        },
         "stages": stages, "core_s": total.core_s, "memory_bytes": total.memory_bytes, "warnings": plan.warnings,
     })
 }

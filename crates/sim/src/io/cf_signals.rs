@@ -61,7 +61,9 @@ fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
         let values = (0..rays).map(|ray| of[ray % scan]).collect();
         variable(name, &["ray"], Data::F64(values), units).text("long_name", text)
     };
-    vec![
+    let azimuth = (!signals.azimuth_rad.is_empty())
+        .then(|| value("azimuth", &signals.azimuth_rad, "rad", "azimuth of the line of sight, clockwise from north"));
+    let mut out = vec![
         number("ray", &|ray| ray, "number of the record"),
         number("ray_line", &|ray| ray % scan / per_line, "line of sight of the pulse, a place along dimension line"),
         number("ray_pulse", &|ray| ray % scan % per_line, "number of the pulse on its line of sight"),
@@ -69,7 +71,9 @@ fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
             .text("standard_name", "realization"),
         value("elevation", &signals.elevation_rad, "rad", "elevation of the line of sight above the horizon"),
         value("pulse_time", &signals.pulse_time_s, "s", "time of the pulse from the start of the flow"),
-    ]
+    ];
+    out.extend(azimuth);
+    out
 }
 
 fn recording(signals: &RawSignals<'_>) -> Vec<Variable> {

@@ -1,4 +1,4 @@
-//! A scanned map as CfRadial 1.4 in classic NetCDF: rays along `time`, gates along `range`, sweeps of mode `rhi`.
+//! A scanned map as CfRadial 1.4 in classic NetCDF: rays along `time`, gates along `range`, sweeps of one mode.
 //! Opens in Py-ART (`pyart.io.read_cfradial`), xradar (`open_cfradial1_datatree(f, first_dim="time")`), wradlib, xarray, scipy.
 //! Ray times count from the start of the flow, whose date is that of the map's site: a synthetic one where none was given.
 //! Check: the tests read the bytes back with an independent reader and hold them to the list that the clients need.
@@ -7,6 +7,7 @@ use super::error::{OutputError, OutputResult};
 use super::map::{Field, FieldKind, Unit, VelocityMap};
 use super::netcdf::{Attr, Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
+use crate::beams::SweepMode;
 
 /// Length of all text variables; unused bytes are NUL, since blanks stay in the strings of xarray and Py-ART.
 const TEXT: usize = 32;
@@ -76,8 +77,8 @@ fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, Str
         ("references", "CfRadial data file format, version 1.4, NCAR (2016)"),
         ("comment", comment),
         ("instrument_name", "wakescope lidar"),
-        ("scan_name", "rhi"),
-        ("platform_is_mobile", "false"),
+        ("scan_name", map.sweeps.first().map_or("rhi", |sweep| sweep.mode.name())),
+        ("platform_is_mobile", if map.places_m.is_some() { "true" } else { "false" }),
         ("n_gates_vary", "false"),
         ("ray_times_increase", "true"),
         ("simulated", simulated),
@@ -125,33 +126,67 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
     ]
 }
 
+/// Length of a degree of latitude on a sphere with the mean radius of the Earth, m.
+const DEGREE_M: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
+
 fn site(map: &VelocityMap) -> Vec<Variable> {
-    vec![
-        Variable::new("latitude", &[], Data::F64(vec![map.site.latitude_deg]))
-            .text("standard_name", "latitude")
-            .text("units", "degrees_north"),
-        Variable::new("longitude", &[], Data::F64(vec![map.site.longitude_deg]))
-            .text("standard_name", "longitude")
-            .text("units", "degrees_east"),
-        Variable::new("altitude", &[], Data::F64(vec![map.site.altitude_m + map.lidar_height_m]))
+    const ONE: &[&str] = &[];
+    const EACH: &[&str] = &["time"];
+    let place = |[x_m, y_m, z_m]: [f64; 3]| {
+        // Along the flight and to the right of it, as north and east.
+        let (sin, cos) = map.flight.map_or(0.0, |(_, azimuth_rad)| azimuth_rad).sin_cos();
+        let (north_m, east_m) = (x_m * cos - y_m * sin, x_m * sin + y_m * cos);
+        let width = map.site.latitude_deg.to_radians().cos();
+        let (latitude, longitude) = (map.site.latitude_deg, map.site.longitude_deg);
+        [latitude + north_m / DEGREE_M, longitude + east_m / (DEGREE_M * width), map.site.altitude_m + z_m]
+    };
+    let fixed = [map.site.latitude_deg, map.site.longitude_deg, map.site.altitude_m + map.lidar_height_m];
+    let places = map.places_m.as_ref().map(|all| all.iter().map(|p| place(*p)).collect::<Vec<_>>());
+    let dims = if places.is_some() { EACH } else { ONE };
+    let values = |d: usize| Data::F64(places.as_ref().map_or(vec![fixed[d]], |all| all.iter().map(|p| p[d]).collect()));
+    let mut out = vec![
+        Variable::new("latitude", dims, values(0)).text("standard_name", "latitude").text("units", "degrees_north"),
+        Variable::new("longitude", dims, values(1)).text("standard_name", "longitude").text("units", "degrees_east"),
+        Variable::new("altitude", dims, values(2))
             .text("standard_name", "altitude")
             .text("long_name", "height of the telescope above the sea")
             .text("units", "meters")
             .text("positive", "up"),
-    ]
+    ];
+    if places.is_some() {
+        // A level carrier that heads along the flight.
+        let heading_deg = turn(map.flight.map_or(0.0, |(_, azimuth_rad)| azimuth_rad)).to_degrees();
+        let angles = map.rays.iter().map(|ray| [ray.azimuth_rad, ray.elevation_rad].map(|rad| rad.to_degrees() as f32));
+        let (rotation, tilt): (Vec<f32>, Vec<f32>) = angles.map(|[az, el]| (az - heading_deg as f32, el)).unzip();
+        let still = || vec![0.0; map.rays.len()];
+        let motion = [
+            ("heading", vec![heading_deg as f32; map.rays.len()]),
+            ("roll", still()),
+            ("pitch", still()),
+            ("drift", still()),
+            ("rotation", rotation),
+            ("tilt", tilt),
+        ];
+        out.extend(motion.map(|(name, values)| Variable::new(name, EACH, Data::F32(values)).text("units", "degrees")));
+    }
+    out
 }
 
 fn sweeps(map: &VelocityMap) -> Vec<Variable> {
     let bounds = map.sweep_bounds();
     let ints = |values: &mut dyn Iterator<Item = usize>| Data::I32(values.map(|v| v as i32).collect());
     let floats = |get: fn(&super::map::Sweep) -> f64| Data::F32(map.sweeps.iter().map(|s| get(s) as f32).collect());
+    let is_rhi = map.sweeps.iter().all(|sweep| sweep.mode == SweepMode::Rhi);
+    let fixed = floats(|s| {
+        let angle_rad = if s.mode == SweepMode::Rhi { turn(s.fixed_angle_rad) } else { s.fixed_angle_rad };
+        angle_rad.to_degrees()
+    });
+    let fixed_name = if is_rhi { "azimuth of the scan plane" } else { "angle that stays during the sweep" };
     let mut out = vec![
         Variable::new("volume_number", &[], Data::I32(vec![0])).text("long_name", "volume number"),
         Variable::new("sweep_number", &["sweep"], ints(&mut (0..bounds.len())))
             .text("long_name", "sweep number, from 0"),
-        Variable::new("fixed_angle", &["sweep"], floats(|s| turn(s.azimuth_rad).to_degrees()))
-            .text("long_name", "azimuth of the scan plane")
-            .text("units", "degrees"),
+        Variable::new("fixed_angle", &["sweep"], fixed).text("long_name", fixed_name).text("units", "degrees"),
         Variable::new("sweep_start_ray_index", &["sweep"], ints(&mut bounds.iter().map(|b| b.0)))
             .text("long_name", "index of the first ray of the sweep"),
         Variable::new("sweep_end_ray_index", &["sweep"], ints(&mut bounds.iter().map(|b| b.1)))
@@ -179,10 +214,10 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
         one("time_coverage_start", &time(map.rays.first())),
         one("time_coverage_end", &time(map.rays.last())),
         one("time_reference", &start.to_string()),
-        one("platform_type", "fixed"),
+        one("platform_type", if map.places_m.is_some() { "aircraft" } else { "fixed" }),
         one("instrument_type", "lidar"),
         one("primary_axis", "axis_z"),
-        each("sweep_mode", "rhi"),
+        Variable::new("sweep_mode", EACH, Data::Char(map.sweeps.iter().flat_map(|s| padded(s.mode.name())).collect())),
         each("follow_mode", "none"),
         each("prt_mode", "fixed"),
     ]
@@ -191,6 +226,7 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
 fn instrument(map: &VelocityMap) -> Vec<Variable> {
     let (rays, pulse) = (map.rays.len(), &map.pulse);
     let each = |value: f64| Data::F32(vec![value as f32; rays]);
+    let samples = map.ray_pulses.clone().unwrap_or_else(|| vec![pulse.samples; rays]);
     let group = |v: Variable, units: &str| v.text("units", units).text("meta_group", "instrument_parameters");
     vec![
         group(
@@ -205,7 +241,7 @@ fn instrument(map: &VelocityMap) -> Vec<Variable> {
             Variable::new(
                 "n_samples",
                 &["time"],
-                Data::I32(vec![i32::try_from(pulse.samples).unwrap_or(i32::MAX); rays]),
+                Data::I32(samples.into_iter().map(|n| i32::try_from(n).unwrap_or(i32::MAX)).collect()),
             ),
             "1",
         ),

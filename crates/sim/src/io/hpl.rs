@@ -8,6 +8,7 @@ use super::error::{OutputError, OutputResult};
 use super::map::VelocityMap;
 use super::site::DAY_S;
 use crate::SPEED_OF_LIGHT_M_S;
+use crate::beams::SweepMode;
 use std::fmt::Write as _;
 
 /// No instrument has the number 0: with the file's own name it is all by which this program's files can be told, for readers
@@ -128,7 +129,7 @@ fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize
         format!("Gate length (pts):\t{points}"),
         format!("Pulses/ray:\t{}", pulse.samples),
         format!("No. of rays in file:\t{}", rays.1 - rays.0 + 1),
-        "Scan type:\tRHI".into(),
+        format!("Scan type:\t{}", scan_type(map, rays)),
         // 65535 stands for a collimated beam; readers ask for an integer.
         "Focus range:\t65535".into(),
         format!("Start time:\t{}", start_time(map, rays.0)),
@@ -142,6 +143,19 @@ fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize
         "****".into(),
     ];
     lines.join("\r\n") + "\r\n"
+}
+
+/// The word of the instrument for a sweep, by its rays.
+fn scan_type(map: &VelocityMap, (first, last): (usize, usize)) -> &'static str {
+    let still = map.rays[first..=last]
+        .windows(2)
+        .all(|pair| pair[0].azimuth_rad == pair[1].azimuth_rad && pair[0].elevation_rad == pair[1].elevation_rad);
+    match map.sweeps[map.rays[first].sweep].mode {
+        SweepMode::Rhi => "RHI",
+        SweepMode::AzimuthSurveillance | SweepMode::Sector => "VAD - stepped",
+        SweepMode::VerticalPointing | SweepMode::Pointing if still => "Stare",
+        SweepMode::VerticalPointing | SweepMode::Pointing => "User file 1 - stepped",
+    }
 }
 
 /// Seconds since midnight UTC of a ray.

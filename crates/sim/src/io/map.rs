@@ -4,7 +4,9 @@
 
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use super::site::Site;
-use ndarray::{Array2, Array3};
+use crate::beams::{Direction, SweepMode};
+use ndarray::{Array2, Array3, Axis};
+use std::f64::consts::FRAC_PI_2;
 use wakescope_les::winds::{Edges, Side};
 
 /// Unit of a field: its tag in a CSV column name and its text in NetCDF (UDUNITS).
@@ -146,17 +148,26 @@ pub struct Ray {
     pub time_s: f64,
     /// Elevation above the horizontal, rad.
     pub elevation_rad: f64,
-    /// Azimuth of the scan plane, clockwise from north, rad.
+    /// Azimuth, clockwise from north, rad.
     pub azimuth_rad: f64,
 }
 
-/// One sweep in elevation (RHI) at one age of the wake.
+/// One sweep at one age of the wake.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sweep {
     /// Age of the wake, dimensionless (t Gamma0 / (2 pi b0^2)).
     pub tau: f64,
-    /// Azimuth of the scan plane, rad.
-    pub azimuth_rad: f64,
+    /// The angle that stays: azimuth of an RHI, else elevation, rad.
+    pub fixed_angle_rad: f64,
+    /// Its kind.
+    pub mode: SweepMode,
+}
+
+impl Sweep {
+    /// A sweep of elevation at one azimuth.
+    pub fn rhi(tau: f64, azimuth_rad: f64) -> Self {
+        Self { tau, fixed_angle_rad: azimuth_rad, mode: SweepMode::Rhi }
+    }
 }
 
 /// Pulse and acquisition, the same for all rays.
@@ -193,6 +204,12 @@ pub struct VelocityMap {
     pub lidar_y_m: f64,
     /// Height of the telescope above the ground, m.
     pub lidar_height_m: f64,
+    /// Where the lidar is along the flight, m, and the azimuth of +x, rad; absent where all rays are in one plane across the flight.
+    pub flight: Option<(f64, f64)>,
+    /// Pulses averaged for each ray, where they are not equally many.
+    pub ray_pulses: Option<Vec<u32>>,
+    /// Where the lidar is at each ray (x, y, z), m, if it moves.
+    pub places_m: Option<Vec<[f64; 3]>>,
     /// Place and date.
     pub site: Site,
     /// Whether the signals were simulated.
@@ -200,14 +217,60 @@ pub struct VelocityMap {
 }
 
 impl VelocityMap {
-    /// Horizontal position of a gate in the frame of the flow, m.
+    /// Horizontal position of a gate across the flight, m.
     pub fn y_m(&self, ray: usize, gate: usize) -> f64 {
-        self.lidar_y_m + self.range_m[gate] * self.rays[ray].elevation_rad.cos()
+        self.place_m(ray)[1] + self.range_m[gate] * self.direction(ray)[1]
+    }
+
+    /// Position of a gate along the flight, m.
+    pub fn x_m(&self, ray: usize, gate: usize) -> f64 {
+        self.place_m(ray)[0] + self.range_m[gate] * self.direction(ray)[0]
+    }
+
+    /// Where the lidar is at a ray, m.
+    fn place_m(&self, ray: usize) -> [f64; 3] {
+        let here = [self.flight.map_or(0.0, |(x_m, _)| x_m), self.lidar_y_m, self.lidar_height_m];
+        self.places_m.as_ref().and_then(|places| places.get(ray)).copied().unwrap_or(here)
+    }
+
+    /// Direction of a ray in the axes of the flow.
+    fn direction(&self, ray: usize) -> [f64; 3] {
+        let Ray { azimuth_rad, elevation_rad, .. } = self.rays[ray];
+        let from_x_rad = self.flight.map_or(FRAC_PI_2, |(_, x_rad)| azimuth_rad - x_rad);
+        Direction::new(from_x_rad, elevation_rad).0
     }
 
     /// Height of a gate above the ground, m.
     pub fn z_m(&self, ray: usize, gate: usize) -> f64 {
-        self.lidar_height_m + self.range_m[gate] * self.rays[ray].elevation_rad.sin()
+        self.place_m(ray)[2] + self.range_m[gate] * self.rays[ray].elevation_rad.sin()
+    }
+
+    /// The kinds of its sweeps, each once, in their order.
+    pub fn modes(&self) -> Vec<SweepMode> {
+        let mut modes: Vec<SweepMode> = Vec::new();
+        for sweep in &self.sweeps {
+            if !modes.contains(&sweep.mode) {
+                modes.push(sweep.mode);
+            }
+        }
+        modes
+    }
+
+    /// The sweeps of one kind alone.
+    #[must_use]
+    pub fn of_mode(&self, mode: SweepMode) -> Self {
+        let is_of = |ray: &usize| self.sweeps.get(self.rays[*ray].sweep).is_some_and(|sweep| sweep.mode == mode);
+        let rays: Vec<usize> = (0..self.rays.len()).filter(is_of).collect();
+        let before = |sweep: usize| self.sweeps[..sweep].iter().filter(|s| s.mode == mode).count();
+        let field = |field: &Field| Field { values: field.values.select(Axis(0), &rays), ..field.clone() };
+        Self {
+            rays: rays.iter().map(|&ray| Ray { sweep: before(self.rays[ray].sweep), ..self.rays[ray] }).collect(),
+            sweeps: self.sweeps.iter().copied().filter(|sweep| sweep.mode == mode).collect(),
+            ray_pulses: self.ray_pulses.as_ref().map(|all| rays.iter().map(|&ray| all[ray]).collect()),
+            places_m: self.places_m.as_ref().map(|all| rays.iter().map(|&ray| all[ray]).collect()),
+            fields: self.fields.iter().map(field).collect(),
+            ..self.clone()
+        }
     }
 
     /// The field of that name.
@@ -239,6 +302,10 @@ impl VelocityMap {
             return Err(OutputError::value("range_m", format!("{:?}", self.range_m[0]), "must be positive"));
         }
         self.check_rays()?;
+        let counts = [self.ray_pulses.as_ref().map(Vec::len), self.places_m.as_ref().map(Vec::len)];
+        for (name, count) in ["ray_pulses", "places_m"].into_iter().zip(counts) {
+            same_length(name, count.unwrap_or(self.rays.len()), "rays", self.rays.len())?;
+        }
         for (i, field) in self.fields.iter().enumerate() {
             if self.fields[..i].iter().any(|f| f.name == field.name) {
                 return Err(OutputError::Duplicate { what: "field", name: field.name.clone() });

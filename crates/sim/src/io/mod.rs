@@ -14,15 +14,18 @@
 //! | [`csv_input`] | (reader) tables of texts | - |
 //! | [`raw`], [`number`] | (readers) raw signals in NetCDF, NPY, NPZ, tables and binary files | - |
 //! | [`scans`] | (readers) scans of radial velocity: CfRadial, `.hpl`, tables | - |
+//! | [`scan_list`] | (reader) lines of sight of a scan | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
-//! | `text_file`, `netcdf_header`, `netcdf_input`, `planes_input` | (readers) texts, classic NetCDF, cross-planes in it | `netcdf` but for texts |
+//! | `text_file`, `netcdf_header`, `netcdf_input`, `planes_input`, `fields_input` | (readers) texts, classic NetCDF, cross-planes and fields in it | `netcdf` but for texts |
 //! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
 //! | `cfradial`, `cf_planes`, `cf_fields`, `cf_signals`, `cf_spectra` (through `netcdf`) | classic NetCDF | `netcdf` |
 //! | `vtr` | VTK rectilinear grids and their collection | `vtk` |
 
 pub mod atomic;
+#[cfg(feature = "netcdf")]
+pub(crate) mod fields_input;
 #[cfg(feature = "netcdf")]
 pub(crate) mod netcdf_header;
 #[cfg(feature = "netcdf")]
@@ -56,6 +59,7 @@ pub mod number;
 pub mod own;
 pub mod provenance;
 pub mod raw;
+pub mod scan_list;
 pub mod scans;
 pub mod signals;
 pub mod site;

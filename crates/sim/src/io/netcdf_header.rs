@@ -34,9 +34,9 @@ pub(crate) enum Attribute {
 pub(crate) struct Header {
     /// Names and lengths of the dimensions.
     pub(crate) dims: Vec<(String, u64)>,
-    /// Attributes of the file itself.
-    pub(crate) attributes: Vec<(String, Attribute)>,
     pub(crate) variables: Vec<Variable>,
+    /// Attributes of the whole file.
+    pub(crate) attributes: Vec<(String, Attribute)>,
     /// Bytes from one record to the next.
     pub(crate) record_bytes: u64,
 }

@@ -29,14 +29,31 @@ pub(crate) struct Role {
 }
 
 /// Time, or the age of a wake.
-pub(crate) const TIME: Role = Role { name: "time", axis: "T", others: &["tau", "t", "age"] };
+pub(crate) const TIME: Role = Role { name: "time", axis: "T", others: &["tau", "t", "age", "xtime"] };
 /// Along the flight.
-#[cfg(feature = "flow")]
-pub(crate) const X: Role = Role { name: "x", axis: "X", others: &["x_face", "xc", "xf", "xu"] };
+pub(crate) const X: Role =
+    Role { name: "x", axis: "X", others: &["x_face", "xc", "xf", "xu", "west_east", "west_east_stag"] };
 /// Across the flight.
-pub(crate) const Y: Role = Role { name: "y", axis: "Y", others: &["y_face", "yc", "yf", "yv", "lateral"] };
+pub(crate) const Y: Role =
+    Role { name: "y", axis: "Y", others: &["y_face", "yc", "yf", "yv", "lateral", "south_north", "south_north_stag"] };
 /// Up.
-pub(crate) const Z: Role = Role { name: "z", axis: "Z", others: &["z_face", "zc", "zf", "zw", "height", "altitude"] };
+pub(crate) const Z: Role = Role {
+    name: "z",
+    axis: "Z",
+    others: &[
+        "z_face",
+        "zc",
+        "zf",
+        "zw",
+        "height",
+        "altitude",
+        "zu",
+        "zu_3d",
+        "zw_3d",
+        "bottom_top",
+        "bottom_top_stag",
+    ],
+};
 
 /// A classic NetCDF file, open.
 pub(crate) struct ClassicFile {
@@ -145,19 +162,44 @@ impl ClassicFile {
         self.variable(variable)?.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value)
     }
 
+    /// A number among the attributes of the whole file.
+    pub(crate) fn global_number(&self, name: &str) -> Option<f64> {
+        self.header.attributes.iter().find_map(|(n, value)| match value {
+            Attribute::Number(number) if n == name => Some(*number),
+            _ => None,
+        })
+    }
+
     /// A variable as `f64`, whatever its type of number; NaN where a value is missing.
     ///
     /// # Errors
     /// A variable that is not there, not made of numbers, too large, or not readable.
     pub(crate) fn floats(&mut self, name: &str) -> Result<Vec<f64>, String> {
+        self.part(name, None)
+    }
+
+    /// The values at one place of the slowest dimension of a variable, or all of them.
+    fn part(&mut self, name: &str, place: Option<usize>) -> Result<Vec<f64>, String> {
         let Some(variable) = self.variable(name) else {
             return Err(format!("it has no variable {name}"));
         };
         if variable.number == NumberType::Text {
             return Err(format!("variable {name} is not made of numbers"));
         }
-        let (number, begin, runs) = (variable.number, variable.begin, variable.runs);
-        let run_bytes = variable.run_bytes();
+        let (number, mut begin, mut runs) = (variable.number, variable.begin, variable.runs);
+        let (mut run_bytes, mut first) = (variable.run_bytes(), 0);
+        if let Some(place) = place {
+            let places = variable.dims.first().map_or(1, |dim| self.header.dims[*dim].1).max(1);
+            if place as u64 >= places {
+                return Err(format!("variable {name} has no place {place}"));
+            }
+            if runs == places && places > 1 {
+                (first, runs) = (place as u64, 1);
+            } else {
+                run_bytes = run_bytes * runs / places;
+                (begin, runs) = (begin + place as u64 * run_bytes, 1);
+            }
+        }
         let bytes = run_bytes.saturating_mul(runs);
         if bytes > LARGEST_VARIABLE_BYTES {
             return Err(format!("variable {name} has more than {LARGEST_VARIABLE_BYTES} bytes: use one file per time"));
@@ -177,7 +219,7 @@ impl ClassicFile {
         let mut values = Vec::new();
         values.try_reserve_exact((bytes / number.bytes()) as usize).map_err(|e| format!("variable {name}: {e}"))?;
         let mut raw = vec![0; run_bytes as usize];
-        for run in 0..runs {
+        for run in first..first + runs {
             let at = SeekFrom::Start(begin + run * self.header.record_bytes);
             self.file
                 .seek(at)
@@ -196,6 +238,12 @@ impl ClassicFile {
             dim == role.name || role.others.contains(&dim.as_str())
         };
         dims.iter().position(of_name).or_else(|| dims.iter().position(of_axis))
+    }
+
+    /// The dimension of a variable that has a role, if there is one.
+    pub(crate) fn dim_of(&self, name: &str, role: Role) -> Option<String> {
+        let dims = self.dims(name)?;
+        self.find(&dims, role).map(|place| dims[place].to_owned())
     }
 
     /// The dimensions of a variable that have these roles, in their order; dimensions of length 1 may be left over.
@@ -231,7 +279,8 @@ impl ClassicFile {
         found.try_into().map_err(|_| format!("{name} has one dimension for two of its axes"))
     }
 
-    fn length(&self, dim: &str) -> Option<u64> {
+    /// Length of a dimension.
+    pub(crate) fn length(&self, dim: &str) -> Option<u64> {
         self.header.dims.iter().find(|(name, _)| name == dim).map(|(_, length)| *length)
     }
 
@@ -256,8 +305,24 @@ impl ClassicFile {
     /// # Errors
     /// As [`Self::floats`].
     pub(crate) fn ordered(&mut self, name: &str, order: &[String]) -> Result<Vec<f64>, String> {
-        let dims: Vec<String> = self.dims(name).unwrap_or_default().into_iter().map(str::to_owned).collect();
-        let values = self.floats(name)?;
+        self.ordered_part(name, order, None)
+    }
+
+    /// The same of one place of the slowest dimension, which `order` then leaves out.
+    ///
+    /// # Errors
+    /// As [`Self::floats`].
+    pub(crate) fn ordered_part(
+        &mut self,
+        name: &str,
+        order: &[String],
+        place: Option<usize>,
+    ) -> Result<Vec<f64>, String> {
+        let mut dims: Vec<String> = self.dims(name).unwrap_or_default().into_iter().map(str::to_owned).collect();
+        if place.is_some() && !dims.is_empty() {
+            dims.remove(0);
+        }
+        let values = self.part(name, place)?;
         if dims == order {
             return Ok(values);
         }

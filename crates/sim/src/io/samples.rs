@@ -28,7 +28,7 @@ pub(crate) fn map() -> VelocityMap {
         title: "two sweeps".into(),
         rays,
         range_m: (0..gates).map(|g| 45.0 + 30.0 * g as f64).collect(),
-        sweeps: [2.5, 5.0].map(|tau| Sweep { tau, azimuth_rad: std::f64::consts::FRAC_PI_2 }).to_vec(),
+        sweeps: [2.5, 5.0].map(|tau| Sweep::rhi(tau, std::f64::consts::FRAC_PI_2)).to_vec(),
         pulse: PulseInfo {
             prt_s: 5e-5,
             pulse_width_s: 2e-7,
@@ -84,6 +84,9 @@ pub(crate) fn map() -> VelocityMap {
         ],
         lidar_y_m: -150.0,
         lidar_height_m: 2.0,
+        flight: None,
+        ray_pulses: None,
+        places_m: None,
         site: Site::default(),
         is_simulated: true,
     }

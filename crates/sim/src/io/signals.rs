@@ -48,6 +48,8 @@ pub struct RawSignals<'a> {
     pub quadrature_a: Option<ArrayView2<'a, f64>>,
     /// Elevation of each pulse of one realisation, rad.
     pub elevation_rad: Vec<f64>,
+    /// Azimuth of each of them, rad; empty for a scan in one plane.
+    pub azimuth_rad: Vec<f64>,
     /// Time of each sample after the middle of the pulse left, s; increasing.
     pub time_s: Vec<f64>,
     /// Pulses of one line of sight, which stand together.
@@ -65,6 +67,9 @@ impl RawSignals<'_> {
         let pulses = self.elevation_rad.len();
         same_length("current_a", self.current_a.nrows(), "elevation_rad", pulses * self.realisations())?;
         same_length("pulse_time_s", self.pulse_time_s.len(), "elevation_rad", pulses)?;
+        if !self.azimuth_rad.is_empty() {
+            same_length("azimuth_rad", self.azimuth_rad.len(), "elevation_rad", pulses)?;
+        }
         if let Some(quadrature) = &self.quadrature_a {
             same_length("quadrature_a", quadrature.nrows(), "current_a", self.current_a.nrows())?;
             same_length("quadrature_a", quadrature.ncols(), "time_s", self.time_s.len())?;
@@ -136,6 +141,7 @@ pub(crate) fn example() -> RawSignals<'static> {
         quadrature_a: None,
         elevation_rad: vec![0.0, 0.0, 0.1, 0.1],
         time_s: vec![1e-6, 2e-6, 3e-6],
+        azimuth_rad: Vec::new(),
         pulses_per_line: 2,
     }
 }

@@ -24,6 +24,9 @@ pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
     for field in &map.fields {
         table = table.column(&field.column(), field_column(field));
     }
+    if map.flight.is_some() {
+        table = table.float("x_m", cells().map(|(r, g)| map.x_m(r, g)));
+    }
     Ok(table
         .float("azimuth_rad", per_ray(&|r| map.rays[r].azimuth_rad))
         .float("time_s", per_ray(&|r| map.rays[r].time_s))

@@ -88,6 +88,7 @@ impl<F: Fn(Offer) -> Answer> Prober<F> {
             // The whole numbers of TOML end here.
             "u64" | "usize" => Kind::Whole { largest: i64::MAX as u64 },
             "a boolean" => Kind::Switch,
+            "a string" => Kind::Text,
             "a sequence" => list(None),
             _ => match what.strip_prefix("an array of length ").and_then(|len| len.parse().ok()) {
                 Some(len) => list(Some(len)),
@@ -235,9 +236,11 @@ mod tests {
         let Kind::Tagged { kinds, .. } = &find(pulse, "shape").kind else { panic!("tagged") };
         assert_eq!(find(&kinds[0].1, "definition").kind, Kind::Choice(&["fwhm", "one_over_e_half_width"]));
         let Kind::Tagged { tag: "kind", kinds } = &find(&scene, "flow").kind else { panic!("tagged") };
-        assert_eq!(kinds.iter().map(|k| k.0).collect::<Vec<_>>(), ["calm", "uniform", "vortex_pair", "simulated"]);
-        assert!(kinds[1].1.iter().all(|key| key.is_required && key.kind == Kind::Number) && kinds[1].1.len() == 2);
-        assert!(kinds[2].1.iter().all(|key| !key.is_required));
+        let names = ["calm", "uniform", "linear", "vortex_lines", "vortex_pair", "simulated", "fields"];
+        assert_eq!(kinds.iter().map(|k| k.0).collect::<Vec<_>>(), names);
+        let required: Vec<&str> = kinds[1].1.iter().filter(|key| key.is_required).map(|key| key.name).collect();
+        assert!(required == ["lateral_m_s", "vertical_m_s"] && kinds[1].1.iter().all(|key| key.kind == Kind::Number));
+        assert!(kinds[4].1.iter().all(|key| !key.is_required));
         let Kind::Table(estimator) = &find(&scene, "estimator").kind else { panic!("a table") };
         assert_eq!(find(estimator, "false_alarm").kind, Kind::Number, "what may be absent");
         let Kind::Tagged { kinds, .. } = &find(estimator, "method").kind else { panic!("tagged") };

@@ -5,7 +5,7 @@
 
 use crate::io::Table;
 use crate::measure::progress::Observer;
-use crate::measure::region::{of_table, region_radius};
+use crate::measure::region::{of_table, places, region_radius};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::{Error, measure::estimators};
@@ -59,12 +59,11 @@ impl Setting {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let noise = scene.detector.noise;
         let model = estimators::window_model(scene, noise, &plan.instrument.pulse)?.ok_or(Error::NoBound)?;
-        let (sampling, gates, pulses) =
-            (estimators::sampling(scene)?, estimators::gates(scene)?, scene.scan.pulses_per_line);
-        let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
+        let places = places(scene, g)?;
         let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
         let radius = region_radius(scene, &plan.instrument.pulse, &scanner.layer_snr(), &places, &correlation)?;
-        let elevation_rad = g.elevation_rad[g.elevation_rad.len() / 2];
+        let lines = places.line_elevation_rad();
+        let elevation_rad = lines[lines.len() / 2];
         Ok(Self { model, kind: estimators::signal_kind(scene), places, correlation, radius, elevation_rad })
     }
 

@@ -4,14 +4,18 @@
 
 use crate::Error;
 use crate::SPEED_OF_LIGHT_M_S;
+use crate::beams::Schedule;
+use crate::measure::scan_lines;
 use crate::measure::wind::SceneWind;
-use crate::scene::Scene;
+use crate::scene::SceneFile;
 use wakescope_signal::{LayerLimits, Pulse};
 
 /// The sampling of one scan in angle, range and time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Geometry {
-    /// Elevation of each line of sight, rad.
+    /// The lines of sight and the beams of their pulses.
+    pub schedule: Schedule,
+    /// Elevation of the middle of each line of sight, rad.
     pub elevation_rad: Vec<f64>,
     /// Time of the middle of the pulses of each line, s from the start of the scan.
     pub line_time_s: Vec<f64>,
@@ -39,13 +43,13 @@ impl Geometry {
     /// The sampling of a checked scene; the layers are as thin as its steepest wind needs.
     ///
     /// # Errors
-    /// What the wind or the layers refuse; a checked scene gives none.
-    pub fn new(scene: &Scene, pulse: &Pulse, wind: &SceneWind) -> Result<Self, Error> {
-        let scan = &scene.scan;
-        let lines = ((scan.elevation_max_rad - scan.elevation_min_rad) / scan.elevation_step_rad + 1e-9) as usize + 1;
-        let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
-        let pulses = scan.pulses_per_line as f64;
-        let line_time_s: Vec<f64> = (0..lines).map(|i| (i as f64 * pulses + 0.5 * (pulses - 1.0)) * prt_s).collect();
+    /// What the wind or the layers refuse, which is nothing for a checked scene; a list of lines that cannot be read or followed,
+    /// beams below the ground.
+    pub fn new(file: &SceneFile, pulse: &Pulse, wind: &SceneWind) -> Result<Self, Error> {
+        let (scene, scan) = (&file.scene, &file.scene.scan);
+        let schedule = scan_lines::schedule(file)?;
+        let middles: Vec<_> = (0..schedule.lines.len()).map(|line| schedule.middle(line)).collect();
+        let line_time_s: Vec<f64> = middles.iter().map(|beam| beam.time_s).collect();
         let max_gradient_per_s = wind.max_gradient_per_s(&line_time_s);
         let sample_spacing_m = scene.sample_spacing_m();
         let samples = scene.samples_per_record();
@@ -62,7 +66,8 @@ impl Geometry {
         let (near, far) = (reach(last_s), reach(-first_s));
         let record_m = (samples - 1) as f64 * sample_spacing_m;
         Ok(Self {
-            elevation_rad: (0..lines).map(|i| scan.elevation_min_rad + i as f64 * scan.elevation_step_rad).collect(),
+            elevation_rad: middles.iter().map(|beam| beam.elevation_rad).collect(),
+            schedule,
             line_time_s,
             samples,
             first_range_m: scan.range_min_m,

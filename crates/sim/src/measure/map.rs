@@ -4,6 +4,7 @@ use crate::Error;
 use crate::measure::estimators;
 use crate::measure::map_estimator::{self, MapEstimator, NoiseAtPoints};
 use crate::measure::progress::Observer;
+use crate::measure::region::places;
 use crate::measure::scan::{Scanner, radial_velocity_m_s};
 use crate::plan::{Plan, Stage};
 use ndarray::{Array2, ArrayView1, ArrayView2};
@@ -29,6 +30,8 @@ pub struct VelocityEstimates {
     pub v_pulse_m_s: Array2<f64>,
     /// The same weighted with pulse and window.
     pub v_gate_m_s: Array2<f64>,
+    /// Standard deviation of `v_pulse_m_s` over the pulses of a line, m/s, where they have airs of their own: it widens spectra.
+    pub v_spread_m_s: Option<Array2<f64>>,
     /// Estimate of the first realisation, m/s; NaN where there is no true velocity, as in the mean.
     pub v_scan_m_s: Array2<f64>,
     /// Mean estimate over the realisations, m/s.
@@ -113,6 +116,7 @@ pub(crate) struct Mapper<S> {
 }
 
 struct Truth {
+    spread_m_s: Option<Array2<f64>>,
     exact_m_s: Array2<f64>,
     pulse_m_s: Array2<f64>,
     gate_m_s: Array2<f64>,
@@ -121,12 +125,10 @@ struct Truth {
 impl<S: Sample> Mapper<S> {
     pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
-        let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
-        let pulses = scene.scan.pulses_per_line;
-        let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
+        let places = places(scene, g)?;
         let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
-        let points = polar_points(&g.elevation_rad, &g.gate_range_m);
+        let points = polar_points(places.line_elevation_rad(), &g.gate_range_m);
         Ok(Self {
             noise: estimator.noise(&places, &points)?,
             estimator,
@@ -194,6 +196,7 @@ impl<S: Sample> Mapper<S> {
             v_exact_m_s: self.truth.exact_m_s,
             v_pulse_m_s: self.truth.pulse_m_s,
             v_gate_m_s: self.truth.gate_m_s,
+            v_spread_m_s: self.truth.spread_m_s,
             level: self.level,
             n_eff: self.n_eff,
             flagged: self.figures.flagged / self.realisations.max(1) as f64,
@@ -209,8 +212,9 @@ impl<S: Sample> Mapper<S> {
 fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let shape = (g.elevation_rad.len(), g.gate_range_m.len());
-    let mut truth =
-        Truth { exact_m_s: Array2::zeros(shape), pulse_m_s: Array2::zeros(shape), gate_m_s: Array2::zeros(shape) };
+    let zeros = || Array2::zeros(shape);
+    let spread_m_s = scanner.spread_m_s().cloned();
+    let mut truth = Truth { spread_m_s, exact_m_s: zeros(), pulse_m_s: zeros(), gate_m_s: zeros() };
     let pulse = &plan.instrument.pulse;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;

@@ -4,10 +4,11 @@
 //! |---|---|
 //! | [`instrument`], [`estimators`] | a scene in the words of the other crates, made once for a plan |
 //! | [`wind`] | the wind: analytic, or the planes of a simulated flow |
-//! | [`geometry`] | lines of sight, samples, gates, layers |
+//! | [`geometry`], `scan_lines` | lines of sight, samples, gates, layers |
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | `efficiencies` | efficiency curves that several scans share |
 //! | [`scan`] | air along the lines of sight, and their records |
+//! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
 //! | [`map`], `map_estimator`, [`cell_average`] | estimates and their errors against the truth |
 //! | [`recorded`] | the same from the records of a file, measured or simulated |
 //! | [`mod@bound`] | the Cramer-Rao bound for a scene |
@@ -15,6 +16,7 @@
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
 //! | [`progress`], [`streams`] | who watches a run; one random stream for each pulse |
 
+pub mod beam_winds;
 pub mod bound;
 pub mod budget;
 pub mod cell_average;
@@ -32,6 +34,7 @@ pub(crate) mod region;
 pub(crate) mod response;
 pub mod run;
 pub mod scan;
+pub(crate) mod scan_lines;
 pub mod streams;
 pub mod wind;
 pub mod write;

@@ -2,6 +2,7 @@
 //!
 //! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
 
+use crate::measure::geometry::Geometry;
 use crate::scene::{Method, NoiseKind, RegionRadius, Scene};
 use crate::{Error, measure::estimators};
 use ndarray::Array2;
@@ -13,6 +14,22 @@ use wakescope_signal::Pulse;
 
 /// Signal-to-noise ratio that stands for no noise where a bound is asked for.
 const NO_NOISE_SNR: f64 = 1e6;
+
+/// Where the windows of a scan are: in one plane if it is a plain RHI, else on a sphere.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub(crate) fn places(scene: &Scene, g: &Geometry) -> Result<ScanGeometry, Error> {
+    let (sampling, gates, scan) = (estimators::sampling(scene)?, estimators::gates(scene)?, &g.schedule);
+    if scan.is_plane() {
+        let pulses = scan.lines.first().map_or(1, |line| line.pulses);
+        return Ok(ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?);
+    }
+    let direction: Vec<[f64; 3]> = (0..scan.lines.len()).map(|line| scan.middle(line).direction.0).collect();
+    let group: Vec<usize> = scan.lines.iter().map(|line| line.group).collect();
+    let first: Vec<usize> = scan.lines.iter().map(|line| line.first).chain([scan.pulses()]).collect();
+    Ok(ScanGeometry::on_sphere(&sampling, &gates, &direction, &group, &first, g.samples)?)
+}
 
 /// The radius of a scene's regions; `layer_snr` holds range, m, and expected signal-to-noise ratio of the layers of a line.
 ///

@@ -1,6 +1,7 @@
 //! One scan: the air along each line of sight, and the signals that it returns.
 
 use crate::Error;
+use crate::beams::{Beam, Line};
 use crate::measure::efficiencies::Efficiencies;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
@@ -8,7 +9,7 @@ use crate::measure::profile::{drawn_turbulence, efficiency_by_theory, model, spa
 use crate::measure::progress::Observer;
 use crate::measure::streams::stream;
 use crate::plan::{Plan, Stage};
-use crate::scene::{DetectorSignal, Outside, Scene, SecondTrip, SnrReference};
+use crate::scene::{DetectorSignal, Outside, Scene, SecondTrip, SnrReference, WindOfPulses};
 use ndarray::{Array2, ArrayView2};
 use rand_xoshiro::rand_core::Rng;
 use rayon::prelude::*;
@@ -18,7 +19,7 @@ use wakescope_signal::digitise::Clipped;
 use wakescope_signal::efficiency::{EfficiencyTable, LayerEfficiency};
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::scan::{PulseKey, Sample};
-use wakescope_signal::{LineOfSight, Pulse, Record, Scan, Shot, Simulator};
+use wakescope_signal::{LineOfSight, Pulse, RangeFilter, Record, Scan, Shot, Simulator};
 
 /// Ranges of the efficiency profile from which the layers take theirs, m: dense where it is a quadrature, few
 /// where each costs transforms and the errors of neighbours are alike.
@@ -33,10 +34,15 @@ pub(crate) fn profile_ranges_m(scene: &Scene, geometry: &Geometry) -> Vec<f64> {
 
 /// The lines of sight of a scan, and what makes signals of them.
 pub struct Scanner<'a> {
+    plan: &'a Plan,
     scene: &'a Scene,
     instrument: &'a Instrument,
     simulator: Simulator,
+    /// The air of each line: that of its middle, or the mean of the airs of its pulses.
     lines: Vec<LineOfSight>,
+    /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the pulses
+    /// have airs of their own.
+    spread_m_s: Option<Array2<f64>>,
     /// What each pulse brings instead of the mean efficiency.
     efficiency: Option<LayerEfficiency>,
     /// The air that the pulse before lights meanwhile, if the scene asks for its echo.
@@ -60,20 +66,29 @@ impl<'a> Scanner<'a> {
         let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
         let weight_per_m = layer_weights(plan, known, observer)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
-        let lines = (0..geometry.elevation_rad.len())
-            .into_par_iter()
-            .map(|i| {
-                let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
-                let radial_velocity_m_s = radial_velocity_m_s(plan, i, &ranges_m)?;
+        let airs = LineAirs::new(plan)?;
+        let all: Vec<usize> = (0..geometry.schedule.lines.len()).collect();
+        let lines = in_time_order(
+            plan,
+            &all,
+            |line| geometry.line_time_s[*line],
+            |&line| {
+                let air = airs.of_line(line)?;
                 observer.advance(1);
-                Ok(LineOfSight {
-                    first_range_m: geometry.first_layer_range_m,
-                    layer_thickness_m: geometry.layer_thickness_m,
-                    radial_velocity_m_s,
-                    weight_per_m: weight_per_m.clone(),
-                })
-            })
-            .collect::<Result<Vec<_>, Error>>()?;
+                Ok(air)
+            },
+        )?;
+        let (velocities, spreads): (Vec<_>, Vec<_>) = lines.into_iter().unzip();
+        let of_velocity = |radial_velocity_m_s| LineOfSight {
+            first_range_m: geometry.first_layer_range_m,
+            layer_thickness_m: geometry.layer_thickness_m,
+            radial_velocity_m_s,
+            weight_per_m: weight_per_m.clone(),
+        };
+        let lines: Vec<LineOfSight> = velocities.into_iter().map(of_velocity).collect();
+        let spreads: Option<Vec<f64>> = spreads.into_iter().collect::<Option<Vec<Vec<f64>>>>().map(|all| all.concat());
+        let shape = (lines.len(), geometry.gate_range_m.len());
+        let spread_m_s = spreads.and_then(|values| Array2::from_shape_vec(shape, values).ok());
         observer.end();
         let efficiency = drawn_efficiency(plan, &lines, known, observer)?;
         let record = Record {
@@ -85,7 +100,7 @@ impl<'a> Scanner<'a> {
             DetectorSignal::Baseband => Simulator::for_baseband(&instrument.pulse, instrument.receiver, record)?,
         };
         let previous = previous_air(plan, &lines)?;
-        Ok(Self { scene, instrument, simulator, lines, efficiency, previous })
+        Ok(Self { plan, scene, instrument, simulator, lines, spread_m_s, efficiency, previous })
     }
 
     /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
@@ -132,6 +147,12 @@ impl<'a> Scanner<'a> {
         &self.lines
     }
 
+    /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the
+    /// pulses have airs of their own.
+    pub fn spread_m_s(&self) -> Option<&Array2<f64>> {
+        self.spread_m_s.as_ref()
+    }
+
     /// The signals of one realisation \[pulse, sample\], A; the pulses of a line stand together.
     ///
     /// # Errors
@@ -142,7 +163,7 @@ impl<'a> Scanner<'a> {
 
     /// Pulses of one realisation.
     pub fn pulses(&self) -> usize {
-        self.lines.len() * self.scene.scan.pulses_per_line
+        self.plan.geometry.schedule.pulses()
     }
 
     /// Hands the signals of one realisation to `sink`, piece after piece: the number of the first pulse and the records
@@ -160,7 +181,12 @@ impl<'a> Scanner<'a> {
         observer: &dyn Observer,
         mut sink: impl FnMut(usize, ArrayView2<'_, T>) -> Result<(), Error>,
     ) -> Result<Clipped, Error> {
-        let size = records_at_once::<T>(self.simulator.record().samples, self.pulses());
+        let mut size = records_at_once::<T>(self.simulator.record().samples, self.pulses());
+        if self.spread_m_s.is_some() {
+            // Each pulse brings its air: velocity and weight of each layer.
+            let layers = self.plan.geometry.layers.max(1);
+            size = size.min((AIRS_BYTES as usize / (16 * layers)).max(rayon::current_num_threads()));
+        }
         let mut clipped = Clipped::default();
         for first in (0..self.pulses()).step_by(size) {
             let last = (first + size).min(self.pulses());
@@ -178,8 +204,9 @@ impl<'a> Scanner<'a> {
         pulses: Range<usize>,
         observer: &dyn Observer,
     ) -> Result<(Array2<T>, Clipped), Error> {
-        let per_line = self.scene.scan.pulses_per_line;
+        let schedule = &self.plan.geometry.schedule;
         let index = |key: PulseKey| realisation * self.pulses() + pulses.start + key.pulse;
+        let (airs, air_of) = self.airs(&pulses)?;
         let scan = Scan {
             simulator: &self.simulator,
             // One line after the other, which the simulation of signals need not know.
@@ -187,21 +214,144 @@ impl<'a> Scanner<'a> {
             pulses_per_line: pulses.len(),
             shot: |key: PulseKey| {
                 let pulse = pulses.start + key.pulse;
-                if pulse.is_multiple_of(per_line) {
+                let line = schedule.line_of(pulse);
+                if schedule.lines[line].first == pulse {
                     observer.advance(1);
                 }
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
-                let previous = self.previous.as_ref().map(|lines| &lines[pulse / per_line]);
+                let previous = self.previous.as_ref().map(|lines| &lines[line]);
                 let is_plain = self.is_plain();
                 let aside_seed =
                     if is_plain { 0 } else { stream(self.scene.seed, "asides", index(key) as u64).next_u64() };
-                Shot { line: &self.lines[pulse / per_line], efficiency, previous, aside_seed }
+                let air = air_of.get(key.pulse).and_then(|air| airs.get(*air));
+                Shot { line: air.unwrap_or(&self.lines[line]), efficiency, previous, aside_seed }
             },
             generator: |key| stream(self.scene.seed, "signal", index(key) as u64),
             digitiser: self.instrument.digitiser,
         };
         Ok(scan.collect()?)
     }
+
+    /// The airs of some pulses, and which one each of them meets; none where lines have one air.
+    fn airs(&self, pulses: &Range<usize>) -> Result<(Vec<LineOfSight>, Vec<usize>), Error> {
+        if self.spread_m_s.is_none() {
+            return Ok((Vec::new(), Vec::new()));
+        }
+        let (schedule, of) = (&self.plan.geometry.schedule, self.scene.scan.wind_of_pulses);
+        let mut wanted: Vec<(usize, usize)> = Vec::new();
+        let air_of = pulses
+            .clone()
+            .map(|pulse| {
+                let line = schedule.line_of(pulse);
+                let Line { first, pulses, .. } = schedule.lines[line];
+                let air = (line, (pulse - first) * of.of_line(pulses) / pulses);
+                if wanted.last() != Some(&air) {
+                    wanted.push(air);
+                }
+                wanted.len() - 1
+            })
+            .collect();
+        let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
+        let beams: Vec<(usize, Beam)> =
+            wanted.iter().map(|&(line, air)| (line, beam_of_air(self.plan, line, air))).collect();
+        let airs = in_time_order(
+            self.plan,
+            &beams,
+            |(_, beam)| beam.time_s,
+            |(line, beam)| {
+                Ok(LineOfSight {
+                    radial_velocity_m_s: velocity_along(self.plan, beam, &ranges_m)?,
+                    ..self.lines[*line].clone()
+                })
+            },
+        )?;
+        Ok((airs, air_of))
+    }
+}
+
+/// The beam in the middle of the pulses that share an air of a line.
+fn beam_of_air(plan: &Plan, line: usize, air: usize) -> Beam {
+    let schedule = &plan.geometry.schedule;
+    let pulses = schedule.lines[line].pulses;
+    let airs = plan.scene.scene.scan.wind_of_pulses.of_line(pulses);
+    if airs == pulses {
+        return schedule.beam_of_pulse(line, air);
+    }
+    // Pulse p meets air p airs/pulses, rounded down.
+    let first = |air: usize| (air * pulses).div_ceil(airs);
+    schedule.beam(line, 0.5 * (first(air) + first(air + 1) - 1) as f64)
+}
+
+/// Velocities of the layers of a line, and their spread over its pulses at the gates.
+type LineAir = (Vec<f64>, Option<Vec<f64>>);
+
+/// What the air of lines is made with.
+struct LineAirs<'a> {
+    plan: &'a Plan,
+    ranges_m: Vec<f64>,
+    filter: RangeFilter,
+}
+
+impl<'a> LineAirs<'a> {
+    fn new(plan: &'a Plan) -> Result<Self, Error> {
+        let g = &plan.geometry;
+        let filter = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
+        Ok(Self { plan, ranges_m: g.layer_range_m().collect(), filter })
+    }
+
+    /// The mean air of the pulses of a line, and where they have airs of their own the spread of what they see.
+    fn of_line(&self, line: usize) -> Result<LineAir, Error> {
+        let (plan, g) = (self.plan, &self.plan.geometry);
+        let pulses = g.schedule.lines[line].pulses;
+        let of = plan.scene.scene.scan.wind_of_pulses;
+        if of == WindOfPulses::default() {
+            return Ok((radial_velocity_m_s(plan, line, &self.ranges_m)?, None));
+        }
+        let airs = of.of_line(pulses);
+        let mut mean_m_s = vec![0.0; self.ranges_m.len()];
+        let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
+        let mut seen_m_s = vec![0.0; g.gate_range_m.len()];
+        let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
+        for air in 0..airs {
+            let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64 / pulses as f64;
+            let air_m_s = velocity_along(plan, &beam_of_air(plan, line, air), &self.ranges_m)?;
+            self.filter.apply_into(g.first_layer_range_m, &air_m_s, &g.gate_range_m, &mut seen_m_s)?;
+            // About the first air, so that the mean of equal airs is that air.
+            if air == 0 {
+                (first_m_s, first_seen_m_s) = (air_m_s.clone(), seen_m_s.clone());
+            }
+            for ((mean, v), first) in mean_m_s.iter_mut().zip(&air_m_s).zip(&first_m_s) {
+                *mean += share * (v - first);
+            }
+            for (((sum, square), v), first) in sums.iter_mut().zip(&seen_m_s).zip(&first_seen_m_s) {
+                let beside = v - first;
+                *sum += share * beside;
+                *square += share * beside * beside;
+            }
+        }
+        mean_m_s.iter_mut().zip(&first_m_s).for_each(|(mean, first)| *mean += first);
+        Ok((
+            mean_m_s,
+            Some(sums.into_iter().map(|(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt()).collect()),
+        ))
+    }
+}
+
+/// Works on items in parallel, but on those of one stretch of the wind's times after those of the one before: a wind that is read
+/// from files then reads each once.
+fn in_time_order<T: Sync, R: Send>(
+    plan: &Plan,
+    items: &[T],
+    time_s: impl Fn(&T) -> f64,
+    work: impl Fn(&T) -> Result<R, Error> + Sync,
+) -> Result<Vec<R>, Error> {
+    let wind = &plan.wind;
+    let stretch = |item: &T| wind.stretch_of(wind.start_s + time_s(item));
+    let mut out = Vec::with_capacity(items.len());
+    for part in items.chunk_by(|a, b| stretch(a) == stretch(b)) {
+        out.extend(part.par_iter().map(&work).collect::<Result<Vec<_>, Error>>()?);
+    }
+    Ok(out)
 }
 
 fn layer_snr(
@@ -234,6 +384,9 @@ pub(crate) fn records_at_once<T>(samples: usize, pulses: usize) -> usize {
 /// Size of a piece of records, bytes.
 const PIECE_BYTES: usize = 16 << 20;
 
+/// Size of the airs of a piece, where pulses have their own, bytes.
+pub(crate) const AIRS_BYTES: f64 = (64 << 20) as f64;
+
 /// Return per metre of each layer, K^2 beta A_R eta_s/R^2, (9); the efficiency is interpolated, and left out if each pulse
 /// brings its own. A signal-to-noise ratio that the scene states takes the place of all of it.
 fn layer_weights(plan: &Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
@@ -264,7 +417,7 @@ fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfS
     let weight = |&range_m: &f64| Ok(instrument.return_per_m(range_m)? * profile.interpolated(range_m)?);
     let weight_per_m = ranges_m.iter().map(weight).collect::<Result<Vec<_>, Error>>()?;
     let far = |(i, line): (usize, &LineOfSight)| {
-        let mut velocity_m_s = known_velocity_m_s(plan, i, &ranges_m)?.1;
+        let mut velocity_m_s = known_velocity_m_s(plan, &geometry.schedule.middle(i), &ranges_m)?.1;
         velocity_m_s.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = elsewhere_m_s);
         Ok(LineOfSight { radial_velocity_m_s: velocity_m_s, weight_per_m: weight_per_m.clone(), ..line.clone() })
     };
@@ -285,12 +438,17 @@ fn drawn_efficiency(
     Ok(Some(EfficiencyTable::new(ranges_m, &realisations)?.onto_layers(line)?))
 }
 
-/// Radial velocity, m/s, positive away from the lidar, at ranges along line of sight `line`; NaN where nothing returns light:
-/// below the ground or outside the flow, if the scene masks that.
+/// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
+/// returns light: below the ground or outside the flow, if the scene masks that.
 pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+    velocity_along(plan, &plan.geometry.schedule.middle(line), range_m)
+}
+
+/// The same along a beam.
+fn velocity_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>, Error> {
     let scan = &plan.scene.scene.scan;
-    let elevation_rad = plan.geometry.elevation_rad[line];
-    let (points_m, known_m_s) = known_velocity_m_s(plan, line, range_m)?;
+    let elevation_rad = beam.elevation_rad;
+    let (points_m, known_m_s) = known_velocity_m_s(plan, beam, range_m)?;
     let checked = |((&[_, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
         let outside = match (z_m < 0.0, known_m_s.is_nan()) {
             (true, _) => scan.below_ground,
@@ -307,14 +465,11 @@ pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> 
     points_m.iter().zip(known_m_s).zip(range_m).map(checked).collect()
 }
 
-/// Places along a line of sight, m, and the radial velocity of the flow there, m/s; NaN where it is not known.
-fn known_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<(Vec<[f64; 3]>, Vec<f64>), Error> {
-    let time_s = plan.wind.start_s + plan.geometry.line_time_s[line];
-    let (sin, cos) = plan.geometry.elevation_rad[line].sin_cos();
-    let lidar_m = plan.scene.scene.scan.lidar_height_m;
-    let points_m: Vec<[f64; 3]> = range_m.iter().map(|r| [0.0, r * cos, lidar_m + r * sin]).collect();
+/// Places along a beam, m, and the radial velocity of the flow there, m/s; NaN where it is not known.
+fn known_velocity_m_s(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<(Vec<[f64; 3]>, Vec<f64>), Error> {
+    let points_m: Vec<[f64; 3]> = range_m.iter().map(|range_m| beam.at_range_m(*range_m)).collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
-    let along = velocity_m_s.iter().map(|v| v[1] * cos + v[2] * sin).collect();
+    plan.wind.wind().velocity_into(&points_m, plan.wind.start_s + beam.time_s, &mut velocity_m_s)?;
+    let along = velocity_m_s.iter().map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s)).collect();
     Ok((points_m, along))
 }

@@ -5,7 +5,7 @@
 //! treats as the scene says. Check: a scanned map shows the flow as sampled from the planes, frozen and moving.
 
 use crate::Error;
-use crate::scene::{Flow, Scene, SceneFile, VortexMotion, VortexPair, VortexProfile};
+use crate::scene::{Flow, Scene, SceneFile, VortexLines, VortexMotion, VortexPair, VortexProfile};
 use std::fmt;
 use wakescope_les::{self as les, Wind};
 
@@ -22,6 +22,8 @@ pub struct SceneWind {
     pub max_speed_m_s: f64,
     /// Where the wind comes from, in words.
     pub source: String,
+    /// Times of fields that are read when they are needed, s.
+    field_times_s: Vec<f64>,
 }
 
 impl fmt::Debug for SceneWind {
@@ -34,33 +36,69 @@ impl SceneWind {
     /// The wind of a checked scene; files are looked for relative to the folder of the scene.
     ///
     /// # Errors
-    /// What the wind refuses; planes that cannot be read, or do not hold the time that is asked for.
+    /// What the wind refuses; files that cannot be read, or do not hold the time that is asked for.
     pub fn new(file: &SceneFile) -> Result<Self, Error> {
-        match &file.scene.flow {
+        let mut whole = Self::of_flow(&file.scene.flow, file)?;
+        for (i, flow) in file.scene.added_flows.iter().enumerate() {
+            let added = Self::of_flow(flow, file)
+                .map_err(|source| Error::OfAddedFlow { number: i, source: Box::new(source) })?;
+            whole = whole.plus(added);
+        }
+        Ok(whole)
+    }
+
+    fn of_flow(flow: &Flow, file: &SceneFile) -> Result<Self, Error> {
+        match flow {
             Flow::Simulated(flow) => simulated(flow, file),
-            _ => Self::analytic(&file.scene),
+            Flow::Fields(flow) => fields(flow, file),
+            _ => Self::analytic(flow),
         }
     }
 
-    fn analytic(scene: &Scene) -> Result<Self, Error> {
-        let max_speed_m_s = match &scene.flow {
-            Flow::Uniform { lateral_m_s, vertical_m_s } => lateral_m_s.hypot(*vertical_m_s),
+    /// Both winds, each from its own start.
+    fn plus(self, other: Self) -> Self {
+        let by_s = other.start_s - self.start_s;
+        let later: Box<dyn Wind> = if by_s == 0.0 { other.wind } else { Box::new(Later { wind: other.wind, by_s }) };
+        let mut field_times_s = self.field_times_s;
+        field_times_s.extend(other.field_times_s.iter().map(|t| t - by_s));
+        field_times_s.sort_by(f64::total_cmp);
+        Self {
+            wind: Box::new(les::winds::Sum { winds: vec![self.wind, later] }),
+            end_s: self.end_s.min(other.end_s - by_s),
+            max_speed_m_s: self.max_speed_m_s + other.max_speed_m_s,
+            source: format!("{}; added: {}", self.source, other.source),
+            field_times_s,
+            ..self
+        }
+    }
+
+    fn analytic(flow: &Flow) -> Result<Self, Error> {
+        let max_speed_m_s = match flow {
+            Flow::Uniform { lateral_m_s, vertical_m_s, along_m_s } => {
+                lateral_m_s.hypot(*vertical_m_s).hypot(*along_m_s)
+            }
             Flow::VortexPair(p) => {
                 p.circulation_m2_s / (4.0 * std::f64::consts::PI * p.core_radius_m) + p.cross_wind_m_s.abs()
             }
-            Flow::Calm {} | Flow::Simulated(_) => 0.0,
+            Flow::Linear(wind) => wind.velocity_m_s.iter().map(|v| v * v).sum::<f64>().sqrt(),
+            Flow::VortexLines(lines) => {
+                let strongest = lines.circulation_m2_s.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
+                strongest / (4.0 * std::f64::consts::PI * lines.core_radius_m) + lines.axial_deficit_m_s.abs()
+            }
+            Flow::Calm {} | Flow::Simulated(_) | Flow::Fields(_) => 0.0,
         };
-        let tau = match &scene.flow {
+        let tau = match flow {
             Flow::VortexPair(pair) => pair.age_tau,
             _ => 0.0,
         };
         Ok(Self {
-            wind: analytic_wind(scene)?,
-            start_s: start_time_s(scene),
+            wind: analytic_wind(flow)?,
+            start_s: start_s(flow),
             tau,
             end_s: f64::INFINITY,
             max_speed_m_s,
             source: "the flow is analytic".into(),
+            field_times_s: Vec::new(),
         })
     }
 
@@ -71,24 +109,57 @@ impl SceneWind {
         after_start_s.iter().map(at).fold(self.wind.max_gradient_per_s(self.start_s), f64::max)
     }
 
+    /// Which stretch of its times a time, s, lies in: between two fields that are in memory together.
+    pub fn stretch_of(&self, time_s: f64) -> usize {
+        self.field_times_s.partition_point(|t| *t <= time_s)
+    }
+
     /// The wind itself.
     pub fn wind(&self) -> &dyn Wind {
         &*self.wind
     }
 }
 
-/// The wind of a scene whose flow is analytic, and calm air for another.
+/// A wind that is asked for at later times.
+struct Later {
+    wind: Box<dyn Wind>,
+    by_s: f64,
+}
+
+impl Wind for Later {
+    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), les::Error> {
+        self.wind.velocity_into(points_m, time_s + self.by_s, out_m_s)
+    }
+
+    fn max_gradient_per_s(&self, time_s: f64) -> f64 {
+        self.wind.max_gradient_per_s(time_s + self.by_s)
+    }
+}
+
+/// A flow that is analytic, and calm air for another.
 ///
 /// # Errors
 /// What the wind refuses; a checked scene gives none.
-fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
-    Ok(match &scene.flow {
-        Flow::Calm {} | Flow::Simulated(_) => Box::new(les::winds::Calm),
-        Flow::Uniform { lateral_m_s, vertical_m_s } => {
-            Box::new(les::winds::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?)
+fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
+    Ok(match flow {
+        Flow::Calm {} | Flow::Simulated(_) | Flow::Fields(_) => Box::new(les::winds::Calm),
+        Flow::Uniform { lateral_m_s, vertical_m_s, along_m_s } => {
+            Box::new(les::winds::Uniform::new([*along_m_s, *lateral_m_s, *vertical_m_s])?)
         }
+        Flow::Linear(wind) => {
+            let linear = les::winds::Linear {
+                velocity_m_s: wind.velocity_m_s,
+                gradient_per_s: [wind.gradient_u_per_s, wind.gradient_v_per_s, wind.gradient_w_per_s],
+                acceleration_m_s2: wind.acceleration_m_s2,
+            };
+            Box::new(linear.validated()?)
+        }
+        Flow::VortexLines(lines) => Box::new(vortex_lines(lines)?),
         Flow::VortexPair(pair) => {
-            let vortices = Box::new(vortex_pair(pair).wind()?);
+            let vortices: Box<dyn Wind> = match pair.aircraft {
+                Some(a) => Box::new(les::winds::AlongFlight::new(vortex_pair(pair), a.speed_m_s, a.x_m)?),
+                None => Box::new(vortex_pair(pair).wind()?),
+            };
             if pair.cross_wind_m_s == 0.0 {
                 return Ok(vortices);
             }
@@ -96,6 +167,22 @@ fn analytic_wind(scene: &Scene) -> Result<Box<dyn les::Wind>, Error> {
             Box::new(les::winds::Sum { winds: vec![vortices, cross] })
         }
     })
+}
+
+/// The vortices of a scene.
+///
+/// # Errors
+/// Nodes in one place.
+pub(crate) fn vortex_lines(lines: &VortexLines) -> Result<les::winds::VortexLines, les::Error> {
+    let line = |(nodes_m, circulation_m2_s): (&Vec<[f64; 3]>, &f64)| les::winds::VortexLine {
+        nodes_m: nodes_m.clone(),
+        endless: lines.endless,
+        circulation_m2_s: *circulation_m2_s,
+        core_radius_m: lines.core_radius_m,
+        axial_deficit_m_s: lines.axial_deficit_m_s,
+    };
+    let ground = if lines.images { les::Ground::Image } else { les::Ground::None };
+    les::winds::VortexLines::new(lines.nodes_m.iter().zip(&lines.circulation_m2_s).map(line).collect(), ground)
 }
 
 /// The vortex pair of a scene.
@@ -125,11 +212,33 @@ pub(crate) fn circulation_profile(profile: VortexProfile) -> les::CirculationPro
 
 /// Age of an analytic flow when the scan begins, s.
 pub fn start_time_s(scene: &Scene) -> f64 {
-    match &scene.flow {
+    start_s(&scene.flow)
+}
+
+fn start_s(flow: &Flow) -> f64 {
+    match flow {
         Flow::VortexPair(pair) if pair.age_tau > 0.0 && pair.circulation_m2_s > 0.0 => {
             vortex_pair(pair).time_s(pair.age_tau)
         }
         _ => 0.0,
+    }
+}
+
+/// A wind that stands still as it was at one time.
+#[cfg(feature = "netcdf")]
+struct Frozen<W> {
+    wind: W,
+    time_s: f64,
+}
+
+#[cfg(feature = "netcdf")]
+impl<W: Wind> Wind for Frozen<W> {
+    fn velocity_into(&self, points_m: &[[f64; 3]], _: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), les::Error> {
+        self.wind.velocity_into(points_m, self.time_s, out_m_s)
+    }
+
+    fn max_gradient_per_s(&self, _: f64) -> f64 {
+        self.wind.max_gradient_per_s(self.time_s)
     }
 }
 
@@ -138,33 +247,24 @@ fn simulated(_: &crate::scene::SimulatedFlow, _: &SceneFile) -> Result<SceneWind
     Err(Error::Input { path: "flow.planes".into(), reason: "this build lacks the feature `netcdf`".into() })
 }
 
+#[cfg(not(feature = "netcdf"))]
+fn fields(_: &crate::scene::FieldFlow, _: &SceneFile) -> Result<SceneWind, Error> {
+    Err(Error::Input { path: "flow.files".into(), reason: "this build lacks the feature `netcdf`".into() })
+}
+
 #[cfg(feature = "netcdf")]
-use planes::simulated;
+mod fields;
+#[cfg(feature = "netcdf")]
+use {fields::fields, planes::simulated};
 
 #[cfg(feature = "netcdf")]
 mod planes {
-    use super::{Error, SceneFile, SceneWind, Wind};
+    use super::{Error, Frozen, SceneFile, SceneWind, Wind};
     use crate::io::CrossPlanes;
     use crate::io::planes_input::{files, read};
     use crate::scene::{SimulatedFlow, SimulatedMotion};
     use wakescope_les::winds::{Edges, GridSeries, OutsidePolicy, PlaneMesh, Side};
     use wakescope_les::{Error as LesError, GridSnapshot};
-
-    /// A wind that stands still as it was at one time.
-    struct Frozen {
-        wind: GridSeries,
-        time_s: f64,
-    }
-
-    impl Wind for Frozen {
-        fn velocity_into(&self, points_m: &[[f64; 3]], _: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), LesError> {
-            self.wind.velocity_into(points_m, self.time_s, out_m_s)
-        }
-
-        fn max_gradient_per_s(&self, _: f64) -> f64 {
-            self.wind.max_gradient_per_s(self.time_s)
-        }
-    }
 
     /// From the units and the place of the flow to those of the scene.
     struct Scale {
@@ -236,7 +336,15 @@ mod planes {
             SimulatedMotion::Moving => (Box::new(series), last_s),
             SimulatedMotion::Frozen => (Box::new(Frozen { wind: series, time_s: start_s }), f64::INFINITY),
         };
-        Ok(SceneWind { wind, start_s, tau, end_s, max_speed_m_s: fastest * scale.speed_m_s, source })
+        Ok(SceneWind {
+            wind,
+            start_s,
+            tau,
+            end_s,
+            max_speed_m_s: fastest * scale.speed_m_s,
+            source,
+            field_times_s: Vec::new(),
+        })
     }
 
     /// Time \[s\] and age of the flow when the scan begins; `times` are (tau, s) of the planes.

@@ -12,18 +12,52 @@ pub(crate) use map::{pulse_info, site};
 pub use recorded::{recorded_names, write_recorded};
 
 use crate::Error;
+use crate::beams::{Schedule, SweepMode};
 use crate::io::lock::FolderLock;
 use crate::io::own::refuse_foreign;
 use crate::io::signals::{LineVelocities, RawSignals, Recording};
-use crate::io::{Existing, FileGroup, Provenance, Table, hpl, tables};
+use crate::io::{Existing, FileGroup, Provenance, Table, VelocityMap, hpl, tables};
+use crate::measure::beam_winds;
 use crate::measure::profile::RangeProfile;
 use crate::measure::run::RunResult;
 use crate::plan::{Plan, Stage, Target};
-use crate::scene::{DetectorSignal, NoiseKind};
+use crate::scene::{DetectorSignal, NoiseKind, Pattern};
 use std::path::{Path, PathBuf};
 
-/// The table of the HALO file has its name.
-const HALO: &str = "halo.hpl";
+/// Names of the CfRadial files: one for each kind of sweep.
+fn map_stems(scan: &Schedule) -> Vec<String> {
+    let mut modes: Vec<SweepMode> = Vec::new();
+    for (mode, _) in &scan.sweeps {
+        if !modes.contains(mode) {
+            modes.push(*mode);
+        }
+    }
+    match modes.len() {
+        0 | 1 => vec!["map".into()],
+        _ => modes.iter().map(|mode| format!("map_{}", mode.name())).collect(),
+    }
+}
+
+/// Names of the HALO files, one for each sweep; their tables have the same.
+fn halo_stems(sweeps: usize) -> Vec<String> {
+    match sweeps {
+        0 | 1 => vec!["halo".into()],
+        _ => (1..=sweeps).map(|sweep| format!("halo_{sweep:04}")).collect(),
+    }
+}
+
+/// The sweeps of a map as HALO files, each with its table, where the scene asks for them.
+fn add_halo(files: &mut FileGroup, plan: &Plan, map: &VelocityMap, origin: &Provenance) -> Result<(), Error> {
+    let outputs = &plan.scene.scene.outputs;
+    for (sweep, stem) in halo_stems(map.sweeps.len()).iter().enumerate().filter(|_| outputs.hpl) {
+        let name = format!("{stem}.hpl");
+        files.add(&name, hpl::hpl_bytes(map, sweep, &name)?)?;
+        if outputs.csv {
+            files.add(&format!("{stem}.csv"), hpl::hpl_table(map, sweep)?.to_csv(origin)?)?;
+        }
+    }
+    Ok(())
+}
 
 /// Finds out, before any computing, whether files of these names can be written to a folder; leaves no trace.
 ///
@@ -68,8 +102,19 @@ pub fn names(plan: &Plan) -> Vec<String> {
         add("signals", &[(o.csv, "csv"), (netcdf, "nc")]);
     }
     if plan.runs(Stage::Estimates) {
-        add("map", &[(o.csv, "csv"), (netcdf, "nc"), pictures[0], pictures[1]]);
-        add("halo", &[(o.hpl, "hpl"), (o.hpl && o.csv, "csv")]);
+        add("map", &[(o.csv, "csv")]);
+        for stem in map_stems(&plan.geometry.schedule) {
+            add(&stem, &[(netcdf, "nc")]);
+        }
+        add("map", &[pictures[0], pictures[1]]);
+        for stem in halo_stems(plan.geometry.schedule.sweeps.len()) {
+            add(&stem, &[(o.hpl, "hpl"), (o.hpl && o.csv, "csv")]);
+        }
+        let pattern = &plan.scene.scene.scan.pattern;
+        let tells_wind = matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_));
+        add("wind", &[(o.csv && tells_wind, "csv")]);
+        let plans = *pattern != Pattern::default();
+        add("scan", &[(pictures[0].0 && plans, "svg"), (pictures[1].0 && plans, "png")]);
     }
     out
 }
@@ -121,16 +166,28 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
         }
         #[cfg(feature = "netcdf")]
         if outputs.netcdf {
-            files.add("map.nc", crate::io::cfradial::cfradial_bytes(&map, &origin)?)?;
-        }
-        if outputs.hpl {
-            files.add(HALO, hpl::hpl_bytes(&map, 0, HALO)?)?;
-            if outputs.csv {
-                files.add("halo.csv", hpl::hpl_table(&map, 0)?.to_csv(&origin)?)?;
+            let stems = map_stems(&plan.geometry.schedule);
+            for (stem, mode) in stems.iter().zip(map.modes()) {
+                // Readers take the kind of a file from its first sweep.
+                let bytes = match stems.len() {
+                    1 => crate::io::cfradial::cfradial_bytes(&map, &origin)?,
+                    _ => crate::io::cfradial::cfradial_bytes(&map.of_mode(mode), &origin)?,
+                };
+                files.add(&format!("{stem}.nc"), bytes)?;
             }
         }
+        add_halo(&mut files, plan, &map, &origin)?;
+        let winds = beam_winds::beam_winds(plan, estimates)?;
+        if let Some(winds) = winds.as_deref().filter(|_| outputs.csv) {
+            files.add("wind.csv", beam_winds::table(winds).to_csv(&origin)?)?;
+        }
         #[cfg(feature = "plots")]
-        pictures::add_map(&mut files, plan, &map, &origin)?;
+        {
+            pictures::add_map(&mut files, plan, &map, winds.as_deref(), &origin)?;
+            if plan.scene.scene.scan.pattern != Pattern::default() {
+                pictures::add(&mut files, plan, "scan", &pictures::scan(plan), &origin)?;
+            }
+        }
     }
     Ok(files)
 }
@@ -184,19 +241,22 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let pulses = scene.scan.pulses_per_line;
+    let all = || (0..g.schedule.pulses()).map(|pulse| (g.schedule.line_of(pulse), pulse));
+    let beam = |(line, pulse): (usize, usize)| g.schedule.beam_of_pulse(line, pulse - g.schedule.lines[line].first);
+    let is_plane = g.schedule.is_plane();
     let first_s = 2.0 * g.first_range_m / crate::SPEED_OF_LIGHT_M_S;
     let first_pulse_s = plan.wind.start_s;
-    let prt_s = 1.0 / scene.laser.pulse_repetition_hz;
     Some(RawSignals {
         recording: recording(plan),
         truth: LineVelocities {
             range_m: g.layer_range_m().collect(),
             radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
         },
-        pulse_time_s: (0..g.elevation_rad.len() * pulses).map(|i| first_pulse_s + i as f64 * prt_s).collect(),
+        pulse_time_s: all().map(|at| first_pulse_s + beam(at).time_s).collect(),
         current_a: result.signals_a.as_ref()?.view(),
         quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),
-        elevation_rad: g.elevation_rad.iter().flat_map(|&el| std::iter::repeat_n(el, pulses)).collect(),
+        elevation_rad: all().map(|at| beam(at).elevation_rad).collect(),
+        azimuth_rad: if is_plane { Vec::new() } else { all().map(|at| beam(at).azimuth_rad).collect() },
         time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
         pulses_per_line: pulses,
     })

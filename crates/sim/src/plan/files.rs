@@ -107,6 +107,9 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
 /// as the scan, with room for letters around it.
 fn map_pixels(scene: &Scene, g: &Geometry) -> (f64, f64, f64) {
     const BOX: f64 = 307.0;
+    if !g.schedule.is_plane() {
+        return (3.0, 12.0 * BOX * BOX, 1872.0 * (72.0 + 1.2 * (BOX + 92.0)));
+    }
     let (low, high) = (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad);
     let far_m = g.gate_range_m.last().copied().unwrap_or(1.0);
     let near_m = g.gate_range_m.first().copied().unwrap_or(0.0) * high.abs().max(low.abs()).cos();

@@ -110,7 +110,9 @@ impl Plan {
 
     /// The stages with another scan or estimator; `None` for a scene that cannot be planned. The optics stay as they are.
     fn stages_with(&self, work: Work, scene: &Scene) -> Option<Vec<PlannedStage>> {
-        let geometry = Geometry::new(scene, &self.instrument.pulse, &self.wind).ok()?;
+        let mut file = self.scene.clone();
+        file.scene = scene.clone();
+        let geometry = Geometry::new(&file, &self.instrument.pulse, &self.wind).ok()?;
         let optics =
             [Stage::PhaseScreens, Stage::Efficiency].map(|stage| self.stages.iter().find(|s| s.stage == stage));
         let optics = [optics[0]?.clone(), optics[1]?.clone()];

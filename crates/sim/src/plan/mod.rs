@@ -8,7 +8,7 @@ use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
 use crate::measure::wind::SceneWind;
 use crate::measure::write::Contents;
-use crate::scene::{Method, Scene, SceneFile, Weighting};
+use crate::scene::{Flow, Method, Scene, SceneFile, Weighting};
 use std::fmt;
 use std::sync::Arc;
 
@@ -20,11 +20,13 @@ mod hardware;
 mod optics;
 mod possible;
 mod rehearsal;
+mod schedule;
 mod sizes;
 mod stage;
 mod stages;
 pub(crate) mod units;
 
+pub use schedule::ScanSchedule;
 pub use stage::{Cost, Forecast, PlannedStage, Stage, Target};
 
 /// What a run will do.
@@ -63,15 +65,22 @@ impl Plan {
     /// As [`Plan::new`].
     pub(crate) fn with_wind(scene: SceneFile, target: Target, wind: Arc<SceneWind>) -> Result<Self, Error> {
         let instrument = Instrument::new(&scene.scene)?;
-        let geometry = Geometry::new(&scene.scene, &instrument.pulse, &wind)?;
+        let geometry = Geometry::new(&scene, &instrument.pulse, &wind)?;
         let last_s = end_s(&wind, &geometry);
         if last_s > wind.end_s {
+            let (key, what) = match scene.scene.flow {
+                Flow::Fields(_) => ("flow.files", "fields"),
+                _ => ("flow.planes", "planes"),
+            };
             let reason = format!(
-                "the scan ends at {last_s:.3} s of the flow, the planes at {:.3} s: begin earlier, scan faster, or set \
+                "the scan ends at {last_s:.3} s of the flow, the {what} at {:.3} s: begin earlier, scan faster, or set \
                  flow.motion = \"frozen\"",
                 wind.end_s
             );
-            return Err(Error::Input { path: "flow.planes".into(), reason });
+            return Err(Error::Input { path: key.into(), reason });
+        }
+        if target != Target::Map && target != Target::Efficiency {
+            refuse_uneven_signals(&scene.scene, &geometry, target)?;
         }
         let mut warnings = warnings(&scene.scene, &wind);
         warnings.extend(ambiguity::warning(&scene.scene, &instrument.pulse));
@@ -119,6 +128,17 @@ impl Plan {
     pub fn realisations(&self) -> usize {
         if self.runs(Stage::Estimates) { self.scene.scene.scan.realisations } else { self.kept_realisations() }
     }
+}
+
+/// Files of raw signals have equally many pulses in each line.
+fn refuse_uneven_signals(scene: &Scene, geometry: &Geometry, target: Target) -> Result<(), Error> {
+    let even = geometry.schedule.lines.iter().all(|line| line.pulses == scene.scan.pulses_per_line);
+    if even || sizes::kept_realisations(scene, target) == 0 {
+        return Ok(());
+    }
+    let reason = "its lines have different numbers of pulses, and a file of raw signals has equally many in each: leave out \
+                  outputs.signals, or the column pulses";
+    Err(Error::Input { path: "scan.pattern.file".into(), reason: reason.into() })
 }
 
 fn end_s(wind: &SceneWind, geometry: &Geometry) -> f64 {
@@ -171,6 +191,9 @@ impl fmt::Display for Plan {
         let Forecast { core_s, memory_bytes, .. } = self.total();
         let (time, memory) = (units::seconds(core_s), units::bytes(memory_bytes));
         writeln!(f, "  total {:<16} {time:>10} {memory:>10}   at once, forecast for one core", "")?;
+        if self.target != Target::Efficiency {
+            writeln!(f, "  scan  {}", self.schedule())?;
+        }
         for w in &self.warnings {
             writeln!(f, "  warning: {w}")?;
         }
@@ -181,7 +204,7 @@ impl fmt::Display for Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Flow, NoiseKind, RefractiveTurbulence, SnrReference, Turbulence, VortexPair};
+    use crate::scene::{NoiseKind, RefractiveTurbulence, SnrReference, Turbulence, VortexPair};
 
     fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
         let mut scene = Scene::default();

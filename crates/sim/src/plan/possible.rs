@@ -22,14 +22,15 @@ const LAYERS_LOOKED_AT: usize = 1_000_000;
 /// is not is looked at layer by layer.
 fn lines_stay_inside(plan: &Plan) -> Result<(), Error> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
-    if !matches!(scene.flow, Flow::Simulated(_)) || scene.scan.outside_flow != (Outside::Error {}) {
+    if !matches!(scene.flow, Flow::Simulated(_) | Flow::Fields(_)) || scene.scan.outside_flow != (Outside::Error {}) {
         return Ok(());
     }
     let last_m = g.first_layer_range_m + g.layers.saturating_sub(1) as f64 * g.layer_thickness_m;
-    for (line, elevation_rad) in g.elevation_rad.iter().enumerate() {
+    for line in 0..g.schedule.lines.len() {
         // Where a line that points down meets the ground.
-        let sin = elevation_rad.sin();
-        let ground_m = if sin < 0.0 { -scene.scan.lidar_height_m / sin } else { f64::INFINITY };
+        let beam = g.schedule.middle(line);
+        let sin = beam.direction.0[2];
+        let ground_m = if sin < 0.0 { -beam.position_m[2] / sin } else { f64::INFINITY };
         let ends_m = [g.first_layer_range_m, last_m.min(ground_m)];
         if g.first_layer_range_m <= ground_m && radial_velocity_m_s(plan, line, &ends_m).is_err() {
             // The words of the run: the first layer outside.

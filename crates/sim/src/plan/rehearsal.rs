@@ -5,7 +5,7 @@
 
 use super::{Plan, Stage, Target};
 use crate::measure::progress::Silent;
-use crate::scene::{Flow, Scene, SceneFile, Turbulence};
+use crate::scene::{Flow, HeadMotionKeys, Pattern, Scene, SceneFile, Turbulence};
 use crate::{Error, measure::run, measure::write};
 
 /// Longest forecast of a rehearsal, s.
@@ -39,6 +39,8 @@ impl Plan {
         for shorten in [false, true] {
             let mut scene = self.scene.scene.clone();
             scene.scan.elevation_max_rad = scene.scan.elevation_min_rad;
+            // One line says it all; which one makes no difference to the signals.
+            (scene.scan.pattern, scene.scan.head) = (Pattern::default(), HeadMotionKeys::default());
             (scene.scan.pulses_per_line, scene.scan.realisations) = (1, scene.scan.realisations.min(2));
             scene.outputs.profile_points = 2;
             // The drawing takes longest and depends on the values alone.
@@ -46,10 +48,11 @@ impl Plan {
             scene.outputs.svg &= !(scene.outputs.csv || scene.outputs.netcdf);
             scene.outputs.csv |= !scene.outputs.netcdf && !scene.outputs.svg;
             scene.atmosphere.turbulence = Turbulence::None {};
-            if matches!(scene.flow, Flow::Simulated(_)) {
-                // Its planes are not read twice.
+            if matches!(scene.flow, Flow::Simulated(_) | Flow::Fields(_)) {
+                // Its files are not read twice.
                 scene.flow = Flow::Calm {};
             }
+            scene.added_flows.clear();
             if shorten {
                 shortened(&mut scene);
             }

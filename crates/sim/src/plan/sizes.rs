@@ -59,7 +59,7 @@ impl Sizes {
         let half_rad = if radius_m < middle_m { (radius_m / middle_m).asin() } else { std::f64::consts::PI };
         Self {
             lines,
-            records: lines * scene.scan.pulses_per_line as f64,
+            records: g.schedule.pulses() as f64,
             samples: g.samples as f64,
             parts,
             layers: g.layers as f64,
@@ -70,11 +70,23 @@ impl Sizes {
             numbers: numbers(scene, parts),
             cells: lines * g.gate_range_m.len() as f64,
             frequencies: e.padded_samples as f64 * d.bandwidth_hz / d.sampling_hz,
-            chords: (2.0 * half_rad / scene.scan.elevation_step_rad + 1.0).min(lines),
+            chords: (2.0 * half_rad / step_rad(scene, g) + 1.0).min(lines),
             kept: kept_realisations(scene, target) as f64,
             drawn: drawn_turbulence(scene).map_or(0.0, |t| t.realisations as f64),
             threads: rayon::current_num_threads() as f64,
         }
+    }
+}
+
+/// Angle between lines that follow each other, rad; half a turn where no two share a region.
+fn step_rad(scene: &Scene, g: &Geometry) -> f64 {
+    match &g.schedule.lines[..] {
+        _ if g.schedule.is_plane() => scene.scan.elevation_step_rad,
+        [first, second, ..] if first.group == second.group => {
+            let [a, b] = [0, 1].map(|line| g.schedule.middle(line).direction);
+            a.cos_sin_to(&b).1.max(1e-7)
+        }
+        _ => std::f64::consts::PI,
     }
 }
 
@@ -121,5 +133,5 @@ fn largest_radius_m(scene: &Scene) -> f64 {
 
 /// Whether the air is at rest everywhere.
 pub(super) fn is_calm(scene: &Scene) -> bool {
-    matches!(scene.flow, Flow::Calm {})
+    matches!(scene.flow, Flow::Calm {}) && scene.added_flows.is_empty()
 }

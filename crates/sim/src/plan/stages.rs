@@ -7,13 +7,14 @@ use super::files::files;
 use super::sizes::{MAP_FIELDS, Sizes, is_calm, keeps_few_lags};
 use super::stage::{PlannedStage, Stage, Target, run, skip};
 use crate::measure::geometry::Geometry;
-use crate::measure::scan::records_at_once;
+use crate::measure::scan::{AIRS_BYTES, records_at_once};
 use crate::measure::wind::SceneWind;
-use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene};
+use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, WindOfPulses};
 
 // Unit costs on one core, s.
 const ANALYTIC_WIND_S: f64 = 7e-8;
 const SAMPLED_WIND_S: f64 = 2e-7;
+const FIELD_WIND_S: f64 = 8e-7;
 const LAYER_OF_RECORD_S: f64 = 4.5e-8;
 const LAYER_OF_SAMPLE_S: f64 = 1.0e-10;
 const SAMPLE_S: f64 = 4e-8;
@@ -55,11 +56,14 @@ pub(super) fn stages(
 
 /// Time of the wind at one point, s.
 fn wind_point_s(scene: &Scene) -> f64 {
-    match scene.flow {
-        Flow::Calm {} | Flow::Uniform { .. } => 1e-8,
+    let of = |flow: &Flow| match flow {
+        Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => 1e-8,
         Flow::VortexPair(_) => ANALYTIC_WIND_S,
+        Flow::VortexLines(lines) => 0.5 * ANALYTIC_WIND_S * lines.nodes_m.len() as f64,
         Flow::Simulated(_) => SAMPLED_WIND_S,
-    }
+        Flow::Fields(_) => FIELD_WIND_S,
+    };
+    of(&scene.flow) + scene.added_flows.iter().map(of).sum::<f64>()
 }
 
 fn cross_plane(scene: &Scene, target: Target) -> PlannedStage {
@@ -77,7 +81,8 @@ fn cross_plane(scene: &Scene, target: Target) -> PlannedStage {
 
 fn lines_of_sight(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let reason = format!("{} lines of {} layers of {:.3} m", n.lines, g.layers, g.layer_thickness_m);
-    let points = n.lines * n.layers;
+    let airs = scene.scan.wind_of_pulses.of_line(scene.scan.pulses_per_line) as f64;
+    let points = n.lines * n.layers * airs;
     // Places and velocities of the lines at work.
     let bytes = air_bytes(n) + n.threads * n.layers * 64.0;
     run(Stage::LinesOfSight, reason, points * wind_point_s(scene), [bytes, 0.0])
@@ -107,7 +112,14 @@ fn signals(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
         n.kept * n.records * n.samples * n.parts * 8.0 + if n.kept > 0.0 { n.lines * n.layers * 8.0 } else { 0.0 };
     // The echo of the pulse before is a record of its own, made of lines of its own.
     let (trips, more) = if scene.scan.second_trip.is_some() { (2.0, 16.0 * n.layers * n.lines) } else { (1.0, 0.0) };
-    run(Stage::Signals, reason, n.realisations * n.records * record_s * trips, [scan_bytes(g, n) + more, kept])
+    // Pulses with airs of their own: the wind again, and a piece of airs.
+    let airs = scene.scan.wind_of_pulses.of_line(scene.scan.pulses_per_line) as f64;
+    let (wind_s, more) = if airs > 1.0 || scene.scan.wind_of_pulses != WindOfPulses::default() {
+        (n.realisations * n.lines * airs * n.layers * wind_point_s(scene), more + AIRS_BYTES)
+    } else {
+        (0.0, more)
+    };
+    run(Stage::Signals, reason, n.realisations * n.records * record_s * trips + wind_s, [scan_bytes(g, n) + more, kept])
 }
 
 fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {

@@ -30,6 +30,8 @@ pub struct MapPlot {
     pub show_lidar: bool,
     /// Points (y, z) in metres to mark, such as vortex centres.
     pub points_m: Vec<(f64, f64)>,
+    /// Whether it is seen from above, along the flight upwards, and not from the side with the ground below.
+    pub from_above: bool,
 }
 
 impl MapPlot {
@@ -58,7 +60,19 @@ impl MapPlot {
             show_lidar: left - map.lidar_y_m < 0.5 * (right - left),
             cells: MapCells::Polar(cells),
             points_m: Vec::new(),
+            from_above: false,
         })
+    }
+
+    /// The picture of a field of a sweep of azimuth, seen from above.
+    ///
+    /// # Errors
+    /// As [`MapPlot::new`].
+    pub fn from_above(map: &VelocityMap, sweep: usize, field: &str) -> OutputResult<Self> {
+        let plot = Self::new(map, sweep, field)?;
+        let values = map.field(field).map(|field| &field.values);
+        let cells = PolarCells::from_above(map, sweep, |r, g| values.map_or(f64::NAN, |values| values[[r, g]]));
+        Ok(Self { cells: MapCells::Polar(cells), from_above: true, show_lidar: false, ..plot })
     }
 
     /// The picture of a field on a cross-plane; signed fields get symmetric colours.
@@ -70,6 +84,7 @@ impl MapPlot {
             show_lidar: false,
             cells: MapCells::Plane(cells),
             points_m: Vec::new(),
+            from_above: false,
         }
     }
 
@@ -101,7 +116,9 @@ impl MapPlot {
     /// Box to show: (left, right), (lowest, highest), m.
     fn view_m(&self) -> ((f64, f64), (f64, f64)) {
         let (mut y, mut z) = self.cells.extent_m();
-        z.0 = z.0.min(0.0);
+        if !self.from_above {
+            z.0 = z.0.min(0.0);
+        }
         if let Some(lidar_m) = self.shown_lidar_m() {
             y = (y.0.min(lidar_m.0), y.1.max(lidar_m.0));
             z.1 = z.1.max(lidar_m.1);
@@ -130,7 +147,11 @@ impl MapPlot {
         let (y_m, z_m) = self.fitted(&frame);
         let x = Scale { range: y_m, log: false, paper: (frame.left, frame.right()) };
         let y = Scale { range: z_m, log: false, paper: (frame.bottom(), frame.top) };
-        let decor = Decor { frame, x, y, x_label: "distance [m]", y_label: "height [m]", title: &self.title };
+        let [x_label, y_label] = match self.from_above {
+            true => ["across the flight [m]", "along the flight [m]"],
+            false => ["distance [m]", "height [m]"],
+        };
+        let decor = Decor { frame, x, y, x_label, y_label, title: &self.title };
         decor.grid(out);
         let ground = Frame { top: y.place(0.0), height: frame.bottom() - y.place(0.0), ..frame };
         let size = ((frame.width * DENSITY) as u32, (frame.height * DENSITY) as u32);
@@ -142,6 +163,9 @@ impl MapPlot {
                 pen: Pen::solid(INK, 1.4),
             },
         ];
+        if self.from_above {
+            content.retain(|shape| matches!(shape, Shape::Image { .. }));
+        }
         self.push_marks(&x, &y, &mut content);
         out.push(Shape::Clip { frame, shapes: content });
         decor.axes(font, out);

@@ -5,6 +5,7 @@
 use super::colour::ColourMap;
 use super::drawing::Raster;
 use crate::io::VelocityMap;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Cells of one sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,11 +35,35 @@ impl PolarCells {
         }
     }
 
+    /// Cells of a sweep of azimuth seen from above: across the flight to the right, along it upwards; ranges along the ground,
+    /// angles from the right.
+    pub(crate) fn from_above(map: &VelocityMap, sweep: usize, value: impl Fn(usize, usize) -> f64) -> Self {
+        let (x_m, x_azimuth_rad) = map.flight.unwrap_or_default();
+        let angle = |ray: &usize| FRAC_PI_2 - (map.rays[*ray].azimuth_rad - x_azimuth_rad);
+        let mut rays: Vec<usize> = (0..map.rays.len()).filter(|r| map.rays[*r].sweep == sweep).collect();
+        rays.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+        let angles: Vec<f64> = rays.iter().map(angle).collect();
+        let turns = angles.first().map_or(0.0, |first| ((first + PI) / TAU).floor() * TAU);
+        let angles: Vec<f64> = angles.iter().map(|angle| angle - turns).collect();
+        let mean = rays.iter().map(|r| map.rays[*r].elevation_rad).sum::<f64>() / rays.len().max(1) as f64;
+        let ranges_m: Vec<f64> = map.range_m.iter().map(|range_m| range_m * mean.cos()).collect();
+        let gates = map.range_m.len();
+        Self {
+            lidar_m: (map.lidar_y_m, x_m),
+            range_edge_m: edges(&ranges_m, 0.5 * ranges_m[0]),
+            elevation_edge_rad: edges(&angles, 0.005),
+            values: rays.iter().flat_map(|&r| (0..gates).map(move |g| (r, g))).map(|(r, g)| value(r, g)).collect(),
+        }
+    }
+
     /// Value at a point; `None` outside the scan, NaN where it is missing.
     pub fn at(&self, y_m: f64, z_m: f64) -> Option<f64> {
         let (dy, dz) = (y_m - self.lidar_m.0, z_m - self.lidar_m.1);
         let gate = cell(&self.range_edge_m, dy.hypot(dz))?;
-        let ray = cell(&self.elevation_edge_rad, dz.atan2(dy))?;
+        let angle_rad = dz.atan2(dy);
+        // A full turn may begin anywhere.
+        let below = self.elevation_edge_rad.first().is_some_and(|first| angle_rad < *first);
+        let ray = cell(&self.elevation_edge_rad, if below { angle_rad + TAU } else { angle_rad })?;
         Some(self.values[ray * (self.range_edge_m.len() - 1) + gate])
     }
 
@@ -190,6 +215,22 @@ mod tests {
         }
         assert_eq!(cells.at(map.lidar_y_m + 10.0, map.lidar_height_m + 0.5), None, "before the first gate");
         assert_eq!(cells.at(map.lidar_y_m + 100.0, map.lidar_height_m + 50.0), None, "above the scan");
+    }
+
+    #[test]
+    fn from_above_every_cell_finds_its_own_value_round_a_full_turn() {
+        let mut map = samples::map();
+        map.flight = Some((5.0, 0.3));
+        let turn = |i: usize| TAU * i as f64 / 6.0;
+        (0..6).for_each(|i| (map.rays[i].azimuth_rad, map.rays[i].elevation_rad) = (0.2 + turn(i), 0.4));
+        let cells = PolarCells::from_above(&map, 0, |r, g| (10 * r + g) as f64);
+        for (ray, gate) in (0..6).flat_map(|ray| (0..map.range_m.len()).map(move |gate| (ray, gate))) {
+            assert_eq!(
+                cells.at(map.y_m(ray, gate), map.x_m(ray, gate)),
+                Some((10 * ray + gate) as f64),
+                "{ray} {gate}"
+            );
+        }
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         title: String::new(),
         rays: rays.collect(),
         range_m: map.range_m.clone(),
-        sweeps: vec![Sweep { tau: f64::NAN, azimuth_rad: 0.0 }],
+        sweeps: vec![Sweep::rhi(f64::NAN, 0.0)],
         pulse: PulseInfo { prt_s: 1.0, pulse_width_s: 0.0, nyquist_velocity_m_s: 0.0, samples: 1, frequency_hz: 1.0 },
         fields: fields
             .iter()
@@ -41,6 +41,9 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         lidar_y_m: scan.options.model.lidar_lateral_position_m,
         lidar_height_m: scan.options.model.lidar_height_m,
         site: Site::default(),
+        flight: None,
+        ray_pulses: None,
+        places_m: None,
         is_simulated: false,
     };
     let centres_m: Vec<(f64, f64)> =

@@ -1,6 +1,6 @@
 //! Limits between the keys of a scene. Each blames a key that the file states, not the default beside it.
 
-use super::{DetectorSignal, Flow, Outside, PulseShape, Scene, Turbulence};
+use super::{DetectorSignal, Flow, Outside, Pattern, PulseShape, Scene, Turbulence};
 use crate::keys::{Checker, Side};
 
 fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
@@ -20,7 +20,10 @@ impl Scene {
     pub(super) fn check_between(&self, c: &mut Checker<'_>) {
         self.check_instrument_between(c);
         self.check_band(c);
-        self.check_lines(c);
+        if matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Axial(_)) {
+            self.check_lines(c);
+        }
+        self.check_scan_between(c);
         self.check_ranges(c);
         if self.outputs.hpl {
             self.check_hpl(c);

@@ -4,9 +4,8 @@
 //! all. Each names the key, the value and what is allowed.
 
 use super::check_estimator::check_estimator;
-use super::{
-    Digitiser, EfficiencyOfPulse, FORMAT, Flow, PulseShape, Scan, Scene, SnrReference, Turbulence, VortexMotion,
-};
+use super::check_flow::check_flow;
+use super::{Digitiser, EfficiencyOfPulse, FORMAT, PulseShape, Scan, Scene, SnrReference, Turbulence};
 use crate::keys::{Checker, Problem};
 use std::f64::consts::FRAC_PI_2;
 
@@ -24,8 +23,12 @@ impl Scene {
         c.require(self.seed <= i64::MAX as u64, "seed", self.seed, format!("a whole number from 0 to {}", i64::MAX));
         self.check_instrument(&mut c);
         self.check_receiver(&mut c);
-        self.check_flow(&mut c);
+        check_flow(&self.flow, "flow", &mut c);
+        for (i, flow) in self.added_flows.iter().enumerate() {
+            check_flow(flow, &format!("added_flows[{i}]"), &mut c);
+        }
         self.check_scan(&mut c);
+        self.check_pattern(&mut c);
         check_estimator(self, &mut c);
         self.check_outputs(&mut c);
         self.check_site(&mut c);
@@ -111,32 +114,6 @@ impl Scene {
         }
     }
 
-    fn check_flow(&self, c: &mut Checker<'_>) {
-        match &self.flow {
-            Flow::Calm {} => {}
-            Flow::Uniform { lateral_m_s, vertical_m_s } => {
-                c.within("flow.lateral_m_s", *lateral_m_s, -1e3, 1e3, "m/s");
-                c.within("flow.vertical_m_s", *vertical_m_s, -1e3, 1e3, "m/s");
-            }
-            Flow::Simulated(flow) => check_simulated(flow, c),
-            Flow::VortexPair(p) => {
-                c.within("flow.circulation_m2_s", p.circulation_m2_s, 0.0, 1e5, "m^2/s");
-                c.within("flow.spacing_m", p.spacing_m, 1e-2, 1e4, "m");
-                c.within("flow.core_radius_m", p.core_radius_m, 1e-3, 1e3, "m");
-                c.within("flow.lateral_position_m", p.lateral_position_m, -1e5, 1e5, "m");
-                c.within("flow.height_m", p.height_m, 1e-2, 1e4, "m");
-                c.within("flow.cross_wind_m_s", p.cross_wind_m_s, -1e3, 1e3, "m/s");
-                c.within("flow.age_tau", p.age_tau, 0.0, 1e3, "");
-                c.require(
-                    p.age_tau == 0.0 || p.motion == VortexMotion::Inviscid,
-                    "flow.age_tau",
-                    p.age_tau,
-                    "0 for a pair at rest; an age needs flow.motion = \"inviscid\"",
-                );
-            }
-        }
-    }
-
     fn check_scan(&self, c: &mut Checker<'_>) {
         let s = &self.scan;
         c.within("scan.lidar_height_m", s.lidar_height_m, 0.0, 1e4, "m");
@@ -207,23 +184,6 @@ fn check_lengths(counts: &[(&str, usize)], table: &str, c: &mut Checker<'_>) {
     }
 }
 
-fn check_simulated(flow: &super::SimulatedFlow, c: &mut Checker<'_>) {
-    if flow.planes.is_empty() {
-        let allowed = "a file of cross-planes, or the beginning of the names of numbered ones";
-        c.refuse("flow.planes", Problem::ABSENT, allowed);
-    }
-    if let Some(time_s) = flow.time_s {
-        c.within("flow.time_s", time_s, -1e9, 1e9, "s");
-        c.require(flow.age_tau.is_none(), "flow.time_s", time_s, "absent beside flow.age_tau");
-    }
-    if let Some(age_tau) = flow.age_tau {
-        c.within("flow.age_tau", age_tau, -1e9, 1e9, "");
-    }
-    c.within("flow.lateral_position_m", flow.lateral_position_m, -1e5, 1e5, "m");
-    c.within("flow.length_unit_m", flow.length_unit_m, 1e-6, 1e6, "m");
-    c.within("flow.velocity_unit_m_s", flow.velocity_unit_m_s, 1e-6, 1e6, "m/s");
-}
-
 fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker<'_>) {
     const SECTION: &str = "atmosphere.turbulence";
     let key = |name: &str| format!("{SECTION}.{name}");
@@ -241,6 +201,7 @@ fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Flow;
 
     fn keys(change: impl FnOnce(&mut Scene)) -> Vec<String> {
         let mut scene = Scene::default();

@@ -1,5 +1,6 @@
 //! The wind of a scene.
 
+use super::receiver::is_zero;
 use serde::{Deserialize, Serialize};
 
 /// The wind that the lidar sees.
@@ -14,11 +15,20 @@ pub enum Flow {
         lateral_m_s: f64,
         /// Wind upwards, m/s.
         vertical_m_s: f64,
+        /// Wind along the flight, m/s.
+        #[serde(default, skip_serializing_if = "is_zero")]
+        along_m_s: f64,
     },
+    /// A wind that is linear in place and time.
+    Linear(LinearWind),
+    /// Vortices of any axis.
+    VortexLines(VortexLines),
     /// The analytic vortex pair (3)-(5) with its images below the ground.
     VortexPair(VortexPair),
     /// Cross-planes that `wakescope flow` wrote.
     Simulated(SimulatedFlow),
+    /// Whole fields: those of `wakescope flow` and `wake`, or of other programs.
+    Fields(FieldFlow),
 }
 
 impl Default for Flow {
@@ -49,7 +59,99 @@ section! {
         age_tau: f64 = 0.0,
         /// Uniform cross wind added to the pair, m/s, positive away from the lidar.
         cross_wind_m_s: f64 = 0.0,
+        /// The aircraft, if the wake is the older the farther it is behind it; absent: of one age everywhere.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        aircraft: Option<Aircraft> = None,
     }
+}
+
+section! {
+    /// An aircraft on its way along +x.
+    #[derive(Copy)]
+    Aircraft {
+        /// Speed, m/s.
+        speed_m_s: f64 = 70.0,
+        /// Where it is when the scan begins, m.
+        x_m: f64 = 0.0,
+    }
+}
+
+section! {
+    /// `u + G x + a t`, from the place of the lidar's foot and the start of the scan.
+    #[derive(Copy)]
+    LinearWind {
+        /// Wind at the origin when the scan begins (u, v, w), m/s.
+        velocity_m_s: [f64; 3] = [0.0; 3],
+        /// How fast u changes along x, y, z, 1/s.
+        gradient_u_per_s: [f64; 3] = [0.0; 3],
+        /// How fast v does.
+        gradient_v_per_s: [f64; 3] = [0.0; 3],
+        /// How fast w does.
+        gradient_w_per_s: [f64; 3] = [0.0; 3],
+        /// How fast they change in time, m/s^2.
+        acceleration_m_s2: [f64; 3] = [0.0; 3],
+    }
+}
+
+section! {
+    /// Straight vortices without end, or polylines; one entry of each list for each vortex.
+    VortexLines {
+        /// Places (x, y, z) that each vortex goes through, m: two of an endless one, all corners of another.
+        nodes_m: Vec<Vec<[f64; 3]>> = Vec::new(),
+        /// Circulation of each, m^2/s.
+        circulation_m2_s: Vec<f64> = Vec::new(),
+        /// Core radius of all, m.
+        core_radius_m: f64 = 2.35,
+        /// Speed of the air in the middle of each against the direction of its nodes, m/s.
+        axial_deficit_m_s: f64 = 0.0,
+        /// Whether they go on beyond their ends.
+        endless: bool = true,
+        /// Whether there are images below the ground.
+        images: bool = true,
+    }
+}
+
+section! {
+    /// Fields over (time, z, y, x), in one file or one for each time.
+    FieldFlow {
+        /// The file, or the beginning of the names of numbered files, relative to the folder of the scene.
+        files: String = String::new(),
+        /// Names of the variables of u, v, w in the file.
+        names: [String; 3] = ["u".into(), "v".into(), "w".into()],
+        /// Whether the flow moves during the scan.
+        motion: SimulatedMotion = SimulatedMotion::Moving,
+        /// Time of the flow when the scan begins, s; its first one if absent.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        time_s: Option<f64> = None,
+        /// Place in the scene of the origin of the file's axes, m.
+        origin_m: [f64; 3] = [0.0; 3],
+        /// Angle from the scene's x to the file's x, clockwise seen from above, rad.
+        rotation_rad: f64 = 0.0,
+        /// Whether the file's axes are right-handed, y to the left of x: y and v change their sign.
+        mirror_y: bool = false,
+        /// Metres in the unit of length of the file.
+        length_unit_m: f64 = 1.0,
+        /// Metres per second in its unit of velocity.
+        velocity_unit_m_s: f64 = 1.0,
+        /// Whether the flow repeats itself along the file's x.
+        periodic_x: bool = false,
+        /// Whether it does along its y.
+        periodic_y: bool = false,
+        /// What lies below its lowest nodes.
+        ground: FieldGround = FieldGround::Open,
+    }
+}
+
+/// What lies below the lowest nodes of fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FieldGround {
+    /// Nothing is known there.
+    Open,
+    /// A wall at z = 0 to which the air sticks.
+    NoSlip,
+    /// A wall at z = 0 without friction.
+    Slip,
 }
 
 /// Circulation profile of a vortex.

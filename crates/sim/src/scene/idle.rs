@@ -3,8 +3,8 @@
 //! They are refused, so that nobody turns a knob that turns nothing. Keys that stand in the file of `wakescope init` may stay
 //! there with their default.
 
-use super::{FrontEnd, Method, OuterScaleWavenumber, RefractiveTurbulence, RegionRadius, Scene, SnrReference};
-use super::{Problem, ScreenSampling, SpectrumKind, Turbulence};
+use super::{FrontEnd, HeadMotion, Method, OuterScaleWavenumber, Pattern, RefractiveTurbulence, RegionRadius, Scan};
+use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
 use crate::keys::Document;
 
 /// A key without use.
@@ -51,10 +51,23 @@ fn idle(scene: &Scene) -> Vec<Idle> {
         let fast = f.half_power_hz.is_infinite();
         unused(fast, &["detector.front_end.poles"], beside("half_power_hz", f.half_power_hz));
     }
+    of_scan(&scene.scan, &mut unused);
     if let Turbulence::Refractive(turbulence) = &scene.atmosphere.turbulence {
         of_turbulence(turbulence, unused);
     }
     found
+}
+
+fn of_scan(scan: &Scan, unused: &mut impl FnMut(bool, &[&'static str], String)) {
+    let kind = format!("scan.pattern.kind = \"{}\" has angles of its own", scan.pattern.name());
+    let rows = matches!(scan.pattern, Pattern::Rhi {} | Pattern::Axial(_));
+    unused(!rows, &["scan.elevation_min_rad", "scan.elevation_max_rad"], kind.clone());
+    unused(!rows, &["scan.elevation_step_rad"], kind.clone());
+    unused(!matches!(scan.pattern, Pattern::Rhi {} | Pattern::Stare(_)), &["scan.azimuth_rad"], kind);
+    let moves = scan.head.motion == HeadMotion::Continuous;
+    let pace = "with scan.head.motion = \"continuous\" the rate and the pulses of a line set the step";
+    unused(moves && scan.pattern == Pattern::Rhi {}, &["scan.elevation_step_rad"], pace.into());
+    unused(moves, &["scan.pattern.azimuth_step_rad", "scan.head.dead_time_s"], pace.into());
 }
 
 fn of_turbulence(turbulence: &RefractiveTurbulence, mut unused: impl FnMut(bool, &[&'static str], String)) {

@@ -23,13 +23,16 @@ mod atmosphere;
 mod between;
 mod check;
 mod check_estimator;
+mod check_flow;
 mod check_outputs;
+mod check_pattern;
 mod check_receiver;
 mod estimator;
 mod flow;
 mod format1;
 mod idle;
 mod instrument;
+mod pattern;
 mod presets;
 mod read;
 mod receiver;
@@ -43,10 +46,16 @@ pub use estimator::{
     CorrelogramForm, Estimator, FirstMoment, GradientLikelihood, LagWindow, Likelihood, Method, ModelOrder,
     OrderChoice, Refinement, RegionRadius, Weighting,
 };
-pub use flow::{Flow, Outside, SimulatedFlow, SimulatedMotion, VortexMotion, VortexPair, VortexProfile};
+pub use flow::{
+    Aircraft, FieldFlow, FieldGround, Flow, LinearWind, Outside, SimulatedFlow, SimulatedMotion, VortexLines,
+    VortexMotion, VortexPair, VortexProfile,
+};
 pub use instrument::{
     BeamRadiusDefinition, Detector, DetectorSignal, Digitiser, GaussianShape, Laser, NoiseKind, Pulse, PulseDefinition,
     PulseResampling, PulseShape, ReceiverPath, SampledShape, SnrReference, Telescope,
+};
+pub use pattern::{
+    Axial, Dbs, HeadMotion, HeadMotionKeys, LidarPlace, Pattern, Ppi, Stare, SweepDirection, Towards, Vad, WindOfPulses,
 };
 pub use presets::{preset_names, preset_toml};
 pub use read::SceneFile;
@@ -83,6 +92,9 @@ section! {
         atmosphere: Atmosphere = Atmosphere::default(),
         /// The wind that the lidar sees.
         flow: Flow = Flow::default(),
+        /// Further winds that are added to it.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        added_flows: Vec<Flow> = Vec::new(),
         /// Where the lidar looks.
         scan: Scan = Scan::default(),
         /// From signals to velocities.
@@ -95,7 +107,7 @@ section! {
 }
 
 section! {
-    /// Where the lidar looks: a vertical scan (RHI) across the runway.
+    /// Where the lidar looks: a vertical scan (RHI) across the runway, if no other pattern is stated.
     Scan {
         /// Height of the telescope above the ground, m.
         lidar_height_m: f64 = 0.0,
@@ -122,6 +134,18 @@ section! {
         below_ground: Outside = Outside::Error {},
         /// What lines that leave a simulated flow meet.
         outside_flow: Outside = Outside::Error {},
+        /// Which way the lidar looks, line after line.
+        #[serde(skip_serializing_if = "Pattern::is_default")]
+        pattern: Pattern = Pattern::default(),
+        /// How the lines follow each other.
+        #[serde(skip_serializing_if = "pattern::is_default")]
+        head: HeadMotionKeys = HeadMotionKeys::default(),
+        /// Where the lidar is.
+        #[serde(skip_serializing_if = "pattern::is_default")]
+        lidar: LidarPlace = LidarPlace::default(),
+        /// How many airs the pulses of a line meet.
+        #[serde(skip_serializing_if = "pattern::is_default")]
+        wind_of_pulses: WindOfPulses = WindOfPulses::default(),
     }
 }
 
@@ -281,7 +305,7 @@ mod tests {
     fn scene_survives_a_round_trip() {
         let mut scene = Scene::default();
         scene.detector.snr = SnrReference::Fixed { snr_db: 0.1 + 0.2 };
-        scene.flow = Flow::Uniform { lateral_m_s: 1.0 / 3.0, vertical_m_s: -0.0 };
+        scene.flow = Flow::Uniform { lateral_m_s: 1.0 / 3.0, vertical_m_s: -0.0, along_m_s: 0.0 };
         let back: Scene = toml::from_str(&scene.to_toml()).unwrap();
         assert_eq!(back, scene);
     }

@@ -174,8 +174,8 @@ impl Cells {
                     let to = |centre_m: f64| (y_m - centre_m).hypot(z_m - centres.height_m);
                     to(centres.left_y_m).min(to(centres.right_y_m)) / pair.spacing_m
                 }
-                Flow::Simulated(_) => f64::NAN,
-                Flow::Calm {} | Flow::Uniform { .. } => f64::INFINITY,
+                Flow::Simulated(_) | Flow::Fields(_) | Flow::VortexLines(_) => f64::NAN,
+                Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => f64::INFINITY,
             }
         });
         Ok(Self { distance, shared: (lines.min(g.elevation_rad.len() as f64), gates.min(g.gate_range_m.len() as f64)) })

@@ -12,6 +12,8 @@ mod messages;
 mod receiver;
 #[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
 mod retrieve;
+#[cfg(all(feature = "netcdf", feature = "plots"))]
+mod scans;
 mod scene_features;
 #[cfg(all(feature = "flow", feature = "netcdf"))]
 mod simulated_flow;

@@ -106,13 +106,22 @@ pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Erro
             && records.records().is_multiple_of(whole(&scene.scene))
     });
     let repetitions = records.records() / whole(&scene.scene).max(1);
-    if !is_own || repetitions == scene.scene.scan.realisations {
-        return Ok((Plan::new(scene, Target::Map)?, is_own));
+    let file = if !is_own || repetitions == scene.scene.scan.realisations {
+        scene
+    } else {
+        let mut own = scene.scene.clone();
+        own.scan.realisations = repetitions;
+        SceneFile::new(own).map_err(|problems| scene.located(problems))?.with_file_of(scene)
+    };
+    let plan = Plan::new(file, Target::Map)?;
+    if !plan.geometry.schedule.is_plane() {
+        let kind = plan.scene.scene.scan.pattern.name();
+        return Err(records.refuse(format!(
+            "the scene's lines (scan.pattern.kind = \"{kind}\") are not those of one vertical plane, one after the other upwards: \
+             records are estimated for kind = \"rhi\" with a head that keeps still during a line"
+        )));
     }
-    let mut own = scene.scene.clone();
-    own.scan.realisations = repetitions;
-    let file = SceneFile::new(own).map_err(|problems| scene.located(problems))?.with_file_of(scene);
-    Ok((Plan::new(file, Target::Map)?, is_own))
+    Ok((plan, is_own))
 }
 
 /// A scene without what is done with its signals.

@@ -99,7 +99,7 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
         title: "Radial velocity estimated from recorded signals".into(),
         rays: scans.iter().enumerate().flat_map(of_scan).collect(),
         range_m: plan.geometry.gate_range_m.clone(),
-        sweeps: scans.iter().map(|_| Sweep { tau: f64::NAN, azimuth_rad }).collect(),
+        sweeps: scans.iter().map(|_| Sweep::rhi(f64::NAN, azimuth_rad)).collect(),
         pulse: pulse_info(scene),
         fields: vec![
             field("radial_velocity", speed, "estimated radial velocity, positive away from the lidar", |s| {
@@ -134,6 +134,9 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
         lidar_y_m: 0.0,
         lidar_height_m: scene.scan.lidar_height_m,
         site: site(scene),
+        flight: None,
+        ray_pulses: None,
+        places_m: None,
         is_simulated: false,
     })
 }

@@ -1,10 +1,12 @@
 //! The estimates of a run as a map for files and pictures.
 //! Check: the tests of the program read the files.
 
+use crate::beams::SweepMode;
 use crate::io::{Field, PulseInfo, Ray, Site, Sweep, Unit, UtcTime, VelocityMap};
 use crate::measure::map::VelocityEstimates;
 use crate::plan::Plan;
 use crate::scene::Scene;
+use std::f64::consts::FRAC_PI_2;
 
 /// Fields that say how good the mean estimate is.
 const JUDGES: [&str; 9] = [
@@ -22,7 +24,13 @@ const JUDGES: [&str; 9] = [
 /// The map of a run in the form that files and pictures take.
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
-    let azimuth_rad = scene.scan.azimuth_rad;
+    let (mount, lines) = (&g.schedule.mount, &g.schedule.lines);
+    let pulses = lines.iter().map(|line| u32::try_from(line.pulses).unwrap_or(u32::MAX)).collect();
+    let (zero_rad, from_x_rad) = mount.reference_rad;
+    let moves = lines.iter().any(|line| line.velocity_m_s != [0.0; 3] || line.position_m != mount.position_m);
+    let rhi = g.schedule.sweeps.iter().all(|(mode, _)| *mode == SweepMode::Rhi);
+    let stands = mount.position_m[0] == 0.0 && !moves;
+    let across = rhi && stands && (zero_rad, from_x_rad) == (scene.scan.azimuth_rad, FRAC_PI_2);
     let start_s = plan.wind.start_s;
     let away = |what: &str| format!("{what}, positive away from the lidar");
     let speed = |name: &str, text: String, values: &ndarray::Array2<f64>| {
@@ -30,18 +38,27 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     };
     let number =
         |name: &str, text: &str, values: &ndarray::Array2<f64>| Field::float(name, Unit::One, text, values.clone());
+    let spread = e
+        .v_spread_m_s
+        .as_ref()
+        .map(|values| speed("v_spread", "standard deviation of v_pulse over the pulses of a line".into(), values));
     VelocityMap {
         title: "Radial velocity of a wake-vortex scan".into(),
         rays: (0..g.elevation_rad.len())
             .map(|i| Ray {
-                sweep: 0,
+                sweep: g.schedule.lines[i].sweep,
                 time_s: start_s + g.line_time_s[i],
                 elevation_rad: g.elevation_rad[i],
-                azimuth_rad,
+                azimuth_rad: g.schedule.middle(i).azimuth_rad,
             })
             .collect(),
         range_m: e.range_m.clone(),
-        sweeps: vec![Sweep { tau: plan.wind.tau, azimuth_rad }],
+        sweeps: g
+            .schedule
+            .sweeps
+            .iter()
+            .map(|&(mode, fixed_angle_rad)| Sweep { tau: plan.wind.tau, fixed_angle_rad, mode })
+            .collect(),
         pulse: pulse_info(scene),
         fields: vec![
             speed("v_exact", away("radial velocity of the air at the gate's centre"), &e.v_exact_m_s),
@@ -68,9 +85,15 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             ),
             number("quality", "density of the peak over the mean density in the band", &e.quality),
             speed("v_scan", away("radial velocity estimated from the first realisation"), &e.v_scan_m_s),
-        ],
-        lidar_y_m: 0.0,
+        ]
+        .into_iter()
+        .chain(spread)
+        .collect(),
+        lidar_y_m: mount.position_m[1],
         lidar_height_m: scene.scan.lidar_height_m,
+        ray_pulses: lines.iter().any(|line| line.pulses != scene.scan.pulses_per_line).then_some(pulses),
+        places_m: moves.then(|| (0..lines.len()).map(|line| g.schedule.middle(line).position_m).collect()),
+        flight: (!across).then_some((mount.position_m[0], zero_rad - from_x_rad)),
         site: site(scene),
         is_simulated: true,
     }

@@ -2,7 +2,9 @@
 //! Check: by eye; a test of the program compares the names of the files.
 
 use crate::Error;
+use crate::beams::{Direction, SweepMode};
 use crate::io::{FileGroup, Provenance, VelocityMap};
+use crate::measure::beam_winds::BeamWind;
 use crate::measure::profile::RangeProfile;
 use crate::plan::Plan;
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
@@ -79,11 +81,34 @@ fn snr_band_db(profile: &RangeProfile) -> Vec<(f64, f64)> {
 }
 
 /// The air, one scan of it and the mean of all; below them the errors. One scan alone has its error beside it.
-pub(super) fn add_map(files: &mut FileGroup, plan: &Plan, map: &VelocityMap, origin: &Provenance) -> Result<(), Error> {
+///
+/// Sweeps of elevation are seen from the side, those of azimuth from above, the middle one of several; beams of few directions
+/// are curves over range. A VAD has its sine curve beside it.
+pub(super) fn add_map(
+    files: &mut FileGroup,
+    plan: &Plan,
+    map: &VelocityMap,
+    winds: Option<&[BeamWind]>,
+    origin: &Provenance,
+) -> Result<(), Error> {
     let centres_m = centres_m(plan);
+    let sweep = if plan.geometry.schedule.is_plane() { 0 } else { map.sweeps.len() / 2 };
+    let from_above = match map.sweeps.get(sweep).map(|sweep| sweep.mode) {
+        None | Some(SweepMode::Rhi) => false,
+        Some(SweepMode::AzimuthSurveillance | SweepMode::Sector) => true,
+        Some(SweepMode::VerticalPointing | SweepMode::Pointing) => {
+            return add(files, plan, "map", &lines(plan, map), origin);
+        }
+    };
+    if let Some(winds) = winds {
+        return add(files, plan, "map", &azimuth_display(plan, map, winds), origin);
+    }
     let panel = |field: &str, title: &str| -> Result<MapPlot, Error> {
-        let mut plot = MapPlot::new(map, 0, field)?.titled(title).labelled("m/s");
-        plot.points_m.clone_from(&centres_m);
+        let plot = if from_above { MapPlot::from_above(map, sweep, field)? } else { MapPlot::new(map, sweep, field)? };
+        let mut plot = plot.titled(title).labelled("m/s");
+        if !from_above {
+            plot.points_m.clone_from(&centres_m);
+        }
         Ok(plot)
     };
     let realisations = plan.scene.scene.scan.realisations;
@@ -127,6 +152,79 @@ pub(super) fn add_measured(
     let mut figure = Figure::stacked(panels).titled("One scan of recorded signals; grey: no value");
     (figure.columns, figure.width) = (3, 1560.0);
     add(files, plan, "map", &figure, origin)
+}
+
+/// Curves of the first lines over range: the air, and the mean estimates.
+fn lines(plan: &Plan, map: &VelocityMap) -> Figure {
+    let mut plot = CurvePlot::new("", Axis::linear("range [m]"), Axis::linear("radial velocity [m/s]"));
+    for line in 0..map.rays.len().min(5) {
+        let ray = &map.rays[line];
+        let (azimuth, elevation) = (ray.azimuth_rad.to_degrees(), ray.elevation_rad.to_degrees());
+        for (field, style, what) in [("v_pulse", Style::Line, "air"), ("radial_velocity", Style::Markers, "estimate")] {
+            let Some(field) = map.field(field) else { continue };
+            let points: Vec<(f64, f64)> =
+                map.range_m.iter().enumerate().map(|(gate, range_m)| (*range_m, field.values[[line, gate]])).collect();
+            let label = format!("{what}, azimuth {azimuth:.0}°, elevation {elevation:.0}°");
+            plot = plot.with(Series::new(&label, style, points).in_colour(line));
+        }
+    }
+    Figure::stacked([plot]).titled(&title(plan, false))
+}
+
+/// Radial velocity over azimuth at the middle range of the first sweep, with the sine curve of its wind.
+fn azimuth_display(plan: &Plan, map: &VelocityMap, winds: &[BeamWind]) -> Figure {
+    let gate = map.range_m.len() / 2;
+    let x = Axis::linear("azimuth [degrees]");
+    let mut plot = CurvePlot::new("", x, Axis::linear("radial velocity [m/s]"));
+    let rays: Vec<usize> = (0..map.rays.len()).filter(|ray| map.rays[*ray].sweep == 0).collect();
+    for (field, label) in [("v_pulse", "air, weighted with the pulse"), ("v_scan", "one scan, estimated")] {
+        let Some(field) = map.field(field) else { continue };
+        let points = rays.iter().map(|&ray| (map.rays[ray].azimuth_rad.to_degrees(), field.values[[ray, gate]]));
+        plot = plot.with(Series::new(label, Style::Markers, points));
+    }
+    if let (Some(wind), Some(&ray)) = (winds.get(gate), rays.first()) {
+        let (zero_rad, from_x_rad) = plan.geometry.schedule.mount.reference_rad;
+        let curve = (0..=180).map(|i| {
+            let azimuth_rad = f64::from(2 * i).to_radians();
+            let direction = Direction::new((azimuth_rad - zero_rad) + from_x_rad, map.rays[ray].elevation_rad);
+            (f64::from(2 * i), direction.radial_velocity_m_s(wind.wind_m_s, [0.0; 3]))
+        });
+        plot = plot.with(Series::new("its sine curve", Style::Line, curve));
+    }
+    let range_m = map.range_m.get(gate).copied().unwrap_or(f64::NAN);
+    Figure::stacked([plot]).titled(&format!("{}; at {range_m:.0} m", title(plan, false)))
+}
+
+/// Lines of sight that a plan of the scan draws.
+const DRAWN_LINES: usize = 60;
+
+/// Plan of the scan, from above and from behind: each line from the first gate to the last, and where the vortices are.
+pub(super) fn scan(plan: &Plan) -> Figure {
+    let (g, start_m) = (&plan.geometry, plan.geometry.schedule.mount.position_m);
+    let ends = [g.gate_range_m.first(), g.gate_range_m.last()].map(|r| r.copied().unwrap_or(0.0));
+    let lines = g.schedule.lines.len();
+    let panel = |title: &str, label: &str, up: usize| {
+        let mut plot = CurvePlot::new(title, Axis::linear("across the flight [m]"), Axis::linear(label));
+        plot.equal_scales = true;
+        for line in (0..lines).step_by(lines.div_ceil(DRAWN_LINES).max(1)) {
+            let beam = g.schedule.middle(line);
+            let points = ends.map(|range_m| beam.at_range_m(range_m)).map(|p| (p[1], p[up]));
+            plot = plot.with(Series::new("", Style::Line, points).in_colour(0));
+        }
+        let vortices = centres_m(plan).into_iter();
+        let marks: Vec<(f64, f64)> = match up {
+            2 => vortices.collect(),
+            _ => vortices.flat_map(|(y_m, _)| ends.map(|x_m| (y_m, start_m[0] + x_m - ends[0]))).collect(),
+        };
+        if !marks.is_empty() {
+            plot = plot.with(Series::new("vortices", Style::Markers, marks).in_colour(1));
+        }
+        plot.with(Series::new("lidar", Style::Markers, [(start_m[1], start_m[up])]).in_colour(2))
+    };
+    let panels = [panel("from above", "along the flight [m]", 0), panel("from behind", "height [m]", 2)];
+    let mut figure = Figure::side_by_side(panels).titled(&plan.schedule().to_string());
+    figure.width = 1120.0;
+    figure
 }
 
 /// What is shown, of which age and from how many realisations.

@@ -3,9 +3,9 @@
 
 #[cfg(feature = "plots")]
 use super::pictures;
-use super::{HALO, provenance, put, scene_text};
+use super::{add_halo, provenance, put, scene_text};
 use crate::Error;
-use crate::io::{Existing, FileGroup, VelocityMap, hpl, tables};
+use crate::io::{Existing, FileGroup, VelocityMap, tables};
 use crate::measure::recorded::{Recorded, measured_map, predicted_table};
 use crate::measure::run::RunResult;
 use crate::plan::{Plan, Stage};
@@ -66,17 +66,7 @@ fn add_map(files: &mut FileGroup, plan: &Plan, map: &VelocityMap) -> Result<(), 
     if outputs.netcdf {
         files.add("map.nc", crate::io::cfradial::cfradial_bytes(map, &origin)?)?;
     }
-    if outputs.hpl {
-        // One sweep a file.
-        for sweep in 0..map.sweeps.len() {
-            let stem = if sweep == 0 { "halo".to_owned() } else { format!("halo_{}", sweep + 1) };
-            let name = if sweep == 0 { HALO.to_owned() } else { format!("{stem}.hpl") };
-            files.add(&name, hpl::hpl_bytes(map, sweep, &name)?)?;
-            if outputs.csv {
-                files.add(&format!("{stem}.csv"), hpl::hpl_table(map, sweep)?.to_csv(&origin)?)?;
-            }
-        }
-    }
+    add_halo(files, plan, map, &origin)?;
     #[cfg(feature = "plots")]
     pictures::add_measured(files, plan, map, &origin)?;
     Ok(())

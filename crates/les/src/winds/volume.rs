@@ -1,0 +1,188 @@
+//! A velocity field in three dimensions at one instant, each component at nodes of its own, interpolated by (26), (27).
+//!
+//! The interpolation is the tensor product of four weights in each direction, taken in the index coordinates of the mesh, as in
+//! a plane. Where the mesh ends at open sides nothing is known beyond: NaN. Check: linear fields are exact on staggered and
+//! stretched meshes, the error of a sampled vortex falls with the third power of the cell.
+
+use super::axis::{Axis, Edges, GHOSTS};
+use super::grid_wind::{ghost_places, ghost_value};
+use super::strain::largest_strain_per_s;
+use super::wind::Wind;
+use crate::Error;
+use crate::error::{check, check_lengths};
+
+/// One component of the velocity at its nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VolumeComponent {
+    /// Places of the nodes along x, y, z \[m\], increasing, four or more each.
+    pub nodes_m: [Vec<f64>; 3],
+    /// Values `[z][y][x]` \[m/s\].
+    pub values_m_s: Vec<f64>,
+}
+
+/// A velocity field at one instant; the time it is asked for makes no difference.
+#[derive(Debug, Clone)]
+pub struct VolumeSnapshot {
+    components: [Padded; 3],
+    max_gradient_per_s: f64,
+    max_speed_m_s: f64,
+}
+
+/// A component with its ghosts.
+#[derive(Debug, Clone)]
+struct Padded {
+    axes: [Axis; 3],
+    /// x fastest.
+    values_m_s: Vec<f64>,
+}
+
+impl VolumeSnapshot {
+    /// The field of the components u, v, w with the ends of the mesh along x, y, z.
+    ///
+    /// # Errors
+    /// What [`super::GridSnapshot::new`] refuses of a mesh; [`Error::OutOfRange`] for a velocity that is not finite and for a
+    /// number of values that is not that of the nodes.
+    pub fn new(components: &[VolumeComponent; 3], edges: [Edges; 3]) -> Result<Self, Error> {
+        let [u, v, w] = std::array::from_fn(|d| Padded::new(&components[d], edges, d));
+        let components = [u?, v?, w?];
+        let largest = |p: &Padded| p.values_m_s.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let max_speed_m_s = components.iter().map(|p| largest(p).powi(2)).sum::<f64>().sqrt();
+        let mut field = Self { components, max_gradient_per_s: 0.0, max_speed_m_s };
+        field.max_gradient_per_s = field.steepest_per_s()?;
+        Ok(field)
+    }
+
+    /// The largest strain rate in the middle of the cells of u, from differences of their corners.
+    fn steepest_per_s(&self) -> Result<f64, Error> {
+        let nodes_m = self.components[0].axes.each_ref().map(|axis| {
+            let cells = axis.cells();
+            &axis.padded_position_m()[cells.start..=cells.end]
+        });
+        let [xs, ys, zs] = nodes_m;
+        let nx = xs.len();
+        let plane = |z_m: f64| -> Result<Vec<[f64; 3]>, Error> {
+            let points: Vec<[f64; 3]> = ys.iter().flat_map(|&y_m| xs.iter().map(move |&x_m| [x_m, y_m, z_m])).collect();
+            let mut velocity = vec![[0.0; 3]; points.len()];
+            self.velocity_into(&points, 0.0, &mut velocity)?;
+            Ok(velocity)
+        };
+        let mut largest = 0.0_f64;
+        let mut below = plane(zs[0])?;
+        for k in 1..zs.len() {
+            let above = plane(zs[k])?;
+            for (j, i) in (1..ys.len()).flat_map(|j| (1..nx).map(move |i| (j, i))) {
+                let widths_m = [xs[i] - xs[i - 1], ys[j] - ys[j - 1], zs[k] - zs[k - 1]];
+                // Corner by its three steps.
+                let corner = |dx: usize, dy: usize, dz: usize| {
+                    let at = (j - 1 + dy) * nx + i - 1 + dx;
+                    if dz == 1 { above[at] } else { below[at] }
+                };
+                let gradient = std::array::from_fn(|c| {
+                    std::array::from_fn(|d| {
+                        let across = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(a, b)| {
+                            let step = |s: usize| match d {
+                                0 => corner(s, a, b)[c],
+                                1 => corner(a, s, b)[c],
+                                _ => corner(a, b, s)[c],
+                            };
+                            step(1) - step(0)
+                        });
+                        0.25 * across.iter().sum::<f64>() / widths_m[d]
+                    })
+                });
+                // A corner outside the mesh of another component makes it no number, which max leaves out.
+                largest = largest.max(largest_strain_per_s(&gradient));
+            }
+            below = above;
+        }
+        Ok(largest)
+    }
+
+    /// A speed that no node exceeds \[m/s\]: of the largest values of the components.
+    pub fn max_speed_m_s(&self) -> f64 {
+        self.max_speed_m_s
+    }
+}
+
+impl Wind for VolumeSnapshot {
+    /// As the trait says; NaN outside the mesh.
+    fn velocity_into(&self, points_m: &[[f64; 3]], _time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+        check_lengths(points_m.len(), out_m_s.len())?;
+        for (point_m, out) in points_m.iter().zip(out_m_s) {
+            for (component, out) in self.components.iter().zip(out) {
+                *out = component.at(point_m).unwrap_or(f64::NAN);
+            }
+        }
+        Ok(())
+    }
+
+    /// The largest strain rate in the middle of a cell: second-order accurate, so some percent low where the mesh has fewer than
+    /// about ten cells across a core.
+    fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
+        self.max_gradient_per_s
+    }
+}
+
+impl Padded {
+    fn new(component: &VolumeComponent, edges: [Edges; 3], number: usize) -> Result<Self, Error> {
+        const NAMES: [&str; 3] = ["x", "y", "z"];
+        let [x, y, z] = std::array::from_fn(|d| Axis::new(NAMES[d], &component.nodes_m[d], edges[d]));
+        let axes = [x?, y?, z?];
+        let [nx, ny, nz] = axes.each_ref().map(Axis::nodes);
+        let values = &component.values_m_s;
+        let allowed = "as many as nodes along x, y and z give";
+        check("number of values", values.len() as f64, allowed, |n| n == (nx * ny * nz) as f64)?;
+        for &value in values {
+            check("velocity_m_s", value, "finite", |_| true)?;
+        }
+        let [px, py, pz] = axes.each_ref().map(Axis::padded_nodes);
+        let mut padded = vec![0.0; px * py * pz];
+        for (row, from) in values.chunks_exact(nx).enumerate() {
+            let start = ((row / ny + GHOSTS) * py + row % ny + GHOSTS) * px + GHOSTS;
+            padded[start..start + nx].copy_from_slice(from);
+        }
+        // Ghosts direction by direction, over what is already there.
+        let strides = [1, px, px * py];
+        let spans = [
+            [0..1, GHOSTS..GHOSTS + ny, GHOSTS..GHOSTS + nz],
+            [0..px, 0..1, GHOSTS..GHOSTS + nz],
+            [0..px, 0..py, 0..1],
+        ];
+        for d in 0..3 {
+            let [xs, ys, zs] = &spans[d];
+            for (ghost_at, ghost) in ghost_places(&axes[d]) {
+                for (k, j) in zs.clone().flat_map(|k| ys.clone().map(move |j| (k, j))) {
+                    for i in xs.clone() {
+                        let base = i + j * strides[1] + k * strides[2];
+                        // The rules of a wall know all components by their number.
+                        let vector = |node: usize| {
+                            let mut v = [0.0; 3];
+                            v[number] = padded[base + (node + GHOSTS) * strides[d]];
+                            v
+                        };
+                        let value = ghost_value(ghost, d, vector)[number];
+                        padded[base + ghost_at * strides[d]] = value;
+                    }
+                }
+            }
+        }
+        Ok(Self { axes, values_m_s: padded })
+    }
+
+    /// The value at a place, (26); none outside.
+    fn at(&self, point_m: &[f64; 3]) -> Option<f64> {
+        let (i, across_x) = self.axes[0].stencil(point_m[0])?;
+        let (j, across_y) = self.axes[1].stencil(point_m[1])?;
+        let (k, across_z) = self.axes[2].stencil(point_m[2])?;
+        let (px, py) = (self.axes[0].padded_nodes(), self.axes[1].padded_nodes());
+        let mut sum = 0.0;
+        for (dk, weight_z) in across_z.iter().enumerate() {
+            for (dj, weight_y) in across_y.iter().enumerate() {
+                let start = ((k + dk) * py + j + dj) * px + i;
+                let row: f64 = self.values_m_s[start..start + 4].iter().zip(&across_x).map(|(v, w)| v * w).sum();
+                sum += weight_z * weight_y * row;
+            }
+        }
+        Some(sum)
+    }
+}

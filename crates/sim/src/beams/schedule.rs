@@ -1,0 +1,308 @@
+//! The lines of a scan on the clock of the pulses, and the beam of each pulse.
+//!
+//! A sweep begins with the next pulse of the laser's clock once the head is there; between lines and between sweeps the head
+//! moves, and pulses that leave meanwhile belong to no line. Check: sweeps back and forth against a table, pulse by pulse;
+//! jitter against its closed form.
+
+use super::direction::Direction;
+use super::head::Head;
+use super::path::{Angles, Path, SweepMode, SweepPath};
+use crate::measure::streams::stream;
+use rand_xoshiro::rand_core::Rng;
+use std::f64::consts::TAU;
+
+/// Where the lidar stands and how it points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mount {
+    /// Place at the start of the scan, m.
+    pub position_m: [f64; 3],
+    /// Velocity, m/s.
+    pub velocity_m_s: [f64; 3],
+    /// An azimuth, rad, and the angle from +x that it stands for.
+    pub reference_rad: (f64, f64),
+    /// Standard deviations of azimuth and elevation about where the head points, rad.
+    pub jitter_rad: Angles,
+    /// Seed of the jitter.
+    pub seed: u64,
+}
+
+/// What paces a scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// Time between pulses, s.
+    pub prt_s: f64,
+    /// Pulses of a line.
+    pub pulses: usize,
+    /// The head.
+    pub head: Head,
+    /// Time that a line takes beside its pulses, s; the head moves meanwhile.
+    pub dead_time_s: f64,
+}
+
+/// One line of sight: pulses that one spectrum comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// Index of its sweep.
+    pub sweep: usize,
+    /// Lines of equal number may share air in a region of accumulation.
+    pub group: usize,
+    /// Time of its first pulse in periods of the pulses from the start of the scan.
+    pub tick: f64,
+    /// Number of its first pulse in the scan.
+    pub first: usize,
+    /// Its pulses.
+    pub pulses: usize,
+    /// Angles at its first pulse, rad.
+    pub angles_rad: Angles,
+    /// How fast they change during the line, rad/s.
+    pub rate_rad_s: Angles,
+    /// Place of the lidar at its first pulse, m.
+    pub position_m: [f64; 3],
+    /// Its velocity, m/s.
+    pub velocity_m_s: [f64; 3],
+}
+
+/// One pulse, or the middle of several.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beam {
+    /// Time from the start of the scan, s.
+    pub time_s: f64,
+    /// Azimuth, rad, clockwise from north.
+    pub azimuth_rad: f64,
+    /// Elevation, rad.
+    pub elevation_rad: f64,
+    /// Where it points in the axes of the scene.
+    pub direction: Direction,
+    /// Where it starts, m.
+    pub position_m: [f64; 3],
+    /// Velocity of the lidar, m/s.
+    pub velocity_m_s: [f64; 3],
+}
+
+impl Beam {
+    /// The place on the beam at a range, m.
+    pub fn at_range_m(&self, range_m: f64) -> [f64; 3] {
+        self.direction.at_range_m(self.position_m, range_m)
+    }
+}
+
+/// A stop that a file asks for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stop {
+    /// Time of its first pulse from the start of the scan, s; as soon as the head is there if absent.
+    pub time_s: Option<f64>,
+    /// Azimuth and elevation, rad.
+    pub angles_rad: Angles,
+    /// Pulses, if not as many as for others.
+    pub pulses: Option<usize>,
+    /// Number of its sweep, from 0, and the kind of that.
+    pub sweep: usize,
+    /// The kind of its sweep.
+    pub mode: SweepMode,
+    /// Place of the lidar, m, and its velocity, m/s, if not those of the mount.
+    pub carrier: Option<([f64; 3], [f64; 3])>,
+}
+
+/// A whole scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schedule {
+    /// Its lines in the order of time.
+    pub lines: Vec<Line>,
+    /// Kind and fixed angle, rad, of each sweep.
+    pub sweeps: Vec<(SweepMode, f64)>,
+    /// Time between pulses, s.
+    pub prt_s: f64,
+    /// Where the lidar is.
+    pub mount: Mount,
+}
+
+impl Schedule {
+    /// The lines of sweeps one after the other.
+    pub fn new(paths: &[SweepPath], pace: &Pace, mount: Mount) -> Self {
+        let mut scan = Self { lines: Vec::new(), sweeps: Vec::new(), prt_s: pace.prt_s, mount };
+        // When and where the head has done its last line, and the way it then moves.
+        let mut last: Option<(f64, Angles, Angles)> = None;
+        for (sweep, SweepPath { mode, fixed_angle_rad, path, apart }) in paths.iter().enumerate() {
+            scan.sweeps.push((*mode, *fixed_angle_rad));
+            match path {
+                Path::Stepped(stops) => {
+                    for stop in stops {
+                        let wait_s =
+                            last.map_or(0.0, |(_, at, _)| pace.head.time_s(apart_rad(at, *stop)).max(pace.dead_time_s));
+                        let tick = last.map_or(0.0, |(end, ..)| scan.next_tick(end, wait_s));
+                        let group = if *apart { scan.lines.len() } else { sweep };
+                        scan.push(sweep, group, tick, pace.pulses, *stop, [0.0; 2]);
+                        last = Some((tick + pace.pulses as f64, *stop, [0.0; 2]));
+                    }
+                }
+                Path::Moving { from, to } => {
+                    let length_rad = difference(*from, *to).iter().fold(0.0_f64, |most, d| most.max(d.abs()));
+                    let rate_rad_s = difference(*from, *to).map(|d| d / length_rad * pace.head.rate_rad_s);
+                    let tick = last.map_or(0.0, |(end, at, moving)| {
+                        let turns = moving.iter().zip(rate_rad_s).any(|(before, now)| before * now < 0.0);
+                        let turn_s = if turns { pace.head.turn_round_s() } else { 0.0 };
+                        scan.next_tick(end, pace.head.time_s(apart_rad(at, *from)).max(turn_s))
+                    });
+                    let sweep_s = length_rad / pace.head.rate_rad_s;
+                    let line_s = pace.pulses as f64 * pace.prt_s;
+                    for line in 0..(sweep_s / line_s + 1e-9) as usize {
+                        let before = (line * pace.pulses) as f64;
+                        let at = std::array::from_fn(|d| from[d] + rate_rad_s[d] * (before * pace.prt_s));
+                        scan.push(sweep, sweep, tick + before, pace.pulses, at, rate_rad_s);
+                    }
+                    last = Some((tick + sweep_s / pace.prt_s, *to, rate_rad_s));
+                }
+            }
+        }
+        scan
+    }
+
+    /// The lines of stops, in the order of time.
+    ///
+    /// # Errors
+    /// The index of a stop that the head cannot reach in time, and why.
+    pub fn of_stops(stops: &[Stop], pace: &Pace, mount: Mount) -> Result<Self, (usize, String)> {
+        let mut scan = Self { lines: Vec::new(), sweeps: Vec::new(), prt_s: pace.prt_s, mount };
+        let mut last: Option<(f64, Angles)> = None;
+        for (i, stop) in stops.iter().enumerate() {
+            let wait_s = last.map_or(0.0, |(_, at)| pace.head.time_s(apart_rad(at, stop.angles_rad)));
+            let earliest = last.map_or(f64::NEG_INFINITY, |(end, _)| end + wait_s / pace.prt_s);
+            let tick = match stop.time_s {
+                Some(time_s) if time_s / pace.prt_s < earliest - 1e-6 => {
+                    let (end_s, early_s) = (last.map_or(0.0, |(end, _)| end * pace.prt_s), earliest * pace.prt_s);
+                    let reason = if time_s < end_s {
+                        format!("at least {end_s:?} s, the end of the line before")
+                    } else {
+                        format!("at least {early_s:?} s: the head needs {wait_s:.3} s from the angles before")
+                    };
+                    return Err((i, reason));
+                }
+                Some(time_s) => time_s / pace.prt_s,
+                None => last.map_or(0.0, |(end, _)| scan.next_tick(end, wait_s.max(pace.dead_time_s))),
+            };
+            if scan.sweeps.len() <= stop.sweep {
+                let [azimuth_rad, elevation_rad] = stop.angles_rad;
+                let fixed_rad = if stop.mode == SweepMode::Rhi { azimuth_rad } else { elevation_rad };
+                scan.sweeps.push((stop.mode, fixed_rad));
+            }
+            let pulses = stop.pulses.unwrap_or(pace.pulses);
+            let stays = matches!(stop.mode, SweepMode::Pointing | SweepMode::VerticalPointing);
+            let group = if stays { stops.len() + i } else { stop.sweep };
+            scan.push(stop.sweep, group, tick, pulses, stop.angles_rad, [0.0; 2]);
+            if let (Some(line), Some((position_m, velocity_m_s))) = (scan.lines.last_mut(), stop.carrier) {
+                (line.position_m, line.velocity_m_s) = (position_m, velocity_m_s);
+            }
+            last = Some((tick + pulses as f64, stop.angles_rad));
+        }
+        Ok(scan)
+    }
+
+    /// The first pulse of the clock that is not before a wait after `tick`.
+    fn next_tick(&self, tick: f64, wait_s: f64) -> f64 {
+        (tick + wait_s / self.prt_s - 1e-6).ceil()
+    }
+
+    fn push(&mut self, sweep: usize, group: usize, tick: f64, pulses: usize, angles_rad: Angles, rate_rad_s: Angles) {
+        let first = self.pulses();
+        let (time_s, Mount { position_m: start_m, velocity_m_s, .. }) = (tick * self.prt_s, self.mount);
+        let position_m = std::array::from_fn(|d| start_m[d] + velocity_m_s[d] * time_s);
+        let line = Line { sweep, group, tick, first, pulses, angles_rad, rate_rad_s, position_m, velocity_m_s };
+        self.lines.push(line);
+    }
+
+    /// Pulses of the whole scan.
+    pub fn pulses(&self) -> usize {
+        self.lines.last().map_or(0, |line| line.first + line.pulses)
+    }
+
+    /// The line of a pulse of the scan.
+    pub fn line_of(&self, pulse: usize) -> usize {
+        self.lines.partition_point(|line| line.first <= pulse).saturating_sub(1)
+    }
+
+    /// The beam without jitter at a place among the pulses of a line, which may lie between two.
+    ///
+    /// # Panics
+    /// If there is no such line.
+    pub fn beam(&self, line: usize, pulse: f64) -> Beam {
+        self.beam_beside(&self.lines[line], pulse, [0.0; 2])
+    }
+
+    /// The beam of a pulse with its jitter; each realisation of the scan has the same.
+    ///
+    /// # Panics
+    /// If there is no such line.
+    pub fn beam_of_pulse(&self, line: usize, pulse: usize) -> Beam {
+        let line = &self.lines[line];
+        let jitter = self.mount.jitter_rad;
+        if jitter == [0.0; 2] {
+            return self.beam_beside(line, pulse as f64, jitter);
+        }
+        let mut random = stream(self.mount.seed, "pointing", (line.first + pulse) as u64);
+        let mut part = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        // Box and Muller (1958): two normal numbers.
+        let (radius, (sin, cos)) = ((-2.0 * (1.0 - part()).ln()).sqrt(), (TAU * part()).sin_cos());
+        self.beam_beside(line, pulse as f64, [jitter[0] * radius * cos, jitter[1] * radius * sin])
+    }
+
+    fn beam_beside(&self, line: &Line, pulse: f64, beside_rad: Angles) -> Beam {
+        let after_s = pulse * self.prt_s;
+        let [azimuth_rad, elevation_rad] =
+            std::array::from_fn(|d| line.angles_rad[d] + line.rate_rad_s[d] * after_s + beside_rad[d]);
+        let (zero_rad, from_x_rad) = self.mount.reference_rad;
+        Beam {
+            time_s: (line.tick + pulse) * self.prt_s,
+            azimuth_rad,
+            elevation_rad,
+            direction: Direction::new((azimuth_rad - zero_rad) + from_x_rad, elevation_rad),
+            position_m: std::array::from_fn(|d| line.position_m[d] + line.velocity_m_s[d] * after_s),
+            velocity_m_s: line.velocity_m_s,
+        }
+    }
+
+    /// The beam in the middle of a line.
+    pub fn middle(&self, line: usize) -> Beam {
+        self.beam(line, 0.5 * (self.lines[line].pulses as f64 - 1.0))
+    }
+
+    /// First and last beam of each line, by which the whole line is bounded.
+    pub fn ends(&self) -> impl Iterator<Item = Beam> + '_ {
+        let of_line = |i: usize| [0.0, (self.lines[i].pulses - 1) as f64].map(|pulse| self.beam(i, pulse));
+        (0..self.lines.len()).flat_map(of_line)
+    }
+
+    /// Time from the first pulse to the last, s.
+    pub fn duration_s(&self) -> f64 {
+        let end = self.lines.last().map_or(0.0, |line| line.tick + line.pulses as f64 - 1.0);
+        (end - self.lines.first().map_or(0.0, |line| line.tick)) * self.prt_s
+    }
+
+    /// Longest time between the beginnings of sweeps, s; none for one sweep.
+    pub fn revisit_s(&self) -> Option<f64> {
+        let first = |sweep: usize| self.lines.iter().find(|line| line.sweep == sweep).map(|line| line.tick);
+        let ticks: Vec<f64> = (0..self.sweeps.len()).filter_map(first).collect();
+        ticks.windows(2).map(|pair| (pair[1] - pair[0]) * self.prt_s).reduce(f64::max)
+    }
+
+    /// Whether all is one RHI upwards of equal lines that stand still: the scan that regions in a plane are for.
+    pub fn is_plane(&self) -> bool {
+        let pulses = self.lines.first().map_or(0, |line| line.pulses);
+        let here_m = self.mount.position_m;
+        let alike = |line: &Line| line.pulses == pulses && line.velocity_m_s == [0.0; 3] && line.position_m == here_m;
+        let rises = |pair: &[Line]| pair[1].angles_rad[1] > pair[0].angles_rad[1];
+        matches!(self.sweeps[..], [(SweepMode::Rhi, _)])
+            && self.lines.iter().all(alike)
+            && self.lines.windows(2).all(|pair| rises(pair) && pair[0].angles_rad[0] == pair[1].angles_rad[0])
+    }
+}
+
+/// From one pair of angles to another, rad; azimuths as they are given.
+fn difference(from: Angles, to: Angles) -> Angles {
+    std::array::from_fn(|d| to[d] - from[d])
+}
+
+/// How far the head turns, rad: the longer of its two ways, azimuths the shorter way round.
+fn apart_rad(from: Angles, to: Angles) -> f64 {
+    let [azimuth, elevation] = difference(from, to);
+    (azimuth - TAU * (azimuth / TAU).round()).abs().max(elevation.abs())
+}

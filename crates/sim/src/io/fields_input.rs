@@ -1,0 +1,144 @@
+//! Velocity fields in three dimensions from classic NetCDF, one time at once: those that this program writes, those of PALM and
+//! WRF with each component on nodes of its own, and any other with coordinates.
+//!
+//! Check: fields of this program come back; staggered files made with the names and axes of PALM and WRF give the same wind.
+
+use crate::Error;
+use crate::io::netcdf_input::{ClassicFile, TIME, X, Y, Z, open};
+use std::path::{Path, PathBuf};
+use wakescope_les::winds::VolumeComponent;
+
+/// Acceleration of gravity by which WRF makes heights of its geopotential, m/s^2.
+const WRF_GRAVITY_M_S2: f64 = 9.81;
+
+/// Heights of a level may differ by so much of the highest over a field, if it is to count as level.
+const LEVEL: f64 = 2e-3;
+
+/// One field of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FieldPlace {
+    /// The file.
+    pub(crate) path: PathBuf,
+    /// Its place along the time, if the file has such a dimension.
+    pub(crate) place: Option<usize>,
+    /// Its time in the unit of the file, which is the second where it says so.
+    pub(crate) time_s: f64,
+}
+
+/// The fields of a file, in the order of their times.
+///
+/// # Errors
+/// A file that cannot be read or lacks the variable `name`; a time without values.
+pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> {
+    let mut file = open(path)?;
+    times(&mut file, name)
+        .map(|times| {
+            let of = |(place, time_s): (Option<usize>, f64)| FieldPlace { path: path.to_owned(), place, time_s };
+            times.into_iter().map(of).collect()
+        })
+        .map_err(|reason| file.refuse(reason))
+}
+
+fn times(file: &mut ClassicFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
+    let Some(dim) = file.dim_of(name, TIME) else {
+        // A field on its own: its time is a number beside it.
+        let time = if file.has("time") { seconds(file, "time")?.first().copied() } else { None };
+        return Ok(vec![(None, time.unwrap_or(0.0))]);
+    };
+    if file.dims(name).and_then(|dims| dims.first().copied()) != Some(dim.as_str()) {
+        return Err(format!("{name}: time must be its first dimension"));
+    }
+    let source = [dim.as_str(), "XTIME", "time"].into_iter().find(|n| file.has(n)).map(str::to_owned);
+    let Some(source) = source else {
+        return Err("it has no times: a variable of the name of its time dimension is needed".into());
+    };
+    Ok(seconds(file, &source)?.into_iter().enumerate().map(|(i, t)| (Some(i), t)).collect())
+}
+
+/// Times in seconds, from the unit that the file states.
+fn seconds(file: &mut ClassicFile, name: &str) -> Result<Vec<f64>, String> {
+    let unit = file.text(name, "units").and_then(|units| units.split_whitespace().next());
+    let factor = match unit {
+        None | Some("s" | "sec" | "secs" | "second" | "seconds" | "1") => 1.0,
+        Some("min" | "minute" | "minutes") => 60.0,
+        Some("h" | "hour" | "hours") => 3600.0,
+        Some(_) => return Err("its times are in no unit that is known: seconds, minutes or hours".into()),
+    };
+    Ok(file.floats(name)?.into_iter().map(|t| t * factor).collect())
+}
+
+/// The components of one field, in the units and axes of the file.
+///
+/// # Errors
+/// A variable or a coordinate that is missing, a value that is missing, levels that are not level.
+pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<[VolumeComponent; 3], Error> {
+    let mut file = open(&field.path)?;
+    let mut component = |name: &str| component(&mut file, name, field.place).map_err(|reason| file.refuse(reason));
+    Ok([component(&names[0])?, component(&names[1])?, component(&names[2])?])
+}
+
+fn component(file: &mut ClassicFile, name: &str, place: Option<usize>) -> Result<VolumeComponent, String> {
+    let dims = match place {
+        Some(_) => {
+            let [_, z, y, x] = file.roles(name, [TIME, Z, Y, X])?;
+            [z, y, x]
+        }
+        None => file.roles(name, [Z, Y, X])?,
+    };
+    let [z, y, x] = dims.each_ref().map(String::as_str);
+    let nodes_m = [nodes(file, x, place)?, nodes(file, y, place)?, nodes(file, z, place)?];
+    let values_m_s = file.ordered_part(name, &dims, place)?;
+    if let Some(at) = values_m_s.iter().position(|v| !v.is_finite()) {
+        return Err(format!("{name} is missing or not finite at place {at}: cut what the terrain hides, or fill it"));
+    }
+    Ok(VolumeComponent { nodes_m, values_m_s })
+}
+
+/// Places of the nodes along a dimension: its coordinate, or what WRF has instead.
+fn nodes(file: &mut ClassicFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>, String> {
+    if file.has(dim) {
+        return file.coordinate(dim);
+    }
+    let staggered = dim.ends_with("_stag");
+    let step = match dim.trim_end_matches("_stag") {
+        "west_east" => "DX",
+        "south_north" => "DY",
+        "bottom_top" => return levels(file, staggered, place),
+        _ => return file.coordinate(dim),
+    };
+    let Some(step_m) = file.global_number(step).filter(|step_m| *step_m > 0.0) else {
+        return Err(format!("it has neither the coordinate of {dim} nor the attribute {step}"));
+    };
+    let count = file.length(dim).unwrap_or(0);
+    let first = if staggered { 0.0 } else { 0.5 };
+    Ok((0..count).map(|i| (i as f64 + first) * step_m).collect())
+}
+
+/// Heights of WRF's levels above the ground, from the geopotential, if they are level.
+fn levels(file: &mut ClassicFile, staggered: bool, place: Option<usize>) -> Result<Vec<f64>, String> {
+    let both = ["PH", "PHB"].map(|name| {
+        let dims = file.roles(name, [TIME, Z, Y, X]).map(|[_, z, y, x]| [z, y, x]);
+        dims.or_else(|_| file.roles(name, [Z, Y, X])).and_then(|dims| {
+            let count = file.length(&dims[0]).unwrap_or(0) as usize;
+            Ok((count, file.ordered_part(name, &dims, place)?))
+        })
+    });
+    let [(count, disturbed), (_, base)] = match both {
+        [Ok(ph), Ok(phb)] if ph.1.len() == phb.1.len() && ph.0 > 1 => [ph, phb],
+        _ => return Err("its levels have no heights: a coordinate of bottom_top, or PH and PHB are needed".into()),
+    };
+    let height_m: Vec<f64> = disturbed.iter().zip(&base).map(|(a, b)| (a + b) / WRF_GRAVITY_M_S2).collect();
+    let columns = height_m.len() / count;
+    let mean_m: Vec<f64> = height_m.chunks_exact(columns).map(|l| l.iter().sum::<f64>() / columns as f64).collect();
+    let uneven_m =
+        height_m.chunks_exact(columns).zip(&mean_m).flat_map(|(l, mean)| l.iter().map(move |h| (h - mean).abs()));
+    let uneven_m = uneven_m.fold(0.0, f64::max);
+    let (ground_m, top_m) = (mean_m[0], mean_m[count - 1]);
+    if uneven_m > LEVEL * (top_m - ground_m) {
+        return Err(format!(
+            "its levels rise and fall by {uneven_m:.1} m: bring it to levels of constant height first, e.g. by wrf-python's vinterp"
+        ));
+    }
+    let faces_m: Vec<f64> = mean_m.iter().map(|h| h - ground_m).collect();
+    Ok(if staggered { faces_m } else { faces_m.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect() })
+}

@@ -1,0 +1,118 @@
+//! The lines of sight of a scene's scan, from its pattern, its head and the place of its lidar.
+//! Check: an RHI has the lines and times of before; what a list or the ground forbids is refused with its key.
+
+use crate::Error;
+use crate::beams::path::{self, SweepPath};
+use crate::beams::schedule::{Pace, Schedule};
+use crate::beams::{Head, Mount};
+use crate::io::scan_list;
+use crate::keys::Problem;
+use crate::scene::{HeadMotion, Outside, Pattern, Scene, SceneFile, SweepDirection, Towards};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// The lines of sight of a checked scene; a list is looked for relative to the folder of the scene.
+///
+/// # Errors
+/// A list that cannot be read or followed; beams that meet the ground where the scene does not allow it.
+pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
+    let scene = &file.scene;
+    let (s, head) = (&scene.scan, &scene.scan.head);
+    let pace = Pace {
+        prt_s: 1.0 / scene.laser.pulse_repetition_hz,
+        pulses: s.pulses_per_line,
+        head: Head { rate_rad_s: head.rate_rad_s, acceleration_rad_s2: head.acceleration_rad_s2 },
+        dead_time_s: head.dead_time_s,
+    };
+    let scan = match &s.pattern {
+        Pattern::List { file: list } => {
+            let of_key = |e: Error| Error::OfKey { key: "scan.pattern.file", source: Box::new(e) };
+            let path = file.folder.join(list);
+            let stops = scan_list::read(&path).map_err(of_key)?;
+            Schedule::of_stops(&stops, &pace, mount(scene)).map_err(|(i, reason)| {
+                let time_s = stops.get(i).and_then(|stop| stop.time_s).unwrap_or(0.0);
+                of_key(Error::Input { path, reason: format!("row {}: time_s = {time_s:?}: {reason}", i + 1) })
+            })?
+        }
+        _ => Schedule::new(&sweeps(scene), &pace, mount(scene)),
+    };
+    above_ground(file, &scan)?;
+    Ok(scan)
+}
+
+/// North, and where the lidar is.
+fn mount(scene: &Scene) -> Mount {
+    let (s, l) = (&scene.scan, &scene.scan.lidar);
+    let reference_rad = match (l.flight_azimuth_rad, &s.pattern) {
+        (Some(azimuth_rad), _) => (azimuth_rad, 0.0),
+        // The plane of a scan across the flight, whatever it is called.
+        (None, Pattern::Rhi {}) => (s.azimuth_rad, FRAC_PI_2),
+        (None, _) => (0.0, 0.0),
+    };
+    Mount {
+        position_m: [l.x_m, l.y_m, s.lidar_height_m],
+        velocity_m_s: l.velocity_m_s,
+        reference_rad,
+        jitter_rad: s.head.pointing_jitter_rad,
+        seed: scene.seed,
+    }
+}
+
+/// The sweeps of a pattern, repeated as often as the scene says.
+fn sweeps(scene: &Scene) -> Vec<SweepPath> {
+    let s = &scene.scan;
+    let moving = s.head.motion == HeadMotion::Continuous;
+    let rows = || path::steps(s.elevation_min_rad, s.elevation_max_rad, s.elevation_step_rad);
+    let once = match &s.pattern {
+        Pattern::Rhi {} => {
+            vec![path::rhi(s.azimuth_rad, s.elevation_min_rad, s.elevation_max_rad, s.elevation_step_rad, moving)]
+        }
+        Pattern::Ppi(p) => {
+            let row = |el: &f64| path::ppi(*el, p.azimuth_min_rad, p.azimuth_max_rad, p.azimuth_step_rad, moving);
+            p.elevations_rad.iter().map(row).collect()
+        }
+        Pattern::Vad(p) => vec![path::vad(p.elevation_rad, p.beams)],
+        Pattern::Dbs(p) => vec![path::dbs(p.elevation_rad)],
+        Pattern::Stare(p) => vec![path::stare(s.azimuth_rad, p.elevation_rad, p.lines)],
+        Pattern::Axial(p) => {
+            let (zero_rad, from_x_rad) = mount(scene).reference_rad;
+            let along_rad = zero_rad - from_x_rad;
+            let axis_rad = along_rad + if p.towards == Towards::PlusX { 0.0 } else { PI };
+            path::raster(axis_rad, &rows(), [p.azimuth_min_rad, p.azimuth_max_rad, p.azimuth_step_rad], moving)
+        }
+        Pattern::List { .. } => Vec::new(),
+    };
+    let all = (0..s.head.sweeps).flat_map(|_| once.iter().cloned());
+    let back = |i: usize| s.head.direction == SweepDirection::Alternate && i % 2 == 1;
+    all.enumerate()
+        .map(|(i, sweep)| if back(i) { SweepPath { path: sweep.path.reversed(), ..sweep } } else { sweep })
+        .collect()
+}
+
+/// Refuses beams below the ground.
+fn above_ground(file: &SceneFile, scan: &Schedule) -> Result<(), Error> {
+    let s = &file.scene.scan;
+    if s.below_ground != (Outside::Error {}) {
+        return Ok(());
+    }
+    let low = |beam: &crate::beams::Beam| beam.position_m[2].min(beam.at_range_m(s.range_max_m)[2]);
+    let Some(lowest) = scan.ends().min_by(|a, b| low(a).total_cmp(&low(b))).filter(|beam| low(beam) < -1e-9) else {
+        return Ok(());
+    };
+    let key = match &s.pattern {
+        Pattern::Rhi {} | Pattern::Axial(_) => "scan.elevation_min_rad",
+        Pattern::Ppi(_) => "scan.pattern.elevations_rad",
+        Pattern::List { .. } => "scan.pattern.file",
+        _ => "scan.pattern.elevation_rad",
+    };
+    let problem = Problem {
+        key: key.into(),
+        value: format!("{:?}", lowest.elevation_rad),
+        allowed: format!(
+            "beams above the ground up to scan.range_max_m; the one at {:.3} s ends {:.3} m below it, which \
+             scan.below_ground.policy = \"mask\" allows",
+            lowest.time_s,
+            -low(&lowest)
+        ),
+    };
+    Err(file.located(vec![problem]).into())
+}

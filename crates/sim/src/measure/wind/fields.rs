@@ -1,0 +1,137 @@
+//! Whole fields over time as the wind of a scene: read slice by slice, turned and moved to their place.
+//!
+//! Check: a right-handed file with one vortex comes out unmirrored; a field off the cross-plane is what it says.
+
+use super::{Frozen, SceneWind};
+use crate::Error;
+use crate::beams::direction::sin_cos_of_turn;
+use crate::io::fields_input::{FieldPlace, places, read};
+use crate::io::planes_input::files;
+use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
+use wakescope_les::winds::{Edges, Side, VolumeComponent, VolumeSeries, VolumeSnapshot};
+use wakescope_les::{Error as LesError, Wind};
+
+/// A wind in axes of its own.
+struct Placed {
+    wind: Box<dyn Wind>,
+    origin_m: [f64; 3],
+    sin: f64,
+    cos: f64,
+    /// -1 where y of the file points to the left.
+    side: f64,
+}
+
+/// Points that are turned at once.
+const BATCH: usize = 256;
+
+impl Wind for Placed {
+    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), LesError> {
+        let (sin, cos, [x0, y0, z0]) = (self.sin, self.cos, self.origin_m);
+        let mut turned = Vec::with_capacity(BATCH);
+        for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
+            turned.clear();
+            turned.extend(points.iter().map(|[x, y, z]| {
+                let (x, y) = (x - x0, y - y0);
+                [cos * x + sin * y, self.side * (cos * y - sin * x), z - z0]
+            }));
+            self.wind.velocity_into(&turned, time_s, outs)?;
+            for out in outs {
+                let [u, v, w] = *out;
+                let v = self.side * v;
+                *out = [cos * u - sin * v, sin * u + cos * v, w];
+            }
+        }
+        Ok(())
+    }
+
+    fn max_gradient_per_s(&self, time_s: f64) -> f64 {
+        self.wind.max_gradient_per_s(time_s)
+    }
+}
+
+/// A field in metres and seconds.
+fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Error> {
+    let scaled = |c: VolumeComponent| VolumeComponent {
+        nodes_m: c.nodes_m.map(|nodes| nodes.into_iter().map(|x| x * flow.length_unit_m).collect()),
+        values_m_s: c.values_m_s.into_iter().map(|v| v * flow.velocity_unit_m_s).collect(),
+    };
+    let components = read(field, &flow.names)?.map(scaled);
+    let refuse = |reason: String| Error::Input { path: field.path.clone(), reason };
+    // The period of evenly spaced nodes; faces and centres have the same.
+    let along = |direction: usize, periodic: bool| -> Result<Edges, Error> {
+        let nodes_m = &components[direction].nodes_m[direction];
+        let (Some(first), Some(second), Some(last)) = (nodes_m.first(), nodes_m.get(1), nodes_m.last()) else {
+            return Err(refuse("a coordinate without values".into()));
+        };
+        if !periodic {
+            return Ok(Edges::Bounded { low: Side::Open, high: Side::Open });
+        }
+        let step_m = second - first;
+        if nodes_m.windows(2).any(|pair| (pair[1] - pair[0] - step_m).abs() > 1e-6 * step_m) {
+            return Err(refuse("a periodic direction needs nodes at equal distances".into()));
+        }
+        Ok(Edges::Periodic { period_m: last - first + step_m })
+    };
+    let low = match flow.ground {
+        FieldGround::Open => Side::Open,
+        FieldGround::NoSlip => Side::NoSlipWall { position_m: 0.0, velocity_m_s: [0.0; 3] },
+        FieldGround::Slip => Side::SlipWall { position_m: 0.0 },
+    };
+    let edges = [along(0, flow.periodic_x)?, along(1, flow.periodic_y)?, Edges::Bounded { low, high: Side::Open }];
+    VolumeSnapshot::new(&components, edges).map_err(|e| refuse(e.to_string()))
+}
+
+/// Reads fields: their times, and once each for its gradient; the rest when it is needed.
+pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Error> {
+    let path = file.folder.join(&flow.files);
+    let of_key = |e: Error| Error::OfKey { key: "flow.files", source: Box::new(e) };
+    let refuse = |reason: String| Error::Input { path: path.clone(), reason };
+    let mut all = Vec::new();
+    for path in files(&path).map_err(of_key)? {
+        all.extend(places(&path, &flow.names[0]).map_err(of_key)?);
+    }
+    let times_s: Vec<f64> = all.iter().map(|f| f.time_s * flow.length_unit_m / flow.velocity_unit_m_s).collect();
+    let (Some(&first_s), Some(&last_s)) = (times_s.first(), times_s.last()) else {
+        return Err(refuse("no field at all".into()));
+    };
+    let start_s = flow.time_s.unwrap_or(first_s);
+    if !(first_s..=last_s).contains(&start_s) {
+        return Err(refuse(format!("flow.time_s = {start_s:?}: the fields are from {first_s:?} to {last_s:?} s")));
+    }
+    let (mut steepest_per_s, mut fastest_m_s) = (0.0_f64, 0.0_f64);
+    let ends_s = [start_s, if flow.motion == SimulatedMotion::Frozen { start_s } else { last_s }];
+    let used = |i: usize| {
+        let (before, after) = (times_s.get(i + 1), i.checked_sub(1).and_then(|i| times_s.get(i)));
+        before.is_none_or(|t| *t > ends_s[0]) && after.is_none_or(|t| *t < ends_s[1])
+    };
+    for (_, field) in all.iter().enumerate().filter(|(i, _)| used(*i)) {
+        let snapshot = snapshot(field, flow).map_err(of_key)?;
+        steepest_per_s = steepest_per_s.max(snapshot.max_gradient_per_s(0.0));
+        fastest_m_s = fastest_m_s.max(snapshot.max_speed_m_s());
+    }
+    let source = format!("{} fields of {first_s:.4} to {last_s:.4} s from {}", all.len(), path.display());
+    let own = flow.clone();
+    let reader = move |i: usize| {
+        let field =
+            all.get(i).ok_or(LesError::OutOfRange { field: "field", value: i as f64, allowed: "in the series" })?;
+        let unreadable = |e: Error| LesError::File {
+            action: "read",
+            path: field.path.clone(),
+            kind: std::io::ErrorKind::InvalidData,
+            reason: e.to_string(),
+        };
+        snapshot(field, &own).map_err(unreadable)
+    };
+    let series = VolumeSeries::new(times_s.clone(), steepest_per_s, reader)
+        .map_err(|e| refuse(format!("the times of the fields: {e}")))?;
+    let (wind, end_s): (Box<dyn Wind>, f64) = match flow.motion {
+        SimulatedMotion::Moving => (Box::new(series), last_s),
+        SimulatedMotion::Frozen => (Box::new(Frozen { wind: series, time_s: start_s }), f64::INFINITY),
+    };
+    let (sin, cos) = sin_cos_of_turn(flow.rotation_rad);
+    let side = if flow.mirror_y { -1.0 } else { 1.0 };
+    let plain = flow.origin_m == [0.0; 3] && (sin, cos) == (0.0, 1.0) && !flow.mirror_y;
+    let wind = if plain { wind } else { Box::new(Placed { wind, origin_m: flow.origin_m, sin, cos, side }) };
+    let field_times_s = if end_s.is_finite() { times_s } else { Vec::new() };
+    Ok(SceneWind { wind, start_s, tau: 0.0, end_s, max_speed_m_s: fastest_m_s, source, field_times_s })
+}
