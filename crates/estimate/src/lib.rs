@@ -37,6 +37,7 @@
 //! | [`map`] | regions, accumulation (Table 3) and n_eff, the radius that a variance needs; errors against the truth, (33); good estimates told from bad ones; a map drawn towards a guess |
 //! | [`bound`] | Cramer-Rao bound on the velocity, and on velocity and gradient |
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
+//! | [`wake_detection`] | whether a scan holds a wake: threshold for a rate of false alarms, smallest circulation that is found |
 //! | `linalg`, `parallel` | solve and eigenvectors with residual checks, the bundled LAPACK; loops on the caller's threads |
 //!
 //! Features:
@@ -61,6 +62,7 @@ pub mod models;
 mod parallel;
 pub mod spectrum;
 pub mod vortex_fit;
+pub mod wake_detection;
 pub mod window;
 
 pub use error::Error;

@@ -33,7 +33,7 @@
 mod damped_newton;
 mod map_fit;
 mod signal_fit;
-mod wake;
+pub(crate) mod wake;
 
 pub use map_fit::data::{Loss, MapFit, MapFitOptions, MapTop, VelocityMap};
 pub use map_fit::estimates::{fit_map_of_estimator, refine_map_fit_of_estimator};

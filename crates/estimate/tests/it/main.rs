@@ -18,3 +18,4 @@ mod quality;
 mod rolling_moment;
 mod sliding;
 mod vortex_fit;
+mod wake_detection;

@@ -1,0 +1,256 @@
+//! The statistic of a scan: how much better the best wake of a bank explains it than the wind alone.
+//!
+//! ```text
+//! T = min over wind of chi^2 - min over wind and wake of chi^2 = max over the bank of max(0, s . x)^2
+//! ```
+//!
+//! x the velocities, made white; s what a wake of the bank shows, made white, the wind taken out, of unit length. Products with
+//! single vortices are taken once and combined to those of pairs. Check: against a direct least-squares fit; drawn scans.
+
+use ndarray::{Array1, Array2, ArrayView1, Axis};
+
+use crate::error::{Error, increasing, positive};
+use crate::linalg::cholesky::cholesky;
+use crate::vortex_fit::{RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
+use crate::wake_detection::background::{Turbulence, Whitening};
+use crate::wake_detection::bank::{Bank, Template, shown};
+use crate::wake_detection::cells::Cells;
+
+/// Velocities that a test needs.
+const NEEDED: usize = 100;
+/// Of the variance of a product with a place: keeps the covariance of all of them regular, and changes nothing else.
+const REGULAR: f64 = 1e-9;
+
+/// What a test takes for granted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DetectorOptions {
+    /// Least and largest distance of a pair's vortices that is tried \[m\].
+    pub spacing_m: (f64, f64),
+    /// Whether single vortices are tried, too: the partner may be out of view.
+    pub single_vortices: bool,
+    /// The background besides wind and the noise of the map's standard deviations.
+    pub turbulence: Option<Turbulence>,
+}
+
+impl Default for DetectorOptions {
+    /// Wakes of wings of 20 to 80 m (spacing pi/4 of the span), single vortices, and no turbulence.
+    fn default() -> Self {
+        Self { spacing_m: (16.0, 63.0), single_vortices: true, turbulence: None }
+    }
+}
+
+/// The test of one scan's geometry, noise and background for a wake.
+#[derive(Debug, Clone)]
+pub struct WakeDetector {
+    model: WakeModel,
+    kernel: RangeKernel,
+    cells: Cells,
+    whitening: Whitening,
+    bank: Bank,
+    /// Uniform wind and shear, white and orthonormal: cells by one or two.
+    wind: Array2<f64>,
+    /// What single vortices show, white, without wind: places by cells.
+    shapes: Array2<f64>,
+    /// For each wake of the bank, the reciprocal of its length.
+    reciprocal_length: Vec<f64>,
+    /// Lower factor of the covariance of the products with an empty scan.
+    factor: Array2<f64>,
+}
+
+/// The test of one scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WakeStatistic {
+    /// T: what a wake explains of the best wind's chi-square.
+    pub value: f64,
+    /// Sum of squares over the variances that is left of the scan after the best wind, over its degrees of freedom.
+    pub wind_chi2_per_dof: f64,
+    /// And after the best wind and wake of the bank.
+    pub wake_chi2_per_dof: f64,
+    /// The wake of the bank that explains most, without wind; a vortex that it lacks has no circulation.
+    pub wake: Wake,
+    /// Standard deviation of its circulation \[m^2/s\], were its place known.
+    pub circulation_std_m2_s: f64,
+}
+
+impl WakeDetector {
+    /// A test for maps like `map`: its axes, its standard deviations, its missing velocities. `kernel` is what a gate sees of the
+    /// air about its range, `gate_m` the standard deviation of that \[m\].
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for impossible numbers or a map without standard deviations, [`Error::TooFewVelocities`] with less
+    /// than a hundred, [`Error::Empty`] if no wake of the bank fits into the scan, [`Error::Linalg`] if the background has
+    /// no covariance.
+    pub fn new(
+        map: &VelocityMap<'_>,
+        model: &WakeModel,
+        (kernel, gate_m): (&RangeKernel, f64),
+        options: &DetectorOptions,
+    ) -> Result<Self, Error> {
+        let found = map.validate()?;
+        if map.standard_deviation_m_s.is_none() {
+            return Err(Error::Empty { field: "standard_deviation_m_s" });
+        }
+        if found < NEEDED {
+            return Err(Error::TooFewVelocities { found, needed: NEEDED });
+        }
+        positive("least spacing_m", options.spacing_m.0)?;
+        if options.spacing_m.0 != options.spacing_m.1 {
+            increasing("spacing_m", &[options.spacing_m.0, options.spacing_m.1])?;
+        }
+        let cells = Cells::new(map, model);
+        let whitening = Whitening::new(&cells, options.turbulence.as_ref())?;
+        let bank = Bank::new(&cells, model, gate_m, options);
+        if bank.templates.is_empty() {
+            return Err(Error::Empty { field: "list of wakes that fit into the scan" });
+        }
+        let kernel = kernel.coarser(2);
+        let mut shapes = bank.shapes(&cells, model, &kernel);
+        whitening.apply(&mut shapes);
+        let wind = wind(&cells, &whitening);
+        remove(&wind, &mut shapes);
+        let gram = shapes.t().dot(&shapes);
+        let shapes = shapes.t().as_standard_layout().into_owned();
+        let reciprocal_length = bank.templates.iter().map(|template| length2(template, &gram).sqrt().recip()).collect();
+        let floor = REGULAR * gram.diag().iter().fold(0.0_f64, |most, x| most.max(*x));
+        let order = gram.nrows();
+        let factor = cholesky(gram + Array2::from_diag(&Array1::from_elem(order, floor)));
+        let reason = "is not positive definite";
+        let factor = factor.ok_or(Error::Linalg { what: "covariance of the products with the bank", order, reason })?;
+        Ok(Self { model: *model, kernel, cells, whitening, bank, wind, shapes, reciprocal_length, factor })
+    }
+
+    /// The statistic of a scan with the geometry, noise and missing velocities of this test.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another shape, [`Error::OutOfRange`] where a velocity is missing that was there.
+    pub fn statistic(&self, velocity_m_s: ndarray::ArrayView2<'_, f64>) -> Result<WakeStatistic, Error> {
+        let white = self.white(self.cells.means(velocity_m_s)?);
+        let products = self.shapes.dot(&white);
+        let (value, best) = self.best(products.view());
+        let rest = white.dot(&white);
+        let dof = |fitted: usize| (self.cells.cells.len() - self.wind.ncols() - fitted) as f64;
+        let length = self.reciprocal_length[best];
+        Ok(WakeStatistic {
+            value,
+            wind_chi2_per_dof: rest / dof(0),
+            wake_chi2_per_dof: (rest - value) / dof(4),
+            wake: self.wake(&self.bank.templates[best], value.sqrt() * length),
+            circulation_std_m2_s: length,
+        })
+    }
+
+    /// Numbers by cell, made white, without what wind explains.
+    fn white(&self, mut numbers: Vec<f64>) -> Array1<f64> {
+        self.whitening.apply_one(&mut numbers);
+        let white = Array1::from_vec(numbers);
+        let part = self.wind.t().dot(&white);
+        white - self.wind.dot(&part)
+    }
+
+    /// Statistic and index of the best wake of the bank, given the products of a scan with all places.
+    fn best(&self, products: ArrayView1<'_, f64>) -> (f64, usize) {
+        let product = |template: &Template| {
+            let of = |place: Option<usize>| place.map_or(0.0, |place| products[place]);
+            of(template.right) - of(template.left)
+        };
+        let all = self.bank.templates.iter().zip(&self.reciprocal_length).map(|(t, length)| product(t) * length);
+        let (most, best) = all.enumerate().fold((0.0, 0), |best, (i, x)| if x > best.0 { (x, i) } else { best });
+        (most * most, best)
+    }
+
+    pub(super) fn value(&self, products: ArrayView1<'_, f64>) -> f64 {
+        self.best(products).0
+    }
+
+    /// Factor of the covariance of the products of an empty scan with all places.
+    pub(super) fn factor(&self) -> &Array2<f64> {
+        &self.factor
+    }
+
+    /// Products of what a wake shows with all places, and its length: the reciprocal of the standard deviation of a factor on its
+    /// circulations, were places and cores known.
+    pub(super) fn products_of(&self, wake: &Wake) -> (Array1<f64>, f64) {
+        let calm = Wake { lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0, ..*wake };
+        let shown = shown(&calm, &self.cells, &self.model, &self.kernel, &mut Default::default());
+        let white = self.white(shown);
+        (self.shapes.dot(&white), white.dot(&white).sqrt())
+    }
+
+    fn wake(&self, template: &Template, circulation_m2_s: f64) -> Wake {
+        let spacing_m = match template {
+            Template { left: Some(_), right: Some(_) } => 0.0,
+            _ => self.bank.step_m.0,
+        };
+        let other = template.left.or(template.right).unwrap_or(0);
+        let vortex = |place: Option<usize>, sense: f64| {
+            let (lateral_m, height_m) = self.bank.places_m[place.unwrap_or(other)];
+            Vortex {
+                circulation_m2_s: if place.is_some() { circulation_m2_s } else { 0.0 },
+                lateral_position_m: lateral_m + if place.is_some() { 0.0 } else { sense * spacing_m },
+                height_m,
+                core_radius_m: self.bank.core_m,
+            }
+        };
+        Wake {
+            left: vortex(template.left, -1.0),
+            right: vortex(template.right, 1.0),
+            lateral_wind_m_s: 0.0,
+            wind_shear_per_s: 0.0,
+        }
+    }
+
+    /// Velocities of the map that count as one cell, at most: large maps are thinned.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.cells.cells.len()
+    }
+
+    /// Wakes that are tried.
+    #[must_use]
+    pub fn wakes_tried(&self) -> usize {
+        self.bank.templates.len()
+    }
+
+    /// Pairs of the bank with their distances of places, for draws of wakes between them.
+    pub(super) fn pairs(&self) -> (Vec<[(f64, f64); 2]>, (f64, f64)) {
+        let place = |index: usize| self.bank.places_m[index];
+        let pairs = self.bank.templates.iter().filter_map(|t| Some([place(t.left?), place(t.right?)]));
+        (pairs.collect(), self.bank.step_m)
+    }
+}
+
+/// Uniform wind and shear, white and orthonormal; one direction if the scan cannot tell them apart.
+fn wind(cells: &Cells, whitening: &Whitening) -> Array2<f64> {
+    let cos = |cell: &crate::wake_detection::cells::Cell| cells.elevation_rad[cell.line].cos();
+    let mut wind = Array2::from_shape_fn((cells.cells.len(), 2), |(i, shear)| {
+        let cell = &cells.cells[i];
+        cos(cell) * if shear == 1 { cell.place_m.1 } else { 1.0 }
+    });
+    whitening.apply(&mut wind);
+    let mut basis = Array2::zeros((cells.cells.len(), 0));
+    for direction in wind.columns() {
+        let mut direction = direction.to_owned().insert_axis(Axis(1));
+        let before = direction.iter().map(|x| x * x).sum::<f64>();
+        remove(&basis, &mut direction);
+        let after = direction.iter().map(|x| x * x).sum::<f64>();
+        if after > 1e-12 * before {
+            direction /= after.sqrt();
+            // as many rows as the basis has
+            let _ = basis.append(Axis(1), direction.view());
+        }
+    }
+    basis
+}
+
+/// Takes the part along an orthonormal basis out of columns.
+fn remove(basis: &Array2<f64>, columns: &mut Array2<f64>) {
+    let part = basis.t().dot(columns);
+    ndarray::linalg::general_mat_mul(-1.0, basis, &part, 1.0, columns);
+}
+
+/// Square of the length of what a wake of unit circulation shows, from the products of single vortices.
+fn length2(template: &Template, gram: &Array2<f64>) -> f64 {
+    let of = |a: Option<usize>, b: Option<usize>| a.zip(b).map_or(0.0, |(a, b)| gram[[a, b]]);
+    let (left, right) = (template.left, template.right);
+    of(left, left) + of(right, right) - 2.0 * of(left, right)
+}
