@@ -38,6 +38,7 @@
 //! | [`bound`] | Cramer-Rao bound on the velocity, and on velocity and gradient |
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
 //! | [`wake_detection`] | whether a scan holds a wake: threshold for a rate of false alarms, smallest circulation that is found |
+//! | [`retrieval`] | from one scan of any instrument to its vortices, or none; tracks |
 //! | `linalg`, `parallel` | solve and eigenvectors with residual checks, the bundled LAPACK; loops on the caller's threads |
 //!
 //! Features:
@@ -60,6 +61,7 @@ mod linalg;
 pub mod map;
 pub mod models;
 mod parallel;
+pub mod retrieval;
 pub mod spectrum;
 pub mod vortex_fit;
 pub mod wake_detection;

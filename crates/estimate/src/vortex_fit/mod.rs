@@ -30,8 +30,8 @@
 //! To measure again: `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
 //! (signals) or `circulation_from_many_maps` (maps).
 
-mod damped_newton;
-mod map_fit;
+pub(crate) mod damped_newton;
+pub(crate) mod map_fit;
 mod signal_fit;
 pub(crate) mod wake;
 

@@ -10,29 +10,12 @@ use ndarray::{Array2, Axis};
 
 use crate::error::{Error, not_negative, positive};
 use crate::linalg::cholesky::{cholesky, forward, forward_one};
+use crate::retrieval::Turbulence;
 use crate::wake_detection::cells::Cells;
 
-/// Velocities of turbulence: correlated as exp(-d/L) over a distance d, alike in all directions.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Turbulence {
-    /// Standard deviation of what the cells of the map show of it \[m/s\].
-    pub standard_deviation_m_s: f64,
-    /// Distance L over which the correlation falls to 1/e \[m\].
-    pub length_m: f64,
-}
-
-impl Turbulence {
-    fn validate(&self) -> Result<(), Error> {
-        not_negative("standard_deviation_m_s of the turbulence", self.standard_deviation_m_s)?;
-        positive("length_m of the turbulence", self.length_m)
-    }
-
-    /// Covariance of two velocities \[m^2/s^2\] at places (y, z) \[m\].
-    #[must_use]
-    pub fn covariance_m2_s2(&self, a_m: (f64, f64), b_m: (f64, f64)) -> f64 {
-        let distance_m = (a_m.0 - b_m.0).hypot(a_m.1 - b_m.1);
-        self.standard_deviation_m_s.powi(2) * (-distance_m / self.length_m).exp()
-    }
+fn covariance_m2_s2(turbulence: &Turbulence, a_m: (f64, f64), b_m: (f64, f64)) -> f64 {
+    let distance_m = (a_m.0 - b_m.0).hypot(a_m.1 - b_m.1);
+    turbulence.deviation_m_s.powi(2) * (-distance_m / turbulence.length_m).exp()
 }
 
 /// Makes the background of a map white, of unit variance.
@@ -52,11 +35,12 @@ impl Whitening {
         let Some(turbulence) = turbulence else {
             return Ok(Self::Deviations(cells.iter().map(|cell| cell.deviation_m_s).collect()));
         };
-        turbulence.validate()?;
+        not_negative("deviation_m_s of the turbulence", turbulence.deviation_m_s)?;
+        positive("length_m of the turbulence", turbulence.length_m)?;
         let order = cells.len();
         let covariance = Array2::from_shape_fn((order, order), |(i, j)| match j.cmp(&i) {
-            std::cmp::Ordering::Less => turbulence.covariance_m2_s2(cells[i].place_m, cells[j].place_m),
-            std::cmp::Ordering::Equal => turbulence.standard_deviation_m_s.powi(2) + cells[i].deviation_m_s.powi(2),
+            std::cmp::Ordering::Less => covariance_m2_s2(turbulence, cells[i].place_m, cells[j].place_m),
+            std::cmp::Ordering::Equal => turbulence.deviation_m_s.powi(2) + cells[i].deviation_m_s.powi(2),
             std::cmp::Ordering::Greater => 0.0,
         });
         let reason = "is not positive definite: turbulence without noise in close cells has none";

@@ -11,8 +11,9 @@ use ndarray::{Array1, Array2, ArrayView1, Axis};
 
 use crate::error::{Error, increasing, positive};
 use crate::linalg::cholesky::cholesky;
-use crate::vortex_fit::{RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
-use crate::wake_detection::background::{Turbulence, Whitening};
+use crate::retrieval::{Gate, ScanMap, Turbulence};
+use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
+use crate::wake_detection::background::Whitening;
 use crate::wake_detection::bank::{Bank, Template, shown};
 use crate::wake_detection::cells::Cells;
 
@@ -73,22 +74,17 @@ pub struct WakeStatistic {
 }
 
 impl WakeDetector {
-    /// A test for maps like `map`: its axes, its standard deviations, its missing velocities. `kernel` is what a gate sees of the
-    /// air about its range, `gate_m` the standard deviation of that \[m\].
+    /// A test for maps like `map`: its axes, its standard deviations, its missing velocities. `gate` is what a velocity is of the
+    /// air about its range.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for impossible numbers or a map without standard deviations, [`Error::TooFewVelocities`] with less
     /// than a hundred, [`Error::Empty`] if no wake of the bank fits into the scan, [`Error::Linalg`] if the background has
     /// no covariance.
-    pub fn new(
-        map: &VelocityMap<'_>,
-        model: &WakeModel,
-        (kernel, gate_m): (&RangeKernel, f64),
-        options: &DetectorOptions,
-    ) -> Result<Self, Error> {
+    pub fn new(map: &ScanMap, model: &WakeModel, gate: &Gate, options: &DetectorOptions) -> Result<Self, Error> {
         let found = map.validate()?;
-        if map.standard_deviation_m_s.is_none() {
-            return Err(Error::Empty { field: "standard_deviation_m_s" });
+        if map.sigma_m_s.is_none() {
+            return Err(Error::Empty { field: "sigma_m_s" });
         }
         if found < NEEDED {
             return Err(Error::TooFewVelocities { found, needed: NEEDED });
@@ -97,13 +93,13 @@ impl WakeDetector {
         if options.spacing_m.0 != options.spacing_m.1 {
             increasing("spacing_m", &[options.spacing_m.0, options.spacing_m.1])?;
         }
-        let cells = Cells::new(map, model);
+        let cells = Cells::new(&map.view(), model);
         let whitening = Whitening::new(&cells, options.turbulence.as_ref())?;
-        let bank = Bank::new(&cells, model, gate_m, options);
+        let kernel = kernel(gate)?;
+        let bank = Bank::new(&cells, model, kernel.width_m(), options);
         if bank.templates.is_empty() {
             return Err(Error::Empty { field: "list of wakes that fit into the scan" });
         }
-        let kernel = kernel.coarser(2);
         let mut shapes = bank.shapes(&cells, model, &kernel);
         whitening.apply(&mut shapes);
         let wind = wind(&cells, &whitening);
@@ -211,11 +207,28 @@ impl WakeDetector {
         self.bank.templates.len()
     }
 
-    /// Pairs of the bank with their distances of places, for draws of wakes between them.
-    pub(super) fn pairs(&self) -> (Vec<[(f64, f64); 2]>, (f64, f64)) {
+    /// Places of the pairs of the bank \[m\].
+    pub(super) fn pairs(&self) -> Vec<[(f64, f64); 2]> {
         let place = |index: usize| self.bank.places_m[index];
-        let pairs = self.bank.templates.iter().filter_map(|t| Some([place(t.left?), place(t.right?)]));
-        (pairs.collect(), self.bank.step_m)
+        self.bank.templates.iter().filter_map(|t| Some([place(t.left?), place(t.right?)])).collect()
+    }
+
+    /// Distances of neighbouring places \[m\].
+    pub(super) fn step_m(&self) -> (f64, f64) {
+        self.bank.step_m
+    }
+}
+
+/// The weight of a gate on a grid that is fine enough for wakes of the bank.
+fn kernel(gate: &Gate) -> Result<RangeKernel, Error> {
+    match gate {
+        Gate::Gaussian { std_m } if *std_m != 0.0 => {
+            positive("std_m of the gate", *std_m)?;
+            let weights: Vec<f64> = (-14..=14).map(|i| 0.25 * f64::from(i)).map(|x| (-0.5 * x * x).exp()).collect();
+            RangeKernel::new(-3.5 * std_m, 0.25 * std_m, &weights)
+        }
+        Gate::Kernel(kernel) => Ok(kernel.coarser(2)),
+        Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, 1.0, &[1.0]),
     }
 }
 

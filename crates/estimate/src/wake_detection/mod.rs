@@ -16,7 +16,6 @@ mod detector;
 mod law;
 mod power;
 
-pub use background::Turbulence;
 pub use detector::{DetectorOptions, WakeDetector, WakeStatistic};
 pub use law::EmptyScanLaw;
 pub use power::{DetectionTrials, Share};

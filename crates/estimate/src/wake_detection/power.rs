@@ -46,7 +46,7 @@ impl WakeDetector {
     /// So many pairs of unit circulation anywhere in the scan, both vortices in it, between the places of the bank; with cores of
     /// 5 % of their spacing.
     pub fn draw_wakes<R: Rng>(&self, count: usize, stream: impl Fn(u64) -> R) -> Vec<Wake> {
-        let (pairs, step_m) = self.pairs();
+        let (pairs, step_m) = (self.pairs(), self.step_m());
         let draw = |index: usize| {
             let mut generator = stream(index as u64);
             let [left, right] = *pairs.get(generator.random_range(0..pairs.len().max(1)))?;

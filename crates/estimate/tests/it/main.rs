@@ -15,6 +15,7 @@ mod likelihood;
 mod models;
 mod periodogram;
 mod quality;
+mod retrieval;
 mod rolling_moment;
 mod sliding;
 mod vortex_fit;

@@ -5,10 +5,9 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
-use wakescope_estimate::vortex_fit::{RangeKernel, VelocityMap, Wake, WakeModel};
-use wakescope_estimate::wake_detection::{
-    DetectorOptions, EmptyScanLaw, Share, Turbulence, WakeDetector, WakeStatistic,
-};
+use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
+use wakescope_estimate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
+use wakescope_estimate::wake_detection::{DetectorOptions, EmptyScanLaw, Share, WakeDetector, WakeStatistic};
 
 /// A generator for each number; other seeds have others.
 fn stream(seed: u64) -> impl Fn(u64) -> Xoshiro256PlusPlus {
@@ -25,7 +24,7 @@ struct Case {
     model: WakeModel,
 }
 
-const TURBULENCE: Turbulence = Turbulence { standard_deviation_m_s: 0.8, length_m: 25.0 };
+const TURBULENCE: Turbulence = Turbulence { deviation_m_s: 0.8, length_m: 25.0 };
 
 impl Case {
     fn new((lines, first_rad, step_rad): (usize, f64, f64), (gates, first_m, step_m): (usize, f64, f64)) -> Self {
@@ -56,13 +55,19 @@ impl Case {
         Self { gate_m: 11.0, ..case }
     }
 
-    fn map<'a>(&'a self, velocity: &'a Array2<f64>) -> VelocityMap<'a> {
-        VelocityMap {
-            elevation_rad: &self.elevation_rad,
-            range_m: &self.range_m,
-            velocity_m_s: velocity.view(),
-            standard_deviation_m_s: Some(self.deviation.view()),
+    fn map(&self) -> ScanMap {
+        ScanMap {
+            elevation_rad: self.elevation_rad.clone(),
+            time_s: vec![f64::NAN; self.elevation_rad.len()],
+            range_m: self.range_m.clone(),
+            velocity_m_s: self.empty.clone(),
+            sigma_m_s: Some(self.deviation.clone()),
+            fold_m_s: None,
         }
+    }
+
+    fn gate(&self) -> Gate {
+        Gate::Gaussian { std_m: self.gate_m }
     }
 
     fn kernel(&self) -> RangeKernel {
@@ -75,7 +80,7 @@ impl Case {
     }
 
     fn detector(&self, options: &DetectorOptions) -> WakeDetector {
-        WakeDetector::new(&self.map(&self.empty), &self.model, (&self.kernel(), self.gate_m), options).unwrap()
+        WakeDetector::new(&self.map(), &self.model, &self.gate(), options).unwrap()
     }
 
     /// Statistics of whole drawn scans with a sheared wind, and with `wake`.
@@ -87,7 +92,9 @@ impl Case {
         let factor = turbulence.map(|turbulence| {
             let n = places.len();
             factor(Array2::from_shape_fn((n, n), |(i, j)| {
-                turbulence.covariance_m2_s2(places[i], places[j]) + if i == j { 1e-6 } else { 0.0 }
+                let distance_m = (places[i].0 - places[j].0).hypot(places[i].1 - places[j].1);
+                let covariance = turbulence.deviation_m_s.powi(2) * (-distance_m / turbulence.length_m).exp();
+                covariance + if i == j { 1e-6 } else { 0.0 }
             }))
         });
         let generator = stream(77);
@@ -152,8 +159,8 @@ fn the_statistic_is_the_chi_square_that_the_best_wake_of_the_bank_takes_from_the
     let velocity = &case.empty + &exact + case.deviation.mapv(|std| std * normal(&mut rng));
     let found: WakeStatistic = detector.statistic(velocity.view()).unwrap();
     let wake = Wake {
-        left: wakescope_estimate::vortex_fit::Vortex { circulation_m2_s: 1.0, ..found.wake.left },
-        right: wakescope_estimate::vortex_fit::Vortex { circulation_m2_s: 1.0, ..found.wake.right },
+        left: Vortex { circulation_m2_s: 1.0, ..found.wake.left },
+        right: Vortex { circulation_m2_s: 1.0, ..found.wake.right },
         ..found.wake
     };
     let shape = case.model.map(&wake, &case.kernel(), &case.elevation_rad, &case.range_m, 0.0).unwrap();
@@ -316,8 +323,7 @@ fn laws_repeat_and_impossible_tests_are_refused() {
     assert!(law.threshold(0.0).unwrap_err().to_string().contains("false_alarm"));
     assert!(detector.calibrate(10, stream(1)).unwrap_err().to_string().contains("empty scans"));
     let build = |case: &Case, options: &DetectorOptions| {
-        let map = case.map(&case.empty);
-        WakeDetector::new(&map, &case.model, (&case.kernel(), case.gate_m), options).map(|_| ()).unwrap_err()
+        WakeDetector::new(&case.map(), &case.model, &case.gate(), options).map(|_| ()).unwrap_err()
     };
     let with = |spacing_m, turbulence| DetectorOptions { spacing_m, turbulence, ..DetectorOptions::default() };
     assert!(build(&case, &with((0.0, 60.0), None)).to_string().contains("spacing_m"));

@@ -46,6 +46,11 @@ impl VelocityMap<'_> {
         middle_m * length(self.elevation_rad) / self.elevation_rad.len() as f64
     }
 
+    /// Mean distance of neighbouring gates.
+    pub(crate) fn gate_spacing_m(&self) -> f64 {
+        self.range_m.first().zip(self.range_m.last()).map_or(0.0, |(a, b)| (b - a) / self.range_m.len() as f64)
+    }
+
     /// Standard deviation of one velocity, 1 if none was given.
     pub(crate) fn deviation(&self, line: usize, gate: usize) -> f64 {
         self.standard_deviation_m_s.as_ref().map_or(1.0, |d| d[[line, gate]])

@@ -26,8 +26,10 @@ const SIGNIFICANT: f64 = 60.0;
 struct Thinned {
     elevation_rad: Vec<f64>,
     range_m: Vec<f64>,
-    /// Median velocity \[line, gate\]; NaN without any.
+    /// Median velocity \[line, gate\]; 0 without any.
     velocity: Vec<f64>,
+    /// One over the median standard deviation; 0 where there is no velocity.
+    weight: Vec<f64>,
 }
 
 fn thin(map: &VelocityMap<'_>) -> Thinned {
@@ -37,18 +39,22 @@ fn thin(map: &VelocityMap<'_>) -> Thinned {
     };
     let middle = |axis: &[f64], (from, to): (usize, usize)| axis[from..to].iter().sum::<f64>() / (to - from) as f64;
     let (lines, gates) = (blocks(map.elevation_rad), blocks(map.range_m));
-    let mut velocity = Vec::with_capacity(lines.len() * gates.len());
+    let (mut velocity, mut weight) = (Vec::with_capacity(lines.len() * gates.len()), Vec::new());
     for &(first, last) in &lines {
         for &(from, to) in &gates {
             let block = map.velocity_m_s.slice(ndarray::s![first..last, from..to]);
-            let mut finite: Vec<f64> = block.iter().copied().filter(|v| v.is_finite()).collect();
-            velocity.push(median(&mut finite));
+            let known = block.indexed_iter().filter(|(_, v)| v.is_finite());
+            let (mut deviations, mut finite): (Vec<f64>, Vec<f64>) =
+                known.map(|((line, gate), v)| (map.deviation(first + line, from + gate), *v)).unzip();
+            velocity.push(if finite.is_empty() { 0.0 } else { median(&mut finite) });
+            weight.push(if deviations.is_empty() { 0.0 } else { median(&mut deviations).recip() });
         }
     }
     Thinned {
         elevation_rad: lines.iter().map(|&block| middle(map.elevation_rad, block)).collect(),
         range_m: gates.iter().map(|&block| middle(map.range_m, block)).collect(),
         velocity,
+        weight,
     }
 }
 
@@ -59,57 +65,96 @@ struct Place {
     shape: Vec<f64>,
 }
 
+/// A pair of places with the circulations that fit best there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pair {
+    /// Sum of squares that it explains.
+    pub(crate) explained: f64,
+    left: usize,
+    right: usize,
+    strength: (f64, f64),
+}
+
+/// The thinned map and what vortices on a grid of places show of it, both without the part that a wind explains.
+pub(crate) struct Search {
+    places: Vec<Place>,
+    shapes: Vec<Vec<f64>>,
+    data: Vec<f64>,
+    known: Vec<bool>,
+}
+
 /// The best pair of vortices on a grid of places.
 ///
 /// # Errors
 /// [`Error::TooFewVelocities`] with less than a hundred velocities, [`Error::NoVortex`] if no pair stands out.
 pub(crate) fn first_guess(map: &VelocityMap<'_>, model: &WakeModel, kernel: &RangeKernel) -> Result<Wake, Error> {
-    let found = map.validate()?;
-    if found < NEEDED {
-        return Err(Error::TooFewVelocities { found, needed: NEEDED });
-    }
-    let thinned = thin(map);
-    let places = places(&thinned, model, kernel);
-    let wind = wind_shapes(&thinned, model);
-    let mut data: Vec<f64> = thinned.velocity.clone();
-    let known: Vec<bool> = data.iter().map(|v| v.is_finite()).collect();
-    data.iter_mut().filter(|v| !v.is_finite()).for_each(|v| *v = 0.0);
-    let basis = orthonormal(wind, &known);
-    remove(&basis, &mut data);
-    let shapes: Vec<Vec<f64>> = map_indexed(
-        places.len(),
-        || (),
-        |(), i| {
-            let mut shape = places[i].shape.clone();
-            shape.iter_mut().zip(&known).filter(|(_, known)| !**known).for_each(|(s, _)| *s = 0.0);
-            remove(&basis, &mut shape);
-            shape
-        },
-    );
-    let (explained, left, right, strength) =
-        best_pair(&places, &shapes, &data).ok_or(Error::NoVortex { significance: 0.0, needed: SIGNIFICANT })?;
-    let mut rest: Vec<f64> = (0..data.len())
-        .filter(|&i| known[i])
-        .map(|i| (data[i] + strength.0 * shapes[left][i] - strength.1 * shapes[right][i]).abs())
-        .collect();
-    let deviation = median(&mut rest) / 0.674_5;
-    let significance = explained / (deviation * deviation) / 6.0;
+    let search = Search::new(map, model, kernel)?;
+    // the first of equals, whoever computed it
+    let best =
+        search.pairs().into_iter().reduce(|most, next| if next.explained > most.explained { next } else { most });
+    let best = best.ok_or(Error::NoVortex { significance: 0.0, needed: SIGNIFICANT })?;
+    let significance = search.significance(&best);
     if significance.is_nan() || significance < SIGNIFICANT {
         return Err(Error::NoVortex { significance, needed: SIGNIFICANT });
     }
-    let spacing_m = places[right].lateral_m - places[left].lateral_m;
-    let vortex = |place: &Place, circulation_m2_s| Vortex {
-        circulation_m2_s,
-        lateral_position_m: place.lateral_m,
-        height_m: place.height_m,
-        core_radius_m: CORE_OVER_SPACING * spacing_m,
-    };
-    Ok(Wake {
-        left: vortex(&places[left], strength.0),
-        right: vortex(&places[right], strength.1),
-        lateral_wind_m_s: 0.0,
-        wind_shear_per_s: 0.0,
-    })
+    Ok(search.wake(&best))
+}
+
+impl Search {
+    /// # Errors
+    /// [`Error::TooFewVelocities`] with less than a hundred velocities.
+    pub(crate) fn new(map: &VelocityMap<'_>, model: &WakeModel, kernel: &RangeKernel) -> Result<Self, Error> {
+        let found = map.validate()?;
+        if found < NEEDED {
+            return Err(Error::TooFewVelocities { found, needed: NEEDED });
+        }
+        let thinned = thin(map);
+        let places = places(&thinned, model, kernel);
+        let weighted = |shape: &[f64]| -> Vec<f64> { shape.iter().zip(&thinned.weight).map(|(s, w)| s * w).collect() };
+        let basis = orthonormal(wind_shapes(&thinned, model).map(|shape| weighted(&shape)));
+        let mut data = weighted(&thinned.velocity);
+        remove(&basis, &mut data);
+        let shapes = map_indexed(
+            places.len(),
+            || (),
+            |(), i| {
+                let mut shape = weighted(&places[i].shape);
+                remove(&basis, &mut shape);
+                shape
+            },
+        );
+        let known = thinned.weight.iter().map(|w| *w > 0.0).collect();
+        Ok(Self { places, shapes, data, known })
+    }
+
+    /// What a pair explains over the variance of what is left, per number of the pair.
+    fn significance(&self, pair: &Pair) -> f64 {
+        let (left, right) = (&self.shapes[pair.left], &self.shapes[pair.right]);
+        let mut rest: Vec<f64> = (0..self.data.len())
+            .filter(|&i| self.known[i])
+            .map(|i| (self.data[i] + pair.strength.0 * left[i] - pair.strength.1 * right[i]).abs())
+            .collect();
+        let deviation = median(&mut rest) / 0.674_5;
+        pair.explained / (deviation * deviation) / 6.0
+    }
+
+    /// The wake of a pair, without wind.
+    pub(crate) fn wake(&self, pair: &Pair) -> Wake {
+        let (left, right) = (&self.places[pair.left], &self.places[pair.right]);
+        let core_radius_m = CORE_OVER_SPACING * (right.lateral_m - left.lateral_m);
+        let vortex = |place: &Place, circulation_m2_s| Vortex {
+            circulation_m2_s,
+            lateral_position_m: place.lateral_m,
+            height_m: place.height_m,
+            core_radius_m,
+        };
+        Wake {
+            left: vortex(left, pair.strength.0),
+            right: vortex(right, pair.strength.1),
+            lateral_wind_m_s: 0.0,
+            wind_shear_per_s: 0.0,
+        }
+    }
 }
 
 /// The grid of places, with what an anticlockwise vortex of unit circulation at each shows on the thinned map.
@@ -163,11 +208,10 @@ fn wind_shapes(thinned: &Thinned, model: &WakeModel) -> [Vec<f64>; 2] {
     shapes
 }
 
-/// An orthonormal basis of shapes, zero where nothing is known.
-fn orthonormal(shapes: [Vec<f64>; 2], known: &[bool]) -> Vec<Vec<f64>> {
+/// An orthonormal basis of shapes.
+fn orthonormal(shapes: [Vec<f64>; 2]) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut shape in shapes {
-        shape.iter_mut().zip(known).filter(|(_, known)| !**known).for_each(|(s, _)| *s = 0.0);
         let before = crate::linalg::dot(&shape, &shape);
         remove(&basis, &mut shape);
         let norm = crate::linalg::dot(&shape, &shape);
@@ -187,39 +231,55 @@ fn remove(basis: &[Vec<f64>], shape: &mut [f64]) {
     }
 }
 
-/// (explained sum of squares, left place, right place, circulations) of the best pair with positive circulations.
-fn best_pair(places: &[Place], shapes: &[Vec<f64>], data: &[f64]) -> Option<(f64, usize, usize, (f64, f64))> {
-    let towards: Vec<f64> = shapes.iter().map(|shape| crate::linalg::dot(shape, data)).collect();
-    let squares: Vec<f64> = shapes.iter().map(|shape| crate::linalg::dot(shape, shape)).collect();
-    let best = map_indexed(
-        places.len(),
-        || (),
-        |(), left| {
-            let mut best: Option<(f64, usize, usize, (f64, f64))> = None;
-            // a clockwise vortex shows the opposite shape
-            let (a, aa) = (-towards[left], squares[left]);
-            for right in 0..places.len() {
-                if places[right].lateral_m - places[left].lateral_m < 2.0 {
-                    continue;
+impl Search {
+    /// For each place of a left vortex the best one of a right vortex with positive circulations of both.
+    pub(crate) fn pairs(&self) -> Vec<Pair> {
+        let (towards, squares) = self.products();
+        let best = map_indexed(
+            self.places.len(),
+            || (),
+            |(), left| {
+                let mut best: Option<Pair> = None;
+                // a clockwise vortex shows the opposite shape
+                let (a, aa) = (-towards[left], squares[left]);
+                for right in 0..self.places.len() {
+                    if self.places[right].lateral_m - self.places[left].lateral_m < 2.0 {
+                        continue;
+                    }
+                    let (b, bb) = (towards[right], squares[right]);
+                    if a <= 0.0 && b <= 0.0 {
+                        continue;
+                    }
+                    let ab = -crate::linalg::dot(&self.shapes[left], &self.shapes[right]);
+                    let determinant = aa * bb - ab * ab;
+                    let strength = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
+                    if !(strength.0 > 0.0 && strength.1 > 0.0 && determinant > 1e-6 * aa * bb) {
+                        continue;
+                    }
+                    let explained = strength.0 * a + strength.1 * b;
+                    if best.is_none_or(|best| explained > best.explained) {
+                        best = Some(Pair { explained, left, right, strength });
+                    }
                 }
-                let (b, bb) = (towards[right], squares[right]);
-                if a <= 0.0 && b <= 0.0 {
-                    continue;
-                }
-                let ab = -crate::linalg::dot(&shapes[left], &shapes[right]);
-                let determinant = aa * bb - ab * ab;
-                let strength = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
-                if !(strength.0 > 0.0 && strength.1 > 0.0 && determinant > 1e-6 * aa * bb) {
-                    continue;
-                }
-                let explained = strength.0 * a + strength.1 * b;
-                if best.is_none_or(|(most, ..)| explained > most) {
-                    best = Some((explained, left, right, strength));
-                }
-            }
-            best
-        },
-    );
-    // the first of equals, whoever computed it
-    best.into_iter().flatten().reduce(|most, next| if next.0 > most.0 { next } else { most })
+                best
+            },
+        );
+        best.into_iter().flatten().collect()
+    }
+
+    /// The best place of one vortex of that sense of turning (-1 left, +1 right) alone: its circulation, lateral position, height.
+    pub(crate) fn single(&self, sense: f64) -> Option<(f64, f64, f64)> {
+        let (towards, squares) = self.products();
+        let explained = |place: usize| (sense * towards[place]).max(0.0).powi(2) / squares[place];
+        let best = (0..self.places.len()).reduce(|a, b| if explained(b) > explained(a) { b } else { a })?;
+        let place = &self.places[best];
+        let strength = sense * towards[best] / squares[best];
+        (strength > 0.0).then_some((strength, place.lateral_m, place.height_m))
+    }
+
+    /// Products of the shapes with the data and with themselves.
+    fn products(&self) -> (Vec<f64>, Vec<f64>) {
+        let product = |shape: &Vec<f64>| (crate::linalg::dot(shape, &self.data), crate::linalg::dot(shape, shape));
+        self.shapes.iter().map(product).unzip()
+    }
 }

@@ -139,7 +139,7 @@ pub enum CoreProfile {
 
 impl CoreProfile {
     /// Omega, its derivative with respect to r^2 and to the core radius, for unit circulation.
-    fn angular(self, r2: f64, core_m: f64) -> (f64, f64, f64) {
+    pub(crate) fn angular(self, r2: f64, core_m: f64) -> (f64, f64, f64) {
         let core2 = core_m * core_m;
         match self {
             Self::Algebraic => {

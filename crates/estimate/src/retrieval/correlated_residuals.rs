@@ -1,0 +1,322 @@
+//! Covariance of a fit from its residuals: the sandwich A^-1 B A^-1 (Huber 1967) with correlated residuals.
+//!
+//! B = sum over cells i, k of C(i - k) s_i s_k^T, s the slopes, C the covariance of the weighted residuals psi that there would be
+//! without the fit. C is white noise and, if the residuals show it, a part that decays exponentially along and across the lines:
+//!
+//! ```text
+//! C = c_0 [0] + c_1 exp(-sqrt((lines / L_t)^2 + (gates / L_r)^2))
+//! ```
+//!
+//! The fit takes from the residuals what looks like a wake or a wind, which is most of what is long, so a correlogram of
+//! residuals falls too soon. It is therefore compared with what is expected of it *after* the fit: sums over pairs of cells of
+//! M C M, M = 1 - Q Q^T, Q an orthonormal basis of the slopes; all sums by Fourier transforms. c_1 is kept if the white correlogram is beyond
+//! chance. Check: made-up noise, white and with known correlation; the spread of fits over many maps.
+
+use ndarray::Array2;
+use num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+use std::sync::Arc;
+
+use crate::linalg::dot;
+use crate::retrieval::problem::{Cell, products};
+
+/// Reduction of chi-square that a correlated part must bring.
+const BEYOND_CHANCE: f64 = 12.0;
+/// Ratio of the lengths that are tried at first, and the last ratio.
+const COARSE: f64 = 1.8;
+const FINE: f64 = 1.15;
+
+/// Sums over all pairs of cells that are so far apart, by Fourier transforms on a grid with as much room again.
+struct Plane<'a> {
+    cells: &'a [Cell],
+    lines: usize,
+    gates: usize,
+    along: [Arc<dyn Fft<f64>>; 2],
+    across: [Arc<dyn Fft<f64>>; 2],
+}
+
+impl<'a> Plane<'a> {
+    fn new(cells: &'a [Cell]) -> Self {
+        let most = |of: fn(&Cell) -> usize| 2 * (cells.iter().map(of).max().unwrap_or(0) + 1);
+        let (lines, gates) = (most(|cell| cell.line), most(|cell| cell.gate));
+        let mut planner = FftPlanner::new();
+        let along = [planner.plan_fft_forward(gates), planner.plan_fft_inverse(gates)];
+        let across = [planner.plan_fft_forward(lines), planner.plan_fft_inverse(lines)];
+        Self { cells, lines, gates, along, across }
+    }
+
+    fn transform(&self, grid: &mut [Complex<f64>], inverse: usize) {
+        self.along[inverse].process(grid);
+        let mut turned = vec![Complex::default(); grid.len()];
+        for (i, row) in grid.chunks_exact(self.gates).enumerate() {
+            row.iter().enumerate().for_each(|(j, value)| turned[j * self.lines + i] = *value);
+        }
+        self.across[inverse].process(&mut turned);
+        let scale = if inverse == 1 { (grid.len() as f64).recip() } else { 1.0 };
+        for (j, column) in turned.chunks_exact(self.lines).enumerate() {
+            column.iter().enumerate().for_each(|(i, value)| grid[i * self.gates + j] = value * scale);
+        }
+    }
+
+    /// Transform of numbers of the cells, 0 elsewhere.
+    fn spectrum(&self, numbers: &[f64]) -> Vec<Complex<f64>> {
+        let mut grid = vec![Complex::default(); self.lines * self.gates];
+        self.cells.iter().zip(numbers).for_each(|(cell, x)| grid[cell.line * self.gates + cell.gate] = (*x).into());
+        self.transform(&mut grid, 0);
+        grid
+    }
+
+    fn back(&self, mut grid: Vec<Complex<f64>>) -> Vec<f64> {
+        self.transform(&mut grid, 1);
+        grid.into_iter().map(|value| value.re).collect()
+    }
+
+    /// A function of the distances (lines, gates) on the grid.
+    fn of_distance(&self, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        let short = |i: usize, of: usize| i.min(of - i) as f64;
+        let places = (0..self.lines).flat_map(|i| (0..self.gates).map(move |j| (i, j)));
+        places.map(|(i, j)| f(short(i, self.lines), short(j, self.gates))).collect()
+    }
+
+    /// Sums of the numbers of the cells with the weights of a function of the distance, whose transform is given.
+    fn convolve(&self, numbers: &[f64], function: &[Complex<f64>]) -> Vec<f64> {
+        let product = self.spectrum(numbers).iter().zip(function).map(|(a, b)| a * b).collect();
+        let grid = self.back(product);
+        self.cells.iter().map(|cell| grid[cell.line * self.gates + cell.gate]).collect()
+    }
+}
+
+/// Correlation at those lengths.
+fn exponential(plane: &Plane<'_>, (lines, gates): (f64, f64)) -> Vec<f64> {
+    plane.of_distance(|i, j| (-(i / lines).hypot(j / gates)).exp())
+}
+
+/// Covariance of the residuals.
+#[derive(Debug, Clone, Copy)]
+struct Fitted {
+    white: f64,
+    correlated: f64,
+    lengths: (f64, f64),
+    /// Sum of squares of what is left of the correlogram.
+    left: f64,
+}
+
+/// Correlogram of the residuals and what is needed to say what is expected of it.
+struct Correlogram<'a> {
+    plane: &'a Plane<'a>,
+    basis: Vec<Vec<f64>>,
+    basis_spectra: Vec<Vec<Complex<f64>>>,
+    /// Pairs of cells, sums of products and expected sums of unit white noise, by distance.
+    pairs: Vec<f64>,
+    sums: Vec<f64>,
+    white: Vec<f64>,
+    /// Weights of the distances.
+    weights: Vec<f64>,
+}
+
+impl<'a> Correlogram<'a> {
+    fn new(plane: &'a Plane<'a>, residuals: &[f64], slopes: &[Vec<f64>]) -> Self {
+        let power = |numbers: &[f64]| {
+            let spectrum = plane.spectrum(numbers);
+            plane.back(spectrum.into_iter().map(|value| value.norm_sqr().into()).collect())
+        };
+        let (pairs, sums) = (power(&vec![1.0; residuals.len()]), power(residuals));
+        let basis = orthonormal(slopes);
+        let basis_spectra: Vec<_> = basis.iter().map(|column| plane.spectrum(column)).collect();
+        let mut white: Vec<f64> = vec![0.0; pairs.len()];
+        white[0] = residuals.len() as f64;
+        for column in &basis {
+            white.iter_mut().zip(power(column)).for_each(|(white, taken)| *white -= taken);
+        }
+        // far cells are few and have little to say
+        let (most_lines, most_gates) = (plane.lines as f64 / 4.0, plane.gates as f64 / 4.0);
+        let near = plane.of_distance(|i, j| if i <= most_lines && j <= most_gates { 1.0 } else { 0.0 });
+        let mut weights: Vec<f64> =
+            near.iter().zip(&pairs).map(|(near, pairs)| if *pairs > 0.5 { near / pairs } else { 0.0 }).collect();
+        weights[0] *= 0.5;
+        Self { plane, basis, basis_spectra, pairs, sums, white, weights }
+    }
+
+    /// Expected sums of products of residuals of noise with that correlation.
+    fn expected(&self, correlation: &[f64]) -> Vec<f64> {
+        let plane = self.plane;
+        let mut function: Vec<Complex<f64>> = correlation.iter().map(|c| (*c).into()).collect();
+        plane.transform(&mut function, 0);
+        let smooth: Vec<Vec<f64>> = self.basis.iter().map(|column| plane.convolve(column, &function)).collect();
+        let mut taken = vec![Complex::default(); function.len()];
+        for (column, spectrum) in smooth.iter().zip(&self.basis_spectra) {
+            let mut rest = column.clone();
+            for other in &self.basis {
+                let part = 0.5 * dot(other, column);
+                rest.iter_mut().zip(other).for_each(|(rest, other)| *rest -= part * other);
+            }
+            let rest = plane.spectrum(&rest);
+            for ((taken, a), b) in taken.iter_mut().zip(spectrum).zip(rest) {
+                *taken += 2.0 * (a.conj() * b).re;
+            }
+        }
+        let taken = plane.back(taken);
+        correlation.iter().zip(&self.pairs).zip(taken).map(|((c, pairs), taken)| c * pairs - taken).collect()
+    }
+
+    fn product(&self, a: &[f64], b: &[f64]) -> f64 {
+        self.weights.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum()
+    }
+
+    /// White noise alone.
+    fn white_alone(&self) -> Fitted {
+        let white = self.product(&self.sums, &self.white) / self.product(&self.white, &self.white);
+        let left: Vec<f64> = self.sums.iter().zip(&self.white).map(|(sum, of)| sum - white * of).collect();
+        Fitted { white, correlated: 0.0, lengths: (0.0, 0.0), left: self.product(&left, &left) }
+    }
+
+    /// The best strengths at given lengths.
+    fn at(&self, lengths: (f64, f64)) -> Fitted {
+        let shape = self.expected(&exponential(self.plane, lengths));
+        let (aa, ab, bb) =
+            (self.product(&self.white, &self.white), self.product(&self.white, &shape), self.product(&shape, &shape));
+        let (a, b) = (self.product(&self.sums, &self.white), self.product(&self.sums, &shape));
+        let determinant = aa * bb - ab * ab;
+        let (mut white, mut correlated) = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
+        if white < 0.0 {
+            (white, correlated) = (0.0, b / bb);
+        }
+        let left = self.sums.iter().zip(&self.white).zip(&shape);
+        let left: Vec<f64> = left.map(|((sum, w), s)| sum - white * w - correlated * s).collect();
+        let left = if correlated > 0.0 { self.product(&left, &left) } else { f64::INFINITY };
+        Fitted { white, correlated, lengths, left }
+    }
+
+    fn fit(&self) -> Fitted {
+        let alone = self.white_alone();
+        let longest = (self.plane.lines as f64 / 4.0, self.plane.gates as f64 / 4.0);
+        let better = |a: Fitted, b: Fitted| if b.left < a.left { b } else { a };
+        let parts = (0..).map(|i| COARSE.powi(-i)).take_while(|part| longest.0.max(longest.1) * part > 0.4);
+        let best = parts.map(|part| self.at((longest.0 * part, longest.1 * part))).fold(alone, better);
+        // distances come twice, one for each sign
+        if alone.left - best.left < 2.0 * BEYOND_CHANCE * alone.white * alone.white {
+            return alone;
+        }
+        let (mut best, mut ratio) = (best, COARSE);
+        while ratio > FINE {
+            let (i, j) = best.lengths;
+            let tried = [(i * ratio, j), (i / ratio, j), (i, j * ratio), (i, j / ratio)];
+            let next = tried.map(|lengths| self.at(lengths)).into_iter().fold(best, better);
+            if next.left >= best.left {
+                ratio = ratio.sqrt();
+            }
+            best = next;
+        }
+        best
+    }
+}
+
+/// Orthonormal basis of the columns, twice by Gram and Schmidt.
+fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for column in columns {
+        let (mut rest, before) = (column.clone(), dot(column, column));
+        for _ in 0..2 {
+            for other in &basis {
+                let part = dot(other, &rest);
+                rest.iter_mut().zip(other).for_each(|(rest, other)| *rest -= part * other);
+            }
+        }
+        let norm = dot(&rest, &rest);
+        if norm > 1e-20 * before {
+            rest.iter_mut().for_each(|x| *x /= norm.sqrt());
+            basis.push(rest);
+        }
+    }
+    basis
+}
+
+/// B, and the number of cells that count as one.
+pub(crate) fn filling(cells: &[Cell], residuals: &[f64], slopes: &[Vec<f64>]) -> (Array2<f64>, f64) {
+    let plane = Plane::new(cells);
+    let found = Correlogram::new(&plane, residuals, slopes).fit();
+    let mut filling = products(&vec![found.white; residuals.len()], slopes);
+    if found.correlated == 0.0 {
+        return (filling, 1.0);
+    }
+    let correlation = exponential(&plane, found.lengths);
+    let alike = 1.0 + found.correlated / (found.white + found.correlated) * (correlation.iter().sum::<f64>() - 1.0);
+    let mut function: Vec<Complex<f64>> = correlation.into_iter().map(Complex::from).collect();
+    plane.transform(&mut function, 0);
+    for (i, column) in slopes.iter().enumerate() {
+        let smooth = plane.convolve(column, &function);
+        slopes.iter().enumerate().for_each(|(j, other)| filling[[i, j]] += found.correlated * dot(other, &smooth));
+    }
+    (filling, alike)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
+        rng.sample(rand_distr::StandardNormal)
+    }
+
+    fn cells(lines: usize, gates: usize) -> Vec<Cell> {
+        let all = (0..lines).flat_map(|line| (0..gates).map(move |gate| Cell { line, gate, sigma_m_s: 1.0 }));
+        all.filter(|cell| (7 * cell.line + cell.gate) % 23 != 0).collect()
+    }
+
+    /// Variance of the sums of residuals with slopes that the fit takes out, stated and found.
+    #[test]
+    fn sums_of_white_and_correlated_noise_have_their_variance_although_the_fit_takes_from_the_residuals() {
+        let (lines, gates, repeats) = (40, 24, 24);
+        let cells = cells(lines, gates);
+        let wave = |a: f64, b: f64| -> Vec<f64> {
+            cells.iter().map(|cell| (a * cell.line as f64).cos() * (b * cell.gate as f64).sin() + 0.3 * b).collect()
+        };
+        let slopes = vec![wave(0.1, 0.2), wave(0.25, 0.15), wave(0.0, 0.5)];
+        let basis = orthonormal(&slopes);
+        for (smooth, white) in [(0, 1.0), (9, 0.3)] {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+            let (mut stated, mut found) = (0.0, 0.0);
+            for _ in 0..repeats {
+                // moving means of white numbers: correlated over about `smooth` lines and half as many gates
+                let room = smooth + 1;
+                let numbers = Array2::from_shape_fn((lines + room, gates + room), |_| normal(&mut rng));
+                let noise: Vec<f64> = cells
+                    .iter()
+                    .map(|cell| {
+                        let block = numbers
+                            .slice(ndarray::s![cell.line..=cell.line + smooth, cell.gate..=cell.gate + smooth / 2]);
+                        let correlated = if smooth > 0 { block.sum() / (block.len() as f64).sqrt() } else { 0.0 };
+                        correlated + white * normal(&mut rng)
+                    })
+                    .collect();
+                let mut residuals = noise.clone();
+                for column in &basis {
+                    let part = dot(column, &noise);
+                    residuals.iter_mut().zip(column).for_each(|(r, c)| *r -= part * c);
+                }
+                let filling = filling(&cells, &residuals, &slopes).0;
+                for (i, slope) in slopes.iter().enumerate() {
+                    stated += filling[[i, i]] / dot(slope, slope);
+                    found += dot(slope, &noise).powi(2) / dot(slope, slope);
+                }
+            }
+            // 72 squares, not quite independent, scatter by 17 to 20 %
+            let ratio = stated / found;
+            assert!((0.6..1.6).contains(&ratio), "{smooth}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn white_residuals_are_taken_as_white() {
+        let cells = cells(60, 30);
+        let slopes = vec![vec![1.0; cells.len()], cells.iter().map(|cell| cell.line as f64).collect()];
+        let white = (0..20).filter(|&seed| {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let residuals: Vec<f64> = cells.iter().map(|_| 2.0 * normal(&mut rng)).collect();
+            filling(&cells, &residuals, &slopes).1 == 1.0
+        });
+        assert!(white.count() >= 18);
+    }
+}

@@ -1,0 +1,162 @@
+//! Fit of one scan: the best wake, whether there is one, and what is known of it.
+//!
+//! Wind alone, a left vortex, a right one and both are fitted. Of the last three the one with the least chi^2 + k ln N is taken; it is
+//! a wake if the statistic, the least chi^2 of the wind alone minus its own, reaches the threshold, and so for each vortex.
+//! Check: the reference maps; scatter, bias and stated deviations over many maps.
+
+use crate::error::Error;
+use crate::retrieval::expected::Expected;
+use crate::retrieval::hypotheses::{End, Fits, Kind, best, starts};
+use crate::retrieval::problem::{Cell, Problem};
+use crate::retrieval::report::Report;
+use crate::retrieval::whitening::Whitening;
+use crate::retrieval::{Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
+use crate::vortex_fit::map_fit::data::median;
+use crate::vortex_fit::{Loss, Wake};
+
+/// Median of the absolute value of a normal number.
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+/// Velocities with larger residuals, in their deviations, are outliers.
+pub(crate) const OUTLIER: f64 = 4.0;
+/// Most velocities that are whitened.
+const WHITENED: usize = 3000;
+
+/// Finds the vortices of one scan. No wake is a result, not an error.
+///
+/// # Errors
+/// [`Error::Length`], [`Error::OutOfRange`] for impossible input; [`Error::TooFewVelocities`] with less than a hundred;
+/// [`Error::Linalg`] if what is free does not show in the map or velocities are so correlated that they cannot be whitened.
+pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
+    options.validate()?;
+    map.validate()?;
+    let unfolded = unfolded(map);
+    let expected = Expected::rough(&unfolded, options)?;
+    let cells = cells(map);
+    let mut problem =
+        Problem { expected: &expected, cells, whitening: None, loss: options.loss, prior: options.core_prior };
+    let starts = starts(&unfolded, &problem, options)?;
+    let about = starts.first().map_or(Wake::from_array(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]), |s| s.1);
+    if map.sigma_m_s.is_none() {
+        // what the wind leaves, until fits are known
+        let wind = Fits { problem: &problem, options }.wind(&about)?;
+        rescale(&mut problem, &wind);
+    }
+    let mut ends = Fits { problem: &problem, options }.from_starts(&starts);
+    let (mut thinned, mut rejected) = (false, 0);
+    if let Some(turbulence) = &options.turbulence {
+        let before = problem.cells.len();
+        reject(&mut problem, turbulence, least(&ends, before));
+        rejected = before - problem.cells.len();
+        thinned = thin(&mut problem);
+        let places = problem.cells.iter().map(|cell| {
+            let at = options.model.position_m(map.range_m[cell.gate], map.elevation_rad[cell.line]);
+            (at, cell.sigma_m_s)
+        });
+        problem.whitening = Some(Whitening::new(&places.collect::<Vec<_>>(), turbulence).ok_or(Error::Linalg {
+            what: "covariance of the velocities",
+            order: problem.cells.len(),
+            reason: "is singular to working precision: state larger deviations of the velocities",
+        })?);
+        ends = Fits { problem: &problem, options }.from_starts(&starts);
+    }
+    let mut scale = 1.0;
+    if let Some(end) = least(&ends, problem.cells.len()) {
+        if map.sigma_m_s.is_none() && problem.whitening.is_none() {
+            rescale(&mut problem, end);
+        } else {
+            scale = residual_scale(&problem, end).max(1.0);
+        }
+        problem.loss = match options.loss {
+            Loss::Cauchy { width } => Loss::Cauchy { width: width * scale },
+            loss => loss,
+        };
+    }
+    let fine = expected.fine(options)?;
+    problem.expected = &fine;
+    let mut ends = Fits { problem: &problem, options }.again(&ends);
+    let frozen = fine.frozen();
+    if options.movement == Movement::Auto && fine.moves() {
+        problem.expected = &frozen;
+        let still = Fits { problem: &problem, options }.again(&ends);
+        let chi2 = |ends: &[End]| least(ends, problem.cells.len()).map_or(f64::INFINITY, |end| end.chi2);
+        if chi2(&still) < chi2(&ends) {
+            ends = still;
+        } else {
+            problem.expected = &fine;
+        }
+    }
+    let wind = Fits { problem: &problem, options }.wind(&about)?;
+    Report { map, options, problem: &problem, scale, rejected, thinned, wind: &wind, ends: &ends }.result()
+}
+
+/// The velocities that there are.
+fn cells(map: &ScanMap) -> Vec<Cell> {
+    let known = map.velocity_m_s.indexed_iter().filter(|(_, velocity)| velocity.is_finite());
+    known
+        .map(|((line, gate), _)| {
+            let sigma_m_s = map.sigma_m_s.as_ref().map_or(1.0, |sigma| sigma[[line, gate]]);
+            Cell { line, gate, sigma_m_s }
+        })
+        .collect()
+}
+
+/// Velocities that repeat are put about their median.
+fn unfolded(map: &ScanMap) -> ScanMap {
+    let mut unfolded = map.clone();
+    if let Some(fold) = map.fold_m_s {
+        let middle = median(&mut map.velocity_m_s.iter().copied().filter(|v| v.is_finite()).collect::<Vec<f64>>());
+        unfolded.velocity_m_s.mapv_inplace(|v| v - fold * ((v - middle) / fold).round());
+    }
+    unfolded
+}
+
+/// The end with the least chi^2 + k ln N.
+pub(crate) fn least(ends: &[End], cells: usize) -> Option<&End> {
+    let cost = |end: &End| end.chi2 + end.groups.len() as f64 * (cells as f64).ln();
+    let bests = [Kind::Left, Kind::Right, Kind::Both].into_iter().filter_map(|kind| best(ends, kind));
+    bests.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+}
+
+/// Scale of the residuals over their deviations, from their median.
+fn residual_scale(problem: &Problem<'_>, end: &End) -> f64 {
+    let mut sizes: Vec<f64> = problem.rows(&end.wake, &[]).residuals.iter().map(|r| r.abs()).collect();
+    median(&mut sizes) / NORMAL_MEDIAN
+}
+
+/// Where no deviations are stated, they are those of the residuals; a millionth of a metre per second where the fit is exact.
+fn rescale(problem: &mut Problem<'_>, end: &End) {
+    let scale = residual_scale(problem, end);
+    problem.cells.iter_mut().for_each(|cell| cell.sigma_m_s = (cell.sigma_m_s * scale).max(1e-6));
+}
+
+/// Takes away velocities far off a first fit, which whitening would spread over their neighbours.
+fn reject(problem: &mut Problem<'_>, turbulence: &Turbulence, end: Option<&End>) {
+    let Some(end) = end else { return };
+    let residuals = problem.rows(&end.wake, &[]).residuals;
+    let mut residuals = residuals.iter();
+    problem.cells.retain(|cell| {
+        let deviation_m_s = cell.sigma_m_s.hypot(turbulence.deviation_m_s);
+        residuals.next().is_none_or(|r| r.abs() * cell.sigma_m_s <= OUTLIER * deviation_m_s)
+    });
+}
+
+/// Leaves lines and gates out until there are not more velocities than can be whitened.
+fn thin(problem: &mut Problem<'_>) -> bool {
+    let map = problem.expected.map;
+    let view = map.view();
+    let gate_m = view.gate_spacing_m();
+    let (mut lines, mut gates, mut thinned) = (1, 1, false);
+    let count = |cells: &[Cell], lines: usize, gates: usize| {
+        cells.iter().filter(|cell| cell.line % lines == 0 && cell.gate % gates == 0).count()
+    };
+    while count(&problem.cells, lines, gates) > WHITENED {
+        if lines as f64 * view.line_spacing_m() < gates as f64 * gate_m {
+            lines += 1
+        } else {
+            gates += 1
+        }
+        thinned = true;
+    }
+    problem.cells.retain(|cell| cell.line % lines == 0 && cell.gate % gates == 0);
+    thinned
+}

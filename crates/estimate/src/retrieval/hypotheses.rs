@@ -1,0 +1,249 @@
+//! Wind alone, one vortex or two: the best fit of each to a scan.
+//!
+//! Check: the reference maps; wakes of which one vortex is in view.
+
+use crate::error::Error;
+use crate::retrieval::problem::Problem;
+use crate::retrieval::{RetrievalOptions, ScanMap};
+use crate::vortex_fit::damped_newton::{Stop, inverse};
+use crate::vortex_fit::map_fit::guess::Search;
+use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
+use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake};
+
+/// Pairs of places that fits start from.
+const PAIRS: usize = 3;
+/// Pairs are different if a vortex of one is that far from that of the other \[m\].
+const APART_M: f64 = 12.0;
+/// Where a vortex is that does not exist \[m\] from the other, and the typical core of one without a partner.
+const NOWHERE_M: f64 = 1000.0;
+const LONE_CORE_M: f64 = 2.0;
+/// While fits search their way cores are broad, over the spacing.
+const BROAD: f64 = 0.1;
+/// A core is not resolved if its deviation is more than this part of it, or if it is more than that part of the spacing.
+const RESOLVED: f64 = 0.5;
+const LARGEST: f64 = 0.5;
+/// Ends closer than this many standard deviations in every parameter are one.
+const SAME_SIGMAS: f64 = 0.3;
+/// So near they are one even where there is no noise.
+const SAME: f64 = 1e-4;
+
+const FAR: Stop = Stop { iterations: 40, sigmas: 0.3, learns: false };
+const NEAR: Stop = Stop { iterations: 100, sigmas: 1e-4, learns: false };
+
+/// Which vortices there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Wind,
+    Left,
+    Right,
+    Both,
+}
+
+impl Kind {
+    /// Whether the parameter belongs to a vortex that there is, or to the wind.
+    fn has(self, place: usize) -> bool {
+        let left = [Parameter::LeftCirculation, Parameter::LeftLateral, Parameter::LeftHeight, Parameter::LeftCore];
+        let is_left = left.iter().any(|parameter| *parameter as usize == place);
+        match self {
+            _ if place >= Parameter::Wind as usize => true,
+            Self::Wind => false,
+            Self::Left => is_left,
+            Self::Right => !is_left,
+            Self::Both => true,
+        }
+    }
+
+    /// The wake without the vortices that there are not.
+    fn of(self, wake: &Wake) -> Wake {
+        let nowhere = |other: &Vortex, by_m: f64| Vortex {
+            circulation_m2_s: 0.0,
+            lateral_position_m: other.lateral_position_m + by_m,
+            ..*other
+        };
+        match self {
+            Self::Both => *wake,
+            Self::Left => Wake { right: nowhere(&wake.left, NOWHERE_M), ..*wake },
+            Self::Right => Wake { left: nowhere(&wake.right, -NOWHERE_M), ..*wake },
+            Self::Wind => Wake { left: nowhere(&wake.left, 0.0), right: nowhere(&wake.right, 0.0), ..*wake },
+        }
+    }
+}
+
+/// An end of a fit.
+#[derive(Debug, Clone)]
+pub(crate) struct End {
+    pub(crate) kind: Kind,
+    pub(crate) wake: Wake,
+    pub(crate) chi2: f64,
+    /// Free numbers.
+    pub(crate) groups: Vec<Vec<usize>>,
+}
+
+/// Where fits of a scan start.
+pub(crate) fn starts(
+    map: &ScanMap,
+    problem: &Problem<'_>,
+    options: &RetrievalOptions,
+) -> Result<Vec<(Kind, Wake)>, Error> {
+    let expected = problem.expected;
+    let search = Search::new(&map.view(), expected.model, &expected.kernel)?;
+    let mut pairs = search.pairs();
+    pairs.sort_by(|a, b| b.explained.total_cmp(&a.explained));
+    let mut wakes: Vec<Wake> = options.start.into_iter().collect();
+    let given = wakes.len();
+    for pair in &pairs {
+        let wake = search.wake(pair);
+        let near = |a: &Vortex, b: &Vortex| {
+            (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m) < APART_M
+        };
+        if wakes.len() < given + PAIRS
+            && !wakes.iter().skip(given).any(|known| near(&known.left, &wake.left) && near(&known.right, &wake.right))
+        {
+            wakes.push(wake);
+        }
+    }
+    let mut starts: Vec<(Kind, Wake)> = wakes.into_iter().map(|wake| (Kind::Both, wake)).collect();
+    for (kind, sense) in [(Kind::Left, -1.0), (Kind::Right, 1.0)] {
+        let single = search.single(sense);
+        starts.extend(single.map(|(circulation_m2_s, lateral_position_m, height_m)| {
+            let vortex = Vortex { circulation_m2_s, lateral_position_m, height_m, core_radius_m: LONE_CORE_M };
+            (kind, kind.of(&Wake { left: vortex, right: vortex, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }))
+        }));
+    }
+    Ok(starts)
+}
+
+/// Fits of one scan.
+pub(crate) struct Fits<'a> {
+    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) options: &'a RetrievalOptions,
+}
+
+impl Fits<'_> {
+    fn groups(&self, kind: Kind) -> Vec<Vec<usize>> {
+        let all = self.options.free.groups().into_iter();
+        all.map(|group| group.into_iter().filter(|place| kind.has(*place)).collect::<Vec<usize>>())
+            .filter(|group| !group.is_empty())
+            .collect()
+    }
+
+    /// The wind alone.
+    pub(crate) fn wind(&self, about: &Wake) -> Result<End, Error> {
+        self.end(Kind::Wind, &Kind::Wind.of(about), self.groups(Kind::Wind))
+    }
+
+    fn end(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>) -> Result<End, Error> {
+        let (wake, chi2) = self.problem.minimum(start, &groups, NEAR)?;
+        Ok(End { kind, wake, chi2, groups })
+    }
+
+    /// Core radius that a fit starts with or keeps.
+    fn core_m(&self, kind: Kind, wake: &Wake) -> f64 {
+        let typical = if kind == Kind::Both { CORE_OVER_SPACING * wake.spacing_m() } else { LONE_CORE_M };
+        self.options.core_radius_m.unwrap_or(typical)
+    }
+
+    /// From a rough start: with broad cores until the places are known, then with all that is free.
+    fn from(&self, kind: Kind, start: &Wake) -> Option<End> {
+        let groups = self.groups(kind);
+        let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
+        let spacing_m = if kind == Kind::Both { start.spacing_m() } else { LONE_CORE_M / CORE_OVER_SPACING };
+        let broad = with_cores(&self.options.free.start(start), BROAD * spacing_m);
+        let (near, _) = self.problem.minimum(&broad, &coreless, FAR).ok()?;
+        self.polished(kind, &near)
+    }
+
+    /// From a start near the end, with cores begun anew.
+    fn polished(&self, kind: Kind, near: &Wake) -> Option<End> {
+        let mut groups = self.groups(kind);
+        let core_m = self.core_m(kind, near);
+        if !groups.iter().any(|group| is_core(group)) {
+            let end = self.end(kind, &with_cores(near, core_m), groups.clone()).ok()?;
+            // the typical core is that of the spacing which the fit ends with
+            return self.end(kind, &with_cores(&end.wake, self.core_m(kind, &end.wake)), groups).ok();
+        }
+        let spacing_m = if kind == Kind::Both { near.spacing_m() } else { LONE_CORE_M / CORE_OVER_SPACING };
+        let end = self.end(kind, &with_cores(near, core_m), groups.clone()).ok();
+        let vague: Vec<usize> = match &end {
+            Some(end) => self.vague_cores(end, LARGEST * spacing_m),
+            None => vec![Parameter::LeftCore as usize, Parameter::RightCore as usize],
+        };
+        if vague.is_empty() {
+            return end;
+        }
+        groups.retain(|group| !group.iter().all(|place| vague.contains(place)));
+        let mut p = near.to_array();
+        vague.iter().for_each(|place| p[*place] = core_m);
+        if let Some(end) = end {
+            let found = end.wake.to_array();
+            (0..PARAMETERS).filter(|place| is_core(&[*place]) && !vague.contains(place)).for_each(|i| p[i] = found[i]);
+        }
+        self.end(kind, &Wake::from_array(&p), groups).ok()
+    }
+
+    /// Places of the core radii that the scan does not resolve.
+    fn vague_cores(&self, end: &End, largest_m: f64) -> Vec<usize> {
+        let rows = self.problem.rows(&end.wake, &end.groups);
+        let ones = vec![1.0; rows.residuals.len()];
+        let curvature = crate::retrieval::problem::products(&ones, &rows.slopes);
+        let covariance = inverse("curvature of the fit", &curvature);
+        let p = end.wake.to_array();
+        let vague = |(i, group): (usize, &Vec<usize>)| {
+            let core_m = p[group[0]];
+            let deviation_m = covariance.as_ref().map_or(f64::INFINITY, |c| c[[i, i]].sqrt());
+            // also true for NaN
+            !(deviation_m < RESOLVED * core_m && core_m < largest_m)
+        };
+        let cores = end.groups.iter().enumerate().filter(|(_, group)| is_core(group));
+        cores.filter(|core| vague(*core)).flat_map(|(_, group)| group.clone()).collect()
+    }
+
+    /// Ends of all starts; pairs also start fits of each of their vortices alone.
+    pub(crate) fn from_starts(&self, starts: &[(Kind, Wake)]) -> Vec<End> {
+        let mut ends: Vec<End> = starts.iter().filter_map(|(kind, wake)| self.from(*kind, wake)).collect();
+        if let Some(pair) = best(&ends, Kind::Both).map(|end| end.wake) {
+            ends.extend([Kind::Left, Kind::Right].iter().filter_map(|kind| self.polished(*kind, &kind.of(&pair))));
+        }
+        ends
+    }
+
+    /// The same ends for another problem, such as another scale of the loss.
+    pub(crate) fn again(&self, ends: &[End]) -> Vec<End> {
+        ends.iter().filter_map(|end| self.end(end.kind, &end.wake, end.groups.clone()).ok()).collect()
+    }
+}
+
+/// The best end of a kind whose circulations have the sense of an aircraft's: a left vortex the other way round is a right one.
+pub(crate) fn best(ends: &[End], kind: Kind) -> Option<&End> {
+    let circulations = [Parameter::LeftCirculation as usize, Parameter::RightCirculation as usize];
+    let turns = |end: &&End| circulations.iter().all(|i| !kind.has(*i) || end.wake.to_array()[*i] > 0.0);
+    ends.iter().filter(|end| end.kind == kind).filter(turns).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// All ends of the kind of the best one that are not the same, the best first, given its covariance.
+pub(crate) fn tops<'a>(ends: &'a [End], best: &End, covariance: &ndarray::Array2<f64>) -> Vec<&'a End> {
+    let mut sorted: Vec<&End> = ends.iter().filter(|end| end.kind == best.kind).collect();
+    sorted.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    let mut tops: Vec<&End> = Vec::new();
+    for end in sorted {
+        let same = |top: &&End| {
+            let (a, b) = (end.wake.to_array(), top.wake.to_array());
+            (0..PARAMETERS)
+                .all(|i| (a[i] - b[i]).powi(2) <= SAME_SIGMAS.powi(2) * covariance[[i, i]] || !end.kind.has(i))
+        };
+        if !tops.iter().any(same) {
+            tops.push(end);
+        }
+    }
+    tops
+}
+
+/// Whether a free number moves core radii.
+fn is_core(group: &[usize]) -> bool {
+    crate::vortex_fit::wake::core_prior::is_core(group)
+}
+
+fn with_cores(wake: &Wake, core_radius_m: f64) -> Wake {
+    let with = |vortex: &Vortex| Vortex { core_radius_m, ..*vortex };
+    Wake { left: with(&wake.left), right: with(&wake.right), ..*wake }
+}

@@ -1,0 +1,113 @@
+//! How vortices move while a scan lasts: each with the velocity that the other one, the images and the wind have at its centre.
+//!
+//! Over a scan of some seconds the velocity changes by per cents, so it is that of the middle of the scan.
+//! Check: the stored velocities of an independent program; difference quotients.
+
+use crate::vortex_fit::{PARAMETERS, Parameter, Wake, WakeModel};
+
+/// Places of the moving coordinates among the parameters.
+const MOVING: [usize; 4] = [
+    Parameter::LeftLateral as usize,
+    Parameter::LeftHeight as usize,
+    Parameter::RightLateral as usize,
+    Parameter::RightHeight as usize,
+];
+
+/// Velocities of the centres and their derivatives by all parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Motion {
+    velocity_m_s: [f64; 4],
+    slopes: [[f64; PARAMETERS]; 4],
+}
+
+impl Motion {
+    pub(crate) fn new(model: &WakeModel, wake: &Wake) -> Self {
+        let velocity_m_s = model.centre_velocities_m_s(wake);
+        let mut slopes = [[0.0; PARAMETERS]; 4];
+        for place in 0..PARAMETERS {
+            let step = 1e-4 * wake.to_array()[place].abs().max(1.0);
+            let moved = |by: f64| {
+                let mut p = wake.to_array();
+                p[place] += by;
+                model.centre_velocities_m_s(&Wake::from_array(&p))
+            };
+            let (ahead, behind) = (moved(step), moved(-step));
+            for ((row, ahead), behind) in slopes.iter_mut().zip(ahead).zip(behind) {
+                row[place] = (ahead - behind) / (2.0 * step);
+            }
+        }
+        Self { velocity_m_s, slopes }
+    }
+
+    /// The wake after so many seconds.
+    pub(crate) fn wake_after(&self, wake: &Wake, seconds: f64) -> Wake {
+        let mut p = wake.to_array();
+        MOVING.iter().zip(self.velocity_m_s).for_each(|(&place, velocity)| p[place] += seconds * velocity);
+        Wake::from_array(&p)
+    }
+
+    /// Turns derivatives by the parameters of the wake after so many seconds into those by the parameters of the wake at first.
+    pub(crate) fn carry_back(&self, seconds: f64, slope: &mut [f64; PARAMETERS]) {
+        let then = *slope;
+        for (place, row) in MOVING.iter().zip(&self.slopes) {
+            slope.iter_mut().zip(row).for_each(|(slope, by)| *slope += then[*place] * seconds * by);
+        }
+    }
+}
+
+impl WakeModel {
+    /// Velocities \[m/s\] that the other vortex, the images and the wind have at the centres: lateral and vertical of the left, lateral
+    /// and vertical of the right vortex.
+    #[must_use]
+    pub fn centre_velocities_m_s(&self, wake: &Wake) -> [f64; 4] {
+        let at = |own: &crate::vortex_fit::Vortex| {
+            let mut lateral_m_s = wake.lateral_wind_m_s + wake.wind_shear_per_s * own.height_m;
+            let mut vertical_m_s = 0.0;
+            for (vortex, _, side, sense) in self.sources(wake) {
+                let dy = own.lateral_position_m - vortex.lateral_position_m;
+                let dz = own.height_m - side * vortex.height_m;
+                let (omega, _, _) = self.profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
+                lateral_m_s -= sense * vortex.circulation_m2_s * omega * dz;
+                vertical_m_s += sense * vortex.circulation_m2_s * omega * dy;
+            }
+            [lateral_m_s, vertical_m_s]
+        };
+        let ([a, b], [c, d]) = (at(&wake.left), at(&wake.right));
+        [a, b, c, d]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The truth of the reference map of moving vortices.
+    #[test]
+    fn centres_move_as_an_independent_program_has_them() {
+        let wake = Wake::from_array(&[420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.5, 3.0, 0.02]);
+        let found = WakeModel::default().centre_velocities_m_s(&wake);
+        let stored = [3.497_550_2, -0.910_882_06, 3.528_323_08, -1.125_207_24];
+        assert!(found.iter().zip(stored).all(|(f, s)| (f - s).abs() < 2e-3), "{found:?}");
+    }
+
+    #[test]
+    fn derivatives_carried_back_are_difference_quotients() {
+        let (model, wake) =
+            (WakeModel::default(), Wake::from_array(&[420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.0, 3.0, 0.02]));
+        let seen = |wake: &Wake| {
+            let moved = Motion::new(&model, wake).wake_after(wake, 2.5);
+            model.radial_velocity_m_s(&moved, 400.0, 0.12)
+        };
+        let motion = Motion::new(&model, &wake);
+        let (_, mut slope) = model.gradient(&motion.wake_after(&wake, 2.5), 400.0, 0.12);
+        motion.carry_back(2.5, &mut slope);
+        for (place, slope) in slope.iter().enumerate() {
+            let moved = |by: f64| {
+                let mut p = wake.to_array();
+                p[place] += by;
+                seen(&Wake::from_array(&p))
+            };
+            assert!((slope - (moved(1e-4) - moved(-1e-4)) / 2e-4).abs() < 1e-6, "{place}");
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! How a scan is retrieved.
+
+use crate::error::{Error, not_negative, positive};
+use crate::vortex_fit::{CorePrior, FreeParameters, Loss, RangeKernel, Wake, WakeModel, WindFit};
+
+/// What a velocity of the map is of the air about its range.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Gate {
+    /// The velocity at the point itself.
+    Point,
+    /// The mean with a Gaussian weight of that standard deviation: sigma_R = (c/2) sqrt((sigma^2 + sigma_h^2)/2) for a Gaussian
+    /// pulse and window.
+    Gaussian {
+        /// Standard deviation of the weight along the line \[m\].
+        std_m: f64,
+    },
+    /// The mean with any other weight.
+    Kernel(RangeKernel),
+}
+
+/// Correlated velocities beside the noise of each: C = deviation^2 exp(-distance / length).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turbulence {
+    /// Standard deviation of the correlated part \[m/s\].
+    pub deviation_m_s: f64,
+    /// Distance after which the correlation has fallen to 1/e \[m\].
+    pub length_m: f64,
+}
+
+/// How the covariance of a fit is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Covariance {
+    /// From the residuals and their correlation (sandwich): right for any noise that is much the same over the map.
+    Sandwich,
+    /// The inverse of the information: right if the stated deviations (and the turbulence) are.
+    Model,
+}
+
+/// Whether vortices move while a scan lasts, each with the velocity that the other one, the images and the wind give it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Movement {
+    /// They move or stand still, whichever fits better: the times of a file need not be those of the air (averaged scans, frozen
+    /// simulations).
+    Auto,
+    /// They move.
+    Moving,
+    /// They stand still.
+    Frozen,
+}
+
+/// Options of [`fit_scan`](crate::retrieval::fit_scan).
+#[derive(Debug, Clone, PartialEq)]
+pub struct RetrievalOptions {
+    /// Profile, images, place of the lidar.
+    pub model: WakeModel,
+    /// What a velocity is of the air about its range.
+    pub gate: Gate,
+    /// What may change.
+    pub free: FreeParameters,
+    /// Core radius \[m\] that fixed cores keep and free ones start from; 4.5 % of the spacing if absent.
+    pub core_radius_m: Option<f64>,
+    /// What is known of free cores.
+    pub core_prior: Option<CorePrior>,
+    /// What residuals cost.
+    pub loss: Loss,
+    /// Correlated velocities to be whitened.
+    pub turbulence: Option<Turbulence>,
+    /// How the covariance is made.
+    pub covariance: Covariance,
+    /// Whether the vortices move while the scan lasts.
+    pub movement: Movement,
+    /// Least statistic (see [`ScanResult::statistic`](crate::retrieval::ScanResult::statistic)) of a wake.
+    pub threshold: f64,
+    /// A wake to start from beside the blind search, such as the prediction of a track.
+    pub start: Option<Wake>,
+}
+
+impl RetrievalOptions {
+    /// [`RetrievalOptions::threshold`] unless set.
+    pub const DEFAULT_THRESHOLD: f64 = 40.0;
+
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        if let Gate::Gaussian { std_m } = self.gate {
+            not_negative("std_m of the gate", std_m)?;
+        }
+        if let Some(turbulence) = self.turbulence {
+            positive("deviation_m_s of the turbulence", turbulence.deviation_m_s)?;
+            positive("length_m of the turbulence", turbulence.length_m)?;
+        }
+        if let Loss::Cauchy { width } = self.loss {
+            positive("width of the loss", width)?;
+        }
+        self.core_radius_m.map_or(Ok(()), |core| positive("core_radius_m", core))?;
+        self.start.map_or(Ok(()), |wake| wake.validate())?;
+        not_negative("threshold", self.threshold)
+    }
+}
+
+impl Default for RetrievalOptions {
+    /// Points, all ten parameters, the loss of Cauchy, the sandwich, moving vortices if that fits.
+    fn default() -> Self {
+        Self {
+            model: WakeModel::default(),
+            gate: Gate::Point,
+            free: FreeParameters { wind: WindFit::Linear, ..FreeParameters::default() },
+            core_radius_m: None,
+            core_prior: None,
+            loss: Loss::Cauchy { width: 2.385 },
+            turbulence: None,
+            covariance: Covariance::Sandwich,
+            movement: Movement::Auto,
+            threshold: Self::DEFAULT_THRESHOLD,
+            start: None,
+        }
+    }
+}

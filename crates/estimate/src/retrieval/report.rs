@@ -1,0 +1,247 @@
+//! What is told of the fits of a scan: which vortices there are, their deviations, and flags.
+//!
+//! Check: the reference maps; wakes at the end of the sector, near the ground, with a kept core.
+
+use ndarray::Array2;
+
+use crate::error::Error;
+use crate::retrieval::correlated_residuals::filling;
+use crate::retrieval::fit::{OUTLIER, least};
+use crate::retrieval::hypotheses::{End, Kind, best, tops};
+use crate::retrieval::motion::Motion;
+use crate::retrieval::problem::{Problem, products};
+use crate::retrieval::{Covariance, Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
+use crate::vortex_fit::damped_newton::inverse;
+use crate::vortex_fit::wake::free_parameters::spread;
+use crate::vortex_fit::{Loss, PARAMETERS, Parameter};
+
+/// A vortex whose circulation is less than so many of its deviations is none.
+const LEAST_SIGMAS: f64 = 3.0;
+/// A top so much above the least chi-square competes with it.
+const COMPETES: f64 = 9.0;
+/// A side of a vortex is seen if the sector reaches so far beyond its centre \[m\], where circulation begins to be counted.
+const SEEN_M: f64 = 5.0;
+/// Chi-square per degree after robust scaling that is too much, and part of outliers that is.
+const POOR: f64 = 2.0;
+const MANY_OUTLIERS: f64 = 0.1;
+
+pub(crate) struct Report<'a> {
+    pub(crate) map: &'a ScanMap,
+    pub(crate) options: &'a RetrievalOptions,
+    pub(crate) problem: &'a Problem<'a>,
+    /// Scale of the residuals over the stated deviations, at least 1.
+    pub(crate) scale: f64,
+    pub(crate) rejected: usize,
+    pub(crate) thinned: bool,
+    pub(crate) wind: &'a End,
+    pub(crate) ends: &'a [End],
+}
+
+impl Report<'_> {
+    pub(crate) fn result(&self) -> Result<ScanResult, Error> {
+        let cells = self.problem.cells.len();
+        let gain = |without: Option<&End>, with: &End| {
+            without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2)
+        };
+        let likely = least(self.ends, cells);
+        let statistic = likely.map_or(0.0, |end| gain(Some(self.wind), end));
+        let (left, right) = (best(self.ends, Kind::Left), best(self.ends, Kind::Right));
+        // the likely one, then a lone vortex instead of a pair of which one is not seen
+        let lone = [left, right].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        let mut chosen = None;
+        for end in likely.into_iter().chain(lone.filter(|_| likely.is_some_and(|end| end.kind == Kind::Both))) {
+            let seen = match end.kind {
+                Kind::Both => gain(left, end).min(gain(right, end)),
+                _ => gain(Some(self.wind), end),
+            };
+            if seen.min(statistic) < self.options.threshold {
+                continue;
+            }
+            let covariance = self.covariance(end)?;
+            if self.sides(end).iter().all(|side| certain(end, *side, &covariance)) {
+                chosen = Some((end, covariance));
+                break;
+            }
+        }
+        match chosen {
+            Some((end, covariance)) => Ok(self.told(end, covariance, statistic)),
+            None => Ok(self.told(self.wind, self.covariance(self.wind)?, statistic)),
+        }
+    }
+
+    fn sides(&self, end: &End) -> Vec<Side> {
+        match end.kind {
+            Kind::Wind => vec![],
+            Kind::Left => vec![Side::Left],
+            Kind::Right => vec![Side::Right],
+            Kind::Both => vec![Side::Left, Side::Right],
+        }
+    }
+
+    /// Covariance of all parameters.
+    fn covariance(&self, end: &End) -> Result<Array2<f64>, Error> {
+        let rows = self.problem.rows(&end.wake, &end.groups);
+        let losses: Vec<_> = rows.residuals.iter().map(|r| self.problem.loss.at(*r)).collect();
+        let (weights, curved): (Vec<f64>, Vec<f64>) =
+            losses.iter().map(|(_, weight, second)| (*weight, *second)).unzip();
+        let mut known = Array2::<f64>::zeros((end.groups.len(), end.groups.len()));
+        for (_, slope) in self.problem.known(&end.wake, &end.groups) {
+            known.indexed_iter_mut().for_each(|((i, j), k)| *k += slope[i] * slope[j]);
+        }
+        let inverse_of = |weights: &[f64]| inverse("curvature of the fit", &(products(weights, &rows.slopes) + &known));
+        let covariance = match self.options.covariance {
+            Covariance::Model => inverse_of(&vec![1.0; weights.len()])? * inflation(self.options.loss),
+            Covariance::Sandwich => {
+                // with many outliers the second derivatives need not be positive: their weights are, and are larger
+                let bread = inverse_of(&curved).or_else(|_| inverse_of(&weights))?;
+                let weighted: Vec<f64> = rows.residuals.iter().zip(&weights).map(|(r, w)| r * w).collect();
+                let (filling, _) = filling(&self.problem.cells, &weighted, &rows.slopes);
+                bread.dot(&(filling + &known)).dot(&bread)
+            }
+        };
+        Ok(spread(&end.groups, &covariance))
+    }
+
+    fn told(&self, end: &End, covariance: Array2<f64>, statistic: f64) -> ScanResult {
+        let residuals = self.problem.rows(&end.wake, &[]).residuals;
+        let used = residuals.iter().filter(|r| r.abs() <= OUTLIER * self.scale);
+        let (count, squares) = used.fold((0, 0.0), |(count, sum), r| (count + 1, sum + r * r));
+        let cells_rejected = self.rejected + residuals.len() - count;
+        let motion = self.problem.expected.motion(&end.wake);
+        let mut vortices: Vec<VortexResult> =
+            self.sides(end).into_iter().map(|side| self.vortex(end, side, &covariance, motion.as_ref())).collect();
+        // what is beyond the sector is hardly known, though it acts
+        if vortices.iter().any(|vortex| self.margin_m(vortex) >= 0.0) {
+            vortices.retain(|vortex| self.margin_m(vortex) >= 0.0);
+        }
+        let tops: Vec<Top> =
+            tops(self.ends, end, &covariance).iter().map(|end| Top { wake: end.wake, chi2: end.chi2 }).collect();
+        let measured = |parameter: Parameter| Measured {
+            value: end.wake.to_array()[parameter as usize],
+            std: covariance[[parameter as usize; 2]].sqrt(),
+        };
+        let low = |vortex: &VortexResult| vortex.height_m.value < 0.5 * self.spacing_m(end);
+        let competes = tops
+            .get(1)
+            .zip(tops.first())
+            .is_some_and(|(second, first)| second.chi2 - first.chi2 < COMPETES * self.scale.powi(2));
+        let unmoved = !self.problem.expected.moves()
+            && !(self.map.has_times() && self.map.time_s.iter().all(|time| *time == self.map.time_s[0]));
+        let flags = [
+            (Flag::NoWake, vortices.is_empty()),
+            (Flag::OneVortex, vortices.len() == 1),
+            (Flag::CoreKept, vortices.iter().any(|vortex| vortex.core_radius_m.is_none())),
+            (Flag::AtEdge, vortices.iter().any(|vortex| self.margin_m(vortex) < SEEN_M)),
+            (Flag::NearGround, vortices.iter().any(low)),
+            (Flag::MotionIgnored, unmoved),
+            (Flag::Ambiguous, competes),
+            (Flag::PoorFit, self.scale.powi(2) > POOR),
+            (Flag::Outliers, cells_rejected as f64 > MANY_OUTLIERS * (self.rejected + residuals.len()) as f64),
+            (Flag::Thinned, self.thinned),
+        ];
+        ScanResult {
+            wake: (!vortices.is_empty()).then_some(end.wake),
+            reference_time_s: self.problem.expected.reference_time_s,
+            lateral_wind_m_s: measured(Parameter::Wind),
+            wind_shear_per_s: measured(Parameter::Shear),
+            chi2_per_dof: squares / (count.saturating_sub(end.groups.len()).max(1)) as f64,
+            cells_used: count,
+            cells_rejected,
+            statistic,
+            threshold: self.options.threshold,
+            flags: flags.into_iter().filter(|(_, set)| *set).map(|(flag, _)| flag).collect(),
+            vortices,
+            covariance,
+            tops,
+        }
+    }
+
+    fn spacing_m(&self, end: &End) -> f64 {
+        if end.kind == Kind::Both { end.wake.spacing_m() } else { 2.0 * SEEN_M }
+    }
+
+    /// How far the sector reaches beyond a centre \[m\]; negative outside.
+    fn margin_m(&self, vortex: &VortexResult) -> f64 {
+        let (range_m, elevation_rad) = self.polar(vortex.lateral_position_m.value, vortex.height_m.value);
+        let within = |axis: &[f64], value: f64| {
+            axis.first().zip(axis.last()).map_or(f64::NAN, |(first, last)| (value - first).min(last - value))
+        };
+        within(&self.map.range_m, range_m).min(range_m * within(&self.map.elevation_rad, elevation_rad))
+    }
+
+    fn polar(&self, lateral_m: f64, height_m: f64) -> (f64, f64) {
+        let model = &self.options.model;
+        let (dy, dz) = (lateral_m - model.lidar_lateral_position_m, height_m - model.lidar_height_m);
+        (dy.hypot(dz), dz.atan2(dy))
+    }
+
+    /// A vortex when the line through its core is measured.
+    fn vortex(&self, end: &End, side: Side, covariance: &Array2<f64>, motion: Option<&Motion>) -> VortexResult {
+        let [circulation, lateral, height, core] = places(side);
+        let reference_s = self.problem.expected.reference_time_s;
+        let mut seconds = 0.0;
+        if let Some(motion) = motion {
+            // the line is that of the place then
+            for _ in 0..4 {
+                let p = motion.wake_after(&end.wake, seconds).to_array();
+                let (_, elevation_rad) = self.polar(p[lateral], p[height]);
+                let away = |line: &usize| (self.map.elevation_rad[*line] - elevation_rad).abs();
+                let nearest = (0..self.map.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+                seconds = nearest.map_or(0.0, |line| self.map.time_s[line] - reference_s);
+            }
+        }
+        let then = motion.map_or(end.wake, |motion| motion.wake_after(&end.wake, seconds)).to_array();
+        let measured = |place: usize| {
+            let mut slope = [0.0; PARAMETERS];
+            slope[place] = 1.0;
+            if let Some(motion) = motion {
+                motion.carry_back(seconds, &mut slope);
+            }
+            let terms = covariance.indexed_iter().map(|((i, j), c)| slope[i] * c * slope[j]);
+            Measured { value: then[place], std: terms.sum::<f64>().max(0.0).sqrt() }
+        };
+        let [left, right] = end.wake.mean_circulations_5_15_m2_s(self.options.model.profile, covariance.view());
+        let (value, std) = if side == Side::Left { left } else { right };
+        let fitted = end.groups.iter().any(|group| group.contains(&core));
+        VortexResult {
+            side,
+            time_s: reference_s + seconds,
+            circulation_m2_s: measured(circulation),
+            circulation_5_15_m2_s: Measured { value, std },
+            lateral_position_m: measured(lateral),
+            height_m: measured(height),
+            core_radius_m: fitted.then(|| measured(core)),
+        }
+    }
+}
+
+/// Places of a vortex's parameters: circulation, lateral position, height, core.
+fn places(side: Side) -> [usize; 4] {
+    use Parameter as P;
+    let of = match side {
+        Side::Left => [P::LeftCirculation, P::LeftLateral, P::LeftHeight, P::LeftCore],
+        Side::Right => [P::RightCirculation, P::RightLateral, P::RightHeight, P::RightCore],
+    };
+    of.map(|parameter| parameter as usize)
+}
+
+/// Whether a circulation is positive beyond doubt, or kept.
+fn certain(end: &End, side: Side, covariance: &Array2<f64>) -> bool {
+    let place = places(side)[0];
+    let free = end.groups.iter().any(|group| group.contains(&place));
+    !free || end.wake.to_array()[place] > LEAST_SIGMAS * covariance[[place, place]].sqrt()
+}
+
+/// Variance of a fit with that loss over that of least squares, for normal residuals.
+fn inflation(loss: Loss) -> f64 {
+    let (mut squares, mut curvature, mut sum) = (0.0, 0.0, 0.0);
+    for i in -800..=800 {
+        let r = 0.01 * f64::from(i);
+        let density = (-0.5 * r * r).exp();
+        let (_, weight, second) = loss.at(r);
+        sum += density;
+        squares += density * (weight * r).powi(2);
+        curvature += density * second;
+    }
+    squares * sum / (curvature * curvature)
+}

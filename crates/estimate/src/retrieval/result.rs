@@ -1,0 +1,141 @@
+//! What a retrieval finds in one scan: none, one or two vortices with their errors, and what to think of them.
+
+use ndarray::Array2;
+
+use crate::vortex_fit::Wake;
+
+/// A number with its standard deviation; NaN where that is not known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// The value.
+    pub value: f64,
+    /// Its standard deviation, in the same unit.
+    pub std: f64,
+}
+
+/// Which of the two vortices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// The one at smaller y, clockwise.
+    Left,
+    /// The one at larger y, anticlockwise.
+    Right,
+}
+
+/// One vortex of a scan, where it is when the line through its core is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VortexResult {
+    /// Which one.
+    pub side: Side,
+    /// Time of the core's line \[s\], of the origin of the map's times; NaN if they are unknown.
+    pub time_s: f64,
+    /// Circulation \[m^2/s\].
+    pub circulation_m2_s: Measured,
+    /// Its mean over radii of 5 to 15 m \[m^2/s\].
+    pub circulation_5_15_m2_s: Measured,
+    /// Lateral coordinate of the centre \[m\].
+    pub lateral_position_m: Measured,
+    /// Height of the centre \[m\].
+    pub height_m: Measured,
+    /// Core radius \[m\]; nothing if it was not fitted.
+    pub core_radius_m: Option<Measured>,
+}
+
+/// What to think of a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Flag {
+    /// No wake was found.
+    NoWake,
+    /// One vortex only is in view.
+    OneVortex,
+    /// The core radius is not of this scan.
+    CoreKept,
+    /// A vortex is so near the end of the sector that one of its sides is not seen.
+    AtEdge,
+    /// A vortex is lower than half the spacing, where the ground makes secondary vortices.
+    NearGround,
+    /// The vortices were taken as standing still although the scan lasted, or its times are unknown.
+    MotionIgnored,
+    /// Another wake is within 9 of the least chi-square.
+    Ambiguous,
+    /// Residuals are larger than stated: chi-square per degree above 2 after robust scaling.
+    PoorFit,
+    /// More than 10 % of the velocities are outliers.
+    Outliers,
+    /// The map was thinned, as whitening takes 3000 velocities at most.
+    Thinned,
+}
+
+impl Flag {
+    /// The name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoWake => "no_wake",
+            Self::OneVortex => "one_vortex",
+            Self::CoreKept => "core_kept",
+            Self::AtEdge => "at_edge",
+            Self::NearGround => "near_ground",
+            Self::MotionIgnored => "motion_ignored",
+            Self::Ambiguous => "ambiguous",
+            Self::PoorFit => "poor_fit",
+            Self::Outliers => "outliers",
+            Self::Thinned => "thinned",
+        }
+    }
+}
+
+/// An end of the fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Top {
+    /// The wake there, at the reference time.
+    pub wake: Wake,
+    /// Its chi-square: twice the cost of the loss.
+    pub chi2: f64,
+}
+
+/// Outcome of a retrieval from one scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanResult {
+    /// The vortices, left before right; none if there is no wake.
+    pub vortices: Vec<VortexResult>,
+    /// The fitted wake at the reference time; a vortex that is not there has no circulation. Nothing without a wake.
+    pub wake: Option<Wake>,
+    /// Reference time \[s\]: the middle of the scan. NaN if times are unknown.
+    pub reference_time_s: f64,
+    /// Covariance \[10, 10\] of the wake at the reference time, in the order of [`Parameter`](crate::vortex_fit::Parameter).
+    pub covariance: Array2<f64>,
+    /// Lateral wind at the ground \[m/s\].
+    pub lateral_wind_m_s: Measured,
+    /// Its change with height \[1/s\].
+    pub wind_shear_per_s: Measured,
+    /// Sum of squares of the residuals of used velocities over the stated deviations, per degree of freedom; 1 by construction if
+    /// none were stated.
+    pub chi2_per_dof: f64,
+    /// Velocities used.
+    pub cells_used: usize,
+    /// Velocities with a residual beyond 4 of its deviations.
+    pub cells_rejected: usize,
+    /// Least chi-square of the wind alone minus the least one of wind and wake.
+    pub statistic: f64,
+    /// The least statistic that was asked for.
+    pub threshold: f64,
+    /// What to think of the result, in the order of [`Flag`].
+    pub flags: Vec<Flag>,
+    /// All ends of the fit that are not the same, the best first.
+    pub tops: Vec<Top>,
+}
+
+impl ScanResult {
+    /// Whether a flag is set.
+    #[must_use]
+    pub fn has(&self, flag: Flag) -> bool {
+        self.flags.contains(&flag)
+    }
+
+    /// The vortex of that side, if there is one.
+    #[must_use]
+    pub fn vortex(&self, side: Side) -> Option<&VortexResult> {
+        self.vortices.iter().find(|vortex| vortex.side == side)
+    }
+}

@@ -1,0 +1,56 @@
+//! One scan's map of radial velocities as any instrument gives it: a polar grid with holes.
+//!
+//! Check: impossible maps are refused with the field's name.
+
+use ndarray::Array2;
+
+use crate::error::{Error, finite, length, positive};
+use crate::vortex_fit::VelocityMap;
+
+/// A map of radial velocities with the times of its lines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanMap {
+    /// Elevation of the lines \[rad\], increasing.
+    pub elevation_rad: Vec<f64>,
+    /// Time of each line \[s\], of any origin and in any order; NaN for all lines if unknown.
+    pub time_s: Vec<f64>,
+    /// Ranges of the gates \[m\], increasing.
+    pub range_m: Vec<f64>,
+    /// Radial velocities \[m/s\] \[line, gate\], positive away from the lidar; NaN where there is none.
+    pub velocity_m_s: Array2<f64>,
+    /// Their standard deviations \[m/s\], used as they are; if absent they are equal, and known from the residuals only.
+    pub sigma_m_s: Option<Array2<f64>>,
+    /// Velocities repeat after this width \[m/s\] (lambda F_s / 2, or the band): residuals are taken modulo it.
+    pub fold_m_s: Option<f64>,
+}
+
+impl ScanMap {
+    /// Checks shapes, axes and numbers, and counts the velocities.
+    ///
+    /// # Errors
+    /// [`Error::Length`], [`Error::OutOfRange`] with the field at fault.
+    pub fn validate(&self) -> Result<usize, Error> {
+        let found = self.view().validate()?;
+        length("time_s", self.elevation_rad.len(), self.time_s.len())?;
+        if self.has_times() {
+            self.time_s.iter().try_for_each(|time| finite("time_s", *time))?;
+        }
+        self.fold_m_s.map_or(Ok(()), |fold| positive("fold_m_s", fold))?;
+        Ok(found)
+    }
+
+    /// Whether the lines have times.
+    pub(crate) fn has_times(&self) -> bool {
+        self.time_s.iter().any(|time| time.is_finite())
+    }
+
+    /// The map for the fits that know no times.
+    pub(crate) fn view(&self) -> VelocityMap<'_> {
+        VelocityMap {
+            elevation_rad: &self.elevation_rad,
+            range_m: &self.range_m,
+            velocity_m_s: self.velocity_m_s.view(),
+            standard_deviation_m_s: self.sigma_m_s.as_ref().map(|sigma| sigma.view()),
+        }
+    }
+}
