@@ -6,7 +6,7 @@
 
 use crate::error::Error;
 use crate::retrieval::expected::Expected;
-use crate::retrieval::hypotheses::{End, Fits, Kind, best, starts};
+use crate::retrieval::hypotheses::{End, Fits, Kind, best, rivals, starts};
 use crate::retrieval::problem::{Cell, Problem};
 use crate::retrieval::report::Report;
 use crate::retrieval::whitening::Whitening;
@@ -44,19 +44,7 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     let mut ends = Fits { problem: &problem, options }.from_starts(&starts);
     let (mut thinned, mut rejected) = (false, 0);
     if let Some(turbulence) = &options.turbulence {
-        let before = problem.cells.len();
-        reject(&mut problem, turbulence, least(&ends, before));
-        rejected = before - problem.cells.len();
-        thinned = thin(&mut problem);
-        let places = problem.cells.iter().map(|cell| {
-            let at = options.model.position_m(map.range_m[cell.gate], map.elevation_rad[cell.line]);
-            (at, cell.sigma_m_s)
-        });
-        problem.whitening = Some(Whitening::new(&places.collect::<Vec<_>>(), turbulence).ok_or(Error::Linalg {
-            what: "covariance of the velocities",
-            order: problem.cells.len(),
-            reason: "is singular to working precision: state larger deviations of the velocities",
-        })?);
+        (rejected, thinned) = whiten(&mut problem, turbulence, least(&ends, map.velocity_m_s.len()))?;
         ends = Fits { problem: &problem, options }.from_starts(&starts);
     }
     let mut scale = 1.0;
@@ -73,20 +61,39 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     }
     let fine = expected.fine(options)?;
     problem.expected = &fine;
-    let mut ends = Fits { problem: &problem, options }.again(&ends);
+    let mut ends = Fits { problem: &problem, options }.fine(&rivals(&ends, scale));
     let frozen = fine.frozen();
-    if options.movement == Movement::Auto && fine.moves() {
+    let likely = least(&ends, problem.cells.len()).filter(|_| options.movement == Movement::Auto && fine.moves());
+    if let Some(likely) = likely {
         problem.expected = &frozen;
-        let still = Fits { problem: &problem, options }.again(&ends);
-        let chi2 = |ends: &[End]| least(ends, problem.cells.len()).map_or(f64::INFINITY, |end| end.chi2);
-        if chi2(&still) < chi2(&ends) {
-            ends = still;
+        let fits = Fits { problem: &problem, options };
+        let still = fits.fine(std::slice::from_ref(likely));
+        if still.first().is_some_and(|still| still.chi2 < likely.chi2) {
+            ends = fits.fine(&ends);
         } else {
             problem.expected = &fine;
         }
     }
     let wind = Fits { problem: &problem, options }.wind(&about)?;
     Report { map, options, problem: &problem, scale, rejected, thinned, wind: &wind, ends: &ends }.result()
+}
+
+/// Makes residuals white: the velocities far off a first fit are taken away, as whitening would spread them over their neighbours, and
+/// some of too many. Tells how many were rejected, and whether there were too many.
+fn whiten(problem: &mut Problem<'_>, turbulence: &Turbulence, first: Option<&End>) -> Result<(usize, bool), Error> {
+    let before = problem.cells.len();
+    reject(problem, turbulence, first);
+    let rejected = before - problem.cells.len();
+    let thinned = thin(problem);
+    let (map, model) = (problem.expected.map, problem.expected.model);
+    let place = |cell: &Cell| (model.position_m(map.range_m[cell.gate], map.elevation_rad[cell.line]), cell.sigma_m_s);
+    let places: Vec<_> = problem.cells.iter().map(place).collect();
+    problem.whitening = Some(Whitening::new(&places, turbulence).ok_or(Error::Linalg {
+        what: "covariance of the velocities",
+        order: places.len(),
+        reason: "is singular to working precision: state larger deviations of the velocities",
+    })?);
+    Ok((rejected, thinned))
 }
 
 /// The velocities that there are.

@@ -27,8 +27,14 @@ const SAME_SIGMAS: f64 = 0.3;
 /// So near they are one even where there is no noise.
 const SAME: f64 = 1e-4;
 
+/// Where ends of rough fits are one: this part of a parameter, of 20 at least.
+const ROUGHLY: f64 = 1e-3;
+/// A rough end so much above the best of its kind competes no longer.
+const HOPELESS: f64 = 50.0;
+
 const FAR: Stop = Stop { iterations: 40, sigmas: 0.3, learns: false };
-const NEAR: Stop = Stop { iterations: 100, sigmas: 1e-4, learns: false };
+const ROUGH: Stop = Stop { iterations: 100, sigmas: 1e-2, learns: false };
+const FINE: Stop = Stop { iterations: 100, sigmas: 1e-4, learns: false };
 
 /// Which vortices there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -133,7 +139,7 @@ impl Fits<'_> {
     }
 
     fn end(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>) -> Result<End, Error> {
-        let (wake, chi2) = self.problem.minimum(start, &groups, NEAR)?;
+        let (wake, chi2) = self.problem.minimum(start, &groups, ROUGH)?;
         Ok(End { kind, wake, chi2, groups })
     }
 
@@ -207,10 +213,31 @@ impl Fits<'_> {
         ends
     }
 
-    /// The same ends for another problem, such as another scale of the loss.
-    pub(crate) fn again(&self, ends: &[End]) -> Vec<End> {
-        ends.iter().filter_map(|end| self.end(end.kind, &end.wake, end.groups.clone()).ok()).collect()
+    /// The ends for another problem, such as another scale of the loss, to the last.
+    pub(crate) fn fine(&self, ends: &[End]) -> Vec<End> {
+        let fine = |end: &End| {
+            let (wake, chi2) = self.problem.minimum(&end.wake, &end.groups, FINE).ok()?;
+            Some(End { wake, chi2, ..end.clone() })
+        };
+        ends.iter().filter_map(fine).collect()
     }
+}
+
+/// Rough ends without those that are the same or far worse than the best of their kind.
+pub(crate) fn rivals(ends: &[End], scale: f64) -> Vec<End> {
+    let mut rivals: Vec<End> = Vec::new();
+    for end in ends {
+        let same = |other: &End| {
+            let (a, b) = (end.wake.to_array(), other.wake.to_array());
+            let near = |i: usize| (a[i] - b[i]).abs() <= ROUGHLY * a[i].abs().max(20.0);
+            other.kind == end.kind && (0..PARAMETERS).all(|i| near(i) || !end.kind.has(i))
+        };
+        let hopeless = best(ends, end.kind).is_none_or(|best| end.chi2 > best.chi2 + HOPELESS * scale * scale);
+        if !hopeless && !rivals.iter().any(same) {
+            rivals.push(end.clone());
+        }
+    }
+    rivals
 }
 
 /// The best end of a kind whose circulations have the sense of an aircraft's: a left vortex the other way round is a right one.
