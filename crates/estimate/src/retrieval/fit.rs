@@ -108,7 +108,7 @@ fn cells(map: &ScanMap) -> Vec<Cell> {
 }
 
 /// Velocities that repeat are put about their median.
-fn unfolded(map: &ScanMap) -> ScanMap {
+pub(crate) fn unfolded(map: &ScanMap) -> ScanMap {
     let mut unfolded = map.clone();
     if let Some(fold) = map.fold_m_s {
         let middle = median(&mut map.velocity_m_s.iter().copied().filter(|v| v.is_finite()).collect::<Vec<f64>>());

@@ -17,6 +17,7 @@ mod scan_map;
 mod whitening;
 
 pub use fit::fit_scan;
+pub(crate) use fit::unfolded;
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use result::{Flag, Measured, ScanResult, Side, Top, VortexResult};
 pub use scan_map::ScanMap;

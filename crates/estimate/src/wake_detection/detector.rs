@@ -7,7 +7,7 @@
 //! x the velocities, made white; s what a wake of the bank shows, made white, the wind taken out, of unit length. Products with
 //! single vortices are taken once and combined to those of pairs. Check: against a direct least-squares fit; drawn scans.
 
-use ndarray::{Array1, Array2, ArrayView1, Axis};
+use ndarray::{Array1, Array2, ArrayView1, Axis, s};
 
 use crate::error::{Error, increasing, positive};
 use crate::linalg::cholesky::cholesky;
@@ -21,6 +21,9 @@ use crate::wake_detection::cells::Cells;
 const NEEDED: usize = 100;
 /// Of the variance of a product with a place: keeps the covariance of all of them regular, and changes nothing else.
 const REGULAR: f64 = 1e-9;
+
+/// What is nearer to a vortex than this \[m\] is not taken for background.
+const WAKE_M: f64 = 25.0;
 
 /// What a test takes for granted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,6 +74,9 @@ pub struct WakeStatistic {
     pub wake: Wake,
     /// Standard deviation of its circulation \[m^2/s\], were its place known.
     pub circulation_std_m2_s: f64,
+    /// Correlation of what is left with the next gate and with the next line, made white and away from that wake: near 0 if the
+    /// background is the one that the test was told.
+    pub neighbour_correlation: (f64, f64),
 }
 
 impl WakeDetector {
@@ -126,13 +132,40 @@ impl WakeDetector {
         let rest = white.dot(&white);
         let dof = |fitted: usize| (self.cells.cells.len() - self.wind.ncols() - fitted) as f64;
         let length = self.reciprocal_length[best];
+        let template = &self.bank.templates[best];
+        let mut left = white;
+        for (place, sense) in [(template.left, -1.0), (template.right, 1.0)] {
+            let Some(place) = place else { continue };
+            left.scaled_add(-sense * value.sqrt() * length, &self.shapes.row(place));
+        }
         Ok(WakeStatistic {
             value,
+            neighbour_correlation: self.neighbour_correlation(&left, template),
             wind_chi2_per_dof: rest / dof(0),
             wake_chi2_per_dof: (rest - value) / dof(4),
-            wake: self.wake(&self.bank.templates[best], value.sqrt() * length),
+            wake: self.wake(template, value.sqrt() * length),
             circulation_std_m2_s: length,
         })
+    }
+
+    /// Correlation of white numbers by cell with those of the next gate and the next line, far from a wake.
+    fn neighbour_correlation(&self, numbers: &Array1<f64>, template: &Template) -> (f64, f64) {
+        let mut grid = Array2::from_elem((self.cells.elevation_rad.len(), self.cells.range_m.len()), f64::NAN);
+        let far = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1) > WAKE_M;
+        for (cell, number) in self.cells.cells.iter().zip(numbers) {
+            let centres = [template.left, template.right].into_iter().flatten();
+            if centres.map(|place| self.bank.places_m[place]).all(|centre| far(centre, cell.place_m)) {
+                grid[[cell.line, cell.gate]] = *number;
+            }
+        }
+        let mean = |products: ndarray::Array2<f64>| {
+            let (sum, count) = products.iter().filter(|x| x.is_finite()).fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
+            sum / count
+        };
+        let power = mean(&grid * &grid);
+        let along = mean(&grid.slice(s![.., 1..]) * &grid.slice(s![.., ..-1])) / power;
+        let across = mean(&grid.slice(s![1.., ..]) * &grid.slice(s![..-1, ..])) / power;
+        (along, across)
     }
 
     /// Numbers by cell, made white, without what wind explains.

@@ -115,7 +115,12 @@ impl Case {
                     velocity[*at] = wind + self.deviation[*at] * noise[[cell, scan]] + air;
                 }
                 for (found, test) in found.iter_mut().zip(tests) {
-                    found.push(test.statistic(velocity.view()).unwrap().value);
+                    let statistic = test.statistic(velocity.view()).unwrap();
+                    found.push(statistic.value);
+                    if std::ptr::eq(test, &tests[0]) {
+                        let (along, across) = statistic.neighbour_correlation;
+                        assert!(along.abs() < 0.25 && across.abs() < 0.25, "{along} {across}");
+                    }
                 }
             }
         }
