@@ -55,6 +55,7 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         lidar_y_m: -400.0,
         lidar_height_m: 2.0,
         site: Site::default(),
+        is_simulated: true,
     };
     let exact = Array2::from_shape_fn((map.rays.len(), gates), |(r, g)| {
         let (v, w) = wind(map.y_m(r, g), map.z_m(r, g), map.sweeps[map.rays[r].sweep].tau);

@@ -6,6 +6,7 @@
 mod accuracy;
 mod bound;
 mod budget;
+mod estimate;
 mod flow;
 mod output;
 mod progress;
@@ -69,6 +70,8 @@ enum Command {
     Signal(Io),
     /// The radial-velocity map with its errors.
     Map(Io),
+    /// Velocities from raw signals of a file, simulated or measured, through the estimator of a scene.
+    Estimate(estimate::EstimateWords),
     /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
     Bound(bound::BoundWords),
     /// The power budget in dB, from the energy of a pulse to the signal-to-noise ratio, with what bounds the instrument.
@@ -138,6 +141,7 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
+        Command::Estimate(words) => estimate::estimate(words, cli),
         Command::Bound(words) => bound::bound(words, cli),
         Command::Budget(words) => budget::budget(words, cli),
         Command::Sweep(words) => sweep::sweep(words, cli),

@@ -59,22 +59,28 @@ fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
     })
 }
 
+const SIMULATED: &str = "Simulated measurement: date, latitude and longitude are those of the scene, or synthetic; velocity is positive \
+                         away from the lidar";
+const MEASURED: &str = "Estimated from recorded signals: date, latitude and longitude are those of the scene, or synthetic; velocity \
+                        is positive away from the lidar";
+
 fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, String)> {
+    let (institution, comment, simulated) = match map.is_simulated {
+        true => ("simulation, no institution", SIMULATED, "true"),
+        false => ("", MEASURED, "false"),
+    };
     let fixed = [
         ("Conventions", "CF-1.7 CF/Radial instrument_parameters"),
         ("version", "1.4"),
-        ("institution", "simulation, no institution"),
+        ("institution", institution),
         ("references", "CfRadial data file format, version 1.4, NCAR (2016)"),
-        (
-            "comment",
-            "Simulated measurement: date, latitude and longitude are those of the scene, or synthetic; velocity is positive away from the lidar",
-        ),
+        ("comment", comment),
         ("instrument_name", "wakescope lidar"),
         ("scan_name", "rhi"),
         ("platform_is_mobile", "false"),
         ("n_gates_vary", "false"),
         ("ray_times_increase", "true"),
-        ("simulated", "true"),
+        ("simulated", simulated),
     ];
     let made = [
         ("title", map.title.clone()),
@@ -139,7 +145,7 @@ fn sweeps(map: &VelocityMap) -> Vec<Variable> {
     let bounds = map.sweep_bounds();
     let ints = |values: &mut dyn Iterator<Item = usize>| Data::I32(values.map(|v| v as i32).collect());
     let floats = |get: fn(&super::map::Sweep) -> f64| Data::F32(map.sweeps.iter().map(|s| get(s) as f32).collect());
-    vec![
+    let mut out = vec![
         Variable::new("volume_number", &[], Data::I32(vec![0])).text("long_name", "volume number"),
         Variable::new("sweep_number", &["sweep"], ints(&mut (0..bounds.len())))
             .text("long_name", "sweep number, from 0"),
@@ -150,10 +156,16 @@ fn sweeps(map: &VelocityMap) -> Vec<Variable> {
             .text("long_name", "index of the first ray of the sweep"),
         Variable::new("sweep_end_ray_index", &["sweep"], ints(&mut bounds.iter().map(|b| b.1)))
             .text("long_name", "index of the last ray of the sweep, inclusive"),
-        Variable::new("wake_age", &["sweep"], floats(|s| s.tau))
-            .text("long_name", "age of the wake, t Gamma0 / (2 pi b0^2)")
-            .text("units", "1"),
-    ]
+    ];
+    // Nobody knows the age of a measured wake.
+    if map.sweeps.iter().all(|sweep| sweep.tau.is_finite()) {
+        out.push(
+            Variable::new("wake_age", &["sweep"], floats(|s| s.tau))
+                .text("long_name", "age of the wake, t Gamma0 / (2 pi b0^2)")
+                .text("units", "1"),
+        );
+    }
+    out
 }
 
 fn texts(map: &VelocityMap) -> Vec<Variable> {

@@ -195,6 +195,8 @@ pub struct VelocityMap {
     pub lidar_height_m: f64,
     /// Place and date.
     pub site: Site,
+    /// Whether the signals were simulated.
+    pub is_simulated: bool,
 }
 
 impl VelocityMap {

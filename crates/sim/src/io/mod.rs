@@ -12,12 +12,14 @@
 //! | [`own`] | which files this program wrote, so that no other is replaced | - |
 //! | [`csv`] | any table | - |
 //! | [`csv_input`] | (reader) tables of texts | - |
+//! | [`raw`], [`number`] | (readers) raw signals in NetCDF, NPY, NPZ, tables and binary files | - |
+//! | [`scans`] | (readers) scans of radial velocity: CfRadial, `.hpl`, tables | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
 //! | `text_file`, `netcdf_header`, `netcdf_input`, `planes_input` | (readers) texts, classic NetCDF, cross-planes in it | `netcdf` but for texts |
 //! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
-//! | `cfradial`, `cf_planes`, `cf_fields` (through `netcdf`) | classic NetCDF | `netcdf` |
+//! | `cfradial`, `cf_planes`, `cf_fields`, `cf_signals`, `cf_spectra` (through `netcdf`) | classic NetCDF | `netcdf` |
 //! | `vtr` | VTK rectilinear grids and their collection | `vtk` |
 
 pub mod atomic;
@@ -36,6 +38,8 @@ pub mod cf_planes;
 #[cfg(feature = "netcdf")]
 pub mod cf_signals;
 #[cfg(feature = "netcdf")]
+pub mod cf_spectra;
+#[cfg(feature = "netcdf")]
 pub mod cfradial;
 pub mod csv;
 pub mod csv_input;
@@ -48,8 +52,11 @@ pub(crate) mod lock;
 pub mod map;
 #[cfg(feature = "netcdf")]
 pub(crate) mod netcdf;
+pub mod number;
 pub mod own;
 pub mod provenance;
+pub mod raw;
+pub mod scans;
 pub mod signals;
 pub mod site;
 pub mod tables;

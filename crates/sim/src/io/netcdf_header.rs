@@ -3,6 +3,8 @@
 //!
 //! Nothing of the file is repeated in a message. Check: each word of a good header is replaced by large and negative counts.
 
+use crate::io::number::NumberType;
+
 /// A variable of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Variable {
@@ -27,70 +29,13 @@ pub(crate) enum Attribute {
     Number(f64),
 }
 
-/// How a number is stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum NumberType {
-    I8,
-    Text,
-    I16,
-    I32,
-    F32,
-    F64,
-    U8,
-    U16,
-    U32,
-    I64,
-    U64,
-}
-
-impl NumberType {
-    fn of_code(code: u32) -> Option<Self> {
-        const ALL: [NumberType; 11] = [
-            NumberType::I8,
-            NumberType::Text,
-            NumberType::I16,
-            NumberType::I32,
-            NumberType::F32,
-            NumberType::F64,
-            NumberType::U8,
-            NumberType::U16,
-            NumberType::U32,
-            NumberType::I64,
-            NumberType::U64,
-        ];
-        ALL.get(usize::try_from(code).ok()?.checked_sub(1)?).copied()
-    }
-
-    /// Bytes of one number.
-    pub(crate) fn bytes(self) -> u64 {
-        match self {
-            Self::I8 | Self::U8 | Self::Text => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 | Self::I64 | Self::U64 => 8,
-        }
-    }
-
-    /// A number from its bytes, the first one highest.
-    pub(crate) fn value(self, bytes: &[u8]) -> f64 {
-        let bits = bytes.iter().fold(0_u64, |bits, byte| bits << 8 | u64::from(*byte));
-        match self {
-            Self::I8 => f64::from(bits as u8 as i8),
-            Self::I16 => f64::from(bits as u16 as i16),
-            Self::I32 => f64::from(bits as u32 as i32),
-            Self::I64 => bits as i64 as f64,
-            Self::F32 => f64::from(f32::from_bits(bits as u32)),
-            Self::F64 => f64::from_bits(bits),
-            Self::U8 | Self::U16 | Self::U32 | Self::U64 | Self::Text => bits as f64,
-        }
-    }
-}
-
 /// What the file holds.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Header {
     /// Names and lengths of the dimensions.
     pub(crate) dims: Vec<(String, u64)>,
+    /// Attributes of the file itself.
+    pub(crate) attributes: Vec<(String, Attribute)>,
     pub(crate) variables: Vec<Variable>,
     /// Bytes from one record to the next.
     pub(crate) record_bytes: u64,
@@ -127,7 +72,7 @@ pub(crate) fn read(beginning: &[u8], length: u64) -> Result<Header, Refused> {
     for _ in 0..words.list(0x0A)? {
         header.dims.push((words.name()?, words.count()?));
     }
-    words.attributes()?;
+    header.attributes = words.attributes()?;
     for _ in 0..words.list(0x0B)? {
         header.variables.push(words.variable(&header.dims)?);
     }
@@ -137,7 +82,7 @@ pub(crate) fn read(beginning: &[u8], length: u64) -> Result<Header, Refused> {
 
 /// Finds lengths and places of all values and holds them against the length of the file.
 fn lay_out(header: &mut Header, records: Option<u64>, length: u64) -> Result<(), Refused> {
-    let Header { dims, variables, record_bytes } = header;
+    let Header { dims, variables, record_bytes, .. } = header;
     let grows = |v: &Variable| v.dims.first().is_some_and(|dim| dims[*dim].1 == 0);
     let growing: Vec<bool> = variables.iter().map(grows).collect();
     for (variable, grows) in variables.iter_mut().zip(&growing) {
@@ -257,7 +202,7 @@ impl<'a> Words<'a> {
     }
 
     fn number_type(&mut self) -> Result<NumberType, Refused> {
-        u32::try_from(self.word(4)?).ok().and_then(NumberType::of_code).ok_or(BROKEN)
+        u32::try_from(self.word(4)?).ok().and_then(NumberType::of_netcdf).ok_or(BROKEN)
     }
 
     fn variable(&mut self, dims: &[(String, u64)]) -> Result<Variable, Refused> {

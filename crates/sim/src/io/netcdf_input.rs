@@ -4,7 +4,8 @@
 //! unpacked (`scale_factor`, `add_offset`), missing ones are NaN. Check: the readers of initial fields and of cross-planes read
 //! back what the writers wrote; files of another hand and damaged ones in the tests below.
 
-use crate::io::netcdf_header::{self as header, Attribute, Header, NumberType, Variable};
+use crate::io::netcdf_header::{self as header, Attribute, Header, Variable};
+use crate::io::number::NumberType;
 use crate::{Error, io::text_file};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -44,6 +45,15 @@ pub(crate) struct ClassicFile {
     header: Header,
 }
 
+/// Where the numbers of a variable are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NumbersInFile {
+    pub(crate) number: NumberType,
+    pub(crate) begin: u64,
+    /// Bytes from one record of the file to the next, where the variable grows with them.
+    pub(crate) stride: Option<u64>,
+}
+
 /// Opens a classic NetCDF file and reads its header.
 ///
 /// # Errors
@@ -71,6 +81,43 @@ impl ClassicFile {
     /// Whether it has a variable of this name.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.variable(name).is_some()
+    }
+
+    /// Names of all variables.
+    pub(crate) fn names(&self) -> Vec<String> {
+        self.header.variables.iter().map(|variable| variable.name.clone()).collect()
+    }
+
+    /// Lengths of the dimensions of a variable, slowest first.
+    pub(crate) fn shape(&self, name: &str) -> Option<Vec<u64>> {
+        Some(self.variable(name)?.dims.iter().map(|dim| self.header.dims[*dim].1).collect())
+    }
+
+    /// Where the numbers of a variable are.
+    pub(crate) fn layout(&self, name: &str) -> Option<NumbersInFile> {
+        let variable = self.variable(name)?;
+        let stride = (variable.runs != 1).then_some(self.header.record_bytes);
+        Some(NumbersInFile { number: variable.number, begin: variable.begin, stride })
+    }
+
+    /// The numbers that stand for a missing one, and factor and offset of the others.
+    pub(crate) fn packing(&self, name: &str) -> (Vec<f64>, f64, f64) {
+        let fills = ["_FillValue", "missing_value"].iter().filter_map(|fill| self.number(name, fill)).collect();
+        let scale = self.number(name, "scale_factor").unwrap_or(1.0);
+        (fills, scale, self.number(name, "add_offset").unwrap_or(0.0))
+    }
+
+    /// A text attribute of the file.
+    pub(crate) fn global_text(&self, name: &str) -> Option<&str> {
+        self.header.attributes.iter().find(|(own, _)| own == name).and_then(|(_, value)| match value {
+            Attribute::Text(text) => Some(text.as_str()),
+            Attribute::Number(_) => None,
+        })
+    }
+
+    /// The open file, for who reads places of it.
+    pub(crate) fn handle(&self) -> std::io::Result<File> {
+        self.file.try_clone()
     }
 
     /// Names of the dimensions of a variable, slowest first; none if there is no such variable.

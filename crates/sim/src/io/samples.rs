@@ -85,6 +85,7 @@ pub(crate) fn map() -> VelocityMap {
         lidar_y_m: -150.0,
         lidar_height_m: 2.0,
         site: Site::default(),
+        is_simulated: true,
     }
 }
 

@@ -71,6 +71,11 @@ impl UtcTime {
             .then_some(Self { since_1970_s: days * DAY + h * 3600 + m * 60 + s })
     }
 
+    /// Seconds from an earlier date to this one.
+    pub fn seconds_since(self, earlier: Self) -> f64 {
+        (self.since_1970_s - earlier.since_1970_s) as f64
+    }
+
     /// The second in which the time `seconds` later lies.
     #[must_use]
     pub fn after_s(self, seconds: f64) -> Self {

@@ -63,7 +63,7 @@ impl Setting {
             (estimators::sampling(scene)?, estimators::gates(scene)?, scene.scan.pulses_per_line);
         let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
         let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
-        let radius = region_radius(scene, scanner, &places, &correlation)?;
+        let radius = region_radius(scene, &plan.instrument.pulse, &scanner.layer_snr(), &places, &correlation)?;
         let elevation_rad = g.elevation_rad[g.elevation_rad.len() / 2];
         Ok(Self { model, kind: estimators::signal_kind(scene), places, correlation, radius, elevation_rad })
     }

@@ -1,16 +1,15 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
 use crate::Error;
-use crate::measure::estimators::{self, Toolkit, WindowStatistics};
+use crate::measure::estimators;
+use crate::measure::map_estimator::{self, MapEstimator, NoiseAtPoints};
 use crate::measure::progress::Observer;
-use crate::measure::region::{interpolated, region_radius};
 use crate::measure::scan::{Scanner, radial_velocity_m_s};
 use crate::plan::{Plan, Stage};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use wakescope_estimate::{
-    GateVelocity, Gates, Radius, Sampling, Scan, Statistic,
-    estimators::NoiseTest,
-    map::{ErrorMap, MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCorrelation},
+    Scan, Statistic,
+    map::{ErrorMap, MapPoint, PolarPoint, ScanGeometry, ScanSums},
     polar_points,
     window::Sample,
 };
@@ -95,21 +94,13 @@ impl Figures {
 
 /// Accumulates the errors of realisation after realisation.
 pub(crate) struct Mapper<S> {
-    sampling: Sampling,
-    gates: Gates,
+    estimator: MapEstimator<S>,
+    places: ScanGeometry,
     points: Vec<PolarPoint>,
     shape: (usize, usize),
-    places: ScanGeometry,
-    record_samples: usize,
     /// Real numbers that the converter sees in one realisation.
     samples_of_realisation: f64,
-    tools: Toolkit<S>,
-    correlation: WindowCorrelation,
-    radius: Radius,
-    /// Density in the band, A^2, that noise exceeds with the probability of the scene, for each point; none without a test.
-    threshold: Option<Vec<f64>>,
-    /// Standard deviation of the power ratio of noise, for each point.
-    deviation: Vec<f64>,
+    noise: NoiseAtPoints,
     truth: Truth,
     first_m_s: Array2<f64>,
     errors: ErrorMap<ndarray::Ix2>,
@@ -121,94 +112,28 @@ pub(crate) struct Mapper<S> {
     realisations: usize,
 }
 
-/// What noise alone gives at each point of a map.
-struct NoiseLevels<'a> {
-    test: &'a NoiseTest,
-    /// Density of the noise, A^2.
-    density_a2: f64,
-    /// Independent windows of noise at each point.
-    n_eff: Vec<f64>,
-}
-
-impl<'a> NoiseLevels<'a> {
-    fn new(
-        test: &'a NoiseTest,
-        noise: &GateVelocity,
-        places: &ScanGeometry,
-        points: &[PolarPoint],
-        radius: &Radius,
-    ) -> Result<Self, Error> {
-        let of = |point: &PolarPoint| Ok(places.level(*point, radius.at_m(point.range_m)?, test.correlation()).1);
-        Ok(Self { test, density_a2: noise.detection, n_eff: points.iter().map(of).collect::<Result<_, Error>>()? })
-    }
-
-    /// Densities, A^2, that noise exceeds with probability `rate`; NaN where there is no window.
-    fn thresholds(&self, rate: f64) -> Result<Vec<f64>, Error> {
-        // Many points share their number of windows; a thousandth of it changes nothing.
-        let mut known = std::collections::HashMap::new();
-        let mut of = |n_eff: f64| -> Result<f64, Error> {
-            let step = (1e3 * n_eff.ln()).round();
-            if n_eff.is_nan() || n_eff <= 0.0 {
-                return Ok(f64::NAN);
-            }
-            match known.entry(step as i64) {
-                std::collections::hash_map::Entry::Occupied(level) => Ok(*level.get()),
-                std::collections::hash_map::Entry::Vacant(place) => {
-                    Ok(*place.insert(self.density_a2 * self.test.threshold((1e-3 * step).exp(), rate)?))
-                }
-            }
-        };
-        self.n_eff.iter().map(|n_eff| of(*n_eff)).collect()
-    }
-
-    /// Standard deviations of the power in the band over its mean.
-    fn deviations(&self) -> Vec<f64> {
-        self.n_eff.iter().map(|n_eff| self.test.band_deviation(*n_eff)).collect()
-    }
-}
-
 struct Truth {
     exact_m_s: Array2<f64>,
     pulse_m_s: Array2<f64>,
     gate_m_s: Array2<f64>,
 }
 
-impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
+impl<S: Sample> Mapper<S> {
     pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let pulses = scene.scan.pulses_per_line;
-        let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
         let places = ScanGeometry::regular(&sampling, &gates, &g.elevation_rad, pulses, g.samples)?;
-        let radius = region_radius(scene, scanner, &places, &correlation)?;
-        let middle = PolarPoint {
-            range_m: g.gate_range_m[g.gate_range_m.len() / 2],
-            elevation_rad: g.elevation_rad[g.elevation_rad.len() / 2],
-        };
-        let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
-        let known = WindowStatistics { snr: scanner.mean_snr(), n_eff };
+        let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
         let points = polar_points(&g.elevation_rad, &g.gate_range_m);
-        let tools = Toolkit::new(scene, &plan.instrument, &known)?;
-        let noise = match (&tools.test, &tools.noise) {
-            (Some(test), Some(noise)) => Some(NoiseLevels::new(test, noise, &places, &points, &radius)?),
-            _ => None,
-        };
-        let rate = scene.estimator.false_alarm;
-        let threshold = noise.as_ref().filter(|_| rate > 0.0).map(|levels| levels.thresholds(rate)).transpose()?;
         Ok(Self {
-            sampling,
-            gates,
-            deviation: noise.map_or_else(|| vec![0.0; points.len()], |levels| levels.deviations()),
+            noise: estimator.noise(&places, &points)?,
+            estimator,
+            places,
             points,
             shape,
-            places,
-            record_samples: g.samples,
             samples_of_realisation: (scanner.pulses() * g.samples * S::KIND.lag_numbers(1)) as f64,
-            tools,
-            correlation,
-            radius,
-            threshold,
             truth: truth(plan, scanner)?,
             first_m_s: Array2::from_elem(shape, f64::NAN),
             errors: ErrorMap::new(ndarray::Dim(shape)),
@@ -221,28 +146,14 @@ impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
         })
     }
 
-    /// Estimates the velocities of one realisation.
-    fn map(&self, scan: &Scan) -> Result<Vec<MapPoint>, Error> {
-        let Toolkit { estimator, following, .. } = &self.tools;
-        let first = scan.map(&self.points, &self.radius, Some(&self.correlation), &**estimator)?;
-        let Some(following) = following else { return Ok(first) };
-        let velocity_m_s =
-            Array2::from_shape_fn(self.shape, |(i, j)| first[i * self.shape.1 + j].estimate.velocity_m_s);
-        let guess = interpolated(&self.points, velocity_m_s);
-        let mut second =
-            scan.map_following(&self.points, &self.radius, S::KIND, &self.sampling, &guess, &**following)?;
-        second.iter_mut().zip(&first).for_each(|(point, first)| point.n_eff = first.n_eff);
-        Ok(second)
-    }
-
     /// The sums of a realisation, still without any record.
     fn sums(&self) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
-        Ok(ScanSums::new(&*self.tools.statistic, &self.gates, self.places.clone(), self.record_samples)?)
+        self.estimator.sums(self.places.clone())
     }
 
     /// Estimates the velocities of one realisation and adds their errors; returns the velocities, m/s.
     pub(crate) fn add(&mut self, scan: &Scan, clipped: Clipped) -> Result<Array2<f64>, Error> {
-        let map = self.map(scan)?;
+        let map = self.estimator.map(scan, &self.points)?;
         let columns = self.shape.1;
         let velocity = Array2::from_shape_fn(self.shape, |(i, j)| map[i * columns + j].estimate.velocity_m_s);
         self.errors.add(velocity.view(), self.truth.pulse_m_s.view())?;
@@ -252,11 +163,7 @@ impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
         }
         for (index, point) in map.iter().enumerate() {
             let place = (index / columns, index % columns);
-            let is_flagged = match &self.threshold {
-                Some(threshold) => !point.estimate.exceeds(threshold[index]),
-                None => !point.estimate.is_good(),
-            };
-            self.figures.add(place, point, is_flagged);
+            self.figures.add(place, point, self.noise.flags(index, &point.estimate));
             // The level is the same for all realisations: a matter of geometry.
             (self.level[place], self.n_eff[place]) = (point.level as f64, point.n_eff);
         }
@@ -270,10 +177,10 @@ impl<S: Sample + wakescope_signal::scan::Sample> Mapper<S> {
         let statistics = self.errors.statistics();
         let bias_m_s = statistics.mapv(|s| s.bias_m_s);
         let [width_m_s, power_a2, quality] = self.figures.means();
-        let mut snr_db = power_a2 / self.tools.noise.map_or(f64::NAN, |noise| noise.power) - 1.0;
-        for ((place, snr), deviation) in snr_db.indexed_iter_mut().zip(&self.deviation) {
-            let seen = *snr > 2.0 * deviation / self.figures.count[place].sqrt();
-            *snr = if seen { 10.0 * snr.log10() } else { f64::NAN };
+        let noise_a2 = self.estimator.noise_power_a2();
+        let mut snr_db = power_a2;
+        for (index, (place, power)) in snr_db.indexed_iter_mut().enumerate() {
+            *power = map_estimator::snr_db(*power / noise_a2, self.noise.deviation(index), self.figures.count[place]);
         }
         VelocityEstimates {
             elevation_rad: plan.geometry.elevation_rad.clone(),
@@ -358,4 +265,23 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::scan::Sample>(
     }
     observer.end();
     Ok(mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan)).collect())
+}
+
+/// What takes the records of pulses from a number on.
+pub(crate) type AddRecords<'a, S> = &'a mut dyn FnMut(usize, ArrayView2<'_, S>) -> Result<(), Error>;
+
+/// The estimates of a plan from records that `read` hands over for each realisation, piece after piece.
+pub(crate) fn of_records<S: Sample>(
+    plan: &Plan,
+    scanner: &Scanner<'_>,
+    mut read: impl FnMut(usize, AddRecords<'_, S>) -> Result<(), Error>,
+) -> Result<VelocityEstimates, Error> {
+    let mut mapper = Mapper::<S>::new(plan, scanner)?;
+    for realisation in 0..plan.realisations() {
+        let mut sums = mapper.sums()?;
+        read(realisation, &mut |first, records| Ok(sums.add(first, records)?))?;
+        let scan = sums.finish();
+        mapper.add(&scan, Clipped::default())?;
+    }
+    Ok(mapper.finish(plan))
 }

@@ -8,7 +8,8 @@
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | `efficiencies` | efficiency curves that several scans share |
 //! | [`scan`] | air along the lines of sight, and their records |
-//! | [`map`], [`cell_average`] | estimates and their errors against the truth |
+//! | [`map`], `map_estimator`, [`cell_average`] | estimates and their errors against the truth |
+//! | [`recorded`] | the same from the records of a file, measured or simulated |
 //! | [`mod@bound`] | the Cramer-Rao bound for a scene |
 //! | [`budget`] | the power budget, from the pulse to the signal-to-noise ratio |
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
@@ -22,9 +23,11 @@ pub mod estimators;
 pub mod geometry;
 pub mod instrument;
 pub mod map;
+pub(crate) mod map_estimator;
 pub(crate) mod plane;
 pub mod profile;
 pub mod progress;
+pub mod recorded;
 pub(crate) mod region;
 pub mod run;
 pub mod scan;

@@ -2,7 +2,6 @@
 //!
 //! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
 
-use crate::measure::scan::Scanner;
 use crate::scene::{Method, NoiseKind, RegionRadius, Scene};
 use crate::{Error, measure::estimators};
 use ndarray::Array2;
@@ -10,17 +9,19 @@ use wakescope_estimate::{
     Radius,
     map::{PolarPoint, ScanGeometry, WindowCorrelation},
 };
+use wakescope_signal::Pulse;
 
 /// Signal-to-noise ratio that stands for no noise where a bound is asked for.
 const NO_NOISE_SNR: f64 = 1e6;
 
-/// The radius of a scene's regions.
+/// The radius of a scene's regions; `layer_snr` holds range, m, and expected signal-to-noise ratio of the layers of a line.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn region_radius(
     scene: &Scene,
-    scanner: &Scanner<'_>,
+    pulse: &Pulse,
+    layer_snr: &[(f64, f64)],
     geometry: &ScanGeometry,
     correlation: &WindowCorrelation,
 ) -> Result<Radius, Error> {
@@ -33,7 +34,7 @@ pub(crate) fn region_radius(
             Ok(Radius::OfRange(Box::new(move |at_m| of_table(&range_m, &radius_m, at_m))))
         }
         RegionRadius::Target { standard_deviation_m_s, largest_m } => {
-            let (range_m, bound_m_s) = bound_by_range(scene, scanner, geometry)?;
+            let (range_m, bound_m_s) = bound_by_range(scene, pulse, layer_snr, geometry)?;
             let single_m_s = |at_m: f64| of_table(&range_m, &bound_m_s, at_m);
             Ok(Radius::for_standard_deviation(geometry, correlation, single_m_s, *standard_deviation_m_s, *largest_m)?)
         }
@@ -43,16 +44,17 @@ pub(crate) fn region_radius(
 /// The bound of one window at ranges along the lines, m and m/s.
 fn bound_by_range(
     scene: &Scene,
-    scanner: &Scanner<'_>,
+    pulse: &Pulse,
+    layer_snr: &[(f64, f64)],
     geometry: &ScanGeometry,
 ) -> Result<(Vec<f64>, Vec<f64>), Error> {
     let noise = match scene.detector.noise {
         NoiseKind::None => NoiseKind::White,
         noise => noise,
     };
-    let model = estimators::window_model(scene, noise, scanner.pulse())?
-        .ok_or(wakescope_estimate::Error::Empty { field: "noise" })?;
-    let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
+    let model =
+        estimators::window_model(scene, noise, pulse)?.ok_or(wakescope_estimate::Error::Empty { field: "noise" })?;
+    let (layer_m, snr): (Vec<f64>, Vec<f64>) = layer_snr.iter().copied().unzip();
     let all_m = geometry.gate_ranges_m();
     let range_m: Vec<f64> = all_m.iter().copied().step_by(all_m.len().div_ceil(16)).collect();
     let bound = |at_m: &f64| {

@@ -90,22 +90,30 @@ impl<'a> Scanner<'a> {
 
     /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
     pub fn mean_snr(&self) -> f64 {
-        let layers = self.layer_snr();
-        layers.iter().map(|(_, snr)| snr).sum::<f64>() / layers.len().max(1) as f64
+        mean_snr(&self.layer_snr())
     }
 
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; the efficiency is its
     /// mean.
     pub fn layer_snr(&self) -> Vec<(f64, f64)> {
         let Some(line) = self.lines.first() else { return Vec::new() };
-        let receiver = &self.instrument.receiver;
-        let mut mean = vec![1.0; line.layers()];
-        if let Some(efficiency) = &self.efficiency {
-            // As many places as layers: the efficiencies were made for this line.
-            let _ = efficiency.mean_into(&mut mean);
-        }
-        let snr = |l: usize| receiver.slowly_varying_snr(self.scene.pulse_energy_j(), line.weight_per_m[l] * mean[l]);
-        (0..line.layers()).map(|l| (line.range_m(l), snr(l))).collect()
+        layer_snr(self.scene, self.instrument, line, self.efficiency.as_ref())
+    }
+
+    /// The same without any wind, for records that were not made here.
+    ///
+    /// # Errors
+    /// As [`Scanner::new`].
+    pub(crate) fn expected_layer_snr(plan: &Plan, observer: &dyn Observer) -> Result<Vec<(f64, f64)>, Error> {
+        let known = Efficiencies::default();
+        let line = LineOfSight {
+            first_range_m: plan.geometry.first_layer_range_m,
+            layer_thickness_m: plan.geometry.layer_thickness_m,
+            radial_velocity_m_s: vec![0.0; plan.geometry.layers],
+            weight_per_m: layer_weights(plan, &known, observer)?,
+        };
+        let efficiency = drawn_efficiency(plan, std::slice::from_ref(&line), &known, observer)?;
+        Ok(layer_snr(&plan.scene.scene, &plan.instrument, &line, efficiency.as_ref()))
     }
 
     /// Whether signals are (15) and noise: no phases of the laser, reflex of the telescope or echo of the pulse before.
@@ -194,6 +202,27 @@ impl<'a> Scanner<'a> {
         };
         Ok(scan.collect()?)
     }
+}
+
+fn layer_snr(
+    scene: &Scene,
+    instrument: &Instrument,
+    line: &LineOfSight,
+    efficiency: Option<&LayerEfficiency>,
+) -> Vec<(f64, f64)> {
+    let mut mean = vec![1.0; line.layers()];
+    if let Some(efficiency) = efficiency {
+        // As many places as layers: the efficiencies were made for this line.
+        let _ = efficiency.mean_into(&mut mean);
+    }
+    let energy_j = scene.pulse_energy_j();
+    let snr = |l: usize| instrument.receiver.slowly_varying_snr(energy_j, line.weight_per_m[l] * mean[l]);
+    (0..line.layers()).map(|l| (line.range_m(l), snr(l))).collect()
+}
+
+/// Mean signal-to-noise ratio of layers, given with their ranges.
+pub(crate) fn mean_snr(layer_snr: &[(f64, f64)]) -> f64 {
+    layer_snr.iter().map(|(_, snr)| snr).sum::<f64>() / layer_snr.len().max(1) as f64
 }
 
 /// Records that are in memory at a time: some ten megabytes of them, and enough for every thread.

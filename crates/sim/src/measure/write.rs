@@ -4,9 +4,12 @@ mod limits;
 mod map;
 #[cfg(feature = "plots")]
 mod pictures;
+mod recorded;
 
 pub use limits::{Contents, check};
 pub use map::velocity_map;
+pub(crate) use map::{pulse_info, site};
+pub use recorded::{recorded_names, write_recorded};
 
 use crate::Error;
 use crate::io::lock::FolderLock;

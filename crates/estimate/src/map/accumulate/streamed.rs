@@ -72,6 +72,13 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         })
     }
 
+    /// The same with the scale of samples up to `largest`: parts of a scan that are summed apart have the bits of the whole.
+    #[must_use]
+    pub fn scaled_for(mut self, largest: f64) -> Self {
+        self.scale = Rule::NOT_FINITE.largest_binary_scale(std::iter::once(largest));
+        self
+    }
+
     /// Adds the `records` \[ray, sample\] of the rays `first_ray`, `first_ray + 1`, ...
     ///
     /// The rays of a line must come in their order. Windows with a missing sample are left out.

@@ -42,13 +42,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             .collect(),
         range_m: e.range_m.clone(),
         sweeps: vec![Sweep { tau: plan.wind.tau, azimuth_rad }],
-        pulse: PulseInfo {
-            prt_s: 1.0 / scene.laser.pulse_repetition_hz,
-            pulse_width_s: scene.pulse_width_s(),
-            nyquist_velocity_m_s: 0.25 * scene.laser.wavelength_m * scene.detector.sampling_hz,
-            samples: scene.scan.pulses_per_line as u32,
-            frequency_hz: crate::SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m,
-        },
+        pulse: pulse_info(scene),
         fields: vec![
             speed("v_exact", away("radial velocity of the air at the gate's centre"), &e.v_exact_m_s),
             speed("v_pulse", away("radial velocity weighted with the pulse"), &e.v_pulse_m_s),
@@ -78,11 +72,23 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         lidar_y_m: 0.0,
         lidar_height_m: scene.scan.lidar_height_m,
         site: site(scene),
+        is_simulated: true,
+    }
+}
+
+/// Pulse and acquisition of a scene.
+pub(crate) fn pulse_info(scene: &Scene) -> PulseInfo {
+    PulseInfo {
+        prt_s: 1.0 / scene.laser.pulse_repetition_hz,
+        pulse_width_s: scene.pulse_width_s(),
+        nyquist_velocity_m_s: 0.25 * scene.laser.wavelength_m * scene.detector.sampling_hz,
+        samples: scene.scan.pulses_per_line as u32,
+        frequency_hz: crate::SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m,
     }
 }
 
 /// The site of a checked scene.
-fn site(scene: &Scene) -> Site {
+pub(crate) fn site(scene: &Scene) -> Site {
     let s = &scene.site;
     Site {
         name: s.name.clone(),

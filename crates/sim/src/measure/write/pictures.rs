@@ -109,6 +109,26 @@ pub(super) fn add_map(files: &mut FileGroup, plan: &Plan, map: &VelocityMap, ori
     add(files, plan, "map", &figure, origin)
 }
 
+/// The first scan of recorded signals: velocity, its predicted error, signal-to-noise ratio.
+pub(super) fn add_measured(
+    files: &mut FileGroup,
+    plan: &Plan,
+    map: &VelocityMap,
+    origin: &Provenance,
+) -> Result<(), Error> {
+    let panel = |field: &str, title: &str, unit: &str| -> Result<MapPlot, Error> {
+        Ok(MapPlot::new(map, 0, field)?.titled(title).labelled(unit))
+    };
+    let panels = vec![
+        panel("radial_velocity", "radial velocity, positive away from the lidar", "m/s")?,
+        panel("velocity_standard_deviation", "predicted standard deviation", "m/s")?,
+        panel("signal_to_noise_ratio", "signal-to-noise ratio", "dB")?,
+    ];
+    let mut figure = Figure::stacked(panels).titled("One scan of recorded signals; grey: no value");
+    (figure.columns, figure.width) = (3, 1560.0);
+    add(files, plan, "map", &figure, origin)
+}
+
 /// What is shown, of which age and from how many realisations.
 fn title(plan: &Plan, has_gaps: bool) -> String {
     let mut words = vec!["Radial velocity [m/s], positive away from the lidar".to_owned()];

@@ -1,0 +1,287 @@
+//! Records that stand in a file as one array of numbers, read by places: no more is in memory than what was asked for.
+//!
+//! Check: every order of an array gives the same records.
+
+use crate::io::number::{ByteOrder, NumberType};
+use num_complex::Complex;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::ops::Range;
+
+/// Where the parts of complex samples are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Parts {
+    /// Samples are real.
+    Real,
+    /// Both parts of a sample stand together.
+    Together,
+    /// The second parts are an array of their own, which begins here.
+    Apart(u64),
+}
+
+/// Which index of an array runs fastest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum Order {
+    /// \[line, pulse, sample\]: the pulses of a line stand together, and the samples of a pulse.
+    #[default]
+    LineMajor,
+    /// \[pulse, line, sample\]: each scan has one pulse a line.
+    PulseMajor,
+    /// \[sample, line, pulse\]: the first samples of all pulses, then the second ones (an array of Fortran).
+    SampleMajor,
+}
+
+/// An array \[record, sample\] of numbers in a file.
+#[derive(Debug)]
+pub(super) struct ArrayInFile {
+    pub(super) file: File,
+    pub(super) number: NumberType,
+    pub(super) byte_order: ByteOrder,
+    pub(super) parts: Parts,
+    pub(super) order: Order,
+    /// Where the first number is.
+    pub(super) begin: u64,
+    /// Bytes from one record to the next where samples run fastest.
+    pub(super) record_bytes: u64,
+    pub(super) records: usize,
+    pub(super) samples: usize,
+    /// Pulses of a line, for [`Order::PulseMajor`].
+    pub(super) pulses_per_line: usize,
+    /// Stand for a missing number.
+    pub(super) fills: Vec<f64>,
+    pub(super) scale: f64,
+    pub(super) offset: f64,
+}
+
+impl ArrayInFile {
+    /// Numbers of a sample.
+    fn numbers(&self) -> usize {
+        if self.parts == Parts::Together { 2 } else { 1 }
+    }
+
+    /// Bytes of a sample.
+    pub(super) fn sample_bytes(&self) -> u64 {
+        self.number.bytes() * self.numbers() as u64
+    }
+
+    /// Place in the file of a record in the order of lines and their pulses.
+    fn row(&self, record: usize) -> u64 {
+        match self.order {
+            Order::LineMajor | Order::SampleMajor => record as u64,
+            Order::PulseMajor => {
+                let lines = self.records / self.pulses_per_line.max(1);
+                (record % self.pulses_per_line.max(1) * lines + record / self.pulses_per_line.max(1)) as u64
+            }
+        }
+    }
+
+    /// The samples of some records, one record after the other.
+    pub(super) fn read(&mut self, records: Range<usize>) -> std::io::Result<Vec<Complex<f64>>> {
+        let mut out = vec![Complex::new(0.0, 0.0); records.len() * self.samples];
+        self.read_part(records.clone(), self.begin, &mut out, |sample, numbers| {
+            *sample = Complex::new(numbers[0], numbers.get(1).copied().unwrap_or(0.0));
+        })?;
+        if let Parts::Apart(begin) = self.parts {
+            self.read_part(records, begin, &mut out, |sample, numbers| sample.im = numbers[0])?;
+        }
+        Ok(out)
+    }
+
+    fn read_part(
+        &mut self,
+        records: Range<usize>,
+        begin: u64,
+        out: &mut [Complex<f64>],
+        put: impl Fn(&mut Complex<f64>, &[f64]),
+    ) -> std::io::Result<()> {
+        let (samples, sample_bytes) = (self.samples, self.sample_bytes());
+        let mut raw = Vec::new();
+        if self.order == Order::SampleMajor {
+            for sample in 0..samples {
+                let at = begin + (sample as u64 * self.records as u64 + records.start as u64) * sample_bytes;
+                self.bytes(at, records.len() as u64 * sample_bytes, &mut raw)?;
+                let places = out.iter_mut().skip(sample).step_by(samples);
+                self.decode(&raw, places, &put);
+            }
+            return Ok(());
+        }
+        let row_bytes = samples as u64 * sample_bytes;
+        // Records without a gap between them are read at once.
+        let together = match self.order == Order::LineMajor && self.record_bytes == row_bytes {
+            true => records.len().max(1),
+            false => 1,
+        };
+        let firsts = records.clone().step_by(together);
+        for (first, out) in firsts.zip(out.chunks_mut(together * samples)) {
+            let length = row_bytes * (out.len() / samples.max(1)) as u64;
+            self.bytes(begin + self.row(first) * self.record_bytes, length, &mut raw)?;
+            self.decode(&raw, out.iter_mut(), &put);
+        }
+        Ok(())
+    }
+
+    fn bytes(&mut self, at: u64, length: u64, raw: &mut Vec<u8>) -> std::io::Result<()> {
+        raw.resize(length as usize, 0);
+        self.file.seek(SeekFrom::Start(at))?;
+        self.file.read_exact(raw)
+    }
+
+    fn decode<'o>(
+        &self,
+        raw: &[u8],
+        out: impl Iterator<Item = &'o mut Complex<f64>>,
+        put: &impl Fn(&mut Complex<f64>, &[f64]),
+    ) {
+        let bytes = self.number.bytes() as usize;
+        let value = |bytes: &[u8]| {
+            let stored = self.number.ordered_value(bytes, self.byte_order);
+            if self.fills.contains(&stored) { f64::NAN } else { stored * self.scale + self.offset }
+        };
+        let mut numbers = [0.0; 2];
+        let numbers = &mut numbers[..self.numbers()];
+        for (sample, raw) in out.zip(raw.chunks_exact(bytes * numbers.len())) {
+            for (number, raw) in numbers.iter_mut().zip(raw.chunks_exact(bytes)) {
+                *number = value(raw);
+            }
+            put(sample, numbers);
+        }
+    }
+
+    /// What speaks against the order of the bytes, from the beginning of the data: a text for the user.
+    pub(super) fn doubt(&mut self) -> std::io::Result<Option<String>> {
+        let length = self.sample_bytes() * (self.records as u64 * self.samples as u64).min(1 << 14);
+        if self.number.bytes() == 1 {
+            return Ok(None);
+        }
+        let mut raw = Vec::new();
+        self.bytes(self.begin, length, &mut raw)?;
+        let bytes = self.number.bytes() as usize;
+        let read = |order| -> Vec<f64> {
+            raw.chunks_exact(bytes).map(|number| self.number.ordered_value(number, order)).collect()
+        };
+        let (here, there) = (read(self.byte_order), read(self.byte_order.other()));
+        let worse = match self.number.is_float() {
+            // Samples of one signal do not differ by tens of orders of magnitude.
+            true => decades(&here) > 25.0 && decades(&there) < 15.0,
+            // Swapped integers fill their whole range evenly; a signal that does is in saturation.
+            false => spread(&here) > 0.2 * spread_of_all(self.number) && spread(&there) < 0.25 * spread(&here),
+        };
+        let other = self.byte_order.other().name();
+        Ok(worse.then(|| {
+            format!(
+                "its numbers make no signal with the {} byte first: --byte-order {other}",
+                match self.byte_order {
+                    ByteOrder::Little => "lowest",
+                    ByteOrder::Big => "highest",
+                }
+            )
+        }))
+    }
+}
+
+/// Orders of magnitude between the largest and the smallest of most numbers that are not 0.
+fn decades(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> =
+        values.iter().filter(|v| **v != 0.0).map(|v| if v.is_finite() { v.abs().log10() } else { 400.0 }).collect();
+    sizes.sort_by(f64::total_cmp);
+    let cut = sizes.len() / 50;
+    match (sizes.get(cut), sizes.get(sizes.len().saturating_sub(1 + cut))) {
+        (Some(low), Some(high)) => high - low,
+        _ => 0.0,
+    }
+}
+
+/// Standard deviation.
+fn spread(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+/// Standard deviation of all integers of a kind.
+fn spread_of_all(number: NumberType) -> f64 {
+    (8.0 * number.bytes() as f64).exp2() / 12f64.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn file(numbers: &[f64], order: ByteOrder) -> File {
+        let mut file = tempfile::tempfile().unwrap();
+        for number in numbers {
+            let number = *number as i16;
+            let bytes = if order == ByteOrder::Big { number.to_be_bytes() } else { number.to_le_bytes() };
+            file.write_all(&bytes).unwrap();
+        }
+        file
+    }
+
+    fn array(numbers: &[f64], order: Order) -> ArrayInFile {
+        ArrayInFile {
+            file: file(numbers, ByteOrder::Big),
+            number: NumberType::I16,
+            byte_order: ByteOrder::Big,
+            parts: Parts::Real,
+            order,
+            begin: 0,
+            record_bytes: 6,
+            records: 4,
+            samples: 3,
+            pulses_per_line: 2,
+            fills: vec![-1.0],
+            scale: 2.0,
+            offset: 1.0,
+        }
+    }
+
+    #[test]
+    fn every_order_gives_the_same_records() {
+        // Records of two lines with two pulses: hundreds count lines, tens pulses, ones samples.
+        let of = |line: usize, pulse: usize, sample: usize| (100 * line + 10 * pulse + sample) as f64;
+        let wanted: Vec<f64> =
+            (0..12).map(|i| if i == 5 { f64::NAN } else { 2.0 * of(i / 6, i / 3 % 2, i % 3) + 1.0 }).collect();
+        let with = |places: &dyn Fn(usize) -> (usize, usize, usize)| -> Vec<f64> {
+            let value = |place: (usize, usize, usize)| {
+                if place == (0, 1, 2) { -1.0 } else { of(place.0, place.1, place.2) }
+            };
+            (0..12).map(|i| value(places(i))).collect()
+        };
+        for (order, numbers) in [
+            (Order::LineMajor, with(&|i| (i / 6, i / 3 % 2, i % 3))),
+            (Order::PulseMajor, with(&|i| (i / 3 % 2, i / 6, i % 3))),
+            (Order::SampleMajor, with(&|i| (i / 2 % 2, i % 2, i / 4))),
+        ] {
+            let mut array = array(&numbers, order);
+            for records in [0..4, 1..3, 3..4] {
+                let found = array.read(records.clone()).unwrap();
+                let wanted = &wanted[records.start * 3..records.end * 3];
+                let same = |(a, b): (&Complex<f64>, &f64)| a.im == 0.0 && (a.re == *b || (a.re.is_nan() && b.is_nan()));
+                assert!(found.iter().zip(wanted).all(same), "{order:?} {records:?}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn complex_samples_may_stand_together_or_apart() {
+        let mut together = ArrayInFile { samples: 3, records: 2, record_bytes: 12, ..array(&[], Order::LineMajor) };
+        together.file = file(&(0..12).map(f64::from).collect::<Vec<_>>(), ByteOrder::Big);
+        (together.parts, together.scale, together.offset) = (Parts::Together, 1.0, 0.0);
+        let found = together.read(1..2).unwrap();
+        assert_eq!(found, [(6.0, 7.0), (8.0, 9.0), (10.0, 11.0)].map(|(re, im)| Complex::new(re, im)));
+        let mut apart = ArrayInFile { parts: Parts::Apart(12), record_bytes: 6, ..together };
+        let found = apart.read(0..2).unwrap();
+        assert!(found.iter().enumerate().all(|(i, z)| *z == Complex::new(i as f64, i as f64 + 6.0)), "{found:?}");
+    }
+
+    #[test]
+    fn bytes_in_the_wrong_order_are_seen() {
+        let signal: Vec<f64> = (0..12).map(|i| (900.0 * f64::from(i * i).sin()).round()).collect();
+        let mut right = array(&signal, Order::LineMajor);
+        assert_eq!(right.doubt().unwrap(), None);
+        right.byte_order = ByteOrder::Little;
+        assert!(right.doubt().unwrap().is_some_and(|text| text.contains("--byte-order big")));
+    }
+}

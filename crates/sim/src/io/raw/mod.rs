@@ -1,0 +1,315 @@
+//! Raw signals of an instrument or of a simulation, from a file: records of samples, read piece by piece, and what the file says
+//! of them.
+//!
+//! | format | how it is known | what it says by itself |
+//! |---|---|---|
+//! | classic NetCDF | its first bytes | shape, kind of number; `signals.nc` also angles, times and how it was recorded |
+//! | NPY, NPZ | its first bytes | shape, kind of number, byte order; NPZ also `elevation_rad` and `time_s` |
+//! | text | the name ends with `.csv` or `.txt` | shape |
+//! | binary | [`RawFormat::number`] is stated | nothing |
+//!
+//! Check: the same records come from every format.
+
+mod array;
+#[cfg(feature = "netcdf")]
+mod netcdf;
+mod numpy;
+mod text;
+
+pub use array::Order;
+
+use crate::Error;
+use crate::io::number::{ByteOrder, NumberType};
+use crate::io::text_file;
+use array::{ArrayInFile, Parts};
+use num_complex::Complex;
+use numpy::NumpyArray;
+use std::fs::File;
+use std::io::Read;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use text::TextRecords;
+
+/// How the numbers of a file stand, as far as the file does not say it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawFormat {
+    /// Kind of the numbers of a binary file, such as `i16` or `f32`.
+    pub number: Option<String>,
+    /// Their byte order.
+    pub byte_order: ByteOrder,
+    /// Whether samples are pairs of numbers, the first quadrature before the second.
+    pub complex: bool,
+    /// Which index runs fastest.
+    pub order: Order,
+    /// Bytes before the first number.
+    pub header_bytes: u64,
+    /// What a number is multiplied with, A for signals in counts.
+    pub scale: f64,
+    /// The variable or array that holds the samples.
+    pub variable: Option<String>,
+    /// The variable that holds the second quadrature.
+    pub quadrature: Option<String>,
+}
+
+impl Default for RawFormat {
+    fn default() -> Self {
+        Self {
+            number: None,
+            byte_order: ByteOrder::default(),
+            complex: false,
+            order: Order::default(),
+            header_bytes: 0,
+            scale: 1.0,
+            variable: None,
+            quadrature: None,
+        }
+    }
+}
+
+/// What a scene says of a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecordShape {
+    /// Samples of a record.
+    pub samples: usize,
+    /// Pulses of a line of sight.
+    pub pulses_per_line: usize,
+}
+
+/// What a file says of its records.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct About {
+    /// Elevation of each record, rad.
+    pub elevation_rad: Option<Vec<f64>>,
+    /// Time of each record, s.
+    pub time_s: Option<Vec<f64>>,
+    /// Constants of the recording: their name in the file, the key of a scene that says the same, and the value.
+    pub constants: Vec<(&'static str, &'static str, f64)>,
+    /// The scene that the signals were simulated for.
+    pub scene_toml: Option<String>,
+}
+
+/// Records of samples in a file.
+#[derive(Debug)]
+pub struct RawRecords {
+    path: PathBuf,
+    store: Store,
+    /// What the file says of them.
+    pub about: About,
+}
+
+#[derive(Debug)]
+enum Store {
+    Array(ArrayInFile),
+    Text(TextRecords),
+}
+
+impl RawRecords {
+    /// Opens a file; nothing but its header is read, and the lines of a text are counted.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged, has another shape than its header says or needs words that `format` lacks.
+    pub fn open(path: &Path, format: &RawFormat, shape: RecordShape) -> Result<Self, Error> {
+        let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
+        let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+        let (mut file, length) = text_file::open(path).map_err(unreadable)?;
+        let mut magic = Vec::new();
+        Read::by_ref(&mut file).take(8).read_to_end(&mut magic).map_err(unreadable)?;
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        let (store, about) = match &magic[..] {
+            _ if format.number.is_some() => (binary(file, length, format, shape).map_err(refuse)?, About::default()),
+            #[cfg(feature = "netcdf")]
+            [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
+                let (array, about) = netcdf::read(path, format)?;
+                (Store::Array(array), about)
+            }
+            [0x93, b'N', b'U', b'M', ..] => {
+                let array = NumpyArray::read(&mut file, 0, length).map_err(refuse)?;
+                (of_numpy(file, &array, format, shape).map_err(refuse)?, About::default())
+            }
+            [b'P', b'K', 3, 4, ..] => of_archive(file, length, format, shape).map_err(refuse)?,
+            _ if ["csv", "txt"].contains(&extension.as_str()) => {
+                let file = File::open(path).map_err(unreadable)?;
+                let text = TextRecords::open(file, format.complex).map_err(refuse)?;
+                (Store::Text(text), About::default())
+            }
+            _ => {
+                return Err(refuse(
+                    "it is neither NetCDF, NPY, NPZ nor a text whose name ends with .csv or .txt: of a binary file, --format \
+                     states the numbers, e.g. --format i16 --byte-order little"
+                        .into(),
+                ));
+            }
+        };
+        let mut records = Self { path: path.to_owned(), store, about };
+        if let Store::Array(array) = &mut records.store {
+            let doubt = array.doubt().map_err(unreadable)?;
+            if let Some(doubt) = doubt.filter(|_| format.number.is_some()) {
+                return Err(refuse(doubt));
+            }
+        }
+        if records.records() == 0 || records.samples() == 0 {
+            return Err(refuse("it holds no records".into()));
+        }
+        Ok(records)
+    }
+
+    /// Number of records.
+    pub fn records(&self) -> usize {
+        match &self.store {
+            Store::Array(array) => array.records,
+            Store::Text(text) => text.records(),
+        }
+    }
+
+    /// Samples of a record.
+    pub fn samples(&self) -> usize {
+        match &self.store {
+            Store::Array(array) => array.samples,
+            Store::Text(text) => text.samples,
+        }
+    }
+
+    /// Whether samples are complex.
+    pub fn is_complex(&self) -> bool {
+        match &self.store {
+            Store::Array(array) => array.parts != Parts::Real,
+            Store::Text(text) => text.is_complex,
+        }
+    }
+
+    /// Whether the numbers are codes of a converter.
+    pub fn is_of_integers(&self) -> bool {
+        matches!(&self.store, Store::Array(array) if !array.number.is_float())
+    }
+
+    /// What the numbers of the file were multiplied with.
+    pub fn scale(&self) -> f64 {
+        match &self.store {
+            Store::Array(array) => array.scale,
+            Store::Text(_) => 1.0,
+        }
+    }
+
+    /// An error of this file.
+    pub fn refuse(&self, reason: String) -> Error {
+        Error::Input { path: self.path.clone(), reason }
+    }
+
+    /// The samples of some records, one record after the other; the second parts of real samples are 0.
+    ///
+    /// # Errors
+    /// What the system says; words in place of numbers.
+    pub fn read(&mut self, records: Range<usize>) -> Result<Vec<Complex<f64>>, Error> {
+        match &mut self.store {
+            Store::Array(array) => array.read(records).map_err(|e| match e.kind() {
+                std::io::ErrorKind::UnexpectedEof => "it became shorter while it was read".to_owned(),
+                _ => e.to_string(),
+            }),
+            Store::Text(text) => text.read(records),
+        }
+        .map_err(|reason| self.refuse(reason))
+    }
+}
+
+/// A file of nothing but numbers behind a header.
+fn binary(file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Result<Store, String> {
+    let name = format.number.as_deref().unwrap_or_default();
+    let number =
+        NumberType::named(name).ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
+    let parts = if format.complex { Parts::Together } else { Parts::Real };
+    let mut array = ArrayInFile {
+        file,
+        number,
+        byte_order: format.byte_order,
+        parts,
+        order: format.order,
+        begin: format.header_bytes,
+        record_bytes: 0,
+        records: 0,
+        samples: shape.samples,
+        pulses_per_line: shape.pulses_per_line,
+        fills: Vec::new(),
+        scale: format.scale,
+        offset: 0.0,
+    };
+    array.record_bytes = shape.samples as u64 * array.sample_bytes();
+    let data = length.checked_sub(format.header_bytes);
+    let data = data.ok_or_else(|| format!("it has {length} bytes, --header-bytes says {}", format.header_bytes))?;
+    let rest = data.checked_rem(array.record_bytes).unwrap_or(data);
+    if rest != 0 {
+        return Err(format!(
+            "behind a header of {} bytes it holds {data} bytes, no whole number of records of {} samples of {} bytes: {rest} \
+             are left over; scan.range_min_m and range_max_m say how many samples a record has",
+            format.header_bytes,
+            shape.samples,
+            array.sample_bytes()
+        ));
+    }
+    array.records = (data / array.record_bytes) as usize;
+    Ok(Store::Array(array))
+}
+
+fn of_numpy(file: File, found: &NumpyArray, format: &RawFormat, shape: RecordShape) -> Result<Store, String> {
+    let mut lengths = found.shape.clone();
+    let pairs = format.complex && !found.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
+    if pairs {
+        lengths.pop();
+    }
+    let order = match (found.fortran_order && lengths.len() > 1, lengths.len()) {
+        (false, _) => format.order,
+        (true, 2) if !pairs => Order::SampleMajor,
+        (true, _) => {
+            return Err("it is an array in the order of Fortran: numpy.ascontiguousarray makes one that is read".into());
+        }
+    };
+    // Whatever the order, the header says how long each dimension is; the samples are the last, or the first.
+    let samples = match (found.fortran_order, order) {
+        (false, Order::SampleMajor) => (!lengths.is_empty()).then(|| lengths.remove(0)),
+        _ => lengths.pop(),
+    };
+    let samples = samples.ok_or("it holds a single number, no records")?;
+    let parts = if found.is_complex || pairs { Parts::Together } else { Parts::Real };
+    let mut array = ArrayInFile {
+        file,
+        number: found.number,
+        byte_order: found.byte_order,
+        parts,
+        order,
+        begin: found.begin,
+        record_bytes: 0,
+        records: lengths.iter().product::<u64>() as usize,
+        samples: samples as usize,
+        pulses_per_line: shape.pulses_per_line,
+        fills: Vec::new(),
+        scale: format.scale,
+        offset: 0.0,
+    };
+    array.record_bytes = samples * array.sample_bytes();
+    Ok(Store::Array(array))
+}
+
+fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Result<(Store, About), String> {
+    let arrays = numpy::archive(&mut file, length)?;
+    let large: Vec<&(String, NumpyArray)> = arrays.iter().filter(|(_, array)| array.shape.len() > 1).collect();
+    let chosen = match (&format.variable, &large[..]) {
+        (Some(name), _) => arrays.iter().find(|(own, _)| own == name),
+        (None, [one]) => Some(*one),
+        (None, _) => arrays.iter().find(|(name, _)| name == "signals" || name == "current_a"),
+    };
+    let (_, signals) =
+        chosen.ok_or("it has several arrays, or none: --variable names the one that holds the samples")?;
+    let values = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
+        let Some((_, array)) = arrays.iter().find(|(name, _)| names.contains(&name.as_str())) else { return Ok(None) };
+        let own = file.try_clone().map_err(|e| e.to_string())?;
+        // A row of numbers is one record.
+        let Store::Array(mut array) = of_numpy(own, array, &RawFormat::default(), shape)? else { return Ok(None) };
+        let read = array.read(0..array.records).map_err(|e| e.to_string())?;
+        Ok(Some(read.into_iter().map(|value| value.re).collect()))
+    };
+    let about = About {
+        elevation_rad: values(["elevation_rad", "elevation"])?,
+        time_s: values(["time_s", "pulse_time"])?,
+        ..About::default()
+    };
+    Ok((of_numpy(file, signals, format, shape)?, about))
+}

@@ -1,0 +1,108 @@
+//! Raw signals in classic NetCDF: `signals.nc`, or a variable of one's own with the samples of a record running fastest.
+//!
+//! Check: signals of a run come back; constants of the recording that the scene contradicts are named.
+
+use super::array::{ArrayInFile, Order, Parts};
+use super::{About, RawFormat};
+use crate::Error;
+use crate::io::netcdf_input::{ClassicFile, open};
+use crate::io::number::ByteOrder;
+use std::path::Path;
+
+/// Constants of a recording: the name of the variable, and the key of a scene that says the same.
+const CONSTANTS: [(&str, &str); 6] = [
+    ("sampling_frequency", "detector.sampling_hz"),
+    ("intermediate_frequency", "detector.intermediate_frequency_hz"),
+    ("bandwidth", "detector.bandwidth_hz"),
+    ("wavelength", "laser.wavelength_m"),
+    ("pulse_repetition_frequency", "laser.pulse_repetition_hz"),
+    ("pulse_sigma", "pulse"),
+];
+
+/// Opens the signals of a file.
+pub(super) fn read(path: &Path, format: &RawFormat) -> Result<(ArrayInFile, About), Error> {
+    let mut file = open(path)?;
+    let found = signals(&mut file, format);
+    found.map_err(|reason| file.refuse(reason))
+}
+
+fn signals(file: &mut ClassicFile, format: &RawFormat) -> Result<(ArrayInFile, About), String> {
+    let name = match &format.variable {
+        Some(name) => name.clone(),
+        None if file.has("current_a") => "current_a".to_owned(),
+        None => return Err("it has no variable current_a: --variable names the one that holds the samples".into()),
+    };
+    let mut shape = file.shape(&name).ok_or_else(|| format!("it has no variable {name}"))?;
+    let second = match &format.quadrature {
+        Some(name) => Some(name.clone()),
+        None => (name == "current_a" && file.has("quadrature_a")).then(|| "quadrature_a".to_owned()),
+    };
+    let mut parts = Parts::Real;
+    if let Some(second) = &second {
+        if file.shape(second) != Some(shape.clone()) {
+            return Err(format!("variable {second} has not the dimensions of {name}"));
+        }
+        parts = Parts::Apart(file.layout(second).ok_or("it has no second quadrature")?.begin);
+    } else if format.complex && shape.last() == Some(&2) {
+        shape.pop();
+        parts = Parts::Together;
+    }
+    let (Some(samples), true) = (shape.pop(), shape.iter().all(|length| *length > 0)) else {
+        return Err(format!("variable {name} has no dimension: records with samples are needed"));
+    };
+    let records = shape.iter().product::<u64>() as usize;
+    let layout = file.layout(&name).ok_or("it has no such variable")?;
+    let of_parts = if parts == Parts::Together { 2 } else { 1 };
+    let tight = samples * layout.number.bytes() * of_parts;
+    let record_bytes = match layout.stride {
+        None => tight,
+        // The dimension that grows is the first; one record of the file must be one of the signals.
+        Some(stride) if shape.len() <= 1 => stride,
+        Some(_) => {
+            return Err(format!("variable {name} grows along a dimension and has two more: nccopy -u makes it fixed"));
+        }
+    };
+    let (fills, scale, offset) = file.packing(&name);
+    let array = ArrayInFile {
+        file: file.handle().map_err(|e| e.to_string())?,
+        number: layout.number,
+        byte_order: ByteOrder::Big,
+        parts,
+        order: Order::LineMajor,
+        begin: layout.begin,
+        record_bytes,
+        records,
+        samples: samples as usize,
+        pulses_per_line: 1,
+        fills,
+        scale: scale * format.scale,
+        offset: offset * format.scale,
+    };
+    let about = about(file, records)?;
+    Ok((array, about))
+}
+
+fn about(file: &mut ClassicFile, records: usize) -> Result<About, String> {
+    let mut about = About { scene_toml: file.global_text("scene").map(str::to_owned), ..About::default() };
+    let mut of_records = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
+        let Some(name) = names.into_iter().find(|name| file.has(name)) else { return Ok(None) };
+        let units = file.text(name, "units").unwrap_or_default().to_ascii_lowercase();
+        let values = file.floats(name)?;
+        let factor = if units.starts_with("deg") { 1f64.to_radians() } else { 1.0 };
+        match values.len() == records {
+            true => Ok(Some(values.into_iter().map(|value| value * factor).collect())),
+            // A coordinate of the samples, such as time, is none of the records.
+            false => Ok(None),
+        }
+    };
+    about.elevation_rad = of_records(["elevation", "elevation_rad"])?;
+    about.time_s = of_records(["pulse_time", "ray_time"])?;
+    for (name, key) in CONSTANTS {
+        if file.has(name)
+            && let Some(value) = file.floats(name)?.first()
+        {
+            about.constants.push((name, key, *value));
+        }
+    }
+    Ok(about)
+}

@@ -1,0 +1,154 @@
+//! Records as text: a row of numbers for each record, or the long table `ray, time_s, current_a` of `signals.csv`.
+//!
+//! The first pass finds where each record begins, so that any of them can be read without the others. Check: both forms give
+//! the same records; rows of different lengths and words are refused with their line.
+
+use num_complex::Complex;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Seek, SeekFrom};
+use std::ops::Range;
+
+/// Records in a text file.
+#[derive(Debug)]
+pub(super) struct TextRecords {
+    reader: BufReader<File>,
+    /// Where the text of each record begins, and its line, from 1.
+    records: Vec<(u64, usize)>,
+    pub(super) samples: usize,
+    pub(super) is_complex: bool,
+    /// Columns of both parts in the long table.
+    columns: Option<Vec<usize>>,
+}
+
+impl TextRecords {
+    /// Finds the records; numbers of a row are pairs of both parts where `is_complex` says so.
+    pub(super) fn open(file: File, is_complex: bool) -> Result<Self, String> {
+        let mut out = Self { reader: BufReader::new(file), records: Vec::new(), samples: 0, is_complex, columns: None };
+        let (mut at, mut line, mut text) = (0, 0, String::new());
+        // Column of the long table that numbers the records, the last number there, and how many rows have had it.
+        let (mut key, mut last, mut rows) = (0, String::new(), 0);
+        loop {
+            text.clear();
+            let read = out.reader.read_line(&mut text).map_err(|_| format!("line {} is no text", line + 1))?;
+            if read == 0 {
+                break;
+            }
+            line += 1;
+            let begin = at;
+            at += read as u64;
+            let content = text.trim_start_matches('\u{feff}').trim();
+            if content.is_empty() || content.starts_with('#') {
+                continue;
+            }
+            if out.records.is_empty()
+                && out.columns.is_none()
+                && cells(content).any(|cell| cell.parse::<f64>().is_err())
+            {
+                let header: Vec<&str> = cells(content).collect();
+                let place = |name: &str| header.iter().position(|cell| *cell == name);
+                key = place("ray").ok_or("its header names no column ray: rows of numbers have none")?;
+                let value = place("current_a").ok_or("its header names no column current_a")?;
+                let quadrature = place("quadrature_a");
+                out.is_complex = quadrature.is_some();
+                out.columns = Some([Some(value), quadrature].into_iter().flatten().collect());
+                continue;
+            }
+            match &out.columns {
+                None => {
+                    out.records.push((begin, line));
+                    out.check_samples(cells(content).count() / out.numbers(), line)?;
+                }
+                Some(_) => {
+                    let ray = cells(content).nth(key).unwrap_or_default();
+                    if out.records.is_empty() || ray != last {
+                        if !out.records.is_empty() {
+                            out.check_samples(rows, line - 1)?;
+                        }
+                        out.records.push((begin, line));
+                        (last, rows) = (ray.to_owned(), 0);
+                    }
+                    rows += 1;
+                }
+            }
+        }
+        if out.columns.is_some() {
+            out.check_samples(rows, line)?;
+        }
+        Ok(out)
+    }
+
+    fn numbers(&self) -> usize {
+        if self.is_complex { 2 } else { 1 }
+    }
+
+    fn check_samples(&mut self, samples: usize, line: usize) -> Result<(), String> {
+        if self.samples == 0 {
+            self.samples = samples;
+        }
+        match samples == self.samples {
+            true => Ok(()),
+            false => Err(format!("line {line}: the record has {samples} samples, those before it {}", self.samples)),
+        }
+    }
+
+    pub(super) fn records(&self) -> usize {
+        self.records.len()
+    }
+
+    /// The samples of some records, one record after the other.
+    pub(super) fn read(&mut self, records: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
+        let mut out = Vec::with_capacity(records.len() * self.samples);
+        let mut text = String::new();
+        for record in records {
+            let Some((begin, mut line)) = self.records.get(record).copied() else { break };
+            self.reader.seek(SeekFrom::Start(begin)).map_err(|e| e.to_string())?;
+            let rows = if self.columns.is_some() { self.samples } else { 1 };
+            let mut row = 0;
+            while row < rows {
+                text.clear();
+                if self.reader.read_line(&mut text).map_err(|e| e.to_string())? == 0 {
+                    return Err("it became shorter while it was read".into());
+                }
+                let content = text.trim_start_matches('\u{feff}').trim();
+                if !content.is_empty() && !content.starts_with('#') {
+                    self.push(content, line, &mut out)?;
+                    row += 1;
+                }
+                line += 1;
+            }
+        }
+        Ok(out)
+    }
+
+    fn push(&self, content: &str, line: usize, out: &mut Vec<Complex<f64>>) -> Result<(), String> {
+        let number = |cell: &str| -> Result<f64, String> {
+            match cell {
+                "" => Ok(f64::NAN),
+                cell => cell.parse().map_err(|_| format!("line {line}: {cell:?} is no number")),
+            }
+        };
+        match &self.columns {
+            Some(columns) => {
+                let cells: Vec<&str> = cells(content).collect();
+                let mut parts = columns.iter().map(|column| number(cells.get(*column).copied().unwrap_or_default()));
+                let re = parts.next().transpose()?.unwrap_or(f64::NAN);
+                out.push(Complex::new(re, parts.next().transpose()?.unwrap_or(0.0)));
+            }
+            None => {
+                let numbers = cells(content).map(number).collect::<Result<Vec<f64>, String>>()?;
+                let sample = |parts: &[f64]| Complex::new(parts[0], parts.get(1).copied().unwrap_or(0.0));
+                out.extend(numbers.chunks_exact(self.numbers()).map(sample));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Cells of a row: between commas or semicolons, or between blanks.
+fn cells(row: &str) -> Box<dyn Iterator<Item = &str> + '_> {
+    let separator = [',', ';'].into_iter().find(|separator| row.contains(*separator));
+    match separator {
+        Some(separator) => Box::new(row.split(separator).map(str::trim)),
+        None => Box::new(row.split_whitespace()),
+    }
+}

@@ -1,0 +1,302 @@
+//! Scans from CfRadial 1.x in classic NetCDF, by any writer.
+//!
+//! A sweep is a scan if its elevations differ and its azimuths do not, whatever it calls itself. Velocities are found by their
+//! standard names, which say the sign, or by the names that instruments use. Check: maps of this program, and of Py-ART and
+//! xradar in the tests of the program; files without Nyquist velocity, with ragged gates, another sign, several sweeps.
+
+use super::grid::{RayRow, between_turns, one_plane, scan_map};
+use super::{ReadScan, ScanFormat};
+use crate::Error;
+use crate::io::UtcTime;
+use crate::io::netcdf_input::{ClassicFile, open};
+use std::path::Path;
+
+const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrument";
+const TOWARDS: &str = "radial_velocity_of_scatterers_toward_instrument";
+/// Names of the velocity where no standard name says it, positive away.
+const VELOCITIES: [&str; 9] = [
+    "radial_velocity",
+    "velocity",
+    "radial_wind_speed",
+    "VEL",
+    "VR",
+    "VRAD",
+    "VRADH",
+    "doppler_velocity",
+    "mean_doppler_velocity",
+];
+/// Names of its standard deviation.
+const SIGMAS: [&str; 4] = ["velocity_standard_deviation", "sigma_m_s", "radial_velocity_error", "velocity_error"];
+/// Names of the signal-to-noise ratio in dB.
+const RATIOS: [&str; 4] = ["signal_to_noise_ratio", "SNR", "snr", "cnr"];
+
+/// The scans of a file, and what was left out.
+pub(super) fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<String>), Error> {
+    let mut file = open(path)?;
+    scans(&mut file, path, format).map_err(|reason| file.refuse(reason))
+}
+
+fn scans(file: &mut ClassicFile, path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<String>), String> {
+    let elevation_rad = angles(file, "elevation")?;
+    let azimuth_rad = angles(file, "azimuth")?;
+    let count = elevation_rad.len();
+    if azimuth_rad.len() != count {
+        return Err(format!("azimuth has {} values, elevation {count}: one for each ray", azimuth_rad.len()));
+    }
+    let (time_s, reference) = times(file, count)?;
+    let range_m = ranges(file)?;
+    let velocity = Field::velocity(file, format)?;
+    let layout = GateLayout::new(file, &velocity.name, count, range_m.len())?;
+    let velocity_m_s = layout.read(file, &velocity.name)?;
+    // A fraction of realisations, or 0 and 1.
+    let flagged = layout.optional(file, &["flagged"])?;
+    let ratio_db = if format.min_snr_db.is_some() { layout.optional(file, &RATIOS)? } else { None };
+    let sigma_m_s = layout.optional(file, &SIGMAS)?;
+    let realisations = if velocity.is_mean { layout.optional(file, &["count"])? } else { None };
+    let moving = if file.has("antenna_transition") { file.floats("antenna_transition")? } else { Vec::new() };
+    let fold_m_s = nyquist(file)?.map(|nyquist| 2.0 * nyquist);
+    let gates = range_m.len();
+    let ray = |ray: usize| {
+        let cells = || (ray * gates..(ray + 1) * gates).map(|at| (at, velocity_m_s[at]));
+        let noisy = |at: usize| {
+            let below = |ratios: &Vec<f64>| format.min_snr_db.is_some_and(|least| !(ratios[at] >= least));
+            ratio_db.as_ref().is_some_and(below) || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
+        };
+        let sigma = |sigma_m_s: &Vec<f64>| {
+            let of = |at: usize| {
+                let count = realisations.as_ref().map_or(1.0, |count| count[at].max(1.0));
+                sigma_m_s[at] / count.sqrt()
+            };
+            cells().map(|(at, _)| of(at)).collect()
+        };
+        RayRow {
+            elevation_rad: elevation_rad[ray],
+            azimuth_rad: azimuth_rad[ray],
+            time_s: time_s[ray],
+            velocity_m_s: cells().map(|(at, v)| if noisy(at) { f64::NAN } else { velocity.sign * v }).collect(),
+            sigma_m_s: sigma_m_s.as_ref().map(sigma).unwrap_or_default(),
+        }
+    };
+    let (mut out, mut left_out) = (Vec::new(), Vec::new());
+    let pulse_width_s = if file.has("pulse_width") { first(file, "pulse_width")? } else { None };
+    let step_m = range_m.get(1).zip(range_m.first()).map(|(second, first)| second - first);
+    let scene_toml = file.global_text("scene").map(str::to_owned);
+    for (number, rays) in sweeps(file, count)?.into_iter().enumerate() {
+        let what = format!("sweep {number}");
+        let is_still = |ray: &usize| moving.get(*ray).is_none_or(|moves| *moves != 1.0);
+        let rows: Vec<RayRow> = rays.filter(is_still).map(&ray).collect();
+        if let Err((low, high)) = one_plane(&rows) {
+            left_out
+                .push(format!("{what}: its azimuths go from {low:.2} to {high:.2} degrees, those of an RHI are one"));
+            continue;
+        }
+        let heights: Vec<f64> = rows.iter().map(|row| row.elevation_rad).collect();
+        for part in between_turns(&heights) {
+            let rows = rows[part].to_vec();
+            if rows.iter().all(|row| (row.elevation_rad - rows[0].elevation_rad).abs() < 1e-4) {
+                left_out.push(format!("{what}: all of its rays have one elevation"));
+                continue;
+            }
+            out.push(ReadScan {
+                path: path.to_owned(),
+                sweep: number,
+                map: scan_map(rows, range_m.clone(), fold_m_s, &what)?,
+                reference,
+                gate_length_m: step_m,
+                pulse_width_s,
+                scene_toml: scene_toml.clone(),
+            });
+        }
+    }
+    match out.is_empty() {
+        true => Err(format!("it has no scan in elevation (RHI): {}", left_out.join("; "))),
+        false => Ok((out, left_out)),
+    }
+}
+
+/// The variable that holds the velocities.
+struct Field {
+    name: String,
+    /// 1 for velocities that are positive away from the lidar.
+    sign: f64,
+    /// Whether it is the mean of several scans.
+    is_mean: bool,
+}
+
+impl Field {
+    fn velocity(file: &ClassicFile, format: &ScanFormat) -> Result<Self, String> {
+        let standard = |name: &str| file.text(name, "standard_name").unwrap_or_default().to_owned();
+        let name = match &format.field {
+            Some(name) if file.has(name) => name.clone(),
+            Some(name) => return Err(format!("it has no variable {name}, which --field names")),
+            None => {
+                let known = VELOCITIES.iter().find(|name| file.has(name)).map(|name| (*name).to_owned());
+                let by_standard = || {
+                    let names = file.names();
+                    names.into_iter().find(|name| [AWAY, TOWARDS].contains(&standard(name).as_str()))
+                };
+                known.or_else(by_standard).ok_or(
+                    "it has no radial velocity: none of its variables has that standard name or a usual name; --field names it",
+                )?
+            }
+        };
+        let units = file.text(&name, "units").unwrap_or("m/s").to_ascii_lowercase().replace([' ', '_'], "");
+        if !["m/s", "ms-1", "ms^-1", "m.s-1", "meterspersecond", "meterpersecond", "metrespersecond", ""]
+            .contains(&units.as_str())
+        {
+            return Err(format!("the units of {name} are not m/s"));
+        }
+        let is_towards = standard(&name) == TOWARDS || format.towards;
+        let is_mean = file.text(&name, "cell_methods").is_some_and(|methods| methods.contains("realization: mean"));
+        Ok(Self { name, sign: if is_towards { -1.0 } else { 1.0 }, is_mean })
+    }
+}
+
+/// How the gates of the rays stand in a variable.
+enum GateLayout {
+    /// \[time, range\].
+    Full { rays: usize, gates: usize },
+    /// One ray after the other, each with its own number of gates.
+    Ragged { starts: Vec<usize>, counts: Vec<usize>, gates: usize },
+}
+
+impl GateLayout {
+    fn new(file: &mut ClassicFile, name: &str, rays: usize, gates: usize) -> Result<Self, String> {
+        let dims = file.dims(name).unwrap_or_default().len();
+        let shape = file.shape(name).unwrap_or_default();
+        match (dims, &shape[..]) {
+            (2, [a, b]) if (*a, *b) == (rays as u64, gates as u64) => Ok(Self::Full { rays, gates }),
+            (2, _) => {
+                Err(format!("variable {name} is {} x {}; {rays} rays x {gates} ranges are needed", shape[0], shape[1]))
+            }
+            (1, _) if file.has("ray_start_index") && file.has("ray_n_gates") => {
+                let whole = |name: &str, file: &mut ClassicFile| -> Result<Vec<usize>, String> {
+                    let values = file.floats(name)?;
+                    let bad = values.iter().any(|v| !(*v >= 0.0 && *v < 1e9));
+                    match bad || values.len() != rays {
+                        true => Err(format!("{name} must have a whole number for each ray")),
+                        false => Ok(values.into_iter().map(|v| v as usize).collect()),
+                    }
+                };
+                let (starts, counts) = (whole("ray_start_index", file)?, whole("ray_n_gates", file)?);
+                match counts.iter().find(|count| **count > gates) {
+                    Some(count) => Err(format!("a ray has {count} gates, range {gates} values")),
+                    None => Ok(Self::Ragged { starts, counts, gates }),
+                }
+            }
+            _ => Err(format!("variable {name} has {dims} dimensions; [time, range] are needed")),
+        }
+    }
+
+    /// The values \[ray, gate\], one ray after the other.
+    fn read(&self, file: &mut ClassicFile, name: &str) -> Result<Vec<f64>, String> {
+        let values = file.floats(name)?;
+        match self {
+            Self::Full { rays, gates } if values.len() == rays * gates => Ok(values),
+            Self::Full { rays, gates } => {
+                Err(format!("variable {name} has {} values; {rays} rays x {gates} ranges are needed", values.len()))
+            }
+            Self::Ragged { starts, counts, gates } => {
+                let mut out = vec![f64::NAN; starts.len() * gates];
+                for (ray, (start, count)) in starts.iter().zip(counts).enumerate() {
+                    let own = values.get(*start..start + count);
+                    let own = own.ok_or_else(|| format!("variable {name} ends before the gates of ray {ray}"))?;
+                    out[ray * gates..ray * gates + count].copy_from_slice(own);
+                }
+                Ok(out)
+            }
+        }
+    }
+
+    /// The first of some variables that is there.
+    fn optional(&self, file: &mut ClassicFile, names: &[&str]) -> Result<Option<Vec<f64>>, String> {
+        match names.iter().find(|name| file.has(name)) {
+            Some(name) => self.read(file, name).map(Some),
+            None => Ok(None),
+        }
+    }
+}
+
+/// An angle of each ray, rad.
+fn angles(file: &mut ClassicFile, name: &str) -> Result<Vec<f64>, String> {
+    let units = file.text(name, "units").unwrap_or("degrees").to_ascii_lowercase();
+    let values = file.floats(name)?;
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(ray) => Err(format!("{name} of ray {ray} is missing")),
+        None if units.starts_with("rad") => Ok(values),
+        None => Ok(values.into_iter().map(f64::to_radians).collect()),
+    }
+}
+
+/// Ranges of the centres of the gates, m.
+fn ranges(file: &mut ClassicFile) -> Result<Vec<f64>, String> {
+    let units = file.text("range", "units").unwrap_or("meters").to_ascii_lowercase();
+    let unit_m = if units.starts_with('k') { 1e3 } else { 1.0 };
+    // One row for each ray where gates differ.
+    if file.shape("range").is_some_and(|shape| shape.len() > 1) {
+        return Err("range has two dimensions: gates that are the same for all rays are needed".into());
+    }
+    Ok(file.floats("range")?.into_iter().map(|range| unit_m * range).collect())
+}
+
+/// Times of the rays in s, and the date from which they count.
+fn times(file: &mut ClassicFile, count: usize) -> Result<(Vec<f64>, Option<UtcTime>), String> {
+    if !file.has("time") {
+        return Ok((vec![f64::NAN; count], None));
+    }
+    let units = file.text("time", "units").unwrap_or_default().trim().to_owned();
+    let (unit, since) = units.split_once(" since ").unwrap_or((&units, ""));
+    let unit_s = match unit.trim().to_ascii_lowercase().as_str() {
+        "" | "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
+        "ms" | "millisecond" | "milliseconds" => 1e-3,
+        "us" | "microsecond" | "microseconds" => 1e-6,
+        "ns" | "nanosecond" | "nanoseconds" => 1e-9,
+        "min" | "minute" | "minutes" => 60.0,
+        "h" | "hour" | "hours" => 3600.0,
+        "d" | "day" | "days" => 86_400.0,
+        _ => return Err("the units of time are none of s, ms, us, ns, minutes, hours, days".into()),
+    };
+    // 2024-01-31T12:00:00Z, or with a blank, without the time, with parts of a second or another zone at the end.
+    let mut text = since.trim().replace(' ', "T");
+    text.truncate(text.char_indices().nth(19).map_or(text.len(), |(at, _)| at));
+    if text.len() == 10 {
+        text += "T00:00:00";
+    }
+    let reference = UtcTime::parse(&format!("{text}Z"));
+    let values = file.floats("time")?;
+    match values.len() == count {
+        true => Ok((values.into_iter().map(|value| unit_s * value).collect(), reference)),
+        false => Err(format!("time has {} values, elevation {count}: one for each ray", values.len())),
+    }
+}
+
+/// The rays of each sweep.
+fn sweeps(file: &mut ClassicFile, count: usize) -> Result<Vec<std::ops::Range<usize>>, String> {
+    let (start, end) = ("sweep_start_ray_index", "sweep_end_ray_index");
+    if !(file.has(start) && file.has(end)) {
+        return Ok(std::iter::once(0..count).collect());
+    }
+    let (starts, ends) = (file.floats(start)?, file.floats(end)?);
+    starts
+        .iter()
+        .zip(&ends)
+        .enumerate()
+        .map(|(sweep, (start, end))| match 0.0 <= *start && start <= end && *end < count as f64 {
+            true => Ok(*start as usize..*end as usize + 1),
+            false => Err(format!(
+                "sweep {sweep} goes from ray {start} to ray {end}; the file has rays 0 to {}",
+                count.max(1) - 1
+            )),
+        })
+        .collect()
+}
+
+/// The largest velocity that can be told apart, m/s: that of the file's first ray.
+fn nyquist(file: &mut ClassicFile) -> Result<Option<f64>, String> {
+    if file.has("nyquist_velocity") { first(file, "nyquist_velocity") } else { Ok(None) }
+}
+
+/// The first value of a variable, if it is above 0.
+fn first(file: &mut ClassicFile, name: &str) -> Result<Option<f64>, String> {
+    Ok(file.floats(name)?.first().copied().filter(|value| *value > 0.0 && value.is_finite()))
+}

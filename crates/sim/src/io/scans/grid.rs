@@ -1,0 +1,226 @@
+//! Lines of sight with their velocities as the grid of a map: sorted by elevation, equal ones averaged, checked.
+//!
+//! Check: scans up and down, lines of one elevation, angles of several azimuths.
+
+use ndarray::Array2;
+use std::ops::Range;
+use wakescope_estimate::retrieval::ScanMap;
+
+/// A line of sight as a file has it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct RayRow {
+    pub(super) elevation_rad: f64,
+    /// NaN if unknown.
+    pub(super) azimuth_rad: f64,
+    /// NaN if unknown.
+    pub(super) time_s: f64,
+    pub(super) velocity_m_s: Vec<f64>,
+    /// Empty if there are none.
+    pub(super) sigma_m_s: Vec<f64>,
+}
+
+/// Largest difference of the azimuths of one scan, rad.
+const ONE_PLANE_RAD: f64 = 0.02;
+/// Part of a scan's elevations that a line must go back for another scan to begin.
+const TURN: f64 = 0.1;
+/// Least lines, gates and velocities of a map.
+const LEAST: (usize, usize, usize) = (3, 3, 30);
+
+/// The map of rays; `what` names the scan in messages.
+pub(super) fn scan_map(
+    mut rays: Vec<RayRow>,
+    range_m: Vec<f64>,
+    fold_m_s: Option<f64>,
+    what: &str,
+) -> Result<ScanMap, String> {
+    if let Some(bad) = rays.iter().find(|ray| !(ray.elevation_rad.abs() <= std::f64::consts::FRAC_PI_2 + 1e-6)) {
+        return Err(format!(
+            "{what}: elevation is {} degrees: from -90 to 90 are allowed",
+            bad.elevation_rad.to_degrees()
+        ));
+    }
+    let gates = range_m.len();
+    if let Some(pair) = range_m.windows(2).find(|pair| !(pair[1] > pair[0])) {
+        return Err(format!(
+            "{what}: range must increase from gate to gate, and {} m is followed by {} m",
+            pair[0], pair[1]
+        ));
+    }
+    if !range_m.first().is_some_and(|first| *first >= 0.0 && first.is_finite()) {
+        return Err(format!("{what}: range must be at least 0 m at the first gate"));
+    }
+    rays.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
+    let mut lines: Vec<Vec<RayRow>> = Vec::new();
+    for ray in rays {
+        match lines.last_mut() {
+            Some(line) if line.first().is_some_and(|first| first.elevation_rad == ray.elevation_rad) => line.push(ray),
+            _ => lines.push(vec![ray]),
+        }
+    }
+    let (least_lines, least_gates, least_values) = LEAST;
+    if lines.len() < least_lines || gates < least_gates {
+        return Err(format!(
+            "{what}: it has {} different elevations and {gates} ranges; a scan in elevation (RHI) of at least {least_lines} lines and \
+             {least_gates} gates is needed",
+            lines.len()
+        ));
+    }
+    let has_sigma = lines.iter().flatten().all(|ray| !ray.sigma_m_s.is_empty());
+    let mean_at = |line: &[RayRow], of: &dyn Fn(&RayRow) -> f64| {
+        let values: Vec<f64> = line.iter().map(of).filter(|value| value.is_finite()).collect();
+        values.iter().sum::<f64>() / values.len() as f64
+    };
+    let sigma_at = |line: usize, gate: usize| {
+        let rows = &lines[line];
+        let count = rows.iter().filter(|ray| ray.velocity_m_s[gate].is_finite()).count();
+        mean_at(rows, &|ray| ray.sigma_m_s[gate]) / (count as f64).sqrt()
+    };
+    let mut velocity_m_s = Array2::from_shape_fn((lines.len(), gates), |(line, gate)| {
+        mean_at(&lines[line], &|ray| ray.velocity_m_s[gate])
+    });
+    let mut sigma_m_s =
+        has_sigma.then(|| Array2::from_shape_fn((lines.len(), gates), |(line, gate)| sigma_at(line, gate)));
+    if let Some(sigma) = &mut sigma_m_s {
+        let good = |value: &f64| value.is_finite() && *value > 0.0;
+        if sigma.iter().any(good) {
+            // A velocity of unknown error counts for nothing.
+            velocity_m_s.zip_mut_with(sigma, |velocity, sigma| {
+                if !good(sigma) {
+                    *velocity = f64::NAN
+                }
+            });
+            sigma.mapv_inplace(|value| if good(&value) { value } else { 1.0 });
+        } else {
+            sigma_m_s = None;
+        }
+    }
+    let values = velocity_m_s.iter().filter(|value| value.is_finite()).count();
+    if values < least_values {
+        return Err(match values {
+            0 => format!("{what}: all of its velocities are missing"),
+            _ => format!("{what}: it has {values} velocities that are not missing; at least {least_values} are needed"),
+        });
+    }
+    if let Some(bad) = velocity_m_s.iter().find(|value| value.abs() > 500.0) {
+        return Err(format!("{what}: a velocity is {bad} m/s: its unit must be m/s, and a missing one its fill value"));
+    }
+    Ok(ScanMap {
+        elevation_rad: lines.iter().map(|line| line[0].elevation_rad).collect(),
+        time_s: times(&lines.iter().map(|line| mean_at(line, &|ray| ray.time_s)).collect::<Vec<_>>()),
+        range_m,
+        velocity_m_s,
+        sigma_m_s,
+        fold_m_s: fold_m_s.filter(|fold| *fold > 0.0 && fold.is_finite()),
+    })
+}
+
+/// Times of all lines, or of none.
+fn times(of_lines: &[f64]) -> Vec<f64> {
+    let known = of_lines.iter().all(|time| time.is_finite());
+    if known { of_lines.to_vec() } else { vec![f64::NAN; of_lines.len()] }
+}
+
+/// Whether the rays lie in one vertical plane on one side of the lidar; else the lowest and the highest azimuth, degrees.
+pub(super) fn one_plane(rays: &[RayRow]) -> Result<(), (f64, f64)> {
+    let Some(first) = rays.iter().map(|ray| ray.azimuth_rad).find(|azimuth| azimuth.is_finite()) else { return Ok(()) };
+    let apart = |azimuth: f64| {
+        (azimuth - first + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI
+    };
+    // Near the zenith an azimuth says nothing.
+    let known = rays.iter().filter(|ray| ray.azimuth_rad.is_finite() && ray.elevation_rad.cos() > 0.05);
+    let (low, high) =
+        known.map(|ray| apart(ray.azimuth_rad)).fold((0.0_f64, 0.0_f64), |(low, high), a| (low.min(a), high.max(a)));
+    match high - low <= ONE_PLANE_RAD {
+        true => Ok(()),
+        false => Err(((first + low).to_degrees(), (first + high).to_degrees())),
+    }
+}
+
+/// Scans that follow each other: a line that goes back by more than a tenth of all elevations begins another.
+pub(super) fn between_turns(elevation_rad: &[f64]) -> Vec<Range<usize>> {
+    let ends =
+        elevation_rad.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| (low.min(*e), high.max(*e)));
+    let back = TURN * (ends.1 - ends.0);
+    let mut out = Vec::new();
+    let (mut first, mut extreme, mut direction) = (0, 0, 0.0);
+    for i in 1..elevation_rad.len() {
+        let step = elevation_rad[i] - elevation_rad[extreme];
+        if direction == 0.0 {
+            if step.abs() > back {
+                direction = step.signum();
+                extreme = i;
+            }
+        } else if step * direction >= 0.0 {
+            extreme = i;
+        } else if step.abs() > back {
+            out.push(first..extreme + 1);
+            (first, direction) = (extreme + 1, 0.0);
+            // What goes on the same way after a jump back is a scan, too.
+            extreme = first;
+        }
+    }
+    out.push(first..elevation_rad.len());
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rays(elevations: impl IntoIterator<Item = f64>) -> Vec<RayRow> {
+        let ray = |(i, elevation_rad): (usize, f64)| RayRow {
+            elevation_rad,
+            azimuth_rad: 1.0,
+            time_s: i as f64,
+            velocity_m_s: vec![i as f64; 12],
+            sigma_m_s: Vec::new(),
+        };
+        elevations.into_iter().enumerate().map(ray).collect()
+    }
+
+    fn range_m() -> Vec<f64> {
+        (1..=12).map(|i| 10.0 * f64::from(i)).collect()
+    }
+
+    #[test]
+    fn lines_are_sorted_and_equal_ones_averaged() {
+        let map = scan_map(rays([0.3, 0.2, 0.2, 0.1]), range_m(), Some(20.0), "it").unwrap();
+        assert_eq!(map.elevation_rad, [0.1, 0.2, 0.3]);
+        assert_eq!((map.time_s.clone(), map.velocity_m_s[[1, 5]]), (vec![3.0, 1.5, 0.0], 1.5));
+        assert_eq!((map.fold_m_s, map.sigma_m_s.clone()), (Some(20.0), None));
+        assert!(map.validate().is_ok());
+    }
+
+    #[test]
+    fn scans_end_where_the_elevation_turns() {
+        let up = |n: usize| (0..n).map(|i| 0.01 * i as f64);
+        let both: Vec<f64> = up(20).chain(up(20).rev().skip(1)).collect();
+        assert_eq!(between_turns(&both), [0..20, 20..39]);
+        let again: Vec<f64> = up(20).chain(up(20)).chain(up(20)).collect();
+        assert_eq!(between_turns(&again), [0..20, 20..40, 40..60]);
+        let mut shaky: Vec<f64> = up(20).collect();
+        shaky[7] -= 0.011;
+        assert_eq!(between_turns(&shaky), [0..20]);
+    }
+
+    #[test]
+    fn what_is_no_scan_is_refused_by_name() {
+        let refused = |rays: Vec<RayRow>, range_m: Vec<f64>| scan_map(rays, range_m, None, "sweep 3").unwrap_err();
+        assert!(refused(rays([0.1; 9]), range_m()).contains("sweep 3: it has 1 different elevations"));
+        assert!(refused(rays([0.1, 0.2, 3.0]), range_m()).contains("elevation"));
+        let mut falling = range_m();
+        falling.swap(3, 4);
+        assert!(refused(rays([0.1, 0.2, 0.3]), falling).contains("range must increase"));
+        let mut missing = rays([0.1, 0.2, 0.3]);
+        missing.iter_mut().for_each(|ray| ray.velocity_m_s = vec![f64::NAN; 12]);
+        assert!(refused(missing.clone(), range_m()).contains("all of its velocities are missing"));
+        missing.iter_mut().for_each(|ray| ray.velocity_m_s = vec![-9999.0; 12]);
+        assert!(refused(missing, range_m()).contains("fill value"));
+        let mut planes = rays([0.1, 0.2, 0.3]);
+        assert_eq!(one_plane(&planes), Ok(()));
+        planes[1].azimuth_rad = 1.0 + std::f64::consts::TAU;
+        assert_eq!(one_plane(&planes), Ok(()));
+        planes[1].azimuth_rad = 1.5;
+        assert!(one_plane(&planes).is_err());
+    }
+}

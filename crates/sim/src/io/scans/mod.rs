@@ -1,0 +1,87 @@
+//! Scans of radial velocity that any instrument or program wrote, as maps for a retrieval.
+//!
+//! | format | how it is known | sign, angles, gaps |
+//! |---|---|---|
+//! | CfRadial 1.4, classic NetCDF | its first bytes | by standard names and units; fill values; sweeps that are no RHI are left out |
+//! | HALO `.hpl` | the line `****` | positive away; below an intensity threshold there is noise |
+//! | table | the header names `range_m`, an elevation and a velocity | positive away; empty cells |
+//!
+//! Check: what the writers write comes back; files of other hands; damaged ones are refused with their field.
+
+#[cfg(feature = "netcdf")]
+mod cfradial;
+mod grid;
+mod hpl;
+mod table;
+
+use crate::Error;
+use crate::io::{UtcTime, text_file};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use wakescope_estimate::retrieval::ScanMap;
+
+/// What a file does not say of its velocities.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ScanFormat {
+    /// The variable or column that holds the velocities.
+    pub field: Option<String>,
+    /// Whether velocities are positive towards the lidar.
+    pub towards: bool,
+    /// Least signal-to-noise ratio, dB, where the file has one.
+    pub min_snr_db: Option<f64>,
+}
+
+/// One scan of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadScan {
+    /// The file.
+    pub path: PathBuf,
+    /// Number of the sweep in the file, from 0.
+    pub sweep: usize,
+    /// The velocities; times count from `reference`.
+    pub map: ScanMap,
+    /// Date from which times count, if the file has one.
+    pub reference: Option<UtcTime>,
+    /// Length of a gate that touches its neighbours, m, if the file says so.
+    pub gate_length_m: Option<f64>,
+    /// Duration of a pulse, s, if the file has it.
+    pub pulse_width_s: Option<f64>,
+    /// The scene that this program wrote the file for.
+    pub scene_toml: Option<String>,
+}
+
+/// Reads the scans of a file; the sweeps that are none are left out, and said in the texts.
+///
+/// # Errors
+/// A file that cannot be read, is damaged or cut short, has no scan in elevation, or no velocity that is not missing.
+pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<String>), Error> {
+    let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
+    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+    let (file, length) = text_file::open(path).map_err(unreadable)?;
+    let mut magic = Vec::new();
+    file.take(8).read_to_end(&mut magic).map_err(unreadable)?;
+    match &magic[..] {
+        #[cfg(feature = "netcdf")]
+        [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => cfradial::read(path, format),
+        #[cfg(not(feature = "netcdf"))]
+        [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
+            Err(refuse("it is NetCDF, which this program was built without: feature netcdf".into()))
+        }
+        _ => {
+            if length > LARGEST_TEXT_BYTES {
+                return Err(refuse(format!("it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read")));
+            }
+            let bytes = std::fs::read(path).map_err(unreadable)?;
+            // Files of instruments have names of places in all encodings; numbers are the same in each.
+            let text = String::from_utf8_lossy(&bytes);
+            let found = match text.lines().take(60).any(|line| line.trim_start().starts_with("****")) {
+                true => hpl::scans(&text, path, format),
+                false => table::scans(&text, path, format),
+            };
+            found.map(|scans| (scans, Vec::new())).map_err(refuse)
+        }
+    }
+}
+
+/// Largest text that is read \[bytes\].
+const LARGEST_TEXT_BYTES: u64 = 1 << 30;

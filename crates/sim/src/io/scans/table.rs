@@ -1,0 +1,202 @@
+//! Scans from a table: a row for each velocity in any order, the grid recognised from the cells.
+//!
+//! Check: maps of a run, references, cells that are missing, twice there, or make no grid.
+
+use super::grid::{RayRow, one_plane, scan_map};
+use super::{ReadScan, ScanFormat};
+use crate::io::csv_input::TextTable;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Names of the velocity, the first that is there is taken.
+const VELOCITIES: [&str; 4] = ["velocity_m_s", "v_mean_m_s", "radial_velocity_m_s", "radial_velocity"];
+/// Names of its standard deviation.
+const SIGMAS: [&str; 3] = ["sigma_m_s", "std_m_s", "predicted_std_m_s"];
+/// Values of an axis that differ by less than this part of its mean step are the same.
+const SAME: f64 = 1e-3;
+
+/// Columns of a table that are read.
+struct Columns {
+    range: usize,
+    elevation: (usize, f64),
+    azimuth: Option<(usize, f64)>,
+    time: Option<usize>,
+    velocity: usize,
+    sigma: Option<usize>,
+    sweep: Option<usize>,
+    snr: Option<usize>,
+    flagged: Option<usize>,
+    count: Option<usize>,
+}
+
+impl Columns {
+    fn new(table: &TextTable, format: &ScanFormat) -> Result<Self, String> {
+        let needed = |names: &[&str]| -> Result<usize, String> {
+            let found = names.iter().find_map(|name| table.column(name));
+            found.ok_or_else(|| {
+                format!(
+                    "it has no column {}: range_m, elevation_rad (or elevation_deg), velocity_m_s and, if known, time_s and sigma_m_s \
+                     are read",
+                    names.join(" or ")
+                )
+            })
+        };
+        let angle = |name: &str| {
+            let degrees = 1f64.to_radians();
+            table
+                .column(&format!("{name}_rad"))
+                .map(|c| (c, 1.0))
+                .or(table.column(&format!("{name}_deg")).map(|c| (c, degrees)))
+        };
+        let elevation = match angle("elevation") {
+            Some(elevation) => elevation,
+            None => (needed(&["elevation_rad"])?, 1.0),
+        };
+        let velocity = match &format.field {
+            Some(name) => needed(&[name])?,
+            None => needed(&VELOCITIES)?,
+        };
+        let is_mean = table.header.get(velocity).is_some_and(|name| name == "v_mean_m_s");
+        let sigma = SIGMAS.iter().find_map(|name| table.column(name));
+        Ok(Self {
+            range: needed(&["range_m"])?,
+            elevation,
+            azimuth: angle("azimuth"),
+            time: table.column("time_s"),
+            velocity,
+            sigma,
+            sweep: table.column("sweep").or(table.column("scan")),
+            snr: table.column("snr_db"),
+            flagged: table.column("flagged"),
+            // The mean of so many scans.
+            count: table.column("count").filter(|_| is_mean),
+        })
+    }
+}
+
+/// The scans of a table.
+pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<ReadScan>, String> {
+    let table = TextTable::parse(text)?;
+    let columns = Columns::new(&table, format)?;
+    let mut rows: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+    for row in 0..table.rows.len() {
+        let sweep = columns.sweep.map_or(0.0, |column| table.number(row, column));
+        if !(sweep >= 0.0 && sweep.fract() == 0.0) {
+            return Err(format!("row {}: sweep is no whole number", row + 1));
+        }
+        rows.entry(sweep as u64).or_default().push(row);
+    }
+    if rows.is_empty() {
+        return Err("it has a header and no rows".into());
+    }
+    let origin = table.origin();
+    rows.into_iter()
+        .map(|(sweep, rows)| {
+            let (rays, range_m) = cells(&table, &columns, &rows, format)?;
+            let what = format!("sweep {sweep}");
+            one_plane(&rays).map_err(|(low, high)| {
+                format!("{what}: it has azimuths from {low:.2} to {high:.2} degrees; a scan in elevation (RHI) has one")
+            })?;
+            Ok(ReadScan {
+                path: path.to_owned(),
+                sweep: sweep as usize,
+                map: scan_map(rays, range_m, None, &what)?,
+                reference: None,
+                gate_length_m: None,
+                pulse_width_s: None,
+                scene_toml: Some(origin.scene_toml.clone()).filter(|text| !text.is_empty()),
+            })
+        })
+        .collect()
+}
+
+/// The rays of one scan on the ranges of all.
+fn cells(
+    table: &TextTable,
+    columns: &Columns,
+    rows: &[usize],
+    format: &ScanFormat,
+) -> Result<(Vec<RayRow>, Vec<f64>), String> {
+    let number = |row: usize, column: usize| table.number(row, column);
+    let mut places = Vec::with_capacity(rows.len());
+    for &row in rows {
+        let (range_m, elevation_rad) =
+            (number(row, columns.range), columns.elevation.1 * number(row, columns.elevation.0));
+        if !(range_m.is_finite() && elevation_rad.is_finite()) {
+            return Err(format!("row {}: its range or elevation is no number", row + 1));
+        }
+        places.push((range_m, elevation_rad));
+    }
+    let range_m = axis(places.iter().map(|place| place.0));
+    let elevation_rad = axis(places.iter().map(|place| place.1));
+    if range_m.len() * elevation_rad.len() > 10 * rows.len() + 1000 {
+        return Err(format!(
+            "its {} rows make no polar grid: they have {} different ranges and {} different elevations",
+            rows.len(),
+            range_m.len(),
+            elevation_rad.len()
+        ));
+    }
+    let empty = |elevation_rad: &f64| RayRow {
+        elevation_rad: *elevation_rad,
+        azimuth_rad: f64::NAN,
+        time_s: f64::NAN,
+        velocity_m_s: vec![f64::NAN; range_m.len()],
+        sigma_m_s: if columns.sigma.is_some() { vec![f64::NAN; range_m.len()] } else { Vec::new() },
+    };
+    let mut rays: Vec<RayRow> = elevation_rad.iter().map(empty).collect();
+    let mut seen = vec![false; range_m.len() * elevation_rad.len()];
+    let sign = if format.towards { -1.0 } else { 1.0 };
+    for (&row, (range, elevation)) in rows.iter().zip(places) {
+        let (line, gate) = (nearest(&elevation_rad, elevation), nearest(&range_m, range));
+        if std::mem::replace(&mut seen[line * range_m.len() + gate], true) {
+            return Err(format!(
+                "row {}: range {range} m at elevation {elevation} rad is there twice: a column sweep tells scans apart",
+                row + 1
+            ));
+        }
+        let ray = &mut rays[line];
+        let text = table.rows[row][columns.velocity].trim();
+        let velocity_m_s = number(row, columns.velocity);
+        if velocity_m_s.is_nan() && !(text.is_empty() || text.eq_ignore_ascii_case("nan")) {
+            return Err(format!("row {}: its velocity is no number; an empty cell is a missing one", row + 1));
+        }
+        let noisy = columns.snr.is_some_and(|c| format.min_snr_db.is_some_and(|least| !(number(row, c) >= least)));
+        let is_flagged = columns.flagged.is_some_and(|c| number(row, c) > 0.5);
+        if !noisy && !is_flagged {
+            ray.velocity_m_s[gate] = sign * velocity_m_s;
+        }
+        if let Some(column) = columns.sigma {
+            let count = columns.count.map_or(1.0, |c| number(row, c).max(1.0));
+            ray.sigma_m_s[gate] = number(row, column) / count.sqrt();
+        }
+        for (of, value) in [
+            (&mut ray.time_s, columns.time.map(|c| number(row, c))),
+            (&mut ray.azimuth_rad, columns.azimuth.map(|(c, unit)| unit * number(row, c))),
+        ] {
+            if let Some(value) = value.filter(|value| value.is_finite()) {
+                *of = value;
+            }
+        }
+    }
+    Ok((rays, range_m))
+}
+
+/// Different values, increasing; those that rounding alone sets apart are one.
+fn axis(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut all: Vec<f64> = values.collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    let step = match (all.first(), all.last()) {
+        (Some(first), Some(last)) if all.len() > 1 => (last - first) / (all.len() - 1) as f64,
+        _ => 0.0,
+    };
+    all.dedup_by(|next, kept| *next - *kept <= SAME * step);
+    all
+}
+
+fn nearest(axis: &[f64], value: f64) -> usize {
+    let above = axis.partition_point(|x| *x <= value);
+    let near = [above.saturating_sub(1), above.min(axis.len().saturating_sub(1))];
+    if (axis[near[0]] - value).abs() <= (axis[near[1]] - value).abs() { near[0] } else { near[1] }
+}

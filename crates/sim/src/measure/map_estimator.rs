@@ -1,0 +1,176 @@
+//! The estimator of a scene with the regions of its maps and the noise that it is held against: what turns the windows of a
+//! scan into velocities, whether the records are simulated or read from a file.
+//!
+//! Check: maps of simulated records have the same bits whether they come from memory or from a file, whole or in blocks.
+
+use crate::Error;
+use crate::measure::estimators::{self, Toolkit, WindowStatistics};
+use crate::measure::region::{interpolated, region_radius};
+use crate::measure::scan::mean_snr;
+use crate::plan::Plan;
+use ndarray::Array2;
+use wakescope_estimate::{
+    GateVelocity, Gates, Radius, Sampling, Scan, Statistic,
+    estimators::NoiseTest,
+    map::{MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCorrelation},
+    window::Sample,
+};
+
+/// Statistic, regions and estimator of a scene.
+pub(crate) struct MapEstimator<S> {
+    sampling: Sampling,
+    gates: Gates,
+    record_samples: usize,
+    tools: Toolkit<S>,
+    correlation: WindowCorrelation,
+    radius: Radius,
+    /// Rate of false alarms of the test against noise; 0 without one.
+    rate: f64,
+}
+
+impl<S: Sample> MapEstimator<S> {
+    /// For the lines of `places`; `layer_snr` holds range, m, and expected signal-to-noise ratio of the layers of a line.
+    ///
+    /// # Errors
+    /// What the estimators refuse; a checked scene gives none.
+    pub(crate) fn new(plan: &Plan, layer_snr: &[(f64, f64)], places: &ScanGeometry) -> Result<Self, Error> {
+        let (scene, g) = (&plan.scene.scene, &plan.geometry);
+        let pulse = &plan.instrument.pulse;
+        let snr = mean_snr(layer_snr);
+        let correlation = estimators::window_correlation(scene, pulse, snr)?;
+        let radius = region_radius(scene, pulse, layer_snr, places, &correlation)?;
+        let lines = places.line_elevation_rad();
+        let middle =
+            PolarPoint { range_m: g.gate_range_m[g.gate_range_m.len() / 2], elevation_rad: lines[lines.len() / 2] };
+        let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
+        let known = WindowStatistics { snr, n_eff };
+        Ok(Self {
+            sampling: estimators::sampling(scene)?,
+            gates: estimators::gates(scene)?,
+            record_samples: g.samples,
+            tools: Toolkit::new(scene, &plan.instrument, &known)?,
+            correlation,
+            radius,
+            rate: scene.estimator.false_alarm,
+        })
+    }
+
+    /// Numbers of a window.
+    pub(crate) fn numbers(&self) -> usize {
+        self.tools.statistic.statistic_len()
+    }
+
+    /// Radius of the region at a range, m.
+    pub(crate) fn radius_m(&self, range_m: f64) -> Result<f64, Error> {
+        Ok(self.radius.at_m(range_m)?)
+    }
+
+    /// Angle that the region at a range reaches from its line, rad.
+    pub(crate) fn reach_rad(&self, range_m: f64) -> Result<f64, Error> {
+        let share = self.radius_m(range_m)? / range_m;
+        Ok(if share < 1.0 { share.asin() } else { std::f64::consts::PI })
+    }
+
+    /// How many such angles away the windows are that an estimate depends on: estimates that follow the wind need those of others.
+    pub(crate) fn windows_reach(&self) -> f64 {
+        if self.tools.following.is_some() { 2.0 } else { 1.0 }
+    }
+
+    /// Sums over the windows of some lines, still without any record.
+    pub(crate) fn sums(&self, places: ScanGeometry) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
+        Ok(ScanSums::new(&*self.tools.statistic, &self.gates, places, self.record_samples)?)
+    }
+
+    /// Mean power, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
+    pub(crate) fn noise_power_a2(&self) -> f64 {
+        self.tools.noise.map_or(f64::NAN, |noise| noise.power)
+    }
+
+    /// Density, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
+    pub(crate) fn noise_density_a2(&self) -> f64 {
+        self.tools.noise.map_or(f64::NAN, |noise| noise.detection)
+    }
+
+    /// Velocities at points, the gates of a line together and lines by increasing elevation.
+    pub(crate) fn map(&self, scan: &Scan, points: &[PolarPoint]) -> Result<Vec<MapPoint>, Error> {
+        let Toolkit { estimator, following, .. } = &self.tools;
+        let first = scan.map(points, &self.radius, Some(&self.correlation), &**estimator)?;
+        let Some(following) = following else { return Ok(first) };
+        let gates = points.iter().take_while(|p| p.elevation_rad == points[0].elevation_rad).count().max(1);
+        let shape = (points.len() / gates, gates);
+        let velocity_m_s = Array2::from_shape_fn(shape, |(i, j)| first[i * gates + j].estimate.velocity_m_s);
+        let guess = interpolated(points, velocity_m_s);
+        let mut second = scan.map_following(points, &self.radius, S::KIND, &self.sampling, &guess, &**following)?;
+        second.iter_mut().zip(&first).for_each(|(point, first)| point.n_eff = first.n_eff);
+        Ok(second)
+    }
+
+    /// What noise gives at points of a scan.
+    pub(crate) fn noise(&self, places: &ScanGeometry, points: &[PolarPoint]) -> Result<NoiseAtPoints, Error> {
+        let (Some(test), Some(noise)) = (&self.tools.test, &self.tools.noise) else {
+            return Ok(NoiseAtPoints { threshold: None, deviation: vec![0.0; points.len()] });
+        };
+        let windows =
+            |point: &PolarPoint| Ok(places.level(*point, self.radius.at_m(point.range_m)?, test.correlation()).1);
+        let n_eff = points.iter().map(windows).collect::<Result<Vec<f64>, Error>>()?;
+        let threshold = match self.rate > 0.0 {
+            true => Some(thresholds(test, noise, &n_eff, self.rate)?),
+            false => None,
+        };
+        Ok(NoiseAtPoints { threshold, deviation: n_eff.iter().map(|n_eff| test.band_deviation(*n_eff)).collect() })
+    }
+}
+
+/// What noise alone gives at each point of a map.
+pub(crate) struct NoiseAtPoints {
+    /// Density in the band, A^2, that noise exceeds with the probability of the scene; none without a test.
+    threshold: Option<Vec<f64>>,
+    /// Standard deviation of the power in the band over its mean.
+    deviation: Vec<f64>,
+}
+
+impl NoiseAtPoints {
+    /// Whether an estimate does not stand out of noise, or is flagged by itself.
+    pub(crate) fn flags(&self, point: usize, estimate: &GateVelocity) -> bool {
+        match &self.threshold {
+            Some(threshold) => !estimate.exceeds(threshold[point]),
+            None => !estimate.is_good(),
+        }
+    }
+
+    /// Density of the peak over what noise exceeds with the rate of the scene; NaN without a test.
+    pub(crate) fn detection_ratio(&self, point: usize, estimate: &GateVelocity) -> f64 {
+        self.threshold.as_ref().map_or(f64::NAN, |threshold| estimate.detection / threshold[point])
+    }
+
+    /// Standard deviation of the power of noise in the band over its mean.
+    pub(crate) fn deviation(&self, point: usize) -> f64 {
+        self.deviation[point]
+    }
+}
+
+/// Signal-to-noise ratio, dB, of a mean power over that of noise in `count` maps; NaN below twice its standard deviation, of one
+/// map `deviation`.
+pub(crate) fn snr_db(power_ratio: f64, deviation: f64, count: f64) -> f64 {
+    let snr = power_ratio - 1.0;
+    if snr > 2.0 * deviation / count.sqrt() { 10.0 * snr.log10() } else { f64::NAN }
+}
+
+/// Densities, A^2, that noise exceeds with probability `rate`; NaN where there is no window.
+fn thresholds(test: &NoiseTest, noise: &GateVelocity, n_eff: &[f64], rate: f64) -> Result<Vec<f64>, Error> {
+    // Many points share their number of windows; a thousandth of it changes nothing.
+    let mut known = std::collections::HashMap::new();
+    let mut of = |n_eff: f64| -> Result<f64, Error> {
+        let step = (1e3 * n_eff.ln()).round();
+        if n_eff.is_nan() || n_eff <= 0.0 {
+            return Ok(f64::NAN);
+        }
+        match known.entry(step as i64) {
+            std::collections::hash_map::Entry::Occupied(level) => Ok(*level.get()),
+            std::collections::hash_map::Entry::Vacant(place) => {
+                Ok(*place.insert(noise.detection * test.threshold((1e-3 * step).exp(), rate)?))
+            }
+        }
+    };
+    n_eff.iter().map(|n_eff| of(*n_eff)).collect()
+}

@@ -1,0 +1,172 @@
+//! The lines of sight of records from a file: which records belong to which line and scan, and when.
+//!
+//! Check: scans that go up, up and down, or repeat; angles that are missing.
+
+use crate::Error;
+use crate::io::csv_input::TextTable;
+use crate::io::raw::RawRecords;
+use crate::plan::Plan;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Angles and times of records, or of lines, from a table of the user's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RayTable {
+    path: PathBuf,
+    /// Elevations, rad.
+    elevation_rad: Vec<f64>,
+    /// Times, s.
+    time_s: Option<Vec<f64>>,
+}
+
+impl RayTable {
+    /// Reads `elevation_rad` or `elevation_deg`, and `time_s` where there is one, a row for each record or for each line.
+    ///
+    /// # Errors
+    /// A table that cannot be read, without an elevation, or with a cell that is no number.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let table = TextTable::read(path)?;
+        let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+        let column = |name: &str| -> Result<Option<Vec<f64>>, Error> {
+            let Some(column) = table.column(name) else { return Ok(None) };
+            let values: Vec<f64> = (0..table.rows.len()).map(|row| table.number(row, column)).collect();
+            match values.iter().position(|value| !value.is_finite()) {
+                Some(row) => Err(refuse(format!("row {}: {name} is no number", row + 1))),
+                None => Ok(Some(values)),
+            }
+        };
+        let elevation_rad = match (column("elevation_rad")?, column("elevation_deg")?) {
+            (Some(values), _) => values,
+            (None, Some(values)) => values.into_iter().map(f64::to_radians).collect(),
+            (None, None) => return Err(refuse("it has no column elevation_rad or elevation_deg".into())),
+        };
+        Ok(Self { path: path.to_owned(), elevation_rad, time_s: column("time_s")? })
+    }
+}
+
+/// The lines of one scan, in the order of their records.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ScanLines {
+    /// Elevation of each line, rad.
+    pub elevation_rad: Vec<f64>,
+    /// Time of each line, s.
+    pub time_s: Vec<f64>,
+    /// First record of each line, and the end of the last.
+    pub(super) first_record: Vec<usize>,
+}
+
+impl ScanLines {
+    /// The records of some lines.
+    pub(super) fn records(&self, lines: &Range<usize>) -> Range<usize> {
+        self.first_record[lines.start]..self.first_record[lines.end]
+    }
+
+    /// Elevation of each record of some lines, rad.
+    pub(super) fn record_elevation_rad(&self, lines: &Range<usize>) -> Vec<f64> {
+        let of = |line: usize| {
+            let count = self.first_record[line + 1] - self.first_record[line];
+            std::iter::repeat_n(self.elevation_rad[line], count)
+        };
+        lines.clone().flat_map(of).collect()
+    }
+}
+
+/// Records of a file by scan and line: by the table, by what the file says, or as the scene has them.
+///
+/// # Errors
+/// Records that do not fit the angles, angles that are none, times that do not increase.
+pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>) -> Result<Vec<ScanLines>, Error> {
+    let count = records.records();
+    let per_line = plan.scene.scene.scan.pulses_per_line;
+    let (elevation_rad, time_s) = match table {
+        Some(table) => of_table(table, count, per_line)?,
+        None => match &records.about.elevation_rad {
+            Some(elevation_rad) => (elevation_rad.clone(), records.about.time_s.clone()),
+            None => (of_scene(plan, records)?, records.about.time_s.clone()),
+        },
+    };
+    let prt_s = 1.0 / plan.scene.scene.laser.pulse_repetition_hz;
+    let time_s = time_s.unwrap_or_else(|| (0..count).map(|i| plan.wind.start_s + i as f64 * prt_s).collect());
+    if let Some(bad) = elevation_rad.iter().find(|angle| !(angle.abs() <= std::f64::consts::FRAC_PI_2 + 1e-9)) {
+        return Err(records.refuse(format!(
+            "an elevation is {bad} rad: from -pi/2 to pi/2 are allowed; degrees need the unit degrees, or a column elevation_deg"
+        )));
+    }
+    if time_s.len() != count {
+        return Err(records.refuse(format!("it has {count} records and {} times", time_s.len())));
+    }
+    if let Some(bad) = time_s.iter().find(|time| !time.is_finite()) {
+        return Err(records.refuse(format!("the time of a record is {bad}: each must be finite")));
+    }
+    let mut found: Vec<ScanLines> = Vec::new();
+    let mut first = 0;
+    let mut direction = 0.0;
+    while first < count {
+        let same = elevation_rad[first..].iter().take_while(|angle| **angle == elevation_rad[first]).count();
+        let last = found.last().and_then(|scan| scan.elevation_rad.last());
+        let step = last.map_or(0.0, |last| (elevation_rad[first] - last).signum());
+        // A line that goes back begins another scan.
+        if found.is_empty() || (direction != 0.0 && step != direction) {
+            found.push(ScanLines::default());
+            direction = 0.0;
+        } else {
+            direction = step;
+        }
+        if let Some(scan) = found.last_mut() {
+            scan.elevation_rad.push(elevation_rad[first]);
+            // The middle of the pulses.
+            scan.time_s.push(0.5 * (time_s[first] + time_s[first + same - 1]));
+            scan.first_record.push(first);
+        }
+        first += same;
+    }
+    let ends: Vec<usize> = found.iter().skip(1).map(|scan| scan.first_record[0]).chain([count]).collect();
+    found.iter_mut().zip(ends).for_each(|(scan, end)| scan.first_record.push(end));
+    let times: Vec<f64> = found.iter().flat_map(|scan| scan.time_s.iter().copied()).collect();
+    if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
+        // Repetitions of a simulated scan have the same times.
+        let whole_s = times[..found[0].time_s.len()].last().copied().unwrap_or(0.0) - times[0] + prt_s;
+        if found.iter().any(|scan| scan.time_s != found[0].time_s) {
+            return Err(
+                records.refuse(format!("the times of its lines do not increase: {} s, then {} s", pair[0], pair[1]))
+            );
+        }
+        for (i, scan) in found.iter_mut().enumerate() {
+            scan.time_s.iter_mut().for_each(|time_s| *time_s += i as f64 * whole_s);
+        }
+    }
+    Ok(found)
+}
+
+/// Angles and times of all records from those of records or lines.
+fn of_table(table: &RayTable, count: usize, per_line: usize) -> Result<(Vec<f64>, Option<Vec<f64>>), Error> {
+    let rows = table.elevation_rad.len();
+    if rows == count {
+        return Ok((table.elevation_rad.clone(), table.time_s.clone()));
+    }
+    if rows * per_line != count {
+        let reason = format!(
+            "it has {rows} rows; the {count} records need as many, or {} lines of scan.pulses_per_line = {per_line}",
+            count / per_line.max(1)
+        );
+        return Err(Error::Input { path: table.path.clone(), reason });
+    }
+    let each = |values: &Vec<f64>| values.iter().flat_map(|v| std::iter::repeat_n(*v, per_line)).collect::<Vec<_>>();
+    Ok((each(&table.elevation_rad), table.time_s.as_ref().map(each)))
+}
+
+/// Angles as the scene has them.
+fn of_scene(plan: &Plan, records: &RawRecords) -> Result<Vec<f64>, Error> {
+    let (count, lines) = (records.records(), &plan.geometry.elevation_rad);
+    let per_line = plan.scene.scene.scan.pulses_per_line;
+    let whole = lines.len() * per_line;
+    if !count.is_multiple_of(whole) {
+        return Err(records.refuse(format!(
+            "it has {count} records and no elevations; the scene has {} lines of scan.pulses_per_line = {per_line}, {whole} \
+             records a scan: change scan, or give the angles with --rays",
+            lines.len()
+        )));
+    }
+    let scan = lines.iter().flat_map(|angle| std::iter::repeat_n(*angle, per_line));
+    Ok(scan.cycle().take(count).collect())
+}

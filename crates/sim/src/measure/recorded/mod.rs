@@ -1,0 +1,267 @@
+//! Velocities from the records of a file, measured or simulated, through the estimator of a scene.
+//!
+//! Records of a simulation whose scene differs in estimator, outputs and site alone are held against the truth of that scene, as
+//! a run does it; all others give what an instrument can know: velocity, quality, n_eff, signal-to-noise ratio, and the standard
+//! deviation that the Cramer-Rao bound predicts for it. Records are read in pieces and lines in blocks, so that the memory for
+//! signals does not grow with their number.
+//! Check: maps of a run's own signals have the bytes of the run, from every format, whole or in blocks.
+
+mod blocks;
+mod lines;
+mod predicted;
+mod result;
+mod spectra;
+
+pub use lines::{RayTable, ScanLines};
+pub use predicted::predicted_table;
+pub use result::{MeasuredScan, measured_map};
+pub use spectra::Spectra;
+
+use crate::Error;
+use crate::io::raw::{RawRecords, RecordShape};
+use crate::measure::map::{self, VelocityEstimates};
+use crate::measure::progress::Observer;
+use crate::measure::scan::{Scanner, records_at_once};
+use crate::plan::{Plan, Stage, Target};
+use crate::scene::{DetectorSignal, Digitiser, Estimator, Outputs, Scene, SceneFile, Site};
+use num_complex::Complex;
+use std::ops::Range;
+use wakescope_estimate::window::Sample;
+
+/// The power of the noise that velocities are held against.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoiseLevel {
+    /// As the scene's receiver has it, for signals in ampere.
+    OfScene,
+    /// That of the quietest gates: the tenth part of the gates with the least power, in the mean over the lines.
+    Quietest,
+    /// Mean square of a sample of noise in the band, both quadratures together, in the square of the unit of the samples.
+    Given(f64),
+}
+
+/// How the records of a file are estimated.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RecordedOptions {
+    /// Angles and times of the records, where they are not those of the file or of the scene.
+    pub rays: Option<RayTable>,
+    /// The noise; that of the scene for its own signals and the quietest gates for others if absent.
+    pub noise: Option<NoiseLevel>,
+    /// Whether the spectrum of each gate is kept.
+    pub spectra: bool,
+    /// Most bytes that the sums of a block of lines may take.
+    pub block_bytes: Option<usize>,
+}
+
+/// What the records of a file give.
+#[derive(Debug, PartialEq)]
+pub enum Recorded {
+    /// Signals of a simulation, with the truth of its scene.
+    OfRun(Box<VelocityEstimates>),
+    /// Signals of which nothing is known but themselves.
+    Measured {
+        /// Velocities of each scan.
+        scans: Vec<MeasuredScan>,
+        /// Their spectra, if they were asked for.
+        spectra: Option<Spectra>,
+    },
+}
+
+/// A sample from the parts that a file holds.
+pub(crate) trait FromParts: Sample {
+    fn from_parts(parts: Complex<f64>) -> Self;
+}
+
+impl FromParts for f64 {
+    fn from_parts(parts: Complex<f64>) -> Self {
+        parts.re
+    }
+}
+
+impl FromParts for Complex<f64> {
+    fn from_parts(parts: Complex<f64>) -> Self {
+        parts
+    }
+}
+
+/// What a scene says of a record.
+pub fn record_shape(scene: &Scene) -> RecordShape {
+    RecordShape { samples: scene.samples_per_record(), pulses_per_line: scene.scan.pulses_per_line }
+}
+
+/// The plan for the records of a file: that of the scene with as many repetitions as the file has, and whether the truth of the
+/// scene is that of the records.
+///
+/// # Errors
+/// As [`Plan::new`]; records of another shape or kind than the scene's, recorded otherwise than it says.
+pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Error> {
+    fits(&scene.scene, records)?;
+    let whole = |scene: &Scene| {
+        let scan = &scene.scan;
+        let lines = ((scan.elevation_max_rad - scan.elevation_min_rad) / scan.elevation_step_rad + 1e-9) as usize + 1;
+        lines * scan.pulses_per_line
+    };
+    let is_own = records.about.scene_toml.as_deref().is_some_and(|toml| {
+        SceneFile::parse(toml, std::path::Path::new("scene"))
+            .is_ok_and(|own| signals_of(&own.scene) == signals_of(&scene.scene))
+            && records.records().is_multiple_of(whole(&scene.scene))
+    });
+    let repetitions = records.records() / whole(&scene.scene).max(1);
+    if !is_own || repetitions == scene.scene.scan.realisations {
+        return Ok((Plan::new(scene, Target::Map)?, is_own));
+    }
+    let mut own = scene.scene.clone();
+    own.scan.realisations = repetitions;
+    let file = SceneFile::new(own).map_err(|problems| scene.located(problems))?.with_file_of(scene);
+    Ok((Plan::new(file, Target::Map)?, is_own))
+}
+
+/// A scene without what is done with its signals.
+fn signals_of(scene: &Scene) -> String {
+    let mut same = Scene {
+        seed: 0,
+        estimator: Estimator::default(),
+        outputs: Outputs::default(),
+        site: Site::default(),
+        ..scene.clone()
+    };
+    same.scan.realisations = 1;
+    format!("{same:?}")
+}
+
+/// Refuses records that are not those of the scene's receiver.
+fn fits(scene: &Scene, records: &RawRecords) -> Result<(), Error> {
+    let samples = scene.samples_per_record();
+    if records.samples() != samples {
+        let last_m = scene.scan.range_min_m + (records.samples() as f64 - 0.5) * scene.sample_spacing_m();
+        return Err(records.refuse(format!(
+            "a record has {} samples, {samples} in the scene: scan.range_max_m = {last_m:.3} makes it as many",
+            records.samples()
+        )));
+    }
+    let needed = scene.detector.signal == DetectorSignal::Baseband;
+    if records.is_complex() != needed {
+        let kind = |complex| if complex { "complex" } else { "real" };
+        return Err(records.refuse(format!(
+            "its samples are {}, the scene's {}: detector.signal is \"intermediate_frequency\" for real and \"baseband\" for \
+             complex samples; --complex says that the numbers of a file are pairs",
+            kind(records.is_complex()),
+            kind(needed)
+        )));
+    }
+    for (name, key, value) in &records.about.constants {
+        let d = &scene.detector;
+        let own = match *name {
+            "sampling_frequency" => d.sampling_hz,
+            "intermediate_frequency" if needed => 0.0,
+            "intermediate_frequency" => d.intermediate_frequency_hz,
+            "bandwidth" => d.bandwidth_hz,
+            "wavelength" => scene.laser.wavelength_m,
+            "pulse_repetition_frequency" => scene.laser.pulse_repetition_hz,
+            _ => scene.pulse_sigma_s(),
+        };
+        if !((value - own).abs() <= 1e-6 * own.abs()) {
+            return Err(records.refuse(format!("its {name} is {value:?}, the scene's {key} says {own:?}")));
+        }
+    }
+    Ok(())
+}
+
+/// Estimates the velocities of all records, through a plan of [`plan`].
+///
+/// # Errors
+/// What the system says of the file; records without any number; angles and times that do not fit.
+pub fn estimate(
+    (plan, is_own): (&Plan, bool),
+    records: &mut RawRecords,
+    options: &RecordedOptions,
+    observer: &dyn Observer,
+) -> Result<Recorded, Error> {
+    match plan.scene.scene.detector.signal {
+        DetectorSignal::IntermediateFrequency => of_samples::<f64>(plan, is_own, records, options, observer),
+        DetectorSignal::Baseband => of_samples::<Complex<f64>>(plan, is_own, records, options, observer),
+    }
+}
+
+fn of_samples<S: FromParts>(
+    plan: &Plan,
+    is_own: bool,
+    records: &mut RawRecords,
+    options: &RecordedOptions,
+    observer: &dyn Observer,
+) -> Result<Recorded, Error> {
+    if is_own && options.rays.is_none() && !options.spectra {
+        return of_run::<S>(plan, records, observer);
+    }
+    let scans = lines::scans(plan, records, options.rays.as_ref())?;
+    let largest = largest_part(plan, records)?;
+    observer.begin(Stage::Estimates, scans.iter().map(|scan| scan.elevation_rad.len() as u64).sum());
+    let default = if is_own { NoiseLevel::OfScene } else { NoiseLevel::Quietest };
+    let noise = options.noise.unwrap_or(default);
+    let found = blocks::Blocks::<S>::new(plan, largest, options, observer)?.scans(records, scans)?;
+    observer.end();
+    let spectra = found.iter().any(|scan| scan.spectra.is_some()).then(|| Spectra::of(plan, &found)).transpose()?;
+    let measured = found.into_iter().map(|scan| result::measured(plan, scan, noise)).collect::<Result<_, _>>()?;
+    Ok(Recorded::Measured { scans: measured, spectra })
+}
+
+/// The maps of a simulation's own records, held against the truth of its scene.
+fn of_run<S: FromParts>(plan: &Plan, records: &mut RawRecords, observer: &dyn Observer) -> Result<Recorded, Error> {
+    let scanner = Scanner::new(plan, observer)?;
+    let lines = plan.geometry.elevation_rad.len() as u64;
+    let pulses = scanner.pulses();
+    observer.begin(Stage::Estimates, lines * plan.realisations() as u64);
+    let estimates = map::of_records::<S>(plan, &scanner, |realisation, add| {
+        let scan = realisation * pulses..(realisation + 1) * pulses;
+        for piece in pieces(scan.clone(), records.samples()) {
+            let samples = samples::<S>(records, piece.clone())?;
+            add(piece.start - scan.start, samples.view())?;
+        }
+        observer.advance(lines);
+        Ok(())
+    })?;
+    observer.end();
+    Ok(Recorded::OfRun(Box::new(estimates)))
+}
+
+/// Pieces of a range of records of some ten megabytes.
+fn pieces(records: Range<usize>, samples: usize) -> impl Iterator<Item = Range<usize>> {
+    let size = records_at_once::<Complex<f64>>(samples, records.len());
+    let end = records.end;
+    records.step_by(size).map(move |first| first..(first + size).min(end))
+}
+
+/// The samples of some records \[record, sample\].
+fn samples<S: FromParts>(records: &mut RawRecords, range: Range<usize>) -> Result<ndarray::Array2<S>, Error> {
+    let shape = (range.len(), records.samples());
+    let samples: Vec<S> = records.read(range)?.into_iter().map(S::from_parts).collect();
+    ndarray::Array2::from_shape_vec(shape, samples).map_err(|_| records.refuse("it became shorter".into()))
+}
+
+/// The largest part of all samples; refuses records without any, and codes that the scene's converter does not have.
+fn largest_part(plan: &Plan, records: &mut RawRecords) -> Result<f64, Error> {
+    let (mut largest, mut any) = (0.0_f64, false);
+    for piece in pieces(0..records.records(), records.samples()) {
+        for sample in records.read(piece)? {
+            if sample.is_finite() {
+                any = true;
+                largest = largest.max(sample.largest_part());
+            }
+        }
+    }
+    if !any {
+        return Err(records.refuse("all of its samples are missing: none is a finite number".into()));
+    }
+    if largest == 0.0 {
+        return Err(records.refuse("all of its samples are 0".into()));
+    }
+    if let Digitiser::Quantised { bits, .. } = plan.scene.scene.detector.digitiser
+        && records.is_of_integers()
+        && largest / records.scale() > (f64::from(bits) - 1.0).exp2()
+    {
+        return Err(records.refuse(format!(
+            "it has the code {}, beyond the {bits} bits of detector.digitiser: is --byte-order right?",
+            largest / records.scale()
+        )));
+    }
+    Ok(largest)
+}

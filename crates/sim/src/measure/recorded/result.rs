@@ -1,0 +1,139 @@
+//! What an instrument can know of its gates, and the map of it for files.
+//!
+//! Check: flags and ratios of measured signals are those of a run of the same signals.
+
+use super::NoiseLevel;
+use super::blocks::{Cell, ScanCells};
+use super::lines::ScanLines;
+use super::predicted::PredictedDeviation;
+use crate::Error;
+use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
+use crate::measure::map_estimator::snr_db;
+use crate::measure::write::{pulse_info, site};
+use crate::plan::Plan;
+use ndarray::{Array2, Axis, concatenate};
+
+/// Velocities of one scan, each \[line, gate\].
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredScan {
+    /// The lines.
+    pub lines: ScanLines,
+    /// Radial velocity, m/s, positive away from the lidar; NaN where there is none.
+    pub velocity_m_s: Array2<f64>,
+    /// The standard deviation that the Cramer-Rao bound predicts at the estimated signal-to-noise ratio, m/s.
+    pub predicted_m_s: Array2<f64>,
+    /// Windows accumulated.
+    pub level: Array2<f64>,
+    /// Independent windows that they are worth.
+    pub n_eff: Array2<f64>,
+    /// 1 where the estimate was flagged: a flag of its own, or a peak that does not stand out of noise.
+    pub flagged: Array2<f64>,
+    /// Spectral width beyond that of the window, m/s.
+    pub width_m_s: Array2<f64>,
+    /// Signal-to-noise ratio in the detector band, dB; NaN below twice its standard deviation.
+    pub snr_db: Array2<f64>,
+    /// Density of the peak over the mean density in the band.
+    pub quality: Array2<f64>,
+}
+
+/// Holds the gates of a scan against the noise.
+pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Result<MeasuredScan, Error> {
+    let ScanCells { lines, cells, .. } = scan;
+    // The noise over that of the scene.
+    let factor = match noise {
+        NoiseLevel::OfScene => 1.0,
+        NoiseLevel::Given(power) => power / plan.instrument.receiver.noise_variance_a2(),
+        NoiseLevel::Quietest => quietest(&cells),
+    };
+    let predicted = PredictedDeviation::new(plan)?;
+    let ratio = |cell: &Cell| snr_db(cell.power_ratio / factor, cell.deviation, 1.0);
+    let is_flagged = |cell: &Cell| match cell.detection_ratio.is_nan() {
+        true => !cell.is_good,
+        false => !(cell.is_good && cell.detection_ratio > factor),
+    };
+    let prediction =
+        |cell: &Cell| predicted.as_ref().map_or(f64::NAN, |predicted| predicted.m_s(ratio(cell), cell.n_eff));
+    Ok(MeasuredScan {
+        velocity_m_s: cells.map(|cell| cell.velocity_m_s),
+        predicted_m_s: cells.map(prediction),
+        level: cells.map(|cell| cell.level),
+        n_eff: cells.map(|cell| cell.n_eff),
+        flagged: cells.map(|cell| f64::from(u8::from(is_flagged(cell)))),
+        width_m_s: cells.map(|cell| cell.width_m_s),
+        snr_db: cells.map(ratio),
+        quality: cells.map(|cell| cell.quality),
+        lines,
+    })
+}
+
+/// Mean power of the quietest tenth of the gates over that of the scene's noise.
+fn quietest(cells: &Array2<Cell>) -> f64 {
+    let of_gate = |gate: ndarray::ArrayView1<'_, Cell>| {
+        let known: Vec<f64> = gate.iter().map(|cell| cell.power_ratio).filter(|ratio| ratio.is_finite()).collect();
+        known.iter().sum::<f64>() / known.len() as f64
+    };
+    let mut powers: Vec<f64> = cells.axis_iter(Axis(1)).map(of_gate).filter(|power| power.is_finite()).collect();
+    powers.sort_by(f64::total_cmp);
+    let some = &powers[..powers.len().div_ceil(10)];
+    some.iter().sum::<f64>() / some.len() as f64
+}
+
+/// The map of the scans, each a sweep, in the form that files and pictures take.
+pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, Error> {
+    let scene = &plan.scene.scene;
+    let azimuth_rad = scene.scan.azimuth_rad;
+    let of_scan = |(sweep, scan): (usize, &MeasuredScan)| -> Vec<Ray> {
+        let rays = scan.lines.elevation_rad.iter().zip(&scan.lines.time_s);
+        rays.map(|(elevation_rad, time_s)| Ray { sweep, time_s: *time_s, elevation_rad: *elevation_rad, azimuth_rad })
+            .collect()
+    };
+    let stacked = |of: fn(&MeasuredScan) -> &Array2<f64>| -> Result<Array2<f64>, Error> {
+        let views: Vec<_> = scans.iter().map(|scan| of(scan).view()).collect();
+        concatenate(Axis(0), &views).map_err(|_| wakescope_estimate::Error::Empty { field: "scans" }.into())
+    };
+    let field = |name: &str, unit: Unit, text: &str, of: fn(&MeasuredScan) -> &Array2<f64>| {
+        Ok::<_, Error>(Field::float(name, unit, text, stacked(of)?))
+    };
+    let speed = Unit::MetrePerSecond;
+    Ok(VelocityMap {
+        title: "Radial velocity estimated from recorded signals".into(),
+        rays: scans.iter().enumerate().flat_map(of_scan).collect(),
+        range_m: plan.geometry.gate_range_m.clone(),
+        sweeps: scans.iter().map(|_| Sweep { tau: f64::NAN, azimuth_rad }).collect(),
+        pulse: pulse_info(scene),
+        fields: vec![
+            field("radial_velocity", speed, "estimated radial velocity, positive away from the lidar", |s| {
+                &s.velocity_m_s
+            })?
+            .with_ancillary(&[
+                "velocity_standard_deviation",
+                "level",
+                "n_eff",
+                "flagged",
+                "signal_to_noise_ratio",
+                "quality",
+            ]),
+            field(
+                "velocity_standard_deviation",
+                speed,
+                "predicted standard deviation: Cramer-Rao bound at the estimated signal-to-noise ratio",
+                |s| &s.predicted_m_s,
+            )?,
+            field("level", Unit::One, "windows accumulated for one estimate", |s| &s.level)?,
+            field("n_eff", Unit::One, "independent windows that these are worth", |s| &s.n_eff)?,
+            field("flagged", Unit::One, "1 where the estimate was flagged", |s| &s.flagged)?,
+            field("width", speed, "spectral width beyond that of the window", |s| &s.width_m_s)?,
+            field(
+                "signal_to_noise_ratio",
+                Unit::Decibel,
+                "signal-to-noise ratio in the detector band that the spectra show",
+                |s| &s.snr_db,
+            )?,
+            field("quality", Unit::One, "density of the peak over the mean density in the band", |s| &s.quality)?,
+        ],
+        lidar_y_m: 0.0,
+        lidar_height_m: scene.scan.lidar_height_m,
+        site: site(scene),
+        is_simulated: false,
+    })
+}

@@ -1,0 +1,124 @@
+//! The mean spectrum of the region of each gate, over the density of noise.
+//!
+//! Check: the highest density of a spectrum is where the velocity of its gate is.
+
+use super::blocks::ScanCells;
+use crate::Error;
+use crate::io::OutputError;
+use crate::measure::estimators;
+use crate::plan::Plan;
+use crate::scene::{Method, Scene, Weighting};
+use wakescope_estimate::map::PolarPoint;
+use wakescope_estimate::spectrum::LagSpectrum;
+use wakescope_estimate::{Scan, Scratch, SignalKind};
+
+/// Spectra \[line, gate, velocity\] of all scans.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spectra {
+    /// Velocity of each frequency in the band, m/s, positive away from the lidar, increasing.
+    pub velocity_m_s: Vec<f64>,
+    /// Range of each gate, m.
+    pub range_m: Vec<f64>,
+    /// Elevation of each line of all scans, rad.
+    pub elevation_rad: Vec<f64>,
+    /// Time of each line, s.
+    pub time_s: Vec<f64>,
+    /// Density over that of the scene's noise, or over the mean in the band without noise.
+    pub density: Vec<f32>,
+}
+
+impl Spectra {
+    pub(super) fn of(plan: &Plan, scans: &[ScanCells]) -> Result<Self, Error> {
+        let velocity_m_s = GateSpectra::new(plan, estimators::signal_kind(&plan.scene.scene))?.velocity_m_s;
+        let lines = || scans.iter().map(|scan| &scan.lines);
+        Ok(Self {
+            velocity_m_s,
+            range_m: plan.geometry.gate_range_m.clone(),
+            elevation_rad: lines().flat_map(|lines| lines.elevation_rad.iter().copied()).collect(),
+            time_s: lines().flat_map(|lines| lines.time_s.iter().copied()).collect(),
+            density: scans.iter().flat_map(|scan| scan.spectra.iter().flatten().copied()).collect(),
+        })
+    }
+}
+
+/// Makes the spectra of gates.
+pub(super) struct GateSpectra {
+    spectrum: LagSpectrum,
+    /// Places of the frequencies in the band, by increasing velocity.
+    bins: Vec<usize>,
+    velocity_m_s: Vec<f64>,
+}
+
+impl GateSpectra {
+    /// For the windows of a scene.
+    ///
+    /// # Errors
+    /// A method whose numbers are no correlogram of the whole window; more spectra than a file holds.
+    pub(super) fn new(plan: &Plan, kind: SignalKind) -> Result<Self, Error> {
+        let scene = &plan.scene.scene;
+        if !has_spectrum(scene) {
+            let reason =
+                "--spectra needs the correlogram of the whole window, which this estimator.method does not make".into();
+            return Err(Error::Input { path: "estimator.method".into(), reason });
+        }
+        let spectrum = LagSpectrum::new(kind, scene.estimator.window_samples, scene.estimator.padded_samples)?;
+        let (sampling, padded) = (estimators::sampling(scene)?, scene.estimator.padded_samples);
+        let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
+        let of_bin = |bin: usize| {
+            let frequency_hz = bin as f64 * sampling.sample_rate_hz / padded as f64;
+            // Complex signals have negative frequencies in the upper half; a real one is known by its lower half.
+            let folded = kind == SignalKind::Complex && 2 * bin > padded;
+            sampling.velocity_m_s(if folded { frequency_hz - sampling.sample_rate_hz } else { frequency_hz })
+        };
+        let last = if kind == SignalKind::Complex { padded } else { padded / 2 + 1 };
+        let mut bins: Vec<(usize, f64)> =
+            (0..last).map(|bin| (bin, of_bin(bin))).filter(|(_, v)| (low_m_s..=high_m_s).contains(v)).collect();
+        bins.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let bytes = 4 * bins.len() * plan.geometry.gate_range_m.len() * plan.geometry.elevation_rad.len();
+        if bytes > MOST_BYTES {
+            let reason = format!(
+                "--spectra makes {bytes} bytes, at most {MOST_BYTES}: larger estimator.gate_step_samples or smaller \
+                 estimator.padded_samples make fewer"
+            );
+            return Err(OutputError::Unsupported { format: "spectra.nc", reason }.into());
+        }
+        let (bins, velocity_m_s) = bins.into_iter().unzip();
+        Ok(Self { spectrum, bins, velocity_m_s })
+    }
+
+    /// Adds the spectrum of the region of a point.
+    pub(super) fn push(
+        &self,
+        scan: &Scan,
+        point: PolarPoint,
+        radius_m: f64,
+        noise_a2: f64,
+        out: &mut Vec<f32>,
+    ) -> Result<(), Error> {
+        let mut mean = vec![0.0; scan.statistic_len()];
+        scan.region_mean(point, radius_m, &mut mean)?;
+        let mut scratch = Scratch::new();
+        let density = self.spectrum.density(&mean, &mut scratch)?;
+        let in_band = || self.bins.iter().map(|bin| density[*bin]);
+        let unit = match noise_a2.is_finite() {
+            true => noise_a2 / scan.scale().powi(2),
+            false => in_band().sum::<f64>() / self.bins.len() as f64,
+        };
+        out.extend(in_band().map(|density| (density / unit) as f32));
+        Ok(())
+    }
+}
+
+/// Most bytes of a file of spectra.
+const MOST_BYTES: usize = 256 << 20;
+
+/// Whether the numbers of the windows are the correlogram of the whole window.
+fn has_spectrum(scene: &Scene) -> bool {
+    match scene.estimator.method {
+        Method::GradientLikelihood(_) => false,
+        Method::Autoregressive(_) | Method::AutoregressivePole(_) | Method::Capon(_) => {
+            scene.estimator.weighting != Weighting::Rectangular
+        }
+        _ => true,
+    }
+}
