@@ -12,6 +12,7 @@ use ndarray::{Array1, Array2, ArrayView1, Axis, s};
 use crate::error::{Error, increasing, positive};
 use crate::linalg::cholesky::cholesky;
 use crate::retrieval::{Gate, ScanMap, Turbulence};
+use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::background::Whitening;
 use crate::wake_detection::bank::{Bank, Template, shown};
@@ -19,6 +20,8 @@ use crate::wake_detection::cells::Cells;
 
 /// Velocities that a test needs.
 const NEEDED: usize = 100;
+/// One part in so many of the cells may be missing in a scan.
+const MISSING: usize = 10;
 /// Of the variance of a product with a place: keeps the covariance of all of them regular, and changes nothing else.
 const REGULAR: f64 = 1e-9;
 
@@ -121,16 +124,19 @@ impl WakeDetector {
         Ok(Self { model: *model, kernel, cells, whitening, bank, wind, shapes, reciprocal_length, factor })
     }
 
-    /// The statistic of a scan with the geometry, noise and missing velocities of this test.
+    /// The statistic of a scan with the geometry and noise of this test. Some velocities may be missing that the test has: the wind
+    /// takes their place, which lowers the statistic a little.
     ///
     /// # Errors
-    /// [`Error::Length`] for another shape, [`Error::OutOfRange`] where a velocity is missing that was there.
+    /// [`Error::Length`] for another shape, [`Error::TooFewVelocities`] if more than a tenth is missing.
     pub fn statistic(&self, velocity_m_s: ndarray::ArrayView2<'_, f64>) -> Result<WakeStatistic, Error> {
-        let white = self.white(self.cells.means(velocity_m_s)?);
+        let mut means = self.cells.means(velocity_m_s)?;
+        let missing = self.fill(&mut means)?;
+        let white = self.white(means);
         let products = self.shapes.dot(&white);
         let (value, best) = self.best(products.view());
         let rest = white.dot(&white);
-        let dof = |fitted: usize| (self.cells.cells.len() - self.wind.ncols() - fitted) as f64;
+        let dof = |fitted: usize| (self.cells.cells.len() - missing - self.wind.ncols() - fitted) as f64;
         let length = self.reciprocal_length[best];
         let template = &self.bank.templates[best];
         let mut left = white;
@@ -146,6 +152,33 @@ impl WakeDetector {
             wake: self.wake(template, value.sqrt() * length),
             circulation_std_m2_s: length,
         })
+    }
+
+    /// Puts the best wind into cells without a velocity; returns their number.
+    fn fill(&self, means: &mut [f64]) -> Result<usize, Error> {
+        let missing = means.iter().filter(|value| value.is_nan()).count();
+        if missing == 0 {
+            return Ok(0);
+        }
+        let (found, needed) = (means.len() - missing, means.len() - means.len() / MISSING);
+        if found < needed {
+            return Err(Error::TooFewVelocities { found, needed });
+        }
+        let cells = &self.cells.cells;
+        let row = |i: usize| wind_row(&self.cells, i).map(|x| x / cells[i].deviation_m_s);
+        let (mut curvature, mut towards) = (Array2::zeros((2, 2)), [0.0; 2]);
+        for i in (0..means.len()).filter(|&i| means[i].is_finite()) {
+            let (row, value) = (row(i), means[i] / cells[i].deviation_m_s);
+            for a in 0..2 {
+                towards[a] += row[a] * value;
+                (0..2).for_each(|b| curvature[[a, b]] += row[a] * row[b]);
+            }
+        }
+        let wind = solve(&curvature, &towards).unwrap_or_else(|| vec![towards[0] / curvature[[0, 0]], 0.0]);
+        for (i, value) in means.iter_mut().enumerate().filter(|(_, value)| value.is_nan()) {
+            *value = wind_row(&self.cells, i).iter().zip(&wind).map(|(row, wind)| row * wind).sum();
+        }
+        Ok(missing)
     }
 
     /// Correlation of white numbers by cell with those of the next gate and the next line, far from a wake.
@@ -267,11 +300,7 @@ fn kernel(gate: &Gate) -> Result<RangeKernel, Error> {
 
 /// Uniform wind and shear, white and orthonormal; one direction if the scan cannot tell them apart.
 fn wind(cells: &Cells, whitening: &Whitening) -> Array2<f64> {
-    let cos = |cell: &crate::wake_detection::cells::Cell| cells.elevation_rad[cell.line].cos();
-    let mut wind = Array2::from_shape_fn((cells.cells.len(), 2), |(i, shear)| {
-        let cell = &cells.cells[i];
-        cos(cell) * if shear == 1 { cell.place_m.1 } else { 1.0 }
-    });
+    let mut wind = Array2::from_shape_fn((cells.cells.len(), 2), |(i, direction)| wind_row(cells, i)[direction]);
     whitening.apply(&mut wind);
     let mut basis = Array2::zeros((cells.cells.len(), 0));
     for direction in wind.columns() {
@@ -286,6 +315,13 @@ fn wind(cells: &Cells, whitening: &Whitening) -> Array2<f64> {
         }
     }
     basis
+}
+
+/// What uniform wind and shear show in a cell.
+fn wind_row(cells: &Cells, index: usize) -> [f64; 2] {
+    let cell = &cells.cells[index];
+    let cos = cells.elevation_rad[cell.line].cos();
+    [cos, cos * cell.place_m.1]
 }
 
 /// Takes the part along an orthonormal basis out of columns.

@@ -316,6 +316,36 @@ fn one_vortex_in_view_is_found_as_one() {
 }
 
 #[test]
+fn scans_that_miss_some_velocities_keep_below_the_rate_and_those_that_miss_many_are_refused() {
+    let case = Case::of_the_study(0.5, 15.0);
+    let detector = case.detector(&DetectorOptions::default());
+    let threshold = detector.calibrate(4000, stream(11)).unwrap().threshold(1e-1).unwrap();
+    let wake = Wake::from_array(&[60.0, 60.0, 377.9, 47.7, 424.9, 47.7, 2.35, 2.35, 3.0, 0.02]);
+    let exact = case.model.map(&wake, &case.kernel(), &case.elevation_rad, &case.range_m, 0.0).unwrap();
+    let mut rng = stream(12)(0);
+    let (mut alarms, mut whole, mut holed) = (0, 0.0, 0.0);
+    for scan in 0..600 {
+        let noise = case.deviation.mapv(|std| std * normal(&mut rng));
+        let holes = |mut map: Array2<f64>| {
+            (0..110).for_each(|k| map[[(scan + 13 * k) % 56, (7 * k) % 29]] = f64::NAN);
+            map
+        };
+        let of = |map: Array2<f64>| detector.statistic(map.view()).unwrap().value;
+        alarms += usize::from(of(holes(noise.clone() + 2.0)) > threshold);
+        if scan < 20 {
+            whole += of(&exact + &noise);
+            holed += of(holes(&exact + &noise));
+        }
+    }
+    let alarms = Share::of(alarms, 600);
+    assert!(alarms.value < 0.1 + 3.0 * 0.013 && alarms.value > 0.05, "{alarms:?}");
+    assert!(holed < whole && holed > 0.8 * whole, "{holed} {whole}");
+    let mut half = case.empty.clone();
+    half.slice_mut(ndarray::s![..20, ..]).fill(f64::NAN);
+    assert!(detector.statistic(half.view()).unwrap_err().to_string().contains("velocit"));
+}
+
+#[test]
 fn laws_repeat_and_impossible_tests_are_refused() {
     let case = Case::uneven();
     let detector = case.detector(&DetectorOptions::default());
