@@ -29,6 +29,7 @@
 //! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
 //! | [`measure`] | instrument, wind, signals, velocities and their errors; running a plan and writing its results |
+//! | [`detection`] | whether scans hold a wake, at a rate of false alarms that is calibrated for them |
 //! | `sweep` | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |
@@ -37,6 +38,7 @@
 //! Features, all but the last on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
 //! PNG, the report page), `sweep` (design studies, with `cli`), `vtk` (fields for ParaView).
 
+pub mod detection;
 #[cfg(feature = "flow")]
 pub mod flow;
 pub mod io;
