@@ -30,6 +30,7 @@
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
 //! | [`measure`] | instrument, wind, signals, velocities and their errors; running a plan and writing its results |
 //! | [`detection`] | whether scans hold a wake, at a rate of false alarms that is calibrated for them |
+//! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
 //! | `sweep` | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |
@@ -46,6 +47,7 @@ mod keys;
 mod machine;
 pub mod measure;
 pub mod plan;
+pub mod retrieve;
 pub mod scene;
 #[cfg(feature = "sweep")]
 pub mod sweep;

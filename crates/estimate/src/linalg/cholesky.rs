@@ -3,6 +3,7 @@
 //!
 //! Check: the factor times its transpose; solutions; matrices that are not positive.
 
+use multiversion::multiversion;
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array2, ArrayView2, Axis, s};
 
@@ -64,10 +65,16 @@ pub(crate) fn forward(lower: ArrayView2<'_, f64>, b: &mut Array2<f64>) {
 
 /// x = L^-1 b, in the place of b.
 pub(crate) fn forward_one(lower: ArrayView2<'_, f64>, b: &mut [f64]) {
-    for (i, row) in lower.rows().into_iter().enumerate().take(b.len()) {
-        let (known, rest) = b.split_at_mut(i);
-        let sum = row.as_slice().map_or(f64::NAN, |row| dot(&row[..i], known));
-        rest[0] = (rest[0] - sum) / row[i];
+    // rows of a factor lie in one piece
+    if let Some(rows) = lower.as_slice() {
+        forward_rows(rows, b);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn forward_rows(rows: &[f64], b: &mut [f64]) {
+    for (i, row) in rows.chunks_exact(b.len().max(1)).enumerate() {
+        b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
     }
 }
 

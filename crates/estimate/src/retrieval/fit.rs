@@ -97,7 +97,7 @@ fn whiten(problem: &mut Problem<'_>, turbulence: &Turbulence, first: Option<&End
 }
 
 /// The velocities that there are.
-fn cells(map: &ScanMap) -> Vec<Cell> {
+pub(crate) fn cells(map: &ScanMap) -> Vec<Cell> {
     let known = map.velocity_m_s.indexed_iter().filter(|(_, velocity)| velocity.is_finite());
     known
         .map(|((line, gate), _)| {
@@ -131,7 +131,7 @@ fn residual_scale(problem: &Problem<'_>, end: &End) -> f64 {
 }
 
 /// Where no deviations are stated, they are those of the residuals; a millionth of a metre per second where the fit is exact.
-fn rescale(problem: &mut Problem<'_>, end: &End) {
+pub(crate) fn rescale(problem: &mut Problem<'_>, end: &End) {
     let scale = residual_scale(problem, end);
     problem.cells.iter_mut().for_each(|cell| cell.sigma_m_s = (cell.sigma_m_s * scale).max(1e-6));
 }

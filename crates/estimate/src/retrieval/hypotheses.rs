@@ -60,7 +60,7 @@ impl Kind {
     }
 
     /// The wake without the vortices that there are not.
-    fn of(self, wake: &Wake) -> Wake {
+    pub(crate) fn of(self, wake: &Wake) -> Wake {
         let nowhere = |other: &Vortex, by_m: f64| Vortex {
             circulation_m2_s: 0.0,
             lateral_position_m: other.lateral_position_m + by_m,
@@ -126,7 +126,7 @@ pub(crate) struct Fits<'a> {
 }
 
 impl Fits<'_> {
-    fn groups(&self, kind: Kind) -> Vec<Vec<usize>> {
+    pub(crate) fn groups(&self, kind: Kind) -> Vec<Vec<usize>> {
         let all = self.options.free.groups().into_iter();
         all.map(|group| group.into_iter().filter(|place| kind.has(*place)).collect::<Vec<usize>>())
             .filter(|group| !group.is_empty())
@@ -255,8 +255,11 @@ pub(crate) fn tops<'a>(ends: &'a [End], best: &End, covariance: &ndarray::Array2
     for end in sorted {
         let same = |top: &&End| {
             let (a, b) = (end.wake.to_array(), top.wake.to_array());
-            (0..PARAMETERS)
-                .all(|i| (a[i] - b[i]).powi(2) <= SAME_SIGMAS.powi(2) * covariance[[i, i]] || !end.kind.has(i))
+            let near = |i: usize| {
+                let sigma = covariance[[i, i]].sqrt();
+                (a[i] - b[i]).abs() <= (SAME_SIGMAS * sigma).max(SAME * a[i].abs().max(1.0))
+            };
+            (0..PARAMETERS).all(|i| near(i) || !end.kind.has(i))
         };
         if !tops.iter().any(same) {
             tops.push(end);

@@ -179,18 +179,17 @@ impl Report<'_> {
     fn vortex(&self, end: &End, side: Side, covariance: &Array2<f64>, motion: Option<&Motion>) -> VortexResult {
         let [circulation, lateral, height, core] = places(side);
         let reference_s = self.problem.expected.reference_time_s;
+        let after = |seconds: f64| motion.map_or(end.wake, |motion| motion.wake_after(&end.wake, seconds)).to_array();
         let mut seconds = 0.0;
-        if let Some(motion) = motion {
-            // the line is that of the place then
-            for _ in 0..4 {
-                let p = motion.wake_after(&end.wake, seconds).to_array();
-                let (_, elevation_rad) = self.polar(p[lateral], p[height]);
-                let away = |line: &usize| (self.map.elevation_rad[*line] - elevation_rad).abs();
-                let nearest = (0..self.map.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
-                seconds = nearest.map_or(0.0, |line| self.map.time_s[line] - reference_s);
-            }
+        // the line is that of the place then
+        for _ in 0..4 {
+            let p = after(seconds);
+            let (_, elevation_rad) = self.polar(p[lateral], p[height]);
+            let away = |line: &usize| (self.map.elevation_rad[*line] - elevation_rad).abs();
+            let nearest = (0..self.map.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+            seconds = nearest.map_or(f64::NAN, |line| self.map.time_s[line] - reference_s);
         }
-        let then = motion.map_or(end.wake, |motion| motion.wake_after(&end.wake, seconds)).to_array();
+        let then = after(seconds);
         let measured = |place: usize| {
             let mut slope = [0.0; PARAMETERS];
             slope[place] = 1.0;

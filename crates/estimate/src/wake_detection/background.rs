@@ -9,65 +9,51 @@
 use ndarray::{Array2, Axis};
 
 use crate::error::{Error, not_negative, positive};
-use crate::linalg::cholesky::{cholesky, forward, forward_one};
-use crate::retrieval::Turbulence;
+use crate::linalg::cholesky::forward;
+use crate::retrieval::{Turbulence, Whitening};
 use crate::wake_detection::cells::Cells;
-
-fn covariance_m2_s2(turbulence: &Turbulence, a_m: (f64, f64), b_m: (f64, f64)) -> f64 {
-    let distance_m = (a_m.0 - b_m.0).hypot(a_m.1 - b_m.1);
-    turbulence.deviation_m_s.powi(2) * (-distance_m / turbulence.length_m).exp()
-}
 
 /// Makes the background of a map white, of unit variance.
 #[derive(Debug, Clone)]
-pub(super) enum Whitening {
-    /// Divides by standard deviations.
-    Deviations(Vec<f64>),
-    /// Solves with the lower factor of the covariance.
-    Factor(Array2<f64>),
+pub(super) enum Background {
+    /// Independent noise of those standard deviations.
+    Noise(Vec<f64>),
+    /// With turbulence.
+    Turbulent(Whitening),
 }
 
-impl Whitening {
+impl Background {
     /// # Errors
     /// [`Error::OutOfRange`] for an impossible turbulence, [`Error::Linalg`] for a covariance without a factor.
     pub(super) fn new(cells: &Cells, turbulence: Option<&Turbulence>) -> Result<Self, Error> {
         let cells = &cells.cells;
         let Some(turbulence) = turbulence else {
-            return Ok(Self::Deviations(cells.iter().map(|cell| cell.deviation_m_s).collect()));
+            return Ok(Self::Noise(cells.iter().map(|cell| cell.deviation_m_s).collect()));
         };
         not_negative("deviation_m_s of the turbulence", turbulence.deviation_m_s)?;
         positive("length_m of the turbulence", turbulence.length_m)?;
-        let order = cells.len();
-        let covariance = Array2::from_shape_fn((order, order), |(i, j)| match j.cmp(&i) {
-            std::cmp::Ordering::Less => covariance_m2_s2(turbulence, cells[i].place_m, cells[j].place_m),
-            std::cmp::Ordering::Equal => turbulence.deviation_m_s.powi(2) + cells[i].deviation_m_s.powi(2),
-            std::cmp::Ordering::Greater => 0.0,
-        });
+        let places: Vec<_> = cells.iter().map(|cell| (cell.place_m, cell.deviation_m_s)).collect();
         let reason = "is not positive definite: turbulence without noise in close cells has none";
-        cholesky(covariance).map(Self::Factor).ok_or(Error::Linalg {
-            what: "covariance of the background",
-            order,
-            reason,
-        })
+        let order = cells.len();
+        let singular = Error::Linalg { what: "covariance of the background", order, reason };
+        Whitening::new(&places, turbulence).map(Self::Turbulent).ok_or(singular)
     }
 
     /// Columns of numbers by cell, made white in place.
-    pub(super) fn apply(&self, columns: &mut Array2<f64>) {
+    pub(super) fn whiten(&self, columns: &mut Array2<f64>) {
         match self {
-            Self::Deviations(deviations) => {
+            Self::Noise(deviations) => {
                 columns.axis_iter_mut(Axis(0)).zip(deviations).for_each(|(mut row, deviation)| row /= *deviation);
             }
-            Self::Factor(lower) => forward(lower.view(), columns),
+            Self::Turbulent(whitening) => forward(whitening.lower(), columns),
         }
     }
 
     /// One number by cell, made white in place.
-    pub(super) fn apply_one(&self, numbers: &mut [f64]) {
+    pub(super) fn whiten_one(&self, numbers: &mut [f64]) {
         match self {
-            Self::Deviations(deviations) => {
-                numbers.iter_mut().zip(deviations).for_each(|(x, deviation)| *x /= deviation)
-            }
-            Self::Factor(lower) => forward_one(lower.view(), numbers),
+            Self::Noise(deviations) => numbers.iter_mut().zip(deviations).for_each(|(x, deviation)| *x /= deviation),
+            Self::Turbulent(whitening) => whitening.whiten(numbers),
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::linalg::cholesky::cholesky;
 use crate::retrieval::{Gate, ScanMap, Turbulence};
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
-use crate::wake_detection::background::Whitening;
+use crate::wake_detection::background::Background;
 use crate::wake_detection::bank::{Bank, Template, shown};
 use crate::wake_detection::cells::Cells;
 
@@ -52,7 +52,7 @@ pub struct WakeDetector {
     model: WakeModel,
     kernel: RangeKernel,
     cells: Cells,
-    whitening: Whitening,
+    background: Background,
     bank: Bank,
     /// Uniform wind and shear, white and orthonormal: cells by one or two.
     wind: Array2<f64>,
@@ -103,15 +103,15 @@ impl WakeDetector {
             increasing("spacing_m", &[options.spacing_m.0, options.spacing_m.1])?;
         }
         let cells = Cells::new(&map.view(), model);
-        let whitening = Whitening::new(&cells, options.turbulence.as_ref())?;
+        let background = Background::new(&cells, options.turbulence.as_ref())?;
         let kernel = kernel(gate)?;
         let bank = Bank::new(&cells, model, kernel.width_m(), options);
         if bank.templates.is_empty() {
             return Err(Error::Empty { field: "list of wakes that fit into the scan" });
         }
         let mut shapes = bank.shapes(&cells, model, &kernel);
-        whitening.apply(&mut shapes);
-        let wind = wind(&cells, &whitening);
+        background.whiten(&mut shapes);
+        let wind = wind(&cells, &background);
         remove(&wind, &mut shapes);
         let gram = shapes.t().dot(&shapes);
         let shapes = shapes.t().as_standard_layout().into_owned();
@@ -121,7 +121,7 @@ impl WakeDetector {
         let factor = cholesky(gram + Array2::from_diag(&Array1::from_elem(order, floor)));
         let reason = "is not positive definite";
         let factor = factor.ok_or(Error::Linalg { what: "covariance of the products with the bank", order, reason })?;
-        Ok(Self { model: *model, kernel, cells, whitening, bank, wind, shapes, reciprocal_length, factor })
+        Ok(Self { model: *model, kernel, cells, background, bank, wind, shapes, reciprocal_length, factor })
     }
 
     /// The statistic of a scan with the geometry and noise of this test. Some velocities may be missing that the test has: the wind
@@ -203,7 +203,7 @@ impl WakeDetector {
 
     /// Numbers by cell, made white, without what wind explains.
     fn white(&self, mut numbers: Vec<f64>) -> Array1<f64> {
-        self.whitening.apply_one(&mut numbers);
+        self.background.whiten_one(&mut numbers);
         let white = Array1::from_vec(numbers);
         let part = self.wind.t().dot(&white);
         white - self.wind.dot(&part)
@@ -299,9 +299,9 @@ fn kernel(gate: &Gate) -> Result<RangeKernel, Error> {
 }
 
 /// Uniform wind and shear, white and orthonormal; one direction if the scan cannot tell them apart.
-fn wind(cells: &Cells, whitening: &Whitening) -> Array2<f64> {
+fn wind(cells: &Cells, background: &Background) -> Array2<f64> {
     let mut wind = Array2::from_shape_fn((cells.cells.len(), 2), |(i, direction)| wind_row(cells, i)[direction]);
-    whitening.apply(&mut wind);
+    background.whiten(&mut wind);
     let mut basis = Array2::zeros((cells.cells.len(), 0));
     for direction in wind.columns() {
         let mut direction = direction.to_owned().insert_axis(Axis(1));

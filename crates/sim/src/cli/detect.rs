@@ -1,16 +1,18 @@
 //! `wakescope detect`: whether scans hold a wake, and how small a wake is found in scans like them.
 
+use super::retrieve::{YesNo, not_negative, turbulence};
 use super::{Cli, load, progress, say, shown};
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test, gate_table,
-    power_table, roc_table, scan_gate, scan_table, strided,
+    power_table, roc_table, scan_table, strided,
 };
 use crate::io::scans::{self, ReadScan, ScanFormat};
 use crate::io::{Existing, FileGroup, Provenance};
 use crate::measure::progress::Observer;
 use crate::measure::write;
 use crate::plan::{Plan, Target};
+use crate::retrieve::gate_of;
 use crate::scene::{NoiseKind, SceneFile};
 use clap::Args;
 use serde_json::{Value, json};
@@ -29,8 +31,8 @@ pub(super) struct DetectWords {
     /// Rate of false alarms of a scan.
     #[arg(long, value_name = "RATE", default_value_t = 1e-2, value_parser = rate)]
     false_alarm: f64,
-    /// Correlated velocities of the air: their standard deviation, m/s, and length, m, such as 0.8,25.
-    #[arg(long, value_name = "STD,LENGTH", value_parser = turbulence)]
+    /// Standard deviation, m/s, and length, m, of turbulence that neighbouring velocities share, e.g. 0.8,25.
+    #[arg(long, value_name = "SIGMA,LENGTH", value_parser = turbulence)]
     turbulence: Option<Turbulence>,
     /// Standard deviation of a gate's weight along the line, m; 0 for velocities at points.
     #[arg(long, value_name = "M", value_parser = not_negative)]
@@ -41,9 +43,9 @@ pub(super) struct DetectWords {
     /// Look for pairs only, not for single vortices.
     #[arg(long)]
     pairs_only: bool,
-    /// The air has no ground below the vortices.
-    #[arg(long)]
-    no_ground: bool,
+    /// Whether image vortices make the ground a streamline.
+    #[arg(long, value_enum, default_value_t = YesNo::Yes)]
+    ground: YesNo,
     /// Height of the lidar above the ground, m; that of the scene, or 0.
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = finite)]
     lidar_height: Option<f64>,
@@ -59,9 +61,9 @@ pub(super) struct DetectWords {
     /// Velocities are positive towards the lidar.
     #[arg(long)]
     towards: bool,
-    /// Least signal-to-noise ratio, dB, where the file has one.
+    /// Leave out velocities below this signal-to-noise ratio, dB.
     #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = finite)]
-    min_snr_db: Option<f64>,
+    min_snr: Option<f64>,
     /// Folder to write to; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -78,10 +80,6 @@ fn finite(word: &str) -> Result<f64, String> {
     number(word).ok_or_else(|| "a number, e.g. 1.5".into())
 }
 
-fn not_negative(word: &str) -> Result<f64, String> {
-    number(word).filter(|value| *value >= 0.0).ok_or_else(|| "a length of at least 0 m, e.g. 14.4".into())
-}
-
 fn rate(word: &str) -> Result<f64, String> {
     let rate = number(word).filter(|rate| (1e-9..=0.5).contains(rate));
     rate.ok_or_else(|| "a rate from 1e-9 to 0.5, e.g. 0.01".into())
@@ -90,12 +88,6 @@ fn rate(word: &str) -> Result<f64, String> {
 fn two(word: &str) -> Option<(f64, f64)> {
     let (a, b) = word.split_once(',')?;
     Some((number(a)?, number(b)?))
-}
-
-fn turbulence(word: &str) -> Result<Turbulence, String> {
-    let found = two(word).filter(|(deviation, length)| *deviation > 0.0 && *length > 0.0);
-    let (deviation_m_s, length_m) = found.ok_or("a standard deviation, m/s, and a length, m, above 0, e.g. 0.8,25")?;
-    Ok(Turbulence { deviation_m_s, length_m })
 }
 
 fn spacing(word: &str) -> Result<(f64, f64), String> {
@@ -157,7 +149,7 @@ fn run(words: &DetectWords, cli: &Cli, observer: &dyn Observer) -> Result<(), Er
 
 impl Task {
     fn new(words: &DetectWords, cli: &Cli, observer: &dyn Observer, existing: Existing) -> Result<Self, Error> {
-        let format = ScanFormat { field: words.field.clone(), towards: words.towards, min_snr_db: words.min_snr_db };
+        let format = ScanFormat { field: words.field.clone(), towards: words.towards, min_snr_db: words.min_snr };
         let (mut scans, mut notes) = (Vec::new(), Vec::new());
         for path in &words.data {
             let (read, left_out) = scans::read(path, &format)?;
@@ -182,8 +174,8 @@ impl Task {
         };
         let height_m = plan.as_ref().map_or(0.0, |plan| plan.scene.scene.scan.lidar_height_m);
         settings.model.lidar_height_m = words.lidar_height.unwrap_or(height_m);
-        settings.model.images = !words.no_ground;
-        let (gate, note) = scan_gate(scans.first(), words.gate_std, plan.as_ref().map(|plan| &plan.scene.scene))?;
+        settings.model.images = words.ground == YesNo::Yes;
+        let (gate, note) = gate_of(scans.first(), words.gate_std, plan.as_ref().map(|plan| &plan.scene.scene))?;
         settings.gate = gate;
         notes.extend(note.map(str::to_owned));
         let mut empty = None;
@@ -346,14 +338,10 @@ mod tests {
 
     #[test]
     fn words_are_read_or_refused_with_an_example() {
-        assert_eq!(turbulence("0.8, 25"), Ok(Turbulence { deviation_m_s: 0.8, length_m: 25.0 }));
         assert_eq!((spacing("47,47"), stride("4,8"), rate("1e-3")), (Ok((47.0, 47.0)), Ok((4, 8)), Ok(1e-3)));
-        for bad in ["0.8", "0,25", "0.8,-1", "nan,25", "0.8,25,1"] {
-            assert!(turbulence(bad).unwrap_err().contains("0.8,25"), "{bad}");
-        }
         assert!(
             spacing("60,20").is_err() && spacing("0,20").is_err() && stride("0,1").is_err() && stride("a").is_err()
         );
-        assert!(rate("0").is_err() && rate("0.7").is_err() && rate("inf").is_err() && not_negative("-1").is_err());
+        assert!(rate("0").is_err() && rate("0.7").is_err() && rate("inf").is_err());
     }
 }

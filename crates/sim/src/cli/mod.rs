@@ -11,6 +11,7 @@ mod estimate;
 mod flow;
 mod output;
 mod progress;
+mod retrieve;
 mod sweep;
 mod wake;
 
@@ -73,6 +74,8 @@ enum Command {
     Map(Io),
     /// Velocities from raw signals of a file, simulated or measured, through the estimator of a scene.
     Estimate(estimate::EstimateWords),
+    /// Circulation, place and core of the vortices in scans of any instrument.
+    Retrieve(retrieve::RetrieveWords),
     /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
     Bound(bound::BoundWords),
     /// The power budget in dB, from the energy of a pulse to the signal-to-noise ratio, with what bounds the instrument.
@@ -145,6 +148,7 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Signal(io) => execute(io, Target::Signal, cli),
         Command::Map(io) => execute(io, Target::Map, cli),
         Command::Estimate(words) => estimate::estimate(words, cli),
+        Command::Retrieve(words) => retrieve::retrieve(words, cli),
         Command::Bound(words) => bound::bound(words, cli),
         Command::Budget(words) => budget::budget(words, cli),
         Command::Detect(words) => detect::detect(words, cli),

@@ -17,7 +17,7 @@ mod tables;
 pub use gates::gate_table;
 #[cfg(feature = "plots")]
 pub use pictures::picture;
-pub use scene_noise::{SceneNoise, scan_gate};
+pub use scene_noise::SceneNoise;
 pub use tables::{power_table, roc_table, scan_table};
 
 use crate::Error;

@@ -5,26 +5,20 @@
 //! of a bound. Check: deviations against those of a whole run; regions that overlap are told.
 
 use crate::Error;
-use crate::io::scans::ReadScan;
-use crate::measure::estimators;
-use crate::measure::instrument::Instrument;
 use crate::measure::map::estimates;
 use crate::measure::progress::Observer;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Target};
-use crate::scene::{DetectorSignal, Flow, Scene, SceneFile};
+use crate::scene::{DetectorSignal, Flow, SceneFile};
 use ndarray::{Array2, s};
 use num_complex::Complex;
-use wakescope_estimate::retrieval::{Gate, ScanMap};
-use wakescope_estimate::vortex_fit::RangeKernel;
+use wakescope_estimate::retrieval::ScanMap;
 
 /// Lines and scans of still air: a few hundred independent velocities at each range.
 const LINES: f64 = 48.0;
 const SCANS: usize = 8;
 /// Velocities that are less correlated are taken as independent.
 const INDEPENDENT: f64 = 0.1;
-/// Points of a gate's weight, m.
-const SPACING_M: f64 = 1.25;
 /// Median of the absolute value of a normal number.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
@@ -138,43 +132,10 @@ impl SceneNoise {
     }
 }
 
-/// What a velocity is of the air about its range: as stated, else the mean over pulse and window of the scene or of the file; at a
-/// point if nothing is known, with the remedy.
-///
-/// # Errors
-/// What the estimators refuse; a checked scene gives none.
-pub fn scan_gate(
-    scan: Option<&ReadScan>,
-    stated_m: Option<f64>,
-    scene: Option<&Scene>,
-) -> Result<(Gate, Option<&'static str>), Error> {
-    if let Some(std_m) = stated_m {
-        return Ok((Gate::Gaussian { std_m }, None));
-    }
-    if let Some(scene) = scene {
-        let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
-        let sigma_s = Instrument::new(scene)?.pulse.sigma_s();
-        let kernel = RangeKernel::gaussian_gate(sigma_s, &window, 1.0 / scene.detector.sampling_hz, SPACING_M)?;
-        return Ok((Gate::Kernel(kernel), None));
-    }
-    let pulse_m = |width_s: f64| 0.5 * crate::SPEED_OF_LIGHT_M_S * width_s / (8.0 * 2f64.ln()).sqrt();
-    let of_file = scan.and_then(|scan| {
-        let (pulse_m, gate_m) = (scan.pulse_width_s.map(pulse_m), scan.gate_length_m.map(|m| m / 12f64.sqrt()));
-        Some(pulse_m.or(gate_m)?.hypot(pulse_m.and(gate_m).unwrap_or(0.0)))
-    });
-    Ok(match of_file {
-        Some(std_m) => (Gate::Gaussian { std_m }, None),
-        None => (
-            Gate::Point,
-            Some("velocities are taken for those at points: state --gate-std, or the instrument by --scene"),
-        ),
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::SnrReference;
+    use crate::scene::{Scene, SnrReference};
     use crate::{Silent, run};
 
     #[test]

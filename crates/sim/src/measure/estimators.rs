@@ -240,7 +240,6 @@ impl<S: Sample> Toolkit<S> {
 }
 
 /// Correlogram of all lags and the scene's estimator of it, for what a mean of very many pulses would show.
-#[cfg(feature = "sweep")]
 pub(crate) struct Response {
     pub(crate) correlogram: estimate::Correlogram<f64>,
     pub(crate) estimator: Box<dyn Estimator>,
@@ -251,7 +250,6 @@ pub(crate) struct Response {
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-#[cfg(feature = "sweep")]
 pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<Response>, Error> {
     let e = &scene.estimator;
     if signal_kind(scene) == SignalKind::Complex || e.follow_wind || matches!(e.method, Method::GradientLikelihood(_)) {

@@ -29,6 +29,7 @@ pub mod profile;
 pub mod progress;
 pub mod recorded;
 pub(crate) mod region;
+pub(crate) mod response;
 pub mod run;
 pub mod scan;
 pub mod streams;

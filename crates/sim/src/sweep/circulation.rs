@@ -3,16 +3,15 @@
 //! The fit knows nothing but that cores are some 4.5 % of the spacing; the bound is for known cores. Check: against the truth
 //! of the scene, and the bound of Table 2's scan against the stored one.
 
-use crate::measure::estimators::{Response, response, sampling, signal_kind};
+use crate::measure::response::{SceneResponse, correlated_lines, gate_step};
 use crate::measure::scan::Scanner;
 use crate::measure::wind::vortex_pair;
 use crate::plan::Plan;
-use crate::scene::{Flow, NoiseKind, VortexPair, VortexProfile};
+use crate::scene::{Flow, VortexPair, VortexProfile};
 use ndarray::Array2;
-use wakescope_estimate::bound::Noise;
 use wakescope_estimate::vortex_fit::{
-    CoreProfile, EstimatorResponse, FreeParameters, MapFitOptions, Parameter, Powers, PulseShape, ScanModel, ScanSetup,
-    Sharing, VelocityMap, Vortex, Wake, WakeModel, fit_map_of_estimator,
+    CoreProfile, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake,
+    WakeModel, fit_map_of_estimator,
 };
 
 /// Circulation fitted to the maps of a case.
@@ -34,10 +33,7 @@ pub(super) struct Circulation {
 pub(super) struct Retrieval<'p> {
     plan: &'p Plan,
     pair: VortexPair,
-    response: Option<Response>,
-    pulse: PulseShape,
-    noise: Noise,
-    snr: Vec<(f64, f64)>,
+    response: SceneResponse,
     circulations_m2_s: Vec<f64>,
 }
 
@@ -46,19 +42,11 @@ impl<'p> Retrieval<'p> {
     pub(super) fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Option<Self> {
         let scene = &plan.scene.scene;
         let Flow::VortexPair(pair) = scene.flow else { return None };
-        let gaussian = matches!(scene.pulse.shape, crate::scene::PulseShape::Gaussian(_));
-        if pair.circulation_m2_s <= 0.0 || !gaussian || scene.pulse.chirp_hz_s != 0.0 {
+        if pair.circulation_m2_s <= 0.0 {
             return None;
         }
-        let noise = match scene.detector.noise {
-            NoiseKind::Band => Noise::Band { floor: 0.0 },
-            NoiseKind::White => Noise::White,
-            NoiseKind::None => return None,
-        };
-        let snr = scanner.layer_snr();
-        let pulse = PulseShape::gaussian(plan.instrument.pulse.sigma_s()).ok()?;
-        let response = response(scene, &plan.instrument.pulse, scanner.mean_snr()).ok().flatten();
-        Some(Self { plan, pair, response, pulse, noise, snr, circulations_m2_s: Vec::new() })
+        let response = SceneResponse::new(scene, &plan.instrument, scanner.layer_snr())?;
+        Some(Self { plan, pair, response, circulations_m2_s: Vec::new() })
     }
 
     fn model(&self) -> WakeModel {
@@ -72,11 +60,6 @@ impl<'p> Retrieval<'p> {
         }
     }
 
-    fn snr_at(&self, range_m: f64) -> f64 {
-        let nearest = self.snr.iter().min_by(|a, b| (a.0 - range_m).abs().total_cmp(&(b.0 - range_m).abs()));
-        nearest.map_or(0.0, |(_, snr)| *snr)
-    }
-
     /// Fits the velocities of a map, m/s.
     pub(super) fn add(&mut self, velocity_m_s: &Array2<f64>) {
         let found = self.fit(velocity_m_s).unwrap_or(f64::NAN);
@@ -85,10 +68,8 @@ impl<'p> Retrieval<'p> {
 
     fn fit(&self, velocity_m_s: &Array2<f64>) -> Option<f64> {
         let (scene, g) = (&self.plan.scene.scene, &self.plan.geometry);
-        let Response { correlogram, estimator } = self.response.as_ref()?;
-        // Gates that share most of their window say the same.
-        let step = (scene.estimator.window_samples / 4).div_ceil(scene.estimator.gate_step_samples).max(1);
-        let some: Vec<usize> = (0..g.gate_range_m.len()).step_by(step).collect();
+        let shown = self.response.shown(scene, self.pair.lateral_position_m)?;
+        let some: Vec<usize> = (0..g.gate_range_m.len()).step_by(gate_step(scene)).collect();
         let range_m: Vec<f64> = some.iter().map(|i| g.gate_range_m[*i]).collect();
         let velocity_m_s = velocity_m_s.select(ndarray::Axis(1), &some);
         let map = VelocityMap {
@@ -97,17 +78,8 @@ impl<'p> Retrieval<'p> {
             velocity_m_s: velocity_m_s.view(),
             standard_deviation_m_s: None,
         };
-        let radius_m = if scene.estimator.method == (crate::scene::Method::Periodogram {}) {
-            0.0
-        } else {
-            scene.estimator.radius_m
-        };
-        let noise = (self.noise, self.snr_at(self.pair.lateral_position_m));
-        let sampling = sampling(scene).ok()?;
-        let shown = EstimatorResponse::new(correlogram, &**estimator, &sampling, &self.pulse, noise, radius_m).ok()?;
-        let line_m = scene.scan.elevation_step_rad * self.pair.lateral_position_m;
-        let options =
-            MapFitOptions { free: free(), correlated_lines: (2.0 * radius_m / line_m) as usize, ..Default::default() };
+        let correlated_lines = correlated_lines(scene, scene.scan.elevation_step_rad, self.pair.lateral_position_m);
+        let options = MapFitOptions { free: free(), correlated_lines, ..Default::default() };
         let wake = fit_map_of_estimator(&map, &self.model(), &shown, &options).ok()?.wake;
         Some(0.5 * (wake.left.circulation_m2_s + wake.right.circulation_m2_s))
     }
@@ -130,17 +102,9 @@ impl<'p> Retrieval<'p> {
             wind_shear_per_s: 0.0,
         };
         let rays = |line: &f64| std::iter::repeat_n(*line, scene.scan.pulses_per_line);
-        let setup = ScanSetup {
-            sampling: sampling(scene)?,
-            kind: signal_kind(scene),
-            noise: self.noise,
-            pulse: self.pulse.clone(),
-            wake: self.model(),
-            elevation_rad: g.elevation_rad.iter().flat_map(rays).collect(),
-            first_sample_time_s: 2.0 * g.first_range_m / crate::SPEED_OF_LIGHT_M_S,
-            record_samples: g.samples,
-        };
-        let model = ScanModel::new(&setup, |range_m, _| self.snr_at(range_m), &truth)?;
+        let elevation_rad = g.elevation_rad.iter().flat_map(rays).collect();
+        let setup = self.response.setup(scene, self.model(), elevation_rad)?;
+        let model = ScanModel::new(&setup, |range_m, _| self.response.snr_at(range_m), &truth)?;
         let bound = model.bound(&truth, Powers::default(), &free(), true)?;
         Ok(bound[[Parameter::LeftCirculation as usize; 2]].sqrt())
     }
@@ -177,7 +141,7 @@ fn free() -> FreeParameters {
 mod tests {
     use super::*;
     use crate::plan::Target;
-    use crate::scene::{Scene, SceneFile, SnrReference};
+    use crate::scene::{NoiseKind, Scene, SceneFile, SnrReference};
     use crate::{Silent, measure::map};
 
     fn plan(change: impl FnOnce(&mut Scene)) -> Plan {

@@ -1,14 +1,13 @@
-//! Scans from CfRadial 1.x in classic NetCDF, by any writer.
+//! Scans from CfRadial 1.x by any writer, and from the groups of NetCDF-4 files that hold a sweep each (CfRadial 2, Windcube).
 //!
 //! A sweep is a scan if its elevations differ and its azimuths do not, whatever it calls itself. Velocities are found by their
 //! standard names, which say the sign, or by the names that instruments use. Check: maps of this program, and of Py-ART and
 //! xradar in the tests of the program; files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
-use super::grid::{RayRow, between_turns, one_plane, scan_map};
+use super::grid::{RayRow, between_turns, of_mean, one_plane, scan_map};
+use super::source::Source;
 use super::{ReadScan, ScanFormat};
-use crate::Error;
 use crate::io::UtcTime;
-use crate::io::netcdf_input::{ClassicFile, open};
 use std::path::Path;
 
 const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrument";
@@ -28,28 +27,38 @@ const VELOCITIES: [&str; 9] = [
 /// Names of its standard deviation.
 const SIGMAS: [&str; 4] = ["velocity_standard_deviation", "sigma_m_s", "radial_velocity_error", "velocity_error"];
 /// Names of the signal-to-noise ratio in dB.
+/// Whether a Windcube trusts a velocity; its times are those of the ends of rays.
+const STATUS: &str = "radial_wind_speed_status";
 const RATIOS: [&str; 4] = ["signal_to_noise_ratio", "SNR", "snr", "cnr"];
 
-/// The scans of a file, and what was left out.
-pub(super) fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<String>), Error> {
-    let mut file = open(path)?;
-    scans(&mut file, path, format).map_err(|reason| file.refuse(reason))
-}
-
-fn scans(file: &mut ClassicFile, path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<String>), String> {
+/// The scans of a file or a group, and what was left out; `sweep` is the number of its first sweep.
+pub(super) fn scans(
+    file: &mut dyn Source,
+    path: &Path,
+    format: &ScanFormat,
+    sweep: usize,
+) -> Result<(Vec<ReadScan>, Vec<String>), String> {
     let elevation_rad = angles(file, "elevation")?;
     let azimuth_rad = angles(file, "azimuth")?;
     let count = elevation_rad.len();
     if azimuth_rad.len() != count {
         return Err(format!("azimuth has {} values, elevation {count}: one for each ray", azimuth_rad.len()));
     }
-    let (time_s, reference) = times(file, count)?;
+    let (mut time_s, reference) = times(file, count)?;
+    if file.has(STATUS) {
+        let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        let half_s = 0.5 * steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+        time_s.iter_mut().for_each(|time_s| *time_s -= half_s);
+    }
     let range_m = ranges(file)?;
     let velocity = Field::velocity(file, format)?;
     let layout = GateLayout::new(file, &velocity.name, count, range_m.len())?;
     let velocity_m_s = layout.read(file, &velocity.name)?;
     // A fraction of realisations, or 0 and 1.
     let flagged = layout.optional(file, &["flagged"])?;
+    // 1 where the instrument trusts its velocity.
+    let status = layout.optional(file, &[STATUS])?;
     let ratio_db = if format.min_snr_db.is_some() { layout.optional(file, &RATIOS)? } else { None };
     let sigma_m_s = layout.optional(file, &SIGMAS)?;
     let realisations = if velocity.is_mean { layout.optional(file, &["count"])? } else { None };
@@ -60,13 +69,12 @@ fn scans(file: &mut ClassicFile, path: &Path, format: &ScanFormat) -> Result<(Ve
         let cells = || (ray * gates..(ray + 1) * gates).map(|at| (at, velocity_m_s[at]));
         let noisy = |at: usize| {
             let below = |ratios: &Vec<f64>| format.min_snr_db.is_some_and(|least| !(ratios[at] >= least));
-            ratio_db.as_ref().is_some_and(below) || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
+            ratio_db.as_ref().is_some_and(below)
+                || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
+                || status.as_ref().is_some_and(|status| status[at] != 1.0)
         };
         let sigma = |sigma_m_s: &Vec<f64>| {
-            let of = |at: usize| {
-                let count = realisations.as_ref().map_or(1.0, |count| count[at].max(1.0));
-                sigma_m_s[at] / count.sqrt()
-            };
+            let of = |at: usize| of_mean(sigma_m_s[at], realisations.as_ref().map(|count| count[at]));
             cells().map(|(at, _)| of(at)).collect()
         };
         RayRow {
@@ -80,8 +88,10 @@ fn scans(file: &mut ClassicFile, path: &Path, format: &ScanFormat) -> Result<(Ve
     let (mut out, mut left_out) = (Vec::new(), Vec::new());
     let pulse_width_s = if file.has("pulse_width") { first(file, "pulse_width")? } else { None };
     let step_m = range_m.get(1).zip(range_m.first()).map(|(second, first)| second - first);
-    let scene_toml = file.global_text("scene").map(str::to_owned);
+    let scene_toml = file.global_text("scene");
+    let is_own = file.global_text("source").is_some_and(|source| source.starts_with("wakescope "));
     for (number, rays) in sweeps(file, count)?.into_iter().enumerate() {
+        let number = number + sweep;
         let what = format!("sweep {number}");
         let is_still = |ray: &usize| moving.get(*ray).is_none_or(|moves| *moves != 1.0);
         let rows: Vec<RayRow> = rays.filter(is_still).map(&ray).collect();
@@ -97,21 +107,22 @@ fn scans(file: &mut ClassicFile, path: &Path, format: &ScanFormat) -> Result<(Ve
                 left_out.push(format!("{what}: all of its rays have one elevation"));
                 continue;
             }
-            out.push(ReadScan {
-                path: path.to_owned(),
-                sweep: number,
-                map: scan_map(rows, range_m.clone(), fold_m_s, &what)?,
-                reference,
-                gate_length_m: step_m,
-                pulse_width_s,
-                scene_toml: scene_toml.clone(),
-            });
+            match scan_map(rows, range_m.clone(), fold_m_s, &what) {
+                Err(reason) => left_out.push(reason),
+                Ok(map) => out.push(ReadScan {
+                    path: path.to_owned(),
+                    sweep: number,
+                    map,
+                    reference,
+                    gate_length_m: step_m,
+                    pulse_width_s,
+                    scene_toml: scene_toml.clone(),
+                    is_own,
+                }),
+            }
         }
     }
-    match out.is_empty() {
-        true => Err(format!("it has no scan in elevation (RHI): {}", left_out.join("; "))),
-        false => Ok((out, left_out)),
-    }
+    Ok((out, left_out))
 }
 
 /// The variable that holds the velocities.
@@ -124,8 +135,8 @@ struct Field {
 }
 
 impl Field {
-    fn velocity(file: &ClassicFile, format: &ScanFormat) -> Result<Self, String> {
-        let standard = |name: &str| file.text(name, "standard_name").unwrap_or_default().to_owned();
+    fn velocity(file: &dyn Source, format: &ScanFormat) -> Result<Self, String> {
+        let standard = |name: &str| file.text(name, "standard_name").unwrap_or_default();
         let name = match &format.field {
             Some(name) if file.has(name) => name.clone(),
             Some(name) => return Err(format!("it has no variable {name}, which --field names")),
@@ -140,7 +151,7 @@ impl Field {
                 )?
             }
         };
-        let units = file.text(&name, "units").unwrap_or("m/s").to_ascii_lowercase().replace([' ', '_'], "");
+        let units = file.text(&name, "units").unwrap_or("m/s".into()).to_ascii_lowercase().replace([' ', '_'], "");
         if !["m/s", "ms-1", "ms^-1", "m.s-1", "meterspersecond", "meterpersecond", "metrespersecond", ""]
             .contains(&units.as_str())
         {
@@ -161,16 +172,16 @@ enum GateLayout {
 }
 
 impl GateLayout {
-    fn new(file: &mut ClassicFile, name: &str, rays: usize, gates: usize) -> Result<Self, String> {
-        let dims = file.dims(name).unwrap_or_default().len();
+    fn new(file: &mut dyn Source, name: &str, rays: usize, gates: usize) -> Result<Self, String> {
         let shape = file.shape(name).unwrap_or_default();
+        let dims = shape.len();
         match (dims, &shape[..]) {
             (2, [a, b]) if (*a, *b) == (rays as u64, gates as u64) => Ok(Self::Full { rays, gates }),
             (2, _) => {
                 Err(format!("variable {name} is {} x {}; {rays} rays x {gates} ranges are needed", shape[0], shape[1]))
             }
             (1, _) if file.has("ray_start_index") && file.has("ray_n_gates") => {
-                let whole = |name: &str, file: &mut ClassicFile| -> Result<Vec<usize>, String> {
+                let whole = |name: &str, file: &mut dyn Source| -> Result<Vec<usize>, String> {
                     let values = file.floats(name)?;
                     let bad = values.iter().any(|v| !(*v >= 0.0 && *v < 1e9));
                     match bad || values.len() != rays {
@@ -189,7 +200,7 @@ impl GateLayout {
     }
 
     /// The values \[ray, gate\], one ray after the other.
-    fn read(&self, file: &mut ClassicFile, name: &str) -> Result<Vec<f64>, String> {
+    fn read(&self, file: &mut dyn Source, name: &str) -> Result<Vec<f64>, String> {
         let values = file.floats(name)?;
         match self {
             Self::Full { rays, gates } if values.len() == rays * gates => Ok(values),
@@ -209,7 +220,7 @@ impl GateLayout {
     }
 
     /// The first of some variables that is there.
-    fn optional(&self, file: &mut ClassicFile, names: &[&str]) -> Result<Option<Vec<f64>>, String> {
+    fn optional(&self, file: &mut dyn Source, names: &[&str]) -> Result<Option<Vec<f64>>, String> {
         match names.iter().find(|name| file.has(name)) {
             Some(name) => self.read(file, name).map(Some),
             None => Ok(None),
@@ -218,8 +229,8 @@ impl GateLayout {
 }
 
 /// An angle of each ray, rad.
-fn angles(file: &mut ClassicFile, name: &str) -> Result<Vec<f64>, String> {
-    let units = file.text(name, "units").unwrap_or("degrees").to_ascii_lowercase();
+fn angles(file: &mut dyn Source, name: &str) -> Result<Vec<f64>, String> {
+    let units = file.text(name, "units").unwrap_or("degrees".into()).to_ascii_lowercase();
     let values = file.floats(name)?;
     match values.iter().position(|value| !value.is_finite()) {
         Some(ray) => Err(format!("{name} of ray {ray} is missing")),
@@ -229,8 +240,8 @@ fn angles(file: &mut ClassicFile, name: &str) -> Result<Vec<f64>, String> {
 }
 
 /// Ranges of the centres of the gates, m.
-fn ranges(file: &mut ClassicFile) -> Result<Vec<f64>, String> {
-    let units = file.text("range", "units").unwrap_or("meters").to_ascii_lowercase();
+fn ranges(file: &mut dyn Source) -> Result<Vec<f64>, String> {
+    let units = file.text("range", "units").unwrap_or("meters".into()).to_ascii_lowercase();
     let unit_m = if units.starts_with('k') { 1e3 } else { 1.0 };
     // One row for each ray where gates differ.
     if file.shape("range").is_some_and(|shape| shape.len() > 1) {
@@ -240,7 +251,7 @@ fn ranges(file: &mut ClassicFile) -> Result<Vec<f64>, String> {
 }
 
 /// Times of the rays in s, and the date from which they count.
-fn times(file: &mut ClassicFile, count: usize) -> Result<(Vec<f64>, Option<UtcTime>), String> {
+fn times(file: &mut dyn Source, count: usize) -> Result<(Vec<f64>, Option<UtcTime>), String> {
     if !file.has("time") {
         return Ok((vec![f64::NAN; count], None));
     }
@@ -271,7 +282,7 @@ fn times(file: &mut ClassicFile, count: usize) -> Result<(Vec<f64>, Option<UtcTi
 }
 
 /// The rays of each sweep.
-fn sweeps(file: &mut ClassicFile, count: usize) -> Result<Vec<std::ops::Range<usize>>, String> {
+fn sweeps(file: &mut dyn Source, count: usize) -> Result<Vec<std::ops::Range<usize>>, String> {
     let (start, end) = ("sweep_start_ray_index", "sweep_end_ray_index");
     if !(file.has(start) && file.has(end)) {
         return Ok(std::iter::once(0..count).collect());
@@ -292,11 +303,11 @@ fn sweeps(file: &mut ClassicFile, count: usize) -> Result<Vec<std::ops::Range<us
 }
 
 /// The largest velocity that can be told apart, m/s: that of the file's first ray.
-fn nyquist(file: &mut ClassicFile) -> Result<Option<f64>, String> {
+fn nyquist(file: &mut dyn Source) -> Result<Option<f64>, String> {
     if file.has("nyquist_velocity") { first(file, "nyquist_velocity") } else { Ok(None) }
 }
 
 /// The first value of a variable, if it is above 0.
-fn first(file: &mut ClassicFile, name: &str) -> Result<Option<f64>, String> {
+fn first(file: &mut dyn Source, name: &str) -> Result<Option<f64>, String> {
     Ok(file.floats(name)?.first().copied().filter(|value| *value > 0.0 && value.is_finite()))
 }

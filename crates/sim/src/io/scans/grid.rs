@@ -26,6 +26,18 @@ const TURN: f64 = 0.1;
 /// Least lines, gates and velocities of a map.
 const LEAST: (usize, usize, usize) = (3, 3, 30);
 
+/// Scans of which the scatter tells a deviation.
+const ENOUGH_SCANS: f64 = 20.0;
+
+/// Standard deviation of a velocity that is the mean of `count` scans, whose scatter gave the deviation of one; unknown of few.
+pub(super) fn of_mean(sigma_m_s: f64, count: Option<f64>) -> f64 {
+    match count {
+        None => sigma_m_s,
+        Some(count) if count >= ENOUGH_SCANS => sigma_m_s / count.sqrt(),
+        Some(_) => f64::NAN,
+    }
+}
+
 /// The map of rays; `what` names the scan in messages.
 pub(super) fn scan_map(
     mut rays: Vec<RayRow>,

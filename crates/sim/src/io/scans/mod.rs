@@ -2,7 +2,7 @@
 //!
 //! | format | how it is known | sign, angles, gaps |
 //! |---|---|---|
-//! | CfRadial 1.4, classic NetCDF | its first bytes | by standard names and units; fill values; sweeps that are no RHI are left out |
+//! | CfRadial 1.x in classic NetCDF; in NetCDF-4 also CfRadial 2 and Windcube, a group for each sweep (feature `netcdf4`) | its first bytes | by standard names and units; fill values; sweeps that are no RHI are left out |
 //! | HALO `.hpl` | the line `****` | positive away; below an intensity threshold there is noise |
 //! | table | the header names `range_m`, an elevation and a velocity | positive away; empty cells |
 //!
@@ -12,6 +12,10 @@
 mod cfradial;
 mod grid;
 mod hpl;
+#[cfg(feature = "netcdf4")]
+mod netcdf4;
+#[cfg(feature = "netcdf")]
+mod source;
 mod table;
 
 use crate::Error;
@@ -48,6 +52,8 @@ pub struct ReadScan {
     pub pulse_width_s: Option<f64>,
     /// The scene that this program wrote the file for.
     pub scene_toml: Option<String>,
+    /// Whether this program made its velocities, so that its estimator is that of the scene.
+    pub is_own: bool,
 }
 
 /// Reads the scans of a file; the sweeps that are none are left out, and said in the texts.
@@ -61,8 +67,29 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
     let mut magic = Vec::new();
     file.take(8).read_to_end(&mut magic).map_err(unreadable)?;
     match &magic[..] {
+        #[cfg(feature = "netcdf4")]
+        [0x89, b'H', b'D', b'F', ..] => {
+            let (mut out, mut left_out) = (Vec::new(), Vec::new());
+            for (sweep, (name, mut group)) in netcdf4::groups(path)?.into_iter().enumerate() {
+                let found = cfradial::scans(&mut group, path, format, sweep);
+                let (scans, others) = found.map_err(|reason| match name.as_str() {
+                    "" => refuse(reason),
+                    name => refuse(format!("group {name}: {reason}")),
+                })?;
+                out.extend(scans);
+                left_out.extend(others);
+            }
+            some_scan(path, out, left_out)
+        }
         #[cfg(feature = "netcdf")]
-        [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => cfradial::read(path, format),
+        [b'C', b'D', b'F', ..] => {
+            let mut file = crate::io::netcdf_input::open(path)?;
+            let (out, left_out) = cfradial::scans(&mut file, path, format, 0).map_err(refuse)?;
+            some_scan(path, out, left_out)
+        }
+        // The reader of classic files tells what to do about others.
+        #[cfg(all(feature = "netcdf", not(feature = "netcdf4")))]
+        [0x89, b'H', b'D', b'F', ..] => crate::io::netcdf_input::open(path).map(|_| Default::default()),
         #[cfg(not(feature = "netcdf"))]
         [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
             Err(refuse("it is NetCDF, which this program was built without: feature netcdf".into()))
@@ -81,6 +108,16 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
             found.map(|scans| (scans, Vec::new())).map_err(refuse)
         }
     }
+}
+
+/// A file needs one scan at least.
+#[cfg(feature = "netcdf")]
+fn some_scan(path: &Path, found: Vec<ReadScan>, left_out: Vec<String>) -> Result<(Vec<ReadScan>, Vec<String>), Error> {
+    if found.is_empty() {
+        let reason = format!("it has no scan in elevation (RHI) that can be used: {}", left_out.join("; "));
+        return Err(Error::Input { path: path.to_owned(), reason });
+    }
+    Ok((found, left_out))
 }
 
 /// Largest text that is read \[bytes\].

@@ -2,7 +2,7 @@
 //!
 //! Check: maps of a run, references, cells that are missing, twice there, or make no grid.
 
-use super::grid::{RayRow, one_plane, scan_map};
+use super::grid::{RayRow, of_mean, one_plane, scan_map};
 use super::{ReadScan, ScanFormat};
 use crate::io::csv_input::TextTable;
 use std::collections::BTreeMap;
@@ -105,6 +105,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
                 gate_length_m: None,
                 pulse_width_s: None,
                 scene_toml: Some(origin.scene_toml.clone()).filter(|text| !text.is_empty()),
+                is_own: table.comment.trim_start().starts_with("source: wakescope "),
             })
         })
         .collect()
@@ -167,8 +168,8 @@ fn cells(
             ray.velocity_m_s[gate] = sign * velocity_m_s;
         }
         if let Some(column) = columns.sigma {
-            let count = columns.count.map_or(1.0, |c| number(row, c).max(1.0));
-            ray.sigma_m_s[gate] = number(row, column) / count.sqrt();
+            let count = columns.count.map(|c| number(row, c));
+            ray.sigma_m_s[gate] = of_mean(number(row, column), count);
         }
         for (of, value) in [
             (&mut ray.time_s, columns.time.map(|c| number(row, c))),

@@ -61,6 +61,12 @@ impl ScanLines {
         self.first_record[lines.start]..self.first_record[lines.end]
     }
 
+    /// All records of the scan, and the elevation of each, rad.
+    pub(crate) fn all_records(&self) -> (Range<usize>, Vec<f64>) {
+        let all = 0..self.elevation_rad.len();
+        (self.records(&all), self.record_elevation_rad(&all))
+    }
+
     /// Elevation of each record of some lines, rad.
     pub(super) fn record_elevation_rad(&self, lines: &Range<usize>) -> Vec<f64> {
         let of = |line: usize| {

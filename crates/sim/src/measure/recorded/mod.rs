@@ -231,7 +231,10 @@ fn pieces(records: Range<usize>, samples: usize) -> impl Iterator<Item = Range<u
 }
 
 /// The samples of some records \[record, sample\].
-fn samples<S: FromParts>(records: &mut RawRecords, range: Range<usize>) -> Result<ndarray::Array2<S>, Error> {
+pub(crate) fn samples<S: FromParts>(
+    records: &mut RawRecords,
+    range: Range<usize>,
+) -> Result<ndarray::Array2<S>, Error> {
     let shape = (range.len(), records.samples());
     let samples: Vec<S> = records.read(range)?.into_iter().map(S::from_parts).collect();
     ndarray::Array2::from_shape_vec(shape, samples).map_err(|_| records.refuse("it became shorter".into()))

@@ -1,0 +1,440 @@
+//! `wakescope retrieve`: vortices from scans, maps of any instrument or signals of a scene.
+
+use super::{Cli, load, progress, say};
+use crate::Error;
+use crate::io::raw::{RawFormat, RawRecords};
+use crate::io::scans::{self, ReadScan, ScanFormat};
+use crate::io::{Existing, FileGroup, Provenance};
+use crate::measure::progress::{Observer, Silent};
+use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape};
+use crate::measure::write;
+use crate::plan::{Plan, Target};
+use crate::retrieve::{self, Method, OwnScene, RetrievedScan, gate_of};
+use crate::scene::{SceneFile, VortexProfile};
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use wakescope_estimate::retrieval::{
+    Covariance, EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track, Turbulence,
+};
+use wakescope_estimate::vortex_fit::{CoreProfile, Loss, Sharing, Wake, WakeModel};
+
+/// Words of `wakescope retrieve`.
+#[derive(Debug, Args)]
+pub(super) struct RetrieveWords {
+    /// Maps of scans: CfRadial 1.4 (classic NetCDF), HALO .hpl, CSV; or raw signals, signals.nc, NPY or NPZ, with --scene.
+    #[arg(required = true)]
+    data: Vec<PathBuf>,
+    /// The scene of the instrument; a map of this program has its own in it.
+    #[arg(long, value_name = "SCENE.toml")]
+    scene: Option<PathBuf>,
+    /// How circulations are found.
+    #[arg(long, value_enum, default_value_t)]
+    method: Method,
+    /// Folder to write to; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Whether image vortices make the ground a streamline.
+    #[arg(long, value_enum, default_value_t = YesNo::Yes)]
+    ground: YesNo,
+    /// Standard deviation of the weight of a gate along the line, m; 0 for velocities at points.
+    #[arg(long, value_name = "M", value_parser = not_negative)]
+    gate_std: Option<f64>,
+    /// Circulation against radius; of the scene without it, else algebraic.
+    #[arg(long, value_enum)]
+    profile: Option<Profile>,
+    /// Core radius that is kept, m; fitted without it.
+    #[arg(long, value_name = "M", value_parser = positive)]
+    core: Option<f64>,
+    /// What residuals cost: cauchy bears outliers, squares does not.
+    #[arg(long, value_enum, default_value_t = LossWord::Cauchy)]
+    loss: LossWord,
+    /// Standard deviation, m/s, and length, m, of turbulence that neighbouring velocities share, e.g. 1.2,25.
+    #[arg(long, value_name = "SIGMA,LENGTH", value_parser = turbulence)]
+    turbulence: Option<Turbulence>,
+    /// Where deviations come from: the residuals, or the stated deviations of the velocities.
+    #[arg(long, value_enum, default_value_t = CovarianceWord::Sandwich)]
+    covariance: CovarianceWord,
+    /// Whether vortices move while a scan lasts: whichever fits better, yes, or no.
+    #[arg(long, value_enum, default_value_t = MotionWord::Auto)]
+    motion: MotionWord,
+    /// Least gain of chi-square over the wind alone that makes a wake.
+    #[arg(long, value_name = "T", default_value_t = RetrievalOptions::DEFAULT_THRESHOLD, value_parser = not_negative)]
+    threshold: f64,
+    /// Height of the lidar above the ground, m; of the scene without it, else 0.
+    #[arg(long, value_name = "M", value_parser = not_negative)]
+    lidar_height: Option<f64>,
+    /// The variable or column that holds the velocities.
+    #[arg(long, value_name = "NAME")]
+    field: Option<String>,
+    /// Velocities are positive towards the lidar.
+    #[arg(long)]
+    towards: bool,
+    /// Leave out velocities below this signal-to-noise ratio, dB.
+    #[arg(long, value_name = "DB", allow_negative_numbers = true)]
+    min_snr: Option<f64>,
+    /// Replace files in the folder that this program did not write, or that were changed since.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum YesNo {
+    Yes,
+    No,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Profile {
+    Algebraic,
+    LambOseen,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LossWord {
+    Cauchy,
+    Squares,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CovarianceWord {
+    Sandwich,
+    Model,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum MotionWord {
+    Auto,
+    Yes,
+    No,
+}
+
+pub(super) fn not_negative(word: &str) -> Result<f64, String> {
+    let value = word.trim().parse::<f64>().ok().filter(|v| *v >= 0.0 && v.is_finite());
+    value.ok_or_else(|| "a number from 0 on, e.g. 14.4".into())
+}
+
+fn positive(word: &str) -> Result<f64, String> {
+    let value = word.trim().parse::<f64>().ok().filter(|v| *v > 0.0 && v.is_finite());
+    value.ok_or_else(|| "a number above 0, e.g. 2.35".into())
+}
+
+pub(super) fn turbulence(word: &str) -> Result<Turbulence, String> {
+    let both = word.split_once(',').and_then(|(a, b)| Some((positive(a).ok()?, positive(b).ok()?)));
+    let (deviation_m_s, length_m) = both.ok_or("two numbers above 0, m/s and m, with a comma between, e.g. 1.2,25")?;
+    Ok(Turbulence { deviation_m_s, length_m })
+}
+
+impl RetrieveWords {
+    fn options(&self, scene: Option<&SceneFile>, gate: Gate) -> RetrievalOptions {
+        let of_scene = scene.map(|file| &file.scene);
+        let profile = match (self.profile, of_scene.map(|scene| &scene.flow)) {
+            (Some(Profile::LambOseen), _) => CoreProfile::LambOseen,
+            (None, Some(crate::scene::Flow::VortexPair(pair))) if pair.profile == VortexProfile::LambOseen => {
+                CoreProfile::LambOseen
+            }
+            _ => CoreProfile::Algebraic,
+        };
+        let height_m = self.lidar_height.or(of_scene.map(|scene| scene.scan.lidar_height_m));
+        let mut options = RetrievalOptions {
+            model: WakeModel {
+                profile,
+                images: self.ground == YesNo::Yes,
+                lidar_height_m: height_m.unwrap_or(0.0),
+                ..WakeModel::default()
+            },
+            gate,
+            core_radius_m: self.core,
+            turbulence: self.turbulence,
+            covariance: match self.covariance {
+                CovarianceWord::Sandwich => Covariance::Sandwich,
+                CovarianceWord::Model => Covariance::Model,
+            },
+            movement: match self.motion {
+                MotionWord::Auto => Movement::Auto,
+                MotionWord::Yes => Movement::Moving,
+                MotionWord::No => Movement::Frozen,
+            },
+            threshold: self.threshold,
+            ..RetrievalOptions::default()
+        };
+        if self.loss == LossWord::Squares {
+            options.loss = Loss::Squares;
+        }
+        if self.core.is_some() {
+            options.free.core_radius = Sharing::Fixed;
+        }
+        options
+    }
+}
+
+/// What is retrieved: maps, or signals with the maps of their scans.
+enum Input {
+    Map(Box<ReadScan>),
+    Signals(Box<Signals>),
+}
+
+struct Signals {
+    path: PathBuf,
+    records: RawRecords,
+    plan: Plan,
+    scans: Vec<MeasuredScan>,
+    spectra: Option<Spectra>,
+}
+
+/// What was found in all scans.
+#[derive(Default)]
+struct Found {
+    scans: Vec<RetrievedScan>,
+    /// Circulations by envelopes, with the number of their scan.
+    envelopes: Vec<(usize, EnvelopeResult)>,
+}
+
+pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
+    let stated = words.scene.as_deref().map(|path| load(path, cli)).transpose()?;
+    let format = ScanFormat { field: words.field.clone(), towards: words.towards, min_snr_db: words.min_snr };
+    let mut told = progress_of(cli);
+    let mut inputs = Vec::new();
+    for path in &words.data {
+        if is_signals(path) {
+            inputs.push(Input::Signals(Box::new(signals(path, words, stated.clone())?)));
+            continue;
+        }
+        if matches!(words.method, Method::Signals | Method::Envelope) {
+            let reason = "it is no file of raw signals, which this method needs: --method fit takes maps".into();
+            return Err(Error::Input { path: path.clone(), reason });
+        }
+        let (found, left_out) = scans::read(path, &format)?;
+        left_out.iter().for_each(|text| told.warn(&format!("{}: {text}: left out", path.display())));
+        inputs.extend(found.into_iter().map(|scan| Input::Map(Box::new(scan))));
+    }
+    let scans_of = |input: &Input| if let Input::Signals(signals) = input { signals.scans.len() } else { 1 };
+    let count: usize = inputs.iter().map(scans_of).sum();
+    let existing = if words.overwrite { Existing::Any } else { Existing::Own };
+    write::prepare(&words.out, names(count).iter().map(String::as_str), existing)?;
+    let mut found = Found::default();
+    for input in inputs {
+        match input {
+            Input::Map(scan) => {
+                let start = prediction(&found.scans, &scan);
+                found.scans.push(of_map(words, stated.as_ref(), *scan, start, told.as_mut())?);
+            }
+            Input::Signals(signals) => of_signals(words, *signals, &mut found)?,
+        }
+    }
+    same_origin(&mut found.scans);
+    let track = retrieve::track_of(&found.scans)?;
+    let files = files(words, stated.as_ref(), &found, track.as_ref(), existing)?;
+    let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found.scans), "files": files });
+    say(cli.json, &object, &format!("{}wrote {} files to {}", text(&found.scans), files.len(), words.out.display()))
+}
+
+/// Where the track of the scans so far says that the wake is, to start from beside the blind search.
+fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
+    let last = before.last()?;
+    let times = scan.map.time_s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+    let (reference, of_last) = (scan.reference.zip(last.scan.reference), 0.5 * (times.0 + times.1));
+    let time_s = of_last + reference.map_or(0.0, |(own, of_last)| own.seconds_since(of_last));
+    let core_m = last.result.wake.map_or(2.0, |wake| wake.left.core_radius_m);
+    retrieve::track_of(before).ok().flatten()?.prediction(time_s, core_m)
+}
+
+fn progress_of(cli: &Cli) -> Box<dyn Observer> {
+    if cli.quiet { Box::new(progress::Quiet) } else { Box::new(progress::Bars::new()) }
+}
+
+/// Whether a file holds raw signals and no map.
+fn is_signals(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    if ["npy", "npz"].contains(&extension) {
+        return true;
+    }
+    #[cfg(feature = "netcdf")]
+    return crate::io::netcdf_input::open(path).is_ok_and(|file| file.has("current_a"));
+    #[cfg(not(feature = "netcdf"))]
+    false
+}
+
+/// The map of signals first: it starts the fit.
+fn signals(path: &Path, words: &RetrieveWords, scene: Option<SceneFile>) -> Result<Signals, Error> {
+    let Some(scene) = scene else {
+        let reason = "it holds raw signals: --scene says which instrument recorded them".into();
+        return Err(Error::Input { path: path.to_owned(), reason });
+    };
+    let mut records = RawRecords::open(path, &RawFormat::default(), record_shape(&scene.scene))?;
+    let (plan, is_own) = recorded::plan(scene, &records)?;
+    let noise = if is_own { NoiseLevel::OfScene } else { NoiseLevel::Quietest };
+    // What is known of the air is not looked at: this is a retrieval.
+    let spectra = words.method == Method::Envelope;
+    let options = RecordedOptions { noise: Some(noise), spectra, ..RecordedOptions::default() };
+    let (scans, spectra) = match recorded::estimate((&plan, false), &mut records, &options, &Silent)? {
+        Recorded::Measured { scans, spectra } => (scans, spectra),
+        Recorded::OfRun(_) => (Vec::new(), None),
+    };
+    Ok(Signals { path: path.to_owned(), records, plan, scans, spectra })
+}
+
+/// The scene of a map of this program, if it is one.
+fn scene_of(scan: &ReadScan) -> Option<SceneFile> {
+    SceneFile::parse(scan.scene_toml.as_deref()?, &scan.path).ok()
+}
+
+fn of_map(
+    words: &RetrieveWords,
+    stated: Option<&SceneFile>,
+    scan: ReadScan,
+    start: Option<Wake>,
+    told: &mut dyn Observer,
+) -> Result<RetrievedScan, Error> {
+    let own = scene_of(&scan);
+    let scene = stated.or(own.as_ref());
+    let (gate, mut remark) = gate_of(Some(&scan), words.gate_std, scene.map(|file| &file.scene))?;
+    if scan.is_own && scene.is_none() {
+        remark = Some(
+            "it is a map of this program that has lost its scene, as some programs drop it: --scene gives the circulations of the \
+             original, which are tens of per cent off without it",
+        );
+    }
+    if let Some(remark) = remark {
+        told.warn(&format!("{}: {remark}", scan.path.display()));
+    }
+    // What the estimator of a scene makes of a wake is in its own maps alone.
+    let response = match (scan.is_own && words.gate_std.is_none(), scene) {
+        (true, Some(scene)) => own_scene(&Plan::new(scene.clone(), Target::Map)?)?,
+        _ => None,
+    };
+    let options = RetrievalOptions { start, ..words.options(scene, gate) };
+    retrieve::retrieve_map(scan, words.method, options, response.as_ref())
+}
+
+fn own_scene(plan: &Plan) -> Result<Option<OwnScene>, Error> {
+    OwnScene::new(plan, &Silent)
+}
+
+fn of_signals(words: &RetrieveWords, signals: Signals, found: &mut Found) -> Result<(), Error> {
+    let Signals { path, mut records, plan, scans, spectra } = signals;
+    let own = own_scene(&plan)?;
+    let mut first_line = 0;
+    for (sweep, measured) in scans.iter().enumerate() {
+        let scan = retrieve::scan_of_signals(&path, sweep, &plan, measured);
+        let (gate, _) = gate_of(Some(&scan), words.gate_std, Some(&plan.scene.scene))?;
+        let mut one = retrieve::retrieve_map(scan, words.method, words.options(Some(&plan.scene), gate), own.as_ref())?;
+        let lines = first_line..first_line + measured.lines.elevation_rad.len();
+        first_line = lines.end;
+        match (&own, words.method) {
+            (Some(own), Method::Signals) => one = retrieve::retrieve_signals(own, &mut records, measured, one)?,
+            (Some(own), Method::Envelope) => {
+                if let (Some(spectra), Some(wake)) = (&spectra, one.result.wake) {
+                    let snr = own.snr_of(&wake);
+                    let results = retrieve::envelopes(&plan, spectra, lines, snr, &mut one)?;
+                    found.envelopes.extend(results.into_iter().map(|result| (found.scans.len() + 1, result)));
+                }
+            }
+            (None, Method::Signals | Method::Envelope) => {
+                let reason = "this method needs noise and a Gaussian pulse without chirp in the scene".into();
+                return Err(Error::Input { path, reason });
+            }
+            _ => {}
+        }
+        found.scans.push(one);
+    }
+    Ok(())
+}
+
+/// Times of all scans from the date of the first one, where all have a date.
+fn same_origin(scans: &mut [RetrievedScan]) {
+    let Some(first) = scans.first().and_then(|scan| scan.scan.reference) else { return };
+    if scans.iter().any(|scan| scan.scan.reference.is_none()) {
+        return;
+    }
+    for scan in scans {
+        let Some(reference) = scan.scan.reference.replace(first) else { continue };
+        let later_s = reference.seconds_since(first);
+        scan.scan.map.time_s.iter_mut().for_each(|time_s| *time_s += later_s);
+        scan.result.reference_time_s += later_s;
+        scan.result.vortices.iter_mut().for_each(|vortex| vortex.time_s += later_s);
+    }
+}
+
+/// Names of the files.
+fn names(scans: usize) -> Vec<String> {
+    let tables =
+        ["retrieval.csv", "retrieval.json", "envelopes.csv", "profiles.csv", "track.csv", "track.svg", "track.png"];
+    let mut out = tables.map(str::to_owned).to_vec();
+    if cfg!(feature = "plots") {
+        out.extend((1..=scans).flat_map(|number| ["svg", "png"].map(|kind| format!("scan_{number:03}.{kind}"))));
+    }
+    out
+}
+
+fn files(
+    words: &RetrieveWords,
+    scene: Option<&SceneFile>,
+    Found { scans, envelopes }: &Found,
+    track: Option<&Track>,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, Error> {
+    let origin = Provenance {
+        program: crate::PROGRAM.into(),
+        scene_toml: scene.map(|scene| scene.toml.clone()).unwrap_or_default(),
+        scene_hash: scene.map(|scene| scene.hash.clone()).unwrap_or_default(),
+        seed: scene.map_or(0, |scene| scene.scene.seed),
+    };
+    let mut files = FileGroup::new(&words.out);
+    files.add("retrieval.csv", retrieve::rows(scans).to_csv(&origin)?)?;
+    files.add(
+        "retrieval.json",
+        format!("{{\"source\": \"{}\", \"scans\": {}}}\n", crate::PROGRAM, retrieve::json(scans)),
+    )?;
+    if words.method == Method::Envelope {
+        files.add("envelopes.csv", retrieve::envelope_table(envelopes).to_csv(&origin)?)?;
+    }
+    if words.method == Method::Integral {
+        files.add("profiles.csv", retrieve::profile_table(scans)?.to_csv(&origin)?)?;
+    }
+    if let Some(track) = track {
+        files.add("track.csv", retrieve::track_table(track).to_csv(&origin)?)?;
+    }
+    #[cfg(feature = "plots")]
+    {
+        let mut add = |name: &str, figure: &crate::plot::Figure| -> Result<(), Error> {
+            files.add(&format!("{name}.svg"), figure.svg(&origin)?)?;
+            Ok(files.add(&format!("{name}.png"), figure.png(&origin)?)?)
+        };
+        for (number, scan) in scans.iter().enumerate() {
+            add(&format!("scan_{:03}", number + 1), &retrieve::figure(scan, number + 1)?)?;
+        }
+        if let Some(track) = track {
+            add("track", &retrieve::track_figure(track, scans))?;
+        }
+    }
+    write::put(files, &words.out, existing)
+}
+
+/// A line for each vortex.
+fn text(found: &[RetrievedScan]) -> String {
+    let mut out = String::new();
+    for (number, scan) in found.iter().enumerate() {
+        let flags: Vec<&str> = scan.result.flags.iter().map(|flag| flag.name()).collect();
+        let flags = if flags.is_empty() { String::new() } else { format!("  [{}]", flags.join(" ")) };
+        if scan.result.has(Flag::NoWake) || scan.result.vortices.is_empty() {
+            let (statistic, threshold) = (scan.result.statistic, scan.result.threshold);
+            out += &format!("scan {}: no wake, statistic {statistic:.1} below {threshold:.1}{flags}\n", number + 1);
+        }
+        for vortex in &scan.result.vortices {
+            let (mean, y_m, z_m) = (vortex.circulation_5_15_m2_s, vortex.lateral_position_m, vortex.height_m);
+            out += &format!(
+                "scan {}: {:<5} Gamma(5-15 m) {:.1} +- {:.1} m^2/s at y {:.2} +- {:.2} m, z {:.2} +- {:.2} m{flags}\n",
+                number + 1,
+                if vortex.side == wakescope_estimate::retrieval::Side::Left { "left" } else { "right" },
+                mean.value,
+                mean.std,
+                y_m.value,
+                y_m.std,
+                z_m.value,
+                z_m.std,
+            );
+        }
+    }
+    out
+}

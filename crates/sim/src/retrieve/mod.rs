@@ -1,0 +1,92 @@
+//! From scans of any instrument to vortices: circulation, place, core and their errors, one row for each vortex and scan.
+//!
+//! | module | content |
+//! |---|---|
+//! | `gate` | what a velocity of a file is of the air about its range |
+//! | `own` | maps and signals of this program's scenes: what their estimator makes of a wake |
+//! | `others` | velocity envelopes, circulation against radius |
+//! | `tracks` | the vortices through several scans |
+//! | `table` | rows, and everything as JSON |
+//! | `pictures` | velocities, the fitted wake, what is left |
+//!
+//! Check: maps of runs are retrieved within their stated deviations, from every format.
+
+mod gate;
+mod others;
+mod own;
+#[cfg(feature = "plots")]
+mod pictures;
+mod table;
+mod tracks;
+
+pub use gate::gate_of;
+pub use others::{envelope_table, envelopes, profile_table};
+pub use own::{OwnScene, retrieve_signals, scan_of_signals};
+#[cfg(feature = "plots")]
+pub use pictures::figure;
+#[cfg(feature = "sweep")]
+pub use table::json;
+pub use table::rows;
+#[cfg(feature = "plots")]
+pub use tracks::track_figure;
+pub use tracks::{track_of, track_table};
+
+use crate::Error;
+use crate::io::scans::ReadScan;
+use wakescope_estimate::retrieval::{RetrievalOptions, ScanResult, fit_scan, radial_velocity_method};
+
+/// How circulations are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum Method {
+    /// Fit of the wake to the map.
+    #[default]
+    Fit,
+    /// Fit of the wake to all raw signals.
+    Signals,
+    /// Radial-velocity method: places from extremes, circulations by linear least squares.
+    Rv,
+    /// Velocity envelopes of the spectra of raw signals about the wake that is fitted to their map.
+    Envelope,
+    /// Fit to the map, and circulation against radius by integrals over the map beside it.
+    Integral,
+}
+
+/// One scan with what was found in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RetrievedScan {
+    /// The scan.
+    pub scan: ReadScan,
+    /// How it was retrieved.
+    pub options: RetrievalOptions,
+    /// Its vortices, or none.
+    pub result: ScanResult,
+}
+
+/// Retrieves one map.
+///
+/// # Errors
+/// What the fits refuse, with the file and the sweep.
+pub fn retrieve_map(
+    scan: ReadScan,
+    method: Method,
+    options: RetrievalOptions,
+    own: Option<&OwnScene>,
+) -> Result<RetrievedScan, Error> {
+    let found = match method {
+        Method::Rv => radial_velocity_method(&scan.map, &options),
+        _ => fit_scan(&scan.map, &options),
+    };
+    let mut result = found.map_err(|error| refused(&scan, &error))?;
+    if let Some(own) = own.filter(|_| method != Method::Rv)
+        && let Some(better) = own.refined(&scan.map, &options, &result)
+    {
+        result = better;
+    }
+    Ok(RetrievedScan { scan, options, result })
+}
+
+/// An error of the fits with the file that caused it.
+fn refused(scan: &ReadScan, error: &wakescope_estimate::Error) -> Error {
+    Error::Input { path: scan.path.clone(), reason: format!("sweep {}: {error}", scan.sweep) }
+}

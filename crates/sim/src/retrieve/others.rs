@@ -1,0 +1,123 @@
+//! Methods beside the fit, shown as they are: velocity envelopes of spectra, and circulation against radius from the map itself.
+//!
+//! Check: a pair's envelopes, inverted, have its circulation, and raw ones more, in the tests of the program.
+
+use super::{RetrievedScan, refused};
+use crate::Error;
+use crate::io::Table;
+use crate::measure::estimators;
+use crate::measure::recorded::Spectra;
+use crate::plan::Plan;
+use crate::scene::PulseShape;
+use ndarray::Array3;
+use std::ops::Range;
+use wakescope_estimate::Weighting;
+use wakescope_estimate::estimators::CellTest;
+use wakescope_estimate::retrieval::{
+    EnvelopeResult, Measured, ProfilePoint, ScanSpectra, Side, SpectralShape, circulation_profile, velocity_envelopes,
+};
+
+/// Rate at which the highest cell of noise is above the threshold of an envelope.
+const FALSE_ALARM: f64 = 1e-2;
+/// Radii of a profile, m.
+const RADII_M: Range<u32> = 2..26;
+
+/// Circulations by velocity envelopes about the wake that the map of a scan has; nothing without one. The circulations over 5 to
+/// 15 m of the scan become the inverted ones.
+///
+/// # Errors
+/// A scene whose pulse or window is no Gaussian, or whose noise is not known.
+pub fn envelopes(
+    plan: &Plan,
+    spectra: &Spectra,
+    lines: Range<usize>,
+    snr: f64,
+    found: &mut RetrievedScan,
+) -> Result<Vec<EnvelopeResult>, Error> {
+    let scene = &plan.scene.scene;
+    let refuse = |reason: &str| Error::Input { path: found.scan.path.clone(), reason: reason.into() };
+    let (true, Weighting::Gaussian { relative_half_width }) = (
+        matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0,
+        estimators::weighting(scene),
+    ) else {
+        return Err(refuse(
+            "--method envelope knows Gaussian pulses and windows alone: estimator.weighting = \"gaussian\"",
+        ));
+    };
+    let Some(about) = found.result.wake.filter(|_| found.result.vortices.len() == 2) else { return Ok(Vec::new()) };
+    let window_sigma_s = relative_half_width * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
+    let shape = SpectralShape::gaussian(
+        plan.instrument.pulse.sigma_s(),
+        window_sigma_s,
+        scene.laser.wavelength_m,
+        scene.detector.bandwidth_hz,
+    )?;
+    let (gates, cells) = (spectra.range_m.len(), spectra.velocity_m_s.len());
+    // Lines by increasing elevation.
+    let mut order: Vec<usize> = lines.collect();
+    order.sort_by(|a, b| spectra.elevation_rad[*a].total_cmp(&spectra.elevation_rad[*b]));
+    let power = Array3::from_shape_fn((order.len(), gates, cells), |(line, gate, cell)| {
+        f64::from(spectra.density[(order[line] * gates + gate) * cells + cell])
+    });
+    let elevation_rad: Vec<f64> = order.iter().map(|line| spectra.elevation_rad[*line]).collect();
+    // Independent cells of the maximum over all frequencies of the band.
+    let count = 3.0 * scene.detector.bandwidth_hz * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
+    let of_cell = -((-FALSE_ALARM).ln_1p() / count).exp_m1();
+    let windows = scene.scan.pulses_per_line as f64;
+    let threshold = CellTest::known_noise(windows)?.threshold(of_cell)?;
+    let scan = ScanSpectra {
+        elevation_rad: &elevation_rad,
+        range_m: &spectra.range_m,
+        velocity_m_s: &spectra.velocity_m_s,
+        power: power.view(),
+        snr,
+    };
+    let results = velocity_envelopes(&scan, &shape, &found.options.model, &about, threshold)
+        .map_err(|error| refused(&found.scan, &error))?;
+    for vortex in &mut found.result.vortices {
+        if let Some(result) = results.iter().find(|result| result.side == vortex.side) {
+            vortex.circulation_5_15_m2_s = result.inverted_m2_s;
+            vortex.circulation_m2_s = Measured { value: f64::NAN, std: f64::NAN };
+        }
+    }
+    Ok(results.to_vec())
+}
+
+/// Raw, narrowed and inverted circulations of each scan.
+pub fn envelope_table(all: &[(usize, EnvelopeResult)]) -> Table {
+    Table::new()
+        .int("scan", all.iter().map(|(scan, _)| *scan as i64))
+        .text("side", all.iter().map(|(_, r)| super::table::side(r.side)))
+        .float("raw_m2_s", all.iter().map(|(_, r)| r.raw_m2_s))
+        .float("narrowed_m2_s", all.iter().map(|(_, r)| r.narrowed_m2_s))
+        .float("inverted_m2_s", all.iter().map(|(_, r)| r.inverted_m2_s.value))
+        .float("inverted_std_m2_s", all.iter().map(|(_, r)| r.inverted_m2_s.std))
+        .int("lines", all.iter().map(|(_, r)| r.lines as i64))
+        .int("left_out", all.iter().map(|(_, r)| r.left_out as i64))
+}
+
+/// Circulation against radius of each vortex of each scan, from the map itself and corrected with the fitted wake.
+///
+/// # Errors
+/// What the integrals refuse.
+pub fn profile_table(scans: &[RetrievedScan]) -> Result<Table, Error> {
+    let radii_m: Vec<f64> = RADII_M.map(f64::from).collect();
+    let mut rows: Vec<(usize, Side, ProfilePoint)> = Vec::new();
+    for (number, scan) in scans.iter().enumerate() {
+        let Some(wake) = &scan.result.wake else { continue };
+        for vortex in &scan.result.vortices {
+            let found = circulation_profile(&scan.scan.map, wake, vortex.side, &radii_m, &scan.options)
+                .map_err(|error| refused(&scan.scan, &error))?;
+            rows.extend(found.into_iter().map(|point| (number + 1, vortex.side, point)));
+        }
+    }
+    let column = |get: fn(&ProfilePoint) -> f64| rows.iter().map(|(_, _, point)| get(point)).collect::<Vec<f64>>();
+    Ok(Table::new()
+        .int("scan", rows.iter().map(|(scan, ..)| *scan as i64))
+        .text("side", rows.iter().map(|(_, side, _)| super::table::side(*side)))
+        .float("radius_m", column(|p| p.radius_m))
+        .float("across_m2_s", column(|p| p.across_m2_s))
+        .float("across_corrected_m2_s", column(|p| p.across_corrected_m2_s))
+        .float("around_m2_s", column(|p| p.around_m2_s))
+        .float("around_corrected_m2_s", column(|p| p.around_corrected_m2_s)))
+}

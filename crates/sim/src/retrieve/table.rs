@@ -1,0 +1,128 @@
+//! What retrievals found, as rows and as JSON.
+//!
+//! Check: rows of no wake, one vortex and two.
+
+use super::RetrievedScan;
+use crate::io::Table;
+use wakescope_estimate::retrieval::{Measured, ScanResult, Side, VortexResult};
+
+/// A row for each vortex and scan; a scan without a wake has one row without a vortex.
+pub fn rows(scans: &[RetrievedScan]) -> Table {
+    let mut of: Vec<(usize, &RetrievedScan, Option<&VortexResult>)> = Vec::new();
+    for (number, scan) in scans.iter().enumerate() {
+        match scan.result.vortices.is_empty() {
+            true => of.push((number + 1, scan, None)),
+            false => of.extend(scan.result.vortices.iter().map(|vortex| (number + 1, scan, Some(vortex)))),
+        }
+    }
+    let text = |get: &dyn Fn(&RetrievedScan, Option<&VortexResult>) -> String| -> Vec<String> {
+        of.iter().map(|(_, scan, vortex)| get(scan, *vortex)).collect()
+    };
+    let number = |get: &dyn Fn(&ScanResult, Option<&VortexResult>) -> f64| -> Vec<f64> {
+        of.iter().map(|(_, scan, vortex)| get(&scan.result, *vortex)).collect()
+    };
+    let time =
+        |result: &ScanResult, vortex: Option<&VortexResult>| vortex.map_or(result.reference_time_s, |v| v.time_s);
+    let mut table = Table::new()
+        .int("scan", of.iter().map(|(number, ..)| *number as i64))
+        .text("file", text(&|scan, _| scan.scan.path.file_name().unwrap_or_default().to_string_lossy().into_owned()))
+        .int("sweep", of.iter().map(|(_, scan, _)| scan.scan.sweep as i64))
+        .float("time_s", number(&time))
+        .text("side", text(&|_, vortex| vortex.map_or("none", |v| side(v.side)).to_owned()));
+    for (name, get) in VORTEX {
+        let of = |vortex: Option<&VortexResult>| vortex.and_then(get).unwrap_or(UNKNOWN);
+        table = table.float(name, number(&|_, v| of(v).value)).float(&with_std(name), number(&|_, v| of(v).std));
+    }
+    for (name, get) in WIND {
+        table = table.float(name, number(&|r, _| get(r).value)).float(&with_std(name), number(&|r, _| get(r).std));
+    }
+    table
+        .float("chi2_per_dof", number(&|result, _| result.chi2_per_dof))
+        .int("cells_used", of.iter().map(|(_, scan, _)| scan.result.cells_used as i64))
+        .int("cells_rejected", of.iter().map(|(_, scan, _)| scan.result.cells_rejected as i64))
+        .float("statistic", number(&|result, _| result.statistic))
+        .float("threshold", number(&|result, _| result.threshold))
+        .text("flags", text(&|scan, _| flags(&scan.result).join(" ")))
+}
+
+const UNKNOWN: Measured = Measured { value: f64::NAN, std: f64::NAN };
+
+type OfVortex = (&'static str, fn(&VortexResult) -> Option<Measured>);
+
+/// Columns of a vortex.
+const VORTEX: [OfVortex; 5] = [
+    ("gamma_m2_s", |v| Some(v.circulation_m2_s)),
+    ("gamma_5_15_m2_s", |v| Some(v.circulation_5_15_m2_s)),
+    ("y_m", |v| Some(v.lateral_position_m)),
+    ("z_m", |v| Some(v.height_m)),
+    ("core_m", |v| v.core_radius_m),
+];
+
+type OfScan = (&'static str, fn(&ScanResult) -> Measured);
+
+/// Columns of the wind.
+const WIND: [OfScan; 2] = [("wind_m_s", |r| r.lateral_wind_m_s), ("shear_per_s", |r| r.wind_shear_per_s)];
+
+/// `gamma_m2_s` to `gamma_std_m2_s`: the unit stays at the end.
+fn with_std(name: &str) -> String {
+    let unit = ["_m2_s", "_m_s", "_per_s", "_m"].into_iter().find(|unit| name.ends_with(unit)).unwrap_or_default();
+    format!("{}_std{unit}", name.strip_suffix(unit).unwrap_or(name))
+}
+
+pub(super) fn side(side: Side) -> &'static str {
+    match side {
+        Side::Left => "left",
+        Side::Right => "right",
+    }
+}
+
+fn flags(result: &ScanResult) -> Vec<&'static str> {
+    result.flags.iter().map(|flag| flag.name()).collect()
+}
+
+/// Everything that was found, with covariances and competing tops.
+#[cfg(feature = "sweep")]
+pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
+    use serde_json::{Value, json};
+    // JSON has no NaN: what is not known is null.
+    let measured = |m: Measured| json!({ "value": m.value, "std": m.std });
+    let wake = |values: [f64; 10]| -> Value {
+        PARAMETER_NAMES.iter().zip(values).map(|(name, value)| ((*name).to_owned(), json!(value))).collect()
+    };
+    let of_vortex = |vortex: &VortexResult| -> Value {
+        let mut object = json!({ "side": side(vortex.side), "time_s": vortex.time_s });
+        for (name, get) in VORTEX {
+            object[name] = get(vortex).map_or(Value::Null, measured);
+        }
+        object
+    };
+    let of_scan = |(number, scan): (usize, &RetrievedScan)| -> Value {
+        let r = &scan.result;
+        let rows: Vec<Vec<f64>> = r.covariance.outer_iter().map(|row| row.to_vec()).collect();
+        json!({
+            "scan": number + 1, "file": scan.scan.path, "sweep": scan.scan.sweep, "reference_time_s": r.reference_time_s,
+            "vortices": r.vortices.iter().map(of_vortex).collect::<Vec<_>>(),
+            "wind_m_s": measured(r.lateral_wind_m_s), "shear_per_s": measured(r.wind_shear_per_s),
+            "chi2_per_dof": r.chi2_per_dof, "cells_used": r.cells_used, "cells_rejected": r.cells_rejected,
+            "statistic": r.statistic, "threshold": r.threshold, "flags": flags(r),
+            "parameters": PARAMETER_NAMES, "wake": r.wake.map(|found| wake(found.to_array())), "covariance": rows,
+            "tops": r.tops.iter().map(|top| json!({ "wake": wake(top.wake.to_array()), "chi2": top.chi2 })).collect::<Vec<_>>(),
+        })
+    };
+    Value::Array(scans.iter().enumerate().map(of_scan).collect())
+}
+
+/// Names of the parameters of a wake in their order.
+#[cfg(feature = "sweep")]
+const PARAMETER_NAMES: [&str; 10] = [
+    "gamma_left_m2_s",
+    "gamma_right_m2_s",
+    "y_left_m",
+    "z_left_m",
+    "y_right_m",
+    "z_right_m",
+    "core_left_m",
+    "core_right_m",
+    "wind_m_s",
+    "shear_per_s",
+];
