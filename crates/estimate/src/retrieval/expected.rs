@@ -12,6 +12,8 @@ use crate::vortex_fit::{PARAMETERS, RangeKernel, Wake, WakeModel};
 /// A Gaussian weight is cut off after so many standard deviations, and sampled at so many points at last.
 const REACH: f64 = 3.5;
 const POINTS: usize = 41;
+/// A search is content with points so many times as far apart.
+const COARSER: usize = 2;
 
 /// Geometry, times and gates of a scan.
 #[derive(Clone)]
@@ -32,11 +34,11 @@ impl<'a> Expected<'a> {
         let step_m = uniform_step_m(&map.range_m);
         let kernel = match &options.gate {
             Gate::Gaussian { std_m } if *std_m > 0.0 => {
-                let longest_m = 2.0 * REACH * std_m / (POINTS - 1) as f64;
+                let longest_m = COARSER as f64 * 2.0 * REACH * std_m / (POINTS - 1) as f64;
                 let spacing_m = step_m.map_or(longest_m, |step| step / (step / longest_m).ceil());
                 gaussian(*std_m, spacing_m, (REACH * std_m / spacing_m).ceil() as usize)?
             }
-            Gate::Kernel(kernel) => kernel.clone(),
+            Gate::Kernel(kernel) => kernel.coarser(COARSER),
             Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, step_m.unwrap_or(1.0), &[1.0])?,
         };
         let times = map.time_s.iter();
@@ -44,13 +46,16 @@ impl<'a> Expected<'a> {
         let reference_time_s = if map.has_times() { 0.5 * (first_s + last_s) } else { f64::NAN };
         let moves = options.movement != Movement::Frozen && map.has_times() && last_s > first_s;
         let seconds = moves.then(|| map.time_s.iter().map(|time| time - reference_time_s).collect());
-        let uniform = step_m.is_some() && !matches!(options.gate, Gate::Kernel(_));
+        let uniform = step_m.is_some();
         Ok(Self { model: &options.model, kernel, map, seconds, reference_time_s, uniform })
     }
 
     /// For the end of a fit: every gate has its own points, each at its place.
     pub(crate) fn fine(&self, options: &RetrievalOptions) -> Result<Self, Error> {
         let mut fine = self.clone();
+        if let Gate::Kernel(kernel) = &options.gate {
+            fine.kernel = kernel.clone();
+        }
         if let Gate::Gaussian { std_m } = options.gate
             && std_m > 0.0
         {

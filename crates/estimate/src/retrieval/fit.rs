@@ -6,9 +6,9 @@
 
 use crate::error::Error;
 use crate::retrieval::expected::Expected;
-use crate::retrieval::hypotheses::{End, Fits, Kind, best, rivals, starts};
+use crate::retrieval::hypotheses::{End, Fits, least, rivals, starts};
 use crate::retrieval::problem::{Cell, Problem};
-use crate::retrieval::report::Report;
+use crate::retrieval::report::{OUTLIER, Report};
 use crate::retrieval::whitening::Whitening;
 use crate::retrieval::{Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
 use crate::vortex_fit::map_fit::data::median;
@@ -16,8 +16,6 @@ use crate::vortex_fit::{Loss, Wake};
 
 /// Median of the absolute value of a normal number.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
-/// Velocities with larger residuals, in their deviations, are outliers.
-pub(crate) const OUTLIER: f64 = 4.0;
 /// Most velocities that are whitened.
 const WHITENED: usize = 3000;
 
@@ -41,11 +39,11 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
         let wind = Fits { problem: &problem, options }.wind(&about)?;
         rescale(&mut problem, &wind);
     }
-    let mut ends = Fits { problem: &problem, options }.from_starts(&starts);
+    let mut ends = Fits { problem: &problem, options }.ends_of(&starts);
     let (mut thinned, mut rejected) = (false, 0);
     if let Some(turbulence) = &options.turbulence {
         (rejected, thinned) = whiten(&mut problem, turbulence, least(&ends, map.velocity_m_s.len()))?;
-        ends = Fits { problem: &problem, options }.from_starts(&starts);
+        ends = Fits { problem: &problem, options }.ends_of(&starts);
     }
     let mut scale = 1.0;
     if let Some(end) = least(&ends, problem.cells.len()) {
@@ -115,13 +113,6 @@ pub(crate) fn unfolded(map: &ScanMap) -> ScanMap {
         unfolded.velocity_m_s.mapv_inplace(|v| v - fold * ((v - middle) / fold).round());
     }
     unfolded
-}
-
-/// The end with the least chi^2 + k ln N.
-pub(crate) fn least(ends: &[End], cells: usize) -> Option<&End> {
-    let cost = |end: &End| end.chi2 + end.groups.len() as f64 * (cells as f64).ln();
-    let bests = [Kind::Left, Kind::Right, Kind::Both].into_iter().filter_map(|kind| best(ends, kind));
-    bests.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
 /// Scale of the residuals over their deviations, from their median.

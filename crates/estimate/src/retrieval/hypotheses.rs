@@ -27,8 +27,9 @@ const SAME_SIGMAS: f64 = 0.3;
 /// So near they are one even where there is no noise.
 const SAME: f64 = 1e-4;
 
-/// Where ends of rough fits are one: this part of a parameter, of 20 at least.
+/// Where ends of rough fits are one, and wakes with broad cores: this part of a parameter, of 20 at least.
 const ROUGHLY: f64 = 1e-3;
+const NEARLY: f64 = 5e-3;
 /// A rough end so much above the best of its kind competes no longer.
 const HOPELESS: f64 = 50.0;
 
@@ -72,6 +73,14 @@ impl Kind {
             Self::Right => Wake { left: nowhere(&wake.right, -NOWHERE_M), ..*wake },
             Self::Wind => Wake { left: nowhere(&wake.left, 0.0), right: nowhere(&wake.right, 0.0), ..*wake },
         }
+    }
+}
+
+impl Kind {
+    /// Whether two wakes are one but for a part of each parameter.
+    fn same(self, a: &Wake, b: &Wake, part: f64) -> bool {
+        let (a, b) = (a.to_array(), b.to_array());
+        (0..PARAMETERS).all(|i| (a[i] - b[i]).abs() <= part * a[i].abs().max(20.0) || !self.has(i))
     }
 }
 
@@ -149,14 +158,13 @@ impl Fits<'_> {
         self.options.core_radius_m.unwrap_or(typical)
     }
 
-    /// From a rough start: with broad cores until the places are known, then with all that is free.
-    fn from(&self, kind: Kind, start: &Wake) -> Option<End> {
+    /// From a rough start with broad cores, until the places are known.
+    fn near(&self, kind: Kind, start: &Wake) -> Option<Wake> {
         let groups = self.groups(kind);
         let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
         let spacing_m = if kind == Kind::Both { start.spacing_m() } else { LONE_CORE_M / CORE_OVER_SPACING };
         let broad = with_cores(&self.options.free.start(start), BROAD * spacing_m);
-        let (near, _) = self.problem.minimum(&broad, &coreless, FAR).ok()?;
-        self.polished(kind, &near)
+        self.problem.minimum(&broad, &coreless, FAR).ok().map(|(near, _)| near)
     }
 
     /// From a start near the end, with cores begun anew.
@@ -205,8 +213,15 @@ impl Fits<'_> {
     }
 
     /// Ends of all starts; pairs also start fits of each of their vortices alone.
-    pub(crate) fn from_starts(&self, starts: &[(Kind, Wake)]) -> Vec<End> {
-        let mut ends: Vec<End> = starts.iter().filter_map(|(kind, wake)| self.from(*kind, wake)).collect();
+    pub(crate) fn ends_of(&self, starts: &[(Kind, Wake)]) -> Vec<End> {
+        let (mut nears, mut ends): (Vec<(Kind, Wake)>, Vec<End>) = (Vec::new(), Vec::new());
+        for (kind, start) in starts {
+            let Some(near) = self.near(*kind, start) else { continue };
+            if !nears.iter().any(|(other, wake)| other == kind && kind.same(wake, &near, NEARLY)) {
+                nears.push((*kind, near));
+                ends.extend(self.polished(*kind, &near));
+            }
+        }
         if let Some(pair) = best(&ends, Kind::Both).map(|end| end.wake) {
             ends.extend([Kind::Left, Kind::Right].iter().filter_map(|kind| self.polished(*kind, &kind.of(&pair))));
         }
@@ -227,11 +242,7 @@ impl Fits<'_> {
 pub(crate) fn rivals(ends: &[End], scale: f64) -> Vec<End> {
     let mut rivals: Vec<End> = Vec::new();
     for end in ends {
-        let same = |other: &End| {
-            let (a, b) = (end.wake.to_array(), other.wake.to_array());
-            let near = |i: usize| (a[i] - b[i]).abs() <= ROUGHLY * a[i].abs().max(20.0);
-            other.kind == end.kind && (0..PARAMETERS).all(|i| near(i) || !end.kind.has(i))
-        };
+        let same = |other: &End| other.kind == end.kind && end.kind.same(&end.wake, &other.wake, ROUGHLY);
         let hopeless = best(ends, end.kind).is_none_or(|best| end.chi2 > best.chi2 + HOPELESS * scale * scale);
         if !hopeless && !rivals.iter().any(same) {
             rivals.push(end.clone());
@@ -245,6 +256,13 @@ pub(crate) fn best(ends: &[End], kind: Kind) -> Option<&End> {
     let circulations = [Parameter::LeftCirculation as usize, Parameter::RightCirculation as usize];
     let turns = |end: &&End| circulations.iter().all(|i| !kind.has(*i) || end.wake.to_array()[*i] > 0.0);
     ends.iter().filter(|end| end.kind == kind).filter(turns).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// The end with the least chi^2 + k ln N.
+pub(crate) fn least(ends: &[End], cells: usize) -> Option<&End> {
+    let cost = |end: &End| end.chi2 + end.groups.len() as f64 * (cells as f64).ln();
+    let bests = [Kind::Left, Kind::Right, Kind::Both].into_iter().filter_map(|kind| best(ends, kind));
+    bests.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
 /// All ends of the kind of the best one that are not the same, the best first, given its covariance.

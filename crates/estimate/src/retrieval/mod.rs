@@ -3,6 +3,25 @@
 //! | module | content |
 //! |---|---|
 //! | `scan_map`, `options`, `result` | what goes in, how, what comes out |
+//! | `fit`, `hypotheses`, `report` | fits of wind alone, one vortex and two; which it is; deviations and flags |
+//! | `expected`, `motion`, `problem`, `whitening`, `correlated_residuals` | gates that see moving vortices; cost and its minimum; correlated velocities, given or learnt from the residuals |
+//! | `radial_velocity`, `envelope`, `integral` | the methods of the literature beside it, with their errors |
+//! | `track` | many scans: filter and smoother |
+//!
+//! ```
+//! use ndarray::Array2;
+//! use wakescope_estimate::retrieval::{Flag, RetrievalOptions, ScanMap, fit_scan};
+//!
+//! // a wind of 3 m/s and nothing else
+//! let elevation_rad: Vec<f64> = (0..30).map(|i| 0.007 * f64::from(i)).collect();
+//! let velocity_m_s = Array2::from_shape_fn((30, 20), |(i, j)| 3.0 * elevation_rad[i].cos() + 0.2 * (7.0 * (i * 20 + j) as f64).sin());
+//! let range_m = (0..20).map(|j| 330.0 + 7.0 * f64::from(j)).collect();
+//! let time_s = vec![0.0; 30];
+//! let map = ScanMap { elevation_rad, time_s, range_m, velocity_m_s, sigma_m_s: None, fold_m_s: None };
+//! let found = fit_scan(&map, &RetrievalOptions::default())?;
+//! assert!(found.has(Flag::NoWake) && (found.lateral_wind_m_s.value - 3.0).abs() < 0.1);
+//! # Ok::<(), wakescope_estimate::Error>(())
+//! ```
 
 mod correlated_residuals;
 mod envelope;

@@ -76,8 +76,9 @@ pub struct RetrievalOptions {
 }
 
 impl RetrievalOptions {
-    /// [`RetrievalOptions::threshold`] unless set.
-    pub const DEFAULT_THRESHOLD: f64 = 40.0;
+    /// [`RetrievalOptions::threshold`] unless set: one empty scan in a thousand in white noise, on grids of some thousand velocities. The
+    /// largest statistic of 300 such scans was 18. In turbulence that is not whitened it says nothing.
+    pub const DEFAULT_THRESHOLD: f64 = 22.0;
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
         if let Gate::Gaussian { std_m } = self.gate {

@@ -6,8 +6,7 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::retrieval::correlated_residuals::filling;
-use crate::retrieval::fit::{OUTLIER, least};
-use crate::retrieval::hypotheses::{End, Kind, best, tops};
+use crate::retrieval::hypotheses::{End, Kind, best, least, tops};
 use crate::retrieval::motion::Motion;
 use crate::retrieval::problem::{Problem, products};
 use crate::retrieval::{Covariance, Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
@@ -15,6 +14,8 @@ use crate::vortex_fit::damped_newton::inverse;
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::{Loss, PARAMETERS, Parameter};
 
+/// Velocities with larger residuals, in their deviations, are outliers.
+pub(crate) const OUTLIER: f64 = 4.0;
 /// A vortex whose circulation is less than so many of its deviations is none.
 const LEAST_SIGMAS: f64 = 3.0;
 /// A top so much above the least chi-square competes with it.
@@ -125,8 +126,8 @@ impl Report<'_> {
             .get(1)
             .zip(tops.first())
             .is_some_and(|(second, first)| second.chi2 - first.chi2 < COMPETES * self.scale.powi(2));
-        let unmoved = !self.problem.expected.moves()
-            && !(self.map.has_times() && self.map.time_s.iter().all(|time| *time == self.map.time_s[0]));
+        let instant = self.map.has_times() && self.map.time_s.windows(2).all(|pair| pair[0] == pair[1]);
+        let unmoved = !self.problem.expected.moves() && !instant;
         let flags = [
             (Flag::NoWake, vortices.is_empty()),
             (Flag::OneVortex, vortices.len() == 1),

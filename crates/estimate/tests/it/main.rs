@@ -16,6 +16,7 @@ mod models;
 mod periodogram;
 mod quality;
 mod retrieval;
+mod retrieval_methods;
 mod rolling_moment;
 mod sliding;
 mod vortex_fit;

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use wakescope_estimate::retrieval::{
     Covariance, EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track, Turbulence,
 };
-use wakescope_estimate::vortex_fit::{CoreProfile, Loss, Sharing, Wake, WakeModel};
+use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Loss, Sharing, Wake, WakeModel};
 
 /// Words of `wakescope retrieve`.
 #[derive(Debug, Args)]
@@ -109,6 +109,9 @@ enum MotionWord {
     No,
 }
 
+/// Standard deviation of the weight of gates that do not show cores, m.
+const LONG_GATE_M: f64 = 3.0;
+
 pub(super) fn not_negative(word: &str) -> Result<f64, String> {
     let value = word.trim().parse::<f64>().ok().filter(|v| *v >= 0.0 && v.is_finite());
     value.ok_or_else(|| "a number from 0 on, e.g. 14.4".into())
@@ -136,7 +139,14 @@ impl RetrieveWords {
             _ => CoreProfile::Algebraic,
         };
         let height_m = self.lidar_height.or(of_scene.map(|scene| scene.scan.lidar_height_m));
+        // Long gates do not show cores: without what is known of them they run away with the circulation.
+        let is_long = match &gate {
+            Gate::Point => false,
+            Gate::Gaussian { std_m } => *std_m > LONG_GATE_M,
+            Gate::Kernel(_) => true,
+        };
         let mut options = RetrievalOptions {
+            core_prior: is_long.then_some(CorePrior::TYPICAL),
             model: WakeModel {
                 profile,
                 images: self.ground == YesNo::Yes,
@@ -419,7 +429,12 @@ fn text(found: &[RetrievedScan]) -> String {
         let flags = if flags.is_empty() { String::new() } else { format!("  [{}]", flags.join(" ")) };
         if scan.result.has(Flag::NoWake) || scan.result.vortices.is_empty() {
             let (statistic, threshold) = (scan.result.statistic, scan.result.threshold);
-            out += &format!("scan {}: no wake, statistic {statistic:.1} below {threshold:.1}{flags}\n", number + 1);
+            let why = if statistic < threshold { "below" } else { "above" };
+            let certain = if statistic < threshold { "" } else { ", but no circulation is certain" };
+            out += &format!(
+                "scan {}: no wake, statistic {statistic:.1} {why} {threshold:.1}{certain}{flags}\n",
+                number + 1
+            );
         }
         for vortex in &scan.result.vortices {
             let (mean, y_m, z_m) = (vortex.circulation_5_15_m2_s, vortex.lateral_position_m, vortex.height_m);

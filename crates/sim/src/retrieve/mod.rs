@@ -34,6 +34,7 @@ pub use tracks::{track_of, track_table};
 use crate::Error;
 use crate::io::scans::ReadScan;
 use wakescope_estimate::retrieval::{RetrievalOptions, ScanResult, fit_scan, radial_velocity_method};
+use wakescope_estimate::vortex_fit::Sharing;
 
 /// How circulations are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -65,6 +66,9 @@ pub struct RetrievedScan {
 
 /// Retrieves one map.
 ///
+/// With the scene of a map of this program, its means only lead to the start of the fit to what the estimator shows: taken for means,
+/// peaks mislead about the core above all, which is kept until then.
+///
 /// # Errors
 /// What the fits refuse, with the file and the sweep.
 pub fn retrieve_map(
@@ -73,16 +77,17 @@ pub fn retrieve_map(
     options: RetrievalOptions,
     own: Option<&OwnScene>,
 ) -> Result<RetrievedScan, Error> {
-    let found = match method {
-        Method::Rv => radial_velocity_method(&scan.map, &options),
-        _ => fit_scan(&scan.map, &options),
+    let refuse = |error: wakescope_estimate::Error| refused(&scan, &error);
+    let result = match (method, own) {
+        (Method::Rv, _) => radial_velocity_method(&scan.map, &options).map_err(refuse)?,
+        (_, None) => fit_scan(&scan.map, &options).map_err(refuse)?,
+        (_, Some(own)) => {
+            let mut rough = options.clone();
+            rough.free.core_radius = Sharing::Fixed;
+            let found = fit_scan(&scan.map, &rough).map_err(refuse)?;
+            own.refined(&scan.map, &options, &found).unwrap_or(found)
+        }
     };
-    let mut result = found.map_err(|error| refused(&scan, &error))?;
-    if let Some(own) = own.filter(|_| method != Method::Rv)
-        && let Some(better) = own.refined(&scan.map, &options, &result)
-    {
-        result = better;
-    }
     Ok(RetrievedScan { scan, options, result })
 }
 

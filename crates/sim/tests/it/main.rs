@@ -5,14 +5,20 @@
 
 #[cfg(feature = "cli")]
 mod cli;
+#[cfg(all(feature = "cli", feature = "netcdf"))]
+mod estimate;
 #[cfg(feature = "cli")]
 mod messages;
 mod receiver;
+#[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
+mod retrieve;
 mod scene_features;
 #[cfg(all(feature = "flow", feature = "netcdf"))]
 mod simulated_flow;
 #[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
 mod sweep;
+#[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
+mod tutorials;
 #[cfg(feature = "cli")]
 mod wake;
 

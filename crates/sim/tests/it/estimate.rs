@@ -1,0 +1,246 @@
+//! `wakescope estimate`: signals of a run come out as its own map, from every format; signals that are none are refused.
+
+use super::cli::{SMALL, names};
+use super::wakescope;
+use std::fs;
+use std::path::Path;
+use wakescope_sim::Silent;
+use wakescope_sim::io::csv_input::TextTable;
+use wakescope_sim::io::raw::{RawFormat, RawRecords};
+use wakescope_sim::measure::recorded::{self, Recorded, RecordedOptions, record_shape};
+use wakescope_sim::plan::Plan;
+use wakescope_sim::scene::SceneFile;
+
+/// A folder with the scene and its signals, all realisations.
+fn recorded_run(words: &str) -> tempfile::TempDir {
+    let temp = tempfile::tempdir().unwrap();
+    let scene = SMALL.replace("signals = true", "signals = true\nsignals_of = \"all\"\npng = false");
+    fs::write(temp.path().join("s.toml"), format!("{scene}{words}")).unwrap();
+    let out = wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]);
+    assert!(out.status.success(), "{out:?}");
+    temp
+}
+
+/// Numbers of a column, bit by bit.
+fn column(path: &Path, name: &str) -> Vec<u64> {
+    let table = TextTable::read(path).unwrap();
+    let place = table.column(name).unwrap();
+    (0..table.rows.len()).map(|row| table.number(row, place).to_bits()).collect()
+}
+
+/// The samples of `signals.nc`, record after record, and the samples of one.
+fn samples(folder: &Path) -> (Vec<f64>, usize) {
+    let mut file = netcdf3::FileReader::open(folder.join("o/signals.nc")).unwrap();
+    let samples = file.data_set().dim_size("time").unwrap();
+    (file.read_var_f64("current_a").unwrap(), samples)
+}
+
+#[test]
+fn a_runs_own_signals_give_the_bytes_of_the_run() {
+    let temp = recorded_run("");
+    let out = wakescope(temp.path(), &["estimate", "o/signals.nc", "--scene", "s.toml", "--out", "e", "--quiet"]);
+    assert!(out.status.success(), "{out:?}");
+    assert_eq!(names(&temp.path().join("e")), ["map.csv", "map.nc", "map.svg", "predicted.csv", "scene.toml"]);
+    for name in ["map.csv", "map.nc", "map.svg", "scene.toml"] {
+        let of = |folder: &str| fs::read(temp.path().join(folder).join(name)).unwrap();
+        assert_eq!(of("o"), of("e"), "{name}");
+    }
+    let predicted = column(&temp.path().join("e/predicted.csv"), "predicted_std_m_s");
+    let known: Vec<f64> = predicted.into_iter().map(f64::from_bits).filter(|v| v.is_finite()).collect();
+    // 10 dB, some ten independent windows.
+    assert!(known.len() > 150 && known.iter().all(|v| (0.01..1.0).contains(v)), "{known:?}");
+}
+
+#[test]
+fn another_estimator_sees_the_truth_of_the_same_signals() {
+    let temp = recorded_run("");
+    let scene = fs::read_to_string(temp.path().join("s.toml")).unwrap() + "[estimator]\nradius_m = 4.0\n";
+    fs::write(temp.path().join("t.toml"), scene).unwrap();
+    for (words, folder) in [
+        (["map", "t.toml", "--out", "run", "--quiet"].to_vec(), "run"),
+        (["estimate", "o/signals.nc", "--scene", "t.toml", "--out", "est", "--quiet"].to_vec(), "est"),
+    ] {
+        assert!(wakescope(temp.path(), &words).status.success(), "{folder}");
+    }
+    let of = |folder: &str| fs::read(temp.path().join(folder).join("map.nc")).unwrap();
+    assert_eq!(of("run"), of("est"));
+}
+
+#[test]
+fn every_format_and_order_gives_the_velocities_of_the_run() {
+    let temp = recorded_run("");
+    let (all, samples) = samples(temp.path());
+    let one = &all[..all.len() / 3];
+    let rows = one.len() / samples;
+    let bytes = |at: &dyn Fn(usize) -> f64| (0..one.len()).flat_map(|i| at(i).to_be_bytes()).collect::<Vec<u8>>();
+    let text: Vec<String> =
+        one.chunks(samples).map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",")).collect();
+    let npy = {
+        let header = format!("{{'descr': '>f8', 'fortran_order': False, 'shape': ({rows}, {samples}), }}\n");
+        let length = (header.len() as u16).to_le_bytes();
+        [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), &bytes(&|i| one[i])].concat()
+    };
+    let lines = rows / 2;
+    for (name, content, words) in [
+        ("a.bin", [b"head".to_vec(), bytes(&|i| one[i])].concat(), "--format f64 --byte-order big --header-bytes 4"),
+        // [pulse, line, sample] and [sample, line, pulse] of [line, pulse, sample].
+        (
+            "b.bin",
+            bytes(&|i| one[(i / samples % lines * 2 + i / samples / lines) * samples + i % samples]),
+            "--format f64 --byte-order big --order pulse-major",
+        ),
+        ("c.bin", bytes(&|i| one[i % rows * samples + i / rows]), "--format f64 --byte-order big --order sample-major"),
+        ("d.csv", text.join("\n").into_bytes(), ""),
+        ("e.npy", npy, ""),
+    ] {
+        fs::write(temp.path().join(name), content).unwrap();
+        let mut all = vec![
+            "estimate",
+            name,
+            "--scene",
+            "s.toml",
+            "--out",
+            name.split('.').next().unwrap(),
+            "--quiet",
+            "--noise",
+            "scene",
+        ];
+        all.extend(words.split_whitespace());
+        let out = wakescope(temp.path(), &all);
+        assert!(out.status.success(), "{name}: {out:?}");
+        let found = temp.path().join(name.split('.').next().unwrap()).join("map.csv");
+        let run = temp.path().join("o/map.csv");
+        assert_eq!(column(&found, "v_mean_m_s"), column(&run, "v_scan_m_s"), "{name}");
+        assert_eq!(column(&found, "n_eff"), column(&run, "n_eff"), "{name}");
+        let snr_db: Vec<f64> = column(&found, "snr_db").into_iter().map(f64::from_bits).collect();
+        let mean_db = snr_db.iter().sum::<f64>() / snr_db.len() as f64;
+        assert!((8.0..12.0).contains(&mean_db), "{name}: {mean_db}");
+    }
+}
+
+#[test]
+fn arrays_that_numpy_wrote_are_read_by_name() {
+    // np.savez("numpy.npz", signals=np.arange(24, dtype="<i2").reshape(4, 6), elevation_rad=[0.1, 0.1, 0.2, 0.2])
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/reference/sim/numpy.npz");
+    let scene = SceneFile::parse(SMALL, Path::new("s.toml")).unwrap();
+    let mut records = RawRecords::open(&path, &RawFormat::default(), record_shape(&scene.scene)).unwrap();
+    assert_eq!((records.records(), records.samples(), records.is_complex()), (4, 6, false));
+    assert_eq!(records.about.elevation_rad, Some(vec![0.1, 0.1, 0.2, 0.2]));
+    let found: Vec<f64> = records.read(1..3).unwrap().iter().map(|z| z.re).collect();
+    assert_eq!(found, (6..18).map(f64::from).collect::<Vec<_>>());
+}
+
+#[test]
+fn blocks_of_lines_change_no_bit_of_velocities_that_follow_the_wind() {
+    let temp = recorded_run("[estimator]\nradius_m = 6.0\nfollow_wind = true\n");
+    let scene = SceneFile::read(&temp.path().join("s.toml")).unwrap();
+    let with = |block_bytes: Option<usize>| {
+        let (path, shape) = (temp.path().join("o/signals.nc"), record_shape(&scene.scene));
+        let mut records = RawRecords::open(&path, &RawFormat::default(), shape).unwrap();
+        let plan = Plan::new(scene.clone(), wakescope_sim::Target::Map).unwrap();
+        let options = RecordedOptions { block_bytes, ..RecordedOptions::default() };
+        match recorded::estimate((&plan, false), &mut records, &options, &Silent).unwrap() {
+            Recorded::Measured { scans, .. } => scans,
+            Recorded::OfRun(_) => panic!("nothing is known of them"),
+        }
+    };
+    let (whole, in_blocks) = (with(None), with(Some(1)));
+    assert_eq!(whole.len(), 3);
+    for (a, b) in whole.iter().zip(&in_blocks) {
+        let bits = |values: &ndarray::Array2<f64>| values.mapv(f64::to_bits);
+        assert_eq!(bits(&a.velocity_m_s), bits(&b.velocity_m_s));
+        assert_eq!((bits(&a.n_eff), &a.flagged, bits(&a.snr_db)), (bits(&b.n_eff), &b.flagged, bits(&b.snr_db)));
+    }
+}
+
+#[test]
+fn complex_signals_and_spectra_on_request() {
+    let temp = recorded_run("[detector]\nsignal = \"baseband\"\n");
+    let estimate = |words: &[&str]| {
+        let out =
+            wakescope(temp.path(), &[&["estimate", "o/signals.nc", "--scene", "s.toml", "--quiet"], words].concat());
+        assert!(out.status.success(), "{out:?}");
+    };
+    estimate(&["--out", "own"]);
+    let of = |folder: &str| fs::read(temp.path().join(folder).join("map.nc")).unwrap();
+    assert_eq!(of("o"), of("own"));
+    estimate(&["--out", "spectra", "--spectra"]);
+    let mut file = netcdf3::FileReader::open(temp.path().join("spectra/spectra.nc")).unwrap();
+    let (density, velocity) = (file.read_var_f32("density").unwrap(), file.read_var_f64("velocity").unwrap());
+    let found = column(&temp.path().join("spectra/map.csv"), "v_mean_m_s");
+    assert!(velocity.windows(2).all(|pair| pair[1] > pair[0]));
+    assert_eq!(density.len(), found.len() * velocity.len());
+    let step_m_s = velocity[1] - velocity[0];
+    for (spectrum, found) in density.chunks(velocity.len()).zip(found) {
+        let peak = (0..spectrum.len()).max_by(|a, b| spectrum[*a].total_cmp(&spectrum[*b])).unwrap();
+        assert!(
+            (velocity[peak] - f64::from_bits(found)).abs() < step_m_s,
+            "{} {}",
+            velocity[peak],
+            f64::from_bits(found)
+        );
+    }
+}
+
+#[test]
+fn signals_that_are_none_are_refused_and_nothing_is_written() {
+    let temp = recorded_run("");
+    let folder = temp.path();
+    let (all, samples) = samples(folder);
+    let one: Vec<f64> = all[..all.len() / 3].to_vec();
+    let binary = |scale: f64| one.iter().flat_map(|a| ((a * scale) as i16).to_le_bytes()).collect::<Vec<u8>>();
+    let counts = binary(1000.0 / one.iter().fold(0.0_f64, |m, a| m.max(a.abs())));
+    let nc = fs::read(folder.join("o/signals.nc")).unwrap();
+    fs::write(folder.join("cut.nc"), &nc[..nc.len() - 4000]).unwrap();
+    fs::write(folder.join("c.bin"), &counts).unwrap();
+    fs::write(folder.join("cut.bin"), &counts[..counts.len() - 7]).unwrap();
+    fs::write(folder.join("zero.bin"), vec![0_u8; counts.len()]).unwrap();
+    fs::write(folder.join("few.bin"), &counts[..2 * samples * 4]).unwrap();
+    fs::write(folder.join("nan.csv"), vec![vec!["nan"; samples].join(","); 18].join("\n")).unwrap();
+    fs::write(folder.join("ragged.csv"), "1,2,3\n1,2\n").unwrap();
+    fs::write(folder.join("word.csv"), format!("{}\n{}x\n", vec!["1"; samples].join(","), "1,".repeat(samples - 1)))
+        .unwrap();
+    fs::write(
+        folder.join("short.npy"),
+        b"\x93NUMPY\x01\x00\x46\x00{'descr': '<f8', 'fortran_order': False, 'shape': (18, 167), }         \n",
+    )
+    .unwrap();
+    fs::write(folder.join("rays.csv"), "elevation_deg,time_s\n1,0\n2,1\n").unwrap();
+    let scene = fs::read_to_string(folder.join("s.toml")).unwrap();
+    fs::write(folder.join("fast.toml"), format!("{scene}[detector]\nsampling_hz = 200e6\n")).unwrap();
+    fs::write(folder.join("base.toml"), format!("{scene}[detector]\nsignal = \"baseband\"\n")).unwrap();
+    let bits = "[detector]\ndigitiser = { kind = \"quantised\", bits = 8, full_scale_over_noise = 5.0 }\n";
+    fs::write(folder.join("bits.toml"), format!("{scene}{bits}")).unwrap();
+    let before = names(folder);
+    for (words, parts) in [
+        ("none.nc --scene s.toml", &["none.nc"][..]),
+        ("cut.nc --scene s.toml", &["cut.nc", "more than the file holds"]),
+        ("s.toml --scene s.toml", &["s.toml", "--format"]),
+        ("c.bin --scene s.toml", &["--format i16"]),
+        ("c.bin --scene s.toml --format i16 --byte-order big", &["c.bin", "--byte-order little"]),
+        ("cut.bin --scene s.toml --format i16", &["cut.bin", "records of 167 samples", "left over"]),
+        ("few.bin --scene s.toml --format i16", &["few.bin", "4 records", "9 lines", "scan.pulses_per_line"]),
+        ("zero.bin --scene s.toml --format i16", &["zero.bin", "all of its samples are 0"]),
+        ("c.bin --scene bits.toml --format i16", &["c.bin", "beyond the 8 bits of detector.digitiser"]),
+        ("nan.csv --scene s.toml", &["nan.csv", "all of its samples are missing"]),
+        ("ragged.csv --scene s.toml", &["ragged.csv", "line 2", "2 samples", "3"]),
+        ("word.csv --scene s.toml", &["word.csv", "line 2", "no number"]),
+        ("short.npy --scene s.toml", &["short.npy", "cut short"]),
+        ("o/signals.nc --scene s.toml --variable voltage", &["no variable voltage"]),
+        ("o/signals.nc --scene s.toml --rays rays.csv", &["rays.csv", "2 rows", "54 records"]),
+        ("o/signals.nc --scene fast.toml", &["signals.nc", "samples", "scan.range_max_m"]),
+        ("o/signals.nc --scene base.toml", &["signals.nc", "its samples are real", "detector.signal"]),
+        ("o/signals.nc --scene s.toml --noise loud", &["--noise"]),
+    ] {
+        let mut all = vec!["estimate"];
+        all.extend(words.split_whitespace());
+        all.extend(["--out", "x", "--quiet"]);
+        let out = wakescope(folder, &all);
+        let message = String::from_utf8(out.stderr).unwrap();
+        assert_eq!(out.status.code(), Some(2), "{words}: {message}");
+        for part in parts {
+            assert!(message.contains(part), "{words}: {part} is not in: {message}");
+        }
+        assert_eq!(names(folder), before, "{words}");
+    }
+}

@@ -1,0 +1,234 @@
+//! `wakescope retrieve`: circulations of maps of every format, of signals, and what is no map.
+
+use super::cli::names;
+use super::wakescope;
+use std::fs;
+use std::path::{Path, PathBuf};
+use wakescope_sim::io::csv_input::TextTable;
+
+/// A scan of the chapter's pair at 10 dB, with few gates so that a fit is quick.
+const SCENE: &str = "seed = 3\n[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[scan]\nelevation_min_rad = 0.06\n\
+    elevation_max_rad = 0.18\nelevation_step_rad = 3e-3\nrange_min_m = 320.0\nrange_max_m = 480.0\npulses_per_line = 4\nrealisations = 1\n\
+    [estimator]\ngate_step_samples = 16\n[outputs]\nsignals = true\nflow = false\nsvg = false\npng = false\nprofile_points = 3\n";
+
+fn reference(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/reference").join(name)
+}
+
+/// Runs a retrieval that must succeed; the rows of its table.
+fn retrieved(folder: &Path, words: &str) -> TextTable {
+    let mut all = vec!["retrieve"];
+    all.extend(words.split_whitespace());
+    all.extend(["--out", "r", "--quiet", "--overwrite"]);
+    let out = wakescope(folder, &all);
+    assert!(out.status.success(), "{words}: {}", String::from_utf8_lossy(&out.stderr));
+    TextTable::read(&folder.join("r/retrieval.csv")).unwrap()
+}
+
+fn number(table: &TextTable, row: usize, name: &str) -> f64 {
+    table.number(row, table.column(name).unwrap())
+}
+
+fn text<'t>(table: &'t TextTable, row: usize, name: &str) -> &'t str {
+    &table.rows[row][table.column(name).unwrap()]
+}
+
+#[test]
+fn reference_maps_are_retrieved_from_tables() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = |name: &str| reference(&format!("estimate/{name}.csv")).display().to_string();
+    let pair = retrieved(temp.path(), &path("map_a"));
+    // Truth and bounds of the file's makers: 466.635 m^2/s of 500, at 376.5 and 423.5 m.
+    for (row, y_m) in [(0, 376.5), (1, 423.5)] {
+        let within = |name: &str, std: &str, truth: f64| {
+            let (value, std) = (number(&pair, row, name), number(&pair, row, std));
+            assert!((value - truth).abs() < 3.0 * std && std > 0.0, "{name}: {value} +- {std}, {truth}");
+        };
+        within("gamma_5_15_m2_s", "gamma_5_15_std_m2_s", 466.635);
+        within("y_m", "y_std_m", y_m);
+        within("z_m", "z_std_m", 60.0);
+    }
+    assert_eq!((text(&pair, 0, "side"), text(&pair, 1, "side"), pair.rows.len()), ("left", "right", 2));
+    assert_eq!(names(&temp.path().join("r")), ["retrieval.csv", "retrieval.json", "scan_001.png", "scan_001.svg"]);
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(temp.path().join("r/retrieval.json")).unwrap()).unwrap();
+    let scan = &json["scans"][0];
+    let variance = scan["covariance"][0][0].as_f64().unwrap();
+    assert!((variance.sqrt() / number(&pair, 0, "gamma_std_m2_s") - 1.0).abs() < 1e-12);
+    assert_eq!(
+        (scan["covariance"].as_array().unwrap().len(), scan["tops"].as_array().unwrap().is_empty()),
+        (10, false)
+    );
+}
+
+#[test]
+fn wind_without_a_wake_is_a_result() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut rows = String::from("range_m,elevation_deg,velocity_m_s,sigma_m_s\n");
+    let mut place = 0.5_f64;
+    for (line, gate) in (0..40).flat_map(|line| (0..20).map(move |gate| (line, gate))) {
+        let (range_m, elevation_deg) = (330.0 + 8.0 * f64::from(gate), 2.0 + 0.2 * f64::from(line));
+        place = (place * 997.13 + 0.123).fract();
+        let velocity = -3.0 * elevation_deg.to_radians().cos() + place - 0.5;
+        // Some cells are missing.
+        let cell = if (line + gate) % 7 == 0 { String::new() } else { velocity.to_string() };
+        rows += &format!("{range_m},{elevation_deg},{cell},0.29\n");
+    }
+    fs::write(temp.path().join("calm.csv"), rows).unwrap();
+    let table = retrieved(temp.path(), "calm.csv");
+    assert_eq!((table.rows.len(), text(&table, 0, "side")), (1, "none"));
+    assert!(text(&table, 0, "flags").contains("no_wake") && number(&table, 0, "gamma_m2_s").is_nan());
+    assert!((number(&table, 0, "wind_m_s") + 3.0).abs() < 0.3, "{table:?}");
+}
+
+#[test]
+fn a_map_of_a_run_is_retrieved_within_its_deviations_from_every_file_and_from_its_signals() {
+    let temp = tempfile::tempdir().unwrap();
+    fs::write(temp.path().join("s.toml"), SCENE).unwrap();
+    let run = wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]);
+    assert!(run.status.success(), "{run:?}");
+    // 500 m^2/s with a core of 4.5 % of 47 m.
+    let truth = |table: &TextTable, what: &str| {
+        for (row, y_m) in [(0, 376.5), (1, 423.5)] {
+            let (mean, std) = (number(table, row, "gamma_5_15_m2_s"), number(table, row, "gamma_5_15_std_m2_s"));
+            assert!((mean - 472.0).abs() < 3.0 * std && std < 60.0, "{what}: {mean} +- {std}");
+            let (y, std) = (number(table, row, "y_m"), number(table, row, "y_std_m"));
+            assert!((y - y_m).abs() < 3.0 * std + 0.1, "{what}: {y} +- {std}, {y_m}");
+        }
+    };
+    let map = retrieved(temp.path(), "o/map.nc");
+    truth(&map, "map.nc");
+    let same = |other: &TextTable, what: &str| {
+        for (row, name) in [(0, "gamma_m2_s"), (1, "gamma_m2_s"), (0, "y_m"), (1, "z_m")] {
+            let (a, b) = (number(&map, row, name), number(other, row, name));
+            assert!((a - b).abs() < 1e-2 * a.abs().max(1.0), "{what}: {name} {a}, {b}");
+        }
+    };
+    same(&retrieved(temp.path(), "o/map.csv"), "map.csv");
+    same(&retrieved(temp.path(), "o/signals.nc --scene s.toml"), "signals.nc");
+    let signals = retrieved(temp.path(), "o/signals.nc --scene s.toml --method signals");
+    truth(&signals, "signals");
+    assert!(
+        number(&signals, 0, "gamma_std_m2_s") < number(&map, 0, "gamma_std_m2_s"),
+        "signals hold more than their map"
+    );
+}
+
+/// Part of a map of `SCENE`, opened and written again by Py-ART 2.3.0 and xradar 0.12.0, classic NetCDF and NetCDF-4.
+#[test]
+fn maps_that_other_programs_wrote_again_give_the_same_circulations() {
+    let temp = tempfile::tempdir().unwrap();
+    let of = |name: &str| {
+        retrieved(temp.path(), &format!("{} --gate-std 14.4", reference(&format!("sim/{name}")).display()))
+    };
+    let own = of("map_own.nc");
+    for name in OTHERS {
+        let table = of(name);
+        assert_eq!(table.rows.len(), own.rows.len(), "{name}");
+        for row in 0..table.rows.len() {
+            for column in ["gamma_m2_s", "gamma_std_m2_s", "gamma_5_15_m2_s", "y_m", "z_m", "wind_m_s", "statistic"] {
+                let (a, b) = (number(&table, row, column), number(&own, row, column));
+                assert!((a - b).abs() < 1e-6 * b.abs(), "{name}: {column} {a}, {b}");
+            }
+            let (a, b) = (number(&table, row, "time_s"), number(&own, row, "time_s"));
+            assert!((a - b).abs() < 1e-3, "{name}: {a} s, {b} s");
+        }
+    }
+}
+
+#[cfg(feature = "netcdf4")]
+const OTHERS: [&str; 4] = ["map_pyart.nc", "map_xradar.nc", "map_xradar_cfradial2.nc", "map_windcube_groups.nc"];
+#[cfg(not(feature = "netcdf4"))]
+const OTHERS: [&str; 2] = ["map_pyart.nc", "map_xradar.nc"];
+
+#[test]
+fn several_scans_are_tracked() {
+    let temp = tempfile::tempdir().unwrap();
+    let header = "range_m,elevation_rad,time_s,velocity_m_s,sigma_m_s,sweep\n";
+    let mut rows = String::from(header);
+    let model = wakescope_estimate::vortex_fit::WakeModel::default();
+    let mut place = 0.5_f64;
+    for scan in 0..4 {
+        let z_m = 70.0 - 3.0 * f64::from(scan);
+        let values = [400.0, 400.0, 376.0, z_m, 424.0, z_m, 2.5, 2.5, 1.0, 0.0];
+        let wake = wakescope_estimate::vortex_fit::Wake::from_array(&values);
+        for (line, gate) in (0..45).flat_map(|line| (0..22).map(move |gate| (line, gate))) {
+            let (range_m, angle) = (330.0 + 7.0 * f64::from(gate), 0.07 + 4e-3 * f64::from(line));
+            place = (place * 997.13 + 0.123).fract();
+            let velocity = model.radial_velocity_m_s(&wake, range_m, angle) + 0.5 * (place - 0.5);
+            rows += &format!("{range_m},{angle},{},{velocity},0.145,{scan}\n", 10.0 * f64::from(scan));
+        }
+    }
+    fs::write(temp.path().join("scans.csv"), rows).unwrap();
+    let table = retrieved(temp.path(), "scans.csv --gate-std 0 --motion no");
+    assert_eq!(table.rows.len(), 8);
+    let track = TextTable::read(&temp.path().join("r/track.csv")).unwrap();
+    assert_eq!((track.rows.len(), track.rows[0].len()), (8, 15));
+    for row in 0..8 {
+        let (rate, std) = (number(&track, row, "z_rate_m_s"), number(&track, row, "z_rate_std_m_s"));
+        assert!((rate + 0.3).abs() < 4.0 * std && std < 0.3, "{rate} +- {std}");
+        assert!((number(&track, row, "gamma_m2_s") - 400.0).abs() < 20.0);
+    }
+    assert!(temp.path().join("r/track.svg").exists());
+}
+
+#[test]
+fn what_is_no_map_is_refused_and_nothing_is_written() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    let own = fs::read(reference("sim/map_own.nc")).unwrap();
+    fs::write(folder.join("cut.nc"), &own[..own.len() / 2]).unwrap();
+    fs::write(folder.join("empty.csv"), "").unwrap();
+    let table = |rows: &str| format!("range_m,elevation_rad,velocity_m_s\n{rows}");
+    let grid = |cell: &dyn Fn(usize) -> String| -> String {
+        (0..100).map(|i| format!("{},{},{}\n", 300 + 10 * (i % 10), 0.1 + 0.01 * (i / 10) as f64, cell(i))).collect()
+    };
+    fs::write(folder.join("masked.csv"), table(&grid(&|_| String::new()))).unwrap();
+    fs::write(folder.join("word.csv"), table(&grid(&|i| if i == 7 { "fast".into() } else { "1".into() }))).unwrap();
+    fs::write(folder.join("fill.csv"), table(&grid(&|_| "-9999".into()))).unwrap();
+    fs::write(folder.join("twice.csv"), table(&(grid(&|_| "1".into()) + "300,0.1,2\n"))).unwrap();
+    fs::write(folder.join("line.csv"), table("300,0.1,1\n310,0.1,1\n320,0.1,1\n")).unwrap();
+    fs::write(folder.join("names.csv"), "range_m,elevation_rad,speed\n1,2,3\n").unwrap();
+    let planes: String =
+        (0..100).map(|i| format!("{},{},1,{}\n", 300 + 10 * (i % 10), 0.1 + 0.01 * (i / 10) as f64, i / 50)).collect();
+    fs::write(folder.join("planes.csv"), format!("range_m,elevation_rad,velocity_m_s,azimuth_rad\n{planes}")).unwrap();
+    fs::write(folder.join("cut.hpl"), HPL.split_once("  2 ").unwrap().0).unwrap();
+    fs::write(folder.join("gates.hpl"), HPL.replace("Number of gates:\t4", "Number of gates:\t-4")).unwrap();
+    fs::write(folder.join("rays.hpl"), HPL.replace("rays in file:\t2", "rays in file:\t9")).unwrap();
+    let before = names(folder);
+    for (words, parts) in [
+        ("none.csv", &["none.csv"][..]),
+        ("empty.csv", &["empty.csv", "no header"]),
+        ("cut.nc", &["cut.nc", "more than the file holds"]),
+        ("masked.csv", &["masked.csv", "all of its velocities are missing"]),
+        ("word.csv", &["word.csv", "row 8", "no number"]),
+        ("fill.csv", &["fill.csv", "-9999", "fill value"]),
+        ("twice.csv", &["twice.csv", "row 101", "twice", "sweep"]),
+        ("line.csv", &["line.csv", "1 different elevations", "RHI"]),
+        ("names.csv", &["names.csv", "velocity_m_s"]),
+        ("planes.csv", &["planes.csv", "azimuths"]),
+        ("cut.hpl", &["cut.hpl", "cut short", "gates"]),
+        ("gates.hpl", &["gates.hpl", "number of gates"]),
+        ("rays.hpl", &["rays.hpl", "2 of 9 rays"]),
+        ("twice.csv --method signals", &["raw signals"]),
+        ("masked.csv --turbulence 1", &["--turbulence", "1.2,25"]),
+    ] {
+        let mut all = vec!["retrieve"];
+        all.extend(words.split_whitespace());
+        all.extend(["--out", "x", "--quiet"]);
+        let out = wakescope(folder, &all);
+        let message = String::from_utf8(out.stderr).unwrap();
+        assert_eq!(out.status.code(), Some(2), "{words}: {message}");
+        for part in parts {
+            assert!(message.contains(part), "{words}: {part} is not in: {message}");
+        }
+        assert_eq!(names(folder), before, "{words}");
+    }
+}
+
+/// Two rays of a HALO file.
+const HPL: &str = "Filename:\tx.hpl\nNumber of gates:\t4\nRange gate length (m):\t30.0\nGate length (pts):\t10\nNo. of rays in file:\t2\n\
+    Scan type:\tRHI\nStart time:\t20240101 12:00:00.00\nRange of measurement (center of gate) = (range gate + 0.5) * Gate length\n\
+    Data line 1: Decimal time (hours)  Azimuth (degrees)  Elevation (degrees) Pitch (degrees) Roll (degrees)\n****\n\
+    12.0 90.0 1.0 0.0 0.0\n  0 1.5 1.2 0.0\n  1 1.5 1.2 0.0\n  2 1.5 1.2 0.0\n  3 1.5 1.2 0.0\n\
+    12.1 90.0 2.0 0.0 0.0\n  0 1.5 1.2 0.0\n  1 1.5 1.2 0.0\n  2 1.5 1.2 0.0\n  3 1.5 1.2 0.0\n";
