@@ -37,6 +37,7 @@
 //! | [`map`] | regions, accumulation (Table 3) and n_eff, the radius that a variance needs; errors against the truth, (33); good estimates told from bad ones; a map drawn towards a guess |
 //! | [`bound`] | Cramer-Rao bound on the velocity, and on velocity and gradient |
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
+//! | [`wake_detection`] | whether a scan holds a wake: threshold for a rate of false alarms, smallest circulation that is found |
 //! | [`retrieval`] | from one scan of any instrument to its vortices, or none; tracks |
 //! | [`wind_profile`] | winds from beams in several directions: VAD with covariance, DBS |
 //! | `linalg`, `parallel` | solve and eigenvectors with residual checks, the bundled LAPACK; loops on the caller's threads |
@@ -64,6 +65,7 @@ mod parallel;
 pub mod retrieval;
 pub mod spectrum;
 pub mod vortex_fit;
+pub mod wake_detection;
 pub mod wind_profile;
 pub mod window;
 

@@ -30,6 +30,7 @@
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
 //! | [`beams`] | when, whence and whither each pulse of a scan goes |
 //! | [`measure`] | instrument, wind, signals, velocities and their errors; running a plan and writing its results |
+//! | [`detection`] | whether scans hold a wake, at a rate of false alarms that is calibrated for them |
 //! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
 //! | `sweep` | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
@@ -40,6 +41,7 @@
 //! PNG, the report page), `sweep` (design studies, with `cli`), `vtk` (fields for ParaView).
 
 pub mod beams;
+pub mod detection;
 #[cfg(feature = "flow")]
 pub mod flow;
 pub mod io;

@@ -4,6 +4,7 @@
 //! particular ndarray-linalg returns the eigenvectors of the conjugate for complex row-major matrices, whatever the
 //! LAPACK; here a matrix goes in column-major. Check: random, singular and ill-conditioned matrices.
 
+pub(crate) mod cholesky;
 #[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
 mod dense;
 #[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]

@@ -20,4 +20,5 @@ mod retrieval_methods;
 mod rolling_moment;
 mod sliding;
 mod vortex_fit;
+mod wake_detection;
 mod wind_profile;

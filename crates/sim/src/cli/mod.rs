@@ -6,6 +6,7 @@
 mod accuracy;
 mod bound;
 mod budget;
+mod detect;
 mod estimate;
 mod flow;
 mod output;
@@ -79,6 +80,8 @@ enum Command {
     Bound(bound::BoundWords),
     /// The power budget in dB, from the energy of a pulse to the signal-to-noise ratio, with what bounds the instrument.
     Budget(budget::BudgetWords),
+    /// Whether scans hold a wake, at a rate of false alarms; the smallest circulation that is found.
+    Detect(detect::DetectWords),
     /// Run many scenes that differ in some keys: a table and pictures of what each gives.
     Sweep(sweep::SweepWords),
     /// The rows of a table that no other one beats.
@@ -148,6 +151,7 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Retrieve(words) => retrieve::retrieve(words, cli),
         Command::Bound(words) => bound::bound(words, cli),
         Command::Budget(words) => budget::budget(words, cli),
+        Command::Detect(words) => detect::detect(words, cli),
         Command::Sweep(words) => sweep::sweep(words, cli),
         Command::Pareto(words) => sweep::pareto(words, cli),
         Command::Flow(words) => flow::flow(words, cli),

@@ -79,7 +79,7 @@ pub(super) struct RetrieveWords {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum YesNo {
+pub(super) enum YesNo {
     Yes,
     No,
 }
@@ -112,7 +112,7 @@ enum MotionWord {
 /// Standard deviation of the weight of gates that do not show cores, m.
 const LONG_GATE_M: f64 = 3.0;
 
-fn not_negative(word: &str) -> Result<f64, String> {
+pub(super) fn not_negative(word: &str) -> Result<f64, String> {
     let value = word.trim().parse::<f64>().ok().filter(|v| *v >= 0.0 && v.is_finite());
     value.ok_or_else(|| "a number from 0 on, e.g. 14.4".into())
 }
@@ -122,7 +122,7 @@ fn positive(word: &str) -> Result<f64, String> {
     value.ok_or_else(|| "a number above 0, e.g. 2.35".into())
 }
 
-fn turbulence(word: &str) -> Result<Turbulence, String> {
+pub(super) fn turbulence(word: &str) -> Result<Turbulence, String> {
     let both = word.split_once(',').and_then(|(a, b)| Some((positive(a).ok()?, positive(b).ok()?)));
     let (deviation_m_s, length_m) = both.ok_or("two numbers above 0, m/s and m, with a comma between, e.g. 1.2,25")?;
     Ok(Turbulence { deviation_m_s, length_m })
@@ -298,7 +298,7 @@ fn of_map(
 ) -> Result<RetrievedScan, Error> {
     let own = scene_of(&scan);
     let scene = stated.or(own.as_ref());
-    let (gate, mut remark) = gate_of(&scan, words.gate_std, scene.map(|file| &file.scene))?;
+    let (gate, mut remark) = gate_of(Some(&scan), words.gate_std, scene.map(|file| &file.scene))?;
     if scan.is_own && scene.is_none() {
         remark = Some(
             "it is a map of this program that has lost its scene, as some programs drop it: --scene gives the circulations of the \
@@ -327,7 +327,7 @@ fn of_signals(words: &RetrieveWords, signals: Signals, found: &mut Found) -> Res
     let mut first_line = 0;
     for (sweep, measured) in scans.iter().enumerate() {
         let scan = retrieve::scan_of_signals(&path, sweep, &plan, measured);
-        let (gate, _) = gate_of(&scan, words.gate_std, Some(&plan.scene.scene))?;
+        let (gate, _) = gate_of(Some(&scan), words.gate_std, Some(&plan.scene.scene))?;
         let mut one = retrieve::retrieve_map(scan, words.method, words.options(Some(&plan.scene), gate), own.as_ref())?;
         let lines = first_line..first_line + measured.lines.elevation_rad.len();
         first_line = lines.end;

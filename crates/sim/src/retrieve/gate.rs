@@ -21,7 +21,7 @@ const WIDTH_OVER_STD: f64 = 2.354_820_045_030_949_4;
 /// # Errors
 /// What the estimators refuse of a scene; a checked one gives none.
 pub fn gate_of(
-    scan: &ReadScan,
+    scan: Option<&ReadScan>,
     stated_m: Option<f64>,
     scene: Option<&Scene>,
 ) -> Result<(Gate, Option<&'static str>), Error> {
@@ -29,8 +29,9 @@ pub fn gate_of(
         (Some(std_m), _) => Ok((of_std(std_m), None)),
         (None, Some(scene)) => Ok((of_scene(scene)?, None)),
         (None, None) => {
-            let pulse_m = scan.pulse_width_s.map(|width_s| 0.5 * SPEED_OF_LIGHT_M_S * width_s / WIDTH_OVER_STD);
-            let window_m = scan.gate_length_m.map(|length_m| length_m / 12f64.sqrt());
+            let pulse_width_s = scan.and_then(|scan| scan.pulse_width_s);
+            let pulse_m = pulse_width_s.map(|width_s| 0.5 * SPEED_OF_LIGHT_M_S * width_s / WIDTH_OVER_STD);
+            let window_m = scan.and_then(|scan| scan.gate_length_m).map(|length_m| length_m / 12f64.sqrt());
             match (pulse_m, window_m) {
                 (Some(pulse_m), window_m) => Ok((of_std(pulse_m.hypot(window_m.unwrap_or(0.0))), None)),
                 (None, Some(window_m)) => Ok((
@@ -86,7 +87,7 @@ mod tests {
             scene_toml: None,
             is_own: false,
         };
-        let std_m = |scan: &ReadScan, stated| match gate_of(scan, stated, None).unwrap() {
+        let std_m = |scan: &ReadScan, stated| match gate_of(Some(scan), stated, None).unwrap() {
             (Gate::Gaussian { std_m }, told) => (std_m, told.is_some()),
             (_, told) => (0.0, told.is_some()),
         };

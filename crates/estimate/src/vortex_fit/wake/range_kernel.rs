@@ -56,6 +56,15 @@ impl RangeKernel {
         Self::new(-(reach as f64) * spacing_m, spacing_m, &weights)
     }
 
+    /// Root mean square width of the weights \[m\].
+    pub(crate) fn width_m(&self) -> f64 {
+        let moment = |power: i32, centre_m: f64| -> f64 {
+            let offsets = (0..self.weights.len()).map(|i| self.first_offset_m + i as f64 * self.spacing_m - centre_m);
+            offsets.zip(&self.weights).map(|(offset_m, w)| offset_m.powi(power) * w).sum()
+        };
+        moment(2, moment(1, 0.0)).max(0.0).sqrt()
+    }
+
     /// The same kernel on a grid about `factor` times as coarse.
     pub(crate) fn coarser(&self, factor: usize) -> Self {
         if factor <= 1 || self.weights.len() <= factor {
@@ -134,18 +143,6 @@ impl RangeKernel {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
-
-    impl RangeKernel {
-        /// Root mean square width of the weights \[m\].
-        fn width_m(&self) -> f64 {
-            let moment = |power: i32, centre_m: f64| -> f64 {
-                let offsets =
-                    (0..self.weights.len()).map(|i| self.first_offset_m + i as f64 * self.spacing_m - centre_m);
-                offsets.zip(&self.weights).map(|(offset_m, w)| offset_m.powi(power) * w).sum()
-            };
-            moment(2, moment(1, 0.0)).max(0.0).sqrt()
-        }
-    }
 
     fn wake() -> Wake {
         Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02])

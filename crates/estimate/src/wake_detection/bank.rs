@@ -1,0 +1,157 @@
+//! The bank of wakes that a test tries: places on a grid over the scan, and at them pairs of one circulation and single vortices.
+//!
+//! Check: places lie in the scan; pairs have the spacings that were asked for.
+
+use ndarray::Array2;
+
+use crate::parallel::map_indexed;
+use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::wake::range_kernel::LineScratch;
+use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
+use crate::wake_detection::DetectorOptions;
+use crate::wake_detection::cells::Cells;
+
+/// Distance of places \[m\] where lines and gates are closer; between them a wake loses little of its statistic.
+const STEP_M: f64 = 4.0;
+/// Along the line gates blur: this part of their standard deviation is close enough.
+const STEP_OVER_GATE: f64 = 0.4;
+/// Most places.
+const MOST_PLACES: f64 = 1200.0;
+/// Core radius over the distance of places: what lies between them is not missed.
+const CORE_OVER_STEP: f64 = 0.5;
+
+/// A wake of the bank: the places of its vortices, none where there is no such vortex.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Template {
+    pub(super) left: Option<usize>,
+    pub(super) right: Option<usize>,
+}
+
+/// Places and wakes.
+#[derive(Debug, Clone)]
+pub(super) struct Bank {
+    /// Lateral coordinate and height of each place \[m\].
+    pub(super) places_m: Vec<(f64, f64)>,
+    /// Distances of neighbouring places \[m\].
+    pub(super) step_m: (f64, f64),
+    pub(super) core_m: f64,
+    pub(super) templates: Vec<Template>,
+}
+
+impl Bank {
+    /// Pairs and, if asked for, single vortices; `gate_m` is the standard deviation of a gate.
+    pub(super) fn new(cells: &Cells, model: &WakeModel, gate_m: f64, options: &DetectorOptions) -> Self {
+        let spacing_m = options.spacing_m;
+        let sector = Sector::new(cells, model);
+        let area = sector.width_m() * sector.height_m();
+        let apart_m = STEP_M.max((area / MOST_PLACES).sqrt());
+        let lateral_m = apart_m.max(STEP_OVER_GATE * gate_m);
+        // the least spacing is a number of steps
+        let lateral_m = spacing_m.0 / (spacing_m.0 / lateral_m).ceil().max(1.0);
+        let step_m = (lateral_m, apart_m);
+        let columns = (sector.width_m() / lateral_m) as usize + 1;
+        let rows = (sector.height_m() / apart_m) as usize + 1;
+        let mut index = Array2::from_elem((rows, columns), None);
+        let mut places_m = Vec::new();
+        for ((row, column), at) in index.indexed_iter_mut() {
+            let place = (sector.lateral_m.0 + column as f64 * lateral_m, sector.up_m.0 + row as f64 * apart_m);
+            if sector.holds(place) {
+                *at = Some(places_m.len());
+                places_m.push(place);
+            }
+        }
+        let mut templates = Vec::new();
+        let least = (spacing_m.0 / lateral_m).round() as usize;
+        let most = (spacing_m.1 / lateral_m + 1e-9) as usize;
+        for ((row, column), &place) in index.indexed_iter() {
+            let Some(place) = place else { continue };
+            if options.single_vortices {
+                templates.push(Template { left: Some(place), right: None });
+                templates.push(Template { left: None, right: Some(place) });
+            }
+            let partners = (least..=most.max(least)).filter_map(|away| *index.get((row, column + away))?);
+            templates.extend(partners.map(|partner| Template { left: Some(place), right: Some(partner) }));
+        }
+        Self { places_m, step_m, core_m: CORE_OVER_STEP * apart_m, templates }
+    }
+
+    /// What an anticlockwise vortex of unit circulation at each place shows: cells by places.
+    pub(super) fn shapes(&self, cells: &Cells, model: &WakeModel, kernel: &RangeKernel) -> Array2<f64> {
+        let columns = map_indexed(self.places_m.len(), LineScratch::default, |scratch, place| {
+            shown(&self.vortex(place), cells, model, kernel, scratch)
+        });
+        Array2::from_shape_fn((cells.cells.len(), columns.len()), |(cell, place)| columns[place][cell])
+    }
+
+    /// An anticlockwise vortex alone.
+    fn vortex(&self, place: usize) -> Wake {
+        let (lateral_position_m, height_m) = self.places_m[place];
+        let of = |circulation_m2_s, lateral_position_m| Vortex {
+            circulation_m2_s,
+            lateral_position_m,
+            height_m,
+            core_radius_m: self.core_m,
+        };
+        Wake {
+            left: of(0.0, lateral_position_m - 1.0),
+            right: of(1.0, lateral_position_m),
+            lateral_wind_m_s: 0.0,
+            wind_shear_per_s: 0.0,
+        }
+    }
+}
+
+/// What a wake shows in each cell \[m/s\].
+pub(super) fn shown(
+    wake: &Wake,
+    cells: &Cells,
+    model: &WakeModel,
+    kernel: &RangeKernel,
+    scratch: &mut LineScratch,
+) -> Vec<f64> {
+    let mut map = Array2::zeros((cells.elevation_rad.len(), cells.range_m.len()));
+    for (mut line, &elevation_rad) in map.rows_mut().into_iter().zip(&cells.elevation_rad) {
+        let ray = Ray::new(elevation_rad);
+        kernel.apply((model, wake, ray), &cells.range_m, false, scratch, |gate, velocity, _| line[gate] = velocity);
+    }
+    cells.cells.iter().map(|cell| map[[cell.line, cell.gate]]).collect()
+}
+
+/// Where cells are.
+struct Sector<'a> {
+    cells: &'a Cells,
+    model: &'a WakeModel,
+    lateral_m: (f64, f64),
+    up_m: (f64, f64),
+}
+
+impl<'a> Sector<'a> {
+    fn new(cells: &'a Cells, model: &'a WakeModel) -> Self {
+        let ends = |of: fn(&(f64, f64)) -> f64| {
+            let values = cells.cells.iter().map(|cell| of(&cell.place_m));
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+        };
+        let mut up_m = ends(|place| place.1);
+        if model.images {
+            up_m.0 = up_m.0.max(STEP_M);
+        }
+        Self { cells, model, lateral_m: ends(|place| place.0), up_m }
+    }
+
+    fn width_m(&self) -> f64 {
+        (self.lateral_m.1 - self.lateral_m.0).max(0.0)
+    }
+
+    fn height_m(&self) -> f64 {
+        (self.up_m.1 - self.up_m.0).max(0.0)
+    }
+
+    fn holds(&self, place_m: (f64, f64)) -> bool {
+        let (y, z) = (place_m.0 - self.model.lidar_lateral_position_m, place_m.1 - self.model.lidar_height_m);
+        let within = |axis: &[f64], value: f64| match (axis.first(), axis.last()) {
+            (Some(first), Some(last)) => (*first..=*last).contains(&value),
+            _ => false,
+        };
+        within(&self.cells.range_m, y.hypot(z)) && within(&self.cells.elevation_rad, z.atan2(y))
+    }
+}

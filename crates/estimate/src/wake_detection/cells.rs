@@ -1,0 +1,125 @@
+//! The velocities that a test for a wake uses: those that are there, large maps thinned to means of blocks.
+//!
+//! Check: a mean has the deviation of its block; holes are left out.
+
+use ndarray::{Array2, ArrayView2};
+
+use crate::error::{Error, length};
+use crate::vortex_fit::{VelocityMap, WakeModel};
+
+/// Most cells that are kept: more tell little that is new about a wake of some ten metres, and whitening takes the cube.
+const MOST_CELLS: usize = 3000;
+
+/// Means over blocks of a map.
+#[derive(Debug, Clone)]
+pub(super) struct Cells {
+    /// Axes of the thinned map.
+    pub(super) elevation_rad: Vec<f64>,
+    pub(super) range_m: Vec<f64>,
+    /// Place (line, gate) on the thinned map, lateral coordinate and height \[m\] and standard deviation \[m/s\] of each cell.
+    pub(super) cells: Vec<Cell>,
+    /// Cell of each velocity of the whole map and its weight in the mean; none where nothing was known.
+    share: Array2<Option<(usize, f64)>>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cell {
+    pub(super) line: usize,
+    pub(super) gate: usize,
+    pub(super) place_m: (f64, f64),
+    pub(super) deviation_m_s: f64,
+}
+
+impl Cells {
+    pub(super) fn new(map: &VelocityMap<'_>, model: &WakeModel) -> Self {
+        let (lines, gates) = (map.elevation_rad.len(), map.range_m.len());
+        let (by_line, by_gate) = blocks(map);
+        let mean = |axis: &[f64], by: usize| -> Vec<f64> {
+            axis.chunks(by).map(|block| block.iter().sum::<f64>() / block.len() as f64).collect()
+        };
+        let (elevation_rad, range_m) = (mean(map.elevation_rad, by_line), mean(map.range_m, by_gate));
+        let weight = |line: usize, gate: usize| {
+            let known = map.velocity_m_s[[line, gate]].is_finite();
+            known.then(|| map.deviation(line, gate).powi(-2))
+        };
+        let mut sums = Array2::<f64>::zeros((elevation_rad.len(), range_m.len()));
+        for (line, gate) in (0..lines).flat_map(|line| (0..gates).map(move |gate| (line, gate))) {
+            sums[[line / by_line, gate / by_gate]] += weight(line, gate).unwrap_or(0.0);
+        }
+        let mut cells = Vec::new();
+        let mut index = Array2::from_elem(sums.raw_dim(), 0);
+        for ((line, gate), &sum) in sums.indexed_iter().filter(|(_, sum)| **sum > 0.0) {
+            index[[line, gate]] = cells.len();
+            let place_m = model.position_m(range_m[gate], elevation_rad[line]);
+            cells.push(Cell { line, gate, place_m, deviation_m_s: sum.sqrt().recip() });
+        }
+        let share = Array2::from_shape_fn((lines, gates), |(line, gate)| {
+            let block = [line / by_line, gate / by_gate];
+            weight(line, gate).map(|weight| (index[block], weight / sums[block]))
+        });
+        Self { elevation_rad, range_m, cells, share }
+    }
+
+    /// The means of a map of the same shape; NaN where no velocity of a block is left.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another shape.
+    pub(super) fn means(&self, velocity_m_s: ArrayView2<'_, f64>) -> Result<Vec<f64>, Error> {
+        length("lines of velocity_m_s", self.share.nrows(), velocity_m_s.nrows())?;
+        length("gates of velocity_m_s", self.share.ncols(), velocity_m_s.ncols())?;
+        let mut sums = vec![(0.0, 0.0); self.cells.len()];
+        for (share, &value) in self.share.iter().zip(&velocity_m_s) {
+            if let Some((cell, weight)) = share.filter(|_| value.is_finite()) {
+                sums[cell].0 += weight * value;
+                sums[cell].1 += weight;
+            }
+        }
+        Ok(sums.into_iter().map(|(sum, weight)| sum / weight).collect())
+    }
+}
+
+/// Lines and gates of a block: one of each, or more, so that blocks are about as wide as long.
+fn blocks(map: &VelocityMap<'_>) -> (usize, usize) {
+    let (lines, gates) = (map.elevation_rad.len(), map.range_m.len());
+    let span = |axis: &[f64]| axis.last().copied().unwrap_or(0.0) - axis.first().copied().unwrap_or(0.0);
+    let (line_m, gate_m) = (map.line_spacing_m(), span(map.range_m) / gates.max(1) as f64);
+    let (mut by_line, mut by_gate) = (1, 1);
+    while lines.div_ceil(by_line) * gates.div_ceil(by_gate) > MOST_CELLS {
+        if by_line as f64 * line_m <= by_gate as f64 * gate_m && by_line < lines || by_gate >= gates {
+            by_line += 1;
+        } else {
+            by_gate += 1;
+        }
+    }
+    (by_line, by_gate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_large_map_becomes_means_of_blocks_with_their_deviation_and_without_holes() {
+        let elevation_rad: Vec<f64> = (0..120).map(|i| 0.05 + 1e-3 * f64::from(i)).collect();
+        let range_m: Vec<f64> = (0..60).map(|i| 300.0 + 3.0 * f64::from(i)).collect();
+        let mut velocity = Array2::from_shape_fn((120, 60), |(line, gate)| 0.1 * line as f64 + gate as f64);
+        velocity[[0, 0]] = f64::NAN;
+        velocity.slice_mut(ndarray::s![60.., 30..]).fill(f64::NAN);
+        let deviation = Array2::from_elem((120, 60), 0.6);
+        let map = VelocityMap {
+            elevation_rad: &elevation_rad,
+            range_m: &range_m,
+            velocity_m_s: velocity.view(),
+            standard_deviation_m_s: Some(deviation.view()),
+        };
+        let cells = Cells::new(&map, &WakeModel::default());
+        assert_eq!(blocks(&map), (3, 1));
+        assert_eq!(cells.cells.len(), 40 * 60 - 20 * 30);
+        let means = cells.means(velocity.view()).unwrap();
+        assert!((means[0] - 0.15).abs() < 1e-12 && (cells.cells[0].deviation_m_s - 0.6 / 2f64.sqrt()).abs() < 1e-12);
+        assert!((means[1] - 1.1).abs() < 1e-12 && (cells.cells[1].deviation_m_s - 0.6 / 3f64.sqrt()).abs() < 1e-12);
+        velocity.slice_mut(ndarray::s![3..6, 5]).fill(f64::NAN);
+        assert_eq!(cells.means(velocity.view()).unwrap().iter().filter(|v| v.is_nan()).count(), 1);
+        assert!(cells.means(velocity.slice(ndarray::s![1.., ..])).is_err());
+    }
+}

@@ -1,0 +1,338 @@
+//! The statistic of a scan: how much better the best wake of a bank explains it than the wind alone.
+//!
+//! ```text
+//! T = min over wind of chi^2 - min over wind and wake of chi^2 = max over the bank of max(0, s . x)^2
+//! ```
+//!
+//! x the velocities, made white; s what a wake of the bank shows, made white, the wind taken out, of unit length. Products with
+//! single vortices are taken once and combined to those of pairs. Check: against a direct least-squares fit; drawn scans.
+
+use ndarray::{Array1, Array2, ArrayView1, Axis, s};
+
+use crate::error::{Error, increasing, positive};
+use crate::linalg::cholesky::cholesky;
+use crate::retrieval::{Gate, ScanMap, Turbulence};
+use crate::vortex_fit::damped_newton::solve;
+use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
+use crate::wake_detection::background::Background;
+use crate::wake_detection::bank::{Bank, Template, shown};
+use crate::wake_detection::cells::Cells;
+
+/// Velocities that a test needs.
+const NEEDED: usize = 100;
+/// One part in so many of the cells may be missing in a scan.
+const MISSING: usize = 10;
+/// Of the variance of a product with a place: keeps the covariance of all of them regular, and changes nothing else.
+const REGULAR: f64 = 1e-9;
+
+/// What is nearer to a vortex than this \[m\] is not taken for background.
+const WAKE_M: f64 = 25.0;
+
+/// What a test takes for granted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DetectorOptions {
+    /// Least and largest distance of a pair's vortices that is tried \[m\].
+    pub spacing_m: (f64, f64),
+    /// Whether single vortices are tried, too: the partner may be out of view.
+    pub single_vortices: bool,
+    /// The background besides wind and the noise of the map's standard deviations.
+    pub turbulence: Option<Turbulence>,
+}
+
+impl Default for DetectorOptions {
+    /// Wakes of wings of 20 to 80 m (spacing pi/4 of the span), single vortices, and no turbulence.
+    fn default() -> Self {
+        Self { spacing_m: (16.0, 63.0), single_vortices: true, turbulence: None }
+    }
+}
+
+/// The test of one scan's geometry, noise and background for a wake.
+#[derive(Debug, Clone)]
+pub struct WakeDetector {
+    model: WakeModel,
+    kernel: RangeKernel,
+    cells: Cells,
+    background: Background,
+    bank: Bank,
+    /// Uniform wind and shear, white and orthonormal: cells by one or two.
+    wind: Array2<f64>,
+    /// What single vortices show, white, without wind: places by cells.
+    shapes: Array2<f64>,
+    /// For each wake of the bank, the reciprocal of its length.
+    reciprocal_length: Vec<f64>,
+    /// Lower factor of the covariance of the products with an empty scan.
+    factor: Array2<f64>,
+}
+
+/// The test of one scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WakeStatistic {
+    /// T: what a wake explains of the best wind's chi-square.
+    pub value: f64,
+    /// Sum of squares over the variances that is left of the scan after the best wind, over its degrees of freedom.
+    pub wind_chi2_per_dof: f64,
+    /// And after the best wind and wake of the bank.
+    pub wake_chi2_per_dof: f64,
+    /// The wake of the bank that explains most, without wind; a vortex that it lacks has no circulation.
+    pub wake: Wake,
+    /// Standard deviation of its circulation \[m^2/s\], were its place known.
+    pub circulation_std_m2_s: f64,
+    /// Correlation of what is left with the next gate and with the next line, made white and away from that wake: near 0 if the
+    /// background is the one that the test was told.
+    pub neighbour_correlation: (f64, f64),
+}
+
+impl WakeDetector {
+    /// A test for maps like `map`: its axes, its standard deviations, its missing velocities. `gate` is what a velocity is of the
+    /// air about its range.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for impossible numbers or a map without standard deviations, [`Error::TooFewVelocities`] with less
+    /// than a hundred, [`Error::Empty`] if no wake of the bank fits into the scan, [`Error::Linalg`] if the background has
+    /// no covariance.
+    pub fn new(map: &ScanMap, model: &WakeModel, gate: &Gate, options: &DetectorOptions) -> Result<Self, Error> {
+        let found = map.validate()?;
+        if map.sigma_m_s.is_none() {
+            return Err(Error::Empty { field: "sigma_m_s" });
+        }
+        if found < NEEDED {
+            return Err(Error::TooFewVelocities { found, needed: NEEDED });
+        }
+        positive("least spacing_m", options.spacing_m.0)?;
+        if options.spacing_m.0 != options.spacing_m.1 {
+            increasing("spacing_m", &[options.spacing_m.0, options.spacing_m.1])?;
+        }
+        let cells = Cells::new(&map.view(), model);
+        let background = Background::new(&cells, options.turbulence.as_ref())?;
+        let kernel = kernel(gate)?;
+        let bank = Bank::new(&cells, model, kernel.width_m(), options);
+        if bank.templates.is_empty() {
+            return Err(Error::Empty { field: "list of wakes that fit into the scan" });
+        }
+        let mut shapes = bank.shapes(&cells, model, &kernel);
+        background.whiten(&mut shapes);
+        let wind = wind(&cells, &background);
+        remove(&wind, &mut shapes);
+        let gram = shapes.t().dot(&shapes);
+        let shapes = shapes.t().as_standard_layout().into_owned();
+        let reciprocal_length = bank.templates.iter().map(|template| length2(template, &gram).sqrt().recip()).collect();
+        let floor = REGULAR * gram.diag().iter().fold(0.0_f64, |most, x| most.max(*x));
+        let order = gram.nrows();
+        let factor = cholesky(gram + Array2::from_diag(&Array1::from_elem(order, floor)));
+        let reason = "is not positive definite";
+        let factor = factor.ok_or(Error::Linalg { what: "covariance of the products with the bank", order, reason })?;
+        Ok(Self { model: *model, kernel, cells, background, bank, wind, shapes, reciprocal_length, factor })
+    }
+
+    /// The statistic of a scan with the geometry and noise of this test. Some velocities may be missing that the test has: the wind
+    /// takes their place, which lowers the statistic a little.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another shape, [`Error::TooFewVelocities`] if more than a tenth is missing.
+    pub fn statistic(&self, velocity_m_s: ndarray::ArrayView2<'_, f64>) -> Result<WakeStatistic, Error> {
+        let mut means = self.cells.means(velocity_m_s)?;
+        let missing = self.fill(&mut means)?;
+        let white = self.white(means);
+        let products = self.shapes.dot(&white);
+        let (value, best) = self.best(products.view());
+        let rest = white.dot(&white);
+        let dof = |fitted: usize| (self.cells.cells.len() - missing - self.wind.ncols() - fitted) as f64;
+        let length = self.reciprocal_length[best];
+        let template = &self.bank.templates[best];
+        let mut left = white;
+        for (place, sense) in [(template.left, -1.0), (template.right, 1.0)] {
+            let Some(place) = place else { continue };
+            left.scaled_add(-sense * value.sqrt() * length, &self.shapes.row(place));
+        }
+        Ok(WakeStatistic {
+            value,
+            neighbour_correlation: self.neighbour_correlation(&left, template),
+            wind_chi2_per_dof: rest / dof(0),
+            wake_chi2_per_dof: (rest - value) / dof(4),
+            wake: self.wake(template, value.sqrt() * length),
+            circulation_std_m2_s: length,
+        })
+    }
+
+    /// Puts the best wind into cells without a velocity; returns their number.
+    fn fill(&self, means: &mut [f64]) -> Result<usize, Error> {
+        let missing = means.iter().filter(|value| value.is_nan()).count();
+        if missing == 0 {
+            return Ok(0);
+        }
+        let (found, needed) = (means.len() - missing, means.len() - means.len() / MISSING);
+        if found < needed {
+            return Err(Error::TooFewVelocities { found, needed });
+        }
+        let cells = &self.cells.cells;
+        let row = |i: usize| wind_row(&self.cells, i).map(|x| x / cells[i].deviation_m_s);
+        let (mut curvature, mut towards) = (Array2::zeros((2, 2)), [0.0; 2]);
+        for i in (0..means.len()).filter(|&i| means[i].is_finite()) {
+            let (row, value) = (row(i), means[i] / cells[i].deviation_m_s);
+            for a in 0..2 {
+                towards[a] += row[a] * value;
+                (0..2).for_each(|b| curvature[[a, b]] += row[a] * row[b]);
+            }
+        }
+        let wind = solve(&curvature, &towards).unwrap_or_else(|| vec![towards[0] / curvature[[0, 0]], 0.0]);
+        for (i, value) in means.iter_mut().enumerate().filter(|(_, value)| value.is_nan()) {
+            *value = wind_row(&self.cells, i).iter().zip(&wind).map(|(row, wind)| row * wind).sum();
+        }
+        Ok(missing)
+    }
+
+    /// Correlation of white numbers by cell with those of the next gate and the next line, far from a wake.
+    fn neighbour_correlation(&self, numbers: &Array1<f64>, template: &Template) -> (f64, f64) {
+        let mut grid = Array2::from_elem((self.cells.elevation_rad.len(), self.cells.range_m.len()), f64::NAN);
+        let far = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1) > WAKE_M;
+        for (cell, number) in self.cells.cells.iter().zip(numbers) {
+            let centres = [template.left, template.right].into_iter().flatten();
+            if centres.map(|place| self.bank.places_m[place]).all(|centre| far(centre, cell.place_m)) {
+                grid[[cell.line, cell.gate]] = *number;
+            }
+        }
+        let mean = |products: ndarray::Array2<f64>| {
+            let (sum, count) = products.iter().filter(|x| x.is_finite()).fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
+            sum / count
+        };
+        let power = mean(&grid * &grid);
+        let along = mean(&grid.slice(s![.., 1..]) * &grid.slice(s![.., ..-1])) / power;
+        let across = mean(&grid.slice(s![1.., ..]) * &grid.slice(s![..-1, ..])) / power;
+        (along, across)
+    }
+
+    /// Numbers by cell, made white, without what wind explains.
+    fn white(&self, mut numbers: Vec<f64>) -> Array1<f64> {
+        self.background.whiten_one(&mut numbers);
+        let white = Array1::from_vec(numbers);
+        let part = self.wind.t().dot(&white);
+        white - self.wind.dot(&part)
+    }
+
+    /// Statistic and index of the best wake of the bank, given the products of a scan with all places.
+    fn best(&self, products: ArrayView1<'_, f64>) -> (f64, usize) {
+        let product = |template: &Template| {
+            let of = |place: Option<usize>| place.map_or(0.0, |place| products[place]);
+            of(template.right) - of(template.left)
+        };
+        let all = self.bank.templates.iter().zip(&self.reciprocal_length).map(|(t, length)| product(t) * length);
+        let (most, best) = all.enumerate().fold((0.0, 0), |best, (i, x)| if x > best.0 { (x, i) } else { best });
+        (most * most, best)
+    }
+
+    pub(super) fn value(&self, products: ArrayView1<'_, f64>) -> f64 {
+        self.best(products).0
+    }
+
+    /// Factor of the covariance of the products of an empty scan with all places.
+    pub(super) fn factor(&self) -> &Array2<f64> {
+        &self.factor
+    }
+
+    /// Products of what a wake shows with all places, and its length: the reciprocal of the standard deviation of a factor on its
+    /// circulations, were places and cores known.
+    pub(super) fn products_of(&self, wake: &Wake) -> (Array1<f64>, f64) {
+        let calm = Wake { lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0, ..*wake };
+        let shown = shown(&calm, &self.cells, &self.model, &self.kernel, &mut Default::default());
+        let white = self.white(shown);
+        (self.shapes.dot(&white), white.dot(&white).sqrt())
+    }
+
+    fn wake(&self, template: &Template, circulation_m2_s: f64) -> Wake {
+        let spacing_m = match template {
+            Template { left: Some(_), right: Some(_) } => 0.0,
+            _ => self.bank.step_m.0,
+        };
+        let other = template.left.or(template.right).unwrap_or(0);
+        let vortex = |place: Option<usize>, sense: f64| {
+            let (lateral_m, height_m) = self.bank.places_m[place.unwrap_or(other)];
+            Vortex {
+                circulation_m2_s: if place.is_some() { circulation_m2_s } else { 0.0 },
+                lateral_position_m: lateral_m + if place.is_some() { 0.0 } else { sense * spacing_m },
+                height_m,
+                core_radius_m: self.bank.core_m,
+            }
+        };
+        Wake {
+            left: vortex(template.left, -1.0),
+            right: vortex(template.right, 1.0),
+            lateral_wind_m_s: 0.0,
+            wind_shear_per_s: 0.0,
+        }
+    }
+
+    /// Velocities of the map that count as one cell, at most: large maps are thinned.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.cells.cells.len()
+    }
+
+    /// Wakes that are tried.
+    #[must_use]
+    pub fn wakes_tried(&self) -> usize {
+        self.bank.templates.len()
+    }
+
+    /// Places of the pairs of the bank \[m\].
+    pub(super) fn pairs(&self) -> Vec<[(f64, f64); 2]> {
+        let place = |index: usize| self.bank.places_m[index];
+        self.bank.templates.iter().filter_map(|t| Some([place(t.left?), place(t.right?)])).collect()
+    }
+
+    /// Distances of neighbouring places \[m\].
+    pub(super) fn step_m(&self) -> (f64, f64) {
+        self.bank.step_m
+    }
+}
+
+/// The weight of a gate on a grid that is fine enough for wakes of the bank.
+fn kernel(gate: &Gate) -> Result<RangeKernel, Error> {
+    match gate {
+        Gate::Gaussian { std_m } if *std_m != 0.0 => {
+            positive("std_m of the gate", *std_m)?;
+            let weights: Vec<f64> = (-14..=14).map(|i| 0.25 * f64::from(i)).map(|x| (-0.5 * x * x).exp()).collect();
+            RangeKernel::new(-3.5 * std_m, 0.25 * std_m, &weights)
+        }
+        Gate::Kernel(kernel) => Ok(kernel.coarser(2)),
+        Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, 1.0, &[1.0]),
+    }
+}
+
+/// Uniform wind and shear, white and orthonormal; one direction if the scan cannot tell them apart.
+fn wind(cells: &Cells, background: &Background) -> Array2<f64> {
+    let mut wind = Array2::from_shape_fn((cells.cells.len(), 2), |(i, direction)| wind_row(cells, i)[direction]);
+    background.whiten(&mut wind);
+    let mut basis = Array2::zeros((cells.cells.len(), 0));
+    for direction in wind.columns() {
+        let mut direction = direction.to_owned().insert_axis(Axis(1));
+        let before = direction.iter().map(|x| x * x).sum::<f64>();
+        remove(&basis, &mut direction);
+        let after = direction.iter().map(|x| x * x).sum::<f64>();
+        if after > 1e-12 * before {
+            direction /= after.sqrt();
+            // as many rows as the basis has
+            let _ = basis.append(Axis(1), direction.view());
+        }
+    }
+    basis
+}
+
+/// What uniform wind and shear show in a cell.
+fn wind_row(cells: &Cells, index: usize) -> [f64; 2] {
+    let cell = &cells.cells[index];
+    let cos = cells.elevation_rad[cell.line].cos();
+    [cos, cos * cell.place_m.1]
+}
+
+/// Takes the part along an orthonormal basis out of columns.
+fn remove(basis: &Array2<f64>, columns: &mut Array2<f64>) {
+    let part = basis.t().dot(columns);
+    ndarray::linalg::general_mat_mul(-1.0, basis, &part, 1.0, columns);
+}
+
+/// Square of the length of what a wake of unit circulation shows, from the products of single vortices.
+fn length2(template: &Template, gram: &Array2<f64>) -> f64 {
+    let of = |a: Option<usize>, b: Option<usize>| a.zip(b).map_or(0.0, |(a, b)| gram[[a, b]]);
+    let (left, right) = (template.left, template.right);
+    of(left, left) + of(right, right) - 2.0 * of(left, right)
+}

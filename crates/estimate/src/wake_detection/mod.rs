@@ -1,0 +1,24 @@
+//! Whether a scan holds a wake: a statistic, its law in empty scans, and how often wakes are found.
+//!
+//! | module | content |
+//! |---|---|
+//! | `detector` | [`WakeDetector`]: the statistic of a scan with given geometry, noise and background; `cells`, `background`, `bank`: its velocities, how they are made white, the wakes that are tried |
+//! | `law` | [`EmptyScanLaw`]: thresholds for a rate of false alarms, and the rate of a statistic |
+//! | `spikes` | velocities that stand off their neighbours, to be left out before |
+//! | `power` | [`DetectionTrials`]: share of wakes that are found, the smallest circulation that is |
+//!
+//! The rate of false alarms holds for the background that the test is told, and for no other: the threshold for white noise raises
+//! an alarm in nearly every empty scan of turbulent air.
+
+mod background;
+mod bank;
+mod cells;
+mod detector;
+mod law;
+mod power;
+mod spikes;
+
+pub use detector::{DetectorOptions, WakeDetector, WakeStatistic};
+pub use law::EmptyScanLaw;
+pub use power::{DetectionTrials, Share};
+pub use spikes::without_spikes;

@@ -1,0 +1,132 @@
+//! How often a wake of a given circulation is found, and the smallest that nearly always is.
+//!
+//! A wake adds its own products with the bank to those of the background, so trials cost no more than empty scans; all circulations
+//! see the same backgrounds, so the curve is smooth. With places known it would be Phi(Gamma/sigma_Gamma - sqrt(T_c)). Check:
+//! against that form; whole drawn scans.
+
+use ndarray::{Array1, Array2};
+use rand::{Rng, RngExt};
+
+use crate::error::{Error, positive};
+use crate::vortex_fit::{Vortex, Wake};
+use crate::wake_detection::WakeDetector;
+
+/// The 0.9 quantile of a normal number.
+const NINE_OF_TEN: f64 = 1.281_551_565_544_600_4;
+
+/// Backgrounds with wakes, one in each, of a circulation that is chosen later.
+#[derive(Debug, Clone)]
+pub struct DetectionTrials<'a> {
+    detector: &'a WakeDetector,
+    empty: Array2<f64>,
+    /// Products of wakes of unit mean circulation.
+    wakes: Vec<Array1<f64>>,
+    circulation_std_m2_s: Vec<f64>,
+}
+
+/// A share of trials.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Share {
+    /// The share.
+    pub value: f64,
+    /// Its binomial standard error.
+    pub standard_error: f64,
+}
+
+impl Share {
+    /// Of `hits` among `trials`.
+    #[must_use]
+    pub fn of(hits: usize, trials: usize) -> Self {
+        let value = hits as f64 / trials as f64;
+        Self { value, standard_error: (value * (1.0 - value) / trials as f64).sqrt() }
+    }
+}
+
+impl WakeDetector {
+    /// So many pairs of unit circulation anywhere in the scan, both vortices in it, between the places of the bank; with cores of
+    /// 5 % of their spacing.
+    pub fn draw_wakes<R: Rng>(&self, count: usize, stream: impl Fn(u64) -> R) -> Vec<Wake> {
+        let (pairs, step_m) = (self.pairs(), self.step_m());
+        let draw = |index: usize| {
+            let mut generator = stream(index as u64);
+            let [left, right] = *pairs.get(generator.random_range(0..pairs.len().max(1)))?;
+            let mut off = |step_m: f64| step_m * (generator.random::<f64>() - 0.5);
+            let (aside_m, up_m) = (off(step_m.0), off(step_m.1));
+            let vortex = |place: (f64, f64)| Vortex {
+                circulation_m2_s: 1.0,
+                lateral_position_m: place.0 + aside_m,
+                height_m: place.1 + up_m,
+                core_radius_m: 0.05 * (right.0 - left.0),
+            };
+            Some(Wake { left: vortex(left), right: vortex(right), lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 })
+        };
+        (0..count).map_while(draw).collect()
+    }
+
+    /// Trials with the given wakes, in turn, in so many drawn backgrounds.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without wakes, [`Error::OutOfRange`] for one that is impossible or has no circulation.
+    pub fn trials<R: Rng>(
+        &self,
+        wakes: &[Wake],
+        trials: usize,
+        stream: impl Fn(u64) -> R + Sync + Send,
+    ) -> Result<DetectionTrials<'_>, Error> {
+        if wakes.is_empty() || trials == 0 {
+            return Err(Error::Empty { field: "wakes and trials" });
+        }
+        let (mut products, mut deviations) = (Vec::new(), Vec::new());
+        for wake in wakes {
+            wake.validate()?;
+            let mean_m2_s = 0.5 * (wake.left.circulation_m2_s + wake.right.circulation_m2_s);
+            positive("mean of circulation_m2_s", mean_m2_s)?;
+            let (product, length) = self.products_of(wake);
+            products.push(product / mean_m2_s);
+            deviations.push(mean_m2_s / length);
+        }
+        let empty = self.empty_products(trials, stream);
+        Ok(DetectionTrials { detector: self, empty, wakes: products, circulation_std_m2_s: deviations })
+    }
+}
+
+impl DetectionTrials<'_> {
+    /// Statistics of all trials with wakes of that circulation \[m^2/s\].
+    #[must_use]
+    pub fn statistics(&self, circulation_m2_s: f64) -> Vec<f64> {
+        let trial = |(i, empty): (usize, ndarray::ArrayView1<'_, f64>)| {
+            let wake = &self.wakes[i % self.wakes.len()];
+            self.detector.value((&empty + circulation_m2_s * wake).view())
+        };
+        self.empty.rows().into_iter().enumerate().map(trial).collect()
+    }
+
+    /// Share of the wakes of that circulation \[m^2/s\] whose statistic exceeds a threshold.
+    #[must_use]
+    pub fn detection(&self, circulation_m2_s: f64, threshold: f64) -> Share {
+        let found = self.statistics(circulation_m2_s).into_iter().filter(|value| *value > threshold).count();
+        Share::of(found, self.empty.nrows())
+    }
+
+    /// Bound on the circulation of the wakes were their places known \[m^2/s\], root mean square.
+    #[must_use]
+    pub fn circulation_std_m2_s(&self) -> f64 {
+        let squares: f64 = self.circulation_std_m2_s.iter().map(|std| std * std).sum();
+        (squares / self.circulation_std_m2_s.len() as f64).sqrt()
+    }
+
+    /// The circulation that is found nine times in ten \[m^2/s\]: measured, and as the bound foretells, sigma_Gamma (sqrt(T_c) + 1.28).
+    #[must_use]
+    pub fn smallest_detectable_m2_s(&self, threshold: f64) -> (f64, f64) {
+        let foretold = self.circulation_std_m2_s() * (threshold.max(0.0).sqrt() + NINE_OF_TEN);
+        let (mut low, mut high) = (0.0, 2.0 * foretold);
+        while self.detection(high, threshold).value < 0.9 && high < 64.0 * foretold {
+            high *= 2.0;
+        }
+        while high - low > 2e-3 * high {
+            let middle = 0.5 * (low + high);
+            if self.detection(middle, threshold).value < 0.9 { low = middle } else { high = middle }
+        }
+        (0.5 * (low + high), foretold)
+    }
+}

@@ -1,0 +1,360 @@
+//! Whether scans hold a wake: statistics against thresholds that are calibrated on empty scans of the same geometry and background.
+//!
+//! | module | content |
+//! |---|---|
+//! | `scene_noise` | deviations of a scene's velocities, and how far apart they are independent, from scans of still air |
+//! | `gates` | false alarms of single gates in closed form |
+//! | `tables`, `pictures` | what is written |
+//!
+//! Check: a wake is found and empty scans are not, at their rate; results do not depend on threads.
+
+mod gates;
+#[cfg(feature = "plots")]
+mod pictures;
+mod scene_noise;
+mod tables;
+
+pub use gates::gate_table;
+#[cfg(feature = "plots")]
+pub use pictures::picture;
+pub use scene_noise::SceneNoise;
+pub use tables::{power_table, roc_table, scan_table};
+
+use crate::Error;
+use crate::measure::streams::stream;
+use ndarray::s;
+use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
+use wakescope_estimate::vortex_fit::WakeModel;
+use wakescope_estimate::wake_detection::{
+    DetectorOptions, EmptyScanLaw, Share, WakeDetector, WakeStatistic, without_spikes,
+};
+
+/// Backgrounds with wakes that are drawn for the shares of wakes that are found.
+const TRIALS: usize = 2000;
+/// Wakes whose places are drawn.
+const PLACES: usize = 200;
+/// Circulations over the bound, of the curves.
+const CURVES: [f64; 4] = [3.0, 4.0, 5.0, 6.0];
+/// Correlation of neighbours beyond which the background is not the one that was stated.
+const CORRELATED: f64 = 0.2;
+
+/// How wakes are looked for.
+#[derive(Debug, Clone)]
+pub struct DetectionSettings {
+    /// Rate of false alarms of a scan.
+    pub false_alarm: f64,
+    /// Profile of the vortices, ground, lidar.
+    pub model: WakeModel,
+    /// What a velocity is of the air about its range.
+    pub gate: Gate,
+    /// Wakes that are tried, turbulence.
+    pub options: DetectorOptions,
+    /// Empty scans that are drawn.
+    pub empty_scans: usize,
+    /// Every so many lines and gates are used.
+    pub stride: (usize, usize),
+    /// Seed of what is drawn.
+    pub seed: u64,
+}
+
+impl Default for DetectionSettings {
+    /// A rate of a hundredth from 10 000 empty scans; all velocities, as points, in white noise.
+    fn default() -> Self {
+        Self {
+            false_alarm: 1e-2,
+            model: WakeModel::default(),
+            gate: Gate::Point,
+            options: DetectorOptions::default(),
+            empty_scans: 10_000,
+            stride: (1, 1),
+            seed: 1,
+        }
+    }
+}
+
+/// What was found in one scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanDetection {
+    /// The statistic, and the wake that explains most.
+    pub statistic: WakeStatistic,
+    /// The threshold.
+    pub threshold: f64,
+    /// Probability that an empty scan reaches that statistic.
+    pub false_alarm: f64,
+    /// Velocities that stood off their neighbours and were left out.
+    pub outliers: usize,
+    /// Velocities that were there.
+    pub velocities: usize,
+    /// Standard deviation that was taken for all velocities, m/s, where the scan states none.
+    pub assumed_sigma_m_s: Option<f64>,
+    /// mu and beta of Gumbel's law with the moments of the empty scans.
+    pub gumbel: (f64, f64),
+}
+
+impl ScanDetection {
+    /// Whether the scan holds a wake.
+    #[must_use]
+    pub fn is_wake(&self) -> bool {
+        self.statistic.value > self.threshold
+    }
+
+    /// Whether what is left of the scan is so correlated that the stated background cannot be the true one.
+    #[must_use]
+    pub fn is_correlated(&self) -> bool {
+        let (along, across) = self.statistic.neighbour_correlation;
+        along > CORRELATED || across > CORRELATED
+    }
+}
+
+/// How often wakes are found in one geometry and background.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Power {
+    /// The rate of false alarms and its threshold.
+    pub false_alarm: f64,
+    /// The threshold.
+    pub threshold: f64,
+    /// mu and beta of Gumbel's law.
+    pub gumbel: (f64, f64),
+    /// Bound on the circulation of a pair at a known place, m^2/s: root mean square over the places.
+    pub circulation_std_m2_s: f64,
+    /// Circulation, m^2/s, and share that is found at the rate.
+    pub found: Vec<(f64, Share)>,
+    /// Circulation, m^2/s, rate, threshold and share.
+    pub roc: Vec<(f64, f64, f64, Share)>,
+    /// The circulation that is found nine times in ten, m^2/s: measured, and as the bound foretells.
+    pub smallest_m2_s: (f64, f64),
+}
+
+/// A test with its law, for all scans that are alike.
+pub struct Calibration {
+    map: ScanMap,
+    detector: WakeDetector,
+    law: EmptyScanLaw,
+    threshold: f64,
+    assumed_sigma_m_s: Option<f64>,
+}
+
+impl Calibration {
+    /// Calibrates the test for scans like `map`. Where it states no deviations, they are those of what its best wake leaves.
+    ///
+    /// # Errors
+    /// What the test refuses.
+    pub fn new(map: &ScanMap, settings: &DetectionSettings) -> Result<Self, Error> {
+        let with = |map: &ScanMap| WakeDetector::new(map, &settings.model, &settings.gate, &settings.options);
+        let mut map = map.clone();
+        let mut assumed_sigma_m_s = None;
+        if map.sigma_m_s.is_none() {
+            map.sigma_m_s = Some(ndarray::Array2::ones(map.velocity_m_s.raw_dim()));
+            let plain = DetectorOptions { turbulence: None, ..settings.options };
+            let unit = WakeDetector::new(&map, &settings.model, &settings.gate, &plain)?;
+            let all = unit.statistic(map.velocity_m_s.view())?.wake_chi2_per_dof;
+            let air = settings.options.turbulence.map_or(0.0, |turbulence| turbulence.deviation_m_s.powi(2));
+            // turbulence has its part of what is left; some noise there must be
+            let sigma_m_s = (all - air).max(0.01 * all).sqrt();
+            map.sigma_m_s = Some(ndarray::Array2::from_elem(map.velocity_m_s.raw_dim(), sigma_m_s));
+            assumed_sigma_m_s = Some(sigma_m_s);
+        }
+        let detector = with(&map)?;
+        let law = detector.calibrate(settings.empty_scans, |scan| stream(settings.seed, "empty scans", scan))?;
+        let threshold = law.threshold(settings.false_alarm)?;
+        Ok(Self { map, detector, law, threshold, assumed_sigma_m_s })
+    }
+
+    /// Whether the calibration holds for another scan: the same axes, nearly the same velocities missing, deviations within a tenth.
+    fn is_for(&self, map: &ScanMap) -> bool {
+        let same_axes = map.elevation_rad == self.map.elevation_rad && map.range_m == self.map.range_m;
+        if !same_axes || map.sigma_m_s.is_none() != self.assumed_sigma_m_s.is_some() {
+            return false;
+        }
+        let sigma = |of: &ScanMap, at: (usize, usize)| of.sigma_m_s.as_ref().map_or(f64::NAN, |sigma| sigma[at]);
+        let (mut both, mut one) = (0, 0);
+        for (at, velocity) in map.velocity_m_s.indexed_iter() {
+            match (velocity.is_finite(), self.map.velocity_m_s[at].is_finite()) {
+                (true, true) => {
+                    let ratio = sigma(map, at) / sigma(&self.map, at);
+                    if (ratio - 1.0).abs() > 0.1 {
+                        return false;
+                    }
+                    both += 1;
+                }
+                (false, false) => {}
+                _ => one += 1,
+            }
+        }
+        10 * one < both
+    }
+
+    fn test(&self, map: &ScanMap, (outliers, velocities): (usize, usize)) -> Result<ScanDetection, Error> {
+        let statistic = self.detector.statistic(map.velocity_m_s.view())?;
+        Ok(ScanDetection {
+            statistic,
+            threshold: self.threshold,
+            false_alarm: self.law.false_alarm(statistic.value),
+            outliers,
+            velocities,
+            assumed_sigma_m_s: self.assumed_sigma_m_s,
+            gumbel: self.law.gumbel(),
+        })
+    }
+
+    /// How often pairs anywhere in the scan are found.
+    ///
+    /// # Errors
+    /// What the trials refuse, such as a scan too small for a pair.
+    pub fn power(&self, settings: &DetectionSettings) -> Result<Power, Error> {
+        let wakes = self.detector.draw_wakes(PLACES, |wake| stream(settings.seed, "wakes to find", wake));
+        let trials = self.detector.trials(&wakes, TRIALS, |trial| stream(settings.seed, "scans with wakes", trial))?;
+        let std_m2_s = trials.circulation_std_m2_s();
+        let circulations = (0..=20).map(|i| 0.5 * f64::from(i) * std_m2_s);
+        let found = circulations.map(|c| (c, trials.detection(c, self.threshold))).collect();
+        // four rates in a decade
+        let rates: Vec<f64> = (-16..0).map(|i| 10f64.powf(0.25 * f64::from(i))).collect();
+        let mut roc = Vec::new();
+        for circulation_m2_s in CURVES.map(|bounds| bounds * std_m2_s) {
+            let statistics = trials.statistics(circulation_m2_s);
+            for &rate in &rates {
+                let threshold = self.law.threshold(rate)?;
+                let hits = statistics.iter().filter(|value| **value > threshold).count();
+                roc.push((circulation_m2_s, rate, threshold, Share::of(hits, TRIALS)));
+            }
+        }
+        Ok(Power {
+            false_alarm: settings.false_alarm,
+            threshold: self.threshold,
+            gumbel: self.law.gumbel(),
+            circulation_std_m2_s: std_m2_s,
+            found,
+            roc,
+            smallest_m2_s: trials.smallest_detectable_m2_s(self.threshold),
+        })
+    }
+}
+
+/// Tests scans one after the other; those that are alike share a calibration. Returns the first calibration, too.
+///
+/// # Errors
+/// What the test refuses of a scan.
+pub fn detect(
+    scans: &[ScanMap],
+    settings: &DetectionSettings,
+) -> Result<(Vec<ScanDetection>, Option<Calibration>), Error> {
+    let (mut found, mut calibrations) = (Vec::with_capacity(scans.len()), Vec::<Calibration>::new());
+    for scan in scans {
+        let (map, outliers) = without_spikes(&strided(scan, settings.stride), settings.options.turbulence.as_ref());
+        let velocities = map.velocity_m_s.iter().filter(|v| v.is_finite()).count();
+        if !calibrations.last().is_some_and(|known| known.is_for(&map)) {
+            // the first is kept for its curves, the last for the next scan
+            calibrations.truncate(1);
+            calibrations.push(Calibration::new(&map, settings)?);
+        }
+        if let Some(calibration) = calibrations.last() {
+            found.push(calibration.test(&map, (outliers, velocities))?);
+        }
+    }
+    calibrations.truncate(1);
+    Ok((found, calibrations.pop()))
+}
+
+/// Every so many lines and gates of a map.
+#[must_use]
+pub fn strided(map: &ScanMap, (lines, gates): (usize, usize)) -> ScanMap {
+    let (lines, gates) = (lines.max(1), gates.max(1));
+    let some = |axis: &[f64], by: usize| axis.iter().copied().step_by(by).collect();
+    let cells = |values: &ndarray::Array2<f64>| values.slice(s![..;lines, ..;gates]).to_owned();
+    ScanMap {
+        elevation_rad: some(&map.elevation_rad, lines),
+        time_s: some(&map.time_s, lines),
+        range_m: some(&map.range_m, gates),
+        velocity_m_s: cells(&map.velocity_m_s),
+        sigma_m_s: map.sigma_m_s.as_ref().map(cells),
+        fold_m_s: map.fold_m_s,
+    }
+}
+
+/// The background that the rate of false alarms holds for, in words.
+#[must_use]
+pub fn background(settings: &DetectionSettings, has_sigma: bool) -> String {
+    let noise = match has_sigma {
+        true => "independent noise with the stated deviation of each velocity",
+        false => "independent noise of one deviation, that of what is left of the scan",
+    };
+    let air = settings.options.turbulence.map_or(String::new(), |turbulence| {
+        let Turbulence { deviation_m_s, length_m } = turbulence;
+        format!(", and turbulence of {deviation_m_s} m/s correlated over {length_m} m")
+    });
+    format!("a wind that is linear in height, {noise}{air}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+    use rand_xoshiro::rand_core::Rng;
+    use wakescope_estimate::vortex_fit::Wake;
+
+    fn map(seed: u64, circulation_m2_s: f64) -> ScanMap {
+        let elevation_rad: Vec<f64> = (0..44).map(|i| 0.01 + 4e-3 * f64::from(i)).collect();
+        let range_m: Vec<f64> = (0..26).map(|i| 340.0 + 5.0 * f64::from(i)).collect();
+        let c = circulation_m2_s;
+        let wake = Wake::from_array(&[c, c, 379.0, 46.0, 421.0, 46.0, 2.0, 2.0, 1.5, 0.01]);
+        let mut rng = stream(seed, "test", 0);
+        let velocity_m_s = Array2::from_shape_fn((44, 26), |(i, j)| {
+            // twelve uniform numbers are nearly normal
+            let noise: f64 = (0..12).map(|_| rng.next_u64() as f64 / u64::MAX as f64).sum::<f64>() - 6.0;
+            WakeModel::default().radial_velocity_m_s(&wake, range_m[j], elevation_rad[i]) + 0.5 * noise
+        });
+        let sigma_m_s = Some(Array2::from_elem((44, 26), 0.5));
+        ScanMap { time_s: vec![f64::NAN; 44], elevation_rad, range_m, velocity_m_s, sigma_m_s, fold_m_s: None }
+    }
+
+    fn settings() -> DetectionSettings {
+        DetectionSettings { empty_scans: 2000, ..DetectionSettings::default() }
+    }
+
+    #[test]
+    fn wakes_are_found_and_empty_scans_are_not_whatever_the_threads() {
+        let scans = [map(1, 0.0), map(2, 60.0), map(3, 0.0)];
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| detect(&scans, &settings()).unwrap().0)
+        };
+        let found = run(1);
+        assert_eq!(found, run(3));
+        assert_eq!(found.iter().map(ScanDetection::is_wake).collect::<Vec<_>>(), [false, true, false]);
+        assert!(found[1].false_alarm < 1e-6 && found[0].false_alarm > 1e-2, "{found:?}");
+        assert!(!found.iter().any(ScanDetection::is_correlated), "{found:?}");
+        let wake = found[1].statistic.wake;
+        assert!((wake.left.lateral_position_m - 379.0).abs() < 8.0 && (wake.right.height_m - 46.0).abs() < 5.0);
+        // a scan that states no deviations is told by its residuals
+        let unstated = ScanMap { sigma_m_s: None, ..scans[1].clone() };
+        let (found, _) = detect(&[unstated], &settings()).unwrap();
+        assert!(found[0].is_wake() && (found[0].assumed_sigma_m_s.unwrap() / 0.5 - 1.0).abs() < 0.1, "{found:?}");
+    }
+
+    #[test]
+    fn shares_grow_with_circulation_and_rate_and_reach_the_smallest_that_is_found() {
+        let (_, calibration) = detect(&[map(1, 0.0)], &settings()).unwrap();
+        let power = calibration.unwrap().power(&settings()).unwrap();
+        assert!(power.found.windows(2).all(|pair| pair[1].1.value >= pair[0].1.value - 0.01));
+        assert!(power.found[0].1.value < 0.03 && power.found[20].1.value > 0.99, "{power:?}");
+        let (measured, foretold) = power.smallest_m2_s;
+        assert!((measured / foretold - 1.0).abs() < 0.15, "{measured} {foretold}");
+        for curve in power.roc.chunks(16) {
+            assert!(curve.windows(2).all(|pair| pair[1].3.value >= pair[0].3.value));
+        }
+    }
+
+    #[test]
+    fn neighbours_that_say_the_same_are_told_and_a_stride_parts_them() {
+        let mut smooth = map(5, 0.0);
+        let from = smooth.velocity_m_s.clone();
+        for ((line, gate), v) in smooth.velocity_m_s.indexed_iter_mut() {
+            let last = (line + 3).min(44);
+            *v = from.slice(s![line..last, gate]).mean().unwrap() * 3f64.sqrt();
+        }
+        let (found, _) = detect(std::slice::from_ref(&smooth), &settings()).unwrap();
+        assert!(found[0].is_correlated(), "{found:?}");
+        let parted = DetectionSettings { stride: (3, 1), ..settings() };
+        assert!(!detect(&[smooth], &parted).unwrap().0[0].is_correlated());
+    }
+}

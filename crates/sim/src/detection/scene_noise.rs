@@ -1,0 +1,160 @@
+//! The noise of a scene's velocities, measured on scans of still air: its deviation at each range, and how many lines and gates
+//! apart velocities are independent.
+//!
+//! The estimator, its regions, speckle and noise are those of the scene; so a rate of false alarms is that of the instrument, not
+//! of a bound. Check: deviations against those of a whole run; regions that overlap are told.
+
+use crate::Error;
+use crate::measure::map::estimates;
+use crate::measure::progress::Observer;
+use crate::measure::scan::Scanner;
+use crate::plan::{Plan, Target};
+use crate::scene::{DetectorSignal, Flow, SceneFile};
+use ndarray::{Array2, s};
+use num_complex::Complex;
+use wakescope_estimate::retrieval::ScanMap;
+
+/// Lines and scans of still air: a few hundred independent velocities at each range.
+const LINES: f64 = 48.0;
+const SCANS: usize = 8;
+/// Velocities that are less correlated are taken as independent.
+const INDEPENDENT: f64 = 0.1;
+/// Median of the absolute value of a normal number.
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+
+/// Noise of the velocities of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneNoise {
+    /// Ranges of the gates, m.
+    pub range_m: Vec<f64>,
+    /// Standard deviation of one velocity at each, m/s; of the bulk, without outliers.
+    pub sigma_m_s: Vec<f64>,
+    /// Lines and gates after which velocities are independent.
+    pub stride: (usize, usize),
+}
+
+impl SceneNoise {
+    /// Measures the noise of a planned scene on a few scans of still air.
+    ///
+    /// # Errors
+    /// What the crates refuse.
+    pub fn new(plan: &Plan, observer: &dyn Observer) -> Result<Self, Error> {
+        let mut scene = plan.scene.scene.clone();
+        scene.flow = Flow::Calm {};
+        scene.scan.realisations = SCANS;
+        let middle_rad = 0.5 * (scene.scan.elevation_min_rad + scene.scan.elevation_max_rad);
+        let half_rad = 0.5 * LINES * scene.scan.elevation_step_rad;
+        scene.scan.elevation_min_rad = scene.scan.elevation_min_rad.max(middle_rad - half_rad);
+        scene.scan.elevation_max_rad = scene.scan.elevation_max_rad.min(middle_rad + half_rad);
+        scene.outputs.signals = false;
+        let file = SceneFile::new(scene).map_err(|problems| plan.scene.located(problems))?;
+        let still = Plan::new(file, Target::Map)?;
+        let scanner = Scanner::new(&still, observer)?;
+        let mut maps = Vec::with_capacity(SCANS);
+        match still.scene.scene.detector.signal {
+            DetectorSignal::IntermediateFrequency => {
+                estimates::<f64>(&[&still], &scanner, observer, |_| (), |_, map| maps.push(map.clone()))?;
+            }
+            DetectorSignal::Baseband => {
+                estimates::<Complex<f64>>(&[&still], &scanner, observer, |_| (), |_, map| maps.push(map.clone()))?;
+            }
+        }
+        Ok(Self::of_maps(still.geometry.gate_range_m.clone(), &maps))
+    }
+
+    /// From maps of still air.
+    fn of_maps(range_m: Vec<f64>, maps: &[Array2<f64>]) -> Self {
+        let sigma_m_s: Vec<f64> = (0..range_m.len())
+            .map(|gate| {
+                let mut sizes: Vec<f64> = maps
+                    .iter()
+                    .flat_map(|map| map.column(gate).to_vec())
+                    .filter(|v| v.is_finite())
+                    .map(f64::abs)
+                    .collect();
+                sizes.sort_by(f64::total_cmp);
+                sizes.get(sizes.len() / 2).map_or(f64::NAN, |median| median / NORMAL_MEDIAN)
+            })
+            .collect();
+        // outliers say nothing of the correlation
+        let white: Vec<Array2<f64>> = maps
+            .iter()
+            .map(|map| {
+                let mut white = map.clone();
+                white.indexed_iter_mut().for_each(|((_, gate), v)| *v /= sigma_m_s[gate]);
+                white.mapv(|v| if v.abs() < 4.0 { v } else { f64::NAN })
+            })
+            .collect();
+        let correlation = |lines: usize, gates: usize| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for map in &white {
+                let products =
+                    &map.slice(s![lines.., gates..]) * &map.slice(s![..map.nrows() - lines, ..map.ncols() - gates]);
+                for product in products.iter().filter(|x| x.is_finite()) {
+                    (sum, count) = (sum + product, count + 1.0);
+                }
+            }
+            sum / count
+        };
+        let (lines, gates) = maps.first().map_or((1, 1), Array2::dim);
+        let power = correlation(0, 0);
+        let apart = |most: usize, of: &dyn Fn(usize) -> f64| {
+            (1..most.max(1)).find(|&k| of(k) < INDEPENDENT * power).unwrap_or(most.max(1))
+        };
+        let stride = (apart(lines / 2, &|k| correlation(k, 0)), apart(gates / 2, &|k| correlation(0, k)));
+        Self { range_m, sigma_m_s, stride }
+    }
+
+    /// Deviations, by range, of a map that is the mean of so many `scans`, where it states none or smaller ones: those that a few
+    /// scans show of themselves are often far too small.
+    pub fn give(&self, map: &mut ScanMap, scans: usize) {
+        let at = |range_m: f64| crate::measure::region::of_table(&self.range_m, &self.sigma_m_s, range_m);
+        let least_m_s: Vec<f64> = map.range_m.iter().map(|r| at(*r) / (scans.max(1) as f64).sqrt()).collect();
+        let shape = map.velocity_m_s.raw_dim();
+        let stated = map.sigma_m_s.take().unwrap_or_else(|| Array2::zeros(shape));
+        map.sigma_m_s = Some(Array2::from_shape_fn(shape, |at| stated[at].max(least_m_s[at.1])));
+    }
+
+    /// A scan of still air without noise on the grid of the scene, with the deviations.
+    #[must_use]
+    pub fn empty_scan(&self, plan: &Plan) -> ScanMap {
+        let elevation_rad = plan.geometry.elevation_rad.clone();
+        let mut map = ScanMap {
+            time_s: vec![f64::NAN; elevation_rad.len()],
+            velocity_m_s: Array2::zeros((elevation_rad.len(), self.range_m.len())),
+            elevation_rad,
+            range_m: self.range_m.clone(),
+            sigma_m_s: None,
+            fold_m_s: None,
+        };
+        self.give(&mut map, 1);
+        map
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Scene, SnrReference};
+    use crate::{Silent, run};
+
+    #[test]
+    fn noise_of_a_scene_is_that_of_its_runs_and_overlapping_regions_are_parted() {
+        let mut scene = Scene::default();
+        scene.detector.snr = SnrReference::Fixed { snr_db: 10.0 };
+        (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.08, 0.12);
+        (scene.scan.range_min_m, scene.scan.range_max_m) = (340.0, 460.0);
+        (scene.scan.pulses_per_line, scene.scan.realisations) = (1, 8);
+        let plan = |scene: &Scene| Plan::new(SceneFile::new(scene.clone()).unwrap(), Target::Map).unwrap();
+        let noise = SceneNoise::new(&plan(&scene), &Silent).unwrap();
+        scene.flow = Flow::Calm {};
+        let std_m_s = run(&plan(&scene), &Silent).unwrap().map.unwrap().std_m_s;
+        let of_run = (std_m_s.iter().map(|std| std * std).sum::<f64>() / std_m_s.len() as f64).sqrt();
+        let found = (noise.sigma_m_s.iter().map(|std| std * std).sum::<f64>() / noise.sigma_m_s.len() as f64).sqrt();
+        assert!((found / of_run - 1.0).abs() < 0.2, "{found} {of_run}");
+        // regions of 2 m on lines half a metre apart, windows of 38 m on gates 3 m apart
+        assert!((4..=9).contains(&noise.stride.0) && (4..=12).contains(&noise.stride.1), "{:?}", noise.stride);
+        let map = noise.empty_scan(&plan(&scene));
+        assert_eq!(map.validate().unwrap(), map.velocity_m_s.len());
+    }
+}

@@ -1,0 +1,60 @@
+//! What detection writes: a row for each scan, and the curves of its geometry and background.
+
+use super::{Power, ScanDetection};
+use crate::io::Table;
+
+/// The table of scans; `names` has file, sweep and time of each. A vortex that the best wake lacks has no place.
+#[must_use]
+pub fn scan_table(names: &[(String, usize, f64)], found: &[ScanDetection]) -> Table {
+    let column = |get: &dyn Fn(&ScanDetection) -> f64| found.iter().map(get).collect::<Vec<_>>();
+    let side = |get: &dyn Fn(&ScanDetection) -> (f64, f64)| {
+        found.iter().map(|f| Some(get(f)).filter(|(c, _)| *c > 0.0).map_or(f64::NAN, |(_, x)| x)).collect::<Vec<_>>()
+    };
+    let (left, right) = (|f: &ScanDetection| f.statistic.wake.left, |f: &ScanDetection| f.statistic.wake.right);
+    Table::new()
+        .text("file", names.iter().map(|name| name.0.clone()))
+        .int("sweep", names.iter().map(|name| name.1 as i64))
+        .float("time_s", names.iter().map(|name| name.2))
+        .int("wake", found.iter().map(|f| i64::from(f.is_wake())))
+        .float("statistic", column(&|f| f.statistic.value))
+        .float("threshold", column(&|f| f.threshold))
+        .float("false_alarm", column(&|f| f.false_alarm))
+        .float("gamma_m2_s", column(&|f| left(f).circulation_m2_s.max(right(f).circulation_m2_s)))
+        .float("gamma_std_m2_s", column(&|f| f.statistic.circulation_std_m2_s))
+        .float("y_left_m", side(&|f| (left(f).circulation_m2_s, left(f).lateral_position_m)))
+        .float("z_left_m", side(&|f| (left(f).circulation_m2_s, left(f).height_m)))
+        .float("y_right_m", side(&|f| (right(f).circulation_m2_s, right(f).lateral_position_m)))
+        .float("z_right_m", side(&|f| (right(f).circulation_m2_s, right(f).height_m)))
+        .float("chi2_per_dof_wind", column(&|f| f.statistic.wind_chi2_per_dof))
+        .float("chi2_per_dof_wake", column(&|f| f.statistic.wake_chi2_per_dof))
+        .int("velocities", found.iter().map(|f| f.velocities as i64))
+        .int("outliers", found.iter().map(|f| f.outliers as i64))
+        .float("assumed_sigma_m_s", column(&|f| f.assumed_sigma_m_s.unwrap_or(f64::NAN)))
+        .float("correlation_along", column(&|f| f.statistic.neighbour_correlation.0))
+        .float("correlation_across", column(&|f| f.statistic.neighbour_correlation.1))
+        .float("gumbel_mu", column(&|f| f.gumbel.0))
+        .float("gumbel_beta", column(&|f| f.gumbel.1))
+}
+
+/// Share of wakes found against circulation, at the rate: `gamma_m2_s,gamma_over_std,false_alarm,detection,standard_error`.
+#[must_use]
+pub fn power_table(power: &Power) -> Table {
+    Table::new()
+        .float("gamma_m2_s", power.found.iter().map(|row| row.0))
+        .float("gamma_over_std", power.found.iter().map(|row| row.0 / power.circulation_std_m2_s))
+        .float("false_alarm", power.found.iter().map(|_| power.false_alarm))
+        .float("detection", power.found.iter().map(|row| row.1.value))
+        .float("standard_error", power.found.iter().map(|row| row.1.standard_error))
+}
+
+/// Operating curves: `gamma_m2_s,gamma_over_std,false_alarm,threshold,detection,standard_error`.
+#[must_use]
+pub fn roc_table(power: &Power) -> Table {
+    Table::new()
+        .float("gamma_m2_s", power.roc.iter().map(|row| row.0))
+        .float("gamma_over_std", power.roc.iter().map(|row| row.0 / power.circulation_std_m2_s))
+        .float("false_alarm", power.roc.iter().map(|row| row.1))
+        .float("threshold", power.roc.iter().map(|row| row.2))
+        .float("detection", power.roc.iter().map(|row| row.3.value))
+        .float("standard_error", power.roc.iter().map(|row| row.3.standard_error))
+}
