@@ -68,7 +68,7 @@ pub(super) fn scans(
     let ray = |ray: usize| {
         let cells = || (ray * gates..(ray + 1) * gates).map(|at| (at, velocity_m_s[at]));
         let noisy = |at: usize| {
-            let below = |ratios: &Vec<f64>| format.min_snr_db.is_some_and(|least| !(ratios[at] >= least));
+            let below = |ratios: &Vec<f64>| format.min_snr_db.is_some_and(|least| ratios[at].is_nan() || ratios[at] < least);
             ratio_db.as_ref().is_some_and(below)
                 || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
                 || status.as_ref().is_some_and(|status| status[at] != 1.0)

@@ -168,7 +168,7 @@ fn fits(scene: &Scene, records: &RawRecords) -> Result<(), Error> {
             "pulse_repetition_frequency" => scene.laser.pulse_repetition_hz,
             _ => scene.pulse_sigma_s(),
         };
-        if !((value - own).abs() <= 1e-6 * own.abs()) {
+        if !(0.0..=1e-6 * own.abs()).contains(&(value - own).abs()) {
             return Err(records.refuse(format!("its {name} is {value:?}, the scene's {key} says {own:?}")));
         }
     }
