@@ -74,9 +74,7 @@ impl SceneWind {
 
     fn analytic(flow: &Flow) -> Result<Self, Error> {
         let max_speed_m_s = match flow {
-            Flow::Uniform { lateral_m_s, vertical_m_s, along_m_s } => {
-                lateral_m_s.hypot(*vertical_m_s).hypot(*along_m_s)
-            }
+            Flow::Uniform { lateral_m_s, vertical_m_s } => lateral_m_s.hypot(*vertical_m_s),
             Flow::VortexPair(p) => {
                 p.circulation_m2_s / (4.0 * std::f64::consts::PI * p.core_radius_m) + p.cross_wind_m_s.abs()
             }
@@ -143,8 +141,8 @@ impl Wind for Later {
 fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
     Ok(match flow {
         Flow::Calm {} | Flow::Simulated(_) | Flow::Fields(_) => Box::new(les::winds::Calm),
-        Flow::Uniform { lateral_m_s, vertical_m_s, along_m_s } => {
-            Box::new(les::winds::Uniform::new([*along_m_s, *lateral_m_s, *vertical_m_s])?)
+        Flow::Uniform { lateral_m_s, vertical_m_s } => {
+            Box::new(les::winds::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?)
         }
         Flow::Linear(wind) => {
             let linear = les::winds::Linear {
