@@ -197,9 +197,9 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
     fs::write(folder.join("zero.bin"), vec![0_u8; counts.len()]).unwrap();
     fs::write(folder.join("few.bin"), &counts[..2 * samples * 4]).unwrap();
     fs::write(folder.join("nan.csv"), vec![vec!["nan"; samples].join(","); 18].join("\n")).unwrap();
+    let ones = vec!["1"; samples].join(",") + "\n";
     fs::write(folder.join("ragged.csv"), "1,2,3\n1,2\n").unwrap();
-    fs::write(folder.join("word.csv"), format!("{}\n{}x\n", vec!["1"; samples].join(","), "1,".repeat(samples - 1)))
-        .unwrap();
+    fs::write(folder.join("word.csv"), format!("{}{}x\n", ones.repeat(17), "1,".repeat(samples - 1))).unwrap();
     fs::write(
         folder.join("short.npy"),
         b"\x93NUMPY\x01\x00\x46\x00{'descr': '<f8', 'fortran_order': False, 'shape': (18, 167), }         \n",
@@ -224,7 +224,7 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
         ("c.bin --scene bits.toml --format i16", &["c.bin", "beyond the 8 bits of detector.digitiser"]),
         ("nan.csv --scene s.toml", &["nan.csv", "all of its samples are missing"]),
         ("ragged.csv --scene s.toml", &["ragged.csv", "line 2", "2 samples", "3"]),
-        ("word.csv --scene s.toml", &["word.csv", "line 2", "no number"]),
+        ("word.csv --scene s.toml", &["word.csv", "line 18", "no number"]),
         ("short.npy --scene s.toml", &["short.npy", "cut short"]),
         ("o/signals.nc --scene s.toml --variable voltage", &["no variable voltage"]),
         ("o/signals.nc --scene s.toml --rays rays.csv", &["rays.csv", "2 rows", "54 records"]),

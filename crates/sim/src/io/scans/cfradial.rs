@@ -68,7 +68,8 @@ pub(super) fn scans(
     let ray = |ray: usize| {
         let cells = || (ray * gates..(ray + 1) * gates).map(|at| (at, velocity_m_s[at]));
         let noisy = |at: usize| {
-            let below = |ratios: &Vec<f64>| format.min_snr_db.is_some_and(|least| ratios[at].is_nan() || ratios[at] < least);
+            let below =
+                |ratios: &Vec<f64>| format.min_snr_db.is_some_and(|least| ratios[at].is_nan() || ratios[at] < least);
             ratio_db.as_ref().is_some_and(below)
                 || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
                 || status.as_ref().is_some_and(|status| status[at] != 1.0)
@@ -310,4 +311,126 @@ fn nyquist(file: &mut dyn Source) -> Result<Option<f64>, String> {
 /// The first value of a variable, if it is above 0.
 fn first(file: &mut dyn Source, name: &str) -> Result<Option<f64>, String> {
     Ok(file.floats(name)?.first().copied().filter(|value| *value > 0.0 && value.is_finite()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    /// Variables with their lengths, text attributes and values.
+    #[derive(Default)]
+    struct Made(BTreeMap<&'static str, Variable>);
+
+    type Variable = (Vec<u64>, Vec<(&'static str, &'static str)>, Vec<f64>);
+
+    impl Source for Made {
+        fn names(&self) -> Vec<String> {
+            self.0.keys().map(|name| (*name).to_owned()).collect()
+        }
+        fn shape(&self, name: &str) -> Option<Vec<u64>> {
+            Some(self.0.get(name)?.0.clone())
+        }
+        fn text(&self, variable: &str, name: &str) -> Option<String> {
+            let attributes = &self.0.get(variable)?.1;
+            attributes.iter().find(|(own, _)| *own == name).map(|(_, text)| (*text).to_owned())
+        }
+        fn global_text(&self, _: &str) -> Option<String> {
+            None
+        }
+        fn floats(&mut self, name: &str) -> Result<Vec<f64>, String> {
+            Ok(self.0.get(name).ok_or_else(|| format!("it has no variable {name}"))?.2.clone())
+        }
+    }
+
+    const RAYS: usize = 12;
+    const GATES: usize = 6;
+
+    /// Two sweeps of six rays, the second one in azimuth, without Nyquist velocity.
+    fn made() -> Made {
+        let mut made = Made::default();
+        let velocity: Vec<f64> = (0..RAYS * GATES).map(|i| i as f64 * 0.1).collect();
+        let up = (0..RAYS).map(|ray| 2.0 + (ray % 6) as f64);
+        let round = (0..RAYS).map(|ray| if ray < 6 { 359.9 + 0.02 * ray as f64 } else { 30.0 * ray as f64 });
+        let ray = |values: Vec<f64>| (vec![RAYS as u64], vec![("units", "degrees")], values);
+        made.0.insert("elevation", ray(up.collect()));
+        made.0.insert("azimuth", ray(round.map(|a| a % 360.0).collect()));
+        let units = vec![("units", "seconds since 2024-01-31 12:00:00.5 +00:00")];
+        made.0.insert("time", (vec![RAYS as u64], units, (0..RAYS).map(|i| i as f64).collect()));
+        made.0.insert(
+            "range",
+            (vec![GATES as u64], vec![("units", "km")], (0..GATES).map(|i| 0.3 + 0.01 * i as f64).collect()),
+        );
+        made.0.insert("sweep_start_ray_index", (vec![2], vec![], vec![0.0, 6.0]));
+        made.0.insert("sweep_end_ray_index", (vec![2], vec![], vec![5.0, 11.0]));
+        made.0.insert(
+            "VEL",
+            (vec![RAYS as u64, GATES as u64], vec![("units", "m/s"), ("standard_name", AWAY)], velocity),
+        );
+        made
+    }
+
+    fn read(made: &mut Made) -> Result<(Vec<ReadScan>, Vec<String>), String> {
+        scans(made, Path::new("x.nc"), &ScanFormat::default(), 0)
+    }
+
+    #[test]
+    fn the_sweep_in_elevation_is_read_and_others_are_told() {
+        let (found, left_out) = read(&mut made()).unwrap();
+        assert_eq!((found.len(), left_out.len()), (1, 1));
+        assert!(left_out[0].contains("sweep 1") && left_out[0].contains("azimuths"), "{left_out:?}");
+        let map = &found[0].map;
+        assert_eq!((map.velocity_m_s.dim(), map.fold_m_s, map.velocity_m_s[[5, 5]]), ((6, 6), None, 3.5));
+        assert!((map.range_m[1] - 310.0).abs() < 1e-9 && (map.elevation_rad[0] - 2f64.to_radians()).abs() < 1e-12);
+        assert_eq!(found[0].reference.unwrap().to_string(), "2024-01-31T12:00:00Z");
+    }
+
+    #[test]
+    fn sign_folds_masks_and_ragged_gates_follow_the_file() {
+        let mut towards = made();
+        let (shape, _, values) = towards.0.remove("VEL").unwrap();
+        towards.0.insert("speed", (shape, vec![("standard_name", TOWARDS)], values.clone()));
+        towards.0.insert("nyquist_velocity", (vec![RAYS as u64], vec![], vec![12.0; RAYS]));
+        let moving = (0..RAYS).map(|ray| f64::from(u8::from(ray == 2))).collect();
+        towards.0.insert("antenna_transition", (vec![RAYS as u64], vec![], moving));
+        let map = read(&mut towards).unwrap().0.remove(0).map;
+        assert_eq!((map.velocity_m_s[[4, 5]], map.fold_m_s, map.elevation_rad.len()), (-3.5, Some(24.0), 5));
+        // The same gates one ray after the other, the last gate of the first ray missing.
+        let mut ragged = made();
+        let own = values.iter().enumerate().filter(|(i, _)| *i != 5).map(|(_, v)| *v).collect::<Vec<_>>();
+        let starts = (0..RAYS).map(|ray| if ray == 0 { 0.0 } else { (ray * GATES - 1) as f64 }).collect();
+        let counts = (0..RAYS).map(|ray| if ray == 0 { 5.0 } else { 6.0 }).collect();
+        ragged.0.insert("VEL", (vec![own.len() as u64], vec![], own));
+        ragged.0.insert("ray_start_index", (vec![RAYS as u64], vec![], starts));
+        ragged.0.insert("ray_n_gates", (vec![RAYS as u64], vec![], counts));
+        let map = read(&mut ragged).unwrap().0.remove(0).map;
+        assert!(
+            map.velocity_m_s[[0, 5]].is_nan() && map.velocity_m_s[[0, 4]] == 0.4 && map.velocity_m_s[[5, 5]] == 3.5
+        );
+    }
+
+    #[test]
+    fn what_contradicts_itself_is_refused_by_name() {
+        let refused = |change: &dyn Fn(&mut Made)| {
+            let mut made = made();
+            change(&mut made);
+            read(&mut made).unwrap_err()
+        };
+        assert!(refused(&|m| m.0.get_mut("VEL").unwrap().0 = vec![7, 6]).contains("VEL is 7 x 6; 12 rays x 6 ranges"));
+        assert!(refused(&|m| drop(m.0.remove("VEL"))).contains("no radial velocity"));
+        assert!(refused(&|m| drop(m.0.remove("elevation"))).contains("elevation"));
+        assert!(refused(&|m| m.0.get_mut("VEL").unwrap().1 = vec![("units", "knots")]).contains("units of VEL"));
+        assert!(refused(&|m| m.0.get_mut("time").unwrap().2 = vec![0.0]).contains("time has 1 values"));
+        assert!(refused(&|m| m.0.get_mut("sweep_end_ray_index").unwrap().2 = vec![5.0, 99.0]).contains("ray 99"));
+        assert!(
+            refused(&|m| m.0.get_mut("elevation").unwrap().2[3] = f64::NAN).contains("elevation of ray 3 is missing")
+        );
+        let all_missing = |m: &mut Made| m.0.get_mut("VEL").unwrap().2.fill(f64::NAN);
+        let (found, left_out) = {
+            let mut made = made();
+            all_missing(&mut made);
+            read(&mut made).unwrap()
+        };
+        assert!(found.is_empty() && left_out[0].contains("all of its velocities are missing"));
+    }
 }

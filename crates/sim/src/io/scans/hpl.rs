@@ -159,3 +159,89 @@ fn mask_noise(rays: &mut [RayRow], intensities: &[Vec<f64>], format: &ScanFormat
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::{Unit, VelocityMap, hpl, samples};
+
+    /// Six rays of eight gates; noise in the last two gates and in one below 1.
+    fn file(changes: &[(&str, &str)]) -> String {
+        let mut out = String::from(
+            "Filename:\tx.hpl\nNumber of gates:\t8\nRange gate length (m):\t30.0\nGate length (pts):\t10\nPulses/ray:\t9\n\
+             No. of rays in file:\t6\nScan type:\tRHI\nFocus range:\t65535\nStart time:\t20240131 23:59:00.00\n\
+             Range of measurement (center of gate) = (range gate + 0.5) * Gate length\n****\n",
+        );
+        for ray in 0..6 {
+            let hours = (23.99 + 0.005 * f64::from(ray)) % 24.0;
+            out += &format!("{hours:.5} 90.00 {:.2} 0.0 0.0\n", 1.0 + 0.5 * f64::from(ray));
+            for gate in 0..8 {
+                let intensity = if gate < 6 { 1.2 } else { 1.0 + 0.004 * f64::from(2 * (ray % 2) - 1) };
+                out += &format!("{gate:3} {:.4} {intensity:.6} 1.0E-6\n", f64::from(gate) - 2.5);
+            }
+        }
+        changes.iter().fold(out, |text, (from, to)| text.replace(from, to))
+    }
+
+    fn read(text: &str, format: &ScanFormat) -> ReadScan {
+        let mut found = scans(text, Path::new("x.hpl"), format).unwrap();
+        assert_eq!(found.len(), 1);
+        found.remove(0)
+    }
+
+    #[test]
+    fn noise_is_left_out_and_hours_go_on_after_midnight() {
+        let found = read(&file(&[]), &ScanFormat::default());
+        let map = &found.map;
+        assert_eq!((map.range_m[0], map.range_m[7], map.velocity_m_s.dim()), (15.0, 225.0, (6, 8)));
+        assert!(
+            map.velocity_m_s.column(5).iter().all(|v| *v == 2.5)
+                && map.velocity_m_s.column(6).iter().all(|v| v.is_nan())
+        );
+        assert!(map.time_s.windows(2).all(|pair| (pair[1] - pair[0] - 18.0).abs() < 0.1), "{:?}", map.time_s);
+        assert_eq!(found.reference.unwrap().to_string(), "2024-01-31T00:00:00Z");
+        let loud = ScanFormat { min_snr_db: Some(-6.0), towards: true, ..ScanFormat::default() };
+        assert!(scans(&file(&[]), Path::new("x.hpl"), &loud).is_err(), "0.2 is -7 dB");
+        let towards = ScanFormat { towards: true, ..ScanFormat::default() };
+        assert_eq!(read(&file(&[]), &towards).map.velocity_m_s[[0, 5]], -2.5);
+    }
+
+    #[test]
+    fn dialects_of_the_header_are_understood() {
+        let ranges = |changes: &[(&str, &str)]| {
+            let map = read(&file(changes), &ScanFormat::default()).map;
+            (map.range_m[0], map.range_m[1] - map.range_m[0])
+        };
+        // Whatever the formula says: the scan type is right.
+        assert_eq!(ranges(&[("Scan type:\tRHI", "Scan type:\tRHI - overlapping")]), (15.0, 3.0));
+        assert_eq!(ranges(&[("(range gate + 0.5) * Gate length", "gate length / 2 + (range gate x 3)")]), (15.0, 3.0));
+        assert_eq!(
+            ranges(&[("Range of measurement", "Altitude of measurement"), ("No. of rays", "No. of waypoints")]),
+            (15.0, 30.0)
+        );
+        let commas = file(&[]).replace(".000000", ",000000").replace(".200000", ",200000").replace("30.0", "30,0");
+        assert_eq!(
+            read(&commas, &ScanFormat::default()).map.velocity_m_s,
+            read(&file(&[]), &ScanFormat::default()).map.velocity_m_s
+        );
+    }
+
+    #[test]
+    fn a_map_of_this_program_comes_back() {
+        let mut map: VelocityMap = samples::map();
+        let shape = map.field("radial_velocity").unwrap().values.dim();
+        let ratio = ndarray::Array2::from_elem(shape, 3.0);
+        map.fields.retain(|field| field.name != "signal_to_noise_ratio");
+        map.fields.push(crate::io::Field::float("signal_to_noise_ratio", Unit::Decibel, "ratio", ratio));
+        // Two sweeps of six rays and five gates: 30 velocities are as few as a scan may have.
+        let bytes = hpl::hpl_bytes(&map, 0, "halo.hpl").unwrap();
+        let found = read(&String::from_utf8(bytes).unwrap(), &ScanFormat::default());
+        let written = &map.field("radial_velocity").unwrap().values;
+        let gates = map.range_m.len();
+        let before = found.map.range_m.len() - gates;
+        for ((ray, gate), velocity) in found.map.velocity_m_s.indexed_iter().filter(|((_, gate), _)| *gate >= before) {
+            assert!((velocity - written[[ray, gate - before]]).abs() < 1e-4);
+        }
+        assert!((found.map.range_m[before] - map.range_m[0]).abs() < 1e-3);
+    }
+}

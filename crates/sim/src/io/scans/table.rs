@@ -162,7 +162,9 @@ fn cells(
         if velocity_m_s.is_nan() && !(text.is_empty() || text.eq_ignore_ascii_case("nan")) {
             return Err(format!("row {}: its velocity is no number; an empty cell is a missing one", row + 1));
         }
-        let noisy = columns.snr.is_some_and(|c| format.min_snr_db.is_some_and(|least| number(row, c).partial_cmp(&least).is_none_or(std::cmp::Ordering::is_lt)));
+        let noisy = columns
+            .snr
+            .is_some_and(|c| format.min_snr_db.is_some_and(|least| number(row, c).is_nan() || number(row, c) < least));
         let is_flagged = columns.flagged.is_some_and(|c| number(row, c) > 0.5);
         if !noisy && !is_flagged {
             ray.velocity_m_s[gate] = sign * velocity_m_s;

@@ -2,6 +2,7 @@
 //!
 //! The samples of all blocks have one scale, and a region sums its lines in their order, so that blocks change no bit.
 
+use super::cells::{Cell, ScanCells};
 use super::lines::ScanLines;
 use super::spectra::GateSpectra;
 use super::{FromParts, RecordedOptions, pieces, samples};
@@ -19,31 +20,6 @@ use wakescope_estimate::{Gates, Sampling};
 
 /// Most bytes of the sums of a block.
 const BLOCK_BYTES: usize = 256 << 20;
-
-/// What is known of one gate before the noise is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Cell {
-    pub(super) velocity_m_s: f64,
-    /// Mean power in the band over that of the scene's noise.
-    pub(super) power_ratio: f64,
-    /// Density of the peak over what the scene's noise exceeds with the rate of false alarms; NaN without a test.
-    pub(super) detection_ratio: f64,
-    /// Standard deviation of the power ratio of noise.
-    pub(super) deviation: f64,
-    pub(super) width_m_s: f64,
-    pub(super) quality: f64,
-    pub(super) level: f64,
-    pub(super) n_eff: f64,
-    pub(super) is_good: bool,
-}
-
-/// The gates of a scan.
-pub(super) struct ScanCells {
-    pub(super) lines: ScanLines,
-    pub(super) cells: Array2<Cell>,
-    /// Spectra of the gates over the noise of the scene, where they were asked for.
-    pub(super) spectra: Option<Vec<f32>>,
-}
 
 pub(super) struct Blocks<'p, S> {
     plan: &'p Plan,

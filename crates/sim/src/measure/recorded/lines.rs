@@ -9,6 +9,9 @@ use crate::plan::Plan;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+/// Largest elevation, with rounding, rad.
+const MOST_RAD: f64 = std::f64::consts::FRAC_PI_2 + 1e-9;
+
 /// Angles and times of records, or of lines, from a table of the user's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayTable {
@@ -93,7 +96,7 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
     };
     let prt_s = 1.0 / plan.scene.scene.laser.pulse_repetition_hz;
     let time_s = time_s.unwrap_or_else(|| (0..count).map(|i| plan.wind.start_s + i as f64 * prt_s).collect());
-    if let Some(bad) = elevation_rad.iter().find(|angle| !(0.0..=std::f64::consts::FRAC_PI_2 + 1e-9).contains(&angle.abs())) {
+    if let Some(bad) = elevation_rad.iter().find(|angle| !(-MOST_RAD..=MOST_RAD).contains(*angle)) {
         return Err(records.refuse(format!(
             "an elevation is {bad} rad: from -pi/2 to pi/2 are allowed; degrees need the unit degrees, or a column elevation_deg"
         )));

@@ -3,7 +3,7 @@
 //! Check: flags and ratios of measured signals are those of a run of the same signals.
 
 use super::NoiseLevel;
-use super::blocks::{Cell, ScanCells};
+use super::cells::{Cell, ScanCells};
 use super::lines::ScanLines;
 use super::predicted::PredictedDeviation;
 use crate::Error;

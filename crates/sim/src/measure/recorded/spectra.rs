@@ -2,7 +2,7 @@
 //!
 //! Check: the highest density of a spectrum is where the velocity of its gate is.
 
-use super::blocks::ScanCells;
+use super::cells::ScanCells;
 use crate::Error;
 use crate::io::OutputError;
 use crate::measure::estimators;
