@@ -10,10 +10,9 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
     let key = |name: &str| format!("{at}.{name}");
     match flow {
         Flow::Calm {} => {}
-        Flow::Uniform { lateral_m_s, vertical_m_s, along_m_s } => {
+        Flow::Uniform { lateral_m_s, vertical_m_s } => {
             c.within(&key("lateral_m_s"), *lateral_m_s, -1e3, 1e3, "m/s");
             c.within(&key("vertical_m_s"), *vertical_m_s, -1e3, 1e3, "m/s");
-            c.within(&key("along_m_s"), *along_m_s, -1e3, 1e3, "m/s");
         }
         Flow::Linear(wind) => {
             let lists = [

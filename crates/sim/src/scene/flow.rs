@@ -1,6 +1,5 @@
 //! The wind of a scene.
 
-use super::receiver::is_zero;
 use serde::{Deserialize, Serialize};
 
 /// The wind that the lidar sees.
@@ -15,9 +14,6 @@ pub enum Flow {
         lateral_m_s: f64,
         /// Wind upwards, m/s.
         vertical_m_s: f64,
-        /// Wind along the flight, m/s.
-        #[serde(default, skip_serializing_if = "is_zero")]
-        along_m_s: f64,
     },
     /// A wind that is linear in place and time.
     Linear(LinearWind),

@@ -305,7 +305,7 @@ mod tests {
     fn scene_survives_a_round_trip() {
         let mut scene = Scene::default();
         scene.detector.snr = SnrReference::Fixed { snr_db: 0.1 + 0.2 };
-        scene.flow = Flow::Uniform { lateral_m_s: 1.0 / 3.0, vertical_m_s: -0.0, along_m_s: 0.0 };
+        scene.flow = Flow::Uniform { lateral_m_s: 1.0 / 3.0, vertical_m_s: -0.0 };
         let back: Scene = toml::from_str(&scene.to_toml()).unwrap();
         assert_eq!(back, scene);
     }

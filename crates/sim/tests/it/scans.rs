@@ -145,7 +145,7 @@ fn truths_of_a_linear_wind_are_exact_in_any_direction() {
 fn the_truth_of_a_line_is_the_mean_over_its_pulses_with_their_spread() {
     let scan = "pattern = { kind = \"ppi\", azimuth_min_rad = 0.4, azimuth_max_rad = 1.0 }\n\
                 head = { motion = \"continuous\", rate_rad_s = 6.0 }\nwind_of_pulses.kind = \"pulse\"";
-    let plan = plan("kind = \"uniform\"\nlateral_m_s = 3.0\nvertical_m_s = 0.5\nalong_m_s = -8.0", scan);
+    let plan = plan("kind = \"linear\"\nvelocity_m_s = [-8.0, 3.0, 0.5]", scan);
     let map = map(&plan);
     let schedule = &plan.geometry.schedule;
     assert!(schedule.lines.len() >= 4);
@@ -166,7 +166,7 @@ fn the_truth_of_a_line_is_the_mean_over_its_pulses_with_their_spread() {
 
 #[test]
 fn vad_and_dbs_of_a_scan_tell_the_wind_with_their_errors() {
-    let uniform = "kind = \"uniform\"\nlateral_m_s = -3.0\nvertical_m_s = 0.2\nalong_m_s = 6.0";
+    let uniform = "kind = \"linear\"\nvelocity_m_s = [6.0, -3.0, 0.2]";
     let wind = [6.0, -3.0, 0.2];
     for (scan, beams) in [
         ("pattern = { kind = \"vad\", elevation_rad = 1.1, beams = 24 }\nhead.sweeps = 2", 24.0),
@@ -181,10 +181,10 @@ fn vad_and_dbs_of_a_scan_tell_the_wind_with_their_errors() {
             assert!((found.height_m - found.range_m * 1.1f64.sin()).abs() < 1e-6);
             let gate = i % map.range_m.len();
             let sigma = map.std_m_s.column(gate).mean().unwrap().max(0.1);
-            for d in 0..3 {
-                assert!((found.true_m_s[d] - wind[d]).abs() < 1e-12 && (found.noiseless_m_s[d] - wind[d]).abs() < 1e-9);
+            for (d, wind) in wind.iter().enumerate() {
+                assert!((found.true_m_s[d] - wind).abs() < 1e-12 && (found.noiseless_m_s[d] - wind).abs() < 1e-9);
                 // (u, v) of white noise: sigma sqrt(2/N)/cos.
-                assert!((found.mean_m_s[d] - wind[d]).abs() < 6.0 * sigma * (2.0 / beams).sqrt() / cos, "{found:?}");
+                assert!((found.mean_m_s[d] - wind).abs() < 6.0 * sigma * (2.0 / beams).sqrt() / cos, "{found:?}");
                 assert!(found.std_m_s[d] > 0.0 && found.std_m_s[d] < 10.0 * sigma * (2.0 / beams).sqrt() / cos);
                 assert_eq!(found.error_bar_m_s[d].is_nan(), beams == 4.0);
             }
@@ -377,7 +377,7 @@ fn winds_add_up_each_from_its_own_start() {
     let text = SCENE
         .replace(
             "ADDED",
-            "added_flows = [{ kind = \"uniform\", lateral_m_s = 2.0, vertical_m_s = 1.0, along_m_s = 3.0 }, \
+            "added_flows = [{ kind = \"linear\", velocity_m_s = [3.0, 2.0, 1.0] }, \
                   { kind = \"vortex_pair\", circulation_m2_s = 0.0 }]",
         )
         .replace("FLOW", LINEAR)
