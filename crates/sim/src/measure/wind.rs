@@ -222,24 +222,6 @@ fn start_s(flow: &Flow) -> f64 {
     }
 }
 
-/// A wind that stands still as it was at one time.
-#[cfg(feature = "netcdf")]
-struct Frozen<W> {
-    wind: W,
-    time_s: f64,
-}
-
-#[cfg(feature = "netcdf")]
-impl<W: Wind> Wind for Frozen<W> {
-    fn velocity_into(&self, points_m: &[[f64; 3]], _: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), les::Error> {
-        self.wind.velocity_into(points_m, self.time_s, out_m_s)
-    }
-
-    fn max_gradient_per_s(&self, _: f64) -> f64 {
-        self.wind.max_gradient_per_s(self.time_s)
-    }
-}
-
 #[cfg(not(feature = "netcdf"))]
 fn simulated(_: &crate::scene::SimulatedFlow, _: &SceneFile) -> Result<SceneWind, Error> {
     Err(Error::Input { path: "flow.planes".into(), reason: "this build lacks the feature `netcdf`".into() })
@@ -253,11 +235,19 @@ fn fields(_: &crate::scene::FieldFlow, _: &SceneFile) -> Result<SceneWind, Error
 #[cfg(feature = "netcdf")]
 mod fields;
 #[cfg(feature = "netcdf")]
-use {fields::fields, planes::simulated};
+use planes::simulated;
+
+#[cfg(feature = "netcdf")]
+fn fields(flow: &crate::scene::FieldFlow, file: &SceneFile) -> Result<SceneWind, Error> {
+    let fields::FieldWind { wind, start_s, end_s, max_speed_m_s, source, times_s: field_times_s } =
+        fields::fields(flow, file)?;
+    Ok(SceneWind { wind, start_s, tau: 0.0, end_s, max_speed_m_s, source, field_times_s })
+}
 
 #[cfg(feature = "netcdf")]
 mod planes {
-    use super::{Error, Frozen, SceneFile, SceneWind, Wind};
+    use super::fields::Frozen;
+    use super::{Error, SceneFile, SceneWind, Wind};
     use crate::io::CrossPlanes;
     use crate::io::planes_input::{files, read};
     use crate::scene::{SimulatedFlow, SimulatedMotion};
