@@ -27,7 +27,7 @@ const WHITENED: usize = 3000;
 pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
     options.validate()?;
     map.validate()?;
-    let unfolded = unfolded(map);
+    let unfolded = map.unfolded();
     let expected = Expected::rough(&unfolded, options)?;
     let cells = cells(map);
     let mut problem =
@@ -103,16 +103,6 @@ pub(crate) fn cells(map: &ScanMap) -> Vec<Cell> {
             Cell { line, gate, sigma_m_s }
         })
         .collect()
-}
-
-/// Velocities that repeat are put about their median.
-pub(crate) fn unfolded(map: &ScanMap) -> ScanMap {
-    let mut unfolded = map.clone();
-    if let Some(fold) = map.fold_m_s {
-        let middle = median(&mut map.velocity_m_s.iter().copied().filter(|v| v.is_finite()).collect::<Vec<f64>>());
-        unfolded.velocity_m_s.mapv_inplace(|v| v - fold * ((v - middle) / fold).round());
-    }
-    unfolded
 }
 
 /// Scale of the residuals over their deviations, from their median.

@@ -43,7 +43,6 @@ mod whitening;
 pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelopes};
 pub use expected_map::expected_velocities;
 pub use fit::fit_scan;
-pub(crate) use fit::unfolded;
 pub use integral::{ProfilePoint, circulation_profile};
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use radial_velocity::radial_velocity_method;

@@ -10,7 +10,7 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::retrieval::expected::Expected;
-use crate::retrieval::fit::{cells, rescale, unfolded};
+use crate::retrieval::fit::{cells, rescale};
 use crate::retrieval::hypotheses::{End, Fits, Kind};
 use crate::retrieval::problem::Problem;
 use crate::retrieval::report::Report;
@@ -42,7 +42,7 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
         core_prior: None,
         ..options.clone()
     };
-    let unfolded = unfolded(map);
+    let unfolded = map.unfolded();
     let expected = Expected::rough(&unfolded, &linear)?.fine(&linear)?;
     let cells = cells(map);
     let mut problem = Problem { expected: &expected, cells, whitening: None, loss: options.loss, prior: None };

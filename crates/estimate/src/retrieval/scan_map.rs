@@ -6,6 +6,7 @@ use ndarray::Array2;
 
 use crate::error::{Error, finite, length, positive};
 use crate::vortex_fit::VelocityMap;
+use crate::vortex_fit::map_fit::data::median;
 
 /// A map of radial velocities with the times of its lines.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +38,16 @@ impl ScanMap {
         }
         self.fold_m_s.map_or(Ok(()), |fold| positive("fold_m_s", fold))?;
         Ok(found)
+    }
+
+    /// The map with velocities that repeat put about their median.
+    pub(crate) fn unfolded(&self) -> Self {
+        let mut unfolded = self.clone();
+        if let Some(fold) = self.fold_m_s {
+            let middle = median(&mut self.velocity_m_s.iter().copied().filter(|v| v.is_finite()).collect::<Vec<f64>>());
+            unfolded.velocity_m_s.mapv_inplace(|v| v - fold * ((v - middle) / fold).round());
+        }
+        unfolded
     }
 
     /// Whether the lines have times.

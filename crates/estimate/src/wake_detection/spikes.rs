@@ -4,7 +4,7 @@
 
 use ndarray::Array2;
 
-use crate::retrieval::{ScanMap, Turbulence, unfolded};
+use crate::retrieval::{ScanMap, Turbulence};
 use crate::vortex_fit::map_fit::data::median;
 
 /// A velocity so many deviations off the median of its neighbours is an outlier: noise is so once in a million.
@@ -18,7 +18,7 @@ const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 /// are stated, the distances from the neighbours tell them.
 #[must_use]
 pub fn without_spikes(map: &ScanMap, turbulence: Option<&Turbulence>) -> (ScanMap, usize) {
-    let mut kept = unfolded(map);
+    let mut kept = map.unfolded();
     let off = Array2::from_shape_fn(kept.velocity_m_s.raw_dim(), |at| off_neighbours(&kept.velocity_m_s, at));
     let mut sizes: Vec<f64> = off.iter().copied().filter(|x| x.is_finite()).map(f64::abs).collect();
     let of_all = median(&mut sizes) / NORMAL_MEDIAN;
