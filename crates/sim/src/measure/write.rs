@@ -71,6 +71,10 @@ pub fn names(plan: &Plan) -> Vec<String> {
         add("map", &[(o.csv, "csv"), (netcdf, "nc"), pictures[0], pictures[1]]);
         add("halo", &[(o.hpl, "hpl"), (o.hpl && o.csv, "csv")]);
     }
+    if plan.runs(Stage::Retrieval) {
+        add("retrieval", &[(o.csv, "csv")]);
+        add("retrieval_summary", &[(o.csv, "csv")]);
+    }
     out
 }
 
@@ -131,6 +135,10 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
         }
         #[cfg(feature = "plots")]
         pictures::add_map(&mut files, plan, &map, &origin)?;
+    }
+    if let Some(retrieval) = result.retrieval.as_ref().filter(|_| outputs.csv) {
+        files.add("retrieval.csv", retrieval.table().to_csv(&origin)?)?;
+        files.add("retrieval_summary.csv", retrieval.error_table().to_csv(&origin)?)?;
     }
     Ok(files)
 }

@@ -6,6 +6,7 @@
 //! | `own` | maps and signals of this program's scenes: what their estimator makes of a wake |
 //! | `others` | velocity envelopes, circulation against radius |
 //! | `tracks` | the vortices through several scans |
+//! | `realisations`, `truth`, `summary` | all realisations of a scene against the vortices of its flow |
 //! | `table` | rows, and everything as JSON |
 //! | `pictures` | velocities, the fitted wake, what is left |
 //!
@@ -16,42 +17,34 @@ mod others;
 mod own;
 #[cfg(feature = "plots")]
 mod pictures;
+mod realisations;
+mod summary;
 mod table;
 mod tracks;
+mod truth;
 
 pub use gate::gate_of;
 pub use others::{envelope_table, envelopes, profile_table};
 pub use own::{OwnScene, retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]
 pub use pictures::figure;
+pub(crate) use realisations::of_realisations;
+pub use realisations::{RetrievalRow, SceneRetrieval};
+pub use summary::RetrievalErrors;
+pub(crate) use summary::name;
 #[cfg(feature = "sweep")]
 pub use table::json;
 pub use table::rows;
 #[cfg(feature = "plots")]
 pub use tracks::track_figure;
 pub use tracks::{track_of, track_table};
+pub use truth::TrueVortex;
 
 use crate::Error;
 use crate::io::scans::ReadScan;
+pub use crate::scene::RetrievalMethod as Method;
 use wakescope_estimate::retrieval::{RetrievalOptions, ScanResult, fit_scan, radial_velocity_method};
 use wakescope_estimate::vortex_fit::Sharing;
-
-/// How circulations are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum Method {
-    /// Fit of the wake to the map.
-    #[default]
-    Fit,
-    /// Fit of the wake to all raw signals.
-    Signals,
-    /// Radial-velocity method: places from extremes, circulations by linear least squares.
-    Rv,
-    /// Velocity envelopes of the spectra of raw signals about the wake that is fitted to their map.
-    Envelope,
-    /// Fit to the map, and circulation against radius by integrals over the map beside it.
-    Integral,
-}
 
 /// One scan with what was found in it.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,6 +4,7 @@
 //! all. Each names the key, the value and what is allowed.
 
 use super::check_estimator::check_estimator;
+use super::retrieval::check_retrieval;
 use super::{
     Digitiser, EfficiencyOfPulse, FORMAT, Flow, PulseShape, Scan, Scene, SnrReference, Turbulence, VortexMotion,
 };
@@ -27,6 +28,7 @@ impl Scene {
         self.check_flow(&mut c);
         self.check_scan(&mut c);
         check_estimator(self, &mut c);
+        check_retrieval(self, &mut c);
         self.check_outputs(&mut c);
         self.check_site(&mut c);
         // Limits between keys make sense only once each key does.
