@@ -22,7 +22,7 @@ use crate::wake_detection::cells::Cells;
 /// Velocities that a test needs.
 const NEEDED: usize = 100;
 /// One part in so many of the cells may be missing in a scan.
-const MISSING: usize = 10;
+const MISSING: usize = 2;
 /// Of the variance of a product with a place: keeps the covariance of all of them regular, and changes nothing else.
 const REGULAR: f64 = 1e-9;
 
@@ -111,7 +111,7 @@ impl WakeDetector {
     /// takes their place, which lowers the statistic a little.
     ///
     /// # Errors
-    /// [`Error::Length`] for another shape, [`Error::TooFewVelocities`] if more than a tenth is missing.
+    /// [`Error::Length`] for another shape, [`Error::TooFewVelocities`] if more than half is missing.
     pub fn statistic(&self, velocity_m_s: ndarray::ArrayView2<'_, f64>) -> Result<WakeStatistic, Error> {
         let mut means = self.cells.means(velocity_m_s)?;
         let missing = self.fill(&mut means)?;

@@ -340,7 +340,7 @@ fn scans_that_miss_some_velocities_keep_below_the_rate_and_those_that_miss_many_
     assert!(alarms.value < 0.1 + 3.0 * 0.013 && alarms.value > 0.05, "{alarms:?}");
     assert!(holed < whole && holed > 0.8 * whole, "{holed} {whole}");
     let mut half = case.empty.clone();
-    half.slice_mut(ndarray::s![..20, ..]).fill(f64::NAN);
+    half.slice_mut(ndarray::s![..30, ..]).fill(f64::NAN);
     assert!(detector.statistic(half.view()).unwrap_err().to_string().contains("velocit"));
 }
 

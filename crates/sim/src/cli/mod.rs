@@ -12,6 +12,7 @@ mod flow;
 mod output;
 mod progress;
 mod retrieve;
+mod retrieved;
 mod sweep;
 mod wake;
 
@@ -234,10 +235,14 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     let files = write::write(&plan, &outcome, &io.out, existing)?;
     let summary = outcome.summary();
     let mut text: Vec<String> = summary.iter().map(|line| format!("{:<44} {}", line.text, shown(line.value))).collect();
+    text.extend(outcome.retrieval.as_ref().map(retrieved::text));
     text.push(format!("wrote {} files to {}", files.len(), io.out.display()));
     let values: serde_json::Map<String, Value> = summary.iter().map(|l| (l.key.to_owned(), json!(l.value))).collect();
     let mut object = plan_json(&plan);
     object["results"] = Value::Object(values);
+    if let Some(retrieval) = &outcome.retrieval {
+        object["retrieval"] = retrieved::as_json(retrieval);
+    }
     object["files"] = json!(files);
     say(cli.json, &object, &text.join("\n"))
 }

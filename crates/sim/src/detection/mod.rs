@@ -184,6 +184,15 @@ impl Calibration {
         10 * one < both
     }
 
+    /// Tests a scan that the calibration is for.
+    ///
+    /// # Errors
+    /// What the test refuses.
+    pub(crate) fn of_scan(&self, scan: &ScanMap, settings: &DetectionSettings) -> Result<ScanDetection, Error> {
+        let (map, outliers, velocities) = cleaned(scan, settings);
+        self.test(&map, (outliers, velocities))
+    }
+
     fn test(&self, map: &ScanMap, (outliers, velocities): (usize, usize)) -> Result<ScanDetection, Error> {
         let statistic = self.detector.statistic(map.velocity_m_s.view())?;
         Ok(ScanDetection {
@@ -240,8 +249,7 @@ pub fn detect(
 ) -> Result<(Vec<ScanDetection>, Option<Calibration>), Error> {
     let (mut found, mut calibrations) = (Vec::with_capacity(scans.len()), Vec::<Calibration>::new());
     for scan in scans {
-        let (map, outliers) = without_spikes(&strided(scan, settings.stride), settings.options.turbulence.as_ref());
-        let velocities = map.velocity_m_s.iter().filter(|v| v.is_finite()).count();
+        let (map, outliers, velocities) = cleaned(scan, settings);
         if !calibrations.last().is_some_and(|known| known.is_for(&map)) {
             // the first is kept for its curves, the last for the next scan
             calibrations.truncate(1);
@@ -253,6 +261,15 @@ pub fn detect(
     }
     calibrations.truncate(1);
     Ok((found, calibrations.pop()))
+}
+
+/// What is tested of a scan, and how many outliers and velocities there are: outliers are told by all neighbours, before lines and
+/// gates are left out.
+fn cleaned(scan: &ScanMap, settings: &DetectionSettings) -> (ScanMap, usize, usize) {
+    let (map, outliers) = without_spikes(scan, settings.options.turbulence.as_ref());
+    let map = strided(&map, settings.stride);
+    let velocities = map.velocity_m_s.iter().filter(|v| v.is_finite()).count();
+    (map, outliers, velocities)
 }
 
 /// Every so many lines and gates of a map.

@@ -40,7 +40,7 @@ impl SceneNoise {
     /// What the crates refuse.
     pub fn new(plan: &Plan, observer: &dyn Observer) -> Result<Self, Error> {
         let mut scene = plan.scene.scene.clone();
-        scene.flow = Flow::Calm {};
+        (scene.flow, scene.retrieval) = (Flow::Calm {}, None);
         scene.scan.realisations = SCANS;
         let middle_rad = 0.5 * (scene.scan.elevation_min_rad + scene.scan.elevation_max_rad);
         let half_rad = 0.5 * LINES * scene.scan.elevation_step_rad;
@@ -147,7 +147,7 @@ mod tests {
         (scene.scan.pulses_per_line, scene.scan.realisations) = (1, 8);
         let plan = |scene: &Scene| Plan::new(SceneFile::new(scene.clone()).unwrap(), Target::Map).unwrap();
         let noise = SceneNoise::new(&plan(&scene), &Silent).unwrap();
-        scene.flow = Flow::Calm {};
+        (scene.flow, scene.retrieval) = (Flow::Calm {}, None);
         let std_m_s = run(&plan(&scene), &Silent).unwrap().map.unwrap().std_m_s;
         let of_run = (std_m_s.iter().map(|std| std * std).sum::<f64>() / std_m_s.len() as f64).sqrt();
         let found = (noise.sigma_m_s.iter().map(|std| std * std).sum::<f64>() / noise.sigma_m_s.len() as f64).sqrt();

@@ -231,19 +231,9 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     Ok(truth)
 }
 
-/// Runs the estimates of all realisations; the records of those that the files will have go to `kept`, too, piece after piece.
-pub(crate) fn estimate<S: Sample + wakescope_signal::scan::Sample>(
-    plan: &Plan,
-    scanner: &Scanner<'_>,
-    observer: &dyn Observer,
-    kept: impl FnMut(ArrayView2<'_, S>),
-) -> Result<VelocityEstimates, Error> {
-    let map = estimates(&[plan], scanner, observer, kept, |_, _| ())?.pop();
-    Ok(map.ok_or(wakescope_estimate::Error::Empty { field: "plans" })?)
-}
-
-/// The same for several plans that differ in their estimators alone: the signals of each realisation are made once. `seen` is
-/// given the place of the plan and the velocities, m/s, of each map as it comes.
+/// Runs the estimates of all realisations, of several plans that differ in their estimators alone: the signals of each are made
+/// once. The records of those that the files will have go to `kept`, too, piece after piece; `seen` is given the place of the plan
+/// and the velocities, m/s, of each map as it comes.
 pub(crate) fn estimates<S: Sample + wakescope_signal::scan::Sample>(
     plans: &[&Plan],
     scanner: &Scanner<'_>,

@@ -20,6 +20,7 @@ pub mod beam_winds;
 pub mod bound;
 pub mod budget;
 pub mod cell_average;
+pub(crate) mod described;
 pub(crate) mod efficiencies;
 pub mod estimators;
 pub mod geometry;

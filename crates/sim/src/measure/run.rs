@@ -9,6 +9,7 @@ use crate::measure::progress::Observer;
 use crate::measure::region::of_table;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage, Target};
+use crate::retrieve::realisations::{SceneRetrieval, of_realisations};
 use crate::scene::DetectorSignal;
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex;
@@ -29,6 +30,8 @@ pub struct RunResult {
     pub line_velocity_m_s: Option<Array2<f64>>,
     /// The velocity map with its errors.
     pub map: Option<VelocityEstimates>,
+    /// Vortices of all realisations against those of the flow.
+    pub retrieval: Option<SceneRetrieval>,
     /// What comes back from the middle of the scan.
     pub middle: Option<ScanMiddle>,
 }
@@ -118,7 +121,16 @@ fn signals_and_map<S: Sample + wakescope_signal::scan::Sample>(
         }
     };
     if plan.runs(Stage::Estimates) {
-        result.map = Some(map::estimate(plan, scanner, observer, keep)?);
+        let mut maps = Vec::new();
+        let seen = |_, velocity_m_s: &Array2<f64>| {
+            if plan.runs(Stage::Retrieval) {
+                maps.push(velocity_m_s.clone());
+            }
+        };
+        result.map = map::estimates(&[plan], scanner, observer, keep, seen)?.pop();
+        if plan.runs(Stage::Retrieval) {
+            result.retrieval = of_realisations::<S>(plan, scanner, &maps, observer)?;
+        }
     } else {
         let steps = (plan.realisations() * plan.geometry.elevation_rad.len()) as u64;
         observer.begin(Stage::Signals, steps);

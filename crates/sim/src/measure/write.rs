@@ -8,7 +8,6 @@ mod recorded;
 
 pub use limits::{Contents, check};
 pub use map::velocity_map;
-pub(crate) use map::{pulse_info, site};
 pub use recorded::{recorded_names, write_recorded};
 
 use crate::Error;
@@ -116,6 +115,10 @@ pub fn names(plan: &Plan) -> Vec<String> {
         let plans = *pattern != Pattern::default();
         add("scan", &[(pictures[0].0 && plans, "svg"), (pictures[1].0 && plans, "png")]);
     }
+    if plan.runs(Stage::Retrieval) {
+        add("retrieval", &[(o.csv, "csv")]);
+        add("retrieval_summary", &[(o.csv, "csv")]);
+    }
     out
 }
 
@@ -188,6 +191,10 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
                 pictures::add(&mut files, plan, "scan", &pictures::scan(plan), &origin)?;
             }
         }
+    }
+    if let Some(retrieval) = result.retrieval.as_ref().filter(|_| outputs.csv) {
+        files.add("retrieval.csv", retrieval.table().to_csv(&origin)?)?;
+        files.add("retrieval_summary.csv", retrieval.error_table().to_csv(&origin)?)?;
     }
     Ok(files)
 }

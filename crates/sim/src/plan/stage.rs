@@ -37,6 +37,8 @@ pub enum Stage {
     Estimates,
     /// Estimates against the truth.
     Errors,
+    /// Vortices from maps and signals.
+    Retrieval,
     /// Tables and pictures.
     Files,
 }
@@ -54,6 +56,7 @@ impl Stage {
             Stage::Noise => "noise",
             Stage::Estimates => "estimates",
             Stage::Errors => "errors",
+            Stage::Retrieval => "retrieval",
             Stage::Files => "files",
         }
     }

@@ -9,7 +9,7 @@ use super::stage::{PlannedStage, Stage, Target, run, skip};
 use crate::measure::geometry::Geometry;
 use crate::measure::scan::{AIRS_BYTES, records_at_once};
 use crate::measure::wind::SceneWind;
-use crate::scene::{Flow, Method, NoiseKind, RegionRadius, Scene, WindOfPulses};
+use crate::scene::{Flow, Method, NoiseKind, RegionRadius, RetrievalMethod, Scene, WindOfPulses};
 
 // Unit costs on one core, s.
 const ANALYTIC_WIND_S: f64 = 7e-8;
@@ -28,6 +28,13 @@ const NEW_BYTE_S: f64 = 2.5e-10;
 const SPECTRUM_LAG_S: f64 = 6e-11;
 const SPECTRUM_POINT_S: f64 = 6e-9;
 const TRUTH_LAYER_S: f64 = 5e-10;
+const FITTED_CELL_S: f64 = 2e-4;
+const RV_CELL_S: f64 = 2e-5;
+const FITTED_SAMPLE_S: f64 = 3e-4;
+/// Of the test for a wake: scans of still air, empty scans.
+const TEST_S: f64 = 3.0;
+/// Numbers of a cell that fits hold.
+const RETRIEVED_NUMBERS: f64 = 60.0;
 
 /// All stages, in the order in which they run.
 pub(super) fn stages(
@@ -50,8 +57,29 @@ pub(super) fn stages(
             _ => [estimates(scene, g, &n), errors(scene, g, &n)],
         });
     }
+    out.extend(retrieval(scene, target, &n));
     out.push(files(scene, target, g, &n));
     out
+}
+
+/// Vortices of every realisation, if the scene asks for them.
+fn retrieval(scene: &Scene, target: Target, n: &Sizes) -> Option<PlannedStage> {
+    let wanted = scene.retrieval.as_ref().filter(|_| target == Target::Run)?;
+    let record_s = n.layers * LAYER_OF_RECORD_S + n.samples * (n.layers_per_sample * LAYER_OF_SAMPLE_S + SAMPLE_S);
+    let of_method = |method: &RetrievalMethod| match method {
+        RetrievalMethod::Fit | RetrievalMethod::Integral | RetrievalMethod::Envelope => n.cells * FITTED_CELL_S,
+        RetrievalMethod::Rv => n.cells * RV_CELL_S,
+        RetrievalMethod::Signals => n.cells * FITTED_CELL_S + n.records * (record_s + n.samples * FITTED_SAMPLE_S),
+    };
+    let scan_s: f64 = wanted.methods.iter().map(of_method).sum();
+    let test_s = if wanted.false_alarm.is_some() { TEST_S } else { 0.0 };
+    let signals = if wanted.methods.contains(&RetrievalMethod::Signals) { 3.0 } else { 0.0 };
+    let working =
+        n.cells * 8.0 * (n.realisations + RETRIEVED_NUMBERS) + signals * n.records * n.samples * n.parts * 8.0;
+    let names: Vec<&str> = wanted.methods.iter().map(|method| crate::retrieve::summary::name(*method)).collect();
+    let reason = format!("{} scans by {}", n.realisations, names.join(", "));
+    let kept = n.realisations * wanted.methods.len() as f64 * 600.0;
+    Some(run(Stage::Retrieval, reason, n.realisations * scan_s + test_s, [working, kept]))
 }
 
 /// Time of the wind at one point, s.

@@ -2,7 +2,7 @@
 //!
 //! Check: circulations of maps and signals of a pair within their stated deviations.
 
-use super::{RetrievedScan, refused};
+use super::retrieved_scan::{RetrievedScan, refused};
 use crate::Error;
 use crate::io::raw::RawRecords;
 use crate::io::scans::ReadScan;
@@ -12,13 +12,14 @@ use crate::measure::response::{SceneResponse, correlated_lines, gate_step};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::scene::{DetectorSignal, Scene};
-use ndarray::{Array2, Axis};
+use ndarray::{Array2, ArrayView2, Axis};
 use num_complex::Complex;
 use wakescope_estimate::retrieval::{Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
 use wakescope_estimate::vortex_fit::{
     MapFitOptions, Parameter, Sharing, SignalFit, SignalFitOptions, VelocityMap, Wake, fit_map_of_estimator,
     fit_signals,
 };
+use wakescope_estimate::window::Sample;
 
 /// A top so much above the least chi-square competes with it.
 const COMPETES: f64 = 9.0;
@@ -41,6 +42,14 @@ impl OwnScene {
         let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
         let response = SceneResponse::new(&scene, &plan.instrument, layers);
         Ok(response.map(|response| Self { scene, response, noise_power_a2 }))
+    }
+
+    /// The same for a plan whose lines are there.
+    pub(super) fn of_scanner(plan: &Plan, scanner: &Scanner<'_>) -> Option<Self> {
+        let scene = plan.scene.scene.clone();
+        let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
+        let response = SceneResponse::new(&scene, &plan.instrument, scanner.layer_snr())?;
+        Some(Self { scene, response, noise_power_a2 })
     }
 
     /// Expected signal-to-noise ratio in the band at the middle of a wake, a power ratio.
@@ -108,26 +117,41 @@ fn of_samples<S: FromParts>(
     measured: &MeasuredScan,
     found: RetrievedScan,
 ) -> Result<RetrievedScan, Error> {
-    let Some(guess) = found.result.wake.filter(|_| found.result.vortices.len() == 2) else { return Ok(found) };
-    let RetrievedScan { scan, options, result } = found;
     let (range, elevation_rad) = measured.lines.all_records();
     let samples: Array2<S> = crate::measure::recorded::samples(records, range)?;
-    let setup = own.response.setup(&own.scene, options.model, elevation_rad)?;
-    let snr = |range_m: f64, _: f64| own.response.snr_at(range_m);
-    let fit_options = SignalFitOptions { free: options.free, ..SignalFitOptions::default() };
-    let fit = fit_signals(&setup, snr, samples.view(), own.noise_power_a2, &guess, &fit_options)
-        .map_err(|error| refused(&scan, &error))?;
-    let SignalFit { wake, covariance, tops, log_likelihood_gain, used_rays, .. } = fit;
-    let best = tops.iter().map(|top| top.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
-    let tops = tops.iter().map(|top| Top { wake: top.wake, chi2: 2.0 * (best - top.log_likelihood) }).collect();
-    let mut result = retold(&result, &options, (wake, covariance), tops);
-    if options.free.core_radius == Sharing::Fixed {
-        keep_cores(&mut result);
+    own.of_records(samples.view(), elevation_rad, found)
+}
+
+impl OwnScene {
+    /// The fit to the records of lines at those elevations, rad; the wake of their map starts it.
+    ///
+    /// # Errors
+    /// What the fit refuses.
+    pub(super) fn of_records<S: Sample>(
+        &self,
+        samples: ArrayView2<'_, S>,
+        elevation_rad: Vec<f64>,
+        found: RetrievedScan,
+    ) -> Result<RetrievedScan, Error> {
+        let Some(guess) = found.result.wake.filter(|_| found.result.vortices.len() == 2) else { return Ok(found) };
+        let RetrievedScan { scan, options, result } = found;
+        let setup = self.response.setup(&self.scene, options.model, elevation_rad)?;
+        let snr = |range_m: f64, _: f64| self.response.snr_at(range_m);
+        let fit_options = SignalFitOptions { free: options.free, ..SignalFitOptions::default() };
+        let fit = fit_signals(&setup, snr, samples, self.noise_power_a2, &guess, &fit_options)
+            .map_err(|error| refused(&scan, &error))?;
+        let SignalFit { wake, covariance, tops, log_likelihood_gain, used_rays, .. } = fit;
+        let best = tops.iter().map(|top| top.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
+        let tops = tops.iter().map(|top| Top { wake: top.wake, chi2: 2.0 * (best - top.log_likelihood) }).collect();
+        let mut result = retold(&result, &options, (wake, covariance), tops);
+        if options.free.core_radius == Sharing::Fixed {
+            keep_cores(&mut result);
+        }
+        result.statistic = 2.0 * log_likelihood_gain;
+        (result.cells_used, result.cells_rejected) = (used_rays, setup.elevation_rad.len() - used_rays);
+        result.chi2_per_dof = f64::NAN;
+        Ok(RetrievedScan { scan, options, result })
     }
-    result.statistic = 2.0 * log_likelihood_gain;
-    (result.cells_used, result.cells_rejected) = (used_rays, setup.elevation_rad.len() - used_rays);
-    result.chi2_per_dof = f64::NAN;
-    Ok(RetrievedScan { scan, options, result })
 }
 
 /// The middle of both vortices, m.

@@ -2,7 +2,7 @@
 //!
 //! Check: rows of no wake, one vortex and two.
 
-use super::RetrievedScan;
+use super::retrieved_scan::RetrievedScan;
 use crate::io::Table;
 use wakescope_estimate::retrieval::{Measured, ScanResult, Side, VortexResult};
 

@@ -5,6 +5,7 @@
 
 use super::check_estimator::check_estimator;
 use super::check_flow::check_flow;
+use super::retrieval::check_retrieval;
 use super::{Digitiser, EfficiencyOfPulse, FORMAT, PulseShape, Scan, Scene, SnrReference, Turbulence};
 use crate::keys::{Checker, Problem};
 use std::f64::consts::FRAC_PI_2;
@@ -30,6 +31,7 @@ impl Scene {
         self.check_scan(&mut c);
         self.check_pattern(&mut c);
         check_estimator(self, &mut c);
+        check_retrieval(self, &mut c);
         self.check_outputs(&mut c);
         self.check_site(&mut c);
         // Limits between keys make sense only once each key does.

@@ -36,6 +36,7 @@ mod pattern;
 mod presets;
 mod read;
 mod receiver;
+mod retrieval;
 
 pub use crate::keys::{Located, Problem, SceneError};
 pub use atmosphere::{
@@ -60,6 +61,7 @@ pub use pattern::{
 pub use presets::{preset_names, preset_toml};
 pub use read::SceneFile;
 pub use receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, SecondTrip};
+pub use retrieval::{FollowingAircraft, LiftSlope, Retrieval, RetrievalMethod};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -99,6 +101,9 @@ section! {
         scan: Scan = Scan::default(),
         /// From signals to velocities.
         estimator: Estimator = Estimator::default(),
+        /// Vortices from each realisation; absent: none are looked for.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        retrieval: Option<Retrieval> = None,
         /// What is written.
         outputs: Outputs = Outputs::default(),
         /// Place and date, for the files.

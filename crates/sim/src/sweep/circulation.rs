@@ -38,7 +38,7 @@ pub(super) struct Retrieval<'p> {
 }
 
 impl<'p> Retrieval<'p> {
-    /// For a case; nothing where the flow is no pair that turns, or the pulse is no Gaussian without chirp.
+    /// For a case; nothing where the flow is no pair that turns, the lines are not in one plane, or the pulse is no Gaussian without chirp.
     pub(super) fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Option<Self> {
         let scene = &plan.scene.scene;
         let Flow::VortexPair(pair) = scene.flow else { return None };

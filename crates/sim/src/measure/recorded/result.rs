@@ -8,8 +8,8 @@ use super::lines::ScanLines;
 use super::predicted::PredictedDeviation;
 use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
+use crate::measure::described::{pulse_info, site};
 use crate::measure::map_estimator::snr_db;
-use crate::measure::write::{pulse_info, site};
 use crate::plan::Plan;
 use ndarray::{Array2, Axis, concatenate};
 

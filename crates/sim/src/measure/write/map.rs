@@ -2,10 +2,10 @@
 //! Check: the tests of the program read the files.
 
 use crate::beams::SweepMode;
-use crate::io::{Field, PulseInfo, Ray, Site, Sweep, Unit, UtcTime, VelocityMap};
+use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
+use crate::measure::described::{pulse_info, site};
 use crate::measure::map::VelocityEstimates;
 use crate::plan::Plan;
-use crate::scene::Scene;
 use std::f64::consts::FRAC_PI_2;
 
 /// Fields that say how good the mean estimate is.
@@ -96,28 +96,5 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         flight: (!across).then_some((mount.position_m[0], zero_rad - from_x_rad)),
         site: site(scene),
         is_simulated: true,
-    }
-}
-
-/// Pulse and acquisition of a scene.
-pub(crate) fn pulse_info(scene: &Scene) -> PulseInfo {
-    PulseInfo {
-        prt_s: 1.0 / scene.laser.pulse_repetition_hz,
-        pulse_width_s: scene.pulse_width_s(),
-        nyquist_velocity_m_s: 0.25 * scene.laser.wavelength_m * scene.detector.sampling_hz,
-        samples: scene.scan.pulses_per_line as u32,
-        frequency_hz: crate::SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m,
-    }
-}
-
-/// The site of a checked scene.
-pub(crate) fn site(scene: &Scene) -> Site {
-    let s = &scene.site;
-    Site {
-        name: s.name.clone(),
-        latitude_deg: s.latitude_deg,
-        longitude_deg: s.longitude_deg,
-        altitude_m: s.altitude_m,
-        start: UtcTime::parse(&s.start_utc).unwrap_or(UtcTime::SYNTHETIC),
     }
 }

@@ -1,0 +1,252 @@
+//! Retrieval from every realisation of a scene, by each of its methods, held against the truth of the flow.
+//!
+//! Check: bias and scatter of a pair; a method that fails is counted; the test for a wake keeps its rate.
+
+use super::gate::gate_of;
+use super::one_scan::retrieve_map;
+use super::own::OwnScene;
+use super::retrieved_scan::RetrievedScan;
+use super::truth::{TrueVortex, core_profile, true_vortices, true_wake};
+use crate::Error;
+use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
+use crate::io::scans::ReadScan;
+use crate::measure::progress::{Observer, Silent};
+use crate::measure::scan::Scanner;
+use crate::plan::{Plan, Stage};
+use crate::scene::{Flow, FollowingAircraft, LiftSlope as Slope, Retrieval, RetrievalMethod as Method, Scene};
+use ndarray::{Array2, ArrayView2};
+use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, VortexResult, circulation_profile};
+use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Follower, LiftSlope, Sharing, Wake, WakeModel};
+use wakescope_estimate::window::Sample;
+
+/// Radii of the circulation from integrals over the map, m.
+const RADII_M: [f64; 11] = [5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
+/// Empty scans of the test for a wake.
+const EMPTY_SCANS: usize = 10_000;
+
+/// One vortex of one realisation by one method.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RetrievalRow {
+    /// Number of the realisation, from 0.
+    pub realisation: usize,
+    /// How it was found.
+    pub method: Method,
+    /// Which vortex.
+    pub side: Side,
+    /// What was found; nothing where the method failed or found no such vortex.
+    pub found: Option<VortexResult>,
+    /// The truth.
+    pub truth: TrueVortex,
+    /// Rolling-moment coefficient of the aircraft in that vortex, found and true; NaN without an aircraft, or where it is unknown.
+    pub rolling_moment: (f64, f64),
+    /// Sum of squares of the residuals per degree of freedom.
+    pub chi2_per_dof: f64,
+    /// Names of what is to be thought of the result.
+    pub flags: String,
+}
+
+/// What retrievals gave in all realisations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneRetrieval {
+    /// A row for each realisation, method and vortex.
+    pub rows: Vec<RetrievalRow>,
+    /// Statistic and threshold of the test of each map for a wake, if the scene asks for it.
+    pub tests: Vec<(f64, f64)>,
+}
+
+/// Retrieves the maps of all realisations, and their signals where a method needs them.
+///
+/// # Errors
+/// What the crates refuse; a fit that does not come to an end is none.
+pub(crate) fn of_realisations<S: Sample + wakescope_signal::scan::Sample>(
+    plan: &Plan,
+    scanner: &Scanner<'_>,
+    maps: &[Array2<f64>],
+    observer: &dyn Observer,
+) -> Result<Option<SceneRetrieval>, Error> {
+    let scene = &plan.scene.scene;
+    let Some(wanted) = &scene.retrieval else { return Ok(None) };
+    let truth = true_vortices(plan)?;
+    let own = OwnScene::of_scanner(plan, scanner);
+    let options = options(scene, wanted)?;
+    let mut tests = Vec::new();
+    if let Some(false_alarm) = wanted.false_alarm {
+        tests = self::tests(plan, &options, false_alarm, maps, observer)?;
+    }
+    observer.begin(Stage::Retrieval, (maps.len() * wanted.methods.len()) as u64);
+    let mut rows = Vec::new();
+    for (realisation, velocity_m_s) in maps.iter().enumerate() {
+        for &method in &wanted.methods {
+            let scan = read_scan(plan, velocity_m_s);
+            let found = match (method, &own) {
+                (Method::Signals, Some(own)) => of_signals::<S>(
+                    plan,
+                    scanner,
+                    own,
+                    realisation,
+                    retrieve_map(scan, method, options.clone(), Some(own)),
+                ),
+                _ => retrieve_map(scan, method, options.clone(), own.as_ref()),
+            };
+            let found = found.and_then(|found| if method == Method::Integral { integral(found) } else { Ok(found) });
+            rows.extend(rows_of(scene, (realisation, method), &truth, found.ok().as_ref(), &options.model)?);
+            observer.advance(1);
+        }
+    }
+    observer.end();
+    Ok(Some(SceneRetrieval { rows, tests }))
+}
+
+/// How the scans of a scene are retrieved: its gates, ground and profile, cores fitted unless the scene keeps them.
+fn options(scene: &Scene, wanted: &Retrieval) -> Result<RetrievalOptions, Error> {
+    let profile = match scene.flow {
+        Flow::VortexPair(pair) => core_profile(pair.profile),
+        _ => CoreProfile::Algebraic,
+    };
+    let mut options = RetrievalOptions {
+        model: WakeModel { profile, lidar_height_m: scene.scan.lidar_height_m, ..WakeModel::default() },
+        gate: gate_of(None, None, Some(scene))?.0,
+        core_radius_m: wanted.core_radius_m,
+        core_prior: Some(CorePrior::TYPICAL),
+        ..RetrievalOptions::default()
+    };
+    if wanted.core_radius_m.is_some() {
+        options.free.core_radius = Sharing::Fixed;
+    }
+    Ok(options)
+}
+
+/// A map of one realisation as a scan.
+fn read_scan(plan: &Plan, velocity_m_s: &Array2<f64>) -> ReadScan {
+    let g = &plan.geometry;
+    ReadScan {
+        path: "retrieval".into(),
+        sweep: 0,
+        map: ScanMap {
+            elevation_rad: g.elevation_rad.clone(),
+            time_s: g.line_time_s.iter().map(|t| plan.wind.start_s + t).collect(),
+            range_m: g.gate_range_m.clone(),
+            velocity_m_s: velocity_m_s.clone(),
+            sigma_m_s: None,
+            fold_m_s: None,
+        },
+        reference: None,
+        gate_length_m: None,
+        pulse_width_s: None,
+        scene_toml: None,
+        is_own: true,
+    }
+}
+
+/// The fit to all signals of a realisation, which are made again; the wake of the map starts it.
+fn of_signals<S: Sample + wakescope_signal::scan::Sample>(
+    plan: &Plan,
+    scanner: &Scanner<'_>,
+    own: &OwnScene,
+    realisation: usize,
+    of_map: Result<RetrievedScan, Error>,
+) -> Result<RetrievedScan, Error> {
+    let of_map = of_map?;
+    let mut samples: Vec<S> = Vec::with_capacity(scanner.pulses() * plan.geometry.samples);
+    scanner.in_pieces::<S>(realisation, &Silent, |_, records| {
+        samples.extend(records.iter().copied());
+        Ok(())
+    })?;
+    let samples = ArrayView2::from_shape((scanner.pulses(), plan.geometry.samples), &samples)
+        .map_err(|_| wakescope_estimate::Error::Empty { field: "records of a realisation" })?;
+    let per_line = plan.scene.scene.scan.pulses_per_line;
+    let rays = |line: &f64| std::iter::repeat_n(*line, per_line);
+    let elevation_rad = plan.geometry.elevation_rad.iter().flat_map(rays).collect();
+    let vortices = of_map.result.vortices.len();
+    let found = own.of_records(samples, elevation_rad, of_map)?;
+    if vortices < 2 {
+        let reason = "the map shows no pair for the fit of the signals to start from".into();
+        return Err(Error::Input { path: "retrieval".into(), reason });
+    }
+    Ok(found)
+}
+
+/// The circulation over 5 to 15 m by integrals over the map itself, not corrected.
+fn integral(mut found: RetrievedScan) -> Result<RetrievedScan, Error> {
+    let Some(wake) = found.result.wake else { return Ok(found) };
+    for vortex in &mut found.result.vortices {
+        let profile = circulation_profile(&found.scan.map, &wake, vortex.side, &RADII_M, &found.options)?;
+        let value = profile.iter().map(|point| point.across_m2_s).sum::<f64>() / profile.len() as f64;
+        vortex.circulation_5_15_m2_s = Measured { value, std: f64::NAN };
+        vortex.circulation_m2_s = Measured { value: f64::NAN, std: f64::NAN };
+    }
+    Ok(found)
+}
+
+fn rows_of(
+    scene: &Scene,
+    (realisation, method): (usize, Method),
+    truth: &[TrueVortex; 2],
+    found: Option<&RetrievedScan>,
+    model: &WakeModel,
+) -> Result<[RetrievalRow; 2], Error> {
+    let follower = scene.retrieval.as_ref().and_then(|r| r.follower).map(follower);
+    let moment = |wake: Option<Wake>, at: Option<(f64, f64)>| match (&follower, wake.zip(at)) {
+        // the coefficient is known for the profile (3)
+        (Some(follower), Some((wake, at))) if model.profile == CoreProfile::Algebraic => {
+            follower.rolling_moment(model, &wake, at)
+        }
+        _ => Ok(f64::NAN),
+    };
+    let row = |side: Side, truth_of: TrueVortex| -> Result<RetrievalRow, Error> {
+        let vortex = found.and_then(|found| found.result.vortex(side).copied());
+        let wake = found.and_then(|found| found.result.wake);
+        let place = |v: VortexResult| (v.lateral_position_m.value, v.height_m.value);
+        let at_truth = (truth_of.lateral_position_m, truth_of.height_m);
+        let flags = found.map_or(Vec::new(), |found| found.result.flags.iter().map(|flag| flag.name()).collect());
+        Ok(RetrievalRow {
+            realisation,
+            method,
+            side,
+            found: vortex,
+            truth: truth_of,
+            rolling_moment: (moment(wake, vortex.map(place))?, moment(true_wake(truth), Some(at_truth))?),
+            chi2_per_dof: found.map_or(f64::NAN, |found| found.result.chi2_per_dof),
+            flags: flags.join(" "),
+        })
+    };
+    Ok([row(Side::Left, truth[0])?, row(Side::Right, truth[1])?])
+}
+
+fn follower(aircraft: FollowingAircraft) -> Follower {
+    let FollowingAircraft { span_m, aspect_ratio, speed_m_s, slope } = aircraft;
+    let slope = match slope {
+        Slope::Span => LiftSlope::Span,
+        Slope::Semispan => LiftSlope::Semispan,
+    };
+    Follower { span_m, aspect_ratio, speed_m_s, slope }
+}
+
+/// Tests of all maps for a wake, calibrated on the noise of the scene.
+fn tests(
+    plan: &Plan,
+    options: &RetrievalOptions,
+    false_alarm: f64,
+    maps: &[Array2<f64>],
+    observer: &dyn Observer,
+) -> Result<Vec<(f64, f64)>, Error> {
+    let noise = SceneNoise::new(plan, observer)?;
+    let settings = DetectionSettings {
+        false_alarm,
+        model: options.model,
+        gate: options.gate.clone(),
+        empty_scans: EMPTY_SCANS,
+        stride: noise.stride,
+        seed: plan.scene.scene.seed,
+        ..DetectionSettings::default()
+    };
+    let empty = noise.empty_scan(plan);
+    let calibration = Calibration::new(&strided(&empty, settings.stride), &settings)?;
+    maps.iter()
+        .map(|map| {
+            let scan = ScanMap { velocity_m_s: map.clone(), ..empty.clone() };
+            let found = calibration.of_scan(&scan, &settings)?;
+            Ok((found.statistic.value, found.threshold))
+        })
+        .collect()
+}

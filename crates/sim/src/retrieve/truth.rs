@@ -1,0 +1,249 @@
+//! The vortices of the air that a scan saw: each where it was when the line of sight passed it.
+//!
+//! An analytic pair is known exactly. In a simulated flow the truth is that of the scanned plane at that time: the centroid of the
+//! vorticity of the vortex's own sign within 0.15 of the spacing, and the circulation on circles of 5 to 15 m about it. Check: the
+//! pair's own vortices, found in its wind as if that were simulated.
+
+use crate::Error;
+use crate::measure::wind::vortex_pair;
+use crate::plan::Plan;
+use crate::scene::{Flow, VortexProfile};
+use wakescope_estimate::retrieval::Side;
+use wakescope_estimate::vortex_fit::{CoreProfile, Vortex, Wake};
+use wakescope_les::analysis::mean_circulation_5_15_m2_s;
+
+/// Distance of the points at which vorticity is looked for, m, first and about a centre.
+const COARSE_M: f64 = 2.0;
+const FINE_M: f64 = 0.5;
+/// Points of a circle.
+const CIRCLE: usize = 128;
+/// Vorticity counts within this part of the spacing.
+const REACH_OVER_SPACING: f64 = 0.15;
+/// Most rounds to a centre or a time.
+const ROUNDS: usize = 20;
+
+/// One vortex of the air.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrueVortex {
+    /// Time from the start of the flow at which a line passes its centre, s.
+    pub time_s: f64,
+    /// Circulation, m^2/s; NaN in a simulated flow, where it depends on the radius.
+    pub circulation_m2_s: f64,
+    /// Its mean over radii of 5 to 15 m, m^2/s.
+    pub circulation_5_15_m2_s: f64,
+    /// Lateral coordinate of the centre, m.
+    pub lateral_position_m: f64,
+    /// Height of the centre, m.
+    pub height_m: f64,
+    /// Core radius, m; NaN in a simulated flow.
+    pub core_radius_m: f64,
+}
+
+/// Both vortices, left and right.
+///
+/// # Errors
+/// A simulated flow in which no vortices are found; what the wind refuses.
+pub(crate) fn true_vortices(plan: &Plan) -> Result<[TrueVortex; 2], Error> {
+    match &plan.scene.scene.flow {
+        Flow::VortexPair(pair) => {
+            let (air, profile) = (vortex_pair(pair), core_profile(pair.profile));
+            let of = |side: Side| -> Result<TrueVortex, Error> {
+                let centre = |time_s: f64| {
+                    let centres = air.centres(time_s);
+                    let y_m = if side == Side::Left { centres.left_y_m } else { centres.right_y_m };
+                    Ok((y_m, centres.height_m))
+                };
+                let ((lateral_position_m, height_m), time_s) = when_passed(plan, centre)?;
+                Ok(TrueVortex {
+                    time_s,
+                    circulation_m2_s: pair.circulation_m2_s,
+                    circulation_5_15_m2_s: pair.circulation_m2_s * profile.mean_5_15(pair.core_radius_m).0,
+                    lateral_position_m,
+                    height_m,
+                    core_radius_m: pair.core_radius_m,
+                })
+            };
+            Ok([of(Side::Left)?, of(Side::Right)?])
+        }
+        _ => Ok([simulated(plan, Side::Left)?, simulated(plan, Side::Right)?]),
+    }
+}
+
+/// Both vortices as a wake; nothing in a simulated flow.
+pub(crate) fn true_wake(truth: &[TrueVortex; 2]) -> Option<Wake> {
+    let vortex = |v: &TrueVortex| Vortex {
+        circulation_m2_s: v.circulation_m2_s,
+        lateral_position_m: v.lateral_position_m,
+        height_m: v.height_m,
+        core_radius_m: v.core_radius_m,
+    };
+    let [left, right] = truth.each_ref().map(vortex);
+    let wake = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
+    wake.validate().is_ok().then_some(wake)
+}
+
+/// The profile of a scene's vortices in the words of the fits.
+pub(crate) fn core_profile(profile: VortexProfile) -> CoreProfile {
+    match profile {
+        VortexProfile::Algebraic => CoreProfile::Algebraic,
+        VortexProfile::LambOseen => CoreProfile::LambOseen,
+    }
+}
+
+/// Place of a centre that moves, and the time, when the line of sight passes it.
+fn when_passed(plan: &Plan, centre: impl Fn(f64) -> Result<(f64, f64), Error>) -> Result<((f64, f64), f64), Error> {
+    let (g, lidar_m) = (&plan.geometry, plan.scene.scene.scan.lidar_height_m);
+    let mut time_s = 0.5 * (plan.wind.start_s + plan.scan_end_s());
+    let mut place_m = centre(time_s)?;
+    for _ in 0..ROUNDS {
+        let elevation_rad = (place_m.1 - lidar_m).atan2(place_m.0);
+        let away = |line: &usize| (g.elevation_rad[*line] - elevation_rad).abs();
+        let line = (0..g.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+        let next_s = plan.wind.start_s + line.map_or(0.0, |line| g.line_time_s[line]);
+        if next_s == time_s {
+            break;
+        }
+        time_s = next_s;
+        place_m = centre(time_s)?;
+    }
+    Ok((place_m, time_s))
+}
+
+fn simulated(plan: &Plan, side: Side) -> Result<TrueVortex, Error> {
+    let sense = if side == Side::Left { -1.0 } else { 1.0 };
+    let centre = |time_s: f64| {
+        let [left, right] = [-1.0, 1.0].map(|sense| strongest(plan, time_s, sense));
+        let (left, right) = (left?, right?);
+        let reach_m = REACH_OVER_SPACING * (left.0 - right.0).hypot(left.1 - right.1);
+        centroid(plan, time_s, if side == Side::Left { left } else { right }, sense, reach_m)
+    };
+    let ((lateral_position_m, height_m), time_s) = when_passed(plan, centre)?;
+    let mean_m2_s = mean_circulation_5_15_m2_s(plan.wind.wind(), [lateral_position_m, height_m], time_s, CIRCLE)?;
+    Ok(TrueVortex {
+        time_s,
+        circulation_m2_s: f64::NAN,
+        circulation_5_15_m2_s: sense * mean_m2_s,
+        lateral_position_m,
+        height_m,
+        core_radius_m: f64::NAN,
+    })
+}
+
+/// A place (y, z), m, and the vorticity there, 1/s.
+type PlaceAndVorticity = ((f64, f64), f64);
+
+/// Vorticity at points `step_m` apart in a box, where the wind is known: place and value, 1/s.
+fn vorticity(
+    plan: &Plan,
+    time_s: f64,
+    (low_m, high_m): ((f64, f64), (f64, f64)),
+    step_m: f64,
+) -> Result<Vec<PlaceAndVorticity>, Error> {
+    let count = |low: f64, high: f64| ((high - low) / step_m).ceil().max(0.0) as usize + 1;
+    let (columns, rows) = (count(low_m.0, high_m.0), count(low_m.1, high_m.1));
+    let place = |i: usize| (low_m.0 + (i % columns) as f64 * step_m, low_m.1 + (i / columns) as f64 * step_m);
+    let points_m: Vec<[f64; 3]> = (0..columns * rows).map(place).map(|(y, z)| [0.0, y, z]).collect();
+    let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
+    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
+    let mut found = Vec::new();
+    for row in 1..rows.saturating_sub(1) {
+        for column in 1..columns.saturating_sub(1) {
+            let i = row * columns + column;
+            let up = velocity_m_s[i + 1][2] - velocity_m_s[i - 1][2];
+            let across = velocity_m_s[i + columns][1] - velocity_m_s[i - columns][1];
+            let value = (up - across) / (2.0 * step_m);
+            if value.is_finite() {
+                found.push((place(i), value));
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// The place of the scan where the vorticity of a sign is strongest.
+fn strongest(plan: &Plan, time_s: f64, sense: f64) -> Result<(f64, f64), Error> {
+    let (scan, g) = (&plan.scene.scene.scan, &plan.geometry);
+    let top = g.elevation_rad.iter().fold(0.0_f64, |top, e| top.max(*e)).min(std::f64::consts::FRAC_PI_2);
+    let sector = (
+        (scan.range_min_m * top.cos(), COARSE_M),
+        (scan.range_max_m, scan.lidar_height_m + scan.range_max_m * top.sin()),
+    );
+    let all = vorticity(plan, time_s, sector, COARSE_M)?;
+    let best = all.into_iter().max_by(|a, b| (sense * a.1).total_cmp(&(sense * b.1))).filter(|(_, w)| sense * w > 0.0);
+    best.map(|(place, _)| place).ok_or_else(|| Error::Input {
+        path: "retrieval".into(),
+        reason: format!("the simulated flow has no vortex in the scanned plane at {time_s} s: it must lie in the scan"),
+    })
+}
+
+/// Centroid of the vorticity of a sign within `reach_m`, from a first place on.
+fn centroid(plan: &Plan, time_s: f64, first_m: (f64, f64), sense: f64, reach_m: f64) -> Result<(f64, f64), Error> {
+    let mut centre_m = first_m;
+    for _ in 0..ROUNDS {
+        let edge = reach_m + 2.0 * FINE_M;
+        let around = ((centre_m.0 - edge, centre_m.1 - edge), (centre_m.0 + edge, centre_m.1 + edge));
+        let (mut sum, mut y, mut z) = (0.0, 0.0, 0.0);
+        for ((at_y, at_z), value) in vorticity(plan, time_s, around, FINE_M)? {
+            let near = (at_y - centre_m.0).hypot(at_z - centre_m.1) <= reach_m;
+            let weight = if near { (sense * value).max(0.0) } else { 0.0 };
+            (sum, y, z) = (sum + weight, y + weight * at_y, z + weight * at_z);
+        }
+        if sum <= 0.0 {
+            break;
+        }
+        let next = (y / sum, z / sum);
+        let step = (next.0 - centre_m.0).hypot(next.1 - centre_m.1);
+        centre_m = next;
+        if step < 1e-3 * reach_m {
+            break;
+        }
+    }
+    Ok(centre_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Target;
+    use crate::scene::{Scene, SceneFile, SnrReference, VortexMotion};
+
+    fn plan(change: impl FnOnce(&mut crate::scene::VortexPair)) -> Plan {
+        let mut scene = Scene::default();
+        scene.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
+        if let Flow::VortexPair(pair) = &mut scene.flow {
+            change(pair);
+        }
+        Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap()
+    }
+
+    #[test]
+    fn vortices_of_a_pair_are_found_in_its_wind_as_if_that_were_simulated() {
+        let plan = plan(|_| ());
+        let truth = true_vortices(&plan).unwrap();
+        for (side, truth) in [Side::Left, Side::Right].into_iter().zip(truth) {
+            let found = simulated(&plan, side).unwrap();
+            let away = (found.lateral_position_m - truth.lateral_position_m).hypot(found.height_m - truth.height_m);
+            assert!(away < 0.3, "{found:?} {truth:?}");
+            // the other vortex has no circulation within 15 m
+            let ratio = found.circulation_5_15_m2_s / truth.circulation_5_15_m2_s;
+            assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+        }
+    }
+
+    #[test]
+    fn a_pair_that_moves_is_where_it_is_when_the_line_passes() {
+        let moving = plan(|pair| {
+            pair.motion = VortexMotion::Inviscid;
+            pair.age_tau = 0.5;
+        });
+        let [left, right] = true_vortices(&moving).unwrap();
+        let Flow::VortexPair(pair) = moving.scene.scene.flow else { unreachable!() };
+        let at = vortex_pair(&pair).centres(left.time_s);
+        assert_eq!((left.lateral_position_m, left.height_m), (at.left_y_m, at.height_m));
+        let line = moving.geometry.line_time_s.iter().position(|t| moving.wind.start_s + t == left.time_s).unwrap();
+        let elevation_rad = left.height_m.atan2(left.lateral_position_m);
+        assert!((moving.geometry.elevation_rad[line] - elevation_rad).abs() < 1.25e-3);
+        // the far one is lower in elevation, and so seen at another time
+        assert!(left.time_s != right.time_s);
+    }
+}

@@ -1,0 +1,149 @@
+//! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
+
+use super::{Flow, NoiseKind, Pattern, PulseShape, Scene};
+use crate::keys::Checker;
+use serde::{Deserialize, Serialize};
+
+/// How circulations are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "snake_case")]
+pub enum RetrievalMethod {
+    /// Fit of the wake to the map.
+    #[default]
+    Fit,
+    /// Fit of the wake to all raw signals.
+    Signals,
+    /// Radial-velocity method: places from extremes, circulations by linear least squares.
+    Rv,
+    /// Velocity envelopes of the spectra of raw signals about the wake that is fitted to their map.
+    Envelope,
+    /// Fit to the map, and circulation against radius by integrals over the map beside it.
+    Integral,
+}
+
+section! {
+    /// Vortices from each realisation, held against the truth of the flow.
+    Retrieval {
+        /// How circulations are found, each method beside the others.
+        methods: Vec<RetrievalMethod> = vec![RetrievalMethod::Fit],
+        /// Core radius that fits keep, m; fitted if absent.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        core_radius_m: Option<f64> = None,
+        /// Rate of false alarms of a scan at which the maps are tested for a wake; absent: no test.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        false_alarm: Option<f64> = None,
+        /// The aircraft that follows; absent: none.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        follower: Option<FollowingAircraft> = None,
+    }
+}
+
+section! {
+    /// An aircraft in the wake: rectangular wing, strip theory.
+    #[derive(Copy)]
+    FollowingAircraft {
+        /// Span of the wing, m.
+        span_m: f64 = 34.0,
+        /// Span squared over the area of the wing.
+        aspect_ratio: f64 = 9.4,
+        /// True air speed, m/s.
+        speed_m_s: f64 = 70.0,
+        /// Slope of the lift.
+        slope: LiftSlope = LiftSlope::Span,
+    }
+}
+
+/// Slope of the lift of a wing of aspect ratio A.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LiftSlope {
+    /// 2 pi A/(A + 2).
+    Span,
+    /// 2 pi A/(A + 4).
+    Semispan,
+}
+
+/// What a scene may say of its retrievals.
+pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
+    let Some(r) = &scene.retrieval else { return };
+    let key = "retrieval.methods";
+    let distinct = r.methods.iter().enumerate().all(|(i, method)| !r.methods[..i].contains(method));
+    let allowed =
+        "at least one of \"fit\", \"signals\", \"rv\", \"integral\", each once, for example [\"fit\", \"rv\"]";
+    c.require(distinct && !r.methods.is_empty(), key, &r.methods, allowed);
+    c.require(
+        !r.methods.contains(&RetrievalMethod::Envelope),
+        key,
+        "envelope",
+        "another method in a scene: envelopes need spectra of gates, which `wakescope retrieve signals.nc --method envelope` makes",
+    );
+    if let Some(core_m) = r.core_radius_m {
+        c.within("retrieval.core_radius_m", core_m, 1e-3, 1e3, "m");
+    }
+    if let Some(rate) = r.false_alarm {
+        c.within("retrieval.false_alarm", rate, 1e-9, 0.5, "");
+        let noise = scene.detector.noise != NoiseKind::None;
+        c.require(noise, "retrieval.false_alarm", rate, "absent where detector.noise = \"none\": nothing is by chance");
+    }
+    if let Some(f) = &r.follower {
+        c.within("retrieval.follower.span_m", f.span_m, 0.1, 1e3, "m");
+        c.within("retrieval.follower.aspect_ratio", f.aspect_ratio, 0.1, 1e3, "");
+        c.within("retrieval.follower.speed_m_s", f.speed_m_s, 0.1, 1e3, "m/s");
+    }
+    let scan = &scene.scan;
+    let plain =
+        scan.pattern == Pattern::default() && scan.head == Default::default() && scan.lidar == Default::default();
+    let upwards = "absent but for scan.pattern.kind = \"rhi\" with a head and a lidar that keep still: vortices are sought in a plane across \
+                   the flight";
+    c.require(plain, "retrieval", "a table", upwards);
+    let has_vortices = match &scene.flow {
+        Flow::VortexPair(pair) => pair.circulation_m2_s > 0.0,
+        Flow::Simulated(_) => true,
+        Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) | Flow::VortexLines(_) | Flow::Fields(_) => false,
+    };
+    let allowed = "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";
+    c.require(has_vortices, "retrieval", "a table", allowed);
+    let plain = matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
+    c.require(
+        !r.methods.contains(&RetrievalMethod::Signals) || (plain && scene.detector.noise != NoiseKind::None),
+        key,
+        "signals",
+        "another method where detector.noise = \"none\" or the pulse is sampled or has a chirp: their signals have no likelihood here",
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys(text: &str) -> Vec<String> {
+        toml::from_str::<Scene>(text).unwrap().problems().into_iter().map(|p| p.key).collect()
+    }
+
+    #[test]
+    fn retrievals_are_held_to_their_limits_and_need_vortices() {
+        assert!(
+            keys("[retrieval]\nmethods = [\"fit\", \"signals\", \"rv\", \"integral\"]\nfalse_alarm = 0.01\n")
+                .is_empty()
+        );
+        for (text, key) in [
+            ("[retrieval]\nmethods = []\n", "retrieval.methods"),
+            ("[retrieval]\nmethods = [\"rv\", \"fit\", \"rv\"]\n", "retrieval.methods"),
+            ("[retrieval]\nmethods = [\"envelope\"]\n", "retrieval.methods"),
+            ("[retrieval]\nmethods = [\"signals\"]\n[detector]\nnoise = \"none\"\n", "retrieval.methods"),
+            ("[retrieval]\nfalse_alarm = 0.9\n", "retrieval.false_alarm"),
+            ("[retrieval]\ncore_radius_m = 0.0\n", "retrieval.core_radius_m"),
+            ("[retrieval]\n[retrieval.follower]\nspan_m = -1.0\n", "retrieval.follower.span_m"),
+            ("[retrieval]\n[flow]\nkind = \"calm\"\n", "retrieval"),
+            ("[retrieval]\n[scan.pattern]\nkind = \"stare\"\n", "retrieval"),
+        ] {
+            assert_eq!(keys(text), [key], "{text}");
+        }
+    }
+
+    #[test]
+    fn a_scene_without_the_table_is_written_as_before() {
+        assert!(!Scene::default().to_toml().contains("retrieval"));
+    }
+}
