@@ -207,7 +207,8 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
     .unwrap();
     fs::write(folder.join("rays.csv"), "elevation_deg,time_s\n1,0\n2,1\n").unwrap();
     let scene = fs::read_to_string(folder.join("s.toml")).unwrap();
-    fs::write(folder.join("fast.toml"), format!("{scene}[detector]\nsampling_hz = 200e6\n")).unwrap();
+    fs::write(folder.join("fast.toml"), format!("{scene}[detector]\nsampling_hz = 260e6\n")).unwrap();
+    fs::write(folder.join("wave.toml"), format!("{scene}[laser]\nwavelength_m = 1.6e-6\n")).unwrap();
     fs::write(folder.join("base.toml"), format!("{scene}[detector]\nsignal = \"baseband\"\n")).unwrap();
     let bits = "[detector]\ndigitiser = { kind = \"quantised\", bits = 8, full_scale_over_noise = 5.0 }\n";
     fs::write(folder.join("bits.toml"), format!("{scene}{bits}")).unwrap();
@@ -229,6 +230,7 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
         ("o/signals.nc --scene s.toml --variable voltage", &["no variable voltage"]),
         ("o/signals.nc --scene s.toml --rays rays.csv", &["rays.csv", "2 rows", "54 records"]),
         ("o/signals.nc --scene fast.toml", &["signals.nc", "samples", "scan.range_max_m"]),
+        ("o/signals.nc --scene wave.toml", &["signals.nc", "its wavelength is", "laser.wavelength_m"]),
         ("o/signals.nc --scene base.toml", &["signals.nc", "its samples are real", "detector.signal"]),
         ("o/signals.nc --scene s.toml --noise loud", &["--noise"]),
     ] {
