@@ -102,7 +102,7 @@ pub fn ppi(elevation_rad: f64, low_rad: f64, high_rad: f64, step_rad: f64, movin
     let path = if moving {
         Path::Moving { from: [low_rad, elevation_rad], to: [high_rad, elevation_rad] }
     } else {
-        let last_rad = if full { high_rad - 1e-6 * step_rad } else { high_rad };
+        let last_rad = if full { high_rad - 1e-3 * step_rad } else { high_rad };
         Path::Stepped(steps(low_rad, last_rad, step_rad).into_iter().map(|az| [az, elevation_rad]).collect())
     };
     let mode = if full { SweepMode::AzimuthSurveillance } else { SweepMode::Sector };

@@ -149,10 +149,13 @@ fn end_s(wind: &SceneWind, geometry: &Geometry) -> f64 {
 fn warnings(scene: &Scene, wind: &SceneWind) -> Vec<String> {
     let mut out = Vec::new();
     let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
-    let speed_m_s = wind.max_speed_m_s;
+    // A lidar that flies sees its own speed.
+    let own_m_s = scene.scan.lidar.velocity_m_s.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let speed_m_s = wind.max_speed_m_s + own_m_s;
     if speed_m_s > half_band_m_s {
         out.push(format!(
-            "the flow reaches {speed_m_s:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster air is not seen"
+            "the flow{} reaches {speed_m_s:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster air is not seen",
+            if own_m_s > 0.0 { ", seen from the lidar," } else { "" }
         ));
     }
     if scene.estimator.padded_samples < 4 * scene.estimator.window_samples {

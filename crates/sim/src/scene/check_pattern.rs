@@ -131,7 +131,9 @@ impl Scene {
         let lines = if moves { turn_rad / line_rad } else { turn_rad / step_rad + 1.0 };
         let allowed = format!("at most {line_rad:?} rad of a line in a sweep of {turn_rad:?} rad: slower");
         c.require(!moves || lines >= 1.0 - 1e-9, "scan.head.rate_rad_s", s.head.rate_rad_s, allowed);
-        let all = lines * rows * s.head.sweeps as f64;
+        // Those of one sweep are counted with its limits.
+        let counted = s.pattern == Pattern::default() && !moves && s.head.sweeps == 1;
+        let all = if counted { 0.0 } else { lines * rows * s.head.sweeps as f64 };
         let (key, value) = if s.head.sweeps > 1 { ("scan.head.sweeps", s.head.sweeps as f64) } else { (key, step_rad) };
         let allowed = format!("at most 100000 lines of sight; there would be {all:.3e}");
         c.require(all <= MOST_LINES, key, value, allowed);
