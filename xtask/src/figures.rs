@@ -21,6 +21,8 @@ mod fig15;
 mod fig16;
 mod fig17;
 mod fig18;
+mod fig19;
+mod fig20;
 mod profiles;
 mod study;
 mod tab01;
@@ -38,7 +40,7 @@ pub(crate) struct Figure {
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 20] = [
+pub(crate) const ALL: [Figure; 22] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
     Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
     Figure {
@@ -63,5 +65,7 @@ pub(crate) const ALL: [Figure; 20] = [
     Figure { id: "fig16", number: 16, title: "Stiff and extreme cases", make: fig16::make },
     Figure { id: "fig17", number: 17, title: "Circulation and positions from single scans", make: fig17::make },
     Figure { id: "fig18", number: 18, title: "Velocity estimators against the Cramer-Rao bound", make: fig18::make },
-    Figure { id: "ca_pa", number: 19, title: "CA against PA: where the claim holds", make: ca_pa::make },
+    Figure { id: "fig19", number: 19, title: "Detection of wakes", make: fig19::make },
+    Figure { id: "fig20", number: 20, title: "Map, model and residual of one scan", make: fig20::make },
+    Figure { id: "ca_pa", number: 25, title: "CA against PA: where the claim holds", make: ca_pa::make },
 ];

@@ -20,7 +20,7 @@ use crate::wake_detection::bank::{Bank, Template, shown};
 use crate::wake_detection::cells::Cells;
 
 /// Velocities that a test needs.
-const NEEDED: usize = 100;
+const NEEDED: usize = 40;
 /// One part in so many of the cells may be missing in a scan.
 const MISSING: usize = 2;
 /// Of the variance of a product with a place: keeps the covariance of all of them regular, and changes nothing else.
@@ -71,7 +71,7 @@ impl WakeDetector {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for impossible numbers or a map without standard deviations, [`Error::TooFewVelocities`] with less
-    /// than a hundred, [`Error::Empty`] if no wake of the bank fits into the scan, [`Error::Linalg`] if the background has
+    /// than forty, [`Error::Empty`] if no wake of the bank fits into the scan, [`Error::Linalg`] if the background has
     /// no covariance.
     pub fn new(map: &ScanMap, model: &WakeModel, gate: &Gate, options: &DetectorOptions) -> Result<Self, Error> {
         let found = map.validate()?;

@@ -364,8 +364,8 @@ fn laws_repeat_and_impossible_tests_are_refused() {
     assert!(build(&case, &with((60.0, 20.0), None)).to_string().contains("spacing_m"));
     let still = Turbulence { length_m: 0.0, ..TURBULENCE };
     assert!(build(&case, &with((20.0, 60.0), Some(still))).to_string().contains("length_m"));
-    let few = Case::new((9, 0.05, 4e-3), (11, 400.0, 5.0));
-    assert!(build(&few, &DetectorOptions::default()).to_string().contains("99"));
+    let few = Case::new((3, 0.05, 4e-3), (13, 400.0, 5.0));
+    assert!(build(&few, &DetectorOptions::default()).to_string().contains("39"));
     let mut silent = Case::uneven();
     silent.deviation.fill(0.0);
     assert!(build(&silent, &DetectorOptions::default()).to_string().contains("standard_deviation_m_s"));

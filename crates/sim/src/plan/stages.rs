@@ -67,11 +67,14 @@ fn retrieval(scene: &Scene, target: Target, n: &Sizes) -> Option<PlannedStage> {
     let wanted = scene.retrieval.as_ref().filter(|_| target == Target::Run)?;
     let record_s = n.layers * LAYER_OF_RECORD_S + n.samples * (n.layers_per_sample * LAYER_OF_SAMPLE_S + SAMPLE_S);
     let of_method = |method: &RetrievalMethod| match method {
-        RetrievalMethod::Fit | RetrievalMethod::Integral | RetrievalMethod::Envelope => n.cells * FITTED_CELL_S,
+        RetrievalMethod::Fit | RetrievalMethod::Integral | RetrievalMethod::Envelope => 0.0,
         RetrievalMethod::Rv => n.cells * RV_CELL_S,
-        RetrievalMethod::Signals => n.cells * FITTED_CELL_S + n.records * (record_s + n.samples * FITTED_SAMPLE_S),
+        RetrievalMethod::Signals => n.records * (record_s + n.samples * FITTED_SAMPLE_S),
     };
-    let scan_s: f64 = wanted.methods.iter().map(of_method).sum();
+    // the fit of the map is made once for all that need it
+    let of_map = wanted.methods.iter().any(|method| *method != RetrievalMethod::Rv);
+    let map_s = if of_map { n.cells * FITTED_CELL_S } else { 0.0 };
+    let scan_s = map_s + wanted.methods.iter().map(of_method).sum::<f64>();
     let test_s = if wanted.false_alarm.is_some() { TEST_S } else { 0.0 };
     let signals = if wanted.methods.contains(&RetrievalMethod::Signals) { 3.0 } else { 0.0 };
     let working =

@@ -76,20 +76,17 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::scan::Sample>(
     observer.begin(Stage::Retrieval, (maps.len() * wanted.methods.len()) as u64);
     let mut rows = Vec::new();
     for (realisation, velocity_m_s) in maps.iter().enumerate() {
+        let by = |method| retrieve_map(read_scan(plan, velocity_m_s), method, options.clone(), own.as_ref()).ok();
+        // the fit of the map also starts that of the signals and the integrals
+        let of_map = wanted.methods.iter().any(|method| *method != Method::Rv).then(|| by(Method::Fit)).flatten();
         for &method in &wanted.methods {
-            let scan = read_scan(plan, velocity_m_s);
-            let found = match (method, &own) {
-                (Method::Signals, Some(own)) => of_signals::<S>(
-                    plan,
-                    scanner,
-                    own,
-                    realisation,
-                    retrieve_map(scan, method, options.clone(), Some(own)),
-                ),
-                _ => retrieve_map(scan, method, options.clone(), own.as_ref()),
+            let found = match (method, of_map.clone(), &own) {
+                (Method::Rv, ..) => by(method),
+                (Method::Signals, Some(map), Some(own)) => of_signals::<S>(plan, scanner, own, realisation, map)?,
+                (Method::Integral, Some(map), _) => integral(map).ok(),
+                (_, map, _) => map.filter(|_| method == Method::Fit),
             };
-            let found = found.and_then(|found| if method == Method::Integral { integral(found) } else { Ok(found) });
-            rows.extend(rows_of(scene, (realisation, method), &truth, found.ok().as_ref(), &options.model)?);
+            rows.extend(rows_of(scene, (realisation, method), &truth, found.as_ref(), &options.model)?);
             observer.advance(1);
         }
     }
@@ -138,15 +135,18 @@ fn read_scan(plan: &Plan, velocity_m_s: &Array2<f64>) -> ReadScan {
     }
 }
 
-/// The fit to all signals of a realisation, which are made again; the wake of the map starts it.
+/// The fit to all signals of a realisation, which are made again; the wake of the map starts it. Nothing where the map shows no pair,
+/// or the fit does not come to an end.
 fn of_signals<S: Sample + wakescope_signal::scan::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     own: &OwnScene,
     realisation: usize,
-    of_map: Result<RetrievedScan, Error>,
-) -> Result<RetrievedScan, Error> {
-    let of_map = of_map?;
+    of_map: RetrievedScan,
+) -> Result<Option<RetrievedScan>, Error> {
+    if of_map.result.vortices.len() < 2 {
+        return Ok(None);
+    }
     let mut samples: Vec<S> = Vec::with_capacity(scanner.pulses() * plan.geometry.samples);
     scanner.in_pieces::<S>(realisation, &Silent, |_, records| {
         samples.extend(records.iter().copied());
@@ -157,13 +157,7 @@ fn of_signals<S: Sample + wakescope_signal::scan::Sample>(
     let per_line = plan.scene.scene.scan.pulses_per_line;
     let rays = |line: &f64| std::iter::repeat_n(*line, per_line);
     let elevation_rad = plan.geometry.elevation_rad.iter().flat_map(rays).collect();
-    let vortices = of_map.result.vortices.len();
-    let found = own.of_records(samples, elevation_rad, of_map)?;
-    if vortices < 2 {
-        let reason = "the map shows no pair for the fit of the signals to start from".into();
-        return Err(Error::Input { path: "retrieval".into(), reason });
-    }
-    Ok(found)
+    Ok(own.of_records(samples, elevation_rad, of_map).ok())
 }
 
 /// The circulation over 5 to 15 m by integrals over the map itself, not corrected.

@@ -6,6 +6,8 @@
 #[cfg(feature = "cli")]
 mod cli;
 #[cfg(all(feature = "cli", feature = "netcdf"))]
+mod detection;
+#[cfg(all(feature = "cli", feature = "netcdf"))]
 mod estimate;
 #[cfg(feature = "cli")]
 mod messages;

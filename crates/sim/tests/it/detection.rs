@@ -1,0 +1,107 @@
+//! `wakescope detect` and scenes with `[retrieval]`, as a user meets them.
+
+use crate::wakescope;
+use serde_json::Value;
+use std::path::Path;
+
+/// A small scan of the default pair at 10 dB.
+const SCENE: &str = "seed = 5\n[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[scan]\nelevation_min_rad = 0.06\n\
+    elevation_max_rad = 0.18\nelevation_step_rad = 2.5e-3\nrange_min_m = 310.0\nrange_max_m = 490.0\npulses_per_line = 8\n\
+    realisations = 2\n[outputs]\nsvg = false\npng = false\nflow = false\nprofile_points = 3\n";
+
+fn json(folder: &Path, words: &[&str]) -> Value {
+    let words: Vec<&str> = words.iter().copied().chain(["--quiet", "--json"]).collect();
+    let output = wakescope(folder, &words);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Rows of a table without its comments.
+fn rows(path: &Path) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let rows = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
+    rows.map(|line| line.split(',').map(str::to_owned).collect()).collect()
+}
+
+#[test]
+fn a_run_is_held_against_its_pair_and_its_map_is_found_to_hold_a_wake() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!(
+        "{SCENE}[retrieval]\nmethods = [\"rv\"]\nfalse_alarm = 0.01\n[retrieval.follower]\nspan_m = 11.0\naspect_ratio = 7.0\n"
+    );
+    std::fs::write(folder.path().join("s.toml"), text).unwrap();
+    let run = json(folder.path(), &["run", "s.toml", "--out", "out"]);
+    assert_eq!(run["retrieval"]["detected"], 1.0);
+    let errors = run["retrieval"]["errors"].as_array().unwrap();
+    let of = |side: &str, quantity: &str| {
+        let found = errors.iter().find(|e| e["side"] == side && e["quantity"] == quantity).unwrap();
+        (found["truth"].as_f64().unwrap(), found["bias"].as_f64().unwrap(), found["failures"].as_u64().unwrap())
+    };
+    let (truth, bias, failures) = of("left", "gamma_m2_s");
+    // in noise and with gates of 14 m the radial-velocity method finds too little
+    assert!(truth == 500.0 && (-230.0..20.0).contains(&bias) && failures == 0, "{run:#}");
+    let (truth, bias, _) = of("right", "z_m");
+    assert!(truth == 47.0 && bias.abs() < 4.0, "{run:#}");
+    // twice the 0.127 of 250 m^2/s in the closed form for one vortex alone
+    let (truth, ..) = of("right", "rolling_moment");
+    assert!((0.2..0.3).contains(&truth), "{truth}");
+    let table = rows(&folder.path().join("out/retrieval.csv"));
+    assert_eq!((table.len(), table[0][..3].join(",")), (5, "realisation,method,side".to_owned()));
+    assert_eq!(rows(&folder.path().join("out/retrieval_summary.csv")).len(), 11);
+
+    let detect = json(folder.path(), &["detect", "out/map.nc", "--empty-scans", "2000", "--out", "found"]);
+    assert_eq!(detect["scans"][0]["wake"], true, "{detect:#}");
+    assert!(detect["scans"][0]["false_alarm"].as_f64().unwrap() < 1e-6);
+    assert!(detect["background"].as_str().unwrap().contains("independent noise"));
+    let files: Vec<String> =
+        detect["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap().to_owned()).collect();
+    for name in ["detection.csv", "detection_power.csv", "detection_roc.csv", "detection_gates.csv"] {
+        assert!(files.iter().any(|file| file.ends_with(name)), "{files:?}");
+    }
+}
+
+#[test]
+fn a_scene_alone_says_what_would_be_found_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), SCENE).unwrap();
+    let of = |name: &str, more: &[&str]| {
+        let words = [&["detect", "--scene", "s.toml", "--empty-scans", "2000", "--out", name], more].concat();
+        json(folder.path(), &words)
+    };
+    let found = of("white", &[]);
+    let (measured, foretold) =
+        (found["smallest_detectable_m2_s"].as_f64().unwrap(), found["smallest_foretold_m2_s"].as_f64().unwrap());
+    assert!(measured > 5.0 && (measured / foretold - 1.0).abs() < 0.3, "{found:#}");
+    assert!((found["gumbel"][1].as_f64().unwrap() - 2.0).abs() < 0.5);
+    // turbulence hides wakes
+    let hidden = of("turbulent", &["--turbulence", "0.8,25"]);
+    assert!(hidden["smallest_detectable_m2_s"].as_f64().unwrap() > 1.5 * measured, "{hidden:#}");
+    assert!(hidden["background"].as_str().unwrap().contains("0.8 m/s correlated over 25 m"));
+    // closed form: 1e-2 for each gate, more where the best of many cells counts
+    let gates = rows(&folder.path().join("white/detection_gates.csv"));
+    let column = |name: &str| gates[0].iter().position(|column| column == name).unwrap();
+    let number = |name: &str| gates[1][column(name)].parse::<f64>().unwrap();
+    assert!(number("false_alarm") == 0.01 && (0.2..0.6).contains(&number("false_alarm_best")));
+    assert!(number("detection") > 0.9 && number("needed_snr_db") < 10.0);
+}
+
+#[test]
+fn data_and_words_that_cannot_be_tested_are_refused_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("few.csv"), "range_m,elevation_rad,velocity_m_s\n300,0.1,1\n310,0.1,2\n")
+        .unwrap();
+    for (words, message) in [
+        (&["detect", "few.csv", "--out", "o"][..], "few.csv"),
+        (&["detect", "none.nc", "--out", "o"], "none.nc"),
+        (&["detect", "--out", "o"], "--scene"),
+        (&["detect", "few.csv", "--turbulence", "0.8", "--out", "o"], "1.2,25"),
+        (&["detect", "few.csv", "--false-alarm", "2", "--out", "o"], "0.01"),
+        (&["detect", "few.csv", "--empty-scans", "10", "--out", "o"], "2000"),
+    ] {
+        let output = wakescope(folder.path(), words);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {text}");
+        assert!(text.contains(message), "{words:?}: {text}");
+    }
+    assert!(!folder.path().join("o").exists());
+}
