@@ -18,6 +18,7 @@
 
 mod along_flight;
 pub(crate) mod axis;
+mod between_times;
 pub(crate) mod grid_wind;
 mod kernel;
 mod linear;

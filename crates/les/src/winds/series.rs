@@ -6,13 +6,11 @@
 //!
 //! Check: fields linear in time are exact, the error of a curved one falls with the square of the time between snapshots.
 
+use super::between_times::{self, blend, check_times};
 use super::grid_wind::GridSnapshot;
 use super::wind::Wind;
 use crate::Error;
-use crate::error::{check, check_lengths};
-
-/// Points handled at once, so that the scratch stays on the stack.
-const BATCH: usize = 256;
+use crate::error::check_lengths;
 
 /// The snapshot at or before a time, the one behind it, and the weight of the latter.
 type About<'a> = (&'a GridSnapshot, Option<(&'a GridSnapshot, f64)>);
@@ -31,12 +29,7 @@ impl GridSeries {
     /// [`Error::OutOfRange`] for an empty series, and for times that are not finite or do not increase.
     pub fn new(snapshots: impl IntoIterator<Item = (f64, GridSnapshot)>) -> Result<Self, Error> {
         let (time_s, snapshots): (Vec<f64>, Vec<GridSnapshot>) = snapshots.into_iter().unzip();
-        check("number of snapshots", snapshots.len() as f64, "at least 1", |n| n >= 1.0)?;
-        let mut last_s = f64::NEG_INFINITY;
-        for &time_s in &time_s {
-            check("time_s", time_s, "finite and greater than that of the snapshot before", |t| t > last_s)?;
-            last_s = time_s;
-        }
+        check_times(&time_s)?;
         Ok(Self { time_s, snapshots })
     }
 
@@ -47,17 +40,8 @@ impl GridSeries {
 
     /// The snapshots about `time_s`.
     fn about(&self, time_s: f64) -> Result<About<'_>, Error> {
-        let last = self.time_s.len() - 1;
-        check("time_s", time_s, "between the times of the first and the last snapshot", |t| {
-            self.time_s[0] <= t && t <= self.time_s[last]
-        })?;
-        let at = self.time_s.partition_point(|&t| t <= time_s) - 1;
-        let (from_s, snapshot) = (self.time_s[at], &self.snapshots[at]);
-        if time_s == from_s || at == last {
-            return Ok((snapshot, None));
-        }
-        let weight = (time_s - from_s) / (self.time_s[at + 1] - from_s);
-        Ok((snapshot, Some((&self.snapshots[at + 1], weight))))
+        let (at, weight) = between_times::about(&self.time_s, time_s)?;
+        Ok((&self.snapshots[at], weight.map(|weight| (&self.snapshots[at + 1], weight))))
     }
 }
 
@@ -68,17 +52,7 @@ impl Wind for GridSeries {
         let (before, after) = self.about(time_s)?;
         before.velocity_into(points_m, time_s, out_m_s)?;
         let Some((after, weight)) = after else { return Ok(()) };
-        let mut scratch = [[0.0; 3]; BATCH];
-        for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
-            let part = &mut scratch[..points.len()];
-            after.velocity_into(points, time_s, part)?;
-            for (out, later) in outs.iter_mut().zip(part.iter()) {
-                for (o, l) in out.iter_mut().zip(later) {
-                    *o += weight * (l - *o);
-                }
-            }
-        }
-        Ok(())
+        blend(after, weight, points_m, time_s, out_m_s)
     }
 
     /// The larger of the two snapshots' values; of a time outside the series, the largest of all.
@@ -95,6 +69,7 @@ impl Wind for GridSeries {
 
 #[cfg(test)]
 mod tests {
+    use super::super::between_times::BATCH;
     use super::super::{Edges, OutsidePolicy, PlaneMesh, Side};
     use super::*;
 

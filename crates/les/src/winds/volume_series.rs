@@ -5,10 +5,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::between_times::{about, blend, check_times};
 use super::volume::VolumeSnapshot;
 use super::wind::Wind;
 use crate::Error;
-use crate::error::{check, check_lengths};
+use crate::error::check_lengths;
 
 /// Reads field number `i`.
 type Reader = dyn Fn(usize) -> Result<VolumeSnapshot, Error> + Send + Sync;
@@ -21,9 +22,6 @@ pub struct VolumeSeries {
     max_gradient_per_s: f64,
 }
 
-/// Points handled at once, so that the scratch stays on the stack.
-const BATCH: usize = 256;
-
 impl VolumeSeries {
     /// A series with the times \[s\] of its fields, what reads them, and the largest gradient of all \[1/s\].
     ///
@@ -34,12 +32,7 @@ impl VolumeSeries {
         max_gradient_per_s: f64,
         read: impl Fn(usize) -> Result<VolumeSnapshot, Error> + Send + Sync + 'static,
     ) -> Result<Self, Error> {
-        check("number of fields", time_s.len() as f64, "at least 1", |n| n >= 1.0)?;
-        let mut last_s = f64::NEG_INFINITY;
-        for &time_s in &time_s {
-            check("time_s", time_s, "finite and greater than that of the field before", |t| t > last_s)?;
-            last_s = time_s;
-        }
+        check_times(&time_s)?;
         Ok(Self { time_s, read: Box::new(read), kept: Mutex::new(Vec::new()), max_gradient_per_s })
     }
 
@@ -61,29 +54,10 @@ impl Wind for VolumeSeries {
     /// As the trait says; a time outside the series is refused.
     fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
-        let last = self.time_s.len() - 1;
-        check("time_s", time_s, "between the times of the first and the last field", |t| {
-            self.time_s[0] <= t && t <= self.time_s[last]
-        })?;
-        let at = self.time_s.partition_point(|t| *t <= time_s) - 1;
-        let before = self.field(at)?;
-        before.velocity_into(points_m, time_s, out_m_s)?;
-        if time_s == self.time_s[at] || at == last {
-            return Ok(());
-        }
-        let after = self.field(at + 1)?;
-        let weight = (time_s - self.time_s[at]) / (self.time_s[at + 1] - self.time_s[at]);
-        let mut scratch = [[0.0; 3]; BATCH];
-        for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
-            let part = &mut scratch[..points.len()];
-            after.velocity_into(points, time_s, part)?;
-            for (out, later) in outs.iter_mut().zip(part.iter()) {
-                for (o, l) in out.iter_mut().zip(later) {
-                    *o += weight * (l - *o);
-                }
-            }
-        }
-        Ok(())
+        let (at, weight) = about(&self.time_s, time_s)?;
+        self.field(at)?.velocity_into(points_m, time_s, out_m_s)?;
+        let Some(weight) = weight else { return Ok(()) };
+        blend(&*self.field(at + 1)?, weight, points_m, time_s, out_m_s)
     }
 
     /// The largest of all fields.

@@ -1,8 +1,14 @@
 //! False alarms and detections of single gates, in closed form: the cell of a mean spectrum against the known noise.
 //!
-//! A window's signal-to-noise ratio in the band is spread over the width of the pulse's spectrum: the cell of the peak has
-//! S = SNR v_B kappa/sqrt(pi) times the noise, v_B = lambda B/2, kappa = 4 pi sigma_p/lambda, sigma_p = sigma sigma_h/sqrt(sigma^2 +
-//! sigma_h^2) for a Gaussian pulse and window. Check: S is 10.0 at 0 dB for Table 2; the closed forms in `CellTest`.
+//! A window's signal-to-noise ratio in the band is spread over the width of its spectrum. The cell of the peak has S times the noise,
+//!
+//! ```text
+//! S = SNR (B/F_s) sum_nm h_n h_m exp(-(n - m)^2/(4 (sigma F_s)^2)) / sum_n h_n^2
+//! ```
+//!
+//! h the window, sigma the half-width of the pulse's power at 1/e: its power at zero lag, seen through the window, over noise of equal density in
+//! the band B. For a Gaussian window that is not cut off it is SNR v_B kappa/sqrt(pi), v_B = lambda B/2, kappa = 4 pi sigma_p/lambda, sigma_p =
+//! sigma sigma_h/sqrt(sigma^2 + sigma_h^2): 10.0 at 0 dB for 64 ns; cut off at 256 ns, as Table 2's is, 9.4. Check: that form; the closed forms in `CellTest`.
 
 use crate::Error;
 use crate::io::Table;
@@ -10,18 +16,16 @@ use crate::measure::bound::{BoundPoint, bound};
 use crate::measure::estimators;
 use crate::measure::progress::Observer;
 use crate::plan::Plan;
-use crate::scene::Scene;
-use std::f64::consts::PI;
 use wakescope_estimate::estimators::CellTest;
 
-/// Power of the signal over that of the noise in the cell of the peak, at a ratio of 1 in the band.
-fn peak_gain(scene: &Scene, sigma_s: f64) -> Result<f64, Error> {
-    let weights = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
-    let (sum, squares) = weights.iter().fold((0.0, 0.0), |(sum, squares), h| (sum + h, squares + h * h));
-    // the Gaussian with the same ratio of sum and squares, and so with the same band of noise
-    let window_s = sum * sum / squares / (2.0 * PI.sqrt()) / scene.detector.sampling_hz;
-    let width_s = sigma_s * window_s / sigma_s.hypot(window_s);
-    Ok(2.0 * PI.sqrt() * width_s * scene.detector.bandwidth_hz)
+/// Power of the signal over that of the noise in the cell of the peak, at a ratio of 1 in a band of `band` over the rate of samples, for
+/// a pulse of `sigma` intervals.
+fn peak_gain(window: &[f64], sigma: f64, band: f64) -> f64 {
+    let lag = |n: usize, m: usize| (n as f64 - m as f64) / sigma;
+    let row =
+        |n: usize| window.iter().enumerate().map(move |(m, h)| h * (-0.25 * lag(n, m).powi(2)).exp()).sum::<f64>();
+    let power: f64 = window.iter().enumerate().map(|(n, h)| h * row(n)).sum();
+    band * power / window.iter().map(|h| h * h).sum::<f64>()
 }
 
 /// The table `range_m,snr_db,n_eff,false_alarm,threshold,detection,needed_snr_db,false_alarm_best`: threshold over the noise in a cell,
@@ -32,8 +36,9 @@ fn peak_gain(scene: &Scene, sigma_s: f64) -> Result<f64, Error> {
 /// A scene without noise; what the crates refuse.
 pub fn gate_table(plan: &Plan, false_alarm: f64, observer: &dyn Observer) -> Result<Table, Error> {
     let scene = &plan.scene.scene;
-    let gain = peak_gain(scene, plan.instrument.pulse.sigma_s())?;
     let d = &scene.detector;
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let gain = peak_gain(&window, plan.instrument.pulse.sigma_s() * d.sampling_hz, d.bandwidth_hz / d.sampling_hz);
     let cells = (3.0 * d.bandwidth_hz * scene.estimator.window_samples as f64 / d.sampling_hz).max(1.0);
     let best = CellTest::best_of(cells, false_alarm)?;
     let points = bound(plan, observer)?.by_range;
@@ -60,12 +65,19 @@ pub fn gate_table(plan: &Plan, false_alarm: f64, observer: &dyn Observer) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wakescope_estimate::Weighting;
 
     #[test]
-    fn the_peak_of_table_2_is_ten_times_the_noise_at_0_db() {
-        let scene = Scene::default();
-        let gain = peak_gain(&scene, scene.pulse_sigma_s()).unwrap();
-        // that of a Gaussian window; the default one is not Gaussian, and its equal in the band of noise is 7 % below
-        assert!((gain - 10.0).abs() < 1.0, "{gain}");
+    fn the_peak_of_a_gaussian_window_is_that_of_the_closed_form_and_a_cut_one_is_lower() {
+        let sigma = 30.03;
+        let closed = 2.0 * std::f64::consts::PI.sqrt() * 0.2 * sigma * 16.0 / f64::hypot(sigma, 16.0);
+        assert!((closed - 10.0).abs() < 0.02, "{closed}");
+        let whole = Weighting::Gaussian { relative_half_width: 16.0 / 256.0 }.weights(256).unwrap();
+        let gain = peak_gain(&whole, sigma, 0.2);
+        assert!((gain / closed - 1.0).abs() < 1e-9, "{gain} {closed}");
+        let cut = peak_gain(&Weighting::default().weights(64).unwrap(), sigma, 0.2);
+        assert!((9.3..9.5).contains(&cut), "{cut}");
+        // one sample: the noise of the whole rate over that of the band
+        assert!((peak_gain(&[2.0], sigma, 0.2) - 0.2).abs() < 1e-15);
     }
 }
