@@ -84,7 +84,56 @@ impl GradientModel {
                 Complex::from_polar((pulse + broadening * gradient_per_s.powi(2)).exp(), phase * gradient_per_s);
             [value, value * Complex::new(2.0 * broadening * gradient_per_s, phase)]
         };
-        [0, 1].map(|which| Array2::from_shape_fn(shape, |place| parts(place)[which]))
+        let mut by_gradient = Array2::zeros(shape);
+        let envelope = Array2::from_shape_fn(shape, |place| {
+            let [value, slope] = parts(place);
+            by_gradient[place] = slope;
+            value
+        });
+        [envelope, by_gradient]
+    }
+
+    /// Of the lags -(N - 1) to N - 1 of a window: the carrier, and the noise where the signal has unit power.
+    fn carrier_and_noise(
+        &self,
+        velocity_m_s: f64,
+        snr: f64,
+        kind: SignalKind,
+    ) -> Result<Vec<[Complex<f64>; 2]>, Error> {
+        positive("snr", snr)?;
+        finite("velocity_m_s", velocity_m_s)?;
+        self.sampling.validate_for(kind)?;
+        let cycles = self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
+        let bandwidth = (self.sampling.band_hz.1 - self.sampling.band_hz.0) / self.sampling.sample_rate_hz;
+        let density = 1.0 / (snr * bandwidth);
+        let longest = self.window_samples as i64 - 1;
+        let of_lag = |lag: i64| {
+            let lag = lag as f64;
+            let noise = self.noise.covariance(&self.sampling, lag, kind) * density;
+            [Complex::from_polar(1.0, turned(cycles, lag)), noise]
+        };
+        Ok((-longest..=longest).map(of_lag).collect())
+    }
+
+    /// Covariance of complex samples of unit signal power, from the [`envelope`](Self::envelope) of a gradient.
+    ///
+    /// # Errors
+    /// As [`GradientModel::covariance`].
+    pub(crate) fn moved(
+        &self,
+        envelope: &Array2<Complex<f64>>,
+        velocity_m_s: f64,
+        snr: f64,
+        kind: SignalKind,
+    ) -> Result<Array2<Complex<f64>>, Error> {
+        let lags = self.carrier_and_noise(velocity_m_s, snr, kind)?;
+        let mut signal = envelope.clone();
+        for (row, mut values) in signal.rows_mut().into_iter().enumerate() {
+            // along a row the lag falls
+            let lags = lags[row..row + self.window_samples].iter().rev();
+            values.iter_mut().zip(lags).for_each(|(value, [carrier, noise])| *value = *value * carrier + noise);
+        }
+        Ok(signal)
     }
 
     /// Covariance and its derivatives with respect to velocity \[per m/s\] and gradient \[per 1/s\], complex samples
@@ -101,24 +150,16 @@ impl GradientModel {
         snr: f64,
         kind: SignalKind,
     ) -> Result<[Array2<Complex<f64>>; 3], Error> {
-        positive("snr", snr)?;
-        finite("velocity_m_s", velocity_m_s)?;
         finite("gradient_per_s", gradient_per_s)?;
-        self.sampling.validate_for(kind)?;
-        let cycles = self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
+        let lags = self.carrier_and_noise(velocity_m_s, snr, kind)?;
         let slope = -4.0 * std::f64::consts::PI * self.sampling.period_s() / self.sampling.wavelength_m;
-        let bandwidth = (self.sampling.band_hz.1 - self.sampling.band_hz.0) / self.sampling.sample_rate_hz;
-        let density = 1.0 / (snr * bandwidth);
-        let lag = |(n, m): (usize, usize)| n as f64 - m as f64;
-        let [mut signal, mut by_gradient] = self.envelope(gradient_per_s);
-        for part in [&mut signal, &mut by_gradient] {
-            part.indexed_iter_mut()
-                .for_each(|(place, value)| *value *= Complex::from_polar(1.0, turned(cycles, lag(place))));
-        }
-        let by_velocity =
-            Array2::from_shape_fn(signal.dim(), |place| signal[place] * Complex::new(0.0, slope * lag(place)));
-        signal.indexed_iter_mut().for_each(|(place, value)| {
-            *value += self.noise.covariance(&self.sampling, lag(place), kind) * density;
+        let of_lag = |(n, m): (usize, usize)| lags[n + self.window_samples - 1 - m];
+        let [envelope, mut by_gradient] = self.envelope(gradient_per_s);
+        let signal = self.moved(&envelope, velocity_m_s, snr, kind)?;
+        by_gradient.indexed_iter_mut().for_each(|(place, value)| *value *= of_lag(place)[0]);
+        let by_velocity = Array2::from_shape_fn(signal.dim(), |place| {
+            let lag = place.0 as f64 - place.1 as f64;
+            envelope[place] * of_lag(place)[0] * Complex::new(0.0, slope * lag)
         });
         Ok([signal, by_velocity, by_gradient])
     }

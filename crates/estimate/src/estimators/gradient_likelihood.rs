@@ -21,7 +21,7 @@ use rustfft::{Fft, FftPlanner};
 
 use crate::bound::{GradientModel, Noise};
 use crate::error::{Error, finite, increasing, positive};
-use crate::estimators::gradient_tapers::{Tapers, band_lag, expected_lags, tapers};
+use crate::estimators::gradient_tapers::{LagWeights, Tapers, band_lag, tapers};
 use crate::estimators::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
 use crate::estimators::{Estimator, GateVelocity, NoiseTest, Quality, Refinement, Statistic};
 use crate::spectrum::ZoomSpectrum;
@@ -128,7 +128,7 @@ impl<S: Sample> GradientLikelihood<S> {
             search,
         };
         // Tapers of other gradients are these with a chirp, which takes out that of the wind.
-        let tone = expected_lags(&Array2::ones((n, n)), &tapers[slowest]);
+        let tone = LagWeights::new(&tapers[slowest], n).expected_lags(&Array2::ones((n, n)));
         let weights: Vec<f64> = tone.iter().step_by(2).map(|weight| weight / tone[0]).collect();
         estimator.search.own_width = own_width_cycles(&weights) * padded_samples as f64;
         if S::KIND == SignalKind::Real {
@@ -171,7 +171,7 @@ impl<S: Sample> GradientLikelihood<S> {
             let lag = S::KIND.lag(&lags, i.abs_diff(j));
             if i >= j { lag } else { lag.conj() }
         });
-        Ok(self.statistic.expected(&covariance))
+        Ok(self.statistic.expected(&covariance, &self.statistic.lag_weights()))
     }
 }
 
@@ -214,10 +214,15 @@ impl<S: Sample> Statistic<S> for GradientStatistic<S> {
 }
 
 impl<S: Sample> GradientStatistic<S> {
+    /// What products of samples weigh in the lags of each gradient.
+    fn lag_weights(&self) -> Vec<LagWeights> {
+        self.tapers.iter().map(|tapers| LagWeights::new(tapers, self.window_samples)).collect()
+    }
+
     /// The mean statistic of windows of that covariance.
-    fn expected(&self, covariance: &Array2<C64>) -> Vec<f64> {
+    fn expected(&self, covariance: &Array2<C64>, weights: &[LagWeights]) -> Vec<f64> {
         let n = self.window_samples;
-        let mut numbers: Vec<f64> = self.tapers.iter().flat_map(|tapers| expected_lags(covariance, tapers)).collect();
+        let mut numbers: Vec<f64> = weights.iter().flat_map(|weights| weights.expected_lags(covariance)).collect();
         let lag = |m: usize| (0..n - m).map(|k| covariance[[k + m, k]]).sum::<C64>();
         numbers.push(self.band_lags.iter().enumerate().map(|(m, weight)| (lag(m) * weight).re).sum());
         numbers
@@ -232,15 +237,17 @@ impl<S: Sample> GradientStatistic<S> {
     ) -> Result<Vec<(f64, f64)>, Error> {
         let middle_hz = 0.5 * (estimator.sampling.band_hz.0 + estimator.sampling.band_hz.1);
         let velocity_m_s = estimator.sampling.velocity_m_s(middle_hz);
+        let weights = self.lag_weights();
         let mut readings = Vec::<(f64, f64)>::new();
         for pair in estimator.gradient_per_s.windows(2) {
             for part in 0..=READINGS {
                 let gradient_per_s = pair[0] + (pair[1] - pair[0]) * f64::from(part) / f64::from(READINGS);
-                let [mut covariance, ..] = model.covariance(velocity_m_s, gradient_per_s, snr, S::KIND)?;
+                let [envelope, _] = model.envelope(gradient_per_s);
+                let mut covariance = model.moved(&envelope, velocity_m_s, snr, S::KIND)?;
                 if S::KIND == SignalKind::Real {
                     covariance.mapv_inplace(|value| C64::from(value.re));
                 }
-                let found = estimator.velocity_and_gradient(&self.expected(&covariance), &mut Scratch::new());
+                let found = estimator.velocity_and_gradient(&self.expected(&covariance, &weights), &mut Scratch::new());
                 // the ends of the list read themselves however far off the wind: only increasing readings can be inverted
                 if found.gradient_per_s.is_finite() && readings.last().is_none_or(|last| last.0 < found.gradient_per_s)
                 {
@@ -279,12 +286,14 @@ impl GradientPeak {
         let step_m_s =
             0.0625 * self.sampling.wavelength_m * self.sampling.sample_rate_hz / model.window_samples() as f64;
         let steps = ((high_m_s - low_m_s) / step_m_s).ceil().max(1.0);
+        let weights = LagWeights::new(tapers, model.window_samples());
+        let [envelope, _] = model.envelope(gradient_per_s);
         let mut density = Vec::new();
         let mut readings = Vec::<(f64, f64)>::with_capacity(steps as usize + 1);
         for k in 0..=steps as usize {
             let velocity_m_s = low_m_s + (high_m_s - low_m_s) * k as f64 / steps;
-            let [covariance, ..] = model.covariance(velocity_m_s, gradient_per_s, snr, SignalKind::Real)?;
-            let lags = expected_lags(&covariance.mapv(|value| C64::from(value.re)), tapers);
+            let covariance = model.moved(&envelope, velocity_m_s, snr, SignalKind::Real)?;
+            let lags = weights.expected_lags(&covariance.mapv(|value| C64::from(value.re)));
             self.zoom.density_into(&lags, &mut density)?;
             let found = self.search.locate(&density, Refinement::Parabola, |_, _| None);
             let read_m_s = self.sampling.velocity_m_s(self.search.band.frequency_hz(found.bin));

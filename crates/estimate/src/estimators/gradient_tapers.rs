@@ -24,16 +24,23 @@ pub(crate) struct Tapers {
     pub(crate) spread: f64,
 }
 
-/// Expected lags of the tapered correlogram for windows of that covariance.
-pub(crate) fn expected_lags(covariance: &Array2<C64>, tapers: &Tapers) -> Vec<f64> {
-    let n = covariance.nrows();
-    let lag = |m: usize| -> C64 {
-        let of = |taper: &Vec<C64>| -> C64 {
-            (0..n - m).map(|k| taper[k + m] * taper[k].conj() * covariance[[k + m, k]]).sum()
+/// What each product of two samples weighs in the lags of the tapered correlogram.
+#[derive(Debug, Clone)]
+pub(crate) struct LagWeights(Vec<Vec<C64>>);
+
+impl LagWeights {
+    pub(crate) fn new(tapers: &Tapers, window_samples: usize) -> Self {
+        let weight = |k: usize, m: usize| tapers.weights.iter().map(|taper| taper[k + m] * taper[k].conj()).sum();
+        Self((0..window_samples).map(|m| (0..window_samples - m).map(|k| weight(k, m)).collect()).collect())
+    }
+
+    /// Expected lags of the tapered correlogram for windows of that covariance.
+    pub(crate) fn expected_lags(&self, covariance: &Array2<C64>) -> Vec<f64> {
+        let lag = |(m, weights): (usize, &Vec<C64>)| -> C64 {
+            weights.iter().enumerate().map(|(k, weight)| weight * covariance[[k + m, k]]).sum()
         };
-        tapers.weights.iter().map(of).sum()
-    };
-    (0..n).map(lag).flat_map(|value| [value.re, value.im]).collect()
+        self.0.iter().enumerate().map(lag).flat_map(|value| [value.re, value.im]).collect()
+    }
 }
 
 /// Weight of lag m in the energy inside the band: the integral of exp(-j 2 pi f m / F_s) over the band, twice for m > 0.

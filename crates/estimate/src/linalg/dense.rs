@@ -138,13 +138,12 @@ const SWEEPS: usize = 60;
 pub(crate) fn jacobi<T: Scalar>(mut a: Vec<T>, order: usize) -> Option<(Vec<f64>, Vec<T>)> {
     let mut v = vec![T::zero(); order * order];
     (0..order).for_each(|k| v[k * (order + 1)] = T::one());
-    let (mut a_columns, mut v_columns) = (Columns::new(&mut a, order), Columns::new(&mut v, order));
     let mut converged = false;
     for _ in 0..SWEEPS {
         let mut rotated = false;
         for q in 1..order {
             for p in 0..q {
-                rotated |= rotate(&mut a_columns, &mut v_columns, order, p, q)?;
+                rotated |= rotate(&mut a, &mut v, order, p, q)?;
             }
         }
         if !rotated {
@@ -152,7 +151,7 @@ pub(crate) fn jacobi<T: Scalar>(mut a: Vec<T>, order: usize) -> Option<(Vec<f64>
             break;
         }
     }
-    let diagonal: Vec<f64> = (0..order).map(|k| a_columns[(k, k)].re()).collect();
+    let diagonal: Vec<f64> = (0..order).map(|k| a[k * (order + 1)].re()).collect();
     if !converged || diagonal.iter().any(|value| !value.is_finite()) {
         return None;
     }
@@ -162,20 +161,15 @@ pub(crate) fn jacobi<T: Scalar>(mut a: Vec<T>, order: usize) -> Option<(Vec<f64>
     Some((places.iter().map(|&k| diagonal[k]).collect(), vectors))
 }
 
-/// One rotation that annihilates a_pq; `Some(false)` if that element is negligible, `None` if it is not finite.
-fn rotate<'a, T: Scalar>(
-    a: &mut Columns<'a, T>,
-    v: &mut Columns<'a, T>,
-    order: usize,
-    p: usize,
-    q: usize,
-) -> Option<bool> {
-    let off = a[(p, q)];
+/// One rotation of columns p < q that annihilates a_pq; `Some(false)` if that element is negligible, `None` if it is not finite.
+fn rotate<T: Scalar>(a: &mut [T], v: &mut [T], order: usize, p: usize, q: usize) -> Option<bool> {
+    let at = |row: usize, column: usize| row + column * order;
+    let off = a[at(p, q)];
     let size = off.abs();
     if !size.is_finite() {
         return None;
     }
-    let (app, aqq) = (a[(p, p)].re(), a[(q, q)].re());
+    let (app, aqq) = (a[at(p, p)].re(), a[at(q, q)].re());
     // negligible: it cannot change either diagonal element any more
     if size <= f64::EPSILON * 0.25 * (app.abs() * aqq.abs()).sqrt() || size < f64::MIN_POSITIVE {
         return Some(false);
@@ -187,22 +181,19 @@ fn rotate<'a, T: Scalar>(
     let s = t * c;
     // columns p and q of A and V times [[c, s phase], [-s conj(phase), c]]
     let (up, down) = (phase * s, phase.conj() * s);
-    for k in 0..order {
-        for matrix in [&mut *a, &mut *v] {
-            let (x, y) = (matrix[(k, p)], matrix[(k, q)]);
-            matrix[(k, p)] = x * c - y * down;
-            matrix[(k, q)] = x * up + y * c;
+    for matrix in [&mut *a, &mut *v] {
+        let (before, from_q) = matrix.split_at_mut(q * order);
+        for (x, y) in before[p * order..(p + 1) * order].iter_mut().zip(&mut from_q[..order]) {
+            (*x, *y) = (*x * c - *y * down, *x * up + *y * c);
         }
     }
-    // rows p and q of A times the adjoint
+    // rows p and q of A times the adjoint: A stays Hermitian
     for k in 0..order {
-        let (x, y) = (a[(p, k)], a[(q, k)]);
-        a[(p, k)] = x * c - y * up;
-        a[(q, k)] = x * down + y * c;
+        (a[at(p, k)], a[at(q, k)]) = (a[at(k, p)].conj(), a[at(k, q)].conj());
     }
-    a[(p, q)] = T::zero();
-    a[(q, p)] = T::zero();
-    a[(p, p)] = T::from_real(app - t * size);
-    a[(q, q)] = T::from_real(aqq + t * size);
+    a[at(p, q)] = T::zero();
+    a[at(q, p)] = T::zero();
+    a[at(p, p)] = T::from_real(app - t * size);
+    a[at(q, q)] = T::from_real(aqq + t * size);
     Some(true)
 }
