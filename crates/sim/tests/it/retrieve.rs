@@ -62,6 +62,29 @@ fn reference_maps_are_retrieved_from_tables() {
 }
 
 #[test]
+fn a_scan_beyond_the_zenith_sees_the_wake_on_the_other_side() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = reference("estimate/map_a.csv");
+    let mut mirrored = String::new();
+    for line in fs::read_to_string(&path).unwrap().lines() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Some(Ok(elevation_rad)) = cells.get(1).map(|cell| cell.parse::<f64>()) {
+            cells[1] = (std::f64::consts::PI - elevation_rad).to_string();
+        }
+        mirrored += &(cells.join(",") + "\n");
+    }
+    fs::write(temp.path().join("mirrored.csv"), mirrored).unwrap();
+    let [here, there] =
+        [path.display().to_string().as_str(), "mirrored.csv"].map(|words| retrieved(temp.path(), words));
+    for (row, other) in [(0, 1), (1, 0)] {
+        for (name, sign) in [("gamma_m2_s", 1.0), ("y_m", -1.0), ("z_m", 1.0), ("wind_m_s", -1.0)] {
+            let (seen, std) = (sign * number(&there, other, name), number(&here, row, &name.replace("_m", "_std_m")));
+            assert!((seen - number(&here, row, name)).abs() < 0.02 * std, "{name}: {seen}, {here:?}");
+        }
+    }
+}
+
+#[test]
 fn wind_without_a_wake_is_a_result() {
     let temp = tempfile::tempdir().unwrap();
     let mut rows = String::from("range_m,elevation_deg,velocity_m_s,sigma_m_s\n");

@@ -23,8 +23,8 @@ pub(super) struct RayRow {
 const ONE_PLANE_RAD: f64 = 0.02;
 /// Part of a scan's elevations that a line must go back for another scan to begin.
 const TURN: f64 = 0.1;
-/// Largest elevation, with rounding, rad.
-const MOST_RAD: f64 = std::f64::consts::FRAC_PI_2 + 1e-6;
+/// Elevations of a scan, with rounding, rad: beyond the zenith it looks to the other side.
+const ALLOWED_RAD: std::ops::RangeInclusive<f64> = -std::f64::consts::FRAC_PI_2 - 1e-6..=std::f64::consts::PI + 1e-6;
 /// Least lines, gates and velocities of a map.
 const LEAST: (usize, usize, usize) = (3, 3, 30);
 
@@ -47,9 +47,9 @@ pub(super) fn scan_map(
     fold_m_s: Option<f64>,
     what: &str,
 ) -> Result<ScanMap, String> {
-    if let Some(bad) = rays.iter().find(|ray| !(-MOST_RAD..=MOST_RAD).contains(&ray.elevation_rad)) {
+    if let Some(bad) = rays.iter().find(|ray| !ALLOWED_RAD.contains(&ray.elevation_rad)) {
         return Err(format!(
-            "{what}: elevation is {} degrees: from -90 to 90 are allowed",
+            "{what}: elevation is {} degrees: from -90 to 180 are allowed, beyond 90 to the other side",
             bad.elevation_rad.to_degrees()
         ));
     }
