@@ -80,8 +80,10 @@ impl Volume {
         self.value(self.place(at_m))
     }
 
-    fn place(&self, at_m: [f64; 3]) -> Place {
-        std::array::from_fn(|d| self.bins[d].place(&self.axis_m[d], at_m[d]))
+    fn place(&self, [x_m, y_m, z_m]: [f64; 3]) -> Place {
+        // Written out: a closure for `from_fn` is a call of its own, and this is most of the work of a ray.
+        let ([x, y, z], [x_axis, y_axis, z_axis]) = (&self.bins, &self.axis_m);
+        [x.place(x_axis, x_m), y.place(y_axis, y_m), z.place(z_axis, z_m)]
     }
 
     fn value(&self, [x, y, z]: Place) -> f64 {
@@ -125,13 +127,15 @@ impl Volume {
         mut met: impl FnMut(Crossing) -> bool,
     ) {
         let Some((start, end)) = self.span_m(from_m, along) else { return };
-        let on_ray = |t: f64| -> [f64; 3] { std::array::from_fn(|d| from_m[d] + t * along[d]) };
+        let on_ray = |t: f64| [from_m[0] + t * along[0], from_m[1] + t * along[1], from_m[2] + t * along[2]];
         let step = |number: f64| (start + number * self.step_m).min(end);
         let mut place = self.place(on_ray(start));
         let (mut number, mut value) = (0.0, self.value(place));
         while step(number) < end {
-            if self.passes(place, levels) {
-                let left = (self.leaves_m(place, from_m, along) - start) / self.step_m - 1e-6;
+            let block =
+                if self.passes(place, levels) { Some(BLOCK) } else { self.cell_passes(place, levels).then_some(1) };
+            if let Some(block) = block {
+                let left = (self.leaves_m(place, block, from_m, along) - start) / self.step_m - 1e-6;
                 number = left.floor().max(number);
                 if step(number) >= end {
                     return;
@@ -164,12 +168,26 @@ impl Volume {
         levels.iter().all(|level| (low < *level) == (high < *level))
     }
 
-    /// Where the ray leaves the block of a cell \[m\].
-    fn leaves_m(&self, place: Place, from_m: [f64; 3], along: [f64; 3]) -> f64 {
+    /// Whether the values at the corners of a cell lie on the same side of each level.
+    fn cell_passes(&self, [x, y, z]: Place, levels: &[f64]) -> bool {
+        let [nx, ny, _] = self.axis_m.each_ref().map(Vec::len);
+        let start = (z.0 * ny + y.0) * nx + x.0;
+        let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
+        for row in [start, start + nx, start + nx * ny, start + nx * ny + nx] {
+            for value in &self.values[row..row + 2] {
+                ends = with_value(ends, *value);
+            }
+        }
+        let [low, high] = ends.map(f64::from);
+        levels.iter().all(|level| (low < *level) == (high < *level))
+    }
+
+    /// Where the ray leaves the block of so many cells that a cell lies in \[m\].
+    fn leaves_m(&self, place: Place, block: usize, from_m: [f64; 3], along: [f64; 3]) -> f64 {
         (0..3).filter(|d| along[*d].abs() > 1e-12).fold(f64::INFINITY, |least, d| {
             let axis = &self.axis_m[d];
-            let first = place[d].0 / BLOCK * BLOCK;
-            let side = if along[d] > 0.0 { (first + BLOCK).min(axis.len() - 1) } else { first };
+            let first = place[d].0 / block * block;
+            let side = if along[d] > 0.0 { (first + block).min(axis.len() - 1) } else { first };
             least.min((axis[side] - from_m[d]) / along[d])
         })
     }
@@ -197,7 +215,13 @@ impl Volume {
     }
 }
 
-/// Smallest and largest value of each block of cells; a block of NaN has no side of any level and is never passed.
+/// Smallest and largest value with one more; NaN has no side of any level and is never passed.
+#[inline]
+fn with_value([low, high]: [f32; 2], value: f32) -> [f32; 2] {
+    if value.is_nan() { [f32::NEG_INFINITY, f32::INFINITY] } else { [low.min(value), high.max(value)] }
+}
+
+/// Smallest and largest value of each block of cells.
 fn extremes([nx, ny, nz]: [usize; 3], values: &[f32]) -> Vec<[f32; 2]> {
     let [bx, by, bz] = [nx, ny, nz].map(|points| (points - 1).div_ceil(BLOCK));
     let points = |block: usize, count: usize| block * BLOCK..=((block + 1) * BLOCK).min(count - 1);
@@ -209,8 +233,7 @@ fn extremes([nx, ny, nz]: [usize; 3], values: &[f32]) -> Vec<[f32; 2]> {
                 let row = (k * ny + j) * nx;
                 let cells = points(block % bx, nx);
                 for value in &values[row + cells.start()..=row + cells.end()] {
-                    let value = if value.is_nan() { [f32::NEG_INFINITY, f32::INFINITY] } else { [*value; 2] };
-                    ends = [ends[0].min(value[0]), ends[1].max(value[1])];
+                    ends = with_value(ends, *value);
                 }
             }
         }
