@@ -3,6 +3,9 @@
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
+/// Share of a level below which two levels do not differ.
+pub(crate) const NO_DIFFERENCE: f64 = 0.05;
+
 /// How a claim came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -19,9 +22,12 @@ impl Verdict {
         if pass { Self::Pass } else { Self::Fail }
     }
 
-    /// Of differences in standard errors: pass if all are above `limit`, fail if one is below its negative.
-    pub(crate) fn of_differences(z: &[f64], limit: f64) -> Self {
-        match (z.iter().all(|z| *z > limit), z.iter().any(|z| *z < -limit)) {
+    /// Of differences, each a share of the level with its standard error, of which `limit` are trusted: pass if all are
+    /// above their errors, fail if one is surely below [`NO_DIFFERENCE`].
+    pub(crate) fn of_differences(shares: &[(f64, f64)], limit: f64) -> Self {
+        let all = shares.iter().all(|(share, error)| *share > limit * error);
+        let none = shares.iter().any(|(share, error)| share + limit * error < NO_DIFFERENCE);
+        match (all, none) {
             (true, _) => Self::Pass,
             (_, true) => Self::Fail,
             _ => Self::NotResolved,
@@ -153,10 +159,13 @@ mod tests {
 
     #[test]
     fn differences_decide_only_beyond_their_errors() {
-        let of = |z: &[f64]| Verdict::of_differences(z, 2.0);
+        let of = |shares: &[(f64, f64)]| Verdict::of_differences(shares, 2.0);
+        let large = (0.5, 0.1);
         assert_eq!(
-            [of(&[2.1, 3.0]), of(&[3.0, -2.1]), of(&[3.0, 0.5])],
-            [Verdict::Pass, Verdict::Fail, Verdict::NotResolved]
+            [of(&[large, (0.03, 0.01)]), of(&[large, (-0.5, 0.1)]), of(&[large, (0.01, 0.015)])],
+            [Verdict::Pass, Verdict::Fail, Verdict::Fail]
         );
+        let unsure = [(0.1, 0.1), (0.0, 0.03), (f64::NAN, 0.1), (0.1, f64::NAN)];
+        assert!(unsure.iter().all(|share| of(&[large, *share]) == Verdict::NotResolved));
     }
 }

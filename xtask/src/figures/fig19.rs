@@ -31,10 +31,12 @@ struct Case {
     power: Power,
 }
 
-/// The lidar of Table 2 with a scan of the same extent about a range, lines half a metre apart there.
-fn scene(range_m: f64) -> Scene {
+/// The lidar of Table 2 with a scan of the same extent about a range, lines so far apart there.
+fn scene(range_m: f64, step_m: f64) -> Scene {
     let mut scene = Scene { flow: Flow::Calm {}, ..Scene::default() };
-    scene.scan.elevation_step_rad = 0.5 / range_m;
+    // windows of 64 samples overlap so far that each second one says nearly all
+    scene.estimator.window_step_samples = 2;
+    scene.scan.elevation_step_rad = step_m / range_m;
     scene.scan.elevation_max_rad = HEIGHT_M / range_m;
     (scene.scan.range_min_m, scene.scan.range_max_m) = (range_m - HALF_LENGTH_M, range_m + HALF_LENGTH_M);
     scene.scan.realisations = 1;
@@ -60,9 +62,10 @@ fn settings(
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let ranges_m = context.choose(vec![400.0], vec![300.0, 400.0, 600.0, 900.0], vec![300.0, 400.0, 600.0, 900.0]);
+    let step_m = context.choose(1.0, 0.5, 0.5);
     let mut cases = Vec::new();
     for &range_m in &ranges_m {
-        let plan = Plan::new(context.scene_file(scene(range_m))?, Target::Map)?;
+        let plan = Plan::new(context.scene_file(scene(range_m, step_m))?, Target::Map)?;
         let snr_db = snr_without_screens_db(&plan, &[range_m])?.first().copied().unwrap_or(f64::NAN);
         let noise = SceneNoise::new(&plan, &Silent)?;
         for (background, turbulence) in [("still air", None), ("turbulence", Some(AIR))] {
@@ -72,10 +75,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             cases.push(Case { background, range_m, snr_db, power });
         }
     }
-    let scans = context.choose(40, 300, 1000);
-    let alarms = alarms(context, scans)?;
+    let scans = context.choose(30, 300, 1000);
+    let alarms = alarms(context, scans, step_m)?;
     let parameters = format!(
-        "profile = \"{}\"\nrange_m = {ranges_m:?}\nfalse_alarm = {FALSE_ALARM}\nturbulence = [{}, {}]\nscans_of_still_air = {scans}\n",
+        "profile = \"{}\"\nrange_m = {ranges_m:?}\nline_spacing_m = {step_m}\nfalse_alarm = {FALSE_ALARM}\nturbulence = [{}, {}]\nscans_of_still_air = {scans}\n",
         context.profile_name(),
         AIR.deviation_m_s,
         AIR.length_m
@@ -96,9 +99,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
 /// Share of alarms in whole scans of still air, each with signals of its own, through the scene's estimator, and the binomial
 /// standard error of the rate that was set.
-fn alarms(context: &Context, scans: u64) -> Result<(Share, f64), Failure> {
+fn alarms(context: &Context, scans: u64, step_m: f64) -> Result<(Share, f64), Failure> {
     let plan = |seed: u64| -> Result<Plan, Failure> {
-        let mut file = context.scene_file(scene(400.0))?;
+        let mut file = context.scene_file(scene(400.0, step_m))?;
         file.scene.seed = seed;
         Ok(Plan::new(file, Target::Map)?)
     };
