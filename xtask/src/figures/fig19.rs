@@ -75,7 +75,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             cases.push(Case { background, range_m, snr_db, power });
         }
     }
-    let scans = context.choose(30, 300, 1000);
+    let scans = context.choose(20, 300, 1000);
     let alarms = alarms(context, scans, step_m)?;
     let parameters = format!(
         "profile = \"{}\"\nrange_m = {ranges_m:?}\nline_spacing_m = {step_m}\nfalse_alarm = {FALSE_ALARM}\nturbulence = [{}, {}]\nscans_of_still_air = {scans}\n",
