@@ -1,10 +1,13 @@
 //! What a simulation is told beside its mesh and its initial field.
 
+use std::sync::Arc;
+
 use super::mesh::{AXIS_NAMES, Mesh};
 use super::pressure::PressureMethod;
 use super::subgrid::{self, SubgridModel};
 use crate::Error;
 use crate::error::check;
+use crate::ranks::{Ranks, Single};
 
 /// Time integration of convection and subgrid stresses; viscosity is Crank-Nicolson along implicit axes in both.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -130,6 +133,9 @@ pub struct FlowSettings {
     pub subgrid: SubgridModel,
     /// Order of the directions in memory, slowest last; `None` chooses. It changes rounding, nothing else.
     pub memory_order: Option<[usize; 3]>,
+    /// The ranks that share the flow; one process unless told otherwise. They change nothing of a result. All ranks must have
+    /// the same settings but for their own number, and make the same calls.
+    pub ranks: Arc<dyn Ranks>,
 }
 
 impl FlowSettings {
@@ -147,6 +153,7 @@ impl FlowSettings {
             rotational: false,
             subgrid: SubgridModel::None,
             memory_order: None,
+            ranks: Arc::new(Single),
         }
     }
 
