@@ -8,7 +8,8 @@
 
 mod threads;
 
-use std::fmt::Debug;
+use std::borrow::Cow;
+use std::fmt::{Debug, Display};
 
 use crate::Error;
 
@@ -46,5 +47,47 @@ impl Ranks for Single {
     fn turn(&self, send: &[f64], _: &[usize], receive: &mut [f64], _: &[usize]) -> Result<(), Error> {
         receive.copy_from_slice(send);
         Ok(())
+    }
+}
+
+/// Everybody's numbers in the order of the ranks.
+///
+/// # Errors
+/// Those of [`Ranks::turn`].
+pub fn together<'a>(ranks: &dyn Ranks, own: &'a [f64]) -> Result<Cow<'a, [f64]>, Error> {
+    let count = ranks.count();
+    if count == 1 {
+        return Ok(Cow::Borrowed(own));
+    }
+    let share = |own: &[f64], from: &[usize]| {
+        let mut all = vec![0.0; from.iter().sum()];
+        ranks.turn(&own.repeat(count), &vec![own.len(); count], &mut all, from).map(|()| all)
+    };
+    let lengths = share(&[own.len() as f64], &vec![1; count])?;
+    let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
+    share(own, &lengths).map(Cow::Owned)
+}
+
+/// An error of one rank is the error of all, that of the lowest if there are several; `other` makes it from
+/// [`Error::OtherRank`], which has its words, where it did not happen.
+///
+/// # Errors
+/// It; those of [`Ranks::turn`].
+pub fn agree<T, E: Display>(ranks: &dyn Ranks, result: Result<T, E>, other: impl Fn(Error) -> E) -> Result<T, E> {
+    if ranks.count() == 1 {
+        return result;
+    }
+    let own = result.as_ref().err().map(ToString::to_string);
+    let failed = [f64::from(u8::from(own.is_some()))];
+    let failed = together(ranks, &failed).map_err(&other)?;
+    let Some(rank) = failed.iter().position(|failed| *failed > 0.0) else { return result };
+    let told = own.as_deref().filter(|_| ranks.rank() == rank).unwrap_or_default();
+    let bytes: Vec<f64> = told.bytes().map(f64::from).collect();
+    let bytes: Vec<u8> = together(ranks, &bytes).map_err(&other)?.iter().map(|byte| *byte as u8).collect();
+    let message = String::from_utf8_lossy(&bytes).into_owned();
+    match result {
+        // Every rank that found the same keeps what it knows of it.
+        Err(error) if own.as_ref() == Some(&message) => Err(error),
+        _ => Err(other(Error::OtherRank { rank, message })),
     }
 }

@@ -11,6 +11,7 @@
 use rayon::prelude::*;
 
 mod project;
+mod show;
 
 use super::implicit::LineSolver;
 use super::layout::{Layout, Shape};

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::rows::HALO;
 use super::shape::Shape;
 use crate::Error;
-use crate::ranks::Ranks;
+use crate::ranks::{self, Ranks};
 
 /// The ranks and what this one holds.
 #[derive(Debug, Clone)]
@@ -36,7 +36,8 @@ impl Slabs {
         Ok(Self { ranks, shape })
     }
 
-    fn is_alone(&self) -> bool {
+    /// Whether there is but one rank.
+    pub(crate) fn is_alone(&self) -> bool {
         self.ranks.count() == 1
     }
 
@@ -90,22 +91,12 @@ impl Slabs {
         Ok(())
     }
 
-    /// Everybody's numbers in the order of the ranks.
+    /// As [`ranks::together`].
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
+    /// As there.
     pub(crate) fn together<'a>(&self, own: &'a [f64]) -> Result<Cow<'a, [f64]>, Error> {
-        if self.is_alone() {
-            return Ok(Cow::Borrowed(own));
-        }
-        let share = |own: &[f64], from: &[usize]| {
-            let mut all = vec![0.0; from.iter().sum()];
-            let count = from.len();
-            self.ranks.turn(&own.repeat(count), &vec![own.len(); count], &mut all, from).map(|()| all)
-        };
-        let lengths = share(&[own.len() as f64], &vec![1; self.ranks.count()])?;
-        let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
-        share(own, &lengths).map(Cow::Owned)
+        ranks::together(&*self.ranks, own)
     }
 
     /// The numbers of all planes, from those of the planes that are owned: what is summed in their order does not depend on
@@ -201,24 +192,12 @@ impl Slabs {
         field[self.shape.own_places()].copy_from_slice(&whole[own.start * plane..own.end * plane]);
     }
 
-    /// An error of one rank is the error of all, that of the lowest if there are several.
+    /// As [`ranks::agree`].
     ///
     /// # Errors
-    /// It, with the same words everywhere; those of [`Ranks::turn`].
+    /// As there.
     pub(crate) fn agree<T>(&self, result: Result<T, Error>) -> Result<T, Error> {
-        if self.is_alone() {
-            return result;
-        }
-        let failed = self.together(&[f64::from(u8::from(result.is_err()))])?.iter().position(|failed| *failed > 0.0);
-        let Some(rank) = failed else { return result };
-        let own = self.ranks.rank() == rank;
-        let text = result.as_ref().err().filter(|_| own).map(ToString::to_string).unwrap_or_default();
-        let words: Vec<f64> = text.bytes().map(f64::from).collect();
-        let bytes: Vec<u8> = self.together(&words)?.iter().map(|byte| *byte as u8).collect();
-        match result {
-            Err(error) if own => Err(error),
-            _ => Err(Error::OtherRank { rank, message: String::from_utf8_lossy(&bytes).into_owned() }),
-        }
+        ranks::agree(&*self.ranks, result, |other| other)
     }
 }
 

@@ -28,7 +28,7 @@ mod writer;
 
 pub use case::{AxisName, Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time};
 pub use examples::{EXAMPLES, example};
-pub use execute::{RunOptions, check, run, run_with};
+pub use execute::{RunOptions, check, run, run_on, run_with};
 pub use forecast::{FileForecast, FlowForecast};
 pub use free::{Axis, EndName, Free, InitialName, InitialPair, MappingName};
 pub use kind::CaseKind;
