@@ -41,6 +41,19 @@ impl ThreadRanks {
 }
 
 /// Runs `work` on `count` threads as ranks and returns what each of them did, or `None` for one that panicked.
+///
+/// ```
+/// use wakescope_les::{FlowSettings, cases::taylor_green_3d, ranks::on_threads};
+///
+/// let case = taylor_green_3d(16, 100.0)?;
+/// let energy = on_threads(3, |ranks| {
+///     let settings = FlowSettings { ranks, ..case.settings.clone() };
+///     let (mut flow, _) = case.initial.start(case.mesh.clone(), settings)?;
+///     flow.step().map(|report| report.kinetic_energy_m5_s2)
+/// });
+/// assert!(energy.iter().all(|found| matches!(found, Some(Ok(_))) && *found == energy[0]));
+/// # Ok::<(), wakescope_les::Error>(())
+/// ```
 pub fn on_threads<T: Send>(count: usize, work: impl Fn(Arc<dyn Ranks>) -> T + Sync) -> Vec<Option<T>> {
     std::thread::scope(|scope| {
         let work = &work;

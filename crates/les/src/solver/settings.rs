@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::layout::Layout;
 use super::mesh::{AXIS_NAMES, Mesh};
 use super::pressure::PressureMethod;
 use super::subgrid::{self, SubgridModel};
@@ -160,10 +161,11 @@ impl FlowSettings {
     /// Refuses what a flow on `mesh` would refuse, before anything is allocated.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a setting, [`Error::BadDirection`] for no-slip walls without viscosity.
+    /// [`Error::OutOfRange`] for a setting, [`Error::BadDirection`] for no-slip walls without viscosity, [`Error::TooManyRanks`].
     pub fn validate(&self, mesh: &Mesh) -> Result<(), Error> {
         self.check()?;
         subgrid::check_constants(self.subgrid)?;
+        Layout::on(mesh, self.memory_order, self.ranks.clone())?;
         refuse_sticking_without_viscosity(mesh, self.viscosity_m2_s)
     }
 

@@ -116,20 +116,19 @@ pub fn run_on(
         Source::Checkpoint => resume(&checkpoint, setup, plan, &file.case)?,
         Source::Previous => resume(&previous, setup, plan, &file.case)?,
     };
-    let mut writer = if is_first {
+    let writer = if is_first {
         warnings.iter().for_each(|text| watch.note(text));
         let wake = meter.map(|meter| WakeRun::new(meter, run.flow(), folder.to_owned(), file.provenance()));
         let continues = source != Source::Nothing;
         let written = begin_files(file, folder, &files, wake, (continues, &kept));
-        written.map(|(wake, steps, written)| {
+        written.map(|Begun { wake, steps, written }| {
             let (start_s, end_s) = (run.flow().time_s(), run.plan().end_s);
             Some(Writer { files, schedule, steps, wake, written, warnings, watch, start_s, end_s, error: None })
         })
     } else {
         Ok(None)
     };
-    writer = agree(ranks, writer);
-    let mut writer = writer?;
+    let mut writer = agree(ranks, writer)?;
     let result = match &mut writer {
         Some(writer) => run.to_end(writer),
         None => run.to_end(&mut Silent),
@@ -193,19 +192,25 @@ fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(Fold
     Ok((lock, source))
 }
 
-/// The files that grow with the run, begun or continued from what a checkpoint kept of them; their paths.
+/// The files that grow with a run, and the paths of all that were begun.
+struct Begun {
+    wake: Option<WakeRun>,
+    steps: Option<StepTable>,
+    written: Vec<PathBuf>,
+}
+
+/// Begins the files of a run, or continues them from what a checkpoint kept.
 fn begin_files(
     file: &CaseFile,
     folder: &Path,
     files: &Files,
     mut wake: Option<WakeRun>,
     (continues, kept): (bool, &[u8]),
-) -> Result<(Option<WakeRun>, Option<StepTable>, Vec<PathBuf>), Error> {
+) -> Result<Begun, Error> {
     let kept = Kept::read(kept, wake.is_some());
     if let (Some(wake), true) = (&mut wake, continues) {
         let ([path, _], what) = (checkpoint_paths(folder), "its history of the wake is not that of this case");
-        wake.restore(&kept.wake)
-            .ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
+        wake.restore(&kept.wake).ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
     }
     let case_toml = folder.join(CASE);
     write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
@@ -218,7 +223,7 @@ fn begin_files(
     let mut written = vec![case_toml];
     written.extend(steps.is_some().then_some(steps_path));
     written.extend(wake.iter().flat_map(WakeRun::paths));
-    Ok((wake, steps, written))
+    Ok(Begun { wake, steps, written })
 }
 
 /// Refuses a folder that holds a run that is not to be overwritten, that cannot be written to, or that is in use.
@@ -232,12 +237,7 @@ fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
 }
 
 /// The setup and the plan of a case, with all that can be refused before the computing.
-fn prepare(
-    file: &CaseFile,
-    folder: &Path,
-    options: RunOptions,
-    ranks: &Arc<dyn Ranks>,
-) -> Result<Prepared, Error> {
+fn prepare(file: &CaseFile, folder: &Path, options: RunOptions, ranks: &Arc<dyn Ranks>) -> Result<Prepared, Error> {
     // Of several ranks each is taken to have a machine of its own.
     let machines = ranks.count() as f64;
     let available = machine::available_memory_bytes().filter(|_| !options.allow_large).map(|bytes| bytes * machines);

@@ -18,6 +18,8 @@ mod initial_file;
 mod integration;
 mod kind;
 mod named;
+#[cfg(test)]
+mod ranks_tests;
 #[cfg(feature = "netcdf")]
 mod read;
 mod setup;
