@@ -65,6 +65,8 @@ fn steps() -> Result<Vec<Step>, Failure> {
         "wake",
         format!("cargo run --quiet --bin wakescope -- wake {WAKE} --out {WAKE_OUT} --overwrite --quiet"),
     ));
+    // Says so where there is no MPI.
+    out.push(plain("mpi", format!("'{own}' ranks")));
     out.push(plain("figures", format!("'{own}' reproduce-figs --profile quick --no-cache --wake {WAKE_OUT}")));
     Ok(out)
 }

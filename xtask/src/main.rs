@@ -15,6 +15,7 @@ mod forecast;
 mod fuzz_scenes;
 mod process;
 mod profile;
+mod ranks;
 mod references;
 mod regress;
 mod reproduce;
@@ -68,6 +69,8 @@ enum Task {
     ReproduceFigs(reproduce::Options),
     /// Compare what the crates compute now with the stored reference curves.
     Regress(regress::Options),
+    /// A wake under `mpirun` against one process; a run whose second process is killed.
+    Ranks,
     /// Write stored reference curves from what the crates compute now.
     Bless(bless::Options),
     /// Measure error against run time.
@@ -92,6 +95,7 @@ fn main() -> std::process::ExitCode {
     let result = match Cli::parse().task {
         Task::ReproduceFigs(options) => reproduce::run(&options),
         Task::Regress(options) => regress::run(&options),
+        Task::Ranks => ranks::run(),
         Task::Bless(options) => bless::run(&options),
         Task::WorkPrecision(options) => work_precision::run(&options),
         Task::FitTrials(options) => fit_trials::run(&options),

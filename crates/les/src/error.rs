@@ -268,6 +268,35 @@ pub enum Error {
         /// Relative residual after each pass or iteration.
         history: Vec<f64>,
     },
+    /// More ranks than a flow can be shared among.
+    #[error(
+        "{ranks} ranks for a mesh with {planes} planes along its last direction in memory: a rank owns at least 4 of them, so at most \
+         {most} ranks are allowed; give each of them more threads instead"
+    )]
+    TooManyRanks {
+        /// Number of ranks.
+        ranks: usize,
+        /// Planes of the mesh.
+        planes: usize,
+        /// Largest number of ranks.
+        most: usize,
+    },
+    /// A rank has ended on which this one waited.
+    #[error(
+        "rank {rank}, which has a part of the flow, has ended: the run cannot go on; restart it from its last checkpoint"
+    )]
+    RankLost {
+        /// The rank.
+        rank: usize,
+    },
+    /// What went wrong on another rank, in its words.
+    #[error("{message}")]
+    OtherRank {
+        /// The rank.
+        rank: usize,
+        /// Its error.
+        message: String,
+    },
     /// A point is outside the mesh and the policy is to refuse it.
     #[error("the point y = {y_m:?} m, z = {z_m:?} m is outside the mesh")]
     OutsideMesh {

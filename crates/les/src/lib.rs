@@ -30,6 +30,7 @@
 //! |---|---|
 //! | [`winds`] | the trait [`Wind`]: analytic vortices, uniform winds, sums, fields on meshes |
 //! | [`solver`] | [`Flow`]: the large-eddy simulation, its mesh, settings, pressure equation, runs with checkpoints |
+//! | [`ranks`] | processes or threads that share a flow |
 //! | [`cases`] | flows with known solutions, and the wake above ground |
 //! | [`analysis`] | what is measured in a wind or a flow: circulations, cross-planes, the state of a wake |
 //!
@@ -41,6 +42,8 @@ struct Readme;
 
 pub mod analysis;
 mod error;
+#[cfg(feature = "solver")]
+pub mod ranks;
 #[cfg(feature = "solver")]
 pub mod solver;
 pub mod winds;

@@ -67,15 +67,7 @@ impl Flow {
         if courant <= limit {
             return Ok(());
         }
-        let mut worst = (0, 0, 0.0);
-        for (axis, field) in self.state.velocity.iter().enumerate() {
-            for (place, value) in field.iter().enumerate() {
-                if value.abs() > worst.2 {
-                    worst = (axis, place, value.abs());
-                }
-            }
-        }
-        let (axis, place, _) = worst;
+        let (_, axis, place) = self.first_largest(|axis, place| self.state.velocity[axis][place].abs())?;
         Err(Error::CourantTooLarge {
             step: self.state.step + 1,
             step_s,
@@ -88,8 +80,31 @@ impl Flow {
         })
     }
 
-    pub(super) fn diverged(&self, axis: usize, field: &'static str) -> Error {
-        let place = self.state.velocity[axis].iter().position(|v| !v.is_finite()).unwrap_or(0);
+    /// The largest positive value at the places that the ranks own, with memory axis of the component and place in the whole
+    /// field of the first that has it.
+    pub(super) fn first_largest(&self, of: impl Fn(usize, usize) -> f64) -> Result<(f64, usize, usize), Error> {
+        let shape = self.layout.shape;
+        let (own, first) = (shape.own_places(), shape.own().start * shape.plane());
+        let larger = |best: [f64; 3], next: [f64; 3]| {
+            let is_before = next[0] == best[0] && next[1..] < best[1..];
+            if next[0] > best[0] || is_before { next } else { best }
+        };
+        let none = [0.0, f64::INFINITY, 0.0];
+        let of = |axis: usize, place: usize| [of(axis, place), axis as f64, (place - own.start + first) as f64];
+        let all = (0..3).flat_map(|axis| own.clone().map(move |place| (axis, place)));
+        let best = all.fold(none, |best, (axis, place)| larger(best, of(axis, place)));
+        let ranks = self.layout.slabs.together(&best)?;
+        let [value, axis, place] = ranks.as_chunks::<3>().0.iter().fold(none, |best, next| larger(best, *next));
+        Ok(if value > 0.0 { (value, axis as usize, place as usize) } else { (0.0, 0, 0) })
+    }
+
+    /// Whether a velocity is not finite, and the first such place.
+    pub(super) fn first_not_finite(&self) -> Result<(bool, usize, usize), Error> {
+        let not_finite = |axis: usize, place: usize| f64::from(u8::from(!self.state.velocity[axis][place].is_finite()));
+        self.first_largest(not_finite).map(|(found, axis, place)| (found > 0.0, axis, place))
+    }
+
+    pub(super) fn diverged(&self, axis: usize, place: usize, field: &'static str) -> Error {
         Error::Diverged {
             field,
             step: self.state.step,
@@ -104,7 +119,7 @@ impl Flow {
         ["u", "v", "w"][self.layout.direction[axis]]
     }
 
-    /// Indices along x, y, z of a place in memory.
+    /// Indices along x, y, z of a place in a whole field.
     pub(super) fn cell(&self, place: usize) -> [usize; 3] {
         let mut cell = [0; 3];
         for (axis, index) in self.layout.shape.index(place).into_iter().enumerate() {

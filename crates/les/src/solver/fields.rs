@@ -1,9 +1,14 @@
 //! Fields of a flow as plain arrays in the order `[z][y][x]`, whatever their order in memory.
 //!
+//! Of a flow on several ranks all must ask together, and all get the whole field; where a rank is lost, which the next step
+//! says, its values are not finite.
+//!
 //! Check: round trip, interpolation exact for cubics, values against the closed form they were set from.
 
+use std::borrow::Cow;
+
 use super::flow::Flow;
-use super::layout::Layout;
+use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
 use super::settings::FlowSettings;
 use crate::Error;
@@ -41,14 +46,24 @@ impl Flow {
 
     /// Largest divergence over the largest `sum |u_i|/h_i`: what the flow fails to conserve of its own volume.
     pub fn relative_divergence(&self) -> f64 {
+        self.measure_divergence().unwrap_or(f64::NAN)
+    }
+
+    pub(super) fn measure_divergence(&self) -> Result<f64, Error> {
         let velocity = self.state.velocity.each_ref().map(Vec::as_slice);
-        let largest = self.divergence.largest_per_s(velocity);
-        if largest == 0.0 { 0.0 } else { largest / self.state.courant_per_s }
+        let [largest] = self.layout.slabs.largest([self.divergence.largest_per_s(velocity)])?;
+        Ok(if largest == 0.0 { 0.0 } else { largest / self.state.courant_per_s })
+    }
+
+    /// A whole field from those of all ranks.
+    fn whole<'a>(&self, field: &'a [f64]) -> Cow<'a, [f64]> {
+        let lost = |_| Cow::Owned(vec![f64::NAN; Shape::whole(self.layout.shape.n).len()]);
+        self.layout.slabs.whole(field, true).unwrap_or_else(lost)
     }
 
     /// Velocity along `direction` (0, 1, 2 for x, y, z) at the low faces of the cells \[m/s\], `[z][y][x]`.
     pub fn face_velocity_m_s(&self, direction: usize) -> Vec<f64> {
-        to_xyz(&self.layout, &self.state.velocity[self.layout.axis_of(direction)])
+        to_xyz(&self.layout, &self.whole(&self.state.velocity[self.layout.axis_of(direction)]))
     }
 
     /// Velocity along `direction` at the centres of the cells, interpolated with fourth order \[m/s\], `[z][y][x]`.
@@ -58,7 +73,7 @@ impl Flow {
         let line = &self.layout.line[axis];
         let n = line.cells;
         let stride = [1, shape.n[0], shape.plane()][axis];
-        let field = &self.state.velocity[axis];
+        let field = self.whole(&self.state.velocity[axis]);
         let mut centred = vec![0.0; field.len()];
         for (place, value) in centred.iter_mut().enumerate() {
             let index = place / stride % n;
@@ -83,13 +98,13 @@ impl Flow {
 
     /// Kinematic pressure at the centres \[m^2/s^2\], `[z][y][x]`, up to a constant.
     pub fn pressure_m2_s2(&self) -> Vec<f64> {
-        to_xyz(&self.layout, &self.state.pressure)
+        to_xyz(&self.layout, &self.whole(&self.state.pressure))
     }
 
     /// Eddy viscosity at the centres \[m^2/s\], `[z][y][x]`, of the field that the last step started from; `None` without a
     /// subgrid model.
     pub fn subgrid_viscosity_m2_s(&self) -> Option<Vec<f64>> {
-        self.model.as_ref().map(|model| to_xyz(&self.layout, model.viscosity_m2_s()))
+        self.model.as_ref().map(|model| to_xyz(&self.layout, &self.whole(model.viscosity_m2_s())))
     }
 
     /// A flow that starts from velocities given at the low faces of the cells, `[z][y][x]` \[m/s\]; they are projected.
@@ -102,7 +117,7 @@ impl Flow {
         velocity_m_s: [&[f64]; 3],
     ) -> Result<(Self, super::StartReport), Error> {
         let mut flow = Self::at_rest(mesh, settings)?;
-        let cells = flow.layout.shape.len();
+        let cells = Shape::whole(flow.layout.shape.n).len();
         for (direction, values) in velocity_m_s.into_iter().enumerate() {
             if values.len() != cells {
                 return Err(Error::LengthMismatch { points: cells, out: values.len() });
@@ -117,7 +132,7 @@ impl Flow {
                     *value = 0.0;
                 }
             }
-            flow.state.velocity[axis] = field;
+            flow.layout.slabs.take_own(&field, &mut flow.state.velocity[axis]);
         }
         let report = flow.start()?;
         Ok((flow, report))

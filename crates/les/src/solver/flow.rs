@@ -11,6 +11,7 @@
 use rayon::prelude::*;
 
 mod project;
+mod show;
 
 use super::implicit::LineSolver;
 use super::layout::{Layout, Shape};
@@ -87,10 +88,10 @@ impl Flow {
                 let d = direction[b];
                 if b == axis { flow.mesh.face_m(d) } else { flow.mesh.centre_m(d) }
             });
-            let [n0, n1, _] = layout.shape.n;
+            let (n0, shape) = (layout.shape.n[0], layout.shape);
             let first = layout.line[axis].first_face();
-            let field = &mut flow.state.velocity[axis];
-            field.par_chunks_mut(n0 * n1).enumerate().for_each(|(k, plane)| {
+            let own = &mut flow.state.velocity[axis][shape.own_places()];
+            own.par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
                 for (place, value) in plane.iter_mut().enumerate() {
                     let index = [place % n0, place / n0, k];
                     let mut at_m = [0.0; 3];
@@ -109,7 +110,7 @@ impl Flow {
     pub(crate) fn at_rest(mesh: Mesh, settings: FlowSettings) -> Result<Self, Error> {
         settings.check()?;
         refuse_sticking_without_viscosity(&mesh, settings.viscosity_m2_s)?;
-        let layout = Layout::new(&mesh, settings.memory_order);
+        let layout = Layout::on(&mesh, settings.memory_order, settings.ranks.clone())?;
         let n = layout.shape.len();
         let field = || vec![0.0; n];
         let fields = || [field(), field(), field()];
@@ -141,10 +142,11 @@ impl Flow {
 
     /// Projects the initial field, finds its pressure, decides which directions are implicit.
     pub(crate) fn start(&mut self) -> Result<StartReport, Error> {
-        if let Some(axis) = (0..3).find(|&a| self.state.velocity[a].iter().any(|v| !v.is_finite())) {
-            return Err(self.diverged(axis, "initial velocity"));
+        let slabs = self.layout.slabs.clone();
+        if let (true, axis, place) = self.first_not_finite()? {
+            return Err(self.diverged(axis, place, "initial velocity"));
         }
-        let given = self.kinetic_energy();
+        let [given] = slabs.sums(self.kinetic_energy())?;
         let velocity = std::mem::take(&mut self.state.velocity);
         self.work.star = velocity;
         self.state.velocity = std::array::from_fn(|_| vec![0.0; self.layout.shape.len()]);
@@ -154,7 +156,7 @@ impl Flow {
         // The pressure that belongs to the field: that which keeps its acceleration free of divergence.
         let velocity = self.state.velocity.clone();
         let summary = (self.state.energy, self.state.courant_per_s);
-        self.accelerations();
+        self.accelerations()?;
         self.project(1.0)?;
         std::mem::swap(&mut self.state.pressure, &mut self.work.phi);
         self.state.velocity = velocity;
@@ -204,12 +206,12 @@ impl Flow {
             let stage_s = stage.fraction * step_s;
             // The report tells the powers of the field that the step began with.
             let first = powers.is_none();
-            let found = self.increments(&stage, stage_s, first);
+            let found = self.increments(&stage, stage_s, first)?;
             if first && starting {
                 first_terms = Some(self.state.history.clone());
             }
             powers.get_or_insert(found);
-            self.solve_lines(implicit_share * stage_s * self.settings.viscosity_m2_s);
+            self.solve_lines(implicit_share * stage_s * self.settings.viscosity_m2_s)?;
             solved = Some(self.project(stage_s)?);
             self.update_pressure();
         }
@@ -220,8 +222,8 @@ impl Flow {
         self.state.time_s += step_s;
         self.state.last_step_s = step_s;
         if !self.state.energy.is_finite() {
-            let axis = (0..3).find(|&a| self.state.velocity[a].iter().any(|v| !v.is_finite())).unwrap_or(0);
-            return Err(self.diverged(axis, "velocity"));
+            let (_, axis, place) = self.first_not_finite()?;
+            return Err(self.diverged(axis, place, "velocity"));
         }
         let powers = powers.unwrap_or_default();
         Ok(StepReport {
@@ -230,9 +232,9 @@ impl Flow {
             step_s,
             courant,
             kinetic_energy_m5_s2: self.state.energy,
-            viscous_power_m5_s3: powers.viscous,
-            subgrid_power_m5_s3: powers.subgrid,
-            force_power_m5_s3: powers.force,
+            viscous_power_m5_s3: powers[0],
+            subgrid_power_m5_s3: powers[1],
+            force_power_m5_s3: powers[2],
             subgrid_viscosity_m2_s: self.model.as_ref().map_or(0.0, Subgrid::max_viscosity_m2_s),
             subgrid_decay: step_s * self.model.as_ref().map_or(0.0, Subgrid::max_decay_per_s),
             pressure_iterations: solved.map_or(0, |s| s.iterations),
@@ -242,50 +244,54 @@ impl Flow {
     }
 
     /// The right side of (22) into `star`, with the velocity added if no line solve follows; the work of its terms if `measured`.
-    fn increments(&mut self, stage: &Stage, stage_s: f64, measured: bool) -> Powers {
+    fn increments(&mut self, stage: &Stage, stage_s: f64, measured: bool) -> Result<Powers, Error> {
         let explicit_per_s = self.settings.scheme.largest_decay() * stage.fraction / stage_s;
-        self.update_model((SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0));
-        let (shape, mut total) = (self.layout.shape, Powers::default());
-        let (task, star, history) = self.task();
-        let keep = if task.implicit == [false; 3] { 1.0 } else { 0.0 };
-        for (axis, (star, history)) in star.iter_mut().zip(history).enumerate() {
-            let planes = (star.par_chunks_mut(shape.plane()), history.par_chunks_mut(shape.plane()));
-            let powers: Vec<Powers> = planes
+        self.update_model((SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0))?;
+        let shape = self.layout.shape;
+        let mut total = Powers::default();
+        for axis in 0..3 {
+            let (task, star, history) = self.task();
+            let keep = if task.implicit == [false; 3] { 1.0 } else { 0.0 };
+            let own = [&mut star[axis], &mut history[axis]].map(|field| &mut field[shape.own_places()]);
+            let [star, history] = own.map(|field| field.par_chunks_mut(shape.plane()));
+            let powers: Vec<Powers> = (star, history, shape.own())
                 .into_par_iter()
-                .enumerate()
                 .map_init(
                     || Scratch::new(shape.n[0]),
-                    |scratch, (k, (star, history))| {
+                    |scratch, (star, history, k)| {
                         task.increments([axis, k], (stage, stage_s, keep, measured), star, history, scratch)
                     },
                 )
                 .collect();
-            for plane in powers {
-                total.add(plane);
+            if measured {
+                for plane in self.layout.slabs.planes(powers)? {
+                    total = std::array::from_fn(|i| total[i] + plane[i]);
+                }
             }
         }
-        total
+        Ok(total)
     }
 
     /// The acceleration by everything but pressure into `star`.
-    fn accelerations(&mut self) {
+    fn accelerations(&mut self) -> Result<(), Error> {
         // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long.
-        self.update_model(f64::INFINITY);
+        self.update_model(f64::INFINITY)?;
         let shape = self.layout.shape;
         let (task, star, _) = self.task();
         for (axis, star) in star.iter_mut().enumerate() {
-            star.par_chunks_mut(shape.plane()).enumerate().for_each_init(
+            let planes = star[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+            planes.for_each_init(
                 || Scratch::new(shape.n[0]),
-                |scratch, (k, star)| task.accelerations([axis, k], star, scratch),
+                |scratch, (star, k)| task.accelerations([axis, k], star, scratch),
             );
         }
+        Ok(())
     }
 
     /// The viscosity of the model for the present field, at most such that it decays by `limit_per_s`.
-    fn update_model(&mut self, limit_per_s: f64) {
-        if let Some(model) = self.model.as_mut() {
-            model.update(self.state.velocity.each_ref().map(Vec::as_slice), limit_per_s);
-        }
+    fn update_model(&mut self, limit_per_s: f64) -> Result<(), Error> {
+        let velocity = self.state.velocity.each_ref().map(Vec::as_slice);
+        self.model.as_mut().map_or(Ok(()), |model| model.update(velocity, limit_per_s))
     }
 
     /// What the momentum equation reads, and what it writes: `star` and the history.
@@ -305,9 +311,9 @@ impl Flow {
     }
 
     /// Solves for the increments along the implicit axes and adds the velocity.
-    fn solve_lines(&mut self, a_m2: f64) {
+    fn solve_lines(&mut self, a_m2: f64) -> Result<(), Error> {
         if self.state.implicit == [false; 3] {
-            return;
+            return Ok(());
         }
         if !self.line_solvers.iter().any(|(a, _)| *a == a_m2) {
             // A fixed step has at most three stages of different length; a variable one always needs new factors.
@@ -319,13 +325,15 @@ impl Flow {
                 .collect();
             self.line_solvers.insert(0, (a_m2, solvers));
         }
-        let Some((_, solvers)) = self.line_solvers.iter().find(|(a, _)| *a == a_m2) else { return };
+        let Some((_, solvers)) = self.line_solvers.iter().find(|(a, _)| *a == a_m2) else { return Ok(()) };
+        let own = self.layout.shape.own_places();
         for (component, solver) in solvers {
-            solver.solve(self.layout.shape, &mut self.work.star[*component]);
+            solver.solve(&self.layout.slabs, &mut self.work.star[*component][own.clone()])?;
         }
         for (star, velocity) in self.work.star.iter_mut().zip(&self.state.velocity) {
-            add_multiple(star, 1.0, velocity, self.layout.shape);
+            add_multiple(&mut star[own.clone()], 1.0, &velocity[own.clone()], self.layout.shape);
         }
+        Ok(())
     }
 
     /// (25), or the rotational form.
@@ -337,19 +345,16 @@ impl Flow {
         }
     }
 
-    fn kinetic_energy(&self) -> f64 {
+    /// Kinetic energy of each plane that is owned.
+    fn kinetic_energy(&self) -> Vec<[f64; 1]> {
         let shape = self.layout.shape;
-        let mut energy = 0.0;
-        for (ops, field) in self.ops.iter().zip(&self.state.velocity) {
-            for k in 0..shape.n[2] {
-                for j in 0..shape.n[1] {
-                    let row = &field[shape.row(j, k)];
-                    let (across, along) = ops.row_mass(j, k);
-                    energy += 0.5 * across * weighted_dot(row, row, along);
-                }
-            }
-        }
-        energy
+        let of_row = |component: usize, j: usize, k: usize| {
+            let row = &self.state.velocity[component][shape.row(j, k)];
+            let (across, along) = self.ops[component].row_mass(j, k);
+            0.5 * across * weighted_dot(row, row, along)
+        };
+        let of_plane = |k| [(0..3).map(|a| (0..shape.n[1]).map(|j| of_row(a, j, k)).sum::<f64>()).sum::<f64>()];
+        shape.own().map(of_plane).collect()
     }
 }
 

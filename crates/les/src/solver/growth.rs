@@ -14,10 +14,10 @@ use num_complex::Complex;
 use rayon::prelude::*;
 
 use super::flow::Flow;
-use super::layout::Layout;
 use super::mesh::{Mesh, Wall};
 use super::settings::{FlowSettings, TimeScheme, TimeStep};
 use super::subgrid::SubgridModel;
+use crate::Error;
 
 /// Transport by a uniform stream per cell and Courant number, `sum_m c_m sin(m theta)`, of boxes without no-slip walls and of
 /// those with them.
@@ -50,10 +50,11 @@ impl UndampedGrowth {
         settings: &FlowSettings,
         velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync,
     ) -> Option<Self> {
-        if settings.scheme != TimeScheme::AdamsBashforth2 || settings.subgrid != SubgridModel::None {
-            return None;
-        }
-        let [courant_per_s, worst] = largest_rates(mesh, velocity_m_s);
+        if is_damped(settings) { None } else { Self::at_rates(mesh, settings, largest_rates(mesh, velocity_m_s)) }
+    }
+
+    /// The same from the largest of [`Rates::of`].
+    fn at_rates(mesh: &Mesh, settings: &FlowSettings, [courant_per_s, worst]: [f64; 2]) -> Option<Self> {
         let step_s = match settings.time_step {
             TimeStep::Fixed { step_s } => step_s,
             TimeStep::Courant { courant, longest_s } => longest_s.min(courant / courant_per_s),
@@ -74,6 +75,11 @@ impl UndampedGrowth {
     pub fn damped_courant(&self) -> f64 {
         halve(0.0, self.courant, |courant| largest_reynolds(self.transport, courant) > self.cell_reynolds)
     }
+}
+
+/// Whether the scheme or a model damps all waves.
+fn is_damped(settings: &FlowSettings) -> bool {
+    settings.scheme != TimeScheme::AdamsBashforth2 || settings.subgrid != SubgridModel::None
 }
 
 impl Mesh {
@@ -177,44 +183,47 @@ impl Rates {
 impl Flow {
     /// Waves of the present field that Adams-Bashforth lets grow, if any.
     pub fn undamped_growth(&self) -> Option<UndampedGrowth> {
-        let stride = strides(&self.layout);
+        if is_damped(&self.settings) {
+            return None;
+        }
+        let shape = self.layout.shape;
         let axis = [0, 1, 2].map(|d| self.layout.axis_of(d));
-        let velocity = &self.state.velocity;
-        UndampedGrowth::of(&self.mesh, &self.settings, |cell| {
-            let place = (0..3).map(|d| cell[d] * stride[axis[d]]).sum::<usize>();
-            axis.map(|a| velocity[a][place])
-        })
+        let (own, direction, velocity) = (shape.own(), self.layout.direction, &self.state.velocity);
+        let rates = largest_rates(&self.mesh, |cell| {
+            let index = direction.map(|d| cell[d]);
+            // What others own is at rest here and does not count.
+            let place = own.contains(&index[2]).then(|| shape.place(index));
+            place.map_or([0.0; 3], |place| axis.map(|a| velocity[a][place]))
+        });
+        // If a rank is lost, the next step says so.
+        let rates = self.layout.slabs.largest(rates).ok()?;
+        UndampedGrowth::at_rates(&self.mesh, &self.settings, rates)
     }
 
     /// Memory axis and place of the component whose waves of two cells are strongest: where numerical growth shows most.
-    pub(super) fn strongest_short_wave(&self) -> (usize, usize) {
-        let stride = strides(&self.layout);
-        let n = self.layout.shape.n;
-        let mut worst = (0, 0, 0.0);
-        for (component, field) in self.state.velocity.iter().enumerate() {
-            for axis in (0..3).filter(|&axis| n[axis] > 2) {
-                let periodic = self.layout.line[axis].is_periodic();
-                for (place, value) in field.iter().enumerate() {
-                    let index = place / stride[axis] % n[axis];
-                    if !periodic && (index == 0 || index + 1 == n[axis]) {
-                        continue;
-                    }
-                    let origin = place - index * stride[axis];
-                    let at = |index: usize| field[origin + index % n[axis] * stride[axis]];
-                    let wave = (at(index + n[axis] - 1) - 2.0 * value + at(index + 1)).abs();
-                    if wave > worst.2 {
-                        worst = (component, place, wave);
-                    }
+    pub(super) fn strongest_short_wave(&self) -> Result<(usize, usize), Error> {
+        let shape = self.layout.shape;
+        let n = shape.n;
+        let first = shape.own().start * shape.plane();
+        let (_, component, place) = self.first_largest(|component, place| {
+            let index = shape.index(place - shape.own_places().start + first);
+            let field = &self.state.velocity[component];
+            let of = |axis: usize| {
+                let at_end = index[axis] == 0 || index[axis] + 1 == n[axis];
+                if n[axis] <= 2 || (at_end && !self.layout.line[axis].is_periodic()) {
+                    return 0.0;
                 }
-            }
-        }
-        (worst.0, worst.1)
+                let at = |offset: usize| {
+                    let mut other = index;
+                    other[axis] = (index[axis] + n[axis] + offset - 1) % n[axis];
+                    field[shape.place(other)]
+                };
+                (at(0) - 2.0 * at(1) + at(2)).abs()
+            };
+            of(0).max(of(1)).max(of(2))
+        })?;
+        Ok((component, place))
     }
-}
-
-/// Distance in memory of neighbours along the three axes.
-fn strides(layout: &Layout) -> [usize; 3] {
-    [1, layout.shape.n[0], layout.shape.plane()]
 }
 
 #[cfg(test)]

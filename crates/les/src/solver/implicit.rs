@@ -12,6 +12,8 @@ use super::layout::Shape;
 use super::momentum::Momentum;
 use super::operators_1d::Taps;
 use super::rows::add_across;
+use super::slabs::Slabs;
+use crate::Error;
 
 /// Factors of `1 - a L` along one axis for one component.
 #[derive(Debug, Clone)]
@@ -70,13 +72,18 @@ impl LineSolver {
         Self { axis, mass, inverse_pivot: pivot.iter().map(|d| 1.0 / d).collect(), lower, upper }
     }
 
-    /// Replaces `field` by the solution.
-    pub(crate) fn solve(&self, shape: Shape, field: &mut [f64]) {
+    /// Replaces the planes of a field that are owned by the solution.
+    ///
+    /// # Errors
+    /// Those of the exchange between ranks.
+    pub(crate) fn solve(&self, slabs: &Slabs, own: &mut [f64]) -> Result<(), Error> {
+        let shape = slabs.shape;
         match self.axis {
-            0 => field.par_chunks_mut(shape.n[0] * TILE).for_each(|rows| self.solve_tile(rows, shape.n[0])),
-            1 => field.par_chunks_mut(shape.plane()).for_each(|plane| solve_block(self, plane, shape.n[0])),
-            _ => self.solve_across_planes(shape, field),
+            0 => own.par_chunks_mut(shape.n[0] * TILE).for_each(|rows| self.solve_tile(rows, shape.n[0])),
+            1 => own.par_chunks_mut(shape.plane()).for_each(|plane| solve_block(self, plane, shape.n[0])),
+            _ => slabs.turned(own, 1, |field, shape, _| self.solve_across_planes(shape, field))?,
         }
+        Ok(())
     }
 
     /// Lines along axis 0: a few rows are transposed so that they lie side by side.
@@ -197,7 +204,7 @@ mod tests {
                 for axis in 0..3 {
                     let right: Vec<f64> = (0..shape.len()).map(|i| ((i * i) as f64).sin()).collect();
                     let mut x = right.clone();
-                    LineSolver::new(&ops, axis, a_m2).solve(shape, &mut x);
+                    LineSolver::new(&ops, axis, a_m2).solve(&layout.slabs, &mut x).unwrap();
                     let stride = [1, nx, nx * ny][axis];
                     for place in 0..shape.len() {
                         let index = place / stride % shape.n[axis];

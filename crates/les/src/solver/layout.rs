@@ -6,43 +6,14 @@
 //!
 //! Check: the order of plane and spatial flows.
 
+use std::sync::Arc;
+
 use super::mesh::{Ends, Mesh, Wall};
 use super::operators_1d::Operators1d;
-
-/// Number of values along the three memory axes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Shape {
-    /// Values along the axes; axis 0 is contiguous.
-    pub(crate) n: [usize; 3],
-}
-
-impl Shape {
-    /// Number of values of a field.
-    pub(crate) fn len(self) -> usize {
-        self.n.iter().product()
-    }
-
-    /// Number of values of a plane at one index of axis 2.
-    pub(crate) fn plane(self) -> usize {
-        self.n[0] * self.n[1]
-    }
-
-    /// Indices along the axes of a place in memory.
-    pub(crate) fn index(self, place: usize) -> [usize; 3] {
-        [place % self.n[0], place / self.n[0] % self.n[1], place / self.plane()]
-    }
-
-    /// Place in memory of indices along the axes.
-    pub(crate) fn place(self, [i, j, k]: [usize; 3]) -> usize {
-        (k * self.n[1] + j) * self.n[0] + i
-    }
-
-    /// Places of the row at indices `j` of axis 1 and `k` of axis 2.
-    pub(crate) fn row(self, j: usize, k: usize) -> std::ops::Range<usize> {
-        let start = self.place([0, j, k]);
-        start..start + self.n[0]
-    }
-}
+pub(crate) use super::shape::Shape;
+use super::slabs::Slabs;
+use crate::Error;
+use crate::ranks::{Ranks, Single};
 
 /// The operators of the three memory axes.
 #[derive(Debug, Clone)]
@@ -51,22 +22,33 @@ pub(crate) struct Layout {
     pub(crate) line: [Operators1d; 3],
     /// The direction (0, 1, 2 for x, y, z) of each memory axis.
     pub(crate) direction: [usize; 3],
-    /// Number of values.
+    /// Number of values, and those that this rank holds.
     pub(crate) shape: Shape,
+    /// What the ranks exchange.
+    pub(crate) slabs: Slabs,
 }
 
 impl Layout {
-    /// The operators of `mesh`, with the memory axes in the order `direction`, or in the best one.
+    /// The operators of `mesh` in one process, with the memory axes in the order `direction`, or in the best one.
     pub(crate) fn new(mesh: &Mesh, direction: Option<[usize; 3]>) -> Self {
-        let cells = mesh.cells();
-        let direction = direction.unwrap_or(match cells {
-            [1, ny, nz] if ny > 1 && ny >= nz => [1, 0, 2],
-            [1, _, nz] if nz > 1 => [2, 0, 1],
-            _ => [0, 1, 2],
-        });
+        let direction = order(mesh, direction);
+        let shape = Shape::whole(direction.map(|d| mesh.cells()[d]));
+        Self::of(mesh, direction, Slabs { ranks: Arc::new(Single), shape })
+    }
+
+    /// The same of one of several ranks.
+    ///
+    /// # Errors
+    /// [`Error::TooManyRanks`].
+    pub(crate) fn on(mesh: &Mesh, direction: Option<[usize; 3]>, ranks: Arc<dyn Ranks>) -> Result<Self, Error> {
+        let direction = order(mesh, direction);
+        let slabs = Slabs::new(ranks, direction.map(|d| mesh.cells()[d]))?;
+        Ok(Self::of(mesh, direction, slabs))
+    }
+
+    fn of(mesh: &Mesh, direction: [usize; 3], slabs: Slabs) -> Self {
         let line = direction.map(|d| Operators1d::new(&mesh.directions()[d]));
-        let shape = Shape { n: direction.map(|d| cells[d]) };
-        Self { line, direction, shape }
+        Self { line, direction, shape: slabs.shape, slabs }
     }
 
     /// The memory axis of direction `d` (0, 1, 2 for x, y, z).
@@ -85,6 +67,15 @@ impl Layout {
             }),
         }
     }
+}
+
+/// The order of the directions in memory: that asked for, or the best one.
+fn order(mesh: &Mesh, asked: Option<[usize; 3]>) -> [usize; 3] {
+    asked.unwrap_or(match mesh.cells() {
+        [1, ny, nz] if ny > 1 && ny >= nz => [1, 0, 2],
+        [1, _, nz] if nz > 1 => [2, 0, 1],
+        _ => [0, 1, 2],
+    })
 }
 
 #[cfg(test)]

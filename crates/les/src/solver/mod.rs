@@ -26,6 +26,10 @@ mod row_operator;
 mod rows;
 mod run;
 pub(crate) mod settings;
+mod shape;
+mod slabs;
+#[cfg(test)]
+mod slabs_tests;
 mod stage;
 mod subgrid;
 mod transport;

@@ -9,7 +9,7 @@
 use multiversion::multiversion;
 
 use super::kept_fluxes::KeptFluxes;
-use super::layout::Layout;
+use super::layout::{Layout, Shape};
 use super::operators_1d::{DIFFERENCE, Taps};
 use super::row_operator::RowOperator;
 use super::rows::{HALO, add_even, from_places, pad};
@@ -22,6 +22,7 @@ pub(crate) struct Momentum {
     pub(super) axis: usize,
     /// Sizes of the memory axes.
     pub(super) n: [usize; 3],
+    shape: Shape,
     pub(super) periodic: [bool; 3],
     pub(super) thin: [bool; 3],
     /// Weighted flux along `axis` at its faces from the cells.
@@ -103,6 +104,7 @@ impl Momentum {
         Self {
             axis,
             n,
+            shape: layout.shape,
             periodic: std::array::from_fn(|b| line[b].is_periodic()),
             thin: std::array::from_fn(|b| line[b].is_thin()),
             flux_mean: RowOperator::new(layout, axis, own.flux_mean()),
@@ -150,7 +152,7 @@ impl Momentum {
     }
 
     pub(super) fn start(&self, j: usize, k: usize) -> usize {
-        (k * self.n[1] + j) * self.n[0]
+        self.shape.place([0, j, k])
     }
 
     /// Start of the row whose index along `axis` (1 or 2) is replaced.

@@ -36,9 +36,10 @@ impl Divergence {
     /// Writes `scale` times the weighted divergence of `velocity` to `out`.
     pub(crate) fn apply(&self, velocity: [&[f64]; 3], scale: f64, out: &mut [f64]) {
         let n = self.shape.n[0];
-        out.par_chunks_mut(self.shape.plane()).enumerate().for_each_init(
+        let planes = out[self.shape.own_places()].par_chunks_mut(self.shape.plane()).zip(self.shape.own());
+        planes.for_each_init(
             || vec![0.0; n + 2 * HALO],
-            |padded, (k, plane)| {
+            |padded, (plane, k)| {
                 for (j, row) in plane.chunks_mut(n).enumerate() {
                     divergence_row(self, velocity, scale, j, k, row, padded);
                 }
@@ -46,10 +47,11 @@ impl Divergence {
         );
     }
 
-    /// Largest modulus of the divergence \[1/s\].
+    /// Largest modulus of the divergence in the planes that are owned \[1/s\].
     pub(crate) fn largest_per_s(&self, velocity: [&[f64]; 3]) -> f64 {
         let n = self.shape.n[0];
-        (0..self.shape.n[2])
+        self.shape
+            .own()
             .into_par_iter()
             .map_init(
                 || (vec![0.0; n + 2 * HALO], vec![0.0; n]),
@@ -69,7 +71,7 @@ impl Divergence {
     }
 
     fn start(&self, j: usize, k: usize) -> usize {
-        (k * self.shape.n[1] + j) * self.shape.n[0]
+        self.shape.place([0, j, k])
     }
 }
 
@@ -104,7 +106,8 @@ fn divergence_row(
 pub(super) fn divide_by_volume(layout: &Layout, scale: f64, field: &mut [f64]) {
     let shape = layout.shape;
     let mass: [&[f64]; 3] = std::array::from_fn(|b| layout.line[b].cell_mass_m.as_slice());
-    field.par_chunks_mut(shape.plane()).enumerate().for_each(|(k, plane)| {
+    let planes = field[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+    planes.for_each(|(plane, k)| {
         for (j, row) in plane.chunks_mut(shape.n[0]).enumerate() {
             let factor = scale / (mass[1][j] * mass[2][k]);
             for (value, mass) in row.iter_mut().zip(mass[0]) {
@@ -112,17 +115,6 @@ pub(super) fn divide_by_volume(layout: &Layout, scale: f64, field: &mut [f64]) {
             }
         }
     });
-}
-
-/// What the correction learns of the new field on its way.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct FieldSummary {
-    /// `1/2 sum mass u^2` \[m^5/s^2\].
-    pub(crate) energy: f64,
-    /// Largest `sum_a |u_a|/h_a` \[1/s\].
-    pub(crate) courant_per_s: f64,
-    /// Place of that value.
-    pub(crate) place: usize,
 }
 
 /// `1/h` at the stored faces of each axis \[1/m\]; zero where the flow cannot vary.
@@ -134,7 +126,8 @@ fn inverse_metrics(layout: &Layout) -> [Vec<f64>; 3] {
     })
 }
 
-/// `velocity = star - scale grad(phi)`, and the summary of the new field.
+/// `velocity = star - scale grad(phi)`; returns of each plane `1/2 sum mass u^2` \[m^5/s^2\] and the largest `sum_a |u_a|/h_a`
+/// \[1/s\].
 pub(crate) fn correct(
     ops: &[Momentum; 3],
     layout: &Layout,
@@ -142,19 +135,18 @@ pub(crate) fn correct(
     phi: &[f64],
     scale: f64,
     velocity: [&mut [f64]; 3],
-) -> FieldSummary {
+) -> Vec<[f64; 2]> {
     let shape = layout.shape;
     let n = shape.n[0];
     let inverse_metric = inverse_metrics(layout);
-    let [u, v, w] = velocity.map(|field| field.par_chunks_mut(shape.plane()));
-    let planes: Vec<FieldSummary> = (u, v, w)
+    let [u, v, w] = velocity.map(|field| field[shape.own_places()].par_chunks_mut(shape.plane()));
+    (u, v, w, shape.own())
         .into_par_iter()
-        .enumerate()
         .map_init(
             || (Scratch::new(n), vec![0.0; n]),
-            |(scratch, rate), (k, (u, v, w))| {
+            |(scratch, rate), (u, v, w, k)| {
                 let mut planes = [u, v, w];
-                let mut summary = FieldSummary { energy: 0.0, courant_per_s: 0.0, place: k * shape.plane() };
+                let (mut energy, mut courant_per_s) = (0.0, 0.0);
                 for j in 0..shape.n[1] {
                     rate.fill(0.0);
                     for (a, plane) in planes.iter_mut().enumerate() {
@@ -177,27 +169,18 @@ pub(crate) fn correct(
                             own,
                             (a == 0).then_some(&inverse_metric[0]),
                         );
-                        summary.energy += 0.5 * across * sum;
+                        energy += 0.5 * across * sum;
                     }
-                    for (i, &value) in rate.iter().enumerate() {
-                        if value > summary.courant_per_s {
-                            summary.courant_per_s = value;
-                            summary.place = shape.row(j, k).start + i;
+                    for &value in rate.iter() {
+                        if value > courant_per_s {
+                            courant_per_s = value;
                         }
                     }
                 }
-                summary
+                [energy, courant_per_s]
             },
         )
-        .collect();
-    let mut total = FieldSummary { energy: 0.0, courant_per_s: 0.0, place: 0 };
-    for plane in planes {
-        total.energy += plane.energy;
-        if plane.courant_per_s > total.courant_per_s {
-            (total.courant_per_s, total.place) = (plane.courant_per_s, plane.place);
-        }
-    }
-    total
+        .collect()
 }
 
 /// Corrects one row, adds its part of the Courant rate, and returns `sum mass u^2`.

@@ -44,6 +44,12 @@ impl RowOperator {
         add_across(out, field, 1.0, &self.rows[at[self.axis - 1]], |i| row(i).start);
     }
 
+    /// `out +=` an operator of axis 1 at row `j` of a plane that stands alone.
+    #[inline(always)]
+    pub(crate) fn add_in_plane(&self, out: &mut [f64], plane: &[f64], j: usize) {
+        add_across(out, plane, 1.0, &self.rows[j], |i| i * self.shape.n[0]);
+    }
+
     /// `out +=` an operator of axis 0 on one row.
     #[inline(always)]
     pub(crate) fn add_along(&self, out: &mut [f64], row: &[f64], padded: &mut [f64]) {

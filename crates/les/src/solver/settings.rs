@@ -1,10 +1,14 @@
 //! What a simulation is told beside its mesh and its initial field.
 
+use std::sync::Arc;
+
+use super::layout::Layout;
 use super::mesh::{AXIS_NAMES, Mesh};
 use super::pressure::PressureMethod;
 use super::subgrid::{self, SubgridModel};
 use crate::Error;
 use crate::error::check;
+use crate::ranks::{Ranks, Single};
 
 /// Time integration of convection and subgrid stresses; viscosity is Crank-Nicolson along implicit axes in both.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -130,6 +134,9 @@ pub struct FlowSettings {
     pub subgrid: SubgridModel,
     /// Order of the directions in memory, slowest last; `None` chooses. It changes rounding, nothing else.
     pub memory_order: Option<[usize; 3]>,
+    /// The ranks that share the flow; one process unless told otherwise. They change nothing of a result. All ranks must have
+    /// the same settings but for their own number, and make the same calls.
+    pub ranks: Arc<dyn Ranks>,
 }
 
 impl FlowSettings {
@@ -147,16 +154,18 @@ impl FlowSettings {
             rotational: false,
             subgrid: SubgridModel::None,
             memory_order: None,
+            ranks: Arc::new(Single),
         }
     }
 
     /// Refuses what a flow on `mesh` would refuse, before anything is allocated.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a setting, [`Error::BadDirection`] for no-slip walls without viscosity.
+    /// [`Error::OutOfRange`] for a setting, [`Error::BadDirection`] for no-slip walls without viscosity, [`Error::TooManyRanks`].
     pub fn validate(&self, mesh: &Mesh) -> Result<(), Error> {
         self.check()?;
         subgrid::check_constants(self.subgrid)?;
+        Layout::on(mesh, self.memory_order, self.ranks.clone())?;
         refuse_sticking_without_viscosity(mesh, self.viscosity_m2_s)
     }
 

@@ -8,21 +8,8 @@ use super::projection::weighted_dot;
 use super::settings::Stage;
 use super::subgrid::Subgrid;
 
-/// Work done on the fluid per time by each term.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Powers {
-    pub(super) viscous: f64,
-    pub(super) subgrid: f64,
-    pub(super) force: f64,
-}
-
-impl Powers {
-    pub(super) fn add(&mut self, other: Self) {
-        self.viscous += other.viscous;
-        self.subgrid += other.subgrid;
-        self.force += other.force;
-    }
-}
+/// Work done on the fluid per time by viscosity, the subgrid stress and the force.
+pub(super) type Powers = [f64; 3];
 
 /// What the planes of the momentum equation read.
 pub(super) struct Task<'a> {
@@ -108,14 +95,14 @@ impl Task<'_> {
         let (across, along) = ops.row_mass(j, k);
         if nu > 0.0 {
             let work = weighted_dot(own, &scratch.implicit, along) + weighted_dot(own, &scratch.explicit, along);
-            powers.viscous += across * nu * work;
+            powers[0] += across * nu * work;
         }
         if force != 0.0 {
             let momentum: f64 = own.iter().zip(along).map(|(u, mass)| u * mass).sum();
-            powers.force += across * force * momentum;
+            powers[2] += across * force * momentum;
         }
         if self.model.is_some() {
-            powers.subgrid += across * weighted_dot(own, &scratch.model, along);
+            powers[1] += across * weighted_dot(own, &scratch.model, along);
         }
     }
 

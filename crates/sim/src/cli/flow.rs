@@ -5,10 +5,12 @@ use super::{Cli, progress, say};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
-use crate::flow::{Begin, CaseFile, EXAMPLES, FlowForecast, RunOptions, Watch, check, example, run_with};
+use crate::flow::{Begin, CaseFile, EXAMPLES, FlowForecast, RunOptions, Watch, check, example, run_on};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
+use std::sync::Arc;
+use wakescope_les::ranks::Ranks;
 
 /// Words of `wakescope flow`.
 #[derive(Debug, Args)]
@@ -46,17 +48,18 @@ pub(super) struct RunWords {
     allow_large: bool,
 }
 
-pub(super) fn flow(words: &FlowWords, cli: &Cli) -> Result<(), Error> {
+pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
     if let Some(text) = words.example.as_deref().and_then(example) {
-        return print(text);
+        return if ranks.rank() == 0 { print(text) } else { Ok(()) };
     }
     // The words were checked: without an example there is a case.
     let Some(case) = &words.case else { return Ok(()) };
-    simulate(&CaseFile::read(case)?, &words.run, cli)
+    simulate(&CaseFile::read(case)?, &words.run, cli, ranks)
 }
 
-/// Runs a case and says what came of it.
-pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(), Error> {
+/// Runs a case and says what came of it, on rank 0.
+pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
+    let is_first = ranks.rank() == 0;
     let ended = words.end.map(|end| file.with_end(end)).transpose()?;
     let file = ended.as_ref().unwrap_or(file);
     let begin = match (words.restart, words.overwrite) {
@@ -66,6 +69,9 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
     };
     let options = RunOptions { begin, allow_large: words.allow_large };
     if words.check {
+        if !is_first {
+            return Ok(());
+        }
         let forecast = check(file, words.out.as_deref(), options)?;
         return say(cli.json, &forecast_json(&forecast), &format!("good\n{forecast}"));
     }
@@ -75,14 +81,17 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli) -> Result<(
     };
     let mut quiet = progress::NotesOnly;
     let mut bar;
-    let watch: &mut dyn Watch = if cli.quiet {
+    let watch: &mut dyn Watch = if cli.quiet || !is_first {
         &mut quiet
     } else {
         bar = progress::FlowBar::new();
         &mut bar
     };
     #[cfg_attr(not(feature = "plots"), expect(unused_mut, reason = "there is nothing to draw with"))]
-    let mut outcome = run_with(file, out, options, watch)?;
+    let mut outcome = run_on(ranks, file, out, options, watch)?;
+    if !is_first {
+        return Ok(());
+    }
     #[cfg(feature = "plots")]
     if outcome.is_complete && file.case.wake.is_some() {
         match FinishedWake::read(out).and_then(|wake| wake.draw()) {

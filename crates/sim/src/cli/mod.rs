@@ -9,8 +9,11 @@ mod budget;
 mod detect;
 mod estimate;
 mod flow;
+#[cfg(feature = "mpi")]
+mod mpi;
 mod output;
 mod progress;
+mod ranked;
 mod retrieve;
 mod retrieved;
 mod sweep;
@@ -155,8 +158,8 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Detect(words) => detect::detect(words, cli),
         Command::Sweep(words) => sweep::sweep(words, cli),
         Command::Pareto(words) => sweep::pareto(words, cli),
-        Command::Flow(words) => flow::flow(words, cli),
-        Command::Wake(words) => wake::wake(words, cli),
+        Command::Flow(words) => ranked::ranked(cli, |ranks| flow::flow(words, cli, ranks)),
+        Command::Wake(words) => ranked::ranked(cli, |ranks| wake::wake(words, cli, ranks)),
     }
 }
 

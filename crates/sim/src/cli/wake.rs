@@ -7,6 +7,8 @@ use crate::Error;
 use crate::flow::{CaseFile, CaseKind, WakePreset};
 use clap::Args;
 use std::path::PathBuf;
+use std::sync::Arc;
+use wakescope_les::ranks::Ranks;
 
 /// Words of `wakescope wake`.
 #[derive(Debug, Args)]
@@ -23,16 +25,16 @@ pub(super) struct WakeWords {
     run: RunWords,
 }
 
-pub(super) fn wake(words: &WakeWords, cli: &Cli) -> Result<(), Error> {
+pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
     let file = case_file(words)?;
     if !matches!(file.case.case, CaseKind::Wake(_)) {
         let path = words.case.clone().unwrap_or_default();
         return Err(Error::Input { path, reason: "case.kind is not \"wake\": wakescope flow runs it".into() });
     }
     if words.print {
-        return print(&file.toml);
+        return if ranks.rank() == 0 { print(&file.toml) } else { Ok(()) };
     }
-    simulate(&file, &words.run, cli)
+    simulate(&file, &words.run, cli, ranks)
 }
 
 fn case_file(words: &WakeWords) -> Result<CaseFile, Error> {

@@ -13,8 +13,10 @@ use crate::io::lock::FolderLock;
 use crate::io::{Existing, write_atomic};
 use crate::keys::Problem;
 use crate::{Error, machine};
-use std::path::Path;
-use wakescope_les::solver::{CheckpointPlan, Ends, Interval, Run, RunPlan};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use wakescope_les::ranks::{self, Ranks, Single, together};
+use wakescope_les::solver::{CheckpointPlan, Ends, Interval, Run, RunPlan, Silent};
 
 /// Steps between checkpoints where a case states nothing.
 const STEPS_PER_CHECKPOINT: u64 = 500;
@@ -45,7 +47,8 @@ pub fn check(file: &CaseFile, folder: Option<&Path>, options: RunOptions) -> Res
     if let Some(folder) = folder {
         refuse_folder(folder, options.begin)?;
     }
-    prepare(file, folder.unwrap_or(Path::new("")), options).map(|prepared| prepared.forecast)
+    let alone: Arc<dyn Ranks> = Arc::new(Single);
+    prepare(file, folder.unwrap_or(Path::new("")), options, &alone).map(|prepared| prepared.forecast)
 }
 
 /// As [`run_with`], for a case that fits into the memory of the machine.
@@ -56,80 +59,86 @@ pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) 
     run_with(file, folder, RunOptions { begin, allow_large: false }, watch)
 }
 
-/// Runs a case and writes its files to `folder`, in which no other run may be writing.
+/// As [`run_on`], in one process.
 ///
 /// # Errors
-/// A case that the solver refuses or that needs more memory than there is, a checkpoint that does not fit, a flow that blows
-/// up, files that cannot be written. The last good checkpoint stays.
+/// As there.
 pub fn run_with(
     file: &CaseFile,
     folder: &Path,
     options: RunOptions,
     watch: &mut dyn Watch,
 ) -> Result<FlowOutcome, Error> {
-    let begin = options.begin;
-    let [checkpoint, previous] = checkpoint_paths(folder);
-    refuse_folder(folder, begin)?;
-    let Prepared { mut setup, plan, files, schedule, forecast } = prepare(file, folder, options)?;
-    files.refuse_foreign(&schedule.due, setup.wake.is_some(), begin)?;
-    watch.forecast(&forecast);
-    std::fs::create_dir_all(folder).map_err(|source| Error::Io {
-        action: "make the folder",
-        path: folder.to_owned(),
-        source,
-    })?;
-    let _lock = FolderLock::take(folder)?;
+    run_on(&(Arc::new(Single) as Arc<dyn Ranks>), file, folder, options, watch)
+}
+
+/// Runs a case on ranks, all of which call this, and writes its files to `folder`, in which no other run may be writing. The
+/// files have the same bytes for any number of ranks; rank 0 writes them, and it alone tells `watch` anything.
+///
+/// # Errors
+/// A case that the solver refuses or that needs more memory than there is, a checkpoint that does not fit, a flow that blows
+/// up, files that cannot be written, a rank that is lost. The last good checkpoint stays.
+pub fn run_on(
+    ranks: &Arc<dyn Ranks>,
+    file: &CaseFile,
+    folder: &Path,
+    options: RunOptions,
+    watch: &mut dyn Watch,
+) -> Result<FlowOutcome, Error> {
+    let is_first = ranks.rank() == 0;
+    let prepared = if is_first { refuse_folder(folder, options.begin) } else { Ok(()) };
+    let prepared = prepared.and_then(|()| prepare(file, folder, options, ranks));
+    let Prepared { mut setup, plan, files, schedule, forecast } = agree(ranks, prepared)?;
     let mut warnings = file.case.case.unresolved(&setup.mesh);
-    let begin = match begin {
-        // Killed before there was anything to continue from.
-        Begin::Restart if !checkpoint.exists() && !previous.exists() => {
-            warnings.push(format!("there is no checkpoint in {}: the run begins anew", folder.display()));
-            Begin::New
-        }
-        other => other,
-    };
+    let opened = is_first.then(|| {
+        files.refuse_foreign(&schedule.due, setup.wake.is_some(), options.begin)?;
+        watch.forecast(&forecast);
+        open(folder, options.begin, &mut warnings)
+    });
+    let opened = agree(ranks, opened.transpose())?;
+    // From where the run goes on, rank 0 says.
+    let source = opened.as_ref().map_or(Source::Nothing, |(_, source)| *source);
+    let source = Source::of(together(&**ranks, &[source as u8 as f64]).map_err(Error::Flow)?[0]);
+    let [checkpoint, previous] = checkpoint_paths(folder);
     let meter = setup.wake.take().map(|wake| wake.meter);
-    let (mut run, kept) = if begin == Begin::Restart {
-        let path = readable(&checkpoint, &previous, &mut warnings);
-        resume(path, setup, plan, &file.case)?
-    } else {
-        let (flow, start) = setup.start()?;
-        let removed = 1.0 - start.kinetic_energy_m5_s2 / start.given_energy_m5_s2;
-        if removed > 0.01 {
-            warnings.push(format!(
-                "the projection of the initial field onto fields without divergence removed {:.3} % of its energy",
-                100.0 * removed
-            ));
+    let (mut run, kept) = match source {
+        Source::Nothing => {
+            let (flow, start) = setup.start()?;
+            let removed = 1.0 - start.kinetic_energy_m5_s2 / start.given_energy_m5_s2;
+            if removed > 0.01 {
+                warnings.push(format!(
+                    "the projection of the initial field onto fields without divergence removed {:.3} % of its energy",
+                    100.0 * removed
+                ));
+            }
+            (Run::new(flow, plan).map_err(Error::Flow)?, Vec::new())
         }
-        (Run::new(flow, plan).map_err(Error::Flow)?, Vec::new())
+        Source::Checkpoint => resume(&checkpoint, setup, plan, &file.case)?,
+        Source::Previous => resume(&previous, setup, plan, &file.case)?,
     };
-    warnings.iter().for_each(|text| watch.note(text));
-    let mut wake = meter.map(|meter| WakeRun::new(meter, run.flow(), folder.to_owned(), file.provenance()));
-    let kept = Kept::read(&kept, wake.is_some());
-    if let (Some(wake), true) = (&mut wake, begin == Begin::Restart) {
-        let what = "its history of the wake is not that of this case";
-        wake.restore(&kept.wake)
-            .ok_or_else(|| Error::Flow(wakescope_les::Error::CheckpointDamaged { path: checkpoint.clone(), what }))?;
-    }
-    let case_toml = folder.join(CASE);
-    write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
-    let steps_path = files.steps_path();
-    let steps = match (files.output.steps, begin) {
-        (false, _) => None,
-        (true, Begin::Restart) => Some(StepTable::resume(&steps_path, &files.origin, &kept.steps)?),
-        (true, _) => Some(StepTable::begin(&steps_path, &files.origin)?),
+    let writer = if is_first {
+        warnings.iter().for_each(|text| watch.note(text));
+        let wake = meter.map(|meter| WakeRun::new(meter, run.flow(), folder.to_owned(), file.provenance()));
+        let continues = source != Source::Nothing;
+        let written = begin_files(file, folder, &files, wake, (continues, &kept));
+        written.map(|Begun { wake, steps, written }| {
+            let (start_s, end_s) = (run.flow().time_s(), run.plan().end_s);
+            Some(Writer { files, schedule, steps, wake, written, warnings, watch, start_s, end_s, error: None })
+        })
+    } else {
+        Ok(None)
     };
-    let mut written = vec![case_toml];
-    written.extend(steps.is_some().then_some(steps_path));
-    written.extend(wake.iter().flat_map(WakeRun::paths));
-    let (start_s, end_s) = (run.flow().time_s(), run.plan().end_s);
-    let mut writer = Writer { files, schedule, steps, wake, written, warnings, watch, start_s, end_s, error: None };
-    let result = run.to_end(&mut writer);
+    let mut writer = agree(ranks, writer)?;
+    let result = match &mut writer {
+        Some(writer) => run.to_end(writer),
+        None => run.to_end(&mut Silent),
+    };
     // Also of a run that failed: its last row is what one wants to see.
-    let finished = writer.finish();
-    let Writer { written, warnings, error, .. } = writer;
+    let finished = writer.as_mut().map_or(Ok(()), Writer::finish);
+    let error = writer.as_mut().and_then(|writer| writer.error.take());
     let summary = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
-    finished?;
+    agree(ranks, finished)?;
+    let (files, warnings) = writer.map_or_else(Default::default, |writer| (writer.written, writer.warnings));
     let flow = run.flow();
     Ok(FlowOutcome {
         steps: summary.steps,
@@ -137,9 +146,84 @@ pub fn run_with(
         is_complete: summary.is_complete,
         kinetic_energy_m5_s2: flow.kinetic_energy_m5_s2(),
         relative_divergence: flow.relative_divergence(),
-        files: written,
+        files,
         warnings,
     })
+}
+
+/// An error of one rank is that of all.
+fn agree<T>(ranks: &Arc<dyn Ranks>, result: Result<T, Error>) -> Result<T, Error> {
+    ranks::agree(&**ranks, result, Error::Flow)
+}
+
+/// From where a run goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Source {
+    Nothing,
+    Checkpoint,
+    Previous,
+}
+
+impl Source {
+    fn of(number: f64) -> Self {
+        let all = [Self::Nothing, Self::Checkpoint, Self::Previous];
+        all.into_iter().find(|source| *source as u8 as f64 == number).unwrap_or(Self::Nothing)
+    }
+}
+
+/// Takes the folder, and finds from where the run goes on.
+fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(FolderLock, Source), Error> {
+    std::fs::create_dir_all(folder).map_err(|source| Error::Io {
+        action: "make the folder",
+        path: folder.to_owned(),
+        source,
+    })?;
+    let lock = FolderLock::take(folder)?;
+    let [checkpoint, previous] = checkpoint_paths(folder);
+    let source = match begin {
+        // Killed before there was anything to continue from.
+        Begin::Restart if !checkpoint.exists() && !previous.exists() => {
+            warnings.push(format!("there is no checkpoint in {}: the run begins anew", folder.display()));
+            Source::Nothing
+        }
+        Begin::Restart => readable(&checkpoint, &previous, warnings),
+        Begin::New | Begin::Overwrite => Source::Nothing,
+    };
+    Ok((lock, source))
+}
+
+/// The files that grow with a run, and the paths of all that were begun.
+struct Begun {
+    wake: Option<WakeRun>,
+    steps: Option<StepTable>,
+    written: Vec<PathBuf>,
+}
+
+/// Begins the files of a run, or continues them from what a checkpoint kept.
+fn begin_files(
+    file: &CaseFile,
+    folder: &Path,
+    files: &Files,
+    mut wake: Option<WakeRun>,
+    (continues, kept): (bool, &[u8]),
+) -> Result<Begun, Error> {
+    let kept = Kept::read(kept, wake.is_some());
+    if let (Some(wake), true) = (&mut wake, continues) {
+        let ([path, _], what) = (checkpoint_paths(folder), "its history of the wake is not that of this case");
+        wake.restore(&kept.wake).ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
+    }
+    let case_toml = folder.join(CASE);
+    write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
+    let steps_path = files.steps_path();
+    let steps = match (files.output.steps, continues) {
+        (false, _) => None,
+        (true, true) => Some(StepTable::resume(&steps_path, &files.origin, &kept.steps)?),
+        (true, false) => Some(StepTable::begin(&steps_path, &files.origin)?),
+    };
+    let mut written = vec![case_toml];
+    written.extend(steps.is_some().then_some(steps_path));
+    written.extend(wake.iter().flat_map(WakeRun::paths));
+    Ok(Begun { wake, steps, written })
 }
 
 /// Refuses a folder that holds a run that is not to be overwritten, that cannot be written to, or that is in use.
@@ -153,11 +237,14 @@ fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
 }
 
 /// The setup and the plan of a case, with all that can be refused before the computing.
-fn prepare(file: &CaseFile, folder: &Path, options: RunOptions) -> Result<Prepared, Error> {
-    let available = if options.allow_large { None } else { machine::available_memory_bytes() };
+fn prepare(file: &CaseFile, folder: &Path, options: RunOptions, ranks: &Arc<dyn Ranks>) -> Result<Prepared, Error> {
+    // Of several ranks each is taken to have a machine of its own.
+    let machines = ranks.count() as f64;
+    let available = machine::available_memory_bytes().filter(|_| !options.allow_large).map(|bytes| bytes * machines);
     // Before the setup, which holds the initial field.
     refuse_too_large(&file.case, file.case.case.cells(), &[], available)?;
-    let setup = Setup::new(&file.case, file.source.folder())?;
+    let mut setup = Setup::new(&file.case, file.source.folder())?;
+    setup.settings.ranks = ranks.clone();
     let dense = setup.settings.pressure.dense_directions(&setup.mesh);
     refuse_too_large(&file.case, setup.mesh.cells(), &dense, available)?;
     setup.settings.validate(&setup.mesh).map_err(Error::Flow)?;
@@ -183,13 +270,13 @@ fn resume(path: &Path, setup: Setup, plan: RunPlan, case: &FlowCase) -> Result<(
 }
 
 /// The newer checkpoint, or the one before it where that is gone or damaged.
-fn readable<'a>(checkpoint: &'a Path, previous: &'a Path, warnings: &mut Vec<String>) -> &'a Path {
+fn readable(checkpoint: &Path, previous: &Path, warnings: &mut Vec<String>) -> Source {
     match wakescope_les::solver::check_checkpoint(checkpoint) {
         Err(error) if wakescope_les::solver::check_checkpoint(previous).is_ok() => {
             warnings.push(format!("{error}: the one before it is used, {}", previous.display()));
-            previous
+            Source::Previous
         }
-        _ => checkpoint,
+        _ => Source::Checkpoint,
     }
 }
 

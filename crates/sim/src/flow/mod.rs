@@ -18,6 +18,8 @@ mod initial_file;
 mod integration;
 mod kind;
 mod named;
+#[cfg(test)]
+mod ranks_tests;
 #[cfg(feature = "netcdf")]
 mod read;
 mod setup;
@@ -28,7 +30,7 @@ mod writer;
 
 pub use case::{AxisName, Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time};
 pub use examples::{EXAMPLES, example};
-pub use execute::{RunOptions, check, run, run_with};
+pub use execute::{RunOptions, check, run, run_on, run_with};
 pub use forecast::{FileForecast, FlowForecast};
 pub use free::{Axis, EndName, Free, InitialName, InitialPair, MappingName};
 pub use kind::CaseKind;

@@ -66,6 +66,10 @@ impl Writer<'_> {
 }
 
 impl RunObserver for Writer<'_> {
+    fn looks_at_steps(&self) -> bool {
+        false
+    }
+
     fn step(&mut self, _: &Flow, record: &StepRecord) -> Result<(), String> {
         let done = (record.report.time_s - self.start_s) / (self.end_s - self.start_s);
         self.watch.step(done, record);

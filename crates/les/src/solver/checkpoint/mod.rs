@@ -9,10 +9,11 @@
 
 mod container;
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use super::flow::{Flow, State};
-use super::layout::Layout;
+use super::layout::{Layout, Shape};
 use super::mesh::{AXIS_NAMES, Mesh};
 use super::settings::FlowSettings;
 use crate::Error;
@@ -43,19 +44,32 @@ impl Flow {
         self.save_and_keep(path.as_ref(), None, user_data)
     }
 
-    /// As [`Self::save`], with the older file renamed to `previous`.
+    /// As [`Self::save`], with the older file renamed to `previous`. Of several ranks the first writes for all.
     pub(crate) fn save_and_keep(&self, path: &Path, previous: Option<&Path>, user_data: &[u8]) -> Result<(), Error> {
+        let (slabs, state) = (&self.layout.slabs, &self.state);
+        let fields = state.velocity.iter().chain(&state.history).chain([&state.pressure]);
+        let fields = fields.map(|field| slabs.whole(field, false)).collect::<Result<Vec<_>, Error>>()?;
+        let is_first = slabs.is_first();
+        slabs.agree(if is_first { self.write(path, previous, user_data, &fields) } else { Ok(()) })
+    }
+
+    /// Writes the state with these fields: velocity, history, pressure.
+    fn write(
+        &self,
+        path: &Path,
+        previous: Option<&Path>,
+        user_data: &[u8],
+        fields: &[Cow<'_, [f64]>],
+    ) -> Result<(), Error> {
         let text: String =
             identity(self.mesh(), self.settings(), &self.layout).iter().map(|(k, v)| format!("{k}\t{v}\n")).collect();
         let metrics = self.mesh().directions().each_ref().map(|d| metrics(d.cells, |xi| d.at(xi)));
-        let state = &self.state;
-        let scalars = scalars(state);
+        let scalars = scalars(&self.state);
         let mut sections = vec![(*IDENTITY, Content::Bytes(text.as_bytes()))];
         sections.extend(METRICS.iter().zip(&metrics).map(|(tag, m)| (**tag, Content::Floats(m))));
         sections.push((*SCALARS, Content::Bytes(&scalars)));
-        sections.extend(VELOCITY.iter().zip(&state.velocity).map(|(tag, f)| (**tag, Content::Floats(f))));
-        sections.extend(HISTORY.iter().zip(&state.history).map(|(tag, f)| (**tag, Content::Floats(f))));
-        sections.push((*PRESSURE, Content::Floats(&state.pressure)));
+        let tags = VELOCITY.into_iter().chain(HISTORY).chain([PRESSURE]);
+        sections.extend(tags.zip(fields).map(|(tag, field)| (*tag, Content::Floats(field))));
         sections.push((*USER, Content::Bytes(user_data)));
         container::write(path, previous, VERSION, &sections)
     }
@@ -67,32 +81,38 @@ impl Flow {
     /// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`], [`Error::CheckpointDamaged`]; what
     /// [`Flow::new`] refuses; [`Error::CheckpointMismatch`] names what differs between the checkpoint and `mesh` or `settings`.
     pub fn restore(path: impl AsRef<Path>, mesh: Mesh, settings: FlowSettings) -> Result<(Self, Vec<u8>), Error> {
-        let path = path.as_ref();
+        let read = Self::read(path.as_ref(), &mesh, &settings);
+        // The ranks that share the flow must agree on that, too.
+        let (mut flow, user_data) = Layout::on(&mesh, settings.memory_order, settings.ranks)?.slabs.agree(read)?;
+        let [u, v, w] = flow.state.velocity.each_mut().map(Vec::as_mut_slice);
+        flow.layout.slabs.halos(&mut [u, v, w, &mut flow.state.pressure])?;
+        Ok((flow, user_data))
+    }
+
+    /// The flow of a checkpoint, without halos.
+    fn read(path: &Path, mesh: &Mesh, settings: &FlowSettings) -> Result<(Self, Vec<u8>), Error> {
         let mut file = Reader::open(path, VERSION)?;
         let text = file.bytes(IDENTITY)?;
         let Ok(text) = std::str::from_utf8(&text) else { return Err(file.damaged("its properties are no text")) };
-        let wanted = identity(&mesh, &settings, &Layout::new(&mesh, settings.memory_order));
+        let wanted = identity(mesh, settings, &Layout::new(mesh, settings.memory_order));
         compare_identity(path, text, &wanted)?;
         for (axis, tag) in METRICS.iter().enumerate() {
             let direction = &mesh.directions()[axis];
             let present = metrics(direction.cells, |xi| direction.at(xi));
             compare_metrics(path, axis, &file.floats(tag)?, &present)?;
         }
-        let mut flow = Self::at_rest(mesh, settings)?;
+        let mut flow = Self::at_rest(mesh.clone(), settings.clone())?;
         read_scalars(&file.bytes(SCALARS)?, &mut flow.state)
             .ok_or_else(|| file.damaged("its scalars are not whole"))?;
-        let cells = flow.layout.shape.len();
-        let mut field = |tag: &Tag| match file.floats(tag)? {
-            values if values.len() == cells => Ok(values),
-            _ => Err(file.damaged("a field is not of the size of the mesh")),
-        };
-        for (values, tag) in flow.state.velocity.iter_mut().zip(VELOCITY) {
-            *values = field(tag)?;
+        let cells = Shape::whole(flow.layout.shape.n).len();
+        let State { velocity, history, pressure, .. } = &mut flow.state;
+        let fields = velocity.iter_mut().chain(history).chain([pressure]);
+        for (field, tag) in fields.zip(VELOCITY.into_iter().chain(HISTORY).chain([PRESSURE])) {
+            match file.floats(tag)? {
+                values if values.len() == cells => flow.layout.slabs.take_own(&values, field),
+                _ => return Err(file.damaged("a field is not of the size of the mesh")),
+            }
         }
-        for (values, tag) in flow.state.history.iter_mut().zip(HISTORY) {
-            *values = field(tag)?;
-        }
-        flow.state.pressure = field(PRESSURE)?;
         let user_data = file.bytes(USER)?;
         Ok((flow, user_data))
     }

@@ -25,28 +25,31 @@ impl Flow {
     /// If the residual of the pressure equation, which is the divergence of the new velocity, does not reach the tolerance,
     /// neither relative to what was to be corrected nor to the velocity over the cell.
     pub(super) fn project(&mut self, stage_s: f64) -> Result<Solved, Error> {
+        self.layout.slabs.halos(&mut [&mut self.work.star[2]])?;
         let star = self.work.star.each_ref().map(Vec::as_slice);
         self.divergence.apply(star, 1.0 / stage_s, &mut self.work.phi);
         if self.settings.rotational {
             self.work.divergence.copy_from_slice(&self.work.phi);
             // The pressure takes the plain divergence of u*.
             divide_by_volume(&self.layout, stage_s, &mut self.work.divergence);
+            self.layout.slabs.halos(&mut [&mut self.work.divergence])?;
         }
         let tolerance = self.settings.pressure_tolerance;
         let solved = self.pressure_solver.solve(&mut self.work.phi, tolerance);
         let phi = std::mem::take(&mut self.work.phi);
-        self.correct(stage_s, &phi);
+        let corrected = self.correct(stage_s, &phi);
         self.work.phi = phi;
+        corrected?;
         let Err(Error::PressureNotSolved { reason, .. }) = &solved else { return solved };
         match reason {
             PressureFailure::RoundOff { .. } => {
                 let mut right = vec![0.0; self.layout.shape.len()];
                 self.divergence.apply(self.work.star.each_ref().map(Vec::as_slice), 1.0 / stage_s, &mut right);
-                let size = norm(self.layout.shape, &right);
+                let size = norm(&self.layout.slabs, &right)?;
                 let left = self.repeat(stage_s, tolerance * size)?;
                 // A step that hardly changes the flow has so little to correct that round-off of the velocity is more than the
                 // tolerance's share of it.
-                if left > tolerance * size && self.relative_divergence() > tolerance {
+                if left > tolerance * size && self.measure_divergence()? > tolerance {
                     return solved;
                 }
                 Ok(Solved { residual: left / size, iterations: 0, factor: None, imbalance: 0.0 })
@@ -66,7 +69,7 @@ impl Flow {
         let mut last = f64::INFINITY;
         for _ in 0..=MAX_REPETITIONS {
             self.divergence.apply(self.state.velocity.each_ref().map(Vec::as_slice), 1.0 / stage_s, &mut rest);
-            let size = norm(self.layout.shape, &rest);
+            let size = norm(&self.layout.slabs, &rest)?;
             if size <= enough || size > GAIN * last {
                 return Ok(size);
             }
@@ -76,18 +79,22 @@ impl Flow {
                 Err(other) => return Err(other),
             }
             std::mem::swap(&mut self.work.star, &mut self.state.velocity);
-            self.correct(stage_s, &rest);
+            self.correct(stage_s, &rest)?;
             add_multiple(&mut self.work.phi, 1.0, &rest, self.layout.shape);
         }
         Ok(last)
     }
 
     /// `velocity = star - stage_s grad(phi)`.
-    fn correct(&mut self, stage_s: f64, phi: &[f64]) {
+    fn correct(&mut self, stage_s: f64, phi: &[f64]) -> Result<(), Error> {
         let star = self.work.star.each_ref().map(Vec::as_slice);
-        let velocity = self.state.velocity.each_mut().map(Vec::as_mut_slice);
-        let summary = correct(&self.ops, &self.layout, star, phi, stage_s, velocity);
-        self.state.energy = summary.energy;
-        self.state.courant_per_s = summary.courant_per_s;
+        let mut velocity = self.state.velocity.each_mut().map(Vec::as_mut_slice);
+        let planes =
+            correct(&self.ops, &self.layout, star, phi, stage_s, velocity.each_mut().map(|field| &mut **field));
+        self.layout.slabs.halos(&mut velocity)?;
+        let planes = self.layout.slabs.planes(planes)?;
+        self.state.energy = planes.iter().fold(0.0, |sum, plane| sum + plane[0]);
+        self.state.courant_per_s = planes.iter().fold(0.0, |most, plane| if plane[1] > most { plane[1] } else { most });
+        Ok(())
     }
 }

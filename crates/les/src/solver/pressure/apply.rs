@@ -10,7 +10,9 @@ use rayon::prelude::*;
 use super::super::layout::{Layout, Shape};
 use super::super::operators_1d::{Operators1d, Taps};
 use super::super::rows::{Columns, HALO, cut_rows, from_places, pad};
+use super::super::slabs::Slabs;
 use super::kernel;
+use crate::Error;
 
 /// `sum_b (prod_{d != b} m_d) Dw_b f_b^-1 Dw_b^T`.
 ///
@@ -18,6 +20,7 @@ use super::kernel;
 #[derive(Debug)]
 pub(crate) struct Operator {
     shape: Shape,
+    slabs: Slabs,
     mass_m: [Vec<f64>; 3],
     /// `Dw_0 f_0^-1 Dw_0^T` by columns.
     along: Columns,
@@ -29,9 +32,6 @@ pub(crate) struct Operator {
     /// Ratio of the largest eigenvalue to the smallest that is not zero, about.
     condition: f64,
 }
-
-/// Rows that are treated at a time.
-const ROWS: usize = 64;
 
 impl Operator {
     /// The operator of a mesh.
@@ -45,6 +45,7 @@ impl Operator {
         };
         Self {
             shape: layout.shape,
+            slabs: layout.slabs.clone(),
             mass_m: std::array::from_fn(|b| layout.line[b].cell_mass_m.clone()),
             along: Columns::new(&rows[0], periodic),
             even: even(&layout.line[0], &rows[0]),
@@ -59,59 +60,62 @@ impl Operator {
         self.shape
     }
 
+    /// What the ranks exchange of its fields.
+    pub(crate) fn slabs(&self) -> &Slabs {
+        &self.slabs
+    }
+
     /// Ratio of the largest eigenvalue to the smallest that is not zero, about: what round-off of the solution is multiplied
     /// by in the residual of the longest waves.
     pub(crate) fn condition(&self) -> f64 {
         self.condition
     }
 
-    /// Places in `residual` what `phi` leaves of the right side, `-g - A phi`, and returns its 2-norm.
-    pub(crate) fn residual(&self, g: &[f64], phi: &[f64], residual: &mut [f64]) -> f64 {
-        let n0 = self.shape.n[0];
-        let chunks = residual.par_chunks_mut(ROWS * n0).enumerate();
-        let squares: Vec<f64> = chunks
-            .map_init(
-                || vec![0.0; n0 + 2 * HALO],
-                |padded, (c, chunk)| {
-                    let rows = chunk.chunks_mut(n0).enumerate();
-                    rows.map(|(r, out)| residual_row(self, g, phi, c * ROWS + r, out, padded)).sum()
-                },
-            )
-            .collect();
-        squares.iter().sum::<f64>().sqrt()
+    /// Places in `residual` what `phi` leaves of the right side, `-g - A phi`.
+    pub(crate) fn residual(&self, g: &[f64], phi: &[f64], residual: &mut [f64]) {
+        let (shape, n0) = (self.shape, self.shape.n[0]);
+        let planes = residual[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+        planes.for_each_init(
+            || vec![0.0; n0 + 2 * HALO],
+            |padded, (plane, k)| {
+                for (j, out) in plane.chunks_mut(n0).enumerate() {
+                    residual_row(self, g, phi, [j, k], out, padded);
+                }
+            },
+        );
     }
 
     /// 2-norm of what `phi` leaves of the right side, which is nowhere stored.
-    pub(crate) fn residual_norm(&self, g: &[f64], phi: &[f64]) -> f64 {
-        let n0 = self.shape.n[0];
-        let rows = self.shape.len() / n0;
-        let squares: Vec<f64> = (0..rows.div_ceil(ROWS))
-            .into_par_iter()
-            .map_init(
-                || (vec![0.0; n0], vec![0.0; n0 + 2 * HALO]),
-                |(out, padded), c| {
-                    let chunk = c * ROWS..rows.min((c + 1) * ROWS);
-                    chunk.map(|r| residual_row(self, g, phi, r, out, padded)).sum()
-                },
-            )
-            .collect();
-        squares.iter().sum::<f64>().sqrt()
+    ///
+    /// # Errors
+    /// Those of the exchange between ranks.
+    pub(crate) fn residual_norm(&self, g: &[f64], phi: &[f64]) -> Result<f64, Error> {
+        let [n0, n1, _] = self.shape.n;
+        let planes = self.shape.own().into_par_iter();
+        let squares = planes.map_init(
+            || (vec![0.0; n0], vec![0.0; n0 + 2 * HALO]),
+            |(out, padded), k| [(0..n1).map(|j| residual_row(self, g, phi, [j, k], out, padded)).sum()],
+        );
+        self.slabs.sums(squares.collect()).map(|[squares]| squares.sqrt())
     }
 
     /// Copies the right side `from` to `to`; returns its 2-norm and its sum over the sum of its moduli. If the sum, which
     /// nothing can balance, is more than `share` of the norm, it is taken out of the copy.
-    pub(crate) fn copy_balanced(&self, from: &[f64], to: &mut [f64], share: f64) -> [f64; 2] {
-        let chunk = ROWS * self.shape.n[0];
-        let parts: Vec<[f64; 3]> = to
-            .par_chunks_mut(chunk)
-            .zip(from.par_chunks(chunk))
+    ///
+    /// # Errors
+    /// Those of the exchange between ranks.
+    pub(crate) fn copy_balanced(&self, from: &[f64], to: &mut [f64], share: f64) -> Result<[f64; 2], Error> {
+        let (plane, own) = (self.shape.plane(), self.shape.own_places());
+        let parts: Vec<[f64; 3]> = to[own.clone()]
+            .par_chunks_mut(plane)
+            .zip(from[own].par_chunks(plane))
             .map(|(to, from)| {
                 to.copy_from_slice(from);
                 let [sum, moduli] = kernel::sum_and_moduli(to);
                 [sum, moduli, kernel::dot(to, to)]
             })
             .collect();
-        let [sum, moduli, squares] = parts.iter().fold([0.0; 3], |a, b| std::array::from_fn(|i| a[i] + b[i]));
+        let [sum, moduli, squares] = self.slabs.sums(parts)?;
         let imbalance = if moduli > 0.0 { sum / moduli } else { 0.0 };
         let (mut volume, mut mass) = (1.0, 1.0);
         for axis in &self.mass_m {
@@ -119,15 +123,18 @@ impl Operator {
             mass *= kernel::dot(axis, axis).sqrt();
         }
         if (sum / volume).abs() * mass <= share * squares.sqrt() {
-            return [squares.sqrt(), imbalance];
+            return Ok([squares.sqrt(), imbalance]);
         }
-        self.subtract_mean(to, sum / volume);
-        [norm(self.shape, to), imbalance]
+        self.each_mass(to, sum / volume, |g, mass| *g -= mass);
+        Ok([norm(&self.slabs, to)?, imbalance])
     }
 
     /// 2-norm of what the last digit of `phi` leaves.
-    pub(crate) fn round_off(&self, phi: &[f64]) -> f64 {
-        let [n0, n1, _] = self.shape.n;
+    ///
+    /// # Errors
+    /// Those of the exchange between ranks.
+    pub(crate) fn round_off(&self, phi: &[f64]) -> Result<f64, Error> {
+        let (n0, shape) = (self.shape.n[0], self.shape);
         let sum = |taps: &Taps| {
             taps.iter().map(|tap| tap.1 * tap.1).sum::<f64>() + taps.iter().map(|tap| tap.1).sum::<f64>().powi(2)
         };
@@ -136,52 +143,47 @@ impl Operator {
             self.across[0].iter().map(sum).collect(),
             self.across[1].iter().map(sum).collect(),
         ];
-        let squares = phi.par_chunks(n0).enumerate().map(|(r, row)| {
-            let (j, k) = (r % n1, r / n1);
+        let squares = phi[shape.own_places()].par_chunks(shape.plane()).zip(shape.own()).map(|(plane, k)| {
             let mass = |b: usize, i: usize| self.mass_m[b][i];
-            let terms = row.iter().enumerate().map(|(i, phi)| {
+            let terms = plane.iter().enumerate().map(|(place, phi)| {
+                let (i, j) = (place % n0, place / n0);
                 let [a, b, c] = [mass(1, j) * mass(2, k), mass(0, i) * mass(2, k), mass(0, i) * mass(1, j)];
                 (a * a * own[0][i] + b * b * own[1][j] + c * c * own[2][k]) * phi * phi
             });
-            terms.sum::<f64>()
+            [terms.sum::<f64>()]
         });
-        0.5 * f64::EPSILON * squares.collect::<Vec<f64>>().iter().sum::<f64>().sqrt()
+        self.slabs.sums(squares.collect()).map(|[squares]| 0.5 * f64::EPSILON * squares.sqrt())
     }
 
     /// 2-norm of the residual over that of the right side `g`.
-    pub(crate) fn relative_residual(&self, g: &[f64], phi: &[f64]) -> f64 {
-        let left = self.residual_norm(g, phi);
-        let size = norm(self.shape, g);
-        if size > 0.0 { left / size } else { 0.0 }
-    }
-
-    /// Subtracts `mean` times the cells' masses.
-    fn subtract_mean(&self, g: &mut [f64], mean: f64) {
-        let [n0, n1, _] = self.shape.n;
-        g.par_chunks_mut(n0).enumerate().for_each(|(r, row)| {
-            let mass = self.mass_m[1][r % n1] * self.mass_m[2][r / n1] * mean;
-            for (g, m0) in row.iter_mut().zip(&self.mass_m[0]) {
-                *g -= mass * m0;
-            }
-        });
+    ///
+    /// # Errors
+    /// Those of the exchange between ranks.
+    pub(crate) fn relative_residual(&self, g: &[f64], phi: &[f64]) -> Result<f64, Error> {
+        let left = self.residual_norm(g, phi)?;
+        let size = norm(&self.slabs, g)?;
+        Ok(if size > 0.0 { left / size } else { 0.0 })
     }
 
     /// Multiplies each value by the mass of its cell.
     pub(crate) fn weigh(&self, field: &mut [f64]) {
-        let [n0, n1, _] = self.shape.n;
-        field.par_chunks_mut(n0).enumerate().for_each(|(r, row)| {
-            let mass = self.mass_m[1][r % n1] * self.mass_m[2][r / n1];
-            for (value, m0) in row.iter_mut().zip(&self.mass_m[0]) {
-                *value *= mass * m0;
+        self.each_mass(field, 1.0, |value, mass| *value *= mass);
+    }
+
+    /// Gives each value that is owned, with `scale` times the mass of its cell, to `act`.
+    fn each_mass(&self, field: &mut [f64], scale: f64, act: impl Fn(&mut f64, f64) + Sync) {
+        let (n0, shape) = (self.shape.n[0], self.shape);
+        field[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
+            for (row, m1) in plane.chunks_mut(n0).zip(&self.mass_m[1]) {
+                let mass = m1 * self.mass_m[2][k] * scale;
+                row.iter_mut().zip(&self.mass_m[0]).for_each(|(value, m0)| act(value, mass * m0));
             }
         });
     }
 }
 
-/// Residual of row `r` of memory; returns the sum of its squares.
-fn residual_row(op: &Operator, g: &[f64], phi: &[f64], r: usize, out: &mut [f64], padded: &mut [f64]) -> f64 {
-    let n1 = op.shape.n[1];
-    let (j, k) = (r % n1, r / n1);
+/// Residual of row `(j, k)`; returns the sum of its squares.
+fn residual_row(op: &Operator, g: &[f64], phi: &[f64], [j, k]: [usize; 2], out: &mut [f64], padded: &mut [f64]) -> f64 {
     let at = op.shape.row(j, k);
     let own = &phi[at.clone()];
     let (m1, m2) = (op.mass_m[1][j], op.mass_m[2][k]);
@@ -305,8 +307,11 @@ pub(crate) fn stiffness(line: &Operators1d) -> Vec<Taps> {
     divergence.iter().map(row).collect()
 }
 
-/// 2-norm of a field, by rows in their order.
-pub(crate) fn norm(shape: Shape, field: &[f64]) -> f64 {
-    let rows: Vec<f64> = field.par_chunks(shape.n[0]).map(|row| kernel::dot(row, row)).collect();
-    rows.iter().sum::<f64>().sqrt()
+/// 2-norm of a field: the sums of the planes are added in their order.
+///
+/// # Errors
+/// Those of the exchange between ranks.
+pub(crate) fn norm(slabs: &Slabs, field: &[f64]) -> Result<f64, Error> {
+    let planes = field[slabs.shape.own_places()].par_chunks(slabs.shape.plane());
+    slabs.sums(planes.map(|plane| [kernel::dot(plane, plane)]).collect()).map(|[squares]| squares.sqrt())
 }

@@ -87,19 +87,25 @@ impl Direct {
         self.operator.shape()
     }
 
-    /// One solve.
-    fn solve_once(&self, field: &mut [f64]) {
-        self.rows_forward(field);
+    /// One solve for the planes that are owned.
+    fn solve_once(&self, own: &mut [f64]) -> Result<(), Error> {
+        self.rows_forward(own);
+        self.operator.slabs().turned(own, 1, |field, shape, first| self.lines_once(field, shape, first))?;
+        self.rows_inverse(own);
+        Ok(())
+    }
+
+    /// What is done along the axes 1 and 2 of the places from `first` on of axis 0.
+    fn lines_once(&self, field: &mut [f64], shape: Shape, first: usize) {
         if !self.by_planes() {
-            self.lines(0, field, LineTransform::forward);
+            self.lines(0, field, shape, LineTransform::forward);
         }
-        self.lines(1, field, LineTransform::forward);
-        self.divide(field);
-        self.lines(1, field, LineTransform::inverse);
+        self.lines(1, field, shape, LineTransform::forward);
+        self.divide(field, shape, first);
+        self.lines(1, field, shape, LineTransform::inverse);
         if !self.by_planes() {
-            self.lines(0, field, LineTransform::inverse);
+            self.lines(0, field, shape, LineTransform::inverse);
         }
-        self.rows_inverse(field);
     }
 
     /// Whether axes 0 and 1 are transformed together, plane by plane.
@@ -140,32 +146,34 @@ impl Direct {
         &self,
         which: usize,
         field: &mut [f64],
+        shape: Shape,
         apply: impl Fn(&LineTransform, &mut [&mut [f64]], &mut Work) + Sync,
     ) {
         let Along::Transformed(transform) = &self.along[which] else { return };
-        let mut bundles = bundles(field, self.shape(), which + 1);
+        let mut bundles = bundles(field, shape, which + 1);
         let each = bundles.par_iter_mut();
         each.for_each_init(Work::default, |work, bundle| apply(transform, &mut bundle.rows, work));
     }
 
     /// Solves for the coefficients of the eigenvectors.
-    fn divide(&self, field: &mut [f64]) {
+    fn divide(&self, field: &mut [f64], shape: Shape, first: usize) {
         let banded = self.along.iter().enumerate().find_map(|(which, along)| match along {
             Along::Factorised(band) => Some((which + 1, band)),
             Along::Transformed(_) => None,
         });
         let value = &self.value;
-        let n1 = self.shape().n[1];
+        let (n0, n1) = (shape.n[0], shape.n[1]);
+        let along = &value[0][first..first + n0];
         if let Some((axis, band)) = banded {
             let other = &value[3 - axis];
-            bundles(field, self.shape(), axis).par_iter_mut().for_each_init(Scratch::default, |scratch, bundle| {
+            bundles(field, shape, axis).par_iter_mut().for_each_init(Scratch::default, |scratch, bundle| {
                 let width = bundle.rows.first().map_or(0, |row| row.len());
-                let shifts = &value[0][bundle.start..bundle.start + width];
+                let shifts = &along[bundle.start..bundle.start + width];
                 band.solve(&mut bundle.rows, other[bundle.other], shifts, self.scale, scratch);
             });
         } else {
-            field.par_chunks_mut(self.shape().n[0]).with_min_len(64).enumerate().for_each(|(r, row)| {
-                kernel::divide(row, value[1][r % n1] + value[2][r / n1], &value[0], self.scale);
+            field.par_chunks_mut(n0).with_min_len(64).enumerate().for_each(|(r, row)| {
+                kernel::divide(row, value[1][r % n1] + value[2][r / n1], along, self.scale);
             });
         }
     }
@@ -175,9 +183,9 @@ impl PressureSolver for Direct {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
         check_request(self.shape(), field, tolerance)?;
         let mut refinement = std::mem::take(&mut self.refinement);
+        let own = self.shape().own_places();
         let solved = refinement.run(&self.operator, field, tolerance, "direct solver", |field, _, _| {
-            self.solve_once(field);
-            Pass(Vec::new())
+            self.solve_once(&mut field[own.clone()]).map(|()| Pass(Vec::new()))
         });
         self.refinement = refinement;
         solved

@@ -78,7 +78,7 @@ impl PressureEquation {
     pub fn residual(&self, g: &[f64], phi: &[f64]) -> Result<f64, Error> {
         check_length(self.layout.shape, g)?;
         check_length(self.layout.shape, phi)?;
-        Ok(self.operator.relative_residual(g, phi))
+        self.operator.relative_residual(g, phi)
     }
 
     /// The method and what it does in each direction.

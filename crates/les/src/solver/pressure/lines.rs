@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn bundles_hold_every_value_once_in_its_place() {
         for n in [[70, 3, 5], [4, 1, 9], [33, 80, 2], [1, 1, 1]] {
-            let shape = Shape { n };
+            let shape = Shape::whole(n);
             let mut field: Vec<f64> = (0..shape.len()).map(|i| i as f64).collect();
             for axis in [1, 2] {
                 let mut seen = 0;

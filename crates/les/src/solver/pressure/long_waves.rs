@@ -24,7 +24,7 @@ fn right_side(layout: &Layout, divergence: impl Fn([f64; 3]) -> f64) -> Vec<f64>
     let operator = Operator::new(layout);
     operator.weigh(&mut g);
     let mut balanced = g.clone();
-    operator.copy_balanced(&g, &mut balanced, 0.0);
+    operator.copy_balanced(&g, &mut balanced, 0.0).unwrap();
     balanced
 }
 

@@ -31,7 +31,7 @@ const ROUND_OFF: f64 = 4.0;
 const BALANCED: f64 = 0.01;
 
 impl Refinement {
-    /// Replaces the right side in `field` by the solution. `solve` replaces a right side of the given norm by a solution of
+    /// Replaces the right side in `field` by the solution, halos included. `solve` replaces a right side of the given norm by a solution of
     /// about the given relative residual; `method` is its name in errors.
     ///
     /// # Errors
@@ -42,12 +42,12 @@ impl Refinement {
         field: &mut [f64],
         tolerance: f64,
         method: &'static str,
-        mut solve: impl FnMut(&mut [f64], f64, f64) -> Pass,
+        mut solve: impl FnMut(&mut [f64], f64, f64) -> Result<Pass, Error>,
     ) -> Result<Solved, Error> {
         let refused = |history, reason| Err(Error::PressureNotSolved { method, tolerance, reason, history });
         // The solvers ignore what no pressure can balance; only the residual must not hold it against them.
         self.right.resize(field.len(), 0.0);
-        let [size, imbalance] = operator.copy_balanced(field, &mut self.right, BALANCED * tolerance);
+        let [size, imbalance] = operator.copy_balanced(field, &mut self.right, BALANCED * tolerance)?;
         if size == 0.0 {
             field.fill(0.0);
             return Ok(Solved { residual: 0.0, iterations: 0, factor: None, imbalance });
@@ -57,7 +57,7 @@ impl Refinement {
         for pass in 0..MAX_PASSES {
             // Of a later pass the right side is what the field so far leaves.
             let right = if pass == 0 { &mut *field } else { &mut self.left };
-            let Pass(seen) = solve(right, last * size, f64::max(SAFETY * tolerance, 0.25 * attainable) / last);
+            let Pass(seen) = solve(right, last * size, f64::max(SAFETY * tolerance, 0.25 * attainable) / last)?;
             iterations += seen.len();
             history.extend(seen.iter().map(|residual| residual * last));
             if !seen.is_empty() {
@@ -67,7 +67,8 @@ impl Refinement {
             if pass > 0 {
                 field.par_iter_mut().zip(&self.left).for_each(|(phi, more)| *phi += more);
             }
-            let residual = operator.residual_norm(&self.right, field) / size;
+            operator.slabs().halos(&mut [field])?;
+            let residual = operator.residual_norm(&self.right, field)? / size;
             history.push(residual);
             if residual <= tolerance {
                 let factor = (iterations > 0).then(|| residual.powf(1.0 / iterations as f64));
@@ -76,7 +77,7 @@ impl Refinement {
             if residual.is_nan() {
                 return refused(history, PressureFailure::NotFinite);
             }
-            attainable = operator.round_off(field) / size;
+            attainable = operator.round_off(field)? / size;
             if residual > STALLED * last {
                 break;
             }

@@ -45,7 +45,7 @@ impl EnergyBound {
         let forced = (self.bound_m5_s2.sqrt() + step_s * force).powi(2);
         let allowed = (forced.sqrt() + wall).powi(2);
         if energy > (1.0 + SHARE) * allowed {
-            return Err(grew(flow, allowed, (energy / energy_before).ln() / step_s));
+            return Err(grew(flow, allowed, (energy / energy_before).ln() / step_s)?);
         }
         self.largest_m5_s2 = self.largest_m5_s2.max(energy);
         self.bound_m5_s2 = energy.min(forced).max(ROUND_OFF * self.largest_m5_s2);
@@ -65,9 +65,9 @@ fn sources(flow: &Flow) -> [f64; 2] {
     [length(flow.settings().force_m_s2), fastest_m_s].map(|v| v * (0.5 * volume_m3).sqrt())
 }
 
-fn grew(flow: &Flow, allowed_m5_s2: f64, rate_per_s: f64) -> Error {
-    let (axis, place) = flow.strongest_short_wave();
-    Error::EnergyGrew(Box::new(EnergyGrowth {
+fn grew(flow: &Flow, allowed_m5_s2: f64, rate_per_s: f64) -> Result<Error, Error> {
+    let (axis, place) = flow.strongest_short_wave()?;
+    Ok(Error::EnergyGrew(Box::new(EnergyGrowth {
         step: flow.steps(),
         time_s: flow.time_s(),
         energy_m5_s2: flow.kinetic_energy_m5_s2(),
@@ -77,7 +77,7 @@ fn grew(flow: &Flow, allowed_m5_s2: f64, rate_per_s: f64) -> Error {
         cell: flow.cell(place),
         position_m: flow.position_m(place),
         cause: cause(flow),
-    }))
+    })))
 }
 
 /// The likeliest cause, and what to do.

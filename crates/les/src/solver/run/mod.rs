@@ -118,8 +118,14 @@ pub enum RunWarning {
     },
 }
 
-/// Who watches a run. An `Err` with a reason stops it; the last checkpoint stays.
+/// Who watches a run. An `Err` with a reason stops it; the last checkpoint stays. Of a run on several ranks the observer of
+/// rank 0 alone is asked; it sees the whole flow.
 pub trait RunObserver {
+    /// Whether [`Self::step`] looks at the fields of the flow. If not, ranks need not gather them after every step.
+    fn looks_at_steps(&self) -> bool {
+        true
+    }
+
     /// After every step.
     ///
     /// # Errors
@@ -170,6 +176,8 @@ pub struct RunSummary {
 #[derive(Debug)]
 pub struct Run {
     flow: Flow,
+    /// Of a flow on several ranks what observers see, on rank 0.
+    whole: Option<Flow>,
     plan: RunPlan,
     /// The budget of the last step, which waits for the powers at its end: those at its start.
     open: Option<EnergyBudget>,
@@ -193,7 +201,7 @@ impl Run {
     pub fn new(flow: Flow, plan: RunPlan) -> Result<Self, Error> {
         plan.check(flow.time_s())?;
         let energy = EnergyBound::new(&flow);
-        Ok(Self { flow, plan, open: None, energy, has_warned: HasWarned::default(), is_fresh: true })
+        Ok(Self { flow, whole: None, plan, open: None, energy, has_warned: HasWarned::default(), is_fresh: true })
     }
 
     /// A run that continues from a checkpoint written by a run, with the bytes that the observer had given.
@@ -214,10 +222,10 @@ impl Run {
         };
         plan.check(f64::NEG_INFINITY)?;
         let has_warned = HasWarned::default();
-        Ok((Self { flow, plan, open, energy, has_warned, is_fresh: false }, user_data.to_vec()))
+        Ok((Self { flow, whole: None, plan, open, energy, has_warned, is_fresh: false }, user_data.to_vec()))
     }
 
-    /// The simulation.
+    /// The simulation, or the part that this rank has.
     pub fn flow(&self) -> &Flow {
         &self.flow
     }
@@ -238,6 +246,8 @@ impl Run {
         let given = |&t: &f64| if self.is_fresh { t < start_s } else { self.is_reached(t) };
         let mut next_output = self.plan.output_times_s.iter().take_while(|t| given(t)).count();
         self.is_fresh = false;
+        let looks = self.flow.layout.slabs.is_first() && observer.looks_at_steps();
+        let [looks] = self.flow.layout.slabs.largest([f64::from(u8::from(looks))])?;
         self.give_outputs(&mut next_output, observer)?;
         while !self.is_reached(end_s) {
             if self.plan.pause_after_steps.is_some_and(|steps| self.flow.steps() >= steps) {
@@ -253,8 +263,8 @@ impl Run {
                 return Err(Error::StepTooShort { step, time_s: report.time_s, step_s, end_s });
             }
             self.warn(&report, observer);
-            let record = self.record(report, energy);
-            observer.step(&self.flow, &record).map_err(|reason| self.stopped(reason))?;
+            let record = self.record(report, energy)?;
+            self.show(looks > 0.0, |flow| observer.step(flow, &record))?;
             self.energy.pass(&self.flow, energy, report.step_s)?;
             self.give_outputs(&mut next_output, observer)?;
             if self.checkpoint_is_due(before_s, &report) {
@@ -270,23 +280,34 @@ impl Run {
         time_s - self.flow.time_s() <= SAME_TIME * time_s.abs().max(self.plan.end_s.abs())
     }
 
-    fn give_outputs(&self, next: &mut usize, observer: &mut dyn RunObserver) -> Result<(), Error> {
+    fn give_outputs(&mut self, next: &mut usize, observer: &mut dyn RunObserver) -> Result<(), Error> {
         while self.plan.output_times_s.get(*next).is_some_and(|&t| self.is_reached(t)) {
-            observer.output(&self.flow, *next).map_err(|reason| self.stopped(reason))?;
+            self.show(true, |flow| observer.output(flow, *next))?;
             *next += 1;
         }
         Ok(())
     }
 
-    fn stopped(&self, reason: String) -> Error {
-        Error::Stopped { step: self.flow.steps(), time_s: self.flow.time_s(), reason }
+    /// Shows the flow to who watches it on rank 0; what stops that stops all ranks.
+    fn show(&mut self, fields: bool, look: impl FnOnce(&Flow) -> Result<(), String>) -> Result<(), Error> {
+        let Self { flow, whole, .. } = self;
+        flow.show(whole, fields)?;
+        let stopped = |reason| Error::Stopped { step: flow.steps(), time_s: flow.time_s(), reason };
+        flow.layout.slabs.agree(flow.seen(whole).map_or(Ok(()), look).map_err(stopped))
+    }
+
+    /// Tells who watches, once for all ranks.
+    fn tell(&self, observer: &mut dyn RunObserver, warning: &RunWarning) {
+        if self.flow.layout.slabs.is_first() {
+            observer.warning(warning);
+        }
     }
 
     fn warn(&mut self, report: &StepReport, observer: &mut dyn RunObserver) {
         let limit = self.flow.settings().scheme.largest_courant();
         if report.courant > WARNING_SHARE * limit && !self.has_warned.courant {
             self.has_warned.courant = true;
-            observer.warning(&RunWarning::Courant { step: report.step, courant: report.courant, limit });
+            self.tell(observer, &RunWarning::Courant { step: report.step, courant: report.courant, limit });
         }
     }
 
@@ -298,17 +319,17 @@ impl Run {
         let left_s = self.plan.end_s - self.flow.time_s();
         if let Some(growth) = self.flow.undamped_growth().filter(|g| g.rate_per_s * left_s > NOTICED_GROWTH) {
             self.has_warned.growth = true;
-            observer.warning(&RunWarning::UndampedGrowth { step, growth });
+            self.tell(observer, &RunWarning::UndampedGrowth { step, growth });
         }
     }
 
-    fn record(&mut self, report: StepReport, energy_before: f64) -> StepRecord {
+    fn record(&mut self, report: StepReport, energy_before: f64) -> Result<StepRecord, Error> {
         let power_m5_s3 = report.viscous_power_m5_s3 + report.subgrid_power_m5_s3 + report.force_power_m5_s3;
         let mean = |open: EnergyBudget| EnergyBudget { power_m5_s3: 0.5 * (open.power_m5_s3 + power_m5_s3), ..open };
         let budget_before = self.open.map(mean);
         let rate_m5_s3 = (report.kinetic_energy_m5_s2 - energy_before) / report.step_s;
         self.open = Some(EnergyBudget { step: report.step, rate_m5_s3, power_m5_s3 });
-        StepRecord { report, relative_divergence: self.flow.relative_divergence(), budget_before }
+        Ok(StepRecord { report, relative_divergence: self.flow.measure_divergence()?, budget_before })
     }
 
     fn checkpoint_is_due(&self, before_s: f64, report: &StepReport) -> bool {
@@ -379,5 +400,7 @@ fn read_own(bytes: &[u8]) -> Option<(Option<EnergyBudget>, EnergyBound, &[u8])> 
     }
 }
 
+#[cfg(test)]
+mod ranks_tests;
 #[cfg(test)]
 mod tests;

@@ -70,13 +70,13 @@ impl Filter {
     pub(super) fn small_scales(&self, velocity: [&[f64]; 3], small: &mut [Vec<f64>; 3]) {
         let shape = self.shape;
         for (component, (field, small)) in velocity.into_iter().zip(small).enumerate() {
-            small.par_chunks_mut(shape.plane()).enumerate().for_each_init(
+            small[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own()).for_each_init(
                 || Scratch {
                     plane: vec![0.0; shape.plane()],
                     row: vec![0.0; shape.n[0]],
                     padded: vec![0.0; shape.n[0] + 2 * HALO],
                 },
-                |scratch, (k, out)| match self.order {
+                |scratch, (out, k)| match self.order {
                     1 => plane_of_order_1(self, field, component, k, out, scratch),
                     2 => plane_of_order_2(self, field, component, k, out, scratch),
                     3 => plane_of_order_3(self, field, component, k, out, scratch),

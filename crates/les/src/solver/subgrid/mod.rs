@@ -33,6 +33,7 @@ mod stress;
 mod viscosity;
 
 use super::layout::Layout;
+use super::slabs::Slabs;
 use crate::Error;
 use crate::error::check;
 use filter::{Filter, HIGHEST_ORDER};
@@ -94,6 +95,7 @@ pub(crate) struct Subgrid {
     viscosity: Vec<f64>,
     largest: Largest,
     stress: Stress,
+    slabs: Slabs,
 }
 
 impl Subgrid {
@@ -112,22 +114,35 @@ impl Subgrid {
             viscosity: vec![0.0; cells],
             largest: Largest::default(),
             stress: Stress::new(cells),
+            slabs: layout.slabs.clone(),
         }))
     }
 
     /// Eddy viscosity and stress of the flow `velocity_m_s`. The viscosity is cut where the shortest waves would decay faster
     /// than `limit_per_s`, which an explicit time step could not follow; infinity leaves it as it is.
-    pub(crate) fn update(&mut self, velocity_m_s: [&[f64]; 3], limit_per_s: f64) {
-        let Self { operators, formula, viscosity, .. } = self;
-        self.largest = eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity);
-        let strained = match &mut self.small {
+    ///
+    /// # Errors
+    /// Those of the exchange between ranks.
+    pub(crate) fn update(&mut self, velocity_m_s: [&[f64]; 3], limit_per_s: f64) -> Result<(), Error> {
+        let Self { operators, formula, viscosity, small, slabs, .. } = self;
+        let largest = eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity);
+        let [viscosity_m2_s, decay_per_s] = slabs.largest([largest.viscosity_m2_s, largest.decay_per_s])?;
+        self.largest = Largest { viscosity_m2_s, decay_per_s };
+        let strained = match small {
             Some((filter, small)) => {
                 filter.small_scales(velocity_m_s, small);
+                let [a, b, c] = small.each_mut().map(Vec::as_mut_slice);
+                slabs.halos(&mut [viscosity, a, b, c])?;
                 small.each_ref().map(Vec::as_slice)
             }
-            None => velocity_m_s,
+            None => {
+                slabs.halos(&mut [viscosity])?;
+                velocity_m_s
+            }
         };
-        self.stress.update(&self.operators, &self.viscosity, strained);
+        self.stress.update(operators, viscosity, strained);
+        let [a, b, c] = self.stress.across.each_mut().map(Vec::as_mut_slice);
+        slabs.halos(&mut [a, b, c])
     }
 
     /// Adds the divergence of the stress to the acceleration of row `(j, k)` of one component \[m/s^2\]. Rows of walls get
@@ -144,6 +159,11 @@ impl Subgrid {
     /// Largest decay rate of the shortest waves by the eddy viscosity, before it was cut \[1/s\].
     pub(crate) fn max_decay_per_s(&self) -> f64 {
         self.largest.decay_per_s
+    }
+
+    /// Takes an eddy viscosity from elsewhere, to be shown.
+    pub(crate) fn set_viscosity(&mut self, viscosity_m2_s: Vec<f64>) {
+        self.viscosity = viscosity_m2_s;
     }
 
     /// Eddy viscosity at the centres, in the order of memory \[m^2/s\].

@@ -51,10 +51,11 @@ impl Stress {
 
     /// The stress by the viscosity at the centres and the strain of `velocity`.
     pub(super) fn update(&mut self, operators: &Operators, viscosity: &[f64], velocity: [&[f64]; 3]) {
-        let (n, plane) = (operators.shape.n[0], operators.shape.plane());
-        let [a0, a1, a2] = self.in_plane.each_mut().map(|field| field.par_chunks_mut(plane));
-        let [t0, t1, t2] = self.across.each_mut().map(|field| field.par_chunks_mut(plane));
-        (a0, a1, a2, t0, t1, t2).into_par_iter().enumerate().for_each_init(
+        let shape = operators.shape;
+        let (n, plane) = (shape.n[0], shape.plane());
+        let [a0, a1, a2] = self.in_plane.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
+        let [t0, t1, t2] = self.across.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
+        (a0, a1, a2, t0, t1, t2, shape.own()).into_par_iter().for_each_init(
             || Scratch {
                 shear: vec![0.0; plane],
                 normal: vec![0.0; plane],
@@ -62,7 +63,7 @@ impl Stress {
                 viscosity: vec![0.0; n],
                 padded: vec![0.0; n + 2 * HALO],
             },
-            |scratch, (k, (a0, a1, a2, t0, t1, t2))| {
+            |scratch, (a0, a1, a2, t0, t1, t2, k)| {
                 let mut planes = Planes { in_plane: [a0, a1, a2], across: [t0, t1, t2] };
                 stress_plane(operators, viscosity, velocity, k, &mut planes, scratch);
             },
@@ -129,10 +130,9 @@ fn stress_plane(
     }
     for j in 0..shape.n[1] {
         let [in_0, in_1, in_2] = planes.in_plane.each_mut().map(|plane| &mut plane[j * n..(j + 1) * n]);
-        // The planes stand alone: their rows are those of plane 0.
-        operators.to_cells[1].add_across(in_0, &scratch.shear, [j, 0]);
-        operators.to_faces[1].add_across(in_1, &scratch.normal, [j, 0]);
-        operators.to_cells[1].add_across(in_2, planes.across[1], [j, 0]);
+        operators.to_cells[1].add_in_plane(in_0, &scratch.shear, j);
+        operators.to_faces[1].add_in_plane(in_1, &scratch.normal, j);
+        operators.to_cells[1].add_in_plane(in_2, planes.across[1], j);
     }
 }
 

@@ -46,13 +46,14 @@ pub(super) fn eddy_viscosity(
     limit_per_s: f64,
     viscosity: &mut [f64],
 ) -> Largest {
-    let n = operators.shape.n[0];
-    viscosity
-        .par_chunks_mut(operators.shape.plane())
-        .enumerate()
+    let shape = operators.shape;
+    let n = shape.n[0];
+    viscosity[shape.own_places()]
+        .par_chunks_mut(shape.plane())
+        .zip(shape.own())
         .map_init(
             || Scratch::new(n),
-            |scratch, (k, plane)| viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch),
+            |scratch, (plane, k)| viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch),
         )
         .reduce(Largest::default, Largest::or)
 }

@@ -22,6 +22,7 @@ use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
 use super::super::mesh::AXIS_NAMES;
+use super::super::slabs::Slabs;
 use super::apply::{Operator, stiffness};
 use super::lines::columns;
 use super::refine::{Pass, Refinement};
@@ -92,21 +93,25 @@ impl Multigrid {
         self.operator.shape()
     }
 
-    /// Solves for the right side in `field`, of norm `size`, to about `tolerance`.
-    fn pass(&self, field: &mut [f64], size: f64, tolerance: f64) -> Pass {
-        self.transform(field, RowTransform::forward);
+    /// Solves for the right side in the planes that are owned, of norm `size`, to about `tolerance`.
+    fn pass(&self, own: &mut [f64], size: f64, tolerance: f64) -> Result<Pass, Error> {
+        self.transform(own, RowTransform::forward);
         let allowed = (tolerance * size * self.scale).powi(2);
-        let histories: Vec<Vec<f64>> = columns(field, self.shape(), LANES)
-            .par_iter_mut()
-            .enumerate()
-            .map_init(krylov::Work::default, |work, (group, rows)| self.group(group, rows, allowed, tolerance, work))
-            .collect();
-        self.transform(field, RowTransform::inverse);
+        let slabs = self.operator.slabs();
+        let histories: Vec<Vec<f64>> = slabs.turned(own, LANES, |field, shape, first| {
+            let mut groups = columns(field, shape, LANES);
+            let groups = groups.par_iter_mut().enumerate().map_init(krylov::Work::default, |work, (group, rows)| {
+                self.group(first / LANES + group, rows, allowed, tolerance, work)
+            });
+            groups.collect()
+        })?;
+        self.transform(own, RowTransform::inverse);
+        let histories = together(slabs, histories)?;
         let longest = histories.iter().map(Vec::len).max().unwrap_or(1);
         let total =
             |t: usize| -> f64 { histories.iter().filter_map(|history| history.get(t).or(history.last())).sum::<f64>() };
         let unit = (size * self.scale).abs();
-        Pass((1..longest).map(|t| if unit > 0.0 { total(t).sqrt() / unit } else { 0.0 }).collect())
+        Ok(Pass((1..longest).map(|t| if unit > 0.0 { total(t).sqrt() / unit } else { 0.0 }).collect()))
     }
 
     /// Solves one group of modes; returns the squares of its residual's norm.
@@ -156,12 +161,26 @@ impl Multigrid {
     }
 }
 
+/// The lists of all ranks: each is sent behind its length.
+fn together(slabs: &Slabs, own: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Error> {
+    let lists: Vec<f64> = own.iter().flat_map(|list| [&[list.len() as f64], &list[..]].concat()).collect();
+    let mut all = &*slabs.together(&lists)?;
+    let mut found = Vec::new();
+    while let [length, rest @ ..] = all {
+        let (list, others) = rest.split_at(*length as usize);
+        found.push(list.to_vec());
+        all = others;
+    }
+    Ok(found)
+}
+
 impl PressureSolver for Multigrid {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
         check_request(self.shape(), field, tolerance)?;
         let mut refinement = std::mem::take(&mut self.refinement);
+        let own = self.shape().own_places();
         let solved = refinement.run(&self.operator, field, tolerance, "multigrid", |field, size, tolerance| {
-            self.pass(field, size, tolerance)
+            self.pass(&mut field[own.clone()], size, tolerance)
         });
         self.refinement = refinement;
         solved

@@ -26,7 +26,7 @@ impl Modelled {
         let layout = Layout::new(&mesh, Some([0, 1, 2]));
         let velocity = faces(&mesh, &layout, field);
         let mut model = Subgrid::new(&layout, model).unwrap().unwrap();
-        model.update(velocity.each_ref().map(Vec::as_slice), f64::INFINITY);
+        model.update(velocity.each_ref().map(Vec::as_slice), f64::INFINITY).unwrap();
         Self { mesh, layout, velocity, model }
     }
 

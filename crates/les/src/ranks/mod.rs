@@ -1,0 +1,93 @@
+//! The ranks that share a flow: processes of one machine or of many, each with a slab of the mesh and threads of its own.
+//!
+//! All that the solver exchanges is one operation, [`Ranks::turn`]: halos, lines that cross slabs, numbers of all planes.
+//! Sums are made from the numbers of single planes in the order of the mesh, so that results have the same bits for any
+//! number of ranks.
+//!
+//! Check: the solver on ranks against one process, bit for bit (`solver::slabs_tests`); a rank that is lost.
+
+mod threads;
+
+use std::borrow::Cow;
+use std::fmt::{Debug, Display};
+
+use crate::Error;
+
+pub use threads::{ThreadRanks, on_threads};
+
+/// The ranks that share a flow. All of them call the same operations in the same order.
+pub trait Ranks: Debug + Send + Sync {
+    /// Number of this rank, from 0. Rank 0 is the one that observers and files see.
+    fn rank(&self) -> usize;
+
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// All-to-all: of `send` the first `to[0]` values go to rank 0, the next `to[1]` to rank 1; `receive` gets `from[0]`
+    /// values of rank 0, then `from[1]` of rank 1.
+    ///
+    /// # Errors
+    /// [`Error::RankLost`] if a rank has ended that was to send something.
+    fn turn(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error>;
+}
+
+/// One process.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Single;
+
+impl Ranks for Single {
+    fn rank(&self) -> usize {
+        0
+    }
+
+    fn count(&self) -> usize {
+        1
+    }
+
+    fn turn(&self, send: &[f64], _: &[usize], receive: &mut [f64], _: &[usize]) -> Result<(), Error> {
+        receive.copy_from_slice(send);
+        Ok(())
+    }
+}
+
+/// Everybody's numbers in the order of the ranks.
+///
+/// # Errors
+/// Those of [`Ranks::turn`].
+pub fn together<'a>(ranks: &dyn Ranks, own: &'a [f64]) -> Result<Cow<'a, [f64]>, Error> {
+    let count = ranks.count();
+    if count == 1 {
+        return Ok(Cow::Borrowed(own));
+    }
+    let share = |own: &[f64], from: &[usize]| {
+        let mut all = vec![0.0; from.iter().sum()];
+        ranks.turn(&own.repeat(count), &vec![own.len(); count], &mut all, from).map(|()| all)
+    };
+    let lengths = share(&[own.len() as f64], &vec![1; count])?;
+    let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
+    share(own, &lengths).map(Cow::Owned)
+}
+
+/// An error of one rank is the error of all, that of the lowest if there are several; `other` makes it from
+/// [`Error::OtherRank`], which has its words, where it did not happen.
+///
+/// # Errors
+/// It; those of [`Ranks::turn`].
+pub fn agree<T, E: Display>(ranks: &dyn Ranks, result: Result<T, E>, other: impl Fn(Error) -> E) -> Result<T, E> {
+    if ranks.count() == 1 {
+        return result;
+    }
+    let own = result.as_ref().err().map(ToString::to_string);
+    let failed = [f64::from(u8::from(own.is_some()))];
+    let failed = together(ranks, &failed).map_err(&other)?;
+    let Some(rank) = failed.iter().position(|failed| *failed > 0.0) else { return result };
+    let told = own.as_deref().filter(|_| ranks.rank() == rank).unwrap_or_default();
+    let bytes: Vec<f64> = told.bytes().map(f64::from).collect();
+    let bytes: Vec<u8> = together(ranks, &bytes).map_err(&other)?.iter().map(|byte| *byte as u8).collect();
+    let message = String::from_utf8_lossy(&bytes).into_owned();
+    match result {
+        // Every rank that found the same keeps what it knows of it.
+        Err(error) if own.as_ref() == Some(&message) => Err(error),
+        _ => Err(other(Error::OtherRank { rank, message })),
+    }
+}

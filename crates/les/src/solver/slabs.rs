@@ -1,0 +1,224 @@
+//! What the slabs of a flow exchange: halos, numbers of planes and ranks, lines that cross slabs, whole fields.
+//!
+//! One process exchanges nothing, and no array is copied.
+//!
+//! Check: the tests of the flow on ranks.
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::rows::HALO;
+use super::shape::Shape;
+use crate::Error;
+use crate::ranks::{self, Ranks};
+
+/// The ranks and what this one holds.
+#[derive(Debug, Clone)]
+pub(crate) struct Slabs {
+    pub(crate) ranks: Arc<dyn Ranks>,
+    pub(crate) shape: Shape,
+}
+
+impl Slabs {
+    /// Equal slabs of a mesh of `n` values along the memory axes.
+    ///
+    /// # Errors
+    /// [`Error::TooManyRanks`] if one would own fewer planes than a halo has.
+    pub(crate) fn new(ranks: Arc<dyn Ranks>, n: [usize; 3]) -> Result<Self, Error> {
+        let (ranks_found, most) = (ranks.count(), (n[2] / HALO).max(1));
+        if ranks_found > most {
+            return Err(Error::TooManyRanks { ranks: ranks_found, planes: n[2], most });
+        }
+        let shape = Shape::slab(n, ranks.rank(), ranks.count());
+        Ok(Self { ranks, shape })
+    }
+
+    /// Whether there is but one rank.
+    pub(crate) fn is_alone(&self) -> bool {
+        self.ranks.count() == 1
+    }
+
+    /// Whether observers and files see this rank.
+    pub(crate) fn is_first(&self) -> bool {
+        self.ranks.rank() == 0
+    }
+
+    /// Brings the halos of fields up to date.
+    ///
+    /// # Errors
+    /// Those of [`Ranks::turn`].
+    pub(crate) fn halos(&self, fields: &mut [&mut [f64]]) -> Result<(), Error> {
+        if self.is_alone() {
+            return Ok(());
+        }
+        let (shape, count) = (self.shape, self.ranks.count());
+        let (plane, n2, own) = (shape.plane(), shape.n[2], shape.own());
+        let before = (self.ranks.rank() + count - 1) % count;
+        let after = (self.ranks.rank() + 1) % count;
+        // With two ranks the other one is both neighbours.
+        let mut lengths = vec![0; count];
+        lengths[before] += HALO * plane * fields.len();
+        lengths[after] += HALO * plane * fields.len();
+        let lowest = (before, [own.start, own.start + n2 - HALO]);
+        let highest = (after, [own.end - HALO, own.end]);
+        // A message holds lowest planes before highest ones, so that what comes are highest halos before lowest.
+        let mut ends = [lowest, highest];
+        ends.sort_by_key(|end| end.0);
+        let mut send = Vec::with_capacity(2 * HALO * plane * fields.len());
+        for (_, [first, _]) in ends {
+            for field in fields.iter() {
+                let start = shape.place([0, 0, first]);
+                send.extend_from_slice(&field[start..start + HALO * plane]);
+            }
+        }
+        let mut receive = vec![0.0; send.len()];
+        self.ranks.turn(&send, &lengths, &mut receive, &lengths)?;
+        let mut came = receive.chunks(plane);
+        if before == after {
+            ends.reverse();
+        }
+        for (_, [_, first]) in ends {
+            for field in fields.iter_mut() {
+                for (k, plane) in (first..first + HALO).zip(&mut came) {
+                    let start = shape.place([0, 0, k % n2]);
+                    field[start..start + plane.len()].copy_from_slice(plane);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// As [`ranks::together`].
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn together<'a>(&self, own: &'a [f64]) -> Result<Cow<'a, [f64]>, Error> {
+        ranks::together(&*self.ranks, own)
+    }
+
+    /// The numbers of all planes, from those of the planes that are owned: what is summed in their order does not depend on
+    /// the ranks.
+    ///
+    /// # Errors
+    /// Those of [`Ranks::turn`].
+    pub(crate) fn planes<const M: usize>(&self, own: Vec<[f64; M]>) -> Result<Vec<[f64; M]>, Error> {
+        if self.is_alone() {
+            return Ok(own);
+        }
+        Ok(self.together(own.as_flattened())?.as_chunks::<M>().0.to_vec())
+    }
+
+    /// Sums over the planes that are owned to sums over all, one after the other.
+    ///
+    /// # Errors
+    /// Those of [`Ranks::turn`].
+    pub(crate) fn sums<const M: usize>(&self, own: Vec<[f64; M]>) -> Result<[f64; M], Error> {
+        let planes = self.planes(own)?;
+        Ok(planes.iter().fold([0.0; M], |sum, plane| std::array::from_fn(|i| sum[i] + plane[i])))
+    }
+
+    /// The largest of each of some numbers.
+    ///
+    /// # Errors
+    /// Those of [`Ranks::turn`].
+    pub(crate) fn largest<const M: usize>(&self, own: [f64; M]) -> Result<[f64; M], Error> {
+        let all = self.together(&own)?;
+        Ok(all.as_chunks::<M>().0.iter().fold(own, |a, b| std::array::from_fn(|i| a[i].max(b[i]))))
+    }
+
+    /// Lets `work` act on the planes that are owned while they lie so that lines along the axes 1 and 2 are whole: each rank
+    /// has some places of axis 0, in groups of `step`. `work` is told the shape that it sees and the first place; a rank
+    /// without places does nothing.
+    ///
+    /// # Errors
+    /// Those of [`Ranks::turn`].
+    pub(crate) fn turned<R: Default>(
+        &self,
+        own: &mut [f64],
+        step: usize,
+        work: impl FnOnce(&mut [f64], Shape, usize) -> R,
+    ) -> Result<R, Error> {
+        if self.is_alone() {
+            return Ok(work(own, self.shape, 0));
+        }
+        let (shape, count) = (self.shape, self.ranks.count());
+        let [n0, n1, n2] = shape.n;
+        let groups = n0.div_ceil(step);
+        let columns = |r: usize| (groups * r / count * step).min(n0)..(groups * (r + 1) / count * step).min(n0);
+        let mine = columns(self.ranks.rank());
+        let to: Vec<usize> = (0..count).map(|r| shape.own().len() * n1 * columns(r).len()).collect();
+        let from: Vec<usize> = (0..count).map(|r| shape.planes_of(r, count).len() * n1 * mine.len()).collect();
+        let mut pieces = vec![0.0; own.len()];
+        pack(own, &mut pieces, shape, (0..count).map(columns), |row, piece| piece.copy_from_slice(row));
+        // In the order of the ranks the planes follow one another.
+        let mut turned = vec![0.0; mine.len() * n1 * n2];
+        self.ranks.turn(&pieces, &to, &mut turned, &from)?;
+        let found = if mine.is_empty() {
+            R::default()
+        } else {
+            work(&mut turned, Shape::whole([mine.len(), n1, n2]), mine.start)
+        };
+        self.ranks.turn(&turned, &from, &mut pieces, &to)?;
+        pack(own, &mut pieces, shape, (0..count).map(columns), |row, piece| row.copy_from_slice(piece));
+        Ok(found)
+    }
+
+    /// A whole field from the slabs, on rank 0 or on all; empty elsewhere.
+    ///
+    /// # Errors
+    /// Those of [`Ranks::turn`].
+    pub(crate) fn whole<'a>(&self, field: &'a [f64], everywhere: bool) -> Result<Cow<'a, [f64]>, Error> {
+        if self.is_alone() {
+            return Ok(Cow::Borrowed(field));
+        }
+        let (shape, count) = (self.shape, self.ranks.count());
+        let own = &field[shape.own_places()];
+        let takes = |rank: usize| usize::from(everywhere || rank == 0);
+        let to: Vec<usize> = (0..count).map(|r| takes(r) * own.len()).collect();
+        let mine = takes(self.ranks.rank());
+        let from: Vec<usize> = (0..count).map(|r| mine * shape.planes_of(r, count).len() * shape.plane()).collect();
+        let send = own.repeat(if everywhere { count } else { 1 });
+        let mut whole = vec![0.0; from.iter().sum()];
+        self.ranks.turn(&send, &to, &mut whole, &from)?;
+        Ok(Cow::Owned(whole))
+    }
+
+    /// The part of a whole field that is owned, into a field of this rank.
+    pub(crate) fn take_own(&self, whole: &[f64], field: &mut [f64]) {
+        let (plane, own) = (self.shape.plane(), self.shape.own());
+        field[self.shape.own_places()].copy_from_slice(&whole[own.start * plane..own.end * plane]);
+    }
+
+    /// As [`ranks::agree`].
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn agree<T>(&self, result: Result<T, Error>) -> Result<T, Error> {
+        ranks::agree(&*self.ranks, result, |other| other)
+    }
+}
+
+/// Goes through the pieces of all rows of `own`: those of the first columns, plane after plane, then those of the next.
+fn pack(
+    own: &mut [f64],
+    pieces: &mut [f64],
+    shape: Shape,
+    columns: impl Iterator<Item = Range<usize>>,
+    each: impl Fn(&mut [f64], &mut [f64]) + Sync,
+) {
+    let [n0, n1, _] = shape.n;
+    let mut rest = pieces;
+    for columns in columns.filter(|columns| !columns.is_empty()) {
+        let (part, after) = rest.split_at_mut(shape.own().len() * n1 * columns.len());
+        let planes = own.par_chunks_mut(shape.plane()).zip(part.par_chunks_mut(n1 * columns.len()));
+        planes.for_each(|(plane, part)| {
+            for (row, piece) in plane.chunks_mut(n0).zip(part.chunks_mut(columns.len())) {
+                each(&mut row[columns.clone()], piece);
+            }
+        });
+        rest = after;
+    }
+}

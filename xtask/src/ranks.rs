@@ -1,0 +1,140 @@
+//! `cargo xtask ranks`: a wake under `mpirun` on 2 and 4 processes against one process, byte for byte, and a run whose
+//! second process is killed.
+//!
+//! Needs an MPI library with its compiler `mpicc`, and libclang, for the build; on Debian as root it installs them.
+
+use crate::process::watch;
+use crate::workspace::root;
+use crate::{Failure, Outcome};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Steps of the runs that are compared.
+const STEPS: u32 = 20;
+/// Longest processor time of a run, s; six times as much of the clock.
+const LONGEST_S: f64 = 100.0;
+/// What Debian calls the library.
+const INSTALL: &str = "apt-get update -qq && apt-get install -y -qq openmpi-bin libopenmpi-dev libclang-dev";
+
+/// Runs the checks, or says why there are none.
+///
+/// # Errors
+/// A build that fails, files that differ, a run that hangs or ends well although a process was killed.
+pub(crate) fn run() -> Outcome {
+    let succeeds = |command: &str| {
+        let status = Command::new("sh").args(["-c", command]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+        status.is_ok_and(|status| status.success())
+    };
+    let is_there = || succeeds("command -v mpicc && command -v mpirun");
+    let installed = || succeeds("[ $(id -u) = 0 ]") && succeeds(INSTALL) && is_there();
+    if !is_there() && !installed() {
+        println!("skipped: there is no mpicc or mpirun, and they cannot be installed here ({INSTALL})");
+        return Ok(());
+    }
+    let built = Command::new(env!("CARGO"))
+        .args(["build", "--quiet", "--package", "wakescope-sim", "--features", "mpi"])
+        .current_dir(root())
+        .status()?;
+    if !built.success() {
+        return Err(Failure::new("wakescope does not build with the feature `mpi`".into()));
+    }
+    let program = root().join("target/debug/wakescope");
+    let scratch = root().join("target/ranks");
+    let _ = std::fs::remove_dir_all(&scratch);
+    std::fs::create_dir_all(&scratch)?;
+    let case = |pause: &str| {
+        format!(
+            "format = 1\n[case]\nkind = \"wake\"\n[wake]\nend_tau = 1.0\nevery_tau = 0.02\nplanes_tau = [0.02, 0.04]\n\
+             [time]\n{pause}[output]\nplanes = [\"netcdf\"]\n[checkpoint]\nevery_steps = 2\n"
+        )
+    };
+    std::fs::write(scratch.join("short.toml"), case(&format!("pause_after_steps = {STEPS}\n")))?;
+    std::fs::write(scratch.join("long.toml"), case(""))?;
+    compare(&program, &scratch)?;
+    kill_one(&program, &scratch)
+}
+
+/// Words of `mpirun` for `count` processes, more than cores if need be.
+fn mpirun(count: usize) -> Command {
+    let mut command = Command::new("mpirun");
+    command.args(["--oversubscribe", "--bind-to", "none", "-n", &count.to_string()]);
+    command.envs([("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")]);
+    command
+}
+
+fn compare(program: &Path, scratch: &Path) -> Outcome {
+    let words = |out: &'static str| ["wake", "short.toml", "--quiet", "--threads", "1", "--out", out];
+    let alone = watch(program, &words("one"), scratch, LONGEST_S)?;
+    if alone.code != Some(0) {
+        return Err(Failure::new(format!("one process: {}", alone.stderr)));
+    }
+    let expected = files(&scratch.join("one"))?;
+    for (count, out) in [(2, "two"), (4, "four")] {
+        let begun = Instant::now();
+        let output = mpirun(count).arg(program).args(words(out)).current_dir(scratch).output()?;
+        let failed =
+            |why: &str| Failure::new(format!("{count} processes: {why}\n{}", String::from_utf8_lossy(&output.stderr)));
+        if !output.status.success() {
+            return Err(failed("they failed"));
+        }
+        if String::from_utf8_lossy(&output.stdout).matches("wrote").count() != 1 {
+            return Err(failed("not exactly one of them says what was written"));
+        }
+        let found = files(&scratch.join(out))?;
+        if let Some(name) = expected.keys().chain(found.keys()).find(|name| found.get(*name) != expected.get(*name)) {
+            return Err(failed(&format!("{name} is not that of one process")));
+        }
+        let seconds = begun.elapsed().as_secs_f64();
+        println!("{count} processes: {} files of {STEPS} steps, the bytes of one process, {seconds:.0} s", found.len());
+    }
+    Ok(())
+}
+
+/// The files of a folder.
+fn files(folder: &Path) -> Result<BTreeMap<String, Vec<u8>>, Failure> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        found.insert(path.file_name().unwrap_or_default().to_string_lossy().into_owned(), std::fs::read(&path)?);
+    }
+    Ok(found)
+}
+
+/// Kills one of two processes when there is a checkpoint: the other must end, and the checkpoint must be whole.
+fn kill_one(program: &Path, scratch: &Path) -> Outcome {
+    let words = |case| ["wake", case, "--quiet", "--threads", "1", "--out", "killed"];
+    let mut command = mpirun(2);
+    command.arg(program).args(words("long.toml")).current_dir(scratch).stderr(Stdio::null()).stdout(Stdio::null());
+    let mut child = command.spawn()?;
+    let ends_within = |child: &mut Child, seconds: f64, done: &dyn Fn() -> bool| -> Result<bool, Failure> {
+        let begun = Instant::now();
+        while begun.elapsed().as_secs_f64() < seconds {
+            if done() || child.try_wait()?.is_some() {
+                return Ok(true);
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        child.kill()?;
+        Ok(false)
+    };
+    let previous = scratch.join("killed/flow.checkpoint.previous");
+    if !ends_within(&mut child, LONGEST_S, &|| previous.exists())? || child.try_wait()?.is_some() {
+        return Err(Failure::new("no two checkpoints were written by two processes".into()));
+    }
+    let ranks = Command::new("pgrep").args(["-P", &child.id().to_string()]).output()?;
+    let ranks = String::from_utf8_lossy(&ranks.stdout).into_owned();
+    let victim = ranks.lines().last().ok_or_else(|| Failure::new("mpirun has no processes".into()))?;
+    let killed = Command::new("kill").args(["-9", victim]).status()?;
+    if !killed.success() || !ends_within(&mut child, LONGEST_S, &|| false)? || child.wait()?.success() {
+        return Err(Failure::new("a process was killed, and the run hangs or ends well".into()));
+    }
+    let goes_on = [&words("short.toml")[..], &["--restart"]].concat();
+    let goes_on = watch(program, &goes_on, scratch, LONGEST_S)?;
+    if goes_on.code != Some(0) {
+        return Err(Failure::new(format!("the run of a killed process does not continue: {}", goes_on.stderr)));
+    }
+    println!("one of two processes killed: the other ended, one process continues from the checkpoint");
+    Ok(())
+}
