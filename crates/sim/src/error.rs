@@ -60,7 +60,7 @@ pub enum Error {
     },
     /// A line of sight leaves the simulated flow, and the scene does not say what is there.
     #[error(
-        "the line at elevation {elevation_rad:.6} rad leaves the simulated flow at range {range_m:.2} m (y = {y_m:.2} m, \
+        "the line at elevation {elevation_rad:.6} rad leaves the simulated flow at range {range_m:.2} m (x = {x_m:.2} m, y = {y_m:.2} m, \
          z = {z_m:.2} m): shorten the scan, or set scan.outside_flow.policy to \"mask\" or \"constant\""
     )]
     OutsideFlow {
@@ -68,7 +68,9 @@ pub enum Error {
         elevation_rad: f64,
         /// Range of the point, m.
         range_m: f64,
-        /// Its distance from the lidar along the ground, m.
+        /// Its place along the flight, m.
+        x_m: f64,
+        /// Its place across the flight, m.
         y_m: f64,
         /// Its height, m.
         z_m: f64,

@@ -284,15 +284,25 @@ impl Schedule {
         ticks.windows(2).map(|pair| (pair[1] - pair[0]) * self.prt_s).reduce(f64::max)
     }
 
-    /// Whether all is one RHI upwards of equal lines that stand still: the scan that regions in a plane are for.
+    /// Whether all is one RHI upwards of equal lines from a lidar that stands still: the scan that regions in a plane are for.
     pub fn is_plane(&self) -> bool {
-        let pulses = self.lines.first().map_or(0, |line| line.pulses);
-        let here_m = self.mount.position_m;
-        let alike = |line: &Line| line.pulses == pulses && line.velocity_m_s == [0.0; 3] && line.position_m == here_m;
-        let rises = |pair: &[Line]| pair[1].angles_rad[1] > pair[0].angles_rad[1];
-        matches!(self.sweeps[..], [(SweepMode::Rhi, _)])
-            && self.lines.iter().all(alike)
-            && self.lines.windows(2).all(|pair| rises(pair) && pair[0].angles_rad[0] == pair[1].angles_rad[0])
+        self.is_of_one_plane()
+            && self.sweeps.len() == 1
+            && self.lines.windows(2).all(|pair| pair[1].angles_rad[1] > pair[0].angles_rad[1])
+    }
+
+    /// Whether all lines are in one vertical plane, up or down, and the head stands still during each.
+    pub fn keeps_to_a_plane(&self) -> bool {
+        self.is_of_one_plane() && self.lines.iter().all(|line| line.rate_rad_s == [0.0; 2])
+    }
+
+    fn is_of_one_plane(&self) -> bool {
+        let first = self.lines.first().map(|line| (line.pulses, line.angles_rad[0]));
+        let (here_m, still) = (self.mount.position_m, [0.0; 3]);
+        let alike = |line: &Line| {
+            Some((line.pulses, line.angles_rad[0])) == first && (line.position_m, line.velocity_m_s) == (here_m, still)
+        };
+        self.sweeps.iter().all(|(mode, _)| *mode == SweepMode::Rhi) && self.lines.iter().all(alike)
     }
 }
 

@@ -52,7 +52,9 @@ fn current<'a>(name: &str, values: impl Iterator<Item = &'a f64>, long_name: &st
 
 /// Which line, pulse and realisation each record belongs to.
 fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
-    let (scan, per_line) = (signals.elevation_rad.len().max(1), signals.pulses_per_line.max(1));
+    let scan = signals.elevation_rad.len().max(1);
+    let line_of = |ray: usize| signals.first_pulse.partition_point(|first| *first <= ray % scan).saturating_sub(1);
+    let before = |ray: usize| signals.first_pulse.get(line_of(ray)).copied().unwrap_or(0);
     let number = |name: &str, of: &dyn Fn(usize) -> usize, text: &str| {
         let values = (0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX)).collect();
         variable(name, &["ray"], Data::I32(values), "1").text("long_name", text)
@@ -65,8 +67,8 @@ fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
         .then(|| value("azimuth", &signals.azimuth_rad, "rad", "azimuth of the line of sight, clockwise from north"));
     let mut out = vec![
         number("ray", &|ray| ray, "number of the record"),
-        number("ray_line", &|ray| ray % scan / per_line, "line of sight of the pulse, a place along dimension line"),
-        number("ray_pulse", &|ray| ray % scan % per_line, "number of the pulse on its line of sight"),
+        number("ray_line", &line_of, "line of sight of the pulse, a place along dimension line"),
+        number("ray_pulse", &|ray| ray % scan - before(ray), "number of the pulse on its line of sight"),
         number("realization", &|ray| ray / scan, "number of the repetition of the scan")
             .text("standard_name", "realization"),
         value("elevation", &signals.elevation_rad, "rad", "elevation of the line of sight above the horizon"),
@@ -104,11 +106,11 @@ fn recording(signals: &RawSignals<'_>) -> Vec<Variable> {
 }
 
 fn truth(signals: &RawSignals<'_>) -> Vec<Variable> {
-    let pulses = signals.elevation_rad.iter().step_by(signals.pulses_per_line.max(1));
+    let elevation = signals.first_pulse.iter().filter_map(|first| signals.elevation_rad.get(*first));
     vec![
         variable("range", &["range"], Data::F64(signals.truth.range_m.clone()), "m")
             .text("long_name", "range of the true velocities"),
-        variable("line_elevation", &["line"], Data::F64(pulses.copied().collect()), "rad")
+        variable("line_elevation", &["line"], Data::F64(elevation.copied().collect()), "rad")
             .text("long_name", "elevation of the line of sight above the horizon"),
         variable("radial_velocity", &["line", "range"], Data::filled(signals.truth.radial_velocity_m_s), "m s-1")
             .text("standard_name", "radial_velocity_of_scatterers_away_from_instrument")

@@ -222,6 +222,26 @@ mod tests {
     }
 
     #[test]
+    fn the_scan_type_is_the_word_of_the_instrument_for_the_sweep() {
+        let mut map = samples::map();
+        for (mode, word) in [
+            (SweepMode::Rhi, "RHI"),
+            (SweepMode::AzimuthSurveillance, "VAD - stepped"),
+            (SweepMode::Sector, "VAD - stepped"),
+            (SweepMode::Pointing, "User file 1 - stepped"),
+        ] {
+            map.sweeps[0].mode = mode;
+            assert_eq!(lines(&map, 0)[7], format!("Scan type:\t{word}"));
+        }
+        for mode in [SweepMode::VerticalPointing, SweepMode::Pointing] {
+            map.sweeps[0].mode = mode;
+            let up = map.rays[0].elevation_rad;
+            map.rays.iter_mut().for_each(|ray| ray.elevation_rad = up);
+            assert_eq!(lines(&map, 0)[7], "Scan type:\tStare");
+        }
+    }
+
+    #[test]
     fn a_missing_value_is_no_signal() {
         let map = samples::map();
         let lines = lines(&map, 1);

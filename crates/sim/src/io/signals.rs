@@ -52,8 +52,8 @@ pub struct RawSignals<'a> {
     pub azimuth_rad: Vec<f64>,
     /// Time of each sample after the middle of the pulse left, s; increasing.
     pub time_s: Vec<f64>,
-    /// Pulses of one line of sight, which stand together.
-    pub pulses_per_line: usize,
+    /// First pulse of each line of sight in one realisation; the pulses of a line stand together.
+    pub first_pulse: Vec<usize>,
 }
 
 impl RawSignals<'_> {
@@ -77,7 +77,7 @@ impl RawSignals<'_> {
         increasing("range_m", &self.truth.range_m)?;
         let (lines, ranges) = self.truth.radial_velocity_m_s.dim();
         same_length("radial_velocity_m_s", ranges, "range_m", self.truth.range_m.len())?;
-        same_length("radial_velocity_m_s", lines, "the lines", pulses.div_ceil(self.pulses_per_line.max(1)))?;
+        same_length("radial_velocity_m_s", lines, "the lines", self.first_pulse.len())?;
         match self.current_a.iter().chain(self.quadrature_a.iter().flatten()).find(|a| !a.is_finite()) {
             Some(bad) => Err(OutputError::value("current_a", bad, "must be finite")),
             None => Ok(()),
@@ -95,7 +95,7 @@ impl RawSignals<'_> {
     /// As [`RawSignals::check`].
     pub fn table(&self) -> OutputResult<Table> {
         self.check()?;
-        let rays: Vec<usize> = (0..self.elevation_rad.len()).step_by(self.pulses_per_line.max(1)).collect();
+        let rays = &self.first_pulse;
         let samples = self.time_s.len();
         let cells = || (0..rays.len() * samples).map(|cell| (rays[cell / samples], cell % samples));
         let table = Table::new()
@@ -142,7 +142,7 @@ pub(crate) fn example() -> RawSignals<'static> {
         elevation_rad: vec![0.0, 0.0, 0.1, 0.1],
         time_s: vec![1e-6, 2e-6, 3e-6],
         azimuth_rad: Vec::new(),
-        pulses_per_line: 2,
+        first_pulse: vec![0, 2],
     }
 }
 

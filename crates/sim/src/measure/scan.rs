@@ -449,7 +449,7 @@ fn velocity_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>,
     let scan = &plan.scene.scene.scan;
     let elevation_rad = beam.elevation_rad;
     let (points_m, known_m_s) = known_velocity_m_s(plan, beam, range_m)?;
-    let checked = |((&[_, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
+    let checked = |((&[x_m, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
         let outside = match (z_m < 0.0, known_m_s.is_nan()) {
             (true, _) => scan.below_ground,
             (false, true) => scan.outside_flow,
@@ -458,7 +458,7 @@ fn velocity_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>,
         match outside {
             Outside::Constant { radial_velocity_m_s } => Ok(radial_velocity_m_s),
             // A scene with lines below the ground was refused, but for air behind its last sample.
-            Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow { elevation_rad, range_m, y_m, z_m }),
+            Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow { elevation_rad, range_m, x_m, y_m, z_m }),
             Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
         }
     };

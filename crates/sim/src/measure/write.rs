@@ -21,6 +21,7 @@ use crate::measure::profile::RangeProfile;
 use crate::measure::run::RunResult;
 use crate::plan::{Plan, Stage, Target};
 use crate::scene::{DetectorSignal, NoiseKind, Pattern};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Names of the CfRadial files: one for each kind of sweep.
@@ -103,7 +104,7 @@ pub fn names(plan: &Plan) -> Vec<String> {
     if plan.runs(Stage::Estimates) {
         add("map", &[(o.csv, "csv")]);
         for stem in map_stems(&plan.geometry.schedule) {
-            add(&stem, &[(netcdf, "nc")]);
+            add(&stem, &[(o.csv && stem != "map", "csv"), (netcdf, "nc")]);
         }
         add("map", &[pictures[0], pictures[1]]);
         for stem in halo_stems(plan.geometry.schedule.sweeps.len()) {
@@ -167,16 +168,16 @@ pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<Fi
         if outputs.csv {
             files.add("map.csv", tables::map_table(&map)?.to_csv(&origin)?)?;
         }
-        #[cfg(feature = "netcdf")]
-        if outputs.netcdf {
-            let stems = map_stems(&plan.geometry.schedule);
-            for (stem, mode) in stems.iter().zip(map.modes()) {
-                // Readers take the kind of a file from its first sweep.
-                let bytes = match stems.len() {
-                    1 => crate::io::cfradial::cfradial_bytes(&map, &origin)?,
-                    _ => crate::io::cfradial::cfradial_bytes(&map.of_mode(mode), &origin)?,
-                };
-                files.add(&format!("{stem}.nc"), bytes)?;
+        let stems = map_stems(&plan.geometry.schedule);
+        for (stem, mode) in stems.iter().zip(map.modes()) {
+            // Readers take the kind of a file from its first sweep.
+            let own = if stems.len() == 1 { Cow::Borrowed(&map) } else { Cow::Owned(map.of_mode(mode)) };
+            if outputs.csv && stems.len() > 1 {
+                files.add(&format!("{stem}.csv"), tables::map_table(&own)?.to_csv(&origin)?)?;
+            }
+            #[cfg(feature = "netcdf")]
+            if outputs.netcdf {
+                files.add(&format!("{stem}.nc"), crate::io::cfradial::cfradial_bytes(&own, &origin)?)?;
             }
         }
         add_halo(&mut files, plan, &map, &origin)?;
@@ -247,7 +248,6 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 /// The raw signals of a run, with what makes them readable.
 fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
-    let pulses = scene.scan.pulses_per_line;
     let all = || (0..g.schedule.pulses()).map(|pulse| (g.schedule.line_of(pulse), pulse));
     let beam = |(line, pulse): (usize, usize)| g.schedule.beam_of_pulse(line, pulse - g.schedule.lines[line].first);
     let is_plane = g.schedule.is_plane();
@@ -265,7 +265,7 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
         elevation_rad: all().map(|at| beam(at).elevation_rad).collect(),
         azimuth_rad: if is_plane { Vec::new() } else { all().map(|at| beam(at).azimuth_rad).collect() },
         time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
-        pulses_per_line: pulses,
+        first_pulse: g.schedule.lines.iter().map(|line| line.first).collect(),
     })
 }
 

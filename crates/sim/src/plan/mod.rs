@@ -79,9 +79,6 @@ impl Plan {
             );
             return Err(Error::Input { path: key.into(), reason });
         }
-        if target != Target::Map && target != Target::Efficiency {
-            refuse_uneven_signals(&scene.scene, &geometry, target)?;
-        }
         let mut warnings = warnings(&scene.scene, &wind);
         warnings.extend(ambiguity::warning(&scene.scene, &instrument.pulse));
         warnings.extend(hardware::warnings(&scene.scene, &instrument));
@@ -128,17 +125,6 @@ impl Plan {
     pub fn realisations(&self) -> usize {
         if self.runs(Stage::Estimates) { self.scene.scene.scan.realisations } else { self.kept_realisations() }
     }
-}
-
-/// Files of raw signals have equally many pulses in each line.
-fn refuse_uneven_signals(scene: &Scene, geometry: &Geometry, target: Target) -> Result<(), Error> {
-    let even = geometry.schedule.lines.iter().all(|line| line.pulses == scene.scan.pulses_per_line);
-    if even || sizes::kept_realisations(scene, target) == 0 {
-        return Ok(());
-    }
-    let reason = "its lines have different numbers of pulses, and a file of raw signals has equally many in each: leave out \
-                  outputs.signals, or the column pulses";
-    Err(Error::Input { path: "scan.pattern.file".into(), reason: reason.into() })
 }
 
 fn end_s(wind: &SceneWind, geometry: &Geometry) -> f64 {

@@ -14,7 +14,7 @@ use crate::measure::progress::{Observer, Silent};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use crate::scene::{Flow, FollowingAircraft, LiftSlope as Slope, Retrieval, RetrievalMethod as Method, Scene};
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, Axis};
 use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, VortexResult, circulation_profile};
 use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Follower, LiftSlope, Sharing, Wake, WakeModel};
 use wakescope_estimate::window::Sample;
@@ -29,6 +29,8 @@ const EMPTY_SCANS: usize = 10_000;
 pub struct RetrievalRow {
     /// Number of the realisation, from 0.
     pub realisation: usize,
+    /// Number of the sweep, from 0.
+    pub sweep: usize,
     /// How it was found.
     pub method: Method,
     /// Which vortex.
@@ -48,7 +50,7 @@ pub struct RetrievalRow {
 /// What retrievals gave in all realisations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneRetrieval {
-    /// A row for each realisation, method and vortex.
+    /// A row for each realisation, sweep, method and vortex.
     pub rows: Vec<RetrievalRow>,
     /// Statistic and threshold of the test of each map for a wake, if the scene asks for it.
     pub tests: Vec<(f64, f64)>,
@@ -66,27 +68,32 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::scan::Sample>(
 ) -> Result<Option<SceneRetrieval>, Error> {
     let scene = &plan.scene.scene;
     let Some(wanted) = &scene.retrieval else { return Ok(None) };
-    let truth = true_vortices(plan)?;
+    let sweeps = upward_sweeps(plan);
+    let truths = sweeps.iter().map(|lines| true_vortices(plan, lines)).collect::<Result<Vec<_>, _>>()?;
     let own = OwnScene::of_scanner(plan, scanner);
     let options = options(scene, wanted)?;
     let mut tests = Vec::new();
     if let Some(false_alarm) = wanted.false_alarm {
         tests = self::tests(plan, &options, false_alarm, maps, observer)?;
     }
-    observer.begin(Stage::Retrieval, (maps.len() * wanted.methods.len()) as u64);
+    observer.begin(Stage::Retrieval, (maps.len() * sweeps.len() * wanted.methods.len()) as u64);
     let mut rows = Vec::new();
-    for (realisation, velocity_m_s) in maps.iter().enumerate() {
-        let by = |method| retrieve_map(read_scan(plan, velocity_m_s), method, options.clone(), own.as_ref()).ok();
+    let each = maps.iter().enumerate().flat_map(|map| sweeps.iter().zip(&truths).enumerate().map(move |of| (map, of)));
+    for ((realisation, velocity_m_s), (sweep, (lines, truth))) in each {
+        let scan = || read_scan(plan, lines, velocity_m_s);
+        let by = |method| retrieve_map(scan(), method, options.clone(), own.as_ref()).ok();
         // the fit of the map also starts that of the signals and the integrals
         let of_map = wanted.methods.iter().any(|method| *method != Method::Rv).then(|| by(Method::Fit)).flatten();
         for &method in &wanted.methods {
             let found = match (method, of_map.clone(), &own) {
                 (Method::Rv, ..) => by(method),
-                (Method::Signals, Some(map), Some(own)) => of_signals::<S>(plan, scanner, own, realisation, map)?,
+                (Method::Signals, Some(map), Some(own)) => {
+                    of_signals::<S>(plan, scanner, own, (realisation, lines), map)?
+                }
                 (Method::Integral, Some(map), _) => integral(map).ok(),
                 (_, map, _) => map.filter(|_| method == Method::Fit),
             };
-            rows.extend(rows_of(scene, (realisation, method), &truth, found.as_ref(), &options.model)?);
+            rows.extend(rows_of(scene, (realisation, sweep, method), truth, found.as_ref(), &options.model)?);
             observer.advance(1);
         }
     }
@@ -113,17 +120,30 @@ fn options(scene: &Scene, wanted: &Retrieval) -> Result<RetrievalOptions, Error>
     Ok(options)
 }
 
-/// A map of one realisation as a scan.
-fn read_scan(plan: &Plan, velocity_m_s: &Array2<f64>) -> ReadScan {
+/// The lines of each sweep, by increasing elevation.
+fn upward_sweeps(plan: &Plan) -> Vec<Vec<usize>> {
     let g = &plan.geometry;
+    let of_sweep = |sweep: usize| {
+        let own = |line: &usize| g.schedule.lines[*line].sweep == sweep;
+        let mut lines: Vec<usize> = (0..g.schedule.lines.len()).filter(own).collect();
+        lines.sort_by(|a, b| g.elevation_rad[*a].total_cmp(&g.elevation_rad[*b]));
+        lines
+    };
+    (0..g.schedule.sweeps.len()).map(of_sweep).collect()
+}
+
+/// Lines of a map of one realisation as a scan.
+fn read_scan(plan: &Plan, lines: &[usize], velocity_m_s: &Array2<f64>) -> ReadScan {
+    let g = &plan.geometry;
+    let of = |values: &[f64]| lines.iter().map(|line| values[*line]).collect::<Vec<f64>>();
     ReadScan {
         path: "retrieval".into(),
         sweep: 0,
         map: ScanMap {
-            elevation_rad: g.elevation_rad.clone(),
-            time_s: g.line_time_s.iter().map(|t| plan.wind.start_s + t).collect(),
+            elevation_rad: of(&g.elevation_rad),
+            time_s: of(&g.line_time_s).iter().map(|t| plan.wind.start_s + t).collect(),
             range_m: g.gate_range_m.clone(),
-            velocity_m_s: velocity_m_s.clone(),
+            velocity_m_s: velocity_m_s.select(Axis(0), lines),
             sigma_m_s: None,
             fold_m_s: None,
         },
@@ -135,28 +155,31 @@ fn read_scan(plan: &Plan, velocity_m_s: &Array2<f64>) -> ReadScan {
     }
 }
 
-/// The fit to all signals of a realisation, which are made again; the wake of the map starts it. Nothing where the map shows no pair,
+/// The fit to all signals of some lines of a realisation, which are made again; the wake of the map starts it. Nothing where the map shows no pair,
 /// or the fit does not come to an end.
 fn of_signals<S: Sample + wakescope_signal::scan::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     own: &OwnScene,
-    realisation: usize,
+    (realisation, lines): (usize, &[usize]),
     of_map: RetrievedScan,
 ) -> Result<Option<RetrievedScan>, Error> {
     if of_map.result.vortices.len() < 2 {
         return Ok(None);
     }
-    let mut samples: Vec<S> = Vec::with_capacity(scanner.pulses() * plan.geometry.samples);
-    scanner.in_pieces::<S>(realisation, &Silent, |_, records| {
-        samples.extend(records.iter().copied());
+    let schedule = &plan.geometry.schedule;
+    let is_own = |pulse: usize| lines.contains(&schedule.line_of(pulse));
+    let (mut samples, mut elevation_rad): (Vec<S>, Vec<f64>) = (Vec::new(), Vec::new());
+    scanner.in_pieces::<S>(realisation, &Silent, |first, records| {
+        for (pulse, record) in (first..).zip(records.outer_iter()).filter(|(pulse, _)| is_own(*pulse)) {
+            samples.extend(record);
+            let line = schedule.line_of(pulse);
+            elevation_rad.push(schedule.beam(line, (pulse - schedule.lines[line].first) as f64).elevation_rad);
+        }
         Ok(())
     })?;
-    let samples = ArrayView2::from_shape((scanner.pulses(), plan.geometry.samples), &samples)
+    let samples = ArrayView2::from_shape((elevation_rad.len(), plan.geometry.samples), &samples)
         .map_err(|_| wakescope_estimate::Error::Empty { field: "records of a realisation" })?;
-    let per_line = plan.scene.scene.scan.pulses_per_line;
-    let rays = |line: &f64| std::iter::repeat_n(*line, per_line);
-    let elevation_rad = plan.geometry.elevation_rad.iter().flat_map(rays).collect();
     Ok(own.of_records(samples, elevation_rad, of_map).ok())
 }
 
@@ -174,7 +197,7 @@ fn integral(mut found: RetrievedScan) -> Result<RetrievedScan, Error> {
 
 fn rows_of(
     scene: &Scene,
-    (realisation, method): (usize, Method),
+    (realisation, sweep, method): (usize, usize, Method),
     truth: &[TrueVortex; 2],
     found: Option<&RetrievedScan>,
     model: &WakeModel,
@@ -195,6 +218,7 @@ fn rows_of(
         let flags = found.map_or(Vec::new(), |found| found.result.flags.iter().map(|flag| flag.name()).collect());
         Ok(RetrievalRow {
             realisation,
+            sweep,
             method,
             side,
             found: vortex,

@@ -17,9 +17,9 @@ pub struct RetrievalErrors {
     pub side: Side,
     /// Name of the quantity, with its unit.
     pub quantity: &'static str,
-    /// Its true value, that of the first realisation.
+    /// Its true value, that of the first realisation and sweep.
     pub truth: f64,
-    /// Realisations.
+    /// Realisations, each as often as it has sweeps.
     pub realisations: usize,
     /// Those without a value.
     pub failures: usize,
@@ -104,8 +104,11 @@ impl SceneRetrieval {
     #[must_use]
     pub fn table(&self) -> Table {
         let number = |get: &dyn Fn(&RetrievalRow) -> f64| self.rows.iter().map(get).collect::<Vec<_>>();
-        let mut table = Table::new()
-            .int("realisation", self.rows.iter().map(|row| row.realisation as i64))
+        let mut table = Table::new().int("realisation", self.rows.iter().map(|row| row.realisation as i64));
+        if self.rows.iter().any(|row| row.sweep > 0) {
+            table = table.int("sweep", self.rows.iter().map(|row| row.sweep as i64));
+        }
+        table = table
             .text("method", self.rows.iter().map(|row| name(row.method)))
             .text("side", self.rows.iter().map(|row| side_name(row.side)))
             .float("time_s", number(&|row| row.found.map_or(row.truth.time_s, |v| v.time_s)));

@@ -39,21 +39,24 @@ pub struct TrueVortex {
     pub core_radius_m: f64,
 }
 
-/// Both vortices, left and right.
+/// Both vortices, left and right, as some lines pass them.
 ///
 /// # Errors
 /// A simulated flow in which no vortices are found; what the wind refuses.
-pub(crate) fn true_vortices(plan: &Plan) -> Result<[TrueVortex; 2], Error> {
+pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[TrueVortex; 2], Error> {
     match &plan.scene.scene.flow {
         Flow::VortexPair(pair) => {
             let (air, profile) = (vortex_pair(pair), core_profile(pair.profile));
+            // Behind an aircraft, the wake in the plane of the scan has its age there.
+            let x_m = plan.scene.scene.scan.lidar.x_m;
+            let since_s = pair.aircraft.map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
             let of = |side: Side| -> Result<TrueVortex, Error> {
                 let centre = |time_s: f64| {
-                    let centres = air.centres(time_s);
+                    let centres = air.centres(time_s + since_s);
                     let y_m = if side == Side::Left { centres.left_y_m } else { centres.right_y_m };
                     Ok((y_m, centres.height_m))
                 };
-                let ((lateral_position_m, height_m), time_s) = when_passed(plan, centre)?;
+                let ((lateral_position_m, height_m), time_s) = when_passed(plan, lines, centre)?;
                 Ok(TrueVortex {
                     time_s,
                     circulation_m2_s: pair.circulation_m2_s,
@@ -65,7 +68,7 @@ pub(crate) fn true_vortices(plan: &Plan) -> Result<[TrueVortex; 2], Error> {
             };
             Ok([of(Side::Left)?, of(Side::Right)?])
         }
-        _ => Ok([simulated(plan, Side::Left)?, simulated(plan, Side::Right)?]),
+        _ => Ok([simulated(plan, lines, Side::Left)?, simulated(plan, lines, Side::Right)?]),
     }
 }
 
@@ -91,14 +94,19 @@ pub(crate) fn core_profile(profile: VortexProfile) -> CoreProfile {
 }
 
 /// Place of a centre that moves, and the time, when the line of sight passes it.
-fn when_passed(plan: &Plan, centre: impl Fn(f64) -> Result<(f64, f64), Error>) -> Result<((f64, f64), f64), Error> {
+fn when_passed(
+    plan: &Plan,
+    lines: &[usize],
+    centre: impl Fn(f64) -> Result<(f64, f64), Error>,
+) -> Result<((f64, f64), f64), Error> {
     let (g, lidar_m) = (&plan.geometry, plan.scene.scene.scan.lidar_height_m);
-    let mut time_s = 0.5 * (plan.wind.start_s + plan.scan_end_s());
+    let times_s = || lines.iter().map(|line| plan.wind.start_s + g.line_time_s[*line]);
+    let mut time_s = times_s().sum::<f64>() / lines.len().max(1) as f64;
     let mut place_m = centre(time_s)?;
     for _ in 0..ROUNDS {
         let elevation_rad = (place_m.1 - lidar_m).atan2(place_m.0);
         let away = |line: &usize| (g.elevation_rad[*line] - elevation_rad).abs();
-        let line = (0..g.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+        let line = lines.iter().copied().min_by(|a, b| away(a).total_cmp(&away(b)));
         let next_s = plan.wind.start_s + line.map_or(0.0, |line| g.line_time_s[line]);
         if next_s == time_s {
             break;
@@ -109,7 +117,7 @@ fn when_passed(plan: &Plan, centre: impl Fn(f64) -> Result<(f64, f64), Error>) -
     Ok((place_m, time_s))
 }
 
-fn simulated(plan: &Plan, side: Side) -> Result<TrueVortex, Error> {
+fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<TrueVortex, Error> {
     let sense = if side == Side::Left { -1.0 } else { 1.0 };
     let centre = |time_s: f64| {
         let [left, right] = [-1.0, 1.0].map(|sense| strongest(plan, time_s, sense));
@@ -117,7 +125,7 @@ fn simulated(plan: &Plan, side: Side) -> Result<TrueVortex, Error> {
         let reach_m = REACH_OVER_SPACING * (left.0 - right.0).hypot(left.1 - right.1);
         centroid(plan, time_s, if side == Side::Left { left } else { right }, sense, reach_m)
     };
-    let ((lateral_position_m, height_m), time_s) = when_passed(plan, centre)?;
+    let ((lateral_position_m, height_m), time_s) = when_passed(plan, lines, centre)?;
     let mean_m2_s = mean_circulation_5_15_m2_s(plan.wind.wind(), [lateral_position_m, height_m], time_s, CIRCLE)?;
     Ok(TrueVortex {
         time_s,
@@ -216,12 +224,16 @@ mod tests {
         Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap()
     }
 
+    fn lines(plan: &Plan) -> Vec<usize> {
+        (0..plan.geometry.elevation_rad.len()).collect()
+    }
+
     #[test]
     fn vortices_of_a_pair_are_found_in_its_wind_as_if_that_were_simulated() {
         let plan = plan(|_| ());
-        let truth = true_vortices(&plan).unwrap();
+        let truth = true_vortices(&plan, &lines(&plan)).unwrap();
         for (side, truth) in [Side::Left, Side::Right].into_iter().zip(truth) {
-            let found = simulated(&plan, side).unwrap();
+            let found = simulated(&plan, &lines(&plan), side).unwrap();
             let away = (found.lateral_position_m - truth.lateral_position_m).hypot(found.height_m - truth.height_m);
             assert!(away < 0.3, "{found:?} {truth:?}");
             // the other vortex has no circulation within 15 m
@@ -236,7 +248,7 @@ mod tests {
             pair.motion = VortexMotion::Inviscid;
             pair.age_tau = 0.5;
         });
-        let [left, right] = true_vortices(&moving).unwrap();
+        let [left, right] = true_vortices(&moving, &lines(&moving)).unwrap();
         let Flow::VortexPair(pair) = moving.scene.scene.flow else { unreachable!() };
         let at = vortex_pair(&pair).centres(left.time_s);
         assert_eq!((left.lateral_position_m, left.height_m), (at.left_y_m, at.height_m));

@@ -30,7 +30,7 @@ impl Scene {
             }
             Pattern::Vad(p) => {
                 c.within("scan.pattern.elevation_rad", p.elevation_rad, 1e-3, FRAC_PI_2 - 1e-3, "rad");
-                c.count("scan.pattern.beams", p.beams, 4, 10_000);
+                c.count("scan.pattern.beams", p.beams, 3, 10_000);
             }
             Pattern::Dbs(p) => {
                 c.within("scan.pattern.elevation_rad", p.elevation_rad, 1e-3, FRAC_PI_2 - 1e-3, "rad");

@@ -1,6 +1,7 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
-use super::{Flow, NoiseKind, Pattern, PulseShape, Scene};
+use super::{Flow, NoiseKind, Pattern, PulseShape, Scan, Scene};
+use crate::beams::direction::sin_cos_of_turn;
 use crate::keys::Checker;
 use serde::{Deserialize, Serialize};
 
@@ -91,12 +92,11 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
         c.within("retrieval.follower.aspect_ratio", f.aspect_ratio, 0.1, 1e3, "");
         c.within("retrieval.follower.speed_m_s", f.speed_m_s, 0.1, 1e3, "m/s");
     }
-    let scan = &scene.scan;
-    let plain =
-        scan.pattern == Pattern::default() && scan.head == Default::default() && scan.lidar == Default::default();
-    let upwards = "absent but for scan.pattern.kind = \"rhi\" with a head and a lidar that keep still: vortices are sought in a plane across \
-                   the flight";
-    c.require(plain, "retrieval", "a table", upwards);
+    let across = "absent but for scan.pattern.kind = \"rhi\" in the plane across the flight, where vortices are sought: with \
+                  scan.lidar.velocity_m_s = [0.0, 0.0, 0.0], y_m = 0.0, and flight_azimuth_rad absent or a quarter turn before scan.azimuth_rad";
+    c.require(scene.scan.is_across(), "retrieval", "a table", across);
+    let one = "absent with more than one sweep (scan.head.sweeps): scans are tested one at a time";
+    c.require(r.false_alarm.is_none() || scene.scan.head.sweeps == 1, "retrieval.false_alarm", "a rate", one);
     let has_vortices = match &scene.flow {
         Flow::VortexPair(pair) => pair.circulation_m2_s > 0.0,
         Flow::Simulated(_) => true,
@@ -113,6 +113,17 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     );
 }
 
+impl Scan {
+    /// Whether all lines are in the plane across the flight, seen from the origin of its lateral coordinate: where vortices are sought.
+    pub(crate) fn is_across(&self) -> bool {
+        let lidar = &self.lidar;
+        let is_quarter = |azimuth_rad: f64| sin_cos_of_turn(self.azimuth_rad - azimuth_rad) == (1.0, 0.0);
+        self.pattern == Pattern::default()
+            && (lidar.velocity_m_s, lidar.y_m) == ([0.0; 3], 0.0)
+            && lidar.flight_azimuth_rad.is_none_or(is_quarter)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -123,10 +134,13 @@ mod tests {
 
     #[test]
     fn retrievals_are_held_to_their_limits_and_need_vortices() {
-        assert!(
-            keys("[retrieval]\nmethods = [\"fit\", \"signals\", \"rv\", \"integral\"]\nfalse_alarm = 0.01\n")
-                .is_empty()
-        );
+        for text in [
+            "[retrieval]\nmethods = [\"fit\", \"signals\", \"rv\", \"integral\"]\nfalse_alarm = 0.01\n",
+            "[retrieval]\n[scan]\nazimuth_rad = 1.0\n[scan.head]\nsweeps = 3\ndirection = \"alternate\"\n",
+            "[retrieval]\n[scan]\nazimuth_rad = 2.0\n[scan.lidar]\nflight_azimuth_rad = 0.42920367320510344\n",
+        ] {
+            assert_eq!(keys(text), Vec::<String>::new(), "{text}");
+        }
         for (text, key) in [
             ("[retrieval]\nmethods = []\n", "retrieval.methods"),
             ("[retrieval]\nmethods = [\"rv\", \"fit\", \"rv\"]\n", "retrieval.methods"),
@@ -137,6 +151,9 @@ mod tests {
             ("[retrieval]\n[retrieval.follower]\nspan_m = -1.0\n", "retrieval.follower.span_m"),
             ("[retrieval]\n[flow]\nkind = \"calm\"\n", "retrieval"),
             ("[retrieval]\n[scan.pattern]\nkind = \"stare\"\n", "retrieval"),
+            ("[retrieval]\n[scan.lidar]\ny_m = 5.0\n", "retrieval"),
+            ("[retrieval]\n[scan.lidar]\nflight_azimuth_rad = 0.3\n", "retrieval"),
+            ("[retrieval]\nfalse_alarm = 0.01\n[scan.head]\nsweeps = 2\n", "retrieval.false_alarm"),
         ] {
             assert_eq!(keys(text), [key], "{text}");
         }

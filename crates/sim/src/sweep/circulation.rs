@@ -38,11 +38,14 @@ pub(super) struct Retrieval<'p> {
 }
 
 impl<'p> Retrieval<'p> {
-    /// For a case; nothing where the flow is no pair that turns, the lines are not in one plane, or the pulse is no Gaussian without chirp.
+    /// For a case; nothing where the flow is no pair that turns, or one behind its aircraft, the lines are not one still sweep across
+    /// the flight, or the pulse is no Gaussian without chirp.
     pub(super) fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Option<Self> {
         let scene = &plan.scene.scene;
         let Flow::VortexPair(pair) = scene.flow else { return None };
-        if pair.circulation_m2_s <= 0.0 {
+        let lines = &plan.geometry.schedule;
+        let is_one_scan = scene.scan.is_across() && lines.is_plane() && lines.keeps_to_a_plane();
+        if !is_one_scan || pair.circulation_m2_s <= 0.0 || pair.aircraft.is_some() {
             return None;
         }
         let response = SceneResponse::new(scene, &plan.instrument, scanner.layer_snr())?;
@@ -184,6 +187,8 @@ mod tests {
             (|scene| scene.flow = Flow::Calm {}) as fn(&mut Scene),
             |scene| scene.detector.noise = NoiseKind::None,
             |scene| scene.pulse.chirp_hz_s = 1e12,
+            |scene| scene.scan.pattern = crate::scene::Pattern::Ppi(crate::scene::Ppi::default()),
+            |scene| scene.scan.head.sweeps = 2,
         ] {
             let plan = plan(change);
             assert!(Retrieval::new(&plan, &Scanner::new(&plan, &Silent).unwrap()).is_none());

@@ -24,6 +24,34 @@ fn rows(path: &Path) -> Vec<Vec<String>> {
 }
 
 #[test]
+fn sweeps_back_and_forth_are_retrieved_one_by_one_against_the_wake_of_their_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene =
+        SCENE.replace("[scan]\n", "[flow]\nkind = \"vortex_pair\"\nmotion = \"inviscid\"\n[scan]\nazimuth_rad = 1.0\n");
+    let head = "[scan.head]\nsweeps = 2\ndirection = \"alternate\"\ndead_time_s = 0.02\n";
+    std::fs::write(folder.path().join("s.toml"), format!("{scene}{head}[retrieval]\nmethods = [\"rv\"]\n")).unwrap();
+    let run = json(folder.path(), &["run", "s.toml", "--out", "out"]);
+    let table = rows(&folder.path().join("out/retrieval.csv"));
+    // Two realisations, sweeps and vortices.
+    assert_eq!((table.len(), table[0][..4].join(",")), (9, "realisation,sweep,method,side".to_owned()));
+    let column = |name: &str| table[0].iter().position(|n| n == name).unwrap();
+    let (truth, found) = (column("z_true_m"), column("z_m"));
+    for row in &table[1..] {
+        let [truth_m, found_m] = [truth, found].map(|at| row[at].parse::<f64>().unwrap());
+        // The wake sinks by 1.7 m/s, and a sweep with its pauses takes two seconds.
+        assert_eq!(truth_m < 44.5, row[1] == "1", "{row:?}");
+        assert!((found_m - truth_m).abs() < 4.0, "{row:?}");
+    }
+    for error in run["retrieval"]["errors"].as_array().unwrap() {
+        assert!(error["failures"] == 0 && error["realisations"] == 4, "{error}");
+        if error["quantity"] == "gamma_m2_s" {
+            // The radial-velocity method finds too little, as in a single sweep.
+            assert!((-230.0..20.0).contains(&error["bias"].as_f64().unwrap()), "{error}");
+        }
+    }
+}
+
+#[test]
 fn a_run_is_held_against_its_pair_and_its_map_is_found_to_hold_a_wake() {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(

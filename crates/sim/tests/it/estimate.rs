@@ -13,8 +13,18 @@ use wakescope_sim::scene::SceneFile;
 
 /// A folder with the scene and its signals, all realisations.
 fn recorded_run(words: &str) -> tempfile::TempDir {
+    recorded_scan(RHI, words)
+}
+
+/// The lines of the small scene.
+const RHI: &str = "elevation_min_rad = 0.1\nelevation_max_rad = 0.12\nelevation_step_rad = 2.5e-3\n";
+
+/// The same with other lines.
+fn recorded_scan(scan: &str, words: &str) -> tempfile::TempDir {
     let temp = tempfile::tempdir().unwrap();
-    let scene = SMALL.replace("signals = true", "signals = true\nsignals_of = \"all\"\npng = false");
+    let lines = "azimuth_rad,elevation_rad,pulses\n0.3,0.2,2\n0.4,0.2,5\n0.5,0.3,1\n";
+    fs::write(temp.path().join("lines.csv"), lines).unwrap();
+    let scene = SMALL.replace("signals = true", "signals = true\nsignals_of = \"all\"\npng = false").replace(RHI, scan);
     fs::write(temp.path().join("s.toml"), format!("{scene}{words}")).unwrap();
     let out = wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]);
     assert!(out.status.success(), "{out:?}");
@@ -49,6 +59,44 @@ fn a_runs_own_signals_give_the_bytes_of_the_run() {
     let known: Vec<f64> = predicted.into_iter().map(f64::from_bits).filter(|v| v.is_finite()).collect();
     // 10 dB, some ten independent windows.
     assert!(known.len() > 150 && known.iter().all(|v| (0.01..1.0).contains(v)), "{known:?}");
+}
+
+#[test]
+fn signals_of_any_pattern_give_the_bytes_of_the_run() {
+    let estimate = |folder: &Path, out: &'static str, words: &[&str]| {
+        let all = [&["estimate", "o/signals.nc", "--scene", "s.toml", "--out", out, "--quiet"], words].concat();
+        wakescope(folder, &all)
+    };
+    let back = format!("{RHI}head = {{ sweeps = 3, direction = \"alternate\" }}\n");
+    for scan in [
+        "pattern = { kind = \"ppi\", azimuth_min_rad = 1.3, azimuth_max_rad = 1.5 }\nwind_of_pulses.kind = \"pulse\"\n\
+         head = { motion = \"continuous\", rate_rad_s = 3.0, pointing_jitter_rad = [1e-3, 1e-3] }\n",
+        "pattern = { kind = \"vad\", beams = 6 }\n",
+        "pattern = { kind = \"list\", file = \"lines.csv\" }\n",
+        &back,
+    ] {
+        let temp = recorded_scan(scan, "");
+        let folder = temp.path();
+        let out = estimate(folder, "e", &[]);
+        assert!(out.status.success(), "{scan}: {out:?}");
+        let found = names(&folder.join("e"));
+        assert!(
+            found.contains(&"map.nc".to_owned()) && found.contains(&"scan.svg".to_owned()) == (scan != back),
+            "{found:?}"
+        );
+        for name in found.iter().filter(|name| *name != "predicted.csv") {
+            assert!(
+                fs::read(folder.join("e").join(name)).unwrap() == fs::read(folder.join("o").join(name)).unwrap(),
+                "{name}"
+            );
+        }
+        // Spectra are of records that nothing is known of, whose lines are in a plane.
+        if scan != back {
+            let out = estimate(folder, "x", &["--spectra"]);
+            let message = String::from_utf8(out.stderr).unwrap();
+            assert!(out.status.code() == Some(2) && message.contains("others need kind = \"rhi\""), "{message}");
+        }
+    }
 }
 
 #[test]

@@ -235,7 +235,11 @@ fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
     }
     let left = scan.replace("31.7", "300.0");
     let message = plan_in(folder.path(), [flow, &left, ""], Target::Map).unwrap_err().to_string();
-    assert!(message.contains("leaves the simulated flow"), "{message}");
+    assert!(message.contains("leaves the simulated flow") && message.contains("x = 300.00 m"), "{message}");
+    // The only field is of 2 s, and the scan goes on.
+    let moving = flow.replace("frozen", "moving");
+    let message = plan_in(folder.path(), [&moving, &scan, ""], Target::Map).unwrap_err().to_string();
+    assert!(message.contains("flow.files") && message.contains("the fields at 2.000 s: begin earlier"), "{message}");
 }
 
 /// One vortex at (y, z), anticlockwise as one looks along +x with y to the right; `side` -1 in right-handed axes.
@@ -435,6 +439,16 @@ fn each_kind_of_sweep_has_its_word_and_angle_in_files_of_its_own() {
         let (modes, angles, last) = sweeps(out.path(), "map.nc");
         assert!(modes.iter().all(|m| m == mode) && modes.len() == ends.len(), "{modes:?}");
         assert!((f64::from(angles[0]) - fixed.to_degrees()).abs() < 1e-4 && last == ends, "{angles:?} {last:?}");
+    }
+    let flying = "pattern = { kind = \"stare\", elevation_rad = 0.2, lines = 3 }\nlidar.velocity_m_s = [9.0, 0.0, 1.0]";
+    for (scan, name, mobile, dims) in
+        [("pattern = { kind = \"vad\" }", "azimuth_surveillance", "false", 0), (flying, "pointing", "true", 1)]
+    {
+        let out = run_in(scan);
+        let file = FileReader::open(out.path().join("map.nc")).unwrap();
+        let of = |name: &str| file.data_set().get_global_attr_as_string(name).unwrap();
+        assert_eq!((of("scan_name"), of("platform_is_mobile")), (name.to_owned(), mobile.to_owned()));
+        assert_eq!(file.data_set().get_var("latitude").unwrap().get_dims().len(), dims);
     }
     let list = "azimuth_rad,elevation_rad,pulses,sweep,mode\n1.5,0.1,4,0,rhi\n1.5,0.2,4,0,rhi\n0.5,0.3,9,1,pointing\n";
     std::fs::write(folder.path().join("list.csv"), list).unwrap();

@@ -23,6 +23,7 @@ use crate::io::raw::{RawRecords, RecordShape};
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::progress::Observer;
 use crate::measure::scan::{Scanner, records_at_once};
+use crate::measure::scan_lines;
 use crate::plan::{Plan, Stage, Target};
 use crate::scene::{DetectorSignal, Digitiser, Estimator, Outputs, Scene, SceneFile, Site};
 use num_complex::Complex;
@@ -96,17 +97,13 @@ pub fn record_shape(scene: &Scene) -> RecordShape {
 /// As [`Plan::new`]; records of another shape or kind than the scene's, recorded otherwise than it says.
 pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Error> {
     fits(&scene.scene, records)?;
-    let whole = |scene: &Scene| {
-        let scan = &scene.scan;
-        let lines = ((scan.elevation_max_rad - scan.elevation_min_rad) / scan.elevation_step_rad + 1e-9) as usize + 1;
-        lines * scan.pulses_per_line
-    };
+    let whole = scan_lines::schedule(&scene)?.pulses();
     let is_own = records.about.scene_toml.as_deref().is_some_and(|toml| {
         SceneFile::parse(toml, std::path::Path::new("scene"))
             .is_ok_and(|own| signals_of(&own.scene) == signals_of(&scene.scene))
-            && records.records().is_multiple_of(whole(&scene.scene))
+            && records.records().is_multiple_of(whole)
     });
-    let repetitions = records.records() / whole(&scene.scene).max(1);
+    let repetitions = records.records() / whole.max(1);
     let file = if !is_own || repetitions == scene.scene.scan.realisations {
         scene
     } else {
@@ -114,21 +111,15 @@ pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Erro
         own.scan.realisations = repetitions;
         SceneFile::new(own).map_err(|problems| scene.located(problems))?.with_file_of(scene)
     };
-    let plan = Plan::new(file, Target::Map)?;
-    if !plan.geometry.schedule.is_plane() {
-        let kind = plan.scene.scene.scan.pattern.name();
-        return Err(records.refuse(format!(
-            "the scene's lines (scan.pattern.kind = \"{kind}\") are not those of one vertical plane, one after the other upwards: \
-             records are estimated for kind = \"rhi\" with a head that keeps still during a line"
-        )));
-    }
-    Ok((plan, is_own))
+    Ok((Plan::new(file, Target::Map)?, is_own))
 }
 
 /// A scene without what is done with its signals.
 fn signals_of(scene: &Scene) -> String {
+    // Signals come from the file; where pulses point comes from the seed.
+    let still = scene.scan.head.pointing_jitter_rad == [0.0; 2];
     let mut same = Scene {
-        seed: 0,
+        seed: if still { 0 } else { scene.seed },
         estimator: Estimator::default(),
         outputs: Outputs::default(),
         site: Site::default(),
@@ -202,6 +193,14 @@ fn of_samples<S: FromParts>(
 ) -> Result<Recorded, Error> {
     if is_own && options.rays.is_none() && !options.spectra {
         return of_run::<S>(plan, records, observer);
+    }
+    if !plan.geometry.schedule.keeps_to_a_plane() {
+        let kind = plan.scene.scene.scan.pattern.name();
+        return Err(records.refuse(format!(
+            "the lines of the scene (scan.pattern.kind = \"{kind}\") are not those of one vertical plane from a lidar and a head that \
+             stand still: such records are estimated where they are a simulation's own, by its scene, without --rays and --spectra; \
+             others need kind = \"rhi\" with scan.head.motion = \"stepped\""
+        )));
     }
     let scans = lines::scans(plan, records, options.rays.as_ref())?;
     let largest = largest_part(plan, records)?;
