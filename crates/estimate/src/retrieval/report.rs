@@ -18,6 +18,8 @@ use crate::vortex_fit::{Loss, PARAMETERS, Parameter, Wake};
 pub(crate) const OUTLIER: f64 = 4.0;
 /// A vortex whose circulation is less than so many of its deviations may be none.
 const LEAST_SIGMAS: f64 = 3.0;
+/// So many times the root of the threshold is far beyond doubt in correlated noise too.
+const BY_FAR: f64 = 2.0;
 /// A top so much above the least chi-square competes with it.
 const COMPETES: f64 = 9.0;
 /// A side of a vortex is seen if the sector reaches so far beyond its centre \[m\], where circulation begins to be counted.
@@ -244,15 +246,15 @@ impl Uncertainty<'_> {
         Ok(spread(&groups, &bread.dot(&of(&self.scores)).dot(&bread)))
     }
 
-    /// Whether a circulation is positive beyond doubt, or is so where all but it and the wind is as found and the test is that of the
-    /// whole statistic: long gates show little more than circulation times spacing, so that each of them may be uncertain where the wake
-    /// is not. Correlated residuals count in both.
+    /// Whether a circulation is positive beyond doubt, or is so by far where all but it and the wind is as found: long gates show little
+    /// more than circulation times spacing, so that each of them may be uncertain where the wake is not. Correlated residuals count in
+    /// both, as far as the fit leaves them; the places are the best of many, as those of the statistic are.
     fn certain(&self, wake: &Wake, circulation: usize, threshold: f64) -> Result<bool, Error> {
         let value = wake.to_array()[circulation];
         let beyond = |covariance: Array2<f64>, sigmas: f64| value > sigmas * covariance[[circulation; 2]].sqrt();
         let alone = |group: &[usize]| group.contains(&circulation) || group[0] >= Parameter::Wind as usize;
         Ok(beyond(self.covariance(|_| true)?, LEAST_SIGMAS)
-            || beyond(self.covariance(alone)?, threshold.sqrt().max(LEAST_SIGMAS)))
+            || beyond(self.covariance(alone)?, (BY_FAR * threshold.sqrt()).max(LEAST_SIGMAS)))
     }
 }
 
