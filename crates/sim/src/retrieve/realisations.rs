@@ -4,6 +4,7 @@
 
 use super::gate::gate_of;
 use super::one_scan::retrieve_map;
+use super::others::envelopes;
 use super::own::OwnScene;
 use super::retrieved_scan::RetrievedScan;
 use super::truth::{TrueVortex, core_profile, true_vortices, true_wake};
@@ -11,6 +12,7 @@ use crate::Error;
 use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
 use crate::io::scans::ReadScan;
 use crate::measure::progress::{Observer, Silent};
+use crate::measure::recorded::Spectra;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use crate::scene::{Flow, FollowingAircraft, LiftSlope as Slope, Retrieval, RetrievalMethod as Method, Scene};
@@ -82,7 +84,9 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::scan::Sample>(
         for &method in &wanted.methods {
             let found = match (method, of_map.clone(), &own) {
                 (Method::Rv, ..) => by(method),
-                (Method::Signals, Some(map), Some(own)) => of_signals::<S>(plan, scanner, own, realisation, map)?,
+                (Method::Signals | Method::Envelope, Some(map), Some(own)) => {
+                    of_signals::<S>(plan, scanner, (method, own), realisation, map)?
+                }
                 (Method::Integral, Some(map), _) => integral(map).ok(),
                 (_, map, _) => map.filter(|_| method == Method::Fit),
             };
@@ -135,18 +139,16 @@ fn read_scan(plan: &Plan, velocity_m_s: &Array2<f64>) -> ReadScan {
     }
 }
 
-/// The fit to all signals of a realisation, which are made again; the wake of the map starts it. Nothing where the map shows no pair,
-/// or the fit does not come to an end.
+/// What the signals of a realisation, which are made again, give by fit or envelopes; the wake of the map starts them. Nothing where the
+/// map shows no pair, or the fit does not come to an end.
 fn of_signals<S: Sample + wakescope_signal::scan::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
-    own: &OwnScene,
+    (method, own): (Method, &OwnScene),
     realisation: usize,
-    of_map: RetrievedScan,
+    mut of_map: RetrievedScan,
 ) -> Result<Option<RetrievedScan>, Error> {
-    if of_map.result.vortices.len() < 2 {
-        return Ok(None);
-    }
+    let Some(wake) = of_map.result.wake.filter(|_| of_map.result.vortices.len() == 2) else { return Ok(None) };
     let mut samples: Vec<S> = Vec::with_capacity(scanner.pulses() * plan.geometry.samples);
     scanner.in_pieces::<S>(realisation, &Silent, |_, records| {
         samples.extend(records.iter().copied());
@@ -154,6 +156,11 @@ fn of_signals<S: Sample + wakescope_signal::scan::Sample>(
     })?;
     let samples = ArrayView2::from_shape((scanner.pulses(), plan.geometry.samples), &samples)
         .map_err(|_| wakescope_estimate::Error::Empty { field: "records of a realisation" })?;
+    if method == Method::Envelope {
+        let spectra = Spectra::of_samples(plan, &scanner.layer_snr(), samples)?;
+        let lines = 0..spectra.elevation_rad.len();
+        return Ok(envelopes(plan, &spectra, lines, own.snr_of(&wake), &mut of_map).ok().map(|_| of_map));
+    }
     let per_line = plan.scene.scene.scan.pulses_per_line;
     let rays = |line: &f64| std::iter::repeat_n(*line, per_line);
     let elevation_rad = plan.geometry.elevation_rad.iter().flat_map(rays).collect();
