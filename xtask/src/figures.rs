@@ -20,6 +20,7 @@ mod fig14;
 mod fig15;
 mod fig16;
 mod fig17;
+mod fig17_flows;
 mod fig18;
 mod fig19;
 mod fig20;

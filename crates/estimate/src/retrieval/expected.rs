@@ -74,6 +74,12 @@ impl<'a> Expected<'a> {
         self.seconds.is_some()
     }
 
+    /// How long the scan lasts, if the vortices move \[s\].
+    pub(crate) fn lasts_s(&self) -> f64 {
+        let times = self.seconds.iter().flatten();
+        2.0 * times.fold(0.0, |most: f64, seconds| most.max(seconds.abs()))
+    }
+
     /// How the vortices of a wake move, if they do.
     pub(crate) fn motion(&self, wake: &Wake) -> Option<Motion> {
         self.seconds.as_ref().map(|_| Motion::new(self.model, wake))

@@ -16,6 +16,10 @@ use crate::vortex_fit::{Loss, Wake};
 
 /// Median of the absolute value of a normal number.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+/// Vortices are taken to stand still in scans that are shorter \[s\] and to move in others, if the other is not better by that much in
+/// chi-square: whatever is true of them, chance alone brings it once in 700 scans at most, where both models are about as far apart.
+const SHORT_S: f64 = 2.0;
+const MOVES: f64 = 9.0;
 /// Most velocities that are whitened.
 const WHITENED: usize = 3000;
 
@@ -66,7 +70,8 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
         problem.expected = &frozen;
         let fits = Fits { problem: &problem, options };
         let still = fits.fine(std::slice::from_ref(likely));
-        if still.first().is_some_and(|still| still.chi2 < likely.chi2) {
+        let margin = MOVES * scale.powi(2) * if fine.lasts_s() < SHORT_S { -1.0 } else { 1.0 };
+        if still.first().is_some_and(|still| still.chi2 + margin < likely.chi2) {
             ends = fits.fine(&ends);
         } else {
             problem.expected = &fine;

@@ -39,8 +39,8 @@ pub enum Covariance {
 /// Whether vortices move while a scan lasts, each with the velocity that the other one, the images and the wind give it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Movement {
-    /// They move or stand still, whichever fits better: the times of a file need not be those of the air (averaged scans, frozen
-    /// simulations).
+    /// They stand still in scans of less than 2 s and move in longer ones, unless the other is better by 9 in chi-square: the times of a
+    /// file need not be those of the air (averaged scans, frozen simulations), and short scans hardly show which.
     Auto,
     /// They move.
     Moving,

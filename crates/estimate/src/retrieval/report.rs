@@ -2,7 +2,7 @@
 //!
 //! Check: the reference maps; wakes at the end of the sector, near the ground, with a kept core.
 
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 
 use crate::error::Error;
 use crate::retrieval::correlated_residuals::filling;
@@ -12,12 +12,14 @@ use crate::retrieval::problem::{Problem, products};
 use crate::retrieval::{Covariance, Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
 use crate::vortex_fit::damped_newton::inverse;
 use crate::vortex_fit::wake::free_parameters::spread;
-use crate::vortex_fit::{Loss, PARAMETERS, Parameter};
+use crate::vortex_fit::{Loss, PARAMETERS, Parameter, Wake};
 
 /// Velocities with larger residuals, in their deviations, are outliers.
 pub(crate) const OUTLIER: f64 = 4.0;
-/// A vortex whose circulation is less than so many of its deviations is none.
+/// A vortex whose circulation is less than so many of its deviations may be none.
 const LEAST_SIGMAS: f64 = 3.0;
+/// So many times the root of the threshold is far beyond doubt in correlated noise too.
+const BY_FAR: f64 = 2.0;
 /// A top so much above the least chi-square competes with it.
 const COMPETES: f64 = 9.0;
 /// A side of a vortex is seen if the sector reaches so far beyond its centre \[m\], where circulation begins to be counted.
@@ -58,16 +60,20 @@ impl Report<'_> {
             if seen.min(statistic) < self.options.threshold {
                 continue;
             }
-            let covariance = self.covariance(end)?;
-            if self.sides(end).iter().all(|side| certain(end, *side, &covariance)) {
-                chosen = Some((end, covariance));
+            let uncertainty = self.uncertainty(end)?;
+            let circulations = self.sides(end).into_iter().map(|side| places(side)[0]);
+            let threshold = self.options.threshold;
+            let certain = circulations.map(|place| uncertainty.certain(&end.wake, place, threshold));
+            if certain.collect::<Result<Vec<bool>, _>>()?.into_iter().all(|certain| certain) {
+                chosen = Some((end, uncertainty));
                 break;
             }
         }
-        match chosen {
-            Some((end, covariance)) => Ok(self.told(end, covariance, statistic)),
-            None => Ok(self.told(self.wind, self.covariance(self.wind)?, statistic)),
-        }
+        let (end, uncertainty) = match chosen {
+            Some(chosen) => chosen,
+            None => (self.wind, self.uncertainty(self.wind)?),
+        };
+        Ok(self.told(end, uncertainty.covariance(|_| true)?, statistic))
     }
 
     fn sides(&self, end: &End) -> Vec<Side> {
@@ -79,8 +85,7 @@ impl Report<'_> {
         }
     }
 
-    /// Covariance of all parameters.
-    fn covariance(&self, end: &End) -> Result<Array2<f64>, Error> {
+    fn uncertainty<'b>(&self, end: &'b End) -> Result<Uncertainty<'b>, Error> {
         let rows = self.problem.rows(&end.wake, &end.groups);
         let losses: Vec<_> = rows.residuals.iter().map(|r| self.problem.loss.at(*r)).collect();
         let (weights, curved): (Vec<f64>, Vec<f64>) =
@@ -89,18 +94,25 @@ impl Report<'_> {
         for (_, slope) in self.problem.known(&end.wake, &end.groups) {
             known.indexed_iter_mut().for_each(|((i, j), k)| *k += slope[i] * slope[j]);
         }
-        let inverse_of = |weights: &[f64]| inverse("curvature of the fit", &(products(weights, &rows.slopes) + &known));
-        let covariance = match self.options.covariance {
-            Covariance::Model => inverse_of(&vec![1.0; weights.len()])? * inflation(self.options.loss),
+        let curvature = |weights: &[f64]| products(weights, &rows.slopes) + &known;
+        let (curvature, scores) = match self.options.covariance {
+            Covariance::Model => {
+                let information = curvature(&vec![1.0; weights.len()]);
+                let scores = &information * inflation(self.options.loss);
+                (information, scores)
+            }
             Covariance::Sandwich => {
                 // with many outliers the second derivatives need not be positive: their weights are, and are larger
-                let bread = inverse_of(&curved).or_else(|_| inverse_of(&weights))?;
+                let mut bread = curvature(&curved);
+                if inverse(CURVATURE, &bread).is_err() {
+                    bread = curvature(&weights);
+                }
                 let weighted: Vec<f64> = rows.residuals.iter().zip(&weights).map(|(r, w)| r * w).collect();
                 let (filling, _) = filling(&self.problem.cells, &weighted, &rows.slopes);
-                bread.dot(&(filling + &known)).dot(&bread)
+                (bread, filling + &known)
             }
         };
-        Ok(spread(&end.groups, &covariance))
+        Ok(Uncertainty { groups: &end.groups, curvature, scores })
     }
 
     fn told(&self, end: &End, covariance: Array2<f64>, statistic: f64) -> ScanResult {
@@ -215,6 +227,37 @@ impl Report<'_> {
     }
 }
 
+const CURVATURE: &str = "curvature of the fit";
+
+/// What a scan tells of the free numbers of a fit: the curvature A of its cost and the covariance B of the gradient.
+struct Uncertainty<'a> {
+    groups: &'a [Vec<usize>],
+    curvature: Array2<f64>,
+    scores: Array2<f64>,
+}
+
+impl Uncertainty<'_> {
+    /// Covariance A^-1 B A^-1 of all parameters where only those of the wanted groups are free.
+    fn covariance(&self, wanted: impl Fn(&[usize]) -> bool) -> Result<Array2<f64>, Error> {
+        let free: Vec<usize> = (0..self.groups.len()).filter(|i| wanted(&self.groups[*i])).collect();
+        let of = |all: &Array2<f64>| all.select(Axis(0), &free).select(Axis(1), &free);
+        let bread = inverse(CURVATURE, &of(&self.curvature))?;
+        let groups: Vec<Vec<usize>> = free.iter().map(|i| self.groups[*i].clone()).collect();
+        Ok(spread(&groups, &bread.dot(&of(&self.scores)).dot(&bread)))
+    }
+
+    /// Whether a circulation is positive beyond doubt, or is so by far where all but it and the wind is as found: long gates show little
+    /// more than circulation times spacing, so that each of them may be uncertain where the wake is not. Correlated residuals count in
+    /// both, as far as the fit leaves them; the places are the best of many, as those of the statistic are.
+    fn certain(&self, wake: &Wake, circulation: usize, threshold: f64) -> Result<bool, Error> {
+        let value = wake.to_array()[circulation];
+        let beyond = |covariance: Array2<f64>, sigmas: f64| value > sigmas * covariance[[circulation; 2]].sqrt();
+        let alone = |group: &[usize]| group.contains(&circulation) || group[0] >= Parameter::Wind as usize;
+        Ok(beyond(self.covariance(|_| true)?, LEAST_SIGMAS)
+            || beyond(self.covariance(alone)?, (BY_FAR * threshold.sqrt()).max(LEAST_SIGMAS)))
+    }
+}
+
 /// Places of a vortex's parameters: circulation, lateral position, height, core.
 fn places(side: Side) -> [usize; 4] {
     use Parameter as P;
@@ -223,13 +266,6 @@ fn places(side: Side) -> [usize; 4] {
         Side::Right => [P::RightCirculation, P::RightLateral, P::RightHeight, P::RightCore],
     };
     of.map(|parameter| parameter as usize)
-}
-
-/// Whether a circulation is positive beyond doubt, or kept.
-fn certain(end: &End, side: Side, covariance: &Array2<f64>) -> bool {
-    let place = places(side)[0];
-    let free = end.groups.iter().any(|group| group.contains(&place));
-    !free || end.wake.to_array()[place] > LEAST_SIGMAS * covariance[[place, place]].sqrt()
 }
 
 /// Variance of a fit with that loss over that of least squares, for normal residuals.

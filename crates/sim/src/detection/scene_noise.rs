@@ -115,7 +115,8 @@ impl SceneNoise {
     /// scans show of themselves are often far too small. They are those of velocities in sums, with [`excess`](Self::excess).
     pub fn give(&self, map: &mut ScanMap, scans: usize) {
         let at = |range_m: f64| crate::measure::region::of_table(&self.range_m, &self.sigma_m_s, range_m);
-        let least_m_s: Vec<f64> = map.range_m.iter().map(|r| at(*r) * (self.excess / scans.max(1) as f64).sqrt()).collect();
+        let least_m_s: Vec<f64> =
+            map.range_m.iter().map(|r| at(*r) * (self.excess / scans.max(1) as f64).sqrt()).collect();
         let shape = map.velocity_m_s.raw_dim();
         let stated = map.sigma_m_s.take().unwrap_or_else(|| Array2::zeros(shape));
         map.sigma_m_s = Some(Array2::from_shape_fn(shape, |at| stated[at].max(least_m_s[at.1])));

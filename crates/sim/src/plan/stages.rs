@@ -30,6 +30,7 @@ const SPECTRUM_POINT_S: f64 = 6e-9;
 const TRUTH_LAYER_S: f64 = 5e-10;
 const FITTED_CELL_S: f64 = 2e-4;
 const RV_CELL_S: f64 = 2e-5;
+const ENVELOPE_CELL_S: f64 = 3e-5;
 const FITTED_SAMPLE_S: f64 = 3e-4;
 /// Of the test for a wake: scans of still air, empty scans.
 const TEST_S: f64 = 3.0;
@@ -67,7 +68,8 @@ fn retrieval(scene: &Scene, target: Target, n: &Sizes) -> Option<PlannedStage> {
     let wanted = scene.retrieval.as_ref().filter(|_| target == Target::Run)?;
     let record_s = n.layers * LAYER_OF_RECORD_S + n.samples * (n.layers_per_sample * LAYER_OF_SAMPLE_S + SAMPLE_S);
     let of_method = |method: &RetrievalMethod| match method {
-        RetrievalMethod::Fit | RetrievalMethod::Integral | RetrievalMethod::Envelope => 0.0,
+        RetrievalMethod::Fit | RetrievalMethod::Integral => 0.0,
+        RetrievalMethod::Envelope => n.records * record_s + n.cells * ENVELOPE_CELL_S,
         RetrievalMethod::Rv => n.cells * RV_CELL_S,
         RetrievalMethod::Signals => n.records * (record_s + n.samples * FITTED_SAMPLE_S),
     };
@@ -76,7 +78,8 @@ fn retrieval(scene: &Scene, target: Target, n: &Sizes) -> Option<PlannedStage> {
     let map_s = if of_map { n.cells * FITTED_CELL_S } else { 0.0 };
     let scan_s = map_s + wanted.methods.iter().map(of_method).sum::<f64>();
     let test_s = if wanted.false_alarm.is_some() { TEST_S } else { 0.0 };
-    let signals = if wanted.methods.contains(&RetrievalMethod::Signals) { 3.0 } else { 0.0 };
+    let of_signals = [RetrievalMethod::Signals, RetrievalMethod::Envelope];
+    let signals = if of_signals.iter().any(|method| wanted.methods.contains(method)) { 3.0 } else { 0.0 };
     let working =
         n.cells * 8.0 * (n.realisations + RETRIEVED_NUMBERS) + signals * n.records * n.samples * n.parts * 8.0;
     let names: Vec<&str> = wanted.methods.iter().map(|method| crate::retrieve::summary::name(*method)).collect();

@@ -4,6 +4,7 @@
 
 use super::gate::gate_of;
 use super::one_scan::retrieve_map;
+use super::others::envelopes;
 use super::own::OwnScene;
 use super::retrieved_scan::RetrievedScan;
 use super::truth::{TrueVortex, core_profile, true_vortices, true_wake};
@@ -11,6 +12,7 @@ use crate::Error;
 use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
 use crate::io::scans::ReadScan;
 use crate::measure::progress::{Observer, Silent};
+use crate::measure::recorded::Spectra;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use crate::scene::{Flow, FollowingAircraft, LiftSlope as Slope, Retrieval, RetrievalMethod as Method, Scene};
@@ -87,8 +89,8 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::scan::Sample>(
         for &method in &wanted.methods {
             let found = match (method, of_map.clone(), &own) {
                 (Method::Rv, ..) => by(method),
-                (Method::Signals, Some(map), Some(own)) => {
-                    of_signals::<S>(plan, scanner, own, (realisation, lines), map)?
+                (Method::Signals | Method::Envelope, Some(map), Some(own)) => {
+                    of_signals::<S>(plan, scanner, (method, own), (realisation, lines), map)?
                 }
                 (Method::Integral, Some(map), _) => integral(map).ok(),
                 (_, map, _) => map.filter(|_| method == Method::Fit),
@@ -155,18 +157,16 @@ fn read_scan(plan: &Plan, lines: &[usize], velocity_m_s: &Array2<f64>) -> ReadSc
     }
 }
 
-/// The fit to all signals of some lines of a realisation, which are made again; the wake of the map starts it. Nothing where the map shows no pair,
-/// or the fit does not come to an end.
+/// What the signals of some lines of a realisation, which are made again, give by fit or envelopes; the wake of the map starts them.
+/// Nothing where the map shows no pair, or the fit does not come to an end.
 fn of_signals<S: Sample + wakescope_signal::scan::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
-    own: &OwnScene,
+    (method, own): (Method, &OwnScene),
     (realisation, lines): (usize, &[usize]),
-    of_map: RetrievedScan,
+    mut of_map: RetrievedScan,
 ) -> Result<Option<RetrievedScan>, Error> {
-    if of_map.result.vortices.len() < 2 {
-        return Ok(None);
-    }
+    let Some(wake) = of_map.result.wake.filter(|_| of_map.result.vortices.len() == 2) else { return Ok(None) };
     let schedule = &plan.geometry.schedule;
     let is_own = |pulse: usize| lines.contains(&schedule.line_of(pulse));
     let (mut samples, mut elevation_rad): (Vec<S>, Vec<f64>) = (Vec::new(), Vec::new());
@@ -180,6 +180,11 @@ fn of_signals<S: Sample + wakescope_signal::scan::Sample>(
     })?;
     let samples = ArrayView2::from_shape((elevation_rad.len(), plan.geometry.samples), &samples)
         .map_err(|_| wakescope_estimate::Error::Empty { field: "records of a realisation" })?;
+    if method == Method::Envelope {
+        let spectra = Spectra::of_samples(plan, &scanner.layer_snr(), &elevation_rad, samples)?;
+        let lines = 0..spectra.elevation_rad.len();
+        return Ok(envelopes(plan, &spectra, lines, own.snr_of(&wake), &mut of_map).ok().map(|_| of_map));
+    }
     Ok(own.of_records(samples, elevation_rad, of_map).ok())
 }
 

@@ -1,6 +1,6 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
-use super::{Flow, NoiseKind, Pattern, PulseShape, Scan, Scene};
+use super::{Flow, Method, NoiseKind, Pattern, PulseShape, Scan, Scene, Weighting};
 use crate::beams::direction::sin_cos_of_turn;
 use crate::keys::Checker;
 use serde::{Deserialize, Serialize};
@@ -70,15 +70,20 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let Some(r) = &scene.retrieval else { return };
     let key = "retrieval.methods";
     let distinct = r.methods.iter().enumerate().all(|(i, method)| !r.methods[..i].contains(method));
-    let allowed =
-        "at least one of \"fit\", \"signals\", \"rv\", \"integral\", each once, for example [\"fit\", \"rv\"]";
+    let allowed = "at least one of \"fit\", \"signals\", \"rv\", \"envelope\", \"integral\", each once, for example [\"fit\", \"rv\"]";
     c.require(distinct && !r.methods.is_empty(), key, &r.methods, allowed);
+    let estimator = &scene.estimator;
+    let has_edges =
+        estimator.weighting == Weighting::Gaussian && !matches!(estimator.method, Method::GradientLikelihood(_));
     c.require(
-        !r.methods.contains(&RetrievalMethod::Envelope),
+        !r.methods.contains(&RetrievalMethod::Envelope) || has_edges,
         key,
         "envelope",
-        "another method in a scene: envelopes need spectra of gates, which `wakescope retrieve signals.nc --method envelope` makes",
+        "another method unless estimator.weighting = \"gaussian\" and the estimator has a spectrum, which all have but gradient_likelihood",
     );
+    let one = "another method with more than one sweep (scan.head.sweeps)";
+    let alone = scene.scan.head.sweeps == 1 || !r.methods.contains(&RetrievalMethod::Envelope);
+    c.require(alone, key, "envelope", one);
     if let Some(core_m) = r.core_radius_m {
         c.within("retrieval.core_radius_m", core_m, 1e-3, 1e3, "m");
     }
@@ -105,12 +110,14 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let allowed = "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";
     c.require(has_vortices, "retrieval", "a table", allowed);
     let plain = matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
-    c.require(
-        !r.methods.contains(&RetrievalMethod::Signals) || (plain && scene.detector.noise != NoiseKind::None),
-        key,
-        "signals",
-        "another method where detector.noise = \"none\" or the pulse is sampled or has a chirp: their signals have no likelihood here",
-    );
+    for (method, word) in [(RetrievalMethod::Signals, "signals"), (RetrievalMethod::Envelope, "envelope")] {
+        c.require(
+            !r.methods.contains(&method) || (plain && scene.detector.noise != NoiseKind::None),
+            key,
+            word,
+            "another method where detector.noise = \"none\" or the pulse is sampled or has a chirp: their signals have no likelihood here",
+        );
+    }
 }
 
 impl Scan {
@@ -135,7 +142,7 @@ mod tests {
     #[test]
     fn retrievals_are_held_to_their_limits_and_need_vortices() {
         for text in [
-            "[retrieval]\nmethods = [\"fit\", \"signals\", \"rv\", \"integral\"]\nfalse_alarm = 0.01\n",
+            "[retrieval]\nmethods = [\"fit\", \"signals\", \"rv\", \"envelope\", \"integral\"]\nfalse_alarm = 0.01\n",
             "[retrieval]\n[scan]\nazimuth_rad = 1.0\n[scan.head]\nsweeps = 3\ndirection = \"alternate\"\n",
             "[retrieval]\n[scan]\nazimuth_rad = 2.0\n[scan.lidar]\nflight_azimuth_rad = 0.42920367320510344\n",
         ] {
@@ -144,7 +151,9 @@ mod tests {
         for (text, key) in [
             ("[retrieval]\nmethods = []\n", "retrieval.methods"),
             ("[retrieval]\nmethods = [\"rv\", \"fit\", \"rv\"]\n", "retrieval.methods"),
-            ("[retrieval]\nmethods = [\"envelope\"]\n", "retrieval.methods"),
+            ("[retrieval]\nmethods = [\"envelope\"]\n[estimator]\nweighting = \"hann\"\n", "retrieval.methods"),
+            ("[retrieval]\nmethods = [\"envelope\"]\n[detector]\nnoise = \"none\"\n", "retrieval.methods"),
+            ("[retrieval]\nmethods = [\"envelope\"]\n[scan.head]\nsweeps = 2\n", "retrieval.methods"),
             ("[retrieval]\nmethods = [\"signals\"]\n[detector]\nnoise = \"none\"\n", "retrieval.methods"),
             ("[retrieval]\nfalse_alarm = 0.9\n", "retrieval.false_alarm"),
             ("[retrieval]\ncore_radius_m = 0.0\n", "retrieval.core_radius_m"),

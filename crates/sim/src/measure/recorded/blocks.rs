@@ -43,6 +43,7 @@ impl<'p, S: FromParts> Blocks<'p, S> {
     ) -> Result<Self, Error> {
         let scene = &plan.scene.scene;
         let spectra = if options.spectra { Some(GateSpectra::new(plan, S::KIND)?) } else { None };
+        spectra.iter().try_for_each(|spectra| spectra.fit_a_file(plan))?;
         Ok(Self {
             plan,
             largest,

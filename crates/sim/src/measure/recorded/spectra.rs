@@ -6,10 +6,13 @@ use super::cells::ScanCells;
 use crate::Error;
 use crate::io::OutputError;
 use crate::measure::estimators;
+use crate::measure::map_estimator::MapEstimator;
 use crate::plan::Plan;
 use crate::scene::{Method, Scene, Weighting};
-use wakescope_estimate::map::PolarPoint;
+use ndarray::ArrayView2;
+use wakescope_estimate::map::{PolarPoint, ScanGeometry};
 use wakescope_estimate::spectrum::LagSpectrum;
+use wakescope_estimate::window::Sample;
 use wakescope_estimate::{Scan, Scratch, SignalKind};
 
 /// Spectra \[line, gate, velocity\] of all scans.
@@ -39,6 +42,39 @@ impl Spectra {
             density: scans.iter().flat_map(|scan| scan.spectra.iter().flatten().copied()).collect(),
         })
     }
+
+    /// Of the samples of one realisation of a scene whose lines rise, pulse by pulse; `layer_snr` holds range, m, and expected
+    /// signal-to-noise ratio of the layers.
+    ///
+    /// # Errors
+    /// A method whose numbers are no correlogram of the whole window; what the estimators refuse.
+    pub(crate) fn of_samples<S: Sample>(
+        plan: &Plan,
+        layer_snr: &[(f64, f64)],
+        pulse_elevation_rad: &[f64],
+        samples: ArrayView2<'_, S>,
+    ) -> Result<Self, Error> {
+        let (scene, g) = (&plan.scene.scene, &plan.geometry);
+        let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
+        let places = ScanGeometry::new(&sampling, &gates, pulse_elevation_rad, g.samples)?;
+        let estimator = MapEstimator::<S>::new(plan, layer_snr, &places)?;
+        let mut sums = estimator.sums(places)?;
+        sums.add(0, samples)?;
+        let (scan, of_gate, mut density) = (sums.finish(), GateSpectra::new(plan, S::KIND)?, Vec::new());
+        for &elevation_rad in &g.elevation_rad {
+            for &range_m in &g.gate_range_m {
+                let (point, radius_m) = (PolarPoint { range_m, elevation_rad }, estimator.radius_m(range_m)?);
+                of_gate.push(&scan, point, radius_m, estimator.noise_density_a2(), &mut density)?;
+            }
+        }
+        Ok(Self {
+            velocity_m_s: of_gate.velocity_m_s,
+            range_m: g.gate_range_m.clone(),
+            elevation_rad: g.elevation_rad.clone(),
+            time_s: g.line_time_s.clone(),
+            density,
+        })
+    }
 }
 
 /// Makes the spectra of gates.
@@ -53,7 +89,7 @@ impl GateSpectra {
     /// For the windows of a scene.
     ///
     /// # Errors
-    /// A method whose numbers are no correlogram of the whole window; more spectra than a file holds.
+    /// A method whose numbers are no correlogram of the whole window.
     pub(super) fn new(plan: &Plan, kind: SignalKind) -> Result<Self, Error> {
         let scene = &plan.scene.scene;
         if !has_spectrum(scene) {
@@ -74,7 +110,13 @@ impl GateSpectra {
         let mut bins: Vec<(usize, f64)> =
             (0..last).map(|bin| (bin, of_bin(bin))).filter(|(_, v)| (low_m_s..=high_m_s).contains(v)).collect();
         bins.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let bytes = 4 * bins.len() * plan.geometry.gate_range_m.len() * plan.geometry.elevation_rad.len();
+        let (bins, velocity_m_s) = bins.into_iter().unzip();
+        Ok(Self { spectrum, bins, velocity_m_s })
+    }
+
+    /// Refuses more spectra than a file holds.
+    pub(super) fn fit_a_file(&self, plan: &Plan) -> Result<(), Error> {
+        let bytes = 4 * self.bins.len() * plan.geometry.gate_range_m.len() * plan.geometry.elevation_rad.len();
         if bytes > MOST_BYTES {
             let reason = format!(
                 "--spectra makes {bytes} bytes, at most {MOST_BYTES}: larger estimator.gate_step_samples or smaller \
@@ -82,8 +124,7 @@ impl GateSpectra {
             );
             return Err(OutputError::Unsupported { format: "spectra.nc", reason }.into());
         }
-        let (bins, velocity_m_s) = bins.into_iter().unzip();
-        Ok(Self { spectrum, bins, velocity_m_s })
+        Ok(())
     }
 
     /// Adds the spectrum of the region of a point.
