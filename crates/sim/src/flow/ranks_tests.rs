@@ -13,7 +13,7 @@ fn wake(more: &str) -> String {
     format!(
         "[case]\nkind = \"wake\"\ncells = [6, 32, 24]\nreynolds = 1000.0\nperturbation = 0.05\n\
          [wake]\nend_tau = 0.1\nevery_tau = 0.02\nfields_tau = [0.1]\nplanes_tau = [0.05, 0.1]\n\
-         [output]\nfields = [\"{format}\"]\nplanes = [\"{format}\"]\n[solver]\nsubgrid = \"multiscale_wale\"\n\
+         [output]\nfields = [\"{format}\"]\nplanes = [\"{format}\"]\n[solver]\nsubgrid = {{ model = \"multiscale_wale\" }}\n\
          [checkpoint]\nevery_steps = 2\n{more}"
     )
 }
