@@ -4,6 +4,8 @@ use super::context::Context;
 use crate::Failure;
 use crate::claim::{Claim, Verdict, with_error};
 use crate::wakes;
+use rayon::prelude::*;
+use std::path::Path;
 use wakescope_sim::Silent;
 use wakescope_sim::io::Table;
 use wakescope_sim::plan::{Plan, Target};
@@ -48,21 +50,23 @@ impl OfFlow {
 }
 
 pub(super) fn all(context: &Context) -> Result<Vec<OfFlow>, Failure> {
-    AGES.into_iter().map(|tau| of_flow(context, tau)).collect()
+    let wake = wakes::of(context)?.folder;
+    let of = |tau| of_flow(context, tau, &wake).map_err(|e| e.to_string());
+    let flows: Vec<_> = AGES.into_par_iter().map(of).collect();
+    flows.into_iter().collect::<Result<_, _>>().map_err(Failure::new)
 }
 
-fn of_flow(context: &Context, tau: Option<f64>) -> Result<OfFlow, Failure> {
+fn of_flow(context: &Context, tau: Option<f64>, wake: &Path) -> Result<OfFlow, Failure> {
     let mut scene = Scene { seed: context.seed, ..Scene::default() };
     scene.detector.snr = SnrReference::Fixed { snr_db: SNR_DB };
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.02, 0.2);
     scene.scan.elevation_step_rad = context.choose(2.5e-3, 1.25e-3, 1.25e-3);
+    scene.estimator.gate_step_samples = context.choose(15, 5, 5);
     scene.scan.pulses_per_line = 4;
     scene.scan.realisations = context.choose(1, 16, 32);
-    let mut folder = context.stages.clone();
     scene.flow = match tau {
         None => Flow::VortexPair(VortexPair::default()),
         Some(age_tau) => {
-            folder = wakes::of(context)?.folder;
             scene.scan.outside_flow = Outside::Mask {};
             let motion = SimulatedMotion::Frozen;
             let planes = "plane1".into();
@@ -72,7 +76,7 @@ fn of_flow(context: &Context, tau: Option<f64>) -> Result<OfFlow, Failure> {
     // Signals take longest: the fits of all samples of the pair are in the other part of the figure.
     let some = METHODS[..context.choose(4, 5, 5)].iter().map(|(method, _)| *method).collect();
     scene.retrieval = Some(Retrieval { methods: some, ..Retrieval::default() });
-    let file = SceneFile::parse(&scene.to_toml(), &folder.join("scene.toml"))?;
+    let file = SceneFile::parse(&scene.to_toml(), &wake.join("scene.toml"))?;
     let result = wakescope_sim::run(&Plan::new(file, Target::Run)?, &Silent)?;
     let found = result.retrieval.ok_or_else(|| Failure::new("a run without retrievals".into()))?;
     Ok(OfFlow { tau, rows: found.rows })
