@@ -26,7 +26,7 @@ struct Curve {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let realisations = context.choose(64, 400, 400);
+    let realisations = context.choose(48, 400, 400);
     // A range in the middle and at the end of each layer of the chapter's path.
     let range_m: Vec<f64> = (1..=20).map(|i| 150.0 * f64::from(i)).collect();
     let weak = monte_carlo(WEAK_M_M23, &range_m, realisations, context.seed)?;

@@ -3,6 +3,7 @@
 use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::{Claim, Verdict, with_error};
+use rayon::prelude::*;
 use wakescope_estimate::retrieval::Turbulence;
 use wakescope_estimate::wake_detection::{DetectorOptions, Share};
 use wakescope_sim::Silent;
@@ -108,14 +109,15 @@ fn alarms(context: &Context, scans: u64, step_m: f64) -> Result<(Share, f64), Fa
     let first = plan(context.seed)?;
     let noise = SceneNoise::new(&first, &Silent)?;
     let settings = settings(&first, &noise, None, COUNTED)?;
-    let mut maps = Vec::new();
-    for scan in 0..scans {
+    let scan = |scan: u64| -> Result<_, Failure> {
         // far from the seed of the scans that measured the noise
         let map = wakescope_sim::run(&plan(context.seed + 1000 + scan)?, &Silent)?.map;
         let mut empty = noise.empty_scan(&first);
         empty.velocity_m_s = map.ok_or_else(|| Failure::new("a run without a map".into()))?.v_scan_m_s;
-        maps.push(empty);
-    }
+        Ok(empty)
+    };
+    let maps: Vec<_> = (0..scans).into_par_iter().map(|number| scan(number).map_err(|e| e.to_string())).collect();
+    let maps = maps.into_iter().collect::<Result<Vec<_>, _>>().map_err(Failure::new)?;
     let (found, _) = detect(&maps, &settings)?;
     let error = (COUNTED * (1.0 - COUNTED) / maps.len() as f64).sqrt();
     Ok((Share::of(found.iter().filter(|scan| scan.is_wake()).count(), maps.len()), error))

@@ -16,13 +16,15 @@ use ndarray::{Array2, ArrayView2, Axis};
 use num_complex::Complex;
 use wakescope_estimate::retrieval::{Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
 use wakescope_estimate::vortex_fit::{
-    MapFitOptions, Parameter, Sharing, SignalFit, SignalFitOptions, VelocityMap, Wake, fit_map_of_estimator,
+    MapFitOptions, Parameter, Sharing, SignalFit, SignalFitOptions, VelocityMap, Vortex, Wake, fit_map_of_estimator,
     fit_signals,
 };
 use wakescope_estimate::window::Sample;
 
 /// A top so much above the least chi-square competes with it.
 const COMPETES: f64 = 9.0;
+/// A vortex that means do not show is one if its circulation is that many of its deviations.
+const CERTAIN_SIGMAS: f64 = 3.0;
 
 /// The scene of a map or of signals.
 pub struct OwnScene {
@@ -58,12 +60,20 @@ impl OwnScene {
         self.response.snr_at(y_m.hypot(z_m - self.scene.scan.lidar_height_m))
     }
 
-    /// The fit to what the estimator of the scene shows, for a map in which `found` has both vortices; nothing where it has not, the
-    /// estimator is one of those without such a model, or the fit does not come to an end.
+    /// The fit of a pair to what the estimator of the scene shows, for a map in which `found` has a wake: taken for means, peaks may show
+    /// but one of its vortices. Nothing where there is no wake or no certain pair, the estimator is one of those without such a
+    /// model, or the fit does not come to an end.
     pub(super) fn refined(&self, map: &ScanMap, options: &RetrievalOptions, found: &ScanResult) -> Option<ScanResult> {
-        let wake = found.wake.filter(|_| found.vortices.len() == 2)?;
-        let (y_m, z_m) = middle_m(&wake);
-        let range_m = y_m.hypot(z_m - self.scene.scan.lidar_height_m);
+        if found.statistic.is_nan() || found.statistic < options.threshold {
+            return None;
+        }
+        let from_lidar = |vortex: &VortexResult| {
+            vortex.lateral_position_m.value.hypot(vortex.height_m.value - self.scene.scan.lidar_height_m)
+        };
+        let range_m = match found.vortices.len() {
+            0 => 0.5 * (map.range_m.first()? + map.range_m.last()?),
+            count => found.vortices.iter().map(from_lidar).sum::<f64>() / count as f64,
+        };
         let shown = self.response.shown(&self.scene, range_m)?;
         let some: Vec<usize> = (0..map.range_m.len()).step_by(gate_step(&self.scene)).collect();
         let ranges_m: Vec<f64> = some.iter().map(|gate| map.range_m[*gate]).collect();
@@ -85,7 +95,13 @@ impl OwnScene {
         };
         let fit = fit_map_of_estimator(&view, &options.model, &shown, &fit_options).ok()?;
         let tops = fit.tops.iter().map(|top| Top { wake: top.wake, chi2: -2.0 * top.log_likelihood }).collect();
-        let mut result = retold(found, options, (fit.wake, fit.covariance), tops);
+        let pair = as_pair(found, map, options, &fit.wake);
+        let mut result = retold(&pair, options, (fit.wake, fit.covariance), tops);
+        let certain =
+            |vortex: &VortexResult| vortex.circulation_m2_s.value > CERTAIN_SIGMAS * vortex.circulation_m2_s.std;
+        if found.vortices.len() < 2 && !result.vortices.iter().all(certain) {
+            return None;
+        }
         if !fit.cores_fitted || options.free.core_radius == Sharing::Fixed {
             keep_cores(&mut result);
         }
@@ -160,6 +176,32 @@ fn middle_m(wake: &Wake) -> (f64, f64) {
         0.5 * (wake.left.lateral_position_m + wake.right.lateral_position_m),
         0.5 * (wake.left.height_m + wake.right.height_m),
     )
+}
+
+/// A result in which both vortices of a wake are found, each when the line of sight passes it.
+fn as_pair(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, wake: &Wake) -> ScanResult {
+    if found.vortices.len() == 2 {
+        return found.clone();
+    }
+    let unknown = Measured { value: f64::NAN, std: f64::NAN };
+    let of = |(side, vortex): (Side, Vortex)| {
+        let elevation_rad = (vortex.height_m - options.model.lidar_height_m).atan2(vortex.lateral_position_m);
+        let away = |line: &usize| (map.elevation_rad[*line] - elevation_rad).abs();
+        let line = (0..map.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+        VortexResult {
+            side,
+            time_s: line.map_or(f64::NAN, |line| map.time_s[line]),
+            circulation_m2_s: unknown,
+            circulation_5_15_m2_s: unknown,
+            lateral_position_m: unknown,
+            height_m: unknown,
+            core_radius_m: None,
+        }
+    };
+    let mut pair = found.clone();
+    pair.vortices = [(Side::Left, wake.left), (Side::Right, wake.right)].map(of).to_vec();
+    [Flag::NoWake, Flag::OneVortex].into_iter().for_each(|flag| set(&mut pair.flags, flag, false));
+    pair
 }
 
 /// A result with another wake of standing vortices.

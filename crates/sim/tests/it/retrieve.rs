@@ -84,6 +84,31 @@ fn a_scan_beyond_the_zenith_sees_the_wake_on_the_other_side() {
     }
 }
 
+/// The peaks of this scan, taken for means over gates, show one vortex alone.
+#[test]
+fn a_pair_of_which_peaks_show_one_vortex_is_found_by_what_the_estimator_shows() {
+    let scene = "seed = 1\n[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n[scan]\nelevation_min_rad = 0.02\nelevation_max_rad = 0.2\n\
+        elevation_step_rad = 2.5e-3\npulses_per_line = 4\nrealisations = 1\n[estimator]\ngate_step_samples = 15\n[outputs]\n\
+        flow = false\nsvg = false\npng = false\nprofile_points = 2\n";
+    let temp = tempfile::tempdir().unwrap();
+    fs::write(temp.path().join("s.toml"), scene).unwrap();
+    assert!(wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]).status.success());
+    let pair = retrieved(temp.path(), "o/map.nc");
+    assert_eq!((text(&pair, 0, "side"), text(&pair, 1, "side"), pair.rows.len()), ("left", "right", 2));
+    for (row, y_m) in [(0, 376.5), (1, 423.5)] {
+        for (name, std, truth) in [
+            ("gamma_m2_s", "gamma_std_m2_s", 500.0),
+            ("gamma_5_15_m2_s", "gamma_5_15_std_m2_s", 466.635),
+            ("y_m", "y_std_m", y_m),
+            ("z_m", "z_std_m", 47.0),
+        ] {
+            let (value, std) = (number(&pair, row, name), number(&pair, row, std));
+            assert!((value - truth).abs() < 4.0 * std, "{name}: {value} +- {std}, {truth}");
+        }
+        assert!(!text(&pair, row, "flags").contains("one_vortex"));
+    }
+}
+
 #[test]
 fn wind_without_a_wake_is_a_result() {
     let temp = tempfile::tempdir().unwrap();

@@ -221,7 +221,7 @@ mod tests {
     fn what_is_no_scan_is_refused_by_name() {
         let refused = |rays: Vec<RayRow>, range_m: Vec<f64>| scan_map(rays, range_m, None, "sweep 3").unwrap_err();
         assert!(refused(rays([0.1; 9]), range_m()).contains("sweep 3: it has 1 different elevations"));
-        assert!(refused(rays([0.1, 0.2, 3.0]), range_m()).contains("elevation"));
+        assert!(refused(rays([0.1, 0.2, 3.2]), range_m()).contains("elevation"));
         let mut falling = range_m();
         falling.swap(3, 4);
         assert!(refused(rays([0.1, 0.2, 0.3]), falling).contains("range must increase"));
