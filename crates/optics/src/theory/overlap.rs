@@ -35,7 +35,7 @@ pub fn quadrature_cost_s(telescope: &Telescope, screens: usize, range_m: f64) ->
     // Nodes grow with the Fresnel number, and so do those of M(rho) at each until steepest descent takes over.
     let overlaps = 1e-4 + (fresnel * (4e-4 + 1.5e-5 * fresnel)).min(0.03 + 3.2e-4 * fresnel);
     let annulus = if telescope.obscuration_radius_m > 0.0 { 2.5 } else { 1.0 };
-    overlaps * annulus + (60.0 + 126.0 * fresnel) * 1e-7 * screens as f64
+    0.7 * overlaps * annulus + (60.0 + 126.0 * fresnel) * 1e-7 * screens as f64
 }
 
 pub(crate) fn check_fresnel_number(telescope: &Telescope, range_m: f64) -> Result<(), Error> {

@@ -15,12 +15,12 @@ use crate::scene::{Flow, Method, NoiseKind, RegionRadius, RetrievalMethod, Scene
 const ANALYTIC_WIND_S: f64 = 7e-8;
 const SAMPLED_WIND_S: f64 = 2e-7;
 const FIELD_WIND_S: f64 = 8e-7;
-const LAYER_OF_RECORD_S: f64 = 4.5e-8;
-const LAYER_OF_SAMPLE_S: f64 = 1.0e-10;
-const SAMPLE_S: f64 = 4e-8;
+const LAYER_OF_RECORD_S: f64 = 5.4e-8;
+const LAYER_OF_SAMPLE_S: f64 = 1.2e-10;
+const SAMPLE_S: f64 = 4.8e-8;
 const NOISE_SAMPLE_S: f64 = 3e-9;
 /// Of a window, for each point of its transform times the logarithm of their number.
-const TRANSFORM_POINT_S: f64 = 3.4e-10;
+const TRANSFORM_POINT_S: f64 = 4.2e-10;
 const SLIDING_LAG_S: f64 = 2e-9;
 const GRADIENT_PAIR_S: f64 = 7e-10;
 const SUMMED_NUMBER_S: f64 = 5e-9;
