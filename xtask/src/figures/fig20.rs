@@ -22,23 +22,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     (scene.scan.pulses_per_line, scene.scan.realisations) = (4, 1);
     let plan = Plan::new(context.scene_file(scene)?, Target::Map)?;
     let map = wakescope_sim::run(&plan, &Silent)?.map.ok_or_else(|| Failure::new("a run without a map".into()))?;
-    let scan = ReadScan {
-        path: "scan".into(),
-        sweep: 0,
-        map: ScanMap {
-            elevation_rad: map.elevation_rad,
-            time_s: plan.geometry.line_time_s.clone(),
-            range_m: map.range_m,
-            velocity_m_s: map.v_scan_m_s,
-            sigma_m_s: None,
-            fold_m_s: None,
-        },
-        reference: None,
-        gate_length_m: None,
-        pulse_width_s: None,
-        scene_toml: None,
-        is_own: true,
+    let map = ScanMap {
+        elevation_rad: map.elevation_rad,
+        time_s: plan.geometry.line_time_s.clone(),
+        range_m: map.range_m,
+        velocity_m_s: map.v_scan_m_s,
+        sigma_m_s: None,
+        fold_m_s: None,
     };
+    let scan = ReadScan::own("scan", map);
     let options = RetrievalOptions {
         gate: gate_of(None, None, Some(&plan.scene.scene))?.0,
         core_prior: Some(CorePrior::TYPICAL),

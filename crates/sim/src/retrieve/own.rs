@@ -86,7 +86,8 @@ impl OwnScene {
             standard_deviation_m_s: None,
         };
         let lines = map.elevation_rad.len();
-        let step_rad = (map.elevation_rad.last()? - map.elevation_rad.first()?) / (lines.max(2) - 1) as f64;
+        let (lowest, highest) = (*map.elevation_rad.first()?, *map.elevation_rad.last()?);
+        let step_rad = (highest - lowest) / (lines.max(2) - 1) as f64;
         let fit_options = MapFitOptions {
             free: options.free,
             loss: options.loss,
@@ -97,9 +98,16 @@ impl OwnScene {
         let tops = fit.tops.iter().map(|top| Top { wake: top.wake, chi2: -2.0 * top.log_likelihood }).collect();
         let pair = as_pair(found, map, options, &fit.wake);
         let mut result = retold(&pair, options, (fit.wake, fit.covariance), tops);
-        let certain =
+        // Beyond the scan there may be anything.
+        let (ranges, elevations) = (map.range_m.first()?..=map.range_m.last()?, lowest..=highest);
+        let is_seen = |vortex: &VortexResult| {
+            let (y_m, z_m) = (vortex.lateral_position_m.value, vortex.height_m.value);
+            let elevation_rad = (z_m - self.scene.scan.lidar_height_m).atan2(y_m);
+            ranges.contains(&&from_lidar(vortex)) && elevations.contains(&elevation_rad)
+        };
+        let is_certain =
             |vortex: &VortexResult| vortex.circulation_m2_s.value > CERTAIN_SIGMAS * vortex.circulation_m2_s.std;
-        if found.vortices.len() < 2 && !result.vortices.iter().all(certain) {
+        if found.vortices.len() < 2 && !result.vortices.iter().all(|vortex| is_seen(vortex) && is_certain(vortex)) {
             return None;
         }
         if !fit.cores_fitted || options.free.core_radius == Sharing::Fixed {
@@ -200,7 +208,9 @@ fn as_pair(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, wake: 
     };
     let mut pair = found.clone();
     pair.vortices = [(Side::Left, wake.left), (Side::Right, wake.right)].map(of).to_vec();
-    [Flag::NoWake, Flag::OneVortex].into_iter().for_each(|flag| set(&mut pair.flags, flag, false));
+    // What the other fit left says nothing of this one.
+    [Flag::NoWake, Flag::OneVortex, Flag::PoorFit].into_iter().for_each(|flag| set(&mut pair.flags, flag, false));
+    pair.chi2_per_dof = f64::NAN;
     pair
 }
 
@@ -283,21 +293,19 @@ pub fn scan_of_signals(path: &std::path::Path, sweep: usize, plan: &Plan, scan: 
         }
     });
     let of = |values: &[f64]| order.iter().map(|line| values[*line]).collect();
+    let map = ScanMap {
+        elevation_rad: of(&scan.lines.elevation_rad),
+        time_s: of(&scan.lines.time_s),
+        range_m: plan.geometry.gate_range_m.clone(),
+        velocity_m_s,
+        sigma_m_s: None,
+        fold_m_s: None,
+    };
     ReadScan {
         path: path.to_owned(),
         sweep,
-        map: ScanMap {
-            elevation_rad: of(&scan.lines.elevation_rad),
-            time_s: of(&scan.lines.time_s),
-            range_m: plan.geometry.gate_range_m.clone(),
-            velocity_m_s,
-            sigma_m_s: None,
-            fold_m_s: None,
-        },
         reference: crate::io::UtcTime::parse(&plan.scene.scene.site.start_utc),
-        gate_length_m: None,
-        pulse_width_s: None,
         scene_toml: Some(plan.scene.toml.clone()),
-        is_own: true,
+        ..ReadScan::own("", map)
     }
 }

@@ -138,23 +138,15 @@ fn upward_sweeps(plan: &Plan) -> Vec<Vec<usize>> {
 fn read_scan(plan: &Plan, lines: &[usize], velocity_m_s: &Array2<f64>) -> ReadScan {
     let g = &plan.geometry;
     let of = |values: &[f64]| lines.iter().map(|line| values[*line]).collect::<Vec<f64>>();
-    ReadScan {
-        path: "retrieval".into(),
-        sweep: 0,
-        map: ScanMap {
-            elevation_rad: of(&g.elevation_rad),
-            time_s: of(&g.line_time_s).iter().map(|t| plan.wind.start_s + t).collect(),
-            range_m: g.gate_range_m.clone(),
-            velocity_m_s: velocity_m_s.select(Axis(0), lines),
-            sigma_m_s: None,
-            fold_m_s: None,
-        },
-        reference: None,
-        gate_length_m: None,
-        pulse_width_s: None,
-        scene_toml: None,
-        is_own: true,
-    }
+    let map = ScanMap {
+        elevation_rad: of(&g.elevation_rad),
+        time_s: of(&g.line_time_s).iter().map(|t| plan.wind.start_s + t).collect(),
+        range_m: g.gate_range_m.clone(),
+        velocity_m_s: velocity_m_s.select(Axis(0), lines),
+        sigma_m_s: None,
+        fold_m_s: None,
+    };
+    ReadScan::own("retrieval", map)
 }
 
 /// What the signals of some lines of a realisation, which are made again, give by fit or envelopes; the wake of the map starts them.

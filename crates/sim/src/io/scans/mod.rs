@@ -56,6 +56,22 @@ pub struct ReadScan {
     pub is_own: bool,
 }
 
+impl ReadScan {
+    /// A map that was just made by this program, named `name` in messages.
+    pub fn own(name: &str, map: ScanMap) -> Self {
+        Self {
+            path: name.into(),
+            sweep: 0,
+            map,
+            reference: None,
+            gate_length_m: None,
+            pulse_width_s: None,
+            scene_toml: None,
+            is_own: true,
+        }
+    }
+}
+
 /// Reads the scans of a file; the sweeps that are none are left out, and said in the texts.
 ///
 /// # Errors
