@@ -157,7 +157,8 @@ pub(crate) fn hermitian_eigen<T: Scalar<Real = f64> + Lapack>(
     }
 }
 
-/// Scalar product, in eight partial sums that the compiler keeps in vector registers.
+/// Scalar product, in eight partial sums that the compiler keeps in vector registers: those of the function that calls it.
+#[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));

@@ -220,20 +220,14 @@ impl Prepared<'_> {
         };
         let nodes = self.weights.len() / self.numbers;
         let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + nodes + 1;
-        phasors.clear();
-        for point in 0..points {
+        let turn = |point: usize| {
             let at_m = nearest_m + self.first_offset_m + point as f64 * self.spacing_m;
             let cycles = sampling.frequency_hz(model.velocity_on(wake, at_m, ray)) * sampling.period_s();
-            let (sin, cos) = (TAU * cycles).sin_cos();
-            let (mut re, mut im) = (1.0, 0.0);
-            while phasors.len() < (point + 1) * self.numbers {
-                phasors.push(re);
-                if self.response.kind == SignalKind::Complex {
-                    phasors.push(im);
-                }
-                (re, im) = (re * cos - im * sin, im * cos + re * sin);
-            }
-        }
+            (TAU * cycles).sin_cos()
+        };
+        let turns: Vec<(f64, f64)> = (0..points).map(turn).collect();
+        phasors.resize(points * self.numbers, 0.0);
+        fill_powers(phasors, &turns, self.response.kind);
         let mut lags = vec![0.0; self.range_m.len() * self.numbers];
         for (range_m, lags) in self.range_m.iter().zip(lags.chunks_exact_mut(self.numbers)) {
             let place = (range_m - nearest_m) / self.spacing_m;
@@ -248,6 +242,40 @@ impl Prepared<'_> {
             }
         }
         lags
+    }
+}
+
+/// Points whose powers are taken side by side.
+const LANES: usize = 8;
+
+/// Powers 0, 1, ... of unit phasors, given as sine and cosine: a row for each.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn fill_powers(phasors: &mut [f64], turns: &[(f64, f64)], kind: SignalKind) {
+    let count = phasors.len() / turns.len().max(1);
+    for (rows, turns) in phasors.chunks_mut(LANES * count).zip(turns.chunks(LANES)) {
+        let (mut sin, mut cos) = ([0.0; LANES], [1.0; LANES]);
+        for (lane, turn) in turns.iter().enumerate() {
+            (sin[lane], cos[lane]) = *turn;
+        }
+        let (mut re, mut im) = ([1.0; LANES], [0.0; LANES]);
+        let mut number = 0;
+        while number < count {
+            for lane in 0..turns.len() {
+                rows[lane * count + number] = re[lane];
+            }
+            number += 1;
+            if kind == SignalKind::Complex {
+                for lane in 0..turns.len() {
+                    rows[lane * count + number] = im[lane];
+                }
+                number += 1;
+            }
+            for lane in 0..LANES {
+                let (x, y) = (re[lane], im[lane]);
+                re[lane] = x * cos[lane] - y * sin[lane];
+                im[lane] = y * cos[lane] + x * sin[lane];
+            }
+        }
     }
 }
 

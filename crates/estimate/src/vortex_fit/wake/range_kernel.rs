@@ -4,6 +4,8 @@
 //! Check: a linear wind is kept but for the mean offset; gates between grid points are interpolated; derivatives against
 //! difference quotients.
 
+use multiversion::multiversion;
+
 use crate::error::{Error, finite, positive};
 use crate::linalg::dot;
 use crate::vortex_fit::wake::pair::Ray;
@@ -85,16 +87,17 @@ pub(crate) struct LineScratch {
     rows: Vec<Vec<f64>>,
 }
 
-impl RangeKernel {
-    /// Mean velocity of the gate whose first weight falls on grid point `index`, and the means of the other rows.
-    fn means(&self, rows: &[Vec<f64>], index: usize) -> [f64; PARAMETERS + 1] {
-        let mut found = [0.0; PARAMETERS + 1];
-        for (found, row) in found.iter_mut().zip(rows) {
-            *found = dot(&self.weights, &row[index..index + self.weights.len()]);
-        }
-        found
+/// Mean velocity of the gate whose first weight falls on grid point `index`, and the means of the other rows.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn means(weights: &[f64], rows: &[Vec<f64>], index: usize) -> [f64; PARAMETERS + 1] {
+    let mut found = [0.0; PARAMETERS + 1];
+    for (found, row) in found.iter_mut().zip(rows) {
+        *found = dot(weights, &row[index..index + weights.len()]);
     }
+    found
+}
 
+impl RangeKernel {
     /// Gate velocities of a line, and with `slopes` their derivatives: `out(gate, velocity, derivatives)` for each range.
     pub(crate) fn apply(
         &self,
@@ -127,9 +130,9 @@ impl RangeKernel {
             let index = (place + 1e-9).floor();
             let part = (place - index).max(0.0);
             let index = index as usize;
-            let mut found = self.means(&scratch.rows[..numbers], index);
+            let mut found = means(&self.weights, &scratch.rows[..numbers], index);
             if part > 1e-6 {
-                let next = self.means(&scratch.rows[..numbers], index + 1);
+                let next = means(&self.weights, &scratch.rows[..numbers], index + 1);
                 found.iter_mut().zip(next).for_each(|(f, n)| *f += part * (n - *f));
             }
             let mut slope = [0.0; PARAMETERS];
