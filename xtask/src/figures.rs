@@ -24,6 +24,7 @@ mod fig17_flows;
 mod fig18;
 mod fig19;
 mod fig20;
+mod fig21;
 mod profiles;
 mod study;
 mod tab01;
@@ -41,7 +42,7 @@ pub(crate) struct Figure {
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 22] = [
+pub(crate) const ALL: [Figure; 23] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
     Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
     Figure {
@@ -68,5 +69,6 @@ pub(crate) const ALL: [Figure; 22] = [
     Figure { id: "fig18", number: 18, title: "Velocity estimators against the Cramer-Rao bound", make: fig18::make },
     Figure { id: "fig19", number: 19, title: "Detection of wakes", make: fig19::make },
     Figure { id: "fig20", number: 20, title: "Map, model and residual of one scan", make: fig20::make },
+    Figure { id: "fig21", number: 21, title: "One wake across, round and along the flight", make: fig21::make },
     Figure { id: "ca_pa", number: 25, title: "CA against PA: where the claim holds", make: ca_pa::make },
 ];

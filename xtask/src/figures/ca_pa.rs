@@ -57,7 +57,7 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 
 fn cases(context: &Context) -> Vec<Case> {
     let levels_db = context.choose(
-        vec![-5.0, 0.0, 10.0, 20.0],
+        vec![0.0, 10.0, 20.0],
         vec![-5.0, 0.0, 5.0, 10.0, 20.0, 30.0],
         vec![-10.0, -5.0, 0.0, 5.0, 10.0, 15.0, 20.0, 30.0],
     );

@@ -125,6 +125,10 @@ struct CheckWords {
     /// Relative error, such as 3% or 0.03: name the cheapest settings that were measured to reach it, and what they cost.
     #[arg(long, value_name = "ERROR", value_parser = accuracy::share)]
     accuracy: Option<f64>,
+    /// Draw the set-up, from above and from behind, to this file, such as set-up.svg or set-up.png.
+    #[cfg(feature = "plots")]
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
 }
 
 /// Runs the program with the words of the command line; returns its exit code.
@@ -181,6 +185,10 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     // What is in the way of a run is in the way of it here, too.
     let out = words.out.as_deref().map(|folder| (folder, Existing::Own));
     let plan = planned(&words.scene, Target::Run, out, words.allow_large, cli)?;
+    #[cfg(feature = "plots")]
+    if let Some(path) = &words.picture {
+        write::write_set_up(&plan, path)?;
+    }
     if cli.quiet && !cli.json {
         return Ok(());
     }

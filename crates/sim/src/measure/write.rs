@@ -132,6 +132,27 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing)
     put(files(plan, result, folder)?, folder, existing)
 }
 
+/// Writes a picture of the set-up: lidar, lines of sight, ground, vortices. The ending of the path says whether SVG or PNG.
+///
+/// # Errors
+/// [`Error::Input`] for another ending; a file in the way that this program did not write, or what the system says.
+#[cfg(feature = "plots")]
+pub fn write_set_up(plan: &Plan, path: &Path) -> Result<(), Error> {
+    let (figure, origin) = (pictures::scan(plan), provenance(plan));
+    let bytes = match path.extension().and_then(|ending| ending.to_str()) {
+        Some("svg") => figure.svg(&origin)?.into_bytes(),
+        Some("png") => figure.png(&origin)?,
+        _ => {
+            let reason = "a picture ends in .svg or .png, such as set-up.svg".into();
+            return Err(Error::Input { path: path.to_owned(), reason });
+        }
+    };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    refuse_foreign(folder, [name.as_ref()], Existing::Own)?;
+    Ok(crate::io::write_atomic(path, bytes)?)
+}
+
 /// The files of a run, still in memory.
 pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<FileGroup, Error> {
     let outputs = &plan.scene.scene.outputs;

@@ -168,6 +168,21 @@ fn an_initial_scene_is_good_and_its_plan_says_what_is_left_out() {
     }
 }
 
+#[cfg(feature = "plots")]
+#[test]
+fn check_draws_the_set_up() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
+    let draw = |file: &str| wakescope(temp.path(), &["check", "s.toml", "--picture", file]);
+    assert!(draw("set-up.svg").status.success() && draw("set-up.svg").status.success(), "its own picture is replaced");
+    let text = std::fs::read_to_string(temp.path().join("set-up.svg")).unwrap();
+    assert!(["lidar", "vortices", "ground"].iter().all(|word| text.contains(word)));
+    assert!(String::from_utf8(draw("set-up.jpg").stderr).unwrap().contains(".svg or .png"));
+    std::fs::write(temp.path().join("mine.svg"), "mine").unwrap();
+    assert_eq!(draw("mine.svg").status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(temp.path().join("mine.svg")).unwrap(), "mine");
+}
+
 #[test]
 fn each_stage_can_be_asked_for_alone() {
     let temp = tempfile::tempdir().unwrap();

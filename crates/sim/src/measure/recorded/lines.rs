@@ -111,7 +111,11 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
     let mut first = 0;
     let mut direction = 0.0;
     while first < count {
-        let same = elevation_rad[first..].iter().take_while(|angle| **angle == elevation_rad[first]).count();
+        let is_same = |record: &usize| {
+            elevation_rad[*record] == elevation_rad[first]
+                && (*record == first || time_s[*record] > time_s[*record - 1])
+        };
+        let same = (first..count).take_while(is_same).count();
         let last = found.last().and_then(|scan| scan.elevation_rad.last());
         let step = last.map_or(0.0, |last| (elevation_rad[first] - last).signum());
         // A line that goes back begins another scan.
@@ -132,16 +136,22 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
     let ends: Vec<usize> = found.iter().skip(1).map(|scan| scan.first_record[0]).chain([count]).collect();
     found.iter_mut().zip(ends).for_each(|(scan, end)| scan.first_record.push(end));
     let times: Vec<f64> = found.iter().flat_map(|scan| scan.time_s.iter().copied()).collect();
-    if let Some(pair) = times.windows(2).find(|pair| pair[1] <= pair[0]) {
-        // Repetitions of a simulated scan have the same times.
-        let whole_s = times[..found[0].time_s.len()].last().copied().unwrap_or(0.0) - times[0] + prt_s;
-        if found.iter().any(|scan| scan.time_s != found[0].time_s) {
-            return Err(
-                records.refuse(format!("the times of its lines do not increase: {} s, then {} s", pair[0], pair[1]))
-            );
+    if let Some(last) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
+        // Realisations of a simulated scan, of one sweep or several, have the same times.
+        let lines = last + 1;
+        let mut begins = found.iter().scan(0, |begin, scan| {
+            *begin += scan.time_s.len();
+            Some(*begin)
+        });
+        if !begins.any(|begin| begin == lines)
+            || times.iter().enumerate().any(|(line, time_s)| *time_s != times[line % lines])
+        {
+            let reason = format!("the times of its lines do not increase: {} s, then {} s", times[last], times[lines]);
+            return Err(records.refuse(reason));
         }
-        for (i, scan) in found.iter_mut().enumerate() {
-            scan.time_s.iter_mut().for_each(|time_s| *time_s += i as f64 * whole_s);
+        let whole_s = times[last] - times[0] + prt_s;
+        for (line, time_s) in found.iter_mut().flat_map(|scan| &mut scan.time_s).enumerate() {
+            *time_s += (line / lines) as f64 * whole_s;
         }
     }
     Ok(found)

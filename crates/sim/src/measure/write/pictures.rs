@@ -196,13 +196,20 @@ fn azimuth_display(plan: &Plan, map: &VelocityMap, winds: &[BeamWind]) -> Figure
 }
 
 /// Lines of sight that a plan of the scan draws.
-const DRAWN_LINES: usize = 60;
+const DRAWN_LINES: usize = 24;
 
-/// Plan of the scan, from above and from behind: each line from the first gate to the last, and where the vortices are.
+/// The set-up, from above and from behind: the lidar, each line from the first gate to the last, the ground and the vortices.
 pub(super) fn scan(plan: &Plan) -> Figure {
     let (g, start_m) = (&plan.geometry, plan.geometry.schedule.mount.position_m);
     let ends = [g.gate_range_m.first(), g.gate_range_m.last()].map(|r| r.copied().unwrap_or(0.0));
     let lines = g.schedule.lines.len();
+    // Along the flight, vortices and ground are drawn a little beyond the lidar and the farthest gates.
+    let spread_m = |axis: usize, least_m: f64| {
+        let drawn = (0..lines).map(|line| g.schedule.middle(line).at_range_m(ends[1])[axis]);
+        let with = |[low, high]: [f64; 2], at_m: f64| [low.min(at_m), high.max(at_m)];
+        drawn.fold([start_m[axis] - least_m, start_m[axis] + least_m], with)
+    };
+    let (x_m, y_m) = (spread_m(0, 0.2 * ends[1]), spread_m(1, 0.0));
     let panel = |title: &str, label: &str, up: usize| {
         let mut plot = CurvePlot::new(title, Axis::linear("across the flight [m]"), Axis::linear(label));
         plot.equal_scales = true;
@@ -211,13 +218,16 @@ pub(super) fn scan(plan: &Plan) -> Figure {
             let points = ends.map(|range_m| beam.at_range_m(range_m)).map(|p| (p[1], p[up]));
             plot = plot.with(Series::new("", Style::Line, points).in_colour(0));
         }
-        let vortices = centres_m(plan).into_iter();
-        let marks: Vec<(f64, f64)> = match up {
-            2 => vortices.collect(),
-            _ => vortices.flat_map(|(y_m, _)| ends.map(|x_m| (y_m, start_m[0] + x_m - ends[0]))).collect(),
-        };
-        if !marks.is_empty() {
-            plot = plot.with(Series::new("vortices", Style::Markers, marks).in_colour(1));
+        let vortices = centres_m(plan);
+        for (number, (centre_m, height_m)) in vortices.into_iter().enumerate() {
+            let label = if number == 0 { "vortices" } else { "" };
+            plot = plot.with(match up {
+                2 => Series::new(label, Style::Markers, [(centre_m, height_m)]).in_colour(1),
+                _ => Series::new(label, Style::Dash, x_m.map(|x_m| (centre_m, x_m))).in_colour(1),
+            });
+        }
+        if up == 2 {
+            plot = plot.with(Series::new("ground", Style::Line, y_m.map(|y_m| (y_m, 0.0))).in_colour(3));
         }
         plot.with(Series::new("lidar", Style::Markers, [(start_m[1], start_m[up])]).in_colour(2))
     };

@@ -1,0 +1,330 @@
+//! Figure 21: one wake seen across, round and along the flight path at the same energy, and what each scan says of its circulation.
+
+use super::context::{Context, Rendered};
+use crate::Failure;
+use crate::claim::{Claim, with_error};
+use ndarray::Array2;
+use rayon::prelude::*;
+use wakescope_les::{VortexPair, Wind};
+use wakescope_signal::RangeFilter;
+use wakescope_sim::Silent;
+use wakescope_sim::io::Table;
+use wakescope_sim::measure::estimators::weighting;
+use wakescope_sim::measure::map::VelocityEstimates;
+use wakescope_sim::measure::wind::vortex_pair;
+use wakescope_sim::measure::write::{provenance, velocity_map};
+use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, MapPlot, Panel, Series, Style};
+use wakescope_sim::retrieve::{Method, RetrievalRow};
+use wakescope_sim::scene::{Axial, Flow, Pattern, Ppi, Retrieval, Scene, SnrReference};
+
+/// Circulation of the pair \[m^2/s\].
+const TRUE_M2_S: f64 = 500.0;
+/// Lines of sight of each scan.
+const LINES: usize = 72;
+/// What is fitted: circulation, lateral position and height of the middle, distance of the vortices, in steps of derivatives.
+const STEPS: [f64; 4] = [1.0, 0.05, 0.05, 0.05];
+/// Most steps of a fit.
+const ROUNDS: usize = 30;
+
+/// Values of what is fitted.
+type Parameters = [f64; 4];
+
+/// One scan: its velocities, and the circulation \[m^2/s\] that each method finds.
+struct Scan {
+    plan: Plan,
+    map: VelocityEstimates,
+    /// `means`: by means of gates; `fit`: by what the estimator shows, as `[retrieval]` fits scans across the flight.
+    found_m2_s: Vec<(&'static str, Option<f64>)>,
+}
+
+/// One way to look at the wake.
+struct View {
+    name: &'static str,
+    scans: Vec<Scan>,
+}
+
+/// Circulations of all scans by one method.
+struct Fits<'a> {
+    view: &'a View,
+    method: &'static str,
+    known_m2_s: Vec<f64>,
+}
+
+/// The scenes: each with as many pulses through the same air, 280 to 520 m away.
+fn scenes() -> [(&'static str, Scene); 3] {
+    let mut across = Scene::default();
+    across.detector.snr = SnrReference::Fixed { snr_db: 5.0 };
+    across.scan.realisations = 1;
+    across.estimator.gate_step_samples = 16;
+    let (mut round, mut along) = (across.clone(), across.clone());
+    across.scan.elevation_min_rad = 0.03;
+    across.scan.elevation_step_rad = 2.5e-3;
+    across.scan.elevation_max_rad = 0.03 + 2.5e-3 * (LINES - 1) as f64;
+    across.retrieval = Some(Retrieval { methods: vec![Method::Fit], ..Retrieval::default() });
+    let quarter_rad = std::f64::consts::FRAC_PI_2;
+    round.scan.pattern = Pattern::Ppi(Ppi {
+        elevations_rad: vec![0.09, 0.117, 0.145],
+        azimuth_min_rad: quarter_rad - 0.23,
+        azimuth_max_rad: quarter_rad + 0.23,
+        azimuth_step_rad: 0.02,
+    });
+    along.scan.pattern = Pattern::Axial(Axial {
+        azimuth_min_rad: -0.11,
+        azimuth_max_rad: 0.11,
+        azimuth_step_rad: 0.02,
+        ..Axial::default()
+    });
+    along.scan.lidar.y_m = 400.0;
+    (along.scan.elevation_min_rad, along.scan.elevation_max_rad, along.scan.elevation_step_rad) = (0.04, 0.19, 0.03);
+    [("rhi", across), ("ppi", round), ("axial", along)]
+}
+
+pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
+    let scans = context.choose(3, 40, 100);
+    let views = scenes().into_iter().map(|(name, scene)| view(context, name, &scene, scans));
+    let views = views.collect::<Result<Vec<View>, Failure>>()?;
+    let mut out = Rendered::new(&table(&views), &picture(&views)?, &provenance(&views[0].scans[0].plan))?;
+    out.marks = vec!["analytic pair".into()];
+    out.caption = format!(
+        "ANALYTIC PAIR, not a simulated flow: the same wake, {LINES} lines of 16 pulses at 5 dB in each scan; velocities of one of {scans} scans, \
+         and the circulations of all. Along the flight a tenth of the motion is along the beams, but gates hold hardly any gradient: a plain fit \
+         of means tells the circulation. Across and round it, peaks of spectra are no means, and such a fit finds too little; the fit to what \
+         the estimator shows exists for the plane across the flight."
+    );
+    out.claims = claims(&views);
+    Ok(out)
+}
+
+fn view(context: &Context, name: &'static str, scene: &Scene, scans: u64) -> Result<View, Failure> {
+    let one = |scan: u64| -> Result<Scan, Failure> {
+        let mut file = context.scene_file(scene.clone())?;
+        file.scene.seed += scan;
+        let plan = Plan::new(file, if scene.retrieval.is_some() { Target::Run } else { Target::Map })?;
+        let result = wakescope_sim::run(&plan, &Silent)?;
+        let map = result.map.ok_or_else(|| Failure::new("a run without a map".into()))?;
+        let mut found_m2_s = vec![("means", fit(&plan, &map.v_scan_m_s)?)];
+        found_m2_s.extend(result.retrieval.map(|retrieval| ("fit", retrieved(&retrieval.rows))));
+        Ok(Scan { plan, map, found_m2_s })
+    };
+    let all: Result<Vec<Scan>, String> =
+        (0..scans).into_par_iter().map(|scan| one(scan).map_err(|e| e.to_string())).collect();
+    Ok(View { name, scans: all.map_err(Failure::new)? })
+}
+
+/// The mean of both circulations that the scene's own retrieval finds, m^2/s.
+fn retrieved(rows: &[RetrievalRow]) -> Option<f64> {
+    let found: Option<Vec<f64>> = rows.iter().map(|row| Some(row.found?.circulation_m2_s.value)).collect();
+    found.filter(|found| found.len() == 2).map(|found| 0.5 * (found[0] + found[1]))
+}
+
+/// The circulation of which means of gates fit a scan best, m^2/s; nothing where the fit leaves what it can know.
+fn fit(plan: &Plan, seen_m_s: &Array2<f64>) -> Result<Option<f64>, Failure> {
+    let Flow::VortexPair(pair) = plan.scene.scene.flow else { return Ok(None) };
+    let truth = vortex_pair(&pair);
+    // Not from the truth itself.
+    let mut at: Parameters =
+        [0.8 * TRUE_M2_S, truth.lateral_position_m + 3.0, truth.height_m - 3.0, truth.spacing_m + 2.0];
+    let squares = |model: &[f64]| -> f64 {
+        seen_m_s.iter().zip(model).filter(|(seen, _)| seen.is_finite()).map(|(seen, v)| (seen - v).powi(2)).sum()
+    };
+    let mut model = model_m_s(plan, &truth, &at)?;
+    let mut damping = 1e-3;
+    for _ in 0..ROUNDS {
+        let mut columns = Vec::new();
+        // Velocities are in proportion to the circulation.
+        columns.push(model.iter().map(|v| v / at[0]).collect::<Vec<f64>>());
+        for (which, step) in STEPS.into_iter().enumerate().skip(1) {
+            let mut beside = at;
+            beside[which] += step;
+            let moved = model_m_s(plan, &truth, &beside)?;
+            columns.push(moved.iter().zip(&model).map(|(a, b)| (a - b) / step).collect::<Vec<f64>>());
+        }
+        let residuals: Vec<f64> = seen_m_s.iter().zip(&model).map(|(seen, v)| seen - v).collect();
+        let known =
+            |of: &dyn Fn(usize) -> f64| (0..residuals.len()).filter(|i| residuals[*i].is_finite()).map(of).sum();
+        let mut matrix: [[f64; 5]; 4] = [[0.0; 5]; 4];
+        for row in 0..4 {
+            for column in 0..4 {
+                matrix[row][column] = known(&|i| columns[row][i] * columns[column][i]);
+            }
+            matrix[row][row] *= 1.0 + damping;
+            matrix[row][4] = known(&|i| columns[row][i] * residuals[i]);
+        }
+        let step = solved(matrix);
+        if step.iter().zip(STEPS).all(|(change, unit)| change.abs() < 0.2 * unit) {
+            return Ok(Some(at[0]));
+        }
+        let next: Parameters = std::array::from_fn(|i| at[i] + step[i]);
+        let inside = (50.0..2000.0).contains(&next[0]) && (10.0..100.0).contains(&next[3]) && next[2] > 5.0;
+        let moved = if inside { model_m_s(plan, &truth, &next)? } else { Vec::new() };
+        if !inside || squares(&moved) > squares(&model) {
+            damping *= 10.0;
+            continue;
+        }
+        (at, model, damping) = (next, moved, 0.1 * damping);
+    }
+    Ok(None)
+}
+
+/// Velocities that pulse and window make of a pair, one line after the other, m/s.
+fn model_m_s(plan: &Plan, pair: &VortexPair, parameters: &Parameters) -> Result<Vec<f64>, Failure> {
+    let [circulation_m2_s, lateral_position_m, height_m, pair_spacing_m] = *parameters;
+    let wind =
+        VortexPair { circulation_m2_s, lateral_position_m, height_m, spacing_m: pair_spacing_m, ..*pair }.wind()?;
+    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let window = weighting(scene).weights(scene.estimator.window_samples)?;
+    // Every fourth layer is enough for means over gates of some 40 m.
+    let spacing_m = 4.0 * g.layer_thickness_m;
+    let filter = RangeFilter::gate(&plan.instrument.pulse, &window, scene.detector.sampling_hz, spacing_m)?;
+    let ranges_m: Vec<f64> = g.layer_range_m().step_by(4).collect();
+    let mut gates_m_s = vec![0.0; g.gate_range_m.len()];
+    let mut velocity_m_s = vec![[0.0; 3]; ranges_m.len()];
+    let mut out = Vec::with_capacity(g.schedule.lines.len() * gates_m_s.len());
+    for line in 0..g.schedule.lines.len() {
+        let beam = g.schedule.middle(line);
+        let points: Vec<[f64; 3]> = ranges_m.iter().map(|range_m| beam.at_range_m(*range_m)).collect();
+        wind.velocity_into(&points, 0.0, &mut velocity_m_s)?;
+        let along: Vec<f64> =
+            velocity_m_s.iter().map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s)).collect();
+        filter.apply_into(g.first_layer_range_m, &along, &g.gate_range_m, &mut gates_m_s)?;
+        out.extend(&gates_m_s);
+    }
+    Ok(out)
+}
+
+/// The solution of four equations by elimination; their matrix is positive.
+fn solved(mut m: [[f64; 5]; 4]) -> Parameters {
+    for pivot in 0..4 {
+        for row in 0..4 {
+            let share = if row == pivot { 0.0 } else { m[row][pivot] / m[pivot][pivot] };
+            for column in pivot..5 {
+                m[row][column] -= share * m[pivot][column];
+            }
+        }
+    }
+    std::array::from_fn(|i| m[i][4] / m[i][i])
+}
+
+impl Fits<'_> {
+    /// Mean and standard deviation over the scans, m^2/s.
+    fn mean_and_std_m2_s(&self) -> (f64, f64) {
+        let n = self.known_m2_s.len() as f64;
+        let mean = self.known_m2_s.iter().sum::<f64>() / n;
+        (mean, (self.known_m2_s.iter().map(|found| (found - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
+    }
+
+    fn failures(&self) -> usize {
+        self.view.scans.len() - self.known_m2_s.len()
+    }
+}
+
+impl View {
+    fn energy_j(&self) -> f64 {
+        let plan = &self.scans[0].plan;
+        plan.geometry.schedule.pulses() as f64 * plan.scene.scene.pulse_energy_j()
+    }
+
+    /// By method.
+    fn fits(&self) -> Vec<Fits<'_>> {
+        let of = |(place, (method, _)): (usize, &(&'static str, Option<f64>))| {
+            let known_m2_s = self.scans.iter().filter_map(|scan| scan.found_m2_s[place].1).collect();
+            Fits { view: self, method, known_m2_s }
+        };
+        self.scans[0].found_m2_s.iter().enumerate().map(of).collect()
+    }
+}
+
+fn table(views: &[View]) -> Table {
+    let rows: Vec<Fits<'_>> = views.iter().flat_map(View::fits).collect();
+    let column = |of: &dyn Fn(&Fits<'_>) -> f64| rows.iter().map(of).collect::<Vec<_>>();
+    Table::new()
+        .text("scan", rows.iter().map(|row| row.view.name))
+        .float("energy_j", column(&|row| row.view.energy_j()))
+        .float("duration_s", column(&|row| row.view.scans[0].plan.geometry.schedule.duration_s()))
+        .text("method", rows.iter().map(|row| row.method))
+        .float("gamma_true_m2_s", column(&|_| TRUE_M2_S))
+        .float("gamma_m2_s", column(&|row| row.mean_and_std_m2_s().0))
+        .float("gamma_std_m2_s", column(&|row| row.mean_and_std_m2_s().1))
+        .int("failures", rows.iter().map(|row| row.failures() as i64))
+        .int("scans", rows.iter().map(|row| row.view.scans.len() as i64))
+}
+
+fn picture(views: &[View]) -> Result<Figure, Failure> {
+    let mut panels: Vec<Panel> = Vec::new();
+    for view in views {
+        let map = velocity_map(&view.scans[0].plan, &view.scans[0].map);
+        // The row through the vortices.
+        let plot = match view.name {
+            "rhi" => MapPlot::new(&map, 0, "v_scan")?,
+            _ => MapPlot::from_above(&map, map.sweeps.len() / 2, "v_scan")?,
+        };
+        panels.push(plot.titled(&format!("{}, one scan", view.name)).labelled("m/s").into());
+    }
+    let axis = Axis::linear("scan and method");
+    let mut plot = CurvePlot::new("Circulation of each scan", axis, Axis::linear("circulation [m²/s]"));
+    for (place, fits) in views.iter().flat_map(View::fits).enumerate() {
+        let points = fits.known_m2_s.iter().map(|found| (1.0 + place as f64, *found));
+        let label = format!("{} {}, {}", place + 1, fits.view.name, fits.method);
+        plot = plot.with(Series::new(&label, Style::Markers, points).in_colour(place));
+    }
+    plot = plot.with(Series::new("truth", Style::Dash, [(0.5, TRUE_M2_S), (4.5, TRUE_M2_S)]).in_colour(4));
+    panels.push(plot.into());
+    let mut figure = Figure::stacked(panels);
+    (figure.columns, figure.width) = (2, 1200.0);
+    Ok(figure)
+}
+
+fn claims(views: &[View]) -> Vec<Claim> {
+    let energies: Vec<String> = views.iter().map(|view| format!("{:.4}", view.energy_j())).collect();
+    let of = |name: &str, method: &str| {
+        views.iter().flat_map(View::fits).find(|fits| fits.view.name == name && fits.method == method).map(|fits| {
+            let (mean, std) = fits.mean_and_std_m2_s();
+            (mean, std / (fits.known_m2_s.len() as f64).sqrt(), fits.failures())
+        })
+    };
+    let mut out = vec![Claim::exact(
+        "F21a",
+        "fig21",
+        "all scans send the same energy, J",
+        "equal",
+        energies.join(", "),
+        energies.iter().all(|energy| *energy == energies[0]),
+    )];
+    let told = [
+        ("F21b", "rhi", "fit", "across the flight, the fit to what the estimator shows tells the circulation"),
+        (
+            "F21c",
+            "axial",
+            "means",
+            "along the flight, gates hold hardly any gradient, and their means tell the circulation",
+        ),
+    ];
+    for (id, name, method, statement) in told {
+        out.extend(of(name, method).map(|(mean, error, failures)| Claim {
+            standard_error: error,
+            ..Claim::exact(
+                id,
+                "fig21",
+                statement,
+                "mean within 10 % of 500 m^2/s, no fit fails",
+                with_error(mean, error),
+                (mean / TRUE_M2_S - 1.0).abs() < 0.1 && failures == 0,
+            )
+        }));
+    }
+    for (id, name) in [("F21d", "rhi"), ("F21e", "ppi")] {
+        out.extend(of(name, "means").map(|(mean, error, _)| Claim {
+            standard_error: error,
+            ..Claim::exact(
+                id,
+                "fig21",
+                &format!("{name}: fits of gate means find too little, for peaks of spectra keep away from the fast air of a core"),
+                "mean at least 15 % below 500 m^2/s",
+                with_error(mean, error),
+                mean < 0.85 * TRUE_M2_S,
+            )
+        }));
+    }
+    out
+}
