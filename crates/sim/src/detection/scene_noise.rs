@@ -22,8 +22,9 @@ const LINES: f64 = 96.0;
 const LINES_OF_ALL: f64 = 1536.0;
 /// Their seed differs from the scene's in one bit: a run of the scene itself does not share their noise.
 const SEED_BIT: u64 = 1 << 62;
-/// Velocities that are less correlated are taken as independent.
-const INDEPENDENT: f64 = 0.05;
+/// Velocities that are less correlated are taken as independent; the second where the first leaves less than so many of a scan.
+const INDEPENDENT: [f64; 2] = [0.05, 0.1];
+const NEEDED: usize = 60;
 /// Median of the absolute value of a normal number.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 /// What is so many deviations off is an outlier.
@@ -73,11 +74,11 @@ impl SceneNoise {
                 estimates::<Complex<f64>>(&[&still], &scanner, observer, |_| (), |_, map| maps.push(map.clone()))?;
             }
         }
-        Ok(Self::of_maps(still.geometry.gate_range_m.clone(), &maps))
+        Ok(Self::of_maps(still.geometry.gate_range_m.clone(), &maps, plan.geometry.elevation_rad.len()))
     }
 
-    /// From maps of still air.
-    fn of_maps(range_m: Vec<f64>, maps: &[Array2<f64>]) -> Self {
+    /// From maps of still air, for scans of so many lines.
+    fn of_maps(range_m: Vec<f64>, maps: &[Array2<f64>], scan_lines: usize) -> Self {
         let (lines, gates) = maps.first().map_or((1, 1), Array2::dim);
         let white = whitened(maps, &deviations(maps, 0));
         let correlation = |lines: usize, gates: usize| {
@@ -88,10 +89,14 @@ impl SceneNoise {
             mean(products)
         };
         let power = correlation(0, 0);
-        let apart = |most: usize, of: &dyn Fn(usize) -> f64| {
-            (1..most.max(1)).find(|&k| of(k) < INDEPENDENT * power).unwrap_or(most.max(1))
+        let apart = |most: usize, limit: f64, of: &dyn Fn(usize) -> f64| {
+            (1..most.max(1)).find(|&k| of(k) < limit * power).unwrap_or(most.max(1))
         };
-        let stride = (apart(lines / 2, &|k| correlation(k, 0)), apart(gates / 2, &|k| correlation(0, k)));
+        let strides = INDEPENDENT.map(|limit| {
+            (apart(lines / 2, limit, &|k| correlation(k, 0)), apart(gates / 2, limit, &|k| correlation(0, k)))
+        });
+        let leaves = |stride: (usize, usize)| scan_lines.div_ceil(stride.0) * gates.div_ceil(stride.1);
+        let stride = if leaves(strides[0]) < NEEDED { strides[1] } else { strides[0] };
         // on both sides of each; NaN where there is no velocity so far away
         let left = |correlation: f64| 1.0 + 2.0 * (correlation / power).max(0.0);
         let excess = left(correlation(stride.0, 0)) * left(correlation(0, stride.1));
@@ -191,7 +196,7 @@ mod tests {
             map
         };
         let maps: Vec<Array2<f64>> = (0..40).map(|_| map()).collect();
-        let noise = SceneNoise::of_maps((0..cells).map(|gate| gate as f64).collect(), &maps);
+        let noise = SceneNoise::of_maps((0..cells).map(|gate| gate as f64).collect(), &maps, cells);
         assert_eq!(noise.stride, (6, 6));
         let mut squares = Vec::new();
         for map in &maps {
