@@ -46,7 +46,7 @@ fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
     variables.extend(sweeps(map));
     variables.extend(texts(map));
     variables.extend(instrument(map));
-    variables.extend(fields(map)?);
+    variables.extend(fields(map, &provenance.scene_toml)?);
     Ok(Layout {
         dims: vec![
             ("time", map.rays.len()),
@@ -250,8 +250,13 @@ fn instrument(map: &VelocityMap) -> Vec<Variable> {
     ]
 }
 
-fn fields(map: &VelocityMap) -> OutputResult<Vec<Variable>> {
-    let mut out: Vec<Variable> = map.fields.iter().map(field_variable).collect();
+/// The estimates keep the scene too: xradar writes no global attributes but its own, and what a map means for a wake is in the scene.
+fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
+    let variable = |field: &Field| {
+        let out = field_variable(field);
+        if field.name == "radial_velocity" { out.text("scene", scene_toml) } else { out }
+    };
+    let mut out: Vec<Variable> = map.fields.iter().map(variable).collect();
     if map.field("radial_velocity").is_none() {
         let source = ["v_gate", "v_pulse", "v_exact"].iter().find_map(|name| map.field(name));
         let source = source.ok_or_else(|| OutputError::Missing {

@@ -184,6 +184,26 @@ fn maps_that_other_programs_wrote_again_give_the_same_circulations() {
     }
 }
 
+/// The velocities of a map of `SCENE` on coarser axes, and what xradar 0.12.0 made of them: it drops the global attribute with the scene.
+#[test]
+fn a_map_that_lost_its_global_scene_is_retrieved_as_the_original() {
+    let temp = tempfile::tempdir().unwrap();
+    let of = |name: &str| retrieved(temp.path(), &reference(&format!("sim/{name}")).display().to_string());
+    let (own, other) = (of("map_own_scene.nc"), of("map_xradar_scene.nc"));
+    for column in ["gamma_m2_s", "gamma_std_m2_s", "gamma_5_15_m2_s", "y_m", "z_m", "core_m", "chi2_per_dof"] {
+        for row in 0..2 {
+            let (a, b) = (number(&other, row, column), number(&own, row, column));
+            assert!(a == b || a.is_nan() && b.is_nan(), "{column}: {a}, {b}");
+        }
+    }
+    let bare = retrieved(temp.path(), &format!("{} --gate-std 14.4", reference("sim/map_xradar_scene.nc").display()));
+    assert_ne!(
+        number(&bare, 0, "gamma_m2_s"),
+        number(&own, 0, "gamma_m2_s"),
+        "the estimator of the scene has no part in it"
+    );
+}
+
 #[cfg(feature = "netcdf4")]
 const OTHERS: [&str; 4] = ["map_pyart.nc", "map_xradar.nc", "map_xradar_cfradial2.nc", "map_windcube_groups.nc"];
 #[cfg(not(feature = "netcdf4"))]
