@@ -12,6 +12,7 @@ use super::layout::Shape;
 use super::momentum::Momentum;
 use super::operators_1d::Taps;
 use super::rows::add_across;
+use super::shape::Starts;
 use super::slabs::Slabs;
 use crate::Error;
 
@@ -175,7 +176,7 @@ fn add_taps(row: &mut [f64], other: &[f64], taps: &[(usize, f64)], first: usize)
                 row[i] += (a.1 * x[i] + b.1 * y[i]) + c.1 * z[i];
             }
         } else {
-            add_across(row, other, 1.0, taps, |i| (i - first) * n);
+            add_across(row, other, 1.0, taps, Starts::every(n, first));
         }
     }
 }

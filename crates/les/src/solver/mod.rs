@@ -42,6 +42,7 @@ pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
 pub use report::{StartReport, StepReport};
 pub use run::{
     CheckpointPlan, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent, StepRecord,
+    Stepping,
 };
 pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};
 pub use subgrid::SubgridModel;
