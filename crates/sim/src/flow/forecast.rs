@@ -313,7 +313,7 @@ const RECORD_BYTES: f64 = 2500.0;
 
 /// Planes of a halo.
 const HALO_PLANES: usize = 4;
-/// Arrays of the whole flow on the first rank: state and terms of the last step.
+/// Arrays of the whole flow on the first rank: what outputs gather, and what they make of it.
 const GATHERED_ARRAYS: f64 = 12.0;
 
 // Unit costs on one core: a cell of one stage of a step and what the passes of multigrid add to it, in the plane and in space;
