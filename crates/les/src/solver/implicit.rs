@@ -12,8 +12,8 @@ use super::layout::Shape;
 use super::momentum::Momentum;
 use super::operators_1d::Taps;
 use super::rows::add_across;
-use super::shape::Starts;
 use super::slabs::Slabs;
+use super::starts::Starts;
 use crate::Error;
 
 /// Factors of `1 - a L` along one axis for one component.

@@ -31,6 +31,7 @@ mod slabs;
 #[cfg(test)]
 mod slabs_tests;
 mod stage;
+mod starts;
 mod subgrid;
 mod transport;
 

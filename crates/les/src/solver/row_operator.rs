@@ -3,7 +3,7 @@
 use super::layout::{Layout, Shape};
 use super::operators_1d::Taps;
 use super::rows::{Columns, add_across, pad};
-use super::shape::Starts;
+use super::starts::Starts;
 
 /// A linear operator along one axis.
 #[derive(Debug, Clone)]

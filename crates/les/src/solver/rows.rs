@@ -2,7 +2,7 @@
 //! products and sums are kept apart, so that each version gives the same bits.
 
 use super::operators_1d::Taps;
-use super::shape::Starts;
+use super::starts::Starts;
 use super::transport::{MEAN, Stencil};
 
 /// Some rows of an array, cut to `n` values. Closures given to `map` or `from_fn` stay calls in functions that are compiled for

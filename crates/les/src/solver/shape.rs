@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 use super::rows::HALO;
+use super::starts::Starts;
 
 /// Number of values along the three memory axes, and the slab of them that is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,31 +93,6 @@ impl Shape {
     pub(crate) fn row(self, j: usize, k: usize) -> Range<usize> {
         let start = self.place([0, j, k]);
         start..start + self.n[0]
-    }
-}
-
-/// Where the rows of some index begin in an array.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Starts {
-    first: usize,
-    step: usize,
-    /// Index below which rows lie `round` further.
-    lowest: usize,
-    round: usize,
-}
-
-impl Starts {
-    /// Rows of `step` values, of which that of index `lowest` is the first.
-    #[inline(always)]
-    pub(crate) fn every(step: usize, lowest: usize) -> Self {
-        Self { first: 0_usize.wrapping_sub(lowest * step), step, lowest: 0, round: 0 }
-    }
-
-    /// That of index `i`.
-    #[inline(always)]
-    pub(crate) fn of(self, i: usize) -> usize {
-        let start = self.first.wrapping_add(i * self.step);
-        if i < self.lowest { start.wrapping_add(self.round) } else { start }
     }
 }
 
