@@ -16,6 +16,7 @@ mod fuzz_scenes;
 mod process;
 mod profile;
 mod ranks;
+mod ranks_model;
 mod references;
 mod regress;
 mod reproduce;

@@ -1,9 +1,10 @@
-//! `cargo xtask ranks`: a wake under `mpirun` on 2 and 4 processes against one process, byte for byte, and a run whose
-//! second process is killed.
+//! `cargo xtask ranks`: a wake under `mpirun` on 2 and 4 processes against one process, byte for byte, a run whose
+//! second process is killed, and how fast two processes are.
 //!
 //! Needs an MPI library with its compiler `mpicc`, and libclang, for the build; on Debian as root it installs them.
 
 use crate::process::watch;
+use crate::ranks_model;
 use crate::workspace::root;
 use crate::{Failure, Outcome};
 use std::collections::BTreeMap;
@@ -26,6 +27,7 @@ const IS_THERE: &str = "command -v mpicc && command -v mpirun && { ldconfig -p |
 /// # Errors
 /// A build that fails, files that differ, a run that hangs or ends well although a process was killed.
 pub(crate) fn run() -> Outcome {
+    println!("weak scaling by a model, not measured:\n{}", ranks_model::table());
     let succeeds = |command: &str| {
         let status = Command::new("sh").args(["-c", command]).stdout(Stdio::null()).stderr(Stdio::null()).status();
         status.is_ok_and(|status| status.success())
@@ -56,7 +58,37 @@ pub(crate) fn run() -> Outcome {
     std::fs::write(scratch.join("short.toml"), case(&format!("pause_after_steps = {STEPS}\n")))?;
     std::fs::write(scratch.join("long.toml"), case(""))?;
     compare(&program, &scratch)?;
-    kill_one(&program, &scratch)
+    kill_one(&program, &scratch)?;
+    measure(&program, &scratch)
+}
+
+/// Prints how much less time steps take on two ranks of one thread than on one, and what they spend in turns and halos. A
+/// measurement, which depends on what else the machine does: nothing is decided by it.
+fn measure(program: &Path, scratch: &Path) -> Outcome {
+    let case = "format = 1\n[case]\nkind = \"taylor_green\"\ncells = 128\n[time]\nscheme = \"runge_kutta3\"\n\
+                pause_after_steps = 4\n[solver]\nsubgrid = { model = \"multiscale_wale\" }\n[checkpoint]\nwrite = false\n";
+    std::fs::write(scratch.join("even.toml"), case)?;
+    let mut found = Vec::new();
+    for (count, out) in [(1, "even_one"), (2, "even_two")] {
+        let words = ["flow", "even.toml", "--quiet", "--json", "--threads", "1", "--out", out];
+        let output = mpirun(count).arg(program).args(words).current_dir(scratch).output()?;
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let number = |key: &str| {
+            let (_, rest) = text.split_once(&format!("\"{key}\":"))?;
+            rest.split([',', '}']).next()?.trim().parse::<f64>().ok()
+        };
+        let both = number("steps_wall_s").zip(number("exchange_wall_s"));
+        found.push(both.ok_or_else(|| Failure::new(String::from_utf8_lossy(&output.stderr).into_owned()))?);
+    }
+    if let [(one_s, _), (two_s, exchange_s)] = found[..] {
+        println!(
+            "measured, 128^3 with the multiscale model: two ranks of one thread are {:.2} times as fast as one; {:.0} % of a \
+             step in turns and halos",
+            one_s / two_s,
+            100.0 * exchange_s / two_s
+        );
+    }
+    Ok(())
 }
 
 /// Words of `mpirun` for `count` processes, more than cores if need be.

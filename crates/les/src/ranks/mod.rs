@@ -10,6 +10,9 @@ mod threads;
 
 use std::borrow::Cow;
 use std::fmt::{Debug, Display};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 
 use crate::Error;
 
@@ -47,6 +50,41 @@ impl Ranks for Single {
     fn turn(&self, send: &[f64], _: &[usize], receive: &mut [f64], _: &[usize]) -> Result<(), Error> {
         receive.copy_from_slice(send);
         Ok(())
+    }
+}
+
+/// Ranks, and how long their exchanges take, waiting for others included.
+#[derive(Debug)]
+pub(crate) struct Timed {
+    ranks: Arc<dyn Ranks>,
+    spent_ns: AtomicU64,
+}
+
+impl Timed {
+    pub(crate) fn new(ranks: Arc<dyn Ranks>) -> Self {
+        Self { ranks, spent_ns: AtomicU64::new(0) }
+    }
+
+    /// Time of all exchanges so far \[s\].
+    pub(crate) fn spent_s(&self) -> f64 {
+        1e-9 * self.spent_ns.load(Ordering::Relaxed) as f64
+    }
+}
+
+impl Ranks for Timed {
+    fn rank(&self) -> usize {
+        self.ranks.rank()
+    }
+
+    fn count(&self) -> usize {
+        self.ranks.count()
+    }
+
+    fn turn(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
+        let begun = Instant::now();
+        let turned = self.ranks.turn(send, to, receive, from);
+        self.spent_ns.fetch_add(begun.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        turned
     }
 }
 

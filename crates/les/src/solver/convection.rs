@@ -6,11 +6,10 @@ use multiversion::multiversion;
 
 use super::kept_fluxes::{KeptFluxes, SLOTS};
 use super::momentum::{Momentum, Scratch};
-use super::rows::{HALO, add_product, add_transport, cut_rows, even_mean, from_places, pad};
+use super::rows::{HALO, add_product, add_transport, cut_rows, even_mean, from_places, pad, round, rows_from};
 use super::transport::{MEAN, Transport};
 
 /// The row that is computed: indices `j` and `k` along the axes 1 and 2.
-#[derive(Clone, Copy)]
 struct Row<'a> {
     ops: &'a Momentum,
     velocity: [&'a [f64]; 3],
@@ -23,20 +22,20 @@ impl Scratch {
     pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
         self.kept.fit(ops.axis, ops.n);
         let row = Row { ops, velocity, j, k };
-        convection_row(row, &mut self.convection, &mut self.padded, &mut self.flux, &mut self.kept);
+        convection_row(&row, &mut self.convection, &mut self.padded, &mut self.flux, &mut self.kept);
     }
 }
 
 /// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn convection_row(
-    row: Row<'_>,
+    row: &Row<'_>,
     out: &mut [f64],
     padded: &mut [Vec<f64>; 2],
     flux: &mut [Vec<f64>; 2],
     kept: &mut KeptFluxes,
 ) {
-    let Row { ops, j, k, .. } = row;
+    let &Row { ops, j, k, .. } = row;
     out.fill(0.0);
     if !ops.thin[0] {
         along_row(row, out, padded, flux);
@@ -63,11 +62,11 @@ fn convection_row(
 
 /// The part of the convection along axis 0.
 #[inline(always)]
-fn along_row(target: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux: &mut [Vec<f64>; 2]) {
-    let Row { ops, velocity, j, k } = target;
+fn along_row(target: &Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux: &mut [Vec<f64>; 2]) {
+    let &Row { ops, ref velocity, j, k } = target;
     let n = out.len();
     let periodic = ops.periodic[0];
-    let start = ops.start(j, k);
+    let start = ops.shape.place([0, j, k]);
     let [values, fluxes] = padded;
     pad(values, &velocity[ops.axis][start..start + n], periodic);
     let transport = &ops.transport[0];
@@ -80,7 +79,7 @@ fn along_row(target: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux:
         let at = |offset: usize| &fluxes[HALO + offset - 3..];
         let q = |offset: usize| &values[HALO + offset - 3..];
         let values = [q(0), q(1), q(2), q(3), q(4), q(5), q(6)];
-        add_transport(out, 1.0, transport.stencil, [at(1), at(2), at(3), at(4)], values);
+        add_transport(out, 1.0, transport.stencil, &[at(1), at(2), at(3), at(4)], &values);
         if !periodic {
             irregular_columns(transport, out, &velocity[0][start..start + n]);
         }
@@ -92,7 +91,7 @@ fn along_row(target: Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux:
         let line = &mut flux[1];
         line.fill(0.0);
         let values = [q(0), q(1), q(2), q(3), q(4), q(5), q(6)];
-        add_transport(line, 1.0, transport.stencil, [at(0), at(1), at(2), at(3)], values);
+        add_transport(line, 1.0, transport.stencil, &[at(0), at(1), at(2), at(3)], &values);
         let inverse = &ops.inverse_cell_mass[0];
         for ((out, line), inverse) in out.iter_mut().zip(line.iter()).zip(inverse) {
             *out += inverse * line;
@@ -125,40 +124,33 @@ fn irregular(transport: &Transport, n: usize) -> impl Iterator<Item = usize> + u
 /// The part of the convection along axis 1 or 2.
 #[inline(always)]
 fn across_rows(
-    target: Row<'_>,
+    target: &Row<'_>,
     axis: usize,
     out: &mut [f64],
     padded: &mut [Vec<f64>; 2],
     (fresh, kept): (&mut [f64], &mut KeptFluxes),
 ) {
-    let Row { ops, velocity, j, k } = target;
+    let &Row { ops, ref velocity, j, k } = target;
     let length = out.len();
     let index = if axis == 1 { j } else { k };
     let count = ops.n[axis];
     let transport = &ops.transport[axis];
     let scale = if axis == ops.axis { 1.0 } else { ops.inverse_cell_mass[axis][index] };
     let values = velocity[ops.axis];
-    let row = |i: usize| {
-        let start = ops.start_with(j, k, axis, i);
-        &values[start..start + length]
-    };
+    let rows = ops.shape.starts(axis, [j, k]);
     if ops.periodic[axis] || transport.regular.contains(&index) {
-        // Offset 3 is the row itself; a regular row of a bounded direction never wraps.
-        let unwrapped = |offset: usize| index + offset + count - 3;
-        let at = |offset: usize| {
-            let i = unwrapped(offset);
-            if ops.periodic[axis] { i % count } else { i - count }
-        };
-        let q = [row(at(0)), row(at(1)), row(at(2)), row(at(3)), row(at(4)), row(at(5)), row(at(6))];
+        // The row itself is the fourth; a regular row of a bounded direction never wraps.
+        let first = index + count - 3;
+        let q = rows_from::<7>(values, length, rows, first, count);
         let (values, starts) = (&mut kept.values[axis - 1], &mut kept.starts[axis - 1]);
         // The flux at offset 2 to 5 from the row has the same place for all four rows on which it acts.
-        let place = |slot: usize| match axis {
-            1 => unwrapped(slot + 2) % SLOTS,
-            _ => unwrapped(slot + 2) % SLOTS * ops.n[1] + j,
-        };
+        let (across, j_of) = if axis == 1 { (1, 0) } else { (ops.n[1], j) };
+        let mut places = [0; SLOTS];
         for slot in 0..SLOTS {
-            let (face, place) = (at(slot + 2), place(slot));
-            let start = ops.start_with(j, k, axis, face);
+            let place = (first + slot + 2) % SLOTS * across + j_of;
+            let face = round(first + slot + 2, count);
+            let start = rows.of(face);
+            places[slot] = place * length;
             if starts[place] != start {
                 starts[place] = start;
                 let flux = &mut values[place * length..][..length];
@@ -169,15 +161,16 @@ fn across_rows(
                 }
             }
         }
-        let flux = |slot: usize| &values[place(slot) * length..][..length];
-        add_transport(out, scale, transport.stencil, [flux(0), flux(1), flux(2), flux(3)], q);
+        let flux = from_places!(values, places[0], places[1], places[2], places[3]);
+        add_transport(out, scale, transport.stencil, &flux, &q);
     } else {
         for &(face, cell, c) in &transport.rows[index] {
+            let value = &values[rows.of(cell)..][..length];
             if axis == ops.axis {
-                add_product(out, scale * c, row(face), row(cell));
+                add_product(out, scale * c, &values[rows.of(face)..][..length], value);
             } else {
                 flux_row(target, axis, face, fresh, &mut padded[0]);
-                add_product(out, scale * c, fresh, row(cell));
+                add_product(out, scale * c, fresh, value);
             }
         }
     }
@@ -195,36 +188,31 @@ fn mean_row(out: &mut [f64], rows: [&[f64]; 4]) {
 
 /// The flux along `along` through its face `face`, weighted along the component's axis and brought to its faces.
 #[inline(always)]
-fn flux_row(target: Row<'_>, along: usize, face: usize, out: &mut [f64], padded: &mut [f64]) {
-    let Row { ops, velocity, mut j, mut k } = target;
+fn flux_row(target: &Row<'_>, along: usize, face: usize, out: &mut [f64], padded: &mut [f64]) {
+    let &Row { ops, ref velocity, mut j, mut k } = target;
     let field = velocity[along];
     let n = out.len();
+    match along {
+        1 => j = face,
+        2 => k = face,
+        _ => {}
+    }
     if ops.axis == 0 {
-        let start = ops.start_with(j, k, along, face);
-        let row = &field[start..start + n];
+        let row = &field[ops.shape.row(j, k)];
         if let Some(mass) = ops.equal_mass {
             pad(padded, row, ops.periodic[0]);
             let first = HALO - 2;
-            even_mean(out, mass, from_places!(padded, first, first + 1, first + 2, first + 3));
+            even_mean(out, mass, &from_places!(padded, first, first + 1, first + 2, first + 3));
             return;
         }
         out.fill(0.0);
         ops.flux_mean.add_along(out, row, padded);
         return;
     }
-    match along {
-        1 => j = face,
-        2 => k = face,
-        _ => {}
-    }
     let own = if ops.axis == 1 { j } else { k };
     if let Some(mass) = ops.equal_mass {
         let count = ops.n[ops.axis];
-        let row = |offset: usize| {
-            let start = ops.start_with(j, k, ops.axis, (own + offset + 2 * count - 2) % count);
-            &field[start..start + n]
-        };
-        even_mean(out, mass, [row(0), row(1), row(2), row(3)]);
+        even_mean(out, mass, &rows_from(field, n, ops.shape.starts(ops.axis, [j, k]), own + 2 * count - 2, count));
         return;
     }
     out.fill(0.0);

@@ -22,7 +22,7 @@ use super::projection::{Divergence, correct, divide_by_volume, weighted_dot};
 use super::report::{StartReport, StepReport};
 use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
 use super::stage::{Powers, Task};
-use super::subgrid::Subgrid;
+use super::subgrid::{Lent, Subgrid};
 use crate::Error;
 
 /// Share of the explicit limit beyond which the subgrid viscosity is cut. In the core of a vortex WALE's viscosity has no
@@ -288,10 +288,12 @@ impl Flow {
         Ok(())
     }
 
-    /// The viscosity of the model for the present field, at most such that it decays by `limit_per_s`.
+    /// The viscosity of the model for the present field, at most such that it decays by `limit_per_s`; a part of its acceleration
+    /// into `star`.
     fn update_model(&mut self, limit_per_s: f64) -> Result<(), Error> {
-        let velocity = self.state.velocity.each_ref().map(Vec::as_slice);
-        self.model.as_mut().map_or(Ok(()), |model| model.update(velocity, limit_per_s))
+        let Self { state, work, model: Some(model), .. } = self else { return Ok(()) };
+        let lent = Lent { in_plane: &mut work.star, small: &mut work.phi };
+        model.update(state.velocity.each_ref().map(Vec::as_slice), limit_per_s, lent)
     }
 
     /// What the momentum equation reads, and what it writes: `star` and the history.

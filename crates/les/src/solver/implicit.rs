@@ -13,6 +13,7 @@ use super::momentum::Momentum;
 use super::operators_1d::Taps;
 use super::rows::add_across;
 use super::slabs::Slabs;
+use super::starts::Starts;
 use crate::Error;
 
 /// Factors of `1 - a L` along one axis for one component.
@@ -175,7 +176,7 @@ fn add_taps(row: &mut [f64], other: &[f64], taps: &[(usize, f64)], first: usize)
                 row[i] += (a.1 * x[i] + b.1 * y[i]) + c.1 * z[i];
             }
         } else {
-            add_across(row, other, 1.0, taps, |i| (i - first) * n);
+            add_across(row, other, 1.0, taps, Starts::every(n, first));
         }
     }
 }

@@ -13,7 +13,7 @@ use super::operators_1d::Operators1d;
 pub(crate) use super::shape::Shape;
 use super::slabs::Slabs;
 use crate::Error;
-use crate::ranks::{Ranks, Single};
+use crate::ranks::{Ranks, Single, Timed};
 
 /// The operators of the three memory axes.
 #[derive(Debug, Clone)]
@@ -33,7 +33,7 @@ impl Layout {
     pub(crate) fn new(mesh: &Mesh, direction: Option<[usize; 3]>) -> Self {
         let direction = order(mesh, direction);
         let shape = Shape::whole(direction.map(|d| mesh.cells()[d]));
-        Self::of(mesh, direction, Slabs { ranks: Arc::new(Single), shape })
+        Self::of(mesh, direction, Slabs { ranks: Arc::new(Timed::new(Arc::new(Single))), shape })
     }
 
     /// The same of one of several ranks.

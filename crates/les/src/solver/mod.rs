@@ -31,6 +31,7 @@ mod slabs;
 #[cfg(test)]
 mod slabs_tests;
 mod stage;
+mod starts;
 mod subgrid;
 mod transport;
 
@@ -42,6 +43,7 @@ pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
 pub use report::{StartReport, StepReport};
 pub use run::{
     CheckpointPlan, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent, StepRecord,
+    Stepping,
 };
 pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};
 pub use subgrid::SubgridModel;

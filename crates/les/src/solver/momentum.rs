@@ -12,7 +12,7 @@ use super::kept_fluxes::KeptFluxes;
 use super::layout::{Layout, Shape};
 use super::operators_1d::{DIFFERENCE, Taps};
 use super::row_operator::RowOperator;
-use super::rows::{HALO, add_even, from_places, pad};
+use super::rows::{HALO, add_even, from_places, pad, rows_from};
 use super::transport::{Stencil, Transport};
 
 /// The operators of one component.
@@ -22,7 +22,7 @@ pub(crate) struct Momentum {
     pub(super) axis: usize,
     /// Sizes of the memory axes.
     pub(super) n: [usize; 3],
-    shape: Shape,
+    pub(super) shape: Shape,
     pub(super) periodic: [bool; 3],
     pub(super) thin: [bool; 3],
     /// Weighted flux along `axis` at its faces from the cells.
@@ -150,15 +150,6 @@ impl Momentum {
             _ => false,
         }
     }
-
-    pub(super) fn start(&self, j: usize, k: usize) -> usize {
-        self.shape.place([0, j, k])
-    }
-
-    /// Start of the row whose index along `axis` (1 or 2) is replaced.
-    pub(super) fn start_with(&self, j: usize, k: usize, axis: usize, index: usize) -> usize {
-        if axis == 1 { self.start(index, k) } else { self.start(j, index) }
-    }
 }
 
 /// Adds the Laplacian of the component along `axis` to row `(j, k)` \[1/(m s)\].
@@ -174,13 +165,12 @@ pub(crate) fn add_laplacian_row(
 ) {
     let n = out.len();
     if axis == 0 {
-        let start = ops.start(j, k);
-        let row = &field[start..start + n];
+        let row = &field[ops.shape.row(j, k)];
         if let Some(c) = ops.even_laplacian[0] {
             pad(padded, row, ops.periodic[0]);
             let first = HALO - 3;
             let places = from_places!(padded, first, first + 1, first + 2, first + 3, first + 4, first + 5, first + 6);
-            add_even(out, c, places);
+            add_even(out, c, &places);
             return;
         }
         ops.laplacian[0].add_along(out, row, padded);
@@ -192,11 +182,7 @@ pub(crate) fn add_laplacian_row(
     let index = if axis == 1 { j } else { k };
     if let Some(c) = ops.even_laplacian[axis] {
         let count = ops.n[axis];
-        let row = |offset: usize| {
-            let start = ops.start_with(j, k, axis, (index + offset + 3 * count - 3) % count);
-            &field[start..start + n]
-        };
-        add_even(out, c, [row(0), row(1), row(2), row(3), row(4), row(5), row(6)]);
+        add_even(out, c, &rows_from(field, n, ops.shape.starts(axis, [j, k]), index + 3 * count - 3, count));
         return;
     }
     ops.laplacian[axis].add_across(out, field, [j, k]);

@@ -69,10 +69,6 @@ impl Divergence {
             )
             .reduce(|| 0.0, f64::max)
     }
-
-    fn start(&self, j: usize, k: usize) -> usize {
-        self.shape.place([0, j, k])
-    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
@@ -88,13 +84,13 @@ fn divergence_row(
     let n = out.len();
     let (mass_1, mass_2) = (scale * ops.cell_mass[1][j], scale * ops.cell_mass[2][k]);
     out.fill(0.0);
-    add_across(out, velocity[1], mass_2, &ops.rows[1][j], |i| ops.start(i, k));
-    add_across(out, velocity[2], mass_1, &ops.rows[2][k], |i| ops.start(j, i));
+    add_across(out, velocity[1], mass_2, &ops.rows[1][j], ops.shape.starts(1, [j, k]));
+    add_across(out, velocity[2], mass_1, &ops.rows[2][k], ops.shape.starts(2, [j, k]));
     for (out, mass) in out.iter_mut().zip(&ops.cell_mass[0]) {
         *out *= mass;
     }
     let across = mass_1 * ops.cell_mass[2][k];
-    let start = ops.start(j, k);
+    let start = ops.shape.place([0, j, k]);
     for (to, from) in padded[HALO..].iter_mut().zip(&velocity[0][start..start + n]) {
         *to = across * from;
     }

@@ -3,6 +3,7 @@
 use super::layout::{Layout, Shape};
 use super::operators_1d::Taps;
 use super::rows::{Columns, add_across, pad};
+use super::starts::Starts;
 
 /// A linear operator along one axis.
 #[derive(Debug, Clone)]
@@ -40,14 +41,13 @@ impl RowOperator {
     /// `out +=` an operator of axis 1 or 2 on `field` at the targets of the row `at`.
     #[inline(always)]
     pub(crate) fn add_across(&self, out: &mut [f64], field: &[f64], at: [usize; 2]) {
-        let row = |i: usize| if self.axis == 1 { self.shape.row(i, at[1]) } else { self.shape.row(at[0], i) };
-        add_across(out, field, 1.0, &self.rows[at[self.axis - 1]], |i| row(i).start);
+        add_across(out, field, 1.0, &self.rows[at[self.axis - 1]], self.shape.starts(self.axis, at));
     }
 
     /// `out +=` an operator of axis 1 at row `j` of a plane that stands alone.
     #[inline(always)]
     pub(crate) fn add_in_plane(&self, out: &mut [f64], plane: &[f64], j: usize) {
-        add_across(out, plane, 1.0, &self.rows[j], |i| i * self.shape.n[0]);
+        add_across(out, plane, 1.0, &self.rows[j], Starts::every(self.shape.n[0], 0));
     }
 
     /// `out +=` an operator of axis 0 on one row.

@@ -2,6 +2,7 @@
 //! products and sums are kept apart, so that each version gives the same bits.
 
 use super::operators_1d::Taps;
+use super::starts::Starts;
 use super::transport::{MEAN, Stencil};
 
 /// Some rows of an array, cut to `n` values. Closures given to `map` or `from_fn` stay calls in functions that are compiled for
@@ -104,7 +105,10 @@ pub(crate) fn pad(padded: &mut [f64], row: &[f64], periodic: bool) {
 /// Fills the halos of a padded row of `n` values.
 #[inline(always)]
 pub(crate) fn wrap(padded: &mut [f64], n: usize, periodic: bool) {
-    if periodic {
+    if periodic && n >= HALO {
+        padded.copy_within(n..n + HALO, 0);
+        padded.copy_within(HALO..2 * HALO, HALO + n);
+    } else if periodic {
         for h in 0..HALO {
             // One value is its own neighbour on both sides.
             padded[HALO - 1 - h] = padded[HALO + n - 1 - h % n];
@@ -116,19 +120,13 @@ pub(crate) fn wrap(padded: &mut [f64], n: usize, periodic: bool) {
     }
 }
 
-/// `out += scale sum c row` over the taps of an operator across rows; those of index `i` start at `start(i)`.
+/// `out += scale sum c row` over the taps of an operator across rows.
 #[inline(always)]
-pub(crate) fn add_across(
-    out: &mut [f64],
-    field: &[f64],
-    scale: f64,
-    mut taps: &[(usize, f64)],
-    start: impl Fn(usize) -> usize,
-) {
+pub(crate) fn add_across(out: &mut [f64], field: &[f64], scale: f64, mut taps: &[(usize, f64)], starts: Starts) {
     let n = out.len();
     while let [a, b, c, d, rest @ ..] = taps {
-        let (x0, x1) = (&field[start(a.0)..][..n], &field[start(b.0)..][..n]);
-        let (x2, x3) = (&field[start(c.0)..][..n], &field[start(d.0)..][..n]);
+        let (x0, x1) = (&field[starts.of(a.0)..][..n], &field[starts.of(b.0)..][..n]);
+        let (x2, x3) = (&field[starts.of(c.0)..][..n], &field[starts.of(d.0)..][..n]);
         let [a, b, c, d] = [scale * a.1, scale * b.1, scale * c.1, scale * d.1];
         for i in 0..n {
             out[i] += (a * x0[i] + b * x1[i]) + (c * x2[i] + d * x3[i]);
@@ -137,15 +135,40 @@ pub(crate) fn add_across(
     }
     for tap in taps {
         let c = scale * tap.1;
-        for (out, x) in out.iter_mut().zip(&field[start(tap.0)..][..n]) {
+        for (out, x) in out.iter_mut().zip(&field[starts.of(tap.0)..][..n]) {
             *out += c * x;
         }
     }
 }
 
+/// The rows of indices `first` to `first + N`, which are taken round a period of `count`.
+#[inline(always)]
+pub(crate) fn rows_from<const N: usize>(
+    field: &[f64],
+    n: usize,
+    starts: Starts,
+    first: usize,
+    count: usize,
+) -> [&[f64]; N] {
+    let mut rows: [&[f64]; N] = [&[]; N];
+    for (offset, row) in rows.iter_mut().enumerate() {
+        *row = &field[starts.of(round(first + offset, count))..][..n];
+    }
+    rows
+}
+
+/// An index within a period of `count`, from which it is not far.
+#[inline(always)]
+pub(crate) fn round(mut index: usize, count: usize) -> usize {
+    while index >= count {
+        index -= count;
+    }
+    index
+}
+
 /// `out += scale transport`, by the formula of the interior: fluxes `g` at -1, 0, 1, 2 and values `q` at -3 to 3.
 #[inline(always)]
-pub(crate) fn add_transport(out: &mut [f64], scale: f64, stencil: Stencil, g: [&[f64]; 4], q: [&[f64]; 7]) {
+pub(crate) fn add_transport(out: &mut [f64], scale: f64, stencil: Stencil, g: &[&[f64]; 4], q: &[&[f64]; 7]) {
     let n = out.len();
     let [g0, g1, g2, g3] = cut_rows!(g, n, 0 1 2 3);
     let [q0, q1, q2, q4, q5, q6] = cut_rows!(q, n, 0 1 2 4 5 6);
@@ -166,7 +189,7 @@ pub(crate) fn add_transport(out: &mut [f64], scale: f64, stencil: Stencil, g: [&
 
 /// `out += sum_d c_d (q_d + q_-d - 2 q)` of the values at -3 to 3: nothing at all for a constant.
 #[inline(always)]
-pub(crate) fn add_even(out: &mut [f64], c: [f64; 3], q: [&[f64]; 7]) {
+pub(crate) fn add_even(out: &mut [f64], c: [f64; 3], q: &[&[f64]; 7]) {
     let n = out.len();
     let [q0, q1, q2, q3, q4, q5, q6] = cut_rows!(q, n, 0 1 2 3 4 5 6);
     for i in 0..n {
@@ -178,7 +201,7 @@ pub(crate) fn add_even(out: &mut [f64], c: [f64; 3], q: [&[f64]; 7]) {
 
 /// `out = scale` times the fourth-order mean of the values at -2 to 1: a constant stays itself.
 #[inline(always)]
-pub(crate) fn even_mean(out: &mut [f64], scale: f64, q: [&[f64]; 4]) {
+pub(crate) fn even_mean(out: &mut [f64], scale: f64, q: &[&[f64]; 4]) {
     let n = out.len();
     let [q0, q1, q2, q3] = cut_rows!(q, n, 0 1 2 3);
     let far = -MEAN[0];

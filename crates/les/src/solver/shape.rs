@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 use super::rows::HALO;
+use super::starts::Starts;
 
 /// Number of values along the three memory axes, and the slab of them that is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,6 +78,16 @@ impl Shape {
         (k * self.n[1] + j) * self.n[0] + i
     }
 
+    /// Where the rows begin whose index along `axis` (1 or 2) takes the place of that in `[j, k]`.
+    #[inline(always)]
+    pub(crate) fn starts(self, axis: usize, [j, k]: [usize; 2]) -> Starts {
+        if axis == 1 {
+            return Starts { first: self.place([0, 0, k]), step: self.n[0], lowest: 0, round: 0 };
+        }
+        let (step, first) = (self.plane(), j * self.n[0]);
+        Starts { first: first.wrapping_sub(self.lowest * step), step, lowest: self.lowest, round: self.n[2] * step }
+    }
+
     /// Places in memory of the row at indices `j` of axis 1 and `k` of axis 2.
     #[inline(always)]
     pub(crate) fn row(self, j: usize, k: usize) -> Range<usize> {
@@ -99,6 +110,10 @@ mod tests {
                 assert!(shape.own().len() >= HALO && shape.own_places().end <= shape.len());
                 shape.own().for_each(|k| owners[k] += 1);
                 for (at, k) in shape.own().enumerate() {
+                    assert_eq!(
+                        [shape.starts(1, [0, k]).of(1), shape.starts(2, [1, 0]).of(k)],
+                        [shape.place([0, 1, k]); 2]
+                    );
                     assert_eq!(shape.place([1, 1, k]), shape.own_places().start + 6 * at + 4);
                 }
                 let held = (0..planes).filter(|&k| shape.row(1, k).end <= shape.len()).count();

@@ -13,12 +13,12 @@ use rayon::prelude::*;
 use super::rows::HALO;
 use super::shape::Shape;
 use crate::Error;
-use crate::ranks::{self, Ranks};
+use crate::ranks::{self, Ranks, Timed};
 
 /// The ranks and what this one holds.
 #[derive(Debug, Clone)]
 pub(crate) struct Slabs {
-    pub(crate) ranks: Arc<dyn Ranks>,
+    pub(crate) ranks: Arc<Timed>,
     pub(crate) shape: Shape,
 }
 
@@ -33,7 +33,7 @@ impl Slabs {
             return Err(Error::TooManyRanks { ranks: ranks_found, planes: n[2], most });
         }
         let shape = Shape::slab(n, ranks.rank(), ranks.count());
-        Ok(Self { ranks, shape })
+        Ok(Self { ranks: Arc::new(Timed::new(ranks)), shape })
     }
 
     /// Whether there is but one rank.

@@ -71,9 +71,13 @@ impl Task<'_> {
         }
     }
 
-    /// `N`, the terms that are integrated explicitly, of one row into `out`; the Laplacian along the implicit axes into the scratch.
+    /// `N`, the terms that are integrated explicitly, of one row into `out`, which holds what the model was lent; the Laplacian along
+    /// the implicit axes into the scratch.
     fn terms(&self, [axis, j, k]: [usize; 3], out: &mut [f64], scratch: &mut Scratch, powers: Option<&mut Powers>) {
         let ops = &self.ops[axis];
+        if self.model.is_some() {
+            scratch.model.copy_from_slice(out);
+        }
         scratch.convection(ops, self.velocity, j, k);
         let (nu, force) = (self.viscosity_m2_s, self.force_m_s2[axis]);
         if nu == 0.0 {
@@ -84,7 +88,6 @@ impl Task<'_> {
         }
         explicit_terms(out, nu, &scratch.explicit, &scratch.convection, force);
         if let Some(model) = self.model {
-            scratch.model.fill(0.0);
             model.add_divergence_row(axis, j, k, &mut scratch.model);
             for (out, model) in out.iter_mut().zip(&scratch.model) {
                 *out += model;

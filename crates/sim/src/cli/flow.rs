@@ -5,7 +5,7 @@ use super::{Cli, progress, say};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
-use crate::flow::{Begin, CaseFile, EXAMPLES, FlowForecast, RunOptions, Watch, check, example, run_on};
+use crate::flow::{Begin, CaseFile, EXAMPLES, FlowForecast, RunOptions, Watch, check_on, example, run_on};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -72,7 +72,7 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc
         if !is_first {
             return Ok(());
         }
-        let forecast = check(file, words.out.as_deref(), options)?;
+        let forecast = check_on(ranks, file, words.out.as_deref(), options)?;
         return say(cli.json, &forecast_json(&forecast), &format!("good\n{forecast}"));
     }
     let Some(out) = &words.out else {
@@ -107,11 +107,19 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
         "is_complete": outcome.is_complete, "kinetic_energy_m5_s2": outcome.kinetic_energy_m5_s2,
-        "relative_divergence": outcome.relative_divergence, "files": outcome.files, "warnings": outcome.warnings,
+        "relative_divergence": outcome.relative_divergence, "steps_wall_s": outcome.stepping.wall_s,
+        "exchange_wall_s": outcome.stepping.exchange_s, "files": outcome.files, "warnings": outcome.warnings,
     });
     let state = if outcome.is_complete { "done" } else { "paused, --restart continues it" };
+    let stepping = outcome.stepping;
+    let exchange = if ranks.count() > 1 {
+        let share = 100.0 * stepping.exchange_s / stepping.wall_s;
+        format!("steps took {:.1} s, {share:.1} % of it in turns and halos\n", stepping.wall_s)
+    } else {
+        String::new()
+    };
     let text = format!(
-        "{state}: step {}, t = {:?} s, energy {:.6e} m^5/s^2, relative divergence {:.1e}\nwrote {} files to {}",
+        "{state}: step {}, t = {:?} s, energy {:.6e} m^5/s^2, relative divergence {:.1e}\n{exchange}wrote {} files to {}",
         outcome.steps,
         outcome.time_s,
         outcome.kinetic_energy_m5_s2,
@@ -132,6 +140,6 @@ fn forecast_json(forecast: &FlowForecast) -> Value {
         "version": crate::VERSION, "case_hash": forecast.case_hash, "cells": forecast.cells, "scheme": forecast.scheme,
         "scheme_reason": forecast.scheme_reason, "end_s": forecast.end_s, "end_tau": forecast.end_tau,
         "step_s": forecast.step_s, "steps": forecast.steps, "core_s": forecast.core_s,
-        "memory_bytes": forecast.memory_bytes, "files": files,
+        "memory_bytes": forecast.memory_bytes, "ranks": forecast.ranks, "rank_bytes": forecast.rank_bytes, "files": files,
     })
 }

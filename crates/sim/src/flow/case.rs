@@ -136,12 +136,19 @@ pub enum AxisName {
     Z,
 }
 
+/// Directions in the order of their numbers.
+pub(super) const ALL_AXES: [AxisName; 3] = [AxisName::X, AxisName::Y, AxisName::Z];
+
 section! {
     /// How the equations are solved.
     Solver {
         /// Directions of implicit viscosity; chosen by the first time step if absent.
         #[serde(skip_serializing_if = "Option::is_none")]
         implicit_viscosity: Option<Vec<AxisName>> = None,
+        /// Order of the directions in memory, that of neighbours first; ranks share the planes across the last one. Absent: x, y, z,
+        /// in plane flows the long direction first. Another order rounds in another way.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        memory_order: Option<[AxisName; 3]> = None,
         /// How the pressure equation is solved.
         pressure: Pressure = Pressure::Auto,
         /// Relative residual at which it counts as solved.
@@ -208,6 +215,15 @@ impl FlowCase {
         p.require(self.format == FORMAT, "format", self.format, "1, the format of this program");
         self.case.check(&mut p);
         self.check_time(&mut p);
+        if let Some(order) = &self.solver.memory_order {
+            let once = ALL_AXES.iter().all(|axis| order.contains(axis));
+            p.require(
+                once,
+                "solver.memory_order",
+                order,
+                "each of \"x\", \"y\", \"z\" once, e.g. [\"x\", \"z\", \"y\"]",
+            );
+        }
         p.within("solver.pressure_tolerance", self.solver.pressure_tolerance, 1e-15, 0.1, "");
         self.check_output(&mut p);
         self.check_wake(&mut p);

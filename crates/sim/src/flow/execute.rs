@@ -39,16 +39,28 @@ struct Prepared {
     forecast: FlowForecast,
 }
 
-/// What a run would take; nothing is written. With the folder that it would write to this is checked, too.
+/// As [`check_on`], in one process.
 ///
 /// # Errors
-/// All that [`run_with`] refuses before it computes.
+/// As there.
 pub fn check(file: &CaseFile, folder: Option<&Path>, options: RunOptions) -> Result<FlowForecast, Error> {
+    check_on(&(Arc::new(Single) as Arc<dyn Ranks>), file, folder, options)
+}
+
+/// What a run on ranks would take, of which one calls this; nothing is written. With the folder that it would write to this is checked, too.
+///
+/// # Errors
+/// All that [`run_on`] refuses before it computes.
+pub fn check_on(
+    ranks: &Arc<dyn Ranks>,
+    file: &CaseFile,
+    folder: Option<&Path>,
+    options: RunOptions,
+) -> Result<FlowForecast, Error> {
     if let Some(folder) = folder {
         refuse_folder(folder, options.begin)?;
     }
-    let alone: Arc<dyn Ranks> = Arc::new(Single);
-    prepare(file, folder.unwrap_or(Path::new("")), options, &alone).map(|prepared| prepared.forecast)
+    prepare(file, folder.unwrap_or(Path::new("")), options, ranks).map(|prepared| prepared.forecast)
 }
 
 /// As [`run_with`], for a case that fits into the memory of the machine.
@@ -144,6 +156,7 @@ pub fn run_on(
         steps: summary.steps,
         time_s: summary.time_s,
         is_complete: summary.is_complete,
+        stepping: run.stepping(),
         kinetic_energy_m5_s2: flow.kinetic_energy_m5_s2(),
         relative_divergence: flow.relative_divergence(),
         files,

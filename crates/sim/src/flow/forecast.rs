@@ -39,6 +39,10 @@ pub struct FlowForecast {
     pub core_s: f64,
     /// Memory held at once \[bytes\].
     pub memory_bytes: f64,
+    /// Ranks that share the run.
+    pub ranks: usize,
+    /// Memory that each of them holds, and how much more the first one, which gathers what is written \[bytes\].
+    pub rank_bytes: [f64; 2],
     /// Files, by kind.
     pub files: Vec<FileForecast>,
 }
@@ -89,6 +93,8 @@ impl FlowForecast {
             steps,
             core_s: start_s + (steps * passes + 2.0) * pass_s,
             memory_bytes: memory_bytes(case, cells, &dense),
+            ranks: setup.settings.ranks.count(),
+            rank_bytes: rank_bytes(case, setup, &dense),
             files: file_forecasts(case, files, schedule, cells, steps),
         }
     }
@@ -116,6 +122,10 @@ impl fmt::Display for FlowForecast {
         writeln!(f, "  time     about {} on one core", seconds(self.core_s))?;
         let available = machine::available_memory_bytes().map_or(String::new(), |b| format!(" of {}", bytes(b)));
         writeln!(f, "  memory   about {}{available}", bytes(self.memory_bytes))?;
+        if self.ranks > 1 {
+            let [each, more] = self.rank_bytes.map(bytes);
+            writeln!(f, "  ranks    {}, each about {each}, the first {more} more", self.ranks)?;
+        }
         writeln!(f, "  files    about {}", bytes(self.file_bytes()))?;
         for kind in &self.files {
             writeln!(f, "           {:<28} {:>6} {:>10}", kind.name, kind.count, bytes(kind.bytes))?;
@@ -195,8 +205,8 @@ fn fitting(case: &FlowCase, cells: [usize; 3], dense: &[usize], available_bytes:
 fn memory_bytes(case: &FlowCase, cells: [usize; 3], dense: &[usize]) -> f64 {
     let model = match case.solver.subgrid {
         Subgrid::None {} => 0.0,
-        Subgrid::MultiscaleWale { .. } => 10.0,
-        Subgrid::Smagorinsky { .. } | Subgrid::Wale { .. } => 7.0,
+        Subgrid::MultiscaleWale { .. } => 6.0,
+        Subgrid::Smagorinsky { .. } | Subgrid::Wale { .. } => 4.0,
     };
     let given = match &case.case {
         CaseKind::Wake(_) | CaseKind::VortexPair(_) => 3.0,
@@ -210,6 +220,19 @@ fn memory_bytes(case: &FlowCase, cells: [usize; 3], dense: &[usize]) -> f64 {
     let rotational = f64::from(u8::from(case.solver.rotational));
     let arrays = FLOW_ARRAYS + rotational + model + f64::max(start, f64::max(outputs, meter));
     8.0 * count(cells) * arrays + dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>() + PROGRAM_BYTES
+}
+
+/// Memory of one of the ranks with its halos, and what the first holds besides: the whole flow that it shows \[bytes\].
+fn rank_bytes(case: &FlowCase, setup: &Setup, dense: &[usize]) -> [f64; 2] {
+    let (mut cells, ranks) = (setup.mesh.cells(), setup.settings.ranks.count());
+    let all = memory_bytes(case, cells, dense);
+    if ranks == 1 {
+        return [all, 0.0];
+    }
+    let whole = 8.0 * GATHERED_ARRAYS * count(cells);
+    let last = setup.settings.memory_order.map_or(2, |order| order[2]);
+    cells[last] = (cells[last].div_ceil(ranks) + 2 * HALO_PLANES).min(cells[last]);
+    [memory_bytes(case, cells, dense), whole]
 }
 
 /// The eigenvectors of a direction, what finds them, and its two transforms.
@@ -288,11 +311,16 @@ const CSV_PLANE_BYTES: f64 = 90.0;
 const STEP_ROW_BYTES: f64 = 220.0;
 const RECORD_BYTES: f64 = 2500.0;
 
+/// Planes of a halo.
+const HALO_PLANES: usize = 4;
+/// Arrays of the whole flow on the first rank: what outputs gather, and what they make of it.
+const GATHERED_ARRAYS: f64 = 12.0;
+
 // Unit costs on one core: a cell of one stage of a step and what the passes of multigrid add to it, in the plane and in space;
 // the subgrid model, a cell of a dense direction, the eigenvectors.
 const PLANE_S: (f64, f64) = (0.9e-7, 0.4e-7);
-const SPACE_S: (f64, f64) = (1.6e-7, 1.6e-7);
-const MODEL_S: f64 = 6.0e-8;
+const SPACE_S: (f64, f64) = (1.1e-7, 1.6e-7);
+const MODEL_S: f64 = 5.0e-8;
 const MATRIX_S: f64 = 1.5e-10;
 const EIGEN_S: f64 = 5e-9;
 

@@ -1,6 +1,6 @@
 //! From a case file to the setup of its simulation: the flow, and how the case has it integrated.
 
-use super::case::{AxisName, FlowCase, Pressure, Scheme, Subgrid};
+use super::case::{ALL_AXES, FlowCase, Pressure, Scheme, Subgrid};
 use super::setup::Setup;
 use crate::Error;
 use std::path::Path;
@@ -13,9 +13,9 @@ impl Setup {
         let (s, solver) = (&mut setup.settings, &case.solver);
         s.damped_steps = case.time.damped_steps;
         if let Some(axes) = &solver.implicit_viscosity {
-            s.viscous =
-                ViscousTreatment::Implicit([AxisName::X, AxisName::Y, AxisName::Z].map(|axis| axes.contains(&axis)));
+            s.viscous = ViscousTreatment::Implicit(ALL_AXES.map(|axis| axes.contains(&axis)));
         }
+        s.memory_order = solver.memory_order.map(|order| order.map(|axis| axis as usize));
         s.pressure = match solver.pressure {
             Pressure::Auto => PressureMethod::Auto,
             Pressure::Direct => PressureMethod::Direct,

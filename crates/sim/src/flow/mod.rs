@@ -30,7 +30,7 @@ mod writer;
 
 pub use case::{AxisName, Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time};
 pub use examples::{EXAMPLES, example};
-pub use execute::{RunOptions, check, run, run_on, run_with};
+pub use execute::{RunOptions, check, check_on, run, run_on, run_with};
 pub use forecast::{FileForecast, FlowForecast};
 pub use free::{Axis, EndName, Free, InitialName, InitialPair, MappingName};
 pub use kind::CaseKind;
@@ -50,7 +50,7 @@ use crate::io::text_file;
 use crate::keys::{Located, Problem, SceneError, Source};
 use crate::scene::hash_of;
 use std::path::{Path, PathBuf};
-use wakescope_les::solver::StepRecord;
+use wakescope_les::solver::{StepRecord, Stepping};
 
 /// A valid case, with what names it.
 #[derive(Debug, Clone, PartialEq)]
@@ -210,6 +210,8 @@ pub struct FlowOutcome {
     pub time_s: f64,
     /// Whether that is the end, not a pause.
     pub is_complete: bool,
+    /// Wall time of the steps, and of exchanges between ranks in them.
+    pub stepping: Stepping,
     /// Kinetic energy, integral of `u^2/2` \[m^5/s^2\].
     pub kinetic_energy_m5_s2: f64,
     /// Largest divergence over the largest `sum |u_i|/h_i`.

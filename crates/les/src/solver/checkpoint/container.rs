@@ -1,13 +1,15 @@
-//! A file of tagged sections with a version and a checksum, put in place in one piece.
+//! A file of tagged sections and of planes, with a version and checksums, put in place in one piece.
 //!
-//! Layout, all numbers little-endian: 16 bytes of magic, version (`u32`), number of sections (`u32`); each section an
-//! eight-byte tag, its length in bytes (`u64`) and its content; at last the SHA-256 of all before. The magic holds bytes that
-//! a transfer as text would change. A file is written beside its place, synced, then renamed.
+//! Layout, all numbers little-endian: 16 bytes of magic, version (`u32`), number of sections (`u32`), bytes of all sections, number
+//! of planes, bytes of each (`u64`); each section an eight-byte tag, its length in bytes (`u64`) and its content; the SHA-256 of
+//! all before. Then the planes, each followed by the SHA-256 of that checksum, its number and its content: whoever has planes
+//! writes and checks them alone. The magic holds bytes that a transfer as text would change. A file is written beside its place,
+//! synced, then renamed.
 //!
-//! Check: every truncation and every flipped byte of a small file is refused.
+//! Check: every truncation and every flipped byte of a small file is refused; planes of another file.
 
-use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
@@ -17,9 +19,12 @@ use crate::Error;
 const MAGIC: [u8; 16] = *b"\x89WAKEFLOW\r\n\x1a\n\0\0\0";
 const CHECKSUM_BYTES: u64 = 32;
 /// Bytes before the first section.
-const HEAD_BYTES: u64 = 24;
+const HEAD_BYTES: u64 = 48;
 /// Values converted at once.
 const BATCH: usize = 8192;
+
+/// SHA-256.
+pub(super) type Checksum = [u8; CHECKSUM_BYTES as usize];
 
 /// Name of a section.
 pub(super) type Tag = [u8; 8];
@@ -44,49 +49,96 @@ pub(super) fn refused(action: &'static str, path: &Path, error: &io::Error) -> E
     Error::File { action, path: path.to_owned(), kind: error.kind(), reason: error.to_string() }
 }
 
-/// Hashes what passes through it.
-struct Hashing<W> {
-    inner: W,
-    hash: Sha256,
+/// The planes of a file that is written: where they begin, what they belong to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Planes {
+    pub(super) start: u64,
+    pub(super) checksum: Checksum,
 }
 
-impl<W: Write> Write for Hashing<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.inner.write(bytes)?;
-        self.hash.update(&bytes[..written]);
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.inner.flush()
-    }
-}
-
-/// Writes a file; an older one of that name is replaced, or renamed to `previous`, only once the new one is safe on disk.
-pub(super) fn write(
+/// Begins a file for `planes` planes of `plane_bytes` each beside its place.
+pub(super) fn begin(
     path: &Path,
-    previous: Option<&Path>,
     version: u32,
     sections: &[(Tag, Content<'_>)],
+    [planes, plane_bytes]: [u64; 2],
+) -> Result<Planes, Error> {
+    let mut bytes = Vec::new();
+    for (tag, content) in sections {
+        bytes.extend(tag);
+        bytes.extend(content.bytes().to_le_bytes());
+        match content {
+            Content::Bytes(content) => bytes.extend(*content),
+            Content::Floats(values) => bytes.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        }
+    }
+    let numbers = [bytes.len() as u64, planes, plane_bytes].into_iter().flat_map(u64::to_le_bytes);
+    let counts = [version, sections.len() as u32].into_iter().flat_map(u32::to_le_bytes);
+    let mut head: Vec<u8> = MAGIC.into_iter().chain(counts).chain(numbers).collect();
+    head.extend(bytes);
+    let checksum: Checksum = Sha256::digest(&head).into();
+    head.extend(checksum);
+    let start = head.len() as u64;
+    let written = File::create(beside(path)).and_then(|mut file| {
+        file.write_all(&head)?;
+        file.set_len(start + planes * (plane_bytes + CHECKSUM_BYTES))?;
+        file.sync_all()
+    });
+    written.map_err(|error| refused("write", path, &error))?;
+    Ok(Planes { start, checksum })
+}
+
+/// Writes planes from number `first` on to a file that was begun; `next` fills in the bytes of each.
+pub(super) fn write_planes(
+    path: &Path,
+    planes: Planes,
+    numbers: std::ops::Range<usize>,
+    plane_bytes: u64,
+    next: impl Fn(usize, &mut Vec<u8>),
 ) -> Result<(), Error> {
-    let part = beside(path);
-    let result = write_part(&part, version, sections).and_then(|()| {
+    let write = || -> io::Result<()> {
+        let mut file = OpenOptions::new().write(true).open(beside(path))?;
+        file.seek(SeekFrom::Start(planes.start + numbers.start as u64 * (plane_bytes + CHECKSUM_BYTES)))?;
+        let mut out = BufWriter::with_capacity(1 << 18, file);
+        let mut bytes = Vec::with_capacity(plane_bytes as usize);
+        for number in numbers.clone() {
+            bytes.clear();
+            next(number, &mut bytes);
+            out.write_all(&bytes)?;
+            out.write_all(&checksum_of(&planes.checksum, number, &bytes))?;
+        }
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+    };
+    write().map_err(|error| refused("write", path, &error))
+}
+
+/// Checksum of a plane of the file whose head has the checksum `head`.
+fn checksum_of(head: &Checksum, number: usize, bytes: &[u8]) -> Checksum {
+    let hash = Sha256::new().chain_update(head).chain_update((number as u64).to_le_bytes());
+    hash.chain_update(bytes).finalize().into()
+}
+
+/// Puts a whole file in place; an older one of that name is replaced, or renamed to `previous`.
+pub(super) fn finish(path: &Path, previous: Option<&Path>) -> Result<(), Error> {
+    let rename = || {
         if let Some(previous) = previous
             && path.exists()
         {
             fs::rename(path, previous)?;
         }
-        fs::rename(&part, path)
-    });
-    if let Err(error) = result {
-        // The first refusal is the one to report.
-        let _ = fs::remove_file(&part);
-        return Err(refused("write", path, &error));
-    }
+        fs::rename(beside(path), path)
+    };
+    rename().map_err(|error| refused("write", path, &error))?;
     // Makes the renaming last through a power failure where the system can do so.
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let _ = File::open(folder).and_then(|f| f.sync_all());
     Ok(())
+}
+
+/// Takes away what was begun.
+pub(super) fn abandon(path: &Path) {
+    // The first refusal is the one to report.
+    let _ = fs::remove_file(beside(path));
 }
 
 /// The name under which a file is written before it is put in place.
@@ -96,43 +148,21 @@ fn beside(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-fn write_part(part: &Path, version: u32, sections: &[(Tag, Content<'_>)]) -> io::Result<()> {
-    let mut out = Hashing { inner: BufWriter::with_capacity(1 << 18, File::create(part)?), hash: Sha256::new() };
-    out.write_all(&MAGIC)?;
-    out.write_all(&version.to_le_bytes())?;
-    out.write_all(&(sections.len() as u32).to_le_bytes())?;
-    for (tag, content) in sections {
-        out.write_all(tag)?;
-        out.write_all(&content.bytes().to_le_bytes())?;
-        match content {
-            Content::Bytes(bytes) => out.write_all(bytes)?,
-            Content::Floats(values) => {
-                let mut buffer = Vec::with_capacity(8 * BATCH);
-                for batch in values.chunks(BATCH) {
-                    buffer.clear();
-                    buffer.extend(batch.iter().flat_map(|v| v.to_le_bytes()));
-                    out.write_all(&buffer)?;
-                }
-            }
-        }
-    }
-    let Hashing { mut inner, hash } = out;
-    inner.write_all(&hash.finalize())?;
-    inner.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
-}
-
 /// A file whose checksum is right, read section after section.
 #[derive(Debug)]
 pub(super) struct Reader {
     path: PathBuf,
     file: BufReader<File>,
     sections_left: u32,
-    /// Bytes before the checksum that are not read yet.
+    /// Bytes of sections that are not read yet.
     left: u64,
+    planes: Planes,
+    /// Number of planes, and bytes of each.
+    counts: [u64; 2],
 }
 
 impl Reader {
-    /// Opens a file and checks its magic, version and checksum.
+    /// Opens a file and checks its magic, version, length and the checksum of its sections.
     pub(super) fn open(path: &Path, supported: u32) -> Result<Self, Error> {
         let io = |error: &io::Error| refused("read", path, error);
         let mut file = File::open(path).map_err(|e| io(&e))?;
@@ -144,44 +174,71 @@ impl Reader {
             return Err(Error::NotACheckpoint { path: path.to_owned() });
         }
         let damaged = |what| Error::CheckpointDamaged { path: path.to_owned(), what };
-        if length < HEAD_BYTES + CHECKSUM_BYTES {
+        let (words, _) = head[16..].as_chunks::<8>();
+        let [counts, sections, planes, plane_bytes] =
+            words.iter().map(|w| u64::from_le_bytes(*w)).collect::<Vec<_>>()[..]
+        else {
+            return Err(damaged("it ends within its first bytes"));
+        };
+        let version = counts as u32;
+        if found < head.len() {
             return Err(damaged("it ends within its first bytes"));
         }
-        let [.., a, b, c, d, e, f, g, h] = head;
-        let version = u32::from_le_bytes([a, b, c, d]);
         if version != supported {
             return Err(Error::CheckpointVersion { path: path.to_owned(), found: version, supported });
         }
+        let start = (HEAD_BYTES + CHECKSUM_BYTES).checked_add(sections);
+        let all = plane_bytes.checked_add(CHECKSUM_BYTES).and_then(|each| planes.checked_mul(each));
+        let whole = start.zip(all).and_then(|(start, all)| start.checked_add(all));
+        let (Some(start), true) = (start, whole == Some(length)) else {
+            return Err(damaged("it has not the length that it should have"));
+        };
         let mut reader = Self {
             path: path.to_owned(),
             file: BufReader::with_capacity(1 << 18, file),
-            sections_left: u32::from_le_bytes([e, f, g, h]),
-            left: length - HEAD_BYTES - CHECKSUM_BYTES,
+            sections_left: (counts >> 32) as u32,
+            left: sections,
+            planes: Planes { start, checksum: [0; CHECKSUM_BYTES as usize] },
+            counts: [planes, plane_bytes],
         };
         reader.check(&head)?;
         Ok(reader)
     }
 
-    /// Reads the whole file once against its checksum and goes back to the first section.
+    /// Reads the sections once against their checksum and goes back to the first one.
     fn check(&mut self, head: &[u8]) -> Result<(), Error> {
-        use io::Seek as _;
-        let mut hash = Sha256::new();
-        hash.update(head);
-        let mut buffer = vec![0; 8 * BATCH];
-        let mut left = self.left;
-        while left > 0 {
-            let count = left.min(buffer.len() as u64) as usize;
-            self.fill(&mut buffer[..count])?;
-            hash.update(&buffer[..count]);
-            left -= count as u64;
-        }
-        let mut stored = [0; CHECKSUM_BYTES as usize];
+        let mut sections = vec![0; self.left as usize];
+        self.fill(&mut sections)?;
+        let mut stored = self.planes.checksum;
         self.fill(&mut stored)?;
-        if hash.finalize()[..] != stored[..] {
+        self.planes.checksum = Sha256::new().chain_update(head).chain_update(sections).finalize().into();
+        if self.planes.checksum != stored {
             return Err(self.damaged("its checksum is wrong, so it was cut off or altered"));
         }
-        self.file.seek(io::SeekFrom::Start(HEAD_BYTES)).map_err(|e| refused("read", &self.path, &e))?;
-        Ok(())
+        self.seek(HEAD_BYTES)
+    }
+
+    fn seek(&mut self, place: u64) -> Result<(), Error> {
+        self.file.seek(SeekFrom::Start(place)).map(drop).map_err(|e| refused("read", &self.path, &e))
+    }
+
+    /// Number of planes, and bytes of each.
+    pub(super) fn counts(&self) -> [u64; 2] {
+        self.counts
+    }
+
+    /// The bytes of a plane; sections cannot be read any more.
+    pub(super) fn plane(&mut self, number: usize) -> Result<Vec<u8>, Error> {
+        let [_, plane_bytes] = self.counts;
+        self.seek(self.planes.start + number as u64 * (plane_bytes + CHECKSUM_BYTES))?;
+        let mut bytes = vec![0; plane_bytes as usize];
+        let mut stored = self.planes.checksum;
+        self.fill(&mut bytes)?;
+        self.fill(&mut stored)?;
+        if checksum_of(&self.planes.checksum, number, &bytes) != stored {
+            return Err(self.damaged("the checksum of a plane is wrong, so it was altered"));
+        }
+        Ok(bytes)
     }
 
     pub(super) fn damaged(&self, what: &'static str) -> Error {

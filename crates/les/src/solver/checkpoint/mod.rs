@@ -1,7 +1,8 @@
 //! Checkpoints: the whole state of a simulation in one file, from which it continues with the same bits.
 //!
 //! A file holds the state (velocity, the terms of the step before, pressure, time, step lengths, implicit directions), what
-//! mesh and settings it belongs to, and bytes of the caller. It is versioned, has a checksum and is put in place by renaming.
+//! mesh and settings it belongs to, and bytes of the caller. It is versioned, has a checksum for each plane and is put in place by
+//! renaming. Each rank writes and reads its own planes.
 //! Mesh, walls, viscosity, force, scheme, viscous treatment, form of the pressure update, subgrid model and memory order must
 //! be the same to continue; time step, pressure method and tolerance may be changed.
 //!
@@ -9,27 +10,25 @@
 
 mod container;
 
-use std::borrow::Cow;
 use std::path::Path;
 
 use super::flow::{Flow, State};
-use super::layout::{Layout, Shape};
+use super::layout::Layout;
 use super::mesh::{AXIS_NAMES, Mesh};
 use super::settings::FlowSettings;
 use crate::Error;
-use container::{Content, Reader, Tag};
+use container::{Content, Planes, Reader, Tag};
 
 /// Version of the content. Raise it with every change of the sections, of the texts in [`identity`], or of what a run keeps
 /// beside the flow.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 const IDENTITY: &Tag = b"IDENTITY";
 const METRICS: [&Tag; 3] = [b"METRIC X", b"METRIC Y", b"METRIC Z"];
 const SCALARS: &Tag = b"SCALARS ";
-const VELOCITY: [&Tag; 3] = [b"VELOCIT0", b"VELOCIT1", b"VELOCIT2"];
-const HISTORY: [&Tag; 3] = [b"HISTORY0", b"HISTORY1", b"HISTORY2"];
-const PRESSURE: &Tag = b"PRESSURE";
 const USER: &Tag = b"USERDATA";
+/// Fields of which each plane has its values: velocity, terms of the step before, pressure.
+const FIELDS: usize = 7;
 
 /// Positions and metrics of another machine may differ in their last digits; a different mapping differs more.
 const METRIC_TOLERANCE: f64 = 1e-11;
@@ -44,23 +43,27 @@ impl Flow {
         self.save_and_keep(path.as_ref(), None, user_data)
     }
 
-    /// As [`Self::save`], with the older file renamed to `previous`. Of several ranks the first writes for all.
+    /// As [`Self::save`], with the older file renamed to `previous`. Of several ranks the first begins and ends the file, and each
+    /// writes its planes.
     pub(crate) fn save_and_keep(&self, path: &Path, previous: Option<&Path>, user_data: &[u8]) -> Result<(), Error> {
-        let (slabs, state) = (&self.layout.slabs, &self.state);
-        let fields = state.velocity.iter().chain(&state.history).chain([&state.pressure]);
-        let fields = fields.map(|field| slabs.whole(field, false)).collect::<Result<Vec<_>, Error>>()?;
-        let is_first = slabs.is_first();
-        slabs.agree(if is_first { self.write(path, previous, user_data, &fields) } else { Ok(()) })
+        let slabs = &self.layout.slabs;
+        let begun = if slabs.is_first() { self.begin(path, user_data).map(Some) } else { Ok(None) };
+        let written = slabs.agree(begun).and_then(|begun| slabs.agree(self.write_planes(path, begun)));
+        let put = |()| slabs.agree(if slabs.is_first() { container::finish(path, previous) } else { Ok(()) });
+        let result = written.and_then(put);
+        if result.is_err() && slabs.is_first() {
+            container::abandon(path);
+        }
+        result
     }
 
-    /// Writes the state with these fields: velocity, history, pressure.
-    fn write(
-        &self,
-        path: &Path,
-        previous: Option<&Path>,
-        user_data: &[u8],
-        fields: &[Cow<'_, [f64]>],
-    ) -> Result<(), Error> {
+    /// Bytes of the fields in a plane.
+    fn plane_bytes(&self) -> u64 {
+        (8 * FIELDS * self.layout.shape.plane()) as u64
+    }
+
+    /// Begins the file.
+    fn begin(&self, path: &Path, user_data: &[u8]) -> Result<Planes, Error> {
         let text: String =
             identity(self.mesh(), self.settings(), &self.layout).iter().map(|(k, v)| format!("{k}\t{v}\n")).collect();
         let metrics = self.mesh().directions().each_ref().map(|d| metrics(d.cells, |xi| d.at(xi)));
@@ -68,10 +71,25 @@ impl Flow {
         let mut sections = vec![(*IDENTITY, Content::Bytes(text.as_bytes()))];
         sections.extend(METRICS.iter().zip(&metrics).map(|(tag, m)| (**tag, Content::Floats(m))));
         sections.push((*SCALARS, Content::Bytes(&scalars)));
-        let tags = VELOCITY.into_iter().chain(HISTORY).chain([PRESSURE]);
-        sections.extend(tags.zip(fields).map(|(tag, field)| (*tag, Content::Floats(field))));
         sections.push((*USER, Content::Bytes(user_data)));
-        container::write(path, previous, VERSION, &sections)
+        container::begin(path, VERSION, &sections, [self.layout.shape.n[2] as u64, self.plane_bytes()])
+    }
+
+    /// Writes the planes that this rank owns to the file that the first rank has begun, and tells of to the others.
+    fn write_planes(&self, path: &Path, begun: Option<Planes>) -> Result<(), Error> {
+        let told = begun.map_or_else(Vec::new, |planes| {
+            [planes.start as f64].into_iter().chain(planes.checksum.map(f64::from)).collect::<Vec<f64>>()
+        });
+        let told = self.layout.slabs.together(&told)?;
+        let checksum = std::array::from_fn(|i| told.get(i + 1).map_or(0, |byte| *byte as u8));
+        let planes = Planes { start: told.first().map_or(0, |start| *start as u64), checksum };
+        let (shape, state) = (self.layout.shape, &self.state);
+        container::write_planes(path, planes, shape.own(), self.plane_bytes(), |k, bytes| {
+            let start = shape.place([0, 0, k]);
+            for field in state.velocity.iter().chain(&state.history).chain([&state.pressure]) {
+                bytes.extend(field[start..start + shape.plane()].iter().flat_map(|value| value.to_le_bytes()));
+            }
+        })
     }
 
     /// The simulation of a checkpoint, with the caller's bytes. With equal settings it continues bit for bit as if it had
@@ -104,16 +122,20 @@ impl Flow {
         let mut flow = Self::at_rest(mesh.clone(), settings.clone())?;
         read_scalars(&file.bytes(SCALARS)?, &mut flow.state)
             .ok_or_else(|| file.damaged("its scalars are not whole"))?;
-        let cells = Shape::whole(flow.layout.shape.n).len();
-        let State { velocity, history, pressure, .. } = &mut flow.state;
-        let fields = velocity.iter_mut().chain(history).chain([pressure]);
-        for (field, tag) in fields.zip(VELOCITY.into_iter().chain(HISTORY).chain([PRESSURE])) {
-            match file.floats(tag)? {
-                values if values.len() == cells => flow.layout.slabs.take_own(&values, field),
-                _ => return Err(file.damaged("a field is not of the size of the mesh")),
+        let user_data = file.bytes(USER)?;
+        let shape = flow.layout.shape;
+        if file.counts() != [shape.n[2] as u64, flow.plane_bytes()] {
+            return Err(file.damaged("its fields are not of the size of the mesh"));
+        }
+        for k in shape.own() {
+            let bytes = file.plane(k)?;
+            let mut values = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b));
+            let start = shape.place([0, 0, k]);
+            let State { velocity, history, pressure, .. } = &mut flow.state;
+            for field in velocity.iter_mut().chain(history).chain([pressure]) {
+                field[start..start + shape.plane()].iter_mut().zip(&mut values).for_each(|(to, value)| *to = value);
             }
         }
-        let user_data = file.bytes(USER)?;
         Ok((flow, user_data))
     }
 }
@@ -123,7 +145,9 @@ impl Flow {
 /// # Errors
 /// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`], [`Error::CheckpointDamaged`].
 pub fn check_checkpoint(path: impl AsRef<Path>) -> Result<(), Error> {
-    Reader::open(path.as_ref(), VERSION).map(drop)
+    let mut file = Reader::open(path.as_ref(), VERSION)?;
+    let [planes, _] = file.counts();
+    (0..planes as usize).try_for_each(|number| file.plane(number).map(drop))
 }
 
 /// What a checkpoint and its continuation must have in common, as names and values.

@@ -8,6 +8,8 @@
 
 use multiversion::{multiversion, target::target_cfg_f};
 
+use super::fold::Fold;
+
 /// Rows of a tile.
 const ROWS: usize = 6;
 /// Columns of a tile.
@@ -16,13 +18,42 @@ pub(crate) const COLUMNS: usize = 32;
 const NARROW: usize = 8;
 
 type TileRow = [f64; COLUMNS];
-type Tile = [TileRow; ROWS];
+/// Six rows of a matrix, column by column.
+type Group = Vec<[f64; ROWS]>;
 
-/// A square matrix packed for products from the left, `A f`: groups of 6 rows, column by column.
+/// A square matrix packed for products from the left, `A f`: of each of its blocks groups of 6 rows, column by column.
 #[derive(Debug)]
 pub(crate) struct Left {
     n: usize,
-    groups: Vec<Vec<[f64; ROWS]>>,
+    before: Pairs,
+    /// First row of each block on the diagonal, rows, and groups.
+    blocks: Vec<(usize, usize, Vec<Group>)>,
+    after: Pairs,
+}
+
+/// Rows that are replaced by their sum and their difference.
+#[derive(Debug)]
+struct Pairs {
+    /// Those that are taken while rows are copied, and the rows that are only copied.
+    outer: Vec<[usize; 2]>,
+    alone: Vec<usize>,
+    /// The others, one after the other.
+    inner: Vec<[usize; 2]>,
+}
+
+impl Pairs {
+    /// Of `n` rows, the outer pairs first.
+    fn new(n: usize, pairs: &[[usize; 2]]) -> Self {
+        let mut alone: Vec<usize> = (0..n).collect();
+        let is_outer = |pair: &&[usize; 2]| {
+            let before = alone.len();
+            alone.retain(|row| !pair.contains(row));
+            alone.len() + 2 == before
+        };
+        let outer: Vec<[usize; 2]> = pairs.iter().take_while(is_outer).copied().collect();
+        let alone = (0..n).filter(|row| outer.iter().all(|pair| !pair.contains(row))).collect();
+        Self { inner: pairs[outer.len()..].to_vec(), outer, alone }
+    }
 }
 
 /// A square matrix packed for products from the right, `f B`: panels of 32 columns, row by row.
@@ -37,36 +68,101 @@ pub(crate) struct Right {
 pub(crate) struct Packed {
     rows: Vec<[f64; ROWS]>,
     columns: Vec<TileRow>,
+    product: Vec<TileRow>,
 }
 
 impl Left {
-    /// The `n x n` matrix of elements `at(row, column)`.
-    pub(crate) fn new(n: usize, at: impl Fn(usize, usize) -> f64) -> Self {
-        let group = |first: usize| -> Vec<[f64; ROWS]> {
-            let entry = |i: usize, k: usize| if first + i < n { at(first + i, k) } else { 0.0 };
-            (0..n).map(|k| std::array::from_fn(|i| entry(i, k))).collect()
+    /// The transpose of a matrix with the columns in the order of `fold`.
+    pub(crate) fn transpose(fold: &Fold) -> Self {
+        Self::new([&fold.pairs, &[]], fold, |block, i, k| block[i][k])
+    }
+
+    /// A matrix with the columns in the order of `fold`.
+    pub(crate) fn same(fold: &Fold) -> Self {
+        Self::new([&[], &fold.pairs], fold, |block, i, k| block[k][i])
+    }
+
+    fn new(pairs: [&[[usize; 2]]; 2], fold: &Fold, at: impl Fn(&[Vec<f64>], usize, usize) -> f64) -> Self {
+        let pack = |(start, block): &(usize, Vec<Vec<f64>>)| {
+            let n = block.len();
+            let group = |first: usize| -> Group {
+                let entry = |i: usize, k: usize| if first + i < n { at(block, first + i, k) } else { 0.0 };
+                (0..n).map(|k| std::array::from_fn(|i| entry(i, k))).collect()
+            };
+            (*start, n, (0..n).step_by(ROWS).map(group).collect())
         };
-        Self { n, groups: (0..n).step_by(ROWS).map(group).collect() }
+        let n = fold.columns.len();
+        let [before, after] = pairs.map(|pairs| Pairs::new(n, pairs));
+        Self { n, before, blocks: fold.blocks.iter().map(pack).collect(), after }
     }
 
     /// Replaces the `n` rows `f` of equal length by `A f`.
     pub(crate) fn apply(&self, f: &mut [&mut [f64]], packed: &mut Packed) {
         let width = f.first().map_or(0, |row| row.len());
-        let panel = &mut packed.columns;
+        let Packed { columns: panel, product, .. } = packed;
         panel.resize(self.n, [0.0; COLUMNS]);
+        product.resize(self.n, [0.0; COLUMNS]);
         for start in (0..width).step_by(COLUMNS) {
             let columns = COLUMNS.min(width - start);
-            for (packed, row) in panel.iter_mut().zip(f.iter()) {
-                copy(&row[start..start + columns], packed);
-            }
-            for (group, out) in self.groups.iter().zip(f.chunks_mut(ROWS)) {
-                let mut tile = [[0.0; COLUMNS]; ROWS];
-                multiply(group, panel, columns, &mut tile);
-                for (row, tile) in out.iter_mut().zip(&tile) {
-                    paste(tile, &mut row[start..start + columns]);
+            take(&self.before, f, [start, start + columns], panel);
+            for &(first, rows, ref groups) in &self.blocks {
+                let panel = &panel[first..first + rows];
+                for (group, out) in groups.iter().zip(product[first..first + rows].chunks_mut(ROWS)) {
+                    multiply(group, panel, columns, out);
                 }
             }
+            give(&self.after, product, f, [start, start + columns]);
         }
+    }
+}
+
+/// Copies some columns of `f`, with sums and differences of pairs of rows in their places.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn take(pairs: &Pairs, f: &[&mut [f64]], [start, end]: [usize; 2], panel: &mut [TileRow]) {
+    for &row in &pairs.alone {
+        copy(&f[row][start..end], &mut panel[row]);
+    }
+    for &[low, high] in &pairs.outer {
+        let (a, b) = (&f[low][start..end], &f[high][start..end]);
+        if let Ok([low, high]) = panel.get_disjoint_mut([low, high]) {
+            sum_and_difference(a, b, &mut low[..end - start], &mut high[..end - start]);
+        }
+    }
+    for &[low, high] in &pairs.inner {
+        let (a, b) = (panel[low], panel[high]);
+        if let Ok([low, high]) = panel.get_disjoint_mut([low, high]) {
+            sum_and_difference(&a, &b, low, high);
+        }
+    }
+}
+
+/// The other way round.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn give(pairs: &Pairs, product: &mut [TileRow], f: &mut [&mut [f64]], [start, end]: [usize; 2]) {
+    for &[low, high] in pairs.inner.iter().rev() {
+        let (a, b) = (product[low], product[high]);
+        if let Ok([low, high]) = product.get_disjoint_mut([low, high]) {
+            sum_and_difference(&a, &b, low, high);
+        }
+    }
+    for &[low, high] in &pairs.outer {
+        let (a, b) = (&product[low][..end - start], &product[high][..end - start]);
+        if let Ok([low, high]) = f.get_disjoint_mut([low, high]) {
+            sum_and_difference(a, b, &mut low[start..end], &mut high[start..end]);
+        }
+    }
+    for &row in &pairs.alone {
+        paste(&product[row], &mut f[row][start..end]);
+    }
+}
+
+#[inline(always)]
+fn sum_and_difference(a: &[f64], b: &[f64], sum: &mut [f64], difference: &mut [f64]) {
+    let n = sum.len();
+    let (a, b, difference) = (&a[..n], &b[..n], &mut difference[..n]);
+    for l in 0..n {
+        sum[l] = a[l] + b[l];
+        difference[l] = a[l] - b[l];
     }
 }
 
@@ -121,9 +217,9 @@ fn paste(from: &TileRow, to: &mut [f64]) {
     }
 }
 
-/// `tile = a b` over the first `columns` columns (rounded up to 8).
+/// The rows of `tile`, at most 6, `= a b` over the first `columns` columns (rounded up to 8).
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
-fn multiply(a: &[[f64; ROWS]], b: &[TileRow], columns: usize, tile: &mut Tile) {
+fn multiply(a: &[[f64; ROWS]], b: &[TileRow], columns: usize, tile: &mut [TileRow]) {
     if target_cfg_f!(target_feature = "avx512f") && columns > COLUMNS - NARROW {
         multiply_part::<COLUMNS>(a, b, 0, tile);
     } else {
@@ -135,7 +231,7 @@ fn multiply(a: &[[f64; ROWS]], b: &[TileRow], columns: usize, tile: &mut Tile) {
 
 /// The columns `first` to `first + WIDTH` of a tile.
 #[inline(always)]
-fn multiply_part<const WIDTH: usize>(a: &[[f64; ROWS]], b: &[TileRow], first: usize, tile: &mut Tile) {
+fn multiply_part<const WIDTH: usize>(a: &[[f64; ROWS]], b: &[TileRow], first: usize, tile: &mut [TileRow]) {
     let mut sum = [[0.0_f64; WIDTH]; ROWS];
     for (a, b) in a.iter().zip(b) {
         let b = &b[first..first + WIDTH];
@@ -164,7 +260,8 @@ mod tests {
             let f: Vec<f64> = (0..n * width).map(|i| (i as f64 * 0.37).sin()).collect();
             let mut left = f.clone();
             let mut rows: Vec<&mut [f64]> = left.chunks_mut(width).collect();
-            Left::new(n, entry).apply(&mut rows, &mut Packed::default());
+            let matrix: Vec<f64> = (0..n * n).map(|p| entry(p / n, p % n)).collect();
+            Left::same(&Fold::new(n, &matrix)).apply(&mut rows, &mut Packed::default());
             let mut right = f.clone();
             Right::new(n, entry).apply(&mut right, &mut Packed::default());
             for r in 0..n {

@@ -9,6 +9,7 @@ mod cost;
 mod direct;
 mod eigen;
 mod equation;
+mod fold;
 mod gemm;
 mod kernel;
 mod lines;

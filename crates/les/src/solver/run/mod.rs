@@ -12,6 +12,7 @@
 mod energy;
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use super::flow::Flow;
 use super::growth::UndampedGrowth;
@@ -172,6 +173,15 @@ pub struct RunSummary {
     pub is_complete: bool,
 }
 
+/// Wall time that a run has spent in steps.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Stepping {
+    /// All of it \[s\].
+    pub wall_s: f64,
+    /// In exchanges between ranks, waiting for them included \[s\].
+    pub exchange_s: f64,
+}
+
 /// A simulation with its plan.
 #[derive(Debug)]
 pub struct Run {
@@ -184,6 +194,7 @@ pub struct Run {
     energy: EnergyBound,
     has_warned: HasWarned,
     is_fresh: bool,
+    stepping: Stepping,
 }
 
 /// What has been warned of.
@@ -201,7 +212,7 @@ impl Run {
     pub fn new(flow: Flow, plan: RunPlan) -> Result<Self, Error> {
         plan.check(flow.time_s())?;
         let energy = EnergyBound::new(&flow);
-        Ok(Self { flow, whole: None, plan, open: None, energy, has_warned: HasWarned::default(), is_fresh: true })
+        Ok(Self::with(flow, plan, None, energy, true))
     }
 
     /// A run that continues from a checkpoint written by a run, with the bytes that the observer had given.
@@ -221,13 +232,22 @@ impl Run {
             return Err(Error::CheckpointDamaged { path: path.to_owned(), what });
         };
         plan.check(f64::NEG_INFINITY)?;
-        let has_warned = HasWarned::default();
-        Ok((Self { flow, whole: None, plan, open, energy, has_warned, is_fresh: false }, user_data.to_vec()))
+        Ok((Self::with(flow, plan, open, energy, false), user_data.to_vec()))
+    }
+
+    fn with(flow: Flow, plan: RunPlan, open: Option<EnergyBudget>, energy: EnergyBound, is_fresh: bool) -> Self {
+        let (has_warned, stepping) = Default::default();
+        Self { flow, whole: None, plan, open, energy, has_warned, is_fresh, stepping }
     }
 
     /// The simulation, or the part that this rank has.
     pub fn flow(&self) -> &Flow {
         &self.flow
+    }
+
+    /// What the steps of this run have taken so far.
+    pub fn stepping(&self) -> Stepping {
+        self.stepping
     }
 
     /// The plan.
@@ -257,7 +277,10 @@ impl Run {
             let before_s = self.flow.time_s();
             let energy = self.flow.kinetic_energy_m5_s2();
             self.look_for_growth(observer);
+            let (begun, exchanged_s) = (Instant::now(), self.flow.layout.slabs.ranks.spent_s());
             let report = self.flow.step_towards(target_s)?;
+            self.stepping.wall_s += begun.elapsed().as_secs_f64();
+            self.stepping.exchange_s += self.flow.layout.slabs.ranks.spent_s() - exchanged_s;
             if report.step_s < SHORTEST_SHARE * (end_s - start_s) && !self.is_reached(target_s) {
                 let (step, step_s) = (report.step, report.step_s);
                 return Err(Error::StepTooShort { step, time_s: report.time_s, step_s, end_s });

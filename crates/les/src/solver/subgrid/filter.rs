@@ -67,7 +67,7 @@ impl Filter {
     }
 
     /// Writes the small scales of `velocity` to `small`.
-    pub(super) fn small_scales(&self, velocity: [&[f64]; 3], small: &mut [Vec<f64>; 3]) {
+    pub(super) fn small_scales(&self, velocity: [&[f64]; 3], small: &mut [&mut [f64]; 3]) {
         let shape = self.shape;
         for (component, (field, small)) in velocity.into_iter().zip(small).enumerate() {
             small[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own()).for_each_init(
@@ -287,7 +287,8 @@ mod tests {
                 };
                 let field: Vec<f64> = (0..layout.shape.len()).map(value).collect();
                 let mut small = [0, 1, 2].map(|_| vec![0.0; field.len()]);
-                Filter::new(&layout, order).small_scales([&field, &field, &field], &mut small);
+                let filter = Filter::new(&layout, order);
+                filter.small_scales([&field, &field, &field], &mut small.each_mut().map(Vec::as_mut_slice));
                 for (small, field) in small.iter().flatten().zip(field.iter().cycle()) {
                     assert!((small - share * field).abs() < 5e-14, "order {order}, {waves:?}: {small}");
                 }

@@ -22,8 +22,8 @@
 //! what the step follows: it is cut at that value. Without the cut noise along a vortex of three cells grew a thousandfold in
 //! 150 steps; a step short enough gave the same noise and, to 5e-5, the same energy as the cut.
 //!
-//! Where no model is asked for there is none: no arrays, no work. A model takes 7 arrays of the size of the mesh, the multiscale
-//! one 10.
+//! Where no model is asked for there is none: no arrays, no work. A model takes 4 arrays of the size of the mesh, the multiscale
+//! one 6.
 //!
 //! Check: closed forms, laminar flows, walls, vortices, the energy identity, bits against threads.
 
@@ -84,13 +84,22 @@ impl SubgridModel {
     }
 }
 
+/// Fields of the flow that are free while a model is updated.
+#[derive(Debug)]
+pub(crate) struct Lent<'a> {
+    /// Gets the acceleration by the stresses whose divergence is taken in planes \[m/s^2\].
+    pub(crate) in_plane: &'a mut [Vec<f64>; 3],
+    /// Gets small scales of the first component.
+    pub(crate) small: &'a mut Vec<f64>,
+}
+
 /// A subgrid model at work on one mesh.
 #[derive(Debug)]
 pub(crate) struct Subgrid {
     formula: Formula,
     operators: Operators,
-    /// The filter and the small scales of the multiscale model.
-    small: Option<(Filter, [Vec<f64>; 3])>,
+    /// The filter and the small scales of the multiscale model, but for those of the first component.
+    small: Option<(Filter, [Vec<f64>; 2])>,
     /// At the centres \[m^2/s\].
     viscosity: Vec<f64>,
     largest: Largest,
@@ -106,7 +115,7 @@ impl Subgrid {
     pub(crate) fn new(layout: &Layout, model: SubgridModel) -> Result<Option<Self>, Error> {
         let Some((formula, order)) = formula_and_order(model)? else { return Ok(None) };
         let cells = layout.shape.len();
-        let fields = || [vec![0.0; cells], vec![0.0; cells], vec![0.0; cells]];
+        let fields = || [vec![0.0; cells], vec![0.0; cells]];
         Ok(Some(Self {
             formula,
             operators: Operators::new(layout),
@@ -119,34 +128,36 @@ impl Subgrid {
     }
 
     /// Eddy viscosity and stress of the flow `velocity_m_s`. The viscosity is cut where the shortest waves would decay faster
-    /// than `limit_per_s`, which an explicit time step could not follow; infinity leaves it as it is.
+    /// than `limit_per_s`, which an explicit time step could not follow; infinity leaves it as it is. What is lent keeps a part of
+    /// the divergence of the stress, for [`Self::add_divergence_row`].
     ///
     /// # Errors
     /// Those of the exchange between ranks.
-    pub(crate) fn update(&mut self, velocity_m_s: [&[f64]; 3], limit_per_s: f64) -> Result<(), Error> {
+    pub(crate) fn update(&mut self, velocity_m_s: [&[f64]; 3], limit_per_s: f64, lent: Lent<'_>) -> Result<(), Error> {
         let Self { operators, formula, viscosity, small, slabs, .. } = self;
         let largest = eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity);
         let [viscosity_m2_s, decay_per_s] = slabs.largest([largest.viscosity_m2_s, largest.decay_per_s])?;
         self.largest = Largest { viscosity_m2_s, decay_per_s };
         let strained = match small {
-            Some((filter, small)) => {
-                filter.small_scales(velocity_m_s, small);
-                let [a, b, c] = small.each_mut().map(Vec::as_mut_slice);
-                slabs.halos(&mut [viscosity, a, b, c])?;
-                small.each_ref().map(Vec::as_slice)
+            Some((filter, [second, third])) => {
+                let mut small = [lent.small.as_mut_slice(), second, third];
+                filter.small_scales(velocity_m_s, &mut small);
+                let [a, b, c] = small;
+                slabs.halos(&mut [viscosity, &mut *a, &mut *b, &mut *c])?;
+                [&*a, &*b, &*c]
             }
             None => {
                 slabs.halos(&mut [viscosity])?;
                 velocity_m_s
             }
         };
-        self.stress.update(operators, viscosity, strained);
+        self.stress.update(operators, viscosity, strained, lent.in_plane);
         let [a, b, c] = self.stress.across.each_mut().map(Vec::as_mut_slice);
         slabs.halos(&mut [a, b, c])
     }
 
-    /// Adds the divergence of the stress to the acceleration of row `(j, k)` of one component \[m/s^2\]. Rows of walls get
-    /// nothing.
+    /// Adds the rest of the divergence of the stress to the acceleration of row `(j, k)` of one component, which has the part
+    /// that was lent \[m/s^2\]. Rows of walls get nothing.
     pub(crate) fn add_divergence_row(&self, component: usize, j: usize, k: usize, out_m_s2: &mut [f64]) {
         self.stress.add_divergence_row(&self.operators, component, [j, k], out_m_s2);
     }

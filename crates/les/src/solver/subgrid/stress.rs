@@ -5,8 +5,8 @@
 //! work that it does on the flow is `-sum weights tau:S`, for any viscosity, mesh and wall. Edges on walls carry no stress:
 //! an eddy viscosity vanishes at a no-slip wall, and so does the strain at a slip wall.
 //!
-//! Of the divergence, what comes from the stresses in a plane of axis 2 is kept ready; for the rest the three stresses that act
-//! across that axis are kept.
+//! Of the divergence, what comes from the stresses in a plane of axis 2 goes to fields that the flow lends; for the rest the three
+//! stresses that act across that axis are kept.
 //!
 //! Check: the energy identity to round-off.
 
@@ -20,8 +20,6 @@ use super::operators::Operators;
 /// What the divergence needs of the stress.
 #[derive(Debug, Clone)]
 pub(super) struct Stress {
-    /// Acceleration of each component by the stresses whose divergence is taken along the axes 0 and 1 \[m/s^2\].
-    pub(super) in_plane: [Vec<f64>; 3],
     /// `tau_02`, `tau_12` at the edges and `tau_22` at the centres \[m^2/s^2\].
     pub(super) across: [Vec<f64>; 3],
 }
@@ -37,7 +35,7 @@ struct Scratch {
     padded: Vec<f64>,
 }
 
-/// One plane of each array of [`Stress`].
+/// One plane of each array that is written.
 struct Planes<'a> {
     in_plane: [&'a mut [f64]; 3],
     across: [&'a mut [f64]; 3],
@@ -45,15 +43,21 @@ struct Planes<'a> {
 
 impl Stress {
     pub(super) fn new(cells: usize) -> Self {
-        let fields = || [vec![0.0; cells], vec![0.0; cells], vec![0.0; cells]];
-        Self { in_plane: fields(), across: fields() }
+        Self { across: [vec![0.0; cells], vec![0.0; cells], vec![0.0; cells]] }
     }
 
-    /// The stress by the viscosity at the centres and the strain of `velocity`.
-    pub(super) fn update(&mut self, operators: &Operators, viscosity: &[f64], velocity: [&[f64]; 3]) {
+    /// The stress by the viscosity at the centres and the strain of `velocity`. `in_plane` gets the acceleration of each component by
+    /// the stresses whose divergence is taken along the axes 0 and 1 \[m/s^2\].
+    pub(super) fn update(
+        &mut self,
+        operators: &Operators,
+        viscosity: &[f64],
+        velocity: [&[f64]; 3],
+        in_plane: &mut [Vec<f64>; 3],
+    ) {
         let shape = operators.shape;
         let (n, plane) = (shape.n[0], shape.plane());
-        let [a0, a1, a2] = self.in_plane.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
+        let [a0, a1, a2] = in_plane.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
         let [t0, t1, t2] = self.across.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
         (a0, a1, a2, t0, t1, t2, shape.own()).into_par_iter().for_each_init(
             || Scratch {
@@ -70,19 +74,15 @@ impl Stress {
         );
     }
 
-    /// Adds the divergence of the stress to the acceleration of the row `at` of `component` \[m/s^2\].
+    /// Adds the divergence of the stresses across the planes to the acceleration of the row `at` of `component` \[m/s^2\].
     pub(super) fn add_divergence_row(&self, operators: &Operators, component: usize, at: [usize; 2], out: &mut [f64]) {
-        let in_plane = &self.in_plane[component][operators.shape.row(at[0], at[1])];
         let operator = if component == 2 { &operators.to_faces[2] } else { &operators.to_cells[2] };
-        add_divergence_row(operator, in_plane, &self.across[component], at, out);
+        add_divergence_row(operator, &self.across[component], at, out);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn add_divergence_row(operator: &RowOperator, in_plane: &[f64], across: &[f64], at: [usize; 2], out: &mut [f64]) {
-    for (out, value) in out.iter_mut().zip(in_plane) {
-        *out += value;
-    }
+fn add_divergence_row(operator: &RowOperator, across: &[f64], at: [usize; 2], out: &mut [f64]) {
     operator.add_across(out, across, at);
 }
 

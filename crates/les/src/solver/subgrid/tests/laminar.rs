@@ -66,7 +66,7 @@ fn the_viscosity_is_cut_where_the_shortest_wave_would_decay_faster_than_the_limi
     let free_m2_s = flow.model.viscosity_m2_s()[middle];
     let decay_per_s = free_m2_s * 49.0 / 9.0 * h.iter().map(|h| 1.0 / (h * h)).sum::<f64>();
     for (share, kept) in [(0.25, 0.25), (0.999, 0.999), (1.001, 1.0)] {
-        flow.model.update(flow.velocity.each_ref().map(Vec::as_slice), share * decay_per_s).unwrap();
+        flow.update(share * decay_per_s);
         let found = flow.model.viscosity_m2_s()[middle];
         assert!((found / free_m2_s - kept).abs() < 1e-12, "{share}: {found} of {free_m2_s}");
         // The corners of the box, where slip walls bend the flow, may have more.
@@ -123,7 +123,7 @@ fn laminar_shear_has_no_small_scales_right_up_to_the_walls() {
         let small = |field: &dyn Fn([f64; 3]) -> [f64; 3]| {
             let flow = Modelled::new(directions.clone(), model, field);
             let cells = flow.layout.shape.len();
-            let small = flow.model.small.as_ref().map(|(_, small)| small.clone()).unwrap();
+            let small = flow.small().unwrap();
             (0..24)
                 .map(|k| {
                     let of_plane = |place: usize| flow.index(place)[2] == k;

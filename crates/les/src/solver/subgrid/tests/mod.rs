@@ -16,6 +16,9 @@ struct Modelled {
     layout: Layout,
     velocity: [Vec<f64>; 3],
     model: Subgrid,
+    in_plane: [Vec<f64>; 3],
+    /// Small scales of the first component.
+    small: Vec<f64>,
 }
 
 impl Modelled {
@@ -25,9 +28,22 @@ impl Modelled {
         // The memory axes are x, y, z, so that a test can name them.
         let layout = Layout::new(&mesh, Some([0, 1, 2]));
         let velocity = faces(&mesh, &layout, field);
-        let mut model = Subgrid::new(&layout, model).unwrap().unwrap();
-        model.update(velocity.each_ref().map(Vec::as_slice), f64::INFINITY).unwrap();
-        Self { mesh, layout, velocity, model }
+        let model = Subgrid::new(&layout, model).unwrap().unwrap();
+        let small = vec![0.0; layout.shape.len()];
+        let in_plane = [small.clone(), small.clone(), small.clone()];
+        let mut modelled = Self { mesh, layout, velocity, model, in_plane, small };
+        modelled.update(f64::INFINITY);
+        modelled
+    }
+
+    fn update(&mut self, limit_per_s: f64) {
+        let lent = Lent { in_plane: &mut self.in_plane, small: &mut self.small };
+        self.model.update(self.velocity.each_ref().map(Vec::as_slice), limit_per_s, lent).unwrap();
+    }
+
+    /// The small scales of the multiscale model.
+    fn small(&self) -> Option<[Vec<f64>; 3]> {
+        self.model.small.as_ref().map(|(_, [second, third])| [self.small.clone(), second.clone(), third.clone()])
     }
 
     fn index(&self, place: usize) -> [usize; 3] {
@@ -42,7 +58,7 @@ impl Modelled {
     fn acceleration(&self) -> [Vec<f64>; 3] {
         let shape = self.layout.shape;
         std::array::from_fn(|component| {
-            let mut field = vec![0.0; shape.len()];
+            let mut field = self.in_plane[component].clone();
             for k in 0..shape.n[2] {
                 for j in 0..shape.n[1] {
                     self.model.add_divergence_row(component, j, k, &mut field[shape.row(j, k)]);
@@ -62,8 +78,8 @@ impl Modelled {
 
     /// Stress `tau_00, tau_11, tau_22, tau_01, tau_02, tau_12`, place by place from the rows of the operators.
     fn plain_stress(&self) -> [Vec<f64>; 6] {
-        let small = self.model.small.as_ref().map_or(&self.velocity, |(_, small)| small);
-        let mut strain = strain(&self.layout, small);
+        let small = self.small();
+        let mut strain = strain(&self.layout, small.as_ref().unwrap_or(&self.velocity));
         let nu = &self.model.viscosity;
         let before = |place: usize, axis: usize| {
             let mut index = self.index(place);
