@@ -196,11 +196,10 @@ fn model_m_s(plan: &Plan, pair: &VortexPair, parameters: &Parameters) -> Result<
 /// The solution of four equations by elimination; their matrix is positive.
 fn solved(mut m: [[f64; 5]; 4]) -> Parameters {
     for pivot in 0..4 {
-        for row in 0..4 {
-            let share = if row == pivot { 0.0 } else { m[row][pivot] / m[pivot][pivot] };
-            for column in pivot..5 {
-                m[row][column] -= share * m[pivot][column];
-            }
+        let line = m[pivot];
+        for (_, other) in m.iter_mut().enumerate().filter(|(row, _)| *row != pivot) {
+            let share = other[pivot] / line[pivot];
+            other.iter_mut().zip(line).for_each(|(a, b)| *a -= share * b);
         }
     }
     std::array::from_fn(|i| m[i][4] / m[i][i])
