@@ -21,6 +21,8 @@ const AIR: Turbulence = Turbulence { deviation_m_s: 0.8, length_m: 25.0 };
 /// Height that is scanned and half the length of the scan, m.
 const HEIGHT_M: f64 = 110.0;
 const HALF_LENGTH_M: f64 = 110.0;
+/// Where alarms in still air are counted \[m\].
+const ALARM_RANGE_M: f64 = 400.0;
 
 /// What is found at one range in one background.
 struct Case {
@@ -62,7 +64,9 @@ fn settings(
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let ranges_m = context.choose(vec![400.0], vec![300.0, 400.0, 600.0, 900.0], vec![300.0, 400.0, 600.0, 900.0]);
     let step_m = context.choose(1.0, 0.5, 0.5);
-    let mut cases = Vec::new();
+    // Few scans tell a high rate alone.
+    let (scans, rate) = context.choose((24, 0.3), (300, 0.1), (1000, 0.1));
+    let (mut cases, mut alarmed) = (Vec::new(), None);
     for &range_m in &ranges_m {
         let plan = Plan::new(context.scene_file(scene(range_m, step_m))?, Target::Map)?;
         let snr_db = snr_without_screens_db(&plan, &[range_m])?.first().copied().unwrap_or(f64::NAN);
@@ -73,10 +77,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
                 Calibration::new(&strided(&noise.empty_scan(&plan), settings.stride), &settings)?.power(&settings)?;
             cases.push(Case { background, range_m, snr_db, power });
         }
+        if range_m == ALARM_RANGE_M {
+            alarmed = Some(alarms(&plan, &noise, (scans, rate))?);
+        }
     }
-    // Few scans tell a high rate alone.
-    let (scans, rate) = context.choose((24, 0.3), (300, 0.1), (1000, 0.1));
-    let alarms = alarms(context, (scans, rate), step_m)?;
+    let alarmed = alarmed.ok_or_else(|| Failure::new(format!("no scan at {ALARM_RANGE_M} m")))?;
     let parameters = format!(
         "profile = \"{}\"\nrange_m = {ranges_m:?}\nline_spacing_m = {step_m}\nfalse_alarm = {FALSE_ALARM}\nturbulence = [{}, {}]\nscans_of_still_air = {scans}\nrate_counted = {rate}\n",
         context.profile_name(),
@@ -93,25 +98,20 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         AIR.deviation_m_s,
         AIR.length_m
     );
-    out.claims = claims(&cases, alarms);
+    out.claims = claims(&cases, alarmed);
     Ok(out)
 }
 
 /// Share of alarms at a rate in whole scans of still air, each with signals of its own, through the scene's estimator; the rate and its
 /// binomial standard error.
-fn alarms(context: &Context, (scans, rate): (u64, f64), step_m: f64) -> Result<(Share, [f64; 2]), Failure> {
-    let plan = |seed: u64| -> Result<Plan, Failure> {
-        let mut file = context.scene_file(scene(400.0, step_m))?;
-        file.scene.seed = seed;
-        Ok(Plan::new(file, Target::Map)?)
-    };
-    let first = plan(context.seed)?;
-    let noise = SceneNoise::new(&first, &Silent)?;
-    let settings = settings(&first, &noise, None, rate)?;
+fn alarms(plan: &Plan, noise: &SceneNoise, (scans, rate): (u64, f64)) -> Result<(Share, [f64; 2]), Failure> {
+    let settings = settings(plan, noise, None, rate)?;
     let scan = |scan: u64| -> Result<_, Failure> {
+        let mut file = plan.scene.clone();
         // far from the seed of the scans that measured the noise
-        let map = wakescope_sim::run(&plan(context.seed + 1000 + scan)?, &Silent)?.map;
-        let mut empty = noise.empty_scan(&first);
+        file.scene.seed += 1000 + scan;
+        let map = wakescope_sim::run(&Plan::new(file, Target::Map)?, &Silent)?.map;
+        let mut empty = noise.empty_scan(plan);
         empty.velocity_m_s = map.ok_or_else(|| Failure::new("a run without a map".into()))?.v_scan_m_s;
         Ok(empty)
     };
