@@ -1,6 +1,6 @@
 //! `cargo xtask work-precision`: error against run time of every solver, every estimator and the whole chain, knob by knob.
 //!
-//! Every row is measured in this run, on one thread; the time is the smallest of three runs. Errors are relative, with their standard
+//! Every row is measured in this run, on one thread; the time is the smallest of three runs, of one beyond 0.2 s. Errors are relative, with their standard
 //! errors; a setting that fails is a row. Tables, pictures and the cheapest settings go to `target/work-precision`.
 
 mod chain;

@@ -35,7 +35,7 @@ struct Curve {
 }
 
 fn scene(context: &Context) -> Scene {
-    with_turbulence(context, with_method(early_scene(context.choose(5, 24, 100)), "CA"), 1e-13)
+    with_turbulence(context, with_method(early_scene(context.choose(3, 24, 100)), "CA"), 1e-13)
 }
 
 fn curve(study: &Study, reference: &'static str, energy_j: f64) -> Curve {

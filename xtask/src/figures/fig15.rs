@@ -14,7 +14,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = context.provenance_of_formula(&format!("profile = \"{}\"\nthreads = 1\n", context.profile_name()));
     let mut out = Rendered::new(&table(&groups), &fronts(&groups), &origin)?;
     out.caption = format!(
-        "Relative error against processor time, one thread of {}, the smallest of three times: of each case the settings that no other \
+        "Relative error against processor time, one thread of {}, the smallest of three times below 0.2 s: of each case the settings that no other \
          beats in both{}. All settings, also those that fail, are in the table (fig15.csv); times differ from run to run.",
         machine(),
         if quick { "; a few settings, the whole is `cargo xtask work-precision`" } else { "" }
