@@ -17,8 +17,9 @@ pub(crate) fn roots(a: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
     }
     // every root lies within 1 + the largest coefficient; trailing zeros are roots at 0
     let degree = a.len();
-    let bound = 1.0 + a.iter().map(|a| a.norm()).fold(0.0, f64::max);
-    let radius = a.last().map_or(1.0, |last| last.norm().powf(1.0 / degree as f64)).clamp(1e-3, bound);
+    let sizes: Vec<f64> = a.iter().map(|a| a.norm()).collect();
+    let bound = 1.0 + sizes.iter().copied().fold(0.0, f64::max);
+    let radius = sizes.last().map_or(1.0, |last| last.powf(1.0 / degree as f64)).clamp(1e-3, bound);
     // the offset keeps the start from the symmetry of real coefficients
     let start = |k: usize| Complex::from_polar(radius, std::f64::consts::TAU * (k as f64 + 0.35) / degree as f64);
     let mut roots: Vec<Complex<f64>> = (0..degree).map(start).collect();
@@ -26,7 +27,7 @@ pub(crate) fn roots(a: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
         let mut moved = 0.0_f64;
         for k in 0..degree {
             let z = roots[k];
-            let Some(newton) = newton_step(a, z) else {
+            let Some(newton) = newton_step(a, &sizes, z) else {
                 continue;
             };
             let crowd: Complex<f64> = roots
@@ -47,17 +48,18 @@ pub(crate) fn roots(a: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
         }
     }
     // a cluster converges only linearly and to the root of the rounding: accepted where the polynomial vanishes
-    let settled = |z: &Complex<f64>| newton_step(a, *z).is_none_or(|step| step.norm() < 1e-5);
+    let settled = |z: &Complex<f64>| newton_step(a, &sizes, *z).is_none_or(|step| step.norm() < 1e-5);
     roots.iter().all(settled).then_some(roots)
 }
 
-/// P(z) / P'(z); `None` where P is zero to rounding.
-fn newton_step(a: &[Complex<f64>], z: Complex<f64>) -> Option<Complex<f64>> {
+/// P(z) / P'(z), with the absolute values of the coefficients; `None` where P is zero to rounding.
+fn newton_step(a: &[Complex<f64>], sizes: &[f64], z: Complex<f64>) -> Option<Complex<f64>> {
+    let radius = z.norm();
     let (mut value, mut slope, mut size): (Complex<f64>, Complex<f64>, f64) = (Complex::ONE, Complex::ZERO, 1.0);
-    for a in a {
+    for (a, a_size) in a.iter().zip(sizes) {
         slope = slope * z + value;
         value = value * z + a;
-        size = size * z.norm() + a.norm();
+        size = size * radius + a_size;
     }
     if value.norm() <= 4.0 * f64::EPSILON * size { None } else { Some(value / slope) }
 }

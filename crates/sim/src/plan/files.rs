@@ -20,7 +20,7 @@ const MAP_COLUMNS: f64 = 25.0;
 const NUMBER_BYTES: f64 = 8.0;
 const TEXT_BYTES: f64 = 15.0;
 /// Program that drawing brings into memory, letters included.
-const DRAWING_BYTES: f64 = 1.2e6;
+const DRAWING_BYTES: f64 = 7e5;
 /// Pixels of the picture of a profile.
 const PROFILE_PIXELS: f64 = 1344.0 * 520.0;
 
