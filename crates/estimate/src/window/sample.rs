@@ -32,21 +32,27 @@ pub trait Sample: Copy + Send + Sync + sealed::Sealed + 'static {
 
 impl Sample for f64 {
     const KIND: SignalKind = SignalKind::Real;
+    #[inline]
     fn to_complex(self) -> Complex<f64> {
         Complex::new(self, 0.0)
     }
+    #[inline]
     fn scaled(self, factor: f64) -> Self {
         self * factor
     }
+    #[inline]
     fn largest_part(self) -> f64 {
         self.abs()
     }
+    #[inline]
     fn is_finite(self) -> bool {
         f64::is_finite(self)
     }
+    #[inline]
     fn has_part(self, value: f64) -> bool {
         self == value
     }
+    #[inline]
     fn products(ahead: &[Self], behind: &[Self], parts: &mut [Vec<f64>; 2]) {
         parts[0].clear();
         parts[0].extend(ahead.iter().zip(behind).map(|(a, b)| a * b));
@@ -55,21 +61,27 @@ impl Sample for f64 {
 
 impl Sample for Complex<f64> {
     const KIND: SignalKind = SignalKind::Complex;
+    #[inline]
     fn to_complex(self) -> Complex<f64> {
         self
     }
+    #[inline]
     fn scaled(self, factor: f64) -> Self {
         self * factor
     }
+    #[inline]
     fn largest_part(self) -> f64 {
         self.re.abs().max(self.im.abs())
     }
+    #[inline]
     fn is_finite(self) -> bool {
         Complex::is_finite(self)
     }
+    #[inline]
     fn has_part(self, value: f64) -> bool {
         self.re == value || self.im == value
     }
+    #[inline]
     fn products(ahead: &[Self], behind: &[Self], parts: &mut [Vec<f64>; 2]) {
         let [re, im] = parts;
         re.clear();
