@@ -12,6 +12,8 @@ pub use recorded::{recorded_names, write_recorded};
 
 use crate::Error;
 use crate::beams::{Schedule, SweepMode};
+#[cfg(feature = "plots")]
+use crate::io::OutputError;
 use crate::io::lock::FolderLock;
 use crate::io::own::refuse_foreign;
 use crate::io::signals::{LineVelocities, RawSignals, Recording};
@@ -149,7 +151,13 @@ pub fn write_set_up(plan: &Plan, path: &Path) -> Result<(), Error> {
     };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    refuse_foreign(folder, [name.as_ref()], Existing::Own)?;
+    refuse_foreign(folder, [name.as_ref()], Existing::Own).map_err(|error| match error {
+        OutputError::Foreign { path } => {
+            let reason = "it was not written by this program, or was changed since: name another file".into();
+            Error::Input { path, reason }
+        }
+        other => other.into(),
+    })?;
     Ok(crate::io::write_atomic(path, bytes)?)
 }
 

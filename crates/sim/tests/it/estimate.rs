@@ -131,6 +131,11 @@ fn every_format_and_order_gives_the_velocities_of_the_run() {
         [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), &bytes(&|i| one[i])].concat()
     };
     let lines = rows / 2;
+    // One time for all pulses of a line.
+    let scene = SceneFile::read(&temp.path().join("s.toml")).unwrap();
+    let elevation_rad = Plan::new(scene, wakescope_sim::Target::Map).unwrap().geometry.elevation_rad.clone();
+    let rays: Vec<String> = elevation_rad.iter().enumerate().map(|(i, e)| format!("{e},{i}\n")).collect();
+    fs::write(temp.path().join("rays.csv"), format!("elevation_rad,time_s\n{}", rays.concat())).unwrap();
     for (name, content, words) in [
         ("a.bin", [b"head".to_vec(), bytes(&|i| one[i])].concat(), "--format f64 --byte-order big --header-bytes 4"),
         // [pulse, line, sample] and [sample, line, pulse] of [line, pulse, sample].
@@ -140,7 +145,7 @@ fn every_format_and_order_gives_the_velocities_of_the_run() {
             "--format f64 --byte-order big --order pulse-major",
         ),
         ("c.bin", bytes(&|i| one[i % rows * samples + i / rows]), "--format f64 --byte-order big --order sample-major"),
-        ("d.csv", text.join("\n").into_bytes(), ""),
+        ("d.csv", text.join("\n").into_bytes(), "--rays rays.csv"),
         ("e.npy", npy, ""),
     ] {
         fs::write(temp.path().join(name), content).unwrap();

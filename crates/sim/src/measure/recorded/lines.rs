@@ -111,9 +111,10 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
     let mut first = 0;
     let mut direction = 0.0;
     while first < count {
+        // Pulses of a line may share its time; a time that goes back begins another line.
         let is_same = |record: &usize| {
             elevation_rad[*record] == elevation_rad[first]
-                && (*record == first || time_s[*record] > time_s[*record - 1])
+                && (*record == first || time_s[*record] >= time_s[*record - 1])
         };
         let same = (first..count).take_while(is_same).count();
         let last = found.last().and_then(|scan| scan.elevation_rad.last());
