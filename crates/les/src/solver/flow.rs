@@ -21,7 +21,7 @@ use super::pressure::{self, PressureSolver, Solved};
 use super::projection::{Divergence, correct, divide_by_volume, weighted_dot};
 use super::report::{StartReport, StepReport};
 use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
-use super::stage::{Powers, Task};
+use super::stage::{Powers, Task, blocks};
 use super::subgrid::{Lent, Subgrid};
 use crate::Error;
 
@@ -248,25 +248,25 @@ impl Flow {
         let explicit_per_s = self.settings.scheme.largest_decay() * stage.fraction / stage_s;
         self.update_model((SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0))?;
         let shape = self.layout.shape;
+        let (task, star, history) = self.task();
+        let keep = if task.implicit == [false; 3] { 1.0 } else { 0.0 };
+        let powers: Vec<[Powers; 3]> = blocks(shape, star, history)
+            .into_par_iter()
+            .map_init(
+                || std::array::from_fn(|_| Scratch::new(shape.n[0])),
+                |scratch, block| task.increments(block, (stage, stage_s, keep, measured), scratch),
+            )
+            .collect();
         let mut total = Powers::default();
-        for axis in 0..3 {
-            let (task, star, history) = self.task();
-            let keep = if task.implicit == [false; 3] { 1.0 } else { 0.0 };
-            let own = [&mut star[axis], &mut history[axis]].map(|field| &mut field[shape.own_places()]);
-            let [star, history] = own.map(|field| field.par_chunks_mut(shape.plane()));
-            let powers: Vec<Powers> = (star, history, shape.own())
-                .into_par_iter()
-                .map_init(
-                    || Scratch::new(shape.n[0]),
-                    |scratch, (star, history, k)| {
-                        task.increments([axis, k], (stage, stage_s, keep, measured), star, history, scratch)
-                    },
-                )
-                .collect();
-            if measured {
-                for plane in self.layout.slabs.planes(powers)? {
-                    total = std::array::from_fn(|i| total[i] + plane[i]);
-                }
+        if measured {
+            // Those of each plane, component after component, then of all.
+            let of_plane = |k| -> [f64; 9] {
+                let blocks = || powers.iter().skip(k).step_by(shape.own().len());
+                std::array::from_fn(|i| blocks().map(|powers| powers[i / 3][i % 3]).sum())
+            };
+            let planes = self.layout.slabs.planes((0..shape.own().len()).map(of_plane).collect())?;
+            for (component, plane) in (0..3).flat_map(|component| planes.iter().map(move |plane| (component, plane))) {
+                total = std::array::from_fn(|i| total[i] + plane[3 * component + i]);
             }
         }
         Ok(total)

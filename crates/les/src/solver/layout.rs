@@ -1,7 +1,8 @@
 //! How fields lie in memory, and the operators in that order.
 //!
-//! Memory axis 0 is contiguous. It is x, but for plane flows in which x has one cell: then a direction with many cells takes
-//! its place, so that the kernels have long rows to work on. Every array of the solver has one value per cell, `[axis 2][axis
+//! Memory axis 0 is contiguous. It is x, unless another direction gives the kernels longer rows to work on: y if it is longer and
+//! its cells are equal and periodic, so that the pressure solver has a Fourier transform there, too; in a plane flow the direction
+//! with many cells. Every array of the solver has one value per cell, `[axis 2][axis
 //! 1][axis 0]`: values at the centres, or at the low face of each cell in the component's own direction.
 //!
 //! Check: the order of plane and spatial flows.
@@ -74,22 +75,26 @@ fn order(mesh: &Mesh, asked: Option<[usize; 3]>) -> [usize; 3] {
     asked.unwrap_or(match mesh.cells() {
         [1, ny, nz] if ny > 1 && ny >= nz => [1, 0, 2],
         [1, _, nz] if nz > 1 => [2, 0, 1],
+        [nx, ny, _] if ny > nx && Operators1d::new(&mesh.directions()[1]).is_fourier() => [1, 0, 2],
         _ => [0, 1, 2],
     })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::mesh::Direction;
+    use super::super::mesh::{Direction, Mapping};
     use super::*;
 
     #[test]
-    fn rows_are_long_in_plane_flows() {
-        let order = |nx, ny, nz| {
-            let d = |n| Direction::periodic(n, 0.0, 1.0);
-            Layout::new(&Mesh::new(d(nx), d(ny), d(nz)).unwrap(), None).direction
-        };
-        assert_eq!(order(8, 16, 32), [0, 1, 2]);
+    fn rows_are_long_where_that_costs_no_transform() {
+        let d = |n| Direction::periodic(n, 0.0, 1.0);
+        let order = |nx, ny, nz| Layout::new(&Mesh::new(d(nx), d(ny), d(nz)).unwrap(), None).direction;
+        assert_eq!(order(8, 16, 32), [1, 0, 2]);
+        assert_eq!(order(16, 16, 32), [0, 1, 2]);
+        let sine = d(16).stretched(Mapping::Sine { amplitude: 0.3 });
+        for y in [Direction::between(16, 0.0, 1.0, Wall::Slip, Wall::Slip), sine] {
+            assert_eq!(Layout::new(&Mesh::new(d(8), y, d(32)).unwrap(), None).direction, [0, 1, 2]);
+        }
         assert_eq!(order(1, 64, 32), [1, 0, 2]);
         assert_eq!(order(1, 32, 64), [2, 0, 1]);
         assert_eq!(order(32, 1, 64), [0, 1, 2]);

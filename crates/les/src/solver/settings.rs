@@ -132,7 +132,8 @@ pub struct FlowSettings {
     pub rotational: bool,
     /// Subgrid model.
     pub subgrid: SubgridModel,
-    /// Order of the directions in memory, slowest last; `None` chooses. It changes rounding, nothing else.
+    /// Order of the directions in memory, slowest last. `None` chooses: x, y, z, but y, x, z where y has more cells than x, all equal
+    /// and periodic, and in plane flows the long direction first. It changes rounding, nothing else.
     pub memory_order: Option<[usize; 3]>,
     /// The ranks that share the flow; one process unless told otherwise. They change nothing of a result. All ranks must have
     /// the same settings but for their own number, and make the same calls.

@@ -69,6 +69,7 @@ fn wakes_with_filters_of_order_1_and_4_are_the_same_on_any_number_of_ranks() {
         let model = SubgridModel::MultiscaleWale { constant: 0.9, order };
         assert_same(&format!("order {order}"), &wake([8, 24, 29], model, false), 2);
     }
+    assert_same("planes of two blocks", &wake([72, 60, 28], SubgridModel::None, false), 1);
 }
 
 #[test]

@@ -1,8 +1,8 @@
-//! The right side of the momentum equation, plane by plane.
+//! The right side of the momentum equation, in blocks of rows.
 
 use multiversion::multiversion;
 
-use super::layout::Layout;
+use super::layout::{Layout, Shape};
 use super::momentum::{Momentum, Scratch};
 use super::projection::weighted_dot;
 use super::settings::Stage;
@@ -10,6 +10,40 @@ use super::subgrid::Subgrid;
 
 /// Work done on the fluid per time by viscosity, the subgrid stress and the force.
 pub(super) type Powers = [f64; 3];
+
+/// Values of a block: what its stencils reach, and the fluxes that are kept for it, stay in the cache of a core.
+const BLOCK: usize = 4096;
+
+/// Some rows of one plane, of the three components.
+#[derive(Debug)]
+pub(super) struct Block<'a> {
+    plane: usize,
+    /// The first of its rows.
+    row: usize,
+    star: [&'a mut [f64]; 3],
+    history: [&'a mut [f64]; 3],
+}
+
+/// Cuts the planes that are owned into blocks of the same rows of one plane after the other, so that rows of the planes about a
+/// block have just been read.
+pub(super) fn blocks<'a>(shape: Shape, star: &'a mut [Vec<f64>; 3], history: &'a mut [Vec<f64>; 3]) -> Vec<Block<'a>> {
+    let [n0, n1, _] = shape.n;
+    let rows = n1.div_ceil((n0 * n1).div_ceil(BLOCK));
+    let pieces = |field: &'a mut Vec<f64>| {
+        let planes = field[shape.own_places()].chunks_mut(shape.plane());
+        planes.flat_map(move |plane| plane.chunks_mut(rows * n0))
+    };
+    let (mut star, mut history) = (star.each_mut().map(pieces), history.each_mut().map(pieces));
+    let mut blocks: Vec<Vec<Block<'_>>> = (0..n1.div_ceil(rows)).map(|_| Vec::new()).collect();
+    for plane in shape.own() {
+        for (at, blocks) in blocks.iter_mut().enumerate() {
+            let star = star.each_mut().map(|pieces| pieces.next().unwrap_or_default());
+            let history = history.each_mut().map(|pieces| pieces.next().unwrap_or_default());
+            blocks.push(Block { plane, row: at * rows, star, history });
+        }
+    }
+    blocks.into_iter().flatten().collect()
+}
 
 /// What the planes of the momentum equation read.
 pub(super) struct Task<'a> {
@@ -24,34 +58,36 @@ pub(super) struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// `star = dt (c N + c' N' - grad p + nu L u) + keep u` in plane `k` of component `axis`, with the history; returns the work
-    /// if `measured`.
+    /// `star = dt (c N + c' N' - grad p + nu L u) + keep u` in the rows of a block, with the history; returns the work of each
+    /// component if `measured`.
     pub(super) fn increments(
         &self,
-        [axis, k]: [usize; 2],
+        block: Block<'_>,
         (stage, stage_s, keep, measured): (&Stage, f64, f64, bool),
-        star: &mut [f64],
-        history: &mut [f64],
-        scratch: &mut Scratch,
-    ) -> Powers {
-        let n = self.layout.shape.n[0];
-        let mut powers = Powers::default();
-        for (j, (star, history)) in star.chunks_mut(n).zip(history.chunks_mut(n)).enumerate() {
-            if self.ops[axis].is_wall_row(j, k) {
-                star.fill(0.0);
-                continue;
+        scratch: &mut [Scratch; 3],
+    ) -> [Powers; 3] {
+        let (n, k) = (self.layout.shape.n[0], block.plane);
+        let mut powers = [Powers::default(); 3];
+        let components = block.star.into_iter().zip(block.history).zip(scratch).zip(&mut powers).enumerate();
+        for (axis, (((star, history), scratch), powers)) in components {
+            let rows = star.chunks_mut(n).zip(history.chunks_mut(n));
+            for ((star, history), j) in rows.zip(block.row..) {
+                if self.ops[axis].is_wall_row(j, k) {
+                    star.fill(0.0);
+                    continue;
+                }
+                self.terms([axis, j, k], star, scratch, measured.then_some(&mut *powers));
+                scratch.gradient(&self.ops[axis], self.pressure, j, k);
+                let own = &self.velocity[axis][self.layout.shape.row(j, k)];
+                let nu = self.viscosity_m2_s;
+                advance_row(
+                    [stage.new, stage.old, nu, stage_s, keep],
+                    star,
+                    history,
+                    [&scratch.implicit, &scratch.pressure, own],
+                );
+                self.hold_at_wall(axis, star);
             }
-            self.terms([axis, j, k], star, scratch, measured.then_some(&mut powers));
-            scratch.gradient(&self.ops[axis], self.pressure, j, k);
-            let own = &self.velocity[axis][self.layout.shape.row(j, k)];
-            let nu = self.viscosity_m2_s;
-            advance_row(
-                [stage.new, stage.old, nu, stage_s, keep],
-                star,
-                history,
-                [&scratch.implicit, &scratch.pressure, own],
-            );
-            self.hold_at_wall(axis, star);
         }
         powers
     }
@@ -142,5 +178,28 @@ fn advance_row(
         let total = new * term + old * history[i] - pressure[i] + nu * implicit[i];
         history[i] = term;
         star[i] = stage_s * total + keep * own[i];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_hold_every_value_that_is_owned_once_and_in_its_place() {
+        for shape in [Shape::whole([100, 130, 5]), Shape::slab([100, 41, 16], 1, 3), Shape::whole([5000, 2, 9])] {
+            let mut star = [0, 1, 2].map(|axis| (0..shape.len()).map(|place| (3 * place + axis) as f64).collect());
+            let mut history = star.clone();
+            let mut seen = 0;
+            for Block { plane, row, star, history } in blocks(shape, &mut star, &mut history) {
+                assert!(star[0].len() <= BLOCK.max(shape.n[0]));
+                for (axis, (star, history)) in star.into_iter().zip(history).enumerate() {
+                    assert_eq!(star[0], (3 * shape.place([0, row, plane]) + axis) as f64);
+                    assert_eq!(star, history);
+                    seen += star.len();
+                }
+            }
+            assert_eq!(seen, 3 * shape.own_places().len());
+        }
     }
 }

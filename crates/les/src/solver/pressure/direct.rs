@@ -100,9 +100,15 @@ impl Direct {
         if !self.by_planes() {
             self.lines(0, field, shape, LineTransform::forward);
         }
-        self.lines(1, field, shape, LineTransform::forward);
-        self.divide(field, shape, first);
-        self.lines(1, field, shape, LineTransform::inverse);
+        match &self.along {
+            [Along::Factorised(band), _] => {
+                self.lines(1, field, shape, LineTransform::forward);
+                self.banded(1, band, field, shape, first);
+                self.lines(1, field, shape, LineTransform::inverse);
+            }
+            [_, Along::Factorised(band)] => self.banded(2, band, field, shape, first),
+            [_, Along::Transformed(transform)] => self.divide(transform, field, shape, first),
+        }
         if !self.by_planes() {
             self.lines(0, field, shape, LineTransform::inverse);
         }
@@ -155,27 +161,26 @@ impl Direct {
         each.for_each_init(Work::default, |work, bundle| apply(transform, &mut bundle.rows, work));
     }
 
-    /// Solves for the coefficients of the eigenvectors.
-    fn divide(&self, field: &mut [f64], shape: Shape, first: usize) {
-        let banded = self.along.iter().enumerate().find_map(|(which, along)| match along {
-            Along::Factorised(band) => Some((which + 1, band)),
-            Along::Transformed(_) => None,
+    /// Solves for the coefficients of the eigenvectors of the other axes along the factorised one.
+    fn banded(&self, axis: usize, band: &BandedCholesky, field: &mut [f64], shape: Shape, first: usize) {
+        let along = &self.value[0][first..first + shape.n[0]];
+        let other = &self.value[3 - axis];
+        bundles(field, shape, axis).par_iter_mut().for_each_init(Scratch::default, |scratch, bundle| {
+            let width = bundle.rows.first().map_or(0, |row| row.len());
+            let shifts = &along[bundle.start..bundle.start + width];
+            band.solve(&mut bundle.rows, other[bundle.other], shifts, self.scale, scratch);
         });
+    }
+
+    /// Divides the coefficients of the eigenvectors of all axes by their values, on the way along axis 2 there and back.
+    fn divide(&self, transform: &LineTransform, field: &mut [f64], shape: Shape, first: usize) {
         let value = &self.value;
-        let (n0, n1) = (shape.n[0], shape.n[1]);
-        let along = &value[0][first..first + n0];
-        if let Some((axis, band)) = banded {
-            let other = &value[3 - axis];
-            bundles(field, shape, axis).par_iter_mut().for_each_init(Scratch::default, |scratch, bundle| {
-                let width = bundle.rows.first().map_or(0, |row| row.len());
-                let shifts = &along[bundle.start..bundle.start + width];
-                band.solve(&mut bundle.rows, other[bundle.other], shifts, self.scale, scratch);
+        bundles(field, shape, 2).par_iter_mut().for_each_init(Work::default, |work, bundle| {
+            let along = &value[0][first + bundle.start..];
+            transform.there_and_back(&mut bundle.rows, work, |mode, start, values| {
+                kernel::divide(values, value[1][bundle.other] + value[2][mode], &along[start..], self.scale);
             });
-        } else {
-            field.par_chunks_mut(n0).with_min_len(64).enumerate().for_each(|(r, row)| {
-                kernel::divide(row, value[1][r % n1] + value[2][r / n1], along, self.scale);
-            });
-        }
+        });
     }
 }
 

@@ -98,22 +98,58 @@ impl Left {
 
     /// Replaces the `n` rows `f` of equal length by `A f`.
     pub(crate) fn apply(&self, f: &mut [&mut [f64]], packed: &mut Packed) {
-        let width = f.first().map_or(0, |row| row.len());
-        let Packed { columns: panel, product, .. } = packed;
-        panel.resize(self.n, [0.0; COLUMNS]);
-        product.resize(self.n, [0.0; COLUMNS]);
-        for start in (0..width).step_by(COLUMNS) {
-            let columns = COLUMNS.min(width - start);
-            take(&self.before, f, [start, start + columns], panel);
-            for &(first, rows, ref groups) in &self.blocks {
-                let panel = &panel[first..first + rows];
-                for (group, out) in groups.iter().zip(product[first..first + rows].chunks_mut(ROWS)) {
-                    multiply(group, panel, columns, out);
-                }
-            }
-            give(&self.after, product, f, [start, start + columns]);
+        let (panel, product) = packed.panels(self.n);
+        for columns in panels(f) {
+            take(&self.before, f, columns, panel);
+            self.multiply(panel, columns, product);
+            give(&self.after, product, f, columns);
         }
     }
+
+    /// As `there`, which has sums and differences before it alone, and `back`, with those after it alone, one after the other;
+    /// `act` is given each row in between, in pieces, with the first place of the piece.
+    pub(crate) fn there_and_back(
+        [there, back]: &[Self; 2],
+        f: &mut [&mut [f64]],
+        packed: &mut Packed,
+        act: impl Fn(usize, usize, &mut [f64]),
+    ) {
+        let (panel, product) = packed.panels(there.n);
+        for columns in panels(f) {
+            take(&there.before, f, columns, panel);
+            there.multiply(panel, columns, product);
+            for (row, values) in product.iter_mut().enumerate() {
+                act(row, columns[0], &mut values[..columns[1] - columns[0]]);
+            }
+            back.multiply(product, columns, panel);
+            give(&back.after, panel, f, columns);
+        }
+    }
+
+    /// The product with one panel.
+    fn multiply(&self, panel: &[TileRow], [start, end]: [usize; 2], product: &mut [TileRow]) {
+        for &(first, rows, ref groups) in &self.blocks {
+            let panel = &panel[first..first + rows];
+            for (group, out) in groups.iter().zip(product[first..first + rows].chunks_mut(ROWS)) {
+                multiply(group, panel, end - start, out);
+            }
+        }
+    }
+}
+
+impl Packed {
+    /// Two panels of `n` rows.
+    fn panels(&mut self, n: usize) -> (&mut [TileRow], &mut [TileRow]) {
+        self.columns.resize(n, [0.0; COLUMNS]);
+        self.product.resize(n, [0.0; COLUMNS]);
+        (&mut self.columns[..n], &mut self.product[..n])
+    }
+}
+
+/// First column of each panel of `f`, and the one after its last.
+fn panels(f: &[&mut [f64]]) -> impl Iterator<Item = [usize; 2]> + use<> {
+    let width = f.first().map_or(0, |row| row.len());
+    (0..width).step_by(COLUMNS).map(move |start| [start, width.min(start + COLUMNS)])
 }
 
 /// Copies some columns of `f`, with sums and differences of pairs of rows in their places.
