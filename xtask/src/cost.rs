@@ -1,7 +1,8 @@
-//! What a piece of work takes: processor time, time on the clock, memory; and on which machine. Linux only: the figures come from /proc.
+//! What a piece of work takes: processor time, time on the clock, memory; and on which machine. Linux only: memory and machine come
+//! from /proc.
 
 use crate::Failure;
-use std::path::PathBuf;
+use rustix::time::{ClockId, clock_gettime};
 use std::process::Command;
 use std::time::Instant;
 
@@ -29,30 +30,25 @@ impl Cost {
 
 /// Runs a piece of work and measures it.
 pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
-    let (threads_s, process_s, start) = (cpu_s(), process_cpu_s(), Instant::now());
+    let (before_s, start) = (cpu_s(), Instant::now());
     let value = work()?;
-    let (threads_s, process_s) = (cpu_s() - threads_s, process_cpu_s() - process_s);
-    // Threads that have ended since count in the time of the process alone, which is told in hundredths of a second.
-    let cpu_s = if process_s > threads_s + 0.05 { process_s } else { threads_s };
+    let cpu_s = cpu_s() - before_s;
     Ok((value, Cost { cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: peak_mem_bytes() }))
 }
 
-/// Processor time of the process so far, ended threads included, s; NaN where the system does not tell.
-fn process_cpu_s() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // Behind the name in brackets: utime and stime at places 11 and 12, in hundredths of a second.
-    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or("").split_whitespace().collect();
-    let ticks = |place: usize| fields.get(place).and_then(|t| t.parse::<f64>().ok()).unwrap_or(f64::NAN);
-    (ticks(11) + ticks(12)) / 100.0
+/// Processor time of the process so far, s: of all its threads, those that have ended included.
+pub(crate) fn cpu_s() -> f64 {
+    seconds(ClockId::ProcessCPUTime)
 }
 
-/// Processor time of all threads so far, s; NaN where the system does not tell.
-fn cpu_s() -> f64 {
-    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
-    let of = |path: PathBuf| -> Option<f64> {
-        std::fs::read_to_string(path.join("schedstat")).ok()?.split_whitespace().next()?.parse().ok()
-    };
-    tasks.flatten().filter_map(|task| of(task.path())).sum::<f64>() * 1e-9
+/// Processor time of this thread so far, s.
+pub(crate) fn thread_cpu_s() -> f64 {
+    seconds(ClockId::ThreadCPUTime)
+}
+
+fn seconds(clock: ClockId) -> f64 {
+    let time = clock_gettime(clock);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 /// Largest resident memory of this process so far, bytes; NaN where the system does not tell.
@@ -62,8 +58,8 @@ fn peak_mem_bytes() -> f64 {
     line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).map_or(f64::NAN, |kb| 1024.0 * kb)
 }
 
-/// Shortest piece of work that the system's clock of processor time, which ticks every 4 ms, tells to a tenth \[s\].
-const TELLABLE_S: f64 = 0.04;
+/// Shortest piece of work whose time is told by one of three runs: a call into the system and a full cache count little beside it \[s\].
+const TELLABLE_S: f64 = 0.01;
 
 /// Work that takes longer \[s\] is timed once: what disturbs it now and then is a small part of it.
 const LONG_S: f64 = 0.2;

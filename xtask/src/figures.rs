@@ -41,6 +41,27 @@ pub(crate) struct Figure {
     pub(crate) make: fn(&Context) -> Result<Rendered, Failure>,
 }
 
+/// Which figures are drawn one after the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Lane {
+    /// Those of the simulated wake, which the first of them may have to run.
+    Wake,
+    /// Those that do not look at it.
+    Formula,
+    /// Those that measure times, and need the machine for themselves.
+    Alone,
+}
+
+impl Figure {
+    pub(crate) fn lane(&self) -> Lane {
+        match self.number {
+            6..=14 | 17 => Lane::Wake,
+            15 => Lane::Alone,
+            _ => Lane::Formula,
+        }
+    }
+}
+
 /// All figures, in the order of the report.
 pub(crate) const ALL: [Figure; 23] = [
     Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },

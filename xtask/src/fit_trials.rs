@@ -32,9 +32,15 @@ pub(crate) struct Options {
     /// Fit the signals with the true core radius, which is then not fitted.
     #[arg(long)]
     known_core: bool,
+    /// Samples from one gate of the maps to the next.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=64))]
+    gate_step: u16,
     /// Fit the maps only, which takes seconds instead of minutes.
     #[arg(long)]
     maps_only: bool,
+    /// Fit no more maps than the signals need to start from: that with the core kept.
+    #[arg(long, conflicts_with = "maps_only")]
+    signals_only: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -125,7 +131,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
         Case::SmallCores => (PairCase::SMALL_CORES, Sharing::Separate),
     };
     let truth = case.truth();
-    let pair = PairScan::of(&case, NoiseModel::BandLimited, (200e-9, options.snr_db), 8, options.seed)?;
+    let pair =
+        PairScan::of(&case, NoiseModel::BandLimited, (200e-9, options.snr_db), options.gate_step.into(), options.seed)?;
     let free = |core_radius| FreeParameters { circulation, core_radius, ..Default::default() };
     let of_signals = free(if options.known_core { Sharing::Fixed } else { Sharing::Common });
     let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth)?;
@@ -139,7 +146,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let trial = FitTrial::new(&pair, scan)?;
         let mut guess = None;
         let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
-        for (fits, (core, prior)) in maps.iter_mut().zip(cores) {
+        for (fits, (core, prior)) in maps.iter_mut().zip(cores).take(if options.signals_only { 1 } else { 3 }) {
             let (fit, cost) = measured(|| trial.map(free(core), prior))?;
             let kept = fits.keep(scan, (fit, cost.cpu_s), |fit: &MapFit| (fit.wake, &fit.covariance));
             guess = guess.or(kept.map(|fit| fit.wake));
@@ -156,9 +163,14 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let (found, at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?);
         if let (Some(found), Some(at_truth)) = (found, at_truth) {
             let less = at_truth.log_likelihood - found.log_likelihood;
+            let off = |place: usize| (found.wake.to_array()[place] - truth.to_array()[place]) / bound[place];
+            let fitted = TOLD.iter().filter(|told| bound[told.1 as usize] > 0.0);
+            let worst = fitted.max_by(|a, b| off(a.1 as usize).abs().total_cmp(&off(b.1 as usize).abs()));
             println!(
-                "scan {scan}: ln p {less:+.2} below that of the start at the truth; tops {:.2?}",
-                found.tops.iter().map(|top| top.log_likelihood - found.log_likelihood).collect::<Vec<_>>()
+                "scan {scan}: ln p {less:+.2} below that of the start at the truth; tops {:.2?}; {} off by {:+.1} bounds",
+                found.tops.iter().map(|top| top.log_likelihood - found.log_likelihood).collect::<Vec<_>>(),
+                worst.map_or("nothing", |told| told.0),
+                worst.map_or(0.0, |told| off(told.1 as usize)),
             );
             below.push(less);
         }

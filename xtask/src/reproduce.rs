@@ -1,20 +1,23 @@
 //! `cargo xtask reproduce-figs`: draws the figures, measures the claims, writes one report.
 //!
 //! Each figure is written as soon as it is made, and kept in a cache whose key is what it depends on: a second run draws
-//! only what has changed, and an interrupted one goes on where it was.
+//! only what has changed, and an interrupted one goes on where it was. Figures of the wake are drawn beside the others, for each
+//! leaves a core idle at times; those that measure times come last, alone.
 
 mod cache;
 mod report;
 
 use crate::claim::{Claim, Verdict};
-use crate::cost::measured;
+use crate::cost::{cpu_s, thread_cpu_s};
 use crate::figures::context::{Context, Rendered};
-use crate::figures::{self, Figure};
+use crate::figures::{self, Figure, Lane};
 use crate::profile::Profile;
 use crate::workspace::root;
 use crate::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
+use rayon::ThreadPool;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use wakescope_sim::io::{FileGroup, Table, write_atomic};
 
 /// Options of the task.
@@ -54,7 +57,6 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let chosen = choose(&options.only)?;
     let out = options.out.clone().unwrap_or_else(|| root().join("target/figures"));
     std::fs::create_dir_all(&out).map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
     let context = Context {
         profile: options.profile,
         seed: options.seed,
@@ -63,34 +65,66 @@ pub(crate) fn run(options: &Options) -> Outcome {
         wake: options.wake.clone(),
         analytic: options.analytic,
     };
+    let bar = progress_bar(chosen.len() as u64);
+    let start = Instant::now();
+    let draw = |lane: Lane| -> Result<Vec<(&'static Figure, Rendered)>, Failure> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
+        let of_lane = chosen.iter().filter(|figure| figure.lane() == lane);
+        of_lane.map(|figure| Ok((*figure, drawn(figure, options, &context, (&pool, &bar, &out))?))).collect()
+    };
+    let (of_wake, others) = if options.threads == 0 {
+        std::thread::scope(|scope| {
+            let beside = scope.spawn(|| draw(Lane::Wake));
+            let others = draw(Lane::Formula);
+            (beside.join(), others)
+        })
+    } else {
+        // No more threads than were asked for.
+        (Ok(draw(Lane::Wake)), draw(Lane::Formula))
+    };
+    let mut done = of_wake.map_err(|_| Failure::new("a figure of the wake stopped short".into()))??;
+    done.extend(others?);
+    done.extend(draw(Lane::Alone)?);
+    done.sort_by_key(|(figure, _)| figures::ALL.iter().position(|of| of.id == figure.id));
+    bar.finish_and_clear();
+    finish(&out, &context, &done, start.elapsed().as_secs_f64())
+}
+
+/// One figure, from the cache or made by the threads of the pool, and written.
+fn drawn(
+    figure: &'static Figure,
+    options: &Options,
+    context: &Context,
+    (pool, bar, out): (&ThreadPool, &ProgressBar, &Path),
+) -> Result<Rendered, Failure> {
+    bar.set_message(figure.id);
     // The key of the cache knows nothing of a wake from elsewhere.
     let is_other = options.wake.is_some();
-    let bar = progress_bar(chosen.len() as u64);
-
-    let mut done = Vec::new();
-    for figure in chosen {
-        bar.set_message(figure.id);
-        let place = cache::Place::new(figure.id, &context)?;
-        let cached = if options.no_cache || is_other { None } else { place.load() };
-        let from_cache = cached.is_some();
-        let rendered = match cached {
-            Some(rendered) => rendered,
-            None => {
-                let (mut rendered, cost) = measured(|| pool.install(|| (figure.make)(&context)))?;
-                rendered.timings.push(("total".into(), [cost.wall_s, cost.cpu_s]));
-                if !is_other {
-                    place.store(&rendered)?;
-                }
-                rendered
+    let place = cache::Place::new(figure.id, context)?;
+    let cached = if options.no_cache || is_other { None } else { place.load() };
+    let from_cache = cached.is_some();
+    let rendered = match cached {
+        Some(rendered) => rendered,
+        None => {
+            // Of the other lane the process's own clock would count the work, too.
+            let used_s = || match figure.lane() {
+                Lane::Alone => cpu_s(),
+                Lane::Wake | Lane::Formula => pool.broadcast(|_| thread_cpu_s()).into_iter().sum(),
+            };
+            let (before_s, start) = (used_s(), Instant::now());
+            let mut rendered = pool.install(|| (figure.make)(context))?;
+            let wall_s = start.elapsed().as_secs_f64();
+            rendered.timings.push(("total".into(), [wall_s, used_s() - before_s]));
+            if !is_other {
+                place.store(&rendered)?;
             }
-        };
-        write_figure(&out, figure, &rendered)?;
-        bar.inc(1);
-        bar.println(format!("{}{}: {}", figure.id, if from_cache { " (cached)" } else { "" }, figure.title));
-        done.push((figure, rendered));
-    }
-    bar.finish_and_clear();
-    finish(&out, &context, &done)
+            rendered
+        }
+    };
+    write_figure(out, figure, &rendered)?;
+    bar.inc(1);
+    bar.println(format!("{}{}: {}", figure.id, if from_cache { " (cached)" } else { "" }, figure.title));
+    Ok(rendered)
 }
 
 fn choose(only: &[u32]) -> Result<Vec<&'static Figure>, Failure> {
@@ -119,7 +153,7 @@ fn write_figure(out: &Path, figure: &Figure, rendered: &Rendered) -> Outcome {
 }
 
 /// Writes the tables over all figures and the report, and says what the claims came to.
-fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)]) -> Outcome {
+fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> Outcome {
     let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
     write_atomic(&out.join("claims.csv"), claims_table(&claims).to_csv(&context.provenance_of_run())?)?;
     let timings: Vec<(&str, &str, [f64; 2])> =
@@ -130,7 +164,7 @@ fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)]) -> Outcom
         .float("wall_s", timings.iter().map(|t| t.2[0]))
         .float("core_s", timings.iter().map(|t| t.2[1]));
     write_atomic(&out.join("timings.csv"), table.to_csv(&context.provenance_of_run())?)?;
-    write_atomic(&out.join("index.html"), report::html(context, done)?)?;
+    write_atomic(&out.join("index.html"), report::html(context, done, run_s)?)?;
     for claim in &claims {
         println!("{claim}");
     }

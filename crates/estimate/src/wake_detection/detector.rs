@@ -194,13 +194,18 @@ impl WakeDetector {
 
     /// Statistic and index of the best wake of the bank, given the products of a scan with all places.
     fn best(&self, products: ArrayView1<'_, f64>) -> (f64, usize) {
-        let product = |template: &Template| {
-            let of = |place: Option<usize>| place.map_or(0.0, |place| products[place]);
-            of(template.right) - of(template.left)
-        };
-        let all = self.bank.templates.iter().zip(&self.reciprocal_length).map(|(t, length)| product(t) * length);
-        let (most, best) = all.enumerate().fold((0.0, 0), |best, (i, x)| if x > best.0 { (x, i) } else { best });
+        let all = self.scores(products).enumerate();
+        let (most, best) = all.fold((0.0, 0), |best, (i, x)| if x > best.0 { (x, i) } else { best });
         (most * most, best)
+    }
+
+    /// How well each wake of the bank explains a scan, given its products with all places; the statistic is the square of the largest.
+    pub(super) fn scores(&self, products: ArrayView1<'_, f64>) -> impl Iterator<Item = f64> {
+        let score = move |(template, length): (&Template, &f64)| {
+            let of = |place: Option<usize>| place.map_or(0.0, |place| products[place]);
+            (of(template.right) - of(template.left)) * length
+        };
+        self.bank.templates.iter().zip(&self.reciprocal_length).map(score)
     }
 
     pub(super) fn value(&self, products: ArrayView1<'_, f64>) -> f64 {

@@ -101,11 +101,28 @@ impl DetectionTrials<'_> {
         self.empty.rows().into_iter().enumerate().map(trial).collect()
     }
 
-    /// Share of the wakes of that circulation \[m^2/s\] whose statistic exceeds a threshold.
+    /// Shares of the wakes of each circulation \[m^2/s\] whose statistic exceeds a threshold, which must not be negative.
     #[must_use]
-    pub fn detection(&self, circulation_m2_s: f64, threshold: f64) -> Share {
-        let found = self.statistics(circulation_m2_s).into_iter().filter(|value| *value > threshold).count();
-        Share::of(found, self.empty.nrows())
+    pub fn detection(&self, circulation_m2_s: &[f64], threshold: f64) -> Vec<Share> {
+        let missed = self.missed_m2_s(threshold);
+        circulation_m2_s.iter().map(|circulation| share(&missed, *circulation)).collect()
+    }
+
+    /// The circulations between which each trial stays below a threshold \[m^2/s\]: scores are linear in the circulation, so the largest of them is
+    /// convex.
+    fn missed_m2_s(&self, threshold: f64) -> Vec<[f64; 2]> {
+        let root = threshold.max(0.0).sqrt();
+        let slopes: Vec<Vec<f64>> = self.wakes.iter().map(|wake| self.detector.scores(wake.view()).collect()).collect();
+        let trial = |(i, empty): (usize, ndarray::ArrayView1<'_, f64>)| {
+            let lines = self.detector.scores(empty).zip(&slopes[i % slopes.len()]);
+            lines.fold([f64::NEG_INFINITY, f64::INFINITY], |[low, high], (score, slope)| match (root - score) / slope {
+                reached if *slope > 0.0 => [low, high.min(reached)],
+                reached if *slope < 0.0 => [low.max(reached), high],
+                _ if score > root => [f64::INFINITY, f64::NEG_INFINITY],
+                _ => [low, high],
+            })
+        };
+        self.empty.rows().into_iter().enumerate().map(trial).collect()
     }
 
     /// Bound on the circulation of the wakes were their places known \[m^2/s\], root mean square.
@@ -119,14 +136,21 @@ impl DetectionTrials<'_> {
     #[must_use]
     pub fn smallest_detectable_m2_s(&self, threshold: f64) -> (f64, f64) {
         let foretold = self.circulation_std_m2_s() * (threshold.max(0.0).sqrt() + NINE_OF_TEN);
+        let missed = self.missed_m2_s(threshold);
         let (mut low, mut high) = (0.0, 2.0 * foretold);
-        while self.detection(high, threshold).value < 0.9 && high < 64.0 * foretold {
+        while share(&missed, high).value < 0.9 && high < 64.0 * foretold {
             high *= 2.0;
         }
         while high - low > 2e-3 * high {
             let middle = 0.5 * (low + high);
-            if self.detection(middle, threshold).value < 0.9 { low = middle } else { high = middle }
+            if share(&missed, middle).value < 0.9 { low = middle } else { high = middle }
         }
         (0.5 * (low + high), foretold)
     }
+}
+
+/// Share of trials that find a circulation, of those between which each misses it.
+fn share(missed_m2_s: &[[f64; 2]], circulation_m2_s: f64) -> Share {
+    let is_missed = |[low, high]: &&[f64; 2]| (*low..=*high).contains(&circulation_m2_s);
+    Share::of(missed_m2_s.len() - missed_m2_s.iter().filter(is_missed).count(), missed_m2_s.len())
 }

@@ -265,8 +265,9 @@ fn thresholds_and_shares_of_wakes_that_are_found_are_those_of_an_independent_stu
         assert!((threshold - t2).abs() < 1.6 && (rare - t3).abs() < 1.9, "{text}");
         assert!((law.gumbel().0 - mu).abs() < 0.7 && (law.gumbel().1 - beta).abs() < 0.25, "{text}");
         assert!((found_m2_s / bound_m2_s - 1.0).abs() < 0.03, "{text}");
-        for (bounds, study) in [4.0, 5.0, 6.0].into_iter().zip(shares) {
-            let found = trials.detection(bounds * found_m2_s, threshold);
+        let of_bounds = [4.0, 5.0, 6.0];
+        let all = trials.detection(&of_bounds.map(|bounds| bounds * found_m2_s), threshold);
+        for ((bounds, found), study) in of_bounds.into_iter().zip(all).zip(shares) {
             println!("{bounds} {found:?}, study {study}");
             // never fewer than the study, by more than three standard errors
             assert!(found.value > study - 3.0 * found.standard_error, "{bounds}: {found:?}");
@@ -286,7 +287,11 @@ fn shares_from_products_are_those_of_whole_scans_with_wakes() {
     assert_eq!(wakes.len(), 40);
     let trials = detector.trials(&wakes, 2000, stream(9)).unwrap();
     let circulation_m2_s = 5.0 * trials.circulation_std_m2_s();
-    let expected = trials.detection(circulation_m2_s, threshold);
+    let expected = trials.detection(&[circulation_m2_s], threshold)[0];
+    for circulation_m2_s in [0.0, 0.6 * circulation_m2_s, circulation_m2_s] {
+        let counted = trials.statistics(circulation_m2_s).into_iter().filter(|value| *value > threshold).count();
+        assert_eq!(trials.detection(&[circulation_m2_s], threshold), [Share::of(counted, 2000)]);
+    }
     let mut rng = stream(10)(0);
     let mut found = 0;
     for scan in 0..1000 {
