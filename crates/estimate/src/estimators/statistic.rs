@@ -22,11 +22,13 @@ pub trait Statistic<S: Sample>: Sync {
 
     /// Hands the numbers of all valid windows of a record, `step_samples` apart, to `each` with the index of the window.
     ///
-    /// `valid` says which windows are to be used: those without a missing sample, which may be anything. The form given here calls
+    /// `record` may be a part of a longer one, in which it begins at `first_sample`; a window has the same numbers to the last bit
+    /// in every part. `valid` says which windows are to be used: those without a missing sample, which may be anything. The form given here calls
     /// [`Statistic::evaluate`] for every window; a statistic that can go on from the window before replaces it.
     fn evaluate_record(
         &self,
         record: &[S],
+        _first_sample: usize,
         step_samples: usize,
         valid: &dyn Fn(usize) -> bool,
         scratch: &mut Scratch,

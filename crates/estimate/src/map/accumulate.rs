@@ -8,6 +8,7 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use ndarray::ArrayView2;
 use num_complex::Complex;
@@ -71,14 +72,16 @@ pub struct MapPoint {
 /// (185 lines, 937 gates, 64 lags: 100 MB). Pulses of equal elevation share a line.
 pub struct Scan {
     geometry: ScanGeometry,
+    /// Gates whose windows are known: all, but for [`ScanSums::of_gates`].
+    held: Range<usize>,
     numbers: usize,
-    /// Statistics of each gate, the pulses of a line added.
+    /// Statistics of each gate held, the pulses of a line added.
     rows: Vec<f64>,
-    /// Sums over [`BLOCK`] gates, the last of a line over what is left.
+    /// Sums over [`BLOCK`] gates, from the first multiple of it held; the last of a line over what is left.
     blocks: Vec<f64>,
-    /// Valid windows before each gate, `gates + 1` per line.
+    /// Valid windows before each gate held, one more than gates per line.
     counts: Vec<usize>,
-    /// Validity of the windows of the rays with one that is not.
+    /// Validity of the windows held of the rays with one that is not.
     invalid: BTreeMap<usize, Vec<bool>>,
     scale: f64,
 }
@@ -150,7 +153,7 @@ impl Scan {
         length("mean", self.numbers, mean.len())?;
         mean.fill(0.0);
         let mut level = 0;
-        for chord in self.geometry.chords(point, radius_m) {
+        for chord in self.chords(point, radius_m) {
             level += self.valid(chord);
             self.add_chord(chord, mean);
         }
@@ -219,7 +222,7 @@ impl Scan {
         mean.fill(0.0);
         let mut sum = vec![0.0; self.numbers];
         let mut level = 0;
-        for chord in self.geometry.chords(point, radius_m) {
+        for chord in self.chords(point, radius_m) {
             level += self.valid(chord);
             sum.fill(0.0);
             self.add_chord(chord, &mut sum);
@@ -284,45 +287,55 @@ impl Scan {
     /// Effective number of independent windows of a region, (sum n)^2 / sum of gamma^2 over pairs of one pulse.
     #[must_use]
     pub fn n_eff(&self, point: PolarPoint, radius_m: f64, correlation: &WindowCorrelation) -> f64 {
-        let (mut level, mut pairs) = (0, 0.0);
-        for chord in self.geometry.chords(point, radius_m) {
+        let (mut level, mut pairs, start) = (0, 0.0, self.held.start);
+        for chord in self.chords(point, radius_m) {
             level += self.valid(chord);
             let whole = correlation.pair_sum(chord.gates());
             for ray in self.geometry.line_rays(chord.line) {
                 pairs += match self.invalid.get(&ray) {
                     None => whole,
-                    Some(invalid) => valid_pairs(&invalid[chord.first..=chord.last], correlation),
+                    Some(invalid) => valid_pairs(&invalid[chord.first - start..=chord.last - start], correlation),
                 };
             }
         }
         effective(level, pairs)
     }
 
+    /// Chords of a region, as far as they are held, by increasing elevation.
+    fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
+        self.geometry.chords(point, radius_m).filter_map(|chord| {
+            let (first, last) = (chord.first.max(self.held.start), chord.last.min(self.held.end - 1));
+            (first <= last).then_some(Chord { first, last, ..chord })
+        })
+    }
+
     /// Windows of a region, valid or not.
     fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
         let of = |chord: Chord| chord.gates() * self.geometry.rays.count(chord.line);
-        self.geometry.chords(point, radius_m).map(of).sum()
+        self.chords(point, radius_m).map(of).sum()
     }
 
     /// Valid windows of a chord.
     fn valid(&self, chord: Chord) -> usize {
-        let row = chord.line * (self.geometry.gates() + 1);
-        self.counts[row + chord.last + 1] - self.counts[row + chord.first]
+        let row = chord.line * (self.held.len() + 1);
+        let before = |gate: usize| self.counts[row + gate - self.held.start];
+        before(chord.last + 1) - before(chord.first)
     }
 
     /// Adds the sum over a chord to `out`: whole blocks, and the gates before and behind them.
     fn add_chord(&self, chord: Chord, out: &mut [f64]) {
-        let gates = self.geometry.gates();
+        let (start, gates) = (self.held.start, self.held.len());
+        let blocks = self.blocks.len() / (self.geometry.line_elevation_rad().len() * self.numbers);
         let of = |table: &'_ [f64], place: usize, out: &mut [f64]| {
             add(out, &table[place * self.numbers..(place + 1) * self.numbers]);
         };
         let mut gate = chord.first;
         while gate <= chord.last {
             if gate.is_multiple_of(BLOCK) && gate + BLOCK <= chord.last + 1 {
-                of(&self.blocks, chord.line * gates.div_ceil(BLOCK) + gate / BLOCK, out);
+                of(&self.blocks, chord.line * blocks + gate / BLOCK - start.div_ceil(BLOCK), out);
                 gate += BLOCK;
             } else {
-                of(&self.rows, chord.line * gates + gate, out);
+                of(&self.rows, chord.line * gates + gate - start, out);
                 gate += 1;
             }
         }

@@ -4,6 +4,8 @@
 //! Check: against the distance of every window; the accumulation levels 11, 43, 169 for 1, 2, 4 m
 //! at 400 m with 0.5 m between lines and 0.6 m between windows.
 
+use std::ops::Range;
+
 use crate::error::{Error, at_least_one, increasing, length, not_negative, positive};
 use crate::map::rays::{Rays, check_angles};
 use crate::window::{Gates, Sampling};
@@ -50,7 +52,7 @@ impl Chord {
 pub struct ScanGeometry {
     lines: Vec<f64>,
     /// Directions of the lines, if they are not all in one plane, and with each the lines that may share its regions.
-    sphere: Option<Vec<([f64; 3], std::ops::Range<usize>)>>,
+    sphere: Option<Vec<([f64; 3], Range<usize>)>>,
     pub(crate) rays: Rays,
     first_range_m: f64,
     spacing_m: f64,
@@ -164,6 +166,14 @@ impl ScanGeometry {
         (0..self.gates).map(|gate| self.first_range_m + gate as f64 * self.spacing_m).collect()
     }
 
+    /// Gates whose ranges are from `low_m` to `high_m`, and one more at each end.
+    #[must_use]
+    pub fn gates_between(&self, low_m: f64, high_m: f64) -> Range<usize> {
+        let place = |range_m: f64| (range_m - self.first_range_m) / self.spacing_m;
+        let start = (place(low_m).floor().max(0.0) as usize).min(self.gates - 1);
+        start..(place(high_m).ceil().max(0.0) as usize + 1).clamp(start + 1, self.gates)
+    }
+
     /// The middle of a chord.
     pub(crate) fn middle(&self, chord: Chord) -> PolarPoint {
         let gate = 0.5 * (chord.first + chord.last) as f64;
@@ -197,7 +207,7 @@ impl ScanGeometry {
     }
 
     /// Lines of a plane scan that may touch the disc.
-    fn lines_within(&self, point: PolarPoint, radius_m: f64) -> std::ops::Range<usize> {
+    fn lines_within(&self, point: PolarPoint, radius_m: f64) -> Range<usize> {
         let reach_rad = if radius_m < point.range_m { (radius_m / point.range_m).asin() } else { std::f64::consts::PI };
         let start = self.lines.partition_point(|line| *line < point.elevation_rad - reach_rad);
         let end = self.lines.partition_point(|line| *line <= point.elevation_rad + reach_rad);

@@ -70,8 +70,9 @@ impl<S: Sample> ShortCorrelogram<S> {
         }
     }
 
-    /// The same of all windows of a record, `step` samples apart, each after the other.
-    fn sums_of_all(&self, record: &[S], step: usize, out: &mut [f64]) {
+    /// The same of all windows of a record, `step` samples apart, each after the other. Blocks begin at the multiples of their
+    /// length in the whole record, of which this one is the part from `first_sample` on.
+    fn sums_of_all(&self, record: &[S], first_sample: usize, step: usize, out: &mut [f64]) {
         let numbers = S::KIND.lag_numbers(self.lags);
         let per_lag = S::KIND.lag_numbers(1);
         let mut parts = [Vec::new(), Vec::new()];
@@ -80,9 +81,9 @@ impl<S: Sample> ShortCorrelogram<S> {
             let length = self.window_samples - m;
             S::products(&record[m..], record, &mut parts);
             for (part, products) in parts.iter().take(per_lag).enumerate() {
-                running.form(products, length);
+                running.form(products, first_sample % length, length);
                 for (gate, sums) in out.chunks_mut(numbers).enumerate() {
-                    sums[per_lag * m + part] = running.of(gate * step, length);
+                    sums[per_lag * m + part] = running.of(gate * step, first_sample % length, length);
                 }
             }
         }
@@ -107,6 +108,7 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
     fn evaluate_record(
         &self,
         record: &[S],
+        first_sample: usize,
         step_samples: usize,
         valid: &dyn Fn(usize) -> bool,
         _: &mut Scratch,
@@ -121,7 +123,7 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
         // far apart, windows are cheaper one by one
         let mut means = vec![0.0; gates * numbers];
         if 3 * step_samples <= n {
-            self.sums_of_all(record, step_samples, &mut means);
+            self.sums_of_all(record, first_sample, step_samples, &mut means);
         } else {
             let windows = record.windows(n).step_by(step_samples);
             windows.zip(means.chunks_mut(numbers)).for_each(|(window, sums)| self.sums(window, sums));
@@ -144,12 +146,15 @@ struct Running {
 }
 
 impl Running {
-    /// Forms the sums in blocks of `length` products.
-    fn form(&mut self, products: &[f64], length: usize) {
+    /// Forms the sums in blocks of `length` products, of the first of which `skipped` are missing.
+    fn form(&mut self, products: &[f64], skipped: usize, length: usize) {
         self.to.clear();
         self.from.clear();
         self.from.resize(products.len(), 0.0);
-        for (block, from) in products.chunks(length).zip(self.from.chunks_mut(length)) {
+        let (first, rest) = products.split_at((length - skipped).min(products.len()));
+        let (first_from, rest_from) = self.from.split_at_mut(first.len());
+        let blocks = std::iter::once((first, first_from)).chain(rest.chunks(length).zip(rest_from.chunks_mut(length)));
+        for (block, from) in blocks {
             let mut sum = 0.0;
             self.to.extend(block.iter().map(|product| {
                 sum += product;
@@ -164,8 +169,8 @@ impl Running {
     }
 
     /// Sum of the `length` products from `start` on.
-    fn of(&self, start: usize, length: usize) -> f64 {
+    fn of(&self, start: usize, skipped: usize, length: usize) -> f64 {
         let end = self.to[start + length - 1];
-        if start.is_multiple_of(length) { end } else { self.from[start] + end }
+        if (start + skipped).is_multiple_of(length) { end } else { self.from[start] + end }
     }
 }

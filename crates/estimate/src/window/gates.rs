@@ -3,6 +3,8 @@
 //! Computes R = c (t_p + N T_s / 2) / 2 for a window that starts at t_p after the centre of the pulse
 //! has left. Check: the centre lies half a gate, 19.2 m for 64 samples at 250 MHz, beyond the start.
 
+use std::ops::Range;
+
 use crate::error::{Error, at_least_one, finite};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sampling};
 
@@ -48,6 +50,13 @@ impl Gates {
             return Err(Error::WindowLongerThanRecord { window_samples: self.window_samples, record_samples });
         }
         Ok((record_samples - self.window_samples) / self.step_samples + 1)
+    }
+
+    /// The samples of some windows, which are at least one.
+    #[must_use]
+    pub fn samples(&self, gates: &Range<usize>) -> Range<usize> {
+        let last = gates.end.saturating_sub(1).max(gates.start);
+        gates.start * self.step_samples..last * self.step_samples + self.window_samples
     }
 
     /// Range of the centre of window `gate` \[m\].

@@ -124,6 +124,43 @@ fn records_that_come_in_pieces_give_the_same_bits() {
     assert!(falling.to_string().contains("increasing"), "{falling}");
 }
 
+#[test]
+fn sums_of_some_gates_have_the_bits_of_whole_records() {
+    let mut records = noise_records(13);
+    records[[5, 200]] = f64::NAN;
+    let largest = records.iter().fold(0.0_f64, |largest, sample| largest.max(sample.abs()));
+    let correlation = WindowCorrelation::from_gate_lags(&[1.0, 0.9, 0.7, 0.4]).unwrap();
+    let of = |statistic: &dyn Statistic<f64>, step: usize, radius_m: f64, held: std::ops::Range<usize>| {
+        let gates = Gates { step_samples: step, ..gates() };
+        let geometry = ScanGeometry::new(&table_2(), &gates, &elevations_rad(), SAMPLES).unwrap();
+        let part = records.slice(s![.., gates.samples(&held)]).to_owned();
+        let mut sums = ScanSums::of_gates(statistic, &gates, geometry, held).unwrap().scaled_for(largest);
+        sums.add(0, part.view()).unwrap();
+        let scan = sums.finish();
+        let point = PolarPoint { range_m: 400.0, elevation_rad: 0.01 };
+        let mut mean = vec![0.0; statistic.statistic_len()];
+        let level = scan.region_mean(point, radius_m, &mut mean).unwrap();
+        let bits: Vec<u64> = mean.iter().map(|m| m.to_bits()).collect();
+        (bits, level, scan.n_eff(point, radius_m, &correlation).to_bits())
+    };
+    let (whole, short) = (plan().statistic, ShortCorrelogram::new(64, 17).unwrap());
+    for statistic in [&whole as &dyn Statistic<f64>, &short] {
+        for step in [1, 3, 30] {
+            let gates = Gates { step_samples: step, ..gates() };
+            let geometry = ScanGeometry::new(&table_2(), &gates, &elevations_rad(), SAMPLES).unwrap();
+            for radius_m in [0.5, 4.0, 14.0] {
+                let whole = of(statistic, step, radius_m, 0..geometry.gates());
+                let near = geometry.gates_between(400.0 - radius_m, 400.0 + radius_m);
+                for held in [near.clone(), near.start.saturating_sub(5)..near.end, near.start..geometry.gates()] {
+                    assert_eq!(of(statistic, step, radius_m, held), whole, "{step} {radius_m}");
+                }
+            }
+        }
+    }
+    let geometry = ScanGeometry::new(&table_2(), &gates(), &elevations_rad(), SAMPLES).unwrap();
+    assert!(ScanSums::<f64, _>::of_gates(&short, &gates(), geometry, 330..338).is_err());
+}
+
 fn points() -> Vec<PolarPoint> {
     let ranges_m: Vec<f64> = (0..40).map(|i| 330.0 + 3.0 * i as f64).collect();
     polar_points(&[0.001, 0.008, 0.0125], &ranges_m)

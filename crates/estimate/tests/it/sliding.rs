@@ -9,7 +9,7 @@ fn worst<S: Sample>(record: &[S], step: usize, valid: &dyn Fn(usize) -> bool) ->
     let (n, lags) = (64, 17);
     let statistic = ShortCorrelogram::<S>::new(n, lags).unwrap();
     let (mut largest, mut seen) = (0.0_f64, vec![]);
-    statistic.evaluate_record(record, step, valid, &mut Scratch::new(), &mut |gate, found| {
+    statistic.evaluate_record(record, 0, step, valid, &mut Scratch::new(), &mut |gate, found| {
         let direct = correlogram_by_sum(&record[gate * step..gate * step + n], &[1.0; 64]);
         for (found, direct_lag) in found.iter().zip(&direct) {
             largest = largest.max((found - direct_lag).abs() / direct[0]);
@@ -47,7 +47,7 @@ fn a_missing_sample_spoils_its_windows_only() {
 fn windows_without<S: Sample>(record: &[S], step: usize, bad: &[usize]) -> Vec<(usize, Vec<u64>)> {
     let statistic = ShortCorrelogram::<S>::new(64, 17).unwrap();
     let (mut seen, valid) = (vec![], |gate: usize| !bad.iter().any(|b| (gate * step..gate * step + 64).contains(b)));
-    statistic.evaluate_record(record, step, &valid, &mut Scratch::new(), &mut |gate, found| {
+    statistic.evaluate_record(record, 0, step, &valid, &mut Scratch::new(), &mut |gate, found| {
         seen.push((gate, found.iter().map(|value| value.to_bits()).collect()));
     });
     seen

@@ -186,8 +186,14 @@ fn arrays_that_numpy_wrote_are_read_by_name() {
 }
 
 #[test]
-fn blocks_of_lines_change_no_bit_of_velocities_that_follow_the_wind() {
-    let temp = recorded_run("[estimator]\nradius_m = 6.0\nfollow_wind = true\n");
+fn tiles_of_lines_and_gates_change_no_bit() {
+    for words in ["follow_wind = true", "method = { kind = \"autoregressive\" }\nweighting = \"rectangular\""] {
+        tiles_change_no_bit(&format!("[estimator]\nradius_m = 6.0\n{words}\n"));
+    }
+}
+
+fn tiles_change_no_bit(words: &str) {
+    let temp = recorded_run(words);
     let scene = SceneFile::read(&temp.path().join("s.toml")).unwrap();
     let with = |block_bytes: Option<usize>| {
         let (path, shape) = (temp.path().join("o/signals.nc"), record_shape(&scene.scene));
@@ -199,12 +205,14 @@ fn blocks_of_lines_change_no_bit_of_velocities_that_follow_the_wind() {
             Recorded::OfRun(_) => panic!("nothing is known of them"),
         }
     };
-    let (whole, in_blocks) = (with(None), with(Some(1)));
+    let whole = with(None);
     assert_eq!(whole.len(), 3);
-    for (a, b) in whole.iter().zip(&in_blocks) {
-        let bits = |values: &ndarray::Array2<f64>| values.mapv(f64::to_bits);
-        assert_eq!(bits(&a.velocity_m_s), bits(&b.velocity_m_s));
-        assert_eq!((bits(&a.n_eff), &a.flagged, bits(&a.snr_db)), (bits(&b.n_eff), &b.flagged, bits(&b.snr_db)));
+    for bytes in [1, 100_000] {
+        for (a, b) in whole.iter().zip(&with(Some(bytes))) {
+            let bits = |values: &ndarray::Array2<f64>| values.mapv(f64::to_bits);
+            assert_eq!(bits(&a.velocity_m_s), bits(&b.velocity_m_s), "{words} {bytes}");
+            assert_eq!((bits(&a.n_eff), &a.flagged, bits(&a.snr_db)), (bits(&b.n_eff), &b.flagged, bits(&b.snr_db)));
+        }
     }
 }
 

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use ndarray::ArrayView2;
 
@@ -24,9 +25,11 @@ pub struct ScanSums<'s, S, T: ?Sized> {
     statistic: &'s T,
     gates: Gates,
     geometry: ScanGeometry,
+    /// Gates whose windows are summed.
+    held: Range<usize>,
     record_samples: usize,
     numbers: usize,
-    /// Statistics of each gate, the pulses of a line added.
+    /// Statistics of each gate held, the pulses of a line added.
     rows: Vec<f64>,
     rule: Rule<'s>,
     invalid: BTreeMap<usize, Vec<bool>>,
@@ -45,6 +48,26 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         Self::with_rule(statistic, gates, geometry, record_samples, Rule::NOT_FINITE)
     }
 
+    /// The same for some gates of the records, whose samples [`Gates::samples`] tells: regions hold windows of these gates alone.
+    /// Those that lie within them have the bits that they have in the sums of whole records.
+    ///
+    /// # Errors
+    /// As [`ScanSums::new`]; [`Error::OutOfRange`] for gates that the geometry does not have.
+    pub fn of_gates(
+        statistic: &'s T,
+        gates: &Gates,
+        geometry: ScanGeometry,
+        held: Range<usize>,
+    ) -> Result<Self, Error> {
+        length("window", statistic.window_samples(), gates.window_samples)?;
+        if held.is_empty() || held.end > geometry.gates() {
+            let allowed = "behind their start, at most the gates of a record";
+            return Err(Error::OutOfRange { field: "end of the gates", value: held.end as f64, allowed });
+        }
+        let record_samples = gates.samples(&held).len();
+        Ok(Self::held(statistic, gates, geometry, held, record_samples, Rule::NOT_FINITE))
+    }
+
     /// The same with a rule for missing samples.
     pub(super) fn with_rule(
         statistic: &'s T,
@@ -55,21 +78,22 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     ) -> Result<Self, Error> {
         length("window", statistic.window_samples(), gates.window_samples)?;
         length("windows of a record", geometry.gates(), gates.count(record_samples)?)?;
+        let held = 0..geometry.gates();
+        Ok(Self::held(statistic, gates, geometry, held, record_samples, rule))
+    }
+
+    fn held(
+        statistic: &'s T,
+        gates: &Gates,
+        geometry: ScanGeometry,
+        held: Range<usize>,
+        record_samples: usize,
+        rule: Rule<'s>,
+    ) -> Self {
         let numbers = statistic.statistic_len();
-        let rows = vec![0.0; geometry.line_elevation_rad().len() * geometry.gates() * numbers];
-        let (invalid, sample) = (BTreeMap::new(), PhantomData);
-        Ok(Self {
-            statistic,
-            gates: *gates,
-            geometry,
-            record_samples,
-            numbers,
-            rows,
-            rule,
-            invalid,
-            scale: None,
-            sample,
-        })
+        let rows = vec![0.0; geometry.line_elevation_rad().len() * held.len() * numbers];
+        let (invalid, gates, scale, sample) = (BTreeMap::new(), *gates, None, PhantomData);
+        Self { statistic, gates, geometry, held, record_samples, numbers, rows, rule, invalid, scale, sample }
     }
 
     /// The same with the scale of samples up to `largest`: parts of a scan that are summed apart have the bits of the whole.
@@ -89,13 +113,13 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         let (rays, samples) = records.dim();
         length("samples of a record", self.record_samples, samples)?;
         let scale = self.rescale(records);
-        let (gates, rule, count) = (&self.gates, &self.rule, self.geometry.gates());
+        let (gates, rule, count) = (&self.gates, &self.rule, self.held.len());
         let found =
             map_indexed(rays, || (), |(), ray| invalid_windows(records.row(ray).iter().copied(), rule, gates, count));
         let found = found.into_iter().enumerate().filter_map(|(ray, invalid)| Some((first_ray + ray, invalid?)));
         self.invalid.extend(found);
         let (statistic, invalid, lines, numbers) = (self.statistic, &self.invalid, &self.geometry.rays, self.numbers);
-        let piece = first_ray..first_ray + rays;
+        let (piece, first_sample) = (first_ray..first_ray + rays, self.held.start * gates.step_samples);
         for_each_chunk(
             &mut self.rows,
             count * numbers,
@@ -106,9 +130,8 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
                     row.extend(records.row(ray - first_ray).iter().map(|s| s.scaled(scale.recip())));
                     let invalid = invalid.get(&ray);
                     let valid = |gate: usize| !invalid.is_some_and(|invalid| invalid[gate]);
-                    statistic.evaluate_record(row, gates.step_samples, &valid, scratch, &mut |gate, one| {
-                        add(&mut chunk[gate * numbers..(gate + 1) * numbers], one);
-                    });
+                    let mut sum = |gate: usize, one: &[f64]| add(&mut chunk[gate * numbers..][..numbers], one);
+                    statistic.evaluate_record(row, first_sample, gates.step_samples, &valid, scratch, &mut sum);
                 }
             },
         );
@@ -135,29 +158,32 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     /// The scan of the records that have come, ready to be averaged over any region.
     #[must_use]
     pub fn finish(self) -> Scan {
-        let Self { geometry, numbers, rows, invalid, scale, .. } = self;
-        let (line_numbers, line_blocks) = (geometry.gates() * numbers, geometry.gates().div_ceil(BLOCK) * numbers);
+        let Self { geometry, held, numbers, rows, invalid, scale, .. } = self;
+        // Blocks have the same gates whatever is held.
+        let skipped = (held.start.next_multiple_of(BLOCK) - held.start).min(held.len());
+        let line_numbers = held.len() * numbers;
+        let line_blocks = (held.len() - skipped).div_ceil(BLOCK) * numbers;
         let mut blocks = vec![0.0; geometry.line_elevation_rad().len() * line_blocks];
         for_each_chunk(
             &mut blocks,
-            line_blocks,
+            line_blocks.max(1),
             || (),
             |(), line, chunk| {
-                let rows = &rows[line * line_numbers..(line + 1) * line_numbers];
+                let rows = &rows[line * line_numbers + skipped * numbers..(line + 1) * line_numbers];
                 for (sum, rows) in chunk.chunks_mut(numbers).zip(rows.chunks(BLOCK * numbers)) {
                     rows.chunks(numbers).for_each(|row| add(sum, row));
                 }
             },
         );
-        let counts = valid_before(&geometry, &invalid);
-        Scan { geometry, numbers, rows, blocks, counts, invalid, scale: scale.unwrap_or(1.0) }
+        let counts = valid_before(&geometry, held.len(), &invalid);
+        Scan { geometry, held, numbers, rows, blocks, counts, invalid, scale: scale.unwrap_or(1.0) }
     }
 }
 
-/// Valid windows before each gate, for all lines.
-fn valid_before(geometry: &ScanGeometry, invalid: &BTreeMap<usize, Vec<bool>>) -> Vec<usize> {
+/// Valid windows before each gate held, for all lines.
+fn valid_before(geometry: &ScanGeometry, gates: usize, invalid: &BTreeMap<usize, Vec<bool>>) -> Vec<usize> {
     let lines = geometry.line_elevation_rad().len();
-    let mut counts = Vec::with_capacity(lines * (geometry.gates() + 1));
+    let mut counts = Vec::with_capacity(lines * (gates + 1));
     for line in 0..lines {
         let broken: Vec<&Vec<bool>> = match invalid.is_empty() {
             true => Vec::new(),
@@ -166,7 +192,7 @@ fn valid_before(geometry: &ScanGeometry, invalid: &BTreeMap<usize, Vec<bool>>) -
         let rays = geometry.rays.count(line);
         let mut before = 0;
         counts.push(0);
-        for gate in 0..geometry.gates() {
+        for gate in 0..gates {
             before += rays - broken.iter().filter(|list| list[gate]).count();
             counts.push(before);
         }

@@ -55,20 +55,7 @@ impl Banded {
 
     /// Replaces rows `from` .. `to` of x by those of L^-1 x, for an x that is 0 above `from`.
     pub(crate) fn forward(&self, re: &mut [f64], im: &mut [f64], from: usize, to: usize) {
-        for j in from..to {
-            let start = self.at(j, 0);
-            let scale = self.re[start].recip();
-            let value = (re[j] * scale, im[j] * scale);
-            (re[j], im[j]) = value;
-            let end = (j + self.height(j)).min(to);
-            let count = end - j - 1;
-            // x -= L value: `subtract` conjugates its factor
-            subtract(
-                (&mut re[j + 1..end], &mut im[j + 1..end]),
-                (&self.re[start + 1..start + 1 + count], &self.im[start + 1..start + 1 + count]),
-                (value.0, -value.1),
-            );
-        }
+        forward(self, re, im, from, to);
     }
 
     /// Replaces x by L^-H x.
@@ -119,6 +106,24 @@ fn factorize(band: &mut Banded) -> Option<f64> {
         }
     }
     Some(log_determinant)
+}
+
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn forward(band: &Banded, re: &mut [f64], im: &mut [f64], from: usize, to: usize) {
+    for j in from..to {
+        let start = band.at(j, 0);
+        let scale = band.re[start].recip();
+        let value = (re[j] * scale, im[j] * scale);
+        (re[j], im[j]) = value;
+        let end = (j + band.height(j)).min(to);
+        let count = end - j - 1;
+        // x -= L value: `subtract` conjugates its factor
+        subtract(
+            (&mut re[j + 1..end], &mut im[j + 1..end]),
+            (&band.re[start + 1..start + 1 + count], &band.im[start + 1..start + 1 + count]),
+            (value.0, -value.1),
+        );
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]

@@ -76,46 +76,48 @@ impl ArrayInFile {
         }
     }
 
-    /// The samples of some records, one record after the other.
-    pub(super) fn read(&mut self, records: Range<usize>) -> std::io::Result<Vec<Complex<f64>>> {
-        let mut out = vec![Complex::new(0.0, 0.0); records.len() * self.samples];
-        self.read_part(records.clone(), self.begin, &mut out, |sample, numbers| {
+    /// Some samples of some records, one record after the other.
+    pub(super) fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> std::io::Result<Vec<Complex<f64>>> {
+        let mut out = vec![Complex::new(0.0, 0.0); records.len() * samples.len()];
+        let places = (records, samples);
+        self.read_part(&places, self.begin, &mut out, |sample, numbers| {
             *sample = Complex::new(numbers[0], numbers.get(1).copied().unwrap_or(0.0));
         })?;
         if let Parts::Apart(begin) = self.parts {
-            self.read_part(records, begin, &mut out, |sample, numbers| sample.im = numbers[0])?;
+            self.read_part(&places, begin, &mut out, |sample, numbers| sample.im = numbers[0])?;
         }
         Ok(out)
     }
 
     fn read_part(
         &mut self,
-        records: Range<usize>,
+        (records, samples): &(Range<usize>, Range<usize>),
         begin: u64,
         out: &mut [Complex<f64>],
         put: impl Fn(&mut Complex<f64>, &[f64]),
     ) -> std::io::Result<()> {
-        let (samples, sample_bytes) = (self.samples, self.sample_bytes());
+        let (count, sample_bytes) = (samples.len(), self.sample_bytes());
         let mut raw = Vec::new();
         if self.order == Order::SampleMajor {
-            for sample in 0..samples {
+            for (place, sample) in samples.clone().enumerate() {
                 let at = begin + (sample as u64 * self.records as u64 + records.start as u64) * sample_bytes;
                 self.bytes(at, records.len() as u64 * sample_bytes, &mut raw)?;
-                let places = out.iter_mut().skip(sample).step_by(samples);
+                let places = out.iter_mut().skip(place).step_by(count);
                 self.decode(&raw, places, &put);
             }
             return Ok(());
         }
-        let row_bytes = samples as u64 * sample_bytes;
+        let row_bytes = count as u64 * sample_bytes;
         // Records without a gap between them are read at once.
         let together = match self.order == Order::LineMajor && self.record_bytes == row_bytes {
             true => records.len().max(1),
             false => 1,
         };
         let firsts = records.clone().step_by(together);
-        for (first, out) in firsts.zip(out.chunks_mut(together * samples)) {
-            let length = row_bytes * (out.len() / samples.max(1)) as u64;
-            self.bytes(begin + self.row(first) * self.record_bytes, length, &mut raw)?;
+        for (first, out) in firsts.zip(out.chunks_mut(together * count)) {
+            let length = row_bytes * (out.len() / count.max(1)) as u64;
+            let at = self.row(first) * self.record_bytes + samples.start as u64 * sample_bytes;
+            self.bytes(begin + at, length, &mut raw)?;
             self.decode(&raw, out.iter_mut(), &put);
         }
         Ok(())
@@ -256,10 +258,15 @@ mod tests {
         ] {
             let mut array = array(&numbers, order);
             for records in [0..4, 1..3, 3..4] {
-                let found = array.read(records.clone()).unwrap();
-                let wanted = &wanted[records.start * 3..records.end * 3];
-                let same = |(a, b): (&Complex<f64>, &f64)| a.im == 0.0 && (a.re == *b || (a.re.is_nan() && b.is_nan()));
-                assert!(found.iter().zip(wanted).all(same), "{order:?} {records:?}: {found:?}");
+                for samples in [0..3, 1..2, 1..3] {
+                    let found = array.read(records.clone(), samples.clone()).unwrap();
+                    let wanted: Vec<f64> =
+                        records.clone().flat_map(|record| &wanted[3 * record..][samples.clone()]).copied().collect();
+                    let same =
+                        |(a, b): (&Complex<f64>, &f64)| a.im == 0.0 && (a.re == *b || (a.re.is_nan() && b.is_nan()));
+                    assert!(found.iter().zip(&wanted).all(same), "{order:?} {records:?} {samples:?}: {found:?}");
+                    assert_eq!(found.len(), wanted.len());
+                }
             }
         }
     }
@@ -269,10 +276,10 @@ mod tests {
         let mut together = ArrayInFile { samples: 3, records: 2, record_bytes: 12, ..array(&[], Order::LineMajor) };
         together.file = file(&(0..12).map(f64::from).collect::<Vec<_>>(), ByteOrder::Big);
         (together.parts, together.scale, together.offset) = (Parts::Together, 1.0, 0.0);
-        let found = together.read(1..2).unwrap();
+        let found = together.read(1..2, 0..3).unwrap();
         assert_eq!(found, [(6.0, 7.0), (8.0, 9.0), (10.0, 11.0)].map(|(re, im)| Complex::new(re, im)));
         let mut apart = ArrayInFile { parts: Parts::Apart(12), record_bytes: 6, ..together };
-        let found = apart.read(0..2).unwrap();
+        let found = apart.read(0..2, 0..3).unwrap();
         assert!(found.iter().enumerate().all(|(i, z)| *z == Complex::new(i as f64, i as f64 + 6.0)), "{found:?}");
     }
 

@@ -200,12 +200,20 @@ impl RawRecords {
     /// # Errors
     /// What the system says; words in place of numbers.
     pub fn read(&mut self, records: Range<usize>) -> Result<Vec<Complex<f64>>, Error> {
+        self.read_samples(records, 0..self.samples())
+    }
+
+    /// The same of some samples of each of them.
+    ///
+    /// # Errors
+    /// As [`RawRecords::read`].
+    pub fn read_samples(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, Error> {
         match &mut self.store {
-            Store::Array(array) => array.read(records).map_err(|e| match e.kind() {
+            Store::Array(array) => array.read(records, samples).map_err(|e| match e.kind() {
                 std::io::ErrorKind::UnexpectedEof => "it became shorter while it was read".to_owned(),
                 _ => e.to_string(),
             }),
-            Store::Text(text) => text.read(records),
+            Store::Text(text) => text.read(records, samples),
         }
         .map_err(|reason| self.refuse(reason))
     }
@@ -303,7 +311,7 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
         let own = file.try_clone().map_err(|e| e.to_string())?;
         // A row of numbers is one record.
         let Store::Array(mut array) = of_numpy(own, array, &RawFormat::default(), shape)? else { return Ok(None) };
-        let read = array.read(0..array.records).map_err(|e| e.to_string())?;
+        let read = array.read(0..array.records, 0..array.samples).map_err(|e| e.to_string())?;
         Ok(Some(read.into_iter().map(|value| value.re).collect()))
     };
     let about = About {

@@ -5,7 +5,7 @@
 use super::array::{ArrayInFile, Order, Parts};
 use super::{About, RawFormat};
 use crate::Error;
-use crate::io::netcdf_input::{ClassicFile, open};
+use crate::io::netcdf_input::{NetcdfFile, open_classic};
 use crate::io::number::ByteOrder;
 use std::path::Path;
 
@@ -21,12 +21,12 @@ const CONSTANTS: [(&str, &str); 6] = [
 
 /// Opens the signals of a file.
 pub(super) fn read(path: &Path, format: &RawFormat) -> Result<(ArrayInFile, About), Error> {
-    let mut file = open(path)?;
+    let mut file = open_classic(path)?;
     let found = signals(&mut file, format);
     found.map_err(|reason| file.refuse(reason))
 }
 
-fn signals(file: &mut ClassicFile, format: &RawFormat) -> Result<(ArrayInFile, About), String> {
+fn signals(file: &mut NetcdfFile, format: &RawFormat) -> Result<(ArrayInFile, About), String> {
     let name = match &format.variable {
         Some(name) => name.clone(),
         None if file.has("current_a") => "current_a".to_owned(),
@@ -82,7 +82,7 @@ fn signals(file: &mut ClassicFile, format: &RawFormat) -> Result<(ArrayInFile, A
     Ok((array, about))
 }
 
-fn about(file: &mut ClassicFile, records: usize) -> Result<About, String> {
+fn about(file: &mut NetcdfFile, records: usize) -> Result<About, String> {
     let mut about = About { scene_toml: file.global_text("scene").map(str::to_owned), ..About::default() };
     let mut of_records = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
         let Some(name) = names.into_iter().find(|name| file.has(name)) else { return Ok(None) };

@@ -95,15 +95,15 @@ impl TextRecords {
         self.records.len()
     }
 
-    /// The samples of some records, one record after the other.
-    pub(super) fn read(&mut self, records: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
-        let mut out = Vec::with_capacity(records.len() * self.samples);
+    /// Some samples of some records, one record after the other.
+    pub(super) fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
+        let mut out = Vec::with_capacity(records.len() * samples.len());
         let mut text = String::new();
         for record in records {
             let Some((begin, mut line)) = self.records.get(record).copied() else { break };
             self.reader.seek(SeekFrom::Start(begin)).map_err(|e| e.to_string())?;
             let rows = if self.columns.is_some() { self.samples } else { 1 };
-            let mut row = 0;
+            let (mut row, begun) = (0, out.len());
             while row < rows {
                 text.clear();
                 if self.reader.read_line(&mut text).map_err(|e| e.to_string())? == 0 {
@@ -116,6 +116,8 @@ impl TextRecords {
                 }
                 line += 1;
             }
+            out.truncate(begun + samples.end);
+            out.drain(begun..begun + samples.start);
         }
         Ok(out)
     }

@@ -1,10 +1,12 @@
-//! The lines of a scan in blocks, each with those neighbours that its regions reach: memory that does not grow with the lines.
+//! The velocities of a scan tile by tile.
 //!
-//! The samples of all blocks have one scale, and a region sums its lines in their order, so that blocks change no bit.
+//! The samples of all tiles have one scale, a region sums its lines in their order, and windows have the same numbers in parts of a
+//! record, so that tiles change no bit.
 
 use super::cells::{Cell, ScanCells};
 use super::lines::ScanLines;
 use super::spectra::GateSpectra;
+use super::tiles::{Tile, Tiling};
 use super::{FromParts, RecordedOptions, pieces, samples};
 use crate::Error;
 use crate::io::raw::RawRecords;
@@ -15,10 +17,10 @@ use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use ndarray::Array2;
 use std::ops::Range;
-use wakescope_estimate::map::{PolarPoint, ScanGeometry};
+use wakescope_estimate::map::{ScanGeometry, polar_points};
 use wakescope_estimate::{Gates, Sampling};
 
-/// Most bytes of the sums of a block.
+/// Most bytes of the sums of a tile.
 const BLOCK_BYTES: usize = 256 << 20;
 
 pub(super) struct Blocks<'p, S> {
@@ -86,85 +88,70 @@ impl<'p, S: FromParts> Blocks<'p, S> {
         estimator: &MapEstimator<S>,
         places: &ScanGeometry,
     ) -> Result<ScanCells, Error> {
-        let range_m = &self.plan.geometry.gate_range_m;
-        let count = lines.elevation_rad.len();
-        let reach_rad = range_m.iter().try_fold(0.0_f64, |reach, range_m| -> Result<f64, Error> {
-            Ok(reach.max(estimator.reach_rad(*range_m)?))
-        })?;
-        let line_bytes = places.gates() * estimator.numbers() * size_of::<f64>() * 9 / 8;
-        let mut cells = Vec::with_capacity(count * range_m.len());
-        let mut spectra = self.spectra.is_some().then(Vec::new);
-        let mut first = 0;
-        while first < count {
-            // As many lines as fit with their neighbours, and one at least.
-            let mut block = first..first + 1;
-            while block.end < count
-                && within(&lines, &(first..block.end + 1), estimator.windows_reach() * reach_rad).len() * line_bytes
-                    <= self.block_bytes
-            {
-                block.end += 1;
+        let shape = (lines.elevation_rad.len(), self.plan.geometry.gate_range_m.len());
+        let mut cells = Array2::from_elem(shape, Cell::NONE);
+        let mut spectra = self.spectra.as_ref().map(|of_gate| vec![0.0; shape.0 * shape.1 * of_gate.len()]);
+        let tiling = Tiling::new(estimator, places, &self.plan.geometry.gate_range_m, self.block_bytes)?;
+        for tile in tiling.tiles(&lines) {
+            self.tile(records, &lines, (estimator, places), &tile, (&mut cells, spectra.as_deref_mut()))?;
+            if tile.gates.end == shape.1 {
+                self.observer.advance(tile.lines.len() as u64);
             }
-            let guessed = within(&lines, &block, (estimator.windows_reach() - 1.0) * reach_rad);
-            let needed = within(&lines, &block, estimator.windows_reach() * reach_rad);
-            let of_records = lines.records(&needed);
-            let mut sums = estimator.sums(self.places(&lines, &needed)?)?.scaled_for(self.largest);
-            for piece in pieces(of_records.clone(), records.samples()) {
-                let samples = samples::<S>(records, piece.clone())?;
-                sums.add(piece.start - of_records.start, samples.view())?;
-            }
-            let scan = sums.finish();
-            // The estimator takes lines by increasing elevation.
-            let mut order: Vec<usize> = guessed.collect();
-            order.sort_by(|a, b| lines.elevation_rad[*a].total_cmp(&lines.elevation_rad[*b]));
-            let points: Vec<PolarPoint> = order
-                .iter()
-                .flat_map(|line| {
-                    let elevation_rad = lines.elevation_rad[*line];
-                    range_m.iter().map(move |range_m| PolarPoint { range_m: *range_m, elevation_rad })
-                })
-                .collect();
-            let found = estimator.map(&scan, &points)?;
-            let noise = estimator.noise(places, &points)?;
-            for line in block.clone() {
-                let Some(row) = order.iter().position(|own| *own == line) else { continue };
-                for at in row * range_m.len()..(row + 1) * range_m.len() {
-                    let e = &found[at].estimate;
-                    cells.push(Cell {
-                        velocity_m_s: e.velocity_m_s,
-                        power_ratio: if e.velocity_m_s.is_finite() {
-                            e.power / estimator.noise_power_a2()
-                        } else {
-                            f64::NAN
-                        },
-                        detection_ratio: noise.detection_ratio(at, e),
-                        deviation: noise.deviation(at),
-                        width_m_s: e.width_m_s,
-                        quality: e.quality,
-                        level: found[at].level as f64,
-                        n_eff: found[at].n_eff,
-                        is_good: e.is_good(),
-                    });
-                    if let (Some(spectra), Some(of_gate)) = (&mut spectra, &self.spectra) {
-                        let radius_m = estimator.radius_m(points[at].range_m)?;
-                        of_gate.push(&scan, points[at], radius_m, estimator.noise_density_a2(), spectra)?;
-                    }
-                }
-                self.observer.advance(1);
-            }
-            first = block.end;
         }
-        let cells = Array2::from_shape_vec((count, range_m.len()), cells)
-            .map_err(|_| wakescope_estimate::Error::Empty { field: "gates" })?;
         Ok(ScanCells { lines, cells, spectra })
     }
-}
 
-/// The lines around some lines that are at most so far from one of them; the lines of a scan go up or down.
-fn within(lines: &ScanLines, some: &Range<usize>, reach_rad: f64) -> Range<usize> {
-    let angles = &lines.elevation_rad;
-    // A millionth of the reach for rounding.
-    let near = |line: usize, end: usize| (angles[line] - angles[end]).abs() <= reach_rad * (1.0 + 1e-6);
-    let before = (0..some.start).rev().take_while(|line| near(*line, some.start)).count();
-    let after = (some.end..angles.len()).take_while(|line| near(*line, some.end - 1)).count();
-    some.start - before..some.end + after
+    fn tile(
+        &self,
+        records: &mut RawRecords,
+        lines: &ScanLines,
+        (estimator, places): (&MapEstimator<S>, &ScanGeometry),
+        tile: &Tile,
+        (cells, mut spectra): (&mut Array2<Cell>, Option<&mut [f32]>),
+    ) -> Result<(), Error> {
+        let (read, held) = &tile.windows;
+        let (of_records, of_samples) = (lines.records(read), self.gates.samples(held));
+        let mut sums = estimator.sums_of(self.places(lines, read)?, held.clone())?.scaled_for(self.largest);
+        for piece in pieces(of_records.clone(), of_samples.len()) {
+            let samples = samples::<S>(records, piece.clone(), of_samples.clone())?;
+            sums.add(piece.start - of_records.start, samples.view())?;
+        }
+        let scan = sums.finish();
+        // The estimator takes lines by increasing elevation.
+        let (guessed, gates) = &tile.guessed;
+        let mut order: Vec<usize> = guessed.clone().collect();
+        order.sort_by(|a, b| lines.elevation_rad[*a].total_cmp(&lines.elevation_rad[*b]));
+        let angles: Vec<f64> = order.iter().map(|line| lines.elevation_rad[*line]).collect();
+        let points = polar_points(&angles, &self.plan.geometry.gate_range_m[gates.clone()]);
+        let found = estimator.map(&scan, &points)?;
+        let noise = estimator.noise(places, &points)?;
+        for (row, line) in order.into_iter().enumerate().filter(|(_, line)| tile.lines.contains(line)) {
+            for gate in tile.gates.clone() {
+                let at = row * gates.len() + gate - gates.start;
+                let e = &found[at].estimate;
+                cells[[line, gate]] = Cell {
+                    velocity_m_s: e.velocity_m_s,
+                    power_ratio: if e.velocity_m_s.is_finite() {
+                        e.power / estimator.noise_power_a2()
+                    } else {
+                        f64::NAN
+                    },
+                    detection_ratio: noise.detection_ratio(at, e),
+                    deviation: noise.deviation(at),
+                    width_m_s: e.width_m_s,
+                    quality: e.quality,
+                    level: found[at].level as f64,
+                    n_eff: found[at].n_eff,
+                    is_good: e.is_good(),
+                };
+                if let (Some(spectra), Some(of_gate)) = (&mut spectra, &self.spectra) {
+                    let radius_m = estimator.radius_m(points[at].range_m)?;
+                    let one = of_gate.density(&scan, points[at], radius_m, estimator.noise_density_a2())?;
+                    let place = (line * cells.ncols() + gate) * one.len();
+                    spectra[place..place + one.len()].copy_from_slice(&one);
+                }
+            }
+        }
+        Ok(())
+    }
 }

@@ -20,6 +20,21 @@ pub(super) struct Cell {
     pub(super) is_good: bool,
 }
 
+impl Cell {
+    /// A gate of which nothing is known yet.
+    pub(super) const NONE: Self = Self {
+        velocity_m_s: f64::NAN,
+        power_ratio: f64::NAN,
+        detection_ratio: f64::NAN,
+        deviation: f64::NAN,
+        width_m_s: f64::NAN,
+        quality: f64::NAN,
+        level: 0.0,
+        n_eff: 0.0,
+        is_good: false,
+    };
+}
+
 /// The gates of a scan.
 pub(super) struct ScanCells {
     pub(super) lines: ScanLines,

@@ -2,8 +2,8 @@
 //!
 //! Records of a simulation whose scene differs in estimator, outputs and site alone are held against the truth of that scene, as
 //! a run does it; all others give what an instrument can know: velocity, quality, n_eff, signal-to-noise ratio, and the standard
-//! deviation that the Cramer-Rao bound predicts for it. Records are read in pieces and lines in blocks, so that the memory for
-//! signals does not grow with their number.
+//! deviation that the Cramer-Rao bound predicts for it. Records are read in pieces and estimated in tiles of lines and gates, so
+//! that the memory for signals grows neither with their number nor with their length.
 //! Check: maps of a run's own signals have the bytes of the run, from every format, whole or in blocks.
 
 mod blocks;
@@ -12,6 +12,7 @@ mod lines;
 mod predicted;
 mod result;
 mod spectra;
+mod tiles;
 
 pub use lines::{RayTable, ScanLines};
 pub use predicted::predicted_table;
@@ -50,7 +51,7 @@ pub struct RecordedOptions {
     pub noise: Option<NoiseLevel>,
     /// Whether the spectrum of each gate is kept.
     pub spectra: bool,
-    /// Most bytes that the sums of a block of lines may take.
+    /// Most bytes that the sums of a tile of lines and gates may take.
     pub block_bytes: Option<usize>,
 }
 
@@ -223,7 +224,7 @@ fn of_run<S: FromParts>(plan: &Plan, records: &mut RawRecords, observer: &dyn Ob
     let estimates = map::of_records::<S>(plan, &scanner, |realisation, add| {
         let scan = realisation * pulses..(realisation + 1) * pulses;
         for piece in pieces(scan.clone(), records.samples()) {
-            let samples = samples::<S>(records, piece.clone())?;
+            let samples = samples::<S>(records, piece.clone(), 0..records.samples())?;
             add(piece.start - scan.start, samples.view())?;
         }
         observer.advance(lines);
@@ -240,13 +241,14 @@ fn pieces(records: Range<usize>, samples: usize) -> impl Iterator<Item = Range<u
     records.step_by(size).map(move |first| first..(first + size).min(end))
 }
 
-/// The samples of some records \[record, sample\].
+/// Some samples of some records \[record, sample\].
 pub(crate) fn samples<S: FromParts>(
     records: &mut RawRecords,
     range: Range<usize>,
+    some: Range<usize>,
 ) -> Result<ndarray::Array2<S>, Error> {
-    let shape = (range.len(), records.samples());
-    let samples: Vec<S> = records.read(range)?.into_iter().map(S::from_parts).collect();
+    let shape = (range.len(), some.len());
+    let samples: Vec<S> = records.read_samples(range, some)?.into_iter().map(S::from_parts).collect();
     ndarray::Array2::from_shape_vec(shape, samples).map_err(|_| records.refuse("it became shorter".into()))
 }
 

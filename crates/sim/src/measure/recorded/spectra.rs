@@ -64,7 +64,7 @@ impl Spectra {
         for &elevation_rad in &g.elevation_rad {
             for &range_m in &g.gate_range_m {
                 let (point, radius_m) = (PolarPoint { range_m, elevation_rad }, estimator.radius_m(range_m)?);
-                of_gate.push(&scan, point, radius_m, estimator.noise_density_a2(), &mut density)?;
+                density.extend(of_gate.density(&scan, point, radius_m, estimator.noise_density_a2())?);
             }
         }
         Ok(Self {
@@ -127,15 +127,19 @@ impl GateSpectra {
         Ok(())
     }
 
-    /// Adds the spectrum of the region of a point.
-    pub(super) fn push(
+    /// Numbers of a spectrum.
+    pub(super) fn len(&self) -> usize {
+        self.bins.len()
+    }
+
+    /// The spectrum of the region of a point.
+    pub(super) fn density(
         &self,
         scan: &Scan,
         point: PolarPoint,
         radius_m: f64,
         noise_a2: f64,
-        out: &mut Vec<f32>,
-    ) -> Result<(), Error> {
+    ) -> Result<Vec<f32>, Error> {
         let mut mean = vec![0.0; scan.statistic_len()];
         scan.region_mean(point, radius_m, &mut mean)?;
         let mut scratch = Scratch::new();
@@ -145,8 +149,7 @@ impl GateSpectra {
             true => noise_a2 / scan.scale().powi(2),
             false => in_band().sum::<f64>() / self.bins.len() as f64,
         };
-        out.extend(in_band().map(|density| (density / unit) as f32));
-        Ok(())
+        Ok(in_band().map(|density| (density / unit) as f32).collect())
     }
 }
 
