@@ -68,6 +68,14 @@ impl Medium {
         Ok((value(&self.backscatter_per_m_sr, (index, part)), depth))
     }
 
+    /// Backscatter `beta` \[1/(m sr)\] at a range.
+    ///
+    /// # Errors
+    /// As [`Medium::transmission`].
+    pub fn backscatter_per_m_sr(&self, range_m: f64) -> Result<f64, Error> {
+        Ok(self.at(range_m)?.0)
+    }
+
     /// One-way transmission `K = exp(-integral of alpha)` from the lidar to a range.
     ///
     /// # Errors

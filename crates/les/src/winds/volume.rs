@@ -4,26 +4,27 @@
 //! a plane. Where the mesh ends at open sides nothing is known beyond: NaN. Check: linear fields are exact on staggered and
 //! stretched meshes, the error of a sampled vortex falls with the third power of the cell.
 
-use super::axis::{Axis, Edges, GHOSTS};
+use super::axis::{Axis, Edges, GHOSTS, Side};
 use super::grid_wind::{ghost_places, ghost_value};
 use super::strain::largest_strain_per_s;
 use super::wind::Wind;
 use crate::Error;
 use crate::error::{check, check_lengths};
 
-/// One component of the velocity at its nodes.
+/// One component of the velocity, or a scalar, at its nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VolumeComponent {
     /// Places of the nodes along x, y, z \[m\], increasing, four or more each.
     pub nodes_m: [Vec<f64>; 3],
-    /// Values `[z][y][x]` \[m/s\].
-    pub values_m_s: Vec<f64>,
+    /// Values `[z][y][x]` \[m/s\], of a scalar in a unit of its own.
+    pub values: Vec<f64>,
 }
 
 /// A velocity field at one instant; the time it is asked for makes no difference.
 #[derive(Debug, Clone)]
 pub struct VolumeSnapshot {
     components: [Padded; 3],
+    scalar: Option<Padded>,
     max_gradient_per_s: f64,
     max_speed_m_s: f64,
 }
@@ -33,7 +34,7 @@ pub struct VolumeSnapshot {
 struct Padded {
     axes: [Axis; 3],
     /// x fastest.
-    values_m_s: Vec<f64>,
+    values: Vec<f64>,
 }
 
 impl VolumeSnapshot {
@@ -43,13 +44,30 @@ impl VolumeSnapshot {
     /// What [`super::GridSnapshot::new`] refuses of a mesh; [`Error::OutOfRange`] for a velocity that is not finite and for a
     /// number of values that is not that of the nodes.
     pub fn new(components: &[VolumeComponent; 3], edges: [Edges; 3]) -> Result<Self, Error> {
-        let [u, v, w] = std::array::from_fn(|d| Padded::new(&components[d], edges, d));
+        let [u, v, w] = std::array::from_fn(|c| Padded::new(&components[c], edges, |_| c));
         let components = [u?, v?, w?];
-        let largest = |p: &Padded| p.values_m_s.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let largest = |p: &Padded| p.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         let max_speed_m_s = components.iter().map(|p| largest(p).powi(2)).sum::<f64>().sqrt();
-        let mut field = Self { components, max_gradient_per_s: 0.0, max_speed_m_s };
+        let mut field = Self { components, scalar: None, max_gradient_per_s: 0.0, max_speed_m_s };
         field.max_gradient_per_s = field.steepest_per_s()?;
         Ok(field)
+    }
+
+    /// The same air with a scalar that it carries, at nodes of its own; it does not change across walls.
+    ///
+    /// # Errors
+    /// As [`VolumeSnapshot::new`].
+    pub fn with_scalar(self, scalar: &VolumeComponent, edges: [Edges; 3]) -> Result<Self, Error> {
+        let even = |side: Side| match side {
+            Side::NoSlipWall { position_m, .. } => Side::SlipWall { position_m },
+            other => other,
+        };
+        let edges = edges.map(|edges| match edges {
+            Edges::Bounded { low, high } => Edges::Bounded { low: even(low), high: even(high) },
+            periodic @ Edges::Periodic { .. } => periodic,
+        });
+        // At a wall without friction the velocity along it is mirrored as it is.
+        Ok(Self { scalar: Some(Padded::new(scalar, edges, |direction| (direction + 1) % 3)?), ..self })
     }
 
     /// The largest strain rate in the middle of the cells of u, from differences of their corners.
@@ -121,15 +139,23 @@ impl Wind for VolumeSnapshot {
     fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
         self.max_gradient_per_s
     }
+
+    fn scalar_into(&self, points_m: &[[f64; 3]], _time_s: f64, out: &mut [f64]) -> Result<(), Error> {
+        check_lengths(points_m.len(), out.len())?;
+        let at = |point_m: &[f64; 3]| self.scalar.as_ref().and_then(|scalar| scalar.at(point_m)).unwrap_or(f64::NAN);
+        out.iter_mut().zip(points_m).for_each(|(out, point_m)| *out = at(point_m));
+        Ok(())
+    }
 }
 
 impl Padded {
-    fn new(component: &VolumeComponent, edges: [Edges; 3], number: usize) -> Result<Self, Error> {
+    /// `number` says for each direction which component of a velocity the values are to its walls.
+    fn new(component: &VolumeComponent, edges: [Edges; 3], number: impl Fn(usize) -> usize) -> Result<Self, Error> {
         const NAMES: [&str; 3] = ["x", "y", "z"];
         let [x, y, z] = std::array::from_fn(|d| Axis::new(NAMES[d], &component.nodes_m[d], edges[d]));
         let axes = [x?, y?, z?];
         let [nx, ny, nz] = axes.each_ref().map(Axis::nodes);
-        let values = &component.values_m_s;
+        let values = &component.values;
         let allowed = "as many as nodes along x, y and z give";
         check("number of values", values.len() as f64, allowed, |n| n == (nx * ny * nz) as f64)?;
         for &value in values {
@@ -149,6 +175,7 @@ impl Padded {
             [0..px, 0..py, 0..1],
         ];
         for d in 0..3 {
+            let number = number(d);
             let [xs, ys, zs] = &spans[d];
             for (ghost_at, ghost) in ghost_places(&axes[d]) {
                 for (k, j) in zs.clone().flat_map(|k| ys.clone().map(move |j| (k, j))) {
@@ -166,7 +193,7 @@ impl Padded {
                 }
             }
         }
-        Ok(Self { axes, values_m_s: padded })
+        Ok(Self { axes, values: padded })
     }
 
     /// The value at a place, (26); none outside.
@@ -179,7 +206,7 @@ impl Padded {
         for (dk, weight_z) in across_z.iter().enumerate() {
             for (dj, weight_y) in across_y.iter().enumerate() {
                 let start = ((k + dk) * py + j + dj) * px + i;
-                let row: f64 = self.values_m_s[start..start + 4].iter().zip(&across_x).map(|(v, w)| v * w).sum();
+                let row: f64 = self.values[start..start + 4].iter().zip(&across_x).map(|(v, w)| v * w).sum();
                 sum += weight_z * weight_y * row;
             }
         }

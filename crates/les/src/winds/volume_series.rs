@@ -60,6 +60,17 @@ impl Wind for VolumeSeries {
         blend(&*self.field(at + 1)?, weight, points_m, time_s, out_m_s)
     }
 
+    /// As the velocity: linear between two times, unknown where one of them does not know it.
+    fn scalar_into(&self, points_m: &[[f64; 3]], time_s: f64, out: &mut [f64]) -> Result<(), Error> {
+        let (at, weight) = about(&self.time_s, time_s)?;
+        self.field(at)?.scalar_into(points_m, time_s, out)?;
+        let Some(weight) = weight else { return Ok(()) };
+        let mut later = vec![0.0; out.len()];
+        self.field(at + 1)?.scalar_into(points_m, time_s, &mut later)?;
+        out.iter_mut().zip(&later).for_each(|(out, later)| *out += weight * (later - *out));
+        Ok(())
+    }
+
     /// The largest of all fields.
     fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
         self.max_gradient_per_s

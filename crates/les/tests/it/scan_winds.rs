@@ -1,7 +1,7 @@
 //! Winds in three dimensions against tables of independent origin, and against closed forms on meshes.
 
 use wakescope_les::winds::{
-    AlongFlight, Edges, Linear, Side, VolumeComponent, VolumeSeries, VolumeSnapshot, VortexLine, VortexLines,
+    AlongFlight, Calm, Edges, Linear, Side, Sum, VolumeComponent, VolumeSeries, VolumeSnapshot, VortexLine, VortexLines,
 };
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 
@@ -168,13 +168,13 @@ fn staggered(count: usize, velocity: impl Fn([f64; 3]) -> [f64; 3]) -> VolumeSna
             nodes(0.0, 110.0, count, shift(2)),
         ];
         let [xs, ys, zs] = nodes_m.clone();
-        let values_m_s = zs
+        let values = zs
             .iter()
             .flat_map(|&z| ys.iter().map(move |&y| (y, z)))
             .flat_map(|(y, z)| xs.iter().map(move |&x| [x, y, z]))
             .map(|p| velocity(p)[c])
             .collect();
-        VolumeComponent { nodes_m, values_m_s }
+        VolumeComponent { nodes_m, values }
     };
     VolumeSnapshot::new(&[component(0), component(1), component(2)], [OPEN; 3]).unwrap()
 }
@@ -225,6 +225,44 @@ fn a_sampled_field_converges_with_the_third_power_and_is_unknown_outside() {
     assert!(order > 2.7 && fine < 2e-3, "{order} {coarse} {fine}");
     let field = staggered(9, wave);
     assert!(at(&field, [200.0, 400.0, 50.0], 0.0)[0].is_nan());
+}
+
+/// What the air carries at a place.
+fn carried(wind: &dyn Wind, point: [f64; 3], time_s: f64) -> f64 {
+    let mut out = [0.0];
+    wind.scalar_into(&[point], time_s, &mut out).unwrap();
+    out[0]
+}
+
+#[test]
+fn a_linear_scalar_is_exact_in_place_and_time_flat_at_walls_and_the_first_of_a_sum() {
+    let amount = |[x, y, z]: [f64; 3], time_s: f64| 2.0 + 0.01 * x - 0.003 * y + 0.02 * z + 0.1 * time_s;
+    let scalar = |of: &dyn Fn([f64; 3]) -> f64| {
+        let nodes_m = [nodes(-90.0, 90.0, 7, 0.0), nodes(300.0, 480.0, 8, 0.0), nodes(5.0, 115.0, 9, 0.0)];
+        let [xs, ys, zs] = nodes_m.clone();
+        let rows = zs.iter().flat_map(|&z| ys.iter().map(move |&y| (y, z)));
+        let values = rows.flat_map(|(y, z)| xs.iter().map(move |&x| [x, y, z])).map(of).collect();
+        VolumeComponent { nodes_m, values }
+    };
+    let series = move |offset: f64| {
+        VolumeSeries::new(vec![0.0, 4.0, 10.0], 0.0, move |i| {
+            staggered(9, |_| [1.0; 3]).with_scalar(&scalar(&|p| offset + amount(p, [0.0, 4.0, 10.0][i])), [OPEN; 3])
+        })
+        .unwrap()
+    };
+    let point = [12.0, 377.0, 41.0];
+    assert!((carried(&series(0.0), point, 5.5) - amount(point, 5.5)).abs() < 1e-12);
+    assert!(carried(&series(0.0), [200.0, 377.0, 41.0], 5.5).is_nan());
+    assert!(carried(&staggered(9, |_| [1.0; 3]), point, 0.0).is_nan() && carried(&Calm, point, 0.0).is_nan());
+    let sum = Sum { winds: vec![Box::new(Calm), Box::new(series(3.0)), Box::new(series(0.0))] };
+    assert!((carried(&sum, point, 5.5) - amount(point, 5.5) - 3.0).abs() < 1e-12);
+    // Below the lowest node, 5 m up, a wall mirrors it, with or without friction; the velocity sticks to one of them.
+    for low in [Side::SlipWall { position_m: 0.0 }, Side::NoSlipWall { position_m: 0.0, velocity_m_s: [0.0; 3] }] {
+        let edges = [OPEN, OPEN, Edges::Bounded { low, high: Side::Open }];
+        let walled = staggered(9, |_| [1.0; 3]).with_scalar(&scalar(&|[_, y, _]| y), edges).unwrap();
+        let near_wall = [12.0, 377.0, 1.0];
+        assert!((carried(&walled, near_wall, 0.0) - 377.0).abs() < 1e-10, "{low:?}");
+    }
 }
 
 #[test]

@@ -214,8 +214,9 @@ impl Calibration {
         let wakes = self.detector.draw_wakes(PLACES, |wake| stream(settings.seed, "wakes to find", wake));
         let trials = self.detector.trials(&wakes, TRIALS, |trial| stream(settings.seed, "scans with wakes", trial))?;
         let std_m2_s = trials.circulation_std_m2_s();
-        let circulations = (0..=20).map(|i| 0.5 * f64::from(i) * std_m2_s);
-        let found = circulations.map(|c| (c, trials.detection(c, self.threshold))).collect();
+        let circulations: Vec<f64> = (0..=20).map(|i| 0.5 * f64::from(i) * std_m2_s).collect();
+        let shares = trials.detection(&circulations, self.threshold);
+        let found = circulations.into_iter().zip(shares).collect();
         // four rates in a decade
         let rates: Vec<f64> = (-16..0).map(|i| 10f64.powf(0.25 * f64::from(i))).collect();
         let mut roc = Vec::new();

@@ -145,8 +145,9 @@ section! {
         /// Directions of implicit viscosity; chosen by the first time step if absent.
         #[serde(skip_serializing_if = "Option::is_none")]
         implicit_viscosity: Option<Vec<AxisName>> = None,
-        /// Order of the directions in memory, that of neighbours first; ranks share the planes across the last one. Absent: x, y, z,
-        /// in plane flows the long direction first. Another order rounds in another way.
+        /// Order of the directions in memory, that of neighbours first; ranks share the planes across the last one. Absent: x, y, z, but
+        /// y, x, z where y has more cells than x, all equal and periodic, and in plane flows the long direction first. Another order
+        /// rounds in another way.
         #[serde(skip_serializing_if = "Option::is_none")]
         memory_order: Option<[AxisName; 3]> = None,
         /// How the pressure equation is solved.

@@ -7,7 +7,7 @@
 //! Check: a field written by a run reads back to the same values; a smooth field on another mesh with fourth order.
 
 use crate::Error;
-use crate::io::netcdf_input::{ClassicFile, X, Y, Z, open};
+use crate::io::netcdf_input::{NetcdfFile, X, Y, Z, open};
 use std::path::Path;
 use wakescope_les::solver::Ends;
 use wakescope_les::{Direction, Mesh};
@@ -26,7 +26,7 @@ pub(super) fn read(path: &Path, mesh: &Mesh) -> Result<[Vec<f64>; 3], Error> {
 }
 
 /// One component, brought to the faces of the mesh.
-fn velocity(file: &mut ClassicFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, String> {
+fn velocity(file: &mut NetcdfFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, String> {
     let name = ["u", "v", "w"][axis];
     let dims = axes(file, name)?;
     let mut values = file.ordered(name, &dims)?;
@@ -55,7 +55,7 @@ fn velocity(file: &mut ClassicFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>
 }
 
 /// The dimensions of a component along z, y, x: by what they are for, or three of any name in this order.
-fn axes(file: &ClassicFile, name: &str) -> Result<[String; 3], String> {
+fn axes(file: &NetcdfFile, name: &str) -> Result<[String; 3], String> {
     file.roles(name, [Z, Y, X]).or_else(|reason| {
         let dims: Vec<String> = file.dims(name).unwrap_or_default().into_iter().map(str::to_owned).collect();
         let letters = |dim: &String| ["x", "y", "z", "X", "Y", "Z"].iter().any(|letter| dim.starts_with(letter));

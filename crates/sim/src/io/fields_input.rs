@@ -4,7 +4,7 @@
 //! Check: fields of this program come back; staggered files made with the names and axes of PALM and WRF give the same wind.
 
 use crate::Error;
-use crate::io::netcdf_input::{ClassicFile, TIME, X, Y, Z, open};
+use crate::io::netcdf_input::{NetcdfFile, TIME, X, Y, Z, open};
 use std::path::{Path, PathBuf};
 use wakescope_les::winds::VolumeComponent;
 
@@ -39,7 +39,7 @@ pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> 
         .map_err(|reason| file.refuse(reason))
 }
 
-fn times(file: &mut ClassicFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
+fn times(file: &mut NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
     let Some(dim) = file.dim_of(name, TIME) else {
         // A field on its own: its time is a number beside it.
         let time = if file.has("time") { seconds(file, "time")?.first().copied() } else { None };
@@ -56,7 +56,7 @@ fn times(file: &mut ClassicFile, name: &str) -> Result<Vec<(Option<usize>, f64)>
 }
 
 /// Times in seconds, from the unit that the file states.
-fn seconds(file: &mut ClassicFile, name: &str) -> Result<Vec<f64>, String> {
+fn seconds(file: &mut NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
     let unit = file.text(name, "units").and_then(|units| units.split_whitespace().next());
     let factor = match unit {
         None | Some("s" | "sec" | "secs" | "second" | "seconds" | "1") => 1.0,
@@ -77,7 +77,22 @@ pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<[VolumeCom
     Ok([component(&names[0])?, component(&names[1])?, component(&names[2])?])
 }
 
-fn component(file: &mut ClassicFile, name: &str, place: Option<usize>) -> Result<VolumeComponent, String> {
+/// What the air carries with it in one field, in the units and axes of the file.
+///
+/// # Errors
+/// As [`read`]; a negative value.
+pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeComponent, Error> {
+    let mut file = open(&field.path)?;
+    let scalar = component(&mut file, name, field.place).map_err(|reason| file.refuse(reason))?;
+    match scalar.values.iter().position(|v| *v < 0.0) {
+        Some(at) => {
+            Err(file.refuse(format!("{name} is {:?} at place {at}: it must not be negative", scalar.values[at])))
+        }
+        None => Ok(scalar),
+    }
+}
+
+fn component(file: &mut NetcdfFile, name: &str, place: Option<usize>) -> Result<VolumeComponent, String> {
     let dims = match place {
         Some(_) => {
             let [_, z, y, x] = file.roles(name, [TIME, Z, Y, X])?;
@@ -87,15 +102,15 @@ fn component(file: &mut ClassicFile, name: &str, place: Option<usize>) -> Result
     };
     let [z, y, x] = dims.each_ref().map(String::as_str);
     let nodes_m = [nodes(file, x, place)?, nodes(file, y, place)?, nodes(file, z, place)?];
-    let values_m_s = file.ordered_part(name, &dims, place)?;
-    if let Some(at) = values_m_s.iter().position(|v| !v.is_finite()) {
+    let values = file.ordered_part(name, &dims, place)?;
+    if let Some(at) = values.iter().position(|v| !v.is_finite()) {
         return Err(format!("{name} is missing or not finite at place {at}: cut what the terrain hides, or fill it"));
     }
-    Ok(VolumeComponent { nodes_m, values_m_s })
+    Ok(VolumeComponent { nodes_m, values })
 }
 
 /// Places of the nodes along a dimension: its coordinate, or what WRF has instead.
-fn nodes(file: &mut ClassicFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>, String> {
+fn nodes(file: &mut NetcdfFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>, String> {
     if file.has(dim) {
         return file.coordinate(dim);
     }
@@ -115,7 +130,7 @@ fn nodes(file: &mut ClassicFile, dim: &str, place: Option<usize>) -> Result<Vec<
 }
 
 /// Heights of WRF's levels above the ground, from the geopotential, if they are level.
-fn levels(file: &mut ClassicFile, staggered: bool, place: Option<usize>) -> Result<Vec<f64>, String> {
+fn levels(file: &mut NetcdfFile, staggered: bool, place: Option<usize>) -> Result<Vec<f64>, String> {
     let both = ["PH", "PHB"].map(|name| {
         let dims = file.roles(name, [TIME, Z, Y, X]).map(|[_, z, y, x]| [z, y, x]);
         dims.or_else(|_| file.roles(name, [Z, Y, X])).and_then(|dims| {

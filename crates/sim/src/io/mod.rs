@@ -17,7 +17,7 @@
 //! | [`scan_list`] | (reader) lines of sight of a scan | - |
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`atomic`] | files to disk, all or none | - |
-//! | `text_file`, `netcdf_header`, `netcdf_input`, `planes_input`, `fields_input` | (readers) texts, classic NetCDF, cross-planes and fields in it | `netcdf` but for texts |
+//! | `text_file`, `netcdf_header`, `netcdf_input`, `netcdf4_input`, `planes_input`, `fields_input` | (readers) texts, NetCDF, cross-planes and fields in it | `netcdf` or `netcdf4` but for texts |
 //! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
 //! | `cfradial`, `cf_planes`, `cf_fields`, `cf_signals`, `cf_spectra` (through `netcdf`) | classic NetCDF | `netcdf` |
@@ -26,6 +26,8 @@
 pub mod atomic;
 #[cfg(feature = "netcdf")]
 pub(crate) mod fields_input;
+#[cfg(feature = "netcdf4")]
+mod netcdf4_input;
 #[cfg(feature = "netcdf")]
 pub(crate) mod netcdf_header;
 #[cfg(feature = "netcdf")]

@@ -41,6 +41,14 @@ pub(crate) struct Header {
     pub(crate) record_bytes: u64,
 }
 
+/// What the library of NetCDF stores where nothing was written.
+pub(crate) const DEFAULT_FILL: f64 = 9.969_209_968_386_869e36;
+
+/// Whether a value is what the library of NetCDF leaves where nothing was written.
+pub(crate) fn is_default_fill(value: f64) -> bool {
+    (value / DEFAULT_FILL - 1.0).abs() < 1e-6
+}
+
 /// Why a file is not read.
 type Refused = &'static str;
 

@@ -1,10 +1,11 @@
-//! Reading classic NetCDF files: variables as `f64`, with their dimensions in a wanted order.
+//! Reading NetCDF files, classic ones and with the feature `netcdf4` those in HDF5: variables as `f64`, with their dimensions in a
+//! wanted order.
 //!
 //! Dimensions are found by what they are for: by the attribute `axis` of their coordinate, or by their name. Values are
 //! unpacked (`scale_factor`, `add_offset`), missing ones are NaN. Check: the readers of initial fields and of cross-planes read
 //! back what the writers wrote; files of another hand and damaged ones in the tests below.
 
-use crate::io::netcdf_header::{self as header, Attribute, Header, Variable};
+use crate::io::netcdf_header::{self as header, Attribute, Header, Variable, is_default_fill};
 use crate::io::number::NumberType;
 use crate::{Error, io::text_file};
 use std::fs::File;
@@ -16,9 +17,6 @@ const LONGEST_HEADER_BYTES: u64 = 16 << 20;
 
 /// Largest variable that is read \[bytes\].
 const LARGEST_VARIABLE_BYTES: u64 = 4 << 30;
-
-/// What the library of NetCDF stores where nothing was written.
-const DEFAULT_FILL: f64 = 9.969_209_968_386_869e36;
 
 /// What a dimension is for: its name here, its letter in the attribute `axis`, and other names for it.
 #[derive(Debug, Clone, Copy)]
@@ -55,11 +53,18 @@ pub(crate) const Z: Role = Role {
     ],
 };
 
-/// A classic NetCDF file, open.
-pub(crate) struct ClassicFile {
+/// A NetCDF file, open.
+pub(crate) struct NetcdfFile {
     path: PathBuf,
-    file: File,
+    numbers: Numbers,
     header: Header,
+}
+
+/// What the numbers of a file are read from.
+enum Numbers {
+    Classic(File),
+    #[cfg(feature = "netcdf4")]
+    Hdf5(Box<netcdf_reader::NcFile>),
 }
 
 /// Where the numbers of a variable are.
@@ -71,21 +76,40 @@ pub(crate) struct NumbersInFile {
     pub(crate) stride: Option<u64>,
 }
 
-/// Opens a classic NetCDF file and reads its header.
+/// Opens a NetCDF file and reads its header.
 ///
 /// # Errors
 /// What the system says; a file of another kind, or one whose header does not fit its length.
-pub(crate) fn open(path: &Path) -> Result<ClassicFile, Error> {
+pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
+    #[cfg(feature = "netcdf4")]
+    {
+        let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
+        let mut magic = Vec::new();
+        text_file::open(path).and_then(|(file, _)| file.take(4).read_to_end(&mut magic)).map_err(unreadable)?;
+        if magic == b"\x89HDF" {
+            let (file, header) =
+                super::netcdf4_input::open(path).map_err(|reason| Error::Input { path: path.to_owned(), reason })?;
+            return Ok(NetcdfFile { path: path.to_owned(), numbers: Numbers::Hdf5(Box::new(file)), header });
+        }
+    }
+    open_classic(path)
+}
+
+/// The same of a classic file alone, whose numbers lie where [`NetcdfFile::layout`] says.
+///
+/// # Errors
+/// As [`open`]; a NetCDF-4 file.
+pub(crate) fn open_classic(path: &Path) -> Result<NetcdfFile, Error> {
     let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
     let (mut file, length) = text_file::open(path).map_err(unreadable)?;
     let mut beginning = Vec::new();
     Read::by_ref(&mut file).take(LONGEST_HEADER_BYTES).read_to_end(&mut beginning).map_err(unreadable)?;
     let header = header::read(&beginning, length)
         .map_err(|reason| Error::Input { path: path.to_owned(), reason: reason.into() })?;
-    Ok(ClassicFile { path: path.to_owned(), file, header })
+    Ok(NetcdfFile { path: path.to_owned(), numbers: Numbers::Classic(file), header })
 }
 
-impl ClassicFile {
+impl NetcdfFile {
     /// An error of this file.
     pub(crate) fn refuse(&self, reason: String) -> Error {
         Error::Input { path: self.path.clone(), reason }
@@ -134,7 +158,11 @@ impl ClassicFile {
 
     /// The open file, for who reads places of it.
     pub(crate) fn handle(&self) -> std::io::Result<File> {
-        self.file.try_clone()
+        match &self.numbers {
+            Numbers::Classic(file) => file.try_clone(),
+            #[cfg(feature = "netcdf4")]
+            Numbers::Hdf5(_) => Err(std::io::ErrorKind::Unsupported.into()),
+        }
     }
 
     /// Names of the dimensions of a variable, slowest first; none if there is no such variable.
@@ -204,12 +232,16 @@ impl ClassicFile {
         if bytes > LARGEST_VARIABLE_BYTES {
             return Err(format!("variable {name} has more than {LARGEST_VARIABLE_BYTES} bytes: use one file per time"));
         }
+        #[cfg(feature = "netcdf4")]
+        if let Numbers::Hdf5(file) = &self.numbers {
+            return super::netcdf4_input::read(file, name, variable.dims.len(), place);
+        }
         let fills = ["_FillValue", "missing_value"].map(|fill| self.number(name, fill));
         let scale = self.number(name, "scale_factor").unwrap_or(1.0);
         let offset = self.number(name, "add_offset").unwrap_or(0.0);
         let packed = scale != 1.0 || offset != 0.0;
         let unpack = |value: f64| {
-            let missing = fills.contains(&Some(value)) || (value / DEFAULT_FILL - 1.0).abs() < 1e-6;
+            let missing = fills.contains(&Some(value)) || is_default_fill(value);
             match (missing, packed) {
                 (true, _) => f64::NAN,
                 (_, true) => value * scale + offset,
@@ -218,12 +250,12 @@ impl ClassicFile {
         };
         let mut values = Vec::new();
         values.try_reserve_exact((bytes / number.bytes()) as usize).map_err(|e| format!("variable {name}: {e}"))?;
+        let mut file = self.handle().map_err(|e| format!("variable {name} cannot be read: {e}"))?;
         let mut raw = vec![0; run_bytes as usize];
         for run in first..first + runs {
             let at = SeekFrom::Start(begin + run * self.header.record_bytes);
-            self.file
-                .seek(at)
-                .and_then(|_| self.file.read_exact(&mut raw))
+            file.seek(at)
+                .and_then(|_| file.read_exact(&mut raw))
                 .map_err(|e| format!("variable {name} cannot be read: {e}"))?;
             values.extend(raw.chunks_exact(number.bytes() as usize).map(|bytes| unpack(number.value(bytes))));
         }

@@ -1,6 +1,7 @@
 //! Tests of the reader: files of other hands, and files that lie.
 
 use super::*;
+use crate::io::netcdf_header::DEFAULT_FILL;
 use crate::io::planes_input;
 
 /// Name, dimensions, text attributes and values of a variable.
@@ -180,8 +181,13 @@ fn a_header_that_lies_is_refused_without_memory_and_without_a_word_of_the_file()
 
 #[test]
 fn files_of_other_kinds_name_the_remedy_and_nothing_of_their_content() {
-    let hdf = planes_of(b"\x89HDF\r\n\x1a\nsecret").unwrap_err();
-    assert!(hdf.contains("nccopy -k cdf2") && hdf.contains("NETCDF3_64BIT"), "{hdf}");
+    let hdf = b"\x89HDF\r\n\x1a\nsecret";
+    let broken = planes_of(hdf).unwrap_err();
+    assert!(broken.contains("NetCDF-4") && !broken.contains("secret"), "{broken}");
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), hdf).unwrap();
+    let classic = open_classic(file.path()).map(|_| ()).unwrap_err().to_string();
+    assert!(classic.contains("nccopy -k cdf2") && classic.contains("NETCDF3_64BIT"), "{classic}");
     let text = planes_of("root:x:0:0:secret\n".repeat(300).as_bytes()).unwrap_err();
     assert!(text.contains("no NetCDF file") && !text.contains("root"), "{text}");
     #[cfg(unix)]

@@ -5,7 +5,7 @@
 //! Check: what was written comes back; files that lack something are refused by name.
 
 use crate::Error;
-use crate::io::netcdf_input::{ClassicFile, TIME, Y, Z, open};
+use crate::io::netcdf_input::{NetcdfFile, TIME, Y, Z, open};
 use crate::io::{CrossPlanes, OPEN_EDGES, edges};
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ pub(crate) fn read(path: &Path) -> Result<CrossPlanes, Error> {
     planes(&mut file).map_err(|reason| file.refuse(reason))
 }
 
-fn planes(file: &mut ClassicFile) -> Result<CrossPlanes, String> {
+fn planes(file: &mut NetcdfFile) -> Result<CrossPlanes, String> {
     let dims = file.roles("v", [TIME, Z, Y])?;
     let others = file.roles("w", [TIME, Z, Y])?;
     if dims != others {
@@ -77,7 +77,7 @@ fn planes(file: &mut ClassicFile) -> Result<CrossPlanes, String> {
 }
 
 /// Ages and times \[s\] of the planes: each from the variable of its name, or else from the coordinate of the planes.
-fn times(file: &mut ClassicFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
+fn times(file: &mut NetcdfFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
     let count = file.coordinate(dim)?.len();
     let is_age = ["tau", "age"].contains(&dim.to_ascii_lowercase().as_str());
     let mut values = |name: &str| -> Result<Vec<f64>, String> {
@@ -95,7 +95,7 @@ fn times(file: &mut ClassicFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
 }
 
 /// Times have no unit, or seconds.
-fn in_seconds(file: &ClassicFile, name: &str) -> Result<(), String> {
+fn in_seconds(file: &NetcdfFile, name: &str) -> Result<(), String> {
     let unit = file.text(name, "units").and_then(|units| units.split_whitespace().next());
     match unit {
         None | Some("s" | "sec" | "secs" | "second" | "seconds" | "1") => Ok(()),
@@ -104,7 +104,7 @@ fn in_seconds(file: &ClassicFile, name: &str) -> Result<(), String> {
 }
 
 /// The ends of an axis; open if the file does not say.
-fn ends(file: &ClassicFile, axis: &str) -> Result<Edges, String> {
+fn ends(file: &NetcdfFile, axis: &str) -> Result<Edges, String> {
     match file.text(axis, "edges") {
         Some(text) => edges::from_text(text)
             .ok_or_else(|| "an attribute edges must be as `wakescope flow` writes it, or be taken out".to_owned()),

@@ -1,11 +1,12 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
 use crate::Error;
+use crate::measure::air::radial_velocity_m_s;
 use crate::measure::estimators;
 use crate::measure::map_estimator::{self, MapEstimator, NoiseAtPoints};
 use crate::measure::progress::Observer;
 use crate::measure::region::places;
-use crate::measure::scan::{Scanner, radial_velocity_m_s};
+use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use wakescope_estimate::{
@@ -219,12 +220,12 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
     let by_gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
-    for (i, line) in scanner.lines().iter().enumerate() {
+    for i in 0..scanner.lines().len() {
         let exact_m_s = radial_velocity_m_s(plan, i, &g.gate_range_m)?;
         truth.exact_m_s.row_mut(i).assign(&ArrayView1::from(&exact_m_s));
         let mut filtered_m_s = vec![0.0; g.gate_range_m.len()];
         for (filter, cells) in [(&by_pulse, &mut truth.pulse_m_s), (&by_gate, &mut truth.gate_m_s)] {
-            filter.apply_into(line.first_range_m, &line.radial_velocity_m_s, &g.gate_range_m, &mut filtered_m_s)?;
+            scanner.seen_into(filter, i, &mut filtered_m_s)?;
             cells.row_mut(i).assign(&ArrayView1::from(&filtered_m_s));
         }
     }

@@ -9,6 +9,7 @@ use crate::measure::region::{interpolated, region_radius};
 use crate::measure::scan::mean_snr;
 use crate::plan::Plan;
 use ndarray::Array2;
+use std::ops::Range;
 use wakescope_estimate::{
     GateVelocity, Gates, Radius, Sampling, Scan, Statistic,
     estimators::NoiseTest,
@@ -71,14 +72,23 @@ impl<S: Sample> MapEstimator<S> {
         Ok(if share < 1.0 { share.asin() } else { std::f64::consts::PI })
     }
 
-    /// How many such angles away the windows are that an estimate depends on: estimates that follow the wind need those of others.
-    pub(crate) fn windows_reach(&self) -> f64 {
-        if self.tools.following.is_some() { 2.0 } else { 1.0 }
+    /// Whether estimates follow the wind that first estimates of their neighbours show.
+    pub(crate) fn follows_wind(&self) -> bool {
+        self.tools.following.is_some()
     }
 
     /// Sums over the windows of some lines, still without any record.
     pub(crate) fn sums(&self, places: ScanGeometry) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
         Ok(ScanSums::new(&*self.tools.statistic, &self.gates, places, self.record_samples)?)
+    }
+
+    /// The same of some gates.
+    pub(crate) fn sums_of(
+        &self,
+        places: ScanGeometry,
+        held: Range<usize>,
+    ) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
+        Ok(ScanSums::of_gates(&*self.tools.statistic, &self.gates, places, held)?)
     }
 
     /// Mean power, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.

@@ -7,7 +7,7 @@
 //! | [`geometry`], `scan_lines` | lines of sight, samples, gates, layers |
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | `efficiencies` | efficiency curves that several scans share |
-//! | [`scan`] | air along the lines of sight, and their records |
+//! | `air`, [`scan`] | air along the lines of sight, and their records |
 //! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
 //! | [`map`], `map_estimator`, [`cell_average`] | estimates and their errors against the truth |
 //! | [`recorded`] | the same from the records of a file, measured or simulated |
@@ -16,6 +16,7 @@
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
 //! | [`progress`], [`streams`] | who watches a run; one random stream for each pulse |
 
+pub(crate) mod air;
 pub mod beam_winds;
 pub mod bound;
 pub mod budget;

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::beams::{Beam, Line};
+use crate::measure::air::{Air, LineAirs, air_along, beam_of_air, known_velocity_m_s, seen_into};
 use crate::measure::efficiencies::Efficiencies;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
@@ -9,7 +10,7 @@ use crate::measure::profile::{drawn_turbulence, efficiency_by_theory, model, spa
 use crate::measure::progress::Observer;
 use crate::measure::streams::stream;
 use crate::plan::{Plan, Stage};
-use crate::scene::{DetectorSignal, Outside, Scene, SecondTrip, SnrReference, WindOfPulses};
+use crate::scene::{DetectorSignal, Scene, SecondTrip, SnrReference};
 use ndarray::{Array2, ArrayView2};
 use rand_xoshiro::rand_core::Rng;
 use rayon::prelude::*;
@@ -38,8 +39,11 @@ pub struct Scanner<'a> {
     scene: &'a Scene,
     instrument: &'a Instrument,
     simulator: Simulator,
+    returns: Returns,
     /// The air of each line: that of its middle, or the mean of the airs of its pulses.
     lines: Vec<LineOfSight>,
+    /// Backscatter that the flow carries \[line\]\[layer\], 1/(m sr); empty where it carries none.
+    backscatter_per_m_sr: Vec<Vec<f64>>,
     /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the pulses
     /// have airs of their own.
     spread_m_s: Option<Array2<f64>>,
@@ -64,7 +68,7 @@ impl<'a> Scanner<'a> {
     /// As [`Scanner::new`].
     pub(crate) fn with(plan: &'a Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Self, Error> {
         let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
-        let weight_per_m = layer_weights(plan, known, observer)?;
+        let returns = layer_returns(plan, known, observer)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
         let airs = LineAirs::new(plan)?;
         let all: Vec<usize> = (0..geometry.schedule.lines.len()).collect();
@@ -78,14 +82,9 @@ impl<'a> Scanner<'a> {
                 Ok(air)
             },
         )?;
-        let (velocities, spreads): (Vec<_>, Vec<_>) = lines.into_iter().unzip();
-        let of_velocity = |radial_velocity_m_s| LineOfSight {
-            first_range_m: geometry.first_layer_range_m,
-            layer_thickness_m: geometry.layer_thickness_m,
-            radial_velocity_m_s,
-            weight_per_m: weight_per_m.clone(),
-        };
-        let lines: Vec<LineOfSight> = velocities.into_iter().map(of_velocity).collect();
+        let (airs, spreads): (Vec<Air>, Vec<_>) = lines.into_iter().unzip();
+        let lines: Vec<LineOfSight> = airs.iter().map(|air| returns.line(air, geometry)).collect();
+        let backscatter_per_m_sr = airs.into_iter().filter_map(|air| air.backscatter_per_m_sr).collect();
         let spreads: Option<Vec<f64>> = spreads.into_iter().collect::<Option<Vec<Vec<f64>>>>().map(|all| all.concat());
         let shape = (lines.len(), geometry.gate_range_m.len());
         let spread_m_s = spreads.and_then(|values| Array2::from_shape_vec(shape, values).ok());
@@ -100,7 +99,18 @@ impl<'a> Scanner<'a> {
             DetectorSignal::Baseband => Simulator::for_baseband(&instrument.pulse, instrument.receiver, record)?,
         };
         let previous = previous_air(plan, &lines)?;
-        Ok(Self { plan, scene, instrument, simulator, lines, spread_m_s, efficiency, previous })
+        Ok(Self {
+            plan,
+            scene,
+            instrument,
+            simulator,
+            returns,
+            lines,
+            backscatter_per_m_sr,
+            spread_m_s,
+            efficiency,
+            previous,
+        })
     }
 
     /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
@@ -109,10 +119,15 @@ impl<'a> Scanner<'a> {
     }
 
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; the efficiency is its
-    /// mean.
+    /// mean, and backscatter that the flow carries that over the lines.
     pub fn layer_snr(&self) -> Vec<(f64, f64)> {
-        let Some(line) = self.lines.first() else { return Vec::new() };
-        layer_snr(self.scene, self.instrument, line, self.efficiency.as_ref())
+        let Some(mut line) = self.lines.first().cloned() else { return Vec::new() };
+        if !self.backscatter_per_m_sr.is_empty() {
+            let count = self.lines.len() as f64;
+            let mean = |layer: usize| self.lines.iter().map(|line| line.weight_per_m[layer]).sum::<f64>() / count;
+            line.weight_per_m = (0..line.layers()).map(mean).collect();
+        }
+        layer_snr(self.scene, self.instrument, &line, self.efficiency.as_ref())
     }
 
     /// The same without any wind, for records that were not made here.
@@ -121,12 +136,8 @@ impl<'a> Scanner<'a> {
     /// As [`Scanner::new`].
     pub(crate) fn expected_layer_snr(plan: &Plan, observer: &dyn Observer) -> Result<Vec<(f64, f64)>, Error> {
         let known = Efficiencies::default();
-        let line = LineOfSight {
-            first_range_m: plan.geometry.first_layer_range_m,
-            layer_thickness_m: plan.geometry.layer_thickness_m,
-            radial_velocity_m_s: vec![0.0; plan.geometry.layers],
-            weight_per_m: layer_weights(plan, &known, observer)?,
-        };
+        let still = Air { radial_velocity_m_s: vec![0.0; plan.geometry.layers], backscatter_per_m_sr: None };
+        let line = layer_returns(plan, &known, observer)?.line(&still, &plan.geometry);
         let efficiency = drawn_efficiency(plan, std::slice::from_ref(&line), &known, observer)?;
         Ok(layer_snr(&plan.scene.scene, &plan.instrument, &line, efficiency.as_ref()))
     }
@@ -140,6 +151,16 @@ impl<'a> Scanner<'a> {
     /// The pulse that is sent along them.
     pub fn pulse(&self) -> &Pulse {
         &self.instrument.pulse
+    }
+
+    /// What a filter sees of a line at the gates, m/s.
+    ///
+    /// # Errors
+    /// What the filter refuses; a checked scene gives none.
+    pub(crate) fn seen_into(&self, filter: &RangeFilter, line: usize, out_m_s: &mut [f64]) -> Result<(), Error> {
+        let backscatter = self.backscatter_per_m_sr.get(line).map(Vec::as_slice);
+        let velocity_m_s = &self.lines[line].radial_velocity_m_s;
+        seen_into(filter, &self.plan.geometry, velocity_m_s, backscatter, out_m_s)
     }
 
     /// The air along each line of sight, in the order of the geometry's elevations.
@@ -206,7 +227,7 @@ impl<'a> Scanner<'a> {
     ) -> Result<(Array2<T>, Clipped), Error> {
         let schedule = &self.plan.geometry.schedule;
         let index = |key: PulseKey| realisation * self.pulses() + pulses.start + key.pulse;
-        let (airs, air_of) = self.airs(&pulses)?;
+        let (airs, air_of) = self.airs_of_pulses(&pulses)?;
         let scan = Scan {
             simulator: &self.simulator,
             // One line after the other, which the simulation of signals need not know.
@@ -233,7 +254,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The airs of some pulses, and which one each of them meets; none where lines have one air.
-    fn airs(&self, pulses: &Range<usize>) -> Result<(Vec<LineOfSight>, Vec<usize>), Error> {
+    fn airs_of_pulses(&self, pulses: &Range<usize>) -> Result<(Vec<LineOfSight>, Vec<usize>), Error> {
         if self.spread_m_s.is_none() {
             return Ok((Vec::new(), Vec::new()));
         }
@@ -258,82 +279,9 @@ impl<'a> Scanner<'a> {
             self.plan,
             &beams,
             |(_, beam)| beam.time_s,
-            |(line, beam)| {
-                Ok(LineOfSight {
-                    radial_velocity_m_s: velocity_along(self.plan, beam, &ranges_m)?,
-                    ..self.lines[*line].clone()
-                })
-            },
+            |(_, beam)| Ok(self.returns.line(&air_along(self.plan, beam, &ranges_m)?, &self.plan.geometry)),
         )?;
         Ok((airs, air_of))
-    }
-}
-
-/// The beam in the middle of the pulses that share an air of a line.
-fn beam_of_air(plan: &Plan, line: usize, air: usize) -> Beam {
-    let schedule = &plan.geometry.schedule;
-    let pulses = schedule.lines[line].pulses;
-    let airs = plan.scene.scene.scan.wind_of_pulses.of_line(pulses);
-    if airs == pulses {
-        return schedule.beam_of_pulse(line, air);
-    }
-    // Pulse p meets air p airs/pulses, rounded down.
-    let first = |air: usize| (air * pulses).div_ceil(airs);
-    schedule.beam(line, 0.5 * (first(air) + first(air + 1) - 1) as f64)
-}
-
-/// Velocities of the layers of a line, and their spread over its pulses at the gates.
-type LineAir = (Vec<f64>, Option<Vec<f64>>);
-
-/// What the air of lines is made with.
-struct LineAirs<'a> {
-    plan: &'a Plan,
-    ranges_m: Vec<f64>,
-    filter: RangeFilter,
-}
-
-impl<'a> LineAirs<'a> {
-    fn new(plan: &'a Plan) -> Result<Self, Error> {
-        let g = &plan.geometry;
-        let filter = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
-        Ok(Self { plan, ranges_m: g.layer_range_m().collect(), filter })
-    }
-
-    /// The mean air of the pulses of a line, and where they have airs of their own the spread of what they see.
-    fn of_line(&self, line: usize) -> Result<LineAir, Error> {
-        let (plan, g) = (self.plan, &self.plan.geometry);
-        let pulses = g.schedule.lines[line].pulses;
-        let of = plan.scene.scene.scan.wind_of_pulses;
-        if of == WindOfPulses::default() {
-            return Ok((radial_velocity_m_s(plan, line, &self.ranges_m)?, None));
-        }
-        let airs = of.of_line(pulses);
-        let mut mean_m_s = vec![0.0; self.ranges_m.len()];
-        let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
-        let mut seen_m_s = vec![0.0; g.gate_range_m.len()];
-        let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
-        for air in 0..airs {
-            let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64 / pulses as f64;
-            let air_m_s = velocity_along(plan, &beam_of_air(plan, line, air), &self.ranges_m)?;
-            self.filter.apply_into(g.first_layer_range_m, &air_m_s, &g.gate_range_m, &mut seen_m_s)?;
-            // About the first air, so that the mean of equal airs is that air.
-            if air == 0 {
-                (first_m_s, first_seen_m_s) = (air_m_s.clone(), seen_m_s.clone());
-            }
-            for ((mean, v), first) in mean_m_s.iter_mut().zip(&air_m_s).zip(&first_m_s) {
-                *mean += share * (v - first);
-            }
-            for (((sum, square), v), first) in sums.iter_mut().zip(&seen_m_s).zip(&first_seen_m_s) {
-                let beside = v - first;
-                *sum += share * beside;
-                *square += share * beside * beside;
-            }
-        }
-        mean_m_s.iter_mut().zip(&first_m_s).for_each(|(mean, first)| *mean += first);
-        Ok((
-            mean_m_s,
-            Some(sums.into_iter().map(|(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt()).collect()),
-        ))
     }
 }
 
@@ -387,23 +335,58 @@ const PIECE_BYTES: usize = 16 << 20;
 /// Size of the airs of a piece, where pulses have their own, bytes.
 pub(crate) const AIRS_BYTES: f64 = (64 << 20) as f64;
 
-/// Return per metre of each layer, K^2 beta A_R eta_s/R^2, (9); the efficiency is interpolated, and left out if each pulse
-/// brings its own. A signal-to-noise ratio that the scene states takes the place of all of it.
-fn layer_weights(plan: &Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Vec<f64>, Error> {
+/// What the layers of a line return.
+struct Returns {
+    /// Return per metre of each layer of the scene's air, K^2 beta A_R eta_s/R^2, (9); the efficiency is left out if each pulse
+    /// brings its own.
+    weight_per_m: Vec<f64>,
+    /// The same over the backscatter, sr, where the flow carries some.
+    of_backscatter_sr: Vec<f64>,
+}
+
+impl Returns {
+    /// A line of sight through some air.
+    fn line(&self, air: &Air, geometry: &Geometry) -> LineOfSight {
+        let weight_per_m = match &air.backscatter_per_m_sr {
+            None => self.weight_per_m.clone(),
+            Some(carried) => carried.iter().zip(&self.of_backscatter_sr).map(|(beta, of)| beta * of).collect(),
+        };
+        LineOfSight {
+            first_range_m: geometry.first_layer_range_m,
+            layer_thickness_m: geometry.layer_thickness_m,
+            radial_velocity_m_s: air.radial_velocity_m_s.clone(),
+            weight_per_m,
+        }
+    }
+}
+
+/// The returns of the layers; a signal-to-noise ratio that the scene states takes the place of all of it.
+fn layer_returns(plan: &Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Returns, Error> {
     let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         let unit = instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), 1.0);
-        return Ok(vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers]);
+        let weight_per_m = vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers];
+        return Ok(Returns { weight_per_m, of_backscatter_sr: Vec::new() });
     }
     let profile = match drawn_turbulence(scene) {
         Some(_) => None,
         None => Some(known.mean(scene, instrument, &profile_ranges_m(scene, geometry), observer)?),
     };
-    let weight = |range_m: f64| {
-        let eta = profile.as_ref().map_or(Ok(1.0), |profile| profile.interpolated(range_m))?;
-        Ok(instrument.return_per_m(range_m)? * eta)
+    let with_efficiency = |of: &dyn Fn(f64) -> Result<f64, Error>| -> Result<Vec<f64>, Error> {
+        let weight = |range_m: f64| {
+            let eta = profile.as_ref().map_or(Ok(1.0), |profile| profile.interpolated(range_m))?;
+            Ok(of(range_m)? * eta)
+        };
+        geometry.layer_range_m().map(weight).collect()
     };
-    geometry.layer_range_m().map(weight).collect()
+    Ok(Returns {
+        weight_per_m: with_efficiency(&|range_m| instrument.return_per_m(range_m))?,
+        of_backscatter_sr: if plan.wind.carries_backscatter() {
+            with_efficiency(&|range_m| instrument.return_of_backscatter_sr(range_m))?
+        } else {
+            Vec::new()
+        },
+    })
 }
 
 /// The air from which the pulse before comes back at the same time, c/(2 PRF) farther away, at the ranges of the lines.
@@ -436,40 +419,4 @@ fn drawn_efficiency(
     let ranges_m = profile_ranges_m(scene, &plan.geometry);
     let realisations = known.of_realisations(scene, &plan.instrument, &t, &ranges_m, observer)?;
     Ok(Some(EfficiencyTable::new(ranges_m, &realisations)?.onto_layers(line)?))
-}
-
-/// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
-/// returns light: below the ground or outside the flow, if the scene masks that.
-pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
-    velocity_along(plan, &plan.geometry.schedule.middle(line), range_m)
-}
-
-/// The same along a beam.
-fn velocity_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>, Error> {
-    let scan = &plan.scene.scene.scan;
-    let elevation_rad = beam.elevation_rad;
-    let (points_m, known_m_s) = known_velocity_m_s(plan, beam, range_m)?;
-    let checked = |((&[x_m, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
-        let outside = match (z_m < 0.0, known_m_s.is_nan()) {
-            (true, _) => scan.below_ground,
-            (false, true) => scan.outside_flow,
-            (false, false) => return Ok(known_m_s),
-        };
-        match outside {
-            Outside::Constant { radial_velocity_m_s } => Ok(radial_velocity_m_s),
-            // A scene with lines below the ground was refused, but for air behind its last sample.
-            Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow { elevation_rad, range_m, x_m, y_m, z_m }),
-            Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
-        }
-    };
-    points_m.iter().zip(known_m_s).zip(range_m).map(checked).collect()
-}
-
-/// Places along a beam, m, and the radial velocity of the flow there, m/s; NaN where it is not known.
-fn known_velocity_m_s(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<(Vec<[f64; 3]>, Vec<f64>), Error> {
-    let points_m: Vec<[f64; 3]> = range_m.iter().map(|range_m| beam.at_range_m(*range_m)).collect();
-    let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    plan.wind.wind().velocity_into(&points_m, plan.wind.start_s + beam.time_s, &mut velocity_m_s)?;
-    let along = velocity_m_s.iter().map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s)).collect();
-    Ok((points_m, along))
 }

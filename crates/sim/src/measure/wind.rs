@@ -24,6 +24,8 @@ pub struct SceneWind {
     pub source: String,
     /// Times of fields that are read when they are needed, s.
     field_times_s: Vec<f64>,
+    /// Whether the air carries its backscatter somewhere.
+    carries_backscatter: bool,
 }
 
 impl fmt::Debug for SceneWind {
@@ -68,6 +70,7 @@ impl SceneWind {
             max_speed_m_s: self.max_speed_m_s + other.max_speed_m_s,
             source: format!("{}; added: {}", self.source, other.source),
             field_times_s,
+            carries_backscatter: self.carries_backscatter || other.carries_backscatter,
             ..self
         }
     }
@@ -97,6 +100,7 @@ impl SceneWind {
             max_speed_m_s,
             source: "the flow is analytic".into(),
             field_times_s: Vec::new(),
+            carries_backscatter: false,
         })
     }
 
@@ -110,6 +114,25 @@ impl SceneWind {
     /// Which stretch of its times a time, s, lies in: between two fields that are in memory together.
     pub fn stretch_of(&self, time_s: f64) -> usize {
         self.field_times_s.partition_point(|t| *t <= time_s)
+    }
+
+    /// Whether the air carries its backscatter somewhere.
+    pub(crate) fn carries_backscatter(&self) -> bool {
+        self.carries_backscatter
+    }
+
+    /// Backscatter that the air carries at places, 1/(m sr), NaN where it carries none; nothing where no wind carries any.
+    ///
+    /// # Errors
+    /// What the wind refuses.
+    pub(crate) fn backscatter_per_m_sr(&self, points_m: &[[f64; 3]], time_s: f64) -> Result<Option<Vec<f64>>, Error> {
+        if !self.carries_backscatter {
+            return Ok(None);
+        }
+        let mut carried = vec![0.0; points_m.len()];
+        self.wind.scalar_into(points_m, time_s, &mut carried)?;
+        // (26) swings below zero beside the edge of a cloud.
+        Ok(Some(carried.into_iter().map(|beta| if beta < 0.0 { 0.0 } else { beta }).collect()))
     }
 
     /// The wind itself.
@@ -131,6 +154,10 @@ impl Wind for Later {
 
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
         self.wind.max_gradient_per_s(time_s + self.by_s)
+    }
+
+    fn scalar_into(&self, points_m: &[[f64; 3]], time_s: f64, out: &mut [f64]) -> Result<(), les::Error> {
+        self.wind.scalar_into(points_m, time_s + self.by_s, out)
     }
 }
 
@@ -241,7 +268,8 @@ use planes::simulated;
 fn fields(flow: &crate::scene::FieldFlow, file: &SceneFile) -> Result<SceneWind, Error> {
     let fields::FieldWind { wind, start_s, end_s, max_speed_m_s, source, times_s: field_times_s } =
         fields::fields(flow, file)?;
-    Ok(SceneWind { wind, start_s, tau: 0.0, end_s, max_speed_m_s, source, field_times_s })
+    let carries_backscatter = flow.backscatter.is_some();
+    Ok(SceneWind { wind, start_s, tau: 0.0, end_s, max_speed_m_s, source, field_times_s, carries_backscatter })
 }
 
 #[cfg(feature = "netcdf")]
@@ -332,6 +360,7 @@ mod planes {
             max_speed_m_s: fastest * scale.speed_m_s,
             source,
             field_times_s: Vec::new(),
+            carries_backscatter: false,
         })
     }
 

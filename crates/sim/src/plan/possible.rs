@@ -4,7 +4,7 @@
 
 use super::{Plan, Target};
 use crate::Error;
-use crate::measure::scan::radial_velocity_m_s;
+use crate::measure::air::radial_velocity_m_s;
 use crate::scene::{Flow, Outside};
 
 /// Refuses what a run of the plan would refuse: lines that leave a simulated flow.

@@ -142,7 +142,7 @@ fn of_samples<S: FromParts>(
     found: RetrievedScan,
 ) -> Result<RetrievedScan, Error> {
     let (range, elevation_rad) = measured.lines.all_records();
-    let samples: Array2<S> = crate::measure::recorded::samples(records, range)?;
+    let samples: Array2<S> = crate::measure::recorded::samples(records, range, 0..records.samples())?;
     own.of_records(samples.view(), elevation_rad, found)
 }
 

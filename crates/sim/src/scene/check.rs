@@ -6,7 +6,7 @@
 use super::check_estimator::check_estimator;
 use super::check_flow::check_flow;
 use super::retrieval::check_retrieval;
-use super::{Digitiser, EfficiencyOfPulse, FORMAT, PulseShape, Scan, Scene, SnrReference, Turbulence};
+use super::{Digitiser, EfficiencyOfPulse, FORMAT, FieldFlow, Flow, PulseShape, Scan, Scene, SnrReference, Turbulence};
 use crate::keys::{Checker, Problem};
 use std::f64::consts::FRAC_PI_2;
 
@@ -24,9 +24,15 @@ impl Scene {
         c.require(self.seed <= i64::MAX as u64, "seed", self.seed, format!("a whole number from 0 to {}", i64::MAX));
         self.check_instrument(&mut c);
         self.check_receiver(&mut c);
-        check_flow(&self.flow, "flow", &mut c);
-        for (i, flow) in self.added_flows.iter().enumerate() {
-            check_flow(flow, &format!("added_flows[{i}]"), &mut c);
+        let added = self.added_flows.iter().enumerate().map(|(i, flow)| (format!("added_flows[{i}]"), flow));
+        for (at, flow) in std::iter::once(("flow".to_owned(), &self.flow)).chain(added) {
+            check_flow(flow, &at, &mut c);
+            if let (Flow::Fields(FieldFlow { backscatter: Some(carried), .. }), SnrReference::Fixed { .. }) =
+                (flow, self.detector.snr)
+            {
+                let allowed = "absent with detector.snr.reference = \"fixed\", which asks for no backscatter";
+                c.refuse(&format!("{at}.backscatter.name"), &format!("{:?}", carried.name), allowed);
+            }
         }
         self.check_scan(&mut c);
         self.check_pattern(&mut c);

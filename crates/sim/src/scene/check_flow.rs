@@ -113,4 +113,14 @@ fn check_fields(flow: &FieldFlow, at: &str, c: &mut Checker<'_>) {
     c.within(&key("rotation_rad"), flow.rotation_rad, -TAU, TAU, "rad");
     c.within(&key("length_unit_m"), flow.length_unit_m, 1e-6, 1e6, "m");
     c.within(&key("velocity_unit_m_s"), flow.velocity_unit_m_s, 1e-6, 1e6, "m/s");
+    if let Some(backscatter) = &flow.backscatter {
+        if backscatter.name.is_empty() {
+            c.refuse(
+                &key("backscatter.name"),
+                Problem::ABSENT,
+                "the name of a variable of the file over (time, z, y, x)",
+            );
+        }
+        c.within(&key("backscatter.unit_per_m_sr"), backscatter.unit_per_m_sr, 0.0, 1e6, "1/(m sr)");
+    }
 }

@@ -135,6 +135,19 @@ section! {
         periodic_y: bool = false,
         /// What lies below its lowest nodes.
         ground: FieldGround = FieldGround::Open,
+        /// Backscatter that the air carries, in place of that of the atmosphere; absent: none.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        backscatter: Option<CarriedBackscatter> = None,
+    }
+}
+
+section! {
+    /// Backscatter that a field brings for each of its nodes.
+    CarriedBackscatter {
+        /// Name of its variable in the file.
+        name: String = String::new(),
+        /// Backscatter coefficient in the unit of the file, 1/(m sr).
+        unit_per_m_sr: f64 = 1.0,
     }
 }
 

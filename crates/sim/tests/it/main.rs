@@ -15,6 +15,8 @@ mod receiver;
 #[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
 mod retrieve;
 #[cfg(all(feature = "netcdf", feature = "plots"))]
+mod scan_fields;
+#[cfg(all(feature = "netcdf", feature = "plots"))]
 mod scans;
 mod scene_features;
 #[cfg(all(feature = "flow", feature = "netcdf"))]

@@ -1,10 +1,9 @@
-//! Scans of every pattern through whole runs: the bytes of an RHI, truths of linear winds, fields in three dimensions, files.
+//! Scans of every pattern through whole runs: the bytes of an RHI, truths of linear winds, files.
 
-use netcdf3::{DataSet, FileReader, FileWriter, Version};
+use netcdf3::FileReader;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
-use wakescope_sim::io::cf_fields::{FaceVelocities, cf_faces_bytes};
-use wakescope_sim::io::{Existing, Provenance};
+use wakescope_sim::io::Existing;
 use wakescope_sim::measure::beam_winds::beam_winds;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::measure::write::write;
@@ -13,7 +12,7 @@ use wakescope_sim::scene::SceneFile;
 use wakescope_sim::{Error, Silent, run};
 
 /// A scene with few lines at 10 dB; the words in capitals are replaced.
-const SCENE: &str = r#"
+pub(crate) const SCENE: &str = r#"
 seed = 3
 ADDED
 [detector.snr]
@@ -35,9 +34,9 @@ png = false
 OUTPUTS
 "#;
 
-const RHI: &str = "elevation_max_rad = 0.02\nelevation_step_rad = 4e-3\n";
+pub(crate) const RHI: &str = "elevation_max_rad = 0.02\nelevation_step_rad = 4e-3\n";
 
-fn plan_in(folder: &Path, [flow, scan, outputs]: [&str; 3], target: Target) -> Result<Plan, Error> {
+pub(crate) fn plan_in(folder: &Path, [flow, scan, outputs]: [&str; 3], target: Target) -> Result<Plan, Error> {
     let text = SCENE.replace("ADDED", "").replace("FLOW", flow).replace("SCAN", scan).replace("OUTPUTS", outputs);
     Plan::new(SceneFile::parse(&text, &folder.join("scene.toml"))?, target)
 }
@@ -50,7 +49,7 @@ fn refused(flow: &str, scan: &str) -> String {
     plan_in(Path::new(""), [flow, scan, ""], Target::Map).unwrap_err().to_string()
 }
 
-fn map(plan: &Plan) -> VelocityEstimates {
+pub(crate) fn map(plan: &Plan) -> VelocityEstimates {
     run(plan, &Silent).unwrap().map.unwrap()
 }
 
@@ -192,188 +191,24 @@ fn vad_and_dbs_of_a_scan_tell_the_wind_with_their_errors() {
     }
 }
 
-/// A smooth field that varies along the flight.
-fn wave([x, y, z]: [f64; 3]) -> [f64; 3] {
-    let (a, b, c) = (x / 400.0, y / 500.0, z / 300.0);
-    [3.0 * a.sin() * b.cos(), 4.0 * (a + b).cos() * c.cos(), 2.0 * a.cos() * (b + c).sin()]
-}
-
-fn axis(low: f64, high: f64, count: usize) -> Vec<f64> {
-    (0..count).map(|i| low + (high - low) * i as f64 / (count - 1) as f64).collect()
-}
-
-fn sampled(nodes_m: [&[f64]; 3], component: usize, of: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<f64> {
-    let [xs, ys, zs] = nodes_m;
-    let places = zs.iter().flat_map(|&z| ys.iter().flat_map(move |&y| xs.iter().map(move |&x| [x, y, z])));
-    places.map(|p| of(p)[component]).collect()
-}
-
 #[test]
-fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
-    let folder = tempfile::tempdir().unwrap();
-    let centre_m = [axis(-60.0, 60.0, 41), axis(220.0, 500.0, 95), axis(-4.0, 60.0, 33)];
-    let face_m = centre_m.clone().map(|c| c.iter().map(|x| x - 0.5 * (c[1] - c[0])).collect::<Vec<f64>>());
-    let velocity_m_s = std::array::from_fn(|d| {
-        let nodes = std::array::from_fn(|k| if k == d { &face_m[k][..] } else { &centre_m[k][..] });
-        sampled(nodes, d, wave)
-    });
-    let origin = Provenance { program: "t".into(), scene_toml: String::new(), scene_hash: "0".into(), seed: 1 };
-    let faces = FaceVelocities { title: "wave".into(), time_s: 2.0, centre_m, face_m, velocity_m_s };
-    std::fs::write(folder.path().join("wave.nc"), cf_faces_bytes(&faces, &origin).unwrap()).unwrap();
-    let flow = "kind = \"fields\"\nfiles = \"wave.nc\"\nmotion = \"frozen\"\n";
-    let scan = format!(
-        "elevation_min_rad = 0.02\nelevation_max_rad = 0.08\nelevation_step_rad = 0.02\n{}",
-        "lidar.x_m = 31.7\n"
-    );
-    let plan = plan_in(folder.path(), [flow, &scan, ""], Target::Map).unwrap();
-    assert_eq!(plan.wind.start_s, 2.0);
-    let map = map(&plan);
-    for (line, gate) in (0..4).flat_map(|line| (0..map.range_m.len()).map(move |gate| (line, gate))) {
-        let beam = plan.geometry.schedule.middle(line);
-        let expected = beam.direction.radial_velocity_m_s(wave(beam.at_range_m(map.range_m[gate])), [0.0; 3]);
-        assert!((map.v_exact_m_s[[line, gate]] - expected).abs() < 1e-6, "{line} {gate} {expected}");
-    }
-    let left = scan.replace("31.7", "300.0");
-    let message = plan_in(folder.path(), [flow, &left, ""], Target::Map).unwrap_err().to_string();
-    assert!(message.contains("leaves the simulated flow") && message.contains("x = 300.00 m"), "{message}");
-    // The only field is of 2 s, and the scan goes on.
-    let moving = flow.replace("frozen", "moving");
-    let message = plan_in(folder.path(), [&moving, &scan, ""], Target::Map).unwrap_err().to_string();
-    assert!(message.contains("flow.files") && message.contains("the fields at 2.000 s: begin earlier"), "{message}");
-}
-
-/// One vortex at (y, z), anticlockwise as one looks along +x with y to the right; `side` -1 in right-handed axes.
-fn vortex(side: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
-    move |[_, y, z]| {
-        let (dy, dz) = (side * y - 370.0, z - 30.0);
-        let omega = 300.0 / (TAU * (dy * dy + dz * dz + 25.0 * 25.0));
-        [0.0, side * -omega * dz, omega * dy]
-    }
-}
-
-/// Writes a file: dimensions, coordinates (name, values), and components over their dimensions.
-type Component<'a> = (&'a str, [&'a str; 4], Vec<f64>);
-
-fn netcdf(
-    path: &Path,
-    dims: &[(&str, usize)],
-    lists: &[(&str, &[&str], Vec<f64>)],
-    components: &[Component<'_>],
-    globals: &[(&str, f64)],
-) {
-    let mut data = DataSet::new();
-    for (name, length) in dims {
-        data.add_fixed_dim(name, *length).unwrap();
-    }
-    for (name, value) in globals {
-        data.add_global_attr_f64(name, vec![*value]).unwrap();
-    }
-    for (name, dims, _) in lists {
-        data.add_var_f64(name, dims).unwrap();
-    }
-    for (name, dims, _) in components {
-        data.add_var_f64(name, dims).unwrap();
-    }
-    let mut file = FileWriter::open(path).unwrap();
-    file.set_def(&data, Version::Offset64Bit, 0).unwrap();
-    for (name, _, values) in lists {
-        file.write_var_f64(name, values).unwrap();
-    }
-    for (name, _, values) in components {
-        file.write_var_f64(name, values).unwrap();
-    }
-    file.close().unwrap();
-}
-
-fn near_vortex(folder: &Path, flow: &str) {
-    let scan = "elevation_min_rad = 0.02\nelevation_max_rad = 0.12\nelevation_step_rad = 0.02\n";
-    let plan = plan_in(folder, [flow, scan, ""], Target::Map).unwrap();
-    let map = map(&plan);
-    let mut largest = 0.0_f64;
-    for (line, gate) in (0..6).flat_map(|line| (0..map.range_m.len()).map(move |gate| (line, gate))) {
-        let beam = plan.geometry.schedule.middle(line);
-        let expected = beam.direction.radial_velocity_m_s(vortex(1.0)(beam.at_range_m(map.range_m[gate])), [0.0; 3]);
-        let found = map.v_exact_m_s[[line, gate]];
-        assert!((found - expected).abs() < 2e-3, "{flow} {line} {gate} {found} {expected}");
-        largest = largest.max(expected.abs());
-    }
-    assert!(largest > 0.5);
-}
-
-#[test]
-fn staggered_fields_of_palm_and_wrf_come_out_unmirrored() {
-    let folder = tempfile::tempdir().unwrap();
-    // PALM: right-handed, y to the left of x, so the scan at y > 0 of the scene is at y < 0 of the file.
-    let (x, y, z) = (axis(-100.0, 100.0, 6), axis(-500.0, -220.0, 71), axis(0.0, 80.0, 21));
-    let half = |nodes: &[f64]| -> Vec<f64> { nodes.iter().map(|x| x - 0.5 * (nodes[1] - nodes[0])).collect() };
-    let (xu, yv) = (half(&x), half(&y));
-    let zw: Vec<f64> = z.iter().map(|z| z + 2.0).collect();
-    let times = |mut values: Vec<f64>| {
-        values.extend(values.clone());
-        values
+fn the_wake_begins_where_the_aircraft_is_when_the_scan_begins() {
+    let pair = "kind = \"vortex_pair\"\nmotion = \"inviscid\"\n";
+    let velocity = |plan: &Plan, x_m: f64| {
+        let mut out = [[f64::NAN; 3]];
+        plan.wind.wind().velocity_into(&[[x_m, 410.0, 40.0]], plan.wind.start_s, &mut out).unwrap();
+        out[0]
     };
-    let right = || vortex(-1.0);
-    netcdf(
-        &folder.path().join("palm.nc"),
-        &[("time", 2), ("zu_3d", 21), ("zw_3d", 21), ("y", 71), ("yv", 71), ("x", 6), ("xu", 6)],
-        &[
-            ("time", &["time"], vec![600.0, 660.0]),
-            ("zu_3d", &["zu_3d"], z.clone()),
-            ("zw_3d", &["zw_3d"], zw.clone()),
-            ("y", &["y"], y.clone()),
-            ("yv", &["yv"], yv.clone()),
-            ("x", &["x"], x.clone()),
-            ("xu", &["xu"], xu.clone()),
-        ],
-        &[
-            ("u", ["time", "zu_3d", "y", "xu"], times(sampled([&xu, &y, &z], 0, right()))),
-            ("v", ["time", "zu_3d", "yv", "x"], times(sampled([&x, &yv, &z], 1, right()))),
-            ("w", ["time", "zw_3d", "y", "x"], times(sampled([&x, &y, &zw], 2, right()))),
-        ],
-        &[],
-    );
-    let flow = "kind = \"fields\"\nfiles = \"palm.nc\"\nmirror_y = true\nmotion = \"frozen\"\n";
-    // The lowest w is 2 m up: open below, so the lines stay above.
-    near_vortex(folder.path(), flow);
-    let mirrored =
-        plan_in(folder.path(), [&flow.replace("true", "false"), RHI, ""], Target::Map).unwrap_err().to_string();
-    assert!(mirrored.contains("leaves the simulated flow"), "{mirrored}");
-    // WRF: no coordinates but DX, DY and the geopotential; faces one more than centres. Moved to where the scan is.
-    let (nx, ny, nz) = (6, 71, 20);
-    let faces = |count: usize, step: f64| -> Vec<f64> { (0..=count).map(|i| i as f64 * step).collect() };
-    let centres = |count: usize, step: f64| -> Vec<f64> { (0..count).map(|i| (i as f64 + 0.5) * step).collect() };
-    let (xs, xc, ys, yc) = (faces(nx, 40.0), centres(nx, 40.0), faces(ny, 4.0), centres(ny, 4.0));
-    let (zs, zc) = (faces(nz, 4.0), centres(nz, 4.0));
-    // The file's y runs against the scene's: its origin is at y = 500 m, x = -120 m.
-    let moved = |[x, y, z]: [f64; 3]| vortex(-1.0)([x - 120.0, y - 500.0, z]);
-    let geopotential: Vec<f64> = zs.iter().flat_map(|z| vec![9.81 * (z + 55.0); nx * ny]).collect();
-    let mass = ["Time", "bottom_top_stag", "south_north", "west_east"];
-    netcdf(
-        &folder.path().join("wrfout.nc"),
-        &[
-            ("Time", 1),
-            ("bottom_top", nz),
-            ("bottom_top_stag", nz + 1),
-            ("south_north", ny),
-            ("south_north_stag", ny + 1),
-            ("west_east", nx),
-            ("west_east_stag", nx + 1),
-        ],
-        &[("XTIME", &["Time"], vec![0.0])],
-        &[
-            ("U", ["Time", "bottom_top", "south_north", "west_east_stag"], sampled([&xs, &yc, &zc], 0, moved)),
-            ("V", ["Time", "bottom_top", "south_north_stag", "west_east"], sampled([&xc, &ys, &zc], 1, moved)),
-            ("W", mass, sampled([&xc, &yc, &zs], 2, moved)),
-            ("PH", mass, vec![0.0; geopotential.len()]),
-            ("PHB", mass, geopotential.clone()),
-        ],
-        &[("DX", 40.0), ("DY", 4.0)],
-    );
-    let flow = "kind = \"fields\"\nfiles = \"wrfout.nc\"\nnames = [\"U\", \"V\", \"W\"]\nmirror_y = true\n\
-                origin_m = [-120.0, 500.0, 0.0]\nmotion = \"frozen\"\n";
-    near_vortex(folder.path(), flow);
-    let turned = flow.replace("origin_m", "rotation_rad = 6.283185307179586\norigin_m");
-    near_vortex(folder.path(), &turned);
+    let of = |aircraft: &str| plan(&format!("{pair}aircraft = {{ {aircraft} }}"), RHI);
+    let coming = of("speed_m_s = 70.0, x_m = -300.0");
+    assert_eq!(velocity(&coming, -299.0), [0.0; 3]);
+    assert_ne!(velocity(&coming, -301.0), [0.0; 3]);
+    // 700 m behind it the wake is 10 s old, and everywhere so is a pair of that age.
+    let age_tau = 10.0 * 500.0 / (TAU * 47.0 * 47.0);
+    let aged = plan(&format!("{pair}age_tau = {age_tau:?}"), RHI);
+    for (found, expected) in velocity(&coming, -1000.0).into_iter().zip(velocity(&aged, 0.0)) {
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+    }
 }
 
 #[test]

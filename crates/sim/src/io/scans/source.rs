@@ -2,7 +2,7 @@
 //!
 //! Check: the same scans come from classic NetCDF and from NetCDF-4.
 
-use crate::io::netcdf_input::ClassicFile;
+use crate::io::netcdf_input::NetcdfFile;
 
 /// Variables and their attributes.
 pub(super) trait Source {
@@ -26,24 +26,24 @@ pub(super) trait Source {
     }
 }
 
-impl Source for ClassicFile {
+impl Source for NetcdfFile {
     fn names(&self) -> Vec<String> {
-        ClassicFile::names(self)
+        NetcdfFile::names(self)
     }
 
     fn shape(&self, name: &str) -> Option<Vec<u64>> {
-        ClassicFile::shape(self, name)
+        NetcdfFile::shape(self, name)
     }
 
     fn text(&self, variable: &str, name: &str) -> Option<String> {
-        ClassicFile::text(self, variable, name).map(str::to_owned)
+        NetcdfFile::text(self, variable, name).map(str::to_owned)
     }
 
     fn global_text(&self, name: &str) -> Option<String> {
-        ClassicFile::global_text(self, name).map(str::to_owned)
+        NetcdfFile::global_text(self, name).map(str::to_owned)
     }
 
     fn floats(&mut self, name: &str) -> Result<Vec<f64>, String> {
-        ClassicFile::floats(self, name)
+        NetcdfFile::floats(self, name)
     }
 }

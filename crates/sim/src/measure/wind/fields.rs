@@ -4,7 +4,7 @@
 
 use crate::Error;
 use crate::beams::direction::sin_cos_of_turn;
-use crate::io::fields_input::{FieldPlace, places, read};
+use crate::io::fields_input::{FieldPlace, places, read, read_scalar};
 use crate::io::planes_input::files;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
 use wakescope_les::winds::{Edges, Side, VolumeComponent, VolumeSeries, VolumeSnapshot};
@@ -36,6 +36,10 @@ impl<W: Wind> Wind for Frozen<W> {
         self.wind.velocity_into(points_m, self.time_s, out_m_s)
     }
 
+    fn scalar_into(&self, points_m: &[[f64; 3]], _: f64, out: &mut [f64]) -> Result<(), LesError> {
+        self.wind.scalar_into(points_m, self.time_s, out)
+    }
+
     fn max_gradient_per_s(&self, _: f64) -> f64 {
         self.wind.max_gradient_per_s(self.time_s)
     }
@@ -54,16 +58,22 @@ struct Placed {
 /// Points that are turned at once.
 const BATCH: usize = 256;
 
+impl Placed {
+    /// A place of the scene in the axes of the file.
+    fn own_m(&self, [x, y, z]: &[f64; 3]) -> [f64; 3] {
+        let (sin, cos, [x0, y0, z0]) = (self.sin, self.cos, self.origin_m);
+        let (x, y) = (x - x0, y - y0);
+        [cos * x + sin * y, self.side * (cos * y - sin * x), z - z0]
+    }
+}
+
 impl Wind for Placed {
     fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), LesError> {
-        let (sin, cos, [x0, y0, z0]) = (self.sin, self.cos, self.origin_m);
+        let (sin, cos) = (self.sin, self.cos);
         let mut turned = Vec::with_capacity(BATCH);
         for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
             turned.clear();
-            turned.extend(points.iter().map(|[x, y, z]| {
-                let (x, y) = (x - x0, y - y0);
-                [cos * x + sin * y, self.side * (cos * y - sin * x), z - z0]
-            }));
+            turned.extend(points.iter().map(|point_m| self.own_m(point_m)));
             self.wind.velocity_into(&turned, time_s, outs)?;
             for out in outs {
                 let [u, v, w] = *out;
@@ -77,15 +87,20 @@ impl Wind for Placed {
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
         self.wind.max_gradient_per_s(time_s)
     }
+
+    fn scalar_into(&self, points_m: &[[f64; 3]], time_s: f64, out: &mut [f64]) -> Result<(), LesError> {
+        let own: Vec<_> = points_m.iter().map(|point_m| self.own_m(point_m)).collect();
+        self.wind.scalar_into(&own, time_s, out)
+    }
 }
 
 /// A field in metres and seconds.
 fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Error> {
-    let scaled = |c: VolumeComponent| VolumeComponent {
+    let scaled = |c: VolumeComponent, unit: f64| VolumeComponent {
         nodes_m: c.nodes_m.map(|nodes| nodes.into_iter().map(|x| x * flow.length_unit_m).collect()),
-        values_m_s: c.values_m_s.into_iter().map(|v| v * flow.velocity_unit_m_s).collect(),
+        values: c.values.into_iter().map(|v| v * unit).collect(),
     };
-    let components = read(field, &flow.names)?.map(scaled);
+    let components = read(field, &flow.names)?.map(|c| scaled(c, flow.velocity_unit_m_s));
     let refuse = |reason: String| Error::Input { path: field.path.clone(), reason };
     // The period of evenly spaced nodes; faces and centres have the same.
     let along = |direction: usize, periodic: bool| -> Result<Edges, Error> {
@@ -108,7 +123,10 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
         FieldGround::Slip => Side::SlipWall { position_m: 0.0 },
     };
     let edges = [along(0, flow.periodic_x)?, along(1, flow.periodic_y)?, Edges::Bounded { low, high: Side::Open }];
-    VolumeSnapshot::new(&components, edges).map_err(|e| refuse(e.to_string()))
+    let snapshot = VolumeSnapshot::new(&components, edges).map_err(|e| refuse(e.to_string()))?;
+    let Some(backscatter) = &flow.backscatter else { return Ok(snapshot) };
+    let scalar = scaled(read_scalar(field, &backscatter.name)?, backscatter.unit_per_m_sr);
+    snapshot.with_scalar(&scalar, edges).map_err(|e| refuse(e.to_string()))
 }
 
 /// Reads fields: their times, and once each for its gradient; the rest when it is needed.

@@ -1,0 +1,189 @@
+//! The air along beams: radial velocity and backscatter of each layer, and their means over the pulses of a line.
+//!
+//! Check: the truth of a line is the mean over its pulses; a cloud that the flow carries weighs the velocities that are seen.
+
+use crate::Error;
+use crate::beams::Beam;
+use crate::measure::geometry::Geometry;
+use crate::plan::Plan;
+use crate::scene::{Outside, WindOfPulses};
+use wakescope_signal::RangeFilter;
+
+/// The air of the layers along a beam.
+pub(crate) struct Air {
+    /// Radial velocity, m/s; NaN where nothing returns light.
+    pub(crate) radial_velocity_m_s: Vec<f64>,
+    /// Backscatter, 1/(m sr), where the flow carries some; the atmosphere's in those layers that the flow says nothing of.
+    pub(crate) backscatter_per_m_sr: Option<Vec<f64>>,
+}
+
+impl Air {
+    /// What a filter sees at the gates: the mean velocity with its weights and those of the backscatter.
+    ///
+    /// # Errors
+    /// What the filter refuses; a checked scene gives none.
+    pub(crate) fn seen_into(&self, filter: &RangeFilter, g: &Geometry, out_m_s: &mut [f64]) -> Result<(), Error> {
+        seen_into(filter, g, &self.radial_velocity_m_s, self.backscatter_per_m_sr.as_deref(), out_m_s)
+    }
+}
+
+/// [`Air::seen_into`] for the parts of an air.
+///
+/// # Errors
+/// As that.
+pub(crate) fn seen_into(
+    filter: &RangeFilter,
+    g: &Geometry,
+    velocity_m_s: &[f64],
+    backscatter_per_m_sr: Option<&[f64]>,
+    out_m_s: &mut [f64],
+) -> Result<(), Error> {
+    let apply =
+        |values: &[f64], out: &mut [f64]| filter.apply_into(g.first_layer_range_m, values, &g.gate_range_m, out);
+    let Some(backscatter) = backscatter_per_m_sr else { return Ok(apply(velocity_m_s, out_m_s)?) };
+    let pairs = || velocity_m_s.iter().zip(backscatter);
+    let mut weight = vec![0.0; out_m_s.len()];
+    apply(&pairs().map(|(v, beta)| v * beta).collect::<Vec<_>>(), out_m_s)?;
+    apply(&pairs().map(|(v, beta)| if v.is_nan() { f64::NAN } else { *beta }).collect::<Vec<_>>(), &mut weight)?;
+    out_m_s.iter_mut().zip(&weight).for_each(|(sum, weight)| *sum /= weight);
+    Ok(())
+}
+
+/// The beam in the middle of the pulses that share an air of a line.
+pub(crate) fn beam_of_air(plan: &Plan, line: usize, air: usize) -> Beam {
+    let schedule = &plan.geometry.schedule;
+    let pulses = schedule.lines[line].pulses;
+    let airs = plan.scene.scene.scan.wind_of_pulses.of_line(pulses);
+    if airs == pulses {
+        return schedule.beam_of_pulse(line, air);
+    }
+    // Pulse p meets air p airs/pulses, rounded down.
+    let first = |air: usize| (air * pulses).div_ceil(airs);
+    schedule.beam(line, 0.5 * (first(air) + first(air + 1) - 1) as f64)
+}
+
+/// The air of a line, and where its pulses have airs of their own the standard deviation of what they see at the gates, m/s.
+pub(crate) type LineAir = (Air, Option<Vec<f64>>);
+
+/// What the air of lines is made with.
+pub(crate) struct LineAirs<'a> {
+    plan: &'a Plan,
+    ranges_m: Vec<f64>,
+    filter: RangeFilter,
+}
+
+impl<'a> LineAirs<'a> {
+    pub(crate) fn new(plan: &'a Plan) -> Result<Self, Error> {
+        let g = &plan.geometry;
+        let filter = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
+        Ok(Self { plan, ranges_m: g.layer_range_m().collect(), filter })
+    }
+
+    /// The air in the middle of a line, or the mean over its pulses if they have airs of their own.
+    pub(crate) fn of_line(&self, line: usize) -> Result<LineAir, Error> {
+        let (plan, g) = (self.plan, &self.plan.geometry);
+        let schedule = &g.schedule;
+        let pulses = schedule.lines[line].pulses;
+        let of = plan.scene.scene.scan.wind_of_pulses;
+        if of == WindOfPulses::default() {
+            return Ok((air_along(plan, &schedule.middle(line), &self.ranges_m)?, None));
+        }
+        let airs = of.of_line(pulses);
+        let mut sums_m_s = vec![0.0; self.ranges_m.len()];
+        let mut backscatter: Option<Vec<f64>> = None;
+        let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
+        let mut seen_m_s = vec![0.0; g.gate_range_m.len()];
+        let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
+        for air in 0..airs {
+            let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64 / pulses as f64;
+            let here = air_along(plan, &beam_of_air(plan, line, air), &self.ranges_m)?;
+            here.seen_into(&self.filter, g, &mut seen_m_s)?;
+            // About the first air, so that the mean of equal airs is that air.
+            if air == 0 {
+                (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), seen_m_s.clone());
+                backscatter = here.backscatter_per_m_sr.as_ref().map(|carried| vec![0.0; carried.len()]);
+            }
+            let weight = |layer: usize| here.backscatter_per_m_sr.as_ref().map_or(1.0, |carried| carried[layer]);
+            for (layer, (sum, v)) in sums_m_s.iter_mut().zip(&here.radial_velocity_m_s).enumerate() {
+                *sum += share * weight(layer) * (v - first_m_s[layer]);
+            }
+            if let Some(backscatter) = &mut backscatter {
+                backscatter.iter_mut().enumerate().for_each(|(layer, sum)| *sum += share * weight(layer));
+            }
+            for ((sum, square), (v, first)) in sums.iter_mut().zip(seen_m_s.iter().zip(&first_seen_m_s)) {
+                let beside = v - first;
+                *sum += share * beside;
+                *square += share * beside * beside;
+            }
+        }
+        for (layer, (sum, first)) in sums_m_s.iter_mut().zip(&first_m_s).enumerate() {
+            match backscatter.as_ref().map_or(1.0, |mean| mean[layer]) {
+                // Nothing returns light: any velocity will do.
+                0.0 => *sum = 0.0,
+                total => *sum /= total,
+            }
+            *sum += first;
+        }
+        let spread = |(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt();
+        let air = Air { radial_velocity_m_s: sums_m_s, backscatter_per_m_sr: backscatter };
+        Ok((air, Some(sums.into_iter().map(spread).collect())))
+    }
+}
+
+/// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
+/// returns light: below the ground or outside the flow, if the scene masks that.
+pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+    let beam = plan.geometry.schedule.middle(line);
+    let (points_m, known_m_s) = known_velocity_m_s(plan, &beam, range_m)?;
+    velocity_of(plan, &beam, range_m, &points_m, known_m_s)
+}
+
+/// The air along a beam.
+pub(crate) fn air_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Air, Error> {
+    let (points_m, known_m_s) = known_velocity_m_s(plan, beam, range_m)?;
+    let radial_velocity_m_s = velocity_of(plan, beam, range_m, &points_m, known_m_s)?;
+    let mut backscatter_per_m_sr = plan.wind.backscatter_per_m_sr(&points_m, plan.wind.start_s + beam.time_s)?;
+    for (beta, range_m) in backscatter_per_m_sr.iter_mut().flatten().zip(range_m).filter(|(beta, _)| beta.is_nan()) {
+        *beta = plan.instrument.backscatter_per_m_sr(*range_m)?;
+    }
+    Ok(Air { radial_velocity_m_s, backscatter_per_m_sr })
+}
+
+/// The velocities of a beam with what the scene says of places where the flow is not known.
+fn velocity_of(
+    plan: &Plan,
+    beam: &Beam,
+    range_m: &[f64],
+    points_m: &[[f64; 3]],
+    known_m_s: Vec<f64>,
+) -> Result<Vec<f64>, Error> {
+    let scan = &plan.scene.scene.scan;
+    let elevation_rad = beam.elevation_rad;
+    let checked = |((&[x_m, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
+        let outside = match (z_m < 0.0, known_m_s.is_nan()) {
+            (true, _) => scan.below_ground,
+            (false, true) => scan.outside_flow,
+            (false, false) => return Ok(known_m_s),
+        };
+        match outside {
+            Outside::Constant { radial_velocity_m_s } => Ok(radial_velocity_m_s),
+            // A scene with lines below the ground was refused, but for air behind its last sample.
+            Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow { elevation_rad, range_m, x_m, y_m, z_m }),
+            Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
+        }
+    };
+    points_m.iter().zip(known_m_s).zip(range_m).map(checked).collect()
+}
+
+/// Places along a beam, m, and the radial velocity of the flow there, m/s; NaN where it is not known.
+pub(crate) fn known_velocity_m_s(
+    plan: &Plan,
+    beam: &Beam,
+    range_m: &[f64],
+) -> Result<(Vec<[f64; 3]>, Vec<f64>), Error> {
+    let points_m: Vec<[f64; 3]> = range_m.iter().map(|range_m| beam.at_range_m(*range_m)).collect();
+    let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
+    plan.wind.wind().velocity_into(&points_m, plan.wind.start_s + beam.time_s, &mut velocity_m_s)?;
+    let along = velocity_m_s.iter().map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s)).collect();
+    Ok((points_m, along))
+}
