@@ -37,8 +37,8 @@ pub(crate) fn of(context: &Context) -> Result<FinishedWake, Failure> {
             std::fs::remove_dir_all(&folder)?;
         }
         if !done.exists() {
-            let begin = if folder.join("flow.checkpoint").exists() { Begin::Restart } else { Begin::Overwrite };
-            flow::run(&file, &folder, begin, &mut Unwatched)?;
+            // From its last good checkpoint, or anew where there is none.
+            flow::run(&file, &folder, Begin::Restart, &mut Unwatched)?;
             std::fs::write(&done, &file.hash)?;
         }
         made.insert(folder.clone());

@@ -3,11 +3,10 @@
 //! Some independent batches of realisations give the correlation its confidence interval.
 
 use super::context::{Context, Rendered};
-use super::study::{Age, REFERENCES, Sight, Study, early_scene, mean_and_error, stacked, with_method};
+use super::study::{Age, REFERENCES, Sight, Study, early_scene, mean_and_error, of_batch, stacked, with_method};
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
-use rayon::prelude::*;
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
@@ -21,15 +20,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let sight = Sight::of(context, Age::Early)?;
     let (mut tables, mut panels, mut shown) = (Vec::new(), Vec::new(), Vec::new());
     let mut origin = None;
-    for (name, reference) in REFERENCES {
+    let scene = |reference, batch| {
+        let mut scene = of_batch(with_method(early_scene(realisations), "PA"), batch);
+        scene.detector.snr = reference;
+        scene
+    };
+    let scenes = REFERENCES.iter().flat_map(|(_, reference)| (0..BATCHES).map(|batch| scene(*reference, batch)));
+    let all = Study::runs(context, &sight, scenes.collect())?;
+    for ((name, _), studies) in REFERENCES.into_iter().zip(all.chunks(BATCHES as usize)) {
         let (mut of_rms, mut of_std) = (Vec::new(), Vec::new());
-        let study = |batch: u64| {
-            let mut scene = with_method(early_scene(realisations), "PA");
-            scene.detector.snr = reference;
-            let batch_context = Context { seed: context.seed + 1_000_003 * batch, ..context.clone() };
-            Study::run(&batch_context, &sight, scene)
-        };
-        let studies: Vec<Study> = (0..BATCHES).into_par_iter().map(study).collect::<Result<_, _>>()?;
         for (batch, study) in studies.iter().enumerate() {
             let gradient = gradient_per_s(study);
             of_rms.push(correlation(&study.map.rms_m_s, &gradient));

@@ -5,7 +5,6 @@ use super::study::{Age, REFERENCES, Sight, Study, early_scene, stacked, with_met
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use ndarray::Array2;
-use rayon::prelude::*;
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
@@ -42,12 +41,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let (mut tables, mut panels, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     let mut origin = None;
     let sight = Sight::of(context, Age::Late)?;
-    let study = |(_, reference)| {
+    let scene = |(_, reference)| {
         let mut scene = scene(context, &sight);
         scene.detector.snr = reference;
-        Study::run(context, &sight, scene)
+        scene
     };
-    let studies: Vec<Study> = REFERENCES.into_par_iter().map(study).collect::<Result<_, _>>()?;
+    let studies = Study::runs(context, &sight, REFERENCES.map(scene).to_vec())?;
     for ((name, _), study) in REFERENCES.into_iter().zip(&studies) {
         let map = write::velocity_map(&study.plan, &study.map);
         tables.push((name, map_table(&map)?));

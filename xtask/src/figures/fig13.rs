@@ -2,19 +2,19 @@
 
 use super::context::{Context, Rendered};
 use super::profiles;
-use super::study::{Age, INSIDE_M, REFERENCES, Sight, Study, mean_and_error, near_scene, with_method};
+use super::study::{Age, INSIDE_M, REFERENCES, Sight, Study, mean_and_error, near_scene, of_batch, with_method};
 use crate::Failure;
 use crate::claim::{Claim, Verdict, with_error};
 use profiles::{Profiles, edge_level};
-use rayon::prelude::*;
 use wakescope_sim::plot::Figure;
-use wakescope_sim::scene::SnrReference;
+use wakescope_sim::scene::{Scene, SnrReference};
 
 /// Fixed ratios beside the two references, dB.
 const FIXED_DB: [f64; 4] = [-5.0, 0.0, 10.0, 20.0];
 
 /// Batches of scans with seeds of their own, and Student's factor of a 95 % interval for their mean.
 const BATCHES: u64 = 6;
+const METHODS: [&str; 2] = ["PA", "CA"];
 const STUDENT: f64 = 2.571;
 
 /// PA and CA on the same signals at one signal-to-noise ratio.
@@ -25,21 +25,25 @@ struct Pair {
     differences_m_s: Vec<f64>,
 }
 
-fn pair(
-    context: &Context,
-    sight: &Sight,
-    name: &'static str,
-    reference: SnrReference,
-    realisations: usize,
-) -> Result<Pair, Failure> {
-    let (mut batches, mut differences_m_s) = ([Vec::new(), Vec::new()], Vec::new());
-    for batch in 0..BATCHES {
-        let batch_context = Context { seed: context.seed + 1_000_003 * batch, ..context.clone() };
-        let mut level_m_s = [0.0; 2];
-        for (place, method) in ["PA", "CA"].into_iter().enumerate() {
-            let mut scene = with_method(near_scene(realisations), method);
+/// The scenes of the batches, PA and CA of each.
+fn scenes(reference: SnrReference, realisations: usize) -> impl Iterator<Item = Scene> {
+    let of_batch = move |batch| {
+        METHODS.map(|method| {
+            let mut scene = of_batch(with_method(near_scene(realisations), method), batch);
             scene.detector.snr = reference;
-            let profiles = Profiles::of(method, name, &Study::run(&batch_context, sight, scene)?)?;
+            scene
+        })
+    };
+    (0..BATCHES).flat_map(of_batch)
+}
+
+/// What the batches of a ratio show.
+fn pair(name: &'static str, studies: &[Study]) -> Result<Pair, Failure> {
+    let (mut batches, mut differences_m_s) = ([Vec::new(), Vec::new()], Vec::new());
+    for of_batch in studies.chunks(METHODS.len()) {
+        let mut level_m_s = [0.0; 2];
+        for (place, (method, study)) in METHODS.into_iter().zip(of_batch).enumerate() {
+            let profiles = Profiles::of(method, name, study)?;
             level_m_s[place] = profiles.inside.rms_m_s - edge_level(&profiles);
             batches[place].push(profiles);
         }
@@ -55,10 +59,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let fixed = FIXED_DB.map(|snr_db| ("fixed", SnrReference::Fixed { snr_db }));
     let pairs = REFERENCES.into_iter().chain(fixed);
     let pairs: Vec<(&'static str, SnrReference)> = pairs.collect();
-    let pairs: Vec<Pair> = pairs
-        .into_par_iter()
-        .map(|(name, reference)| pair(context, &sight, name, reference, realisations))
-        .collect::<Result<_, _>>()?;
+    let all_scenes = pairs.iter().flat_map(|(_, reference)| scenes(*reference, realisations)).collect();
+    let studies = Study::runs(context, &sight, all_scenes)?;
+    let of_pairs = pairs.iter().zip(studies.chunks(BATCHES as usize * METHODS.len()));
+    let pairs: Vec<Pair> = of_pairs.map(|((name, _), studies)| pair(name, studies)).collect::<Result<_, _>>()?;
     let origin = context.provenance_of_formula(&sight.scene(context, near_scene(realisations)).to_toml());
     let all: Vec<&Profiles> = pairs.iter().flat_map(|p| [&p.pa, &p.ca]).collect();
     let shown = |p: &&Pair| p.pa.name != "fixed" || [0.0, 20.0].iter().any(|db| (p.pa.snr_db - db).abs() < 0.1);

@@ -6,7 +6,6 @@ use super::study::{Age, REFERENCES, Sight, Study, near_scene, with_method, with_
 use crate::Failure;
 use crate::claim::{Claim, Verdict};
 use profiles::{Profiles, peak, width_m};
-use rayon::prelude::*;
 use wakescope_sim::plot::Figure;
 use wakescope_sim::scene::{PulseShape, SnrReference};
 
@@ -21,14 +20,16 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             cases.extend(["PA", "CA"].map(|method| (name, reference, duration_s, method)));
         }
     }
-    let profiles_of = |(name, reference, duration_s, method): (&'static str, SnrReference, f64, &'static str)| {
+    let scene = |(_, reference, duration_s, method): &(&str, SnrReference, f64, &str)| {
         let mut scene = with_method(near_scene(realisations), method);
-        scene.detector.snr = reference;
-        scene.pulse.shape = PulseShape::gaussian(duration_s);
-        let scene = with_turbulence(context, scene, 1e-15);
-        Profiles::of(method, name, &Study::run(context, &sight, scene)?)
+        scene.detector.snr = *reference;
+        scene.pulse.shape = PulseShape::gaussian(*duration_s);
+        with_turbulence(context, scene, 1e-15)
     };
-    let all: Vec<Profiles> = cases.into_par_iter().map(profiles_of).collect::<Result<_, Failure>>()?;
+    let studies = Study::runs(context, &sight, cases.iter().map(scene).collect())?;
+    let shown = cases.iter().zip(&studies);
+    let all: Vec<Profiles> =
+        shown.map(|((name, _, _, method), study)| Profiles::of(method, name, study)).collect::<Result<_, _>>()?;
     let origin = context.provenance_of_formula(&sight.scene(context, near_scene(realisations)).to_toml());
     let every: Vec<&Profiles> = all.iter().collect();
     let panels = all.chunks(4).map(|of| {

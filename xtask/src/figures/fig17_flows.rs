@@ -74,6 +74,7 @@ fn of_flow(context: &Context, tau: Option<f64>, wake: &Path) -> Result<OfFlow, F
             Flow::Simulated(SimulatedFlow { planes, motion, age_tau: Some(age_tau), ..SimulatedFlow::default() })
         }
     };
+    (scene.outputs.flow, scene.outputs.signals) = (false, false);
     // Signals take longest: the fits of all samples of the pair are in the other part of the figure.
     let some = METHODS[..context.choose(4, 5, 5)].iter().map(|(method, _)| *method).collect();
     scene.retrieval = Some(Retrieval { methods: some, ..Retrieval::default() });

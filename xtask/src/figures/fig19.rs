@@ -3,13 +3,13 @@
 use super::context::{Context, Rendered};
 use crate::Failure;
 use crate::claim::{Claim, Verdict, with_error};
-use rayon::prelude::*;
-use wakescope_estimate::retrieval::Turbulence;
+use wakescope_estimate::retrieval::{ScanMap, Turbulence};
 use wakescope_estimate::wake_detection::{DetectorOptions, Share};
 use wakescope_sim::Silent;
 use wakescope_sim::detection::{Calibration, DetectionSettings, Power, SceneNoise, detect, strided};
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::budget::snr_without_screens_db;
+use wakescope_sim::measure::map::velocities;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::retrieve::gate_of;
@@ -104,19 +104,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
 /// Share of alarms at a rate in whole scans of still air, each with signals of its own, through the scene's estimator; the rate and its
 /// binomial standard error.
-fn alarms(plan: &Plan, noise: &SceneNoise, (scans, rate): (u64, f64)) -> Result<(Share, [f64; 2]), Failure> {
+fn alarms(plan: &Plan, noise: &SceneNoise, (scans, rate): (usize, f64)) -> Result<(Share, [f64; 2]), Failure> {
     let settings = settings(plan, noise, None, rate)?;
-    let scan = |scan: u64| -> Result<_, Failure> {
-        let mut file = plan.scene.clone();
-        // far from the seed of the scans that measured the noise
-        file.scene.seed += 1000 + scan;
-        let map = wakescope_sim::run(&Plan::new(file, Target::Map)?, &Silent)?.map;
-        let mut empty = noise.empty_scan(plan);
-        empty.velocity_m_s = map.ok_or_else(|| Failure::new("a run without a map".into()))?.v_scan_m_s;
-        Ok(empty)
-    };
-    let maps: Vec<_> = (0..scans).into_par_iter().map(|number| scan(number).map_err(|e| e.to_string())).collect();
-    let maps = maps.into_iter().collect::<Result<Vec<_>, _>>().map_err(Failure::new)?;
+    let mut file = plan.scene.clone();
+    file.scene.scan.realisations = scans;
+    let shown_m_s = velocities(&Plan::new(file, Target::Map)?, &Silent)?;
+    let maps: Vec<_> =
+        shown_m_s.into_iter().map(|velocity_m_s| ScanMap { velocity_m_s, ..noise.empty_scan(plan) }).collect();
     let (found, _) = detect(&maps, &settings)?;
     let error = (rate * (1.0 - rate) / maps.len() as f64).sqrt();
     Ok((Share::of(found.iter().filter(|scan| scan.is_wake()).count(), maps.len()), [rate, error]))

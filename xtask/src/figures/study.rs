@@ -13,13 +13,13 @@ use wakescope_sim::io::{Provenance, Table};
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::measure::progress::Silent;
-use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::plan::Plan;
 use wakescope_sim::scene::{
     Flow, Method, ModelOrder, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
     SnrReference, Turbulence, VortexPair, Weighting,
 };
 use wakescope_sim::sweep::{self, Request, Sweep};
-use wakescope_sim::{measure::run, measure::wind, measure::write};
+use wakescope_sim::{measure::wind, measure::write};
 
 /// Lines of sight 0.5 m apart that a region of 2 m shares.
 const SHARED_LINES: f64 = 9.0;
@@ -36,9 +36,9 @@ pub(super) const OUTSIDE_M: f64 = 30.0;
 pub(super) const REFERENCES: [(&str, SnrReference); 2] =
     [("physical", SnrReference::Physical {}), ("chapter", SnrReference::Chapter {})];
 
-/// One pulse a line, unweighted windows, regions of 2 m, the pair 400 m away.
+/// One pulse a line, unweighted windows, regions of 2 m, the pair 400 m away; the first seed.
 pub(super) fn early_scene(realisations: usize) -> Scene {
-    let mut scene = Scene::default();
+    let mut scene = Scene { seed: 0, ..Scene::default() };
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.03, 0.2);
     (scene.scan.range_min_m, scene.scan.range_max_m) = (310.0, 500.0);
     (scene.scan.pulses_per_line, scene.scan.realisations) = (1, realisations);
@@ -74,6 +74,11 @@ pub(super) fn with_turbulence(context: &Context, mut scene: Scene, cn2_m_m23: f6
     };
     scene.atmosphere.turbulence = Turbulence::Refractive(turbulence);
     scene
+}
+
+/// The scene with the seed of a batch of scans.
+pub(super) fn of_batch(scene: Scene, batch: u64) -> Scene {
+    Scene { seed: scene.seed + 1_000_003 * batch, ..scene }
 }
 
 /// The flow that is looked at.
@@ -121,9 +126,14 @@ impl Sight {
         Ok(Self { flow: Flow::Simulated(flow), folder: wake.folder, cores, words, mark: "simulated flow".into() })
     }
 
-    /// The scene with this flow.
+    /// Where the files of its scenes are looked for.
+    fn path(&self) -> PathBuf {
+        self.folder.join("scene.toml")
+    }
+
+    /// The scene with this flow; its seed is counted from that of the figures.
     pub(super) fn scene(&self, context: &Context, mut scene: Scene) -> Scene {
-        scene.seed = context.seed;
+        scene.seed += context.seed;
         scene.flow = self.flow.clone();
         if matches!(self.flow, Flow::Simulated(_)) {
             scene.scan.outside_flow = Outside::Mask {};
@@ -158,20 +168,22 @@ pub(super) struct Study {
 }
 
 impl Study {
-    /// Runs the map of a scene.
-    pub(super) fn run(context: &Context, sight: &Sight, scene: Scene) -> Result<Self, Failure> {
-        let toml = sight.scene(context, scene).to_toml();
-        let plan = Plan::new(SceneFile::parse(&toml, &sight.folder.join("scene.toml"))?, Target::Map)?;
-        let map = run::run(&plan, &Silent)?.map.ok_or_else(|| Failure::new("the plan gave no map".into()))?;
-        Ok(Self::of(sight, plan, map))
+    /// Runs the maps of scenes; what they have in common is computed once.
+    pub(super) fn runs(context: &Context, sight: &Sight, scenes: Vec<Scene>) -> Result<Vec<Self>, Failure> {
+        let file = |scene| SceneFile::parse(&sight.scene(context, scene).to_toml(), &sight.path());
+        Self::of_files(sight, &scenes.into_iter().map(file).collect::<Result<Vec<_>, _>>()?)
     }
 
     /// Runs the maps of a scene with keys that vary, the last one fastest.
     pub(super) fn sweep(context: &Context, sight: &Sight, scene: Scene, vary: &[&str]) -> Result<Vec<Self>, Failure> {
         let toml = sight.scene(context, scene).to_toml();
         let request = Request { vary: vary.iter().map(ToString::to_string).collect(), ..Request::default() };
-        let sweep = Sweep::parse(&toml, &sight.folder.join("scene.toml"), &request)?;
-        Ok(sweep::maps(&sweep, &Silent)?.into_iter().map(|(plan, map)| Self::of(sight, plan, map)).collect())
+        let sweep = Sweep::parse(&toml, &sight.path(), &request)?;
+        Self::of_files(sight, &sweep.cases.into_iter().map(|case| case.scene).collect::<Vec<_>>())
+    }
+
+    fn of_files(sight: &Sight, files: &[SceneFile]) -> Result<Vec<Self>, Failure> {
+        Ok(sweep::maps(files, &Silent)?.into_iter().map(|(plan, map)| Self::of(sight, plan, map)).collect())
     }
 
     fn of(sight: &Sight, plan: Plan, map: VelocityEstimates) -> Self {

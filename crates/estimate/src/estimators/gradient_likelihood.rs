@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use ndarray::Array2;
 use num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use rustfft::Fft;
 
 use crate::bound::{GradientModel, Noise};
 use crate::error::{Error, finite, increasing, positive};
@@ -25,6 +25,7 @@ use crate::estimators::gradient_tapers::{LagWeights, Tapers, band_lag, tapers};
 use crate::estimators::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
 use crate::estimators::{Estimator, GateVelocity, NoiseTest, Quality, Refinement, Statistic};
 use crate::spectrum::ZoomSpectrum;
+use crate::spectrum::transform::complex_transforms;
 use crate::window::{Gates, Sample, Sampling, Scratch, SignalKind};
 
 type C64 = Complex<f64>;
@@ -113,7 +114,6 @@ impl<S: Sample> GradientLikelihood<S> {
         let grid_hz: Vec<f64> = (0..4 * n).map(|k| k as f64 * sampling.sample_rate_hz / (4 * n) as f64).collect();
         let size = |&k: &usize| gradient_per_s[k].abs();
         let slowest = (0..tapers.len()).min_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
-        let mut planner = FftPlanner::new();
         let mut estimator = GradientPeak {
             corrections: Vec::new(),
             gradient_readings: Vec::new(),
@@ -135,12 +135,13 @@ impl<S: Sample> GradientLikelihood<S> {
             let read = gradient_per_s.iter().zip(&tapers).map(|(&g, tapers)| estimator.readings(model, g, snr, tapers));
             estimator.corrections = read.collect::<Result<_, _>>()?;
         }
+        let [forward, inverse] = complex_transforms(2 * n);
         let statistic = GradientStatistic {
             tapers,
             band_lags,
             window_samples: n,
-            forward: planner.plan_fft_forward(2 * n),
-            inverse: planner.plan_fft_inverse(2 * n),
+            forward,
+            inverse,
             sample: std::marker::PhantomData,
         };
         estimator.gradient_readings = statistic.gradient_readings(&estimator, model, snr)?;

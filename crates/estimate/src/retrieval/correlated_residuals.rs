@@ -14,11 +14,12 @@
 
 use ndarray::Array2;
 use num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use rustfft::Fft;
 use std::sync::Arc;
 
 use crate::linalg::dot;
 use crate::retrieval::problem::{Cell, products};
+use crate::spectrum::transform::complex_transforms;
 
 /// Reduction of chi-square that a correlated part must bring.
 const BEYOND_CHANCE: f64 = 12.0;
@@ -39,10 +40,7 @@ impl<'a> Plane<'a> {
     fn new(cells: &'a [Cell]) -> Self {
         let most = |of: fn(&Cell) -> usize| 2 * (cells.iter().map(of).max().unwrap_or(0) + 1);
         let (lines, gates) = (most(|cell| cell.line), most(|cell| cell.gate));
-        let mut planner = FftPlanner::new();
-        let along = [planner.plan_fft_forward(gates), planner.plan_fft_inverse(gates)];
-        let across = [planner.plan_fft_forward(lines), planner.plan_fft_inverse(lines)];
-        Self { cells, lines, gates, along, across }
+        Self { cells, lines, gates, along: complex_transforms(gates), across: complex_transforms(lines) }
     }
 
     fn transform(&self, grid: &mut [Complex<f64>], inverse: usize) {

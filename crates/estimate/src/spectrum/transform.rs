@@ -18,6 +18,28 @@ enum Plans {
     Complex(Arc<dyn Fft<f64>>, Arc<dyn Fft<f64>>),
 }
 
+impl Plans {
+    /// Not generic, so that the planner is compiled once, with this crate, and not again by each program that names a sample type.
+    fn new(kind: SignalKind, padded: usize) -> Self {
+        match kind {
+            SignalKind::Real => {
+                let mut planner = RealFftPlanner::new();
+                Self::Real(planner.plan_fft_forward(padded), planner.plan_fft_inverse(padded))
+            }
+            SignalKind::Complex => {
+                let [forward, inverse] = complex_transforms(padded);
+                Self::Complex(forward, inverse)
+            }
+        }
+    }
+}
+
+/// The forward and the inverse transform of complex numbers; not generic either.
+pub(crate) fn complex_transforms(length: usize) -> [Arc<dyn Fft<f64>>; 2] {
+    let mut planner = FftPlanner::new();
+    [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
+}
+
 /// Zero-padded transform of length `padded` for samples of type `S`.
 #[derive(Clone)]
 pub(crate) struct WindowTransform<S> {
@@ -29,16 +51,7 @@ pub(crate) struct WindowTransform<S> {
 
 impl<S: Sample> WindowTransform<S> {
     pub(crate) fn new(padded: usize) -> Self {
-        let plans = match S::KIND {
-            SignalKind::Real => {
-                let mut planner = RealFftPlanner::new();
-                Plans::Real(planner.plan_fft_forward(padded), planner.plan_fft_inverse(padded))
-            }
-            SignalKind::Complex => {
-                let mut planner = FftPlanner::new();
-                Plans::Complex(planner.plan_fft_forward(padded), planner.plan_fft_inverse(padded))
-            }
-        };
+        let plans = Plans::new(S::KIND, padded);
         let inner = match &plans {
             Plans::Real(forward, inverse) => forward.get_scratch_len().max(inverse.get_scratch_len()),
             Plans::Complex(forward, inverse) => {

@@ -7,8 +7,8 @@
 use crate::Error;
 use crate::error::positive;
 use crate::screens::kernel::Real;
+use rustfft::Fft;
 use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
 
 /// Rows transformed at a time before they are stored transposed: one cache line of f32 numbers.
@@ -107,9 +107,8 @@ pub(crate) struct Fft2<T: Real> {
 
 impl<T: Real> Fft2<T> {
     pub(crate) fn new(grid: &Grid) -> Self {
-        let mut planner = FftPlanner::new();
-        let forward = [grid.nx, grid.ny].map(|n| planner.plan_fft_forward(n));
-        let inverse = [grid.nx, grid.ny].map(|n| planner.plan_fft_inverse(n));
+        let [[forward_x, inverse_x], [forward_y, inverse_y]] = [grid.nx, grid.ny].map(T::transforms);
+        let (forward, inverse) = ([forward_x, forward_y], [inverse_x, inverse_y]);
         let scratch = forward.iter().chain(&inverse).map(|f| f.get_inplace_scratch_len()).max().unwrap_or(0);
         Self { nx: grid.nx, ny: grid.ny, forward, inverse, scratch }
     }

@@ -9,8 +9,9 @@
 #![allow(clippy::excessive_precision)]
 
 use multiversion::multiversion;
-use rustfft::FftNum;
 use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftNum, FftPlanner};
+use std::sync::Arc;
 
 /// Points handled at a time by the kernels that need temporaries.
 const BLOCK: usize = 64;
@@ -31,6 +32,10 @@ pub trait Real: sealed::Sealed + FftNum + Default + PartialOrd {
     fn of(value: f64) -> Self;
     /// The number as f64.
     fn wide(self) -> f64;
+    /// The forward and the inverse transform of a length; of each type by itself, so that the planner is compiled with this crate
+    /// and not again by each program that names the type.
+    #[doc(hidden)]
+    fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2];
     /// field *= exp(j scale phase).
     #[doc(hidden)]
     fn multiply_cis(field: &mut [Complex<Self>], phase: &[Self], scale: Self);
@@ -248,6 +253,10 @@ macro_rules! kernels {
             }
             fn wide(self) -> f64 {
                 f64::from(self)
+            }
+            fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2] {
+                let mut planner = FftPlanner::new();
+                [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
             }
             fn multiply_cis(field: &mut [Complex<Self>], phase: &[Self], scale: Self) {
                 $module::multiply_cis(field, phase, scale);

@@ -7,13 +7,11 @@
 //! among them; regions that overlap are told.
 
 use crate::Error;
-use crate::measure::map::estimates;
+use crate::measure::map::velocities;
 use crate::measure::progress::Observer;
-use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Target};
-use crate::scene::{DetectorSignal, Flow, SceneFile};
+use crate::scene::{Flow, SceneFile};
 use ndarray::{Array2, s};
-use num_complex::Complex;
 use wakescope_estimate::retrieval::ScanMap;
 
 /// Lines of a scan of still air at most, and of all of them together: a few hundred independent velocities at each range, its deviation
@@ -64,16 +62,7 @@ impl SceneNoise {
         scene.outputs.signals = false;
         let file = SceneFile::new(scene).map_err(|problems| plan.scene.located(problems))?;
         let still = Plan::new(file, Target::Map)?;
-        let scanner = Scanner::new(&still, observer)?;
-        let mut maps = Vec::new();
-        match still.scene.scene.detector.signal {
-            DetectorSignal::IntermediateFrequency => {
-                estimates::<f64>(&[&still], &scanner, observer, |_| (), |_, map| maps.push(map.clone()))?;
-            }
-            DetectorSignal::Baseband => {
-                estimates::<Complex<f64>>(&[&still], &scanner, observer, |_| (), |_, map| maps.push(map.clone()))?;
-            }
-        }
+        let maps = velocities(&still, observer)?;
         Ok(Self::of_maps(still.geometry.gate_range_m.clone(), &maps, plan.geometry.elevation_rad.len()))
     }
 

@@ -8,7 +8,9 @@ use crate::measure::progress::Observer;
 use crate::measure::region::places;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
+use crate::scene::DetectorSignal;
 use ndarray::{Array2, ArrayView1, ArrayView2};
+use num_complex::Complex;
 use wakescope_estimate::{
     Scan, Statistic,
     map::{ErrorMap, MapPoint, PolarPoint, ScanGeometry, ScanSums},
@@ -260,6 +262,22 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::scan::Sample>(
     }
     observer.end();
     Ok(mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan)).collect())
+}
+
+/// The radial velocities \[line, gate\], m/s, of each realisation of a plan: what whole scans show, one after the other. Efficiency and
+/// lines are made once for all of them.
+///
+/// # Errors
+/// What the crates refuse; a checked scene gives none.
+pub fn velocities(plan: &Plan, observer: &dyn Observer) -> Result<Vec<Array2<f64>>, Error> {
+    let scanner = Scanner::new(plan, observer)?;
+    let mut maps = Vec::with_capacity(plan.realisations());
+    let seen = |_, velocity_m_s: &Array2<f64>| maps.push(velocity_m_s.clone());
+    match plan.scene.scene.detector.signal {
+        DetectorSignal::IntermediateFrequency => estimates::<f64>(&[plan], &scanner, observer, |_| (), seen)?,
+        DetectorSignal::Baseband => estimates::<Complex<f64>>(&[plan], &scanner, observer, |_| (), seen)?,
+    };
+    Ok(maps)
 }
 
 /// What takes the records of pulses from a number on.

@@ -14,7 +14,7 @@ use crate::measure::progress::Observer;
 use crate::measure::wind::SceneWind;
 use crate::measure::write::prepare;
 use crate::plan::{Plan, Target};
-use crate::scene::{Estimator, Outputs, Scene, Site, hash_of};
+use crate::scene::{Estimator, Outputs, Scene, SceneFile, Site, hash_of};
 use crate::{Error, machine};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -117,8 +117,11 @@ pub fn run<'s>(
     definition.write(out)?;
     let known = Efficiencies::default();
     let (mut signals, mut done, mut walls) = (0, 0, Vec::new());
-    for group in groups(&due) {
-        let planned = |case: &&'s Case| Ok((*case, plan(case, &winds).map_err(|e| failed(sweep, case, e))?));
+    for group in groups(due.iter().map(|case| &case.scene)) {
+        let planned = |&place: &usize| {
+            let case: &'s Case = due[place];
+            Ok((case, plan(&case.scene, &winds).map_err(|e| failed(sweep, case, e))?))
+        };
         for batch in batches(group.iter().map(planned).collect::<Result<_, Error>>()?) {
             let begun = Instant::now();
             let (cases, plans): (Vec<&Case>, Vec<Plan>) = batch.into_iter().unzip();
@@ -143,29 +146,27 @@ pub fn run<'s>(
     Ok(Summary { run: due.len(), kept: mine.len() - due.len(), shared, files })
 }
 
-/// The plan and the map of every case, in their order, without any file; what they have in common is computed once.
+/// The plan and the map of every scene, in their order, without any file; what they have in common is computed once: flows,
+/// efficiencies, and the signals of those that differ in what is done with the records alone.
 ///
 /// # Errors
-/// The first case that is refused; a case that cannot be run.
-pub fn maps(sweep: &Sweep, observer: &dyn Observer) -> Result<Vec<(Plan, VelocityEstimates)>, Error> {
+/// What a plan refuses; a scene that cannot be run.
+pub fn maps(scenes: &[SceneFile], observer: &dyn Observer) -> Result<Vec<(Plan, VelocityEstimates)>, Error> {
     let (winds, known) = (Known::default(), Efficiencies::default());
-    check(sweep, &winds, false)?;
-    let mut out = Vec::with_capacity(sweep.cases.len());
-    for cases in groups(&sweep.cases.iter().collect::<Vec<_>>()) {
-        let planned = |case: &&Case| plan(case, &winds).map_err(|e| failed(sweep, case, e));
-        let plans: Vec<Plan> = cases.iter().map(planned).collect::<Result<_, _>>()?;
-        let found = group::maps(&plans.iter().collect::<Vec<_>>(), &known, observer);
-        let found = found.map_err(|e| of_batch(sweep, &cases, e))?;
-        out.extend(cases.iter().map(|case| case.index).zip(plans.into_iter().zip(found)));
+    let mut out: Vec<(usize, (Plan, VelocityEstimates))> = Vec::with_capacity(scenes.len());
+    for places in groups(scenes.iter()) {
+        let plans: Vec<Plan> = places.iter().map(|&i| plan(&scenes[i], &winds)).collect::<Result<_, _>>()?;
+        let found = group::maps(&plans.iter().collect::<Vec<_>>(), &known, observer)?;
+        out.extend(places.into_iter().zip(plans.into_iter().zip(found)));
     }
-    out.sort_by_key(|(index, _)| *index);
+    out.sort_by_key(|(place, _)| *place);
     Ok(out.into_iter().map(|(_, found)| found).collect())
 }
 
 /// Plans and rehearses every case, and finds out whether it fits the memory.
 fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<(), Error> {
     let checked = |case: &Case| -> Result<(), Error> {
-        let plan = plan(case, winds)?;
+        let plan = plan(&case.scene, winds)?;
         if !allow_large {
             plan.fits()?;
         }
@@ -196,27 +197,27 @@ fn of_batch(sweep: &Sweep, cases: &[&Case], error: Error) -> Error {
     }
 }
 
-/// The plan of a case, with a wind that other cases may share.
-fn plan(case: &Case, winds: &Known<SceneWind>) -> Result<Plan, Error> {
-    let cause = hash_of(&format!("{:?}", case.scene.scene.flow));
-    let wind = winds.of(cause, || SceneWind::new(&case.scene))?;
-    Plan::with_wind(case.scene.clone(), Target::Map, wind)
+/// The plan of a scene, with a wind that others may share.
+fn plan(scene: &SceneFile, winds: &Known<SceneWind>) -> Result<Plan, Error> {
+    let cause = hash_of(&format!("{:?}", scene.scene.flow));
+    let wind = winds.of(cause, || SceneWind::new(scene))?;
+    Plan::with_wind(scene.clone(), Target::Map, wind)
 }
 
-/// Cases with the same signals: those whose scenes differ in what is done with the records alone.
-fn groups<'c>(cases: &[&'c Case]) -> Vec<Vec<&'c Case>> {
-    let mut groups: Vec<(String, Vec<&Case>)> = Vec::new();
-    for case in cases {
+/// Places of the scenes with the same signals: those that differ in what is done with the records alone.
+fn groups<'s>(scenes: impl Iterator<Item = &'s SceneFile>) -> Vec<Vec<usize>> {
+    let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
+    for (place, file) in scenes.enumerate() {
         let signals = Scene {
             estimator: Estimator::default(),
             outputs: Outputs::default(),
             site: Site::default(),
-            ..case.scene.scene.clone()
+            ..file.scene.clone()
         };
         let cause = hash_of(&format!("{signals:?}"));
         match groups.iter_mut().find(|(known, _)| *known == cause) {
-            Some((_, group)) => group.push(case),
-            None => groups.push((cause, vec![case])),
+            Some((_, group)) => group.push(place),
+            None => groups.push((cause, vec![place])),
         }
     }
     groups.into_iter().map(|(_, group)| group).collect()
