@@ -5,7 +5,7 @@
 
 use crate::Error;
 use crate::measure::instrument::Instrument;
-use crate::measure::profile::{drawn_turbulence, efficiency_at, efficiency_realisations};
+use crate::measure::profile::{efficiency_at, efficiency_realisations, turbulence};
 use crate::measure::progress::Observer;
 use crate::plan::Stage;
 use crate::scene::{RefractiveTurbulence, Scene, hash_of};
@@ -90,9 +90,9 @@ impl Efficiencies {
     }
 }
 
-/// What a curve depends on: on the seed only where screens are drawn.
+/// What a curve depends on: on the seed only in turbulence, where screens may be drawn.
 fn cause(scene: &Scene, range_m: &[f64]) -> String {
     let (air, laser) = (&scene.atmosphere.turbulence, scene.laser.wavelength_m);
-    let seed = drawn_turbulence(scene).map(|_| scene.seed);
+    let seed = turbulence(scene).map(|_| scene.seed);
     hash_of(&format!("{:?}", (laser, &scene.telescope, air, seed, range_m)))
 }

@@ -225,6 +225,32 @@ fn what_cases_have_in_common_is_computed_once() {
 }
 
 #[test]
+fn seeds_share_an_efficiency_where_no_screens_are_drawn() {
+    let turbulent = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-15\ngrid_points = 64\n\
+                     grid_spacing_m = 0.004\nrealisations = 5\nlayers = 4\n[telescope]\nfocus_m = 400.0\n";
+    let of_seeds = |scene: &str| ran(scene, &vary(&["seed=1,2"])).1.shared.efficiencies;
+    assert_eq!(of_seeds(SMALL), 1);
+    assert_eq!(of_seeds(&(SMALL.to_owned() + turbulent)), 2);
+}
+
+#[test]
+fn maps_of_scenes_together_are_those_of_each_alone() {
+    let scene = |text: &str| SceneFile::parse(text, Path::new("s.toml")).unwrap();
+    let other = format!("seed = 2\n{SMALL}[estimator]\nradius_m = 1.0\n");
+    let scenes = [scene(SMALL), scene(&other), scene(&format!("{SMALL}[estimator]\nradius_m = 1.0\n"))];
+    let together = maps(&scenes, &crate::Silent).unwrap();
+    for (scene, (plan, map)) in scenes.iter().zip(&together) {
+        assert_eq!(plan.scene.scene, scene.scene);
+        let alone = crate::plan::Plan::new(scene.clone(), crate::plan::Target::Map).unwrap();
+        let alone = crate::run(&alone, &crate::Silent).unwrap().map.unwrap();
+        let bits = |of: &crate::measure::map::VelocityEstimates| {
+            [&of.v_scan_m_s, &of.rms_m_s, &of.snr_db].map(|values| values.mapv(f64::to_bits))
+        };
+        assert_eq!(bits(&alone), bits(map));
+    }
+}
+
+#[test]
 fn results_are_those_of_the_map_of_the_case() {
     let (_, _, table) = ran(SMALL, &vary(&["pulse.energy_j=150e-6"]));
     let plan = crate::plan::Plan::new(SceneFile::parse(SMALL, Path::new("s.toml")).unwrap(), crate::plan::Target::Map)
