@@ -11,7 +11,6 @@
 use rayon::prelude::*;
 
 mod project;
-mod show;
 
 use super::implicit::LineSolver;
 use super::layout::{Layout, Shape};

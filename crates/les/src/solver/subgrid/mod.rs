@@ -172,11 +172,6 @@ impl Subgrid {
         self.largest.decay_per_s
     }
 
-    /// Takes an eddy viscosity from elsewhere, to be shown.
-    pub(crate) fn set_viscosity(&mut self, viscosity_m2_s: Vec<f64>) {
-        self.viscosity = viscosity_m2_s;
-    }
-
     /// Eddy viscosity at the centres, in the order of memory \[m^2/s\].
     pub(crate) fn viscosity_m2_s(&self) -> &[f64] {
         &self.viscosity
