@@ -52,7 +52,8 @@ pub(crate) fn run() -> Outcome {
     let case = |pause: &str| {
         format!(
             "format = 1\n[case]\nkind = \"wake\"\n[wake]\nend_tau = 1.0\nevery_tau = 0.02\nplanes_tau = [0.02, 0.04]\n\
-             [time]\n{pause}[output]\nplanes = [\"netcdf\"]\n[checkpoint]\nevery_steps = 2\n"
+             fields_tau = [0.04]\n[time]\n{pause}[output]\nplanes = [\"netcdf\"]\n\
+             fields = [\"netcdf\", \"csv\", \"initial_netcdf\"]\n[checkpoint]\nevery_steps = 2\n"
         )
     };
     std::fs::write(scratch.join("short.toml"), case(&format!("pause_after_steps = {STEPS}\n")))?;

@@ -9,6 +9,7 @@
 use crate::Error;
 use crate::solver::flow::Flow;
 use crate::solver::mesh::{AXIS_NAMES, Direction, Ends, Mesh, Wall};
+use crate::solver::planes::Faces;
 use crate::winds::axis::{Axis, Edges, GHOSTS, Ghost, Side};
 use crate::winds::grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh, ghost_places, ghost_value};
 
@@ -44,11 +45,11 @@ impl Flow {
     /// Velocity at the centres of the cells of the cross-plane at `x_m` \[m\].
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a position outside the mesh, if x is not periodic, or not finite.
+    /// [`Error::OutOfRange`] for a position outside the mesh, if x is not periodic, or not finite; [`Error::RankLost`].
     pub fn cross_plane(&self, x_m: f64) -> Result<CrossPlane, Error> {
         let mesh = self.mesh();
         let along = &mesh.directions()[0];
-        let [nx, ny, nz] = mesh.cells();
+        let [nx, ny, _] = mesh.cells();
         let refused = || Error::OutOfRange { field: "x_m", value: x_m, allowed: "finite, within the mesh" };
         let taps;
         if nx > 1 {
@@ -60,8 +61,10 @@ impl Flow {
         } else {
             return Err(refused());
         }
-        let centred = [0, 1, 2].map(|component| self.centre_velocity_m_s(component));
-        let velocity_m_s = (0..ny * nz)
+        let centred = [0, 1, 2].map(|component| self.own_centre_velocity_m_s(component));
+        let [u, v, w] = centred;
+        let centred = [u?, v?, w?];
+        let own: Vec<[f64; 3]> = (0..ny * self.own_planes().len())
             .map(|row| {
                 let node = |i: usize| centred.each_ref().map(|field| field[row * nx + i]);
                 let mut sum = [0.0; 3];
@@ -77,7 +80,7 @@ impl Flow {
                 sum
             })
             .collect();
-        Ok(CrossPlane::at(x_m, mesh, velocity_m_s))
+        Ok(CrossPlane::at(x_m, mesh, self.layout.slabs.planes(own)?))
     }
 
     /// The cross-plane at `x_m` \[m\] as a wind at the present time, with the walls and periods of the mesh.
@@ -89,20 +92,28 @@ impl Flow {
     }
 
     /// The velocity averaged along the flight, at the centres of the cells; its `x_m` is the middle of the mesh.
-    pub fn mean_cross_plane(&self) -> CrossPlane {
+    ///
+    /// # Errors
+    /// [`Error::RankLost`].
+    pub fn mean_cross_plane(&self) -> Result<CrossPlane, Error> {
+        self.mean_plane_of(&self.faces()?)
+    }
+
+    /// The same of the velocity at the faces.
+    pub(super) fn mean_plane_of(&self, faces: &Faces) -> Result<CrossPlane, Error> {
         let mesh = self.mesh();
         let along = &mesh.directions()[0];
         let length_m: Vec<f64> = mesh.face_m(0).windows(2).map(|w| w[1] - w[0]).collect();
         let nx = length_m.len();
-        let mut velocity_m_s = vec![[0.0; 3]; mesh.cells()[1] * mesh.cells()[2]];
+        let mut own = vec![[0.0; 3]; mesh.cells()[1] * self.own_planes().len()];
         for component in 0..3 {
-            let centred = self.centre_velocity_m_s(component);
-            for (mean, row) in velocity_m_s.iter_mut().zip(centred.chunks(nx)) {
+            let centred = self.centred(component, &faces.field[component]);
+            for (mean, row) in own.iter_mut().zip(centred.chunks(nx)) {
                 let sum: f64 = row.iter().zip(&length_m).map(|(value, length_m)| value * length_m).sum();
                 mean[component] = sum / along.length_m();
             }
         }
-        CrossPlane::at(0.5 * (along.low_m + along.high_m), mesh, velocity_m_s)
+        Ok(CrossPlane::at(0.5 * (along.low_m + along.high_m), mesh, self.layout.slabs.planes(own)?))
     }
 
     /// A plane of this flow as a wind.

@@ -1,15 +1,19 @@
 //! Fields of a flow as plain arrays in the order `[z][y][x]`, whatever their order in memory.
 //!
-//! Of a flow on several ranks all must ask together, and all get the whole field; where a rank is lost, which the next step
-//! says, its values are not finite.
+//! Of a flow on several ranks all must ask together. All get the whole field, which each must have room for, and whose values
+//! are not finite where a rank is lost, which the next step says; or each gets its own planes across z.
 //!
 //! Check: round trip, interpolation exact for cubics, values against the closed form they were set from.
 
 use std::borrow::Cow;
+use std::ops::Range;
+
+use rayon::prelude::*;
 
 use super::flow::Flow;
 use super::layout::{Layout, Shape};
-use super::mesh::Mesh;
+use super::mesh::{Ends, Mesh};
+use super::planes::without_halos;
 use super::settings::FlowSettings;
 use crate::Error;
 
@@ -55,56 +59,101 @@ impl Flow {
         Ok(if largest == 0.0 { 0.0 } else { largest / self.state.courant_per_s })
     }
 
-    /// A whole field from those of all ranks.
-    fn whole<'a>(&self, field: &'a [f64]) -> Cow<'a, [f64]> {
-        let lost = |_| Cow::Owned(vec![f64::NAN; Shape::whole(self.layout.shape.n).len()]);
-        self.layout.slabs.whole(field, true).unwrap_or_else(lost)
+    /// The planes across z that this rank has to show, which the readers that begin with `own` give: all of them in one process.
+    pub fn own_planes(&self) -> Range<usize> {
+        self.shown().own()
+    }
+
+    /// Velocity along `direction` (0, 1, 2 for x, y, z) at the low faces of the cells of [`Self::own_planes`] \[m/s\],
+    /// `[z][y][x]`.
+    ///
+    /// # Errors
+    /// [`Error::RankLost`].
+    pub fn own_face_velocity_m_s(&self, direction: usize) -> Result<Vec<f64>, Error> {
+        self.face(direction).map(|faces| without_halos(self.shown(), faces))
+    }
+
+    /// Velocity along `direction` at the centres of the cells of [`Self::own_planes`], interpolated with fourth order \[m/s\],
+    /// `[z][y][x]`.
+    ///
+    /// # Errors
+    /// [`Error::RankLost`].
+    pub fn own_centre_velocity_m_s(&self, direction: usize) -> Result<Vec<f64>, Error> {
+        self.face(direction).map(|faces| self.centred(direction, &faces))
+    }
+
+    /// Kinematic pressure at the centres of the cells of [`Self::own_planes`] \[m^2/s^2\], `[z][y][x]`, up to a constant.
+    ///
+    /// # Errors
+    /// [`Error::RankLost`].
+    pub fn own_pressure_m2_s2(&self) -> Result<Vec<f64>, Error> {
+        self.in_planes(&self.state.pressure).map(|pressure| without_halos(self.shown(), pressure))
+    }
+
+    /// From the planes of all ranks to the whole field.
+    pub(crate) fn whole(&self, own: Result<Vec<f64>, Error>) -> Vec<f64> {
+        let slabs = &self.layout.slabs;
+        let whole = match own {
+            Ok(own) if slabs.is_alone() => Ok(own),
+            Ok(own) => slabs.together(&own).map(Cow::into_owned),
+            Err(lost) => Err(lost),
+        };
+        whole.unwrap_or_else(|_| vec![f64::NAN; Shape::whole(self.layout.shape.n).len()])
     }
 
     /// Velocity along `direction` (0, 1, 2 for x, y, z) at the low faces of the cells \[m/s\], `[z][y][x]`.
     pub fn face_velocity_m_s(&self, direction: usize) -> Vec<f64> {
-        to_xyz(&self.layout, &self.whole(&self.state.velocity[self.layout.axis_of(direction)]))
+        self.whole(self.own_face_velocity_m_s(direction))
     }
 
     /// Velocity along `direction` at the centres of the cells, interpolated with fourth order \[m/s\], `[z][y][x]`.
     pub fn centre_velocity_m_s(&self, direction: usize) -> Vec<f64> {
-        let axis = self.layout.axis_of(direction);
-        let shape = self.layout.shape;
-        let line = &self.layout.line[axis];
-        let n = line.cells;
-        let stride = [1, shape.n[0], shape.plane()][axis];
-        let field = self.whole(&self.state.velocity[axis]);
-        let mut centred = vec![0.0; field.len()];
-        for (place, value) in centred.iter_mut().enumerate() {
-            let index = place / stride % n;
-            let origin = place - index * stride;
-            // A bounded direction does not store its high wall, where the normal velocity is zero.
-            let face = |i: usize| if i < n { field[origin + i * stride] } else { 0.0 };
-            *value = if n == 1 {
-                // One cell: nothing varies, or nothing flows through it.
-                field[place]
-            } else if line.is_periodic() {
-                (0..4).map(|t| INSIDE[t] * face((index + n + t - 1) % n)).sum()
-            } else if index == 0 {
-                (0..4).map(|t| AT_WALL[t] * face(t)).sum()
-            } else if index + 1 == n {
-                (0..4).map(|t| AT_WALL[t] * face(n - t)).sum()
-            } else {
-                (0..4).map(|t| INSIDE[t] * face(index + t - 1)).sum()
-            };
-        }
-        to_xyz(&self.layout, &centred)
+        self.whole(self.own_centre_velocity_m_s(direction))
+    }
+
+    /// From the faces of the planes that are shown to the centres of those that are owned.
+    pub(crate) fn centred(&self, direction: usize, faces: &[f64]) -> Vec<f64> {
+        let shown = self.shown();
+        let (nx, n) = (shown.n[0], shown.n[direction]);
+        let is_periodic = self.mesh.directions()[direction].ends == Ends::Periodic;
+        let mut centred = vec![0.0; shown.own_places().len()];
+        centred.par_chunks_mut(shown.plane()).zip(shown.own()).for_each(|(plane, k)| {
+            for (place, value) in plane.iter_mut().enumerate() {
+                let mut at = [place % nx, place / nx, k];
+                let index = at[direction];
+                // A bounded direction does not store its high wall, where the normal velocity is zero.
+                let mut face = |i: usize| {
+                    at[direction] = i;
+                    if i < n { faces[shown.place(at)] } else { 0.0 }
+                };
+                *value = if n == 1 {
+                    // One cell: nothing varies, or nothing flows through it.
+                    face(0)
+                } else if is_periodic {
+                    (0..4).map(|t| INSIDE[t] * face((index + n + t - 1) % n)).sum()
+                } else if index == 0 {
+                    (0..4).map(|t| AT_WALL[t] * face(t)).sum()
+                } else if index + 1 == n {
+                    (0..4).map(|t| AT_WALL[t] * face(n - t)).sum()
+                } else {
+                    (0..4).map(|t| INSIDE[t] * face(index + t - 1)).sum()
+                };
+            }
+        });
+        centred
     }
 
     /// Kinematic pressure at the centres \[m^2/s^2\], `[z][y][x]`, up to a constant.
     pub fn pressure_m2_s2(&self) -> Vec<f64> {
-        to_xyz(&self.layout, &self.whole(&self.state.pressure))
+        self.whole(self.own_pressure_m2_s2())
     }
 
     /// Eddy viscosity at the centres \[m^2/s\], `[z][y][x]`, of the field that the last step started from; `None` without a
     /// subgrid model.
     pub fn subgrid_viscosity_m2_s(&self) -> Option<Vec<f64>> {
-        self.model.as_ref().map(|model| to_xyz(&self.layout, &self.whole(model.viscosity_m2_s())))
+        let model = self.model.as_ref()?;
+        let own = self.in_planes(model.viscosity_m2_s()).map(|planes| without_halos(self.shown(), planes));
+        Some(self.whole(own))
     }
 
     /// A flow that starts from velocities given at the low faces of the cells, `[z][y][x]` \[m/s\]; they are projected.
@@ -139,25 +188,15 @@ impl Flow {
     }
 }
 
-/// Place in memory of each place in the order `[z][y][x]`.
-fn places(layout: &Layout) -> impl Iterator<Item = usize> + '_ {
-    let shape = layout.shape;
-    let stride = |d: usize| [1, shape.n[0], shape.plane()][layout.axis_of(d)];
+/// The values given in the order `[z][y][x]`, in the order of memory.
+fn from_xyz(layout: &Layout, values: &[f64]) -> Vec<f64> {
+    let shape = Shape::whole(layout.shape.n);
     let count = |d: usize| shape.n[layout.axis_of(d)];
-    let (counts, strides) = ([count(0), count(1), count(2)], [stride(0), stride(1), stride(2)]);
-    (0..counts[2]).flat_map(move |k| {
-        (0..counts[1]).flat_map(move |j| (0..counts[0]).map(move |i| i * strides[0] + j * strides[1] + k * strides[2]))
-    })
-}
-
-pub(crate) fn to_xyz(layout: &Layout, field: &[f64]) -> Vec<f64> {
-    places(layout).map(|place| field[place]).collect()
-}
-
-pub(crate) fn from_xyz(layout: &Layout, values: &[f64]) -> Vec<f64> {
+    let [nx, ny] = [count(0), count(1)];
     let mut field = vec![0.0; values.len()];
-    for (place, value) in places(layout).zip(values) {
-        field[place] = *value;
+    for (at, value) in values.iter().enumerate() {
+        let index = [at % nx, at / nx % ny, at / nx / ny];
+        field[shape.place(layout.direction.map(|d| index[d]))] = *value;
     }
     field
 }

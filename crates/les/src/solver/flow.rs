@@ -11,7 +11,6 @@
 use rayon::prelude::*;
 
 mod project;
-mod show;
 
 use super::implicit::LineSolver;
 use super::layout::{Layout, Shape};
@@ -147,19 +146,19 @@ impl Flow {
             return Err(self.diverged(axis, place, "initial velocity"));
         }
         let [given] = slabs.sums(self.kinetic_energy())?;
-        let velocity = std::mem::take(&mut self.state.velocity);
-        self.work.star = velocity;
-        self.state.velocity = std::array::from_fn(|_| vec![0.0; self.layout.shape.len()]);
+        std::mem::swap(&mut self.state.velocity, &mut self.work.star);
         self.project(1.0)?;
         self.repeat(1.0, 0.0)?;
         self.state.implicit = self.choose_implicit();
         // The pressure that belongs to the field: that which keeps its acceleration free of divergence.
-        let velocity = self.state.velocity.clone();
         let summary = (self.state.energy, self.state.courant_per_s);
         self.accelerations()?;
+        // The fields of the history, which begins with the first step, keep the velocity meanwhile.
+        std::mem::swap(&mut self.state.velocity, &mut self.state.history);
         self.project(1.0)?;
         std::mem::swap(&mut self.state.pressure, &mut self.work.phi);
-        self.state.velocity = velocity;
+        std::mem::swap(&mut self.state.velocity, &mut self.state.history);
+        self.state.history.iter_mut().for_each(|terms| terms.fill(0.0));
         (self.state.energy, self.state.courant_per_s) = summary;
         Ok(StartReport { given_energy_m5_s2: given, kinetic_energy_m5_s2: self.state.energy })
     }
@@ -291,8 +290,8 @@ impl Flow {
     /// The viscosity of the model for the present field, at most such that it decays by `limit_per_s`; a part of its acceleration
     /// into `star`.
     fn update_model(&mut self, limit_per_s: f64) -> Result<(), Error> {
-        let Self { state, work, model: Some(model), .. } = self else { return Ok(()) };
-        let lent = Lent { in_plane: &mut work.star, small: &mut work.phi };
+        let Self { state, work, pressure_solver, model: Some(model), .. } = self else { return Ok(()) };
+        let lent = Lent { in_plane: &mut work.star, small: [&mut work.phi, pressure_solver.spare()] };
         model.update(state.velocity.each_ref().map(Vec::as_slice), limit_per_s, lent)
     }
 

@@ -19,6 +19,7 @@ mod mapping;
 pub(crate) mod mesh;
 mod momentum;
 mod operators_1d;
+pub(crate) mod planes;
 mod pressure;
 mod projection;
 mod report;
@@ -26,8 +27,8 @@ mod row_operator;
 mod rows;
 mod run;
 pub(crate) mod settings;
-mod shape;
-mod slabs;
+pub(crate) mod shape;
+pub(crate) mod slabs;
 #[cfg(test)]
 mod slabs_tests;
 mod stage;

@@ -29,20 +29,25 @@ impl Shape {
         Self { n, own: [0, n[2]], lowest: 0, held: n[2] }
     }
 
-    /// The slab of one of `count` ranks, each of which owns at least [`HALO`] planes.
+    /// The slab of one of `count` ranks.
     pub(crate) fn slab(n: [usize; 3], rank: usize, count: usize) -> Self {
         let whole = Self::whole(n);
         let own = whole.planes_of(rank, count);
         if own.len() == n[2] {
             return whole;
         }
-        let lowest = (own.start + n[2] - HALO) % n[2];
+        let lowest = (own.start + n[2] - HALO.min(n[2])) % n[2];
         Self { n, own: [own.start, own.end], lowest, held: (own.len() + 2 * HALO).min(n[2]) }
     }
 
     /// Planes that one of `count` ranks owns.
     pub(crate) fn planes_of(self, rank: usize, count: usize) -> Range<usize> {
         self.n[2] * rank / count..self.n[2] * (rank + 1) / count
+    }
+
+    /// Planes in memory, in their order there.
+    pub(crate) fn held(self) -> impl Iterator<Item = usize> {
+        (self.lowest..self.lowest + self.held).map(move |k| k % self.n[2])
     }
 
     /// Planes that are owned.

@@ -1,4 +1,4 @@
-//! What the slabs of a flow exchange: halos, numbers of planes and ranks, lines that cross slabs, whole fields.
+//! What the slabs of a flow exchange: halos, numbers of planes and ranks, lines that cross slabs.
 //!
 //! One process exchanges nothing, and no array is copied.
 //!
@@ -166,24 +166,14 @@ impl Slabs {
         Ok(found)
     }
 
-    /// A whole field from the slabs, on rank 0 or on all; empty elsewhere.
+    /// What rank 0 has of some numbers, on all: what decides what all do next must be the same to the last bit, also where
+    /// the machines differ.
     ///
     /// # Errors
     /// Those of [`Ranks::turn`].
-    pub(crate) fn whole<'a>(&self, field: &'a [f64], everywhere: bool) -> Result<Cow<'a, [f64]>, Error> {
-        if self.is_alone() {
-            return Ok(Cow::Borrowed(field));
-        }
-        let (shape, count) = (self.shape, self.ranks.count());
-        let own = &field[shape.own_places()];
-        let takes = |rank: usize| usize::from(everywhere || rank == 0);
-        let to: Vec<usize> = (0..count).map(|r| takes(r) * own.len()).collect();
-        let mine = takes(self.ranks.rank());
-        let from: Vec<usize> = (0..count).map(|r| mine * shape.planes_of(r, count).len() * shape.plane()).collect();
-        let send = own.repeat(if everywhere { count } else { 1 });
-        let mut whole = vec![0.0; from.iter().sum()];
-        self.ranks.turn(&send, &to, &mut whole, &from)?;
-        Ok(Cow::Owned(whole))
+    pub(crate) fn of_first(&self, numbers: impl FnOnce() -> Vec<f64>) -> Result<Vec<f64>, Error> {
+        let own = if self.is_first() { numbers() } else { Vec::new() };
+        self.together(&own).map(Cow::into_owned)
     }
 
     /// The part of a whole field that is owned, into a field of this rank.

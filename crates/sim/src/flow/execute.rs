@@ -5,6 +5,7 @@
 use super::files::{CASE, Files, checkpoint_paths};
 use super::forecast::{FlowForecast, refuse_too_large};
 use super::setup::{Setup, WakeSetup};
+use super::shared::agree;
 use super::steps::StepTable;
 use super::wake::{Schedule, WakeRun};
 use super::writer::{Kept, Writer};
@@ -15,8 +16,8 @@ use crate::keys::Problem;
 use crate::{Error, machine};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use wakescope_les::ranks::{self, Ranks, Single, together};
-use wakescope_les::solver::{CheckpointPlan, Ends, Interval, Run, RunPlan, Silent};
+use wakescope_les::ranks::{Ranks, Single, together};
+use wakescope_les::solver::{CheckpointPlan, Ends, Interval, Run, RunPlan};
 
 /// Steps between checkpoints where a case states nothing.
 const STEPS_PER_CHECKPOINT: u64 = 500;
@@ -85,7 +86,8 @@ pub fn run_with(
 }
 
 /// Runs a case on ranks, all of which call this, and writes its files to `folder`, in which no other run may be writing. The
-/// files have the same bytes for any number of ranks; rank 0 writes them, and it alone tells `watch` anything.
+/// files have the same bytes for any number of ranks; of fields and checkpoints each writes what it has, rank 0 the rest, and it
+/// alone tells `watch` anything.
 ///
 /// # Errors
 /// A case that the solver refuses or that needs more memory than there is, a checkpoint that does not fit, a flow that blows
@@ -128,29 +130,33 @@ pub fn run_on(
         Source::Checkpoint => resume(&checkpoint, setup, plan, &file.case)?,
         Source::Previous => resume(&previous, setup, plan, &file.case)?,
     };
-    let writer = if is_first {
+    if is_first {
         warnings.iter().for_each(|text| watch.note(text));
-        let wake = meter.map(|meter| WakeRun::new(meter, run.flow(), folder.to_owned(), file.provenance()));
-        let continues = source != Source::Nothing;
-        let written = begin_files(file, folder, &files, wake, (continues, &kept));
-        written.map(|Begun { wake, steps, written }| {
-            let (start_s, end_s) = (run.flow().time_s(), run.plan().end_s);
-            Some(Writer { files, schedule, steps, wake, written, warnings, watch, start_s, end_s, error: None })
-        })
-    } else {
-        Ok(None)
+    }
+    let wake = meter.map(|meter| WakeRun::new(meter, run.flow(), (folder.to_owned(), file.provenance()), is_first));
+    let begun = begin_files(file, folder, &files, wake, (source != Source::Nothing, &kept), is_first);
+    let Begun { wake, steps, written } = agree(ranks, begun)?;
+    let (start_s, end_s) = (run.flow().time_s(), run.plan().end_s);
+    let mut writer = Writer {
+        ranks: ranks.clone(),
+        files,
+        schedule,
+        steps,
+        wake,
+        written,
+        warnings,
+        watch,
+        start_s,
+        end_s,
+        error: None,
     };
-    let mut writer = agree(ranks, writer)?;
-    let result = match &mut writer {
-        Some(writer) => run.to_end(writer),
-        None => run.to_end(&mut Silent),
-    };
+    let result = run.to_end(&mut writer);
     // Also of a run that failed: its last row is what one wants to see.
-    let finished = writer.as_mut().map_or(Ok(()), Writer::finish);
-    let error = writer.as_mut().and_then(|writer| writer.error.take());
+    let finished = writer.finish();
+    let error = writer.error.take();
     let summary = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
     agree(ranks, finished)?;
-    let (files, warnings) = writer.map_or_else(Default::default, |writer| (writer.written, writer.warnings));
+    let (files, warnings) = (writer.written, writer.warnings);
     let flow = run.flow();
     Ok(FlowOutcome {
         steps: summary.steps,
@@ -162,11 +168,6 @@ pub fn run_on(
         files,
         warnings,
     })
-}
-
-/// An error of one rank is that of all.
-fn agree<T>(ranks: &Arc<dyn Ranks>, result: Result<T, Error>) -> Result<T, Error> {
-    ranks::agree(&**ranks, result, Error::Flow)
 }
 
 /// From where a run goes on.
@@ -212,18 +213,22 @@ struct Begun {
     written: Vec<PathBuf>,
 }
 
-/// Begins the files of a run, or continues them from what a checkpoint kept.
+/// Begins the files of a run, or continues them from what a checkpoint kept; ranks other than the first have none.
 fn begin_files(
     file: &CaseFile,
     folder: &Path,
     files: &Files,
     mut wake: Option<WakeRun>,
     (continues, kept): (bool, &[u8]),
+    is_first: bool,
 ) -> Result<Begun, Error> {
     let kept = Kept::read(kept, wake.is_some());
     if let (Some(wake), true) = (&mut wake, continues) {
         let ([path, _], what) = (checkpoint_paths(folder), "its history of the wake is not that of this case");
         wake.restore(&kept.wake).ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
+    }
+    if !is_first {
+        return Ok(Begun { wake, steps: None, written: Vec::new() });
     }
     let case_toml = folder.join(CASE);
     write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;

@@ -1,7 +1,8 @@
 //! What a run will take, before anything of its size is allocated: cells, steps, time, memory, files.
 //!
 //! Memory is counted in arrays of one number for each cell, time in passes over the cells; the unit costs at the end of this
-//! file are good to a factor of two. Steps follow from the Courant number of the initial field: flows that speed up take more.
+//! file are good to a factor of two. Steps follow from the Courant number of the initial field, those of a wake also from how
+//! viscosity spreads its cores: flows that speed up take more.
 //!
 //! Check: memory against the arrays of a run, sizes that fit, cases too large are refused at once.
 
@@ -41,8 +42,8 @@ pub struct FlowForecast {
     pub memory_bytes: f64,
     /// Ranks that share the run.
     pub ranks: usize,
-    /// Memory that each of them holds, and how much more the first one, which gathers what is written \[bytes\].
-    pub rank_bytes: [f64; 2],
+    /// Memory that each of them holds at once \[bytes\].
+    pub rank_bytes: f64,
     /// Files, by kind.
     pub files: Vec<FileForecast>,
 }
@@ -63,7 +64,7 @@ impl FlowForecast {
         let case = &file.case;
         let dense = setup.settings.pressure.dense_directions(&setup.mesh);
         let step_s = first_step_s(setup, plan.end_s);
-        let to_end = (plan.end_s / step_s).ceil();
+        let to_end = steps_to(plan.end_s, step_s, setup).ceil();
         let steps = plan.pause_after_steps.map_or(to_end, |pause| to_end.min(pause as f64));
         let cells = setup.mesh.cells();
         let (scheme, passes) = match setup.settings.scheme {
@@ -92,7 +93,7 @@ impl FlowForecast {
             step_s,
             steps,
             core_s: start_s + (steps * passes + 2.0) * pass_s,
-            memory_bytes: memory_bytes(case, cells, &dense),
+            memory_bytes: memory_bytes(case, [cells; 2], &dense),
             ranks: setup.settings.ranks.count(),
             rank_bytes: rank_bytes(case, setup, &dense),
             files: file_forecasts(case, files, schedule, cells, steps),
@@ -123,8 +124,7 @@ impl fmt::Display for FlowForecast {
         let available = machine::available_memory_bytes().map_or(String::new(), |b| format!(" of {}", bytes(b)));
         writeln!(f, "  memory   about {}{available}", bytes(self.memory_bytes))?;
         if self.ranks > 1 {
-            let [each, more] = self.rank_bytes.map(bytes);
-            writeln!(f, "  ranks    {}, each about {each}, the first {more} more", self.ranks)?;
+            writeln!(f, "  ranks    {}, each about {}", self.ranks, bytes(self.rank_bytes))?;
         }
         writeln!(f, "  files    about {}", bytes(self.file_bytes()))?;
         for kind in &self.files {
@@ -155,6 +155,22 @@ fn first_step_s(setup: &Setup, end_s: f64) -> f64 {
     step_s.min(end_s)
 }
 
+/// Steps to `end_s`, of which the first has the length `first_s`. The step of a wake grows with the cores, in which the air is
+/// fastest: their radius squared grows by `4 nu t`, and their largest speed, `b0/(2 r) V0`, falls beside the `V0` that each vortex
+/// gets from the other.
+fn steps_to(end_s: f64, first_s: f64, setup: &Setup) -> f64 {
+    let (Some(wake), TimeStep::Courant { longest_s, .. }) = (&setup.wake, setup.settings.time_step) else {
+        return end_s / first_s;
+    };
+    let speed = |time_s: f64| {
+        let radius_m = (wake.core_radius_m.powi(2) + 4.0 * setup.settings.viscosity_m2_s * time_s).sqrt();
+        1.0 + 0.5 * wake.scales.spacing_m / radius_m
+    };
+    let part_s = end_s / SPREADING_PARTS as f64;
+    let step_s = |part: usize| (first_s * speed(0.0) / speed((part as f64 + 0.5) * part_s)).min(longest_s);
+    (0..SPREADING_PARTS).map(|part| part_s / step_s(part)).sum()
+}
+
 /// Refuses a case whose fields and matrices do not fit into `available_bytes`.
 ///
 /// # Errors
@@ -165,7 +181,7 @@ pub(super) fn refuse_too_large(
     dense: &[usize],
     available_bytes: Option<f64>,
 ) -> Result<(), Error> {
-    let needed = memory_bytes(case, cells, dense);
+    let needed = memory_bytes(case, [cells; 2], dense);
     let Some(available) = available_bytes.filter(|available| needed > *available) else { return Ok(()) };
     let matrices = dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>();
     let (stage, remedy) = if matrices > 0.5 * needed {
@@ -187,7 +203,7 @@ fn fitting(case: &FlowCase, cells: [usize; 3], dense: &[usize], available_bytes:
     let scaled = |factor: f64| cells.map(|n| if n == 1 { 1 } else { ((n as f64 * factor) as usize).max(4) });
     let fits = |factor: f64| {
         let dense: Vec<usize> = dense.iter().map(|n| (*n as f64 * factor) as usize).collect();
-        memory_bytes(case, scaled(factor), &dense) <= available_bytes
+        memory_bytes(case, [scaled(factor); 2], &dense) <= available_bytes
     };
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..60 {
@@ -201,11 +217,11 @@ fn fitting(case: &FlowCase, cells: [usize; 3], dense: &[usize], available_bytes:
     })
 }
 
-/// Memory that a run holds at once \[bytes\].
-fn memory_bytes(case: &FlowCase, cells: [usize; 3], dense: &[usize]) -> f64 {
+/// Memory that a run holds at once \[bytes\], of whose mesh `whole` a rank has `cells`.
+fn memory_bytes(case: &FlowCase, [cells, whole]: [[usize; 3]; 2], dense: &[usize]) -> f64 {
     let model = match case.solver.subgrid {
         Subgrid::None {} => 0.0,
-        Subgrid::MultiscaleWale { .. } => 6.0,
+        Subgrid::MultiscaleWale { .. } => 5.0,
         Subgrid::Smagorinsky { .. } | Subgrid::Wale { .. } => 4.0,
     };
     let given = match &case.case {
@@ -213,26 +229,24 @@ fn memory_bytes(case: &FlowCase, cells: [usize; 3], dense: &[usize]) -> f64 {
         CaseKind::Free(free) if free.starts_from_file() => 3.0,
         _ => 0.0,
     };
-    // At the start the given field and a copy of the velocity; later what the outputs gather.
-    let start = given + 3.0;
     let outputs = case.output.fields.iter().map(|format| output_arrays(*format)).fold(0.0, f64::max);
     let meter = if matches!(case.case, CaseKind::Wake(_)) { METER_ARRAYS } else { 0.0 };
     let rotational = f64::from(u8::from(case.solver.rotational));
-    let arrays = FLOW_ARRAYS + rotational + model + f64::max(start, f64::max(outputs, meter));
-    8.0 * count(cells) * arrays + dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>() + PROGRAM_BYTES
+    // At the start the given field, which every rank has whole; in the first step of Adams-Bashforth its terms; later what is written.
+    let later = count(cells) * [FIRST_STEP_ARRAYS, outputs, meter].into_iter().fold(0.0, f64::max);
+    let values = count(cells) * (FLOW_ARRAYS + rotational + model) + f64::max(count(whole) * given, later);
+    8.0 * values + dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>() + PROGRAM_BYTES
 }
 
-/// Memory of one of the ranks with its halos, and what the first holds besides: the whole flow that it shows \[bytes\].
-fn rank_bytes(case: &FlowCase, setup: &Setup, dense: &[usize]) -> [f64; 2] {
-    let (mut cells, ranks) = (setup.mesh.cells(), setup.settings.ranks.count());
-    let all = memory_bytes(case, cells, dense);
-    if ranks == 1 {
-        return [all, 0.0];
+/// Memory of one of the ranks with its halos \[bytes\].
+fn rank_bytes(case: &FlowCase, setup: &Setup, dense: &[usize]) -> f64 {
+    let (whole, ranks) = (setup.mesh.cells(), setup.settings.ranks.count());
+    let mut cells = whole;
+    if ranks > 1 {
+        let last = setup.settings.memory_order.map_or(2, |order| order[2]);
+        cells[last] = (cells[last].div_ceil(ranks) + 2 * HALO_PLANES).min(cells[last]);
     }
-    let whole = 8.0 * GATHERED_ARRAYS * count(cells);
-    let last = setup.settings.memory_order.map_or(2, |order| order[2]);
-    cells[last] = (cells[last].div_ceil(ranks) + 2 * HALO_PLANES).min(cells[last]);
-    [memory_bytes(case, cells, dense), whole]
+    memory_bytes(case, [cells, whole], dense)
 }
 
 /// The eigenvectors of a direction, what finds them, and its two transforms.
@@ -301,6 +315,8 @@ fn file_forecasts(
 
 /// Arrays of a flow: velocity, history, pressure; the velocity before the projection, the increment; two of the refinement.
 const FLOW_ARRAYS: f64 = 13.0;
+/// Arrays that the first step of Adams-Bashforth needs.
+const FIRST_STEP_ARRAYS: f64 = 3.0;
 /// Arrays that the record of a wake needs.
 const METER_ARRAYS: f64 = 4.0;
 /// The program without a flow \[bytes\].
@@ -313,8 +329,8 @@ const RECORD_BYTES: f64 = 2500.0;
 
 /// Planes of a halo.
 const HALO_PLANES: usize = 4;
-/// Arrays of the whole flow on the first rank: what outputs gather, and what they make of it.
-const GATHERED_ARRAYS: f64 = 12.0;
+/// Parts of a run in which the step of a wake is taken as constant.
+const SPREADING_PARTS: usize = 100;
 
 // Unit costs on one core: a cell of one stage of a step and what the passes of multigrid add to it, in the plane and in space;
 // the subgrid model, a cell of a dense direction, the eigenvectors.

@@ -23,6 +23,7 @@ mod ranks_tests;
 #[cfg(feature = "netcdf")]
 mod read;
 mod setup;
+mod shared;
 mod steps;
 mod text;
 mod wake;

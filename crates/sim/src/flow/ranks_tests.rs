@@ -1,20 +1,24 @@
 //! Runs on ranks: the files of one process, byte for byte.
 
 use super::execute::{RunOptions, run_on};
-use super::{Begin, CaseFile, Unwatched};
+use super::{Begin, CaseFile, Unwatched, Watch};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use wakescope_les::ranks::on_threads;
 
-/// A small wake with records, fields, planes and checkpoints.
+/// A small wake with records, fields and planes in all formats, and checkpoints.
 fn wake(more: &str) -> String {
-    let format = if cfg!(feature = "netcdf") { "netcdf" } else { "csv" };
+    let mut planes = vec!["csv"];
+    planes.extend(cfg!(feature = "netcdf").then_some("netcdf"));
+    planes.extend(cfg!(feature = "vtk").then_some("vtr"));
+    let mut fields = planes.clone();
+    fields.extend(cfg!(feature = "netcdf").then_some("initial_netcdf"));
     format!(
         "[case]\nkind = \"wake\"\ncells = [6, 32, 24]\nreynolds = 1000.0\nperturbation = 0.05\n\
          [wake]\nend_tau = 0.1\nevery_tau = 0.02\nfields_tau = [0.1]\nplanes_tau = [0.05, 0.1]\n\
-         [output]\nfields = [\"{format}\"]\nplanes = [\"{format}\"]\n[solver]\nsubgrid = {{ model = \"multiscale_wale\" }}\n\
-         [checkpoint]\nevery_steps = 2\n{more}"
+         [output]\nfields = {fields:?}\nplanes = {planes:?}\n[checkpoint]\nevery_steps = 2\n\
+         {more}[solver]\nsubgrid = {{ model = \"multiscale_wale\" }}\n"
     )
 }
 
@@ -31,28 +35,62 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         let path = entry.unwrap().path();
         (path.file_name().unwrap().to_string_lossy().into_owned(), fs::read(path).unwrap())
     };
-    fs::read_dir(folder).unwrap().map(entry).collect()
+    fs::read_dir(folder).unwrap().filter(|entry| entry.as_ref().unwrap().path().is_file()).map(entry).collect()
 }
 
 #[test]
 fn every_file_has_the_bytes_of_one_process_also_after_a_restart_on_other_ranks() {
     let new = || tempfile::tempdir().unwrap();
-    let (paused, whole) = (wake("[time]\npause_after_steps = 3\n"), wake(""));
-    let (alone, ranks) = (new(), new());
-    assert_eq!(run(&paused, alone.path(), Begin::New, 1), [None]);
-    assert_eq!(run(&paused, ranks.path(), Begin::New, 3), [None, None, None]);
-    assert!(files(alone.path()).len() > 3 && files(ranks.path()) == files(alone.path()), "paused");
-    assert_eq!(run(&whole, alone.path(), Begin::Restart, 1), [None]);
-    assert_eq!(run(&whole, ranks.path(), Begin::Restart, 2), [None, None]);
-    let (expected, found) = (files(alone.path()), files(ranks.path()));
-    assert!(expected.len() > 5, "{:?}", expected.keys());
-    assert!(found.keys().eq(expected.keys()), "{:?} against {:?}", found.keys(), expected.keys());
-    for (name, bytes) in &expected {
-        assert!(found[name] == *bytes, "{name}");
+    // The second order shares y, so that each rank gets its planes across z from all.
+    for order in ["", "memory_order = [\"x\", \"z\", \"y\"]\n"] {
+        let (paused, whole) = (wake("[time]\npause_after_steps = 3\n") + order, wake("") + order);
+        let (alone, ranks) = (new(), new());
+        assert_eq!(run(&paused, alone.path(), Begin::New, 1), [None]);
+        assert_eq!(run(&paused, ranks.path(), Begin::New, 3), [None, None, None]);
+        assert!(files(alone.path()).len() > 3 && files(ranks.path()) == files(alone.path()), "paused");
+        assert_eq!(run(&whole, alone.path(), Begin::Restart, 1), [None]);
+        assert_eq!(run(&whole, ranks.path(), Begin::Restart, 2), [None, None]);
+        let (expected, found) = (files(alone.path()), files(ranks.path()));
+        assert!(expected.len() > 8, "{:?}", expected.keys());
+        assert!(found.keys().eq(expected.keys()), "{:?} against {:?}", found.keys(), expected.keys());
+        for (name, bytes) in &expected {
+            assert!(found[name] == *bytes, "{name} {order}");
+        }
     }
+    let whole = wake("");
+    let ranks = new();
+    assert_eq!(run(&whole, ranks.path(), Begin::New, 2), [None, None]);
     // What rank 0 finds in its folder stops all.
     let refused = run(&whole, ranks.path(), Begin::New, 2);
     assert!(refused.iter().all(|error| error.as_ref().is_some_and(|e| e.contains("--restart"))), "{refused:?}");
     let many = run(&whole, new().path(), Begin::New, 7);
     assert!(many.iter().all(|error| error.as_ref().is_some_and(|e| e.contains("at most 6"))), "{many:?}");
+}
+
+#[test]
+fn an_output_that_one_rank_cannot_write_stops_all_and_leaves_no_part_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    // A folder in the way of the fields: rank 0 sees it when all have written their parts.
+    let name = if cfg!(feature = "netcdf") { "fields_0001.nc" } else { "fields_0001.csv" };
+    let text = wake("");
+    let file = CaseFile::parse(&text, Path::new("case.toml")).unwrap();
+    let blocked = folder.path().join(name);
+    let found = on_threads(3, |ranks| {
+        let mut blocks = Blocks(&blocked);
+        let options = RunOptions { begin: Begin::New, allow_large: false };
+        run_on(&ranks, &file, folder.path(), options, &mut blocks).err().map(|e| e.to_string())
+    });
+    assert!(found.iter().all(|one| matches!(one, Some(Some(words)) if words.contains(name))), "{found:?}");
+    let left = files(folder.path());
+    assert!(left.keys().all(|name| !name.starts_with("fields") && !name.starts_with('.')), "{:?}", left.keys());
+    assert!(left.contains_key("flow.checkpoint"), "{:?}", left.keys());
+}
+
+/// Puts a folder in the way of a file when the run has begun.
+struct Blocks<'a>(&'a Path);
+
+impl Watch for Blocks<'_> {
+    fn step(&mut self, _: f64, _: &wakescope_les::solver::StepRecord) {
+        fs::create_dir_all(self.0).unwrap();
+    }
 }

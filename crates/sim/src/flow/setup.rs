@@ -25,6 +25,8 @@ pub(super) struct Setup {
 pub(super) struct WakeSetup {
     pub(super) meter: WakeMeter,
     pub(super) scales: WakeScales,
+    /// Core radius at the start \[m\].
+    pub(super) core_radius_m: f64,
 }
 
 impl Setup {

@@ -4,11 +4,14 @@
 
 use super::Watch;
 use super::files::Files;
+use super::shared::agree;
 use super::steps::StepTable;
 use super::wake::{Schedule, WakeRun};
 use crate::Error;
 use std::path::PathBuf;
+use std::sync::Arc;
 use wakescope_les::Flow;
+use wakescope_les::ranks::Ranks;
 use wakescope_les::solver::{RunObserver, RunWarning, StepRecord};
 
 /// What a checkpoint keeps for the files.
@@ -33,8 +36,9 @@ impl Kept {
     }
 }
 
-/// Writes what the run gives.
+/// Writes what the run gives, on each rank what that has; tables, and what is told, on rank 0.
 pub(super) struct Writer<'a> {
+    pub(super) ranks: Arc<dyn Ranks>,
     pub(super) files: Files,
     pub(super) schedule: Schedule,
     pub(super) steps: Option<StepTable>,
@@ -66,11 +70,10 @@ impl Writer<'_> {
 }
 
 impl RunObserver for Writer<'_> {
-    fn looks_at_steps(&self) -> bool {
-        false
-    }
-
     fn step(&mut self, _: &Flow, record: &StepRecord) -> Result<(), String> {
+        if self.ranks.rank() > 0 {
+            return Ok(());
+        }
         let done = (record.report.time_s - self.start_s) / (self.end_s - self.start_s);
         self.watch.step(done, record);
         let pushed = self.steps.as_mut().map_or(Ok(()), |steps| steps.push(record));
@@ -81,9 +84,10 @@ impl RunObserver for Writer<'_> {
         let due = self.schedule.due.get(index).copied().unwrap_or_default();
         if due.record {
             let recorded = self.wake.as_mut().map_or(Ok(()), |wake| wake.record(flow));
+            let recorded = agree(&self.ranks, recorded);
             self.keep(recorded)?;
         }
-        let written = self.files.write(flow, due);
+        let written = self.files.write(flow, due, &self.ranks);
         let mut written = self.keep(written)?;
         // A collection is written anew with each output.
         written.retain(|path| !self.written.contains(path));

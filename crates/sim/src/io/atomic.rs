@@ -4,8 +4,9 @@
 //! Check: the tests provoke a failure at each step and list the folder afterwards.
 
 use super::error::{OutputError, OutputResult};
+use super::parts::FileParts;
 use std::fs;
-use std::io::Write;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Files of one run, collected in memory and committed together.
@@ -23,7 +24,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct FileGroup {
     folder: PathBuf,
-    files: Vec<(String, Vec<u8>)>,
+    files: Vec<(String, FileParts)>,
 }
 
 impl FileGroup {
@@ -37,13 +38,21 @@ impl FileGroup {
     /// # Errors
     /// A name that is not a plain file name (empty, with a separator, `.`, `..`), or one already in the group.
     pub fn add(&mut self, name: &str, content: impl Into<Vec<u8>>) -> OutputResult<()> {
+        self.add_parts(name, FileParts::from(content.into()))
+    }
+
+    /// Adds a file of which several ranks have parts; of a file in one process all must be here.
+    ///
+    /// # Errors
+    /// As [`Self::add`].
+    pub fn add_parts(&mut self, name: &str, content: FileParts) -> OutputResult<()> {
         if Path::new(name).file_name() != Some(name.as_ref()) {
             return Err(OutputError::value("file name", name, "must be a plain name without folders"));
         }
         if self.files.iter().any(|(n, _)| n == name) {
             return Err(OutputError::Duplicate { what: "file", name: name.into() });
         }
-        self.files.push((name.into(), content.into()));
+        self.files.push((name.into(), content));
         Ok(())
     }
 
@@ -67,13 +76,53 @@ impl FileGroup {
     }
 
     fn commit_inside(&self) -> OutputResult<Vec<PathBuf>> {
+        let stage = self.begin()?;
+        self.write(&stage.name())?;
+        self.put(&stage)
+    }
+
+    /// Makes a hidden folder with the files, which lack their content yet. The folder of the group must exist.
+    ///
+    /// # Errors
+    /// The first refusal of the system.
+    pub(crate) fn begin(&self) -> OutputResult<Stage> {
         let stage = Stage::make(&self.folder)?;
         for (name, content) in &self.files {
-            write_synced(&stage.new.join(name), content)?;
+            let path = stage.new.join(name);
+            let made = fs::File::create_new(&path).and_then(|file| file.set_len(content.length));
+            made.map_err(|e| io_error("write", &path, e))?;
         }
+        Ok(stage)
+    }
+
+    /// Writes the parts that are here into the stage of that name, and waits until they are on disk.
+    ///
+    /// # Errors
+    /// The first refusal of the system.
+    pub(crate) fn write(&self, stage: &str) -> OutputResult<()> {
+        let write = |path: &Path, content: &FileParts| {
+            let mut file = fs::OpenOptions::new().write(true).open(path)?;
+            for (start, bytes) in &content.parts {
+                file.seek(SeekFrom::Start(*start))?;
+                file.write_all(bytes)?;
+            }
+            file.sync_all()
+        };
+        for (name, content) in self.files.iter().filter(|(_, content)| !content.parts.is_empty()) {
+            let path = self.folder.join(stage).join(NEW).join(name);
+            write(&path, content).map_err(|e| io_error("write", &path, e))?;
+        }
+        Ok(())
+    }
+
+    /// Puts the files of a stage, which are whole, into place; returns their paths.
+    ///
+    /// # Errors
+    /// The first refusal of the system. The folder is then as it was before.
+    pub(crate) fn put(&self, stage: &Stage) -> OutputResult<Vec<PathBuf>> {
         let mut swapped: Vec<Swap> = Vec::new();
         for (name, _) in &self.files {
-            match Swap::into_place(&stage, &self.folder, name) {
+            match Swap::into_place(stage, &self.folder, name) {
                 Ok(swap) => swapped.push(swap),
                 Err(error) => {
                     swapped.iter().rev().for_each(Swap::undo);
@@ -139,12 +188,15 @@ impl Swap {
 }
 
 /// Hidden folder for the new and the replaced files; removed when dropped.
-struct Stage {
+#[derive(Debug)]
+pub(crate) struct Stage {
     root: PathBuf,
     new: PathBuf,
     old: PathBuf,
 }
 
+/// What the folder of the new files in it is called.
+const NEW: &str = "new";
 /// How the names of stage folders begin.
 const STAGE: &str = ".wakescope-stage-";
 
@@ -154,7 +206,7 @@ pub(super) fn sweep_stages(folder: &Path) {
     let entries = |path: &Path| fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
     let is_stage = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(STAGE));
     for root in entries(folder).filter(is_stage) {
-        let stage = Stage { new: root.join("new"), old: root.join("old"), root };
+        let stage = Stage { new: root.join(NEW), old: root.join("old"), root };
         if entries(&stage.new).next().is_some() {
             for kept in entries(&stage.old) {
                 if let Some(name) = kept.file_name() {
@@ -167,13 +219,18 @@ pub(super) fn sweep_stages(folder: &Path) {
 }
 
 impl Stage {
+    /// The name of the folder.
+    pub(crate) fn name(&self) -> String {
+        self.root.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
     fn make(folder: &Path) -> OutputResult<Self> {
         let mut attempt = 0_u32;
         loop {
             let root = folder.join(format!("{STAGE}{}-{attempt}", std::process::id()));
             match fs::create_dir(&root) {
                 Ok(()) => {
-                    let stage = Self { new: root.join("new"), old: root.join("old"), root };
+                    let stage = Self { new: root.join(NEW), old: root.join("old"), root };
                     for part in [&stage.new, &stage.old] {
                         fs::create_dir(part).map_err(|e| io_error("create folder", part, e))?;
                     }
@@ -208,15 +265,6 @@ fn make_folders(folder: &Path) -> OutputResult<Vec<PathBuf>> {
         io_error("create folder", folder, e)
     })?;
     Ok(missing)
-}
-
-fn write_synced(path: &Path, content: &[u8]) -> OutputResult<()> {
-    let write = || {
-        let mut file = fs::File::create_new(path)?;
-        file.write_all(content)?;
-        file.sync_all()
-    };
-    write().map_err(|e| io_error("write", path, e))
 }
 
 /// Asks for the renames to reach the disk. Not every system can sync a folder; the files themselves are complete either way.

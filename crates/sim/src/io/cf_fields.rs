@@ -5,18 +5,19 @@
 use super::error::{OutputResult, same_length};
 use super::fields::VelocityField;
 use super::netcdf::{Attr, Data, FILL, Layout, Variable};
+use super::parts::{FileParts, Share};
 use super::provenance::Provenance;
 
-/// The field at the centres as the bytes of a file.
+/// The field at the centres as a file, or what one of several ranks has of it.
 ///
 /// # Errors
 /// What [`VelocityField::check`] finds, or a result too large for one file.
-pub fn cf_field_bytes(field: &VelocityField, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputResult<FileParts> {
     field.check()?;
     const DIMS: &[&str] = &["time", "z", "y", "x"];
     let [u, v, w] = &field.velocity_m_s;
     let data = |name: &str, values: &[f64], units: &str, long_name: &str| {
-        Variable::new(name, DIMS, Data::filled(values))
+        Variable::part(name, DIMS, Data::filled(values), field.first())
             .text("long_name", long_name)
             .text("units", units)
             .attr("_FillValue", Attr::F32(FILL))
@@ -37,7 +38,7 @@ pub fn cf_field_bytes(field: &VelocityField, provenance: &Provenance) -> OutputR
         variables.push(data("vorticity_magnitude", vorticity, "s-1", "magnitude of the vorticity"));
     }
     let dims = vec![("time", 1), ("z", field.z_m.len()), ("y", field.y_m.len()), ("x", field.x_m.len())];
-    file(&field.title, dims, variables, provenance)
+    file(&field.title, dims, variables, provenance, &field.share)
 }
 
 /// Velocity components at the low faces of the cells.
@@ -53,13 +54,15 @@ pub struct FaceVelocities {
     pub face_m: [Vec<f64>; 3],
     /// Velocities u, v, w, each `[z][y][x]`, m/s.
     pub velocity_m_s: [Vec<f64>; 3],
+    /// The planes across z whose values these are.
+    pub share: Share,
 }
 
-/// The components on their own faces as the bytes of a file.
+/// The components on their own faces as a file, or what one of several ranks has of it.
 ///
 /// # Errors
 /// An array of another length than its axes, or a result too large for one file.
-pub fn cf_faces_bytes(faces: &FaceVelocities, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> OutputResult<FileParts> {
     const NAMES: [(&str, &[&str], &str, &[&str]); 3] = [
         ("x", &["x"], "x_face", &["x_face"]),
         ("y", &["y"], "y_face", &["y_face"]),
@@ -78,14 +81,16 @@ pub fn cf_faces_bytes(faces: &FaceVelocities, provenance: &Provenance) -> Output
         variables.push(axis(name, own, &faces.centre_m[d], "cell centre"));
         variables.push(axis(face, own_face, &faces.face_m[d], "low face of the cell"));
     }
+    let plane = faces.centre_m[0].len() * faces.centre_m[1].len();
     for (d, (name, values)) in ["u", "v", "w"].into_iter().zip(&faces.velocity_m_s).enumerate() {
-        let variable = Variable::new(name, DIMS[d], Data::F64(values.clone()))
+        same_length(name, values.len(), "z x y x x", faces.share.planes.len() * plane)?;
+        let variable = Variable::part(name, DIMS[d], Data::F64(values.clone()), faces.share.planes.start * plane)
             .text("standard_name", ["x_wind", "y_wind", "upward_air_velocity"][d])
             .text("long_name", ["wind along the flight direction", "horizontal wind across it", "vertical wind"][d])
             .text("units", "m s-1");
         variables.push(variable);
     }
-    file(&faces.title, dims, variables, provenance)
+    file(&faces.title, dims, variables, provenance, &faces.share)
 }
 
 fn axis(name: &str, dims: &'static [&'static str], values: &[f64], long_name: &str) -> Variable {
@@ -108,13 +113,14 @@ fn file(
     dims: Vec<(&'static str, usize)>,
     variables: Vec<Variable>,
     provenance: &Provenance,
-) -> OutputResult<Vec<u8>> {
+    share: &Share,
+) -> OutputResult<FileParts> {
     let globals = vec![
         ("Conventions", "CF-1.10".into()),
         ("title", title.to_owned()),
         ("history", format!("written by {}", provenance.program)),
     ];
-    Layout { dims, globals, variables }.into_bytes(provenance)
+    Layout { dims, globals, variables }.into_parts(provenance, share.is_first)
 }
 
 #[cfg(test)]
@@ -124,10 +130,10 @@ mod tests {
     use super::*;
     use netcdf3::FileReader;
 
-    fn open(bytes: Vec<u8>) -> (tempfile::TempDir, FileReader) {
+    fn open(file: FileParts) -> (tempfile::TempDir, FileReader) {
         let temp = tempfile::tempdir().unwrap();
         let path = temp.path().join("field.nc");
-        std::fs::write(&path, bytes).unwrap();
+        std::fs::write(&path, file.into_bytes()).unwrap();
         let file = FileReader::open(&path).unwrap();
         (temp, file)
     }
@@ -135,7 +141,7 @@ mod tests {
     #[test]
     fn a_field_at_the_centres_reads_back() {
         let field = fields::example();
-        let (_temp, mut file) = open(cf_field_bytes(&field, &example()).unwrap());
+        let (_temp, mut file) = open(cf_field_parts(&field, &example()).unwrap());
         assert_eq!(file.read_var_f64("x").unwrap(), field.x_m);
         assert_eq!(file.read_var_f64("z").unwrap(), field.z_m);
         assert_eq!(file.read_var_f64("time").unwrap(), [2.5]);
@@ -146,19 +152,28 @@ mod tests {
     }
 
     #[test]
+    fn what_ranks_have_of_a_field_is_the_file_of_one() {
+        let mut parts = fields::example_on_ranks().into_iter().map(|field| cf_field_parts(&field, &example()).unwrap());
+        let mut file = parts.next().unwrap();
+        parts.for_each(|other| file.parts.extend(other.parts));
+        assert_eq!(file.into_bytes(), cf_field_parts(&fields::example(), &example()).unwrap().into_bytes());
+    }
+
+    #[test]
     fn components_on_their_faces_read_back_in_full_precision() {
         let field = fields::example();
         let centre_m = [field.x_m.clone(), field.y_m.clone(), field.z_m.clone()];
         let face_m = centre_m.clone().map(|axis| axis.iter().map(|a| a - 0.05).collect::<Vec<f64>>());
         let mut velocity_m_s = field.velocity_m_s.clone();
         velocity_m_s[0][5] = 1.0 / 3.0;
-        let faces = FaceVelocities { title: "A".into(), time_s: 2.5, centre_m, face_m, velocity_m_s };
-        let (_temp, mut file) = open(cf_faces_bytes(&faces, &example()).unwrap());
+        let faces =
+            FaceVelocities { title: "A".into(), time_s: 2.5, centre_m, face_m, velocity_m_s, share: Share::whole(4) };
+        let (_temp, mut file) = open(cf_faces_parts(&faces, &example()).unwrap());
         assert_eq!(file.data_set().get_var("v").unwrap().dim_names(), ["z", "y_face", "x"]);
         assert_eq!(file.read_var_f64("u").unwrap(), faces.velocity_m_s[0]);
         assert_eq!(file.read_var_f64("y_face").unwrap(), faces.face_m[1]);
         let mut short = faces;
         short.velocity_m_s[2].pop();
-        assert!(cf_faces_bytes(&short, &example()).is_err());
+        assert!(cf_faces_parts(&short, &example()).is_err());
     }
 }

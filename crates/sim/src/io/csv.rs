@@ -131,22 +131,37 @@ impl Table {
     pub fn to_csv(&self, provenance: &Provenance) -> OutputResult<String> {
         self.check()?;
         let mut out = provenance.comment_lines();
-        // Room for most texts at once, so that growing does not copy what is there.
-        out.reserve(self.columns.iter().map(|(_, column)| column.len() * column.usual_width()).sum());
         let header: Vec<String> = self.columns.iter().map(|(n, _)| quoted(n)).collect();
         out.push_str(&header.join(","));
         out.push('\n');
+        self.push_rows(&mut out);
+        Ok(out)
+    }
+
+    /// The rows alone.
+    ///
+    /// # Errors
+    /// As [`Self::to_csv`].
+    pub(crate) fn rows(&self) -> OutputResult<String> {
+        self.check()?;
+        let mut out = String::new();
+        self.push_rows(&mut out);
+        Ok(out)
+    }
+
+    fn push_rows(&self, out: &mut String) {
+        // Room for most texts at once, so that growing does not copy what is there.
+        out.reserve(self.columns.iter().map(|(_, column)| column.len() * column.usual_width()).sum());
         for row in 0..self.columns[0].1.len() {
             for (i, (_, column)) in self.columns.iter().enumerate() {
                 if i > 0 {
                     out.push(',');
                 }
-                column.push_cell(row, &mut out);
+                column.push_cell(row, out);
             }
             out.push('\n');
         }
         out.shrink_to_fit();
-        Ok(out)
     }
 
     fn check(&self) -> OutputResult<()> {

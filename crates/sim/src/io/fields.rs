@@ -3,6 +3,7 @@
 
 use super::csv::Table;
 use super::error::{OutputError, OutputResult, increasing, same_length};
+use super::parts::Share;
 
 /// Velocity and pressure at the centres of the cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +24,8 @@ pub struct VelocityField {
     pub pressure_m2_s2: Vec<f64>,
     /// Magnitude of the vorticity, `[z][y][x]`, 1/s; where it is wanted.
     pub vorticity_per_s: Option<Vec<f64>>,
+    /// The planes across z whose values these are.
+    pub share: Share,
 }
 
 impl VelocityField {
@@ -34,7 +37,7 @@ impl VelocityField {
         increasing("x_m", &self.x_m)?;
         increasing("y_m", &self.y_m)?;
         increasing("z_m", &self.z_m)?;
-        let cells = self.x_m.len() * self.y_m.len() * self.z_m.len();
+        let cells = self.x_m.len() * self.y_m.len() * self.share.planes.len();
         for (name, values) in self.named() {
             same_length(name, values.len(), "z_m x y_m x x_m", cells)?;
             if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
@@ -42,6 +45,11 @@ impl VelocityField {
             }
         }
         Ok(())
+    }
+
+    /// The first of the values that are here, in the order of the whole field.
+    pub(crate) fn first(&self) -> usize {
+        self.share.planes.start * self.x_m.len() * self.y_m.len()
     }
 
     /// The fields with their names.
@@ -60,7 +68,7 @@ impl VelocityField {
     pub fn table(&self) -> OutputResult<Table> {
         self.check()?;
         let (nx, ny) = (self.x_m.len(), self.y_m.len());
-        let cells = || 0..self.velocity_m_s[0].len();
+        let cells = || self.first()..self.first() + self.velocity_m_s[0].len();
         let table = Table::new()
             .float("time_s", cells().map(|_| self.time_s))
             .float("z_m", cells().map(|i| self.z_m[i / (nx * ny)]))
@@ -83,7 +91,25 @@ pub(crate) fn example() -> VelocityField {
         velocity_m_s: [field(0.25), field(100.5), field(-300.0)],
         pressure_m2_s2: field(0.125),
         vorticity_per_s: Some(field(7.5)),
+        share: Share::whole(4),
     }
+}
+
+/// What each of several ranks has of the example: two planes, none, one, one.
+#[cfg(test)]
+pub(crate) fn example_on_ranks() -> Vec<VelocityField> {
+    let (whole, mut is_first) = (example(), true);
+    let rank = |planes: std::ops::Range<usize>| {
+        let part = |values: &Vec<f64>| values[6 * planes.start..6 * planes.end].to_vec();
+        VelocityField {
+            velocity_m_s: whole.velocity_m_s.each_ref().map(part),
+            pressure_m2_s2: part(&whole.pressure_m2_s2),
+            vorticity_per_s: whole.vorticity_per_s.as_ref().map(part),
+            share: Share { planes, is_first: std::mem::take(&mut is_first) },
+            ..whole.clone()
+        }
+    };
+    [0..2, 2..2, 2..3, 3..4].map(rank).into()
 }
 
 #[cfg(test)]

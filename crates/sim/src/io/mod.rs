@@ -16,6 +16,7 @@
 //! | [`scans`] | (readers) scans of radial velocity: CfRadial, `.hpl`, tables | - |
 //! | [`scan_list`] | (reader) lines of sight of a scan | - |
 //! | [`tables`] | a map or planes as a table | - |
+//! | [`parts`] | (data) files in parts, for ranks that write them together | - |
 //! | [`atomic`] | files to disk, all or none | - |
 //! | `text_file`, `netcdf_header`, `netcdf_input`, `netcdf4_input`, `planes_input`, `fields_input` | (readers) texts, NetCDF, cross-planes and fields in it | `netcdf` or `netcdf4` but for texts |
 //! | `lock` | nothing: one writer for a folder at a time | - |
@@ -59,6 +60,7 @@ pub mod map;
 pub(crate) mod netcdf;
 pub mod number;
 pub mod own;
+pub mod parts;
 pub mod provenance;
 pub mod raw;
 pub mod scan_list;
@@ -77,6 +79,7 @@ pub use error::{OutputError, OutputResult};
 pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 pub use own::Existing;
+pub use parts::{FileParts, Share};
 pub use provenance::Provenance;
 pub use site::{Site, UtcTime};
 

@@ -1,13 +1,17 @@
-//! A classic NetCDF file as one table of dimensions, variables and attributes, and the loop that writes it (CDF-2).
+//! A classic NetCDF file as one table of dimensions, variables and attributes, and its bytes (CDF-2): whole, or what one of several
+//! ranks has of them.
 //! The layouts live in `cfradial` and `cf_planes`; nothing here knows what a radar is.
-//! Check: their tests read the bytes with an independent reader.
+//! Check: their tests read the bytes with an independent reader; here they are held against those of another encoder.
 
 use super::error::{OutputError, OutputResult, same_length};
+use super::parts::FileParts;
 use super::provenance::Provenance;
-use netcdf_writer::{DimensionId, NcAttrValue, NcFileBuilder, NcWriteOptions};
 
-/// The encoder holds several copies of the data in memory; a larger result belongs in one file per time.
+/// The whole file is held in memory, unless ranks share it; a larger result belongs in one file per time.
 pub(crate) const MAX_BYTES: usize = 512 << 20;
+
+/// Largest size of a variable in this format, bytes.
+const LARGEST_VARIABLE: u64 = u32::MAX as u64 - 3;
 
 /// Stored in place of a missing float.
 pub(crate) const FILL: f32 = -9999.0;
@@ -32,13 +36,36 @@ impl Data {
         }
     }
 
+    /// Code of the type in the format, and bytes of a value.
+    fn kind(&self) -> (u32, usize) {
+        match self {
+            Self::I8(_) => (1, 1),
+            Self::Char(_) => (2, 1),
+            Self::I32(_) => (4, 4),
+            Self::F32(_) => (5, 4),
+            Self::F64(_) => (6, 8),
+        }
+    }
+
     fn bytes(&self) -> usize {
-        self.len()
-            * match self {
-                Self::F64(_) => 8,
-                Self::F32(_) | Self::I32(_) => 4,
-                Self::I8(_) | Self::Char(_) => 1,
-            }
+        self.len() * self.kind().1
+    }
+
+    /// The values as they stand in the file, without what fills the last word.
+    fn into_encoded(self) -> Vec<u8> {
+        match self {
+            Self::F64(v) => v.iter().flat_map(|v| v.to_be_bytes()).collect(),
+            Self::F32(v) => v.iter().flat_map(|v| v.to_be_bytes()).collect(),
+            Self::I32(v) => v.iter().flat_map(|v| v.to_be_bytes()).collect(),
+            Self::I8(v) => v.iter().flat_map(|v| v.to_be_bytes()).collect(),
+            Self::Char(v) => v,
+        }
+    }
+
+    /// What fills the last word.
+    fn padding(&self) -> u8 {
+        // The value that the library of NetCDF stores where nothing was written.
+        if matches!(self, Self::I8(_)) { (-127_i8) as u8 } else { 0 }
     }
 
     /// 32-bit floats with [`FILL`] for NaN.
@@ -61,27 +88,24 @@ impl From<&str> for Attr {
     }
 }
 
-impl Attr {
-    fn value(&self) -> NcAttrValue {
-        match self {
-            Self::Text(text) => NcAttrValue::Chars(text.clone()),
-            Self::F32(value) => NcAttrValue::Floats(vec![*value]),
-            Self::I8(values) => NcAttrValue::Bytes(values.clone()),
-        }
-    }
-}
-
 /// One variable.
 pub(crate) struct Variable {
     pub(crate) name: String,
     pub(crate) dims: &'static [&'static str],
     pub(crate) data: Data,
     pub(crate) attrs: Vec<(&'static str, Attr)>,
+    /// The first of its values that are here, of a variable that ranks share.
+    pub(crate) first: Option<usize>,
 }
 
 impl Variable {
     pub(crate) fn new(name: &str, dims: &'static [&'static str], data: Data) -> Self {
-        Self { name: name.into(), dims, data, attrs: Vec::new() }
+        Self { name: name.into(), dims, data, attrs: Vec::new(), first: None }
+    }
+
+    /// Of a variable that ranks share, the values from number `first` on.
+    pub(crate) fn part(name: &str, dims: &'static [&'static str], data: Data, first: usize) -> Self {
+        Self { first: Some(first), ..Self::new(name, dims, data) }
     }
 
     /// Adds a text attribute.
@@ -106,77 +130,165 @@ pub(crate) struct Layout {
 
 impl Layout {
     /// The bytes of the file. The provenance follows the global attributes, each entry as text.
-    ///
-    /// Each variable is freed as soon as the encoder has its copy; the encoder makes three more before the file.
     pub(crate) fn into_bytes(self, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-        let size = self.check()?;
-        let refuse = |e: netcdf_writer::Error| OutputError::encode("NetCDF", e);
-        let mut file = NcFileBuilder::new();
-        let mut ids: Vec<(&str, DimensionId)> = Vec::new();
-        for (name, size) in &self.dims {
-            ids.push((name, file.add_dimension(*name, *size as u64).map_err(refuse)?));
-        }
-        let own = self.globals.into_iter();
-        for (name, text) in own.chain(provenance.entries()) {
-            file.add_attribute(name, NcAttrValue::Chars(text)).map_err(refuse)?;
-        }
-        for variable in self.variables {
-            add_variable(&mut file, &ids, &variable).map_err(refuse)?;
-        }
-        // Room for the head; it may grow beyond.
-        let mut bytes = Vec::with_capacity(size + (16 << 10));
-        file.write(&mut bytes, NcWriteOptions::offset64()).map_err(refuse)?;
-        Ok(bytes)
+        self.into_parts(provenance, true).map(FileParts::into_bytes)
     }
 
-    /// Checks the lengths; the bytes of the data.
-    fn check(&self) -> OutputResult<usize> {
-        let size = |dim: &str| {
-            let found = self.dims.iter().find(|(name, _)| *name == dim);
-            found.map_or(0, |(_, size)| *size)
-        };
-        for variable in &self.variables {
-            let expected = variable.dims.iter().map(|d| size(d)).product();
-            let axes = variable.dims.join(" x ");
-            same_length(&variable.name, variable.data.len(), &axes, expected)?;
+    /// The parts of the file that are here: of the variables that ranks share, and, for the first rank, all else.
+    pub(crate) fn into_parts(mut self, provenance: &Provenance, is_first: bool) -> OutputResult<FileParts> {
+        self.check()?;
+        self.globals.extend(provenance.entries());
+        self.check_names()?;
+        let sizes: Vec<u64> = self.variables.iter().map(|v| (self.count(v) * v.data.kind().1) as u64).collect();
+        if let Some(size) = sizes.iter().find(|size| **size > LARGEST_VARIABLE) {
+            let reason = format!("a variable of {size} bytes, at most {LARGEST_VARIABLE}: take fewer cells");
+            return Err(OutputError::Unsupported { format: "NetCDF", reason });
         }
-        let total: usize = self.variables.iter().map(|v| v.data.bytes()).sum();
+        // The places of the data do not change the length of the head.
+        let mut length = self.head(&sizes, &vec![0; sizes.len()]).len() as u64;
+        let begins: Vec<u64> = sizes
+            .iter()
+            .map(|size| {
+                let begin = length;
+                length += size.next_multiple_of(4);
+                begin
+            })
+            .collect();
+        let mut parts = Vec::new();
+        if is_first {
+            parts.push((0, self.head(&sizes, &begins)));
+        }
+        for (variable, begin) in self.variables.into_iter().zip(begins) {
+            let (padding, each) = (variable.data.padding(), variable.data.kind().1);
+            match variable.first {
+                Some(first) => parts.push((begin + (first * each) as u64, variable.data.into_encoded())),
+                None if is_first => {
+                    let mut bytes = variable.data.into_encoded();
+                    bytes.resize(bytes.len().next_multiple_of(4), padding);
+                    parts.push((begin, bytes));
+                }
+                None => {}
+            }
+        }
+        Ok(FileParts { length, parts })
+    }
+
+    /// Values of a whole variable.
+    fn count(&self, variable: &Variable) -> usize {
+        let size = |dim: &&str| self.dims.iter().find(|(name, _)| name == dim).map_or(0, |(_, size)| *size);
+        variable.dims.iter().map(size).product()
+    }
+
+    /// Checks the lengths.
+    fn check(&self) -> OutputResult<()> {
+        for variable in &self.variables {
+            let (found, expected) = (variable.data.len(), self.count(variable));
+            let axes = variable.dims.join(" x ");
+            match variable.first {
+                Some(first) if first + found <= expected => {}
+                first => same_length(&variable.name, first.unwrap_or(0) + found, &axes, expected)?,
+            }
+        }
+        let own = self.variables.iter().filter(|variable| variable.first.is_none());
+        let total: usize = own.map(|v| v.data.bytes()).sum();
         if total > MAX_BYTES {
             return Err(OutputError::Unsupported {
                 format: "NetCDF",
                 reason: format!("{total} bytes in one file, at most {MAX_BYTES}: write one file per time or sweep"),
             });
         }
-        Ok(total)
+        Ok(())
+    }
+
+    /// Checks what readers could not tell apart or not take for a name.
+    fn check_names(&self) -> OutputResult<()> {
+        let dims: Vec<&str> = self.dims.iter().map(|(name, _)| *name).collect();
+        let variables: Vec<&str> = self.variables.iter().map(|variable| variable.name.as_str()).collect();
+        let globals: Vec<&str> = self.globals.iter().map(|(name, _)| *name).collect();
+        let of_variable = |v: &Variable| v.attrs.iter().map(|(name, _)| *name).collect();
+        let mut lists = vec![dims, variables, globals];
+        lists.extend(self.variables.iter().map(of_variable));
+        for list in lists {
+            for (place, name) in list.iter().enumerate() {
+                if name.is_empty() || name.contains(['/', '\0']) {
+                    return Err(OutputError::encode("NetCDF", format!("'{name}' is no name")));
+                }
+                if list[..place].contains(name) {
+                    return Err(OutputError::Duplicate { what: "name in NetCDF", name: (*name).into() });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The head of the file, of variables of these sizes at these places \[bytes\].
+    fn head(&self, sizes: &[u64], begins: &[u64]) -> Vec<u8> {
+        let mut head = Head(b"CDF\x02\0\0\0\0".to_vec());
+        head.list(0x0A, self.dims.len());
+        for (name, size) in &self.dims {
+            head.name(name);
+            head.number(*size);
+        }
+        head.list(0x0C, self.globals.len());
+        for (name, text) in &self.globals {
+            head.attribute(name, 2, text.len(), text.as_bytes());
+        }
+        head.list(0x0B, self.variables.len());
+        for ((variable, size), begin) in self.variables.iter().zip(sizes).zip(begins) {
+            head.name(&variable.name);
+            head.number(variable.dims.len());
+            for dim in variable.dims {
+                // Every axis is among the dimensions, or the variable had no values and was refused.
+                head.number(self.dims.iter().position(|(name, _)| name == dim).unwrap_or_default());
+            }
+            head.list(0x0C, variable.attrs.len());
+            for (name, value) in &variable.attrs {
+                match value {
+                    Attr::Text(text) => head.attribute(name, 2, text.len(), text.as_bytes()),
+                    Attr::F32(value) => head.attribute(name, 5, 1, &value.to_be_bytes()),
+                    Attr::I8(values) => {
+                        let bytes: Vec<u8> = values.iter().map(|value| *value as u8).collect();
+                        head.attribute(name, 1, values.len(), &bytes);
+                    }
+                }
+            }
+            head.number(variable.data.kind().0 as usize);
+            head.number(size.next_multiple_of(4) as usize);
+            head.0.extend(begin.to_be_bytes());
+        }
+        head.0
     }
 }
 
-fn add_variable(
-    file: &mut NcFileBuilder,
-    ids: &[(&str, DimensionId)],
-    variable: &Variable,
-) -> netcdf_writer::Result<()> {
-    let wanted = |(name, _): &&(&str, DimensionId)| variable.dims.contains(name);
-    debug_assert_eq!(ids.iter().filter(wanted).count(), variable.dims.len());
-    let dims: Vec<DimensionId> =
-        variable.dims.iter().filter_map(|d| ids.iter().find(|(name, _)| name == d).map(|(_, id)| *id)).collect();
-    let name = variable.name.as_str();
-    let id = match &variable.data {
-        Data::F64(_) => file.add_variable::<f64>(name, &dims)?,
-        Data::F32(_) => file.add_variable::<f32>(name, &dims)?,
-        Data::I32(_) => file.add_variable::<i32>(name, &dims)?,
-        Data::I8(_) => file.add_variable::<i8>(name, &dims)?,
-        Data::Char(_) => file.add_char_variable(name, &dims)?,
-    };
-    for (attribute, value) in &variable.attrs {
-        file.add_variable_attribute(id, *attribute, value.value())?;
+/// The head of a file as it grows, in words of four bytes.
+struct Head(Vec<u8>);
+
+impl Head {
+    fn number(&mut self, number: usize) {
+        self.0.extend((number as u32).to_be_bytes());
     }
-    match &variable.data {
-        Data::F64(v) => file.write_variable(id, v),
-        Data::F32(v) => file.write_variable(id, v),
-        Data::I32(v) => file.write_variable(id, v),
-        Data::I8(v) => file.write_variable(id, v),
-        Data::Char(v) => file.write_char_variable(id, v),
+
+    /// Tag and length of a list.
+    fn list(&mut self, tag: usize, length: usize) {
+        self.number(if length == 0 { 0 } else { tag });
+        self.number(length);
+    }
+
+    fn name(&mut self, name: &str) {
+        self.number(name.len());
+        self.bytes(name.as_bytes());
+    }
+
+    fn attribute(&mut self, name: &str, code: usize, count: usize, bytes: &[u8]) {
+        self.name(name);
+        self.number(code);
+        self.number(count);
+        self.bytes(bytes);
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        self.0.extend(bytes);
+        self.0.resize(self.0.len().next_multiple_of(4), 0);
     }
 }
 
@@ -184,6 +296,86 @@ fn add_variable(
 mod tests {
     use super::super::provenance::example;
     use super::*;
+    use netcdf_writer::{NcAttrValue, NcFileBuilder, NcWriteOptions};
+
+    fn layout() -> Layout {
+        Layout {
+            dims: vec![("time", 3), ("range", 2), ("letters", 5)],
+            globals: vec![("title", "A, b".into()), ("empty", String::new())],
+            variables: vec![
+                Variable::new("v", &["time", "range"], Data::F32((0..6).map(|i| i as f32 - 2.5).collect()))
+                    .text("units", "m s-1")
+                    .attr("_FillValue", Attr::F32(FILL)),
+                Variable::new("once", &[], Data::F64(vec![1.0 / 3.0])),
+                Variable::new("flag", &["letters"], Data::I8(vec![1, -2, 3, 4, 5]))
+                    .attr("values", Attr::I8(vec![1, 2])),
+                Variable::new("word", &["letters"], Data::Char(b"lidar".to_vec())),
+                Variable::new("count", &["time"], Data::I32(vec![7, -8, 9])).text("long_name", ""),
+            ],
+        }
+    }
+
+    #[test]
+    fn the_bytes_are_those_of_another_encoder() {
+        let mut file = NcFileBuilder::new();
+        let ids =
+            [("time", 3), ("range", 2), ("letters", 5)].map(|(name, size)| file.add_dimension(name, size).unwrap());
+        let chars = |text: &str| NcAttrValue::Chars(text.into());
+        let own = [("title", "A, b".to_owned()), ("empty", String::new())];
+        for (name, text) in own.into_iter().chain(example().entries()) {
+            file.add_attribute(name, chars(&text)).unwrap();
+        }
+        let v = file.add_variable::<f32>("v", &ids[..2]).unwrap();
+        file.add_variable_attribute(v, "units", chars("m s-1")).unwrap();
+        file.add_variable_attribute(v, "_FillValue", NcAttrValue::Floats(vec![FILL])).unwrap();
+        file.write_variable(v, &[-2.5_f32, -1.5, -0.5, 0.5, 1.5, 2.5]).unwrap();
+        let once = file.add_variable::<f64>("once", &[]).unwrap();
+        file.write_variable(once, &[1.0 / 3.0]).unwrap();
+        let flag = file.add_variable::<i8>("flag", &ids[2..]).unwrap();
+        file.add_variable_attribute(flag, "values", NcAttrValue::Bytes(vec![1, 2])).unwrap();
+        file.write_variable(flag, &[1_i8, -2, 3, 4, 5]).unwrap();
+        let word = file.add_char_variable("word", &ids[2..]).unwrap();
+        file.write_char_variable(word, b"lidar").unwrap();
+        let count = file.add_variable::<i32>("count", &ids[..1]).unwrap();
+        file.add_variable_attribute(count, "long_name", chars("")).unwrap();
+        file.write_variable(count, &[7, -8, 9]).unwrap();
+        let mut expected = Vec::new();
+        file.write(&mut expected, NcWriteOptions::offset64()).unwrap();
+        assert_eq!(layout().into_bytes(&example()).unwrap(), expected);
+    }
+
+    #[test]
+    fn parts_of_several_ranks_are_the_file_of_one() {
+        let rank = |first: usize, values: &[f32]| {
+            let mut layout = layout();
+            layout.variables[0].data = Data::F32(values.to_vec());
+            layout.variables[0].first = Some(first);
+            layout.into_parts(&example(), first == 0).unwrap()
+        };
+        let mut parts = rank(0, &[-2.5, -1.5]);
+        for other in [rank(2, &[-0.5, 0.5, 1.5]), rank(5, &[2.5]), rank(6, &[])] {
+            assert_eq!((other.length, other.parts.len()), (parts.length, 1));
+            parts.parts.extend(other.parts);
+        }
+        assert_eq!(parts.into_bytes(), layout().into_bytes(&example()).unwrap());
+        let mut beyond = layout();
+        beyond.variables[0].first = Some(1);
+        assert!(matches!(beyond.into_parts(&example(), true), Err(OutputError::Length { .. })));
+        let mut large = layout();
+        (large.dims[0].1, large.variables[0].first) = (1 << 30, Some(0));
+        large.variables.truncate(1);
+        let error = large.into_parts(&example(), true).unwrap_err();
+        assert!(matches!(error, OutputError::Unsupported { .. }), "{error}");
+    }
+
+    #[test]
+    fn names_that_readers_cannot_take_are_refused() {
+        for name in ["", "a/b", "count"] {
+            let mut layout = layout();
+            layout.variables[0].name = name.into();
+            assert!(layout.into_bytes(&example()).is_err(), "{name:?}");
+        }
+    }
 
     #[test]
     fn a_variable_of_the_wrong_length_is_refused() {

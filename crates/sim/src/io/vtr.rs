@@ -6,6 +6,7 @@
 use super::error::{OutputError, OutputResult};
 use super::fields::VelocityField;
 use super::map::CrossPlanes;
+use super::parts::FileParts;
 use super::provenance::Provenance;
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, Coordinates, DataSet, Extent, RectilinearGridPiece, Version, Vtk,
@@ -45,24 +46,104 @@ fn collection(entries: &str, provenance: &Provenance) -> Vec<u8> {
 }
 
 /// A whole field as a rectilinear grid with points at the centres: vectors `velocity` in m/s, scalars `pressure_m2_s2`
-/// and, where it is there, `vorticity_magnitude` in 1/s.
+/// and, where it is there, `vorticity_magnitude` in 1/s; or what one of several ranks has of the file. `behind` are the values of
+/// the cell behind the last one that is here, in the order of [`VelocityField::named`]: digits of the encoding hold bytes of both.
 ///
 /// # Errors
 /// What [`VelocityField::check`] finds, or a refusal of the encoder.
-pub fn field_bytes(field: &VelocityField, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn field_parts(field: &VelocityField, behind: Option<&[f64]>, provenance: &Provenance) -> OutputResult<FileParts> {
     field.check()?;
-    let [u, v, w] = &field.velocity_m_s;
-    let velocity: Vec<f32> = u.iter().zip(v).zip(w).flat_map(|((u, v), w)| [*u as f32, *v as f32, *w as f32]).collect();
-    let pressure: Vec<f32> = field.pressure_m2_s2.iter().map(|p| *p as f32).collect();
+    let cells = field.x_m.len() * field.y_m.len() * field.z_m.len();
+    let empty = Vec::<f32>::new;
     let mut point = vec![
-        Attribute::vectors("velocity").with_data(velocity),
-        Attribute::scalars("pressure_m2_s2", 1).with_data(pressure),
+        Attribute::vectors("velocity").with_data(empty()),
+        Attribute::scalars("pressure_m2_s2", 1).with_data(empty()),
     ];
-    if let Some(vorticity) = &field.vorticity_per_s {
-        let vorticity: Vec<f32> = vorticity.iter().map(|w| *w as f32).collect();
-        point.push(Attribute::scalars("vorticity_magnitude", 1).with_data(vorticity));
+    if field.vorticity_per_s.is_some() {
+        point.push(Attribute::scalars("vorticity_magnitude", 1).with_data(empty()));
     }
-    grid_bytes(&field.title, [&field.x_m, &field.y_m, &field.z_m], point, provenance)
+    // The encoder writes all but the values, for which there is a mark each; they stand before the coordinates.
+    let arrays = point.len();
+    let frame = grid_text(&field.title, [&field.x_m, &field.y_m, &field.z_m], point)?;
+    let named: Vec<&[f64]> = field.named().map(|(_, values)| values).collect();
+    let mut texts = frame.splitn(arrays + 1, NO_VALUES).map(str::to_owned);
+    let mut file = FileParts::default();
+    let mut next_text = || texts.next().ok_or_else(|| OutputError::encode("VTK", "an array is missing"));
+    let add_text = |file: &mut FileParts, text: String| {
+        let start = file.length;
+        file.length += text.len() as u64;
+        if field.share.is_first {
+            file.parts.push((start, text.into_bytes()));
+        }
+    };
+    add_text(&mut file, with_comment(&next_text()?, provenance)?);
+    let groups = std::iter::once(0..3).chain((3..named.len()).map(|i| i..i + 1));
+    for group in groups {
+        let array = Array { components: group.len(), cells, first: field.first() };
+        let (start, text) = array.encoded(&named[group.clone()], behind.map(|values| &values[group]));
+        file.parts.push((file.length + start, text));
+        file.length += array.length();
+        add_text(&mut file, next_text()?);
+    }
+    Ok(file)
+}
+
+/// What the encoder makes of an array without values: eight bytes for its length.
+const NO_VALUES: &str = "AAAAAAAAAAA=";
+
+/// An array of 32-bit floats as it stands in a file, in base64 with its length before it.
+struct Array {
+    components: usize,
+    /// Of the whole array.
+    cells: usize,
+    /// The first cell that is here.
+    first: usize,
+}
+
+impl Array {
+    /// Bytes before the values of a cell.
+    fn before(&self, cell: usize) -> usize {
+        8 + 4 * self.components * cell
+    }
+
+    /// Digits of the whole array.
+    fn length(&self) -> u64 {
+        4 * self.before(self.cells).div_ceil(3) as u64
+    }
+
+    /// The digits that begin here, and the place of the first of them.
+    fn encoded(&self, values: &[&[f64]], behind: Option<&[f64]>) -> (u64, Vec<u8>) {
+        let cells = values.first().map_or(0, |values| values.len());
+        let end = self.first + cells;
+        let mut bytes = Vec::with_capacity(4 * self.components * (cells + 1) + 8);
+        if self.first == 0 {
+            bytes.extend((self.before(self.cells) as u64 - 8).to_le_bytes());
+        }
+        for cell in 0..cells {
+            bytes.extend(values.iter().flat_map(|values| (values[cell] as f32).to_le_bytes()));
+        }
+        bytes.extend(behind.unwrap_or_default().iter().flat_map(|value| (*value as f32).to_le_bytes()));
+        // Three bytes make four digits, which belong to who has the first of these.
+        let from = if self.first == 0 { 0 } else { self.before(self.first).next_multiple_of(3) };
+        let to = if end == self.cells { self.before(end) } else { self.before(end).next_multiple_of(3) };
+        let here = if self.first == 0 { 0 } else { self.before(self.first) };
+        let own = bytes.get(from - here..to - here).filter(|_| cells > 0).unwrap_or_default();
+        ((from / 3 * 4) as u64, base64(own))
+    }
+}
+
+/// Base64 with its usual digits.
+fn base64(bytes: &[u8]) -> Vec<u8> {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = Vec::with_capacity(4 * bytes.len().div_ceil(3));
+    for chunk in bytes.chunks(3) {
+        let word = chunk.iter().fold(0_u32, |word, byte| word << 8 | u32::from(*byte)) << (8 * (3 - chunk.len()));
+        for place in 0..4 {
+            let digit = DIGITS[(word >> (18 - 6 * place)) as usize & 63];
+            out.push(if place <= chunk.len() { digit } else { b'=' });
+        }
+    }
+    out
 }
 
 /// The first plane alone.
@@ -89,6 +170,10 @@ fn plane_bytes(planes: &CrossPlanes, index: usize, provenance: &Provenance) -> O
 }
 
 fn grid_bytes(title: &str, axes: [&[f64]; 3], point: Vec<Attribute>, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    with_comment(&grid_text(title, axes, point)?, provenance).map(String::into_bytes)
+}
+
+fn grid_text(title: &str, axes: [&[f64]; 3], point: Vec<Attribute>) -> OutputResult<String> {
     let [x, y, z] = axes.map(<[f64]>::to_vec);
     let range = |axis: &[f64]| 0..=(axis.len() as i32 - 1);
     let grid = RectilinearGridPiece {
@@ -105,14 +190,13 @@ fn grid_bytes(title: &str, axes: [&[f64]; 3], point: Vec<Attribute>, provenance:
     };
     let mut bytes = Vec::new();
     file.write_xml(&mut bytes).map_err(|e| OutputError::encode("VTK", e))?;
-    insert_comment(bytes, provenance)
+    String::from_utf8(bytes).map_err(|e| OutputError::encode("VTK", e))
 }
 
 /// The provenance goes as a comment before the root element.
-fn insert_comment(bytes: Vec<u8>, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-    let text = String::from_utf8(bytes).map_err(|e| OutputError::encode("VTK", e))?;
+fn with_comment(text: &str, provenance: &Provenance) -> OutputResult<String> {
     let root = text.find("<VTKFile").ok_or_else(|| OutputError::encode("VTK", "no root element"))?;
-    Ok([&text[..root], &comment(provenance), &text[root..]].concat().into_bytes())
+    Ok([&text[..root], &comment(provenance), &text[root..]].concat())
 }
 
 fn comment(provenance: &Provenance) -> String {
@@ -158,9 +242,47 @@ mod tests {
     }
 
     #[test]
+    fn fields_have_the_bytes_of_the_encoder_and_what_ranks_have_of_them_is_the_file_of_one() {
+        for with_vorticity in [true, false] {
+            let keep = |mut field: VelocityField| {
+                field.vorticity_per_s = field.vorticity_per_s.filter(|_| with_vorticity);
+                field
+            };
+            let field = keep(super::super::fields::example());
+            let floats = |values: &[f64]| values.iter().map(|value| *value as f32).collect::<Vec<f32>>();
+            let [u, v, w] = field.velocity_m_s.each_ref().map(|values| floats(values));
+            let velocity: Vec<f32> = (0..u.len()).flat_map(|i| [u[i], v[i], w[i]]).collect();
+            let mut point = vec![
+                Attribute::vectors("velocity").with_data(velocity),
+                Attribute::scalars("pressure_m2_s2", 1).with_data(floats(&field.pressure_m2_s2)),
+            ];
+            point.extend(
+                field
+                    .vorticity_per_s
+                    .as_ref()
+                    .map(|w| Attribute::scalars("vorticity_magnitude", 1).with_data(floats(w))),
+            );
+            let expected = grid_bytes(&field.title, [&field.x_m, &field.y_m, &field.z_m], point, &example()).unwrap();
+            assert!(field_parts(&field, None, &example()).unwrap().into_bytes() == expected);
+            let ranks: Vec<VelocityField> = super::super::fields::example_on_ranks().into_iter().map(keep).collect();
+            let mut file = FileParts::default();
+            for rank in &ranks {
+                let next = ranks
+                    .iter()
+                    .find(|next| next.share.planes.start == rank.share.planes.end && !next.share.planes.is_empty());
+                let behind: Option<Vec<f64>> = next.map(|next| next.named().map(|(_, values)| values[0]).collect());
+                let parts = field_parts(rank, behind.as_deref(), &example()).unwrap();
+                file.length = parts.length;
+                file.parts.extend(parts.parts);
+            }
+            assert!(file.into_bytes() == expected, "ranks, vorticity: {with_vorticity}");
+        }
+    }
+
+    #[test]
     fn a_whole_field_reads_back_with_x_fastest() {
         let field = super::super::fields::example();
-        let vtk = Vtk::parse_xml(field_bytes(&field, &example()).unwrap().as_slice()).unwrap();
+        let vtk = Vtk::parse_xml(field_parts(&field, None, &example()).unwrap().into_bytes().as_slice()).unwrap();
         let DataSet::RectilinearGrid { pieces, .. } = vtk.data else { panic!("no rectilinear grid") };
         let Piece::Inline(grid) = &pieces[0] else { panic!("no inline piece") };
         assert_eq!(grid.coords.x.clone().cast_into::<f64>().unwrap(), field.x_m);

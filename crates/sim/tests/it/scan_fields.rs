@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use wakescope_sim::Silent;
 use wakescope_sim::io::Provenance;
-use wakescope_sim::io::cf_fields::{FaceVelocities, cf_faces_bytes};
+use wakescope_sim::io::Share;
+use wakescope_sim::io::cf_fields::{FaceVelocities, cf_faces_parts};
 use wakescope_sim::measure::scan::Scanner;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::scene::SceneFile;
@@ -37,8 +38,9 @@ fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
         sampled(nodes, d, wave)
     });
     let origin = Provenance { program: "t".into(), scene_toml: String::new(), scene_hash: "0".into(), seed: 1 };
-    let faces = FaceVelocities { title: "wave".into(), time_s: 2.0, centre_m, face_m, velocity_m_s };
-    std::fs::write(folder.path().join("wave.nc"), cf_faces_bytes(&faces, &origin).unwrap()).unwrap();
+    let share = Share::whole(centre_m[2].len());
+    let faces = FaceVelocities { title: "wave".into(), time_s: 2.0, centre_m, face_m, velocity_m_s, share };
+    std::fs::write(folder.path().join("wave.nc"), cf_faces_parts(&faces, &origin).unwrap().into_bytes()).unwrap();
     let flow = "kind = \"fields\"\nfiles = \"wave.nc\"\nmotion = \"frozen\"\n";
     let scan = format!(
         "elevation_min_rad = 0.02\nelevation_max_rad = 0.08\nelevation_step_rad = 0.02\n{}",

@@ -2,18 +2,23 @@
 //!
 //! Check: an analytic pair with its images on a mesh: centres, circulation against radius, secondary vortices, spread.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use super::cores::{Core, EdgePlane};
 use super::record::{SecondaryRecord, VortexRecord, WakeRecord};
 use super::scales::WakeScales;
 use super::spectrum::mode_energies_m4_s2;
-use super::vorticity::{Curl, Faces};
+use super::vorticity::Curl;
 use crate::Error;
 use crate::analysis::circulation::circulation_m2_s;
 use crate::error::check;
+use crate::ranks::Ranks;
 use crate::solver::flow::Flow;
 use crate::solver::mesh::{Ends, Mesh};
+use crate::solver::planes::Faces;
+use crate::solver::slabs::Slabs;
 use crate::winds::{GridSnapshot, OutsidePolicy};
 
 /// Radius of the circle of a centroid, in `b0`.
@@ -126,20 +131,21 @@ impl WakeMeter {
         self.track.as_flattened_mut().as_flattened_mut().copy_from_slice(&state);
     }
 
-    /// Measures the flow, which is on the mesh of the meter and not earlier than the one before.
+    /// Measures the flow, which is on the mesh of the meter and not earlier than the one before. Of a flow on several ranks all
+    /// must measure together, and all get the record.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] for a flow on a mesh of other size; what the interpolation refuses.
+    /// [`Error::LengthMismatch`] for a flow on a mesh of other size; what the interpolation refuses; [`Error::RankLost`].
     pub fn measure(&mut self, flow: &Flow) -> Result<WakeRecord, Error> {
-        let velocity = [0, 1, 2].map(|d| flow.face_velocity_m_s(d));
         let cells: usize = self.curl.cell_m.iter().map(Vec::len).product();
-        crate::error::check_lengths(cells, velocity[0].len())?;
-        let plane = self.mean_vorticity(&velocity);
-        let wind = flow.plane_snapshot(&flow.mean_cross_plane(), OutsidePolicy::Mask)?;
+        crate::error::check_lengths(cells, flow.mesh().cells().iter().product())?;
+        let seen = Seen { faces: flow.faces()?, slabs: &flow.layout.slabs };
+        let plane = self.mean_vorticity(&seen)?;
+        let wind = flow.plane_snapshot(&flow.mean_plane_of(&seen.faces)?, OutsidePolicy::Mask)?;
         let radius_m = self.core_radius * self.scales.spacing_m;
         let time_s = flow.time_s();
-        let cores: [Option<Core>; 2] =
-            std::array::from_fn(|v| plane.core(guess(&self.track[v], time_s), SIGN[v], radius_m));
+        let core = |v: usize| seen.core(|| plane.core(guess(&self.track[v], time_s), SIGN[v], radius_m));
+        let cores = [core(0)?, core(1)?];
         let mut tracks = self.track;
         for (track, core) in tracks.iter_mut().zip(&cores) {
             let [y_m, z_m] = core.map_or([f64::NAN; 2], |core| core.centre_m);
@@ -151,10 +157,10 @@ impl WakeMeter {
             }
         }
         let centres_m = tracks.map(|track| [track[1][1], track[1][2]]);
-        let (shear, wall_shear_per_s) = self.wall_shear(&velocity);
+        let (shear, wall_shear_per_s) = self.wall_shear(&seen)?;
         let vortex = |own: usize| {
             let side = Side { plane: &plane, centres_m, own };
-            let mut record = self.vortex(&velocity, &side, cores[own].is_some(), &wind)?;
+            let mut record = self.vortex(&seen, &side, cores[own].is_some(), &wind)?;
             let faces = self.face_m[0].iter().zip(&shear).filter(|(y_m, _)| side.has(**y_m));
             record.outward_shear_per_s = faces.map(|(_, shear)| SIGN[own] * shear).fold(f64::NAN, f64::min);
             Ok::<_, Error>(record)
@@ -168,8 +174,8 @@ impl WakeMeter {
             left: vortex(0)?,
             right: vortex(1)?,
             energy_m4_s2: flow.kinetic_energy_m5_s2() / length_m,
-            mode_energy_m4_s2: mode_energies_m4_s2(&self.curl, &velocity),
-            enstrophy_m2_s2: self.curl.enstrophy_m2_s2(&velocity),
+            mode_energy_m4_s2: mode_energies_m4_s2(&self.curl, &seen.faces, |own| seen.together(own))?,
+            enstrophy_m2_s2: self.curl.enstrophy_m2_s2(&seen.faces, |own| seen.together(own))?,
             wall_shear_per_s,
             wall_units,
         };
@@ -189,49 +195,70 @@ impl WakeMeter {
     }
 
     /// Axial vorticity averaged over x.
-    fn mean_vorticity(&self, velocity: &Faces) -> EdgePlane<'_> {
+    fn mean_vorticity(&self, seen: &Seen<'_>) -> Result<EdgePlane<'_>, Error> {
         let (ny, x_m) = (self.face_m[0].len(), &self.curl.cell_m[0]);
         let length_m: f64 = x_m.iter().sum();
-        let mut mean = vec![0.0; ny * self.face_m[1].len()];
-        mean.par_chunks_mut(ny).enumerate().for_each(|(k, out)| {
+        let own = self.curl.own_faces(seen.faces.shape.own());
+        let mut mean = vec![0.0; ny * own.len()];
+        mean.par_chunks_mut(ny).zip(own).for_each(|(out, k)| {
             let mut row = vec![0.0; x_m.len()];
             for (j, out) in out.iter_mut().enumerate() {
-                self.curl.row(velocity, 0, j, k, &mut row);
+                self.curl.row(&seen.faces, 0, j, k, &mut row);
                 *out = row.iter().zip(x_m).map(|(w, x_m)| w * x_m).sum::<f64>() / length_m;
             }
         });
-        self.edge_plane(mean)
+        seen.together(mean).map(|mean| self.edge_plane(mean))
     }
 
-    /// The core in each cross-plane about the one of the mean; NaN where there is none.
-    fn slices(&self, velocity: &Faces, about: Core, sign: f64, floor_m: f64) -> Vec<[f64; 2]> {
+    /// The core in each cross-plane about the one of the mean; NaN where there is none. Each rank seeks it in some of the planes.
+    fn slices(&self, seen: &Seen<'_>, about: Core, sign: f64, floor_m: f64) -> Result<Vec<[f64; 2]>, Error> {
         let radius_m = self.core_radius * self.scales.spacing_m;
-        let (ny, nx) = (self.face_m[0].len(), self.curl.cell_m[0].len());
-        let near = |k: usize| {
-            let z_m = self.face_m[1][k];
+        let (ny, nz, nx) = (self.face_m[0].len(), self.face_m[1].len(), self.curl.cell_m[0].len());
+        let near = |k: &usize| {
+            let z_m = self.face_m[1][*k];
             z_m > floor_m && (z_m - about.centre_m[1]).abs() < 2.0 * radius_m
         };
         let flat = self.edge_plane(Vec::new());
         let is_beside = |j: usize| flat.lateral_m(about.centre_m[0], self.face_m[0][j]).abs() < 2.0 * radius_m;
         let beside: Vec<usize> = (0..ny).filter(|j| is_beside(*j)).collect();
-        let mut planes = vec![vec![0.0; ny * self.face_m[1].len()]; nx];
-        let mut row = vec![0.0; nx];
-        for k in (0..self.face_m[1].len()).filter(|k| near(*k)) {
-            for &j in &beside {
-                self.curl.row(velocity, 0, j, k, &mut row);
-                planes.iter_mut().zip(&row).for_each(|(plane, value)| plane[k * ny + j] = *value);
-            }
-        }
-        let found = |plane: Vec<f64>| {
-            let core = self.edge_plane(plane).core(about.centre_m, sign, radius_m);
-            core.map_or([f64::NAN; 2], |core| core.centre_m)
-        };
-        planes.into_iter().map(found).collect()
+        // What each rank finds in its planes across z, and seeks in which across x.
+        let ranks = &seen.slabs.ranks;
+        let (rank, count) = (ranks.rank(), ranks.count());
+        let found = |rank: usize| self.curl.own_faces(seen.faces.shape.planes_of(rank, count)).filter(near);
+        let sought = |rank: usize| nx * rank / count..nx * (rank + 1) / count;
+        let rows: Vec<[usize; 2]> = found(rank).flat_map(|k| beside.iter().map(move |j| [*j, k])).collect();
+        let mut values = vec![0.0; rows.len() * nx];
+        values.par_chunks_mut(nx).zip(&rows).for_each(|(row, [j, k])| self.curl.row(&seen.faces, 0, *j, *k, row));
+        let size = |found_by: usize, sought_by: usize| found(found_by).count() * beside.len() * sought(sought_by).len();
+        let to: Vec<usize> = (0..count).map(|other| size(rank, other)).collect();
+        let from: Vec<usize> = (0..count).map(|other| size(other, rank)).collect();
+        let give = |other: usize| sought(other).flat_map(|i| values.iter().skip(i).step_by(nx));
+        let send: Vec<f64> = (0..count).flat_map(give).copied().collect();
+        drop(values);
+        let mut came = vec![0.0; from.iter().sum()];
+        ranks.turn(&send, &to, &mut came, &from)?;
+        let own: Vec<[f64; 2]> = sought(rank)
+            .into_par_iter()
+            .map(|i| {
+                let mut plane = vec![0.0; ny * nz];
+                let (mut start, at) = (0, i - sought(rank).start);
+                for (other, length) in from.iter().enumerate() {
+                    let rows = length / sought(rank).len();
+                    let values = &came[start + at * rows..start + (at + 1) * rows];
+                    let places = found(other).flat_map(|k| beside.iter().map(move |j| k * ny + j));
+                    places.zip(values).for_each(|(place, value)| plane[place] = *value);
+                    start += length;
+                }
+                let core = self.edge_plane(plane).core(about.centre_m, sign, radius_m);
+                core.map_or([f64::NAN; 2], |core| core.centre_m)
+            })
+            .collect();
+        seen.slabs.planes(own)
     }
 
     fn vortex(
         &self,
-        velocity: &Faces,
+        seen: &Seen<'_>,
         side: &Side<'_>,
         is_found: bool,
         wind: &GridSnapshot,
@@ -247,8 +274,8 @@ impl WakeMeter {
         }
         let gamma_m2_s = self.radii_m().into_iter().map(circulation).collect::<Result<_, _>>()?;
         let above = |y: f64, z: f64| z > ABOVE_LAYER * spacing_m && side.has(y);
-        let slices_m = match side.plane.core(centre_m, sign, self.core_radius * spacing_m) {
-            Some(core) if is_found => self.slices(velocity, core, sign, f64::NEG_INFINITY),
+        let slices_m = match seen.core(|| side.plane.core(centre_m, sign, self.core_radius * spacing_m))? {
+            Some(core) if is_found => self.slices(seen, core, sign, f64::NEG_INFINITY)?,
             _ => vec![[f64::NAN; 2]; self.curl.cell_m[0].len()],
         };
         let [y_spread_m, z_spread_m] = spread(&slices_m);
@@ -262,12 +289,17 @@ impl WakeMeter {
             gamma_5_15_m2_s: mean + missing,
             gamma_m2_s,
             gamma_opposite_m2_s: side.plane.circulation_m2_s(-sign, above),
-            secondary: self.secondary(velocity, side, above),
+            secondary: self.secondary(seen, side, above)?,
             outward_shear_per_s: f64::NAN,
         })
     }
 
-    fn secondary(&self, velocity: &Faces, side: &Side<'_>, above: impl Fn(f64, f64) -> bool) -> SecondaryRecord {
+    fn secondary(
+        &self,
+        seen: &Seen<'_>,
+        side: &Side<'_>,
+        above: impl Fn(f64, f64) -> bool,
+    ) -> Result<SecondaryRecord, Error> {
         let sign = -SIGN[side.own];
         // The layer at the ground has vorticity of the same sign and would draw the centroid down.
         let floor_m = ABOVE_LAYER * self.scales.spacing_m;
@@ -277,42 +309,70 @@ impl WakeMeter {
         let radius_m = self.core_radius * self.scales.spacing_m;
         // The first vortex of the other side has the same sign: a search that slides over to it has found nothing.
         let core_at = |guess_m: [f64; 2]| upper.core(guess_m, sign, radius_m).filter(|core| side.has(core.centre_m[0]));
-        let first = side.plane.strongest_m(sign, &above).and_then(core_at);
+        let first = || side.plane.strongest_m(sign, &above).and_then(core_at);
         // The strongest vorticity may be that of the sheet which the layer sends up: the vortex is then a second maximum.
         let apart = |y_m: f64, z_m: f64, core: &Core| {
             side.plane.lateral_m(core.centre_m[0], y_m).hypot(z_m - core.centre_m[1]) > 2.0 * radius_m
         };
-        let second = first.and_then(|core| {
+        let second = |core: Core| {
             side.plane.strongest_m(sign, |y_m, z_m| above(y_m, z_m) && apart(y_m, z_m, &core)).and_then(core_at)
-        });
+        };
         let size = |core: &Core| core.circulation_m2_s.abs();
-        let found = first.into_iter().chain(second).max_by(|a, b| size(a).total_cmp(&size(b)));
+        let found = seen.core(|| {
+            let first = first();
+            first.into_iter().chain(first.and_then(second)).max_by(|a, b| size(a).total_cmp(&size(b)))
+        })?;
         let least_m2_s = LEAST_SECONDARY * self.scales.circulation_m2_s;
-        match found {
+        Ok(match found {
             Some(core) if core.circulation_m2_s.abs() >= least_m2_s => {
-                let [y_spread_m, z_spread_m] = spread(&self.slices(velocity, core, sign, floor_m));
+                let [y_spread_m, z_spread_m] = spread(&self.slices(seen, core, sign, floor_m)?);
                 let ([y_m, z_m], gamma_m2_s) = (core.centre_m, core.circulation_m2_s);
                 SecondaryRecord { y_m, z_m, y_spread_m, z_spread_m, gamma_m2_s }
             }
             _ => SecondaryRecord::NONE,
-        }
+        })
     }
 
     /// Lateral shear at the ground averaged over x, at the faces of y, and the largest magnitude of the shear anywhere.
-    fn wall_shear(&self, velocity: &Faces) -> (Vec<f64>, f64) {
-        let nx = self.curl.cell_m[0].len();
-        let ny = self.curl.cell_m[1].len();
-        let (mut along, mut across) = (vec![0.0; nx], vec![0.0; nx]);
-        let mut mean = Vec::with_capacity(ny);
-        let mut largest = 0.0_f64;
-        for j in 0..ny {
-            // At the ground w does not vary, so that the vorticity is the shear.
-            self.curl.row(velocity, 0, j, 0, &mut across);
-            self.curl.row(velocity, 1, j, 0, &mut along);
-            mean.push(-across.iter().sum::<f64>() / nx as f64);
-            largest = across.iter().zip(&along).map(|(a, b)| a.hypot(*b)).fold(largest, f64::max);
-        }
-        (mean, largest)
+    fn wall_shear(&self, seen: &Seen<'_>) -> Result<(Vec<f64>, f64), Error> {
+        let (nx, ny) = (self.curl.cell_m[0].len(), self.curl.cell_m[1].len());
+        // The first rank has the lowest planes.
+        let mut found = seen.slabs.of_first(|| {
+            let (mut along, mut across) = (vec![0.0; nx], vec![0.0; nx]);
+            let mut found = Vec::with_capacity(ny + 1);
+            let mut largest = 0.0_f64;
+            for j in 0..ny {
+                // At the ground w does not vary, so that the vorticity is the shear.
+                self.curl.row(&seen.faces, 0, j, 0, &mut across);
+                self.curl.row(&seen.faces, 1, j, 0, &mut along);
+                found.push(-across.iter().sum::<f64>() / nx as f64);
+                largest = across.iter().zip(&along).map(|(a, b)| a.hypot(*b)).fold(largest, f64::max);
+            }
+            found.push(largest);
+            found
+        })?;
+        let largest = found.pop().unwrap_or(f64::NAN);
+        Ok((found, largest))
+    }
+}
+
+/// What this rank has of a flow, and how it asks the others.
+struct Seen<'a> {
+    faces: Faces,
+    slabs: &'a Slabs,
+}
+
+impl Seen<'_> {
+    fn together(&self, own: Vec<f64>) -> Result<Vec<f64>, Error> {
+        if self.slabs.is_alone() { Ok(own) } else { self.slabs.together(&own).map(Cow::into_owned) }
+    }
+
+    /// The core that rank 0 finds: which planes are looked at depends on it.
+    fn core(&self, find: impl FnOnce() -> Option<Core>) -> Result<Option<Core>, Error> {
+        let numbers = |core: Core| vec![core.centre_m[0], core.centre_m[1], core.circulation_m2_s];
+        let found = self.slabs.of_first(|| find().map_or_else(Vec::new, numbers))?;
+        let core = |&[y_m, z_m, circulation_m2_s]: &[f64; 3]| Core { centre_m: [y_m, z_m], circulation_m2_s };
+        Ok(found.first_chunk().map(core))
     }
 }
 

@@ -1,11 +1,13 @@
 //! An analytic pair on a mesh, cost, memory of the meter.
 
 use super::*;
+use crate::ranks::{Single, on_threads};
 use crate::solver::cases::VortexPairCase;
 use crate::solver::mesh::{Direction, Mapping, Wall};
 use crate::solver::settings::{FlowSettings, TimeStep};
 use crate::winds::CirculationProfile;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 const PAIR: [[f64; 2]; 2] = [[-0.5, 1.0], [0.5, 1.0]];
 
@@ -169,4 +171,34 @@ fn records_scale_with_the_pair() {
     close(reduced.enstrophy_m2_s2, record.enstrophy_m2_s2 / 2.25, 1e-9, "enstrophy");
     close(reduced.wall_shear_per_s, record.wall_shear_per_s * 4.0 / 3.0, 1e-9, "shear");
     assert!(meter(&flow).with_window([0.3, 0.2]).is_err());
+}
+
+#[test]
+fn records_on_ranks_have_the_bits_of_one_process_in_every_order_in_memory() {
+    let pair = VortexPairCase { cells: [10, 32, 29], perturbation: 0.1, ..VortexPairCase::coarse() };
+    let case = pair.case(TimeStep::Courant { courant: 0.65, longest_s: 0.1 }).unwrap();
+    for (order, counts) in [(None, &[2, 5, 7][..]), (Some([0, 2, 1]), &[3, 8]), (Some([1, 2, 0]), &[2])] {
+        let records = |ranks: Arc<dyn Ranks>| {
+            let settings = FlowSettings { memory_order: order, ranks, ..case.settings.clone() };
+            let (mut flow, _) = case.initial.start(case.mesh.clone(), settings)?;
+            let mut meter = meter(&flow);
+            let first = meter.measure(&flow)?;
+            flow.step()?;
+            let planes = [flow.cross_plane(0.13)?, flow.mean_cross_plane()?];
+            Ok::<_, Error>((first, meter.measure(&flow)?, planes, bits(&flow.vorticity_magnitude_per_s()?)))
+        };
+        let alone = records(Arc::new(Single)).unwrap();
+        assert!(alone.1.left.slices_m.iter().all(|slice| slice[0] < 0.0), "{:?}", alone.1.left.slices_m);
+        for &count in counts {
+            for (rank, found) in on_threads(count, records).into_iter().enumerate() {
+                let found = found.unwrap().unwrap();
+                // As texts, in which what is missing equals itself.
+                assert_eq!(format!("{found:?}"), format!("{alone:?}"), "rank {rank} of {count}, {order:?}");
+            }
+        }
+    }
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
 }

@@ -5,15 +5,25 @@
 use rayon::prelude::*;
 use realfft::RealFftPlanner;
 
-use super::vorticity::{Curl, Faces};
+use super::vorticity::Curl;
+use crate::Error;
+use crate::solver::planes::Faces;
 
 /// Energy per length of x \[m^4/s^2\] of each axial mode `m = 0..=n/2`, wavelength `L_x/m`, all velocity components together.
-pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Vec<f64> {
-    let [nx, ny] = [curl.cell_m[0].len(), curl.cell_m[1].len()];
+/// `together` gives the numbers of all ranks in their order from those of the planes that are owned.
+///
+/// # Errors
+/// Those of `together`.
+pub(super) fn mode_energies_m4_s2(
+    curl: &Curl,
+    velocity: &Faces,
+    together: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
+) -> Result<Vec<f64>, Error> {
+    let nx = curl.cell_m[0].len();
     let transform = RealFftPlanner::new().plan_fft_forward(nx);
     let modes = nx / 2 + 1;
     let mut energies = vec![0.0; modes];
-    for (component, field) in velocity.iter().enumerate() {
+    for (component, field) in velocity.field.iter().enumerate() {
         let length_m = |d: usize| if component == d { &curl.face_m[d] } else { &curl.cell_m[d] };
         let (y_m, z_m) = (length_m(1), length_m(2));
         let plane = |plane: &[f64]| {
@@ -31,8 +41,9 @@ pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Vec<f64> {
             }
             sums
         };
-        let planes: Vec<Vec<f64>> = field.par_chunks(nx * ny).map(plane).collect();
-        for (sums, z_m) in planes.iter().zip(z_m) {
+        let own = field[velocity.shape.own_places()].par_chunks(velocity.shape.plane());
+        let own: Vec<Vec<f64>> = own.map(plane).collect();
+        for (sums, z_m) in together(own.concat())?.chunks(modes).zip(z_m) {
             for (energy, sum) in energies.iter_mut().zip(sums) {
                 *energy += 0.5 * z_m * sum;
             }
@@ -43,13 +54,14 @@ pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Vec<f64> {
         let pair = if m == 0 || 2 * m == nx { 1.0 } else { 2.0 };
         *energy *= pair / (nx * nx) as f64;
     }
-    energies
+    Ok(energies)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::solver::mesh::{Direction, Mapping, Mesh, Wall};
+    use crate::solver::shape::Shape;
     use std::f64::consts::TAU;
 
     #[test]
@@ -67,7 +79,8 @@ mod tests {
                 .collect();
             let v: Vec<f64> = (0..8 * 16).flat_map(|_| x_m[..nx].iter().map(|x| (TAU * x / 3.0).sin())).collect();
             let w = vec![0.0; u.len()];
-            let energies = mode_energies_m4_s2(&curl, &[u, v, w]);
+            let faces = Faces { shape: Shape::whole([nx, 8, 16]), field: [u, v, w] };
+            let energies = mode_energies_m4_s2(&curl, &faces, Ok).unwrap();
             assert_eq!(energies.len(), nx / 2 + 1);
             // The area is 1; a wave of amplitude a has the energy a^2/4.
             for (m, expected) in [0.5 * 0.49, 0.25, 0.25 * 0.25, 0.0].into_iter().enumerate() {
@@ -78,7 +91,8 @@ mod tests {
         let z = Direction::between(4, 0.0, 1.0, Wall::Slip, Wall::Slip);
         let curl = Curl::new(&Mesh::new(even.clone(), even, z).unwrap()).unwrap();
         let saw: Vec<f64> = (0..64).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
-        let energies = mode_energies_m4_s2(&curl, &[saw, vec![0.0; 64], vec![0.0; 64]]);
+        let faces = Faces { shape: Shape::whole([4; 3]), field: [saw, vec![0.0; 64], vec![0.0; 64]] };
+        let energies = mode_energies_m4_s2(&curl, &faces, Ok).unwrap();
         assert!((energies[2] - 0.5).abs() < 1e-14 && energies[0].abs() < 1e-14, "the shortest wave: {energies:?}");
     }
 }

@@ -5,18 +5,18 @@
 //!
 //! Check: solid rotation and sheared columns; enstrophy against the dissipation of a decaying exact flow.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::slope::Slope;
 use crate::Error;
 use crate::solver::flow::Flow;
 use crate::solver::mesh::{AXIS_NAMES, Ends, Mesh};
+use crate::solver::planes::Faces;
 
 /// Weights of the first faces over those of the trapezoidal rule: 3/8, 7/6, 23/24 for 1/2, 1, 1.
 const GREGORY: [f64; 3] = [0.75, 7.0 / 6.0, 23.0 / 24.0];
-
-/// Velocities at the low faces of the cells, `[z][y][x]` \[m/s\].
-pub(super) type Faces = [Vec<f64>; 3];
 
 /// Operators of the vorticity on one mesh whose x is periodic or one cell and whose z is bounded.
 #[derive(Debug, Clone)]
@@ -98,12 +98,12 @@ impl Curl {
         out: &mut [f64],
     ) {
         let slope = &self.slope[along][component];
-        let field = &velocity[component];
-        let [nx, ny, nz] = self.cells;
+        let field = &velocity.field[component];
+        let [_, ny, nz] = self.cells;
         let row = |j: usize, k: usize| {
             // Walls at the high ends are not stored; nothing flows through them.
             let is_wall = (component == 1 && j == ny) || (component == 2 && k == nz);
-            (!is_wall).then(|| &field[(k * ny + j) * nx..(k * ny + j + 1) * nx])
+            (!is_wall).then(|| &field[velocity.shape.row(j, k)])
         };
         if along == 0 {
             let Some(values) = row(j, k) else { return };
@@ -130,39 +130,53 @@ impl Curl {
         [if c == 1 { self.cells[1] } else { self.faces[1] }, if c == 2 { self.cells[2] } else { self.faces[2] }]
     }
 
-    /// Half the integral of the squared vorticity over the box, per length of x \[m^2/s^2\].
-    pub(super) fn enstrophy_m2_s2(&self, velocity: &Faces) -> f64 {
-        let nx = self.cells[0];
-        (0..3)
-            .map(|c| {
-                let [ny, nz] = self.places(c);
-                let weight = |d: usize| if c == d { &self.cell_m[d] } else { &self.face_m[d] };
-                let (x_m, y_m) = (weight(0), weight(1));
-                let z_m = if c == 2 { &self.cell_m[2] } else { &self.corrected_m };
-                let plane = |k: usize| {
-                    let mut row = vec![0.0; nx];
-                    let mut sum = 0.0;
-                    for (j, y_m) in y_m.iter().enumerate().take(ny) {
-                        self.row(velocity, c, j, k, &mut row);
-                        sum += y_m * row.iter().zip(x_m).map(|(w, x_m)| x_m * w * w).sum::<f64>();
-                    }
-                    sum
-                };
-                // Collected first, so that the order of the sum is that of the planes.
-                let planes: Vec<f64> = (0..nz).into_par_iter().map(plane).collect();
-                0.5 * planes.iter().zip(z_m).map(|(sum, z_m)| sum * z_m).sum::<f64>()
-            })
-            .sum::<f64>()
-            / self.cell_m[0].iter().sum::<f64>()
+    /// The faces across z of the cells in the planes that are owned; the highest one is with the last cells.
+    pub(super) fn own_faces(&self, own: Range<usize>) -> Range<usize> {
+        if own.end == self.cells[2] { own.start..self.faces[2] } else { own }
     }
 
-    /// Magnitude of the vorticity at the centres \[1/s\], `[z][y][x]`: each component is the mean of the four edges about
-    /// the centre.
+    /// Half the integral of the squared vorticity over the box, per length of x \[m^2/s^2\]. `together` gives the numbers of all
+    /// ranks in their order from those of the planes that are owned.
+    ///
+    /// # Errors
+    /// Those of `together`.
+    pub(super) fn enstrophy_m2_s2(
+        &self,
+        velocity: &Faces,
+        together: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
+    ) -> Result<f64, Error> {
+        let nx = self.cells[0];
+        let component = |c: usize| {
+            let [ny, _] = self.places(c);
+            let weight = |d: usize| if c == d { &self.cell_m[d] } else { &self.face_m[d] };
+            let (x_m, y_m) = (weight(0), weight(1));
+            let z_m = if c == 2 { &self.cell_m[2] } else { &self.corrected_m };
+            let plane = |k: usize| {
+                let mut row = vec![0.0; nx];
+                let mut sum = 0.0;
+                for (j, y_m) in y_m.iter().enumerate().take(ny) {
+                    self.row(velocity, c, j, k, &mut row);
+                    sum += y_m * row.iter().zip(x_m).map(|(w, x_m)| x_m * w * w).sum::<f64>();
+                }
+                sum
+            };
+            let own = velocity.shape.own();
+            let own = if c == 2 { own } else { self.own_faces(own) };
+            // Collected first, so that the order of the sum is that of the planes.
+            let planes = together(own.into_par_iter().map(plane).collect())?;
+            Ok(0.5 * planes.iter().zip(z_m).map(|(sum, z_m)| sum * z_m).sum::<f64>())
+        };
+        let components = [component(0)?, component(1)?, component(2)?];
+        Ok(components.iter().sum::<f64>() / self.cell_m[0].iter().sum::<f64>())
+    }
+
+    /// Magnitude of the vorticity at the centres in the planes that are owned \[1/s\], `[z][y][x]`: each component is the mean of
+    /// the four edges about the centre.
     fn magnitude_per_s(&self, velocity: &Faces) -> Vec<f64> {
-        let [nx, ny, nz] = self.cells;
+        let (shape, nx) = (velocity.shape, self.cells[0]);
         let next = |d: usize, i: usize| (i + 1) % self.faces[d];
-        let mut out = vec![0.0; nx * ny * nz];
-        out.par_chunks_mut(nx * ny).enumerate().for_each(|(k, plane)| {
+        let mut out = vec![0.0; shape.own_places().len()];
+        out.par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
             let mut edges = vec![0.0; nx];
             for (j, out) in plane.chunks_mut(nx).enumerate() {
                 let (j_high, k_high) = (next(1, j), next(2, k));
@@ -197,8 +211,16 @@ impl Flow {
     /// # Errors
     /// [`Error::BadDirection`] for other flows.
     pub fn vorticity_magnitude_per_s(&self) -> Result<Vec<f64>, Error> {
-        let velocity = [0, 1, 2].map(|d| self.face_velocity_m_s(d));
-        Ok(Curl::new(self.mesh())?.magnitude_per_s(&velocity))
+        Ok(self.whole(Ok(self.own_vorticity_magnitude_per_s()?)))
+    }
+
+    /// The same in the planes of [`Self::own_planes`].
+    ///
+    /// # Errors
+    /// [`Error::BadDirection`] for other flows, [`Error::RankLost`].
+    pub fn own_vorticity_magnitude_per_s(&self) -> Result<Vec<f64>, Error> {
+        let curl = Curl::new(self.mesh())?;
+        Ok(curl.magnitude_per_s(&self.faces()?))
     }
 }
 
@@ -243,8 +265,7 @@ mod tests {
         }
         // -dE/dt = nu int omega^2 = 2 nu times the enstrophy, between planes without friction.
         let curl = Curl::new(flow.mesh()).unwrap();
-        let velocity = [0, 1, 2].map(|d| flow.face_velocity_m_s(d));
-        let enstrophy = curl.enstrophy_m2_s2(&velocity);
+        let enstrophy = curl.enstrophy_m2_s2(&flow.faces().unwrap(), Ok).unwrap();
         let mut flow = flow;
         let power = flow.step().unwrap().viscous_power_m5_s3 / 2.0;
         assert!((-power / (2.0 * 0.01 * enstrophy) - 1.0).abs() < 1e-4, "{power} for {enstrophy}");
@@ -262,7 +283,7 @@ mod tests {
         let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
         let stream = |[_, y, z]: [f64; 3]| [0.0, (PI * y).sin() * (PI * z).cos(), -(PI * y).cos() * (PI * z).sin()];
         let (flow, _) = Flow::new(mesh, settings, stream).unwrap();
-        let velocity = [0, 1, 2].map(|d| flow.face_velocity_m_s(d));
+        let velocity = flow.faces().unwrap();
         let mut row = [0.0];
         for (j, k) in [(3, 5), (17, 30), (8, 16)] {
             curl.row(&velocity, 0, j, k, &mut row);

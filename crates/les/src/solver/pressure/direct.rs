@@ -196,6 +196,10 @@ impl PressureSolver for Direct {
         solved
     }
 
+    fn spare(&mut self) -> &mut Vec<f64> {
+        self.refinement.spare()
+    }
+
     fn describe(&self) -> String {
         let along = |which: usize| match &self.along[which] {
             Along::Transformed(transform) => transform.name(),

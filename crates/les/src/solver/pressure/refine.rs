@@ -31,6 +31,11 @@ const ROUND_OFF: f64 = 4.0;
 const BALANCED: f64 = 0.01;
 
 impl Refinement {
+    /// A field that is free between solves.
+    pub(crate) fn spare(&mut self) -> &mut Vec<f64> {
+        &mut self.right
+    }
+
     /// Replaces the right side in `field` by the solution, halos included. `solve` replaces a right side of the given norm by a solution of
     /// about the given relative residual; `method` is its name in errors.
     ///

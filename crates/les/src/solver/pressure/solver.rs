@@ -41,6 +41,9 @@ pub(crate) trait PressureSolver: Send + std::fmt::Debug {
     /// found.
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error>;
 
+    /// A field of this solver that is free between its solves.
+    fn spare(&mut self) -> &mut Vec<f64>;
+
     /// The method and what it is made of, for the log.
     fn describe(&self) -> String;
 }

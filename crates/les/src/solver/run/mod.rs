@@ -119,14 +119,10 @@ pub enum RunWarning {
     },
 }
 
-/// Who watches a run. An `Err` with a reason stops it; the last checkpoint stays. Of a run on several ranks the observer of
-/// rank 0 alone is asked; it sees the whole flow.
+/// Who watches a run. An `Err` with a reason stops it; the last checkpoint stays. Of a run on several ranks the observers of all
+/// are asked, for readers of the flow must be called by all; one that fails alone must do so after them. Warnings go to that
+/// of rank 0, which says what checkpoints keep.
 pub trait RunObserver {
-    /// Whether [`Self::step`] looks at the fields of the flow. If not, ranks need not gather them after every step.
-    fn looks_at_steps(&self) -> bool {
-        true
-    }
-
     /// After every step.
     ///
     /// # Errors
@@ -186,8 +182,6 @@ pub struct Stepping {
 #[derive(Debug)]
 pub struct Run {
     flow: Flow,
-    /// Of a flow on several ranks what observers see, on rank 0.
-    whole: Option<Flow>,
     plan: RunPlan,
     /// The budget of the last step, which waits for the powers at its end: those at its start.
     open: Option<EnergyBudget>,
@@ -237,7 +231,7 @@ impl Run {
 
     fn with(flow: Flow, plan: RunPlan, open: Option<EnergyBudget>, energy: EnergyBound, is_fresh: bool) -> Self {
         let (has_warned, stepping) = Default::default();
-        Self { flow, whole: None, plan, open, energy, has_warned, is_fresh, stepping }
+        Self { flow, plan, open, energy, has_warned, is_fresh, stepping }
     }
 
     /// The simulation, or the part that this rank has.
@@ -266,8 +260,6 @@ impl Run {
         let given = |&t: &f64| if self.is_fresh { t < start_s } else { self.is_reached(t) };
         let mut next_output = self.plan.output_times_s.iter().take_while(|t| given(t)).count();
         self.is_fresh = false;
-        let looks = self.flow.layout.slabs.is_first() && observer.looks_at_steps();
-        let [looks] = self.flow.layout.slabs.largest([f64::from(u8::from(looks))])?;
         self.give_outputs(&mut next_output, observer)?;
         while !self.is_reached(end_s) {
             if self.plan.pause_after_steps.is_some_and(|steps| self.flow.steps() >= steps) {
@@ -287,7 +279,7 @@ impl Run {
             }
             self.warn(&report, observer);
             let record = self.record(report, energy)?;
-            self.show(looks > 0.0, |flow| observer.step(flow, &record))?;
+            self.agree(observer.step(&self.flow, &record))?;
             self.energy.pass(&self.flow, energy, report.step_s)?;
             self.give_outputs(&mut next_output, observer)?;
             if self.checkpoint_is_due(before_s, &report) {
@@ -305,18 +297,17 @@ impl Run {
 
     fn give_outputs(&mut self, next: &mut usize, observer: &mut dyn RunObserver) -> Result<(), Error> {
         while self.plan.output_times_s.get(*next).is_some_and(|&t| self.is_reached(t)) {
-            self.show(true, |flow| observer.output(flow, *next))?;
+            self.agree(observer.output(&self.flow, *next))?;
             *next += 1;
         }
         Ok(())
     }
 
-    /// Shows the flow to who watches it on rank 0; what stops that stops all ranks.
-    fn show(&mut self, fields: bool, look: impl FnOnce(&Flow) -> Result<(), String>) -> Result<(), Error> {
-        let Self { flow, whole, .. } = self;
-        flow.show(whole, fields)?;
+    /// What stops one rank stops all.
+    fn agree(&self, seen: Result<(), String>) -> Result<(), Error> {
+        let flow = &self.flow;
         let stopped = |reason| Error::Stopped { step: flow.steps(), time_s: flow.time_s(), reason };
-        flow.layout.slabs.agree(flow.seen(whole).map_or(Ok(()), look).map_err(stopped))
+        flow.layout.slabs.agree(seen.map_err(stopped))
     }
 
     /// Tells who watches, once for all ranks.

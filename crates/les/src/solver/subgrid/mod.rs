@@ -23,7 +23,7 @@
 //! 150 steps; a step short enough gave the same noise and, to 5e-5, the same energy as the cut.
 //!
 //! Where no model is asked for there is none: no arrays, no work. A model takes 4 arrays of the size of the mesh, the multiscale
-//! one 6.
+//! one 5.
 //!
 //! Check: closed forms, laminar flows, walls, vortices, the energy identity, bits against threads.
 
@@ -89,8 +89,8 @@ impl SubgridModel {
 pub(crate) struct Lent<'a> {
     /// Gets the acceleration by the stresses whose divergence is taken in planes \[m/s^2\].
     pub(crate) in_plane: &'a mut [Vec<f64>; 3],
-    /// Gets small scales of the first component.
-    pub(crate) small: &'a mut Vec<f64>,
+    /// Get small scales of the first two components; made if they are not there.
+    pub(crate) small: [&'a mut Vec<f64>; 2],
 }
 
 /// A subgrid model at work on one mesh.
@@ -98,8 +98,8 @@ pub(crate) struct Lent<'a> {
 pub(crate) struct Subgrid {
     formula: Formula,
     operators: Operators,
-    /// The filter and the small scales of the multiscale model, but for those of the first component.
-    small: Option<(Filter, [Vec<f64>; 2])>,
+    /// The filter of the multiscale model, and the small scales of the last component.
+    small: Option<(Filter, Vec<f64>)>,
     /// At the centres \[m^2/s\].
     viscosity: Vec<f64>,
     largest: Largest,
@@ -115,11 +115,10 @@ impl Subgrid {
     pub(crate) fn new(layout: &Layout, model: SubgridModel) -> Result<Option<Self>, Error> {
         let Some((formula, order)) = formula_and_order(model)? else { return Ok(None) };
         let cells = layout.shape.len();
-        let fields = || [vec![0.0; cells], vec![0.0; cells]];
         Ok(Some(Self {
             formula,
             operators: Operators::new(layout),
-            small: order.map(|order| (Filter::new(layout, order), fields())),
+            small: order.map(|order| (Filter::new(layout, order), vec![0.0; cells])),
             viscosity: vec![0.0; cells],
             largest: Largest::default(),
             stress: Stress::new(cells),
@@ -139,8 +138,11 @@ impl Subgrid {
         let [viscosity_m2_s, decay_per_s] = slabs.largest([largest.viscosity_m2_s, largest.decay_per_s])?;
         self.largest = Largest { viscosity_m2_s, decay_per_s };
         let strained = match small {
-            Some((filter, [second, third])) => {
-                let mut small = [lent.small.as_mut_slice(), second, third];
+            Some((filter, third)) => {
+                let [first, second] = lent.small;
+                first.resize(third.len(), 0.0);
+                second.resize(third.len(), 0.0);
+                let mut small = [first.as_mut_slice(), second, third];
                 filter.small_scales(velocity_m_s, &mut small);
                 let [a, b, c] = small;
                 slabs.halos(&mut [viscosity, &mut *a, &mut *b, &mut *c])?;
@@ -170,11 +172,6 @@ impl Subgrid {
     /// Largest decay rate of the shortest waves by the eddy viscosity, before it was cut \[1/s\].
     pub(crate) fn max_decay_per_s(&self) -> f64 {
         self.largest.decay_per_s
-    }
-
-    /// Takes an eddy viscosity from elsewhere, to be shown.
-    pub(crate) fn set_viscosity(&mut self, viscosity_m2_s: Vec<f64>) {
-        self.viscosity = viscosity_m2_s;
     }
 
     /// Eddy viscosity at the centres, in the order of memory \[m^2/s\].

@@ -180,7 +180,7 @@ impl WakeFlow {
         let meter = pair.meter(&scales).and_then(|meter| meter.with_window(window)).map_err(Error::Flow)?;
         let Case { mesh, settings, initial, end_s } =
             pair.scaled(&scales, VortexPairCase::steps(LONGEST_STEP * unit_s)).map_err(Error::Flow)?;
-        let wake = Some(WakeSetup { meter, scales });
+        let wake = Some(WakeSetup { meter, scales, core_radius_m: self.core_radius * scales.spacing_m });
         Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0 / unit_s, wake, undamped: None })
     }
 }

@@ -162,11 +162,18 @@ pub(in super::super) struct WakeRun {
     rows: Vec<Vec<f64>>,
     folder: PathBuf,
     origin: Provenance,
+    /// Of several ranks, which measure together, the first one writes.
+    writes: bool,
 }
 
 impl WakeRun {
     /// An empty history of flows on the mesh of `flow`.
-    pub(in super::super) fn new(meter: WakeMeter, flow: &Flow, folder: PathBuf, origin: Provenance) -> Self {
+    pub(in super::super) fn new(
+        meter: WakeMeter,
+        flow: &Flow,
+        (folder, origin): (PathBuf, Provenance),
+        writes: bool,
+    ) -> Self {
         let (scales, radius_m, x_m) = (*meter.scales(), meter.radii_m(), flow.mesh().centre_m(0));
         let lengths = Lengths { radii: radius_m.len(), slices: x_m.len(), modes: x_m.len() / 2 + 1 };
         Self {
@@ -179,6 +186,7 @@ impl WakeRun {
             rows: Vec::new(),
             folder,
             origin,
+            writes,
         }
     }
 
@@ -201,12 +209,12 @@ impl WakeRun {
         state.iter().chain(self.rows.iter().flatten()).flat_map(|x| x.to_le_bytes()).collect()
     }
 
-    /// Measures the flow and writes the table anew.
+    /// Measures the flow, for which all ranks must ask together, and writes the table anew.
     pub(in super::super) fn record(&mut self, flow: &Flow) -> Result<(), Error> {
         let record = self.meter.measure(flow).map_err(Error::Flow)?;
         let row = self.row(&record);
         self.rows.push(row);
-        self.write_table()
+        if self.writes { self.write_table() } else { Ok(()) }
     }
 
     /// The files of the history.
@@ -216,6 +224,9 @@ impl WakeRun {
 
     /// Writes the files of the whole history.
     pub(in super::super) fn finish(&self) -> Result<(), Error> {
+        if !self.writes {
+            return Ok(());
+        }
         self.write_table()?;
         #[cfg(feature = "netcdf")]
         write_atomic(&self.folder.join(NETCDF), self.netcdf()?)?;

@@ -186,6 +186,10 @@ impl PressureSolver for Multigrid {
         solved
     }
 
+    fn spare(&mut self) -> &mut Vec<f64> {
+        self.refinement.spare()
+    }
+
     fn describe(&self) -> String {
         let [x, y, z] = self.direction.map(|d| AXIS_NAMES[d]);
         format!("multigrid: {x} {}, {} meshes in {y} and {z}", self.rows.name(), self.hierarchy.depth())

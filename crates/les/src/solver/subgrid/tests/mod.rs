@@ -17,8 +17,8 @@ struct Modelled {
     velocity: [Vec<f64>; 3],
     model: Subgrid,
     in_plane: [Vec<f64>; 3],
-    /// Small scales of the first component.
-    small: Vec<f64>,
+    /// Small scales of the first two components.
+    small: [Vec<f64>; 2],
 }
 
 impl Modelled {
@@ -29,21 +29,22 @@ impl Modelled {
         let layout = Layout::new(&mesh, Some([0, 1, 2]));
         let velocity = faces(&mesh, &layout, field);
         let model = Subgrid::new(&layout, model).unwrap().unwrap();
-        let small = vec![0.0; layout.shape.len()];
-        let in_plane = [small.clone(), small.clone(), small.clone()];
+        let field = || vec![0.0; layout.shape.len()];
+        let (small, in_plane) = ([field(), field()], [field(), field(), field()]);
         let mut modelled = Self { mesh, layout, velocity, model, in_plane, small };
         modelled.update(f64::INFINITY);
         modelled
     }
 
     fn update(&mut self, limit_per_s: f64) {
-        let lent = Lent { in_plane: &mut self.in_plane, small: &mut self.small };
+        let lent = Lent { in_plane: &mut self.in_plane, small: self.small.each_mut() };
         self.model.update(self.velocity.each_ref().map(Vec::as_slice), limit_per_s, lent).unwrap();
     }
 
     /// The small scales of the multiscale model.
     fn small(&self) -> Option<[Vec<f64>; 3]> {
-        self.model.small.as_ref().map(|(_, [second, third])| [self.small.clone(), second.clone(), third.clone()])
+        let [first, second] = &self.small;
+        self.model.small.as_ref().map(|(_, third)| [first.clone(), second.clone(), third.clone()])
     }
 
     fn index(&self, place: usize) -> [usize; 3] {

@@ -1,0 +1,154 @@
+//! Fields as they are measured and written: planes across z in the order `[z][y][x]`, whatever their order in memory.
+//!
+//! Of a flow on several ranks each has some of these planes, with halos about them. Where z is the last direction in memory
+//! they are those that it owns, and nothing is exchanged; otherwise all give all what they need.
+//!
+//! Check: fields on ranks against those of one process, every order in memory, fewer planes across z than ranks.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::flow::Flow;
+use super::layout::{Layout, Shape};
+use crate::Error;
+use crate::ranks::Ranks;
+
+/// Velocity at the low faces of the cells \[m/s\] in the planes across z that a rank measures, halos included.
+#[derive(Debug, Clone)]
+pub(crate) struct Faces {
+    pub(crate) shape: Shape,
+    pub(crate) field: [Vec<f64>; 3],
+}
+
+impl Flow {
+    /// The planes across z that this rank measures and writes; all of them in one process.
+    pub(crate) fn shown(&self) -> Shape {
+        let ranks = &self.layout.slabs.ranks;
+        Shape::slab(self.mesh.cells(), ranks.rank(), ranks.count())
+    }
+
+    /// Velocity at the faces in these planes.
+    ///
+    /// # Errors
+    /// Those of [`Ranks::turn`].
+    pub(crate) fn faces(&self) -> Result<Faces, Error> {
+        Ok(Faces { shape: self.shown(), field: [self.face(0)?, self.face(1)?, self.face(2)?] })
+    }
+
+    /// One component of it.
+    ///
+    /// # Errors
+    /// Those of [`Ranks::turn`].
+    pub(crate) fn face(&self, direction: usize) -> Result<Vec<f64>, Error> {
+        self.in_planes(&self.state.velocity[self.layout.axis_of(direction)])
+    }
+
+    /// A field of this rank, whose halos are up to date, in the planes that it shows, halos included.
+    ///
+    /// # Errors
+    /// Those of [`Ranks::turn`].
+    pub(crate) fn in_planes(&self, field: &[f64]) -> Result<Vec<f64>, Error> {
+        in_planes(&self.layout, self.shown(), field)
+    }
+}
+
+/// The planes of `shown` without its halos.
+pub(crate) fn without_halos(shown: Shape, mut planes: Vec<f64>) -> Vec<f64> {
+    let own = shown.own_places();
+    planes.truncate(own.end);
+    planes.drain(..own.start);
+    planes
+}
+
+fn in_planes(layout: &Layout, shown: Shape, field: &[f64]) -> Result<Vec<f64>, Error> {
+    let [nx, ny, _] = shown.n;
+    let place = |at: [usize; 3]| layout.shape.place(layout.direction.map(|d| at[d]));
+    let mut out = vec![0.0; shown.len()];
+    if layout.direction[2] == 2 || layout.slabs.is_alone() {
+        let held: Vec<usize> = shown.held().collect();
+        out.par_chunks_mut(nx * ny).zip(held).for_each(|(plane, k)| {
+            for (j, row) in plane.chunks_mut(nx).enumerate() {
+                row.iter_mut().enumerate().for_each(|(i, value)| *value = field[place([i, j, k])]);
+            }
+        });
+        return Ok(out);
+    }
+    let (ranks, cut) = (&layout.slabs.ranks, layout.direction[2]);
+    let count = ranks.count();
+    // What a rank has of a plane: some columns, or some rows.
+    let piece = |rank: usize, k: usize| {
+        let part = layout.shape.planes_of(rank, count);
+        let of = |d: usize, cells: usize| if d == cut { part.clone() } else { 0..cells };
+        let (columns, rows): (Range<usize>, Range<usize>) = (of(0, nx), of(1, ny));
+        rows.flat_map(move |j| columns.clone().map(move |i| [i, j, k]))
+    };
+    let pieces = |rank: usize, shape: Shape| shape.held().flat_map(move |k| piece(rank, k));
+    let size = |rank: usize, shape: Shape| shape.len() / shown.n[cut] * layout.shape.planes_of(rank, count).len();
+    let of_rank = |rank: usize| Shape::slab(shown.n, rank, count);
+    let to: Vec<usize> = (0..count).map(|rank| size(ranks.rank(), of_rank(rank))).collect();
+    let from: Vec<usize> = (0..count).map(|rank| size(rank, shown)).collect();
+    let mut send = Vec::with_capacity(to.iter().sum());
+    for rank in 0..count {
+        send.extend(pieces(ranks.rank(), of_rank(rank)).map(|at| field[place(at)]));
+    }
+    let mut came = vec![0.0; from.iter().sum()];
+    ranks.turn(&send, &to, &mut came, &from)?;
+    for (at, value) in (0..count).flat_map(|rank| pieces(rank, shown)).zip(came) {
+        out[shown.place(at)] = value;
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cases::taylor_green_3d;
+    use super::super::mesh::{Direction, Mesh};
+    use super::super::settings::{FlowSettings, TimeStep};
+    use super::*;
+    use crate::ranks::on_threads;
+
+    #[test]
+    fn planes_and_their_halos_are_those_of_one_process_in_every_order_in_memory() {
+        let case = taylor_green_3d(16, 100.0).unwrap();
+        let flat =
+            Mesh::new(Direction::periodic(24, 0.0, 1.0), Direction::periodic(28, 0.0, 1.0), Direction::thin(0.1))
+                .unwrap();
+        let orders = [[0, 1, 2], [1, 0, 2], [0, 2, 1], [2, 0, 1], [1, 2, 0]];
+        for (mesh, orders) in [(case.mesh, &orders[..]), (flat, &orders[2..])] {
+            let field = |[x, y, z]: [f64; 3]| [(7.0 * x + z).sin(), (5.0 * y - x).cos(), (3.0 * z + 2.0 * y).sin()];
+            let start = |ranks, order| {
+                let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
+                let settings = FlowSettings { memory_order: Some(order), ranks, ..settings };
+                Flow::new(mesh.clone(), settings, field).unwrap().0
+            };
+            for &order in orders {
+                let alone = start(std::sync::Arc::new(crate::ranks::Single), order);
+                let (whole, centred) = (alone.faces().unwrap(), alone.own_centre_velocity_m_s(2).unwrap());
+                assert!(whole.field.iter().flatten().any(|value| *value != 0.0));
+                for count in [2, 3, 4] {
+                    let found = on_threads(count, |ranks| {
+                        let flow = start(ranks, order);
+                        let faces = flow.faces().unwrap();
+                        for (d, field) in faces.field.iter().enumerate() {
+                            for k in faces.shape.held() {
+                                let row = faces.shape.row(3, k);
+                                assert_eq!(
+                                    field[row],
+                                    whole.field[d][whole.shape.row(3, k)],
+                                    "{order:?}, {count}, {k}"
+                                );
+                            }
+                        }
+                        assert_eq!(flow.centre_velocity_m_s(2), centred);
+                        (flow.own_planes(), flow.own_centre_velocity_m_s(2).unwrap().len())
+                    });
+                    let [nx, ny, nz] = mesh.cells();
+                    let planes: usize = found.iter().flatten().map(|(planes, _)| planes.len()).sum();
+                    let values: usize = found.iter().flatten().map(|(_, values)| values).sum();
+                    assert_eq!((planes, values), (nz, nx * ny * nz), "{order:?}, {count} ranks");
+                }
+            }
+        }
+    }
+}
