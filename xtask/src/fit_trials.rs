@@ -4,8 +4,10 @@
 //! fitted or the true one, and once more from the truth on. Each row has its standard error; one thread tells the processor time.
 
 use crate::cost::measured;
-use crate::trials::fits::FitTrial;
+use crate::trials::fits::{FitTrial, RADIUS_M};
+use crate::trials::map_bound::{MapBound, MapSetting};
 use crate::{Failure, Outcome};
+use fixtures::WINDOW;
 use fixtures::pair::{PairCase, PairScan};
 use ndarray::Array2;
 use wakescope_estimate::Error;
@@ -41,6 +43,12 @@ pub(crate) struct Options {
     /// Fit no more maps than the signals need to start from: that with the core kept.
     #[arg(long, conflicts_with = "maps_only")]
     signals_only: bool,
+    /// Fit nothing: state what velocities of such maps could tell at best, alone and with the widths of their spectra.
+    #[arg(long, conflicts_with_all = ["maps_only", "signals_only", "known_core"])]
+    map_bound: bool,
+    /// Radius of the regions of the maps whose bound is stated, m.
+    #[arg(long, default_value_t = RADIUS_M, requires = "map_bound")]
+    radius_m: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -124,6 +132,64 @@ impl Fits {
     }
 }
 
+/// What a map tells of the circulation at best, beside the bound of the signals.
+fn show_map_bound(options: &Options, pair: &PairScan, truth: &Wake, circulation: Sharing) -> Outcome {
+    let setup = pair.setup()?;
+    let setting = MapSetting {
+        model: setup.wake,
+        sampling: pair.sampling,
+        window: WINDOW,
+        sigma_s: pair.sigma_s(),
+        snr: pair.snr,
+        noise: setup.noise,
+        radius_m: options.radius_m,
+        elevation_rad: &pair.elevation_rad,
+        range_m: &pair.range_m,
+    };
+    let (model, map) = (ScanModel::new(&setup, |_, _| pair.snr, truth)?, MapBound::new(&setting, truth)?);
+    let strongest = Parameter::LeftCirculation as usize;
+    let truth_m2_s = truth.to_array()[strongest];
+    let show = |name: &str, deviation: f64| {
+        println!("  {name:<56} {deviation:6.2} m^2/s, {:.2} %", 100.0 * deviation / truth_m2_s);
+    };
+    for (name, core_radius) in [("one core radius free", Sharing::Common), ("core known", Sharing::Fixed)] {
+        println!("left circulation, {name}:");
+        let free = FreeParameters { circulation, core_radius, ..Default::default() };
+        let bound = model.bound(truth, Powers::default(), &free, true)?;
+        show("all signals, Cramer-Rao bound", bound[[strongest; 2]].sqrt());
+        let groups = groups(circulation, core_radius);
+        for (what, widths) in [("velocities", false), ("velocities and widths", true)] {
+            let found = map.deviations(&groups, widths).ok_or_else(|| {
+                Failure::new("a free number does not show in the map, or its covariance is singular".to_owned())
+            })?;
+            show(&format!("{what} of the map, weights of their covariance"), found.best[0]);
+            show(&format!("{what} of the map, weights of their variances"), found.by_variance[0]);
+        }
+    }
+    Ok(())
+}
+
+/// Places of the parameters that each free number moves, circulations first.
+fn groups(circulation: Sharing, core_radius: Sharing) -> Vec<Vec<usize>> {
+    let shared = |a: Parameter, b: Parameter, sharing| match sharing {
+        Sharing::Common => vec![vec![a as usize, b as usize]],
+        Sharing::Separate => vec![vec![a as usize], vec![b as usize]],
+        Sharing::Fixed => Vec::new(),
+    };
+    let mut groups = shared(Parameter::LeftCirculation, Parameter::RightCirculation, circulation);
+    groups.extend(shared(Parameter::LeftCore, Parameter::RightCore, core_radius));
+    let alone = [
+        Parameter::LeftLateral,
+        Parameter::LeftHeight,
+        Parameter::RightLateral,
+        Parameter::RightHeight,
+        Parameter::Wind,
+        Parameter::Shear,
+    ];
+    groups.extend(alone.map(|parameter| vec![parameter as usize]));
+    groups
+}
+
 pub(crate) fn run(options: &Options) -> Outcome {
     let (case, circulation) = match options.case {
         Case::Figures => (PairCase::FIGURES, Sharing::Common),
@@ -133,6 +199,9 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let truth = case.truth();
     let pair =
         PairScan::of(&case, NoiseModel::BandLimited, (200e-9, options.snr_db), options.gate_step.into(), options.seed)?;
+    if options.map_bound {
+        return show_map_bound(options, &pair, &truth, circulation);
+    }
     let free = |core_radius| FreeParameters { circulation, core_radius, ..Default::default() };
     let of_signals = free(if options.known_core { Sharing::Fixed } else { Sharing::Common });
     let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth)?;
