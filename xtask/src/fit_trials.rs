@@ -43,11 +43,14 @@ pub(crate) struct Options {
     /// Fit no more maps than the signals need to start from: that with the core kept.
     #[arg(long, conflicts_with = "maps_only")]
     signals_only: bool,
+    /// State how wide the likelihood of each scan is in the heights, beside the bound that holds its mean curvature.
+    #[arg(long, conflicts_with = "maps_only")]
+    widths: bool,
     /// Fit nothing: state what velocities of such maps could tell at best, alone and with the widths of their spectra.
-    #[arg(long, conflicts_with_all = ["maps_only", "signals_only", "known_core"])]
+    #[arg(long, conflicts_with_all = ["maps_only", "signals_only", "known_core", "widths"])]
     map_bound: bool,
-    /// Radius of the regions of the maps whose bound is stated, m.
-    #[arg(long, default_value_t = RADIUS_M, requires = "map_bound")]
+    /// Radius of the regions of the maps, m.
+    #[arg(long, default_value_t = RADIUS_M)]
     radius_m: f64,
 }
 
@@ -71,6 +74,9 @@ const TOLD: [(&str, Parameter); 7] = [
     ("right height, m", Parameter::RightHeight),
     ("core radius, m", Parameter::LeftCore),
 ];
+
+/// Whose likelihood is looked at scan by scan.
+const HEIGHTS: [Parameter; 2] = [Parameter::LeftHeight, Parameter::RightHeight];
 
 /// Fits of one kind over the scans.
 #[derive(Default)]
@@ -211,8 +217,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
         [Fits::of("map, core kept"), Fits::of("map, core about the typical one"), Fits::of("map, core fitted freely")];
     let mut signals = [Fits::of("signals"), Fits::of("signals, started at the truth")];
     let mut below = Vec::new();
+    let mut widths = HEIGHTS.map(|_| Vec::new());
+    let groups = groups(circulation, if options.known_core { Sharing::Fixed } else { Sharing::Common });
     for scan in 0..options.scans as usize {
-        let trial = FitTrial::new(&pair, scan)?;
+        let trial = FitTrial::new(&pair, scan, options.radius_m)?;
         let mut guess = None;
         let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
         for (fits, (core, prior)) in maps.iter_mut().zip(cores).take(if options.signals_only { 1 } else { 3 }) {
@@ -230,6 +238,11 @@ pub(crate) fn run(options: &Options) -> Outcome {
             Ok(signals[place].keep(scan, (fit, cost.cpu_s), |fit: &SignalFit| (fit.wake, &fit.covariance)))
         };
         let (found, at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?);
+        if let (true, Some(found)) = (options.widths, &found) {
+            for (widths, parameter) in widths.iter_mut().zip(HEIGHTS) {
+                widths.extend(trial.width(&model, found, parameter as usize, (&covariance, &groups))?);
+            }
+        }
         if let (Some(found), Some(at_truth)) = (found, at_truth) {
             let less = at_truth.log_likelihood - found.log_likelihood;
             let off = |place: usize| (found.wake.to_array()[place] - truth.to_array()[place]) / bound[place];
@@ -245,6 +258,22 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
     }
     maps.iter().chain(&signals).filter(|fits| fits.found.len() > 1).for_each(|fits| fits.show(&truth, &bound));
+    for ((name, widths), parameter) in ["left", "right"].into_iter().zip(&widths).zip(HEIGHTS) {
+        let n = widths.len() as f64;
+        let over: Vec<f64> = widths.iter().map(|width| width / bound[parameter as usize]).collect();
+        let squares: Vec<f64> = over.iter().map(|o| o * o).collect();
+        let mean = squares.iter().sum::<f64>() / n;
+        let error = (squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+        if n > 1.0 {
+            println!(
+                "posterior of the {name} height: {:.2} +- {:.2} of the bound, from {:.2} to {:.2} by scan",
+                mean.sqrt(),
+                0.5 * error / mean.sqrt(),
+                over.iter().copied().fold(f64::INFINITY, f64::min),
+                over.iter().copied().fold(0.0, f64::max),
+            );
+        }
+    }
     if !below.is_empty() {
         let lower = below.iter().filter(|less| **less > 0.1).count();
         let most = below.iter().fold(f64::NEG_INFINITY, |most, less| most.max(*less));

@@ -80,11 +80,11 @@ impl Banded {
                 let place = |row: usize, column: usize| row * stride + self.width + column - row;
                 let sum = self.values[place(i, j)]
                     - dot(&self.values[place(i, from)..place(i, j)], &self.values[place(j, from)..place(j, j)]);
-                // also false for NaN
-                if i == j && !(sum > 0.0) {
+                let value = if i == j { sum.sqrt() } else { sum / self.values[place(j, j)] };
+                // the root of a pivot that is not positive is no number, or zero
+                if i == j && (value.is_nan() || value == 0.0) {
                     return None;
                 }
-                let value = if i == j { sum.sqrt() } else { sum / self.values[place(j, j)] };
                 self.values[i * stride + self.width + j - i] = value;
             }
         }

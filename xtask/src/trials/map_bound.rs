@@ -413,12 +413,12 @@ fn cholesky(mut a: Array2<C64>) -> Option<Array2<C64>> {
             let sum: C64 = (0..j).map(|k| a[[i, k]] * a[[j, k]].conj()).sum();
             a[[i, j]] -= sum;
         }
-        let pivot = a[[j, j]].re;
-        // also false for NaN
-        if !(pivot > 0.0) {
+        // the root of a pivot that is not positive is no number, or zero
+        let root = a[[j, j]].re.sqrt();
+        if root.is_nan() || root == 0.0 {
             return None;
         }
-        (j..n).for_each(|i| a[[i, j]] /= pivot.sqrt());
+        (j..n).for_each(|i| a[[i, j]] /= root);
         (0..j).for_each(|i| a[[i, j]] = C64::ZERO);
     }
     Some(a)
