@@ -4,8 +4,10 @@
 //! fitted or the true one, and once more from the truth on. Each row has its standard error; one thread tells the processor time.
 
 use crate::cost::measured;
-use crate::trials::fits::FitTrial;
+use crate::trials::fits::{FitTrial, RADIUS_M};
+use crate::trials::map_bound::{MapBound, MapSetting};
 use crate::{Failure, Outcome};
+use fixtures::WINDOW;
 use fixtures::pair::{PairCase, PairScan};
 use ndarray::Array2;
 use wakescope_estimate::Error;
@@ -41,6 +43,15 @@ pub(crate) struct Options {
     /// Fit no more maps than the signals need to start from: that with the core kept.
     #[arg(long, conflicts_with = "maps_only")]
     signals_only: bool,
+    /// State how wide the likelihood of each scan is in the heights, beside the bound that holds its mean curvature.
+    #[arg(long, conflicts_with = "maps_only")]
+    widths: bool,
+    /// Fit nothing: state what velocities of such maps could tell at best, alone and with the widths of their spectra.
+    #[arg(long, conflicts_with_all = ["maps_only", "signals_only", "known_core", "widths"])]
+    map_bound: bool,
+    /// Radius of the regions of the maps, m.
+    #[arg(long, default_value_t = RADIUS_M)]
+    radius_m: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -63,6 +74,9 @@ const TOLD: [(&str, Parameter); 7] = [
     ("right height, m", Parameter::RightHeight),
     ("core radius, m", Parameter::LeftCore),
 ];
+
+/// Whose likelihood is looked at scan by scan.
+const HEIGHTS: [Parameter; 2] = [Parameter::LeftHeight, Parameter::RightHeight];
 
 /// Fits of one kind over the scans.
 #[derive(Default)]
@@ -124,6 +138,64 @@ impl Fits {
     }
 }
 
+/// What a map tells of the circulation at best, beside the bound of the signals.
+fn show_map_bound(options: &Options, pair: &PairScan, truth: &Wake, circulation: Sharing) -> Outcome {
+    let setup = pair.setup()?;
+    let setting = MapSetting {
+        model: setup.wake,
+        sampling: pair.sampling,
+        window: WINDOW,
+        sigma_s: pair.sigma_s(),
+        snr: pair.snr,
+        noise: setup.noise,
+        radius_m: options.radius_m,
+        elevation_rad: &pair.elevation_rad,
+        range_m: &pair.range_m,
+    };
+    let (model, map) = (ScanModel::new(&setup, |_, _| pair.snr, truth)?, MapBound::new(&setting, truth)?);
+    let strongest = Parameter::LeftCirculation as usize;
+    let truth_m2_s = truth.to_array()[strongest];
+    let show = |name: &str, deviation: f64| {
+        println!("  {name:<56} {deviation:6.2} m^2/s, {:.2} %", 100.0 * deviation / truth_m2_s);
+    };
+    for (name, core_radius) in [("one core radius free", Sharing::Common), ("core known", Sharing::Fixed)] {
+        println!("left circulation, {name}:");
+        let free = FreeParameters { circulation, core_radius, ..Default::default() };
+        let bound = model.bound(truth, Powers::default(), &free, true)?;
+        show("all signals, Cramer-Rao bound", bound[[strongest; 2]].sqrt());
+        let groups = groups(circulation, core_radius);
+        for (what, widths) in [("velocities", false), ("velocities and widths", true)] {
+            let found = map.deviations(&groups, widths).ok_or_else(|| {
+                Failure::new("a free number does not show in the map, or its covariance is singular".to_owned())
+            })?;
+            show(&format!("{what} of the map, weights of their covariance"), found.best[0]);
+            show(&format!("{what} of the map, weights of their variances"), found.by_variance[0]);
+        }
+    }
+    Ok(())
+}
+
+/// Places of the parameters that each free number moves, circulations first.
+fn groups(circulation: Sharing, core_radius: Sharing) -> Vec<Vec<usize>> {
+    let shared = |a: Parameter, b: Parameter, sharing| match sharing {
+        Sharing::Common => vec![vec![a as usize, b as usize]],
+        Sharing::Separate => vec![vec![a as usize], vec![b as usize]],
+        Sharing::Fixed => Vec::new(),
+    };
+    let mut groups = shared(Parameter::LeftCirculation, Parameter::RightCirculation, circulation);
+    groups.extend(shared(Parameter::LeftCore, Parameter::RightCore, core_radius));
+    let alone = [
+        Parameter::LeftLateral,
+        Parameter::LeftHeight,
+        Parameter::RightLateral,
+        Parameter::RightHeight,
+        Parameter::Wind,
+        Parameter::Shear,
+    ];
+    groups.extend(alone.map(|parameter| vec![parameter as usize]));
+    groups
+}
+
 pub(crate) fn run(options: &Options) -> Outcome {
     let (case, circulation) = match options.case {
         Case::Figures => (PairCase::FIGURES, Sharing::Common),
@@ -133,6 +205,9 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let truth = case.truth();
     let pair =
         PairScan::of(&case, NoiseModel::BandLimited, (200e-9, options.snr_db), options.gate_step.into(), options.seed)?;
+    if options.map_bound {
+        return show_map_bound(options, &pair, &truth, circulation);
+    }
     let free = |core_radius| FreeParameters { circulation, core_radius, ..Default::default() };
     let of_signals = free(if options.known_core { Sharing::Fixed } else { Sharing::Common });
     let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth)?;
@@ -142,8 +217,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
         [Fits::of("map, core kept"), Fits::of("map, core about the typical one"), Fits::of("map, core fitted freely")];
     let mut signals = [Fits::of("signals"), Fits::of("signals, started at the truth")];
     let mut below = Vec::new();
+    let mut widths = HEIGHTS.map(|_| Vec::new());
+    let groups = groups(circulation, if options.known_core { Sharing::Fixed } else { Sharing::Common });
     for scan in 0..options.scans as usize {
-        let trial = FitTrial::new(&pair, scan)?;
+        let trial = FitTrial::new(&pair, scan, options.radius_m)?;
         let mut guess = None;
         let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
         for (fits, (core, prior)) in maps.iter_mut().zip(cores).take(if options.signals_only { 1 } else { 3 }) {
@@ -161,6 +238,11 @@ pub(crate) fn run(options: &Options) -> Outcome {
             Ok(signals[place].keep(scan, (fit, cost.cpu_s), |fit: &SignalFit| (fit.wake, &fit.covariance)))
         };
         let (found, at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?);
+        if let (true, Some(found)) = (options.widths, &found) {
+            for (widths, parameter) in widths.iter_mut().zip(HEIGHTS) {
+                widths.extend(trial.width(&model, found, parameter as usize, (&covariance, &groups))?);
+            }
+        }
         if let (Some(found), Some(at_truth)) = (found, at_truth) {
             let less = at_truth.log_likelihood - found.log_likelihood;
             let off = |place: usize| (found.wake.to_array()[place] - truth.to_array()[place]) / bound[place];
@@ -176,6 +258,22 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
     }
     maps.iter().chain(&signals).filter(|fits| fits.found.len() > 1).for_each(|fits| fits.show(&truth, &bound));
+    for ((name, widths), parameter) in ["left", "right"].into_iter().zip(&widths).zip(HEIGHTS) {
+        let n = widths.len() as f64;
+        let over: Vec<f64> = widths.iter().map(|width| width / bound[parameter as usize]).collect();
+        let squares: Vec<f64> = over.iter().map(|o| o * o).collect();
+        let mean = squares.iter().sum::<f64>() / n;
+        let error = (squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+        if n > 1.0 {
+            println!(
+                "posterior of the {name} height: {:.2} +- {:.2} of the bound, from {:.2} to {:.2} by scan",
+                mean.sqrt(),
+                0.5 * error / mean.sqrt(),
+                over.iter().copied().fold(f64::INFINITY, f64::min),
+                over.iter().copied().fold(0.0, f64::max),
+            );
+        }
+    }
     if !below.is_empty() {
         let lower = below.iter().filter(|less| **less > 0.1).count();
         let most = below.iter().fold(f64::NEG_INFINITY, |most, less| most.max(*less));

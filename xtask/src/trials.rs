@@ -2,8 +2,11 @@
 //!
 //! Figures and work-precision share these, so that both speak of the same signals.
 
+pub(crate) mod banded;
 pub(crate) mod fits;
+pub(crate) mod map_bound;
 pub(crate) mod methods;
+pub(crate) mod profile;
 pub(crate) mod uniform;
 
 use wakescope_signal::NoiseModel;

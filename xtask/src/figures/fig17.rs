@@ -75,7 +75,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
 /// The fits of one scan, of its signals too or of its map alone.
 fn fit(pair: &PairScan, scan: usize, signals: bool) -> Result<Vec<Found>, Failure> {
-    let trial = FitTrial::new(pair, scan)?;
+    let trial = FitTrial::new(pair, scan, RADIUS_M)?;
     let from_map = |core_radius: Sharing| -> Result<Found, Failure> {
         let fit = trial.map(FreeParameters { core_radius, ..free() }, Some(CorePrior::TYPICAL))?;
         Ok(fit.ok().map(|fit| (fit.wake, fit.covariance)))

@@ -1,12 +1,13 @@
 //! Fits to scans of a pair: to the map of the likelihood with tapers, and to all raw signals.
 
 use crate::Failure;
+use crate::trials::profile::posterior_deviation;
 use fixtures::WINDOW;
 use fixtures::pair::PairScan;
 use ndarray::{Array2, ArrayView2};
 use wakescope_estimate::vortex_fit::{
-    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, SignalFit, SignalFitOptions, Starts,
-    VelocityMap, Wake, fit_map_of_estimator, fit_signals,
+    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, ScanModel, ScanSignals, SignalFit,
+    SignalFitOptions, Starts, VelocityMap, Wake, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
     Correlogram, Error, Refinement, SignalKind, SpectralPeak,
@@ -20,6 +21,8 @@ pub(crate) const RADIUS_M: f64 = 2.0;
 /// One scan of a pair and what fits need of it.
 pub(crate) struct FitTrial<'a> {
     pair: &'a PairScan,
+    /// Radius of the regions of its map \[m\].
+    radius_m: f64,
     records: Array2<f64>,
     tapered: Correlogram<f64>,
     peak: SpectralPeak,
@@ -27,13 +30,13 @@ pub(crate) struct FitTrial<'a> {
 }
 
 impl<'a> FitTrial<'a> {
-    pub(crate) fn new(pair: &'a PairScan, scan: usize) -> Result<Self, Failure> {
+    pub(crate) fn new(pair: &'a PairScan, scan: usize, radius_m: f64) -> Result<Self, Failure> {
         let records = pair.records(scan)?;
         let window = WindowModel::gaussian_pulse(&pair.sampling, WINDOW, pair.sigma_s(), Noise::White)?;
         let tapered = Correlogram::with_tapers(likelihood_tapers(&window, pair.snr)?)?;
         let peak = SpectralPeak::new(&pair.sampling, SignalKind::Real, WINDOW, 1024, Refinement::Parabola)?;
-        let velocities = pair.velocities(&pair.statistics(&records, &tapered)?, &pair.points, RADIUS_M, &peak)?;
-        Ok(Self { pair, records, tapered, peak, velocities })
+        let velocities = pair.velocities(&pair.statistics(&records, &tapered)?, &pair.points, radius_m, &peak)?;
+        Ok(Self { pair, radius_m, records, tapered, peak, velocities })
     }
 
     /// The fit of the map, with nothing known but what typical cores are.
@@ -50,9 +53,26 @@ impl<'a> FitTrial<'a> {
             standard_deviation_m_s: None,
         };
         let noise = (setup.noise, pair.snr);
-        let shown = EstimatorResponse::new(&self.tapered, &self.peak, &setup.sampling, &setup.pulse, noise, RADIUS_M)?;
+        let shown =
+            EstimatorResponse::new(&self.tapered, &self.peak, &setup.sampling, &setup.pulse, noise, self.radius_m)?;
         let options = MapFitOptions { free, core_prior, ..Default::default() };
         Ok(fit_map_of_estimator(&map, &setup.wake, &shown, &options))
+    }
+
+    /// How wide the likelihood of the signals is about a fit in one parameter, in its unit; see [`posterior_deviation`].
+    pub(crate) fn width(
+        &self,
+        model: &ScanModel,
+        fit: &SignalFit,
+        place: usize,
+        bound: (&Array2<f64>, &[Vec<usize>]),
+    ) -> Result<Option<f64>, Failure> {
+        let signals = ScanSignals::new(model, self.records.view(), self.pair.noise_power_a2())?;
+        let likelihood = |wake: &Wake| {
+            let value = model.log_likelihood(&signals, wake, fit.powers)?;
+            Some((value.log_likelihood, value.by_wake))
+        };
+        Ok(posterior_deviation(&fit.wake, place, bound, likelihood))
     }
 
     /// The fit of all signals from a guess on.

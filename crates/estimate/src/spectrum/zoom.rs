@@ -75,9 +75,12 @@ impl ZoomSpectrum {
 fn clenshaw(lags: &[f64], cos: &[f64], out: &mut [f64]) {
     let (cos, _) = cos.as_chunks::<LANES>();
     let (out, _) = out.as_chunks_mut::<LANES>();
-    let twice = |c: &[f64; LANES]| c.map(|c| 2.0 * c);
     for (cos, out) in cos.iter().zip(out) {
-        let twice = twice(cos);
+        // a loop, which is compiled for the vector instructions of this function: a closure would not be
+        let mut twice = [0.0; LANES];
+        for i in 0..LANES {
+            twice[i] = 2.0 * cos[i];
+        }
         let (mut next, mut after) = ([0.0; LANES], [0.0; LANES]);
         for &lag in lags[1..].iter().rev() {
             for i in 0..LANES {

@@ -1,0 +1,493 @@
+//! What the velocities of a map tell of a wake at best, to first order in the fluctuations of its spectra.
+//!
+//! A velocity v of a map is the highest place of the mean spectrum P of a region, so near its expectation v - <v> = -P'(<v>) / <P''>.
+//! P' is quadratic in the baseband z of the lines of the region, z^H A z with A_pq = j k T (p - q) W_pq exp(j k <v> T (p - q)) conjugated,
+//! k = 4 pi / lambda, W the tapers. Lines are independent and Gaussian with the covariance R, thus
+//!
+//! ```text
+//! cov(v_a, v_b) = sum over lines of tr(A_a R A_b R) / (P_a'' P_b''),    dv/d theta = -(dP'/d theta) / P''
+//! ```
+//!
+//! with shares of regions in A. The information on the wake is J^T C^-1 J (generalised least squares; no linear estimate knows more),
+//! with a diagonal of C alone for weights the sandwich. The logarithm of P''/P at the same place is the width of the spectrum, taken
+//! along on request. Real samples are seen as complex ones of the band at a quarter of their rate: what changes is some tenths of a
+//! per cent. Check: one window of uniform wind against its Cramer-Rao bound; lines far apart.
+
+use super::banded::Banded;
+use crate::Failure;
+use ndarray::{Array2, ArrayView2};
+use num_complex::Complex;
+use rayon::prelude::*;
+use std::f64::consts::{PI, SQRT_2};
+use wakescope_estimate::Sampling;
+use wakescope_estimate::bound::{Noise, WindowModel};
+use wakescope_estimate::estimators::likelihood_tapers;
+use wakescope_estimate::vortex_fit::{PARAMETERS, Wake, WakeModel};
+use wakescope_estimate::window::SPEED_OF_LIGHT_M_S;
+
+type C64 = Complex<f64>;
+
+/// Thickness of the layers of air \[m\]: the rule of the signal model at 500 m^2/s and cores of 2.35 m.
+const LAYER_M: f64 = 0.25;
+/// Lines whose forms are held at a time.
+const AT_ONCE: usize = 4;
+/// Velocities are rounded: part of their variance that is independent.
+const ROUNDING: f64 = 1e-4;
+/// Places of the spectrum among which the highest is sought.
+const PLACES: usize = 512;
+
+/// What is measured in each cell of a map: its velocity, and the logarithm of the relative curvature of its spectrum.
+const KINDS: usize = 2;
+
+/// How a map is made.
+#[derive(Debug, Clone)]
+pub(crate) struct MapSetting<'a> {
+    pub(crate) model: WakeModel,
+    /// Real samples as they are recorded.
+    pub(crate) sampling: Sampling,
+    /// Samples of a window; a multiple of 4.
+    pub(crate) window: usize,
+    /// Half-width of |f|^2 at 1/e \[s\].
+    pub(crate) sigma_s: f64,
+    pub(crate) snr: f64,
+    pub(crate) noise: Noise,
+    /// Of the regions \[m\].
+    pub(crate) radius_m: f64,
+    pub(crate) elevation_rad: &'a [f64],
+    /// A multiple of 4 samples apart.
+    pub(crate) range_m: &'a [f64],
+}
+
+/// First-order slopes and covariance of a map.
+pub(crate) struct MapBound {
+    /// By cell and kind: lines, then gates, then kinds.
+    slopes: Vec<[f64; PARAMETERS]>,
+    covariance: Banded,
+}
+
+/// Standard deviations of free numbers.
+pub(crate) struct Deviations {
+    /// With the best weights, those of the covariance.
+    pub(crate) best: Vec<f64>,
+    /// With weights of the variances alone.
+    pub(crate) by_variance: Vec<f64>,
+}
+
+/// The grid of the complex samples.
+struct Grid {
+    period_s: f64,
+    first_s: f64,
+    window: usize,
+    samples: usize,
+    /// Samples from one gate to the next.
+    step: usize,
+    /// Tapers summed, \[window, window\].
+    tapers: Array2<f64>,
+    /// Covariance of the noise by lag.
+    noise: Vec<f64>,
+}
+
+/// Signals of one line.
+struct Line {
+    /// Lower factor of the covariance of its samples.
+    factor: Array2<C64>,
+    /// Correlogram of each gate and its derivatives: \[gate\]\[number\]\[lag\].
+    lags: Vec<Vec<Vec<C64>>>,
+}
+
+/// One cell in the mean.
+struct Cell {
+    velocity_m_s: f64,
+    level: f64,
+    curvature: f64,
+    slopes: [[f64; PARAMETERS]; KINDS],
+    /// Lines of the region with their shares.
+    shares: Vec<(usize, f64)>,
+}
+
+impl MapBound {
+    pub(crate) fn new(setting: &MapSetting<'_>, wake: &Wake) -> Result<Self, Failure> {
+        let grid = Grid::new(setting)?;
+        let lines: Vec<Line> = setting
+            .elevation_rad
+            .par_iter()
+            .map(|&elevation_rad| Line::new(setting, &grid, wake, elevation_rad))
+            .collect::<Option<_>>()
+            .ok_or_else(|| Failure::new("the covariance of a line is not positive definite".to_owned()))?;
+        let gates = setting.range_m.len();
+        let cells: Vec<Cell> =
+            (0..lines.len() * gates).map(|i| Cell::new(setting, &grid, &lines, (i / gates, i % gates))).collect();
+        let reach = cells
+            .iter()
+            .enumerate()
+            .flat_map(|(i, cell)| cell.shares.iter().map(move |(line, _)| line.abs_diff(i / gates)));
+        // two regions share a line if they are up to twice their reach apart
+        let lines_apart = 2 * reach.max().unwrap_or(0);
+        let order = cells.len() * KINDS;
+        let mut covariance = Banded::zeros(order, (lines_apart + 1) * gates * KINDS - 1);
+        let numbers: Vec<usize> = (0..lines.len()).collect();
+        for some in numbers.chunks(AT_ONCE) {
+            let parts: Vec<_> =
+                some.par_iter().map(|&line| covariance_of_line(setting, &grid, (&lines[line], line), &cells)).collect();
+            for (places, part) in parts {
+                for (a, &i) in places.iter().enumerate() {
+                    for (b, &j) in places[..=a].iter().enumerate() {
+                        *covariance.at(i, j) += part[[a, b]];
+                    }
+                }
+            }
+        }
+        for i in 0..order {
+            *covariance.at(i, i) *= 1.0 + ROUNDING;
+        }
+        Ok(Self { slopes: cells.iter().flat_map(|cell| cell.slopes).collect(), covariance })
+    }
+
+    /// Deviations of free numbers, each of which moves some parameters; with the widths of the spectra or without.
+    pub(crate) fn deviations(&self, groups: &[Vec<usize>], widths: bool) -> Option<Deviations> {
+        let used = |i: usize| widths || i.is_multiple_of(KINDS);
+        let covariance = self.covariance.part(used);
+        let column = |group: &Vec<usize>| -> Vec<f64> {
+            let rows = self.slopes.iter().enumerate().filter(|(i, _)| used(*i));
+            rows.map(|(_, slopes)| group.iter().map(|&place| slopes[place]).sum()).collect()
+        };
+        let slopes: Vec<Vec<f64>> = groups.iter().map(column).collect();
+        let weighted: Vec<Vec<f64>> =
+            slopes.iter().map(|j| j.iter().zip(covariance.diagonal()).map(|(j, c)| j / c).collect()).collect();
+        let products = |a: &[Vec<f64>], b: &[Vec<f64>]| {
+            let of = |(i, j): (usize, usize)| a[i].iter().zip(&b[j]).map(|(a, b)| a * b).sum::<f64>();
+            Array2::from_shape_fn((groups.len(), groups.len()), of)
+        };
+        let bread = inverse(&products(&weighted, &slopes))?;
+        let about: Vec<Vec<f64>> = weighted.iter().map(|x| covariance.times(x)).collect();
+        let sandwich = bread.dot(&products(&weighted, &about)).dot(&bread);
+        let factor = covariance.factor()?;
+        let white: Vec<Vec<f64>> = slopes.into_iter().map(|j| factor.forward(j)).collect();
+        let best = inverse(&products(&white, &white))?;
+        let roots = |a: &Array2<f64>| a.diag().iter().map(|v| v.sqrt()).collect();
+        Some(Deviations { best: roots(&best), by_variance: roots(&sandwich) })
+    }
+}
+
+/// Inverse of a small positive definite matrix.
+fn inverse(a: &Array2<f64>) -> Option<Array2<f64>> {
+    let n = a.nrows();
+    let mut band = Banded::zeros(n, n);
+    for i in 0..n {
+        for j in 0..=i {
+            *band.at(i, j) = a[[i, j]];
+        }
+    }
+    let factor = band.factor()?;
+    let unit = |k: usize| (0..n).map(|i| if i == k { 1.0 } else { 0.0 }).collect();
+    let columns: Vec<Vec<f64>> = (0..n).map(|k| factor.forward(unit(k))).collect();
+    Some(Array2::from_shape_fn((n, n), |(i, j)| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum()))
+}
+
+impl Grid {
+    fn new(setting: &MapSetting<'_>) -> Result<Self, Failure> {
+        let refused = |what: &str| Failure::new(format!("the bound of a map wants {what} of 4 samples"));
+        let period_s = 4.0 * setting.sampling.period_s();
+        let window = setting.window / 4;
+        if !setting.window.is_multiple_of(4) || window == 0 {
+            return Err(refused("windows that are a multiple"));
+        }
+        let gap_m = setting.range_m.windows(2).next().map_or(0.0, |pair| pair[1] - pair[0]);
+        let step = 2.0 * gap_m / SPEED_OF_LIGHT_M_S / period_s;
+        if (step - step.round()).abs() > 1e-6 {
+            return Err(refused("gates a multiple"));
+        }
+        let (step, first_m) = (step.round() as usize, setting.range_m.first().copied().unwrap_or(0.0));
+        let band_hz = setting.sampling.band_hz.1 - setting.sampling.band_hz.0;
+        let baseband = Sampling::baseband(period_s.recip(), setting.sampling.wavelength_m, band_hz)?;
+        let model = WindowModel::gaussian_pulse(&baseband, window, setting.sigma_s, Noise::White)?;
+        let mut tapers = Array2::zeros((window, window));
+        for taper in likelihood_tapers(&model, setting.snr)? {
+            tapers.indexed_iter_mut().for_each(|((p, q), w)| {
+                *w += taper.factor * taper.weights[p] * taper.weights[q];
+            });
+        }
+        let samples = window + setting.range_m.len().saturating_sub(1) * step;
+        let noise = |lag: usize| match setting.noise {
+            Noise::White => {
+                if lag == 0 {
+                    (band_hz * period_s).recip()
+                } else {
+                    0.0
+                }
+            }
+            _ => {
+                let turns = PI * band_hz * period_s * lag as f64;
+                if lag == 0 { 1.0 } else { turns.sin() / turns }
+            }
+        };
+        Ok(Self {
+            period_s,
+            first_s: 2.0 * first_m / SPEED_OF_LIGHT_M_S - 0.5 * window as f64 * period_s,
+            window,
+            samples,
+            step,
+            tapers,
+            noise: (0..samples).map(noise).collect(),
+        })
+    }
+
+    /// Phase per velocity of a lag, k T m \[rad s/m\].
+    fn turn(&self, wavelength_m: f64, lag: f64) -> f64 {
+        4.0 * PI / wavelength_m * self.period_s * lag
+    }
+}
+
+impl Line {
+    fn new(setting: &MapSetting<'_>, grid: &Grid, wake: &Wake, elevation_rad: f64) -> Option<Self> {
+        let reach_m = 0.5 * SPEED_OF_LIGHT_M_S * 4.0 * setting.sigma_s;
+        let length_m = 0.5 * SPEED_OF_LIGHT_M_S * grid.samples as f64 * grid.period_s + 2.0 * reach_m;
+        let layers = (length_m / LAYER_M).ceil() as usize;
+        let at_m = |layer: usize| 0.5 * SPEED_OF_LIGHT_M_S * grid.first_s - reach_m + (layer as f64 + 0.5) * LAYER_M;
+        let winds: Vec<(f64, [f64; PARAMETERS])> =
+            (0..layers).map(|layer| setting.model.gradient(wake, at_m(layer), elevation_rad)).collect();
+        let middle = 0.5 * grid.samples as f64;
+        let seen = |(k, layer): (usize, usize)| {
+            let time_s = grid.first_s + k as f64 * grid.period_s - 2.0 * at_m(layer) / SPEED_OF_LIGHT_M_S;
+            let power = setting.snr * LAYER_M * 2.0 / SPEED_OF_LIGHT_M_S / (PI.sqrt() * setting.sigma_s);
+            let phase = -grid.turn(setting.sampling.wavelength_m, k as f64 - middle) * winds[layer].0;
+            C64::from_polar(power.sqrt() * (-0.5 * (time_s / setting.sigma_s).powi(2)).exp(), phase)
+        };
+        let seen = Array2::from_shape_fn((grid.samples, layers), seen);
+        let (re, im) = (seen.mapv(|s| s.re), seen.mapv(|s| s.im));
+        // B diag(weight) B^H
+        let summed = |weight: &dyn Fn(usize) -> f64| {
+            let mut by = (re.clone(), im.clone());
+            for part in [&mut by.0, &mut by.1] {
+                part.columns_mut().into_iter().enumerate().for_each(|(layer, mut column)| column *= weight(layer));
+            }
+            let (real, imaginary) = (by.0.dot(&re.t()) + by.1.dot(&im.t()), by.1.dot(&re.t()) - by.0.dot(&im.t()));
+            ndarray::Zip::from(&real).and(&imaginary).map_collect(|&re, &im| C64::new(re, im))
+        };
+        let mut covariance = summed(&|_| 1.0);
+        covariance.indexed_iter_mut().for_each(|((p, q), c)| *c += grid.noise[p.abs_diff(q)]);
+        let mut numbers = vec![covariance.clone()];
+        for place in 0..PARAMETERS {
+            let mut slope = summed(&|layer| winds[layer].1[place]);
+            slope.indexed_iter_mut().for_each(|((p, q), s)| {
+                *s *= C64::new(0.0, -grid.turn(setting.sampling.wavelength_m, p as f64 - q as f64));
+            });
+            numbers.push(slope);
+        }
+        let gate = |gate: usize| -> Vec<Vec<C64>> { numbers.iter().map(|x| grid.lags(x.view(), gate)).collect() };
+        // a factor of noise that fills its band alone: a part of 1e-9 outside of it
+        covariance.diag_mut().iter_mut().for_each(|c| *c *= 1.0 + 1e-9);
+        Some(Self { lags: (0..setting.range_m.len()).map(gate).collect(), factor: cholesky(covariance)? })
+    }
+}
+
+impl Grid {
+    /// Mean correlogram of a gate of a line with that covariance, lags from 0 on.
+    fn lags(&self, covariance: ArrayView2<'_, C64>, gate: usize) -> Vec<C64> {
+        let first = gate * self.step;
+        let one = |lag: usize| {
+            (0..self.window - lag).map(|q| covariance[[first + q + lag, first + q]] * self.tapers[[q + lag, q]]).sum()
+        };
+        (0..self.window).map(one).collect()
+    }
+}
+
+impl Cell {
+    fn new(setting: &MapSetting<'_>, grid: &Grid, lines: &[Line], (line, gate): (usize, usize)) -> Self {
+        let shares = shares(setting, line, setting.range_m[gate]);
+        let numbers = lines[line].lags[gate].len();
+        let mut lags = vec![vec![C64::ZERO; grid.window]; numbers];
+        for &(other, share) in &shares {
+            for (sum, one) in lags.iter_mut().zip(&lines[other].lags[gate]) {
+                sum.iter_mut().zip(one).for_each(|(sum, one)| *sum += share * one);
+            }
+        }
+        // spectrum and its first and second derivatives by velocity
+        let spectrum = |lags: &[C64], velocity_m_s: f64| -> [f64; 3] {
+            let mut sums = [lags[0].re, 0.0, 0.0];
+            for (m, lag) in lags.iter().enumerate().skip(1) {
+                let turn = grid.turn(setting.sampling.wavelength_m, m as f64);
+                let turned = 2.0 * lag * C64::cis(turn * velocity_m_s);
+                sums[0] += turned.re;
+                sums[1] -= turn * turned.im;
+                sums[2] -= turn * turn * turned.re;
+            }
+            sums
+        };
+        let band_hz = setting.sampling.band_hz.1 - setting.sampling.band_hz.0;
+        let fastest_m_s = 0.25 * setting.sampling.wavelength_m * band_hz;
+        let place = |i: usize| fastest_m_s * (2.0 * i as f64 / PLACES as f64 - 1.0);
+        let highest = |a: &f64, b: &f64| spectrum(&lags[0], *a)[0].total_cmp(&spectrum(&lags[0], *b)[0]);
+        let mut velocity_m_s = (0..PLACES).map(place).max_by(highest).unwrap_or(0.0);
+        for _ in 0..8 {
+            let [_, first, second] = spectrum(&lags[0], velocity_m_s);
+            velocity_m_s -= if second < 0.0 { (first / second).clamp(-0.1, 0.1) } else { 0.0 };
+        }
+        let [level, _, curvature] = spectrum(&lags[0], velocity_m_s);
+        let mut slopes = [[0.0; PARAMETERS]; KINDS];
+        for place in 0..PARAMETERS {
+            let [of_level, of_slope, of_curvature] = spectrum(&lags[place + 1], velocity_m_s);
+            slopes[0][place] = -of_slope / curvature;
+            slopes[1][place] = of_curvature / curvature - of_level / level;
+        }
+        Self { velocity_m_s, level, curvature, slopes, shares }
+    }
+}
+
+/// Lines of a region with their shares: the windows of each chord over those of all.
+fn shares(setting: &MapSetting<'_>, line: usize, range_m: f64) -> Vec<(usize, f64)> {
+    let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * setting.sampling.period_s();
+    let windows = |other: usize| {
+        let away_m = range_m * (setting.elevation_rad[other] - setting.elevation_rad[line]).abs();
+        let chord_m2 = setting.radius_m * setting.radius_m - away_m * away_m;
+        if chord_m2 >= 0.0 || other == line { 2.0 * (chord_m2.max(0.0).sqrt() / sample_m).floor() + 1.0 } else { 0.0 }
+    };
+    let all: Vec<(usize, f64)> =
+        (0..setting.elevation_rad.len()).map(|other| (other, windows(other))).filter(|(_, n)| *n > 0.0).collect();
+    let sum: f64 = all.iter().map(|(_, n)| n).sum();
+    all.into_iter().map(|(other, n)| (other, n / sum)).collect()
+}
+
+/// Places of the numbers of a map that see a line, and what the line adds to their covariance.
+fn covariance_of_line(
+    setting: &MapSetting<'_>,
+    grid: &Grid,
+    (line, number): (&Line, usize),
+    cells: &[Cell],
+) -> (Vec<usize>, Array2<f64>) {
+    let (gates, n) = (setting.range_m.len(), grid.samples);
+    let seen = cells.iter().enumerate().filter_map(|(i, cell)| {
+        cell.shares.iter().find(|(other, _)| *other == number).map(|(_, share)| (i, cell, *share))
+    });
+    let seen: Vec<_> = seen.collect();
+    let mut forms = Array2::zeros((seen.len() * KINDS, n * n));
+    let mut places = Vec::with_capacity(seen.len() * KINDS);
+    for (row, (i, cell, share)) in seen.into_iter().enumerate() {
+        let first = i % gates * grid.step;
+        for kind in 0..KINDS {
+            let form = |p: usize, q: usize| {
+                let turn = grid.turn(setting.sampling.wavelength_m, p as f64 - q as f64);
+                let weight = match kind {
+                    0 => C64::new(0.0, -turn / cell.curvature),
+                    _ => C64::new(-turn * turn / cell.curvature - cell.level.recip(), 0.0),
+                };
+                // conjugated: the correlogram sums z_p z_q^*, the form z_p^* z_q
+                (weight * C64::cis(turn * cell.velocity_m_s)).conj() * (share * grid.tapers[[p, q]])
+            };
+            let form = Array2::from_shape_fn((grid.window, grid.window), |(p, q)| form(p, q));
+            let mut out = forms.row_mut(row * KINDS + kind);
+            if let Some(out) = out.as_slice_mut() {
+                whiten(&line.factor, form.view(), first, out);
+            }
+            places.push(i * KINDS + kind);
+        }
+    }
+    let covariance = forms.dot(&forms.t());
+    (places, covariance)
+}
+
+/// L^H A L of a Hermitian A that stands at row `first`, as real numbers whose scalar product is the trace of a product.
+fn whiten(factor: &Array2<C64>, form: ArrayView2<'_, C64>, first: usize, out: &mut [f64]) {
+    let (n, m) = (factor.nrows(), form.nrows());
+    // no row of L reaches beyond its diagonal
+    let columns = first + m;
+    let part = factor.slice(ndarray::s![first..first + m, ..columns]);
+    let half = form.dot(&part);
+    for a in 0..columns {
+        for b in 0..=a {
+            let sum: C64 = (0..m).map(|p| part[[p, a]].conj() * half[[p, b]]).sum();
+            if a == b {
+                out[a * n + a] = sum.re;
+            } else {
+                (out[a * n + b], out[b * n + a]) = (SQRT_2 * sum.re, SQRT_2 * sum.im);
+            }
+        }
+    }
+}
+
+/// Lower factor of a Hermitian matrix; nothing unless it is positive definite.
+fn cholesky(mut a: Array2<C64>) -> Option<Array2<C64>> {
+    let n = a.nrows();
+    for j in 0..n {
+        for i in j..n {
+            let sum: C64 = (0..j).map(|k| a[[i, k]] * a[[j, k]].conj()).sum();
+            a[[i, j]] -= sum;
+        }
+        // the root of a pivot that is not positive is no number, or zero
+        let root = a[[j, j]].re.sqrt();
+        if root.is_nan() || root == 0.0 {
+            return None;
+        }
+        (j..n).for_each(|i| a[[i, j]] /= root);
+        (0..j).for_each(|i| a[[i, j]] = C64::ZERO);
+    }
+    Some(a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fixtures::{WINDOW, sampling};
+    use wakescope_estimate::SignalKind;
+
+    const SIGMA_S: f64 = 120.112e-9;
+    const WIND: [[usize; 1]; 1] = [[8]];
+
+    fn calm() -> Wake {
+        Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 3.0, 0.0])
+    }
+
+    fn deviation(noise: Noise, radius_m: f64, elevation_rad: &[f64], range_m: &[f64]) -> Deviations {
+        let sampling = sampling().unwrap();
+        let setting = MapSetting {
+            model: WakeModel::default(),
+            sampling,
+            window: WINDOW,
+            sigma_s: SIGMA_S,
+            snr: 2.0,
+            noise,
+            radius_m,
+            elevation_rad,
+            range_m,
+        };
+        let groups: Vec<Vec<usize>> = WIND.iter().map(|g| g.to_vec()).collect();
+        MapBound::new(&setting, &calm()).unwrap().deviations(&groups, false).unwrap()
+    }
+
+    /// In white noise the highest place of the spectrum with those tapers is the likelihood's own, and one line of elevation 0 the wind itself.
+    #[test]
+    fn one_window_of_wind_has_its_cramer_rao_bound() {
+        let found = deviation(Noise::White, 0.0, &[0.0], &[400.0]);
+        let baseband = Sampling::baseband(62.5e6, 1.55e-6, 50e6).unwrap();
+        let model = WindowModel::gaussian_pulse(&baseband, WINDOW / 4, SIGMA_S, Noise::White).unwrap();
+        let bound_m_s = model.bound_m_s(3.0, 2.0, SignalKind::Complex, 1.0).unwrap();
+        for deviation in [found.best[0], found.by_variance[0]] {
+            assert!((deviation / bound_m_s - 1.0).abs() < 2e-3, "{deviation} {bound_m_s}");
+        }
+    }
+
+    /// Lines of their own: four lines halve the deviation of one. Regions that hold all lines: four cells say the same four times.
+    #[test]
+    fn lines_count_once_whether_regions_share_them_or_not() {
+        let lines = [0.0, 1e-3, 2e-3, 3e-3];
+        let one = deviation(Noise::White, 0.0, &lines[..1], &[400.0]).best[0];
+        for radius_m in [0.0, 50.0] {
+            let all = deviation(Noise::White, radius_m, &lines, &[400.0]);
+            for deviation in [all.best[0], all.by_variance[0]] {
+                assert!((2.0 * deviation / one - 1.0).abs() < 2e-3, "{radius_m} {deviation} {one}");
+            }
+        }
+    }
+
+    /// Gates that overlap by half: correlated, so that two are worth less than two, and more than one.
+    #[test]
+    fn gates_that_overlap_are_correlated() {
+        let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * 4e-9;
+        let band = Noise::Band { floor: 0.0 };
+        let of = |range_m: &[f64]| deviation(band, 0.0, &[0.0], range_m).best[0];
+        let (one, two, apart) =
+            (of(&[400.0]), of(&[400.0, 400.0 + 32.0 * sample_m]), of(&[400.0, 400.0 + 400.0 * sample_m]));
+        assert!((apart / one - 0.5_f64.sqrt()).abs() < 1e-6, "{one} {apart}");
+        assert!(two < 0.95 * one && two > 1.05 * apart, "{one} {two} {apart}");
+    }
+}
