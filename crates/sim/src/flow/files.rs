@@ -129,6 +129,10 @@ impl Files {
     }
 
     /// Adds the fields to the group, or as texts whose places in their files are not known yet.
+    #[cfg_attr(
+        not(any(feature = "netcdf", feature = "vtk")),
+        expect(unused_variables, reason = "texts are not in the group")
+    )]
     fn add_fields(
         &self,
         group: &mut FileGroup,

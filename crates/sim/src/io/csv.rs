@@ -142,6 +142,7 @@ impl Table {
     ///
     /// # Errors
     /// As [`Self::to_csv`].
+    #[cfg(feature = "flow")]
     pub(crate) fn rows(&self) -> OutputResult<String> {
         self.check()?;
         let mut out = String::new();
