@@ -2,7 +2,8 @@
 //!
 //! Check: every kind comes back from its bytes in both orders.
 
-/// How a number is stored.
+/// How a number is stored. Some kinds are of NetCDF alone.
+#[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NumberType {
     I8,

@@ -7,7 +7,9 @@ use crate::Error;
 use crate::io::Table;
 #[cfg(feature = "plots")]
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
-use wakescope_estimate::retrieval::{Measured, ScanResult, Side, Track, TrackOptions, TrackedVortex, track};
+#[cfg(feature = "plots")]
+use wakescope_estimate::retrieval::Side;
+use wakescope_estimate::retrieval::{Measured, ScanResult, Track, TrackOptions, TrackedVortex, track};
 
 /// The track of several scans in the order of their times; nothing of a single scan, of scans without times, or without a wake.
 ///
