@@ -1,7 +1,7 @@
 //! What the velocities of a map tell of a wake at best, to first order in the fluctuations of its spectra.
 //!
-//! A velocity v of a map is the highest place of the mean spectrum P of a region, so near its expectation v - <v> = -P'(<v>) / <P''>.
-//! P' is quadratic in the baseband z of the lines of the region, z^H A z with A_pq = j k T (p - q) W_pq exp(j k <v> T (p - q)) conjugated,
+//! A velocity v of a map is the highest place of the mean spectrum P of a region, so near its expectation w it is `v - w = -P'(w) / P''(w)`, the latter in the mean.
+//! P' is quadratic in the baseband z of the lines of the region, z^H A z with A_pq = j k T (p - q) W_pq exp(j k w T (p - q)) conjugated,
 //! k = 4 pi / lambda, W the tapers. Lines are independent and Gaussian with the covariance R, thus
 //!
 //! ```text
