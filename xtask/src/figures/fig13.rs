@@ -27,14 +27,14 @@ struct Pair {
 
 /// The scenes of the batches, PA and CA of each.
 fn scenes(reference: SnrReference, realisations: usize) -> impl Iterator<Item = Scene> {
-    let of_batch = move |batch| {
+    let both = move |batch| {
         METHODS.map(|method| {
             let mut scene = of_batch(with_method(near_scene(realisations), method), batch);
             scene.detector.snr = reference;
             scene
         })
     };
-    (0..BATCHES).flat_map(of_batch)
+    (0..BATCHES).flat_map(both)
 }
 
 /// What the batches of a ratio show.

@@ -199,7 +199,7 @@ fn of_batch(sweep: &Sweep, cases: &[&Case], error: Error) -> Error {
 
 /// The plan of a scene, with a wind that others may share.
 fn plan(scene: &SceneFile, winds: &Known<SceneWind>) -> Result<Plan, Error> {
-    let cause = hash_of(&format!("{:?}", scene.scene.flow));
+    let cause = hash_of(&format!("{:?}", (&scene.scene.flow, &scene.scene.added_flows, &scene.folder)));
     let wind = winds.of(cause, || SceneWind::new(scene))?;
     Plan::with_wind(scene.clone(), Target::Map, wind)
 }
@@ -214,7 +214,7 @@ fn groups<'s>(scenes: impl Iterator<Item = &'s SceneFile>) -> Vec<Vec<usize>> {
             site: Site::default(),
             ..file.scene.clone()
         };
-        let cause = hash_of(&format!("{signals:?}"));
+        let cause = hash_of(&format!("{:?}", (signals, &file.folder)));
         match groups.iter_mut().find(|(known, _)| *known == cause) {
             Some((_, group)) => group.push(place),
             None => groups.push((cause, vec![place])),

@@ -237,7 +237,9 @@ fn seeds_share_an_efficiency_where_no_screens_are_drawn() {
 fn maps_of_scenes_together_are_those_of_each_alone() {
     let scene = |text: &str| SceneFile::parse(text, Path::new("s.toml")).unwrap();
     let other = format!("seed = 2\n{SMALL}[estimator]\nradius_m = 1.0\n");
-    let scenes = [scene(SMALL), scene(&other), scene(&format!("{SMALL}[estimator]\nradius_m = 1.0\n"))];
+    let windy = format!("added_flows = [{{ kind = \"uniform\", lateral_m_s = 3.0, vertical_m_s = 0.0 }}]\n{SMALL}");
+    let narrow = format!("{SMALL}[estimator]\nradius_m = 1.0\n");
+    let scenes = [SMALL, &other, &narrow, &windy].map(scene);
     let together = maps(&scenes, &crate::Silent).unwrap();
     for (scene, (plan, map)) in scenes.iter().zip(&together) {
         assert_eq!(plan.scene.scene, scene.scene);
