@@ -8,6 +8,7 @@
 
 mod checker;
 mod key;
+mod offer;
 mod probe;
 mod problem;
 mod source;

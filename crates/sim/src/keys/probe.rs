@@ -4,9 +4,8 @@
 //! carry the names of their keys and variants.
 
 use super::key::{Key, Kind};
-use serde::de::value::{BorrowedStrDeserializer, MapDeserializer, SeqDeserializer};
-use serde::de::{DeserializeOwned, Deserializer, Expected, IntoDeserializer, Unexpected, Visitor};
-use std::fmt::Display;
+use super::offer::{Answer, Offer};
+use serde::de::DeserializeOwned;
 
 /// A name that no key and no variant has.
 const STRANGE: &str = "?";
@@ -17,27 +16,6 @@ pub(crate) fn keys_of<T: DeserializeOwned>() -> Vec<Key> {
         Kind::Table(keys) => keys,
         _ => Vec::new(),
     }
-}
-
-/// A value on offer.
-#[derive(Debug, Clone)]
-enum Offer {
-    Whole(u64),
-    Switch(bool),
-    Text(&'static str),
-    List(Vec<Offer>),
-    Table(Vec<(&'static str, Offer)>),
-}
-
-/// What a type says to an offer.
-#[derive(Debug, Clone, PartialEq)]
-enum Answer {
-    Accepted,
-    UnknownKey(&'static [&'static str]),
-    UnknownVariant(&'static [&'static str]),
-    Missing(&'static str),
-    Wanted(String),
-    Other,
 }
 
 /// A step on the way from the whole to the value that is asked about.
@@ -57,20 +35,20 @@ impl<F: Fn(Offer) -> Answer> Prober<F> {
     fn answer(&self, path: &[Step], offer: Offer) -> Answer {
         (self.ask)(path.iter().rev().fold(offer, |inner, step| match *step {
             Step::Key(key, tag) => {
-                let tag = tag.map(|(tag, name)| (tag, Offer::Text(name)));
-                Offer::Table(tag.into_iter().chain([(key, inner)]).collect())
+                let tag = tag.map(|(tag, name)| (tag.into(), Offer::text(name)));
+                Offer::Table(tag.into_iter().chain([(key.into(), inner)]).collect())
             }
             Step::First => Offer::List(vec![inner]),
         }))
     }
 
     fn kind(&self, path: &[Step]) -> Kind {
-        match self.answer(path, Offer::Text(STRANGE)) {
+        match self.answer(path, Offer::text(STRANGE)) {
             Answer::UnknownVariant(names) => return Kind::Choice(names),
             Answer::Accepted | Answer::Missing(_) => return Kind::Text,
             _ => {}
         }
-        match self.answer(path, Offer::Table(vec![(STRANGE, Offer::Switch(true))])) {
+        match self.answer(path, Offer::table([(STRANGE, Offer::Switch(true))])) {
             Answer::UnknownKey(names) => Kind::Table(self.keys(path, names, None)),
             Answer::Missing(tag) => self.tagged(path, tag),
             Answer::Wanted(what) => self.plain(path, &what),
@@ -98,11 +76,11 @@ impl<F: Fn(Offer) -> Answer> Prober<F> {
     }
 
     fn tagged(&self, path: &[Step], tag: &'static str) -> Kind {
-        let Answer::UnknownVariant(names) = self.answer(path, Offer::Table(vec![(tag, Offer::Text(STRANGE))])) else {
+        let Answer::UnknownVariant(names) = self.answer(path, Offer::table([(tag, Offer::text(STRANGE))])) else {
             return Kind::Other;
         };
         let further = |name| {
-            let strange = Offer::Table(vec![(tag, Offer::Text(name)), (STRANGE, Offer::Switch(true))]);
+            let strange = Offer::table([(tag, Offer::text(name)), (STRANGE, Offer::Switch(true))]);
             match self.answer(path, strange) {
                 Answer::UnknownKey(keys) => self.keys(path, keys, Some((tag, name))),
                 _ => Vec::new(),
@@ -120,9 +98,9 @@ impl<F: Fn(Offer) -> Answer> Prober<F> {
         let kind = |name| self.kind(&[path, &[Step::Key(name, tag)]].concat());
         let mut keys: Vec<Key> = names.iter().map(|&name| Key { name, kind: kind(name), is_required: false }).collect();
         // What is missing from a table that has only the tag, one after the other.
-        let mut given: Vec<(&str, Offer)> = tag.into_iter().map(|(tag, name)| (tag, Offer::Text(name))).collect();
+        let mut given: Vec<(&str, Offer)> = tag.into_iter().map(|(tag, name)| (tag, Offer::text(name))).collect();
         for _ in names {
-            let Answer::Missing(missing) = self.answer(path, Offer::Table(given.clone())) else { break };
+            let Answer::Missing(missing) = self.answer(path, Offer::table(given.clone())) else { break };
             let Some(key) = keys.iter_mut().find(|key| key.name == missing && !key.is_required) else { break };
             key.is_required = true;
             given.push((key.name, example(&key.kind)));
@@ -133,89 +111,22 @@ impl<F: Fn(Offer) -> Answer> Prober<F> {
 
 /// A value that a key of this kind takes.
 fn example(kind: &Kind) -> Offer {
-    let of = |keys: &[Key]| keys.iter().filter(|k| k.is_required).map(|k| (k.name, example(&k.kind))).collect();
+    let of = |keys: &[Key]| -> Vec<(&'static str, Offer)> {
+        keys.iter().filter(|k| k.is_required).map(|k| (k.name, example(&k.kind))).collect()
+    };
     match kind {
         Kind::Number | Kind::Whole { .. } | Kind::Other => Offer::Whole(1),
         Kind::Switch => Offer::Switch(true),
-        Kind::Text => Offer::Text(STRANGE),
-        Kind::Choice(names) => Offer::Text(names.first().copied().unwrap_or(STRANGE)),
+        Kind::Text => Offer::text(STRANGE),
+        Kind::Choice(names) => Offer::text(names.first().copied().unwrap_or(STRANGE)),
         Kind::List { of, len } => Offer::List(vec![example(of); len.unwrap_or(1)]),
-        Kind::Table(keys) => Offer::Table(of(keys)),
+        Kind::Table(keys) => Offer::table(of(keys)),
         Kind::Tagged { tag, kinds } => {
             let (name, keys) = kinds.first().map_or((STRANGE, &[][..]), |(name, keys)| (*name, keys));
-            let mut table: Vec<(&str, Offer)> = of(keys);
-            table.push((tag, Offer::Text(name)));
-            Offer::Table(table)
+            let mut table = of(keys);
+            table.push((tag, Offer::text(name)));
+            Offer::table(table)
         }
-    }
-}
-
-impl std::error::Error for Answer {}
-
-impl Display for Answer {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{self:?}")
-    }
-}
-
-impl serde::de::Error for Answer {
-    fn custom<T: Display>(_: T) -> Self {
-        Self::Other
-    }
-    fn invalid_type(_: Unexpected<'_>, wanted: &dyn Expected) -> Self {
-        Self::Wanted(wanted.to_string())
-    }
-    fn unknown_variant(_: &str, names: &'static [&'static str]) -> Self {
-        Self::UnknownVariant(names)
-    }
-    fn unknown_field(_: &str, names: &'static [&'static str]) -> Self {
-        Self::UnknownKey(names)
-    }
-    fn missing_field(name: &'static str) -> Self {
-        Self::Missing(name)
-    }
-}
-
-impl IntoDeserializer<'_, Answer> for Offer {
-    type Deserializer = Self;
-
-    fn into_deserializer(self) -> Self {
-        self
-    }
-}
-
-impl<'de> Deserializer<'de> for Offer {
-    type Error = Answer;
-
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Answer> {
-        match self {
-            Self::Whole(value) => visitor.visit_u64(value),
-            Self::Switch(value) => visitor.visit_bool(value),
-            Self::Text(text) => visitor.visit_borrowed_str(text),
-            Self::List(values) => visitor.visit_seq(SeqDeserializer::new(values.into_iter())),
-            Self::Table(values) => visitor.visit_map(MapDeserializer::new(values.into_iter())),
-        }
-    }
-
-    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Answer> {
-        visitor.visit_some(self)
-    }
-
-    fn deserialize_enum<V: Visitor<'de>>(
-        self,
-        _: &'static str,
-        _: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, Answer> {
-        match self {
-            Self::Text(text) => visitor.visit_enum(BorrowedStrDeserializer::new(text)),
-            _ => Err(Answer::Other),
-        }
-    }
-
-    serde::forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 u8 u16 u32 u64 f32 f64 char str string bytes byte_buf unit unit_struct newtype_struct seq tuple
-        tuple_struct map struct identifier ignored_any
     }
 }
 

@@ -1,6 +1,7 @@
 //! A text beside the description of its keys: what does not fit, and the table that it stands for.
 
 use super::key::{Key, Kind, join};
+use super::offer::Offer;
 use super::problem::{Located, Problem, SceneError};
 use super::words::{near, one_of, quote, tables_with, wanted};
 use serde::de::DeserializeOwned;
@@ -90,10 +91,10 @@ impl<'a> Document<'a> {
     /// # Errors
     /// What the type says that refuses it nevertheless.
     pub(crate) fn read<T: DeserializeOwned>(&self, table: toml::Table) -> Result<T, SceneError> {
-        T::deserialize(table).map_err(|e| SceneError::Malformed {
+        T::deserialize(Offer::from(table)).map_err(|e| SceneError::Malformed {
             path: self.path.to_owned(),
             line: 1,
-            message: e.message().replace('\n', " "),
+            message: e.to_string(),
         })
     }
 

@@ -218,6 +218,7 @@ pub fn hash_of(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::keys::{Key, Kind, keys_of};
+    use std::path::Path;
 
     /// Keys that `wakescope init` does not write.
     const RARE_KEYS: [&str; 15] = [
@@ -238,12 +239,14 @@ mod tests {
         "start_utc",
     ];
 
+    fn scene_of(text: &str) -> Scene {
+        SceneFile::without_limits(text, Path::new("s.toml")).unwrap()
+    }
+
     #[test]
     fn commented_table2_is_the_default_scene() {
-        let scene: Scene = toml::from_str(TABLE2_TOML).unwrap();
-        assert_eq!(scene, Scene::default());
-        let empty: Scene = toml::from_str("").unwrap();
-        assert_eq!(empty, Scene::default());
+        assert_eq!(scene_of(TABLE2_TOML), Scene::default());
+        assert_eq!(scene_of(""), Scene::default());
     }
 
     /// Names of keys, those of all kinds of tables.
@@ -300,7 +303,7 @@ mod tests {
             .take_while(|l| l.starts_with("# "))
             .map(|l| format!("{}\n", &l[2..]))
             .collect();
-        let read: Turbulence = toml::from_str(&commented).unwrap();
+        let read = scene_of(&format!("[atmosphere.turbulence]\n{commented}")).atmosphere.turbulence;
         assert_eq!(read, Turbulence::Refractive(RefractiveTurbulence::default()));
         let keys = commented.lines().filter(|l| l.contains(" = ")).count();
         assert_eq!(keys, toml::to_string(&read).unwrap().lines().count(), "each key is there");
@@ -311,7 +314,6 @@ mod tests {
         let mut scene = Scene::default();
         scene.detector.snr = SnrReference::Fixed { snr_db: 0.1 + 0.2 };
         scene.flow = Flow::Uniform { lateral_m_s: 1.0 / 3.0, vertical_m_s: -0.0 };
-        let back: Scene = toml::from_str(&scene.to_toml()).unwrap();
-        assert_eq!(back, scene);
+        assert_eq!(scene_of(&scene.to_toml()), scene);
     }
 }

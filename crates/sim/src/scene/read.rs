@@ -61,9 +61,17 @@ impl SceneFile {
     /// Keys that do not exist, values of the wrong kind.
     #[cfg(feature = "sweep")]
     pub(crate) fn whole_table(text: &str, path: &Path) -> Result<toml::Table, SceneError> {
+        Ok(toml::Table::try_from(Self::without_limits(text, path)?).unwrap_or_default())
+    }
+
+    /// The scene of a text, whatever the limits of its values.
+    ///
+    /// # Errors
+    /// Keys that do not exist, values of the wrong kind.
+    #[cfg(any(test, feature = "sweep"))]
+    pub(crate) fn without_limits(text: &str, path: &Path) -> Result<Scene, SceneError> {
         let document = Document::parse(text, path)?;
-        let scene: Scene = document.read(document.vet(&scene_format())?)?;
-        Ok(toml::Table::try_from(scene).unwrap_or_default())
+        document.read(document.vet(&scene_format())?)
     }
 
     /// Checks a scene that was made in memory; its files are relative to the working folder.

@@ -134,9 +134,12 @@ impl Scan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::SceneFile;
+    use std::path::Path;
 
     fn keys(text: &str) -> Vec<String> {
-        toml::from_str::<Scene>(text).unwrap().problems().into_iter().map(|p| p.key).collect()
+        let scene = SceneFile::without_limits(text, Path::new("s.toml")).unwrap();
+        scene.problems().into_iter().map(|p| p.key).collect()
     }
 
     #[test]
