@@ -1,7 +1,7 @@
 //! The one deserializer of scenes and case files: of what a text holds and of what a probe offers alike.
 //!
-//! Serde compiles every type once for each deserializer that it is read from. With one for both, and none of TOML's own
-//! beside it, the keys take a third of the object code that they took with three.
+//! Serde compiles every type once for each deserializer that it is read from, and the keys are a large part of this crate: so
+//! there is one for both, and none of TOML's own beside it.
 
 use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{Deserializer, Expected, IntoDeserializer, Unexpected, Visitor};
