@@ -36,7 +36,7 @@ impl From<toml::Value> for Offer {
             toml::Value::Float(value) => Self::Number(value),
             toml::Value::Boolean(value) => Self::Switch(value),
             toml::Value::String(text) => Self::Text(text.into()),
-            // No key takes a date: as a text it is refused.
+            // The walk beside the keys has refused dates before: no key takes one.
             toml::Value::Datetime(date) => Self::Text(date.to_string().into()),
             toml::Value::Array(values) => Self::List(values.into_iter().map(Self::from).collect()),
             toml::Value::Table(table) => table.into(),
