@@ -20,6 +20,9 @@ const MAY_DEPEND_ON: [(&str, &[&str]); 7] = [
     ("tests", &["optics", "les", "signal", "estimate", "sim"]),
 ];
 
+/// Crates that work on one thread without their feature `rayon`.
+const WITH_THREADS: [&str; 3] = ["wakescope-optics", "wakescope-signal", "wakescope-estimate"];
+
 /// Longest source file, in lines of code: what explains them may take the room that it needs.
 const MAX_CODE_LINES: usize = 500;
 
@@ -327,6 +330,11 @@ fn check_manifest(folder: &str, allowed: &[&str], text: &str, found: &mut Vec<St
         if name.strip_prefix("wakescope-").is_some_and(|own| !allowed.contains(&own)) {
             found.push(format!("{folder}/Cargo.toml:{}: must not know `{name}`", i + 1));
         }
+        // The workspace turns their default features off, and builds of the whole workspace hide that one is missing.
+        let program = folder == "crates/sim" || folder == "xtask";
+        if program && WITH_THREADS.contains(&name) && !line.contains("\"rayon\"") {
+            found.push(format!("{folder}/Cargo.toml:{}: `{name}` without `rayon` works on one thread", i + 1));
+        }
         if name == "ndarray-linalg" && folder != "crates/estimate" {
             found.push(format!("{folder}/Cargo.toml:{}: ndarray-linalg belongs to estimate alone", i + 1));
         }
@@ -358,6 +366,9 @@ mod tests {
         let manifest = "[dependencies]\nwakescope-les.workspace = true\n";
         assert_eq!(complaints(|f| check_manifest("crates/optics", &[], manifest, f)).len(), 1);
         assert!(complaints(|f| check_manifest("crates/sim", &["les"], manifest, f)).is_empty());
+        let one_thread = "[dependencies]\nwakescope-signal.workspace = true\n";
+        assert_eq!(complaints(|f| check_manifest("crates/sim", &["signal"], one_thread, f)).len(), 1);
+        assert!(complaints(|f| check_manifest("crates/estimate", &["signal"], one_thread, f)).is_empty());
         let version = "[dependencies]\nserde = \"1\"\n";
         assert_eq!(complaints(|f| check_manifest("crates/sim", &[], version, f)).len(), 1);
     }

@@ -23,6 +23,7 @@ use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_v
 use super::stage::{Powers, Task, blocks};
 use super::subgrid::{Lent, Subgrid};
 use crate::Error;
+use crate::solver::aligned::Aligned;
 
 /// Share of the explicit limit beyond which the subgrid viscosity is cut. In the core of a vortex WALE's viscosity has no
 /// work to do but would make an explicit step unstable; the cut keeps the step that convection allows.
@@ -46,9 +47,9 @@ pub struct Flow {
 /// What a simulation carries from step to step.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct State {
-    pub(crate) velocity: [Vec<f64>; 3],
-    pub(crate) history: [Vec<f64>; 3],
-    pub(crate) pressure: Vec<f64>,
+    pub(crate) velocity: [Aligned; 3],
+    pub(crate) history: [Aligned; 3],
+    pub(crate) pressure: Aligned,
     pub(crate) time_s: f64,
     pub(crate) step: u64,
     /// Length of the last step, zero before the first.
@@ -62,10 +63,10 @@ pub(crate) struct State {
 
 #[derive(Debug, Default)]
 struct Work {
-    star: [Vec<f64>; 3],
-    phi: Vec<f64>,
+    star: [Aligned; 3],
+    phi: Aligned,
     /// Weighted divergence, kept for the rotational form.
-    divergence: Vec<f64>,
+    divergence: Aligned,
 }
 
 impl Flow {
@@ -111,7 +112,7 @@ impl Flow {
         refuse_sticking_without_viscosity(&mesh, settings.viscosity_m2_s)?;
         let layout = Layout::on(&mesh, settings.memory_order, settings.ranks.clone())?;
         let n = layout.shape.len();
-        let field = || vec![0.0; n];
+        let field = || Aligned::zeros(n);
         let fields = || [field(), field(), field()];
         let state = State {
             velocity: fields(),
@@ -124,7 +125,7 @@ impl Flow {
             energy: 0.0,
             implicit: [false; 3],
         };
-        let divergence = if settings.rotational { field() } else { Vec::new() };
+        let divergence = if settings.rotational { field() } else { Aligned::default() };
         Ok(Self {
             ops: std::array::from_fn(|axis| Momentum::new(&layout, axis)),
             divergence: Divergence::new(&layout),
@@ -292,16 +293,16 @@ impl Flow {
     fn update_model(&mut self, limit_per_s: f64) -> Result<(), Error> {
         let Self { state, work, pressure_solver, model: Some(model), .. } = self else { return Ok(()) };
         let lent = Lent { in_plane: &mut work.star, small: [&mut work.phi, pressure_solver.spare()] };
-        model.update(state.velocity.each_ref().map(Vec::as_slice), limit_per_s, lent)
+        model.update(state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, lent)
     }
 
     /// What the momentum equation reads, and what it writes: `star` and the history.
-    fn task(&mut self) -> (Task<'_>, &mut [Vec<f64>; 3], &mut [Vec<f64>; 3]) {
+    fn task(&mut self) -> (Task<'_>, &mut [Aligned; 3], &mut [Aligned; 3]) {
         let Self { ops, state, work, model, layout, settings, .. } = self;
         let task = Task {
             layout,
             ops,
-            velocity: state.velocity.each_ref().map(Vec::as_slice),
+            velocity: state.velocity.each_ref().map(Aligned::as_slice),
             pressure: &state.pressure,
             model: model.as_ref(),
             viscosity_m2_s: settings.viscosity_m2_s,

@@ -23,7 +23,7 @@ fn rough(at_m: [f64; 3]) -> [f64; 3] {
 fn production(flow: &Flow) -> (f64, [f64; 3]) {
     let shape = flow.layout.shape;
     let mut scratch = Scratch::new(shape.n[0]);
-    let velocity = flow.state.velocity.each_ref().map(Vec::as_slice);
+    let velocity = flow.state.velocity.each_ref().map(Aligned::as_slice);
     let (mut energy, mut energy_moduli) = (0.0, 0.0);
     let mut momentum = [0.0; 3];
     for axis in 0..3 {

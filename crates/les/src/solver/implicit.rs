@@ -29,6 +29,8 @@ pub(crate) struct LineSolver {
 
 /// Lines of axis 0 that are solved side by side.
 const TILE: usize = 16;
+/// Lines of axis 2 that are solved side by side: a gathered strip stays in the second cache.
+const COLUMNS: usize = 64;
 
 impl LineSolver {
     /// Factors `1 - a L` of component `ops` along `axis`, `a_s_m2` being half the time step times the viscosity \[m^2\].
@@ -104,43 +106,24 @@ impl LineSolver {
         }
     }
 
-    /// Lines along axis 2: the row of each index of axis 1 is gathered from all planes.
+    /// Lines along axis 2: some neighbours of a plane are gathered from all planes, for rows of the same place in all planes get in
+    /// each other's way in the caches.
     fn solve_across_planes(&self, shape: Shape, field: &mut [f64]) {
-        let width = shape.n[0];
-        let mut strips: Vec<Vec<&mut [f64]>> = (0..shape.n[1]).map(|_| Vec::with_capacity(shape.n[2])).collect();
+        let strip = || Vec::with_capacity(shape.n[2]);
+        let mut strips: Vec<Vec<&mut [f64]>> = (0..shape.plane().div_ceil(COLUMNS)).map(|_| strip()).collect();
         for plane in field.chunks_mut(shape.plane()) {
-            for (strip, row) in strips.iter_mut().zip(plane.chunks_mut(width)) {
-                strip.push(row);
-            }
+            strips.iter_mut().zip(plane.chunks_mut(COLUMNS)).for_each(|(strip, part)| strip.push(part));
         }
-        // A plane flow has one strip; it is then cut along the rows.
-        if shape.n[1] == 1 {
-            strips = cut(strips, width);
-        }
-        strips.par_iter_mut().for_each(|strip| {
-            let width = strip.first().map_or(0, |row| row.len());
-            let mut block = vec![0.0; strip.len() * width];
-            for (to, from) in block.chunks_mut(width).zip(strip.iter()) {
-                to.copy_from_slice(from);
-            }
-            solve_block(self, &mut block, width);
+        strips.par_iter_mut().for_each_init(Vec::new, |block: &mut Vec<f64>, strip| {
+            let width = strip.first().map_or(0, |part| part.len());
+            block.clear();
+            strip.iter().for_each(|part| block.extend_from_slice(part));
+            solve_block(self, block, width);
             for (from, to) in block.chunks(width).zip(strip.iter_mut()) {
                 to.copy_from_slice(from);
             }
         });
     }
-}
-
-/// Cuts strips of rows into strips of at most 32 columns.
-fn cut(strips: Vec<Vec<&mut [f64]>>, width: usize) -> Vec<Vec<&mut [f64]>> {
-    const COLUMNS: usize = 32;
-    let mut pieces: Vec<Vec<&mut [f64]>> = (0..width.div_ceil(COLUMNS)).map(|_| Vec::new()).collect();
-    for row in strips.into_iter().flatten() {
-        for (piece, part) in pieces.iter_mut().zip(row.chunks_mut(COLUMNS)) {
-            piece.push(part);
-        }
-    }
-    pieces
 }
 
 /// Solves lines that run across the rows of `block`, which are `width` long.

@@ -3,6 +3,7 @@
 // Indices stand for directions and places of stencils; kernels take their rows one by one, so that they vectorise.
 #![allow(clippy::needless_range_loop, clippy::too_many_arguments)]
 
+mod aligned;
 pub mod cases;
 mod checkpoint;
 mod control;

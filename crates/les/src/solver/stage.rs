@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use super::aligned::Aligned;
 use super::layout::{Layout, Shape};
 use super::momentum::{Momentum, Scratch};
 use super::projection::weighted_dot;
@@ -26,10 +27,10 @@ pub(super) struct Block<'a> {
 
 /// Cuts the planes that are owned into blocks of the same rows of one plane after the other, so that rows of the planes about a
 /// block have just been read.
-pub(super) fn blocks<'a>(shape: Shape, star: &'a mut [Vec<f64>; 3], history: &'a mut [Vec<f64>; 3]) -> Vec<Block<'a>> {
+pub(super) fn blocks<'a>(shape: Shape, star: &'a mut [Aligned; 3], history: &'a mut [Aligned; 3]) -> Vec<Block<'a>> {
     let [n0, n1, _] = shape.n;
     let rows = n1.div_ceil((n0 * n1).div_ceil(BLOCK));
-    let pieces = |field: &'a mut Vec<f64>| {
+    let pieces = |field: &'a mut Aligned| {
         let planes = field[shape.own_places()].chunks_mut(shape.plane());
         planes.flat_map(move |plane| plane.chunks_mut(rows * n0))
     };
@@ -188,7 +189,8 @@ mod tests {
     #[test]
     fn blocks_hold_every_value_that_is_owned_once_and_in_its_place() {
         for shape in [Shape::whole([100, 130, 5]), Shape::slab([100, 41, 16], 1, 3), Shape::whole([5000, 2, 9])] {
-            let mut star = [0, 1, 2].map(|axis| (0..shape.len()).map(|place| (3 * place + axis) as f64).collect());
+            let values = |axis| (0..shape.len()).map(move |place| (3 * place + axis) as f64).collect::<Vec<f64>>();
+            let mut star = [0, 1, 2].map(|axis| Aligned::from(&values(axis)[..]));
             let mut history = star.clone();
             let mut seen = 0;
             for Block { plane, row, star, history } in blocks(shape, &mut star, &mut history) {

@@ -17,6 +17,7 @@ use super::layout::Layout;
 use super::mesh::{AXIS_NAMES, Mesh};
 use super::settings::FlowSettings;
 use crate::Error;
+use crate::solver::aligned::Aligned;
 use container::{Content, Planes, Reader, Tag};
 
 /// Version of the content. Raise it with every change of the sections, of the texts in [`identity`], or of what a run keeps
@@ -102,7 +103,7 @@ impl Flow {
         let read = Self::read(path.as_ref(), &mesh, &settings);
         // The ranks that share the flow must agree on that, too.
         let (mut flow, user_data) = Layout::on(&mesh, settings.memory_order, settings.ranks)?.slabs.agree(read)?;
-        let [u, v, w] = flow.state.velocity.each_mut().map(Vec::as_mut_slice);
+        let [u, v, w] = flow.state.velocity.each_mut().map(Aligned::as_mut_slice);
         flow.layout.slabs.halos(&mut [u, v, w, &mut flow.state.pressure])?;
         Ok((flow, user_data))
     }

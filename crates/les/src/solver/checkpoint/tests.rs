@@ -70,7 +70,9 @@ fn a_restart_after_any_step_continues_with_the_same_bits_on_other_threads() {
                 flow.state
             });
             // `PartialEq` takes 0 for -0, so compare the bits.
-            let bits = |state: &State| state.velocity.iter().flatten().map(|v| v.to_bits()).collect::<Vec<_>>();
+            let bits = |state: &State| {
+                state.velocity.iter().flat_map(|field| field.iter()).map(|v| v.to_bits()).collect::<Vec<_>>()
+            };
             assert_eq!(state, states[5], "{settings:?} from step {step}");
             assert_eq!(bits(&state), bits(&states[5]));
         }

@@ -9,6 +9,7 @@
 
 use super::{Flow, Solved, add_multiple, correct, divide_by_volume};
 use crate::error::{Error, PressureFailure};
+use crate::solver::aligned::Aligned;
 use crate::solver::pressure::norm;
 
 /// Most repetitions.
@@ -26,7 +27,7 @@ impl Flow {
     /// neither relative to what was to be corrected nor to the velocity over the cell.
     pub(super) fn project(&mut self, stage_s: f64) -> Result<Solved, Error> {
         self.layout.slabs.halos(&mut [&mut self.work.star[2]])?;
-        let star = self.work.star.each_ref().map(Vec::as_slice);
+        let star = self.work.star.each_ref().map(Aligned::as_slice);
         self.divergence.apply(star, 1.0 / stage_s, &mut self.work.phi);
         if self.settings.rotational {
             self.work.divergence.copy_from_slice(&self.work.phi);
@@ -43,8 +44,8 @@ impl Flow {
         let Err(Error::PressureNotSolved { reason, .. }) = &solved else { return solved };
         match reason {
             PressureFailure::RoundOff { .. } => {
-                let mut right = vec![0.0; self.layout.shape.len()];
-                self.divergence.apply(self.work.star.each_ref().map(Vec::as_slice), 1.0 / stage_s, &mut right);
+                let mut right = Aligned::zeros(self.layout.shape.len());
+                self.divergence.apply(self.work.star.each_ref().map(Aligned::as_slice), 1.0 / stage_s, &mut right);
                 let size = norm(&self.layout.slabs, &right)?;
                 let left = self.repeat(stage_s, tolerance * size)?;
                 // A step that hardly changes the flow has so little to correct that round-off of the velocity is more than the
@@ -65,10 +66,10 @@ impl Flow {
     /// Projects the velocity again till the norm of its weighted divergence over `stage_s` is at most `enough`, or falls no
     /// more; returns that norm. What the pressure adds goes to `phi`.
     pub(super) fn repeat(&mut self, stage_s: f64, enough: f64) -> Result<f64, Error> {
-        let mut rest = vec![0.0; self.layout.shape.len()];
+        let mut rest = Aligned::zeros(self.layout.shape.len());
         let mut last = f64::INFINITY;
         for _ in 0..=MAX_REPETITIONS {
-            self.divergence.apply(self.state.velocity.each_ref().map(Vec::as_slice), 1.0 / stage_s, &mut rest);
+            self.divergence.apply(self.state.velocity.each_ref().map(Aligned::as_slice), 1.0 / stage_s, &mut rest);
             let size = norm(&self.layout.slabs, &rest)?;
             if size <= enough || size > GAIN * last {
                 return Ok(size);
@@ -87,8 +88,8 @@ impl Flow {
 
     /// `velocity = star - stage_s grad(phi)`.
     fn correct(&mut self, stage_s: f64, phi: &[f64]) -> Result<(), Error> {
-        let star = self.work.star.each_ref().map(Vec::as_slice);
-        let mut velocity = self.state.velocity.each_mut().map(Vec::as_mut_slice);
+        let star = self.work.star.each_ref().map(Aligned::as_slice);
+        let mut velocity = self.state.velocity.each_mut().map(Aligned::as_mut_slice);
         let planes =
             correct(&self.ops, &self.layout, star, phi, stage_s, velocity.each_mut().map(|field| &mut **field));
         self.layout.slabs.halos(&mut velocity)?;

@@ -26,6 +26,7 @@ use super::refine::{Pass, Refinement};
 use super::solver::{PressureSolver, Solved, check_request};
 use super::transform::{LineTransform, RowTransform, Work};
 use crate::Error;
+use crate::solver::aligned::Aligned;
 
 /// What is done along axis 1 or 2.
 #[derive(Debug)]
@@ -196,7 +197,7 @@ impl PressureSolver for Direct {
         solved
     }
 
-    fn spare(&mut self) -> &mut Vec<f64> {
+    fn spare(&mut self) -> &mut Aligned {
         self.refinement.spare()
     }
 

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::apply::Operator;
 use super::solver::Solved;
 use crate::error::{Error, PressureFailure};
+use crate::solver::aligned::Aligned;
 
 /// Relative residuals that a pass saw after its iterations; none if it has none.
 #[derive(Debug)]
@@ -15,8 +16,8 @@ pub(crate) struct Pass(pub(crate) Vec<f64>);
 /// Fields kept from solve to solve.
 #[derive(Debug, Default)]
 pub(crate) struct Refinement {
-    right: Vec<f64>,
-    left: Vec<f64>,
+    right: Aligned,
+    left: Aligned,
 }
 
 /// Passes after which the residual no longer falls.
@@ -32,7 +33,7 @@ const BALANCED: f64 = 0.01;
 
 impl Refinement {
     /// A field that is free between solves.
-    pub(crate) fn spare(&mut self) -> &mut Vec<f64> {
+    pub(crate) fn spare(&mut self) -> &mut Aligned {
         &mut self.right
     }
 
@@ -51,7 +52,7 @@ impl Refinement {
     ) -> Result<Solved, Error> {
         let refused = |history, reason| Err(Error::PressureNotSolved { method, tolerance, reason, history });
         // The solvers ignore what no pressure can balance; only the residual must not hold it against them.
-        self.right.resize(field.len(), 0.0);
+        self.right.fit(field.len());
         let [size, imbalance] = operator.copy_balanced(field, &mut self.right, BALANCED * tolerance)?;
         if size == 0.0 {
             field.fill(0.0);
@@ -70,7 +71,7 @@ impl Refinement {
                 history.pop();
             }
             if pass > 0 {
-                field.par_iter_mut().zip(&self.left).for_each(|(phi, more)| *phi += more);
+                field.par_iter_mut().zip(&self.left[..]).for_each(|(phi, more)| *phi += more);
             }
             operator.slabs().halos(&mut [field])?;
             let residual = operator.residual_norm(&self.right, field)? / size;
@@ -87,7 +88,7 @@ impl Refinement {
                 break;
             }
             last = residual;
-            self.left.resize(field.len(), 0.0);
+            self.left.fit(field.len());
             operator.residual(&self.right, field, &mut self.left);
             // The solvers take the negative of their right side.
             self.left.par_iter_mut().for_each(|value| *value = -*value);

@@ -3,6 +3,7 @@
 use super::super::layout::Shape;
 use crate::Error;
 use crate::error::check;
+use crate::solver::aligned::Aligned;
 
 /// Refuses a field of another size and a tolerance that is no number.
 pub(super) fn check_request(shape: Shape, field: &[f64], tolerance: f64) -> Result<(), Error> {
@@ -42,7 +43,7 @@ pub(crate) trait PressureSolver: Send + std::fmt::Debug {
     fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error>;
 
     /// A field of this solver that is free between its solves.
-    fn spare(&mut self) -> &mut Vec<f64>;
+    fn spare(&mut self) -> &mut Aligned;
 
     /// The method and what it is made of, for the log.
     fn describe(&self) -> String;

@@ -36,6 +36,7 @@ use super::layout::Layout;
 use super::slabs::Slabs;
 use crate::Error;
 use crate::error::check;
+use crate::solver::aligned::Aligned;
 use filter::{Filter, HIGHEST_ORDER};
 use operators::Operators;
 use stress::Stress;
@@ -88,9 +89,9 @@ impl SubgridModel {
 #[derive(Debug)]
 pub(crate) struct Lent<'a> {
     /// Gets the acceleration by the stresses whose divergence is taken in planes \[m/s^2\].
-    pub(crate) in_plane: &'a mut [Vec<f64>; 3],
+    pub(crate) in_plane: &'a mut [Aligned; 3],
     /// Get small scales of the first two components; made if they are not there.
-    pub(crate) small: [&'a mut Vec<f64>; 2],
+    pub(crate) small: [&'a mut Aligned; 2],
 }
 
 /// A subgrid model at work on one mesh.
@@ -99,9 +100,9 @@ pub(crate) struct Subgrid {
     formula: Formula,
     operators: Operators,
     /// The filter of the multiscale model, and the small scales of the last component.
-    small: Option<(Filter, Vec<f64>)>,
+    small: Option<(Filter, Aligned)>,
     /// At the centres \[m^2/s\].
-    viscosity: Vec<f64>,
+    viscosity: Aligned,
     largest: Largest,
     stress: Stress,
     slabs: Slabs,
@@ -118,8 +119,8 @@ impl Subgrid {
         Ok(Some(Self {
             formula,
             operators: Operators::new(layout),
-            small: order.map(|order| (Filter::new(layout, order), vec![0.0; cells])),
-            viscosity: vec![0.0; cells],
+            small: order.map(|order| (Filter::new(layout, order), Aligned::zeros(cells))),
+            viscosity: Aligned::zeros(cells),
             largest: Largest::default(),
             stress: Stress::new(cells),
             slabs: layout.slabs.clone(),
@@ -140,8 +141,8 @@ impl Subgrid {
         let strained = match small {
             Some((filter, third)) => {
                 let [first, second] = lent.small;
-                first.resize(third.len(), 0.0);
-                second.resize(third.len(), 0.0);
+                first.fit(third.len());
+                second.fit(third.len());
                 let mut small = [first.as_mut_slice(), second, third];
                 filter.small_scales(velocity_m_s, &mut small);
                 let [a, b, c] = small;
@@ -154,7 +155,7 @@ impl Subgrid {
             }
         };
         self.stress.update(operators, viscosity, strained, lent.in_plane);
-        let [a, b, c] = self.stress.across.each_mut().map(Vec::as_mut_slice);
+        let [a, b, c] = self.stress.across.each_mut().map(Aligned::as_mut_slice);
         slabs.halos(&mut [a, b, c])
     }
 

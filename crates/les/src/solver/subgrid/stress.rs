@@ -16,12 +16,13 @@ use rayon::prelude::*;
 use super::super::row_operator::RowOperator;
 use super::super::rows::{HALO, cut_rows, pad};
 use super::operators::Operators;
+use crate::solver::aligned::Aligned;
 
 /// What the divergence needs of the stress.
 #[derive(Debug, Clone)]
 pub(super) struct Stress {
     /// `tau_02`, `tau_12` at the edges and `tau_22` at the centres \[m^2/s^2\].
-    pub(super) across: [Vec<f64>; 3],
+    pub(super) across: [Aligned; 3],
 }
 
 #[derive(Debug)]
@@ -43,7 +44,7 @@ struct Planes<'a> {
 
 impl Stress {
     pub(super) fn new(cells: usize) -> Self {
-        Self { across: [vec![0.0; cells], vec![0.0; cells], vec![0.0; cells]] }
+        Self { across: [0, 1, 2].map(|_| Aligned::zeros(cells)) }
     }
 
     /// The stress by the viscosity at the centres and the strain of `velocity`. `in_plane` gets the acceleration of each component by
@@ -53,7 +54,7 @@ impl Stress {
         operators: &Operators,
         viscosity: &[f64],
         velocity: [&[f64]; 3],
-        in_plane: &mut [Vec<f64>; 3],
+        in_plane: &mut [Aligned; 3],
     ) {
         let shape = operators.shape;
         let (n, plane) = (shape.n[0], shape.plane());

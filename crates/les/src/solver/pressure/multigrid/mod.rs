@@ -29,6 +29,7 @@ use super::refine::{Pass, Refinement};
 use super::solver::{PressureSolver, Solved, check_request};
 use super::transform::{self, RowTransform};
 use crate::Error;
+use crate::solver::aligned::Aligned;
 use cycle::Hierarchy;
 use grid::Axis;
 use krylov::Plane;
@@ -186,7 +187,7 @@ impl PressureSolver for Multigrid {
         solved
     }
 
-    fn spare(&mut self) -> &mut Vec<f64> {
+    fn spare(&mut self) -> &mut Aligned {
         self.refinement.spare()
     }
 

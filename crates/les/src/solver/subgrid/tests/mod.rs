@@ -16,9 +16,9 @@ struct Modelled {
     layout: Layout,
     velocity: [Vec<f64>; 3],
     model: Subgrid,
-    in_plane: [Vec<f64>; 3],
+    in_plane: [Aligned; 3],
     /// Small scales of the first two components.
-    small: [Vec<f64>; 2],
+    small: [Aligned; 2],
 }
 
 impl Modelled {
@@ -29,7 +29,7 @@ impl Modelled {
         let layout = Layout::new(&mesh, Some([0, 1, 2]));
         let velocity = faces(&mesh, &layout, field);
         let model = Subgrid::new(&layout, model).unwrap().unwrap();
-        let field = || vec![0.0; layout.shape.len()];
+        let field = || Aligned::zeros(layout.shape.len());
         let (small, in_plane) = ([field(), field()], [field(), field(), field()]);
         let mut modelled = Self { mesh, layout, velocity, model, in_plane, small };
         modelled.update(f64::INFINITY);
@@ -44,7 +44,7 @@ impl Modelled {
     /// The small scales of the multiscale model.
     fn small(&self) -> Option<[Vec<f64>; 3]> {
         let [first, second] = &self.small;
-        self.model.small.as_ref().map(|(_, third)| [first.clone(), second.clone(), third.clone()])
+        self.model.small.as_ref().map(|(_, third)| [first, second, third].map(|scales| scales.to_vec()))
     }
 
     fn index(&self, place: usize) -> [usize; 3] {
@@ -59,7 +59,7 @@ impl Modelled {
     fn acceleration(&self) -> [Vec<f64>; 3] {
         let shape = self.layout.shape;
         std::array::from_fn(|component| {
-            let mut field = self.in_plane[component].clone();
+            let mut field = self.in_plane[component].to_vec();
             for k in 0..shape.n[2] {
                 for j in 0..shape.n[1] {
                     self.model.add_divergence_row(component, j, k, &mut field[shape.row(j, k)]);
