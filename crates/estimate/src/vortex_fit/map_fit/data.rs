@@ -115,7 +115,8 @@ pub struct MapFitOptions {
     pub correlated_lines: usize,
     /// Most evaluations of the map in a round.
     pub max_iterations: usize,
-    /// The fit ends when the step that is left is below this part of its standard deviations.
+    /// The fit ends when the step that is left is below this part of its standard deviations; for the map of an estimator with velocities
+    /// that say the same as their neighbours counted once.
     pub tolerance_sigmas: f64,
 }
 

@@ -32,6 +32,18 @@ const NODE_M: f64 = 1.25;
 /// And at most this part of the pulse's length, c sigma / 2.
 const NODE_OVER_PULSE: f64 = 0.25;
 
+/// Nodes at both ends of a gate that together see less than this part of its power are left out.
+const LEFT_OUT: f64 = 1e-5;
+
+/// Powers that come before their sum reaches `least`.
+fn below<'p>(powers: impl Iterator<Item = &'p f64>, least: f64) -> usize {
+    let sums = powers.scan(0.0, |sum, power| {
+        *sum += power;
+        Some(*sum)
+    });
+    sums.take_while(|sum| *sum < least).count()
+}
+
 /// How the velocities of a map were estimated: correlogram, estimator, pulse, noise and regions.
 #[derive(Clone)]
 pub struct EstimatorResponse<'a> {
@@ -101,17 +113,7 @@ impl<'a> EstimatorResponse<'a> {
     ) -> Result<Array2<f64>, Error> {
         wake.validate()?;
         crate::vortex_fit::map_fit::data::validate_axes(elevation_rad, range_m)?;
-        Ok(self.prepared(range_m).velocities(model, wake, elevation_rad))
-    }
-
-    /// The mean over a gate, which a wide line would show.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] if the weights have no power.
-    pub(crate) fn kernel(&self, range_m: &[f64]) -> Result<RangeKernel, Error> {
-        let prepared = self.prepared(range_m);
-        let weights: Vec<f64> = prepared.weights.iter().step_by(prepared.numbers).copied().collect();
-        RangeKernel::new(prepared.first_offset_m, prepared.spacing_m, &weights)
+        Ok(self.prepared(model, (elevation_rad, range_m), 1.0).velocities(wake))
     }
 
     /// Radius of the regions \[m\].
@@ -119,12 +121,17 @@ impl<'a> EstimatorResponse<'a> {
         self.radius_m
     }
 
-    /// The weights of the air on nodes that fit the gates.
-    pub(crate) fn prepared<'r>(&'r self, range_m: &'r [f64]) -> Prepared<'r> {
+    /// The weights of the air on nodes that fit the gates of those elevations and ranges, `coarser` times as far apart as maps need.
+    pub(crate) fn prepared<'r>(
+        &'r self,
+        model: &'r WakeModel,
+        (elevation_rad, range_m): (&'r [f64], &'r [f64]),
+        coarser: f64,
+    ) -> Prepared<'r> {
         let (period_s, sigma_s) = (self.sampling.period_s(), self.pulse.sigma_s());
         let lags = self.tapers[0].weights.len();
         let gap_m = range_m.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
-        let widest_m = NODE_M.min(NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
+        let widest_m = coarser * NODE_M.min(NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
         // gates fall on nodes unless they are so close that this would take many more
         let fits = gap_m.is_finite() && gap_m > 0.25 * widest_m;
         let spacing_m = if fits { gap_m / (gap_m / widest_m).ceil() } else { widest_m };
@@ -143,15 +150,29 @@ impl<'a> EstimatorResponse<'a> {
                 weights.extend(std::iter::repeat_n(weight, numbers / lags));
             }
         }
-        let power: f64 = weights.iter().step_by(numbers).sum();
+        let powers: Vec<f64> = weights.iter().step_by(numbers).copied().collect();
+        let power: f64 = powers.iter().sum();
+        let least = 0.5 * LEFT_OUT * power;
+        let (before, after) = (below(powers.iter(), least), below(powers.iter().rev(), least));
+        weights.truncate((powers.len() - after) * numbers);
+        weights.drain(..before * numbers);
         weights.iter_mut().for_each(|weight| *weight /= power);
-        Prepared { response: self, range_m, first_offset_m: -(reach as f64) * spacing_m, spacing_m, numbers, weights }
+        let regions = elevation_rad
+            .iter()
+            .enumerate()
+            .flat_map(|(line, _)| range_m.iter().map(move |&range_m| (line, range_m)))
+            .map(|(line, range_m)| region(elevation_rad, line, range_m, self.radius_m).collect())
+            .collect();
+        let first_offset_m = (before as f64 - reach as f64) * spacing_m;
+        Prepared { response: self, model, elevation_rad, range_m, first_offset_m, spacing_m, numbers, weights, regions }
     }
 }
 
-/// A response with its weights on nodes.
+/// A response at the places of a map, with its weights on nodes.
 pub(crate) struct Prepared<'r> {
     response: &'r EstimatorResponse<'r>,
+    model: &'r WakeModel,
+    elevation_rad: &'r [f64],
     range_m: &'r [f64],
     first_offset_m: f64,
     spacing_m: f64,
@@ -159,20 +180,35 @@ pub(crate) struct Prepared<'r> {
     numbers: usize,
     /// \[node, number\]
     weights: Vec<f64>,
+    /// Lines of the region of each place with their shares, one line of the map after the other.
+    regions: Vec<Vec<(usize, f64)>>,
 }
 
 impl Prepared<'_> {
+    /// The mean over a gate, which a wide line would show.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the weights have no power.
+    pub(crate) fn kernel(&self) -> Result<RangeKernel, Error> {
+        let weights: Vec<f64> = self.weights.iter().step_by(self.numbers).copied().collect();
+        RangeKernel::new(self.first_offset_m, self.spacing_m, &weights)
+    }
+
+    /// Lines of the region of a place with their shares.
+    fn region(&self, line: usize, gate: usize) -> &[(usize, f64)] {
+        &self.regions[line * self.range_m.len() + gate]
+    }
+
     /// The map of a wake.
-    pub(crate) fn velocities(&self, model: &WakeModel, wake: &Wake, elevation_rad: &[f64]) -> Array2<f64> {
-        let (lines, gates) = (elevation_rad.len(), self.range_m.len());
-        let correlograms = map_indexed(lines, Vec::new, |phasors, line| {
-            self.line(model, wake, Ray::new(elevation_rad[line]), phasors)
-        });
+    pub(crate) fn velocities(&self, wake: &Wake) -> Array2<f64> {
+        let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
+        let correlograms =
+            map_indexed(lines, Vec::new, |phasors, line| self.line(wake, Ray::new(self.elevation_rad[line]), phasors));
         let state = || (Scratch::new(), vec![0.0; self.numbers]);
         let rows = map_indexed(lines, state, |(scratch, mean), line| {
             let one = |gate: usize| {
                 mean.copy_from_slice(&self.response.noise);
-                for (other, share) in region(elevation_rad, line, self.range_m[gate], self.response.radius_m) {
+                for &(other, share) in self.region(line, gate) {
                     let lags = &correlograms[other][gate * self.numbers..][..self.numbers];
                     mean.iter_mut().zip(lags).for_each(|(sum, lag)| *sum += share * lag);
                 }
@@ -184,27 +220,26 @@ impl Prepared<'_> {
     }
 
     /// Variance of the velocities \[m^2/s^2\] of the air that each place of the map sees.
-    pub(crate) fn variances(&self, model: &WakeModel, wake: &Wake, elevation_rad: &[f64]) -> Array2<f64> {
-        let (lines, gates) = (elevation_rad.len(), self.range_m.len());
+    pub(crate) fn variances(&self, wake: &Wake) -> Array2<f64> {
+        let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
         let nodes = self.weights.len() / self.numbers;
         let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
         let moments = map_indexed(lines, Vec::new, |velocities: &mut Vec<f64>, line| {
-            let ray = Ray::new(elevation_rad[line]);
+            let ray = Ray::new(self.elevation_rad[line]);
             velocities.clear();
-            let one = |range_m: &f64| {
+            let mut one = |range_m: &f64| {
                 let index = ((range_m - nearest_m) / self.spacing_m).round() as usize;
                 while velocities.len() < index + nodes {
                     let at_m = nearest_m + self.first_offset_m + velocities.len() as f64 * self.spacing_m;
-                    velocities.push(model.velocity_on(wake, at_m, ray));
+                    velocities.push(self.model.velocity_on(wake, at_m, ray));
                 }
                 let seen = self.weights.iter().step_by(self.numbers).zip(&velocities[index..]);
                 seen.fold([0.0, 0.0], |[mean, square], (w, v)| [mean + w * v, square + w * v * v])
             };
-            self.range_m.iter().map(one).collect::<Vec<[f64; 2]>>()
+            self.range_m.iter().map(&mut one).collect::<Vec<[f64; 2]>>()
         });
         Array2::from_shape_fn((lines, gates), |(line, gate)| {
-            let lines = region(elevation_rad, line, self.range_m[gate], self.response.radius_m);
-            let [mean, square] = lines.fold([0.0, 0.0], |[mean, square], (other, share)| {
+            let [mean, square] = self.region(line, gate).iter().fold([0.0, 0.0], |[mean, square], &(other, share)| {
                 let [m, s] = moments[other][gate];
                 [mean + share * m, square + share * s]
             });
@@ -213,7 +248,7 @@ impl Prepared<'_> {
     }
 
     /// Expected correlograms of the signal at all gates of a line, of power 1.
-    fn line(&self, model: &WakeModel, wake: &Wake, ray: Ray, phasors: &mut Vec<f64>) -> Vec<f64> {
+    fn line(&self, wake: &Wake, ray: Ray, phasors: &mut Vec<f64>) -> Vec<f64> {
         let sampling = &self.response.sampling;
         let (Some(&nearest_m), Some(&farthest_m)) = (self.range_m.first(), self.range_m.last()) else {
             return Vec::new();
@@ -222,7 +257,7 @@ impl Prepared<'_> {
         let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + nodes + 1;
         let turn = |point: usize| {
             let at_m = nearest_m + self.first_offset_m + point as f64 * self.spacing_m;
-            let cycles = sampling.frequency_hz(model.velocity_on(wake, at_m, ray)) * sampling.period_s();
+            let cycles = sampling.frequency_hz(self.model.velocity_on(wake, at_m, ray)) * sampling.period_s();
             (TAU * cycles).sin_cos()
         };
         let turns: Vec<(f64, f64)> = (0..points).map(turn).collect();

@@ -5,6 +5,8 @@
 //! left one clockwise and the right one anticlockwise as those of an aircraft are. Check: wakes at many places, in
 //! noise and among outliers, come out near enough for the fit; maps of noise hold no vortex.
 
+use multiversion::multiversion;
+
 use crate::error::Error;
 use crate::parallel::map_indexed;
 use crate::vortex_fit::map_fit::data::median;
@@ -17,6 +19,10 @@ use crate::vortex_fit::{RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
 const BLOCKS: usize = 48;
 /// Places along each axis.
 const PLACES: usize = 26;
+/// Left vortices that are tried side by side.
+const SIDE_BY_SIDE: usize = 4;
+/// Vortices are no closer \[m\].
+const CLOSEST_M: f64 = 2.0;
 /// Velocities that a search needs.
 const NEEDED: usize = 100;
 /// Least significance: explained sum of squares over the variance of what is left, per number of the pair.
@@ -223,6 +229,26 @@ fn orthonormal(shapes: [Vec<f64>; 2]) -> Vec<Vec<f64>> {
     basis
 }
 
+/// Scalar products of some shapes with one, each as [`crate::linalg::dot`] forms it, with the widest vectors that the processor has.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn products(shapes: [&[f64]; SIDE_BY_SIDE], other: &[f64]) -> [f64; SIDE_BY_SIDE] {
+    let mut sums = [[0.0; 8]; SIDE_BY_SIDE];
+    let (chunks, rest) = other.as_chunks::<8>();
+    let parts = shapes.map(|shape| shape.as_chunks::<8>());
+    for (place, other) in chunks.iter().enumerate() {
+        for (sums, (shape, _)) in sums.iter_mut().zip(&parts) {
+            for lane in 0..8 {
+                sums[lane] += shape[place][lane] * other[lane];
+            }
+        }
+    }
+    let mut found = [0.0; SIDE_BY_SIDE];
+    for ((found, sums), (_, last)) in found.iter_mut().zip(sums).zip(parts) {
+        *found = sums.iter().sum::<f64>() + last.iter().zip(rest).map(|(a, b)| a * b).sum::<f64>();
+    }
+    found
+}
+
 /// Takes the part along the basis away.
 fn remove(basis: &[Vec<f64>], shape: &mut [f64]) {
     for direction in basis {
@@ -235,35 +261,40 @@ impl Search {
     /// For each place of a left vortex the best one of a right vortex with positive circulations of both.
     pub(crate) fn pairs(&self) -> Vec<Pair> {
         let (towards, squares) = self.products();
-        let best = map_indexed(
-            self.places.len(),
+        // a few left ones at a time, so that the shapes, which are many, are read but once for them
+        let some = map_indexed(
+            self.places.len().div_ceil(SIDE_BY_SIDE),
             || (),
-            |(), left| {
-                let mut best: Option<Pair> = None;
-                // a clockwise vortex shows the opposite shape
-                let (a, aa) = (-towards[left], squares[left]);
+            |(), group| {
+                let lefts: [usize; SIDE_BY_SIDE] =
+                    std::array::from_fn(|i| (group * SIDE_BY_SIDE + i).min(self.places.len() - 1));
+                let shapes = lefts.map(|left| &self.shapes[left][..]);
+                let first_m = lefts.iter().map(|&left| self.places[left].lateral_m).fold(f64::INFINITY, f64::min);
+                let mut best: [Option<Pair>; SIDE_BY_SIDE] = [None; SIDE_BY_SIDE];
                 for right in 0..self.places.len() {
-                    if self.places[right].lateral_m - self.places[left].lateral_m < 2.0 {
+                    if self.places[right].lateral_m - first_m < CLOSEST_M {
                         continue;
                     }
                     let (b, bb) = (towards[right], squares[right]);
-                    if a <= 0.0 && b <= 0.0 {
-                        continue;
-                    }
-                    let ab = -crate::linalg::dot(&self.shapes[left], &self.shapes[right]);
-                    let determinant = aa * bb - ab * ab;
-                    let strength = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
-                    if !(strength.0 > 0.0 && strength.1 > 0.0 && determinant > 1e-6 * aa * bb) {
-                        continue;
-                    }
-                    let explained = strength.0 * a + strength.1 * b;
-                    if best.is_none_or(|best| explained > best.explained) {
-                        best = Some(Pair { explained, left, right, strength });
+                    let along = products(shapes, &self.shapes[right]);
+                    for ((&left, along), best) in lefts.iter().zip(along).zip(&mut best) {
+                        // a clockwise vortex shows the opposite shape
+                        let (a, aa, ab) = (-towards[left], squares[left], -along);
+                        let determinant = aa * bb - ab * ab;
+                        let strength = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
+                        let apart_m = self.places[right].lateral_m - self.places[left].lateral_m;
+                        let possible = strength.0 > 0.0 && strength.1 > 0.0 && determinant > 1e-6 * aa * bb;
+                        let explained = strength.0 * a + strength.1 * b;
+                        if apart_m >= CLOSEST_M && possible && best.is_none_or(|best| explained > best.explained) {
+                            *best = Some(Pair { explained, left, right, strength });
+                        }
                     }
                 }
                 best
             },
         );
+        let mut best: Vec<Option<Pair>> = some.into_iter().flatten().collect();
+        best.truncate(self.places.len());
         best.into_iter().flatten().collect()
     }
 
@@ -281,5 +312,18 @@ impl Search {
     fn products(&self) -> (Vec<f64>, Vec<f64>) {
         let product = |shape: &Vec<f64>| (crate::linalg::dot(shape, &self.data), crate::linalg::dot(shape, shape));
         self.shapes.iter().map(product).unzip()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_side_by_side_are_scalar_products_to_the_last_bit() {
+        let shape = |seed: f64| (0..61).map(|i| (seed * f64::from(i * i)).sin()).collect::<Vec<f64>>();
+        let (some, other) = ([1.1, 1.2, 1.3, 1.4].map(shape), shape(0.7));
+        let found = products(std::array::from_fn(|i| &some[i][..]), &other);
+        assert_eq!(found, some.map(|one| crate::linalg::dot(&one, &other)));
     }
 }

@@ -54,7 +54,7 @@ pub fn refine_map_fit(
     let mut scale = problem.scale(&wake)?;
     let mut iterations = 0;
     for round in 0..ROUNDS {
-        problem.prior = fit.prior(&problem, &wake, scale);
+        problem.prior = fit.prior(problem.groups, fit.alike(&problem, &wake, scale));
         (wake, iterations) = match problem.descend(wake, scale, fit.stop) {
             // a core that the map does not resolve may run away to nothing: it keeps what the last round gave
             Err(Error::NotConverged { .. }) if round > 0 && coreless.len() < problem.groups.len() => {
@@ -108,10 +108,14 @@ impl<'a, 'm> Fit<'a, 'm> {
         Problem { map, model, expected, groups, loss, learnt: None, prior: None }
     }
 
-    /// What is known of the cores, if any may change, and how often it counts.
-    pub(crate) fn prior(&self, problem: &Problem<'_, '_>, wake: &Wake, scale: f64) -> Option<(CorePrior, f64)> {
-        let known = self.options.core_prior.filter(|_| problem.groups.iter().any(|group| is_core(group)))?;
-        Some((known, problem.alike(wake, scale, self.options.correlated_lines)))
+    /// Number of velocities that count as one.
+    pub(crate) fn alike(&self, problem: &Problem<'_, '_>, wake: &Wake, scale: f64) -> f64 {
+        problem.alike(wake, scale, self.options.correlated_lines)
+    }
+
+    /// What is known of the cores, if any of the free numbers moves them, and how often it counts.
+    pub(crate) fn prior(&self, groups: &[Vec<usize>], alike: f64) -> Option<(CorePrior, f64)> {
+        self.options.core_prior.filter(|_| groups.iter().any(|group| is_core(group))).map(|known| (known, alike))
     }
 
     /// Whether the model exists there: with images, above the ground only.
@@ -130,8 +134,9 @@ impl<'a, 'm> Fit<'a, 'm> {
         let (covariance, alike) = problem.covariance(&wake, scale, self.options.correlated_lines)?;
         let residuals = problem.residuals(&wake);
         let cost = |residuals: &[f64]| residuals.iter().map(|r| self.options.loss.at(r / scale).0).sum::<f64>();
-        // without vortices a gate shows its mean
-        let means = Problem { expected: Expected::Means(self.kernel), ..*problem };
+        // without vortices a gate shows its mean, which is the wind at its middle, as that is linear in height
+        let middle = self.kernel.middle();
+        let means = Problem { expected: Expected::Means(&middle), ..*problem };
         let calm_cost = means.calm(&wake, scale, self.stop).map_or(f64::NAN, |calm| cost(&means.residuals(&calm)));
         Ok(MapFit {
             wake,

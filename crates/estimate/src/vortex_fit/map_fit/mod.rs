@@ -1,5 +1,6 @@
 //! Fits of the wake to a map of radial velocities.
 
+pub(crate) mod coarse;
 pub(crate) mod data;
 pub(crate) mod estimates;
 pub(crate) mod estimator_response;

@@ -15,6 +15,8 @@ const TYPICAL: f64 = 0.05;
 const ROUNDS: usize = 3;
 /// Ends closer than this many standard deviations in every parameter are one.
 const SAME_SIGMAS: f64 = 0.3;
+/// Ends of rough fits that are closer lead to one.
+const ONE_SIGMAS: f64 = 1.0;
 
 /// The starts about a wake: its core radii are the typical one, and others if they are fitted.
 pub(crate) fn starts(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
@@ -58,17 +60,38 @@ pub(crate) fn with_typical_core(
     Ok(end)
 }
 
+/// Logarithm of the likelihood of an end.
+fn height(end: &MapFit) -> f64 {
+    end.tops.first().map_or(f64::NEG_INFINITY, |top| top.log_likelihood)
+}
+
+/// Distance of two ends by parameter, and whether they are closer than so many errors of the first.
+fn apart(a: &MapFit, b: &MapFit, sigmas: f64) -> (Vec<f64>, bool) {
+    let apart: Vec<f64> = b.wake.to_array().iter().zip(a.wake.to_array()).map(|(b, a)| b - a).collect();
+    let same = apart.iter().enumerate().all(|(i, d)| d.powi(2) <= sigmas.powi(2) * a.covariance[[i, i]]);
+    (apart, same)
+}
+
+/// The wakes of those ends of rough fits that lead to different ends, the best first.
+pub(crate) fn distinct(mut ends: Vec<MapFit>) -> Vec<Wake> {
+    ends.sort_by(|a, b| height(b).total_cmp(&height(a)));
+    let mut kept: Vec<MapFit> = Vec::new();
+    for end in ends {
+        if !kept.iter().any(|better| apart(better, &end, ONE_SIGMAS).1) {
+            kept.push(end);
+        }
+    }
+    kept.into_iter().map(|end| end.wake).collect()
+}
+
 /// The best of some ends with the others as its competing tops.
 fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
-    let height = |end: &MapFit| end.tops.first().map_or(f64::NEG_INFINITY, |top| top.log_likelihood);
     ends.sort_by(|a, b| height(b).total_cmp(&height(a)));
     let mut ends = ends.into_iter();
     let mut best = ends.next()?;
-    let (within, highest, mut weights) = (best.covariance.clone(), height(&best), 1.0);
+    let (alone, highest, mut weights) = (best.clone(), height(&best), 1.0);
     for end in ends {
-        let (a, b) = (end.wake.to_array(), best.wake.to_array());
-        let apart: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-        let same = apart.iter().enumerate().all(|(i, d)| d.powi(2) <= SAME_SIGMAS.powi(2) * within[[i, i]]);
+        let (apart, same) = apart(&alone, &end, SAME_SIGMAS);
         if same {
             continue;
         }

@@ -10,7 +10,7 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::vortex_fit::map_fit::data::median;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
-use crate::vortex_fit::{VelocityMap, Wake, WakeModel};
+use crate::vortex_fit::{VelocityMap, Wake};
 
 /// Map and slopes about a wake: the velocities of wakes near it to first order.
 pub(crate) struct Tangent {
@@ -25,32 +25,30 @@ pub(crate) struct Tangent {
 impl Tangent {
     /// About `at`, where `here` is the map, with slopes about it or about a wake near by.
     pub(crate) fn new(
-        (prepared, model): (&Prepared<'_>, &WakeModel),
+        prepared: &Prepared<'_>,
         at: Wake,
         here: ArrayView2<'_, f64>,
         slopes: &[Array2<f64>],
         map: &VelocityMap<'_>,
     ) -> Self {
-        let elevation_rad = map.elevation_rad;
         let mut tangent =
             Self { at, velocity_m_s: here.to_owned(), slopes: slopes.to_vec(), deviation: Array2::ones(here.dim()) };
-        tangent.learn_deviations(&prepared.variances(model, &at, elevation_rad), map);
+        tangent.learn_deviations(&prepared.variances(&at), map);
         tangent
     }
 
     /// Difference quotients of the map about `at` with respect to the groups of parameters.
     pub(crate) fn slopes(
-        (prepared, model): (&Prepared<'_>, &WakeModel),
+        prepared: &Prepared<'_>,
         at: &Wake,
         here: ArrayView2<'_, f64>,
         groups: &[Vec<usize>],
-        elevation_rad: &[f64],
     ) -> Vec<Array2<f64>> {
         let quotient = |group: &Vec<usize>| {
             let step = step(at, group[0]);
             let mut parameters = at.to_array();
             group.iter().for_each(|&place| parameters[place] += step);
-            let there = prepared.velocities(model, &Wake::from_array(&parameters), elevation_rad);
+            let there = prepared.velocities(&Wake::from_array(&parameters));
             (there - here) / step
         };
         groups.iter().map(quotient).collect()

@@ -241,7 +241,8 @@ impl WakeModel {
     pub(crate) fn velocity_on(&self, wake: &Wake, range_m: f64, ray: Ray) -> f64 {
         let (y_m, z_m) = self.place(range_m, ray);
         let mut velocity_m_s = (wake.lateral_wind_m_s + wake.wind_shear_per_s * z_m) * ray.cos;
-        for (vortex, _, side, sense) in self.sources(wake) {
+        // a search tries vortices one by one
+        for (vortex, _, side, sense) in self.sources(wake).filter(|source| source.0.circulation_m2_s != 0.0) {
             let (dy, dz) = (y_m - vortex.lateral_position_m, z_m - side * vortex.height_m);
             let (omega, _, _) = self.profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
             velocity_m_s += sense * vortex.circulation_m2_s * omega * (dy * ray.sin - dz * ray.cos);

@@ -67,6 +67,12 @@ impl RangeKernel {
         moment(2, moment(1, 0.0)).max(0.0).sqrt()
     }
 
+    /// The centre of the weights alone, which sees of a linear wind what they see.
+    pub(crate) fn middle(&self) -> Self {
+        let away = self.weights.iter().enumerate().map(|(i, w)| i as f64 * self.spacing_m * w).sum::<f64>();
+        Self { first_offset_m: self.first_offset_m + away, spacing_m: self.spacing_m, weights: vec![1.0] }
+    }
+
     /// The same kernel on a grid about `factor` times as coarse.
     pub(crate) fn coarser(&self, factor: usize) -> Self {
         if factor <= 1 || self.weights.len() <= factor {
@@ -205,6 +211,27 @@ mod tests {
                 assert_relative_eq!(*slope, quotient, max_relative = 1e-6, epsilon = 1e-8);
             }
         });
+    }
+
+    #[test]
+    fn the_middle_alone_sees_the_same_of_a_linear_wind() {
+        let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1]);
+        let lopsided = RangeKernel::new(-10.0, 4.0, &[0.1, 0.4, 0.3, 0.15, 0.05]).unwrap();
+        let seen = |kernel: &RangeKernel| {
+            let (mut seen, ray) = (Vec::new(), Ray::new(0.3));
+            let take = |_, v, _: &[f64; PARAMETERS]| seen.push(v);
+            kernel.apply(
+                (&WakeModel::default(), &calm, ray),
+                &[300.0, 333.3],
+                false,
+                &mut LineScratch::default(),
+                take,
+            );
+            seen
+        };
+        for (whole, middle) in seen(&lopsided).into_iter().zip(seen(&lopsided.middle())) {
+            assert_relative_eq!(whole, middle, max_relative = 1e-12);
+        }
     }
 
     #[test]

@@ -1,0 +1,159 @@
+//! Every few lines and gates of a map: as many as its regions and gates resolve.
+//!
+//! Neighbouring places of a map see much the same air, so some of them tell nearly all, and what varies no faster than they do is
+//! known everywhere from there, linear between. Check: planes are linear between places; holes; what is too small stays whole.
+
+use ndarray::{Array2, Axis};
+
+use crate::vortex_fit::VelocityMap;
+
+/// Fewer velocities than this are not thinned: they would leave too few for the scale of the residuals.
+const NEEDED: usize = 500;
+
+/// Some lines and gates of a map, and the map there.
+pub(crate) struct Coarse {
+    lines: Vec<usize>,
+    gates: Vec<usize>,
+    elevation_rad: Vec<f64>,
+    range_m: Vec<f64>,
+    velocity_m_s: Array2<f64>,
+    standard_deviation_m_s: Option<Array2<f64>>,
+    line_step: usize,
+}
+
+impl Coarse {
+    /// Places of a map no farther apart than `line_m` across and `gate_m` along its lines \[m\], unless those of the map are; nothing
+    /// where these are all, or too few.
+    pub(crate) fn of(map: &VelocityMap<'_>, line_m: f64, gate_m: f64) -> Option<Self> {
+        let (line_step, lines) = every(map.elevation_rad.len(), line_m / map.line_spacing_m());
+        let (gate_step, gates) = every(map.range_m.len(), gate_m / map.gate_spacing_m());
+        let some = |all: &Array2<f64>| all.select(Axis(0), &lines).select(Axis(1), &gates);
+        let velocity_m_s = some(&map.velocity_m_s.to_owned());
+        let standard_deviation_m_s = map.standard_deviation_m_s.map(|deviation| some(&deviation.to_owned()));
+        let found = velocity_m_s.iter().filter(|v| v.is_finite()).count();
+        (line_step * gate_step > 1 && found >= NEEDED).then(|| Self {
+            elevation_rad: lines.iter().map(|&line| map.elevation_rad[line]).collect(),
+            range_m: gates.iter().map(|&gate| map.range_m[gate]).collect(),
+            velocity_m_s,
+            standard_deviation_m_s,
+            line_step,
+            lines,
+            gates,
+        })
+    }
+
+    /// The map there.
+    pub(crate) fn map(&self) -> VelocityMap<'_> {
+        VelocityMap {
+            elevation_rad: &self.elevation_rad,
+            range_m: &self.range_m,
+            velocity_m_s: self.velocity_m_s.view(),
+            standard_deviation_m_s: self.standard_deviation_m_s.as_ref().map(|deviation| deviation.view()),
+        }
+    }
+
+    /// Lines of the whole map from one to the next.
+    pub(crate) fn line_step(&self) -> usize {
+        self.line_step
+    }
+
+    /// Numbers of these places at all places of a map of that size: linear between, and beyond the outermost as there. Numbers
+    /// that are not finite are left out.
+    pub(crate) fn everywhere(&self, some: &Array2<f64>, size: (usize, usize)) -> Array2<f64> {
+        let about = |chosen: &[usize], count: usize| (0..count).map(|at| neighbours(chosen, at)).collect::<Vec<_>>();
+        let (lines, gates) = (about(&self.lines, size.0), about(&self.gates, size.1));
+        Array2::from_shape_fn(size, |(line, gate)| {
+            let [mut sum, mut shares] = [0.0; 2];
+            for (i, by_line) in lines[line] {
+                for (j, by_gate) in gates[gate] {
+                    let (share, number) = (by_line * by_gate, some[[i, j]]);
+                    if share > 0.0 && number.is_finite() {
+                        (sum, shares) = (sum + share * number, shares + share);
+                    }
+                }
+            }
+            sum / shares
+        })
+    }
+}
+
+/// At most every `step`th of `count` places, about the middle: from one to the next, and which.
+fn every(count: usize, step: f64) -> (usize, Vec<usize>) {
+    // also 1 for NaN
+    let step = (step.max(1.0) as usize).min(count.max(1));
+    (step, (count.saturating_sub(1) % step / 2..count).step_by(step).collect())
+}
+
+/// The chosen places before and after a place, with their shares.
+fn neighbours(chosen: &[usize], at: usize) -> [(usize, f64); 2] {
+    let next = chosen.partition_point(|&place| place <= at);
+    let (low, high) = (next.saturating_sub(1), next.min(chosen.len() - 1));
+    let gap = chosen[high] - chosen[low];
+    let share = if gap == 0 { 0.0 } else { (at - chosen[low]) as f64 / gap as f64 };
+    [(low, 1.0 - share), (high, share)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axes() -> (Vec<f64>, Vec<f64>) {
+        // 1 m and 5 m at 500 m
+        ((0..90).map(|i| f64::from(i) * 2e-3).collect(), (0..41).map(|j| 400.0 + 5.0 * f64::from(j)).collect())
+    }
+
+    #[test]
+    fn planes_are_known_everywhere_from_some_places_even_next_to_holes() {
+        let (elevation_rad, range_m) = axes();
+        let plane = Array2::from_shape_fn((90, 41), |(line, gate)| 1.0 + 0.5 * line as f64 - 0.25 * gate as f64);
+        let map = VelocityMap {
+            elevation_rad: &elevation_rad,
+            range_m: &range_m,
+            velocity_m_s: plane.view(),
+            standard_deviation_m_s: Some(plane.view()),
+        };
+        let coarse = Coarse::of(&map, 3.1, 10.5).unwrap();
+        let some = coarse.map();
+        assert_eq!((coarse.line_step(), some.velocity_m_s.dim()), (3, (30, 21)));
+        assert_eq!(some.elevation_rad[1], elevation_rad[coarse.lines[1]]);
+        assert_eq!(some.range_m[1], range_m[coarse.gates[1]]);
+        assert_eq!(some.standard_deviation_m_s.unwrap()[[1, 1]], plane[[coarse.lines[1], coarse.gates[1]]]);
+        let mut numbers = coarse.velocity_m_s.clone();
+        let everywhere = coarse.everywhere(&numbers, plane.dim());
+        for ((line, gate), number) in everywhere.indexed_iter() {
+            // beyond the outermost places as there
+            let at = |place: usize, chosen: &[usize]| place.clamp(chosen[0], chosen[chosen.len() - 1]);
+            let expected = plane[[at(line, &coarse.lines), at(gate, &coarse.gates)]];
+            assert!((number - expected).abs() < 1e-12, "{line} {gate}: {number} {expected}");
+        }
+        numbers[[3, 4]] = f64::NAN;
+        let holed = coarse.everywhere(&numbers, plane.dim());
+        let hole = [coarse.lines[3], coarse.gates[4]];
+        for (place, number) in holed.indexed_iter() {
+            assert_eq!(number.is_nan(), [place.0, place.1] == hole, "{place:?}");
+        }
+        assert_eq!(holed[[hole[0], hole[1] + 1]], plane[[hole[0], hole[1] + 2]]);
+    }
+
+    #[test]
+    fn maps_that_are_coarse_or_small_stay_whole() {
+        let (elevation_rad, range_m) = axes();
+        let velocity = Array2::zeros((90, 41));
+        let map = VelocityMap {
+            elevation_rad: &elevation_rad,
+            range_m: &range_m,
+            velocity_m_s: velocity.view(),
+            standard_deviation_m_s: None,
+        };
+        assert!(Coarse::of(&map, 0.0, 9.0).is_none());
+        assert!(Coarse::of(&map, f64::NAN, 9.0).is_none());
+        assert!(Coarse::of(&map, 9.0, 20.0).is_none());
+        assert!(Coarse::of(&map, 0.0, 11.0).is_some_and(|coarse| coarse.map().velocity_m_s.dim() == (90, 21)));
+        let one = VelocityMap {
+            elevation_rad: &elevation_rad[..1],
+            velocity_m_s: velocity.slice(ndarray::s![..1, ..]),
+            ..map
+        };
+        assert!(Coarse::of(&one, 3.0, 9.0).is_none());
+    }
+}
