@@ -5,6 +5,7 @@
 //! | `scan_map`, `options`, `result` | what goes in, how, what comes out |
 //! | `fit`, `hypotheses`, `report` | fits of wind alone, one vortex and two; which it is; deviations and flags |
 //! | `expected`, `motion`, `problem`, `whitening`, `correlated_residuals` | gates that see moving vortices; cost and its minimum; correlated velocities, given or learnt from the residuals |
+//! | `secondary` | the fit again with secondary vortices, if the scan shows them |
 //! | `radial_velocity`, `envelope`, `integral` | the methods of the literature beside it, with their errors |
 //! | `track` | many scans: filter and smoother |
 //!
@@ -37,6 +38,7 @@ mod radial_velocity;
 mod report;
 mod result;
 mod scan_map;
+mod secondary;
 mod track;
 mod whitening;
 
@@ -48,5 +50,6 @@ pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, Measured, ScanResult, Side, Top, VortexResult};
 pub use scan_map::ScanMap;
+pub use secondary::with_secondary_vortices;
 pub use track::{Track, TrackOptions, TrackPoint, TrackedVortex, track};
 pub(crate) use whitening::Whitening;

@@ -1,7 +1,7 @@
 //! How a scan is retrieved.
 
 use crate::error::{Error, not_negative, positive};
-use crate::vortex_fit::{CorePrior, FreeParameters, Loss, RangeKernel, Wake, WakeModel, WindFit};
+use crate::vortex_fit::{CorePrior, FreeParameters, Loss, RangeKernel, Vortex, Wake, WakeModel, WindFit};
 
 /// What a velocity of the map is of the air about its range.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,6 +92,7 @@ impl RetrievalOptions {
             positive("width of the loss", width)?;
         }
         self.core_radius_m.map_or(Ok(()), |core| positive("core_radius_m", core))?;
+        self.model.secondary.iter().flatten().try_for_each(Vortex::validate)?;
         self.start.map_or(Ok(()), |wake| wake.validate())?;
         not_negative("threshold", self.threshold)
     }

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use crate::vortex_fit::Wake;
+use crate::vortex_fit::{Parameter, Wake};
 
 /// A number with its standard deviation; NaN where that is not known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +20,21 @@ pub enum Side {
     Left,
     /// The one at larger y, anticlockwise.
     Right,
+}
+
+impl Side {
+    /// Circulation, lateral coordinate, height and core radius of the vortex of that side.
+    #[must_use]
+    pub fn parameters(self) -> [Parameter; 4] {
+        match self {
+            Self::Left => {
+                [Parameter::LeftCirculation, Parameter::LeftLateral, Parameter::LeftHeight, Parameter::LeftCore]
+            }
+            Self::Right => {
+                [Parameter::RightCirculation, Parameter::RightLateral, Parameter::RightHeight, Parameter::RightCore]
+            }
+        }
+    }
 }
 
 /// One vortex of a scan, where it is when the line through its core is measured.
@@ -54,6 +69,8 @@ pub enum Flag {
     AtEdge,
     /// A vortex is lower than half the spacing, where the ground makes secondary vortices.
     NearGround,
+    /// Secondary vortices were fitted beside the pair.
+    SecondaryVortices,
     /// The vortices were taken as standing still although the scan lasted, or its times are unknown.
     MotionIgnored,
     /// Another wake is within 9 of the least chi-square.
@@ -76,6 +93,7 @@ impl Flag {
             Self::CoreKept => "core_kept",
             Self::AtEdge => "at_edge",
             Self::NearGround => "near_ground",
+            Self::SecondaryVortices => "secondary_vortices",
             Self::MotionIgnored => "motion_ignored",
             Self::Ambiguous => "ambiguous",
             Self::PoorFit => "poor_fit",

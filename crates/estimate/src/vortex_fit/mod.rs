@@ -38,7 +38,7 @@ mod signal_fit;
 pub(crate) mod wake;
 
 pub use map_fit::data::{Loss, MapFit, MapFitOptions, MapTop, VelocityMap};
-pub use map_fit::estimates::{fit_map_of_estimator, refine_map_fit_of_estimator};
+pub use map_fit::estimates::{fit_map_of_estimator, fit_secondary_vortices, refine_map_fit_of_estimator};
 pub use map_fit::estimator_response::EstimatorResponse;
 pub use map_fit::means::{fit_map, refine_map_fit};
 pub use signal_fit::baseband::Baseband;

@@ -560,3 +560,55 @@ fn standing_vortices_are_taken_for_such_and_moving_ones_in_scans_of_seconds() {
         }
     }
 }
+
+/// Pairs with secondary vortices beside them, and the same scans without.
+#[test]
+fn secondary_vortices_are_found_in_scans_of_any_instrument_that_show_them() {
+    let case = case("b");
+    let secondary = |circulation_m2_s, lateral_position_m, height_m| Vortex {
+        circulation_m2_s,
+        lateral_position_m,
+        height_m,
+        core_radius_m: 5.0,
+    };
+    let near_ground = [secondary(-120.0, 356.0, 38.0), secondary(-110.0, 445.0, 46.0)];
+    let sigma_m_s = case.map.sigma_m_s.as_ref().unwrap();
+    for (shown, seed) in [(Some(near_ground), 1), (Some(near_ground), 2), (None, 3), (None, 4), (None, 5)] {
+        let mut truth = case.options.clone();
+        truth.model.secondary = shown;
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut velocity_m_s = expected_velocities(&case.map, &truth, &case.truth, false).unwrap();
+        velocity_m_s.zip_mut_with(sigma_m_s, |velocity, sigma| *velocity += sigma * normal(&mut rng));
+        let map = ScanMap { velocity_m_s, ..case.map.clone() };
+        let pair = fit_scan(&map, &case.options).unwrap();
+        let four = with_secondary_vortices(&map, &case.options, &pair).unwrap();
+        assert_eq!(four.is_some(), shown.is_some(), "{seed}");
+        let Some((four, options)) = four else { continue };
+        assert!(four.has(Flag::SecondaryVortices));
+        for (found, of) in options.model.secondary.unwrap().iter().zip(near_ground) {
+            let away_m = (found.lateral_position_m - of.lateral_position_m).hypot(found.height_m - of.height_m);
+            assert!(away_m < 4.0 && (found.circulation_m2_s / of.circulation_m2_s - 1.0).abs() < 0.3, "{found:?}");
+        }
+        let wake = four.wake.unwrap().to_array();
+        let away = |wake: &[f64; PARAMETERS]| {
+            let of = |place: usize| {
+                (wake[place] - case.truth.to_array()[place]).abs() / four.covariance[[place, place]].sqrt()
+            };
+            (0..6).map(of).fold(0.0, f64::max)
+        };
+        let (missed, left) = (away(&pair.wake.unwrap().to_array()), away(&wake));
+        assert!(left < 3.5 && missed > 2.0 * left, "{missed} {left}");
+        let vortex = four.vortex(Side::Left).unwrap();
+        assert_eq!(vortex.circulation_m2_s.std, four.covariance[[0, 0]].sqrt());
+    }
+}
+
+/// The stored scans have no secondary vortices.
+#[test]
+fn stored_scans_show_no_secondary_vortices() {
+    for name in ["a", "b"] {
+        let case = case(name);
+        let pair = fit_scan(&case.map, &case.options).unwrap();
+        assert!(with_secondary_vortices(&case.map, &case.options, &pair).unwrap().is_none(), "{name}");
+    }
+}

@@ -17,7 +17,7 @@ use num_complex::Complex;
 use wakescope_estimate::retrieval::{Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
 use wakescope_estimate::vortex_fit::{
     MapFitOptions, Parameter, Sharing, SignalFit, SignalFitOptions, VelocityMap, Vortex, Wake, fit_map_of_estimator,
-    fit_signals,
+    fit_secondary_vortices, fit_signals,
 };
 use wakescope_estimate::window::Sample;
 
@@ -62,8 +62,13 @@ impl OwnScene {
 
     /// The fit of a pair to what the estimator of the scene shows, for a map in which `found` has a wake: taken for means, peaks may show
     /// but one of its vortices. Nothing where there is no wake or no certain pair, the estimator is one of those without such a
-    /// model, or the fit does not come to an end.
-    pub(super) fn refined(&self, map: &ScanMap, options: &RetrievalOptions, found: &ScanResult) -> Option<ScanResult> {
+    /// model, or the fit does not come to an end. The options are those with the secondary vortices that the map shows beside the pair.
+    pub(super) fn refined(
+        &self,
+        map: &ScanMap,
+        options: &RetrievalOptions,
+        found: &ScanResult,
+    ) -> Option<(ScanResult, RetrievalOptions)> {
         if found.statistic.is_nan() || found.statistic < options.threshold {
             return None;
         }
@@ -94,10 +99,16 @@ impl OwnScene {
             correlated_lines: correlated_lines(&self.scene, step_rad, range_m),
             ..MapFitOptions::default()
         };
-        let fit = fit_map_of_estimator(&view, &options.model, &shown, &fit_options).ok()?;
+        let mut options = options.clone();
+        let mut fit = fit_map_of_estimator(&view, &options.model, &shown, &fit_options).ok()?;
+        let four = fit_secondary_vortices(&view, &options.model, &shown, &fit.wake, &fit_options).ok().flatten();
+        if let Some((with_secondary, vortices)) = four {
+            fit = with_secondary;
+            options.model.secondary = Some(vortices);
+        }
         let tops = fit.tops.iter().map(|top| Top { wake: top.wake, chi2: -2.0 * top.log_likelihood }).collect();
-        let pair = as_pair(found, map, options, &fit.wake);
-        let mut result = retold(&pair, options, (fit.wake, fit.covariance), tops);
+        let pair = as_pair(found, map, &options, &fit.wake);
+        let mut result = retold(&pair, &options, (fit.wake, fit.covariance), tops);
         // Beyond the scan there may be anything.
         let (ranges, elevations) = (map.range_m.first()?..=map.range_m.last()?, lowest..=highest);
         let is_seen = |vortex: &VortexResult| {
@@ -115,7 +126,8 @@ impl OwnScene {
         }
         (result.cells_used, result.cells_rejected) = (fit.used - fit.outliers, fit.outliers);
         set(&mut result.flags, Flag::Outliers, 10 * fit.outliers > fit.used);
-        Some(result)
+        set(&mut result.flags, Flag::SecondaryVortices, options.model.secondary.is_some());
+        Some((result, options))
     }
 }
 
@@ -228,17 +240,8 @@ fn retold(
     };
     let means = wake.mean_circulations_5_15_m2_s(options.model.profile, covariance.view());
     let vortex = |vortex: &VortexResult| {
-        let (of, mean) = match vortex.side {
-            Side::Left => (
-                [Parameter::LeftCirculation, Parameter::LeftLateral, Parameter::LeftHeight, Parameter::LeftCore],
-                means[0],
-            ),
-            Side::Right => (
-                [Parameter::RightCirculation, Parameter::RightLateral, Parameter::RightHeight, Parameter::RightCore],
-                means[1],
-            ),
-        };
-        let [circulation_m2_s, lateral_position_m, height_m, core_radius_m] = of.map(measured);
+        let mean = means[usize::from(vortex.side == Side::Right)];
+        let [circulation_m2_s, lateral_position_m, height_m, core_radius_m] = vortex.side.parameters().map(measured);
         VortexResult {
             circulation_m2_s,
             circulation_5_15_m2_s: Measured { value: mean.0, std: mean.1 },

@@ -106,6 +106,9 @@ pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
             "chi2_per_dof": r.chi2_per_dof, "cells_used": r.cells_used, "cells_rejected": r.cells_rejected,
             "statistic": r.statistic, "threshold": r.threshold, "flags": flags(r),
             "parameters": PARAMETER_NAMES, "wake": r.wake.map(|found| wake(found.to_array())), "covariance": rows,
+            "secondary": scan.options.model.secondary.map(|both| both.map(|v| json!({
+                "gamma_m2_s": v.circulation_m2_s, "y_m": v.lateral_position_m, "z_m": v.height_m, "core_m": v.core_radius_m,
+            }))),
             "tops": r.tops.iter().map(|top| json!({ "wake": wake(top.wake.to_array()), "chi2": top.chi2 })).collect::<Vec<_>>(),
         })
     };

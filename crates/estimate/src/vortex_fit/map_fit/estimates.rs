@@ -13,11 +13,12 @@ use crate::vortex_fit::map_fit::estimator_response::Prepared;
 use crate::vortex_fit::map_fit::guess::first_guess;
 use crate::vortex_fit::map_fit::means::Fit;
 use crate::vortex_fit::map_fit::problem::{Expected, Problem};
+use crate::vortex_fit::map_fit::secondary::{Found, Setting};
 use crate::vortex_fit::map_fit::starts::{best_of, distinct, starts, with_typical_core};
 use crate::vortex_fit::map_fit::tangent::{Tangent, near};
 use crate::vortex_fit::{
-    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, PARAMETERS, RangeKernel, Sharing, VelocityMap, Wake,
-    WakeModel, refine_map_fit,
+    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, PARAMETERS, RangeKernel, Sharing, VelocityMap, Vortex,
+    Wake, WakeModel, refine_map_fit,
 };
 
 /// Most steps of Gauss and Newton, and halvings of one.
@@ -99,6 +100,33 @@ pub fn refine_map_fit_of_estimator(
     whole.refined(guess, few.as_ref(), NEAR_SIGMAS)
 }
 
+/// The pair of a fit with secondary vortices beside it, if the map shows them: both are fitted at once, then the pair once more with the others
+/// as they are. The covariance counts what is not known of them.
+///
+/// # Errors
+/// As [`refine_map_fit_of_estimator`].
+pub fn fit_secondary_vortices(
+    map: &VelocityMap<'_>,
+    model: &WakeModel,
+    response: &EstimatorResponse<'_>,
+    pair: &Wake,
+    options: &MapFitOptions,
+) -> Result<Option<(MapFit, [Vortex; 2])>, Error> {
+    map.validate()?;
+    pair.validate()?;
+    let whole = Shown::new(*map, model, response, options, 1.0)?;
+    let coarse = whole.coarse(response, LINES_OVER_RADIUS[0]);
+    let few = coarse.as_ref().map(|coarse| Few::new(coarse, model, response, options)).transpose()?;
+    let found = match &few {
+        Some(few) => few.shown.with_secondary(pair)?,
+        None => whole.with_secondary(pair)?,
+    };
+    let Some(found) = found else { return Ok(None) };
+    let model = WakeModel { secondary: Some(found.secondary), ..*model };
+    let fit = refine_map_fit_of_estimator(map, &model, response, &found.wake, options)?;
+    Ok(Some((MapFit { covariance: found.covariance, ..fit }, found.secondary)))
+}
+
 /// The few places of a map that tell nearly all of it, and what an estimator shows there.
 struct Few<'a> {
     coarse: &'a Coarse,
@@ -157,6 +185,12 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         let kernel = prepared.kernel()?;
         let least_core_m = SMALLEST_CORE * map.line_spacing_m().max(response.radius_m());
         Ok(Self { map, model, prepared, kernel, options: *options, least_core_m })
+    }
+
+    /// Four vortices in place of a pair, if they explain the map better.
+    fn with_secondary(&self, pair: &Wake) -> Result<Option<Found>, Error> {
+        let Self { map, model, prepared, kernel, options, .. } = self;
+        Setting { map, model, prepared: Some(prepared), kernel, options, groups: &options.free.groups() }.find(pair)
     }
 
     /// The places that tell nearly all of the map.

@@ -201,9 +201,15 @@ impl Prepared<'_> {
 
     /// The map of a wake.
     pub(crate) fn velocities(&self, wake: &Wake) -> Array2<f64> {
+        self.velocities_of(self.model, wake)
+    }
+
+    /// The map of a wake by another model.
+    pub(crate) fn velocities_of(&self, model: &WakeModel, wake: &Wake) -> Array2<f64> {
         let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
-        let correlograms =
-            map_indexed(lines, Vec::new, |phasors, line| self.line(wake, Ray::new(self.elevation_rad[line]), phasors));
+        let correlograms = map_indexed(lines, Vec::new, |phasors, line| {
+            self.line((model, wake), Ray::new(self.elevation_rad[line]), phasors)
+        });
         let state = || (Scratch::new(), vec![0.0; self.numbers]);
         let rows = map_indexed(lines, state, |(scratch, mean), line| {
             let one = |gate: usize| {
@@ -248,7 +254,7 @@ impl Prepared<'_> {
     }
 
     /// Expected correlograms of the signal at all gates of a line, of power 1.
-    fn line(&self, wake: &Wake, ray: Ray, phasors: &mut Vec<f64>) -> Vec<f64> {
+    fn line(&self, (model, wake): (&WakeModel, &Wake), ray: Ray, phasors: &mut Vec<f64>) -> Vec<f64> {
         let sampling = &self.response.sampling;
         let (Some(&nearest_m), Some(&farthest_m)) = (self.range_m.first(), self.range_m.last()) else {
             return Vec::new();
@@ -257,7 +263,7 @@ impl Prepared<'_> {
         let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + nodes + 1;
         let turn = |point: usize| {
             let at_m = nearest_m + self.first_offset_m + point as f64 * self.spacing_m;
-            let cycles = sampling.frequency_hz(self.model.velocity_on(wake, at_m, ray)) * sampling.period_s();
+            let cycles = sampling.frequency_hz(model.velocity_on(wake, at_m, ray)) * sampling.period_s();
             (TAU * cycles).sin_cos()
         };
         let turns: Vec<(f64, f64)> = (0..points).map(turn).collect();

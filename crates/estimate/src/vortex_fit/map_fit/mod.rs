@@ -8,5 +8,6 @@ pub(crate) mod guess;
 pub(crate) mod means;
 pub(crate) mod problem;
 pub(crate) mod residual_covariance;
+pub(crate) mod secondary;
 pub(crate) mod starts;
 pub(crate) mod tangent;

@@ -93,7 +93,7 @@ const NEAR: f64 = 3.0;
 const REACH: f64 = 12.0;
 
 /// Step of a difference quotient.
-fn step(wake: &Wake, place: usize) -> f64 {
+pub(crate) fn step(wake: &Wake, place: usize) -> f64 {
     let spacing_m = wake.spacing_m();
     match place {
         0 | 1 => 0.01 * wake.to_array()[place].abs().max(1.0),

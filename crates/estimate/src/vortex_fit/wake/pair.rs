@@ -55,6 +55,15 @@ pub struct Vortex {
     pub core_radius_m: f64,
 }
 
+impl Vortex {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        finite("circulation_m2_s", self.circulation_m2_s)?;
+        finite("lateral_position_m", self.lateral_position_m)?;
+        finite("height_m", self.height_m)?;
+        positive("core_radius_m", self.core_radius_m)
+    }
+}
+
 /// Two vortices and the background wind u(z) = `lateral_wind_m_s` + z `wind_shear_per_s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wake {
@@ -109,12 +118,8 @@ impl Wake {
     /// # Errors
     /// [`Error::OutOfRange`] with the field at fault.
     pub fn validate(&self) -> Result<(), Error> {
-        for vortex in [&self.left, &self.right] {
-            finite("circulation_m2_s", vortex.circulation_m2_s)?;
-            finite("lateral_position_m", vortex.lateral_position_m)?;
-            finite("height_m", vortex.height_m)?;
-            positive("core_radius_m", vortex.core_radius_m)?;
-        }
+        self.left.validate()?;
+        self.right.validate()?;
         positive("distance of the right vortex from the left one", self.spacing_m())?;
         finite("lateral_wind_m_s", self.lateral_wind_m_s)?;
         finite("wind_shear_per_s", self.wind_shear_per_s)
@@ -174,12 +179,21 @@ pub struct WakeModel {
     pub lidar_lateral_position_m: f64,
     /// Height of the lidar over the ground \[m\].
     pub lidar_height_m: f64,
+    /// Secondary vortices of the left and the right vortex, which the boundary layer at the ground has rolled up into, if any are known:
+    /// they turn against their vortex, so that their circulation is negative.
+    pub secondary: Option<[Vortex; 2]>,
 }
 
 impl Default for WakeModel {
-    /// Profile (3), images, the lidar at the origin on the ground.
+    /// Profile (3), images, the lidar at the origin on the ground, no secondary vortices.
     fn default() -> Self {
-        Self { profile: CoreProfile::Algebraic, images: true, lidar_lateral_position_m: 0.0, lidar_height_m: 0.0 }
+        Self {
+            profile: CoreProfile::Algebraic,
+            images: true,
+            lidar_lateral_position_m: 0.0,
+            lidar_height_m: 0.0,
+            secondary: None,
+        }
     }
 }
 
@@ -243,11 +257,23 @@ impl WakeModel {
         let mut velocity_m_s = (wake.lateral_wind_m_s + wake.wind_shear_per_s * z_m) * ray.cos;
         // a search tries vortices one by one
         for (vortex, _, side, sense) in self.sources(wake).filter(|source| source.0.circulation_m2_s != 0.0) {
-            let (dy, dz) = (y_m - vortex.lateral_position_m, z_m - side * vortex.height_m);
-            let (omega, _, _) = self.profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
-            velocity_m_s += sense * vortex.circulation_m2_s * omega * (dy * ray.sin - dz * ray.cos);
+            velocity_m_s += self.velocity_of((vortex, side, sense), (y_m, z_m), ray);
         }
-        velocity_m_s
+        velocity_m_s + self.velocity_of_secondary((y_m, z_m), ray)
+    }
+
+    /// Radial velocity of one vortex or image.
+    fn velocity_of(&self, (vortex, side, sense): (&Vortex, f64, f64), (y_m, z_m): (f64, f64), ray: Ray) -> f64 {
+        let (dy, dz) = (y_m - vortex.lateral_position_m, z_m - side * vortex.height_m);
+        let (omega, _, _) = self.profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
+        sense * vortex.circulation_m2_s * omega * (dy * ray.sin - dz * ray.cos)
+    }
+
+    /// Radial velocity of the secondary vortices and their images.
+    fn velocity_of_secondary(&self, place_m: (f64, f64), ray: Ray) -> f64 {
+        let Some([left, right]) = self.secondary else { return 0.0 };
+        let secondary = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
+        self.sources(&secondary).map(|(v, _, side, sense)| self.velocity_of((v, side, sense), place_m, ray)).sum()
     }
 
     pub(crate) fn gradient_on(&self, wake: &Wake, range_m: f64, ray: Ray) -> (f64, [f64; PARAMETERS]) {
@@ -267,6 +293,7 @@ impl WakeModel {
             slope[height] += side * strength * (omega * ray.cos - 2.0 * dz * by_r2 * arm);
             slope[core] += strength * by_core * arm;
         }
+        velocity_m_s += self.velocity_of_secondary((y_m, z_m), ray);
         (velocity_m_s, slope)
     }
 }
@@ -295,7 +322,13 @@ mod tests {
     fn derivatives_are_difference_quotients_for_both_profiles_with_and_without_ground() {
         for profile in [CoreProfile::Algebraic, CoreProfile::LambOseen] {
             for images in [true, false] {
-                let model = WakeModel { profile, images, lidar_lateral_position_m: -20.0, lidar_height_m: 1.5 };
+                let model = WakeModel {
+                    profile,
+                    images,
+                    lidar_lateral_position_m: -20.0,
+                    lidar_height_m: 1.5,
+                    secondary: None,
+                };
                 // the last two are inside a core, one within the series of the Lamb-Oseen profile
                 for (range_m, elevation_rad) in [(300.0, 0.05), (420.0, 0.2), (399.0, 0.109_3), (398.923_6, 0.109_261)]
                 {

@@ -1,0 +1,440 @@
+//! Secondary vortices: what the boundary layer at the ground rolls up into beside each vortex, and which turn against it.
+//!
+//! Gates that are longer than the distance of a vortex from its secondary one see both at once: a fit of two vortices then puts them metres
+//! to the side and some tenths too weak. So the residuals of such a fit are searched for a vortex of the other sense near each of
+//! the two. If both together explain enough, all four are fitted at once: damped steps of Gauss and Newton with difference quotients at
+//! every few places, weighted with the loss. Of secondary vortices it is known before how strong they are and how far from their vortex
+//! (`KNOWN_RATIO`, `KNOWN_DISTANCE`), and their cores are kept. Check: exact maps with four vortices, and with two; simulated wakes.
+
+use ndarray::{Array1, Array2, Zip};
+
+use crate::error::Error;
+use crate::vortex_fit::damped_newton::{inverse, solve};
+use crate::vortex_fit::map_fit::data::median;
+use crate::vortex_fit::map_fit::estimator_response::Prepared;
+use crate::vortex_fit::map_fit::residual_covariance::{Cell, alike, filling};
+use crate::vortex_fit::map_fit::tangent::{self, Tangent};
+use crate::vortex_fit::wake::free_parameters::spread;
+use crate::vortex_fit::wake::pair::Ray;
+use crate::vortex_fit::wake::range_kernel::LineScratch;
+use crate::vortex_fit::{CorePrior, MapFitOptions, RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
+
+/// Median of the absolute value of a normal number.
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+/// Circulation over that of the vortex, and distance over its height: mean and standard deviation. The strongest secondary vortex of the
+/// medium wake (the mean along x, `wake_scaled.csv`) has -0.2 to -0.3 and 1.1 to 0.5 between tau = 1.25 and 2.5, without the weaker
+/// vorticity about it that gates see as well.
+const KNOWN_RATIO: (f64, f64) = (-0.4, 0.25);
+const KNOWN_DISTANCE: (f64, f64) = (0.8, 0.4);
+/// What a search allows of both.
+const RATIOS: (f64, f64) = (-0.8, -0.05);
+const DISTANCES: (f64, f64) = (0.25, 1.5);
+/// Core radius, and distance of the places of the search, over the height of the vortex.
+const CORE_OVER_HEIGHT: f64 = 0.12;
+const GRID_OVER_HEIGHT: f64 = 0.12;
+/// Least gain of the logarithm of the likelihood by both, with velocities that say the same counted once.
+const LEAST_GAIN: f64 = 15.0;
+const LEAST_SEARCHED: f64 = 6.0;
+/// Numbers of the secondary vortices that are fitted.
+const NUMBERS: usize = 6;
+/// Most steps, rounds of weights in each, halvings of one, and what is left of the last in standard deviations.
+const STEPS: usize = 30;
+const ROUNDS: usize = 10;
+const HALVINGS: i32 = 6;
+const NEAR_SIGMAS: f64 = 0.3;
+/// A step back by more than this part of the one before turns round.
+const TURNED: f64 = 0.3;
+/// Steps of difference quotients, over the circulation and the height of the vortex, and how many of them a step of the fit may go.
+const QUOTIENTS: [f64; 2] = [0.02, 0.02];
+const REACH: f64 = 12.0;
+
+/// A map and what is expected of it.
+pub(crate) struct Setting<'a, 'm> {
+    pub(crate) map: &'a VelocityMap<'m>,
+    pub(crate) model: &'a WakeModel,
+    /// What an estimator shows; means over gates without one.
+    pub(crate) prepared: Option<&'a Prepared<'a>>,
+    /// What gates see in the mean.
+    pub(crate) kernel: &'a RangeKernel,
+    pub(crate) options: &'a MapFitOptions,
+    pub(crate) groups: &'a [Vec<usize>],
+}
+
+/// Four vortices that explain a map better than two.
+pub(crate) struct Found {
+    pub(crate) wake: Wake,
+    pub(crate) secondary: [Vortex; 2],
+    /// Of the wake alone \[10, 10\].
+    pub(crate) covariance: Array2<f64>,
+}
+
+#[derive(Clone, Copy)]
+struct State {
+    wake: Wake,
+    secondary: [Vortex; 2],
+}
+
+impl State {
+    fn primary(&self, side: usize) -> &Vortex {
+        if side == 0 { &self.wake.left } else { &self.wake.right }
+    }
+
+    /// How far what is known of the secondary vortices is missed, in deviations.
+    fn away(&self) -> [f64; 4] {
+        let of = |side: usize| {
+            let (own, other) = (self.primary(side), &self.secondary[side]);
+            let ratio = other.circulation_m2_s / own.circulation_m2_s;
+            let distance = distance_m(own, other) / own.height_m;
+            [(ratio - KNOWN_RATIO.0) / KNOWN_RATIO.1, (distance - KNOWN_DISTANCE.0) / KNOWN_DISTANCE.1]
+        };
+        let ([a, b], [c, d]) = (of(0), of(1));
+        [a, b, c, d]
+    }
+
+    fn is_possible(&self) -> bool {
+        self.wake.validate().is_ok()
+            && (0..2).all(|side| self.primary(side).height_m > 0.0 && self.secondary[side].height_m > 0.0)
+    }
+}
+
+fn distance_m(a: &Vortex, b: &Vortex) -> f64 {
+    (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m)
+}
+
+/// Velocities and slopes about a state, what they cost, and how much they scatter.
+struct Linear {
+    here: Array2<f64>,
+    slopes: Vec<Array2<f64>>,
+    deviation: Array2<f64>,
+    scale: f64,
+}
+
+/// Curvature and gradient of the cost.
+struct Sums {
+    curvature: Array2<f64>,
+    gradient: Vec<f64>,
+}
+
+/// Residuals of a pair and what its free numbers can do about them.
+struct Free<'a> {
+    /// Weighted residuals and weights, over the units.
+    weighted: Array2<f64>,
+    weights: Array2<f64>,
+    slopes: &'a [Array2<f64>],
+    /// Of the curvature.
+    inverse: Array2<f64>,
+}
+
+impl Setting<'_, '_> {
+    /// The best wake with secondary vortices, if there are any beside those of a fit without them.
+    ///
+    /// # Errors
+    /// [`Error::Linalg`] if what is free does not show in the map.
+    pub(crate) fn find(&self, pair: &Wake) -> Result<Option<Found>, Error> {
+        let possible = |vortex: &Vortex| vortex.circulation_m2_s > 0.0 && vortex.height_m > 0.0;
+        if !possible(&pair.left) || !possible(&pair.right) {
+            return Ok(None);
+        }
+        let none = |own: &Vortex| Vortex { circulation_m2_s: 0.0, ..*own };
+        let two = State { wake: *pair, secondary: [none(&pair.left), none(&pair.right)] };
+        let alone = self.about(&two, &self.quotients(&two)[..self.groups.len()]);
+        let counted = alike(&self.cells(&alone), self.options.correlated_lines);
+        let Some((secondary, gain)) = self.search(pair, &alone) else { return Ok(None) };
+        if gain / counted < LEAST_SEARCHED {
+            return Ok(None);
+        }
+        let Some(state) = self.descend(State { wake: *pair, secondary }, counted)? else { return Ok(None) };
+        let here = self.velocities(&state);
+        let four = self.linear(&state.wake, here, Vec::new());
+        let known: f64 = state.away().iter().map(|away| 0.5 * away * away).sum();
+        let gain = (self.log_likelihood(&four) - self.log_likelihood(&alone)) / counted - known;
+        let sided = (0..2).all(|side| {
+            let ratio = state.secondary[side].circulation_m2_s / state.primary(side).circulation_m2_s;
+            (RATIOS.0..0.0).contains(&ratio)
+        });
+        if gain < LEAST_GAIN || !sided {
+            return Ok(None);
+        }
+        let covariance = self.covariance(&state, counted)?;
+        Ok(Some(Found { wake: state.wake, secondary: state.secondary, covariance }))
+    }
+
+    fn velocities(&self, state: &State) -> Array2<f64> {
+        let model = WakeModel { secondary: Some(state.secondary), ..*self.model };
+        match self.prepared {
+            Some(prepared) => prepared.velocities_of(&model, &state.wake),
+            None => {
+                let mut velocities = Array2::zeros(self.map.velocity_m_s.dim());
+                let mut scratch = LineScratch::default();
+                for (elevation_rad, mut row) in self.map.elevation_rad.iter().zip(velocities.rows_mut()) {
+                    let seen = (&model, &state.wake, Ray::new(*elevation_rad));
+                    self.kernel.apply(seen, self.map.range_m, false, &mut scratch, |gate, v, _| row[gate] = v);
+                }
+                velocities
+            }
+        }
+    }
+
+    fn linear(&self, wake: &Wake, here: Array2<f64>, slopes: Vec<Array2<f64>>) -> Linear {
+        let deviation = match self.prepared {
+            Some(prepared) => Tangent::new(prepared, *wake, here.view(), &[], self.map).deviation,
+            None => Array2::ones(here.dim()),
+        };
+        let mut linear = Linear { here, slopes, deviation, scale: 1.0 };
+        let mut sizes: Vec<f64> = self.residuals(&linear).map(|(_, residual, _)| residual.abs()).collect();
+        linear.scale = (median(&mut sizes) / NORMAL_MEDIAN).max(1e-6);
+        linear
+    }
+
+    /// Places with a velocity, their residuals and units \[m/s\]: a scale times what each scatters.
+    fn residuals<'l>(&'l self, linear: &'l Linear) -> impl Iterator<Item = ((usize, usize), f64, f64)> + 'l {
+        let of = move |(place, velocity): ((usize, usize), &f64)| {
+            let unit = linear.scale * linear.deviation[place] * self.map.deviation(place.0, place.1);
+            (place, (velocity - linear.here[place]) / unit, unit)
+        };
+        self.map.velocity_m_s.indexed_iter().map(of).filter(|(_, residual, _)| residual.is_finite())
+    }
+
+    fn log_likelihood(&self, linear: &Linear) -> f64 {
+        -self.residuals(linear).map(|(_, residual, unit)| self.options.loss.at(residual).0 + unit.ln()).sum::<f64>()
+    }
+
+    fn cells(&self, linear: &Linear) -> Vec<Vec<Option<Cell>>> {
+        let mut cells = vec![vec![None; self.map.range_m.len()]; self.map.elevation_rad.len()];
+        for (place, residual, unit) in self.residuals(linear) {
+            let slopes: Vec<f64> = linear.slopes.iter().map(|slope| slope[place] / unit).collect();
+            if slopes.iter().all(|slope| slope.is_finite()) {
+                let residual = self.options.loss.at(residual).1 * residual;
+                cells[place.0][place.1] = Some(Cell { residual, slopes });
+            }
+        }
+        cells
+    }
+
+    /// The vortices of the other sense, one beside each of the pair, that explain most of its residuals by their means over gates if the pair
+    /// may move along its slopes, and how much of the logarithm of the likelihood.
+    fn search(&self, pair: &Wake, alone: &Linear) -> Option<([Vortex; 2], f64)> {
+        let mut free = Free {
+            weighted: Array2::zeros(alone.here.dim()),
+            weights: Array2::zeros(alone.here.dim()),
+            slopes: &alone.slopes,
+            inverse: Array2::zeros((0, 0)),
+        };
+        for (place, residual, unit) in self.residuals(alone) {
+            let weight = self.options.loss.at(residual).1;
+            if alone.slopes.iter().all(|slope| slope[place].is_finite()) {
+                free.weighted[place] = weight * residual / unit;
+                free.weights[place] = weight / (unit * unit);
+            }
+        }
+        let product = |a: &Array2<f64>, b: &Array2<f64>| {
+            Zip::from(a)
+                .and(b)
+                .and(&free.weights)
+                .fold(0.0, |sum, a, b, w| if *w > 0.0 { sum + w * a * b } else { sum })
+        };
+        let order = alone.slopes.len();
+        let curvature = Array2::from_shape_fn((order, order), |(i, j)| product(&alone.slopes[i], &alone.slopes[j]));
+        free.inverse = inverse("curvature of the fit", &curvature).ok()?;
+        let ((left, a), (right, b)) = (self.beside(pair, 0, &free)?, self.beside(pair, 1, &free)?);
+        Some(([left, right], a + b))
+    }
+
+    fn beside(&self, pair: &Wake, side: usize, free: &Free<'_>) -> Option<(Vortex, f64)> {
+        let own = if side == 0 { &pair.left } else { &pair.right };
+        let step_m = GRID_OVER_HEIGHT * own.height_m;
+        let count = (DISTANCES.1 / GRID_OVER_HEIGHT).ceil() as i64;
+        let plain = WakeModel { secondary: None, ..*self.model };
+        let nowhere = Vortex { circulation_m2_s: 0.0, ..*own };
+        let mut scratch = LineScratch::default();
+        let mut best: Option<(Vortex, f64)> = None;
+        for (i, j) in (-count..=count).flat_map(|i| (-count..=count).map(move |j| (i, j))) {
+            let vortex = Vortex {
+                circulation_m2_s: 1.0,
+                lateral_position_m: own.lateral_position_m + i as f64 * step_m,
+                height_m: own.height_m + j as f64 * step_m,
+                core_radius_m: CORE_OVER_HEIGHT * own.height_m,
+            };
+            let distance = distance_m(own, &vortex) / own.height_m;
+            if !(DISTANCES.0..=DISTANCES.1).contains(&distance) || vortex.height_m <= 0.0 || !self.sees(&vortex) {
+                continue;
+            }
+            let (left, right) = if side == 0 { (vortex, nowhere) } else { (nowhere, vortex) };
+            let wake = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
+            let (mut slope, mut square, mut shared) = (0.0, 0.0, Array1::zeros(free.slopes.len()));
+            for (line, elevation_rad) in self.map.elevation_rad.iter().enumerate() {
+                let seen = (&plain, &wake, Ray::new(*elevation_rad));
+                self.kernel.apply(seen, self.map.range_m, false, &mut scratch, |gate, velocity, _| {
+                    let place = [line, gate];
+                    let weight = free.weights[place];
+                    if weight > 0.0 {
+                        slope += velocity * free.weighted[place];
+                        square += velocity * velocity * weight;
+                        shared.iter_mut().zip(free.slopes).for_each(|(sum, of)| *sum += weight * velocity * of[place]);
+                    }
+                });
+            }
+            // what the pair could do as well does not count
+            let square = square - shared.dot(&free.inverse.dot(&shared));
+            let allowed = (RATIOS.0 * own.circulation_m2_s, RATIOS.1 * own.circulation_m2_s);
+            let circulation_m2_s = (slope / square).clamp(allowed.0, allowed.1);
+            let gain = circulation_m2_s * (slope - 0.5 * circulation_m2_s * square);
+            if best.is_none_or(|(_, most)| gain > most) {
+                best = Some((Vortex { circulation_m2_s, ..vortex }, gain));
+            }
+        }
+        best
+    }
+
+    /// Whether a centre lies within the scan.
+    fn sees(&self, vortex: &Vortex) -> bool {
+        let (y_m, z_m) = (
+            vortex.lateral_position_m - self.model.lidar_lateral_position_m,
+            vortex.height_m - self.model.lidar_height_m,
+        );
+        let within =
+            |axis: &[f64], at: f64| axis.first().is_some_and(|a| at >= *a) && axis.last().is_some_and(|b| at <= *b);
+        within(self.map.range_m, y_m.hypot(z_m)) && within(self.map.elevation_rad, z_m.atan2(y_m))
+    }
+
+    /// A state with one of its numbers moved.
+    fn moved(&self, state: &State, steps: &[f64]) -> State {
+        let mut parameters = state.wake.to_array();
+        for (group, step) in self.groups.iter().zip(steps) {
+            group.iter().for_each(|&place| parameters[place] += step);
+        }
+        let mut moved = State { wake: Wake::from_array(&parameters), ..*state };
+        for (vortex, by) in moved.secondary.iter_mut().zip(steps[self.groups.len()..].chunks(NUMBERS / 2)) {
+            vortex.circulation_m2_s += by[0];
+            vortex.lateral_position_m += by[1];
+            vortex.height_m += by[2];
+        }
+        moved
+    }
+
+    /// Steps of difference quotients.
+    fn quotients(&self, state: &State) -> Vec<f64> {
+        let mut steps: Vec<f64> = self.groups.iter().map(|group| tangent::step(&state.wake, group[0])).collect();
+        for side in 0..2 {
+            let own = state.primary(side);
+            let place_m = QUOTIENTS[1] * own.height_m;
+            steps.extend([QUOTIENTS[0] * own.circulation_m2_s.abs().max(1.0), place_m, place_m]);
+        }
+        steps
+    }
+
+    /// What is known before: distances in deviations with their slopes.
+    fn known(&self, state: &State, steps: &[f64]) -> Vec<(f64, Vec<f64>)> {
+        let terms = |state: &State| {
+            let cores =
+                self.options.core_prior.map_or_else(Vec::new, |known: CorePrior| known.terms(&state.wake, self.groups));
+            let mut away: Vec<f64> = cores.into_iter().map(|(away, _)| away).collect();
+            away.extend(state.away());
+            away
+        };
+        let here = terms(state);
+        let mut known: Vec<(f64, Vec<f64>)> = here.iter().map(|away| (*away, vec![0.0; steps.len()])).collect();
+        for (number, step) in steps.iter().enumerate() {
+            let mut one = vec![0.0; steps.len()];
+            one[number] = *step;
+            let there = terms(&self.moved(state, &one));
+            for ((known, there), here) in known.iter_mut().zip(&there).zip(&here) {
+                known.1[number] = (there - here) / step;
+            }
+        }
+        known
+    }
+
+    /// Velocities and slopes about a state.
+    fn about(&self, state: &State, steps: &[f64]) -> Linear {
+        let here = self.velocities(state);
+        let quotient = |number: usize| {
+            let mut one = vec![0.0; steps.len()];
+            one[number] = steps[number];
+            (self.velocities(&self.moved(state, &one)) - &here) / steps[number]
+        };
+        let slopes = (0..steps.len()).map(quotient).collect();
+        self.linear(&state.wake, here, slopes)
+    }
+
+    /// Sums over the places after a step, with the weights of the loss there.
+    fn sums(&self, linear: &Linear, known: &[(f64, Vec<f64>)], counted: f64, step: &[f64]) -> Sums {
+        let order = step.len();
+        let mut sums = Sums { curvature: Array2::zeros((order, order)), gradient: vec![0.0; order] };
+        let mut add = |away: f64, weight: f64, slopes: &[f64]| {
+            for (i, s) in slopes.iter().enumerate() {
+                sums.gradient[i] += weight * away * s;
+                for (j, t) in slopes.iter().enumerate() {
+                    sums.curvature[[i, j]] += weight * s * t;
+                }
+            }
+        };
+        let along = |slopes: &[f64]| slopes.iter().zip(step).map(|(s, by)| s * by).sum::<f64>();
+        let mut slopes = vec![0.0; order];
+        for (place, residual, unit) in self.residuals(linear) {
+            slopes.iter_mut().zip(&linear.slopes).for_each(|(slope, of)| *slope = of[place] / unit);
+            if slopes.iter().all(|slope| slope.is_finite()) {
+                let left = residual - along(&slopes);
+                add(-left, self.options.loss.at(left).1, &slopes);
+            }
+        }
+        known.iter().for_each(|(away, slopes)| add(away + along(slopes), counted, slopes));
+        sums
+    }
+
+    /// The nearest minimum of the cost, if the steps come to an end and it is possible.
+    fn descend(&self, start: State, counted: f64) -> Result<Option<State>, Error> {
+        let mut state = start;
+        let (mut turns, mut last) = (0, vec![0.0; self.groups.len() + NUMBERS]);
+        for _ in 0..STEPS {
+            let steps = self.quotients(&state);
+            let linear = self.about(&state, &steps);
+            let known = self.known(&state, &steps);
+            let mut way = vec![0.0; steps.len()];
+            for _ in 0..ROUNDS {
+                let Sums { curvature, gradient } = self.sums(&linear, &known, counted, &way);
+                let down: Vec<f64> = gradient.iter().map(|g| -g).collect();
+                let Some(more) = solve(&curvature, &down) else { return Ok(None) };
+                way.iter_mut().zip(&more).for_each(|(way, more)| *way += more);
+                if more.iter().zip(&down).map(|(m, d)| m * d).sum::<f64>() <= (0.1 * NEAR_SIGMAS).powi(2) * counted {
+                    break;
+                }
+            }
+            let curvature = self.sums(&linear, &known, counted, &way).curvature;
+            let product =
+                |a: &[f64], b: &[f64]| -> f64 { curvature.indexed_iter().map(|((i, j), c)| c * a[i] * b[j]).sum() };
+            // as in the fit of two: steps that turn round are shortened, so that their ends are averaged
+            turns += usize::from(-product(&way, &last) > TURNED * product(&last, &last));
+            let share = f64::from(1 + turns as u32).recip();
+            if share * (product(&way, &way) / counted).sqrt() <= NEAR_SIGMAS {
+                return Ok(Some(state));
+            }
+            let reach = way.iter().zip(&steps).map(|(way, step)| REACH * step / way.abs().max(f64::MIN_POSITIVE));
+            let part = reach.fold(share, f64::min);
+            let trial = |halving: i32| {
+                let part = part * 0.5_f64.powi(halving);
+                let trial = self.moved(&state, &way.iter().map(|way| part * way).collect::<Vec<f64>>());
+                trial.is_possible().then_some(trial)
+            };
+            let Some(next) = (0..=HALVINGS).find_map(trial) else { return Ok(None) };
+            (state, last) = (next, way);
+        }
+        Ok(None)
+    }
+
+    /// Of the wake, whatever the secondary vortices are: its part of the sandwich of all numbers.
+    fn covariance(&self, state: &State, counted: f64) -> Result<Array2<f64>, Error> {
+        let steps = self.quotients(state);
+        let linear = self.about(state, &steps);
+        let known = self.known(state, &steps);
+        let curvature = self.sums(&linear, &known, counted, &vec![0.0; steps.len()]).curvature;
+        let bread = inverse("curvature of the fit", &curvature)?;
+        let (mut filling, _) = filling(&self.cells(&linear), &bread, self.options.correlated_lines);
+        for (_, slopes) in &known {
+            filling.indexed_iter_mut().for_each(|((i, j), sum)| *sum += counted * counted * slopes[i] * slopes[j]);
+        }
+        let all = bread.dot(&filling).dot(&bread);
+        let own = self.groups.len();
+        Ok(spread(self.groups, &all.slice(ndarray::s![..own, ..own]).to_owned()))
+    }
+}
