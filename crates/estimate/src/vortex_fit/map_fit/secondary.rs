@@ -7,6 +7,7 @@
 //! (`KNOWN_RATIO`, `KNOWN_DISTANCE`), and their cores are kept. Check: exact maps with four vortices, and with two; simulated wakes.
 
 use ndarray::{Array1, Array2, Zip};
+use std::ops::Range;
 
 use crate::error::Error;
 use crate::vortex_fit::damped_newton::{inverse, solve};
@@ -240,50 +241,62 @@ impl Setting<'_, '_> {
         Some(([left, right], a + b))
     }
 
+    /// Every second place of a grid first, then those about the best of them.
     fn beside(&self, pair: &Wake, side: usize, free: &Free<'_>) -> Option<(Vortex, f64)> {
         let own = if side == 0 { &pair.left } else { &pair.right };
-        let step_m = GRID_OVER_HEIGHT * own.height_m;
         let count = (DISTANCES.1 / GRID_OVER_HEIGHT).ceil() as i64;
+        let mut scratch = LineScratch::default();
+        let mut best = |rows: Range<i64>, columns: Range<i64>, step: usize| {
+            let places = rows.step_by(step).flat_map(|i| columns.clone().step_by(step).map(move |j| (i, j)));
+            let gains = places.filter_map(|at| Some((at, self.gain((own, side), at, free, &mut scratch)?)));
+            gains.max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))
+        };
+        let ((i, j), _) = best(-count..count + 1, -count..count + 1, 2)?;
+        best(i - 1..i + 2, j - 1..j + 2, 1).map(|(_, found)| found)
+    }
+
+    /// The best vortex at a place of the grid about one of the pair, and what it gains; nothing where there can be none.
+    fn gain(
+        &self,
+        (own, side): (&Vortex, usize),
+        (i, j): (i64, i64),
+        free: &Free<'_>,
+        scratch: &mut LineScratch,
+    ) -> Option<(Vortex, f64)> {
+        let step_m = GRID_OVER_HEIGHT * own.height_m;
+        let vortex = Vortex {
+            circulation_m2_s: 1.0,
+            lateral_position_m: own.lateral_position_m + i as f64 * step_m,
+            height_m: own.height_m + j as f64 * step_m,
+            core_radius_m: CORE_OVER_HEIGHT * own.height_m,
+        };
+        let distance = distance_m(own, &vortex) / own.height_m;
+        if !(DISTANCES.0..=DISTANCES.1).contains(&distance) || vortex.height_m <= 0.0 || !self.sees(&vortex) {
+            return None;
+        }
         let plain = WakeModel { secondary: None, ..*self.model };
         let nowhere = Vortex { circulation_m2_s: 0.0, ..*own };
-        let mut scratch = LineScratch::default();
-        let mut best: Option<(Vortex, f64)> = None;
-        for (i, j) in (-count..=count).flat_map(|i| (-count..=count).map(move |j| (i, j))) {
-            let vortex = Vortex {
-                circulation_m2_s: 1.0,
-                lateral_position_m: own.lateral_position_m + i as f64 * step_m,
-                height_m: own.height_m + j as f64 * step_m,
-                core_radius_m: CORE_OVER_HEIGHT * own.height_m,
-            };
-            let distance = distance_m(own, &vortex) / own.height_m;
-            if !(DISTANCES.0..=DISTANCES.1).contains(&distance) || vortex.height_m <= 0.0 || !self.sees(&vortex) {
-                continue;
-            }
-            let (left, right) = if side == 0 { (vortex, nowhere) } else { (nowhere, vortex) };
-            let wake = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
-            let (mut slope, mut square, mut shared) = (0.0, 0.0, Array1::zeros(free.slopes.len()));
-            for (line, elevation_rad) in self.map.elevation_rad.iter().enumerate() {
-                let seen = (&plain, &wake, Ray::new(*elevation_rad));
-                self.kernel.apply(seen, self.map.range_m, false, &mut scratch, |gate, velocity, _| {
-                    let place = [line, gate];
-                    let weight = free.weights[place];
-                    if weight > 0.0 {
-                        slope += velocity * free.weighted[place];
-                        square += velocity * velocity * weight;
-                        shared.iter_mut().zip(free.slopes).for_each(|(sum, of)| *sum += weight * velocity * of[place]);
-                    }
-                });
-            }
-            // what the pair could do as well does not count
-            let square = square - shared.dot(&free.inverse.dot(&shared));
-            let allowed = (RATIOS.0 * own.circulation_m2_s, RATIOS.1 * own.circulation_m2_s);
-            let circulation_m2_s = (slope / square).clamp(allowed.0, allowed.1);
-            let gain = circulation_m2_s * (slope - 0.5 * circulation_m2_s * square);
-            if best.is_none_or(|(_, most)| gain > most) {
-                best = Some((Vortex { circulation_m2_s, ..vortex }, gain));
-            }
+        let (left, right) = if side == 0 { (vortex, nowhere) } else { (nowhere, vortex) };
+        let wake = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
+        let (mut slope, mut square, mut shared) = (0.0, 0.0, Array1::zeros(free.slopes.len()));
+        for (line, elevation_rad) in self.map.elevation_rad.iter().enumerate() {
+            let seen = (&plain, &wake, Ray::new(*elevation_rad));
+            self.kernel.apply(seen, self.map.range_m, false, scratch, |gate, velocity, _| {
+                let place = [line, gate];
+                let weight = free.weights[place];
+                if weight > 0.0 {
+                    slope += velocity * free.weighted[place];
+                    square += velocity * velocity * weight;
+                    shared.iter_mut().zip(free.slopes).for_each(|(sum, of)| *sum += weight * velocity * of[place]);
+                }
+            });
         }
-        best
+        // what the pair could do as well does not count
+        let square = square - shared.dot(&free.inverse.dot(&shared));
+        let allowed = (RATIOS.0 * own.circulation_m2_s, RATIOS.1 * own.circulation_m2_s);
+        let circulation_m2_s = (slope / square).clamp(allowed.0, allowed.1);
+        let gain = circulation_m2_s * (slope - 0.5 * circulation_m2_s * square);
+        gain.is_finite().then_some((Vortex { circulation_m2_s, ..vortex }, gain))
     }
 
     /// Whether a centre lies within the scan.
