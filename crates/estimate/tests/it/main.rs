@@ -18,6 +18,7 @@ mod quality;
 mod retrieval;
 mod retrieval_methods;
 mod rolling_moment;
+mod secondary_vortices;
 mod sliding;
 mod vortex_fit;
 mod wake_detection;

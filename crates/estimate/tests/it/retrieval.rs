@@ -34,13 +34,13 @@ fn stored(text: &str) -> (ScanMap, Array2<f64>) {
 }
 
 /// A stored scan with what is known of it.
-struct Case {
-    map: ScanMap,
-    exact: Array2<f64>,
-    truth: Wake,
+pub(crate) struct Case {
+    pub(crate) map: ScanMap,
+    pub(crate) exact: Array2<f64>,
+    pub(crate) truth: Wake,
     /// Bounds of all ten parameters.
     bound: [f64; PARAMETERS],
-    options: RetrievalOptions,
+    pub(crate) options: RetrievalOptions,
 }
 
 macro_rules! reference {
@@ -50,7 +50,7 @@ macro_rules! reference {
 }
 
 /// `a`, `b` or `c`.
-fn case(name: &str) -> Case {
+pub(crate) fn case(name: &str) -> Case {
     let (text, std_m, truth, bound) = match name {
         "a" => (
             reference!("map_a"),
@@ -153,12 +153,12 @@ fn white(case: &Case, rng: &mut Xoshiro256PlusPlus) -> Array2<f64> {
 }
 
 /// The same with 5 % of the velocities anywhere in the band.
-fn with_outliers(case: &Case, rng: &mut Xoshiro256PlusPlus) -> Array2<f64> {
+pub(crate) fn with_outliers(case: &Case, rng: &mut Xoshiro256PlusPlus) -> Array2<f64> {
     white(case, rng).mapv(|v| if rng.random::<f64>() < 0.05 { -19.0 + 38.0 * rng.random::<f64>() } else { v })
 }
 
 /// Factor of the covariance of turbulence at the cells of a map.
-fn turbulence_factor(map: &ScanMap, deviation_m_s: f64, length_m: f64) -> Vec<Vec<f64>> {
+pub(crate) fn turbulence_factor(map: &ScanMap, deviation_m_s: f64, length_m: f64) -> Vec<Vec<f64>> {
     let places: Vec<(f64, f64)> = map
         .velocity_m_s
         .indexed_iter()
@@ -183,7 +183,7 @@ fn turbulence_factor(map: &ScanMap, deviation_m_s: f64, length_m: f64) -> Vec<Ve
 }
 
 /// Every second line of a case.
-fn thinned(case: Case) -> Case {
+pub(crate) fn thinned(case: Case) -> Case {
     let keep = |a: &Array2<f64>| a.slice(ndarray::s![..;2, ..]).to_owned();
     let axis = |a: &[f64]| a.iter().copied().step_by(2).collect::<Vec<f64>>();
     let map = ScanMap {
@@ -558,86 +558,5 @@ fn standing_vortices_are_taken_for_such_and_moving_ones_in_scans_of_seconds() {
             let found = fit_scan(&ScanMap { velocity_m_s, ..case.map.clone() }, &case.options).unwrap();
             assert_eq!(found.has(Flag::MotionIgnored), !moves, "{name} {lasts_s} {seed}: {:?}", found.flags);
         }
-    }
-}
-
-/// Pairs with secondary vortices beside them, and the same scans without.
-#[test]
-fn secondary_vortices_are_found_in_scans_of_any_instrument_that_show_them() {
-    let case = case("b");
-    let secondary = |circulation_m2_s, lateral_position_m, height_m| Vortex {
-        circulation_m2_s,
-        lateral_position_m,
-        height_m,
-        core_radius_m: 5.0,
-    };
-    let near_ground = [secondary(-120.0, 356.0, 38.0), secondary(-110.0, 445.0, 46.0)];
-    let sigma_m_s = case.map.sigma_m_s.as_ref().unwrap();
-    for (shown, seed) in [(Some(near_ground), 1), (Some(near_ground), 2), (None, 3), (None, 4), (None, 5)] {
-        let mut truth = case.options.clone();
-        truth.model.secondary = shown;
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut velocity_m_s = expected_velocities(&case.map, &truth, &case.truth, false).unwrap();
-        velocity_m_s.zip_mut_with(sigma_m_s, |velocity, sigma| *velocity += sigma * normal(&mut rng));
-        let map = ScanMap { velocity_m_s, ..case.map.clone() };
-        let pair = fit_scan(&map, &case.options).unwrap();
-        let four = with_secondary_vortices(&map, &case.options, &pair).unwrap();
-        assert_eq!(four.is_some(), shown.is_some(), "{seed}");
-        let Some((four, options)) = four else { continue };
-        assert!(four.has(Flag::SecondaryVortices));
-        for (found, of) in options.model.secondary.unwrap().iter().zip(near_ground) {
-            let away_m = (found.lateral_position_m - of.lateral_position_m).hypot(found.height_m - of.height_m);
-            assert!(away_m < 4.0 && (found.circulation_m2_s / of.circulation_m2_s - 1.0).abs() < 0.3, "{found:?}");
-        }
-        let wake = four.wake.unwrap().to_array();
-        let away = |wake: &[f64; PARAMETERS]| {
-            let of = |place: usize| {
-                (wake[place] - case.truth.to_array()[place]).abs() / four.covariance[[place, place]].sqrt()
-            };
-            (0..6).map(of).fold(0.0, f64::max)
-        };
-        let (missed, left) = (away(&pair.wake.unwrap().to_array()), away(&wake));
-        assert!(left < 3.5 && missed > 2.0 * left, "{missed} {left}");
-        let vortex = four.vortex(Side::Left).unwrap();
-        assert_eq!(vortex.circulation_m2_s.std, four.covariance[[0, 0]].sqrt());
-    }
-}
-
-/// The stored scans have no secondary vortices.
-#[test]
-fn stored_scans_show_no_secondary_vortices() {
-    for name in ["a", "b"] {
-        let case = case(name);
-        let pair = fit_scan(&case.map, &case.options).unwrap();
-        assert!(with_secondary_vortices(&case.map, &case.options, &pair).unwrap().is_none(), "{name}");
-    }
-}
-
-/// Turbulence must not pass for secondary vortices: residuals that neighbours share count once.
-#[test]
-#[ignore = "minutes: secondary vortices in 60 scans with outliers and in 60 with turbulence"]
-fn scans_with_outliers_or_turbulence_show_no_secondary_vortices() {
-    let whole = case("a");
-    let thinned = thinned(case("a"));
-    for deviation_m_s in [0.0, 0.4, 1.2] {
-        let factor = turbulence_factor(&thinned.map, deviation_m_s, 25.0);
-        let mut found = 0;
-        for seed in 0..60 {
-            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-            let case = if deviation_m_s > 0.0 { &thinned } else { &whole };
-            let mut velocity_m_s = with_outliers(case, &mut rng);
-            if deviation_m_s > 0.0 {
-                velocity_m_s = case.exact.clone();
-                let normals: Vec<f64> = velocity_m_s.iter().map(|_| normal(&mut rng)).collect();
-                for (velocity, row) in velocity_m_s.iter_mut().zip(&factor) {
-                    *velocity += row.iter().zip(&normals).map(|(l, n)| l * n).sum::<f64>() + 0.3 * normal(&mut rng);
-                }
-            }
-            let map = ScanMap { velocity_m_s, ..case.map.clone() };
-            let pair = fit_scan(&map, &case.options).unwrap();
-            found += usize::from(with_secondary_vortices(&map, &case.options, &pair).unwrap().is_some());
-        }
-        println!("turbulence {deviation_m_s} m/s: secondary vortices in {found} of 60");
-        assert!(found <= 3, "{found}");
     }
 }

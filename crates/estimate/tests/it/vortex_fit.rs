@@ -8,15 +8,15 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::vortex_fit::{
     CoreProfile, EstimatorResponse, FreeParameters, Loss, MapFit, MapFitOptions, Parameter, Powers, PulseShape,
-    RangeKernel, ScanModel, ScanSetup, Sharing, SignalFitOptions, Starts, VelocityMap, Vortex, Wake, WakeModel,
-    WindFit, fit_map, fit_map_of_estimator, fit_secondary_vortices, fit_signals,
+    RangeKernel, ScanModel, ScanSetup, Sharing, SignalFitOptions, Starts, VelocityMap, Wake, WakeModel, WindFit,
+    fit_map, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
     Correlogram, Error, Refinement, Sampling, SignalKind, SpectralPeak, Weighting, bound::Noise,
     window::SPEED_OF_LIGHT_M_S,
 };
 
-const SIGMA_S: f64 = 120.112e-9;
+pub(crate) const SIGMA_S: f64 = 120.112e-9;
 
 fn wake(left_m: f64, spacing_m: f64, height_m: f64) -> Wake {
     let right_m = left_m + spacing_m;
@@ -348,74 +348,4 @@ fn fits_have_the_same_bits_when_repeated_and_say_when_they_do_not_converge() {
     assert_eq!(run(&options).unwrap(), run(&options).unwrap());
     let hasty = SignalFitOptions { max_iterations: 1, ..options };
     assert!(matches!(run(&hasty), Err(Error::NotConverged { .. })));
-}
-
-/// A map of peaks with noise, of a pair with these secondary vortices, fitted without and with such vortices.
-fn with_secondary_vortices(secondary: Option<[Vortex; 2]>, seed: u64) -> (MapFit, Option<(MapFit, [Vortex; 2])>) {
-    let sampling = table_2();
-    let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
-    let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-    let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
-    let response = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();
-    let (elevation_rad, range_m): (Vec<f64>, Vec<f64>) =
-        ((0..90).map(|i| 0.02 + 0.002 * f64::from(i)).collect(), (0..34).map(|i| 296.0 + 6.0 * f64::from(i)).collect());
-    let truth = WakeModel { secondary, ..Default::default() };
-    let mut velocity_m_s = response.map(&truth, &grounded(), &elevation_rad, &range_m).unwrap();
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    velocity_m_s.mapv_inplace(|v| v + 0.2 * normal(&mut rng));
-    let map = VelocityMap {
-        elevation_rad: &elevation_rad,
-        range_m: &range_m,
-        velocity_m_s: velocity_m_s.view(),
-        standard_deviation_m_s: None,
-    };
-    let (model, options) = (WakeModel::default(), MapFitOptions { correlated_lines: 2, ..Default::default() });
-    let pair = fit_map_of_estimator(&map, &model, &response, &options).unwrap();
-    let four = fit_secondary_vortices(&map, &model, &response, &pair.wake, &options).unwrap();
-    (pair, four)
-}
-
-/// Vortices of which the ground has driven the left and the right one apart.
-fn grounded() -> Wake {
-    Wake::from_array(&[450.0, 430.0, 345.0, 38.0, 440.0, 42.0, 3.5, 3.5, 0.5, 0.0])
-}
-
-fn secondary_of_grounded() -> [Vortex; 2] {
-    let vortex = |circulation_m2_s, lateral_position_m, height_m| Vortex {
-        circulation_m2_s,
-        lateral_position_m,
-        height_m,
-        core_radius_m: 5.0,
-    };
-    [vortex(-180.0, 318.0, 40.0), vortex(-160.0, 466.0, 52.0)]
-}
-
-/// A gate of 38 m sees a vortex and its secondary one at once: a pair alone misses the truth by many of its deviations, four vortices do not.
-#[test]
-fn secondary_vortices_are_found_beside_their_vortices() {
-    let truth = grounded().to_array();
-    let (mut missed, mut worst) = (0.0_f64, 0.0_f64);
-    for seed in 0..2 {
-        let (pair, four) = with_secondary_vortices(Some(secondary_of_grounded()), seed);
-        let (fit, secondary) = four.expect("secondary vortices");
-        // circulations and places
-        for (place, truth) in truth.iter().enumerate().take(6) {
-            let away = |fit: &MapFit, of: &MapFit| {
-                (fit.wake.to_array()[place] - truth).abs() / of.covariance[[place; 2]].sqrt()
-            };
-            (worst, missed) = (worst.max(away(&fit, &fit)), missed.max(away(&pair, &fit)));
-        }
-        for (found, of) in secondary.iter().zip(secondary_of_grounded()) {
-            let away_m = (found.lateral_position_m - of.lateral_position_m).hypot(found.height_m - of.height_m);
-            assert!(away_m < 5.0 && (found.circulation_m2_s / of.circulation_m2_s - 1.0).abs() < 0.35, "{found:?}");
-        }
-    }
-    assert!(worst < 3.5 && missed > 2.0 * worst, "{worst} {missed}");
-}
-
-#[test]
-fn a_pair_alone_has_no_secondary_vortices() {
-    for seed in 0..4 {
-        assert!(with_secondary_vortices(None, seed).1.is_none(), "{seed}");
-    }
 }
