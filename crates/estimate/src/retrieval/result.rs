@@ -121,7 +121,7 @@ pub struct ScanResult {
     pub wake: Option<Wake>,
     /// Reference time \[s\]: the middle of the scan. NaN if times are unknown.
     pub reference_time_s: f64,
-    /// Covariance \[10, 10\] of the wake at the reference time, in the order of [`Parameter`](crate::vortex_fit::Parameter).
+    /// Covariance \[10, 10\] of the wake at the reference time, in the order of [`Parameter`].
     pub covariance: Array2<f64>,
     /// Lateral wind at the ground \[m/s\].
     pub lateral_wind_m_s: Measured,

@@ -22,7 +22,7 @@ pub fn with_secondary_vortices(
     found: &ScanResult,
 ) -> Result<Option<(ScanResult, RetrievalOptions)>, Error> {
     let stands = found.has(Flag::MotionIgnored) && found.vortices.len() == 2;
-    let Some(pair) = found.wake.filter(|_| stands && options.turbulence.is_none() && options.model.images) else {
+    let Some(pair) = found.wake.filter(|_| stands && options.turbulence.is_none()) else {
         return Ok(None);
     };
     options.validate()?;

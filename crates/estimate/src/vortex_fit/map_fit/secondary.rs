@@ -127,13 +127,13 @@ struct Free<'a> {
 }
 
 impl Setting<'_, '_> {
-    /// The best wake with secondary vortices, if there are any beside those of a fit without them.
+    /// The best wake with secondary vortices, if there are any beside those of a fit without them. Without a ground there are none.
     ///
     /// # Errors
     /// [`Error::Linalg`] if what is free does not show in the map.
     pub(crate) fn find(&self, pair: &Wake) -> Result<Option<Found>, Error> {
         let possible = |vortex: &Vortex| vortex.circulation_m2_s > 0.0 && vortex.height_m > 0.0;
-        if !possible(&pair.left) || !possible(&pair.right) {
+        if !self.model.images || !possible(&pair.left) || !possible(&pair.right) {
             return Ok(None);
         }
         let none = |own: &Vortex| Vortex { circulation_m2_s: 0.0, ..*own };
