@@ -64,7 +64,7 @@ fn of_flow(context: &Context, tau: Option<f64>, wake: &Path) -> Result<OfFlow, F
     scene.scan.elevation_step_rad = context.choose(2.5e-3, 1.25e-3, 1.25e-3);
     scene.estimator.gate_step_samples = context.choose(15, 5, 5);
     scene.scan.pulses_per_line = 4;
-    scene.scan.realisations = context.choose(2, 16, 32);
+    scene.scan.realisations = context.choose(3, 16, 32);
     scene.flow = match tau {
         None => Flow::VortexPair(VortexPair::default()),
         Some(age_tau) => {

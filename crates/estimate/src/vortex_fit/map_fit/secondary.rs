@@ -27,7 +27,7 @@ const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 /// vorticity about it that gates see as well.
 const KNOWN_RATIO: (f64, f64) = (-0.4, 0.25);
 const KNOWN_DISTANCE: (f64, f64) = (0.8, 0.4);
-/// What a search allows of both.
+/// What is allowed of both in the search, and in the end of any opposite circulation.
 const RATIOS: (f64, f64) = (-0.8, -0.05);
 const DISTANCES: (f64, f64) = (0.25, 1.5);
 /// Core radius, and distance of the places of the search, over the height of the vortex.
@@ -98,6 +98,11 @@ impl State {
     }
 }
 
+/// Whether a secondary vortex may be that far from its vortex, over the height of the latter.
+fn is_near(distance: f64) -> bool {
+    (DISTANCES.0..=DISTANCES.1).contains(&distance)
+}
+
 fn distance_m(a: &Vortex, b: &Vortex) -> f64 {
     (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m)
 }
@@ -149,11 +154,14 @@ impl Setting<'_, '_> {
         let four = self.linear(&state.wake, here, Vec::new());
         let known: f64 = state.away().iter().map(|away| 0.5 * away * away).sum();
         let gain = (self.log_likelihood(&four) - self.log_likelihood(&alone)) / counted - known;
-        let sided = (0..2).all(|side| {
-            let ratio = state.secondary[side].circulation_m2_s / state.primary(side).circulation_m2_s;
-            (RATIOS.0..0.0).contains(&ratio)
+        // one far from its vortex stands for something else; a little beyond the scan it may be
+        let stands = (0..2).all(|side| {
+            let (own, other) = (state.primary(side), &state.secondary[side]);
+            let ratio = other.circulation_m2_s / own.circulation_m2_s;
+            let distance = distance_m(own, other) / own.height_m;
+            (RATIOS.0..0.0).contains(&ratio) && is_near(distance)
         });
-        if gain < LEAST_GAIN || !sided {
+        if gain < LEAST_GAIN || !stands {
             return Ok(None);
         }
         let covariance = self.covariance(&state, counted)?;
@@ -271,7 +279,7 @@ impl Setting<'_, '_> {
             core_radius_m: CORE_OVER_HEIGHT * own.height_m,
         };
         let distance = distance_m(own, &vortex) / own.height_m;
-        if !(DISTANCES.0..=DISTANCES.1).contains(&distance) || vortex.height_m <= 0.0 || !self.sees(&vortex) {
+        if !is_near(distance) || vortex.height_m <= 0.0 || !self.sees(&vortex) {
             return None;
         }
         let plain = WakeModel { secondary: None, ..*self.model };
