@@ -11,11 +11,9 @@ use crate::retrieval::problem::{Cell, Problem};
 use crate::retrieval::report::{OUTLIER, Report};
 use crate::retrieval::whitening::Whitening;
 use crate::retrieval::{Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
-use crate::vortex_fit::map_fit::data::median;
+use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::{Loss, Wake};
 
-/// Median of the absolute value of a normal number.
-const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 /// Vortices are taken to stand still in scans that are shorter \[s\] and to move in others, if the other is not better by that much in
 /// chi-square: whatever is true of them, chance alone brings it once in 700 scans at most, where both models are about as far apart.
 const SHORT_S: f64 = 2.0;
@@ -112,8 +110,7 @@ pub(crate) fn cells(map: &ScanMap) -> Vec<Cell> {
 
 /// Scale of the residuals over their deviations, from their median.
 fn residual_scale(problem: &Problem<'_>, end: &End) -> f64 {
-    let mut sizes: Vec<f64> = problem.rows(&end.wake, &[]).residuals.iter().map(|r| r.abs()).collect();
-    median(&mut sizes) / NORMAL_MEDIAN
+    robust_scale(problem.rows(&end.wake, &[]).residuals.into_iter())
 }
 
 /// Where no deviations are stated, they are those of the residuals; a millionth of a metre per second where the fit is exact.

@@ -43,7 +43,7 @@ pub fn with_secondary_vortices(
         options: &map_options,
         groups: &options.free.groups(),
     };
-    let Some(four) = setting.find(&pair)? else { return Ok(None) };
+    let Some(four) = setting.find(&pair) else { return Ok(None) };
     let mut options = options.clone();
     options.model.secondary = Some(four.secondary);
     options.start = Some(four.wake);

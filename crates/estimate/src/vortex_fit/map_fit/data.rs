@@ -169,6 +169,14 @@ impl MapFit {
     }
 }
 
+/// Median of the absolute value of a normal number.
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+
+/// Standard deviation of normal residuals, from the median of their sizes; NaN if there are none.
+pub(crate) fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
+    median(&mut residuals.map(f64::abs).collect::<Vec<f64>>()) / NORMAL_MEDIAN
+}
+
 /// Median of the numbers, which are reordered; NaN if there are none.
 pub(crate) fn median(numbers: &mut [f64]) -> f64 {
     if numbers.is_empty() {

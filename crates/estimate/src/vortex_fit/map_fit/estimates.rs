@@ -118,8 +118,8 @@ pub fn fit_secondary_vortices(
     let coarse = whole.coarse(response, LINES_OVER_RADIUS[0]);
     let few = coarse.as_ref().map(|coarse| Few::new(coarse, model, response, options)).transpose()?;
     let found = match &few {
-        Some(few) => few.shown.with_secondary(pair)?,
-        None => whole.with_secondary(pair)?,
+        Some(few) => few.shown.with_secondary(pair),
+        None => whole.with_secondary(pair),
     };
     let Some(found) = found else { return Ok(None) };
     let model = WakeModel { secondary: Some(found.secondary), ..*model };
@@ -188,7 +188,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     }
 
     /// Four vortices in place of a pair, if they explain the map better.
-    fn with_secondary(&self, pair: &Wake) -> Result<Option<Found>, Error> {
+    fn with_secondary(&self, pair: &Wake) -> Option<Found> {
         let Self { map, model, prepared, kernel, options, .. } = self;
         Setting { map, model, prepared: Some(prepared), kernel, options, groups: &options.free.groups() }.find(pair)
     }

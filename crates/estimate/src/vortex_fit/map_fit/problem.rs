@@ -7,16 +7,13 @@ use ndarray::{Array1, Array2};
 use crate::error::{Error, finite};
 use crate::parallel::map_indexed;
 use crate::vortex_fit::damped_newton::{Normal, Stop, descend, inverse, solve};
-use crate::vortex_fit::map_fit::data::median;
+use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::map_fit::residual_covariance::{Cell, alike, filling};
 use crate::vortex_fit::map_fit::tangent::Tangent;
 use crate::vortex_fit::wake::free_parameters::{gathered, moved};
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
 use crate::vortex_fit::{CorePrior, Loss, PARAMETERS, Parameter, RangeKernel, VelocityMap, Wake, WakeModel};
-
-/// Median of the absolute value of a normal number.
-const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
 /// What is expected of a wake.
 #[derive(Clone, Copy)]
@@ -142,8 +139,7 @@ impl Problem<'_, '_> {
 
     /// Robust scale of the residuals; a millionth of the speeds where the fit is exact.
     pub(crate) fn scale(&self, wake: &Wake) -> Result<f64, Error> {
-        let mut residuals: Vec<f64> = self.residuals(wake).iter().map(|r| r.abs()).collect();
-        let scale = median(&mut residuals) / NORMAL_MEDIAN;
+        let scale = robust_scale(self.residuals(wake).into_iter());
         finite("scale of the residuals", scale)?;
         Ok(scale.max(1e-6))
     }

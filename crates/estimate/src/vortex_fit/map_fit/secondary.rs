@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::vortex_fit::damped_newton::{inverse, solve};
-use crate::vortex_fit::map_fit::data::median;
+use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
 use crate::vortex_fit::map_fit::residual_covariance::{Cell, alike, filling};
 use crate::vortex_fit::map_fit::tangent::{self, Tangent};
@@ -20,8 +20,6 @@ use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
 use crate::vortex_fit::{CorePrior, MapFitOptions, RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
 
-/// Median of the absolute value of a normal number.
-const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 /// Circulation over that of the vortex, and distance over its height: mean and standard deviation. The strongest secondary vortex of the
 /// medium wake (the mean along x, `wake_scaled.csv`) has -0.2 to -0.3 and 1.1 to 0.5 between tau = 1.25 and 2.5, without the weaker
 /// vorticity about it that gates see as well.
@@ -132,24 +130,22 @@ struct Free<'a> {
 }
 
 impl Setting<'_, '_> {
-    /// The best wake with secondary vortices, if there are any beside those of a fit without them. Without a ground there are none.
-    ///
-    /// # Errors
-    /// [`Error::Linalg`] if what is free does not show in the map.
-    pub(crate) fn find(&self, pair: &Wake) -> Result<Option<Found>, Error> {
+    /// The best wake with secondary vortices, if there are any beside those of a fit without them and the fit of all comes to an end. Without
+    /// a ground there are none.
+    pub(crate) fn find(&self, pair: &Wake) -> Option<Found> {
         let possible = |vortex: &Vortex| vortex.circulation_m2_s > 0.0 && vortex.height_m > 0.0;
         if !self.model.images || !possible(&pair.left) || !possible(&pair.right) {
-            return Ok(None);
+            return None;
         }
         let none = |own: &Vortex| Vortex { circulation_m2_s: 0.0, ..*own };
         let two = State { wake: *pair, secondary: [none(&pair.left), none(&pair.right)] };
         let alone = self.about(&two, &self.quotients(&two)[..self.groups.len()]);
         let counted = alike(&self.cells(&alone), self.options.correlated_lines);
-        let Some((secondary, gain)) = self.search(pair, &alone) else { return Ok(None) };
+        let (secondary, gain) = self.search(pair, &alone)?;
         if gain / counted < LEAST_SEARCHED {
-            return Ok(None);
+            return None;
         }
-        let Some(state) = self.descend(State { wake: *pair, secondary }, counted)? else { return Ok(None) };
+        let state = self.descend(State { wake: *pair, secondary }, counted)?;
         let here = self.velocities(&state);
         let four = self.linear(&state.wake, here, Vec::new());
         let known: f64 = state.away().iter().map(|away| 0.5 * away * away).sum();
@@ -162,10 +158,10 @@ impl Setting<'_, '_> {
             (RATIOS.0..0.0).contains(&ratio) && is_near(distance)
         });
         if gain < LEAST_GAIN || !stands {
-            return Ok(None);
+            return None;
         }
-        let covariance = self.covariance(&state, counted)?;
-        Ok(Some(Found { wake: state.wake, secondary: state.secondary, covariance }))
+        let covariance = self.covariance(&state, counted).ok()?;
+        Some(Found { wake: state.wake, secondary: state.secondary, covariance })
     }
 
     fn velocities(&self, state: &State) -> Array2<f64> {
@@ -190,8 +186,7 @@ impl Setting<'_, '_> {
             None => Array2::ones(here.dim()),
         };
         let mut linear = Linear { here, slopes, deviation, scale: 1.0 };
-        let mut sizes: Vec<f64> = self.residuals(&linear).map(|(_, residual, _)| residual.abs()).collect();
-        linear.scale = (median(&mut sizes) / NORMAL_MEDIAN).max(1e-6);
+        linear.scale = robust_scale(self.residuals(&linear).map(|(_, residual, _)| residual)).max(1e-6);
         linear
     }
 
@@ -304,7 +299,7 @@ impl Setting<'_, '_> {
         let allowed = (RATIOS.0 * own.circulation_m2_s, RATIOS.1 * own.circulation_m2_s);
         let circulation_m2_s = (slope / square).clamp(allowed.0, allowed.1);
         let gain = circulation_m2_s * (slope - 0.5 * circulation_m2_s * square);
-        gain.is_finite().then_some((Vortex { circulation_m2_s, ..vortex }, gain))
+        (square > 0.0 && gain.is_finite()).then_some((Vortex { circulation_m2_s, ..vortex }, gain))
     }
 
     /// Whether a centre lies within the scan.
@@ -404,7 +399,7 @@ impl Setting<'_, '_> {
     }
 
     /// The nearest minimum of the cost, if the steps come to an end and it is possible.
-    fn descend(&self, start: State, counted: f64) -> Result<Option<State>, Error> {
+    fn descend(&self, start: State, counted: f64) -> Option<State> {
         let mut state = start;
         let (mut turns, mut last) = (0, vec![0.0; self.groups.len() + NUMBERS]);
         for _ in 0..STEPS {
@@ -415,7 +410,7 @@ impl Setting<'_, '_> {
             for _ in 0..ROUNDS {
                 let Sums { curvature, gradient } = self.sums(&linear, &known, counted, &way);
                 let down: Vec<f64> = gradient.iter().map(|g| -g).collect();
-                let Some(more) = solve(&curvature, &down) else { return Ok(None) };
+                let more = solve(&curvature, &down)?;
                 way.iter_mut().zip(&more).for_each(|(way, more)| *way += more);
                 if more.iter().zip(&down).map(|(m, d)| m * d).sum::<f64>() <= (0.1 * NEAR_SIGMAS).powi(2) * counted {
                     break;
@@ -428,7 +423,7 @@ impl Setting<'_, '_> {
             turns += usize::from(-product(&way, &last) > TURNED * product(&last, &last));
             let share = f64::from(1 + turns as u32).recip();
             if share * (product(&way, &way) / counted).sqrt() <= NEAR_SIGMAS {
-                return Ok(Some(state));
+                return Some(state);
             }
             let reach = way.iter().zip(&steps).map(|(way, step)| REACH * step / way.abs().max(f64::MIN_POSITIVE));
             let part = reach.fold(share, f64::min);
@@ -437,10 +432,10 @@ impl Setting<'_, '_> {
                 let trial = self.moved(&state, &way.iter().map(|way| part * way).collect::<Vec<f64>>());
                 trial.is_possible().then_some(trial)
             };
-            let Some(next) = (0..=HALVINGS).find_map(trial) else { return Ok(None) };
+            let next = (0..=HALVINGS).find_map(trial)?;
             (state, last) = (next, way);
         }
-        Ok(None)
+        None
     }
 
     /// Of the wake, whatever the secondary vortices are: its part of the sandwich of all numbers.

@@ -180,7 +180,8 @@ pub struct WakeModel {
     /// Height of the lidar over the ground \[m\].
     pub lidar_height_m: f64,
     /// Secondary vortices of the left and the right vortex, which the boundary layer at the ground has rolled up into, if any are known:
-    /// they turn against their vortex, so that their circulation is negative.
+    /// they turn against their vortex, so that their circulation is negative. Lines of sight see them; they move neither vortices nor
+    /// aircraft.
     pub secondary: Option<[Vortex; 2]>,
 }
 
@@ -316,6 +317,32 @@ mod tests {
             lateral_wind_m_s: 1.3,
             wind_shear_per_s: 0.02,
         }
+    }
+
+    /// (3) by hand: above its centre a left vortex moves the air to larger y, its secondary one to smaller y; so do their images below the
+    /// ground with the opposite sense, and the slopes of the pair are those without them.
+    #[test]
+    fn secondary_vortices_are_seen_as_vortices_of_the_other_sense_with_images() {
+        let vortex = |circulation_m2_s, lateral_position_m, height_m| Vortex {
+            circulation_m2_s,
+            lateral_position_m,
+            height_m,
+            core_radius_m: 5.0,
+        };
+        let secondary = Some([vortex(-200.0, 350.0, 30.0), vortex(-100.0, 450.0, 40.0)]);
+        let level = WakeModel { lidar_height_m: 42.0, ..Default::default() };
+        let with = WakeModel { secondary, ..level };
+        // along y at z = 42 m, right above the left one
+        let lateral_m_s = |turn: f64, dy: f64, dz: f64| turn * dz / (2.0 * PI * (dy * dy + dz * dz + 25.0));
+        let expected = lateral_m_s(-200.0, 0.0, 12.0) + lateral_m_s(200.0, 0.0, 72.0)
+            - lateral_m_s(-100.0, -100.0, 2.0)
+            - lateral_m_s(100.0, -100.0, 82.0);
+        let seen = with.radial_velocity_m_s(&wake(), 350.0, 0.0) - level.radial_velocity_m_s(&wake(), 350.0, 0.0);
+        assert!(expected < -1.5);
+        assert_relative_eq!(seen, expected, max_relative = 1e-12);
+        let ((v, slope), (plain, alone)) = (with.gradient(&wake(), 350.0, 0.0), level.gradient(&wake(), 350.0, 0.0));
+        assert_relative_eq!(v - plain, expected, max_relative = 1e-12);
+        assert_eq!(slope, alone);
     }
 
     #[test]
