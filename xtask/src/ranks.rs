@@ -1,10 +1,10 @@
 //! `cargo xtask ranks`: a wake under `mpirun` on 2 and 4 processes against one process, byte for byte, a run whose
-//! second process is killed, and how fast two processes are.
+//! second process is killed, how fast two processes are, and how long single exchanges take.
 //!
 //! Needs an MPI library with its compiler `mpicc`, and libclang, for the build; on Debian as root it installs them.
 
 use crate::process::watch;
-use crate::ranks_model;
+use crate::ranks_model::{self, Halos};
 use crate::workspace::root;
 use crate::{Failure, Outcome};
 use std::collections::BTreeMap;
@@ -40,6 +40,7 @@ pub(crate) fn run() -> Outcome {
     }
     let built = Command::new(env!("CARGO"))
         .args(["build", "--quiet", "--package", "wakescope-sim", "--features", "mpi"])
+        .args(["--bin", "wakescope", "--example", "exchange_times"])
         .current_dir(root())
         .status()?;
     if !built.success() {
@@ -60,14 +61,18 @@ pub(crate) fn run() -> Outcome {
     std::fs::write(scratch.join("long.toml"), case(""))?;
     compare(&program, &scratch)?;
     kill_one(&program, &scratch)?;
-    measure(&program, &scratch)
+    let work_s = measure(&program, &scratch)?;
+    exchanges(&root().join("target/debug/examples/exchange_times"), work_s)
 }
 
 /// Prints how much less time steps take on two ranks of one thread than on one, and what they spend in turns and halos. A
-/// measurement, which depends on what else the machine does: nothing is decided by it.
-fn measure(program: &Path, scratch: &Path) -> Outcome {
-    let case = "format = 1\n[case]\nkind = \"taylor_green\"\ncells = 128\n[time]\nscheme = \"runge_kutta3\"\n\
-                pause_after_steps = 4\n[solver]\nsubgrid = { model = \"multiscale_wale\" }\n[checkpoint]\nwrite = false\n";
+/// measurement, which depends on what else the machine does: nothing is decided by it. Returns the work on a cell in a stage by one \[s\].
+fn measure(program: &Path, scratch: &Path) -> Result<f64, Failure> {
+    let (cells, steps, stages) = (128, 4, 3);
+    let case = format!(
+        "format = 1\n[case]\nkind = \"taylor_green\"\ncells = {cells}\n[time]\nscheme = \"runge_kutta3\"\n\
+         pause_after_steps = {steps}\n[solver]\nsubgrid = {{ model = \"multiscale_wale\" }}\n[checkpoint]\nwrite = false\n"
+    );
     std::fs::write(scratch.join("even.toml"), case)?;
     let mut found = Vec::new();
     for (count, out) in [(1, "even_one"), (2, "even_two")] {
@@ -81,13 +86,51 @@ fn measure(program: &Path, scratch: &Path) -> Outcome {
         let both = number("steps_wall_s").zip(number("exchange_wall_s"));
         found.push(both.ok_or_else(|| Failure::new(String::from_utf8_lossy(&output.stderr).into_owned()))?);
     }
-    if let [(one_s, _), (two_s, exchange_s)] = found[..] {
-        println!(
-            "measured, 128^3 with the multiscale model: two ranks of one thread are {:.2} times as fast as one; {:.0} % of a \
-             step in turns and halos",
-            one_s / two_s,
-            100.0 * exchange_s / two_s
-        );
+    let [(one_s, _), (two_s, exchange_s)] = found[..] else {
+        return Err(Failure::new("two runs were to be measured".into()));
+    };
+    println!(
+        "measured, {cells}^3 with the multiscale model: two ranks of one thread are {:.2} times as fast as one; {:.0} % of a \
+         step in turns and halos",
+        one_s / two_s,
+        100.0 * exchange_s / two_s
+    );
+    Ok(one_s / f64::from(steps * stages * i32::pow(cells, 3)))
+}
+
+/// Prints how long single exchanges take on 2 to 4 ranks by the size of their messages, and how well equal slabs would scale by it if the
+/// work on a cell in a stage takes `cell_s` \[s\].
+fn exchanges(program: &Path, cell_s: f64) -> Outcome {
+    let cores = std::thread::available_parallelism()?.get();
+    println!("measured exchanges on {cores} cores, whose times count waiting where there are more ranks than cores:");
+    println!(
+        "| ranks | cells of a rank | turn: MB | ms | halos of a field: MB | ms | efficiency with the multiscale model |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    for count in 2..=4 {
+        let output = mpirun(count).arg(program).output()?;
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
+        for pair in rows.chunks(2) {
+            let [halos, turn] = [0, 1].map(|place| {
+                let numbers: Option<Vec<f64>> = pair.get(place)?.iter().skip(2).map(|word| word.parse().ok()).collect();
+                <[f64; 3]>::try_from(numbers?).ok()
+            });
+            let (Some([cells, halo_bytes, halo_s]), Some([_, turn_bytes, turn_s])) = (halos, turn) else {
+                return Err(Failure::new(format!(
+                    "exchange_times prints\n{text}{}",
+                    String::from_utf8_lossy(&output.stderr)
+                )));
+            };
+            let efficiency = ranks_model::efficiency(cells * cell_s, turn_s, halo_s, Halos::MULTISCALE);
+            println!(
+                "| {count} | {cells} | {:.2} | {:.2} | {:.2} | {:.2} | {efficiency:.2} |",
+                1e-6 * turn_bytes,
+                1e3 * turn_s,
+                1e-6 * halo_bytes,
+                1e3 * halo_s
+            );
+        }
     }
     Ok(())
 }

@@ -35,10 +35,11 @@
 //! | `sweep` | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |
+//! | `processes` | the processes of `mpirun` as ranks of a flow |
 //! | [`cli`] | the program `wakescope` |
 //!
-//! Features, all but the last on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
-//! PNG, the report page), `sweep` (design studies, with `cli`), `vtk` (fields for ParaView).
+//! Features, all but the last two on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
+//! PNG, the report page), `sweep` (design studies, with `cli`), `vtk` (fields for ParaView), `mpi` (flows on several machines).
 
 pub mod beams;
 pub mod detection;
@@ -49,6 +50,8 @@ mod keys;
 mod machine;
 pub mod measure;
 pub mod plan;
+#[cfg(feature = "mpi")]
+pub mod processes;
 pub mod retrieve;
 pub mod scene;
 #[cfg(feature = "sweep")]

@@ -1,8 +1,8 @@
 //! Damped Newton steps on a handful of parameters: Cholesky of a small symmetric matrix and the iteration of Levenberg and
-//! Marquardt (Marquardt 1963), shared by the fit of a map and the fit of signals.
+//! Marquardt (Marquardt 1963), shared by the fit of a map and the fit of signals; how fits to what is not smooth shorten their steps.
 //!
 //! Check: inverse times matrix; a curved valley (Rosenbrock) is followed to its end; a point that cannot be evaluated is
-//! stepped back from.
+//! stepped back from; only steps that turn round are shortened.
 
 use ndarray::Array2;
 
@@ -142,6 +142,31 @@ pub(crate) fn descend<P: Clone>(
     Err(failed(stop.iterations, left))
 }
 
+/// A step back by more than this part of the one before turns round.
+const TURNED: f64 = 0.3;
+/// Most halvings of a step.
+const HALVINGS: i32 = 6;
+
+/// Shortens the steps of a fit to what is not smooth, as where peaks jump: each time they turn round, so that their ends are averaged
+/// (Kesten 1958). What only corrects a step that went too far is none of those.
+#[derive(Debug, Default)]
+pub(crate) struct Averaging {
+    turns: u32,
+}
+
+impl Averaging {
+    /// The part of a step that is gone, from its product with the step before and that of the latter with itself.
+    pub(crate) fn part(&mut self, with_last: f64, of_last: f64) -> f64 {
+        self.turns += u32::from(-with_last > TURNED * of_last);
+        f64::from(1 + self.turns).recip()
+    }
+}
+
+/// The first end that there is of a part of a step, its half, its quarter and so on.
+pub(crate) fn halved<T>(part: f64, end: impl Fn(f64) -> Option<T>) -> Option<T> {
+    (0..=HALVINGS).find_map(|halving| end(part * 0.5_f64.powi(halving)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,5 +205,15 @@ mod tests {
         let error = descend([-1.2, 1.0], Stop { iterations: 3, ..stop }, valley, moved).unwrap_err();
         assert!(matches!(error, Error::NotConverged { iterations: 3, .. }));
         assert!(descend([2.0, 1.0], stop, valley, moved).is_err());
+    }
+
+    #[test]
+    fn steps_are_shortened_where_they_turn_round_and_halved_to_where_there_is_an_end() {
+        let mut averaging = Averaging::default();
+        let products = [(0.0, 0.0), (2.0, 4.0), (-1.0, 4.0), (-2.0, 4.0), (1.0, 4.0), (-4.0, 4.0)];
+        let parts = products.map(|(with_last, of_last)| averaging.part(with_last, of_last));
+        assert_eq!(parts, [1.0, 1.0, 1.0, 0.5, 0.5, 1.0 / 3.0]);
+        assert_eq!(halved(0.8, |part| (part < 0.3).then_some(part)), Some(0.2));
+        assert_eq!(halved(1.0, |part| (part < 0.01).then_some(part)), None);
     }
 }

@@ -18,6 +18,8 @@ pub(crate) struct Divergence {
     columns: Columns,
     rows: [Vec<Taps>; 3],
     cell_mass: [Vec<f64>; 3],
+    /// What the third component needs of its halos.
+    pub(super) reach: [usize; 2],
 }
 
 impl Divergence {
@@ -28,6 +30,7 @@ impl Divergence {
             shape: layout.shape,
             periodic,
             columns: Columns::new(&rows[0], periodic),
+            reach: layout.slabs.reach(&rows[2]),
             rows,
             cell_mass: std::array::from_fn(|b| layout.line[b].cell_mass_m.clone()),
         }

@@ -10,10 +10,14 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::operators_1d::Taps;
 use super::rows::HALO;
 use super::shape::Shape;
 use crate::Error;
 use crate::ranks::{self, Ranks, Timed};
+
+/// All planes of a halo, for fields that are read by operators of several kinds.
+pub(crate) const WHOLE: [usize; 2] = [HALO; 2];
 
 /// The ranks and what this one holds.
 #[derive(Debug, Clone)]
@@ -46,11 +50,27 @@ impl Slabs {
         self.ranks.rank() == 0
     }
 
-    /// Brings the halos of fields up to date.
+    /// How many planes below and above its own a slab needs of a field that is read by an operator along axis 2 with the rows `rows`; the
+    /// most over all slabs, so that the ranks agree.
+    pub(crate) fn reach(&self, rows: &[Taps]) -> [usize; 2] {
+        let (n2, count) = (self.shape.n[2], self.ranks.count());
+        let mut reach = [0; 2];
+        for own in (0..count).map(|rank| self.shape.planes_of(rank, count)) {
+            for place in rows[own.clone()].iter().flatten().map(|tap| tap.0).filter(|place| !own.contains(place)) {
+                let below = (own.start + n2 - place) % n2;
+                let above = (place + n2 - own.end) % n2 + 1;
+                let (side, planes) = if below <= above { (0, below) } else { (1, above) };
+                reach[side] = reach[side].max(planes);
+            }
+        }
+        reach
+    }
+
+    /// Brings `below` and `above` planes of the halos of fields up to date, at most [`HALO`] each.
     ///
     /// # Errors
     /// Those of [`Ranks::turn`].
-    pub(crate) fn halos(&self, fields: &mut [&mut [f64]]) -> Result<(), Error> {
+    pub(crate) fn halos(&self, fields: &mut [&mut [f64]], [below, above]: [usize; 2]) -> Result<(), Error> {
         if self.is_alone() {
             return Ok(());
         }
@@ -58,31 +78,35 @@ impl Slabs {
         let (plane, n2, own) = (shape.plane(), shape.n[2], shape.own());
         let before = (self.ranks.rank() + count - 1) % count;
         let after = (self.ranks.rank() + 1) % count;
-        // With two ranks the other one is both neighbours.
-        let mut lengths = vec![0; count];
-        lengths[before] += HALO * plane * fields.len();
-        lengths[after] += HALO * plane * fields.len();
-        let lowest = (before, [own.start, own.start + n2 - HALO]);
-        let highest = (after, [own.end - HALO, own.end]);
-        // A message holds lowest planes before highest ones, so that what comes are highest halos before lowest.
-        let mut ends = [lowest, highest];
-        ends.sort_by_key(|end| end.0);
-        let mut send = Vec::with_capacity(2 * HALO * plane * fields.len());
-        for (_, [first, _]) in ends {
+        // Of each neighbour: the planes that it gets, and those that it sends.
+        let mut neighbours = [
+            (before, own.start..own.start + above, own.start + n2 - below..own.start + n2),
+            (after, own.end - below..own.end, own.end..own.end + above),
+        ];
+        let [mut to, mut from] = [vec![0; count], vec![0; count]];
+        for (rank, gets, sends) in &neighbours {
+            to[*rank] += gets.len() * plane * fields.len();
+            from[*rank] += sends.len() * plane * fields.len();
+        }
+        // A message holds lowest planes before highest ones, so that what comes are highest halos before lowest. With two ranks the other
+        // one is both neighbours.
+        neighbours.sort_by_key(|neighbour| neighbour.0);
+        let mut send = Vec::with_capacity(to.iter().sum());
+        for (_, gets, _) in &neighbours {
             for field in fields.iter() {
-                let start = shape.place([0, 0, first]);
-                send.extend_from_slice(&field[start..start + HALO * plane]);
+                let start = shape.place([0, 0, gets.start]);
+                send.extend_from_slice(&field[start..start + gets.len() * plane]);
             }
         }
         let mut receive = vec![0.0; send.len()];
-        self.ranks.turn(&send, &lengths, &mut receive, &lengths)?;
+        self.ranks.turn(&send, &to, &mut receive, &from)?;
         let mut came = receive.chunks(plane);
         if before == after {
-            ends.reverse();
+            neighbours.reverse();
         }
-        for (_, [_, first]) in ends {
+        for (_, _, sends) in neighbours {
             for field in fields.iter_mut() {
-                for (k, plane) in (first..first + HALO).zip(&mut came) {
+                for (k, plane) in sends.clone().zip(&mut came) {
                     let start = shape.place([0, 0, k % n2]);
                     field[start..start + plane.len()].copy_from_slice(plane);
                 }

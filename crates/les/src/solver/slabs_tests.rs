@@ -36,11 +36,11 @@ fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 fn assert_same(name: &str, case: &Case, steps: usize) {
     let alone = seen(case, Arc::new(Single), steps).unwrap();
     assert!(alone.2.iter().flatten().any(|value| *value != 0), "{name}: nothing moves");
-    for (count, threads) in [(2, 1), (3, 2), (5, 1), (7, 2)] {
+    for (count, threads) in [2, 3, 5, 7].into_iter().flat_map(|count| [(count, 1), (count, 2)]) {
         for (rank, found) in
             on_threads(count, |ranks| with_threads(threads, || seen(case, ranks, steps))).into_iter().enumerate()
         {
-            assert!(found == Some(Ok(alone.clone())), "{name}: rank {rank} of {count}");
+            assert!(found == Some(Ok(alone.clone())), "{name}: rank {rank} of {count}, {threads} threads each");
         }
     }
 }

@@ -9,8 +9,6 @@ mod budget;
 mod detect;
 mod estimate;
 mod flow;
-#[cfg(feature = "mpi")]
-mod mpi;
 mod output;
 mod progress;
 mod ranked;

@@ -19,7 +19,7 @@ pub(super) fn ranked(cli: &Cli, work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(),
 
 #[cfg(feature = "mpi")]
 fn on_processes(_: usize, cli: &Cli, work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>) -> Result<(), Error> {
-    let world = super::mpi::World::join()?;
+    let world = crate::processes::World::join()?;
     let ranks = world.ranks();
     if ranks.rank() == 0 && !cli.quiet {
         use std::io::Write as _;

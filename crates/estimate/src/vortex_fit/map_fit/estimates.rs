@@ -8,6 +8,7 @@
 use ndarray::Array2;
 
 use crate::error::Error;
+use crate::vortex_fit::damped_newton::{Averaging, halved};
 use crate::vortex_fit::map_fit::coarse::Coarse;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
 use crate::vortex_fit::map_fit::guess::first_guess;
@@ -21,13 +22,10 @@ use crate::vortex_fit::{
     Wake, WakeModel, refine_map_fit,
 };
 
-/// Most steps of Gauss and Newton, and halvings of one.
+/// Most steps of Gauss and Newton.
 const STEPS: usize = 40;
-const HALVINGS: i32 = 6;
 /// The least core radius over a region's radius, or over the distance of lines.
 const SMALLEST_CORE: f64 = 0.25;
-/// A step back by more than this part of the one before turns round.
-const TURNED: f64 = 0.3;
 /// Fits end at a step of this many standard deviations at the latest, with neighbours that are alike counted once: estimators
 /// round.
 const NEAR_SIGMAS: f64 = 0.03;
@@ -206,7 +204,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         let coreless = fit.coreless();
         let mut groups = &fit.groups;
         let mut wake = options.free.start(guess);
-        let (mut turns, mut last, mut sigmas_left) = (0, [0.0; PARAMETERS], f64::INFINITY);
+        let (mut averaging, mut last, mut sigmas_left) = (Averaging::default(), [0.0; PARAMETERS], f64::INFINITY);
         let mut slopes: Option<(Wake, Vec<Array2<f64>>)> = None;
         let mut alike = 1.0;
         for step in 1..=STEPS {
@@ -232,22 +230,17 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
             let next = problem.reweighted(wake, scale, fit.stop)?;
             let (from, to) = (wake.to_array(), next.to_array());
             let way: [f64; PARAMETERS] = std::array::from_fn(|i| to[i] - from[i]);
-            // where peaks jump the map is not smooth: each time the steps turn round they are shortened, so that their
-            // ends are averaged (Kesten 1958); what only corrects a step that went too far is none of those
-            let [back, before] = [&way, &last].map(|step| problem.product(&wake, step, &last, scale));
-            turns += usize::from(-back > TURNED * before);
-            let share = ((1 + turns) as f64).recip();
+            let [with_last, of_last] = [&way, &last].map(|step| problem.product(&wake, step, &last, scale));
+            let share = averaging.part(with_last, of_last);
             sigmas_left = share * (problem.product(&wake, &way, &way, scale) / alike).sqrt();
             if sigmas_left <= near_sigmas.max(options.tolerance_sigmas) {
                 return fit.outcome(&problem, wake, scale, step);
             }
-            let part = share.min(tangent.reach(&next));
-            let trial = |halving: i32| {
-                let part = part * 0.5_f64.powi(halving);
+            let next = halved(share.min(tangent.reach(&next)), |part| {
                 let trial = Wake::from_array(&std::array::from_fn(|i| from[i] + part * way[i]));
                 fit.allows(&trial).then_some(trial)
-            };
-            wake = (0..=HALVINGS).find_map(trial).ok_or(Error::NotConverged { iterations: step, sigmas_left })?;
+            });
+            wake = next.ok_or(Error::NotConverged { iterations: step, sigmas_left })?;
             last = way;
             if groups.len() > coreless.len() && raised(&mut wake, self.least_core_m) {
                 groups = &coreless;

@@ -10,7 +10,7 @@ use ndarray::{Array1, Array2, Zip};
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::vortex_fit::damped_newton::{inverse, solve};
+use crate::vortex_fit::damped_newton::{Averaging, halved, inverse, solve};
 use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
 use crate::vortex_fit::map_fit::residual_covariance::{Cell, alike, filling};
@@ -36,13 +36,10 @@ const LEAST_GAIN: f64 = 15.0;
 const LEAST_SEARCHED: f64 = 6.0;
 /// Numbers of the secondary vortices that are fitted.
 const NUMBERS: usize = 6;
-/// Most steps, rounds of weights in each, halvings of one, and what is left of the last in standard deviations.
+/// Most steps, rounds of weights in each, and what is left of the last in standard deviations.
 const STEPS: usize = 30;
 const ROUNDS: usize = 10;
-const HALVINGS: i32 = 6;
 const NEAR_SIGMAS: f64 = 0.3;
-/// A step back by more than this part of the one before turns round.
-const TURNED: f64 = 0.3;
 /// Steps of difference quotients, over the circulation and the height of the vortex, and how many of them a step of the fit may go.
 const QUOTIENTS: [f64; 2] = [0.02, 0.02];
 const REACH: f64 = 12.0;
@@ -401,7 +398,7 @@ impl Setting<'_, '_> {
     /// The nearest minimum of the cost, if the steps come to an end and it is possible.
     fn descend(&self, start: State, counted: f64) -> Option<State> {
         let mut state = start;
-        let (mut turns, mut last) = (0, vec![0.0; self.groups.len() + NUMBERS]);
+        let (mut averaging, mut last) = (Averaging::default(), vec![0.0; self.groups.len() + NUMBERS]);
         for _ in 0..STEPS {
             let steps = self.quotients(&state);
             let linear = self.about(&state, &steps);
@@ -419,20 +416,15 @@ impl Setting<'_, '_> {
             let curvature = self.sums(&linear, &known, counted, &way).curvature;
             let product =
                 |a: &[f64], b: &[f64]| -> f64 { curvature.indexed_iter().map(|((i, j), c)| c * a[i] * b[j]).sum() };
-            // as in the fit of two: steps that turn round are shortened, so that their ends are averaged
-            turns += usize::from(-product(&way, &last) > TURNED * product(&last, &last));
-            let share = f64::from(1 + turns as u32).recip();
+            let share = averaging.part(product(&way, &last), product(&last, &last));
             if share * (product(&way, &way) / counted).sqrt() <= NEAR_SIGMAS {
                 return Some(state);
             }
             let reach = way.iter().zip(&steps).map(|(way, step)| REACH * step / way.abs().max(f64::MIN_POSITIVE));
-            let part = reach.fold(share, f64::min);
-            let trial = |halving: i32| {
-                let part = part * 0.5_f64.powi(halving);
+            let next = halved(reach.fold(share, f64::min), |part| {
                 let trial = self.moved(&state, &way.iter().map(|way| part * way).collect::<Vec<f64>>());
                 trial.is_possible().then_some(trial)
-            };
-            let next = (0..=HALVINGS).find_map(trial)?;
+            })?;
             (state, last) = (next, way);
         }
         None

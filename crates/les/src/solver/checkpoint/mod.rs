@@ -18,6 +18,7 @@ use super::mesh::{AXIS_NAMES, Mesh};
 use super::settings::FlowSettings;
 use crate::Error;
 use crate::solver::aligned::Aligned;
+use crate::solver::slabs::WHOLE;
 use container::{Content, Planes, Reader, Tag};
 
 /// Version of the content. Raise it with every change of the sections, of the texts in [`identity`], or of what a run keeps
@@ -104,7 +105,7 @@ impl Flow {
         // The ranks that share the flow must agree on that, too.
         let (mut flow, user_data) = Layout::on(&mesh, settings.memory_order, settings.ranks)?.slabs.agree(read)?;
         let [u, v, w] = flow.state.velocity.each_mut().map(Aligned::as_mut_slice);
-        flow.layout.slabs.halos(&mut [u, v, w, &mut flow.state.pressure])?;
+        flow.layout.slabs.halos(&mut [u, v, w, &mut flow.state.pressure], WHOLE)?;
         Ok((flow, user_data))
     }
 

@@ -11,6 +11,7 @@ use super::{Flow, Solved, add_multiple, correct, divide_by_volume};
 use crate::error::{Error, PressureFailure};
 use crate::solver::aligned::Aligned;
 use crate::solver::pressure::norm;
+use crate::solver::slabs::WHOLE;
 
 /// Most repetitions.
 const MAX_REPETITIONS: usize = 4;
@@ -26,14 +27,14 @@ impl Flow {
     /// If the residual of the pressure equation, which is the divergence of the new velocity, does not reach the tolerance,
     /// neither relative to what was to be corrected nor to the velocity over the cell.
     pub(super) fn project(&mut self, stage_s: f64) -> Result<Solved, Error> {
-        self.layout.slabs.halos(&mut [&mut self.work.star[2]])?;
+        self.layout.slabs.halos(&mut [&mut self.work.star[2]], self.divergence.reach)?;
         let star = self.work.star.each_ref().map(Aligned::as_slice);
         self.divergence.apply(star, 1.0 / stage_s, &mut self.work.phi);
         if self.settings.rotational {
             self.work.divergence.copy_from_slice(&self.work.phi);
             // The pressure takes the plain divergence of u*.
             divide_by_volume(&self.layout, stage_s, &mut self.work.divergence);
-            self.layout.slabs.halos(&mut [&mut self.work.divergence])?;
+            self.layout.slabs.halos(&mut [&mut self.work.divergence], WHOLE)?;
         }
         let tolerance = self.settings.pressure_tolerance;
         let solved = self.pressure_solver.solve(&mut self.work.phi, tolerance);
@@ -92,7 +93,7 @@ impl Flow {
         let mut velocity = self.state.velocity.each_mut().map(Aligned::as_mut_slice);
         let planes =
             correct(&self.ops, &self.layout, star, phi, stage_s, velocity.each_mut().map(|field| &mut **field));
-        self.layout.slabs.halos(&mut velocity)?;
+        self.layout.slabs.halos(&mut velocity, WHOLE)?;
         let planes = self.layout.slabs.planes(planes)?;
         self.state.energy = planes.iter().fold(0.0, |sum, plane| sum + plane[0]);
         self.state.courant_per_s = planes.iter().fold(0.0, |most, plane| if plane[1] > most { plane[1] } else { most });

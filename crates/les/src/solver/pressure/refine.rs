@@ -8,6 +8,7 @@ use super::apply::Operator;
 use super::solver::Solved;
 use crate::error::{Error, PressureFailure};
 use crate::solver::aligned::Aligned;
+use crate::solver::slabs::WHOLE;
 
 /// Relative residuals that a pass saw after its iterations; none if it has none.
 #[derive(Debug)]
@@ -73,7 +74,7 @@ impl Refinement {
             if pass > 0 {
                 field.par_iter_mut().zip(&self.left[..]).for_each(|(phi, more)| *phi += more);
             }
-            operator.slabs().halos(&mut [field])?;
+            operator.slabs().halos(&mut [field], WHOLE)?;
             let residual = operator.residual_norm(&self.right, field)? / size;
             history.push(residual);
             if residual <= tolerance {

@@ -146,17 +146,17 @@ impl Subgrid {
                 let mut small = [first.as_mut_slice(), second, third];
                 filter.small_scales(velocity_m_s, &mut small);
                 let [a, b, c] = small;
-                slabs.halos(&mut [viscosity, &mut *a, &mut *b, &mut *c])?;
+                slabs.halos(&mut [viscosity, &mut *a, &mut *b, &mut *c], operators.reach)?;
                 [&*a, &*b, &*c]
             }
             None => {
-                slabs.halos(&mut [viscosity])?;
+                slabs.halos(&mut [viscosity], operators.reach)?;
                 velocity_m_s
             }
         };
         self.stress.update(operators, viscosity, strained, lent.in_plane);
         let [a, b, c] = self.stress.across.each_mut().map(Aligned::as_mut_slice);
-        slabs.halos(&mut [a, b, c])
+        slabs.halos(&mut [a, b, c], operators.reach)
     }
 
     /// Adds the rest of the divergence of the stress to the acceleration of row `(j, k)` of one component, which has the part

@@ -21,6 +21,8 @@ pub(super) struct Operators {
     pub(super) wall_source: [[Vec<f64>; 3]; 3],
     /// `h^(2/3)` of the cells of each axis: their product is the square of the filter width.
     pub(super) width: [Vec<f64>; 3],
+    /// What viscosity, strained velocity and stress need of their halos: planes below and above a slab.
+    pub(super) reach: [usize; 2],
     /// Largest decay rate by a unit viscosity along each axis, `49/9 h^-2`; zero along a thin one \[1/m^2\].
     pub(super) decay: [Vec<f64>; 3],
 }
@@ -31,11 +33,16 @@ const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
 impl Operators {
     pub(super) fn new(layout: &Layout) -> Self {
         let operator = |axis: usize, rows| RowOperator::new(layout, axis, rows);
+        let to_cells = std::array::from_fn(|axis| operator(axis, divergence(&layout.line[axis])));
+        let to_faces = std::array::from_fn(|axis| operator(axis, layout.line[axis].gradient()));
+        // of the viscosity the plane below
+        let [[a, b], [c, d]] = [&to_cells, &to_faces].map(|of: &[RowOperator; 3]| layout.slabs.reach(of[2].rows()));
         Self {
             shape: layout.shape,
+            reach: [a.max(c).max(1), b.max(d)],
             periodic: std::array::from_fn(|axis| layout.line[axis].is_periodic()),
-            to_cells: std::array::from_fn(|axis| operator(axis, divergence(&layout.line[axis]))),
-            to_faces: std::array::from_fn(|axis| operator(axis, layout.line[axis].gradient())),
+            to_cells,
+            to_faces,
             half_mean_gradient: std::array::from_fn(|axis| operator(axis, half_mean_gradient(&layout.line[axis]).0)),
             wall_source: std::array::from_fn(|axis| {
                 let walls = half_mean_gradient(&layout.line[axis]).1;

@@ -1,4 +1,5 @@
-//! The processes that `mpirun` has started as the ranks of a flow.
+//! The processes that `mpirun` has started as the ranks of a flow: for the program, and for programs of one's own, which give
+//! [`World::ranks`] to `FlowSettings::ranks` (the example `exchange_times` begins like this).
 //!
 //! All calls to MPI are made by the thread that joined. A process that fails ends all others: none waits for it in vain.
 //!
@@ -21,13 +22,16 @@ const GRACE: Duration = Duration::from_secs(5);
 const FAILED: i32 = 2;
 
 /// Membership of this process; MPI ends with it.
-pub(super) struct World {
+pub struct World {
     _universe: Universe,
 }
 
 impl World {
-    /// Joins the other processes.
-    pub(super) fn join() -> Result<Self, Error> {
+    /// Joins the other processes. From then on a panic of this process ends all.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if MPI runs already, or allows no threads beside its own.
+    pub fn join() -> Result<Self, Error> {
         let (universe, threads) =
             mpi::initialize_with_threading(Threading::Funneled).ok_or_else(|| refused("MPI runs already"))?;
         if threads < Threading::Funneled {
@@ -44,13 +48,14 @@ impl World {
     }
 
     /// The processes as ranks.
-    pub(super) fn ranks(&self) -> Arc<dyn Ranks> {
+    #[must_use]
+    pub fn ranks(&self) -> Arc<dyn Ranks> {
         let world = SimpleCommunicator::world();
         Arc::new(Processes { rank: world.rank() as usize, count: world.size() as usize })
     }
 
     /// Ends all processes after `say` has told why: that of rank 0, or, where it has nothing to say, that of another one.
-    pub(super) fn fail(&self, say: impl FnOnce()) -> ! {
+    pub fn fail(&self, say: impl FnOnce()) -> ! {
         let world = SimpleCommunicator::world();
         if world.rank() > 0 {
             std::thread::sleep(GRACE);
