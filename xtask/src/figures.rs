@@ -9,7 +9,7 @@ mod fig03;
 mod fig04;
 mod fig05;
 mod fig06;
-mod fig07;
+pub(crate) mod fig07;
 mod fig08;
 mod fig09;
 mod fig10;

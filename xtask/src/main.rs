@@ -13,6 +13,7 @@ mod figures;
 mod fit_trials;
 mod forecast;
 mod fuzz_scenes;
+mod histories;
 mod process;
 mod profile;
 mod ranks;
@@ -72,6 +73,8 @@ enum Task {
     Regress(regress::Options),
     /// A wake under `mpirun` against one process; a run whose second process is killed.
     Ranks,
+    /// What the wakes at the chapter's Reynolds number come to, from the histories that the book keeps.
+    Histories,
     /// Write stored reference curves from what the crates compute now.
     Bless(bless::Options),
     /// Measure error against run time.
@@ -97,6 +100,7 @@ fn main() -> std::process::ExitCode {
         Task::ReproduceFigs(options) => reproduce::run(&options),
         Task::Regress(options) => regress::run(&options),
         Task::Ranks => ranks::run(),
+        Task::Histories => histories::run(),
         Task::Bless(options) => bless::run(&options),
         Task::WorkPrecision(options) => work_precision::run(&options),
         Task::FitTrials(options) => fit_trials::run(&options),

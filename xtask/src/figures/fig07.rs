@@ -134,11 +134,17 @@ fn inviscid_path(wake: &FinishedWake, y: &[(f64, f64)], z: &[(f64, f64)]) -> Res
     Ok(Claim::exact("F7d", "fig07", statement, "within 0.03 b₀", measured, separation.is_finite() && worst < 0.03))
 }
 
+/// The widest place of a path `y` until `tau = 3`, and the innermost after it.
+pub(crate) fn swing(y: &[(f64, f64)]) -> [(f64, f64); 2] {
+    let widest = y.iter().filter(|p| p.0 < 3.0).fold((0.0, 0.0), |m, p| if p.1 > m.1 { *p } else { m });
+    let inner = y.iter().filter(|p| p.0 > widest.0).fold((0.0, f64::INFINITY), |m, p| if p.1 < m.1 { *p } else { m });
+    [widest, inner]
+}
+
 fn rebound(y: &[(f64, f64)], z: &[(f64, f64)]) -> Claim {
     let lowest = z.iter().filter(|p| p.0 < 2.0).fold((0.0, f64::INFINITY), |m, p| if p.1 < m.1 { *p } else { m });
     let top = z.iter().filter(|p| p.0 > lowest.0 && p.0 < 3.5).fold((0.0, 0.0), |m, p| if p.1 > m.1 { *p } else { m });
-    let widest = y.iter().filter(|p| p.0 < 3.0).fold((0.0, 0.0), |m, p| if p.1 > m.1 { *p } else { m });
-    let inner = y.iter().filter(|p| p.0 > widest.0).fold((0.0, f64::INFINITY), |m, p| if p.1 < m.1 { *p } else { m });
+    let [widest, inner] = swing(y);
     let measured = format!(
         "lowest {:.3} at tau = {:.2}, top {:.3} at {:.2}; widest {:.3} at {:.2}, then inward to {:.3} at {:.2}",
         lowest.1, lowest.0, top.1, top.0, widest.1, widest.0, inner.1, inner.0

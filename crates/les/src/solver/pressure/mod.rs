@@ -19,9 +19,9 @@ mod solver;
 mod transform;
 
 #[cfg(test)]
-mod checks;
+mod long_waves_tests;
 #[cfg(test)]
-mod long_waves;
+mod tests;
 
 use super::layout::Layout;
 use crate::Error;

@@ -159,7 +159,7 @@ fn an_iteration_of_multigrid_gains_a_factor_of_ten_on_odd_sizes_strong_stretchin
         let layout = layout(mesh);
         let about = format!("{name}, {:?}", layout.shape.n);
         let sides = [
-            ("eddies", checks::turbulent_right_side(&layout), 1e-6),
+            ("eddies", tests::turbulent_right_side(&layout), 1e-6),
             ("rough", rough(&layout), 1e-6),
             ("long waves", long_waves(&layout), 1e-10),
         ];
