@@ -74,7 +74,7 @@ impl Claim {
 
     /// A quantity that may be `allowed` from its reference, in its own unit; what is not a number passes no bar.
     pub(crate) fn within(quantity: &str, measured: f64, reference: f64, allowed: f64) -> Self {
-        let expected = format!("{} +- {allowed:.2e}", number(reference));
+        let expected = format!("{} ± {allowed:.2e}", number(reference));
         Self::exact("", "", quantity, &expected, number(measured), (measured - reference).abs() <= allowed)
     }
 
@@ -108,8 +108,8 @@ pub(crate) fn two_digits(error: f64) -> String {
 /// A value with as many decimals as its standard error has in two digits, and the error.
 pub(crate) fn with_error(value: f64, error: f64) -> String {
     match (value.is_finite(), error.is_finite()) {
-        (true, true) => format!("{value:.*} +- {}", decimals(error), two_digits(error)),
-        (true, false) => format!("{value:.3} +- unknown"),
+        (true, true) => format!("{value:.*} ± {}", decimals(error), two_digits(error)),
+        (true, false) => format!("{value:.3} ± unknown"),
         (false, _) => "not known".into(),
     }
 }
@@ -138,8 +138,8 @@ mod tests {
     #[test]
     fn numbers_have_the_digits_of_their_error() {
         let found = [with_error(12.3456, 0.0321), with_error(-1.0, 4.56), with_error(1234.5, 67.0), two_digits(0.2)];
-        assert_eq!(found, ["12.346 +- 0.032", "-1.0 +- 4.6", "1234 +- 67", "0.20"]);
-        assert_eq!(with_error(0.5, f64::NAN), "0.500 +- unknown");
+        assert_eq!(found, ["12.346 ± 0.032", "-1.0 ± 4.6", "1234 ± 67", "0.20"]);
+        assert_eq!(with_error(0.5, f64::NAN), "0.500 ± unknown");
         assert_eq!(with_error(f64::NAN, 0.1), "not known");
     }
 

@@ -53,6 +53,12 @@ pub(crate) enum Lane {
 }
 
 impl Figure {
+    /// Its own number, by which `--only` asks for it, and what it is called.
+    pub(crate) fn heading(&self) -> String {
+        let kind = if self.id.starts_with("tab") { "Table" } else { "Figure" };
+        format!("{kind} {}: {}", self.number, self.title)
+    }
+
     pub(crate) fn lane(&self) -> Lane {
         match self.number {
             6..=14 | 17 => Lane::Wake,

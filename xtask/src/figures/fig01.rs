@@ -42,8 +42,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
     let top_m_s = GAMMA_M2_S / (4.0 * PI * CORE_M);
     let scaled = |v: &[f64]| y_m.iter().map(|y| y / SPACING_M).zip(v.iter().map(|v| v / top_m_s)).collect::<Vec<_>>();
-    let x = Axis::linear("y / b0");
-    let y = Axis::linear("w / (Gamma0 / 4 pi rc)").between(-1.6, 1.6);
+    let x = Axis::linear("y / b₀");
+    let y = Axis::linear("w / (Γ₀ / 4π r_c)").between(-1.6, 1.6);
     // The potential profile is cut where it leaves the frame, or a line would join its two ends.
     let inside = |v: &f64| if (v / top_m_s).abs() < 1.7 { *v } else { f64::NAN };
     let drawn_m_s: Vec<f64> = potential_m_s.iter().map(inside).collect();
@@ -84,7 +84,7 @@ fn claims(top_m_s: f64) -> Vec<Claim> {
         Claim::exact(
             "F1a",
             "fig01",
-            "maximum tangential speed of one vortex is Gamma0/(4 pi rc) at r = rc",
+            "maximum tangential speed of one vortex is Γ₀/(4π r_c) at r = r_c",
             &format!("{top_m_s:.4} m/s at {CORE_M} m"),
             format!("{found_m_s:.4} m/s at {radius_m:.4} m"),
             pass,

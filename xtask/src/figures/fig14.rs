@@ -54,7 +54,7 @@ fn peak_claim(all: &[Profiles]) -> Claim {
         let standard_error = pa_error.hypot(ca_error);
         shares.push(((pa - ca) / pa, standard_error / pa));
         error = error.max(standard_error);
-        words.push(format!("{}: PA {pa:.2}, CA {ca:.2} (+- {standard_error:.2})", pair[0].title()));
+        words.push(format!("{}: PA {pa:.2}, CA {ca:.2} (± {standard_error:.2})", pair[0].title()));
     }
     Claim {
         verdict: Verdict::of_differences(&shares, 2.0),

@@ -146,7 +146,7 @@ fn table(fits: &[Fits]) -> Table {
 fn picture(fits: &[Fits]) -> [CurvePlot; 3] {
     let first: Vec<&Fits> = fits.iter().filter(|f| f.snr_db == fits[0].snr_db).collect();
     [
-        ("circulation", "Gamma [m^{2}/s]", Parameter::LeftCirculation),
+        ("circulation", "Γ [m^{2}/s]", Parameter::LeftCirculation),
         ("left vortex, lateral", "y [m]", Parameter::LeftLateral),
         ("left vortex, height", "z [m]", Parameter::LeftHeight),
     ]
@@ -239,7 +239,7 @@ fn claims(fits: &[Fits], [known_m2_s, fitted_m2_s]: [f64; 2]) -> Vec<Claim> {
                 "F17d",
                 "the same: size of the bias of the circulation",
                 2.0,
-                " m^2/s",
+                " m²/s",
                 (fitted[0].0.abs(), fitted[0].1),
             ),
         ]);

@@ -71,7 +71,7 @@ fn claims(found: &RetrievedScan) -> Vec<Claim> {
         "F20a",
         "fig20",
         "both circulations of one scan",
-        "within 25 % of 500 m^2/s",
+        "within 25 % of 500 m²/s",
         format!("{left:.0}, {right:.0}"),
         off(left) < 0.25 && off(right) < 0.25,
     )]

@@ -309,7 +309,7 @@ fn claims(views: &[View]) -> Vec<Claim> {
                 id,
                 "fig21",
                 statement,
-                "mean within 10 % of 500 m^2/s, no fit fails",
+                "mean within 10 % of 500 m²/s, no fit fails",
                 with_error(mean, error),
                 (mean / true_m2_s() - 1.0).abs() < 0.1 && failures == 0,
             )
@@ -322,7 +322,7 @@ fn claims(views: &[View]) -> Vec<Claim> {
                 id,
                 "fig21",
                 &format!("{name}: fits of gate means find too little, for peaks of spectra keep away from the fast air of a core"),
-                "mean at least 15 % below 500 m^2/s",
+                "mean at least 15 % below 500 m²/s",
                 with_error(mean, error),
                 mean < 0.85 * true_m2_s(),
             )

@@ -73,7 +73,7 @@ fn entry(figure: &Figure, rendered: &Rendered) -> ReportEntry {
     };
     ReportEntry {
         id: figure.id.into(),
-        title: figure.title.into(),
+        title: figure.heading(),
         caption: rendered.caption.clone(),
         svg,
         table,

@@ -42,8 +42,8 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
     let asymmetry = flow.records.iter().map(|r| (r.left.y_m + r.right.y_m).abs()).fold(0.0, f64::max);
     let wide = if profile == Profile::Quick { 4.0 } else { 1.0 };
     let checks = vec![
-        Claim::at_most("largest error of the path, b0", off, 0.01 * wide),
-        Claim::at_most("largest error of Gamma(0.1..0.3), relative", worst(&gamma, &column(4), range, relative), 0.02),
+        Claim::at_most("largest error of the path, b₀", off, 0.01 * wide),
+        Claim::at_most("largest error of Γ(0.1..0.3), relative", worst(&gamma, &column(4), range, relative), 0.02),
         Claim::at_most("largest error of the energy, relative", worst(&energy, &column(6), range, relative), 0.005),
         Claim::at_most(
             "largest error of the enstrophy, relative",
@@ -59,15 +59,15 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
         .float("gamma", gamma.iter().map(|p| p.1))
         .float("energy", energy.iter().map(|p| p.1))
         .float("enstrophy", enstrophy.iter().map(|p| p.1));
-    let path = CurvePlot::new("Path", Axis::linear("y / b0"), Axis::linear("z / b0"))
+    let path = CurvePlot::new("Path", Axis::linear("y / b₀"), Axis::linear("z / b₀"))
         .with(Series::new("this solver", Style::Line, y.iter().zip(&z).map(|(y, z)| (y.1, z.1))))
         .with(Series::new("spectral code", Style::Markers, stored.iter().map(|r| (r[1], r[2]))));
-    let energy = CurvePlot::new("Energy", Axis::linear("tau"), Axis::linear("E [b0^2 V0^2]"))
+    let energy = CurvePlot::new("Energy", Axis::linear("tau"), Axis::linear("E [b₀² V₀²]"))
         .with(Series::new("this solver", Style::Line, energy))
         .with(Series::new("spectral code", Style::Markers, column(6)));
     let clip = |p: (f64, f64)| (p.0, p.1.min(700.0));
     let enstrophy =
-        CurvePlot::new("Enstrophy", Axis::linear("tau"), Axis::linear("enstrophy [V0^2]").between(0.0, 700.0))
+        CurvePlot::new("Enstrophy", Axis::linear("tau"), Axis::linear("enstrophy [V₀²]").between(0.0, 700.0))
             .with(Series::new("this solver", Style::Line, enstrophy.into_iter().map(clip)))
             .with(Series::new("spectral code", Style::Markers, column(5)));
     Ok(Shown { checks, table, figure: Figure::stacked([path, energy, enstrophy]) })
@@ -98,15 +98,15 @@ pub(super) fn show_hyperbola(profile: Profile) -> Result<Shown, Failure> {
     let energy = flow.curve(|r| r.energy_m4_s2);
     let lost = 1.0 - energy[energy.len() - 1].1 / energy[0].1;
     let checks = vec![
-        Claim::at_most("largest error of y to tau = 4, b0", off[0], 0.01),
-        Claim::at_most("largest error of z to tau = 4, b0", off[1], 0.01),
+        Claim::at_most("largest error of y to tau = 4, b₀", off[0], 0.01),
+        Claim::at_most("largest error of z to tau = 4, b₀", off[1], 0.01),
         Claim::at_most("energy lost, relative", lost.abs(), 1e-3),
     ];
     let table = Table::new()
         .float("tau", y.iter().map(|p| p.0))
         .float("y", y.iter().map(|p| p.1))
         .float("z", z.iter().map(|p| p.1));
-    let path = CurvePlot::new("Path over a frictionless ground", Axis::linear("y / b0"), Axis::linear("z / b0"))
+    let path = CurvePlot::new("Path over a frictionless ground", Axis::linear("y / b₀"), Axis::linear("z / b₀"))
         .with(Series::new("this solver", Style::Line, y.iter().zip(&z).map(|(y, z)| (y.1, z.1))))
         .with(Series::new("point vortices", Style::Dash, stored.iter().filter(|r| r[0] <= 4.0).map(|r| (r[1], r[2]))));
     Ok(Shown { checks, table, figure: Figure::stacked([path]) })

@@ -51,6 +51,9 @@ pub(super) struct SweepWords {
     /// Run even if the forecast of the memory of a case is more than the machine has.
     #[arg(long)]
     allow_large: bool,
+    /// Replace another sweep, or files that this program did not write.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
@@ -63,8 +66,9 @@ pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
         seed: cli.seed,
     };
     let sweep = words.scene.as_deref().map(|scene| Sweep::new(scene, &request)).transpose()?;
+    let existing = if words.overwrite { Existing::Any } else { Existing::Own };
     let Some(sweep) = sweep.as_ref().filter(|_| words.merge.is_empty()) else {
-        let files = merge(&words.merge, sweep.as_ref(), &words.out)?;
+        let files = merge(&words.merge, sweep.as_ref(), &words.out, existing)?;
         let text = format!("wrote {} files to {}", files.len(), words.out.display());
         return say(cli.json, &json!({ "version": crate::VERSION, "files": files }), &text);
     };
@@ -73,6 +77,7 @@ pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
         resume: words.resume,
         allow_large: words.allow_large,
         fits: !words.no_circulation,
+        existing,
     };
     let bar = (!cli.quiet).then(SweepBar::new);
     let mut told = |case: &str, done, of| bar.iter().for_each(|bar| bar.done(case, done, of));
@@ -113,12 +118,16 @@ pub(super) struct ParetoWords {
     /// File for the rows of the front, as CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Replace a file that this program did not write.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 pub(super) fn pareto(words: &ParetoWords, cli: &Cli) -> Result<(), Error> {
     if let Some(path) = &words.out {
         let name = path.file_name().and_then(|name| name.to_str());
-        refuse_foreign(path.parent().unwrap_or(Path::new("")), name, Existing::Own)?;
+        let existing = if words.overwrite { Existing::Any } else { Existing::Own };
+        refuse_foreign(path.parent().unwrap_or(Path::new("")), name, existing)?;
     }
     let wanted = Wanted { min: &words.min, max: &words.max, conditions: &words.conditions };
     let refuse = |reason| Error::Input { path: words.table.clone(), reason };

@@ -6,7 +6,7 @@
 use super::error::{OutputError, OutputResult};
 use super::parts::FileParts;
 use std::fs;
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Files of one run, collected in memory and committed together.
@@ -121,8 +121,10 @@ impl FileGroup {
     /// The first refusal of the system. The folder is then as it was before.
     pub(crate) fn put(&self, stage: &Stage) -> OutputResult<Vec<PathBuf>> {
         let mut swapped: Vec<Swap> = Vec::new();
-        for (name, _) in &self.files {
-            match Swap::into_place(stage, &self.folder, name) {
+        for (place, (name, _)) in self.files.iter().enumerate() {
+            // After the last one nothing can fail, so that what it replaces need not be kept: in one step, for others may do the same.
+            let is_last = place + 1 == self.files.len();
+            match Swap::into_place(stage, &self.folder, name, is_last) {
                 Ok(swap) => swapped.push(swap),
                 Err(error) => {
                     swapped.iter().rev().for_each(Swap::undo);
@@ -151,6 +153,14 @@ pub fn write_atomic(path: &Path, content: impl Into<Vec<u8>>) -> OutputResult<()
     group.commit_inside().map(drop)
 }
 
+/// Finds out whether files can be written to a folder.
+///
+/// # Errors
+/// The refusal of the system.
+pub(crate) fn try_folder(folder: &Path) -> OutputResult<()> {
+    Stage::make(folder).map(drop)
+}
+
 /// One renamed file, and where the older file of that name waits.
 struct Swap {
     target: PathBuf,
@@ -158,14 +168,14 @@ struct Swap {
 }
 
 impl Swap {
-    fn into_place(stage: &Stage, folder: &Path, name: &str) -> OutputResult<Self> {
+    fn into_place(stage: &Stage, folder: &Path, name: &str, is_last: bool) -> OutputResult<Self> {
         let target = folder.join(name);
         if target.is_dir() {
             let source = std::io::Error::new(std::io::ErrorKind::IsADirectory, "a folder of that name is in the way");
             return Err(io_error("write", &target, source));
         }
         let mut backup = None;
-        if target.symlink_metadata().is_ok() {
+        if !is_last && target.symlink_metadata().is_ok() {
             let kept = stage.old.join(name);
             fs::rename(&target, &kept).map_err(|e| io_error("replace", &target, e))?;
             backup = Some(kept);
@@ -173,7 +183,9 @@ impl Swap {
         let swap = Self { target, backup };
         if let Err(source) = fs::rename(stage.new.join(name), &swap.target) {
             let error = io_error("write", &swap.target, source);
-            swap.undo();
+            if let Some(kept) = &swap.backup {
+                drop(fs::rename(kept, &swap.target));
+            }
             return Err(error);
         }
         Ok(swap)
@@ -193,22 +205,37 @@ pub(crate) struct Stage {
     root: PathBuf,
     new: PathBuf,
     old: PathBuf,
+    // Locked while its maker lives: what nobody holds was left by a crash.
+    _lock: fs::File,
 }
 
 /// What the folder of the new files in it is called.
 const NEW: &str = "new";
 /// How the names of stage folders begin.
 const STAGE: &str = ".wakescope-stage-";
+/// Name of the file in a stage that its maker holds locked.
+const LOCK: &str = "lock";
 
-/// Removes the stages that crashed processes left in a folder, which nobody else may be writing to. A group that was not put
-/// into place as a whole is taken back as far as the files are still there.
+/// Removes the stages that crashed processes left in a folder; those of processes that live, and links, are left alone. A group
+/// that was not put into place as a whole is taken back as far as the files are still there.
 pub(super) fn sweep_stages(folder: &Path) {
-    let entries = |path: &Path| fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_stage = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(STAGE));
-    for root in entries(folder).filter(is_stage) {
-        let stage = Stage { new: root.join(NEW), old: root.join("old"), root };
+    let entries = |path: &Path| fs::read_dir(path).into_iter().flatten().flatten();
+    let is_stage = |entry: &fs::DirEntry| {
+        entry.file_name().to_string_lossy().starts_with(STAGE) && entry.file_type().is_ok_and(|kind| kind.is_dir())
+    };
+    let path = |entry: fs::DirEntry| entry.path();
+    for root in entries(folder).filter(is_stage).map(path) {
+        let Ok(lock) = fs::File::open(root.join(LOCK)) else {
+            // Not yet locked, or left by a crash there and then: empty, it may go, and its maker takes another name.
+            drop(fs::remove_dir(&root));
+            continue;
+        };
+        if lock.try_lock().is_err() {
+            continue;
+        }
+        let stage = Stage::of(root, lock);
         if entries(&stage.new).next().is_some() {
-            for kept in entries(&stage.old) {
+            for kept in entries(&stage.old).map(path) {
                 if let Some(name) = kept.file_name() {
                     drop(fs::rename(&kept, folder.join(name)));
                 }
@@ -224,24 +251,39 @@ impl Stage {
         self.root.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
+    fn of(root: PathBuf, lock: fs::File) -> Self {
+        Self { new: root.join(NEW), old: root.join("old"), root, _lock: lock }
+    }
+
     fn make(folder: &Path) -> OutputResult<Self> {
-        let mut attempt = 0_u32;
-        loop {
+        for attempt in 0..10_000 {
             let root = folder.join(format!("{STAGE}{}-{attempt}", std::process::id()));
             match fs::create_dir(&root) {
-                Ok(()) => {
-                    let stage = Self { new: root.join(NEW), old: root.join("old"), root };
-                    for part in [&stage.new, &stage.old] {
-                        fs::create_dir(part).map_err(|e| io_error("create folder", part, e))?;
-                    }
-                    return Ok(stage);
-                }
-                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && attempt < 10_000 => {
-                    attempt += 1;
-                }
+                Ok(()) => {}
+                Err(e) if e.kind() == ErrorKind::AlreadyExists => continue,
                 Err(e) => return Err(io_error("write into", folder, e)),
             }
+            match Self::begin(&root) {
+                Ok(stage) => return Ok(stage),
+                // Before it was locked somebody took it for one that was left.
+                Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::WouldBlock) => {}
+                Err(e) => return Err(io_error("create folder", &root, e)),
+            }
         }
+        Err(io_error("write into", folder, ErrorKind::AlreadyExists.into()))
+    }
+
+    fn begin(root: &Path) -> std::io::Result<Self> {
+        let lock = fs::File::create_new(root.join(LOCK))?;
+        match lock.try_lock() {
+            // A file system without locks: then nobody can hold it, and nobody sweeps.
+            Err(fs::TryLockError::Error(e)) if e.kind() == ErrorKind::Unsupported => {}
+            tried => tried?,
+        }
+        let stage = Self::of(root.to_owned(), lock);
+        fs::create_dir(&stage.new)?;
+        fs::create_dir(&stage.old)?;
+        Ok(stage)
     }
 }
 

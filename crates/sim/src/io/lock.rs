@@ -102,6 +102,7 @@ mod tests {
             for part in ["old", "new"] {
                 fs::create_dir_all(stage(name).join(part)).unwrap();
             }
+            fs::write(stage(name).join("lock"), "").unwrap();
         }
         // Killed between taking the old file away and putting the new one into its place, with another still to come.
         fs::write(stage("1-0").join("old/map.csv"), "old").unwrap();
@@ -113,5 +114,26 @@ mod tests {
         let read = |name: &str| fs::read_to_string(temp.path().join(name)).unwrap();
         assert_eq!([read("map.csv"), read("profile.csv")], ["old", "new"]);
         assert!(!stage("1-0").exists() && !stage("1-1").exists());
+    }
+
+    #[test]
+    fn what_a_living_writer_has_begun_stays_and_links_are_not_followed() {
+        let temp = tempfile::tempdir().unwrap();
+        let (folder, elsewhere) = (temp.path().join("out"), temp.path().join("elsewhere"));
+        for of in [&folder, &elsewhere.join("new"), &elsewhere.join("old")] {
+            fs::create_dir_all(of).unwrap();
+        }
+        fs::write(elsewhere.join("lock"), "").unwrap();
+        fs::write(elsewhere.join("new/mine"), "mine").unwrap();
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(&elsewhere, folder.join(".wakescope-stage-1-0")).unwrap();
+        let mut group = crate::io::FileGroup::new(&folder);
+        group.add("map.csv", "new").unwrap();
+        let begun = group.begin().unwrap();
+        drop(FolderLock::take(&folder).unwrap());
+        group.write(&begun.name()).unwrap();
+        group.put(&begun).unwrap();
+        assert_eq!(fs::read_to_string(folder.join("map.csv")).unwrap(), "new");
+        assert_eq!(fs::read_to_string(elsewhere.join("new/mine")).unwrap(), "mine");
     }
 }

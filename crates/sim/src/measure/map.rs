@@ -227,7 +227,7 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
         truth.exact_m_s.row_mut(i).assign(&ArrayView1::from(&exact_m_s));
         let mut filtered_m_s = vec![0.0; g.gate_range_m.len()];
         for (filter, cells) in [(&by_pulse, &mut truth.pulse_m_s), (&by_gate, &mut truth.gate_m_s)] {
-            scanner.seen_into(filter, i, &mut filtered_m_s)?;
+            scanner.seen_into(filter, g, i, &mut filtered_m_s)?;
             cells.row_mut(i).assign(&ArrayView1::from(&filtered_m_s));
         }
     }

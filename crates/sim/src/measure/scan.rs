@@ -153,14 +153,20 @@ impl<'a> Scanner<'a> {
         &self.instrument.pulse
     }
 
-    /// What a filter sees of a line at the gates, m/s.
+    /// What a filter sees of a line at the gates of a geometry, m/s: that of this scan, or of one with the same layers whose
+    /// estimator has other gates.
     ///
     /// # Errors
     /// What the filter refuses; a checked scene gives none.
-    pub(crate) fn seen_into(&self, filter: &RangeFilter, line: usize, out_m_s: &mut [f64]) -> Result<(), Error> {
+    pub(crate) fn seen_into(
+        &self,
+        filter: &RangeFilter,
+        gates: &Geometry,
+        line: usize,
+        out_m_s: &mut [f64],
+    ) -> Result<(), Error> {
         let backscatter = self.backscatter_per_m_sr.get(line).map(Vec::as_slice);
-        let velocity_m_s = &self.lines[line].radial_velocity_m_s;
-        seen_into(filter, &self.plan.geometry, velocity_m_s, backscatter, out_m_s)
+        seen_into(filter, gates, &self.lines[line].radial_velocity_m_s, backscatter, out_m_s)
     }
 
     /// The air along each line of sight, in the order of the geometry's elevations.

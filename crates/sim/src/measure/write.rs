@@ -14,6 +14,7 @@ use crate::Error;
 use crate::beams::{Schedule, SweepMode};
 #[cfg(feature = "plots")]
 use crate::io::OutputError;
+use crate::io::atomic::try_folder;
 use crate::io::lock::FolderLock;
 use crate::io::own::refuse_foreign;
 use crate::io::signals::{LineVelocities, RawSignals, Recording};
@@ -67,16 +68,27 @@ fn add_halo(files: &mut FileGroup, plan: &Plan, map: &VelocityMap, origin: &Prov
 /// The folder cannot be made, is a file, cannot be written to, or another run writes to it; a folder is in the way of a file,
 /// or a file that this program did not write and may not replace.
 pub fn prepare<'a>(folder: &Path, names: impl IntoIterator<Item = &'a str>, existing: Existing) -> Result<(), Error> {
+    prepare_among_others(folder, names, existing, || Ok(FolderLock::take(folder).map(drop)?))
+}
+
+/// [`prepare`] for a folder to which several processes may write, each its own files: what else must hold is the caller's.
+///
+/// # Errors
+/// As [`prepare`], and what the caller finds.
+pub(crate) fn prepare_among_others<'a>(
+    folder: &Path,
+    names: impl IntoIterator<Item = &'a str>,
+    existing: Existing,
+    also: impl FnOnce() -> Result<(), Error>,
+) -> Result<(), Error> {
     refuse_foreign(folder, names, existing)?;
-    let io = |action, source| Error::Io { action, path: folder.to_owned(), source };
     let missing: Vec<&Path> =
         folder.ancestors().filter(|p| !p.as_os_str().is_empty()).take_while(|p| !p.exists()).collect();
-    let made = std::fs::create_dir_all(folder).map_err(|e| io("make the folder", e));
-    let probe = folder.join(".wakescope-probe");
+    let made = std::fs::create_dir_all(folder);
+    let made = made.map_err(|source| Error::Io { action: "make the folder", path: folder.to_owned(), source });
     let tried = made.and_then(|()| {
-        std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(|e| io("write to", e))?;
-        FolderLock::take(folder)?;
-        Ok(())
+        try_folder(folder)?;
+        also()
     });
     for path in missing {
         // Innermost first; one that was not made cannot be removed, which is what is wanted.

@@ -69,7 +69,7 @@ h1{font-size:28px;line-height:1.25;margin:8px 0 4px}h2{font-size:21px;margin:44p
 h3{font-size:17px;margin:0 0 6px}.found{font-size:18px;margin:14px 0}
 .finding{margin:10px 0;padding:8px 14px;border-left:4px solid #b8ab73;background:#faf8f0}.finding.first{border-color:#b03a00;background:#fdf3ee}
 .finding p{margin:2px 0}.reason{color:#444;font-size:14.5px;overflow-wrap:anywhere}
-nav ol{columns:2;font-size:14.5px;padding-left:22px;margin:14px 0}a{color:#0063a6}
+nav ul{columns:2;font-size:14.5px;padding-left:22px;margin:14px 0}a{color:#0063a6}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 18px;font-size:14px;margin:14px 0}dt{color:#666}dd{margin:0;overflow-wrap:anywhere}
 figure{margin:26px 0;padding:16px;border:1px solid #e3e3e3;border-radius:6px;background:#fff}
 figure svg{display:block;width:100%;height:auto}figcaption{font-size:14.5px;color:#333;margin-top:10px;white-space:pre-line;overflow-wrap:anywhere}
@@ -77,7 +77,7 @@ figure svg{display:block;width:100%;height:auto}figcaption{font-size:14.5px;colo
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-size:14px;width:100%}
 th,td{border-bottom:1px solid #e6e6e6;padding:5px 10px;text-align:left;vertical-align:top;overflow-wrap:anywhere}th{background:#f6f6f6;font-weight:600}
 td.pass{color:#00643f;font-weight:600}td.fail{color:#b03a00;font-weight:600}td.not_resolved{color:#6b5a00;font-weight:600}
-@media (max-width:700px){body{padding:12px 12px 60px}h1{font-size:23px}nav ol{columns:1}dl{grid-template-columns:1fr}dt{margin-top:6px}
+@media (max-width:700px){body{padding:12px 12px 60px}h1{font-size:23px}nav ul{columns:1}dl{grid-template-columns:1fr}dt{margin-top:6px}
 figure{padding:8px;margin:18px 0}thead{display:none}tr{display:block;border-bottom:2px solid #ccc;padding:6px 0}
 td{display:flex;gap:10px;border:0;padding:2px 4px}td::before{content:attr(data-label);flex:0 0 7.5em;color:#666;font-weight:normal}}
 @media print{body{max-width:none;padding:0;font-size:10.5pt}nav{display:none}a{color:inherit;text-decoration:none}
@@ -109,12 +109,12 @@ impl Report {
                 );
             }
         }
-        out += "<h2>Figures and tables</h2>\n<nav><ol>\n";
+        out += "<h2>Figures and tables</h2>\n<nav><ul>\n";
         for entry in &self.entries {
             out += &format!("<li><a href=\"#{}\">{}</a></li>\n", escape(&entry.id), escape(&entry.title));
         }
         out +=
-            "<li><a href=\"#claims\">All claims</a></li>\n<li><a href=\"#timings\">Run times</a></li>\n</ol></nav>\n";
+            "<li><a href=\"#claims\">All claims</a></li>\n<li><a href=\"#timings\">Run times</a></li>\n</ul></nav>\n";
         for (i, entry) in self.entries.iter().enumerate() {
             if self.entries[..i].iter().any(|e| e.id == entry.id) {
                 return Err(OutputError::Duplicate { what: "report entry", name: entry.id.clone() });

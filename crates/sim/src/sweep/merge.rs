@@ -14,7 +14,12 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// Folders that are of different sweeps, or of another one than `sweep`; cases that none of them has; what the system says.
-pub fn merge(folders: &[PathBuf], sweep: Option<&Sweep>, out: &Path) -> Result<Vec<PathBuf>, Error> {
+pub fn merge(
+    folders: &[PathBuf],
+    sweep: Option<&Sweep>,
+    out: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, Error> {
     let mut first: Option<(Definition, String)> = None;
     for folder in folders {
         let found = Definition::read(folder)?;
@@ -53,10 +58,15 @@ pub fn merge(folders: &[PathBuf], sweep: Option<&Sweep>, out: &Path) -> Result<V
         );
         return Err(Error::Input { path: "--merge".into(), reason });
     }
-    write_tables(&definition, &rows, out)
+    write_tables(&definition, &rows, out, existing)
 }
 
 /// Writes the tables of all rows.
-pub(super) fn write_tables(definition: &Definition, rows: &[Row], out: &Path) -> Result<Vec<PathBuf>, Error> {
-    put(tables::files(definition, rows, out)?, out, Existing::Own)
+pub(super) fn write_tables(
+    definition: &Definition,
+    rows: &[Row],
+    out: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, Error> {
+    put(tables::files(definition, rows, out)?, out, existing)
 }

@@ -12,9 +12,10 @@ use crate::measure::efficiencies::{Efficiencies, Known};
 use crate::measure::map::VelocityEstimates;
 use crate::measure::progress::Observer;
 use crate::measure::wind::SceneWind;
-use crate::measure::write::prepare;
+use crate::measure::write::prepare_among_others;
+use crate::plan::units::seconds;
 use crate::plan::{Plan, Target};
-use crate::scene::{Estimator, Outputs, Scene, SceneFile, Site, hash_of};
+use crate::scene::{Estimator, Outputs, Scene, SceneFile, Site, WindOfPulses, hash_of};
 use crate::{Error, machine};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -62,6 +63,8 @@ pub struct Settings {
     pub allow_large: bool,
     /// Whether the circulation is fitted to each map.
     pub fits: bool,
+    /// What may be replaced: results of this sweep, or another sweep and files of somebody else, too.
+    pub existing: Existing,
 }
 
 /// What was computed once for all cases that have it in common.
@@ -104,17 +107,20 @@ pub fn run<'s>(
 ) -> Result<Summary, Error> {
     let definition = Definition::of(sweep, settings.fits);
     let winds = Known::default();
-    check(sweep, &winds, settings.allow_large)?;
+    let core_s = check(sweep, &winds, settings.allow_large)?;
     let times = settings.shard.map_or("times.csv".into(), |s| format!("times-{}-of-{}.csv", s.number, s.of));
     let mut names = vec![SWEEP.to_owned(), times.clone()];
     if settings.shard.is_none() {
         names.extend(tables::names(&definition));
     }
-    prepare(out, names.iter().map(String::as_str), Existing::Own)?;
+    // Shards may begin at the same time, in one folder: each writes files of its own.
+    prepare_among_others(out, names.iter().map(String::as_str), settings.existing, || Ok(()))?;
+    definition.write(out, settings.existing)?;
     let mine: Vec<&Case> = sweep.cases.iter().filter(|c| settings.shard.is_none_or(|s| s.has(c.index))).collect();
     let is_due = |case: &&Case| !(settings.resume && stored(out, &definition, case.index).is_some());
     let due: Vec<&Case> = mine.iter().copied().filter(is_due).collect();
-    definition.write(out)?;
+    let of_due_s = due.iter().filter_map(|case| core_s.get(case.index)).sum();
+    told(&format!("forecast: {} of one core, an order of magnitude", seconds(of_due_s)), 0, due.len());
     let known = Efficiencies::default();
     let (mut signals, mut done, mut walls) = (0, 0, Vec::new());
     for group in groups(due.iter().map(|case| &case.scene)) {
@@ -129,7 +135,7 @@ pub fn run<'s>(
             signals += 1;
             let wall_s = begun.elapsed().as_secs_f64() / found.len() as f64;
             for (row, case) in found.iter().zip(&cases) {
-                store(out, sweep, case.index, row, settings.fits)?;
+                store(out, sweep, case.index, row, settings)?;
                 walls.push((case.index, wall_s));
                 done += 1;
                 told(&sweep.described(case), done, due.len());
@@ -140,7 +146,7 @@ pub fn run<'s>(
     if settings.shard.is_none() {
         let all: Option<Vec<_>> = (0..sweep.cases.len()).map(|case| stored(out, &definition, case)).collect();
         let gone = || Error::Input { path: out.join("cases"), reason: "a result that was written is gone".into() };
-        files.extend(write_tables(&definition, &all.ok_or_else(gone)?, out)?);
+        files.extend(write_tables(&definition, &all.ok_or_else(gone)?, out, settings.existing)?);
     }
     let shared = Shared { flows: winds.len(), efficiencies: known.computed(), signals };
     Ok(Summary { run: due.len(), kept: mine.len() - due.len(), shared, files })
@@ -163,25 +169,26 @@ pub fn maps(scenes: &[SceneFile], observer: &dyn Observer) -> Result<Vec<(Plan, 
     Ok(out.into_iter().map(|(_, found)| found).collect())
 }
 
-/// Plans and rehearses every case, and finds out whether it fits the memory.
-fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<(), Error> {
-    let checked = |case: &Case| -> Result<(), Error> {
+/// Plans and rehearses every case, and finds out whether it fits the memory; returns the forecast of the time of each, s of one core.
+fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<Vec<f64>, Error> {
+    let checked = |case: &Case| -> Result<f64, Error> {
         let plan = plan(&case.scene, winds)?;
         if !allow_large {
             plan.fits()?;
         }
-        plan.rehearse()
+        plan.rehearse()?;
+        Ok(plan.total().core_s)
     };
-    let refused: Vec<(&Case, Error)> =
-        sweep.cases.par_iter().filter_map(|case| checked(case).err().map(|error| (case, error))).collect();
-    let others = refused.len().saturating_sub(1);
-    match refused.into_iter().next() {
-        None => Ok(()),
-        Some((case, error)) => match failed(sweep, case, error) {
-            Error::Case { case, keys, source, .. } => Err(Error::Case { case, keys, others, source }),
-            other => Err(other),
-        },
+    let found: Vec<_> = sweep.cases.par_iter().map(checked).collect();
+    let others = found.iter().filter(|found| found.is_err()).count().saturating_sub(1);
+    let mut core_s = Vec::with_capacity(found.len());
+    for (case, found) in sweep.cases.iter().zip(found) {
+        core_s.push(found.map_err(|error| match failed(sweep, case, error) {
+            Error::Case { case, keys, source, .. } => Error::Case { case, keys, others, source },
+            other => other,
+        })?);
     }
+    Ok(core_s)
 }
 
 fn failed(sweep: &Sweep, case: &Case, source: Error) -> Error {
@@ -214,7 +221,10 @@ fn groups<'s>(scenes: impl Iterator<Item = &'s SceneFile>) -> Vec<Vec<usize>> {
             site: Site::default(),
             ..file.scene.clone()
         };
-        let cause = hash_of(&format!("{:?}", (signals, &file.folder)));
+        // Where pulses have airs of their own, a scan holds what they spread over at the gates.
+        let (e, of_pulses) = (&file.scene.estimator, file.scene.scan.wind_of_pulses);
+        let gates = (of_pulses != WindOfPulses::default()).then_some((e.window_samples, e.gate_step_samples));
+        let cause = hash_of(&format!("{:?}", (signals, gates, &file.folder)));
         match groups.iter_mut().find(|(known, _)| *known == cause) {
             Some((_, group)) => group.push(place),
             None => groups.push((cause, vec![place])),

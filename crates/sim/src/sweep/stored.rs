@@ -6,6 +6,7 @@
 use super::cases::Sweep;
 use super::key_path::Takes;
 use super::results::RESULTS;
+use super::run::Settings;
 use crate::Error;
 use crate::io::{Existing, FileGroup, Provenance, csv::float_text, write_atomic};
 use crate::measure::write::{put, scene_text};
@@ -116,16 +117,28 @@ impl Definition {
     }
 
     /// Writes it into a folder, unless it is there: shards may begin at the same time.
-    pub(super) fn write(&self, folder: &Path) -> Result<(), Error> {
+    ///
+    /// # Errors
+    /// Another sweep that is there and may not be replaced; what the system says.
+    pub(super) fn write(&self, folder: &Path, existing: Existing) -> Result<(), Error> {
         let (path, text) = (folder.join(SWEEP), self.to_json());
-        if std::fs::read_to_string(&path).is_ok_and(|there| there == text) {
-            return Ok(());
-        }
         std::fs::create_dir_all(folder).map_err(|source| Error::Io {
             action: "make the folder",
             path: folder.to_owned(),
             source,
         })?;
+        if path.exists() {
+            let there = Self::read(folder).ok();
+            if there.as_ref() == Some(self) {
+                return Ok(());
+            }
+            let is_same = there.is_some_and(|there| self.is_same(&there));
+            if existing == Existing::Own && !is_same {
+                let reason = "it is of another sweep, of another version of the program or not all with or without \
+                              --no-circulation: take another folder, or replace it with --overwrite";
+                return Err(Error::Input { path, reason: reason.into() });
+            }
+        }
         Ok(write_atomic(&path, text)?)
     }
 
@@ -181,7 +194,13 @@ fn folder_of(folder: &Path, case: usize) -> PathBuf {
 ///
 /// # Errors
 /// What the system says; a file of somebody else in the way.
-pub(super) fn store(folder: &Path, sweep: &Sweep, case: usize, results: &[f64], fits: bool) -> Result<(), Error> {
+pub(super) fn store(
+    folder: &Path,
+    sweep: &Sweep,
+    case: usize,
+    results: &[f64],
+    settings: Settings,
+) -> Result<(), Error> {
     let Some(of) = sweep.cases.get(case) else { return Ok(()) };
     let keys: Map<String, Value> = sweep.keys().map(str::to_owned).zip(of.values.iter().map(|v| json!(v))).collect();
     let names = RESULTS.iter().map(|(name, ..)| (*name).to_owned());
@@ -193,14 +212,14 @@ pub(super) fn store(folder: &Path, sweep: &Sweep, case: usize, results: &[f64], 
         seed: of.scene.scene.seed,
     };
     let object = json!({
-        "source": crate::PROGRAM, "scene_hash": of.scene.hash, "case": case, "keys": keys, "circulation": fits,
+        "source": crate::PROGRAM, "scene_hash": of.scene.hash, "case": case, "keys": keys, "circulation": settings.fits,
         "results": results,
     });
     let path = folder_of(folder, case);
     let mut files = FileGroup::new(&path);
     files.add("scene.toml", scene_text(&scene))?;
     files.add(RESULT, format!("{object:#}\n"))?;
-    put(files, &path, Existing::Own).map(drop)
+    put(files, &path, settings.existing).map(drop)
 }
 
 /// The result of a case in a folder; none where there is none of this scene by this version of the program.

@@ -239,14 +239,19 @@ fn maps_of_scenes_together_are_those_of_each_alone() {
     let other = format!("seed = 2\n{SMALL}[estimator]\nradius_m = 1.0\n");
     let windy = format!("added_flows = [{{ kind = \"uniform\", lateral_m_s = 3.0, vertical_m_s = 0.0 }}]\n{SMALL}");
     let narrow = format!("{SMALL}[estimator]\nradius_m = 1.0\n");
-    let scenes = [SMALL, &other, &narrow, &windy].map(scene);
+    // Other gates, and other gates where pulses have airs of their own.
+    let few = format!("{SMALL}[estimator]\nwindow_samples = 32\ngate_step_samples = 9\n");
+    let moving = SMALL.replace("[scan]", "[scan]\nwind_of_pulses = { kind = \"pulse\" }");
+    let moving_few = format!("{moving}[estimator]\nwindow_samples = 32\n");
+    let scenes = [SMALL, &other, &narrow, &windy, &few, &moving, &moving_few].map(scene);
     let together = maps(&scenes, &crate::Silent).unwrap();
     for (scene, (plan, map)) in scenes.iter().zip(&together) {
         assert_eq!(plan.scene.scene, scene.scene);
         let alone = crate::plan::Plan::new(scene.clone(), crate::plan::Target::Map).unwrap();
         let alone = crate::run(&alone, &crate::Silent).unwrap().map.unwrap();
         let bits = |of: &crate::measure::map::VelocityEstimates| {
-            [&of.v_scan_m_s, &of.rms_m_s, &of.snr_db].map(|values| values.mapv(f64::to_bits))
+            let spread_m_s = of.v_spread_m_s.clone().unwrap_or_default();
+            [&of.v_scan_m_s, &of.rms_m_s, &of.snr_db, &spread_m_s].map(|values| values.mapv(f64::to_bits))
         };
         assert_eq!(bits(&alone), bits(map));
     }

@@ -105,6 +105,56 @@ fn results_have_the_same_bytes_for_threads_shards_and_after_a_kill() {
 }
 
 #[test]
+fn shards_that_begin_together_in_one_folder_all_end() {
+    let temp = folder();
+    let at = temp.path();
+    swept(at, &["--out", "one"]);
+    let begin = |shard: usize| {
+        let shard = format!("{shard}/9");
+        std::process::Command::new(env!("CARGO_BIN_EXE_wakescope"))
+            .args([&SWEEP[..], &["--quiet", "--threads", "1", "--shard", &shard, "--out", "deep/all"]].concat())
+            .current_dir(at)
+            .stderr(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .unwrap()
+    };
+    let begun: Vec<_> = (1..=9).map(begin).collect();
+    for child in begun {
+        let out = child.wait_with_output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    }
+    ran(at, &["sweep", "--merge", "deep/all", "--out", "merged"]);
+    assert!(read(at, "merged/results.csv") == read(at, "one/results.csv"));
+    let hidden = names(&at.join("deep/all"));
+    assert!(!hidden.iter().any(|name| name.starts_with('.')), "{hidden:?}");
+}
+
+#[test]
+fn a_sweep_replaces_another_one_and_damaged_results_only_when_it_is_told_to() {
+    let temp = folder();
+    let at = temp.path();
+    let of = |energies: &str, more: &[&str]| {
+        let vary = format!("pulse.energy_j={energies}");
+        wakescope(at, &[&["sweep", "s.toml", "--vary", &vary, "--quiet", "--out", "o", "--no-circulation"], more].concat())
+    };
+    assert!(of("50e-6,150e-6", &[]).status.success());
+    let expected = read(at, "o/results.csv");
+    let other = of("60e-6", &[]);
+    let message = String::from_utf8(other.stderr).unwrap();
+    assert!(other.status.code() == Some(2) && message.contains("another sweep") && message.contains("--overwrite"));
+    assert!(read(at, "o/results.csv") == expected);
+    // A result that another program damaged.
+    std::fs::write(at.join("o/cases/00001/result.json"), "[]").unwrap();
+    let damaged = of("50e-6,150e-6", &["--resume"]);
+    let message = String::from_utf8(damaged.stderr).unwrap();
+    assert!(damaged.status.code() == Some(2) && message.contains("--overwrite"), "{message}");
+    assert!(of("50e-6,150e-6", &["--resume", "--overwrite"]).status.success());
+    assert!(read(at, "o/results.csv") == expected);
+    assert!(of("60e-6", &["--overwrite"]).status.success());
+}
+
+#[test]
 fn what_cannot_be_swept_is_refused_before_anything_is_written() {
     let temp = folder();
     for (words, wanted) in [

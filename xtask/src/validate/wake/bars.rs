@@ -108,7 +108,7 @@ fn show(pair: VortexPairCase, bars: &Bars, model: Option<VortexPairCase>) -> Res
         let modelled = run(&model, LAMINAR)?;
         checks.extend(laminar("multiscale: ", &modelled, &stored, bars));
         let apart = |right| worst(&modelled.gamma(right), &flow.gamma(right), [0.0, LAMINAR], |a, b| (a - b).abs());
-        checks.push(Claim::at_most("multiscale: Gamma against no model", apart(false).max(apart(true)), 0.005));
+        checks.push(Claim::at_most("multiscale: Γ against no model", apart(false).max(apart(true)), 0.005));
     }
     let figure = figure(&flow, &plane, &stored);
     Ok(Shown { checks, table: table(&flow), figure })
@@ -133,7 +133,7 @@ fn laminar(name: &str, flow: &History, stored: &Stored, bars: &Bars) -> Vec<Clai
     let check = |what: &str, measured: f64, bar: f64| Claim::at_most(&format!("{name}{what}"), measured, bar);
     let mut checks = vec![
         check("y, z to 2", position.into_iter().fold(0.0, f64::max), bars.position),
-        check("Gamma ratio to 2.2", gamma[0].max(gamma[1]), bars.gamma),
+        check("Γ ratio to 2.2", gamma[0].max(gamma[1]), bars.gamma),
         check("energy to 2.2, relative", energy, bars.energy),
         check("energy budget of a step, relative", flow.budget_error, 0.005),
         check("2 nu Z against viscous power, relative", flow.dissipation_error, 0.005),
@@ -159,11 +159,11 @@ fn turbulent(flow: &History, plane: &History, stored: &Stored, bars: &Bars) -> V
         bars.onset,
     )];
     for (tau, reference, bar) in bars.late {
-        checks.push(Claim::within(&format!("Gamma ratio at {tau}"), flow.mean_gamma(tau), reference, bar));
+        checks.push(Claim::within(&format!("Γ ratio at {tau}"), flow.mean_gamma(tau), reference, bar));
     }
     let (ratio, ratio_bar) = bars.ratio_to_plane;
     checks.push(Claim::within(
-        "3-D over 2-D Gamma at 5",
+        "3-D over 2-D Γ at 5",
         flow.mean_gamma(END) / plane.mean_gamma(END),
         ratio,
         ratio_bar,
@@ -217,14 +217,14 @@ fn figure(flow: &History, plane: &History, stored: &Stored) -> Figure {
             .with(Series::new("plane flow", Style::Dash, plane.gamma(true)))
             .with(Series::new("independent code, left", Style::Markers, stored.curve(Stored::GAMMA[0])))
             .with(Series::new("independent code, right", Style::Markers, stored.curve(Stored::GAMMA[1])));
-    let paths = CurvePlot::new("Paths", Axis::linear("|y| / b0"), Axis::linear("z / b0"))
+    let paths = CurvePlot::new("Paths", Axis::linear("|y| / b₀"), Axis::linear("z / b₀"))
         .with(Series::new("left", Style::Line, left))
         .with(Series::new("right", Style::Line, right))
         .with(Series::new("independent code, right", Style::Markers, known));
-    let waves = CurvePlot::new("Energy along x", Axis::linear("tau"), Axis::log("E_3d [b0^2 V0^2]"))
+    let waves = CurvePlot::new("Energy along x", Axis::linear("tau"), Axis::log("E_3d [b₀² V₀²]"))
         .with(Series::new("this solver", Style::Line, flow.curve(|r| r.energy_3d_m4_s2())))
         .with(Series::new("independent code", Style::Markers, stored.curve(Stored::ENERGY_3D)));
-    let enstrophy = CurvePlot::new("Enstrophy", Axis::linear("tau"), Axis::linear("Z [V0^2]").between(0.0, 1100.0))
+    let enstrophy = CurvePlot::new("Enstrophy", Axis::linear("tau"), Axis::linear("Z [V₀²]").between(0.0, 1100.0))
         .with(Series::new("this solver", Style::Line, flow.curve(|r| r.enstrophy_m2_s2.min(1100.0))))
         .with(Series::new("independent code", Style::Markers, {
             stored.curve(Stored::ENSTROPHY).into_iter().map(|p| (p.0, p.1.min(1100.0)))

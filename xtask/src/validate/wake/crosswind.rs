@@ -48,30 +48,30 @@ pub(crate) fn show(profile: Profile) -> Result<Shown, Failure> {
     let checks = vec![
         Claim::at_most("no wind: drift to 1.5", drift(still).abs(), 1e-3),
         Claim::relative("no wind: left over right secondary", unequal(still), 1.0, 0.01),
-        Claim::at_least("wind V0: drift to 1.5", drift(windy), 0.8),
-        Claim::at_least("wind V0: drift twice that of V0/2, share", drift(windy) / drift(&runs[1].1), 1.8),
-        Claim::at_least("wind V0: stronger over weaker secondary", unequal(windy).max(1.0 / unequal(windy)), 1.1),
+        Claim::at_least("wind V₀: drift to 1.5", drift(windy), 0.8),
+        Claim::at_least("wind V₀: drift twice that of V₀/2, share", drift(windy) / drift(&runs[1].1), 1.8),
+        Claim::at_least("wind V₀: stronger over weaker secondary", unequal(windy).max(1.0 / unequal(windy)), 1.1),
     ];
     let mut table = Table::new().float("tau", still.records.iter().map(|r| r.time_s));
-    let mut drifts = CurvePlot::new("Middle of the pair", Axis::linear("tau"), Axis::linear("y / b0"));
-    let mut strengths = CurvePlot::new("Secondary vortices", Axis::linear("tau"), Axis::linear("|Gamma| / Gamma0"));
-    let mut paths = CurvePlot::new("Paths relative to the middle", Axis::linear("y / b0"), Axis::linear("z / b0"));
+    let mut drifts = CurvePlot::new("Middle of the pair", Axis::linear("tau"), Axis::linear("y / b₀"));
+    let mut strengths = CurvePlot::new("Secondary vortices", Axis::linear("tau"), Axis::linear("|Γ| / Γ₀"));
+    let mut paths = CurvePlot::new("Paths relative to the middle", Axis::linear("y / b₀"), Axis::linear("z / b₀"));
     for (wind, flow) in &runs {
         let name = |what: &str| format!("{what}_wind_{wind}");
         table = table.float(&name("middle"), flow.records.iter().map(middle));
-        drifts = drifts.with(Series::new(&format!("wind {wind} V0"), Style::Line, flow.curve(middle)));
+        drifts = drifts.with(Series::new(&format!("wind {wind} V₀"), Style::Line, flow.curve(middle)));
         for right in [false, true] {
             let side = if right { "right" } else { "left" };
             let curve = second(flow, right);
             table = table.float(&name(&format!("secondary_{side}")), curve.iter().map(|p| p.1));
             let style = if right { Style::Dash } else { Style::Line };
             let shown = curve.into_iter().filter(|p| p.1.is_finite()).map(|p| (p.0, p.1.abs()));
-            strengths = strengths.with(Series::new(&format!("wind {wind} V0, {side}"), style, shown));
+            strengths = strengths.with(Series::new(&format!("wind {wind} V₀, {side}"), style, shown));
             let path = flow.records.iter().map(|r| {
                 let vortex = if right { &r.right } else { &r.left };
                 (vortex.y_m - middle(r), vortex.z_m)
             });
-            paths = paths.with(Series::new(&format!("wind {wind} V0, {side}"), style, path));
+            paths = paths.with(Series::new(&format!("wind {wind} V₀, {side}"), style, path));
             let gamma = flow.gamma(right);
             table = table.float(&name(&format!("gamma_5_15_{side}")), gamma.into_iter().map(|p| p.1));
         }

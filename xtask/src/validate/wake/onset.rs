@@ -55,7 +55,7 @@ pub(crate) fn show(profile: Profile) -> Result<Shown, Failure> {
     };
     let by_level = CurvePlot::new(
         "Re 5000",
-        Axis::log("noise, rms of a component [V0]"),
+        Axis::log("noise, rms of a component [V₀]"),
         Axis::linear("onset of the fast decay, tau"),
     )
     .with(Series::new("16 x 96 x 64", Style::LineMarkers, points(&|i| (runs[i].1 == 5000.0).then_some(runs[i].0))));
