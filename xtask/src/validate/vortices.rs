@@ -29,10 +29,8 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
     let stored: Vec<(f64, f64)> = numbers("tgv_re1600_dns.csv")?.iter().map(|r| (r[0], r[2])).collect();
     let peak = stored.iter().map(|p| p.1).fold(0.0, f64::max);
     let (fine, coarse) = if profile == Profile::Quick { (64, 32) } else { (128, 64) };
-    let mut plot =
-        CurvePlot::new("Loss of energy, Re 1600", Axis::linear("time [s]"), Axis::linear("-dE/dt [m²/s³]")).with(
-            Series::new("stored simulation, 512^3", Style::Line, stored.iter().copied().filter(|p| p.0 <= END_S)),
-        );
+    let mut plot = CurvePlot::new("Loss of energy, Re 1600", Axis::linear("time [s]"), Axis::linear("-dE/dt [m²/s³]"))
+        .with(Series::new("stored simulation, 512^3", Style::Line, stored.iter().copied().filter(|p| p.0 <= END_S)));
     let mut table = Table::new().float("time_s", (1..OUTPUTS).map(|i| EVERY_S * i as f64));
     let mut errors = Vec::new();
     let fine_models = [MODELS[0], MODELS[3]].map(|model| (fine, model));

@@ -179,7 +179,11 @@ impl fmt::Display for Plan {
         }
         let Forecast { core_s, memory_bytes, .. } = self.total();
         let (time, memory) = (units::seconds(core_s), units::bytes(memory_bytes));
-        writeln!(f, "  total {:<16} {time:>10} {memory:>10}   at once; forecast, times of one core to an order of magnitude", "")?;
+        writeln!(
+            f,
+            "  total {:<16} {time:>10} {memory:>10}   at once; forecast, times of one core to an order of magnitude",
+            ""
+        )?;
         if self.target != Target::Efficiency {
             writeln!(f, "  scan  {}", self.schedule())?;
         }

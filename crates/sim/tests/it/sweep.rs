@@ -136,7 +136,10 @@ fn a_sweep_replaces_another_one_and_damaged_results_only_when_it_is_told_to() {
     let at = temp.path();
     let of = |energies: &str, more: &[&str]| {
         let vary = format!("pulse.energy_j={energies}");
-        wakescope(at, &[&["sweep", "s.toml", "--vary", &vary, "--quiet", "--out", "o", "--no-circulation"], more].concat())
+        wakescope(
+            at,
+            &[&["sweep", "s.toml", "--vary", &vary, "--quiet", "--out", "o", "--no-circulation"], more].concat(),
+        )
     };
     assert!(of("50e-6,150e-6", &[]).status.success());
     let expected = read(at, "o/results.csv");

@@ -162,12 +162,7 @@ fn turbulent(flow: &History, plane: &History, stored: &Stored, bars: &Bars) -> V
         checks.push(Claim::within(&format!("Γ ratio at {tau}"), flow.mean_gamma(tau), reference, bar));
     }
     let (ratio, ratio_bar) = bars.ratio_to_plane;
-    checks.push(Claim::within(
-        "3-D over 2-D Γ at 5",
-        flow.mean_gamma(END) / plane.mean_gamma(END),
-        ratio,
-        ratio_bar,
-    ));
+    checks.push(Claim::within("3-D over 2-D Γ at 5", flow.mean_gamma(END) / plane.mean_gamma(END), ratio, ratio_bar));
     let energy = flow.curve(|r| r.energy_m4_s2);
     checks.push(Claim::within("energy at 5", value_at(&energy, END), bars.last_energy.0, bars.last_energy.1));
     let enstrophy = flow.curve(|r| r.enstrophy_m2_s2);
