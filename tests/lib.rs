@@ -1,1 +1,3 @@
-//! Tests across the crates of wakescope.
+//! Tests across the crates of wakescope, and the [audit] of the program's numbers.
+
+pub mod audit;

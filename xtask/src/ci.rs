@@ -65,6 +65,9 @@ fn steps() -> Result<Vec<Step>, Failure> {
         "wake",
         format!("cargo run --quiet --bin wakescope -- wake {WAKE} --out {WAKE_OUT} --overwrite --quiet"),
     ));
+    // On the program that the step before has built.
+    let sibling = std::env::current_exe()?.with_file_name("wakescope").display().to_string();
+    out.push(plain("audit", format!("'{own}' audit --program '{sibling}'")));
     // Says so where there is no MPI.
     out.push(plain("mpi", format!("'{own}' ranks")));
     out.push(plain("figures", format!("'{own}' reproduce-figs --profile quick --no-cache --wake {WAKE_OUT}")));

@@ -3,6 +3,7 @@
 // A task talks to a person at a terminal.
 #![allow(clippy::print_stdout)]
 
+mod audit;
 mod bless;
 mod cause;
 mod ci;
@@ -89,6 +90,8 @@ enum Task {
     FuzzScenes(fuzz_scenes::Options),
     /// Run every stiff and extreme case of the crates: what it must come to, what it came to.
     Stability(stability::Options),
+    /// Hold every number that the program writes or prints against its definition, on random scenes and cases.
+    Audit(audit::Options),
     /// Check the rules of the house.
     Tidy,
     /// Everything that continuous integration runs.
@@ -108,6 +111,7 @@ fn main() -> std::process::ExitCode {
         Task::Forecast(options) => forecast::run(&options),
         Task::FuzzScenes(options) => fuzz_scenes::run(&options),
         Task::Stability(options) => stability::run(&options),
+        Task::Audit(options) => audit::run(&options),
         Task::Tidy => tidy::run(),
         Task::Ci(options) => ci::run(&options),
     };

@@ -16,7 +16,7 @@ const MAY_DEPEND_ON: [(&str, &[&str]); 7] = [
     ("crates/signal", &[]),
     ("crates/estimate", &[]),
     ("crates/sim", &["optics", "les", "signal", "estimate"]),
-    ("xtask", &["optics", "les", "signal", "estimate", "sim"]),
+    ("xtask", &["optics", "les", "signal", "estimate", "sim", "tests"]),
     ("tests", &["optics", "les", "signal", "estimate", "sim"]),
 ];
 

@@ -1,0 +1,145 @@
+//! The Cramer-Rao bound and what a level is worth: (E8) to (E12), by own matrices and sums.
+
+use super::geometry::{Scan, radius_m};
+use super::ledger::Ledger;
+use super::numerics::{Complex, information};
+use super::power::{Pulse, window_powers};
+use super::scene::Scene;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+/// Density of what is left of band noise outside of the band, in that of the band (page on the scene file, The bound).
+const FLOOR: f64 = 1e-6;
+
+/// Information of a record of `n` samples about the velocity of a uniform wind at rest (E12), s^2/m^2.
+pub(crate) fn record_information(s: &Scene, pulse: &Pulse, n: usize, snr: f64) -> f64 {
+    let (ts, lambda) = (1.0 / s.f("detector.sampling_hz"), s.f("laser.wavelength_m"));
+    let (b, fc) = (s.f("detector.bandwidth_hz") * ts, s.f("detector.intermediate_frequency_hz") * ts);
+    let is_baseband = s.s("detector.signal") == "baseband";
+    let is_band = s.s("detector.noise") == "band";
+    // c(l) of the signal, of unit power, chirp included.
+    let spread = 1.0 + (2.0 * PI * pulse.chirp_hz_s * pulse.sigma_s.powi(2)).powi(2);
+    let c = |l: f64| (-spread * (l * ts / (2.0 * pulse.sigma_s)).powi(2)).exp();
+    let sinc = |x: f64| if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) };
+    let delta = |l: f64| if l == 0.0 { 1.0 } else { 0.0 };
+    // Power of the noise in the band is one over the ratio; its density goes on beyond the band where it is white.
+    let noise = |l: f64| match (is_band, is_baseband) {
+        (false, true) => delta(l) / (b * snr),
+        (false, false) => delta(l) * 0.5 / (b * snr),
+        (true, true) => ((1.0 - FLOOR) * sinc(b * l) + FLOOR / b * delta(l)) / snr,
+        (true, false) => ((1.0 - FLOOR) * sinc(b * l) * (2.0 * PI * fc * l).cos() + 0.5 * FLOOR / b * delta(l)) / snr,
+    };
+    let rate = 4.0 * PI * ts / lambda;
+    let lag = |i: usize, j: usize| i as f64 - j as f64;
+    let matrix =
+        |of: &dyn Fn(f64) -> Complex| (0..n).map(|i| (0..n).map(|j| of(lag(i, j))).collect()).collect::<Vec<Vec<_>>>();
+    let (r, d, share) = match is_baseband {
+        true => (matrix(&|l| Complex::from(c(l) + noise(l))), matrix(&|l| Complex::new(0.0, -rate * l * c(l))), 1.0),
+        // The real part of the same on its carrier.
+        false => (
+            matrix(&|l| Complex::from(c(l) * (2.0 * PI * fc * l).cos() + noise(l))),
+            matrix(&|l| Complex::from(rate * l * c(l) * (2.0 * PI * fc * l).sin())),
+            0.5,
+        ),
+    };
+    share * information(&r, &d)
+}
+
+/// Squared correlation gamma^2 of two windows `apart` samples apart (E9), (E10), with the noise of its density.
+fn correlation2(s: &Scene, pulse: &Pulse, apart: usize, snr: f64) -> f64 {
+    let ts = 1.0 / s.f("detector.sampling_hz");
+    let h: Vec<f64> = window_powers(s).iter().map(|h2| h2.sqrt()).collect();
+    // The density of noise B wide as that of white noise: F_s/B times stronger.
+    let over = 1.0 / (s.f("detector.bandwidth_hz") * ts * snr);
+    let spread = 1.0 + (2.0 * PI * pulse.chirp_hz_s * pulse.sigma_s.powi(2)).powi(2);
+    let c = |l: i64| {
+        let of_signal = (-spread * (l as f64 * ts / (2.0 * pulse.sigma_s)).powi(2)).exp();
+        of_signal + if l == 0 && s.s("detector.noise") != "none" { over } else { 0.0 }
+    };
+    let sum = |shift: i64| {
+        let mut sum = 0.0;
+        for (n, hn) in h.iter().enumerate() {
+            for (m, hm) in h.iter().enumerate() {
+                sum += hn * hm * c(shift + n as i64 - m as i64);
+            }
+        }
+        sum
+    };
+    (sum(apart as i64) / sum(0)).powi(2)
+}
+
+/// n_eff of a region (E8): `windows` are the first samples of the windows of each line.
+pub(crate) fn independent(s: &Scene, pulse: &Pulse, windows: &[Vec<usize>], pulses: usize, snr: f64) -> f64 {
+    let mut known = BTreeMap::new();
+    let (mut count, mut pairs) = (0.0, 0.0);
+    for starts in windows {
+        for a in starts {
+            count += 1.0;
+            for b in starts {
+                let apart = a.abs_diff(*b);
+                pairs += *known.entry(apart).or_insert_with(|| correlation2(s, pulse, apart, snr));
+            }
+        }
+    }
+    pulses as f64 * count * count / pairs
+}
+
+/// The bound of a region: each line's record that its windows cover, every pulse of it, (E12) for independent records.
+fn region_m_s(s: &Scene, pulse: &Pulse, windows: &[Vec<usize>], pulses: usize, snr: f64) -> f64 {
+    let n = s.n("estimator.window_samples");
+    let mut known = BTreeMap::new();
+    let mut sum = 0.0;
+    for starts in windows.iter().filter(|starts| !starts.is_empty()) {
+        let length = starts[starts.len() - 1] - starts[0] + n;
+        sum += *known.entry(length).or_insert_with(|| record_information(s, pulse, length, snr));
+    }
+    1.0 / (pulses as f64 * sum).sqrt()
+}
+
+/// `bound --json`: windows, levels, n_eff and regions at a few ratios and ranges.
+pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
+    let Some(pulse) = Pulse::gaussian(s) else { return };
+    let n = s.n("estimator.window_samples");
+    let line = scan.elevation_rad.len() / 2;
+    let gates = scan.gate_m.len();
+    let by_snr = json["by_snr"].as_array().cloned().unwrap_or_default();
+    let by_range = json["by_range"].as_array().cloned().unwrap_or_default();
+    ledger.equal("bound: rows", (by_snr.len() + by_range.len()) as f64, (91 + gates) as f64, 0.0);
+    for point in by_snr.first().into_iter() {
+        super::program::see(ledger, "bound", point);
+    }
+    let chosen =
+        |points: &[Value], rows: &[usize]| rows.iter().filter_map(|&i| points.get(i).cloned()).collect::<Vec<_>>();
+    let at_ratio = chosen(&by_snr, &[10, 30, 50]).into_iter().map(|p| (p, gates / 2));
+    let ends = [0, gates / 2, gates - 1];
+    let at_range = chosen(&by_range, &ends).into_iter().zip(ends);
+    for (point, gate) in at_ratio.chain(at_range) {
+        let f = |key: &str| point[key].as_f64().unwrap_or(f64::NAN);
+        let ratio = 10_f64.powf(0.1 * f("snr_db"));
+        ledger.equal("bound: range_m", f("range_m"), scan.gate_m[gate], 1e-6);
+        if ratio.is_nan() {
+            continue;
+        }
+        if f("snr_db") <= 30.0 {
+            let right = 1.0 / record_information(s, &pulse, n, ratio).sqrt();
+            // The autocorrelation of a chirped pulse is by quadrature, which a high ratio sees.
+            let tolerance = if pulse.chirp_hz_s == 0.0 { 1e-4 } else { 5e-3 };
+            ledger.equal("bound: bound_window_m_s", f("bound_window_m_s"), right, tolerance * right);
+        }
+        let Some(radius) = radius_m(s, scan.gate_m[gate]) else { continue };
+        let windows = match s.s("estimator.method.kind") == "periodogram" {
+            true => vec![vec![scan.gate_start[gate]]],
+            false => scan.region(line, gate, radius, n),
+        };
+        let count = windows.iter().map(Vec::len).sum::<usize>();
+        ledger.equal("bound: level", f("level"), (count * scan.pulses) as f64, 0.5);
+        let right = independent(s, &pulse, &windows, scan.pulses, ratio);
+        ledger.equal("bound: n_eff", f("n_eff"), right, 1e-3 * right);
+        let longest = windows.iter().filter_map(|w| Some(w.last()? - w.first()? + n)).max().unwrap_or(n);
+        if f("snr_db") <= 30.0 && longest <= 200 {
+            let right = region_m_s(s, &pulse, &windows, scan.pulses, ratio);
+            ledger.equal("bound: bound_region_m_s", f("bound_region_m_s"), right, 1e-3 * right);
+        }
+    }
+}

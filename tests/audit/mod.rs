@@ -1,0 +1,254 @@
+//! The audit: every number that a command prints or writes, beside its definition in the plainest code that computes it.
+//!
+//! The definitions are written from the book, not from the program. Each draw is a random scene or case over all keys; the program
+//! runs as a user calls it, and its numbers are held with the tolerance that the definition gives: round-off, the error of a
+//! quadrature, standard errors. `cargo xtask audit` runs the draws and prints the table; a number of the program that is neither
+//! held nor excused with a reason is a fault as much as one that is wrong.
+//!
+//! | file | what it defines |
+//! |---|---|
+//! | `draw` | the random scenes |
+//! | `geometry` | lines, gates, windows, times, levels |
+//! | `air` | the winds and their weighted means |
+//! | `power` | efficiency, signal-to-noise ratio, budget, power of the signals |
+//! | `bound` | Cramer-Rao bound, n_eff |
+//! | `statistics` | moments, means over maps, standard errors over seeds, ratios and widths of spectra |
+//! | `files` | one quantity in two files, and what files say of themselves |
+//! | `keys` | two values of every key, and what differs |
+//! | `flow` | histories of flows and wakes, energy, Courant numbers |
+//! | `scans` | `retrieve`, `detect`, `estimate`: formats, chi-square, false alarms |
+//! | `table` | the list of all numbers, of those awaited and of those without a definition |
+
+// What an audit cannot read or run is a fault: it is caught, and told with its draw.
+#![allow(clippy::unwrap_used)]
+// Sums over indices, as the equations have them.
+#![allow(clippy::needless_range_loop)]
+
+mod air;
+mod bound;
+mod draw;
+mod files;
+mod flow;
+mod geometry;
+mod keys;
+mod ledger;
+mod numerics;
+mod power;
+mod program;
+mod random;
+mod scans;
+mod scene;
+mod statistics;
+mod table;
+
+pub use table::Report;
+
+use geometry::Scan;
+use ledger::Ledger;
+use program::Bench;
+use random::Random;
+use scene::Scene;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What a draw is about.
+type Subject = (&'static str, fn(&mut Random, &Bench, &mut Ledger));
+
+/// One after the other: those that cost little come more often.
+const SUBJECTS: [Subject; 15] = [
+    ("map", map),
+    ("power", power_of),
+    ("bound", bound_of),
+    ("spectra", spectra),
+    ("keys", keys::hold),
+    ("map", map),
+    ("wake", flow::hold_wake),
+    ("growth", flow::hold_growth),
+    ("cavity", flow::hold_cavity),
+    ("words", scans::hold_words),
+    ("bound", bound_of),
+    ("power", power_of),
+    ("map", map),
+    ("spectra", spectra),
+    ("seeds", seeds),
+];
+
+/// What takes longer: once in `RARE` draws.
+const LONG: [Subject; 3] =
+    [("retrieve", scans::hold_retrieve), ("detect", scans::hold_detect), ("noise", scans::hold_false_alarms)];
+const RARE: usize = 16;
+
+/// Runs draws number `first` to `first + count - 1` of a seed with a program, on as many threads as are told; `keep` is a folder in
+/// which their scenes and outputs stay.
+pub fn audit(program: &Path, seed: u64, first: usize, count: usize, threads: usize, keep: Option<&Path>) -> Report {
+    let next = AtomicUsize::new(first);
+    let found = Mutex::new(Vec::new());
+    let work = || {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            if number >= first + count {
+                return;
+            }
+            let ledger = draw_of(program, seed, number, keep);
+            found.lock().unwrap().push((number, ledger));
+        }
+    };
+    std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work))));
+    let mut found = found.into_inner().unwrap();
+    found.sort_by_key(|(number, _)| *number);
+    let mut all = Ledger::default();
+    found.into_iter().for_each(|(_, ledger)| all.add(ledger));
+    Report::new(&all, count)
+}
+
+fn draw_of(program: &Path, seed: u64, number: usize, keep: Option<&Path>) -> Ledger {
+    let (name, subject) = match number % RARE {
+        15 => LONG[number / RARE % LONG.len()],
+        _ => SUBJECTS[number % SUBJECTS.len()],
+    };
+    let temporary = || std::env::temp_dir().join(format!("wakescope-audit-{}-{number}", std::process::id()));
+    let folder = keep.map_or_else(temporary, |keep| keep.join(number.to_string()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let bench = Bench { program, folder };
+    let mut ledger = Ledger::new(format!("{number} ({name})"));
+    let mut random = Random::new(seed, number as u64);
+    let ended = catch_unwind(AssertUnwindSafe(|| subject(&mut random, &bench, &mut ledger)));
+    ledger.holds("every draw comes to its end", ended.is_ok(), "it panicked");
+    if keep.is_none() {
+        std::fs::remove_dir_all(&bench.folder).unwrap();
+    }
+    ledger
+}
+
+/// Draws until `check` passes a scene; refusals are counted.
+fn good_scene(
+    r: &mut Random,
+    bench: &Bench,
+    ledger: &mut Ledger,
+    draw: impl Fn(&mut Random) -> Scene,
+) -> Option<Scene> {
+    for _ in 0..20 {
+        let s = draw(r);
+        bench.write("s.toml", &s.text());
+        let check = bench.run(&["check", "s.toml"]);
+        if check.is_good {
+            return Some(s);
+        }
+        ledger.refused.push(check.stderr);
+    }
+    None
+}
+
+/// A whole map: places, times, levels, velocities, profile.
+fn map(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
+    let Some(s) = good_scene(r, bench, ledger, draw::scene) else { return };
+    let Some(run) = bench.must(ledger, &["run", "s.toml", "--out", "o", "--json"]) else { return };
+    let scan = Scan::new(&s);
+    let map = bench.csv(ledger, "o/map.csv");
+    geometry::hold(ledger, &s, &scan, &map, air::start_s(&s));
+    geometry::hold_levels(ledger, &s, &scan, &map);
+    air::hold(ledger, &s, &scan, &map);
+    statistics::hold_map(ledger, &s, &scan, &map);
+    statistics::hold_summary(ledger, &s, &scan, &map, &run.json());
+    if let Some(budget) = bench.must(ledger, &["budget", "s.toml"]) {
+        statistics::hold_reach(ledger, &s, &scan, &budget.stdout);
+    }
+    files::hold_map(ledger, bench, &s, &scan, &map);
+    let profile = bench.csv(ledger, "o/profile.csv");
+    power::hold_profile(ledger, &s, &profile);
+}
+
+/// What comes back, by every command that tells it, with a focus in or near the scan.
+fn power_of(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
+    let draw = |r: &mut Random| {
+        let mut s = draw::scene(r);
+        let first_m = r.between(150.0, 400.0);
+        s.number("scan.range_min_m", first_m).number("scan.range_max_m", first_m + r.between(200.0, 500.0));
+        if s.f("telescope.focus_m").is_finite() {
+            s.number("telescope.focus_m", r.between(200.0, 900.0));
+        }
+        s.number("scan.elevation_min_rad", 0.1).number("scan.elevation_max_rad", 0.1);
+        s.set("scan.pulses_per_line", 150).set("scan.realisations", 2).word("flow.kind", "calm");
+        s.set("estimator.gate_step_samples", 25);
+        s.unset("flow").word("flow.kind", "calm");
+        s
+    };
+    let Some(s) = good_scene(r, bench, ledger, draw) else { return };
+    let scan = Scan::new(&s);
+    let ranges: Vec<f64> = (0..4).map(|_| r.between(s.f("scan.range_min_m"), s.f("scan.range_max_m"))).collect();
+    let words = ranges.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    if let Some(budget) = bench.must(ledger, &["budget", "s.toml", "--json", "--range", &words]) {
+        power::hold_budget(ledger, &s, &budget.json());
+    }
+    if bench.must(ledger, &["signal", "s.toml", "--out", "o"]).is_some() {
+        power::hold_signals(ledger, bench, &s, &scan, "o/signals.nc");
+        files::hold_signals(ledger, bench, &s, &scan, air::start_s(&s));
+    }
+    if s.s("detector.noise") == "none" {
+        return;
+    }
+    if let Some(bound) = bench.must(ledger, &["bound", "s.toml", "--json"]) {
+        let json = bound.json();
+        for (gate, point) in json["by_range"].as_array().into_iter().flatten().enumerate().step_by(5) {
+            let found = point["snr_db"].as_f64().unwrap_or(f64::NAN);
+            let right = power::free_space_snr_db(&s, scan.gate_m[gate]);
+            ledger.equal("bound: snr_db", found, right, 0.01);
+        }
+    }
+}
+
+/// Bounds and what levels are worth, for any pulse, window and noise.
+fn bound_of(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
+    let draw = |r: &mut Random| {
+        let mut s = draw::scene(r);
+        s.set("estimator.gate_step_samples", 16).set("estimator.window_samples", r.pick(&[12, 16, 24, 32, 48, 64]));
+        s.number("pulse.shape.duration_s", r.log(6e-8, 4e-7));
+        s
+    };
+    let Some(s) = good_scene(r, bench, ledger, draw) else { return };
+    if let Some(found) = bench.must(ledger, &["bound", "s.toml", "--json"]) {
+        bound::hold(ledger, &s, &Scan::new(&s), &found.json());
+    }
+}
+
+/// A uniform wind at a fixed ratio, seen by any estimator: the ratio and the width that it shows.
+fn spectra(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
+    let draw = |r: &mut Random| {
+        let mut s = draw::scene(r);
+        draw::fixed_ratio(&mut s, r.between(0.0, 10.0));
+        s.unset("flow").unset("added_flows").word("flow.kind", "uniform");
+        let reach_m_s = 0.25 * s.f("laser.wavelength_m") * s.f("detector.bandwidth_hz");
+        s.number("flow.lateral_m_s", reach_m_s * r.between(-0.5, 0.5)).number("flow.vertical_m_s", 0.0);
+        s.number("scan.elevation_min_rad", 0.0)
+            .number("scan.elevation_step_rad", 0.01)
+            .number("scan.elevation_max_rad", 0.2);
+        s.set("scan.pulses_per_line", 10).set("scan.realisations", 20).set("estimator.gate_step_samples", 20);
+        s.unset("pulse.chirp_hz_s").number("estimator.false_alarm", 0.0);
+        s
+    };
+    let Some(s) = good_scene(r, bench, ledger, draw) else { return };
+    if bench.must(ledger, &["map", "s.toml", "--out", "o"]).is_some() {
+        let map = bench.csv(ledger, "o/map.csv");
+        statistics::hold_spectra(ledger, &s, &Scan::new(&s), &map);
+    }
+}
+
+/// Many seeds of one small scene.
+fn seeds(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
+    let draw = |r: &mut Random| {
+        let mut s = draw::scene(r);
+        draw::fixed_ratio(&mut s, r.between(0.0, 12.0));
+        s.unset("flow").unset("added_flows").number("flow.cross_wind_m_s", r.between(-3.0, 3.0));
+        s.number("scan.elevation_min_rad", 0.08)
+            .number("scan.elevation_step_rad", 4e-3)
+            .number("scan.elevation_max_rad", 0.16);
+        s.number("scan.range_min_m", 350.0).number("scan.range_max_m", 450.0).set("estimator.window_samples", 32);
+        s.set("scan.pulses_per_line", 2).set("scan.realisations", r.whole(2, 6)).set("estimator.gate_step_samples", 12);
+        s
+    };
+    if let Some(s) = good_scene(r, bench, ledger, draw) {
+        statistics::hold_seeds(ledger, bench, &s);
+    }
+}

@@ -1,0 +1,454 @@
+//! Efficiency, signal-to-noise ratio, power budget and the power of the signals: (O1) to (O10), (S1) to (S10), (R1) to (R12).
+
+use super::geometry::Scan;
+use super::ledger::Ledger;
+use super::numerics::{average_and_error, integral, straight};
+use super::program::{Bench, Csv, at};
+use super::scene::{C_M_S, E_C, H_J_S, K_J_K, Scene};
+use serde_json::Value;
+use std::f64::consts::{LN_2, PI};
+
+/// A Gaussian pulse (S1), with chirp.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pulse {
+    pub(crate) sigma_s: f64,
+    pub(crate) chirp_hz_s: f64,
+}
+
+impl Pulse {
+    /// The pulse of a scene, unless it is sampled.
+    pub(crate) fn gaussian(s: &Scene) -> Option<Self> {
+        let duration_s = s.f("pulse.shape.duration_s");
+        let sigma_s = match s.s("pulse.shape.definition").as_str() {
+            "fwhm" => duration_s / (2.0 * LN_2.sqrt()),
+            _ => duration_s,
+        };
+        (s.s("pulse.shape.kind") == "gaussian").then(|| Self { sigma_s, chirp_hz_s: s.f("pulse.chirp_hz_s") })
+    }
+
+    /// |f(t)|^2, 1/s (S1).
+    pub(crate) fn power(&self, t_s: f64) -> f64 {
+        (-(t_s / self.sigma_s).powi(2)).exp() / (PI.sqrt() * self.sigma_s)
+    }
+
+    /// c sigma/2, m.
+    pub(crate) fn scale_m(&self) -> f64 {
+        0.5 * C_M_S * self.sigma_s
+    }
+
+    /// |f|^2 over range, 1/m: its integral is one (S11).
+    pub(crate) fn power_over_range(&self, distance_m: f64) -> f64 {
+        self.power(2.0 * distance_m / C_M_S) * 2.0 / C_M_S
+    }
+
+    /// Full width at half maximum of the power, s.
+    pub(crate) fn fwhm_s(&self) -> f64 {
+        2.0 * LN_2.sqrt() * self.sigma_s
+    }
+
+    /// Standard deviation of the power spectrum, Hz; a chirp widens it.
+    pub(crate) fn spectral_deviation_hz(&self) -> f64 {
+        let x = 2.0 * PI * self.chirp_hz_s * self.sigma_s.powi(2);
+        (1.0 + x * x).sqrt() / (2.0 * PI * 2_f64.sqrt() * self.sigma_s)
+    }
+}
+
+/// h^2 of the samples of a window (page Estimation, Periodogram), the largest near 1.
+pub(crate) fn window_powers(s: &Scene) -> Vec<f64> {
+    let n = s.n("estimator.window_samples");
+    let from_middle = |i: usize| i as f64 - 0.5 * (n as f64 - 1.0);
+    let h2 = |i: usize| match s.s("estimator.weighting").as_str() {
+        "gaussian" => (-(from_middle(i) / (0.25 * n as f64)).powi(2)).exp(),
+        "hann" => (PI * from_middle(i) / n as f64).cos().powi(4),
+        _ => 1.0,
+    };
+    (0..n).map(h2).collect()
+}
+
+/// The telescope's beam (O1).
+struct Beam {
+    a_m: f64,
+    b_m: f64,
+    s_m: f64,
+    /// Wave number, 1/m.
+    k: f64,
+    /// 1/F, 1/m.
+    curvature: f64,
+}
+
+impl Beam {
+    fn new(s: &Scene) -> Self {
+        let radius_m = s.f("telescope.beam_radius_m");
+        let s_m = if s.s("telescope.beam_radius_definition") == "field" { radius_m / 2_f64.sqrt() } else { radius_m };
+        Self {
+            a_m: s.f("telescope.aperture_radius_m"),
+            b_m: s.f("telescope.obscuration_radius_m"),
+            s_m,
+            k: 2.0 * PI / s.f("laser.wavelength_m"),
+            curvature: 1.0 / s.f("telescope.focus_m"),
+        }
+    }
+
+    /// Transmitted part of the power (O2).
+    fn transmission(&self) -> f64 {
+        (-(self.b_m / self.s_m).powi(2)).exp() - (-(self.a_m / self.s_m).powi(2)).exp()
+    }
+
+    fn area_m2(&self) -> f64 {
+        PI * self.a_m.powi(2)
+    }
+
+    /// M(rho) of (O4), at a range: the lens that two discs share, less the obscuration of either.
+    fn overlap(&self, rho: f64, range_m: f64) -> f64 {
+        let q = self.k * rho * (1.0 / range_m - self.curvature);
+        let edge = self.a_m - 0.5 * rho;
+        let of_x = |x: f64| {
+            let high = (self.a_m.powi(2) - (x + 0.5 * rho).powi(2)).max(0.0).sqrt();
+            let low = (self.b_m.powi(2) - (x - 0.5 * rho).powi(2)).max(0.0).sqrt();
+            if low >= high {
+                return 0.0;
+            }
+            let panels = 1 + ((high - low) / self.s_m) as usize;
+            let across = integral(low, high, panels, |y| (-(y / self.s_m).powi(2)).exp());
+            let along = (-(x * x + 0.25 * rho * rho) / self.s_m.powi(2)).exp() * (q * x).cos();
+            4.0 * along * across / (PI * self.s_m.powi(2))
+        };
+        // Smooth between the edges of aperture and obscuration, with square roots there, which the sine takes away.
+        let ends = between(0.0, edge, &[0.5 * rho - self.b_m, 0.5 * rho + self.b_m]);
+        let of_piece = |ends: &[f64]| {
+            let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
+            let panels = 2 + (q * half).abs() as usize / 3;
+            integral(-0.5 * PI, 0.5 * PI, panels, |t| half * t.cos() * of_x(middle + half * t.sin()))
+        };
+        ends.windows(2).map(of_piece).sum()
+    }
+
+    /// (O5), and (P3) with the structure function of independent paths.
+    fn efficiency(&self, range_m: f64, structure: impl Fn(f64) -> f64) -> f64 {
+        let waves = self.k * self.a_m.powi(2) * (1.0 / range_m - self.curvature).abs();
+        let f = |rho: f64| rho * self.overlap(rho, range_m).powi(2) * (-structure(rho)).exp();
+        let ends = between(0.0, 2.0 * self.a_m, &[self.a_m - self.b_m, 2.0 * self.b_m, self.a_m + self.b_m]);
+        let of_piece = |ends: &[f64]| {
+            let share = 0.5 * (ends[1] - ends[0]) / self.a_m;
+            integral(ends[0], ends[1], 3 + (share * waves) as usize / 4, f)
+        };
+        2.0 * PI * ends.windows(2).map(of_piece).sum::<f64>() / self.area_m2()
+    }
+}
+
+/// The ends of an interval with the places between them, in order, each once.
+fn between(low: f64, high: f64, places: &[f64]) -> Vec<f64> {
+    let mut out: Vec<f64> = places.iter().copied().filter(|x| low < *x && *x < high).chain([low, high]).collect();
+    out.sort_by(f64::total_cmp);
+    out.dedup();
+    out
+}
+
+/// eta_s in free space (O5).
+pub(crate) fn free_space_efficiency(s: &Scene, range_m: f64) -> f64 {
+    Beam::new(s).efficiency(range_m, |_| 0.0)
+}
+
+/// K^2 beta at a range: backscatter, and extinction out and back.
+fn air(s: &Scene, range_m: f64) -> (f64, f64) {
+    if !s.has("atmosphere.profile") {
+        let (beta, alpha) = (s.f("atmosphere.backscatter_per_m_sr"), s.f("atmosphere.extinction_per_m"));
+        return (beta, (-2.0 * alpha * range_m).exp());
+    }
+    let list = |key: &str| s.list(&format!("atmosphere.profile.{key}"));
+    let (r, beta, alpha) = (list("range_m"), list("backscatter_per_m_sr"), list("extinction_per_m"));
+    // Straight lines: the trapezoids between the knots are exact.
+    let mut knots: Vec<f64> = [0.0].into_iter().chain(r.iter().copied().filter(|&x| x < range_m)).collect();
+    knots.push(range_m);
+    let depth: f64 =
+        knots.windows(2).map(|k| 0.5 * (k[1] - k[0]) * (straight(&r, &alpha, k[0]) + straight(&r, &alpha, k[1]))).sum();
+    (straight(&r, &beta, range_m), (-2.0 * depth).exp())
+}
+
+/// What the receiver takes from the shot-noise limit, as power ratios (R1) to (R6); all at most 1.
+pub(crate) struct Receiver {
+    saturation: f64,
+    amplifier: f64,
+    dark: f64,
+    intensity: f64,
+    poles: f64,
+    converter: f64,
+    /// Noise in the band, A^2 (S10), with all of these but the converter.
+    pub(crate) noise_a2: f64,
+}
+
+impl Receiver {
+    pub(crate) fn new(s: &Scene) -> Self {
+        let f = |key: &str| s.f(&format!("detector.{key}"));
+        let (nu, lo_w) = (C_M_S / s.f("laser.wavelength_m"), f("local_oscillator_w"));
+        let responsivity = f("quantum_efficiency") * E_C / (H_J_S * nu);
+        let saturated = 1.0 + lo_w / f("front_end.saturation_w");
+        let shot = 2.0 * E_C * responsivity * lo_w / saturated;
+        let amplifier = f("front_end.amplifier_noise_a_rthz").powi(2)
+            + 4.0 * K_J_K * f("front_end.load_temperature_k") / f("front_end.load_ohm");
+        let dark = 2.0 * E_C * f("front_end.dark_current_a");
+        let relative = 10_f64.powf(0.1 * (f("front_end.intensity_noise_db_hz") - f("front_end.rejection_db")));
+        let intensity = (responsivity * lo_w).powi(2) * saturated.powi(-4) * relative;
+        let poles = f("front_end.poles");
+        // Butterworth.
+        let g = 1.0 / (1.0 + (f("intermediate_frequency_hz") / f("front_end.half_power_hz")).powf(2.0 * poles));
+        let sum = shot + amplifier + dark + intensity;
+        let filtered = g * (shot + dark + intensity) + amplifier;
+        let converter = match s.s("detector.digitiser.kind").as_str() {
+            "quantised" => {
+                let (bits, k) = (s.f("detector.digitiser.bits"), s.f("detector.digitiser.full_scale_over_noise"));
+                k * k / (3.0 * 4_f64.powf(bits)) * 2.0 * f("bandwidth_hz") / f("sampling_hz")
+            }
+            _ => 0.0,
+        };
+        Self {
+            saturation: saturated.powi(-3),
+            amplifier: shot / (shot + amplifier),
+            dark: (shot + amplifier) / (shot + amplifier + dark),
+            intensity: (shot + amplifier + dark) / sum,
+            poles: g * sum / filtered,
+            converter: 1.0 / (1.0 + converter),
+            noise_a2: filtered * f("bandwidth_hz"),
+        }
+    }
+
+    pub(crate) fn gain(&self) -> f64 {
+        self.saturation * self.amplifier * self.dark * self.intensity * self.poles * self.converter
+    }
+}
+
+/// Losses of the telescope besides efficiency.
+fn losses(s: &Scene) -> f64 {
+    10_f64.powf(-0.1 * (s.f("telescope.optics_loss_db") + s.f("telescope.polarisation_loss_db")))
+}
+
+/// (O10) with the receiver's noises, given the efficiency.
+pub(crate) fn snr(s: &Scene, range_m: f64, efficiency: f64) -> f64 {
+    if s.s("detector.snr.reference") == "fixed" {
+        return 10_f64.powf(0.1 * s.f("detector.snr.snr_db"));
+    }
+    if range_m < s.f("telescope.blind_range_m") {
+        return 0.0;
+    }
+    let h = if s.s("detector.snr.reference") == "chapter" { H_J_S / (2.0 * PI) } else { H_J_S };
+    let nu = C_M_S / s.f("laser.wavelength_m");
+    let photons = s.f("detector.quantum_efficiency") * s.f("pulse.energy_j") / (h * nu * s.f("detector.bandwidth_hz"));
+    let (beta, k2) = air(s, range_m);
+    let beam = Beam::new(s);
+    photons * 0.5 * C_M_S * k2 * beta * beam.area_m2() / range_m.powi(2)
+        * efficiency
+        * losses(s)
+        * Receiver::new(s).gain()
+}
+
+/// (O10) in free space, dB; missing where nothing returns.
+pub(crate) fn free_space_snr_db(s: &Scene, range_m: f64) -> f64 {
+    let efficiency = if s.s("detector.snr.reference") == "fixed" { 1.0 } else { free_space_efficiency(s, range_m) };
+    let ratio = snr(s, range_m, efficiency);
+    if ratio > 0.0 { db(ratio) } else { f64::NAN }
+}
+
+pub(crate) fn db(ratio: f64) -> f64 {
+    10.0 * ratio.log10()
+}
+
+/// Relative error that the own quadrature may have: with an obscuration its panels end at kinks.
+fn quadrature_error(s: &Scene) -> f64 {
+    if s.f("telescope.obscuration_radius_m") > 0.0 { 1e-4 } else { 1e-6 }
+}
+
+/// profile.csv in free space, at a few of its ranges.
+pub(crate) fn hold_profile(ledger: &mut Ledger, s: &Scene, profile: &Csv) {
+    let ranges = profile.f("range_m");
+    let (first, last) = (s.f("outputs.profile_range_min_m"), s.f("outputs.profile_range_max_m"));
+    let points = s.n("outputs.profile_points");
+    ledger.equal("profile.csv: rows", ranges.len() as f64, points as f64, 0.0);
+    let (efficiency, snr_db) = (profile.f("efficiency"), profile.f("snr_db"));
+    let (deviation, error) = (profile.f("efficiency_standard_deviation"), profile.f("efficiency_standard_error"));
+    for i in (0..points).step_by(1 + points / 5) {
+        let r = first + (last - first) * i as f64 / (points - 1) as f64;
+        ledger.equal("profile.csv: range_m", ranges[i], r, 1e-9 * r);
+        let right = free_space_efficiency(s, r);
+        ledger.equal("profile.csv: efficiency", efficiency[i], right, quadrature_error(s) * right);
+        ledger.equal("profile.csv: snr_db", snr_db[i], free_space_snr_db(s, r), 5.0 * quadrature_error(s));
+        ledger.equal("profile.csv: efficiency_standard_deviation, of theory", deviation[i], 0.0, 0.0);
+        ledger.equal("profile.csv: efficiency_standard_error, of theory", error[i], 0.0, 0.0);
+    }
+}
+
+/// Every row of a budget in free space, and its limits.
+pub(crate) fn hold_budget(ledger: &mut Ledger, s: &Scene, json: &Value) {
+    let ranges: Vec<f64> = json["range_m"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+    let receiver = Receiver::new(s);
+    let beam = Beam::new(s);
+    let nu = C_M_S / s.f("laser.wavelength_m");
+    let is_fixed = s.s("detector.snr.reference") == "fixed";
+    for row in json["rows"].as_array().into_iter().flatten() {
+        let name = row["row"].as_str().unwrap_or_default().to_owned();
+        ledger.saw("budget", &name);
+        for (i, &r) in ranges.iter().enumerate() {
+            let found = row["db"][i].as_f64().unwrap_or(f64::NAN);
+            let efficiency = || free_space_efficiency(s, r);
+            let fixed_db = s.f("detector.snr.snr_db");
+            let right = match name.as_str() {
+                "stated by the scene" => fixed_db,
+                "photons sent" => db(s.f("pulse.energy_j") / (H_J_S * nu)),
+                "per bandwidth" => -db(s.f("detector.bandwidth_hz")),
+                "range per time" => db(0.5 * C_M_S),
+                "backscatter" => db(air(s, r).0),
+                "solid angle" => db(beam.area_m2() / r.powi(2)),
+                "air, out and back" => db(air(s, r).1),
+                "truncation, two beams" => 2.0 * db(beam.transmission()),
+                "antenna efficiency" => db(efficiency() / beam.transmission().powi(2)),
+                "optics" => -s.f("telescope.optics_loss_db"),
+                "polarisation" => -s.f("telescope.polarisation_loss_db"),
+                "quantum efficiency" => db(s.f("detector.quantum_efficiency")),
+                "hbar for h" => db(2.0 * PI),
+                "= shot-noise limit" => db(snr(s, r, efficiency()) / receiver.gain()),
+                "saturation" => db(receiver.saturation),
+                "amplifier noise" => db(receiver.amplifier),
+                "dark current" => db(receiver.dark),
+                "intensity noise of the LO" => db(receiver.intensity),
+                "response of the detector" => db(receiver.poles),
+                "converter" => db(receiver.converter),
+                "= SNR in the band" if is_fixed => fixed_db,
+                "= SNR in the band" => db(snr(s, r, efficiency())),
+                "= in the width of the pulse" => match spectral_fwhm_hz(s) {
+                    Some(width_hz) => free_space_snr_db(s, r) + db(s.f("detector.bandwidth_hz") / width_hz),
+                    None => continue,
+                },
+                _ => continue,
+            };
+            ledger.equal(&format!("budget: {name}"), found, right, 5.0 * quadrature_error(s));
+        }
+    }
+    hold_limits(ledger, s, &json["limits"]);
+}
+
+/// Full width at half maximum of the spectrum of the pulse, Hz.
+pub(crate) fn spectral_fwhm_hz(s: &Scene) -> Option<f64> {
+    if let Some(pulse) = Pulse::gaussian(s) {
+        return Some(2.0 * (2.0 * LN_2).sqrt() * pulse.spectral_deviation_hz());
+    }
+    // A sampled pulse of straight lines, without phase: |F|^2 by quadrature, the first frequency where it is a half.
+    if s.s("pulse.shape.resampling") != "linear" || s.has("pulse.shape.phase_rad") || s.f("pulse.chirp_hz_s") != 0.0 {
+        return None;
+    }
+    let (t, p) = (s.list("pulse.shape.time_s"), s.list("pulse.shape.power"));
+    let middle = 0.5 * (t[0] + t[t.len() - 1]);
+    let part = |f: f64, phase: f64| {
+        let of = |x: f64| straight(&t, &p, x).max(0.0).sqrt() * (2.0 * PI * f * (x - middle) + phase).cos();
+        integral(t[0], t[t.len() - 1], 24 * t.len(), of)
+    };
+    let power = |f: f64| part(f, 0.0).powi(2) + part(f, 0.5 * PI).powi(2);
+    // The largest is not at zero where the phase turns; here it is.
+    let (half, step) = (0.5 * power(0.0), 1e-2 / (t[t.len() - 1] - t[0]));
+    let beyond = (1..10_000).map(|i| i as f64 * step).find(|&f| power(f) < half)?;
+    let (mut low, mut high) = (beyond - step, beyond);
+    for _ in 0..40 {
+        let mid = 0.5 * (low + high);
+        if power(mid) < half { high = mid } else { low = mid }
+    }
+    Some(low + high)
+}
+
+fn hold_limits(ledger: &mut Ledger, s: &Scene, limits: &Value) {
+    super::program::see(ledger, "budget limits", limits);
+    let (lambda, prf) = (s.f("laser.wavelength_m"), s.f("laser.pulse_repetition_hz"));
+    let (fc, fs) = (s.f("detector.intermediate_frequency_hz"), s.f("detector.sampling_hz"));
+    let is_baseband = s.s("detector.signal") == "baseband";
+    let mut hold = |key: &str, right: f64, tolerance: f64| {
+        ledger.equal(&format!("budget limits: {key}"), at(limits, key), right, tolerance * right.abs());
+    };
+    hold("ambiguous_range_m", C_M_S / (2.0 * prf), 1e-9);
+    hold("band_m_s", 0.25 * lambda * s.f("detector.bandwidth_hz"), 1e-9);
+    hold("mean_power_w", s.f("pulse.energy_j") * prf, 1e-9);
+    // (E2) at the ends of the unambiguous interval: 0 and half the sampling frequency, or half of it to each side.
+    let (from, to) = if is_baseband {
+        (-0.25 * lambda * fs, 0.25 * lambda * fs)
+    } else {
+        (0.5 * lambda * (fc - 0.5 * fs), 0.5 * lambda * fc)
+    };
+    hold("sampled_from_m_s", from, 1e-9);
+    hold("sampled_to_m_s", to, 1e-9);
+    if let Some(pulse) = Pulse::gaussian(s) {
+        hold("peak_power_w", s.f("pulse.energy_j") * pulse.power(0.0), 1e-9);
+        hold("pulse_resolution_m", 0.5 * C_M_S * pulse.fwhm_s(), 1e-6);
+        hold("gate_resolution_m", gate_fwhm_m(s, &pulse), 1e-5);
+    }
+}
+
+/// Full width at half maximum of |f|^2 summed over the samples of a window with h^2, m.
+pub(crate) fn gate_fwhm_m(s: &Scene, pulse: &Pulse) -> f64 {
+    let (h2, step_m) = (window_powers(s), 0.5 * C_M_S / s.f("detector.sampling_hz"));
+    let middle = 0.5 * (h2.len() as f64 - 1.0);
+    let weight = |r: f64| -> f64 {
+        h2.iter().enumerate().map(|(n, h2)| h2 * pulse.power_over_range(r - (n as f64 - middle) * step_m)).sum()
+    };
+    let (mut low, mut high) = (0.0, 10.0 * pulse.scale_m() + step_m * h2.len() as f64);
+    for _ in 0..60 {
+        let mid = 0.5 * (low + high);
+        if weight(mid) > 0.5 * weight(0.0) { low = mid } else { high = mid }
+    }
+    low + high
+}
+
+/// Standard deviation of the same weight, m.
+pub(crate) fn gate_deviation_m(s: &Scene, pulse: &Pulse) -> f64 {
+    let (h2, step_m) = (window_powers(s), 0.5 * C_M_S / s.f("detector.sampling_hz"));
+    let middle = 0.5 * (h2.len() as f64 - 1.0);
+    let total: f64 = h2.iter().sum();
+    let square: f64 = h2.iter().enumerate().map(|(n, h2)| h2 * ((n as f64 - middle) * step_m).powi(2)).sum();
+    (square / total + 0.5 * pulse.scale_m().powi(2)).sqrt()
+}
+
+/// The mean power of the signals of `signals.nc` over range, against (O9) and (S10).
+pub(crate) fn hold_signals(ledger: &mut Ledger, bench: &Bench, s: &Scene, scan: &Scan, file: &str) {
+    let Some(pulse) = Pulse::gaussian(s) else { return };
+    let mut nc = bench.netcdf(ledger, file);
+    let (current, quadrature) = (nc.f("current_a"), nc.f("quadrature_a"));
+    let is_baseband = s.s("detector.signal") == "baseband";
+    let receiver = Receiver::new(s);
+    // (S10) to half the sampling frequency, or to both sides of zero.
+    let (fs, b) = (s.f("detector.sampling_hz"), s.f("detector.bandwidth_hz"));
+    let wider = match (s.s("detector.noise").as_str(), is_baseband) {
+        ("none", _) => 0.0,
+        ("band", _) => 1.0,
+        (_, true) => fs / b,
+        _ => 0.5 * fs / b,
+    };
+    let noise_a2 = receiver.noise_a2 * wider;
+    ledger.equal("signals.nc: noise_power", nc.f("noise_power")[0], noise_a2, 1e-6 * noise_a2.max(1e-40));
+    let samples = scan.sample_m.len();
+    let pulses = current.len() / samples;
+    ledger.equal("signals.nc: current_a, rows", pulses as f64, (scan.elevation_rad.len() * scan.pulses) as f64, 0.0);
+    let power = |p: usize, k: usize| {
+        let at = p * samples + k;
+        current[at].powi(2) + quadrature.get(at).map_or(0.0, |q| q * q)
+    };
+    // (O9) from a table of (O10): a smooth curve.
+    let reach_m = 4.5 * pulse.scale_m();
+    let (near_m, far_m) = (scan.sample_m[0] - reach_m, scan.sample_m[samples - 1] + reach_m);
+    let count = 4 + ((far_m - near_m) / 6.0) as usize;
+    let table_m: Vec<f64> = (0..count).map(|i| near_m + (far_m - near_m) * i as f64 / (count - 1) as f64).collect();
+    let table: Vec<f64> = table_m.iter().map(|&r| 10_f64.powf(0.1 * free_space_snr_db(s, r))).collect();
+    let over_pulse = |r: f64| {
+        integral(r - reach_m, r + reach_m, 12, |x| straight(&table_m, &table, x) * pulse.power_over_range(r - x))
+    };
+    const BINS: usize = 6;
+    for bin in 0..BINS {
+        let ks: Vec<usize> = (bin * samples / BINS..(bin + 1) * samples / BINS).collect();
+        let of_pulse: Vec<f64> =
+            (0..pulses).map(|p| ks.iter().map(|&k| power(p, k)).sum::<f64>() / ks.len() as f64).collect();
+        let (mean, error) = average_and_error(&of_pulse);
+        let expected = ks.iter().step_by(4).map(|&k| over_pulse(scan.sample_m[k])).sum::<f64>()
+            / ks.iter().step_by(4).count() as f64;
+        let right = receiver.noise_a2 * expected + noise_a2;
+        ledger.mean(
+            "signals.nc: current_a, mean power (O9)",
+            mean / receiver.noise_a2,
+            right / receiver.noise_a2,
+            error / receiver.noise_a2,
+        );
+    }
+}

@@ -1,0 +1,142 @@
+//! The table of all numbers: where each is defined, what its worst deviation is, and which have no definition of their own.
+
+use super::ledger::{Ledger, Tally};
+
+/// Numbers that are known to be wrong, with the reason; one that comes right must be taken out.
+const AWAITED: [(&str, &str); 28] = [
+    ("retrieve halo.hpl: as of map.nc", "only a scene found in the file tells the fit which estimator made the map"),
+    ("detection.csv: chi2_per_dof_wind", "a mean over realisations is taken for one scan"),
+    ("results.csv: circulation_failed_fraction, of no fit", "1 where no fit is tried"),
+    ("results.nc: scene_hash", "missing"),
+    ("ends of a range that is called allowed", "they are refused"),
+    ("wake: a plane at the age that was asked for", "refused for its last digit"),
+    ("bound: bound_region_m_s", "windows shorter than the pulse: errors of neighbours are not alike as powers are"),
+    ("bound: n_eff", "noise of the density of white noise; one ratio for all gates and rows"),
+    ("map.csv: n_eff", "the same"),
+    ("bound: snr_db", "efficiency of the signals between few ranges"),
+    ("budget text: flow reaches", "the peak of one vortex in place of the largest velocity of the lines"),
+    ("map.csv: snr_db", "the window spreads noise and signal out of the band"),
+    ("map.csv: standard_error_m_s*", "too small with few realisations"),
+    ("map.csv: width_m_s*", "models have none; the width taken off is that of another window"),
+    ("map.nc: nyquist_velocity", "twice the truth for real currents"),
+    ("map.nc: pulse_width", "what the scene states in place of the full width at half maximum"),
+    ("results.csv: *standard_error*", "cells with outliers count least"),
+    ("run results: scan_efficiency", "straight lines between the points of the profile"),
+    ("run results: std_mean_m_s", "a mean of deviations in place of a quadratic one"),
+    ("scan: wake_moves_m", "winds of added_flows do not count"),
+    ("wake.nc: gamma says its radii", "named 5_15 whatever the radii"),
+    ("wake: --seed", "ignored"),
+    ("wake: seed of the files", "0 whatever the noise has"),
+    ("wake: an earlier end", "case.toml states an end before its last rows"),
+    ("flow: Courant numbers of Runge-Kutta", "the linear limit is lower"),
+    ("flow: what the step feeds is told", "with a model no note is given"),
+    ("flow: energy that nothing gave is told", "the same"),
+    ("flow: d*", "creeping flows: damped first steps do harm, long steps ring"),
+];
+
+/// Numbers that the program writes without a definition here, with the reason; `*` at the end stands for any rest.
+const WITHOUT: [(&str, &str); 24] = [
+    ("retrieval.csv: *", "of a fit to random velocities: held over many scans by cargo xtask fit-trials"),
+    ("detection.csv: *", "random, by a law that is drawn: held over 2000 scans by a test of the detector"),
+    ("results.nc: *", "held in results.csv"),
+    ("run results: clipped_fraction", "a count over the samples: held by the closed forms of the converter"),
+    ("run results: signal_rms_a", "random: the power over range is held in signals.nc"),
+    ("results.csv: circulation*", "fits of random maps: held over many scans by cargo xtask fit-trials"),
+    ("wake.csv: *", "of the simulated flow: held by its references"),
+    ("wake.nc: *", "of the simulated flow: held by its references"),
+    ("budget limits: amplifier_equals_shot_w", "where (R2) meets (R1): held by the stored budget"),
+    (
+        "budget limits: best_local_oscillator_w",
+        "where the sum of (R1) to (R4) is best, by search: held by the stored curve of saturation",
+    ),
+    ("budget limits: intensity_equals_shot_w", "where (R4) meets (R1): held by the stored budget"),
+    ("budget limits: reflex_range_m", "where (R7) falls below -20 dB: held by the stored curve of the reflex"),
+    ("map.csv: v_mean_m_s", "random: its bias and scatter are held, and the estimators by stored windows"),
+    ("map.nc: antenna_transition", "no number: always 0"),
+    ("map.nc: follow_mode", "a word of the format"),
+    ("map.nc: instrument_type", "a word of the format"),
+    ("map.nc: platform_type", "a word of the format"),
+    ("map.nc: primary_axis", "a word of the format"),
+    ("map.nc: prt_mode", "a word of the format"),
+    ("map.nc: sweep_mode", "a word of the format"),
+    ("map.nc: time_*", "dates in words, held by the readers of others"),
+    ("map.nc: volume_number", "always 0"),
+    ("results.csv: bad*", "a count over a threshold that the estimates themselves set"),
+    ("results.csv: scene_hash", "a hash"),
+];
+
+/// Fewer draws than these say nothing about an awaited number that comes out right.
+const ENOUGH_DRAWS: usize = 100;
+
+/// What an audit found.
+#[derive(Debug)]
+pub struct Report {
+    /// The table, a line for each number, and the faults in full.
+    pub text: String,
+    /// Names of the numbers that are wrong.
+    pub faults: Vec<String>,
+}
+
+fn covers(pattern: &str, name: &str) -> bool {
+    pattern.strip_suffix('*').map_or(pattern == name, |start| name.starts_with(start))
+}
+
+fn awaited(number: &str) -> Option<&'static str> {
+    AWAITED.iter().find(|(pattern, _)| covers(pattern, number)).map(|(_, reason)| *reason)
+}
+
+impl Report {
+    pub(crate) fn new(ledger: &Ledger, draws: usize) -> Self {
+        let (mut text, mut faults, mut details) = (String::new(), Vec::new(), String::new());
+        text += &format!("{:<62} {:<18} {:>6}  {:<34} verdict\n", "number", "defined in", "draws", "worst");
+        for (number, tally) in &ledger.tallies {
+            let is_wrong = tally.excess() > 1.0;
+            let verdict = match (is_wrong, awaited(number)) {
+                (true, Some(_)) => "awaited",
+                (true, None) => "FAULT",
+                (false, _) => "right",
+            };
+            if verdict == "FAULT" {
+                faults.push(number.clone());
+            }
+            if is_wrong {
+                details += &format!("{verdict}: {number}\n    {}\n", tally.at);
+            }
+            text += &line(number, tally, verdict);
+        }
+        for name in &ledger.seen {
+            let is_held = ledger
+                .tallies
+                .keys()
+                .any(|n| n == name || n.strip_prefix(name.as_str()).is_some_and(|rest| rest.starts_with(", ")));
+            match WITHOUT.iter().find(|(pattern, _)| covers(pattern, name)) {
+                _ if is_held => {}
+                None if draws < ENOUGH_DRAWS => {}
+                Some((_, reason)) => text += &format!("{name:<62} none: {reason}\n"),
+                None => {
+                    text += &format!("{name:<62} FAULT: it has no definition, and no reason why\n");
+                    faults.push(name.clone());
+                }
+            }
+        }
+        let is_wrong =
+            |pattern: &str| ledger.tallies.iter().any(|(n, tally)| covers(pattern, n) && tally.excess() > 1.0);
+        for (pattern, reason) in AWAITED.iter().filter(|(pattern, _)| draws >= ENOUGH_DRAWS && !is_wrong(pattern)) {
+            details += &format!("FAULT: {pattern} came right: take it out of AWAITED ({reason})\n");
+            faults.push((*pattern).into());
+        }
+        let refused = ledger.refused.len();
+        text += &format!(
+            "{details}{draws} draws, {refused} refused; {} numbers held, {} faults\n",
+            ledger.tallies.len(),
+            faults.len()
+        );
+        Self { text, faults }
+    }
+}
+
+fn line(number: &str, tally: &Tally, verdict: &str) -> String {
+    let file = tally.place.file().rsplit('/').next().unwrap_or_default();
+    let place = format!("{file}:{}", tally.place.line());
+    format!("{number:<62} {place:<18} {:>6}  {:<34} {verdict}\n", tally.draws, tally.shown())
+}
