@@ -19,16 +19,11 @@ pub(crate) struct Tally {
     is_random: bool,
     /// Sum over the draws of the mean deviation in standard errors.
     drift: f64,
-    /// Trials that ended so, how many were expected, and the variance of that number.
-    share: Option<[f64; 3]>,
 }
 
 impl Tally {
     /// Deviation over what is allowed; above 1 is a fault.
     pub(crate) fn excess(&self) -> f64 {
-        if let Some([count, expected, variance]) = self.share {
-            return (count - expected).abs() / (SHARE_LIMIT * variance.sqrt()).max(0.5);
-        }
         if !self.is_random {
             return self.worst;
         }
@@ -39,12 +34,9 @@ impl Tally {
 
     /// The worst deviation in words.
     pub(crate) fn shown(&self) -> String {
-        match self.share {
-            Some([count, expected, variance]) => {
-                format!("{count} for {expected:.1} +- {:.1}", variance.sqrt())
-            }
-            None if self.is_random => format!("{:.2} standard errors", self.worst),
-            None => format!("{:.3} of the tolerance", self.worst),
+        match self.is_random {
+            true => format!("{:.2} standard errors", self.worst),
+            false => format!("{:.3} of the tolerance", self.worst),
         }
     }
 
@@ -55,15 +47,8 @@ impl Tally {
         if other.worst > self.worst || other.worst.is_nan() {
             (self.worst, self.at, self.place) = (other.worst, other.at, other.place);
         }
-        self.share = match (self.share, other.share) {
-            (Some(a), Some(b)) => Some([a[0] + b[0], a[1] + b[1], a[2] + b[2]]),
-            (a, b) => a.or(b),
-        };
     }
 }
-
-/// Standard deviations of a binomial count that are allowed.
-const SHARE_LIMIT: f64 = 4.0;
 
 /// The comparisons of one draw, or of all.
 #[derive(Debug, Default)]
@@ -106,17 +91,6 @@ impl Ledger {
         self.enter(number, z.abs(), true, &format!("{found:.6} for {right:.6} +- {standard_error:.6}"));
     }
 
-    /// How many of `trials` ended in a certain way, against the probability of it.
-    #[track_caller]
-    pub(crate) fn share(&mut self, number: &str, count: usize, trials: usize, probability: f64) {
-        let (n, p) = (trials as f64, probability);
-        self.enter(number, 0.0, false, &format!("{count} of {trials} for {p}"));
-        let share = self.tallies.get_mut(number).map(|tally| tally.share.get_or_insert([0.0; 3]));
-        if let Some(share) = share {
-            *share = [share[0] + count as f64, share[1] + n * p, share[2] + n * p * (1.0 - p)];
-        }
-    }
-
     /// Something that holds or does not.
     #[track_caller]
     pub(crate) fn holds(&mut self, number: &str, is_so: bool, what: &str) {
@@ -131,7 +105,7 @@ impl Ledger {
     #[track_caller]
     fn enter(&mut self, number: &str, apart: f64, is_random: bool, at: &str) {
         let (place, at) = (Location::caller(), format!("draw {}: {at}", self.draw));
-        let one = Tally { place, draws: 1, comparisons: 1, worst: apart, at, is_random, drift: 0.0, share: None };
+        let one = Tally { place, draws: 1, comparisons: 1, worst: apart, at, is_random, drift: 0.0 };
         match self.tallies.get_mut(number) {
             Some(tally) => {
                 tally.add(one);
