@@ -12,7 +12,8 @@ use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::plot::{Axis, CurvePlot, Series, Style};
 use wakescope_sim::retrieve::{Method, RetrievalRow};
 use wakescope_sim::scene::{
-    Flow, Outside, Retrieval, Scene, SceneFile, SimulatedFlow, SimulatedMotion, SnrReference, VortexPair,
+    FirstMoment, Flow, Method as Estimator, Outside, Retrieval, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
+    SnrReference, VortexPair, Weighting,
 };
 
 /// Ages of the simulated wake; the pair has none. The one in the middle, where the best bias is about the bar, takes more scans than
@@ -25,12 +26,19 @@ const METHODS: [(Method, &str); 5] = [
     (Method::Integral, "integral"),
     (Method::Signals, "signals"),
 ];
+/// The operational method on what it is made for: radial velocities that are means over the gate, which peaks of spectra are not.
+const OF_MEANS: &str = "rv of first moments";
+
+/// All rows by name, in their order.
+fn names() -> impl Iterator<Item = &'static str> {
+    METHODS.iter().map(|(_, name)| *name).chain([OF_MEANS])
+}
 const SNR_DB: f64 = 10.0;
 
 /// All methods on one flow.
 pub(super) struct OfFlow {
     tau: Option<f64>,
-    rows: Vec<RetrievalRow>,
+    rows: Vec<(&'static str, RetrievalRow)>,
 }
 
 impl OfFlow {
@@ -39,8 +47,9 @@ impl OfFlow {
     }
 
     /// Errors of the circulation over 5 to 15 m in per cent of the truth, and retrievals in which a vortex is missing.
-    fn errors(&self, method: Method) -> (Vec<f64>, usize) {
-        let rows: Vec<&RetrievalRow> = self.rows.iter().filter(|row| row.method == method).collect();
+    fn errors(&self, method: &str) -> (Vec<f64>, usize) {
+        let rows: Vec<&RetrievalRow> =
+            self.rows.iter().filter(|(name, _)| *name == method).map(|(_, row)| row).collect();
         let error = |row: &&RetrievalRow| {
             let found = row.found?.circulation_5_15_m2_s.value;
             (found.is_finite()).then(|| 100.0 * (found / row.truth.circulation_5_15_m2_s - 1.0))
@@ -77,28 +86,36 @@ fn of_flow(context: &Context, tau: Option<f64>, wake: &Path) -> Result<OfFlow, F
     (scene.outputs.flow, scene.outputs.signals) = (false, false);
     // Signals take longest: the fits of all samples of the pair are in the other part of the figure.
     let some = METHODS[..context.choose(4, 5, 5)].iter().map(|(method, _)| *method).collect();
-    scene.retrieval = Some(Retrieval { methods: some, ..Retrieval::default() });
+    let name = |method: Method| METHODS.iter().find(|(of, _)| *of == method).map_or("", |(_, name)| *name);
+    let mut rows: Vec<_> = retrieved(&scene, some, wake)?.into_iter().map(|row| (name(row.method), row)).collect();
+    scene.estimator.method = Estimator::FirstMoment(FirstMoment::default());
+    scene.estimator.weighting = Weighting::Rectangular;
+    rows.extend(retrieved(&scene, vec![Method::Rv], wake)?.into_iter().map(|row| (OF_MEANS, row)));
+    Ok(OfFlow { tau, rows })
+}
+
+/// What some methods find in the scans of a scene beside a wake.
+fn retrieved(scene: &Scene, methods: Vec<Method>, wake: &Path) -> Result<Vec<RetrievalRow>, Failure> {
+    let scene = Scene { retrieval: Some(Retrieval { methods, ..Retrieval::default() }), ..scene.clone() };
     let file = SceneFile::parse(&scene.to_toml(), &wake.join("scene.toml"))?;
     let result = wakescope_sim::run(&Plan::new(file, Target::Run)?, &Silent)?;
-    let found = result.retrieval.ok_or_else(|| Failure::new("a run without retrievals".into()))?;
-    Ok(OfFlow { tau, rows: found.rows })
+    Ok(result.retrieval.ok_or_else(|| Failure::new("a run without retrievals".into()))?.rows)
 }
 
 /// Rows as those of the first part; positions have no stated deviation there where the method states none.
 pub(super) fn table(flows: &[OfFlow]) -> Table {
-    let rows: Vec<(&OfFlow, &RetrievalRow)> =
-        flows.iter().flat_map(|flow| flow.rows.iter().map(move |row| (flow, row))).collect();
+    let rows: Vec<((&OfFlow, &str), &RetrievalRow)> =
+        flows.iter().flat_map(|flow| flow.rows.iter().map(move |(name, row)| ((flow, *name), row))).collect();
     let float = |get: &dyn Fn(&RetrievalRow) -> Option<f64>| -> Vec<f64> {
         rows.iter().map(|(_, row)| get(row).unwrap_or(f64::NAN)).collect()
     };
     let found = |get: fn(&wakescope_estimate::retrieval::VortexResult) -> f64| {
         float(&move |row: &RetrievalRow| row.found.as_ref().map(get))
     };
-    let name = |method: Method| METHODS.iter().find(|(of, _)| *of == method).map_or("", |(_, name)| *name);
     Table::new()
-        .text("flow", rows.iter().map(|(flow, _)| flow.name()))
+        .text("flow", rows.iter().map(|((flow, _), _)| flow.name()))
         .int("scan", rows.iter().map(|(_, row)| row.realisation as i64))
-        .text("method", rows.iter().map(|(_, row)| name(row.method)))
+        .text("method", rows.iter().map(|((_, name), _)| *name))
         .float("gamma_true_m2_s", float(&|row| Some(row.truth.circulation_5_15_m2_s)))
         .float("gamma_m2_s", found(|v| v.circulation_5_15_m2_s.value))
         .float("gamma_std_m2_s", found(|v| v.circulation_5_15_m2_s.std))
@@ -122,10 +139,10 @@ pub(super) fn table(flows: &[OfFlow]) -> Table {
 
 /// Errors of the circulations over 5 to 15 m by age, the pair at 0.
 pub(super) fn picture(flows: &[OfFlow]) -> CurvePlot {
-    let title = "all methods: bias and scatter of Gamma_{5-15} (age 0: analytic pair)";
-    let mut plot = CurvePlot::new(title, Axis::linear("tau"), Axis::linear("error [%]"));
-    for (k, (method, name)) in METHODS.into_iter().enumerate() {
-        let known = flows.iter().filter_map(|flow| Some((flow.tau.unwrap_or(0.0), moments(&flow.errors(method).0)?)));
+    let title = "all methods: bias and scatter of Γ_{5-15} (age 0: analytic pair)";
+    let mut plot = CurvePlot::new(title, Axis::linear("τ"), Axis::linear("error [%]"));
+    for (k, name) in names().enumerate() {
+        let known = flows.iter().filter_map(|flow| Some((flow.tau.unwrap_or(0.0), moments(&flow.errors(name).0)?)));
         let points: Vec<(f64, (f64, f64))> = known.collect();
         let stds: Vec<f64> = points.iter().map(|(_, (_, std))| *std).collect();
         if points.is_empty() {
@@ -152,12 +169,12 @@ pub(super) fn claims(flows: &[OfFlow]) -> Vec<Claim> {
 
 /// The least bias of a method that finds every vortex.
 fn claim(id: &str, flow: &OfFlow) -> Claim {
-    let of_method = |(method, name): (Method, &'static str)| {
-        let (errors, failures) = flow.errors(method);
+    let of_method = |name: &'static str| {
+        let (errors, failures) = flow.errors(name);
         let (mean, std) = moments(&errors)?;
         (errors.len() > 1).then(|| (name, mean, std / (errors.len() as f64).sqrt(), std, failures))
     };
-    let told: Vec<_> = METHODS.into_iter().filter_map(of_method).collect();
+    let told: Vec<_> = names().filter_map(of_method).collect();
     let best = told.iter().filter(|m| m.4 == 0).min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
     let (bias, error) = best.map_or((f64::NAN, f64::NAN), |m| (m.1.abs(), m.2));
     let words = told.iter().map(|(name, mean, error, std, failures)| {
