@@ -9,7 +9,7 @@ use wakescope_sim::Silent;
 use wakescope_sim::io::Table;
 use wakescope_sim::io::scans::ReadScan;
 use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::retrieve::{Method, OwnScene, RetrievedScan, figure, gate_of, retrieve_map};
+use wakescope_sim::retrieve::{Method, OwnScene, RetrievedScan, Velocities, figure, gate_of, retrieve_map};
 use wakescope_sim::scene::{Scene, SnrReference};
 
 const TRUE_M2_S: f64 = 500.0;
@@ -36,8 +36,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         core_prior: Some(CorePrior::TYPICAL),
         ..RetrievalOptions::default()
     };
-    let own = OwnScene::new(&plan, &Silent)?;
-    let found = retrieve_map(scan, Method::Fit, options, own.as_ref())?;
+    let own = OwnScene::new(&plan.scene, &Silent)?;
+    let found = retrieve_map(scan, Method::Fit, options, own.as_ref().map_or(Velocities::Unknown, Velocities::Shown))?;
     let origin = wakescope_sim::measure::write::provenance(&plan);
     let mut out = Rendered::new(&table(&found)?, &figure(&found, 1)?, &origin)?;
     out.marks = vec!["analytic pair".into()];

@@ -41,11 +41,9 @@ impl<'a> Expected<'a> {
             Gate::Kernel(kernel) => kernel.coarser(COARSER),
             Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, step_m.unwrap_or(1.0), &[1.0])?,
         };
-        let times = map.time_s.iter();
-        let (first_s, last_s) = times.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
-        let reference_time_s = if map.has_times() { 0.5 * (first_s + last_s) } else { f64::NAN };
+        let ((first_s, last_s), reference_time_s) = (map.ends_s(), map.middle_s());
         let moves = options.movement != Movement::Frozen && map.has_times() && last_s > first_s;
-        let seconds = moves.then(|| map.time_s.iter().map(|time| time - reference_time_s).collect());
+        let seconds = moves.then(|| map.after_middle_s());
         let uniform = step_m.is_some();
         Ok(Self { model: &options.model, kernel, map, seconds, reference_time_s, uniform })
     }
@@ -72,12 +70,6 @@ impl<'a> Expected<'a> {
 
     pub(crate) fn moves(&self) -> bool {
         self.seconds.is_some()
-    }
-
-    /// How long the scan lasts, if the vortices move \[s\].
-    pub(crate) fn lasts_s(&self) -> f64 {
-        let times = self.seconds.iter().flatten();
-        2.0 * times.fold(0.0, |most: f64, seconds| most.max(seconds.abs()))
     }
 
     /// How the vortices of a wake move, if they do.

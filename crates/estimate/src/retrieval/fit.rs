@@ -14,10 +14,6 @@ use crate::retrieval::{Movement, RetrievalOptions, ScanMap, ScanResult, Turbulen
 use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::{Loss, Wake};
 
-/// Vortices are taken to stand still in scans that are shorter \[s\] and to move in others, if the other is not better by that much in
-/// chi-square: whatever is true of them, chance alone brings it once in 700 scans at most, where both models are about as far apart.
-const SHORT_S: f64 = 2.0;
-const MOVES: f64 = 9.0;
 /// Most velocities that are whitened.
 const WHITENED: usize = 3000;
 
@@ -68,7 +64,8 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
         problem.expected = &frozen;
         let fits = Fits { problem: &problem, options };
         let still = fits.fine(std::slice::from_ref(likely));
-        let margin = MOVES * scale.powi(2) * if fine.lasts_s() < SHORT_S { -1.0 } else { 1.0 };
+        let sense = if map.lasts_s() < RetrievalOptions::SHORT_S { -1.0 } else { 1.0 };
+        let margin = RetrievalOptions::MOVES * scale.powi(2) * sense;
         if still.first().is_some_and(|still| still.chi2 + margin < likely.chi2) {
             ends = fits.fine(&ends);
         } else {

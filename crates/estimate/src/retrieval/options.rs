@@ -79,6 +79,12 @@ impl RetrievalOptions {
     /// [`RetrievalOptions::threshold`] unless set: one empty scan in a thousand in white noise, on grids of some thousand velocities. The
     /// largest statistic of 300 such scans was 18. In turbulence that is not whitened it says nothing.
     pub const DEFAULT_THRESHOLD: f64 = 22.0;
+    /// Vortices are taken to stand still in scans that are shorter \[s\] and to move in others, if the other is not better by
+    /// [`MOVES`](Self::MOVES) in chi-square: whatever is true of them, chance alone brings it once in 700 scans at most, where both models
+    /// are about as far apart.
+    pub const SHORT_S: f64 = 2.0;
+    /// See [`SHORT_S`](Self::SHORT_S).
+    pub const MOVES: f64 = 9.0;
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
         if let Gate::Gaussian { std_m } = self.gate {

@@ -7,12 +7,11 @@ use ndarray::{Array2, Axis};
 use crate::error::Error;
 use crate::retrieval::correlated_residuals::filling;
 use crate::retrieval::hypotheses::{End, Kind, best, least, tops};
-use crate::retrieval::motion::Motion;
 use crate::retrieval::problem::{Problem, products};
 use crate::retrieval::{Covariance, Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
 use crate::vortex_fit::damped_newton::inverse;
 use crate::vortex_fit::wake::free_parameters::spread;
-use crate::vortex_fit::{Loss, PARAMETERS, Parameter, Wake};
+use crate::vortex_fit::{Loss, Parameter, Wake};
 
 /// Velocities with larger residuals, in their deviations, are outliers.
 pub(crate) const OUTLIER: f64 = 4.0;
@@ -61,7 +60,7 @@ impl Report<'_> {
                 continue;
             }
             let uncertainty = self.uncertainty(end)?;
-            let circulations = self.sides(end).into_iter().map(|side| places(side)[0]);
+            let circulations = self.sides(end).into_iter().map(|side| side.parameters()[0] as usize);
             let threshold = self.options.threshold;
             let certain = circulations.map(|place| uncertainty.certain(&end.wake, place, threshold));
             if certain.collect::<Result<Vec<bool>, _>>()?.into_iter().all(|certain| certain) {
@@ -120,9 +119,11 @@ impl Report<'_> {
         let used = residuals.iter().filter(|r| r.abs() <= OUTLIER * self.scale);
         let (count, squares) = used.fold((0, 0.0), |(count, sum), r| (count + 1, sum + r * r));
         let cells_rejected = self.rejected + residuals.len() - count;
-        let motion = self.problem.expected.motion(&end.wake);
-        let mut vortices: Vec<VortexResult> =
-            self.sides(end).into_iter().map(|side| self.vortex(end, side, &covariance, motion.as_ref())).collect();
+        let moves = self.problem.expected.moves();
+        let vortex = |side: Side| {
+            VortexResult::at_its_line(self.map, &self.options.model, (&end.wake, &covariance), side, moves)
+        };
+        let mut vortices: Vec<VortexResult> = self.sides(end).into_iter().map(vortex).collect();
         // what is beyond the sector is hardly known, though it acts
         if vortices.iter().any(|vortex| self.margin_m(vortex) >= 0.0) {
             vortices.retain(|vortex| self.margin_m(vortex) >= 0.0);
@@ -139,7 +140,7 @@ impl Report<'_> {
             .zip(tops.first())
             .is_some_and(|(second, first)| second.chi2 - first.chi2 < COMPETES * self.scale.powi(2));
         let instant = self.map.has_times() && self.map.time_s.windows(2).all(|pair| pair[0] == pair[1]);
-        let unmoved = !self.problem.expected.moves() && !instant;
+        let unmoved = !moves && !instant;
         let flags = [
             (Flag::NoWake, vortices.is_empty()),
             (Flag::OneVortex, vortices.len() == 1),
@@ -175,55 +176,12 @@ impl Report<'_> {
 
     /// How far the sector reaches beyond a centre \[m\]; negative outside.
     fn margin_m(&self, vortex: &VortexResult) -> f64 {
-        let (range_m, elevation_rad) = self.polar(vortex.lateral_position_m.value, vortex.height_m.value);
+        let place_m = (vortex.lateral_position_m.value, vortex.height_m.value);
+        let (range_m, elevation_rad) = self.options.model.range_and_elevation(place_m);
         let within = |axis: &[f64], value: f64| {
             axis.first().zip(axis.last()).map_or(f64::NAN, |(first, last)| (value - first).min(last - value))
         };
         within(&self.map.range_m, range_m).min(range_m * within(&self.map.elevation_rad, elevation_rad))
-    }
-
-    fn polar(&self, lateral_m: f64, height_m: f64) -> (f64, f64) {
-        let model = &self.options.model;
-        let (dy, dz) = (lateral_m - model.lidar_lateral_position_m, height_m - model.lidar_height_m);
-        (dy.hypot(dz), dz.atan2(dy))
-    }
-
-    /// A vortex when the line through its core is measured.
-    fn vortex(&self, end: &End, side: Side, covariance: &Array2<f64>, motion: Option<&Motion>) -> VortexResult {
-        let [circulation, lateral, height, core] = places(side);
-        let reference_s = self.problem.expected.reference_time_s;
-        let after = |seconds: f64| motion.map_or(end.wake, |motion| motion.wake_after(&end.wake, seconds)).to_array();
-        let mut seconds = 0.0;
-        // the line is that of the place then
-        for _ in 0..4 {
-            let p = after(seconds);
-            let (_, elevation_rad) = self.polar(p[lateral], p[height]);
-            let away = |line: &usize| (self.map.elevation_rad[*line] - elevation_rad).abs();
-            let nearest = (0..self.map.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
-            seconds = nearest.map_or(f64::NAN, |line| self.map.time_s[line] - reference_s);
-        }
-        let then = after(seconds);
-        let measured = |place: usize| {
-            let mut slope = [0.0; PARAMETERS];
-            slope[place] = 1.0;
-            if let Some(motion) = motion {
-                motion.carry_back(seconds, &mut slope);
-            }
-            let terms = covariance.indexed_iter().map(|((i, j), c)| slope[i] * c * slope[j]);
-            Measured { value: then[place], std: terms.sum::<f64>().max(0.0).sqrt() }
-        };
-        let [left, right] = end.wake.mean_circulations_5_15_m2_s(self.options.model.profile, covariance.view());
-        let (value, std) = if side == Side::Left { left } else { right };
-        let fitted = end.groups.iter().any(|group| group.contains(&core));
-        VortexResult {
-            side,
-            time_s: reference_s + seconds,
-            circulation_m2_s: measured(circulation),
-            circulation_5_15_m2_s: Measured { value, std },
-            lateral_position_m: measured(lateral),
-            height_m: measured(height),
-            core_radius_m: fitted.then(|| measured(core)),
-        }
     }
 }
 
@@ -256,16 +214,6 @@ impl Uncertainty<'_> {
         Ok(beyond(self.covariance(|_| true)?, LEAST_SIGMAS)
             || beyond(self.covariance(alone)?, (BY_FAR * threshold.sqrt()).max(LEAST_SIGMAS)))
     }
-}
-
-/// Places of a vortex's parameters: circulation, lateral position, height, core.
-fn places(side: Side) -> [usize; 4] {
-    use Parameter as P;
-    let of = match side {
-        Side::Left => [P::LeftCirculation, P::LeftLateral, P::LeftHeight, P::LeftCore],
-        Side::Right => [P::RightCirculation, P::RightLateral, P::RightHeight, P::RightCore],
-    };
-    of.map(|parameter| parameter as usize)
 }
 
 /// Variance of a fit with that loss over that of least squares, for normal residuals.

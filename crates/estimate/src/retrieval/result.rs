@@ -79,6 +79,8 @@ pub enum Flag {
     PoorFit,
     /// More than 10 % of the velocities are outliers.
     Outliers,
+    /// Velocities were taken for means over gates, though nothing says that they are: peaks of spectra read less in a vortex.
+    TakenForMeans,
     /// The map was thinned, as whitening takes 3000 velocities at most.
     Thinned,
 }
@@ -98,6 +100,7 @@ impl Flag {
             Self::Ambiguous => "ambiguous",
             Self::PoorFit => "poor_fit",
             Self::Outliers => "outliers",
+            Self::TakenForMeans => "taken_for_means",
             Self::Thinned => "thinned",
         }
     }

@@ -51,8 +51,35 @@ impl ScanMap {
     }
 
     /// Whether the lines have times.
-    pub(crate) fn has_times(&self) -> bool {
+    #[must_use]
+    pub fn has_times(&self) -> bool {
         self.time_s.iter().any(|time| time.is_finite())
+    }
+
+    /// Times of the first and the last line \[s\]; infinite the wrong way round if they are unknown.
+    pub(crate) fn ends_s(&self) -> (f64, f64) {
+        self.time_s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)))
+    }
+
+    /// How long the scan lasts \[s\]; 0 if times are unknown.
+    #[must_use]
+    pub fn lasts_s(&self) -> f64 {
+        let (first_s, last_s) = self.ends_s();
+        if self.has_times() { last_s - first_s } else { 0.0 }
+    }
+
+    /// Time in the middle of the scan \[s\], that of the wake of a fit; NaN if times are unknown.
+    #[must_use]
+    pub fn middle_s(&self) -> f64 {
+        let (first_s, last_s) = self.ends_s();
+        if self.has_times() { 0.5 * (first_s + last_s) } else { f64::NAN }
+    }
+
+    /// Time of each line after the middle of the scan \[s\].
+    #[must_use]
+    pub fn after_middle_s(&self) -> Vec<f64> {
+        let middle_s = self.middle_s();
+        self.time_s.iter().map(|time_s| time_s - middle_s).collect()
     }
 
     /// The map for the fits that know no times.

@@ -6,13 +6,12 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::retrieval::expected::Expected;
-use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, fit_scan};
+use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, VortexResult, fit_scan};
 use crate::vortex_fit::map_fit::secondary::Setting;
 use crate::vortex_fit::{MapFitOptions, Parameter};
 
 /// What [`fit_scan`] finds with secondary vortices in the model, and the options with them, if the scan shows them beside the pair that it has
-/// `found`. Looked for are those of vortices that stand still, in velocities whose errors are independent. The deviations count what is
-/// not known of them.
+/// `found`. Looked for are those in velocities whose errors are independent. The deviations count what is not known of them.
 ///
 /// # Errors
 /// As [`fit_scan`].
@@ -21,10 +20,12 @@ pub fn with_secondary_vortices(
     options: &RetrievalOptions,
     found: &ScanResult,
 ) -> Result<Option<(ScanResult, RetrievalOptions)>, Error> {
-    let stands = found.has(Flag::MotionIgnored) && found.vortices.len() == 2;
-    let Some(pair) = found.wake.filter(|_| stands && options.turbulence.is_none()) else {
+    let is_pair = found.vortices.len() == 2;
+    let Some(pair) = found.wake.filter(|_| is_pair && options.turbulence.is_none()) else {
         return Ok(None);
     };
+    let moves = map.has_times() && !found.has(Flag::MotionIgnored);
+    let seconds = moves.then(|| map.after_middle_s());
     options.validate()?;
     let map_options = MapFitOptions {
         free: options.free,
@@ -40,6 +41,7 @@ pub fn with_secondary_vortices(
         model: &options.model,
         prepared: None,
         kernel: &kernel,
+        seconds: seconds.as_deref(),
         options: &map_options,
         groups: &options.free.groups(),
     };
@@ -53,12 +55,12 @@ pub fn with_secondary_vortices(
     }
     result.flags.push(Flag::SecondaryVortices);
     result.flags.sort();
-    widen(&mut result, &four.covariance, &options);
+    widen(&mut result, map, &four.covariance, &options);
     Ok(Some((result, options)))
 }
 
 /// Deviations that are too small as the secondary vortices were kept become those of the fit of all.
-fn widen(result: &mut ScanResult, all: &Array2<f64>, options: &RetrievalOptions) {
+fn widen(result: &mut ScanResult, map: &ScanMap, all: &Array2<f64>, options: &RetrievalOptions) {
     let grown: Vec<f64> = (0..all.nrows())
         .map(|place| {
             let (own, all) = (result.covariance[[place, place]], all[[place, place]]);
@@ -67,16 +69,9 @@ fn widen(result: &mut ScanResult, all: &Array2<f64>, options: &RetrievalOptions)
         .collect();
     result.covariance.indexed_iter_mut().for_each(|((i, j), c)| *c *= grown[i] * grown[j]);
     let Some(wake) = result.wake else { return };
-    let means = wake.mean_circulations_5_15_m2_s(options.model.profile, result.covariance.view());
+    let moves = map.has_times() && !result.has(Flag::MotionIgnored);
     for vortex in &mut result.vortices {
-        let [circulation, lateral, height, core] = vortex.side.parameters();
-        vortex.circulation_m2_s.std *= grown[circulation as usize];
-        vortex.lateral_position_m.std *= grown[lateral as usize];
-        vortex.height_m.std *= grown[height as usize];
-        if let Some(radius) = &mut vortex.core_radius_m {
-            radius.std *= grown[core as usize];
-        }
-        vortex.circulation_5_15_m2_s.std = means[usize::from(circulation == Parameter::RightCirculation)].1;
+        *vortex = VortexResult::at_its_line(map, &options.model, (&wake, &result.covariance), vortex.side, moves);
     }
     result.lateral_wind_m_s.std *= grown[Parameter::Wind as usize];
     result.wind_shear_per_s.std *= grown[Parameter::Shear as usize];

@@ -19,6 +19,7 @@ mod retrieval;
 mod retrieval_methods;
 mod rolling_moment;
 mod secondary_vortices;
+mod shown_maps;
 mod sliding;
 mod vortex_fit;
 mod wake_detection;

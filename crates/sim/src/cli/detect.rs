@@ -12,7 +12,7 @@ use crate::io::{Existing, FileGroup, Provenance};
 use crate::measure::progress::Observer;
 use crate::measure::write;
 use crate::plan::{Plan, Target};
-use crate::retrieve::gate_of;
+use crate::retrieve::{gate_of, scene_of};
 use crate::scene::{NoiseKind, SceneFile};
 use clap::Args;
 use serde_json::{Value, json};
@@ -107,6 +107,8 @@ struct Task {
     settings: DetectionSettings,
     /// The grid of the scene, if there are no scans.
     empty: Option<ScanMap>,
+    scene: Option<SceneFile>,
+    /// Of the scene in still air.
     plan: Option<Plan>,
     notes: Vec<String>,
 }
@@ -156,9 +158,13 @@ impl Task {
             scans.extend(read);
             notes.extend(left_out);
         }
-        let scene = words.scene.as_deref().map(|path| load(path, cli)).transpose()?;
-        let own = || own_scene(scans.first()?);
-        let plan = scene.or_else(own).map(|scene| Plan::new(scene, Target::Map)).transpose()?;
+        let scene = match (&words.scene, scans.first()) {
+            (Some(path), _) => Some(load(path, cli)?),
+            (None, Some(scan)) => scene_of(scan)?,
+            (None, None) => None,
+        };
+        let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;
+        let plan = still.map(|scene| Plan::new(scene, Target::Map)).transpose()?;
         let names = names(words.data.is_empty(), plan.as_ref());
         write::prepare(&words.out, names.iter().copied(), existing)?;
         let mut settings = DetectionSettings {
@@ -188,7 +194,7 @@ impl Task {
             empty = scans.is_empty().then(|| noise.empty_scan(plan));
         }
         settings.stride = words.stride.unwrap_or(settings.stride);
-        Ok(Self { scans, settings, empty, plan, notes })
+        Ok(Self { scans, settings, empty, scene, plan, notes })
     }
 
     /// An error of a test with the file it is of, if there is one.
@@ -200,15 +206,8 @@ impl Task {
     }
 
     fn provenance(&self) -> Provenance {
-        match &self.plan {
-            Some(plan) => write::provenance(plan),
-            None => Provenance {
-                program: crate::PROGRAM.into(),
-                scene_toml: String::new(),
-                scene_hash: String::new(),
-                seed: self.settings.seed,
-            },
-        }
+        let of_scene = write::provenance_of(self.scene.as_ref());
+        Provenance { seed: self.scene.as_ref().map_or(self.settings.seed, |_| of_scene.seed), ..of_scene }
     }
 
     fn write(
@@ -304,11 +303,6 @@ fn names(is_scene_alone: bool, plan: Option<&Plan>) -> Vec<&'static str> {
 /// Whether the closed forms of single gates are known: there must be noise.
 fn has_gates(plan: &Plan) -> bool {
     plan.scene.scene.detector.noise != NoiseKind::None
-}
-
-/// The scene that a file of this program carries.
-fn own_scene(scan: &ReadScan) -> Option<SceneFile> {
-    SceneFile::parse(scan.scene_toml.as_deref()?, &scan.path).ok()
 }
 
 fn shown_path(path: &Path) -> String {

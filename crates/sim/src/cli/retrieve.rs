@@ -4,12 +4,12 @@ use super::{Cli, load, progress, say};
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
-use crate::io::{Existing, FileGroup, Provenance};
+use crate::io::{Existing, FileGroup};
 use crate::measure::progress::{Observer, Silent};
 use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape};
 use crate::measure::write;
-use crate::plan::{Plan, Target};
-use crate::retrieve::{self, Method, OwnScene, RetrievedScan, gate_of};
+use crate::plan::Plan;
+use crate::retrieve::{self, Method, OwnScene, RetrievedScan, StatedEstimator, Velocities, gate_of};
 use crate::scene::{SceneFile, VortexProfile};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -25,9 +25,21 @@ pub(super) struct RetrieveWords {
     /// Maps of scans: CfRadial 1.4 (classic NetCDF), HALO .hpl, CSV; or raw signals, signals.nc, NPY or NPZ, with --scene.
     #[arg(required = true)]
     data: Vec<PathBuf>,
-    /// The scene of the instrument; a map of this program has its own in it.
+    /// The scene of the instrument and its estimator; a map of this program has its own in it.
     #[arg(long, value_name = "SCENE.toml")]
     scene: Option<PathBuf>,
+    /// How velocities were estimated, without a scene: a method of scenes such as periodogram or first_moment, or means over the gates.
+    #[arg(long, value_name = "METHOD", conflicts_with = "scene")]
+    estimator: Option<String>,
+    /// Full width of the pulse at half its maximum, s, e.g. 200e-9; of the file without it.
+    #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "scene")]
+    pulse: Option<f64>,
+    /// Length of the estimator's window, s, e.g. 256e-9; of the gates without it.
+    #[arg(long, value_name = "S", value_parser = positive, requires = "estimator")]
+    window: Option<f64>,
+    /// Weighting of that window, as in scenes; rectangular without it.
+    #[arg(long, value_name = "WORD", requires = "estimator")]
+    weighting: Option<String>,
     /// How circulations are found.
     #[arg(long, value_enum, default_value_t)]
     method: Method,
@@ -37,7 +49,7 @@ pub(super) struct RetrieveWords {
     /// Whether image vortices make the ground a streamline.
     #[arg(long, value_enum, default_value_t = YesNo::Yes)]
     ground: YesNo,
-    /// Standard deviation of the weight of a gate along the line, m; 0 for velocities at points.
+    /// Standard deviation of the weight of a gate along the line, m, for velocities that are taken for means; 0 for those at points.
     #[arg(long, value_name = "M", value_parser = not_negative)]
     gate_std: Option<f64>,
     /// Circulation against radius; of the scene without it, else algebraic.
@@ -196,6 +208,8 @@ struct Signals {
 #[derive(Default)]
 struct Found {
     scans: Vec<RetrievedScan>,
+    /// The scene of each scan, where one is known.
+    scenes: Vec<Option<SceneFile>>,
     /// Circulations by envelopes, with the number of their scan.
     envelopes: Vec<(usize, EnvelopeResult)>,
 }
@@ -215,6 +229,7 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
             return Err(Error::Input { path: path.clone(), reason });
         }
         let (found, left_out) = scans::read(path, &format)?;
+        found.iter().try_for_each(|scan| words.scene_of(scan, stated.as_ref()).map(|_| ()))?;
         left_out.iter().for_each(|text| told.warn(&format!("{}: {text}: left out", path.display())));
         inputs.extend(found.into_iter().map(|scan| Input::Map(Box::new(scan))));
     }
@@ -227,14 +242,16 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         match input {
             Input::Map(scan) => {
                 let start = prediction(&found.scans, &scan);
-                found.scans.push(of_map(words, stated.as_ref(), *scan, start, told.as_mut())?);
+                let scene = words.scene_of(&scan, stated.as_ref())?;
+                found.scans.push(of_map(words, scene.as_ref(), *scan, start, told.as_mut())?);
+                found.scenes.push(scene);
             }
             Input::Signals(signals) => of_signals(words, *signals, &mut found)?,
         }
     }
     same_origin(&mut found.scans);
     let track = retrieve::track_of(&found.scans)?;
-    let files = files(words, stated.as_ref(), &found, track.as_ref(), existing)?;
+    let files = files(words, &found, track.as_ref(), existing)?;
     let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found.scans), "files": files });
     say(cli.json, &object, &format!("{}wrote {} files to {}", text(&found.scans), files.len(), words.out.display()))
 }
@@ -284,51 +301,73 @@ fn signals(path: &Path, words: &RetrieveWords, scene: Option<SceneFile>) -> Resu
     Ok(Signals { path: path.to_owned(), records, plan, scans, spectra })
 }
 
-/// The scene of a map of this program, if it is one.
-fn scene_of(scan: &ReadScan) -> Option<SceneFile> {
-    SceneFile::parse(scan.scene_toml.as_deref()?, &scan.path).ok()
+impl RetrieveWords {
+    /// The scene of a map: as stated, else its own.
+    fn scene_of(&self, scan: &ReadScan, stated: Option<&SceneFile>) -> Result<Option<SceneFile>, Error> {
+        match stated {
+            Some(scene) => Ok(Some(scene.clone())),
+            None => retrieve::scene_of(scan),
+        }
+    }
+
+    fn estimator(&self) -> StatedEstimator {
+        let Self { estimator, pulse, window, weighting, .. } = self;
+        StatedEstimator { method: estimator.clone(), pulse_s: *pulse, window_s: *window, weighting: weighting.clone() }
+    }
 }
+
+/// The word for velocities that are means over the gates.
+const MEANS: &str = "means";
+const UNKNOWN: &str = "velocities are taken for means over the gates: those of spectral peaks give circulations that are a quarter to a half too \
+                       small; --estimator with --pulse and --window says how they were estimated, --estimator means that they are means, or \
+                       --scene everything";
 
 fn of_map(
     words: &RetrieveWords,
-    stated: Option<&SceneFile>,
+    scene: Option<&SceneFile>,
     scan: ReadScan,
     start: Option<Wake>,
     told: &mut dyn Observer,
 ) -> Result<RetrievedScan, Error> {
-    let own = scene_of(&scan);
-    let scene = stated.or(own.as_ref());
-    let (gate, mut remark) = gate_of(Some(&scan), words.gate_std, scene.map(|file| &file.scene))?;
-    if scan.is_own && scene.is_none() {
-        remark = Some(
-            "it is a map of this program that has lost its scene, as some programs drop it: --scene gives the circulations of the \
-             original, which are tens of per cent off without it",
-        );
-    }
-    if let Some(remark) = remark {
-        told.warn(&format!("{}: {remark}", scan.path.display()));
-    }
-    // What the estimator of a scene makes of a wake is in its own maps alone.
-    let response = match (scan.is_own && words.gate_std.is_none(), scene) {
-        (true, Some(scene)) => own_scene(&Plan::new(scene.clone(), Target::Map)?)?,
-        _ => None,
+    let stated = words.estimator();
+    let are_means = stated.method.as_deref() == Some(MEANS) || words.gate_std == Some(0.0);
+    // What is stated goes before what the file says.
+    let (instrument, is_likely) = match (words.gate_std, &stated.method, scene) {
+        _ if are_means => (None, false),
+        (None, None, Some(scene)) => (Some(scene.clone()), false),
+        (None, Some(_), _) => (Some(retrieve::stated_scene(&scan, &stated)?), false),
+        (None, None, None) if scan.is_own => (Some(retrieve::stated_scene(&scan, &stated)?), true),
+        _ => (None, false),
+    };
+    let of_gate = instrument.as_ref().or(scene).map(|file| &file.scene);
+    let (gate, remark) = gate_of(Some(&scan), words.gate_std, of_gate)?;
+    let own = instrument.as_ref().map(|scene| OwnScene::new(scene, &Silent)).transpose()?.flatten();
+    let velocities = match &own {
+        Some(own) if is_likely => Velocities::LikelyShown(own),
+        Some(own) => Velocities::Shown(own),
+        None if are_means => Velocities::Means,
+        None => Velocities::Unknown,
     };
     let options = RetrievalOptions { start, ..words.options(scene, gate) };
-    retrieve::retrieve_map(scan, words.method, options, response.as_ref())
-}
-
-fn own_scene(plan: &Plan) -> Result<Option<OwnScene>, Error> {
-    OwnScene::new(plan, &Silent)
+    let found = retrieve::retrieve_map(scan, words.method, options, velocities)?;
+    let lost = "it is a map of this program that has lost its scene, as some programs drop it: the estimator is taken for the default one, and \
+                the deviations hold what means would differ by; --scene gives the circulations of the original";
+    let taken = found.result.has(Flag::TakenForMeans);
+    for remark in [remark, taken.then_some(if is_likely { lost } else { UNKNOWN })].into_iter().flatten() {
+        told.warn(&format!("{}: {remark}", found.scan.path.display()));
+    }
+    Ok(found)
 }
 
 fn of_signals(words: &RetrieveWords, signals: Signals, found: &mut Found) -> Result<(), Error> {
     let Signals { path, mut records, plan, scans, spectra } = signals;
-    let own = own_scene(&plan)?;
+    let own = OwnScene::new(&plan.scene, &Silent)?;
+    let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
     let mut first_line = 0;
     for (sweep, measured) in scans.iter().enumerate() {
         let scan = retrieve::scan_of_signals(&path, sweep, &plan, measured);
         let (gate, _) = gate_of(Some(&scan), words.gate_std, Some(&plan.scene.scene))?;
-        let mut one = retrieve::retrieve_map(scan, words.method, words.options(Some(&plan.scene), gate), own.as_ref())?;
+        let mut one = retrieve::retrieve_map(scan, words.method, words.options(Some(&plan.scene), gate), velocities)?;
         let lines = first_line..first_line + measured.lines.elevation_rad.len();
         first_line = lines.end;
         match (&own, words.method) {
@@ -347,6 +386,7 @@ fn of_signals(words: &RetrieveWords, signals: Signals, found: &mut Found) -> Res
             _ => {}
         }
         found.scans.push(one);
+        found.scenes.push(Some(plan.scene.clone()));
     }
     Ok(())
 }
@@ -379,22 +419,26 @@ fn names(scans: usize) -> Vec<String> {
 
 fn files(
     words: &RetrieveWords,
-    scene: Option<&SceneFile>,
-    Found { scans, envelopes }: &Found,
+    Found { scans, scenes, envelopes }: &Found,
     track: Option<&Track>,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, Error> {
-    let origin = Provenance {
-        program: crate::PROGRAM.into(),
-        scene_toml: scene.map(|scene| scene.toml.clone()).unwrap_or_default(),
-        scene_hash: scene.map(|scene| scene.hash.clone()).unwrap_or_default(),
-        seed: scene.map_or(0, |scene| scene.scene.seed),
-    };
+    // Scans of several scenes have none in common.
+    let scene = scenes
+        .first()
+        .and_then(Option::as_ref)
+        .filter(|first| scenes.iter().all(|scene| scene.as_ref().is_some_and(|scene| scene.hash == first.hash)));
+    let origin = write::provenance_of(scene);
     let mut files = FileGroup::new(&words.out);
     files.add("retrieval.csv", retrieve::rows(scans).to_csv(&origin)?)?;
     files.add(
         "retrieval.json",
-        format!("{{\"source\": \"{}\", \"scans\": {}}}\n", crate::PROGRAM, retrieve::json(scans)),
+        format!(
+            "{{\"source\": \"{}\", \"scene_hash\": \"{}\", \"scans\": {}}}\n",
+            origin.program,
+            origin.scene_hash,
+            retrieve::json(scans)
+        ),
     )?;
     if words.method == Method::Envelope {
         files.add("envelopes.csv", retrieve::envelope_table(envelopes).to_csv(&origin)?)?;

@@ -250,11 +250,15 @@ fn instrument(map: &VelocityMap) -> Vec<Variable> {
     ]
 }
 
-/// The estimates keep the scene too: xradar writes no global attributes but its own, and what a map means for a wake is in the scene.
+/// The estimates keep the scene too: xradar writes no global attributes but its own, and what a map means for a wake is in the scene; and
+/// the part of it that says how they were estimated, for those who drop it.
 fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
     let variable = |field: &Field| {
         let out = field_variable(field);
-        if field.name == "radial_velocity" { out.text("scene", scene_toml) } else { out }
+        match field.name.as_str() {
+            "radial_velocity" => out.text("scene", scene_toml).text("instrument", &instrument_of(scene_toml)),
+            _ => out,
+        }
     };
     let mut out: Vec<Variable> = map.fields.iter().map(variable).collect();
     if map.field("radial_velocity").is_none() {
@@ -267,6 +271,15 @@ fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
         out.push(field_variable(&copy).text("comment", &format!("no estimate was made: copy of {}", source.name)));
     }
     Ok(out)
+}
+
+/// The tables of a scene that say how velocities were estimated, whatever the air did.
+fn instrument_of(scene_toml: &str) -> String {
+    let mut scene: toml::Table = scene_toml.parse().unwrap_or_default();
+    scene.retain(|key, _| {
+        ["format", "laser", "pulse", "detector", "telescope", "atmosphere", "scan", "estimator"].contains(&key)
+    });
+    scene.to_string()
 }
 
 fn field_variable(field: &Field) -> Variable {

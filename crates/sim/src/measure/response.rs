@@ -2,10 +2,13 @@
 //!
 //! Check: circulations fitted to maps and signals of a pair, in the tests of sweeps and retrievals.
 
-use crate::measure::estimators::{Response, response, sampling, signal_kind};
-use crate::measure::instrument::Instrument;
+use crate::Error;
+use crate::measure::estimators::{Response, response, sampling, signal_kind, window_correlation};
+use crate::measure::region::{places, region_radius};
 use crate::measure::scan::mean_snr;
-use crate::scene::{Method, NoiseKind, PulseShape as Shape, Scene};
+use crate::plan::Plan;
+use crate::scene::{NoiseKind, PulseShape as Shape, Scene};
+use wakescope_estimate::Radius;
 use wakescope_estimate::bound::Noise;
 use wakescope_estimate::vortex_fit::{EstimatorResponse, PulseShape, ScanSetup, WakeModel};
 
@@ -15,21 +18,32 @@ pub(crate) struct SceneResponse {
     pub(crate) pulse: PulseShape,
     pub(crate) noise: Noise,
     layer_snr: Vec<(f64, f64)>,
+    radius: Radius,
 }
 
 impl SceneResponse {
     /// Nothing where there is no noise, or the pulse is no Gaussian without chirp. `layer_snr` holds range, m, and expected
     /// signal-to-noise ratio of the layers of a line.
-    pub(crate) fn new(scene: &Scene, instrument: &Instrument, layer_snr: Vec<(f64, f64)>) -> Option<Self> {
+    ///
+    /// # Errors
+    /// What the regions refuse; a checked scene gives none.
+    pub(crate) fn new(plan: &Plan, layer_snr: Vec<(f64, f64)>) -> Result<Option<Self>, Error> {
+        let (scene, pulse) = (&plan.scene.scene, &plan.instrument.pulse);
         let is_gaussian = matches!(scene.pulse.shape, Shape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
         let noise = match scene.detector.noise {
             NoiseKind::Band => Noise::Band { floor: 0.0 },
             NoiseKind::White => Noise::White,
-            NoiseKind::None => return None,
+            NoiseKind::None => return Ok(None),
         };
-        let pulse = PulseShape::gaussian(instrument.pulse.sigma_s()).ok().filter(|_| is_gaussian)?;
-        let response = response(scene, &instrument.pulse, mean_snr(&layer_snr)).ok().flatten();
-        Some(Self { response, pulse, noise, layer_snr })
+        if !is_gaussian {
+            return Ok(None);
+        }
+        let snr = mean_snr(&layer_snr);
+        let correlation = window_correlation(scene, pulse, snr)?;
+        let radius = region_radius(scene, pulse, &layer_snr, &places(scene, &plan.geometry)?, &correlation)?;
+        let response = response(scene, pulse, snr).ok().flatten();
+        let pulse = PulseShape::gaussian(pulse.sigma_s())?;
+        Ok(Some(Self { response, pulse, noise, layer_snr, radius }))
     }
 
     /// Expected signal-to-noise ratio of the layer nearest to a range, a power ratio.
@@ -44,16 +58,22 @@ impl SceneResponse {
         let Response { correlogram, estimator } = self.response.as_ref()?;
         let noise = (self.noise, self.snr_at(range_m));
         let sampling = sampling(scene).ok()?;
-        EstimatorResponse::new(correlogram, &**estimator, &sampling, &self.pulse, noise, radius_m(scene)).ok()
+        let of_lines = EstimatorResponse::new(correlogram, &**estimator, &sampling, &self.pulse, noise, 0.0).ok()?;
+        Some(of_lines.with_radius(|range_m| self.radius_m(range_m)))
+    }
+
+    /// Radius of the regions of the maps at a range, m.
+    fn radius_m(&self, range_m: f64) -> f64 {
+        self.radius.at_m(range_m).unwrap_or(0.0)
+    }
+
+    /// Neighbouring lines, `step_rad` apart, that share windows at a range, m.
+    pub(crate) fn correlated_lines(&self, step_rad: f64, range_m: f64) -> usize {
+        (2.0 * self.radius_m(range_m) / (step_rad * range_m)) as usize
     }
 
     /// How the records of lines at elevations, rad, were taken.
-    pub(crate) fn setup(
-        &self,
-        scene: &Scene,
-        wake: WakeModel,
-        elevation_rad: Vec<f64>,
-    ) -> Result<ScanSetup, crate::Error> {
+    pub(crate) fn setup(&self, scene: &Scene, wake: WakeModel, elevation_rad: Vec<f64>) -> Result<ScanSetup, Error> {
         Ok(ScanSetup {
             sampling: sampling(scene)?,
             kind: signal_kind(scene),
@@ -67,17 +87,47 @@ impl SceneResponse {
     }
 }
 
-/// Radius of the regions of a scene's maps, m.
-fn radius_m(scene: &Scene) -> f64 {
-    if scene.estimator.method == (Method::Periodogram {}) { 0.0 } else { scene.estimator.radius_m }
+/// Gates of a scene's maps, `spacing_m` apart, of which neighbours share most of their window say the same: every so-manyth says all.
+pub(crate) fn gate_step(scene: &Scene, spacing_m: f64) -> usize {
+    let period_s = 1.0 / scene.detector.sampling_hz;
+    let apart_m = 0.25 * scene.estimator.window_samples as f64 * 0.5 * crate::SPEED_OF_LIGHT_M_S * period_s;
+    // files round their ranges
+    ((apart_m / spacing_m - 1e-3).ceil() as usize).max(1)
 }
 
-/// Gates of a scene's maps of which neighbours share most of their window say the same: every so-manyth says all.
-pub(crate) fn gate_step(scene: &Scene) -> usize {
-    (scene.estimator.window_samples / 4).div_ceil(scene.estimator.gate_step_samples).max(1)
+/// Mean distance of ranges, m.
+pub(crate) fn spacing_m(range_m: &[f64]) -> f64 {
+    let length_m = range_m.last().copied().unwrap_or(0.0) - range_m.first().copied().unwrap_or(0.0);
+    length_m / (range_m.len().max(2) - 1) as f64
 }
 
-/// Neighbouring lines, `step_rad` apart, that share windows at a range, m.
-pub(crate) fn correlated_lines(scene: &Scene, step_rad: f64, range_m: f64) -> usize {
-    (2.0 * radius_m(scene) / (step_rad * range_m)) as usize
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Target;
+    use crate::scene::{RegionRadius, SceneFile};
+    use wakescope_estimate::vortex_fit::Wake;
+
+    #[test]
+    fn what_is_shown_has_regions_of_the_radius_that_the_map_has_at_each_range() {
+        let shown = |radius_m: f64, radius: RegionRadius| {
+            let mut scene = Scene::default();
+            (scene.estimator.radius_m, scene.estimator.radius) = (radius_m, radius);
+            let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap();
+            let response = SceneResponse::new(&plan, vec![(280.0, 1.0), (520.0, 1.0)]).unwrap().unwrap();
+            let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0]);
+            let lines: Vec<f64> = (0..20).map(|line| 0.1 + 2.5e-3 * f64::from(line)).collect();
+            let shown = response.shown(&plan.scene.scene, 400.0).unwrap();
+            let map = shown.map(&WakeModel::default(), &wake, &lines, &[376.5, 423.5]).unwrap();
+            (map, response.correlated_lines(2.5e-3, 400.0))
+        };
+        let table = |radius_m| RegionRadius::OfRange { range_m: vec![300.0, 500.0], radius_m };
+        let six = shown(6.0, RegionRadius::Fixed {});
+        assert_eq!(shown(2.0, table(vec![6.0, 6.0])), six);
+        assert_ne!(shown(2.0, RegionRadius::Fixed {}).0, six.0);
+        assert_eq!(six.1, 12);
+        // Regions that are as large as may be in order to reach a deviation that none has.
+        let target = RegionRadius::Target { standard_deviation_m_s: 1e-3, largest_m: 6.0 };
+        assert_eq!(shown(2.0, target), six);
+    }
 }

@@ -23,7 +23,7 @@ use crate::measure::beam_winds;
 use crate::measure::profile::RangeProfile;
 use crate::measure::run::RunResult;
 use crate::plan::{Plan, Stage, Target};
-use crate::scene::{DetectorSignal, NoiseKind, Pattern};
+use crate::scene::{DetectorSignal, NoiseKind, Pattern, SceneFile};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -255,11 +255,16 @@ pub(crate) fn put(files: FileGroup, folder: &Path, existing: Existing) -> Result
 
 /// Where the files of a run come from.
 pub fn provenance(plan: &Plan) -> Provenance {
+    provenance_of(Some(&plan.scene))
+}
+
+/// The same of a scene that may be unknown.
+pub(crate) fn provenance_of(scene: Option<&SceneFile>) -> Provenance {
     Provenance {
         program: crate::PROGRAM.into(),
-        scene_toml: plan.scene.toml.clone(),
-        scene_hash: plan.scene.hash.clone(),
-        seed: plan.scene.scene.seed,
+        scene_toml: scene.map_or_else(String::new, |scene| scene.toml.clone()),
+        scene_hash: scene.map_or_else(String::new, |scene| scene.hash.clone()),
+        seed: scene.map_or(0, |scene| scene.scene.seed),
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `gate` | what a velocity of a file is of the air about its range |
-//! | `own` | maps and signals of this program's scenes: what their estimator makes of a wake |
+//! | `gate`, `instrument` | what a velocity of a file is of the air about its range, and how it was estimated |
+//! | `own` | maps and signals of a scene that is known: what its estimator makes of a wake |
 //! | `one_scan`, `retrieved_scan` | one map, and what was found in it |
 //! | `others` | velocity envelopes, circulation against radius |
 //! | `tracks` | the vortices through several scans |
@@ -14,6 +14,7 @@
 //! Check: maps of runs are retrieved within their stated deviations, from every format.
 
 mod gate;
+mod instrument;
 mod one_scan;
 mod others;
 mod own;
@@ -27,7 +28,8 @@ mod tracks;
 mod truth;
 
 pub use gate::gate_of;
-pub use one_scan::retrieve_map;
+pub use instrument::{StatedEstimator, scene_of, stated_scene};
+pub use one_scan::{Velocities, retrieve_map};
 pub use others::{envelope_table, envelopes, profile_table};
 pub use own::{OwnScene, retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]

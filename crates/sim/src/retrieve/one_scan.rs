@@ -1,18 +1,33 @@
 //! Retrieval of one map.
 
-use super::own::OwnScene;
+use super::own::{OwnScene, retold, set};
 use super::retrieved_scan::{RetrievedScan, refused};
 use crate::Error;
 use crate::io::scans::ReadScan;
 use crate::scene::RetrievalMethod as Method;
-use wakescope_estimate::retrieval::{RetrievalOptions, fit_scan, radial_velocity_method, with_secondary_vortices};
+use ndarray::Array2;
+use wakescope_estimate::retrieval::{
+    Flag, RetrievalOptions, ScanResult, fit_scan, radial_velocity_method, with_secondary_vortices,
+};
 use wakescope_estimate::vortex_fit::Sharing;
+
+/// What the velocities of a map are of the air in its gates.
+#[derive(Clone, Copy)]
+pub enum Velocities<'s> {
+    /// Means, as somebody says.
+    Means,
+    /// Nobody knows: they are taken for means.
+    Unknown,
+    /// What the estimator of a scene shows.
+    Shown(&'s OwnScene),
+    /// Most likely what the estimator of such a scene shows: the difference to means counts as an error.
+    LikelyShown(&'s OwnScene),
+}
 
 /// Retrieves one map.
 ///
-/// With the scene of a map of this program, its means only lead to the start of the fit to what the estimator shows: taken for means,
-/// peaks mislead about the core above all, which is kept until then. Secondary vortices that the map shows are in the options that come
-/// back.
+/// Where it is known what an estimator shows, means only lead to the start of the fit: taken for means, peaks mislead about the core above
+/// all, which is a typical one until then. Secondary vortices that the map shows are in the options that come back.
 ///
 /// # Errors
 /// What the fits refuse, with the file and the sweep.
@@ -20,26 +35,51 @@ pub fn retrieve_map(
     scan: ReadScan,
     method: Method,
     options: RetrievalOptions,
-    own: Option<&OwnScene>,
+    velocities: Velocities<'_>,
 ) -> Result<RetrievedScan, Error> {
     let refuse = |error: wakescope_estimate::Error| refused(&scan, &error);
-    let mut found = match (method, own) {
-        (Method::Rv, _) => radial_velocity_method(&scan.map, &options).map_err(refuse)?,
-        (_, None) => fit_scan(&scan.map, &options).map_err(refuse)?,
-        (_, Some(_)) => {
-            let mut rough = options.clone();
+    if method == Method::Rv {
+        let result = radial_velocity_method(&scan.map, &options).map_err(refuse)?;
+        return Ok(RetrievedScan { scan, options, result });
+    }
+    let own = match velocities {
+        Velocities::Shown(own) | Velocities::LikelyShown(own) => Some(own),
+        Velocities::Means | Velocities::Unknown => None,
+    };
+    let shown = match own {
+        Some(own) => {
+            let mut rough = RetrievalOptions { core_radius_m: None, ..options.clone() };
             rough.free.core_radius = Sharing::Fixed;
-            fit_scan(&scan.map, &rough).map_err(refuse)?
+            let found = fit_scan(&scan.map, &rough).map_err(refuse)?;
+            own.refined(&scan.map, &options, &found)
+        }
+        None => None,
+    };
+    let (mut result, options) = match (shown, velocities) {
+        (Some(shown), Velocities::Shown(_)) => return Ok(RetrievedScan { result: shown.0, options: shown.1, scan }),
+        (Some((mut result, with_secondary)), _) => {
+            let means = fit_scan(&scan.map, &options).map_err(refuse)?;
+            doubt(&mut result, &means, &scan, &with_secondary);
+            (result, with_secondary)
+        }
+        (None, _) => {
+            let found = fit_scan(&scan.map, &options).map_err(refuse)?;
+            with_secondary_vortices(&scan.map, &options, &found).map_err(refuse)?.unwrap_or((found, options))
         }
     };
-    let mut options = options;
-    let better = match (method, own) {
-        (Method::Rv, _) => None,
-        (_, None) => with_secondary_vortices(&scan.map, &options, &found).map_err(refuse)?,
-        (_, Some(own)) => own.refined(&scan.map, &options, &found),
-    };
-    if let Some(better) = better {
-        (found, options) = better;
-    }
-    Ok(RetrievedScan { scan, options, result: found })
+    let are_means = matches!(velocities, Velocities::Means);
+    set(&mut result.flags, Flag::TakenForMeans, !are_means && !result.vortices.is_empty());
+    Ok(RetrievedScan { scan, options, result })
+}
+
+/// Counts the distance from another result as an error of one: of all numbers that it knows.
+fn doubt(result: &mut ScanResult, other: &ScanResult, scan: &ReadScan, options: &RetrievalOptions) {
+    let (Some(wake), Some(there)) = (result.wake, other.wake) else { return };
+    let (a, b) = (wake.to_array(), there.to_array());
+    let known: Vec<f64> = result.covariance.diag().iter().map(|variance| f64::from(*variance > 0.0)).collect();
+    let apart = |i: usize| known[i] * (a[i] - b[i]);
+    let covariance =
+        Array2::from_shape_fn(result.covariance.dim(), |(i, j)| result.covariance[[i, j]] + apart(i) * apart(j));
+    let moves = !result.has(Flag::MotionIgnored);
+    *result = retold(result, &scan.map, options, (wake, covariance), result.tops.clone(), moves);
 }

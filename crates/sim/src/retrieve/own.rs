@@ -1,4 +1,4 @@
-//! Maps and signals of scenes of this program: what their estimator makes of a wake is known, and so are their signals.
+//! Maps and signals of which the scene is known: what their estimator makes of a wake, and their likelihood.
 //!
 //! Check: circulations of maps and signals of a pair within their stated deviations.
 
@@ -8,16 +8,18 @@ use crate::io::raw::RawRecords;
 use crate::io::scans::ReadScan;
 use crate::measure::progress::Observer;
 use crate::measure::recorded::{FromParts, MeasuredScan};
-use crate::measure::response::{SceneResponse, correlated_lines, gate_step};
+use crate::measure::response::{SceneResponse, gate_step, spacing_m};
 use crate::measure::scan::Scanner;
-use crate::plan::Plan;
-use crate::scene::{DetectorSignal, Scene};
+use crate::plan::{Plan, Target};
+use crate::scene::{DetectorSignal, Scene, SceneFile};
 use ndarray::{Array2, ArrayView2, Axis};
 use num_complex::Complex;
-use wakescope_estimate::retrieval::{Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
+use wakescope_estimate::retrieval::{
+    Flag, Measured, Movement, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult,
+};
 use wakescope_estimate::vortex_fit::{
-    MapFitOptions, Parameter, Sharing, SignalFit, SignalFitOptions, VelocityMap, Vortex, Wake, fit_map_of_estimator,
-    fit_secondary_vortices, fit_signals,
+    EstimatorResponse, MapFit, MapFitOptions, Parameter, SignalFit, SignalFitOptions, VelocityMap, Wake,
+    fit_map_of_estimator, fit_secondary_vortices, fit_signals, refine_map_fit_of_estimator,
 };
 use wakescope_estimate::window::Sample;
 
@@ -34,24 +36,25 @@ pub struct OwnScene {
 }
 
 impl OwnScene {
-    /// Nothing for a scene without noise, or with a pulse that is no Gaussian without chirp.
+    /// Nothing for a scene without noise, or with a pulse that is no Gaussian without chirp. No flow is opened.
     ///
     /// # Errors
     /// What the efficiency refuses; a checked scene gives none.
-    pub fn new(plan: &Plan, observer: &dyn Observer) -> Result<Option<Self>, Error> {
-        let layers = Scanner::expected_layer_snr(plan, observer)?;
-        let scene = plan.scene.scene.clone();
-        let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
-        let response = SceneResponse::new(&scene, &plan.instrument, layers);
-        Ok(response.map(|response| Self { scene, response, noise_power_a2 }))
+    pub fn new(scene: &SceneFile, observer: &dyn Observer) -> Result<Option<Self>, Error> {
+        let plan = Plan::new(scene.in_still_air()?, Target::Map)?;
+        let layers = Scanner::expected_layer_snr(&plan, observer)?;
+        Self::with(&plan, layers)
     }
 
     /// The same for a plan whose lines are there.
-    pub(super) fn of_scanner(plan: &Plan, scanner: &Scanner<'_>) -> Option<Self> {
-        let scene = plan.scene.scene.clone();
-        let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
-        let response = SceneResponse::new(&scene, &plan.instrument, scanner.layer_snr())?;
-        Some(Self { scene, response, noise_power_a2 })
+    pub(super) fn of_scanner(plan: &Plan, scanner: &Scanner<'_>) -> Result<Option<Self>, Error> {
+        Self::with(plan, scanner.layer_snr())
+    }
+
+    fn with(plan: &Plan, layer_snr: Vec<(f64, f64)>) -> Result<Option<Self>, Error> {
+        let (scene, noise_power_a2) = (plan.scene.scene.clone(), plan.instrument.receiver.noise_variance_a2());
+        let response = SceneResponse::new(plan, layer_snr)?;
+        Ok(response.map(|response| Self { scene, response, noise_power_a2 }))
     }
 
     /// Expected signal-to-noise ratio in the band at the middle of a wake, a power ratio.
@@ -60,9 +63,9 @@ impl OwnScene {
         self.response.snr_at(y_m.hypot(z_m - self.scene.scan.lidar_height_m))
     }
 
-    /// The fit of a pair to what the estimator of the scene shows, for a map in which `found` has a wake: taken for means, peaks may show
-    /// but one of its vortices. Nothing where there is no wake or no certain pair, the estimator is one of those without such a
-    /// model, or the fit does not come to an end. The options are those with the secondary vortices that the map shows beside the pair.
+    /// The fit to what the estimator of the scene shows, for a map in which `found` has a wake: of a pair, as means may show but one of its
+    /// vortices, else of the one that is found. Nothing where there is no wake, the estimator is one of those without such a model, or
+    /// the fit does not come to an end. The options are those with the secondary vortices that the map shows beside the pair.
     pub(super) fn refined(
         &self,
         map: &ScanMap,
@@ -72,63 +75,130 @@ impl OwnScene {
         if found.statistic.is_nan() || found.statistic < options.threshold {
             return None;
         }
-        let from_lidar = |vortex: &VortexResult| {
-            vortex.lateral_position_m.value.hypot(vortex.height_m.value - self.scene.scan.lidar_height_m)
+        let place = |vortex: &VortexResult| {
+            options.model.range_and_elevation((vortex.lateral_position_m.value, vortex.height_m.value))
         };
         let range_m = match found.vortices.len() {
             0 => 0.5 * (map.range_m.first()? + map.range_m.last()?),
-            count => found.vortices.iter().map(from_lidar).sum::<f64>() / count as f64,
+            count => found.vortices.iter().map(|vortex| place(vortex).0).sum::<f64>() / count as f64,
         };
-        let shown = self.response.shown(&self.scene, range_m)?;
-        let some: Vec<usize> = (0..map.range_m.len()).step_by(gate_step(&self.scene)).collect();
+        let gate_step = gate_step(&self.scene, spacing_m(&map.range_m));
+        let some: Vec<usize> = (0..map.range_m.len()).step_by(gate_step).collect();
         let ranges_m: Vec<f64> = some.iter().map(|gate| map.range_m[*gate]).collect();
         let velocity_m_s = map.velocity_m_s.select(Axis(1), &some);
-        // Maps of one scan know no deviation, and those of a few scans hardly any.
-        let view = VelocityMap {
-            elevation_rad: &map.elevation_rad,
-            range_m: &ranges_m,
-            velocity_m_s: velocity_m_s.view(),
-            standard_deviation_m_s: None,
+        let fits = Fits {
+            scan: map,
+            // Maps of one scan know no deviation, and those of a few scans hardly any.
+            view: VelocityMap {
+                elevation_rad: &map.elevation_rad,
+                range_m: &ranges_m,
+                velocity_m_s: velocity_m_s.view(),
+                standard_deviation_m_s: None,
+            },
+            still: self.response.shown(&self.scene, range_m)?,
+            moving: self.response.shown(&self.scene, range_m)?.moving(&map.elevation_rad, &map.after_middle_s()),
+            options,
+            map_options: MapFitOptions {
+                free: options.free,
+                core_radius_m: options.core_radius_m,
+                loss: options.loss,
+                correlated_lines: self.response.correlated_lines(spacing_m(&map.elevation_rad), range_m),
+                ..MapFitOptions::default()
+            },
         };
-        let lines = map.elevation_rad.len();
-        let (lowest, highest) = (*map.elevation_rad.first()?, *map.elevation_rad.last()?);
-        let step_rad = (highest - lowest) / (lines.max(2) - 1) as f64;
-        let fit_options = MapFitOptions {
-            free: options.free,
-            loss: options.loss,
-            correlated_lines: correlated_lines(&self.scene, step_rad, range_m),
-            ..MapFitOptions::default()
+        // Beyond the scan there may be anything.
+        let (ranges, elevations) = (ends(&map.range_m)?, ends(&map.elevation_rad)?);
+        let is_sure = |vortex: &VortexResult| {
+            let (range_m, elevation_rad) = place(vortex);
+            let circulation = vortex.circulation_m2_s;
+            ranges.contains(&range_m)
+                && elevations.contains(&elevation_rad)
+                && circulation.value > CERTAIN_SIGMAS * circulation.std
         };
-        let mut options = options.clone();
-        let mut fit = fit_map_of_estimator(&view, &options.model, &shown, &fit_options).ok()?;
-        let four = fit_secondary_vortices(&view, &options.model, &shown, &fit.wake, &fit_options).ok().flatten();
+        match (fits.pair(found), found.vortices.len()) {
+            (Some(pair), 2) => Some(pair),
+            (Some(pair), _) if pair.0.vortices.iter().all(is_sure) => Some(pair),
+            (_, 1) => fits.one(found),
+            _ => None,
+        }
+    }
+}
+
+/// Fits of one scan to what an estimator shows of vortices that stand still, and that move.
+struct Fits<'a> {
+    scan: &'a ScanMap,
+    view: VelocityMap<'a>,
+    still: EstimatorResponse<'a>,
+    moving: EstimatorResponse<'a>,
+    options: &'a RetrievalOptions,
+    map_options: MapFitOptions,
+}
+
+impl Fits<'_> {
+    /// The fit from a start or, without one, from a blind search on, and whether its vortices move: as stated, else as it is likely in scans
+    /// that last so long unless the other is clearly better.
+    fn best(&self, start: Option<&Wake>) -> Option<(MapFit, bool)> {
+        let moves = match self.options.movement {
+            Movement::Moving => true,
+            Movement::Frozen => false,
+            Movement::Auto => self.scan.lasts_s() >= RetrievalOptions::SHORT_S,
+        } && self.scan.has_times();
+        let (view, model, options) = (&self.view, &self.options.model, &self.map_options);
+        let first = match start {
+            Some(start) => refine_map_fit_of_estimator(view, model, self.shown(moves), start, options),
+            None => fit_map_of_estimator(view, model, self.shown(moves), options),
+        }
+        .ok()?;
+        if self.options.movement != Movement::Auto || self.scan.lasts_s() == 0.0 {
+            return Some((first, moves));
+        }
+        let top = |fit: &MapFit| fit.tops.first().map_or(f64::NEG_INFINITY, |top| top.log_likelihood);
+        let other = refine_map_fit_of_estimator(view, model, self.shown(!moves), &first.wake, options).ok();
+        match other.filter(|other| 2.0 * (top(other) - top(&first)) > RetrievalOptions::MOVES) {
+            Some(other) => Some((other, !moves)),
+            None => Some((first, moves)),
+        }
+    }
+
+    fn shown(&self, moves: bool) -> &EstimatorResponse<'_> {
+        if moves { &self.moving } else { &self.still }
+    }
+
+    /// A pair, and the options with the secondary vortices that the map shows beside it.
+    fn pair(&self, found: &ScanResult) -> Option<(ScanResult, RetrievalOptions)> {
+        let mut options = self.options.clone();
+        let (mut fit, moves) = self.best(None)?;
+        let (model, shown) = (&options.model, self.shown(moves));
+        let four = fit_secondary_vortices(&self.view, model, shown, &fit.wake, &self.map_options).ok().flatten();
         if let Some((with_secondary, vortices)) = four {
             fit = with_secondary;
             options.model.secondary = Some(vortices);
         }
-        let tops = fit.tops.iter().map(|top| Top { wake: top.wake, chi2: -2.0 * top.log_likelihood }).collect();
-        let pair = as_pair(found, map, &options, &fit.wake);
-        let mut result = retold(&pair, &options, (fit.wake, fit.covariance), tops);
-        // Beyond the scan there may be anything.
-        let (ranges, elevations) = (map.range_m.first()?..=map.range_m.last()?, lowest..=highest);
-        let is_seen = |vortex: &VortexResult| {
-            let (y_m, z_m) = (vortex.lateral_position_m.value, vortex.height_m.value);
-            let elevation_rad = (z_m - self.scene.scan.lidar_height_m).atan2(y_m);
-            ranges.contains(&&from_lidar(vortex)) && elevations.contains(&elevation_rad)
-        };
-        let is_certain =
-            |vortex: &VortexResult| vortex.circulation_m2_s.value > CERTAIN_SIGMAS * vortex.circulation_m2_s.std;
-        if found.vortices.len() < 2 && !result.vortices.iter().all(|vortex| is_seen(vortex) && is_certain(vortex)) {
-            return None;
-        }
-        if !fit.cores_fitted || options.free.core_radius == Sharing::Fixed {
-            keep_cores(&mut result);
-        }
-        (result.cells_used, result.cells_rejected) = (fit.used - fit.outliers, fit.outliers);
-        set(&mut result.flags, Flag::Outliers, 10 * fit.outliers > fit.used);
-        set(&mut result.flags, Flag::SecondaryVortices, options.model.secondary.is_some());
-        Some((result, options))
+        Some((of_fit(found, self.scan, &options, &fit, moves), options))
     }
+
+    /// The one vortex that is found; another may be there beyond the scan.
+    fn one(&self, found: &ScanResult) -> Option<(ScanResult, RetrievalOptions)> {
+        let (fit, moves) = self.best(found.wake.as_ref())?;
+        let mut result = of_fit(found, self.scan, self.options, &fit, moves);
+        result.vortices.retain(|vortex| found.vortex(vortex.side).is_some());
+        set(&mut result.flags, Flag::OneVortex, true);
+        Some((result, self.options.clone()))
+    }
+}
+
+fn ends(axis: &[f64]) -> Option<std::ops::RangeInclusive<f64>> {
+    Some(*axis.first()?..=*axis.last()?)
+}
+
+/// The result of a fit to a map that tells other vortices than the means did.
+fn of_fit(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, fit: &MapFit, moves: bool) -> ScanResult {
+    let tops = fit.tops.iter().map(|top| Top { wake: top.wake, chi2: -2.0 * top.log_likelihood }).collect();
+    let mut result = retold(found, map, options, (fit.wake, fit.covariance.clone()), tops, moves);
+    (result.cells_used, result.cells_rejected) = (fit.used - fit.outliers, fit.outliers);
+    set(&mut result.flags, Flag::Outliers, 10 * fit.outliers > fit.used);
+    set(&mut result.flags, Flag::SecondaryVortices, options.model.secondary.is_some());
+    result
 }
 
 /// Retrieves a scan from its raw signals: the wake of its map starts the fit.
@@ -179,10 +249,7 @@ impl OwnScene {
         let SignalFit { wake, covariance, tops, log_likelihood_gain, used_rays, .. } = fit;
         let best = tops.iter().map(|top| top.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
         let tops = tops.iter().map(|top| Top { wake: top.wake, chi2: 2.0 * (best - top.log_likelihood) }).collect();
-        let mut result = retold(&result, &options, (wake, covariance), tops);
-        if options.free.core_radius == Sharing::Fixed {
-            keep_cores(&mut result);
-        }
+        let mut result = retold(&result, &scan.map, &options, (wake, covariance), tops, false);
         result.statistic = 2.0 * log_likelihood_gain;
         (result.cells_used, result.cells_rejected) = (used_rays, setup.elevation_rad.len() - used_rays);
         result.chi2_per_dof = f64::NAN;
@@ -198,84 +265,51 @@ fn middle_m(wake: &Wake) -> (f64, f64) {
     )
 }
 
-/// A result in which both vortices of a wake are found, each when the line of sight passes it.
-fn as_pair(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, wake: &Wake) -> ScanResult {
-    if found.vortices.len() == 2 {
-        return found.clone();
-    }
-    let unknown = Measured { value: f64::NAN, std: f64::NAN };
-    let of = |(side, vortex): (Side, Vortex)| {
-        let elevation_rad = (vortex.height_m - options.model.lidar_height_m).atan2(vortex.lateral_position_m);
-        let away = |line: &usize| (map.elevation_rad[*line] - elevation_rad).abs();
-        let line = (0..map.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
-        VortexResult {
-            side,
-            time_s: line.map_or(f64::NAN, |line| map.time_s[line]),
-            circulation_m2_s: unknown,
-            circulation_5_15_m2_s: unknown,
-            lateral_position_m: unknown,
-            height_m: unknown,
-            core_radius_m: None,
-        }
-    };
-    let mut pair = found.clone();
-    pair.vortices = [(Side::Left, wake.left), (Side::Right, wake.right)].map(of).to_vec();
-    // What the other fit left says nothing of this one.
-    [Flag::NoWake, Flag::OneVortex, Flag::PoorFit].into_iter().for_each(|flag| set(&mut pair.flags, flag, false));
-    pair.chi2_per_dof = f64::NAN;
-    pair
-}
-
-/// A result with another wake of standing vortices.
-fn retold(
+/// A result with another wake: the vortices that it has, each when the line of sight passes it.
+pub(super) fn retold(
     found: &ScanResult,
+    map: &ScanMap,
     options: &RetrievalOptions,
     (wake, covariance): (Wake, Array2<f64>),
     tops: Vec<Top>,
+    moves: bool,
 ) -> ScanResult {
     let values = wake.to_array();
     let measured = |parameter: Parameter| Measured {
         value: values[parameter as usize],
         std: covariance[[parameter as usize; 2]].sqrt(),
     };
-    let means = wake.mean_circulations_5_15_m2_s(options.model.profile, covariance.view());
-    let vortex = |vortex: &VortexResult| {
-        let mean = means[usize::from(vortex.side == Side::Right)];
-        let [circulation_m2_s, lateral_position_m, height_m, core_radius_m] = vortex.side.parameters().map(measured);
-        VortexResult {
-            circulation_m2_s,
-            circulation_5_15_m2_s: Measured { value: mean.0, std: mean.1 },
-            lateral_position_m,
-            height_m,
-            core_radius_m: Some(core_radius_m),
-            ..*vortex
-        }
-    };
+    let sides = [Side::Left, Side::Right].into_iter().filter(|side| values[side.parameters()[0] as usize] != 0.0);
+    let vortex = |side| VortexResult::at_its_line(map, &options.model, (&wake, &covariance), side, moves);
+    let vortices: Vec<VortexResult> = sides.map(vortex).collect();
     let mut flags = found.flags.clone();
-    // The wake stands still in these fits, and that of the map moved or had no times.
-    set(&mut flags, Flag::MotionIgnored, true);
-    set(&mut flags, Flag::CoreKept, false);
+    let mut chi2_per_dof = found.chi2_per_dof;
+    if vortices.len() != found.vortices.len() {
+        // What the other fit left says nothing of this one.
+        set(&mut flags, Flag::PoorFit, false);
+        chi2_per_dof = f64::NAN;
+    }
+    set(&mut flags, Flag::NoWake, false);
+    set(&mut flags, Flag::OneVortex, vortices.len() == 1);
+    let is_instant = map.has_times() && map.lasts_s() == 0.0;
+    set(&mut flags, Flag::MotionIgnored, !moves && !is_instant);
+    set(&mut flags, Flag::CoreKept, vortices.iter().any(|vortex| vortex.core_radius_m.is_none()));
     let competing = tops.iter().skip(1).any(|top: &Top| top.chi2 - tops[0].chi2 < COMPETES);
     set(&mut flags, Flag::Ambiguous, competing);
     ScanResult {
-        vortices: found.vortices.iter().map(vortex).collect(),
+        vortices,
         wake: Some(wake),
         lateral_wind_m_s: measured(Parameter::Wind),
         wind_shear_per_s: measured(Parameter::Shear),
         covariance,
         flags,
         tops,
+        chi2_per_dof,
         ..found.clone()
     }
 }
 
-/// Core radii that were not fitted.
-fn keep_cores(result: &mut ScanResult) {
-    result.vortices.iter_mut().for_each(|vortex| vortex.core_radius_m = None);
-    set(&mut result.flags, Flag::CoreKept, true);
-}
-
-fn set(flags: &mut Vec<Flag>, flag: Flag, is_set: bool) {
+pub(super) fn set(flags: &mut Vec<Flag>, flag: Flag, is_set: bool) {
     flags.retain(|own| *own != flag);
     if is_set {
         flags.push(flag);

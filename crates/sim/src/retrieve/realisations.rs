@@ -3,7 +3,7 @@
 //! Check: bias and scatter of a pair; a method that fails is counted; the test for a wake keeps its rate.
 
 use super::gate::gate_of;
-use super::one_scan::retrieve_map;
+use super::one_scan::{Velocities, retrieve_map};
 use super::others::envelopes;
 use super::own::OwnScene;
 use super::retrieved_scan::RetrievedScan;
@@ -72,7 +72,8 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::scan::Sample>(
     let Some(wanted) = &scene.retrieval else { return Ok(None) };
     let sweeps = upward_sweeps(plan);
     let truths = sweeps.iter().map(|lines| true_vortices(plan, lines)).collect::<Result<Vec<_>, _>>()?;
-    let own = OwnScene::of_scanner(plan, scanner);
+    let own = OwnScene::of_scanner(plan, scanner)?;
+    let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
     let options = options(scene, wanted)?;
     let mut tests = Vec::new();
     if let Some(false_alarm) = wanted.false_alarm {
@@ -83,7 +84,7 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::scan::Sample>(
     let each = maps.iter().enumerate().flat_map(|map| sweeps.iter().zip(&truths).enumerate().map(move |of| (map, of)));
     for ((realisation, velocity_m_s), (sweep, (lines, truth))) in each {
         let scan = || read_scan(plan, lines, velocity_m_s);
-        let by = |method| retrieve_map(scan(), method, options.clone(), own.as_ref()).ok();
+        let by = |method| retrieve_map(scan(), method, options.clone(), velocities).ok();
         // the fit of the map also starts that of the signals and the integrals
         let of_map = wanted.methods.iter().any(|method| *method != Method::Rv).then(|| by(Method::Fit)).flatten();
         for &method in &wanted.methods {

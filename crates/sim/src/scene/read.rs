@@ -88,6 +88,18 @@ impl SceneFile {
         Ok(Self { scene, toml, hash, folder: PathBuf::new(), source: Source::new(Path::new("scene"), "") })
     }
 
+    /// The same instrument and scan in still air, of which nothing is retrieved: what says how velocities were measured, without the
+    /// files of a flow.
+    ///
+    /// # Errors
+    /// What is not allowed in still air; a checked scene gives none.
+    pub(crate) fn in_still_air(&self) -> Result<Self, SceneError> {
+        let mut scene = self.scene.clone();
+        (scene.flow, scene.added_flows, scene.retrieval) = (super::Flow::Calm {}, Vec::new(), None);
+        scene.outputs.signals = false;
+        Self::new(scene).map_err(|problems| self.located(problems))
+    }
+
     /// Problems that only a plan could find, with the lines of the file that this scene was read from.
     pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
         self.source.located(problems)

@@ -1,9 +1,9 @@
 //! The circulation of an analytic pair from the maps of a case: a fit to each, and the bound of all raw signals of a scan.
 //!
-//! The fit knows nothing but that cores are some 4.5 % of the spacing; the bound is for known cores. Check: against the truth
+//! The fit keeps the core of `[retrieval] core_radius_m`, or one of 4.5 % of the spacing; the bound is for known cores. Check: against the truth
 //! of the scene, and the bound of Table 2's scan against the stored one.
 
-use crate::measure::response::{SceneResponse, correlated_lines, gate_step};
+use crate::measure::response::{SceneResponse, gate_step, spacing_m};
 use crate::measure::scan::Scanner;
 use crate::measure::wind::vortex_pair;
 use crate::plan::Plan;
@@ -48,7 +48,7 @@ impl<'p> Retrieval<'p> {
         if !is_one_scan || pair.circulation_m2_s <= 0.0 || pair.aircraft.is_some() {
             return None;
         }
-        let response = SceneResponse::new(scene, &plan.instrument, scanner.layer_snr())?;
+        let response = SceneResponse::new(plan, scanner.layer_snr()).ok().flatten()?;
         Some(Self { plan, pair, response, circulations_m2_s: Vec::new() })
     }
 
@@ -72,7 +72,8 @@ impl<'p> Retrieval<'p> {
     fn fit(&self, velocity_m_s: &Array2<f64>) -> Option<f64> {
         let (scene, g) = (&self.plan.scene.scene, &self.plan.geometry);
         let shown = self.response.shown(scene, self.pair.lateral_position_m)?;
-        let some: Vec<usize> = (0..g.gate_range_m.len()).step_by(gate_step(scene)).collect();
+        let some: Vec<usize> =
+            (0..g.gate_range_m.len()).step_by(gate_step(scene, spacing_m(&g.gate_range_m))).collect();
         let range_m: Vec<f64> = some.iter().map(|i| g.gate_range_m[*i]).collect();
         let velocity_m_s = velocity_m_s.select(ndarray::Axis(1), &some);
         let map = VelocityMap {
@@ -81,8 +82,10 @@ impl<'p> Retrieval<'p> {
             velocity_m_s: velocity_m_s.view(),
             standard_deviation_m_s: None,
         };
-        let correlated_lines = correlated_lines(scene, scene.scan.elevation_step_rad, self.pair.lateral_position_m);
-        let options = MapFitOptions { free: free(), correlated_lines, ..Default::default() };
+        let step_rad = scene.scan.elevation_step_rad;
+        let correlated_lines = self.response.correlated_lines(step_rad, self.pair.lateral_position_m);
+        let core_radius_m = scene.retrieval.as_ref().and_then(|wanted| wanted.core_radius_m);
+        let options = MapFitOptions { free: free(), core_radius_m, correlated_lines, ..Default::default() };
         let wake = fit_map_of_estimator(&map, &self.model(), &shown, &options).ok()?.wake;
         Some(0.5 * (wake.left.circulation_m2_s + wake.right.circulation_m2_s))
     }

@@ -162,6 +162,90 @@ fn a_map_of_a_run_is_retrieved_within_its_deviations_from_every_file_and_from_it
     );
 }
 
+/// A scan with gates that touch, as HALO files have them.
+const TOUCHING: &str = "seed = 5\n[pulse]\nenergy_j = 5e-3\n[scan]\nelevation_step_rad = 5e-3\nrealisations = 1\nrange_min_m = 268.614\n\
+    [estimator]\ngate_step_samples = 64\n[outputs]\nhpl = true\nflow = false\nsvg = false\npng = false\nprofile_points = 2\n";
+
+/// The lines of a table that programs write again: without what stands before the header.
+fn without_comments(path: &Path) -> String {
+    let text = fs::read_to_string(path).unwrap();
+    text.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect()
+}
+
+#[test]
+fn equal_velocities_have_equal_circulations_whether_their_scene_is_found_or_stated_and_without_it_a_deviation_that_covers()
+ {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    fs::write(folder.join("s.toml"), TOUCHING).unwrap();
+    assert!(wakescope(folder, &["run", "s.toml", "--out", "o", "--quiet"]).status.success());
+    fs::write(folder.join("bare.csv"), without_comments(&folder.join("o/map.csv"))).unwrap();
+    let own = retrieved(folder, "o/map.nc");
+    let head = fs::read_to_string(folder.join("r/retrieval.csv")).unwrap();
+    assert!(head.contains("# seed: 5\n") && head.contains("#   energy_j = 0.005\n"), "the scene that the fit has read");
+    for words in ["o/map.csv", "o/map.nc --scene s.toml", "bare.csv --scene s.toml", "o/halo.hpl --scene s.toml"] {
+        let other = retrieved(folder, words);
+        for (row, name) in [(0, "gamma_m2_s"), (1, "gamma_m2_s"), (0, "y_m"), (1, "z_m")] {
+            let (a, b) = (number(&own, row, name), number(&other, row, name));
+            // files round velocities and angles
+            assert!((a - b).abs() < 0.02 * a.abs(), "{words}: {name} {a}, {b}");
+        }
+        assert!(!text(&other, 0, "flags").contains("taken_for_means"), "{words}");
+    }
+    for words in ["bare.csv", "o/halo.hpl"] {
+        let out = wakescope(folder, &["retrieve", words, "--out", "r", "--overwrite"]);
+        let told = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success() && told.contains("has lost its scene") && told.contains("--scene"), "{told}");
+        let lost = TextTable::read(&folder.join("r/retrieval.csv")).unwrap();
+        for row in 0..2 {
+            let [mean, std] = ["gamma_5_15_m2_s", "gamma_5_15_std_m2_s"].map(|name| number(&lost, row, name));
+            assert!((mean - 466.635).abs() < 2.0 * std && std < mean, "{words}: {mean} +- {std}");
+            assert!(text(&lost, row, "flags").contains("taken_for_means"), "{words}");
+        }
+    }
+    // What is stated in words stands for the scene: 256 ns of a Gaussian window.
+    let stated = "bare.csv --estimator periodogram --pulse 200e-9 --window 256e-9 --weighting gaussian";
+    let stated = retrieved(folder, stated);
+    for row in 0..2 {
+        let [a, b] = [&own, &stated].map(|table| number(table, row, "gamma_5_15_m2_s"));
+        assert!((a - b).abs() < 0.1 * a && !text(&stated, row, "flags").contains("taken_for_means"), "{a}, {b}");
+    }
+    let refused = wakescope(folder, &["retrieve", "bare.csv", "--estimator", "median", "--out", "x", "--quiet"]);
+    let told = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(
+        refused.status.code() == Some(2) && told.contains("estimator.method.kind") && told.contains("median"),
+        "{told}"
+    );
+}
+
+/// Tables that say of their scene what the test needs; nothing is simulated.
+#[test]
+fn a_fit_opens_no_flow_and_a_scene_that_is_not_read_is_refused_with_its_key() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    fs::write(folder.join("s.toml"), SCENE).unwrap();
+    assert!(wakescope(folder, &["run", "s.toml", "--out", "o", "--quiet"]).status.success());
+    let own = retrieved(folder, "o/map.csv");
+    let map = fs::read_to_string(folder.join("o/map.csv")).unwrap();
+    let (before, flow) = map.split_once("#   [flow]\n").unwrap();
+    let (_, after) = flow.split_once("#   [scan").unwrap();
+    let simulated = format!("{before}#   [flow]\n#   kind = \"simulated\"\n#   planes = \"gone.nc\"\n#   [scan{after}");
+    fs::write(folder.join("simulated.csv"), simulated).unwrap();
+    let found = retrieved(folder, "simulated.csv");
+    assert_eq!(number(&found, 0, "gamma_m2_s"), number(&own, 0, "gamma_m2_s"));
+    let detected = wakescope(folder, &["detect", "simulated.csv", "--out", "d", "--empty-scans", "2000", "--quiet"]);
+    assert!(detected.status.success(), "{}", String::from_utf8_lossy(&detected.stderr));
+    fs::write(folder.join("unknown.csv"), map.replace("#   [flow]\n", "#   [flow]\n#   colour = 3\n")).unwrap();
+    for command in ["retrieve", "detect"] {
+        let out = wakescope(folder, &[command, "unknown.csv", "--out", "x", "--quiet"]);
+        let told = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert_eq!(out.status.code(), Some(2), "{told}");
+        assert!(told.contains("flow.colour") && told.contains("--scene"), "{told}");
+    }
+    let stated = retrieved(folder, "unknown.csv --scene s.toml");
+    assert_eq!(number(&stated, 0, "gamma_m2_s"), number(&own, 0, "gamma_m2_s"));
+}
+
 /// Part of a map of `SCENE`, opened and written again by Py-ART 2.3.0 and xradar 0.12.0, classic NetCDF and NetCDF-4.
 #[test]
 fn maps_that_other_programs_wrote_again_give_the_same_circulations() {

@@ -107,6 +107,8 @@ pub struct MapTop {
 pub struct MapFitOptions {
     /// What may change.
     pub free: FreeParameters,
+    /// Core radius \[m\] that fixed cores keep; a typical part of the spacing if absent.
+    pub core_radius_m: Option<f64>,
     /// What is known of the core radii that may change.
     pub core_prior: Option<CorePrior>,
     /// What residuals cost.
@@ -125,6 +127,7 @@ impl Default for MapFitOptions {
     fn default() -> Self {
         Self {
             free: FreeParameters::default(),
+            core_radius_m: None,
             core_prior: Some(CorePrior::TYPICAL),
             loss: Loss::Cauchy { width: 2.385 },
             correlated_lines: 8,

@@ -80,7 +80,7 @@ pub fn fit_map_of_estimator(
 }
 
 /// Fits the wake to a map that an estimator made, from a given start on: what is expected of a wake is the estimate from its
-/// expected correlograms.
+/// expected correlograms. A vortex that has no circulation at the start is none: its numbers are not fitted.
 ///
 /// # Errors
 /// As [`refine_map_fit`].
@@ -181,19 +181,21 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     ) -> Result<Self, Error> {
         let prepared = response.prepared(model, (map.elevation_rad, map.range_m), coarser);
         let kernel = prepared.kernel()?;
-        let least_core_m = SMALLEST_CORE * map.line_spacing_m().max(response.radius_m());
+        let least_core_m = SMALLEST_CORE * map.line_spacing_m().max(response.least_radius_m(map.range_m));
         Ok(Self { map, model, prepared, kernel, options: *options, least_core_m })
     }
 
     /// Four vortices in place of a pair, if they explain the map better.
     fn with_secondary(&self, pair: &Wake) -> Option<Found> {
         let Self { map, model, prepared, kernel, options, .. } = self;
-        Setting { map, model, prepared: Some(prepared), kernel, options, groups: &options.free.groups() }.find(pair)
+        let groups = &options.free.groups();
+        Setting { map, model, prepared: Some(prepared), kernel, seconds: None, options, groups }.find(pair)
     }
 
     /// The places that tell nearly all of the map.
     fn coarse(&self, response: &EstimatorResponse<'_>, lines_over_radius: f64) -> Option<Coarse> {
-        Coarse::of(&self.map, lines_over_radius * response.radius_m(), GATES_OVER_WIDTH * self.kernel.width_m())
+        let line_m = lines_over_radius * response.least_radius_m(self.map.range_m);
+        Coarse::of(&self.map, line_m, GATES_OVER_WIDTH * self.kernel.width_m())
     }
 
     /// The fit from a start on until the step that is left is below `near_sigmas` or the tolerance, with slopes from `few` places, if there

@@ -21,6 +21,7 @@ use crate::error::{Error, length, not_negative, positive};
 use crate::estimators::Estimator;
 use crate::linalg::dot;
 use crate::parallel::map_indexed;
+use crate::retrieval::Motion;
 use crate::spectrum::{Correlogram, Taper};
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::wake_map::region;
@@ -45,7 +46,6 @@ fn below<'p>(powers: impl Iterator<Item = &'p f64>, least: f64) -> usize {
 }
 
 /// How the velocities of a map were estimated: correlogram, estimator, pulse, noise and regions.
-#[derive(Clone)]
 pub struct EstimatorResponse<'a> {
     estimator: &'a dyn Estimator,
     kind: SignalKind,
@@ -54,7 +54,10 @@ pub struct EstimatorResponse<'a> {
     pulse: PulseShape,
     /// Lags of the noise over the power of the signal.
     noise: Vec<f64>,
-    radius_m: f64,
+    /// Radius of the region at a range \[m\].
+    radius_m: Box<dyn Fn(f64) -> f64 + Send + Sync + 'a>,
+    /// Elevation \[rad\] and time \[s\] of the lines, if the vortices move meanwhile.
+    line_times: Vec<(f64, f64)>,
 }
 
 impl<'a> EstimatorResponse<'a> {
@@ -95,8 +98,22 @@ impl<'a> EstimatorResponse<'a> {
             sampling: *sampling,
             pulse: pulse.clone(),
             noise,
-            radius_m,
+            radius_m: Box::new(move |_| radius_m),
+            line_times: Vec::new(),
         })
+    }
+
+    /// The same with regions whose radius \[m\] depends on the range \[m\].
+    #[must_use]
+    pub fn with_radius(self, radius_m: impl Fn(f64) -> f64 + Send + Sync + 'a) -> Self {
+        Self { radius_m: Box::new(radius_m), ..self }
+    }
+
+    /// The same with vortices that move while the lines, at `elevation_rad` \[rad\], are measured: `seconds` \[s\] after the time that the
+    /// wake is given for. A line that is none of these sees it as it is then.
+    #[must_use]
+    pub fn moving(self, elevation_rad: &[f64], seconds: &[f64]) -> Self {
+        Self { line_times: elevation_rad.iter().copied().zip(seconds.iter().copied()).collect(), ..self }
     }
 
     /// The map \[line, gate\] of velocities \[m/s\] at `elevation_rad` \[rad\] and `range_m` \[m\], both increasing;
@@ -116,9 +133,14 @@ impl<'a> EstimatorResponse<'a> {
         Ok(self.prepared(model, (elevation_rad, range_m), 1.0).velocities(wake))
     }
 
-    /// Radius of the regions \[m\].
-    pub(crate) fn radius_m(&self) -> f64 {
-        self.radius_m
+    /// Least radius of the regions at those ranges \[m\].
+    pub(crate) fn least_radius_m(&self, range_m: &[f64]) -> f64 {
+        range_m.iter().map(|range_m| (self.radius_m)(*range_m)).fold(f64::INFINITY, f64::min)
+    }
+
+    fn seconds_of(&self, elevation_rad: f64) -> f64 {
+        let line = self.line_times.iter().find(|(elevation, _)| *elevation == elevation_rad);
+        line.map_or(0.0, |(_, seconds)| *seconds)
     }
 
     /// The weights of the air on nodes that fit the gates of those elevations and ranges, `coarser` times as far apart as maps need.
@@ -161,10 +183,25 @@ impl<'a> EstimatorResponse<'a> {
             .iter()
             .enumerate()
             .flat_map(|(line, _)| range_m.iter().map(move |&range_m| (line, range_m)))
-            .map(|(line, range_m)| region(elevation_rad, line, range_m, self.radius_m).collect())
+            .map(|(line, range_m)| region(elevation_rad, line, range_m, (self.radius_m)(range_m)).collect())
             .collect();
         let first_offset_m = (before as f64 - reach as f64) * spacing_m;
-        Prepared { response: self, model, elevation_rad, range_m, first_offset_m, spacing_m, numbers, weights, regions }
+        let seconds = match self.line_times.is_empty() {
+            true => Vec::new(),
+            false => elevation_rad.iter().map(|elevation_rad| self.seconds_of(*elevation_rad)).collect(),
+        };
+        Prepared {
+            response: self,
+            model,
+            elevation_rad,
+            range_m,
+            first_offset_m,
+            spacing_m,
+            numbers,
+            weights,
+            regions,
+            seconds,
+        }
     }
 }
 
@@ -182,6 +219,8 @@ pub(crate) struct Prepared<'r> {
     weights: Vec<f64>,
     /// Lines of the region of each place with their shares, one line of the map after the other.
     regions: Vec<Vec<(usize, f64)>>,
+    /// Time of each line after that of the wake \[s\]; empty if it stands still.
+    seconds: Vec<f64>,
 }
 
 impl Prepared<'_> {
@@ -199,6 +238,15 @@ impl Prepared<'_> {
         &self.regions[line * self.range_m.len() + gate]
     }
 
+    /// The wake when each line is measured.
+    fn wakes(&self, model: &WakeModel, wake: &Wake) -> Vec<Wake> {
+        if self.seconds.is_empty() {
+            return vec![*wake; self.elevation_rad.len()];
+        }
+        let motion = Motion::new(model, wake);
+        self.seconds.iter().map(|seconds| motion.wake_after(wake, *seconds)).collect()
+    }
+
     /// The map of a wake.
     pub(crate) fn velocities(&self, wake: &Wake) -> Array2<f64> {
         self.velocities_of(self.model, wake)
@@ -207,8 +255,9 @@ impl Prepared<'_> {
     /// The map of a wake by another model.
     pub(crate) fn velocities_of(&self, model: &WakeModel, wake: &Wake) -> Array2<f64> {
         let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
+        let wakes = self.wakes(model, wake);
         let correlograms = map_indexed(lines, Vec::new, |phasors, line| {
-            self.line((model, wake), Ray::new(self.elevation_rad[line]), phasors)
+            self.line((model, &wakes[line]), Ray::new(self.elevation_rad[line]), phasors)
         });
         let state = || (Scratch::new(), vec![0.0; self.numbers]);
         let rows = map_indexed(lines, state, |(scratch, mean), line| {
@@ -230,6 +279,7 @@ impl Prepared<'_> {
         let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
         let nodes = self.weights.len() / self.numbers;
         let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
+        let wakes = self.wakes(self.model, wake);
         let moments = map_indexed(lines, Vec::new, |velocities: &mut Vec<f64>, line| {
             let ray = Ray::new(self.elevation_rad[line]);
             velocities.clear();
@@ -237,7 +287,7 @@ impl Prepared<'_> {
                 let index = ((range_m - nearest_m) / self.spacing_m).round() as usize;
                 while velocities.len() < index + nodes {
                     let at_m = nearest_m + self.first_offset_m + velocities.len() as f64 * self.spacing_m;
-                    velocities.push(self.model.velocity_on(wake, at_m, ray));
+                    velocities.push(self.model.velocity_on(&wakes[line], at_m, ray));
                 }
                 let seen = self.weights.iter().step_by(self.numbers).zip(&velocities[index..]);
                 seen.fold([0.0, 0.0], |[mean, square], (w, v)| [mean + w * v, square + w * v * v])

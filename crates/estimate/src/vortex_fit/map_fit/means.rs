@@ -90,7 +90,7 @@ impl<'a, 'm> Fit<'a, 'm> {
         let used = map.validate()?;
         guess.validate()?;
         options.core_prior.as_ref().map_or(Ok(()), CorePrior::validate)?;
-        let groups = options.free.groups();
+        let groups = options.free.groups_of(guess);
         let needed = 10 * groups.len().max(1);
         if used < needed {
             return Err(Error::TooFewVelocities { found: used, needed });

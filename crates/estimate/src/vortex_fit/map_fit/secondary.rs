@@ -2,7 +2,7 @@
 //!
 //! Gates that are longer than the distance of a vortex from its secondary one see both at once: a fit of two vortices then puts them metres
 //! to the side and some tenths too weak. So the residuals of such a fit are searched for a vortex of the other sense near each of
-//! the two. If both together explain enough, all four are fitted at once: damped steps of Gauss and Newton with difference quotients at
+//! the two, beside all that the pair or another profile of its vortices could do about them. If both together explain enough, all four are fitted at once: damped steps of Gauss and Newton with difference quotients at
 //! every few places, weighted with the loss. Of secondary vortices it is known before how strong they are and how far from their vortex
 //! (`KNOWN_RATIO`, `KNOWN_DISTANCE`), and their cores are kept. Check: exact maps with four vortices, and with two; simulated wakes.
 
@@ -10,6 +10,7 @@ use ndarray::{Array1, Array2, Zip};
 use std::ops::Range;
 
 use crate::error::Error;
+use crate::retrieval::Motion;
 use crate::vortex_fit::damped_newton::{Averaging, halved, inverse, solve};
 use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
@@ -18,7 +19,7 @@ use crate::vortex_fit::map_fit::tangent::{self, Tangent};
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
-use crate::vortex_fit::{CorePrior, MapFitOptions, RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
+use crate::vortex_fit::{CorePrior, CoreProfile, MapFitOptions, RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
 
 /// Circulation over that of the vortex, and distance over its height: mean and standard deviation. The strongest secondary vortex of the
 /// medium wake (the mean along x, `wake_scaled.csv`) has -0.2 to -0.3 and 1.1 to 0.5 between tau = 1.25 and 2.5, without the weaker
@@ -52,6 +53,8 @@ pub(crate) struct Setting<'a, 'm> {
     pub(crate) prepared: Option<&'a Prepared<'a>>,
     /// What gates see in the mean.
     pub(crate) kernel: &'a RangeKernel,
+    /// Seconds of each line after the time of the wake, for means of vortices that move; what an estimator shows moves by itself.
+    pub(crate) seconds: Option<&'a [f64]>,
     pub(crate) options: &'a MapFitOptions,
     pub(crate) groups: &'a [Vec<usize>],
 }
@@ -124,6 +127,8 @@ struct Free<'a> {
     slopes: &'a [Array2<f64>],
     /// Of the curvature.
     inverse: Array2<f64>,
+    /// Where the free numbers go.
+    step: Array1<f64>,
 }
 
 impl Setting<'_, '_> {
@@ -136,9 +141,17 @@ impl Setting<'_, '_> {
         }
         let none = |own: &Vortex| Vortex { circulation_m2_s: 0.0, ..*own };
         let two = State { wake: *pair, secondary: [none(&pair.left), none(&pair.right)] };
-        let alone = self.about(&two, &self.quotients(&two)[..self.groups.len()]);
+        let mut alone = self.about(&two, &self.quotients(&two)[..self.groups.len()]);
         let counted = alike(&self.cells(&alone), self.options.correlated_lines);
-        let (secondary, gain) = self.search(pair, &alone)?;
+        // A profile that does not fit is not mended by vortices.
+        let profile = match self.model.profile {
+            CoreProfile::Algebraic => CoreProfile::LambOseen,
+            CoreProfile::LambOseen => CoreProfile::Algebraic,
+        };
+        let other = self.velocities_of(&WakeModel { profile, ..*self.model }, pair);
+        let apart = other - &alone.here;
+        alone.slopes.push(apart);
+        let (secondary, gain, of_profile) = self.search(pair, &alone)?;
         if gain / counted < LEAST_SEARCHED {
             return None;
         }
@@ -146,7 +159,7 @@ impl Setting<'_, '_> {
         let here = self.velocities(&state);
         let four = self.linear(&state.wake, here, Vec::new());
         let known: f64 = state.away().iter().map(|away| 0.5 * away * away).sum();
-        let gain = (self.log_likelihood(&four) - self.log_likelihood(&alone)) / counted - known;
+        let gain = (self.log_likelihood(&four) - self.log_likelihood(&alone) - of_profile) / counted - known;
         // one far from its vortex stands for something else; a little beyond the scan it may be
         let stands = (0..2).all(|side| {
             let (own, other) = (state.primary(side), &state.secondary[side]);
@@ -162,14 +175,20 @@ impl Setting<'_, '_> {
     }
 
     fn velocities(&self, state: &State) -> Array2<f64> {
-        let model = WakeModel { secondary: Some(state.secondary), ..*self.model };
+        self.velocities_of(&WakeModel { secondary: Some(state.secondary), ..*self.model }, &state.wake)
+    }
+
+    fn velocities_of(&self, model: &WakeModel, wake: &Wake) -> Array2<f64> {
         match self.prepared {
-            Some(prepared) => prepared.velocities_of(&model, &state.wake),
+            Some(prepared) => prepared.velocities_of(model, wake),
             None => {
                 let mut velocities = Array2::zeros(self.map.velocity_m_s.dim());
                 let mut scratch = LineScratch::default();
-                for (elevation_rad, mut row) in self.map.elevation_rad.iter().zip(velocities.rows_mut()) {
-                    let seen = (&model, &state.wake, Ray::new(*elevation_rad));
+                let motion = self.seconds.map(|seconds| (Motion::new(model, wake), seconds));
+                for (line, mut row) in velocities.rows_mut().into_iter().enumerate() {
+                    let then =
+                        motion.as_ref().map_or(*wake, |(motion, seconds)| motion.wake_after(wake, seconds[line]));
+                    let seen = (model, &then, Ray::new(self.map.elevation_rad[line]));
                     self.kernel.apply(seen, self.map.range_m, false, &mut scratch, |gate, v, _| row[gate] = v);
                 }
                 velocities
@@ -213,13 +232,14 @@ impl Setting<'_, '_> {
     }
 
     /// The vortices of the other sense, one beside each of the pair, that explain most of its residuals by their means over gates if the pair
-    /// may move along its slopes, and how much of the logarithm of the likelihood.
-    fn search(&self, pair: &Wake, alone: &Linear) -> Option<([Vortex; 2], f64)> {
+    /// may move along its slopes, how much of the logarithm of the likelihood, and how much these slopes explain.
+    fn search(&self, pair: &Wake, alone: &Linear) -> Option<([Vortex; 2], f64, f64)> {
         let mut free = Free {
             weighted: Array2::zeros(alone.here.dim()),
             weights: Array2::zeros(alone.here.dim()),
             slopes: &alone.slopes,
             inverse: Array2::zeros((0, 0)),
+            step: Array1::zeros(0),
         };
         for (place, residual, unit) in self.residuals(alone) {
             let weight = self.options.loss.at(residual).1;
@@ -237,8 +257,14 @@ impl Setting<'_, '_> {
         let order = alone.slopes.len();
         let curvature = Array2::from_shape_fn((order, order), |(i, j)| product(&alone.slopes[i], &alone.slopes[j]));
         free.inverse = inverse("curvature of the fit", &curvature).ok()?;
+        let along = |slope: &Array2<f64>| {
+            let both = Zip::from(slope).and(&free.weighted).and(&free.weights);
+            both.fold(0.0, |sum, s, r, w| if *w > 0.0 { sum + s * r } else { sum })
+        };
+        let gradient: Array1<f64> = alone.slopes.iter().map(along).collect();
+        free.step = free.inverse.dot(&gradient);
         let ((left, a), (right, b)) = (self.beside(pair, 0, &free)?, self.beside(pair, 1, &free)?);
-        Some(([left, right], a + b))
+        Some(([left, right], a + b, 0.5 * gradient.dot(&free.step)))
     }
 
     /// Every second place of a grid first, then those about the best of them.
@@ -293,6 +319,7 @@ impl Setting<'_, '_> {
         }
         // what the pair could do as well does not count
         let square = square - shared.dot(&free.inverse.dot(&shared));
+        let slope = slope - shared.dot(&free.step);
         let allowed = (RATIOS.0 * own.circulation_m2_s, RATIOS.1 * own.circulation_m2_s);
         let circulation_m2_s = (slope / square).clamp(allowed.0, allowed.1);
         let gain = circulation_m2_s * (slope - 0.5 * circulation_m2_s * square);

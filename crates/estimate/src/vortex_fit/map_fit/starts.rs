@@ -18,16 +18,19 @@ const SAME_SIGMAS: f64 = 0.3;
 /// Ends of rough fits that are closer lead to one.
 const ONE_SIGMAS: f64 = 1.0;
 
-/// The starts about a wake: its core radii are the typical one, and others if they are fitted.
+/// The starts about a wake: its core radii are the one that is kept, the typical one, or that and others if they are fitted.
 pub(crate) fn starts(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
-    let fitted = options.free.core_radius != Sharing::Fixed;
-    let of = |over_spacing: f64| {
+    let typical_m = CORES_OVER_SPACING.map(|over_spacing| over_spacing * about.spacing_m());
+    let cores_m = match options.free.core_radius {
+        Sharing::Fixed => vec![options.core_radius_m.unwrap_or(typical_m[0])],
+        Sharing::Common | Sharing::Separate => typical_m.to_vec(),
+    };
+    let of = |core_m: f64| {
         let mut wake = *about;
-        let core_m = over_spacing * wake.spacing_m();
         (wake.left.core_radius_m, wake.right.core_radius_m) = (core_m, core_m);
         wake
     };
-    CORES_OVER_SPACING.into_iter().take(if fitted { CORES_OVER_SPACING.len() } else { 1 }).map(of).collect()
+    cores_m.into_iter().map(of).collect()
 }
 
 /// The best end of the fits from some starts; the first error if none comes to an end.

@@ -92,9 +92,12 @@ const NEAR: f64 = 3.0;
 /// The map is linear enough over this many steps.
 const REACH: f64 = 12.0;
 
+/// Spacing that stands for that of a vortex without a partner \[m\].
+const LONE_M: f64 = 45.0;
+
 /// Step of a difference quotient.
 pub(crate) fn step(wake: &Wake, place: usize) -> f64 {
-    let spacing_m = wake.spacing_m();
+    let spacing_m = if wake.is_pair() { wake.spacing_m() } else { LONE_M };
     match place {
         0 | 1 => 0.01 * wake.to_array()[place].abs().max(1.0),
         2..=5 => 0.006 * spacing_m,

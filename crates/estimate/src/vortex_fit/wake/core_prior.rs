@@ -27,8 +27,11 @@ impl CorePrior {
     }
 
     /// For each free number that moves core radii: how many deviations the core is away, and the derivatives of that by all
-    /// free numbers.
+    /// free numbers. Nothing for one vortex, which has no spacing.
     pub(crate) fn terms(&self, wake: &Wake, groups: &[Vec<usize>]) -> Vec<(f64, Vec<f64>)> {
+        if !wake.is_pair() {
+            return Vec::new();
+        }
         let (p, spacing_m) = (wake.to_array(), wake.spacing_m());
         let term = |place: usize| {
             let away = (p[place] / (self.median_ratio * spacing_m)).ln() / self.log_deviation;

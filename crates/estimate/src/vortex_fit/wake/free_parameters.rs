@@ -87,6 +87,17 @@ impl FreeParameters {
         groups
     }
 
+    /// The same without the numbers of a vortex that a wake does not have: one without circulation.
+    pub(crate) fn groups_of(&self, wake: &Wake) -> Vec<Vec<usize>> {
+        let has = |place: &usize| match place {
+            0 | 2 | 3 | 6 => wake.left.circulation_m2_s != 0.0,
+            1 | 4 | 5 | 7 => wake.right.circulation_m2_s != 0.0,
+            _ => true,
+        };
+        let own = |group: Vec<usize>| group.into_iter().filter(has).collect::<Vec<usize>>();
+        self.groups().into_iter().map(own).filter(|group| !group.is_empty()).collect()
+    }
+
     /// A start that obeys the ties: common quantities at their mean.
     pub(crate) fn start(&self, wake: &Wake) -> Wake {
         let mut p = wake.to_array();

@@ -125,6 +125,11 @@ impl Wake {
         finite("wind_shear_per_s", self.wind_shear_per_s)
     }
 
+    /// Whether both vortices have a circulation: one without is none.
+    pub(crate) fn is_pair(&self) -> bool {
+        self.left.circulation_m2_s != 0.0 && self.right.circulation_m2_s != 0.0
+    }
+
     /// Lateral distance of the vortices \[m\].
     #[must_use]
     pub fn spacing_m(&self) -> f64 {

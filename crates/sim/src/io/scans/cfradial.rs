@@ -89,7 +89,9 @@ pub(super) fn scans(
     let (mut out, mut left_out) = (Vec::new(), Vec::new());
     let pulse_width_s = if file.has("pulse_width") { first(file, "pulse_width")? } else { None };
     let step_m = range_m.get(1).zip(range_m.first()).map(|(second, first)| second - first);
-    let scene_toml = file.global_text("scene").or_else(|| file.text(&velocity.name, "scene"));
+    let of_field = |file: &dyn Source, name| file.text(&velocity.name, name);
+    let scene_toml =
+        file.global_text("scene").or_else(|| of_field(file, "scene")).or_else(|| of_field(file, "instrument"));
     let is_own = file.global_text("source").is_some_and(|source| source.starts_with("wakescope "));
     for (number, rays) in sweeps(file, count)?.into_iter().enumerate() {
         let number = number + sweep;

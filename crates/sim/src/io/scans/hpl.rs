@@ -92,7 +92,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
             gate_length_m: Some(header.gate_length_m),
             pulse_width_s: None,
             scene_toml: None,
-            is_own: false,
+            is_own: head.contains(&crate::io::hpl::SYSTEM_ID),
         });
     }
     Ok(out)

@@ -9,7 +9,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Names of the velocity, the first that is there is taken.
-const VELOCITIES: [&str; 4] = ["velocity_m_s", "v_mean_m_s", "radial_velocity_m_s", "radial_velocity"];
+const VELOCITIES: [&str; 4] = ["velocity_m_s", OWN, "radial_velocity_m_s", "radial_velocity"];
+/// That of the estimates of this program.
+const OWN: &str = "v_mean_m_s";
 /// Names of its standard deviation.
 const SIGMAS: [&str; 3] = ["sigma_m_s", "std_m_s", "predicted_std_m_s"];
 /// Values of an axis that differ by less than this part of its mean step are the same.
@@ -56,7 +58,7 @@ impl Columns {
             Some(name) => needed(&[name])?,
             None => needed(&VELOCITIES)?,
         };
-        let is_mean = table.header.get(velocity).is_some_and(|name| name == "v_mean_m_s");
+        let is_mean = table.header.get(velocity).is_some_and(|name| name == OWN);
         let sigma = SIGMAS.iter().find_map(|name| table.column(name));
         Ok(Self {
             range: needed(&["range_m"])?,
@@ -105,7 +107,8 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
                 gate_length_m: None,
                 pulse_width_s: None,
                 scene_toml: Some(origin.scene_toml.clone()).filter(|text| !text.is_empty()),
-                is_own: table.comment.trim_start().starts_with("source: wakescope "),
+                // Programs that write it again keep the names of its columns.
+                is_own: table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some(),
             })
         })
         .collect()
