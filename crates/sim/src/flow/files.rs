@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wakescope_les::Flow;
 use wakescope_les::ranks::{Ranks, together};
+use wakescope_les::solver::Ends;
 
 /// The case with every default.
 pub(super) const CASE: &str = "case.toml";
@@ -224,6 +225,10 @@ impl Files {
             x_m: mesh.centre_m(0),
             y_m: mesh.centre_m(1),
             z_m: mesh.centre_m(2),
+            period_m: [0, 1].map(|axis| {
+                let along = &mesh.directions()[axis];
+                (along.ends == Ends::Periodic).then(|| along.length_m())
+            }),
             velocity_m_s: [velocity(0)?, velocity(1)?, velocity(2)?],
             pressure_m2_s2: flow.own_pressure_m2_s2().map_err(Error::Flow)?,
             vorticity_per_s,
@@ -258,7 +263,7 @@ impl Files {
         };
         Ok(CrossPlanes {
             title: format!("{}, plane at x = {x_m} m", self.title),
-            tau: vec![flow.time_s() * self.tau_per_s],
+            tau: vec![super::age_tau(flow.time_s(), self.tau_per_s)],
             time_s: vec![flow.time_s()],
             v_m_s: component(1),
             w_m_s: component(2),

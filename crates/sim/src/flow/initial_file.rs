@@ -1,6 +1,7 @@
 //! An initial field from a classic NetCDF file, on axes of its own.
 //!
-//! The file has variables `u`, `v`, `w` in m/s, each over three dimensions with a coordinate variable in metres for each; they
+//! The file has variables `u`, `v`, `w`, each over three dimensions with a coordinate variable for each, in m/s and m or the units
+//! that attributes name; they
 //! are found by their names or the attribute `axis`, or else are taken to be z, y, x, the last fastest. Along each direction the values are brought to the faces or centres of the mesh by
 //! the cubic through the four nearest nodes, which gives a value at its own node back exactly; periodic directions wrap.
 //!
@@ -29,11 +30,11 @@ pub(super) fn read(path: &Path, mesh: &Mesh) -> Result<[Vec<f64>; 3], Error> {
 fn velocity(file: &mut NetcdfFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, String> {
     let name = ["u", "v", "w"][axis];
     let dims = axes(file, name)?;
-    let mut values = file.ordered(name, &dims)?;
+    let mut values = file.velocities(name, &dims, None)?;
     let mut shape = [0; 3];
     // x is the fastest: direction 0 is the last dimension.
     for (direction, dim) in dims.iter().rev().enumerate() {
-        let coordinate_m = file.coordinate(dim)?;
+        let coordinate_m = file.coordinate_m(dim)?;
         shape[direction] = coordinate_m.len();
         let target_m = if direction == axis { mesh.face_m(direction) } else { mesh.centre_m(direction) };
         let along = &mesh.directions()[direction];

@@ -2,11 +2,13 @@
 //! full precision, from which a run can start. One file for each time: `xarray.concat` or `open_mfdataset` joins them.
 //! Check: the tests read the bytes back and compare axes and values.
 
+use super::edges;
 use super::error::{OutputResult, same_length};
 use super::fields::VelocityField;
 use super::netcdf::{Attr, Data, FILL, Layout, Variable};
 use super::parts::{FileParts, Share};
 use super::provenance::Provenance;
+use wakescope_les::winds::Edges;
 
 /// The field at the centres as a file, or what one of several ranks has of it.
 ///
@@ -22,13 +24,22 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
             .text("units", units)
             .attr("_FillValue", Attr::F32(FILL))
     };
+    // By which readers close a period of cells that are not equal.
+    let across = |name: &str, dims: &'static [&'static str], values: &[f64], long_name: &str, period_m: Option<f64>| {
+        let axis = axis(name, dims, values, long_name);
+        match period_m {
+            Some(period_m) => axis.text("edges", &edges::to_text(Edges::Periodic { period_m })),
+            None => axis,
+        }
+    };
+    let [x_period_m, y_period_m] = field.period_m;
     let mut variables = vec![
         Variable::new("time", &["time"], Data::F64(vec![field.time_s]))
             .text("long_name", "time since the start of the flow")
             .text("units", "s"),
         axis("z", &["z"], &field.z_m, "height of the cell centre above the ground").text("positive", "up"),
-        axis("y", &["y"], &field.y_m, "position of the cell centre across the flight direction"),
-        axis("x", &["x"], &field.x_m, "position of the cell centre along the flight direction"),
+        across("y", &["y"], &field.y_m, "position of the cell centre across the flight direction", y_period_m),
+        across("x", &["x"], &field.x_m, "position of the cell centre along the flight direction", x_period_m),
         data("u", u, "m s-1", "wind along the flight direction").text("standard_name", "x_wind"),
         data("v", v, "m s-1", "horizontal wind across the flight direction").text("standard_name", "y_wind"),
         data("w", w, "m s-1", "vertical wind").text("standard_name", "upward_air_velocity"),
@@ -145,6 +156,8 @@ mod tests {
         assert_eq!(file.read_var_f64("x").unwrap(), field.x_m);
         assert_eq!(file.read_var_f64("z").unwrap(), field.z_m);
         assert_eq!(file.read_var_f64("time").unwrap(), [2.5]);
+        assert_eq!(file.data_set().get_var_attr_as_string("y", "edges").unwrap(), "periodic 3.25");
+        assert_eq!(file.data_set().get_var_attr_as_string("x", "edges"), None);
         assert_eq!(file.data_set().get_var("w").unwrap().dim_names(), ["time", "z", "y", "x"]);
         let expected: Vec<f32> = field.velocity_m_s[2].iter().map(|v| *v as f32).collect();
         assert_eq!(file.read_var_f32("w").unwrap(), expected);

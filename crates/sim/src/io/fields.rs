@@ -18,6 +18,8 @@ pub struct VelocityField {
     pub y_m: Vec<f64>,
     /// Heights of the centres, m, increasing.
     pub z_m: Vec<f64>,
+    /// Lengths of the box along x and y where these are periodic, m.
+    pub period_m: [Option<f64>; 2],
     /// Velocities u, v, w, each `[z][y][x]`, m/s.
     pub velocity_m_s: [Vec<f64>; 3],
     /// Pressure over density, `[z][y][x]`, m^2/s^2, up to a constant.
@@ -88,6 +90,7 @@ pub(crate) fn example() -> VelocityField {
         x_m,
         y_m,
         z_m,
+        period_m: [None, Some(3.25)],
         velocity_m_s: [field(0.25), field(100.5), field(-300.0)],
         pressure_m2_s2: field(0.125),
         vorticity_per_s: Some(field(7.5)),

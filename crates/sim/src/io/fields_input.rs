@@ -4,9 +4,10 @@
 //! Check: fields of this program come back; staggered files made with the names and axes of PALM and WRF give the same wind.
 
 use crate::Error;
+use crate::io::edges;
 use crate::io::netcdf_input::{NetcdfFile, TIME, X, Y, Z, open};
 use std::path::{Path, PathBuf};
-use wakescope_les::winds::VolumeComponent;
+use wakescope_les::winds::{Edges, VolumeComponent};
 
 /// Acceleration of gravity by which WRF makes heights of its geopotential, m/s^2.
 const WRF_GRAVITY_M_S2: f64 = 9.81;
@@ -21,7 +22,7 @@ pub(crate) struct FieldPlace {
     pub(crate) path: PathBuf,
     /// Its place along the time, if the file has such a dimension.
     pub(crate) place: Option<usize>,
-    /// Its time in the unit of the file, which is the second where it says so.
+    /// Its time in s, or in the unit that the file leaves unnamed.
     pub(crate) time_s: f64,
 }
 
@@ -42,7 +43,7 @@ pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> 
 fn times(file: &mut NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
     let Some(dim) = file.dim_of(name, TIME) else {
         // A field on its own: its time is a number beside it.
-        let time = if file.has("time") { seconds(file, "time")?.first().copied() } else { None };
+        let time = if file.has("time") { file.seconds("time")?.first().copied() } else { None };
         return Ok(vec![(None, time.unwrap_or(0.0))]);
     };
     if file.dims(name).and_then(|dims| dims.first().copied()) != Some(dim.as_str()) {
@@ -52,29 +53,30 @@ fn times(file: &mut NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>,
     let Some(source) = source else {
         return Err("it has no times: a variable of the name of its time dimension is needed".into());
     };
-    Ok(seconds(file, &source)?.into_iter().enumerate().map(|(i, t)| (Some(i), t)).collect())
+    Ok(file.seconds(&source)?.into_iter().enumerate().map(|(i, t)| (Some(i), t)).collect())
 }
 
-/// Times in seconds, from the unit that the file states.
-fn seconds(file: &mut NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
-    let unit = file.text(name, "units").and_then(|units| units.split_whitespace().next());
-    let factor = match unit {
-        None | Some("s" | "sec" | "secs" | "second" | "seconds" | "1") => 1.0,
-        Some("min" | "minute" | "minutes") => 60.0,
-        Some("h" | "hour" | "hours") => 3600.0,
-        Some(_) => return Err("its times are in no unit that is known: seconds, minutes or hours".into()),
-    };
-    Ok(file.floats(name)?.into_iter().map(|t| t * factor).collect())
-}
-
-/// The components of one field, in the units and axes of the file.
+/// The components of one field, in m and m/s or the units that the file leaves unnamed, on the axes of the file.
 ///
 /// # Errors
 /// A variable or a coordinate that is missing, a value that is missing, levels that are not level.
 pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<[VolumeComponent; 3], Error> {
     let mut file = open(&field.path)?;
-    let mut component = |name: &str| component(&mut file, name, field.place).map_err(|reason| file.refuse(reason));
+    let mut component =
+        |name: &str| component(&mut file, name, field.place, true).map_err(|reason| file.refuse(reason));
     Ok([component(&names[0])?, component(&names[1])?, component(&names[2])?])
+}
+
+/// Lengths of the periods along x and y that the file states for the component `name` \[m\].
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn periods_m(field: &FieldPlace, name: &str) -> Result<[Option<f64>; 2], Error> {
+    let file = open(&field.path)?;
+    Ok([X, Y].map(|role| match file.text(&file.dim_of(name, role)?, "edges").and_then(edges::from_text) {
+        Some(Edges::Periodic { period_m }) => Some(period_m),
+        _ => None,
+    }))
 }
 
 /// What the air carries with it in one field, in the units and axes of the file.
@@ -83,7 +85,7 @@ pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<[VolumeCom
 /// As [`read`]; a negative value.
 pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeComponent, Error> {
     let mut file = open(&field.path)?;
-    let scalar = component(&mut file, name, field.place).map_err(|reason| file.refuse(reason))?;
+    let scalar = component(&mut file, name, field.place, false).map_err(|reason| file.refuse(reason))?;
     match scalar.values.iter().position(|v| *v < 0.0) {
         Some(at) => {
             Err(file.refuse(format!("{name} is {:?} at place {at}: it must not be negative", scalar.values[at])))
@@ -92,7 +94,12 @@ pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeCompon
     }
 }
 
-fn component(file: &mut NetcdfFile, name: &str, place: Option<usize>) -> Result<VolumeComponent, String> {
+fn component(
+    file: &mut NetcdfFile,
+    name: &str,
+    place: Option<usize>,
+    is_velocity: bool,
+) -> Result<VolumeComponent, String> {
     let dims = match place {
         Some(_) => {
             let [_, z, y, x] = file.roles(name, [TIME, Z, Y, X])?;
@@ -102,7 +109,10 @@ fn component(file: &mut NetcdfFile, name: &str, place: Option<usize>) -> Result<
     };
     let [z, y, x] = dims.each_ref().map(String::as_str);
     let nodes_m = [nodes(file, x, place)?, nodes(file, y, place)?, nodes(file, z, place)?];
-    let values = file.ordered_part(name, &dims, place)?;
+    let values = match is_velocity {
+        true => file.velocities(name, &dims, place)?,
+        false => file.ordered_part(name, &dims, place)?,
+    };
     if let Some(at) = values.iter().position(|v| !v.is_finite()) {
         return Err(format!("{name} is missing or not finite at place {at}: cut what the terrain hides, or fill it"));
     }
@@ -112,7 +122,7 @@ fn component(file: &mut NetcdfFile, name: &str, place: Option<usize>) -> Result<
 /// Places of the nodes along a dimension: its coordinate, or what WRF has instead.
 fn nodes(file: &mut NetcdfFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>, String> {
     if file.has(dim) {
-        return file.coordinate(dim);
+        return file.coordinate_m(dim);
     }
     let staggered = dim.ends_with("_stag");
     let step = match dim.trim_end_matches("_stag") {
@@ -156,4 +166,53 @@ fn levels(file: &mut NetcdfFile, staggered: bool, place: Option<usize>) -> Resul
     }
     let faces_m: Vec<f64> = mean_m.iter().map(|h| h - ground_m).collect();
     Ok(if staggered { faces_m } else { faces_m.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::netcdf::{Data, Layout, Variable};
+
+    #[test]
+    fn velocities_places_and_times_come_in_the_units_that_the_file_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fields_0001.nc");
+        let wind = |name: &str| {
+            let values = (0..64).map(|i| 100.0 * f64::from(i)).collect();
+            Variable::new(name, &["time", "z", "y", "x"], Data::F64(values)).text("units", "cm s-1")
+        };
+        let axis = |name: &str, dims: &'static [&'static str]| {
+            Variable::new(name, dims, Data::F64((0..4).map(|i| 0.01 * f64::from(i)).collect())).text("units", "km")
+        };
+        let time = Variable::new("time", &["time"], Data::F64(vec![0.5])).text("units", "days since 2024-01-01");
+        let scalar =
+            Variable::new("beta", &["time", "z", "y", "x"], Data::F64(vec![2.0; 64])).text("units", "km-1 sr-1");
+        let variables = vec![
+            time,
+            axis("z", &["z"]),
+            axis("y", &["y"]),
+            axis("x", &["x"]),
+            wind("u"),
+            wind("v"),
+            wind("w"),
+            scalar,
+        ];
+        let layout = Layout { dims: vec![("time", 1), ("z", 4), ("y", 4), ("x", 4)], globals: Vec::new(), variables };
+        std::fs::write(&path, layout.into_bytes(&crate::io::provenance::example()).unwrap()).unwrap();
+        let place = places(&path, "u").unwrap().remove(0);
+        assert_eq!(place.time_s, 43_200.0);
+        for component in read(&place, &["u", "v", "w"].map(str::to_owned)).unwrap() {
+            assert!(component.values.iter().enumerate().all(|(i, v)| (v - i as f64).abs() < 1e-12));
+            assert!(
+                component
+                    .nodes_m
+                    .iter()
+                    .flatten()
+                    .zip([0.0, 10.0, 20.0, 30.0].iter().cycle())
+                    .all(|(a, b)| (a - b).abs() < 1e-12)
+            );
+        }
+        // What the air carries keeps its own unit, which the scene scales.
+        assert_eq!(read_scalar(&place, "beta").unwrap().values, vec![2.0; 64]);
+    }
 }

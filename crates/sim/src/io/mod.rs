@@ -18,7 +18,7 @@
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`parts`] | (data) files in parts, for ranks that write them together | - |
 //! | [`atomic`] | files to disk, all or none | - |
-//! | `text_file`, `netcdf_header`, `netcdf_input`, `netcdf4_input`, `planes_input`, `fields_input` | (readers) texts, NetCDF, cross-planes and fields in it | `netcdf` or `netcdf4` but for texts |
+//! | `text_file`, `netcdf_header`, `netcdf_input`, `netcdf4_input`, `planes_input`, `fields_input`, `units` | (readers) texts, NetCDF, cross-planes and fields in it, units | `netcdf` or `netcdf4` but for texts |
 //! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
 //! | `cfradial`, `cf_planes`, `cf_fields`, `cf_signals`, `cf_spectra` (through `netcdf`) | classic NetCDF | `netcdf` |
@@ -36,6 +36,8 @@ pub(crate) mod netcdf_input;
 #[cfg(feature = "netcdf")]
 pub(crate) mod planes_input;
 pub(crate) mod text_file;
+#[cfg(feature = "netcdf")]
+pub(crate) mod units;
 
 #[cfg(feature = "netcdf")]
 pub mod cf_fields;

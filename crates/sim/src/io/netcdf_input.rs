@@ -7,6 +7,7 @@
 
 use crate::io::netcdf_header::{self as header, Attribute, Header, Variable, is_default_fill};
 use crate::io::number::NumberType;
+use crate::io::units::Quantity;
 use crate::{Error, io::text_file};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -332,6 +333,51 @@ impl NetcdfFile {
         Ok(values)
     }
 
+    /// SI units in the unit that the attribute `units` of a variable names; 1 where it has none.
+    ///
+    /// # Errors
+    /// Another unit, with what is needed.
+    pub(crate) fn unit(&self, name: &str, quantity: Quantity) -> Result<f64, String> {
+        let text = self.text(name, "units").unwrap_or_default();
+        let text = text.split(" since ").next().unwrap_or_default();
+        let shown = presentable(name).unwrap_or("a variable");
+        quantity.si(text).map_err(|needed| format!("the attribute units of {shown} is of no use: {needed}"))
+    }
+
+    /// The coordinate of a dimension in metres.
+    ///
+    /// # Errors
+    /// As [`Self::coordinate`]; a unit that is no length.
+    pub(crate) fn coordinate_m(&mut self, dim: &str) -> Result<Vec<f64>, String> {
+        let unit_m = self.unit(dim, Quantity::Length)?;
+        Ok(scaled(self.coordinate(dim)?, unit_m))
+    }
+
+    /// Times in seconds, from the unit of a variable; a date from which they count is left out.
+    ///
+    /// # Errors
+    /// As [`Self::floats`]; a unit that is no time.
+    pub(crate) fn seconds(&mut self, name: &str) -> Result<Vec<f64>, String> {
+        // Plain numbers are taken for seconds.
+        let is_plain = self.text(name, "units") == Some("1");
+        let unit_s = if is_plain { 1.0 } else { self.unit(name, Quantity::Time)? };
+        Ok(scaled(self.floats(name)?, unit_s))
+    }
+
+    /// Velocities in m/s with their dimensions in this order, as [`Self::ordered_part`].
+    ///
+    /// # Errors
+    /// As there; a unit that is no velocity.
+    pub(crate) fn velocities(
+        &mut self,
+        name: &str,
+        order: &[String],
+        place: Option<usize>,
+    ) -> Result<Vec<f64>, String> {
+        let unit_m_s = self.unit(name, Quantity::Velocity)?;
+        Ok(scaled(self.ordered_part(name, order, place)?, unit_m_s))
+    }
+
     /// Values of a variable with its dimensions in this order, the last one fastest.
     ///
     /// # Errors
@@ -375,6 +421,12 @@ impl NetcdfFile {
         }
         Ok(out)
     }
+}
+
+/// The values in another unit; with the same bits in the same.
+fn scaled(mut values: Vec<f64>, unit: f64) -> Vec<f64> {
+    values.iter_mut().for_each(|value| *value *= unit);
+    values
 }
 
 /// A name that may be shown: a short word of letters, digits and underscores. Nothing else of a file is.

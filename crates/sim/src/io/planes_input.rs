@@ -1,6 +1,7 @@
 //! Cross-planes of a simulated flow, read back from the files that `wakescope flow` writes.
 //!
-//! A file has the variables `v` and `w` in m/s over (`tau`, `z`, `y`), the coordinates of the same names, and `time`; attributes
+//! A file has the variables `v` and `w` over (`tau`, `z`, `y`), the coordinates of the same names, and `time`, in SI units or
+//! those that their attributes `units` name; attributes
 //! `edges` of `y` and `z` say what lies beyond their ends. Files of others may have `time` in place of `tau`, and any order.
 //! Check: what was written comes back; files that lack something are refused by name.
 
@@ -53,7 +54,7 @@ fn planes(file: &mut NetcdfFile) -> Result<CrossPlanes, String> {
         return Err("v and w have not the same dimensions".into());
     }
     let [time, z, y] = &dims;
-    let (z_m, y_m) = (file.coordinate(z)?, file.coordinate(y)?);
+    let (z_m, y_m) = (file.coordinate_m(z)?, file.coordinate_m(y)?);
     let [tau, time_s] = times(file, time)?;
     for (name, values) in [("tau", &tau), ("time", &time_s), ("z", &z_m), ("y", &y_m)] {
         let increases = values.windows(2).all(|pair| pair[1] > pair[0]) && values.iter().all(|v| v.is_finite());
@@ -63,7 +64,7 @@ fn planes(file: &mut NetcdfFile) -> Result<CrossPlanes, String> {
     }
     let shape = (tau.len(), z_m.len(), y_m.len());
     let mut component = |name: &str| -> Result<Array3<f64>, String> {
-        let values = file.ordered(name, &dims)?;
+        let values = file.velocities(name, &dims, None)?;
         if let Some(place) = values.iter().position(|v| !v.is_finite()) {
             return Err(format!("{name} is missing or not finite at place {place}"));
         }
@@ -85,22 +86,10 @@ fn times(file: &mut NetcdfFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
             return Err("it has no variable time, the times of the planes in s".into());
         }
         let source = if file.has(name) { name } else { dim };
-        if name == "time" {
-            in_seconds(file, source)?;
-        }
-        let values = file.floats(source)?;
+        let values = if name == "time" || !is_age { file.seconds(source)? } else { file.floats(source)? };
         if values.len() == count { Ok(values) } else { Err(format!("{name} has not one value for each plane")) }
     };
     Ok([values("tau")?, values("time")?])
-}
-
-/// Times have no unit, or seconds.
-fn in_seconds(file: &NetcdfFile, name: &str) -> Result<(), String> {
-    let unit = file.text(name, "units").and_then(|units| units.split_whitespace().next());
-    match unit {
-        None | Some("s" | "sec" | "secs" | "second" | "seconds" | "1") => Ok(()),
-        Some(_) => Err("time is not in seconds: its attribute units must be s, or begin with seconds".into()),
-    }
 }
 
 /// The ends of an axis; open if the file does not say.
@@ -145,6 +134,59 @@ mod tests {
         assert_eq!((found.v_m_s, found.w_m_s), (single(&planes.v_m_s), single(&planes.w_m_s)));
         assert_eq!((found.y_m, found.z_m, found.time_s), (planes.y_m, planes.z_m, planes.time_s));
         assert_eq!((found.tau, found.y_edges, found.z_edges), (planes.tau, planes.y_edges, planes.z_edges));
+    }
+
+    /// The same planes with other units, made with nothing but what a client has.
+    fn with_units(units: [&str; 3], scale: [f64; 3]) -> Result<CrossPlanes, Error> {
+        use crate::io::netcdf::{Data, Layout, Variable};
+        let [velocity, length, time] = scale;
+        let axis = |name: &str, dims: &'static [&'static str], values: &[f64], scale: f64, units: &str| {
+            let values = values.iter().map(|v| v / scale).collect();
+            Variable::new(name, dims, Data::F64(values)).text("units", units)
+        };
+        let planes = whole();
+        let flat = |field: &Array3<f64>| field.iter().copied().collect::<Vec<f64>>();
+        let variables = vec![
+            axis("time", &["time"], &planes.time_s, time, units[2]),
+            axis("z", &["z"], &planes.z_m, length, units[1]),
+            axis("y", &["y"], &planes.y_m, length, units[1]),
+            axis("v", &["time", "z", "y"], &flat(&planes.v_m_s), velocity, units[0]),
+            axis("w", &["time", "z", "y"], &flat(&planes.w_m_s), velocity, units[0]),
+        ];
+        let dims = vec![("time", planes.time_s.len()), ("z", planes.z_m.len()), ("y", planes.y_m.len())];
+        let file = Layout { dims, globals: Vec::new(), variables };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("plane1_0001.nc");
+        std::fs::write(&path, file.into_bytes(&crate::io::provenance::example()).unwrap()).unwrap();
+        read(&path)
+    }
+
+    #[test]
+    fn velocities_lengths_and_times_come_in_the_units_that_the_file_names() {
+        let planes = whole();
+        for (units, scale) in [
+            (["m s-1", "m", "s"], [1.0; 3]),
+            (["cm s-1", "km", "days since 2024-02-29 23:59:58"], [0.01, 1e3, 86_400.0]),
+            (["km/h", "cm", "nanoseconds since 2000-01-01"], [1.0 / 3.6, 0.01, 1e-9]),
+            (["knots", "metre", "milliseconds"], [1852.0 / 3600.0, 1.0, 1e-3]),
+            (["", "", ""], [1.0; 3]),
+        ] {
+            let found = with_units(units, scale).unwrap();
+            let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-12 * b.abs());
+            assert!(close(&found.y_m, &planes.y_m) && close(&found.z_m, &planes.z_m), "{units:?}: {:?}", found.z_m);
+            assert!(close(&found.time_s, &planes.time_s) && close(&found.tau, &planes.time_s), "{units:?}");
+            let flat = |field: &Array3<f64>| field.iter().copied().collect::<Vec<f64>>();
+            assert!(close(&flat(&found.v_m_s), &flat(&planes.v_m_s)), "{units:?}");
+            assert!(close(&flat(&found.w_m_s), &flat(&planes.w_m_s)), "{units:?}");
+        }
+        for (units, name) in [
+            (["furlongs", "m", "s"], "units of v"),
+            (["m", "m", "s"], "units of v"),
+            (["m/s", "degrees", "s"], "units of z"),
+        ] {
+            let message = with_units(units, [1.0; 3]).unwrap_err().to_string();
+            assert!(message.contains(name), "{message}");
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use super::grid::{RayRow, between_turns, of_mean, one_plane, scan_map};
 use super::source::Source;
 use super::{ReadScan, ScanFormat};
 use crate::io::UtcTime;
+use crate::io::units::Quantity;
 use std::path::Path;
 
 const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrument";
@@ -131,7 +132,7 @@ pub(super) fn scans(
 /// The variable that holds the velocities.
 struct Field {
     name: String,
-    /// 1 for velocities that are positive away from the lidar.
+    /// 1 for velocities in m/s that are positive away from the lidar.
     sign: f64,
     /// Whether it is the mean of several scans.
     is_mean: bool,
@@ -154,15 +155,11 @@ impl Field {
                 )?
             }
         };
-        let units = file.text(&name, "units").unwrap_or("m/s".into()).to_ascii_lowercase().replace([' ', '_'], "");
-        if !["m/s", "ms-1", "ms^-1", "m.s-1", "meterspersecond", "meterpersecond", "metrespersecond", ""]
-            .contains(&units.as_str())
-        {
-            return Err(format!("the units of {name} are not m/s"));
-        }
+        let units = file.text(&name, "units").unwrap_or_default();
+        let unit_m_s = Quantity::Velocity.si(&units).map_err(|needed| format!("the units of {name}: {needed}"))?;
         let is_towards = standard(&name) == TOWARDS || format.towards;
         let is_mean = file.text(&name, "cell_methods").is_some_and(|methods| methods.contains("realization: mean"));
-        Ok(Self { name, sign: if is_towards { -1.0 } else { 1.0 }, is_mean })
+        Ok(Self { name, sign: if is_towards { -unit_m_s } else { unit_m_s }, is_mean })
     }
 }
 
@@ -244,8 +241,8 @@ fn angles(file: &mut dyn Source, name: &str) -> Result<Vec<f64>, String> {
 
 /// Ranges of the centres of the gates, m.
 fn ranges(file: &mut dyn Source) -> Result<Vec<f64>, String> {
-    let units = file.text("range", "units").unwrap_or("meters".into()).to_ascii_lowercase();
-    let unit_m = if units.starts_with('k') { 1e3 } else { 1.0 };
+    let units = file.text("range", "units").unwrap_or_default();
+    let unit_m = Quantity::Length.si(&units).map_err(|needed| format!("the units of range: {needed}"))?;
     // One row for each ray where gates differ.
     if file.shape("range").is_some_and(|shape| shape.len() > 1) {
         return Err("range has two dimensions: gates that are the same for all rays are needed".into());
@@ -260,16 +257,7 @@ fn times(file: &mut dyn Source, count: usize) -> Result<(Vec<f64>, Option<UtcTim
     }
     let units = file.text("time", "units").unwrap_or_default().trim().to_owned();
     let (unit, since) = units.split_once(" since ").unwrap_or((&units, ""));
-    let unit_s = match unit.trim().to_ascii_lowercase().as_str() {
-        "" | "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
-        "ms" | "millisecond" | "milliseconds" => 1e-3,
-        "us" | "microsecond" | "microseconds" => 1e-6,
-        "ns" | "nanosecond" | "nanoseconds" => 1e-9,
-        "min" | "minute" | "minutes" => 60.0,
-        "h" | "hour" | "hours" => 3600.0,
-        "d" | "day" | "days" => 86_400.0,
-        _ => return Err("the units of time are none of s, ms, us, ns, minutes, hours, days".into()),
-    };
+    let unit_s = Quantity::Time.si(unit).map_err(|needed| format!("the units of time: {needed}"))?;
     // 2024-01-31T12:00:00Z, or with a blank, without the time, with parts of a second or another zone at the end.
     let mut text = since.trim().replace(' ', "T");
     text.truncate(text.char_indices().nth(19).map_or(text.len(), |(at, _)| at));
@@ -421,7 +409,7 @@ mod tests {
         assert!(refused(&|m| m.0.get_mut("VEL").unwrap().0 = vec![7, 6]).contains("VEL is 7 x 6; 12 rays x 6 ranges"));
         assert!(refused(&|m| drop(m.0.remove("VEL"))).contains("no radial velocity"));
         assert!(refused(&|m| drop(m.0.remove("elevation"))).contains("elevation"));
-        assert!(refused(&|m| m.0.get_mut("VEL").unwrap().1 = vec![("units", "knots")]).contains("units of VEL"));
+        assert!(refused(&|m| m.0.get_mut("VEL").unwrap().1 = vec![("units", "furlongs")]).contains("units of VEL"));
         assert!(refused(&|m| m.0.get_mut("time").unwrap().2 = vec![0.0]).contains("time has 1 values"));
         assert!(refused(&|m| m.0.get_mut("sweep_end_ray_index").unwrap().2 = vec![5.0, 99.0]).contains("ray 99"));
         assert!(

@@ -4,7 +4,7 @@
 
 use crate::Error;
 use crate::beams::direction::sin_cos_of_turn;
-use crate::io::fields_input::{FieldPlace, places, read, read_scalar};
+use crate::io::fields_input::{FieldPlace, periods_m, places, read, read_scalar};
 use crate::io::planes_input::files;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
 use wakescope_les::winds::{Edges, Side, VolumeComponent, VolumeSeries, VolumeSnapshot};
@@ -102,7 +102,8 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
     };
     let components = read(field, &flow.names)?.map(|c| scaled(c, flow.velocity_unit_m_s));
     let refuse = |reason: String| Error::Input { path: field.path.clone(), reason };
-    // The period of evenly spaced nodes; faces and centres have the same.
+    let stated_m = periods_m(field, &flow.names[0])?;
+    // The period that the file states, or of evenly spaced nodes; faces and centres have the same.
     let along = |direction: usize, periodic: bool| -> Result<Edges, Error> {
         let nodes_m = &components[direction].nodes_m[direction];
         let (Some(first), Some(second), Some(last)) = (nodes_m.first(), nodes_m.get(1), nodes_m.last()) else {
@@ -111,9 +112,15 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
         if !periodic {
             return Ok(Edges::Bounded { low: Side::Open, high: Side::Open });
         }
+        if let Some(period_m) = stated_m[direction] {
+            return Ok(Edges::Periodic { period_m: period_m * flow.length_unit_m });
+        }
         let step_m = second - first;
         if nodes_m.windows(2).any(|pair| (pair[1] - pair[0] - step_m).abs() > 1e-6 * step_m) {
-            return Err(refuse("a periodic direction needs nodes at equal distances".into()));
+            return Err(refuse(
+                "a periodic direction needs nodes at equal distances, or an attribute edges = \"periodic LENGTH\""
+                    .into(),
+            ));
         }
         Ok(Edges::Periodic { period_m: last - first + step_m })
     };
