@@ -136,6 +136,16 @@ pub enum Error {
     /// A flow has more kinetic energy than it started with and force or moving walls can have given it.
     #[error("{0}")]
     EnergyGrew(Box<EnergyGrowth>),
+    /// The time step feeds a flow with more energy than viscosity and subgrid model take.
+    #[error("step {step} (t = {time_s:?} s): {energy}")]
+    StepFeeds {
+        /// Number of the step.
+        step: u64,
+        /// Time reached \[s\].
+        time_s: f64,
+        /// What the last steps did.
+        energy: crate::solver::StepEnergy,
+    },
     /// The system refused to read or write a file.
     #[error("cannot {action} {}: {reason}", path.display())]
     File {
@@ -331,7 +341,9 @@ impl std::fmt::Display for PressureFailure {
                 "round-off of so large a solution leaves about {attainable:.0e}, so ask for a tolerance above that, or for a \
                  mesh that is shorter in units of its finest cell"
             ),
-            Self::Stalled => write!(f, "the residual no longer falls; take the direct solver"),
+            Self::Stalled => {
+                write!(f, "the residual no longer falls; take the direct solver, or a mesh whose cells are less flat")
+            }
             Self::NotFinite => write!(f, "the right side holds a value that is not finite"),
         }
     }

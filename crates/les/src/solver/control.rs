@@ -1,7 +1,9 @@
 //! Control of the time step, and what is said of a flow that fails.
 
 use super::flow::Flow;
-use super::settings::{TimeStep, ViscousTreatment};
+use super::growth::metrics;
+use super::mesh::Mesh;
+use super::settings::{FlowSettings, TimeStep, ViscousTreatment};
 use crate::Error;
 
 /// Largest symbol of the Laplacian times the square of the spacing.
@@ -10,20 +12,90 @@ const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
 const IMPLICIT_SHARE: f64 = 0.1;
 /// Largest share of the explicit viscous limit that a variable time step may use.
 const EXPLICIT_SHARE: f64 = 0.5;
+/// Largest product of a variable step and the second of the decay rates of implicit axes. The factored increments take
+/// `(d1 + d2)/((1 + d1/2) (1 + d2/2))` of a wave that is stiff along two axes: a ninth here, less and less beyond.
+const STIFF_DECAY: f64 = 64.0;
+/// Product of the step and the largest decay rate beyond which Crank-Nicolson turns the sign of the shortest waves for hundreds of steps.
+const RINGING_DECAY: f64 = 400.0;
+/// The same beyond which the mean of the viscous powers at both ends of a step is not that of the step.
+const RESOLVED_DECAY: f64 = 4.0;
 /// Largest growth of the time step from one step to the next.
 const LARGEST_GROWTH: f64 = 1.1;
 
+/// Largest decay rate of the viscous term along a direction of cells of these lengths \[1/s\].
+pub(super) fn decay_per_s(metric_m: &[f64], viscosity_m2_s: f64) -> f64 {
+    let least_m = metric_m.iter().copied().fold(f64::INFINITY, f64::min);
+    LAPLACIAN_SYMBOL * viscosity_m2_s / least_m.powi(2)
+}
+
+/// Along which of x, y, z viscosity is implicit in a flow whose largest `sum |u_i|/h_i` is `courant_per_s` at first.
+pub(super) fn implicit_axes(mesh: &Mesh, settings: &FlowSettings, courant_per_s: f64) -> [bool; 3] {
+    let (nu, step_s) = (settings.viscosity_m2_s, settings.time_step.step_s(courant_per_s));
+    match settings.viscous {
+        _ if nu == 0.0 => [false; 3],
+        ViscousTreatment::Implicit(directions) => directions,
+        ViscousTreatment::Auto => metrics(mesh).map(|m| m.len() > 1 && step_s * decay_per_s(&m, nu) > IMPLICIT_SHARE),
+    }
+}
+
+/// The two largest decay rates of viscosity along implicit axes \[1/s\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stiffness([f64; 2]);
+
+impl Stiffness {
+    /// From the rates along all axes; zero where viscosity is not implicit.
+    pub(super) fn new(mut rates_per_s: [f64; 3]) -> Self {
+        rates_per_s.sort_by(|a, b| b.total_cmp(a));
+        Self([rates_per_s[0], rates_per_s[1]])
+    }
+
+    /// Longest step in which waves that are short along two axes decay well \[s\].
+    pub(super) fn longest_s(self) -> f64 {
+        STIFF_DECAY / self.0[1]
+    }
+
+    /// Whether the viscous powers at both ends of a step of `step_s` tell what viscosity does in it.
+    pub(super) fn is_resolved(self, step_s: f64) -> bool {
+        step_s * self.0[0] <= RESOLVED_DECAY
+    }
+
+    /// What steps of `step_s` do to the shortest waves, if it is not what viscosity does.
+    pub(super) fn note(self, step_s: f64, damped_steps: u64) -> Option<String> {
+        let [first, second] = self.0.map(|rate| step_s * rate / LAPLACIAN_SYMBOL);
+        if step_s > (1.0 + 1e-9) * self.longest_s() {
+            return Some(format!(
+                "the step is too long for viscosity along two directions (nu dt/h^2 = {first:.3e} and {second:.3e}): short waves \
+                 hardly decay; take steps of at most {:.3e} s",
+                self.longest_s()
+            ));
+        }
+        (damped_steps == 0 && first * LAPLACIAN_SYMBOL > RINGING_DECAY).then(|| {
+            format!(
+                "Crank-Nicolson keeps the shortest waves of a sudden start for many steps (nu dt/h^2 = {first:.3e}): \
+                 time.damped_steps = 4 takes them out"
+            )
+        })
+    }
+}
+
 impl Flow {
+    /// How stiff viscosity is along the implicit axes.
+    pub(super) fn stiffness(&self) -> Stiffness {
+        let rate = |axis: usize| if self.state.implicit[axis] { self.viscous_rate_per_s(axis) } else { 0.0 };
+        Stiffness::new([rate(0), rate(1), rate(2)])
+    }
+
     /// Length of the next step \[s\].
     pub(super) fn next_step_s(&self) -> f64 {
         match self.settings.time_step {
             TimeStep::Fixed { step_s } => step_s,
-            TimeStep::Courant { courant, longest_s } => {
-                let mut step_s = longest_s.min(courant / self.state.courant_per_s);
+            TimeStep::Courant { .. } => {
+                let mut step_s = self.settings.time_step.step_s(self.state.courant_per_s);
                 let explicit = self.explicit_viscous_rate_per_s();
                 if explicit > 0.0 {
                     step_s = step_s.min(EXPLICIT_SHARE / explicit);
                 }
+                step_s = step_s.min(self.stiffness().longest_s());
                 if self.state.last_step_s > 0.0 {
                     step_s = step_s.min(LARGEST_GROWTH * self.state.last_step_s);
                 }
@@ -38,8 +110,7 @@ impl Flow {
         if line.is_thin() {
             return 0.0;
         }
-        let least_m = line.cell_metric_m.iter().copied().fold(f64::INFINITY, f64::min);
-        LAPLACIAN_SYMBOL * self.settings.viscosity_m2_s / least_m.powi(2)
+        decay_per_s(&line.cell_metric_m, self.settings.viscosity_m2_s)
     }
 
     pub(super) fn explicit_viscous_rate_per_s(&self) -> f64 {
@@ -47,26 +118,16 @@ impl Flow {
     }
 
     pub(super) fn choose_implicit(&self) -> [bool; 3] {
-        if self.settings.viscosity_m2_s == 0.0 {
-            return [false; 3];
-        }
-        match self.settings.viscous {
-            ViscousTreatment::Implicit(directions) => self.layout.direction.map(|d| directions[d]),
-            ViscousTreatment::Auto => {
-                let step_s = match self.settings.time_step {
-                    TimeStep::Fixed { step_s } => step_s,
-                    TimeStep::Courant { courant, longest_s } => longest_s.min(courant / self.state.courant_per_s),
-                };
-                std::array::from_fn(|axis| step_s * self.viscous_rate_per_s(axis) > IMPLICIT_SHARE)
-            }
-        }
+        let implicit = implicit_axes(&self.mesh, &self.settings, self.state.courant_per_s);
+        self.layout.direction.map(|d| implicit[d])
     }
 
     pub(super) fn refuse_courant(&self, courant: f64, step_s: f64) -> Result<(), Error> {
-        let limit = self.settings.scheme.largest_courant();
-        if courant <= limit {
+        let explicit = step_s * self.explicit_viscous_rate_per_s();
+        if courant <= self.settings.scheme.default_courant() && explicit <= EXPLICIT_SHARE {
             return Ok(());
         }
+        let Some(limit) = self.stability()?.refused(step_s) else { return Ok(()) };
         let (_, axis, place) = self.first_largest(|axis, place| self.state.velocity[axis][place].abs())?;
         Err(Error::CourantTooLarge {
             step: self.state.step + 1,

@@ -15,11 +15,12 @@ mod project;
 use super::implicit::LineSolver;
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
-use super::momentum::{Momentum, Scratch};
+use super::momentum::{Momentum, Scratch, add_laplacian_row};
 use super::pressure::{self, PressureSolver, Solved};
 use super::projection::{Divergence, correct, divide_by_volume, weighted_dot};
 use super::report::{StartReport, StepReport};
 use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
+use super::slabs::WHOLE;
 use super::stage::{Powers, Task, blocks};
 use super::subgrid::{Lent, Subgrid};
 use crate::Error;
@@ -196,7 +197,7 @@ impl Flow {
         let courant = step_s * self.state.courant_per_s;
         self.refuse_courant(courant, step_s)?;
         let ratio = (self.state.last_step_s > 0.0).then(|| step_s / self.state.last_step_s);
-        let implicit_share = if self.state.step < self.settings.damped_steps { 1.0 } else { 0.5 };
+        let is_damped = self.state.step < self.settings.damped_steps;
         // Adams-Bashforth starts with a step of Runge-Kutta and then wants the terms of the initial field.
         let starting = self.settings.scheme == TimeScheme::AdamsBashforth2 && ratio.is_none();
         let mut first_terms = None;
@@ -206,12 +207,12 @@ impl Flow {
             let stage_s = stage.fraction * step_s;
             // The report tells the powers of the field that the step began with.
             let first = powers.is_none();
-            let found = self.increments(&stage, stage_s, first)?;
+            let found = self.increments(&stage, stage_s, first, is_damped)?;
             if first && starting {
                 first_terms = Some(self.state.history.clone());
             }
             powers.get_or_insert(found);
-            self.solve_lines(implicit_share * stage_s * self.settings.viscosity_m2_s)?;
+            self.solve_lines(stage_s * self.settings.viscosity_m2_s, is_damped)?;
             solved = Some(self.project(stage_s)?);
             self.update_pressure();
         }
@@ -243,13 +244,14 @@ impl Flow {
         })
     }
 
-    /// The right side of (22) into `star`, with the velocity added if no line solve follows; the work of its terms if `measured`.
-    fn increments(&mut self, stage: &Stage, stage_s: f64, measured: bool) -> Result<Powers, Error> {
+    /// The right side of (22) into `star`, or the velocity with all but implicit viscosity if no line solve follows or a damped one;
+    /// the work of its terms if `measured`.
+    fn increments(&mut self, stage: &Stage, stage_s: f64, measured: bool, is_damped: bool) -> Result<Powers, Error> {
         let explicit_per_s = self.settings.scheme.largest_decay() * stage.fraction / stage_s;
         self.update_model((SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0))?;
         let shape = self.layout.shape;
         let (task, star, history) = self.task();
-        let keep = if task.implicit == [false; 3] { 1.0 } else { 0.0 };
+        let keep = if is_damped || task.implicit == [false; 3] { 1.0 } else { 0.0 };
         let powers: Vec<[Powers; 3]> = blocks(shape, star, history)
             .into_par_iter()
             .map_init(
@@ -312,11 +314,15 @@ impl Flow {
         (task, &mut work.star, &mut state.history)
     }
 
-    /// Solves for the increments along the implicit axes and adds the velocity.
-    fn solve_lines(&mut self, a_m2: f64) -> Result<(), Error> {
+    /// Takes `nu_s_m2`, viscosity times the stage, along the implicit axes: solves for the increments by Crank-Nicolson and adds the
+    /// velocity, or by backward Euler along one axis after the other. The factored increments of backward Euler would leave waves
+    /// that are stiff along two axes as they are, `1 - (d1 + d2)/((1 + d1) (1 + d2))`; one after the other it is
+    /// `1/((1 + d1) (1 + d2))`.
+    fn solve_lines(&mut self, nu_s_m2: f64, is_damped: bool) -> Result<(), Error> {
         if self.state.implicit == [false; 3] {
             return Ok(());
         }
+        let a_m2 = if is_damped { nu_s_m2 } else { 0.5 * nu_s_m2 };
         if !self.line_solvers.iter().any(|(a, _)| *a == a_m2) {
             // A fixed step has at most three stages of different length; a variable one always needs new factors.
             self.line_solvers.truncate(2);
@@ -329,8 +335,19 @@ impl Flow {
         }
         let Some((_, solvers)) = self.line_solvers.iter().find(|(a, _)| *a == a_m2) else { return Ok(()) };
         let own = self.layout.shape.own_places();
+        let Work { star, phi, .. } = &mut self.work;
         for (component, solver) in solvers {
-            solver.solve(&self.layout.slabs, &mut self.work.star[*component][own.clone()])?;
+            if !is_damped {
+                solver.solve(&self.layout.slabs, &mut star[*component][own.clone()])?;
+                continue;
+            }
+            self.layout.slabs.halos(&mut [&mut star[*component]], WHOLE)?;
+            viscous_increment(&self.layout, &self.ops[*component], (solver.axis, a_m2), &star[*component], phi);
+            solver.solve(&self.layout.slabs, &mut phi[own.clone()])?;
+            add_multiple(&mut star[*component], 1.0, phi, self.layout.shape);
+        }
+        if is_damped {
+            return Ok(());
         }
         for (star, velocity) in self.work.star.iter_mut().zip(&self.state.velocity) {
             add_multiple(&mut star[own.clone()], 1.0, &velocity[own.clone()], self.layout.shape);
@@ -358,6 +375,28 @@ impl Flow {
         let of_plane = |k| [(0..3).map(|a| (0..shape.n[1]).map(|j| of_row(a, j, k)).sum::<f64>()).sum::<f64>()];
         shape.own().map(of_plane).collect()
     }
+}
+
+/// `a L field` along one axis for one component into `out`; zero on walls.
+fn viscous_increment(layout: &Layout, ops: &Momentum, (axis, a_m2): (usize, f64), field: &[f64], out: &mut [f64]) {
+    let (shape, n) = (layout.shape, layout.shape.n[0]);
+    let starts_at_wall = ops.axis == 0 && layout.line[0].first_face() == 1;
+    let planes = out[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+    planes.for_each_init(
+        || Scratch::new(n),
+        |scratch, (plane, k)| {
+            for (j, row) in plane.chunks_mut(n).enumerate() {
+                row.fill(0.0);
+                if !ops.is_wall_row(j, k) {
+                    add_laplacian_row(ops, field, axis, j, k, row, &mut scratch.padded[0]);
+                }
+                row.iter_mut().for_each(|value| *value *= a_m2);
+                if starts_at_wall {
+                    row[0] = 0.0;
+                }
+            }
+        },
+    );
 }
 
 /// `to += factor from`, plane by plane.

@@ -1,22 +1,25 @@
-//! Waves that Adams-Bashforth lets grow, and where a flow's shortest waves are strongest.
+//! Waves of the mesh that a time scheme lets grow, and where a flow's shortest waves are strongest.
 //!
-//! A wave that turns by the angle `w dt` in a step grows by about `(w dt)^4/4` under Adams-Bashforth, while viscosity takes
-//! `nu k^2 dt`. With `w dt = C k'` and `k = kappa/h` (`C` the Courant number, `k'` and `kappa` the symbols of transport and
-//! gradient per cell) all waves decay where the cell's Reynolds number `S h^2/nu`, `S = sum |u_i|/h_i`, stays below a limit that
-//! falls with `C^3`. It follows from the roots of the scheme: 30 at a Courant number of 0.35 in boxes without no-slip walls, 82
-//! with them, whose transport is of lower order. Explicit viscosity, which is as accurate, damps a little more.
+//! A wave of `theta` per cell that a stream carries turns by `C s(theta)` in a step (`C = dt sum |u_i|/h_i` the Courant number,
+//! `s` the symbol of the transport, at most 1.586, or 1.167 on meshes with no-slip walls), and viscosity takes
+//! `nu dt kappa(theta)^2/h^2` of it. Whether it grows follows from the amplification of the scheme, with viscosity explicit or by
+//! Crank-Nicolson along the direction of the stream. Runge-Kutta lets none grow up to `C = 1.0921` (1.4846 with walls), more with
+//! viscosity. Adams-Bashforth lets every wave grow that viscosity does not damp: all decay where the Reynolds number of the cell,
+//! `h^2 S/nu` with `S = sum |u_i|/h_i`, is below a limit that falls about with the cube of `C`: 30 at 0.35, 82 with walls.
 //!
-//! Check: a wave carried by a uniform stream grows above that number and decays below it.
+//! The air is taken to stream on: where it turns, waves grow less. What a subgrid model takes is not counted; a run measures it.
+//!
+//! Check: waves carried by a uniform stream grow above these limits and decay below them.
 
 use std::f64::consts::PI;
 
 use num_complex::Complex;
 use rayon::prelude::*;
 
+use super::control::{Stiffness, decay_per_s, implicit_axes};
 use super::flow::Flow;
 use super::mesh::{Mesh, Wall};
 use super::settings::{FlowSettings, TimeScheme, TimeStep};
-use super::subgrid::SubgridModel;
 use crate::Error;
 
 /// Transport by a uniform stream per cell and Courant number, `sum_m c_m sin(m theta)`, of boxes without no-slip walls and of
@@ -26,82 +29,188 @@ const TRANSPORT: [[f64; 3]; 2] = [[1.5, -0.3, 1.0 / 30.0], [9.0 / 8.0, 0.0, -1.0
 const WAVES: usize = 90;
 /// Halvings of an interval that find a limit.
 const HALVINGS: usize = 40;
+/// No wave that matters decays beyond this Courant number.
+const MOST_COURANT: f64 = 4.0;
+/// Growth in a step that is round-off.
+pub(super) const ROUND_OFF: f64 = 1e-12;
 
 /// Waves of the mesh that grow because the time scheme gives them more than viscosity takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UndampedGrowth {
-    /// Largest `h^2 sum |u_i|/h_i/nu`, weighted with the local Courant number; infinite without viscosity.
+    /// `h^2 sum |u_i|/h_i/nu` of the cell whose waves grow most, `h` its length along the largest term; infinite without viscosity.
     pub cell_reynolds: f64,
-    /// Up to which every wave decays.
-    pub limit: f64,
-    /// Courant number of the steps.
+    /// Largest Courant number of the steps.
     pub courant: f64,
+    /// Largest Courant number at which every wave decays, steps being shorter for the same flow; zero without viscosity under
+    /// Adams-Bashforth.
+    pub damped_courant: f64,
     /// Rate at which the amplitude of the worst wave grows \[1/s\].
     pub rate_per_s: f64,
+}
+
+impl std::fmt::Display for UndampedGrowth {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { cell_reynolds, courant, damped_courant, rate_per_s } = self;
+        write!(
+            f,
+            "short waves grow at {rate_per_s:.2e} 1/s, as viscosity is too small to damp them (cell Reynolds number \
+             {cell_reynolds:.3e} at Courant number {courant:.2}; all decay below {damped_courant:.2})"
+        )
+    }
+}
+
+/// How fast the cells of a mesh carry and damp the waves of a flow.
+#[derive(Debug, Clone)]
+pub struct Stability {
+    scheme: TimeScheme,
     transport: [f64; 3],
+    viscosity_m2_s: f64,
+    cells: Vec<Carrying>,
+    stiffness: Stiffness,
 }
 
-impl UndampedGrowth {
-    /// What grows in a flow of `settings` on `mesh`, whose velocity in the cell of the indices along x, y, z is
-    /// `velocity_m_s`. `None` where nothing does: Runge-Kutta damps all waves within its Courant number, a subgrid model is
-    /// taken to do its work, and viscosity may suffice.
-    pub fn of(
-        mesh: &Mesh,
-        settings: &FlowSettings,
-        velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync,
-    ) -> Option<Self> {
-        if is_damped(settings) { None } else { Self::at_rates(mesh, settings, largest_rates(mesh, velocity_m_s)) }
+/// The fastest of the cells that are equally long along the direction that carries most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Carrying {
+    /// `S = sum |u_i|/h_i` \[1/s\].
+    rate_per_s: f64,
+    length_m: f64,
+    /// Whether viscosity is implicit along that direction.
+    is_implicit: bool,
+}
+
+impl Stability {
+    /// Of a flow of `settings` on `mesh`, whose velocity in the cell of the indices along x, y, z is `velocity_m_s`.
+    pub fn of(mesh: &Mesh, settings: &FlowSettings, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> Self {
+        let rates = largest_rates(mesh, velocity_m_s);
+        let implicit = implicit_axes(mesh, settings, largest(&rates));
+        Self::at_rates(mesh, settings, implicit, &rates)
     }
 
-    /// The same from the largest of [`Rates::of`].
-    fn at_rates(mesh: &Mesh, settings: &FlowSettings, [courant_per_s, worst]: [f64; 2]) -> Option<Self> {
-        let step_s = match settings.time_step {
-            TimeStep::Fixed { step_s } => step_s,
-            TimeStep::Courant { courant, longest_s } => longest_s.min(courant / courant_per_s),
-        };
-        let courant = step_s * courant_per_s;
-        if courant == 0.0 || !courant.is_finite() {
-            return None;
-        }
+    /// The same from [`largest_rates`].
+    fn at_rates(mesh: &Mesh, settings: &FlowSettings, implicit: [bool; 3], rates: &[Vec<f64>; 3]) -> Self {
         let sticks = mesh.directions().iter().any(|d| d.ends.no_slip() != [false; 2]);
+        let mut cells: Vec<Carrying> = Vec::new();
+        for ((rates, lengths_m), is_implicit) in rates.iter().zip(metrics(mesh)).zip(implicit) {
+            for (&rate_per_s, length_m) in rates.iter().zip(lengths_m).filter(|(rate, _)| **rate > 0.0) {
+                match cells.iter_mut().find(|c| c.length_m == length_m && c.is_implicit == is_implicit) {
+                    Some(same) => same.rate_per_s = same.rate_per_s.max(rate_per_s),
+                    None => cells.push(Carrying { rate_per_s, length_m, is_implicit }),
+                }
+            }
+        }
         let transport = TRANSPORT[usize::from(sticks)];
-        let cell_reynolds = worst / (courant_per_s.powi(3) * settings.viscosity_m2_s);
-        let rate_per_s = largest_growth(transport, courant, courant / cell_reynolds) / step_s;
-        let limit = largest_reynolds(transport, courant);
-        (cell_reynolds > limit).then_some(Self { cell_reynolds, limit, courant, rate_per_s, transport })
+        let nu = settings.viscosity_m2_s;
+        let decay = |d: usize, m: &[f64]| if implicit[d] && m.len() > 1 { decay_per_s(m, nu) } else { 0.0 };
+        let [x, y, z] = metrics(mesh);
+        let stiffness = Stiffness::new([decay(0, &x), decay(1, &y), decay(2, &z)]);
+        Self { scheme: settings.scheme, transport, viscosity_m2_s: nu, cells, stiffness }
     }
 
-    /// Courant number at which every wave decays; zero without viscosity.
+    /// Length of the first step that `time_step` gives, or of the longest if the flow starts from rest \[s\].
+    pub fn first_step_s(&self, time_step: TimeStep) -> f64 {
+        let step_s = time_step.step_s(self.courant_per_s());
+        if matches!(time_step, TimeStep::Fixed { .. }) { step_s } else { step_s.min(self.stiffness.longest_s()) }
+    }
+
+    /// Whether steps of `step_s` are too long for implicit viscosity, in a sentence.
+    pub fn stiff_note(&self, step_s: f64, damped_steps: u64) -> Option<String> {
+        self.stiffness.note(step_s, damped_steps)
+    }
+
+    /// Largest `sum |u_i|/h_i` \[1/s\]: a Courant number over it is a time step.
+    pub fn courant_per_s(&self) -> f64 {
+        self.cells.iter().fold(0.0, |most, cell| most.max(cell.rate_per_s))
+    }
+
+    /// Growth of the worst wave in a step of `step_s`, `ln |G|`, and its cell.
+    fn worst(&self, step_s: f64) -> (f64, Option<Carrying>) {
+        let growth = |cell: &Carrying| {
+            let viscous = self.viscosity_m2_s * step_s / cell.length_m.powi(2);
+            largest_growth(self.scheme, self.transport, step_s * cell.rate_per_s, viscous, cell.is_implicit)
+        };
+        let all = self.cells.iter().map(|cell| (growth(cell), Some(*cell)));
+        all.fold((f64::NEG_INFINITY, None), |worst, next| if next.0 > worst.0 { next } else { worst })
+    }
+
+    /// Largest Courant number, of steps of at most `step_s`, at which no wave grows by more than `growth` in a step.
+    fn largest_courant(&self, growth: f64, step_s: f64) -> f64 {
+        self.courant_per_s() * halve(0.0, step_s, |step_s| self.worst(step_s).0 <= growth)
+    }
+
+    /// Largest Courant number at which every wave decays; infinite in a flow that carries none.
     pub fn damped_courant(&self) -> f64 {
-        halve(0.0, self.courant, |courant| largest_reynolds(self.transport, courant) > self.cell_reynolds)
+        let longest_s = MOST_COURANT / self.courant_per_s();
+        if longest_s.is_finite() { self.largest_courant(ROUND_OFF, longest_s) } else { f64::INFINITY }
     }
-}
 
-/// Whether the scheme or a model damps all waves.
-fn is_damped(settings: &FlowSettings) -> bool {
-    settings.scheme != TimeScheme::AdamsBashforth2 || settings.subgrid != SubgridModel::None
+    /// What grows in steps of `step_s`; `None` where nothing does.
+    pub fn undamped(&self, step_s: f64) -> Option<UndampedGrowth> {
+        let (growth, Some(cell)) = self.worst(step_s) else { return None };
+        (growth > ROUND_OFF).then(|| UndampedGrowth {
+            cell_reynolds: cell.length_m.powi(2) * cell.rate_per_s / self.viscosity_m2_s,
+            courant: self.courant_per_s() * step_s,
+            damped_courant: self.damped_courant(),
+            rate_per_s: growth / step_s,
+        })
+    }
+
+    /// The largest Courant number of such a step, if one of `step_s` is refused.
+    pub fn refused(&self, step_s: f64) -> Option<f64> {
+        let allowed = self.scheme.allowed_growth();
+        (self.worst(step_s).0 > allowed).then(|| self.largest_courant(allowed, step_s))
+    }
 }
 
 impl Mesh {
     /// Largest `sum |u_i|/h_i` of a flow whose velocity in the cell of the indices along x, y, z is `velocity_m_s`, walls that
     /// move included \[1/s\]: a Courant number over it is a time step.
     pub fn courant_rate_per_s(&self, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> f64 {
-        largest_rates(self, velocity_m_s)[0]
+        largest(&largest_rates(self, velocity_m_s))
     }
 }
 
-/// The largest of [`Rates::of`] over all cells and walls.
-fn largest_rates(mesh: &Mesh, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> [f64; 2] {
-    let rates = Rates::new(mesh);
-    let [nx, ny, nz] = mesh.cells();
-    let plane = |k: usize| {
-        (0..nx * ny).fold([0.0_f64; 2], |worst, at| {
-            let cell = [at % nx, at / nx, k];
-            larger(worst, rates.of(cell, velocity_m_s(cell)))
-        })
+/// Lengths of the cells along each direction \[m\].
+pub(super) fn metrics(mesh: &Mesh) -> [Vec<f64>; 3] {
+    mesh.directions().each_ref().map(|d| (0..d.cells).map(|i| d.at(i as f64 + 0.5).1).collect())
+}
+
+/// Largest `sum |u_i|/h_i` \[1/s\] of all cells whose largest term is that of a direction, by their index along it, and of the
+/// smallest cells beside walls that move: the fluid may come to their speed.
+fn largest_rates(mesh: &Mesh, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> [Vec<f64>; 3] {
+    let (metric_m, [nx, ny, nz]) = (metrics(mesh), mesh.cells());
+    let none = || metric_m.each_ref().map(|m| vec![0.0_f64; m.len()]);
+    let add = |rates: &mut [Vec<f64>; 3], cell: [usize; 3], velocity_m_s: [f64; 3]| {
+        let term = |d: usize| if metric_m[d].len() == 1 { 0.0 } else { velocity_m_s[d].abs() / metric_m[d][cell[d]] };
+        let terms = [term(0), term(1), term(2)];
+        let most = (1..3).fold(0, |most, d| if terms[d] > terms[most] { d } else { most });
+        let rate = &mut rates[most][cell[most]];
+        *rate = rate.max(terms.iter().sum());
     };
-    let inside = (0..nz).into_par_iter().map(plane).reduce(|| [0.0; 2], larger);
-    larger(inside, rates.of_walls(mesh))
+    let with_plane = |mut rates: [Vec<f64>; 3], k: usize| {
+        (0..nx * ny).map(|at| [at % nx, at / nx, k]).for_each(|cell| add(&mut rates, cell, velocity_m_s(cell)));
+        rates
+    };
+    let mut rates = (0..nz).into_par_iter().fold(none, with_plane).reduce(none, |mut a, b| {
+        larger(&mut a, &b.concat());
+        a
+    });
+    let smallest = metric_m.each_ref().map(|m| (0..m.len()).min_by(|&a, &b| m[a].total_cmp(&m[b])).unwrap_or(0));
+    for wall in mesh.directions().iter().flat_map(|d| d.ends.walls()) {
+        if let Wall::NoSlip { velocity_m_s } = wall {
+            add(&mut rates, smallest, velocity_m_s);
+        }
+    }
+    rates
+}
+
+/// Takes the larger of these rates and those of `others`, one direction after the other.
+fn larger(rates: &mut [Vec<f64>; 3], others: &[f64]) {
+    rates.iter_mut().flatten().zip(others).for_each(|(rate, other)| *rate = rate.max(*other));
+}
+
+fn largest(rates: &[Vec<f64>; 3]) -> f64 {
+    rates.iter().flatten().copied().fold(0.0, f64::max)
 }
 
 /// The end of the low part of an interval, in which `holds`.
@@ -113,91 +222,54 @@ fn halve(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// Reynolds number of a cell up to which every wave decays.
-fn largest_reynolds(transport: [f64; 3], courant: f64) -> f64 {
-    // In powers of ten: the limit spans many.
-    10.0_f64.powf(halve(-2.0, 12.0, |power| largest_growth(transport, courant, courant / 10.0_f64.powf(power)) < 0.0))
-}
-
-/// Largest growth of a wave in a step, `ln |G|`, with viscosity by Crank-Nicolson and `viscous = nu dt/h^2`.
-fn largest_growth(transport: [f64; 3], courant: f64, viscous: f64) -> f64 {
+/// Largest growth of a wave in a step, `ln |G|`, with `viscous = nu dt/h^2`.
+fn largest_growth(scheme: TimeScheme, transport: [f64; 3], courant: f64, viscous: f64, is_implicit: bool) -> f64 {
     let growth = |wave: usize| {
         let theta = PI * wave as f64 / WAVES as f64;
         let symbol = (1..=3).map(|m| transport[m - 1] * (m as f64 * theta).sin()).sum::<f64>();
         let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
-        let half = 0.5 * viscous * kappa * kappa;
-        // G^2 - (a + 3/2 z) G + z/2 = 0.
-        let (a, z) = ((1.0 - half) / (1.0 + half), Complex::new(0.0, courant * symbol / (1.0 + half)));
-        let b = a + 1.5 * z;
-        let root = (b * b - 2.0 * z).sqrt();
-        (0.5 * (b + root)).norm().max((0.5 * (b - root)).norm()).ln()
+        let decay = viscous * kappa * kappa;
+        let [explicit, implicit] = if is_implicit { [0.0, decay] } else { [decay, 0.0] };
+        amplification(scheme, Complex::new(-explicit, courant * symbol), implicit).ln()
     };
     (1..=WAVES).map(growth).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The larger of two, one by one.
-fn larger(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0].max(b[0]), a[1].max(b[1])]
-}
-
-/// Metrics of the cells, for the rates at which their flow carries waves.
-struct Rates {
-    metric_m: [Vec<f64>; 3],
-}
-
-impl Rates {
-    fn new(mesh: &Mesh) -> Self {
-        let metric = |d: &super::mesh::Direction| (0..d.cells).map(|i| d.at(i as f64 + 0.5).1).collect();
-        Self { metric_m: mesh.directions().each_ref().map(metric) }
+/// `|G|` of a step of `du/dt = (z u - d u)/dt` with `d` by Crank-Nicolson: the larger root of Adams-Bashforth, the product of the
+/// stages of Runge-Kutta.
+fn amplification(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
+    if scheme == TimeScheme::AdamsBashforth2 {
+        // G^2 - (a + 3/2 z) G + z/2 = 0.
+        let (a, z) = ((1.0 - 0.5 * d) / (1.0 + 0.5 * d), z / (1.0 + 0.5 * d));
+        let b = a + 1.5 * z;
+        let root = (b * b - 2.0 * z).sqrt();
+        return (0.5 * (b + root)).norm().max((0.5 * (b - root)).norm());
     }
-
-    /// `S = sum |u_i|/h_i` \[1/s\], and `S^4 h^2`, `h` the cell's length along the largest term: what Adams-Bashforth gives a
-    /// wave of the cell over what viscosity takes, but for factors that all cells have in common.
-    fn of(&self, cell: [usize; 3], velocity_m_s: [f64; 3]) -> [f64; 2] {
-        let (mut sum, mut most, mut length_m) = (0.0, 0.0, 0.0);
-        for d in 0..3 {
-            if self.metric_m[d].len() == 1 {
-                continue;
-            }
-            let h = self.metric_m[d][cell[d]];
-            let rate = velocity_m_s[d].abs() / h;
-            sum += rate;
-            if rate > most {
-                (most, length_m) = (rate, h);
-            }
-        }
-        [sum, sum.powi(4) * length_m * length_m]
+    let (mut u, mut before) = (Complex::from(1.0), Complex::from(0.0));
+    for stage in scheme.stages(None) {
+        let term = z * u;
+        u += stage.fraction * (stage.new * term + stage.old * before - d * u) / (1.0 + 0.5 * stage.fraction * d);
+        before = term;
     }
-
-    /// The same of walls that move, on the smallest cells: the fluid may come to their speed.
-    fn of_walls(&self, mesh: &Mesh) -> [f64; 2] {
-        let smallest =
-            self.metric_m.each_ref().map(|m| (0..m.len()).min_by(|&a, &b| m[a].total_cmp(&m[b])).unwrap_or(0));
-        mesh.directions().iter().flat_map(|d| d.ends.walls()).fold([0.0; 2], |worst, wall| match wall {
-            Wall::Slip => worst,
-            Wall::NoSlip { velocity_m_s } => larger(worst, self.of(smallest, velocity_m_s)),
-        })
-    }
+    u.norm()
 }
 
 impl Flow {
-    /// Waves of the present field that Adams-Bashforth lets grow, if any.
-    pub fn undamped_growth(&self) -> Option<UndampedGrowth> {
-        if is_damped(&self.settings) {
-            return None;
-        }
+    /// How its cells carry and damp the waves of the present field.
+    pub fn stability(&self) -> Result<Stability, Error> {
         let shape = self.layout.shape;
         let axis = [0, 1, 2].map(|d| self.layout.axis_of(d));
         let (own, direction, velocity) = (shape.own(), self.layout.direction, &self.state.velocity);
-        let rates = largest_rates(&self.mesh, |cell| {
+        let mut rates = largest_rates(&self.mesh, |cell| {
             let index = direction.map(|d| cell[d]);
             // What others own is at rest here and does not count.
             let place = own.contains(&index[2]).then(|| shape.place(index));
             place.map_or([0.0; 3], |place| axis.map(|a| velocity[a][place]))
         });
-        // If a rank is lost, the next step says so.
-        let rates = self.layout.slabs.largest(rates).ok()?;
-        UndampedGrowth::at_rates(&self.mesh, &self.settings, rates)
+        let own = rates.concat();
+        self.layout.slabs.together(&own)?.chunks(own.len()).for_each(|others| larger(&mut rates, others));
+        let implicit = axis.map(|a| self.state.implicit[a]);
+        Ok(Stability::at_rates(&self.mesh, &self.settings, implicit, &rates))
     }
 
     /// Memory axis and place of the component whose waves of two cells are strongest: where numerical growth shows most.
@@ -232,17 +304,26 @@ mod tests {
     use super::super::settings::ViscousTreatment;
     use super::*;
 
-    /// Growth of the energy of a wave of the mesh per second, carried by a stream of 1 m/s on cells of 1 m.
-    fn measured_per_s(cells_per_wave: f64, viscosity_m2_s: f64, courant: f64) -> (f64, Option<UndampedGrowth>) {
+    const AB2: TimeScheme = TimeScheme::AdamsBashforth2;
+    const RK3: TimeScheme = TimeScheme::RungeKutta3;
+
+    /// A wave of the mesh, carried by a stream of 1 m/s on 48 cells of 1 m.
+    fn wave(cells_per_wave: f64, viscosity_m2_s: f64, courant: f64, scheme: TimeScheme, implicit: bool) -> Flow {
         let mesh = || {
-            let y = Direction::periodic(40, 0.0, 40.0);
+            let y = Direction::periodic(48, 0.0, 48.0);
             Mesh::new(Direction::thin(1.0), y, Direction::periodic(4, 0.0, 4.0)).unwrap()
         };
         let mut settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s: courant });
-        settings.viscous = ViscousTreatment::Implicit([false, true, true]);
+        settings.viscous = ViscousTreatment::Implicit([false, implicit, implicit]);
+        settings.scheme = scheme;
         let wave = std::f64::consts::TAU / cells_per_wave;
-        let (mut flow, _) = Flow::new(mesh(), settings, |[_, y, _]| [1e-3 * (wave * y).cos(), 1.0, 0.0]).unwrap();
-        let growth = flow.undamped_growth();
+        Flow::new(mesh(), settings, |[_, y, _]| [1e-3 * (wave * y).cos(), 1.0, 0.0]).unwrap().0
+    }
+
+    /// Growth of the energy of such a wave per second, and what is said of it.
+    fn measured_per_s(cells_per_wave: f64, viscosity_m2_s: f64, courant: f64) -> (f64, Option<UndampedGrowth>) {
+        let mut flow = wave(cells_per_wave, viscosity_m2_s, courant, AB2, true);
+        let growth = flow.stability().unwrap().undamped(courant);
         let energy = |flow: &Flow| flow.face_velocity_m_s(0).iter().map(|u| u * u).sum::<f64>();
         // The spurious root of the scheme dies out first.
         for _ in 0..20 {
@@ -255,9 +336,21 @@ mod tests {
         ((energy(&flow) / start).ln() / (f64::from(steps) * courant), growth)
     }
 
+    /// Reynolds number of a cell up to which every wave decays under Adams-Bashforth.
+    fn largest_reynolds(transport: [f64; 3], courant: f64) -> f64 {
+        let decays = |power: f64| largest_growth(AB2, transport, courant, courant / 10.0_f64.powf(power), true) < 0.0;
+        10.0_f64.powf(halve(-2.0, 12.0, decays))
+    }
+
+    /// Largest Courant number at which every wave decays.
+    fn limit(scheme: TimeScheme, sticks: bool, viscous: f64, is_implicit: bool) -> f64 {
+        let transport = TRANSPORT[usize::from(sticks)];
+        halve(0.0, 2.0, |courant| largest_growth(scheme, transport, courant, viscous, is_implicit) <= ROUND_OFF)
+    }
+
     #[test]
     fn a_wave_grows_above_the_cells_reynolds_number_and_decays_below_it() {
-        let waves = [2.5, 40.0 / 12.0, 40.0 / 11.0, 4.0, 8.0, 20.0];
+        let waves = [2.4, 3.2, 48.0 / 13.0, 4.0, 8.0, 24.0];
         for (courant, factor) in [(0.2, 0.88), (0.35, 0.66)] {
             let limit = largest_reynolds(TRANSPORT[0], courant);
             // The leading order of the growth gives 4/(2.047 C^3).
@@ -266,29 +359,82 @@ mod tests {
             let above = all(1.15 * limit);
             assert!(above.iter().any(|(grown, _)| *grown > 0.0), "{above:?}");
             let found = above[0].1.unwrap();
-            assert!((found.cell_reynolds / limit - 1.15).abs() < 1e-9 && (found.limit / limit - 1.0).abs() < 1e-6);
-            let damped = found.damped_courant();
-            assert!((largest_reynolds(TRANSPORT[0], damped) / found.cell_reynolds - 1.0).abs() < 1e-6, "{damped}");
+            assert!((found.cell_reynolds / limit - 1.15).abs() < 1e-9, "{found:?}");
+            let damped = largest_reynolds(TRANSPORT[0], found.damped_courant);
+            assert!((damped / found.cell_reynolds - 1.0).abs() < 1e-6, "{found:?}");
             let below = all(0.85 * limit);
             assert!(below.iter().all(|(grown, found)| *grown < 0.0 && found.is_none()), "{below:?}");
         }
         assert!((largest_reynolds(TRANSPORT[1], 0.35) / 82.0 - 1.0).abs() < 0.01);
         // Without viscosity; the rate of the amplitude is half that of the energy, and the worst wave has 3.2 cells.
-        let (grown, found) = measured_per_s(40.0 / 13.0, 0.0, 0.35);
+        let (grown, found) = measured_per_s(3.2, 0.0, 0.35);
         let found = found.unwrap();
-        assert!(found.cell_reynolds.is_infinite() && found.damped_courant() < 0.01, "{found:?}");
-        assert!((0.5 * grown / found.rate_per_s - 0.963).abs() < 0.01, "{grown}, {found:?}");
+        assert!(found.cell_reynolds.is_infinite() && found.damped_courant < 0.01, "{found:?}");
+        assert!((0.5 * grown / found.rate_per_s - 1.0).abs() < 0.01, "{grown}, {found:?}");
     }
 
     #[test]
-    fn runge_kutta_models_and_flows_without_convection_have_nothing_to_damp() {
+    fn limits_are_the_measured_ones_of_both_schemes_with_viscosity_explicit_and_implicit() {
+        // Measured with fixed steps on lines of 48 and 64 cells, white noise or the worst wave.
+        let of = |scheme, is_implicit, viscous| limit(scheme, false, viscous, is_implicit);
+        for (viscous, measured) in
+            [(0.0, 1.0921), (0.001, 1.099), (0.01, 1.147), (0.1, 1.364), (0.3, 1.546), (0.4, 1.589)]
+        {
+            assert!((of(RK3, true, viscous) / measured - 1.0).abs() < 0.01, "{viscous}: {}", of(RK3, true, viscous));
+        }
+        for (viscous, measured) in [(0.001, 1.101), (0.01, 1.162), (0.1, 1.413), (0.3, 1.453), (0.4, 1.095)] {
+            assert!((of(RK3, false, viscous) / measured - 1.0).abs() < 0.01, "{viscous}: {}", of(RK3, false, viscous));
+        }
+        for (viscous, measured) in [(0.001, 0.204), (0.01, 0.339), (0.03, 0.4195), (0.1, 0.516), (0.15, 0.552)] {
+            assert!((of(AB2, true, viscous) / measured - 1.0).abs() < 0.01, "{viscous}: {}", of(AB2, true, viscous));
+        }
+        for (viscous, measured) in [(0.001, 0.206), (0.01, 0.351), (0.03, 0.438), (0.1, 0.5075), (0.15, 0.478)] {
+            assert!((of(AB2, false, viscous) / measured - 1.0).abs() < 0.01, "{viscous}: {}", of(AB2, false, viscous));
+        }
+        assert!((limit(RK3, true, 0.0, true) / 1.4846 - 1.0).abs() < 0.001, "with walls");
+        // Explicit viscosity alone.
+        for (scheme, most) in [(AB2, 1.0), (RK3, 2.513)] {
+            let most = most / (49.0 / 9.0);
+            assert!(largest_growth(scheme, TRANSPORT[0], 0.0, 0.98 * most, false) <= ROUND_OFF);
+            assert!(largest_growth(scheme, TRANSPORT[0], 0.0, 1.02 * most, false) > ROUND_OFF);
+        }
+    }
+
+    #[test]
+    fn steps_of_runge_kutta_are_taken_just_below_their_limit_and_refused_just_above() {
+        for (viscosity_m2_s, implicit) in [(0.0, true), (0.05, true), (0.05, false), (0.2, false)] {
+            let step = |courant: f64| wave(3.6, viscosity_m2_s, courant, RK3, implicit);
+            // nu dt/h^2 changes with the step.
+            let limit =
+                halve(0.0, 2.0, |c| largest_growth(RK3, TRANSPORT[0], c, viscosity_m2_s * c, implicit) <= ROUND_OFF);
+            let mut flow = step(0.999 * limit);
+            let start = flow.kinetic_energy_m5_s2();
+            for _ in 0..50 {
+                flow.step().unwrap();
+            }
+            assert!(flow.kinetic_energy_m5_s2() <= start * (1.0 + 1e-12));
+            let Err(Error::CourantTooLarge { limit: said, .. }) = step(1.001 * limit).step() else { panic!("{limit}") };
+            assert!((said / limit - 1.0).abs() < 1e-6, "{said}, {limit}");
+        }
+    }
+
+    #[test]
+    fn cells_of_their_own_length_and_directions_without_variation_are_judged_each() {
         let y = Direction::periodic(8, 0.0, 8.0);
-        let mesh = Mesh::new(Direction::thin(1.0), y.clone(), y).unwrap();
-        let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 0.3 });
-        let of = |settings: &FlowSettings, u: [f64; 3]| UndampedGrowth::of(&mesh, settings, |_| u);
-        assert!(of(&settings, [0.0, 1.0, 0.0]).is_some());
+        let mesh = Mesh::new(Direction::thin(1.0), y.clone(), Direction::periodic(8, 0.0, 80.0)).unwrap();
+        let settings = FlowSettings::new(0.05, TimeStep::Fixed { step_s: 0.3 });
+        let of = |settings: &FlowSettings, u: [f64; 3]| Stability::of(&mesh, settings, |_| u).undamped(0.3);
         assert!(of(&settings, [5.0, 0.0, 0.0]).is_none(), "nothing varies along x");
-        assert!(of(&FlowSettings { scheme: TimeScheme::RungeKutta3, ..settings.clone() }, [0.0, 1.0, 0.0]).is_none());
-        assert!(of(&FlowSettings { subgrid: SubgridModel::WALE, ..settings }, [0.0, 1.0, 0.0]).is_none());
+        // The same Courant number, but viscosity takes a hundredth from the long cells.
+        assert!(of(&settings, [0.0, 1.0, 0.0]).is_none());
+        let found = of(&settings, [0.0, 0.0, 10.0]).unwrap();
+        assert!((found.cell_reynolds - 2000.0).abs() < 1e-6 && (found.courant - 0.3).abs() < 1e-12, "{found:?}");
+        // The cell that carries less may be the worse one.
+        let both = of(&settings, [0.0, 1.2, 9.0]).unwrap();
+        assert!(both.cell_reynolds < 100.0, "{both:?}");
+        let mixed = Stability::of(&mesh, &settings, |[_, j, _]| if j == 0 { [0.0, 0.0, 9.0] } else { [0.0, 1.2, 0.0] });
+        let mixed = mixed.undamped(0.3).unwrap();
+        assert!((mixed.cell_reynolds - 1800.0).abs() < 1e-6 && (mixed.courant - 0.36).abs() < 1e-12, "{mixed:?}");
+        assert!(of(&FlowSettings { scheme: RK3, ..settings }, [0.0, 0.0, 10.0]).is_none());
     }
 }

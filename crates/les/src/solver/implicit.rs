@@ -19,7 +19,7 @@ use crate::Error;
 /// Factors of `1 - a L` along one axis for one component.
 #[derive(Debug, Clone)]
 pub(crate) struct LineSolver {
-    axis: usize,
+    pub(super) axis: usize,
     mass: Vec<f64>,
     inverse_pivot: Vec<f64>,
     /// Rows of `-L` below the diagonal and of `-L^T` above it.

@@ -39,13 +39,13 @@ mod transport;
 
 pub use checkpoint::check_checkpoint;
 pub use flow::Flow;
-pub use growth::UndampedGrowth;
+pub use growth::{Stability, UndampedGrowth};
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
 pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
 pub use report::{StartReport, StepReport};
 pub use run::{
-    CheckpointPlan, EnergyBudget, Interval, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent, StepRecord,
-    Stepping,
+    CheckpointPlan, EnergyBudget, Interval, NOTICED_GROWTH, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent,
+    StepEnergy, StepRecord, Stepping,
 };
 pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};
 pub use subgrid::SubgridModel;

@@ -59,7 +59,7 @@ pub(super) struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// `star = dt (c N + c' N' - grad p + nu L u) + keep u` in the rows of a block, with the history; returns the work of each
+    /// `star = dt (c N + c' N' - grad p + nu L u) + keep u`, without `nu L u` if `keep` is 1, in the rows of a block, with the history; returns the work of each
     /// component if `measured`.
     pub(super) fn increments(
         &self,
@@ -80,7 +80,7 @@ impl Task<'_> {
                 self.terms([axis, j, k], star, scratch, measured.then_some(&mut *powers));
                 scratch.gradient(&self.ops[axis], self.pressure, j, k);
                 let own = &self.velocity[axis][self.layout.shape.row(j, k)];
-                let nu = self.viscosity_m2_s;
+                let nu = if keep == 1.0 { 0.0 } else { self.viscosity_m2_s };
                 advance_row(
                     [stage.new, stage.old, nu, stage_s, keep],
                     star,

@@ -62,6 +62,8 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc
     let is_first = ranks.rank() == 0;
     let ended = words.end.map(|end| file.with_end(end)).transpose()?;
     let file = ended.as_ref().unwrap_or(file);
+    let seeded = cli.seed.map(|seed| file.with_seed(seed)).transpose()?;
+    let file = seeded.as_ref().unwrap_or(file);
     let begin = match (words.restart, words.overwrite) {
         (true, _) => Begin::Restart,
         (_, true) => Begin::Overwrite,
@@ -73,6 +75,7 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc
             return Ok(());
         }
         let forecast = check_on(ranks, file, words.out.as_deref(), options)?;
+        forecast.notes.iter().for_each(|text| progress::NotesOnly.note(text));
         return say(cli.json, &forecast_json(&forecast), &format!("good\n{forecast}"));
     }
     let Some(out) = &words.out else {
@@ -138,7 +141,8 @@ fn forecast_json(forecast: &FlowForecast) -> Value {
         .collect();
     json!({
         "version": crate::VERSION, "case_hash": forecast.case_hash, "cells": forecast.cells, "scheme": forecast.scheme,
-        "scheme_reason": forecast.scheme_reason, "end_s": forecast.end_s, "end_tau": forecast.end_tau,
+        "scheme_reason": forecast.scheme_reason, "courant": forecast.courant,
+        "damped_courant": forecast.damped_courant, "notes": forecast.notes, "end_s": forecast.end_s, "end_tau": forecast.end_tau,
         "step_s": forecast.step_s, "steps": forecast.steps, "core_s": forecast.core_s,
         "memory_bytes": forecast.memory_bytes, "ranks": forecast.ranks, "rank_bytes": forecast.rank_bytes, "files": files,
     })

@@ -32,6 +32,7 @@ pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
         return Err(Error::Input { path, reason: "case.kind is not \"wake\": wakescope flow runs it".into() });
     }
     if words.print {
+        let file = cli.seed.map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
         return if ranks.rank() == 0 { print(&file.toml) } else { Ok(()) };
     }
     simulate(&file, &words.run, cli, ranks)

@@ -8,8 +8,8 @@ use super::setup::{Setup, WakeSetup};
 use super::shared::agree;
 use super::steps::StepTable;
 use super::wake::{Schedule, WakeRun};
-use super::writer::{Kept, Writer};
-use super::{Begin, CaseFile, FlowCase, FlowOutcome, Watch};
+use super::writer::{Kept, Writer, growth_note};
+use super::{Begin, CaseFile, FlowCase, FlowOutcome, Watch, age_tau};
 use crate::io::lock::FolderLock;
 use crate::io::{Existing, write_atomic};
 use crate::keys::Problem;
@@ -17,7 +17,8 @@ use crate::{Error, machine};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wakescope_les::ranks::{Ranks, Single, together};
-use wakescope_les::solver::{CheckpointPlan, Ends, Interval, Run, RunPlan};
+use wakescope_les::solver::{CheckpointPlan, Ends, Interval, NOTICED_GROWTH, Run, RunPlan};
+use wakescope_les::{SubgridModel, TimeStep};
 
 /// Steps between checkpoints where a case states nothing.
 const STEPS_PER_CHECKPOINT: u64 = 500;
@@ -61,7 +62,14 @@ pub fn check_on(
     if let Some(folder) = folder {
         refuse_folder(folder, options.begin)?;
     }
-    prepare(file, folder.unwrap_or(Path::new("")), options, ranks).map(|prepared| prepared.forecast)
+    let mut prepared = prepare(file, folder.unwrap_or(Path::new("")), options, ranks)?;
+    // A run tells of these itself, as it goes.
+    let (setup, forecast) = (&prepared.setup, &mut prepared.forecast);
+    let growth = setup.stability().undamped(forecast.step_s);
+    let is_modelled = setup.settings.subgrid != SubgridModel::None;
+    let noticed = growth.filter(|g| !is_modelled && g.rate_per_s * forecast.end_s > NOTICED_GROWTH);
+    forecast.notes.extend(noticed.as_ref().map(growth_note));
+    Ok(prepared.forecast)
 }
 
 /// As [`run_with`], for a case that fits into the memory of the machine.
@@ -103,7 +111,7 @@ pub fn run_on(
     let prepared = if is_first { refuse_folder(folder, options.begin) } else { Ok(()) };
     let prepared = prepared.and_then(|()| prepare(file, folder, options, ranks));
     let Prepared { mut setup, plan, files, schedule, forecast } = agree(ranks, prepared)?;
-    let mut warnings = file.case.case.unresolved(&setup.mesh);
+    let mut warnings = forecast.notes.clone();
     let opened = is_first.then(|| {
         files.refuse_foreign(&schedule.due, setup.wake.is_some(), options.begin)?;
         watch.forecast(&forecast);
@@ -114,7 +122,8 @@ pub fn run_on(
     let source = opened.as_ref().map_or(Source::Nothing, |(_, source)| *source);
     let source = Source::of(together(&**ranks, &[source as u8 as f64]).map_err(Error::Flow)?[0]);
     let [checkpoint, previous] = checkpoint_paths(folder);
-    let meter = setup.wake.take().map(|wake| wake.meter);
+    let tau_per_s = setup.tau_per_s;
+    let meter = setup.wake.take().map(|wake| (wake.meter, wake.circulation_radii_m));
     let (mut run, kept) = match source {
         Source::Nothing => {
             let (flow, start) = setup.start()?;
@@ -130,13 +139,21 @@ pub fn run_on(
         Source::Checkpoint => resume(&checkpoint, setup, plan, &file.case)?,
         Source::Previous => resume(&previous, setup, plan, &file.case)?,
     };
+    let (reached_s, end_s) = (run.flow().time_s(), run.plan().end_s);
+    if reached_s > (1.0 + 1e-9) * end_s {
+        let reached_tau = age_tau(reached_s, tau_per_s);
+        let reason = format!(
+            "the end, {end_s:?} s, lies before {reached_s:?} s (tau = {reached_tau:?}), which the checkpoint has reached"
+        );
+        return Err(Error::Input { path: file.source.path().to_owned(), reason });
+    }
     if is_first {
         warnings.iter().for_each(|text| watch.note(text));
     }
     let wake = meter.map(|meter| WakeRun::new(meter, run.flow(), (folder.to_owned(), file.provenance()), is_first));
     let begun = begin_files(file, folder, &files, wake, (source != Source::Nothing, &kept), is_first);
     let Begun { wake, steps, written } = agree(ranks, begun)?;
-    let (start_s, end_s) = (run.flow().time_s(), run.plan().end_s);
+    let start_s = reached_s;
     let mut writer = Writer {
         ranks: ranks.clone(),
         files,
@@ -261,15 +278,44 @@ fn prepare(file: &CaseFile, folder: &Path, options: RunOptions, ranks: &Arc<dyn 
     let available = machine::available_memory_bytes().filter(|_| !options.allow_large).map(|bytes| bytes * machines);
     // Before the setup, which holds the initial field.
     refuse_too_large(&file.case, file.case.case.cells(), &[], available)?;
-    let mut setup = Setup::new(&file.case, file.source.folder())?;
+    // What the solver refuses of a case is a matter of its file.
+    let of_file = |error: wakescope_les::Error| Error::Input {
+        path: file.source.path().to_owned(),
+        reason: format!("[case]: {error}"),
+    };
+    let setup = Setup::new(&file.case, file.source.folder());
+    let mut setup = setup.map_err(|error| if let Error::Flow(error) = error { of_file(error) } else { error })?;
     setup.settings.ranks = ranks.clone();
     let dense = setup.settings.pressure.dense_directions(&setup.mesh);
     refuse_too_large(&file.case, setup.mesh.cells(), &dense, available)?;
-    setup.settings.validate(&setup.mesh).map_err(Error::Flow)?;
+    setup.settings.validate(&setup.mesh).map_err(|error| match error {
+        wakescope_les::Error::TooManyRanks { .. } => Error::Flow(error),
+        error => of_file(error),
+    })?;
+    if options.begin != Begin::Restart {
+        refuse_unstable(file, &setup)?;
+    }
     let (plan, files, schedule) = plan(file, &setup, folder)?;
     plan.check(if options.begin == Begin::Restart { f64::NEG_INFINITY } else { 0.0 }).map_err(Error::Flow)?;
     let forecast = FlowForecast::new(file, &setup, &plan, &files, &schedule);
     Ok(Prepared { setup, plan, files, schedule, forecast })
+}
+
+/// Refuses a step that the run would refuse at its start.
+fn refuse_unstable(file: &CaseFile, setup: &Setup) -> Result<(), Error> {
+    let stability = setup.stability();
+    let step_s = setup.first_step_s(&stability);
+    let Some(limit) = stability.refused(step_s) else { return Ok(()) };
+    let allowed = |most: f64| {
+        format!(
+            "at most {most:.4} with this scheme, mesh and viscosity: beyond a Courant number of {limit:.3} waves of the mesh grow"
+        )
+    };
+    let courant_per_s = stability.courant_per_s();
+    Err(match setup.settings.time_step {
+        TimeStep::Fixed { .. } => file.refuse("time.step_s", step_s, allowed(limit / courant_per_s)),
+        TimeStep::Courant { courant, .. } => file.refuse("time.courant", courant, allowed(limit)),
+    })
 }
 
 /// The run of a checkpoint. Which scheme suits a flow depends on the step, which may be changed: where the case does not name

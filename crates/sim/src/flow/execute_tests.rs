@@ -79,6 +79,8 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
         (wake.fields_tau.unwrap(), wake.planes_tau.unwrap(), wake.series_tau)
     };
     assert_eq!(ended("", 1.5), (vec![0.5, 1.0, 1.5], vec![0.75, 1.5], None));
+    // A list that is written out is the case's own, also where it is that of the old end.
+    assert_eq!(ended("end_tau = 0.7\nplanes_tau = [0.35, 0.7]\n", 0.5), (vec![0.5], vec![0.35], None));
     let own = "fields_tau = [0.2, 0.9]\nseries_tau = [0.1, 0.8]\n";
     assert_eq!(ended(own, 0.4), (vec![0.2], vec![0.2, 0.4], Some([0.1, 0.4])));
     let plane = vortices("", "end_s = 0.5\n").with_end(0.25).unwrap();
@@ -91,7 +93,7 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
 fn energy_from_nowhere_stops_a_run_whose_checkpoints_are_good() {
     let folder = tempfile::tempdir().unwrap();
     let inviscid = "viscosity_m2_s = 0.0\n";
-    let case = vortices(inviscid, "end_s = 1000.0\nscheme = \"adams_bashforth2\"\ncourant = 1.0\n");
+    let case = vortices(inviscid, "end_s = 1000.0\nscheme = \"adams_bashforth2\"\ncourant = 0.4\n");
     let mut notes = Notes::default();
     let error = run(&case, folder.path(), Begin::New, &mut notes).unwrap_err();
     assert!(matches!(error, Error::Flow(wakescope_les::Error::EnergyGrew { .. })), "{error}");
@@ -129,4 +131,115 @@ fn a_run_goes_on_with_the_scheme_of_its_checkpoint() {
     let named = case("end_s = 0.3\nscheme = \"runge_kutta3\"\n");
     let error = run(&named, folder.path(), Begin::Restart, &mut Unwatched).unwrap_err().to_string();
     assert!(error.contains("time scheme"), "{error}");
+}
+
+#[test]
+fn a_courant_number_is_checked_against_the_limit_of_its_scheme_mesh_and_viscosity() {
+    let with = |case: &str, scheme: &str, courant: f64, model: &str| {
+        let text = format!(
+            "[case]\nkind = {case}\n[time]\nend_s = 0.2\nscheme = \"{scheme}\"\ncourant = {courant:?}\n[solver]\n\
+             subgrid = {{ model = \"{model}\" }}\n"
+        );
+        check(&parse(&text), None, RunOptions::default())
+    };
+    let [thin, thick] = ["1e6", "50.0"].map(|re| format!("\"taylor_green\"\ncells = 12\nreynolds = {re}"));
+    let walls = "\"dipole\"\ncells = [32, 32]\nreynolds = 1e5".to_owned();
+    for (case, least, most) in [(thin, 1.092, 1.093), (thick, 1.15, 1.3), (walls, 1.484, 1.495)] {
+        let limit = with(&case, "runge_kutta3", 0.5, "none").unwrap().damped_courant;
+        assert!(limit > least && limit < most, "{case}: {limit}");
+        with(&case, "runge_kutta3", 0.999 * limit, "none").unwrap();
+        let error = with(&case, "runge_kutta3", 1.001 * limit, "none").unwrap_err().to_string();
+        assert!(error.contains("case.toml:") && error.contains("time.courant") && error.contains("at most"), "{error}");
+        assert!(with(&case, "runge_kutta3", 2.0, "none").is_err());
+    }
+    // What a model will take does not count.
+    let thin = "\"taylor_green\"\ncells = 12\nreynolds = 1e6";
+    with(thin, "adams_bashforth2", 0.4, "multiscale_wale").unwrap();
+    let error = with(thin, "adams_bashforth2", 0.45, "multiscale_wale").unwrap_err().to_string();
+    assert!(error.contains("time.courant = 0.45"), "{error}");
+    let own = parse(&format!("[case]\nkind = {thin}\n[solver]\nsubgrid = {{ model = \"wale\", constant = 0.02 }}\n"));
+    let scheme = Setup::new(&own.case, Path::new("")).unwrap().settings.scheme;
+    assert_eq!(scheme, wakescope_les::TimeScheme::RungeKutta3);
+    // A note that a run would give is given by the check, too.
+    let noted = with(thin, "adams_bashforth2", 0.35, "none").unwrap_or_else(|e| panic!("{e}"));
+    assert!(noted.notes.is_empty(), "too short a run for waves to grow: {:?}", noted.notes);
+    let long = "[time]\nend_s = 10.0\nscheme = \"adams_bashforth2\"\n";
+    let noted = check(&parse(&format!("[case]\nkind = {thin}\n{long}")), None, RunOptions::default()).unwrap();
+    assert!(noted.notes.len() == 1 && noted.notes[0].contains("runge_kutta3"), "{:?}", noted.notes);
+}
+
+/// A wake that takes next to nothing.
+fn tiny_wake(case: &str, wake: &str) -> CaseFile {
+    parse(&format!(
+        "[case]\nkind = \"wake\"\ncells = [1, 24, 16]\nheight = 1.2\n{case}[wake]\nend_tau = 0.2\nevery_tau = 0.1\n\
+         fields_tau = []\nplanes_tau = []\n{wake}[checkpoint]\nevery_steps = 3\n"
+    ))
+}
+
+#[test]
+fn a_finished_wake_is_left_as_it_is_by_a_restart_and_refuses_an_earlier_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = tiny_wake("", "");
+    run(&case, folder.path(), Begin::New, &mut Unwatched).unwrap();
+    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    let kept = ["flow.checkpoint", "flow.checkpoint.previous", CASE].map(read);
+    assert!(kept[0] != kept[1]);
+    assert!(run(&case, folder.path(), Begin::Restart, &mut Unwatched).unwrap().is_complete);
+    let error =
+        run(&case.with_end(0.1).unwrap(), folder.path(), Begin::Restart, &mut Unwatched).unwrap_err().to_string();
+    assert!(error.contains("the end") && error.contains("tau = 0.2"), "{error}");
+    assert!(kept == ["flow.checkpoint", "flow.checkpoint.previous", CASE].map(read));
+}
+
+#[test]
+fn a_seed_of_the_command_line_is_that_of_the_noise_and_of_the_files() {
+    let seeded = tiny_wake("seed = 5\n", "").with_seed(7).unwrap();
+    assert!(seeded.toml.contains("seed = 7\n") && seeded.provenance().seed == 7);
+    assert_eq!(tiny_wake("", "").with_seed(7).unwrap().toml, seeded.toml);
+    assert_eq!(tiny_wake("", "").provenance().seed, 0);
+    let error = vortices("", "end_s = 0.1\n").with_seed(7).unwrap_err().to_string();
+    assert!(error.contains("--seed = 7") && error.contains("no noise"), "{error}");
+}
+
+#[test]
+fn columns_and_texts_of_the_circulation_have_the_radii_of_the_case() {
+    for (radii, name) in [
+        ("[3.0, 9.0]", "gamma_3_9_left_m2_s"),
+        ("[4.5, 15.0]", "gamma_4p5_15_left_m2_s"),
+        ("[5.0, 15.0]", "gamma_5_15_left_m2_s"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let case = tiny_wake(&format!("circulation_radii_m = {radii}\n"), "");
+        run(&case, folder.path(), Begin::New, &mut Unwatched).unwrap();
+        let table = fs::read_to_string(folder.path().join("wake.csv")).unwrap();
+        let names = table.lines().find(|line| line.starts_with("tau,")).unwrap();
+        assert!(names.split(',').any(|column| column == name), "{names}");
+        assert_eq!(names.matches("gamma_5_15").count(), if radii.starts_with("[5") { 2 } else { 0 });
+    }
+}
+
+#[test]
+fn keys_that_do_nothing_are_told_of() {
+    let notes = |case: &str, wake: &str| check(&tiny_wake(case, wake), None, RunOptions::default()).unwrap().notes;
+    let before = notes("", "").len();
+    for (case, wake, wanted) in [
+        ("circulation_radii_m = [4.0, 60.0]\n", "", "circulation_radii_m"),
+        ("wind_roughness_m = 0.1\n", "", "wind_roughness_m"),
+        ("seed = 3\nperturbation = 0.0\n", "", "case.seed"),
+    ] {
+        let found = notes(case, wake);
+        assert!(found.len() == before + 1 && found.iter().any(|text| text.contains(wanted)), "{found:?}");
+    }
+    let uneven = parse("[case]\nkind = \"wake\"\ncells = [1, 24, 16]\n[wake]\nend_tau = 0.25\nevery_tau = 0.1\n");
+    let found = check(&uneven, None, RunOptions::default()).unwrap().notes;
+    assert!(found.iter().any(|text| text.contains("every_tau = 0.1")), "{found:?}");
+}
+
+#[test]
+fn an_age_comes_back_as_it_was_asked_for() {
+    for tau_per_s in [0.049_514_871_3, 0.036_024_1, 1.0 / 27.759_2, 1.0 / 3.0] {
+        for tau in (1..=50).map(|i| f64::from(i) / 10.0) {
+            assert_eq!(age_tau(tau / tau_per_s, tau_per_s), tau);
+        }
+    }
 }

@@ -10,11 +10,11 @@ use super::case::{FileFormat, FlowCase, Scheme, Subgrid};
 use super::files::Files;
 use super::setup::Setup;
 use super::wake::Schedule;
-use super::{CaseFile, CaseKind};
+use super::{CaseFile, CaseKind, WakeOutput};
 use crate::plan::units::{bytes, seconds};
 use crate::{Error, machine};
 use std::fmt;
-use wakescope_les::solver::RunPlan;
+use wakescope_les::solver::{RunPlan, Stability};
 use wakescope_les::{TimeScheme, TimeStep};
 
 /// Forecast of a run.
@@ -28,6 +28,12 @@ pub struct FlowForecast {
     pub scheme: Scheme,
     /// Why, where it is not that of the case.
     pub scheme_reason: Option<String>,
+    /// Courant number of the first steps.
+    pub courant: f64,
+    /// The largest at which every wave of the mesh decays under the scheme; infinite in a flow that starts from rest.
+    pub damped_courant: f64,
+    /// What deserves attention.
+    pub notes: Vec<String>,
     /// End of the run \[s\].
     pub end_s: f64,
     /// Age of the wake at the end; the time in seconds where there is none.
@@ -63,7 +69,8 @@ impl FlowForecast {
     pub(super) fn new(file: &CaseFile, setup: &Setup, plan: &RunPlan, files: &Files, schedule: &Schedule) -> Self {
         let case = &file.case;
         let dense = setup.settings.pressure.dense_directions(&setup.mesh);
-        let step_s = first_step_s(setup, plan.end_s);
+        let stability = setup.stability();
+        let step_s = setup.first_step_s(&stability).min(plan.end_s);
         let to_end = steps_to(plan.end_s, step_s, setup).ceil();
         let steps = plan.pause_after_steps.map_or(to_end, |pause| to_end.min(pause as f64));
         let cells = setup.mesh.cells();
@@ -84,10 +91,13 @@ impl FlowForecast {
             scheme,
             scheme_reason: setup.undamped.map(|growth| {
                 format!(
-                    "as viscosity is too small to damp what Adams-Bashforth feeds (cell Reynolds number {:.3e}, at most {:.3e})",
-                    growth.cell_reynolds, growth.limit
+                    "as viscosity is too small to damp what Adams-Bashforth feeds (cell Reynolds number {:.3e} at Courant number {:.2})",
+                    growth.cell_reynolds, growth.courant
                 )
             }),
+            courant: step_s * stability.courant_per_s(),
+            damped_courant: stability.damped_courant(),
+            notes: notes(case, setup, &stability, step_s),
             end_s: plan.end_s,
             end_tau: plan.end_s * setup.tau_per_s,
             step_s,
@@ -120,6 +130,10 @@ impl fmt::Display for FlowForecast {
         };
         let reason = self.scheme_reason.as_ref().map_or(String::new(), |reason| format!(", {reason}"));
         writeln!(f, "  steps    about {:.0} of {:.3e} s, {scheme}{reason}", self.steps, self.step_s)?;
+        if self.damped_courant.is_finite() {
+            let (courant, damped) = (self.courant, self.damped_courant);
+            writeln!(f, "  courant  {courant:.3}, all waves of the mesh decay up to {damped:.3}")?;
+        }
         writeln!(f, "  time     about {} on one core", seconds(self.core_s))?;
         let available = machine::available_memory_bytes().map_or(String::new(), |b| format!(" of {}", bytes(b)));
         writeln!(f, "  memory   about {}{available}", bytes(self.memory_bytes))?;
@@ -143,16 +157,15 @@ fn count(cells: [usize; 3]) -> f64 {
     cells.iter().map(|n| *n as f64).product()
 }
 
-/// Length of the first step, or of the longest if the flow starts from rest.
-fn first_step_s(setup: &Setup, end_s: f64) -> f64 {
-    let step_s = match setup.settings.time_step {
-        TimeStep::Fixed { step_s } => step_s,
-        TimeStep::Courant { courant, longest_s } => {
-            let velocity_m_s = setup.initial_velocity();
-            longest_s.min(courant / setup.mesh.courant_rate_per_s(velocity_m_s))
-        }
-    };
-    step_s.min(end_s)
+/// What deserves attention before a run.
+fn notes(case: &FlowCase, setup: &Setup, stability: &Stability, step_s: f64) -> Vec<String> {
+    let mut notes = case.case.unresolved(&setup.mesh);
+    notes.extend(stability.stiff_note(step_s, setup.settings.damped_steps));
+    if let CaseKind::Wake(wake) = &case.case {
+        notes.extend(wake.idle());
+    }
+    notes.extend(case.wake.as_ref().and_then(WakeOutput::idle));
+    notes
 }
 
 /// Steps to `end_s`, of which the first has the length `first_s`. The step of a wake grows with the cores, in which the air is

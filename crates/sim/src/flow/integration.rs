@@ -29,7 +29,9 @@ impl Setup {
             Some(Scheme::RungeKutta3) => setup.integrate(case, TimeScheme::RungeKutta3),
             None => {
                 setup.integrate(case, setup.settings.scheme);
-                setup.undamped = setup.undamped_growth();
+                // What a model will take is not known at the start.
+                let stability = setup.stability();
+                setup.undamped = stability.undamped(setup.first_step_s(&stability));
                 if setup.undamped.is_some() {
                     setup.integrate(case, TimeScheme::RungeKutta3);
                 }

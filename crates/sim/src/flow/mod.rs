@@ -91,7 +91,7 @@ impl CaseFile {
         let mut case = self.case.clone();
         case.time.end_s = None;
         match &mut case.wake {
-            Some(wake) => wake.end_at(end),
+            Some(wake) => wake.end_at(end, ["wake.fields_tau", "wake.planes_tau"].map(|key| self.source.has(key))),
             None => {
                 case.time.end_s = Some(end);
                 case.output.times_s.retain(|time_s| *time_s <= end);
@@ -109,6 +109,22 @@ impl CaseFile {
         let problems =
             problems.into_iter().map(|problem| Located { problem: of_command(problem), line: None }).collect();
         Err(SceneError::Invalid { path: self.source.path().to_owned(), problems })
+    }
+
+    /// The same case with another seed of its noise.
+    ///
+    /// # Errors
+    /// A flow whose noise has no seed.
+    pub fn with_seed(&self, seed: u64) -> Result<Self, SceneError> {
+        let mut case = self.case.clone();
+        let CaseKind::Wake(wake) = &mut case.case else {
+            let allowed = "absent: this flow has no noise; it is for case.kind = \"wake\"".into();
+            let problem = Problem { key: "--seed".into(), value: seed.to_string(), allowed };
+            let problems = vec![Located { problem, line: None }];
+            return Err(SceneError::Invalid { path: self.source.path().to_owned(), problems });
+        };
+        wake.seed = Some(seed);
+        Ok(Self::of(case, self.source.clone()))
     }
 
     /// A preset.
@@ -156,9 +172,16 @@ impl CaseFile {
             program: crate::PROGRAM.into(),
             scene_toml: self.toml.clone(),
             scene_hash: self.hash.clone(),
-            seed: 0,
+            // 0 stands for noise by a closed formula, and for none.
+            seed: if let CaseKind::Wake(wake) = &self.case.case { wake.seed.unwrap_or(0) } else { 0 },
         }
     }
+}
+
+/// Age of a wake of a time, without the last digits, in which the age that was asked for may not come back.
+fn age_tau(time_s: f64, tau_per_s: f64) -> f64 {
+    let tau = time_s * tau_per_s;
+    format!("{tau:.13e}").parse().unwrap_or(tau)
 }
 
 /// The text of a case file.

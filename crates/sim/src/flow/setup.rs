@@ -3,7 +3,8 @@
 use crate::Error;
 pub(super) use wakescope_les::cases::Initial;
 use wakescope_les::{
-    Flow, FlowSettings, Mesh, analysis::WakeMeter, analysis::WakeScales, solver::StartReport, solver::UndampedGrowth,
+    Flow, FlowSettings, Mesh, analysis::WakeMeter, analysis::WakeScales, solver::Stability, solver::StartReport,
+    solver::UndampedGrowth,
 };
 
 /// All that a simulation is made of.
@@ -24,15 +25,22 @@ pub(super) struct Setup {
 /// The meter of a wake and its scales.
 pub(super) struct WakeSetup {
     pub(super) meter: WakeMeter,
+    /// Radii between which the circulation is averaged \[m\].
+    pub(super) circulation_radii_m: [f64; 2],
     pub(super) scales: WakeScales,
     /// Core radius at the start \[m\].
     pub(super) core_radius_m: f64,
 }
 
 impl Setup {
-    /// Waves that the scheme would let grow in the initial field.
-    pub(super) fn undamped_growth(&self) -> Option<UndampedGrowth> {
-        UndampedGrowth::of(&self.mesh, &self.settings, self.initial_velocity())
+    /// How the cells carry and damp the waves of the initial field.
+    pub(super) fn stability(&self) -> Stability {
+        Stability::of(&self.mesh, &self.settings, self.initial_velocity())
+    }
+
+    /// Length of the first step, or of the longest if the flow starts from rest \[s\].
+    pub(super) fn first_step_s(&self, stability: &Stability) -> f64 {
+        stability.first_step_s(self.settings.time_step)
     }
 
     /// Velocity of the initial field in the cell of the indices along x, y, z: at its centre, or at its low faces.

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use wakescope_les::solver::{EnergyBudget, StepRecord};
 
 const HEADER: &str = "step,time_s,step_s,courant,kinetic_energy_m5_s2,viscous_power_m5_s3,subgrid_power_m5_s3,\
-                      force_power_m5_s3,relative_divergence,subgrid_viscosity_m2_s,pressure_iterations,\
+                      force_power_m5_s3,relative_divergence,subgrid_viscosity_m2_s,subgrid_decay,pressure_iterations,\
                       pressure_residual,pressure_factor,energy_rate_m5_s3,energy_residual_m5_s3";
 
 /// The table and the row that waits.
@@ -65,6 +65,7 @@ impl StepTable {
             r.force_power_m5_s3,
             record.relative_divergence,
             r.subgrid_viscosity_m2_s,
+            r.subgrid_decay,
             r.pressure_iterations as f64,
             r.pressure_residual.unwrap_or(missing),
             r.pressure_factor.unwrap_or(missing),

@@ -294,7 +294,16 @@ fn a_flow_that_blows_up_names_step_and_place() {
     let folder = tempfile::tempdir().unwrap();
     let text = "[case]\nkind = \"taylor_green_plane\"\ncells = 12\n[time]\nend_s = 1.0\nstep_s = 0.2\n";
     let error = run(&parse(text), folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
-    assert!(error.starts_with("flow: step 1 ") && error.contains("Courant number"), "{error}");
+    assert!(error.contains("time.step_s = 0.2") && error.contains("Courant number"), "{error}");
+    // A force that brings the air to a speed that the step does not allow.
+    let z = "[case.z]\ncells = 8\nlow_m = 0.0\nhigh_m = 8.0\n";
+    let text = format!(
+        "[case]\nkind = \"free\"\nviscosity_m2_s = 0.01\nforce_m_s2 = [0.0, 1.0, 0.0]\n[case.y]\ncells = 8\nlow_m = 0.0\nhigh_m = 8.0\n{z}\
+         [case.initial]\nkind = \"uniform\"\nvelocity_m_s = [0.0, 0.1, 0.0]\n[time]\nend_s = 10.0\nstep_s = 0.2\nscheme = \"runge_kutta3\"\n"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let error = run(&parse(&text), folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
+    assert!(error.starts_with("flow: step ") && error.contains("fastest is v"), "{error}");
 }
 
 #[test]
@@ -307,7 +316,7 @@ fn a_mesh_that_does_not_resolve_core_and_boundary_layer_is_said_to() {
         run(&parse(&text), folder.path(), Begin::New, &mut Unwatched).unwrap().warnings
     };
     let found = warnings("cells = [48, 48]\nreynolds = 2500.0");
-    assert!(found.iter().any(|text| text.contains("core radius along y has 2.4 cells, at least 2.5")), "{found:?}");
+    assert!(found.iter().any(|text| text.contains("core radius along y has 2.40 cells, at least 2.5")), "{found:?}");
     assert!(found.iter().any(|text| text.contains("along the wall, where it rolls up")), "{found:?}");
     assert_eq!(warnings("cells = [96, 96]\nlateral_stretch = 0.7\nreynolds = 200.0"), Vec::<String>::new());
 }

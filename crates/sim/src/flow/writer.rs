@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use wakescope_les::Flow;
 use wakescope_les::ranks::Ranks;
-use wakescope_les::solver::{RunObserver, RunWarning, StepRecord};
+use wakescope_les::solver::{RunObserver, RunWarning, StepRecord, UndampedGrowth};
 
 /// What a checkpoint keeps for the files.
 #[derive(Debug, Default)]
@@ -69,6 +69,11 @@ impl Writer<'_> {
     }
 }
 
+/// What is said of waves that Adams-Bashforth lets grow.
+pub(super) fn growth_note(growth: &UndampedGrowth) -> String {
+    format!("with Adams-Bashforth {growth}: take time.scheme = \"runge_kutta3\"")
+}
+
 impl RunObserver for Writer<'_> {
     fn step(&mut self, _: &Flow, record: &StepRecord) -> Result<(), String> {
         if self.ranks.rank() > 0 {
@@ -97,14 +102,8 @@ impl RunObserver for Writer<'_> {
 
     fn warning(&mut self, warning: &RunWarning) {
         let text = match warning {
-            RunWarning::Courant { step, courant, limit } => {
-                format!("step {step} has Courant number {courant:.3}, near the limit {limit}: shorten the time step")
-            }
-            RunWarning::UndampedGrowth { growth, .. } => format!(
-                "Adams-Bashforth lets short waves grow at {:.2e} 1/s, as viscosity is too small to damp them (cell Reynolds \
-                 number {:.3e}, at most {:.3e} at Courant number {:.2}): take time.scheme = \"runge_kutta3\"",
-                growth.rate_per_s, growth.cell_reynolds, growth.limit, growth.courant
-            ),
+            RunWarning::StepEnergy { step, energy } => format!("step {step}: {energy}"),
+            RunWarning::UndampedGrowth { growth, .. } => growth_note(growth),
             _ => format!("{warning:?}"),
         };
         self.watch.note(&text);

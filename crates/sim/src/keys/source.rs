@@ -26,6 +26,12 @@ impl Source {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
+    /// Whether the text gives a value to a key.
+    #[cfg(feature = "flow")]
+    pub(crate) fn has(&self, key: &str) -> bool {
+        Document::parse(&self.text, &self.path).is_ok_and(|document| document.value(key).is_some())
+    }
+
     /// Problems with the lines of the text.
     pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
         match Document::parse(&self.text, &self.path) {

@@ -380,7 +380,13 @@ mod planes {
                 None => to(&times[at]),
             }
         };
-        match (flow.time_s, flow.age_tau) {
+        // Ages of files are rounded: the first and the last plane are meant.
+        let within = |x: f64, from: f64, to: f64| {
+            let clamped = x.clamp(from, to);
+            if (x - clamped).abs() <= 1e-9 * to.abs() { clamped } else { x }
+        };
+        let time_s = flow.time_s.map(|time_s| within(time_s, first.1, last.1));
+        match (time_s, flow.age_tau.map(|tau| within(tau, first.0, last.0))) {
             (Some(time_s), _) if (first.1..=last.1).contains(&time_s) => {
                 Ok((time_s, interpolated(time_s, |t| t.1, |t| t.0)))
             }

@@ -327,6 +327,9 @@ impl WakeMeter {
             Some(core) if core.circulation_m2_s.abs() >= least_m2_s => {
                 let [y_spread_m, z_spread_m] = spread(&self.slices(seen, core, sign, floor_m)?);
                 let ([y_m, z_m], gamma_m2_s) = (core.centre_m, core.circulation_m2_s);
+                // Beside its own vortex, which is counted on over the sides.
+                let own_y_m = side.centres_m[side.own][0];
+                let y_m = own_y_m + side.plane.lateral_m(own_y_m, y_m);
                 SecondaryRecord { y_m, z_m, y_spread_m, z_spread_m, gamma_m2_s }
             }
             _ => SecondaryRecord::NONE,

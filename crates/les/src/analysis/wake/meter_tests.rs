@@ -126,6 +126,22 @@ fn the_secondary_vortex_is_neither_the_sharpest_sheet_nor_the_first_vortex_of_th
 }
 
 #[test]
+fn secondary_vortices_are_counted_on_over_the_sides_with_their_own() {
+    const LIST: &[(f64, f64, f64, f64)] =
+        &[(-TAU, -0.5, 0.8, 0.1), (TAU, 0.5, 0.8, 0.1), (0.3 * TAU, -1.2, 0.9, 0.1), (-0.3 * TAU, 1.2, 0.9, 0.1)];
+    let flow = flow(1, vortices(LIST, |_| 0.0));
+    for periods in [-2.0, -1.0, 0.0, 1.0, 2.0] {
+        let shift = 4.0 * periods;
+        let centres = PAIR.map(|[y, z]| [y + shift, z]);
+        let nu = flow.settings().viscosity_m2_s;
+        let record = WakeMeter::new(flow.mesh(), nu, WakeScales::REDUCED, centres).unwrap().measure(&flow).unwrap();
+        close(record.right.secondary.y_m, record.right.y_m + 0.7, 0.02, "beside the right vortex");
+        close(record.left.secondary.y_m, record.left.y_m - 0.7, 0.02, "beside the left vortex");
+        close(record.right.y_m, 0.5 + shift, 0.02, "counted on");
+    }
+}
+
+#[test]
 fn the_meter_follows_across_the_period_and_remembers_through_a_restart() {
     let pair = VortexPairCase {
         cells: [1, 64, 40],

@@ -73,10 +73,12 @@ impl Resolution {
         .into_iter()
         .filter_map(|(what, cells, least)| Some((what, cells.filter(|cells| *cells < least)?, least)))
         .map(|(what, cells, least)| {
+            let other = if what.contains("core") { "" } else { ", or a lower Reynolds number" };
+            // Rounded up, and a little more where cells are stretched.
+            let more = (10.0 * least / cells + 0.5).ceil() / 10.0;
             format!(
-                "{what} has {cells:.1} cells, at least {least} are needed: take {:.1} times as many cells there, a stronger \
-                 stretching towards it, or a lower Reynolds number",
-                least / cells
+                "{what} has {cells:.2} cells, at least {least} are needed: take {more:.1} times as many cells, a stronger stretching \
+                 towards it{other}"
             )
         })
         .collect()
@@ -118,7 +120,10 @@ mod tests {
         assert_eq!(dipole(384, 0.0, 1250.0), Vec::<String>::new());
         assert_eq!(dipole(512, 0.0, 2500.0), Vec::<String>::new());
         let found = dipole(384, 0.0, 2500.0);
-        assert!(found.len() == 1 && found[0].contains("along the wall") && found[0].contains("3.8 cells"), "{found:?}");
+        assert!(
+            found.len() == 1 && found[0].contains("along the wall") && found[0].contains("3.84 cells"),
+            "{found:?}"
+        );
         assert_eq!(dipole(384, 0.5, 2500.0), Vec::<String>::new());
         let found = dipole(32, 0.0, 2500.0);
         assert!(found.len() == 4 && found[0].contains("core radius along y"), "{found:?}");

@@ -18,7 +18,7 @@ pub(super) const SHARE: f64 = 0.01;
 /// Below this share of the largest energy of the run the energy is round-off.
 const ROUND_OFF: f64 = 1e-24;
 /// A pressure tolerance above this may itself feed energy.
-const LOOSE: f64 = 1e-6;
+pub(super) const LOOSE: f64 = 1e-6;
 
 /// The bound on the energy as a run goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,38 +76,34 @@ fn grew(flow: &Flow, allowed_m5_s2: f64, rate_per_s: f64) -> Result<Error, Error
         component: flow.component_name(axis),
         cell: flow.cell(place),
         position_m: flow.position_m(place),
-        cause: cause(flow),
+        cause: cause(flow)?,
     })))
 }
 
 /// The likeliest cause, and what to do.
-fn cause(flow: &Flow) -> String {
+fn cause(flow: &Flow) -> Result<String, Error> {
     let settings = flow.settings();
     let step_s = flow.state.last_step_s;
     let decay = step_s * flow.explicit_viscous_rate_per_s();
     if decay > settings.scheme.largest_decay() {
-        return format!(
+        return Ok(format!(
             "viscosity is explicit with {decay:.2} per step, stable up to {}: shorten the step or take it implicitly",
             settings.scheme.largest_decay()
-        );
+        ));
     }
-    if let Some(growth) = flow.undamped_growth() {
-        let slower = match growth.damped_courant() {
-            courant if courant > 0.01 => format!("; the Courant number that suits it is below {courant:.2}"),
-            _ => String::new(),
-        };
-        return format!(
-            "Adams-Bashforth lets short waves grow, and viscosity is too small to damp them (cell Reynolds number {:.3e}, at \
-             most {:.3e} at Courant number {:.2}): take Runge-Kutta{slower}",
-            growth.cell_reynolds, growth.limit, growth.courant
-        );
+    if let Some(growth) = flow.stability()?.undamped(step_s) {
+        let remedy =
+            if settings.scheme == TimeScheme::AdamsBashforth2 { "take Runge-Kutta" } else { "shorten the step" };
+        return Ok(format!("{growth}: {remedy}"));
+    }
+    if let Some(note) = flow.stiffness().note(step_s, settings.damped_steps) {
+        return Ok(note);
     }
     if settings.pressure_tolerance > LOOSE {
-        return format!(
+        return Ok(format!(
             "the pressure tolerance {:e} leaves divergence, which feeds energy: take 1e-8 or less",
             settings.pressure_tolerance
-        );
+        ));
     }
-    let other = if settings.scheme == TimeScheme::AdamsBashforth2 { ", or take Runge-Kutta" } else { "" };
-    format!("the time step is too long for this flow: shorten it{other}")
+    Ok("the time step is too long for this flow: shorten it".into())
 }

@@ -10,6 +10,7 @@
 //! up, observers that fail.
 
 mod energy;
+mod window;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -19,12 +20,13 @@ use super::growth::UndampedGrowth;
 use super::mesh::Mesh;
 use super::report::StepReport;
 use super::settings::FlowSettings;
+use super::subgrid::SubgridModel;
 use crate::Error;
 use crate::error::check;
 use energy::EnergyBound;
+pub use window::StepEnergy;
+use window::Window;
 
-/// Share of the largest Courant number beyond which the run warns.
-const WARNING_SHARE: f64 = 0.6;
 /// A step shorter than this share of the time of the run does not lead to its end.
 const SHORTEST_SHARE: f64 = 1e-10;
 /// Times closer than this share of the time of the run are the same.
@@ -32,7 +34,7 @@ const SAME_TIME: f64 = 1e-12;
 /// Steps between checks for waves that grow.
 const STEPS_PER_CHECK: u64 = 64;
 /// Growth of the worst wave over the rest of the run, as an exponent, that is warned of.
-const NOTICED_GROWTH: f64 = 0.1;
+pub const NOTICED_GROWTH: f64 = 0.1;
 
 /// How often.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,14 +103,12 @@ pub struct StepRecord {
 #[non_exhaustive]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RunWarning {
-    /// The Courant number is so high that the time scheme is near its limit.
-    Courant {
-        /// Number of the step.
+    /// The time step feeds the flow, or takes from it, more than a tenth of what viscosity and model take.
+    StepEnergy {
+        /// Number of the last of the steps over which this was summed.
         step: u64,
-        /// Its Courant number.
-        courant: f64,
-        /// Courant number beyond which a step is refused.
-        limit: f64,
+        /// What they did.
+        energy: StepEnergy,
     },
     /// Adams-Bashforth lets waves of the mesh grow, for all that viscosity takes from them.
     UndampedGrowth {
@@ -183,18 +183,25 @@ pub struct Stepping {
 pub struct Run {
     flow: Flow,
     plan: RunPlan,
-    /// The budget of the last step, which waits for the powers at its end: those at its start.
-    open: Option<EnergyBudget>,
-    energy: EnergyBound,
+    kept: Kept,
     has_warned: HasWarned,
     is_fresh: bool,
     stepping: Stepping,
 }
 
+/// What a run remembers of its steps, and keeps in its checkpoints beside the flow.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    /// The budget of the last step, which waits for the powers at its end: those at its start.
+    open: Option<EnergyBudget>,
+    energy: EnergyBound,
+    window: Window,
+}
+
 /// What has been warned of.
 #[derive(Debug, Default)]
 struct HasWarned {
-    courant: bool,
+    energy: bool,
     growth: bool,
 }
 
@@ -205,8 +212,8 @@ impl Run {
     /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty intervals.
     pub fn new(flow: Flow, plan: RunPlan) -> Result<Self, Error> {
         plan.check(flow.time_s())?;
-        let energy = EnergyBound::new(&flow);
-        Ok(Self::with(flow, plan, None, energy, true))
+        let kept = Kept { open: None, energy: EnergyBound::new(&flow), window: Window::default() };
+        Ok(Self::with(flow, plan, kept, true))
     }
 
     /// A run that continues from a checkpoint written by a run, with the bytes that the observer had given.
@@ -222,16 +229,16 @@ impl Run {
         let path = path.as_ref();
         let (flow, bytes) = Flow::restore(path, mesh, settings)?;
         let what = "it was written by another kind of program";
-        let Some((open, energy, user_data)) = read_own(&bytes) else {
+        let Some((kept, user_data)) = Kept::read(&bytes) else {
             return Err(Error::CheckpointDamaged { path: path.to_owned(), what });
         };
         plan.check(f64::NEG_INFINITY)?;
-        Ok((Self::with(flow, plan, open, energy, false), user_data.to_vec()))
+        Ok((Self::with(flow, plan, kept, false), user_data.to_vec()))
     }
 
-    fn with(flow: Flow, plan: RunPlan, open: Option<EnergyBudget>, energy: EnergyBound, is_fresh: bool) -> Self {
+    fn with(flow: Flow, plan: RunPlan, kept: Kept, is_fresh: bool) -> Self {
         let (has_warned, stepping) = Default::default();
-        Self { flow, plan, open, energy, has_warned, is_fresh, stepping }
+        Self { flow, plan, kept, has_warned, is_fresh, stepping }
     }
 
     /// The simulation, or the part that this rank has.
@@ -257,6 +264,7 @@ impl Run {
     pub fn to_end(&mut self, observer: &mut dyn RunObserver) -> Result<RunSummary, Error> {
         let (start_s, end_s) = (self.flow.time_s(), self.plan.end_s);
         // A fresh run gives the output of its start; a resumed one gave it before its checkpoint.
+        let (was_fresh, begun_at) = (self.is_fresh, self.flow.steps());
         let given = |&t: &f64| if self.is_fresh { t < start_s } else { self.is_reached(t) };
         let mut next_output = self.plan.output_times_s.iter().take_while(|t| given(t)).count();
         self.is_fresh = false;
@@ -277,17 +285,20 @@ impl Run {
                 let (step, step_s) = (report.step, report.step_s);
                 return Err(Error::StepTooShort { step, time_s: report.time_s, step_s, end_s });
             }
-            self.warn(&report, observer);
             let record = self.record(report, energy)?;
             self.agree(observer.step(&self.flow, &record))?;
-            self.energy.pass(&self.flow, energy, report.step_s)?;
+            self.kept.energy.pass(&self.flow, energy, report.step_s)?;
+            self.watch(&report, observer)?;
             self.give_outputs(&mut next_output, observer)?;
             if self.checkpoint_is_due(before_s, &report) {
                 self.write_checkpoint(observer)?;
             }
         }
         let is_complete = self.is_reached(end_s);
-        self.write_checkpoint(observer)?;
+        // What a run resumed from is not written again.
+        if was_fresh || self.flow.steps() > begun_at {
+            self.write_checkpoint(observer)?;
+        }
         Ok(RunSummary { steps: self.flow.steps(), time_s: self.flow.time_s(), is_complete })
     }
 
@@ -317,21 +328,31 @@ impl Run {
         }
     }
 
-    fn warn(&mut self, report: &StepReport, observer: &mut dyn RunObserver) {
-        let limit = self.flow.settings().scheme.largest_courant();
-        if report.courant > WARNING_SHARE * limit && !self.has_warned.courant {
-            self.has_warned.courant = true;
-            self.tell(observer, &RunWarning::Courant { step: report.step, courant: report.courant, limit });
+    /// Tells of energy that the steps themselves feed or take, and refuses more than viscosity and model take.
+    fn watch(&mut self, report: &StepReport, observer: &mut dyn RunObserver) -> Result<(), Error> {
+        let Some(energy) = self.kept.window.close(&self.flow, report) else { return Ok(()) };
+        if energy.share > 1.0 && energy.share.is_finite() {
+            return Err(Error::StepFeeds { step: report.step, time_s: report.time_s, energy });
         }
+        if !self.has_warned.energy {
+            self.has_warned.energy = true;
+            self.tell(observer, &RunWarning::StepEnergy { step: report.step, energy });
+        }
+        Ok(())
     }
 
     fn look_for_growth(&mut self, observer: &mut dyn RunObserver) {
         let step = self.flow.steps();
-        if self.has_warned.growth || !step.is_multiple_of(STEPS_PER_CHECK) {
+        // What a model takes from the waves, the energy of the steps tells.
+        let is_modelled = self.flow.settings().subgrid != SubgridModel::None;
+        if self.has_warned.growth || is_modelled || !step.is_multiple_of(STEPS_PER_CHECK) {
             return;
         }
         let left_s = self.plan.end_s - self.flow.time_s();
-        if let Some(growth) = self.flow.undamped_growth().filter(|g| g.rate_per_s * left_s > NOTICED_GROWTH) {
+        let step_s = self.flow.next_step_s();
+        // If a rank is lost, the next step says so.
+        let growth = self.flow.stability().ok().and_then(|stability| stability.undamped(step_s));
+        if let Some(growth) = growth.filter(|g| g.rate_per_s * left_s > NOTICED_GROWTH) {
             self.has_warned.growth = true;
             self.tell(observer, &RunWarning::UndampedGrowth { step, growth });
         }
@@ -340,9 +361,12 @@ impl Run {
     fn record(&mut self, report: StepReport, energy_before: f64) -> Result<StepRecord, Error> {
         let power_m5_s3 = report.viscous_power_m5_s3 + report.subgrid_power_m5_s3 + report.force_power_m5_s3;
         let mean = |open: EnergyBudget| EnergyBudget { power_m5_s3: 0.5 * (open.power_m5_s3 + power_m5_s3), ..open };
-        let budget_before = self.open.map(mean);
+        let budget_before = self.kept.open.map(mean);
+        if let (Some(open), Some(closed)) = (self.kept.open, budget_before) {
+            self.kept.window.add(open, closed, &report);
+        }
         let rate_m5_s3 = (report.kinetic_energy_m5_s2 - energy_before) / report.step_s;
-        self.open = Some(EnergyBudget { step: report.step, rate_m5_s3, power_m5_s3 });
+        self.kept.open = Some(EnergyBudget { step: report.step, rate_m5_s3, power_m5_s3 });
         Ok(StepRecord { report, relative_divergence: self.flow.measure_divergence()?, budget_before })
     }
 
@@ -353,9 +377,8 @@ impl Run {
             return false;
         }
         // One whose next step would be refused is not worth keeping.
-        let limit = self.flow.settings().scheme.largest_courant();
-        let is_good = self.flow.state.courant_per_s * report.step_s <= limit;
-        is_good
+        let courant = self.flow.state.courant_per_s * report.step_s;
+        self.flow.refuse_courant(courant, report.step_s).is_ok()
             && match plan.every {
                 Interval::Steps(steps) => report.step.is_multiple_of(steps),
                 Interval::Time { time_s } => (report.time_s / time_s).floor() > (before_s / time_s).floor(),
@@ -366,7 +389,7 @@ impl Run {
         let Some(plan) = &self.plan.checkpoint else { return Ok(()) };
         let mut previous = plan.path.clone().into_os_string();
         previous.push(".previous");
-        let bytes = [own_bytes(self.open, self.energy), observer.user_data()].concat();
+        let bytes = [self.kept.bytes(), observer.user_data()].concat();
         self.flow.save_and_keep(&plan.path, Some(Path::new(&previous)), &bytes)
     }
 }
@@ -394,23 +417,27 @@ impl RunPlan {
     }
 }
 
-/// What a run keeps in its checkpoints beside the flow: the open budget (its presence, then its numbers) and the bound.
-fn own_bytes(open: Option<EnergyBudget>, energy: EnergyBound) -> Vec<u8> {
-    let open = open.map_or([0; 4], |b| [1, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]);
-    let energy = [energy.bound_m5_s2, energy.largest_m5_s2].map(f64::to_bits);
-    open.into_iter().chain(energy).flat_map(u64::to_le_bytes).collect()
-}
+impl Kept {
+    /// Bit 0 of the first number: whether a budget is open; bit 1: whether the window is there, which older checkpoints lack.
+    fn bytes(&self) -> Vec<u8> {
+        let open = self.open.map_or([2, 0, 0, 0], |b| [3, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]);
+        let Self { energy, window, .. } = self;
+        let numbers = [energy.bound_m5_s2, energy.largest_m5_s2, window.fed_m5_s3, window.taken_m5_s3];
+        open.into_iter().chain(numbers.map(f64::to_bits)).flat_map(u64::to_le_bytes).collect()
+    }
 
-fn read_own(bytes: &[u8]) -> Option<(Option<EnergyBudget>, EnergyBound, &[u8])> {
-    let (own, rest) = bytes.split_at_checked(48)?;
-    let numbers: Vec<u64> = own.as_chunks::<8>().0.iter().map(|w| u64::from_le_bytes(*w)).collect();
-    let [present, step, rate, power, bound, largest] = numbers[..] else { return None };
-    let (rate_m5_s3, power_m5_s3) = (f64::from_bits(rate), f64::from_bits(power));
-    let energy = EnergyBound { bound_m5_s2: f64::from_bits(bound), largest_m5_s2: f64::from_bits(largest) };
-    match present {
-        0 => Some((None, energy, rest)),
-        1 => Some((Some(EnergyBudget { step, rate_m5_s3, power_m5_s3 }), energy, rest)),
-        _ => None,
+    fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
+        let number = |at: usize| Some(u64::from_le_bytes(*bytes.get(8 * at..)?.first_chunk()?));
+        let float = |at: usize| number(at).map(f64::from_bits);
+        let flags = number(0).filter(|flags| *flags < 4)?;
+        let (rate_m5_s3, power_m5_s3) = (float(2)?, float(3)?);
+        let open = (flags & 1 == 1).then_some(EnergyBudget { step: number(1)?, rate_m5_s3, power_m5_s3 });
+        let energy = EnergyBound { bound_m5_s2: float(4)?, largest_m5_s2: float(5)? };
+        let (window, own) = match flags & 2 {
+            0 => (Window::default(), 48),
+            _ => (Window { fed_m5_s3: float(6)?, taken_m5_s3: float(7)? }, 64),
+        };
+        Some((Self { open, energy, window }, bytes.get(own..)?))
     }
 }
 

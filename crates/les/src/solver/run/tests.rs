@@ -132,8 +132,8 @@ fn the_energy_budget_closes_to_the_second_order_of_the_time_step() {
 }
 
 #[test]
-fn high_courant_numbers_warn_once_and_too_high_ones_stop_the_run() {
-    // Vortices with a speed of 1 on cells of 1/12 m: 0.1 s is more than the limit.
+fn steps_in_which_waves_grow_are_told_of_once_and_longer_ones_stop_the_run() {
+    // Vortices with a speed of 1 on cells of 1/12 m.
     let run = |step_s| {
         let mut witness = Witness::default();
         let flow = vortices(TimeStep::Fixed { step_s }, TimeScheme::AdamsBashforth2);
@@ -142,12 +142,11 @@ fn high_courant_numbers_warn_once_and_too_high_ones_stop_the_run() {
     };
     let (result, witness) = run(0.02);
     assert!(result.is_ok() && witness.warnings.is_empty());
-    let (result, witness) = run(0.06);
-    assert!(result.is_ok() && witness.records.len() == 3);
-    let [RunWarning::Courant { step: 1, courant, limit: 1.0 }] = witness.warnings[1..] else { panic!("{witness:?}") };
-    assert!(matches!(witness.warnings[0], RunWarning::UndampedGrowth { step: 0, .. }), "{witness:?}");
-    assert!(courant > 0.6 && courant < 1.0, "{courant}");
-    let (result, _) = run(0.11);
+    let (result, witness) = run(0.0305);
+    assert!(result.is_ok() && witness.records.len() == 3, "{result:?}");
+    let [RunWarning::UndampedGrowth { step: 0, growth }] = witness.warnings[..] else { panic!("{witness:?}") };
+    assert!(growth.courant > 0.45 && growth.damped_courant < growth.courant, "{growth:?}");
+    let (result, _) = run(0.06);
     assert!(matches!(result, Err(Error::CourantTooLarge { step: 1, .. })), "{result:?}");
 }
 
@@ -167,11 +166,11 @@ fn a_flow_that_blows_up_stops_with_its_place_and_leaves_a_checkpoint_that_can_be
     let error = Run::new(flow, blown.clone()).unwrap().to_end(&mut witness).unwrap_err();
     let Error::CourantTooLarge { step, component, courant, .. } = error else { panic!("{error}") };
     assert_eq!((component, step), ("v", witness.records.len() as u64 + 1));
-    assert!(courant > 1.0);
+    assert!(courant > 0.4);
     // The last state was refused; the one before it is the last that could be stepped from.
     let (flow, _) = Flow::restore(&path, mesh.clone(), settings.clone()).unwrap();
     assert_eq!(flow.steps(), step - 2);
-    let slower = FlowSettings { time_step: TimeStep::Courant { courant: 0.5, longest_s: 1.0 }, ..settings };
+    let slower = FlowSettings { time_step: TimeStep::Courant { courant: 0.3, longest_s: 1.0 }, ..settings };
     let (mut run, _) = Run::resume(&path, mesh, slower, plan(flow.time_s() + 0.1, &[])).unwrap();
     run.to_end(&mut Silent).unwrap();
 }
@@ -189,16 +188,16 @@ fn energy_that_nothing_gave_stops_the_run_and_no_checkpoint_holds_it() {
     let path = folder.path().join("run.ckpt");
     let checkpoint = Some(CheckpointPlan { path: path.clone(), every: Interval::Steps(10) });
     let plan = RunPlan { checkpoint, ..plan(1000.0, &[]) };
-    let flow = inviscid(courant(1.0), TimeScheme::AdamsBashforth2);
+    let flow = inviscid(courant(0.4), TimeScheme::AdamsBashforth2);
     let (mesh, settings, start) = (flow.mesh().clone(), flow.settings().clone(), flow.kinetic_energy_m5_s2());
     let mut witness = Witness::default();
     let error = Run::new(flow, plan.clone()).unwrap().to_end(&mut witness).unwrap_err();
     let text = error.to_string();
     let Error::EnergyGrew(growth) = error else { panic!("{error}") };
     let EnergyGrowth { step, energy_m5_s2, allowed_m5_s2, rate_per_s, cause, .. } = *growth;
-    // At its first percent, not after many orders of magnitude; the fastest waves double in a few steps.
+    // At its first percent, not after many orders of magnitude.
     assert!(allowed_m5_s2 <= start * (1.0 + 1e-9) && energy_m5_s2 > 1.01 * allowed_m5_s2, "{text}");
-    assert!(energy_m5_s2 < 2.0 * start && rate_per_s > 0.0, "{text}");
+    assert!(energy_m5_s2 < 1.5 * start && rate_per_s > 0.0, "{text}");
     assert!(cause.contains("Runge-Kutta") && text.contains("near cell") && text.contains("1/s"), "{text}");
     assert_eq!(step, witness.records.len() as u64, "the step that failed is recorded");
     assert!(matches!(witness.warnings[0], RunWarning::UndampedGrowth { step: 0, .. }), "{:?}", witness.warnings);
@@ -236,6 +235,42 @@ fn steady_forced_dragged_and_fading_flows_keep_within_the_energy_that_they_may_h
         let summary = Run::new(flow, steps).unwrap().to_end(&mut Silent);
         assert_eq!(summary.unwrap_or_else(|e| panic!("{e}: {settings:?}")).steps, 300);
     }
+}
+
+#[test]
+fn steps_that_feed_a_flow_more_than_it_loses_are_told_of_and_stop_it() {
+    use super::super::cases::taylor_green_3d;
+    let run = |reynolds: f64, scheme: TimeScheme, courant: f64, constant: f64| {
+        let mut case = taylor_green_3d(16, reynolds).unwrap();
+        case.settings.scheme = scheme;
+        case.settings.time_step = TimeStep::Courant { courant, longest_s: 0.2 };
+        if constant > 0.0 {
+            case.settings.subgrid = SubgridModel::Smagorinsky { constant };
+        }
+        let mut witness = Witness::default();
+        let result = Run::new(case.start().unwrap().0, plan(20.0, &[])).unwrap().to_end(&mut witness);
+        (result, witness.warnings)
+    };
+    let (ab2, rk3) = (TimeScheme::AdamsBashforth2, TimeScheme::RungeKutta3);
+    // A model that is there but does next to nothing.
+    let (result, _) = run(1e6, ab2, 0.35, 0.005);
+    let Err(Error::StepFeeds { step, energy, .. }) = result else { panic!("{result:?}") };
+    assert!(step.is_multiple_of(100) && energy.share > 1.0, "{energy:?}");
+    let text = energy.to_string();
+    assert!(text.contains("take Runge-Kutta") && text.contains("feeds"), "{text}");
+    // The remedies, obeyed; and a model that does its work.
+    for (scheme, courant) in [(ab2, energy.suited_courant()), (rk3, 0.3)] {
+        let (result, warnings) = run(1e6, scheme, courant, 0.005);
+        assert!(result.is_ok() && warnings.is_empty(), "{scheme:?}, {courant}: {result:?}, {warnings:?}");
+    }
+    let (result, warnings) = run(1e6, ab2, 0.35, 0.17);
+    assert!(result.is_ok() && warnings.is_empty(), "{result:?}, {warnings:?}");
+    // Runge-Kutta takes energy at long steps, which is told, and does not stop a run.
+    let (result, warnings) = run(1e6, rk3, 0.6, 0.0);
+    let [RunWarning::StepEnergy { step: 100, energy }] = warnings[..] else { panic!("{warnings:?}") };
+    assert!(result.is_ok() && energy.share < -0.1 && energy.to_string().contains("takes"), "{energy:?}");
+    let (result, warnings) = run(200.0, rk3, 0.6, 0.0);
+    assert!(result.is_ok() && warnings.is_empty(), "{result:?}, {warnings:?}");
 }
 
 #[test]

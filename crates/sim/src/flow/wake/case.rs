@@ -142,6 +142,27 @@ impl WakeFlow {
         }
     }
 
+    /// Keys that do nothing, or less than they seem to, in sentences.
+    pub(in super::super) fn idle(&self) -> Vec<String> {
+        let height_m = self.pair.scales().map_or(f64::INFINITY, |scales| self.height * scales.spacing_m);
+        let is_noisy = self.perturbation > 0.0 || self.background > 0.0;
+        let [_, to] = self.circulation_radii_m;
+        let mut idle = Vec::new();
+        if to >= height_m {
+            idle.push(format!(
+                "case.circulation_radii_m: circles of {to:?} m about vortices at a height of {height_m:?} m leave the flow: their \
+                 circulation is empty"
+            ));
+        }
+        if self.wind_roughness_m > 0.0 && self.cross_wind_m_s == 0.0 {
+            idle.push("case.wind_roughness_m does nothing without case.cross_wind_m_s".into());
+        }
+        if self.seed.is_some() && !is_noisy {
+            idle.push("case.seed does nothing without case.perturbation or case.background".into());
+        }
+        idle
+    }
+
     /// The case of the solver.
     ///
     /// # Errors
@@ -180,7 +201,9 @@ impl WakeFlow {
         let meter = pair.meter(&scales).and_then(|meter| meter.with_window(window)).map_err(Error::Flow)?;
         let Case { mesh, settings, initial, end_s } =
             pair.scaled(&scales, VortexPairCase::steps(LONGEST_STEP * unit_s)).map_err(Error::Flow)?;
-        let wake = Some(WakeSetup { meter, scales, core_radius_m: self.core_radius * scales.spacing_m });
+        let circulation_radii_m = self.circulation_radii_m;
+        let wake =
+            Some(WakeSetup { meter, circulation_radii_m, scales, core_radius_m: self.core_radius * scales.spacing_m });
         Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0 / unit_s, wake, undamped: None })
     }
 }

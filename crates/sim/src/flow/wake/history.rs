@@ -75,7 +75,8 @@ type OfFlow = (&'static str, Kind, &'static str, fn(&WakeRecord) -> f64);
 
 /// Numbers of each vortex with what they are; the first is the one whose ratio to its start is given, too.
 const VORTEX: [OfVortex; 12] = [
-    ("gamma_5_15", Kind::Gamma, "circulation averaged over radii from 5 to 15 m", |v| v.gamma_5_15_m2_s),
+    // Name and text have the radii of the case.
+    ("gamma", Kind::Gamma, "circulation averaged over radii", |v| v.gamma_5_15_m2_s),
     ("y", Kind::Length, "lateral position of the centroid of axial vorticity", |v| v.y_m),
     ("z", Kind::Length, "height of the centroid of axial vorticity", |v| v.z_m),
     ("y_spread", Kind::Length, "standard deviation along x of the lateral position", |v| v.y_spread_m),
@@ -153,6 +154,8 @@ impl Lengths {
 pub(in super::super) struct WakeRun {
     meter: WakeMeter,
     scales: WakeScales,
+    /// Between which the circulation of a vortex is averaged.
+    circulation_radii_m: [f64; 2],
     #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
     radius_m: Vec<f64>,
     lengths: Lengths,
@@ -169,7 +172,7 @@ pub(in super::super) struct WakeRun {
 impl WakeRun {
     /// An empty history of flows on the mesh of `flow`.
     pub(in super::super) fn new(
-        meter: WakeMeter,
+        (meter, circulation_radii_m): (WakeMeter, [f64; 2]),
         flow: &Flow,
         (folder, origin): (PathBuf, Provenance),
         writes: bool,
@@ -179,6 +182,7 @@ impl WakeRun {
         Self {
             meter,
             scales,
+            circulation_radii_m,
             radius_m,
             lengths,
             #[cfg(feature = "netcdf")]
@@ -247,13 +251,20 @@ impl WakeRun {
     }
 
     /// The single numbers.
-    fn singles() -> Vec<Single> {
+    fn singles(&self) -> Vec<Single> {
+        let [from, to] = self.circulation_radii_m;
         let of_vortex = |side: usize| {
-            VORTEX.iter().enumerate().map(move |(i, (name, kind, text, _))| Single {
-                name: format!("{name}_{}", SIDES[side]),
-                kind: *kind,
-                text: format!("{} vortex: {text}", SIDES[side]),
-                place: 1 + side * VORTEX.len() + i,
+            VORTEX.iter().enumerate().map(move |(i, (name, kind, text, _))| {
+                let (radii, text) = match i {
+                    0 => (format!("_{from}_{to}").replace('.', "p"), format!("{text} from {from:?} to {to:?} m")),
+                    _ => (String::new(), (*text).to_owned()),
+                };
+                Single {
+                    name: format!("{name}{radii}_{}", SIDES[side]),
+                    kind: *kind,
+                    text: format!("{} vortex: {text}", SIDES[side]),
+                    place: 1 + side * VORTEX.len() + i,
+                }
             })
         };
         let of_flow = FLOW.iter().enumerate().map(|(i, (name, kind, text, _))| Single {
@@ -270,7 +281,8 @@ impl WakeRun {
     }
 
     fn tau(&self) -> Vec<f64> {
-        self.column(0, self.scales.time_unit_s())
+        let time_unit_s = self.scales.time_unit_s();
+        self.rows.iter().map(|row| super::super::age_tau(row[0], 1.0 / time_unit_s)).collect()
     }
 
     /// Circulation of each vortex over its first value.
@@ -295,7 +307,7 @@ impl WakeRun {
         for (name, values) in self.gamma_ratios() {
             table = table.float(&name, values);
         }
-        for single in Self::singles() {
+        for single in self.singles() {
             table = table.float(&format!("{}{}", single.name, single.kind.suffix()), self.column(single.place, 1.0));
         }
         self.modes(Kind::Energy.suffix(), 1.0)
@@ -306,7 +318,7 @@ impl WakeRun {
     /// The history in the scales of the pair, circulations in `Gamma0`.
     fn scaled_table(&self) -> Table {
         let mut table = Table::new().float("tau", self.tau());
-        for single in Self::singles() {
+        for single in self.singles() {
             table = table.float(&single.name, self.column(single.place, single.kind.unit(&self.scales)));
         }
         let energy = Kind::Energy.unit(&self.scales);
@@ -387,11 +399,13 @@ impl WakeRun {
                 .text("long_name", long_name)
                 .text("coordinates", "time")
         };
+        let [from, to] = self.circulation_radii_m;
+        let ratio_text = format!("{} from {from:?} to {to:?} m", VORTEX[0].2);
         let ratio = |(name, values): (String, Vec<f64>)| {
-            variable(&name, values, "1", "circulation averaged over radii from 5 to 15 m, over its first value")
+            variable(&name, values, "1", &format!("{ratio_text}, over its first value"))
         };
         let mut out: Vec<Variable> = self.gamma_ratios().into_iter().map(ratio).collect();
-        for single in Self::singles() {
+        for single in self.singles() {
             let (name, units) = (single.kind.variable(&single.name), single.kind.udunits());
             out.push(variable(&name, self.column(single.place, 1.0), units, &single.text));
         }

@@ -45,19 +45,24 @@ impl WakeOutput {
         self.planes_tau.get_or_insert_with(|| vec![0.5 * end, end]);
     }
 
-    /// Ends at another age: lists that followed from the old end follow the new one, others lose what lies behind it.
-    pub(in super::super) fn end_at(&mut self, end_tau: f64) {
-        let mut own = Self { fields_tau: None, planes_tau: None, ..self.clone() };
-        own.complete();
-        let kept = |list: &Option<Vec<f64>>, own: &Option<Vec<f64>>| {
-            let list = list.as_ref().filter(|_| list != own)?;
-            Some(list.iter().copied().filter(|tau| *tau <= end_tau).collect())
-        };
-        (self.fields_tau, self.planes_tau) =
-            (kept(&self.fields_tau, &own.fields_tau), kept(&self.planes_tau, &own.planes_tau));
+    /// Ends at another age: lists of fields and planes that the case has not of its own follow the new one, others lose what lies
+    /// behind it.
+    pub(in super::super) fn end_at(&mut self, end_tau: f64, is_own: [bool; 2]) {
+        for (list, is_own) in [&mut self.fields_tau, &mut self.planes_tau].into_iter().zip(is_own) {
+            *list = list.take().filter(|_| is_own);
+            list.iter_mut().for_each(|list| list.retain(|tau| *tau <= end_tau));
+        }
         self.series_tau = self.series_tau.map(|[from, to]| [from, to.min(end_tau)]).filter(|[from, to]| to > from);
         self.end_tau = end_tau;
         self.complete();
+    }
+
+    /// What is missing at the end, in a sentence.
+    pub(in super::super) fn idle(&self) -> Option<String> {
+        let (end, every) = (self.end_tau, self.every_tau);
+        let rows = end / every;
+        ((rows - rows.round()).abs() > 1e-6)
+            .then(|| format!("wake.every_tau = {every:?} does not divide the end, {end:?}: there is no row of it"))
     }
 
     pub(in super::super) fn check(&self, p: &mut Checker<'_>) {
