@@ -1,6 +1,7 @@
 //! The power of the simulated signal against (14), through all crates that have a part in it.
 
 use wakescope_optics::theory::free_space_efficiency;
+use wakescope_optics::{EfficiencyProfile, snr::SPEED_OF_LIGHT_M_S};
 use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::measure::run;
 use wakescope_sim::plan::{Plan, Target};
@@ -71,4 +72,46 @@ fn power_does_not_depend_on_the_layer_thickness() {
     g.layers_per_sample = (g.layers_per_sample - 1) * factor + 1;
     let ((a, a_error), (b, b_error)) = (mean_square_a2(&thick), mean_square_a2(&thin));
     assert!((a - b).abs() < 3.5 * a_error.hypot(b_error), "{a} +- {a_error} and {b} +- {b_error}");
+}
+
+#[test]
+fn power_through_a_near_focus_is_14_over_the_pulse() {
+    for (focus_m, radii_m, ends_m, at_m) in
+        [(300.0, [0.05, 0.03], [150.0, 900.0], 180.0), (600.0, [0.15, 0.09], [200.0, 1500.0], 555.0)]
+    {
+        let plan = plan(|s| {
+            s.detector.noise = NoiseKind::None;
+            s.telescope.focus_m = focus_m;
+            [s.telescope.aperture_radius_m, s.telescope.beam_radius_m] = radii_m;
+            [s.scan.range_min_m, s.scan.range_max_m] = ends_m;
+            s.scan.pulses_per_line = 200;
+        });
+        let g = &plan.geometry;
+        let range_m = |k: usize| g.first_range_m + k as f64 * g.sample_spacing_m;
+        let near: Vec<usize> = (0..g.samples).filter(|k| (range_m(*k) - at_m).abs() < 8.0).collect();
+        let signals = run::run(&plan, &Silent).unwrap().signals_a.unwrap();
+        let of_pulse: Vec<f64> = signals
+            .rows()
+            .into_iter()
+            .map(|r| near.iter().map(|k| r[*k].powi(2)).sum::<f64>() / near.len() as f64)
+            .collect();
+        let n = of_pulse.len() as f64;
+        let mean = of_pulse.iter().sum::<f64>() / n;
+        let error = (of_pulse.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+        // The air that the pulse lights, quadrature by quadrature a metre apart.
+        let telescope = &plan.instrument.telescope;
+        let (first_m, last_m) = (at_m - 120.0, at_m + 120.0);
+        let metres: Vec<f64> = (0..=240).map(|i| first_m + f64::from(i) * (last_m - first_m) / 240.0).collect();
+        let eta = EfficiencyProfile::from_theory(&metres, |r| free_space_efficiency(telescope, r)).unwrap();
+        let sigma_s = plan.instrument.pulse.sigma_s();
+        let snr = |k: &usize| {
+            let time_s = 2.0 * range_m(*k) / SPEED_OF_LIGHT_M_S;
+            plan.instrument.snr.snr_pulse(time_s, sigma_s, |r| eta.interpolated(r.clamp(first_m, last_m))).unwrap()
+        };
+        let expected = near.iter().map(snr).sum::<f64>() / near.len() as f64;
+        let noise_a2 = plan.instrument.receiver.noise_variance_a2();
+        let (found, error) = (mean / noise_a2, error / noise_a2);
+        assert!(error / expected < 0.04, "the test resolves a fifth of a decibel: {error} {expected}");
+        assert!((found - expected).abs() < 3.5 * error, "{focus_m}: {found} +- {error}, (14) gives {expected}");
+    }
 }

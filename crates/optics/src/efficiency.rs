@@ -1,9 +1,11 @@
 //! The efficiency as a function of range, with its scatter and its statistical error.
 //!
-//! Check: the interpolation passes through the points, keeps monotone data monotone and refuses to extrapolate.
+//! Check: the interpolation passes through the points, keeps monotone data monotone and refuses to extrapolate; between ranges that
+//! follow the curvature it is the function itself, however near the focus.
 
-use crate::Error;
 use crate::error::{finite, not_negative, positive};
+use crate::{Error, Telescope};
+use std::f64::consts::SQRT_2;
 
 /// eta_s(R) of (19): what the rest of a simulation needs to know about optics and turbulence.
 ///
@@ -122,6 +124,35 @@ impl EfficiencyProfile {
     }
 }
 
+/// Ranges from `first_m` to `last_m` \[m\] that follow the curvature of an efficiency: an eighth of the path apart at most, and closer where
+/// the beam's width changes, about a focus above all; `density` times as many. At a density of 12 monotone cubics between them are
+/// within 1e-3 of the function.
+pub fn curved_ranges_m(telescope: &Telescope, first_m: f64, last_m: f64, density: f64) -> Vec<f64> {
+    let width_m = telescope.intensity_radius_m().min(telescope.aperture_radius_m / SQRT_2);
+    let rayleigh_m = telescope.wavenumber_rad_m() * width_m * width_m;
+    // The efficiency is a bell of (1/R - 1/F) rayleigh_m, about 1 wide, that falls with its square: even steps in its area sine.
+    let place = |range_m: f64| {
+        let bend = rayleigh_m * (1.0 / range_m - telescope.focus.curvature_per_m());
+        8.0 * range_m / last_m - 3.0 * bend.asinh()
+    };
+    let (start, end) = (place(first_m), place(last_m));
+    let steps = (density * (end - start)).ceil().max(1.0);
+    let at = |step: f64| {
+        let (mut low_m, mut high_m) = (first_m, last_m);
+        for _ in 0..60 {
+            let middle_m = 0.5 * (low_m + high_m);
+            let is_before = place(middle_m) < start + (end - start) * step / steps;
+            if is_before { low_m = middle_m } else { high_m = middle_m }
+        }
+        high_m
+    };
+    let mut ranges_m: Vec<f64> = (1..steps as u32).map(|step| at(f64::from(step))).collect();
+    ranges_m.insert(0, first_m);
+    ranges_m.push(last_m);
+    ranges_m.dedup();
+    ranges_m
+}
+
 fn known(value: f64, field: &'static str, needed: &'static str) -> Result<f64, Error> {
     if value.is_nan() { Err(Error::NotKnown { field, needed }) } else { Ok(value) }
 }
@@ -205,6 +236,29 @@ mod tests {
             (p.interpolated(1.503).unwrap() - 1.503f64.powi(2)).abs()
         };
         assert!(error(40) < 1e-4);
+    }
+
+    #[test]
+    fn ranges_that_follow_the_curvature_give_the_function_at_and_beside_any_focus() {
+        use crate::theory::free_space_efficiency;
+        let wide = Telescope { aperture_radius_m: 0.15, beam_radius_m: 0.09, ..Telescope::table2() };
+        for (telescope, focus, first_m, last_m) in [
+            (Telescope::table2(), crate::Focus::At(300.0), 150.0, 3000.0),
+            (wide, crate::Focus::At(600.0), 200.0, 3000.0),
+            (Telescope { beam_radius_m: f64::INFINITY, ..wide }, crate::Focus::At(450.0), 250.0, 900.0),
+        ] {
+            let telescope = Telescope { focus, ..telescope };
+            let ranges_m = curved_ranges_m(&telescope, first_m, last_m, 12.0);
+            assert!(ranges_m.len() < 600 && ranges_m.windows(2).all(|r| r[1] > r[0]), "{ranges_m:?}");
+            let exact = |r| free_space_efficiency(&telescope, r);
+            let profile = EfficiencyProfile::from_theory(&ranges_m, exact).unwrap();
+            let mut worst = 0f64;
+            for i in 0..80 {
+                let range_m = first_m * (last_m / first_m).powf((f64::from(i) + 0.37) / 80.0);
+                worst = worst.max((profile.interpolated(range_m).unwrap() / exact(range_m).unwrap() - 1.0).abs());
+            }
+            assert!(worst < 1e-3, "{focus:?}: {worst}");
+        }
     }
 
     #[test]

@@ -56,7 +56,7 @@ pub enum Error {
     Sampling {
         /// The limits, one at least.
         violations: Vec<Violation>,
-        /// A set-up that was tried and holds, if one of at most 4096 points does.
+        /// A set-up that was tried and holds, if one of at most 16384 points does.
         would_do: Option<SetUp>,
     },
     /// Turbulence so strong that layers cannot be made thin enough.
@@ -74,6 +74,21 @@ pub enum Error {
         range_m: f64,
         /// Mean fraction of the power that was lost.
         fraction: f64,
+    },
+    /// Phase screens do not give the bistatic mean that is known exactly for them.
+    #[error(
+        "at {range_m:?} m the phase screens give a bistatic efficiency of {mean:.5} +- {standard_error:.5} where {exact:.5} is exact for \
+         their layers: the grid does not carry the beam, take a smaller grid spacing with as many more points, or a derived grid"
+    )]
+    AgainstTheory {
+        /// Range \[m\].
+        range_m: f64,
+        /// What the screens give.
+        mean: f64,
+        /// Its standard error.
+        standard_error: f64,
+        /// What is exact for them.
+        exact: f64,
     },
     /// The caller's progress function asked to stop.
     #[error("cancelled after {realisations} realisations")]

@@ -64,7 +64,7 @@ pub mod theory;
 
 pub use air::{Cn2Path, Spectrum, Turbulence, VonKarman};
 pub use beam::{Focus, Misalignment, RadiusDefinition, Telescope};
-pub use efficiency::EfficiencyProfile;
+pub use efficiency::{EfficiencyProfile, curved_ranges_m};
 pub use error::Error;
 #[cfg(feature = "screens")]
 pub use monte_carlo::{Layers, MonteCarlo, Stop};

@@ -164,6 +164,6 @@ pub(super) fn profile_ranges() -> Vec<f64> {
 }
 
 pub(super) fn profile_snr(_: &[f64]) -> Values {
-    let scene = Scene::default();
-    Ok(profile::range_profile(&scene, &wakescope_sim::measure::instrument::Instrument::new(&scene)?, &Silent)?.snr_db)
+    let file = SceneFile::new(Scene::default()).unwrap_or_else(|p| unreachable!("{p:?}"));
+    Ok(profile::range_profile(&Plan::new(file, Target::Efficiency)?, &Silent)?.snr_db)
 }

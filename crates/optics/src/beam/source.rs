@@ -122,6 +122,16 @@ pub(crate) fn aperture_field<T: Real>(
     out
 }
 
+/// Slope of the wave front \[rad\] of which the spacing takes half a wave at most: that of the tilt, and **twice** that of the focus.
+///
+/// The field has waves up to k a/|F|, its irradiance up to twice and the square of that up to four times as much. The sum over
+/// the points is the integral (19) while no wave of the square comes round to 0, at 2 pi/dx: dx <= lambda |F|/(4 a).
+pub(crate) fn slope_rad(telescope: &Telescope, misalignment: &Misalignment) -> f64 {
+    let reach = telescope.aperture_radius_m.min(3.0 * telescope.intensity_radius_m());
+    let tilt = misalignment.tilt_rad[0].hypot(misalignment.tilt_rad[1]);
+    tilt + 2.0 * reach * telescope.focus.curvature_per_m().abs()
+}
+
 /// Whether the grid can hold the telescope and its beam out to `range_m`.
 ///
 /// # Errors
@@ -155,12 +165,11 @@ pub(crate) fn grid_violations(
     let offset = misalignment.offset_m[0].hypot(misalignment.offset_m[1]);
     let tilt = misalignment.tilt_rad[0].hypot(misalignment.tilt_rad[1]);
     let reach = a.min(3.0 * telescope.intensity_radius_m());
-    let slope = tilt + reach * telescope.focus.curvature_per_m().abs();
     let geometric = reach * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
     let beam = geometric + lambda * range_m / (2.0 * reach) + offset + tilt * range_m;
     let found = [
         Violation::too_large(Limit::Aperture, resolved, spacing),
-        Violation::too_large(Limit::WaveFront, 0.5 * lambda / slope, spacing),
+        Violation::too_large(Limit::WaveFront, 0.5 * lambda / slope_rad(&telescope, &misalignment), spacing),
         Violation::too_small(Limit::Border, 2.5 * (a + offset), width),
         Violation::too_small(Limit::Beam, 2.0 * beam / 0.9, width),
     ];
@@ -198,7 +207,7 @@ mod tests {
         let huge = Telescope { aperture_radius_m: 0.6, ..t };
         assert_eq!(first(huge, 100.0), (Limit::Border, 1.5));
         // Focus far in front of the target: the beam outgrows the grid.
-        let short = Telescope { focus: crate::Focus::At(150.0), ..t };
+        let short = Telescope { focus: crate::Focus::At(300.0), ..t };
         assert_eq!(first(short, 3000.0).0, Limit::Beam);
         let steep = Telescope { focus: crate::Focus::At(50.0), ..t };
         assert_eq!(first(steep, 60.0).0, Limit::WaveFront);

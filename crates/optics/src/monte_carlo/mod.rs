@@ -6,9 +6,10 @@
 //!
 //! Means, scatter and errors are multiplied with the ratio of exact to grid free-space efficiency.
 //!
-//! Check: bistatic against exact theory for the very screens used, as a z-score; no turbulence gives free space with an
+//! Check: bistatic against exact theory for the very screens used, as a z-score, in every run; no turbulence gives free space with an
 //! error of exactly 0.
 
+mod against_theory;
 #[cfg(test)]
 mod mutation;
 pub(crate) mod path;
@@ -21,6 +22,7 @@ pub use walk::Sampling;
 
 use crate::beam::source::{aperture_field, check_grid};
 use crate::efficiency::EfficiencyProfile;
+use crate::monte_carlo::against_theory::Found;
 use crate::monte_carlo::path::Program;
 use crate::monte_carlo::prepared::Prepared;
 use crate::monte_carlo::statistics::{Folding, Sample, bistatic, mean_and_variance};
@@ -138,7 +140,7 @@ impl MonteCarlo {
     /// `progress` is called between groups of realisations; `ControlFlow::Break` cancels.
     ///
     /// # Errors
-    /// [`Error`] for a set-up that is not allowed, [`Error::PowerLost`], [`Error::Cancelled`].
+    /// [`Error`] for a set-up that is not allowed, [`Error::PowerLost`], [`Error::AgainstTheory`], [`Error::Cancelled`].
     pub fn run<T: Real>(
         &self,
         stop: Stop,
@@ -265,7 +267,7 @@ impl MonteCarlo {
             .iter()
             .map(|&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r))
             .collect::<Result<Vec<_>, _>>()?;
-        let mut lost_power_fraction = Vec::new();
+        let (mut lost_power_fraction, mut found) = (Vec::new(), Vec::new());
         let none = Vec::new;
         let mut mono = EfficiencyProfile {
             range_m: self.range_m.clone(),
@@ -282,6 +284,7 @@ impl MonteCarlo {
             }
             lost_power_fraction.push(fraction);
             let factor = exact_free_space[i] / grid_free_space[i];
+            found.push(Found { correction: factor, lost: fraction });
             single.push(samples.iter().flat_map(|s| s.single.iter().map(|eta| factor * eta)).collect());
             pairs.push(sums.products[i].iter().map(|eta| factor * eta).collect());
             if prepared.screens.is_none() {
@@ -302,13 +305,17 @@ impl MonteCarlo {
             }
         }
         let has_pairs = !bi.mean.is_empty();
+        let independent_samples = sums.samples.first().map_or(0, Vec::len);
+        if let (Some(screens), true) = (&prepared.screens, has_pairs) {
+            against_theory::check(self, screens, &bi, &found, independent_samples)?;
+        }
         Ok(EfficiencyEstimate {
             monostatic: mono,
             bistatic: has_pairs.then_some(bi),
             monostatic_realisations: single,
             bistatic_realisations: pairs,
             realisations: if prepared.screens.is_some() { realisations } else { 1 },
-            independent_samples: sums.samples.first().map_or(0, Vec::len),
+            independent_samples,
             grid_free_space,
             exact_free_space,
             lost_power_fraction,

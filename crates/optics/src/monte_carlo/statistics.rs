@@ -3,7 +3,7 @@
 //! Monostatic: mean of q_i = integral of j_i^2. Bistatic: all pairs of different realisations,
 //! \[integral of (sum j)^2 - sum of integral j_i^2\] / (n (n - 1)). The irradiance is folded onto one quadrant, which
 //! is exact for beams symmetric about the axes; its error is the jackknife over realisations, for which
-//! the overlap of one realisation with all is taken on rings.
+//! the overlap of one realisation with all others is taken on rings.
 //! Check: against the double sum over pairs and the full jackknife.
 
 use crate::screens::grid::Grid;
@@ -173,23 +173,24 @@ pub(crate) fn bistatic(samples: &[&Sample], total: f64, folding: &Folding, scale
         }
     }
     let symmetric = samples[0].rings[1].is_empty();
-    let with_all = |s: &Sample| -> f64 {
+    let with_others = |s: &Sample| -> f64 {
         let mut sum = 0.0;
         for (i, points) in folding.ring_points.iter().enumerate() {
             if *points > 0.0 {
                 let t = f64::from(s.rings[0][i]);
                 let product = if symmetric {
-                    2.0 * t * sums[0][i]
+                    2.0 * t * (sums[0][i] - t)
                 } else {
-                    t * sums[1][i] + f64::from(s.rings[1][i]) * sums[0][i]
+                    let b = f64::from(s.rings[1][i]);
+                    t * (sums[1][i] - b) + b * (sums[0][i] - t)
                 };
                 sum += product / points;
             }
         }
         sum * scale
     };
-    let left_out: Vec<f64> =
-        samples.iter().map(|s| (total - with_all(s) + s.folded - (own - s.folded)) / ((n - 1.0) * (n - 2.0))).collect();
+    // Its overlap with itself, which rings would smooth, is in neither.
+    let left_out: Vec<f64> = samples.iter().map(|s| (total - own - with_others(s)) / ((n - 1.0) * (n - 2.0))).collect();
     let (_, variance) = mean_and_variance(left_out.iter().copied());
     // Jackknife: (n - 1)/n sum (theta_i - mean)^2 = (n - 1)^2/n variance.
     (mean, (variance / n).sqrt() * (n - 1.0))

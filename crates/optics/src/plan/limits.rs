@@ -6,13 +6,14 @@ use super::light::{Light, scatter_rad};
 use super::violation::{Limit, SetUp, Violation, not_above, not_below};
 use crate::air::cn2::Cn2Path;
 use crate::air::structure::StructureTable;
-use crate::beam::source::grid_violations;
+use crate::beam::source::{grid_violations, slope_rad};
 use crate::screens::grid::Grid;
 use crate::theory::fresnel_number;
 use crate::{Error, Misalignment, Telescope, Turbulence};
 
-/// Largest number of points along an axis that a plan proposes.
-const LARGEST_POINTS: usize = 4096;
+/// Points along an axis up to which a plan keeps a margin in its spacing, and the most that it proposes.
+const COMFORTABLE_POINTS: usize = 4096;
+const LARGEST_POINTS: usize = 16384;
 /// Share of the light that the border of a derived grid takes at most, by forecast: three quarters of what is doubtful.
 const DERIVED_LOSS: f64 = 0.0075;
 /// Share at which a run ends with an error; a little less, so that the run does not end where the plan went on.
@@ -73,14 +74,12 @@ impl<'a> Limits<'a> {
         points.map(|n| self.telescope.aperture_radius_m / n)
     }
 
-    /// Spacing \[m\] for the angles into which focus, tilt and turbulence send the beam.
-    fn scatter_spacing_m(&self, range_m: &[f64]) -> Result<f64, Error> {
-        let t = &self.telescope;
-        let reach = t.aperture_radius_m.min(3.0 * t.intensity_radius_m());
-        let tilt = self.misalignment.tilt_rad[0].hypot(self.misalignment.tilt_rad[1]);
-        let scatter = scatter_rad(t, &self.cn2, last(range_m)?)?;
-        let slope = reach * t.focus.curvature_per_m().abs() + tilt + 2.0 * scatter;
-        Ok(0.5 * t.wavelength_m / slope.max(1e-30))
+    /// Spacings \[m\] for the angles into which focus, tilt and turbulence send the beam: to plan with, and the largest that is
+    /// accepted. The rule keeps a margin of two: what lies within it is left to the monitored border.
+    fn scatter_spacings_m(&self, range_m: &[f64]) -> Result<[f64; 2], Error> {
+        let scatter = scatter_rad(&self.telescope, &self.cn2, last(range_m)?)?;
+        let slope = slope_rad(&self.telescope, &self.misalignment) + 2.0 * scatter;
+        Ok([0.5, 1.0].map(|waves| waves * self.telescope.wavelength_m / slope.max(1e-30)))
     }
 
     /// What a grid violates for these ranges.
@@ -90,10 +89,9 @@ impl<'a> Limits<'a> {
         let (width, spacing) = (grid.smallest_width_m(), grid.dx_m.max(grid.dy_m));
         let light = self.light(range_m)?;
         if !self.cn2.is_none() {
-            // The rules keep a margin of two: what lies within it is left to the monitored border.
             let [_, aperture] = self.aperture_spacings_m(range_m);
             violations.extend(Violation::too_large(Limit::Aperture, aperture, spacing));
-            let scatter = 2.0 * self.scatter_spacing_m(range_m)?;
+            let [_, scatter] = self.scatter_spacings_m(range_m)?;
             violations.extend(Violation::too_large(Limit::Scatter, scatter, spacing));
         }
         let light_lost = light.lost_from(grid);
@@ -103,11 +101,12 @@ impl<'a> Limits<'a> {
         Ok(Verdict { violations, light_lost })
     }
 
-    /// A grid for these ranges.
+    /// A grid for these ranges: with the spacing to plan with, or else with the largest that is accepted; with the border that takes next
+    /// to nothing, or else with the narrowest that is accepted.
     pub(super) fn grid(&self, range_m: &[f64]) -> Result<Grid, Error> {
-        let (t, furthest) = (&self.telescope, last(range_m)?);
-        let [mut spacing, _] = self.aperture_spacings_m(range_m);
-        spacing = spacing.min(self.scatter_spacing_m(range_m)?);
+        let (aperture, scatter, light) =
+            (self.aperture_spacings_m(range_m), self.scatter_spacings_m(range_m)?, self.light(range_m)?);
+        let [mut spacing, largest] = [0, 1].map(|i| aperture[i].min(scatter[i]));
         let inner = self.turbulence.spectrum.inner_wavenumber_rad_m();
         if inner.is_finite() && !self.cn2.is_none() {
             // Half the inner scale if that costs no more than a factor of two.
@@ -116,10 +115,18 @@ impl<'a> Limits<'a> {
                 spacing = fine;
             }
         }
+        let grid = |spacing, loss| self.grid_of(spacing, light.width_m(loss, spacing), last(range_m)?);
+        match grid(spacing, DERIVED_LOSS) {
+            Ok(grid) if grid.nx <= COMFORTABLE_POINTS => Ok(grid),
+            _ => grid(largest, DERIVED_LOSS).or_else(|_| grid(largest, LARGEST_LOSS)),
+        }
+    }
+
+    /// A grid of at most this spacing and at least this width that holds the beam to `furthest_m`.
+    fn grid_of(&self, mut spacing: f64, mut width: f64, furthest_m: f64) -> Result<Grid, Error> {
         // The limits of the grid itself, at no width at all: the largest of their widths, the least of their spacings.
         let nothing = Grid { nx: Grid::SMALLEST, ny: Grid::SMALLEST, dx_m: spacing, dy_m: spacing };
-        let mut width = self.light(range_m)?.width_m(DERIVED_LOSS, spacing);
-        for violation in grid_violations(t, &self.misalignment, &nothing, furthest)? {
+        for violation in grid_violations(&self.telescope, &self.misalignment, &nothing, furthest_m)? {
             match violation.limit.is_spacing() {
                 true => spacing = spacing.min(violation.needed),
                 false => width = width.max(violation.needed),
@@ -141,14 +148,31 @@ impl<'a> Limits<'a> {
         all.sort_by(f64::total_cmp);
         all.dedup();
         let grid = self.grid(&all).ok()?;
+        let layers = self.equal_layers(runs).ok()??;
+        let good = |range_m: &&[f64]| self.verdict(&grid, range_m).is_ok_and(|v| v.violations.is_empty());
+        runs.iter().all(good).then_some(SetUp { points: grid.nx, spacing_m: grid.dx_m, layers })
+    }
+
+    /// How many equal layers to its last range are enough for every one of these lists of ranges; none if 1000 are not.
+    pub(super) fn equal_layers(&self, runs: &[&[f64]]) -> Result<Option<usize>, Error> {
         let mut count = 1;
         for range_m in runs {
-            let furthest = last(range_m).ok()?;
-            let thin = thin_layers(&self.cn2, self.telescope.wavelength_m, furthest).ok()?;
-            count = count.max(self.gaps(range_m).ok()?.equal_layers(thin.end_m().len(), furthest).ok()??);
+            let thin = thin_layers(&self.cn2, self.telescope.wavelength_m, last(range_m)?)?;
+            count = count.max(thin.end_m().len());
         }
-        let good = |range_m: &&[f64]| self.verdict(&grid, range_m).is_ok_and(|v| v.violations.is_empty());
-        runs.iter().all(good).then_some(SetUp { points: grid.nx, spacing_m: grid.dx_m, layers: count })
+        // What is enough for one may leave a gap in another.
+        loop {
+            let before = count;
+            for range_m in runs {
+                match self.gaps(range_m)?.equal_layers(count, last(range_m)?)? {
+                    Some(enough) => count = enough,
+                    None => return Ok(None),
+                }
+            }
+            if count == before {
+                return Ok(Some(count));
+            }
+        }
     }
 }
 

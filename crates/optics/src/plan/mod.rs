@@ -20,9 +20,10 @@ use crate::air::cn2::Cn2Path;
 use crate::air::turbulence::path_rytov_variance;
 use crate::monte_carlo::path::{Layers, Program};
 use crate::monte_carlo::{GROUP, GROUPS_PER_WAVE};
+use crate::screens::generator::ScreenGenerator;
 use crate::screens::grid::Grid;
 use crate::{Error, Misalignment, Turbulence};
-use gaps::{Gaps, thin_layers, worst_rytov};
+use gaps::{thin_layers, worst_rytov};
 use limits::{Limits, Verdict, last};
 
 /// CPU time of one f32 layer per point, transforms included \[s\]; f64 takes twice as long. Measured, one core of 2023.
@@ -106,14 +107,14 @@ pub enum Warning {
     ThickLayers {
         /// Largest Rytov variance of a layer.
         rytov_variance: f64,
-        /// Number of equal layers that would do.
-        layers_needed: usize,
+        /// Number of equal layers that would do for all runs, if one of at most 1000 does.
+        layers_needed: Option<usize>,
     },
     /// The layers shift the mean by more than a third of its standard error.
     LayerGap {
         /// The worst of the ranges.
         worst: LayerGap,
-        /// Number of equal layers that would do, if one of at most 1000 does.
+        /// As of [`Warning::ThickLayers`].
         layers_needed: Option<usize>,
     },
     /// The border takes more than 0.01 of the light.
@@ -134,7 +135,7 @@ impl Case {
     /// Derives grid and layers for ranges \[m\], increasing; layers end at the largest.
     ///
     /// # Errors
-    /// [`Error::Sampling`] when more than 4096 points along an axis are needed; [`Error`] for a case that is not allowed.
+    /// [`Error::Sampling`] when more than 16384 points along an axis are needed; [`Error`] for a case that is not allowed.
     pub fn plan(&self, range_m: &[f64]) -> Result<Plan, Error> {
         crate::efficiency::check_increasing("range_m", range_m)?;
         let limits = Limits::new(self)?;
@@ -145,7 +146,7 @@ impl Case {
         if !verdict.violations.is_empty() {
             return Err(Error::Sampling { violations: verdict.violations, would_do: None });
         }
-        limits.judge(&grid, &layers, range_m, &gaps, &verdict)
+        limits.judge(&grid, &layers, range_m, &verdict, &[range_m])
     }
 
     /// Examines a set-up that someone else chose, the chapter's 512 x 2 mm and 10 layers for example.
@@ -174,6 +175,7 @@ impl Case {
 
 impl Limits<'_> {
     fn examine(&self, grid: &Grid, runs: &[(Layers, &[f64])]) -> Result<Vec<Plan>, Error> {
+        let all: Vec<&[f64]> = runs.iter().map(|(_, range_m)| *range_m).collect();
         let mut verdicts: Vec<Verdict> = Vec::new();
         for (_, range_m) in runs {
             crate::efficiency::check_increasing("range_m", range_m)?;
@@ -181,31 +183,30 @@ impl Limits<'_> {
         }
         let violations: Vec<_> = verdicts.iter().flat_map(|v| v.violations.iter().copied()).collect();
         if !violations.is_empty() {
-            let ranges: Vec<&[f64]> = runs.iter().map(|(_, range_m)| *range_m).collect();
-            return Err(Error::Sampling { violations, would_do: self.set_up(&ranges) });
+            return Err(Error::Sampling { violations, would_do: self.set_up(&all) });
         }
         let mut plans = Vec::new();
         for ((layers, range_m), verdict) in runs.iter().zip(&verdicts) {
-            plans.push(self.judge(grid, layers, range_m, &self.gaps(range_m)?, verdict)?);
+            plans.push(self.judge(grid, layers, range_m, verdict, &all)?);
         }
         Ok(plans)
     }
 
-    /// Cost and warnings of a set-up whose grid is accepted.
+    /// Cost and warnings of a set-up whose grid is accepted; layers that would do, do for all runs.
     fn judge(
         &self,
         grid: &Grid,
         layers: &Layers,
         range_m: &[f64],
-        gaps: &Gaps<'_>,
         verdict: &Verdict,
+        runs: &[&[f64]],
     ) -> Result<Plan, Error> {
         let (lambda, furthest) = (self.telescope.wavelength_m, last(range_m)?);
         let program = Program::compile(layers, range_m, &self.cn2, grid, lambda)?;
         let layer_rytov_variance = worst_rytov(&self.cn2, lambda, layers, furthest)?;
-        let gap_list = gaps.of(layers)?;
+        let gap_list = self.gaps(range_m)?.of(layers)?;
         let beams = if self.misalignment == Misalignment::NONE { 1 } else { 2 };
-        let warnings = self.warnings(grid, layer_rytov_variance, &gap_list, range_m, gaps, verdict)?;
+        let warnings = self.warnings(grid, layer_rytov_variance, &gap_list, range_m, verdict, runs)?;
         let pairs = program.transform_pairs() * beams as f64;
         let transfers = program.distance_m.len() * (grid.nx + grid.ny) * 8;
         let group_bytes = group_bytes(grid, range_m.len(), beams);
@@ -228,19 +229,18 @@ impl Limits<'_> {
         layer_rytov_variance: f64,
         gap_list: &[LayerGap],
         range_m: &[f64],
-        gaps: &Gaps<'_>,
         verdict: &Verdict,
+        runs: &[&[f64]],
     ) -> Result<Vec<Warning>, Error> {
         let mut warnings = Vec::new();
         let (lambda, furthest) = (self.telescope.wavelength_m, last(range_m)?);
-        if layer_rytov_variance > LARGEST_LAYER_RYTOV {
-            let layers_needed = thin_layers(&self.cn2, lambda, furthest)?.end_m().len();
-            warnings.push(Warning::ThickLayers { rytov_variance: layer_rytov_variance, layers_needed });
-        }
+        let thick = (layer_rytov_variance > LARGEST_LAYER_RYTOV).then_some(layer_rytov_variance);
         let worst = gap_list.iter().filter(|g| g.is_large()).max_by(|a, b| a.excess().total_cmp(&b.excess()));
-        if let Some(&worst) = worst {
-            let layers_needed = gaps.equal_layers(1, furthest)?;
-            warnings.push(Warning::LayerGap { worst, layers_needed });
+        if thick.is_some() || worst.is_some() {
+            // One number clears both warnings, of every run.
+            let layers_needed = self.equal_layers(runs)?;
+            warnings.extend(thick.map(|rytov_variance| Warning::ThickLayers { rytov_variance, layers_needed }));
+            warnings.extend(worst.map(|&worst| Warning::LayerGap { worst, layers_needed }));
         }
         if verdict.light_lost > DOUBTFUL_LOSS {
             let width_m = self.width_for_light_m(grid, range_m)?;
@@ -259,13 +259,10 @@ impl Limits<'_> {
     }
 }
 
-/// Relative deficit of the screens' structure function at one grid spacing. It hardly depends on the width of the grid: a
-/// part of a large grid shows it.
+/// What screens miss at one grid spacing: a part of a large grid shows it.
 fn missing_at_one_spacing(turbulence: &Turbulence, grid: &Grid) -> Result<f64, Error> {
     let part = Grid { nx: grid.nx.min(256), ny: grid.ny.min(256), ..*grid };
-    let generator = crate::screens::generator::ScreenGenerator::<f64>::new(part, turbulence.spectrum.clone())?;
-    let exact = crate::air::structure::structure_function_m53(&*turbulence.spectrum, grid.dx_m)?;
-    Ok(1.0 - generator.expected_structure_m53(1, 0) / exact)
+    ScreenGenerator::<f64>::new(part, turbulence.spectrum.clone())?.missing_at_one_spacing()
 }
 
 /// Points of the plane onto which a field folds.
@@ -309,7 +306,7 @@ mod tests {
     fn chapters_set_up_is_accepted_with_the_warning_it_deserves() {
         assert!(chapter(1e-15, 3000.0).unwrap().warnings.is_empty());
         let plan = chapter(1e-13, 3000.0).unwrap();
-        assert!(matches!(plan.warnings[..], [Warning::ThickLayers { layers_needed: 15..=17, .. }]), "{plan:?}");
+        assert!(matches!(plan.warnings[..], [Warning::ThickLayers { layers_needed: Some(15..=17), .. }]), "{plan:?}");
         assert!((plan.layer_rytov_variance - 0.22).abs() < 0.01);
         assert!(plan.memory_bytes < 200 << 20, "{}", plan.memory_bytes);
         let weak = chapter(1e-18, 1000.0).unwrap();

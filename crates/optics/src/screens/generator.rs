@@ -280,6 +280,15 @@ impl<T: Real> ScreenGenerator<T> {
         2.0 * sum
     }
 
+    /// Part of the structure function that these screens miss at one grid spacing along x; it hardly depends on the width.
+    ///
+    /// # Errors
+    /// What the quadrature of the spectrum refuses.
+    pub fn missing_at_one_spacing(&self) -> Result<f64, Error> {
+        let exact = crate::air::structure::structure_function_m53(&*self.spectrum, self.grid.dx_m)?;
+        Ok(1.0 - self.expected_structure_m53(1, 0) / exact)
+    }
+
     /// Integral of Phi_psi (1 - cos(kappa.r)) over a cell, without cancellation.
     fn cell_integral(&self, rule: &GaussLegendre, corner: [f64; 2], size: [f64; 2], r: [f64; 2]) -> f64 {
         let mut sum = 0.0;

@@ -26,6 +26,32 @@ fn pupil_overlap_reproduces_the_free_space_curve_to_1e_9() {
     }
 }
 
+/// (O5) knows range and focus by 1/R - 1/F alone, and its sign not at all: the stored curve of a collimated beam is that of any focus.
+#[test]
+fn any_focus_has_the_stored_curve_at_its_distance_from_the_focus() {
+    let snr_at_1_m = |range_m: f64| (-2.0 * 7e-5 * range_m).exp() / (range_m * range_m);
+    let mut compared = 0;
+    for focus_m in [150.0, 600.0, -400.0] {
+        let telescope = Telescope { focus: Focus::At(focus_m), ..Telescope::table2() };
+        for row in &reference("eta_freespace_table2.csv") {
+            for curvature_per_m in [1.0 / row[0], -1.0 / row[0]] {
+                let range_m = 1.0 / (curvature_per_m + 1.0 / focus_m);
+                if !(20.0..5000.0).contains(&range_m) {
+                    continue;
+                }
+                let eta = free_space_efficiency(&telescope, range_m).unwrap();
+                assert!((eta / row[1] - 1.0).abs() < 1e-9, "{focus_m} {range_m} m: {eta} {}", row[1]);
+                // And (14) with it: K^2/R^2 is all that the range changes beside.
+                let model = SnrModel::table2();
+                let [here, there] = [range_m, row[0]].map(|r| model.snr(r, eta).unwrap() / snr_at_1_m(r));
+                assert!((here / there - 1.0).abs() < 1e-12, "{focus_m} {range_m}");
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 150, "{compared}");
+}
+
 #[test]
 fn hankel_quadrature_agrees_with_the_free_space_curve() {
     for row in reference("eta_freespace_table2.csv").iter().step_by(9) {

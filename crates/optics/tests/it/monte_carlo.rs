@@ -190,6 +190,38 @@ fn errors_that_too_few_samples_leave_open_are_not_known() {
 }
 
 #[test]
+fn few_realisations_state_the_error_that_they_have() {
+    let mut set_up = coarse(1e-13, 0);
+    set_up.grid = Grid::square(96, 4e-3).expect("grid");
+    set_up.layers = Layers::equal(2, 600.0).expect("layers");
+    set_up.range_m = vec![300.0, 600.0];
+    for (sampling, realisations, runs) in [(Sampling::Antithetic, 20, 40), (Sampling::Independent, 8, 60)] {
+        let (mut z, mut stated, mut means) = (Vec::new(), Vec::new(), Vec::new());
+        for seed in 0..runs {
+            let run = MonteCarlo { seed: 100 + seed, sampling, ..set_up.clone() };
+            let estimate = run.run::<f32>(Stop::after(realisations), go).expect("run");
+            z.extend(bistatic_z(&run, &estimate));
+            let bistatic = estimate.bistatic.expect("pairs");
+            stated.push(bistatic.standard_error[0]);
+            means.push(bistatic.mean[0]);
+        }
+        // Root of the mean squared stated error over the scatter of the means, which so many runs know to 11 and 9 %.
+        let count = runs as f64;
+        let mean = means.iter().sum::<f64>() / count;
+        let scatter = (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
+        let rms = (stated.iter().map(|e| e * e).sum::<f64>() / count).sqrt();
+        assert!((0.7..1.4).contains(&(rms / scatter)), "{sampling:?}: {}", rms / scatter);
+        // No run states next to nothing, and errors cover as Student's distribution says: two thirds within one.
+        let least = stated.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+        let worst = z.iter().fold(0f64, |a, b| a.max(b.abs()));
+        let within = z.iter().filter(|z| z.abs() < 1.0).count() as f64 / z.len() as f64;
+        println!("{sampling:?} {} {} {worst} {within}", rms / scatter, least / rms);
+        assert!(least > 0.25 * rms, "{sampling:?}: {least} {rms}");
+        assert!(worst < 5.0 && (0.5..0.8).contains(&within), "{sampling:?}: {worst} {within}");
+    }
+}
+
+#[test]
 fn single_and_double_precision_agree_far_below_the_monte_carlo_error() {
     let mut run = coarse(1e-13, 6);
     run.grid = Grid { nx: 128, ny: 135, dx_m: 4e-3, dy_m: 4e-3 };

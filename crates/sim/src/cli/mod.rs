@@ -19,6 +19,7 @@ mod wake;
 
 use crate::io::Existing;
 use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
+use crate::measure::profile::model;
 use crate::plan::accuracy::proposals;
 use crate::plan::{Plan, Stage, Target};
 use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
@@ -29,6 +30,7 @@ use output::say;
 use serde_json::{Value, json};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use wakescope_optics::plan::Model;
 
 /// Simulator of coherent Doppler lidar measurements of aircraft wake vortices.
 #[derive(Debug, Parser)]
@@ -195,7 +197,14 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     let mut object = plan_json(&plan);
     object["budget"] = json!({ "range_m": ranges_m, "snr_db": snr_db });
     // What only phase screens could tell is not told.
-    let screens = if plan.runs(Stage::PhaseScreens) { ", turbulence as on independent paths" } else { "" };
+    let is_less = plan.runs(Stage::PhaseScreens) && model(&plan.scene.scene) == Model::MonteCarlo;
+    object["budget"]["independent_paths"] = json!(is_less);
+    let screens = match is_less {
+        true => {
+            "; turbulence as on independent paths: one path out and back returns more, by as much as wakescope budget says"
+        }
+        false => "",
+    };
     let joined = |cells: Vec<String>| cells.join(", ");
     let short = format!(
         "SNR in the band, one pulse, at {} m: {} dB{screens}",

@@ -5,13 +5,13 @@
 
 use crate::Error;
 use crate::measure::instrument::Instrument;
-use crate::measure::profile::{efficiency_at, efficiency_realisations, turbulence};
+use crate::measure::profile::{OF_SCREENS, Screens, efficiency_at, turbulence};
 use crate::measure::progress::Observer;
-use crate::plan::Stage;
-use crate::scene::{RefractiveTurbulence, Scene, hash_of};
+use crate::plan::{Plan, Stage};
+use crate::scene::{Scene, hash_of};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
-use wakescope_optics::EfficiencyProfile;
+use wakescope_optics::{EfficiencyProfile, curved_ranges_m};
 
 /// Values by the hash of what they depend on.
 #[derive(Debug)]
@@ -49,44 +49,40 @@ impl<T> Known<T> {
 /// The curves of some scenes.
 #[derive(Debug, Default)]
 pub(crate) struct Efficiencies {
-    means: Known<EfficiencyProfile>,
-    realisations: Known<Vec<Vec<f64>>>,
+    layers: Known<EfficiencyProfile>,
+    screens: Known<Screens>,
 }
 
 impl Efficiencies {
-    /// As [`efficiency_at`].
-    pub(crate) fn mean(
-        &self,
-        scene: &Scene,
-        instrument: &Instrument,
-        range_m: &[f64],
-        observer: &dyn Observer,
-    ) -> Result<Arc<EfficiencyProfile>, Error> {
-        self.means.of(cause(scene, range_m), || {
+    /// The efficiency at the layers of the lines, as [`efficiency_at`].
+    pub(crate) fn of_layers(&self, plan: &Plan, observer: &dyn Observer) -> Result<Arc<EfficiencyProfile>, Error> {
+        let ranges_m: Vec<f64> = plan.geometry.layer_range_m().collect();
+        self.layers.of(cause(&plan.scene.scene, &ranges_m), || {
             observer.begin(Stage::Efficiency, 1);
-            let profile = efficiency_at(scene, instrument, range_m, observer)?;
+            let profile = efficiency_at(plan, self, &ranges_m, observer)?;
             observer.end();
             Ok(profile)
         })
     }
 
-    /// As [`efficiency_realisations`].
-    pub(crate) fn of_realisations(
+    /// The phase screens of a stretch of range, m.
+    pub(crate) fn screens(
         &self,
         scene: &Scene,
         instrument: &Instrument,
-        t: &RefractiveTurbulence,
-        range_m: &[f64],
+        [from_m, to_m]: [f64; 2],
         observer: &dyn Observer,
-    ) -> Result<Arc<Vec<Vec<f64>>>, Error> {
-        let make = || efficiency_realisations(scene, instrument, t, range_m, observer);
-        self.realisations.of(cause(scene, range_m), make)
+    ) -> Result<Arc<Screens>, Error> {
+        let t = turbulence(scene).unwrap_or_default();
+        let range_m = curved_ranges_m(&instrument.telescope, from_m, to_m, OF_SCREENS);
+        let cause = cause(scene, &range_m);
+        self.screens.of(cause, || Screens::run(scene, instrument, &t, range_m, observer))
     }
 
     /// How many were computed.
     #[cfg(feature = "sweep")]
     pub(crate) fn computed(&self) -> usize {
-        self.means.len() + self.realisations.len()
+        self.layers.len()
     }
 }
 

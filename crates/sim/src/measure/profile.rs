@@ -2,17 +2,23 @@
 //!
 //! Free space is a quadrature. Turbulence on independent paths (bistatic) has an exact mean at any strength.
 //! Only turbulence that both beams share (monostatic) needs phase screens.
+//!
+//! One function says the efficiency at a range, whoever asks. Check: signals, bound, budget and profile have the same, through any
+//! focus (`every_output_has_the_same_ratio_through_a_focus`).
 
 use crate::Error;
+use crate::measure::efficiencies::Efficiencies;
+use crate::measure::geometry::Geometry;
 use crate::measure::instrument::{Instrument, receiver_path};
 use crate::measure::progress::Observer;
-use crate::plan::Stage;
+use crate::measure::region::of_table;
+use crate::plan::{Plan, Stage};
 use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence};
 use std::ops::ControlFlow;
 use wakescope_optics::air::StructureTable;
 use wakescope_optics::plan::{DOUBTFUL_LOSS, Model, cheapest_model};
 use wakescope_optics::theory::{bistatic_efficiency_with, free_space_efficiency};
-use wakescope_optics::{Cn2Path, EfficiencyProfile, Misalignment, Stop};
+use wakescope_optics::{Cn2Path, EfficiencyProfile, Misalignment, Stop, curved_ranges_m};
 
 /// The cheapest model of the efficiency that is valid for a scene.
 pub fn model(scene: &Scene) -> Model {
@@ -57,145 +63,361 @@ pub struct RangeProfile {
 ///
 /// # Errors
 /// What the optics refuse, such as a grid too small for the beam.
-pub fn range_profile(scene: &Scene, instrument: &Instrument, observer: &dyn Observer) -> Result<RangeProfile, Error> {
-    let o = &scene.outputs;
+pub fn range_profile(plan: &Plan, observer: &dyn Observer) -> Result<RangeProfile, Error> {
+    let o = &plan.scene.scene.outputs;
     let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
+    profile_at(plan, &Efficiencies::default(), &range_m, observer)
+}
+
+/// The profile at some ranges, m, increasing.
+///
+/// # Errors
+/// As [`range_profile`]; in turbulence that phase screens cross, ranges beyond the signals and the profile of the scene.
+pub(crate) fn profile_at(
+    plan: &Plan,
+    known: &Efficiencies,
+    range_m: &[f64],
+    observer: &dyn Observer,
+) -> Result<RangeProfile, Error> {
+    let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
     let model = self::model(scene);
-    let mut others = Vec::new();
-    let mut lost_power_fraction = None;
-    let efficiency = match turbulence(scene) {
-        None => free_space(instrument, &range_m)?,
-        Some(t) => {
-            let exact = efficiency_by_theory(instrument, &range_m)?;
-            let Paths { monostatic, bistatic, lost_power_fraction: lost, .. } =
-                monte_carlo(scene, instrument, &t, &range_m, observer)?;
-            lost_power_fraction = Some(lost);
-            others.push(("efficiency_free_space", free_space(instrument, &range_m)?));
-            others.push(("efficiency_bistatic_exact", exact.clone()));
-            others.push(("efficiency_monostatic_monte_carlo", monostatic.clone()));
-            others.push(("efficiency_bistatic_monte_carlo", bistatic));
-            if model == Model::MonteCarlo { monostatic } else { exact }
+    let theory = efficiency_by_theory(instrument, range_m)?;
+    let (mut others, mut lost_power_fraction) = (Vec::new(), None);
+    let mut efficiency = theory.clone();
+    if turbulence(scene).is_some() {
+        let ([monostatic, bistatic], lost) = across_screens(plan, known, &theory, observer)?;
+        lost_power_fraction = Some(lost);
+        if model == Model::MonteCarlo {
+            efficiency = monostatic.clone();
         }
-    };
-    let receiver = &instrument.receiver;
-    let snr_db = efficiency
-        .range_m
-        .iter()
-        .zip(&efficiency.mean)
-        .map(|(&range_m, &mean)| match scene.detector.snr {
-            SnrReference::Fixed { snr_db } => Ok(snr_db),
-            _ => Ok(10.0
-                * receiver
-                    .slowly_varying_snr(scene.pulse_energy_j(), instrument.return_per_m(range_m)? * mean)
-                    .log10()),
-        })
-        .collect::<Result<_, Error>>()?;
+        others.push(("efficiency_free_space", free_space(instrument, range_m)?));
+        others.push(("efficiency_bistatic_exact", theory));
+        others.push(("efficiency_monostatic_monte_carlo", monostatic));
+        others.push(("efficiency_bistatic_monte_carlo", bistatic));
+    }
+    let snr_db = snr_db(scene, instrument, &efficiency)?;
     Ok(RangeProfile { model, efficiency, snr_db, others, lost_power_fraction })
 }
 
-/// The efficiency at given ranges, m, increasing, by the cheapest model that is valid.
-///
-/// # Errors
-/// What the optics refuse, such as a range of 0 or a grid too small for the beam.
-pub fn efficiency_at(
+/// Mean signal-to-noise ratio (14) in the detector band at the ranges of an efficiency, dB, or what the scene fixes.
+pub(crate) fn snr_db(
     scene: &Scene,
     instrument: &Instrument,
+    efficiency: &EfficiencyProfile,
+) -> Result<Vec<f64>, Error> {
+    let snr_db = |(&range_m, &mean): (&f64, &f64)| match scene.detector.snr {
+        SnrReference::Fixed { snr_db } => Ok(snr_db),
+        _ => {
+            let returned = instrument.return_per_m(range_m)? * mean;
+            Ok(10.0 * instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), returned).log10())
+        }
+    };
+    efficiency.range_m.iter().zip(&efficiency.mean).map(snr_db).collect()
+}
+
+/// The efficiency at given ranges, m, increasing, by the cheapest model that is valid: the one that signals, budget, bound, map and
+/// profile have.
+///
+/// # Errors
+/// As [`profile_at`].
+pub(crate) fn efficiency_at(
+    plan: &Plan,
+    known: &Efficiencies,
     range_m: &[f64],
     observer: &dyn Observer,
 ) -> Result<EfficiencyProfile, Error> {
-    match (turbulence(scene), model(scene)) {
-        (Some(_), Model::ExactBistatic) => efficiency_by_theory(instrument, range_m),
-        (Some(t), Model::MonteCarlo) => Ok(monte_carlo(scene, instrument, &t, range_m, observer)?.monostatic),
-        _ => free_space(instrument, range_m),
+    let theory = efficiency_by_theory(&plan.instrument, range_m)?;
+    match model(&plan.scene.scene) {
+        Model::MonteCarlo => Ok(across_screens(plan, known, &theory, observer)?.0[0].clone()),
+        _ => Ok(theory),
     }
 }
 
 pub(crate) fn free_space(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
-    Ok(EfficiencyProfile::from_theory(range_m, |range_m| free_space_efficiency(&instrument.telescope, range_m))?)
+    of_theory(instrument, range_m, |range_m| free_space_efficiency(&instrument.telescope, range_m))
 }
 
 /// The efficiency without phase screens: of free space, and in turbulence the exact mean of independent paths, which leaves out
 /// what a path out and back gains.
 ///
 /// # Errors
-/// As [`efficiency_at`].
+/// What the optics refuse, such as a range of 0.
 pub(crate) fn efficiency_by_theory(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
     let Some(turbulence) = &instrument.turbulence else { return free_space(instrument, range_m) };
     let table = StructureTable::new(&*turbulence.spectrum);
-    Ok(EfficiencyProfile::from_theory(range_m, |range_m| {
+    of_theory(instrument, range_m, |range_m| {
         bistatic_efficiency_with(&instrument.telescope, &Misalignment::NONE, &turbulence.cn2, &table, range_m)
-    })?)
+    })
 }
 
-/// Efficiency of each realisation of the path at given ranges, m, increasing: `[realisation][range]`, by phase screens.
-///
-/// # Errors
-/// As [`efficiency_at`].
-pub fn efficiency_realisations(
-    scene: &Scene,
+/// Most ranges at which a quadrature is done for each.
+const MOST_QUADRATURES: usize = 256;
+/// How close the ranges of quadratures are where there are more: what is joined between them is within 0.005 dB.
+pub(crate) const OF_QUADRATURES: f64 = 12.0;
+/// How close those of phase screens are: ratios to theory bend less.
+pub(crate) const OF_SCREENS: f64 = 1.0;
+
+/// A quadrature at each range, or at as many as the curvature asks for where there are more.
+fn of_theory(
     instrument: &Instrument,
-    t: &RefractiveTurbulence,
     range_m: &[f64],
-    observer: &dyn Observer,
-) -> Result<Vec<Vec<f64>>, Error> {
-    let paths = monte_carlo(scene, instrument, t, range_m, observer)?;
-    let by_range = match scene.telescope.receiver {
-        ReceiverPath::Monostatic => paths.monostatic_realisations,
-        ReceiverPath::Bistatic => paths.bistatic_realisations,
-    };
-    let count = by_range.iter().map(Vec::len).min().unwrap_or(0);
-    Ok((0..count).map(|i| by_range.iter().map(|efficiencies| efficiencies[i]).collect()).collect())
+    quadrature: impl Fn(f64) -> Result<f64, wakescope_optics::Error>,
+) -> Result<EfficiencyProfile, Error> {
+    match *range_m {
+        [first_m, .., last_m] if range_m.len() > MOST_QUADRATURES => {
+            let curved_m = curved_ranges_m(&instrument.telescope, first_m, last_m, OF_QUADRATURES);
+            let curve = EfficiencyProfile::from_theory(&curved_m, quadrature)?;
+            Ok(EfficiencyProfile::from_theory(range_m, |range_m| curve.interpolated(range_m))?)
+        }
+        _ => Ok(EfficiencyProfile::from_theory(range_m, quadrature)?),
+    }
 }
 
-/// What the phase screens give for both receivers.
-struct Paths {
-    monostatic: EfficiencyProfile,
-    bistatic: EfficiencyProfile,
-    monostatic_realisations: Vec<Vec<f64>>,
-    bistatic_realisations: Vec<Vec<f64>>,
+/// Whether the signals take their efficiency from phase screens.
+pub(crate) fn signals_cross_screens(scene: &Scene) -> bool {
+    let of_signals = model(scene) == Model::MonteCarlo || drawn_turbulence(scene).is_some();
+    of_signals && !matches!(scene.detector.snr, SnrReference::Fixed { .. })
+}
+
+/// The stretches with phase screens of their own in which there are some of these ranges, m, increasing, with those ranges: the
+/// air of the signals, and what of the profile lies before it and behind it.
+pub(crate) fn stretches<'a>(scene: &Scene, g: &Geometry, mut range_m: &'a [f64]) -> Vec<([f64; 2], &'a [f64])> {
+    let o = &scene.outputs;
+    let [first_m, last_m] = [o.profile_range_min_m, o.profile_range_max_m];
+    let (near_m, far_m) = (g.first_layer_range_m, g.first_layer_range_m + g.layers as f64 * g.layer_thickness_m);
+    let all = match signals_cross_screens(scene) {
+        true => {
+            vec![[first_m, near_m.next_down().min(last_m)], [near_m, far_m], [far_m.next_up().max(first_m), last_m]]
+        }
+        false => vec![[first_m, last_m]],
+    };
+    let mut out = Vec::new();
+    for [from_m, to_m] in all {
+        range_m = &range_m[range_m.partition_point(|r| *r < from_m)..];
+        let (inside, beyond) = range_m.split_at(range_m.partition_point(|r| *r <= to_m));
+        if !inside.is_empty() {
+            out.push(([from_m, to_m], inside));
+        }
+        range_m = beyond;
+    }
+    out
+}
+
+/// What phase screens give for both receivers.
+#[derive(Debug)]
+pub(crate) struct Screens {
+    pub(crate) range_m: Vec<f64>,
+    /// Mean, scatter and standard error, monostatic and then bistatic, over theory: `[number][range]`.
+    over_theory: [Vec<f64>; 6],
+    /// Of the receiver of the scene, over their mean: `[realisation][range]`.
+    pub(crate) realisations: Vec<Vec<f64>>,
     /// Largest mean fraction of the power that the border of the grid took.
     lost_power_fraction: f64,
 }
 
-/// Monostatic and bistatic efficiency by phase screens, from one set of realisations.
-fn monte_carlo(
-    scene: &Scene,
-    instrument: &Instrument,
-    t: &RefractiveTurbulence,
-    range_m: &[f64],
+/// The monostatic and the bistatic efficiency across phase screens at the ranges of `theory`, and the light lost at the border: the
+/// ratio to theory, which is smooth, on straight lines between the ranges of the screens, times theory.
+fn across_screens(
+    plan: &Plan,
+    known: &Efficiencies,
+    theory: &EfficiencyProfile,
     observer: &dyn Observer,
-) -> Result<Paths, Error> {
-    observer.begin(Stage::PhaseScreens, t.realisations as u64);
-    let mut seen = 0;
-    // Single precision: its rounding is far below the error of any number of realisations.
-    let estimate =
-        instrument.monte_carlo(t, range_m, scene.seed)?.run::<f32>(Stop::after(t.realisations), |progress| {
-            observer.advance((progress.done - seen) as u64);
-            seen = progress.done;
-            ControlFlow::Continue(())
-        })?;
-    observer.end();
-    let lost = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
-    if lost > DOUBTFUL_LOSS {
-        observer.warn(&format!(
-            "the border of the phase screens took {lost:.3} of the light, 0.01 at most is good: a wider grid is needed, more \
-             atmosphere.turbulence.grid_points or sampling = \"derived\""
-        ));
+) -> Result<([EfficiencyProfile; 2], f64), Error> {
+    let (scene, mut columns, mut done, mut lost) = (&plan.scene.scene, [const { Vec::new() }; 6], 0, 0f64);
+    for (ends_m, inside) in stretches(scene, &plan.geometry, &theory.range_m) {
+        let screens = known.screens(scene, &plan.instrument, ends_m, observer)?;
+        lost = lost.max(screens.lost_power_fraction);
+        if theory.range_m.get(done) != inside.first() {
+            break;
+        }
+        for &range_m in inside {
+            for (column, ratio) in columns.iter_mut().zip(&screens.over_theory) {
+                column.push(theory.mean[done] * of_table(&screens.range_m, ratio, range_m));
+            }
+            done += 1;
+        }
     }
-    // A checked scene has at least two realisations, and so pairs of them.
-    let bistatic =
-        estimate.bistatic.ok_or(wakescope_optics::Error::Length { field: "realisations", found: 1, expected: 2 })?;
-    Ok(Paths {
-        monostatic: estimate.monostatic,
-        bistatic,
-        monostatic_realisations: estimate.monostatic_realisations,
-        bistatic_realisations: estimate.bistatic_realisations,
-        lost_power_fraction: lost,
-    })
+    if let Some(&range_m) = theory.range_m.get(done) {
+        let (first_m, last_m) = (scene.outputs.profile_range_min_m, scene.outputs.profile_range_max_m);
+        return Err(wakescope_optics::Error::Extrapolation { range_m, first_m, last_m }.into());
+    }
+    let [mean, standard_deviation, standard_error, ..] = columns.clone();
+    let monostatic = EfficiencyProfile { range_m: theory.range_m.clone(), mean, standard_deviation, standard_error };
+    let [.., mean, standard_deviation, standard_error] = columns;
+    Ok((
+        [monostatic, EfficiencyProfile { range_m: theory.range_m.clone(), mean, standard_deviation, standard_error }],
+        lost,
+    ))
+}
+
+impl Screens {
+    /// Runs the screens of some ranges, m, increasing.
+    ///
+    /// # Errors
+    /// What the optics refuse, such as a grid too small for the beam.
+    pub(crate) fn run(
+        scene: &Scene,
+        instrument: &Instrument,
+        t: &RefractiveTurbulence,
+        range_m: Vec<f64>,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
+        observer.begin(Stage::PhaseScreens, t.realisations as u64);
+        let mut seen = 0;
+        // Single precision: its rounding is far below the error of any number of realisations.
+        let estimate =
+            instrument.monte_carlo(t, &range_m, scene.seed)?.run::<f32>(Stop::after(t.realisations), |progress| {
+                observer.advance((progress.done - seen) as u64);
+                seen = progress.done;
+                ControlFlow::Continue(())
+            })?;
+        observer.end();
+        let lost_power_fraction = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
+        if lost_power_fraction > DOUBTFUL_LOSS {
+            observer.warn(&format!(
+                "the border of the phase screens took {lost_power_fraction:.3} of the light, 0.01 at most is good: a wider grid is \
+                 needed, more atmosphere.turbulence.grid_points or sampling = \"derived\""
+            ));
+        }
+        // A checked scene has at least two realisations, and so pairs of them.
+        let (m, b) = (estimate.monostatic, estimate.bistatic);
+        let b = b.ok_or(wakescope_optics::Error::Length { field: "realisations", found: 1, expected: 2 })?;
+        let mut over_theory =
+            [m.mean, m.standard_deviation, m.standard_error, b.mean, b.standard_deviation, b.standard_error];
+        let theory = efficiency_by_theory(instrument, &range_m)?.mean;
+        over_theory.iter_mut().for_each(|list| list.iter_mut().zip(&theory).for_each(|(value, eta)| *value /= eta));
+        let by_range = match scene.telescope.receiver {
+            ReceiverPath::Monostatic => estimate.monostatic_realisations,
+            ReceiverPath::Bistatic => estimate.bistatic_realisations,
+        };
+        let count = by_range.iter().map(Vec::len).min().unwrap_or(0);
+        let mean: Vec<f64> = by_range.iter().map(|all| all[..count].iter().sum::<f64>() / count as f64).collect();
+        let over_mean = |i: usize| by_range.iter().zip(&mean).map(|(all, mean)| all[i] / mean).collect();
+        let realisations = (0..count).map(over_mean).collect();
+        Ok(Self { range_m, over_theory, realisations, lost_power_fraction })
+    }
 }
 
 /// `points` values from `low` to `high`, both included.
 pub(crate) fn spaced(low: f64, high: f64, points: usize) -> Vec<f64> {
     let step = (high - low) / (points.max(2) - 1) as f64;
     (0..points).map(|i| if i + 1 == points { high } else { low + i as f64 * step }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::bound::bound;
+    use crate::measure::budget::Budget;
+    use crate::measure::progress::Silent;
+    use crate::measure::run::run;
+    use crate::plan::Target;
+    use crate::scene::SceneFile;
+    use std::path::Path;
+
+    fn plan(telescope: &str, [from_m, to_m]: [f64; 2], more: &str, target: Target) -> Plan {
+        let text = format!(
+            "[telescope]\n{telescope}\n[scan]\nelevation_min_rad = 0.1\nelevation_max_rad = 0.1\nrange_min_m = {from_m:?}\n\
+             range_max_m = {to_m:?}\npulses_per_line = 1\nrealisations = 2\n[estimator]\ngate_step_samples = 150\n{more}"
+        );
+        let file = SceneFile::parse(&text, Path::new("s.toml")).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        Plan::new(file, target).unwrap()
+    }
+
+    /// Signal-to-noise ratios of `bound`, `budget` and the profile at the ranges of the bound, dB.
+    fn three_outputs(plan: &Plan) -> Vec<(f64, [f64; 3])> {
+        let of_bound = bound(plan, &Silent).unwrap().by_range;
+        let ranges_m: Vec<f64> = of_bound.iter().map(|p| p.range_m).collect();
+        let budget = Budget::new(plan, &ranges_m, &Silent).unwrap();
+        let profile = profile_at(plan, &Efficiencies::default(), &ranges_m, &Silent).unwrap();
+        let all = of_bound.iter().zip(budget.snr_db()).zip(&profile.snr_db);
+        all.map(|((bound, budget), profile)| (bound.range_m, [bound.snr_db, *budget, *profile])).collect()
+    }
+
+    #[test]
+    fn every_output_has_the_ratio_of_14_through_any_focus() {
+        const WIDE: &str = "focus_m = 600.0\naperture_radius_m = 0.15\nbeam_radius_m = 0.09";
+        for (telescope, ends_m) in [
+            ("focus_m = 300.0", [150.0, 1500.0]),
+            (WIDE, [200.0, 2000.0]),
+            ("focus_m = -700.0\nobscuration_radius_m = 0.02", [150.0, 900.0]),
+            ("", [280.0, 520.0]),
+        ] {
+            let plan = plan(telescope, ends_m, "", Target::Map);
+            let found = three_outputs(&plan);
+            assert!(found.len() > 1);
+            for (range_m, outputs_db) in found {
+                let efficiency = free_space_efficiency(&plan.instrument.telescope, range_m).unwrap();
+                let exact_db = 10.0 * plan.instrument.snr.snr(range_m, efficiency).unwrap().log10();
+                for (snr_db, error_db) in outputs_db.into_iter().zip([0.01, 1e-9, 1e-9]) {
+                    assert!((snr_db - exact_db).abs() < error_db, "{telescope} {range_m}: {outputs_db:?} {exact_db}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_output_has_the_same_ratio_through_a_focus_in_turbulence() {
+        for (receiver, efficiency) in
+            [("monostatic", "mean"), ("monostatic", "realisation"), ("bistatic", "realisation")]
+        {
+            let more = format!(
+                "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-13\ngrid_points = 160\ngrid_spacing_m = 0.0022\n\
+                 layers = 5\nrealisations = 5\nefficiency = \"{efficiency}\"\n[outputs]\nprofile_range_min_m = 120.0\n\
+                 profile_range_max_m = 660.0\nprofile_points = 5\n"
+            );
+            let telescope = format!("focus_m = 300.0\nreceiver = \"{receiver}\"");
+            let plan = plan(&telescope, [200.0, 540.0], &more, Target::Run);
+            for (range_m, [bound, budget, profile]) in three_outputs(&plan) {
+                assert!(
+                    (bound - budget).abs() < 0.02 && (budget - profile).abs() < 1e-9,
+                    "{range_m}: {bound} {budget} {profile}"
+                );
+            }
+            // The profile of a run, the middle of its scan, and ranges before and behind the signals.
+            let result = run(&plan, &Silent).unwrap();
+            let profile = result.profile.unwrap();
+            let budget = Budget::new(&plan, &profile.efficiency.range_m, &Silent).unwrap();
+            for (a, b) in budget.snr_db().iter().zip(&profile.snr_db) {
+                assert!((a - b).abs() < 1e-9, "{a} {b}");
+            }
+            let middle = result.middle.unwrap();
+            let there = efficiency_at(&plan, &Efficiencies::default(), &[middle.range_m], &Silent).unwrap();
+            assert!((middle.efficiency / there.mean[0] - 1.0).abs() < 1e-12);
+            assert!((middle.snr_db - snr_db(&plan.scene.scene, &plan.instrument, &there).unwrap()[0]).abs() < 0.02);
+        }
+    }
+
+    #[test]
+    fn what_is_joined_between_ranges_of_the_screens_is_what_they_give_there() {
+        let more = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-13\ngrid_points = 160\n\
+             grid_spacing_m = 0.0022\nlayers = 5\nrealisations = 8\n[outputs]\nprofile_range_max_m = 560.0\n";
+        let plan = plan("focus_m = 300.0", [200.0, 500.0], more, Target::Map);
+        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
+        let (ends_m, _) = stretches(scene, &plan.geometry, &[300.0])[0];
+        let nodes_m = curved_ranges_m(&instrument.telescope, ends_m[0], ends_m[1], OF_SCREENS);
+        let mut between_m: Vec<f64> = nodes_m.windows(2).map(|r| 0.5 * (r[0] + r[1])).collect();
+        between_m.push(ends_m[1]);
+        let t = turbulence(scene).unwrap();
+        // The same layers and random numbers: what differs is the interpolation.
+        let direct = instrument.monte_carlo(&t, &between_m, scene.seed).unwrap();
+        let direct = direct.run::<f32>(Stop::after(t.realisations), |_| ControlFlow::Continue(())).unwrap().monostatic;
+        let joined = efficiency_at(&plan, &Efficiencies::default(), &between_m, &Silent).unwrap();
+        for (i, range_m) in between_m.iter().enumerate() {
+            let off_db = 10.0 * (joined.mean[i] / direct.mean[i]).log10();
+            assert!(off_db.abs() < 0.04, "{range_m}: {off_db}");
+        }
+    }
+
+    #[test]
+    fn the_summary_has_the_efficiency_of_the_middle_however_few_points_the_profile_has() {
+        for (telescope, target) in [("", Target::Run), ("focus_m = 420.0", Target::Efficiency)] {
+            let plan = plan(telescope, [280.0, 520.0], "[outputs]\nprofile_points = 2\n", target);
+            let middle = run(&plan, &Silent).unwrap().middle.unwrap();
+            let exact = free_space_efficiency(&plan.instrument.telescope, 400.0).unwrap();
+            assert!((middle.efficiency / exact - 1.0).abs() < 1e-12, "{} {exact}", middle.efficiency);
+            let snr_db = 10.0 * plan.instrument.snr.snr(400.0, exact).unwrap().log10();
+            assert!((middle.snr_db - snr_db).abs() < 1e-3, "{} {snr_db}", middle.snr_db);
+        }
+    }
 }

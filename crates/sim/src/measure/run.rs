@@ -2,9 +2,10 @@
 
 use crate::Error;
 use crate::io::CrossPlanes;
+use crate::measure::efficiencies::Efficiencies;
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::plane;
-use crate::measure::profile::{RangeProfile, range_profile};
+use crate::measure::profile::{RangeProfile, profile_at, spaced};
 use crate::measure::progress::Observer;
 use crate::measure::region::of_table;
 use crate::measure::scan::Scanner;
@@ -48,24 +49,22 @@ pub struct ScanMiddle {
 }
 
 impl ScanMiddle {
-    /// From the profile, and from the layers of the signals where there are any.
-    pub(crate) fn of(plan: &Plan, profile: Option<&RangeProfile>, scanner: Option<&Scanner<'_>>) -> Option<Self> {
-        let scan = &plan.scene.scene.scan;
-        let range_m = 0.5 * (scan.range_min_m + scan.range_max_m);
-        let of_profile = |values: &dyn Fn(&RangeProfile) -> Vec<f64>| {
-            let profile = profile?;
-            let (first, last) = (profile.efficiency.range_m.first()?, profile.efficiency.range_m.last()?);
-            let inside = (*first..=*last).contains(&range_m);
-            inside.then(|| of_table(&profile.efficiency.range_m, &values(profile), range_m))
-        };
+    /// From the profile at that range, and from the layers of the signals where there are any.
+    pub(crate) fn of(plan: &Plan, there: Option<&RangeProfile>, scanner: Option<&Scanner<'_>>) -> Option<Self> {
+        let range_m = middle_m(plan);
         let of_signals = scanner.map(|scanner| {
             let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
             10.0 * of_table(&layer_m, &snr, range_m).log10()
         });
-        let efficiency = of_profile(&|p| p.efficiency.mean.clone());
-        let snr_db = of_signals.or_else(|| of_profile(&|p| p.snr_db.clone()))?;
+        let efficiency = there.and_then(|p| p.efficiency.mean.first().copied());
+        let snr_db = of_signals.or_else(|| there?.snr_db.first().copied())?;
         Some(Self { range_m, efficiency: efficiency.unwrap_or(f64::NAN), snr_db })
     }
+}
+
+fn middle_m(plan: &Plan) -> f64 {
+    let scan = &plan.scene.scene.scan;
+    0.5 * (scan.range_min_m + scan.range_max_m)
 }
 
 /// One line of the summary that a person or a program reads.
@@ -85,18 +84,22 @@ pub struct SummaryLine {
 /// What the crates refuse; a checked scene gives none.
 pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let mut result = RunResult::default();
+    let (o, known, mut there) = (&plan.scene.scene.outputs, Efficiencies::default(), None);
     if matches!(plan.target, Target::Run | Target::Efficiency) {
-        result.profile = Some(range_profile(&plan.scene.scene, &plan.instrument, observer)?);
-        result.middle = ScanMiddle::of(plan, result.profile.as_ref(), None);
+        let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
+        result.profile = Some(profile_at(plan, &known, &range_m, observer)?);
+        if (o.profile_range_min_m..=o.profile_range_max_m).contains(&middle_m(plan)) {
+            there = Some(profile_at(plan, &known, &[middle_m(plan)], observer)?);
+        }
     }
     if plan.runs(Stage::CrossPlane) {
         observer.begin(Stage::CrossPlane, 1);
         result.plane = Some(plane::cross_plane(plan)?);
         observer.end();
     }
-    if plan.runs(Stage::Signals) {
-        let scanner = Scanner::new(plan, observer)?;
-        result.middle = ScanMiddle::of(plan, result.profile.as_ref(), Some(&scanner));
+    let scanner = plan.runs(Stage::Signals).then(|| Scanner::with(plan, &known, observer)).transpose()?;
+    result.middle = ScanMiddle::of(plan, there.as_ref(), scanner.as_ref());
+    if let Some(scanner) = scanner {
         match plan.scene.scene.detector.signal {
             DetectorSignal::IntermediateFrequency => signals_and_map::<f64>(plan, &scanner, observer, &mut result)?,
             DetectorSignal::Baseband => signals_and_map::<Complex<f64>>(plan, &scanner, observer, &mut result)?,

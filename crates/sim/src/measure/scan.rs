@@ -6,7 +6,7 @@ use crate::measure::air::{Air, LineAirs, air_along, beam_of_air, known_velocity_
 use crate::measure::efficiencies::Efficiencies;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
-use crate::measure::profile::{drawn_turbulence, efficiency_by_theory, model, spaced};
+use crate::measure::profile::{drawn_turbulence, efficiency_by_theory, stretches};
 use crate::measure::progress::Observer;
 use crate::measure::streams::stream;
 use crate::plan::{Plan, Stage};
@@ -15,23 +15,11 @@ use ndarray::{Array2, ArrayView2};
 use rand_xoshiro::rand_core::Rng;
 use rayon::prelude::*;
 use std::ops::Range;
-use wakescope_optics::plan::Model;
 use wakescope_signal::digitise::Clipped;
 use wakescope_signal::efficiency::{EfficiencyTable, LayerEfficiency};
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::scan::{PulseKey, Sample};
 use wakescope_signal::{LineOfSight, Pulse, RangeFilter, Record, Scan, Shot, Simulator};
-
-/// Ranges of the efficiency profile from which the layers take theirs, m: dense where it is a quadrature, few
-/// where each costs transforms and the errors of neighbours are alike.
-pub(crate) fn profile_ranges_m(scene: &Scene, geometry: &Geometry) -> Vec<f64> {
-    let points = match model(scene) {
-        Model::FreeSpace | Model::ExactBistatic if drawn_turbulence(scene).is_none() => 65,
-        _ => 9,
-    };
-    let last_m = geometry.first_layer_range_m + geometry.layers as f64 * geometry.layer_thickness_m;
-    spaced(geometry.first_layer_range_m, last_m, points)
-}
 
 /// The lines of sight of a scan, and what makes signals of them.
 pub struct Scanner<'a> {
@@ -47,7 +35,7 @@ pub struct Scanner<'a> {
     /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the pulses
     /// have airs of their own.
     spread_m_s: Option<Array2<f64>>,
-    /// What each pulse brings instead of the mean efficiency.
+    /// The efficiency of each pulse over the mean, where pulses have their own.
     efficiency: Option<LayerEfficiency>,
     /// The air that the pulse before lights meanwhile, if the scene asks for its echo.
     previous: Option<Vec<LineOfSight>>,
@@ -118,8 +106,8 @@ impl<'a> Scanner<'a> {
         mean_snr(&self.layer_snr())
     }
 
-    /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; the efficiency is its
-    /// mean, and backscatter that the flow carries that over the lines.
+    /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; backscatter that the flow
+    /// carries is its mean over the lines.
     pub fn layer_snr(&self) -> Vec<(f64, f64)> {
         let Some(mut line) = self.lines.first().cloned() else { return Vec::new() };
         if !self.backscatter_per_m_sr.is_empty() {
@@ -127,7 +115,7 @@ impl<'a> Scanner<'a> {
             let mean = |layer: usize| self.lines.iter().map(|line| line.weight_per_m[layer]).sum::<f64>() / count;
             line.weight_per_m = (0..line.layers()).map(mean).collect();
         }
-        layer_snr(self.scene, self.instrument, &line, self.efficiency.as_ref())
+        layer_snr(self.scene, self.instrument, &line)
     }
 
     /// The same without any wind, for records that were not made here.
@@ -138,8 +126,7 @@ impl<'a> Scanner<'a> {
         let known = Efficiencies::default();
         let still = Air { radial_velocity_m_s: vec![0.0; plan.geometry.layers], backscatter_per_m_sr: None };
         let line = layer_returns(plan, &known, observer)?.line(&still, &plan.geometry);
-        let efficiency = drawn_efficiency(plan, std::slice::from_ref(&line), &known, observer)?;
-        Ok(layer_snr(&plan.scene.scene, &plan.instrument, &line, efficiency.as_ref()))
+        Ok(layer_snr(&plan.scene.scene, &plan.instrument, &line))
     }
 
     /// Whether signals are (15) and noise: no phases of the laser, reflex of the telescope or echo of the pulse before.
@@ -308,20 +295,9 @@ fn in_time_order<T: Sync, R: Send>(
     Ok(out)
 }
 
-fn layer_snr(
-    scene: &Scene,
-    instrument: &Instrument,
-    line: &LineOfSight,
-    efficiency: Option<&LayerEfficiency>,
-) -> Vec<(f64, f64)> {
-    let mut mean = vec![1.0; line.layers()];
-    if let Some(efficiency) = efficiency {
-        // As many places as layers: the efficiencies were made for this line.
-        let _ = efficiency.mean_into(&mut mean);
-    }
-    let energy_j = scene.pulse_energy_j();
-    let snr = |l: usize| instrument.receiver.slowly_varying_snr(energy_j, line.weight_per_m[l] * mean[l]);
-    (0..line.layers()).map(|l| (line.range_m(l), snr(l))).collect()
+fn layer_snr(scene: &Scene, instrument: &Instrument, line: &LineOfSight) -> Vec<(f64, f64)> {
+    let snr = |&weight_per_m: &f64| instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), weight_per_m);
+    line.weight_per_m.iter().enumerate().map(|(l, weight_per_m)| (line.range_m(l), snr(weight_per_m))).collect()
 }
 
 /// Mean signal-to-noise ratio of layers, given with their ranges.
@@ -343,8 +319,7 @@ pub(crate) const AIRS_BYTES: f64 = (64 << 20) as f64;
 
 /// What the layers of a line return.
 struct Returns {
-    /// Return per metre of each layer of the scene's air, K^2 beta A_R eta_s/R^2, (9); the efficiency is left out if each pulse
-    /// brings its own.
+    /// Return per metre of each layer of the scene's air, K^2 beta A_R eta_s/R^2, (9), with the mean efficiency.
     weight_per_m: Vec<f64>,
     /// The same over the backscatter, sr, where the flow carries some.
     of_backscatter_sr: Vec<f64>,
@@ -374,16 +349,9 @@ fn layer_returns(plan: &Plan, known: &Efficiencies, observer: &dyn Observer) -> 
         let weight_per_m = vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers];
         return Ok(Returns { weight_per_m, of_backscatter_sr: Vec::new() });
     }
-    let profile = match drawn_turbulence(scene) {
-        Some(_) => None,
-        None => Some(known.mean(scene, instrument, &profile_ranges_m(scene, geometry), observer)?),
-    };
+    let efficiency = known.of_layers(plan, observer)?;
     let with_efficiency = |of: &dyn Fn(f64) -> Result<f64, Error>| -> Result<Vec<f64>, Error> {
-        let weight = |range_m: f64| {
-            let eta = profile.as_ref().map_or(Ok(1.0), |profile| profile.interpolated(range_m))?;
-            Ok(of(range_m)? * eta)
-        };
-        geometry.layer_range_m().map(weight).collect()
+        efficiency.range_m.iter().zip(&efficiency.mean).map(|(&range_m, eta)| Ok(of(range_m)? * eta)).collect()
     };
     Ok(Returns {
         weight_per_m: with_efficiency(&|range_m| instrument.return_per_m(range_m))?,
@@ -401,10 +369,9 @@ fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfS
     let Some(SecondTrip { radial_velocity_m_s: elsewhere_m_s }) = scene.scan.second_trip else { return Ok(None) };
     let apart_m = ambiguous_range_m(scene.laser.pulse_repetition_hz);
     let ranges_m: Vec<f64> = geometry.layer_range_m().map(|range_m| range_m + apart_m).collect();
-    let (Some(&first_m), Some(&last_m)) = (ranges_m.first(), ranges_m.last()) else { return Ok(None) };
-    let profile = efficiency_by_theory(instrument, &spaced(first_m, last_m, 65))?;
-    let weight = |&range_m: &f64| Ok(instrument.return_per_m(range_m)? * profile.interpolated(range_m)?);
-    let weight_per_m = ranges_m.iter().map(weight).collect::<Result<Vec<_>, Error>>()?;
+    let efficiency = efficiency_by_theory(instrument, &ranges_m)?;
+    let weight = |(&range_m, eta): (&f64, &f64)| Ok(instrument.return_per_m(range_m)? * eta);
+    let weight_per_m = ranges_m.iter().zip(&efficiency.mean).map(weight).collect::<Result<Vec<_>, Error>>()?;
     let far = |(i, line): (usize, &LineOfSight)| {
         let mut velocity_m_s = known_velocity_m_s(plan, &geometry.schedule.middle(i), &ranges_m)?.1;
         velocity_m_s.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = elsewhere_m_s);
@@ -413,7 +380,7 @@ fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfS
     Ok(Some(lines.iter().enumerate().map(far).collect::<Result<_, Error>>()?))
 }
 
-/// Efficiencies of the layers, one set for each realisation of the turbulence, if the pulses have their own.
+/// Efficiencies of the layers over their mean, one set for each realisation of the turbulence, if the pulses have their own.
 fn drawn_efficiency(
     plan: &Plan,
     lines: &[LineOfSight],
@@ -421,8 +388,9 @@ fn drawn_efficiency(
     observer: &dyn Observer,
 ) -> Result<Option<LayerEfficiency>, Error> {
     let scene = &plan.scene.scene;
-    let (Some(t), Some(line)) = (drawn_turbulence(scene), lines.first()) else { return Ok(None) };
-    let ranges_m = profile_ranges_m(scene, &plan.geometry);
-    let realisations = known.of_realisations(scene, &plan.instrument, &t, &ranges_m, observer)?;
-    Ok(Some(EfficiencyTable::new(ranges_m, &realisations)?.onto_layers(line)?))
+    let (Some(_), Some(line)) = (drawn_turbulence(scene), lines.first()) else { return Ok(None) };
+    let first_m = [plan.geometry.first_layer_range_m];
+    let Some(&(ends_m, _)) = stretches(scene, &plan.geometry, &first_m).first() else { return Ok(None) };
+    let screens = known.screens(scene, &plan.instrument, ends_m, observer)?;
+    Ok(Some(EfficiencyTable::new(screens.range_m.clone(), &screens.realisations)?.onto_layers(line)?))
 }

@@ -4,11 +4,12 @@ use super::stage::{Cost, PlannedStage, Stage, Target};
 use crate::Error;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
-use crate::measure::profile::{drawn_turbulence, model, spaced, turbulence};
-use crate::measure::scan::profile_ranges_m;
+use crate::measure::profile::{
+    OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, spaced, stretches, turbulence,
+};
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
 use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
-use wakescope_optics::{Focus, Telescope, theory};
+use wakescope_optics::{Focus, Telescope, curved_ranges_m, theory};
 
 /// Phase screens and efficiency; adds what is doubtful about the screens to `warnings`.
 ///
@@ -31,9 +32,13 @@ pub(super) fn stages(
     // Ranges at which the efficiency is wanted: for the table, and for the layers of the signals.
     let table = matches!(target, Target::Run | Target::Efficiency)
         .then(|| spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points));
-    let layers = (target != Target::Efficiency && fixed.is_none()).then(|| profile_ranges_m(scene, geometry));
-    let ranges_m: Vec<f64> = table.iter().chain(&layers).flatten().copied().collect();
     let telescope = &instrument.telescope;
+    let layers = (target != Target::Efficiency && fixed.is_none()).then(|| {
+        let first_m = geometry.first_layer_range_m;
+        let last_m = first_m + geometry.layers as f64 * geometry.layer_thickness_m;
+        curved_ranges_m(telescope, first_m, last_m, OF_QUADRATURES)
+    });
+    let ranges_m: Vec<f64> = table.iter().chain(&layers).flatten().copied().collect();
     refuse_fresnel_numbers(file, telescope, &ranges_m)?;
     // A table through turbulence has the free-space and the exact bistatic curves beside the Monte Carlo.
     let places = if turbulence(scene).is_some() { 16 } else { 0 };
@@ -43,8 +48,12 @@ pub(super) fn stages(
     let screens = match turbulence(scene) {
         None => planned(Stage::PhaseScreens, "no turbulence: atmosphere.turbulence".into(), None),
         Some(t) => {
-            let drawn = layers.filter(|_| model == Model::MonteCarlo || drawn_turbulence(scene).is_some());
-            let runs: Vec<Vec<f64>> = [table, drawn].into_iter().flatten().collect();
+            let drawn = layers.filter(|_| signals_cross_screens(scene));
+            let mut across: Vec<f64> = table.iter().chain(&drawn).flatten().copied().collect();
+            across.sort_by(f64::total_cmp);
+            let of_stretch =
+                |([from_m, to_m], _): ([f64; 2], &[f64])| curved_ranges_m(telescope, from_m, to_m, OF_SCREENS);
+            let runs: Vec<Vec<f64>> = stretches(scene, geometry, &across).into_iter().map(of_stretch).collect();
             match (runs.is_empty(), model) {
                 (false, _) => screens(file, instrument, &t, &runs, warnings)?,
                 (true, Model::ExactBistatic) => {
@@ -139,7 +148,12 @@ fn screens(
             );
         }
         what.push(words);
-        warnings.extend(plan.warnings.iter().map(|w| in_words(w, last_m, t)));
+        for words in plan.warnings.iter().map(|w| in_words(w, last_m, t)) {
+            // That of the inner scale is the same for all.
+            if !warnings.contains(&words) {
+                warnings.push(words);
+            }
+        }
     }
     let reason = format!("{} realisations of {}", t.realisations, what.join("; "));
     Ok(PlannedStage { stage: Stage::PhaseScreens, reason, cost: Some(cost) })
@@ -192,12 +206,21 @@ fn refused(file: &SceneFile, t: &RefractiveTurbulence, error: wakescope_optics::
                  \"derived\""
             ),
             None if t.sampling == ScreenSampling::Explicit => {
-                "; no grid of at most 4096 points holds all: shorter ranges or a longer focus".into()
+                "; no grid of at most 16384 points holds all: shorter ranges or a longer focus".into()
             }
             None => String::new(),
         };
     }
     file.located(problems).into()
+}
+
+fn more_layers(t: &RefractiveTurbulence, needed: Option<usize>) -> String {
+    match (t.sampling, needed) {
+        (ScreenSampling::Explicit, Some(count)) => {
+            format!("atmosphere.turbulence.layers = {count} would do, or sampling = \"derived\"")
+        }
+        _ => "more than 1000 layers would be needed".into(),
+    }
 }
 
 fn in_words(warning: &Warning, range_m: f64, t: &RefractiveTurbulence) -> String {
@@ -208,30 +231,28 @@ fn in_words(warning: &Warning, range_m: f64, t: &RefractiveTurbulence) -> String
             100.0 * missing
         ),
         Warning::ThickLayers { rytov_variance, layers_needed } => format!(
-            "layers to {range_m:.0} m have a Rytov variance of {rytov_variance:.2}, above 0.1: \
-             atmosphere.turbulence.layers = {layers_needed} would do"
+            "layers to {range_m:.0} m have a Rytov variance of {rytov_variance:.2}, above 0.1: {}",
+            more_layers(t, *layers_needed)
         ),
-        Warning::LayerGap { worst, layers_needed } => {
-            let remedy = match (t.sampling, layers_needed) {
-                (ScreenSampling::Explicit, Some(count)) => {
-                    format!("atmosphere.turbulence.layers = {count} would do, or sampling = \"derived\"")
-                }
-                _ => "more than 1000 layers would be needed".into(),
+        Warning::LayerGap { worst, layers_needed } => format!(
+            "the layers to {range_m:.0} m shift the mean efficiency by {:+.2} % at {:.0} m, more than a third of its standard \
+             error of {:.2} %: {}",
+            100.0 * worst.relative,
+            worst.range_m,
+            100.0 * worst.standard_error,
+            more_layers(t, *layers_needed)
+        ),
+        Warning::LightLost { fraction, width_m } => {
+            let points = (width_m / t.grid_spacing_m).ceil();
+            let remedy = match points <= 16384.0 && t.sampling == ScreenSampling::Explicit {
+                true => format!("atmosphere.turbulence.grid_points = {points} would do"),
+                false => "shorter ranges or a wider aperture would".into(),
             };
+            let percent = 100.0 * fraction;
             format!(
-                "the layers to {range_m:.0} m shift the mean efficiency by {:+.2} % at {:.0} m, more than a third of its standard \
-                 error of {:.2} %: {remedy}",
-                100.0 * worst.relative,
-                worst.range_m,
-                100.0 * worst.standard_error
+                "the border of the screens to {range_m:.0} m will take {percent:.1} % of the light, 1 % at most is good: {remedy}"
             )
         }
-        Warning::LightLost { fraction, width_m } => format!(
-            "the border of the screens to {range_m:.0} m will take {:.1} % of the light, 1 % at most is good: \
-             atmosphere.turbulence.grid_points = {} would do",
-            100.0 * fraction,
-            (width_m / t.grid_spacing_m).ceil()
-        ),
         Warning::WeakTurbulence { rytov_variance } => format!(
             "turbulence of Rytov variance {rytov_variance:.1e} changes less than the error of phase screens: \
              atmosphere.turbulence.kind = \"none\" is as good"
@@ -279,6 +300,50 @@ mod tests {
         assert!(!message.contains("turbulence.grid_points = "), "{message}");
         let most = number(&message, "at most ");
         plan(&turbulent("1e-12", &format!("grid_points = 4000\ngrid_spacing_m = {most}\n"))).unwrap();
+    }
+
+    #[test]
+    fn a_refusal_that_is_obeyed_is_accepted_however_many_points_it_asks_for() {
+        let small =
+            "[telescope]\naperture_radius_m = 0.01\nbeam_radius_m = 0.006\n[outputs]\nprofile_range_max_m = 20000.0\n";
+        let with = |keys: &str| plan(&(turbulent("1e-14", keys) + small));
+        let message = with("grid_spacing_m = 0.004\n").unwrap_err();
+        let together = message.split_at(message.find("together").unwrap()).1;
+        let [points, spacing, layers] =
+            ["grid_points = ", "grid_spacing_m = ", "layers = "].map(|words| number(together, words));
+        // With a word on the light that even the widest grid would lose.
+        for keys in [
+            format!("grid_points = {points}\ngrid_spacing_m = {spacing}\nlayers = {layers}\n"),
+            "sampling = \"derived\"\n".into(),
+        ] {
+            let warnings = with(&keys).unwrap().warnings;
+            assert!(
+                warnings.len() < 2 && warnings.iter().all(|w| w.contains("would take") || w.contains("will take")),
+                "{warnings:?}"
+            );
+        }
+        // What an explicit grid is accepted for, a derived one finds.
+        let far = "[outputs]\nprofile_range_max_m = 5000.0\n";
+        plan(&(turbulent("1e-12", "grid_points = 2460\nlayers = 93\n") + far)).unwrap();
+        let derived = plan(&(turbulent("1e-12", "sampling = \"derived\"\n") + far)).unwrap();
+        assert!(derived.warnings.is_empty(), "{:?}", derived.warnings);
+    }
+
+    #[test]
+    fn all_warnings_of_a_run_name_one_number_of_layers_and_none_comes_twice() {
+        let scene = |layers: &str| {
+            let keys = format!("grid_spacing_m = 0.004\ngrid_points = 256\nlayers = {layers}\n");
+            let rest = "[outputs]\nprofile_range_max_m = 1400.0\n[scan]\nrange_max_m = 480.0\n";
+            let file = SceneFile::parse(&(turbulent("1e-13", &keys) + rest), Path::new("s.toml")).unwrap();
+            Plan::new(file, Target::Run).unwrap().warnings
+        };
+        let warnings = scene("2");
+        let named: Vec<String> =
+            warnings.iter().filter(|w| w.contains("layers = ")).map(|w| number(w, "layers = ")).collect();
+        assert!(named.len() > 2 && named.iter().all(|n| *n == named[0]), "{warnings:?}");
+        assert!(!scene(&named[0]).iter().any(|w| w.contains("layers")), "{:?}", scene(&named[0]));
+        let rough = scene("2\ninner_scale_m = 0.005");
+        assert_eq!(rough.iter().filter(|w| w.contains("inner scale")).count(), 1, "{rough:?}");
     }
 
     #[test]

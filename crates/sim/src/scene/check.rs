@@ -197,6 +197,13 @@ fn check_turbulence(t: &super::RefractiveTurbulence, c: &mut Checker<'_>) {
     let key = |name: &str| format!("{SECTION}.{name}");
     c.within(&key("cn2_m_m23"), t.cn2_m_m23, 0.0, 1e-9, "m^(-2/3)");
     c.within(&key("inner_scale_m"), t.inner_scale_m, 0.0, 1.0, "m");
+    let has_inner_scale = t.spectrum != super::SpectrumKind::HillAndrews || t.inner_scale_m > 0.0;
+    c.require(
+        has_inner_scale,
+        &key("inner_scale_m"),
+        t.inner_scale_m,
+        "above 0 m with atmosphere.turbulence.spectrum = \"hill_andrews\", whose bump stands at it",
+    );
     c.require(t.outer_scale_m > 0.0, &key("outer_scale_m"), t.outer_scale_m, "above 0 m, or inf for none");
     c.count(&key("grid_points"), t.grid_points, 16, 16_384);
     c.within(&key("grid_spacing_m"), t.grid_spacing_m, 1e-5, 1.0, "m");
@@ -215,6 +222,19 @@ mod tests {
         let mut scene = Scene::default();
         change(&mut scene);
         scene.problems().into_iter().map(|p| p.key).collect()
+    }
+
+    #[test]
+    fn a_spectrum_that_stands_on_its_inner_scale_needs_one() {
+        let air = |spectrum, inner_scale_m| {
+            keys(|s| {
+                let t = crate::scene::RefractiveTurbulence { spectrum, inner_scale_m, ..Default::default() };
+                s.atmosphere.turbulence = Turbulence::Refractive(t);
+            })
+        };
+        assert_eq!(air(crate::scene::SpectrumKind::HillAndrews, 0.0), ["atmosphere.turbulence.inner_scale_m"]);
+        assert!(air(crate::scene::SpectrumKind::HillAndrews, 0.01).is_empty());
+        assert!(air(crate::scene::SpectrumKind::VonKarman, 0.0).is_empty());
     }
 
     #[test]

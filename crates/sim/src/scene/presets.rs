@@ -111,7 +111,8 @@ mod tests {
             let mut at = scene;
             (at.outputs.profile_range_min_m, at.outputs.profile_range_max_m) = (ranges_m[0], ranges_m[2]);
             at.outputs.profile_points = 3;
-            let profile = range_profile(&at, &plan.instrument, &Silent).unwrap();
+            let plan = Plan::new(SceneFile::new(at).unwrap(), Target::Efficiency).unwrap();
+            let profile = range_profile(&plan, &Silent).unwrap();
             for (sum, snr_db) in budget.snr_db().iter().zip(&profile.snr_db) {
                 assert!((sum - snr_db).abs() < 1e-9, "{}: {sum} {snr_db}", row[0]);
             }

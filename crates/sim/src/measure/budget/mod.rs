@@ -10,8 +10,9 @@ mod text;
 pub use limits::Limits;
 
 use crate::Error;
+use crate::measure::efficiencies::Efficiencies;
 use crate::measure::instrument::Instrument;
-use crate::measure::profile::{efficiency_at, efficiency_by_theory, free_space, model, spaced, turbulence};
+use crate::measure::profile::{efficiency_at, efficiency_by_theory, free_space, turbulence};
 use crate::measure::progress::Observer;
 use crate::plan::Plan;
 use crate::scene::{Digitiser, FrontEnd, Scene, SnrReference};
@@ -19,7 +20,6 @@ use digits::{scientific, si};
 use std::f64::consts::{LN_2, PI};
 
 use wakescope_optics::EfficiencyProfile;
-use wakescope_optics::plan::Model;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 
 /// One factor of the signal-to-noise ratio, or one of its sums.
@@ -59,21 +59,14 @@ pub fn scan_ranges_m(scene: &Scene) -> Vec<f64> {
 
 impl Budget {
     /// The budget of a planned scene at some ranges, m; through turbulence that both beams share it runs the phase screens of
-    /// the profile.
+    /// the signals or the profile.
     ///
     /// # Errors
-    /// What the optics refuse, such as a range beyond the profile in turbulence.
+    /// What the optics refuse, such as a range beyond both in turbulence.
     pub fn new(plan: &Plan, range_m: &[f64], observer: &dyn Observer) -> Result<Self, Error> {
         let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
-        let mut rows = match model(scene) {
-            Model::MonteCarlo if !matches!(scene.detector.snr, SnrReference::Fixed { .. }) => {
-                let o = &scene.outputs;
-                let table_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
-                let efficiency = efficiency_at(scene, instrument, &table_m, observer)?;
-                Rows::new(plan, range_m, |_| Ok(efficiency))?
-            }
-            _ => Rows::new(plan, range_m, |sorted_m| efficiency_by_theory(instrument, sorted_m))?,
-        };
+        let efficiency = |sorted_m: &[f64]| efficiency_at(plan, &Efficiencies::default(), sorted_m, observer);
+        let mut rows = Rows::new(plan, range_m, efficiency)?;
         rows.beside_the_ratio(scene, instrument, range_m)?;
         let limits = Limits::new(plan)?;
         Ok(Self { range_m: range_m.to_vec(), rows: rows.rows, limits, warnings: plan.warnings.clone() })
@@ -139,7 +132,7 @@ impl Rows {
 
     /// The ratio in the width of the pulse, and the echo of the pulse before.
     fn beside_the_ratio(&mut self, scene: &Scene, instrument: &Instrument, range_m: &[f64]) -> Result<(), Error> {
-        let width_hz = 2.0 * (2.0 * LN_2).sqrt() * instrument.pulse.spectral_width_hz();
+        let width_hz = instrument.pulse.spectral_full_width_half_maximum_hz();
         let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
         let fwhm_s = instrument.gaussian_fwhm_s();
         // Of a Gaussian without chirp the product is 2 ln 2/pi.
@@ -371,7 +364,7 @@ mod tests {
             scene.outputs.profile_points = 3;
             change(&mut scene);
             let plan = Plan::new(SceneFile::new(scene.clone()).unwrap(), Target::Efficiency).unwrap();
-            let profile = range_profile(&scene, &plan.instrument, &Silent).unwrap();
+            let profile = range_profile(&plan, &Silent).unwrap();
             let found = Budget::new(&plan, &profile.efficiency.range_m, &Silent).unwrap();
             let sums: Vec<f64> = (0..3)
                 .map(|at| found.rows.iter().filter(|row| !row.name.starts_with('=')).map(|row| row.db[at]).sum())
@@ -380,6 +373,19 @@ mod tests {
                 let close = |sum: f64| sum == *snr_db || (sum - snr_db).abs() < 1e-9;
                 assert!(close(sums[at]) && close(found.snr_db()[at]), "{i}: {} {snr_db}", sums[at]);
             }
+        }
+    }
+
+    #[test]
+    fn the_width_of_a_pulse_is_that_of_its_spectrum_at_half_its_maximum() {
+        // A trapezoid of 400 ns, whose spectrum has far tails: a transform of its own gives 2.36 MHz, its tails 5.13 MHz.
+        let flat = "[pulse.shape]\nkind = \"sampled\"\ntime_s = [0.0, 4e-8, 3.6e-7, 4e-7]\npower = [0.0, 1.0, 1.0, 0.0]\n\
+             resampling = \"linear\"\n";
+        for (text, width_hz) in [(flat, 2.36e6), ("", 2.0 * LN_2 / PI / 200e-9)] {
+            let found = budget(text, &[400.0]);
+            let row = found.rows.iter().find(|row| row.name.contains("width of the pulse")).unwrap();
+            let gain_db = row.db[0] - found.snr_db()[0];
+            assert!((gain_db - 10.0 * (50e6 / width_hz).log10()).abs() < 0.02, "{gain_db}: {}", row.value);
         }
     }
 

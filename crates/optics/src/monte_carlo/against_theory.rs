@@ -1,0 +1,119 @@
+//! Whether the phase screens of a run give the bistatic mean that is known exactly for them, (P5).
+//!
+//! Nothing else shows that a grid is too coarse or too narrow for the field: what (P12) corrects does not show in the result.
+//! Check: a grid of twice the spacing that its focus needs is refused, and so is a mistake put in on purpose; good runs are not.
+
+use crate::air::StructureTable;
+use crate::efficiency::EfficiencyProfile;
+use crate::monte_carlo::MonteCarlo;
+use crate::screens::generator::ScreenGenerator;
+use crate::screens::kernel::Real;
+use crate::theory::{ScreenStrength, bistatic_efficiency_screens};
+use crate::{Error, Telescope};
+
+/// Standard errors by which mean and theory may differ.
+const SIGMAS: f64 = 5.0;
+/// Share of the mean that good screens may miss: single precision, and phases that are not quite normal.
+const OF_SCREENS: f64 = 2e-3;
+/// Share of what (P12) corrects that turbulence may change.
+const OF_CORRECTION: f64 = 0.1;
+
+/// What a run found at one range.
+pub(super) struct Found {
+    /// Exact over grid free-space efficiency, (P12).
+    pub(super) correction: f64,
+    /// Fraction of the power that the border took.
+    pub(super) lost: f64,
+}
+
+/// Refuses a bistatic mean, from so many independent samples, that the layers of the run cannot have.
+///
+/// # Errors
+/// [`Error::AgainstTheory`] at the first such range.
+pub(super) fn check<T: Real>(
+    run: &MonteCarlo,
+    screens: &ScreenGenerator<T>,
+    bistatic: &EfficiencyProfile,
+    found: &[Found],
+    samples: usize,
+) -> Result<(), Error> {
+    let table = StructureTable::new(&*run.turbulence.spectrum);
+    // Of a spectrum that is cut at Nyquist less than this is missing at any separation.
+    let missing = if screens.folds() { 0.0 } else { screens.missing_at_one_spacing()?.max(0.0) };
+    let telescope: Telescope = run.telescope.validated()?;
+    for (i, &range_m) in run.range_m.iter().enumerate() {
+        let layers = run.layers.screens_to(range_m, &run.turbulence.cn2)?;
+        let with = |share: f64| {
+            let weaker = |s: &ScreenStrength| ScreenStrength { cn2_thickness_m13: share * s.cn2_thickness_m13, ..*s };
+            let layers: Vec<ScreenStrength> = layers.iter().map(weaker).collect();
+            bistatic_efficiency_screens(&telescope, &run.misalignment, &layers, &table, range_m)
+        };
+        let exact = with(1.0)?;
+        let most = if missing > 0.0 { with(1.0 - missing)? } else { exact };
+        let (mean, standard_error) = (bistatic.mean[i], bistatic.standard_error[i]);
+        let Found { correction, lost } = found[i];
+        let of_grid = OF_SCREENS + OF_CORRECTION * (correction - 1.0).abs();
+        let allowed = errors_of(samples) * standard_error + of_grid * exact;
+        if mean < exact - allowed - 2.0 * lost * exact || mean > most + allowed {
+            return Err(Error::AgainstTheory { range_m, mean, standard_error, exact });
+        }
+    }
+    Ok(())
+}
+
+/// As many standard errors of a mean from so many samples as are passed as seldom as [`SIGMAS`] of a known one: Student's
+/// distribution, after Wallace (1959).
+fn errors_of(samples: usize) -> f64 {
+    let freedom = samples.saturating_sub(1).max(1) as f64;
+    let normal = SIGMAS * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
+    (freedom * (normal * normal / freedom).exp_m1()).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_beyond_five_errors_of_theory_are_refused_and_others_are_not() {
+        let run = MonteCarlo {
+            layers: crate::Layers::equal(2, 600.0).unwrap(),
+            range_m: vec![600.0],
+            ..MonteCarlo::table2(1e-13, 1).unwrap()
+        };
+        let layers = run.layers.screens_to(600.0, &run.turbulence.cn2).unwrap();
+        let table = StructureTable::new(&*run.turbulence.spectrum);
+        let exact = bistatic_efficiency_screens(&run.telescope, &run.misalignment, &layers, &table, 600.0).unwrap();
+        let grid = |spacing_m| {
+            ScreenGenerator::<f64>::new(crate::Grid::square(64, spacing_m).unwrap(), run.turbulence.spectrum.clone())
+                .unwrap()
+        };
+        let tried = |spacing_m: f64, off: f64, error: f64, samples: usize, lost: f64| {
+            let bistatic = EfficiencyProfile {
+                range_m: vec![600.0],
+                mean: vec![(1.0 + off) * exact],
+                standard_deviation: vec![0.0],
+                standard_error: vec![error * exact],
+            };
+            check(&run, &grid(spacing_m), &bistatic, &[Found { correction: 1.0, lost }], samples).is_ok()
+        };
+        for sign in [-1.0, 1.0] {
+            assert!(tried(4e-3, sign * 0.048, 0.01, 10_000, 0.0) && !tried(4e-3, sign * 0.056, 0.01, 10_000, 0.0));
+            // What the error of few samples is worth; that of one pair is not known.
+            assert!(tried(4e-3, sign * 0.08, 0.01, 11, 0.0) && !tried(4e-3, sign * 0.13, 0.01, 11, 0.0));
+            assert!(tried(4e-3, sign * 0.9, f64::NAN, 2, 0.0));
+            // Without random error the screens themselves are allowed for.
+            assert!(tried(4e-3, sign * 1e-3, 0.0, 10_000, 0.0) && !tried(4e-3, sign * 4e-3, 0.0, 10_000, 0.0));
+        }
+        // Light that the border took lowers the mean, and screens that miss small eddies raise it.
+        assert!(tried(4e-3, -0.03, 0.0, 10_000, 0.02) && !tried(4e-3, 0.03, 0.0, 10_000, 0.02));
+        assert!(tried(2e-2, 0.008, 0.0, 10_000, 0.0) && !tried(2e-2, -0.008, 0.0, 10_000, 0.0));
+    }
+
+    #[test]
+    fn errors_are_students() {
+        // The quantiles of five normal deviations, 1 - 2.87e-7, by a quadrature of the density.
+        for (samples, quantile) in [(11, 11.166), (31, 6.319), (101, 5.344), (100_001, 5.0)] {
+            assert!((errors_of(samples) / quantile - 1.0).abs() < 0.02, "{samples}: {}", errors_of(samples));
+        }
+    }
+}
