@@ -195,7 +195,10 @@ fn few_realisations_state_the_error_that_they_have() {
     set_up.grid = Grid::square(96, 4e-3).expect("grid");
     set_up.layers = Layers::equal(2, 600.0).expect("layers");
     set_up.range_m = vec![300.0, 600.0];
-    for (sampling, realisations, runs) in [(Sampling::Antithetic, 20, 40), (Sampling::Independent, 8, 60)] {
+    // Student's distribution with 9 and 7 degrees of freedom: one in a hundred runs passes the last number.
+    for (sampling, realisations, runs, largest) in
+        [(Sampling::Antithetic, 20, 40, 5.6), (Sampling::Independent, 8, 60, 7.0)]
+    {
         let (mut z, mut stated, mut means) = (Vec::new(), Vec::new(), Vec::new());
         for seed in 0..runs {
             let run = MonteCarlo { seed: 100 + seed, sampling, ..set_up.clone() };
@@ -215,9 +218,8 @@ fn few_realisations_state_the_error_that_they_have() {
         let least = stated.iter().fold(f64::INFINITY, |a, b| a.min(*b));
         let worst = z.iter().fold(0f64, |a, b| a.max(b.abs()));
         let within = z.iter().filter(|z| z.abs() < 1.0).count() as f64 / z.len() as f64;
-        println!("{sampling:?} {} {} {worst} {within}", rms / scatter, least / rms);
         assert!(least > 0.25 * rms, "{sampling:?}: {least} {rms}");
-        assert!(worst < 5.0 && (0.5..0.8).contains(&within), "{sampling:?}: {worst} {within}");
+        assert!(worst < largest && (0.5..0.8).contains(&within), "{sampling:?}: {worst} {within}");
     }
 }
 

@@ -202,7 +202,7 @@ fn ran(scene: &str, request: &Request) -> (Counter, Summary, crate::io::csv_inpu
 #[test]
 fn what_cases_have_in_common_is_computed_once() {
     // Two estimators see the signals of each energy; all share the screens and the flow.
-    let turbulent = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-15\ngrid_points = 64\n\
+    let turbulent = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-15\ngrid_points = 80\n\
                      grid_spacing_m = 0.003\nrealisations = 5\nlayers = 4\n[telescope]\nfocus_m = 400.0\n";
     let request = vary(&["pulse.energy_j=50e-6,150e-6,600e-6", "estimator.radius_m=1,2"]);
     let (counter, summary, table) = ran(&(SMALL.to_owned() + turbulent), &request);
@@ -226,7 +226,7 @@ fn what_cases_have_in_common_is_computed_once() {
 
 #[test]
 fn seeds_share_an_efficiency_where_no_screens_are_drawn() {
-    let turbulent = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-15\ngrid_points = 64\n\
+    let turbulent = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-15\ngrid_points = 80\n\
                      grid_spacing_m = 0.003\nrealisations = 5\nlayers = 4\n[telescope]\nfocus_m = 400.0\n";
     let of_seeds = |scene: &str| ran(scene, &vary(&["seed=1,2"])).1.shared.efficiencies;
     assert_eq!(of_seeds(SMALL), 1);
