@@ -1,7 +1,7 @@
 //! Control of the time step, and what is said of a flow that fails.
 
 use super::flow::Flow;
-use super::growth::metrics;
+use super::growth::{Stability, metrics};
 use super::mesh::Mesh;
 use super::settings::{FlowSettings, TimeStep, ViscousTreatment};
 use crate::Error;
@@ -79,6 +79,12 @@ impl Stiffness {
 }
 
 impl Flow {
+    /// The step at which `stability`, whose metric is that of the cells, has the Courant number of a step of `step_s`, whose metric is
+    /// that of the faces.
+    pub(super) fn judged_step_s(&self, stability: &Stability, step_s: f64) -> f64 {
+        self.state.courant_per_s * step_s / stability.courant_per_s()
+    }
+
     /// How stiff viscosity is along the implicit axes.
     pub(super) fn stiffness(&self) -> Stiffness {
         let rate = |axis: usize| if self.state.implicit[axis] { self.viscous_rate_per_s(axis) } else { 0.0 };
@@ -127,7 +133,8 @@ impl Flow {
         if courant <= self.settings.scheme.default_courant() && explicit <= EXPLICIT_SHARE {
             return Ok(());
         }
-        let Some(limit) = self.stability()?.refused(step_s) else { return Ok(()) };
+        let stability = self.stability()?;
+        let Some(limit) = stability.refused(self.judged_step_s(&stability, step_s)) else { return Ok(()) };
         let (_, axis, place) = self.first_largest(|axis, place| self.state.velocity[axis][place].abs())?;
         Err(Error::CourantTooLarge {
             step: self.state.step + 1,

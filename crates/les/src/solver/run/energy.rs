@@ -91,7 +91,8 @@ fn cause(flow: &Flow) -> Result<String, Error> {
             settings.scheme.largest_decay()
         ));
     }
-    if let Some(growth) = flow.stability()?.undamped(step_s) {
+    let stability = flow.stability()?;
+    if let Some(growth) = stability.undamped(flow.judged_step_s(&stability, step_s)) {
         let remedy =
             if settings.scheme == TimeScheme::AdamsBashforth2 { "take Runge-Kutta" } else { "shorten the step" };
         return Ok(format!("{growth}: {remedy}"));

@@ -351,7 +351,7 @@ impl Run {
         let left_s = self.plan.end_s - self.flow.time_s();
         let step_s = self.flow.next_step_s();
         // If a rank is lost, the next step says so.
-        let growth = self.flow.stability().ok().and_then(|stability| stability.undamped(step_s));
+        let growth = self.flow.stability().ok().and_then(|s| s.undamped(self.flow.judged_step_s(&s, step_s)));
         if let Some(growth) = growth.filter(|g| g.rate_per_s * left_s > NOTICED_GROWTH) {
             self.has_warned.growth = true;
             self.tell(observer, &RunWarning::UndampedGrowth { step, growth });
