@@ -15,6 +15,7 @@
 use ndarray::Array2;
 use num_complex::Complex;
 use rustfft::Fft;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::linalg::dot;
@@ -229,11 +230,26 @@ fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
     basis
 }
 
-/// B, and the number of cells that count as one.
-pub(crate) fn filling(cells: &[Cell], residuals: &[f64], slopes: &[Vec<f64>]) -> (Array2<f64>, f64) {
-    let plane = Plane::new(cells);
-    let found = Correlogram::new(&plane, residuals, slopes).fit();
-    let mut filling = products(&vec![found.white; residuals.len()], slopes);
+/// B, and the number of cells that count as one. Residuals and slopes are summed over blocks of so many lines and gates, over the root of their
+/// number: what is white keeps its variance, and what is correlated within a block is counted as white of more.
+pub(crate) fn filling(
+    cells: &[Cell],
+    residuals: &[f64],
+    slopes: &[Vec<f64>],
+    (lines, gates): (usize, usize),
+) -> (Array2<f64>, f64) {
+    let block = |cell: &Cell| (cell.line / lines, cell.gate / gates);
+    let mut places: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+    cells.iter().enumerate().for_each(|(i, cell)| places.entry(block(cell)).or_default().push(i));
+    let blocks: Vec<Cell> = places.keys().map(|&(line, gate)| Cell { line, gate, sigma_m_s: 1.0 }).collect();
+    let summed = |numbers: &Vec<f64>| -> Vec<f64> {
+        places.values().map(|own| own.iter().map(|i| numbers[*i]).sum::<f64>() / (own.len() as f64).sqrt()).collect()
+    };
+    let all = slopes;
+    let (residuals, slopes) = (summed(&residuals.to_vec()), all.iter().map(summed).collect::<Vec<_>>());
+    let plane = Plane::new(&blocks);
+    let found = Correlogram::new(&plane, &residuals, &slopes).fit();
+    let mut filling = products(&vec![found.white; cells.len()], all);
     if found.correlated == 0.0 {
         return (filling, 1.0);
     }
@@ -294,7 +310,7 @@ mod tests {
                     let part = dot(column, &noise);
                     residuals.iter_mut().zip(column).for_each(|(r, c)| *r -= part * c);
                 }
-                let filling = filling(&cells, &residuals, &slopes).0;
+                let filling = filling(&cells, &residuals, &slopes, (1, 1)).0;
                 for (i, slope) in slopes.iter().enumerate() {
                     stated += filling[[i, i]] / dot(slope, slope);
                     found += dot(slope, &noise).powi(2) / dot(slope, slope);
@@ -313,7 +329,7 @@ mod tests {
         let white = (0..20).filter(|&seed| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
             let residuals: Vec<f64> = cells.iter().map(|_| 2.0 * normal(&mut rng)).collect();
-            filling(&cells, &residuals, &slopes).1 == 1.0
+            filling(&cells, &residuals, &slopes, (1, 1)).1 == 1.0
         });
         assert!(white.count() >= 18);
     }

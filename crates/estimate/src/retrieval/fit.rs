@@ -14,8 +14,12 @@ use crate::retrieval::{Movement, RetrievalOptions, ScanMap, ScanResult, Turbulen
 use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::{Loss, Wake};
 
-/// Most velocities that are whitened.
-const WHITENED: usize = 3000;
+/// Most velocities that are whitened, that are fitted, and that are searched for a wake: blocks stand for more.
+const WHITENED: usize = 1500;
+const MOST: usize = 16_000;
+const SEARCHED: usize = 1200;
+/// A statistic below this part of the threshold in medians, which tell two thirds of what all velocities do, is no wake.
+const NOTHING: f64 = 0.5;
 
 /// Finds the vortices of one scan. No wake is a result, not an error.
 ///
@@ -26,22 +30,39 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     options.validate()?;
     map.validate()?;
     let unfolded = map.unfolded();
-    let expected = Expected::rough(&unfolded, options)?;
-    let cells = cells(map);
-    let mut problem =
-        Problem { expected: &expected, cells, whitening: None, loss: options.loss, prior: options.core_prior };
-    let starts = starts(&unfolded, &problem, options)?;
+    let bounded = unfolded.medians(if options.turbulence.is_some() { WHITENED } else { MOST });
+    let map = bounded.as_ref().unwrap_or(&unfolded);
+    let expected = Expected::rough(map, options)?;
+    let mut problem = problem_of(&expected, options);
+    // broad blocks are enough to search in
+    let few = map.medians(SEARCHED);
+    let sought = Expected::rough(few.as_ref().unwrap_or(map), options)?;
+    let mut search = problem_of(&sought, options);
+    let starts = starts(sought.map, &search, options)?;
     let about = starts.first().map_or(Wake::from_array(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]), |s| s.1);
     if map.sigma_m_s.is_none() {
         // what the wind leaves, until fits are known
-        let wind = Fits { problem: &problem, options }.wind(&about)?;
-        rescale(&mut problem, &wind);
+        for problem in [&mut search, &mut problem] {
+            let wind = Fits { problem, options }.wind(&about)?;
+            rescale(problem, &wind);
+        }
     }
-    let mut ends = Fits { problem: &problem, options }.ends_of(&starts);
-    let (mut thinned, mut rejected) = (false, 0);
+    let found = Fits { problem: &search, options }.ends_of(&starts);
+    let (thinned, mut rejected) = (bounded.is_some(), 0);
+    let mut ends = found.clone();
     if let Some(turbulence) = &options.turbulence {
-        (rejected, thinned) = whiten(&mut problem, turbulence, least(&ends, map.velocity_m_s.len()))?;
+        rejected = whiten(&mut problem, turbulence, least(&found, search.cells.len()))?;
         ends = Fits { problem: &problem, options }.ends_of(&starts);
+    } else if let (Some(few), Some(likely)) = (&few, least(&found, search.cells.len())) {
+        // the scale in which they compete
+        let scale = residual_scale(&search, likely).max(1.0);
+        let wind = Fits { problem: &search, options }.wind(&about)?;
+        let (wind, ends_there) = (&wind, &found[..]);
+        let report = Report { map: few, options, problem: &search, scale, rejected, thinned, wind, ends: ends_there };
+        // where blocks show next to nothing, the best is enough to tell so
+        let is_empty = report.result()?.statistic < NOTHING * options.threshold;
+        let rivals = if is_empty { vec![likely.clone()] } else { rivals(&found, scale) };
+        ends = Fits { problem: &problem, options }.again(&rivals);
     }
     let mut scale = 1.0;
     if let Some(end) = least(&ends, problem.cells.len()) {
@@ -76,13 +97,17 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     Report { map, options, problem: &problem, scale, rejected, thinned, wind: &wind, ends: &ends }.result()
 }
 
-/// Makes residuals white: the velocities far off a first fit are taken away, as whitening would spread them over their neighbours, and
-/// some of too many. Tells how many were rejected, and whether there were too many.
-fn whiten(problem: &mut Problem<'_>, turbulence: &Turbulence, first: Option<&End>) -> Result<(usize, bool), Error> {
+/// Rough, with all velocities of the map.
+fn problem_of<'a>(expected: &'a Expected<'a>, options: &RetrievalOptions) -> Problem<'a> {
+    let cells = cells(expected.map);
+    Problem { expected, cells, whitening: None, loss: options.loss, prior: options.core_prior }
+}
+
+/// Makes residuals white: the velocities far off a first fit are taken away, as whitening would spread them over their neighbours. Tells how many.
+fn whiten(problem: &mut Problem<'_>, turbulence: &Turbulence, first: Option<&End>) -> Result<usize, Error> {
     let before = problem.cells.len();
     reject(problem, turbulence, first);
     let rejected = before - problem.cells.len();
-    let thinned = thin(problem);
     let (map, model) = (problem.expected.map, problem.expected.model);
     let place = |cell: &Cell| (model.position_m(map.range_m[cell.gate], map.elevation_rad[cell.line]), cell.sigma_m_s);
     let places: Vec<_> = problem.cells.iter().map(place).collect();
@@ -91,7 +116,7 @@ fn whiten(problem: &mut Problem<'_>, turbulence: &Turbulence, first: Option<&End
         order: places.len(),
         reason: "is singular to working precision: state larger deviations of the velocities",
     })?);
-    Ok((rejected, thinned))
+    Ok(rejected)
 }
 
 /// The velocities that there are.
@@ -125,25 +150,4 @@ fn reject(problem: &mut Problem<'_>, turbulence: &Turbulence, end: Option<&End>)
         let deviation_m_s = cell.sigma_m_s.hypot(turbulence.deviation_m_s);
         residuals.next().is_none_or(|r| r.abs() * cell.sigma_m_s <= OUTLIER * deviation_m_s)
     });
-}
-
-/// Leaves lines and gates out until there are not more velocities than can be whitened.
-fn thin(problem: &mut Problem<'_>) -> bool {
-    let map = problem.expected.map;
-    let view = map.view();
-    let gate_m = view.gate_spacing_m();
-    let (mut lines, mut gates, mut thinned) = (1, 1, false);
-    let count = |cells: &[Cell], lines: usize, gates: usize| {
-        cells.iter().filter(|cell| cell.line % lines == 0 && cell.gate % gates == 0).count()
-    };
-    while count(&problem.cells, lines, gates) > WHITENED {
-        if lines as f64 * view.line_spacing_m() < gates as f64 * gate_m {
-            lines += 1
-        } else {
-            gates += 1
-        }
-        thinned = true;
-    }
-    problem.cells.retain(|cell| cell.line % lines == 0 && cell.gate % gates == 0);
-    thinned
 }

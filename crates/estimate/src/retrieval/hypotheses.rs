@@ -33,9 +33,9 @@ const NEARLY: f64 = 5e-3;
 /// A rough end so much above the best of its kind competes no longer.
 const HOPELESS: f64 = 50.0;
 
-const FAR: Stop = Stop { iterations: 40, sigmas: 0.3, learns: false };
-const ROUGH: Stop = Stop { iterations: 100, sigmas: 1e-2, learns: false };
-const FINE: Stop = Stop { iterations: 100, sigmas: 1e-4, learns: false };
+const FAR: Stop = Stop { iterations: 25, sigmas: 0.3, learns: false };
+const ROUGH: Stop = Stop { iterations: 40, sigmas: 1e-2, learns: false };
+const FINE: Stop = Stop { iterations: 50, sigmas: 1e-4, learns: false };
 
 /// Which vortices there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,6 +90,8 @@ pub(crate) struct End {
     pub(crate) kind: Kind,
     pub(crate) wake: Wake,
     pub(crate) chi2: f64,
+    /// The step that is left \[standard deviations\].
+    pub(crate) sigmas_left: f64,
     /// Free numbers.
     pub(crate) groups: Vec<Vec<usize>>,
 }
@@ -143,13 +145,21 @@ impl Fits<'_> {
     }
 
     /// The wind alone.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`] about an impossible wake.
     pub(crate) fn wind(&self, about: &Wake) -> Result<End, Error> {
-        self.end(Kind::Wind, &Kind::Wind.of(about), self.groups(Kind::Wind))
+        let nowhere = Error::NotConverged { iterations: 0, sigmas_left: f64::INFINITY };
+        self.lowest(Kind::Wind, &Kind::Wind.of(about), self.groups(Kind::Wind), ROUGH).ok_or(nowhere)
     }
 
-    fn end(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>) -> Result<End, Error> {
-        let (wake, chi2) = self.problem.minimum(start, &groups, ROUGH)?;
-        Ok(End { kind, wake, chi2, groups })
+    fn lowest(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>, stop: Stop) -> Option<End> {
+        let (wake, chi2, sigmas_left) = self.problem.minimum(start, &groups, stop)?;
+        Some(End { kind, wake, chi2, sigmas_left, groups })
+    }
+
+    fn end(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>) -> Option<End> {
+        self.lowest(kind, start, groups, ROUGH)
     }
 
     /// Core radius that a fit starts with or keeps.
@@ -164,7 +174,7 @@ impl Fits<'_> {
         let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
         let spacing_m = if kind == Kind::Both { start.spacing_m() } else { LONE_CORE_M / CORE_OVER_SPACING };
         let broad = with_cores(&self.options.free.start(start), BROAD * spacing_m);
-        self.problem.minimum(&broad, &coreless, FAR).ok().map(|(near, _)| near)
+        self.lowest(kind, &broad, coreless, FAR).map(|end| end.wake)
     }
 
     /// From a start near the end, with cores begun anew.
@@ -172,12 +182,12 @@ impl Fits<'_> {
         let mut groups = self.groups(kind);
         let core_m = self.core_m(kind, near);
         if !groups.iter().any(|group| is_core(group)) {
-            let end = self.end(kind, &with_cores(near, core_m), groups.clone()).ok()?;
+            let end = self.end(kind, &with_cores(near, core_m), groups.clone())?;
             // the typical core is that of the spacing which the fit ends with
-            return self.end(kind, &with_cores(&end.wake, self.core_m(kind, &end.wake)), groups).ok();
+            return self.end(kind, &with_cores(&end.wake, self.core_m(kind, &end.wake)), groups);
         }
         let spacing_m = if kind == Kind::Both { near.spacing_m() } else { LONE_CORE_M / CORE_OVER_SPACING };
-        let end = self.end(kind, &with_cores(near, core_m), groups.clone()).ok();
+        let end = self.end(kind, &with_cores(near, core_m), groups.clone());
         let vague: Vec<usize> = match &end {
             Some(end) => self.vague_cores(end, LARGEST * spacing_m),
             None => vec![Parameter::LeftCore as usize, Parameter::RightCore as usize],
@@ -192,7 +202,7 @@ impl Fits<'_> {
             let found = end.wake.to_array();
             (0..PARAMETERS).filter(|place| is_core(&[*place]) && !vague.contains(place)).for_each(|i| p[i] = found[i]);
         }
-        self.end(kind, &Wake::from_array(&p), groups).ok()
+        self.end(kind, &Wake::from_array(&p), groups)
     }
 
     /// Places of the core radii that the scan does not resolve.
@@ -230,11 +240,12 @@ impl Fits<'_> {
 
     /// The ends for another problem, such as another scale of the loss, to the last.
     pub(crate) fn fine(&self, ends: &[End]) -> Vec<End> {
-        let fine = |end: &End| {
-            let (wake, chi2) = self.problem.minimum(&end.wake, &end.groups, FINE).ok()?;
-            Some(End { wake, chi2, ..end.clone() })
-        };
-        ends.iter().filter_map(fine).collect()
+        ends.iter().filter_map(|end| self.lowest(end.kind, &end.wake, end.groups.clone(), FINE)).collect()
+    }
+
+    /// Ends for a problem with more velocities, from those of one with fewer.
+    pub(crate) fn again(&self, ends: &[End]) -> Vec<End> {
+        ends.iter().filter_map(|end| self.polished(end.kind, &end.wake)).collect()
     }
 }
 

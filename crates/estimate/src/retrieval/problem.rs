@@ -4,12 +4,11 @@
 
 use ndarray::Array2;
 
-use crate::error::Error;
 use crate::linalg::dot;
 use crate::parallel::map_indexed;
 use crate::retrieval::expected::Expected;
 use crate::retrieval::whitening::Whitening;
-use crate::vortex_fit::damped_newton::{Normal, Stop, descend};
+use crate::vortex_fit::damped_newton::{Normal, Stop, lowest};
 use crate::vortex_fit::wake::free_parameters::{gathered, moved};
 use crate::vortex_fit::wake::range_kernel::LineScratch;
 use crate::vortex_fit::{CorePrior, Loss, Wake};
@@ -104,10 +103,11 @@ impl Problem<'_> {
         self.prior.map_or_else(Vec::new, |prior| prior.terms(wake, groups))
     }
 
-    /// The minimum from a start on and its chi-square, twice the cost.
-    pub(crate) fn minimum(&self, start: &Wake, groups: &[Vec<usize>], stop: Stop) -> Result<(Wake, f64), Error> {
+    /// The minimum from a start on, its chi-square, twice the cost, and the step that is left in deviations; nothing from an impossible start.
+    pub(crate) fn minimum(&self, start: &Wake, groups: &[Vec<usize>], stop: Stop) -> Option<(Wake, f64, f64)> {
         let step = |wake: &Wake, step: &[f64]| moved(groups, wake, step);
-        descend(*start, stop, |wake| self.normal(wake, groups), step).map(|(wake, end, _)| (wake, 2.0 * end.cost))
+        let (wake, end, _, left) = lowest(*start, stop, |wake| self.normal(wake, groups), step)?;
+        Some((wake, 2.0 * end.cost, left))
     }
 }
 

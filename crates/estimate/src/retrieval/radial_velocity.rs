@@ -75,6 +75,7 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
             kind,
             wake: kind.of(&wake),
             chi2: f64::INFINITY,
+            sigmas_left: f64::INFINITY,
             groups: Fits { problem, options: &linear }.groups(kind),
         });
         Fits { problem, options: &linear }.fine(&kinds)

@@ -2,14 +2,14 @@
 //!
 //! Check: the reference maps; wakes at the end of the sector, near the ground, with a kept core.
 
-use ndarray::{Array2, Axis};
+use ndarray::{Array1, Array2, Axis};
 
 use crate::error::Error;
 use crate::retrieval::correlated_residuals::filling;
 use crate::retrieval::hypotheses::{End, Kind, best, least, tops};
 use crate::retrieval::problem::{Problem, products};
 use crate::retrieval::{Covariance, Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
-use crate::vortex_fit::damped_newton::inverse;
+use crate::vortex_fit::damped_newton::{inverse, solve};
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::{Loss, Parameter, Wake};
 
@@ -26,6 +26,10 @@ const SEEN_M: f64 = 5.0;
 /// Chi-square per degree after robust scaling that is too much, and part of outliers that is.
 const POOR: f64 = 2.0;
 const MANY_OUTLIERS: f64 = 0.1;
+/// A fit has come to its end if the step that is left is less than this part of its deviations.
+const AT_END: f64 = 0.1;
+/// Blocks of a map that tell how its residuals are correlated: more are no better for wakes, and take longer.
+const BLOCKS: usize = 2000;
 
 pub(crate) struct Report<'a> {
     pub(crate) map: &'a ScanMap,
@@ -46,6 +50,11 @@ impl Report<'_> {
             without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2)
         };
         let likely = least(self.ends, cells);
+        let alike = match likely {
+            Some(end) => self.uncertainty(end)?.alike(&end.wake, self.scale.powi(2)),
+            None => 1.0,
+        };
+        let gain = |without: Option<&End>, with: &End| gain(without, with) / alike;
         let statistic = likely.map_or(0.0, |end| gain(Some(self.wind), end));
         let (left, right) = (best(self.ends, Kind::Left), best(self.ends, Kind::Right));
         // the likely one, then a lone vortex instead of a pair of which one is not seen
@@ -107,11 +116,13 @@ impl Report<'_> {
                     bread = curvature(&weights);
                 }
                 let weighted: Vec<f64> = rows.residuals.iter().zip(&weights).map(|(r, w)| r * w).collect();
-                let (filling, _) = filling(&self.problem.cells, &weighted, &rows.slopes);
+                let blocks = self.map.view().blocks(BLOCKS);
+                let (filling, _) = filling(&self.problem.cells, &weighted, &rows.slopes, blocks);
                 (bread, filling + &known)
             }
         };
-        Ok(Uncertainty { groups: &end.groups, curvature, scores })
+        let from_residuals = self.options.covariance == Covariance::Sandwich;
+        Ok(Uncertainty { groups: &end.groups, curvature, scores, from_residuals })
     }
 
     fn told(&self, end: &End, covariance: Array2<f64>, statistic: f64) -> ScanResult {
@@ -152,6 +163,7 @@ impl Report<'_> {
             (Flag::PoorFit, self.scale.powi(2) > POOR),
             (Flag::Outliers, cells_rejected as f64 > MANY_OUTLIERS * (self.rejected + residuals.len()) as f64),
             (Flag::Thinned, self.thinned),
+            (Flag::NotConverged, end.sigmas_left > AT_END),
         ];
         ScanResult {
             wake: (!vortices.is_empty()).then_some(end.wake),
@@ -192,6 +204,8 @@ struct Uncertainty<'a> {
     groups: &'a [Vec<usize>],
     curvature: Array2<f64>,
     scores: Array2<f64>,
+    /// Whether the residuals tell the covariance, and so what is correlated.
+    from_residuals: bool,
 }
 
 impl Uncertainty<'_> {
@@ -202,6 +216,28 @@ impl Uncertainty<'_> {
         let bread = inverse(CURVATURE, &of(&self.curvature))?;
         let groups: Vec<Vec<usize>> = free.iter().map(|i| self.groups[*i].clone()).collect();
         Ok(spread(&groups, &bread.dot(&of(&self.scores)).dot(&bread)))
+    }
+
+    /// Variance of the size of a wake at its places over that in independent noise of the variance that was taken, at least 1: a gain of chi-square
+    /// is so many times larger by chance. What wind takes from the wake is left out.
+    fn alike(&self, wake: &Wake, variance: f64) -> f64 {
+        let p = wake.to_array();
+        let (wind, vortices): (Vec<usize>, Vec<usize>) =
+            (0..self.groups.len()).partition(|i| self.groups[*i][0] >= Parameter::Wind as usize);
+        let size = |i: &usize| {
+            if self.groups[*i][0] <= Parameter::RightCirculation as usize { p[self.groups[*i][0]] } else { 0.0 }
+        };
+        let mut along = vec![0.0; self.groups.len()];
+        vortices.iter().for_each(|i| along[*i] = size(i));
+        let times = |matrix: &Array2<f64>, i: usize| (0..along.len()).map(|j| matrix[[i, j]] * along[j]).sum::<f64>();
+        let towards: Vec<f64> = wind.iter().map(|i| -times(&self.curvature, *i)).collect();
+        let own = self.curvature.select(Axis(0), &wind).select(Axis(1), &wind);
+        let taken = solve(&own, &towards).unwrap_or_else(|| vec![0.0; wind.len()]);
+        wind.iter().zip(taken).for_each(|(i, taken)| along[*i] = taken);
+        let along = Array1::from_vec(along);
+        let ratio = along.dot(&self.scores.dot(&along)) / along.dot(&self.curvature.dot(&along));
+        // also 1 for NaN, where no circulation is free
+        if self.from_residuals { (ratio / variance).max(1.0) } else { 1.0 }
     }
 
     /// Whether a circulation is positive beyond doubt, or is so by far where all but it and the wind is as found: long gates show little

@@ -81,8 +81,10 @@ pub enum Flag {
     Outliers,
     /// Velocities were taken for means over gates, though nothing says that they are: peaks of spectra read less in a vortex.
     TakenForMeans,
-    /// The map was thinned, as whitening takes 3000 velocities at most.
+    /// Medians over blocks were fitted: there are more than 16 000 velocities, or more than 1500 to be whitened.
     Thinned,
+    /// The fit came to no end: what is told is where it was.
+    NotConverged,
 }
 
 impl Flag {
@@ -102,6 +104,7 @@ impl Flag {
             Self::Outliers => "outliers",
             Self::TakenForMeans => "taken_for_means",
             Self::Thinned => "thinned",
+            Self::NotConverged => "not_converged",
         }
     }
 }

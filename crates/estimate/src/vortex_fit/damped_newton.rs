@@ -89,27 +89,41 @@ pub(crate) struct Stop {
     pub(crate) learns: bool,
 }
 
-/// Goes downhill from `start` until the step that is left is below `stop.sigmas` standard deviations (the curvature taken
-/// as the inverse covariance). `evaluate` returns nothing where the model does not exist, `moved` adds a step.
+/// As [`lowest`], to the end.
 ///
 /// # Errors
 /// [`Error::NotConverged`] after `stop.iterations` evaluations, or where no step goes downhill.
 pub(crate) fn descend<P: Clone>(
     start: P,
     stop: Stop,
-    mut evaluate: impl FnMut(&P) -> Option<Normal>,
+    evaluate: impl FnMut(&P) -> Option<Normal>,
     moved: impl Fn(&P, &[f64]) -> P,
 ) -> Result<(P, Normal, usize), Error> {
-    let failed = |iterations, sigmas_left| Error::NotConverged { iterations, sigmas_left };
+    let nowhere = Error::NotConverged { iterations: 0, sigmas_left: f64::INFINITY };
+    match lowest(start, stop, evaluate, moved).ok_or(nowhere)? {
+        (at, here, iterations, sigmas_left) if sigmas_left <= stop.sigmas => Ok((at, here, iterations)),
+        (_, _, iterations, sigmas_left) => Err(Error::NotConverged { iterations, sigmas_left }),
+    }
+}
+
+/// Goes downhill from `start` until the step that is left is below `stop.sigmas` standard deviations (the curvature taken
+/// as the inverse covariance), no step goes downhill or there are no evaluations left; with their number and the step that is left.
+/// `evaluate` returns nothing where the model does not exist, `moved` adds a step. Nothing if it does not at the start.
+pub(crate) fn lowest<P: Clone>(
+    start: P,
+    stop: Stop,
+    mut evaluate: impl FnMut(&P) -> Option<Normal>,
+    moved: impl Fn(&P, &[f64]) -> P,
+) -> Option<(P, Normal, usize, f64)> {
     let mut at = start;
-    let mut here = evaluate(&at).ok_or(failed(0, f64::INFINITY))?;
+    let mut here = evaluate(&at)?;
     let (mut damping, mut left) = (1e-3, f64::INFINITY);
     for iteration in 1..=stop.iterations {
         let down: Vec<f64> = here.gradient.iter().map(|g| -g).collect();
         if let Some(newton) = solve(&here.curvature, &down) {
             left = newton.iter().zip(&down).map(|(s, d)| s * d).sum::<f64>().max(0.0).sqrt();
             if left <= stop.sigmas {
-                return Ok((at, here, iteration));
+                return Some((at, here, iteration, left));
             }
         }
         let mut damped = here.curvature.clone();
@@ -136,10 +150,10 @@ pub(crate) fn descend<P: Clone>(
             }
         }
         if damping > 1e12 {
-            return Err(failed(iteration, left));
+            return Some((at, here, iteration, left));
         }
     }
-    Err(failed(stop.iterations, left))
+    Some((at, here, stop.iterations, left))
 }
 
 /// A step back by more than this part of the one before turns round.

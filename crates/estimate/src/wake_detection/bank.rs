@@ -15,8 +15,9 @@ use crate::wake_detection::cells::Cells;
 const STEP_M: f64 = 4.0;
 /// Along the line gates blur: this part of their standard deviation is close enough.
 const STEP_OVER_GATE: f64 = 0.4;
-/// Most places.
+/// Places of a large scan, and how many times more there may be where pairs are close: their number is squared in memory and cubed in time.
 const MOST_PLACES: f64 = 1200.0;
+const MANY: f64 = 2.0;
 /// Core radius over the distance of places: what lies between them is not missed.
 const CORE_OVER_STEP: f64 = 0.5;
 
@@ -46,8 +47,9 @@ impl Bank {
         let area = sector.width_m() * sector.height_m();
         let apart_m = STEP_M.max((area / MOST_PLACES).sqrt());
         let lateral_m = apart_m.max(STEP_OVER_GATE * gate_m);
-        // the least spacing is a number of steps
+        // the least spacing is a number of steps, unless the scan is so large that this gives too many places
         let lateral_m = spacing_m.0 / (spacing_m.0 / lateral_m).ceil().max(1.0);
+        let lateral_m = lateral_m.max(area / apart_m / (MANY * MOST_PLACES));
         let step_m = (lateral_m, apart_m);
         let columns = (sector.width_m() / lateral_m) as usize + 1;
         let rows = (sector.height_m() / apart_m) as usize + 1;
@@ -61,7 +63,7 @@ impl Bank {
             }
         }
         let mut templates = Vec::new();
-        let least = (spacing_m.0 / lateral_m).round() as usize;
+        let least = (spacing_m.0 / lateral_m - 1e-9).ceil() as usize;
         let most = (spacing_m.1 / lateral_m + 1e-9) as usize;
         for ((row, column), &place) in index.indexed_iter() {
             let Some(place) = place else { continue };
@@ -69,7 +71,7 @@ impl Bank {
                 templates.push(Template { left: Some(place), right: None });
                 templates.push(Template { left: None, right: Some(place) });
             }
-            let partners = (least..=most.max(least)).filter_map(|away| *index.get((row, column + away))?);
+            let partners = (least..=most).filter_map(|away| *index.get((row, column + away))?);
             templates.extend(partners.map(|partner| Template { left: Some(place), right: Some(partner) }));
         }
         Self { places_m, step_m, core_m: CORE_OVER_STEP * apart_m, templates }
@@ -118,15 +120,15 @@ pub(super) fn shown(
 }
 
 /// Where cells are.
-struct Sector<'a> {
+pub(super) struct Sector<'a> {
     cells: &'a Cells,
     model: &'a WakeModel,
-    lateral_m: (f64, f64),
-    up_m: (f64, f64),
+    pub(super) lateral_m: (f64, f64),
+    pub(super) up_m: (f64, f64),
 }
 
 impl<'a> Sector<'a> {
-    fn new(cells: &'a Cells, model: &'a WakeModel) -> Self {
+    pub(super) fn new(cells: &'a Cells, model: &'a WakeModel) -> Self {
         let ends = |of: fn(&(f64, f64)) -> f64| {
             let values = cells.cells.iter().map(|cell| of(&cell.place_m));
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
@@ -146,12 +148,50 @@ impl<'a> Sector<'a> {
         (self.up_m.1 - self.up_m.0).max(0.0)
     }
 
-    fn holds(&self, place_m: (f64, f64)) -> bool {
+    pub(super) fn holds(&self, place_m: (f64, f64)) -> bool {
         let (y, z) = (place_m.0 - self.model.lidar_lateral_position_m, place_m.1 - self.model.lidar_height_m);
         let within = |axis: &[f64], value: f64| match (axis.first(), axis.last()) {
             (Some(first), Some(last)) => (*first..=*last).contains(&value),
             _ => false,
         };
         within(&self.cells.range_m, y.hypot(z)) && within(&self.cells.elevation_rad, z.atan2(y))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vortex_fit::VelocityMap;
+
+    /// Least and largest spacing of the pairs of a scan of 100 lines from the ground to `top_rad`, and its places.
+    fn bank(top_rad: f64, (first_m, step_m): (f64, f64)) -> (f64, f64, usize) {
+        let elevation_rad: Vec<f64> = (0..100).map(|i| 0.01 * top_rad * f64::from(i)).collect();
+        let range_m: Vec<f64> = (0..600).map(|i| first_m + step_m * f64::from(i)).collect();
+        let velocity = Array2::zeros((100, 600));
+        let map = VelocityMap {
+            elevation_rad: &elevation_rad,
+            range_m: &range_m,
+            velocity_m_s: velocity.view(),
+            standard_deviation_m_s: None,
+        };
+        let model = WakeModel::default();
+        let bank = Bank::new(&Cells::new(&map, &model), &model, 0.3 * step_m, &DetectorOptions::default());
+        let pairs = bank.templates.iter().filter_map(|t| Some(bank.places_m[t.right?].0 - bank.places_m[t.left?].0));
+        let (least, most) = pairs.fold((f64::INFINITY, 0.0_f64), |(least, most), b| (least.min(b), most.max(b)));
+        assert!(!bank.templates.is_empty());
+        (least, most, bank.places_m.len())
+    }
+
+    #[test]
+    fn a_bank_is_bounded_whatever_the_size_of_the_scan_and_its_pairs_have_the_spacings_that_are_asked_for() {
+        // a lidar near a runway, one that sees 6 km, and a radar that sees 150 km
+        for (top_rad, gates, has_pairs) in
+            [(0.2, (300.0, 0.5), true), (0.5, (500.0, 10.0), true), (1.5, (500.0, 250.0), false)]
+        {
+            let (least_m, most_m, places) = bank(top_rad, gates);
+            assert!(places <= 2700, "{places}");
+            assert_eq!(least_m.is_finite(), has_pairs, "{gates:?}: {least_m}");
+            assert!(!has_pairs || (15.99..40.0).contains(&least_m) && most_m <= 63.01, "{least_m} {most_m}");
+        }
     }
 }

@@ -33,7 +33,7 @@ pub(super) struct Cell {
 impl Cells {
     pub(super) fn new(map: &VelocityMap<'_>, model: &WakeModel) -> Self {
         let (lines, gates) = (map.elevation_rad.len(), map.range_m.len());
-        let (by_line, by_gate) = blocks(map);
+        let (by_line, by_gate) = map.blocks(MOST_CELLS);
         let mean = |axis: &[f64], by: usize| -> Vec<f64> {
             axis.chunks(by).map(|block| block.iter().sum::<f64>() / block.len() as f64).collect()
         };
@@ -78,22 +78,6 @@ impl Cells {
     }
 }
 
-/// Lines and gates of a block: one of each, or more, so that blocks are about as wide as long.
-fn blocks(map: &VelocityMap<'_>) -> (usize, usize) {
-    let (lines, gates) = (map.elevation_rad.len(), map.range_m.len());
-    let span = |axis: &[f64]| axis.last().copied().unwrap_or(0.0) - axis.first().copied().unwrap_or(0.0);
-    let (line_m, gate_m) = (map.line_spacing_m(), span(map.range_m) / gates.max(1) as f64);
-    let (mut by_line, mut by_gate) = (1, 1);
-    while lines.div_ceil(by_line) * gates.div_ceil(by_gate) > MOST_CELLS {
-        if by_line as f64 * line_m <= by_gate as f64 * gate_m && by_line < lines || by_gate >= gates {
-            by_line += 1;
-        } else {
-            by_gate += 1;
-        }
-    }
-    (by_line, by_gate)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -113,7 +97,7 @@ mod tests {
             standard_deviation_m_s: Some(deviation.view()),
         };
         let cells = Cells::new(&map, &WakeModel::default());
-        assert_eq!(blocks(&map), (3, 1));
+        assert_eq!(map.blocks(MOST_CELLS), (3, 1));
         assert_eq!(cells.cells.len(), 40 * 60 - 20 * 30);
         let means = cells.means(velocity.view()).unwrap();
         assert!((means[0] - 0.15).abs() < 1e-12 && (cells.cells[0].deviation_m_s - 0.6 / 2f64.sqrt()).abs() < 1e-12);

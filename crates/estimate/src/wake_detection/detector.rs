@@ -16,11 +16,9 @@ use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::DetectorOptions;
 use crate::wake_detection::background::Background;
-use crate::wake_detection::bank::{Bank, Template, shown};
+use crate::wake_detection::bank::{Bank, Sector, Template, shown};
 use crate::wake_detection::cells::Cells;
 
-/// Velocities that a test needs.
-const NEEDED: usize = 40;
 /// One part in so many of the cells may be missing in a scan.
 const MISSING: usize = 2;
 /// Of the variance of a product with a place: keeps the covariance of all of them regular, and changes nothing else.
@@ -37,6 +35,7 @@ pub struct WakeDetector {
     cells: Cells,
     background: Background,
     bank: Bank,
+    spacing_m: (f64, f64),
     /// Uniform wind and shear, white and orthonormal: cells by one or two.
     wind: Array2<f64>,
     /// What single vortices show, white, without wind: places by cells.
@@ -63,9 +62,14 @@ pub struct WakeStatistic {
     /// Correlation of what is left with the next gate and with the next line, made white and away from that wake: near 0 if the
     /// background is the one that the test was told.
     pub neighbour_correlation: (f64, f64),
+    /// What both scatter by about 0 in such a background: the reciprocal root of the number of neighbours.
+    pub correlation_error: (f64, f64),
 }
 
 impl WakeDetector {
+    /// Velocities that a test needs.
+    pub const NEEDED: usize = 40;
+
     /// A test for maps like `map`: its axes, its standard deviations, its missing velocities. `gate` is what a velocity is of the
     /// air about its range.
     ///
@@ -78,8 +82,8 @@ impl WakeDetector {
         if map.sigma_m_s.is_none() {
             return Err(Error::Empty { field: "sigma_m_s" });
         }
-        if found < NEEDED {
-            return Err(Error::TooFewVelocities { found, needed: NEEDED });
+        if found < Self::NEEDED {
+            return Err(Error::TooFewVelocities { found, needed: Self::NEEDED });
         }
         positive("least spacing_m", options.spacing_m.0)?;
         if options.spacing_m.0 != options.spacing_m.1 {
@@ -104,7 +108,18 @@ impl WakeDetector {
         let factor = cholesky(gram + Array2::from_diag(&Array1::from_elem(order, floor)));
         let reason = "is not positive definite";
         let factor = factor.ok_or(Error::Linalg { what: "covariance of the products with the bank", order, reason })?;
-        Ok(Self { model: *model, kernel, cells, background, bank, wind, shapes, reciprocal_length, factor })
+        Ok(Self {
+            model: *model,
+            kernel,
+            cells,
+            background,
+            bank,
+            spacing_m: options.spacing_m,
+            wind,
+            shapes,
+            reciprocal_length,
+            factor,
+        })
     }
 
     /// The statistic of a scan with the geometry and noise of this test. Some velocities may be missing that the test has: the wind
@@ -127,9 +142,11 @@ impl WakeDetector {
             let Some(place) = place else { continue };
             left.scaled_add(-sense * value.sqrt() * length, &self.shapes.row(place));
         }
+        let [along, across] = self.neighbour_correlation(&left, template);
         Ok(WakeStatistic {
             value,
-            neighbour_correlation: self.neighbour_correlation(&left, template),
+            neighbour_correlation: (along.0, across.0),
+            correlation_error: (along.1, across.1),
             wind_chi2_per_dof: rest / dof(0),
             wake_chi2_per_dof: (rest - value) / dof(4),
             wake: self.wake(template, value.sqrt() * length),
@@ -164,8 +181,8 @@ impl WakeDetector {
         Ok(missing)
     }
 
-    /// Correlation of white numbers by cell with those of the next gate and the next line, far from a wake.
-    fn neighbour_correlation(&self, numbers: &Array1<f64>, template: &Template) -> (f64, f64) {
+    /// Correlation of white numbers by cell with those of the next gate and the next line, far from a wake, each with its error.
+    fn neighbour_correlation(&self, numbers: &Array1<f64>, template: &Template) -> [(f64, f64); 2] {
         let mut grid = Array2::from_elem((self.cells.elevation_rad.len(), self.cells.range_m.len()), f64::NAN);
         let far = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1) > WAKE_M;
         for (cell, number) in self.cells.cells.iter().zip(numbers) {
@@ -176,12 +193,12 @@ impl WakeDetector {
         }
         let mean = |products: ndarray::Array2<f64>| {
             let (sum, count) = products.iter().filter(|x| x.is_finite()).fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
-            sum / count
+            (sum / count, count)
         };
-        let power = mean(&grid * &grid);
-        let along = mean(&grid.slice(s![.., 1..]) * &grid.slice(s![.., ..-1])) / power;
-        let across = mean(&grid.slice(s![1.., ..]) * &grid.slice(s![..-1, ..])) / power;
-        (along, across)
+        let (power, _) = mean(&grid * &grid);
+        let along = mean(&grid.slice(s![.., 1..]) * &grid.slice(s![.., ..-1]));
+        let across = mean(&grid.slice(s![1.., ..]) * &grid.slice(s![..-1, ..]));
+        [along, across].map(|(product, count): (f64, f64)| (product / power, count.sqrt().recip()))
     }
 
     /// Numbers by cell, made white, without what wind explains.
@@ -261,15 +278,9 @@ impl WakeDetector {
         self.bank.templates.len()
     }
 
-    /// Places of the pairs of the bank \[m\].
-    pub(super) fn pairs(&self) -> Vec<[(f64, f64); 2]> {
-        let place = |index: usize| self.bank.places_m[index];
-        self.bank.templates.iter().filter_map(|t| Some([place(t.left?), place(t.right?)])).collect()
-    }
-
-    /// Distances of neighbouring places \[m\].
-    pub(super) fn step_m(&self) -> (f64, f64) {
-        self.bank.step_m
+    /// Where wakes may be, and how far apart the vortices of a pair.
+    pub(super) fn sector(&self) -> (Sector<'_>, (f64, f64)) {
+        (Sector::new(&self.cells, &self.model), self.spacing_m)
     }
 }
 

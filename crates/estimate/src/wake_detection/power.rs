@@ -13,6 +13,10 @@ use crate::wake_detection::WakeDetector;
 
 /// The 0.9 quantile of a normal number.
 const NINE_OF_TEN: f64 = 1.281_551_565_544_600_4;
+/// How often a spacing is drawn, and a place for each, until a pair lies in the scan.
+const TRIES: (usize, usize) = (50, 400);
+/// Groups of wakes whose scatter tells the error of a circulation.
+const GROUPS: usize = 10;
 
 /// Backgrounds with wakes, one in each, of a circulation that is chosen later.
 #[derive(Debug, Clone)]
@@ -43,22 +47,28 @@ impl Share {
 }
 
 impl WakeDetector {
-    /// So many pairs of unit circulation anywhere in the scan, both vortices in it, between the places of the bank; with cores of
-    /// 5 % of their spacing.
+    /// So many pairs of unit circulation: each as far apart as any that are asked for, anywhere in the scan with both vortices in it, with
+    /// cores of 5 % of their spacing. Fewer where the scan has hardly room for a pair.
     pub fn draw_wakes<R: Rng>(&self, count: usize, stream: impl Fn(u64) -> R) -> Vec<Wake> {
-        let (pairs, step_m) = (self.pairs(), self.step_m());
+        let (sector, spacings_m) = self.sector();
         let draw = |index: usize| {
             let mut generator = stream(index as u64);
-            let [left, right] = *pairs.get(generator.random_range(0..pairs.len().max(1)))?;
-            let mut off = |step_m: f64| step_m * (generator.random::<f64>() - 0.5);
-            let (aside_m, up_m) = (off(step_m.0), off(step_m.1));
-            let vortex = |place: (f64, f64)| Vortex {
-                circulation_m2_s: 1.0,
-                lateral_position_m: place.0 + aside_m,
-                height_m: place.1 + up_m,
-                core_radius_m: 0.05 * (right.0 - left.0),
-            };
-            Some(Wake { left: vortex(left), right: vortex(right), lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 })
+            let mut between = |(low, high): (f64, f64)| low + (high - low) * generator.random::<f64>();
+            (0..TRIES.0).find_map(|_| {
+                let spacing_m = between(spacings_m);
+                (0..TRIES.1).find_map(|_| {
+                    let (left_m, height_m) = (between(sector.lateral_m), between(sector.up_m));
+                    let vortex = |lateral_position_m: f64| Vortex {
+                        circulation_m2_s: 1.0,
+                        lateral_position_m,
+                        height_m,
+                        core_radius_m: 0.05 * spacing_m,
+                    };
+                    let (left, right) = (vortex(left_m), vortex(left_m + spacing_m));
+                    let seen = [left, right].iter().all(|v| sector.holds((v.lateral_position_m, v.height_m)));
+                    seen.then_some(Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 })
+                })
+            })
         };
         (0..count).map_while(draw).collect()
     }
@@ -136,17 +146,36 @@ impl DetectionTrials<'_> {
     #[must_use]
     pub fn smallest_detectable_m2_s(&self, threshold: f64) -> (f64, f64) {
         let foretold = self.circulation_std_m2_s() * (threshold.max(0.0).sqrt() + NINE_OF_TEN);
-        let missed = self.missed_m2_s(threshold);
-        let (mut low, mut high) = (0.0, 2.0 * foretold);
-        while share(&missed, high).value < 0.9 && high < 64.0 * foretold {
-            high *= 2.0;
-        }
-        while high - low > 2e-3 * high {
-            let middle = 0.5 * (low + high);
-            if share(&missed, middle).value < 0.9 { low = middle } else { high = middle }
-        }
-        (0.5 * (low + high), foretold)
+        (found_nine_times(&self.missed_m2_s(threshold), foretold), foretold)
     }
+
+    /// Standard error of the former, from its scatter between groups of wakes; NaN with less than twenty wakes.
+    #[must_use]
+    pub fn smallest_detectable_error_m2_s(&self, threshold: f64) -> f64 {
+        let (missed, about) = (self.missed_m2_s(threshold), self.smallest_detectable_m2_s(threshold).1);
+        let of_group = |group: usize| {
+            let own = |i: &usize| i % self.wakes.len() % GROUPS == group;
+            found_nine_times(&(0..missed.len()).filter(own).map(|i| missed[i]).collect::<Vec<_>>(), about)
+        };
+        let groups: Vec<f64> = (0..GROUPS).filter(|_| self.wakes.len() >= 2 * GROUPS).map(of_group).collect();
+        let count = groups.len() as f64;
+        let mean = groups.iter().sum::<f64>() / count;
+        let squares: f64 = groups.iter().map(|x| (x - mean).powi(2)).sum();
+        (squares / (count - 1.0) / count).sqrt()
+    }
+}
+
+/// The circulation that nine in ten trials find, sought from `about` on \[m^2/s\].
+fn found_nine_times(missed: &[[f64; 2]], about: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 2.0 * about);
+    while share(missed, high).value < 0.9 && high < 64.0 * about {
+        high *= 2.0;
+    }
+    while high - low > 2e-3 * high {
+        let middle = 0.5 * (low + high);
+        if share(missed, middle).value < 0.9 { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
 }
 
 /// Share of trials that find a circulation, of those between which each misses it.

@@ -5,6 +5,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
+use statrs::distribution::{ContinuousCDF, Normal};
 use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
 use wakescope_estimate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use wakescope_estimate::wake_detection::{DetectorOptions, EmptyScanLaw, Share, WakeDetector, WakeStatistic};
@@ -223,6 +224,7 @@ fn alarms_in_turbulence(case: &Case) -> Share {
     let found = case.statistics(2000, Some(TURBULENCE), &[&whitened, &white]);
     for rate in [1e-1, 1e-2, 1e-3] {
         let (good, alarms) = holds(&found[0], &law, rate);
+        println!("{alarms} alarms at {rate}");
         assert!(good, "{alarms} alarms at {rate}");
     }
     let threshold = white.calibrate(2000, stream(4)).unwrap().threshold(1e-2).unwrap();
@@ -238,15 +240,33 @@ fn false_alarms_keep_their_rate_in_turbulence_where_a_threshold_for_white_noise_
 
 #[test]
 #[ignore = "slow: 10 s"]
-fn a_threshold_for_white_noise_alarms_in_94_per_cent_of_the_turbulent_scans_of_an_independent_study() {
+fn a_threshold_for_white_noise_alarms_in_all_but_a_few_of_a_thousand_turbulent_scans() {
     let alarms = alarms_in_turbulence(&Case::of_the_study(0.3, 15.0));
     println!("{alarms:?}");
-    assert!(alarms.value > 0.9, "{alarms:?}");
+    // an independent study, with a bank of its own, has 0.94
+    assert!(alarms.value > 0.997, "{alarms:?}");
+    // what more wakes in the bank cost
+    for (noise, gate_m, turbulence) in [(0.5, 0.0, None), (0.5, 15.0, None), (0.3, 15.0, Some(TURBULENCE))] {
+        let case = Case::of_the_study(noise, gate_m);
+        let wake = Wake::from_array(&[1.0, 1.0, 377.9, 47.7, 424.9, 47.7, 2.35, 2.35, 0.0, 0.0]);
+        let of = |options: DetectorOptions| {
+            let detector = case.detector(&options);
+            let threshold = detector.calibrate(10_000, stream(5)).unwrap().threshold(1e-2).unwrap();
+            let trials = detector.trials(&[wake], 2000, stream(6)).unwrap();
+            (threshold, trials.smallest_detectable_m2_s(threshold).0)
+        };
+        let pairs = of(DetectorOptions { spacing_m: (47.0, 47.0), single_vortices: false, turbulence });
+        let all = of(DetectorOptions { turbulence, ..Default::default() });
+        let (higher, larger) = (all.0 - pairs.0, all.1 / pairs.1 - 1.0);
+        println!("any spacing and single vortices: threshold + {higher:.1}, smallest + {:.0} %", 100.0 * larger);
+        assert!((3.0..6.5).contains(&higher) && (0.05..0.16).contains(&larger), "{higher} {larger}");
+    }
 }
 
-/// T_c at 1e-2 and 1e-3, mu, beta, bound, shares found at 4, 5, 6 bounds: the bank of the study had other places.
+/// T_c at 1e-2 and 1e-3, mu, beta, bound, and shares found at 4, 5, 6 bounds: those of the study, whose bank had fewer places, are lower, and lower
+/// than at a known place.
 #[test]
-fn thresholds_and_shares_of_wakes_that_are_found_are_those_of_an_independent_study() {
+fn thresholds_are_those_of_an_independent_study_and_wakes_are_found_as_often_as_at_a_known_place() {
     for (noise, gate_m, turbulence, (t2, t3, mu, beta, bound_m2_s), shares) in [
         (0.5, 0.0, None, (17.0, 22.0, 6.45, 2.25, 2.5), [0.52, 0.83, 0.96]),
         (0.5, 15.0, None, (14.9, 19.3, 4.36, 2.15, 3.6), [0.67, 0.92, 0.98]),
@@ -268,9 +288,11 @@ fn thresholds_and_shares_of_wakes_that_are_found_are_those_of_an_independent_stu
         let of_bounds = [4.0, 5.0, 6.0];
         let all = trials.detection(&of_bounds.map(|bounds| bounds * found_m2_s), threshold);
         for ((bounds, found), study) in of_bounds.into_iter().zip(all).zip(shares) {
-            println!("{bounds} {found:?}, study {study}");
-            // never fewer than the study, by more than three standard errors
-            assert!(found.value > study - 3.0 * found.standard_error, "{bounds}: {found:?}");
+            let known = Normal::standard().cdf(bounds - threshold.sqrt());
+            println!("{bounds} {found:?}, known place {known:.3}, study {study}");
+            // the best of many places is better than one, by what chance adds there
+            let errors = 3.0 * found.standard_error;
+            assert!(found.value > known - errors && found.value < known + 0.14 + errors, "{bounds}: {found:?} {known}");
         }
         // near the form for known places: the best of many places is a little better than one
         let (smallest, foretold) = trials.smallest_detectable_m2_s(threshold);
@@ -305,6 +327,36 @@ fn shares_from_products_are_those_of_whole_scans_with_wakes() {
     let error = found.standard_error.hypot(expected.standard_error);
     assert!((found.value - expected.value).abs() < 3.5 * error, "{found:?} {expected:?}");
     assert!((0.3..0.98).contains(&expected.value), "{expected:?}");
+}
+
+/// Gates of 20 m at 2 km: the bank's places are 8 m apart, its pairs 16, 24 ... 56 m wide.
+#[test]
+fn wakes_to_find_are_as_wide_as_was_asked_and_what_is_found_of_them_has_its_scatter_for_an_error() {
+    let case = Case::new((36, 0.01, 2.2e-3), (20, 1800.0, 20.0));
+    let case = Case { gate_m: 12.0, ..case };
+    let detector = case.detector(&DetectorOptions::default());
+    let wakes = detector.draw_wakes(400, stream(20));
+    let spacings_m: Vec<f64> = wakes.iter().map(Wake::spacing_m).collect();
+    // uniform from 16 to 63 m: each fifth holds 80 of 400, by three and a half deviations of 8
+    for fifth in 0..5 {
+        let from_m = 16.0 + 9.4 * f64::from(fifth);
+        let count = spacings_m.iter().filter(|b| (from_m..from_m + 9.4).contains(*b)).count();
+        assert!((52..=108).contains(&count), "{from_m}: {count}");
+    }
+    assert!(spacings_m.iter().filter(|b| (*b / 8.0).fract() > 0.01).count() > 300);
+    let threshold = detector.calibrate(2000, stream(21)).unwrap().threshold(1e-2).unwrap();
+    let found: Vec<(f64, f64)> = (0..8)
+        .map(|seed| {
+            let wakes = detector.draw_wakes(60, stream(30 + seed));
+            let trials = detector.trials(&wakes, 600, stream(50 + seed)).unwrap();
+            (trials.smallest_detectable_m2_s(threshold).0, trials.smallest_detectable_error_m2_s(threshold))
+        })
+        .collect();
+    let mean = found.iter().map(|f| f.0).sum::<f64>() / 8.0;
+    let scatter = (found.iter().map(|f| (f.0 - mean).powi(2)).sum::<f64>() / 7.0).sqrt();
+    let stated = (found.iter().map(|f| f.1.powi(2)).sum::<f64>() / 8.0).sqrt();
+    // a scatter of eight is known to 27 %
+    assert!((0.4..2.2).contains(&(stated / scatter)), "{stated} {scatter} of {mean}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! `wakescope detect`: whether scans hold a wake, and how small a wake is found in scans like them.
 
-use super::retrieve::{YesNo, not_negative, turbulence};
+use super::retrieve::{YesNo, is_signals, not_negative, positive, signals, turbulence};
 use super::{Cli, load, progress, say, shown};
 use crate::Error;
 use crate::detection::{
@@ -23,7 +23,7 @@ use wakescope_estimate::wake_detection::DetectorOptions;
 /// Words of `wakescope detect`.
 #[derive(Debug, Args)]
 pub(super) struct DetectWords {
-    /// Scans: CfRadial, HALO .hpl or tables; without any the scene says what would be found.
+    /// Scans: CfRadial, HALO .hpl or tables; or raw signals, with --scene; without any the scene says what would be found.
     data: Vec<PathBuf>,
     /// The scene whose instrument measured them: gates, place of the lidar, noise and how far apart velocities are independent.
     #[arg(long, value_name = "SCENE.toml", required_unless_present = "data")]
@@ -55,6 +55,9 @@ pub(super) struct DetectWords {
     /// Empty scans that are drawn for the threshold.
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(2000..=1_000_000))]
     empty_scans: u32,
+    /// What raw samples are multiplied with, such as ampere per count; the noise is then that of the scene.
+    #[arg(long, value_name = "A", value_parser = positive)]
+    scale: Option<f64>,
     /// The variable or column that holds the velocities.
     #[arg(long, value_name = "NAME")]
     field: Option<String>,
@@ -140,6 +143,7 @@ fn run(words: &DetectWords, cli: &Cli, observer: &dyn Observer) -> Result<(), Er
         "version": crate::VERSION, "false_alarm": words.false_alarm, "background": holds,
         "scans": task.scans.iter().zip(&found).map(as_json).collect::<Vec<_>>(),
         "smallest_detectable_m2_s": power.as_ref().map(|power| power.smallest_m2_s.0),
+        "smallest_detectable_error_m2_s": power.as_ref().map(|power| power.smallest_error_m2_s),
         "smallest_foretold_m2_s": power.as_ref().map(|power| power.smallest_m2_s.1),
         "threshold": power.as_ref().map(|power| power.threshold),
         "circulation_std_m2_s": power.as_ref().map(|power| power.circulation_std_m2_s),
@@ -153,13 +157,18 @@ impl Task {
     fn new(words: &DetectWords, cli: &Cli, observer: &dyn Observer, existing: Existing) -> Result<Self, Error> {
         let format = ScanFormat { field: words.field.clone(), towards: words.towards, min_snr_db: words.min_snr };
         let (mut scans, mut notes) = (Vec::new(), Vec::new());
+        let scene = words.scene.as_deref().map(|path| load(path, cli)).transpose()?;
         for path in &words.data {
+            if is_signals(path) {
+                scans.extend(signals(path, scene.clone(), words.scale, false)?.maps());
+                continue;
+            }
             let (read, left_out) = scans::read(path, &format)?;
             scans.extend(read);
             notes.extend(left_out);
         }
-        let scene = match (&words.scene, scans.first()) {
-            (Some(path), _) => Some(load(path, cli)?),
+        let scene = match (scene, scans.first()) {
+            (Some(scene), _) => Some(scene),
             (None, Some(scan)) => scene_of(scan)?,
             (None, None) => None,
         };
@@ -188,9 +197,7 @@ impl Task {
         if let Some(plan) = &plan {
             let noise = SceneNoise::new(plan, observer)?;
             settings.stride = noise.stride;
-            // files of runs hold means over the realisations of their scene
-            let means = if words.scene.is_none() { plan.scene.scene.scan.realisations } else { 1 };
-            scans.iter_mut().for_each(|scan| noise.give(&mut scan.map, means));
+            scans.iter_mut().for_each(|scan| noise.give(&mut scan.map, scan.scans));
             empty = scans.is_empty().then(|| noise.empty_scan(plan));
         }
         settings.stride = words.stride.unwrap_or(settings.stride);
@@ -277,8 +284,8 @@ impl Task {
             ));
             let (measured, foretold) = power.smallest_m2_s;
             text.push(format!(
-                "circulation found nine times in ten: {measured:.1} m^2/s (the bound of {:.2} m^2/s foretells {foretold:.1})",
-                power.circulation_std_m2_s
+                "circulation found nine times in ten: {measured:.1} +- {:.1} m^2/s (the bound of {:.2} m^2/s foretells {foretold:.1})",
+                power.smallest_error_m2_s, power.circulation_std_m2_s
             ));
         }
         text

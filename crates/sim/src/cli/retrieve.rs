@@ -8,7 +8,7 @@ use crate::io::{Existing, FileGroup};
 use crate::measure::progress::{Observer, Silent};
 use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape};
 use crate::measure::write;
-use crate::plan::Plan;
+use crate::plan::{Plan, Stage};
 use crate::retrieve::{self, Method, OwnScene, RetrievedScan, StatedEstimator, Velocities, gate_of};
 use crate::scene::{SceneFile, VortexProfile};
 use clap::{Args, ValueEnum};
@@ -76,6 +76,9 @@ pub(super) struct RetrieveWords {
     /// Height of the lidar above the ground, m; of the scene without it, else 0.
     #[arg(long, value_name = "M", value_parser = not_negative)]
     lidar_height: Option<f64>,
+    /// What raw samples are multiplied with, such as ampere per count; the noise is then that of the scene.
+    #[arg(long, value_name = "A", value_parser = positive)]
+    scale: Option<f64>,
     /// The variable or column that holds the velocities.
     #[arg(long, value_name = "NAME")]
     field: Option<String>,
@@ -129,7 +132,7 @@ pub(super) fn not_negative(word: &str) -> Result<f64, String> {
     value.ok_or_else(|| "a number from 0 on, e.g. 14.4".into())
 }
 
-fn positive(word: &str) -> Result<f64, String> {
+pub(super) fn positive(word: &str) -> Result<f64, String> {
     let value = word.trim().parse::<f64>().ok().filter(|v| *v > 0.0 && v.is_finite());
     value.ok_or_else(|| "a number above 0, e.g. 2.35".into())
 }
@@ -196,12 +199,20 @@ enum Input {
     Signals(Box<Signals>),
 }
 
-struct Signals {
+pub(super) struct Signals {
     path: PathBuf,
     records: RawRecords,
     plan: Plan,
     scans: Vec<MeasuredScan>,
     spectra: Option<Spectra>,
+}
+
+impl Signals {
+    /// The maps of their scans.
+    pub(super) fn maps(&self) -> impl Iterator<Item = ReadScan> + '_ {
+        let map = |(sweep, scan)| retrieve::scan_of_signals(&self.path, sweep, &self.plan, scan);
+        self.scans.iter().enumerate().map(map)
+    }
 }
 
 /// What was found in all scans.
@@ -221,7 +232,8 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     let mut inputs = Vec::new();
     for path in &words.data {
         if is_signals(path) {
-            inputs.push(Input::Signals(Box::new(signals(path, words, stated.clone())?)));
+            let spectra = words.method == Method::Envelope;
+            inputs.push(Input::Signals(Box::new(signals(path, stated.clone(), words.scale, spectra)?)));
             continue;
         }
         if matches!(words.method, Method::Signals | Method::Envelope) {
@@ -238,6 +250,7 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     let existing = if words.overwrite { Existing::Any } else { Existing::Own };
     write::prepare(&words.out, names(count).iter().map(String::as_str), existing)?;
     let mut found = Found::default();
+    told.begin(Stage::Retrieval, count as u64);
     for input in inputs {
         match input {
             Input::Map(scan) => {
@@ -245,10 +258,12 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
                 let scene = words.scene_of(&scan, stated.as_ref())?;
                 found.scans.push(of_map(words, scene.as_ref(), *scan, start, told.as_mut())?);
                 found.scenes.push(scene);
+                told.advance(1);
             }
-            Input::Signals(signals) => of_signals(words, *signals, &mut found)?,
+            Input::Signals(signals) => of_signals(words, *signals, &mut found, told.as_ref())?,
         }
     }
+    told.end();
     same_origin(&mut found.scans);
     let track = retrieve::track_of(&found.scans)?;
     let files = files(words, &found, track.as_ref(), existing)?;
@@ -271,7 +286,7 @@ fn progress_of(cli: &Cli) -> Box<dyn Observer> {
 }
 
 /// Whether a file holds raw signals and no map.
-fn is_signals(path: &Path) -> bool {
+pub(super) fn is_signals(path: &Path) -> bool {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     if ["npy", "npz"].contains(&extension) {
         return true;
@@ -283,16 +298,24 @@ fn is_signals(path: &Path) -> bool {
 }
 
 /// The map of signals first: it starts the fit.
-fn signals(path: &Path, words: &RetrieveWords, scene: Option<SceneFile>) -> Result<Signals, Error> {
+pub(super) fn signals(
+    path: &Path,
+    scene: Option<SceneFile>,
+    scale: Option<f64>,
+    spectra: bool,
+) -> Result<Signals, Error> {
     let Some(scene) = scene else {
         let reason = "it holds raw signals: --scene says which instrument recorded them".into();
         return Err(Error::Input { path: path.to_owned(), reason });
     };
-    let mut records = RawRecords::open(path, &RawFormat::default(), record_shape(&scene.scene))?;
+    let mut records = RawRecords::open(
+        path,
+        &RawFormat { scale: scale.unwrap_or(1.0), ..RawFormat::default() },
+        record_shape(&scene.scene),
+    )?;
     let (plan, is_own) = recorded::plan(scene, &records)?;
-    let noise = if is_own { NoiseLevel::OfScene } else { NoiseLevel::Quietest };
+    let noise = if is_own || scale.is_some() { NoiseLevel::OfScene } else { NoiseLevel::Quietest };
     // What is known of the air is not looked at: this is a retrieval.
-    let spectra = words.method == Method::Envelope;
     let options = RecordedOptions { noise: Some(noise), spectra, ..RecordedOptions::default() };
     let (scans, spectra) = match recorded::estimate((&plan, false), &mut records, &options, &Silent)? {
         Recorded::Measured { scans, spectra } => (scans, spectra),
@@ -359,7 +382,7 @@ fn of_map(
     Ok(found)
 }
 
-fn of_signals(words: &RetrieveWords, signals: Signals, found: &mut Found) -> Result<(), Error> {
+fn of_signals(words: &RetrieveWords, signals: Signals, found: &mut Found, told: &dyn Observer) -> Result<(), Error> {
     let Signals { path, mut records, plan, scans, spectra } = signals;
     let own = OwnScene::new(&plan.scene, &Silent)?;
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
@@ -387,6 +410,7 @@ fn of_signals(words: &RetrieveWords, signals: Signals, found: &mut Found) -> Res
         }
         found.scans.push(one);
         found.scenes.push(Some(plan.scene.clone()));
+        told.advance(1);
     }
     Ok(())
 }
@@ -482,12 +506,15 @@ fn text(found: &[RetrievedScan]) -> String {
         }
         for vortex in &scan.result.vortices {
             let (mean, y_m, z_m) = (vortex.circulation_5_15_m2_s, vortex.lateral_position_m, vortex.height_m);
+            let circulation = match (mean.value.is_finite(), mean.std.is_finite()) {
+                (false, _) => "unknown: no line of it has an envelope that ends in the band".into(),
+                (true, false) => format!("{:.1} m^2/s, its error unknown,", mean.value),
+                (true, true) => format!("{:.1} +- {:.1} m^2/s", mean.value, mean.std),
+            };
             out += &format!(
-                "scan {}: {:<5} Gamma(5-15 m) {:.1} +- {:.1} m^2/s at y {:.2} +- {:.2} m, z {:.2} +- {:.2} m{flags}\n",
+                "scan {}: {:<5} Gamma(5-15 m) {circulation} at y {:.2} +- {:.2} m, z {:.2} +- {:.2} m{flags}\n",
                 number + 1,
                 if vortex.side == wakescope_estimate::retrieval::Side::Left { "left" } else { "right" },
-                mean.value,
-                mean.std,
                 y_m.value,
                 y_m.std,
                 z_m.value,

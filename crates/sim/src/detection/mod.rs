@@ -35,8 +35,9 @@ const TRIALS: usize = 2000;
 const PLACES: usize = 200;
 /// Circulations over the bound, of the curves.
 const CURVES: [f64; 4] = [3.0, 4.0, 5.0, 6.0];
-/// Correlation of neighbours beyond which the background is not the one that was stated.
-const CORRELATED: f64 = 0.2;
+/// Correlation of neighbours, in its standard errors, beyond which the background is not the one that was stated: chance brings it once in
+/// some thousand scans.
+const CORRELATED: f64 = 3.5;
 
 /// How wakes are looked for.
 #[derive(Debug, Clone)]
@@ -101,8 +102,8 @@ impl ScanDetection {
     /// Whether what is left of the scan is so correlated that the stated background cannot be the true one.
     #[must_use]
     pub fn is_correlated(&self) -> bool {
-        let (along, across) = self.statistic.neighbour_correlation;
-        along > CORRELATED || across > CORRELATED
+        let ((along, across), errors) = (self.statistic.neighbour_correlation, self.statistic.correlation_error);
+        along > CORRELATED * errors.0 || across > CORRELATED * errors.1
     }
 }
 
@@ -123,6 +124,8 @@ pub struct Power {
     pub roc: Vec<(f64, f64, f64, Share)>,
     /// The circulation that is found nine times in ten, m^2/s: measured, and as the bound foretells.
     pub smallest_m2_s: (f64, f64),
+    /// Standard error of the measured one, m^2/s.
+    pub smallest_error_m2_s: f64,
 }
 
 /// A test with its law, for all scans that are alike.
@@ -236,6 +239,7 @@ impl Calibration {
             found,
             roc,
             smallest_m2_s: trials.smallest_detectable_m2_s(self.threshold),
+            smallest_error_m2_s: trials.smallest_detectable_error_m2_s(self.threshold),
         })
     }
 }
@@ -374,5 +378,26 @@ mod tests {
         assert!(found[0].is_correlated(), "{found:?}");
         let parted = DetectionSettings { stride: (3, 1), ..settings() };
         assert!(!detect(&[smooth], &parted).unwrap().0[0].is_correlated());
+    }
+
+    #[test]
+    fn correlation_of_a_few_neighbours_is_held_against_its_own_error() {
+        let few = |seed: u64| {
+            let whole = map(seed, 0.0);
+            let cells = |all: &Array2<f64>| all.slice(s![20..28, 8..14]).to_owned();
+            ScanMap {
+                elevation_rad: whole.elevation_rad[20..28].to_vec(),
+                time_s: vec![f64::NAN; 8],
+                range_m: whole.range_m[8..14].to_vec(),
+                velocity_m_s: cells(&whole.velocity_m_s),
+                sigma_m_s: whole.sigma_m_s.as_ref().map(cells),
+                fold_m_s: None,
+            }
+        };
+        let scans: Vec<ScanMap> = (100..250).map(few).collect();
+        let (found, _) = detect(&scans, &settings()).unwrap();
+        let beyond = |limit: f64| found.iter().filter(|f| f.statistic.neighbour_correlation.0 > limit).count();
+        // a fifth is chance among so few
+        assert!(beyond(0.2) > 5 && found.iter().filter(|f| f.is_correlated()).count() <= 1, "{}", beyond(0.2));
     }
 }

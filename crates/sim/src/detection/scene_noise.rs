@@ -20,8 +20,9 @@ const LINES: f64 = 96.0;
 const LINES_OF_ALL: f64 = 1536.0;
 /// Their seed differs from the scene's in one bit: a run of the scene itself does not share their noise.
 const SEED_BIT: u64 = 1 << 62;
-/// Velocities that are less correlated are taken as independent; the second where the first leaves less than so many of a scan.
-const INDEPENDENT: [f64; 2] = [0.05, 0.1];
+/// Velocities that are less correlated are taken as independent; the next where one leaves less than so many of a scan. What the last ones leave is
+/// alike, which `excess` counts.
+const INDEPENDENT: [f64; 7] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0];
 const NEEDED: usize = 60;
 /// Median of the absolute value of a normal number.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
@@ -78,17 +79,18 @@ impl SceneNoise {
             mean(products)
         };
         let power = correlation(0, 0);
-        let apart = |most: usize, limit: f64, of: &dyn Fn(usize) -> f64| {
-            (1..most.max(1)).find(|&k| of(k) < limit * power).unwrap_or(most.max(1))
+        let across: Vec<f64> = (0..(lines / 2).max(2)).map(|k| correlation(k, 0) / power).collect();
+        let along: Vec<f64> = (0..(gates / 2).max(2)).map(|k| correlation(0, k) / power).collect();
+        let apart = |of: &[f64], limit: f64| (1..of.len()).find(|&k| of[k] < limit).unwrap_or(of.len());
+        let mut strides = INDEPENDENT.map(|limit| (apart(&across, limit), apart(&along, limit))).into_iter();
+        let leaves = |stride: &(usize, usize)| scan_lines.div_ceil(stride.0) * gates.div_ceil(stride.1);
+        let stride = strides.find(|stride| leaves(stride) >= NEEDED).unwrap_or((1, 1));
+        // on both sides of each, as far as they are alike; none where there is no velocity so far away
+        let left = |of: &[f64], stride: usize| {
+            let alike = of.iter().skip(stride).step_by(stride).take_while(|c| **c > 0.0);
+            1.0 + 2.0 * alike.sum::<f64>()
         };
-        let strides = INDEPENDENT.map(|limit| {
-            (apart(lines / 2, limit, &|k| correlation(k, 0)), apart(gates / 2, limit, &|k| correlation(0, k)))
-        });
-        let leaves = |stride: (usize, usize)| scan_lines.div_ceil(stride.0) * gates.div_ceil(stride.1);
-        let stride = if leaves(strides[0]) < NEEDED { strides[1] } else { strides[0] };
-        // on both sides of each; NaN where there is no velocity so far away
-        let left = |correlation: f64| 1.0 + 2.0 * (correlation / power).max(0.0);
-        let excess = left(correlation(stride.0, 0)) * left(correlation(0, stride.1));
+        let excess = left(&across, stride.0) * left(&along, stride.1);
         // velocities are alike over as many lines as a region has, half of which are near the end
         let ends = stride.0.min(lines / 4);
         let sigma_m_s = deviations(maps, ends);
@@ -102,10 +104,9 @@ impl SceneNoise {
 
     /// Deviations, by range and line, of a map that is the mean of so many `scans`, where it states none or smaller ones: those that
     /// a few scans show of themselves are often far too small. They are those of velocities in sums, with [`excess`](Self::excess).
-    pub fn give(&self, map: &mut ScanMap, scans: usize) {
+    pub fn give(&self, map: &mut ScanMap, scans: f64) {
         let at = |range_m: f64| crate::measure::region::of_table(&self.range_m, &self.sigma_m_s, range_m);
-        let least_m_s: Vec<f64> =
-            map.range_m.iter().map(|r| at(*r) * (self.excess / scans.max(1) as f64).sqrt()).collect();
+        let least_m_s: Vec<f64> = map.range_m.iter().map(|r| at(*r) * (self.excess / scans.max(1.0)).sqrt()).collect();
         let shape = map.velocity_m_s.raw_dim();
         let outer = |line: usize| self.outer.get(line.min(shape[0] - 1 - line)).copied().unwrap_or(1.0);
         let stated = map.sigma_m_s.take().unwrap_or_else(|| Array2::zeros(shape));
@@ -124,7 +125,7 @@ impl SceneNoise {
             sigma_m_s: None,
             fold_m_s: None,
         };
-        self.give(&mut map, 1);
+        self.give(&mut map, 1.0);
         map
     }
 }
@@ -196,6 +197,34 @@ mod tests {
         let stated = 16.0 * noise.excess;
         // 1.04 in closed form, known to 0.05; without what is left 0.87
         assert!((0.95..1.2).contains(&(stated / measured)), "{stated} {measured}");
+    }
+
+    #[test]
+    fn scans_in_which_all_velocities_are_alike_keep_enough_of_them() {
+        use rand_xoshiro::Xoshiro256PlusPlus;
+        use rand_xoshiro::rand_core::{Rng, SeedableRng};
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
+        let (lines, gates, wide) = (40, 20, 12);
+        let mut map = || {
+            let size = (lines + wide, gates + wide);
+            let white = Array2::from_shape_simple_fn(size, || {
+                (0..12).map(|_| rng.next_u64() as f64 / 2f64.powi(64) - 0.5).sum::<f64>()
+            });
+            Array2::<f64>::from_shape_fn((lines, gates), |(i, j)| {
+                white.slice(s![i..i + wide, j..j + wide]).sum() / wide as f64
+            })
+        };
+        let maps: Vec<Array2<f64>> = (0..60).map(|_| map()).collect();
+        let noise = SceneNoise::of_maps((0..gates).map(|gate| gate as f64).collect(), &maps, lines);
+        let (by_line, by_gate) = noise.stride;
+        let left = lines.div_ceil(by_line) * gates.div_ceil(by_gate);
+        // independent ones would be 4 x 2
+        assert!(left >= NEEDED, "{:?}", noise.stride);
+        // and what they share is counted: sums of all that are left
+        let squares = maps.iter().map(|map| map.slice(s![..;by_line, ..;by_gate]).sum().powi(2));
+        let measured = squares.sum::<f64>() / maps.len() as f64;
+        let stated = left as f64 * noise.excess;
+        assert!((0.6..2.5).contains(&(stated / measured)), "{stated} {measured} {:?}", noise.stride);
     }
 
     #[test]

@@ -6,12 +6,23 @@ use super::{Plan, Target};
 use crate::Error;
 use crate::measure::air::radial_velocity_m_s;
 use crate::scene::{Flow, Outside};
+use wakescope_estimate::wake_detection::WakeDetector;
 
-/// Refuses what a run of the plan would refuse: lines that leave a simulated flow.
+/// Refuses what a run of the plan would refuse: lines that leave a simulated flow, a test for a wake in a scan of a few velocities.
 ///
 /// # Errors
 /// The first place outside, in the words of the run.
 pub(super) fn check(plan: &Plan) -> Result<(), Error> {
+    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let velocities = g.elevation_rad.len() * g.gate_range_m.len();
+    let is_tested = plan.target == Target::Run && scene.retrieval.as_ref().is_some_and(|r| r.false_alarm.is_some());
+    if is_tested && velocities < WakeDetector::NEEDED {
+        let reason = format!(
+            "the scan has {velocities} velocities: a test for a wake needs {} lines times gates at least, or no retrieval.false_alarm",
+            WakeDetector::NEEDED
+        );
+        return Err(Error::Input { path: "retrieval.false_alarm".into(), reason });
+    }
     if plan.target == Target::Efficiency { Ok(()) } else { lines_stay_inside(plan) }
 }
 

@@ -86,6 +86,7 @@ mod tests {
             pulse_width_s: None,
             scene_toml: None,
             is_own: false,
+            scans: 1.0,
         };
         let std_m = |scan: &ReadScan, stated| match gate_of(Some(scan), stated, None).unwrap() {
             (Gate::Gaussian { std_m }, told) => (std_m, told.is_some()),

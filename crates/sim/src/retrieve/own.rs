@@ -244,8 +244,15 @@ impl OwnScene {
         let setup = self.response.setup(&self.scene, options.model, elevation_rad)?;
         let snr = |range_m: f64, _: f64| self.response.snr_at(range_m);
         let fit_options = SignalFitOptions { free: options.free, ..SignalFitOptions::default() };
-        let fit = fit_signals(&setup, snr, samples, self.noise_power_a2, &guess, &fit_options)
-            .map_err(|error| refused(&scan, &error))?;
+        let fit = match fit_signals(&setup, snr, samples, self.noise_power_a2, &guess, &fit_options) {
+            // what the map shows is what was found
+            Err(wakescope_estimate::Error::NotConverged { .. }) => {
+                let mut result = result;
+                set(&mut result.flags, Flag::NotConverged, true);
+                return Ok(RetrievedScan { scan, options, result });
+            }
+            fit => fit.map_err(|error| refused(&scan, &error))?,
+        };
         let SignalFit { wake, covariance, tops, log_likelihood_gain, used_rays, .. } = fit;
         let best = tops.iter().map(|top| top.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
         let tops = tops.iter().map(|top| Top { wake: top.wake, chi2: 2.0 * (best - top.log_likelihood) }).collect();
@@ -294,6 +301,7 @@ pub(super) fn retold(
     let is_instant = map.has_times() && map.lasts_s() == 0.0;
     set(&mut flags, Flag::MotionIgnored, !moves && !is_instant);
     set(&mut flags, Flag::CoreKept, vortices.iter().any(|vortex| vortex.core_radius_m.is_none()));
+    set(&mut flags, Flag::NotConverged, false);
     let competing = tops.iter().skip(1).any(|top: &Top| top.chi2 - tops[0].chi2 < COMPETES);
     set(&mut flags, Flag::Ambiguous, competing);
     ScanResult {

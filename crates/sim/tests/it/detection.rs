@@ -113,6 +113,34 @@ fn a_scene_alone_says_what_would_be_found_in_it() {
     assert!(number("detection") > 0.9 && number("needed_snr_db") < 10.0);
 }
 
+/// Nine scans of still air: a map of nine realisations has a third of the deviation of one, whatever the scene says that is given with it.
+#[test]
+fn a_map_of_several_realisations_is_tested_with_the_deviation_of_their_mean() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |realisations: usize| {
+        let flow = "[flow]\nkind = \"uniform\"\nlateral_m_s = 4.0\nvertical_m_s = 0.0\n[scan]\n";
+        SCENE.replace("[scan]\n", flow).replace("realisations = 2", &format!("realisations = {realisations}"))
+    };
+    std::fs::write(folder.path().join("one.toml"), of(1)).unwrap();
+    std::fs::write(folder.path().join("nine.toml"), of(9)).unwrap();
+    json(folder.path(), &["run", "nine.toml", "--out", "nine"]);
+    json(folder.path(), &["run", "one.toml", "--out", "one"]);
+    let found = ["one/map.csv", "nine/map.csv", "nine/map.nc"].map(|map| {
+        let found = json(
+            folder.path(),
+            &["detect", map, "--scene", "one.toml", "--empty-scans", "2000", "--out", "found", "--overwrite"],
+        );
+        let chi2 = found["scans"][0]["chi2_per_dof"]["wind"].as_f64().unwrap();
+        // some sixty velocities: known to a fifth
+        assert!((0.4..1.7).contains(&chi2), "{map}: {chi2}");
+        found["smallest_detectable_m2_s"].as_f64().unwrap()
+    });
+    assert!(
+        (found[0] / found[1] / 3.0 - 1.0).abs() < 0.1 && (found[1] - found[2]).abs() < 1e-6 * found[1],
+        "{found:?}"
+    );
+}
+
 #[test]
 fn data_and_words_that_cannot_be_tested_are_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();

@@ -51,6 +51,21 @@ impl VelocityMap<'_> {
         self.range_m.first().zip(self.range_m.last()).map_or(0.0, |(a, b)| (b - a) / self.range_m.len() as f64)
     }
 
+    /// Lines and gates of blocks, about as wide as long, of which the map has no more than `most`.
+    pub(crate) fn blocks(&self, most: usize) -> (usize, usize) {
+        let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
+        let (line_m, gate_m) = (self.line_spacing_m(), self.gate_spacing_m());
+        let (mut by_line, mut by_gate) = (1, 1);
+        while lines.div_ceil(by_line) * gates.div_ceil(by_gate) > most {
+            if by_line as f64 * line_m <= by_gate as f64 * gate_m && by_line < lines || by_gate >= gates {
+                by_line += 1;
+            } else {
+                by_gate += 1;
+            }
+        }
+        (by_line, by_gate)
+    }
+
     /// Standard deviation of one velocity, 1 if none was given.
     pub(crate) fn deviation(&self, line: usize, gate: usize) -> f64 {
         self.standard_deviation_m_s.as_ref().map_or(1.0, |d| d[[line, gate]])

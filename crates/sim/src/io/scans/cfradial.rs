@@ -4,7 +4,7 @@
 //! standard names, which say the sign, or by the names that instruments use. Check: maps of this program, and of Py-ART and
 //! xradar in the tests of the program; files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
-use super::grid::{RayRow, between_turns, of_mean, one_plane, scan_map};
+use super::grid::{RayRow, between_turns, mean_count, of_mean, one_plane, scan_map};
 use super::source::Source;
 use super::{ReadScan, ScanFormat};
 use crate::io::UtcTime;
@@ -63,6 +63,7 @@ pub(super) fn scans(
     let ratio_db = if format.min_snr_db.is_some() { layout.optional(file, &RATIOS)? } else { None };
     let sigma_m_s = layout.optional(file, &SIGMAS)?;
     let realisations = if velocity.is_mean { layout.optional(file, &["count"])? } else { None };
+    let scans = mean_count(realisations.iter().flatten().copied());
     let moving = if file.has("antenna_transition") { file.floats("antenna_transition")? } else { Vec::new() };
     let fold_m_s = nyquist(file)?.map(|nyquist| 2.0 * nyquist);
     let gates = range_m.len();
@@ -122,6 +123,7 @@ pub(super) fn scans(
                     pulse_width_s,
                     scene_toml: scene_toml.clone(),
                     is_own,
+                    scans,
                 }),
             }
         }

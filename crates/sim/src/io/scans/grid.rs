@@ -40,6 +40,12 @@ pub(super) fn of_mean(sigma_m_s: f64, count: Option<f64>) -> f64 {
     }
 }
 
+/// Scans of which the velocities of a map are means, from those of each cell; 1 where none are counted.
+pub(super) fn mean_count(counts: impl Iterator<Item = f64>) -> f64 {
+    let (sum, cells) = counts.filter(|count| *count > 0.0).fold((0.0, 0.0), |(sum, cells), c| (sum + c, cells + 1.0));
+    if cells > 0.0 { sum / cells } else { 1.0 }
+}
+
 /// The map of rays; `what` names the scan in messages.
 pub(super) fn scan_map(
     mut rays: Vec<RayRow>,

@@ -93,6 +93,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
             pulse_width_s: None,
             scene_toml: None,
             is_own: head.contains(&crate::io::hpl::SYSTEM_ID),
+            scans: 1.0,
         });
     }
     Ok(out)

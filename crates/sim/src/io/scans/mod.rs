@@ -54,6 +54,8 @@ pub struct ReadScan {
     pub scene_toml: Option<String>,
     /// Whether this program made its velocities, so that its estimator is that of the scene.
     pub is_own: bool,
+    /// Scans of which each velocity is the mean, as the file counts them: 1 for a single scan.
+    pub scans: f64,
 }
 
 impl ReadScan {
@@ -68,6 +70,7 @@ impl ReadScan {
             pulse_width_s: None,
             scene_toml: None,
             is_own: true,
+            scans: 1.0,
         }
     }
 }

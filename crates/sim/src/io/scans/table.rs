@@ -2,7 +2,7 @@
 //!
 //! Check: maps of a run, references, cells that are missing, twice there, or make no grid.
 
-use super::grid::{RayRow, of_mean, one_plane, scan_map};
+use super::grid::{RayRow, mean_count, of_mean, one_plane, scan_map};
 use super::{ReadScan, ScanFormat};
 use crate::io::csv_input::TextTable;
 use std::collections::BTreeMap;
@@ -107,6 +107,7 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
                 gate_length_m: None,
                 pulse_width_s: None,
                 scene_toml: Some(origin.scene_toml.clone()).filter(|text| !text.is_empty()),
+                scans: mean_count(columns.count.iter().flat_map(|c| rows.iter().map(|row| table.number(*row, *c)))),
                 // Programs that write it again keep the names of its columns.
                 is_own: table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some(),
             })
