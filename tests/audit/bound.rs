@@ -50,12 +50,19 @@ pub(crate) fn record_information(s: &Scene, pulse: &Pulse, n: usize, snr: f64) -
 fn correlation2(s: &Scene, pulse: &Pulse, apart: usize, snr: f64) -> f64 {
     let ts = 1.0 / s.f("detector.sampling_hz");
     let h: Vec<f64> = window_powers(s).iter().map(|h2| h2.sqrt()).collect();
-    // The density of noise B wide as that of white noise: F_s/B times stronger.
-    let over = 1.0 / (s.f("detector.bandwidth_hz") * ts * snr);
+    // White noise has F_s/B times the power in the band; that of the band alone is alike over its inverse.
+    let b = s.f("detector.bandwidth_hz") * ts;
+    let noise = |l: i64| match (s.s("detector.noise").as_str(), l) {
+        ("none", _) => 0.0,
+        ("white", 0) => 1.0 / (b * snr),
+        ("white", _) => 0.0,
+        (_, 0) => 1.0 / snr,
+        (_, l) => (PI * b * l as f64).sin() / (PI * b * l as f64) / snr,
+    };
     let spread = 1.0 + (2.0 * PI * pulse.chirp_hz_s * pulse.sigma_s.powi(2)).powi(2);
     let c = |l: i64| {
         let of_signal = (-spread * (l as f64 * ts / (2.0 * pulse.sigma_s)).powi(2)).exp();
-        of_signal + if l == 0 && s.s("detector.noise") != "none" { over } else { 0.0 }
+        of_signal + noise(l)
     };
     let sum = |shift: i64| {
         let mut sum = 0.0;

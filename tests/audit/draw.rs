@@ -208,7 +208,9 @@ fn estimator(r: &mut Random, s: &mut Scene) {
         .set("estimator.window_step_samples", r.whole(1, 4));
     s.set("estimator.gate_step_samples", r.pick(&[5, 8, 12, 20]))
         .set("estimator.padded_samples", r.pick(&[256, 512, 1024]));
-    s.word("estimator.weighting", r.pick(&["gaussian", "rectangular", "hann"]));
+    let weighting = r.pick(&["gaussian", "rectangular", "hann"]);
+    // The likelihood has tapers of its own.
+    s.word("estimator.weighting", if method == "likelihood" { "gaussian" } else { weighting });
     s.word("estimator.method.kind", method).number("estimator.false_alarm", r.pick(&[0.01, 0.0, 0.1]));
     if ["autoregressive", "autoregressive_pole", "capon"].contains(&method) {
         s.set("estimator.method.order", r.whole(2, 15));

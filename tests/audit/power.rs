@@ -53,11 +53,12 @@ impl Pulse {
     }
 }
 
-/// h^2 of the samples of a window (page Estimation, Periodogram), the largest near 1.
+/// h^2 of the samples of a window (page Estimation, Periodogram), the largest near 1; the tapers of a likelihood see all alike.
 pub(crate) fn window_powers(s: &Scene) -> Vec<f64> {
     let n = s.n("estimator.window_samples");
     let from_middle = |i: usize| i as f64 - 0.5 * (n as f64 - 1.0);
     let h2 = |i: usize| match s.s("estimator.weighting").as_str() {
+        _ if s.s("estimator.method.kind") == "likelihood" => 1.0,
         "gaussian" => (-(from_middle(i) / (0.25 * n as f64)).powi(2)).exp(),
         "hann" => (PI * from_middle(i) / n as f64).cos().powi(4),
         _ => 1.0,

@@ -3,16 +3,12 @@
 use super::ledger::{Ledger, Tally};
 
 /// Numbers that are known to be wrong, with the reason; one that comes right must be taken out.
-const AWAITED: [(&str, &str); 26] = [
+const AWAITED: [(&str, &str); 21] = [
     ("retrieve halo.hpl: as of map.nc", "only a scene found in the file tells the fit which estimator made the map"),
     ("detection.csv: chi2_per_dof_wind", "a mean over realisations is taken for one scan"),
-    ("results.csv: circulation_failed_fraction, of no fit", "1 where no fit is tried"),
     ("results.nc: scene_hash", "missing"),
     ("ends of a range that is called allowed", "they are refused"),
     ("wake: a plane at the age that was asked for", "refused for its last digit"),
-    ("bound: bound_region_m_s", "windows shorter than the pulse: errors of neighbours are not alike as powers are"),
-    ("bound: n_eff", "noise of the density of white noise; one ratio for all gates and rows"),
-    ("map.csv: n_eff", "the same"),
     ("budget text: flow reaches", "the peak of one vortex in place of the largest velocity of the lines"),
     ("map.csv: snr_db", "the window spreads noise and signal out of the band"),
     ("map.csv: standard_error_m_s*", "too small with few realisations"),
@@ -20,7 +16,6 @@ const AWAITED: [(&str, &str); 26] = [
     ("map.nc: nyquist_velocity", "twice the truth for real currents"),
     ("map.nc: pulse_width", "what the scene states in place of the full width at half maximum"),
     ("results.csv: *standard_error*", "cells with outliers count least"),
-    ("run results: std_mean_m_s", "a mean of deviations in place of a quadratic one"),
     ("scan: wake_moves_m", "winds of added_flows do not count"),
     ("wake.nc: gamma says its radii", "named 5_15 whatever the radii"),
     ("wake: --seed", "ignored"),

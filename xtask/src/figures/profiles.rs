@@ -161,7 +161,9 @@ mod tests {
         let range_m: Vec<f64> = (-14..=14).map(|k| 3.0 * f64::from(k)).collect();
         let average = |r: &f64| CellAverage {
             bias_m_s: 0.0,
+            bias_standard_error_m_s: 0.0,
             std_m_s: 0.0,
+            std_standard_error_m_s: 0.0,
             rms_m_s: 0.5 + 2.0 * (-0.5 * (r / 8.0).powi(2)).exp(),
             standard_error_m_s: 0.1,
         };

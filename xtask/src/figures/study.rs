@@ -218,12 +218,12 @@ impl Study {
 
     /// Averages over some cells, whose neighbours share lines and gates.
     pub(super) fn over_cells(&self, cells: &[(usize, usize)]) -> CellAverage {
-        CellAverage::over(&self.map, cells, SHARED_CELLS)
+        CellAverage::over(&self.map, cells, (SHARED_LINES, SHARED_GATES))
     }
 
     /// Averages over cells of a profile: at one gate, or at one for each vortex.
     pub(super) fn over_profile(&self, cells: &[(usize, usize)]) -> CellAverage {
-        CellAverage::over(&self.map, cells, SHARED_LINES)
+        CellAverage::over(&self.map, cells, (SHARED_LINES, SHARED_GATES))
     }
 }
 

@@ -2,7 +2,9 @@
 
 mod extended;
 pub(crate) mod gradient;
+mod record;
 pub(crate) mod window_model;
 
 pub use gradient::{GradientBound, GradientModel};
+pub use record::RecordModel;
 pub use window_model::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s, information_complex, information_real};

@@ -85,7 +85,7 @@ pub fn information_real(
 /// Rounding changes the smallest eigenvalue by the order times the unit of rounding. At this limit the bound of a 200 ns pulse
 /// in 64 samples at 0 dB is right to some 1e-4, at a fifth of it to 4e-3, both held against 60 digits; there it soon
 /// loses all meaning.
-const LEAST_CONDITION: f64 = 32.0 * f64::EPSILON;
+pub(super) const LEAST_CONDITION: f64 = 32.0 * f64::EPSILON;
 
 /// R^-1 dR for each derivative, unless R is too near a singular matrix.
 fn solved<T: Scalar<Real = f64> + Lapack>(

@@ -1,33 +1,34 @@
 //! The radius rho(R) that a target variance needs: small where the signal is strong or the lines are close, larger
 //! where they are not.
 //!
-//! A large region averages noise away and blurs the vortex; this takes the smallest that is enough. The variance of a
-//! mean of n_eff independent windows is that of one window over n_eff. Check: the variance asked for is reached and
+//! A large region averages noise away and blurs the vortex; this takes the smallest that is enough. The information of a region is
+//! the sum of that of its pulses, each of the record that its chord covers. Check: the variance asked for is reached and
 //! not by much more; the radius grows with range.
 
 use crate::error::{Error, positive};
-use crate::map::{PolarPoint, Radius, ScanGeometry, WindowCorrelation};
+use crate::map::{PolarPoint, Radius, ScanGeometry};
 
 /// Bisections of the radius: to a thousandth of the largest.
 const BISECTIONS: usize = 10;
 
 impl ScanGeometry {
-    /// Smallest radius \[m\] about `point` whose region is worth `n_eff` independent windows, to a thousandth of `largest_m`.
+    /// Smallest radius \[m\] about `point` whose region has so much `information`, 1/(m/s)^2, to a thousandth of `largest_m`, where a
+    /// pulse has `by_gates` in a chord of 1, 2, .. gates.
     ///
     /// `None` if even `largest_m` is not enough.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] unless `n_eff` and `largest_m` are above 0.
+    /// [`Error::OutOfRange`] unless `information` and `largest_m` are above 0.
     pub fn radius_for(
         &self,
         point: PolarPoint,
-        n_eff: f64,
-        correlation: &WindowCorrelation,
+        information: f64,
+        by_gates: &[f64],
         largest_m: f64,
     ) -> Result<Option<f64>, Error> {
-        positive("n_eff", n_eff)?;
+        positive("information", information)?;
         positive("largest_m", largest_m)?;
-        let enough = |radius_m: f64| self.level(point, radius_m, correlation).1 >= n_eff;
+        let enough = |radius_m: f64| self.information(point, radius_m, by_gates) >= information;
         if !enough(largest_m) {
             return Ok(None);
         }
@@ -51,17 +52,16 @@ impl Radius {
     /// rho(R) for a target standard deviation `target_m_s` \[m/s\] of velocity: the smallest region in the middle of
     /// the scan that is enough, at most `largest_m`.
     ///
-    /// `single_m_s` gives the standard deviation of one window \[m/s\] at a range \[m\]: the bound for the
-    /// signal-to-noise ratio there ([`WindowModel::bound_m_s`](crate::bound::WindowModel::bound_m_s)) times what the
-    /// estimator loses. Between the ranges of a table of 65, increasing, the radius is interpolated. Where
-    /// `largest_m` is not enough it is taken all the same: n_eff of the map tells.
+    /// `by_gates` gives the information of one pulse on the velocity, 1/(m/s)^2, in chords of 1, 2, .. gates at a range \[m\]:
+    /// that of the record ([`RecordModel::information`](crate::bound::RecordModel::information)) for the signal-to-noise ratio
+    /// there, less what the estimator loses. Between the ranges of a table of 65, increasing, the radius is interpolated. Where
+    /// `largest_m` is not enough it is taken all the same: the bound tells.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a target, radius or standard deviation that is not above 0.
+    /// [`Error::OutOfRange`] for a target or radius that is not above 0.
     pub fn for_standard_deviation(
         geometry: &ScanGeometry,
-        correlation: &WindowCorrelation,
-        single_m_s: impl Fn(f64) -> f64,
+        by_gates: impl Fn(f64) -> Vec<f64>,
         target_m_s: f64,
         largest_m: f64,
     ) -> Result<Self, Error> {
@@ -74,10 +74,8 @@ impl Radius {
         let table_m: Vec<f64> = (0..=64)
             .map(|k| {
                 let range_m = first_m + f64::from(k) * step_m;
-                let single = single_m_s(range_m);
-                positive("single_m_s", single)?;
                 let point = PolarPoint { range_m, elevation_rad };
-                let radius_m = geometry.radius_for(point, (single / target_m_s).powi(2), correlation, largest_m)?;
+                let radius_m = geometry.radius_for(point, target_m_s.powi(-2), &by_gates(range_m), largest_m)?;
                 Ok(radius_m.unwrap_or(largest_m))
             })
             .collect::<Result<_, Error>>()?;

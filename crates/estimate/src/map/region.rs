@@ -217,13 +217,33 @@ impl ScanGeometry {
     /// Accumulation level and n_eff of a region when all samples are valid (figure 9), without any signal.
     #[must_use]
     pub fn level(&self, point: PolarPoint, radius_m: f64, correlation: &WindowCorrelation) -> (usize, f64) {
-        let (mut level, mut pairs) = (0, 0.0);
-        for chord in self.chords(point, radius_m) {
-            let rays = self.rays.count(chord.line);
-            level += rays * chord.gates();
-            pairs += rays as f64 * correlation.pair_sum(chord.gates());
-        }
-        (level, effective(level, pairs))
+        let level = self.windows(point, radius_m);
+        (level, effective(level, self.sum_over_rays(point, radius_m, |gates| correlation.pair_sum(gates))))
+    }
+
+    /// Windows of a region, when all samples are valid.
+    #[must_use]
+    pub fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
+        self.sum_over_rays(point, radius_m, |gates| gates as f64) as usize
+    }
+
+    /// Information of a region whose rays have `by_gates` in chords of 1, 2, .. gates, and the last of it in longer ones; 0 without any.
+    #[must_use]
+    pub fn information(&self, point: PolarPoint, radius_m: f64, by_gates: &[f64]) -> f64 {
+        let of_gates = |gates: usize| by_gates.get(gates.min(by_gates.len()).wrapping_sub(1)).copied().unwrap_or(0.0);
+        self.sum_over_rays(point, radius_m, of_gates)
+    }
+
+    /// Sum over the rays of a region of what one gives whose chord has so many gates, all samples being valid.
+    fn sum_over_rays(&self, point: PolarPoint, radius_m: f64, of_gates: impl Fn(usize) -> f64) -> f64 {
+        let of_chord = |chord: Chord| self.rays.count(chord.line) as f64 * of_gates(chord.gates());
+        self.chords(point, radius_m).map(of_chord).sum()
+    }
+
+    /// Most gates of a chord of regions of a radius.
+    #[must_use]
+    pub fn most_gates(&self, radius_m: f64) -> usize {
+        ((2.0 * radius_m / self.spacing_m + 1e-5) as usize).min(self.gates - 1) + 1
     }
 }
 
@@ -236,6 +256,68 @@ fn sin_cos_between([a, b, c]: &[f64; 3], [d, e, f]: &[f64; 3]) -> (f64, f64) {
 /// (sum n)^2 / sum over pairs of gamma^2; 0 for an empty region.
 pub(crate) fn effective(level: usize, pairs: f64) -> f64 {
     if level == 0 { 0.0 } else { (level as f64).powi(2) / pairs }
+}
+
+/// Covariance between the windows of one pulse against their distance in gates, of the signal and of the noise: that of their
+/// Fourier coefficients at the peak.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WindowCovariance {
+    signal: Vec<f64>,
+    noise: Vec<f64>,
+}
+
+impl WindowCovariance {
+    /// From the weights of a window and the covariances of the samples by their lag, the carrier removed; those of signal and noise
+    /// in one unit. Up to `gates` windows, as far apart as either is known to reach.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without weights.
+    pub fn new(
+        weights: &[f64],
+        step_samples: usize,
+        gates: usize,
+        signal: impl Fn(usize) -> f64,
+        noise: impl Fn(usize) -> f64,
+    ) -> Result<Self, Error> {
+        if weights.is_empty() {
+            return Err(Error::Empty { field: "weights" });
+        }
+        let overlap: Vec<f64> =
+            (0..weights.len()).map(|d| weights[d..].iter().zip(weights).map(|(a, b)| a * b).sum()).collect();
+        let at = |covariance: &dyn Fn(usize) -> f64, gate: usize| -> f64 {
+            let shift = (gate * step_samples) as i64;
+            let reach = overlap.len() as i64 - 1;
+            (-reach..=reach)
+                .map(|d| overlap[d.unsigned_abs() as usize] * covariance((shift + d).unsigned_abs() as usize))
+                .sum()
+        };
+        let of = |covariance: &dyn Fn(usize) -> f64, reach: &dyn Fn(usize, f64) -> bool| -> Vec<f64> {
+            let all = (0..gates.max(1)).map(|gate| (gate, at(covariance, gate)));
+            all.take_while(|(gate, value)| *gate == 0 || reach(*gate, *value)).map(|(_, value)| value).collect()
+        };
+        let whole = at(&signal, 0);
+        let signal = of(&signal, &|_, value| value.abs() > 1e-8 * whole);
+        // Noise of a band is alike a little at any distance: where windows share no sample, too little to be counted.
+        let noise = of(&noise, &|gate, _| gate * step_samples < 2 * weights.len());
+        Ok(Self { signal, noise })
+    }
+
+    /// The correlation where the signal is `snr` times what it was given as, or the noise so much less. Without any signal it is that of
+    /// noise, which a small ratio says as well.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the power of the window is not above 0.
+    pub fn correlation(&self, snr: f64) -> Result<WindowCorrelation, Error> {
+        let noise = snr.recip().min(1e12);
+        let at = |gate: usize| {
+            let of = |part: &[f64]| part.get(gate).copied().unwrap_or(0.0);
+            of(&self.signal) + noise * of(&self.noise)
+        };
+        let power = at(0);
+        positive("power of the window", power)?;
+        let gates = self.signal.len().max(if noise > 0.0 { self.noise.len() } else { 0 });
+        WindowCorrelation::from_gate_lags(&(0..gates).map(|gate| (at(gate) / power).abs()).collect::<Vec<f64>>())
+    }
 }
 
 /// Correlation gamma between the windowed signals of one pulse against their distance in gates.
@@ -280,29 +362,14 @@ impl WindowCorrelation {
         gates: usize,
         covariance: impl Fn(usize) -> f64,
     ) -> Result<Self, Error> {
-        if weights.is_empty() {
-            return Err(Error::Empty { field: "weights" });
-        }
-        let overlap: Vec<f64> =
-            (0..weights.len()).map(|d| weights[d..].iter().zip(weights).map(|(a, b)| a * b).sum()).collect();
-        let at = |gate: usize| -> f64 {
-            let shift = (gate * step_samples) as i64;
-            let reach = overlap.len() as i64 - 1;
-            (-reach..=reach)
-                .map(|d| overlap[d.unsigned_abs() as usize] * covariance((shift + d).unsigned_abs() as usize))
-                .sum()
-        };
-        let power = at(0);
-        positive("power of the window", power)?;
-        let gamma: Vec<f64> =
-            (0..gates.max(1)).map(|gate| (at(gate) / power).abs()).take_while(|gamma| *gamma > 1e-8).collect();
-        Self::from_gate_lags(&gamma)
+        WindowCovariance::new(weights, step_samples, gates, covariance, |_| 0.0)?.correlation(f64::INFINITY)
     }
 
     /// For a Gaussian pulse, |f|^2 ~ exp(-t^2 / sigma^2), in uniform wind with white noise.
     ///
-    /// `pulse_sigma_s` is the half-width of |f|^2 at 1/e \[s\]; `noise_to_signal` the variance of the white noise over the
-    /// signal power, per sample (2.5 / SNR for real samples when the band is 2/5 of half the rate).
+    /// `pulse_sigma_s` is the half-width of |f|^2 at 1/e \[s\]; `noise_to_signal` is F_s/(B SNR), the density of the noise over
+    /// the signal power: the ratio of the variances of complex samples, and twice that of real ones, whose signal stands at one of
+    /// two frequencies (5 / SNR when the band is a fifth of the rate).
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a pulse or noise that is not positive, and as [`WindowCorrelation::from_covariance`].
@@ -378,6 +445,7 @@ mod tests {
         let gates = Gates::new(64, 1, 0.0).unwrap();
         let weights = Weighting::Rectangular.weights(64).unwrap();
         let sigma_s = 200e-9 / (2.0 * 2.0_f64.ln().sqrt());
+        // The noise hardly shows here; that it is right, other windows tell.
         for noise_to_signal in [0.0, 2.5, 25.0] {
             let correlation =
                 WindowCorrelation::gaussian_pulse(&weights, &gates, 100, 250e6, sigma_s, noise_to_signal).unwrap();
@@ -387,6 +455,18 @@ mod tests {
         let identical = WindowCorrelation::from_gate_lags(&[1.0; 20]).unwrap();
         let (_, n_eff) = geometry.level(point, 2.0, &identical);
         assert_relative_eq!(n_eff, 43.0 * 43.0 / 249.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn information_of_a_region_is_the_sum_over_its_rays_of_that_of_their_chords() {
+        let (geometry, point) = around_400_m();
+        let by_gates: Vec<f64> = (1..=20).map(|gates| f64::from(gates).powf(1.5)).collect();
+        let direct: f64 = geometry.chords(point, 2.0).map(|chord| by_gates[chord.gates() - 1]).sum();
+        assert_relative_eq!(geometry.information(point, 2.0, &by_gates), direct, max_relative = 1e-12);
+        assert_eq!(geometry.chords(point, 2.0).map(|chord| chord.gates()).max(), Some(geometry.most_gates(2.0)));
+        // Longer chords than are known have what the longest known has.
+        assert_relative_eq!(geometry.information(point, 2.0, &[2.0]), 18.0);
+        assert_eq!(geometry.information(point, 2.0, &[]), 0.0);
     }
 
     #[test]

@@ -420,26 +420,26 @@ fn estimators_of_others_plug_in() {
 fn automatic_radius_is_the_smallest_that_reaches_the_target() {
     let elevation_rad: Vec<f64> = (0..101).map(|i| 1.25e-3 * f64::from(i)).collect();
     let geometry = ScanGeometry::new(&table_2(), &gates(), &elevation_rad, 1000).unwrap();
-    let weights = Weighting::Rectangular.weights(64).unwrap();
-    let correlation = WindowCorrelation::gaussian_pulse(&weights, &gates(), 100, 250e6, 120e-9, 2.5).unwrap();
-    // one window: 0.69 m/s near the lidar, more with the range
-    let single_m_s = |range_m: f64| 0.69 * range_m / 400.0;
+    // one window: 0.69 m/s near the lidar, more with the range; long chords tell more than the root of their gates
+    let by_gates = |range_m: f64| -> Vec<f64> {
+        (1..=100).map(|gates| (0.69 * range_m / 400.0).powi(-2) * f64::from(gates).powf(1.2)).collect()
+    };
     let target_m_s = 0.2;
-    let radius = Radius::for_standard_deviation(&geometry, &correlation, single_m_s, target_m_s, 20.0).unwrap();
+    let radius = Radius::for_standard_deviation(&geometry, by_gates, target_m_s, 20.0).unwrap();
     let mut before_m = 0.0;
     for range_m in [380.0, 450.0, 600.0, 800.0] {
         let radius_m = radius.at_m(range_m).unwrap();
         let point = PolarPoint { range_m, elevation_rad: elevation_rad[50] };
-        let std_m_s = |radius_m: f64| single_m_s(range_m) / geometry.level(point, radius_m, &correlation).1.sqrt();
+        let std_m_s = |radius_m: f64| geometry.information(point, radius_m, &by_gates(range_m)).sqrt().recip();
         assert!(std_m_s(radius_m * 1.1) < target_m_s && std_m_s(radius_m * 0.6) > target_m_s, "{range_m}: {radius_m}");
         assert!(radius_m > before_m);
         before_m = radius_m;
     }
     // out of reach: the largest
-    let modest = Radius::for_standard_deviation(&geometry, &correlation, single_m_s, 1e-3, 5.0).unwrap();
+    let modest = Radius::for_standard_deviation(&geometry, by_gates, 1e-3, 5.0).unwrap();
     assert_eq!(modest.at_m(600.0).unwrap(), 5.0);
-    assert!(Radius::for_standard_deviation(&geometry, &correlation, |_| 0.0, 0.2, 5.0).is_err());
+    assert!(Radius::for_standard_deviation(&geometry, by_gates, 0.0, 5.0).is_err());
     let point = PolarPoint { range_m: 400.0, elevation_rad: 0.05 };
-    assert_eq!(geometry.radius_for(point, 1e9, &correlation, 5.0).unwrap(), None);
-    assert!(geometry.radius_for(point, 0.0, &correlation, 5.0).is_err());
+    assert_eq!(geometry.radius_for(point, 1e9, &by_gates(400.0), 5.0).unwrap(), None);
+    assert!(geometry.radius_for(point, 0.0, &by_gates(400.0), 5.0).is_err());
 }

@@ -1,10 +1,10 @@
 //! The bound against a stored curve, a closed form and difference quotients.
 
-use crate::fixtures::{sigma_s, table_2};
+use crate::fixtures::{baseband, sigma_s, table_2};
 use approx::assert_relative_eq;
 use ndarray::Array2;
 use num_complex::Complex;
-use wakescope_estimate::{Error, Sampling, SignalKind, bound::*};
+use wakescope_estimate::{Error, Gates, Sampling, SignalKind, bound::*};
 
 #[test]
 fn bound_of_a_200_ns_pulse_is_the_stored_curve_from_minus_40_to_60_db() {
@@ -216,4 +216,83 @@ fn any_covariance_is_accepted_and_impossible_ones_are_refused() {
     assert!(WindowModel::point_target(&sampling, &[0.0; 4], Noise::White).is_err());
     let model = WindowModel::gaussian_pulse(&sampling, 8, 1e-7, Noise::White).unwrap();
     assert!(model.bound_m_s(0.0, 0.0, SignalKind::Real, 1.0).is_err());
+}
+
+/// The bound from 1, 2, .. windows of `window` samples in a row, `step` apart, m/s.
+fn rows_m_s(
+    (sampling, kind): (&Sampling, SignalKind),
+    sigma_s: f64,
+    noise: Noise,
+    (window, step, count): (usize, usize, usize),
+    snr: f64,
+) -> Vec<f64> {
+    let lag = |m: usize| m as f64 * sampling.period_s() / sigma_s;
+    let correlation = (0..2000).map(|m| (-0.25 * lag(m).powi(2)).exp()).collect();
+    let model = RecordModel::new(sampling, kind, noise, correlation, true).unwrap();
+    let gates = Gates::new(window, step, 0.0).unwrap();
+    model.information(&gates, count, |_| snr).unwrap().into_iter().map(|x| x.sqrt().recip()).collect()
+}
+
+#[test]
+fn bound_of_windows_in_a_row_is_that_of_the_samples_that_they_cover() {
+    for (sampling, kind) in [(table_2(), SignalKind::Real), (baseband(), SignalKind::Complex)] {
+        for (noise, snr) in [
+            (Noise::White, 10.0),
+            (Noise::White, 0.01),
+            (Noise::Band { floor: 1e-6 }, 0.3),
+            (Noise::Band { floor: 1e-4 }, 100.0),
+        ] {
+            for (sigma_s, (window, step, count)) in
+                [(sigma_s(400e-9), (16, 1, 100)), (sigma_s(100e-9), (16, 5, 12)), (sigma_s(200e-9), (64, 1, 7))]
+            {
+                let found_m_s = rows_m_s((&sampling, kind), sigma_s, noise, (window, step, count), snr);
+                assert_eq!(found_m_s.len(), count);
+                for windows in [1, count / 2, count] {
+                    let samples = window + (windows - 1) * step;
+                    let whole = WindowModel::gaussian_pulse(&sampling, samples, sigma_s, noise).unwrap();
+                    let expected_m_s = whole.bound_m_s(0.0, snr, kind, 1.0).unwrap();
+                    // Rounding is magnified by the condition of the covariance.
+                    assert_relative_eq!(found_m_s[windows - 1], expected_m_s, max_relative = 1e-5);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn records_far_longer_than_window_and_pulse_are_continued_and_gaps_tell_nothing() {
+    let of = |window, noise, snr, count| {
+        rows_m_s((&baseband(), SignalKind::Complex), sigma_s(200e-9), noise, (window, 1, count), snr)
+    };
+    for (noise, snr) in [(Noise::White, 0.1), (Noise::White, 1e3), (Noise::Band { floor: 1e-6 }, 1.0)] {
+        // 256 samples of the first are computed as a whole, all of the second.
+        let (short, long) = (of(16, noise, snr, 400), of(410, noise, snr, 6));
+        assert_relative_eq!(short[399], long[5], max_relative = 2e-3);
+    }
+    let apart = rows_m_s((&baseband(), SignalKind::Complex), sigma_s(200e-9), Noise::White, (16, 400, 3), 1.0);
+    assert_relative_eq!(apart[2] * 3.0_f64.sqrt(), apart[0], max_relative = 1e-6);
+}
+
+/// A pulse in air whose return grows by 30 dB from one layer to the next: the covariance of all layers is that of the model.
+#[test]
+fn bound_beside_a_cloud_is_that_of_the_sum_over_its_layers() {
+    let (sampling, sigma) = (baseband(), 20.0);
+    let snr_of_layer = |layer: i32| if layer > 4 { 1000.0 } else { 1.0 };
+    let layers = -150..150_i32;
+    let envelope =
+        |samples: f64| (-0.5 * (samples / sigma).powi(2)).exp() / (std::f64::consts::PI.sqrt() * sigma).sqrt();
+    let seen = |at: f64| layers.clone().map(|l| snr_of_layer(l) * envelope(at - f64::from(l)).powi(2)).sum();
+    let correlation = (0..200).map(|m| (-0.25 * (f64::from(m) / sigma).powi(2)).exp()).collect();
+    let model = RecordModel::new(&sampling, SignalKind::Complex, Noise::White, correlation, true).unwrap();
+    let found = model.information(&Gates::new(20, 1, 0.0).unwrap(), 5, seen).unwrap()[4];
+    let signal = |n: usize, m: usize| -> f64 {
+        let (a, b) = (n as f64 - 11.5, m as f64 - 11.5);
+        layers.clone().map(|l| snr_of_layer(l) * envelope(a - f64::from(l)) * envelope(b - f64::from(l))).sum()
+    };
+    let slope = -4.0 * std::f64::consts::PI / (sampling.wavelength_m * sampling.sample_rate_hz);
+    let whole = Array2::from_shape_fn((24, 24), |(n, m)| Complex::from(signal(n, m) + if n == m { 5.0 } else { 0.0 }));
+    let derivative =
+        Array2::from_shape_fn((24, 24), |(n, m)| Complex::new(0.0, slope * (n as f64 - m as f64) * signal(n, m)));
+    let expected_m_s = bound_complex_m_s(whole.view(), derivative.view(), 1.0).unwrap();
+    assert_relative_eq!(found.sqrt().recip(), expected_m_s, max_relative = 1e-6);
 }

@@ -24,3 +24,4 @@ mod sliding;
 mod vortex_fit;
 mod wake_detection;
 mod wind_profile;
+mod window_worth;

@@ -1,18 +1,20 @@
 //! The Cramer-Rao bound on the velocity for a scene: against the signal-to-noise ratio, and against range.
 //!
-//! For the scene's pulse, window, sampling and noise in a uniform wind; a region is worth n_eff independent windows, which
-//! divides the bound by their root. Check: the stored curve of independent origin for one window of Table 2.
+//! For the scene's pulse, window, sampling and noise in a uniform wind; that of a region comes from the records that its chords
+//! cover, each of the samples of all its windows. Check: the stored curve of independent origin for one window of Table 2; no
+//! estimate of a region scatters less.
 
 use crate::io::Table;
+use crate::measure::estimators;
 use crate::measure::progress::Observer;
+use crate::measure::ray_information::RayInformation;
 use crate::measure::region::{of_table, places, region_radius};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
-use crate::{Error, measure::estimators};
+use crate::{Error, scene::NoiseKind};
 use wakescope_estimate::{
-    Radius, SignalKind,
-    bound::WindowModel,
-    map::{PolarPoint, ScanGeometry, WindowCorrelation},
+    Radius,
+    map::{PolarPoint, ScanGeometry, WindowCovariance},
 };
 
 /// Signal-to-noise ratios of the curve, dB.
@@ -46,37 +48,57 @@ pub struct SceneBound {
 
 /// What all points share.
 struct Setting {
-    model: WindowModel,
-    kind: SignalKind,
+    of_rays: RayInformation,
+    layer_snr: (Vec<f64>, Vec<f64>),
     places: ScanGeometry,
-    correlation: WindowCorrelation,
+    covariance: WindowCovariance,
     radius: Radius,
     elevation_rad: f64,
 }
 
 impl Setting {
     fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
-        let (scene, g) = (&plan.scene.scene, &plan.geometry);
-        let noise = scene.detector.noise;
-        let model = estimators::window_model(scene, noise, &plan.instrument.pulse)?.ok_or(Error::NoBound)?;
-        let places = places(scene, g)?;
-        let correlation = estimators::window_correlation(scene, &plan.instrument.pulse, scanner.mean_snr())?;
-        let radius = region_radius(scene, &plan.instrument.pulse, &scanner.layer_snr(), &places, &correlation)?;
+        let (scene, layer_snr) = (&plan.scene.scene, scanner.layer_snr());
+        if scene.detector.noise == NoiseKind::None {
+            return Err(Error::NoBound);
+        }
+        let places = places(scene, &plan.geometry)?;
+        let of_rays = RayInformation::new(plan, &layer_snr)?;
+        let radius = region_radius(scene, &of_rays, &places)?;
+        let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let lines = places.line_elevation_rad();
         let elevation_rad = lines[lines.len() / 2];
-        Ok(Self { model, kind: estimators::signal_kind(scene), places, correlation, radius, elevation_rad })
+        Ok(Self { of_rays, layer_snr: layer_snr.into_iter().unzip(), places, covariance, radius, elevation_rad })
     }
 
-    fn at(&self, range_m: f64, snr: f64) -> Result<BoundPoint, Error> {
-        let point = PolarPoint { range_m, elevation_rad: self.elevation_rad };
-        let (level, n_eff) = self.places.level(point, self.radius.at_m(range_m)?, &self.correlation);
+    /// At a range, with the scene's own signal-to-noise ratios about it.
+    fn at(&self, range_m: f64) -> Result<BoundPoint, Error> {
+        let (layer_m, snr) = &self.layer_snr;
+        let by_gates = self.of_rays.at(range_m, self.places.most_gates(self.radius.at_m(range_m)?))?;
+        self.point(range_m, of_table(layer_m, snr, range_m), self.of_rays.snr_at(range_m)?, &by_gates)
+    }
+
+    /// At a range, all samples having one signal-to-noise ratio.
+    fn of_snr(&self, range_m: f64, snr: f64) -> Result<BoundPoint, Error> {
+        let by_gates = self.of_rays.of_snr(snr, self.places.most_gates(self.radius.at_m(range_m)?))?;
+        self.point(range_m, snr, snr, &by_gates)
+    }
+
+    /// From the ratio of the air at the range, that of a sample there, and the information of a pulse in 1, 2, .. windows.
+    fn point(&self, range_m: f64, snr: f64, seen_snr: f64, by_gates: &[f64]) -> Result<BoundPoint, Error> {
+        let (point, radius_m) = (PolarPoint { range_m, elevation_rad: self.elevation_rad }, self.radius.at_m(range_m)?);
+        let correlation = self.covariance.correlation(seen_snr)?;
+        let (level, n_eff) = self.places.level(point, radius_m, &correlation);
         // Without any return there is no information.
-        let window_m_s = match snr > 0.0 {
-            true => estimators::bound_m_s(&self.model, snr, self.kind)?,
-            false => f64::NAN,
-        };
-        let snr_db = if snr > 0.0 { 10.0 * snr.log10() } else { f64::NAN };
-        Ok(BoundPoint { range_m, snr_db, window_m_s, level, n_eff, region_m_s: window_m_s / n_eff.sqrt() })
+        let bound_m_s = |information: f64| if information > 0.0 { information.sqrt().recip() } else { f64::NAN };
+        Ok(BoundPoint {
+            range_m,
+            snr_db: if snr > 0.0 { 10.0 * snr.log10() } else { f64::NAN },
+            window_m_s: bound_m_s(by_gates[0]),
+            level,
+            n_eff,
+            region_m_s: bound_m_s(self.places.information(point, radius_m, by_gates)),
+        })
     }
 }
 
@@ -86,13 +108,11 @@ impl Setting {
 /// [`Error::NoBound`] for a scene without noise; what the crates refuse.
 pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> {
     let scanner = Scanner::new(plan, observer)?;
-    let (setting, g) = (Setting::new(plan, &scanner)?, &plan.geometry);
-    let middle_m = g.gate_range_m[g.gate_range_m.len() / 2];
-    let by_snr = SNR_DB.map(|db| setting.at(middle_m, 10f64.powf(0.1 * f64::from(db)))).collect::<Result<_, _>>()?;
-    let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
-    let by_range =
-        g.gate_range_m.iter().map(|&r| setting.at(r, of_table(&layer_m, &snr, r))).collect::<Result<_, _>>()?;
-    Ok(SceneBound { by_snr, by_range })
+    let (setting, gates_m) = (Setting::new(plan, &scanner)?, &plan.geometry.gate_range_m);
+    let middle_m = gates_m[gates_m.len() / 2];
+    let of_snr = |db: i32| setting.of_snr(middle_m, 10f64.powf(0.1 * f64::from(db)));
+    let by_snr = SNR_DB.map(of_snr).collect::<Result<_, _>>()?;
+    Ok(SceneBound { by_snr, by_range: gates_m.iter().map(|&range_m| setting.at(range_m)).collect::<Result<_, _>>()? })
 }
 
 /// The bound in the middle of the range of the gates of a scan.
@@ -101,9 +121,7 @@ pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> 
 /// As [`bound`].
 #[cfg(feature = "sweep")]
 pub(crate) fn bound_in_the_middle(plan: &Plan, scanner: &Scanner<'_>) -> Result<BoundPoint, Error> {
-    let range_m = plan.geometry.gate_range_m[plan.geometry.gate_range_m.len() / 2];
-    let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
-    Setting::new(plan, scanner)?.at(range_m, of_table(&layer_m, &snr, range_m))
+    Setting::new(plan, scanner)?.at(plan.geometry.gate_range_m[plan.geometry.gate_range_m.len() / 2])
 }
 
 impl SceneBound {
@@ -195,6 +213,89 @@ mod tests {
         assert!((one.region_m_s / many.region_m_s - 3.0).abs() < 1e-9, "{one:?} {many:?}");
         let region = middle(|s| s.scan.pulses_per_line = 1);
         assert!(region.level > 20 && region.region_m_s < 0.5 * one.region_m_s, "{region:?}");
+    }
+
+    fn plan(text: &str) -> Plan {
+        Plan::new(SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap(), Target::Map).unwrap()
+    }
+
+    /// Lines so far from each other that they share nothing, in a wind of 3 m/s at rest along them.
+    fn lines(detector: &str, pulse_s: f64, pulses: usize, estimator: &str) -> Plan {
+        plan(&format!(
+            "[pulse.shape]\nduration_s = {pulse_s:?}\n[detector]\n{detector}\n[flow]\nkind = \"uniform\"\nlateral_m_s = 3.0\nvertical_m_s = 0.0\n\
+             [scan]\nelevation_min_rad = 0.0\nelevation_max_rad = 0.24\nelevation_step_rad = 0.24\nrange_min_m = 300.0\n\
+             range_max_m = 460.0\npulses_per_line = {pulses}\nrealisations = 80\n[estimator]\ngate_step_samples = 20\n{estimator}"
+        ))
+    }
+
+    #[test]
+    fn no_estimate_of_a_region_scatters_less_than_its_bound() {
+        let fixed = |db: f64| format!("snr = {{ reference = \"fixed\", snr_db = {db:?} }}");
+        let complex = |db: f64| format!("signal = \"baseband\"\nnoise = \"white\"\n{}", fixed(db));
+        let likelihood = "method.kind = \"likelihood\"\nwindow_samples = 16\n";
+        let of_radius = |radius_m: f64| format!("{likelihood}radius_m = {radius_m:?}\n");
+        // The bound of one window over the root of n_eff is above the scatter in the first three.
+        for (plan, beaten) in [
+            (lines(&complex(10.0), 400e-9, 1, &of_radius(60.0)), true),
+            (lines(&complex(-5.0), 400e-9, 8, &of_radius(60.0)), true),
+            (lines(&fixed(10.0), 400e-9, 4, &of_radius(30.0)), true),
+            (lines(&fixed(10.0), 200e-9, 4, &of_radius(30.0)), true),
+            (lines(&fixed(10.0), 200e-9, 8, "radius_m = 2.0\n"), false),
+            (
+                lines(&fixed(3.0), 200e-9, 20, "method.kind = \"likelihood\"\nradius_m = 10.0\nwindow_samples = 32\n"),
+                false,
+            ),
+        ] {
+            let map = crate::measure::run::run(&plan, &Silent).unwrap().map.unwrap();
+            let gate = map.range_m.len() / 2;
+            let column = map.std_m_s.column(gate);
+            let std_m_s = column.iter().map(|std| std * std / column.len() as f64).sum::<f64>().sqrt();
+            let error_m_s = std_m_s / (2.0 * column.len() as f64 * 79.0).sqrt();
+            let found = bound(&plan, &Silent).unwrap().by_range[gate];
+            assert!(found.region_m_s < std_m_s + 3.0 * error_m_s, "{found:?}: {std_m_s} +- {error_m_s}");
+            assert!(found.region_m_s > 0.2 * std_m_s, "{found:?}: {std_m_s}");
+            let by_n_eff_m_s = found.window_m_s / found.n_eff.sqrt();
+            assert_eq!(by_n_eff_m_s > std_m_s + 3.0 * error_m_s, beaten, "{by_n_eff_m_s} {std_m_s} {found:?}");
+        }
+    }
+
+    #[test]
+    fn each_row_has_what_its_own_ratio_is_worth() {
+        let at = |db: f64| {
+            let detector = format!("snr = {{ reference = \"fixed\", snr_db = {db:?} }}");
+            bound(&lines(&detector, 200e-9, 1, "window_samples = 16\nradius_m = 10.0\n"), &Silent).unwrap()
+        };
+        let (strong, weak) = (at(0.0), at(-20.0));
+        let (row, gate) = (strong.by_snr[10], weak.by_range[weak.by_range.len() / 2]);
+        assert!((row.snr_db + 20.0).abs() < 1e-9 && (gate.snr_db + 20.0).abs() < 1e-9);
+        for (row, gate) in
+            [(row.n_eff, gate.n_eff), (row.region_m_s, gate.region_m_s), (row.window_m_s, gate.window_m_s)]
+        {
+            assert!((row / gate - 1.0).abs() < 1e-6, "{row} {gate}");
+        }
+        assert!(row.n_eff > 1.3 * strong.by_snr[30].n_eff, "{row:?} {:?}", strong.by_snr[30]);
+    }
+
+    #[test]
+    fn a_cloud_far_away_changes_no_gate_and_one_near_by_is_seen_through_the_pulse() {
+        let of = |cloud: &str| {
+            let scene = plan(&format!(
+                "[pulse]\nenergy_j = 1e-3\n[pulse.shape]\nduration_s = 100e-9\n[atmosphere.profile]\n\
+                 range_m = [0.0, 470.0, 470.1, 900.0]\nbackscatter_per_m_sr = [1e-7, 1e-7, {cloud}, {cloud}]\n\
+                 extinction_per_m = [7e-5, 7e-5, 7e-5, 7e-5]\n[scan]\nelevation_min_rad = 0.1\nelevation_max_rad = 0.1\n\
+                 range_max_m = 550.0\n[estimator]\nwindow_samples = 16\nradius_m = 6.0\n"
+            ));
+            let points = bound(&scene, &Silent).unwrap().by_range;
+            let map = crate::measure::run::run(&scene, &Silent).unwrap().map.unwrap();
+            (points, map.n_eff.row(0).to_vec())
+        };
+        let (clear, cloudy) = (of("1e-7"), of("1e-4"));
+        let at = |range_m: f64| clear.0.iter().position(|point| point.range_m > range_m).unwrap();
+        let (far, near) = (at(350.0), at(464.0));
+        let ratio = |gate: usize| cloudy.0[gate].region_m_s / clear.0[gate].region_m_s;
+        assert!((ratio(far) - 1.0).abs() < 1e-9 && ratio(near) < 0.7, "{} {}", ratio(far), ratio(near));
+        assert!((cloudy.1[far] / clear.1[far] - 1.0).abs() < 1e-9, "{} {}", cloudy.1[far], clear.1[far]);
+        assert!((cloudy.1[far] / cloudy.0[far].n_eff - 1.0).abs() < 1e-9, "map and bound differ");
     }
 
     #[test]

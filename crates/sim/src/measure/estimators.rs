@@ -47,9 +47,10 @@ pub fn gates(scene: &Scene) -> Result<estimate::Gates, Error> {
     Ok(estimate::Gates::new(e.window_samples, e.window_step_samples, first_sample_time_s)?)
 }
 
-/// The weighting of the windows.
+/// The weighting of the windows; the tapers of a likelihood together weigh nearly all samples alike.
 pub fn weighting(scene: &Scene) -> estimate::Weighting {
     match scene.estimator.weighting {
+        _ if scene.estimator.method.has_own_tapers() => estimate::Weighting::Rectangular,
         Weighting::Gaussian => estimate::Weighting::default(),
         Weighting::Rectangular => estimate::Weighting::Rectangular,
         Weighting::Hann => estimate::Weighting::Hann,
@@ -93,9 +94,12 @@ fn pulse_correlation(scene: &Scene, pulse: &Pulse) -> Vec<f64> {
     (0..count).map(|m| if m * parts <= steps { lag(m) / energy } else { 0.0 }).collect()
 }
 
-/// Second-order model of a window of the scene in a uniform wind and a noise, for likelihood and bound.
+/// Density of noise outside its band over that inside, which keeps covariances regular.
+const NOISE_FLOOR: f64 = 1e-6;
+
+/// Second-order model of a window of the scene in a uniform wind and a noise, for the likelihood.
 ///
-/// `None` without noise: no bound is above 0 then.
+/// `None` without noise.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
@@ -106,8 +110,7 @@ pub fn window_model(
 ) -> Result<Option<estimate::bound::WindowModel>, Error> {
     let noise = match noise {
         NoiseKind::White => estimate::bound::Noise::White,
-        // A floor of a millionth keeps the covariance regular.
-        NoiseKind::Band => estimate::bound::Noise::Band { floor: 1e-6 },
+        NoiseKind::Band => estimate::bound::Noise::Band { floor: NOISE_FLOOR },
         NoiseKind::None => return Ok(None),
     };
     let correlation = pulse_correlation(scene, pulse);
@@ -117,43 +120,42 @@ pub fn window_model(
     Ok(Some(estimate::bound::WindowModel::with_envelope(&sampling(scene)?, envelope, noise)?))
 }
 
-/// The bound of one window at rest, m/s. Where the noise of the model is too small outside the band for double precision, at
-/// high signal-to-noise ratios and in long windows, that of the smallest floor which is not.
+/// Second-order model of the record of a pulse of the scene in a uniform wind, for the bound; white noise stands for none.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn bound_m_s(model: &estimate::bound::WindowModel, snr: f64, kind: SignalKind) -> Result<f64, Error> {
-    match model.bound_m_s(0.0, snr, kind, 1.0) {
-        Err(estimate::Error::NoiseFloor { least, .. }) => {
-            let noise = estimate::bound::Noise::Band { floor: least };
-            let envelope = model.envelope().to_owned();
-            let model = estimate::bound::WindowModel::with_envelope(model.sampling(), envelope, noise)?;
-            Ok(model.bound_m_s(0.0, snr, kind, 1.0)?)
-        }
-        bound => Ok(bound?),
-    }
+pub fn record_model(scene: &Scene, pulse: &Pulse) -> Result<estimate::bound::RecordModel, Error> {
+    let noise = match scene.detector.noise {
+        NoiseKind::Band => estimate::bound::Noise::Band { floor: NOISE_FLOOR },
+        NoiseKind::White | NoiseKind::None => estimate::bound::Noise::White,
+    };
+    let is_gaussian = matches!(scene.pulse.shape, PulseShape::Gaussian(_));
+    let correlation = pulse_correlation(scene, pulse);
+    Ok(estimate::bound::RecordModel::new(&sampling(scene)?, signal_kind(scene), noise, correlation, is_gaussian)?)
 }
 
-/// Correlation between windows of one pulse: of the speckle, and of the noise at a signal-to-noise ratio `snr`.
+/// Covariance between windows of one pulse: of speckle of unit power, and of noise whose power in the detector band is one.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn window_correlation(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<estimate::map::WindowCorrelation, Error> {
-    let e = &scene.estimator;
+pub fn window_covariance(scene: &Scene, pulse: &Pulse) -> Result<estimate::map::WindowCovariance, Error> {
+    let (e, d) = (&scene.estimator, &scene.detector);
     let window = weighting(scene).weights(e.window_samples)?;
-    let d = &scene.detector;
-    let in_band_hz = match (d.noise, d.signal) {
-        (NoiseKind::White, DetectorSignal::IntermediateFrequency) => 0.5 * d.sampling_hz,
-        (NoiseKind::White, DetectorSignal::Baseband) => d.sampling_hz,
-        (NoiseKind::Band | NoiseKind::None, _) => d.bandwidth_hz,
-    };
-    let snr = if d.noise == NoiseKind::None { f64::INFINITY } else { snr };
-    // Without any return there is only noise, which a large finite ratio says as well.
-    let noise_to_signal = (in_band_hz / d.bandwidth_hz / snr).min(1e12);
     let correlation = pulse_correlation(scene, pulse);
-    let covariance = |m: usize| correlation.get(m).copied().unwrap_or(0.0) + if m == 0 { noise_to_signal } else { 0.0 };
+    let signal = |lag: usize| correlation.get(lag).copied().unwrap_or(0.0);
+    // Half of a real signal and half of its noise stand at the frequency of the peak.
+    let band = d.bandwidth_hz / d.sampling_hz;
+    let noise = |lag: usize| match (d.noise, lag) {
+        (NoiseKind::None, _) => 0.0,
+        (NoiseKind::White, 0) => 1.0 / band,
+        (NoiseKind::White, _) => 0.0,
+        (NoiseKind::Band, 0) => 1.0,
+        (NoiseKind::Band, _) => {
+            (std::f64::consts::PI * band * lag as f64).sin() / (std::f64::consts::PI * band * lag as f64)
+        }
+    };
     let samples = scene.samples_per_record();
-    Ok(estimate::map::WindowCorrelation::from_covariance(&window, e.window_step_samples, samples, covariance)?)
+    Ok(estimate::map::WindowCovariance::new(&window, e.window_step_samples, samples, signal, noise)?)
 }
 
 /// What is known of the windows before any is seen, for estimators that are planned for it.
@@ -177,6 +179,8 @@ pub struct Toolkit<S> {
     pub test: Option<estimate::estimators::NoiseTest>,
     /// What the estimator finds in the mean statistic of the scene's noise: its power and its density, A^2.
     pub noise: Option<estimate::GateVelocity>,
+    /// Weights that the windows give the lags; empty where the statistic is no correlogram.
+    lag_weights: Vec<f64>,
 }
 
 impl<S: Sample> Toolkit<S> {
@@ -235,7 +239,55 @@ impl<S: Sample> Toolkit<S> {
             }
         };
         let test = noise_test(scene, tapers, lag_weights)?;
-        Ok(Self { statistic, estimator, following, test, noise })
+        Ok(Self { statistic, estimator, following, test, noise, lag_weights: lag_weights.to_vec() })
+    }
+}
+
+/// What an estimator of correlograms makes of the mean spectrum of air at one velocity in the scene's noise.
+pub(crate) struct ExpectedBias {
+    estimator: Box<dyn Estimator>,
+    sampling: estimate::Sampling,
+    kind: SignalKind,
+    /// Mean statistic of a signal of unit power at rest, by lag, and of noise whose power in the band is one.
+    signal: Vec<f64>,
+    noise: Vec<f64>,
+}
+
+impl ExpectedBias {
+    /// For windows of which so much is known; nothing without noise, for the likelihood of gradients, which knows no correlogram, and
+    /// for lines that are shifted.
+    ///
+    /// # Errors
+    /// What the estimators refuse; a checked scene gives none.
+    pub(crate) fn new(scene: &Scene, instrument: &Instrument, known: &WindowStatistics) -> Result<Option<Self>, Error> {
+        let (kind, sampling) = (signal_kind(scene), sampling(scene)?);
+        let (estimator, lag_weights) = match kind {
+            SignalKind::Real => Toolkit::<f64>::new(scene, instrument, known).map(|t| (t.estimator, t.lag_weights))?,
+            SignalKind::Complex => {
+                Toolkit::<Complex<f64>>::new(scene, instrument, known).map(|t| (t.estimator, t.lag_weights))?
+            }
+        };
+        let Some((noise, _)) =
+            noise(scene, instrument).filter(|_| !lag_weights.is_empty() && !scene.estimator.follow_wind)
+        else {
+            return Ok(None);
+        };
+        let noise = noise.expected_correlogram(&sampling, kind, 1.0, &lag_weights)?;
+        let correlation = pulse_correlation(scene, &instrument.pulse);
+        let signal =
+            lag_weights.iter().enumerate().map(|(m, weight)| weight * correlation.get(m).unwrap_or(&0.0)).collect();
+        Ok(Some(Self { estimator, sampling, kind, signal, noise }))
+    }
+
+    /// The velocity that it finds less the true one, m/s, at a signal-to-noise ratio.
+    pub(crate) fn m_s(&self, velocity_m_s: f64, snr: f64) -> f64 {
+        let step = std::f64::consts::TAU * self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
+        let lags = self.signal.iter().enumerate().flat_map(|(m, power)| {
+            let lag = Complex::from_polar(snr * power, step * m as f64);
+            [lag.re, lag.im].into_iter().take(self.kind.lag_numbers(1))
+        });
+        let mean: Vec<f64> = lags.zip(&self.noise).map(|(signal, noise)| signal + noise).collect();
+        self.estimator.estimate(&mean, &mut estimate::Scratch::new()).velocity_m_s - velocity_m_s
     }
 }
 
@@ -407,5 +459,5 @@ fn gradient_likelihood<S: Sample>(
         }
     };
     let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
-    Ok(Toolkit { statistic, estimator, following: None, test, noise })
+    Ok(Toolkit { statistic, estimator, following: None, test, noise, lag_weights: Vec::new() })
 }

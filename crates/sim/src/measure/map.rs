@@ -21,12 +21,14 @@ use wakescope_signal::RangeFilter;
 use wakescope_signal::digitise::Clipped;
 
 /// Estimates of the radial velocity and their errors, each \[line, gate\].
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct VelocityEstimates {
     /// Elevation of each line, rad.
     pub elevation_rad: Vec<f64>,
     /// Range of each gate, m.
     pub range_m: Vec<f64>,
+    /// Radius of the region of each gate, m.
+    pub radius_m: Vec<f64>,
     /// Radial velocity of the air at the centre of the gate, m/s, positive away from the lidar.
     pub v_exact_m_s: Array2<f64>,
     /// The same weighted with the pulse, (28).
@@ -64,6 +66,17 @@ pub struct VelocityEstimates {
     pub quality: Array2<f64>,
     /// Fraction of the samples that the converter clipped.
     pub clipped_fraction: f64,
+    /// The errors of each realisation; empty where they are not kept.
+    pub scans: Vec<ScanErrors>,
+}
+
+/// What one realisation shows, each \[line, gate\].
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanErrors {
+    /// Error against the velocity weighted with the pulse, m/s.
+    pub error_m_s: Array2<f64>,
+    /// Whether the estimate was flagged.
+    pub flagged: Array2<bool>,
 }
 
 /// Sums over the realisations of what an estimator says beside the velocity.
@@ -116,6 +129,8 @@ pub(crate) struct Mapper<S> {
     clipped: Clipped,
     samples: f64,
     realisations: usize,
+    /// The errors of each realisation, if they are kept.
+    scans: Option<Vec<ScanErrors>>,
 }
 
 struct Truth {
@@ -126,7 +141,7 @@ struct Truth {
 }
 
 impl<S: Sample> Mapper<S> {
-    pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
+    pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>, keeps_scans: bool) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let places = places(scene, g)?;
@@ -148,6 +163,7 @@ impl<S: Sample> Mapper<S> {
             clipped: Clipped::default(),
             samples: 0.0,
             realisations: 0,
+            scans: keeps_scans.then(Vec::new),
         })
     }
 
@@ -166,11 +182,16 @@ impl<S: Sample> Mapper<S> {
             let known = |estimate: &f64, truth: &f64| if truth.is_nan() { f64::NAN } else { *estimate };
             self.first_m_s = ndarray::Zip::from(&velocity).and(&self.truth.pulse_m_s).map_collect(known);
         }
+        let mut flagged = Array2::from_elem(self.shape, false);
         for (index, point) in map.iter().enumerate() {
             let place = (index / columns, index % columns);
-            self.figures.add(place, point, self.noise.flags(index, &point.estimate));
+            flagged[place] = self.noise.flags(index, &point.estimate);
+            self.figures.add(place, point, flagged[place]);
             // The level is the same for all realisations: a matter of geometry.
             (self.level[place], self.n_eff[place]) = (point.level as f64, point.n_eff);
+        }
+        if let Some(scans) = &mut self.scans {
+            scans.push(ScanErrors { error_m_s: &velocity - &self.truth.pulse_m_s, flagged });
         }
         self.clipped += clipped;
         self.samples += self.samples_of_realisation;
@@ -178,7 +199,7 @@ impl<S: Sample> Mapper<S> {
         Ok(velocity)
     }
 
-    pub(crate) fn finish(self, plan: &Plan) -> VelocityEstimates {
+    pub(crate) fn finish(self, plan: &Plan) -> Result<VelocityEstimates, Error> {
         let statistics = self.errors.statistics();
         let bias_m_s = statistics.mapv(|s| s.bias_m_s);
         let [width_m_s, power_a2, quality] = self.figures.means();
@@ -187,9 +208,11 @@ impl<S: Sample> Mapper<S> {
         for (index, (place, power)) in snr_db.indexed_iter_mut().enumerate() {
             *power = map_estimator::snr_db(*power / noise_a2, self.noise.deviation(index), self.figures.count[place]);
         }
-        VelocityEstimates {
+        let radius_m = plan.geometry.gate_range_m.iter().map(|range_m| self.estimator.radius_m(*range_m));
+        Ok(VelocityEstimates {
             elevation_rad: plan.geometry.elevation_rad.clone(),
             range_m: plan.geometry.gate_range_m.clone(),
+            radius_m: radius_m.collect::<Result<_, _>>()?,
             v_scan_m_s: self.first_m_s,
             v_mean_m_s: &self.truth.pulse_m_s + &bias_m_s,
             bias_m_s,
@@ -208,7 +231,8 @@ impl<S: Sample> Mapper<S> {
             snr_db,
             quality,
             clipped_fraction: self.clipped.total() as f64 / self.samples.max(1.0),
-        }
+            scans: self.scans.unwrap_or_default(),
+        })
     }
 }
 
@@ -236,16 +260,18 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
 
 /// Runs the estimates of all realisations, of several plans that differ in their estimators alone: the signals of each are made
 /// once. The records of those that the files will have go to `kept`, too, piece after piece; `seen` is given the place of the plan
-/// and the velocities, m/s, of each map as it comes.
+/// and the velocities, m/s, of each map as it comes. `keeps_scans` keeps the errors of each realisation for standard errors of averages.
 pub(crate) fn estimates<S: Sample + wakescope_signal::scan::Sample>(
     plans: &[&Plan],
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
     mut kept: impl FnMut(ArrayView2<'_, S>),
     mut seen: impl FnMut(usize, &Array2<f64>),
+    keeps_scans: bool,
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(plan) = plans.first() else { return Ok(Vec::new()) };
-    let mut mappers: Vec<Mapper<S>> = plans.iter().map(|plan| Mapper::new(plan, scanner)).collect::<Result<_, _>>()?;
+    let mut mappers: Vec<Mapper<S>> =
+        plans.iter().map(|plan| Mapper::new(plan, scanner, keeps_scans)).collect::<Result<_, _>>()?;
     observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
     for realisation in 0..plan.realisations() {
         let mut sums = mappers.iter().map(Mapper::sums).collect::<Result<Vec<_>, _>>()?;
@@ -261,7 +287,7 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::scan::Sample>(
         }
     }
     observer.end();
-    Ok(mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan)).collect())
+    mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan)).collect()
 }
 
 /// The radial velocities \[line, gate\], m/s, of each realisation of a plan: what whole scans show, one after the other. Efficiency and
@@ -274,8 +300,8 @@ pub fn velocities(plan: &Plan, observer: &dyn Observer) -> Result<Vec<Array2<f64
     let mut maps = Vec::with_capacity(plan.realisations());
     let seen = |_, velocity_m_s: &Array2<f64>| maps.push(velocity_m_s.clone());
     match plan.scene.scene.detector.signal {
-        DetectorSignal::IntermediateFrequency => estimates::<f64>(&[plan], &scanner, observer, |_| (), seen)?,
-        DetectorSignal::Baseband => estimates::<Complex<f64>>(&[plan], &scanner, observer, |_| (), seen)?,
+        DetectorSignal::IntermediateFrequency => estimates::<f64>(&[plan], &scanner, observer, |_| (), seen, false)?,
+        DetectorSignal::Baseband => estimates::<Complex<f64>>(&[plan], &scanner, observer, |_| (), seen, false)?,
     };
     Ok(maps)
 }
@@ -289,12 +315,12 @@ pub(crate) fn of_records<S: Sample>(
     scanner: &Scanner<'_>,
     mut read: impl FnMut(usize, AddRecords<'_, S>) -> Result<(), Error>,
 ) -> Result<VelocityEstimates, Error> {
-    let mut mapper = Mapper::<S>::new(plan, scanner)?;
+    let mut mapper = Mapper::<S>::new(plan, scanner, false)?;
     for realisation in 0..plan.realisations() {
         let mut sums = mapper.sums()?;
         read(realisation, &mut |first, records| Ok(sums.add(first, records)?))?;
         let scan = sums.finish();
         mapper.add(&scan, Clipped::default())?;
     }
-    Ok(mapper.finish(plan))
+    mapper.finish(plan)
 }

@@ -5,15 +5,17 @@
 
 use crate::Error;
 use crate::measure::estimators::{self, Toolkit, WindowStatistics};
+use crate::measure::ray_information::RayInformation;
 use crate::measure::region::{interpolated, region_radius};
-use crate::measure::scan::mean_snr;
+use crate::measure::scan::median_snr;
 use crate::plan::Plan;
 use ndarray::Array2;
+use rayon::prelude::*;
 use std::ops::Range;
 use wakescope_estimate::{
     GateVelocity, Gates, Radius, Sampling, Scan, Statistic,
     estimators::NoiseTest,
-    map::{MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCorrelation},
+    map::{MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCovariance},
     window::Sample,
 };
 
@@ -23,7 +25,8 @@ pub(crate) struct MapEstimator<S> {
     gates: Gates,
     record_samples: usize,
     tools: Toolkit<S>,
-    correlation: WindowCorrelation,
+    covariance: WindowCovariance,
+    of_rays: RayInformation,
     radius: Radius,
     /// Rate of false alarms of the test against noise; 0 without one.
     rate: f64,
@@ -36,21 +39,22 @@ impl<S: Sample> MapEstimator<S> {
     /// What the estimators refuse; a checked scene gives none.
     pub(crate) fn new(plan: &Plan, layer_snr: &[(f64, f64)], places: &ScanGeometry) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
-        let pulse = &plan.instrument.pulse;
-        let snr = mean_snr(layer_snr);
-        let correlation = estimators::window_correlation(scene, pulse, snr)?;
-        let radius = region_radius(scene, pulse, layer_snr, places, &correlation)?;
+        let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
+        let of_rays = RayInformation::new(plan, layer_snr)?;
+        let radius = region_radius(scene, &of_rays, places)?;
         let lines = places.line_elevation_rad();
         let middle =
             PolarPoint { range_m: g.gate_range_m[g.gate_range_m.len() / 2], elevation_rad: lines[lines.len() / 2] };
+        let correlation = covariance.correlation(of_rays.snr_at(middle.range_m)?)?;
         let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
-        let known = WindowStatistics { snr, n_eff };
+        let known = WindowStatistics { snr: median_snr(layer_snr), n_eff };
         Ok(Self {
             sampling: estimators::sampling(scene)?,
             gates: estimators::gates(scene)?,
             record_samples: g.samples,
             tools: Toolkit::new(scene, &plan.instrument, &known)?,
-            correlation,
+            covariance,
+            of_rays,
             radius,
             rate: scene.estimator.false_alarm,
         })
@@ -104,15 +108,25 @@ impl<S: Sample> MapEstimator<S> {
     /// Velocities at points, the gates of a line together and lines by increasing elevation.
     pub(crate) fn map(&self, scan: &Scan, points: &[PolarPoint]) -> Result<Vec<MapPoint>, Error> {
         let Toolkit { estimator, following, .. } = &self.tools;
-        let first = scan.map(points, &self.radius, Some(&self.correlation), &**estimator)?;
-        let Some(following) = following else { return Ok(first) };
+        let mut found = scan.map(points, &self.radius, None, &**estimator)?;
         let gates = points.iter().take_while(|p| p.elevation_rad == points[0].elevation_rad).count().max(1);
-        let shape = (points.len() / gates, gates);
-        let velocity_m_s = Array2::from_shape_fn(shape, |(i, j)| first[i * gates + j].estimate.velocity_m_s);
-        let guess = interpolated(points, velocity_m_s);
-        let mut second = scan.map_following(points, &self.radius, S::KIND, &self.sampling, &guess, &**following)?;
-        second.iter_mut().zip(&first).for_each(|(point, first)| point.n_eff = first.n_eff);
-        Ok(second)
+        if let Some(following) = following {
+            let shape = (points.len() / gates, gates);
+            let velocity_m_s = Array2::from_shape_fn(shape, |(i, j)| found[i * gates + j].estimate.velocity_m_s);
+            let guess = interpolated(points, velocity_m_s);
+            found = scan.map_following(points, &self.radius, S::KIND, &self.sampling, &guess, &**following)?;
+        }
+        // Speckle and noise share out the spectrum of a gate as its own signal-to-noise ratio says.
+        let of_gate = |point: &PolarPoint| {
+            let snr = self.of_rays.snr_at(point.range_m)?;
+            Ok((self.radius.at_m(point.range_m)?, self.covariance.correlation(snr)?))
+        };
+        let of_gates = points.iter().take(gates).map(of_gate).collect::<Result<Vec<_>, Error>>()?;
+        found.par_iter_mut().zip(points).enumerate().for_each(|(index, (found, point))| {
+            let (radius_m, correlation) = &of_gates[index % gates];
+            found.n_eff = scan.n_eff(*point, *radius_m, correlation);
+        });
+        Ok(found)
     }
 
     /// What noise gives at points of a scan.

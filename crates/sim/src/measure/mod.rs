@@ -11,7 +11,7 @@
 //! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
 //! | [`map`], `map_estimator`, [`cell_average`] | estimates and their errors against the truth |
 //! | [`recorded`] | the same from the records of a file, measured or simulated |
-//! | [`mod@bound`] | the Cramer-Rao bound for a scene |
+//! | [`mod@bound`], `ray_information` | the Cramer-Rao bound for a scene; what a pulse tells of the velocity about a range |
 //! | [`budget`] | the power budget, from the pulse to the signal-to-noise ratio |
 //! | [`mod@run`], [`mod@write`] | running a plan, writing its results |
 //! | [`progress`], [`streams`] | who watches a run; one random stream for each pulse |
@@ -31,6 +31,7 @@ pub(crate) mod map_estimator;
 pub(crate) mod plane;
 pub mod profile;
 pub mod progress;
+pub(crate) mod ray_information;
 pub mod recorded;
 pub(crate) mod region;
 pub(crate) mod response;

@@ -3,17 +3,14 @@
 //! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
 
 use crate::measure::geometry::Geometry;
-use crate::scene::{Method, NoiseKind, RegionRadius, Scene};
+use crate::measure::ray_information::RayInformation;
+use crate::scene::{Method, RegionRadius, Scene};
 use crate::{Error, measure::estimators};
 use ndarray::Array2;
 use wakescope_estimate::{
     Radius,
-    map::{PolarPoint, ScanGeometry, WindowCorrelation},
+    map::{PolarPoint, ScanGeometry},
 };
-use wakescope_signal::Pulse;
-
-/// Signal-to-noise ratio that stands for no noise where a bound is asked for.
-const NO_NOISE_SNR: f64 = 1e6;
 
 /// Where the windows of a scan are: in one plane if it is a plain RHI, else on a sphere.
 ///
@@ -31,17 +28,11 @@ pub(crate) fn places(scene: &Scene, g: &Geometry) -> Result<ScanGeometry, Error>
     Ok(ScanGeometry::on_sphere(&sampling, &gates, &direction, &group, &first, g.samples)?)
 }
 
-/// The radius of a scene's regions; `layer_snr` holds range, m, and expected signal-to-noise ratio of the layers of a line.
+/// The radius of a scene's regions.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub(crate) fn region_radius(
-    scene: &Scene,
-    pulse: &Pulse,
-    layer_snr: &[(f64, f64)],
-    geometry: &ScanGeometry,
-    correlation: &WindowCorrelation,
-) -> Result<Radius, Error> {
+pub(crate) fn region_radius(scene: &Scene, of_rays: &RayInformation, geometry: &ScanGeometry) -> Result<Radius, Error> {
     let e = &scene.estimator;
     match &e.radius {
         _ if e.method == (Method::Periodogram {}) => Ok(Radius::Fixed { radius_m: 0.0 }),
@@ -51,38 +42,17 @@ pub(crate) fn region_radius(
             Ok(Radius::OfRange(Box::new(move |at_m| of_table(&range_m, &radius_m, at_m))))
         }
         RegionRadius::Target { standard_deviation_m_s, largest_m } => {
-            let (range_m, bound_m_s) = bound_by_range(scene, pulse, layer_snr, geometry)?;
-            let single_m_s = |at_m: f64| of_table(&range_m, &bound_m_s, at_m);
-            Ok(Radius::for_standard_deviation(geometry, correlation, single_m_s, *standard_deviation_m_s, *largest_m)?)
+            let all_m = geometry.gate_ranges_m();
+            let range_m: Vec<f64> = all_m.iter().copied().step_by(all_m.len().div_ceil(16)).collect();
+            let count = geometry.most_gates(*largest_m);
+            let known = range_m.iter().map(|at_m| of_rays.at(*at_m, count)).collect::<Result<Vec<_>, Error>>()?;
+            let by_gates = |at_m: f64| -> Vec<f64> {
+                let of = |gates: usize| known.iter().map(|by_gates| by_gates[gates]).collect::<Vec<f64>>();
+                (0..count).map(|gates| of_table(&range_m, &of(gates), at_m)).collect()
+            };
+            Ok(Radius::for_standard_deviation(geometry, by_gates, *standard_deviation_m_s, *largest_m)?)
         }
     }
-}
-
-/// The bound of one window at ranges along the lines, m and m/s.
-fn bound_by_range(
-    scene: &Scene,
-    pulse: &Pulse,
-    layer_snr: &[(f64, f64)],
-    geometry: &ScanGeometry,
-) -> Result<(Vec<f64>, Vec<f64>), Error> {
-    let noise = match scene.detector.noise {
-        NoiseKind::None => NoiseKind::White,
-        noise => noise,
-    };
-    let model =
-        estimators::window_model(scene, noise, pulse)?.ok_or(wakescope_estimate::Error::Empty { field: "noise" })?;
-    let (layer_m, snr): (Vec<f64>, Vec<f64>) = layer_snr.iter().copied().unzip();
-    let all_m = geometry.gate_ranges_m();
-    let range_m: Vec<f64> = all_m.iter().copied().step_by(all_m.len().div_ceil(16)).collect();
-    let bound = |at_m: &f64| {
-        let snr = match scene.detector.noise {
-            NoiseKind::None => NO_NOISE_SNR,
-            _ => of_table(&layer_m, &snr, *at_m).clamp(1e-8, NO_NOISE_SNR),
-        };
-        estimators::bound_m_s(&model, snr, estimators::signal_kind(scene))
-    };
-    let bound_m_s = range_m.iter().map(bound).collect::<Result<_, Error>>()?;
-    Ok((range_m, bound_m_s))
 }
 
 /// Straight lines between the points of a table that is not empty; beyond its ends as at the ends.

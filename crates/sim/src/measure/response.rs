@@ -3,9 +3,10 @@
 //! Check: circulations fitted to maps and signals of a pair, in the tests of sweeps and retrievals.
 
 use crate::Error;
-use crate::measure::estimators::{Response, response, sampling, signal_kind, window_correlation};
+use crate::measure::estimators::{Response, response, sampling, signal_kind};
+use crate::measure::ray_information::RayInformation;
 use crate::measure::region::{places, region_radius};
-use crate::measure::scan::mean_snr;
+use crate::measure::scan::median_snr;
 use crate::plan::Plan;
 use crate::scene::{NoiseKind, PulseShape as Shape, Scene};
 use wakescope_estimate::Radius;
@@ -38,10 +39,9 @@ impl SceneResponse {
         if !is_gaussian {
             return Ok(None);
         }
-        let snr = mean_snr(&layer_snr);
-        let correlation = window_correlation(scene, pulse, snr)?;
-        let radius = region_radius(scene, pulse, &layer_snr, &places(scene, &plan.geometry)?, &correlation)?;
-        let response = response(scene, pulse, snr).ok().flatten();
+        let of_rays = RayInformation::new(plan, &layer_snr)?;
+        let radius = region_radius(scene, &of_rays, &places(scene, &plan.geometry)?)?;
+        let response = response(scene, pulse, median_snr(&layer_snr)).ok().flatten();
         let pulse = PulseShape::gaussian(pulse.sigma_s())?;
         Ok(Some(Self { response, pulse, noise, layer_snr, radius }))
     }

@@ -130,7 +130,7 @@ fn signals_and_map<S: Sample + wakescope_signal::scan::Sample>(
                 maps.push(velocity_m_s.clone());
             }
         };
-        result.map = map::estimates(&[plan], scanner, observer, keep, seen)?.pop();
+        result.map = map::estimates(&[plan], scanner, observer, keep, seen, false)?.pop();
         if plan.runs(Stage::Retrieval) {
             result.retrieval = of_realisations::<S>(plan, scanner, &maps, observer)?;
         }
@@ -204,12 +204,9 @@ impl RunResult {
             line("v_max_m_s", "largest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::max));
             line("v_min_m_s", "smallest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::min));
             line("bias_mean_m_s", "mean bias against v_pulse [m/s]", mean(&m.bias_m_s));
-            line(
-                "rms_mean_m_s",
-                "root mean square error against v_pulse [m/s]",
-                mean(&m.rms_m_s.mapv(|x| x * x)).sqrt(),
-            );
-            line("std_mean_m_s", "standard deviation of one estimate [m/s]", mean(&m.std_m_s));
+            let root_mean_square = |field: &Array2<f64>| mean(&field.mapv(|x| x * x)).sqrt();
+            line("rms_mean_m_s", "root mean square error against v_pulse [m/s]", root_mean_square(&m.rms_m_s));
+            line("std_mean_m_s", "standard deviation of one estimate [m/s]", root_mean_square(&m.std_m_s));
             line("flagged_fraction", "fraction of flagged estimates", mean(&m.flagged));
             if m.clipped_fraction > 0.0 {
                 line("clipped_fraction", "fraction of clipped samples", m.clipped_fraction);

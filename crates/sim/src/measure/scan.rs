@@ -101,11 +101,6 @@ impl<'a> Scanner<'a> {
         })
     }
 
-    /// Mean signal-to-noise ratio (14) over the layers, a power ratio.
-    pub fn mean_snr(&self) -> f64 {
-        mean_snr(&self.layer_snr())
-    }
-
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; backscatter that the flow
     /// carries is its mean over the lines.
     pub fn layer_snr(&self) -> Vec<(f64, f64)> {
@@ -300,9 +295,12 @@ fn layer_snr(scene: &Scene, instrument: &Instrument, line: &LineOfSight) -> Vec<
     line.weight_per_m.iter().enumerate().map(|(l, weight_per_m)| (line.range_m(l), snr(weight_per_m))).collect()
 }
 
-/// Mean signal-to-noise ratio of layers, given with their ranges.
-pub(crate) fn mean_snr(layer_snr: &[(f64, f64)]) -> f64 {
-    layer_snr.iter().map(|(_, snr)| snr).sum::<f64>() / layer_snr.len().max(1) as f64
+/// Signal-to-noise ratio of most layers that return light, given with their ranges: the median, which a cloud does not move; 0 where none
+/// does.
+pub(crate) fn median_snr(layer_snr: &[(f64, f64)]) -> f64 {
+    let mut all: Vec<f64> = layer_snr.iter().map(|(_, snr)| *snr).filter(|snr| *snr > 0.0).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Records that are in memory at a time: some ten megabytes of them, and enough for every thread.

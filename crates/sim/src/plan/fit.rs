@@ -41,7 +41,7 @@ impl Plan {
         self.work_fits(Work::Run, available_bytes)
     }
 
-    /// Whether the memory for the Cramer-Rao bound of the scene is there: matrices of a window's samples by as many.
+    /// Whether the memory for the Cramer-Rao bound of the scene is there: matrices of a record's samples by as many.
     ///
     /// # Errors
     /// As [`Plan::fits`].
@@ -242,14 +242,14 @@ mod tests {
     fn bound_of_windows_whose_matrices_do_not_fit_is_refused_and_the_remedy_fits() {
         let text = |window: &str| {
             format!(
-                "[scan]\nrange_max_m = 9000.0\nelevation_max_rad = 0.01\n[estimator]\nwindow_samples = {window}\npadded_samples = 16384\n"
+                "[scan]\nrange_max_m = 9000.0\nelevation_max_rad = 0.01\n[estimator]\nwindow_samples = {window}\npadded_samples = 32768\n"
             )
         };
-        let long = plan(&text("8192"));
+        let long = plan(&text("13000"));
         long.fits_in(8e9).unwrap();
         let refused = long.bound_fits_in(8e9).unwrap_err().to_string();
-        // Some fourteen matrices of 8192 x 8192 numbers.
-        assert!(refused.contains("needs 7.") && refused.contains("--allow-large"), "{refused}");
+        // Some six matrices of 13 000 x 13 000 numbers.
+        assert!(refused.contains("needs 8.") && refused.contains("--allow-large"), "{refused}");
         let window = refused.split("estimator.window_samples = ").nth(1).unwrap();
         plan(&text(window.split([',', ' ']).next().unwrap())).bound_fits_in(8e9).unwrap();
     }

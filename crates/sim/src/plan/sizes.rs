@@ -29,6 +29,8 @@ pub(super) struct Sizes {
     pub(super) realisations: f64,
     /// Samples of a window.
     pub(super) window: f64,
+    /// Samples of the longest record whose covariance a bound takes: of the windows of a chord, or so many that more tell nothing new.
+    pub(super) chord: f64,
     /// Windows of a record.
     pub(super) windows: f64,
     /// Real numbers that are kept of a window.
@@ -57,6 +59,7 @@ impl Sizes {
         let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
         let radius_m = if e.method == (Method::Periodogram {}) { 0.0 } else { largest_radius_m(scene) };
         let half_rad = if radius_m < middle_m { (radius_m / middle_m).asin() } else { std::f64::consts::PI };
+        let samples_kept = window + g.layers_per_sample as f64 * g.layer_thickness_m / g.sample_spacing_m;
         Self {
             lines,
             records: g.schedule.pulses() as f64,
@@ -66,6 +69,7 @@ impl Sizes {
             layers_per_sample: g.layers_per_sample as f64,
             realisations: if maps { scene.scan.realisations } else { kept_realisations(scene, target) } as f64,
             window,
+            chord: (window + 2.0 * radius_m / g.sample_spacing_m).min(samples_kept.max(256.0)),
             windows: ((g.samples - e.window_samples) / e.window_step_samples + 1) as f64,
             numbers: numbers(scene, parts),
             cells: lines * g.gate_range_m.len() as f64,

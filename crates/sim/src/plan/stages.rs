@@ -254,7 +254,7 @@ fn planning(scene: &Scene, n: &Sizes) -> (f64, f64, f64) {
         _ => (0.0, 0.0, 0.0),
     };
     let (model_s, model_matrices) = match scene.estimator.radius {
-        RegionRadius::Target { .. } => (16.0 * 5e-9 * cubed, BOUND_MATRICES),
+        RegionRadius::Target { .. } => (16.0 * 3e-9 * n.chord.powi(3), BOUND_MATRICES * (n.chord / n.window).powi(2)),
         _ => (0.0, 0.0),
     };
     // The windows of a record that share samples or the pulse.
@@ -264,15 +264,14 @@ fn planning(scene: &Scene, n: &Sizes) -> (f64, f64, f64) {
     (core_s + model_s + correlation_s, kept_bytes, kept_bytes + matrices.max(model_matrices) * squared * 8.0)
 }
 
-/// Real numbers of the bound of one window over its samples squared: the covariance and its derivative, complex and as the
-/// solver takes them, its factors, solution and residual, the envelope and its copies.
-const BOUND_MATRICES: f64 = 14.0;
+/// Matrices of the bound of a record: the signal, the covariance and its derivative, its factor, a turned copy.
+const BOUND_MATRICES: f64 = 6.0;
 
-/// What is held for the Cramer-Rao bound in place of a run of these stages: that of the air and the matrices of a window.
+/// What is held for the Cramer-Rao bound in place of a run of these stages: that of the air and the matrices of a record.
 pub(super) fn of_bound(stages: &[PlannedStage], n: &Sizes) -> Vec<PlannedStage> {
     let first = [Stage::PhaseScreens, Stage::Efficiency, Stage::LinesOfSight];
     let mut out: Vec<PlannedStage> = stages.iter().filter(|s| first.contains(&s.stage)).cloned().collect();
-    let matrices_bytes = 8.0 * BOUND_MATRICES * n.window.powi(2);
+    let matrices_bytes = 8.0 * BOUND_MATRICES * n.chord.powi(2);
     out.push(run(Stage::Estimates, String::new(), 0.0, [air_bytes(n) + matrices_bytes, 0.0]));
     out
 }

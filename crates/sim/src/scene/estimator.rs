@@ -113,6 +113,11 @@ section! {
 }
 
 impl Method {
+    /// Whether tapers of its own take the place of the weighting of the windows.
+    pub(crate) fn has_own_tapers(&self) -> bool {
+        matches!(self, Self::Likelihood(_) | Self::GradientLikelihood(_))
+    }
+
     /// The order of the model that the method fits, if it fits one.
     pub fn order(&self) -> Option<ModelOrder> {
         match self {

@@ -30,6 +30,7 @@ fn idle(scene: &Scene) -> Vec<Idle> {
     unused(without_peak, &["estimator.refinement"], format!("{kind} refines no peak"));
     let without_spectrum = *method == (Method::PulsePair {});
     unused(without_spectrum, &["estimator.padded_samples"], format!("{kind} has no spectrum"));
+    unused(method.has_own_tapers(), &["estimator.weighting"], format!("{kind} has tapers of its own"));
     let without_region = *method == (Method::Periodogram {});
     unused(without_region, &["estimator.radius_m"], format!("{kind} has no region"));
     let own_radius = !without_region && scene.estimator.radius != RegionRadius::Fixed {};
@@ -164,6 +165,7 @@ mod tests {
             ("[estimator.method]\nkind = \"capon\"\nmoment_reach = 2.0\n", "estimator.method.moment_reach = 2.0"),
             ("[estimator.method]\nlikelihood_snr_db = 3\n", "estimator.method.likelihood_snr_db = 3"),
             ("[estimator]\nmethod.kind = \"periodogram\"\nradius_m = 5.0\n", "estimator.radius_m = 5.0"),
+            ("[estimator]\nmethod.kind = \"likelihood\"\nweighting = \"hann\"\n", "estimator.weighting = \"hann\""),
             ("[estimator]\nmethod.kind = \"pulse_pair\"\nrefinement = \"none\"\n", "estimator.refinement = \"none\""),
             (
                 "[atmosphere]\nextinction_per_m = 1e-3\nprofile = { range_m = [0.0], backscatter_per_m_sr = [1e-7], \

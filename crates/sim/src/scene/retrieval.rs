@@ -1,6 +1,6 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
-use super::{Flow, Method, NoiseKind, Pattern, PulseShape, Scan, Scene, Weighting};
+use super::{Flow, NoiseKind, Pattern, PulseShape, Scan, Scene, Weighting};
 use crate::beams::direction::sin_cos_of_turn;
 use crate::keys::Checker;
 use serde::{Deserialize, Serialize};
@@ -73,13 +73,12 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let allowed = "at least one of \"fit\", \"signals\", \"rv\", \"envelope\", \"integral\", each once, for example [\"fit\", \"rv\"]";
     c.require(distinct && !r.methods.is_empty(), key, &r.methods, allowed);
     let estimator = &scene.estimator;
-    let has_edges =
-        estimator.weighting == Weighting::Gaussian && !matches!(estimator.method, Method::GradientLikelihood(_));
+    let has_edges = estimator.weighting == Weighting::Gaussian && !estimator.method.has_own_tapers();
     c.require(
         !r.methods.contains(&RetrievalMethod::Envelope) || has_edges,
         key,
         "envelope",
-        "another method unless estimator.weighting = \"gaussian\" and the estimator has a spectrum, which all have but gradient_likelihood",
+        "another method unless estimator.weighting = \"gaussian\" and the windows are weighted with it, as all are but those of the likelihoods",
     );
     let one = "another method with more than one sweep (scan.head.sweeps)";
     let alone = scene.scan.head.sweeps == 1 || !r.methods.contains(&RetrievalMethod::Envelope);

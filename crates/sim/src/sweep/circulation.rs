@@ -9,16 +9,19 @@ use crate::measure::wind::vortex_pair;
 use crate::plan::Plan;
 use crate::scene::{Flow, VortexPair, VortexProfile};
 use ndarray::Array2;
+use wakescope_estimate::map::ErrorStatistics;
 use wakescope_estimate::vortex_fit::{
-    CoreProfile, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake,
-    WakeModel, fit_map_of_estimator,
+    CoreProfile, EstimatorResponse, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap,
+    Vortex, Wake, WakeModel, fit_map_of_estimator,
 };
 
 /// Circulation fitted to the maps of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Circulation {
-    /// Mean error, m^2/s.
+    /// Mean error, m^2/s; NaN with all others but the bound where no fit was tried.
     pub(super) bias_m2_s: f64,
+    /// Its standard error, m^2/s.
+    pub(super) bias_standard_error_m2_s: f64,
     /// Root mean square error, m^2/s.
     pub(super) rms_m2_s: f64,
     /// Its standard error, m^2/s.
@@ -63,15 +66,15 @@ impl<'p> Retrieval<'p> {
         }
     }
 
-    /// Fits the velocities of a map, m/s.
+    /// Fits the velocities of a map, m/s; nothing where it is not known what the estimator shows of a wake.
     pub(super) fn add(&mut self, velocity_m_s: &Array2<f64>) {
-        let found = self.fit(velocity_m_s).unwrap_or(f64::NAN);
-        self.circulations_m2_s.push(found);
+        let shown = self.response.shown(&self.plan.scene.scene, self.pair.lateral_position_m);
+        let found = shown.map(|shown| self.fit(velocity_m_s, &shown).unwrap_or(f64::NAN));
+        self.circulations_m2_s.extend(found);
     }
 
-    fn fit(&self, velocity_m_s: &Array2<f64>) -> Option<f64> {
+    fn fit(&self, velocity_m_s: &Array2<f64>, shown: &EstimatorResponse<'_>) -> Option<f64> {
         let (scene, g) = (&self.plan.scene.scene, &self.plan.geometry);
-        let shown = self.response.shown(scene, self.pair.lateral_position_m)?;
         let some: Vec<usize> =
             (0..g.gate_range_m.len()).step_by(gate_step(scene, spacing_m(&g.gate_range_m))).collect();
         let range_m: Vec<f64> = some.iter().map(|i| g.gate_range_m[*i]).collect();
@@ -86,7 +89,7 @@ impl<'p> Retrieval<'p> {
         let correlated_lines = self.response.correlated_lines(step_rad, self.pair.lateral_position_m);
         let core_radius_m = scene.retrieval.as_ref().and_then(|wanted| wanted.core_radius_m);
         let options = MapFitOptions { free: free(), core_radius_m, correlated_lines, ..Default::default() };
-        let wake = fit_map_of_estimator(&map, &self.model(), &shown, &options).ok()?.wake;
+        let wake = fit_map_of_estimator(&map, &self.model(), shown, &options).ok()?.wake;
         Some(0.5 * (wake.left.circulation_m2_s + wake.right.circulation_m2_s))
     }
 
@@ -117,22 +120,14 @@ impl<'p> Retrieval<'p> {
 
     /// Errors of the fits, and the bound.
     pub(super) fn result(&self) -> Circulation {
-        let errors: Vec<f64> = self
-            .circulations_m2_s
-            .iter()
-            .map(|found| found - self.pair.circulation_m2_s)
-            .filter(|error| error.is_finite())
-            .collect();
-        let n = errors.len() as f64;
-        let mean = |power: i32| errors.iter().map(|e| e.powi(power)).sum::<f64>() / n;
-        let rms_m2_s = mean(2).sqrt();
-        // Of a root of a mean of squares, from their scatter; one map has none.
-        let scatter = ((mean(4) - mean(2).powi(2)).max(0.0) / (n - 1.0)).sqrt();
+        let errors = ErrorStatistics::of(self.circulations_m2_s.iter().map(|found| found - self.pair.circulation_m2_s));
         Circulation {
-            bias_m2_s: mean(1),
-            rms_m2_s,
-            standard_error_m2_s: if n > 1.0 { 0.5 * scatter / rms_m2_s } else { f64::NAN },
-            failed_fraction: 1.0 - n / self.circulations_m2_s.len() as f64,
+            bias_m2_s: errors.bias_m_s,
+            bias_standard_error_m2_s: errors.bias_standard_error_m_s,
+            rms_m2_s: errors.rms_m_s,
+            standard_error_m2_s: errors.rms_standard_error_m_s,
+            // No number where none was tried.
+            failed_fraction: errors.missing as f64 / (errors.missing + errors.count) as f64,
             bound_m2_s: self.bound_m2_s().unwrap_or(f64::NAN),
         }
     }
@@ -176,12 +171,27 @@ mod tests {
         });
         let scanner = Scanner::new(&plan, &Silent).unwrap();
         let mut retrieval = Retrieval::new(&plan, &scanner).unwrap();
-        map::estimates::<f64>(&[&plan], &scanner, &Silent, |_| (), |_, v_m_s| retrieval.add(v_m_s)).unwrap();
+        map::estimates::<f64>(&[&plan], &scanner, &Silent, |_| (), |_, v_m_s| retrieval.add(v_m_s), false).unwrap();
         let found = retrieval.result();
         assert_eq!(found.failed_fraction, 0.0);
         // A map of one scan at 0 dB and twice the lines has 19 m^2/s; at 10 dB speckle is left.
         assert!(found.rms_m2_s < 3.0 * 19.0 && found.bound_m2_s < 5.0, "{found:?}");
         assert!(found.rms_m2_s > 0.2 * found.bound_m2_s, "no fit is so much better than the bound: {found:?}");
+    }
+
+    #[test]
+    fn what_was_never_tried_did_not_fail() {
+        for change in
+            [(|scene| scene.detector.signal = crate::scene::DetectorSignal::Baseband) as fn(&mut Scene), |scene| {
+                scene.estimator.follow_wind = true
+            }]
+        {
+            let plan = plan(change);
+            let mut retrieval = Retrieval::new(&plan, &Scanner::new(&plan, &Silent).unwrap()).unwrap();
+            retrieval.add(&Array2::zeros((plan.geometry.elevation_rad.len(), plan.geometry.gate_range_m.len())));
+            let found = retrieval.result();
+            assert!(found.failed_fraction.is_nan() && found.rms_m2_s.is_nan() && found.bound_m2_s > 0.0, "{found:?}");
+        }
     }
 
     #[test]

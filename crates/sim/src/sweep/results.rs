@@ -1,12 +1,11 @@
 //! What a case gives in numbers: a row of the results.
 //!
-//! Errors are averages over cells of the map, of which those that share pulses and windows count as one where a standard error
-//! is made. Check: the columns of a run against its map; resolution against the stored table.
+//! Errors are averages over cells of the map, with standard errors from their scatter over the realisations. Check: the columns of a run against its map; resolution against the stored table.
 
 use super::circulation::Circulation;
 use crate::Error;
 use crate::measure::bound::BoundPoint;
-use crate::measure::cell_average::CellAverage;
+use crate::measure::cell_average::{CellAverage, error_of_fraction, flagged_fraction};
 use crate::measure::estimators;
 use crate::measure::map::VelocityEstimates;
 use crate::measure::run::ScanMiddle;
@@ -80,7 +79,6 @@ pub(super) struct Measured<'a> {
 /// # Errors
 /// What the crates refuse; a checked scene gives none.
 pub(super) fn row(plan: &Plan, measured: &Measured<'_>) -> Result<Vec<f64>, Error> {
-    let scene = &plan.scene.scene;
     let filter = range_filter(plan)?;
     let cells = Cells::new(plan)?;
     let mut out = vec![
@@ -92,16 +90,11 @@ pub(super) fn row(plan: &Plan, measured: &Measured<'_>) -> Result<Vec<f64>, Erro
     for part in [Part::All, Part::Inside, Part::Outside] {
         out.extend(cells.averages(measured.map, part));
     }
-    let independent = cells.independent(Part::All) * scene.scan.realisations as f64;
-    let known: Vec<f64> = measured.map.flagged.iter().copied().filter(|f| f.is_finite()).collect();
-    let flagged = known.iter().sum::<f64>() / known.len() as f64;
-    out.extend([flagged, error_of_fraction(flagged, independent)]);
+    out.extend(flagged_fraction(measured.map, cells.shared));
     out.extend(bad_fraction(plan, measured.errors_m_s)?);
     out.extend(measured.circulation.map_or([f64::NAN; 6], |c| {
-        let scatter_m2_s = (c.rms_m2_s.powi(2) - c.bias_m2_s.powi(2)).max(0.0).sqrt();
-        let maps = (1.0 - c.failed_fraction) * scene.scan.realisations as f64;
-        let bias_error_m2_s = if maps > 1.5 { scatter_m2_s / (maps - 1.0).sqrt() } else { f64::NAN };
-        [c.bias_m2_s, bias_error_m2_s, c.rms_m2_s, c.standard_error_m2_s, c.failed_fraction, c.bound_m2_s]
+        let Circulation { bias_m2_s, bias_standard_error_m2_s, rms_m2_s, standard_error_m2_s, .. } = c;
+        [bias_m2_s, bias_standard_error_m2_s, rms_m2_s, standard_error_m2_s, c.failed_fraction, c.bound_m2_s]
     }));
     Ok(out)
 }
@@ -129,12 +122,6 @@ fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
     let (of, share) = (errors_m_s.len() as f64, 1.0 - part);
     let beyond = errors_m_s.iter().filter(|error| error.is_nan() || error.abs() > limit_m_s).count() as f64 / of;
     Ok([(beyond / share).min(1.0), error_of_fraction(beyond, of) / share])
-}
-
-/// Standard error of a fraction of so many: not 0 where none was found.
-fn error_of_fraction(fraction: f64, of: f64) -> f64 {
-    let found = fraction * of;
-    ((found + 1.0) * (of - found + 1.0) / ((of + 2.0).powi(2) * (of + 3.0))).sqrt()
 }
 
 /// Cells about which a column speaks.
@@ -197,26 +184,11 @@ impl Cells {
         cells.into_iter().filter(|(i, j)| i.is_multiple_of(lines) && j.is_multiple_of(gates)).collect()
     }
 
-    fn independent(&self, part: Part) -> f64 {
-        (self.of(part).len() as f64 / (self.shared.0 * self.shared.1)).max(1.0)
-    }
-
     /// Standard deviation, bias and root mean square, each with its standard error, m/s.
     fn averages(&self, map: &VelocityEstimates, part: Part) -> [f64; 6] {
-        let cells = self.of(part);
-        let average = CellAverage::over(map, &cells, self.shared.0 * self.shared.1);
-        let scans = cells.iter().map(|cell| map.count[*cell]).fold(0.0, f64::max);
-        let CellAverage { bias_m_s, std_m_s, rms_m_s, standard_error_m_s } = average;
-        // Two bounds: from the mean squares, which a bias adds to, and from the scatter of the variances over the cells, to
-        // which true differences between them add.
-        let variances: Vec<f64> =
-            cells.iter().map(|cell| map.std_m_s[*cell].powi(2)).filter(|v| v.is_finite()).collect();
-        let spread = variances.iter().map(|v| (v - std_m_s * std_m_s).powi(2)).sum::<f64>() / variances.len() as f64;
-        let independent = self.independent(part);
-        let by_squares_m_s = standard_error_m_s * rms_m_s / std_m_s;
-        let std_error_m_s = by_squares_m_s.min((spread / independent).sqrt() / (2.0 * std_m_s));
-        let bias_error_m_s = std_m_s / (scans * independent).sqrt();
-        [std_m_s, std_error_m_s, bias_m_s, bias_error_m_s, rms_m_s, standard_error_m_s]
+        let a = CellAverage::over(map, &self.of(part), self.shared);
+        let [bias, std] = [[a.bias_m_s, a.bias_standard_error_m_s], [a.std_m_s, a.std_standard_error_m_s]];
+        [std[0], std[1], bias[0], bias[1], a.rms_m_s, a.standard_error_m_s]
     }
 }
 

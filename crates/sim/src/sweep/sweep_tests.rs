@@ -264,7 +264,12 @@ fn results_are_those_of_the_map_of_the_case() {
         .unwrap();
     let result = crate::measure::run::run(&plan, &crate::Silent).unwrap();
     let of = |name: &str| table.number(0, table.column(name).unwrap());
-    assert_eq!(of("snr_db"), result.middle.unwrap().snr_db);
+    assert_eq!(of("snr_db"), result.middle.as_ref().unwrap().snr_db);
+    // What both call a standard deviation, a root mean square error, is one number.
+    for (line, column) in [("std_mean_m_s", "std_m_s"), ("rms_mean_m_s", "rms_m_s")] {
+        let told = result.summary().into_iter().find(|told| told.key == line).unwrap().value;
+        assert!((told - of(column)).abs() < 1e-12, "{line} {told}, {column} {}", of(column));
+    }
     let map = result.map.unwrap();
     let mean = |field: &ndarray::Array2<f64>| field.sum() / field.len() as f64;
     for (found, expected) in [

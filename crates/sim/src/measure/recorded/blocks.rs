@@ -98,7 +98,9 @@ impl<'p, S: FromParts> Blocks<'p, S> {
                 self.observer.advance(tile.lines.len() as u64);
             }
         }
-        Ok(ScanCells { lines, cells, spectra })
+        let radius_m = self.plan.geometry.gate_range_m.iter().map(|range_m| estimator.radius_m(*range_m));
+        let regions = (places.clone(), radius_m.collect::<Result<_, _>>()?);
+        Ok(ScanCells { lines, cells, regions, spectra })
     }
 
     fn tile(

@@ -2,6 +2,7 @@
 
 use super::lines::ScanLines;
 use ndarray::Array2;
+use wakescope_estimate::map::ScanGeometry;
 
 /// What is known of one gate before the noise is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +40,8 @@ impl Cell {
 pub(super) struct ScanCells {
     pub(super) lines: ScanLines,
     pub(super) cells: Array2<Cell>,
+    /// Where the windows of the lines are, and the radius of the regions of each gate, m.
+    pub(super) regions: (ScanGeometry, Vec<f64>),
     /// Spectra of the gates over the noise of the scene, where they were asked for.
     pub(super) spectra: Option<Vec<f32>>,
 }

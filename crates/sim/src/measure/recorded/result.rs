@@ -5,13 +5,14 @@
 use super::NoiseLevel;
 use super::cells::{Cell, ScanCells};
 use super::lines::ScanLines;
-use super::predicted::PredictedDeviation;
+use super::predicted::PredictedError;
 use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::measure::described::{pulse_info, site};
 use crate::measure::map_estimator::snr_db;
 use crate::plan::Plan;
 use ndarray::{Array2, Axis, concatenate};
+use wakescope_estimate::map::PolarPoint;
 
 /// Velocities of one scan, each \[line, gate\].
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +23,8 @@ pub struct MeasuredScan {
     pub velocity_m_s: Array2<f64>,
     /// The standard deviation that the Cramer-Rao bound predicts at the estimated signal-to-noise ratio, m/s.
     pub predicted_m_s: Array2<f64>,
+    /// The bias that the method has in the scene's noise at that ratio, m/s; NaN where it is not known.
+    pub bias_m_s: Array2<f64>,
     /// Windows accumulated.
     pub level: Array2<f64>,
     /// Independent windows that they are worth.
@@ -38,24 +41,32 @@ pub struct MeasuredScan {
 
 /// Holds the gates of a scan against the noise.
 pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Result<MeasuredScan, Error> {
-    let ScanCells { lines, cells, .. } = scan;
+    let ScanCells { lines, cells, regions: (places, radius_m), .. } = scan;
     // The noise over that of the scene.
     let factor = match noise {
         NoiseLevel::OfScene => 1.0,
         NoiseLevel::Given(power) => power / plan.instrument.receiver.noise_variance_a2(),
         NoiseLevel::Quietest => quietest(&cells),
     };
-    let predicted = PredictedDeviation::new(plan)?;
+    let n_eff: Vec<f64> = cells.iter().map(|cell| cell.n_eff).filter(|n_eff| n_eff.is_finite()).collect();
+    let n_eff = n_eff.iter().sum::<f64>() / n_eff.len().max(1) as f64;
+    let predicted = PredictedError::new(plan, places, radius_m.iter().copied().fold(0.0, f64::max), n_eff)?;
     let ratio = |cell: &Cell| snr_db(cell.power_ratio / factor, cell.deviation, 1.0);
     let is_flagged = |cell: &Cell| match cell.detection_ratio.is_nan() {
         true => !cell.is_good,
         false => !(cell.is_good && cell.detection_ratio > factor),
     };
-    let prediction =
-        |cell: &Cell| predicted.as_ref().map_or(f64::NAN, |predicted| predicted.m_s(ratio(cell), cell.n_eff));
+    let mut predicted_m_s = Array2::from_elem(cells.dim(), f64::NAN);
+    let mut bias_m_s = predicted_m_s.clone();
+    for (predicted, ((line, gate), cell)) in predicted.iter().cycle().zip(cells.indexed_iter()) {
+        let point = PolarPoint { range_m: plan.geometry.gate_range_m[gate], elevation_rad: lines.elevation_rad[line] };
+        predicted_m_s[[line, gate]] = predicted.deviation_m_s(point, radius_m[gate], cell.level, ratio(cell));
+        bias_m_s[[line, gate]] = predicted.bias_m_s(cell.velocity_m_s, ratio(cell));
+    }
     Ok(MeasuredScan {
         velocity_m_s: cells.map(|cell| cell.velocity_m_s),
-        predicted_m_s: cells.map(prediction),
+        predicted_m_s,
+        bias_m_s,
         level: cells.map(|cell| cell.level),
         n_eff: cells.map(|cell| cell.n_eff),
         flagged: cells.map(|cell| f64::from(u8::from(is_flagged(cell)))),
@@ -107,6 +118,7 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
             })?
             .with_ancillary(&[
                 "velocity_standard_deviation",
+                "bias",
                 "level",
                 "n_eff",
                 "flagged",
@@ -119,6 +131,7 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
                 "predicted standard deviation: Cramer-Rao bound at the estimated signal-to-noise ratio",
                 |s| &s.predicted_m_s,
             )?,
+            field("bias", speed, "predicted bias of the method in this noise, not taken off", |s| &s.bias_m_s)?,
             field("level", Unit::One, "windows accumulated for one estimate", |s| &s.level)?,
             field("n_eff", Unit::One, "independent windows that these are worth", |s| &s.n_eff)?,
             field("flagged", Unit::One, "1 where the estimate was flagged", |s| &s.flagged)?,

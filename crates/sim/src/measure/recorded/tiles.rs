@@ -162,7 +162,8 @@ mod tests {
                 (estimators::sampling(&plan.scene.scene).unwrap(), estimators::gates(&plan.scene.scene).unwrap());
             let places = ScanGeometry::new(&sampling, &gates, &elevation_rad, plan.geometry.samples).unwrap();
             assert_eq!(plan.geometry.samples, samples);
-            let estimator = MapEstimator::<f64>::new(&plan, &[(80.0, 1.0), (1e6, 1.0)], &places).unwrap();
+            let layer_snr: Vec<(f64, f64)> = plan.geometry.layer_range_m().map(|range_m| (range_m, 1.0)).collect();
+            let estimator = MapEstimator::<f64>::new(&plan, &layer_snr, &places).unwrap();
             let range_m = &plan.geometry.gate_range_m;
             let lines = ScanLines { elevation_rad, ..ScanLines::default() };
             let most_bytes = 16 << 20;

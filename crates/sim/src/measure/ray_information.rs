@@ -1,0 +1,87 @@
+//! What the record of one pulse says of the velocity about a range, for bounds, regions and stated errors.
+//!
+//! Check: the stored bound of one window; estimates of whole regions, which no bound may pass.
+
+use crate::measure::estimators;
+use crate::measure::region::of_table;
+use crate::plan::Plan;
+use crate::scene::NoiseKind;
+use crate::{Error, SPEED_OF_LIGHT_M_S};
+use wakescope_estimate::{Gates, bound::RecordModel};
+use wakescope_signal::RangeFilter;
+
+/// Signal-to-noise ratios of which a bound is made: no noise is as little as the last.
+const SNR: std::ops::RangeInclusive<f64> = 1e-8..=1e6;
+
+/// Whether ratios are within a factor of two of each other.
+fn alike(a: f64, b: f64) -> bool {
+    b <= 2.0 * a && a <= 2.0 * b
+}
+
+/// Signal-to-noise ratio of the samples of a scene's records, and the information in windows of them.
+pub(crate) struct RayInformation {
+    model: RecordModel,
+    gates: Gates,
+    /// Range between samples, m.
+    spacing_m: f64,
+    filter: RangeFilter,
+    layer_m: Vec<f64>,
+    layer_snr: Vec<f64>,
+    is_noisy: bool,
+}
+
+impl RayInformation {
+    /// For a planned scene; `layer_snr` holds range, m, and expected signal-to-noise ratio of the layers of its lines.
+    ///
+    /// # Errors
+    /// What the crates refuse; a checked scene gives none.
+    pub(crate) fn new(plan: &Plan, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
+        let (scene, g, pulse) = (&plan.scene.scene, &plan.geometry, &plan.instrument.pulse);
+        let (layer_m, layer_snr) = layer_snr.iter().copied().unzip();
+        Ok(Self {
+            model: estimators::record_model(scene, pulse)?,
+            gates: estimators::gates(scene)?,
+            spacing_m: 0.5 * SPEED_OF_LIGHT_M_S / scene.detector.sampling_hz,
+            filter: RangeFilter::pulse(pulse, g.layer_thickness_m)?,
+            layer_m,
+            layer_snr,
+            is_noisy: scene.detector.noise != NoiseKind::None,
+        })
+    }
+
+    /// Signal-to-noise ratio at a range, a power ratio: that of the air there, or the mean of what the pulse lights beside it where
+    /// that is of another order, as beside a cloud.
+    pub(crate) fn snr_at(&self, range_m: f64) -> Result<f64, Error> {
+        let (here, seen) = (of_table(&self.layer_m, &self.layer_snr, range_m), self.seen_snr(range_m)?);
+        Ok(if alike(here, seen) { here } else { seen })
+    }
+
+    /// Mean ratio of a sample that sees a range: the pulse lights layers before and behind it.
+    fn seen_snr(&self, range_m: f64) -> Result<f64, Error> {
+        let mut snr = [0.0];
+        self.filter.apply_into(self.layer_m[0], &self.layer_snr, &[range_m], &mut snr)?;
+        Ok(snr[0])
+    }
+
+    /// Information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows about a range. A ratio that changes by less than a factor of two
+    /// along their samples is that at the middle, since what one half has more the other has less.
+    pub(crate) fn at(&self, range_m: f64, count: usize) -> Result<Vec<f64>, Error> {
+        if !self.is_noisy {
+            return self.of_snr(*SNR.end(), count);
+        }
+        let here = self.snr_at(range_m)?;
+        // The samples of a window are centred half a sample before its range.
+        let snr = |samples: f64| self.seen_snr(range_m + (samples - 0.5) * self.spacing_m).unwrap_or(f64::NAN);
+        let half = ((count - 1) * self.gates.step_samples + self.gates.window_samples).div_ceil(2) as i64;
+        match (-half..=half).step_by(4).all(|samples| alike(here, snr(samples as f64))) {
+            true => self.of_snr(here, count),
+            false => Ok(self.model.information(&self.gates, count, snr)?),
+        }
+    }
+
+    /// The same where all samples have one signal-to-noise ratio.
+    pub(crate) fn of_snr(&self, snr: f64, count: usize) -> Result<Vec<f64>, Error> {
+        let snr = snr.clamp(*SNR.start(), *SNR.end());
+        Ok(self.model.information(&self.gates, count, |_| snr)?)
+    }
+}
