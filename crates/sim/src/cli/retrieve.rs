@@ -124,6 +124,8 @@ enum MotionWord {
     No,
 }
 
+/// Few lines cross a core, and the likelihood of their speckle is no parabola.
+const HEIGHTS: &str = "fits of signals state the deviations of heights a quarter too small\n";
 /// Standard deviation of the weight of gates that do not show cores, m.
 const LONG_GATE_M: f64 = 3.0;
 
@@ -268,7 +270,14 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     let track = retrieve::track_of(&found.scans)?;
     let files = files(words, &found, track.as_ref(), existing)?;
     let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found.scans), "files": files });
-    say(cli.json, &object, &format!("{}wrote {} files to {}", text(&found.scans), files.len(), words.out.display()))
+    let is_of_signals =
+        words.method == Method::Signals && found.scans.iter().any(|scan| !scan.result.vortices.is_empty());
+    let note = if is_of_signals { HEIGHTS } else { "" };
+    say(
+        cli.json,
+        &object,
+        &format!("{}{note}wrote {} files to {}", text(&found.scans), files.len(), words.out.display()),
+    )
 }
 
 /// Where the track of the scans so far says that the wake is, to start from beside the blind search.
