@@ -24,6 +24,14 @@ pub enum Error {
         /// What is wrong, with what is allowed.
         reason: String,
     },
+    /// What a key asks for cannot be done, which only a plan could find.
+    #[error("{key}: {reason}")]
+    Key {
+        /// Path of the key.
+        key: &'static str,
+        /// What is wrong, and what would do.
+        reason: String,
+    },
     /// A file that a key names cannot be used.
     #[error("{key}: {source}")]
     OfKey {

@@ -1,14 +1,20 @@
 //! What this machine has: the memory that a process may still use.
 //!
-//! Check: control groups below the machine's memory win; text that is no number counts as no limit.
+//! Check: control groups and limits of the shell below the machine's memory win; text that is no number counts as no limit.
 
+use crate::plan::units;
 use std::path::Path;
 
-/// Memory that can be had without swapping, bytes: what the system says is available, or less where a control group sets a
-/// lower limit. `None` where the system does not say.
+/// Memory that can be had without swapping, bytes: what the system says is available, or less where a control group or a limit
+/// of the shell (`ulimit -v`) leaves less. `None` where the system does not say.
 pub(crate) fn available_memory_bytes() -> Option<f64> {
     let read = |path: &str| std::fs::read_to_string(path).ok();
-    let mut found = read("/proc/meminfo").and_then(|text| of_meminfo(&text));
+    let mut found = read("/proc/meminfo").and_then(|text| kilobytes(&text, "MemAvailable:"));
+    let limit = read("/proc/self/limits").and_then(|text| of_addresses(&text));
+    if let (Some(limit), Some(text)) = (limit, read("/proc/self/status")) {
+        let left = (limit - kilobytes(&text, "VmSize:").unwrap_or(0.0)).max(0.0);
+        found = Some(found.map_or(left, |found: f64| found.min(left)));
+    }
     for (limit, usage) in [
         ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
         ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
@@ -23,10 +29,33 @@ pub(crate) fn available_memory_bytes() -> Option<f64> {
     found
 }
 
-/// `MemAvailable` of the text of /proc/meminfo, bytes.
-fn of_meminfo(text: &str) -> Option<f64> {
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+/// Holds what a file asks for against the memory, before any of it is allocated.
+///
+/// # Errors
+/// How much `what` would take, and how much can be had.
+pub(crate) fn holds(what: &str, bytes: f64) -> Result<(), String> {
+    // So little is not worth the question.
+    const LITTLE_BYTES: f64 = 1e7;
+    let too_much = (bytes > LITTLE_BYTES).then(available_memory_bytes).flatten().filter(|available| bytes > *available);
+    too_much.map_or(Ok(()), |available| {
+        Err(format!(
+            "{what} would take {} of memory, and {} are available",
+            units::bytes(bytes),
+            units::bytes(available)
+        ))
+    })
+}
+
+/// An entry of the texts of /proc that are in kB, bytes.
+fn kilobytes(text: &str, name: &str) -> Option<f64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     Some(1024.0 * number(line.trim().trim_end_matches("kB").to_owned())?)
+}
+
+/// The limit of the addresses of a process in the text of /proc/self/limits, bytes; none where there is no limit.
+fn of_addresses(text: &str) -> Option<f64> {
+    let line = text.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    number(line.split_whitespace().next()?.to_owned())
 }
 
 /// A number of bytes; `max` is no limit.
@@ -41,8 +70,14 @@ mod tests {
     #[test]
     fn the_systems_words_are_understood() {
         let text = "MemTotal:       24000000 kB\nMemFree:  1 kB\nMemAvailable:   20000000 kB\n";
-        assert_eq!(of_meminfo(text), Some(2.048e10));
-        assert_eq!(of_meminfo("MemTotal: 1 kB\n"), None);
+        assert_eq!(kilobytes(text, "MemAvailable:"), Some(2.048e10));
+        assert_eq!(kilobytes("MemTotal: 1 kB\n", "MemAvailable:"), None);
+        let limit = |soft: &str| {
+            format!("Max cpu time  1  2  seconds\nMax address space         {soft}   unlimited    bytes\n")
+        };
+        assert_eq!(of_addresses(&limit("8192000")), Some(8_192_000.0));
+        assert_eq!(of_addresses(&limit("unlimited")), None);
+        assert!(holds("a list", 1e18).is_err_and(|e| e.contains("a list would take")) || !cfg!(target_os = "linux"));
         assert_eq!((number("max\n".into()), number("1024\n".into())), (None, Some(1024.0)));
         if cfg!(target_os = "linux") {
             assert!(available_memory_bytes().is_some_and(|bytes| bytes > 1e6));

@@ -31,6 +31,7 @@ pub(crate) struct Expected<'a> {
 impl<'a> Expected<'a> {
     /// For the search of a wake: the points of a Gaussian weight lie on one grid with the gates, which is quick.
     pub(crate) fn rough(map: &'a ScanMap, options: &'a RetrievalOptions) -> Result<Self, Error> {
+        options.gate.validate(&map.range_m)?;
         let step_m = uniform_step_m(&map.range_m);
         let kernel = match &options.gate {
             Gate::Gaussian { std_m } if *std_m > 0.0 => {

@@ -18,6 +18,18 @@ pub enum Gate {
     Kernel(RangeKernel),
 }
 
+impl Gate {
+    /// Refuses a weight that is wider than the scan: it shows nothing of a wake, and has more points than any memory.
+    pub(crate) fn validate(&self, range_m: &[f64]) -> Result<(), Error> {
+        let Self::Gaussian { std_m } = *self else { return Ok(()) };
+        not_negative("std_m of the gate", std_m)?;
+        let length_m = range_m.last().zip(range_m.first()).map_or(0.0, |(last, first)| last - first);
+        let allowed = "at most the distance from the first to the last range of the scan";
+        let error = Error::OutOfRange { field: "std_m of the gate", value: std_m, allowed };
+        if std_m > length_m { Err(error) } else { Ok(()) }
+    }
+}
+
 /// Correlated velocities beside the noise of each: C = deviation^2 exp(-distance / length).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turbulence {
@@ -87,9 +99,6 @@ impl RetrievalOptions {
     pub const MOVES: f64 = 9.0;
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        if let Gate::Gaussian { std_m } = self.gate {
-            not_negative("std_m of the gate", std_m)?;
-        }
         if let Some(turbulence) = self.turbulence {
             positive("deviation_m_s of the turbulence", turbulence.deviation_m_s)?;
             positive("length_m of the turbulence", turbulence.length_m)?;

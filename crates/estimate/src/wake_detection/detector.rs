@@ -89,6 +89,7 @@ impl WakeDetector {
         if options.spacing_m.0 != options.spacing_m.1 {
             increasing("spacing_m", &[options.spacing_m.0, options.spacing_m.1])?;
         }
+        gate.validate(&map.range_m)?;
         let cells = Cells::new(&map.view(), model);
         let background = Background::new(&cells, options.turbulence.as_ref())?;
         let kernel = kernel(gate)?;

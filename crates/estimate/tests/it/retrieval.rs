@@ -521,7 +521,9 @@ fn impossible_scans_and_options_are_refused_with_the_field() {
     refused(&ScanMap { sigma_m_s: Some(Array2::zeros((75, 36))), ..map.clone() }, &options, "standard_deviation_m_s");
     refused(&ScanMap { velocity_m_s: Array2::from_elem((75, 36), f64::NAN), ..map.clone() }, &options, "velocities");
     refused(&map, &RetrievalOptions { threshold: f64::NAN, ..options.clone() }, "threshold");
-    refused(&map, &RetrievalOptions { gate: Gate::Gaussian { std_m: -3.0 }, ..options.clone() }, "std_m");
+    for std_m in [-3.0, 1e9] {
+        refused(&map, &RetrievalOptions { gate: Gate::Gaussian { std_m }, ..options.clone() }, "std_m of the gate");
+    }
     let turbulence = Some(Turbulence { deviation_m_s: 0.0, length_m: 25.0 });
     refused(&map, &RetrievalOptions { turbulence, ..options.clone() }, "deviation_m_s");
     assert_eq!(fit_scan(&map, &options).unwrap(), fit_scan(&map, &options).unwrap());

@@ -421,6 +421,8 @@ fn laws_repeat_and_impossible_tests_are_refused() {
     assert!(build(&case, &with((60.0, 20.0), None)).to_string().contains("spacing_m"));
     let still = Turbulence { length_m: 0.0, ..TURBULENCE };
     assert!(build(&case, &with((20.0, 60.0), Some(still))).to_string().contains("length_m"));
+    let long = Case { gate_m: 1e9, ..Case::uneven() };
+    assert!(build(&long, &DetectorOptions::default()).to_string().contains("std_m of the gate"));
     let few = Case::new((3, 0.05, 4e-3), (13, 400.0, 5.0));
     assert!(build(&few, &DetectorOptions::default()).to_string().contains("39"));
     let mut silent = Case::uneven();

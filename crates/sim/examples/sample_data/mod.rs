@@ -48,6 +48,7 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
             prt_s: 5e-5,
             pulse_width_s: 2e-7,
             nyquist_velocity_m_s: 48.4,
+            sampling_hz: 1.25e8,
             samples: 64,
             frequency_hz: 1.934e14,
         },
@@ -56,7 +57,7 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         lidar_height_m: 2.0,
         flight: None,
         ray_pulses: None,
-        places_m: None,
+        carrier: None,
         site: Site::default(),
         is_simulated: true,
     };

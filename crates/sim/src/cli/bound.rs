@@ -53,7 +53,7 @@ pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
     };
     let object = json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr),
-        "by_range": points(&found.by_range), "files": words.out,
+        "by_range": points(&found.by_range), "files": words.out.as_ref().map(|out| out.to_string_lossy()),
     });
     say(cli.json, &object, &text)
 }

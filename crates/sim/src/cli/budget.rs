@@ -1,6 +1,6 @@
 //! `wakescope budget`: the power budget of a scene.
 
-use super::{Cli, load, progress, say};
+use super::{Cli, load, paths, progress, say};
 use crate::Error;
 use crate::io::{Existing, FileGroup};
 use crate::measure::budget::{Budget, scan_ranges_m};
@@ -60,7 +60,7 @@ pub(super) fn budget(words: &BudgetWords, cli: &Cli) -> Result<(), Error> {
         found.limits.values.iter().map(|(key, value)| ((*key).to_owned(), json!(value))).collect();
     let object = json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "range_m": found.range_m, "rows": rows,
-        "limits": limits, "warnings": found.warnings, "files": files,
+        "limits": limits, "warnings": found.warnings, "files": paths(&files),
     });
     say(cli.json, &object, &text)
 }

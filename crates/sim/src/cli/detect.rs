@@ -1,7 +1,7 @@
 //! `wakescope detect`: whether scans hold a wake, and how small a wake is found in scans like them.
 
 use super::retrieve::{YesNo, is_signals, not_negative, positive, signals, turbulence};
-use super::{Cli, load, progress, say, shown};
+use super::{Cli, load, paths, progress, say, shown};
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test, gate_table,
@@ -148,7 +148,7 @@ fn run(words: &DetectWords, cli: &Cli, observer: &dyn Observer) -> Result<(), Er
         "threshold": power.as_ref().map(|power| power.threshold),
         "circulation_std_m2_s": power.as_ref().map(|power| power.circulation_std_m2_s),
         "gumbel": power.as_ref().map(|power| [power.gumbel.0, power.gumbel.1]),
-        "notes": task.notes, "files": files,
+        "notes": task.notes, "files": paths(&files),
     });
     say(cli.json, &object, &text.join("\n"))
 }
@@ -323,7 +323,7 @@ fn as_json((scan, found): (&ReadScan, &ScanDetection)) -> Value {
     };
     let statistic = &found.statistic;
     json!({
-        "file": scan.path, "sweep": scan.sweep, "wake": found.is_wake(), "statistic": statistic.value,
+        "file": scan.path.to_string_lossy(), "sweep": scan.sweep, "wake": found.is_wake(), "statistic": statistic.value,
         "threshold": found.threshold, "false_alarm": found.false_alarm, "left": vortex(statistic.wake.left),
         "right": vortex(statistic.wake.right), "gamma_std_m2_s": statistic.circulation_std_m2_s,
         "chi2_per_dof": { "wind": statistic.wind_chi2_per_dof, "wake": statistic.wake_chi2_per_dof },

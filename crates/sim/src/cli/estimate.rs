@@ -1,6 +1,6 @@
 //! `wakescope estimate`: velocities from raw signals, simulated or measured.
 
-use super::{Cli, load, progress, say};
+use super::{Cli, load, paths, progress, say};
 use crate::Error;
 use crate::io::Existing;
 use crate::io::number::ByteOrder;
@@ -16,7 +16,7 @@ use std::path::PathBuf;
 /// Words of `wakescope estimate`.
 #[derive(Debug, Args)]
 pub(super) struct EstimateWords {
-    /// The signals: signals.nc or another classic NetCDF file, NPY, NPZ, text (.csv, .txt), or a binary file with --format.
+    /// The signals: signals.nc or another NetCDF file, NPY, NPZ, text (.csv, .txt), or a binary file with --format.
     data: PathBuf,
     /// The scene whose instrument recorded them and whose estimator they go through.
     #[arg(long, value_name = "SCENE.toml")]
@@ -103,7 +103,8 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     let (text, results) = told(&plan, &found, records.records());
     let files = write::write_recorded(&plan, found, &words.out, existing)?;
     let object = json!({
-        "version": crate::VERSION, "scene_hash": plan.scene.hash, "data": words.data, "results": results, "files": files,
+        "version": crate::VERSION, "scene_hash": plan.scene.hash, "data": words.data.to_string_lossy(), "results": results,
+        "files": paths(&files),
     });
     say(cli.json, &object, &format!("{text}wrote {} files to {}", files.len(), words.out.display()))
 }
@@ -111,7 +112,7 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
 /// The result in a few numbers.
 fn told(plan: &Plan, found: &Recorded, records: usize) -> (String, serde_json::Value) {
     match found {
-        Recorded::OfRun(map) => {
+        Recorded::OfRun { map, .. } => {
             let scans = plan.realisations();
             let text = format!(
                 "{records} records of {scans} scans of this scene: the map has the truth of its flow beside it\n"

@@ -1,7 +1,7 @@
 //! `wakescope flow`: simulations from case files.
 
 use super::output::print;
-use super::{Cli, progress, say};
+use super::{Cli, paths, progress, say};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
@@ -111,7 +111,7 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc
         "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
         "is_complete": outcome.is_complete, "kinetic_energy_m5_s2": outcome.kinetic_energy_m5_s2,
         "relative_divergence": outcome.relative_divergence, "steps_wall_s": outcome.stepping.wall_s,
-        "exchange_wall_s": outcome.stepping.exchange_s, "files": outcome.files, "warnings": outcome.warnings,
+        "exchange_wall_s": outcome.stepping.exchange_s, "files": paths(&outcome.files), "warnings": outcome.warnings,
     });
     let state = if outcome.is_complete { "done" } else { "paused, --restart continues it" };
     let stepping = outcome.stepping;

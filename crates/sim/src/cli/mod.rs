@@ -26,7 +26,7 @@ use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::{Error, measure::run, measure::write};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
-use output::say;
+use output::{paths, say};
 use serde_json::{Value, json};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -178,7 +178,11 @@ fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(),
         return Err(Error::Io { action: "write", path: path.to_owned(), source });
     }
     crate::io::write_atomic(path, text.as_bytes())?;
-    say(cli.json, &json!({ "scene": path }), &format!("wrote {}\nnext: wakescope check {0}", path.display()))
+    say(
+        cli.json,
+        &json!({ "scene": path.to_string_lossy() }),
+        &format!("wrote {}\nnext: wakescope check {0}", path.display()),
+    )
 }
 
 fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
@@ -261,7 +265,7 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     if let Some(retrieval) = &outcome.retrieval {
         object["retrieval"] = retrieved::as_json(retrieval);
     }
-    object["files"] = json!(files);
+    object["files"] = json!(paths(&files));
     say(cli.json, &object, &text.join("\n"))
 }
 

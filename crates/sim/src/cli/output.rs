@@ -4,6 +4,7 @@ use crate::Error;
 use crate::scene::{Problem, SceneError};
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write as _};
+use std::path::Path;
 
 /// Prints a text to standard output; a pipe that nobody reads any more is no error, a full disk is.
 ///
@@ -14,6 +15,9 @@ pub(super) fn print(text: &str) -> Result<(), Error> {
     // What is still in the buffer at the end of the program would be lost without a word.
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(source) if source.kind() != ErrorKind::BrokenPipe => {
+            // Results are printed last.
+            let told = format!("{source}; the files of this command are in place");
+            let source = std::io::Error::new(source.kind(), told);
             Err(Error::Io { action: "write to", path: "standard output".into(), source })
         }
         _ => Ok(()),
@@ -26,6 +30,11 @@ pub(super) fn print(text: &str) -> Result<(), Error> {
 /// As [`print()`].
 pub(super) fn say(as_json: bool, object: &Value, text: &str) -> Result<(), Error> {
     print(&if as_json { format!("{object:#}\n") } else { format!("{}\n", text.trim_end()) })
+}
+
+/// Paths for an object, whatever bytes their names are of.
+pub(super) fn paths<P: AsRef<Path>>(paths: &[P]) -> Vec<String> {
+    paths.iter().map(|path| path.as_ref().display().to_string()).collect()
 }
 
 /// Prints an error to standard error; nothing can be done where that fails.
@@ -57,13 +66,13 @@ fn as_object(error: &Error) -> Value {
 }
 
 fn problems(error: &Error) -> Vec<Value> {
-    let problem = |file: &std::path::Path, line: Option<usize>, allowed: &str| json!({ "file": file, "line": line, "key": null, "value": null, "allowed": allowed });
+    let problem = |file: &Path, line: Option<usize>, allowed: &str| json!({ "file": file.to_string_lossy(), "line": line, "key": null, "value": null, "allowed": allowed });
     match error {
         Error::Scene(SceneError::Invalid { path, problems }) => problems
             .iter()
             .map(|located| {
                 let Problem { key, value, allowed } = &located.problem;
-                json!({ "file": path, "line": located.line, "key": key, "value": value, "allowed": allowed })
+                json!({ "file": path.to_string_lossy(), "line": located.line, "key": key, "value": value, "allowed": allowed })
             })
             .collect(),
         Error::Scene(SceneError::Malformed { path, line, message }) => vec![problem(path, Some(*line), message)],

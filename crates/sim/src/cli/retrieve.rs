@@ -1,6 +1,6 @@
 //! `wakescope retrieve`: vortices from scans, maps of any instrument or signals of a scene.
 
-use super::{Cli, load, progress, say};
+use super::{Cli, load, paths, progress, say};
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
@@ -269,7 +269,7 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     same_origin(&mut found.scans);
     let track = retrieve::track_of(&found.scans)?;
     let files = files(words, &found, track.as_ref(), existing)?;
-    let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found.scans), "files": files });
+    let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found.scans), "files": paths(&files) });
     let is_of_signals =
         words.method == Method::Signals && found.scans.iter().any(|scan| !scan.result.vortices.is_empty());
     let note = if is_of_signals { HEIGHTS } else { "" };
@@ -328,7 +328,7 @@ pub(super) fn signals(
     let options = RecordedOptions { noise: Some(noise), spectra, ..RecordedOptions::default() };
     let (scans, spectra) = match recorded::estimate((&plan, false), &mut records, &options, &Silent)? {
         Recorded::Measured { scans, spectra } => (scans, spectra),
-        Recorded::OfRun(_) => (Vec::new(), None),
+        Recorded::OfRun { .. } => (Vec::new(), None),
     };
     Ok(Signals { path: path.to_owned(), records, plan, scans, spectra })
 }

@@ -31,6 +31,7 @@ fn a_second_run_in_a_folder_is_refused_and_what_a_crashed_one_left_is_swept() {
     let stage = folder.path().join(".wakescope-stage-1-0");
     fs::create_dir_all(stage.join("new")).unwrap();
     fs::create_dir_all(stage.join("old")).unwrap();
+    fs::write(stage.join("lock"), "").unwrap();
     let case = vortices("", "end_s = 0.05\n");
     let lock = FolderLock::take(folder.path()).unwrap();
     let error = run(&case, folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();

@@ -234,7 +234,9 @@ pub(super) fn sweep_stages(folder: &Path) {
             continue;
         }
         let stage = Stage::of(root, lock);
-        if entries(&stage.new).next().is_some() {
+        // Links in it lead to folders of others, too.
+        let is_folder = |path: &Path| path.symlink_metadata().is_ok_and(|about| about.is_dir());
+        if is_folder(&stage.new) && is_folder(&stage.old) && entries(&stage.new).next().is_some() {
             for kept in entries(&stage.old).map(path) {
                 if let Some(name) = kept.file_name() {
                     drop(fs::rename(&kept, folder.join(name)));

@@ -16,6 +16,7 @@ pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> Ou
     let (rays, samples) = signals.current_a.dim();
     let mut variables = vec![
         variable("time", &["time"], Data::F64(signals.time_s.clone()), "s")
+            .text("standard_name", "time")
             .text("long_name", "time after the middle of the pulse left the telescope"),
     ];
     variables.extend(of_rays(signals, rays));

@@ -7,13 +7,12 @@ use super::error::{OutputError, OutputResult};
 use super::map::{Field, FieldKind, Unit, VelocityMap};
 use super::netcdf::{Attr, Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
+use super::site::MAX_TIME_S;
 use crate::beams::SweepMode;
+use std::f64::consts::FRAC_PI_2;
 
 /// Length of all text variables; unused bytes are NUL, since blanks stay in the strings of xarray and Py-ART.
 const TEXT: usize = 32;
-/// Ray times stay within some thirty years of the start of the flow, which keeps dates in the calendars of the clients.
-pub(crate) const MAX_TIME_S: f64 = 1e9;
-
 /// The file's bytes.
 ///
 /// `radial_velocity` is the estimate; a map without one gets a copy of the first of `v_gate`, `v_pulse`, `v_exact` under that name
@@ -78,7 +77,7 @@ fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, Str
         ("comment", comment),
         ("instrument_name", "wakescope lidar"),
         ("scan_name", map.sweeps.first().map_or("rhi", |sweep| sweep.mode.name())),
-        ("platform_is_mobile", if map.places_m.is_some() { "true" } else { "false" }),
+        ("platform_is_mobile", if map.carrier.is_some() { "true" } else { "false" }),
         ("n_gates_vary", "false"),
         ("ray_times_increase", "true"),
         ("simulated", simulated),
@@ -126,24 +125,38 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
     ]
 }
 
+/// Velocities of the instrument and its platform.
+const METRES: &str = "meters per second";
+/// What the attribute `folding` of `nyquist_velocity` says of real currents: faster air is mirrored, and no multiple of it is lost.
+pub(crate) const MIRRORED: &str = "mirrored";
+
 /// Length of a degree of latitude on a sphere with the mean radius of the Earth, m.
 const DEGREE_M: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
 
 fn site(map: &VelocityMap) -> Vec<Variable> {
     const ONE: &[&str] = &[];
     const EACH: &[&str] = &["time"];
+    // A scan in one plane without a flight of its own looks across it.
+    let across_rad = map.rays.first().map_or(0.0, |ray| ray.azimuth_rad - FRAC_PI_2);
+    let heading_rad = map.flight.map_or(across_rad, |(_, azimuth_rad)| azimuth_rad);
+    // Along the flight and to the right of it, as north and east.
+    let north_east = |x: f64, y: f64| {
+        let (sin, cos) = heading_rad.sin_cos();
+        (x * cos - y * sin, x * sin + y * cos)
+    };
     let place = |[x_m, y_m, z_m]: [f64; 3]| {
-        // Along the flight and to the right of it, as north and east.
-        let (sin, cos) = map.flight.map_or(0.0, |(_, azimuth_rad)| azimuth_rad).sin_cos();
-        let (north_m, east_m) = (x_m * cos - y_m * sin, x_m * sin + y_m * cos);
+        let (north_m, east_m) = north_east(x_m, y_m);
         let width = map.site.latitude_deg.to_radians().cos();
         let (latitude, longitude) = (map.site.latitude_deg, map.site.longitude_deg);
         [latitude + north_m / DEGREE_M, longitude + east_m / (DEGREE_M * width), map.site.altitude_m + z_m]
     };
-    let fixed = [map.site.latitude_deg, map.site.longitude_deg, map.site.altitude_m + map.lidar_height_m];
-    let places = map.places_m.as_ref().map(|all| all.iter().map(|p| place(*p)).collect::<Vec<_>>());
-    let dims = if places.is_some() { EACH } else { ONE };
-    let values = |d: usize| Data::F64(places.as_ref().map_or(vec![fixed[d]], |all| all.iter().map(|p| p[d]).collect()));
+    let here_m = [map.flight.map_or(0.0, |(x_m, _)| x_m), map.lidar_y_m, map.lidar_height_m];
+    let places = match &map.carrier {
+        Some(all) => all.iter().map(|(place_m, _)| place(*place_m)).collect(),
+        None => vec![place(here_m)],
+    };
+    let dims = if map.carrier.is_some() { EACH } else { ONE };
+    let values = |d: usize| Data::F64(places.iter().map(|p| p[d]).collect());
     let mut out = vec![
         Variable::new("latitude", dims, values(0)).text("standard_name", "latitude").text("units", "degrees_north"),
         Variable::new("longitude", dims, values(1)).text("standard_name", "longitude").text("units", "degrees_east"),
@@ -153,21 +166,33 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
             .text("units", "meters")
             .text("positive", "up"),
     ];
-    if places.is_some() {
-        // A level carrier that heads along the flight.
-        let heading_deg = turn(map.flight.map_or(0.0, |(_, azimuth_rad)| azimuth_rad)).to_degrees();
+    if let Some(carrier) = &map.carrier {
+        // A level carrier that heads along the flight, and drifts where its track does not.
+        let heading_deg = turn(heading_rad).to_degrees();
+        let over_ground = |i: usize| north_east(carrier[i].1[0], carrier[i].1[1]);
+        let drift = |i: usize| {
+            let (north, east) = over_ground(i);
+            let aside_rad = if north == 0.0 && east == 0.0 { 0.0 } else { east.atan2(north) - heading_rad };
+            aside_rad.sin().atan2(aside_rad.cos()).to_degrees() as f32
+        };
+        let each = |of: &dyn Fn(usize) -> f32| (0..carrier.len()).map(of).collect::<Vec<f32>>();
         let angles = map.rays.iter().map(|ray| [ray.azimuth_rad, ray.elevation_rad].map(|rad| rad.to_degrees() as f32));
         let (rotation, tilt): (Vec<f32>, Vec<f32>) = angles.map(|[az, el]| (az - heading_deg as f32, el)).unzip();
         let still = || vec![0.0; map.rays.len()];
         let motion = [
-            ("heading", vec![heading_deg as f32; map.rays.len()]),
-            ("roll", still()),
-            ("pitch", still()),
-            ("drift", still()),
-            ("rotation", rotation),
-            ("tilt", tilt),
+            ("heading", "degrees", "heading of the platform from true north", each(&|_| heading_deg as f32)),
+            ("roll", "degrees", "roll of the platform", still()),
+            ("pitch", "degrees", "pitch of the platform", still()),
+            ("drift", "degrees", "track of the platform over the ground less its heading", each(&drift)),
+            ("rotation", "degrees", "azimuth of the beam from the heading of the platform", rotation),
+            ("tilt", "degrees", "elevation of the beam from the plane of the platform", tilt),
+            ("eastward_velocity", METRES, "eastward velocity of the platform", each(&|i| over_ground(i).1 as f32)),
+            ("northward_velocity", METRES, "northward velocity of the platform", each(&|i| over_ground(i).0 as f32)),
+            ("vertical_velocity", METRES, "upward velocity of the platform", each(&|i| carrier[i].1[2] as f32)),
         ];
-        out.extend(motion.map(|(name, values)| Variable::new(name, EACH, Data::F32(values)).text("units", "degrees")));
+        out.extend(motion.map(|(name, units, long_name, values)| {
+            Variable::new(name, EACH, Data::F32(values)).text("long_name", long_name).text("units", units)
+        }));
     }
     out
 }
@@ -214,7 +239,7 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
         one("time_coverage_start", &time(map.rays.first())),
         one("time_coverage_end", &time(map.rays.last())),
         one("time_reference", &start.to_string()),
-        one("platform_type", if map.places_m.is_some() { "aircraft" } else { "fixed" }),
+        one("platform_type", if map.carrier.is_some() { "aircraft" } else { "fixed" }),
         one("instrument_type", "lidar"),
         one("primary_axis", "axis_z"),
         Variable::new("sweep_mode", EACH, Data::Char(map.sweeps.iter().flat_map(|s| padded(s.mode.name())).collect())),
@@ -228,20 +253,34 @@ fn instrument(map: &VelocityMap) -> Vec<Variable> {
     let each = |value: f64| Data::F32(vec![value as f32; rays]);
     let samples = map.ray_pulses.clone().unwrap_or_else(|| vec![pulse.samples; rays]);
     let group = |v: Variable, units: &str| v.text("units", units).text("meta_group", "instrument_parameters");
+    let named =
+        |name: &str, data: Data, long_name: &str| Variable::new(name, &["time"], data).text("long_name", long_name);
+    let folding = if pulse.is_mirrored() { MIRRORED } else { "modulo" };
     vec![
         group(
             Variable::new("frequency", &["frequency"], Data::F32(vec![pulse.frequency_hz as f32]))
                 .text("standard_name", "radiation_frequency"),
             "s-1",
         ),
-        group(Variable::new("prt", &["time"], each(pulse.prt_s)), "seconds"),
-        group(Variable::new("pulse_width", &["time"], each(pulse.pulse_width_s)), "seconds"),
-        group(Variable::new("nyquist_velocity", &["time"], each(pulse.nyquist_velocity_m_s)), "meters per second"),
+        group(named("prt", each(pulse.prt_s), "time between pulses"), "seconds"),
         group(
-            Variable::new(
+            named("pulse_width", each(pulse.pulse_width_s), "full width at half maximum of the power of the pulse"),
+            "seconds",
+        ),
+        group(
+            named(
+                "nyquist_velocity",
+                each(pulse.nyquist_velocity_m_s),
+                "largest velocity that the samples tell from others",
+            )
+            .text("folding", folding),
+            METRES,
+        ),
+        group(
+            named(
                 "n_samples",
-                &["time"],
                 Data::I32(samples.into_iter().map(|n| i32::try_from(n).unwrap_or(i32::MAX)).collect()),
+                "pulses of the ray",
             ),
             "1",
         ),

@@ -142,6 +142,7 @@ fn a_map_without_estimate_shows_the_gate_velocity() {
 #[test]
 fn place_and_date_are_those_of_the_site() {
     let mut map = samples::map();
+    map.lidar_y_m = 0.0;
     map.site = Site {
         name: "Toulouse".into(),
         latitude_deg: 43.6293,
@@ -191,4 +192,51 @@ fn the_bytes_are_the_same_every_time() {
     let first = cfradial_bytes(&map, &example()).unwrap();
     assert_eq!(first[..4], *b"CDF\x02");
     assert_eq!(first, cfradial_bytes(&map, &example()).unwrap());
+}
+
+/// Places, m, as degrees north and east on a sphere.
+fn placed(map: &VelocityMap, north_m: f64, east_m: f64) -> [f64; 2] {
+    let (site, degree_m) = (&map.site, 6_371_008.8 * std::f64::consts::PI / 180.0);
+    let width = site.latitude_deg.to_radians().cos();
+    [site.latitude_deg + north_m / degree_m, site.longitude_deg + east_m / (degree_m * width)]
+}
+
+#[test]
+fn the_place_is_that_of_the_telescope_whether_it_stands_or_moves() {
+    let mut map = samples::map();
+    (map.site.latitude_deg, map.site.longitude_deg, map.site.altitude_m) = (-43.489, 170.0, 37.5);
+    let of =
+        |file: &mut FileReader| ["latitude", "longitude", "altitude"].map(|name| file.read_var_f64(name).unwrap()[0]);
+    let near = |found: [f64; 3], [latitude, longitude]: [f64; 2], altitude: f64| {
+        let off = [found[0] - latitude, found[1] - longitude, found[2] - altitude];
+        assert!(off.iter().all(|off| off.abs() < 1e-9), "{found:?}");
+    };
+    // Beside the flight, which a scan in one plane looks across; then one that looks to the south-east.
+    let (_temp, mut file) = reopened(&map);
+    near(of(&mut file), placed(&map, 0.0, -150.0), 39.5);
+    map.rays.iter_mut().for_each(|ray| ray.azimuth_rad = 0.75 * std::f64::consts::PI);
+    let (_temp, mut file) = reopened(&map);
+    let half = 0.5_f64.sqrt();
+    near(of(&mut file), placed(&map, 150.0 * half, -150.0 * half), 39.5);
+    // 3000 m along a flight to the azimuth 1.2, and 500 m to its right.
+    (map.flight, map.lidar_y_m) = (Some((3000.0, 1.2)), 500.0);
+    let (sin, cos) = 1.2_f64.sin_cos();
+    let (_temp, mut file) = reopened(&map);
+    near(of(&mut file), placed(&map, 3000.0 * cos - 500.0 * sin, 3000.0 * sin + 500.0 * cos), 39.5);
+    // One that flies 70 m/s along it, drifts to the right and climbs.
+    let at = |i: usize| [3000.0 + 7.0 * i as f64, 500.0 + 0.5 * i as f64, 50.0];
+    map.carrier = Some((0..map.rays.len()).map(|i| (at(i), [70.0, 5.0, 1.0])).collect());
+    let (_temp, mut file) = reopened(&map);
+    near(of(&mut file), placed(&map, 3000.0 * cos - 500.0 * sin, 3000.0 * sin + 500.0 * cos), 87.5);
+    let mut first = |name: &str| f64::from(file.read_var_f32(name).unwrap()[3]);
+    let track_rad = 1.2 + (5.0_f64 / 70.0).atan();
+    assert!((first("heading") - 1.2_f64.to_degrees()).abs() < 1e-5);
+    assert!((first("drift") - (5.0_f64 / 70.0).atan().to_degrees()).abs() < 1e-5);
+    let speed = 70.0_f64.hypot(5.0);
+    assert!((first("eastward_velocity") - speed * track_rad.sin()).abs() < 1e-5);
+    assert!((first("northward_velocity") - speed * track_rad.cos()).abs() < 1e-5);
+    assert_eq!(first("vertical_velocity"), 1.0);
+    for name in ["heading", "roll", "pitch", "drift", "rotation", "tilt", "eastward_velocity", "prt", "pulse_width"] {
+        assert!(file.data_set().get_var_attr_as_string(name, "long_name").is_some(), "{name}");
+    }
 }

@@ -116,10 +116,8 @@ fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
 
 fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize, usize)) -> String {
     let pulse = &map.pulse;
-    let wavelength_m = SPEED_OF_LIGHT_M_S / pulse.frequency_hz;
-    let sample_rate_hz = 4.0 * pulse.nyquist_velocity_m_s / wavelength_m;
-    let points = (2.0 * gate_m / SPEED_OF_LIGHT_M_S * sample_rate_hz).round().max(1.0);
-    let resolution_m_s = 2.0 * pulse.nyquist_velocity_m_s / points;
+    let points = (2.0 * gate_m / SPEED_OF_LIGHT_M_S * pulse.sampling_hz).round().max(1.0);
+    let resolution_m_s = 0.5 * pulse.wavelength_m() * pulse.sampling_hz / points;
     let lines = [
         format!("Filename:\t{name}"),
         SYSTEM_ID.into(),

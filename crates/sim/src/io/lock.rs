@@ -94,6 +94,29 @@ mod tests {
         drop(FolderLock::take(temp.path()).unwrap());
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn links_that_are_named_like_stages_are_not_followed() {
+        use std::os::unix::fs::symlink;
+        let (temp, others) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        for part in ["old", "new"] {
+            fs::create_dir(others.path().join(part)).unwrap();
+            fs::write(others.path().join(part).join("map.csv"), part).unwrap();
+        }
+        symlink(others.path(), temp.path().join(".wakescope-stage-1-0")).unwrap();
+        // A folder of that name whose parts are links.
+        let stage = temp.path().join(".wakescope-stage-1-1");
+        fs::create_dir(&stage).unwrap();
+        fs::write(stage.join("lock"), "").unwrap();
+        ["old", "new"].iter().for_each(|part| symlink(others.path().join(part), stage.join(part)).unwrap());
+        fs::write(temp.path().join("map.csv"), "mine").unwrap();
+        drop(FolderLock::take(temp.path()).unwrap());
+        let read = |folder: &Path, name: &str| fs::read_to_string(folder.join(name)).unwrap();
+        assert_eq!(read(temp.path(), "map.csv"), "mine");
+        assert_eq!(["old/map.csv", "new/map.csv"].map(|name| read(others.path(), name)), ["old", "new"]);
+        assert!(!stage.exists());
+    }
+
     #[test]
     fn what_crashed_writers_left_is_swept_and_a_file_they_had_taken_away_comes_back() {
         let temp = tempfile::tempdir().unwrap();

@@ -171,18 +171,33 @@ impl Sweep {
 }
 
 /// Pulse and acquisition, the same for all rays.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PulseInfo {
     /// Pulse repetition time, s.
     pub prt_s: f64,
     /// Pulse duration, s.
     pub pulse_width_s: f64,
-    /// Largest velocity that can be told apart, sample rate times wavelength / 4, m/s.
+    /// Largest velocity of either sign that the samples tell from others, m/s.
     pub nyquist_velocity_m_s: f64,
+    /// Samples per second.
+    pub sampling_hz: f64,
     /// Pulses averaged per ray.
     pub samples: u32,
     /// Optical frequency, Hz.
     pub frequency_hz: f64,
+}
+
+impl PulseInfo {
+    /// Wavelength of the light, m.
+    pub fn wavelength_m(&self) -> f64 {
+        crate::SPEED_OF_LIGHT_M_S / self.frequency_hz
+    }
+
+    /// Whether air that is faster is mirrored, as of real currents; that of complex ones comes out twice `nyquist_velocity_m_s` off.
+    pub fn is_mirrored(&self) -> bool {
+        // Real currents have half the velocities of complex ones, or less.
+        self.nyquist_velocity_m_s < 0.9 * 0.25 * self.wavelength_m() * self.sampling_hz
+    }
 }
 
 /// A scanned map: fields over (ray, gate), in the geometry of the lidar.
@@ -208,8 +223,8 @@ pub struct VelocityMap {
     pub flight: Option<(f64, f64)>,
     /// Pulses averaged for each ray, where they are not equally many.
     pub ray_pulses: Option<Vec<u32>>,
-    /// Where the lidar is at each ray (x, y, z), m, if it moves.
-    pub places_m: Option<Vec<[f64; 3]>>,
+    /// Where the lidar is at each ray (x, y, z), m, and its velocity, m/s, if it moves.
+    pub carrier: Option<Vec<([f64; 3], [f64; 3])>>,
     /// Place and date.
     pub site: Site,
     /// Whether the signals were simulated.
@@ -230,7 +245,7 @@ impl VelocityMap {
     /// Where the lidar is at a ray, m.
     fn place_m(&self, ray: usize) -> [f64; 3] {
         let here = [self.flight.map_or(0.0, |(x_m, _)| x_m), self.lidar_y_m, self.lidar_height_m];
-        self.places_m.as_ref().and_then(|places| places.get(ray)).copied().unwrap_or(here)
+        self.carrier.as_ref().and_then(|carrier| carrier.get(ray)).map_or(here, |(place_m, _)| *place_m)
     }
 
     /// Direction of a ray in the axes of the flow.
@@ -267,7 +282,7 @@ impl VelocityMap {
             rays: rays.iter().map(|&ray| Ray { sweep: before(self.rays[ray].sweep), ..self.rays[ray] }).collect(),
             sweeps: self.sweeps.iter().copied().filter(|sweep| sweep.mode == mode).collect(),
             ray_pulses: self.ray_pulses.as_ref().map(|all| rays.iter().map(|&ray| all[ray]).collect()),
-            places_m: self.places_m.as_ref().map(|all| rays.iter().map(|&ray| all[ray]).collect()),
+            carrier: self.carrier.as_ref().map(|all| rays.iter().map(|&ray| all[ray]).collect()),
             fields: self.fields.iter().map(field).collect(),
             ..self.clone()
         }
@@ -302,8 +317,8 @@ impl VelocityMap {
             return Err(OutputError::value("range_m", format!("{:?}", self.range_m[0]), "must be positive"));
         }
         self.check_rays()?;
-        let counts = [self.ray_pulses.as_ref().map(Vec::len), self.places_m.as_ref().map(Vec::len)];
-        for (name, count) in ["ray_pulses", "places_m"].into_iter().zip(counts) {
+        let counts = [self.ray_pulses.as_ref().map(Vec::len), self.carrier.as_ref().map(Vec::len)];
+        for (name, count) in ["ray_pulses", "carrier"].into_iter().zip(counts) {
             same_length(name, count.unwrap_or(self.rays.len()), "rays", self.rays.len())?;
         }
         for (i, field) in self.fields.iter().enumerate() {

@@ -28,7 +28,7 @@ pub mod atomic;
 #[cfg(feature = "netcdf")]
 pub(crate) mod fields_input;
 #[cfg(feature = "netcdf4")]
-mod netcdf4_input;
+pub(crate) mod netcdf4_input;
 #[cfg(feature = "netcdf")]
 pub(crate) mod netcdf_header;
 #[cfg(feature = "netcdf")]
@@ -83,6 +83,7 @@ pub use map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, 
 pub use own::Existing;
 pub use parts::{FileParts, Share};
 pub use provenance::Provenance;
+pub(crate) use site::MAX_TIME_S;
 pub use site::{Site, UtcTime};
 
 #[cfg(test)]

@@ -79,6 +79,7 @@ impl Data {
 pub(crate) enum Attr {
     Text(String),
     F32(f32),
+    F64(f64),
     I8(Vec<i8>),
 }
 
@@ -246,6 +247,7 @@ impl Layout {
                 match value {
                     Attr::Text(text) => head.attribute(name, 2, text.len(), text.as_bytes()),
                     Attr::F32(value) => head.attribute(name, 5, 1, &value.to_be_bytes()),
+                    Attr::F64(value) => head.attribute(name, 6, 1, &value.to_be_bytes()),
                     Attr::I8(values) => {
                         let bytes: Vec<u8> = values.iter().map(|value| *value as u8).collect();
                         head.attribute(name, 1, values.len(), &bytes);

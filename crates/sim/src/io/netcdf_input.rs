@@ -8,7 +8,7 @@
 use crate::io::netcdf_header::{self as header, Attribute, Header, Variable, is_default_fill};
 use crate::io::number::NumberType;
 use crate::io::units::Quantity;
-use crate::{Error, io::text_file};
+use crate::{Error, io::text_file, machine};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -65,7 +65,7 @@ pub(crate) struct NetcdfFile {
 enum Numbers {
     Classic(File),
     #[cfg(feature = "netcdf4")]
-    Hdf5(Box<netcdf_reader::NcFile>),
+    Hdf5(Box<super::netcdf4_input::Nc4File>),
 }
 
 /// Where the numbers of a variable are.
@@ -233,9 +233,11 @@ impl NetcdfFile {
         if bytes > LARGEST_VARIABLE_BYTES {
             return Err(format!("variable {name} has more than {LARGEST_VARIABLE_BYTES} bytes: use one file per time"));
         }
+        // As they are in the file and as they are handed on, perhaps in another order.
+        machine::holds(&format!("variable {name}"), 3.0 * 8.0 * (bytes / number.bytes()) as f64)?;
         #[cfg(feature = "netcdf4")]
         if let Numbers::Hdf5(file) = &self.numbers {
-            return super::netcdf4_input::read(file, name, variable.dims.len(), place);
+            return file.read(name, &self.shape(name).unwrap_or_default(), place);
         }
         let fills = ["_FillValue", "missing_value"].map(|fill| self.number(name, fill));
         let scale = self.number(name, "scale_factor").unwrap_or(1.0);

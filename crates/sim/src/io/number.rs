@@ -39,19 +39,27 @@ impl NumberType {
         ALL.get(usize::try_from(code).ok()?.checked_sub(1)?).copied()
     }
 
-    /// By its short name, such as `i16` or, as numpy writes it, `i2`.
+    /// By its name with the number of bits, such as `i16`.
     pub(crate) fn named(name: &str) -> Option<Self> {
         Some(match name {
-            "i8" | "i1" => Self::I8,
-            "u8" | "u1" => Self::U8,
-            "i16" | "i2" => Self::I16,
-            "u16" | "u2" => Self::U16,
-            "i32" | "i4" => Self::I32,
-            "u32" | "u4" => Self::U32,
-            "f32" | "f4" => Self::F32,
-            "f64" | "f8" => Self::F64,
+            "i8" => Self::I8,
+            "u8" => Self::U8,
+            "i16" => Self::I16,
+            "u16" => Self::U16,
+            "i32" => Self::I32,
+            "u32" => Self::U32,
+            "i64" => Self::I64,
+            "u64" => Self::U64,
+            "f32" => Self::F32,
+            "f64" => Self::F64,
             _ => return None,
         })
+    }
+
+    /// By its name in numpy, which counts bytes: `i2`.
+    pub(crate) fn of_numpy(name: &str) -> Option<Self> {
+        let (kind, bytes) = name.split_at_checked(1)?;
+        Self::named(&format!("{kind}{}", bytes.parse::<u8>().ok()?.checked_mul(8)?))
     }
 
     /// Bytes of one number.
@@ -144,7 +152,11 @@ mod tests {
             assert_eq!(number.ordered_value(&little, ByteOrder::Little), value);
             assert_eq!(big.len() as u64, number.bytes());
         }
-        assert_eq!(NumberType::named("i16"), NumberType::named("i2"));
-        assert_eq!(NumberType::named("f2"), None);
+        assert_eq!(NumberType::of_numpy("i2"), Some(NumberType::I16));
+        assert_eq!(
+            (NumberType::of_numpy("i8"), NumberType::named("i8")),
+            (Some(NumberType::I64), Some(NumberType::I8))
+        );
+        assert_eq!(["f2", "f99", "\u{e9}4", ""].map(NumberType::of_numpy), [None; 4]);
     }
 }

@@ -33,6 +33,7 @@ pub(crate) fn map() -> VelocityMap {
             prt_s: 5e-5,
             pulse_width_s: 2e-7,
             nyquist_velocity_m_s: 38.75,
+            sampling_hz: 1e8,
             samples: 64,
             frequency_hz: 1.934e14,
         },
@@ -86,7 +87,7 @@ pub(crate) fn map() -> VelocityMap {
         lidar_height_m: 2.0,
         flight: None,
         ray_pulses: None,
-        places_m: None,
+        carrier: None,
         site: Site::default(),
         is_simulated: true,
     }

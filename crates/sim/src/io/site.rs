@@ -35,6 +35,9 @@ pub struct UtcTime {
     since_1970_s: i64,
 }
 
+/// Times stay within some thirty years of the start of the flow, which keeps dates in the calendars of those who read them, s.
+pub(crate) const MAX_TIME_S: f64 = 1e9;
+
 /// Seconds of a day.
 pub const DAY_S: f64 = 86_400.0;
 const DAY: i64 = 86_400;

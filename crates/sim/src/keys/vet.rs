@@ -53,6 +53,8 @@ impl<'a> Document<'a> {
 
     /// The line of a key, from 1; none if the text does not state it.
     pub(crate) fn line(&self, path: &str) -> Option<usize> {
+        // The values of a list stand where it does.
+        let path = path.strip_suffix(']').and_then(|path| path.rsplit_once('[')).map_or(path, |(list, _)| list);
         find(&self.table, path).map(|(span, _)| line_of(&self.breaks, span.start))
     }
 
@@ -103,7 +105,7 @@ impl<'a> Document<'a> {
         let locate = |mut problem: Problem| {
             if let Some(written) = self.written(&problem.key) {
                 problem.value = written;
-            } else if self.line(&problem.key).is_none() && problem.value != Problem::ABSENT {
+            } else if self.line(&problem.key).is_none() && !["", Problem::ABSENT].contains(&problem.value.as_str()) {
                 problem.value += " (the default)";
             }
             Located { line: self.line_near(&problem.key), problem }

@@ -265,8 +265,8 @@ pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
 pub(crate) fn medium(atmosphere: &Atmosphere) -> Result<Option<signal::Medium>, Error> {
     let Some(profile) = &atmosphere.profile else { return Ok(None) };
     let AirProfile { mut range_m, mut backscatter_per_m_sr, mut extinction_per_m } = profile.clone();
-    // Beyond the table the air is as at its end.
-    range_m.push(range_m.last().copied().unwrap_or(0.0).max(0.0) + 1e7);
+    // Beyond the table the air is as at its end, to where the echo of the pulse before may come from at the slowest rate.
+    range_m.push(range_m.last().copied().unwrap_or(0.0).max(0.0) + 1e12);
     backscatter_per_m_sr.extend(profile.backscatter_per_m_sr.last());
     extinction_per_m.extend(profile.extinction_per_m.last());
     Ok(Some(signal::Medium::new(range_m, backscatter_per_m_sr, extinction_per_m)?))
@@ -325,5 +325,26 @@ fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
         clipping_noise: converter.map_or(0.0, |converter| converter.clipping_noise()),
         linewidth_hz: scene.laser.linewidth_hz,
         reflection: 10f64.powf(0.1 * scene.telescope.reflection_db),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The pulse before comes from 30 000 km at 5 Hz, and from farther at slower rates.
+    #[test]
+    fn a_profile_of_the_air_has_no_end_for_the_echo_of_the_pulse_before() {
+        let profile = AirProfile {
+            range_m: vec![0.0, 1e3],
+            backscatter_per_m_sr: vec![1e-7; 2],
+            extinction_per_m: vec![1e-9; 2],
+        };
+        let air = medium(&Atmosphere { profile: Some(profile), ..Atmosphere::default() }).unwrap().unwrap();
+        for range_m in [1e4, 3e7, 1.5e11] {
+            let (found, expected) = (air.transmission(range_m).unwrap(), (-1e-9 * range_m).exp());
+            assert!((found - expected).abs() <= 1e-9 * expected, "{range_m} m: {found} {expected}");
+            assert_eq!(air.backscatter_per_m_sr(range_m).unwrap(), 1e-7);
+        }
     }
 }

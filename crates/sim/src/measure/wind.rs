@@ -18,8 +18,8 @@ pub struct SceneWind {
     pub tau: f64,
     /// Last time that the wind can be asked for, s; infinite if there is none.
     pub end_s: f64,
-    /// Largest speed of the air that is known, m/s.
-    pub max_speed_m_s: f64,
+    /// A speed that no node of fields exceeds which are read when they are needed, m/s; 0 without such fields.
+    pub(crate) max_speed_m_s: f64,
     /// Where the wind comes from, in words.
     pub source: String,
     /// Times of fields that are read when they are needed, s.
@@ -76,18 +76,6 @@ impl SceneWind {
     }
 
     fn analytic(flow: &Flow) -> Result<Self, Error> {
-        let max_speed_m_s = match flow {
-            Flow::Uniform { lateral_m_s, vertical_m_s } => lateral_m_s.hypot(*vertical_m_s),
-            Flow::VortexPair(p) => {
-                p.circulation_m2_s / (4.0 * std::f64::consts::PI * p.core_radius_m) + p.cross_wind_m_s.abs()
-            }
-            Flow::Linear(wind) => wind.velocity_m_s.iter().map(|v| v * v).sum::<f64>().sqrt(),
-            Flow::VortexLines(lines) => {
-                let strongest = lines.circulation_m2_s.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
-                strongest / (4.0 * std::f64::consts::PI * lines.core_radius_m) + lines.axial_deficit_m_s.abs()
-            }
-            Flow::Calm {} | Flow::Simulated(_) | Flow::Fields(_) => 0.0,
-        };
         let tau = match flow {
             Flow::VortexPair(pair) => pair.age_tau,
             _ => 0.0,
@@ -97,7 +85,7 @@ impl SceneWind {
             start_s: start_s(flow),
             tau,
             end_s: f64::INFINITY,
-            max_speed_m_s,
+            max_speed_m_s: 0.0,
             source: "the flow is analytic".into(),
             field_times_s: Vec::new(),
             carries_backscatter: false,
@@ -333,7 +321,7 @@ mod planes {
         let path = file.folder.join(&flow.planes);
         let of_key = |e: Error| Error::OfKey { key: "flow.planes", source: Box::new(e) };
         let refuse = |reason: String| Error::Input { path: path.clone(), reason };
-        let (mut times, mut snapshots, mut fastest) = (Vec::new(), Vec::new(), 0.0_f64);
+        let (mut times, mut snapshots) = (Vec::new(), Vec::new());
         for path in files(&path).map_err(of_key)? {
             let planes = read(&path).map_err(of_key)?;
             let of_file = |e: LesError| Error::Input { path: path.clone(), reason: e.to_string() };
@@ -341,7 +329,6 @@ mod planes {
             times.extend(
                 planes.tau.iter().zip(&planes.time_s).map(|(tau, t)| (*tau, t * scale.length_m / scale.speed_m_s)),
             );
-            fastest = planes.v_m_s.iter().zip(&planes.w_m_s).map(|(v, w)| v.hypot(*w)).fold(fastest, f64::max);
         }
         let count = snapshots.len();
         let series = GridSeries::new(snapshots).map_err(|e| refuse(format!("the times of the planes: {e}")))?;
@@ -357,7 +344,7 @@ mod planes {
             start_s,
             tau,
             end_s,
-            max_speed_m_s: fastest * scale.speed_m_s,
+            max_speed_m_s: 0.0,
             source,
             field_times_s: Vec::new(),
             carries_backscatter: false,

@@ -44,6 +44,8 @@ pub struct Plan {
     pub geometry: Geometry,
     /// The wind.
     pub wind: Arc<SceneWind>,
+    /// Largest radial velocity of the air on the lines of sight, seen from the lidar, m/s.
+    pub fastest_m_s: f64,
     /// What the user should know before the run.
     pub warnings: Vec<String>,
 }
@@ -64,6 +66,11 @@ impl Plan {
     /// # Errors
     /// As [`Plan::new`].
     pub(crate) fn with_wind(scene: SceneFile, target: Target, wind: Arc<SceneWind>) -> Result<Self, Error> {
+        let file = scene.clone();
+        Self::made(scene, target, wind).map_err(|error| file.of_key(error))
+    }
+
+    fn made(scene: SceneFile, target: Target, wind: Arc<SceneWind>) -> Result<Self, Error> {
         let instrument = Instrument::new(&scene.scene)?;
         let geometry = Geometry::new(&scene, &instrument.pulse, &wind)?;
         let last_s = end_s(&wind, &geometry);
@@ -77,14 +84,16 @@ impl Plan {
                  flow.motion = \"frozen\"",
                 wind.end_s
             );
-            return Err(Error::Input { path: key.into(), reason });
+            return Err(Error::Key { key, reason });
         }
-        let mut warnings = warnings(&scene.scene, &wind);
+        let mut warnings = warnings(&scene.scene);
         warnings.extend(ambiguity::warning(&scene.scene, &instrument.pulse));
         warnings.extend(hardware::warnings(&scene.scene, &instrument));
         let optics = optics::stages(&scene, &instrument, target, &geometry, &mut warnings)?;
         let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
-        let plan = Self { scene, target, stages, instrument, geometry, wind, warnings };
+        let mut plan = Self { scene, target, stages, instrument, geometry, wind, fastest_m_s: 0.0, warnings };
+        plan.fastest_m_s = crate::measure::air::fastest_m_s(&plan)?;
+        plan.warnings.splice(0..0, plan.of_fast_air());
         possible::check(&plan)?;
         crate::measure::write::check(&Contents {
             scene: &plan.scene.scene,
@@ -94,6 +103,20 @@ impl Plan {
             has_map: plan.runs(Stage::Estimates),
         })?;
         Ok(plan)
+    }
+
+    /// A warning of air that the detector band does not hold.
+    fn of_fast_air(&self) -> Option<String> {
+        let scene = &self.scene.scene;
+        let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
+        let seen = if scene.scan.lidar.velocity_m_s == [0.0; 3] { "" } else { ", seen from the lidar," };
+        (self.fastest_m_s > half_band_m_s).then(|| {
+            format!(
+                "the air on the lines of sight{seen} reaches {:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster \
+                 air is not seen",
+                self.fastest_m_s
+            )
+        })
     }
 
     /// Time of the last line from the start of the flow, s.
@@ -132,18 +155,8 @@ fn end_s(wind: &SceneWind, geometry: &Geometry) -> f64 {
 }
 
 /// What is allowed but probably not meant.
-fn warnings(scene: &Scene, wind: &SceneWind) -> Vec<String> {
+fn warnings(scene: &Scene) -> Vec<String> {
     let mut out = Vec::new();
-    let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
-    // A lidar that flies sees its own speed.
-    let own_m_s = scene.scan.lidar.velocity_m_s.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let speed_m_s = wind.max_speed_m_s + own_m_s;
-    if speed_m_s > half_band_m_s {
-        out.push(format!(
-            "the flow{} reaches {speed_m_s:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster air is not seen",
-            if own_m_s > 0.0 { ", seen from the lidar," } else { "" }
-        ));
-    }
     if scene.estimator.padded_samples < 4 * scene.estimator.window_samples {
         let bin_m_s =
             0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / scene.estimator.padded_samples as f64;
@@ -197,7 +210,7 @@ impl fmt::Display for Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{NoiseKind, RefractiveTurbulence, SnrReference, Turbulence, VortexPair};
+    use crate::scene::{NoiseKind, RefractiveTurbulence, SnrReference, Turbulence};
 
     fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
         let mut scene = Scene::default();
@@ -257,9 +270,61 @@ mod tests {
 
     #[test]
     fn air_faster_than_the_band_is_warned_of() {
-        let fast =
-            |s: &mut Scene| s.flow = Flow::VortexPair(VortexPair { core_radius_m: 1.0, ..VortexPair::default() });
-        assert!(plan(Target::Map, fast).warnings.iter().any(|w| w.contains("19.4 m/s")));
+        let of = |words: &str| {
+            let scene = SceneFile::parse(words, std::path::Path::new("s.toml")).unwrap();
+            Plan::new(scene, Target::Map).unwrap()
+        };
+        let lines = "[flow]\nkind = \"vortex_lines\"\nnodes_m = [[[-1e4, 400.0, 57.65], [1e4, 400.0, 57.65]], \
+                     [[-1e4, 400.0, 62.35], [1e4, 400.0, 62.35]]]\ncirculation_m2_s = [500.0, -500.0]\ncore_radius_m = 2.35\n";
+        // The largest speeds in brackets: where they are no radial velocities, nobody sees them.
+        for (words, expected_m_s) in [
+            // The horizontal line at 520 m; the air of the last line, 2.6 m/s faster each second.
+            ("[scan]\nelevation_min_rad = 0.0\n[flow]\nkind = \"linear\"\ngradient_v_per_s = [0.0, 0.2, 0.0]\n", 104.0),
+            (
+                "[flow]\nkind = \"linear\"\nvelocity_m_s = [0.0, 0.0, 5.0]\ngradient_u_per_s = [0.3, 0.0, 0.0]\n",
+                f64::NAN,
+            ),
+            (
+                "[flow]\nkind = \"linear\"\nvelocity_m_s = [0.0, 5.0, 0.0]\nacceleration_m_s2 = [0.0, 10.0, 0.0]\n",
+                f64::NAN,
+            ),
+            ("[flow]\nprofile = \"lamb_oseen\"\n", 24.5),
+            ("[flow]\ncirculation_m2_s = 570.0\n", 19.6),
+            ("[flow]\nspacing_m = 12.0\n", 16.5),
+            (lines, 33.9),
+            (
+                "[flow]\nkind = \"uniform\"\nlateral_m_s = 12.0\nvertical_m_s = 0.0\n[[added_flows]]\nkind = \"uniform\"\n\
+                 lateral_m_s = -12.0\nvertical_m_s = 0.0\n",
+                0.0,
+            ),
+            (
+                "[flow]\nkind = \"calm\"\n[scan.lidar]\nvelocity_m_s = [0.0, 25.0, 0.0]\n[scan]\nelevation_min_rad = 0.0\n",
+                25.0,
+            ),
+        ] {
+            let plan = of(words);
+            // Each line at every five centimetres.
+            let (scan, schedule) = (&plan.scene.scene.scan, &plan.geometry.schedule);
+            let mut dense_m_s = 0.0_f64;
+            for line in 0..schedule.lines.len() {
+                let beam = schedule.middle(line);
+                let steps = ((scan.range_max_m - scan.range_min_m) / 0.05) as usize;
+                let points: Vec<[f64; 3]> =
+                    (0..=steps).map(|i| beam.at_range_m(scan.range_min_m + 0.05 * i as f64)).collect();
+                let mut velocity = vec![[0.0; 3]; points.len()];
+                plan.wind.wind().velocity_into(&points, plan.wind.start_s + beam.time_s, &mut velocity).unwrap();
+                let seen = velocity.iter().map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s).abs());
+                dense_m_s = dense_m_s.max(seen.fold(0.0, f64::max));
+            }
+            let found_m_s = plan.fastest_m_s;
+            assert!((found_m_s - dense_m_s).abs() <= 2e-3 * dense_m_s, "{words}: {found_m_s} for {dense_m_s}");
+            assert!(
+                expected_m_s.is_nan() || (found_m_s - expected_m_s).abs() <= 0.015 * expected_m_s,
+                "{words}: {found_m_s}"
+            );
+            let warned = plan.warnings.iter().any(|w| w.contains("reaches") && w.contains("19.4 m/s"));
+            assert_eq!(warned, dense_m_s > 19.375, "{words}: {:?}", plan.warnings);
+        }
         assert!(plan(Target::Map, |_| {}).warnings.is_empty());
     }
 }

@@ -36,13 +36,25 @@ impl Plan {
         let (scene, scan) = (&self.scene.scene, &self.geometry.schedule);
         let (duration_s, revisit_s) = (scan.duration_s(), scan.revisit_s().unwrap_or(f64::NAN));
         let meanwhile_s = if revisit_s.is_nan() { duration_s } else { revisit_s };
-        let wake_moves_m = match &scene.flow {
-            Flow::VortexPair(pair) => {
-                let sinks_m_s = crate::measure::wind::vortex_pair(pair).descent_speed_m_s();
-                meanwhile_s * sinks_m_s.hypot(pair.cross_wind_m_s)
-            }
-            _ => f64::NAN,
-        };
+        let flows = || std::iter::once(&scene.flow).chain(&scene.added_flows);
+        let pair = flows().find_map(|flow| if let Flow::VortexPair(pair) = flow { Some(pair) } else { None });
+        let wake_moves_m = pair.map_or(f64::NAN, |pair| {
+            let sinks_m_s = crate::measure::wind::vortex_pair(pair).descent_speed_m_s();
+            // Across and up, at the place of the pair and in the mean over the time.
+            let carries = |flow: &Flow| match flow {
+                Flow::Uniform { lateral_m_s, vertical_m_s } => [*lateral_m_s, *vertical_m_s],
+                Flow::Linear(wind) => [(1, wind.gradient_v_per_s), (2, wind.gradient_w_per_s)].map(|(d, gradient)| {
+                    let [_, by_y, by_z] = gradient;
+                    wind.velocity_m_s[d]
+                        + 0.5 * meanwhile_s * wind.acceleration_m_s2[d]
+                        + by_y * pair.lateral_position_m
+                        + by_z * pair.height_m
+                }),
+                _ => [0.0; 2],
+            };
+            let wind_m_s = flows().map(carries).fold([pair.cross_wind_m_s, 0.0], |a, b| [a[0] + b[0], a[1] + b[1]]);
+            meanwhile_s * (wind_m_s[1] - sinks_m_s).hypot(wind_m_s[0])
+        });
         let turned = |line: &crate::beams::Line| {
             let fastest = line.rate_rad_s[0].abs().max(line.rate_rad_s[1].abs());
             fastest * line.pulses as f64 * scan.prt_s
@@ -99,6 +111,15 @@ mod tests {
         assert!((plain.duration_s - 2959.0 / 400.0).abs() < 1e-9 && plain.revisit_s.is_nan());
         // V0 = 500/(2 pi 47) = 1.693 m/s.
         assert!((plain.wake_moves_m - 1.6931 * 7.3975).abs() < 0.01, "{plain:?}");
+        // A cross wind is one whichever flow brings it.
+        let [of_pair, added, linear] = [
+            "[flow]\ncross_wind_m_s = 6.0\n",
+            "[[added_flows]]\nkind = \"uniform\"\nlateral_m_s = 6.0\nvertical_m_s = 0.0\n",
+            "[[added_flows]]\nkind = \"linear\"\nvelocity_m_s = [0.0, 5.06, 0.0]\ngradient_v_per_s = [0.0, 0.0, 0.02]\n",
+        ]
+        .map(|words| schedule(words).wake_moves_m);
+        assert!((of_pair - 7.3975 * 6.0_f64.hypot(1.6931)).abs() < 0.01, "{of_pair}");
+        assert!((added - of_pair).abs() < 1e-9 && (linear - of_pair).abs() < 1e-9, "{added} {linear} {of_pair}");
         let text = "[scan]\nhead = { motion = \"continuous\", sweeps = 3, direction = \"alternate\", rate_rad_s = 0.03125, \
                     acceleration_rad_s2 = 0.5 }\n";
         let back = schedule(text);

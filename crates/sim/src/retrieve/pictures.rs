@@ -33,7 +33,7 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         rays: rays.collect(),
         range_m: map.range_m.clone(),
         sweeps: vec![Sweep::rhi(f64::NAN, 0.0)],
-        pulse: PulseInfo { prt_s: 1.0, pulse_width_s: 0.0, nyquist_velocity_m_s: 0.0, samples: 1, frequency_hz: 1.0 },
+        pulse: PulseInfo::default(),
         fields: fields
             .iter()
             .map(|(name, text, values)| Field::float(name, Unit::MetrePerSecond, text, values.clone()))
@@ -43,7 +43,7 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         site: Site::default(),
         flight: None,
         ray_pulses: None,
-        places_m: None,
+        carrier: None,
         is_simulated: false,
     };
     let centres_m: Vec<(f64, f64)> =

@@ -100,7 +100,7 @@ pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
         let r = &scan.result;
         let rows: Vec<Vec<f64>> = r.covariance.outer_iter().map(|row| row.to_vec()).collect();
         json!({
-            "scan": number + 1, "file": scan.scan.path, "sweep": scan.scan.sweep, "reference_time_s": r.reference_time_s,
+            "scan": number + 1, "file": scan.scan.path.to_string_lossy(), "sweep": scan.scan.sweep, "reference_time_s": r.reference_time_s,
             "vortices": r.vortices.iter().map(of_vortex).collect::<Vec<_>>(),
             "wind_m_s": measured(r.lateral_wind_m_s), "shear_per_s": measured(r.wind_shear_per_s),
             "chi2_per_dof": r.chi2_per_dof, "cells_used": r.cells_used, "cells_rejected": r.cells_rejected,

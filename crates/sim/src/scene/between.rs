@@ -1,6 +1,6 @@
 //! Limits between the keys of a scene. Each blames a key that the file states, not the default beside it.
 
-use super::{DetectorSignal, Flow, Outside, Pattern, PulseShape, Scene, Turbulence};
+use super::{DetectorSignal, Flow, Method, Outside, Pattern, PulseShape, Scene, Turbulence};
 use crate::keys::{Checker, Side};
 
 fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
@@ -82,7 +82,7 @@ impl Scene {
         let narrowest_hz = centre_hz.min(nyquist_hz - centre_hz);
         let mut sides = Vec::new();
         if half_hz < nyquist_hz - half_hz {
-            let allowed = format!("between {half_hz:e} and {:e} Hz, {why}", nyquist_hz - half_hz);
+            let allowed = format!("above {half_hz:e} and below {:e} Hz, {why}", nyquist_hz - half_hz);
             sides.push(side("detector.intermediate_frequency_hz", centre_hz, allowed));
         }
         if centre_hz > half_hz {
@@ -97,9 +97,32 @@ impl Scene {
         let allowed = format!("more than detector.bandwidth_hz, {:e} Hz, and {why}", d.bandwidth_hz);
         sides.push(side("detector.sampling_hz", d.sampling_hz, allowed.clone()));
         sides.push(side("detector.bandwidth_hz", d.bandwidth_hz, format!("below {nyquist_hz:e} Hz, {why}")));
-        let beyond = format!("between {half_hz:e} Hz, half of detector.bandwidth_hz, and {nyquist_hz:e} Hz less that");
+        let beyond =
+            format!("above {half_hz:e} Hz, half of detector.bandwidth_hz, and below {nyquist_hz:e} Hz less that");
         sides.push(side("detector.intermediate_frequency_hz", centre_hz, beyond));
-        c.between(ok, &sides);
+        if c.between(ok, &sides) {
+            self.check_frequencies(c);
+        }
+    }
+
+    /// The spectrum has a frequency in the band.
+    fn check_frequencies(&self, c: &mut Checker<'_>) {
+        let (d, e) = (&self.detector, &self.estimator);
+        let (key, value, points_of_one) = match e.method {
+            Method::PulsePair {} => ("estimator.window_samples", e.window_samples, 4.0),
+            _ => ("estimator.padded_samples", e.padded_samples, 1.0),
+        };
+        let step_hz = d.sampling_hz / (value as f64 * points_of_one);
+        let place = |edge: f64| (d.intermediate_frequency_hz + edge * 0.5 * d.bandwidth_hz) / step_hz;
+        let why = "so that the spectrum has a frequency in the detector band";
+        let needed = (d.sampling_hz / (d.bandwidth_hz * points_of_one)).ceil();
+        c.between(
+            (place(-1.0) - 1e-9).ceil() <= (place(1.0) + 1e-9).floor(),
+            &[
+                side("detector.bandwidth_hz", d.bandwidth_hz, format!("at least {step_hz:e} Hz, {why}")),
+                (key, value.to_string(), format!("at least {needed}, {why}")),
+            ],
+        );
     }
 
     fn check_lines(&self, c: &mut Checker<'_>) {
@@ -260,6 +283,27 @@ mod tests {
         assert_eq!(good("[scan]\nrange_max_m = 317.774\n"), Ok(()));
         assert_eq!(good("[scan]\nrange_min_m = 482.226\n"), Ok(()));
         assert_eq!(good("[detector]\nsampling_hz = 210000001\n"), Ok(()));
+        // The ends themselves are not accepted, and not named as if they were.
+        let band = |middle: &str| {
+            good(&format!(
+                "[detector]\nsampling_hz = 200e6\nbandwidth_hz = 60e6\nintermediate_frequency_hz = {middle}\n"
+            ))
+        };
+        let refused = band("70e6").unwrap_err();
+        assert!(refused.contains("above 3e7 and below 7e7 Hz") && band("30e6").is_err(), "{refused}");
+        assert_eq!((band("30000001"), band("69999999")), (Ok(()), Ok(())));
+        let fine = |words: &str| good(&format!("[detector]\nbandwidth_hz = 1e5\n{words}"));
+        assert!(fine("").unwrap_err().contains("detector.bandwidth_hz = 1e5 is not allowed: at least 2.44140625e5 Hz"));
+        assert_eq!(fine("[estimator]\npadded_samples = 2500\n"), Ok(()));
+        assert_eq!(good("[detector]\nbandwidth_hz = 244141\n"), Ok(()));
+        for (pattern, count) in [("\"vad\", beams", 10_000), ("\"stare\", lines", 100_000)] {
+            let with =
+                |n: usize| good(&format!("[scan]\npulses_per_line = 1\npattern = {{ kind = {pattern} = {n} }}\n"));
+            assert_eq!(with(count), Ok(()));
+            assert!(with(count + 1).is_err());
+        }
+        assert!(good("[scan]\npattern = { kind = \"vad\", beams = 3 }\n").unwrap_err().contains("from 4 to 10000"));
+        assert_eq!(good("[scan]\npattern = { kind = \"vad\", beams = 4 }\n"), Ok(()));
     }
 
     /// A default beside a changed key is not what the user wrote: nobody looks for it in the file.

@@ -62,6 +62,10 @@ impl Scene {
                 let lists = lists.into_iter().chain((!phase.1.is_empty()).then_some(phase));
                 let counts: Vec<(&str, usize)> = lists.map(|(key, list)| (key, list.len())).collect();
                 check_lengths(&counts, "pulse.shape", c);
+                for (i, power) in shape.power.iter().enumerate() {
+                    let good = power.is_finite() && *power >= 0.0;
+                    c.require(good, &format!("pulse.shape.power[{i}]"), power, "a finite number, 0 or more");
+                }
             }
         }
         let d = &self.detector;
@@ -164,12 +168,11 @@ impl Scene {
         }
     }
 
-    /// The duration of the pulse as the scene states it, s; of a sampled one the full width at half maximum of the Gaussian
-    /// with the same spread.
+    /// Full width at half maximum of the power of the pulse, s; of a sampled one that of the Gaussian with the same spread.
     pub fn pulse_width_s(&self) -> f64 {
         match &self.pulse.shape {
-            PulseShape::Gaussian(shape) => shape.duration_s,
-            PulseShape::Sampled(_) => 2.0 * std::f64::consts::LN_2.sqrt() * self.pulse_sigma_s(),
+            PulseShape::Gaussian(shape) if shape.definition == super::PulseDefinition::Fwhm => shape.duration_s,
+            _ => 2.0 * std::f64::consts::LN_2.sqrt() * self.pulse_sigma_s(),
         }
     }
 

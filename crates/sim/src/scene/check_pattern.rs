@@ -2,6 +2,7 @@
 //! Check: each limit is broken once.
 
 use super::{HeadMotion, HeadMotionKeys, Pattern, Scene, SweepDirection, WindOfPulses};
+use crate::io::MAX_TIME_S;
 use crate::keys::Checker;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -30,7 +31,7 @@ impl Scene {
             }
             Pattern::Vad(p) => {
                 c.within("scan.pattern.elevation_rad", p.elevation_rad, 1e-3, FRAC_PI_2 - 1e-3, "rad");
-                c.count("scan.pattern.beams", p.beams, 3, 10_000);
+                c.count("scan.pattern.beams", p.beams, 4, 10_000);
             }
             Pattern::Dbs(p) => {
                 c.within("scan.pattern.elevation_rad", p.elevation_rad, 1e-3, FRAC_PI_2 - 1e-3, "rad");
@@ -122,21 +123,40 @@ impl Scene {
             Pattern::Axial(p) => {
                 (p.azimuth_max_rad - p.azimuth_min_rad, p.azimuth_step_rad, rows, "scan.pattern.azimuth_step_rad")
             }
-            Pattern::Vad(p) => (p.beams as f64, 1.0, 1.0, "scan.pattern.beams"),
-            Pattern::Stare(p) => (p.lines as f64, 1.0, 1.0, "scan.pattern.lines"),
+            Pattern::Vad(p) => (p.beams as f64 - 1.0, 1.0, 1.0, "scan.pattern.beams"),
+            Pattern::Stare(p) => (p.lines as f64 - 1.0, 1.0, 1.0, "scan.pattern.lines"),
             Pattern::Dbs(_) => (4.0, 1.0, 1.0, "scan.head.sweeps"),
             Pattern::List { .. } => return,
         };
         let line_rad = s.head.rate_rad_s * s.pulses_per_line as f64 / self.laser.pulse_repetition_hz;
-        let lines = if moves { turn_rad / line_rad } else { turn_rad / step_rad + 1.0 };
+        let lines = if moves { turn_rad / line_rad } else { (turn_rad / step_rad + 1e-9).floor() + 1.0 };
         let allowed = format!("at most {line_rad:?} rad of a line in a sweep of {turn_rad:?} rad: slower");
         c.require(!moves || lines >= 1.0 - 1e-9, "scan.head.rate_rad_s", s.head.rate_rad_s, allowed);
         // Those of one sweep are counted with its limits.
         let counted = s.pattern == Pattern::default() && !moves && s.head.sweeps == 1;
-        let all = if counted { 0.0 } else { lines * rows * s.head.sweeps as f64 };
-        let (key, value) = if s.head.sweeps > 1 { ("scan.head.sweeps", s.head.sweeps as f64) } else { (key, step_rad) };
-        let allowed = format!("at most 100000 lines of sight; there would be {all:.3e}");
-        c.require(all <= MOST_LINES, key, value, allowed);
+        let sweeps = rows * s.head.sweeps as f64;
+        let all = if counted { 0.0 } else { lines * sweeps };
+        let many = || format!("at most 100000 lines of sight; there would be {all:.3e}");
+        let side = |key, value: f64, allowed: String| (key, format!("{value:?}"), allowed);
+        let of_sweeps = side("scan.head.sweeps", s.head.sweeps as f64, many());
+        let of_step = match moves {
+            true => side("scan.head.rate_rad_s", s.head.rate_rad_s, many()),
+            false => side(key, if step_rad == 1.0 { lines } else { step_rad }, many()),
+        };
+        let sides = if s.head.sweeps > 1 { [of_sweeps, of_step] } else { [of_step, of_sweeps] };
+        let few = c.between(all <= MOST_LINES, &sides);
+        // Pulses, and the way of the head from line to line.
+        let (prf_hz, dead_time_s) = (self.laser.pulse_repetition_hz, s.head.dead_time_s);
+        let turns_s = if step_rad == 1.0 { 0.0 } else { sweeps * turn_rad / s.head.rate_rad_s };
+        let lasts_s = turns_s + lines * sweeps * (s.pulses_per_line as f64 / prf_hz + dead_time_s);
+        let long = || format!("one for which the scan ends within {MAX_TIME_S:e} s; it would last {lasts_s:.3e} s");
+        let sides = [
+            side("scan.head.rate_rad_s", s.head.rate_rad_s, long()),
+            side("scan.head.dead_time_s", dead_time_s, long()),
+            side("laser.pulse_repetition_hz", prf_hz, long()),
+            side("scan.pulses_per_line", s.pulses_per_line as f64, long()),
+        ];
+        c.between(!few || lasts_s <= MAX_TIME_S, &sides);
         let apart = s.head.sweeps > 1 || *s.pattern.name() != *"rhi";
         let word = if self.estimator.follow_wind { "true" } else { "false" };
         let allowed = "false: only a single RHI has lines on both sides of each other";

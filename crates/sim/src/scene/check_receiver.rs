@@ -22,12 +22,16 @@ impl Scene {
             c.within("laser.amplifier.storage_time_s", a.storage_time_s, 1e-9, 1e3, "s");
             positive_or_inf(c, "laser.amplifier.largest_energy_j", a.largest_energy_j, "J");
             let energy_j = self.pulse_energy_j();
-            c.require(
-                (1e-12..=1e3).contains(&energy_j),
-                "laser.amplifier.mean_power_w",
-                a.mean_power_w,
-                format!("a power that gives pulses of 1e-12 to 1e3 J at this repetition rate, not of {energy_j:e} J"),
-            );
+            let allowed =
+                format!("one that gives pulses of 1e-12 to 1e3 J at this repetition rate, not of {energy_j:e} J");
+            let side = |key, value: f64| (key, format!("{value:?}"), allowed.clone());
+            let sides = [
+                side("laser.amplifier.mean_power_w", a.mean_power_w),
+                side("laser.amplifier.largest_energy_j", a.largest_energy_j),
+                side("laser.amplifier.storage_time_s", a.storage_time_s),
+                side("laser.pulse_repetition_hz", self.laser.pulse_repetition_hz),
+            ];
+            c.between(!c.is_good() || (1e-12..=1e3).contains(&energy_j), &sides);
         }
         if let Some(f) = &self.laser.fibre {
             c.within("laser.fibre.effective_area_m2", f.effective_area_m2, 1e-14, 1.0, "m^2");

@@ -3,8 +3,9 @@
 //! They are refused, so that nobody turns a knob that turns nothing. Keys that stand in the file of `wakescope init` may stay
 //! there with their default.
 
-use super::{FrontEnd, HeadMotion, Method, OuterScaleWavenumber, Pattern, RefractiveTurbulence, RegionRadius, Scan};
+use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseKind, OuterScaleWavenumber, Pattern, RefractiveTurbulence};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
+use super::{Refinement, RegionRadius, Scan, SignalsOf};
 use crate::keys::Document;
 
 /// A key without use.
@@ -28,6 +29,17 @@ fn idle(scene: &Scene) -> Vec<Idle> {
     };
     let without_peak = matches!(method, Method::PulsePair {} | Method::FirstMoment(_));
     unused(without_peak, &["estimator.refinement"], format!("{kind} refines no peak"));
+    let no_exact = method.order().is_some() && scene.estimator.refinement == Refinement::Exact;
+    unused(
+        no_exact,
+        &["estimator.refinement"],
+        format!("{kind} has no exact refinement, \"parabola\" is what it takes"),
+    );
+    let none = !scene.outputs.signals && scene.outputs.signals_of == SignalsOf::All;
+    unused(none, &["outputs.signals_of"], "outputs.signals = false writes none".into());
+    let untested = scene.estimator.false_alarm != Estimator::default().false_alarm;
+    let without_noise = untested && scene.detector.noise == NoiseKind::None;
+    unused(without_noise, &["estimator.false_alarm"], "detector.noise = \"none\" leaves nothing to test".into());
     let without_spectrum = *method == (Method::PulsePair {});
     unused(without_spectrum, &["estimator.padded_samples"], format!("{kind} has no spectrum"));
     unused(method.has_own_tapers(), &["estimator.weighting"], format!("{kind} has tapers of its own"));
@@ -172,6 +184,12 @@ mod tests {
                  extinction_per_m = [1e-4] }\n",
                 "atmosphere.extinction_per_m = 1e-3",
             ),
+            (
+                "[estimator]\nmethod.kind = \"autoregressive\"\nrefinement = \"exact\"\n",
+                "estimator.refinement = \"exact\"",
+            ),
+            ("[outputs]\nsignals_of = \"all\"\n", "outputs.signals_of = \"all\""),
+            ("[detector]\nnoise = \"none\"\n[estimator]\nfalse_alarm = 0.02\n", "estimator.false_alarm = 0.02"),
             (
                 "[atmosphere.turbulence]\nkind = \"refractive\"\nsampling = \"derived\"\nlayers = 20\n",
                 "atmosphere.turbulence.layers = 20",

@@ -1,6 +1,7 @@
 //! Reading a scene file, with errors that name the key, the value, what is allowed and the line.
 
 use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, format1, idle};
+use crate::Error;
 use crate::io::text_file;
 use crate::keys::{Document, Format, Key, Source, keys_of};
 use std::path::{Path, PathBuf};
@@ -103,6 +104,15 @@ impl SceneFile {
     /// Problems that only a plan could find, with the lines of the file that this scene was read from.
     pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
         self.source.located(problems)
+    }
+
+    /// An error of a key with the line of the file that states it.
+    pub(crate) fn of_key(&self, error: Error) -> Error {
+        let Error::Key { key, reason } = error else { return error };
+        let value = toml::Value::try_from(&self.scene).ok();
+        let value = key.split('.').try_fold(value, |table, name| Some(table?.get(name).cloned())).flatten();
+        let value = value.filter(|value| !value.is_table()).map(|value| value.to_string()).unwrap_or_default();
+        self.located(vec![Problem { key: key.into(), value, allowed: reason }]).into()
     }
 
     /// The same scene with the folder and the lines of the file that `other` was read from.

@@ -21,6 +21,8 @@ enum Node {
 
 /// Deepest nesting of an expression.
 const DEEPEST: usize = 100;
+/// Most operators of an expression, each of which is a step deeper for those that follow it.
+const MOST_OPERATORS: usize = 1000;
 
 impl Expression {
     /// Reads an expression.
@@ -28,7 +30,7 @@ impl Expression {
     /// # Errors
     /// What is wrong, and where.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
-        let mut parser = Parser { rest: text, text, depth: 0 };
+        let mut parser = Parser { rest: text, text, depth: 0, operators: 0 };
         let root = parser.sum()?;
         parser.skip();
         if !parser.rest.is_empty() {
@@ -75,6 +77,7 @@ struct Parser<'t> {
     rest: &'t str,
     text: &'t str,
     depth: usize,
+    operators: usize,
 }
 
 impl Parser<'_> {
@@ -99,6 +102,10 @@ impl Parser<'_> {
     fn chain(&mut self, operators: &[char], part: fn(&mut Self) -> Result<Node, String>) -> Result<Node, String> {
         let mut left = part(self)?;
         while let Some(operator) = self.take(operators) {
+            self.operators += 1;
+            if self.operators > MOST_OPERATORS {
+                return Err(format!("it has more than {MOST_OPERATORS} operators"));
+            }
             left = Node::Two(Box::new(left), operator, Box::new(part(self)?));
         }
         Ok(left)
@@ -259,6 +266,11 @@ mod tests {
             assert!(message.contains(wanted), "{text}: {message}");
         }
         assert!(value(&"(".repeat(100_000)).unwrap_err().contains("less nesting"));
+        for operator in ["+", "*"] {
+            let long = |terms: usize| value(&vec!["1"; terms].join(operator));
+            assert!(long(1001).is_ok());
+            assert!(long(100_000).unwrap_err().contains("more than 1000 operators"), "{operator}");
+        }
     }
 
     #[test]

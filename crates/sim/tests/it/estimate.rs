@@ -94,10 +94,40 @@ fn signals_of_any_pattern_give_the_bytes_of_the_run() {
         let out = estimate(folder, "x", &["--spectra"]);
         if scan == back {
             assert!(out.status.success(), "{out:?}");
+            // The lines at the turns are lines of their own, and the truth is known as without spectra.
+            for name in ["map.csv", "map.nc", "predicted.csv"] {
+                assert!(
+                    fs::read(folder.join("x").join(name)).unwrap() == fs::read(folder.join("e").join(name)).unwrap(),
+                    "{name}"
+                );
+            }
+            let file = netcdf3::FileReader::open(folder.join("x/spectra.nc")).unwrap();
+            assert_eq!(file.data_set().dim_size("line"), Some(3 * 3 * 9));
         } else {
             let message = String::from_utf8(out.stderr).unwrap();
             assert!(out.status.code() == Some(2) && message.contains("others need kind = \"rhi\""), "{message}");
         }
+    }
+}
+
+/// Another seed draws other signals: files that claim it over these would tell of a run that nobody made.
+#[test]
+fn signals_of_another_draw_are_not_taken_for_those_of_the_scene() {
+    let temp = recorded_run("");
+    let scene = fs::read_to_string(temp.path().join("s.toml")).unwrap();
+    fs::write(temp.path().join("seed.toml"), scene.replace("seed = 5", "seed = 6")).unwrap();
+    fs::write(temp.path().join("more.toml"), scene.replace("realisations = 3", "realisations = 7")).unwrap();
+    for (words, part) in [
+        ("--scene seed.toml", "with seed = 5, and seed is 6"),
+        ("--scene s.toml --seed 77", "with seed = 5, and seed is 77"),
+        ("--scene more.toml", "with scan.realisations = 3, and scan.realisations is 7"),
+    ] {
+        let mut all = vec!["estimate", "o/signals.nc", "--out", "e", "--quiet"];
+        all.extend(words.split_whitespace());
+        let out = wakescope(temp.path(), &all);
+        let message = String::from_utf8(out.stderr).unwrap();
+        assert!(out.status.code() == Some(2) && message.contains(part), "{words}: {message}");
+        assert!(!temp.path().join("e").exists());
     }
 }
 
@@ -202,7 +232,7 @@ fn tiles_change_no_bit(words: &str) {
         let options = RecordedOptions { block_bytes, ..RecordedOptions::default() };
         match recorded::estimate((&plan, false), &mut records, &options, &Silent).unwrap() {
             Recorded::Measured { scans, .. } => scans,
-            Recorded::OfRun(_) => panic!("nothing is known of them"),
+            Recorded::OfRun { .. } => panic!("nothing is known of them"),
         }
     };
     let whole = with(None);
@@ -230,9 +260,10 @@ fn complex_signals_and_spectra_on_request() {
     estimate(&["--out", "spectra", "--spectra"]);
     let mut file = netcdf3::FileReader::open(temp.path().join("spectra/spectra.nc")).unwrap();
     let (density, velocity) = (file.read_var_f32("density").unwrap(), file.read_var_f64("velocity").unwrap());
-    let found = column(&temp.path().join("spectra/map.csv"), "v_mean_m_s");
+    // The first of three realisations.
+    let found = column(&temp.path().join("spectra/map.csv"), "v_scan_m_s");
     assert!(velocity.windows(2).all(|pair| pair[1] > pair[0]));
-    assert_eq!(density.len(), found.len() * velocity.len());
+    assert_eq!(density.len(), 3 * found.len() * velocity.len());
     let step_m_s = velocity[1] - velocity[0];
     for (spectrum, found) in density.chunks(velocity.len()).zip(found) {
         let peak = (0..spectrum.len()).max_by(|a, b| spectrum[*a].total_cmp(&spectrum[*b])).unwrap();

@@ -9,6 +9,8 @@ mod cli;
 mod detection;
 #[cfg(all(feature = "cli", feature = "netcdf"))]
 mod estimate;
+#[cfg(all(feature = "cli", feature = "netcdf"))]
+mod hostile_files;
 #[cfg(feature = "cli")]
 mod messages;
 mod receiver;

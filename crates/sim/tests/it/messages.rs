@@ -107,8 +107,15 @@ fn a_full_disk_is_an_error_and_a_closed_pipe_is_none() {
         drop(reader);
         assert_eq!(to(words, writer.into()).status.code(), Some(0), "{words:?}");
     }
-    let full = to(&["check", "s.toml"], fs::OpenOptions::new().write(true).open("/dev/full").unwrap().into());
-    assert!(String::from_utf8(full.stderr).unwrap().contains("cannot write to standard output"));
+    let full = to(
+        &["efficiency", "s.toml", "--out", "o", "--quiet"],
+        fs::OpenOptions::new().write(true).open("/dev/full").unwrap().into(),
+    );
+    let message = String::from_utf8(full.stderr).unwrap();
+    assert!(
+        message.contains("cannot write to standard output") && message.contains("files of this command are in place")
+    );
+    assert!(names(&temp.path().join("o")).contains(&"profile.csv".to_owned()));
 }
 
 #[test]

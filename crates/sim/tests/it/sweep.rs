@@ -211,3 +211,24 @@ fn the_front_of_a_table_is_printed_and_written() {
         assert!(out.status.code() == Some(2) && message.contains(wanted), "{message}");
     }
 }
+
+#[test]
+fn words_hashes_and_drawn_seeds_are_whole_in_netcdf() {
+    let temp = folder();
+    let words = ["sweep", "s.toml", "--vary", "estimator.weighting=hann,rectangular", "--independent", "--quiet"];
+    ran(temp.path(), &[&words[..], &["--no-circulation", "--out", "o"]].concat());
+    let table = wakescope_sim::io::csv_input::TextTable::read(&temp.path().join("o/results.csv")).unwrap();
+    let mut file = netcdf3::FileReader::open(temp.path().join("o/results.nc")).unwrap();
+    for name in ["estimator.weighting", "scene_hash", "seed"] {
+        let column = table.column(name).unwrap();
+        let bytes = file.read_var_u8(name).unwrap();
+        let found: Vec<&str> = bytes.chunks(bytes.len() / 2).map(|row| std::str::from_utf8(row).unwrap()).collect();
+        for (row, text) in found.iter().enumerate() {
+            assert_eq!(text.trim_end_matches('\0'), table.rows[row][column], "{name}");
+        }
+        assert!(file.data_set().get_var_attr_as_string(name, "long_name").is_some(), "{name}");
+    }
+    // Drawn seeds have more digits than a double.
+    let seed: i64 = table.rows[0][table.column("seed").unwrap()].parse().unwrap();
+    assert!(seed > 1 << 53, "{seed}");
+}

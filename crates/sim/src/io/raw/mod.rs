@@ -3,7 +3,7 @@
 //!
 //! | format | how it is known | what it says by itself |
 //! |---|---|---|
-//! | classic NetCDF | its first bytes | shape, kind of number; `signals.nc` also angles, times and how it was recorded |
+//! | NetCDF, classic or NetCDF-4 | its first bytes | shape, kind of number; `signals.nc` also angles, times and how it was recorded |
 //! | NPY, NPZ | its first bytes | shape, kind of number, byte order; NPZ also `elevation_rad` and `time_s` |
 //! | text | the name ends with `.csv` or `.txt` | shape |
 //! | binary | [`RawFormat::number`] is stated | nothing |
@@ -21,6 +21,7 @@ pub use array::Order;
 use crate::Error;
 use crate::io::number::{ByteOrder, NumberType};
 use crate::io::text_file;
+use crate::machine;
 use array::{ArrayInFile, Parts};
 use num_complex::Complex;
 use numpy::NumpyArray;
@@ -82,6 +83,8 @@ pub struct About {
     pub elevation_rad: Option<Vec<f64>>,
     /// Time of each record, s.
     pub time_s: Option<Vec<f64>>,
+    /// Number of the line of each record.
+    pub line: Option<Vec<f64>>,
     /// Constants of the recording: their name in the file, the key of a scene that says the same, and the value.
     pub constants: Vec<(&'static str, &'static str, f64)>,
     /// The scene that the signals were simulated for.
@@ -101,6 +104,27 @@ pub struct RawRecords {
 enum Store {
     Array(ArrayInFile),
     Text(TextRecords),
+    /// Of files whose numbers lie in compressed pieces.
+    #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
+    Whole(WholeRecords),
+}
+
+/// Records that are in memory, one after the other.
+#[derive(Debug)]
+struct WholeRecords {
+    values: Vec<Complex<f64>>,
+    samples: usize,
+    is_complex: bool,
+}
+
+impl Store {
+    fn records(&self) -> usize {
+        match self {
+            Store::Array(array) => array.records,
+            Store::Text(text) => text.records(),
+            Store::Whole(all) => all.values.len() / all.samples.max(1),
+        }
+    }
 }
 
 impl RawRecords {
@@ -118,10 +142,7 @@ impl RawRecords {
         let (store, about) = match &magic[..] {
             _ if format.number.is_some() => (binary(file, length, format, shape).map_err(refuse)?, About::default()),
             #[cfg(feature = "netcdf")]
-            [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
-                let (array, about) = netcdf::read(path, format)?;
-                (Store::Array(array), about)
-            }
+            [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => netcdf::read(path, format)?,
             [0x93, b'N', b'U', b'M', ..] => {
                 let array = NumpyArray::read(&mut file, 0, length).map_err(refuse)?;
                 (of_numpy(file, &array, format, shape).map_err(refuse)?, About::default())
@@ -155,10 +176,7 @@ impl RawRecords {
 
     /// Number of records.
     pub fn records(&self) -> usize {
-        match &self.store {
-            Store::Array(array) => array.records,
-            Store::Text(text) => text.records(),
-        }
+        self.store.records()
     }
 
     /// Samples of a record.
@@ -166,6 +184,7 @@ impl RawRecords {
         match &self.store {
             Store::Array(array) => array.samples,
             Store::Text(text) => text.samples,
+            Store::Whole(all) => all.samples,
         }
     }
 
@@ -174,6 +193,7 @@ impl RawRecords {
         match &self.store {
             Store::Array(array) => array.parts != Parts::Real,
             Store::Text(text) => text.is_complex,
+            Store::Whole(all) => all.is_complex,
         }
     }
 
@@ -186,7 +206,7 @@ impl RawRecords {
     pub fn scale(&self) -> f64 {
         match &self.store {
             Store::Array(array) => array.scale,
-            Store::Text(_) => 1.0,
+            Store::Text(_) | Store::Whole(_) => 1.0,
         }
     }
 
@@ -214,6 +234,10 @@ impl RawRecords {
                 _ => e.to_string(),
             }),
             Store::Text(text) => text.read(records, samples),
+            Store::Whole(all) => {
+                let of = |record: usize| &all.values[record * all.samples..][samples.clone()];
+                Ok(records.flat_map(of).copied().collect())
+            }
         }
         .map_err(|reason| self.refuse(reason))
     }
@@ -306,8 +330,17 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
     };
     let (_, signals) =
         chosen.ok_or("it has several arrays, or none: --variable names the one that holds the samples")?;
+    let records = of_numpy(file.try_clone().map_err(|e| e.to_string())?, signals, format, shape)?.records();
     let values = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
-        let Some((_, array)) = arrays.iter().find(|(name, _)| names.contains(&name.as_str())) else { return Ok(None) };
+        let Some((name, array)) = arrays.iter().find(|(name, _)| names.contains(&name.as_str())) else {
+            return Ok(None);
+        };
+        let count = array.shape.iter().try_fold(1_u64, |n, length| n.checked_mul(*length)).unwrap_or(u64::MAX);
+        if count != records as u64 {
+            return Err(format!("{name} has {count} values; one for each of the {records} records is needed"));
+        }
+        // The numbers of the array, both parts of them, and what is made of them.
+        machine::holds(name, 40.0 * records as f64)?;
         let own = file.try_clone().map_err(|e| e.to_string())?;
         // A row of numbers is one record.
         let Store::Array(mut array) = of_numpy(own, array, &RawFormat::default(), shape)? else { return Ok(None) };

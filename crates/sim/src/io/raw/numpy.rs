@@ -58,16 +58,18 @@ impl NumpyArray {
         let shape = after("shape").and_then(|rest| rest.strip_prefix('(')?.split(')').next()).ok_or(NO_ARRAY)?;
         let shape: Option<Vec<u64>> =
             shape.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse().ok()).collect();
-        let (order, name) = kind.split_at(kind.len().min(1));
+        // A sign of the byte order, then the kind; bytes that are no text may be several to a sign.
+        let mut signs = kind.chars();
+        let (order, name) = (signs.next(), signs.as_str());
         let (number, is_complex) = match name {
             "c8" => (Some(NumberType::F32), true),
             "c16" => (Some(NumberType::F64), true),
-            name => (NumberType::named(name), false),
+            name => (NumberType::of_numpy(name), false),
         };
-        let byte_order = if order == ">" { ByteOrder::Big } else { ByteOrder::Little };
+        let byte_order = if order == Some('>') { ByteOrder::Big } else { ByteOrder::Little };
         let number = number.ok_or_else(|| {
             format!(
-                "its numbers are of the kind {kind:?}; integers of 8 to 32 bits, floats and complex numbers are read: \
+                "its numbers are of the kind {kind:?}; integers, floats of 32 and 64 bits and complex numbers are read: \
                  numpy's astype(\"f4\") makes them"
             )
         })?;

@@ -5,8 +5,11 @@
 
 use num_complex::Complex;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
+
+/// Longest line that is read \[bytes\].
+const LONGEST_LINE_BYTES: u64 = 64 << 20;
 
 /// Records in a text file.
 #[derive(Debug)]
@@ -29,9 +32,14 @@ impl TextRecords {
         let (mut key, mut last, mut rows) = (0, String::new(), 0);
         loop {
             text.clear();
-            let read = out.reader.read_line(&mut text).map_err(|_| format!("line {} is no text", line + 1))?;
+            let some = Read::by_ref(&mut out.reader).take(LONGEST_LINE_BYTES).read_line(&mut text);
+            let read = some.map_err(|_| format!("line {} is no text", line + 1))?;
             if read == 0 {
                 break;
+            }
+            if read as u64 == LONGEST_LINE_BYTES && !text.ends_with('\n') {
+                let most = LONGEST_LINE_BYTES >> 20;
+                return Err(format!("line {} is longer than {most} MiB: each record is a line of its own", line + 1));
             }
             line += 1;
             let begin = at;

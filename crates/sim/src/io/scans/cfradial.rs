@@ -7,8 +7,9 @@
 use super::grid::{RayRow, between_turns, mean_count, of_mean, one_plane, scan_map};
 use super::source::Source;
 use super::{ReadScan, ScanFormat};
-use crate::io::UtcTime;
 use crate::io::units::Quantity;
+use crate::io::{UtcTime, cfradial::MIRRORED};
+use crate::machine;
 use std::path::Path;
 
 const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrument";
@@ -192,10 +193,12 @@ impl GateLayout {
                     }
                 };
                 let (starts, counts) = (whole("ray_start_index", file)?, whole("ray_n_gates", file)?);
-                match counts.iter().find(|count| **count > gates) {
-                    Some(count) => Err(format!("a ray has {count} gates, range {gates} values")),
-                    None => Ok(Self::Ragged { starts, counts, gates }),
+                if let Some(count) = counts.iter().find(|count| **count > gates) {
+                    return Err(format!("a ray has {count} gates, range {gates} values"));
                 }
+                // Velocities, what stands beside them, and the lines of the map.
+                machine::holds(&format!("{rays} rays x {gates} ranges"), 40.0 * rays as f64 * gates as f64)?;
+                Ok(Self::Ragged { starts, counts, gates })
             }
             _ => Err(format!("variable {name} has {dims} dimensions; [time, range] are needed")),
         }
@@ -297,7 +300,10 @@ fn sweeps(file: &mut dyn Source, count: usize) -> Result<Vec<std::ops::Range<usi
 
 /// The largest velocity that can be told apart, m/s: that of the file's first ray.
 fn nyquist(file: &mut dyn Source) -> Result<Option<f64>, String> {
-    if file.has("nyquist_velocity") { first(file, "nyquist_velocity") } else { Ok(None) }
+    const NAME: &str = "nyquist_velocity";
+    let is_mirrored = file.text(NAME, "folding").is_some_and(|folding| folding == MIRRORED);
+    // Mirrored velocities are no multiple away from those of the air.
+    if file.has(NAME) && !is_mirrored { first(file, NAME) } else { Ok(None) }
 }
 
 /// The first value of a variable, if it is above 0.
@@ -387,6 +393,9 @@ mod tests {
         towards.0.insert("antenna_transition", (vec![RAYS as u64], vec![], moving));
         let map = read(&mut towards).unwrap().0.remove(0).map;
         assert_eq!((map.velocity_m_s[[4, 5]], map.fold_m_s, map.elevation_rad.len()), (-3.5, Some(24.0), 5));
+        // Real currents are mirrored: no multiple is lost.
+        towards.0.insert("nyquist_velocity", (vec![RAYS as u64], vec![("folding", MIRRORED)], vec![12.0; RAYS]));
+        assert_eq!(read(&mut towards).unwrap().0.remove(0).map.fold_m_s, None);
         // The same gates one ray after the other, the last gate of the first ray missing.
         let mut ragged = made();
         let own = values.iter().enumerate().filter(|(i, _)| *i != 5).map(|(_, v)| *v).collect::<Vec<_>>();
@@ -399,6 +408,20 @@ mod tests {
         assert!(
             map.velocity_m_s[[0, 5]].is_nan() && map.velocity_m_s[[0, 4]] == 0.4 && map.velocity_m_s[[5, 5]] == 3.5
         );
+    }
+
+    /// Rays of different lengths can ask for far more than the file holds.
+    #[test]
+    fn gates_that_no_memory_holds_are_refused_before_they_are_made() {
+        const MANY: usize = 3_000_000;
+        let mut made = made();
+        let many = |value: f64| (vec![MANY as u64], vec![], vec![value; MANY]);
+        for name in ["elevation", "azimuth", "time", "ray_start_index", "ray_n_gates", "VEL"] {
+            made.0.insert(name, many(0.0));
+        }
+        made.0.insert("range", (vec![MANY as u64], vec![], (0..MANY).map(|i| i as f64).collect()));
+        let refused = read(&mut made).unwrap_err();
+        assert!(refused.contains("3000000 rays x 3000000 ranges would take"), "{refused}");
     }
 
     #[test]

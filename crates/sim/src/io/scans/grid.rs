@@ -25,6 +25,8 @@ const ONE_PLANE_RAD: f64 = 0.02;
 const TURN: f64 = 0.1;
 /// Elevations of a scan, with rounding, rad: beyond the zenith it looks to the other side.
 const ALLOWED_RAD: std::ops::RangeInclusive<f64> = -std::f64::consts::FRAC_PI_2 - 1e-6..=std::f64::consts::PI + 1e-6;
+/// Farthest range of a gate, m: that of a scene.
+const FARTHEST_M: f64 = 1e6;
 /// Least lines, gates and velocities of a map.
 const LEAST: (usize, usize, usize) = (3, 3, 30);
 
@@ -68,6 +70,9 @@ pub(super) fn scan_map(
     }
     if !range_m.first().is_some_and(|first| *first >= 0.0 && first.is_finite()) {
         return Err(format!("{what}: range must be at least 0 m at the first gate"));
+    }
+    if let Some(far) = range_m.last().filter(|last| **last > FARTHEST_M) {
+        return Err(format!("{what}: range reaches {far} m: at most {FARTHEST_M} m are read"));
     }
     rays.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
     let mut lines: Vec<Vec<RayRow>> = Vec::new();
@@ -231,6 +236,8 @@ mod tests {
         let mut falling = range_m();
         falling.swap(3, 4);
         assert!(refused(rays([0.1, 0.2, 0.3]), falling).contains("range must increase"));
+        let far = range_m().into_iter().map(|range_m| 1e7 * range_m).collect();
+        assert!(refused(rays([0.1, 0.2, 0.3]), far).contains("range reaches 1200000000 m: at most 1000000 m"));
         let mut missing = rays([0.1, 0.2, 0.3]);
         missing.iter_mut().for_each(|ray| ray.velocity_m_s = vec![f64::NAN; 12]);
         assert!(refused(missing.clone(), range_m()).contains("all of its velocities are missing"));

@@ -20,6 +20,7 @@ mod table;
 
 use crate::Error;
 use crate::io::{UtcTime, text_file};
+use crate::machine;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use wakescope_estimate::retrieval::ScanMap;
@@ -118,6 +119,9 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
                 return Err(refuse(format!("it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read")));
             }
             let bytes = std::fs::read(path).map_err(unreadable)?;
+            // The text, and a text of its own for each cell.
+            let cells = bytes.iter().filter(|byte| matches!(byte, b',' | b'\n' | b' ' | b'\t')).count();
+            machine::holds("its table", 2.0 * length as f64 + 64.0 * cells as f64).map_err(refuse)?;
             // Files of instruments have names of places in all encodings; numbers are the same in each.
             let text = String::from_utf8_lossy(&bytes);
             let found = match text.lines().take(60).any(|line| line.trim_start().starts_with("****")) {

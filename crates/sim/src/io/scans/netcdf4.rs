@@ -4,15 +4,13 @@
 
 use super::source::Source;
 use crate::Error;
-use netcdf_reader::{NcAttribute, NcFile, NcGroup};
+use crate::io::netcdf4_input::Nc4File;
+use netcdf_reader::{NcAttribute, NcGroup};
 use std::path::Path;
-
-/// Largest variable that is read \[numbers\].
-const LARGEST: u64 = 1 << 28;
 
 /// A file and one of its groups; attributes are looked for at the root, too.
 pub(super) struct Nc4Group {
-    file: std::rc::Rc<NcFile>,
+    file: std::rc::Rc<Nc4File>,
     /// Name of the group; empty at the root.
     name: String,
 }
@@ -20,9 +18,8 @@ pub(super) struct Nc4Group {
 /// The groups of a file that hold scans: those with elevations.
 pub(super) fn groups(path: &Path) -> Result<Vec<(String, Nc4Group)>, Error> {
     let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
-    let unreadable = |e: netcdf_reader::Error| refuse(format!("it is no sound NetCDF-4 file: {e}"));
-    let file = std::rc::Rc::new(NcFile::open(path).map_err(unreadable)?);
-    let root = file.root_group().map_err(unreadable)?;
+    let file = std::rc::Rc::new(Nc4File::open(path).map_err(refuse)?);
+    let root = file.file.root_group().map_err(|e| refuse(format!("it is no sound NetCDF-4 file: {e}")))?;
     let has_scan = |group: &NcGroup| group.variable("elevation").is_some();
     let mut names: Vec<String> =
         root.groups.iter().filter(|group| has_scan(group)).map(|group| group.name.clone()).collect();
@@ -37,7 +34,7 @@ pub(super) fn groups(path: &Path) -> Result<Vec<(String, Nc4Group)>, Error> {
 
 impl Nc4Group {
     fn group(&self) -> Option<&NcGroup> {
-        let root = self.file.root_group().ok()?;
+        let root = self.file.file.root_group().ok()?;
         if self.name.is_empty() { Some(root) } else { root.groups.iter().find(|group| group.name == self.name) }
     }
 
@@ -64,16 +61,11 @@ impl Source for Nc4Group {
     }
 
     fn global_text(&self, name: &str) -> Option<String> {
-        text_of(self.file.root_group().ok()?.attribute(name))
+        text_of(self.file.file.root_group().ok()?.attribute(name))
     }
 
     fn floats(&mut self, name: &str) -> Result<Vec<f64>, String> {
         let shape = self.shape(name).ok_or_else(|| format!("it has no variable {name}"))?;
-        let numbers = shape.iter().try_fold(1_u64, |n, length| n.checked_mul(*length));
-        if numbers.is_none_or(|numbers| numbers > LARGEST) {
-            return Err(format!("variable {name} has more than {LARGEST} numbers"));
-        }
-        let read = self.file.read_variable_unpacked_masked(&self.path(name));
-        read.map(|values| values.into_iter().collect()).map_err(|e| format!("variable {name} cannot be read: {e}"))
+        self.file.read(&self.path(name), &shape, None)
     }
 }

@@ -1,10 +1,11 @@
 //! What bounds an instrument beside its signal-to-noise ratio: power, ranges, velocities, phase noise, local oscillator, resolution.
 
 use super::digits::{digits, si};
+use crate::measure::described::sampled_velocities_m_s;
 use crate::measure::estimators;
 use crate::measure::instrument::Instrument;
 use crate::plan::Plan;
-use crate::scene::{DetectorSignal, Weighting};
+use crate::scene::Weighting;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_signal::RangeFilter;
 use wakescope_signal::constants::ELEMENTARY_CHARGE_C;
@@ -94,14 +95,8 @@ impl Limits {
     fn velocities(&mut self, plan: &Plan) {
         let (d, half_m) = (&plan.scene.scene.detector, 0.5 * plan.scene.scene.laser.wavelength_m);
         let band_m_s = 0.5 * half_m * d.bandwidth_hz;
-        let (low_m_s, high_m_s) = match d.signal {
-            DetectorSignal::IntermediateFrequency => {
-                let highest_m_s = half_m * d.intermediate_frequency_hz;
-                (highest_m_s - 0.5 * half_m * d.sampling_hz, highest_m_s)
-            }
-            DetectorSignal::Baseband => (-0.5 * half_m * d.sampling_hz, 0.5 * half_m * d.sampling_hz),
-        };
-        let flow_m_s = plan.wind.max_speed_m_s;
+        let (low_m_s, high_m_s) = sampled_velocities_m_s(&plan.scene.scene);
+        let flow_m_s = plan.fastest_m_s;
         self.values.extend([("band_m_s", band_m_s), ("sampled_from_m_s", low_m_s), ("sampled_to_m_s", high_m_s)]);
         self.lines.push(format!(
             "velocity: band +-{band_m_s:.1} m/s; sampled {low_m_s:+.1} to {high_m_s:+.1} m/s; flow reaches {flow_m_s:.0} m/s"

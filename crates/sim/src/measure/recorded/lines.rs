@@ -80,7 +80,8 @@ impl ScanLines {
     }
 }
 
-/// Records of a file by scan and line: by the table, by what the file says, or as the scene has them.
+/// Records of a file by scan and line: by the table, by what the file says, or as the scene has them. A file that numbers the lines
+/// of its records is believed; else the records of a line have one elevation.
 ///
 /// # Errors
 /// Records that do not fit the angles, angles that are none, times that do not increase.
@@ -107,27 +108,31 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
     if let Some(bad) = time_s.iter().find(|time| !time.is_finite()) {
         return Err(records.refuse(format!("the time of a record is {bad}: each must be finite")));
     }
+    let numbers = records.about.line.as_ref().filter(|_| table.is_none());
     let mut found: Vec<ScanLines> = Vec::new();
     let mut first = 0;
     let mut direction = 0.0;
     while first < count {
         // Pulses of a line may share its time; a time that goes back begins another line.
+        let marks = numbers.unwrap_or(&elevation_rad);
         let is_same = |record: &usize| {
-            elevation_rad[*record] == elevation_rad[first]
-                && (*record == first || time_s[*record] >= time_s[*record - 1])
+            marks[*record] == marks[first] && (*record == first || time_s[*record] >= time_s[*record - 1])
         };
         let same = (first..count).take_while(is_same).count();
+        // The middle of angles that pulses may have of their own.
+        let beside = elevation_rad[first..first + same].iter().map(|angle| angle - elevation_rad[first]);
+        let angle_rad = elevation_rad[first] + beside.sum::<f64>() / same as f64;
         let last = found.last().and_then(|scan| scan.elevation_rad.last());
-        let step = last.map_or(0.0, |last| (elevation_rad[first] - last).signum());
-        // A line that goes back begins another scan.
-        if found.is_empty() || (direction != 0.0 && step != direction) {
+        let step = last.map_or(0.0, |last| angle_rad - last);
+        // A line that goes back, or stays, begins another scan.
+        if found.is_empty() || step == 0.0 || step * direction < 0.0 {
             found.push(ScanLines::default());
             direction = 0.0;
         } else {
-            direction = step;
+            direction = step.signum();
         }
         if let Some(scan) = found.last_mut() {
-            scan.elevation_rad.push(elevation_rad[first]);
+            scan.elevation_rad.push(angle_rad);
             // The middle of the pulses.
             scan.time_s.push(0.5 * (time_s[first] + time_s[first + same - 1]));
             scan.first_record.push(first);

@@ -59,7 +59,12 @@ pub struct RecordedOptions {
 #[derive(Debug, PartialEq)]
 pub enum Recorded {
     /// Signals of a simulation, with the truth of its scene.
-    OfRun(Box<VelocityEstimates>),
+    OfRun {
+        /// Velocities, and what they are held against.
+        map: Box<VelocityEstimates>,
+        /// Spectra of all scans, if they were asked for.
+        spectra: Option<Spectra>,
+    },
     /// Signals of which nothing is known but themselves.
     Measured {
         /// Velocities of each scan.
@@ -95,15 +100,24 @@ pub fn record_shape(scene: &Scene) -> RecordShape {
 /// scene is that of the records.
 ///
 /// # Errors
-/// As [`Plan::new`]; records of another shape or kind than the scene's, recorded otherwise than it says.
+/// As [`Plan::new`]; records of another shape or kind than the scene's, recorded otherwise than it says; signals of the same
+/// scene that were drawn with another seed, or of another number of realisations.
 pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Error> {
     fits(&scene.scene, records)?;
     let whole = scan_lines::schedule(&scene)?.pulses();
-    let is_own = records.about.scene_toml.as_deref().is_some_and(|toml| {
-        SceneFile::parse(toml, std::path::Path::new("scene"))
-            .is_ok_and(|own| signals_of(&own.scene) == signals_of(&scene.scene))
-            && records.records().is_multiple_of(whole)
-    });
+    let own = records.about.scene_toml.as_deref().and_then(|toml| SceneFile::parse(toml, "scene".as_ref()).ok());
+    let own = own.filter(|own| signals_of(&own.scene) == signals_of(&scene.scene));
+    if let Some(own) = &own {
+        let drawn = |s: &Scene| [("seed", s.seed), ("scan.realisations", s.scan.realisations as u64)];
+        if let Some(((key, of_file), (_, stated))) =
+            drawn(&own.scene).into_iter().zip(drawn(&scene.scene)).find(|(a, b)| a != b)
+        {
+            return Err(records.refuse(format!(
+                "it has the signals of this scene with {key} = {of_file}, and {key} is {stated}: only estimator, outputs and site may differ"
+            )));
+        }
+    }
+    let is_own = own.is_some() && records.records().is_multiple_of(whole);
     let repetitions = records.records() / whole.max(1);
     let file = if !is_own || repetitions == scene.scene.scan.realisations {
         scene
@@ -117,10 +131,8 @@ pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Erro
 
 /// A scene without what is done with its signals.
 fn signals_of(scene: &Scene) -> String {
-    // Signals come from the file; where pulses point comes from the seed.
-    let still = scene.scan.head.pointing_jitter_rad == [0.0; 2];
     let mut same = Scene {
-        seed: if still { 0 } else { scene.seed },
+        seed: 0,
         estimator: Estimator::default(),
         outputs: Outputs::default(),
         site: Site::default(),
@@ -183,6 +195,7 @@ pub fn estimate(
         DetectorSignal::IntermediateFrequency => of_samples::<f64>(plan, is_own, records, options, observer),
         DetectorSignal::Baseband => of_samples::<Complex<f64>>(plan, is_own, records, options, observer),
     }
+    .map_err(|error| plan.scene.of_key(error))
 }
 
 fn of_samples<S: FromParts>(
@@ -192,8 +205,9 @@ fn of_samples<S: FromParts>(
     options: &RecordedOptions,
     observer: &dyn Observer,
 ) -> Result<Recorded, Error> {
-    if is_own && options.rays.is_none() && !options.spectra {
-        return of_run::<S>(plan, records, observer);
+    let is_run = is_own && options.rays.is_none();
+    if is_run && !options.spectra {
+        return Ok(Recorded::OfRun { map: of_run::<S>(plan, records, observer)?, spectra: None });
     }
     if !plan.geometry.schedule.keeps_to_a_plane() {
         let kind = plan.scene.scene.scan.pattern.name();
@@ -211,12 +225,19 @@ fn of_samples<S: FromParts>(
     let found = blocks::Blocks::<S>::new(plan, largest, options, observer)?.scans(records, scans)?;
     observer.end();
     let spectra = found.iter().any(|scan| scan.spectra.is_some()).then(|| Spectra::of(plan, &found)).transpose()?;
+    if is_run {
+        return Ok(Recorded::OfRun { map: of_run::<S>(plan, records, observer)?, spectra });
+    }
     let measured = found.into_iter().map(|scan| result::measured(plan, scan, noise)).collect::<Result<_, _>>()?;
     Ok(Recorded::Measured { scans: measured, spectra })
 }
 
 /// The maps of a simulation's own records, held against the truth of its scene.
-fn of_run<S: FromParts>(plan: &Plan, records: &mut RawRecords, observer: &dyn Observer) -> Result<Recorded, Error> {
+fn of_run<S: FromParts>(
+    plan: &Plan,
+    records: &mut RawRecords,
+    observer: &dyn Observer,
+) -> Result<Box<VelocityEstimates>, Error> {
     let scanner = Scanner::new(plan, observer)?;
     let lines = plan.geometry.elevation_rad.len() as u64;
     let pulses = scanner.pulses();
@@ -231,7 +252,7 @@ fn of_run<S: FromParts>(plan: &Plan, records: &mut RawRecords, observer: &dyn Ob
         Ok(())
     })?;
     observer.end();
-    Ok(Recorded::OfRun(Box::new(estimates)))
+    Ok(Box::new(estimates))
 }
 
 /// Pieces of a range of records of some ten megabytes.

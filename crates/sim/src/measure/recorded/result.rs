@@ -149,7 +149,7 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
         site: site(scene),
         flight: None,
         ray_pulses: None,
-        places_m: None,
+        carrier: None,
         is_simulated: false,
     })
 }

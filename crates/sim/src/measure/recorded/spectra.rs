@@ -95,7 +95,7 @@ impl GateSpectra {
         if !has_spectrum(scene) {
             let reason =
                 "--spectra needs the correlogram of the whole window, which this estimator.method does not make".into();
-            return Err(Error::Input { path: "estimator.method".into(), reason });
+            return Err(Error::Key { key: "estimator.method", reason });
         }
         let spectrum = LagSpectrum::new(kind, scene.estimator.window_samples, scene.estimator.padded_samples)?;
         let (sampling, padded) = (estimators::sampling(scene)?, scene.estimator.padded_samples);

@@ -49,10 +49,10 @@ pub fn check(contents: &Contents<'_>) -> Result<(), Error> {
         if has_map {
             let bytes = crate::io::cfradial::data_bytes(rays, g.gate_range_m.len() as f64);
             fits("estimator.gate_step_samples", "map.nc", bytes, "make it larger, or scan fewer lines")?;
-            let most_s = crate::io::cfradial::MAX_TIME_S;
+            let most_s = crate::io::MAX_TIME_S;
             if first_s.abs() > most_s || last_s > most_s {
                 let reason = format!("the rays end {last_s:e} s after the start of the flow; files hold {most_s:e} s");
-                return Err(refusal("scan", reason));
+                return Err(refusal("scan.pulses_per_line", reason));
             }
         }
     }
@@ -65,7 +65,7 @@ pub fn check(contents: &Contents<'_>) -> Result<(), Error> {
 }
 
 #[cfg(feature = "netcdf")]
-fn fits(key: &str, file: &str, bytes: f64, remedy: &str) -> Result<(), Error> {
+fn fits(key: &'static str, file: &str, bytes: f64, remedy: &str) -> Result<(), Error> {
     let most = crate::io::netcdf::MAX_BYTES as f64;
     if bytes <= most {
         return Ok(());
@@ -74,8 +74,8 @@ fn fits(key: &str, file: &str, bytes: f64, remedy: &str) -> Result<(), Error> {
     Err(refusal(key, reason))
 }
 
-fn refusal(key: &str, reason: String) -> Error {
-    Error::Input { path: key.into(), reason }
+fn refusal(key: &'static str, reason: String) -> Error {
+    Error::Key { key, reason }
 }
 
 #[cfg(test)]

@@ -92,7 +92,12 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         lidar_y_m: mount.position_m[1],
         lidar_height_m: scene.scan.lidar_height_m,
         ray_pulses: lines.iter().any(|line| line.pulses != scene.scan.pulses_per_line).then_some(pulses),
-        places_m: moves.then(|| (0..lines.len()).map(|line| g.schedule.middle(line).position_m).collect()),
+        carrier: moves.then(|| {
+            (0..lines.len())
+                .map(|line| g.schedule.middle(line))
+                .map(|beam| (beam.position_m, beam.velocity_m_s))
+                .collect()
+        }),
         flight: (!across).then_some((mount.position_m[0], zero_rad - from_x_rad)),
         site: site(scene),
         is_simulated: true,

@@ -28,15 +28,15 @@ pub fn recorded_names(plan: &Plan) -> Vec<String> {
 pub fn write_recorded(plan: &Plan, found: Recorded, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
     let origin = provenance(plan);
     let outputs = &plan.scene.scene.outputs;
-    let files = match found {
-        Recorded::OfRun(map) => {
+    let (mut files, spectra) = match found {
+        Recorded::OfRun { map, spectra } => {
             let predicted = predicted_table(plan, &map)?;
             let result = RunResult { map: Some(*map), ..RunResult::default() };
             let mut files = super::files(plan, &result, folder)?;
             if outputs.csv {
                 files.add(PREDICTED, predicted.to_csv(&origin)?)?;
             }
-            files
+            (files, spectra)
         }
         Recorded::Measured { scans, spectra } => {
             let map = measured_map(plan, &scans)?;
@@ -44,15 +44,15 @@ pub fn write_recorded(plan: &Plan, found: Recorded, folder: &Path, existing: Exi
             let mut files = FileGroup::new(folder);
             files.add("scene.toml", scene_text(&origin))?;
             add_map(&mut files, plan, &map)?;
-            #[cfg(feature = "netcdf")]
-            if let Some(spectra) = &spectra {
-                files.add(SPECTRA, crate::io::cf_spectra::cf_spectra_bytes(spectra, &origin)?)?;
-            }
-            #[cfg(not(feature = "netcdf"))]
-            let _ = spectra;
-            files
+            (files, spectra)
         }
     };
+    #[cfg(feature = "netcdf")]
+    if let Some(spectra) = &spectra {
+        files.add(SPECTRA, crate::io::cf_spectra::cf_spectra_bytes(spectra, &origin)?)?;
+    }
+    #[cfg(not(feature = "netcdf"))]
+    let _ = (&mut files, spectra);
     put(files, folder, existing)
 }
 
