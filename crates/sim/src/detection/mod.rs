@@ -382,20 +382,8 @@ mod tests {
 
     #[test]
     fn correlation_of_a_few_neighbours_is_held_against_its_own_error() {
-        let few = |seed: u64| {
-            let whole = map(seed, 0.0);
-            let cells = |all: &Array2<f64>| all.slice(s![20..28, 8..14]).to_owned();
-            ScanMap {
-                elevation_rad: whole.elevation_rad[20..28].to_vec(),
-                time_s: vec![f64::NAN; 8],
-                range_m: whole.range_m[8..14].to_vec(),
-                velocity_m_s: cells(&whole.velocity_m_s),
-                sigma_m_s: whole.sigma_m_s.as_ref().map(cells),
-                fold_m_s: None,
-            }
-        };
-        let scans: Vec<ScanMap> = (100..250).map(few).collect();
-        let (found, _) = detect(&scans, &settings()).unwrap();
+        let scans: Vec<ScanMap> = (100..250).map(|seed| map(seed, 0.0)).collect();
+        let (found, _) = detect(&scans, &DetectionSettings { stride: (6, 4), ..settings() }).unwrap();
         let beyond = |limit: f64| found.iter().filter(|f| f.statistic.neighbour_correlation.0 > limit).count();
         // a fifth is chance among so few
         assert!(beyond(0.2) > 5 && found.iter().filter(|f| f.is_correlated()).count() <= 1, "{}", beyond(0.2));
