@@ -138,7 +138,7 @@ fn a_run_goes_on_with_the_scheme_of_its_checkpoint() {
 fn a_courant_number_is_checked_against_the_limit_of_its_scheme_mesh_and_viscosity() {
     let with = |case: &str, scheme: &str, courant: f64, model: &str| {
         let text = format!(
-            "[case]\nkind = {case}\n[time]\nend_s = 0.2\nscheme = \"{scheme}\"\ncourant = {courant:?}\n[solver]\n\
+            "[case]\nkind = {case}\n[time]\nend_s = 0.2\nscheme = \"{scheme}\"\ncourant = {courant:?}\nlongest_step_s = 10.0\n[solver]\n\
              subgrid = {{ model = \"{model}\" }}\n"
         );
         check(&parse(&text), None, RunOptions::default())
