@@ -180,13 +180,10 @@ fn gradient_bound_holds_everywhere_and_is_at_most_five_percent_too_large() {
 #[test]
 fn gradient_bound_of_a_close_pair_holds_and_is_the_looser_the_closer_it_is() {
     // Spacings of 12, 9 and 6 core radii.
-    for (spacing_m, most) in [(28.0, 1.12), (21.0, 1.2), (14.0, 1.4)] {
+    for (spacing_m, least, most) in [(28.0, 1.05, 1.1), (21.0, 1.1, 1.16), (14.0, 1.2, 1.26)] {
         for profile in [CirculationProfile::Algebraic, CirculationProfile::LambOseen] {
             let ratio = bound_over_largest(VortexPair { profile, spacing_m, ..heavy() });
-            assert!(
-                (1.0..most).contains(&ratio) && ratio > 1.0 + 0.6 * (most - 1.0),
-                "{spacing_m} m, {profile:?}: {ratio}"
-            );
+            assert!((least..most).contains(&ratio), "{spacing_m} m, {profile:?}: {ratio}");
         }
     }
 }
