@@ -1,6 +1,6 @@
 //! One quantity in two files, and what files say of themselves: signals, maps as NetCDF and CSV.
 
-use super::air::radial_m_s;
+use super::air::{radial_m_s, start_s, velocity_m_s};
 use super::geometry::{Scan, line_time_s};
 use super::ledger::Ledger;
 use super::power::Pulse;
@@ -134,4 +134,33 @@ pub(crate) fn hold_map(ledger: &mut Ledger, bench: &Bench, s: &Scene, scan: &Sca
     );
     let east_deg = (y / (earth_m * site_deg.to_radians().cos())).to_degrees();
     list(ledger, "longitude", &|_| s.f("site.longitude_deg") + east_deg, 5e-3 * east_deg.abs() + 1e-7);
+}
+
+/// flow.csv beside the closed form of the wind, and flow.nc beside it.
+pub(crate) fn hold_flow(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
+    if !bench.folder.join("o/flow.csv").exists() {
+        return;
+    }
+    let (csv, mut nc) = (bench.csv(ledger, "o/flow.csv"), bench.netcdf(ledger, "o/flow.nc"));
+    let f = |name: &str| csv.f(name);
+    let (tau, time, y, z, v, w) = (f("tau"), f("time_s"), f("y_m"), f("z_m"), f("v_m_s"), f("w_m_s"));
+    let lists = ["v", "w"].map(|name| nc.f(name));
+    let axes = ["y", "z"].map(|name| nc.f(name));
+    let age = if s.s("flow.kind") == "vortex_pair" { s.f("flow.age_tau") } else { 0.0 };
+    ledger.equal("flow.nc: tau", nc.f("tau")[0], age, 1e-12);
+    ledger.equal("flow.nc: time", nc.f("time")[0], start_s(s), 1e-9);
+    for row in (0..csv.len()).step_by(1 + csv.len() / 60) {
+        ledger.equal("flow.csv: tau", tau[row], age, 1e-12);
+        ledger.equal("flow.csv: time_s", time[row], start_s(s), 1e-9);
+        let columns = axes[0].len();
+        ledger.equal("flow.nc: y", axes[0][row % columns], y[row], 0.0);
+        ledger.equal("flow.nc: z", axes[1][row / columns], z[row], 0.0);
+        ledger.equal("flow.csv: y_m", y[row], axes[0][row % columns], 0.0);
+        ledger.equal("flow.csv: z_m", z[row], axes[1][row / columns], 0.0);
+        let u = velocity_m_s(s, [0.0, y[row], z[row]], 0.0);
+        for (name, list, column, right) in [("v", &lists[0], &v, u[1]), ("w", &lists[1], &w, u[2])] {
+            ledger.equal(&format!("flow.csv: {name}_m_s"), column[row], right, 1e-10 * right.abs().max(1.0));
+            ledger.equal(&format!("flow.nc: {name}"), list[row], column[row], 2e-7 * column[row].abs() + 1e-30);
+        }
+    }
 }

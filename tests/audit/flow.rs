@@ -135,7 +135,7 @@ pub(crate) fn hold_wake(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     bench.write(
         "p.toml",
         "flow = { kind = \"simulated\", planes = \"w/plane1\", age_tau = 0.2, motion = \"frozen\", lateral_position_m = 400.0 }\n\
-         scan = { range_min_m = 380.0, range_max_m = 410.0, elevation_min_rad = 0.05, elevation_max_rad = 0.06, pulses_per_line = 1, \
+         scan = { range_min_m = 380.0, range_max_m = 440.0, elevation_min_rad = 0.05, elevation_max_rad = 0.06, pulses_per_line = 1, \
          outside_flow = { policy = \"mask\" } }\n",
     );
     let check = bench.run(&["check", "p.toml"]);

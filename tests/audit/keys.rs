@@ -119,7 +119,7 @@ const KEYS: [Key; 78] = [
     ("telescope.blind_range_m", &[], ["0.0", "330.0"], "map", "v_mean_m_s"),
     ("atmosphere.backscatter_per_m_sr", &[], ["1e-7", "1e-6"], "map", "v_mean_m_s"),
     ("atmosphere.extinction_per_m", &[], ["1e-5", "1e-3"], "map", "v_mean_m_s"),
-    ("atmosphere.turbulence.cn2_m_m23", &BISTATIC, ["1e-15", "1e-12"], "efficiency", "efficiency"),
+    ("atmosphere.turbulence.cn2_m_m23", &REFRACTIVE, ["1e-13", "2e-13"], "efficiency", "efficiency"),
     ("atmosphere.turbulence.spectrum", &BISTATIC, ["\"von_karman\"", "\"kolmogorov\""], "budget", ""),
     ("atmosphere.turbulence.inner_scale_m", &BISTATIC, ["0.01", "0.03"], "budget", ""),
     ("atmosphere.turbulence.outer_scale_m", &BISTATIC, ["1.0", "0.2"], "budget", ""),
@@ -215,7 +215,7 @@ fn small() -> Scene {
 
 /// A few keys of the list, those that the draw takes.
 pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
-    for _ in 0..10 {
+    for _ in 0..8 {
         let (key, needs, values, command, column) = r.pick(&KEYS);
         let shown = values.map(|value| {
             let mut s = small();

@@ -14,6 +14,8 @@
 //! | `bound` | Cramer-Rao bound, n_eff |
 //! | `statistics` | moments, means over maps, standard errors over seeds, ratios and widths of spectra |
 //! | `files` | one quantity in two files, and what files say of themselves |
+//! | `patterns` | scans in three dimensions, winds of VAD and DBS, places |
+//! | `estimator` | the estimator on its own signals; `estimate` |
 //! | `keys` | two values of every key, and what differs |
 //! | `flow` | histories of flows and wakes, energy, Courant numbers |
 //! | `scans` | `retrieve`, `detect`, `estimate`: formats, chi-square, false alarms |
@@ -27,12 +29,14 @@
 mod air;
 mod bound;
 mod draw;
+mod estimator;
 mod files;
 mod flow;
 mod geometry;
 mod keys;
 mod ledger;
 mod numerics;
+mod patterns;
 mod power;
 mod program;
 mod random;
@@ -57,7 +61,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 type Subject = (&'static str, fn(&mut Random, &Bench, &mut Ledger));
 
 /// One after the other: those that cost little come more often.
-const SUBJECTS: [Subject; 15] = [
+const SUBJECTS: [Subject; 18] = [
     ("map", map),
     ("power", power_of),
     ("bound", bound_of),
@@ -67,6 +71,9 @@ const SUBJECTS: [Subject; 15] = [
     ("wake", flow::hold_wake),
     ("growth", flow::hold_growth),
     ("cavity", flow::hold_cavity),
+    ("pattern", patterns::hold),
+    ("estimator", estimator::hold),
+    ("turns", estimator::hold_turns),
     ("words", scans::hold_words),
     ("bound", bound_of),
     ("power", power_of),
@@ -76,8 +83,13 @@ const SUBJECTS: [Subject; 15] = [
 ];
 
 /// What takes longer: once in `RARE` draws.
-const LONG: [Subject; 3] =
-    [("retrieve", scans::hold_retrieve), ("detect", scans::hold_detect), ("noise", scans::hold_false_alarms)];
+const LONG: [Subject; 5] = [
+    ("retrieve", scans::hold_retrieve),
+    ("detect", scans::hold_detect),
+    ("turbulence", through_turbulence),
+    ("noise", scans::hold_false_alarms),
+    ("summary", scans::hold_summary),
+];
 const RARE: usize = 16;
 
 /// Runs draws number `first` to `first + count - 1` of a seed with a program, on as many threads as are told; `keep` is a folder in
@@ -143,7 +155,12 @@ fn good_scene(
 
 /// A whole map: places, times, levels, velocities, profile.
 fn map(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
-    let Some(s) = good_scene(r, bench, ledger, draw::scene) else { return };
+    let draw = |r: &mut Random| {
+        let mut s = draw::scene(r);
+        s.set("outputs.flow", r.chance(0.3));
+        s
+    };
+    let Some(s) = good_scene(r, bench, ledger, draw) else { return };
     let Some(run) = bench.must(ledger, &["run", "s.toml", "--out", "o", "--json"]) else { return };
     let scan = Scan::new(&s);
     let map = bench.csv(ledger, "o/map.csv");
@@ -156,6 +173,7 @@ fn map(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         statistics::hold_reach(ledger, &s, &scan, &budget.stdout);
     }
     files::hold_map(ledger, bench, &s, &scan, &map);
+    files::hold_flow(ledger, bench, &s);
     let profile = bench.csv(ledger, "o/profile.csv");
     power::hold_profile(ledger, &s, &profile);
 }
@@ -173,6 +191,12 @@ fn power_of(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         s.set("scan.pulses_per_line", 150).set("scan.realisations", 2).word("flow.kind", "calm");
         s.set("estimator.gate_step_samples", 25);
         s.unset("flow").word("flow.kind", "calm");
+        if r.chance(0.3) {
+            let (rise, top) = (r.log(2e-8, 8e-8), r.log(1e-7, 4e-7));
+            s.unset("pulse.shape").unset("pulse.chirp_hz_s").word("pulse.shape.kind", "sampled");
+            s.set("pulse.shape.time_s", format!("[0.0, {rise:?}, {:?}, {:?}]", rise + top, 2.0 * rise + top));
+            s.set("pulse.shape.power", "[0.0, 1.0, 1.0, 0.0]").word("pulse.shape.resampling", "linear");
+        }
         s
     };
     let Some(s) = good_scene(r, bench, ledger, draw) else { return };
@@ -250,5 +274,51 @@ fn seeds(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     };
     if let Some(s) = good_scene(r, bench, ledger, draw) {
         statistics::hold_seeds(ledger, bench, &s);
+    }
+}
+
+/// Through a focus in turbulence: the ratio of the signals and that of the budget, each a Monte Carlo of its own.
+fn through_turbulence(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
+    let mut s = Scene::default();
+    s.number("telescope.focus_m", r.between(250.0, 500.0)).word("atmosphere.turbulence.kind", "refractive");
+    s.number("atmosphere.turbulence.cn2_m_m23", 1e-14).set("atmosphere.turbulence.grid_points", 320);
+    s.set("atmosphere.turbulence.layers", 10).set("atmosphere.turbulence.realisations", 24);
+    s.number("scan.elevation_min_rad", 0.1).number("scan.elevation_max_rad", 0.1).set("scan.pulses_per_line", 1);
+    s.number("scan.range_min_m", 150.0).number("scan.range_max_m", 1400.0).set("estimator.gate_step_samples", 60);
+    s.number("outputs.profile_range_min_m", 170.0)
+        .number("outputs.profile_range_max_m", 1400.0)
+        .set("outputs.profile_points", 42);
+    bench.write("s.toml", &s.text());
+    let gates = Scan::new(&s).gate_m;
+    let ranges: Vec<f64> = gates.iter().copied().filter(|m| (170.0..1400.0).contains(m)).collect();
+    let words = ranges.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let (Some(budget), Some(bound)) = (
+        bench.must(ledger, &["budget", "s.toml", "--json", "--range", &words]),
+        bench.must(ledger, &["bound", "s.toml", "--json"]),
+    ) else {
+        return;
+    };
+    if bench.must(ledger, &["efficiency", "s.toml", "--out", "o"]).is_some() {
+        let profile = bench.csv(ledger, "o/profile.csv");
+        let (range, free) = (profile.f("range_m"), profile.f("efficiency_free_space"));
+        for i in (0..range.len()).step_by(7) {
+            let right = power::free_space_efficiency(&s, range[i]);
+            ledger.equal("profile.csv: efficiency_free_space", free[i], right, 1e-6 * right);
+        }
+    }
+    let (budget, bound) = (budget.json(), bound.json());
+    let rows = budget["rows"].as_array().cloned().unwrap_or_default();
+    let total = rows.iter().find(|row| row["row"] == "= SNR in the band").cloned().unwrap_or_default();
+    for (i, range_m) in ranges.iter().enumerate() {
+        let points = bound["by_range"].as_array().cloned().unwrap_or_default();
+        let here = points.iter().find(|p| p["range_m"].as_f64().is_some_and(|m| (m - range_m).abs() < 1e-3));
+        let found = here.and_then(|p| p["snr_db"].as_f64()).unwrap_or(f64::NAN);
+        // 24 realisations of either leave some 0.3 dB.
+        ledger.equal(
+            "bound: snr_db, of the budget in turbulence",
+            found,
+            total["db"][i].as_f64().unwrap_or(f64::NAN),
+            1.2,
+        );
     }
 }
