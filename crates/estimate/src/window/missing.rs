@@ -43,13 +43,49 @@ impl MissingSamples {
     pub(crate) fn rule<S: Sample>(&self, samples: impl Iterator<Item = S>) -> Rule<'_> {
         let mut rule = Rule { fill: &self.fill, limit: f64::INFINITY };
         if self.outsized {
-            let mut counts = vec![0_usize; 2048];
-            for sample in samples.filter(|sample| rule.is_measured(*sample) && sample.largest_part() > 0.0) {
-                counts[order(sample.largest_part())] += 1;
-            }
-            rule.limit = limit(&counts);
+            let mut sizes = SampleSizes::default();
+            samples.filter(|sample| rule.is_measured(*sample)).for_each(|sample| sizes.add(sample.largest_part()));
+            rule.limit = sizes.outsized();
         }
         rule
+    }
+}
+
+/// How many samples there are of each binary order of magnitude: it tells which are outsized where the samples of a scan come
+/// piece by piece.
+#[derive(Debug, Clone)]
+pub struct SampleSizes {
+    counts: Vec<usize>,
+    /// The largest sample of each order.
+    largest: Vec<f64>,
+}
+
+impl Default for SampleSizes {
+    fn default() -> Self {
+        Self { counts: vec![0; 2048], largest: vec![0.0; 2048] }
+    }
+}
+
+impl SampleSizes {
+    /// Counts a sample by the size of its largest part; 0 and what is not finite are none.
+    pub fn add(&mut self, size: f64) {
+        if size > 0.0 && size.is_finite() {
+            let order = order(size);
+            self.counts[order] += 1;
+            self.largest[order] = self.largest[order].max(size);
+        }
+    }
+
+    /// Size from which on samples are missing ([`MissingSamples::outsized`]); infinite if none is.
+    #[must_use]
+    pub fn outsized(&self) -> f64 {
+        limit(&self.counts)
+    }
+
+    /// The largest sample below `limit`; 0 if there is none.
+    #[must_use]
+    pub fn largest_below(&self, limit: f64) -> f64 {
+        self.largest.iter().copied().filter(|size| *size < limit).fold(0.0, f64::max)
     }
 }
 

@@ -76,6 +76,16 @@ impl NumberType {
         matches!(self, Self::F32 | Self::F64)
     }
 
+    /// What classic NetCDF holds where no integer was written; every byte may be a number.
+    #[cfg(feature = "netcdf")]
+    pub(crate) fn netcdf_fill(self) -> Option<f64> {
+        match self {
+            Self::I16 => Some(-32767.0),
+            Self::I32 => Some(-2_147_483_647.0),
+            _ => None,
+        }
+    }
+
     /// A number from its bytes, the first one highest.
     pub(crate) fn value(self, bytes: &[u8]) -> f64 {
         self.of_bits(bytes.iter().fold(0_u64, |bits, byte| bits << 8 | u64::from(*byte)))

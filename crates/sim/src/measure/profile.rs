@@ -50,7 +50,7 @@ pub struct RangeProfile {
     /// Efficiency by that model, with its scatter and error.
     pub efficiency: EfficiencyProfile,
     /// Mean signal-to-noise ratio in the detector band, dB, for a pulse short against the changes
-    /// of the path.
+    /// of the path; NaN where no light comes back.
     pub snr_db: Vec<f64>,
     /// The other models side by side, by the name of their column; empty without turbulence.
     pub others: Vec<(&'static str, EfficiencyProfile)>,
@@ -95,7 +95,9 @@ pub(crate) fn profile_at(
         others.push(("efficiency_monostatic_monte_carlo", monostatic));
         others.push(("efficiency_bistatic_monte_carlo", bistatic));
     }
-    let snr_db = snr_db(scene, instrument, &efficiency)?;
+    // No light comes back from the blind range or from air without aerosol.
+    let known = |db: f64| if db.is_finite() { db } else { f64::NAN };
+    let snr_db = snr_db(scene, instrument, &efficiency)?.into_iter().map(known).collect();
     Ok(RangeProfile { model, efficiency, snr_db, others, lost_power_fraction })
 }
 

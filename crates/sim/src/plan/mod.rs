@@ -4,6 +4,7 @@
 //! forecasts are products of counts with unit costs; `cargo xtask forecast` holds them against what runs take.
 
 use crate::Error;
+use crate::measure::estimators::grid_step_and_bias_m_s;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
 use crate::measure::wind::SceneWind;
@@ -14,6 +15,7 @@ use std::sync::Arc;
 
 pub mod accuracy;
 mod ambiguity;
+mod coverage;
 mod files;
 mod fit;
 mod hardware;
@@ -86,7 +88,7 @@ impl Plan {
             );
             return Err(Error::Key { key, reason });
         }
-        let mut warnings = warnings(&scene.scene);
+        let mut warnings = warnings(&scene.scene)?;
         warnings.extend(ambiguity::warning(&scene.scene, &instrument.pulse));
         warnings.extend(hardware::warnings(&scene.scene, &instrument));
         let optics = optics::stages(&scene, &instrument, target, &geometry, &mut warnings)?;
@@ -94,6 +96,9 @@ impl Plan {
         let mut plan = Self { scene, target, stages, instrument, geometry, wind, fastest_m_s: 0.0, warnings };
         plan.fastest_m_s = crate::measure::air::fastest_m_s(&plan)?;
         plan.warnings.splice(0..0, plan.of_fast_air());
+        if plan.runs(Stage::Estimates) {
+            plan.warnings.extend(coverage::warning(&plan.scene.scene, &plan.geometry)?);
+        }
         possible::check(&plan)?;
         crate::measure::write::check(&Contents {
             scene: &plan.scene.scene,
@@ -155,13 +160,13 @@ fn end_s(wind: &SceneWind, geometry: &Geometry) -> f64 {
 }
 
 /// What is allowed but probably not meant.
-fn warnings(scene: &Scene) -> Vec<String> {
+fn warnings(scene: &Scene) -> Result<Vec<String>, Error> {
     let mut out = Vec::new();
     if scene.estimator.padded_samples < 4 * scene.estimator.window_samples {
-        let bin_m_s =
-            0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / scene.estimator.padded_samples as f64;
+        let (step_m_s, off_m_s) = grid_step_and_bias_m_s(scene)?;
         out.push(format!(
-            "estimator.padded_samples gives a spectrum in steps of {bin_m_s:.2} m/s: expect a bias of that order"
+            "estimator.padded_samples gives a spectrum in steps of {step_m_s:.2} m/s: with this estimator.refinement a line is found up \
+             to {off_m_s:.3} m/s off"
         ));
     }
     let method = scene.estimator.method;
@@ -175,7 +180,7 @@ fn warnings(scene: &Scene) -> Vec<String> {
     if scene.scan.realisations < 2 {
         out.push("one realisation: no standard deviation can be given".into());
     }
-    out
+    Ok(out)
 }
 
 impl fmt::Display for Plan {
@@ -266,6 +271,20 @@ mod tests {
         let group = 512.0 * 512.0 * 80.0;
         assert!(two - one > 0.9 * group && (6.9..7.1).contains(&((eight - one) / (two - one))), "{one} {two} {eight}");
         assert!(more - eight < 0.2 * group, "{eight} {more}");
+    }
+
+    #[test]
+    fn coarse_spectra_are_warned_of_with_the_bias_that_their_refinement_leaves() {
+        use crate::scene::Refinement;
+        let off_m_s = |refinement| {
+            let change = |s: &mut Scene| (s.estimator.padded_samples, s.estimator.refinement) = (64, refinement);
+            let text = plan(Target::Map, change).warnings.remove(0);
+            assert!(text.contains("steps of 3.03 m/s"), "{text}");
+            text.split("up to ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap()
+        };
+        // half a step, and what the parabola and the image leave
+        assert!((off_m_s(Refinement::None) - 1.51).abs() < 0.02, "{}", off_m_s(Refinement::None));
+        assert!(off_m_s(Refinement::Parabola) < 0.15 && off_m_s(Refinement::Exact) < 0.15);
     }
 
     #[test]

@@ -325,6 +325,21 @@ fn extreme_scenes_run_to_the_end() {
 }
 
 #[test]
+fn a_profile_is_empty_where_no_light_comes_back() {
+    let temp = tempfile::tempdir().unwrap();
+    std::fs::write(
+        temp.path().join("s.toml"),
+        "[atmosphere]\nbackscatter_per_m_sr = 0.0\n[outputs]\nprofile_points = 3\n",
+    )
+    .unwrap();
+    let out = wakescope(temp.path(), &["efficiency", "s.toml", "--out", "o", "--quiet"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let text = std::fs::read_to_string(temp.path().join("o/profile.csv")).unwrap();
+    let rows: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
+    assert!(rows[0].ends_with("snr_db") && rows[1..].iter().all(|row| row.ends_with(',')), "{rows:?}");
+}
+
+#[test]
 fn turbulence_gives_theory_and_monte_carlo_side_by_side() {
     let turbulent = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-13\ngrid_points = 128\n\
                      grid_spacing_m = 0.004\nlayers = 3\nrealisations = 40\n\

@@ -30,6 +30,7 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use text::TextRecords;
+use wakescope_estimate::window::MissingSamples;
 
 /// How the numbers of a file stand, as far as the file does not say it.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,6 +97,8 @@ pub struct About {
 pub struct RawRecords {
     path: PathBuf,
     store: Store,
+    /// Samples of this size and above are missing.
+    outsized: f64,
     /// What the file says of them.
     pub about: About,
 }
@@ -161,8 +164,12 @@ impl RawRecords {
                 ));
             }
         };
-        let mut records = Self { path: path.to_owned(), store, about };
+        let mut records = Self { path: path.to_owned(), store, outsized: f64::INFINITY, about };
         if let Store::Array(array) = &mut records.store {
+            // Of a converter's codes each may be a sample.
+            if array.number.is_float() {
+                array.fills.extend(MissingSamples::default().fill);
+            }
             let doubt = array.doubt().map_err(unreadable)?;
             if let Some(doubt) = doubt.filter(|_| format.number.is_some()) {
                 return Err(refuse(doubt));
@@ -215,7 +222,13 @@ impl RawRecords {
         Error::Input { path: self.path.clone(), reason }
     }
 
-    /// The samples of some records, one record after the other; the second parts of real samples are 0.
+    /// Counts samples of this size and above as missing.
+    pub fn leave_out(&mut self, outsized: f64) {
+        self.outsized = outsized;
+    }
+
+    /// The samples of some records, one record after the other; the second parts of real samples are 0. A missing sample has a
+    /// part that is not finite.
     ///
     /// # Errors
     /// What the system says; words in place of numbers.
@@ -228,7 +241,7 @@ impl RawRecords {
     /// # Errors
     /// As [`RawRecords::read`].
     pub fn read_samples(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, Error> {
-        match &mut self.store {
+        let found = match &mut self.store {
             Store::Array(array) => array.read(records, samples).map_err(|e| match e.kind() {
                 std::io::ErrorKind::UnexpectedEof => "it became shorter while it was read".to_owned(),
                 _ => e.to_string(),
@@ -238,8 +251,12 @@ impl RawRecords {
                 let of = |record: usize| &all.values[record * all.samples..][samples.clone()];
                 Ok(records.flat_map(of).copied().collect())
             }
+        };
+        let mut found = found.map_err(|reason| self.refuse(reason))?;
+        for sample in found.iter_mut().filter(|sample| sample.re.abs().max(sample.im.abs()) >= self.outsized) {
+            sample.re = f64::NAN;
         }
-        .map_err(|reason| self.refuse(reason))
+        Ok(found)
     }
 }
 

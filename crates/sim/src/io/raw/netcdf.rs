@@ -71,7 +71,11 @@ fn signals(file: &mut NetcdfFile, format: &RawFormat) -> Result<(Store, About), 
             return Err(format!("variable {name} grows along a dimension and has two more: nccopy -u makes it fixed"));
         }
     };
-    let (fills, scale, offset) = file.packing(&name);
+    let (mut fills, scale, offset) = file.packing(&name);
+    if fills.is_empty() {
+        // What stands where nothing was written.
+        fills.extend(layout.number.netcdf_fill());
+    }
     let array = ArrayInFile {
         file: file.handle().map_err(|e| e.to_string())?,
         number: layout.number,

@@ -7,6 +7,7 @@ use num_complex::Complex;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
+use wakescope_estimate::window::MissingSamples;
 
 /// Longest line that is read \[bytes\].
 const LONGEST_LINE_BYTES: u64 = 64 << 20;
@@ -21,12 +22,15 @@ pub(super) struct TextRecords {
     pub(super) is_complex: bool,
     /// Columns of both parts in the long table.
     columns: Option<Vec<usize>>,
+    /// Stand for a missing number.
+    fills: Vec<f64>,
 }
 
 impl TextRecords {
     /// Finds the records; numbers of a row are pairs of both parts where `is_complex` says so.
     pub(super) fn open(file: File, is_complex: bool) -> Result<Self, String> {
-        let mut out = Self { reader: BufReader::new(file), records: Vec::new(), samples: 0, is_complex, columns: None };
+        let (reader, fills) = (BufReader::new(file), MissingSamples::default().fill);
+        let mut out = Self { reader, records: Vec::new(), samples: 0, is_complex, columns: None, fills };
         let (mut at, mut line, mut text) = (0, 0, String::new());
         // Column of the long table that numbers the records, the last number there, and how many rows have had it.
         let (mut key, mut last, mut rows) = (0, String::new(), 0);
@@ -132,10 +136,11 @@ impl TextRecords {
 
     fn push(&self, content: &str, line: usize, out: &mut Vec<Complex<f64>>) -> Result<(), String> {
         let number = |cell: &str| -> Result<f64, String> {
-            match cell {
-                "" => Ok(f64::NAN),
-                cell => cell.parse().map_err(|_| format!("line {line}: {cell:?} is no number")),
+            if cell.is_empty() {
+                return Ok(f64::NAN);
             }
+            let value = cell.parse().map_err(|_| format!("line {line}: {cell:?} is no number"))?;
+            Ok(if self.fills.contains(&value) { f64::NAN } else { value })
         };
         match &self.columns {
             Some(columns) => {

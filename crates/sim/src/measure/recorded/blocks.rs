@@ -130,7 +130,7 @@ impl<'p, S: FromParts> Blocks<'p, S> {
         for (row, line) in order.into_iter().enumerate().filter(|(_, line)| tile.lines.contains(line)) {
             for gate in tile.gates.clone() {
                 let at = row * gates.len() + gate - gates.start;
-                let e = &found[at].estimate;
+                let (e, radius_m) = (&found[at].estimate, estimator.radius_m(points[at].range_m)?);
                 cells[[line, gate]] = Cell {
                     velocity_m_s: e.velocity_m_s,
                     power_ratio: if e.velocity_m_s.is_finite() {
@@ -140,6 +140,7 @@ impl<'p, S: FromParts> Blocks<'p, S> {
                     },
                     detection_ratio: noise.detection_ratio(at, e),
                     deviation: noise.deviation(at),
+                    lines: places.chords(points[at], radius_m).count() as f64,
                     width_m_s: e.width_m_s,
                     quality: e.quality,
                     level: found[at].level as f64,
@@ -147,7 +148,6 @@ impl<'p, S: FromParts> Blocks<'p, S> {
                     is_good: e.is_good(),
                 };
                 if let (Some(spectra), Some(of_gate)) = (&mut spectra, &self.spectra) {
-                    let radius_m = estimator.radius_m(points[at].range_m)?;
                     let one = of_gate.density(&scan, points[at], radius_m, estimator.noise_density_a2())?;
                     let place = (line * cells.ncols() + gate) * one.len();
                     spectra[place..place + one.len()].copy_from_slice(&one);

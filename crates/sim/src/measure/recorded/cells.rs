@@ -14,6 +14,8 @@ pub(super) struct Cell {
     pub(super) detection_ratio: f64,
     /// Standard deviation of the power ratio of noise.
     pub(super) deviation: f64,
+    /// Lines of sight that its region reaches.
+    pub(super) lines: f64,
     pub(super) width_m_s: f64,
     pub(super) quality: f64,
     pub(super) level: f64,
@@ -28,6 +30,7 @@ impl Cell {
         power_ratio: f64::NAN,
         detection_ratio: f64::NAN,
         deviation: f64::NAN,
+        lines: 0.0,
         width_m_s: f64::NAN,
         quality: f64::NAN,
         level: 0.0,

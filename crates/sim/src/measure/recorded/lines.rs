@@ -102,6 +102,9 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
             "an elevation is {bad} rad: from -pi/2 to pi/2 are allowed; degrees need the unit degrees, or a column elevation_deg"
         )));
     }
+    if elevation_rad.len() != count {
+        return Err(records.refuse(format!("it has {count} records and {} elevations", elevation_rad.len())));
+    }
     if time_s.len() != count {
         return Err(records.refuse(format!("it has {count} records and {} times", time_s.len())));
     }

@@ -29,14 +29,15 @@ use crate::plan::{Plan, Stage, Target};
 use crate::scene::{DetectorSignal, Digitiser, Estimator, Outputs, Scene, SceneFile, Site};
 use num_complex::Complex;
 use std::ops::Range;
-use wakescope_estimate::window::Sample;
+use wakescope_estimate::window::{Sample, SampleSizes};
 
 /// The power of the noise that velocities are held against.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoiseLevel {
     /// As the scene's receiver has it, for signals in ampere.
     OfScene,
-    /// That of the quietest gates: the tenth part of the gates with the least power, in the mean over the lines.
+    /// That of the gates without a signal, found from the quietest tenth on, in the mean over the lines; corrected for being chosen
+    /// by their power.
     Quietest,
     /// Mean square of a sample of noise in the band, both quadratures together, in the square of the unit of the samples.
     Given(f64),
@@ -205,7 +206,11 @@ fn of_samples<S: FromParts>(
     options: &RecordedOptions,
     observer: &dyn Observer,
 ) -> Result<Recorded, Error> {
-    let is_run = is_own && options.rays.is_none();
+    let largest = largest_part(plan, records)?;
+    // Numbers that are scaled are not those of the scene any more, and another noise gives another map.
+    let is_own = is_own && records.scale() == 1.0;
+    let noise = options.noise.unwrap_or(if is_own { NoiseLevel::OfScene } else { NoiseLevel::Quietest });
+    let is_run = is_own && noise == NoiseLevel::OfScene && options.rays.is_none();
     if is_run && !options.spectra {
         return Ok(Recorded::OfRun { map: of_run::<S>(plan, records, observer)?, spectra: None });
     }
@@ -218,10 +223,7 @@ fn of_samples<S: FromParts>(
         )));
     }
     let scans = lines::scans(plan, records, options.rays.as_ref())?;
-    let largest = largest_part(plan, records)?;
     observer.begin(Stage::Estimates, scans.iter().map(|scan| scan.elevation_rad.len() as u64).sum());
-    let default = if is_own { NoiseLevel::OfScene } else { NoiseLevel::Quietest };
-    let noise = options.noise.unwrap_or(default);
     let found = blocks::Blocks::<S>::new(plan, largest, options, observer)?.scans(records, scans)?;
     observer.end();
     let spectra = found.iter().any(|scan| scan.spectra.is_some()).then(|| Spectra::of(plan, &found)).transpose()?;
@@ -273,17 +275,19 @@ pub(crate) fn samples<S: FromParts>(
     ndarray::Array2::from_shape_vec(shape, samples).map_err(|_| records.refuse("it became shorter".into()))
 }
 
-/// The largest part of all samples; refuses records without any, and codes that the scene's converter does not have.
+/// The largest part of all samples, the outsized ones left out from here on; refuses records without any, and codes that the
+/// scene's converter does not have.
 fn largest_part(plan: &Plan, records: &mut RawRecords) -> Result<f64, Error> {
-    let (mut largest, mut any) = (0.0_f64, false);
+    let (mut sizes, mut any) = (SampleSizes::default(), false);
     for piece in pieces(0..records.records(), records.samples()) {
-        for sample in records.read(piece)? {
-            if sample.is_finite() {
-                any = true;
-                largest = largest.max(sample.largest_part());
-            }
+        for sample in records.read(piece)?.into_iter().filter(|sample| sample.is_finite()) {
+            any = true;
+            sizes.add(sample.largest_part());
         }
     }
+    let outsized = if records.is_of_integers() { f64::INFINITY } else { sizes.outsized() };
+    records.leave_out(outsized);
+    let largest = sizes.largest_below(outsized);
     if !any {
         return Err(records.refuse("all of its samples are missing: none is a finite number".into()));
     }

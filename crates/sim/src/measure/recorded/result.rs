@@ -12,6 +12,7 @@ use crate::measure::described::{pulse_info, site};
 use crate::measure::map_estimator::snr_db;
 use crate::plan::Plan;
 use ndarray::{Array2, Axis, concatenate};
+use wakescope_estimate::estimators::noise_floor;
 use wakescope_estimate::map::PolarPoint;
 
 /// Velocities of one scan, each \[line, gate\].
@@ -77,16 +78,19 @@ pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Resul
     })
 }
 
-/// Mean power of the quietest tenth of the gates over that of the scene's noise.
+/// Power of the gates without a signal over that of the scene's noise, from the means over the lines.
 fn quietest(cells: &Array2<Cell>) -> f64 {
-    let of_gate = |gate: ndarray::ArrayView1<'_, Cell>| {
-        let known: Vec<f64> = gate.iter().map(|cell| cell.power_ratio).filter(|ratio| ratio.is_finite()).collect();
-        known.iter().sum::<f64>() / known.len() as f64
+    let known = |of: fn(&Cell) -> f64| {
+        let mean = move |gate: ndarray::ArrayView1<'_, Cell>| {
+            let values = || gate.iter().filter(|cell| cell.power_ratio.is_finite()).map(of);
+            values().sum::<f64>() / values().count() as f64
+        };
+        cells.axis_iter(Axis(1)).map(mean).filter(|value| value.is_finite()).collect::<Vec<f64>>()
     };
-    let mut powers: Vec<f64> = cells.axis_iter(Axis(1)).map(of_gate).filter(|power| power.is_finite()).collect();
-    powers.sort_by(f64::total_cmp);
-    let some = &powers[..powers.len().div_ceil(10)];
-    some.iter().sum::<f64>() / some.len() as f64
+    // Regions that reach over several lines share their windows.
+    let variances = known(|cell| cell.deviation.powi(2) * cell.lines);
+    let variance = variances.iter().sum::<f64>() / (variances.len() * cells.nrows()) as f64;
+    noise_floor(&known(|cell| cell.power_ratio), variance.sqrt())
 }
 
 /// The map of the scans, each a sweep, in the form that files and pictures take.
