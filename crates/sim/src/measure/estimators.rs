@@ -302,14 +302,14 @@ pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error>
     let step_m_s = 0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / e.padded_samples as f64;
     let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
     let off_m_s = |part: i32| {
-        let velocity_m_s = 0.5 * (low_m_s + high_m_s) + step_m_s * f64::from(part) / 16.0;
+        let velocity_m_s = 0.5 * (low_m_s + high_m_s) + step_m_s * f64::from(part) / 64.0;
         let turn = std::f64::consts::TAU * sampling.frequency_hz(velocity_m_s) * sampling.period_s();
         let lag = |(m, weight): (usize, &f64)| Complex::from_polar(*weight, turn * m as f64);
         let lags = weights.iter().enumerate().map(lag).flat_map(|z| [z.re, z.im].into_iter().take(kind.lag_numbers(1)));
         let found = peak.estimate(&lags.collect::<Vec<f64>>(), &mut estimate::Scratch::new());
         (found.velocity_m_s - velocity_m_s).abs()
     };
-    Ok((step_m_s, (-8..8).map(off_m_s).fold(0.0, f64::max)))
+    Ok((step_m_s, (-32..32).map(off_m_s).fold(0.0, f64::max)))
 }
 
 /// Correlogram of all lags and the scene's estimator of it, for what a mean of very many pulses would show.

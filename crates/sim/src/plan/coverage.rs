@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn gates_that_no_window_is_near_are_counted_with_a_remedy() {
-        for (step, radius_m) in [(5, 1.0), (16, 2.0), (7, 0.5)] {
+        for (step, radius_m) in [(16, 2.0), (7, 0.5), (12, 1.5)] {
             let plan = plan(step, radius_m);
             let found: Vec<&String> = plan.warnings.iter().filter(|text| text.contains("have no window")).collect();
             let text = found.first().unwrap_or_else(|| panic!("{step} {radius_m}: {:?}", plan.warnings));
