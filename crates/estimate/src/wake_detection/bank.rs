@@ -191,7 +191,7 @@ mod tests {
             let (least_m, most_m, places) = bank(top_rad, gates);
             assert!(places <= 2700, "{places}");
             assert_eq!(least_m.is_finite(), has_pairs, "{gates:?}: {least_m}");
-            assert!(!has_pairs || (15.99..40.0).contains(&least_m) && most_m <= 63.01, "{least_m} {most_m}");
+            assert!(!has_pairs || least_m >= 15.99 && most_m <= 63.01, "{least_m} {most_m}");
         }
     }
 }
