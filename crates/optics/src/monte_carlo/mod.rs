@@ -22,7 +22,6 @@ pub use walk::Sampling;
 
 use crate::beam::source::{aperture_field, check_grid};
 use crate::efficiency::EfficiencyProfile;
-use crate::monte_carlo::against_theory::Found;
 use crate::monte_carlo::path::Program;
 use crate::monte_carlo::prepared::Prepared;
 use crate::monte_carlo::statistics::{Folding, Sample, bistatic, mean_and_variance};
@@ -284,7 +283,7 @@ impl MonteCarlo {
             }
             lost_power_fraction.push(fraction);
             let factor = exact_free_space[i] / grid_free_space[i];
-            found.push(Found { correction: factor, lost: fraction });
+            found.push(against_theory::Found { correction: factor, lost: fraction });
             single.push(samples.iter().flat_map(|s| s.single.iter().map(|eta| factor * eta)).collect());
             pairs.push(sums.products[i].iter().map(|eta| factor * eta).collect());
             if prepared.screens.is_none() {

@@ -7,14 +7,15 @@
 //! focus (`every_output_has_the_same_ratio_through_a_focus`).
 
 use crate::Error;
-use crate::measure::efficiencies::Efficiencies;
+use crate::measure::efficiencies::Known;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::{Instrument, receiver_path};
 use crate::measure::progress::Observer;
 use crate::measure::region::of_table;
 use crate::plan::{Plan, Stage};
-use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence};
+use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence, hash_of};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use wakescope_optics::air::StructureTable;
 use wakescope_optics::plan::{DOUBTFUL_LOSS, Model, cheapest_model};
 use wakescope_optics::theory::{bistatic_efficiency_with, free_space_efficiency};
@@ -304,6 +305,53 @@ impl Screens {
 pub(crate) fn spaced(low: f64, high: f64, points: usize) -> Vec<f64> {
     let step = (high - low) / (points.max(2) - 1) as f64;
     (0..points).map(|i| if i + 1 == points { high } else { low + i as f64 * step }).collect()
+}
+
+/// The curves of some scenes.
+#[derive(Debug, Default)]
+pub(crate) struct Efficiencies {
+    layers: Known<EfficiencyProfile>,
+    screens: Known<Screens>,
+}
+
+impl Efficiencies {
+    /// The efficiency at the layers of the lines, as [`efficiency_at`].
+    pub(crate) fn of_layers(&self, plan: &Plan, observer: &dyn Observer) -> Result<Arc<EfficiencyProfile>, Error> {
+        let ranges_m: Vec<f64> = plan.geometry.layer_range_m().collect();
+        self.layers.of(cause(&plan.scene.scene, &ranges_m), || {
+            observer.begin(Stage::Efficiency, 1);
+            let profile = efficiency_at(plan, self, &ranges_m, observer)?;
+            observer.end();
+            Ok(profile)
+        })
+    }
+
+    /// The phase screens of a stretch of range, m.
+    pub(crate) fn screens(
+        &self,
+        scene: &Scene,
+        instrument: &Instrument,
+        [from_m, to_m]: [f64; 2],
+        observer: &dyn Observer,
+    ) -> Result<Arc<Screens>, Error> {
+        let t = turbulence(scene).unwrap_or_default();
+        let range_m = curved_ranges_m(&instrument.telescope, from_m, to_m, OF_SCREENS);
+        let cause = cause(scene, &range_m);
+        self.screens.of(cause, || Screens::run(scene, instrument, &t, range_m, observer))
+    }
+
+    /// How many were computed.
+    #[cfg(feature = "sweep")]
+    pub(crate) fn computed(&self) -> usize {
+        self.layers.len()
+    }
+}
+
+/// What a curve depends on: on the seed only in turbulence, where screens may be drawn.
+fn cause(scene: &Scene, range_m: &[f64]) -> String {
+    let (air, laser) = (&scene.atmosphere.turbulence, scene.laser.wavelength_m);
+    let seed = turbulence(scene).map(|_| scene.seed);
+    hash_of(&format!("{:?}", (laser, &scene.telescope, air, seed, range_m)))
 }
 
 #[cfg(test)]

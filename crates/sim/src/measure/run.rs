@@ -2,9 +2,9 @@
 
 use crate::Error;
 use crate::io::CrossPlanes;
-use crate::measure::efficiencies::Efficiencies;
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::plane;
+use crate::measure::profile::Efficiencies;
 use crate::measure::profile::{RangeProfile, profile_at, spaced};
 use crate::measure::progress::Observer;
 use crate::measure::region::of_table;

@@ -3,9 +3,9 @@
 use crate::Error;
 use crate::beams::{Beam, Line};
 use crate::measure::air::{Air, LineAirs, air_along, beam_of_air, known_velocity_m_s, seen_into};
-use crate::measure::efficiencies::Efficiencies;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
+use crate::measure::profile::Efficiencies;
 use crate::measure::profile::{drawn_turbulence, efficiency_by_theory, stretches};
 use crate::measure::progress::Observer;
 use crate::measure::streams::stream;

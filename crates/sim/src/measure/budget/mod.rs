@@ -10,8 +10,8 @@ mod text;
 pub use limits::Limits;
 
 use crate::Error;
-use crate::measure::efficiencies::Efficiencies;
 use crate::measure::instrument::Instrument;
+use crate::measure::profile::Efficiencies;
 use crate::measure::profile::{efficiency_at, efficiency_by_theory, free_space, turbulence};
 use crate::measure::progress::Observer;
 use crate::plan::Plan;
