@@ -128,10 +128,10 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
         if ratio.is_nan() {
             continue;
         }
+        // The autocorrelation of a chirped pulse is by quadrature, which a high ratio sees.
+        let tolerance = if pulse.chirp_hz_s == 0.0 { 1e-4 } else { 5e-3 };
         if f("snr_db") <= 30.0 {
             let right = 1.0 / record_information(s, &pulse, n, ratio).sqrt();
-            // The autocorrelation of a chirped pulse is by quadrature, which a high ratio sees.
-            let tolerance = if pulse.chirp_hz_s == 0.0 { 1e-4 } else { 5e-3 };
             ledger.equal("bound: bound_window_m_s", f("bound_window_m_s"), right, tolerance * right);
         }
         let Some(radius) = radius_m(s, scan.gate_m[gate]) else { continue };
@@ -146,7 +146,7 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
         let longest = windows.iter().filter_map(|w| Some(w.last()? - w.first()? + n)).max().unwrap_or(n);
         if f("snr_db") <= 30.0 && longest <= 200 {
             let right = region_m_s(s, &pulse, &windows, scan.pulses, ratio);
-            ledger.equal("bound: bound_region_m_s", f("bound_region_m_s"), right, 1e-3 * right);
+            ledger.equal("bound: bound_region_m_s", f("bound_region_m_s"), right, tolerance.max(1e-3) * right);
         }
     }
 }

@@ -331,14 +331,15 @@ pub(crate) fn spectral_fwhm_hz(s: &Scene) -> Option<f64> {
     if let Some(pulse) = Pulse::gaussian(s) {
         return Some(2.0 * (2.0 * LN_2).sqrt() * pulse.spectral_deviation_hz());
     }
-    // A sampled pulse of straight lines, without phase: |F|^2 by quadrature, the first frequency where it is a half.
+    // A sampled pulse whose amplitude has straight lines, without phase: |F|^2 by quadrature, the first frequency where it is a half.
     if s.s("pulse.shape.resampling") != "linear" || s.has("pulse.shape.phase_rad") || s.f("pulse.chirp_hz_s") != 0.0 {
         return None;
     }
-    let (t, p) = (s.list("pulse.shape.time_s"), s.list("pulse.shape.power"));
+    let (t, power) = (s.list("pulse.shape.time_s"), s.list("pulse.shape.power"));
+    let p: Vec<f64> = power.iter().map(|p| p.sqrt()).collect();
     let middle = 0.5 * (t[0] + t[t.len() - 1]);
     let part = |f: f64, phase: f64| {
-        let of = |x: f64| straight(&t, &p, x).max(0.0).sqrt() * (2.0 * PI * f * (x - middle) + phase).cos();
+        let of = |x: f64| straight(&t, &p, x) * (2.0 * PI * f * (x - middle) + phase).cos();
         integral(t[0], t[t.len() - 1], 24 * t.len(), of)
     };
     let power = |f: f64| part(f, 0.0).powi(2) + part(f, 0.5 * PI).powi(2);
