@@ -7,7 +7,6 @@ use super::numerics::Complex;
 use super::power::window_powers;
 use super::program::Bench;
 use super::random::Random;
-use super::scene::Scene;
 use std::f64::consts::PI;
 
 /// Records of a scan: every pulse, every sample.
