@@ -13,11 +13,11 @@ use wakescope_les::cases::VortexPairCase;
 pub enum WakePreset {
     /// 24 x 128 x 80 cells, `Re_Gamma` 5000, no subgrid model: minutes.
     Coarse,
-    /// 48 x 240 x 128 cells, `Re_Gamma` 5000, no subgrid model: about an hour.
+    /// 48 x 240 x 128 cells, `Re_Gamma` 5000, no subgrid model: some twenty minutes of one core.
     Medium,
-    /// `Re_Gamma` 20000, core 0.05 `b0`, multiscale model, 64 x 256 x 144 cells: hours.
+    /// `Re_Gamma` 20000, core 0.05 `b0`, multiscale model, 64 x 256 x 144 cells: two hours of one core.
     Fine,
-    /// The same flow with walls resolved, 128 x 432 x 224 cells: days.
+    /// The same flow with walls resolved, 128 x 432 x 224 cells: a day of one core.
     Chapter,
 }
 
