@@ -5,6 +5,7 @@
 
 mod chain;
 mod estimate;
+mod front;
 mod les;
 mod optics;
 pub(crate) mod show;
@@ -13,9 +14,9 @@ mod signal;
 use crate::cost::{Cost, machine};
 use crate::workspace::{provenance, root};
 use crate::{Failure, Outcome};
+use front::Measured;
 use std::path::PathBuf;
 use wakescope_sim::io::FileGroup;
-use wakescope_sim::plan::accuracy::Measured;
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
@@ -29,7 +30,7 @@ pub(crate) struct Options {
     /// Few and coarse settings: a minute instead of many.
     #[arg(long)]
     quick: bool,
-    /// Put the table of settings into the crate sim, where `check --accuracy` reads it, and that of the cheapest into the book.
+    /// Put the table of the cheapest settings into the book.
     #[arg(long)]
     store: bool,
 }
@@ -121,8 +122,8 @@ pub(crate) fn measure(groups: &[Group], quick: bool) -> Result<Vec<(Group, Vec<R
     groups.iter().map(|group| Ok((*group, pool.install(|| group.rows(quick))?))).collect()
 }
 
-/// Where `check --accuracy` reads what was measured, and where the book does.
-const STORED: [&str; 2] = ["crates/sim/src/plan/accuracy.csv", "docs/src/work-precision-table.md"];
+/// Where the book reads the cheapest settings.
+const STORED: &str = "docs/src/work-precision-table.md";
 
 /// Measures, prints and writes.
 ///
@@ -146,7 +147,6 @@ pub(crate) fn run(options: &Options) -> Outcome {
         files.add(&format!("{}.svg", group.name()), show::panels(rows).svg(&origin)?)?;
     }
     let all: Vec<(Group, &[Row])> = measured.iter().map(|(group, rows)| (*group, rows.as_slice())).collect();
-    let settings = show::settings(&all).to_csv(&origin)?;
     let cheapest = show::cheapest_markdown(&all, &machine);
     files.add("work_precision.csv", show::table(&all).to_csv(&origin)?)?;
     files.add("work_precision.svg", show::fronts(&all).svg(&origin)?)?;
@@ -154,10 +154,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
     files.commit()?;
     println!("{cheapest}\nwrote {}", folder.join("work_precision.csv").display());
     if options.store {
-        for (place, text) in STORED.into_iter().zip([settings, cheapest]) {
-            wakescope_sim::io::write_atomic(&root().join(place), text.as_bytes())?;
-            println!("stored {place}");
-        }
+        wakescope_sim::io::write_atomic(&root().join(STORED), cheapest.as_bytes())?;
+        println!("stored {STORED}");
     }
     Ok(())
 }

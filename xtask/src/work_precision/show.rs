@@ -1,8 +1,8 @@
 //! What was measured, as tables and pictures: all settings, the fronts of error and time, the cheapest for an error.
 
+use super::front::{Measured, cheapest, on_front};
 use super::{Group, Row};
 use wakescope_sim::io::Table;
-use wakescope_sim::plan::accuracy::{Measured, cheapest, on_front};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Relative errors for which the cheapest settings are sought.
@@ -48,20 +48,6 @@ pub(crate) fn table(groups: &Groups<'_>) -> Table {
         .float("peak_mem_bytes", float(|r| r.cost.peak_mem_bytes))
         .float("standard_error", float(|r| r.standard_error))
         .text("group", rows.iter().map(|r| r.0))
-}
-
-/// The settings that are keys of a scene: what `check --accuracy` chooses from.
-pub(super) fn settings(groups: &Groups<'_>) -> Table {
-    let rows: Vec<&Row> = groups.iter().flat_map(|(_, rows)| *rows).filter(|row| row.knob.contains('.')).collect();
-    let float = |get: fn(&Row) -> f64| rows.iter().map(|r| get(r)).collect::<Vec<_>>();
-    Table::new()
-        .text("key", rows.iter().map(|r| r.knob))
-        .float("value", float(|r| r.value))
-        .float("error", float(|r| r.error))
-        .float("standard_error", float(|r| r.standard_error))
-        .float("core_s", float(|r| r.cost.cpu_s))
-        .text("method", rows.iter().map(|r| r.method.clone()))
-        .text("metric", rows.iter().map(|r| r.metric))
 }
 
 /// Cases of a group in their order.

@@ -3,7 +3,6 @@
 //! Exit codes: 0 done, 2 wrong input or unusable output. Progress, plans and errors go to standard error,
 //! results to standard output; `--json` makes the result one JSON object, and so an error.
 
-mod accuracy;
 mod bound;
 mod budget;
 mod detect;
@@ -20,7 +19,6 @@ mod wake;
 use crate::io::Existing;
 use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
 use crate::measure::profile::model;
-use crate::plan::accuracy::proposals;
 use crate::plan::{Plan, Stage, Target};
 use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::{Error, measure::run, measure::write};
@@ -122,9 +120,6 @@ struct CheckWords {
     /// Accept a scene that needs more memory than the machine has.
     #[arg(long)]
     allow_large: bool,
-    /// Relative error, such as 3% or 0.03: name the cheapest settings that were measured to reach it, and what they cost.
-    #[arg(long, value_name = "ERROR", value_parser = accuracy::share)]
-    accuracy: Option<f64>,
     /// Draw the set-up, from above and from behind, to this file, such as set-up.svg or set-up.png.
     #[cfg(feature = "plots")]
     #[arg(long, value_name = "FILE")]
@@ -215,13 +210,7 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
         joined(ranges_m.iter().map(f64::to_string).collect()),
         joined(snr_db.iter().map(|db| format!("{db:.2}")).collect())
     );
-    let mut text = format!("{}: good\n{plan}  {short}\n", words.scene.display());
-    if let Some(target) = words.accuracy {
-        let found = proposals(&plan, target)?;
-        object["accuracy"] = accuracy::as_json(&found, target);
-        text = format!("{}\n{}", text.trim_end(), accuracy::as_text(&plan, &found, target));
-    }
-    say(cli.json, &object, &text)
+    say(cli.json, &object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
 }
 
 /// The plan of a scene, with all that can be known before the computing: limits, memory, a small rehearsal, the folder.

@@ -13,7 +13,6 @@ use crate::scene::{Flow, Method, Scene, SceneFile, Weighting};
 use std::fmt;
 use std::sync::Arc;
 
-pub mod accuracy;
 mod ambiguity;
 mod coverage;
 mod files;
