@@ -163,7 +163,7 @@ fn both_schemes_are_of_second_order_in_time() {
     let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     for implicit in [false, true] {
         for scheme in [TimeScheme::AdamsBashforth2, TimeScheme::RungeKutta3] {
-            let [coarse, middle, fine] = [20, 40, 80].map(|steps| velocity(scheme, steps, implicit));
+            let [coarse, middle, fine] = [40, 80, 160].map(|steps| velocity(scheme, steps, implicit));
             let order = (distance(&coarse, &middle) / distance(&middle, &fine)).log2();
             assert!(order > 1.9, "{scheme:?}, implicit {implicit}: order {order}");
         }

@@ -10,7 +10,7 @@ use wakescope_optics::{Focus, Grid, Layers, MonteCarlo, Stop, Telescope, VonKarm
 
 #[test]
 fn fast_walk_is_the_literal_loop_to_round_off() {
-    let telescope = Telescope { obscuration_radius_m: 0.01, focus: Focus::At(900.0), ..Telescope::table2() };
+    let telescope = Telescope { obscuration_radius_m: 0.01, focus: Focus::At(1200.0), ..Telescope::table2() };
     let grid = Grid { nx: 40, ny: 45, dx_m: 8e-3, dy_m: 7e-3 };
     // Strong turbulence: some radians of phase in each layer.
     let (cn2, seed, range_m) = (1e-12, 5, 700.0);
