@@ -325,7 +325,8 @@ mod tests {
         for chirp_hz_s in [0.0, 3e13, -1e14] {
             let [closed, found] = [Pulse::from(gaussian()), sampled.clone()]
                 .map(|p| p.with_chirp(chirp_hz_s).unwrap().spectral_full_width_half_maximum_hz());
-            assert_relative_eq!(found, closed, max_relative = 1e-4);
+            // What the samples leave out of the energy, 1e-4, has the widest frequencies.
+            assert_relative_eq!(found, closed, max_relative = 1e-3);
         }
         // A rectangle of T, whose tails make its standard deviation say nothing: |sinc|^2 is half at 0.4429/T.
         let (times, power) = ([-1.0005e-7, -0.9995e-7, 0.9995e-7, 1.0005e-7], [0.0, 1.0, 1.0, 0.0]);

@@ -1,7 +1,6 @@
 //! Control of the time step, and what is said of a flow that fails.
 
 use super::flow::Flow;
-use super::growth::{Stability, metrics};
 use super::mesh::Mesh;
 use super::settings::{FlowSettings, TimeStep, ViscousTreatment};
 use crate::Error;
@@ -26,6 +25,11 @@ const LARGEST_GROWTH: f64 = 1.1;
 pub(super) fn decay_per_s(metric_m: &[f64], viscosity_m2_s: f64) -> f64 {
     let least_m = metric_m.iter().copied().fold(f64::INFINITY, f64::min);
     LAPLACIAN_SYMBOL * viscosity_m2_s / least_m.powi(2)
+}
+
+/// Lengths of the cells along each direction \[m\].
+pub(super) fn metrics(mesh: &Mesh) -> [Vec<f64>; 3] {
+    mesh.directions().each_ref().map(|d| (0..d.cells).map(|i| d.at(i as f64 + 0.5).1).collect())
 }
 
 /// Along which of x, y, z viscosity is implicit in a flow whose largest `sum |u_i|/h_i` is `courant_per_s` at first.
@@ -79,12 +83,6 @@ impl Stiffness {
 }
 
 impl Flow {
-    /// The step at which `stability`, whose metric is that of the cells, has the Courant number of a step of `step_s`, whose metric is
-    /// that of the faces.
-    pub(super) fn judged_step_s(&self, stability: &Stability, step_s: f64) -> f64 {
-        self.state.courant_per_s * step_s / stability.courant_per_s()
-    }
-
     /// How stiff viscosity is along the implicit axes.
     pub(super) fn stiffness(&self) -> Stiffness {
         let rate = |axis: usize| if self.state.implicit[axis] { self.viscous_rate_per_s(axis) } else { 0.0 };

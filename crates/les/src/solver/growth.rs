@@ -16,10 +16,10 @@ use std::f64::consts::PI;
 use num_complex::Complex;
 use rayon::prelude::*;
 
-use super::control::{Stiffness, decay_per_s, implicit_axes};
+use super::control::{Stiffness, decay_per_s, implicit_axes, metrics};
 use super::flow::Flow;
 use super::mesh::{Mesh, Wall};
-use super::settings::{FlowSettings, TimeScheme, TimeStep};
+use super::settings::{FlowSettings, ROUND_OFF, TimeScheme, TimeStep};
 use crate::Error;
 
 /// Transport by a uniform stream per cell and Courant number, `sum_m c_m sin(m theta)`, of boxes without no-slip walls and of
@@ -31,8 +31,6 @@ const WAVES: usize = 90;
 const HALVINGS: usize = 40;
 /// No wave that matters decays beyond this Courant number.
 const MOST_COURANT: f64 = 4.0;
-/// Growth in a step that is round-off.
-pub(super) const ROUND_OFF: f64 = 1e-12;
 
 /// Waves of the mesh that grow because the time scheme gives them more than viscosity takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -170,11 +168,6 @@ impl Mesh {
     }
 }
 
-/// Lengths of the cells along each direction \[m\].
-pub(super) fn metrics(mesh: &Mesh) -> [Vec<f64>; 3] {
-    mesh.directions().each_ref().map(|d| (0..d.cells).map(|i| d.at(i as f64 + 0.5).1).collect())
-}
-
 /// Largest `sum |u_i|/h_i` \[1/s\] of all cells whose largest term is that of a direction, by their index along it, and of the
 /// smallest cells beside walls that move: the fluid may come to their speed.
 fn largest_rates(mesh: &Mesh, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> [Vec<f64>; 3] {
@@ -255,6 +248,12 @@ fn amplification(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
 }
 
 impl Flow {
+    /// The step at which `stability`, whose metric is that of the cells, has the Courant number of a step of `step_s`, whose metric is
+    /// that of the faces.
+    pub(super) fn judged_step_s(&self, stability: &Stability, step_s: f64) -> f64 {
+        self.state.courant_per_s * step_s / stability.courant_per_s()
+    }
+
     /// How its cells carry and damp the waves of the present field.
     pub fn stability(&self) -> Result<Stability, Error> {
         let shape = self.layout.shape;

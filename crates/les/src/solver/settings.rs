@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::growth::ROUND_OFF;
 use super::layout::Layout;
 use super::mesh::{AXIS_NAMES, Mesh};
 use super::pressure::PressureMethod;
@@ -10,6 +9,9 @@ use super::subgrid::{self, SubgridModel};
 use crate::Error;
 use crate::error::check;
 use crate::ranks::{Ranks, Single};
+
+/// Growth in a step that is round-off.
+pub(super) const ROUND_OFF: f64 = 1e-12;
 
 /// Time integration of convection and subgrid stresses; viscosity is Crank-Nicolson along implicit axes in both.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -8,8 +8,9 @@ use crate::io::Table;
 use crate::measure::estimators;
 use crate::measure::progress::Observer;
 use crate::measure::ray_information::RayInformation;
-use crate::measure::region::{of_table, places, region_radius};
+use crate::measure::region::{places, region_radius};
 use crate::measure::scan::Scanner;
+use crate::measure::table::of_table;
 use crate::plan::Plan;
 use crate::{Error, scene::NoiseKind};
 use wakescope_estimate::{

@@ -39,5 +39,6 @@ pub mod run;
 pub mod scan;
 pub(crate) mod scan_lines;
 pub mod streams;
+pub(crate) mod table;
 pub mod wind;
 pub mod write;

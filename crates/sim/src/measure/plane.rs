@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::io::{CrossPlanes, OPEN_EDGES};
-use crate::measure::profile::spaced;
+use crate::measure::table::spaced;
 use crate::plan::Plan;
 use ndarray::Array3;
 

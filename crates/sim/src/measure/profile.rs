@@ -11,7 +11,7 @@ use crate::measure::efficiencies::Known;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::{Instrument, receiver_path};
 use crate::measure::progress::Observer;
-use crate::measure::region::of_table;
+use crate::measure::table::{of_table, spaced};
 use crate::plan::{Plan, Stage};
 use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence, hash_of};
 use std::ops::ControlFlow;
@@ -195,7 +195,8 @@ pub(crate) fn stretches<'a>(scene: &Scene, g: &Geometry, mut range_m: &'a [f64])
         false => vec![[first_m, last_m]],
     };
     let mut out = Vec::new();
-    for [from_m, to_m] in all {
+    // The profile need not reach beyond the signals.
+    for [from_m, to_m] in all.into_iter().filter(|[from_m, to_m]| from_m <= to_m) {
         range_m = &range_m[range_m.partition_point(|r| *r < from_m)..];
         let (inside, beyond) = range_m.split_at(range_m.partition_point(|r| *r <= to_m));
         if !inside.is_empty() {
@@ -299,12 +300,6 @@ impl Screens {
         let realisations = (0..count).map(over_mean).collect();
         Ok(Self { range_m, over_theory, realisations, lost_power_fraction })
     }
-}
-
-/// `points` values from `low` to `high`, both included.
-pub(crate) fn spaced(low: f64, high: f64, points: usize) -> Vec<f64> {
-    let step = (high - low) / (points.max(2) - 1) as f64;
-    (0..points).map(|i| if i + 1 == points { high } else { low + i as f64 * step }).collect()
 }
 
 /// The curves of some scenes.
@@ -432,6 +427,21 @@ mod tests {
             let there = efficiency_at(&plan, &Efficiencies::default(), &[middle.range_m], &Silent).unwrap();
             assert!((middle.efficiency / there.mean[0] - 1.0).abs() < 1e-12);
             assert!((middle.snr_db - snr_db(&plan.scene.scene, &plan.instrument, &there).unwrap()[0]).abs() < 0.02);
+        }
+    }
+
+    #[test]
+    fn signals_have_their_efficiency_wherever_the_profile_begins_and_ends() {
+        for [first_m, last_m] in [[120.0, 660.0], [300.0, 400.0], [600.0, 660.0], [50.0, 60.0]] {
+            let more = format!(
+                "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-13\ngrid_points = 160\ngrid_spacing_m = 0.0022\n\
+                 layers = 5\nrealisations = 5\n[outputs]\nprofile_range_min_m = {first_m:?}\nprofile_range_max_m = {last_m:?}\n"
+            );
+            let plan = plan("focus_m = 300.0", [200.0, 540.0], &more, Target::Run);
+            let mut ranges_m: Vec<f64> = plan.geometry.layer_range_m().chain([first_m, last_m]).collect();
+            ranges_m.sort_by(f64::total_cmp);
+            let found: usize = stretches(&plan.scene.scene, &plan.geometry, &ranges_m).iter().map(|s| s.1.len()).sum();
+            assert_eq!(found, ranges_m.len(), "{first_m} {last_m}");
         }
     }
 

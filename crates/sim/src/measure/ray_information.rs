@@ -3,7 +3,7 @@
 //! Check: the stored bound of one window; estimates of whole regions, which no bound may pass.
 
 use crate::measure::estimators;
-use crate::measure::region::of_table;
+use crate::measure::table::of_table;
 use crate::plan::Plan;
 use crate::scene::NoiseKind;
 use crate::{Error, SPEED_OF_LIGHT_M_S};

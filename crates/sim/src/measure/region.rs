@@ -4,6 +4,7 @@
 
 use crate::measure::geometry::Geometry;
 use crate::measure::ray_information::RayInformation;
+use crate::measure::table::of_table;
 use crate::scene::{Method, RegionRadius, Scene};
 use crate::{Error, measure::estimators};
 use ndarray::Array2;
@@ -52,19 +53,6 @@ pub(crate) fn region_radius(scene: &Scene, of_rays: &RayInformation, geometry: &
             };
             Ok(Radius::for_standard_deviation(geometry, by_gates, *standard_deviation_m_s, *largest_m)?)
         }
-    }
-}
-
-/// Straight lines between the points of a table that is not empty; beyond its ends as at the ends.
-pub(crate) fn of_table(range_m: &[f64], values: &[f64], at_m: f64) -> f64 {
-    let above = range_m.partition_point(|r| *r <= at_m);
-    match (values.get(above.wrapping_sub(1)), values.get(above)) {
-        (Some(low), Some(high)) => {
-            let part = (at_m - range_m[above - 1]) / (range_m[above] - range_m[above - 1]);
-            low + part * (high - low)
-        }
-        (Some(end), None) | (None, Some(end)) => *end,
-        (None, None) => f64::NAN,
     }
 }
 

@@ -114,7 +114,8 @@ mod tests {
             let mut scene = Scene::default();
             (scene.estimator.radius_m, scene.estimator.radius) = (radius_m, radius);
             let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap();
-            let response = SceneResponse::new(&plan, vec![(280.0, 1.0), (520.0, 1.0)]).unwrap().unwrap();
+            let snr: Vec<(f64, f64)> = plan.geometry.layer_range_m().map(|range_m| (range_m, 1.0)).collect();
+            let response = SceneResponse::new(&plan, snr).unwrap().unwrap();
             let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0]);
             let lines: Vec<f64> = (0..20).map(|line| 0.1 + 2.5e-3 * f64::from(line)).collect();
             let shown = response.shown(&plan.scene.scene, 400.0).unwrap();

@@ -4,7 +4,8 @@
 
 use crate::Error;
 use crate::measure::geometry::Geometry;
-use crate::measure::region::{of_table, places};
+use crate::measure::region::places;
+use crate::measure::table::of_table;
 use crate::scene::{Method, RegionRadius, Scene};
 use wakescope_estimate::map::PolarPoint;
 

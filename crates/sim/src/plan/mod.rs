@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 mod ambiguity;
 mod coverage;
+mod fastest;
 mod files;
 mod fit;
 mod hardware;
@@ -93,7 +94,7 @@ impl Plan {
         let optics = optics::stages(&scene, &instrument, target, &geometry, &mut warnings)?;
         let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
         let mut plan = Self { scene, target, stages, instrument, geometry, wind, fastest_m_s: 0.0, warnings };
-        plan.fastest_m_s = crate::measure::air::fastest_m_s(&plan)?;
+        plan.fastest_m_s = fastest::fastest_m_s(&plan)?;
         plan.warnings.splice(0..0, plan.of_fast_air());
         if plan.runs(Stage::Estimates) {
             plan.warnings.extend(coverage::warning(&plan.scene.scene, &plan.geometry)?);

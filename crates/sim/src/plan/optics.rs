@@ -4,9 +4,8 @@ use super::stage::{Cost, PlannedStage, Stage, Target};
 use crate::Error;
 use crate::measure::geometry::Geometry;
 use crate::measure::instrument::Instrument;
-use crate::measure::profile::{
-    OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, spaced, stretches, turbulence,
-};
+use crate::measure::profile::{OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, stretches, turbulence};
+use crate::measure::table::spaced;
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
 use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
 use wakescope_optics::{Focus, Telescope, curved_ranges_m, theory};

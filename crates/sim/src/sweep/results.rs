@@ -202,7 +202,7 @@ fn radius_m(scene: &Scene, middle_m: f64) -> f64 {
     match &scene.estimator.radius {
         _ if scene.estimator.method == (Method::Periodogram {}) => 0.0,
         RegionRadius::Fixed {} => scene.estimator.radius_m,
-        RegionRadius::OfRange { range_m, radius_m } => crate::measure::region::of_table(range_m, radius_m, middle_m),
+        RegionRadius::OfRange { range_m, radius_m } => crate::measure::table::of_table(range_m, radius_m, middle_m),
         RegionRadius::Target { largest_m, .. } => *largest_m,
     }
 }

@@ -136,7 +136,7 @@ pub fn run<'s>(
             signals += 1;
             let wall_s = begun.elapsed().as_secs_f64() / found.len() as f64;
             for (row, case) in found.iter().zip(&cases) {
-                store(out, sweep, case.index, row, settings)?;
+                store(out, sweep, case.index, row, (settings.fits, settings.existing))?;
                 walls.push((case.index, wall_s));
                 done += 1;
                 told(&sweep.described(case), done, due.len());

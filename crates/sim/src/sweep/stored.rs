@@ -6,7 +6,6 @@
 use super::cases::Sweep;
 use super::key_path::Takes;
 use super::results::RESULTS;
-use super::run::Settings;
 use crate::Error;
 use crate::io::{Existing, FileGroup, Provenance, csv::float_text, write_atomic};
 use crate::measure::write::{put, scene_text};
@@ -199,7 +198,7 @@ pub(super) fn store(
     sweep: &Sweep,
     case: usize,
     results: &[f64],
-    settings: Settings,
+    (fits, existing): (bool, Existing),
 ) -> Result<(), Error> {
     let Some(of) = sweep.cases.get(case) else { return Ok(()) };
     let keys: Map<String, Value> = sweep.keys().map(str::to_owned).zip(of.values.iter().map(|v| json!(v))).collect();
@@ -212,14 +211,14 @@ pub(super) fn store(
         seed: of.scene.scene.seed,
     };
     let object = json!({
-        "source": crate::PROGRAM, "scene_hash": of.scene.hash, "case": case, "keys": keys, "circulation": settings.fits,
+        "source": crate::PROGRAM, "scene_hash": of.scene.hash, "case": case, "keys": keys, "circulation": fits,
         "results": results,
     });
     let path = folder_of(folder, case);
     let mut files = FileGroup::new(&path);
     files.add("scene.toml", scene_text(&scene))?;
     files.add(RESULT, format!("{object:#}\n"))?;
-    put(files, &path, settings.existing).map(drop)
+    put(files, &path, existing).map(drop)
 }
 
 /// The result of a case in a folder; none where there is none of this scene by this version of the program.
