@@ -462,7 +462,7 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
     for (words, parts) in [
         ("void.nc --scene s.toml", &["void.nc", "all of its samples are missing"][..]),
         ("still.nc --scene s.toml", &["still.nc", "all of its samples are 0"]),
-        ("more.npz --scene s.toml", &["more.npz", "54 records and 108 elevations"]),
+        ("more.npz --scene s.toml", &["more.npz", "elevation_rad has 108 values", "54 records"]),
         ("none.nc --scene s.toml", &["none.nc"][..]),
         ("cut.nc --scene s.toml", &["cut.nc", "more than the file holds"]),
         ("s.toml --scene s.toml", &["s.toml", "--format"]),

@@ -87,6 +87,7 @@ fn one_run_at_a_time_and_one_killed_before_its_first_checkpoint_begins_anew() {
     child.wait().unwrap();
     // The lock went with the process; a stage that was open when it died is swept.
     std::fs::create_dir_all(folder.join("o/.wakescope-stage-1-0/new")).unwrap();
+    std::fs::write(folder.join("o/.wakescope-stage-1-0/lock"), "").unwrap();
     let again = wakescope(folder, &words(&["--restart", "--end", "0.05"]));
     let message = String::from_utf8(again.stderr).unwrap();
     assert!(again.status.success() && message.contains("begins anew"), "{message}");
