@@ -20,7 +20,7 @@ use num_complex::Complex;
 use rustfft::Fft;
 
 use crate::bound::{GradientModel, Noise};
-use crate::error::{Error, finite, increasing, positive};
+use crate::error::{Error, finite, increasing, length, positive};
 use crate::estimators::gradient_tapers::{LagWeights, Tapers, band_lag, tapers};
 use crate::estimators::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
 use crate::estimators::{Estimator, GateVelocity, NoiseTest, Quality, Refinement, Statistic};
@@ -160,16 +160,16 @@ impl<S: Sample> GradientLikelihood<S> {
         NoiseTest::of_complex(&estimator.sampling, gates, tapers, None, padded)
     }
 
-    /// The mean statistic of noise of that `power` in the detector band: the `power` that the estimator finds in it is that
-    /// of the noise.
+    /// The mean statistic of windows whose samples have the autocovariance `lags`, of all lags of a window: that of a noise
+    /// ([`Noise::expected_correlogram`] without weighting) or of a signal. What the estimator finds in it is that of both in its spectra.
     ///
     /// # Errors
-    /// As [`Noise::expected_correlogram`].
-    pub fn noise_statistic(&self, noise: Noise, power: f64) -> Result<Vec<f64>, Error> {
+    /// [`Error::Length`] for another number of lags.
+    pub fn mean_statistic(&self, lags: &[f64]) -> Result<Vec<f64>, Error> {
         let n = self.statistic.window_samples;
-        let lags = noise.expected_correlogram(&self.estimator.sampling, S::KIND, power, &vec![1.0; n])?;
+        length("lags", S::KIND.lag_numbers(n), lags.len())?;
         let covariance = Array2::from_shape_fn((n, n), |(i, j)| {
-            let lag = S::KIND.lag(&lags, i.abs_diff(j));
+            let lag = S::KIND.lag(lags, i.abs_diff(j));
             if i >= j { lag } else { lag.conj() }
         });
         Ok(self.statistic.expected(&covariance, &self.statistic.lag_weights()))

@@ -207,7 +207,7 @@ fn tested(noise: Noise) -> Vec<Tested> {
             )],
         },
         Tested {
-            noise: joint.noise_statistic(noise, 1.0).unwrap(),
+            noise: joint.mean_statistic(&mean(&vec![1.0; SAMPLES])).unwrap(),
             statistic: Box::new(joint.statistic),
             estimators: vec![("gradient", Box::new(joint.estimator), joint_test)],
         },

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::measure::instrument::Instrument;
+use crate::measure::table::{of_table, spaced};
 use crate::scene::{
     CorrelogramForm, DetectorSignal, Estimator as Words, GradientLikelihood, Method, ModelOrder, NoiseKind,
     OrderChoice, PulseShape, Refinement, Scene, Weighting,
@@ -177,10 +178,59 @@ pub struct Toolkit<S> {
     pub following: Option<Box<dyn Estimator>>,
     /// The test against noise, if the scene has noise and the method one.
     pub test: Option<estimate::estimators::NoiseTest>,
-    /// What the estimator finds in the mean statistic of the scene's noise: its power and its density, A^2.
-    pub noise: Option<estimate::GateVelocity>,
+    /// What the estimator finds in the mean statistic of the scene's noise.
+    pub noise: Option<NoiseSeen>,
     /// Weights that the windows give the lags; empty where the statistic is no correlogram.
     lag_weights: Vec<f64>,
+}
+
+/// What an estimator finds in the mean statistic of the scene's noise, and of signals beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseSeen {
+    /// Power in the band, A^2.
+    pub power: f64,
+    /// Highest density in the band, A^2.
+    pub density: f64,
+    /// Share of the noise's power that is found in the band over that of a signal, for increasing velocities, m/s: the windows spread
+    /// noise over the edges of its band, and signals near them.
+    gain: (Vec<f64>, Vec<f64>),
+}
+
+impl NoiseSeen {
+    /// For an estimator that takes the mean statistic that `seen` makes of the autocovariance of samples.
+    fn new(
+        scene: &Scene,
+        instrument: &Instrument,
+        estimator: &dyn Estimator,
+        seen: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
+    ) -> Result<Option<Self>, Error> {
+        let (Some(noise), sampling, kind) = (noise_kind(scene), sampling(scene)?, signal_kind(scene)) else {
+            return Ok(None);
+        };
+        let n = scene.estimator.window_samples;
+        let found = |lags: Vec<f64>| Ok::<_, Error>(estimator.estimate(&seen(lags)?, &mut estimate::Scratch::new()));
+        let of_noise = found(noise.expected_correlogram(&sampling, kind, 1.0, &vec![1.0; n])?)?;
+        let pulse = pulse_correlation(scene, &instrument.pulse);
+        let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
+        let cells = n as f64 * scene.detector.bandwidth_hz / scene.detector.sampling_hz;
+        let velocity_m_s = spaced(low_m_s, high_m_s, (8.0 * cells).ceil().clamp(65.0, 257.0) as usize);
+        let gain = |velocity_m_s: &f64| {
+            let turn = std::f64::consts::TAU * sampling.frequency_hz(*velocity_m_s) * sampling.period_s();
+            let lag = |m: usize| Complex::from_polar(pulse.get(m).copied().unwrap_or(0.0), turn * m as f64);
+            let lags = (0..n).map(lag).flat_map(|lag| [lag.re, lag.im].into_iter().take(kind.lag_numbers(1)));
+            Ok(of_noise.power / found(lags.collect())?.power)
+        };
+        let gain = velocity_m_s.iter().map(gain).collect::<Result<Vec<f64>, Error>>()?;
+        let unit_a2 = instrument.receiver.noise_variance_a2();
+        let (power, density) = (of_noise.power * unit_a2, of_noise.detection * unit_a2);
+        Ok(Some(Self { power, density, gain: (velocity_m_s, gain) }))
+    }
+
+    /// Signal-to-noise ratio of a signal of that velocity over the excess of the power in the band over that of the noise; NaN without
+    /// a velocity.
+    pub fn gain(&self, velocity_m_s: f64) -> f64 {
+        if velocity_m_s.is_nan() { f64::NAN } else { of_table(&self.gain.0, &self.gain.1, velocity_m_s) }
+    }
 }
 
 impl<S: Sample> Toolkit<S> {
@@ -231,13 +281,17 @@ impl<S: Sample> Toolkit<S> {
             true => Some(of_correlogram(scene, SignalKind::Complex, lag_weights, known)?),
             false => None,
         };
-        let noise = match noise(scene, instrument) {
-            None => None,
-            Some((noise, power_a2)) => {
-                let mean = noise.expected_correlogram(&sampling(scene)?, S::KIND, power_a2, lag_weights)?;
-                Some(scaled_estimate(&*estimator, mean))
-            }
+        let per_lag = S::KIND.lag_numbers(1);
+        // Lines that are shifted have complex lags, whatever the samples.
+        let parts = if following.is_some() { 2 } else { per_lag };
+        let seen = |lags: Vec<f64>| {
+            let weighted = lags
+                .chunks(per_lag)
+                .zip(lag_weights)
+                .map(|(lag, weight)| [lag[0] * weight, lag.get(1).copied().unwrap_or(0.0) * weight]);
+            Ok(weighted.flat_map(|lag| lag.into_iter().take(parts)).collect())
         };
+        let noise = NoiseSeen::new(scene, instrument, following.as_deref().unwrap_or(&*estimator), seen)?;
         let test = noise_test(scene, tapers, lag_weights)?;
         Ok(Self { statistic, estimator, following, test, noise, lag_weights: lag_weights.to_vec() })
     }
@@ -267,9 +321,7 @@ impl ExpectedBias {
                 Toolkit::<Complex<f64>>::new(scene, instrument, known).map(|t| (t.estimator, t.lag_weights))?
             }
         };
-        let Some((noise, _)) =
-            noise(scene, instrument).filter(|_| !lag_weights.is_empty() && !scene.estimator.follow_wind)
-        else {
+        let Some(noise) = noise_kind(scene).filter(|_| !lag_weights.is_empty() && !scene.estimator.follow_wind) else {
             return Ok(None);
         };
         let noise = noise.expected_correlogram(&sampling, kind, 1.0, &lag_weights)?;
@@ -340,22 +392,13 @@ pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<
     Ok(Some(Response { correlogram, estimator }))
 }
 
-/// Spectrum and power in the band, A^2, of a scene's noise.
-fn noise(scene: &Scene, instrument: &Instrument) -> Option<(estimate::bound::Noise, f64)> {
-    let noise = match scene.detector.noise {
-        NoiseKind::White => estimate::bound::Noise::White,
-        NoiseKind::Band => estimate::bound::Noise::Band { floor: 0.0 },
-        NoiseKind::None => return None,
-    };
-    Some((noise, instrument.receiver.noise_variance_a2()))
-}
-
-/// What an estimator finds in a mean statistic, A^2, that is far from order one.
-fn scaled_estimate(estimator: &dyn Estimator, mut mean: Vec<f64>) -> estimate::GateVelocity {
-    let unit = mean.first().copied().filter(|power| *power > 0.0).unwrap_or(1.0);
-    mean.iter_mut().for_each(|number| *number /= unit);
-    let found = estimator.estimate(&mean, &mut estimate::Scratch::new());
-    estimate::GateVelocity { power: found.power * unit, detection: found.detection * unit, ..found }
+/// Spectrum of a scene's noise.
+fn noise_kind(scene: &Scene) -> Option<estimate::bound::Noise> {
+    match scene.detector.noise {
+        NoiseKind::White => Some(estimate::bound::Noise::White),
+        NoiseKind::Band => Some(estimate::bound::Noise::Band { floor: 0.0 }),
+        NoiseKind::None => None,
+    }
 }
 
 /// The test against noise of an estimator of correlograms; none without noise, and none of the spectrum of an unbiased
@@ -462,23 +505,15 @@ fn gradient_likelihood<S: Sample>(
     snr: f64,
 ) -> Result<Toolkit<S>, Error> {
     let e = &scene.estimator;
-    let noise = match scene.detector.noise {
-        NoiseKind::White => estimate::bound::Noise::White,
-        NoiseKind::Band | NoiseKind::None => estimate::bound::Noise::Band { floor: 0.0 },
-    };
+    let noise = noise_kind(scene).unwrap_or(estimate::bound::Noise::Band { floor: 0.0 });
     let sampling = sampling(scene)?;
     let model = estimate::bound::GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
     let half = (own.gradients / 2) as f64;
     let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
     let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
     let plan = estimate::estimators::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
-    let (test, noise) = match self::noise(scene, instrument) {
-        None => (None, None),
-        Some((noise, power_a2)) => {
-            let found = scaled_estimate(&plan.estimator, plan.noise_statistic(noise, power_a2)?);
-            (Some(plan.noise_test(&gates(scene)?)?), Some(found))
-        }
-    };
+    let noise = NoiseSeen::new(scene, instrument, &plan.estimator, |lags| Ok(plan.mean_statistic(&lags)?))?;
+    let test = if noise.is_some() { Some(plan.noise_test(&gates(scene)?)?) } else { None };
     let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
     Ok(Toolkit { statistic, estimator, following: None, test, noise, lag_weights: Vec::new() })
 }

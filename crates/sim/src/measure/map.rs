@@ -59,8 +59,9 @@ pub struct VelocityEstimates {
     pub count: Array2<f64>,
     /// Mean spectral width beyond that of the window, m/s; NaN where the estimator gives none.
     pub width_m_s: Array2<f64>,
-    /// Signal-to-noise ratio in the detector band, dB: the mean power of the spectra in the band over that which the noise
-    /// alone has there, less 1. Unbiased at any ratio; NaN where it is below twice its standard deviation, and without noise.
+    /// Signal-to-noise ratio in the detector band, dB: the excess of the mean power of the spectra in the band over that which the noise
+    /// alone has there, over that power, times the mean of what the windows keep of the noise over what they keep of a signal of the
+    /// estimated velocity. Unbiased at any ratio; NaN where the excess is below twice its standard deviation, and without noise.
     pub snr_db: Array2<f64>,
     /// Mean density of the peak over the mean density in the band; 1 for a flat spectrum.
     pub quality: Array2<f64>,
@@ -83,22 +84,22 @@ pub struct ScanErrors {
 struct Figures {
     flagged: Array2<f64>,
     count: Array2<f64>,
-    /// Sum and number of the finite values: width, power in the band, quality.
-    sums: [Array2<(f64, f64)>; 3],
+    /// Sum and number of the finite values: width, power in the band, its gain, quality.
+    sums: [Array2<(f64, f64)>; 4],
 }
 
 impl Figures {
     fn new(shape: (usize, usize)) -> Self {
         let sums = || Array2::from_elem(shape, (0.0, 0.0));
-        Self { flagged: Array2::zeros(shape), count: Array2::zeros(shape), sums: [sums(), sums(), sums()] }
+        Self { flagged: Array2::zeros(shape), count: Array2::zeros(shape), sums: [sums(), sums(), sums(), sums()] }
     }
 
-    fn add(&mut self, place: (usize, usize), point: &MapPoint, is_flagged: bool) {
+    fn add(&mut self, place: (usize, usize), point: &MapPoint, is_flagged: bool, gain: f64) {
         let e = &point.estimate;
         self.flagged[place] += f64::from(u8::from(is_flagged));
         self.count[place] += f64::from(u8::from(e.velocity_m_s.is_finite()));
         let power_a2 = if e.velocity_m_s.is_finite() { e.power } else { f64::NAN };
-        for (sums, value) in self.sums.iter_mut().zip([e.width_m_s, power_a2, e.quality]) {
+        for (sums, value) in self.sums.iter_mut().zip([e.width_m_s, power_a2, gain, e.quality]) {
             if value.is_finite() {
                 sums[place].0 += value;
                 sums[place].1 += 1.0;
@@ -106,7 +107,7 @@ impl Figures {
         }
     }
 
-    fn means(&self) -> [Array2<f64>; 3] {
+    fn means(&self) -> [Array2<f64>; 4] {
         self.sums.each_ref().map(|sums| sums.mapv(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }))
     }
 }
@@ -186,7 +187,7 @@ impl<S: Sample> Mapper<S> {
         for (index, point) in map.iter().enumerate() {
             let place = (index / columns, index % columns);
             flagged[place] = self.noise.flags(index, &point.estimate);
-            self.figures.add(place, point, flagged[place]);
+            self.figures.add(place, point, flagged[place], self.estimator.gain(point.estimate.velocity_m_s));
             // The level is the same for all realisations: a matter of geometry.
             (self.level[place], self.n_eff[place]) = (point.level as f64, point.n_eff);
         }
@@ -202,11 +203,12 @@ impl<S: Sample> Mapper<S> {
     pub(crate) fn finish(self, plan: &Plan) -> Result<VelocityEstimates, Error> {
         let statistics = self.errors.statistics();
         let bias_m_s = statistics.mapv(|s| s.bias_m_s);
-        let [width_m_s, power_a2, quality] = self.figures.means();
+        let [width_m_s, power_a2, gain, quality] = self.figures.means();
         let noise_a2 = self.estimator.noise_power_a2();
         let mut snr_db = power_a2;
         for (index, (place, power)) in snr_db.indexed_iter_mut().enumerate() {
-            *power = map_estimator::snr_db(*power / noise_a2, self.noise.deviation(index), self.figures.count[place]);
+            let (ratio, deviation) = (*power / noise_a2, self.noise.deviation(index));
+            *power = map_estimator::snr_db(ratio, gain[place], deviation, self.figures.count[place]);
         }
         let radius_m = plan.geometry.gate_range_m.iter().map(|range_m| self.estimator.radius_m(*range_m));
         Ok(VelocityEstimates {

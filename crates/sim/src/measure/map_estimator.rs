@@ -97,12 +97,18 @@ impl<S: Sample> MapEstimator<S> {
 
     /// Mean power, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
     pub(crate) fn noise_power_a2(&self) -> f64 {
-        self.tools.noise.map_or(f64::NAN, |noise| noise.power)
+        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.power)
+    }
+
+    /// Signal-to-noise ratio of a signal of that velocity over the excess of its power over that of the noise, both over
+    /// [`MapEstimator::noise_power_a2`].
+    pub(crate) fn gain(&self, velocity_m_s: f64) -> f64 {
+        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.gain(velocity_m_s))
     }
 
     /// Density, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
     pub(crate) fn noise_density_a2(&self) -> f64 {
-        self.tools.noise.map_or(f64::NAN, |noise| noise.detection)
+        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.density)
     }
 
     /// Velocities at points, the gates of a line together and lines by increasing elevation.
@@ -138,7 +144,7 @@ impl<S: Sample> MapEstimator<S> {
             |point: &PolarPoint| Ok(places.level(*point, self.radius.at_m(point.range_m)?, test.correlation()).1);
         let n_eff = points.iter().map(windows).collect::<Result<Vec<f64>, Error>>()?;
         let threshold = match self.rate > 0.0 {
-            true => Some(thresholds(test, noise, &n_eff, self.rate)?),
+            true => Some(thresholds(test, noise.density, &n_eff, self.rate)?),
             false => None,
         };
         Ok(NoiseAtPoints { threshold, deviation: n_eff.iter().map(|n_eff| test.band_deviation(*n_eff)).collect() })
@@ -173,15 +179,15 @@ impl NoiseAtPoints {
     }
 }
 
-/// Signal-to-noise ratio, dB, of a mean power over that of noise in `count` maps; NaN below twice its standard deviation, of one
-/// map `deviation`.
-pub(crate) fn snr_db(power_ratio: f64, deviation: f64, count: f64) -> f64 {
-    let snr = power_ratio - 1.0;
-    if snr > 2.0 * deviation / count.sqrt() { 10.0 * snr.log10() } else { f64::NAN }
+/// Signal-to-noise ratio, dB, of a mean power over that of noise in `count` maps, the excess times `gain`; NaN where the excess is below
+/// twice its standard deviation, of one map `deviation`.
+pub(crate) fn snr_db(power_ratio: f64, gain: f64, deviation: f64, count: f64) -> f64 {
+    let excess = power_ratio - 1.0;
+    if excess > 2.0 * deviation / count.sqrt() { 10.0 * (excess * gain).log10() } else { f64::NAN }
 }
 
 /// Densities, A^2, that noise exceeds with probability `rate`; NaN where there is no window.
-fn thresholds(test: &NoiseTest, noise: &GateVelocity, n_eff: &[f64], rate: f64) -> Result<Vec<f64>, Error> {
+fn thresholds(test: &NoiseTest, density_a2: f64, n_eff: &[f64], rate: f64) -> Result<Vec<f64>, Error> {
     // Many points share their number of windows; a thousandth of it changes nothing.
     let mut known = std::collections::HashMap::new();
     let mut of = |n_eff: f64| -> Result<f64, Error> {
@@ -192,7 +198,7 @@ fn thresholds(test: &NoiseTest, noise: &GateVelocity, n_eff: &[f64], rate: f64) 
         match known.entry(step as i64) {
             std::collections::hash_map::Entry::Occupied(level) => Ok(*level.get()),
             std::collections::hash_map::Entry::Vacant(place) => {
-                Ok(*place.insert(noise.detection * test.threshold((1e-3 * step).exp(), rate)?))
+                Ok(*place.insert(density_a2 * test.threshold((1e-3 * step).exp(), rate)?))
             }
         }
     };

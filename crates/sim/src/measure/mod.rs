@@ -7,6 +7,7 @@
 //! | [`geometry`], `scan_lines` | lines of sight, samples, gates, layers |
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
 //! | `efficiencies` | efficiency curves that several scans share |
+//! | `table` | tables of numbers and straight lines between them |
 //! | `air`, [`scan`] | air along the lines of sight, and their records |
 //! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
 //! | [`map`], `map_estimator`, [`cell_average`] | estimates and their errors against the truth |

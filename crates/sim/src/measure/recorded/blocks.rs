@@ -138,6 +138,7 @@ impl<'p, S: FromParts> Blocks<'p, S> {
                     } else {
                         f64::NAN
                     },
+                    gain: estimator.gain(e.velocity_m_s),
                     detection_ratio: noise.detection_ratio(at, e),
                     deviation: noise.deviation(at),
                     lines: places.chords(points[at], radius_m).count() as f64,

@@ -10,6 +10,8 @@ pub(super) struct Cell {
     pub(super) velocity_m_s: f64,
     /// Mean power in the band over that of the scene's noise.
     pub(super) power_ratio: f64,
+    /// Signal-to-noise ratio over the excess of that ratio over 1.
+    pub(super) gain: f64,
     /// Density of the peak over what the scene's noise exceeds with the rate of false alarms; NaN without a test.
     pub(super) detection_ratio: f64,
     /// Standard deviation of the power ratio of noise.
@@ -28,6 +30,7 @@ impl Cell {
     pub(super) const NONE: Self = Self {
         velocity_m_s: f64::NAN,
         power_ratio: f64::NAN,
+        gain: f64::NAN,
         detection_ratio: f64::NAN,
         deviation: f64::NAN,
         lines: 0.0,

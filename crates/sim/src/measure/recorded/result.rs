@@ -52,7 +52,7 @@ pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Resul
     let n_eff: Vec<f64> = cells.iter().map(|cell| cell.n_eff).filter(|n_eff| n_eff.is_finite()).collect();
     let n_eff = n_eff.iter().sum::<f64>() / n_eff.len().max(1) as f64;
     let predicted = PredictedError::new(plan, places, radius_m.iter().copied().fold(0.0, f64::max), n_eff)?;
-    let ratio = |cell: &Cell| snr_db(cell.power_ratio / factor, cell.deviation, 1.0);
+    let ratio = |cell: &Cell| snr_db(cell.power_ratio / factor, cell.gain, cell.deviation, 1.0);
     let is_flagged = |cell: &Cell| match cell.detection_ratio.is_nan() {
         true => !cell.is_good,
         false => !(cell.is_good && cell.detection_ratio > factor),
