@@ -58,7 +58,17 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
         let scale = residual_scale(&search, likely).max(1.0);
         let wind = Fits { problem: &search, options }.wind(&about)?;
         let (wind, ends_there) = (&wind, &found[..]);
-        let report = Report { map: few, options, problem: &search, scale, rejected, thinned, wind, ends: ends_there };
+        let report = Report {
+            map: few,
+            options,
+            problem: &search,
+            scale,
+            rejected,
+            thinned,
+            is_noise_left: true,
+            wind,
+            ends: ends_there,
+        };
         // where blocks show next to nothing, the best is enough to tell so
         let is_empty = report.result()?.statistic < NOTHING * options.threshold;
         let rivals = if is_empty { vec![likely.clone()] } else { rivals(&found, scale) };
@@ -94,7 +104,8 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
         }
     }
     let wind = Fits { problem: &problem, options }.wind(&about)?;
-    Report { map, options, problem: &problem, scale, rejected, thinned, wind: &wind, ends: &ends }.result()
+    Report { map, options, problem: &problem, scale, rejected, thinned, is_noise_left: true, wind: &wind, ends: &ends }
+        .result()
 }
 
 /// Rough, with all velocities of the map.

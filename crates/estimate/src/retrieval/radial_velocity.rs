@@ -87,7 +87,17 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
     }
     let wind = Fits { problem: &problem, options: &linear }.wind(&calm.wake)?;
     let (problem, ends) = (&problem, &ends[..]);
-    let report = Report { map, options: &linear, problem, scale: 1.0, rejected: 0, thinned: false, wind: &wind, ends };
+    let report = Report {
+        map,
+        options: &linear,
+        problem,
+        scale: 1.0,
+        rejected: 0,
+        thinned: false,
+        is_noise_left: false,
+        wind: &wind,
+        ends,
+    };
     let mut result = report.result()?;
     for vortex in &mut result.vortices {
         for place in [&mut vortex.lateral_position_m, &mut vortex.height_m] {

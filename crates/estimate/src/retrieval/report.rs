@@ -39,6 +39,8 @@ pub(crate) struct Report<'a> {
     pub(crate) scale: f64,
     pub(crate) rejected: usize,
     pub(crate) thinned: bool,
+    /// Whether the residuals are noise, whose correlation says how many velocities count as one; not those of misplaced cores.
+    pub(crate) is_noise_left: bool,
     pub(crate) wind: &'a End,
     pub(crate) ends: &'a [End],
 }
@@ -51,8 +53,8 @@ impl Report<'_> {
         };
         let likely = least(self.ends, cells);
         let alike = match likely {
-            Some(end) => self.uncertainty(end)?.alike(&end.wake, self.scale.powi(2)),
-            None => 1.0,
+            Some(end) if self.is_noise_left => self.uncertainty(end)?.alike(&end.wake, self.scale.powi(2)),
+            _ => 1.0,
         };
         let gain = |without: Option<&End>, with: &End| gain(without, with) / alike;
         let statistic = likely.map_or(0.0, |end| gain(Some(self.wind), end));
