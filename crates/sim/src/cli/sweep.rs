@@ -70,7 +70,7 @@ pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
     let Some(sweep) = sweep.as_ref().filter(|_| words.merge.is_empty()) else {
         let files = merge(&words.merge, sweep.as_ref(), &words.out, existing)?;
         let text = format!("wrote {} files to {}", files.len(), words.out.display());
-        return say(cli.json, &json!({ "version": crate::VERSION, "files": paths(files) }), &text);
+        return say(cli.json, &json!({ "version": crate::VERSION, "files": paths(&files) }), &text);
     };
     let settings = Settings {
         shard: words.shard,
