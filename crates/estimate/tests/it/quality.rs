@@ -207,7 +207,7 @@ fn tested(noise: Noise) -> Vec<Tested> {
             )],
         },
         Tested {
-            noise: joint.mean_statistic(&mean(&vec![1.0; SAMPLES])).unwrap(),
+            noise: joint.mean_statistic(&mean(&[1.0; 64])).unwrap(),
             statistic: Box::new(joint.statistic),
             estimators: vec![("gradient", Box::new(joint.estimator), joint_test)],
         },
