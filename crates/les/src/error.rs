@@ -137,14 +137,18 @@ pub enum Error {
     #[error("{0}")]
     EnergyGrew(Box<EnergyGrowth>),
     /// The time step feeds a flow with more energy than viscosity and subgrid model take.
-    #[error("step {step} (t = {time_s:?} s): {energy}")]
+    #[error("step {step} (t = {time_s:?} s): {cause}")]
     StepFeeds {
         /// Number of the step.
         step: u64,
         /// Time reached \[s\].
         time_s: f64,
-        /// What the last steps did.
-        energy: crate::solver::StepEnergy,
+        /// What the last steps fed over what viscosity and subgrid model took.
+        share: f64,
+        /// Courant number that suits.
+        suited_courant: f64,
+        /// What they did, and what to do.
+        cause: String,
     },
     /// The system refused to read or write a file.
     #[error("cannot {action} {}: {reason}", path.display())]

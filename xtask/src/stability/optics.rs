@@ -23,7 +23,7 @@ pub(super) fn cases() -> Vec<Extreme> {
         E::at_most("faintest turbulence", "Cn2 1e-18 m^(-2/3), 1500 m", "against free space, relative", 5e-3, faint),
         E::between("strongest turbulence", "Cn2 1e-11 over 1e-12 m^(-2/3), 1000 m, bistatic", "ratio of efficiencies, 10^-1.2 to 10^-1 and what diffraction adds", (0.063, 0.11), strong),
         E::refused("strong turbulence on the chapter's grid", "Cn2 1e-12, 3000 m, 512 points of 2 mm", "grid", || planned(1e-12, 3000.0, true)),
-        E::refused("strongest turbulence, derived grid", "Cn2 1e-11, 3000 m", "16384", || planned(1e-11, 3000.0, false)),
+        E::refused("strongest turbulence, derived grid", "Cn2 1e-9, 10000 m", "16384", || planned(1e-9, 10_000.0, false)),
         E::refused("negative turbulence", "Cn2 -1e-15", "cn2_m_m23", || Ok(Turbulence::table2(-1e-15).map(|_| 0.0)?)),
         E::refused("NaN turbulence", "Cn2 NaN", "cn2_m_m23", || Ok(Turbulence::table2(f64::NAN).map(|_| 0.0)?)),
         E::at_most("infinite outer scale", "L0 infinite, 1.024 m grid", "expected structure function, relative, worst", 1e-3, || structure(f64::INFINITY, 0.01)),

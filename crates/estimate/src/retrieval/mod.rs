@@ -31,7 +31,7 @@ mod expected_map;
 mod fit;
 mod hypotheses;
 mod integral;
-mod motion;
+pub(crate) mod motion;
 mod options;
 mod problem;
 mod radial_velocity;
@@ -46,7 +46,6 @@ pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelope
 pub use expected_map::expected_velocities;
 pub use fit::fit_scan;
 pub use integral::{ProfilePoint, circulation_profile};
-pub(crate) use motion::Motion;
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, Measured, ScanResult, Side, Top, VortexResult};

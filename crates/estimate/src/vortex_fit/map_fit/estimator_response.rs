@@ -21,7 +21,7 @@ use crate::error::{Error, length, not_negative, positive};
 use crate::estimators::Estimator;
 use crate::linalg::dot;
 use crate::parallel::map_indexed;
-use crate::retrieval::Motion;
+use crate::retrieval::motion::Motion;
 use crate::spectrum::{Correlogram, Taper};
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::wake_map::region;

@@ -10,7 +10,7 @@ use ndarray::{Array1, Array2, Zip};
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::retrieval::Motion;
+use crate::retrieval::motion::Motion;
 use crate::vortex_fit::damped_newton::{Averaging, halved, inverse, solve};
 use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;

@@ -332,7 +332,13 @@ impl Run {
     fn watch(&mut self, report: &StepReport, observer: &mut dyn RunObserver) -> Result<(), Error> {
         let Some(energy) = self.kept.window.close(&self.flow, report) else { return Ok(()) };
         if energy.share > 1.0 && energy.share.is_finite() {
-            return Err(Error::StepFeeds { step: report.step, time_s: report.time_s, energy });
+            return Err(Error::StepFeeds {
+                step: report.step,
+                time_s: report.time_s,
+                share: energy.share,
+                suited_courant: energy.suited_courant(),
+                cause: energy.to_string(),
+            });
         }
         if !self.has_warned.energy {
             self.has_warned.energy = true;
