@@ -43,7 +43,7 @@ fn vortices(quick: bool) -> Result<Vec<Row>, Failure> {
     let words = ["largest velocity error over the largest velocity", "exact solution"];
     for (name, scheme) in SCHEMES {
         for &cells in few(&[32, 64, 128, 192], quick) {
-            let steps = cells / 2;
+            let steps = 5 * cells / 8;
             let mut case = cases::taylor_green_plane(cells, [0.5, -0.4], VISCOSITY_M2_S, END_S / steps as f64)?;
             case.settings.scheme = scheme;
             let (error, cost) = fastest(|| vortex_error(&case, steps))?;
