@@ -17,6 +17,7 @@ mod periodogram;
 mod quality;
 mod retrieval;
 mod retrieval_methods;
+mod retrieval_of_hard_scans;
 mod rolling_moment;
 mod secondary_vortices;
 mod shown_maps;

@@ -224,7 +224,7 @@ fn alarms_in_turbulence(case: &Case) -> Share {
     let found = case.statistics(2000, Some(TURBULENCE), &[&whitened, &white]);
     for rate in [1e-1, 1e-2, 1e-3] {
         let (good, alarms) = holds(&found[0], &law, rate);
-        println!("{alarms} alarms at {rate}");
+        eprintln!("{alarms} alarms at {rate}");
         assert!(good, "{alarms} alarms at {rate}");
     }
     let threshold = white.calibrate(2000, stream(4)).unwrap().threshold(1e-2).unwrap();

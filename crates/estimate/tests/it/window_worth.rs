@@ -58,7 +58,7 @@ fn windows_are_worth_what_the_variance_of_their_mean_periodogram_says_in_noise_o
             (false, _) => 0.0,
         };
         let snr = 10f64.powf(0.1 * snr_db);
-        let covariance = WindowCovariance::new(&weights, 1, 200, &signal, noise).unwrap();
+        let covariance = WindowCovariance::new(&weights, 1, 200, signal, noise).unwrap();
         let foretold = (count * count) as f64 / covariance.correlation(snr).unwrap().pair_sum(count);
 
         let kind = if sampling.band_hz.0 < 0.0 { SignalKind::Complex } else { SignalKind::Real };

@@ -188,9 +188,9 @@ pub struct Toolkit<S> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseSeen {
     /// Power in the band, A^2.
-    pub power: f64,
+    pub power_a2: f64,
     /// Highest density in the band, A^2.
-    pub density: f64,
+    pub density_a2: f64,
     /// Share of the noise's power that is found in the band over that of a signal, for increasing velocities, m/s: the windows spread
     /// noise over the edges of its band, and signals near them.
     gain: (Vec<f64>, Vec<f64>),
@@ -222,8 +222,8 @@ impl NoiseSeen {
         };
         let gain = velocity_m_s.iter().map(gain).collect::<Result<Vec<f64>, Error>>()?;
         let unit_a2 = instrument.receiver.noise_variance_a2();
-        let (power, density) = (of_noise.power * unit_a2, of_noise.detection * unit_a2);
-        Ok(Some(Self { power, density, gain: (velocity_m_s, gain) }))
+        let (power_a2, density_a2) = (of_noise.power * unit_a2, of_noise.detection * unit_a2);
+        Ok(Some(Self { power_a2, density_a2, gain: (velocity_m_s, gain) }))
     }
 
     /// Signal-to-noise ratio of a signal of that velocity over the excess of the power in the band over that of the noise; NaN without

@@ -97,7 +97,7 @@ impl<S: Sample> MapEstimator<S> {
 
     /// Mean power, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
     pub(crate) fn noise_power_a2(&self) -> f64 {
-        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.power)
+        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.power_a2)
     }
 
     /// Signal-to-noise ratio of a signal of that velocity over the excess of its power over that of the noise, both over
@@ -108,7 +108,7 @@ impl<S: Sample> MapEstimator<S> {
 
     /// Density, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
     pub(crate) fn noise_density_a2(&self) -> f64 {
-        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.density)
+        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.density_a2)
     }
 
     /// Velocities at points, the gates of a line together and lines by increasing elevation.
@@ -144,7 +144,7 @@ impl<S: Sample> MapEstimator<S> {
             |point: &PolarPoint| Ok(places.level(*point, self.radius.at_m(point.range_m)?, test.correlation()).1);
         let n_eff = points.iter().map(windows).collect::<Result<Vec<f64>, Error>>()?;
         let threshold = match self.rate > 0.0 {
-            true => Some(thresholds(test, noise.density, &n_eff, self.rate)?),
+            true => Some(thresholds(test, noise.density_a2, &n_eff, self.rate)?),
             false => None,
         };
         Ok(NoiseAtPoints { threshold, deviation: n_eff.iter().map(|n_eff| test.band_deviation(*n_eff)).collect() })

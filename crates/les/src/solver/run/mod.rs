@@ -24,8 +24,8 @@ use super::subgrid::SubgridModel;
 use crate::Error;
 use crate::error::check;
 use energy::EnergyBound;
-pub use window::StepEnergy;
 use window::Window;
+pub use window::{EnergyBudget, StepEnergy};
 
 /// A step shorter than this share of the time of the run does not lead to its end.
 const SHORTEST_SHARE: f64 = 1e-10;
@@ -68,24 +68,6 @@ pub struct RunPlan {
     pub checkpoint: Option<CheckpointPlan>,
     /// The run pauses when the flow has made this many steps.
     pub pause_after_steps: Option<u64>,
-}
-
-/// What became of the kinetic energy in one step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EnergyBudget {
-    /// Number of the step.
-    pub step: u64,
-    /// Change of the energy over the length of the step \[m^5/s^3\].
-    pub rate_m5_s3: f64,
-    /// Viscous, subgrid and force power, mean of both ends of the step \[m^5/s^3\].
-    pub power_m5_s3: f64,
-}
-
-impl EnergyBudget {
-    /// What the powers do not explain: the error of the time step, and of the pressure solve \[m^5/s^3\].
-    pub fn residual_m5_s3(&self) -> f64 {
-        self.rate_m5_s3 - self.power_m5_s3
-    }
 }
 
 /// One step as the observer sees it.

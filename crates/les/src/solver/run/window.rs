@@ -6,7 +6,6 @@
 //!
 //! Check: a flow that Adams-Bashforth feeds, one that Runge-Kutta damps more than viscosity does, and flows that are left alone.
 
-use super::EnergyBudget;
 use super::energy::LOOSE;
 use crate::solver::flow::Flow;
 use crate::solver::mesh::Wall;
@@ -21,6 +20,24 @@ const NOTED: f64 = 0.1;
 const NEGLIGIBLE: f64 = 1e-5;
 /// The same where neither viscosity nor a model takes any.
 const UNDAMPED_NEGLIGIBLE: f64 = 1e-3;
+
+/// What became of the kinetic energy in one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EnergyBudget {
+    /// Number of the step.
+    pub step: u64,
+    /// Change of the energy over the length of the step \[m^5/s^3\].
+    pub rate_m5_s3: f64,
+    /// Viscous, subgrid and force power, mean of both ends of the step \[m^5/s^3\].
+    pub power_m5_s3: f64,
+}
+
+impl EnergyBudget {
+    /// What the powers do not explain: the error of the time step, and of the pressure solve \[m^5/s^3\].
+    pub fn residual_m5_s3(&self) -> f64 {
+        self.rate_m5_s3 - self.power_m5_s3
+    }
+}
 
 /// What the time step itself did to the energy.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,0 +1,130 @@
+//! Hard scans: gates that are long against the spacing, velocities that share windows, scans without noise or of another unit.
+
+use super::retrieval::*;
+use crate::fixtures::normal;
+use ndarray::Array2;
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use wakescope_estimate::retrieval::*;
+use wakescope_estimate::vortex_fit::*;
+
+/// Gates so long that circulation and spacing are known by their product alone, and a little shorter than the fit takes them for.
+#[test]
+fn long_gates_hide_circulations_but_no_wakes() {
+    let options = |std_m: f64| RetrievalOptions { gate: Gate::Gaussian { std_m }, ..Default::default() };
+    let wake = Wake::from_array(&[420.0, 420.0, 376.5, 31.0, 423.5, 31.0, 4.5, 4.5, 0.0, 0.0]);
+    let (lines, gates) = ((0.01, 0.0033, 75), (280.0, 13.0, 20));
+    for seed in 1..4 {
+        let found = fit_scan(&noisy(&wake, &options(33.0), lines, gates, seed), &options(37.0)).unwrap();
+        // the gate is taken for too long: what that leaves is alike in neighbours, and counted as such
+        assert!(found.statistic > 100.0 && found.vortices.len() == 2, "{seed}: {} {:?}", found.statistic, found.flags);
+        for vortex in &found.vortices {
+            let Measured { value, std } = vortex.circulation_m2_s;
+            assert!(value < 3.0 * std, "{seed}: it is certain: {value} {std}");
+            assert!((vortex.height_m.value - 31.0).abs() < 4.0 * vortex.height_m.std, "{seed}: {:?}", vortex.height_m);
+        }
+    }
+}
+
+/// Whether the vortices move is told by the scan where it can be, and else by how long it lasts.
+#[test]
+fn standing_vortices_are_taken_for_such_and_moving_ones_in_scans_of_seconds() {
+    for (name, lasts_s, moves) in [("a", 0.7, false), ("a", 4.0, false), ("c", 2.5, true), ("c", 0.7, false)] {
+        let mut case = thinned(case(name));
+        case.options.movement = Movement::Auto;
+        let count = case.map.time_s.len();
+        case.map.time_s = (0..count).map(|i| lasts_s * (i as f64 / (count - 1) as f64 - 0.5)).collect();
+        case.exact = expected_velocities(&case.map, &case.options, &case.truth, moves).unwrap();
+        for seed in 0..3 {
+            let velocity_m_s = white(&case, &mut Xoshiro256PlusPlus::seed_from_u64(7000 + seed));
+            let found = fit_scan(&ScanMap { velocity_m_s, ..case.map.clone() }, &case.options).unwrap();
+            assert_eq!(found.has(Flag::MotionIgnored), !moves, "{name} {lasts_s} {seed}: {:?}", found.flags);
+        }
+    }
+}
+
+/// Moving means over blocks: what overlapping regions and windows make of independent noise.
+fn overlapping(noise: &Array2<f64>, (lines, gates): (usize, usize)) -> Array2<f64> {
+    let (all_lines, all_gates) = noise.dim();
+    Array2::from_shape_fn((all_lines - lines, all_gates - gates), |(line, gate)| {
+        let block = noise.slice(ndarray::s![line..line + lines, gate..gate + gates]);
+        block.sum() / ((lines * gates) as f64).sqrt()
+    })
+}
+
+#[test]
+fn velocities_that_share_windows_with_their_neighbours_are_not_counted_as_independent() {
+    let (shared, mut largest) = ((5, 9), 0.0_f64);
+    let wake = Wake::from_array(&[150.0, 150.0, 376.5, 47.0, 423.5, 47.0, 2.5, 2.5, 2.0, 0.0]);
+    let calm = Wake::from_array(&[0.0, 0.0, 376.5, 47.0, 423.5, 47.0, 2.5, 2.5, 2.0, 0.0]);
+    let options = RetrievalOptions { gate: Gate::Gaussian { std_m: 10.0 }, ..Default::default() };
+    for seed in 0..6 {
+        let map = |wake: &Wake, std_m_s: f64| {
+            let mut map = noisy(wake, &options, (0.02, 2.5e-3, 60), (310.0, 4.0, 45), 1);
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(900 + seed);
+            let noise = Array2::from_shape_fn((60 + shared.0, 45 + shared.1), |_| normal(&mut rng));
+            let exact = expected_velocities(&map, &options, wake, false).unwrap();
+            map.velocity_m_s = exact + overlapping(&noise, shared) * std_m_s;
+            map.sigma_m_s = (seed % 2 == 0).then(|| Array2::from_elem((60, 45), std_m_s));
+            map
+        };
+        let begin = std::time::Instant::now();
+        let empty = fit_scan(&map(&calm, 0.5), &options).unwrap();
+        println!("{seed}: {:.1} {:?} {:.2} s", empty.statistic, empty.flags, begin.elapsed().as_secs_f64());
+        assert!(empty.vortices.is_empty(), "{seed}: {:?}", empty.vortices);
+        largest = largest.max(empty.statistic);
+        if seed < 2 {
+            let begin = std::time::Instant::now();
+            let found = fit_scan(&map(&wake, 0.3), &options).unwrap();
+            println!("{:.1} {:?} {:.2} s", found.statistic, found.flags, begin.elapsed().as_secs_f64());
+            assert_eq!(found.vortices.len(), 2, "{seed}: {} {:?}", found.statistic, found.flags);
+        }
+    }
+    // as independent ones they would reach hundreds
+    assert!(largest < 30.0, "{largest}");
+}
+
+#[test]
+fn scans_without_noise_and_scans_of_another_unit_have_an_answer() {
+    let wake = Wake::from_array(&[400.0, 350.0, 376.5, 60.0, 423.5, 55.0, 2.5, 2.5, 2.0, 0.01]);
+    let options = RetrievalOptions::default();
+    for unit in [1.0, 1e-6, 1e3] {
+        let mut map = noisy(&wake, &options, (0.06, 4e-3, 40), (330.0, 5.0, 30), 1);
+        map.velocity_m_s = expected_velocities(&map, &options, &wake, false).unwrap() * unit;
+        map.sigma_m_s = None;
+        let found = fit_scan(&map, &options).unwrap();
+        println!("{unit}: {:?} {:?}", found.flags, found.wake);
+        let left = found.vortex(Side::Left).unwrap();
+        let off = left.circulation_m2_s.value / unit - 400.0;
+        assert!(
+            off.abs() < 0.1 || found.has(Flag::NotConverged) || found.has(Flag::PoorFit),
+            "{left:?} {:?}",
+            found.flags
+        );
+    }
+}
+
+/// Scans of the size that instruments write, empty and not, with the time of each.
+#[test]
+#[ignore = "a minute: how long fits take"]
+fn times_of_fits() {
+    for (lines, gates) in [(72, 110), (110, 72), (185, 80), (1000, 400)] {
+        for (kind, circulation_m2_s) in [("empty", 0.0), ("weak", 60.0), ("strong", 400.0)] {
+            for std_m in [0.0, 15.0] {
+                let c = circulation_m2_s;
+                let wake = Wake::from_array(&[c, c, 376.5, 47.0, 423.5, 47.0, 2.5, 2.5, 2.0, 0.01]);
+                let options = RetrievalOptions { gate: Gate::Gaussian { std_m }, ..Default::default() };
+                let (line_rad, gate_m) = (0.2 / f64::from(lines), 220.0 / f64::from(gates));
+                let map = noisy(&wake, &options, (0.01, line_rad, lines), (300.0, gate_m, gates), 3);
+                let begin = std::time::Instant::now();
+                let found = fit_scan(&map, &options).unwrap();
+                let wall_s = begin.elapsed().as_secs_f64();
+                let fitted = found.vortices.iter().map(|v| v.circulation_m2_s).collect::<Vec<_>>();
+                println!(
+                    "{lines} x {gates} {kind} {std_m}: {wall_s:.2} s, {:.1} {:?} {fitted:?}",
+                    found.statistic, found.flags
+                );
+            }
+        }
+    }
+}
