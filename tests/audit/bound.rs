@@ -128,8 +128,7 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
         if ratio.is_nan() {
             continue;
         }
-        // The autocorrelation of a chirped pulse is by quadrature, which a high ratio sees.
-        let tolerance = if pulse.chirp_hz_s == 0.0 { 1e-4 } else { 5e-3 };
+        let tolerance = 1e-4;
         if f("snr_db") <= 30.0 {
             let right = 1.0 / record_information(s, &pulse, n, ratio).sqrt();
             ledger.equal("bound: bound_window_m_s", f("bound_window_m_s"), right, tolerance * right);

@@ -5,6 +5,7 @@
 //! Check: the reference maps; scatter, bias and stated deviations over many maps.
 
 use crate::error::Error;
+use crate::retrieval::alternatives::with_alternatives;
 use crate::retrieval::expected::Expected;
 use crate::retrieval::hypotheses::{End, Fits, least, rivals, starts};
 use crate::retrieval::problem::{Cell, Problem};
@@ -104,8 +105,8 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
         }
     }
     let wind = Fits { problem: &problem, options }.wind(&about)?;
-    Report { map, options, problem: &problem, scale, rejected, thinned, is_noise_left: true, wind: &wind, ends: &ends }
-        .result()
+    let (problem, wind, ends) = (&problem, &wind, &ends[..]);
+    with_alternatives(&Report { map, options, problem, scale, rejected, thinned, is_noise_left: true, wind, ends })
 }
 
 /// Rough, with all velocities of the map.

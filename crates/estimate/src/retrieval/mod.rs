@@ -24,6 +24,7 @@
 //! # Ok::<(), wakescope_estimate::Error>(())
 //! ```
 
+mod alternatives;
 mod correlated_residuals;
 mod envelope;
 mod expected;

@@ -65,6 +65,8 @@ pub enum Movement {
 pub struct RetrievalOptions {
     /// Profile, images, place of the lidar.
     pub model: WakeModel,
+    /// Whether the cores may as well have the other profile: what its fit finds, by its likelihood, is part of the deviations.
+    pub other_profile: bool,
     /// What a velocity is of the air about its range.
     pub gate: Gate,
     /// What may change.
@@ -114,10 +116,11 @@ impl RetrievalOptions {
 }
 
 impl Default for RetrievalOptions {
-    /// Points, all ten parameters, the loss of Cauchy, the sandwich, moving vortices if that fits.
+    /// Algebraic cores that may as well be others, points, all ten parameters, the loss of Cauchy, the sandwich, moving vortices if that fits.
     fn default() -> Self {
         Self {
             model: WakeModel::default(),
+            other_profile: true,
             gate: Gate::Point,
             free: FreeParameters { wind: WindFit::Linear, ..FreeParameters::default() },
             core_radius_m: None,

@@ -21,6 +21,7 @@ pub(crate) struct Cell {
     pub(crate) sigma_m_s: f64,
 }
 
+#[derive(Clone)]
 pub(crate) struct Problem<'a> {
     pub(crate) expected: &'a Expected<'a>,
     /// Line by line.

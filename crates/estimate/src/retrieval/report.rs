@@ -20,7 +20,7 @@ const LEAST_SIGMAS: f64 = 3.0;
 /// So many times the root of the threshold is far beyond doubt in correlated noise too.
 const BY_FAR: f64 = 2.0;
 /// A top so much above the least chi-square competes with it.
-const COMPETES: f64 = 9.0;
+pub(crate) const COMPETES: f64 = 9.0;
 /// A side of a vortex is seen if the sector reaches so far beyond its centre \[m\], where circulation begins to be counted.
 const SEEN_M: f64 = 5.0;
 /// Chi-square per degree after robust scaling that is too much, and part of outliers that is.
@@ -45,8 +45,22 @@ pub(crate) struct Report<'a> {
     pub(crate) ends: &'a [End],
 }
 
-impl Report<'_> {
+/// The end that a report is of, its covariance, the statistic of the scan, and how many velocities count as one.
+pub(crate) struct Chosen<'a> {
+    pub(crate) end: &'a End,
+    pub(crate) covariance: Array2<f64>,
+    pub(crate) statistic: f64,
+    pub(crate) alike: f64,
+}
+
+impl<'a> Report<'a> {
     pub(crate) fn result(&self) -> Result<ScanResult, Error> {
+        let Chosen { end, covariance, statistic, .. } = self.chosen()?;
+        Ok(self.told(end, covariance, statistic))
+    }
+
+    /// The likely end if it is a wake, a lone vortex instead of a pair of which one is not seen, or the wind.
+    pub(crate) fn chosen(&self) -> Result<Chosen<'a>, Error> {
         let cells = self.problem.cells.len();
         let gain = |without: Option<&End>, with: &End| {
             without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2)
@@ -59,9 +73,7 @@ impl Report<'_> {
         let gain = |without: Option<&End>, with: &End| gain(without, with) / alike;
         let statistic = likely.map_or(0.0, |end| gain(Some(self.wind), end));
         let (left, right) = (best(self.ends, Kind::Left), best(self.ends, Kind::Right));
-        // the likely one, then a lone vortex instead of a pair of which one is not seen
         let lone = [left, right].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
-        let mut chosen = None;
         for end in likely.into_iter().chain(lone.filter(|_| likely.is_some_and(|end| end.kind == Kind::Both))) {
             let seen = match end.kind {
                 Kind::Both => gain(left, end).min(gain(right, end)),
@@ -75,15 +87,22 @@ impl Report<'_> {
             let threshold = self.options.threshold;
             let certain = circulations.map(|place| uncertainty.certain(&end.wake, place, threshold));
             if certain.collect::<Result<Vec<bool>, _>>()?.into_iter().all(|certain| certain) {
-                chosen = Some((end, uncertainty));
-                break;
+                return Ok(Chosen { end, covariance: uncertainty.covariance(|_| true)?, statistic, alike });
             }
         }
-        let (end, uncertainty) = match chosen {
-            Some(chosen) => chosen,
-            None => (self.wind, self.uncertainty(self.wind)?),
-        };
-        Ok(self.told(end, uncertainty.covariance(|_| true)?, statistic))
+        Ok(Chosen { end: self.wind, covariance: self.covariance(self.wind)?, statistic, alike })
+    }
+
+    /// Covariance \[10, 10\] of an end.
+    pub(crate) fn covariance(&self, end: &End) -> Result<Array2<f64>, Error> {
+        self.uncertainty(end)?.covariance(|_| true)
+    }
+
+    /// The vortices of an end with that covariance, each at its line.
+    pub(crate) fn vortices(&self, end: &End, covariance: &Array2<f64>) -> Vec<VortexResult> {
+        let (model, moves) = (self.problem.expected.model, self.problem.expected.moves());
+        let vortex = |side| VortexResult::at_its_line(self.map, model, (&end.wake, covariance), side, moves);
+        self.sides(end).into_iter().map(vortex).collect()
     }
 
     fn sides(&self, end: &End) -> Vec<Side> {
@@ -127,16 +146,13 @@ impl Report<'_> {
         Ok(Uncertainty { groups: &end.groups, curvature, scores, from_residuals })
     }
 
-    fn told(&self, end: &End, covariance: Array2<f64>, statistic: f64) -> ScanResult {
+    pub(crate) fn told(&self, end: &End, covariance: Array2<f64>, statistic: f64) -> ScanResult {
         let residuals = self.problem.rows(&end.wake, &[]).residuals;
         let used = residuals.iter().filter(|r| r.abs() <= OUTLIER * self.scale);
         let (count, squares) = used.fold((0, 0.0), |(count, sum), r| (count + 1, sum + r * r));
         let cells_rejected = self.rejected + residuals.len() - count;
         let moves = self.problem.expected.moves();
-        let vortex = |side: Side| {
-            VortexResult::at_its_line(self.map, &self.options.model, (&end.wake, &covariance), side, moves)
-        };
-        let mut vortices: Vec<VortexResult> = self.sides(end).into_iter().map(vortex).collect();
+        let mut vortices = self.vortices(end, &covariance);
         // what is beyond the sector is hardly known, though it acts
         if vortices.iter().any(|vortex| self.margin_m(vortex) >= 0.0) {
             vortices.retain(|vortex| self.margin_m(vortex) >= 0.0);

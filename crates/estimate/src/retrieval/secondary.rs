@@ -21,7 +21,8 @@ pub fn with_secondary_vortices(
     found: &ScanResult,
 ) -> Result<Option<(ScanResult, RetrievalOptions)>, Error> {
     let is_pair = found.vortices.len() == 2;
-    let Some(pair) = found.wake.filter(|_| is_pair && options.turbulence.is_none()) else {
+    // the least chi-square, where other spacings share in what is told
+    let Some(pair) = found.tops.first().map(|top| top.wake).filter(|_| is_pair && options.turbulence.is_none()) else {
         return Ok(None);
     };
     let moves = map.has_times() && !found.has(Flag::MotionIgnored);
@@ -46,7 +47,8 @@ pub fn with_secondary_vortices(
         groups: &options.free.groups(),
     };
     let Some(four) = setting.find(&pair) else { return Ok(None) };
-    let mut options = options.clone();
+    // what another profile would do was free in the search
+    let mut options = RetrievalOptions { other_profile: false, ..options.clone() };
     options.model.secondary = Some(four.secondary);
     options.start = Some(four.wake);
     let mut result = fit_scan(map, &options)?;

@@ -10,7 +10,7 @@ use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, Recorde
 use crate::measure::write;
 use crate::plan::{Plan, Stage};
 use crate::retrieve::{self, Method, OwnScene, RetrievedScan, StatedEstimator, Velocities, gate_of};
-use crate::scene::{SceneFile, VortexProfile};
+use crate::scene::{Flow, SceneFile, VortexProfile};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -150,11 +150,10 @@ impl RetrieveWords {
         let of_scene = scene.map(|file| &file.scene);
         let profile = match (self.profile, of_scene.map(|scene| &scene.flow)) {
             (Some(Profile::LambOseen), _) => CoreProfile::LambOseen,
-            (None, Some(crate::scene::Flow::VortexPair(pair))) if pair.profile == VortexProfile::LambOseen => {
-                CoreProfile::LambOseen
-            }
+            (None, Some(Flow::VortexPair(pair))) if pair.profile == VortexProfile::LambOseen => CoreProfile::LambOseen,
             _ => CoreProfile::Algebraic,
         };
+        let of_pair = of_scene.is_some_and(|scene| matches!(scene.flow, Flow::VortexPair(_)));
         let height_m = self.lidar_height.or(of_scene.map(|scene| scene.scan.lidar_height_m));
         // Long gates do not show cores: without what is known of them they run away with the circulation.
         let is_long = match &gate {
@@ -164,6 +163,7 @@ impl RetrieveWords {
         };
         let mut options = RetrievalOptions {
             core_prior: is_long.then_some(CorePrior::TYPICAL),
+            other_profile: self.profile.is_none() && !of_pair,
             model: WakeModel {
                 profile,
                 images: self.ground == YesNo::Yes,

@@ -48,7 +48,7 @@ pub fn retrieve_map(
     };
     let shown = match own {
         Some(own) => {
-            let mut rough = RetrievalOptions { core_radius_m: None, ..options.clone() };
+            let mut rough = RetrievalOptions { core_radius_m: None, other_profile: false, ..options.clone() };
             rough.free.core_radius = Sharing::Fixed;
             let found = fit_scan(&scan.map, &rough).map_err(refuse)?;
             own.refined(&scan.map, &options, &found)

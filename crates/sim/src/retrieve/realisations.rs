@@ -115,6 +115,7 @@ fn options(scene: &Scene, wanted: &Retrieval) -> Result<RetrievalOptions, Error>
         gate: gate_of(None, None, Some(scene))?.0,
         core_radius_m: wanted.core_radius_m,
         core_prior: Some(CorePrior::TYPICAL),
+        other_profile: !matches!(scene.flow, Flow::VortexPair(_)),
         ..RetrievalOptions::default()
     };
     if wanted.core_radius_m.is_some() {

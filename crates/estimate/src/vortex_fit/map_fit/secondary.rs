@@ -19,7 +19,7 @@ use crate::vortex_fit::map_fit::tangent::{self, Tangent};
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
-use crate::vortex_fit::{CorePrior, CoreProfile, MapFitOptions, RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
+use crate::vortex_fit::{CorePrior, MapFitOptions, RangeKernel, VelocityMap, Vortex, Wake, WakeModel};
 
 /// Circulation over that of the vortex, and distance over its height: mean and standard deviation. The strongest secondary vortex of the
 /// medium wake (the mean along x, `wake_scaled.csv`) has -0.2 to -0.3 and 1.1 to 0.5 between tau = 1.25 and 2.5, without the weaker
@@ -144,10 +144,7 @@ impl Setting<'_, '_> {
         let mut alone = self.about(&two, &self.quotients(&two)[..self.groups.len()]);
         let counted = alike(&self.cells(&alone), self.options.correlated_lines);
         // A profile that does not fit is not mended by vortices.
-        let profile = match self.model.profile {
-            CoreProfile::Algebraic => CoreProfile::LambOseen,
-            CoreProfile::LambOseen => CoreProfile::Algebraic,
-        };
+        let profile = self.model.profile.other();
         let other = self.velocities_of(&WakeModel { profile, ..*self.model }, pair);
         let apart = other - &alone.here;
         alone.slopes.push(apart);

@@ -148,6 +148,14 @@ pub enum CoreProfile {
 }
 
 impl CoreProfile {
+    /// The one that it is not.
+    pub(crate) fn other(self) -> Self {
+        match self {
+            Self::Algebraic => Self::LambOseen,
+            Self::LambOseen => Self::Algebraic,
+        }
+    }
+
     /// Omega, its derivative with respect to r^2 and to the core radius, for unit circulation.
     pub(crate) fn angular(self, r2: f64, core_m: f64) -> (f64, f64, f64) {
         let core2 = core_m * core_m;

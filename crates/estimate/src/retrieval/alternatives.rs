@@ -1,0 +1,169 @@
+//! What else a scan allows beside its best fit, as part of the deviations: other spacings where gates are as long as the pair is wide, and
+//! the other profile of the cores where none is stated.
+//!
+//! Each alternative is a fit of its own, weighed by its likelihood. Long gates show circulation times spacing, so that the least chi-square
+//! lies anywhere along a ridge and its curvature says nothing of the ridge's length; there the wake that is told has the mean spacing of all.
+//! Check: deviations against the scatter over scans with gates longer than half the spacing, and over Lamb-Oseen wakes.
+
+use ndarray::Array2;
+
+use crate::error::Error;
+use crate::retrieval::expected::Expected;
+use crate::retrieval::hypotheses::{End, Fits, Kind};
+use crate::retrieval::report::{COMPETES, Chosen, Report};
+use crate::retrieval::{Flag, Measured, ScanResult, VortexResult};
+use crate::vortex_fit::{Parameter, Vortex, Wake};
+
+/// Spacings of the pairs behind aircraft in service \[m\]: pi/4 of spans of 20 to 80 m, one as likely as another in its logarithm.
+const SPACINGS_M: (f64, f64) = (16.0, 63.0);
+const SPACINGS: usize = 12;
+/// Other spacings are tried where the deviation of the gate is more than this part of the spacing, or of the typical one \[m\].
+const LONG: f64 = 0.4;
+const TYPICAL_M: f64 = 45.0;
+/// Spacings are others if their logarithms differ by more.
+const APART: f64 = 0.1;
+
+struct Alternative {
+    end: End,
+    covariance: Array2<f64>,
+    vortices: Vec<VortexResult>,
+    /// Its likelihood, at first to that of the best one.
+    weight: f64,
+}
+
+impl Alternative {
+    fn new(report: &Report<'_>, end: End) -> Result<Self, Error> {
+        let covariance = report.covariance(&end)?;
+        let vortices = report.vortices(&end, &covariance);
+        Ok(Self { end, covariance, vortices, weight: 1.0 })
+    }
+}
+
+/// The result of a report, its deviations those of all that the scan allows.
+pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error> {
+    let Chosen { end, covariance, statistic, alike } = report.chosen()?;
+    if end.kind == Kind::Wind {
+        return Ok(report.told(end, covariance, statistic));
+    }
+    let mut all = vec![Alternative::new(report, end.clone())?];
+    // where the curvature of an end tells nothing, those of the others do
+    all.extend(other_spacings(report, end).into_iter().filter_map(|end| Alternative::new(report, end).ok()));
+    let spacings = all.len();
+    if report.options.other_profile {
+        all.extend(of_other_profile(report, end)?);
+    }
+    let least = all.iter().fold(f64::INFINITY, |least, one| least.min(one.end.chi2));
+    let variance = report.scale.powi(2) * alike;
+    all.iter_mut().for_each(|one| one.weight = (-0.5 * (one.end.chi2 - least) / variance).exp());
+    let sum: f64 = all.iter().map(|one| one.weight).sum();
+    all.iter_mut().for_each(|one| one.weight /= sum);
+    let competes = |one: &Alternative| one.end.chi2 - least < COMPETES * variance;
+    let apart = |one: &Alternative| (one.end.wake.spacing_m() / end.wake.spacing_m()).ln().abs() > APART;
+    let is_ambiguous = all[..spacings].iter().any(|one| competes(one) && apart(one));
+    let told = if is_ambiguous { nearest_to_the_mean_spacing(&all[..spacings]) } else { end };
+    let mut result = report.told(told, mixed(&all, &told.wake), statistic);
+    result.vortices.iter_mut().for_each(|vortex| widen(vortex, &all));
+    if is_ambiguous && !result.has(Flag::Ambiguous) {
+        result.flags.push(Flag::Ambiguous);
+        result.flags.sort();
+    }
+    Ok(result)
+}
+
+/// Fits of pairs with given spacings, where gates are long.
+fn other_spacings(report: &Report<'_>, end: &End) -> Vec<End> {
+    let lateral = [Parameter::LeftLateral as usize, Parameter::RightLateral as usize];
+    let gate_m = report.problem.expected.kernel.width_m();
+    let spacing_m = end.wake.spacing_m();
+    let is_free = |place: &usize| end.groups.iter().any(|group| group == &[*place]);
+    if end.kind != Kind::Both || !lateral.iter().all(is_free) || gate_m < LONG * spacing_m.min(TYPICAL_M) {
+        return Vec::new();
+    }
+    let fits = Fits { problem: report.problem, options: report.options };
+    // both move alike: the spacing stays; cores of which something is known are free, as what suits one spacing does not suit another
+    let known = report.problem.prior.is_some();
+    let mut groups = if known { fits.groups(end.kind) } else { end.groups.clone() };
+    groups.retain(|group| !lateral.iter().any(|place| group == &[*place]));
+    groups.push(lateral.to_vec());
+    let step = (SPACINGS_M.1 / SPACINGS_M.0).ln() / (SPACINGS - 1) as f64;
+    let starts: Vec<End> = (0..SPACINGS)
+        .map(|i| End {
+            wake: with_spacing(&end.wake, SPACINGS_M.0 * (step * i as f64).exp()),
+            groups: groups.clone(),
+            ..end.clone()
+        })
+        .collect();
+    let is_pair = |end: &End| end.wake.left.circulation_m2_s > 0.0 && end.wake.right.circulation_m2_s > 0.0;
+    fits.fine(&starts).into_iter().filter(is_pair).collect()
+}
+
+/// The pair about its middle, with circulation times spacing as it was.
+fn with_spacing(wake: &Wake, spacing_m: f64) -> Wake {
+    let middle_m = 0.5 * (wake.left.lateral_position_m + wake.right.lateral_position_m);
+    let ratio = spacing_m / wake.spacing_m();
+    let vortex = |own: &Vortex| Vortex {
+        circulation_m2_s: own.circulation_m2_s / ratio,
+        lateral_position_m: middle_m + ratio * (own.lateral_position_m - middle_m),
+        ..*own
+    };
+    Wake { left: vortex(&wake.left), right: vortex(&wake.right), ..*wake }
+}
+
+/// The fit with the other profile, from the end of the stated one.
+fn of_other_profile(report: &Report<'_>, end: &End) -> Result<Option<Alternative>, Error> {
+    let mut options = report.options.clone();
+    options.model.profile = options.model.profile.other();
+    let moving = Expected::rough(report.map, &options)?.fine(&options)?;
+    let expected = if report.problem.expected.moves() { moving } else { moving.frozen() };
+    let mut problem = report.problem.clone();
+    problem.expected = &expected;
+    let ends = Fits { problem: &problem, options: &options }.fine(std::slice::from_ref(end));
+    let report = Report { problem: &problem, options: &options, ..*report };
+    Ok(ends.into_iter().next().and_then(|end| Alternative::new(&report, end).ok()))
+}
+
+/// The end whose spacing is nearest to the mean of all by weight, in the logarithm.
+fn nearest_to_the_mean_spacing(all: &[Alternative]) -> &End {
+    let of = |one: &Alternative| one.end.wake.spacing_m().ln();
+    let sum: f64 = all.iter().map(|one| one.weight).sum();
+    let mean = all.iter().map(|one| one.weight * of(one)).sum::<f64>() / sum;
+    let away = |i: &usize| (of(&all[*i]) - mean).abs();
+    &all[(0..all.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)].end
+}
+
+/// Mean squares of the distances from a wake: covariances of all and between them.
+fn mixed(all: &[Alternative], wake: &Wake) -> Array2<f64> {
+    let own = wake.to_array();
+    let mut mixed = Array2::zeros((own.len(), own.len()));
+    for one in all {
+        let other = one.end.wake.to_array();
+        let away = |i: usize| if one.covariance[[i, i]] > 0.0 { other[i] - own[i] } else { 0.0 };
+        mixed.indexed_iter_mut().for_each(|((i, j), c)| {
+            *c += one.weight * (one.covariance[[i, j]] + away(i) * away(j));
+        });
+    }
+    mixed
+}
+
+/// Deviations of a vortex become those of all that the scan allows, each at its own line and with its own profile.
+fn widen(vortex: &mut VortexResult, all: &[Alternative]) {
+    const NUMBERS: [fn(&mut VortexResult) -> Option<&mut Measured>; 5] = [
+        |vortex| Some(&mut vortex.circulation_m2_s),
+        |vortex| Some(&mut vortex.circulation_5_15_m2_s),
+        |vortex| Some(&mut vortex.lateral_position_m),
+        |vortex| Some(&mut vortex.height_m),
+        |vortex| vortex.core_radius_m.as_mut(),
+    ];
+    for number in NUMBERS {
+        let Some(own) = number(vortex).map(|own| own.value) else { continue };
+        let square = |one: &Alternative| -> Option<f64> {
+            let mut other = *one.vortices.iter().find(|other| other.side == vortex.side)?;
+            let Measured { value, std } = *number(&mut other)?;
+            Some(one.weight * (std * std + (value - own).powi(2)))
+        };
+        let squares: f64 = all.iter().filter_map(square).sum();
+        if let Some(own) = number(vortex) {
+            own.std = squares.sqrt();
+        }
+    }
+}
