@@ -1,47 +1,8 @@
 //! Statements about results, measured: those of the chapter about its figures, bars of flows, tolerances of stored curves.
 
+use crate::statistics::{Bar, Estimate, Verdict};
 use serde::{Deserialize, Serialize};
 use std::fmt;
-
-/// Share of a level below which two levels do not differ.
-pub(crate) const NO_DIFFERENCE: f64 = 0.05;
-
-/// How a claim came out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Verdict {
-    Pass,
-    Fail,
-    /// The uncertainty, or the resolution of the profile, does not allow a verdict.
-    NotResolved,
-}
-
-impl Verdict {
-    /// Pass or fail.
-    pub(crate) fn of(pass: bool) -> Self {
-        if pass { Self::Pass } else { Self::Fail }
-    }
-
-    /// Of differences, each a share of the level with its standard error, of which `limit` are trusted: pass if all are
-    /// above their errors, fail if one is surely below [`NO_DIFFERENCE`].
-    pub(crate) fn of_differences(shares: &[(f64, f64)], limit: f64) -> Self {
-        let all = shares.iter().all(|(share, error)| *share > limit * error);
-        let none = shares.iter().any(|(share, error)| share + limit * error < NO_DIFFERENCE);
-        match (all, none) {
-            (true, _) => Self::Pass,
-            (_, true) => Self::Fail,
-            _ => Self::NotResolved,
-        }
-    }
-
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::Fail => "fail",
-            Self::NotResolved => "not_resolved",
-        }
-    }
-}
 
 /// A statement, measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -56,26 +17,66 @@ pub(crate) struct Claim {
     /// NaN where the measurement is deterministic.
     pub(crate) standard_error: f64,
     pub(crate) verdict: Verdict,
+    /// What would decide it where it is open.
+    pub(crate) decided_by: String,
 }
+
+/// A part of a statement: its name, what was found in a unit, and where it must lie.
+pub(crate) type Part = (String, Estimate, &'static str, Bar);
 
 impl Claim {
     /// A claim that a computation without random numbers decides.
-    pub(crate) fn exact(id: &str, figure: &str, statement: &str, expected: &str, measured: String, pass: bool) -> Self {
+    pub(crate) fn exact(id: &str, statement: &str, expected: &str, measured: String, pass: bool) -> Self {
         Self {
             id: id.into(),
-            figure: figure.into(),
+            figure: String::new(),
             statement: statement.into(),
             expected: expected.into(),
             measured,
             standard_error: f64::NAN,
             verdict: Verdict::of(pass),
+            decided_by: String::new(),
         }
+    }
+
+    /// A claim whose parts must all hold by the rule of statistics; those that do not are told first.
+    pub(crate) fn judged(id: &str, statement: &str, expected: &str, parts: &[Part]) -> Self {
+        let verdict = |part: &&Part| part.3.verdict(&part.1);
+        let mut told: Vec<&Part> = parts.iter().collect();
+        told.sort_by_key(|part| match verdict(part) {
+            Verdict::Fail => 0,
+            Verdict::Open => 1,
+            Verdict::Pass => 2,
+        });
+        let words = told.iter().map(|(name, found, unit, _)| {
+            let name = if name.is_empty() { String::new() } else { format!("{name}: ") };
+            format!("{name}{}{unit}", found.words())
+        });
+        let open = parts.iter().filter(|part| verdict(part) == Verdict::Open);
+        let times = open.map(|part| part.3.times_the_data(&part.1)).fold(0.0, f64::max);
+        let claim = Self {
+            verdict: Verdict::of_all(parts.iter().map(|part| verdict(&part))),
+            standard_error: parts.iter().map(|part| part.1.standard_error).fold(0.0, f64::max),
+            ..Self::exact(id, statement, expected, words.collect::<Vec<_>>().join("; "), false)
+        };
+        let more = if times < 100.0 { format!("about {times:.1} times the data") } else { "no sample in reach".into() };
+        if claim.verdict == Verdict::Open { claim.open(&more) } else { claim }
+    }
+
+    /// The claim as one that this run does not decide.
+    pub(crate) fn open(self, decided_by: &str) -> Self {
+        Self { verdict: Verdict::Open, decided_by: decided_by.into(), ..self }
+    }
+
+    /// The claim with what is told beside it.
+    pub(crate) fn beside(self, words: &str) -> Self {
+        Self { measured: format!("{} ({words})", self.measured), ..self }
     }
 
     /// A quantity that may be `allowed` from its reference, in its own unit; what is not a number passes no bar.
     pub(crate) fn within(quantity: &str, measured: f64, reference: f64, allowed: f64) -> Self {
         let expected = format!("{} ± {allowed:.2e}", number(reference));
-        Self::exact("", "", quantity, &expected, number(measured), (measured - reference).abs() <= allowed)
+        Self::exact("", quantity, &expected, number(measured), (measured - reference).abs() <= allowed)
     }
 
     /// Within `share` of the reference.
@@ -86,37 +87,18 @@ impl Claim {
     /// At least `reference`.
     pub(crate) fn at_least(quantity: &str, measured: f64, reference: f64) -> Self {
         let expected = format!("at least {}", number(reference));
-        Self::exact("", "", quantity, &expected, number(measured), measured >= reference)
+        Self::exact("", quantity, &expected, number(measured), measured >= reference)
     }
 
     /// At most `reference`.
     pub(crate) fn at_most(quantity: &str, measured: f64, reference: f64) -> Self {
         let expected = format!("at most {}", number(reference));
-        Self::exact("", "", quantity, &expected, number(measured), measured <= reference)
+        Self::exact("", quantity, &expected, number(measured), measured <= reference)
     }
 
     pub(crate) fn passes(&self) -> bool {
         self.verdict == Verdict::Pass
     }
-}
-
-/// An error as it is told: two digits.
-pub(crate) fn two_digits(error: f64) -> String {
-    format!("{error:.*}", decimals(error))
-}
-
-/// A value with as many decimals as its standard error has in two digits, and the error.
-pub(crate) fn with_error(value: f64, error: f64) -> String {
-    match (value.is_finite(), error.is_finite()) {
-        (true, true) => format!("{value:.*} ± {}", decimals(error), two_digits(error)),
-        (true, false) => format!("{value:.3} ± unknown"),
-        (false, _) => "not known".into(),
-    }
-}
-
-/// Decimals of a number of two digits; of what is zero or no number, three.
-fn decimals(error: f64) -> usize {
-    if error.is_finite() && error > 0.0 { (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize } else { 3 }
 }
 
 /// Six digits after the point, or of a small number.
@@ -136,14 +118,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_the_digits_of_their_error() {
-        let found = [with_error(12.3456, 0.0321), with_error(-1.0, 4.56), with_error(1234.5, 67.0), two_digits(0.2)];
-        assert_eq!(found, ["12.346 ± 0.032", "-1.0 ± 4.6", "1234 ± 67", "0.20"]);
-        assert_eq!(with_error(0.5, f64::NAN), "0.500 ± unknown");
-        assert_eq!(with_error(f64::NAN, 0.1), "not known");
-    }
-
-    #[test]
     fn bars_hold_their_ends_and_nothing_that_is_no_number() {
         assert!(Claim::relative("q", 1.01, 1.0, 0.0101).passes() && !Claim::relative("q", 1.02, 1.0, 0.01).passes());
         assert!(Claim::at_least("q", 2.0, 2.0).passes() && !Claim::at_least("q", 1.9, 2.0).passes());
@@ -158,14 +132,15 @@ mod tests {
     }
 
     #[test]
-    fn differences_decide_only_beyond_their_errors() {
-        let of = |shares: &[(f64, f64)]| Verdict::of_differences(shares, 2.0);
-        let large = (0.5, 0.1);
-        assert_eq!(
-            [of(&[large, (0.03, 0.01)]), of(&[large, (-0.5, 0.1)]), of(&[large, (0.01, 0.015)])],
-            [Verdict::Pass, Verdict::Fail, Verdict::Fail]
-        );
-        let unsure = [(0.1, 0.1), (0.0, 0.03), (f64::NAN, 0.1), (0.1, f64::NAN)];
-        assert!(unsure.iter().all(|share| of(&[large, *share]) == Verdict::NotResolved));
+    fn a_claim_of_parts_holds_if_all_do_and_tells_first_what_does_not() {
+        let part = |name: &str, value: f64| (name.into(), Estimate::stated(value, 0.1), " m/s", Bar::Below(1.0));
+        let of =
+            |values: &[f64]| Claim::judged("F0", "s", "e", &values.iter().map(|v| part("p", *v)).collect::<Vec<_>>());
+        assert_eq!([of(&[0.5, 0.6]).verdict, of(&[0.5, 1.1]).verdict], [Verdict::Pass, Verdict::Open]);
+        let claim = of(&[0.5, 1.1, 2.0]);
+        assert_eq!((claim.verdict, claim.decided_by.as_str()), (Verdict::Fail, ""));
+        assert_eq!(claim.measured, "p: 2.00 ± 0.10 m/s; p: 1.10 ± 0.10 m/s; p: 0.50 ± 0.10 m/s");
+        assert_eq!(of(&[0.9]).decided_by, "about 3.8 times the data");
+        assert_eq!(of(&[f64::NAN]).decided_by, "no sample in reach");
     }
 }

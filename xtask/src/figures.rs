@@ -2,14 +2,13 @@
 //!
 //! A figure is a function from a [`Context`] to the files it writes and the claims it measures.
 
-mod ca_pa;
 pub(crate) mod context;
 mod fig01;
 mod fig03;
 mod fig04;
 mod fig05;
 mod fig06;
-pub(crate) mod fig07;
+mod fig07;
 mod fig08;
 mod fig09;
 mod fig10;
@@ -25,6 +24,7 @@ mod fig18;
 mod fig19;
 mod fig20;
 mod fig21;
+mod fig25;
 mod profiles;
 mod study;
 mod tab01;
@@ -61,7 +61,7 @@ impl Figure {
 
     pub(crate) fn lane(&self) -> Lane {
         match self.number {
-            6..=14 | 17 => Lane::Wake,
+            6..=14 | 17 | 25 => Lane::Wake,
             15 => Lane::Alone,
             _ => Lane::Formula,
         }
@@ -97,5 +97,5 @@ pub(crate) const ALL: [Figure; 23] = [
     Figure { id: "fig19", number: 19, title: "Detection of wakes", make: fig19::make },
     Figure { id: "fig20", number: 20, title: "Map, model and residual of one scan", make: fig20::make },
     Figure { id: "fig21", number: 21, title: "One wake across, round and along the flight", make: fig21::make },
-    Figure { id: "ca_pa", number: 25, title: "CA against PA: where the claim holds", make: ca_pa::make },
+    Figure { id: "fig25", number: 25, title: "Where correlogram accumulation errs less", make: fig25::make },
 ];

@@ -2,7 +2,6 @@
 //!
 //! Check: the tables of the book are those that are printed.
 
-use crate::figures::fig07::swing;
 use crate::workspace::root;
 use crate::{Failure, Outcome};
 use std::collections::HashMap;
@@ -34,6 +33,21 @@ pub(crate) fn run() -> Outcome {
         println!("{mesh}:\n{}", rows(columns)?);
     }
     Ok(())
+}
+
+/// When the fast decay begins and what is left at the end, at each noise on the finer of the meshes.
+///
+/// # Errors
+/// As [`run`].
+pub(crate) fn by_noise() -> Result<String, Failure> {
+    let (mesh, columns) = MESHES[1];
+    let told = columns.iter().map(|(heading, name)| {
+        let run = Run::read(name)?;
+        let begins = knee(&run.mean).map_or("never".into(), |tau| format!("{tau:.2}"));
+        Ok(format!("{heading}: {begins}, {:.2}", value_at(&run.mean, 5.0)))
+    });
+    let told = told.collect::<Result<Vec<_>, Failure>>()?;
+    Ok(format!("at 2e4 on {mesh}, where lines meet and what is left, by the noise, which is free: {}", told.join("; ")))
 }
 
 fn rows(columns: &[Column]) -> Result<String, Failure> {
@@ -77,6 +91,13 @@ impl Run {
         let [(_, widest), (_, inner)] = swing(&against(yl.iter().zip(yr).map(|(l, r)| 0.5 * (r - l)).collect()));
         Ok(Self { sides, mean, swing_back: widest - inner })
     }
+}
+
+/// The widest place of a path `y` until `tau = 3`, and the innermost after it.
+pub(crate) fn swing(y: &[(f64, f64)]) -> [(f64, f64); 2] {
+    let widest = y.iter().filter(|p| p.0 < 3.0).fold((0.0, 0.0), |m, p| if p.1 > m.1 { *p } else { m });
+    let inner = y.iter().filter(|p| p.0 > widest.0).fold((0.0, f64::INFINITY), |m, p| if p.1 < m.1 { *p } else { m });
+    [widest, inner]
 }
 
 fn column<'a>(columns: &'a HashMap<String, Vec<f64>>, name: &str) -> Result<&'a [f64], Failure> {

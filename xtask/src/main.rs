@@ -24,6 +24,7 @@ mod regress;
 mod reproduce;
 mod sources;
 mod stability;
+mod statistics;
 mod tidy;
 mod trials;
 mod validate;

@@ -5,9 +5,10 @@
 //! leaves a core idle at times; those that measure times come last, alone.
 
 mod cache;
+mod lists;
 mod report;
 
-use crate::claim::{Claim, Verdict};
+use crate::claim::Claim;
 use crate::cost::{cpu_s, thread_cpu_s};
 use crate::figures::context::{Context, Rendered};
 use crate::figures::{self, Figure, Lane};
@@ -15,6 +16,7 @@ use crate::profile::Profile;
 use crate::workspace::root;
 use crate::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
+use lists::Kind;
 use rayon::ThreadPool;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -113,6 +115,7 @@ fn drawn(
             };
             let (before_s, start) = (used_s(), Instant::now());
             let mut rendered = pool.install(|| (figure.make)(context))?;
+            rendered.claims.iter_mut().for_each(|claim| claim.figure = figure.id.into());
             let wall_s = start.elapsed().as_secs_f64();
             rendered.timings.push(("total".into(), [wall_s, used_s() - before_s]));
             if !is_other {
@@ -166,14 +169,12 @@ fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f6
     write_atomic(&out.join("timings.csv"), table.to_csv(&context.provenance_of_run())?)?;
     write_atomic(&out.join("index.html"), report::html(context, done, run_s)?)?;
     for claim in &claims {
-        println!("{claim}");
+        println!("{:<8}{claim}", Kind::of(&claim.id).name());
     }
-    let count = |v: Verdict| claims.iter().filter(|c| c.verdict == v).count();
     println!(
-        "{} claims pass, {} fail, {} not resolved; report: {}",
-        count(Verdict::Pass),
-        count(Verdict::Fail),
-        count(Verdict::NotResolved),
+        "the chapter's {}\nthe program's own {}\nreport: {}",
+        report::counted("chapter", &claims),
+        report::counted("own", &claims),
         out.join("index.html").display()
     );
     Ok(())
@@ -189,4 +190,7 @@ fn claims_table(claims: &[&Claim]) -> Table {
         .text("measured", text(|c| c.measured.clone()))
         .float("standard_error", claims.iter().map(|c| c.standard_error))
         .text("verdict", text(|c| c.verdict.name().to_owned()))
+        .text("kind", text(|c| Kind::of(&c.id).name().to_owned()))
+        .text("source", text(|c| Kind::of(&c.id).source()))
+        .text("decided_by", text(|c| c.decided_by.clone()))
 }

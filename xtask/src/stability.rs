@@ -10,8 +10,8 @@ mod optics;
 mod scenes;
 mod signal;
 
-use crate::claim::Verdict;
 use crate::profile::Profile;
+use crate::statistics::Verdict;
 use crate::workspace::{provenance, root};
 use crate::{Failure, Outcome};
 use extreme::{Ended, Extreme};

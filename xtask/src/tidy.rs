@@ -46,7 +46,7 @@ const TOP_LEVEL: [&str; 15] = [
 ];
 
 /// File types that may stand anywhere below.
-const EXTENSIONS: [&str; 10] = ["rs", "toml", "csv", "md", "svg", "png", "lock", "cff", "css", "json"];
+const EXTENSIONS: [&str; 11] = ["rs", "toml", "csv", "md", "svg", "png", "lock", "cff", "css", "json", "py"];
 
 /// What only a machine knows must not stand in the repository.
 const PRIVATE: [&str; 5] = ["/home/", "/root/", "/work/", "/tmp/", "C:\\Users"];

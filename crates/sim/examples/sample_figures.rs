@@ -37,7 +37,7 @@ fn main() -> OutputResult<()> {
         header: words(&["id", "statement", "expected", "measured", "verdict"]),
         rows: vec![
             words(&["S1", "the sample opens", "yes", "yes", "pass"]),
-            words(&["S2", "no claim", "", "", "not_resolved"]),
+            words(&["S2", "no claim", "", "", "open"]),
         ],
     };
     report.timings = HtmlTable { header: words(&["stage", "seconds"]), rows: vec![] };

@@ -60,6 +60,8 @@ pub(crate) struct Rendered {
     pub(crate) caption: String,
     /// Short notes beside the name, such as what is not the real thing.
     pub(crate) marks: Vec<String>,
+    /// What it comes to, for the head of the report; mostly nothing.
+    pub(crate) words: String,
     /// Claims measured on the data of the run.
     pub(crate) claims: Vec<Claim>,
     /// Stage, wall-clock time and processor time, s.
@@ -79,6 +81,12 @@ impl Rendered {
     /// A table as CSV.
     pub(crate) fn of_table(table: &Table, origin: &Provenance) -> Result<Self, Failure> {
         Ok(Self { files: vec![("csv".into(), table.to_csv(origin)?.into_bytes())], ..Self::default() })
+    }
+
+    /// One more table, as `figNN.` and the name.
+    pub(crate) fn add(&mut self, name: &str, table: &Table, origin: &Provenance) -> Result<(), Failure> {
+        self.files.push((name.into(), table.to_csv(origin)?.into_bytes()));
+        Ok(())
     }
 
     pub(crate) fn file(&self, extension: &str) -> Option<&[u8]> {

@@ -55,7 +55,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         "Vertical velocity through the two cores of a pair with Gamma0 = {GAMMA_M2_S} m2/s, b0 = {SPACING_M} m, rc = {CORE_M} m, \
          in units of the largest tangential velocity of one vortex, and the profiles of potential vortices."
     );
-    out.claims = claims(top_m_s);
+    out.claims = claims(top_m_s, &y_m, &w_m_s);
     Ok(out)
 }
 
@@ -65,7 +65,7 @@ fn potential_m_s(y_m: f64) -> f64 {
     one(y_m - 0.5 * SPACING_M) - one(y_m + 0.5 * SPACING_M)
 }
 
-fn claims(top_m_s: f64) -> Vec<Claim> {
+fn claims(top_m_s: f64, y_m: &[f64], w_m_s: &[f64]) -> Vec<Claim> {
     let speed = |r_m: f64| CirculationProfile::Algebraic.tangential_velocity_m_s(GAMMA_M2_S, CORE_M, r_m);
     // The maximum by golden section, not by its formula.
     let (mut low, mut high) = (0.0, 10.0 * CORE_M);
@@ -76,14 +76,11 @@ fn claims(top_m_s: f64) -> Vec<Claim> {
     }
     let (radius_m, found_m_s) = (0.5 * (low + high), speed(0.5 * (low + high)));
     let pass = (found_m_s / top_m_s - 1.0).abs() < 1e-9 && (radius_m / CORE_M - 1.0).abs() < 1e-6;
-    let farthest = (0..1000)
-        .map(|i| CORE_M * (5.0 + 0.1 * f64::from(i)))
-        .map(|r| (1.0 - speed(r) * 2.0 * PI * r / GAMMA_M2_S).abs())
-        .fold(0.0, f64::max);
+    let beyond = y_m.iter().zip(w_m_s).filter(|(y, _)| (y.abs() - 0.5 * SPACING_M).abs() > 5.0 * CORE_M);
+    let farthest = beyond.map(|(y, w)| (w / potential_m_s(*y) - 1.0).abs()).fold(0.0, f64::max);
     vec![
         Claim::exact(
             "F1a",
-            "fig01",
             "maximum tangential speed of one vortex is Γ₀/(4π r_c) at r = r_c",
             &format!("{top_m_s:.4} m/s at {CORE_M} m"),
             format!("{found_m_s:.4} m/s at {radius_m:.4} m"),
@@ -91,11 +88,10 @@ fn claims(top_m_s: f64) -> Vec<Claim> {
         ),
         Claim::exact(
             "F1b",
-            "fig01",
-            "beyond 5 rc within 4 % of the potential profile",
-            "at most 4 %",
+            "the pair that is drawn: beyond 5 rc from both centres within 5 % of the potential profile, one vortex alone within 1/26",
+            "at most 5 %",
             format!("{:.2} %", 100.0 * farthest),
-            farthest <= 0.04,
+            farthest <= 0.05,
         ),
     ]
 }

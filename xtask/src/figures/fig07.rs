@@ -2,7 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::claim::{Claim, Verdict};
+use crate::claim::Claim;
+use crate::histories::{by_noise, swing};
 use crate::references::numbers;
 use crate::wakes;
 use wakescope_les::analysis::decay::{knee, onset, value_at};
@@ -33,8 +34,15 @@ fn table(wake: &FinishedWake) -> Result<Table, Failure> {
     let mut table = Table::new();
     let names =
         ["tau", "gamma_5_15_left_m2_s", "gamma_5_15_right_m2_s", "y_left_m", "z_left_m", "y_right_m", "z_right_m"];
-    for name in names {
+    let of_claims =
+        ["y_left", "z_left", "y_right", "z_right", "outward_shear_left", "outward_shear_right", "wall_shear"];
+    for name in names.into_iter().chain(of_claims) {
         table = table.float(name, wake.column(name)?.iter().copied());
+    }
+    let tau = wake.column("tau")?;
+    for (name, column) in [("y_inviscid", 1), ("z_inviscid", 2)] {
+        let path: Vec<(f64, f64)> = inviscid()?.iter().map(|r| (r[0], r[column])).collect();
+        table = table.float(name, tau.iter().map(|tau| value_at(&path, *tau)));
     }
     Ok(table)
 }
@@ -50,7 +58,7 @@ fn circulation(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
     let mut plot = wake.circulation_plot()?;
     for (place, side) in SIDES.iter().enumerate() {
         let points = stored.iter().map(|r| (r[0], r[1 + place]));
-        plot = plot.with(Series::new(&format!("independent, {side}"), Style::Markers, points).in_colour(place));
+        plot = plot.with(Series::new(&format!("Γ₀/ν = 5000, {side}"), Style::Markers, points).in_colour(place));
     }
     Ok(plot)
 }
@@ -63,7 +71,7 @@ fn paths(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
         plot = plot.with(Series::new(&format!("independent, {side}"), Style::Markers, points).in_colour(place));
     }
     for (name, sign) in [("inviscid", 1.0), ("", -1.0)] {
-        let hyperbola = numbers("vortex_pair_inviscid_ground_h1.csv")?;
+        let hyperbola = inviscid()?;
         let path = hyperbola.iter().filter(|r| r[1] <= 2.0).map(|r| (sign * r[1], r[2]));
         plot = plot.with(Series::new(name, Style::Dash, path.collect::<Vec<_>>()));
     }
@@ -83,7 +91,9 @@ fn claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {
     let noise = format!("noise {} V₀, Γ₀/ν = {}", wake.flow.perturbation, wake.flow.reynolds);
     let like_chapter = wake.flow.reynolds >= CHAPTER.0 && wake.flow.core_radius <= CHAPTER.1;
     // What depends on the Reynolds number of the chapter is measured, but not judged, at another.
-    let of_chapter = |claim: Claim| if like_chapter { claim } else { Claim { verdict: Verdict::NotResolved, ..claim } };
+    let needed = "a wake at 2e4 with a core of 0.05 b₀: `--wake` of preset fine (an hour), profile full (days)";
+    let of_chapter = |claim: Claim| if like_chapter { claim } else { claim.open(needed) };
+    let by_noise = by_noise()?;
     let meets = knee(&gamma).map_or("never".into(), |tau| format!("at {tau:.2}"));
     let onset_words = onset.map_or("never".into(), |tau| format!("tau = {tau:.2}"));
     let before = onset.map_or(f64::NAN, |tau| 1.0 - at(tau - 0.1));
@@ -91,7 +101,6 @@ fn claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {
     Ok(vec![
         of_chapter(Claim::exact(
             "F7a",
-            "fig07",
             "before the fast phase the loss of circulation is below 10 %",
             "below 0.10",
             format!("{before:.3} at the onset, {onset_words} ({noise})"),
@@ -99,18 +108,18 @@ fn claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {
         )),
         of_chapter(Claim::exact(
             "F7b",
-            "fig07",
             "the fast decay begins at tau = 2.8",
             "2.8 ± 0.3",
-            format!("{onset_words} by three times the early loss; early and steepest line meet {meets} ({noise})"),
+            format!(
+                "{onset_words} by three times the early loss; early and steepest line meet {meets} ({noise}; {by_noise})"
+            ),
             onset.is_some_and(|tau| (tau - 2.8).abs() <= 0.3),
         )),
         of_chapter(Claim::exact(
             "F7c",
-            "fig07",
             "the final level is 40 % lower",
             "0.6 ± 0.07",
-            format!("{:.3} at tau = 5 ({noise})", at(5.0)),
+            format!("{:.3} at tau = 5 ({noise}; {by_noise})", at(5.0)),
             (at(5.0) - 0.6).abs() <= 0.07,
         )),
         inviscid_path(wake, &y, &z)?,
@@ -124,21 +133,37 @@ fn inviscid_path(wake: &FinishedWake, y: &[(f64, f64)], z: &[(f64, f64)]) -> Res
     // On the lines of symmetry the shear is zero to round-off and noise from the start.
     let turned = shear.iter().zip(largest).find(|(p, largest)| p.0 > 0.1 && p.1 < -0.01 * **largest);
     let separation = turned.map_or(f64::NAN, |(p, _)| p.0);
-    let hyperbola = numbers("vortex_pair_inviscid_ground_h1.csv")?;
-    let exact =
-        |column: usize, tau: f64| value_at(&hyperbola.iter().map(|r| (r[0], r[column])).collect::<Vec<_>>(), tau);
-    let distance = |tau: f64| (value_at(y, tau) - exact(1, tau)).hypot(value_at(z, tau) - exact(2, tau));
-    let worst = y.iter().map(|p| p.0).filter(|tau| *tau <= separation).map(distance).fold(0.0, f64::max);
+    let hyperbola = inviscid()?;
+    let path: Vec<[f64; 2]> = hyperbola.iter().map(|r| [r[1], r[2]]).collect();
+    let at = |tau: f64| [value_at(y, tau), value_at(z, tau)];
+    let exact = |tau: f64| [1, 2].map(|k| value_at(&hyperbola.iter().map(|r| (r[0], r[k])).collect::<Vec<_>>(), tau));
+    let worst = |distance: &dyn Fn(f64) -> f64| {
+        y.iter().map(|p| p.0).filter(|tau| *tau <= separation).map(distance).fold(0.0, f64::max)
+    };
+    let lag = worst(&|tau| (at(tau)[0] - exact(tau)[0]).hypot(at(tau)[1] - exact(tau)[1]));
+    let worst = worst(&|tau| off_curve(at(tau), &path));
     let statement = "the path is the inviscid one until the boundary layer separates";
-    let measured = format!("{worst:.4} b₀ until tau = {separation:.2}, where the shear at the ground turns");
-    Ok(Claim::exact("F7d", "fig07", statement, "within 0.03 b₀", measured, separation.is_finite() && worst < 0.03))
+    let measured = format!(
+        "{worst:.4} b₀ between the curves until tau = {separation:.2}, where the shear at the ground turns; {lag:.4} b₀ at equal times"
+    );
+    Ok(Claim::exact("F7d", statement, "within 0.03 b₀", measured, separation.is_finite() && worst < 0.03))
 }
 
-/// The widest place of a path `y` until `tau = 3`, and the innermost after it.
-pub(crate) fn swing(y: &[(f64, f64)]) -> [(f64, f64); 2] {
-    let widest = y.iter().filter(|p| p.0 < 3.0).fold((0.0, 0.0), |m, p| if p.1 > m.1 { *p } else { m });
-    let inner = y.iter().filter(|p| p.0 > widest.0).fold((0.0, f64::INFINITY), |m, p| if p.1 < m.1 { *p } else { m });
-    [widest, inner]
+/// The path of point vortices: tau, y, z.
+fn inviscid() -> Result<Vec<Vec<f64>>, Failure> {
+    numbers("vortex_pair_inviscid_ground_h1.csv")
+}
+
+/// Distance of a point from a curve of straight pieces.
+fn off_curve(point: [f64; 2], curve: &[[f64; 2]]) -> f64 {
+    let to_piece = |ends: &[[f64; 2]]| {
+        let [along, from] =
+            [[ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]], [point[0] - ends[0][0], point[1] - ends[0][1]]];
+        let length2 = along[0].powi(2) + along[1].powi(2);
+        let share = ((along[0] * from[0] + along[1] * from[1]) / length2).clamp(0.0, 1.0);
+        (from[0] - share * along[0]).hypot(from[1] - share * along[1])
+    };
+    curve.windows(2).map(to_piece).fold(f64::INFINITY, f64::min)
 }
 
 fn rebound(y: &[(f64, f64)], z: &[(f64, f64)]) -> Claim {
@@ -151,5 +176,18 @@ fn rebound(y: &[(f64, f64)], z: &[(f64, f64)]) -> Claim {
     );
     let pass = top.1 > lowest.1 + 0.2 && inner.1 < widest.1 - 0.1;
     let statement = "the vortices rise again and their paths make loops";
-    Claim::exact("F7e", "fig07", statement, "up by more than 0.2 b₀, back by more than 0.1 b₀", measured, pass)
+    Claim::exact("F7e", statement, "up by more than 0.2 b₀, back by more than 0.1 b₀", measured, pass)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_that_lags_is_on_the_curve() {
+        let curve = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]];
+        for (point, distance) in [([0.5, 0.0], 0.0), ([0.5, 0.3], 0.3), ([1.2, 1.9], 0.2), ([1.3, 2.4], 0.5)] {
+            assert!((off_curve(point, &curve) - distance).abs() < 1e-12);
+        }
+    }
 }

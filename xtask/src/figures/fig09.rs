@@ -2,7 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::claim::{Claim, Verdict};
+use crate::claim::Claim;
+use crate::statistics::Verdict;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::estimators;
@@ -39,8 +40,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         scene.pulse_sigma_s(),
         0.0,
     )?;
-    let ranges_m: Vec<f64> =
-        geometry.gate_ranges_m().into_iter().filter(|r| (200.0..=600.0).contains(r)).step_by(8).collect();
+    let gates_m = geometry.gate_ranges_m().into_iter().filter(|r| (200.0..=600.0).contains(r)).step_by(8);
+    let mut ranges_m: Vec<f64> = gates_m.chain([CHAPTER_RANGE_M]).collect();
+    ranges_m.sort_by(f64::total_cmp);
     let middle_rad = elevation_rad[elevation_rad.len() / 2];
     let at = |range_m: f64, radius_m: f64| {
         geometry.level(PolarPoint { range_m, elevation_rad: middle_rad }, radius_m, &correlation)
@@ -93,7 +95,6 @@ fn claims(rows: &[(f64, f64, usize, f64)], here: &[(usize, f64)]) -> Vec<Claim> 
     vec![
         Claim::exact(
             "F9a",
-            "fig09",
             "the level falls with range",
             "never rises over the quarters of the range, and falls",
             shown.join("; "),
@@ -103,7 +104,6 @@ fn claims(rows: &[(f64, f64, usize, f64)], here: &[(usize, f64)]) -> Vec<Claim> 
             verdict: Verdict::of(agrees),
             ..Claim::exact(
                 "F9b",
-                "fig09",
                 "at 400 m the levels for 1, 2, 4 m are those of the chapter; the spacing of Table 2 gives a full disc of a \
                  regular grid, which grows as rho^2, and the chapter's numbers do not",
                 "20, 60, 120",

@@ -1,64 +1,59 @@
 //! Figure 10: the radial velocity of the early pair, the scatter of its estimates, and their relation to the gradient.
-//!
-//! Some independent batches of realisations give the correlation its confidence interval.
 
 use super::context::{Context, Rendered};
-use super::study::{Age, REFERENCES, Sight, Study, early_scene, mean_and_error, of_batch, stacked, with_method};
+use super::study::{Age, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method};
 use crate::Failure;
-use crate::claim::{Claim, Verdict};
+use crate::claim::Claim;
+use crate::statistics::{BATCHES, Bar, Estimate};
 use ndarray::Array2;
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
 
-/// Batches, and Student's factor of a 95 % interval for their mean.
-const BATCHES: u64 = 4;
-const STUDENT: f64 = 3.182;
-
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let realisations = context.choose(4, 32, 100);
+    let realisations = context.choose(16, 128, 400);
     let sight = Sight::of(context, Age::Early)?;
-    let (mut tables, mut panels, mut shown) = (Vec::new(), Vec::new(), Vec::new());
-    let mut origin = None;
-    let scene = |reference, batch| {
-        let mut scene = of_batch(with_method(early_scene(realisations), "PA"), batch);
+    let (mut tables, mut panels, mut found) = (Vec::new(), Vec::new(), Vec::new());
+    let scene = |(_, reference)| {
+        let mut scene = with_method(early_scene(realisations), METHODS[0]);
         scene.detector.snr = reference;
         scene
     };
-    let scenes = REFERENCES.iter().flat_map(|(_, reference)| (0..BATCHES).map(|batch| scene(*reference, batch)));
-    let all = Study::runs(context, &sight, scenes.collect())?;
-    for ((name, _), studies) in REFERENCES.into_iter().zip(all.chunks(BATCHES as usize)) {
-        let (mut of_rms, mut of_std) = (Vec::new(), Vec::new());
-        for (batch, study) in studies.iter().enumerate() {
-            let gradient = gradient_per_s(study);
-            of_rms.push(correlation(&study.map.rms_m_s, &gradient));
-            of_std.push(correlation(&study.map.std_m_s, &gradient));
-            if batch == 0 {
-                let map = write::velocity_map(&study.plan, &study.map);
-                tables.push((name, map_table(&map)?));
-                if panels.is_empty() {
-                    panels.push(
-                        MapPlot::new(&map, 0, "v_exact")?
-                            .titled(&format!("Radial velocity, {}", sight.mark))
-                            .labelled("v_R [m/s]"),
-                    );
-                }
-                let title = format!("Standard deviation of the estimate, {name} signal-to-noise ratio");
-                panels.push(MapPlot::new(&map, 0, "velocity_standard_deviation")?.titled(&title).labelled("std [m/s]"));
-                origin.get_or_insert_with(|| study.provenance());
-            }
+    let studies = Study::runs(context, &sight, REFERENCES.map(scene).to_vec())?;
+    for ((name, _), study) in REFERENCES.into_iter().zip(&studies) {
+        let map = write::velocity_map(&study.plan, &study.map);
+        tables.push((name, map_table(&map)?));
+        if panels.is_empty() {
+            panels.push(
+                MapPlot::new(&map, 0, "v_exact")?
+                    .titled(&format!("Radial velocity, {}", sight.mark))
+                    .labelled("v_R [m/s]"),
+            );
         }
-        shown.push((name, mean_and_error(&of_rms), mean_and_error(&of_std)));
+        let title = format!("Standard deviation of the estimate, {name} signal-to-noise ratio");
+        panels.push(MapPlot::new(&map, 0, "velocity_standard_deviation")?.titled(&title).labelled("std [m/s]"));
+        let gradient = gradient_per_s(study);
+        let of_rms = |without| {
+            let rms = |cell| study.over_scans(cell, without, |error| error * error).sqrt();
+            correlation(&Array2::from_shape_fn(gradient.dim(), rms), &gradient)
+        };
+        found.push((name, Estimate::of(BATCHES, of_rms), correlation(&study.map.std_m_s, &gradient)));
     }
-    let origin = origin.ok_or_else(|| Failure::new("no map was made".into()))?;
+    let origin = studies[0].provenance();
     let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
     out.caption = format!(
-        "Radial velocity (top) and standard deviation of its estimates by periodogram accumulation over \
-         {realisations} scans of one pulse a line, rho = 2 m, for (14) with h (middle) and as the chapter prints it (bottom); {}.",
+        "Radial velocity (top) and standard deviation of its estimates by periodogram accumulation (unweighted windows, 200 ns, no refractive \
+         turbulence) over {realisations} scans of one pulse a line, \u{3c1} = 2 m, for (14) with h (middle) and as the chapter prints it (bottom). \
+         The claim is on the root mean square error (rms_m_s in the table), which has the bias in it; {}.",
         sight.words
     );
-    out.claims.push(claim(&shown));
+    let beside =
+        found.iter().map(|(name, rms, std)| format!("{name}: {}, of the standard deviation {std:.2}", rms.words()));
+    let statement = "the root mean square error of the estimate and the gradient along the line of sight are correlated over the map";
+    let chapter = found.iter().filter(|of| of.0 == "chapter").map(|of| (String::new(), of.1, "", Bar::Above(0.0)));
+    let claim = Claim::judged("F10", statement, "above 0 at the chapter's reference", &chapter.collect::<Vec<_>>());
+    out.claims.push(claim.beside(&beside.collect::<Vec<_>>().join("; ")));
     Ok(out)
 }
 
@@ -83,45 +78,6 @@ fn correlation(a: &Array2<f64>, b: &Array2<f64>) -> f64 {
         .map(|p| (p.0 - mean.0, p.1 - mean.1))
         .fold([0.0; 3], |s, (x, y)| [s[0] + x * x, s[1] + y * y, s[2] + x * y]);
     sums[2] / (sums[0] * sums[1]).sqrt()
-}
-
-/// Name of a reference and two correlations, each with its standard error or limits.
-type Correlations<'a> = (&'a str, (f64, f64), (f64, f64));
-
-fn claim(shown: &[Correlations<'_>]) -> Claim {
-    let words: Vec<String> = shown
-        .iter()
-        .map(|(name, rms, std)| {
-            let interval =
-                |x: &(f64, f64)| format!("{:.3} ({:.3} to {:.3})", x.0, x.0 - STUDENT * x.1, x.0 + STUDENT * x.1);
-            format!("{name}: root mean square {}, standard deviation {}", interval(rms), interval(std))
-        })
-        .collect();
-    let verdicts: Vec<Verdict> = shown
-        .iter()
-        .map(|(_, (r, error), _)| match (*r - STUDENT * error > 0.0, *r + STUDENT * error < 0.0) {
-            (true, _) => Verdict::Pass,
-            (_, true) => Verdict::Fail,
-            _ => Verdict::NotResolved,
-        })
-        .collect();
-    let verdict = match (verdicts.contains(&Verdict::Fail), verdicts.contains(&Verdict::NotResolved)) {
-        (true, _) => Verdict::Fail,
-        (_, true) => Verdict::NotResolved,
-        _ => Verdict::Pass,
-    };
-    Claim {
-        verdict,
-        standard_error: shown.iter().map(|s| s.1.1).fold(0.0, f64::max),
-        ..Claim::exact(
-            "F10",
-            "fig10",
-            "the error of the estimate and the gradient along the line of sight are correlated over the map (95 % intervals)",
-            "above 0 with both references",
-            words.join("; "),
-            false,
-        )
-    }
 }
 
 #[cfg(test)]

@@ -17,7 +17,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     );
     out.claims = vec![Claim::exact(
         "F16",
-        "fig16",
         "every stiff and extreme case ends as it must",
         &format!("{} cases", rows.len()),
         match missed.is_empty() {

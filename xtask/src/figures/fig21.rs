@@ -2,7 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::Failure;
-use crate::claim::{Claim, with_error};
+use crate::claim::Claim;
+use crate::statistics::{Bar, Estimate, Verdict};
 use ndarray::Array2;
 use rayon::prelude::*;
 use wakescope_les::{VortexPair, Wind};
@@ -280,14 +281,11 @@ fn picture(views: &[View]) -> Result<Figure, Failure> {
 fn claims(views: &[View]) -> Vec<Claim> {
     let energies: Vec<String> = views.iter().map(|view| format!("{:.4}", view.energy_j())).collect();
     let of = |name: &str, method: &str| {
-        views.iter().flat_map(View::fits).find(|fits| fits.view.name == name && fits.method == method).map(|fits| {
-            let (mean, std) = fits.mean_and_std_m2_s();
-            (mean, std / (fits.known_m2_s.len() as f64).sqrt(), fits.failures())
-        })
+        let fits = views.iter().flat_map(View::fits).find(|fits| fits.view.name == name && fits.method == method);
+        fits.map(|fits| (Estimate::mean(&fits.known_m2_s), fits.failures()))
     };
     let mut out = vec![Claim::exact(
         "F21a",
-        "fig21",
         "all scans send the same energy, J",
         "equal",
         energies.join(", "),
@@ -303,29 +301,21 @@ fn claims(views: &[View]) -> Vec<Claim> {
         ),
     ];
     for (id, name, method, statement) in told {
-        out.extend(of(name, method).map(|(mean, error, failures)| Claim {
-            standard_error: error,
-            ..Claim::exact(
-                id,
-                "fig21",
-                statement,
-                "mean within 10 % of 500 m²/s, no fit fails",
-                with_error(mean, error),
-                (mean / true_m2_s() - 1.0).abs() < 0.1 && failures == 0,
-            )
+        out.extend(of(name, method).map(|(found, failures)| {
+            let bar = Bar::Between(0.9 * true_m2_s(), 1.1 * true_m2_s());
+            let claim =
+                Claim::judged(id, statement, "mean within 10 % of 500 m²/s", &[(String::new(), found, " m²/s", bar)]);
+            let claim = if failures > 0 { Claim { verdict: Verdict::Fail, ..claim } } else { claim };
+            claim.beside(&format!("{failures} fits failed"))
         }));
     }
     for (id, name) in [("F21d", "rhi"), ("F21e", "ppi")] {
-        out.extend(of(name, "means").map(|(mean, error, _)| Claim {
-            standard_error: error,
-            ..Claim::exact(
-                id,
-                "fig21",
-                &format!("{name}: fits of gate means find too little, for peaks of spectra keep away from the fast air of a core"),
-                "mean at least 15 % below 500 m²/s",
-                with_error(mean, error),
-                mean < 0.85 * true_m2_s(),
-            )
+        out.extend(of(name, "means").map(|(found, _)| {
+            let statement = format!(
+                "{name}: fits of gate means find too little, for peaks of spectra keep away from the fast air of a core"
+            );
+            let part = (String::new(), found, " m²/s", Bar::Below(0.85 * true_m2_s()));
+            Claim::judged(id, &statement, "mean at least 15 % below 500 m²/s", &[part])
         }));
     }
     out

@@ -1,18 +1,23 @@
-//! Errors along the lines of sight that pass a core, against the range from its centre: figures 13 and 14.
+//! Errors of one method about the vortices: inside, outside against range, and along the lines of sight that pass a core. Figures 13, 14
+//! and 25.
+//!
+//! Outside the error changes with the signal-to-noise ratio along the line: a straight line in range, each gate with the weight of its
+//! estimates, which is taken away.
 
-use super::study::{INSIDE_M, Study};
+use super::study::{INSIDE_M, METHODS, OUTSIDE_M, Study, Zone, batches};
 use crate::Failure;
+use crate::claim::Part;
+use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE};
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::plot::{Axis, CurvePlot, Series, Style};
 
 /// Lines of sight count that pass a centre within this distance, m.
 const CORE_M: f64 = 4.0;
-/// Ranges from the centre that are kept, m; those beyond the second number are the edges.
+/// Ranges from the centre that are kept, m.
 const REACH_M: f64 = 42.0;
-const EDGE_M: f64 = 32.0;
 
-/// The profile of one method.
+/// The errors of one method in one case.
 pub(super) struct Profiles {
     pub(super) method: &'static str,
     /// Reference of the signal-to-noise ratio.
@@ -20,12 +25,12 @@ pub(super) struct Profiles {
     pub(super) pulse_s: f64,
     /// Mean ratio at the vortices, dB.
     pub(super) snr_db: f64,
-    pub(super) gate_m: f64,
+    pub(super) inside: Zone,
+    pub(super) outside: Zone,
+    /// Gate by gate, outside.
+    evolution: Vec<Zone>,
     /// Range from the centre, m, increasing, and the errors there, both vortices together.
-    pub(super) range_m: Vec<f64>,
-    pub(super) errors: Vec<CellAverage>,
-    /// Over all cells inside the vortices.
-    pub(super) inside: CellAverage,
+    across: Vec<(f64, Zone)>,
 }
 
 impl Profiles {
@@ -33,10 +38,9 @@ impl Profiles {
         let map = &study.map;
         let gate_m = map.range_m[1] - map.range_m[0];
         let bins = (REACH_M / gate_m) as i64;
-        let mut range_m = Vec::new();
-        let mut errors = Vec::new();
         let cores = study.cores_polar();
         let middle_m = cores.iter().map(|c| c.0).sum::<f64>() / cores.len() as f64;
+        let mut across = Vec::new();
         for bin in -bins..=bins {
             let mut cells = Vec::new();
             for &(core_m, elevation_rad) in &cores {
@@ -52,33 +56,63 @@ impl Profiles {
                     cells.extend(near.map(|i| (i, place as usize)));
                 }
             }
-            range_m.push(bin as f64 * gate_m);
-            errors.push(study.over_profile(&cells));
+            across.push((bin as f64 * gate_m, study.zone(&cells)));
         }
+        let gates = (0..map.range_m.len()).map(|gate| study.cells(|d, j| d > OUTSIDE_M && j == gate));
         Ok(Self {
             method,
             name,
             pulse_s: study.plan.scene.scene.pulse_width_s(),
             snr_db: snr_db(study)?,
-            gate_m,
-            range_m,
-            errors,
-            inside: study.over(|d| d < INSIDE_M),
+            inside: study.zone(&study.cells(|d, _| d < INSIDE_M)),
+            outside: study.zone(&study.cells(|d, _| d > OUTSIDE_M)),
+            evolution: gates.filter(|cells| !cells.is_empty()).map(|cells| study.zone(&cells)).collect(),
+            across,
         })
-    }
-
-    /// Batches of the same scene as one.
-    pub(super) fn joined(batches: &[Self]) -> Result<Self, Failure> {
-        let first = batches.first().ok_or_else(|| Failure::new("no batch of scans".into()))?;
-        let errors =
-            (0..first.errors.len()).map(|k| CellAverage::joined(batches.iter().map(|b| b.errors[k]))).collect();
-        let inside = CellAverage::joined(batches.iter().map(|b| b.inside));
-        Ok(Self { range_m: first.range_m.clone(), errors, inside, ..*first })
     }
 
     pub(super) fn title(&self) -> String {
         format!("{} {:.1} dB, {:.0} ns", self.name, self.snr_db, 1e9 * self.pulse_s)
     }
+
+    /// The error at a mean range less what it is outside there, without one batch, m/s.
+    fn excess_m_s(&self, zone: &Zone, without: Option<usize>) -> f64 {
+        let gates = self.evolution.iter().filter(|gate| gate.estimates(without) > 0.0);
+        let outside = gates.map(|gate| [gate.range_m, gate.rms_m_s(without), gate.estimates(without)]);
+        zone.rms_m_s(without) - on_line(outside, zone.range_m)
+    }
+
+    /// The same inside the vortices.
+    pub(super) fn inside_m_s(&self, without: Option<usize>) -> f64 {
+        self.excess_m_s(&self.inside, without)
+    }
+
+    /// The same along the lines that pass a core.
+    fn across_m_s(&self, without: Option<usize>) -> Vec<(f64, f64)> {
+        self.across.iter().map(|(range_m, zone)| (*range_m, self.excess_m_s(zone, without))).collect()
+    }
+
+    pub(super) fn peak_m_s(&self, without: Option<usize>) -> f64 {
+        peak(&self.across_m_s(without)).1
+    }
+
+    pub(super) fn width_m(&self, without: Option<usize>) -> f64 {
+        width_m(&self.across_m_s(without))
+    }
+
+    /// How far it is from another method on the same signals in a number that both have.
+    pub(super) fn less(&self, other: &Self, of: fn(&Self, Option<usize>) -> f64) -> Estimate {
+        Estimate::of(BATCHES, |without| of(self, without) - of(other, without))
+    }
+}
+
+/// Where the straight line of least squares through some points (x, y, weight) is at `x`.
+fn on_line(points: impl Iterator<Item = [f64; 3]> + Clone, x: f64) -> f64 {
+    let sum = |of: &dyn Fn([f64; 3]) -> f64| points.clone().map(|p| p[2] * of(p)).sum::<f64>();
+    let weight = sum(&|_| 1.0);
+    let [mean_x, mean_y] = [0, 1].map(|k| sum(&|p| p[k]) / weight);
+    let slope = sum(&|p| (p[0] - mean_x) * (p[1] - mean_y)) / sum(&|p| (p[0] - mean_x).powi(2));
+    mean_y + slope * (x - mean_x)
 }
 
 /// Mean signal-to-noise ratio of the scene at the vortices, dB.
@@ -89,66 +123,78 @@ fn snr_db(study: &Study) -> Result<f64, Failure> {
     Ok(10.0 * (near.iter().sum::<f64>() / near.len() as f64).log10())
 }
 
-/// Median error at the edges: the mean evolution without a vortex, m/s.
-pub(super) fn edge_level(p: &Profiles) -> f64 {
-    let mut edge: Vec<f64> =
-        p.range_m.iter().zip(&p.errors).filter(|(r, _)| r.abs() > EDGE_M).map(|(_, e)| e.rms_m_s).collect();
-    edge.retain(|e| e.is_finite());
-    edge.sort_by(f64::total_cmp);
-    edge.get(edge.len() / 2).copied().unwrap_or(f64::NAN)
+/// Place and value of the largest number inside a vortex.
+fn peak(across: &[(f64, f64)]) -> (usize, f64) {
+    let inside = across.iter().enumerate().filter(|(_, p)| p.0.abs() <= INSIDE_M);
+    inside.map(|(k, p)| (k, p.1)).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::NAN))
 }
 
-/// Largest error above the edges and its standard error, m/s.
-pub(super) fn peak(p: &Profiles) -> (f64, f64) {
-    let top = p.errors.iter().max_by(|a, b| a.rms_m_s.total_cmp(&b.rms_m_s));
-    top.map_or((f64::NAN, f64::NAN), |t| (t.rms_m_s - edge_level(p), t.standard_error_m_s))
+/// Full width at half of the peak, m; straight lines between the gates. NaN where it does not fall that far.
+fn width_m(across: &[(f64, f64)]) -> f64 {
+    let (top, value) = peak(across);
+    let half = 0.5 * value;
+    let crossing = |from: (f64, f64), to: (f64, f64)| from.0 + (to.0 - from.0) * (from.1 - half) / (from.1 - to.1);
+    let steps = |mut side: Box<dyn Iterator<Item = &[(f64, f64)]> + '_>, far: usize| {
+        side.find(|pair| pair[far].1 < half).map_or(f64::NAN, |pair| crossing(pair[1 - far], pair[far]))
+    };
+    steps(Box::new(across[top..].windows(2)), 1) - steps(Box::new(across[..=top].windows(2).rev()), 0)
 }
 
-/// Full width at half maximum of the error above the edges, m; straight lines between the gates.
-pub(super) fn width_m(p: &Profiles) -> f64 {
-    let level = edge_level(p);
-    let half = 0.5 * peak(p).0;
-    let above: Vec<f64> = p.errors.iter().map(|e| e.rms_m_s - level - half).collect();
-    let crossing = |k: usize| p.range_m[k] + p.gate_m * above[k] / (above[k] - above[k + 1]);
-    let crossings: Vec<f64> =
-        (0..above.len() - 1).filter(|&k| (above[k] < 0.0) != (above[k + 1] < 0.0)).map(crossing).collect();
-    match (crossings.first(), crossings.last()) {
-        (Some(first), Some(last)) if crossings.len() > 1 => last - first,
-        _ => f64::NAN,
-    }
+/// CA less each PA in a number of theirs, case by case, in the order of [`METHODS`].
+pub(super) fn parts(all: &[Profiles], unit: &'static str, of: fn(&Profiles, Option<usize>) -> f64) -> Vec<Part> {
+    let case = |of_case: &[Profiles]| {
+        let [pas @ .., ca] = of_case else { return Vec::new() };
+        let part = |pa: &Profiles| {
+            let trifle = NO_DIFFERENCE * of(pa, None).abs();
+            (format!("{}, CA - {}", pa.title(), pa.method), ca.less(pa, of), unit, Bar::Less(trifle))
+        };
+        pas.iter().map(part).collect()
+    };
+    all.chunks(METHODS.len()).flat_map(case).collect()
 }
 
 /// All profiles as one table.
-pub(super) fn table(all: &[&Profiles]) -> Table {
-    let rows: Vec<(&Profiles, usize)> = all.iter().flat_map(|&p| (0..p.range_m.len()).map(move |k| (p, k))).collect();
-    let of = |get: fn(&CellAverage) -> f64| rows.iter().map(move |(p, k)| get(&p.errors[*k])).collect::<Vec<_>>();
+pub(super) fn table(all: &[Profiles]) -> Table {
+    let rows: Vec<(&Profiles, f64, &Zone)> =
+        all.iter().flat_map(|p| p.across.iter().map(move |(range_m, zone)| (p, *range_m, zone))).collect();
+    let of = |get: fn(&CellAverage) -> f64| rows.iter().map(move |(_, _, zone)| get(&zone.average)).collect::<Vec<_>>();
     Table::new()
-        .text("method", rows.iter().map(|(p, _)| p.method))
-        .float("pulse_s", rows.iter().map(|(p, _)| p.pulse_s))
-        .text("snr_reference", rows.iter().map(|(p, _)| p.name))
-        .float("snr_db", rows.iter().map(|(p, _)| p.snr_db))
-        .float("range_from_centre_m", rows.iter().map(|(p, k)| p.range_m[*k]))
+        .text("method", rows.iter().map(|(p, ..)| p.method))
+        .float("pulse_s", rows.iter().map(|(p, ..)| p.pulse_s))
+        .text("snr_reference", rows.iter().map(|(p, ..)| p.name))
+        .float("snr_db", rows.iter().map(|(p, ..)| p.snr_db))
+        .float("range_from_centre_m", rows.iter().map(|(_, range_m, _)| *range_m))
         .float("bias_m_s", of(|a| a.bias_m_s))
         .float("std_m_s", of(|a| a.std_m_s))
         .float("rms_m_s", of(|a| a.rms_m_s))
-        .float("standard_error_m_s", of(|a| a.standard_error_m_s))
-        .float("rms_above_edges_m_s", rows.iter().map(|(p, k)| p.errors[*k].rms_m_s - edge_level(p)))
+        .float("standard_error_m_s", rows.iter().map(|(.., zone)| zone.rms().standard_error))
+        .float("rms_less_evolution_m_s", rows.iter().map(|(p, _, zone)| p.excess_m_s(zone, None)))
 }
 
-/// Curves of some profiles, less their level at the edges.
-pub(super) fn plot(title: &str, profiles: &[&Profiles]) -> CurvePlot {
-    let mut plot = CurvePlot::new(title, Axis::linear("range from the vortex centre [m]"), Axis::linear("error [m/s]"));
-    let styles = [Style::Line, Style::DashDot, Style::Dash, Style::Dot];
-    plot.series = profiles
-        .iter()
-        .zip(styles)
-        .map(|(p, style)| {
-            let level = edge_level(p);
-            let points = p.range_m.iter().copied().zip(p.errors.iter().map(|e| e.rms_m_s - level));
-            let band: Vec<f64> = p.errors.iter().map(|e| e.standard_error_m_s).collect();
-            Series::new(&format!("{}, {:.0} ns", p.method, 1e9 * p.pulse_s), style, points).with_band(&band)
-        })
-        .collect();
+/// All that the claims need: the zones of named cases in their batches, with those gate by gate or without.
+pub(super) fn batches_table<'p>(all: impl Iterator<Item = (String, &'p Profiles)>, with_gates: bool) -> Table {
+    batches(all.flat_map(|(case, p)| {
+        let whole = [("inside", f64::NAN, &p.inside), ("outside", f64::NAN, &p.outside)];
+        let evolution = p.evolution.iter().map(|gate| ("evolution", gate.range_m, gate));
+        let across = p.across.iter().map(|(range_m, zone)| ("across", *range_m, zone));
+        let gates: Vec<_> = if with_gates { evolution.chain(across).collect() } else { Vec::new() };
+        let method = p.method;
+        let named = move |(zone, place, of)| (format!("{method}; {case}"), zone, place, of);
+        whole.into_iter().chain(gates).map(named)
+    }))
+}
+
+/// Curves of some profiles, less their evolution with range.
+pub(super) fn plot(title: &str, profiles: &[Profiles]) -> CurvePlot {
+    let axes = ["range from the vortex centre [m]", "rms less its evolution [m/s]"].map(Axis::linear);
+    let [x, y] = axes;
+    let mut plot = CurvePlot::new(title, x, y);
+    for (place, p) in profiles.iter().enumerate() {
+        let style = [Style::Line, Style::Dash, Style::DashDot][place % METHODS.len()];
+        let band: Vec<f64> = p.across.iter().map(|(_, zone)| zone.rms().standard_error).collect();
+        let label = format!("{}, {:.0} ns", p.method, 1e9 * p.pulse_s);
+        plot = plot.with(Series::new(&label, style, p.across_m_s(None)).with_band(&band).in_colour(place));
+    }
     plot
 }
 
@@ -156,27 +202,23 @@ pub(super) fn plot(title: &str, profiles: &[&Profiles]) -> CurvePlot {
 mod tests {
     use super::*;
 
-    /// A Gaussian of height 2 and standard deviation 8 m on a level of 0.5.
-    fn bell() -> Profiles {
-        let range_m: Vec<f64> = (-14..=14).map(|k| 3.0 * f64::from(k)).collect();
-        let average = |r: &f64| CellAverage {
-            bias_m_s: 0.0,
-            bias_standard_error_m_s: 0.0,
-            std_m_s: 0.0,
-            std_standard_error_m_s: 0.0,
-            rms_m_s: 0.5 + 2.0 * (-0.5 * (r / 8.0).powi(2)).exp(),
-            standard_error_m_s: 0.1,
-        };
-        let errors: Vec<CellAverage> = range_m.iter().map(average).collect();
-        let inside = errors[14];
-        Profiles { method: "PA", name: "fixed", pulse_s: 2e-7, snr_db: 0.0, gate_m: 3.0, range_m, errors, inside }
+    #[test]
+    fn peak_and_width_of_a_bell_are_sought_at_the_vortex() {
+        // A Gaussian of height 2 and standard deviation 8 m, and a higher one far out.
+        let bell = |r: f64, height: f64, at: f64| height * (-0.5 * ((r - at) / 8.0).powi(2)).exp();
+        let across: Vec<(f64, f64)> =
+            (-20..=20).map(|k| 3.0 * f64::from(k)).map(|r| (r, bell(r, 2.0, 0.0) + bell(r, 3.0, 60.0))).collect();
+        assert!((peak(&across).1 - 2.0).abs() < 1e-3);
+        assert!((width_m(&across) - 8.0 * 2.354_82).abs() < 0.3, "{}", width_m(&across));
+        let level: Vec<(f64, f64)> = across.iter().map(|p| (p.0, 1.0)).collect();
+        assert!(width_m(&level).is_nan());
     }
 
     #[test]
-    fn peak_and_width_of_a_bell_on_a_level() {
-        let p = bell();
-        assert!((edge_level(&p) - 0.5).abs() < 1e-3);
-        assert!((peak(&p).0 - 2.0).abs() < 1e-3);
-        assert!((width_m(&p) - 8.0 * 2.354_82).abs() < 0.3, "{}", width_m(&p));
+    fn the_evolution_is_a_straight_line() {
+        let points = [[1.0, 3.0, 5.0], [2.0, 5.0, 1.0], [4.0, 9.0, 2.0]];
+        assert!((on_line(points.into_iter(), 3.0) - 7.0).abs() < 1e-12);
+        // What weighs nothing does not count.
+        assert!((on_line(points.into_iter().chain([[3.0, 100.0, 0.0]]), 3.0) - 7.0).abs() < 1e-12);
     }
 }

@@ -1,10 +1,8 @@
-//! What figures 10 to 14 share: scans of the simulated wake or of the analytic pair, regions about the cores.
-//!
-//! Maps of neighbouring cells share their windows: as independent counts one line of sight in [`SHARED_LINES`] and one gate in
-//! [`SHARED_GATES`].
+//! What figures 10 to 14 and 25 share: scans of the simulated wake or of the analytic pair in batches, regions about the cores.
 
 use super::context::Context;
 use crate::Failure;
+use crate::statistics::{BATCHES, Estimate};
 use crate::wakes;
 use std::path::PathBuf;
 use wakescope_les::analysis::decay::value_at;
@@ -16,17 +14,13 @@ use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::plan::Plan;
 use wakescope_sim::scene::{
     Flow, Method, ModelOrder, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
-    SnrReference, Turbulence, VortexPair, Weighting,
+    SnrReference, Turbulence, VortexMotion, VortexPair, Weighting,
 };
 use wakescope_sim::sweep::{self, Request, Sweep};
 use wakescope_sim::{measure::wind, measure::write};
 
-/// Lines of sight 0.5 m apart that a region of 2 m shares.
-const SHARED_LINES: f64 = 9.0;
-/// Gates 3 m apart that share a window of 38.4 m and the pulse.
-const SHARED_GATES: f64 = 10.0;
-/// Cells of a map that are worth one that is independent.
-pub(super) const SHARED_CELLS: f64 = SHARED_LINES * SHARED_GATES;
+/// Lines of sight 0.5 m apart that a region of 2 m shares, and gates 3 m apart that share a window of 38.4 m and the pulse.
+const SHARED: (f64, f64) = (9.0, 10.0);
 /// What counts as inside a vortex, m from its centre.
 pub(super) const INSIDE_M: f64 = 8.0;
 /// What counts as outside of both, m.
@@ -36,22 +30,25 @@ pub(super) const OUTSIDE_M: f64 = 30.0;
 pub(super) const REFERENCES: [(&str, SnrReference); 2] =
     [("physical", SnrReference::Physical {}), ("chapter", SnrReference::Chapter {})];
 
-/// One pulse a line, unweighted windows, regions of 2 m, the pair 400 m away; the first seed.
+/// One pulse a line, regions of 2 m, the pair 400 m away; the first seed.
 pub(super) fn early_scene(realisations: usize) -> Scene {
     let mut scene = Scene { seed: 0, ..Scene::default() };
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.03, 0.2);
     (scene.scan.range_min_m, scene.scan.range_max_m) = (310.0, 500.0);
     (scene.scan.pulses_per_line, scene.scan.realisations) = (1, realisations);
-    scene.estimator.weighting = Weighting::Rectangular;
     scene
 }
 
-/// The scene with the chapter's periodogram accumulation (PA) or correlogram accumulation (CA).
+/// Periodogram accumulation without and with the chapter's usual weighting, and its correlogram accumulation.
+pub(super) const METHODS: [&str; 3] = ["PA", "PA, Gaussian", "CA"];
+
+/// The scene with one of the [`METHODS`].
 pub(super) fn with_method(mut scene: Scene, method: &str) -> Scene {
     scene.estimator.method = match method {
         "CA" => Method::Autoregressive(ModelOrder::default()),
         _ => Method::PeriodogramAccumulation {},
     };
+    scene.estimator.weighting = if method == METHODS[1] { Weighting::Gaussian } else { Weighting::Rectangular };
     scene.estimator.padded_samples = if method == "CA" { 2048 } else { 1024 };
     scene
 }
@@ -76,11 +73,6 @@ pub(super) fn with_turbulence(context: &Context, mut scene: Scene, cn2_m_m23: f6
     scene
 }
 
-/// The scene with the seed of a batch of scans.
-pub(super) fn of_batch(scene: Scene, batch: u64) -> Scene {
-    Scene { seed: scene.seed + 1_000_003 * batch, ..scene }
-}
-
 /// The flow that is looked at.
 pub(super) struct Sight {
     flow: Flow,
@@ -98,15 +90,11 @@ impl Sight {
     /// The wake of an age, simulated or analytic: at its start if early, on its inviscid path if late.
     pub(super) fn of(context: &Context, age: Age) -> Result<Self, Failure> {
         if context.analytic {
-            let mut scene = Scene::default();
-            let mut words = "ANALYTIC PAIR".to_owned();
-            if age == Age::Late {
-                let motion = wakescope_sim::scene::VortexMotion::Inviscid;
-                scene.flow = Flow::VortexPair(VortexPair { motion, age_tau: age.tau(), ..VortexPair::default() });
-                words = format!("{words} at tau = {} on its inviscid path", age.tau());
-            }
-            let cores = cores_of(&scene);
-            return Ok(Self { flow: scene.flow, folder: PathBuf::new(), cores, words, mark: "analytic pair".into() });
+            let motion = VortexMotion::Inviscid;
+            return Ok(Self::of_pair(match age {
+                Age::Early => VortexPair::default(),
+                Age::Late => VortexPair { motion, age_tau: age.tau(), ..VortexPair::default() },
+            }));
         }
         let wake = wakes::of(context)?;
         let b0_m = wake.flow.pair.scales()?.spacing_m;
@@ -124,6 +112,17 @@ impl Sight {
         let cores = vec![core("left")?, core("right")?];
         let words = format!("tau = {}, {}", age.tau(), wake.words());
         Ok(Self { flow: Flow::Simulated(flow), folder: wake.folder, cores, words, mark: "simulated flow".into() })
+    }
+
+    /// An analytic pair.
+    pub(super) fn of_pair(pair: VortexPair) -> Self {
+        let words = match pair.age_tau {
+            0.0 => format!("ANALYTIC PAIR, core {} m", pair.core_radius_m),
+            tau => format!("ANALYTIC PAIR at tau = {tau} on its inviscid path, core {} m", pair.core_radius_m),
+        };
+        let scene = Scene { flow: Flow::VortexPair(pair), ..Scene::default() };
+        let cores = cores_of(&scene);
+        Self { flow: scene.flow, folder: PathBuf::new(), cores, words, mark: "analytic pair".into() }
     }
 
     /// Where the files of its scenes are looked for.
@@ -207,24 +206,87 @@ impl Study {
         self.cores.iter().map(|c| (c.0.hypot(c.1 - height_m), (c.1 - height_m).atan2(c.0))).collect()
     }
 
-    /// Averages over the cells whose distance to the nearer core, m, is accepted.
-    pub(super) fn over(&self, accept: impl Fn(f64) -> bool) -> CellAverage {
-        let mut cells = Vec::new();
-        for (i, row) in self.distance_m.iter().enumerate() {
-            cells.extend(row.iter().enumerate().filter(|(_, d)| accept(**d)).map(|(j, _)| (i, j)));
+    /// The cells whose distance to the nearer core, m, and gate are accepted.
+    pub(super) fn cells(&self, accept: impl Fn(f64, usize) -> bool) -> Vec<(usize, usize)> {
+        let rows = self.distance_m.iter().enumerate();
+        let all = rows.flat_map(|(i, row)| row.iter().enumerate().map(move |(j, d)| ((i, j), *d)));
+        all.filter(|((_, j), d)| accept(*d, *j)).map(|(cell, _)| cell).collect()
+    }
+
+    /// Mean of a function of the errors of a cell over the scans, without those of one batch.
+    pub(super) fn over_scans(&self, cell: (usize, usize), without: Option<usize>, of: fn(f64) -> f64) -> f64 {
+        let scans = self.map.scans.iter().enumerate();
+        let kept = scans.filter(|(k, _)| Some(k * BATCHES / self.map.scans.len()) != without);
+        let errors: Vec<f64> = kept.map(|(_, scan)| of(scan.error_m_s[cell])).filter(|e| e.is_finite()).collect();
+        errors.iter().sum::<f64>() / errors.len() as f64
+    }
+
+    /// The errors over some cells.
+    pub(super) fn zone(&self, cells: &[(usize, usize)]) -> Zone {
+        let mut of_batch = vec![(0.0, 0.0); BATCHES];
+        for (k, scan) in self.map.scans.iter().enumerate() {
+            let (sum, count) = &mut of_batch[k * BATCHES / self.map.scans.len()];
+            for error in cells.iter().map(|cell| scan.error_m_s[*cell]).filter(|error| error.is_finite()) {
+                (*sum, *count) = (*sum + error * error, *count + 1.0);
+            }
         }
-        self.over_cells(&cells)
+        let range_m = cells.iter().map(|cell| self.map.range_m[cell.1]).sum::<f64>() / cells.len() as f64;
+        Zone { range_m, of_batch, average: CellAverage::over(&self.map, cells, SHARED) }
+    }
+}
+
+/// Errors over a set of cells, in batches of scans.
+pub(super) struct Zone {
+    /// Mean range of the cells, m.
+    pub(super) range_m: f64,
+    /// Sum of the squares of each batch, m^2/s^2, and how many they are.
+    of_batch: Vec<(f64, f64)>,
+    /// Bias and standard deviation.
+    pub(super) average: CellAverage,
+}
+
+impl Zone {
+    /// Sum of the squares and number of the estimates without one batch.
+    fn sums(&self, without: Option<usize>) -> (f64, f64) {
+        let kept = self.of_batch.iter().enumerate().filter(|(batch, _)| Some(*batch) != without);
+        kept.fold((0.0, 0.0), |sums, (_, of)| (sums.0 + of.0, sums.1 + of.1))
     }
 
-    /// Averages over some cells, whose neighbours share lines and gates.
-    pub(super) fn over_cells(&self, cells: &[(usize, usize)]) -> CellAverage {
-        CellAverage::over(&self.map, cells, (SHARED_LINES, SHARED_GATES))
+    pub(super) fn estimates(&self, without: Option<usize>) -> f64 {
+        self.sums(without).1
     }
 
-    /// Averages over cells of a profile: at one gate, or at one for each vortex.
-    pub(super) fn over_profile(&self, cells: &[(usize, usize)]) -> CellAverage {
-        CellAverage::over(&self.map, cells, (SHARED_LINES, SHARED_GATES))
+    /// Root mean square error without one batch, m/s.
+    pub(super) fn rms_m_s(&self, without: Option<usize>) -> f64 {
+        let (sum, estimates) = self.sums(without);
+        (sum / estimates).sqrt()
     }
+
+    pub(super) fn rms(&self) -> Estimate {
+        Estimate::of(BATCHES, |without| self.rms_m_s(without))
+    }
+
+    /// How far its error is from that of another on the same scans, as a share of the latter.
+    pub(super) fn over(&self, other: &Self) -> Estimate {
+        Estimate::of(BATCHES, |without| self.rms_m_s(without) / other.rms_m_s(without) - 1.0)
+    }
+}
+
+/// All that claims on zones need: case, zone, its place in the figure, the zone.
+pub(super) fn batches<'z>(zones: impl Iterator<Item = (String, &'static str, f64, &'z Zone)>) -> Table {
+    let of_zone = |(case, name, place, zone): (String, &'static str, f64, &'z Zone)| {
+        let batches = zone.of_batch.iter().enumerate();
+        batches.map(move |(batch, sums)| (case.clone(), name, place, zone.range_m, batch, *sums)).collect::<Vec<_>>()
+    };
+    let rows: Vec<_> = zones.flat_map(of_zone).collect();
+    Table::new()
+        .text("case", rows.iter().map(|r| r.0.clone()))
+        .text("zone", rows.iter().map(|r| r.1))
+        .float("place", rows.iter().map(|r| r.2))
+        .float("range_m", rows.iter().map(|r| r.3))
+        .int("batch", rows.iter().map(|r| r.4 as i64))
+        .float("sum_of_squares_m2_s2", rows.iter().map(|r| r.5.0))
+        .int("estimates", rows.iter().map(|r| r.5.1 as i64))
 }
 
 /// Centres of the vortices when the scan begins, (y, z), m; none where the flow is no pair.
@@ -251,14 +313,6 @@ pub(super) fn stacked(name: &str, parts: Vec<(&str, Table)>) -> Result<Table, Fa
     Ok(Table::stack(labelled)?)
 }
 
-/// Mean of some numbers and its standard error.
-pub(super) fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -269,11 +323,5 @@ mod tests {
         let both = stacked("which", vec![("one", part(1.0)), ("two", part(5.0))]).unwrap();
         let text = both.to_csv(&crate::workspace::provenance("", 0)).unwrap();
         assert!(text.ends_with("x_m,n,t,which\n1.0,1,a,one\n2.0,2,b,one\n5.0,1,a,two\n6.0,2,b,two\n"), "{text}");
-    }
-
-    #[test]
-    fn the_mean_has_the_error_of_the_mean() {
-        let (mean, error) = mean_and_error(&[1.0, 2.0, 3.0, 4.0]);
-        assert!((mean - 2.5).abs() < 1e-12 && (error - (5.0_f64 / 12.0).sqrt()).abs() < 1e-12);
     }
 }

@@ -31,13 +31,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     // The chapter prints whole seconds.
     let pass = ROWS.iter().all(|r| (delay_s(r.2) - r.3).abs() <= 0.5);
     let statement = "the delays follow from the distance at 70 m/s";
-    out.claims.push(Claim::exact(
-        "T1",
-        "tab01",
-        statement,
-        "106, 132, 159, 132 s",
-        format!("{} s", measured.join(", ")),
-        pass,
-    ));
+    out.claims.push(Claim::exact("T1", statement, "106, 132, 159, 132 s", format!("{} s", measured.join(", ")), pass));
     Ok(out)
 }

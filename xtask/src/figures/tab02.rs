@@ -43,7 +43,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let expected = format!("{} of {0} equal", ROWS.len());
     out.claims.push(Claim::exact(
         "T2",
-        "tab02",
         statement,
         &expected,
         format!("{equal} of {} equal", ROWS.len()),

@@ -28,6 +28,7 @@ pub(super) struct Place {
 struct Index {
     caption: String,
     marks: Vec<String>,
+    words: String,
     extensions: Vec<String>,
     claims: Vec<Claim>,
     timings: Vec<(String, [f64; 2])>,
@@ -47,8 +48,8 @@ impl Place {
         let name = |extension: &String| format!("{}.{extension}", self.id);
         let file = |e: &String| Some((e.clone(), std::fs::read(self.folder.join(name(e))).ok()?));
         let files = index.extensions.iter().map(file).collect::<Option<_>>()?;
-        let Index { caption, marks, claims, timings, .. } = index;
-        Some(Rendered { files, caption, marks, claims, timings })
+        let Index { caption, marks, words, claims, timings, .. } = index;
+        Some(Rendered { files, caption, marks, words, claims, timings })
     }
 
     pub(super) fn store(&self, rendered: &Rendered) -> Outcome {
@@ -56,9 +57,9 @@ impl Place {
         for (extension, bytes) in &rendered.files {
             group.add(&format!("{}.{extension}", self.id), bytes.clone())?;
         }
-        let Rendered { files, caption, marks, claims, timings } = rendered.clone();
+        let Rendered { files, caption, marks, words, claims, timings } = rendered.clone();
         let extensions = files.into_iter().map(|(extension, _)| extension).collect();
-        group.add("index.toml", toml::to_string(&Index { caption, marks, extensions, claims, timings })?)?;
+        group.add("index.toml", toml::to_string(&Index { caption, marks, words, extensions, claims, timings })?)?;
         group.commit()?;
         Ok(())
     }
@@ -74,9 +75,7 @@ mod tests {
         let place = Place { id: "fig00", folder: temp.path().to_owned() };
         let mut rendered = Rendered { caption: "a caption".into(), ..Rendered::default() };
         rendered.files.push(("csv".into(), b"a\n1\n".to_vec()));
-        rendered
-            .claims
-            .push(Claim { standard_error: 0.25, ..Claim::exact("F0", "fig00", "statement", "1", "2".into(), false) });
+        rendered.claims.push(Claim { standard_error: 0.25, ..Claim::exact("F0", "statement", "1", "2".into(), false) });
         rendered.timings.push(("total".into(), [1.5, 2.5]));
         assert!(place.load().is_none());
         place.store(&rendered).unwrap();

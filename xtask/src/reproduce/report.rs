@@ -1,24 +1,31 @@
 //! The report of a run: one page with all figures, claims and run times.
 
+use super::lists::Kind;
 use crate::Failure;
-use crate::claim::{Claim, Verdict, two_digits};
+use crate::claim::Claim;
 use crate::cost::machine;
 use crate::figures::Figure;
 use crate::figures::context::{Context, Rendered};
+use crate::statistics::{Verdict, two_digits};
 use wakescope_sim::plot::html::HtmlTable;
 use wakescope_sim::plot::{Finding, Report, ReportEntry};
 
 /// The page as HTML.
 pub(super) fn html(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> Result<String, Failure> {
-    let of = |verdict: Verdict| done.iter().flat_map(|(_, r)| &r.claims).filter(move |c| c.verdict == verdict);
-    let findings = |verdict: Verdict| of(verdict).map(finding).collect();
+    let heads: [(&str, bool, Verdict); 4] = [
+        ("What the chapter says and this run does not find", true, Verdict::Fail),
+        ("What the chapter says and this run does not decide", true, Verdict::Open),
+        ("The program's own claims that fail", false, Verdict::Fail),
+        ("The program's own claims that this run does not decide", false, Verdict::Open),
+    ];
+    let findings = heads.map(|(heading, of_chapter, verdict)| {
+        let here = |c: &&Claim| c.verdict == verdict && matches!(Kind::of(&c.id), Kind::Chapter(_)) == of_chapter;
+        (heading.into(), done.iter().flat_map(|(_, r)| &r.claims).filter(here).map(finding).collect())
+    });
     let report = Report {
         title: "wakescope: figures and claims".into(),
         found: found(context, done, run_s),
-        findings: vec![
-            ("Claims that fail".into(), findings(Verdict::Fail)),
-            ("Claims that this run does not decide".into(), findings(Verdict::NotResolved)),
-        ],
+        findings: findings.into(),
         facts: facts(context),
         entries: done.iter().map(|(figure, rendered)| entry(figure, rendered)).collect(),
         claims: claims(done),
@@ -27,26 +34,42 @@ pub(super) fn html(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) 
     Ok(report.to_html()?)
 }
 
-/// How many claims hold, and what it took.
+/// Of a list of claims how many hold, do not, are open.
+pub(super) fn counted(name: &str, claims: &[&Claim]) -> String {
+    let of: Vec<&&Claim> = claims.iter().filter(|claim| Kind::of(&claim.id).name() == name).collect();
+    let count = |verdict| of.iter().filter(|claim| claim.verdict == verdict).count();
+    let [holds, fails, open] = [Verdict::Pass, Verdict::Fail, Verdict::Open].map(count);
+    format!("{} claims: {holds} hold, {fails} do not, {open} are open", of.len())
+}
+
+/// How many claims hold, what the figures say in words, and what it took.
 fn found(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> String {
-    let count = |verdict| done.iter().flat_map(|(_, r)| &r.claims).filter(|c| c.verdict == verdict).count();
-    let [holds, fails, open] = [Verdict::Pass, Verdict::Fail, Verdict::NotResolved].map(count);
+    let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
     let core_s: f64 = done.iter().flat_map(|(_, r)| &r.timings).map(|(_, [_, core_s])| core_s).sum();
+    let words: Vec<&str> = done.iter().map(|(_, r)| r.words.as_str()).filter(|words| !words.is_empty()).collect();
     format!(
-        "{holds} of {} claims hold, {fails} fail, {open} are not decided with the profile {}. {} figures and tables took \
-         {core_s:.0} s of processor time; this run, with those that it found in the cache, {run_s:.0} s.",
-        holds + fails + open,
+        "The chapter's {}; the program's own {} (profile {}). {} {} figures and tables took {core_s:.0} s of processor time; this \
+         run, with those that it found in the cache, {run_s:.0} s.",
+        counted("chapter", &claims),
+        counted("own", &claims),
         context.profile_name(),
+        words.join(" "),
         done.len()
     )
 }
 
 fn finding(claim: &Claim) -> Finding {
+    let kind = Kind::of(&claim.id);
+    let said = if let Kind::Chapter(_) = kind { format!("{} ", kind.source()) } else { String::new() };
+    let decided = match claim.decided_by.as_str() {
+        "" => String::new(),
+        by => format!(" Would decide: {by}."),
+    };
     Finding {
         name: claim.id.clone(),
         entry: claim.figure.clone(),
         statement: claim.statement.clone(),
-        reason: format!("Expected: {}. Measured: {}.", claim.expected, claim.measured),
+        reason: format!("{said}Expected: {}. Measured: {}.{decided}", claim.expected, claim.measured),
     }
 }
 
@@ -95,10 +118,12 @@ fn words(list: &[&str]) -> Vec<String> {
 fn claims(done: &[(&Figure, Rendered)]) -> HtmlTable {
     let row = |c: &Claim| {
         let error = if c.standard_error.is_nan() { String::new() } else { two_digits(c.standard_error) };
-        vec![c.id.clone(), c.statement.clone(), c.expected.clone(), c.measured.clone(), error, c.verdict.name().into()]
+        let list = Kind::of(&c.id).name().to_owned();
+        let told = [&c.statement, &c.expected, &c.measured, &error].map(String::clone);
+        [vec![c.id.clone(), list], told.to_vec(), vec![c.verdict.name().into()]].concat()
     };
     HtmlTable {
-        header: words(&["id", "statement", "expected", "measured", "standard error", "verdict"]),
+        header: words(&["id", "list", "statement", "expected", "measured", "standard error", "verdict"]),
         rows: done.iter().flat_map(|(_, r)| r.claims.iter().map(row)).collect(),
     }
 }

@@ -1,7 +1,7 @@
 //! A stiff or extreme case: what is asked, what it must come to, and what it came to.
 
 use crate::Failure;
-use crate::claim::Verdict;
+use crate::statistics::Verdict;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 

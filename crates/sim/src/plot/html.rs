@@ -9,7 +9,7 @@ use crate::io::{OutputError, OutputResult, same_length};
 pub struct HtmlTable {
     /// Column names.
     pub header: Vec<String>,
-    /// Cells, row by row, as many as columns. The words `pass`, `fail` and `not_resolved` are coloured.
+    /// Cells, row by row, as many as columns. The words `pass`, `fail` and `open` are coloured.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -76,7 +76,7 @@ figure svg{display:block;width:100%;height:auto}figcaption{font-size:14.5px;colo
 .mark{display:inline-block;font-size:12px;font-weight:normal;background:#eef3f8;border:1px solid #cbd9e6;border-radius:10px;padding:1px 9px;margin-left:8px;vertical-align:2px}
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-size:14px;width:100%}
 th,td{border-bottom:1px solid #e6e6e6;padding:5px 10px;text-align:left;vertical-align:top;overflow-wrap:anywhere}th{background:#f6f6f6;font-weight:600}
-td.pass{color:#00643f;font-weight:600}td.fail{color:#b03a00;font-weight:600}td.not_resolved{color:#6b5a00;font-weight:600}
+td.pass{color:#00643f;font-weight:600}td.fail{color:#b03a00;font-weight:600}td.open{color:#6b5a00;font-weight:600}
 @media (max-width:700px){body{padding:12px 12px 60px}h1{font-size:23px}nav ul{columns:1}dl{grid-template-columns:1fr}dt{margin-top:6px}
 figure{padding:8px;margin:18px 0}thead{display:none}tr{display:block;border-bottom:2px solid #ccc;padding:6px 0}
 td{display:flex;gap:10px;border:0;padding:2px 4px}td::before{content:attr(data-label);flex:0 0 7.5em;color:#666;font-weight:normal}}
@@ -167,7 +167,7 @@ fn push_table(name: &str, table: &HtmlTable, out: &mut String) -> OutputResult<(
         *out += "<tr>";
         for (cell, column) in row.iter().zip(&table.header) {
             let class = match cell.as_str() {
-                "pass" | "fail" | "not_resolved" => format!(" class=\"{cell}\""),
+                "pass" | "fail" | "open" => format!(" class=\"{cell}\""),
                 _ => String::new(),
             };
             *out += &format!("<td{class} data-label=\"{}\">{}</td>", escape(column), escape(cell));
@@ -202,7 +202,7 @@ mod tests {
                 table: Some(row(WILD)),
                 marks: vec![WILD.into()],
             }],
-            claims: row("not_resolved"),
+            claims: row("open"),
             timings: row(WILD),
         }
     }
@@ -212,7 +212,7 @@ mod tests {
         let page = report().to_html().unwrap();
         assert!(!page.contains("<script"), "{page}");
         assert_eq!(page.matches("&lt;script&gt;").count(), 19);
-        assert!(page.contains("<td class=\"not_resolved\" data-label="));
+        assert!(page.contains("<td class=\"open\" data-label="));
         // What does not hold stands before the figures, and an empty list has no heading.
         assert!(
             page.find("class=\"finding first\"").unwrap() < page.find("<figure").unwrap() && !page.contains("nothing")

@@ -2,12 +2,13 @@
 //!
 //! Check: the test of the pictures reads a run that the program made.
 
-use super::super::CaseFile;
 use super::super::kind::CaseKind;
+use super::super::{CaseFile, Subgrid};
 use super::case::WakeFlow;
 use crate::Error;
 use crate::io::Provenance;
 use std::collections::HashMap;
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 /// A finished run.
@@ -17,6 +18,8 @@ pub struct FinishedWake {
     pub folder: PathBuf,
     /// The flow.
     pub flow: WakeFlow,
+    /// Which subgrid model it has, or none, in a word.
+    pub subgrid: &'static str,
     /// The case as TOML.
     pub case_toml: String,
     /// Ages of the whole fields, in the order of the files.
@@ -46,6 +49,12 @@ impl FinishedWake {
         let wake = Self {
             folder: folder.to_owned(),
             flow: *flow,
+            subgrid: match file.case.solver.subgrid {
+                Subgrid::None {} => "no",
+                Subgrid::Smagorinsky { .. } => "Smagorinsky's",
+                Subgrid::Wale { .. } => "WALE as",
+                Subgrid::MultiscaleWale { .. } => "multiscale",
+            },
             origin: file.provenance(),
             case_toml: file.toml.clone(),
             fields_tau: output.fields_tau.clone().unwrap_or_default(),
@@ -83,8 +92,12 @@ impl FinishedWake {
     pub fn words(&self) -> String {
         let [x, y, z] = self.flow.cells;
         format!(
-            "simulated flow, {x} x {y} x {z} cells, Γ₀/ν = {}, core {} b₀, noise {} V₀",
-            self.flow.reynolds, self.flow.core_radius, self.flow.perturbation
+            "simulated flow, {x} x {y} x {z} cells, {} subgrid model, Γ₀/ν = {}, core {} b₀ ({:.1} % of the span), noise {} V₀",
+            self.subgrid,
+            self.flow.reynolds,
+            self.flow.core_radius,
+            25.0 * PI * self.flow.core_radius,
+            self.flow.perturbation
         )
     }
 }
