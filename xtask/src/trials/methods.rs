@@ -87,6 +87,8 @@ impl Methods {
         let uniform = GradientLikelihood::<f64>::new(&wind, known.snr, &[0.0], 1024)?;
         let sheared = GradientLikelihood::<f64>::new(&wind, known.snr, &GRADIENTS_PER_S, 1024)?;
         let peak = |padded| SpectralPeak::new(&s, kind, WINDOW, padded, refinement);
+        let weighted = |of: &Correlogram<f64>| peak(1024)?.with_lag_weights(&of.lag_weights());
+        let (of_gaussian, of_tapers) = (weighted(&gaussian)?, weighted(&tapered)?);
         let model_of = |order| AutoregressivePeak::new(&s, kind, WINDOW, order, 2048, refinement);
         Ok(Self { statistics: Vec::new(), methods: Vec::new(), counts: counts.to_vec() }
             .with_statistic(plain)
@@ -96,7 +98,7 @@ impl Methods {
             .with_statistic(sheared.statistic)
             .with("PA, no interpolation", 0, SpectralPeak::new(&s, kind, WINDOW, WINDOW, Refinement::None)?)
             .with("PA", 0, peak(1024)?)
-            .with("PA, Gaussian window", 1, peak(1024)?)
+            .with("PA, Gaussian window", 1, of_gaussian)
             .with("CA, AR(16)", 0, model_of(16)?)
             .with_chosen_order("CA, order by MDL", &model_of(16)?)
             .with("CA, unbiased AR(16)", 0, Unbiased::new(model_of(16)?, kind, &weights)?)
@@ -105,7 +107,7 @@ impl Methods {
             .with("CA-BT, 16 lags", 0, LagWindowPeak::new(&s, kind, WINDOW, 16, 1024, refinement)?)
             .with("first moment", 0, FirstMoment::new(&s, kind, WINDOW, 512, 3.5)?)
             .with("pulse pair", 0, PulsePair::new(&s, kind, WINDOW)?)
-            .with("likelihood, tapers", 2, peak(1024)?)
+            .with("likelihood, tapers", 2, of_tapers)
             .with("likelihood", 3, uniform.estimator)
             .with("likelihood with gradient", 4, sheared.estimator))
     }

@@ -17,6 +17,8 @@ pub struct LagWindowPeak {
     lags: usize,
     kind: SignalKind,
     peak: SpectralPeak,
+    /// The same of all lags, whose peak shows the width where the lag window's fills the band.
+    sharp: SpectralPeak,
 }
 
 impl LagWindowPeak {
@@ -36,20 +38,28 @@ impl LagWindowPeak {
         check_order(reach_lags, lags)?;
         let step_rad = std::f64::consts::PI / reach_lags as f64;
         let weights: Vec<f64> = (0..reach_lags).map(|m| 0.5 + 0.5 * (step_rad * m as f64).cos()).collect();
-        let triangle = |m: usize| 1.0 - m as f64 / lags as f64;
-        let seen: Vec<f64> = weights.iter().enumerate().map(|(m, weight)| weight * triangle(m)).collect();
-        let peak =
-            SpectralPeak::new(sampling, kind, reach_lags, padded_samples, refinement)?.with_lag_weights(&seen)?;
-        Ok(Self { weights, lags, kind, peak })
-    }
-}
-
-impl Estimator for LagWindowPeak {
-    fn statistic_len(&self) -> usize {
-        self.kind.lag_numbers(self.lags)
+        Ok(Self {
+            weights,
+            lags,
+            kind,
+            peak: SpectralPeak::new(sampling, kind, reach_lags, padded_samples, refinement)?,
+            sharp: SpectralPeak::new(sampling, kind, lags, padded_samples, refinement)?,
+        })
     }
 
-    fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
+    /// As [`SpectralPeak::with_lag_weights`]; these are the weights of the window.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if there are not as many weights as lags.
+    pub fn with_lag_weights(mut self, lag_weights: &[f64]) -> Result<Self, Error> {
+        self.sharp = self.sharp.with_lag_weights(lag_weights)?;
+        let seen: Vec<f64> = self.weights.iter().zip(lag_weights).map(|(weight, own)| weight * own).collect();
+        self.peak = self.peak.with_lag_weights(&seen)?;
+        Ok(self)
+    }
+
+    /// The peak of the lag-windowed spectrum alone, without a width.
+    pub(crate) fn smooth(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
         let per_lag = self.kind.lag_numbers(1);
         let mut numbers = std::mem::take(&mut scratch.numbers);
         numbers.clear();
@@ -60,7 +70,30 @@ impl Estimator for LagWindowPeak {
         );
         let estimate = self.peak.estimate(&numbers, scratch);
         scratch.numbers = numbers;
-        estimate
+        GateVelocity { spread_m2_s2: f64::NAN, ..estimate }
+    }
+}
+
+impl Estimator for LagWindowPeak {
+    fn statistic_len(&self) -> usize {
+        self.kind.lag_numbers(self.lags)
+    }
+
+    fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
+        let estimate = self.smooth(mean, scratch);
+        let sharp = self.sharp.estimate(mean, scratch);
+        let resolution_m_s = {
+            let sampling = self.peak.sampling();
+            0.5 * sampling.wavelength_m * sampling.sample_rate_hz / self.weights.len() as f64
+        };
+        // the width of another peak is not that of this one
+        match (sharp.velocity_m_s - estimate.velocity_m_s).abs() < resolution_m_s {
+            true => {
+                let GateVelocity { spread_m2_s2, resolution_m2_s2, .. } = sharp;
+                GateVelocity { spread_m2_s2, resolution_m2_s2, ..estimate }
+            }
+            false => estimate,
+        }
     }
 }
 
@@ -91,6 +124,15 @@ impl PulsePair {
         let phasors =
             band.band_frequencies_hz().iter().map(|f_hz| Complex::from_polar(1.0, rad_per_hz * f_hz)).collect();
         Ok(Self { sampling: *sampling, kind, lags, band, phasors })
+    }
+
+    /// As [`SpectralPeak::with_lag_weights`].
+    ///
+    /// # Errors
+    /// [`Error::Length`] if there are not as many weights as lags.
+    pub fn with_lag_weights(mut self, lag_weights: &[f64]) -> Result<Self, Error> {
+        self.band = self.band.with_lag_weights(lag_weights)?;
+        Ok(self)
     }
 
     /// Lag 1 of the band-limited analytic signal.

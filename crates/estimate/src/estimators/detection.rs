@@ -1,192 +1,313 @@
 //! How high the peak of pure noise stands: the threshold that tells a signal from noise.
 //!
-//! The density of a spectrum at one frequency is a quadratic form x^H Q x of the samples. In white noise its mean over
-//! n_eff windows is, nearly, a gamma variable of shape a = n_eff (tr Q)^2 / tr Q^2. Between the frequencies it is a smooth
-//! process; the rate at which it crosses a level upwards follows from its gradient (Rice 1945). With t the level over the
-//! density of the noise, B the band in cycles per sample and w^2 the mean of (2 pi (n - m))^2 / 2 over |Q_nm|^2,
+//! The density of a spectrum at one frequency is a quadratic form x^H A x of the samples, over a region the sum of those of its
+//! windows. With C the covariance of the noise and tr CA = 1 in the middle of the band, it is in noise nearly y + theta G, G a gamma variable of
+//! shape a: mean and variance are those of the form, and the tail falls as that of its largest eigenvalues,
 //!
 //! ```text
-//! P(t) = 1 - (1 - T) exp(-B w / sqrt(pi) (a t)^(a - 1/2) e^(-a t) / Gamma(a))
-//! T = Q(a, a t), the upper incomplete gamma function
+//! theta = tr (CA)^4 / tr (CA)^3, a = tr (CA)^2 / theta^2, y = 1 - theta a
 //! ```
 //!
+//! Between the frequencies it is a smooth process; the rate at which it crosses a level upwards follows from its gradient (Rice 1945). An
+//! excursion above a high level has one peak; those with their peak beyond an edge of the band, where it is flagged, are as many as
+//! those that begin beyond the edge with their peak within. So with t the level over the density of the noise, g = (t - y) / theta, c its
+//! change with the frequency, p the law of G, s^2 = 2 g w^2 the variance of its gradient and F_s the unit of frequency,
+//!
+//! ```text
+//! P(t) = 1 - exp(- integral over the band of p(g) [s / sqrt(2 pi) exp(-c^2 / (2 s^2)) + |c| / 2 erf(|c| / (sqrt(2) s))])
+//! w^2 = tr (C A')^2 / (2 tr (C A)^2), A'_nm = 2 pi i (n - m) A_nm
+//! ```
+//!
+//! Near the edges of a band mean m and deviation d of the density of band-limited noise are smaller than in its middle, and t is
+//! 1 + (t - m) / d there. A grid of frequencies 1 / M apart misses part of the peaks, which fall like t - (t - 1) w^2 f^2 beside their tops:
+//! the first term gets the factor sqrt(pi) / 2 erf(u) / u, u^2 = (t - 1) (1 - (a - 1) / g) / theta (w / (2 M))^2.
+//!
 //! The density of the noise must be known, as an instrument knows it from its detector without light: that of the mean
-//! statistic of noise ([`Noise::expected_correlogram`](crate::bound::Noise::expected_correlogram)). Check: one exponential; the
-//! rate of false alarms of spectra with one taper, several, and lag windows, in white and in band-limited noise, for
-//! single windows and whole regions (in the tests of the estimators).
+//! statistic of noise ([`Noise::expected_correlogram`]). Check: one exponential; the rate of false alarms of spectra with one taper,
+//! several, and lag windows, in white and in band-limited noise, for single windows and whole regions (in the tests of the
+//! estimators).
 
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
+
+use ndarray::Array2;
 use num_complex::Complex;
+use statrs::function::erf::erf;
 use statrs::function::gamma::ln_gamma;
 
+use crate::bound::Noise;
 use crate::error::{Error, positive};
 use crate::estimators::tails::gamma_tail;
-use crate::map::WindowCorrelation;
+use crate::map::{PolarPoint, ScanGeometry};
 use crate::spectrum::Taper;
-use crate::window::{Gates, Sampling};
+use crate::spectrum::lag_spectrum::Band;
+use crate::window::{Gates, Sampling, SignalKind};
 
-/// Distances between windows at which the correlation of their densities is computed; between them it is linear.
-const DISTANCES: usize = 48;
+type C64 = Complex<f64>;
+
+/// Samples by which the lags of a window are described; of more every second, third or further one is taken.
+const SAMPLES: usize = 40;
+
+/// Parts of half the band in which the density of the noise is one.
+const PARTS: usize = 12;
 
 /// The test of a spectrum against noise: what noise looks like in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseTest {
-    /// Gamma shape of the density of one window, (tr Q)^2 / tr Q^2.
-    gain: f64,
-    /// Independent cells that the mean over the band is worth.
-    cells: f64,
-    /// B w / sqrt(pi).
-    crossings: f64,
-    /// Frequencies at which the density is looked at.
-    frequencies: f64,
-    correlation: WindowCorrelation,
+    /// Variance of the mean over the band of the density of one window.
+    band_variance: f64,
+    /// Width of the band, and of the part of it whose peaks are not flagged, in cycles per sample.
+    band: (f64, f64),
+    /// Frequencies over 0 .. F_s at which the density is looked at.
+    padded: f64,
+    /// For increasing numbers of windows in a row the traces of the powers 2, 3 and 4 of CA, and half of that of (CA')^2.
+    moments: Vec<(usize, [f64; 4])>,
+    /// Mean and deviation of the density in the parts of half the band from its middle on, over those in the middle.
+    profile: Vec<(f64, f64)>,
+}
+
+/// What noise looks like in the density of a region, its mean being 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RegionNoise {
+    /// Independent windows that the region is worth; 0 without windows.
+    pub n_eff: f64,
+    /// Shape of the gamma variable, what it is multiplied with, and w in radians per cycle per sample.
+    shape: f64,
+    scale: f64,
+    gradient: f64,
+}
+
+impl RegionNoise {
+    /// Regions of the same key have thresholds within a thousandth of each other.
+    #[must_use]
+    pub fn key(&self) -> [i64; 3] {
+        [self.shape, self.scale, self.gradient].map(|value| (1e3 * value.ln()).round() as i64)
+    }
 }
 
 impl NoiseTest {
     /// For the spectrum of a correlogram of those tapers, times `lag_weights` from lag 0 on (none: all lags as they are),
-    /// whose peak is sought among `padded_samples` frequencies over 0 .. F_s.
+    /// whose peak is sought among `padded_samples` frequencies over 0 .. F_s, in that noise.
     ///
     /// # Errors
-    /// [`Error::Empty`] without tapers, [`Error::OutOfRange`] for tapers or weights without power.
+    /// [`Error::Empty`] without tapers, [`Error::OutOfRange`] for tapers or weights without power, [`Error::Band`] for an impossible band.
     pub fn new(
         sampling: &Sampling,
         gates: &Gates,
         tapers: &[Taper],
         lag_weights: Option<&[f64]>,
         padded_samples: usize,
+        noise: Noise,
     ) -> Result<Self, Error> {
         let complex = |taper: &Taper| {
             let root = taper.factor.abs().sqrt();
             taper.weights.iter().map(|h| Complex::from(h * root)).collect::<Vec<_>>()
         };
         let tapers: Vec<_> = tapers.iter().map(complex).collect();
-        Self::of_complex(sampling, gates, &tapers, lag_weights, padded_samples)
+        Self::of_complex(sampling, gates, &tapers, lag_weights, padded_samples, noise)
     }
 
     /// The same for tapers that are complex and hold the root of their factor.
     pub(crate) fn of_complex(
         sampling: &Sampling,
         gates: &Gates,
-        tapers: &[Vec<Complex<f64>>],
+        tapers: &[Vec<C64>],
         lag_weights: Option<&[f64]>,
         padded_samples: usize,
+        noise: Noise,
     ) -> Result<Self, Error> {
         let samples = tapers.first().map_or(0, Vec::len);
         if samples == 0 {
             return Err(Error::Empty { field: "tapers" });
         }
-        let band = (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz;
-        let shifts = distances(samples, gates.step_samples);
-        let mut overlap = vec![0.0; shifts.len()];
-        let (mut trace, mut square, mut in_band, mut spread) = (0.0, 0.0, 0.0, 0.0);
-        for lag in 0..lag_weights.map_or(samples, |weights| weights.len().min(samples)) {
-            let weight = lag_weights.map_or(1.0, |weights| weights[lag]);
-            // the diagonal of Q that many places off the middle one
-            let at = |n: usize| tapers.iter().map(|h| h[n + lag] * h[n].conj()).sum::<Complex<f64>>() * weight;
-            let diagonal: Vec<Complex<f64>> = (0..samples - lag).map(at).collect();
-            let sides = if lag == 0 { 1.0 } else { 2.0 };
-            let energy = sides * diagonal.iter().map(|q| q.norm_sqr()).sum::<f64>();
-            let turn = std::f64::consts::PI * band * lag as f64;
-            square += energy;
-            in_band += energy * if lag == 0 { 1.0 } else { (turn.sin() / turn).powi(2) };
-            spread += energy * (lag * lag) as f64;
-            if lag == 0 {
-                trace = diagonal.iter().map(|q| q.re).sum();
+        let bins = Band::new(sampling, SignalKind::Complex, padded_samples)?;
+        let (padded, band) =
+            (padded_samples as f64, (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz);
+        let within = if bins.cyclic { 1.0 } else { bins.bins.saturating_sub(2) as f64 / padded };
+        let lags = lag_weights.map_or(samples, |weights| weights.len().min(samples));
+        // Every so many samples stand for all. Where the lags reach not far, a shorter window of like tapers, too: so many times less independent.
+        let every = lags.div_ceil(SAMPLES);
+        let shorter = (samples / (every * SAMPLES.max(8 * lags / every))).max(1);
+        let size = samples.div_ceil(every * shorter);
+        let form = Array2::from_shape_fn((size, size), |(i, j)| {
+            let lag = i.abs_diff(j) * every;
+            let weight = if lag < lags { lag_weights.map_or(1.0, |weights| weights[lag]) } else { 0.0 };
+            let product = |h: &Vec<C64>| h[i * every * shorter] * h[j * every * shorter].conj();
+            tapers.iter().map(product).sum::<C64>() * weight
+        });
+        positive("power of the tapers", form.diag().iter().map(|q| q.re).sum())?;
+        let middle = 0.5 * (sampling.band_hz.0 + sampling.band_hz.1) / sampling.sample_rate_hz;
+        // Covariance of the noise in places, as it is so far from the middle of the band.
+        let covariance = |size: usize, offset: f64| {
+            let white = match noise {
+                Noise::Band { floor } if band * (every as f64) < 1.0 => floor,
+                _ => 1.0,
+            };
+            let lag = |lag: usize| {
+                let own = if lag == 0 { white } else { 0.0 };
+                let apart = (lag * every) as f64;
+                let within = if white < 1.0 {
+                    noise.covariance(sampling, apart, SignalKind::Complex) - own
+                } else {
+                    Complex::ZERO
+                };
+                within * every as f64 * Complex::from_polar(1.0, -TAU * (middle + offset) * apart) + own
+            };
+            let lags: Vec<C64> = (0..size).map(lag).collect();
+            Array2::from_shape_fn((size, size), |(i, j)| if i >= j { lags[i - j] } else { lags[j - i].conj() })
+        };
+        let seen = |offset: f64| {
+            let product = covariance(size, offset).dot(&form);
+            (product.diag().iter().map(|q| q.re).sum::<f64>(), trace(&product, &product).sqrt())
+        };
+        let (mean, deviation) = seen(0.0);
+        positive("power of the weights of the lags", deviation)?;
+        let part = |part: usize| {
+            let (own_mean, own_deviation) = seen(0.5 * band * (part as f64 + 0.5) / PARTS as f64);
+            (own_mean / mean, own_deviation / deviation)
+        };
+        let start = |gate: usize| (gate * gates.step_samples) as f64 / (every * shorter) as f64;
+        let moments = |gates: usize| {
+            let length = size + start(gates - 1).round() as usize;
+            let mut sum = Array2::<C64>::zeros((length, length));
+            for at in (0..gates).map(|gate| start(gate).round() as usize) {
+                let mut part = sum.slice_mut(ndarray::s![at..at + size, at..at + size]);
+                part += &form;
             }
-            for (sum, shift) in overlap.iter_mut().zip(&shifts) {
-                let pairs = diagonal.iter().skip(*shift).zip(&diagonal);
-                *sum += sides * pairs.map(|(a, b)| a.re * b.re + a.im * b.im).sum::<f64>();
-            }
-        }
-        positive("power of the tapers", trace)?;
-        positive("power of the weights of the lags", square)?;
-        let gates_apart = (samples - 1) / gates.step_samples + 1;
-        let gamma = |gate: usize| between(&shifts, &overlap, gate * gates.step_samples) / square;
-        let gamma: Vec<f64> = (0..gates_apart).map(|gate| gamma(gate).clamp(0.0, 1.0).sqrt()).collect();
+            let turned = Array2::from_shape_fn((length, length), |(i, j)| {
+                sum[[i, j]] * Complex::new(0.0, TAU * every as f64 * (i as f64 - j as f64))
+            });
+            let covariance = covariance(length, 0.0);
+            let (once, turned) = (covariance.dot(&sum), covariance.dot(&turned));
+            let twice = once.dot(&once);
+            let (unit, less) = (mean.recip(), shorter as f64);
+            let [second, third] = [unit * unit / less, (unit / less).powi(2) * unit];
+            [
+                trace(&once, &once) * second,
+                trace(&twice, &once) * third,
+                trace(&twice, &twice) * third * unit / less,
+                0.5 * trace(&turned, &turned) * second,
+            ]
+        };
+        let in_band = form.indexed_iter().map(|((i, j), q)| {
+            let turn = PI * band * (i.abs_diff(j) * every) as f64;
+            q.norm_sqr() * if i == j { 1.0 } else { (turn.sin() / turn).powi(2) }
+        });
+        let power: f64 = form.diag().iter().map(|q| q.re).sum();
         Ok(Self {
-            gain: trace * trace / square,
-            cells: square / in_band,
-            // w^2 = (2 pi)^2 spread / (2 square)
-            crossings: band * (std::f64::consts::TAU * spread / square).sqrt(),
-            frequencies: (band * padded_samples as f64).floor().max(1.0),
-            correlation: WindowCorrelation::from_gate_lags(&gamma)?,
+            band_variance: in_band.sum::<f64>() / (power * power * shorter as f64),
+            band: (band, within),
+            padded,
+            moments: lengths(2 * samples / gates.step_samples + 2).into_iter().map(|row| (row, moments(row))).collect(),
+            profile: (0..PARTS).map(part).collect(),
         })
     }
 
-    /// Correlation of the densities of noise in the windows of one pulse, for the n_eff that the test asks for.
+    /// What noise looks like in a region of that many windows in a row, each in so many pulses.
     #[must_use]
-    pub fn correlation(&self) -> &WindowCorrelation {
-        &self.correlation
+    pub fn region(&self, chords: impl Iterator<Item = (usize, usize)>) -> RegionNoise {
+        let (mut level, mut sums) = (0.0, [0.0; 4]);
+        for (gates, pulses) in chords {
+            level += (pulses * gates) as f64;
+            sums.iter_mut().zip(self.row(gates)).for_each(|(sum, moment)| *sum += pulses as f64 * moment);
+        }
+        if level == 0.0 {
+            return RegionNoise { n_eff: 0.0, shape: f64::NAN, scale: f64::NAN, gradient: f64::NAN };
+        }
+        let [second, third, fourth, gradient] = sums;
+        let scale = fourth / (third * level);
+        let variance = second / (level * level);
+        RegionNoise {
+            n_eff: self.moments[0].1[0] / variance,
+            shape: variance / (scale * scale),
+            scale,
+            gradient: (gradient / second).sqrt(),
+        }
+    }
+
+    /// The same in the region of that radius about a point of a scan, all of whose samples are valid.
+    #[must_use]
+    pub fn region_at(&self, places: &ScanGeometry, point: PolarPoint, radius_m: f64) -> RegionNoise {
+        self.region(places.chords(point, radius_m).map(|chord| (chord.gates(), places.rays.count(chord.line))))
+    }
+
+    /// The moments of that many windows in a row: powers of their number at first, linear in it once rows are longer than a window.
+    fn row(&self, gates: usize) -> [f64; 4] {
+        let above = self.moments.partition_point(|(at, _)| *at < gates).clamp(1, self.moments.len() - 1);
+        let ((low, a), (high, b)) = (&self.moments[above - 1], &self.moments[above]);
+        let (at, low, high) = (gates as f64, *low as f64, *high as f64);
+        [0, 1, 2, 3].map(|k| match at > high {
+            true => a[k] + (b[k] - a[k]) * (at - low) / (high - low),
+            false => a[k] * (b[k] / a[k]).powf((at / low).ln() / (high / low).ln()),
+        })
     }
 
     /// Standard deviation of the mean density of noise in the band, over its mean.
     #[must_use]
     pub fn band_deviation(&self, n_eff: f64) -> f64 {
-        (n_eff * self.gain * self.cells).sqrt().recip()
+        (self.band_variance / n_eff).sqrt()
     }
 
-    /// Probability that noise alone has a peak of more than `level` times its density.
-    ///
-    /// `n_eff` is the number of independent windows by [`NoiseTest::correlation`].
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] unless both are above 0 and finite.
-    pub fn false_alarm(&self, n_eff: f64, level: f64) -> Result<f64, Error> {
-        positive("n_eff", n_eff)?;
-        positive("level", level)?;
-        Ok(self.probability(n_eff * self.gain, level))
-    }
-
-    fn probability(&self, shape: f64, level: f64) -> f64 {
-        let sum = shape * level;
-        let single = gamma_tail(shape, sum);
-        let crossings = self.crossings * ((shape - 0.5) * sum.ln() - sum - ln_gamma(shape)).exp();
-        // no more chances than frequencies looked at
-        let chances = crossings.min(-(self.frequencies - 1.0) * (-single).ln_1p());
-        1.0 - (1.0 - single) * (-chances).exp()
-    }
-
-    /// Peak over the density of the noise that noise alone exceeds with probability `false_alarm`.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] unless `n_eff` is above 0 and `false_alarm` between 0 and 1.
-    pub fn threshold(&self, n_eff: f64, false_alarm: f64) -> Result<f64, Error> {
-        positive("n_eff", n_eff)?;
-        if !(false_alarm > 0.0 && false_alarm < 1.0) {
-            return Err(Error::OutOfRange { field: "false_alarm", value: false_alarm, allowed: "between 0 and 1" });
+    /// Probability that noise alone has a peak of more than `level` times its density in a region, within the band and not at its edge.
+    #[must_use]
+    pub fn false_alarm(&self, region: &RegionNoise, level: f64) -> f64 {
+        let RegionNoise { shape, scale, gradient, .. } = *region;
+        let of_part = |(mean, deviation): &(f64, f64)| 1.0 + (level - mean) / deviation;
+        let sums: Vec<f64> = self.profile.iter().map(|part| (of_part(part) - 1.0 + scale * shape) / scale).collect();
+        // below the mean it is always above
+        if level <= 1.0 || sums.iter().any(|sum| *sum <= 0.0) {
+            return 1.0;
         }
-        let shape = n_eff * self.gain;
+        let rate = |part: usize| {
+            let (sum, excess) = (sums[part], of_part(&self.profile[part]) - 1.0);
+            let (before, after) = (part.saturating_sub(1), (part + 1).min(PARTS - 1));
+            let slope =
+                (sums[after] - sums[before]).abs() / ((after - before) as f64 * 0.5 * self.band.0 / PARTS as f64);
+            let spread = (2.0 * sum).sqrt() * gradient;
+            let steepness = (1.0 - (shape - 1.0) / sum).max(0.0) / scale;
+            let half_step = (0.5 * gradient / self.padded * (excess * steepness).sqrt()).max(1e-3);
+            let seen = 0.5 * PI.sqrt() * erf(half_step) / half_step;
+            let level_off = seen * spread / TAU.sqrt() * (-0.5 * (slope / spread).powi(2)).exp();
+            let across = 0.5 * slope * erf(FRAC_1_SQRT_2 * slope / spread);
+            let crossings = ((shape - 1.0) * sum.ln() - sum - ln_gamma(shape)).exp() * (level_off + across);
+            // no more chances than frequencies looked at
+            crossings.min(-self.padded * (-gamma_tail(shape, sum)).ln_1p())
+        };
+        1.0 - (-self.band.1 * (0..PARTS).map(rate).sum::<f64>() / PARTS as f64).exp()
+    }
+
+    /// Peak over the density of the noise that noise alone exceeds in a region with probability `rate`; NaN without windows.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] unless `rate` is between 0 and 1.
+    pub fn threshold(&self, region: &RegionNoise, rate: f64) -> Result<f64, Error> {
+        if !(rate > 0.0 && rate < 1.0) {
+            return Err(Error::OutOfRange { field: "false_alarm", value: rate, allowed: "between 0 and 1" });
+        }
         let (mut low, mut high) = (0.0, 2.0);
-        while self.probability(shape, high) > false_alarm && high < f64::MAX {
+        while self.false_alarm(region, high) > rate && high < f64::MAX {
             (low, high) = (high, 2.0 * high);
         }
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if self.probability(shape, middle) > false_alarm {
+            if self.false_alarm(region, middle) > rate {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        Ok(0.5 * (low + high))
+        Ok(if region.n_eff > 0.0 { 0.5 * (low + high) } else { f64::NAN })
     }
 }
 
-/// Distances in samples from 0 to the length of the window, those of the gates among them while they are few.
-fn distances(samples: usize, step: usize) -> Vec<usize> {
-    let every = step * samples.div_ceil(step).div_ceil(DISTANCES).max(1);
-    (0..samples).step_by(every).chain([samples]).collect()
+/// Trace of the product of two matrices, which is real here.
+fn trace(a: &Array2<C64>, b: &Array2<C64>) -> f64 {
+    a.iter().zip(b.t()).map(|(a, b)| (a * b).re).sum()
 }
 
-/// Value at `at` of a table with increasing places; beyond the last as there.
-fn between(places: &[usize], values: &[f64], at: usize) -> f64 {
-    let above = places.partition_point(|place| *place <= at);
-    match (places.get(above.wrapping_sub(1)), places.get(above)) {
-        (Some(&low), Some(&high)) => {
-            let part = (at - low) as f64 / (high - low) as f64;
-            values[above - 1] + part * (values[above] - values[above - 1])
-        }
-        _ => values.last().copied().unwrap_or(0.0),
-    }
+/// Numbers of windows in a row up to `most`, each some third more than the one before.
+fn lengths(most: usize) -> Vec<usize> {
+    let next = |at: &usize| Some((at + 1).max(4 * at / 3)).filter(|next| *next <= most);
+    std::iter::successors(Some(1), next).collect()
 }
 
 #[cfg(test)]
@@ -200,52 +321,72 @@ mod tests {
 
     fn of(weighting: Weighting, step: usize) -> NoiseTest {
         let taper = Taper::unit(weighting.weights(64).unwrap()).unwrap();
-        NoiseTest::new(&table_2(), &Gates::new(64, step, 0.0).unwrap(), &[taper], None, 1024).unwrap()
+        NoiseTest::new(&table_2(), &Gates::new(64, step, 0.0).unwrap(), &[taper], None, 1 << 16, Noise::White).unwrap()
     }
 
     #[test]
     fn one_taper_has_the_shape_of_one_exponential_and_known_cells() {
         let flat = of(Weighting::Rectangular, 1);
-        assert!((flat.gain - 1.0).abs() < 1e-12);
         // B N, and a little for what the edges of the band let in
-        assert!((12.8..14.5).contains(&flat.cells), "{}", flat.cells);
-        let exact = 12.8 * (std::f64::consts::PI / 3.0).sqrt();
-        assert!((flat.crossings / exact - 1.0).abs() < 1e-3, "{} {exact}", flat.crossings);
-        for gates in [0, 1, 5, 20, 63, 64] {
-            let overlap = (1.0 - f64::from(gates) / 64.0).powi(2);
-            assert!((flat.correlation().squared(gates as usize) - overlap).abs() < 2e-3, "{gates}");
+        assert!((12.8..14.5).contains(&flat.band_variance.recip()), "{}", flat.band_variance);
+        for gates in [1_usize, 2, 5, 20, 63, 100, 400] {
+            let overlap = |k: usize| if k < 64 { (1.0 - k as f64 / 64.0).powi(2) } else { 0.0 };
+            let pairs: f64 = (0..gates).flat_map(|i| (0..gates).map(move |j| overlap(i.abs_diff(j)))).sum();
+            let n_eff = flat.region([(gates, 1)].into_iter()).n_eff;
+            assert!((n_eff * pairs / (gates * gates) as f64 - 1.0).abs() < 0.03, "{gates}: {n_eff}");
         }
-        let weighted = of(Weighting::default(), 3);
-        assert!(weighted.cells < 0.8 * flat.cells && weighted.crossings < 0.8 * flat.crossings);
+        assert!(of(Weighting::default(), 3).band_variance > flat.band_variance / 0.8);
     }
 
     #[test]
     fn one_window_has_the_tail_of_an_exponential_and_crosses_a_level_at_rices_rate() {
         let test = of(Weighting::Rectangular, 1);
+        let window = test.region([(1, 1)].into_iter());
+        assert!((window.n_eff - 1.0).abs() < 1e-9 && (window.scale - 1.0).abs() < 1e-9, "{window:?}");
         for level in [3.0_f64, 5.0, 9.0] {
             let single = (-level).exp();
-            let crossings = 12.8 * (std::f64::consts::PI / 3.0).sqrt() * level.sqrt() * single;
-            let expected = 1.0 - (1.0 - single) * (-crossings).exp();
-            assert!((test.false_alarm(1.0, level).unwrap() / expected - 1.0).abs() < 1e-3, "{level}");
-            // a spectrum that is looked at in one place only
-            let one = NoiseTest { frequencies: 1.0, ..test.clone() };
-            assert!((one.false_alarm(1.0, level).unwrap() / single - 1.0).abs() < 1e-9);
+            let crossings = 12.8 * (PI / 3.0).sqrt() * level.sqrt() * single;
+            let found = test.false_alarm(&window, level) / (1.0 - (-crossings).exp());
+            assert!((found - 1.0).abs() < 2e-3, "{level}: {found}");
+            // frequencies so far apart that each is a chance of its own
+            let few = NoiseTest { padded: 5.0, band: (1.0, 1.0), ..test.clone() };
+            let expected = 1.0 - (1.0 - single).powi(5);
+            assert!((few.false_alarm(&window, level) / expected - 1.0).abs() < 1e-6, "{level}");
+        }
+    }
+
+    #[test]
+    fn short_lags_in_a_long_window_are_so_many_shorter_windows() {
+        let test = |samples: usize| {
+            let taper = Taper::unit(Weighting::Hann.weights(samples).unwrap()).unwrap();
+            let gates = Gates::new(samples, samples / 16, 0.0).unwrap();
+            let lags: Vec<f64> = (0..5).map(|m| 1.0 - 0.2 * f64::from(m)).collect();
+            NoiseTest::new(&table_2(), &gates, &[taper], Some(&lags), 1 << 16, Noise::White).unwrap()
+        };
+        for gates in [1, 10] {
+            let of = |samples: usize, pulses: usize| test(samples).region([(gates, pulses)].into_iter());
+            let (one, four) = (of(1024, 1), of(256, 4));
+            assert!((one.shape / four.shape - 1.0).abs() < 0.03 && (one.scale / four.scale - 1.0).abs() < 0.03);
+            assert!((one.gradient / four.gradient - 1.0).abs() < 0.03, "{one:?} {four:?}");
         }
     }
 
     #[test]
     fn thresholds_have_their_probability_and_fall_to_1_with_averaging() {
         let test = of(Weighting::default(), 1);
-        for n_eff in [0.5, 1.0, 7.5, 120.0, 1e4] {
+        let level = |gates, pulses, rate| test.threshold(&test.region([(gates, pulses)].into_iter()), rate).unwrap();
+        for (gates, pulses) in [(1, 1), (7, 1), (7, 40), (400, 1), (1, 10_000)] {
             for rate in [0.3, 0.01, 1e-6] {
-                let level = test.threshold(n_eff, rate).unwrap();
-                let found = test.false_alarm(n_eff, level).unwrap();
-                assert!((found / rate - 1.0).abs() < 1e-6, "{n_eff} {rate}: {level} {found}");
+                let region = test.region([(gates, pulses)].into_iter());
+                let level = level(gates, pulses, rate);
+                let found = test.false_alarm(&region, level);
+                assert!((found / rate - 1.0).abs() < 1e-6, "{gates} {pulses} {rate}: {level} {found}");
             }
         }
-        assert!(test.threshold(1e6, 0.01).unwrap() < 1.01);
-        assert!(test.threshold(7.5, 0.01).unwrap() < test.threshold(1.0, 0.01).unwrap());
-        assert!(test.threshold(0.0, 0.01).is_err() && test.threshold(1.0, 1.0).is_err());
-        assert!(test.threshold(f64::NAN, 0.01).is_err() && test.false_alarm(1.0, -1.0).is_err());
+        assert!(level(1, 1_000_000, 0.01) < 1.01 && level(1, 8, 0.01) < level(1, 1, 0.01));
+        let window = test.region([(1, 1)].into_iter());
+        assert!(test.threshold(&window, 1.0).is_err() && test.threshold(&window, f64::NAN).is_err());
+        let empty = test.region(std::iter::empty());
+        assert!(empty.n_eff == 0.0 && test.threshold(&empty, 0.01).unwrap().is_nan());
     }
 }

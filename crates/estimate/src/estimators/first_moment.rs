@@ -52,6 +52,16 @@ impl FirstMoment {
             least: padded_samples as f64 / lags as f64,
         })
     }
+
+    /// As [`SpectralPeak::with_lag_weights`].
+    ///
+    /// # Errors
+    /// [`Error::Length`] if there are not as many weights as lags.
+    pub fn with_lag_weights(mut self, lag_weights: &[f64]) -> Result<Self, Error> {
+        self.start = self.start.with_lag_weights(lag_weights)?;
+        self.spectrum = self.spectrum.with_lag_weights(lag_weights)?;
+        Ok(self)
+    }
 }
 
 impl Estimator for FirstMoment {
@@ -60,7 +70,7 @@ impl Estimator for FirstMoment {
     }
 
     fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
-        let smooth = self.start.estimate(mean, scratch);
+        let smooth = self.start.smooth(mean, scratch);
         let peak = self.spectrum.estimate(mean, scratch);
         if peak.flag != Quality::Good || smooth.flag != Quality::Good {
             return peak;

@@ -22,7 +22,7 @@ use rustfft::Fft;
 use crate::bound::{GradientModel, Noise};
 use crate::error::{Error, finite, increasing, length, positive};
 use crate::estimators::gradient_tapers::{LagWeights, Tapers, band_lag, tapers};
-use crate::estimators::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
+use crate::estimators::search::{PeakSearch, highest, unusable};
 use crate::estimators::{Estimator, GateVelocity, NoiseTest, Quality, Refinement, Statistic};
 use crate::spectrum::ZoomSpectrum;
 use crate::spectrum::transform::complex_transforms;
@@ -100,11 +100,16 @@ impl<S: Sample> GradientLikelihood<S> {
         gradient_per_s.iter().try_for_each(|&g| finite("gradient_per_s", g))?;
         increasing("gradient_per_s", gradient_per_s)?;
         let (sampling, n) = (model.sampling(), model.window_samples());
-        let search = PeakSearch::new(sampling, SignalKind::Complex, padded_samples, n)?;
         sampling.validate_for(S::KIND)?;
         let share = (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz;
         let tapers =
             gradient_per_s.iter().map(|&g| tapers(model, g, snr * share, S::KIND)).collect::<Result<Vec<_>, _>>()?;
+        let size = |&k: &usize| gradient_per_s[k].abs();
+        let slowest = (0..tapers.len()).min_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
+        // Tapers of other gradients are these with a chirp, which takes out that of the wind.
+        let tone = LagWeights::new(&tapers[slowest], n).expected_lags(&Array2::ones((n, n)));
+        let weights: Vec<f64> = tone.iter().step_by(2).map(|weight| weight / tone[0]).collect();
+        let search = PeakSearch::new(sampling, SignalKind::Complex, padded_samples, &weights)?;
         let white = model.noise() == Noise::White;
         let sides = if S::KIND == SignalKind::Real { 0.5 } else { 1.0 };
         let band_lags = match white {
@@ -112,8 +117,6 @@ impl<S: Sample> GradientLikelihood<S> {
             false => (0..n).map(|m| band_lag(sampling, m, share)).collect(),
         };
         let grid_hz: Vec<f64> = (0..4 * n).map(|k| k as f64 * sampling.sample_rate_hz / (4 * n) as f64).collect();
-        let size = |&k: &usize| gradient_per_s[k].abs();
-        let slowest = (0..tapers.len()).min_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
         let mut estimator = GradientPeak {
             corrections: Vec::new(),
             gradient_readings: Vec::new(),
@@ -127,10 +130,6 @@ impl<S: Sample> GradientLikelihood<S> {
             whole: ZoomSpectrum::new(SignalKind::Complex, n, sampling, &grid_hz)?,
             search,
         };
-        // Tapers of other gradients are these with a chirp, which takes out that of the wind.
-        let tone = LagWeights::new(&tapers[slowest], n).expected_lags(&Array2::ones((n, n)));
-        let weights: Vec<f64> = tone.iter().step_by(2).map(|weight| weight / tone[0]).collect();
-        estimator.search.own_width = own_width_cycles(&weights) * padded_samples as f64;
         if S::KIND == SignalKind::Real {
             let read = gradient_per_s.iter().zip(&tapers).map(|(&g, tapers)| estimator.readings(model, g, snr, tapers));
             estimator.corrections = read.collect::<Result<_, _>>()?;
@@ -150,14 +149,14 @@ impl<S: Sample> GradientLikelihood<S> {
 }
 
 impl<S: Sample> GradientLikelihood<S> {
-    /// The test of its estimates against noise: of the spectrum of the gradient nearest to 0.
+    /// The test of its estimates against a noise: of the spectrum of the gradient nearest to 0.
     ///
     /// # Errors
     /// As [`NoiseTest::new`].
-    pub fn noise_test(&self, gates: &Gates) -> Result<NoiseTest, Error> {
+    pub fn noise_test(&self, gates: &Gates, noise: Noise) -> Result<NoiseTest, Error> {
         let (estimator, padded) = (&self.estimator, self.estimator.search.padded());
         let tapers = &self.statistic.tapers[estimator.slowest].weights;
-        NoiseTest::of_complex(&estimator.sampling, gates, tapers, None, padded)
+        NoiseTest::of_complex(&estimator.sampling, gates, tapers, None, padded, noise)
     }
 
     /// The mean statistic of windows whose samples have the autocovariance `lags`, of all lags of a window: that of a noise
@@ -296,7 +295,7 @@ impl GradientPeak {
             let covariance = model.moved(&envelope, velocity_m_s, snr, SignalKind::Real)?;
             let lags = weights.expected_lags(&covariance.mapv(|value| C64::from(value.re)));
             self.zoom.density_into(&lags, &mut density)?;
-            let found = self.search.locate(&density, Refinement::Parabola, |_, _| None);
+            let found = self.search.locate(&density, Refinement::Parabola, &[], || None);
             let read_m_s = self.sampling.velocity_m_s(self.search.band.frequency_hz(found.bin));
             // at the edges of the band the peak leaves it: only increasing readings can be inverted
             if found.flag == Quality::Good && readings.last().is_none_or(|last| last.0 < read_m_s) {
@@ -328,12 +327,12 @@ impl GradientPeak {
             if self.zoom.density_into(lags, &mut scratch.band).is_err() {
                 return none(Quality::Invalid);
             }
-            let located = self.search.locate(&scratch.band, Refinement::Parabola, |peak, _| {
-                if beyond_doubt(peak, density_limit(lags)) {
-                    return None;
-                }
+            let located = self.search.locate(&scratch.band, Refinement::Parabola, lags, || {
                 self.whole.density_into(lags, &mut scratch.density).ok()?;
-                Some((highest(&scratch.density).1, 0.5))
+                let (place, highest) = highest(&scratch.density);
+                let place = place as f64 / scratch.density.len() as f64;
+                // of real samples the image may be the higher one
+                Some((highest, if self.corrections.is_empty() { place } else { place.min(1.0 - place) }))
             });
             let estimate = self.search.velocity(&located, self.search.band.frequency_hz(located.bin));
             if k == self.slowest {

@@ -19,7 +19,7 @@ pub(crate) mod velocity;
 
 pub use cell_test::CellTest;
 pub use correlogram_estimators::{LagWindowPeak, PulsePair};
-pub use detection::NoiseTest;
+pub use detection::{NoiseTest, RegionNoise};
 pub use first_moment::FirstMoment;
 pub use gradient_likelihood::{GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity};
 pub use likelihood::likelihood_tapers;

@@ -7,7 +7,7 @@
 //! and tones.
 
 use crate::error::Error;
-use crate::estimators::search::{PeakSearch, unusable};
+use crate::estimators::search::{PeakSearch, highest, unusable};
 use crate::estimators::{Estimator, GateVelocity, Quality, Refinement};
 use crate::models::autoregressive::check_order;
 use crate::models::{Autoregression, OrderChoice};
@@ -33,7 +33,6 @@ struct ModelPeak {
     sampling: Sampling,
     zoom: ZoomSpectrum,
     whole: ZoomSpectrum,
-    padded: usize,
     search: PeakSearch,
     refinement: Refinement,
     /// Weights of the lags for the test against noise.
@@ -58,7 +57,8 @@ impl ModelPeak {
         refinement: Refinement,
     ) -> Result<Self, Error> {
         check_order(order, lags)?;
-        let search = PeakSearch::new(sampling, kind, padded, lags)?;
+        let lag_weights = model_lag_weights(order);
+        let search = PeakSearch::new(sampling, kind, padded, &lag_weights)?;
         let distinct = match kind {
             SignalKind::Real => padded / 2 + 1,
             SignalKind::Complex => padded,
@@ -74,10 +74,9 @@ impl ModelPeak {
             sampling: *sampling,
             zoom: ZoomSpectrum::new(kind, order + 1, sampling, &search.band.with_neighbours_hz())?,
             whole: ZoomSpectrum::new(kind, order + 1, sampling, &grid_hz)?,
-            padded,
             search,
             refinement,
-            lag_weights: model_lag_weights(order),
+            lag_weights,
         })
     }
 
@@ -90,10 +89,11 @@ impl ModelPeak {
         let mut band = std::mem::take(&mut scratch.band);
         let solved = model.solve(mean, self.kind, self.order, &mut numbers).and_then(|()| self.choose(&mut model));
         let mut estimate = match solved {
-            Ok(()) => self.read(&model, mean, &mut numbers, &mut band, &mut scratch.density),
+            Ok(()) => self.read(&model, &mut numbers, &mut band),
             Err(_) => GateVelocity::none(Quality::Invalid),
         };
-        // the density of a model is not linear in the correlogram: power and detection are those of its lags
+        // The density of a model is not linear in the correlogram: power and detection are those of its lags, which also tell what
+        // lines outside leak. How wide a spectrum is a model does not show: its peaks narrow with the signal-to-noise ratio.
         numbers.clear();
         numbers.extend(
             mean.chunks(self.kind.lag_numbers(1))
@@ -101,7 +101,18 @@ impl ModelPeak {
                 .flat_map(|(lag, w)| lag.iter().map(move |r| r * w)),
         );
         if self.zoom.density_into(&numbers, &mut band).is_ok() {
-            (estimate.power, estimate.detection) = self.search.power_and_detection(&band);
+            let found = self.search.locate(&band, Refinement::None, &numbers, || {
+                self.whole.density_into(&numbers, &mut scratch.density).ok()?;
+                let (place, highest) = highest(&scratch.density);
+                Some((highest, place as f64 / self.search.padded() as f64))
+            });
+            match (estimate.flag, found.flag) {
+                (Quality::Good | Quality::OutOfBand, flag @ Quality::NoSignal) => estimate = GateVelocity::none(flag),
+                (Quality::Good, flag) => estimate.flag = flag,
+                _ => {}
+            }
+            (estimate.power, estimate.detection) = (self.search.power(found.sum), found.peak);
+            estimate.spread_m2_s2 = f64::NAN;
         }
         scratch.model = model;
         scratch.numbers = numbers;
@@ -117,14 +128,7 @@ impl ModelPeak {
         Ok(())
     }
 
-    fn read(
-        &self,
-        model: &Autoregression,
-        mean: &[f64],
-        numbers: &mut Vec<f64>,
-        band: &mut Vec<f64>,
-        grid: &mut Vec<f64>,
-    ) -> GateVelocity {
+    fn read(&self, model: &Autoregression, numbers: &mut Vec<f64>, band: &mut Vec<f64>) -> GateVelocity {
         model.inverse_lags(self.kind, self.reading == Reading::Capon, numbers);
         numbers.resize(self.kind.lag_numbers(self.order + 1), 0.0);
         if self.zoom.density_into(numbers, band).is_err() {
@@ -132,34 +136,23 @@ impl ModelPeak {
         }
         // a pole on the circle to rounding must not turn the density negative or infinite
         let least = f64::MIN_POSITIVE.max(1e-300 / model.noise_power);
-        let invert = |values: &mut Vec<f64>| values.iter_mut().for_each(|value| *value = value.max(least).recip());
-        invert(band);
-        let sides = if self.kind == SignalKind::Real { 2.0 } else { 1.0 };
-        let found = self.search.locate(band, self.refinement, |_, sum| {
-            // what holds half of the power is no sidelobe
-            if sides * sum / self.padded as f64 >= 0.5 * mean[0] {
-                return None;
-            }
-            self.whole.density_into(numbers, grid).ok()?;
-            let lowest = grid.iter().copied().fold(f64::INFINITY, f64::min);
-            let place = grid.iter().position(|value| *value == lowest)?;
-            let from_zero = place.min(self.padded - place) as f64 / self.padded as f64;
-            Some((lowest.max(least).recip(), from_zero))
-        });
-        let frequency_hz = self.search.band.frequency_hz(found.bin);
-        let estimate = self.search.velocity(&found, frequency_hz);
-        if self.reading == Reading::Pole && found.flag == Quality::Good {
-            self.at_pole(model, estimate)
-        } else {
-            estimate
+        band.iter_mut().for_each(|value| *value = value.max(least).recip());
+        let found = self.search.locate(band, self.refinement, &[], || None);
+        let estimate = self.search.velocity(&found, self.search.band.frequency_hz(found.bin));
+        match self.reading {
+            Reading::Pole if found.flag == Quality::Good => self.at_pole(model, found.peak, estimate),
+            _ => estimate,
         }
     }
 
-    /// The same estimate at the pole nearest to the circle; out of band if none lies in it.
-    fn at_pole(&self, model: &Autoregression, estimate: GateVelocity) -> GateVelocity {
+    /// The same estimate at the pole nearest to the circle, ambiguous where the spectrum does not peak there; out of band if none lies
+    /// in it.
+    fn at_pole(&self, model: &Autoregression, peak: f64, estimate: GateVelocity) -> GateVelocity {
         match model.nearest_pole(&self.sampling) {
             Ok(Some((frequency_hz, _))) => {
-                GateVelocity { velocity_m_s: self.sampling.velocity_m_s(frequency_hz), ..estimate }
+                let is_beside = 2.0 * model.density(frequency_hz, &self.sampling) < peak;
+                let flag = if is_beside { Quality::Ambiguous } else { estimate.flag };
+                GateVelocity { velocity_m_s: self.sampling.velocity_m_s(frequency_hz), flag, ..estimate }
             }
             Ok(None) => GateVelocity { flag: Quality::OutOfBand, ..estimate },
             Err(_) => GateVelocity::none(Quality::Invalid),
@@ -223,7 +216,8 @@ model_estimator!(
     /// Velocity of the pole nearest to the unit circle in the detector band, of the autoregressive model of the
     /// accumulated correlogram.
     ///
-    /// Width, SNR, quality and flags are those of the model's spectrum.
+    /// SNR, quality and flags are those of the model's spectrum; where that has less than half of its peak at the pole, the estimate is
+    /// [`Quality::Ambiguous`].
     AutoregressivePole,
     Pole,
     /// Plans AR(`order`) of correlograms with `lags` lags; `padded_samples` frequencies serve the quality figures.
@@ -235,5 +229,5 @@ model_estimator!(
     Capon,
     /// Plans filters of `order` + 1 samples for correlograms with `lags` lags, and a search over `padded_samples` frequencies.
     ///
-    /// [`Refinement::Exact`] counts as the parabola. The width of its peaks says little: they narrow with the SNR.
+    /// [`Refinement::Exact`] counts as the parabola.
 );

@@ -5,7 +5,7 @@
 //! signals are flagged.
 
 use crate::error::{Error, length};
-use crate::estimators::search::{PeakSearch, beyond_doubt, density_limit, highest, own_width_cycles, unusable};
+use crate::estimators::search::{PeakSearch, highest, unusable};
 use crate::estimators::{Estimator, GateVelocity, Quality, Refinement};
 use crate::spectrum::{LagSpectrum, ZoomSpectrum, density_at};
 use crate::window::{Sampling, Scratch, SignalKind};
@@ -35,13 +35,14 @@ impl SpectralPeak {
         refinement: Refinement,
     ) -> Result<Self, Error> {
         let whole = LagSpectrum::new(kind, lags, padded_samples)?;
-        let search = PeakSearch::new(sampling, kind, padded_samples, lags)?;
+        let unweighted: Vec<f64> = (0..lags).map(|m| 1.0 - m as f64 / lags as f64).collect();
+        let search = PeakSearch::new(sampling, kind, padded_samples, &unweighted)?;
         let zoom = ZoomSpectrum::new(kind, lags, sampling, &search.band.with_neighbours_hz())?;
         Ok(Self { kind, zoom, whole, search, refinement })
     }
 
     /// The same for correlograms whose lags carry the weights w_0 = 1, w_1, ... of their window
-    /// ([`Correlogram::lag_weights`](crate::Correlogram::lag_weights)); only the spectral width depends on them.
+    /// ([`Correlogram::lag_weights`](crate::Correlogram::lag_weights)); spectral width and flag depend on them.
     ///
     /// Without this call the weights of an unweighted window, 1 - m / N, are assumed.
     ///
@@ -49,7 +50,7 @@ impl SpectralPeak {
     /// [`Error::Length`] if there are not as many weights as lags.
     pub fn with_lag_weights(mut self, lag_weights: &[f64]) -> Result<Self, Error> {
         length("lag_weights", self.zoom.lags(), lag_weights.len())?;
-        self.search.own_width = own_width_cycles(lag_weights) * self.whole.padded_samples() as f64;
+        self.search = PeakSearch::new(&self.search.sampling, self.kind, self.whole.padded_samples(), lag_weights)?;
         Ok(self)
     }
 
@@ -123,13 +124,10 @@ impl Estimator for SpectralPeak {
         if self.zoom.density_into(mean, &mut band).is_err() {
             return GateVelocity::none(Quality::Invalid);
         }
-        let found = self.search.locate(&band, self.refinement, |peak, _| {
-            if beyond_doubt(peak, density_limit(mean)) {
-                return None;
-            }
+        let found = self.search.locate(&band, self.refinement, mean, || {
             let density = self.whole.density(mean, scratch).ok()?;
             let (place, highest) = highest(density);
-            Some((highest, place.min(density.len() - place) as f64 / density.len() as f64))
+            Some((highest, place as f64 / density.len() as f64))
         });
         scratch.band = band;
         let frequency_hz = match (self.refinement, found.flag) {

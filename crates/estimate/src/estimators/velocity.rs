@@ -17,6 +17,8 @@ pub enum Quality {
     /// The peak sits on an edge of the band, or what the band holds can be sidelobes of a line
     /// outside. The velocity is that of the highest density in the band and should not be used.
     OutOfBand,
+    /// The pole of a model lies where its spectrum has no peak.
+    Ambiguous,
     /// Samples or spectrum are not finite. Velocity is NaN.
     Invalid,
     /// No valid window in the region. Velocity is NaN.
@@ -58,9 +60,12 @@ pub struct GateVelocity {
     /// ([`model_lag_weights`](crate::estimators::model_lag_weights)), and for the likelihood with gradient, which takes that of the
     /// gradient nearest to 0. [`NoiseTest`](crate::estimators::NoiseTest) tells what noise alone reaches.
     pub detection: f64,
-    /// Standard deviation of the velocities that the main peak stands for \[m/s\]: its width at half height above the
-    /// floor as that of a Gaussian, less the resolution of the window; 0 where that is all, NaN where unknown.
-    pub width_m_s: f64,
+    /// Variance of the velocities that the main peak stands for \[m^2/s^2\]: that of the Gaussian spectrum whose peak is as wide at half
+    /// height above the floor, through the weights that the method gives its lags. Below 0 where the peak is narrower than that of a line,
+    /// so that means of it are not pulled up by noise; NaN where the method does not show it.
+    pub spread_m2_s2: f64,
+    /// The same of the peak of a line \[m^2/s^2\]: what the method itself adds, and what was taken off; NaN where it shows no width.
+    pub resolution_m2_s2: f64,
     /// Signal power over noise power in the detector band; the noise is the mean density away from the main peak.
     ///
     /// 0 where the band holds no more than that, NaN where unknown. Noise alone has a highest peak too, so that weak signals
@@ -82,11 +87,19 @@ impl GateVelocity {
             power: 0.0,
             quality: f64::NAN,
             detection: f64::NAN,
-            width_m_s: f64::NAN,
+            spread_m2_s2: f64::NAN,
+            resolution_m2_s2: f64::NAN,
             snr: f64::NAN,
             runner_up: None,
             flag,
         }
+    }
+
+    /// Standard deviation of the velocities that the main peak stands for \[m/s\]: the root of their variance; 0 where the peak is no
+    /// wider than that of a line.
+    #[must_use]
+    pub fn width_m_s(&self) -> f64 {
+        if self.spread_m2_s2 < 0.0 { 0.0 } else { self.spread_m2_s2.sqrt() }
     }
 
     /// Multiplies what has the unit of a power.

@@ -251,7 +251,7 @@ fn assert_only_their_own_windows(clean: &[MapPoint], holed: &[MapPoint], what: &
         if holed.left_out == 0 {
             let bits = |point: &MapPoint| {
                 let e = &point.estimate;
-                [e.velocity_m_s, e.quality, e.snr, e.width_m_s, e.power].map(f64::to_bits)
+                [e.velocity_m_s, e.quality, e.snr, e.spread_m2_s2, e.power].map(f64::to_bits)
             };
             assert_eq!(bits(clean), bits(holed), "{what}");
             assert_eq!(clean.estimate.flag, holed.estimate.flag, "{what}");

@@ -409,19 +409,20 @@ fn noise_test(
     lag_weights: &[f64],
 ) -> Result<Option<estimate::estimators::NoiseTest>, Error> {
     let e = &scene.estimator;
+    let Some(noise) = noise_kind(scene) else { return Ok(None) };
     let window = match e.method {
         Method::LagWindow(window) => Some(estimate::estimators::model_lag_weights(window.lag_window_lags - 1)),
         method => method.order().map(|model| estimate::estimators::model_lag_weights(model.order)),
     };
     let unbiased = e.correlogram == CorrelogramForm::Unbiased;
-    if scene.detector.noise == NoiseKind::None || (unbiased && window.is_none()) {
+    if unbiased && window.is_none() {
         return Ok(None);
     }
     let seen = |(at, gain): (&f64, &f64)| if unbiased { at / gain } else { *at };
     let window = window.map(|at| at.iter().zip(lag_weights).map(seen).collect::<Vec<f64>>());
     let padded = if e.method == (Method::PulsePair {}) { 4 * lag_weights.len() } else { e.padded_samples };
     let (sampling, gates) = (sampling(scene)?, gates(scene)?);
-    Ok(Some(estimate::estimators::NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded)?))
+    Ok(Some(estimate::estimators::NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded, noise)?))
 }
 
 /// The estimator of a mean correlogram whose lags carry `lag_weights`.
@@ -433,13 +434,16 @@ fn of_correlogram(
 ) -> Result<Box<dyn Estimator>, Error> {
     let (e, sampling, refine) = (&scene.estimator, sampling(scene)?, refinement(scene));
     let (lags, padded) = (lag_weights.len(), e.padded_samples);
+    // Divided by their weights, all lags count alike.
+    let alike = vec![1.0; lags];
+    let seen = if e.correlogram == CorrelogramForm::Unbiased { &alike } else { lag_weights };
     match e.method {
         Method::Periodogram {}
         | Method::PeriodogramAccumulation {}
         | Method::Likelihood(_)
         | Method::GradientLikelihood(_) => {
             let peak = estimate::SpectralPeak::new(&sampling, kind, lags, padded, refine)?;
-            finish(e, kind, lag_weights, peak.with_lag_weights(lag_weights)?)
+            finish(e, kind, lag_weights, peak.with_lag_weights(seen)?)
         }
         Method::Autoregressive(model) => {
             let peak =
@@ -464,14 +468,15 @@ fn of_correlogram(
                 padded,
                 refine,
             )?;
-            finish(e, kind, lag_weights, peak)
+            finish(e, kind, lag_weights, peak.with_lag_weights(seen)?)
         }
         Method::PulsePair {} => {
-            finish(e, kind, lag_weights, estimate::estimators::PulsePair::new(&sampling, kind, lags)?)
+            let pair = estimate::estimators::PulsePair::new(&sampling, kind, lags)?;
+            finish(e, kind, lag_weights, pair.with_lag_weights(seen)?)
         }
         Method::FirstMoment(own) => {
             let moment = estimate::estimators::FirstMoment::new(&sampling, kind, lags, padded, own.moment_reach)?;
-            finish(e, kind, lag_weights, moment)
+            finish(e, kind, lag_weights, moment.with_lag_weights(seen)?)
         }
     }
 }
@@ -512,8 +517,9 @@ fn gradient_likelihood<S: Sample>(
     let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
     let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
     let plan = estimate::estimators::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
+    let gates = gates(scene)?;
+    let test = noise_kind(scene).map(|noise| plan.noise_test(&gates, noise)).transpose()?;
     let noise = NoiseSeen::new(scene, instrument, &plan.estimator, |lags| Ok(plan.mean_statistic(&lags)?))?;
-    let test = if noise.is_some() { Some(plan.noise_test(&gates(scene)?)?) } else { None };
     let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
     Ok(Toolkit { statistic, estimator, following: None, test, noise, lag_weights: Vec::new() })
 }

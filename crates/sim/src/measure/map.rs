@@ -57,7 +57,8 @@ pub struct VelocityEstimates {
     pub flagged: Array2<f64>,
     /// Realisations with a velocity, flagged ones included.
     pub count: Array2<f64>,
-    /// Mean spectral width beyond that of the window, m/s; NaN where the estimator gives none.
+    /// Spectral width of air and pulse, m/s, without what the method adds: the root of its mean square over the realisations that are
+    /// not flagged. NaN where that does not stand out of its error, and where the method shows none.
     pub width_m_s: Array2<f64>,
     /// Signal-to-noise ratio in the detector band, dB: the excess of the mean power of the spectra in the band over that which the noise
     /// alone has there, over that power, times the mean of what the windows keep of the noise over what they keep of a signal of the
@@ -84,14 +85,21 @@ pub struct ScanErrors {
 struct Figures {
     flagged: Array2<f64>,
     count: Array2<f64>,
-    /// Sum and number of the finite values: width, power in the band, its gain, quality.
+    /// Sum and number of the finite values: power in the band, its gain, quality, resolution.
     sums: [Array2<(f64, f64)>; 4],
+    /// Number, sum and sum of squares of the spreads that are known.
+    spreads: Array2<[f64; 3]>,
 }
 
 impl Figures {
     fn new(shape: (usize, usize)) -> Self {
         let sums = || Array2::from_elem(shape, (0.0, 0.0));
-        Self { flagged: Array2::zeros(shape), count: Array2::zeros(shape), sums: [sums(), sums(), sums(), sums()] }
+        Self {
+            flagged: Array2::zeros(shape),
+            count: Array2::zeros(shape),
+            sums: [sums(), sums(), sums(), sums()],
+            spreads: Array2::from_elem(shape, [0.0; 3]),
+        }
     }
 
     fn add(&mut self, place: (usize, usize), point: &MapPoint, is_flagged: bool, gain: f64) {
@@ -99,11 +107,15 @@ impl Figures {
         self.flagged[place] += f64::from(u8::from(is_flagged));
         self.count[place] += f64::from(u8::from(e.velocity_m_s.is_finite()));
         let power_a2 = if e.velocity_m_s.is_finite() { e.power } else { f64::NAN };
-        for (sums, value) in self.sums.iter_mut().zip([e.width_m_s, power_a2, gain, e.quality]) {
+        for (sums, value) in self.sums.iter_mut().zip([power_a2, gain, e.quality, e.resolution_m2_s2]) {
             if value.is_finite() {
                 sums[place].0 += value;
                 sums[place].1 += 1.0;
             }
+        }
+        let spread = e.spread_m2_s2;
+        if spread.is_finite() && !is_flagged {
+            self.spreads[place].iter_mut().zip([1.0, spread, spread * spread]).for_each(|(sum, term)| *sum += term);
         }
     }
 
@@ -203,12 +215,26 @@ impl<S: Sample> Mapper<S> {
     pub(crate) fn finish(self, plan: &Plan) -> Result<VelocityEstimates, Error> {
         let statistics = self.errors.statistics();
         let bias_m_s = statistics.mapv(|s| s.bias_m_s);
-        let [width_m_s, power_a2, gain, quality] = self.figures.means();
+        let [power_a2, gain, quality, resolution] = self.figures.means();
         let noise_a2 = self.estimator.noise_power_a2();
         let mut snr_db = power_a2;
         for (index, (place, power)) in snr_db.indexed_iter_mut().enumerate() {
             let (ratio, deviation) = (*power / noise_a2, self.noise.deviation(index));
             *power = map_estimator::snr_db(ratio, gain[place], deviation, self.figures.count[place]);
+        }
+        let mut width_m_s = resolution;
+        for (place, width) in width_m_s.indexed_iter_mut() {
+            let kept = self.realisations as f64 - self.figures.flagged[place];
+            *width = match self.figures.spreads[place] {
+                // what only some of the estimates show is not the mean of all
+                [count, sum, squares] if count > 0.9 * kept => {
+                    let mean = sum / count;
+                    let variance = (squares / count - mean * mean).max(0.0) / (count - 1.0).max(1.0);
+                    let snr = if noise_a2.is_nan() { f64::INFINITY } else { 10f64.powf(0.1 * snr_db[place]) };
+                    map_estimator::width_m_s(mean, variance.sqrt(), *width, snr)
+                }
+                _ => f64::NAN,
+            };
         }
         let radius_m = plan.geometry.gate_range_m.iter().map(|range_m| self.estimator.radius_m(*range_m));
         Ok(VelocityEstimates {

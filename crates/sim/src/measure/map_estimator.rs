@@ -11,10 +11,12 @@ use crate::measure::scan::median_snr;
 use crate::plan::Plan;
 use ndarray::Array2;
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::ops::Range;
 use wakescope_estimate::{
     GateVelocity, Gates, Radius, Sampling, Scan, Statistic,
-    estimators::NoiseTest,
+    estimators::{NoiseTest, RegionNoise},
     map::{MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCovariance},
     window::Sample,
 };
@@ -140,14 +142,13 @@ impl<S: Sample> MapEstimator<S> {
         let (Some(test), Some(noise)) = (&self.tools.test, &self.tools.noise) else {
             return Ok(NoiseAtPoints { threshold: None, deviation: vec![0.0; points.len()] });
         };
-        let windows =
-            |point: &PolarPoint| Ok(places.level(*point, self.radius.at_m(point.range_m)?, test.correlation()).1);
-        let n_eff = points.iter().map(windows).collect::<Result<Vec<f64>, Error>>()?;
+        let region = |point: &PolarPoint| Ok(test.region_at(places, *point, self.radius.at_m(point.range_m)?));
+        let regions = points.iter().map(region).collect::<Result<Vec<RegionNoise>, Error>>()?;
         let threshold = match self.rate > 0.0 {
-            true => Some(thresholds(test, noise.density_a2, &n_eff, self.rate)?),
+            true => Some(thresholds(test, noise.density_a2, &regions, self.rate)?),
             false => None,
         };
-        Ok(NoiseAtPoints { threshold, deviation: n_eff.iter().map(|n_eff| test.band_deviation(*n_eff)).collect() })
+        Ok(NoiseAtPoints { threshold, deviation: regions.iter().map(|at| test.band_deviation(at.n_eff)).collect() })
     }
 }
 
@@ -186,21 +187,22 @@ pub(crate) fn snr_db(power_ratio: f64, gain: f64, deviation: f64, count: f64) ->
     if excess > 2.0 * deviation / count.sqrt() { 10.0 * (excess * gain).log10() } else { f64::NAN }
 }
 
+/// Spectral width, m/s, of a mean spread with its standard error, both m^2/s^2; NaN where it does not stand out of that, nor of what the
+/// shape of the floor beneath it may add: a part of the variance `resolution` of a line, measured for all methods.
+pub(crate) fn width_m_s(spread: f64, error: f64, resolution: f64, snr: f64) -> f64 {
+    let least = resolution * (0.05 + 0.12 / snr);
+    if spread > least.max(2.0 * error) { spread.sqrt() } else { f64::NAN }
+}
+
 /// Densities, A^2, that noise exceeds with probability `rate`; NaN where there is no window.
-fn thresholds(test: &NoiseTest, density_a2: f64, n_eff: &[f64], rate: f64) -> Result<Vec<f64>, Error> {
-    // Many points share their number of windows; a thousandth of it changes nothing.
-    let mut known = std::collections::HashMap::new();
-    let mut of = |n_eff: f64| -> Result<f64, Error> {
-        let step = (1e3 * n_eff.ln()).round();
-        if n_eff.is_nan() || n_eff <= 0.0 {
-            return Ok(f64::NAN);
-        }
-        match known.entry(step as i64) {
-            std::collections::hash_map::Entry::Occupied(level) => Ok(*level.get()),
-            std::collections::hash_map::Entry::Vacant(place) => {
-                Ok(*place.insert(density_a2 * test.threshold((1e-3 * step).exp(), rate)?))
-            }
-        }
+fn thresholds(test: &NoiseTest, density_a2: f64, regions: &[RegionNoise], rate: f64) -> Result<Vec<f64>, Error> {
+    // Many points share their windows.
+    let mut known = HashMap::new();
+    let of = |region: &RegionNoise| {
+        Ok(match known.entry(region.key()) {
+            Entry::Occupied(level) => *level.get(),
+            Entry::Vacant(place) => *place.insert(density_a2 * test.threshold(region, rate)?),
+        })
     };
-    n_eff.iter().map(|n_eff| of(*n_eff)).collect()
+    regions.iter().map(of).collect()
 }

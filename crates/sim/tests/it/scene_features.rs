@@ -111,8 +111,13 @@ fn every_method_reads_a_uniform_wind_from_real_and_from_complex_samples() {
             assert_eq!(mean(&found.count), 3.0, "{method}, {signal}");
             assert_eq!(mean(&found.flagged), 0.0, "{method}, {signal}");
             assert!(mean(&found.quality) > 2.0, "{method}, {signal}");
-            let width_m_s = mean(&found.width_m_s);
-            assert!((0.0..2.5).contains(&width_m_s), "{method}, {signal}: {width_m_s}");
+            // lambda/(4 sqrt2 pi sigma) = 0.73 m/s for 200 ns; models show no width, nor do tapers for 10 dB
+            match method {
+                "autoregressive" | "autoregressive_pole" | "capon" | "likelihood" | "gradient_likelihood" => {
+                    assert!(found.width_m_s.iter().all(|width| width.is_nan()), "{method}, {signal}");
+                }
+                _ => assert!((mean(&found.width_m_s) - 0.73).abs() < 0.2, "{method}, {signal}: {:?}", found.width_m_s),
+            }
         }
     }
 }
@@ -123,6 +128,27 @@ fn the_periodogram_shows_the_signal_to_noise_ratio_and_the_width_of_the_pulse() 
     // lambda/(4 sqrt2 pi sigma) = 0.73 m/s for 200 ns.
     assert!((mean(&found.snr_db) - 10.0).abs() < 1.5, "{}", mean(&found.snr_db));
     assert!((mean(&found.width_m_s) - 0.73).abs() < 0.2, "{}", mean(&found.width_m_s));
+}
+
+#[test]
+fn widths_are_those_of_the_pulse_or_missing() {
+    // 1.45 m/s for 100 ns; the standard error of a map is some 0.1
+    for (snr_db, method, true_m_s) in [
+        ("30.0", "window_samples = 32\n", 1.45),
+        ("5.0", "method.kind = \"lag_window\"\nmethod.lag_window_lags = 12\n", 1.45),
+        ("5.0", "method.kind = \"pulse_pair\"\nweighting = \"hann\"\n", 1.45),
+        ("30.0", "method.kind = \"likelihood\"\n", f64::NAN),
+        ("5.0", "window_samples = 16\n", f64::NAN),
+        ("-20.0", "", f64::NAN),
+    ] {
+        let detector = format!("noise = \"white\"\nsnr = {{ reference = \"fixed\", snr_db = {snr_db} }}\n");
+        let pulse = "shape.duration_s = 100e-9\n";
+        let found = map(Words { pulse, detector: detector.leak(), estimator: method, ..PLAIN }).width_m_s;
+        match true_m_s.is_nan() {
+            true => assert!(found.iter().all(|width| width.is_nan()), "{snr_db} {method}: {found:?}"),
+            false => assert!((mean(&found) / true_m_s - 1.0).abs() < 0.15, "{snr_db} {method}: {found:?}"),
+        }
+    }
 }
 
 #[test]
@@ -205,10 +231,9 @@ fn by_default_noise_passes_one_time_in_a_hundred_and_estimates_at_minus_14_db_ar
     ] {
         let estimator = format!("false_alarm = 0.1\n{estimator}");
         let noise = single_pulses(-60.0, 60, detector, &estimator);
-        // few of the gates are independent; a lag window sees less of the noise at the edges of its band
+        // few of the gates are independent
         let passed = 1.0 - mean(&noise.flagged);
-        let least = if estimator.contains("lag_window") { 0.035 } else { 0.065 };
-        assert!((least..0.135).contains(&passed), "{detector}{estimator}: {passed}");
+        assert!((0.065..0.135).contains(&passed), "{detector}{estimator}: {passed}");
     }
     let untested = single_pulses(-14.0, 4, "", "false_alarm = 0.0\n");
     assert!(mean(&untested.flagged) < 0.2, "{}", mean(&untested.flagged));

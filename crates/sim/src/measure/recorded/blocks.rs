@@ -142,7 +142,7 @@ impl<'p, S: FromParts> Blocks<'p, S> {
                     detection_ratio: noise.detection_ratio(at, e),
                     deviation: noise.deviation(at),
                     lines: places.chords(points[at], radius_m).count() as f64,
-                    width_m_s: e.width_m_s,
+                    spread: (e.spread_m2_s2, e.resolution_m2_s2),
                     quality: e.quality,
                     level: found[at].level as f64,
                     n_eff: found[at].n_eff,

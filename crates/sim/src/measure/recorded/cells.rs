@@ -18,7 +18,8 @@ pub(super) struct Cell {
     pub(super) deviation: f64,
     /// Lines of sight that its region reaches.
     pub(super) lines: f64,
-    pub(super) width_m_s: f64,
+    /// Variance of the velocities in the spectrum, and what the method adds to it, m^2/s^2.
+    pub(super) spread: (f64, f64),
     pub(super) quality: f64,
     pub(super) level: f64,
     pub(super) n_eff: f64,
@@ -34,7 +35,7 @@ impl Cell {
         detection_ratio: f64::NAN,
         deviation: f64::NAN,
         lines: 0.0,
-        width_m_s: f64::NAN,
+        spread: (f64::NAN, f64::NAN),
         quality: f64::NAN,
         level: 0.0,
         n_eff: 0.0,

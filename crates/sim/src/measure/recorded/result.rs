@@ -9,7 +9,7 @@ use super::predicted::PredictedError;
 use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::measure::described::{pulse_info, site};
-use crate::measure::map_estimator::snr_db;
+use crate::measure::map_estimator::{snr_db, width_m_s};
 use crate::plan::Plan;
 use ndarray::{Array2, Axis, concatenate};
 use wakescope_estimate::estimators::noise_floor;
@@ -32,7 +32,8 @@ pub struct MeasuredScan {
     pub n_eff: Array2<f64>,
     /// 1 where the estimate was flagged: a flag of its own, or a peak that does not stand out of noise.
     pub flagged: Array2<f64>,
-    /// Spectral width beyond that of the window, m/s.
+    /// Spectral width of air and pulse, m/s, without what the method adds; NaN where the method shows none, and where the gate is flagged
+    /// or its signal too weak to tell.
     pub width_m_s: Array2<f64>,
     /// Signal-to-noise ratio in the detector band, dB; NaN below twice its standard deviation.
     pub snr_db: Array2<f64>,
@@ -71,7 +72,11 @@ pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Resul
         level: cells.map(|cell| cell.level),
         n_eff: cells.map(|cell| cell.n_eff),
         flagged: cells.map(|cell| f64::from(u8::from(is_flagged(cell)))),
-        width_m_s: cells.map(|cell| cell.width_m_s),
+        width_m_s: cells.map(|cell| match (is_flagged(cell), cell.power_ratio.is_nan()) {
+            (true, _) => f64::NAN,
+            (_, true) => width_m_s(cell.spread.0, 0.0, cell.spread.1, f64::INFINITY),
+            _ => width_m_s(cell.spread.0, 0.0, cell.spread.1, 10f64.powf(0.1 * ratio(cell))),
+        }),
         snr_db: cells.map(ratio),
         quality: cells.map(|cell| cell.quality),
         lines,
@@ -139,7 +144,7 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
             field("level", Unit::One, "windows accumulated for one estimate", |s| &s.level)?,
             field("n_eff", Unit::One, "independent windows that these are worth", |s| &s.n_eff)?,
             field("flagged", Unit::One, "1 where the estimate was flagged", |s| &s.flagged)?,
-            field("width", speed, "spectral width beyond that of the window", |s| &s.width_m_s)?,
+            field("width", speed, "spectral width of air and pulse", |s| &s.width_m_s)?,
             field(
                 "signal_to_noise_ratio",
                 Unit::Decibel,

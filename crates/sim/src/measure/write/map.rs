@@ -76,7 +76,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             speed("standard_error", "standard error of the root mean square error".into(), &e.standard_error_m_s),
             number("flagged", "fraction of the realisations whose estimate was flagged", &e.flagged),
             number("count", "realisations with a velocity", &e.count),
-            speed("width", "mean spectral width beyond that of the window".into(), &e.width_m_s),
+            speed("width", "spectral width of air and pulse".into(), &e.width_m_s),
             Field::float(
                 "signal_to_noise_ratio",
                 Unit::Decibel,
