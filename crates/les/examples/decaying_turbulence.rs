@@ -16,7 +16,8 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use wakescope_les::{Direction, Error, Flow, FlowSettings, Mesh, SubgridModel, TimeStep};
 
-/// Wave number \[1/cm\] and the spectral energy at the three stations \[cm^3/s^2\].
+/// Wave number \[1/cm\] and the spectral energy at the three stations \[cm^3/s^2\]. At the first wave number the table has the last station
+/// alone: the other two are assumed, and set the largest eddies of the start.
 const MEASURED: [(f64, [f64; 3]); 18] = [
     (0.15, [60.0, 72.0, 49.7]),
     (0.2, [129.0, 106.0, 92.0]),

@@ -77,28 +77,6 @@ impl EfficiencyProfile {
         self.interpolate(&self.mean, range_m)
     }
 
-    /// Standard deviation of one realisation at `range_m` \[m\], interpolated as the mean is.
-    ///
-    /// # Errors
-    /// As [`EfficiencyProfile::interpolated`]; [`Error::NotKnown`] where one realisation leaves it open.
-    pub fn interpolated_standard_deviation(&self, range_m: f64) -> Result<f64, Error> {
-        let value = self.interpolate(&self.standard_deviation, range_m)?;
-        known(value, "standard_deviation", "two realisations have a scatter, one has none")
-    }
-
-    /// Standard error of the mean at `range_m` \[m\], interpolated as the mean is.
-    ///
-    /// # Errors
-    /// As [`EfficiencyProfile::interpolated`]; [`Error::NotKnown`] where too few realisations leave it open.
-    pub fn interpolated_standard_error(&self, range_m: f64) -> Result<f64, Error> {
-        let value = self.interpolate(&self.standard_error, range_m)?;
-        known(
-            value,
-            "standard_error",
-            "two independent samples give that of the monostatic mean, three that of the bistatic one",
-        )
-    }
-
     fn interpolate(&self, y: &[f64], range_m: f64) -> Result<f64, Error> {
         let x = &self.range_m;
         if x.is_empty() || y.len() != x.len() {
@@ -151,10 +129,6 @@ pub fn curved_ranges_m(telescope: &Telescope, first_m: f64, last_m: f64, density
     ranges_m.push(last_m);
     ranges_m.dedup();
     ranges_m
-}
-
-fn known(value: f64, field: &'static str, needed: &'static str) -> Result<f64, Error> {
-    if value.is_nan() { Err(Error::NotKnown { field, needed }) } else { Ok(value) }
 }
 
 /// Slope at point `i` which keeps monotone data monotone (weighted harmonic mean of the two secants).
@@ -279,7 +253,6 @@ mod tests {
         let mut p = profile(&[100.0, 200.0], &[0.1, 0.2]);
         p.standard_error = vec![f64::NAN; 2];
         let p = p.validated().unwrap();
-        assert!(matches!(p.interpolated_standard_error(150.0), Err(Error::NotKnown { field: "standard_error", .. })));
         p.interpolated(150.0).unwrap();
     }
 }

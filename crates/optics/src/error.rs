@@ -109,14 +109,6 @@ pub enum Error {
         /// The largest that is allowed.
         largest: f64,
     },
-    /// A scatter or error was asked for that too few realisations leave unknown.
-    #[error("{field} is not known: {needed}")]
-    NotKnown {
-        /// Which number.
-        field: &'static str,
-        /// What would make it known.
-        needed: &'static str,
-    },
     /// A quadrature did not reach its tolerance.
     #[error("quadrature of {quantity} stopped at a relative error of {error:.1e}, {tolerance:.1e} was asked for")]
     Convergence {

@@ -273,12 +273,6 @@ impl WakeDetector {
         self.cells.cells.len()
     }
 
-    /// Wakes that are tried.
-    #[must_use]
-    pub fn wakes_tried(&self) -> usize {
-        self.bank.templates.len()
-    }
-
     /// Where wakes may be, and how far apart the vortices of a pair.
     pub(super) fn sector(&self) -> (Sector<'_>, (f64, f64)) {
         (Sector::new(&self.cells, &self.model), self.spacing_m)

@@ -160,14 +160,6 @@ impl Stability {
     }
 }
 
-impl Mesh {
-    /// Largest `sum |u_i|/h_i` of a flow whose velocity in the cell of the indices along x, y, z is `velocity_m_s`, walls that
-    /// move included \[1/s\]: a Courant number over it is a time step.
-    pub fn courant_rate_per_s(&self, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> f64 {
-        largest(&largest_rates(self, velocity_m_s))
-    }
-}
-
 /// Largest `sum |u_i|/h_i` \[1/s\] of all cells whose largest term is that of a direction, by their index along it, and of the
 /// smallest cells beside walls that move: the fluid may come to their speed.
 fn largest_rates(mesh: &Mesh, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> [Vec<f64>; 3] {

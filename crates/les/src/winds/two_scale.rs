@@ -2,7 +2,8 @@
 //!
 //! `Gamma(r) = Gamma0 [1 - exp(-q)]`, `q = beta_i (r/b)^2/{1 + [(beta_i/beta_o) (r/b)^(5/4)]^3}^(1/3)` with the wing span `b` and
 //! `beta_o` = 10 (Winckelmans; Gerz, Holzaepfel and Darracq 2002). Near the centre it is a Lamb-Oseen core, far away
-//! `q = beta_o (r/b)^(3/4)`: a third of the circulation lies further out than a twelfth of the span.
+//! `q = beta_o (r/b)^(3/4)`: a fifth of the circulation lies further out than a twelfth of the span, a third
+//! further out than an eighteenth.
 //!
 //! Check: the largest velocity is at the core radius; both limits of `q`.
 
@@ -71,9 +72,16 @@ mod tests {
             let velocity = |s: f64| -(-profile.exponent(s * s).0).exp_m1() / s;
             assert!(velocity(1.0) > velocity(0.998) && velocity(1.0) > velocity(1.002));
         }
-        // With the constants of the literature, beta_i = 500, the core is 3 % of the span.
-        let usual = |span: f64| TwoScale::new(span).unwrap().inner * span * span;
-        assert!(usual(40.0) > 500.0 && usual(22.0) < 500.0, "{} {}", usual(40.0), usual(22.0));
+        // With the constants of the literature, beta_i = 500, the core is 4.1 % of the span.
+        let usual = |core_over_span: f64| TwoScale::new(core_over_span.recip()).unwrap().inner / core_over_span.powi(2);
+        assert!(usual(0.0405) > 500.0 && usual(0.0415) < 500.0, "{} {}", usual(0.0405), usual(0.0415));
+        // What lies beyond a part of the span.
+        let beyond = |span: f64, part: f64| (-TwoScale::new(span).unwrap().exponent((part * span).powi(2)).0).exp();
+        for span in [25.0, 33.0, 40.0] {
+            assert!(
+                (beyond(span, 1.0 / 12.0) - 0.215).abs() < 0.01 && (beyond(span, 1.0 / 18.0) - 0.333).abs() < 0.025
+            );
+        }
         assert!(TwoScale::new(1.0).is_err() && TwoScale::new(f64::NAN).is_err());
     }
 }

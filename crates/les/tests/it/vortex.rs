@@ -170,7 +170,7 @@ fn bound_over_largest(pair: VortexPair) -> f64 {
 }
 
 #[test]
-fn gradient_bound_holds_everywhere_and_is_at_most_five_percent_too_large() {
+fn gradient_bound_holds_everywhere_and_is_at_most_six_percent_too_large_where_cores_are_far_apart() {
     for profile in [CirculationProfile::Algebraic, CirculationProfile::LambOseen] {
         let ratio = bound_over_largest(VortexPair { profile, ..heavy() });
         assert!((1.0..1.06).contains(&ratio), "{profile:?}: {ratio}");

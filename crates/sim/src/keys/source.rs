@@ -27,7 +27,6 @@ impl Source {
     }
 
     /// Whether the text gives a value to a key.
-    #[cfg(feature = "flow")]
     pub(crate) fn has(&self, key: &str) -> bool {
         Document::parse(&self.text, &self.path).is_ok_and(|document| document.value(key).is_some())
     }

@@ -191,11 +191,11 @@ fn refused(file: &SceneFile, t: &RefractiveTurbulence, error: wakescope_optics::
                 v.needed,
                 v.limit.purpose()
             );
-            problems.push(Problem { key: key("grid_points"), value: t.grid_points.to_string(), allowed });
+            problems.push(of_grid(file, ["grid_points", "grid_spacing_m"], t.grid_points.to_string(), allowed));
         }
         if let Some(v) = strongest(|v| v.limit.is_spacing(), -1.0) {
             let allowed = format!("at most {} m {}", v.needed, v.limit.purpose());
-            problems.push(Problem { key: key("grid_spacing_m"), value: t.grid_spacing_m.to_string(), allowed });
+            problems.push(of_grid(file, ["grid_spacing_m", "grid_points"], t.grid_spacing_m.to_string(), allowed));
         }
     }
     if let Some(last) = problems.last_mut() {
@@ -211,6 +211,18 @@ fn refused(file: &SceneFile, t: &RefractiveTurbulence, error: wakescope_optics::
         };
     }
     file.located(problems).into()
+}
+
+/// A limit of the first of two keys of the grid; of the other one or of the strength of the turbulence if the file leaves the first to its default.
+fn of_grid(file: &SceneFile, [own, other]: [&str; 2], value: String, allowed: String) -> Problem {
+    let key = |name: &str| format!("atmosphere.turbulence.{name}");
+    match [own, other, "cn2_m_m23"].map(key).into_iter().find(|key| file.states(key)) {
+        Some(stated) if stated != key(own) => {
+            let allowed = format!("one for which {own} = {value}, the default, holds, which has to be {allowed}");
+            Problem { key: stated, value: String::new(), allowed }
+        }
+        _ => Problem { key: key(own), value, allowed },
+    }
 }
 
 fn more_layers(t: &RefractiveTurbulence, needed: Option<usize>) -> String {
@@ -292,6 +304,15 @@ mod tests {
         let good = format!("grid_points = {points}\ngrid_spacing_m = {spacing}\nlayers = {layers}\n");
         let accepted = plan(&turbulent("1e-12", &good)).unwrap();
         assert!(accepted.warnings.is_empty(), "{:?}", accepted.warnings);
+        // What the file states is blamed, not the default beside it.
+        let message = plan(&turbulent("1e-12", "")).unwrap_err();
+        assert!(
+            message.contains("s.toml:3: atmosphere.turbulence.cn2_m_m23 = 1e-12 is not allowed: one for"),
+            "{message}"
+        );
+        let message = plan(&turbulent("1e-14", "grid_spacing_m = 2e-5\n")).unwrap_err();
+        assert!(message.contains("s.toml:4: atmosphere.turbulence.grid_spacing_m = 2e-5"), "{message}");
+        let message = plan(&turbulent("1e-12", "grid_points = 128\ngrid_spacing_m = 0.004\n")).unwrap_err();
         // Each number alone mends its own limit.
         let least = number(&message, "at least ");
         let message =

@@ -101,6 +101,11 @@ impl SceneFile {
         Self::new(scene).map_err(|problems| self.located(problems))
     }
 
+    /// Whether the file gives a value to a key.
+    pub(crate) fn states(&self, key: &str) -> bool {
+        self.source.has(key)
+    }
+
     /// Problems that only a plan could find, with the lines of the file that this scene was read from.
     pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
         self.source.located(problems)

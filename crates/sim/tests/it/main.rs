@@ -3,6 +3,8 @@
 // A test that cannot set up its input has failed.
 #![allow(clippy::unwrap_used)]
 
+#[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
+mod book;
 #[cfg(feature = "cli")]
 mod cli;
 #[cfg(all(feature = "cli", feature = "netcdf"))]
@@ -25,8 +27,6 @@ mod scene_features;
 mod simulated_flow;
 #[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
 mod sweep;
-#[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
-mod tutorials;
 #[cfg(feature = "cli")]
 mod wake;
 

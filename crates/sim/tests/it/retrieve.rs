@@ -270,7 +270,11 @@ fn a_fit_opens_no_flow_and_a_scene_that_is_not_read_is_refused_with_its_key() {
 fn maps_that_other_programs_wrote_again_give_the_same_circulations() {
     let temp = tempfile::tempdir().unwrap();
     let of = |name: &str| {
-        retrieved(temp.path(), &format!("{} --gate-std 14.4", reference(&format!("sim/{name}")).display()))
+        // the scene, which one of the files has, says the profile
+        retrieved(
+            temp.path(),
+            &format!("{} --gate-std 14.4 --profile algebraic", reference(&format!("sim/{name}")).display()),
+        )
     };
     let own = of("map_own.nc");
     for name in OTHERS {

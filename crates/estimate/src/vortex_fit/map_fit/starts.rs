@@ -6,7 +6,7 @@
 use crate::error::Error;
 use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Wake};
 
-/// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span).
+/// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the spacing).
 pub(crate) const CORE_OVER_SPACING: f64 = CorePrior::TYPICAL.median_ratio;
 /// Core radii of the starts over the spacing, if they are fitted.
 const CORES_OVER_SPACING: [f64; 2] = [CORE_OVER_SPACING, 0.1];

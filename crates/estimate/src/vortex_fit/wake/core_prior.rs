@@ -18,7 +18,8 @@ pub struct CorePrior {
 }
 
 impl CorePrior {
-    /// Median 4.5 % (the chapter: 3 to 5 % of the span); 2.5 and 8 % are 1.2 standard deviations away.
+    /// Median 4.5 % (3.5 % of the span of an elliptic wing, pi/4 of which is the spacing; the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the
+    /// spacing); 2.5 and 8 % are 1.2 standard deviations away.
     pub const TYPICAL: Self = Self { median_ratio: 0.045, log_deviation: 0.5 };
 
     pub(crate) fn validate(&self) -> Result<(), Error> {

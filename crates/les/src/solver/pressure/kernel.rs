@@ -66,14 +66,6 @@ pub(crate) fn sum_and_moduli(values: &[f64]) -> [f64; 2] {
     sums.map(total)
 }
 
-/// `out -= factor weight values`.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn subtract_weighted(values: &[f64], weight: &[f64], factor: f64, out: &mut [f64]) {
-    for ((out, value), weight) in out.iter_mut().zip(values).zip(weight) {
-        *out -= factor * weight * value;
-    }
-}
-
 /// `values *= scale / (shift + shifts)`, and zero where the divisor is.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn divide(values: &mut [f64], shift: f64, shifts: &[f64], scale: f64) {

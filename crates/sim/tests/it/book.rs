@@ -1,0 +1,221 @@
+//! What the book, the README and the crates' READMEs show and name: commands, scenes, options and keys are those of the program.
+
+use super::wakescope;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Tables at the top of a scene.
+const SECTIONS: [&str; 12] = [
+    "laser",
+    "pulse",
+    "detector",
+    "telescope",
+    "atmosphere",
+    "flow",
+    "scan",
+    "estimator",
+    "retrieval",
+    "outputs",
+    "site",
+    "added_flows",
+];
+/// Options of cargo, of its tests and of other programs that pages name.
+const OF_OTHERS: [&str; 22] = [
+    "--all-targets",
+    "--bench",
+    "--bin",
+    "--bind-to",
+    "--example",
+    "--features",
+    "--ignored",
+    "--include-ignored",
+    "--lib",
+    "--locked",
+    "--map-by",
+    "--mca",
+    "--no-default-features",
+    "--no-fail-fast",
+    "--nocapture",
+    "--package",
+    "--path",
+    "--release",
+    "--test",
+    "--workspace",
+    "--all-features",
+    "--doc",
+];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// Name and text of each page.
+fn pages() -> Vec<(String, String)> {
+    let mut paths = vec![root().join("README.md")];
+    let crates = ["optics", "les", "signal", "estimate", "sim"];
+    paths.extend(crates.map(|name| root().join("crates").join(name).join("README.md")));
+    for folder in ["docs/src", "docs/src/theory"] {
+        let entries = std::fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
+        paths.extend(entries.filter(|path| path.extension().is_some_and(|end| end == "md")));
+    }
+    paths.sort();
+    paths.iter().map(|path| (path.display().to_string(), std::fs::read_to_string(path).unwrap())).collect()
+}
+
+/// Blocks of a kind in a page.
+fn blocks<'t>(page: &'t str, kind: &str) -> Vec<&'t str> {
+    let begin = format!("```{kind}\n");
+    page.split(begin.as_str()).skip(1).filter_map(|rest| rest.split_once("```")).map(|(block, _)| block).collect()
+}
+
+/// Words between single backticks outside of blocks.
+fn spans(page: &str) -> Vec<&str> {
+    let prose = page.split("```").step_by(2);
+    prose.flat_map(|part| part.split('`').skip(1).step_by(2)).collect()
+}
+
+/// Lines of the program in a page: all its blocks, without comments and redirections.
+fn command_lines(page: &str) -> Vec<Vec<&str>> {
+    let lines = page.split("```").skip(1).step_by(2).flat_map(str::lines);
+    let commands = lines.filter(|line| line.starts_with("wakescope ") && !line.contains('['));
+    commands.map(|line| line.split(['#', '>']).next().unwrap().split_whitespace().skip(1).collect()).collect()
+}
+
+#[test]
+fn commands_of_the_tutorials_run() {
+    for name in ["tutorial-cfradial.md", "tutorial-signals.md"] {
+        let page = std::fs::read_to_string(root().join("docs/src").join(name)).unwrap();
+        let temp = tempfile::tempdir().unwrap();
+        for block in blocks(&page, "toml") {
+            let file = block.lines().next().and_then(|line| line.strip_prefix("# ")).unwrap();
+            std::fs::write(temp.path().join(file), block).unwrap();
+        }
+        let commands: Vec<&str> = blocks(&page, "sh").iter().flat_map(|block| block.lines()).collect();
+        assert!(commands.len() >= 4, "{name}: {commands:?}");
+        for command in commands {
+            let words: Vec<&str> = command.split_whitespace().collect();
+            assert_eq!(words[0], "wakescope", "{name}: {command}");
+            let out = wakescope(temp.path(), &[&words[1..], &["--quiet"]].concat());
+            assert!(out.status.success(), "{name}: {command}: {}", String::from_utf8_lossy(&out.stderr));
+        }
+    }
+}
+
+/// With `--help` at its end a line is parsed and nothing runs.
+#[test]
+fn lines_of_the_program_that_pages_show_are_understood() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut count = 0;
+    for (name, page) in pages() {
+        for line in command_lines(&page.replace("\\\n", " ")) {
+            let out = wakescope(temp.path(), &[&line[..], &["--help"]].concat());
+            assert!(out.status.success(), "{name}: {line:?}: {}", String::from_utf8_lossy(&out.stderr));
+            count += 1;
+        }
+    }
+    assert!(count > 25, "{count}");
+    let wrong = wakescope(temp.path(), &["retrieve", "map.nc", "--no-such-option", "--help"]);
+    assert!(!wrong.status.success());
+}
+
+/// Files that a block names need not lie beside it.
+#[test]
+fn scenes_and_cases_that_pages_show_are_good() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut count = 0;
+    for (name, page) in pages() {
+        for block in blocks(&page, "toml") {
+            std::fs::write(temp.path().join("shown.toml"), block).unwrap();
+            let words: &[&str] = match block.contains("[case]") {
+                true => &["wake", "shown.toml", "--check", "--quiet"],
+                false => &["check", "shown.toml", "--quiet"],
+            };
+            let out = wakescope(temp.path(), words);
+            let told = String::from_utf8_lossy(&out.stderr);
+            let is_file_missing =
+                told.contains("neither a file nor the beginning of files") && block.contains("planes = ");
+            assert!(out.status.success() || is_file_missing, "{name}: {block}\n{told}");
+            count += 1;
+        }
+    }
+    assert!(count >= 10, "{count}");
+}
+
+#[test]
+fn options_that_pages_name_exist() {
+    let temp = tempfile::tempdir().unwrap();
+    let help = |words: &[&str]| String::from_utf8(wakescope(temp.path(), words).stdout).unwrap();
+    let commands = [
+        "init",
+        "check",
+        "run",
+        "efficiency",
+        "signal",
+        "map",
+        "estimate",
+        "retrieve",
+        "detect",
+        "sweep",
+        "pareto",
+        "bound",
+        "budget",
+        "flow",
+        "wake",
+    ];
+    let mut known: String = commands.iter().map(|command| help(&[command, "--help"])).collect();
+    let mut folders = vec![root().join("xtask/src")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            match path.is_dir() {
+                true => folders.push(path),
+                // a field of its words is an option of that name
+                false => known += &std::fs::read_to_string(&path).unwrap().replace('_', "-"),
+            }
+        }
+    }
+    let is_end = |c: char| !(c.is_ascii_alphanumeric() || c == '-');
+    let known: BTreeSet<&str> = known.split(is_end).collect();
+    let mut missing = Vec::new();
+    for (name, page) in pages() {
+        for span in spans(&page) {
+            for word in span.split(is_end).filter(|word| word.len() > 3 && word.starts_with("--")) {
+                if !known.contains(word) && !known.contains(&word[2..]) && !OF_OTHERS.contains(&word) {
+                    missing.push(format!("{name}: {word}"));
+                }
+            }
+        }
+    }
+    assert!(missing.is_empty(), "{missing:#?}");
+}
+
+#[test]
+fn keys_that_pages_name_exist() {
+    let temp = tempfile::tempdir().unwrap();
+    let is_key = |span: &&str| {
+        let parts: Vec<&str> = span.split('.').collect();
+        let is_name = |part: &&str| {
+            !part.is_empty() && part.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        };
+        parts.len() > 1 && SECTIONS.contains(&parts[0]) && parts.iter().all(|part| is_name(part))
+    };
+    let files = ["csv", "nc", "toml", "json", "svg", "png", "md", "rs", "hpl", "checkpoint", "previous"];
+    let mut keys: BTreeSet<(String, String)> = BTreeSet::new();
+    for (name, page) in pages() {
+        let named = spans(&page)
+            .into_iter()
+            .filter(is_key)
+            .filter(|key| !files.iter().any(|end| key.ends_with(&format!(".{end}"))));
+        keys.extend(named.map(|key| (key.to_string(), name.clone())));
+    }
+    assert!(keys.len() > 20, "{}", keys.len());
+    let mut unknown = Vec::new();
+    for (key, page) in keys {
+        std::fs::write(temp.path().join("shown.toml"), format!("{key} = \"?\"\n")).unwrap();
+        let out = wakescope(temp.path(), &["check", "shown.toml", "--quiet"]);
+        if String::from_utf8_lossy(&out.stderr).contains("no such key") {
+            unknown.push(format!("{page}: {key}"));
+        }
+    }
+    assert!(unknown.is_empty(), "{unknown:#?}");
+}
