@@ -74,11 +74,13 @@ fn spans(page: &str) -> Vec<&str> {
     prose.flat_map(|part| part.split('`').skip(1).step_by(2)).collect()
 }
 
-/// Lines of the program in a page: all its blocks, without comments and redirections.
-fn command_lines(page: &str) -> Vec<Vec<&str>> {
+/// Lines of the program in a page: all its blocks, without comments and redirections, 1 for what the shell knows.
+fn command_lines(page: &str) -> Vec<Vec<String>> {
     let lines = page.split("```").skip(1).step_by(2).flat_map(str::lines);
     let commands = lines.filter(|line| line.starts_with("wakescope ") && !line.contains('['));
-    commands.map(|line| line.split(['#', '>']).next().unwrap().split_whitespace().skip(1).collect()).collect()
+    let number = |part: &str| if part.starts_with('$') { "1".to_owned() } else { part.to_owned() };
+    let word = |word: &str| word.split('/').map(number).collect::<Vec<String>>().join("/");
+    commands.map(|line| line.split(['#', '>']).next().unwrap().split_whitespace().skip(1).map(word).collect()).collect()
 }
 
 #[test]
@@ -108,7 +110,8 @@ fn lines_of_the_program_that_pages_show_are_understood() {
     let mut count = 0;
     for (name, page) in pages() {
         for line in command_lines(&page.replace("\\\n", " ")) {
-            let out = wakescope(temp.path(), &[&line[..], &["--help"]].concat());
+            let words: Vec<&str> = line.iter().map(String::as_str).chain(["--help"]).collect();
+            let out = wakescope(temp.path(), &words);
             assert!(out.status.success(), "{name}: {line:?}: {}", String::from_utf8_lossy(&out.stderr));
             count += 1;
         }
