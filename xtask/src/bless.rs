@@ -3,6 +3,7 @@
 //! The only way to write one. Curves from independent sources are never written.
 
 use crate::curves::{ALL, Origin};
+use crate::wakes;
 use crate::workspace::root;
 use crate::{Failure, Outcome};
 use wakescope_sim::io::write_atomic;
@@ -10,7 +11,7 @@ use wakescope_sim::io::write_atomic;
 /// Options of the task.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// Names of the curves, as `cargo xtask regress` prints them.
+    /// Names of the curves, as `cargo xtask regress` prints them; `wake`, which the figures of the profile quick look at.
     #[arg(required = true)]
     names: Vec<String>,
 }
@@ -21,6 +22,10 @@ pub(crate) struct Options {
 /// An unknown name, a curve of independent origin, or one that cannot be computed.
 pub(crate) fn run(options: &Options) -> Outcome {
     for name in &options.names {
+        if name == wakes::NAME {
+            wakes::bless()?;
+            continue;
+        }
         let curve = ALL.iter().find(|c| c.name == name).ok_or_else(|| {
             let known: Vec<&str> = ALL.iter().map(|c| c.name).collect();
             Failure::new(format!("bless {name}: no such curve; there are {}", known.join(", ")))

@@ -34,6 +34,9 @@ pub(crate) fn places_of(root: &Path, file: &str) -> Result<Vec<String>, Failure>
     if out.iter().any(|file| file.ends_with("/references.rs")) {
         out.push("tests/reference/les".into());
     }
+    if out.iter().any(|file| file.ends_with("/wakes.rs")) {
+        out.push("tests/reference/wake".into());
+    }
     if libraries.iter().any(|(of, _)| *of == "fixtures") {
         out.push("xtask/fixtures".into());
     }

@@ -35,7 +35,7 @@ pub(crate) fn run() -> Outcome {
     Ok(())
 }
 
-/// When the fast decay begins and what is left at the end, at each noise on the finer of the meshes.
+/// When the fast decay begins, what is left at the end and how far the vortices swing back, at each noise on the finer of the meshes.
 ///
 /// # Errors
 /// As [`run`].
@@ -44,10 +44,11 @@ pub(crate) fn by_noise() -> Result<String, Failure> {
     let told = columns.iter().map(|(heading, name)| {
         let run = Run::read(name)?;
         let begins = knee(&run.mean).map_or("never".into(), |tau| format!("{tau:.2}"));
-        Ok(format!("{heading}: {begins}, {:.2}", value_at(&run.mean, 5.0)))
+        Ok(format!("{heading}: {begins}, {:.2}, {:.2}", value_at(&run.mean, 5.0), run.swing_back))
     });
     let told = told.collect::<Result<Vec<_>, Failure>>()?;
-    Ok(format!("at 2e4 on {mesh}, where lines meet and what is left, by the noise, which is free: {}", told.join("; ")))
+    let what = "where lines meet, what is left, how far in b₀ they swing back, by the noise, which is free";
+    Ok(format!("at 2e4 on {mesh}, {what}: {}", told.join("; ")))
 }
 
 fn rows(columns: &[Column]) -> Result<String, Failure> {

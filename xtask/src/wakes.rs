@@ -1,39 +1,101 @@
 //! Simulated wakes read from their files. Figures share one, which is run once for a profile and continued where it was
 //! interrupted, or lies in a folder that was named. A wake is kept as long as its case and the code that computes it.
+//!
+//! The chapter's flow has a subgrid model and a core of 3 to 5 % of the span. What resolves that takes longer than the profile quick has:
+//! it reads the cross-planes and the history of such a run that are stored with the repository, and runs a coarser flow for the surfaces.
+//!
+//! Check: what is stored is of the case that is run here.
 
-use crate::Failure;
 use crate::cause::cause;
 use crate::figures::context::Context;
+use crate::profile::Profile;
 use crate::workspace::root;
+use crate::{Failure, Outcome};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use wakescope_sim::flow::{self, Begin, CaseFile, FinishedWake, Unwatched, WakePreset};
+use wakescope_sim::flow::{
+    self, Begin, CaseFile, CaseKind, FileFormat, FinishedWake, FlowCase, Subgrid, Unwatched, WakePreset,
+};
 
 /// Ages of the cross-planes that are kept, for pictures that move.
 const SERIES_EVERY: f64 = 0.1;
 /// What computes and writes a wake.
 const COMPUTED_BY: [&str; 3] = ["crates/les", "crates/sim/src/flow", "crates/sim/src/io"];
+/// What `bless` calls the stored wake; where it is, and the ages of its cross-planes.
+pub(crate) const NAME: &str = "wake";
+const STORED: &str = "tests/reference/wake";
+const STORED_TAU: [f64; 4] = [1.0, 2.5, 4.0, 5.0];
 /// Folders of the wakes that this process has made: two figures must not run the same one at the same time, nor twice.
 static MADE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// The wake that was named, or that of the profile.
-pub(crate) fn of(context: &Context) -> Result<FinishedWake, Failure> {
-    if let Some(folder) = &context.wake {
-        return Ok(FinishedWake::read(folder)?);
+/// The flow of the preset `fine` on a mesh of 0.5 to 0.7 core radii, with a few cross-planes alone: twenty minutes of one core.
+fn stored() -> FlowCase {
+    let mut case = WakePreset::Fine.case();
+    case.output.fields.clear();
+    if let CaseKind::Wake(flow) = &mut case.case {
+        flow.cells = [32, 160, 96];
     }
-    let preset = context.choose(WakePreset::Coarse, WakePreset::Medium, WakePreset::Chapter);
-    let mut case = preset.case();
     if let Some(output) = &mut case.wake {
+        (output.planes_tau, output.fields_tau) = (Some(STORED_TAU.to_vec()), Some(Vec::new()));
+    }
+    case
+}
+
+/// A case with whole fields and the planes of pictures that move.
+fn pictured(mut case: FlowCase) -> FlowCase {
+    case.output.fields = vec![FileFormat::Netcdf];
+    if let Some(output) = &mut case.wake {
+        output.fields_tau = None;
         output.series_tau = Some([0.0, output.end_tau]);
         output.series_every_tau = SERIES_EVERY;
     }
-    let file = CaseFile::parse(&toml::to_string(&case)?, Path::new("wake"))?;
-    let folder = context.stages.join(format!("wake-{}", cause(&root(), &[&file.hash], &COMPUTED_BY)?));
+    case
+}
+
+/// The flow that the lidar looks at: the wake that was named, or that of the profile.
+pub(crate) fn of(context: &Context) -> Result<FinishedWake, Failure> {
+    match (&context.wake, context.profile) {
+        (Some(folder), _) => Ok(FinishedWake::read(folder)?),
+        (None, Profile::Quick) => Ok(FinishedWake::read(&root().join(STORED))?),
+        (None, Profile::Standard) => run(&pictured(stored()), &context.stages, context.anew),
+        (None, Profile::Full) => run(&pictured(WakePreset::Chapter.case()), &context.stages, context.anew),
+    }
+}
+
+/// A flow with whole fields: the same, but where planes alone are stored one that is coarser.
+pub(crate) fn whole(context: &Context) -> Result<FinishedWake, Failure> {
+    if context.profile != Profile::Quick || context.wake.is_some() {
+        return of(context);
+    }
+    let mut case = WakePreset::Coarse.case();
+    case.solver.subgrid = Subgrid::MultiscaleWale { constant: None, order: None };
+    run(&pictured(case), &context.stages, context.anew)
+}
+
+/// Writes the stored wake anew.
+///
+/// # Errors
+/// A run that fails, a folder that cannot be written.
+pub(crate) fn bless() -> Outcome {
+    let from = run(&stored(), &root().join("target/figures-cache/stages"), false)?.folder;
+    let to = root().join(STORED);
+    std::fs::create_dir_all(&to)?;
+    let planes = (1..=STORED_TAU.len()).map(|k| format!("plane1_{k:04}.nc"));
+    for name in ["case.toml", "wake.csv", "wake_scaled.csv"].map(String::from).into_iter().chain(planes) {
+        std::fs::copy(from.join(&name), to.join(&name))?;
+    }
+    Ok(())
+}
+
+/// A wake from the cache, or run.
+fn run(case: &FlowCase, stages: &Path, anew: bool) -> Result<FinishedWake, Failure> {
+    let file = CaseFile::parse(&toml::to_string(case)?, Path::new("wake"))?;
+    let folder = stages.join(format!("wake-{}", cause(&root(), &[&file.hash], &COMPUTED_BY)?));
     let done = folder.join("done");
     {
         let mut made = MADE.lock().map_err(|_| Failure::new("another figure failed".into()))?;
-        if context.anew && !made.contains(&folder) && folder.exists() {
+        if anew && !made.contains(&folder) && folder.exists() {
             std::fs::remove_dir_all(&folder)?;
         }
         if !done.exists() {
@@ -54,5 +116,12 @@ mod tests {
     fn what_computes_a_wake_is_where_it_is_said_to_be() {
         let of = |places: &[&str]| cause(&root(), &["case"], places);
         assert_ne!(of(&COMPUTED_BY).unwrap(), of(&COMPUTED_BY[..1]).unwrap());
+    }
+
+    #[test]
+    fn what_is_stored_is_of_the_case_that_is_run_and_has_its_ages() {
+        let stored_case = FinishedWake::read(&root().join(STORED)).unwrap().case_toml;
+        let case = CaseFile::parse(&toml::to_string(&stored()).unwrap(), Path::new("wake")).unwrap();
+        assert_eq!(stored_case, case.toml);
     }
 }

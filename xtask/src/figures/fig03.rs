@@ -39,7 +39,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut series = vec![
         Series::new(&format!("line of sight, every {DRAWN}th"), Style::Line, fan),
         Series::new("first and last sample", Style::Dash, recorded),
-        Series::new("", Style::Dash, last),
+        Series::new("", Style::Dash, last).in_colour(1),
         Series::new("ground", Style::Line, vec![(0.0, 0.0), (1.05 * far_m, 0.0)]),
     ];
     if let Flow::VortexPair(pair) = &scene.flow {

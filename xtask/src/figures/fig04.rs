@@ -46,16 +46,14 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         Curve {
             name: "monostatic_1e-15", label: "monostatic, 10^{−15}", style: Style::Dash, profile: weak.monostatic
         },
-        Curve { name: "bistatic_1e-13", label: "bistatic, 10^{−13}", style: Style::Dot, profile: bistatic },
+        Curve { name: "bistatic_1e-13", label: "bistatic, 10^{−13}", style: Style::Markers, profile: bistatic },
         Curve {
             name: "monostatic_1e-13",
             label: "monostatic, 10^{−13}",
             style: Style::DashDot,
             profile: medium.monostatic,
         },
-        Curve {
-            name: "bistatic_1e-13_exact", label: "bistatic, 10^{−13}, exact", style: Style::Line, profile: exact
-        },
+        Curve { name: "bistatic_1e-13_exact", label: "bistatic, 10^{−13}, exact", style: Style::Dot, profile: exact },
     ];
 
     let parameters = format!(

@@ -12,7 +12,7 @@ use wakescope_sim::plot::animation;
 const FRAME_S: f64 = 0.15;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let wake = wakes::of(context)?;
+    let wake = wakes::whole(context)?;
     let origin = context.provenance_of_formula(&wake.case_toml);
     let mut table = Table::new();
     let names = ["tau", "energy", "energy_3d", "secondary_gamma_left", "secondary_gamma_right"].map(String::from);

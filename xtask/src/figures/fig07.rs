@@ -57,7 +57,7 @@ fn circulation(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
     let stored = reference(wake)?;
     let mut plot = wake.circulation_plot()?;
     for (place, side) in SIDES.iter().enumerate() {
-        let points = stored.iter().map(|r| (r[0], r[1 + place]));
+        let points = stored.iter().step_by(4).map(|r| (r[0], r[1 + place]));
         plot = plot.with(Series::new(&format!("Γ₀/ν = 5000, {side}"), Style::Markers, points).in_colour(place));
     }
     Ok(plot)
@@ -67,8 +67,8 @@ fn paths(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
     let mut plot = wake.path_plot()?;
     let stored = reference(wake)?;
     for (place, side) in SIDES.iter().enumerate() {
-        let points = stored.iter().map(|r| (r[3 + 2 * place], r[4 + 2 * place]));
-        plot = plot.with(Series::new(&format!("independent, {side}"), Style::Markers, points).in_colour(place));
+        let points = stored.iter().step_by(4).map(|r| (r[3 + 2 * place], r[4 + 2 * place]));
+        plot = plot.with(Series::new(&format!("Γ₀/ν = 5000, {side}"), Style::Markers, points).in_colour(place));
     }
     for (name, sign) in [("inviscid", 1.0), ("", -1.0)] {
         let hyperbola = inviscid()?;
@@ -123,7 +123,7 @@ fn claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {
             (at(5.0) - 0.6).abs() <= 0.07,
         )),
         inviscid_path(wake, &y, &z)?,
-        rebound(&y, &z),
+        rebound(&y, &z).beside(&by_noise),
     ])
 }
 

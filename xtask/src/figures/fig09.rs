@@ -105,7 +105,7 @@ fn claims(rows: &[(f64, f64, usize, f64)], here: &[(usize, f64)]) -> Vec<Claim> 
             ..Claim::exact(
                 "F9b",
                 "at 400 m the levels for 1, 2, 4 m are those of the chapter; the spacing of Table 2 gives a full disc of a \
-                 regular grid, which grows as rho^2, and the chapter's numbers do not",
+                 regular grid, which grows as ρ², and the chapter's numbers do not",
                 "20, 60, 120",
                 format!("{} (n_eff {})", levels.join(", "), n_eff.join(", ")),
                 agrees,

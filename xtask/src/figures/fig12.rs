@@ -41,13 +41,14 @@ fn scene(context: &Context) -> Scene {
 
 fn curve(study: &Study, reference: &'static str, energy_j: f64) -> Curve {
     let gates = study.map.range_m.len();
+    let all_lines = |gate| (0..study.map.elevation_rad.len()).map(|line| (line, gate)).collect::<Vec<_>>();
     let lines =
         |gate: usize| study.map.rms_m_s.column(gate).iter().copied().filter(|rms| rms.is_finite()).collect::<Vec<_>>();
     let mean = |of: Vec<f64>| of.iter().sum::<f64>() / of.len() as f64;
     Curve {
         reference,
         energy_j,
-        over_lines: (0..gates).map(|gate| study.zone(&study.cells(|_, j| j == gate))).collect(),
+        over_lines: (0..gates).map(|gate| study.zone(&all_lines(gate))).collect(),
         mean_of_lines_m_s: (0..gates).map(|gate| mean(lines(gate))).collect(),
         inside: study.zone(&study.cells(|d, _| d < INSIDE_M)),
         outside: study.zone(&study.cells(|d, _| d > OUTSIDE_M)),

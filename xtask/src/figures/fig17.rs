@@ -156,6 +156,9 @@ fn picture(fits: &[Fits]) -> [CurvePlot; 3] {
         for (k, method) in METHODS.into_iter().enumerate() {
             let fitted: Vec<(usize, (f64, f64))> =
                 first.iter().filter_map(|f| Some((f.scan, value(f.by_method.get(k)?, parameter)))).collect();
+            if fitted.is_empty() {
+                continue;
+            }
             let points = fitted.iter().map(|(scan, found)| (*scan as f64 + 0.12 * (k as f64 - 1.5), found.0));
             let errors: Vec<f64> = fitted.iter().map(|(_, found)| found.1).collect();
             plot = plot.with(Series::new(method, Style::Markers, points).with_band(&errors).in_colour(k));

@@ -5,7 +5,9 @@ use super::profiles::{self, Profiles};
 use super::study::{Age, METHODS, Sight, Study, near_scene, with_method};
 use crate::Failure;
 use crate::claim::Claim;
+use crate::profile::Profile;
 use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE, Verdict};
+use crate::wakes;
 use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::{NoiseKind, Refinement, SnrReference, VortexPair};
@@ -17,11 +19,20 @@ const STRONG_DB: f64 = 20.0;
 /// The core that the chapter calls typical, and larger ones, in spacings.
 const CORES: [f64; 4] = [0.05, 0.075, 0.1, 0.15];
 
+/// What is looked at.
+#[derive(Clone, Copy, PartialEq)]
+enum Seen {
+    Wake,
+    /// A wake with twice the core, on a coarse mesh.
+    Coarse,
+    /// The analytic pair with a core radius in spacings.
+    Pair(f64),
+}
+
 /// One setting of flow and lidar.
 #[derive(Clone, Copy, PartialEq)]
 struct Case {
-    /// Core radius of the analytic pair in spacings; the wake if absent.
-    core: Option<f64>,
+    seen: Seen,
     snr_db: f64,
     noise: NoiseKind,
     pulses: usize,
@@ -29,10 +40,14 @@ struct Case {
     bins: bool,
 }
 
-const WAKE: Case = Case { core: None, snr_db: CHAPTER_DB, noise: NoiseKind::Band, pulses: 1, bins: false };
+const WAKE: Case = Case { seen: Seen::Wake, snr_db: CHAPTER_DB, noise: NoiseKind::Band, pulses: 1, bins: false };
 /// What is followed along the ratio.
-const WAYS: [Case; 4] =
-    [WAKE, Case { noise: NoiseKind::White, ..WAKE }, Case { pulses: 8, ..WAKE }, Case { core: Some(CORES[0]), ..WAKE }];
+const WAYS: [Case; 4] = [
+    WAKE,
+    Case { noise: NoiseKind::White, ..WAKE },
+    Case { pulses: 8, ..WAKE },
+    Case { seen: Seen::Pair(CORES[0]), ..WAKE },
+];
 
 fn cases(context: &Context) -> Vec<Case> {
     let levels_db = context.choose(
@@ -41,14 +56,25 @@ fn cases(context: &Context) -> Vec<Case> {
         vec![WEAK_DB, -7.5, -5.0, -2.5, CHAPTER_DB, 5.0, 10.0, 15.0, STRONG_DB],
     );
     let along = WAYS.into_iter().flat_map(|way| levels_db.iter().map(move |&snr_db| Case { snr_db, ..way }));
-    let cores = CORES[1..].iter().map(|core| Case { core: Some(*core), ..WAKE });
+    let cores = CORES[1..].iter().map(|core| Case { seen: Seen::Pair(*core), ..WAKE });
     let bins = [CHAPTER_DB, STRONG_DB].map(|snr_db| Case { snr_db, bins: true, ..WAKE });
-    bins.into_iter().chain(along).chain(cores).collect()
+    // The flow that quick has whole is another one.
+    let is_coarse = context.profile == Profile::Quick && context.wake.is_none() && !context.analytic;
+    let coarse = is_coarse.then_some(Case { seen: Seen::Coarse, ..WAKE });
+    bins.into_iter().chain(along).chain(cores).chain(coarse).collect()
 }
 
 impl Case {
+    fn core_b0(&self) -> f64 {
+        if let Seen::Pair(core) = self.seen { core } else { f64::NAN }
+    }
+
     fn name(&self) -> String {
-        let flow = self.core.map_or("wake".into(), |core| format!("pair, core {core} b₀"));
+        let flow = match self.seen {
+            Seen::Wake => "wake".into(),
+            Seen::Coarse => "coarse wake".into(),
+            Seen::Pair(core) => format!("pair, core {core} b₀"),
+        };
         let noise = if self.noise == NoiseKind::White { "white noise" } else { "band noise" };
         let bins = if self.bins { ", raw bins" } else { "" };
         format!("{flow}, {noise}, {} a line{bins}", if self.pulses == 1 { "one pulse" } else { "eight pulses" })
@@ -77,10 +103,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let cases = cases(context);
     let mut all = Vec::new();
     // The pair is looked at from where the wake is.
-    for of_flow in cases.chunk_by(|a, b| a.core == b.core) {
-        let sight = match of_flow[0].core {
-            None => &sight,
-            Some(core) => &Sight::of_pair(VortexPair {
+    for of_flow in cases.chunk_by(|a, b| a.seen == b.seen) {
+        let sight = match of_flow[0].seen {
+            Seen::Wake => &sight,
+            Seen::Coarse => &Sight::of_wake(wakes::whole(context)?, Age::Early)?,
+            Seen::Pair(core) => &Sight::of_pair(VortexPair {
                 core_radius_m: core * VortexPair::default().spacing_m,
                 ..VortexPair::default()
             }),
@@ -129,7 +156,7 @@ fn table(all: &[Measured]) -> Table {
     Table::new()
         .text("case", rows.iter().map(|r| r.0.case.name()))
         .float("snr_db", float(&|m, _, _| m.case.snr_db))
-        .float("core_b0", float(&|m, _, _| m.case.core.unwrap_or(f64::NAN)))
+        .float("core_b0", float(&|m, _, _| m.case.core_b0()))
         .text("zone", rows.iter().map(|r| if r.2 { "inside" } else { "outside" }))
         .text("against", rows.iter().map(|r| METHODS[r.1]))
         .float("rms_pa_m_s", float(&|m, pa, inside| rms(&m.of[pa], inside)))
@@ -159,7 +186,7 @@ fn picture(all: &[Measured]) -> Figure {
         });
         curves.collect()
     };
-    let cores = all.iter().filter(|m| m.case.core.is_some() && m.case.snr_db == CHAPTER_DB).collect();
+    let cores = all.iter().filter(|m| matches!(m.case.seen, Seen::Pair(_)) && m.case.snr_db == CHAPTER_DB).collect();
     Figure::stacked([
         panel("Inside the vortices", "SNR [dB]", true, |case| case.snr_db, along()),
         panel("Outside", "SNR [dB]", false, |case| case.snr_db, along()),
@@ -167,7 +194,7 @@ fn picture(all: &[Measured]) -> Figure {
             &format!("Inside the vortices of the pair, {CHAPTER_DB} dB"),
             "core radius [b₀]",
             true,
-            |case| case.core.unwrap_or(f64::NAN),
+            |case| case.core_b0(),
             vec![("pair, band noise, one pulse a line".into(), cores)],
         ),
     ])
@@ -189,15 +216,17 @@ fn words(all: &[Measured]) -> Result<String, Failure> {
         };
         holds.push(format!("{} dB {verdict} ({})", m.case.snr_db, per_cent(m.case)?));
     }
+    let coarse = find(all, Case { seen: Seen::Coarse, ..WAKE }).and_then(|m| per_cent(m.case));
+    let coarse = coarse.map_or(String::new(), |share| format!(", on a coarse wake with twice the core {share}"));
     Ok(format!(
         "Where that reaches (figure 25, error of CA less that of unweighted PA over the latter, inside): on the wake {}; at {WEAK_DB} dB in white noise \
-         {}; inside a core of {} b₀ at {CHAPTER_DB} dB {}, of {} b₀ {}.",
+         {}; inside a core of {} b₀ at {CHAPTER_DB} dB {}, of {} b₀ {}{coarse}.",
         holds.join(", "),
         per_cent(Case { noise: NoiseKind::White, snr_db: WEAK_DB, ..WAKE })?,
         CORES[0],
-        per_cent(Case { core: Some(CORES[0]), ..WAKE })?,
+        per_cent(Case { seen: Seen::Pair(CORES[0]), ..WAKE })?,
         CORES[3],
-        per_cent(Case { core: Some(CORES[3]), ..WAKE })?
+        per_cent(Case { seen: Seen::Pair(CORES[3]), ..WAKE })?
     ))
 }
 
@@ -209,7 +238,7 @@ fn claims(all: &[Measured]) -> Result<Vec<Claim>, Failure> {
     let less = Bar::Less(NO_DIFFERENCE);
     let [weak, strong] = [WEAK_DB, STRONG_DB].map(|snr_db| Case { snr_db, ..WAKE });
     let white = Case { noise: NoiseKind::White, ..weak };
-    let pair = Case { core: Some(CORES[0]), ..WAKE };
+    let pair = Case { seen: Seen::Pair(CORES[0]), ..WAKE };
     let between = |name: &str, a: Case, b: Case| {
         let [a, b] = [find(all, a)?, find(all, b)?];
         let share = |m: &Measured, without| m.of[2].inside.rms_m_s(without) / m.of[0].inside.rms_m_s(without);
@@ -232,7 +261,7 @@ fn claims(all: &[Measured]) -> Result<Vec<Claim>, Failure> {
             "CA above unweighted PA",
             &[
                 part(strong, 0, true, Bar::Above(0.0))?,
-                part(Case { core: pair.core, ..strong }, 0, true, Bar::Above(0.0))?,
+                part(Case { seen: pair.seen, ..strong }, 0, true, Bar::Above(0.0))?,
             ],
         ),
         claim(
@@ -242,7 +271,7 @@ fn claims(all: &[Measured]) -> Result<Vec<Claim>, Failure> {
                 CORES[3], CORES[0]
             ),
             "CA/PA in the large core below that in the small one",
-            &between("difference of the ratios", Case { core: Some(CORES[3]), ..WAKE }, pair)?,
+            &between("difference of the ratios", Case { seen: Seen::Pair(CORES[3]), ..WAKE }, pair)?,
         ),
         claim(
             "CP4",

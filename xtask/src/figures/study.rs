@@ -6,6 +6,7 @@ use crate::statistics::{BATCHES, Estimate};
 use crate::wakes;
 use std::path::PathBuf;
 use wakescope_les::analysis::decay::value_at;
+use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::io::csv::Column;
 use wakescope_sim::io::{Provenance, Table};
 use wakescope_sim::measure::cell_average::CellAverage;
@@ -96,7 +97,11 @@ impl Sight {
                 Age::Late => VortexPair { motion, age_tau: age.tau(), ..VortexPair::default() },
             }));
         }
-        let wake = wakes::of(context)?;
+        Self::of_wake(wakes::of(context)?, age)
+    }
+
+    /// A simulated wake of an age.
+    pub(super) fn of_wake(wake: FinishedWake, age: Age) -> Result<Self, Failure> {
         let b0_m = wake.flow.pair.scales()?.spacing_m;
         let flow = SimulatedFlow {
             planes: "plane1".into(),
@@ -206,11 +211,15 @@ impl Study {
         self.cores.iter().map(|c| (c.0.hypot(c.1 - height_m), (c.1 - height_m).atan2(c.0))).collect()
     }
 
-    /// The cells whose distance to the nearer core, m, and gate are accepted.
+    /// The cells with whole regions of accumulation, which the border of the sector does not cut, whose distance to the nearer core, m,
+    /// and gate are accepted: cells of fewer windows err more, wherever they are.
     pub(super) fn cells(&self, accept: impl Fn(f64, usize) -> bool) -> Vec<(usize, usize)> {
+        let level = &self.map.level;
+        let most: Vec<f64> = level.columns().into_iter().map(|gate| gate.iter().copied().fold(0.0, f64::max)).collect();
+        let is_whole = |(i, j): (usize, usize)| level[[i, j]] >= 0.9 * most[j] && j > 0 && j + 1 < most.len();
         let rows = self.distance_m.iter().enumerate();
         let all = rows.flat_map(|(i, row)| row.iter().enumerate().map(move |(j, d)| ((i, j), *d)));
-        all.filter(|((_, j), d)| accept(*d, *j)).map(|(cell, _)| cell).collect()
+        all.filter(|(cell, d)| accept(*d, cell.1) && is_whole(*cell)).map(|(cell, _)| cell).collect()
     }
 
     /// Mean of a function of the errors of a cell over the scans, without those of one batch.

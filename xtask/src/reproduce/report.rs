@@ -20,7 +20,9 @@ pub(super) fn html(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) 
     ];
     let findings = heads.map(|(heading, of_chapter, verdict)| {
         let here = |c: &&Claim| c.verdict == verdict && matches!(Kind::of(&c.id), Kind::Chapter(_)) == of_chapter;
-        (heading.into(), done.iter().flat_map(|(_, r)| &r.claims).filter(here).map(finding).collect())
+        let of =
+            |(_, r): &(_, Rendered)| r.claims.iter().filter(here).map(|c| finding(c, core_s(r))).collect::<Vec<_>>();
+        (heading.into(), done.iter().flat_map(of).collect())
     });
     let report = Report {
         title: "wakescope: figures and claims".into(),
@@ -45,7 +47,7 @@ pub(super) fn counted(name: &str, claims: &[&Claim]) -> String {
 /// How many claims hold, what the figures say in words, and what it took.
 fn found(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> String {
     let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
-    let core_s: f64 = done.iter().flat_map(|(_, r)| &r.timings).map(|(_, [_, core_s])| core_s).sum();
+    let core_s: f64 = done.iter().map(|(_, r)| core_s(r)).sum();
     let words: Vec<&str> = done.iter().map(|(_, r)| r.words.as_str()).filter(|words| !words.is_empty()).collect();
     format!(
         "The chapter's {}; the program's own {} (profile {}). {} {} figures and tables took {core_s:.0} s of processor time; this \
@@ -58,12 +60,17 @@ fn found(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> String 
     )
 }
 
-fn finding(claim: &Claim) -> Finding {
+/// Processor time that a figure took, s.
+fn core_s(rendered: &Rendered) -> f64 {
+    rendered.timings.iter().map(|(_, [_, core_s])| core_s).sum()
+}
+
+fn finding(claim: &Claim, core_s: f64) -> Finding {
     let kind = Kind::of(&claim.id);
     let said = if let Kind::Chapter(_) = kind { format!("{} ", kind.source()) } else { String::new() };
     let decided = match claim.decided_by.as_str() {
         "" => String::new(),
-        by => format!(" Would decide: {by}."),
+        by => format!(" Would decide: {by}; the figure took {core_s:.0} s of processor time."),
     };
     Finding {
         name: claim.id.clone(),
