@@ -200,7 +200,7 @@ fn keys_that_pages_name_exist() {
         let is_name = |part: &&str| {
             !part.is_empty() && part.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
         };
-        parts.len() > 1 && SECTIONS.contains(&parts[0]) && parts.iter().all(|part| is_name(part))
+        parts.len() > 1 && SECTIONS.contains(&parts[0]) && parts.iter().all(is_name)
     };
     let files = ["csv", "nc", "toml", "json", "svg", "png", "md", "rs", "hpl", "checkpoint", "previous"];
     let mut keys: BTreeSet<(String, String)> = BTreeSet::new();
