@@ -28,7 +28,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
         let curve = ALL.iter().find(|c| c.name == name).ok_or_else(|| {
             let known: Vec<&str> = ALL.iter().map(|c| c.name).collect();
-            Failure::new(format!("bless {name}: no such curve; there are {}", known.join(", ")))
+            Failure::new(format!("bless {name}: no such curve; there are {}, {}", wakes::NAME, known.join(", ")))
         })?;
         let Origin::Blessed { quantity, grid } = curve.origin else {
             return Err(Failure::new(format!(
