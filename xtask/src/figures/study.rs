@@ -20,8 +20,6 @@ use wakescope_sim::scene::{
 use wakescope_sim::sweep::{self, Request, Sweep};
 use wakescope_sim::{measure::wind, measure::write};
 
-/// Lines of sight 0.5 m apart that a region of 2 m shares, and gates 3 m apart that share a window of 38.4 m and the pulse.
-const SHARED: (f64, f64) = (9.0, 10.0);
 /// What counts as inside a vortex, m from its centre.
 pub(super) const INSIDE_M: f64 = 8.0;
 /// What counts as outside of both, m.
@@ -240,7 +238,7 @@ impl Study {
             }
         }
         let range_m = cells.iter().map(|cell| self.map.range_m[cell.1]).sum::<f64>() / cells.len() as f64;
-        Zone { range_m, of_batch, average: CellAverage::over(&self.map, cells, SHARED) }
+        Zone { range_m, of_batch, average: CellAverage::over(&self.map, cells) }
     }
 }
 

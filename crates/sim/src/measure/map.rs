@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::measure::air::radial_velocity_m_s;
+use crate::measure::error_law::{ErrorLaw, ScanErrors, range_filter, shared_cells};
 use crate::measure::estimators;
 use crate::measure::map_estimator::{self, MapEstimator, NoiseAtPoints};
 use crate::measure::progress::Observer;
@@ -47,7 +48,7 @@ pub struct VelocityEstimates {
     pub std_m_s: Array2<f64>,
     /// Root mean square error against `v_pulse_m_s`, m/s: the root of the mean of (33).
     pub rms_m_s: Array2<f64>,
-    /// Standard error of `rms_m_s`, m/s; NaN for one realisation.
+    /// Standard error of `rms_m_s`, m/s, by the law of the errors of the map; NaN for one realisation.
     pub standard_error_m_s: Array2<f64>,
     /// Windows accumulated for one estimate.
     pub level: Array2<f64>,
@@ -68,17 +69,10 @@ pub struct VelocityEstimates {
     pub quality: Array2<f64>,
     /// Fraction of the samples that the converter clipped.
     pub clipped_fraction: f64,
-    /// The errors of each realisation; empty where they are not kept.
+    /// The errors of each realisation.
     pub scans: Vec<ScanErrors>,
-}
-
-/// What one realisation shows, each \[line, gate\].
-#[derive(Debug, Clone, PartialEq)]
-pub struct ScanErrors {
-    /// Error against the velocity weighted with the pulse, m/s.
-    pub error_m_s: Array2<f64>,
-    /// Whether the estimate was flagged.
-    pub flagged: Array2<bool>,
+    /// What they say of the law of the errors; nothing of one realisation.
+    pub law: Option<ErrorLaw>,
 }
 
 /// Sums over the realisations of what an estimator says beside the velocity.
@@ -142,8 +136,8 @@ pub(crate) struct Mapper<S> {
     clipped: Clipped,
     samples: f64,
     realisations: usize,
-    /// The errors of each realisation, if they are kept.
-    scans: Option<Vec<ScanErrors>>,
+    /// The errors of each realisation.
+    scans: Vec<ScanErrors>,
 }
 
 struct Truth {
@@ -154,7 +148,7 @@ struct Truth {
 }
 
 impl<S: Sample> Mapper<S> {
-    pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>, keeps_scans: bool) -> Result<Self, Error> {
+    pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let places = places(scene, g)?;
@@ -176,7 +170,7 @@ impl<S: Sample> Mapper<S> {
             clipped: Clipped::default(),
             samples: 0.0,
             realisations: 0,
-            scans: keeps_scans.then(Vec::new),
+            scans: Vec::new(),
         })
     }
 
@@ -203,9 +197,7 @@ impl<S: Sample> Mapper<S> {
             // The level is the same for all realisations: a matter of geometry.
             (self.level[place], self.n_eff[place]) = (point.level as f64, point.n_eff);
         }
-        if let Some(scans) = &mut self.scans {
-            scans.push(ScanErrors { error_m_s: &velocity - &self.truth.pulse_m_s, flagged });
-        }
+        self.scans.push(ScanErrors { error_m_s: &velocity - &self.truth.pulse_m_s, flagged });
         self.clipped += clipped;
         self.samples += self.samples_of_realisation;
         self.realisations += 1;
@@ -216,6 +208,7 @@ impl<S: Sample> Mapper<S> {
         let statistics = self.errors.statistics();
         let bias_m_s = statistics.mapv(|s| s.bias_m_s);
         let [power_a2, gain, quality, resolution] = self.figures.means();
+        let law = ErrorLaw::new(&self.scans, shared_cells(plan)?);
         let noise_a2 = self.estimator.noise_power_a2();
         let mut snr_db = power_a2;
         for (index, (place, power)) in snr_db.indexed_iter_mut().enumerate() {
@@ -246,7 +239,9 @@ impl<S: Sample> Mapper<S> {
             bias_m_s,
             std_m_s: statistics.mapv(|s| s.std_m_s),
             rms_m_s: statistics.mapv(|s| s.rms_m_s),
-            standard_error_m_s: statistics.mapv(|s| s.rms_standard_error_m_s),
+            standard_error_m_s: law
+                .as_ref()
+                .map_or(Array2::from_elem(self.shape, f64::NAN), ErrorLaw::rms_standard_errors),
             v_exact_m_s: self.truth.exact_m_s,
             v_pulse_m_s: self.truth.pulse_m_s,
             v_gate_m_s: self.truth.gate_m_s,
@@ -259,21 +254,21 @@ impl<S: Sample> Mapper<S> {
             snr_db,
             quality,
             clipped_fraction: self.clipped.total() as f64 / self.samples.max(1.0),
-            scans: self.scans.unwrap_or_default(),
+            scans: self.scans,
+            law,
         })
     }
 }
 
 fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
-    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let g = &plan.geometry;
     let shape = (g.elevation_rad.len(), g.gate_range_m.len());
     let zeros = || Array2::zeros(shape);
     let spread_m_s = scanner.spread_m_s().cloned();
     let mut truth = Truth { spread_m_s, exact_m_s: zeros(), pulse_m_s: zeros(), gate_m_s: zeros() };
     let pulse = &plan.instrument.pulse;
-    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
-    let by_gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, g.layer_thickness_m)?;
+    let by_gate = range_filter(plan)?;
     for i in 0..scanner.lines().len() {
         let exact_m_s = radial_velocity_m_s(plan, i, &g.gate_range_m)?;
         truth.exact_m_s.row_mut(i).assign(&ArrayView1::from(&exact_m_s));
@@ -288,18 +283,16 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
 
 /// Runs the estimates of all realisations, of several plans that differ in their estimators alone: the signals of each are made
 /// once. The records of those that the files will have go to `kept`, too, piece after piece; `seen` is given the place of the plan
-/// and the velocities, m/s, of each map as it comes. `keeps_scans` keeps the errors of each realisation for standard errors of averages.
+/// and the velocities, m/s, of each map as it comes.
 pub(crate) fn estimates<S: Sample + wakescope_signal::scan::Sample>(
     plans: &[&Plan],
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
     mut kept: impl FnMut(ArrayView2<'_, S>),
     mut seen: impl FnMut(usize, &Array2<f64>),
-    keeps_scans: bool,
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(plan) = plans.first() else { return Ok(Vec::new()) };
-    let mut mappers: Vec<Mapper<S>> =
-        plans.iter().map(|plan| Mapper::new(plan, scanner, keeps_scans)).collect::<Result<_, _>>()?;
+    let mut mappers: Vec<Mapper<S>> = plans.iter().map(|plan| Mapper::new(plan, scanner)).collect::<Result<_, _>>()?;
     observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
     for realisation in 0..plan.realisations() {
         let mut sums = mappers.iter().map(Mapper::sums).collect::<Result<Vec<_>, _>>()?;
@@ -328,8 +321,8 @@ pub fn velocities(plan: &Plan, observer: &dyn Observer) -> Result<Vec<Array2<f64
     let mut maps = Vec::with_capacity(plan.realisations());
     let seen = |_, velocity_m_s: &Array2<f64>| maps.push(velocity_m_s.clone());
     match plan.scene.scene.detector.signal {
-        DetectorSignal::IntermediateFrequency => estimates::<f64>(&[plan], &scanner, observer, |_| (), seen, false)?,
-        DetectorSignal::Baseband => estimates::<Complex<f64>>(&[plan], &scanner, observer, |_| (), seen, false)?,
+        DetectorSignal::IntermediateFrequency => estimates::<f64>(&[plan], &scanner, observer, |_| (), seen)?,
+        DetectorSignal::Baseband => estimates::<Complex<f64>>(&[plan], &scanner, observer, |_| (), seen)?,
     };
     Ok(maps)
 }
@@ -343,7 +336,7 @@ pub(crate) fn of_records<S: Sample>(
     scanner: &Scanner<'_>,
     mut read: impl FnMut(usize, AddRecords<'_, S>) -> Result<(), Error>,
 ) -> Result<VelocityEstimates, Error> {
-    let mut mapper = Mapper::<S>::new(plan, scanner, false)?;
+    let mut mapper = Mapper::<S>::new(plan, scanner)?;
     for realisation in 0..plan.realisations() {
         let mut sums = mapper.sums()?;
         read(realisation, &mut |first, records| Ok(sums.add(first, records)?))?;

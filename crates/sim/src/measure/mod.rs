@@ -10,7 +10,8 @@
 //! | `table` | tables of numbers and straight lines between them |
 //! | `air`, [`scan`] | air along the lines of sight, and their records |
 //! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
-//! | [`map`], `map_estimator`, [`cell_average`] | estimates and their errors against the truth |
+//! | [`map`], `map_estimator` | estimates and their errors against the truth |
+//! | [`error_law`], [`cell_average`] | the law of these errors, averages of them over cells, their standard errors |
 //! | [`recorded`] | the same from the records of a file, measured or simulated |
 //! | [`mod@bound`], `ray_information` | the Cramer-Rao bound for a scene; what a pulse tells of the velocity about a range |
 //! | [`budget`] | the power budget, from the pulse to the signal-to-noise ratio |
@@ -24,6 +25,7 @@ pub mod budget;
 pub mod cell_average;
 pub(crate) mod described;
 pub(crate) mod efficiencies;
+pub mod error_law;
 pub mod estimators;
 pub mod geometry;
 pub mod instrument;
@@ -39,6 +41,8 @@ pub(crate) mod response;
 pub mod run;
 pub mod scan;
 pub(crate) mod scan_lines;
+#[cfg(test)]
+mod standard_error_tests;
 pub mod streams;
 pub(crate) mod table;
 pub mod wind;

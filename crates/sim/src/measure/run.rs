@@ -130,7 +130,7 @@ fn signals_and_map<S: Sample + wakescope_signal::scan::Sample>(
                 maps.push(velocity_m_s.clone());
             }
         };
-        result.map = map::estimates(&[plan], scanner, observer, keep, seen, false)?.pop();
+        result.map = map::estimates(&[plan], scanner, observer, keep, seen)?.pop();
         if plan.runs(Stage::Retrieval) {
             result.retrieval = of_realisations::<S>(plan, scanner, &maps, observer)?;
         }

@@ -179,8 +179,9 @@ fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let realisation_s =
         n.records * n.windows * window_s(scene, n) + n.cells * point_s(scene, n) + sums_bytes * NEW_BYTE_S;
     let (planning_s, planned_bytes, planning_bytes) = planning(scene, n);
-    // Of each point: sums over the realisations, truth and thresholds; then the velocities of one realisation.
-    let points_bytes = n.cells * MAPPER_POINT_BYTES;
+    // Of each point: sums over the realisations, their errors, truth and thresholds; then the velocities of one realisation.
+    let scans_bytes = n.cells * n.realisations * SCAN_POINT_BYTES;
+    let points_bytes = n.cells * MAPPER_POINT_BYTES + scans_bytes;
     let maps = if e.follow_wind { 2.0 } else { 1.0 };
     // While windows are added there is a piece of records, while velocities are sought there are sums over blocks of windows.
     let air = air_bytes(n);
@@ -188,11 +189,18 @@ fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let seeking = air + sums_bytes * 1.125 + n.lines * n.windows * 8.0 + n.cells * MAP_POINT_BYTES * maps;
     let at_work = adding.max(seeking) + points_bytes + planned_bytes;
     let working = at_work.max(air + planning_bytes);
-    run(Stage::Estimates, reason, n.realisations * realisation_s + planning_s, [working, n.cells * MAP_FIELDS * 8.0])
+    run(
+        Stage::Estimates,
+        reason,
+        n.realisations * realisation_s + planning_s,
+        [working, n.cells * MAP_FIELDS * 8.0 + scans_bytes],
+    )
 }
 
 /// Of a point of the map: sums over the realisations, truth, thresholds.
 const MAPPER_POINT_BYTES: f64 = 200.0;
+/// Of a point and a realisation: the error, and whether it was flagged.
+const SCAN_POINT_BYTES: f64 = 9.0;
 /// Of a point of the map of one realisation: the estimate.
 const MAP_POINT_BYTES: f64 = 88.0;
 

@@ -171,7 +171,7 @@ mod tests {
         });
         let scanner = Scanner::new(&plan, &Silent).unwrap();
         let mut retrieval = Retrieval::new(&plan, &scanner).unwrap();
-        map::estimates::<f64>(&[&plan], &scanner, &Silent, |_| (), |_, v_m_s| retrieval.add(v_m_s), false).unwrap();
+        map::estimates::<f64>(&[&plan], &scanner, &Silent, |_| (), |_, v_m_s| retrieval.add(v_m_s)).unwrap();
         let found = retrieval.result();
         assert_eq!(found.failed_fraction, 0.0);
         // A map of one scan at 0 dB and twice the lines has 19 m^2/s; at 10 dB speckle is left.

@@ -47,10 +47,8 @@ pub(super) fn maps(
     let Some(first) = plans.first() else { return Ok(Vec::new()) };
     let scanner = Scanner::with(first, known, observer)?;
     match first.scene.scene.detector.signal {
-        DetectorSignal::IntermediateFrequency => {
-            map::estimates::<f64>(plans, &scanner, observer, |_| (), |_, _| (), true)
-        }
-        DetectorSignal::Baseband => map::estimates::<Complex<f64>>(plans, &scanner, observer, |_| (), |_, _| (), true),
+        DetectorSignal::IntermediateFrequency => map::estimates::<f64>(plans, &scanner, observer, |_| (), |_, _| ()),
+        DetectorSignal::Baseband => map::estimates::<Complex<f64>>(plans, &scanner, observer, |_| (), |_, _| ()),
     }
 }
 
@@ -79,7 +77,7 @@ fn of_samples<S: Sample + wakescope_signal::scan::Sample>(
             collected.retrieval.iter_mut().for_each(|retrieval| retrieval.add(velocity_m_s));
         }
     };
-    let maps = map::estimates::<S>(&of_plans, scanner, observer, |_| (), seen, true)?;
+    let maps = map::estimates::<S>(&of_plans, scanner, observer, |_| (), seen)?;
     let mut rows = Vec::with_capacity(plans.len());
     for ((plan, map), collected) in plans.iter().zip(&maps).zip(&collected) {
         let truths_m_s = collected.apart.iter().map(|cell| map.v_gate_m_s[*cell]).cycle();

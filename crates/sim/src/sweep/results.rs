@@ -6,14 +6,14 @@ use super::circulation::Circulation;
 use crate::Error;
 use crate::measure::bound::BoundPoint;
 use crate::measure::cell_average::{CellAverage, error_of_fraction, flagged_fraction};
+use crate::measure::error_law::{range_filter, shared_cells};
 use crate::measure::estimators;
 use crate::measure::map::VelocityEstimates;
 use crate::measure::run::ScanMiddle;
 use crate::measure::wind::vortex_pair;
 use crate::plan::Plan;
-use crate::scene::{Flow, Method, RegionRadius, Scene};
+use crate::scene::{Flow, Scene};
 use ndarray::Array2;
-use wakescope_signal::RangeFilter;
 
 /// Cells within this part of the spacing of a pair from a centre are inside its vortices: 8 m of 47.
 const INSIDE: f64 = 8.0 / 47.0;
@@ -90,21 +90,13 @@ pub(super) fn row(plan: &Plan, measured: &Measured<'_>) -> Result<Vec<f64>, Erro
     for part in [Part::All, Part::Inside, Part::Outside] {
         out.extend(cells.averages(measured.map, part));
     }
-    out.extend(flagged_fraction(measured.map, cells.shared));
+    out.extend(flagged_fraction(measured.map));
     out.extend(bad_fraction(plan, measured.errors_m_s)?);
     out.extend(measured.circulation.map_or([f64::NAN; 6], |c| {
         let Circulation { bias_m2_s, bias_standard_error_m2_s, rms_m2_s, standard_error_m2_s, .. } = c;
         [bias_m2_s, bias_standard_error_m2_s, rms_m2_s, standard_error_m2_s, c.failed_fraction, c.bound_m2_s]
     }));
     Ok(out)
-}
-
-/// Weight of the air about the range of a gate: of the pulse and of the window.
-fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
-    let scene = &plan.scene.scene;
-    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
-    let thickness_m = plan.geometry.layer_thickness_m;
-    Ok(RangeFilter::gate(&plan.instrument.pulse, &window, scene.detector.sampling_hz, thickness_m)?)
 }
 
 /// Part of the estimates that say nothing of the air, and its standard error: those farther from it than any part of a peak, and
@@ -138,7 +130,7 @@ pub(super) struct Cells {
     /// not known.
     distance: Array2<f64>,
     /// Neighbouring lines and gates that share windows.
-    shared: (f64, f64),
+    shared: [f64; 2],
 }
 
 impl Cells {
@@ -148,11 +140,6 @@ impl Cells {
     /// As [`row`].
     pub(super) fn new(plan: &Plan) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
-        let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
-        let line_m = scene.scan.elevation_step_rad * middle_m;
-        let gate_m = scene.estimator.gate_step_samples as f64 * g.sample_spacing_m;
-        let lines = (2.0 * radius_m(scene, middle_m) / line_m).floor() + 1.0;
-        let gates = (range_filter(plan)?.full_width_half_maximum_m() / gate_m).max(1.0);
         let distance = Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
             let (y_m, z_m) = position_m(scene, g.elevation_rad[i], g.gate_range_m[j]);
             match &scene.flow {
@@ -165,7 +152,7 @@ impl Cells {
                 Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => f64::INFINITY,
             }
         });
-        Ok(Self { distance, shared: (lines.min(g.elevation_rad.len() as f64), gates.min(g.gate_range_m.len() as f64)) })
+        Ok(Self { distance, shared: shared_cells(plan)? })
     }
 
     fn of(&self, part: Part) -> Vec<(usize, usize)> {
@@ -179,14 +166,14 @@ impl Cells {
 
     /// Cells outside the vortices, all where these are not known, so far apart that they share no window.
     pub(super) fn apart(&self) -> Vec<(usize, usize)> {
-        let (lines, gates) = (self.shared.0.ceil() as usize, self.shared.1.ceil() as usize);
+        let [lines, gates] = self.shared.map(|cells| cells.ceil() as usize);
         let cells = if self.of(Part::Outside).is_empty() { self.of(Part::All) } else { self.of(Part::Outside) };
         cells.into_iter().filter(|(i, j)| i.is_multiple_of(lines) && j.is_multiple_of(gates)).collect()
     }
 
     /// Standard deviation, bias and root mean square, each with its standard error, m/s.
     fn averages(&self, map: &VelocityEstimates, part: Part) -> [f64; 6] {
-        let a = CellAverage::over(map, &self.of(part), self.shared);
+        let a = CellAverage::over(map, &self.of(part));
         let [bias, std] = [[a.bias_m_s, a.bias_standard_error_m_s], [a.std_m_s, a.std_standard_error_m_s]];
         [std[0], std[1], bias[0], bias[1], a.rms_m_s, a.standard_error_m_s]
     }
@@ -195,14 +182,4 @@ impl Cells {
 /// Distance along the ground and height of a point of the scan, m.
 fn position_m(scene: &Scene, elevation_rad: f64, range_m: f64) -> (f64, f64) {
     (range_m * elevation_rad.cos(), scene.scan.lidar_height_m + range_m * elevation_rad.sin())
-}
-
-/// Radius of the regions in the middle of the scan, m.
-fn radius_m(scene: &Scene, middle_m: f64) -> f64 {
-    match &scene.estimator.radius {
-        _ if scene.estimator.method == (Method::Periodogram {}) => 0.0,
-        RegionRadius::Fixed {} => scene.estimator.radius_m,
-        RegionRadius::OfRange { range_m, radius_m } => crate::measure::table::of_table(range_m, radius_m, middle_m),
-        RegionRadius::Target { largest_m, .. } => *largest_m,
-    }
 }

@@ -1,0 +1,212 @@
+//! The law of the errors of a map, from few realisations: what a cell alone does not tell, its neighbours do.
+//!
+//! Neighbouring cells have nearly the same variance, so it is pooled over as many of them as have enough degrees of freedom
+//! together; a cell has a bias of its own. Outliers, which may be rarer than the realisations of a cell, are counted over the whole map.
+//! Check: errors of many realisations, given out a few at a time.
+
+use crate::Error;
+use crate::measure::estimators;
+use crate::plan::Plan;
+use crate::scene::{Method, RegionRadius, Scene};
+use ndarray::Array2;
+use std::collections::BTreeMap;
+use wakescope_signal::RangeFilter;
+
+/// Degrees of freedom of a pooled variance of Gaussian errors, for each unit of the variance of their squares.
+const FREEDOM: f64 = 6.0;
+/// Most of these units: beyond, more neighbours would be too unlike.
+const MOST_UNITS: f64 = 4.0;
+/// Part of the cells that share windows over which squares of errors are alike.
+const ALIKE: f64 = 0.25;
+/// Outliers are beyond so many medians of the errors where these are largest: four standard deviations of Gaussian ones.
+const OUTLIER: f64 = 6.0;
+
+/// Weight of the air about the range of a gate: of the pulse and of the window.
+pub(crate) fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
+    let scene = &plan.scene.scene;
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let thickness_m = plan.geometry.layer_thickness_m;
+    Ok(RangeFilter::gate(&plan.instrument.pulse, &window, scene.detector.sampling_hz, thickness_m)?)
+}
+
+/// Neighbouring lines and gates of a plan's map that share windows.
+///
+/// # Errors
+/// What the crates refuse; a checked scene gives none.
+pub(crate) fn shared_cells(plan: &Plan) -> Result<[f64; 2], Error> {
+    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
+    let line_m = scene.scan.elevation_step_rad * middle_m;
+    let gate_m = scene.estimator.gate_step_samples as f64 * g.sample_spacing_m;
+    let across_m = 2.0 * radius_m(scene, middle_m);
+    let lines = (across_m / line_m).floor() + 1.0;
+    let gates = (range_filter(plan)?.full_width_half_maximum_m().hypot(across_m) / gate_m).max(1.0);
+    Ok([lines.min(g.elevation_rad.len() as f64), gates.min(g.gate_range_m.len() as f64)])
+}
+
+/// Radius of the regions in the middle of the scan, m.
+fn radius_m(scene: &Scene, middle_m: f64) -> f64 {
+    match &scene.estimator.radius {
+        _ if scene.estimator.method == (Method::Periodogram {}) => 0.0,
+        RegionRadius::Fixed {} => scene.estimator.radius_m,
+        RegionRadius::OfRange { range_m, radius_m } => crate::measure::table::of_table(range_m, radius_m, middle_m),
+        RegionRadius::Target { largest_m, .. } => *largest_m,
+    }
+}
+
+/// What one realisation shows, each \[line, gate\].
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanErrors {
+    /// Error against the velocity weighted with the pulse, m/s.
+    pub error_m_s: Array2<f64>,
+    /// Whether the estimate was flagged.
+    pub flagged: Array2<bool>,
+}
+
+/// What the realisations of a map say of the law of its errors, each array \[line, gate\].
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorLaw {
+    /// Neighbouring lines and gates that share windows.
+    pub(crate) shared: [f64; 2],
+    /// Realisations with an estimate.
+    count: Array2<f64>,
+    /// Mean error of those that are no outliers, m/s.
+    bias_m_s: Array2<f64>,
+    /// Their variance, pooled, (m/s)^2.
+    variance: Array2<f64>,
+    /// Variance of the squares of their deviations over the square of the variance: 2 for Gaussian ones.
+    of_squares: f64,
+    /// Outliers.
+    outliers: Array2<f64>,
+    /// Their part of all estimates, and the means of their squares and fourth powers.
+    outlier: [f64; 3],
+}
+
+impl ErrorLaw {
+    /// Of the realisations of a map whose neighbours share windows over so many lines and gates; nothing of fewer than two.
+    #[must_use]
+    pub fn new(scans: &[ScanErrors], shared: [f64; 2]) -> Option<Self> {
+        let shape = scans.get(1)?.error_m_s.dim();
+        let n = scans.len() as f64;
+        let freedom = n - 1.0;
+        let near = reach(shared, 2.0 * FREEDOM / freedom);
+        let limit_m_s = OUTLIER * largest_median(scans, near);
+        let finite = |cell| scans.iter().map(move |scan| scan.error_m_s[cell]).filter(|error| error.is_finite());
+        let is_far = |error: &f64| error.abs() > limit_m_s;
+        let far: Vec<f64> =
+            scans.iter().flat_map(|scan| &scan.error_m_s).copied().filter(|e| e.is_finite() && is_far(e)).collect();
+        let mean_power = |power: i32| far.iter().map(|e| e.powi(power)).sum::<f64>() / (far.len() as f64).max(1.0);
+        let count = Array2::from_shape_fn(shape, |cell| finite(cell).count() as f64);
+        let outliers = Array2::from_shape_fn(shape, |cell| finite(cell).filter(is_far).count() as f64);
+        let near_count = &count - &outliers;
+        let central = |power: i32, about: Option<&Array2<f64>>| {
+            Array2::from_shape_fn(shape, |cell| {
+                let middle = about.map_or(0.0, |about| about[cell]);
+                finite(cell).filter(|e| !is_far(e)).map(|e| (e - middle).powi(power)).sum::<f64>()
+            })
+        };
+        let bias_m_s = central(1, None) / near_count.mapv(|n| n.max(1.0));
+        let (squares, fourths) = (central(2, Some(&bias_m_s)), central(4, Some(&bias_m_s)));
+        let freedoms = near_count.mapv(|n| (n - 1.0).max(0.0));
+        let pooled = |reach| sums_about(&squares, reach) / sums_about(&freedoms, reach);
+        // The excess of deviations from a mean of few is a part of that of the errors.
+        let variance = pooled(near);
+        let fourth = sums_about(&fourths, near) / sums_about(&near_count, near) * (n / freedom).powi(2);
+        let ratios: Vec<f64> =
+            fourth.iter().zip(&variance).map(|(f, v)| f / (v * v)).filter(|ratio| ratio.is_finite()).collect();
+        let cells = near.iter().map(|reach| (2 * reach + 1) as f64).product::<f64>() / (ALIKE * shared[0] * shared[1]);
+        let seen = freedom * cells.max(1.0);
+        let fourth = ratios.iter().sum::<f64>() / (ratios.len() as f64).max(1.0) * (seen + 2.0) / seen;
+        let of_squares = 2.0 + (fourth - 3.0).max(0.0) * n * n * freedom / (freedom.powi(3) + 1.0);
+        let variance = pooled(reach(shared, FREEDOM * of_squares.min(MOST_UNITS) / freedom));
+        let part = far.len() as f64 / count.sum().max(1.0);
+        let outlier = [part, mean_power(2), mean_power(4)];
+        Some(Self { shared, count, bias_m_s, variance, of_squares, outliers, outlier })
+    }
+
+    /// Expected part of outliers among `count` estimates that have `found`: those of the map count as one more.
+    fn expected(&self, found: f64, count: f64) -> f64 {
+        let [part, ..] = self.outlier;
+        if part > 0.0 { (found + 1.0) / (count + 1.0 / part) } else { 0.0 }
+    }
+
+    /// Standard error of the root mean square of each cell, m/s; NaN for fewer than two estimates.
+    #[must_use]
+    pub fn rms_standard_errors(&self) -> Array2<f64> {
+        let [_, square, fourth] = self.outlier;
+        Array2::from_shape_fn(self.count.dim(), |cell| {
+            let (n, variance) = (self.count[cell], self.variance[cell]);
+            if n < 2.0 {
+                return f64::NAN;
+            }
+            let part = self.expected(self.outliers[cell], n);
+            let far = part * square;
+            let squared_bias = (self.bias_m_s[cell].powi(2) - variance / n).max(0.0);
+            let of_mean =
+                4.0 * squared_bias * (variance + far) + self.of_squares * variance.powi(2) + 2.0 * variance * far;
+            error_of_root(squared_bias + variance, of_mean / n, [far, part * fourth / n])
+        })
+    }
+
+    /// What the outliers of the map that these cells have not shown yet would add to the mean square of their errors, and to the variance of
+    /// that mean; the first over the number of estimates is what they add to the variance of the mean error.
+    pub(crate) fn unseen(&self, cells: &[(usize, usize)]) -> ([f64; 2], f64) {
+        let [_, square, fourth] = self.outlier;
+        let sum = |of: &Array2<f64>| cells.iter().map(|cell| of[*cell]).sum::<f64>();
+        let (count, found) = (sum(&self.count), sum(&self.outliers));
+        let part = (self.expected(found, count) - found / count).max(0.0);
+        ([part * square, part * fourth / count], part * square / count)
+    }
+}
+
+/// Standard error of the root of a mean square that has a variance, and of what rare outliers add to both.
+///
+/// E (rms - t)^2 = 2 t (t - E rms) for the true root t. E rms is that of a gamma law of this mean and variance, to 1 %: exact for one
+/// or many Gaussian errors. Outliers take at most t less the root without them from it.
+pub(crate) fn error_of_root(square: f64, variance: f64, [rare_square, of_rare]: [f64; 2]) -> f64 {
+    let sum = square + rare_square;
+    if sum <= 0.0 {
+        return 0.0;
+    }
+    let excess = variance / (4.0 * sum * sum);
+    let stretch = (1.0 + excess).sqrt();
+    let rare = (of_rare / (4.0 * sum)).min(2.0 * sum.sqrt() * (sum.sqrt() - square.sqrt()));
+    (2.0 * sum * excess / (stretch * (1.0 + stretch)) + rare).sqrt()
+}
+
+/// How many lines and gates to each side are pooled, where each cell has one degree of freedom in so many as are wanted.
+fn reach(shared: [f64; 2], wanted: f64) -> [usize; 2] {
+    shared.map(|cells| (0.5 * ((ALIKE * wanted).sqrt() * cells - 1.0)).max(0.0).round() as usize)
+}
+
+/// Sums over the neighbours of each cell, itself included.
+fn sums_about(values: &Array2<f64>, reach: [usize; 2]) -> Array2<f64> {
+    let (lines, gates) = values.dim();
+    let mut table = Array2::<f64>::zeros((lines + 1, gates + 1));
+    for ((i, j), value) in values.indexed_iter() {
+        table[(i + 1, j + 1)] = value + table[(i, j + 1)] + table[(i + 1, j)] - table[(i, j)];
+    }
+    Array2::from_shape_fn((lines, gates), |(i, j)| {
+        let (first, end) = (i.saturating_sub(reach[0]), (i + reach[0] + 1).min(lines));
+        let (left, right) = (j.saturating_sub(reach[1]), (j + reach[1] + 1).min(gates));
+        let sum = table[(end, right)] - table[(first, right)] - table[(end, left)] + table[(first, left)];
+        sum.max(0.0)
+    })
+}
+
+/// Median of the sizes of the errors in the part of the map where it is largest.
+fn largest_median(scans: &[ScanErrors], reach: [usize; 2]) -> f64 {
+    let mut parts: BTreeMap<(usize, usize), Vec<f64>> = BTreeMap::new();
+    for scan in scans {
+        let (lines, gates) = scan.error_m_s.dim();
+        let place = |at: usize, of: usize, reach: usize| at * (of / (2 * reach + 1)).max(1) / of;
+        for ((i, j), error) in scan.error_m_s.indexed_iter().filter(|(_, error)| error.is_finite()) {
+            parts.entry((place(i, lines, reach[0]), place(j, gates, reach[1]))).or_default().push(error.abs());
+        }
+    }
+    let median = |sizes: &mut Vec<f64>| {
+        let middle = sizes.len() / 2;
+        *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+    };
+    parts.values_mut().map(median).fold(0.0, f64::max)
+}
