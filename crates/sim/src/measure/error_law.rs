@@ -18,8 +18,8 @@ const FREEDOM: f64 = 6.0;
 const MOST_UNITS: f64 = 4.0;
 /// Part of the cells that share windows over which squares of errors are alike.
 const ALIKE: f64 = 0.25;
-/// Outliers are beyond so many medians of the errors where these are largest: four standard deviations of Gaussian ones.
-const OUTLIER: f64 = 6.0;
+/// Outliers are beyond so many medians of the errors where these are largest: 3.4 standard deviations of Gaussian ones.
+const OUTLIER: f64 = 5.0;
 
 /// Weight of the air about the range of a gate: of the pulse and of the window.
 pub(crate) fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
@@ -176,7 +176,7 @@ pub(crate) fn error_of_root(square: f64, variance: f64, [rare_square, of_rare]: 
 
 /// How many lines and gates to each side are pooled, where each cell has one degree of freedom in so many as are wanted.
 fn reach(shared: [f64; 2], wanted: f64) -> [usize; 2] {
-    shared.map(|cells| (0.5 * ((ALIKE * wanted).sqrt() * cells - 1.0)).max(0.0).round() as usize)
+    shared.map(|cells| (0.5 * (ALIKE * wanted).sqrt() * cells + 0.25).floor() as usize)
 }
 
 /// Sums over the neighbours of each cell, itself included.
