@@ -18,8 +18,8 @@ const FREEDOM: f64 = 6.0;
 const MOST_UNITS: f64 = 4.0;
 /// Part of the cells that share windows over which squares of errors are alike.
 const ALIKE: f64 = 0.25;
-/// Outliers are beyond so many medians of the errors where these are largest: 3.4 standard deviations of Gaussian ones.
-const OUTLIER: f64 = 5.0;
+/// Outliers are beyond so many medians of the errors about them: four standard deviations of Gaussian ones.
+const OUTLIER: f64 = 6.0;
 
 /// Weight of the air about the range of a gate: of the pulse and of the window.
 pub(crate) fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
@@ -76,10 +76,12 @@ pub struct ErrorLaw {
     variance: Array2<f64>,
     /// Variance of the squares of their deviations over the square of the variance: 2 for Gaussian ones.
     of_squares: f64,
-    /// Outliers.
+    /// Outliers found.
     outliers: Array2<f64>,
-    /// Their part of all estimates, and the means of their squares and fourth powers.
-    outlier: [f64; 3],
+    /// Their part of all estimates of the map.
+    outlier_part: f64,
+    /// Mean square and fourth power of outliers, as expected in a cell.
+    powers: [Array2<f64>; 2],
 }
 
 impl ErrorLaw {
@@ -90,19 +92,25 @@ impl ErrorLaw {
         let n = scans.len() as f64;
         let freedom = n - 1.0;
         let near = reach(shared, 2.0 * FREEDOM / freedom);
-        let limit_m_s = OUTLIER * largest_median(scans, near);
+        let median_m_s = medians(scans, near);
         let finite = |cell| scans.iter().map(move |scan| scan.error_m_s[cell]).filter(|error| error.is_finite());
-        let is_far = |error: &f64| error.abs() > limit_m_s;
-        let far: Vec<f64> =
-            scans.iter().flat_map(|scan| &scan.error_m_s).copied().filter(|e| e.is_finite() && is_far(e)).collect();
-        let mean_power = |power: i32| far.iter().map(|e| e.powi(power)).sum::<f64>() / (far.len() as f64).max(1.0);
+        let is_far = |cell, error: &f64| error.abs() > OUTLIER * median_m_s[cell];
         let count = Array2::from_shape_fn(shape, |cell| finite(cell).count() as f64);
-        let outliers = Array2::from_shape_fn(shape, |cell| finite(cell).filter(is_far).count() as f64);
+        let outliers = Array2::from_shape_fn(shape, |cell| finite(cell).filter(|e| is_far(cell, e)).count() as f64);
+        // Guesses over the band are alike in all cells, long tails go with what is usual about them: the lesser.
+        let powers = [2, 4].map(|power| {
+            let far = median_m_s.indexed_iter().flat_map(|(cell, m)| {
+                finite(cell).filter(move |e| is_far(cell, e)).map(move |e| [e.powi(power), (e / m).powi(power)])
+            });
+            let sum = far.fold([0.0; 2], |sum, far| [sum[0] + far[0], sum[1] + far[1]]);
+            let mean = sum.map(|sum| sum / outliers.sum().max(1.0));
+            median_m_s.mapv(|m| mean[0].min(if m > 0.0 { mean[1] * m.powi(power) } else { f64::INFINITY }))
+        });
         let near_count = &count - &outliers;
         let central = |power: i32, about: Option<&Array2<f64>>| {
             Array2::from_shape_fn(shape, |cell| {
                 let middle = about.map_or(0.0, |about| about[cell]);
-                finite(cell).filter(|e| !is_far(e)).map(|e| (e - middle).powi(power)).sum::<f64>()
+                finite(cell).filter(|e| !is_far(cell, e)).map(|e| (e - middle).powi(power)).sum::<f64>()
             })
         };
         let bias_m_s = central(1, None) / near_count.mapv(|n| n.max(1.0));
@@ -119,43 +127,40 @@ impl ErrorLaw {
         let fourth = ratios.iter().sum::<f64>() / (ratios.len() as f64).max(1.0) * (seen + 2.0) / seen;
         let of_squares = 2.0 + (fourth - 3.0).max(0.0) * n * n * freedom / (freedom.powi(3) + 1.0);
         let variance = pooled(reach(shared, FREEDOM * of_squares.min(MOST_UNITS) / freedom));
-        let part = far.len() as f64 / count.sum().max(1.0);
-        let outlier = [part, mean_power(2), mean_power(4)];
-        Some(Self { shared, count, bias_m_s, variance, of_squares, outliers, outlier })
+        let outlier_part = outliers.sum() / count.sum().max(1.0);
+        Some(Self { shared, count, bias_m_s, variance, of_squares, outliers, outlier_part, powers })
     }
 
     /// Expected part of outliers among `count` estimates that have `found`: those of the map count as one more.
     fn expected(&self, found: f64, count: f64) -> f64 {
-        let [part, ..] = self.outlier;
-        if part > 0.0 { (found + 1.0) / (count + 1.0 / part) } else { 0.0 }
+        if self.outlier_part > 0.0 { (found + 1.0) / (count + 1.0 / self.outlier_part) } else { 0.0 }
     }
 
     /// Standard error of the root mean square of each cell, m/s; NaN for fewer than two estimates.
     #[must_use]
     pub fn rms_standard_errors(&self) -> Array2<f64> {
-        let [_, square, fourth] = self.outlier;
         Array2::from_shape_fn(self.count.dim(), |cell| {
             let (n, variance) = (self.count[cell], self.variance[cell]);
             if n < 2.0 {
                 return f64::NAN;
             }
             let part = self.expected(self.outliers[cell], n);
-            let far = part * square;
+            let [far, of_far] = self.powers.each_ref().map(|power| part * power[cell]);
             let squared_bias = (self.bias_m_s[cell].powi(2) - variance / n).max(0.0);
             let of_mean =
                 4.0 * squared_bias * (variance + far) + self.of_squares * variance.powi(2) + 2.0 * variance * far;
-            error_of_root(squared_bias + variance, of_mean / n, [far, part * fourth / n])
+            error_of_root(squared_bias + variance, of_mean / n, [far, of_far / n])
         })
     }
 
     /// What the outliers of the map that these cells have not shown yet would add to the mean square of their errors, and to the variance of
     /// that mean; the first over the number of estimates is what they add to the variance of the mean error.
     pub(crate) fn unseen(&self, cells: &[(usize, usize)]) -> ([f64; 2], f64) {
-        let [_, square, fourth] = self.outlier;
         let sum = |of: &Array2<f64>| cells.iter().map(|cell| of[*cell]).sum::<f64>();
         let (count, found) = (sum(&self.count), sum(&self.outliers));
         let part = (self.expected(found, count) - found / count).max(0.0);
-        ([part * square, part * fourth / count], part * square / count)
+        let [square, fourth] = self.powers.each_ref().map(|power| part * sum(power) / cells.len() as f64);
+        ([square, fourth / count], square / count)
     }
 }
 
@@ -194,19 +199,21 @@ fn sums_about(values: &Array2<f64>, reach: [usize; 2]) -> Array2<f64> {
     })
 }
 
-/// Median of the sizes of the errors in the part of the map where it is largest.
-fn largest_median(scans: &[ScanErrors], reach: [usize; 2]) -> f64 {
+/// Medians of the sizes of the errors in parts of the map that have at least as many cells as are near one; 0 where there is none.
+fn medians(scans: &[ScanErrors], reach: [usize; 2]) -> Array2<f64> {
+    let (lines, gates) = scans[0].error_m_s.dim();
+    let place = |at: usize, of: usize, reach: usize| at * (of / (2 * reach + 1)).max(1) / of;
+    let part = |(i, j)| (place(i, lines, reach[0]), place(j, gates, reach[1]));
     let mut parts: BTreeMap<(usize, usize), Vec<f64>> = BTreeMap::new();
     for scan in scans {
-        let (lines, gates) = scan.error_m_s.dim();
-        let place = |at: usize, of: usize, reach: usize| at * (of / (2 * reach + 1)).max(1) / of;
-        for ((i, j), error) in scan.error_m_s.indexed_iter().filter(|(_, error)| error.is_finite()) {
-            parts.entry((place(i, lines, reach[0]), place(j, gates, reach[1]))).or_default().push(error.abs());
+        for (cell, error) in scan.error_m_s.indexed_iter().filter(|(_, error)| error.is_finite()) {
+            parts.entry(part(cell)).or_default().push(error.abs());
         }
     }
-    let median = |sizes: &mut Vec<f64>| {
+    let median = |mut sizes: Vec<f64>| {
         let middle = sizes.len() / 2;
         *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
     };
-    parts.values_mut().map(median).fold(0.0, f64::max)
+    let medians: BTreeMap<_, f64> = parts.into_iter().map(|(part, sizes)| (part, median(sizes))).collect();
+    Array2::from_shape_fn((lines, gates), |cell| medians.get(&part(cell)).copied().unwrap_or(0.0))
 }
