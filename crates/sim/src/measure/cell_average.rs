@@ -55,22 +55,6 @@ impl CellAverage {
         let (std_m_s, rms_m_s) = (variance.sqrt(), square.sqrt());
         Self { bias_m_s, bias_standard_error_m_s, std_m_s, std_standard_error_m_s, rms_m_s, standard_error_m_s }
     }
-
-    /// Averages of independent batches of equal size as one.
-    #[must_use]
-    pub fn joined(batches: impl ExactSizeIterator<Item = Self>) -> Self {
-        let n = batches.len() as f64;
-        let mut sums = [0.0; 6];
-        for b in batches {
-            let errors = [b.bias_standard_error_m_s, b.std_standard_error_m_s, b.standard_error_m_s].map(|e| e * e / n);
-            let values = [b.bias_m_s, b.std_m_s.powi(2), b.rms_m_s.powi(2)];
-            sums.iter_mut().zip([values, errors].concat()).for_each(|(sum, value)| *sum += value / n);
-        }
-        let [bias_m_s, rest @ ..] = sums;
-        let [std_m_s, rms_m_s, bias_standard_error_m_s, std_standard_error_m_s, standard_error_m_s] =
-            rest.map(f64::sqrt);
-        Self { bias_m_s, bias_standard_error_m_s, std_m_s, std_standard_error_m_s, rms_m_s, standard_error_m_s }
-    }
 }
 
 /// Part of the estimates of all cells and scans that is flagged, and its standard error: not 0 where none or all are.

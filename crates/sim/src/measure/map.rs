@@ -3,7 +3,6 @@
 use crate::Error;
 use crate::measure::air::radial_velocity_m_s;
 use crate::measure::error_law::{ErrorLaw, ScanErrors, range_filter, shared_cells};
-use crate::measure::estimators;
 use crate::measure::map_estimator::{self, MapEstimator, NoiseAtPoints};
 use crate::measure::progress::Observer;
 use crate::measure::region::places;

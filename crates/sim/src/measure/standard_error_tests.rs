@@ -208,22 +208,6 @@ fn standard_errors_of_simulated_maps_cover_with_two_realisations() {
 }
 
 #[test]
-fn errors_of_averages_of_equal_batches_shrink_with_the_root_of_their_number() {
-    let one = CellAverage {
-        bias_m_s: -0.2,
-        bias_standard_error_m_s: 0.02,
-        std_m_s: 0.5,
-        std_standard_error_m_s: 0.08,
-        rms_m_s: 0.6,
-        standard_error_m_s: 0.1,
-    };
-    let four = CellAverage::joined([one; 4].into_iter());
-    assert!((four.bias_m_s + 0.2).abs() < 1e-12 && (four.std_m_s - 0.5).abs() < 1e-12);
-    assert!((four.rms_m_s - 0.6).abs() < 1e-12 && (four.standard_error_m_s - 0.05).abs() < 1e-12);
-    assert!((four.bias_standard_error_m_s - 0.01).abs() < 1e-12 && (four.std_standard_error_m_s - 0.04).abs() < 1e-12);
-}
-
-#[test]
 fn one_realisation_and_no_cells_have_no_standard_error() {
     let law = Law { scans: 2, bias_m_s: 0.0, bad: 0.0 };
     let two = law.map(&mut Xoshiro256PlusPlus::seed_from_u64(1));
