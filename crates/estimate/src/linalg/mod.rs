@@ -161,14 +161,18 @@ pub(crate) fn hermitian_eigen<T: Scalar<Real = f64> + Lapack>(
 #[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
-    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a.zip(b) {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    for i in 0..a.len().min(b.len()) {
         for lane in 0..8 {
-            sums[lane] += a[lane] * b[lane];
+            sums[lane] += a[i][lane] * b[i][lane];
         }
     }
-    sums.iter().sum::<f64>() + rest
+    let mut rest = 0.0;
+    for i in 0..a_rest.len().min(b_rest.len()) {
+        rest += a_rest[i] * b_rest[i];
+    }
+    let [first, second, third, fourth, fifth, sixth, seventh, eighth] = sums;
+    first + second + third + fourth + fifth + sixth + seventh + eighth + rest
 }
 
 #[cfg(test)]

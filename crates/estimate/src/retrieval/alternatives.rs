@@ -9,9 +9,10 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::retrieval::expected::Expected;
-use crate::retrieval::hypotheses::{End, Fits, Kind};
+use crate::retrieval::hypotheses::{End, Fits, Kind, ROUGH};
 use crate::retrieval::report::{COMPETES, Chosen, Report};
 use crate::retrieval::{Flag, Measured, ScanResult, VortexResult};
+use crate::vortex_fit::damped_newton::Stop;
 use crate::vortex_fit::{Parameter, Vortex, Wake};
 
 /// Spacings of the pairs behind aircraft in service \[m\]: pi/4 of spans of 20 to 80 m, one as likely as another in its logarithm.
@@ -22,6 +23,10 @@ const LONG: f64 = 0.4;
 const TYPICAL_M: f64 = 45.0;
 /// Spacings are others if their logarithms differ by more.
 const APART: f64 = 0.1;
+/// What is so much above the best chi-square, in variances, has no weight; nor has what lies beyond it.
+const NEGLIGIBLE: f64 = 30.0;
+/// A fit with a given spacing ends at such a step: its deviations are small against the distance of spacings.
+const WEIGHED: Stop = Stop { iterations: 40, sigmas: 0.1, learns: false };
 
 struct Alternative {
     end: End,
@@ -46,14 +51,15 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
         return Ok(report.told(end, covariance, statistic));
     }
     let mut all = vec![Alternative::new(report, end.clone())?];
+    let variance = report.scale.powi(2) * alike;
+    let most = end.chi2 + NEGLIGIBLE * variance;
     // where the curvature of an end tells nothing, those of the others do
-    all.extend(other_spacings(report, end).into_iter().filter_map(|end| Alternative::new(report, end).ok()));
+    all.extend(other_spacings(report, end, most).into_iter().filter_map(|end| Alternative::new(report, end).ok()));
     let spacings = all.len();
     if report.options.other_profile {
-        all.extend(of_other_profile(report, end)?);
+        all.extend(of_other_profile(report, end, most)?);
     }
     let least = all.iter().fold(f64::INFINITY, |least, one| least.min(one.end.chi2));
-    let variance = report.scale.powi(2) * alike;
     all.iter_mut().for_each(|one| one.weight = (-0.5 * (one.end.chi2 - least) / variance).exp());
     let sum: f64 = all.iter().map(|one| one.weight).sum();
     all.iter_mut().for_each(|one| one.weight /= sum);
@@ -70,8 +76,8 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
     Ok(result)
 }
 
-/// Fits of pairs with given spacings, where gates are long.
-fn other_spacings(report: &Report<'_>, end: &End) -> Vec<End> {
+/// Fits of pairs with given spacings, where gates are long: away from that of the end as far as chi-squares stay below `most`.
+fn other_spacings(report: &Report<'_>, end: &End, most: f64) -> Vec<End> {
     let lateral = [Parameter::LeftLateral as usize, Parameter::RightLateral as usize];
     let gate_m = report.problem.expected.kernel.width_m();
     let spacing_m = end.wake.spacing_m();
@@ -86,15 +92,26 @@ fn other_spacings(report: &Report<'_>, end: &End) -> Vec<End> {
     groups.retain(|group| !lateral.iter().any(|place| group == &[*place]));
     groups.push(lateral.to_vec());
     let step = (SPACINGS_M.1 / SPACINGS_M.0).ln() / (SPACINGS - 1) as f64;
-    let starts: Vec<End> = (0..SPACINGS)
-        .map(|i| End {
-            wake: with_spacing(&end.wake, SPACINGS_M.0 * (step * i as f64).exp()),
-            groups: groups.clone(),
-            ..end.clone()
-        })
-        .collect();
-    let is_pair = |end: &End| end.wake.left.circulation_m2_s > 0.0 && end.wake.right.circulation_m2_s > 0.0;
-    fits.fine(&starts).into_iter().filter(is_pair).collect()
+    let spacings_m: Vec<f64> = (0..SPACINGS).map(|i| SPACINGS_M.0 * (step * i as f64).exp()).collect();
+    let (less, more) = spacings_m.split_at(spacings_m.partition_point(|other_m| *other_m < spacing_m));
+    let mut ends = Vec::new();
+    for way in [less.iter().rev().collect::<Vec<_>>(), more.iter().collect()] {
+        // each begins where its neighbour ended
+        let mut near = end.wake;
+        for spacing_m in way {
+            let Some(found) = fits.lowest(end.kind, &with_spacing(&near, *spacing_m), groups.clone(), WEIGHED) else {
+                continue;
+            };
+            if found.chi2 > most {
+                break;
+            }
+            if found.wake.left.circulation_m2_s > 0.0 && found.wake.right.circulation_m2_s > 0.0 {
+                near = found.wake;
+                ends.push(found);
+            }
+        }
+    }
+    ends
 }
 
 /// The pair about its middle, with circulation times spacing as it was.
@@ -109,17 +126,18 @@ fn with_spacing(wake: &Wake, spacing_m: f64) -> Wake {
     Wake { left: vortex(&wake.left), right: vortex(&wake.right), ..*wake }
 }
 
-/// The fit with the other profile, from the end of the stated one.
-fn of_other_profile(report: &Report<'_>, end: &End) -> Result<Option<Alternative>, Error> {
+/// The fit with the other profile, from the end of the stated one, unless its chi-square is above `most`.
+fn of_other_profile(report: &Report<'_>, end: &End, most: f64) -> Result<Option<Alternative>, Error> {
     let mut options = report.options.clone();
     options.model.profile = options.model.profile.other();
     let moving = Expected::rough(report.map, &options)?.fine(&options)?;
     let expected = if report.problem.expected.moves() { moving } else { moving.frozen() };
     let mut problem = report.problem.clone();
     problem.expected = &expected;
-    let ends = Fits { problem: &problem, options: &options }.fine(std::slice::from_ref(end));
+    let fits = Fits { problem: &problem, options: &options };
+    let other = fits.lowest(end.kind, &end.wake, end.groups.clone(), ROUGH).filter(|other| other.chi2 <= most);
     let report = Report { problem: &problem, options: &options, ..*report };
-    Ok(ends.into_iter().next().and_then(|end| Alternative::new(&report, end).ok()))
+    Ok(other.and_then(|end| Alternative::new(&report, end).ok()))
 }
 
 /// The end whose spacing is nearest to the mean of all by weight, in the logarithm.

@@ -34,7 +34,7 @@ const NEARLY: f64 = 5e-3;
 const HOPELESS: f64 = 50.0;
 
 const FAR: Stop = Stop { iterations: 25, sigmas: 0.3, learns: false };
-const ROUGH: Stop = Stop { iterations: 40, sigmas: 1e-2, learns: false };
+pub(crate) const ROUGH: Stop = Stop { iterations: 40, sigmas: 1e-2, learns: false };
 const FINE: Stop = Stop { iterations: 50, sigmas: 1e-4, learns: false };
 
 /// Which vortices there are.
@@ -153,7 +153,8 @@ impl Fits<'_> {
         self.lowest(Kind::Wind, &Kind::Wind.of(about), self.groups(Kind::Wind), ROUGH).ok_or(nowhere)
     }
 
-    fn lowest(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>, stop: Stop) -> Option<End> {
+    /// The end from a start on, with those free numbers.
+    pub(crate) fn lowest(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>, stop: Stop) -> Option<End> {
         let (wake, chi2, sigmas_left) = self.problem.minimum(start, &groups, stop)?;
         Some(End { kind, wake, chi2, sigmas_left, groups })
     }
@@ -238,9 +239,15 @@ impl Fits<'_> {
         ends
     }
 
-    /// The ends for another problem, such as another scale of the loss, to the last.
+    /// The ends for another problem, such as another scale of the loss; the likely one, which is told, to the last.
     pub(crate) fn fine(&self, ends: &[End]) -> Vec<End> {
-        ends.iter().filter_map(|end| self.lowest(end.kind, &end.wake, end.groups.clone(), FINE)).collect()
+        let to = |end: &End, stop: Stop| self.lowest(end.kind, &end.wake, end.groups.clone(), stop);
+        let mut ends: Vec<End> = ends.iter().filter_map(|end| to(end, ROUGH)).collect();
+        let likely = least(&ends, self.problem.cells.len()).map(|likely| likely.chi2);
+        for end in ends.iter_mut().filter(|end| Some(end.chi2) == likely) {
+            *end = to(end, FINE).unwrap_or_else(|| end.clone());
+        }
+        ends
     }
 
     /// Ends for a problem with more velocities, from those of one with fewer.

@@ -31,7 +31,8 @@ impl ScanModel {
     /// Velocities of the layers of a line.
     pub(crate) fn wind_into(&self, line: &Line, wake: &Wake, work: &mut Work) {
         work.wind.clear();
-        work.wind.extend(line.layers.iter().map(|layer| self.wake.gradient_on(wake, layer.range_m, line.ray)));
+        let range_m: Vec<f64> = line.layers.iter().map(|layer| layer.range_m).collect();
+        work.wind.extend(self.wake.gradients(wake, &range_m, line.ray));
     }
 
     /// Phasors exp(j m omega T) of all lags m for one velocity.

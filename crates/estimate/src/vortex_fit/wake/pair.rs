@@ -6,6 +6,7 @@
 //! for the left vortex (clockwise) and +1 for the right one, so that positive circulations move the air between them down.
 //! Check: derivatives against difference quotients; the ground is a streamline; the peak of (4).
 
+use multiversion::multiversion;
 use std::f64::consts::PI;
 
 use crate::error::{Error, finite, positive};
@@ -157,6 +158,7 @@ impl CoreProfile {
     }
 
     /// Omega, its derivative with respect to r^2 and to the core radius, for unit circulation.
+    #[inline(always)]
     pub(crate) fn angular(self, r2: f64, core_m: f64) -> (f64, f64, f64) {
         let core2 = core_m * core_m;
         match self {
@@ -232,6 +234,7 @@ impl WakeModel {
         self.place(range_m, Ray::new(elevation_rad))
     }
 
+    #[inline(always)]
     fn place(&self, range_m: f64, ray: Ray) -> (f64, f64) {
         (self.lidar_lateral_position_m + range_m * ray.cos, self.lidar_height_m + range_m * ray.sin)
     }
@@ -245,7 +248,7 @@ impl WakeModel {
     /// Radial velocity \[m/s\] and its derivatives, in the order of [`Parameter`].
     #[must_use]
     pub fn gradient(&self, wake: &Wake, range_m: f64, elevation_rad: f64) -> (f64, [f64; PARAMETERS]) {
-        self.gradient_on(wake, range_m, Ray::new(elevation_rad))
+        self.gradients(wake, &[range_m], Ray::new(elevation_rad))[0]
     }
 
     /// Distance at which a line of sight passes the centre of a vortex \[m\].
@@ -271,44 +274,100 @@ impl WakeModel {
         let mut velocity_m_s = (wake.lateral_wind_m_s + wake.wind_shear_per_s * z_m) * ray.cos;
         // a search tries vortices one by one
         for (vortex, _, side, sense) in self.sources(wake).filter(|source| source.0.circulation_m2_s != 0.0) {
-            velocity_m_s += self.velocity_of((vortex, side, sense), (y_m, z_m), ray);
+            velocity_m_s += of_source(self.profile, (vortex, side, sense), (y_m, z_m), ray).0;
         }
-        velocity_m_s + self.velocity_of_secondary((y_m, z_m), ray)
-    }
-
-    /// Radial velocity of one vortex or image.
-    fn velocity_of(&self, (vortex, side, sense): (&Vortex, f64, f64), (y_m, z_m): (f64, f64), ray: Ray) -> f64 {
-        let (dy, dz) = (y_m - vortex.lateral_position_m, z_m - side * vortex.height_m);
-        let (omega, _, _) = self.profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
-        sense * vortex.circulation_m2_s * omega * (dy * ray.sin - dz * ray.cos)
-    }
-
-    /// Radial velocity of the secondary vortices and their images.
-    fn velocity_of_secondary(&self, place_m: (f64, f64), ray: Ray) -> f64 {
-        let Some([left, right]) = self.secondary else { return 0.0 };
-        let secondary = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
-        self.sources(&secondary).map(|(v, _, side, sense)| self.velocity_of((v, side, sense), place_m, ray)).sum()
-    }
-
-    pub(crate) fn gradient_on(&self, wake: &Wake, range_m: f64, ray: Ray) -> (f64, [f64; PARAMETERS]) {
-        let (y_m, z_m) = self.place(range_m, ray);
-        let mut slope = [0.0; PARAMETERS];
-        slope[Parameter::Wind as usize] = ray.cos;
-        slope[Parameter::Shear as usize] = z_m * ray.cos;
-        let mut velocity_m_s = (wake.lateral_wind_m_s + wake.wind_shear_per_s * z_m) * ray.cos;
-        for (vortex, [circulation, lateral, height, core], side, sense) in self.sources(wake) {
-            let (dy, dz) = (y_m - vortex.lateral_position_m, z_m - side * vortex.height_m);
-            let (omega, by_r2, by_core) = self.profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
-            let arm = dy * ray.sin - dz * ray.cos;
-            let strength = sense * vortex.circulation_m2_s;
-            velocity_m_s += strength * omega * arm;
-            slope[circulation] += sense * omega * arm;
-            slope[lateral] -= strength * (2.0 * dy * by_r2 * arm + omega * ray.sin);
-            slope[height] += side * strength * (omega * ray.cos - 2.0 * dz * by_r2 * arm);
-            slope[core] += strength * by_core * arm;
+        let secondary = self.secondary.map(|[left, right]| Wake { left, right, ..*wake });
+        for (vortex, _, side, sense) in secondary.iter().flat_map(|secondary| self.sources(secondary)) {
+            velocity_m_s += of_source(self.profile, (vortex, side, sense), (y_m, z_m), ray).0;
         }
-        velocity_m_s += self.velocity_of_secondary((y_m, z_m), ray);
-        (velocity_m_s, slope)
+        velocity_m_s
+    }
+
+    /// Radial velocities at points of a line with their derivatives.
+    pub(crate) fn gradients(&self, wake: &Wake, range_m: &[f64], ray: Ray) -> Vec<(f64, [f64; PARAMETERS])> {
+        let mut rows = vec![Vec::new(); PARAMETERS + 1];
+        self.along(wake, range_m, ray, &mut rows);
+        (0..range_m.len()).map(|i| (rows[0][i], std::array::from_fn(|place| rows[place + 1][i]))).collect()
+    }
+
+    /// Radial velocities at points of a line, in the first row, and, if there are more rows, their derivatives.
+    pub(crate) fn along(&self, wake: &Wake, range_m: &[f64], ray: Ray, rows: &mut [Vec<f64>]) {
+        for row in rows.iter_mut() {
+            row.clear();
+            row.resize(range_m.len(), 0.0);
+        }
+        let slopes = rows.len() > 1;
+        for (i, range_m) in range_m.iter().enumerate() {
+            let (_, z_m) = self.place(*range_m, ray);
+            rows[0][i] = (wake.lateral_wind_m_s + wake.wind_shear_per_s * z_m) * ray.cos;
+            if slopes {
+                rows[Parameter::Wind as usize + 1][i] = ray.cos;
+                rows[Parameter::Shear as usize + 1][i] = z_m * ray.cos;
+            }
+        }
+        for (vortex, places, side, sense) in self.sources(wake).filter(|s| slopes || s.0.circulation_m2_s != 0.0) {
+            add_along((self, (vortex, side, sense), range_m, ray), rows, slopes.then_some(places));
+        }
+        let secondary = self.secondary.map(|[left, right]| Wake { left, right, ..*wake });
+        for (vortex, _, side, sense) in secondary.iter().flat_map(|secondary| self.sources(secondary)) {
+            add_along((self, (vortex, side, sense), range_m, ray), rows, None);
+        }
+    }
+}
+
+/// A vortex or an image, height of the centre over its sign, sense of turning.
+type Source<'a> = (&'a Vortex, f64, f64);
+
+/// Radial velocity of one vortex or image and its derivatives by circulation, y, z and core.
+#[inline(always)]
+fn of_source(
+    profile: CoreProfile,
+    (vortex, side, sense): Source<'_>,
+    (y_m, z_m): (f64, f64),
+    ray: Ray,
+) -> (f64, [f64; 4]) {
+    let (dy, dz) = (y_m - vortex.lateral_position_m, z_m - side * vortex.height_m);
+    let (omega, by_r2, by_core) = profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
+    let arm = dy * ray.sin - dz * ray.cos;
+    let strength = sense * vortex.circulation_m2_s;
+    let by_lateral = -strength * (2.0 * dy * by_r2 * arm + omega * ray.sin);
+    let by_height = side * strength * (omega * ray.cos - 2.0 * dz * by_r2 * arm);
+    (strength * omega * arm, [sense * omega * arm, by_lateral, by_height, strength * by_core * arm])
+}
+
+/// A source, and the points of a line.
+type Along<'a> = (&'a WakeModel, Source<'a>, &'a [f64], Ray);
+
+/// Adds the velocities of a source at points of a line to the first row, and their derivatives to those of its parameters.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn add_along(along: Along<'_>, rows: &mut [Vec<f64>], slopes: Option<[usize; 4]>) {
+    // with a profile that is known here points are taken side by side
+    match along.0.profile {
+        CoreProfile::Algebraic => add(CoreProfile::Algebraic, along, rows, slopes),
+        CoreProfile::LambOseen => add(CoreProfile::LambOseen, along, rows, slopes),
+    }
+}
+
+#[inline(always)]
+fn add(
+    profile: CoreProfile,
+    (model, source, range_m, ray): Along<'_>,
+    rows: &mut [Vec<f64>],
+    slopes: Option<[usize; 4]>,
+) {
+    let Some([a, b, c, d]) = slopes else {
+        for (velocity, &range_m) in rows[0].iter_mut().zip(range_m) {
+            *velocity += of_source(profile, source, model.place(range_m, ray), ray).0;
+        }
+        return;
+    };
+    let Ok(rows) = rows.get_disjoint_mut([0, a + 1, b + 1, c + 1, d + 1]) else { return };
+    let mut rows = rows.map(|row| &mut row[..range_m.len()]);
+    for (i, &range_m) in range_m.iter().enumerate() {
+        let (velocity, [a, b, c, d]) = of_source(profile, source, model.place(range_m, ray), ray);
+        for (row, by) in rows.iter_mut().zip([velocity, a, b, c, d]) {
+            row[i] += by;
+        }
     }
 }
 

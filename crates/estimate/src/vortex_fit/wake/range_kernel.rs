@@ -90,7 +90,9 @@ impl RangeKernel {
 /// Wind on the grid of one line.
 #[derive(Debug, Default)]
 pub(crate) struct LineScratch {
+    points_m: Vec<f64>,
     rows: Vec<Vec<f64>>,
+    weights: Vec<f64>,
 }
 
 /// Mean velocity of the gate whose first weight falls on grid point `index`, and the means of the other rows.
@@ -104,6 +106,15 @@ fn means(weights: &[f64], rows: &[Vec<f64>], index: usize) -> [f64; PARAMETERS +
 }
 
 impl RangeKernel {
+    /// The weights for a gate that lies by that share of the way to the next point: linear between both.
+    fn between<'w>(&self, share: f64, out: &'w mut Vec<f64>) -> &'w [f64] {
+        out.clear();
+        out.extend(self.weights.iter().map(|weight| (1.0 - share) * weight));
+        out.push(0.0);
+        out[1..].iter_mut().zip(&self.weights).for_each(|(out, weight)| *out += share * weight);
+        out
+    }
+
     /// Gate velocities of a line, and with `slopes` their derivatives: `out(gate, velocity, derivatives)` for each range.
     pub(crate) fn apply(
         &self,
@@ -116,31 +127,17 @@ impl RangeKernel {
         let nearest_m = range_m.iter().copied().fold(f64::INFINITY, f64::min);
         let farthest_m = range_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + self.weights.len() + 1;
-        let numbers = if slopes { PARAMETERS + 1 } else { 1 };
-        scratch.rows.resize_with(PARAMETERS + 1, Vec::new);
-        for row in &mut scratch.rows {
-            row.clear();
-        }
-        for i in 0..points {
-            let at_m = nearest_m + self.first_offset_m + i as f64 * self.spacing_m;
-            if slopes {
-                let (velocity, slope) = model.gradient_on(wake, at_m, ray);
-                scratch.rows[0].push(velocity);
-                scratch.rows[1..].iter_mut().zip(slope).for_each(|(row, s)| row.push(s));
-            } else {
-                scratch.rows[0].push(model.velocity_on(wake, at_m, ray));
-            }
-        }
+        scratch.points_m.clear();
+        let point_m = |i: usize| nearest_m + self.first_offset_m + i as f64 * self.spacing_m;
+        scratch.points_m.extend((0..points).map(point_m));
+        scratch.rows.resize_with(if slopes { PARAMETERS + 1 } else { 1 }, Vec::new);
+        model.along(wake, &scratch.points_m, ray, &mut scratch.rows);
         for (gate, &r_m) in range_m.iter().enumerate() {
             let place = (r_m - nearest_m) / self.spacing_m;
             let index = (place + 1e-9).floor();
             let part = (place - index).max(0.0);
-            let index = index as usize;
-            let mut found = means(&self.weights, &scratch.rows[..numbers], index);
-            if part > 1e-6 {
-                let next = means(&self.weights, &scratch.rows[..numbers], index + 1);
-                found.iter_mut().zip(next).for_each(|(f, n)| *f += part * (n - *f));
-            }
+            let weights = if part > 1e-6 { self.between(part, &mut scratch.weights) } else { &self.weights };
+            let found = means(weights, &scratch.rows, index as usize);
             let mut slope = [0.0; PARAMETERS];
             slope.copy_from_slice(&found[1..]);
             out(gate, found[0], &slope);
