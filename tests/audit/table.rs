@@ -3,7 +3,10 @@
 use super::ledger::{Ledger, Tally};
 
 /// Numbers that are known to be wrong, with the reason; one that comes right must be taken out.
-const AWAITED: &[(&str, &str)] = &[];
+const AWAITED: &[(&str, &str)] = &[(
+    "results.csv: rms_outside_standard_error_m_s*",
+    "with few cells and realisations: outliers that a map has not shown yet",
+)];
 
 /// Numbers that the program writes without a definition here, with the reason.
 const WITHOUT: &[(&str, &str)] = &[
