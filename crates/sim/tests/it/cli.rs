@@ -122,7 +122,7 @@ fn what_is_larger_than_the_machine_is_refused_unless_asked_for() {
     let scene = "[scan]\npulses_per_line = 1000000\nrealisations = 100000\n[outputs]\nsignals = true\nnetcdf = false\n";
     for words in [&["check", "s.toml"][..], &RUN] {
         let message = refused(scene, words);
-        for part in ["593.5 GB of memory", "are available", "outputs.signals = false", "--allow-large"] {
+        for part in ["616.2 GB of memory", "are available", "outputs.signals = false", "--allow-large"] {
             assert!(message.contains(part), "{part} is not in: {message}");
         }
     }
@@ -130,7 +130,7 @@ fn what_is_larger_than_the_machine_is_refused_unless_asked_for() {
     std::fs::write(temp.path().join("s.toml"), scene).unwrap();
     let out = wakescope(temp.path(), &["check", "s.toml", "--allow-large"]);
     let text = String::from_utf8(out.stdout).unwrap();
-    assert!(out.status.success() && text.contains(" years") && text.contains("593.5 GB"), "{text}");
+    assert!(out.status.success() && text.contains(" years") && text.contains("616.2 GB"), "{text}");
     let too_large_for_a_file = scene.replace("netcdf = false", "netcdf = true");
     let message = refused(&too_large_for_a_file, &["check", "s.toml", "--allow-large"]);
     assert!(message.contains("outputs.signals") && message.contains("signals.nc"), "{message}");
