@@ -3,9 +3,9 @@
 //! The only way to write one. Curves from independent sources are never written.
 
 use crate::curves::{ALL, Origin};
+use crate::failure::{Failure, Outcome};
 use crate::wakes;
 use crate::workspace::root;
-use crate::{Failure, Outcome};
 use wakescope_sim::io::write_atomic;
 
 /// Options of the task.

@@ -2,7 +2,7 @@
 //!
 //! Comments, blank lines and tests of Rust sources do not count, nor does anything outside the named places.
 
-use crate::Failure;
+use crate::failure::Failure;
 use crate::sources::{Modules, code_lines, is_test_file};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};

@@ -1,7 +1,7 @@
 //! The stored curves and how each is computed now.
 
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::workspace::read;
 
 mod compute;

@@ -30,7 +30,7 @@ mod study;
 mod tab01;
 mod tab02;
 
-use crate::Failure;
+use crate::failure::Failure;
 use context::{Context, Rendered};
 
 /// A figure that can be asked for.

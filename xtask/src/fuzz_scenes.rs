@@ -5,8 +5,8 @@
 
 mod change;
 
+use crate::failure::{Failure, Outcome};
 use crate::process::{Watched, program, watch};
-use crate::{Failure, Outcome};
 use change::scene;
 
 /// Options of the task.

@@ -10,6 +10,7 @@ mod ci;
 mod claim;
 mod cost;
 mod curves;
+mod failure;
 mod figures;
 mod fit_trials;
 mod forecast;
@@ -33,32 +34,6 @@ mod work_precision;
 mod workspace;
 
 use clap::{Parser, Subcommand};
-use std::fmt;
-
-/// Why a task failed, in words.
-#[derive(Debug)]
-pub(crate) struct Failure(String);
-
-impl Failure {
-    pub(crate) fn new(message: String) -> Self {
-        Self(message)
-    }
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-/// Any library error becomes words here, where a person reads them.
-impl<E: std::error::Error> From<E> for Failure {
-    fn from(e: E) -> Self {
-        Self(e.to_string())
-    }
-}
-
-pub(crate) type Outcome = Result<(), Failure>;
 
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", about = "Tasks of the wakescope workspace")]

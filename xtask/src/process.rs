@@ -2,7 +2,7 @@
 //!
 //! Linux only: the figures come from /proc.
 
-use crate::Failure;
+use crate::failure::Failure;
 use crate::workspace::root;
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! Stored numbers of flows, and what is read off a few of them.
 
-use crate::Failure;
+use crate::failure::Failure;
 use crate::workspace::read;
 
 /// Numbers of a reference file without its comments, row by row.

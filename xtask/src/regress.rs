@@ -2,8 +2,8 @@
 //! `tests/reference/`, as a table of name, error, tolerance, run time and verdict.
 
 use crate::curves::{ALL, Comparison, Curve};
+use crate::failure::{Failure, Outcome};
 use crate::workspace::{provenance, root};
-use crate::{Failure, Outcome};
 use std::time::Instant;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

@@ -10,10 +10,10 @@ mod optics;
 mod scenes;
 mod signal;
 
+use crate::failure::{Failure, Outcome};
 use crate::profile::Profile;
 use crate::statistics::Verdict;
 use crate::workspace::{provenance, root};
-use crate::{Failure, Outcome};
 use extreme::{Ended, Extreme};
 use rayon::prelude::*;
 use std::path::PathBuf;

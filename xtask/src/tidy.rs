@@ -3,9 +3,9 @@
 //! Who may depend on whom, no circles of imports, one line of documentation at the head of each file, file lengths, units
 //! in public names, reference curves with a header, tests and files that pages name, and no stray files or private paths.
 
+use crate::failure::{Failure, Outcome};
 use crate::sources::{Modules, circles, code_lines, declared_tests, is_test_file};
 use crate::workspace::{read, root, tracked_files};
-use crate::{Failure, Outcome};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

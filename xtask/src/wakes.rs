@@ -7,10 +7,10 @@
 //! Check: what is stored is of the case that is run here.
 
 use crate::cause::cause;
+use crate::failure::{Failure, Outcome};
 use crate::figures::context::Context;
 use crate::profile::Profile;
 use crate::workspace::root;
-use crate::{Failure, Outcome};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;

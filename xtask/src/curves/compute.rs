@@ -1,6 +1,6 @@
 //! The curves as the crates compute them now, one function for each.
 
-use crate::Failure;
+use crate::failure::Failure;
 use wakescope_estimate::{
     SignalKind,
     bound::{Noise, WindowModel},

@@ -1,7 +1,7 @@
 //! What every figure takes, and what it gives.
 
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::workspace::provenance;
 use std::path::PathBuf;

@@ -1,8 +1,8 @@
 //! Figure 1: vertical velocity through the two cores of the pair, and the potential profiles.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use std::f64::consts::PI;
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_sim::io::Table;

@@ -1,8 +1,8 @@
 //! Figure 4: signal-to-noise ratio and system efficiency against range, in free space and through turbulence.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::{Claim, Part};
+use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate};
 use std::ops::ControlFlow;
 use wakescope_optics::air::StructureTable;

@@ -1,8 +1,8 @@
 //! Figure 5: the M'4 stencil of a point on a line of sight.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use wakescope_les::winds::m4_prime;
 use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};

@@ -1,8 +1,8 @@
 //! Figure 6: surfaces of equal vorticity of the wake, and an animation of a cross-plane.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::wakes;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::flow::{FinishedWake, REPEATS};

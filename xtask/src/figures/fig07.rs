@@ -1,8 +1,8 @@
 //! Figure 7: circulation and paths of the two vortices of the simulated wake.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::histories::{by_noise, swing};
 use crate::references::numbers;
 use crate::wakes;

@@ -1,8 +1,8 @@
 //! Figure 8: radial velocity of the simulated wake, early and late, and what the lidar makes of it.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::wakes;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::flow::FinishedWake;

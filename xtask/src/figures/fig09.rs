@@ -1,8 +1,8 @@
 //! Figure 9: accumulation level against range for three radii of the region.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::statistics::Verdict;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use wakescope_sim::io::Table;

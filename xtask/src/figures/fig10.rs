@@ -2,8 +2,8 @@
 
 use super::context::{Context, Rendered};
 use super::study::{Age, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::statistics::{BATCHES, Bar, Estimate};
 use ndarray::Array2;
 use wakescope_sim::io::tables::map_table;

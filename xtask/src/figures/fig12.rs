@@ -5,8 +5,8 @@ use super::study::{
     Age, INSIDE_M, METHODS, OUTSIDE_M, REFERENCES, Sight, Study, Zone, batches, early_scene, with_method,
     with_turbulence,
 };
-use crate::Failure;
 use crate::claim::{Claim, Part};
+use crate::failure::Failure;
 use crate::statistics::{Bar, NO_DIFFERENCE};
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::instrument::Instrument;

@@ -1,8 +1,8 @@
 //! Figure 15: error against run time of the solvers, the estimators and the whole chain.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::cost::machine;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::work_precision::show::{fronts, table};
 use crate::work_precision::{Group, Row, measure};

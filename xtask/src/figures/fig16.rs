@@ -1,8 +1,8 @@
 //! Figure 16: stiff and extreme cases of the crates, what each must come to and what it came to.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::stability::{self, Row};
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {

@@ -1,8 +1,8 @@
 //! Figure 17, all methods side by side: the scenes of the analytic pair and of the simulated wake at several ages, retrieved as `run` does it.
 
 use super::context::Context;
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate, Verdict, mean};
 use crate::wakes;
 use rayon::prelude::*;

@@ -1,8 +1,8 @@
 //! Figure 18: velocity error of every estimator against the Cramer-Rao bound, in a uniform random wind.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate};
 use crate::trials::methods::Known;
 use crate::trials::noise_name;

@@ -1,8 +1,8 @@
 //! Figure 19: detection of wakes in maps, operating curves and the smallest circulation that is found against range.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate};
 use wakescope_estimate::retrieval::{ScanMap, Turbulence};
 use wakescope_estimate::wake_detection::{DetectorOptions, Share};

@@ -1,8 +1,8 @@
 //! Figure 20: one scan of the pair, the wake that was fitted to it, and what is left.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate};
 use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, expected_velocities};
 use wakescope_estimate::vortex_fit::CorePrior;

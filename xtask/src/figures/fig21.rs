@@ -1,8 +1,8 @@
 //! Figure 21: one wake seen across, round and along the flight path at the same energy, and what each scan says of its circulation.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate, Verdict};
 use ndarray::Array2;
 use rayon::prelude::*;

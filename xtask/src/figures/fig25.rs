@@ -3,8 +3,8 @@
 use super::context::{Context, Rendered};
 use super::profiles::{self, Profiles};
 use super::study::{Age, METHODS, Sight, Study, near_scene, with_method};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE, Verdict};
 use crate::wakes;

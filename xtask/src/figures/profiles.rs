@@ -5,8 +5,8 @@
 //! estimates, which is taken away.
 
 use super::study::{INSIDE_M, METHODS, OUTSIDE_M, Study, Zone, batches};
-use crate::Failure;
 use crate::claim::Part;
+use crate::failure::Failure;
 use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE};
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::cell_average::CellAverage;

@@ -1,7 +1,7 @@
 //! What figures 10 to 14 and 25 share: scans of the simulated wake or of the analytic pair in batches, regions about the cores.
 
 use super::context::Context;
-use crate::Failure;
+use crate::failure::Failure;
 use crate::statistics::{BATCHES, Estimate};
 use crate::wakes;
 use std::path::PathBuf;

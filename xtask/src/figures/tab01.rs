@@ -1,8 +1,8 @@
 //! Table 1: ICAO separations, as distances and as times at approach speed.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use wakescope_sim::io::Table;
 
 const NAUTICAL_MILE_M: f64 = 1852.0;

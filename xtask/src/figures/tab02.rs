@@ -1,8 +1,8 @@
 //! Table 2: the lidar's parameters, read back from a scene that went through a file.
 
 use super::context::{Context, Rendered};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use std::path::Path;
 use wakescope_sim::io::Table;
 use wakescope_sim::plan::{Plan, Target};

@@ -6,9 +6,9 @@
 
 use crate::cause::{cause, places_of};
 use crate::claim::Claim;
+use crate::failure::{Failure, Outcome};
 use crate::figures::context::{Context, Rendered};
 use crate::workspace::root;
-use crate::{Failure, Outcome};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use wakescope_sim::io::FileGroup;

@@ -1,9 +1,9 @@
 //! The report of a run: one page with all figures, claims and run times.
 
 use super::lists::Kind;
-use crate::Failure;
 use crate::claim::Claim;
 use crate::cost::machine;
+use crate::failure::Failure;
 use crate::figures::Figure;
 use crate::figures::context::{Context, Rendered};
 use crate::statistics::{Verdict, two_digits};

@@ -1,7 +1,7 @@
 //! Extreme cases of the estimators: each takes one window through the accumulation, as any map has it.
 
 use super::extreme::Extreme;
-use crate::Failure;
+use crate::failure::Failure;
 use crate::trials::methods::{Known, Method, Methods};
 use crate::trials::uniform::Air;
 use fixtures::{WINDOW, sampling};

@@ -1,6 +1,6 @@
 //! A stiff or extreme case: what is asked, what it must come to, and what it came to.
 
-use crate::Failure;
+use crate::failure::Failure;
 use crate::statistics::Verdict;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;

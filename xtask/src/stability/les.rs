@@ -1,7 +1,7 @@
 //! Extreme cases of the winds and of the flow solver (section 5 of its numerics).
 
 use super::extreme::Extreme;
-use crate::Failure;
+use crate::failure::Failure;
 use std::f64::consts::TAU;
 use wakescope_les::solver::{PressureMethod, ViscousTreatment};
 use wakescope_les::winds::{Edges, OutsidePolicy, PlaneMesh, Side};

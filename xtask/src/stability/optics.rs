@@ -1,7 +1,7 @@
 //! Extreme cases of the optics (section 5 of its numerics).
 
 use super::extreme::Extreme;
-use crate::Failure;
+use crate::failure::Failure;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wakescope_optics::air::{OuterScaleConvention, Scales, StructureTable, structure_function_m53};

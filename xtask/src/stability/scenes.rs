@@ -1,7 +1,7 @@
 //! Extreme scenes through the whole chain, as `wakescope run` has it but for the files.
 
 use super::extreme::Extreme;
-use crate::Failure;
+use crate::failure::Failure;
 use std::path::Path;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::measure::progress::Silent;

@@ -1,7 +1,7 @@
 //! Extreme cases of the simulated signal.
 
 use super::extreme::Extreme;
-use crate::Failure;
+use crate::failure::Failure;
 use fixtures::{ENERGY_J, receiver};
 use num_complex::Complex;
 use std::f64::consts::PI;

@@ -1,6 +1,6 @@
 //! Fits to scans of a pair: to the map of the likelihood with tapers, and to all raw signals.
 
-use crate::Failure;
+use crate::failure::Failure;
 use crate::trials::profile::posterior_deviation;
 use fixtures::WINDOW;
 use fixtures::pair::PairScan;

@@ -1,6 +1,6 @@
 //! Every estimator of the crate as it is tried on windows of 64 real samples: its name, its statistic, its settings.
 
-use crate::Failure;
+use crate::failure::Failure;
 use fixtures::{WINDOW, sampling};
 use std::sync::Arc;
 use wakescope_estimate::{

@@ -5,7 +5,7 @@
 //! errors do not depend on the number of threads.
 
 use super::methods::{Known, Methods};
-use crate::Failure;
+use crate::failure::Failure;
 use fixtures::{ENERGY_J, WINDOW, receiver, sampling};
 use rayon::prelude::*;
 use wakescope_estimate::{Scratch, models::Autoregression, window::SPEED_OF_LIGHT_M_S};

@@ -1,8 +1,8 @@
 //! The lid-driven cavity at Re 1000 against Ghia, Ghia and Shin (1982) and Botella and Peyret (1998).
 
 use super::shown::Shown;
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::references::{numbers, parabola_vertex};
 use wakescope_les::cases;

@@ -1,8 +1,8 @@
 //! Turbulent channel flow at Re_tau 178 against Moser, Kim and Mansour (1999): the longest of the cases.
 
 use super::shown::Shown;
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::references::numbers;
 use wakescope_les::analysis::decay::value_at;

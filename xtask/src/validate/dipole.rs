@@ -1,8 +1,8 @@
 //! A dipole against a wall: enstrophy in time against Clercx and Bruneau (2006) and a spectral code, vorticity at the wall.
 
 use super::shown::Shown;
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::references::{numbers, parabola_vertex};
 use crate::workspace::read;

@@ -1,8 +1,8 @@
 //! Order of the scheme: plane vortices on meshes stretched both ways, and a layer between walls.
 
 use super::shown::Shown;
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use wakescope_les::TimeScheme;
 use wakescope_les::cases;

@@ -2,8 +2,8 @@
 
 use super::shown::Shown;
 use super::wake::history::{run, run_with, worst};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::references::numbers;
 use std::f64::consts::TAU;

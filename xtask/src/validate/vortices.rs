@@ -1,8 +1,8 @@
 //! The vortices of Taylor and Green at Re 1600: direct simulation against a stored one, and the subgrid models.
 
 use super::shown::Shown;
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::references::numbers;
 use std::f64::consts::PI;

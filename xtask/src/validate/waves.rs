@@ -1,8 +1,8 @@
 //! Growth of Tollmien-Schlichting waves at Re 7500, alpha 1, against linear theory.
 
 use super::shown::Shown;
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::references::numbers;
 use std::f64::consts::TAU;

@@ -3,8 +3,8 @@
 //! The scene: half of Table 2's scan about the nearer vortex at 10 dB, four pulses a line, two realisations.
 
 use super::{Row, few, mean_and_error};
-use crate::Failure;
 use crate::cost::fastest;
+use crate::failure::Failure;
 use std::path::Path;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::measure::progress::Silent;

@@ -5,8 +5,8 @@
 //! is the root mean square error against the velocity that the pulse sees.
 
 use super::{Row, mean_and_error};
-use crate::Failure;
 use crate::cost::fastest;
+use crate::failure::Failure;
 use crate::trials::methods::{Known, Methods};
 use crate::trials::uniform::{Air, BAND_M_S};
 use fixtures::pair::PairScan;

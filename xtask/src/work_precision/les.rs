@@ -1,8 +1,8 @@
 //! Error against run time of the flow solver: grid, time step, scheme, tolerance of the pressure solve, pressure solver.
 
 use super::{Row, few};
-use crate::Failure;
 use crate::cost::fastest;
+use crate::failure::Failure;
 use wakescope_les::cases::{self, Case, TollmienSchlichting};
 use wakescope_les::solver::PressureMethod;
 use wakescope_les::{Flow, TimeScheme, TimeStep};

@@ -1,8 +1,8 @@
 //! Error against run time of the optics: quadrature, layers, grid, screens, realisations, precision, variance reduction.
 
 use super::{Row, few};
-use crate::Failure;
 use crate::cost::{Cost, fastest};
+use crate::failure::Failure;
 use std::ops::ControlFlow;
 use wakescope_optics::air::{StructureTable, structure_function_m53};
 use wakescope_optics::monte_carlo::{EfficiencyEstimate, Sampling};

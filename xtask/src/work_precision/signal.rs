@@ -3,8 +3,8 @@
 //! All on one line of sight through the core of a vortex, the steepest of the chapter's scene.
 
 use super::{Row, few};
-use crate::Failure;
 use crate::cost::fastest;
+use crate::failure::Failure;
 use fixtures::{ENERGY_J, receiver};
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::literal::literal_envelope;

@@ -1,8 +1,8 @@
 //! The pair in space against the independent code, row by row: coarse and medium mesh, without and with the multiscale model.
 
 use super::history::{History, PER_TAU, Stored, run, worst};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::validate::shown::Shown;
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! The pair in a cross wind: drift, and secondary vortices of different strength.
 
 use super::history::{History, run};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::validate::shown::Shown;
 use rayon::prelude::*;

@@ -1,6 +1,6 @@
 //! Histories of runs of the pair, and how far apart two are.
 
-use crate::Failure;
+use crate::failure::Failure;
 use crate::references::numbers;
 use std::f64::consts::TAU;
 use wakescope_les::analysis::decay::value_at;

@@ -1,8 +1,8 @@
 //! When the fast decay begins: against the level of the noise and the Reynolds number, on 16 x 96 x 64 cells.
 
 use super::history::{History, run};
-use crate::Failure;
 use crate::claim::Claim;
+use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::validate::shown::Shown;
 use rayon::prelude::*;
