@@ -59,9 +59,9 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         let (line, gate) = (row / gates, row % gates);
         let lines = match (s.s("estimator.method.kind") == "periodogram", radius_m(&s, scan.gate_m[gate])) {
             (false, Some(radius)) => scan.region(line, gate, radius, h.len()),
-            _ => (0..scan.elevation_rad.len())
-                .map(|l| if l == line { vec![scan.gate_start[gate]] } else { vec![] })
-                .collect(),
+            _ => {
+                (0..scan.elevation_rad.len()).map(|l| if l == line { scan.own_window(gate) } else { vec![] }).collect()
+            }
         };
         let pulses = |l: usize| (0..scan.pulses).map(move |p| l * scan.pulses + p);
         let windows: Vec<(usize, usize)> = lines

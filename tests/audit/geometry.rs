@@ -48,6 +48,11 @@ impl Scan {
         self.sample_m[1] - self.sample_m[0]
     }
 
+    /// The window of a gate alone: its first sample, if windows lie there.
+    pub(crate) fn own_window(&self, gate: usize) -> Vec<usize> {
+        self.window_start.iter().copied().filter(|start| *start == self.gate_start[gate]).collect()
+    }
+
     /// Windows within `radius_m` of a gate (E7), for each line: their first samples.
     pub(crate) fn region(&self, line: usize, gate: usize, radius_m: f64, n: usize) -> Vec<Vec<usize>> {
         let (r1, e1) = (self.gate_m[gate], self.elevation_rad[line]);
@@ -112,7 +117,7 @@ pub(crate) fn hold_levels(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv
         let (line, gate) = (row / gates, row % gates);
         let Some(radius) = radius_m(s, scan.gate_m[gate]) else { return };
         let windows = match is_alone {
-            true => 1,
+            true => scan.own_window(gate).len(),
             false => scan.region(line, gate, radius, n).iter().map(Vec::len).sum::<usize>(),
         };
         ledger.equal("map.csv: level", level[row], (windows * scan.pulses) as f64, 0.5);

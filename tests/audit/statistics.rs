@@ -59,7 +59,7 @@ pub(crate) fn hold_map(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
         let (line, gate) = (row / gates, row % gates);
         let Some(radius) = radius_m(s, scan.gate_m[gate]) else { return };
         let windows = match s.s("estimator.method.kind") == "periodogram" {
-            true => vec![vec![scan.gate_start[gate]]],
+            true => vec![scan.own_window(gate)],
             false => scan.region(line, gate, radius, s.n("estimator.window_samples")),
         };
         if windows.iter().all(Vec::is_empty) {
@@ -219,7 +219,7 @@ pub(crate) fn hold_seeds(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
     ledger.equal("results.csv: snr_db", results.f("snr_db")[0], s.f("detector.snr.snr_db"), 1e-9);
 }
 
-/// Means over parts of the map of each case: within 0.17 spacings of a centre, beyond 0.64 of both.
+/// Means over parts of the map of each case: within 8/47 spacings of a centre, beyond 30/47 of both.
 fn hold_parts(ledger: &mut Ledger, bench: &Bench, s: &Scene, results: &Csv, maps: &[Csv]) {
     let (b0, middle, height) = (s.f("flow.spacing_m"), s.f("flow.lateral_position_m"), s.f("flow.height_m"));
     let apart = |y: f64, z: f64, side: f64| (y - middle - side * 0.5 * b0).hypot(z - height);
@@ -230,8 +230,8 @@ fn hold_parts(ledger: &mut Ledger, bench: &Bench, s: &Scene, results: &Csv, maps
             let values = map.f(name);
             (0..values.len()).filter(|&i| is_in(nearest(i))).map(|i| values[i]).collect()
         };
-        let is_inside = |m: f64| m <= 0.17 * b0;
-        let is_outside = |m: f64| m >= 0.64 * b0;
+        let is_inside = |m: f64| m < 8.0 / 47.0 * b0;
+        let is_outside = |m: f64| m > 30.0 / 47.0 * b0;
         for (name, is_in) in
             [("", &(|_| true) as &dyn Fn(f64) -> bool), ("_inside", &is_inside), ("_outside", &is_outside)]
         {
