@@ -35,7 +35,7 @@ use statrs::function::erf::erf;
 use statrs::function::gamma::ln_gamma;
 
 use crate::bound::Noise;
-use crate::error::{Error, positive};
+use crate::error::{Error, length, positive};
 use crate::estimators::tails::gamma_tail;
 use crate::map::{PolarPoint, ScanGeometry};
 use crate::spectrum::Taper;
@@ -89,7 +89,8 @@ impl NoiseTest {
     /// whose peak is sought among `padded_samples` frequencies over 0 .. F_s, in that noise.
     ///
     /// # Errors
-    /// [`Error::Empty`] without tapers, [`Error::OutOfRange`] for tapers or weights without power, [`Error::Band`] for an impossible band.
+    /// [`Error::Empty`] without tapers or with no weight, [`Error::Length`] for tapers of different lengths, [`Error::OutOfRange`] for impossible
+    /// gates and for tapers or weights without power, [`Error::Band`] for an impossible band.
     pub fn new(
         sampling: &Sampling,
         gates: &Gates,
@@ -116,8 +117,13 @@ impl NoiseTest {
         noise: Noise,
     ) -> Result<Self, Error> {
         let samples = tapers.first().map_or(0, Vec::len);
+        gates.validate()?;
         if samples == 0 {
             return Err(Error::Empty { field: "tapers" });
+        }
+        tapers.iter().try_for_each(|taper| length("tapers", samples, taper.len()))?;
+        if lag_weights.is_some_and(<[f64]>::is_empty) {
+            return Err(Error::Empty { field: "lag_weights" });
         }
         let bins = Band::new(sampling, SignalKind::Complex, padded_samples)?;
         let (padded, band) =
@@ -386,6 +392,15 @@ mod tests {
         assert!(level(1, 1_000_000, 0.01) < 1.01 && level(1, 8, 0.01) < level(1, 1, 0.01));
         let window = test.region([(1, 1)].into_iter());
         assert!(test.threshold(&window, 1.0).is_err() && test.threshold(&window, f64::NAN).is_err());
+        let (taper, other) = (Taper::unit(vec![1.0; 8]).unwrap(), Taper::unit(vec![1.0; 4]).unwrap());
+        let gates = Gates::new(8, 1, 0.0).unwrap();
+        let of = |tapers: &[Taper], lags: Option<&[f64]>, gates: &Gates| {
+            NoiseTest::new(&table_2(), gates, tapers, lags, 64, Noise::White)
+        };
+        assert!(of(&[taper.clone()], None, &gates).is_ok());
+        assert!(matches!(of(&[taper.clone(), other], None, &gates), Err(Error::Length { .. })));
+        assert!(matches!(of(&[taper.clone()], Some(&[]), &gates), Err(Error::Empty { field: "lag_weights" })));
+        assert!(of(&[taper], None, &Gates { step_samples: 0, ..gates }).is_err());
         let empty = test.region(std::iter::empty());
         assert!(empty.n_eff == 0.0 && test.threshold(&empty, 0.01).unwrap().is_nan());
     }
