@@ -397,9 +397,12 @@ mod tests {
         let of = |tapers: &[Taper], lags: Option<&[f64]>, gates: &Gates| {
             NoiseTest::new(&table_2(), gates, tapers, lags, 64, Noise::White)
         };
-        assert!(of(&[taper.clone()], None, &gates).is_ok());
+        assert!(of(std::slice::from_ref(&taper), None, &gates).is_ok());
         assert!(matches!(of(&[taper.clone(), other], None, &gates), Err(Error::Length { .. })));
-        assert!(matches!(of(&[taper.clone()], Some(&[]), &gates), Err(Error::Empty { field: "lag_weights" })));
+        assert!(matches!(
+            of(std::slice::from_ref(&taper), Some(&[]), &gates),
+            Err(Error::Empty { field: "lag_weights" })
+        ));
         assert!(of(&[taper], None, &Gates { step_samples: 0, ..gates }).is_err());
         let empty = test.region(std::iter::empty());
         assert!(empty.n_eff == 0.0 && test.threshold(&empty, 0.01).unwrap().is_nan());
