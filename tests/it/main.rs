@@ -4,6 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 mod circulation;
+mod curves;
+mod extremes;
 mod guided;
 mod point_target;
 mod power;

@@ -61,8 +61,6 @@ fn steps() -> Result<Vec<Step>, Failure> {
     // This very program: in another profile the workspace would be compiled once more.
     let own = std::env::current_exe()?.display().to_string();
     out.push(plain("tidy", format!("'{own}' tidy")));
-    out.push(plain("regress", format!("'{own}' regress")));
-    out.push(plain("stability", format!("'{own}' stability --profile quick")));
     // On a wake of a few cells: that of the profile takes several minutes and shows no other fault of the program.
     out.push(plain(
         "wake",

@@ -9,8 +9,6 @@ mod cause;
 mod ci;
 mod claim;
 mod cost;
-mod curves;
-mod failure;
 mod figures;
 mod fit_trials;
 mod forecast;
@@ -34,6 +32,7 @@ mod work_precision;
 mod workspace;
 
 use clap::{Parser, Subcommand};
+use fixtures::failure;
 
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", about = "Tasks of the wakescope workspace")]

@@ -1,9 +1,9 @@
 //! `cargo xtask regress`: what the crates compute now against the curves stored in
 //! `tests/reference/`, as a table of name, error, tolerance, run time and verdict.
 
-use crate::curves::{ALL, Comparison, Curve};
 use crate::failure::{Failure, Outcome};
 use crate::workspace::{provenance, root};
+use fixtures::curves::{ALL, Comparison, Curve};
 use std::time::Instant;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
@@ -29,8 +29,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let time_s = start.elapsed().as_secs_f64();
         match compared {
             Ok(c) => {
-                let claim = c.claim(curve);
-                let verdict = if claim.passes() { "pass" } else { "FAIL" };
+                let verdict = if c.is_within(curve) { "pass" } else { "FAIL" };
                 println!(
                     "{:<34} {:>6} {:>11.3e} {:>11.1e} {:>7.3} s  {verdict}, worst at {} = {}",
                     curve.name,
@@ -41,7 +40,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
                     curve.x,
                     c.x[c.worst]
                 );
-                if !claim.passes() {
+                if !c.is_within(curve) {
                     failed.push(curve.name);
                     println!("{:<34} see {}", "", draw(curve, &c)?);
                 }

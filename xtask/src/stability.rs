@@ -3,19 +3,11 @@
 //! A case is a number within bounds or a refusal in stated words; a panic is neither. What the cases are: the lists of the
 //! numerics, which a solver that fears nothing would pass.
 
-mod estimate;
-mod extreme;
-mod les;
-mod optics;
-mod scenes;
-mod signal;
-
 use crate::failure::{Failure, Outcome};
 use crate::profile::Profile;
 use crate::statistics::Verdict;
 use crate::workspace::{provenance, root};
-use extreme::{Ended, Extreme};
-use rayon::prelude::*;
+use fixtures::extreme::{Ended, PARTS, Row, rows};
 use std::path::PathBuf;
 use std::time::Instant;
 use wakescope_sim::io::{FileGroup, Table};
@@ -35,44 +27,6 @@ pub(crate) struct Options {
     out: Option<PathBuf>,
 }
 
-/// Name of a crate and its cases.
-type Part = (&'static str, fn() -> Vec<Extreme>);
-
-/// Where the cases are from, in the order in which they are run and drawn.
-const PARTS: [Part; 5] = [
-    ("les", les::cases),
-    ("optics", optics::cases),
-    ("signal", signal::cases),
-    ("estimate", estimate::cases),
-    ("sim", scenes::cases),
-];
-
-/// A case that was run.
-pub(crate) struct Row {
-    part: &'static str,
-    case: Extreme,
-    ended: Ended,
-}
-
-impl Row {
-    /// Whether it ended as it must.
-    pub(crate) fn passes(&self) -> bool {
-        self.ended.verdict == Verdict::Pass
-    }
-
-    pub(crate) fn name(&self) -> &'static str {
-        self.case.name
-    }
-}
-
-/// Runs the cases of a profile whose name is wanted, in parallel.
-pub(crate) fn rows(profile: Profile, wanted: impl Fn(&str) -> bool) -> Vec<Row> {
-    let chosen = |case: &Extreme| wanted(case.name) && (profile != Profile::Quick || !case.long);
-    let of = |(part, cases): Part| cases().into_iter().filter(chosen).map(move |case| (part, case)).collect::<Vec<_>>();
-    let all: Vec<(&'static str, Extreme)> = PARTS.into_iter().flat_map(of).collect();
-    all.into_par_iter().map(|(part, case)| Row { part, ended: case.run(), case }).collect()
-}
-
 /// Runs the cases, prints and writes them.
 ///
 /// # Errors
@@ -80,9 +34,10 @@ pub(crate) fn rows(profile: Profile, wanted: impl Fn(&str) -> bool) -> Vec<Row> 
 pub(crate) fn run(options: &Options) -> Outcome {
     let start = Instant::now();
     println!("{:<8} {:<50} {:<7} {:>7}  {:<30} outcome", "crate", "case", "verdict", "time", "expected");
-    let rows = rows(options.profile, |name| options.only.as_ref().is_none_or(|word| name.contains(word.as_str())));
+    let named = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
+    let rows = rows(|_, case| named(case.name) && !(case.long && options.profile == Profile::Quick));
     for Row { part, case, ended } in &rows {
-        let (name, verdict, expected) = (case.name, ended.verdict.name(), case.expected.to_string());
+        let (name, verdict, expected) = (case.name, verdict(ended), case.expected.to_string());
         println!("{part:<8} {name:<50} {verdict:<7} {:>5.1} s  {expected:<30} {}", ended.took_s, ended.outcome);
     }
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/stability"));
@@ -91,7 +46,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
     files.add("stability.csv", table(&rows).to_csv(&origin)?)?;
     files.add("stability.svg", picture(&rows).svg(&origin)?)?;
     files.commit()?;
-    let missed: Vec<&str> = rows.iter().filter(|row| !row.passes()).map(Row::name).collect();
+    let missed: Vec<&str> = rows.iter().filter(|row| !row.ended.passes).map(|row| row.case.name).collect();
     println!(
         "{} of {} cases end as they must, in {:.1} s; {}",
         rows.len() - missed.len(),
@@ -102,6 +57,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
     if missed.is_empty() { Ok(()) } else { Err(Failure::new(format!("not as expected: {}", missed.join("; ")))) }
 }
 
+fn verdict(ended: &Ended) -> &'static str {
+    Verdict::of(ended.passes).name()
+}
+
 /// One row a case.
 pub(crate) fn table(rows: &[Row]) -> Table {
     Table::new()
@@ -110,7 +69,7 @@ pub(crate) fn table(rows: &[Row]) -> Table {
         .text("input", rows.iter().map(|r| r.case.input))
         .text("outcome", rows.iter().map(|r| r.ended.outcome.clone()))
         .text("expected", rows.iter().map(|r| r.case.expected.to_string()))
-        .text("verdict", rows.iter().map(|r| r.ended.verdict.name()))
+        .text("verdict", rows.iter().map(|r| verdict(&r.ended)))
         .text("quantity", rows.iter().map(|r| r.case.quantity))
         .float("share_of_allowance", rows.iter().map(|r| r.ended.used))
 }
@@ -130,11 +89,12 @@ pub(crate) fn picture(rows: &[Row]) -> Figure {
     };
     let is_number = |row: &Row| row.ended.used.is_finite();
     for (colour, (part, _)) in PARTS.into_iter().enumerate() {
-        let numbers = of(&|row| row.part == part && row.passes() && is_number(row), &|row| row.ended.used.max(FLOOR));
+        let numbers =
+            of(&|row| row.part == part && row.ended.passes && is_number(row), &|row| row.ended.used.max(FLOOR));
         plot = plot.with(Series::new(part, Style::Markers, numbers).in_colour(colour));
     }
-    let refused = of(&|row| row.passes() && !is_number(row), &|_| 0.5 * FLOOR);
-    let missed = of(&|row| !row.passes(), &|_| TOP);
+    let refused = of(&|row| row.ended.passes && !is_number(row), &|_| 0.5 * FLOOR);
+    let missed = of(&|row| !row.ended.passes, &|_| TOP);
     let bar = [(0.0, 1.0), (rows.len() as f64 + 1.0, 1.0)];
     plot = plot
         .with(Series::new("refused as it must be", Style::Markers, refused).in_colour(PARTS.len()))
@@ -146,16 +106,7 @@ pub(crate) fn picture(rows: &[Row]) -> Figure {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn there_are_sixty_cases_of_different_names_most_of_them_quick() {
-        let cases: Vec<Extreme> = PARTS.iter().flat_map(|(_, cases)| cases()).collect();
-        let mut names: Vec<&str> = cases.iter().map(|case| case.name).collect();
-        names.sort_unstable();
-        names.dedup();
-        assert_eq!(names.len(), cases.len(), "two cases of one name");
-        assert!(cases.iter().filter(|case| !case.long).count() >= 60, "{}", cases.len());
-    }
+    use fixtures::extreme::Extreme;
 
     #[test]
     fn a_case_that_is_missed_stands_in_the_table_and_in_the_picture() {

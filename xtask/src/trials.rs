@@ -5,9 +5,7 @@
 pub(crate) mod banded;
 pub(crate) mod fits;
 pub(crate) mod map_bound;
-pub(crate) mod methods;
 pub(crate) mod profile;
-pub(crate) mod uniform;
 
 use wakescope_signal::NoiseModel;
 

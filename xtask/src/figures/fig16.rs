@@ -3,13 +3,15 @@
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
 use crate::failure::Failure;
-use crate::stability::{self, Row};
+use crate::profile::Profile;
+use crate::stability;
+use fixtures::extreme::rows;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let rows = stability::rows(context.profile, |_| true);
+    let rows = rows(|_, case| !(case.long && context.profile == Profile::Quick));
     let origin = context.provenance_of_formula(&format!("profile = \"{}\"\n", context.profile_name()));
     let mut out = Rendered::new(&stability::table(&rows), &stability::picture(&rows), &origin)?;
-    let missed: Vec<&str> = rows.iter().filter(|row| !row.passes()).map(Row::name).collect();
+    let missed: Vec<&str> = rows.iter().filter(|row| !row.ended.passes).map(|row| row.case.name).collect();
     out.caption = format!(
         "Each of {} stiff and extreme cases must come to a number within bounds, or be refused in stated words: how much of what \
          is allowed it takes, 1 being the bar (dashed). Names, inputs and outcomes are in the table (fig16.csv).",

@@ -4,9 +4,9 @@ use super::context::{Context, Rendered};
 use crate::claim::Claim;
 use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate};
-use crate::trials::methods::Known;
 use crate::trials::noise_name;
-use crate::trials::uniform::{Air, BAND_M_S, errors};
+use fixtures::methods::Known;
+use fixtures::uniform::{Air, BAND_M_S, errors};
 use fixtures::{WINDOW, sampling};
 use rayon::prelude::*;
 use wakescope_estimate::{

@@ -7,9 +7,9 @@
 use super::{Row, mean_and_error};
 use crate::cost::fastest;
 use crate::failure::Failure;
-use crate::trials::methods::{Known, Methods};
-use crate::trials::uniform::{Air, BAND_M_S};
+use fixtures::methods::{Known, Methods};
 use fixtures::pair::PairScan;
+use fixtures::uniform::{Air, BAND_M_S};
 use fixtures::{WINDOW, sampling};
 use wakescope_estimate::{
     Correlogram, Estimator, Refinement, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
