@@ -2,8 +2,8 @@
 //!
 //! The definitions and the draws are in `tests/audit`; the table says where each number is defined and how far it is off.
 
-use crate::failure::{Failure, Outcome};
 use crate::process::program;
+use fixtures::failure::{Failure, Outcome};
 use std::path::PathBuf;
 
 /// Options of the task.

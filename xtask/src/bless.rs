@@ -2,10 +2,10 @@
 //!
 //! The only way to write one. Curves from independent sources are never written.
 
-use crate::failure::{Failure, Outcome};
 use crate::wakes;
 use crate::workspace::root;
 use fixtures::curves::{ALL, Origin};
+use fixtures::failure::{Failure, Outcome};
 use wakescope_sim::io::write_atomic;
 
 /// Options of the task.

@@ -3,8 +3,8 @@
 //! `.ci/run` calls it, so that a person can run the same before a commit. Examples are compiled with the tests, benchmarks
 //! are checked with clippy: neither is built once more.
 
-use crate::failure::{Failure, Outcome};
 use crate::workspace::{read, root};
+use fixtures::failure::{Failure, Outcome};
 use std::process::Command;
 use std::time::Instant;
 

@@ -1,7 +1,7 @@
 //! What a piece of work takes: processor time, time on the clock, memory; and on which machine. Linux only: memory and machine come
 //! from /proc.
 
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use rustix::time::{ClockId, clock_gettime};
 use std::process::Command;
 use std::time::Instant;

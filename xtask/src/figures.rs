@@ -30,8 +30,8 @@ mod study;
 mod tab01;
 mod tab02;
 
-use crate::failure::Failure;
 use context::{Context, Rendered};
+use fixtures::failure::Failure;
 
 /// A figure that can be asked for.
 pub(crate) struct Figure {

@@ -4,10 +4,10 @@
 //! fitted or the true one, and once more from the truth on. Each row has its standard error; one thread tells the processor time.
 
 use crate::cost::measured;
-use crate::failure::{Failure, Outcome};
 use crate::trials::fits::{FitTrial, RADIUS_M};
 use crate::trials::map_bound::{MapBound, MapSetting};
 use fixtures::WINDOW;
+use fixtures::failure::{Failure, Outcome};
 use fixtures::pair::{PairCase, PairScan};
 use ndarray::Array2;
 use wakescope_estimate::Error;

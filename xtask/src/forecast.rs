@@ -3,8 +3,8 @@
 //! Ten diverse scenes, each a run of the release program in a process of its own with one thread, drawing and writing
 //! included. Memory is the largest resident set less that of a run that does next to nothing.
 
-use crate::failure::{Failure, Outcome};
 use crate::process::{program, watch};
+use fixtures::failure::{Failure, Outcome};
 use std::path::Path;
 
 /// Options of the task.

@@ -5,9 +5,9 @@
 
 mod change;
 
-use crate::failure::{Failure, Outcome};
 use crate::process::{Watched, program, watch};
 use change::scene;
+use fixtures::failure::{Failure, Outcome};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]

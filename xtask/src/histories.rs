@@ -2,8 +2,8 @@
 //!
 //! Check: the tables of the book are those that are printed.
 
-use crate::failure::{Failure, Outcome};
 use crate::workspace::root;
+use fixtures::failure::{Failure, Outcome};
 use std::collections::HashMap;
 use wakescope_les::analysis::decay::{knee, onset, value_at};
 use wakescope_sim::flow::table;

@@ -32,7 +32,6 @@ mod work_precision;
 mod workspace;
 
 use clap::{Parser, Subcommand};
-use fixtures::failure;
 
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", about = "Tasks of the wakescope workspace")]

@@ -2,8 +2,8 @@
 //!
 //! Linux only: the figures come from /proc.
 
-use crate::failure::Failure;
 use crate::workspace::root;
+use fixtures::failure::Failure;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};

@@ -3,10 +3,10 @@
 //!
 //! Needs an MPI library with its compiler `mpicc`, and libclang, for the build; on Debian as root it installs them.
 
-use crate::failure::{Failure, Outcome};
 use crate::process::watch;
 use crate::ranks_model::{self, Halos};
 use crate::workspace::root;
+use fixtures::failure::{Failure, Outcome};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

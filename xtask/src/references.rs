@@ -1,7 +1,7 @@
 //! Stored numbers of flows, and what is read off a few of them.
 
-use crate::failure::Failure;
 use crate::workspace::read;
+use fixtures::failure::Failure;
 
 /// Numbers of a reference file without its comments, row by row.
 pub(crate) fn numbers(file: &str) -> Result<Vec<Vec<f64>>, Failure> {

@@ -1,9 +1,9 @@
 //! `cargo xtask regress`: what the crates compute now against the curves stored in
 //! `tests/reference/`, as a table of name, error, tolerance, run time and verdict.
 
-use crate::failure::{Failure, Outcome};
 use crate::workspace::{provenance, root};
 use fixtures::curves::{ALL, Comparison, Curve};
+use fixtures::failure::{Failure, Outcome};
 use std::time::Instant;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 

@@ -10,11 +10,11 @@ mod report;
 
 use crate::claim::Claim;
 use crate::cost::{cpu_s, thread_cpu_s};
-use crate::failure::{Failure, Outcome};
 use crate::figures::context::{Context, Rendered};
 use crate::figures::{self, Figure, Lane};
 use crate::profile::Profile;
 use crate::workspace::root;
+use fixtures::failure::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
 use lists::Kind;
 use rayon::ThreadPool;

@@ -8,16 +8,6 @@ pub(crate) fn is_test_file(file: &str) -> bool {
     file.ends_with(".rs") && of_tests || file.ends_with("/tests.rs") || file.ends_with("_tests.rs")
 }
 
-/// Where the files lie that a source file declares for tests alone, without their extension.
-pub(crate) fn declared_tests(file: &str, text: &str) -> Vec<String> {
-    let of_folder = ["/mod.rs", "/lib.rs", "/main.rs"].iter().find_map(|name| file.strip_suffix(name));
-    let folder = of_folder.or(file.strip_suffix(".rs")).unwrap_or(file);
-    let lines: Vec<&str> = text.lines().map(str::trim).collect();
-    let pairs = lines.windows(2).filter(|pair| pair[0] == "#[cfg(test)]");
-    let names = pairs.filter_map(|pair| pair[1].strip_prefix("mod ")?.strip_suffix(';'));
-    names.map(|name| format!("{folder}/{name}")).collect()
-}
-
 /// Lines of code of a source text: neither blank, nor comment, nor part of an item that is compiled for tests alone.
 pub(crate) fn code_lines(text: &str) -> Vec<&str> {
     let mut out = Vec::new();
@@ -41,11 +31,6 @@ pub(crate) fn code_lines(text: &str) -> Vec<&str> {
     out
 }
 
-/// The library of the workspace that a path begins with: that of the fixtures has no prefix.
-fn library(word: &str) -> Option<&str> {
-    word.strip_prefix("wakescope_").or((word == "fixtures").then_some(word))
-}
-
 /// What an item is, as far as importing it matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
@@ -62,7 +47,7 @@ struct Module<'a> {
     file: &'a str,
     items: BTreeMap<String, Kind>,
     uses: Vec<Use>,
-    /// Paths that begin with `crate`, `super` or a library of the workspace, wherever they stand.
+    /// Paths outside of `use`, such as `crate::a::f` or `child::g`.
     paths: Vec<Vec<String>>,
 }
 
@@ -104,16 +89,6 @@ impl<'a> Modules<'a> {
             }
         }
         out
-    }
-
-    /// A file and all that it imports, in one step or several, and what these name of the libraries: (library, module).
-    pub(crate) fn needs(&self, file: &'a str) -> (BTreeSet<&'a str>, BTreeSet<(&str, &str)>) {
-        let mut files = reached(&self.imports(false), file);
-        files.insert(file);
-        let modules = self.0.values().filter(|module| files.contains(module.file));
-        let paths = modules.flat_map(|module| module.uses.iter().flat_map(|u| &u.paths).chain(&module.paths));
-        let libraries = paths.filter_map(|path| Some((library(path.first()?)?, path.get(1)?.as_str()))).collect();
-        (files, libraries)
     }
 
     /// The path from the root of the crate; none if it leads to another crate.
@@ -158,7 +133,7 @@ impl<'a> Modules<'a> {
     }
 }
 
-/// Groups of files each of which imports every other, in one step or several.
+/// Groups of files each of which imports every other, in one step or several; a module and those right below it may.
 pub(crate) fn circles<'a>(imports: &Imports<'a>) -> Vec<Vec<&'a str>> {
     let all: BTreeMap<&str, BTreeSet<&str>> = imports.keys().map(|file| (*file, reached(imports, file))).collect();
     let mut out: Vec<Vec<&str>> = Vec::new();
@@ -167,7 +142,19 @@ pub(crate) fn circles<'a>(imports: &Imports<'a>) -> Vec<Vec<&'a str>> {
             out.push(seen.iter().copied().filter(|to| all.get(to).is_some_and(|back| back.contains(file))).collect());
         }
     }
+    out.retain(|circle| {
+        !circle.iter().any(|above| circle.iter().all(|file| file == above || is_right_below(file, above)))
+    });
     out
+}
+
+fn is_right_below(file: &str, above: &str) -> bool {
+    match (place(file), place(above)) {
+        (Some((folder, path)), Some(above)) => {
+            path.split_last().is_some_and(|(_, rest)| above == (folder, rest.to_vec()))
+        }
+        _ => false,
+    }
 }
 
 /// What a file imports, in one step or several.
@@ -193,21 +180,24 @@ impl<'a> Module<'a> {
     fn new(file: &'a str, text: &str) -> Self {
         let lines = code_lines(text);
         let items = lines.iter().filter_map(|line| item(line)).collect();
-        let mut uses = Vec::new();
+        let (mut uses, mut paths) = (Vec::new(), Vec::new());
         let mut open: Option<(String, String)> = None;
         for line in &lines {
-            if open.is_none() {
-                let (visibility, rest) = visibility(line);
-                open = rest.strip_prefix("use ").map(|rest| (visibility.to_owned(), rest.to_owned()));
-            } else if let Some((_, tree)) = &mut open {
-                tree.push_str(line);
+            match &mut open {
+                Some((_, tree)) => tree.push_str(line),
+                None => {
+                    let (visibility, item) = visibility(line);
+                    open = item.strip_prefix("use ").map(|tree| (visibility.to_owned(), tree.to_owned()));
+                    if open.is_none() {
+                        paths.extend(inline_paths(item));
+                    }
+                }
             }
             if let Some((visibility, tree)) = open.take_if(|(_, tree)| tree.contains(';')) {
                 let paths = written_out(tree.split(';').next().unwrap_or_default());
                 uses.push(Use { is_public: !visibility.is_empty(), is_exported: visibility == "pub", paths });
             }
         }
-        let paths = lines.iter().flat_map(|line| inline_paths(line)).collect();
         Self { file, items, uses, paths }
     }
 }
@@ -269,18 +259,14 @@ fn written_out(tree: &str) -> Vec<Vec<String>> {
     below.map(|path| words(before).into_iter().chain(path).collect()).collect()
 }
 
-/// Paths of a line that begin with `crate`, `super` or a library of the workspace.
+/// Paths of a line, of two words and more.
 fn inline_paths(line: &str) -> Vec<Vec<String>> {
-    let mut out = Vec::new();
-    for path in line.split(|c: char| !is_word(c) && c != ':') {
-        let words: Vec<&str> = path.split("::").collect();
-        let begins = |word: &&str| ["crate", "super"].contains(word) || library(word).is_some();
-        if let Some(first) = words.iter().position(begins) {
-            let named = words[first..].iter().take_while(|word| !word.is_empty() && word.chars().all(is_word));
-            out.extend(Some(named.map(|word| (*word).into()).collect::<Vec<String>>()).filter(|path| path.len() > 1));
-        }
-    }
-    out
+    let paths = line.split(|c: char| !is_word(c) && c != ':').map(|path| {
+        let words =
+            path.trim_start_matches(':').split("::").take_while(|word| !word.is_empty() && word.chars().all(is_word));
+        words.map(String::from).collect::<Vec<_>>()
+    });
+    paths.filter(|path| path.len() > 1).collect()
 }
 
 #[cfg(test)]
@@ -302,12 +288,37 @@ mod tests {
     }
 
     #[test]
-    fn a_child_may_take_its_parents_constants_and_nothing_else() {
-        let parent = |item: &'static str| ("c/src/a/mod.rs", item);
-        let child = ("c/src/a/b.rs", "use super::LANES;\npub(super) fn wide() {}\n");
-        assert!(found(&[parent("mod b;\nuse b::wide;\nconst LANES: usize = 16;\n"), child], true).is_empty());
-        assert_eq!(found(&[parent("mod b;\nuse b::wide;\nconst LANES: usize = 16;\n"), child], false).len(), 1);
-        assert_eq!(found(&[parent("mod b;\nuse b::wide;\npub(crate) fn LANES() {}\n"), child], true).len(), 1);
+    fn a_path_that_begins_with_a_child_module_is_an_import() {
+        let parent = ("c/src/a/mod.rs", "mod b;\npub(in super::super) fn f() { b::c::g() }\n");
+        let (between, below) = (("c/src/a/b/mod.rs", "pub mod c;\n"), |text| ("c/src/a/b/c.rs", text));
+        let circle = [["c/src/a/b/c.rs", "c/src/a/mod.rs"]];
+        assert_eq!(found(&[parent, between, below("fn g() { super::super::f() }\n")], true), circle);
+        assert!(found(&[parent, between, below("fn g() {}\n")], true).is_empty());
+        // A word of a `use` is no child of the file that it stands in.
+        let user = ("c/src/a/mod.rs", "mod b;\nuse crate::{\n    b::h,\n};\n");
+        let files = [user, between, below("fn g() { super::super::f() }\n"), ("c/src/b.rs", "fn h() {}\n")];
+        assert!(found(&files, true).is_empty());
+    }
+
+    #[test]
+    fn a_module_and_those_right_below_it_may_import_one_another_and_others_may_not() {
+        let parent = ("c/src/a/mod.rs", "mod b;\nuse b::wide;\npub(crate) fn lanes() {}\n");
+        let child = ("c/src/a/b.rs", "use super::lanes;\npub(super) fn wide() {}\n");
+        assert!(found(&[parent, child], true).is_empty());
+        let aside = ("c/src/d.rs", "pub fn more() { crate::a::lanes() }\n");
+        let with_aside = ("c/src/a/b.rs", "use crate::d::more;\npub(super) fn wide() {}\n");
+        assert_eq!(found(&[parent, with_aside, aside], true).concat().len(), 3);
+    }
+
+    #[test]
+    fn a_module_may_take_constants_from_above_and_nothing_else() {
+        let of = |item: &str, but_constants| {
+            let above = format!("mod d;\nuse d::b::wide;\n{item}\n");
+            let below = ("c/src/a/d/b.rs", "use crate::a::LANES;\npub(super) fn wide() {}\n");
+            found(&[("c/src/a/mod.rs", &above), ("c/src/a/d/mod.rs", "mod b;\n"), below], but_constants).len()
+        };
+        let constant = "const LANES: usize = 16;";
+        assert_eq!([of(constant, true), of(constant, false), of("pub(crate) fn LANES() {}", true)], [0, 1, 1]);
     }
 
     #[test]
@@ -316,7 +327,6 @@ mod tests {
         let b = ("c/src/b.rs", "pub fn f() {}\n\n#[cfg(test)]\nmod tests {\n    use crate::a::g;\n}\n");
         assert!(found(&[a, b], false).is_empty());
         let text = "//! x\n\n#[cfg(test)]\nmod more_tests;\n#[cfg(test)]\nuse a::{\n    b,\n};\nfn f() {\n    g(); // c\n}\n    #[cfg(test)]\n    fn h() {\n    }\nfn k() {}\n";
-        assert_eq!(declared_tests("c/src/a/mod.rs", text), ["c/src/a/more_tests"]);
         assert_eq!(code_lines(text), ["fn f() {", "    g(); // c", "}", "fn k() {}"]);
     }
 }

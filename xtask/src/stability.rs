@@ -3,11 +3,11 @@
 //! A case is a number within bounds or a refusal in stated words; a panic is neither. What the cases are: the lists of the
 //! numerics, which a solver that fears nothing would pass.
 
-use crate::failure::{Failure, Outcome};
 use crate::profile::Profile;
 use crate::statistics::Verdict;
 use crate::workspace::{provenance, root};
 use fixtures::extreme::{Ended, PARTS, Row, rows};
+use fixtures::failure::{Failure, Outcome};
 use std::path::PathBuf;
 use std::time::Instant;
 use wakescope_sim::io::{FileGroup, Table};

@@ -14,9 +14,9 @@ mod wake;
 mod waves;
 
 use crate::claim::Claim;
-use crate::failure::{Failure, Outcome};
 use crate::profile::Profile;
 use crate::workspace::{provenance, root};
+use fixtures::failure::{Failure, Outcome};
 use shown::Shown;
 use std::path::PathBuf;
 use std::time::Instant;

@@ -7,10 +7,10 @@
 //! Check: what is stored is of the case that is run here.
 
 use crate::cause::cause;
-use crate::failure::{Failure, Outcome};
 use crate::figures::context::Context;
 use crate::profile::Profile;
 use crate::workspace::root;
+use fixtures::failure::{Failure, Outcome};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -21,7 +21,7 @@ use wakescope_sim::flow::{
 /// Ages of the cross-planes that are kept, for pictures that move.
 const SERIES_EVERY: f64 = 0.1;
 /// What computes and writes a wake.
-const COMPUTED_BY: [&str; 3] = ["crates/les", "crates/sim/src/flow", "crates/sim/src/io"];
+const COMPUTED_BY: [&str; 4] = ["crates/les/src", "crates/sim/src/flow", "crates/sim/src/io", "Cargo.lock"];
 /// What `bless` calls the stored wake; where it is, and the ages of its cross-planes.
 pub(crate) const NAME: &str = "wake";
 const STORED: &str = "tests/reference/wake";

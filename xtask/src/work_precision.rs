@@ -12,8 +12,8 @@ pub(crate) mod show;
 mod signal;
 
 use crate::cost::{Cost, machine};
-use crate::failure::{Failure, Outcome};
 use crate::workspace::{provenance, root};
+use fixtures::failure::{Failure, Outcome};
 use front::Measured;
 use std::path::PathBuf;
 use wakescope_sim::io::FileGroup;

@@ -1,6 +1,6 @@
 //! The files of the workspace, and what is written about those that a task makes.
 
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use wakescope_sim::io::Provenance;

@@ -1,9 +1,9 @@
 //! What every figure takes, and what it gives.
 
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::workspace::provenance;
+use fixtures::failure::Failure;
 use std::path::PathBuf;
 use wakescope_sim::io::{Provenance, Table};
 use wakescope_sim::plot::Figure;

@@ -2,7 +2,7 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use std::f64::consts::PI;
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_sim::io::Table;

@@ -1,7 +1,7 @@
 //! Figure 3: the scan pattern on the runway, with the vortices and the lines of sight.
 
 use super::context::{Context, Rendered};
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::wind;
 use wakescope_sim::plan::{Plan, Target};

@@ -2,8 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::{Claim, Part};
-use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate};
+use fixtures::failure::Failure;
 use std::ops::ControlFlow;
 use wakescope_optics::air::StructureTable;
 use wakescope_optics::monte_carlo::EfficiencyEstimate;

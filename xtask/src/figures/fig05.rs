@@ -2,7 +2,7 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use wakescope_les::winds::m4_prime;
 use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};

@@ -2,10 +2,10 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::histories::{by_noise, swing};
 use crate::references::numbers;
 use crate::wakes;
+use fixtures::failure::Failure;
 use wakescope_les::analysis::decay::{knee, onset, value_at};
 use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::io::Table;

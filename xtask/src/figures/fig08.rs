@@ -2,8 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::wakes;
+use fixtures::failure::Failure;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::io::tables::map_table;

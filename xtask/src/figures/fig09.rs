@@ -2,8 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::statistics::Verdict;
+use fixtures::failure::Failure;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::estimators;

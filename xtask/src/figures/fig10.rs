@@ -3,8 +3,8 @@
 use super::context::{Context, Rendered};
 use super::study::{Age, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::statistics::{BATCHES, Bar, Estimate};
+use fixtures::failure::Failure;
 use ndarray::Array2;
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::measure::write;

@@ -6,8 +6,8 @@ use super::study::{
     with_turbulence,
 };
 use crate::claim::{Claim, Part};
-use crate::failure::Failure;
 use crate::statistics::{Bar, NO_DIFFERENCE};
+use fixtures::failure::Failure;
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::instrument::Instrument;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};

@@ -4,8 +4,8 @@ use super::context::{Context, Rendered};
 use super::profiles::{self, Profiles};
 use super::study::{Age, INSIDE_M, METHODS, REFERENCES, Sight, Study, near_scene, with_method};
 use crate::claim::{Claim, Part};
-use crate::failure::Failure;
 use crate::statistics::Verdict;
+use fixtures::failure::Failure;
 use wakescope_sim::plot::Figure;
 use wakescope_sim::scene::{PulseShape, Scene, SnrReference};
 

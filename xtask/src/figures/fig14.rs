@@ -5,7 +5,7 @@ use super::fig13::{of_all_methods, profiles_words};
 use super::profiles::{self, Profiles};
 use super::study::{Age, METHODS, Sight, near_scene, with_turbulence};
 use crate::claim::Claim;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use wakescope_sim::plot::Figure;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {

@@ -2,10 +2,10 @@
 
 use super::context::{Context, Rendered};
 use crate::cost::machine;
-use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::work_precision::show::{fronts, table};
 use crate::work_precision::{Group, Row, measure};
+use fixtures::failure::Failure;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let quick = context.profile == Profile::Quick;

@@ -2,10 +2,10 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::stability;
 use fixtures::extreme::rows;
+use fixtures::failure::Failure;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let rows = rows(|_, case| !(case.long && context.profile == Profile::Quick));

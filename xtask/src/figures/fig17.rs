@@ -3,9 +3,9 @@
 use super::context::{Context, Rendered};
 use super::fig17_flows as flows;
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::statistics::{BATCHES, Bar, Estimate, mean};
 use crate::trials::fits::{FitTrial, RADIUS_M};
+use fixtures::failure::Failure;
 use fixtures::pair::{CIRCULATION_M2_S, PairScan, truth};
 use ndarray::Array2;
 use rayon::prelude::*;

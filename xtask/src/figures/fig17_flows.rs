@@ -2,9 +2,9 @@
 
 use super::context::Context;
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate, Verdict, mean};
 use crate::wakes;
+use fixtures::failure::Failure;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -2,9 +2,9 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate};
 use crate::trials::noise_name;
+use fixtures::failure::Failure;
 use fixtures::methods::Known;
 use fixtures::uniform::{Air, BAND_M_S, errors};
 use fixtures::{WINDOW, sampling};

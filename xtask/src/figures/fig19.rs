@@ -2,8 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate};
+use fixtures::failure::Failure;
 use wakescope_estimate::retrieval::{ScanMap, Turbulence};
 use wakescope_estimate::wake_detection::{DetectorOptions, Share};
 use wakescope_sim::Silent;

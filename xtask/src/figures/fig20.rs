@@ -2,8 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate};
+use fixtures::failure::Failure;
 use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, expected_velocities};
 use wakescope_estimate::vortex_fit::CorePrior;
 use wakescope_sim::Silent;

@@ -2,8 +2,8 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::statistics::{Bar, Estimate, Verdict};
+use fixtures::failure::Failure;
 use ndarray::Array2;
 use rayon::prelude::*;
 use wakescope_les::{VortexPair, Wind};

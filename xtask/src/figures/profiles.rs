@@ -6,8 +6,8 @@
 
 use super::study::{INSIDE_M, METHODS, OUTSIDE_M, Study, Zone, batches};
 use crate::claim::Part;
-use crate::failure::Failure;
 use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE};
+use fixtures::failure::Failure;
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::plot::{Axis, CurvePlot, Series, Style};

@@ -1,9 +1,9 @@
 //! What figures 10 to 14 and 25 share: scans of the simulated wake or of the analytic pair in batches, regions about the cores.
 
 use super::context::Context;
-use crate::failure::Failure;
 use crate::statistics::{BATCHES, Estimate};
 use crate::wakes;
+use fixtures::failure::Failure;
 use std::path::PathBuf;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::flow::FinishedWake;

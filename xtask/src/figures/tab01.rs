@@ -2,7 +2,7 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use wakescope_sim::io::Table;
 
 const NAUTICAL_MILE_M: f64 = 1852.0;

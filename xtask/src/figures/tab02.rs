@@ -2,7 +2,7 @@
 
 use super::context::{Context, Rendered};
 use crate::claim::Claim;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use std::path::Path;
 use wakescope_sim::io::Table;
 use wakescope_sim::plan::{Plan, Target};

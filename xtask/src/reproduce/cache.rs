@@ -1,17 +1,19 @@
 //! The cache of figures: cause in, content out.
 //!
-//! The key is what a figure depends on: profile, seed, which flow it looks at, the code of its own file and of those that it
-//! imports, of the libraries behind them, and the versions of what these use. The value is a folder with the figure's files and
-//! one TOML index. What cannot be read is drawn anew.
+//! The key is what a figure depends on: profile, seed, which flow it looks at, all code, the stored numbers, and the versions of what is
+//! used. The value is a folder with the figure's files and one TOML index. What cannot be read is drawn anew.
 
-use crate::cause::{cause, places_of};
+use crate::cause::cause;
 use crate::claim::Claim;
-use crate::failure::{Failure, Outcome};
 use crate::figures::context::{Context, Rendered};
 use crate::workspace::root;
+use fixtures::failure::{Failure, Outcome};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use wakescope_sim::io::FileGroup;
+
+/// What figures come from.
+const DRAWN_BY: [&str; 4] = ["crates", "xtask", "tests/reference", "Cargo.lock"];
 
 /// Folder of the figures and of the stages that several share.
 pub(super) fn folder() -> PathBuf {
@@ -37,8 +39,7 @@ struct Index {
 impl Place {
     pub(super) fn new(id: &'static str, context: &Context) -> Result<Self, Failure> {
         let (root, seed, flow) = (root(), context.seed.to_string(), if context.analytic { "analytic" } else { "" });
-        let places = places_of(&root, &format!("xtask/src/figures/{id}.rs"))?;
-        let key = cause(&root, &[id, context.profile_name(), &seed, flow], &places)?;
+        let key = cause(&root, &[id, context.profile_name(), &seed, flow], &DRAWN_BY)?;
         Ok(Self { id, folder: folder().join(format!("{id}-{key}")) })
     }
 

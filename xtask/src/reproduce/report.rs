@@ -3,10 +3,10 @@
 use super::lists::Kind;
 use crate::claim::Claim;
 use crate::cost::machine;
-use crate::failure::Failure;
 use crate::figures::Figure;
 use crate::figures::context::{Context, Rendered};
 use crate::statistics::{Verdict, two_digits};
+use fixtures::failure::Failure;
 use wakescope_sim::plot::html::HtmlTable;
 use wakescope_sim::plot::{Finding, Report, ReportEntry};
 

@@ -1,8 +1,8 @@
 //! Fits to scans of a pair: to the map of the likelihood with tapers, and to all raw signals.
 
-use crate::failure::Failure;
 use crate::trials::profile::posterior_deviation;
 use fixtures::WINDOW;
+use fixtures::failure::Failure;
 use fixtures::pair::PairScan;
 use ndarray::{Array2, ArrayView2};
 use wakescope_estimate::vortex_fit::{

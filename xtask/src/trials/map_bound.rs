@@ -14,7 +14,7 @@
 //! per cent. Check: one window of uniform wind against its Cramer-Rao bound; lines far apart.
 
 use super::banded::Banded;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex;
 use rayon::prelude::*;

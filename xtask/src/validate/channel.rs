@@ -2,9 +2,9 @@
 
 use super::shown::Shown;
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::references::numbers;
+use fixtures::failure::Failure;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_les::{SubgridModel, cases};
 use wakescope_sim::io::Table;

@@ -2,10 +2,10 @@
 
 use super::shown::Shown;
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::references::{numbers, parabola_vertex};
 use crate::workspace::read;
+use fixtures::failure::Failure;
 use wakescope_les::cases;
 use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};

@@ -2,8 +2,8 @@
 
 use super::shown::Shown;
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::profile::Profile;
+use fixtures::failure::Failure;
 use wakescope_les::TimeScheme;
 use wakescope_les::cases;
 use wakescope_sim::io::Table;

@@ -3,9 +3,9 @@
 use super::shown::Shown;
 use super::wake::history::{run, run_with, worst};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::references::numbers;
+use fixtures::failure::Failure;
 use std::f64::consts::TAU;
 use wakescope_les::CirculationProfile;
 use wakescope_les::analysis::WakeScales;

@@ -4,7 +4,7 @@
 
 use super::{Row, few, mean_and_error};
 use crate::cost::fastest;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use std::path::Path;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::measure::progress::Silent;

@@ -6,7 +6,7 @@
 
 use super::{Row, mean_and_error};
 use crate::cost::fastest;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use fixtures::methods::{Known, Methods};
 use fixtures::pair::PairScan;
 use fixtures::uniform::{Air, BAND_M_S};

@@ -2,7 +2,7 @@
 
 use super::{Row, few};
 use crate::cost::fastest;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use wakescope_les::cases::{self, Case, TollmienSchlichting};
 use wakescope_les::solver::PressureMethod;
 use wakescope_les::{Flow, TimeScheme, TimeStep};

@@ -2,7 +2,7 @@
 
 use super::{Row, few};
 use crate::cost::{Cost, fastest};
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use std::ops::ControlFlow;
 use wakescope_optics::air::{StructureTable, structure_function_m53};
 use wakescope_optics::monte_carlo::{EfficiencyEstimate, Sampling};

@@ -4,7 +4,7 @@
 
 use super::{Row, few};
 use crate::cost::fastest;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use fixtures::{ENERGY_J, receiver};
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 use wakescope_signal::literal::literal_envelope;

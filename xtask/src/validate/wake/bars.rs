@@ -2,9 +2,9 @@
 
 use super::history::{History, PER_TAU, Stored, run, worst};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::validate::shown::Shown;
+use fixtures::failure::Failure;
 use std::path::Path;
 use wakescope_les::SubgridModel;
 use wakescope_les::analysis::decay::{amplitude_growth, onset, value_at};

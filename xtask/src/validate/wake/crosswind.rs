@@ -2,9 +2,9 @@
 
 use super::history::{History, run};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::validate::shown::Shown;
+use fixtures::failure::Failure;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use wakescope_les::analysis::WakeRecord;

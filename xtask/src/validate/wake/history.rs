@@ -1,7 +1,7 @@
 //! Histories of runs of the pair, and how far apart two are.
 
-use crate::failure::Failure;
 use crate::references::numbers;
+use fixtures::failure::Failure;
 use std::f64::consts::TAU;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_les::analysis::{WakeMeter, WakeRecord, WakeScales};

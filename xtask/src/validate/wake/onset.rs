@@ -2,9 +2,9 @@
 
 use super::history::{History, run};
 use crate::claim::Claim;
-use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::validate::shown::Shown;
+use fixtures::failure::Failure;
 use rayon::prelude::*;
 use wakescope_les::analysis::decay::onset;
 use wakescope_les::cases::VortexPairCase;

@@ -1,7 +1,7 @@
 //! The history of a run that `wakescope wake` made, read from its files.
 
 use super::history::History;
-use crate::failure::Failure;
+use fixtures::failure::Failure;
 use std::f64::consts::TAU;
 use wakescope_les::{analysis::SecondaryRecord, analysis::VortexRecord, analysis::WakeRecord};
 use wakescope_sim::flow::{FinishedWake, table};
