@@ -14,11 +14,11 @@ use wakescope_estimate::{
     estimators::{LagWindowPeak, likelihood_tapers},
     polar_points,
 };
-use wakescope_sim::measure::estimators;
-use wakescope_sim::measure::progress::Silent;
-use wakescope_sim::measure::run;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::run;
 use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
+use wakescope_sim::setup::estimators;
+use wakescope_sim::setup::progress::Silent;
 
 /// Radius of the regions \[m\].
 const RADIUS_M: f64 = 2.0;

@@ -2,10 +2,10 @@
 
 use wakescope_optics::theory::free_space_efficiency;
 use wakescope_optics::{EfficiencyProfile, snr::SPEED_OF_LIGHT_M_S};
-use wakescope_sim::measure::progress::Silent;
-use wakescope_sim::measure::run;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::run;
 use wakescope_sim::scene::{Flow, NoiseKind, Scene, SceneFile};
+use wakescope_sim::setup::progress::Silent;
 
 fn plan(change: impl Fn(&mut Scene)) -> Plan {
     let mut scene = Scene { flow: Flow::Calm {}, ..Scene::default() };
@@ -66,7 +66,7 @@ fn power_does_not_depend_on_the_layer_thickness() {
     // A steep flow makes the layers thinner; at rest the same scene has layers of one sample.
     let [thick, mut thin] = [(), ()].map(|()| plan(|s| s.detector.noise = NoiseKind::None));
     let factor = 4;
-    let g = &mut thin.geometry;
+    let g = &mut thin.setup.geometry;
     g.layer_thickness_m /= factor as f64;
     g.layers *= factor;
     g.layers_per_sample = (g.layers_per_sample - 1) * factor + 1;

@@ -2,12 +2,12 @@
 //!
 //! This crate joins the four others, which know nothing of each other: the wind of `les`, the efficiency
 //! of `optics`, the records of `signal` and the velocities of `estimate`. A [`scene::Scene`] becomes a
-//! [`plan::Plan`], which says what will run and what is left out and why; [`run`] runs it; [`write()`](measure::write::write)
+//! [`plan::Plan`], which says what will run and what is left out and why; [`run()`] runs it; [`write()`](write::write)
 //! puts the results on disk, all files or none.
 //!
 //! ```
 //! use wakescope_sim::plan::{Plan, Stage, Target};
-//! use wakescope_sim::measure::progress::Silent;
+//! use wakescope_sim::setup::progress::Silent;
 //! use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 //!
 //! # fn main() -> Result<(), wakescope_sim::Error> {
@@ -18,7 +18,7 @@
 //! scene.scan.pulses_per_line = 1;
 //! let plan = Plan::new(SceneFile::new(scene).expect("a good scene"), Target::Map)?;
 //! assert!(!plan.runs(Stage::PhaseScreens)); // no turbulence, no screens
-//! let map = wakescope_sim::measure::run::run(&plan, &Silent)?.map.expect("a map was asked for");
+//! let map = wakescope_sim::run::run(&plan, &Silent)?.map.expect("a map was asked for");
 //! assert_eq!(map.v_mean_m_s.dim(), (9, map.range_m.len()));
 //! # Ok(())
 //! # }
@@ -27,11 +27,13 @@
 //! | module | what is in it |
 //! |---|---|
 //! | [`scene`] | the scene: keys, defaults, limits, errors with line numbers |
+//! | [`setup`] | what is made of a scene: instrument, estimators, wind, beams and their samples |
 //! | [`plan`] | stages, what is left out, forecast of time and memory |
-//! | [`beams`] | when, whence and whither each pulse of a scan goes |
-//! | [`measure`] | instrument, wind, signals, velocities and their errors; running a plan and writing its results |
+//! | [`measure`] | signals, velocities and their errors |
 //! | [`detection`] | whether scans hold a wake, at a rate of false alarms that is calibrated for them |
 //! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
+//! | [`mod@run`], [`rehearsal`] | running a plan, and a run in small before it |
+//! | [`mod@write`] | writing the results of a run |
 //! | `sweep` | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |
@@ -41,7 +43,6 @@
 //! Features, all but the last two on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
 //! PNG, the report page), `sweep` (design studies, with `cli`), `vtk` (fields for ParaView), `mpi` (flows on several machines).
 
-pub mod beams;
 pub mod detection;
 #[cfg(feature = "flow")]
 pub mod flow;
@@ -52,10 +53,15 @@ pub mod measure;
 pub mod plan;
 #[cfg(feature = "mpi")]
 pub mod processes;
+pub mod rehearsal;
 pub mod retrieve;
+pub mod run;
 pub mod scene;
+pub mod setup;
 #[cfg(feature = "sweep")]
 pub mod sweep;
+
+pub mod write;
 
 #[cfg(feature = "cli")]
 pub mod cli;
@@ -65,11 +71,11 @@ pub mod plot;
 mod error;
 
 pub use error::Error;
-pub use measure::progress::Silent;
-pub use measure::run::{RunResult, run};
-pub use measure::write::write;
 pub use plan::{Plan, Target};
+pub use run::{RunResult, run};
 pub use scene::{Scene, SceneFile};
+pub use setup::progress::Silent;
+pub use write::write;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

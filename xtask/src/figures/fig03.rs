@@ -3,10 +3,10 @@
 use super::context::{Context, Rendered};
 use fixtures::failure::Failure;
 use wakescope_sim::io::Table;
-use wakescope_sim::measure::wind;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::{Flow, Scene};
+use wakescope_sim::setup::wind;
 
 /// Every so many lines are drawn; the table has all.
 const DRAWN: usize = 8;
@@ -27,7 +27,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("z_first_sample_m", column(|p| p.1, near_m))
         .float("y_last_sample_m", column(|p| p.0, far_m))
         .float("z_last_sample_m", column(|p| p.1, far_m));
-    let origin = wakescope_sim::measure::write::provenance(&plan);
+    let origin = wakescope_sim::write::provenance(&plan);
 
     let mut fan = Vec::new();
     for &el in elevation_rad.iter().step_by(DRAWN) {

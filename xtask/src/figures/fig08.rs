@@ -8,11 +8,11 @@ use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::io::{Table, VelocityMap};
-use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::plot::{ColourMap, Figure, MapPlot};
 use wakescope_sim::scene::{Flow, Outside, Scene, SceneFile, SimulatedFlow, SimulatedMotion, SnrReference};
-use wakescope_sim::{measure::run, measure::write};
+use wakescope_sim::setup::progress::Silent;
+use wakescope_sim::{run, write};
 
 const AGES: [(f64, &str); 2] = [(2.5, "early"), (5.0, "late")];
 /// Air about the centre of a vortex that belongs to it, in spacings: half of the way between the two at the start.

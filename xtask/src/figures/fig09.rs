@@ -6,12 +6,12 @@ use crate::statistics::Verdict;
 use fixtures::failure::Failure;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use wakescope_sim::io::Table;
-use wakescope_sim::measure::estimators;
-use wakescope_sim::measure::geometry::Geometry;
-use wakescope_sim::measure::instrument::Instrument;
-use wakescope_sim::measure::wind::SceneWind;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::Scene;
+use wakescope_sim::setup::estimators;
+use wakescope_sim::setup::geometry::Geometry;
+use wakescope_sim::setup::instrument::Instrument;
+use wakescope_sim::setup::wind::SceneWind;
 
 const RADII_M: [f64; 3] = [1.0, 2.0, 4.0];
 /// Where the chapter gives the levels.

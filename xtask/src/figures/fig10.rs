@@ -7,8 +7,8 @@ use crate::statistics::{BATCHES, Bar, Estimate};
 use fixtures::failure::Failure;
 use ndarray::Array2;
 use wakescope_sim::io::tables::map_table;
-use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
+use wakescope_sim::write;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let realisations = context.choose(16, 128, 400);

@@ -6,9 +6,9 @@ use crate::claim::Claim;
 use crate::statistics::{BATCHES, Bar, Estimate};
 use fixtures::failure::Failure;
 use wakescope_sim::io::tables::map_table;
-use wakescope_sim::measure::write;
 use wakescope_sim::plot::{Figure, MapPlot};
 use wakescope_sim::scene::{PulseShape, Scene};
+use wakescope_sim::write;
 
 /// Cells that count as those of a vortex, m from its centre.
 const NEAR_M: f64 = 15.0;

@@ -9,9 +9,9 @@ use crate::claim::{Claim, Part};
 use crate::statistics::{Bar, NO_DIFFERENCE};
 use fixtures::failure::Failure;
 use wakescope_sim::io::Table;
-use wakescope_sim::measure::instrument::Instrument;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::Scene;
+use wakescope_sim::setup::instrument::Instrument;
 
 const ENERGIES_J: [f64; 4] = [50e-6, 150e-6, 300e-6, 600e-6];
 

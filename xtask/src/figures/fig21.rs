@@ -10,14 +10,14 @@ use wakescope_les::{VortexPair, Wind};
 use wakescope_signal::RangeFilter;
 use wakescope_sim::Silent;
 use wakescope_sim::io::Table;
-use wakescope_sim::measure::estimators::weighting;
 use wakescope_sim::measure::map::VelocityEstimates;
-use wakescope_sim::measure::wind::vortex_pair;
-use wakescope_sim::measure::write::{provenance, velocity_map};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, MapPlot, Panel, Series, Style};
 use wakescope_sim::retrieve::{Method, RetrievalRow};
 use wakescope_sim::scene::{self, Axial, Flow, Pattern, Ppi, Retrieval, Scene, SnrReference};
+use wakescope_sim::setup::estimators::weighting;
+use wakescope_sim::setup::wind::vortex_pair;
+use wakescope_sim::write::{provenance, velocity_map};
 
 /// Lines of sight of each scan.
 const LINES: usize = 72;

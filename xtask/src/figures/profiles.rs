@@ -117,7 +117,7 @@ fn on_line(points: impl Iterator<Item = [f64; 3]> + Clone, x: f64) -> f64 {
 
 /// Mean signal-to-noise ratio of the scene at the vortices, dB.
 fn snr_db(study: &Study) -> Result<f64, Failure> {
-    let scanner = wakescope_sim::measure::scan::Scanner::new(&study.plan, &wakescope_sim::measure::progress::Silent)?;
+    let scanner = wakescope_sim::measure::scan::Scanner::new(&study.plan, &wakescope_sim::setup::progress::Silent)?;
     let near: Vec<f64> =
         scanner.layer_snr().into_iter().filter(|(r, _)| (350.0..450.0).contains(r)).map(|(_, snr)| snr).collect();
     Ok(10.0 * (near.iter().sum::<f64>() / near.len() as f64).log10())

@@ -11,14 +11,14 @@ use wakescope_sim::io::csv::Column;
 use wakescope_sim::io::{Provenance, Table};
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
-use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::plan::Plan;
 use wakescope_sim::scene::{
     Flow, Method, ModelOrder, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
     SnrReference, Turbulence, VortexMotion, VortexPair, Weighting,
 };
+use wakescope_sim::setup::progress::Silent;
 use wakescope_sim::sweep::{self, Request, Sweep};
-use wakescope_sim::{measure::wind, measure::write};
+use wakescope_sim::{setup::wind, write};
 
 /// What counts as inside a vortex, m from its centre.
 pub(super) const INSIDE_M: f64 = 8.0;

@@ -7,10 +7,10 @@ use crate::cost::fastest;
 use fixtures::failure::Failure;
 use std::path::Path;
 use wakescope_sim::measure::map::VelocityEstimates;
-use wakescope_sim::measure::progress::Silent;
-use wakescope_sim::measure::run;
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::run;
 use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
+use wakescope_sim::setup::progress::Silent;
 
 /// A key of the scene, its values, the value of the reference, and what is compared.
 struct Knob {

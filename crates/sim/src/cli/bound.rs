@@ -3,9 +3,9 @@
 use super::{Cli, load, say};
 use crate::io::Existing;
 use crate::io::own::refuse_foreign;
-use crate::measure::progress::Silent;
 use crate::plan::{Plan, Target};
-use crate::{Error, measure::bound, measure::write};
+use crate::setup::progress::Silent;
+use crate::{Error, measure::bound, write};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};

@@ -9,11 +9,11 @@ use crate::detection::{
 };
 use crate::io::scans::{self, ReadScan, ScanFormat};
 use crate::io::{Existing, FileGroup, Provenance};
-use crate::measure::progress::Observer;
-use crate::measure::write;
 use crate::plan::{Plan, Target};
 use crate::retrieve::{gate_of, scene_of};
 use crate::scene::{NoiseKind, SceneFile};
+use crate::setup::progress::Observer;
+use crate::write;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

@@ -18,10 +18,11 @@ mod wake;
 
 use crate::io::Existing;
 use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
-use crate::measure::profile::model;
 use crate::plan::{Plan, Stage, Target};
+use crate::rehearsal::rehearse;
 use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
-use crate::{Error, measure::run, measure::write};
+use crate::setup::efficiency_model::model;
+use crate::{Error, run, write};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 use output::{paths, say};
@@ -229,7 +230,7 @@ fn planned(
         let names = write::names(&plan);
         write::prepare(folder, names.iter().map(String::as_str), existing)?;
     }
-    plan.rehearse()?;
+    rehearse(&plan)?;
     Ok(plan)
 }
 

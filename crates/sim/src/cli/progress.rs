@@ -1,8 +1,8 @@
 //! Progress bars with the time left, on standard error; nothing where that is no terminal.
 
 use crate::flow::{FlowForecast, Watch};
-use crate::measure::progress::Observer;
 use crate::plan::Stage;
+use crate::setup::progress::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write as _;
 use std::sync::Mutex;

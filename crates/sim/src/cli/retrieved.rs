@@ -2,7 +2,6 @@
 
 use super::shown;
 use crate::retrieve::SceneRetrieval;
-use crate::retrieve::summary::name;
 use serde_json::{Value, json};
 use wakescope_estimate::retrieval::Side;
 
@@ -20,7 +19,7 @@ pub(super) fn text(retrieval: &SceneRetrieval) -> String {
             [e.truth, e.bias.0, e.bias.1, e.std, e.rms, e.stated_std].map(|value| format!("{:>11}", shown(value)));
         out += &format!(
             "{:<8} {:<6} {:<16}{} {:>4} of {}\n",
-            name(e.method),
+            e.method.name(),
             word(e.side),
             e.quantity,
             numbers.concat(),
@@ -40,7 +39,7 @@ pub(super) fn as_json(retrieval: &SceneRetrieval) -> Value {
         .iter()
         .map(|e| {
             json!({
-                "method": name(e.method), "side": word(e.side), "quantity": e.quantity, "truth": e.truth,
+                "method": e.method.name(), "side": word(e.side), "quantity": e.quantity, "truth": e.truth,
                 "realisations": e.realisations, "failures": e.failures, "bias": e.bias.0,
                 "bias_standard_error": e.bias.1, "std": e.std, "rms": e.rms, "stated_std": e.stated_std,
             })

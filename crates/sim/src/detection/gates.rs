@@ -13,9 +13,9 @@
 use crate::Error;
 use crate::io::Table;
 use crate::measure::bound::{BoundPoint, bound};
-use crate::measure::estimators;
-use crate::measure::progress::Observer;
 use crate::plan::Plan;
+use crate::setup::estimators;
+use crate::setup::progress::Observer;
 use wakescope_estimate::estimators::CellTest;
 
 /// Power of the signal over that of the noise in the cell of the peak, at a ratio of 1 in a band of `band` over the rate of samples, for

@@ -21,7 +21,7 @@ pub use scene_noise::SceneNoise;
 pub use tables::{power_table, roc_table, scan_table};
 
 use crate::Error;
-use crate::measure::streams::stream;
+use crate::setup::streams::stream;
 use ndarray::s;
 use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
 use wakescope_estimate::vortex_fit::WakeModel;

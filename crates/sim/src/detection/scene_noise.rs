@@ -8,9 +8,9 @@
 
 use crate::Error;
 use crate::measure::map::velocities;
-use crate::measure::progress::Observer;
 use crate::plan::{Plan, Target};
 use crate::scene::{Flow, SceneFile};
+use crate::setup::progress::Observer;
 use ndarray::{Array2, s};
 use wakescope_estimate::retrieval::ScanMap;
 
@@ -105,7 +105,7 @@ impl SceneNoise {
     /// Deviations, by range and line, of a map that is the mean of so many `scans`, where it states none or smaller ones: those that
     /// a few scans show of themselves are often far too small. They are those of velocities in sums, with [`excess`](Self::excess).
     pub fn give(&self, map: &mut ScanMap, scans: f64) {
-        let at = |range_m: f64| crate::measure::table::of_table(&self.range_m, &self.sigma_m_s, range_m);
+        let at = |range_m: f64| crate::setup::table::of_table(&self.range_m, &self.sigma_m_s, range_m);
         let least_m_s: Vec<f64> = map.range_m.iter().map(|r| at(*r) * (self.excess / scans.max(1.0)).sqrt()).collect();
         let shape = map.velocity_m_s.raw_dim();
         let outer = |line: usize| self.outer.get(line.min(shape[0] - 1 - line)).copied().unwrap_or(1.0);

@@ -268,7 +268,7 @@ fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
     {
         return Err(Error::CheckpointInTheWay { path });
     }
-    crate::measure::write::prepare(folder, [], Existing::Own)
+    crate::write::prepare(folder, [], Existing::Own)
 }
 
 /// The setup and the plan of a case, with all that can be refused before the computing.

@@ -275,7 +275,7 @@ impl InitialPair {
             lateral_position_m: self.lateral_position_m,
             height_m: self.height_m,
             ground: Ground::Image,
-            profile: crate::measure::wind::circulation_profile(self.profile),
+            profile: crate::setup::wind::circulation_profile(self.profile),
             motion: Motion::Frozen,
         };
         let (wind, cross_m_s) = (pair.wind().map_err(Error::Flow)?, self.cross_wind_m_s);

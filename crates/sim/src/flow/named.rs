@@ -159,7 +159,7 @@ impl VortexPairFlow {
 
     pub(super) fn case(&self) -> Result<Case, wakescope_les::Error> {
         let Self { cells, size, ground_stretch, height, core_radius, reynolds, .. } = *self;
-        let profile = crate::measure::wind::circulation_profile(self.profile);
+        let profile = crate::setup::wind::circulation_profile(self.profile);
         VortexPairCase {
             cells,
             size,

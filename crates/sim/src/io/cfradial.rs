@@ -8,7 +8,7 @@ use super::map::{Field, FieldKind, Unit, VelocityMap};
 use super::netcdf::{Attr, Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
 use super::site::MAX_TIME_S;
-use crate::beams::SweepMode;
+use crate::setup::beams::SweepMode;
 use std::f64::consts::FRAC_PI_2;
 
 /// Length of all text variables; unused bytes are NUL, since blanks stay in the strings of xarray and Py-ART.

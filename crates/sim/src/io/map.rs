@@ -4,7 +4,7 @@
 
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use super::site::Site;
-use crate::beams::{Direction, SweepMode};
+use crate::setup::beams::{Direction, SweepMode};
 use ndarray::{Array2, Array3, Axis};
 use std::f64::consts::FRAC_PI_2;
 use wakescope_les::winds::{Edges, Side};

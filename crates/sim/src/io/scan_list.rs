@@ -8,8 +8,8 @@
 use super::csv_input::TextTable;
 use super::text_file;
 use crate::Error;
-use crate::beams::SweepMode;
-use crate::beams::schedule::Stop;
+use crate::setup::beams::SweepMode;
+use crate::setup::beams::schedule::Stop;
 use std::path::Path;
 
 /// Most rows that are read.

@@ -5,13 +5,13 @@
 //! estimate of a region scatters less.
 
 use crate::io::Table;
-use crate::measure::estimators;
-use crate::measure::progress::Observer;
-use crate::measure::ray_information::RayInformation;
-use crate::measure::region::{places, region_radius};
 use crate::measure::scan::Scanner;
-use crate::measure::table::of_table;
 use crate::plan::Plan;
+use crate::setup::estimators;
+use crate::setup::progress::Observer;
+use crate::setup::ray_information::RayInformation;
+use crate::setup::region::{places, region_radius};
+use crate::setup::table::of_table;
 use crate::{Error, scene::NoiseKind};
 use wakescope_estimate::{
     Radius,
@@ -162,9 +162,9 @@ impl SceneBound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::progress::Silent;
     use crate::plan::Target;
     use crate::scene::{DetectorSignal, NoiseKind, Scene, SceneFile, SnrReference};
+    use crate::setup::progress::Silent;
 
     fn of(change: impl FnOnce(&mut Scene)) -> Result<SceneBound, Error> {
         let mut scene = Scene::default();
@@ -247,7 +247,7 @@ mod tests {
                 false,
             ),
         ] {
-            let map = crate::measure::run::run(&plan, &Silent).unwrap().map.unwrap();
+            let map = crate::run::run(&plan, &Silent).unwrap().map.unwrap();
             let gate = map.range_m.len() / 2;
             let column = map.std_m_s.column(gate);
             let std_m_s = column.iter().map(|std| std * std / column.len() as f64).sum::<f64>().sqrt();
@@ -287,7 +287,7 @@ mod tests {
                  range_max_m = 550.0\n[estimator]\nwindow_samples = 16\nradius_m = 6.0\n"
             ));
             let points = bound(&scene, &Silent).unwrap().by_range;
-            let map = crate::measure::run::run(&scene, &Silent).unwrap().map.unwrap();
+            let map = crate::run::run(&scene, &Silent).unwrap().map.unwrap();
             (points, map.n_eff.row(0).to_vec())
         };
         let (clear, cloudy) = (of("1e-7"), of("1e-4"));

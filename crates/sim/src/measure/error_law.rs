@@ -5,9 +5,9 @@
 //! Check: errors of many realisations, given out a few at a time.
 
 use crate::Error;
-use crate::measure::estimators;
 use crate::plan::Plan;
 use crate::scene::{Method, RegionRadius, Scene};
+use crate::setup::estimators;
 use ndarray::Array2;
 use std::collections::BTreeMap;
 use wakescope_signal::RangeFilter;
@@ -49,7 +49,7 @@ fn radius_m(scene: &Scene, middle_m: f64) -> f64 {
     match &scene.estimator.radius {
         _ if scene.estimator.method == (Method::Periodogram {}) => 0.0,
         RegionRadius::Fixed {} => scene.estimator.radius_m,
-        RegionRadius::OfRange { range_m, radius_m } => crate::measure::table::of_table(range_m, radius_m, middle_m),
+        RegionRadius::OfRange { range_m, radius_m } => crate::setup::table::of_table(range_m, radius_m, middle_m),
         RegionRadius::Target { largest_m, .. } => *largest_m,
     }
 }

@@ -1,14 +1,14 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
 use crate::Error;
-use crate::measure::air::radial_velocity_m_s;
 use crate::measure::error_law::{ErrorLaw, ScanErrors, range_filter, shared_cells};
 use crate::measure::map_estimator::{self, MapEstimator, NoiseAtPoints};
-use crate::measure::progress::Observer;
-use crate::measure::region::places;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use crate::scene::DetectorSignal;
+use crate::setup::air::radial_velocity_m_s;
+use crate::setup::progress::Observer;
+use crate::setup::region::places;
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use num_complex::Complex;
 use wakescope_estimate::{

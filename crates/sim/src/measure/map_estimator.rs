@@ -4,11 +4,11 @@
 //! Check: maps of simulated records have the same bits whether they come from memory or from a file, whole or in blocks.
 
 use crate::Error;
-use crate::measure::estimators::{self, Toolkit, WindowStatistics};
-use crate::measure::ray_information::RayInformation;
-use crate::measure::region::{interpolated, region_radius};
 use crate::measure::scan::median_snr;
 use crate::plan::Plan;
+use crate::setup::estimators::{self, Toolkit, WindowStatistics};
+use crate::setup::ray_information::RayInformation;
+use crate::setup::region::{interpolated, region_radius};
 use ndarray::Array2;
 use rayon::prelude::*;
 use std::collections::HashMap;

@@ -1,47 +1,22 @@
 //! Efficiency and signal-to-noise ratio against range, by the cheapest model that is valid.
 //!
-//! Free space is a quadrature. Turbulence on independent paths (bistatic) has an exact mean at any strength.
-//! Only turbulence that both beams share (monostatic) needs phase screens.
-//!
 //! One function says the efficiency at a range, whoever asks. Check: signals, bound, budget and profile have the same, through any
 //! focus (`every_output_has_the_same_ratio_through_a_focus`).
 
 use crate::Error;
 use crate::measure::efficiencies::Known;
-use crate::measure::geometry::Geometry;
-use crate::measure::instrument::{Instrument, receiver_path};
-use crate::measure::progress::Observer;
-use crate::measure::table::{of_table, spaced};
 use crate::plan::{Plan, Stage};
-use crate::scene::{EfficiencyOfPulse, ReceiverPath, RefractiveTurbulence, Scene, SnrReference, Turbulence, hash_of};
+use crate::scene::{ReceiverPath, RefractiveTurbulence, Scene, SnrReference, hash_of};
+use crate::setup::efficiency_model::{OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence};
+use crate::setup::instrument::Instrument;
+use crate::setup::progress::Observer;
+use crate::setup::table::{of_table, spaced};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wakescope_optics::air::StructureTable;
-use wakescope_optics::plan::{DOUBTFUL_LOSS, Model, cheapest_model};
+use wakescope_optics::plan::{DOUBTFUL_LOSS, Model};
 use wakescope_optics::theory::{bistatic_efficiency_with, free_space_efficiency};
-use wakescope_optics::{Cn2Path, EfficiencyProfile, Misalignment, Stop, curved_ranges_m};
-
-/// The cheapest model of the efficiency that is valid for a scene.
-pub fn model(scene: &Scene) -> Model {
-    let cn2 = match turbulence(scene) {
-        None => Cn2Path::None,
-        Some(t) => Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 },
-    };
-    cheapest_model(receiver_path(scene), &cn2)
-}
-
-/// The turbulence of a scene, if there is any.
-pub fn turbulence(scene: &Scene) -> Option<RefractiveTurbulence> {
-    match scene.atmosphere.turbulence {
-        Turbulence::Refractive(t) if t.cn2_m_m23 > 0.0 => Some(t),
-        _ => None,
-    }
-}
-
-/// The turbulence of a scene whose pulses each have the efficiency of one realisation.
-pub(crate) fn drawn_turbulence(scene: &Scene) -> Option<RefractiveTurbulence> {
-    turbulence(scene).filter(|t| t.efficiency == EfficiencyOfPulse::Realisation)
-}
+use wakescope_optics::{EfficiencyProfile, Misalignment, Stop, curved_ranges_m};
 
 /// Efficiency (19) and signal-to-noise ratio (14) at the same ranges.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,7 +56,7 @@ pub(crate) fn profile_at(
     observer: &dyn Observer,
 ) -> Result<RangeProfile, Error> {
     let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
-    let model = self::model(scene);
+    let model = model(scene);
     let theory = efficiency_by_theory(instrument, range_m)?;
     let (mut others, mut lost_power_fraction) = (Vec::new(), None);
     let mut efficiency = theory.clone();
@@ -155,11 +130,6 @@ pub(crate) fn efficiency_by_theory(instrument: &Instrument, range_m: &[f64]) -> 
 
 /// Most ranges at which a quadrature is done for each.
 const MOST_QUADRATURES: usize = 256;
-/// How close the ranges of quadratures are where there are more: what is joined between them is within 0.005 dB.
-pub(crate) const OF_QUADRATURES: f64 = 12.0;
-/// How close those of phase screens are: ratios to theory bend less.
-pub(crate) const OF_SCREENS: f64 = 1.0;
-
 /// A quadrature at each range, or at as many as the curvature asks for where there are more.
 fn of_theory(
     instrument: &Instrument,
@@ -174,37 +144,6 @@ fn of_theory(
         }
         _ => Ok(EfficiencyProfile::from_theory(range_m, quadrature)?),
     }
-}
-
-/// Whether the signals take their efficiency from phase screens.
-pub(crate) fn signals_cross_screens(scene: &Scene) -> bool {
-    let of_signals = model(scene) == Model::MonteCarlo || drawn_turbulence(scene).is_some();
-    of_signals && !matches!(scene.detector.snr, SnrReference::Fixed { .. })
-}
-
-/// The stretches with phase screens of their own in which there are some of these ranges, m, increasing, with those ranges: the
-/// air of the signals, and what of the profile lies before it and behind it.
-pub(crate) fn stretches<'a>(scene: &Scene, g: &Geometry, mut range_m: &'a [f64]) -> Vec<([f64; 2], &'a [f64])> {
-    let o = &scene.outputs;
-    let [first_m, last_m] = [o.profile_range_min_m, o.profile_range_max_m];
-    let (near_m, far_m) = (g.first_layer_range_m, g.first_layer_range_m + g.layers as f64 * g.layer_thickness_m);
-    let all = match signals_cross_screens(scene) {
-        true => {
-            vec![[first_m, near_m.next_down().min(last_m)], [near_m, far_m], [far_m.next_up().max(first_m), last_m]]
-        }
-        false => vec![[first_m, last_m]],
-    };
-    let mut out = Vec::new();
-    // The profile need not reach beyond the signals.
-    for [from_m, to_m] in all.into_iter().filter(|[from_m, to_m]| from_m <= to_m) {
-        range_m = &range_m[range_m.partition_point(|r| *r < from_m)..];
-        let (inside, beyond) = range_m.split_at(range_m.partition_point(|r| *r <= to_m));
-        if !inside.is_empty() {
-            out.push(([from_m, to_m], inside));
-        }
-        range_m = beyond;
-    }
-    out
 }
 
 /// What phase screens give for both receivers.
@@ -354,10 +293,10 @@ mod tests {
     use super::*;
     use crate::measure::bound::bound;
     use crate::measure::budget::Budget;
-    use crate::measure::progress::Silent;
-    use crate::measure::run::run;
     use crate::plan::Target;
+    use crate::run::run;
     use crate::scene::SceneFile;
+    use crate::setup::progress::Silent;
     use std::path::Path;
 
     fn plan(telescope: &str, [from_m, to_m]: [f64; 2], more: &str, target: Target) -> Plan {

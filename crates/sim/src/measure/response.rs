@@ -3,12 +3,12 @@
 //! Check: circulations fitted to maps and signals of a pair, in the tests of sweeps and retrievals.
 
 use crate::Error;
-use crate::measure::estimators::{Response, response, sampling, signal_kind};
-use crate::measure::ray_information::RayInformation;
-use crate::measure::region::{places, region_radius};
 use crate::measure::scan::median_snr;
 use crate::plan::Plan;
 use crate::scene::{NoiseKind, PulseShape as Shape, Scene};
+use crate::setup::estimators::{Response, response, sampling, signal_kind};
+use crate::setup::ray_information::RayInformation;
+use crate::setup::region::{places, region_radius};
 use wakescope_estimate::Radius;
 use wakescope_estimate::bound::Noise;
 use wakescope_estimate::vortex_fit::{EstimatorResponse, PulseShape, ScanSetup, WakeModel};

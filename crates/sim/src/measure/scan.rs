@@ -1,16 +1,18 @@
 //! One scan: the air along each line of sight, and the signals that it returns.
 
 use crate::Error;
-use crate::beams::{Beam, Line};
-use crate::measure::air::{Air, LineAirs, air_along, beam_of_air, known_velocity_m_s, seen_into};
-use crate::measure::geometry::Geometry;
-use crate::measure::instrument::Instrument;
 use crate::measure::profile::Efficiencies;
-use crate::measure::profile::{drawn_turbulence, efficiency_by_theory, stretches};
-use crate::measure::progress::Observer;
-use crate::measure::streams::stream;
+use crate::measure::profile::efficiency_by_theory;
 use crate::plan::{Plan, Stage};
 use crate::scene::{DetectorSignal, Scene, SecondTrip, SnrReference};
+use crate::setup::air::{Air, LineAirs, air_along, beam_of_air, known_velocity_m_s, seen_into};
+use crate::setup::beams::{Beam, Line};
+use crate::setup::efficiency_model::{drawn_turbulence, stretches};
+use crate::setup::geometry::Geometry;
+use crate::setup::instrument::Instrument;
+use crate::setup::progress::Observer;
+use crate::setup::sizes::{AIRS_BYTES, records_at_once};
+use crate::setup::streams::stream;
 use ndarray::{Array2, ArrayView2};
 use rand_xoshiro::rand_core::Rng;
 use rayon::prelude::*;
@@ -302,18 +304,6 @@ pub(crate) fn median_snr(layer_snr: &[(f64, f64)]) -> f64 {
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
-
-/// Records that are in memory at a time: some ten megabytes of them, and enough for every thread.
-pub(crate) fn records_at_once<T>(samples: usize, pulses: usize) -> usize {
-    let record_bytes = samples.max(1) * size_of::<T>();
-    (PIECE_BYTES / record_bytes).max(rayon::current_num_threads()).min(pulses.max(1))
-}
-
-/// Size of a piece of records, bytes.
-const PIECE_BYTES: usize = 16 << 20;
-
-/// Size of the airs of a piece, where pulses have their own, bytes.
-pub(crate) const AIRS_BYTES: f64 = (64 << 20) as f64;
 
 /// What the layers of a line return.
 struct Returns {

@@ -3,10 +3,10 @@
 use crate::measure::cell_average::{CellAverage, flagged_fraction};
 use crate::measure::error_law::{ErrorLaw, ScanErrors};
 use crate::measure::map::VelocityEstimates;
-use crate::measure::progress::Silent;
-use crate::measure::run::run;
 use crate::plan::{Plan, Target};
+use crate::run::run;
 use crate::scene::{Scene, SceneFile, SnrReference};
+use crate::setup::progress::Silent;
 use ndarray::Array2;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};

@@ -3,10 +3,10 @@
 //! Check: the number that is warned of is that of the gates which a run leaves empty, and the remedy leaves none.
 
 use crate::Error;
-use crate::measure::geometry::Geometry;
-use crate::measure::region::places;
-use crate::measure::table::of_table;
 use crate::scene::{Method, RegionRadius, Scene};
+use crate::setup::geometry::Geometry;
+use crate::setup::region::places;
+use crate::setup::table::of_table;
 use wakescope_estimate::map::PolarPoint;
 
 /// A warning if a line has gates without a window. Regions as large as a standard deviation asks for are not looked at.
@@ -62,7 +62,7 @@ mod tests {
             let empty: usize = text.split(' ').next().unwrap().parse().unwrap();
             // by the distances themselves
             let (g, scene) = (&plan.geometry, &plan.scene.scene);
-            let places: ScanGeometry = crate::measure::region::places(scene, g).unwrap();
+            let places: ScanGeometry = crate::setup::region::places(scene, g).unwrap();
             let windows_m = places.gate_ranges_m();
             let near = |gate_m: &f64| windows_m.iter().any(|window_m| (window_m - gate_m).abs() <= radius_m + 1e-5);
             assert_eq!(empty, g.gate_range_m.iter().filter(|gate_m| !near(gate_m)).count(), "{text}");

@@ -2,10 +2,10 @@
 //!
 //! Check: the peaks of flows with known ones.
 
-use super::Plan;
 use crate::Error;
-use crate::measure::air::known_velocity_m_s;
-use crate::measure::table::spaced;
+use crate::setup::Setup;
+use crate::setup::air::known_velocity_m_s;
+use crate::setup::table::spaced;
 
 /// Lines and places along them at which the fastest air is looked for first.
 const MOST_LINES: usize = 1000;
@@ -15,15 +15,15 @@ const MOST_PLACES: usize = 100_000;
 ///
 /// # Errors
 /// What the wind refuses.
-pub(super) fn fastest_m_s(plan: &Plan) -> Result<f64, Error> {
-    let (scan, schedule, wind) = (&plan.scene.scene.scan, &plan.geometry.schedule, &plan.wind);
+pub(super) fn fastest_m_s(setup: &Setup) -> Result<f64, Error> {
+    let (scan, schedule, wind) = (&setup.scene.scene.scan, &setup.geometry.schedule, &setup.wind);
     let fastest_of = |line: usize, range_m: &[f64]| -> Result<(f64, f64), Error> {
         let mut beam = schedule.middle(line);
         if wind.max_speed_m_s > 0.0 {
             // Fields are not all read for this: what no node of them exceeds is known.
             beam.time_s = 0.0;
         }
-        let (points_m, velocity_m_s) = known_velocity_m_s(plan, &beam, range_m)?;
+        let (points_m, velocity_m_s) = known_velocity_m_s(setup, &beam, range_m)?;
         let seen =
             points_m.iter().zip(velocity_m_s).zip(range_m).filter(|((point, v), _)| point[2] >= 0.0 && !v.is_nan());
         let speeds = seen.map(|((_, v), range_m)| (v.abs(), *range_m));

@@ -4,9 +4,10 @@
 //! its data and two plans of the file, each with a copy. `cargo xtask forecast` compares the sums with what whole runs take.
 
 use super::sizes::{MAP_FIELDS, Sizes, is_calm};
-use super::stage::{PlannedStage, Stage, Target, run};
-use crate::measure::geometry::Geometry;
+use super::stage::{PlannedStage, Target, run};
 use crate::scene::Scene;
+use crate::setup::geometry::Geometry;
+use crate::setup::progress::Stage;
 
 // Unit costs on one core, s.
 const TABLE_NUMBER_S: f64 = 7e-8;
@@ -71,7 +72,7 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
         memory.picture(pictures, PROFILE_PIXELS, 0.0);
     }
     if target == Target::Run && o.flow && !is_calm(scene) {
-        let (ny, nz) = crate::measure::plane::POINTS;
+        let (ny, nz) = crate::setup::sizes::PLANE_POINTS;
         let points = (ny * nz) as f64;
         core_s += on(o.csv) * 8e-3 + on(netcdf) * 1e-3;
         memory.table(o.csv, points, 6.0);

@@ -4,11 +4,12 @@
 
 use super::Plan;
 use super::sizes::Sizes;
-use super::stage::{Forecast, PlannedStage, Stage, total};
+use super::stage::{Forecast, PlannedStage, total};
 use super::stages::{of_bound, stages};
 use super::units::bytes;
-use crate::measure::geometry::Geometry;
 use crate::scene::{Scene, ScreenSampling, Turbulence};
+use crate::setup::geometry::Geometry;
+use crate::setup::progress::Stage;
 use crate::{Error, machine};
 
 /// Part of the memory that is available which a run may take.
@@ -226,7 +227,7 @@ mod tests {
         let (few, many) = (memory(100, ""), memory(1_000_000, ""));
         assert!(many < 1.01 * few && many < 2e8, "{few} {many}");
         // Signals are kept once, in double precision.
-        let geometry = plan("").geometry;
+        let geometry = &plan("").geometry;
         let kept = 1e4 * (geometry.elevation_rad.len() * geometry.samples) as f64 * 8.0;
         let with_signals = memory(10_000, "signals = true\n");
         assert!((kept..1.1 * kept).contains(&with_signals), "{with_signals} {kept}");

@@ -2,8 +2,8 @@
 //!
 //! Check: each warning appears with what it warns of, and not without.
 
-use crate::measure::instrument::Instrument;
 use crate::scene::Scene;
+use crate::setup::instrument::Instrument;
 
 /// Warnings of Brillouin scattering and of ranges that the receiver does not see.
 pub(super) fn warnings(scene: &Scene, instrument: &Instrument) -> Vec<String> {

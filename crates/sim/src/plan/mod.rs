@@ -4,48 +4,42 @@
 //! forecasts are products of counts with unit costs; `cargo xtask forecast` holds them against what runs take.
 
 use crate::Error;
-use crate::measure::estimators::grid_step_and_bias_m_s;
-use crate::measure::geometry::Geometry;
-use crate::measure::instrument::Instrument;
-use crate::measure::wind::SceneWind;
-use crate::measure::write::Contents;
-use crate::scene::{Flow, Method, Scene, SceneFile, Weighting};
+use crate::scene::{Method, Scene, SceneFile, Weighting};
+use crate::setup::Setup;
+use crate::setup::estimators::grid_step_and_bias_m_s;
+use crate::setup::wind::SceneWind;
 use std::fmt;
+use std::ops::Deref;
 use std::sync::Arc;
 
 mod ambiguity;
 mod coverage;
 mod fastest;
+mod file_limits;
 mod files;
 mod fit;
 mod hardware;
 mod optics;
 mod possible;
-mod rehearsal;
 mod schedule;
 mod sizes;
 mod stage;
 mod stages;
 pub(crate) mod units;
 
+pub use crate::setup::progress::Stage;
 pub use schedule::ScanSchedule;
-pub use stage::{Cost, Forecast, PlannedStage, Stage, Target};
+pub use stage::{Cost, Forecast, PlannedStage, Target};
 
 /// What a run will do.
 #[derive(Debug)]
 pub struct Plan {
-    /// The scene, checked.
-    pub scene: SceneFile,
+    /// The scene and what is made of it.
+    pub setup: Setup,
     /// What was asked for.
     pub target: Target,
     /// All stages, in the order in which they run.
     pub stages: Vec<PlannedStage>,
-    /// The instrument and its air.
-    pub instrument: Instrument,
-    /// Sampling in angle, range and time.
-    pub geometry: Geometry,
-    /// The wind.
-    pub wind: Arc<SceneWind>,
     /// Largest radial velocity of the air on the lines of sight, seen from the lidar, m/s.
     pub fastest_m_s: f64,
     /// What the user should know before the run.
@@ -73,40 +67,21 @@ impl Plan {
     }
 
     fn made(scene: SceneFile, target: Target, wind: Arc<SceneWind>) -> Result<Self, Error> {
-        let instrument = Instrument::new(&scene.scene)?;
-        let geometry = Geometry::new(&scene, &instrument.pulse, &wind)?;
-        let last_s = end_s(&wind, &geometry);
-        if last_s > wind.end_s {
-            let (key, what) = match scene.scene.flow {
-                Flow::Fields(_) => ("flow.files", "fields"),
-                _ => ("flow.planes", "planes"),
-            };
-            let reason = format!(
-                "the scan ends at {last_s:.3} s of the flow, the {what} at {:.3} s: begin earlier, scan faster, or set \
-                 flow.motion = \"frozen\"",
-                wind.end_s
-            );
-            return Err(Error::Key { key, reason });
-        }
-        let mut warnings = warnings(&scene.scene)?;
-        warnings.extend(ambiguity::warning(&scene.scene, &instrument.pulse));
-        warnings.extend(hardware::warnings(&scene.scene, &instrument));
-        let optics = optics::stages(&scene, &instrument, target, &geometry, &mut warnings)?;
-        let stages = stages::stages(&scene.scene, target, &geometry, &wind, optics);
-        let mut plan = Self { scene, target, stages, instrument, geometry, wind, fastest_m_s: 0.0, warnings };
-        plan.fastest_m_s = fastest::fastest_m_s(&plan)?;
+        let setup = Setup::new(scene, wind)?;
+        let scene = &setup.scene.scene;
+        let mut warnings = warnings(scene)?;
+        warnings.extend(ambiguity::warning(scene, &setup.instrument.pulse));
+        warnings.extend(hardware::warnings(scene, &setup.instrument));
+        let optics = optics::stages(&setup.scene, &setup.instrument, target, &setup.geometry, &mut warnings)?;
+        let stages = stages::stages(scene, target, &setup.geometry, &setup.wind, optics);
+        let fastest_m_s = fastest::fastest_m_s(&setup)?;
+        let mut plan = Self { setup, target, stages, fastest_m_s, warnings };
         plan.warnings.splice(0..0, plan.of_fast_air());
         if plan.runs(Stage::Estimates) {
             plan.warnings.extend(coverage::warning(&plan.scene.scene, &plan.geometry)?);
         }
         possible::check(&plan)?;
-        crate::measure::write::check(&Contents {
-            scene: &plan.scene.scene,
-            geometry: &plan.geometry,
-            scan_s: (plan.wind.start_s, plan.scan_end_s()),
-            kept_realisations: plan.kept_realisations(),
-            has_map: plan.runs(Stage::Estimates),
-        })?;
+        file_limits::check(&plan)?;
         Ok(plan)
     }
 
@@ -122,11 +97,6 @@ impl Plan {
                 self.fastest_m_s
             )
         })
-    }
-
-    /// Time of the last line from the start of the flow, s.
-    pub fn scan_end_s(&self) -> f64 {
-        end_s(&self.wind, &self.geometry)
     }
 
     /// Forecast of the whole, with the threads of the pool in which it was planned.
@@ -155,8 +125,12 @@ impl Plan {
     }
 }
 
-fn end_s(wind: &SceneWind, geometry: &Geometry) -> f64 {
-    wind.start_s + geometry.line_time_s.last().copied().unwrap_or(0.0)
+impl Deref for Plan {
+    type Target = Setup;
+
+    fn deref(&self) -> &Setup {
+        &self.setup
+    }
 }
 
 /// What is allowed but probably not meant.
@@ -215,7 +189,7 @@ impl fmt::Display for Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{NoiseKind, RefractiveTurbulence, SnrReference, Turbulence};
+    use crate::scene::{Flow, NoiseKind, RefractiveTurbulence, SnrReference, Turbulence};
 
     fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
         let mut scene = Scene::default();

@@ -1,12 +1,13 @@
 //! The optics of a plan: phase screens only where no theory is valid, or where they are asked for beside it.
 
-use super::stage::{Cost, PlannedStage, Stage, Target};
+use super::stage::{Cost, PlannedStage, Target};
 use crate::Error;
-use crate::measure::geometry::Geometry;
-use crate::measure::instrument::Instrument;
-use crate::measure::profile::{OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, stretches, turbulence};
-use crate::measure::table::spaced;
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
+use crate::setup::efficiency_model::{OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, stretches, turbulence};
+use crate::setup::geometry::Geometry;
+use crate::setup::instrument::Instrument;
+use crate::setup::progress::Stage;
+use crate::setup::table::spaced;
 use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
 use wakescope_optics::{Focus, Telescope, curved_ranges_m, theory};
 

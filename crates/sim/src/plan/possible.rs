@@ -4,8 +4,8 @@
 
 use super::{Plan, Target};
 use crate::Error;
-use crate::measure::air::radial_velocity_m_s;
 use crate::scene::{Flow, Outside};
+use crate::setup::air::radial_velocity_m_s;
 use wakescope_estimate::wake_detection::WakeDetector;
 
 /// Refuses what a run of the plan would refuse: lines that leave a simulated flow, a test for a wake in a scan of a few velocities.

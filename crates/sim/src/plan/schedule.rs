@@ -39,7 +39,7 @@ impl Plan {
         let flows = || std::iter::once(&scene.flow).chain(&scene.added_flows);
         let pair = flows().find_map(|flow| if let Flow::VortexPair(pair) = flow { Some(pair) } else { None });
         let wake_moves_m = pair.map_or(f64::NAN, |pair| {
-            let sinks_m_s = crate::measure::wind::vortex_pair(pair).descent_speed_m_s();
+            let sinks_m_s = crate::setup::wind::vortex_pair(pair).descent_speed_m_s();
             // Across and up, at the place of the pair and in the mean over the time.
             let carries = |flow: &Flow| match flow {
                 Flow::Uniform { lateral_m_s, vertical_m_s } => [*lateral_m_s, *vertical_m_s],
@@ -55,7 +55,7 @@ impl Plan {
             let wind_m_s = flows().map(carries).fold([pair.cross_wind_m_s, 0.0], |a, b| [a[0] + b[0], a[1] + b[1]]);
             meanwhile_s * (wind_m_s[1] - sinks_m_s).hypot(wind_m_s[0])
         });
-        let turned = |line: &crate::beams::Line| {
+        let turned = |line: &crate::setup::beams::Line| {
             let fastest = line.rate_rad_s[0].abs().max(line.rate_rad_s[1].abs());
             fastest * line.pulses as f64 * scan.prt_s
         };

@@ -3,6 +3,8 @@
 //! Stages run one after another and free what they worked with, so memory is the largest over the stages of what the earlier
 //! ones keep and the stage itself holds. Check: sums by hand.
 
+use crate::setup::progress::Stage;
+
 /// What the user asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Target {
@@ -14,52 +16,6 @@ pub enum Target {
     Signal,
     /// The radial-velocity map with its errors.
     Map,
-}
-
-/// A part of the measurement that can run alone or be left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
-    /// Large-eddy simulation of the flow.
-    FlowSimulation,
-    /// Wind on a cross-plane, for the files.
-    CrossPlane,
-    /// Phase screens and beam propagation.
-    PhaseScreens,
-    /// Efficiency and SNR against range.
-    Efficiency,
-    /// Wind along the lines of sight.
-    LinesOfSight,
-    /// Heterodyne signals.
-    Signals,
-    /// Shot noise.
-    Noise,
-    /// Velocity estimates.
-    Estimates,
-    /// Estimates against the truth.
-    Errors,
-    /// Vortices from maps and signals.
-    Retrieval,
-    /// Tables and pictures.
-    Files,
-}
-
-impl Stage {
-    /// The name that plans, progress and summaries use.
-    pub fn name(self) -> &'static str {
-        match self {
-            Stage::FlowSimulation => "flow simulation",
-            Stage::CrossPlane => "cross-plane",
-            Stage::PhaseScreens => "phase screens",
-            Stage::Efficiency => "efficiency",
-            Stage::LinesOfSight => "lines of sight",
-            Stage::Signals => "signals",
-            Stage::Noise => "noise",
-            Stage::Estimates => "estimates",
-            Stage::Errors => "errors",
-            Stage::Retrieval => "retrieval",
-            Stage::Files => "files",
-        }
-    }
 }
 
 /// A stage with its decision.

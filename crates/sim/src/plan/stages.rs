@@ -5,11 +5,12 @@
 
 use super::files::files;
 use super::sizes::{MAP_FIELDS, Sizes, is_calm, keeps_few_lags};
-use super::stage::{PlannedStage, Stage, Target, run, skip};
-use crate::measure::geometry::Geometry;
-use crate::measure::scan::{AIRS_BYTES, records_at_once};
-use crate::measure::wind::SceneWind;
+use super::stage::{PlannedStage, Target, run, skip};
 use crate::scene::{Flow, Method, NoiseKind, RegionRadius, RetrievalMethod, Scene, WindOfPulses};
+use crate::setup::geometry::Geometry;
+use crate::setup::progress::Stage;
+use crate::setup::sizes::{AIRS_BYTES, records_at_once};
+use crate::setup::wind::SceneWind;
 
 // Unit costs on one core, s.
 const ANALYTIC_WIND_S: f64 = 7e-8;
@@ -82,7 +83,7 @@ fn retrieval(scene: &Scene, target: Target, n: &Sizes) -> Option<PlannedStage> {
     let signals = if of_signals.iter().any(|method| wanted.methods.contains(method)) { 3.0 } else { 0.0 };
     let working =
         n.cells * 8.0 * (n.realisations + RETRIEVED_NUMBERS) + signals * n.records * n.samples * n.parts * 8.0;
-    let names: Vec<&str> = wanted.methods.iter().map(|method| crate::retrieve::summary::name(*method)).collect();
+    let names: Vec<&str> = wanted.methods.iter().map(|method| method.name()).collect();
     let reason = format!("{} scans by {}", n.realisations, names.join(", "));
     let kept = n.realisations * wanted.methods.len() as f64 * 600.0;
     Some(run(Stage::Retrieval, reason, n.realisations * scan_s + test_s, [working, kept]))
@@ -107,7 +108,7 @@ fn cross_plane(scene: &Scene, target: Target) -> PlannedStage {
     if is_calm(scene) {
         return skip(Stage::CrossPlane, "flow.kind is \"calm\"");
     }
-    let (ny, nz) = crate::measure::plane::POINTS;
+    let (ny, nz) = crate::setup::sizes::PLANE_POINTS;
     let points = (ny * nz) as f64;
     // Places and velocities are at work; two components are kept.
     run(Stage::CrossPlane, format!("{ny} x {nz} points"), points * wind_point_s(scene), [points * 48.0, points * 16.0])

@@ -5,9 +5,9 @@
 use crate::Error;
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::io::scans::ReadScan;
-use crate::measure::estimators;
-use crate::measure::instrument::Instrument;
 use crate::scene::Scene;
+use crate::setup::estimators;
+use crate::setup::instrument::Instrument;
 use wakescope_estimate::retrieval::Gate;
 use wakescope_estimate::vortex_fit::RangeKernel;
 

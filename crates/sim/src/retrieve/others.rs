@@ -5,10 +5,10 @@
 use super::retrieved_scan::{RetrievedScan, refused};
 use crate::Error;
 use crate::io::Table;
-use crate::measure::estimators;
 use crate::measure::recorded::Spectra;
 use crate::plan::Plan;
 use crate::scene::PulseShape;
+use crate::setup::estimators;
 use ndarray::Array3;
 use std::ops::Range;
 use wakescope_estimate::Weighting;

@@ -6,12 +6,12 @@ use super::retrieved_scan::{RetrievedScan, refused};
 use crate::Error;
 use crate::io::raw::RawRecords;
 use crate::io::scans::ReadScan;
-use crate::measure::progress::Observer;
 use crate::measure::recorded::{FromParts, MeasuredScan};
 use crate::measure::response::{SceneResponse, gate_step, spacing_m};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Target};
 use crate::scene::{DetectorSignal, Scene, SceneFile};
+use crate::setup::progress::Observer;
 use ndarray::{Array2, ArrayView2, Axis};
 use num_complex::Complex;
 use wakescope_estimate::retrieval::{

@@ -87,7 +87,7 @@ impl SceneRetrieval {
         let all = self.errors();
         let column = |get: fn(&RetrievalErrors) -> f64| all.iter().map(get).collect::<Vec<_>>();
         Table::new()
-            .text("method", all.iter().map(|e| name(e.method)))
+            .text("method", all.iter().map(|e| e.method.name()))
             .text("side", all.iter().map(|e| side_name(e.side)))
             .text("quantity", all.iter().map(|e| e.quantity))
             .float("truth", column(|e| e.truth))
@@ -109,7 +109,7 @@ impl SceneRetrieval {
             table = table.int("sweep", self.rows.iter().map(|row| row.sweep as i64));
         }
         table = table
-            .text("method", self.rows.iter().map(|row| name(row.method)))
+            .text("method", self.rows.iter().map(|row| row.method.name()))
             .text("side", self.rows.iter().map(|row| side_name(row.side)))
             .float("time_s", number(&|row| row.found.map_or(row.truth.time_s, |v| v.time_s)));
         for (quantity, found, truth) in QUANTITIES {
@@ -127,17 +127,6 @@ impl SceneRetrieval {
             .float("statistic", number(&|row| of_test(row).0))
             .float("threshold", number(&|row| of_test(row).1))
             .text("flags", self.rows.iter().map(|row| row.flags.clone()))
-    }
-}
-
-/// The name of a method in scenes and tables.
-pub(crate) fn name(method: Method) -> &'static str {
-    match method {
-        Method::Fit => "fit",
-        Method::Signals => "signals",
-        Method::Rv => "rv",
-        Method::Envelope => "envelope",
-        Method::Integral => "integral",
     }
 }
 

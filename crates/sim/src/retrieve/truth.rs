@@ -5,9 +5,9 @@
 //! pair's own vortices, found in its wind as if that were simulated.
 
 use crate::Error;
-use crate::measure::wind::vortex_pair;
 use crate::plan::Plan;
 use crate::scene::{Flow, VortexProfile};
+use crate::setup::wind::vortex_pair;
 use wakescope_estimate::retrieval::Side;
 use wakescope_estimate::vortex_fit::{CoreProfile, Vortex, Wake};
 use wakescope_les::analysis::mean_circulation_5_15_m2_s;

@@ -114,13 +114,13 @@ impl Scene {
         }
         // What is a profile of the air, or a sampled pulse, the simulation of signals knows best.
         if c.is_good()
-            && let Err(e) = crate::measure::instrument::medium(&self.atmosphere)
+            && let Err(e) = crate::setup::instrument::medium(&self.atmosphere)
         {
             c.refuse("atmosphere.profile", "", e.to_string());
         }
         if c.is_good()
             && matches!(self.pulse.shape, PulseShape::Sampled(_))
-            && let Err(e) = crate::measure::instrument::pulse(&self.pulse)
+            && let Err(e) = crate::setup::instrument::pulse(&self.pulse)
         {
             c.refuse("pulse.shape", "", e.to_string());
         }
@@ -159,7 +159,7 @@ impl Scene {
     pub fn pulse_sigma_s(&self) -> f64 {
         match &self.pulse.shape {
             PulseShape::Sampled(_) => {
-                crate::measure::instrument::pulse(&self.pulse).map_or(f64::NAN, |pulse| pulse.sigma_s())
+                crate::setup::instrument::pulse(&self.pulse).map_or(f64::NAN, |pulse| pulse.sigma_s())
             }
             PulseShape::Gaussian(shape) => match shape.definition {
                 super::PulseDefinition::Fwhm => shape.duration_s / (2.0 * std::f64::consts::LN_2.sqrt()),
@@ -178,7 +178,7 @@ impl Scene {
 
     /// How far before the range of a sample air contributes to it, c/2 times the last time of the pulse, m.
     pub fn pulse_reach_m(&self) -> f64 {
-        crate::measure::instrument::pulse(&self.pulse)
+        crate::setup::instrument::pulse(&self.pulse)
             .map_or(f64::NAN, |pulse| 0.5 * crate::SPEED_OF_LIGHT_M_S * pulse.support_s().1)
     }
 }

@@ -75,7 +75,7 @@ fn check_lines(lines: &VortexLines, at: &str, c: &mut Checker<'_>) {
     c.require(axial, &key("axial_deficit_m_s"), lines.axial_deficit_m_s, allowed);
     if fits
         && c.is_good()
-        && let Err(e) = crate::measure::wind::vortex_lines(lines)
+        && let Err(e) = crate::setup::wind::vortex_lines(lines)
     {
         c.refuse(&key("nodes_m"), "", e.to_string());
     }

@@ -78,9 +78,9 @@ mod tests {
     use super::*;
     use crate::measure::budget::{Budget, scan_ranges_m};
     use crate::measure::profile::range_profile;
-    use crate::measure::progress::Silent;
     use crate::plan::{Plan, Target};
     use crate::scene::{Scene, SceneFile};
+    use crate::setup::progress::Silent;
     use std::path::Path;
 
     #[test]

@@ -1,8 +1,8 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
 use super::{Flow, NoiseKind, Pattern, PulseShape, Scan, Scene, Weighting};
-use crate::beams::direction::sin_cos_of_turn;
 use crate::keys::Checker;
+use crate::setup::beams::direction::sin_cos_of_turn;
 use serde::{Deserialize, Serialize};
 
 /// How circulations are found.
@@ -21,6 +21,19 @@ pub enum RetrievalMethod {
     Envelope,
     /// Fit to the map, and circulation against radius by integrals over the map beside it.
     Integral,
+}
+
+impl RetrievalMethod {
+    /// The name in scenes and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fit => "fit",
+            Self::Signals => "signals",
+            Self::Rv => "rv",
+            Self::Envelope => "envelope",
+            Self::Integral => "integral",
+        }
+    }
 }
 
 section! {

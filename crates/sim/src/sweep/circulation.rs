@@ -5,9 +5,9 @@
 
 use crate::measure::response::{SceneResponse, gate_step, spacing_m};
 use crate::measure::scan::Scanner;
-use crate::measure::wind::vortex_pair;
 use crate::plan::Plan;
 use crate::scene::{Flow, VortexPair, VortexProfile};
+use crate::setup::wind::vortex_pair;
 use ndarray::Array2;
 use wakescope_estimate::map::ErrorStatistics;
 use wakescope_estimate::vortex_fit::{

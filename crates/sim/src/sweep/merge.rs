@@ -7,7 +7,7 @@ use super::stored::{Definition, Row, SWEEP, stored};
 use super::tables;
 use crate::Error;
 use crate::io::Existing;
-use crate::measure::write::put;
+use crate::write::put;
 use std::path::{Path, PathBuf};
 
 /// Writes the tables of a sweep whose cases are all in some folders, of shards or of a whole run; returns the paths.

@@ -7,12 +7,12 @@ use crate::Error;
 use crate::measure::bound::BoundPoint;
 use crate::measure::cell_average::{CellAverage, error_of_fraction, flagged_fraction};
 use crate::measure::error_law::{range_filter, shared_cells};
-use crate::measure::estimators;
 use crate::measure::map::VelocityEstimates;
-use crate::measure::run::ScanMiddle;
-use crate::measure::wind::vortex_pair;
 use crate::plan::Plan;
+use crate::run::ScanMiddle;
 use crate::scene::{Flow, Scene};
+use crate::setup::estimators;
+use crate::setup::wind::vortex_pair;
 use ndarray::Array2;
 
 /// Cells within this part of the spacing of a pair from a centre are inside its vortices: 8 m of 47.

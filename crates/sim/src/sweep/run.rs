@@ -11,12 +11,13 @@ use crate::io::{Existing, Table};
 use crate::measure::efficiencies::Known;
 use crate::measure::map::VelocityEstimates;
 use crate::measure::profile::Efficiencies;
-use crate::measure::progress::Observer;
-use crate::measure::wind::SceneWind;
-use crate::measure::write::prepare_among_others;
 use crate::plan::units::seconds;
 use crate::plan::{Plan, Target};
+use crate::rehearsal::rehearse;
 use crate::scene::{Estimator, Outputs, Scene, SceneFile, Site, WindOfPulses, hash_of};
+use crate::setup::progress::Observer;
+use crate::setup::wind::SceneWind;
+use crate::write::prepare_among_others;
 use crate::{Error, machine};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -177,7 +178,7 @@ fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<V
         if !allow_large {
             plan.fits()?;
         }
-        plan.rehearse()?;
+        rehearse(&plan)?;
         Ok(plan.total().core_s)
     };
     let found: Vec<_> = sweep.cases.par_iter().map(checked).collect();

@@ -8,7 +8,7 @@ use super::key_path::Takes;
 use super::results::RESULTS;
 use crate::Error;
 use crate::io::{Existing, FileGroup, Provenance, csv::float_text, write_atomic};
-use crate::measure::write::{put, scene_text};
+use crate::write::{put, scene_text};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 

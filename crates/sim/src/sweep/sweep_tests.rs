@@ -2,9 +2,9 @@
 
 use super::pareto::{Objective, Place, Sense, front};
 use super::*;
-use crate::measure::progress::Observer;
 use crate::plan::Stage;
 use crate::scene::{Scene, SceneFile, Weighting};
+use crate::setup::progress::Observer;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::path::Path;
@@ -62,7 +62,7 @@ fn constant_mean_power_gives_the_stored_energies_pulses_and_ratios() {
         let scene = &case.scene.scene;
         assert_eq!(scene.pulse.energy_j.to_bits(), of("energy_j").to_bits());
         assert_eq!(scene.scan.pulses_per_line as f64, of("pulses"));
-        let instrument = crate::measure::instrument::Instrument::new(scene).unwrap();
+        let instrument = crate::setup::instrument::Instrument::new(scene).unwrap();
         let efficiency = wakescope_optics::theory::free_space_efficiency(&instrument.telescope, 400.0).unwrap();
         let back_per_m = instrument.return_per_m(400.0).unwrap() * efficiency;
         let snr_db = 10.0 * instrument.receiver.slowly_varying_snr(scene.pulse.energy_j, back_per_m).log10();
@@ -97,8 +97,8 @@ fn resolution_is_the_stored_one() {
             "hann" => Weighting::Hann,
             _ => Weighting::Gaussian,
         };
-        let pulse = crate::measure::instrument::pulse(&scene.pulse).unwrap();
-        let window = crate::measure::estimators::weighting(&scene).weights(number(1) as usize).unwrap();
+        let pulse = crate::setup::instrument::pulse(&scene.pulse).unwrap();
+        let window = crate::setup::estimators::weighting(&scene).weights(number(1) as usize).unwrap();
         let filter = RangeFilter::gate(&pulse, &window, number(2), 0.3).unwrap();
         // The stored width is interpolated on a grid.
         for (found, expected, within) in
@@ -262,7 +262,7 @@ fn results_are_those_of_the_map_of_the_case() {
     let (_, _, table) = ran(SMALL, &vary(&["pulse.energy_j=150e-6"]));
     let plan = crate::plan::Plan::new(SceneFile::parse(SMALL, Path::new("s.toml")).unwrap(), crate::plan::Target::Map)
         .unwrap();
-    let result = crate::measure::run::run(&plan, &crate::Silent).unwrap();
+    let result = crate::run::run(&plan, &crate::Silent).unwrap();
     let of = |name: &str| table.number(0, table.column(name).unwrap());
     assert_eq!(of("snr_db"), result.middle.as_ref().unwrap().snr_db);
     // What both call a standard deviation, a root mean square error, is one number.

@@ -1,10 +1,10 @@
 //! A real receiver in a scene: what its keys do to whole runs, and what `wakescope budget` prints.
 
 use std::path::Path;
-use wakescope_sim::measure::progress::Silent;
-use wakescope_sim::measure::run::{RunResult, run};
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::run::{RunResult, run};
 use wakescope_sim::scene::SceneFile;
+use wakescope_sim::setup::progress::Silent;
 
 fn plan(words: &str, target: Target) -> Plan {
     let text = format!(

@@ -6,9 +6,9 @@ use std::path::Path;
 use wakescope_sim::io::Existing;
 use wakescope_sim::measure::beam_winds::beam_winds;
 use wakescope_sim::measure::map::VelocityEstimates;
-use wakescope_sim::measure::write::write;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::scene::SceneFile;
+use wakescope_sim::write::write;
 use wakescope_sim::{Error, Silent, run};
 
 /// A scene with few lines at 10 dB; the words in capitals are replaced.

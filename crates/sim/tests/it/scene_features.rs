@@ -4,12 +4,12 @@ use ndarray::Array2;
 use num_complex::Complex;
 use std::path::Path;
 use wakescope_estimate::{Scratch, SignalKind, window::Sample};
-use wakescope_sim::measure::estimators::{self, Toolkit, WindowStatistics};
 use wakescope_sim::measure::map::VelocityEstimates;
-use wakescope_sim::measure::progress::Silent;
-use wakescope_sim::measure::run::{RunResult, run};
 use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::run::{RunResult, run};
 use wakescope_sim::scene::{NoiseKind, SceneFile};
+use wakescope_sim::setup::estimators::{self, Toolkit, WindowStatistics};
+use wakescope_sim::setup::progress::Silent;
 
 /// A scene with a few lines; the pieces replace the words in capitals.
 const SCENE: &str = r#"

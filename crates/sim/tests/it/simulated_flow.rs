@@ -6,10 +6,10 @@ use wakescope_les::winds::{Edges, OutsidePolicy, PlaneMesh, Side};
 use wakescope_les::{GridSnapshot, Wind};
 use wakescope_sim::flow::{Begin, CaseFile, Unwatched};
 use wakescope_sim::measure::map::VelocityEstimates;
-use wakescope_sim::measure::progress::Silent;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::scene::SceneFile;
-use wakescope_sim::{Error, measure::run};
+use wakescope_sim::setup::progress::Silent;
+use wakescope_sim::{Error, run};
 
 /// A pair over a sticky ground in the units of b0 and V0, three planes.
 const CASE: &str = r#"

@@ -10,12 +10,13 @@ mod text;
 pub use limits::Limits;
 
 use crate::Error;
-use crate::measure::instrument::Instrument;
 use crate::measure::profile::Efficiencies;
-use crate::measure::profile::{efficiency_at, efficiency_by_theory, free_space, turbulence};
-use crate::measure::progress::Observer;
+use crate::measure::profile::{efficiency_at, efficiency_by_theory, free_space};
 use crate::plan::Plan;
 use crate::scene::{Digitiser, FrontEnd, Scene, SnrReference};
+use crate::setup::efficiency_model::turbulence;
+use crate::setup::instrument::Instrument;
+use crate::setup::progress::Observer;
 use digits::{scientific, si};
 use std::f64::consts::{LN_2, PI};
 
@@ -283,9 +284,9 @@ fn second_trip_db(scene: &Scene, instrument: &Instrument, range_m: f64) -> Resul
 mod tests {
     use super::*;
     use crate::measure::profile::range_profile;
-    use crate::measure::progress::Silent;
     use crate::plan::Target;
     use crate::scene::{ReceiverPath, RefractiveTurbulence, SceneFile, SecondTrip, Turbulence};
+    use crate::setup::progress::Silent;
 
     fn budget(text: &str, range_m: &[f64]) -> Budget {
         let file = SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap();

@@ -5,13 +5,13 @@
 
 use crate::Error;
 use crate::io::Table;
-use crate::measure::estimators::{ExpectedBias, WindowStatistics};
 use crate::measure::map::VelocityEstimates;
-use crate::measure::ray_information::RayInformation;
-use crate::measure::region::places;
-use crate::measure::table::of_table;
 use crate::plan::Plan;
 use crate::scene::NoiseKind;
+use crate::setup::estimators::{ExpectedBias, WindowStatistics};
+use crate::setup::ray_information::RayInformation;
+use crate::setup::region::places;
+use crate::setup::table::of_table;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry};
 use wakescope_estimate::polar_points;
 
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
     use crate::plan::Target;
     use crate::scene::SceneFile;
-    use crate::{Silent, measure::bound::bound, measure::run::run};
+    use crate::{Silent, measure::bound::bound, run::run};
 
     /// Air of 6 m/s along four lines that share nothing, at 10 dB.
     fn plan(detector: &str, estimator: &str) -> Plan {

@@ -5,10 +5,10 @@
 use super::cells::ScanCells;
 use crate::Error;
 use crate::io::OutputError;
-use crate::measure::estimators;
 use crate::measure::map_estimator::MapEstimator;
 use crate::plan::Plan;
 use crate::scene::{Method, Scene, Weighting};
+use crate::setup::estimators;
 use ndarray::ArrayView2;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry};
 use wakescope_estimate::spectrum::LagSpectrum;

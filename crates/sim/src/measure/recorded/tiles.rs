@@ -136,9 +136,9 @@ fn within(lines: &ScanLines, some: &Range<usize>, reach_rad: f64) -> Range<usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::estimators;
     use crate::plan::{Plan, Target};
     use crate::scene::SceneFile;
+    use crate::setup::estimators;
     use wakescope_estimate::map::PolarPoint;
 
     /// Lines a milliradian apart, records of so many samples.

@@ -1,17 +1,14 @@
 //! Writes what a run gives: all files of a run appear together, or none.
 
-mod limits;
 mod map;
 #[cfg(feature = "plots")]
 mod pictures;
 mod recorded;
 
-pub use limits::{Contents, check};
 pub use map::velocity_map;
 pub use recorded::{recorded_names, write_recorded};
 
 use crate::Error;
-use crate::beams::{Schedule, SweepMode};
 #[cfg(feature = "plots")]
 use crate::io::OutputError;
 use crate::io::atomic::try_folder;
@@ -21,9 +18,10 @@ use crate::io::signals::{LineVelocities, RawSignals, Recording};
 use crate::io::{Existing, FileGroup, Provenance, Table, VelocityMap, hpl, tables};
 use crate::measure::beam_winds;
 use crate::measure::profile::RangeProfile;
-use crate::measure::run::RunResult;
 use crate::plan::{Plan, Stage, Target};
+use crate::run::RunResult;
 use crate::scene::{DetectorSignal, NoiseKind, Pattern, SceneFile};
+use crate::setup::beams::{Schedule, SweepMode};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 

@@ -1,38 +1,23 @@
 //! What the files of a plan can hold, found before anything is computed.
 //! Check: scenes whose results no file can hold are refused, with the key and what would do.
 
+use super::{Plan, Stage};
 use crate::Error;
 use crate::io::UtcTime;
 use crate::io::hpl::within_a_day;
-use crate::measure::geometry::Geometry;
 #[cfg(feature = "netcdf")]
 use crate::scene::DetectorSignal;
-use crate::scene::Scene;
-
-/// What of a run goes into files.
-#[derive(Debug, Clone, Copy)]
-pub struct Contents<'a> {
-    /// The scene, checked.
-    pub scene: &'a Scene,
-    /// Its lines, samples and gates.
-    pub geometry: &'a Geometry,
-    /// Times of the first and the last line from the start of the flow, s.
-    pub scan_s: (f64, f64),
-    /// Realisations whose raw signals are kept.
-    pub kept_realisations: usize,
-    /// Whether there is a map.
-    pub has_map: bool,
-}
 
 /// Refuses results that do not fit into the files that their scene asks for.
 ///
 /// # Errors
 /// The key, the size or the times, and what is allowed.
-pub fn check(contents: &Contents<'_>) -> Result<(), Error> {
-    let Contents { scene, scan_s: (first_s, last_s), has_map, .. } = *contents;
+pub(super) fn check(plan: &Plan) -> Result<(), Error> {
+    let (scene, has_map) = (&plan.scene.scene, plan.runs(Stage::Estimates));
+    let (first_s, last_s) = (plan.wind.start_s, plan.scan_end_s());
     #[cfg(feature = "netcdf")]
     if scene.outputs.netcdf {
-        let (g, kept_realisations) = (contents.geometry, contents.kept_realisations);
+        let (g, kept_realisations) = (&plan.geometry, plan.kept_realisations());
         let rays = g.elevation_rad.len() as f64;
         if kept_realisations > 0 {
             let pulses = rays * (scene.scan.pulses_per_line * kept_realisations) as f64;

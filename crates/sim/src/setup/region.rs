@@ -2,11 +2,11 @@
 //!
 //! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
 
-use crate::measure::geometry::Geometry;
-use crate::measure::ray_information::RayInformation;
-use crate::measure::table::of_table;
 use crate::scene::{Method, RegionRadius, Scene};
-use crate::{Error, measure::estimators};
+use crate::setup::geometry::Geometry;
+use crate::setup::ray_information::RayInformation;
+use crate::setup::table::of_table;
+use crate::{Error, setup::estimators};
 use ndarray::Array2;
 use wakescope_estimate::{
     Radius,

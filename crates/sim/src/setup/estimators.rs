@@ -1,12 +1,12 @@
 //! The estimator of a scene in the words of `estimate`: statistic of the windows, estimator of their mean, models of both.
 
 use crate::Error;
-use crate::measure::instrument::Instrument;
-use crate::measure::table::{of_table, spaced};
 use crate::scene::{
     CorrelogramForm, DetectorSignal, Estimator as Words, GradientLikelihood, Method, ModelOrder, NoiseKind,
     OrderChoice, PulseShape, Refinement, Scene, Weighting,
 };
+use crate::setup::instrument::Instrument;
+use crate::setup::table::{of_table, spaced};
 use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate as estimate;

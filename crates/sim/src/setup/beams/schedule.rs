@@ -7,7 +7,7 @@
 use super::direction::Direction;
 use super::head::Head;
 use super::path::{Angles, Path, SweepMode, SweepPath};
-use crate::measure::streams::stream;
+use crate::setup::streams::stream;
 use rand_xoshiro::rand_core::Rng;
 use std::f64::consts::TAU;
 

@@ -7,8 +7,8 @@ use super::{add_halo, provenance, put, scene_text};
 use crate::Error;
 use crate::io::{Existing, FileGroup, VelocityMap, tables};
 use crate::measure::recorded::{Recorded, measured_map, predicted_table};
-use crate::measure::run::RunResult;
 use crate::plan::{Plan, Stage};
+use crate::run::RunResult;
 use std::path::{Path, PathBuf};
 
 const SPECTRA: &str = "spectra.nc";

@@ -3,10 +3,10 @@
 //! Check: a right-handed file with one vortex comes out unmirrored; a field off the cross-plane is what it says.
 
 use crate::Error;
-use crate::beams::direction::sin_cos_of_turn;
 use crate::io::fields_input::{FieldPlace, periods_m, places, read, read_scalar};
 use crate::io::planes_input::files;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
+use crate::setup::beams::direction::sin_cos_of_turn;
 use wakescope_les::winds::{Edges, Side, VolumeComponent, VolumeSeries, VolumeSnapshot};
 use wakescope_les::{Error as LesError, Wind};
 

@@ -2,10 +2,10 @@
 //!
 //! Check: the stored bound of one window; estimates of whole regions, which no bound may pass.
 
-use crate::measure::estimators;
-use crate::measure::table::of_table;
-use crate::plan::Plan;
 use crate::scene::NoiseKind;
+use crate::setup::Setup;
+use crate::setup::estimators;
+use crate::setup::table::of_table;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_estimate::{Gates, bound::RecordModel};
 use wakescope_signal::RangeFilter;
@@ -35,8 +35,8 @@ impl RayInformation {
     ///
     /// # Errors
     /// What the crates refuse; a checked scene gives none.
-    pub(crate) fn new(plan: &Plan, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
-        let (scene, g, pulse) = (&plan.scene.scene, &plan.geometry, &plan.instrument.pulse);
+    pub(crate) fn new(setup: &Setup, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
+        let (scene, g, pulse) = (&setup.scene.scene, &setup.geometry, &setup.instrument.pulse);
         let (layer_m, layer_snr) = layer_snr.iter().copied().unzip();
         Ok(Self {
             model: estimators::record_model(scene, pulse)?,

@@ -3,10 +3,10 @@
 //! Check: the truth of a line is the mean over its pulses; a cloud that the flow carries weighs the velocities that are seen.
 
 use crate::Error;
-use crate::beams::Beam;
-use crate::measure::geometry::Geometry;
-use crate::plan::Plan;
 use crate::scene::{Outside, WindOfPulses};
+use crate::setup::Setup;
+use crate::setup::beams::Beam;
+use crate::setup::geometry::Geometry;
 use wakescope_signal::RangeFilter;
 
 /// The air of the layers along a beam.
@@ -50,10 +50,10 @@ pub(crate) fn seen_into(
 }
 
 /// The beam in the middle of the pulses that share an air of a line.
-pub(crate) fn beam_of_air(plan: &Plan, line: usize, air: usize) -> Beam {
-    let schedule = &plan.geometry.schedule;
+pub(crate) fn beam_of_air(setup: &Setup, line: usize, air: usize) -> Beam {
+    let schedule = &setup.geometry.schedule;
     let pulses = schedule.lines[line].pulses;
-    let airs = plan.scene.scene.scan.wind_of_pulses.of_line(pulses);
+    let airs = setup.scene.scene.scan.wind_of_pulses.of_line(pulses);
     if airs == pulses {
         return schedule.beam_of_pulse(line, air);
     }
@@ -67,26 +67,26 @@ pub(crate) type LineAir = (Air, Option<Vec<f64>>);
 
 /// What the air of lines is made with.
 pub(crate) struct LineAirs<'a> {
-    plan: &'a Plan,
+    setup: &'a Setup,
     ranges_m: Vec<f64>,
     filter: RangeFilter,
 }
 
 impl<'a> LineAirs<'a> {
-    pub(crate) fn new(plan: &'a Plan) -> Result<Self, Error> {
-        let g = &plan.geometry;
-        let filter = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
-        Ok(Self { plan, ranges_m: g.layer_range_m().collect(), filter })
+    pub(crate) fn new(setup: &'a Setup) -> Result<Self, Error> {
+        let g = &setup.geometry;
+        let filter = RangeFilter::pulse(&setup.instrument.pulse, g.layer_thickness_m)?;
+        Ok(Self { setup, ranges_m: g.layer_range_m().collect(), filter })
     }
 
     /// The air in the middle of a line, or the mean over its pulses if they have airs of their own.
     pub(crate) fn of_line(&self, line: usize) -> Result<LineAir, Error> {
-        let (plan, g) = (self.plan, &self.plan.geometry);
+        let (setup, g) = (self.setup, &self.setup.geometry);
         let schedule = &g.schedule;
         let pulses = schedule.lines[line].pulses;
-        let of = plan.scene.scene.scan.wind_of_pulses;
+        let of = setup.scene.scene.scan.wind_of_pulses;
         if of == WindOfPulses::default() {
-            return Ok((air_along(plan, &schedule.middle(line), &self.ranges_m)?, None));
+            return Ok((air_along(setup, &schedule.middle(line), &self.ranges_m)?, None));
         }
         let airs = of.of_line(pulses);
         let mut sums_m_s = vec![0.0; self.ranges_m.len()];
@@ -96,7 +96,7 @@ impl<'a> LineAirs<'a> {
         let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
         for air in 0..airs {
             let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64 / pulses as f64;
-            let here = air_along(plan, &beam_of_air(plan, line, air), &self.ranges_m)?;
+            let here = air_along(setup, &beam_of_air(setup, line, air), &self.ranges_m)?;
             here.seen_into(&self.filter, g, &mut seen_m_s)?;
             // About the first air, so that the mean of equal airs is that air.
             if air == 0 {
@@ -132,32 +132,32 @@ impl<'a> LineAirs<'a> {
 
 /// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
 /// returns light: below the ground or outside the flow, if the scene masks that.
-pub(crate) fn radial_velocity_m_s(plan: &Plan, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
-    let beam = plan.geometry.schedule.middle(line);
-    let (points_m, known_m_s) = known_velocity_m_s(plan, &beam, range_m)?;
-    velocity_of(plan, &beam, range_m, &points_m, known_m_s)
+pub(crate) fn radial_velocity_m_s(setup: &Setup, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+    let beam = setup.geometry.schedule.middle(line);
+    let (points_m, known_m_s) = known_velocity_m_s(setup, &beam, range_m)?;
+    velocity_of(setup, &beam, range_m, &points_m, known_m_s)
 }
 
 /// The air along a beam.
-pub(crate) fn air_along(plan: &Plan, beam: &Beam, range_m: &[f64]) -> Result<Air, Error> {
-    let (points_m, known_m_s) = known_velocity_m_s(plan, beam, range_m)?;
-    let radial_velocity_m_s = velocity_of(plan, beam, range_m, &points_m, known_m_s)?;
-    let mut backscatter_per_m_sr = plan.wind.backscatter_per_m_sr(&points_m, plan.wind.start_s + beam.time_s)?;
+pub(crate) fn air_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Air, Error> {
+    let (points_m, known_m_s) = known_velocity_m_s(setup, beam, range_m)?;
+    let radial_velocity_m_s = velocity_of(setup, beam, range_m, &points_m, known_m_s)?;
+    let mut backscatter_per_m_sr = setup.wind.backscatter_per_m_sr(&points_m, setup.wind.start_s + beam.time_s)?;
     for (beta, range_m) in backscatter_per_m_sr.iter_mut().flatten().zip(range_m).filter(|(beta, _)| beta.is_nan()) {
-        *beta = plan.instrument.backscatter_per_m_sr(*range_m)?;
+        *beta = setup.instrument.backscatter_per_m_sr(*range_m)?;
     }
     Ok(Air { radial_velocity_m_s, backscatter_per_m_sr })
 }
 
 /// The velocities of a beam with what the scene says of places where the flow is not known.
 fn velocity_of(
-    plan: &Plan,
+    setup: &Setup,
     beam: &Beam,
     range_m: &[f64],
     points_m: &[[f64; 3]],
     known_m_s: Vec<f64>,
 ) -> Result<Vec<f64>, Error> {
-    let scan = &plan.scene.scene.scan;
+    let scan = &setup.scene.scene.scan;
     let elevation_rad = beam.elevation_rad;
     let checked = |((&[x_m, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
         let outside = match (z_m < 0.0, known_m_s.is_nan()) {
@@ -177,13 +177,13 @@ fn velocity_of(
 
 /// Places along a beam, m, and the radial velocity of the flow there, m/s; NaN where it is not known.
 pub(crate) fn known_velocity_m_s(
-    plan: &Plan,
+    setup: &Setup,
     beam: &Beam,
     range_m: &[f64],
 ) -> Result<(Vec<[f64; 3]>, Vec<f64>), Error> {
     let points_m: Vec<[f64; 3]> = range_m.iter().map(|range_m| beam.at_range_m(*range_m)).collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    plan.wind.wind().velocity_into(&points_m, plan.wind.start_s + beam.time_s, &mut velocity_m_s)?;
+    setup.wind.wind().velocity_into(&points_m, setup.wind.start_s + beam.time_s, &mut velocity_m_s)?;
     let along = velocity_m_s.iter().map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s)).collect();
     Ok((points_m, along))
 }
