@@ -262,11 +262,12 @@ fn fields(flow: &crate::scene::FieldFlow, file: &SceneFile) -> Result<SceneWind,
 
 #[cfg(feature = "netcdf")]
 mod planes {
-    use super::fields::Frozen;
-    use super::{Error, SceneFile, SceneWind, Wind};
     use crate::io::CrossPlanes;
     use crate::io::planes_input::{files, read};
     use crate::scene::{SimulatedFlow, SimulatedMotion};
+    use crate::setup::wind::fields::Frozen;
+    use crate::setup::wind::{SceneWind, Wind};
+    use crate::{Error, scene::SceneFile};
     use wakescope_les::winds::{Edges, GridSeries, OutsidePolicy, PlaneMesh, Side};
     use wakescope_les::{Error as LesError, GridSnapshot};
 
