@@ -3,6 +3,7 @@
 use crate::statistics::{Bar, Estimate, Verdict};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::sync::LazyLock;
 
 /// A statement, measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,11 +25,44 @@ pub(crate) struct Claim {
 /// A part of a statement: its name, what was found in a unit, and where it must lie.
 pub(crate) type Part = (String, Estimate, &'static str, Bar);
 
+/// What the list says of a claim.
+#[derive(Deserialize)]
+pub(crate) struct Listed {
+    pub(crate) id: String,
+    statement: String,
+    /// Absent where it depends on the run.
+    #[serde(default)]
+    expected: String,
+    /// Whether it cannot fail unless the program is wrong.
+    #[serde(default)]
+    pub(crate) check: bool,
+    /// The chapter's sentence, word for word; none of the program's own claims.
+    pub(crate) quote: Option<String>,
+    /// Where the chapter's is judged, and what of that it does not say.
+    #[serde(default)]
+    pub(crate) case: String,
+}
+
+#[derive(Deserialize)]
+struct List {
+    claim: Vec<Listed>,
+}
+
+/// All claims of figures; the test reads it.
+pub(crate) static LIST: LazyLock<Vec<Listed>> =
+    LazyLock::new(|| toml::from_str(include_str!("claims.toml")).map_or(Vec::new(), |list: List| list.claim));
+
 impl Claim {
-    /// A claim that a computation without random numbers decides.
-    pub(crate) fn exact(id: &str, statement: &str, expected: &str, measured: String, pass: bool) -> Self {
+    /// A claim of the list that a computation without random numbers decides.
+    pub(crate) fn exact(id: &str, measured: String, pass: bool) -> Self {
+        let listed = LIST.iter().find(|listed| listed.id == id);
+        let [statement, expected] = listed.map_or(["", ""], |listed| [&listed.statement, &listed.expected]);
+        Self { id: id.into(), ..Self::of(statement, expected, measured, pass) }
+    }
+
+    fn of(statement: &str, expected: &str, measured: String, pass: bool) -> Self {
         Self {
-            id: id.into(),
+            id: String::new(),
             figure: String::new(),
             statement: statement.into(),
             expected: expected.into(),
@@ -39,8 +73,8 @@ impl Claim {
         }
     }
 
-    /// A claim whose parts must all hold by the rule of statistics; those that do not are told first.
-    pub(crate) fn judged(id: &str, statement: &str, expected: &str, parts: &[Part]) -> Self {
+    /// A claim of the list whose parts must all hold by the rule of statistics; those that do not are told first.
+    pub(crate) fn judged(id: &str, parts: &[Part]) -> Self {
         let verdict = |part: &&Part| part.3.verdict(&part.1);
         let mut told: Vec<&Part> = parts.iter().collect();
         told.sort_by_key(|part| match verdict(part) {
@@ -57,10 +91,15 @@ impl Claim {
         let claim = Self {
             verdict: Verdict::of_all(parts.iter().map(|part| verdict(&part))),
             standard_error: parts.iter().map(|part| part.1.standard_error).fold(0.0, f64::max),
-            ..Self::exact(id, statement, expected, words.collect::<Vec<_>>().join("; "), false)
+            ..Self::exact(id, words.collect::<Vec<_>>().join("; "), false)
         };
         let more = if times < 100.0 { format!("about {times:.1} times the data") } else { "no sample in reach".into() };
         if claim.verdict == Verdict::Open { claim.open(&more) } else { claim }
+    }
+
+    /// The claim with what is expected of it in this run.
+    pub(crate) fn expecting(self, expected: String) -> Self {
+        Self { expected, ..self }
     }
 
     /// The claim as one that this run does not decide.
@@ -76,7 +115,7 @@ impl Claim {
     /// A quantity that may be `allowed` from its reference, in its own unit; what is not a number passes no bar.
     pub(crate) fn within(quantity: &str, measured: f64, reference: f64, allowed: f64) -> Self {
         let expected = format!("{} ± {allowed:.2e}", number(reference));
-        Self::exact("", quantity, &expected, number(measured), (measured - reference).abs() <= allowed)
+        Self::of(quantity, &expected, number(measured), (measured - reference).abs() <= allowed)
     }
 
     /// Within `share` of the reference.
@@ -87,13 +126,13 @@ impl Claim {
     /// At least `reference`.
     pub(crate) fn at_least(quantity: &str, measured: f64, reference: f64) -> Self {
         let expected = format!("at least {}", number(reference));
-        Self::exact("", quantity, &expected, number(measured), measured >= reference)
+        Self::of(quantity, &expected, number(measured), measured >= reference)
     }
 
     /// At most `reference`.
     pub(crate) fn at_most(quantity: &str, measured: f64, reference: f64) -> Self {
         let expected = format!("at most {}", number(reference));
-        Self::exact("", quantity, &expected, number(measured), measured <= reference)
+        Self::of(quantity, &expected, number(measured), measured <= reference)
     }
 
     pub(crate) fn passes(&self) -> bool {
@@ -134,8 +173,7 @@ mod tests {
     #[test]
     fn a_claim_of_parts_holds_if_all_do_and_tells_first_what_does_not() {
         let part = |name: &str, value: f64| (name.into(), Estimate::stated(value, 0.1), " m/s", Bar::Below(1.0));
-        let of =
-            |values: &[f64]| Claim::judged("F0", "s", "e", &values.iter().map(|v| part("p", *v)).collect::<Vec<_>>());
+        let of = |values: &[f64]| Claim::judged("F8", &values.iter().map(|v| part("p", *v)).collect::<Vec<_>>());
         assert_eq!([of(&[0.5, 0.6]).verdict, of(&[0.5, 1.1]).verdict], [Verdict::Pass, Verdict::Open]);
         let claim = of(&[0.5, 1.1, 2.0]);
         assert_eq!((claim.verdict, claim.decided_by.as_str()), (Verdict::Fail, ""));

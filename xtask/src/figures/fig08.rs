@@ -112,8 +112,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     };
     out.claims.push(Claim::exact(
         "F8",
-        "late extrema of the exact radial velocity are weaker than early ones",
-        "at most 0.8 of them on both sides",
         format!(
             "{:.2} and {:.2}; early: {early_low:.2} to {early_high:.2} m/s; late: {late_low:.2} to {late_high:.2} m/s",
             late_low / early_low,

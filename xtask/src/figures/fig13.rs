@@ -2,9 +2,8 @@
 
 use super::context::{Context, Rendered};
 use super::profiles::{self, Profiles};
-use super::study::{Age, INSIDE_M, METHODS, REFERENCES, Sight, Study, near_scene, with_method};
-use crate::claim::{Claim, Part};
-use crate::statistics::Verdict;
+use super::study::{Age, METHODS, REFERENCES, Sight, Study, near_scene, with_method};
+use crate::claim::Claim;
 use fixtures::failure::Failure;
 use wakescope_sim::plot::Figure;
 use wakescope_sim::scene::{PulseShape, Scene, SnrReference};
@@ -33,31 +32,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let chapter: Vec<Profiles> = all.into_iter().filter(|p| p.name == CHAPTER).collect();
     let parts = profiles::parts(&chapter, " m/s", Profiles::inside_m_s);
     let whole = profiles::parts(&chapter, " m/s", |p, without| p.inside.rms_m_s(without));
-    let told = |parts: &[Part]| {
-        let verdict = match Verdict::of_all(parts.iter().map(|part| part.3.verdict(&part.1))) {
-            Verdict::Pass => "yes",
-            Verdict::Fail => "not in every reading",
-            Verdict::Open => "not decided in every reading",
-        };
-        let readings = parts.iter().map(|(name, found, unit, _)| format!("{name} {}{unit}", found.words()));
-        format!("{verdict} ({})", readings.collect::<Vec<_>>().join("; "))
-    };
     out.words = format!(
         "Does correlogram accumulation err less than periodogram accumulation inside the vortices, as the chapter has it, at its ratio? As it is: \
          {}. Less what each errs outside, as the chapter draws it: {} (figure 13).",
-        told(&whole),
-        told(&parts)
+        profiles::told(&whole),
+        profiles::told(&parts)
     );
-    let claim = Claim::judged(
-        "F13",
-        &format!(
-            "inside the vortices (within {INSIDE_M} m) the error of CA is below that of PA after the mean evolution with range \
-             is removed, on the same signals, with either weighting of PA"
-        ),
-        "below; what is surely less than 3 % is no difference",
-        &parts,
-    )
-    .beside(&format!("with the evolution: {}", told(&whole)));
+    let claim = Claim::judged("F13", &parts).beside(&format!("with the evolution: {}", profiles::told(&whole)));
     out.claims.push(claim);
     Ok(out)
 }

@@ -28,13 +28,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     );
     out.marks = vec![sight.mark];
     let chapter = &all[all.len() / 2..];
-    let claim = |id, statement, unit, of| {
-        let expected = "below at both durations; what is surely less than 3 % is no difference";
-        Claim::judged(id, statement, expected, &profiles::parts(chapter, unit, of))
-    };
-    let peak = "the peak of the error of CA at the vortex (within 8 m) is below that of PA, on the same signals";
-    let width =
-        "the full width at half maximum of the error of CA at the vortex is below that of PA, on the same signals";
-    out.claims = vec![claim("F14a", peak, " m/s", Profiles::peak_m_s), claim("F14b", width, " m", Profiles::width_m)];
+    let peaks = profiles::parts(chapter, " m/s", Profiles::peak_m_s);
+    let widths = profiles::parts(chapter, " m", Profiles::width_m);
+    out.words = format!("Is its profile across a core narrower, too? {} (figure 14).", profiles::told(&widths));
+    out.claims = vec![Claim::judged("F14a", &peaks), Claim::judged("F14b", &widths)];
     Ok(out)
 }

@@ -17,15 +17,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
          is allowed it takes, 1 being the bar (dashed). Names, inputs and outcomes are in the table (fig16.csv).",
         rows.len()
     );
-    out.claims = vec![Claim::exact(
-        "F16",
-        "every stiff and extreme case ends as it must",
-        &format!("{} cases", rows.len()),
-        match missed.is_empty() {
-            true => format!("{} cases", rows.len()),
-            false => format!("{} cases; not: {}", rows.len() - missed.len(), missed.join(", ")),
-        },
-        missed.is_empty(),
-    )];
+    let measured = match missed.is_empty() {
+        true => format!("{} cases", rows.len()),
+        false => format!("{} cases; not: {}", rows.len() - missed.len(), missed.join(", ")),
+    };
+    let claim = Claim::exact("F16", measured, missed.is_empty());
+    out.claims = vec![claim.expecting(format!("{} cases", rows.len()))];
     Ok(out)
 }

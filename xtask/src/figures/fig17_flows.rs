@@ -187,10 +187,8 @@ fn claim(id: &str, flow: &OfFlow) -> Claim {
         format!("{name} {} %, scatter {scatter:.1} %, {failures} failed", flow.bias(name).words())
     });
     let failures = flow.errors(JUDGED).1;
-    let statement =
-        format!("{}: bias of the circulation over 5 to 15 m in the scanned plane by the method {JUDGED}", flow.name());
     let part = (String::new(), flow.bias(JUDGED), " %", Bar::Between(-5.0, 5.0));
-    let claim = Claim::judged(id, &statement, "within 5 %, no vortex missed", &[part]);
+    let claim = Claim::judged(id, &[part]);
     let claim = if failures > 0 { Claim { verdict: Verdict::Fail, ..claim } } else { claim };
     claim.beside(&format!("{failures} failed; {}", told.collect::<Vec<_>>().join("; ")))
 }

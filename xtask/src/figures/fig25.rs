@@ -245,54 +245,17 @@ fn claims(all: &[Measured]) -> Result<Vec<Claim>, Failure> {
         let found = Estimate::of(BATCHES, |without| share(a, without) - share(b, without));
         Ok::<_, Failure>(vec![(name.into(), found, "", Bar::Below(0.0))])
     };
-    let claim = Claim::judged;
+    let turned = [strong, Case { seen: pair.seen, ..strong }];
+    let outside = [part(WAKE, 0, false, less)?, part(pair, 0, false, less)?];
+    let bins = Case { bins: true, ..WAKE };
+    let many = Case { pulses: 8, ..weak };
+    let above = |case, pa| part(case, pa, true, Bar::Above(0.0));
     Ok(vec![
-        claim(
-            "CP1",
-            &format!(
-                "what CA loses at {WEAK_DB} dB it loses to the steep edges of the band's noise, whose shape its model fits"
-            ),
-            "CA/PA in white noise below that in band noise",
-            &between("difference of the ratios", white, weak)?,
-        ),
-        claim(
-            "CP2",
-            &format!("at {STRONG_DB} dB the conclusion turns round inside, on the wake and on the pair"),
-            "CA above unweighted PA",
-            &[
-                part(strong, 0, true, Bar::Above(0.0))?,
-                part(Case { seen: pair.seen, ..strong }, 0, true, Bar::Above(0.0))?,
-            ],
-        ),
-        claim(
-            "CP3",
-            &format!(
-                "the smaller the core the smaller the lead of CA inside: {} against {} b₀ at {CHAPTER_DB} dB",
-                CORES[3], CORES[0]
-            ),
-            "CA/PA in the large core below that in the small one",
-            &between("difference of the ratios", Case { seen: Seen::Pair(CORES[3]), ..WAKE }, pair)?,
-        ),
-        claim(
-            "CP4",
-            &format!("outside CA errs less than unweighted PA at {CHAPTER_DB} dB, on the wake and on the pair"),
-            "below 0; what is surely less than 3 % is no difference",
-            &[part(WAKE, 0, false, less)?, part(pair, 0, false, less)?],
-        ),
-        claim(
-            "CP5",
-            &format!("with raw bins, as (30) has it, CA errs less inside the wake at {CHAPTER_DB} dB, too"),
-            "below 0; what is surely less than 3 % is no difference",
-            &[part(Case { bins: true, ..WAKE }, 0, true, less)?, part(Case { bins: true, ..WAKE }, 1, true, less)?],
-        ),
-        claim(
-            "CP6",
-            &format!("eight pulses a line do not bring the conclusion back at {WEAK_DB} dB in band noise"),
-            "CA above PA",
-            &[0, 1]
-                .map(|pa| part(Case { pulses: 8, ..weak }, pa, true, Bar::Above(0.0)))
-                .into_iter()
-                .collect::<Result<Vec<_>, _>>()?,
-        ),
+        Claim::judged("CP1", &between("difference of the ratios", white, weak)?),
+        Claim::judged("CP2", &[above(turned[0], 0)?, above(turned[1], 0)?]),
+        Claim::judged("CP3", &between("difference of the ratios", Case { seen: Seen::Pair(CORES[3]), ..WAKE }, pair)?),
+        Claim::judged("CP4", &outside),
+        Claim::judged("CP5", &[part(bins, 0, true, less)?, part(bins, 1, true, less)?]),
+        Claim::judged("CP6", &[above(many, 0)?, above(many, 1)?]),
     ])
 }

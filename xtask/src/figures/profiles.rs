@@ -6,7 +6,7 @@
 
 use super::study::{INSIDE_M, METHODS, OUTSIDE_M, Study, Zone, batches};
 use crate::claim::Part;
-use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE};
+use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE, Verdict};
 use fixtures::failure::Failure;
 use wakescope_sim::io::Table;
 use wakescope_sim::measure::cell_average::CellAverage;
@@ -151,6 +151,18 @@ pub(super) fn parts(all: &[Profiles], unit: &'static str, of: fn(&Profiles, Opti
         pas.iter().map(part).collect()
     };
     all.chunks(METHODS.len()).flat_map(case).collect()
+}
+
+/// In which readings a difference is below zero, in which it is not, and which are open, with their numbers.
+pub(super) fn told(parts: &[Part]) -> String {
+    let of = |verdict, heading: &str| {
+        let readings = parts.iter().filter(|part| part.3.verdict(&part.1) == verdict);
+        let readings = readings.map(|(name, found, unit, _)| format!("{name} {}{unit}", found.words()));
+        let readings = readings.collect::<Vec<_>>().join("; ");
+        if readings.is_empty() { readings } else { format!("{heading}: {readings}") }
+    };
+    let all = [of(Verdict::Pass, "yes"), of(Verdict::Fail, "no"), of(Verdict::Open, "open")];
+    all.into_iter().filter(|told| !told.is_empty()).collect::<Vec<_>>().join(". ")
 }
 
 /// All profiles as one table.

@@ -30,7 +30,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let measured: Vec<String> = ROWS.iter().map(|r| format!("{:.1}", delay_s(r.2))).collect();
     // The chapter prints whole seconds.
     let pass = ROWS.iter().all(|r| (delay_s(r.2) - r.3).abs() <= 0.5);
-    let statement = "the delays follow from the distance at 70 m/s";
-    out.claims.push(Claim::exact("T1", statement, "106, 132, 159, 132 s", format!("{} s", measured.join(", ")), pass));
+    out.claims.push(Claim::exact("T1", format!("{} s", measured.join(", ")), pass));
     Ok(out)
 }

@@ -2,71 +2,25 @@
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
 use toml::{Table, Value};
 use wakescope_sim::scene::Scene;
 
-/// Words that a key takes.
-const WORDS: [(&str, &[&str]); 9] = [
-    ("weighting", &["gaussian", "rectangular", "hann"]),
-    ("refinement", &["parabola", "exact", "none"]),
-    ("order_choice", &["fixed", "aic", "mdl"]),
-    ("correlogram", &["biased", "unbiased"]),
-    ("noise", &["band", "white", "none"]),
-    ("signal", &["intermediate_frequency", "baseband"]),
-    ("definition", &["fwhm", "one_over_e_half_width"]),
-    ("receiver", &["monostatic", "bistatic"]),
-    ("beam_radius_definition", &["intensity", "field"]),
-];
+/// What may stand in place of what the default scene has.
+#[derive(Deserialize)]
+struct Changes {
+    /// Section, key in it, table of another kind.
+    kinds: Vec<(String, String, Table)>,
+    /// What a key takes.
+    words: BTreeMap<String, Vec<String>>,
+}
 
-/// Tables of other kinds: section, key in it, table.
-const KINDS: [(&str, &str, &str); 30] = [
-    ("", "flow", "kind = \"calm\""),
-    ("", "flow", "kind = \"uniform\"\nlateral_m_s = 5.0\nvertical_m_s = -1.0"),
-    ("", "flow", "kind = \"vortex_pair\"\nmotion = \"inviscid\"\nage_tau = 1.0"),
-    ("", "flow", "kind = \"vortex_pair\"\nprofile = \"lamb_oseen\"\ncross_wind_m_s = 3.0"),
-    ("", "flow", "kind = \"simulated\"\nplanes = \"none\""),
-    ("detector", "snr", "reference = \"fixed\"\nsnr_db = 5.0"),
-    ("detector", "snr", "reference = \"chapter\""),
-    ("detector", "digitiser", "kind = \"quantised\"\nbits = 8\nfull_scale_over_noise = 10.0"),
-    ("detector", "digitiser", "kind = \"quantised\"\nbits = 1\nfull_scale_over_noise = 1e-6"),
-    (
-        "pulse",
-        "shape",
-        "kind = \"sampled\"\ntime_s = [-2e-7, -1e-7, 0.0, 1e-7, 2e-7]\npower = [0.0, 0.3, 1.0, 0.3, 0.0]",
-    ),
-    ("pulse", "shape", "kind = \"sampled\"\ntime_s = [0.0, 1e-9]\npower = [1.0, 1.0]\nresampling = \"linear\""),
-    ("scan", "below_ground", "policy = \"mask\""),
-    ("scan", "below_ground", "policy = \"constant\"\nradial_velocity_m_s = 2.0"),
-    ("scan", "outside_flow", "policy = \"mask\""),
-    ("estimator", "method", "kind = \"periodogram\""),
-    ("estimator", "method", "kind = \"autoregressive\"\norder = 16\norder_choice = \"fixed\""),
-    ("estimator", "method", "kind = \"autoregressive_pole\"\norder = 16\norder_choice = \"aic\""),
-    ("estimator", "method", "kind = \"capon\"\norder = 16"),
-    ("estimator", "method", "kind = \"lag_window\"\nlag_window_lags = 16"),
-    ("estimator", "method", "kind = \"pulse_pair\""),
-    ("estimator", "method", "kind = \"first_moment\"\nmoment_reach = 3.5"),
-    ("estimator", "method", "kind = \"likelihood\"\nlikelihood_snr_db = 3.0"),
-    ("estimator", "method", "kind = \"gradient_likelihood\"\ngradient_max_per_s = 0.6\ngradients = 7"),
-    ("estimator", "radius", "kind = \"of_range\"\nrange_m = [300.0, 500.0]\nradius_m = [1.0, 4.0]"),
-    ("estimator", "radius", "kind = \"target\"\nstandard_deviation_m_s = 0.3\nlargest_m = 10.0"),
-    (
-        "atmosphere",
-        "profile",
-        "range_m = [100.0, 500.0]\nbackscatter_per_m_sr = [1e-7, 1e-6]\nextinction_per_m = [1e-4, 1e-5]",
-    ),
-    ("atmosphere", "turbulence", "kind = \"refractive\"\ngrid_points = 128\ngrid_spacing_m = 4e-3\nrealisations = 4"),
-    ("atmosphere", "turbulence", "kind = \"refractive\"\nsampling = \"derived\"\nrealisations = 3"),
-    (
-        "atmosphere",
-        "turbulence",
-        "kind = \"refractive\"\nefficiency = \"realisation\"\nrealisations = 3\ngrid_points = 128\ngrid_spacing_m = 4e-3",
-    ),
-    (
-        "atmosphere",
-        "turbulence",
-        "kind = \"refractive\"\nspectrum = \"hill_andrews\"\ncn2_m_m23 = 1e-17\nrealisations = 3",
-    ),
-];
+/// The list of them; the test draws from it.
+static CHANGES: LazyLock<Changes> = LazyLock::new(|| {
+    toml::from_str(include_str!("changes.toml")).unwrap_or(Changes { kinds: Vec::new(), words: BTreeMap::new() })
+});
 
 /// Keys that the default scene does not have.
 const ABSENT: [(&str, &str, f64); 2] = [("estimator", "false_alarm", 1e-3), ("pulse", "chirp_hz_s", 1e13)];
@@ -143,9 +97,8 @@ fn table_at<'a>(scene: &'a mut Table, section: &str) -> &'a mut Table {
 }
 
 fn other_kind(scene: &mut Table, rng: &mut Xoshiro256PlusPlus) {
-    let (section, key, text) = KINDS[pick(rng, KINDS.len())];
-    let table: Table = toml::from_str(text).unwrap_or_default();
-    table_at(scene, section).insert(key.into(), Value::Table(table));
+    let (section, key, table) = &CHANGES.kinds[pick(rng, CHANGES.kinds.len())];
+    table_at(scene, section).insert(key.clone(), Value::Table(table.clone()));
 }
 
 /// Goes down the tables at random until it meets a value.
@@ -164,8 +117,8 @@ fn changed(value: &Value, key: &str, rng: &mut Xoshiro256PlusPlus) -> Value {
         Value::Integer(n) => Value::Integer(changed_count(*n, rng)),
         Value::Boolean(is_on) => Value::Boolean(!is_on),
         Value::String(_) => {
-            let words = WORDS.iter().find(|(k, _)| *k == key).map_or(&["nonsense"][..], |(_, words)| words);
-            Value::String(words[pick(rng, words.len())].into())
+            let words = CHANGES.words.get(key).map_or(&[][..], Vec::as_slice);
+            Value::String(words.get(pick(rng, words.len())).map_or("nonsense".into(), Clone::clone))
         }
         Value::Array(list) => Value::Array(list.iter().map(|v| changed(v, key, rng)).collect()),
         other => other.clone(),

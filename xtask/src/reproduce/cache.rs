@@ -76,7 +76,7 @@ mod tests {
         let place = Place { id: "fig00", folder: temp.path().to_owned() };
         let mut rendered = Rendered { caption: "a caption".into(), ..Rendered::default() };
         rendered.files.push(("csv".into(), b"a\n1\n".to_vec()));
-        rendered.claims.push(Claim { standard_error: 0.25, ..Claim::exact("F0", "statement", "1", "2".into(), false) });
+        rendered.claims.push(Claim { standard_error: 0.25, ..Claim::exact("F5", "2".into(), false) });
         rendered.timings.push(("total".into(), [1.5, 2.5]));
         assert!(place.load().is_none());
         place.store(&rendered).unwrap();

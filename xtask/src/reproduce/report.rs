@@ -19,7 +19,7 @@ pub(super) fn html(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) 
         ("The program's own claims that this run does not decide", false, Verdict::Open),
     ];
     let findings = heads.map(|(heading, of_chapter, verdict)| {
-        let here = |c: &&Claim| c.verdict == verdict && matches!(Kind::of(&c.id), Kind::Chapter(_)) == of_chapter;
+        let here = |c: &&Claim| c.verdict == verdict && matches!(Kind::of(&c.id), Kind::Chapter(..)) == of_chapter;
         let of =
             |(_, r): &(_, Rendered)| r.claims.iter().filter(here).map(|c| finding(c, core_s(r))).collect::<Vec<_>>();
         (heading.into(), done.iter().flat_map(of).collect())
@@ -67,7 +67,7 @@ fn core_s(rendered: &Rendered) -> f64 {
 
 fn finding(claim: &Claim, core_s: f64) -> Finding {
     let kind = Kind::of(&claim.id);
-    let said = if let Kind::Chapter(_) = kind { format!("{} ", kind.source()) } else { String::new() };
+    let said = if let Kind::Chapter(..) = kind { format!("{} ", kind.source()) } else { String::new() };
     let decided = match claim.decided_by.as_str() {
         "" => String::new(),
         by => format!(" Would decide: {by}; the figure took {core_s:.0} s of processor time."),
@@ -111,11 +111,18 @@ fn entry(figure: &Figure, rendered: &Rendered) -> ReportEntry {
     }
 }
 
-/// The rows of a table whose cells hold no commas.
+/// The rows of a table whose cells hold no commas; its numbers come from four digits at most and are shown with five.
 fn table_of_csv(csv: &str) -> HtmlTable {
     let mut rows =
-        csv.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
+        csv.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').map(five_digits).collect::<Vec<_>>());
     HtmlTable { header: rows.next().unwrap_or_default(), rows: rows.collect() }
+}
+
+/// A cell; if it is a number, rounded to five digits.
+fn five_digits(cell: &str) -> String {
+    let rounded = cell.parse::<f64>().ok().and_then(|x| format!("{x:.4e}").parse::<f64>().ok());
+    rounded
+        .map_or_else(|| cell.to_owned(), |x| if x.abs() < 1e-3 && x != 0.0 { format!("{x:e}") } else { x.to_string() })
 }
 
 fn words(list: &[&str]) -> Vec<String> {

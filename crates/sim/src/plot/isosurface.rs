@@ -135,20 +135,23 @@ impl IsosurfacePlot {
     fn words(&self, cell: Frame, frame: &Frame, corners: &[(f64, f64); 8], out: &mut Vec<Shape>) {
         let middle = cell.left + cell.width / 2.0;
         out.push(label((middle, cell.top + 20.0), self.title.clone(), TICK_SIZE + 2.0, Anchor::Middle));
-        // Axis names at the lowest edges in the picture.
+        // Axis names and the ends of the axes at the lowest edges in the picture; edges that share a corner keep apart.
+        let along = |edge: &[(f64, f64); 2], share: f64| {
+            (edge[0].0 + share * (edge[1].0 - edge[0].0), edge[0].1 + share * (edge[1].1 - edge[0].1))
+        };
         for (d, name) in self.axes.iter().enumerate() {
-            let middles = (0..8_usize).filter(|from| from >> d & 1 == 0).map(|from| {
-                let (a, b) = (corners[from], corners[from ^ (1 << d)]);
-                (0.5 * (a.0 + b.0), 0.5 * (a.1 + b.1))
-            });
+            let edges =
+                (0..8_usize).filter(|from| from >> d & 1 == 0).map(|from| [corners[from], corners[from ^ (1 << d)]]);
             let outermost = if d == 2 {
-                middles.min_by(|a, b| a.0.total_cmp(&b.0))
+                edges.min_by(|a, b| along(a, 0.5).0.total_cmp(&along(b, 0.5).0))
             } else {
-                middles.max_by(|a, b| a.1.total_cmp(&b.1))
+                edges.max_by(|a, b| along(a, 0.5).1.total_cmp(&along(b, 0.5).1))
             };
-            if let Some((x, y)) = outermost {
-                let at = if d == 2 { (x - 6.0, y) } else { (x, y + TICK_SIZE) };
-                out.push(label(at, name.clone(), TICK_SIZE, if d == 2 { Anchor::End } else { Anchor::Middle }));
+            let [low, high] = self.volume.corners_m().map(|end| format!("{:.1}", end[d]));
+            for (share, text) in [(0.5, name.clone()), (0.08, low), (0.92, high)] {
+                let Some((x, y)) = outermost.map(|edge| along(&edge, share)) else { continue };
+                let at = if d == 2 { (x - 4.0, y) } else { (x, y + TICK_SIZE) };
+                out.push(label(at, text, TICK_SIZE - 1.0, if d == 2 { Anchor::End } else { Anchor::Middle }));
             }
         }
         for (row, surface) in self.surfaces.iter().enumerate() {
