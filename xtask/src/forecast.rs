@@ -5,6 +5,7 @@
 
 use crate::process::{program, watch};
 use fixtures::failure::{Failure, Outcome};
+use serde::Deserialize;
 use std::path::Path;
 
 /// Options of the task.
@@ -27,68 +28,17 @@ const EMPTY: &str = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 0.0\n[flow]
     elevation_max_rad = 0.0\nrange_max_m = 320.0\npulses_per_line = 1\nrealisations = 1\n[outputs]\nnetcdf = false\n\
     svg = false\npng = false\nprofile_points = 2\n";
 
-const FIXED: &str = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n";
+/// The scenes.
+#[derive(Deserialize)]
+struct Scenes {
+    scene: Vec<Scene>,
+}
 
-/// Name, scene, command.
-fn scenes() -> Vec<(&'static str, String, &'static str)> {
-    let fixed = |rest: &str| format!("{FIXED}{rest}");
-    vec![
-        ("default", String::new(), "run"),
-        ("raw signals kept", fixed("[scan]\nrealisations = 1\n[outputs]\nsignals = true\n"), "run"),
-        (
-            "fine map",
-            fixed(
-                "[scan]\nelevation_step_rad = 6e-4\nrealisations = 1\npulses_per_line = 2\n[estimator]\n\
-                 gate_step_samples = 1\nwindow_step_samples = 2\nradius_m = 6.0\n",
-            ),
-            "run",
-        ),
-        (
-            "many pulses, autoregressive",
-            fixed(
-                "[scan]\nelevation_max_rad = 0.05\npulses_per_line = 400\n[estimator]\nmethod.kind = \"autoregressive\"\n\
-                 weighting = \"rectangular\"\n",
-            ),
-            "run",
-        ),
-        (
-            "baseband, following",
-            "[detector]\nsignal = \"baseband\"\n[scan]\npulses_per_line = 8\n[estimator]\nfollow_wind = true\n".into(),
-            "run",
-        ),
-        (
-            "long windows, poles",
-            fixed(
-                "[scan]\nrange_max_m = 900.0\npulses_per_line = 4\n[estimator]\nmethod = { kind = \"autoregressive_pole\", order = 24 }\n\
-                 window_samples = 128\nweighting = \"rectangular\"\n",
-            ),
-            "run",
-        ),
-        (
-            "gradients",
-            fixed(
-                "[scan]\npulses_per_line = 2\nrealisations = 1\nelevation_step_rad = 5e-3\n[estimator]\n\
-                 method.kind = \"gradient_likelihood\"\nwindow_step_samples = 2\n",
-            ),
-            "run",
-        ),
-        (
-            "short pulses, fast sampling",
-            "[pulse.shape]\nduration_s = 50e-9\n[detector]\nsampling_hz = 500e6\n[scan]\nrange_max_m = 1000.0\n\
-             elevation_max_rad = 0.1\n[estimator]\nwindow_samples = 32\n"
-                .into(),
-            "run",
-        ),
-        ("efficiency at 2000 ranges", "[outputs]\nprofile_points = 2000\n".into(), "efficiency"),
-        (
-            "phase screens",
-            "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-14\ngrid_points = 256\n\
-             grid_spacing_m = 0.003\nrealisations = 60\n[scan]\nelevation_max_rad = 0.05\n[outputs]\n\
-             profile_range_max_m = 1000.0\nprofile_points = 10\n"
-                .into(),
-            "run",
-        ),
-    ]
+#[derive(Deserialize)]
+struct Scene {
+    name: String,
+    command: String,
+    text: String,
 }
 
 pub(crate) fn run(options: &Options) -> Outcome {
@@ -103,8 +53,9 @@ pub(crate) fn run(options: &Options) -> Outcome {
     );
     let mut beyond = Vec::new();
     let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
-    for (name, scene, command) in scenes().into_iter().filter(|s| wanted(s.0)) {
-        let found = measured(&program, &folder, &scene, command)?;
+    let Scenes { scene } = toml::from_str(include_str!("forecast.toml"))?;
+    for Scene { name, command, text } in scene.iter().filter(|s| wanted(&s.name)) {
+        let found = measured(&program, &folder, text, command)?;
         let (time, memory) = (found.actual.0, (found.actual.1 - empty.actual.1).max(1e5));
         let ratios = (found.forecast.0 / time, found.forecast.1 / memory);
         println!(
@@ -117,7 +68,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         );
         let inside = |ratio: f64, limit: f64| (1.0 / limit..=limit).contains(&ratio);
         if !inside(ratios.0, TIME) || !inside(ratios.1, MEMORY) {
-            beyond.push(name);
+            beyond.push(name.as_str());
         }
     }
     std::fs::remove_dir_all(&folder)?;

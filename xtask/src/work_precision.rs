@@ -30,9 +30,6 @@ pub(crate) struct Options {
     /// Few and coarse settings: a minute instead of many.
     #[arg(long)]
     quick: bool,
-    /// Put the table of the cheapest settings into the book.
-    #[arg(long)]
-    store: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -122,18 +119,12 @@ pub(crate) fn measure(groups: &[Group], quick: bool) -> Result<Vec<(Group, Vec<R
     groups.iter().map(|group| Ok((*group, pool.install(|| group.rows(quick))?))).collect()
 }
 
-/// Where the book reads the cheapest settings.
-const STORED: &str = "docs/src/work-precision-table.md";
-
 /// Measures, prints and writes.
 ///
 /// # Errors
 /// What a crate refuses, or an unusable output.
 pub(crate) fn run(options: &Options) -> Outcome {
     let groups = options.group.map_or(Group::ALL.to_vec(), |group| vec![group]);
-    if options.store && (options.quick || groups.len() < Group::ALL.len()) {
-        return Err(Failure::new("--store keeps a whole measurement: leave --quick and --group out".into()));
-    }
     let measured = measure(&groups, options.quick)?;
     let machine = machine();
     let parameters = format!("machine = {machine:?}\nthreads = 1\nquick = {}\n", options.quick);
@@ -147,15 +138,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
         files.add(&format!("{}.svg", group.name()), show::panels(rows).svg(&origin)?)?;
     }
     let all: Vec<(Group, &[Row])> = measured.iter().map(|(group, rows)| (*group, rows.as_slice())).collect();
-    let cheapest = show::cheapest_markdown(&all, &machine);
     files.add("work_precision.csv", show::table(&all).to_csv(&origin)?)?;
     files.add("work_precision.svg", show::fronts(&all).svg(&origin)?)?;
     files.add("cheapest.csv", show::cheapest_table(&all).to_csv(&origin)?)?;
     files.commit()?;
-    println!("{cheapest}\nwrote {}", folder.join("work_precision.csv").display());
-    if options.store {
-        wakescope_sim::io::write_atomic(&root().join(STORED), cheapest.as_bytes())?;
-        println!("stored {STORED}");
-    }
+    println!("wrote {}", folder.join("work_precision.csv").display());
     Ok(())
 }

@@ -103,14 +103,8 @@ fn waves() -> Result<Vec<Row>, Failure> {
                 Ok(0.5 * (end / start).ln() / span_s)
             })?;
             let error = (rate / expected - 1.0).abs();
-            rows.push(Row::new(
-                "waves on Poiseuille flow",
-                name,
-                ("cells across", cells[1] as f64),
-                (error, 0.0),
-                words,
-                cost,
-            ));
+            let knob = ("cells across", cells[1] as f64);
+            rows.push(Row::new("waves on Poiseuille flow", name, knob, (error, 0.0), words, cost));
         }
     }
     Ok(rows)

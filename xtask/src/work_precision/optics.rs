@@ -72,14 +72,8 @@ fn layers(quick: bool) -> Result<Vec<Row>, Failure> {
         let exact = theory::bistatic_efficiency_screens(&telescope, &none, &screens, &table, RANGE_M)?;
         let (_, cost) = fastest(|| estimate(&set_up(count, Grid::table2())?, 2, false))?;
         let words = ["bistatic efficiency, relative", "exact theory of the continuous path"];
-        rows.push(Row::new(
-            "layers",
-            "mid-layer screens",
-            ("atmosphere.turbulence.layers", count as f64),
-            ((exact / continuous - 1.0).abs(), 0.0),
-            words,
-            cost,
-        ));
+        let (knob, error) = (("atmosphere.turbulence.layers", count as f64), (exact / continuous - 1.0).abs());
+        rows.push(Row::new("layers", "mid-layer screens", knob, (error, 0.0), words, cost));
     }
     Ok(rows)
 }
@@ -95,14 +89,8 @@ fn grids(quick: bool) -> Result<Vec<Row>, Failure> {
                 Ok(if double { set_up.grid_free_space::<f64>()? } else { set_up.grid_free_space::<f32>()? })
             })?;
             let words = ["free-space efficiency, relative, uncorrected", "exact theory"];
-            rows.push(Row::new(
-                "grid",
-                method,
-                ("atmosphere.turbulence.grid_points", points as f64),
-                ((eta[0] / exact - 1.0).abs(), 0.0),
-                words,
-                cost,
-            ));
+            let knob = ("atmosphere.turbulence.grid_points", points as f64);
+            rows.push(Row::new("grid", method, knob, ((eta[0] / exact - 1.0).abs(), 0.0), words, cost));
         }
     }
     Ok(rows)
@@ -123,20 +111,16 @@ fn screens(quick: bool) -> Result<Vec<Row>, Failure> {
         let mut rng = stream(SEED, 0, 0);
         let (_, cost) = fastest(|| Ok(generator.fill_pair(&mut rng, &mut work, first, second)?))?;
         let own = worst_error(&spectrum, points, |steps| generator.expected_structure_m53(steps, 0))?;
-        rows.push(Row::new(
-            "screens (a pair)",
-            "random shift and subharmonics",
-            ("points", points as f64),
-            (own, 0.0),
-            words,
-            cost,
-        ));
+        let row = |method, error, cost| {
+            Row::new("screens (a pair)", method, ("points", points as f64), (error, 0.0), words, cost)
+        };
+        rows.push(row("random shift and subharmonics", own, cost));
         for (method, levels) in [("plain synthesis (no cost taken)", 0), ("3 levels of Lane (no cost taken)", 3)] {
             // Only the expectation is computed: these screens are not part of the crate.
             let error = worst_error(&spectrum, points, |steps| {
                 expected_lane_m53(&spectrum, points, levels, steps as f64 * SPACING_M)
             })?;
-            rows.push(Row::new("screens (a pair)", method, ("points", points as f64), (error, 0.0), words, Cost::NONE));
+            rows.push(row(method, error, Cost::NONE));
         }
     }
     Ok(rows)
@@ -186,14 +170,8 @@ fn realisations(quick: bool) -> Result<Vec<Row>, Failure> {
             // A standard deviation of so many independent samples.
             let of_error = error / (2.0 * (found.independent_samples.max(2) - 1) as f64).sqrt();
             let words = ["relative standard error, monostatic", "itself"];
-            rows.push(Row::new(
-                "realisations",
-                method,
-                ("atmosphere.turbulence.realisations", count as f64),
-                (error, of_error),
-                words,
-                cost,
-            ));
+            let knob = ("atmosphere.turbulence.realisations", count as f64);
+            rows.push(Row::new("realisations", method, knob, (error, of_error), words, cost));
         }
     }
     Ok(rows)

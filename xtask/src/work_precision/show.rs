@@ -99,29 +99,6 @@ pub(super) fn cheapest_table(groups: &Groups<'_>) -> Table {
         .float("core_s", float(|r| r.cost.cpu_s))
 }
 
-/// The same for the book.
-pub(super) fn cheapest_markdown(groups: &Groups<'_>, machine: &str) -> String {
-    let mut out = format!(
-        "One thread of {machine}; the smallest of three times below 0.2 s.\n\n| group | case | 10 % | 3 % | 1 % |\n|---|---|---|---|---|\n"
-    );
-    for of_case in all_cheapest(groups).chunks(TARGETS.len()) {
-        let cell = |c: &Cheapest<'_>| match c.found {
-            Some(r) if r.knob == "none" => format!("{}, {:.1e} s", r.method, r.cost.cpu_s),
-            Some(r) if r.method == r.knob => format!("`{}` {}, {:.1e} s", r.knob, number(r.value), r.cost.cpu_s),
-            Some(r) => format!("{}, {} {}, {:.1e} s", r.method, r.knob, number(r.value), r.cost.cpu_s),
-            None => "none".into(),
-        };
-        let cells: Vec<String> = of_case.iter().map(cell).collect();
-        out += &format!("| {} | {} | {} |\n", of_case[0].group.name(), of_case[0].case, cells.join(" | "));
-    }
-    out
-}
-
-/// Whole numbers as such, small ones with their power of ten.
-fn number(value: f64) -> String {
-    if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:?}") }
-}
-
 /// Points of error and time that a logarithmic plot can show.
 fn points<'a>(rows: impl Iterator<Item = &'a Row>) -> Vec<(f64, f64)> {
     rows.filter(|r| r.error > 0.0 && r.cost.cpu_s > 0.0).map(|r| (r.cost.cpu_s, r.error)).collect()

@@ -145,22 +145,24 @@ impl Figure {
         Ok(Drawing { width: self.width, height: (top + MARGIN).ceil(), shapes })
     }
 
-    /// Cells and panels row by row; a row is as high as its highest panel.
+    /// Cells and panels row by row; a row is as high as its highest panel, and maps beside it keep their own height.
     fn rows(&self, top: &mut f64) -> OutputResult<Vec<(Vec<Frame>, &[Panel])>> {
         let width = (self.width - 2.0 * MARGIN) / self.columns as f64;
         let mut rows = Vec::new();
         for panels in self.panels.chunks(self.columns) {
-            let mut height: f64 = 0.0;
-            for panel in panels {
-                height = height.max(match panel {
-                    Panel::Curves(plot) => plot.height(width)?,
-                    Panel::Map(plot) => plot.height(width),
-                    Panel::Surfaces(plot) => plot.height(width),
-                });
-            }
-            let cell = |i: usize| Frame { left: MARGIN + i as f64 * width, top: *top, width, height };
-            rows.push(((0..panels.len()).map(cell).collect(), panels));
-            *top += height;
+            let own = |panel: &Panel| match panel {
+                Panel::Curves(plot) => plot.height(width),
+                Panel::Map(plot) => Ok(plot.height(width)),
+                Panel::Surfaces(plot) => Ok(plot.height(width)),
+            };
+            let heights = panels.iter().map(own).collect::<OutputResult<Vec<f64>>>()?;
+            let highest = heights.iter().copied().fold(0.0, f64::max);
+            let cell = |(i, panel): (usize, &Panel)| {
+                let height = if matches!(panel, Panel::Map(_)) { heights[i] } else { highest };
+                Frame { left: MARGIN + i as f64 * width, top: *top, width, height }
+            };
+            rows.push((panels.iter().enumerate().map(cell).collect(), panels));
+            *top += highest;
         }
         Ok(rows)
     }
@@ -199,7 +201,8 @@ mod tests {
         let rows = figure.rows(&mut top).unwrap();
         assert_eq!(rows.len(), 2);
         assert_eq!(rows[0].0[0].right(), rows[0].0[1].left);
-        assert_eq!(rows[0].0[0].bottom(), rows[1].0[0].top);
+        assert_eq!(rows[0].0[1].bottom(), rows[1].0[0].top);
+        assert!(rows[0].0[0].bottom() <= rows[1].0[0].top);
         assert_eq!(rows[1].0[0].bottom(), top);
     }
 
