@@ -6,7 +6,6 @@ use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::references::numbers;
 use fixtures::failure::Failure;
-use std::f64::consts::TAU;
 use wakescope_les::CirculationProfile;
 use wakescope_les::analysis::WakeScales;
 use wakescope_les::cases::VortexPairCase;
@@ -32,14 +31,15 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
     let flow = run_with(&pair, meter, END)?;
     let stored = numbers("wake_2d_ground_re2500.csv")?;
     let column = |column: usize| stored.iter().map(move |r| (r[0], r[column])).collect::<Vec<_>>();
-    let [y, z] = [flow.curve(|r| r.right.y_m), flow.curve(|r| r.right.z_m)];
-    let gamma = flow.curve(|r| r.right.gamma_5_15_m2_s / TAU);
-    let [energy, enstrophy] = [flow.curve(|r| r.energy_m4_s2), flow.curve(|r| r.enstrophy_m2_s2)];
+    let [y, z] = ["y_right", "z_right"].map(|name| flow.curve(name));
+    let gamma = flow.curve("gamma_5_15_right");
+    let [energy, enstrophy] = ["energy", "enstrophy"].map(|name| flow.curve(name));
     let range = [0.1, END];
     let apart = |a: f64, b: f64| (a - b).abs();
     let relative = |a: f64, b: f64| (a / b - 1.0).abs();
     let off = worst(&y, &column(1), range, apart).max(worst(&z, &column(2), range, apart));
-    let asymmetry = flow.records.iter().map(|r| (r.left.y_m + r.right.y_m).abs()).fold(0.0, f64::max);
+    let sides = flow.column("y_left").iter().zip(flow.column("y_right"));
+    let asymmetry = sides.map(|(left, right)| (left + right).abs()).fold(0.0, f64::max);
     let wide = if profile == Profile::Quick { 4.0 } else { 1.0 };
     let checks = vec![
         Claim::at_most("largest error of the path, b₀", off, 0.01 * wide),
@@ -92,10 +92,10 @@ pub(super) fn show_hyperbola(profile: Profile) -> Result<Shown, Failure> {
     let flow = run(&pair, 4.0)?;
     let stored = numbers("vortex_pair_inviscid_ground_h1.csv")?;
     let column = |column: usize| stored.iter().map(move |r| (r[0], r[column])).collect::<Vec<_>>();
-    let [y, z] = [flow.curve(|r| r.right.y_m), flow.curve(|r| r.right.z_m)];
+    let [y, z] = ["y_right", "z_right"].map(|name| flow.curve(name));
     let apart = |a: f64, b: f64| (a - b).abs();
     let off = [(&y, 1), (&z, 2)].map(|(curve, c)| worst(curve, &column(c), [0.0, 4.0], apart));
-    let energy = flow.curve(|r| r.energy_m4_s2);
+    let energy = flow.curve("energy");
     let lost = 1.0 - energy[energy.len() - 1].1 / energy[0].1;
     let checks = vec![
         Claim::at_most("largest error of y to tau = 4, b₀", off[0], 0.01),

@@ -1,6 +1,6 @@
 //! The pair in space against the independent code, row by row: coarse and medium mesh, without and with the multiscale model.
 
-use super::history::{History, PER_TAU, Stored, run, worst};
+use super::history::{COLUMNS, History, PER_TAU, Stored, run, worst};
 use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::validate::shown::Shown;
@@ -119,16 +119,15 @@ fn laminar(name: &str, flow: &History, stored: &Stored, bars: &Bars) -> Vec<Clai
         worst(measured, &stored.curve(column), [0.0, to], |a, b| (a - b).abs())
     };
     let position = [
-        apart(&flow.curve(|r| r.left.y_m), Stored::Y[0], 2.0),
-        apart(&flow.curve(|r| r.right.y_m), Stored::Y[1], 2.0),
-        apart(&flow.curve(|r| r.left.z_m), Stored::Z[0], 2.0),
-        apart(&flow.curve(|r| r.right.z_m), Stored::Z[1], 2.0),
+        apart(&flow.curve("y_left"), Stored::Y[0], 2.0),
+        apart(&flow.curve("y_right"), Stored::Y[1], 2.0),
+        apart(&flow.curve("z_left"), Stored::Z[0], 2.0),
+        apart(&flow.curve("z_right"), Stored::Z[1], 2.0),
     ];
     let gamma = [false, true].map(|right| apart(&flow.gamma(right), Stored::GAMMA[usize::from(right)], LAMINAR));
-    let energy = worst(&flow.curve(|r| r.energy_m4_s2), &stored.curve(Stored::ENERGY), [0.1, LAMINAR], |a, b| {
-        (a / b - 1.0).abs()
-    });
-    let waves = flow.curve(|r| r.energy_3d_m4_s2());
+    let energy =
+        worst(&flow.curve("energy"), &stored.curve(Stored::ENERGY), [0.1, LAMINAR], |a, b| (a / b - 1.0).abs());
+    let waves = flow.curve("energy_3d");
     let logarithm = worst(&waves, &stored.curve(Stored::ENERGY_3D), [0.5, LAMINAR], |a, b| (a / b).ln().abs());
     let check = |what: &str, measured: f64, bar: f64| Claim::at_most(&format!("{name}{what}"), measured, bar);
     let mut checks = vec![
@@ -140,7 +139,7 @@ fn laminar(name: &str, flow: &History, stored: &Stored, bars: &Bars) -> Vec<Clai
         check("ln E_3d, 0.5 to 2.2", logarithm, bars.log_energy_3d),
     ];
     for (mode, column) in [(2, Stored::MODE_2), (3, Stored::MODE_3)] {
-        let measured = amplitude_growth(&flow.curve(|r| r.mode_energy_m4_s2[mode]), 1.0, 2.0);
+        let measured = amplitude_growth(&flow.curve(&format!("energy_mode_{mode}")), 1.0, 2.0);
         let reference = amplitude_growth(&stored.curve(column), 1.0, 2.0);
         checks.push(Claim::relative(&format!("{name}growth of mode {mode}, 1 to 2"), measured, reference, bars.growth));
     }
@@ -163,9 +162,9 @@ fn turbulent(flow: &History, plane: &History, stored: &Stored, bars: &Bars) -> V
     }
     let (ratio, ratio_bar) = bars.ratio_to_plane;
     checks.push(Claim::within("3-D over 2-D Γ at 5", flow.mean_gamma(END) / plane.mean_gamma(END), ratio, ratio_bar));
-    let energy = flow.curve(|r| r.energy_m4_s2);
+    let energy = flow.curve("energy");
     checks.push(Claim::within("energy at 5", value_at(&energy, END), bars.last_energy.0, bars.last_energy.1));
-    let enstrophy = flow.curve(|r| r.enstrophy_m2_s2);
+    let enstrophy = flow.curve("enstrophy");
     let late = enstrophy.iter().filter(|p| p.0 > LAMINAR);
     let peak = late.fold((0.0, 0.0), |best, p| if p.1 > best.1 { *p } else { best });
     let middle = |[low, high]: [f64; 2]| (0.5 * (low + high), 0.5 * (high - low));
@@ -176,34 +175,19 @@ fn turbulent(flow: &History, plane: &History, stored: &Stored, bars: &Bars) -> V
     checks
 }
 
+/// The columns of the table, the circulations over those at the start.
 fn table(flow: &History) -> Table {
-    let column = |table: Table, name: &str, of: &dyn Fn(&wakescope_les::analysis::WakeRecord) -> f64| {
-        table.float(name, flow.records.iter().map(of))
-    };
-    let mut table = Table::new()
-        .float("tau", flow.records.iter().map(|r| r.time_s))
-        .float("gamma_5_15_left", flow.gamma(false).into_iter().map(|p| p.1))
-        .float("gamma_5_15_right", flow.gamma(true).into_iter().map(|p| p.1));
-    table = column(table, "y_left", &|r| r.left.y_m);
-    table = column(table, "z_left", &|r| r.left.z_m);
-    table = column(table, "y_right", &|r| r.right.y_m);
-    table = column(table, "z_right", &|r| r.right.z_m);
-    table = column(table, "energy", &|r| r.energy_m4_s2);
-    table = column(table, "enstrophy", &|r| r.enstrophy_m2_s2);
-    table = column(table, "energy_3d", &|r| r.energy_3d_m4_s2());
-    table = column(table, "gamma_opposite_left", &|r| r.left.gamma_opposite_m2_s / std::f64::consts::TAU);
-    table = column(table, "gamma_opposite_right", &|r| r.right.gamma_opposite_m2_s / std::f64::consts::TAU);
-    table = column(table, "secondary_y_left", &|r| r.left.secondary.y_m);
-    table = column(table, "secondary_z_left", &|r| r.left.secondary.z_m);
-    table = column(table, "secondary_y_right", &|r| r.right.secondary.y_m);
-    table = column(table, "secondary_z_right", &|r| r.right.secondary.z_m);
-    column(table, "wall_units", &|r| r.wall_units)
+    let names = COLUMNS[..17].iter().map(|column| column.0);
+    names.fold(Table::new(), |table, name| match name.strip_prefix("gamma_5_15_") {
+        Some(side) => table.float(name, flow.gamma(side == "right").into_iter().map(|p| p.1)),
+        None => table.float(name, flow.column(name).iter().copied()),
+    })
 }
 
 fn figure(flow: &History, plane: &History, stored: &Stored) -> Figure {
     let path = |y: Vec<(f64, f64)>, z: Vec<(f64, f64)>| y.into_iter().zip(z).map(|(y, z)| (y.1.abs(), z.1)).collect();
-    let right: Vec<(f64, f64)> = path(flow.curve(|r| r.right.y_m), flow.curve(|r| r.right.z_m));
-    let left: Vec<(f64, f64)> = path(flow.curve(|r| r.left.y_m), flow.curve(|r| r.left.z_m));
+    let right: Vec<(f64, f64)> = path(flow.curve("y_right"), flow.curve("z_right"));
+    let left: Vec<(f64, f64)> = path(flow.curve("y_left"), flow.curve("z_left"));
     let known: Vec<(f64, f64)> = path(stored.curve(Stored::Y[1]), stored.curve(Stored::Z[1]));
     let decay =
         CurvePlot::new("Circulation", Axis::linear("tau"), Axis::linear("Gamma_5-15 / initial").between(0.3, 1.02))
@@ -217,12 +201,11 @@ fn figure(flow: &History, plane: &History, stored: &Stored) -> Figure {
         .with(Series::new("right", Style::Line, right))
         .with(Series::new("independent code, right", Style::Markers, known));
     let waves = CurvePlot::new("Energy along x", Axis::linear("tau"), Axis::log("E_3d [b₀² V₀²]"))
-        .with(Series::new("this solver", Style::Line, flow.curve(|r| r.energy_3d_m4_s2())))
+        .with(Series::new("this solver", Style::Line, flow.curve("energy_3d")))
         .with(Series::new("independent code", Style::Markers, stored.curve(Stored::ENERGY_3D)));
+    let clipped = |curve: Vec<(f64, f64)>| curve.into_iter().map(|p| (p.0, p.1.min(1100.0))).collect::<Vec<_>>();
     let enstrophy = CurvePlot::new("Enstrophy", Axis::linear("tau"), Axis::linear("Z [V₀²]").between(0.0, 1100.0))
-        .with(Series::new("this solver", Style::Line, flow.curve(|r| r.enstrophy_m2_s2.min(1100.0))))
-        .with(Series::new("independent code", Style::Markers, {
-            stored.curve(Stored::ENSTROPHY).into_iter().map(|p| (p.0, p.1.min(1100.0)))
-        }));
+        .with(Series::new("this solver", Style::Line, clipped(flow.curve("enstrophy"))))
+        .with(Series::new("independent code", Style::Markers, clipped(stored.curve(Stored::ENSTROPHY))));
     Figure::stacked([decay, paths, waves, enstrophy])
 }

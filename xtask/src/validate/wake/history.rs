@@ -10,9 +10,43 @@ use wakescope_les::cases::VortexPairCase;
 /// Records per unit of tau.
 pub(crate) const PER_TAU: usize = 20;
 
+/// A name, and what it is of a record.
+type Column = (&'static str, fn(&WakeRecord) -> f64);
+
+/// Columns of a history, by the names that `wake.csv` has for them, in the units of the pair.
+pub(super) const COLUMNS: [Column; 21] = [
+    ("tau", |r| r.time_s),
+    ("gamma_5_15_left", |r| r.left.gamma_5_15_m2_s / TAU),
+    ("gamma_5_15_right", |r| r.right.gamma_5_15_m2_s / TAU),
+    ("y_left", |r| r.left.y_m),
+    ("z_left", |r| r.left.z_m),
+    ("y_right", |r| r.right.y_m),
+    ("z_right", |r| r.right.z_m),
+    ("energy", |r| r.energy_m4_s2),
+    ("enstrophy", |r| r.enstrophy_m2_s2),
+    ("energy_3d", WakeRecord::energy_3d_m4_s2),
+    ("gamma_opposite_left", |r| r.left.gamma_opposite_m2_s / TAU),
+    ("gamma_opposite_right", |r| r.right.gamma_opposite_m2_s / TAU),
+    ("secondary_y_left", |r| r.left.secondary.y_m),
+    ("secondary_z_left", |r| r.left.secondary.z_m),
+    ("secondary_y_right", |r| r.right.secondary.y_m),
+    ("secondary_z_right", |r| r.right.secondary.z_m),
+    ("wall_units", |r| r.wall_units),
+    ("secondary_gamma_left", |r| r.left.secondary.gamma_m2_s / TAU),
+    ("secondary_gamma_right", |r| r.right.secondary.gamma_m2_s / TAU),
+    ("energy_mode_2", mode::<2>),
+    ("energy_mode_3", mode::<3>),
+];
+
+/// Energy of a mode along the flight, of which a plane flow has the first alone.
+fn mode<const MODE: usize>(record: &WakeRecord) -> f64 {
+    record.mode_energy_m4_s2.get(MODE).copied().unwrap_or(f64::NAN)
+}
+
 /// One run, in the units of the pair.
 pub(crate) struct History {
-    pub(crate) records: Vec<WakeRecord>,
+    /// In the order of [`COLUMNS`].
+    pub(super) columns: Vec<Vec<f64>>,
     /// Largest relative residual of the energy budget of a step, from tau = 0.1 on.
     pub(crate) budget_error: f64,
     /// Largest relative difference of the dissipation of a record by its vorticity and by its viscous power, from tau = 0.1 on.
@@ -20,16 +54,21 @@ pub(crate) struct History {
 }
 
 impl History {
-    /// A quantity against tau.
-    pub(crate) fn curve(&self, of: impl Fn(&WakeRecord) -> f64) -> Vec<(f64, f64)> {
-        self.records.iter().map(|r| (r.time_s, of(r))).collect()
+    /// The values of a column; none of one that is not there.
+    pub(crate) fn column(&self, name: &str) -> &[f64] {
+        let place = COLUMNS.iter().position(|column| column.0 == name);
+        place.and_then(|place| self.columns.get(place)).map_or(&[], Vec::as_slice)
+    }
+
+    /// A column against tau.
+    pub(crate) fn curve(&self, name: &str) -> Vec<(f64, f64)> {
+        self.column("tau").iter().copied().zip(self.column(name).iter().copied()).collect()
     }
 
     /// `Gamma_5-15` of the left or right vortex over its initial value.
     pub(crate) fn gamma(&self, right: bool) -> Vec<(f64, f64)> {
-        let of = |r: &WakeRecord| if right { r.right.gamma_5_15_m2_s } else { r.left.gamma_5_15_m2_s };
-        let first = of(&self.records[0]);
-        self.curve(|r| of(r) / first)
+        let curve = self.curve(if right { "gamma_5_15_right" } else { "gamma_5_15_left" });
+        curve.iter().map(|(tau, gamma)| (*tau, gamma / curve[0].1)).collect()
     }
 
     /// The mean of both.
@@ -47,10 +86,11 @@ pub(crate) fn run(pair: &VortexPairCase, end: f64) -> Result<History, Failure> {
 pub(crate) fn run_with(pair: &VortexPairCase, mut meter: WakeMeter, end: f64) -> Result<History, Failure> {
     let (mut flow, _) = pair.clone().case(VortexPairCase::steps(0.01))?.start()?;
     let [length, viscosity] = [pair.size[0], TAU / pair.reynolds];
-    let mut history = History { records: vec![meter.measure(&flow)?], budget_error: 0.0, dissipation_error: 0.0 };
+    let mut records = vec![meter.measure(&flow)?];
+    let [mut budget_error, mut dissipation_error] = [0.0_f64; 2];
     // Energy rate of a step and the powers at its start wait for the powers at its end.
     let mut open: Option<(f64, f64)> = None;
-    let mut measured = 2.0 * viscosity * length * history.records[0].enstrophy_m2_s2;
+    let mut measured = 2.0 * viscosity * length * records[0].enstrophy_m2_s2;
     for i in 1..=(end * PER_TAU as f64).round() as usize {
         let until = i as f64 / PER_TAU as f64;
         while flow.time_s() < until {
@@ -60,20 +100,21 @@ pub(crate) fn run_with(pair: &VortexPairCase, mut meter: WakeMeter, end: f64) ->
             if let Some((rate, before)) = open
                 && time > 0.1
             {
-                history.budget_error = history.budget_error.max((rate / (0.5 * (before + power)) - 1.0).abs());
+                budget_error = budget_error.max((rate / (0.5 * (before + power)) - 1.0).abs());
             }
             if measured.is_finite() && time > 0.1 {
                 let error = (-report.viscous_power_m5_s3 / measured - 1.0).abs();
-                history.dissipation_error = history.dissipation_error.max(error);
+                dissipation_error = dissipation_error.max(error);
             }
             measured = f64::NAN;
             open = Some(((report.kinetic_energy_m5_s2 - energy) / report.step_s, power));
         }
         let record = meter.measure(&flow)?;
         measured = 2.0 * viscosity * length * record.enstrophy_m2_s2;
-        history.records.push(record);
+        records.push(record);
     }
-    Ok(history)
+    let columns = COLUMNS.iter().map(|(_, of)| records.iter().map(of).collect()).collect();
+    Ok(History { columns, budget_error, dissipation_error })
 }
 
 /// A stored run of the independent code: its rows, `tau` first.
@@ -107,5 +148,8 @@ pub(crate) fn worst(
     difference: impl Fn(f64, f64) -> f64,
 ) -> f64 {
     let within = stored.iter().filter(|p| p.0 > from - 1e-9 && p.0 < to + 1e-9);
-    within.map(|p| difference(value_at(measured, p.0), p.1)).fold(0.0, f64::max)
+    // What is no number is no agreement.
+    within
+        .map(|p| difference(value_at(measured, p.0), p.1))
+        .fold(0.0, |most, d| if d > most || d.is_nan() { d } else { most })
 }
