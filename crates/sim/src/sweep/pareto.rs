@@ -22,7 +22,7 @@ pub struct Objective {
     pub sense: Sense,
     /// Value of each point.
     pub values: Vec<f64>,
-    /// Standard error of each, in the same unit; empty or NaN where it is exact.
+    /// Standard error of each, in the same unit: empty where all are exact, NaN where it is not known, as of one realisation.
     pub standard_errors: Vec<f64>,
 }
 
@@ -41,9 +41,9 @@ impl Objective {
         }
     }
 
-    /// Standard error of the difference of two points.
+    /// Standard error of the difference of two points; without end where one is not known.
     fn error(&self, a: usize, b: usize) -> f64 {
-        let error = |i: usize| self.standard_errors.get(i).copied().filter(|e| e.is_finite()).unwrap_or(0.0);
+        let error = |i: usize| self.standard_errors.get(i).map_or(0.0, |e| if e.is_nan() { f64::INFINITY } else { *e });
         error(a).hypot(error(b))
     }
 }
@@ -66,7 +66,8 @@ pub fn front(objectives: &[Objective]) -> Vec<Place> {
     let is_finite = |i: &usize| objectives.iter().all(|o| o.values[*i].is_finite());
     let finite: Vec<usize> = (0..points).filter(is_finite).collect();
     let dominates = |a: usize, b: usize, lenience: f64| {
-        let gains = || objectives.iter().map(|o| o.gain(a, b) + lenience * o.error(a, b));
+        let luck = |o: &Objective| if lenience > 0.0 { lenience * o.error(a, b) } else { 0.0 };
+        let gains = || objectives.iter().map(|o| o.gain(a, b) + luck(o));
         a != b && gains().all(|gain| gain >= 0.0) && gains().any(|gain| gain > 0.0)
     };
     let mut places = vec![Place::Off; points];

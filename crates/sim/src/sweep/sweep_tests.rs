@@ -167,6 +167,8 @@ fn members_within_two_standard_errors_of_being_beaten_are_doubtful() {
     // 0.2 apart: 2 sqrt(2) 0.08 is more, 2 sqrt(2) 0.07 less.
     assert_eq!(with([0.08, 0.08, 0.0]), [Place::Doubtful, Place::On, Place::Off]);
     assert_eq!(with([0.07, 0.07, f64::NAN]), [Place::On, Place::On, Place::Off]);
+    // An error that is not known is not small.
+    assert_eq!(with([f64::NAN; 3]), [Place::Doubtful, Place::On, Place::Off]);
 }
 
 /// Counts what is computed.
