@@ -6,8 +6,7 @@
 
 use crate::Error;
 use crate::plan::Plan;
-use crate::scene::{Method, RegionRadius, Scene};
-use crate::setup::estimators;
+use crate::setup::{estimators, region::largest_radius_m};
 use ndarray::Array2;
 use std::collections::BTreeMap;
 use wakescope_signal::RangeFilter;
@@ -16,6 +15,8 @@ use wakescope_signal::RangeFilter;
 const FREEDOM: f64 = 6.0;
 /// Most of these units: beyond, more neighbours would be too unlike.
 const MOST_UNITS: f64 = 4.0;
+/// Degrees of freedom over which it is asked whether squares of errors scatter less than those of Gaussian ones.
+const FREEDOM_OF_SCATTER: f64 = 120.0;
 /// Part of the cells that share windows over which squares of errors are alike.
 const ALIKE: f64 = 0.25;
 /// Outliers are beyond so many medians of the errors about them: four standard deviations of Gaussian ones.
@@ -36,22 +37,21 @@ pub(crate) fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
 pub(crate) fn shared_cells(plan: &Plan) -> Result<[f64; 2], Error> {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
-    let line_m = scene.scan.elevation_step_rad * middle_m;
+    // From one line to the next of the same sweep; lines of which each is alone share nothing.
+    let schedule = &g.schedule;
+    let next = |i: &usize| schedule.lines.get(i + 1).is_some_and(|next| next.group == schedule.lines[*i].group);
+    let apart = |i: usize| {
+        let [a, b] = [i, i + 1].map(|line| schedule.middle(line).direction.0);
+        (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+    };
+    let mut steps: Vec<f64> = (0..schedule.lines.len()).filter(next).map(apart).collect();
+    steps.sort_by(f64::total_cmp);
+    let line_m = middle_m * steps.get(steps.len() / 2).copied().unwrap_or(f64::INFINITY);
     let gate_m = scene.estimator.gate_step_samples as f64 * g.sample_spacing_m;
-    let across_m = 2.0 * radius_m(scene, middle_m);
+    let across_m = 2.0 * largest_radius_m(scene, middle_m);
     let lines = (across_m / line_m).floor() + 1.0;
     let gates = (range_filter(plan)?.full_width_half_maximum_m().hypot(across_m) / gate_m).max(1.0);
     Ok([lines.min(g.elevation_rad.len() as f64), gates.min(g.gate_range_m.len() as f64)])
-}
-
-/// Radius of the regions in the middle of the scan, m.
-fn radius_m(scene: &Scene, middle_m: f64) -> f64 {
-    match &scene.estimator.radius {
-        _ if scene.estimator.method == (Method::Periodogram {}) => 0.0,
-        RegionRadius::Fixed {} => scene.estimator.radius_m,
-        RegionRadius::OfRange { range_m, radius_m } => crate::setup::table::of_table(range_m, radius_m, middle_m),
-        RegionRadius::Target { largest_m, .. } => *largest_m,
-    }
 }
 
 /// What one realisation shows, each \[line, gate\].
@@ -76,6 +76,8 @@ pub struct ErrorLaw {
     variance: Array2<f64>,
     /// Variance of the squares of their deviations over the square of the variance: 2 for Gaussian ones.
     of_squares: f64,
+    /// Variance of the squares of the errors as the realisations show it.
+    scatter: Array2<f64>,
     /// Outliers found.
     outliers: Array2<f64>,
     /// Their part of all estimates of the map.
@@ -127,8 +129,12 @@ impl ErrorLaw {
         let fourth = ratios.iter().sum::<f64>() / (ratios.len() as f64).max(1.0) * (seen + 2.0) / seen;
         let of_squares = 2.0 + (fourth - 3.0).max(0.0) * n * n * freedom / (freedom.powi(3) + 1.0);
         let variance = pooled(reach(shared, FREEDOM * of_squares.min(MOST_UNITS) / freedom));
+        let scatter = Array2::from_shape_fn(shape, |cell| {
+            let mean = finite(cell).map(|e| e * e).sum::<f64>() / count[cell].max(1.0);
+            finite(cell).map(|e| (e * e - mean).powi(2)).sum::<f64>() / (count[cell] - 1.0).max(1.0)
+        });
         let outlier_part = outliers.sum() / count.sum().max(1.0);
-        Some(Self { shared, count, bias_m_s, variance, of_squares, outliers, outlier_part, powers })
+        Some(Self { shared, count, bias_m_s, variance, of_squares, scatter, outliers, outlier_part, powers })
     }
 
     /// Expected part of outliers among `count` estimates that have `found`: those of the map count as one more.
@@ -137,19 +143,42 @@ impl ErrorLaw {
     }
 
     /// Standard error of the root mean square of each cell, m/s; NaN for fewer than two estimates.
+    ///
+    /// Squares of errors that scatter less than those of Gaussian ones over many neighbours, such as of guesses at either edge of the band,
+    /// count with what they scatter.
     #[must_use]
     pub fn rms_standard_errors(&self) -> Array2<f64> {
+        let outliers = |cell| {
+            let part = self.expected(self.outliers[cell], self.count[cell]);
+            self.powers.each_ref().map(|power| part * power[cell])
+        };
+        // What the scatter adds to it is taken off: it may be below zero.
+        let squared_bias = |cell| self.bias_m_s[cell].powi(2) - self.variance[cell] / self.count[cell];
+        let of_squares = |cell, squared_bias: f64| {
+            let (variance, [far, _]) = (self.variance[cell], outliers(cell));
+            4.0 * squared_bias * (variance + far) + self.of_squares * variance.powi(2) + 2.0 * variance * far
+        };
+        let freedom = self.count.mapv(|n| (n - 1.0).max(0.0));
+        let wide = reach(self.shared, FREEDOM_OF_SCATTER / freedom.mean().unwrap_or(1.0).max(1.0));
+        let about = |of: &dyn Fn((usize, usize)) -> f64| {
+            let one = |cell| if self.variance[cell] > 0.0 { freedom[cell] * of(cell) } else { 0.0 };
+            sums_about(&Array2::from_shape_fn(freedom.dim(), one), wide)
+        };
+        let seen = about(&|cell| self.scatter[cell] / self.variance[cell].powi(2));
+        let law = about(&|cell| of_squares(cell, squared_bias(cell)) / self.variance[cell].powi(2));
+        let freedoms = about(&|_| 1.0);
         Array2::from_shape_fn(self.count.dim(), |cell| {
-            let (n, variance) = (self.count[cell], self.variance[cell]);
+            let n = self.count[cell];
             if n < 2.0 {
                 return f64::NAN;
             }
-            let part = self.expected(self.outliers[cell], n);
-            let [far, of_far] = self.powers.each_ref().map(|power| part * power[cell]);
-            let squared_bias = (self.bias_m_s[cell].powi(2) - variance / n).max(0.0);
-            let of_mean =
-                4.0 * squared_bias * (variance + far) + self.of_squares * variance.powi(2) + 2.0 * variance * far;
-            error_of_root(squared_bias + variance, of_mean / n, [far, of_far / n])
+            // The variance of a chi-square is known to the root of 14 over its degrees of freedom; as much more is borne.
+            let independent = (freedoms[cell] / (ALIKE * self.shared[0] * self.shared[1])).max(1.0);
+            let less = (seen[cell] / law[cell] * (1.0 + (14.0 / independent).sqrt())).min(1.0);
+            let [far, of_far] = outliers(cell);
+            let squared_bias = squared_bias(cell).max(0.0);
+            let of_mean = less * of_squares(cell, squared_bias) / n;
+            error_of_root(squared_bias + self.variance[cell], of_mean, [far, of_far / n])
         })
     }
 

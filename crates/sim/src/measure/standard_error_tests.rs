@@ -1,7 +1,7 @@
 //! Standard errors of cells and of averages against the scatter over many independent maps, drawn from laws that are known.
 
 use crate::measure::cell_average::{CellAverage, flagged_fraction};
-use crate::measure::error_law::{ErrorLaw, ScanErrors};
+use crate::measure::error_law::{ErrorLaw, ScanErrors, shared_cells};
 use crate::measure::map::VelocityEstimates;
 use crate::plan::{Plan, Target};
 use crate::run::run;
@@ -146,6 +146,33 @@ fn standard_errors_of_cells_cover_however_few_realisations_there_are() {
 }
 
 #[test]
+fn guesses_at_either_edge_of_the_band_have_squares_that_hardly_scatter() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+    for scans in [2, 4, 8, 20] {
+        let mut found = Found::default();
+        // The truth is not in the middle of the band; neighbours that share windows guess alike.
+        let edges = [BAND_M_S - 2.0, -BAND_M_S - 2.0];
+        for _ in 0..20 {
+            let mut scan = || {
+                let white = Array2::from_shape_simple_fn((SHAPE.0 + 2, SHAPE.1 + 3), || normal(&mut rng));
+                let is_low = |(i, j)| white.slice(ndarray::s![i..i + 3, j..j + 4]).sum() < 0.0;
+                let error_m_s = Array2::from_shape_fn(SHAPE, |cell| edges[usize::from(is_low(cell))]);
+                ScanErrors { error_m_s, flagged: Array2::from_elem(SHAPE, true) }
+            };
+            let scans: Vec<ScanErrors> = (0..scans).map(|_| scan()).collect();
+            let stated = ErrorLaw::new(&scans, SHARED).unwrap().rms_standard_errors();
+            let truth = (0.5 * (edges[0].powi(2) + edges[1].powi(2))).sqrt();
+            found.0.extend(cells(|(i, j)| i % 3 == 1 && j % 4 == 1).into_iter().map(|cell| {
+                let square = scans.iter().map(|scan| scan.error_m_s[cell].powi(2)).sum::<f64>() / scans.len() as f64;
+                [square.sqrt() - truth, stated[cell]]
+            }));
+        }
+        let [one, two, size] = found.covered();
+        assert!(two > 0.9 && (0.9..1.5).contains(&size), "{scans} scans: {one} {two} {size}");
+    }
+}
+
+#[test]
 fn standard_errors_of_averages_cover_however_few_realisations_and_cells_there_are() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     let cases = laws(2).chain(laws(40).skip(5).step_by(5));
@@ -205,6 +232,24 @@ fn standard_errors_of_simulated_maps_cover_with_two_realisations() {
     let [one, two, size] = found.covered();
     assert!(one > 0.6 && two > 0.93 && (0.9..1.5).contains(&size), "{one} {two} {size}");
     assert!(maps.iter().all(|map| map.law.is_some() && map.scans.len() == 2));
+}
+
+#[test]
+fn lines_share_windows_by_the_distance_between_them_whatever_the_pattern() {
+    // Regions of 4 m across in the middle of 280 to 520 m; the elevation step that scenes have by default counts in none of them.
+    let lines = |pattern: &str| {
+        let text = format!("[scan]\nlidar_height_m = 20.0\n{pattern}");
+        let file = SceneFile::parse(&text, std::path::Path::new("s.toml")).unwrap();
+        shared_cells(&Plan::new(file, Target::Map).unwrap()).unwrap()[0]
+    };
+    let ppi = |step_rad: f64| {
+        lines(&format!(
+            "pattern = {{ kind = \"ppi\", elevations_rad = [0.1], azimuth_min_rad = 1.4, azimuth_max_rad = 1.6, azimuth_step_rad = {step_rad:?} }}"
+        ))
+    };
+    assert_eq!((ppi(2e-3), ppi(2e-2)), (6.0, 1.0));
+    // Beams 60 degrees apart share nothing.
+    assert_eq!(lines("pattern = { kind = \"vad\", elevation_rad = 1.2, beams = 6 }"), 1.0);
 }
 
 #[test]

@@ -3,25 +3,19 @@
 //! Check: the number that is warned of is that of the gates which a run leaves empty, and the remedy leaves none.
 
 use crate::Error;
-use crate::scene::{Method, RegionRadius, Scene};
+use crate::scene::Scene;
 use crate::setup::geometry::Geometry;
-use crate::setup::region::places;
-use crate::setup::table::of_table;
+use crate::setup::region::{largest_radius_m, places};
 use wakescope_estimate::map::PolarPoint;
 
 /// A warning if a line has gates without a window. Regions as large as a standard deviation asks for are not looked at.
 pub(super) fn warning(scene: &Scene, g: &Geometry) -> Result<Option<String>, Error> {
     let e = &scene.estimator;
-    let radius_m = |range_m: f64| match &e.radius {
-        _ if e.method == (Method::Periodogram {}) => 0.0,
-        RegionRadius::OfRange { range_m: at_m, radius_m } => of_table(at_m, radius_m, range_m),
-        RegionRadius::Target { largest_m, .. } => *largest_m,
-        RegionRadius::Fixed {} => e.radius_m,
-    };
     let places = places(scene, g)?;
     let elevation_rad = places.line_elevation_rad()[0];
-    let is_empty =
-        |range_m: f64| places.chords(PolarPoint { range_m, elevation_rad }, radius_m(range_m)).next().is_none();
+    let is_empty = |range_m: f64| {
+        places.chords(PolarPoint { range_m, elevation_rad }, largest_radius_m(scene, range_m)).next().is_none()
+    };
     let empty = g.gate_range_m.iter().filter(|range_m| is_empty(**range_m)).count();
     let step_m = e.window_step_samples as f64 * scene.sample_spacing_m();
     let windows_m = places.gate_ranges_m();
@@ -34,7 +28,7 @@ pub(super) fn warning(scene: &Scene, g: &Geometry) -> Result<Option<String>, Err
              with windows that gates are a multiple of apart",
             g.gate_range_m.len(),
             e.window_step_samples,
-            2.0 * radius_m(g.gate_range_m[0]),
+            2.0 * largest_radius_m(scene, g.gate_range_m[0]),
             // rounded up, so that the number given is good
             (1000.0 * farthest_m).ceil() / 1000.0,
         )

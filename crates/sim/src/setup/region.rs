@@ -56,6 +56,17 @@ pub(crate) fn region_radius(scene: &Scene, of_rays: &RayInformation, geometry: &
     }
 }
 
+/// Radius of the regions of a scene at a range, m; the largest that is allowed where it is sought.
+pub(crate) fn largest_radius_m(scene: &Scene, range_m: f64) -> f64 {
+    let e = &scene.estimator;
+    match &e.radius {
+        _ if e.method == (Method::Periodogram {}) => 0.0,
+        RegionRadius::OfRange { range_m: at_m, radius_m } => of_table(at_m, radius_m, range_m),
+        RegionRadius::Target { largest_m, .. } => *largest_m,
+        RegionRadius::Fixed {} => e.radius_m,
+    }
+}
+
 /// The wind of a map \[line, gate\] anywhere, bilinear between its points; NaN outside and where a neighbour is NaN.
 pub(crate) fn interpolated(points: &[PolarPoint], velocity_m_s: Array2<f64>) -> impl Fn(PolarPoint) -> f64 + Sync {
     let (lines, gates) = velocity_m_s.dim();
