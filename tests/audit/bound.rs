@@ -3,7 +3,7 @@
 use super::geometry::{Scan, radius_m};
 use super::ledger::Ledger;
 use super::numerics::{Complex, information};
-use super::power::{Pulse, window_powers};
+use super::power::{Pulse, Ratios, window_powers};
 use super::scene::Scene;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -12,8 +12,9 @@ use std::f64::consts::PI;
 /// Density of what is left of band noise outside of the band, in that of the band (page on the scene file, The bound).
 const FLOOR: f64 = 1e-6;
 
-/// Information of a record of `n` samples about the velocity of a uniform wind at rest (E12), s^2/m^2.
-pub(crate) fn record_information(s: &Scene, pulse: &Pulse, n: usize, snr: f64) -> f64 {
+/// Information of a record of `n` samples about the velocity of a uniform wind at rest (E12), s^2/m^2; noise in the band has unit power, the
+/// signal the ratio so many samples behind the middle of the record.
+fn record_information(s: &Scene, pulse: &Pulse, n: usize, snr: impl Fn(f64) -> f64) -> f64 {
     let (ts, lambda) = (1.0 / s.f("detector.sampling_hz"), s.f("laser.wavelength_m"));
     let (b, fc) = (s.f("detector.bandwidth_hz") * ts, s.f("detector.intermediate_frequency_hz") * ts);
     let is_baseband = s.s("detector.signal") == "baseband";
@@ -23,23 +24,31 @@ pub(crate) fn record_information(s: &Scene, pulse: &Pulse, n: usize, snr: f64) -
     let c = |l: f64| (-spread * (l * ts / (2.0 * pulse.sigma_s)).powi(2)).exp();
     let sinc = |x: f64| if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) };
     let delta = |l: f64| if l == 0.0 { 1.0 } else { 0.0 };
-    // Power of the noise in the band is one over the ratio; its density goes on beyond the band where it is white.
+    // The density of the noise goes on beyond the band where it is white.
     let noise = |l: f64| match (is_band, is_baseband) {
-        (false, true) => delta(l) / (b * snr),
-        (false, false) => delta(l) * 0.5 / (b * snr),
-        (true, true) => ((1.0 - FLOOR) * sinc(b * l) + FLOOR / b * delta(l)) / snr,
-        (true, false) => ((1.0 - FLOOR) * sinc(b * l) * (2.0 * PI * fc * l).cos() + 0.5 * FLOOR / b * delta(l)) / snr,
+        (false, true) => delta(l) / b,
+        (false, false) => delta(l) * 0.5 / b,
+        (true, true) => (1.0 - FLOOR) * sinc(b * l) + FLOOR / b * delta(l),
+        (true, false) => (1.0 - FLOOR) * sinc(b * l) * (2.0 * PI * fc * l).cos() + 0.5 * FLOOR / b * delta(l),
     };
+    // Two samples of a Gaussian pulse share the air about the middle between them.
+    let between: Vec<f64> = (0..2 * n).map(|sum| snr(0.5 * sum as f64 - 0.5 * (n as f64 - 1.0))).collect();
     let rate = 4.0 * PI * ts / lambda;
-    let lag = |i: usize, j: usize| i as f64 - j as f64;
-    let matrix =
-        |of: &dyn Fn(f64) -> Complex| (0..n).map(|i| (0..n).map(|j| of(lag(i, j))).collect()).collect::<Vec<Vec<_>>>();
+    // Of lag and power.
+    let matrix = |of: &dyn Fn(f64, f64) -> Complex| {
+        let row = |i: usize| (0..n).map(|j| of(i as f64 - j as f64, between[i + j])).collect();
+        (0..n).map(row).collect::<Vec<Vec<_>>>()
+    };
     let (r, d, share) = match is_baseband {
-        true => (matrix(&|l| Complex::from(c(l) + noise(l))), matrix(&|l| Complex::new(0.0, -rate * l * c(l))), 1.0),
+        true => (
+            matrix(&|l, p| Complex::from(p * c(l) + noise(l))),
+            matrix(&|l, p| Complex::new(0.0, -rate * l * p * c(l))),
+            1.0,
+        ),
         // The real part of the same on its carrier.
         false => (
-            matrix(&|l| Complex::from(c(l) * (2.0 * PI * fc * l).cos() + noise(l))),
-            matrix(&|l| Complex::from(rate * l * c(l) * (2.0 * PI * fc * l).sin())),
+            matrix(&|l, p| Complex::from(p * c(l) * (2.0 * PI * fc * l).cos() + noise(l))),
+            matrix(&|l, p| Complex::from(rate * l * p * c(l) * (2.0 * PI * fc * l).sin())),
             0.5,
         ),
     };
@@ -93,13 +102,12 @@ pub(crate) fn independent(s: &Scene, pulse: &Pulse, windows: &[Vec<usize>], puls
 }
 
 /// The bound of a region: each line's record that its windows cover, every pulse of it, (E12) for independent records.
-fn region_m_s(s: &Scene, pulse: &Pulse, windows: &[Vec<usize>], pulses: usize, snr: f64) -> f64 {
-    let n = s.n("estimator.window_samples");
+fn region_m_s(n: usize, windows: &[Vec<usize>], pulses: usize, record: impl Fn(usize) -> f64) -> f64 {
     let mut known = BTreeMap::new();
     let mut sum = 0.0;
     for starts in windows.iter().filter(|starts| !starts.is_empty()) {
         let length = starts[starts.len() - 1] - starts[0] + n;
-        sum += *known.entry(length).or_insert_with(|| record_information(s, pulse, length, snr));
+        sum += *known.entry(length).or_insert_with(|| record(length));
     }
     1.0 / (pulses as f64 * sum).sqrt()
 }
@@ -118,34 +126,53 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
     }
     let chosen =
         |points: &[Value], rows: &[usize]| rows.iter().filter_map(|&i| points.get(i).cloned()).collect::<Vec<_>>();
-    let at_ratio = chosen(&by_snr, &[10, 30, 50]).into_iter().map(|p| (p, gates / 2));
+    let at_ratio = chosen(&by_snr, &[10, 30, 50]).into_iter().map(|p| (p, gates / 2, false));
     let ends = [0, gates / 2, gates - 1];
-    let at_range = chosen(&by_range, &ends).into_iter().zip(ends);
-    for (point, gate) in at_ratio.chain(at_range) {
+    let at_range = chosen(&by_range, &ends).into_iter().zip(ends).map(|(p, gate)| (p, gate, true));
+    let ratios = Ratios::new(s, pulse, scan, 3.0);
+    for (point, gate, is_of_range) in at_ratio.chain(at_range) {
         let f = |key: &str| point[key].as_f64().unwrap_or(f64::NAN);
-        let ratio = 10_f64.powf(0.1 * f("snr_db"));
+        let air = 10_f64.powf(0.1 * f("snr_db"));
         ledger.equal("bound: range_m", f("range_m"), scan.gate_m[gate], 1e-6);
-        if ratio.is_nan() {
+        if air.is_nan() {
             continue;
-        }
-        let tolerance = 1e-4;
-        if f("snr_db") <= 30.0 {
-            let right = 1.0 / record_information(s, &pulse, n, ratio).sqrt();
-            ledger.equal("bound: bound_window_m_s", f("bound_window_m_s"), right, tolerance * right);
         }
         let Some(radius) = radius_m(s, scan.gate_m[gate]) else { continue };
         let windows = match s.s("estimator.method.kind") == "periodogram" {
-            true => vec![vec![scan.gate_start[gate]]],
+            true => vec![scan.own_window(gate)],
             false => scan.region(line, gate, radius, n),
         };
         let count = windows.iter().map(Vec::len).sum::<usize>();
         ledger.equal("bound: level", f("level"), (count * scan.pulses) as f64, 0.5);
-        let right = independent(s, &pulse, &windows, scan.pulses, ratio);
+        if count == 0 {
+            ledger.equal("bound: n_eff", f("n_eff"), 0.0, 0.0);
+            ledger.equal("bound: bound_region_m_s", f("bound_region_m_s"), f64::NAN, 0.0);
+            continue;
+        }
+        let here = if is_of_range { ratios.at_gate(scan.gate_m[gate], air) } else { air };
+        let right = independent(s, &pulse, &windows, scan.pulses, here);
         ledger.equal("bound: n_eff", f("n_eff"), right, 1e-3 * right);
         let longest = windows.iter().filter_map(|w| Some(w.last()? - w.first()? + n)).max().unwrap_or(n);
-        if f("snr_db") <= 30.0 && longest <= 200 {
-            let right = region_m_s(s, &pulse, &windows, scan.pulses, ratio);
-            ledger.equal("bound: bound_region_m_s", f("bound_region_m_s"), right, tolerance.max(1e-3) * right);
+        if f("snr_db") > 30.0 || longest > 200 {
+            continue;
         }
+        // A ratio that changes by less than a factor of two along the longest record is that in its middle.
+        let seen = |samples: f64| ratios.seen(scan.gate_m[gate] + (samples - 0.5) * scan.sample_step_m());
+        let half = 0.5 * longest as f64;
+        let change =
+            (-4..=4).map(|i| seen(0.25 * half * f64::from(i)) / here).fold(1.0, |a: f64, x| a.max(x).max(1.0 / x));
+        let is_alike = !is_of_range || change < 1.9;
+        if !is_alike && (change < 2.1 || pulse.chirp_hz_s != 0.0) {
+            continue; // on the edge of that rule, or turned by the chirp
+        }
+        let information = |n: usize| match is_alike {
+            true => record_information(s, &pulse, n, |_| here),
+            false => record_information(s, &pulse, n, seen),
+        };
+        let tolerance = if is_alike { 1e-4 } else { 2e-3 };
+        let right = 1.0 / information(n).sqrt();
+        ledger.equal("bound: bound_window_m_s", f("bound_window_m_s"), right, tolerance * right);
+        let right = region_m_s(n, &windows, scan.pulses, information);
+        ledger.equal("bound: bound_region_m_s", f("bound_region_m_s"), right, tolerance.max(1e-3) * right);
     }
 }

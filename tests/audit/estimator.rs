@@ -109,8 +109,9 @@ pub(crate) fn hold_turns(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     let mut s = draw::scene(r);
     s.unset("estimator").set("outputs.signals", true).set("scan.realisations", 1).set("scan.head.sweeps", 2);
     s.word("scan.head.direction", "alternate").set("estimator.gate_step_samples", 25);
+    s.set("estimator.window_step_samples", 3).set("scan.pulses_per_line", r.whole(1, 2));
     s.number("scan.elevation_min_rad", 0.08)
-        .number("scan.elevation_step_rad", 5e-3)
+        .number("scan.elevation_step_rad", 1e-2)
         .number("scan.elevation_max_rad", 0.12);
     bench.write("s.toml", &s.text());
     if !bench.run(&["check", "s.toml"]).is_good || bench.must(ledger, &["run", "s.toml", "--out", "o"]).is_none() {

@@ -19,8 +19,11 @@ const REFRACTIVE: [(&str, &str); 7] = [
     ("atmosphere.turbulence.realisations", "8"),
     ("outputs.profile_range_max_m", "600.0"),
 ];
-const BISTATIC: [(&str, &str); 2] =
-    [("atmosphere.turbulence.kind", "\"refractive\""), ("telescope.receiver", "\"bistatic\"")];
+const BISTATIC: [(&str, &str); 3] = [
+    ("atmosphere.turbulence.kind", "\"refractive\""),
+    ("atmosphere.turbulence.cn2_m_m23", "3e-14"),
+    ("telescope.receiver", "\"bistatic\""),
+];
 const FRONT: [(&str, &str); 1] = [("detector.front_end.half_power_hz", "1e8")];
 const PPI: [(&str, &str); 1] = [("scan.lidar_height_m", "20.0")];
 
@@ -209,7 +212,7 @@ fn small() -> Scene {
 
 /// A few keys of the list, those that the draw takes.
 pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
-    for _ in 0..8 {
+    for _ in 0..6 {
         let (key, needs, values, command, column) = r.pick(&KEYS);
         let shown = values.map(|value| {
             let mut s = small();

@@ -114,11 +114,12 @@ impl Beam {
             let along = (-(x * x + 0.25 * rho * rho) / self.s_m.powi(2)).exp() * (q * x).cos();
             4.0 * along * across / (PI * self.s_m.powi(2))
         };
-        // Smooth between the edges of aperture and obscuration, with square roots there, which the sine takes away.
+        // Smooth between the edges of aperture and obscuration, with square roots there, which the sine takes away but where a piece has others.
+        let fine = if self.b_m > 0.0 { 4 } else { 1 };
         let ends = between(0.0, edge, &[0.5 * rho - self.b_m, 0.5 * rho + self.b_m]);
         let of_piece = |ends: &[f64]| {
             let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
-            let panels = 2 + (q * half).abs() as usize / 3;
+            let panels = fine * (2 + (q * half).abs() as usize / 3);
             integral(-0.5 * PI, 0.5 * PI, panels, |t| half * t.cos() * of_x(middle + half * t.sin()))
         };
         ends.windows(2).map(of_piece).sum()
@@ -247,6 +248,37 @@ pub(crate) fn free_space_snr_db(s: &Scene, range_m: f64) -> f64 {
     let efficiency = if s.s("detector.snr.reference") == "fixed" { 1.0 } else { free_space_efficiency(s, range_m) };
     let ratio = snr(s, range_m, efficiency);
     if ratio > 0.0 { db(ratio) } else { f64::NAN }
+}
+
+/// Ratios of the air in free space, and of what samples see of it through the pulse (O9), by layers.
+pub(crate) struct Ratios {
+    pulse: Pulse,
+    range_m: Vec<f64>,
+    snr: Vec<f64>,
+}
+
+impl Ratios {
+    pub(crate) fn new(s: &Scene, pulse: Pulse, scan: &Scan, step_m: f64) -> Self {
+        let reach_m = 4.5 * pulse.scale_m();
+        let (near_m, far_m) = (scan.sample_m[0] - reach_m, scan.sample_m[scan.sample_m.len() - 1] + reach_m);
+        let count = 4 + ((far_m - near_m) / step_m) as usize;
+        let range_m: Vec<f64> = (0..count).map(|i| near_m + (far_m - near_m) * i as f64 / (count - 1) as f64).collect();
+        let snr = range_m.iter().map(|&r| 10_f64.powf(0.1 * free_space_snr_db(s, r))).collect();
+        Self { pulse, range_m, snr }
+    }
+
+    /// Mean ratio of a sample that sees a range: a sum over layers, so that records of them have a covariance.
+    pub(crate) fn seen(&self, r: f64) -> f64 {
+        let of_layers = self.range_m.iter().zip(&self.snr);
+        let sum: f64 = of_layers.map(|(&x, snr)| snr * self.pulse.power_over_range(r - x)).sum();
+        sum * (self.range_m[1] - self.range_m[0])
+    }
+
+    /// Ratio at a gate where the air has one: that which its samples see where this is more than twice or less than half of it.
+    pub(crate) fn at_gate(&self, r: f64, air: f64) -> f64 {
+        let seen = self.seen(r);
+        if (0.5..=2.0).contains(&(seen / air)) { air } else { seen }
+    }
 }
 
 pub(crate) fn db(ratio: f64) -> f64 {
@@ -431,22 +463,14 @@ pub(crate) fn hold_signals(ledger: &mut Ledger, bench: &Bench, s: &Scene, scan: 
         let at = p * samples + k;
         current[at].powi(2) + quadrature.get(at).map_or(0.0, |q| q * q)
     };
-    // (O9) from a table of (O10): a smooth curve.
-    let reach_m = 4.5 * pulse.scale_m();
-    let (near_m, far_m) = (scan.sample_m[0] - reach_m, scan.sample_m[samples - 1] + reach_m);
-    let count = 4 + ((far_m - near_m) / 6.0) as usize;
-    let table_m: Vec<f64> = (0..count).map(|i| near_m + (far_m - near_m) * i as f64 / (count - 1) as f64).collect();
-    let table: Vec<f64> = table_m.iter().map(|&r| 10_f64.powf(0.1 * free_space_snr_db(s, r))).collect();
-    let over_pulse = |r: f64| {
-        integral(r - reach_m, r + reach_m, 12, |x| straight(&table_m, &table, x) * pulse.power_over_range(r - x))
-    };
+    let ratios = Ratios::new(s, pulse, scan, 6.0);
     const BINS: usize = 6;
     for bin in 0..BINS {
         let ks: Vec<usize> = (bin * samples / BINS..(bin + 1) * samples / BINS).collect();
         let of_pulse: Vec<f64> =
             (0..pulses).map(|p| ks.iter().map(|&k| power(p, k)).sum::<f64>() / ks.len() as f64).collect();
         let (mean, error) = average_and_error(&of_pulse);
-        let expected = ks.iter().step_by(4).map(|&k| over_pulse(scan.sample_m[k])).sum::<f64>()
+        let expected = ks.iter().step_by(4).map(|&k| ratios.seen(scan.sample_m[k])).sum::<f64>()
             / ks.iter().step_by(4).count() as f64;
         let right = receiver.noise_a2 * expected + noise_a2;
         ledger.mean(

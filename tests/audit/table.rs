@@ -3,10 +3,7 @@
 use super::ledger::{Ledger, Tally};
 
 /// Numbers that are known to be wrong, with the reason; one that comes right must be taken out.
-const AWAITED: &[(&str, &str)] = &[(
-    "results.csv: rms_outside_standard_error_m_s*",
-    "with few cells and realisations: outliers that a map has not shown yet",
-)];
+const AWAITED: &[(&str, &str)] = &[];
 
 /// Numbers that the program writes without a definition here, with the reason.
 const WITHOUT: &[(&str, &str)] = &[
@@ -68,6 +65,8 @@ const ENOUGH_DRAWS: usize = 100;
 pub struct Report {
     /// The table, a line for each number, and the faults in full.
     pub text: String,
+    /// The table for the book, as Markdown.
+    pub page: String,
     /// Names of the numbers that are wrong.
     pub faults: Vec<String>,
 }
@@ -89,6 +88,8 @@ fn awaited(number: &str) -> Option<&'static str> {
 impl Report {
     pub(crate) fn new(ledger: &Ledger, draws: usize) -> Self {
         let (mut text, mut faults, mut details) = (String::new(), Vec::new(), String::new());
+        let mut page =
+            String::from("| number | defined in | draws | worst deviation | verdict |\n|---|---|---|---|---|\n");
         text += &format!("{:<62} {:<18} {:>6}  {:<34} verdict\n", "number", "defined in", "draws", "worst");
         for (number, tally) in &ledger.tallies {
             let is_wrong = tally.excess() > 1.0;
@@ -103,8 +104,11 @@ impl Report {
             if is_wrong {
                 details += &format!("{verdict}: {number}\n    {}\n", tally.at);
             }
-            text += &line(number, tally, verdict);
+            let (place, draws, worst) = (place(tally), tally.draws, tally.shown());
+            text += &format!("{number:<62} {place:<18} {draws:>6}  {worst:<34} {verdict}\n");
+            page += &format!("| {number} | `{place}` | {draws} | {worst} | {verdict} |\n");
         }
+        page += "\n| number without a definition here | why |\n|---|---|\n";
         for name in &ledger.seen {
             let is_held = ledger
                 .tallies
@@ -113,7 +117,10 @@ impl Report {
             match WITHOUT.iter().find(|(pattern, _)| covers(pattern, name)) {
                 _ if is_held => {}
                 None if draws < ENOUGH_DRAWS => {}
-                Some((_, reason)) => text += &format!("{name:<62} none: {reason}\n"),
+                Some((_, reason)) => {
+                    text += &format!("{name:<62} none: {reason}\n");
+                    page += &format!("| {name} | {reason} |\n");
+                }
                 None => {
                     text += &format!("{name:<62} FAULT: it has no definition, and no reason why\n");
                     faults.push(name.clone());
@@ -126,18 +133,15 @@ impl Report {
             details += &format!("FAULT: {pattern} came right: take it out of AWAITED ({reason})\n");
             faults.push((*pattern).into());
         }
-        let refused = ledger.refused.len();
-        text += &format!(
-            "{details}{draws} draws, {refused} refused; {} numbers held, {} faults\n",
-            ledger.tallies.len(),
-            faults.len()
-        );
-        Self { text, faults }
+        let (refused, held) = (ledger.refused.len(), ledger.tallies.len());
+        let sum = format!("{draws} draws, {refused} refused; {held} numbers held, {} faults\n", faults.len());
+        text += &format!("{details}{sum}");
+        Self { text, page: format!("{sum}\n{page}"), faults }
     }
 }
 
-fn line(number: &str, tally: &Tally, verdict: &str) -> String {
+/// File and line of a definition.
+fn place(tally: &Tally) -> String {
     let file = tally.place.file().rsplit('/').next().unwrap_or_default();
-    let place = format!("{file}:{}", tally.place.line());
-    format!("{number:<62} {place:<18} {:>6}  {:<34} {verdict}\n", tally.draws, tally.shown())
+    format!("{file}:{}", tally.place.line())
 }
