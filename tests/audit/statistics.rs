@@ -308,11 +308,12 @@ pub(crate) fn hold_spectra(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Cs
         ledger.equal("map.csv: width_m_s, of models", width, f64::NAN, 0.0);
         return;
     }
-    // A uniform wind has the width of the pulse's spectrum (E2). Its words: empty where the peak of a line fills the band or is so much
-    // wider, and for the broad tapers of a likelihood.
+    // A uniform wind has the width of the pulse's spectrum (E2). Empty: where a line's peak fills the band, or for broad tapers.
     let right = 0.5 * s.f("laser.wavelength_m") * pulse.spectral_deviation_hz();
     let step = 0.5 * s.f("laser.wavelength_m") * s.f("detector.sampling_hz") / s.f("estimator.window_samples");
-    let is_shown = s.f("detector.snr.snr_db") >= 5.0 && right > 0.2 * step && !method.contains("likelihood");
+    let fits = 0.5 * s.f("laser.wavelength_m") * s.f("detector.bandwidth_hz") / step
+        > if s.s("estimator.weighting") == "hann" { 8.0 } else { 4.0 };
+    let is_shown = fits && s.f("detector.snr.snr_db") >= 5.0 && right > 0.2 * step && !method.contains("likelihood");
     if is_shown || width.is_finite() {
         ledger.equal("map.csv: width_m_s", width, right, 0.15 * right + 4.0 * error);
     }
