@@ -1,4 +1,4 @@
-//! Draws one figure of each kind and a report page into a folder, to be looked at:
+//! Draws one figure of each kind into a folder, to be looked at:
 //!
 //! `cargo run -p wakescope-sim --example sample_figures -- FOLDER`
 //!
@@ -10,38 +10,17 @@ mod sample_data;
 use sample_data::{map, origin, wind};
 use std::path::Path;
 use wakescope_sim::io::{FileGroup, OutputResult};
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, HtmlTable, MapPlot, Report, ReportEntry, Series, Style};
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 
 fn main() -> OutputResult<()> {
     let folder = std::env::args().nth(1).unwrap_or_else(|| "target/sample-figures".into());
     let origin = origin();
     let figures = [("maps", maps()?), ("curves", curves()), ("pattern", pattern()), ("errors", errors())];
     let mut files = FileGroup::new(Path::new(&folder));
-    let mut report = Report { title: "Sample figures".into(), ..Report::default() };
-    report.facts = vec![("seed".into(), origin.seed.to_string()), ("program".into(), origin.program.clone())];
     for (name, figure) in figures {
-        let svg = figure.svg(&origin)?;
-        files.add(&format!("{name}.svg"), svg.clone())?;
+        files.add(&format!("{name}.svg"), figure.svg(&origin)?)?;
         files.add(&format!("{name}.png"), figure.png(&origin)?)?;
-        report.entries.push(ReportEntry {
-            id: name.into(),
-            title: name.into(),
-            caption: "A made-up vortex pair, 400 m²/s at the start.".into(),
-            svg: Some(svg),
-            table: None,
-            marks: vec!["made up".into()],
-        });
     }
-    let words = |row: &[&str]| row.iter().map(|c| (*c).to_owned()).collect::<Vec<String>>();
-    report.claims = HtmlTable {
-        header: words(&["id", "statement", "expected", "measured", "verdict"]),
-        rows: vec![
-            words(&["S1", "the sample opens", "yes", "yes", "pass"]),
-            words(&["S2", "no claim", "", "", "open"]),
-        ],
-    };
-    report.timings = HtmlTable { header: words(&["stage", "seconds"]), rows: vec![] };
-    files.add("index.html", report.to_html()?)?;
     files.commit()?;
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! The report of a run: one page with all figures, claims and run times.
 
+use super::html::{Finding, HtmlTable, Report, ReportEntry};
 use super::lists::Kind;
 use crate::claim::Claim;
 use crate::cost::machine;
@@ -7,8 +8,6 @@ use crate::figures::Figure;
 use crate::figures::context::{Context, Rendered};
 use crate::statistics::{Verdict, two_digits};
 use fixtures::failure::Failure;
-use wakescope_sim::plot::html::HtmlTable;
-use wakescope_sim::plot::{Finding, Report, ReportEntry};
 
 /// The page as HTML.
 pub(super) fn html(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> Result<String, Failure> {
@@ -33,7 +32,7 @@ pub(super) fn html(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) 
         claims: claims(done),
         timings: timings(done),
     };
-    Ok(report.to_html()?)
+    report.to_html()
 }
 
 /// Of a list of claims how many hold, do not, are open.

@@ -1,4 +1,4 @@
-//! Pictures of results: curves, RHI maps in metres, and a report page. One list of shapes is drawn as SVG and as PNG,
+//! Pictures of results: curves, and RHI maps in metres. One list of shapes is drawn as SVG and as PNG,
 //! with a font that is compiled in, so that no system font is needed and the same input gives the same bytes.
 //! Check: the tests look up single pixels, ticks and colours; the PNG files are for the eye.
 //!
@@ -12,7 +12,6 @@
 //! | [`volume`] | (inside it) rays through a mesh |
 //! | [`animation`] | pictures one after the other, as APNG |
 //! | [`colour`] | palette and colour maps |
-//! | [`html`] | the self-contained report page |
 
 pub mod animation;
 mod axis;
@@ -22,7 +21,6 @@ mod drawing;
 pub mod figure;
 mod font;
 mod frame;
-pub mod html;
 pub mod isosurface;
 mod legend;
 pub mod map;
@@ -36,7 +34,7 @@ pub use axis::Axis;
 pub use colour::ColourMap;
 pub use curves::{CurvePlot, Series, Style};
 pub use figure::{Figure, Panel};
-pub use html::{Finding, HtmlTable, Report, ReportEntry};
 pub use isosurface::{IsosurfacePlot, Surface};
 pub use map::MapPlot;
+pub use svg::escape;
 pub use volume::Volume;

@@ -29,7 +29,7 @@ pub(crate) fn svg_text(drawing: &Drawing, provenance: &Provenance) -> OutputResu
 }
 
 /// Text that may stand between tags and in attributes.
-pub(crate) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

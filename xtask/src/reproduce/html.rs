@@ -1,65 +1,65 @@
 //! The report of a run as one HTML page that opens from disk: pictures inside, no script, nothing fetched.
 //! Check: every text is escaped, the page names nothing outside itself, verdicts are marked by colour and by word.
 
-use super::svg::escape;
-use crate::io::{OutputError, OutputResult, same_length};
+use fixtures::failure::Failure;
+use wakescope_sim::plot::escape;
 
 /// A table of the page; on a narrow screen each row becomes a block of named cells.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct HtmlTable {
+pub(super) struct HtmlTable {
     /// Column names.
-    pub header: Vec<String>,
+    pub(super) header: Vec<String>,
     /// Cells, row by row, as many as columns. The words `pass`, `fail` and `open` are coloured.
-    pub rows: Vec<Vec<String>>,
+    pub(super) rows: Vec<Vec<String>>,
 }
 
 /// A statement that does not hold, or is not decided, for the beginning of the page.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Finding {
+pub(super) struct Finding {
     /// Short name, such as `F9b`.
-    pub name: String,
+    pub(super) name: String,
     /// The entry that shows it.
-    pub entry: String,
+    pub(super) entry: String,
     /// What is stated.
-    pub statement: String,
+    pub(super) statement: String,
     /// Why it does not hold: what was expected and what was found.
-    pub reason: String,
+    pub(super) reason: String,
 }
 
 /// A figure or table of the report.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReportEntry {
+pub(super) struct ReportEntry {
     /// Short name and link target, such as `fig04`.
-    pub id: String,
+    pub(super) id: String,
     /// What it is called.
-    pub title: String,
+    pub(super) title: String,
     /// What is shown and how it was made.
-    pub caption: String,
+    pub(super) caption: String,
     /// The picture as SVG text; the scene's metadata may be in it.
-    pub svg: Option<String>,
+    pub(super) svg: Option<String>,
     /// A table, for entries that are one.
-    pub table: Option<HtmlTable>,
+    pub(super) table: Option<HtmlTable>,
     /// Short notes shown as labels beside the name, such as `analytic pair`.
-    pub marks: Vec<String>,
+    pub(super) marks: Vec<String>,
 }
 
 /// The whole page.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Report {
+pub(super) struct Report {
     /// Title of the page.
-    pub title: String,
+    pub(super) title: String,
     /// What was found, in a sentence or two.
-    pub found: String,
+    pub(super) found: String,
     /// Headings and what stands below them: what fails, what is not decided. Empty lists are left out.
-    pub findings: Vec<(String, Vec<Finding>)>,
+    pub(super) findings: Vec<(String, Vec<Finding>)>,
     /// Name and value of what holds for the whole run: version, seed, machine, profile, command.
-    pub facts: Vec<(String, String)>,
+    pub(super) facts: Vec<(String, String)>,
     /// Figures and tables in order.
-    pub entries: Vec<ReportEntry>,
+    pub(super) entries: Vec<ReportEntry>,
     /// Claims and their verdicts.
-    pub claims: HtmlTable,
+    pub(super) claims: HtmlTable,
     /// Run time of each stage.
-    pub timings: HtmlTable,
+    pub(super) timings: HtmlTable,
 }
 
 const STYLE: &str = "\
@@ -89,7 +89,7 @@ impl Report {
     ///
     /// # Errors
     /// A row with another number of cells than its header, a picture that is not an `<svg>` element, two entries of one id.
-    pub fn to_html(&self) -> OutputResult<String> {
+    pub(super) fn to_html(&self) -> Result<String, Failure> {
         let title = escape(&self.title);
         let mut out = format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n"
@@ -117,7 +117,7 @@ impl Report {
             "<li><a href=\"#claims\">All claims</a></li>\n<li><a href=\"#timings\">Run times</a></li>\n</ul></nav>\n";
         for (i, entry) in self.entries.iter().enumerate() {
             if self.entries[..i].iter().any(|e| e.id == entry.id) {
-                return Err(OutputError::Duplicate { what: "report entry", name: entry.id.clone() });
+                return Err(Failure::new(format!("two entries of the report are called '{}'", entry.id)));
             }
             push_entry(entry, &mut out)?;
         }
@@ -135,7 +135,7 @@ impl Report {
     }
 }
 
-fn push_entry(entry: &ReportEntry, out: &mut String) -> OutputResult<()> {
+fn push_entry(entry: &ReportEntry, out: &mut String) -> Result<(), Failure> {
     let id = escape(&entry.id);
     *out += &format!("<figure id=\"{id}\">\n<h3>{}", escape(&entry.title));
     for mark in &entry.marks {
@@ -145,7 +145,7 @@ fn push_entry(entry: &ReportEntry, out: &mut String) -> OutputResult<()> {
     if let Some(svg) = &entry.svg {
         if !svg.starts_with("<svg") || svg.contains("<script") {
             let start: String = svg.chars().take(20).collect();
-            return Err(OutputError::value(format!("picture of {id}"), start, "one <svg> element without script"));
+            return Err(Failure::new(format!("picture of {id} = {start}: one <svg> element without script")));
         }
         *out += svg;
     }
@@ -156,14 +156,16 @@ fn push_entry(entry: &ReportEntry, out: &mut String) -> OutputResult<()> {
     Ok(())
 }
 
-fn push_table(name: &str, table: &HtmlTable, out: &mut String) -> OutputResult<()> {
+fn push_table(name: &str, table: &HtmlTable, out: &mut String) -> Result<(), Failure> {
     *out += "<div class=\"scroll\"><table>\n<thead><tr>";
     for column in &table.header {
         *out += &format!("<th>{}</th>", escape(column));
     }
     *out += "</tr></thead>\n<tbody>\n";
     for row in &table.rows {
-        same_length(&format!("row of table {name}"), row.len(), "its header", table.header.len())?;
+        if row.len() != table.header.len() {
+            return Err(Failure::new(format!("table {name}: {} cells under {} names", row.len(), table.header.len())));
+        }
         *out += "<tr>";
         for (cell, column) in row.iter().zip(&table.header) {
             let class = match cell.as_str() {
@@ -230,9 +232,9 @@ mod tests {
         assert!(uneven.to_html().is_err());
         let mut twice = report();
         twice.entries.push(twice.entries[0].clone());
-        assert!(matches!(twice.to_html(), Err(OutputError::Duplicate { .. })));
+        assert!(twice.to_html().unwrap_err().to_string().contains("two entries"));
         let mut foreign = report();
         foreign.entries[0].svg = Some("<script>".into());
-        assert!(matches!(foreign.to_html(), Err(OutputError::Value { .. })));
+        assert!(foreign.to_html().unwrap_err().to_string().contains("without script"));
     }
 }
