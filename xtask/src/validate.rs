@@ -109,9 +109,7 @@ fn write(name: &str, profile: Profile, shown: &Shown, folder: &std::path::Path) 
     let mut files = FileGroup::new(folder);
     files.add(&format!("{name}.csv"), shown.table.to_csv(&origin)?)?;
     files.add(&format!("{name}_checks.csv"), checks.to_csv(&origin)?)?;
-    let (svg, png) = shown.figure.svg_and_png(&origin)?;
-    files.add(&format!("{name}.svg"), svg)?;
-    files.add(&format!("{name}.png"), png)?;
+    shown.figure.add_to(&mut files, name, &origin)?;
     files.commit()?;
     Ok(())
 }

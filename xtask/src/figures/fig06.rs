@@ -7,7 +7,7 @@ use fixtures::failure::Failure;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::flow::{FinishedWake, REPEATS};
 use wakescope_sim::io::Table;
-use wakescope_sim::plot::animation;
+use wakescope_sim::plot::apng;
 
 const FRAME_S: f64 = 0.15;
 
@@ -23,7 +23,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             "the wake has no fields as NetCDF: put `fields = [\"netcdf\"]` below `[output]` of its case and run it again".into(),
         ))?;
     let mut out = Rendered::new(&table, &figure, &origin)?;
-    out.files.push(("apng".into(), animation::apng(&wake.frames()?, FRAME_S, &origin)?));
+    out.files.push(("apng".into(), apng(&wake.frames()?, FRAME_S, &origin)?));
     out.caption = format!(
         "Surfaces where |ω| b₀²/Γ₀ is 1 and 10, at τ = {:?}; {}, box repeated {REPEATS} times along the flight, lengths in b₀. The animation \
          (fig06.apng) shows the axial vorticity of a cross-plane from τ = 0 on.",

@@ -239,11 +239,7 @@ impl Task {
             files.add("detection_power.csv", power_table(power).to_csv(&origin)?)?;
             files.add("detection_roc.csv", roc_table(power).to_csv(&origin)?)?;
             #[cfg(feature = "plots")]
-            {
-                let picture = crate::detection::picture(power);
-                files.add("detection.svg", picture.svg(&origin)?)?;
-                files.add("detection.png", picture.png(&origin)?)?;
-            }
+            crate::detection::picture(power).add_to(&mut files, "detection", &origin)?;
         }
         if let Some(plan) = self.plan.as_ref().filter(|plan| has_gates(plan)) {
             let table = gate_table(plan, words.false_alarm, observer)?;

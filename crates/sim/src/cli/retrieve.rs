@@ -484,15 +484,12 @@ fn files(
     }
     #[cfg(feature = "plots")]
     {
-        let mut add = |name: &str, figure: &crate::plot::Figure| -> Result<(), Error> {
-            files.add(&format!("{name}.svg"), figure.svg(&origin)?)?;
-            Ok(files.add(&format!("{name}.png"), figure.png(&origin)?)?)
-        };
         for (number, scan) in scans.iter().enumerate() {
-            add(&format!("scan_{:03}", number + 1), &retrieve::figure(scan, number + 1)?)?;
+            let name = format!("scan_{:03}", number + 1);
+            retrieve::figure(scan, number + 1)?.add_to(&mut files, &name, &origin)?;
         }
         if let Some(track) = track {
-            add("track", &retrieve::track_figure(track, scans))?;
+            retrieve::track_figure(track, scans).add_to(&mut files, "track", &origin)?;
         }
     }
     write::put(files, &words.out, existing)

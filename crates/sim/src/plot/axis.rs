@@ -34,9 +34,9 @@ impl Axis {
 
     /// Range to draw: the asked one, or that of the values with a margin of `pad` of its length.
     pub(crate) fn resolve(&self, values: impl Iterator<Item = f64>, pad: f64) -> OutputResult<(f64, f64)> {
+        let usable = |v: &f64| v.is_finite() && (!self.log || *v > 0.0);
         if let Some((low, high)) = self.range {
-            let fine = low < high && low.is_finite() && high.is_finite() && (!self.log || low > 0.0);
-            if fine {
+            if low < high && usable(&low) && usable(&high) {
                 return Ok((low, high));
             }
             return Err(OutputError::value(
@@ -45,26 +45,40 @@ impl Axis {
                 "finite and increasing, positive on a logarithmic axis",
             ));
         }
-        let usable = values.filter(|v| v.is_finite() && (!self.log || *v > 0.0));
-        let map = |v: f64| if self.log { v.log10() } else { v };
-        let (low, high) = usable.map(map).fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+        let (low, high) = extremes(values.filter(usable).map(|v| forth(self.log, v)));
         if low > high {
             // Nothing to draw: an empty frame is honest and no error.
             return Ok(if self.log { (0.1, 10.0) } else { (0.0, 1.0) });
         }
-        let mut margin = pad * (high - low);
-        if high - low <= 1e-12 * high.abs().max(low.abs()) {
-            margin = if self.log { 0.5 } else { 0.1 * high.abs().max(1e-12) };
-            if high == 0.0 && !self.log {
-                margin = 1.0;
-            }
-        }
-        let back = |v: f64| if self.log { 10_f64.powf(v) } else { v };
-        Ok((back(low - margin), back(high + margin)))
+        let largest = high.abs().max(low.abs());
+        let margin = if high - low > 1e-12 * largest {
+            pad * (high - low)
+        } else if self.log {
+            0.5
+        } else if largest > 0.0 {
+            0.1 * largest
+        } else {
+            1.0
+        };
+        Ok((back(self.log, low - margin), back(self.log, high + margin)))
     }
 }
 
-/// A tick of an axis; a minor one has no label.
+/// Smallest and largest of the values; NaN is none.
+pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+}
+
+/// To what is in proportion to lengths on the paper.
+fn forth(log: bool, value: f64) -> f64 {
+    if log { value.log10() } else { value }
+}
+
+fn back(log: bool, value: f64) -> f64 {
+    if log { 10_f64.powf(value) } else { value }
+}
+
+/// A labelled tick of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tick {
     pub(crate) value: f64,
@@ -82,32 +96,25 @@ pub(crate) struct Scale {
 impl Scale {
     /// Coordinate of a value; NaN where it has none. Far outside it is held at a finite distance.
     pub(crate) fn place(&self, value: f64) -> f64 {
-        let map = |v: f64| if self.log { v.log10() } else { v };
-        let part = (map(value) - map(self.range.0)) / (map(self.range.1) - map(self.range.0));
-        if part.is_nan() || (self.log && value <= 0.0) {
+        if self.log && value <= 0.0 {
             return f64::NAN;
         }
+        let [low, high, value] = [self.range.0, self.range.1, value].map(|v| forth(self.log, v));
+        let part = (value - low) / (high - low);
         self.paper.0 + part.clamp(-20.0, 20.0) * (self.paper.1 - self.paper.0)
     }
 
     /// End of a range that is longer by so large a part of itself, as seen on the paper.
     pub(crate) fn above(&self, part: f64) -> f64 {
-        let part = part.clamp(0.0, 0.7);
-        let (low, high) = self.range;
-        let grow = |low: f64, high: f64| low + (high - low) / (1.0 - part);
-        if self.log { 10_f64.powf(grow(low.log10(), high.log10())) } else { grow(low, high) }
+        let [low, high] = [self.range.0, self.range.1].map(|v| forth(self.log, v));
+        back(self.log, low + (high - low) / (1.0 - part.clamp(0.0, 0.7)))
     }
 
     /// Labelled ticks, about `gap` drawing units apart.
     pub(crate) fn ticks(&self, gap: f64) -> Vec<Tick> {
         let count = ((self.paper.1 - self.paper.0).abs() / gap).clamp(2.0, 12.0);
-        if self.log {
-            let ticks = self.log_ticks(count);
-            if ticks.len() >= 2 {
-                return ticks;
-            }
-        }
-        linear_ticks(self.range, count)
+        let ticks = if self.log { self.log_ticks(count) } else { Vec::new() };
+        if ticks.len() >= 2 { ticks } else { linear_ticks(self.range, count) }
     }
 
     /// Values of the unlabelled ticks between the decades of a logarithmic axis.
@@ -116,14 +123,13 @@ impl Scale {
         if !self.log || decades > 8.0 {
             return Vec::new();
         }
-        let first = self.range.0.log10().floor() as i32;
-        let last = self.range.1.log10().ceil() as i32;
-        let all = (first..=last).flat_map(|e| (2..10).map(move |m| f64::from(m) * 10_f64.powi(e)));
+        let decades = self.range.0.log10().floor() as i32..=self.range.1.log10().ceil() as i32;
+        let all = decades.flat_map(|e| (2..10).map(move |m| f64::from(m) * 10_f64.powi(e)));
         all.filter(|v| self.holds(*v)).collect()
     }
 
     fn holds(&self, value: f64) -> bool {
-        let slack = 1e-9 * (self.range.1 - self.range.0).abs();
+        let slack = 1e-9 * value.abs();
         value >= self.range.0 - slack && value <= self.range.1 + slack
     }
 
@@ -132,68 +138,56 @@ impl Scale {
         let (first, last) = ((low - 1e-9).ceil() as i32, (high + 1e-9).floor() as i32);
         let step = (((high - low) / count).ceil() as i32).max(1);
         let factors: &[f64] = if high - low < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let plain = first >= -3 && last <= 4;
-        let mut out = Vec::new();
-        for e in (first - 1)..=last {
-            if e.rem_euclid(step) != 0 {
-                continue;
-            }
-            for factor in factors {
-                let value = factor * 10_f64.powi(e);
-                let slack = 1e-9 * value;
-                if value < self.range.0 - slack || value > self.range.1 + slack {
-                    continue;
-                }
-                let label = match (plain, *factor == 1.0) {
-                    (true, _) => decimal(value, usize::try_from(-e).unwrap_or(0)),
-                    (false, true) => format!("10^{{{}}}", minus(&e.to_string())),
-                    (false, false) => format!("{factor}·10^{{{}}}", minus(&e.to_string())),
-                };
-                out.push(Tick { value, label });
-            }
-        }
-        out
+        let is_plain = first >= -3 && last <= 4;
+        let tick = |(e, factor): (i32, f64)| {
+            let value = factor * 10_f64.powi(e);
+            let label = match is_plain {
+                true => decimal(value, usize::try_from(-e).unwrap_or(0)),
+                false if factor == 1.0 => power("", e),
+                false => power(&format!("{factor}·"), e),
+            };
+            Tick { value, label }
+        };
+        let decades = (first - 1..=last).filter(|e| e.rem_euclid(step) == 0);
+        let all = decades.flat_map(|e| factors.iter().map(move |factor| (e, *factor)));
+        all.map(tick).filter(|tick| self.holds(tick.value)).collect()
     }
 }
 
 fn linear_ticks((low, high): (f64, f64), count: f64) -> Vec<Tick> {
     let raw = (high - low) / count;
-    let power = 10_f64.powf(raw.log10().floor());
+    let power_of_ten = 10_f64.powf(raw.log10().floor());
     // The step whose number of ticks is nearest to the wanted one, in ratio.
     let distance = |step: &f64| (step / raw).ln().abs();
-    let steps = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0].map(|m| m * power);
+    let steps = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0].map(|m| m * power_of_ten);
+    let ends = |step: f64| ((low / step - 1e-6).ceil(), (high / step + 1e-6).floor());
     // Two ticks do not show a scale: then the next finer step.
-    let held = |step: &f64| (high / step + 1e-6).floor() - (low / step - 1e-6).ceil() + 1.0;
-    let enough = steps.into_iter().filter(|step| held(step) >= 3.0);
+    let enough = steps.into_iter().filter(|step| ends(*step).1 - ends(*step).0 >= 2.0);
     let step = enough.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(raw);
-    let (first, last) = ((low / step - 1e-6).ceil() as i64, (high / step + 1e-6).floor() as i64);
     let largest = low.abs().max(high.abs());
-    let exponent = (step.log10() + 1e-9).floor() as i32;
-    let scientific = !(1e-3..1e5).contains(&largest);
-    let common = (largest.log10() + 1e-9).floor() as i32;
-    (first..=last)
-        .map(|i| {
-            let value = i as f64 * step;
-            let label = if scientific && i != 0 {
-                let digits = usize::try_from(common - exponent).unwrap_or(0);
-                format!("{}·10^{{{}}}", decimal(value / 10_f64.powi(common), digits), minus(&common.to_string()))
-            } else {
-                decimal(value, usize::try_from(-exponent).unwrap_or(0))
-            };
-            Tick { value, label }
-        })
-        .collect()
+    let [exponent, common] = [step, largest].map(|v| (v.log10() + 1e-9).floor() as i32);
+    let is_plain = (1e-3..1e5).contains(&largest);
+    let label = |value: f64| match is_plain || value == 0.0 {
+        true => decimal(value, usize::try_from(-exponent).unwrap_or(0)),
+        false => {
+            let digits = usize::try_from(common - exponent).unwrap_or(0);
+            power(&format!("{}·", decimal(value / 10_f64.powi(common), digits)), common)
+        }
+    };
+    let (first, last) = ends(step);
+    (first as i64..=last as i64).map(|i| i as f64 * step).map(|value| Tick { value, label: label(value) }).collect()
 }
 
-/// Decimal text with a true minus sign.
+/// A factor before a power of ten.
+fn power(factor: &str, exponent: i32) -> String {
+    format!("{factor}10^{{{}}}", decimal(f64::from(exponent), 0))
+}
+
+/// Decimal text with a true minus sign; zero has none.
 fn decimal(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
-    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
-    if zero { text.trim_start_matches('-').into() } else { minus(&text) }
-}
-
-fn minus(text: &str) -> String {
-    text.replace('-', "−")
+    let is_zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
+    text.replace('-', if is_zero { "" } else { "−" })
 }
 
 #[cfg(test)]

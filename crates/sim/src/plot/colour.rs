@@ -2,8 +2,6 @@
 //! OKLab (Ottosson 2020), in which equal steps look equal.
 //! Check: the diverging map is symmetric in lightness about zero, the sequential one darkens steadily.
 
-use std::sync::LazyLock;
-
 /// Red, green, blue, 0 to 255.
 pub type Rgb = [u8; 3];
 
@@ -50,22 +48,12 @@ impl ColourMap {
             return MISSING;
         }
         let (low, high) = self.range();
-        let place = (STEPS * ((value - low) / (high - low)).clamp(0.0, 1.0)).round() as usize;
+        let place = ((value - low) / (high - low)).clamp(0.0, 1.0);
         match self {
-            Self::Diverging { .. } => DIVERGING[place],
-            Self::Sequential { .. } => SEQUENTIAL[place],
+            Self::Diverging { .. } => diverging(2.0 * place - 1.0),
+            Self::Sequential { .. } => sequential(place),
         }
     }
-}
-
-/// Steps of a map: more than a screen can show of any of its colours.
-const STEPS: f64 = 4096.0;
-
-static DIVERGING: LazyLock<Vec<Rgb>> = LazyLock::new(|| steps().map(|t| diverging(2.0 * t - 1.0)).collect());
-static SEQUENTIAL: LazyLock<Vec<Rgb>> = LazyLock::new(|| steps().map(sequential).collect());
-
-fn steps() -> impl Iterator<Item = f64> {
-    (0..=STEPS as u32).map(|step| f64::from(step) / STEPS)
 }
 
 /// s in -1 .. 1: one curve of lightness and chroma for both signs, only the hue differs.

@@ -5,13 +5,14 @@ use super::axis::{Axis, Scale};
 use super::colour::curve_colour;
 use super::drawing::{Frame, Pen, Shape};
 use super::font::Font;
-use super::frame::{BOTTOM, Decor, LEFT, top_room};
-use super::legend::{self, Entry};
-use super::marker::marker;
+use super::frame::{BOTTOM, Decor, LEFT, inner, top_room};
+use super::legend::{self, marker};
 use crate::io::{OutputResult, same_length};
 
 const RIGHT: f64 = 24.0;
 const LINE_WIDTH: f64 = 2.2;
+/// Half the width of the ends of error bars.
+const CAP: f64 = 4.0;
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,11 +41,11 @@ impl Style {
         }
     }
 
-    fn has_line(self) -> bool {
+    pub(crate) fn has_line(self) -> bool {
         self != Self::Markers
     }
 
-    fn has_markers(self) -> bool {
+    pub(crate) fn has_markers(self) -> bool {
         matches!(self, Self::Markers | Self::LineMarkers)
     }
 }
@@ -82,6 +83,36 @@ impl Series {
     pub fn in_colour(mut self, index: usize) -> Self {
         self.colour = Some(index);
         self
+    }
+
+    pub(crate) fn pen(&self, colour: usize) -> Pen {
+        Pen { colour: curve_colour(colour), width: LINE_WIDTH, dash: self.style.dash() }
+    }
+
+    /// The curve through its points on the paper, with its band between those at the same places.
+    fn shapes(&self, colour: usize, points: &[(f64, f64)], band: &[(f64, f64)], out: &mut Vec<Shape>) {
+        let fill = curve_colour(colour);
+        // x, lower and upper edge.
+        let band: Vec<_> = points.iter().zip(band).map(|(p, b)| (p.0, b.0, b.1)).collect();
+        let bands = band.split(|b| !(b.0.is_finite() && b.1.is_finite() && b.2.is_finite()));
+        if self.style == Style::Markers {
+            for &(x, low, high) in bands.flatten() {
+                let cap = |y: f64| [(x - CAP, y), (x + CAP, y)];
+                out.extend([[(x, low), (x, high)], cap(low), cap(high)].map(|line| Shape::line(line, fill, 1.4)));
+            }
+        } else {
+            // One polygon for a stretch without gap: forth along the upper edge, back along the lower.
+            for stretch in bands.filter(|stretch| stretch.len() > 1) {
+                let (upper, lower) = (stretch.iter().map(|b| (b.0, b.2)), stretch.iter().rev().map(|b| (b.0, b.1)));
+                out.push(Shape::Area { points: upper.chain(lower).collect(), fill, opacity: 0.22 });
+            }
+        }
+        if self.style.has_line() {
+            out.extend(pieces(points).map(|p| Shape::Line { points: p.to_vec(), pen: self.pen(colour) }));
+        }
+        if self.style.has_markers() {
+            out.extend(points.iter().filter(|p| finite(p)).map(|p| marker(*p, colour)));
+        }
     }
 }
 
@@ -140,127 +171,55 @@ impl CurvePlot {
                 same_length(&format!("band of '{}'", series.label), band.len(), "its points", series.points.len())?;
             }
         }
-        let frame = Frame {
-            left: cell.left + LEFT,
-            top: cell.top + top_room(&self.title),
-            width: cell.width - LEFT - RIGHT,
-            height: cell.height - top_room(&self.title) - BOTTOM,
-        };
+        let frame = inner(cell, RIGHT, &self.title);
         let (mut x_range, mut y_range) = self.ranges()?;
         if self.equal_scales && !self.x.log && !self.y.log {
-            widen(&mut x_range, &mut y_range, &frame);
+            // A unit is equally long on both axes.
+            let unit = ((x_range.1 - x_range.0) / frame.width).max((y_range.1 - y_range.0) / frame.height);
+            for (range, length) in [(&mut x_range, frame.width), (&mut y_range, frame.height)] {
+                let (middle, half) = (0.5 * (range.0 + range.1), 0.5 * unit * length);
+                *range = (middle - half, middle + half);
+            }
         }
-        let entries = self.entries();
+        // A series without name has a colour, too.
+        let mut named: Vec<(usize, &Series)> = self.coloured().collect();
+        named.retain(|(_, series)| !series.label.is_empty());
         let x = Scale { range: x_range, log: self.x.log, paper: (frame.left, frame.right()) };
         let mut y = Scale { range: y_range, log: self.y.log, paper: (frame.bottom(), frame.top) };
         let (mut content, mut occupied) = self.content(&x, &y);
-        let size = legend::size(&entries, font);
-        if !entries.is_empty() && !self.equal_scales && legend::place(frame, size, &occupied).1 > 0 {
+        let size = legend::size(&named, font);
+        let (mut place, covered) = legend::place(frame, size, &occupied);
+        if !named.is_empty() && !self.equal_scales && covered > 0 {
             // Room above the highest point, as high as the legend.
             y.range.1 = y.above((size.1 + 3.0 * legend::INSET) / frame.height);
             (content, occupied) = self.content(&x, &y);
+            place = legend::place(frame, size, &occupied).0;
         }
         let decor = Decor { frame, x, y, x_label: &self.x.label, y_label: &self.y.label, title: &self.title };
-        decor.grid(out);
-        out.push(Shape::Clip { frame, shapes: content });
-        decor.axes(font, out);
-        legend::legend(&entries, frame, &occupied, font, out);
+        decor.draw(content, font, out);
+        if !named.is_empty() {
+            legend::legend(&named, place, out);
+        }
         Ok(())
     }
 
-    /// Lines of the legend.
-    fn entries(&self) -> Vec<Entry<'_>> {
-        fn entry((i, series): (usize, &Series)) -> Entry<'_> {
-            let index = series.colour.unwrap_or(i);
-            Entry {
-                label: &series.label,
-                pen: series.style.has_line().then(|| pen(series, index)),
-                marker: series.style.has_markers().then_some(index),
-                colour: curve_colour(index),
-            }
-        }
-        // Not filtered before they are numbered: a series without name has a colour, too.
-        self.series.iter().enumerate().map(entry).filter(|e| !e.label.is_empty()).collect()
+    /// The series with the indices of their colours.
+    fn coloured(&self) -> impl Iterator<Item = (usize, &Series)> {
+        self.series.iter().enumerate().map(|(i, series)| (series.colour.unwrap_or(i), series))
     }
 
     /// The curves on the paper, and where their ink is.
     fn content(&self, x: &Scale, y: &Scale) -> (Vec<Shape>, Vec<(f64, f64)>) {
         let (mut content, mut occupied) = (Vec::new(), Vec::new());
-        for (i, series) in self.series.iter().enumerate() {
-            let place = |p: &(f64, f64)| (x.place(p.0), y.place(p.1));
-            let points: Vec<(f64, f64)> = series.points.iter().map(place).collect();
-            push_series(series, series.colour.unwrap_or(i), &points, y, &mut content);
+        for (colour, series) in self.coloured() {
+            let points: Vec<_> = series.points.iter().map(|p| (x.place(p.0), y.place(p.1))).collect();
+            let band: Vec<_> = series.band.iter().flatten().map(|b| (y.place(b.0), y.place(b.1))).collect();
+            series.shapes(colour, &points, &band, &mut content);
             occupied.extend(along(&points, series.style.has_line()));
-            for (p, band) in points.iter().zip(series.band.iter().flatten()) {
-                occupied.extend(along(&[(p.0, y.place(band.0)), (p.0, y.place(band.1))], true));
-            }
+            let bars = points.iter().zip(&band).map(|(p, b)| [(p.0, b.0), (p.0, b.1)]);
+            occupied.extend(bars.flat_map(|bar| along(&bar, true)));
         }
         (content, occupied)
-    }
-}
-
-/// Widens one range so that a unit is equally long on both axes.
-fn widen(x: &mut (f64, f64), y: &mut (f64, f64), frame: &Frame) {
-    let unit = ((x.1 - x.0) / frame.width).max((y.1 - y.0) / frame.height);
-    let centred = |r: (f64, f64), length: f64| {
-        let middle = 0.5 * (r.0 + r.1);
-        (middle - 0.5 * length, middle + 0.5 * length)
-    };
-    *x = centred(*x, unit * frame.width);
-    *y = centred(*y, unit * frame.height);
-}
-
-fn pen(series: &Series, index: usize) -> Pen {
-    Pen { colour: curve_colour(index), width: LINE_WIDTH, dash: series.style.dash() }
-}
-
-fn push_series(series: &Series, index: usize, points: &[(f64, f64)], y: &Scale, out: &mut Vec<Shape>) {
-    let colour = curve_colour(index);
-    if let Some(band) = &series.band {
-        let placed: Vec<(f64, f64)> = band.iter().map(|b| (y.place(b.0), y.place(b.1))).collect();
-        if series.style == Style::Markers {
-            for (p, b) in points.iter().zip(&placed) {
-                push_error_bar(p.0, *b, Pen::solid(colour, 1.4), out);
-            }
-        } else {
-            push_band(points, &placed, colour, out);
-        }
-    }
-    if series.style.has_line() {
-        for piece in pieces(points) {
-            out.push(Shape::Line { points: piece.to_vec(), pen: pen(series, index) });
-        }
-    }
-    if series.style.has_markers() {
-        for p in points.iter().filter(|p| finite(p)) {
-            out.push(Shape::Area { points: marker(*p, index), fill: colour, opacity: 1.0 });
-        }
-    }
-}
-
-fn push_band(points: &[(f64, f64)], band: &[(f64, f64)], colour: [u8; 3], out: &mut Vec<Shape>) {
-    // One polygon per stretch without gap: forth along the upper edge, back along the lower.
-    let whole: Vec<(f64, f64, f64)> = points.iter().zip(band).map(|(p, b)| (p.0, b.0, b.1)).collect();
-    for stretch in whole.split(|c| !(c.0.is_finite() && c.1.is_finite() && c.2.is_finite())) {
-        if stretch.len() > 1 {
-            let upper = stretch.iter().map(|c| (c.0, c.2));
-            let lower = stretch.iter().rev().map(|c| (c.0, c.1));
-            out.push(Shape::Area { points: upper.chain(lower).collect(), fill: colour, opacity: 0.22 });
-        }
-    }
-}
-
-fn push_error_bar(x: f64, band: (f64, f64), pen: Pen, out: &mut Vec<Shape>) {
-    if !(x.is_finite() && finite(&band)) {
-        return;
-    }
-    let cap = 4.0;
-    for points in [
-        vec![(x, band.0), (x, band.1)],
-        vec![(x - cap, band.0), (x + cap, band.0)],
-        vec![(x - cap, band.1), (x + cap, band.1)],
-    ] {
-        out.push(Shape::Line { points, pen });
     }
 }
 
@@ -276,15 +235,10 @@ fn pieces(points: &[(f64, f64)]) -> impl Iterator<Item = &[(f64, f64)]> {
 /// Where the ink is: the points, and every few units along the lines between them.
 fn along(points: &[(f64, f64)], joined: bool) -> Vec<(f64, f64)> {
     let mut out: Vec<(f64, f64)> = points.iter().copied().filter(finite).collect();
-    if joined {
-        for pair in pieces(points).flat_map(|s| s.windows(2)) {
-            let length = (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1);
-            let steps = (length / 8.0).min(400.0) as usize;
-            for k in 1..steps {
-                let t = k as f64 / steps as f64;
-                out.push((pair[0].0 + t * (pair[1].0 - pair[0].0), pair[0].1 + t * (pair[1].1 - pair[0].1)));
-            }
-        }
+    for pair in pieces(points).filter(|_| joined).flat_map(|s| s.windows(2)) {
+        let (dx, dy) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
+        let steps = (dx.hypot(dy) / 8.0).min(400.0) as usize;
+        out.extend((1..steps).map(|k| k as f64 / steps as f64).map(|t| (pair[0].0 + t * dx, pair[0].1 + t * dy)));
     }
     out
 }

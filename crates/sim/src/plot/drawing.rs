@@ -2,6 +2,9 @@
 //! Check: text with raised and lowered parts is split in the tests; the formats' tests do the rest.
 
 use super::colour::Rgb;
+use tiny_skia::Pixmap;
+
+pub(crate) const INK: Rgb = [38, 38, 38];
 
 /// Axis-aligned box: left, top, width, height.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,9 +24,10 @@ impl Frame {
         self.top + self.height
     }
 
-    pub(crate) fn corners(&self) -> Vec<(f64, f64)> {
+    /// Once round and along the first side again, so that a line along it has its joint at every corner.
+    pub(crate) fn outline(&self) -> Vec<(f64, f64)> {
         let (l, t, r, b) = (self.left, self.top, self.right(), self.bottom());
-        vec![(l, t), (r, t), (r, b), (l, b)]
+        vec![(l, t), (r, t), (r, b), (l, b), (l, t), (r, t)]
     }
 }
 
@@ -36,25 +40,12 @@ pub(crate) struct Pen {
     pub(crate) dash: &'static [f64],
 }
 
-impl Pen {
-    pub(crate) fn solid(colour: Rgb, width: f64) -> Self {
-        Self { colour, width, dash: &[] }
-    }
-}
-
+/// Where in a text its point is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Anchor {
     Start,
     Middle,
     End,
-}
-
-/// Pixels of an embedded picture, 4 bytes each (not premultiplied), row by row from the top.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Raster {
-    pub(crate) width: u32,
-    pub(crate) height: u32,
-    pub(crate) rgba: Vec<u8>,
 }
 
 /// A line of text; `^{...}` raises and `_{...}` lowers a part of it.
@@ -67,7 +58,6 @@ pub(crate) struct Text {
     pub(crate) anchor: Anchor,
     /// Turned to read upward.
     pub(crate) upward: bool,
-    pub(crate) colour: Rgb,
     pub(crate) bold: bool,
 }
 
@@ -85,13 +75,29 @@ pub(crate) enum Shape {
     Text(Text),
     Image {
         frame: Frame,
-        raster: Raster,
+        pixels: Pixmap,
     },
     /// Shapes of which only the part inside the frame is seen.
     Clip {
         frame: Frame,
         shapes: Vec<Shape>,
     },
+}
+
+impl Shape {
+    /// A solid line.
+    pub(crate) fn line(points: impl Into<Vec<(f64, f64)>>, colour: Rgb, width: f64) -> Self {
+        Self::Line { points: points.into(), pen: Pen { colour, width, dash: &[] } }
+    }
+
+    /// An area that hides what lies behind.
+    pub(crate) fn area(points: impl Into<Vec<(f64, f64)>>, fill: Rgb) -> Self {
+        Self::Area { points: points.into(), fill, opacity: 1.0 }
+    }
+
+    pub(crate) fn text(at: (f64, f64), text: &str, size: f64, anchor: Anchor) -> Self {
+        Self::Text(Text { at, text: text.into(), size, anchor, upward: false, bold: false })
+    }
 }
 
 /// The whole picture.
@@ -110,17 +116,12 @@ pub(crate) struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Size of the run's letters where the base letters have size 1.
-    pub(crate) fn scale(&self) -> f64 {
-        if self.level == 0 { 1.0 } else { 0.72 }
-    }
-
-    /// Height of its base line above that of the text, in text sizes.
-    pub(crate) fn rise(&self) -> f64 {
+    /// Size of the run's letters and height of its base line above that of the text, in sizes of the text.
+    pub(crate) fn scale_and_rise(&self) -> (f64, f64) {
         match self.level {
-            0 => 0.0,
-            1 => 0.36,
-            _ => -0.18,
+            0 => (1.0, 0.0),
+            1 => (0.72, 0.36),
+            _ => (0.72, -0.18),
         }
     }
 }
@@ -129,22 +130,17 @@ impl Run<'_> {
 pub(crate) fn runs(text: &str) -> Vec<Run<'_>> {
     let mut out = Vec::new();
     let mut rest = text;
-    while !rest.is_empty() {
-        let next = ["^{", "_{"].iter().filter_map(|m| rest.find(m)).min();
-        let marked = next.and_then(|start| rest[start..].find('}').map(|end| (start, start + end)));
-        let Some((start, end)) = marked else {
-            out.push(Run { text: rest, level: 0 });
-            break;
-        };
-        if start > 0 {
-            out.push(Run { text: &rest[..start], level: 0 });
-        }
+    let marked = |rest: &str| {
+        let start = ["^{", "_{"].iter().filter_map(|mark| rest.find(mark)).min()?;
+        Some((start, start + rest[start..].find('}')?))
+    };
+    while let Some((start, end)) = marked(rest) {
         let level = if rest[start..].starts_with('^') { 1 } else { -1 };
-        if end > start + 2 {
-            out.push(Run { text: &rest[start + 2..end], level });
-        }
+        out.extend([Run { text: &rest[..start], level: 0 }, Run { text: &rest[start + 2..end], level }]);
         rest = &rest[end + 1..];
     }
+    out.push(Run { text: rest, level: 0 });
+    out.retain(|run| !run.text.is_empty());
     out
 }
 

@@ -2,13 +2,14 @@
 //! Check: both formats of a figure with every kind of panel come out the same twice, and the panels do not overlap.
 
 use super::curves::CurvePlot;
-use super::drawing::{Anchor, Drawing, Frame, Shape, Text};
+use super::drawing::{Drawing, Frame, Shape};
 use super::font::Font;
-use super::frame::INK;
+use super::frame::title;
 use super::isosurface::IsosurfacePlot;
 use super::map::MapPlot;
-use super::{png_file, svg};
-use crate::io::{OutputError, OutputResult, Provenance};
+use super::png_file::{encode, paint};
+use super::svg::svg_text;
+use crate::io::{FileGroup, OutputError, OutputResult, Provenance};
 
 const TITLE_ROOM: f64 = 40.0;
 const MARGIN: f64 = 10.0;
@@ -22,6 +23,24 @@ pub enum Panel {
     Map(MapPlot),
     /// Surfaces in space.
     Surfaces(IsosurfacePlot),
+}
+
+impl Panel {
+    fn height(&self, width: f64) -> OutputResult<f64> {
+        Ok(match self {
+            Self::Curves(plot) => plot.height(width)?,
+            Self::Map(plot) => plot.height(width),
+            Self::Surfaces(plot) => plot.height(width),
+        })
+    }
+
+    fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
+        match self {
+            Self::Curves(plot) => plot.draw(cell, font, out),
+            Self::Map(plot) => plot.draw(cell, font, out),
+            Self::Surfaces(plot) => plot.draw(cell, out),
+        }
+    }
 }
 
 impl From<IsosurfacePlot> for Panel {
@@ -93,7 +112,7 @@ impl Figure {
     /// # Errors
     /// A range that cannot be drawn, a band of another length than its curve, a size out of range.
     pub fn svg(&self, provenance: &Provenance) -> OutputResult<String> {
-        svg::svg_text(&self.draw()?, provenance)
+        svg_text(&self.draw()?, provenance)
     }
 
     /// The figure as PNG bytes.
@@ -101,7 +120,7 @@ impl Figure {
     /// # Errors
     /// As [`Self::svg`].
     pub fn png(&self, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-        png_file::png_bytes(&self.draw()?, provenance)
+        encode([paint(&self.draw()?)], 0.0, Some(provenance))
     }
 
     /// Both, drawn once: the SVG text and the PNG bytes.
@@ -110,61 +129,43 @@ impl Figure {
     /// As [`Self::svg`].
     pub fn svg_and_png(&self, provenance: &Provenance) -> OutputResult<(String, Vec<u8>)> {
         let drawing = self.draw()?;
-        Ok((svg::svg_text(&drawing, provenance)?, png_file::png_bytes(&drawing, provenance)?))
+        Ok((svg_text(&drawing, provenance)?, encode([paint(&drawing)], 0.0, Some(provenance))?))
     }
 
+    /// Adds both to files, as `name.svg` and `name.png`.
+    ///
+    /// # Errors
+    /// As [`Self::svg`]; a file of that name among them.
+    pub fn add_to(&self, files: &mut FileGroup, name: &str, provenance: &Provenance) -> OutputResult<()> {
+        let (svg, png) = self.svg_and_png(provenance)?;
+        files.add(&format!("{name}.svg"), svg)?;
+        files.add(&format!("{name}.png"), png)
+    }
+
+    /// The shapes of all panels; a row is as high as its highest panel, and maps beside it keep their own height.
     pub(crate) fn draw(&self) -> OutputResult<Drawing> {
         if self.columns == 0 || !(200.0..=10_000.0).contains(&self.width) {
             let value = format!("{} columns, width {}", self.columns, self.width);
             return Err(OutputError::value("figure", value, "at least one column, width 200 to 10000"));
         }
         let font = Font::load()?;
-        let mut shapes = Vec::new();
-        let mut top = MARGIN;
+        let (mut shapes, mut top) = (Vec::new(), MARGIN);
         if !self.title.is_empty() {
-            shapes.push(Shape::Text(Text {
-                at: (self.width / 2.0, top + 22.0),
-                text: self.title.clone(),
-                size: 20.0,
-                anchor: Anchor::Middle,
-                upward: false,
-                colour: INK,
-                bold: true,
-            }));
+            shapes.push(title((self.width / 2.0, top + 22.0), &self.title, 20.0));
             top += TITLE_ROOM;
         }
-        for (cells, panels) in self.rows(&mut top)? {
-            for (cell, panel) in cells.into_iter().zip(panels) {
-                match panel {
-                    Panel::Curves(plot) => plot.draw(cell, &font, &mut shapes)?,
-                    Panel::Map(plot) => plot.draw(cell, &font, &mut shapes)?,
-                    Panel::Surfaces(plot) => plot.draw(cell, &font, &mut shapes)?,
-                }
+        let width = (self.width - 2.0 * MARGIN) / self.columns as f64;
+        for row in self.panels.chunks(self.columns) {
+            let heights: Vec<f64> = row.iter().map(|panel| panel.height(width)).collect::<OutputResult<_>>()?;
+            let highest = heights.iter().copied().fold(0.0, f64::max);
+            for (column, (panel, own)) in row.iter().zip(heights).enumerate() {
+                let left = MARGIN + column as f64 * width;
+                let height = if matches!(panel, Panel::Map(_)) { own } else { highest };
+                panel.draw(Frame { left, top, width, height }, &font, &mut shapes)?;
             }
+            top += highest;
         }
         Ok(Drawing { width: self.width, height: (top + MARGIN).ceil(), shapes })
-    }
-
-    /// Cells and panels row by row; a row is as high as its highest panel, and maps beside it keep their own height.
-    fn rows(&self, top: &mut f64) -> OutputResult<Vec<(Vec<Frame>, &[Panel])>> {
-        let width = (self.width - 2.0 * MARGIN) / self.columns as f64;
-        let mut rows = Vec::new();
-        for panels in self.panels.chunks(self.columns) {
-            let own = |panel: &Panel| match panel {
-                Panel::Curves(plot) => plot.height(width),
-                Panel::Map(plot) => Ok(plot.height(width)),
-                Panel::Surfaces(plot) => Ok(plot.height(width)),
-            };
-            let heights = panels.iter().map(own).collect::<OutputResult<Vec<f64>>>()?;
-            let highest = heights.iter().copied().fold(0.0, f64::max);
-            let cell = |(i, panel): (usize, &Panel)| {
-                let height = if matches!(panel, Panel::Map(_)) { heights[i] } else { highest };
-                Frame { left: MARGIN + i as f64 * width, top: *top, width, height }
-            };
-            rows.push((panels.iter().enumerate().map(cell).collect(), panels));
-            *top += highest;
-        }
-        Ok(rows)
     }
 }
 
@@ -197,13 +198,17 @@ mod tests {
     fn cells_fill_rows_without_overlap() {
         let mut figure = figure();
         figure.columns = 2;
-        let mut top = 0.0;
-        let rows = figure.rows(&mut top).unwrap();
-        assert_eq!(rows.len(), 2);
-        assert_eq!(rows[0].0[0].right(), rows[0].0[1].left);
-        assert_eq!(rows[0].0[1].bottom(), rows[1].0[0].top);
-        assert!(rows[0].0[0].bottom() <= rows[1].0[0].top);
-        assert_eq!(rows[1].0[0].bottom(), top);
+        let drawing = figure.draw().unwrap();
+        let boxes: Vec<Frame> = drawing
+            .shapes
+            .iter()
+            .filter_map(|shape| if let Shape::Clip { frame, .. } = shape { Some(*frame) } else { None })
+            .collect();
+        assert_eq!(boxes.len(), 3);
+        assert!(boxes[0].right() < boxes[1].left && boxes[1].right() < figure.width);
+        assert!(boxes[0].bottom().max(boxes[1].bottom()) < boxes[2].top);
+        assert_eq!(boxes[0].left, boxes[2].left);
+        assert!(boxes[2].bottom() < drawing.height);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The compiled-in font (Ubuntu Light): width of a text and outlines of its letters.
 //! Check: widths add up, and a raised part is narrower than the same letters on the line.
 
-use super::drawing::{Text, runs};
+use super::drawing::runs;
 use crate::io::{OutputError, OutputResult};
 use tiny_skia::{Path, PathBuilder, Transform};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
@@ -19,72 +19,65 @@ impl Font {
 
     /// Width of a text of that size in drawing units.
     pub(crate) fn width(&self, text: &str, size: f64) -> f64 {
-        runs(text).iter().map(|r| size * r.scale() * r.text.chars().map(|c| self.advance(c)).sum::<f64>()).sum()
+        self.letters(text, size).map(|(_, width, ..)| width).sum()
     }
 
-    /// Outlines of a text whose first letter starts at the origin of `place`, in drawing units.
-    pub(crate) fn outline(&self, text: &Text, place: Transform) -> Option<Path> {
-        let mut builder = PathBuilder::new();
-        let mut x = 0.0;
-        for run in runs(&text.text) {
-            let size = text.size * run.scale();
-            for c in run.text.chars() {
-                let scale = (size / f64::from(self.face.units_per_em())) as f32;
-                let mut pen = GlyphPen { out: &mut builder, scale, at: (x as f32, (-text.size * run.rise()) as f32) };
-                self.face.outline_glyph(self.glyph(c), &mut pen);
-                x += size * self.advance(c);
+    /// Outlines of a text that begins at the origin.
+    pub(crate) fn outline(&self, text: &str, size: f64) -> Option<Path> {
+        let (mut out, mut x) = (PathBuilder::new(), 0.0);
+        for (glyph, width, scale, rise) in self.letters(text, size) {
+            let mut pen = Pen(PathBuilder::new());
+            self.face.outline_glyph(glyph, &mut pen);
+            // The font's y is upward.
+            let place = Transform::from_row(scale as f32, 0.0, 0.0, -scale as f32, x as f32, -rise as f32);
+            if let Some(path) = pen.0.finish().and_then(|path| path.transform(place)) {
+                out.push_path(&path);
             }
+            x += width;
         }
-        builder.finish()?.transform(place)
+        out.finish()
+    }
+
+    /// Each letter: glyph, width, drawing units for one of the font, height of its base line.
+    fn letters(&self, text: &str, size: f64) -> impl Iterator<Item = (GlyphId, f64, f64, f64)> {
+        runs(text).into_iter().flat_map(move |run| {
+            let (scale, rise) = run.scale_and_rise();
+            let scale = size * scale / f64::from(self.face.units_per_em());
+            run.text.chars().map(move |c| {
+                let glyph = self.glyph(c);
+                let advance = self.face.glyph_hor_advance(glyph).unwrap_or(0);
+                (glyph, scale * f64::from(advance), scale, size * rise)
+            })
+        })
     }
 
     fn glyph(&self, c: char) -> GlyphId {
         // Glyph 0 is the font's sign for "no such letter".
         self.face.glyph_index(c).unwrap_or(GlyphId(0))
     }
-
-    fn advance(&self, c: char) -> f64 {
-        let units = self.face.glyph_hor_advance(self.glyph(c)).unwrap_or(0);
-        f64::from(units) / f64::from(self.face.units_per_em())
-    }
 }
 
-/// Turns font units (y up) into drawing units (y down).
-struct GlyphPen<'a> {
-    out: &'a mut PathBuilder,
-    scale: f32,
-    at: (f32, f32),
-}
+struct Pen(PathBuilder);
 
-impl GlyphPen<'_> {
-    fn place(&self, x: f32, y: f32) -> (f32, f32) {
-        (self.at.0 + self.scale * x, self.at.1 - self.scale * y)
-    }
-}
-
-impl OutlineBuilder for GlyphPen<'_> {
+impl OutlineBuilder for Pen {
     fn move_to(&mut self, x: f32, y: f32) {
-        let p = self.place(x, y);
-        self.out.move_to(p.0, p.1);
+        self.0.move_to(x, y);
     }
 
     fn line_to(&mut self, x: f32, y: f32) {
-        let p = self.place(x, y);
-        self.out.line_to(p.0, p.1);
+        self.0.line_to(x, y);
     }
 
     fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
-        let (c, p) = (self.place(x1, y1), self.place(x, y));
-        self.out.quad_to(c.0, c.1, p.0, p.1);
+        self.0.quad_to(x1, y1, x, y);
     }
 
     fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
-        let (c, d, p) = (self.place(x1, y1), self.place(x2, y2), self.place(x, y));
-        self.out.cubic_to(c.0, c.1, d.0, d.1, p.0, p.1);
+        self.0.cubic_to(x1, y1, x2, y2, x, y);
     }
 
     fn close(&mut self) {
-        self.out.close();
+        self.0.close();
     }
 }
 

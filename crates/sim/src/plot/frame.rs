@@ -3,20 +3,18 @@
 
 use super::axis::Scale;
 use super::colour::Rgb;
-use super::drawing::{Anchor, Frame, Pen, Shape, Text};
+use super::drawing::{Anchor, Frame, INK, Shape, Text};
 use super::font::Font;
 
-pub(crate) const INK: Rgb = [38, 38, 38];
 pub(crate) const GRID: Rgb = [226, 226, 226];
 const FAINT_GRID: Rgb = [240, 240, 240];
 
-pub(crate) const TITLE_SIZE: f64 = 17.0;
-pub(crate) const LABEL_SIZE: f64 = 16.0;
 pub(crate) const TICK_SIZE: f64 = 14.0;
-
+const TITLE_SIZE: f64 = 17.0;
+const LABEL_SIZE: f64 = 16.0;
 const TICK_LENGTH: f64 = 5.0;
-/// Labelled ticks are about this far apart.
-const GAP: (f64, f64) = (84.0, 48.0);
+/// Middle of the letters above their base line.
+pub(crate) const HALF_HEIGHT: f64 = 0.36 * TICK_SIZE;
 
 /// Room around the box of a panel, the same for all panels so that stacked ones line up.
 pub(crate) const LEFT: f64 = 88.0;
@@ -25,6 +23,36 @@ pub(crate) const BOTTOM: f64 = 58.0;
 /// Room above the box: for the title where there is one.
 pub(crate) fn top_room(title: &str) -> f64 {
     if title.is_empty() { 12.0 } else { 34.0 }
+}
+
+/// The box of a panel in its cell.
+pub(crate) fn inner(cell: Frame, right: f64, title: &str) -> Frame {
+    let top = top_room(title);
+    Frame {
+        left: cell.left + LEFT,
+        top: cell.top + top,
+        width: cell.width - LEFT - right,
+        height: cell.height - top - BOTTOM,
+    }
+}
+
+/// A side of a box that has an axis.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Side {
+    Bottom,
+    Left,
+    Right,
+}
+
+impl Side {
+    /// About how far apart labelled ticks are.
+    fn gap(self) -> f64 {
+        match self {
+            Self::Bottom => 84.0,
+            Self::Left => 48.0,
+            Self::Right => 40.0,
+        }
+    }
 }
 
 /// Axes and title of one panel.
@@ -38,81 +66,50 @@ pub(crate) struct Decor<'a> {
 }
 
 impl Decor<'_> {
-    /// Grid, which the content is drawn over.
-    pub(crate) fn grid(&self, out: &mut Vec<Shape>) {
+    /// The panel: its content over the grid, within the box.
+    pub(crate) fn draw(&self, content: Vec<Shape>, font: &Font, out: &mut Vec<Shape>) {
         let f = &self.frame;
-        let mut line =
-            |from, to, colour| out.push(Shape::Line { points: vec![from, to], pen: Pen::solid(colour, 1.0) });
-        for value in self.x.minor_ticks() {
-            let x = self.x.place(value);
-            line((x, f.top), (x, f.bottom()), FAINT_GRID);
-        }
-        for value in self.y.minor_ticks() {
-            let y = self.y.place(value);
-            line((f.left, y), (f.right(), y), FAINT_GRID);
-        }
-        for tick in self.x.ticks(GAP.0) {
-            let x = self.x.place(tick.value);
-            line((x, f.top), (x, f.bottom()), GRID);
-        }
-        for tick in self.y.ticks(GAP.1) {
-            let y = self.y.place(tick.value);
-            line((f.left, y), (f.right(), y), GRID);
-        }
-    }
-
-    /// Box, ticks, labels and title.
-    pub(crate) fn axes(&self, font: &Font, out: &mut Vec<Shape>) {
-        let f = &self.frame;
-        let mut outline = f.corners();
-        outline.push((f.left, f.top));
-        outline.push((f.right(), f.top));
-        out.push(Shape::Line { points: outline, pen: Pen::solid(INK, 1.2) });
-        for tick in self.x.ticks(GAP.0) {
-            let x = self.x.place(tick.value);
-            out.push(tick_mark((x, f.bottom()), (0.0, TICK_LENGTH)));
-            out.push(label((x, f.bottom() + TICK_LENGTH + TICK_SIZE), tick.label, TICK_SIZE, Anchor::Middle));
-        }
-        let mut widest: f64 = 0.0;
-        for tick in self.y.ticks(GAP.1) {
-            let y = self.y.place(tick.value);
-            widest = widest.max(font.width(&tick.label, TICK_SIZE));
-            out.push(tick_mark((f.left, y), (-TICK_LENGTH, 0.0)));
-            out.push(label((f.left - TICK_LENGTH - 4.0, y + 0.36 * TICK_SIZE), tick.label, TICK_SIZE, Anchor::End));
-        }
-        let middle = (f.left + f.width / 2.0, f.top + f.height / 2.0);
-        out.push(label((middle.0, f.bottom() + BOTTOM - 14.0), self.x_label.into(), LABEL_SIZE, Anchor::Middle));
-        let at = (f.left - TICK_LENGTH - widest - 18.0, middle.1);
-        out.push(upward(at, self.y_label));
-        out.push(Shape::Text(Text {
-            at: (middle.0, f.top - 11.0),
-            text: self.title.into(),
-            size: TITLE_SIZE,
-            anchor: Anchor::Middle,
-            upward: false,
-            colour: INK,
-            bold: true,
-        }));
+        let across = |value: f64| [(self.x.place(value), f.top), (self.x.place(value), f.bottom())];
+        let along = |value: f64| [(f.left, self.y.place(value)), (f.right(), self.y.place(value))];
+        let ticks = |scale: &Scale, side: Side| scale.ticks(side.gap()).into_iter().map(|tick| tick.value);
+        let minor = self.x.minor_ticks().into_iter().map(across).chain(self.y.minor_ticks().into_iter().map(along));
+        let major = ticks(&self.x, Side::Bottom).map(across).chain(ticks(&self.y, Side::Left).map(along));
+        out.extend(minor.map(|line| Shape::line(line, FAINT_GRID, 1.0)));
+        out.extend(major.map(|line| Shape::line(line, GRID, 1.0)));
+        out.push(Shape::Clip { frame: *f, shapes: content });
+        out.push(Shape::line(f.outline(), INK, 1.2));
+        axis(Side::Bottom, &self.x, self.x_label, f, font, out);
+        axis(Side::Left, &self.y, self.y_label, f, font, out);
+        out.push(title((f.left + f.width / 2.0, f.top - 11.0), self.title, TITLE_SIZE));
     }
 }
 
-pub(crate) fn tick_mark(from: (f64, f64), by: (f64, f64)) -> Shape {
-    Shape::Line { points: vec![from, (from.0 + by.0, from.1 + by.1)], pen: Pen::solid(INK, 1.2) }
+/// Ticks, their labels and the name of an axis at a side of a box.
+pub(crate) fn axis(side: Side, scale: &Scale, name: &str, f: &Frame, font: &Font, out: &mut Vec<Shape>) {
+    let mut widest: f64 = 0.0;
+    for tick in scale.ticks(side.gap()) {
+        let at = scale.place(tick.value);
+        widest = widest.max(font.width(&tick.label, TICK_SIZE));
+        let beyond = TICK_LENGTH + 4.0;
+        let (from, to, label, anchor) = match side {
+            Side::Bottom => ((at, f.bottom()), (0.0, 1.0), (at, f.bottom() + TICK_LENGTH + TICK_SIZE), Anchor::Middle),
+            Side::Left => ((f.left, at), (-1.0, 0.0), (f.left - beyond, at + HALF_HEIGHT), Anchor::End),
+            Side::Right => ((f.right(), at), (1.0, 0.0), (f.right() + beyond, at + HALF_HEIGHT), Anchor::Start),
+        };
+        out.push(Shape::line([from, (from.0 + TICK_LENGTH * to.0, from.1 + TICK_LENGTH * to.1)], INK, 1.2));
+        out.push(Shape::text(label, &tick.label, TICK_SIZE, anchor));
+    }
+    let (middle, beyond) = ((f.left + f.width / 2.0, f.top + f.height / 2.0), TICK_LENGTH + widest);
+    let at = match side {
+        Side::Bottom => (middle.0, f.bottom() + BOTTOM - 14.0),
+        Side::Left => (f.left - beyond - 18.0, middle.1),
+        Side::Right => (f.right() + beyond + 24.0, middle.1),
+    };
+    let (upward, anchor) = (side != Side::Bottom, Anchor::Middle);
+    out.push(Shape::Text(Text { at, text: name.into(), size: LABEL_SIZE, anchor, upward, bold: false }));
 }
 
-pub(crate) fn label(at: (f64, f64), text: String, size: f64, anchor: Anchor) -> Shape {
-    Shape::Text(Text { at, text, size, anchor, upward: false, colour: INK, bold: false })
-}
-
-/// An axis label that reads upward, centred on the point.
-pub(crate) fn upward(at: (f64, f64), text: &str) -> Shape {
-    Shape::Text(Text {
-        at,
-        text: text.into(),
-        size: LABEL_SIZE,
-        anchor: Anchor::Middle,
-        upward: true,
-        colour: INK,
-        bold: false,
-    })
+/// A title, centred on the point.
+pub(crate) fn title(at: (f64, f64), text: &str, size: f64) -> Shape {
+    Shape::Text(Text { at, text: text.into(), size, anchor: Anchor::Middle, upward: false, bold: true })
 }

@@ -1,14 +1,16 @@
 //! Surfaces of equal value of a field in space, lit and half transparent, in a box seen from aside without perspective.
 //! Check: a sphere covers the area of its shadow; the opaque surface hides the one behind; the same bytes twice.
 
+use super::axis::extremes;
 use super::colour::Rgb;
-use super::drawing::{Anchor, Frame, Pen, Raster, Shape};
-use super::font::Font;
-use super::frame::{TICK_SIZE, label, top_room};
+use super::drawing::{Anchor, Frame, Shape};
+use super::frame::{TICK_SIZE, top_room};
+use super::png_file::pixels;
 use super::volume::Volume;
 use crate::io::{OutputError, OutputResult};
 use rayon::prelude::*;
 use std::sync::Arc;
+use tiny_skia::Pixmap;
 
 /// Pixels of the embedded picture per drawing unit, as those of a PNG file.
 const DENSITY: f64 = super::png_file::SCALE;
@@ -57,24 +59,22 @@ struct Camera {
     range_m: [(f64, f64); 2],
 }
 
+impl Camera {
+    /// Width and height of the picture \[m\].
+    fn size_m(&self) -> [f64; 2] {
+        self.range_m.map(|(low, high)| high - low)
+    }
+}
+
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 impl IsosurfacePlot {
     fn camera(&self) -> Camera {
-        let ([sa, ca], [se, ce]) = {
-            let [azimuth, elevation] = self.view_rad;
-            ([azimuth.sin(), azimuth.cos()], [elevation.sin(), elevation.cos()])
-        };
+        let [(sa, ca), (se, ce)] = self.view_rad.map(f64::sin_cos);
         let (right, up) = ([-sa, ca, 0.0], [-se * ca, -se * sa, ce]);
-        let mut range_m = [(f64::INFINITY, f64::NEG_INFINITY); 2];
-        for corner in self.corners_m() {
-            for (range, axis) in range_m.iter_mut().zip([right, up]) {
-                let at = dot(corner, axis);
-                *range = (range.0.min(at), range.1.max(at));
-            }
-        }
+        let range_m = [right, up].map(|axis| extremes(self.corners_m().into_iter().map(|corner| dot(corner, axis))));
         Camera { right, up, into: [-ce * ca, -ce * sa, -se], range_m }
     }
 
@@ -85,12 +85,12 @@ impl IsosurfacePlot {
     }
 
     pub(crate) fn height(&self, width: f64) -> f64 {
-        let [across, up] = self.camera().range_m.map(|(low, high)| high - low);
+        let [across, up] = self.camera().size_m();
         let inner = (width - 2.0 * MARGIN) * up / across;
         inner.clamp(60.0, 1.5 * width) + 2.0 * MARGIN + top_room(&self.title)
     }
 
-    pub(crate) fn draw(&self, cell: Frame, _: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
+    pub(crate) fn draw(&self, cell: Frame, out: &mut Vec<Shape>) -> OutputResult<()> {
         for surface in &self.surfaces {
             if !(surface.level.is_finite() && (0.0..=1.0).contains(&surface.opacity)) {
                 let value = format!("level {}, opacity {}", surface.level, surface.opacity);
@@ -98,7 +98,7 @@ impl IsosurfacePlot {
             }
         }
         let camera = self.camera();
-        let [across, up] = camera.range_m.map(|(low, high)| high - low);
+        let [across, up] = camera.size_m();
         let room = (cell.width - 2.0 * MARGIN, cell.height - 2.0 * MARGIN - top_room(&self.title));
         let scale = (room.0 / across).min(room.1 / up);
         let frame = Frame {
@@ -107,107 +107,95 @@ impl IsosurfacePlot {
             width: scale * across,
             height: scale * up,
         };
-        let place = |at_m: [f64; 3]| {
-            let [x, y] = [(dot(at_m, camera.right), 0), (dot(at_m, camera.up), 1)]
-                .map(|(at, axis): (f64, usize)| at - camera.range_m[axis].0);
-            (frame.left + scale * x, frame.bottom() - scale * y)
-        };
-        let corners = self.corners_m();
+        let [left_m, low_m] = camera.range_m.map(|range| range.0);
+        let corners_m = self.corners_m();
+        let corners = corners_m.map(|at_m| {
+            let (x_m, y_m) = (dot(at_m, camera.right) - left_m, dot(at_m, camera.up) - low_m);
+            (frame.left + scale * x_m, frame.bottom() - scale * y_m)
+        });
+        // Of each edge the axis that it lies along, and its ends.
+        let edges = (0..3)
+            .flat_map(|d| (0..8).filter(move |from| from >> d & 1 == 0).map(move |from| (d, from, from | 1 << d)));
         // The corner farthest from the eye has the hidden edges.
-        let far = (0..8).max_by(|a, b| dot(corners[*a], camera.into).total_cmp(&dot(corners[*b], camera.into)));
-        let edge = |from: usize, d: usize| Shape::Line {
-            points: vec![place(corners[from]), place(corners[from ^ (1 << d)])],
-            pen: Pen::solid(EDGE, 1.0),
+        let depth_m = |corner: &usize| dot(corners_m[*corner], camera.into);
+        let far = (0..8).max_by(|a, b| depth_m(a).total_cmp(&depth_m(b)));
+        let (hidden, seen): (Vec<_>, Vec<_>) = edges.partition(|(_, a, b)| far == Some(*a) || far == Some(*b));
+        let lines = |edges: &[(usize, usize, usize)]| -> Vec<Shape> {
+            edges.iter().map(|(_, a, b)| Shape::line([corners[*a], corners[*b]], EDGE, 1.0)).collect()
         };
-        let edges = || (0..8_usize).flat_map(|from| (0..3).filter(move |d| from >> d & 1 == 0).map(move |d| (from, d)));
-        let hidden = |from: usize, d: usize| far.is_some_and(|far| from == far || from ^ (1 << d) == far);
         if self.ground {
-            let points = [0, 1, 3, 2].map(|c| place(corners[c])).to_vec();
-            out.push(Shape::Area { points, fill: GROUND, opacity: 1.0 });
+            out.push(Shape::area([0, 1, 3, 2].map(|corner| corners[corner]), GROUND));
         }
-        out.extend(edges().filter(|e| hidden(e.0, e.1)).map(|e| edge(e.0, e.1)));
-        out.push(Shape::Image { frame, raster: self.raster(&camera, (frame.width * DENSITY, frame.height * DENSITY)) });
-        out.extend(edges().filter(|e| !hidden(e.0, e.1)).map(|e| edge(e.0, e.1)));
-        self.words(cell, &frame, &corners.map(place), out);
-        Ok(())
-    }
-
-    fn words(&self, cell: Frame, frame: &Frame, corners: &[(f64, f64); 8], out: &mut Vec<Shape>) {
+        out.extend(lines(&hidden));
+        let size = [frame.width, frame.height].map(|length| ((length * DENSITY).round() as u32).max(1));
+        out.push(Shape::Image { frame, pixels: self.pixels(&camera, size)? });
+        out.extend(lines(&seen));
         let middle = cell.left + cell.width / 2.0;
-        out.push(label((middle, cell.top + 20.0), self.title.clone(), TICK_SIZE + 2.0, Anchor::Middle));
-        // Axis names and the ends of the axes at the lowest edges in the picture; edges that share a corner keep apart.
-        let along = |edge: &[(f64, f64); 2], share: f64| {
-            (edge[0].0 + share * (edge[1].0 - edge[0].0), edge[0].1 + share * (edge[1].1 - edge[0].1))
+        out.push(Shape::text((middle, cell.top + 20.0), &self.title, TICK_SIZE + 2.0, Anchor::Middle));
+        // Names and ends of the axes at the lowest edges in the picture, of the vertical one at the leftmost; edges that share a corner
+        // keep apart.
+        let along = |(_, a, b): &(usize, usize, usize), share: f64| {
+            let (a, b) = (corners[*a], corners[*b]);
+            (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1))
         };
         for (d, name) in self.axes.iter().enumerate() {
-            let edges =
-                (0..8_usize).filter(|from| from >> d & 1 == 0).map(|from| [corners[from], corners[from ^ (1 << d)]]);
-            let outermost = if d == 2 {
-                edges.min_by(|a, b| along(a, 0.5).0.total_cmp(&along(b, 0.5).0))
-            } else {
-                edges.max_by(|a, b| along(a, 0.5).1.total_cmp(&along(b, 0.5).1))
-            };
+            let outward = |edge: &(usize, usize, usize)| if d == 2 { -along(edge, 0.5).0 } else { along(edge, 0.5).1 };
+            let of_axis = hidden.iter().chain(&seen).filter(|edge| edge.0 == d);
+            let Some(edge) = of_axis.max_by(|a, b| outward(a).total_cmp(&outward(b))) else { continue };
             let [low, high] = self.volume.corners_m().map(|end| format!("{:.1}", end[d]));
-            for (share, text) in [(0.5, name.clone()), (0.08, low), (0.92, high)] {
-                let Some((x, y)) = outermost.map(|edge| along(&edge, share)) else { continue };
-                let at = if d == 2 { (x - 4.0, y) } else { (x, y + TICK_SIZE) };
-                out.push(label(at, text, TICK_SIZE - 1.0, if d == 2 { Anchor::End } else { Anchor::Middle }));
+            for (share, text) in [(0.5, name), (0.08, &low), (0.92, &high)] {
+                let (x, y) = along(edge, share);
+                out.push(match d {
+                    2 => Shape::text((x - 4.0, y), text, TICK_SIZE - 1.0, Anchor::End),
+                    _ => Shape::text((x, y + TICK_SIZE), text, TICK_SIZE - 1.0, Anchor::Middle),
+                });
             }
         }
         for (row, surface) in self.surfaces.iter().enumerate() {
-            let (left, top) = (frame.left + 4.0, frame.top + 14.0 + 18.0 * row as f64);
-            let points = vec![(left, top - 9.0), (left + 14.0, top - 9.0), (left + 14.0, top), (left, top)];
+            let (left, bottom) = (frame.left + 4.0, frame.top + 14.0 + 18.0 * row as f64);
+            let points = Frame { left, top: bottom - 9.0, width: 14.0, height: 9.0 }.outline();
             out.push(Shape::Area { points, fill: surface.colour, opacity: surface.opacity.max(0.4) });
-            out.push(label((left + 20.0, top), surface.name.clone(), TICK_SIZE - 1.0, Anchor::Start));
+            out.push(Shape::text((left + 20.0, bottom), &surface.name, TICK_SIZE - 1.0, Anchor::Start));
         }
+        Ok(())
     }
 
     /// The lit surfaces on a transparent ground.
-    fn raster(&self, camera: &Camera, size: (f64, f64)) -> Raster {
-        let (width, height) = ((size.0.round() as usize).max(1), (size.1.round() as usize).max(1));
+    fn pixels(&self, camera: &Camera, [width, height]: [u32; 2]) -> OutputResult<Pixmap> {
         let levels: Vec<f64> = self.surfaces.iter().map(|s| s.level).collect();
-        let mut rgba = vec![0; 4 * width * height];
-        rgba.par_chunks_mut(4 * width).enumerate().for_each(|(row, pixels)| {
-            for (column, pixel) in pixels.as_chunks_mut::<4>().0.iter_mut().enumerate() {
-                let part = [(column as f64 + 0.5) / width as f64, 1.0 - (row as f64 + 0.5) / height as f64];
-                let [a, b] = [0, 1].map(|i| {
-                    let (low, high) = camera.range_m[i];
-                    low + part[i] * (high - low)
-                });
-                let from = std::array::from_fn(|d| a * camera.right[d] + b * camera.up[d]);
-                *pixel = self.pixel(camera, from, &levels);
-            }
+        let mut rgba = vec![0; 4 * width as usize * height as usize];
+        rgba.as_chunks_mut::<4>().0.par_iter_mut().enumerate().for_each(|(place, pixel)| {
+            let (row, column) = (place / width as usize, place % width as usize);
+            let [(left_m, _), (_, top_m)] = camera.range_m;
+            let [across_m, up_m] = camera.size_m();
+            let a = left_m + (column as f64 + 0.5) / f64::from(width) * across_m;
+            let b = top_m - (row as f64 + 0.5) / f64::from(height) * up_m;
+            let from_m = std::array::from_fn(|d| a * camera.right[d] + b * camera.up[d]);
+            *pixel = self.pixel(camera, from_m, &levels);
         });
-        Raster { width: width as u32, height: height as u32, rgba }
+        pixels(width, height, rgba)
     }
 
+    /// What a ray gathers of surfaces that let some of the light pass: colours times the opacity, and the opacity.
     fn pixel(&self, camera: &Camera, from_m: [f64; 3], levels: &[f64]) -> [u8; 4] {
-        let mut light = [0.0; 3];
-        let mut met = 0.0;
-        self.volume.cast(from_m, camera.into, levels, |crossing| {
-            let surface = &self.surfaces[crossing.level];
-            let shade = self.shade(camera, crossing.normal);
-            let share = (1.0 - met) * surface.opacity;
-            for (sum, colour) in light.iter_mut().zip(surface.colour) {
-                *sum += share * (f64::from(colour) * shade[0] + 255.0 * shade[1]).min(255.0);
-            }
-            met += share;
-            met < OPAQUE
-        });
-        if met == 0.0 {
-            return [0; 4];
-        }
-        let [r, g, b] = light.map(|sum| (sum / met).round() as u8);
-        [r, g, b, (255.0 * met).round() as u8]
-    }
-
-    /// Share of the surface's colour and of white: a lamp above the eye's left shoulder; both sides of a surface are lit.
-    fn shade(&self, camera: &Camera, normal: [f64; 3]) -> [f64; 2] {
+        // A lamp above the eye's left shoulder.
         let lamp: [f64; 3] =
             std::array::from_fn(|d| -0.75 * camera.into[d] + 0.55 * camera.up[d] - 0.37 * camera.right[d]);
-        let facing = if dot(normal, camera.into) > 0.0 { -1.0 } else { 1.0 };
-        let lit = (facing * dot(normal, lamp)).max(0.0);
-        [0.35 + 0.65 * lit, 0.35 * lit.powi(30)]
+        let mut met = [0.0; 4];
+        self.volume.cast(from_m, camera.into, levels, |crossing| {
+            let surface = &self.surfaces[crossing.level];
+            // Both sides of a surface are lit.
+            let facing = if dot(crossing.normal, camera.into) > 0.0 { -1.0 } else { 1.0 };
+            let lit = (facing * dot(crossing.normal, lamp)).max(0.0);
+            let share = (1.0 - met[3]) * surface.opacity;
+            for (sum, colour) in met.iter_mut().zip(surface.colour) {
+                let light = f64::from(colour) / 255.0 * (0.35 + 0.65 * lit) + 0.35 * lit.powi(30);
+                *sum += share * light.min(1.0);
+            }
+            met[3] += share;
+            met[3] < OPAQUE
+        });
+        met.map(|part| (255.0 * part).round() as u8)
     }
 }
 
@@ -236,25 +224,25 @@ mod tests {
         let blue = [0, 0, 200];
         let plot = plot(&[(-0.7, blue, 1.0), (-0.3, [200, 0, 0], 1.0)]);
         let camera = plot.camera();
-        let [across, up] = camera.range_m.map(|(low, high)| high - low);
-        let raster = plot.raster(&camera, (300.0, 300.0 * up / across));
-        let pixels = raster.rgba.as_chunks::<4>().0;
+        let [across, up] = camera.size_m();
+        let picture = plot.pixels(&camera, [300, (300.0 * up / across).round() as u32]).unwrap();
+        let pixels = picture.data().as_chunks::<4>().0;
         let covered = pixels.iter().filter(|p| p[3] == 255).count() as f64;
         let area_m2 = covered * (across / 300.0).powi(2);
         let shadow_m2 = std::f64::consts::PI * 0.49;
         assert!((area_m2 / shadow_m2 - 1.0).abs() < 0.01, "{area_m2} against {shadow_m2}");
         assert!(pixels.iter().all(|p| p[3] == 0 || p[2] > p[0]), "the inner sphere is not seen");
         // Light comes from above.
-        let rows: Vec<&[[u8; 4]]> = pixels.chunks(raster.width as usize).collect();
-        let row = |part: f64| rows[(part * rows.len() as f64) as usize][raster.width as usize / 2][2];
+        let rows: Vec<&[[u8; 4]]> = pixels.chunks(300).collect();
+        let row = |part: f64| rows[(part * rows.len() as f64) as usize][150][2];
         assert!(row(0.4) > row(0.65), "{} {}", row(0.4), row(0.65));
     }
 
     #[test]
     fn a_half_transparent_surface_shows_what_it_holds() {
         let plot = plot(&[(-0.7, [0, 0, 200], 0.3), (-0.3, [200, 0, 0], 1.0)]);
-        let raster = plot.raster(&plot.camera(), (120.0, 120.0));
-        let centre = raster.rgba.as_chunks::<4>().0[60 * 120 + 60];
+        let picture = plot.pixels(&plot.camera(), [120, 120]).unwrap();
+        let centre = picture.data().as_chunks::<4>().0[60 * 120 + 60];
         assert!(centre[0] > centre[2] && centre[2] > 20 && centre[3] == 255, "{centre:?}");
     }
 

@@ -2,11 +2,11 @@
 //! free the plot makes room above its curves.
 //! Check: tests fill all places but one and find the legend there.
 
-use super::colour::Rgb;
-use super::drawing::{Anchor, Frame, Pen, Shape};
+use super::colour::curve_colour;
+use super::curves::Series;
+use super::drawing::{Anchor, Frame, Shape};
 use super::font::Font;
-use super::frame::{GRID, TICK_SIZE, label};
-use super::marker::marker;
+use super::frame::{GRID, HALF_HEIGHT, TICK_SIZE};
 
 const SAMPLE: f64 = 34.0;
 const LINE: f64 = 21.0;
@@ -16,59 +16,55 @@ pub(crate) const INSET: f64 = 8.0;
 /// Half of the largest marker.
 const REACH: f64 = 6.5;
 /// Steps of the places that are tried along each side.
-const GRID_PLACES: usize = 12;
+const GRID_PLACES: u8 = 12;
 
-/// One line of the legend.
-pub(crate) struct Entry<'a> {
-    pub(crate) label: &'a str,
-    pub(crate) pen: Option<Pen>,
-    /// Index of the marker's shape.
-    pub(crate) marker: Option<usize>,
-    pub(crate) colour: Rgb,
-}
-
-/// Room that the entries need.
-pub(crate) fn size(entries: &[Entry], font: &Font) -> (f64, f64) {
-    let widest = entries.iter().map(|e| font.width(e.label, TICK_SIZE)).fold(0.0, f64::max);
+/// Room that the named series need, which come with the indices of their colours.
+pub(crate) fn size(series: &[(usize, &Series)], font: &Font) -> (f64, f64) {
+    let widest = series.iter().map(|(_, s)| font.width(&s.label, TICK_SIZE)).fold(0.0, f64::max);
     // A seventh more than the letters need: the font of an SVG viewer may run wider.
-    (SAMPLE + 3.0 * PAD + 1.15 * widest, LINE * entries.len() as f64 + PAD)
+    (SAMPLE + 3.0 * PAD + 1.15 * widest, LINE * series.len() as f64 + PAD)
 }
 
-/// Draws the entries; `occupied` are points with ink.
-pub(crate) fn legend(entries: &[Entry], frame: Frame, occupied: &[(f64, f64)], font: &Font, out: &mut Vec<Shape>) {
-    if entries.is_empty() {
-        return;
-    }
-    let (place, _) = place(frame, size(entries, font), occupied);
-    out.push(Shape::Area { points: place.corners(), fill: [255, 255, 255], opacity: 0.88 });
-    let mut outline = place.corners();
-    outline.push(outline[0]);
-    out.push(Shape::Line { points: outline, pen: Pen::solid(GRID, 1.0) });
-    for (i, entry) in entries.iter().enumerate() {
-        let y = place.top + 0.5 * PAD + LINE * (i as f64 + 0.5);
-        let x = place.left + PAD;
-        if let Some(pen) = entry.pen {
-            out.push(Shape::Line { points: vec![(x, y), (x + SAMPLE, y)], pen });
+/// Draws samples and names of the series into their place.
+pub(crate) fn legend(series: &[(usize, &Series)], place: Frame, out: &mut Vec<Shape>) {
+    out.push(Shape::Area { points: place.outline(), fill: [255, 255, 255], opacity: 0.88 });
+    out.push(Shape::line(place.outline(), GRID, 1.0));
+    for (row, (colour, series)) in series.iter().enumerate() {
+        let (x, y) = (place.left + PAD, place.top + 0.5 * PAD + LINE * (row as f64 + 0.5));
+        if series.style.has_line() {
+            out.push(Shape::Line { points: vec![(x, y), (x + SAMPLE, y)], pen: series.pen(*colour) });
         }
-        if let Some(index) = entry.marker {
-            out.push(Shape::Area { points: marker((x + SAMPLE / 2.0, y), index), fill: entry.colour, opacity: 1.0 });
+        if series.style.has_markers() {
+            out.push(marker((x + SAMPLE / 2.0, y), *colour));
         }
-        out.push(label((x + SAMPLE + PAD, y + 0.36 * TICK_SIZE), entry.label.into(), TICK_SIZE, Anchor::Start));
+        out.push(Shape::text((x + SAMPLE + PAD, y + HALF_HEIGHT), &series.label, TICK_SIZE, Anchor::Start));
     }
+}
+
+/// The marker of a series: its shape differs as well as its colour.
+pub(crate) fn marker(at: (f64, f64), index: usize) -> Shape {
+    let (corners, radius, turn): (u32, f64, f64) =
+        [(24, 4.6, 0.0), (4, 5.6, 0.125), (3, 6.2, -0.25), (4, 5.8, 0.0)][index % 4];
+    let corner = |i: u32| {
+        let angle = std::f64::consts::TAU * (f64::from(i) / f64::from(corners) + turn);
+        (at.0 + radius * angle.cos(), at.1 + radius * angle.sin())
+    };
+    Shape::area((0..corners).map(corner).collect::<Vec<_>>(), curve_colour(index))
 }
 
 /// The place with the fewest points under the legend, and how many these are. Of equal ones it is the first: the corners
 /// from the upper right on, the middles of the edges, then all over the frame.
 pub(crate) fn place(frame: Frame, (width, height): (f64, f64), occupied: &[(f64, f64)]) -> (Frame, usize) {
-    let (left, right) = (frame.left + INSET, frame.right() - INSET - width);
-    let (top, bottom) = (frame.top + INSET, frame.bottom() - INSET - height);
-    let (centre, middle) = (0.5 * (left + right), 0.5 * (top + bottom));
-    let corners = [(right, top), (left, top), (right, bottom), (left, bottom)];
-    let edges = [(centre, top), (centre, bottom), (right, middle), (left, middle)];
-    let part = |from: f64, to: f64, i: usize| from + (to - from) * i as f64 / GRID_PLACES as f64;
-    let all = (0..=GRID_PLACES)
-        .flat_map(|row| (0..=GRID_PLACES).map(move |column| (row, column)))
-        .map(|(row, column)| (part(right, left, column), part(top, bottom, row)));
+    let corners = [(1.0, 0.0), (0.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+    let edges = [(0.5, 0.0), (0.5, 1.0), (1.0, 0.5), (0.0, 0.5)];
+    let part = |step: u8| f64::from(step) / f64::from(GRID_PLACES);
+    let all = (0..=GRID_PLACES).flat_map(|row| (0..=GRID_PLACES).map(move |column| (1.0 - part(column), part(row))));
+    let places = corners.into_iter().chain(edges).chain(all).map(|(across, down)| Frame {
+        left: frame.left + INSET + across * (frame.width - 2.0 * INSET - width),
+        top: frame.top + INSET + down * (frame.height - 2.0 * INSET - height),
+        width,
+        height,
+    });
     // Markers and the width of lines reach beyond their points.
     let covered = |f: &Frame| {
         let inside = |p: &&(f64, f64)| {
@@ -76,9 +72,8 @@ pub(crate) fn place(frame: Frame, (width, height): (f64, f64), occupied: &[(f64,
         };
         occupied.iter().filter(inside).count()
     };
-    let mut best = (Frame { left: right, top, width, height }, usize::MAX);
-    for (left, top) in corners.into_iter().chain(edges).chain(all) {
-        let frame = Frame { left, top, width, height };
+    let mut best = (frame, usize::MAX);
+    for frame in places {
         let count = covered(&frame);
         if count < best.1 {
             best = (frame, count);

@@ -1,19 +1,22 @@
 //! One field of a sweep as a picture over distance and height in metres, with equal scales, colour bar, ground and lidar.
 //! Check: the colour map is chosen from the field (symmetric for velocities), and the panel's height follows the scan's shape.
 
-use super::axis::Scale;
-use super::colour::ColourMap;
-use super::drawing::{Anchor, Frame, Pen, Raster, Shape};
+use super::axis::{Scale, extremes};
+use super::cells::Cells;
+use super::colour::{ColourMap, Rgb};
+use super::drawing::{Anchor, Frame, INK, Shape};
 use super::font::Font;
-use super::frame::{BOTTOM, Decor, INK, LEFT, TICK_SIZE, label, tick_mark, top_room, upward};
-use super::polar::{MapCells, PlaneCells, PolarCells};
+use super::frame::{BOTTOM, Decor, LEFT, Side, TICK_SIZE, axis, inner, top_room};
+use super::png_file::pixels;
 use crate::io::{OutputError, OutputResult, Unit, VelocityMap};
 
 /// Room to the right of the box, for the colour bar and its label.
 const RIGHT: f64 = 118.0;
 /// Pixels of the embedded picture per drawing unit: cell edges stay sharp when the picture is enlarged.
 const DENSITY: f64 = 2.0;
-const GROUND: [u8; 3] = [222, 211, 196];
+const GROUND: Rgb = [222, 211, 196];
+/// Pixels of the colour bar; wide enough that a viewer's smoothing stays at the rim.
+const BAR: (u32, u32) = (36, 256);
 
 /// A map to draw.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +28,7 @@ pub struct MapPlot {
     /// Colours and their range.
     pub colours: ColourMap,
     /// Cells and values.
-    pub cells: MapCells,
+    pub cells: Cells,
     /// Whether the lidar and its way to the first gate are in the picture.
     pub show_lidar: bool,
     /// Points (y, z) in metres to mark, such as vortex centres.
@@ -42,6 +45,18 @@ impl MapPlot {
     /// # Errors
     /// What [`VelocityMap::check`] finds, no such sweep or field.
     pub fn new(map: &VelocityMap, sweep: usize, field: &str) -> OutputResult<Self> {
+        Self::of_sweep(map, sweep, field, false)
+    }
+
+    /// The picture of a field of a sweep of azimuth, seen from above.
+    ///
+    /// # Errors
+    /// As [`MapPlot::new`].
+    pub fn from_above(map: &VelocityMap, sweep: usize, field: &str) -> OutputResult<Self> {
+        Self::of_sweep(map, sweep, field, true)
+    }
+
+    fn of_sweep(map: &VelocityMap, sweep: usize, field: &str, from_above: bool) -> OutputResult<Self> {
         map.check()?;
         if sweep >= map.sweeps.len() {
             return Err(OutputError::value("sweep", sweep, format!("below {}", map.sweeps.len())));
@@ -50,39 +65,22 @@ impl MapPlot {
             what: format!("field {field}"),
             needed: "the map must have the field that is to be drawn".into(),
         })?;
-        let cells = PolarCells::of_sweep(map, sweep, |r, g| field.values[[r, g]]);
-        let signed = field.name.starts_with("v_") || field.name == "radial_velocity" || field.name == "bias";
+        let cells = Cells::of_sweep(map, sweep, from_above, |r, g| field.values[[r, g]]);
+        let is_signed = field.name.starts_with("v_") || field.name == "radial_velocity" || field.name == "bias";
         let ((left, right), _) = cells.extent_m();
-        Ok(Self {
-            title: map.title.clone(),
-            bar_label: bar_label(&field.long_name, field.unit),
-            colours: colours_for(&cells.values, signed),
-            show_lidar: left - map.lidar_y_m < 0.5 * (right - left),
-            cells: MapCells::Polar(cells),
-            points_m: Vec::new(),
-            from_above: false,
-        })
-    }
-
-    /// The picture of a field of a sweep of azimuth, seen from above.
-    ///
-    /// # Errors
-    /// As [`MapPlot::new`].
-    pub fn from_above(map: &VelocityMap, sweep: usize, field: &str) -> OutputResult<Self> {
-        let plot = Self::new(map, sweep, field)?;
-        let values = map.field(field).map(|field| &field.values);
-        let cells = PolarCells::from_above(map, sweep, |r, g| values.map_or(f64::NAN, |values| values[[r, g]]));
-        Ok(Self { cells: MapCells::Polar(cells), from_above: true, show_lidar: false, ..plot })
+        let show_lidar = !from_above && left - map.lidar_y_m < 0.5 * (right - left);
+        let plot = Self::of_cells(cells, &bar_label(&field.long_name, field.unit), is_signed);
+        Ok(Self { title: map.title.clone(), show_lidar, from_above, ..plot })
     }
 
     /// The picture of a field on a cross-plane; signed fields get symmetric colours.
-    pub fn of_plane(cells: PlaneCells, bar_label: &str, signed: bool) -> Self {
+    pub fn of_cells(cells: Cells, bar_label: &str, is_signed: bool) -> Self {
         Self {
             title: String::new(),
             bar_label: bar_label.into(),
-            colours: colours_for(&cells.values, signed),
+            colours: colours_for(&cells.values, is_signed),
             show_lidar: false,
-            cells: MapCells::Plane(cells),
+            cells,
             points_m: Vec::new(),
             from_above: false,
         }
@@ -110,7 +108,7 @@ impl MapPlot {
     }
 
     fn shown_lidar_m(&self) -> Option<(f64, f64)> {
-        self.cells.lidar_m().filter(|_| self.show_lidar)
+        self.cells.lidar_m.filter(|_| self.show_lidar)
     }
 
     /// Box to show: (left, right), (lowest, highest), m.
@@ -138,108 +136,65 @@ impl MapPlot {
         if !(low < high && low.is_finite() && high.is_finite()) {
             return Err(OutputError::value("range of colours", format!("{low} to {high}"), "finite and increasing"));
         }
-        let frame = Frame {
-            left: cell.left + LEFT,
-            top: cell.top + top_room(&self.title),
-            width: cell.width - LEFT - RIGHT,
-            height: cell.height - top_room(&self.title) - BOTTOM,
-        };
+        let frame = inner(cell, RIGHT, &self.title);
         let (y_m, z_m) = self.fitted(&frame);
         let x = Scale { range: y_m, log: false, paper: (frame.left, frame.right()) };
         let y = Scale { range: z_m, log: false, paper: (frame.bottom(), frame.top) };
+        let size = ((frame.width * DENSITY) as u32, (frame.height * DENSITY) as u32);
+        let mut content = vec![Shape::Image { frame, pixels: self.cells.pixels(y_m, z_m, size, &self.colours)? }];
         let [x_label, y_label] = match self.from_above {
             true => ["across the flight [m]", "along the flight [m]"],
-            false => ["distance [m]", "height [m]"],
+            false => {
+                let ground = Frame { top: y.place(0.0), height: frame.bottom() - y.place(0.0), ..frame };
+                content.insert(0, Shape::area(ground.outline(), GROUND));
+                content.push(Shape::line([(frame.left, ground.top), (frame.right(), ground.top)], INK, 1.4));
+                ["distance [m]", "height [m]"]
+            }
         };
-        let decor = Decor { frame, x, y, x_label, y_label, title: &self.title };
-        decor.grid(out);
-        let ground = Frame { top: y.place(0.0), height: frame.bottom() - y.place(0.0), ..frame };
-        let size = ((frame.width * DENSITY) as u32, (frame.height * DENSITY) as u32);
-        let mut content = vec![
-            Shape::Area { points: ground.corners(), fill: GROUND, opacity: 1.0 },
-            Shape::Image { frame, raster: self.cells.raster(y_m, z_m, size, &self.colours) },
-            Shape::Line {
-                points: vec![(frame.left, ground.top), (frame.right(), ground.top)],
-                pen: Pen::solid(INK, 1.4),
-            },
-        ];
-        if self.from_above {
-            content.retain(|shape| matches!(shape, Shape::Image { .. }));
-        }
         self.push_marks(&x, &y, &mut content);
-        out.push(Shape::Clip { frame, shapes: content });
-        decor.axes(font, out);
-        self.push_bar(&frame, font, out);
+        Decor { frame, x, y, x_label, y_label, title: &self.title }.draw(content, font, out);
+        let bar = Frame { left: frame.right() + 18.0, width: 18.0, ..frame };
+        let rows = (0..BAR.1).map(|row| high - (f64::from(row) + 0.5) / f64::from(BAR.1) * (high - low));
+        let rgba =
+            rows.map(|value| self.colours.colour(value)).flat_map(|[r, g, b]| [r, g, b, 255].repeat(BAR.0 as usize));
+        out.push(Shape::Image { frame: bar, pixels: pixels(BAR.0, BAR.1, rgba.collect())? });
+        out.push(Shape::line(bar.outline(), INK, 1.2));
+        let scale = Scale { range: (low, high), log: false, paper: (bar.bottom(), bar.top) };
+        axis(Side::Right, &scale, &self.bar_label, &bar, font, out);
         Ok(())
     }
 
     /// The view, widened along one axis to the shape of the frame.
     fn fitted(&self, frame: &Frame) -> ((f64, f64), (f64, f64)) {
-        let (mut y, mut z) = self.view_m();
+        let (y, z) = self.view_m();
         let unit = ((y.1 - y.0) / frame.width).max((z.1 - z.0) / frame.height);
         let extra = unit * frame.width - (y.1 - y.0);
-        y = (y.0 - 0.5 * extra, y.1 + 0.5 * extra);
         // Room above, not below the ground.
-        z.1 = z.0 + unit * frame.height;
-        (y, z)
+        ((y.0 - 0.5 * extra, y.1 + 0.5 * extra), (z.0, z.0 + unit * frame.height))
     }
 
     fn push_marks(&self, x: &Scale, y: &Scale, out: &mut Vec<Shape>) {
         if let Some(lidar_m) = self.shown_lidar_m() {
-            let lidar = (x.place(lidar_m.0), y.place(lidar_m.1));
             // A tripod on the ground, large enough to be seen when the telescope is low.
-            let ground = y.place(0.0);
-            let apex = (lidar.0, lidar.1.min(ground - 13.0));
-            let triangle = vec![apex, (lidar.0 - 8.0, ground), (lidar.0 + 8.0, ground)];
-            out.push(Shape::Area { points: triangle, fill: INK, opacity: 1.0 });
-            out.push(label((lidar.0 + 13.0, ground - 4.0), "lidar".into(), TICK_SIZE, Anchor::Start));
+            let (at, ground) = (x.place(lidar_m.0), y.place(0.0));
+            let apex = (at, y.place(lidar_m.1).min(ground - 13.0));
+            out.push(Shape::area([apex, (at - 8.0, ground), (at + 8.0, ground)], INK));
+            out.push(Shape::text((at + 13.0, ground - 4.0), "lidar", TICK_SIZE, Anchor::Start));
         }
         for p in &self.points_m {
             let (px, py) = (x.place(p.0), y.place(p.1));
             for (colour, width) in [([255, 255, 255], 4.5), (INK, 2.0)] {
-                for d in [7.0, -7.0] {
-                    let arm = vec![(px - 7.0, py - d), (px + 7.0, py + d)];
-                    out.push(Shape::Line { points: arm, pen: Pen::solid(colour, width) });
-                }
+                let arm = |d: f64| Shape::line([(px - 7.0, py - d), (px + 7.0, py + d)], colour, width);
+                out.extend([7.0, -7.0].map(arm));
             }
         }
-    }
-
-    fn push_bar(&self, frame: &Frame, font: &Font, out: &mut Vec<Shape>) {
-        let bar = Frame { left: frame.right() + 18.0, top: frame.top, width: 18.0, height: frame.height };
-        let range = self.colours.range();
-        // Wide enough that a viewer's smoothing stays at the rim.
-        let (steps, columns) = (256, 36);
-        let rgba = (0..steps).flat_map(|i| {
-            let value = range.1 - (f64::from(i) + 0.5) / f64::from(steps) * (range.1 - range.0);
-            let c = self.colours.colour(value);
-            [c[0], c[1], c[2], 255].repeat(columns)
-        });
-        out.push(Shape::Image {
-            frame: bar,
-            raster: Raster { width: columns as u32, height: steps, rgba: rgba.collect() },
-        });
-        let mut outline = bar.corners();
-        outline.push((bar.left, bar.top));
-        out.push(Shape::Line { points: outline, pen: Pen::solid(INK, 1.2) });
-        let scale = Scale { range, log: false, paper: (bar.bottom(), bar.top) };
-        let mut widest: f64 = 0.0;
-        for tick in scale.ticks(40.0) {
-            let y = scale.place(tick.value);
-            widest = widest.max(font.width(&tick.label, TICK_SIZE));
-            out.push(tick_mark((bar.right(), y), (5.0, 0.0)));
-            out.push(label((bar.right() + 9.0, y + 0.36 * TICK_SIZE), tick.label, TICK_SIZE, Anchor::Start));
-        }
-        out.push(upward((bar.right() + 9.0 + widest + 20.0, bar.top + bar.height / 2.0), &self.bar_label));
     }
 }
 
 /// Colours from the finite values: symmetric about zero for signed fields, rounded up to two digits.
-fn colours_for(values: &[f64], signed: bool) -> ColourMap {
-    let finite = || values.iter().copied().filter(|v| v.is_finite());
-    let low = finite().fold(f64::INFINITY, f64::min);
-    let high = finite().fold(f64::NEG_INFINITY, f64::max);
-    if signed {
+fn colours_for(values: &[f64], is_signed: bool) -> ColourMap {
+    let (low, high) = extremes(values.iter().copied().filter(|v| v.is_finite()));
+    if is_signed {
         let largest = high.max(-low);
         let limit = if largest > 0.0 && largest.is_finite() { round_up(largest) } else { 1.0 };
         return ColourMap::Diverging { limit };

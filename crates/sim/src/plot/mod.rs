@@ -7,14 +7,14 @@
 //! | [`figure`] | panels side by side or stacked, as SVG text or PNG bytes |
 //! | [`curves`] | curves with bands and markers, linear or logarithmic |
 //! | [`map`] | one field of a sweep or of a plane over distance and height, equal scales, with colour bar |
-//! | [`polar`] | (inside a map) pixels from polar and rectangular cells |
+//! | [`cells`] | (inside a map) pixels from polar and rectangular cells |
 //! | [`isosurface`] | lit surfaces of equal value of a field in space |
 //! | [`volume`] | (inside it) rays through a mesh |
-//! | [`animation`] | pictures one after the other, as APNG |
+//! | [`apng`] | pictures one after the other |
 //! | [`colour`] | palette and colour maps |
 
-pub mod animation;
 mod axis;
+pub mod cells;
 pub mod colour;
 pub mod curves;
 mod drawing;
@@ -24,17 +24,17 @@ mod frame;
 pub mod isosurface;
 mod legend;
 pub mod map;
-mod marker;
 mod png_file;
-pub mod polar;
 mod svg;
 pub mod volume;
 
 pub use axis::Axis;
+pub use cells::Cells;
 pub use colour::ColourMap;
 pub use curves::{CurvePlot, Series, Style};
 pub use figure::{Figure, Panel};
 pub use isosurface::{IsosurfacePlot, Surface};
 pub use map::MapPlot;
+pub use png_file::apng;
 pub use svg::escape;
 pub use volume::Volume;

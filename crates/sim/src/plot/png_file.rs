@@ -1,7 +1,10 @@
-//! A drawing as PNG: shapes and letters are filled with smooth edges; the provenance is in iTXt chunks.
-//! Check: single pixels of a drawn area, a clipped line and an image; the chunks are read back.
+//! A drawing as PNG: shapes and letters are filled with smooth edges; the provenance is in iTXt chunks. Several drawings one after
+//! the other are an animated PNG (APNG), which browsers play and other readers show as its first picture.
+//! Check: single pixels of a drawn area, a clipped line and an image; chunks and frames are read back.
 
-use super::drawing::{Anchor, Drawing, Frame, Pen, Raster, Shape, Text};
+use super::colour::Rgb;
+use super::drawing::{Drawing, INK, Shape, Text};
+use super::figure::Figure;
 use super::font::Font;
 use crate::io::{OutputError, OutputResult, Provenance};
 use tiny_skia::{
@@ -14,20 +17,23 @@ pub(crate) const SCALE: f64 = 1.2;
 /// The font is light: its letters are stroked by this part of their size to read well in small print.
 const EMBOLDEN: f64 = 0.022;
 
-/// The whole file.
-pub(crate) fn png_bytes(drawing: &Drawing, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-    encode(&paint(drawing)?, Some(provenance))
-}
-
-/// The pixels of a drawing.
-pub(crate) fn paint(drawing: &Drawing) -> OutputResult<Raster> {
-    let (width, height) = ((drawing.width * SCALE).round() as u32, (drawing.height * SCALE).round() as u32);
+/// The pixels of a drawing, none of them transparent.
+pub(crate) fn paint(drawing: &Drawing) -> OutputResult<Pixmap> {
+    let [width, height] = [drawing.width, drawing.height].map(|length| (length * SCALE).round() as u32);
     let refuse = || OutputError::value("picture size", format!("{width} x {height}"), "1 to 32767 pixels each");
     let mut pixmap = Pixmap::new(width, height).ok_or_else(refuse)?;
     pixmap.fill(Color::WHITE);
     let mut painter = Painter { pixmap, font: Font::load()?, mask: None };
-    painter.shapes(&drawing.shapes)?;
-    Ok(Raster { width, height, rgba: painter.pixmap.take_demultiplied() })
+    painter.shapes(&drawing.shapes);
+    Ok(painter.pixmap)
+}
+
+/// Pixels, row by row from the top: red, green, blue, times the opacity, and the opacity.
+pub(crate) fn pixels(width: u32, height: u32, rgba: Vec<u8>) -> OutputResult<Pixmap> {
+    let size = IntSize::from_wh(width, height);
+    size.and_then(|size| Pixmap::from_vec(rgba, size)).ok_or_else(|| {
+        OutputError::value("embedded picture", format!("{width} x {height}"), "4 bytes a pixel, at least one pixel")
+    })
 }
 
 struct Painter {
@@ -37,86 +43,59 @@ struct Painter {
 }
 
 impl Painter {
-    fn shapes(&mut self, shapes: &[Shape]) -> OutputResult<()> {
+    fn shapes(&mut self, shapes: &[Shape]) {
         for shape in shapes {
             match shape {
-                Shape::Line { points, pen } => self.line(points, pen),
-                Shape::Area { points, fill, opacity } => {
-                    if let Some(path) = polygon(points, true) {
-                        self.fill(&path, *fill, *opacity);
-                    }
+                Shape::Line { points, pen } => {
+                    let dash = StrokeDash::new(pen.dash.iter().map(|d| *d as f32).collect(), 0.0);
+                    let stroke =
+                        Stroke { width: pen.width as f32, line_join: LineJoin::Round, dash, ..Stroke::default() };
+                    self.stroke(path(points), pen.colour, &stroke);
                 }
+                Shape::Area { points, fill, opacity } => self.fill(path(points), *fill, *opacity),
                 Shape::Text(text) => self.text(text),
-                Shape::Image { frame, raster } => self.image(frame, raster)?,
+                Shape::Image { frame, pixels } => {
+                    let [width, height] = [pixels.width(), pixels.height()].map(f64::from);
+                    let fit = Transform::from_scale((frame.width / width) as f32, (frame.height / height) as f32)
+                        .post_translate(frame.left as f32, frame.top as f32)
+                        .post_concat(scale());
+                    let how = PixmapPaint { quality: FilterQuality::Bilinear, ..PixmapPaint::default() };
+                    self.pixmap.draw_pixmap(0, 0, pixels.as_ref(), &how, fit, self.mask.as_ref());
+                }
                 Shape::Clip { frame, shapes } => {
-                    let outer = self.mask.take();
-                    self.mask = self.clip(frame);
-                    self.shapes(shapes)?;
+                    let mut mask = Mask::new(self.pixmap.width(), self.pixmap.height());
+                    if let (Some(mask), Some(path)) = (&mut mask, path(&frame.outline())) {
+                        mask.fill_path(&path, FillRule::Winding, true, scale());
+                    }
+                    let outer = std::mem::replace(&mut self.mask, mask);
+                    self.shapes(shapes);
                     self.mask = outer;
                 }
             }
         }
-        Ok(())
-    }
-
-    fn clip(&self, frame: &Frame) -> Option<Mask> {
-        let mut mask = Mask::new(self.pixmap.width(), self.pixmap.height())?;
-        let path = polygon(&frame.corners(), true)?;
-        mask.fill_path(&path, FillRule::Winding, true, scale());
-        Some(mask)
-    }
-
-    fn line(&mut self, points: &[(f64, f64)], pen: &Pen) {
-        let Some(path) = polygon(points, false) else { return };
-        let lengths = pen.dash.iter().map(|d| *d as f32).collect();
-        let stroke = Stroke {
-            width: pen.width as f32,
-            line_join: LineJoin::Round,
-            dash: StrokeDash::new(lengths, 0.0),
-            ..Stroke::default()
-        };
-        self.pixmap.stroke_path(&path, &paint_of(pen.colour, 1.0), &stroke, scale(), self.mask.as_ref());
-    }
-
-    fn fill(&mut self, path: &Path, colour: [u8; 3], opacity: f64) {
-        self.pixmap.fill_path(path, &paint_of(colour, opacity), FillRule::Winding, scale(), self.mask.as_ref());
     }
 
     fn text(&mut self, text: &Text) {
-        let width = self.font.width(&text.text, text.size) as f32;
-        let back = match text.anchor {
-            Anchor::Start => 0.0,
-            Anchor::Middle => -width / 2.0,
-            Anchor::End => -width,
-        };
-        let (x, y) = (text.at.0 as f32, text.at.1 as f32);
+        let back = -0.5 * f64::from(text.anchor as u8) * self.font.width(&text.text, text.size);
         let turn = if text.upward { -90.0 } else { 0.0 };
-        let place = Transform::from_rotate(turn).post_translate(x, y).pre_translate(back, 0.0);
-        let Some(path) = self.font.outline(text, place) else { return };
-        self.fill(&path, text.colour, 1.0);
+        let place = Transform::from_rotate(turn).post_translate(text.at.0 as f32, text.at.1 as f32);
+        let outline = self.font.outline(&text.text, text.size);
+        let path = outline.and_then(|path| path.transform(place.pre_translate(back as f32, 0.0)));
+        self.fill(path.clone(), INK, 1.0);
         let part = if text.bold { 2.5 * EMBOLDEN } else { EMBOLDEN };
-        let stroke = Stroke { width: (part * text.size) as f32, ..Stroke::default() };
-        self.pixmap.stroke_path(&path, &paint_of(text.colour, 1.0), &stroke, scale(), self.mask.as_ref());
+        self.stroke(path, INK, &Stroke { width: (part * text.size) as f32, ..Stroke::default() });
     }
 
-    fn image(&mut self, frame: &Frame, raster: &Raster) -> OutputResult<()> {
-        let size = IntSize::from_wh(raster.width, raster.height);
-        let premultiplied = raster.rgba.chunks_exact(4).flat_map(|p| {
-            let c = tiny_skia::ColorU8::from_rgba(p[0], p[1], p[2], p[3]).premultiply();
-            [c.red(), c.green(), c.blue(), c.alpha()]
-        });
-        let pixels = size.and_then(|s| Pixmap::from_vec(premultiplied.collect(), s)).ok_or_else(|| {
-            OutputError::value("embedded picture", raster.rgba.len(), "4 bytes a pixel, at least one pixel")
-        })?;
-        let fit = Transform::from_scale(
-            (frame.width / f64::from(raster.width)) as f32,
-            (frame.height / f64::from(raster.height)) as f32,
-        )
-        .post_translate(frame.left as f32, frame.top as f32)
-        .post_concat(scale());
-        let how = PixmapPaint { quality: FilterQuality::Bilinear, ..PixmapPaint::default() };
-        self.pixmap.draw_pixmap(0, 0, pixels.as_ref(), &how, fit, self.mask.as_ref());
-        Ok(())
+    fn fill(&mut self, path: Option<Path>, colour: Rgb, opacity: f64) {
+        if let Some(path) = path {
+            self.pixmap.fill_path(&path, &ink(colour, opacity), FillRule::Winding, scale(), self.mask.as_ref());
+        }
+    }
+
+    fn stroke(&mut self, path: Option<Path>, colour: Rgb, stroke: &Stroke) {
+        if let Some(path) = path {
+            self.pixmap.stroke_path(&path, &ink(colour, 1.0), stroke, scale(), self.mask.as_ref());
+        }
     }
 }
 
@@ -124,37 +103,64 @@ fn scale() -> Transform {
     Transform::from_scale(SCALE as f32, SCALE as f32)
 }
 
-fn paint_of(c: [u8; 3], opacity: f64) -> Paint<'static> {
+fn ink([r, g, b]: Rgb, opacity: f64) -> Paint<'static> {
     let mut paint = Paint::default();
-    paint.set_color_rgba8(c[0], c[1], c[2], (255.0 * opacity).round() as u8);
+    paint.set_color_rgba8(r, g, b, (255.0 * opacity).round() as u8);
     paint
 }
 
-fn polygon(points: &[(f64, f64)], closed: bool) -> Option<Path> {
-    let mut builder = PathBuilder::with_capacity(points.len() + 1, points.len());
+fn path(points: &[(f64, f64)]) -> Option<Path> {
+    let mut builder = PathBuilder::with_capacity(points.len(), points.len());
     for (i, (x, y)) in points.iter().enumerate() {
         let (x, y) = (*x as f32, *y as f32);
         if i == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
     }
-    if closed {
-        builder.close();
-    }
     builder.finish()
 }
 
-/// PNG bytes of a raster, with the provenance in iTXt chunks where it is given.
-pub(crate) fn encode(raster: &Raster, provenance: Option<&Provenance>) -> OutputResult<Vec<u8>> {
+/// The figures as one animated PNG, each shown for `frame_s` \[s\], over and over.
+///
+/// # Errors
+/// No figures, figures of different sizes, a time that is not between 0.01 s and 60 s, and what [`Figure::png`] finds.
+pub fn apng(figures: &[Figure], frame_s: f64, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    if !(0.01..=60.0).contains(&frame_s) {
+        return Err(OutputError::value("frame_s", frame_s, "0.01 to 60 s"));
+    }
+    encode(figures.iter().map(|figure| paint(&figure.draw()?)), frame_s, Some(provenance))
+}
+
+/// PNG bytes of one picture, APNG bytes of several, with the provenance in iTXt chunks where it is given.
+pub(crate) fn encode(
+    pictures: impl IntoIterator<Item = OutputResult<Pixmap>, IntoIter: ExactSizeIterator>,
+    frame_s: f64,
+    provenance: Option<&Provenance>,
+) -> OutputResult<Vec<u8>> {
     let refuse = |e: png::EncodingError| OutputError::encode("PNG", e);
+    let mut pictures = pictures.into_iter();
+    let count = pictures.len();
+    let first = pictures.next().ok_or_else(|| OutputError::value("figures", 0, "at least one"))??;
+    let size = (first.width(), first.height());
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, raster.width, raster.height);
+    let mut encoder = png::Encoder::new(&mut bytes, size.0, size.1);
     encoder.set_color(png::ColorType::Rgba);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Best);
+    if count > 1 {
+        encoder.set_animated(count as u32, 0).map_err(refuse)?;
+        encoder.set_frame_delay((1000.0 * frame_s).round() as u16, 1000).map_err(refuse)?;
+    }
     for (key, text) in provenance.map(Provenance::entries).into_iter().flatten() {
         encoder.add_itxt_chunk(key.into(), text).map_err(refuse)?;
     }
     let mut writer = encoder.write_header().map_err(refuse)?;
-    writer.write_image_data(&raster.rgba).map_err(refuse)?;
+    for picture in std::iter::once(Ok(first)).chain(pictures) {
+        let picture = picture?;
+        if (picture.width(), picture.height()) != size {
+            let value = format!("{} x {}", picture.width(), picture.height());
+            return Err(OutputError::value("size of a figure", value, "that of the first"));
+        }
+        writer.write_image_data(&picture.take_demultiplied()).map_err(refuse)?;
+    }
     writer.finish().map_err(refuse)?;
     Ok(bytes)
 }
@@ -163,11 +169,12 @@ pub(crate) fn encode(raster: &Raster, provenance: Option<&Provenance>) -> Output
 mod tests {
     use super::*;
     use crate::io::provenance::example;
+    use crate::plot::drawing::Frame;
+    use crate::plot::{Axis, CurvePlot, Series, Style};
 
-    fn pixel(raster: &Raster, x: f64, y: f64) -> [u8; 3] {
-        let (i, j) = ((x * SCALE) as u32, (y * SCALE) as u32);
-        let at = 4 * (j * raster.width + i) as usize;
-        [raster.rgba[at], raster.rgba[at + 1], raster.rgba[at + 2]]
+    fn pixel(picture: &Pixmap, x: f64, y: f64) -> [u8; 3] {
+        let at = picture.pixel((x * SCALE) as u32, (y * SCALE) as u32).unwrap();
+        [at.red(), at.green(), at.blue()]
     }
 
     #[test]
@@ -176,25 +183,17 @@ mod tests {
         // Upper row red, lower row blue.
         let rgba = [[255, 0, 0, 255], [255, 0, 0, 255], [0, 0, 255, 255], [0, 0, 255, 255]].concat();
         let picture = Frame { left: 10.0, top: 40.0, width: 20.0, height: 20.0 };
-        let black = Pen::solid([0, 0, 0], 4.0);
         let drawing = Drawing {
             width: 100.0,
             height: 80.0,
             shapes: vec![
-                Shape::Area {
-                    points: vec![(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)],
-                    fill: [0, 128, 0],
-                    opacity: 1.0,
-                },
-                Shape::Clip {
-                    frame,
-                    shapes: vec![Shape::Line { points: vec![(30.0, 20.0), (90.0, 20.0)], pen: black }],
-                },
-                Shape::Image { frame: picture, raster: Raster { width: 2, height: 2, rgba } },
+                Shape::area([(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)], [0, 128, 0]),
+                Shape::Clip { frame, shapes: vec![Shape::line([(30.0, 20.0), (90.0, 20.0)], [0, 0, 0], 4.0)] },
+                Shape::Image { frame: picture, pixels: pixels(2, 2, rgba).unwrap() },
             ],
         };
         let raster = paint(&drawing).unwrap();
-        assert_eq!((raster.width, raster.height), (120, 96));
+        assert_eq!((raster.width(), raster.height()), (120, 96));
         assert_eq!(pixel(&raster, 10.0, 10.0), [0, 128, 0]);
         assert_eq!(pixel(&raster, 30.0, 10.0), [255, 255, 255]);
         assert_eq!(pixel(&raster, 60.0, 20.0), [0, 0, 0]);
@@ -206,8 +205,9 @@ mod tests {
     #[test]
     fn provenance_is_in_the_chunks_and_the_bytes_do_not_change() {
         let drawing = Drawing { width: 30.0, height: 20.0, shapes: vec![] };
-        let bytes = png_bytes(&drawing, &example()).unwrap();
-        assert_eq!(bytes, png_bytes(&drawing, &example()).unwrap());
+        let png_bytes = || encode([paint(&drawing)], 0.0, Some(&example())).unwrap();
+        let bytes = png_bytes();
+        assert_eq!(bytes, png_bytes());
         let reader = png::Decoder::new(bytes.as_slice()).read_info().unwrap();
         let chunks: Vec<(String, String)> =
             reader.info().utf8_text.iter().map(|c| (c.keyword.clone(), c.get_text().unwrap())).collect();
@@ -219,5 +219,38 @@ mod tests {
     fn an_impossible_size_is_an_error() {
         let drawing = Drawing { width: 0.0, height: 20.0, shapes: vec![] };
         assert!(matches!(paint(&drawing), Err(OutputError::Value { .. })));
+    }
+
+    fn figure(slope: f64, width: f64) -> Figure {
+        let line = Series::new("", Style::Line, [(0.0, 0.0), (1.0, slope)]);
+        let mut figure = Figure::stacked([CurvePlot::new("", Axis::linear("t"), Axis::linear("q")).with(line)]);
+        figure.width = width;
+        figure
+    }
+
+    #[test]
+    fn all_pictures_are_read_back_with_their_times() {
+        let bytes = apng(&[figure(1.0, 300.0), figure(2.0, 300.0), figure(5.0, 300.0)], 0.25, &example()).unwrap();
+        let mut reader = png::Decoder::new(bytes.as_slice()).read_info().unwrap();
+        assert_eq!(reader.info().animation_control.unwrap().num_frames, 3);
+        let mut pixels = vec![0; 4 * reader.info().width as usize * reader.info().height as usize];
+        let mut sums = Vec::new();
+        for _ in 0..3 {
+            let size = reader.next_frame(&mut pixels).unwrap().buffer_size();
+            let frame = reader.info().frame_control.unwrap();
+            assert_eq!((frame.delay_num, frame.delay_den), (250, 1000));
+            sums.push(pixels[..size].iter().map(|p| u64::from(*p)).sum::<u64>());
+        }
+        assert!(sums[0] != sums[1] && sums[1] != sums[2]);
+    }
+
+    #[test]
+    fn no_pictures_pictures_of_two_sizes_and_impossible_times_are_refused() {
+        let one = || figure(1.0, 300.0);
+        assert!(apng(&[], 0.1, &example()).is_err());
+        assert!(apng(&[one(), figure(1.0, 400.0)], 0.1, &example()).is_err());
+        for time_s in [0.0, -1.0, f64::NAN, 1e3] {
+            assert!(apng(&[one()], time_s, &example()).is_err());
+        }
     }
 }

@@ -2,10 +2,12 @@
 //! There are no ids, so that several pictures can stand in one page.
 //! Check: the tests count elements and look for the escapes.
 
-use super::drawing::{Anchor, Drawing, Frame, Pen, Raster, Shape, Text, runs};
+use super::colour::Rgb;
+use super::drawing::{Anchor, Drawing, Frame, Shape, Text, runs};
 use super::png_file::encode;
 use crate::io::{OutputResult, Provenance};
-use std::fmt::Write as _;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 
 /// The compiled-in font of the PNG files first, then what systems have.
 const FAMILY: &str = "Ubuntu, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif";
@@ -19,123 +21,84 @@ pub(crate) fn svg_text(drawing: &Drawing, provenance: &Provenance) -> OutputResu
     for (key, text) in provenance.entries() {
         out += &format!("{key}: {}\n", escape(&text));
     }
-    out += "</metadata>\n";
-    out += &format!("<rect width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n");
+    out += &format!("</metadata>\n<rect width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n");
     for shape in &drawing.shapes {
-        push_shape(shape, &mut out)?;
+        out += &element(shape)?;
     }
-    out += "</svg>\n";
-    Ok(out)
+    Ok(out + "</svg>\n")
 }
 
 /// Text that may stand between tags and in attributes.
 pub fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '<' => out += "&lt;",
-            '>' => out += "&gt;",
-            '&' => out += "&amp;",
-            '"' => out += "&quot;",
-            '\'' => out += "&#39;",
-            // XML has no place for other control characters.
-            c if c.is_control() && !matches!(c, '\n' | '\t') => out.push(' '),
-            c => out.push(c),
-        }
-    }
-    out
+    // XML has no place for other control characters.
+    let plain = text.replace(|c: char| c.is_control() && !matches!(c, '\n' | '\t'), " ");
+    let signs = [('&', "&amp;"), ('<', "&lt;"), ('>', "&gt;"), ('"', "&quot;"), ('\'', "&#39;")];
+    signs.into_iter().fold(plain, |text, (sign, name)| text.replace(sign, name))
 }
 
-fn push_shape(shape: &Shape, out: &mut String) -> OutputResult<()> {
-    match shape {
+fn element(shape: &Shape) -> OutputResult<String> {
+    Ok(match shape {
         Shape::Line { points, pen } => {
-            let _ = writeln!(out, "<polyline points=\"{}\" {}/>", pairs(points), stroke(pen));
+            let (points, colour, width) = (pairs(points), hex(pen.colour), number(pen.width));
+            let mut dash = pen.dash.iter().map(|d| number(*d)).collect::<Vec<_>>().join(" ");
+            if !dash.is_empty() {
+                dash = format!(" stroke-dasharray=\"{dash}\"");
+            }
+            format!(
+                "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"{dash}/>\n"
+            )
         }
         Shape::Area { points, fill, opacity } => {
-            let faint = if *opacity < 1.0 { format!(" fill-opacity=\"{}\"", number(*opacity)) } else { String::new() };
-            let _ = writeln!(out, "<polygon points=\"{}\" fill=\"{}\"{faint}/>", pairs(points), hex(*fill));
+            let (points, colour, opacity) = (pairs(points), hex(*fill), number(*opacity));
+            format!("<polygon points=\"{points}\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>\n")
         }
-        Shape::Text(text) => push_text(text, out),
-        Shape::Image { frame, raster } => push_image(frame, raster, out)?,
+        Shape::Text(text) => text_element(text),
+        Shape::Image { frame, pixels } => {
+            let (place, data) = (place(frame), STANDARD.encode(encode([Ok(pixels.clone())], 0.0, None)?));
+            format!("<image {place} preserveAspectRatio=\"none\" href=\"data:image/png;base64,{data}\"/>\n")
+        }
         Shape::Clip { frame, shapes } => {
             // A nested svg element clips to its own box, without an id.
-            let (x, y, w, h) = (number(frame.left), number(frame.top), number(frame.width), number(frame.height));
-            let _ = writeln!(
-                out,
-                "<svg x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" viewBox=\"{x} {y} {w} {h}\" overflow=\"hidden\">"
-            );
-            for inner in shapes {
-                push_shape(inner, out)?;
-            }
-            *out += "</svg>\n";
+            let corner = [frame.left, frame.top, frame.width, frame.height].map(number).join(" ");
+            let inner = shapes.iter().map(element).collect::<OutputResult<String>>()?;
+            format!("<svg {} viewBox=\"{corner}\" overflow=\"hidden\">\n{inner}</svg>\n", place(frame))
         }
-    }
-    Ok(())
+    })
 }
 
-fn push_text(text: &Text, out: &mut String) {
+fn text_element(text: &Text) -> String {
     let (x, y) = (number(text.at.0), number(text.at.1));
+    let (size, colour) = (number(text.size), hex(super::drawing::INK));
     let anchor = match text.anchor {
         Anchor::Start => "start",
         Anchor::Middle => "middle",
         Anchor::End => "end",
     };
-    let place = if text.upward {
-        format!("transform=\"translate({x} {y}) rotate(-90)\"")
-    } else {
-        format!("x=\"{x}\" y=\"{y}\"")
-    };
+    let turn = if text.upward { " rotate(-90)" } else { "" };
     let weight = if text.bold { " font-weight=\"bold\"" } else { "" };
-    let _ = write!(
-        out,
-        "<text {place} font-size=\"{}\" text-anchor=\"{anchor}\" fill=\"{}\"{weight}>",
-        number(text.size),
-        hex(text.colour)
+    let mut out = format!(
+        "<text transform=\"translate({x} {y}){turn}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{colour}\"{weight}>"
     );
     let mut height = 0.0;
     for run in runs(&text.text) {
-        let shift = text.size * (height - run.rise());
-        height = run.rise();
-        if run.level == 0 && shift == 0.0 {
-            *out += &escape(run.text);
-        } else {
-            let size = number(text.size * run.scale());
-            let _ = write!(out, "<tspan dy=\"{}\" font-size=\"{size}\">{}</tspan>", number(shift), escape(run.text));
-        }
+        let (scale, rise) = run.scale_and_rise();
+        let (shift, size) = (number(text.size * (height - rise)), number(text.size * scale));
+        height = rise;
+        out += &match run.level == 0 && shift == "0" {
+            true => escape(run.text),
+            false => format!("<tspan dy=\"{shift}\" font-size=\"{size}\">{}</tspan>", escape(run.text)),
+        };
     }
-    *out += "</text>\n";
+    out + "</text>\n"
 }
 
-fn push_image(frame: &Frame, raster: &Raster, out: &mut String) -> OutputResult<()> {
-    let bytes = encode(raster, None)?;
-    let _ = writeln!(
-        out,
-        "<image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" href=\"data:image/png;base64,{}\"/>",
-        number(frame.left),
-        number(frame.top),
-        number(frame.width),
-        number(frame.height),
-        base64(&bytes)
-    );
-    Ok(())
-}
-
-fn stroke(pen: &Pen) -> String {
-    let mut out = format!(
-        "fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"",
-        hex(pen.colour),
-        number(pen.width)
-    );
-    if !pen.dash.is_empty() {
-        let lengths: Vec<String> = pen.dash.iter().map(|d| number(*d)).collect();
-        out += &format!(" stroke-dasharray=\"{}\"", lengths.join(" "));
-    }
-    out
+fn place(frame: &Frame) -> String {
+    let [x, y, w, h] = [frame.left, frame.top, frame.width, frame.height].map(number);
+    format!("x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\"")
 }
 
 fn pairs(points: &[(f64, f64)]) -> String {
-    let texts: Vec<String> = points.iter().map(|p| format!("{},{}", number(p.0), number(p.1))).collect();
-    texts.join(" ")
+    points.iter().map(|p| format!("{},{}", number(p.0), number(p.1))).collect::<Vec<_>>().join(" ")
 }
 
 /// At most two decimals: a hundredth of a pixel.
@@ -145,22 +108,8 @@ fn number(value: f64) -> String {
     if short == "-0" { "0".into() } else { short.into() }
 }
 
-fn hex(c: [u8; 3]) -> String {
-    format!("#{:02x}{:02x}{:02x}", c[0], c[1], c[2])
-}
-
-/// Base64 (RFC 4648) with padding.
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for group in bytes.chunks(3) {
-        let word = (0..3).fold(0_u32, |w, i| w << 8 | u32::from(*group.get(i).unwrap_or(&0)));
-        for i in 0..4 {
-            let digit = DIGITS[(word >> (18 - 6 * i)) as usize & 63];
-            out.push(if i <= group.len() { char::from(digit) } else { '=' });
-        }
-    }
-    out
+fn hex([r, g, b]: Rgb) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 #[cfg(test)]
@@ -169,26 +118,9 @@ mod tests {
     use crate::io::provenance::example;
 
     #[test]
-    fn base64_matches_the_vectors_of_rfc_4648() {
-        let vectors =
-            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")];
-        for (plain, coded) in vectors {
-            assert_eq!(base64(plain.as_bytes()), coded);
-        }
-    }
-
-    #[test]
     fn text_and_metadata_are_escaped() {
-        let label = Text {
-            at: (10.0, 10.0),
-            text: "a<b & \"c\"^{2}".into(),
-            size: 16.0,
-            anchor: Anchor::Start,
-            upward: false,
-            colour: [0, 0, 0],
-            bold: false,
-        };
-        let drawing = Drawing { width: 100.0, height: 50.0, shapes: vec![Shape::Text(label)] };
+        let label = Shape::text((10.0, 10.0), "a<b & \"c\"^{2}", 16.0, Anchor::Start);
+        let drawing = Drawing { width: 100.0, height: 50.0, shapes: vec![label] };
         let svg = svg_text(&drawing, &example()).unwrap();
         assert!(svg.contains("a&lt;b &amp; &quot;c&quot;<tspan dy=\"-5.76\" font-size=\"11.52\">2</tspan>"), "{svg}");
         assert!(svg.contains("name = &quot;&lt;a &amp; b&gt;&quot;"), "{svg}");

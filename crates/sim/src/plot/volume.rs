@@ -1,10 +1,10 @@
 //! A field on a rectilinear mesh and rays through it: where does a ray cross a level, and how does the surface lie there.
 //!
-//! Between the points the field is the trilinear interpolant; a crossing is found by steps of half the smallest cell and
-//! bisection. Rays need no list of triangles, and the surfaces are those of the interpolant itself. Blocks of cells whose
-//! values leave all levels on one side are passed in one step: most of a wake is such air.
-//! Check: the interpolant is exact for products of lines; a sphere is met at its radius with its own normal; levels that no
-//! block can be passed for change nothing.
+//! Between the points the field is the trilinear interpolant. A ray goes from cell to cell; in those whose corners are not all on
+//! one side of a level its crossings are found by steps and bisection. Rays need no list of triangles, and the surfaces are
+//! those of the interpolant itself.
+//! Check: the interpolant is exact for products of lines; a sphere is met at its radius with its own normal; small steps along
+//! a ray find no other crossings.
 
 use crate::io::{OutputError, OutputResult};
 
@@ -15,12 +15,6 @@ pub struct Volume {
     pub axis_m: [Vec<f64>; 3],
     /// Values `[k][j][i]`, x fastest.
     pub values: Vec<f32>,
-    /// Bins of equal width over each axis and the interval in which each begins.
-    bins: [Bins; 3],
-    /// Half of the smallest interval \[m\].
-    step_m: f64,
-    /// Smallest and largest value of each block of cells, in the order of the values.
-    blocks: Vec<[f32; 2]>,
 }
 
 /// What a ray meets.
@@ -34,18 +28,9 @@ pub(crate) struct Crossing {
     pub(crate) normal: [f64; 3],
 }
 
-#[derive(Debug, Clone, PartialEq)]
-struct Bins {
-    per_m: f64,
-    first: Vec<u32>,
-}
-
-const BISECTIONS: usize = 12;
-/// Cells of a block along each axis.
-const BLOCK: usize = 2;
-
-/// Cell of a position, and the fraction of it that lies below, along each axis.
-type Place = [(usize, f64); 3];
+/// Steps of a ray through a cell: along it the interpolant is a polynomial of third degree.
+const STEPS: u32 = 4;
+const BISECTIONS: usize = 10;
 
 impl Volume {
     /// A field with the values in the order z, y, x, x fastest.
@@ -63,11 +48,7 @@ impl Volume {
         if values.len() != points {
             return Err(OutputError::value("values", values.len(), format!("one for each of the {points} points")));
         }
-        let gaps = axis_m.iter().flat_map(|axis| axis.windows(2).map(|w| w[1] - w[0]));
-        let step_m = 0.5 * gaps.fold(f64::INFINITY, f64::min);
-        let bins = axis_m.each_ref().map(|axis| Bins::new(axis));
-        let blocks = extremes(axis_m.each_ref().map(Vec::len), &values);
-        Ok(Self { axis_m, values, bins, step_m, blocks })
+        Ok(Self { axis_m, values })
     }
 
     /// Low and high corner \[m\].
@@ -75,30 +56,38 @@ impl Volume {
         [self.axis_m.each_ref().map(|axis| axis[0]), self.axis_m.each_ref().map(|axis| axis[axis.len() - 1])]
     }
 
+    /// The cell of a position, the nearest one outside.
+    fn cell(&self, at_m: [f64; 3]) -> [usize; 3] {
+        std::array::from_fn(|d| {
+            let axis = &self.axis_m[d];
+            axis.partition_point(|a| *a <= at_m[d]).clamp(1, axis.len() - 1) - 1
+        })
+    }
+
+    /// Values at the corners of a cell, x fastest.
+    fn corners(&self, [i, j, k]: [usize; 3]) -> [f32; 8] {
+        let [nx, ny, _] = self.axis_m.each_ref().map(Vec::len);
+        let row = |j: usize, k: usize| (k * ny + j) * nx + i;
+        let [a, b, c, d] = [row(j, k), row(j + 1, k), row(j, k + 1), row(j + 1, k + 1)];
+        [a, a + 1, b, b + 1, c, c + 1, d, d + 1].map(|place| self.values[place])
+    }
+
+    /// The interpolant of a cell; positions outside are moved to its nearest face.
+    fn within(&self, cell: [usize; 3], at_m: [f64; 3]) -> f64 {
+        let part = |d: usize| {
+            let (low, high) = (self.axis_m[d][cell[d]], self.axis_m[d][cell[d] + 1]);
+            ((at_m[d] - low) / (high - low)).clamp(0.0, 1.0)
+        };
+        let between = |a: f64, b: f64, part: f64| a + part * (b - a);
+        let [a, b, c, d, e, f, g, h] = self.corners(cell).map(f64::from);
+        let [low_low, high_low, low_high, high_high] =
+            [(a, b), (c, d), (e, f), (g, h)].map(|(a, b)| between(a, b, part(0)));
+        between(between(low_low, high_low, part(1)), between(low_high, high_high, part(1)), part(2))
+    }
+
     /// The interpolant; positions outside are moved to the nearest face.
     pub(crate) fn at(&self, at_m: [f64; 3]) -> f64 {
-        self.value(self.place(at_m))
-    }
-
-    fn place(&self, [x_m, y_m, z_m]: [f64; 3]) -> Place {
-        // Written out: a closure for `from_fn` is a call of its own, and this is most of the work of a ray.
-        let ([x, y, z], [x_axis, y_axis, z_axis]) = (&self.bins, &self.axis_m);
-        [x.place(x_axis, x_m), y.place(y_axis, y_m), z.place(z_axis, z_m)]
-    }
-
-    fn value(&self, [x, y, z]: Place) -> f64 {
-        let [nx, ny, _] = self.axis_m.each_ref().map(Vec::len);
-        let line = |j: usize, k: usize| {
-            let start = ((z.0 + k) * ny + y.0 + j) * nx + x.0;
-            let (a, b) = (f64::from(self.values[start]), f64::from(self.values[start + 1]));
-            a + x.1 * (b - a)
-        };
-        let plane = |k: usize| {
-            let (a, b) = (line(0, k), line(1, k));
-            a + y.1 * (b - a)
-        };
-        let (a, b) = (plane(0), plane(1));
-        a + z.1 * (b - a)
+        self.within(self.cell(at_m), at_m)
     }
 
     /// Where the ray `from + t along` enters and leaves the mesh.
@@ -126,146 +115,78 @@ impl Volume {
         levels: &[f64],
         mut met: impl FnMut(Crossing) -> bool,
     ) {
-        let Some((start, end)) = self.span_m(from_m, along) else { return };
-        let on_ray = |t: f64| [from_m[0] + t * along[0], from_m[1] + t * along[1], from_m[2] + t * along[2]];
-        let step = |number: f64| (start + number * self.step_m).min(end);
-        let mut place = self.place(on_ray(start));
-        let (mut number, mut value) = (0.0, self.value(place));
-        while step(number) < end {
-            let block =
-                if self.passes(place, levels) { Some(BLOCK) } else { self.cell_passes(place, levels).then_some(1) };
-            if let Some(block) = block {
-                let left = (self.leaves_m(place, block, from_m, along) - start) / self.step_m - 1e-6;
-                number = left.floor().max(number);
-                if step(number) >= end {
-                    return;
+        let Some((mut start, end)) = self.span_m(from_m, along) else { return };
+        let on_ray = |t: f64| [0, 1, 2].map(|d| from_m[d] + t * along[d]);
+        let mut cell = self.cell(on_ray(start));
+        while start < end {
+            // The face through which the ray leaves the cell.
+            let mut leaves = (end, 0);
+            for d in 0..3 {
+                let face = (self.axis_m[d][cell[d] + usize::from(along[d] > 0.0)] - from_m[d]) / along[d];
+                if along[d].abs() >= 1e-12 && face < leaves.0 {
+                    leaves = (face.max(start), d);
                 }
             }
-            let (t, next) = (step(number), step(number + 1.0));
-            place = self.place(on_ray(next));
-            let new = self.value(place);
-            let mut crossed: Vec<(f64, usize)> = Vec::new();
-            for (level, &wanted) in levels.iter().enumerate() {
-                if (value < wanted) != (new < wanted) {
-                    crossed.push((self.bisect(on_ray, (t, next), wanted, value < wanted), level));
+            let corners = self.corners(cell).map(f64::from);
+            let is_crossed = |level: &f64| corners.iter().any(|v| (v < level) != (corners[0] < *level));
+            if levels.iter().any(is_crossed) {
+                let place = |step: u32| start + f64::from(step) / f64::from(STEPS) * (leaves.0 - start);
+                for step in 0..STEPS {
+                    let crossings = self.crossings(cell, on_ray, [place(step), place(step + 1)], levels);
+                    for (at_m, level) in crossings {
+                        if !met(Crossing { at_m, level, normal: self.normal(on_ray(at_m)) }) {
+                            return;
+                        }
+                    }
                 }
             }
-            crossed.sort_by(|a, b| a.0.total_cmp(&b.0));
-            for (at_m, level) in crossed {
-                if !met(Crossing { at_m, level, normal: self.normal(on_ray(at_m)) }) {
-                    return;
-                }
+            let (through, last) = (leaves.1, self.axis_m[leaves.1].len() - 2);
+            match along[through] > 0.0 {
+                true if cell[through] < last => cell[through] += 1,
+                false if cell[through] > 0 => cell[through] -= 1,
+                _ => return,
             }
-            (number, value) = (number + 1.0, new);
+            start = leaves.0;
         }
     }
 
-    /// Whether all values of the block of a cell lie on the same side of each level.
-    fn passes(&self, place: Place, levels: &[f64]) -> bool {
-        let [nx, ny, _] = self.axis_m.each_ref().map(|axis| (axis.len() - 1).div_ceil(BLOCK));
-        let [i, j, k] = place.map(|(cell, _)| cell / BLOCK);
-        let [low, high] = self.blocks[(k * ny + j) * nx + i].map(f64::from);
-        levels.iter().all(|level| (low < *level) == (high < *level))
-    }
-
-    /// Whether the values at the corners of a cell lie on the same side of each level.
-    fn cell_passes(&self, [x, y, z]: Place, levels: &[f64]) -> bool {
-        let [nx, ny, _] = self.axis_m.each_ref().map(Vec::len);
-        let start = (z.0 * ny + y.0) * nx + x.0;
-        let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
-        for row in [start, start + nx, start + nx * ny, start + nx * ny + nx] {
-            for value in &self.values[row..row + 2] {
-                ends = with_value(ends, *value);
+    /// Crossings of the levels in a short part of a ray in a cell, in order.
+    fn crossings(
+        &self,
+        cell: [usize; 3],
+        on_ray: impl Fn(f64) -> [f64; 3],
+        span: [f64; 2],
+        levels: &[f64],
+    ) -> Vec<(f64, usize)> {
+        let is_below = |t: f64, wanted: f64| self.within(cell, on_ray(t)) < wanted;
+        let mut found = Vec::new();
+        for (level, &wanted) in levels.iter().enumerate() {
+            let below = is_below(span[0], wanted);
+            if below == is_below(span[1], wanted) {
+                continue;
             }
+            let [mut low, mut high] = span;
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (low + high);
+                if is_below(middle, wanted) == below { low = middle } else { high = middle }
+            }
+            found.push((0.5 * (low + high), level));
         }
-        let [low, high] = ends.map(f64::from);
-        levels.iter().all(|level| (low < *level) == (high < *level))
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found
     }
 
-    /// Where the ray leaves the block of so many cells that a cell lies in \[m\].
-    fn leaves_m(&self, place: Place, block: usize, from_m: [f64; 3], along: [f64; 3]) -> f64 {
-        (0..3).filter(|d| along[*d].abs() > 1e-12).fold(f64::INFINITY, |least, d| {
-            let axis = &self.axis_m[d];
-            let first = place[d].0 / block * block;
-            let side = if along[d] > 0.0 { (first + block).min(axis.len() - 1) } else { first };
-            least.min((axis[side] - from_m[d]) / along[d])
-        })
-    }
-
-    fn bisect(&self, on_ray: impl Fn(f64) -> [f64; 3], span: (f64, f64), wanted: f64, below: bool) -> f64 {
-        let (mut low, mut high) = span;
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * (low + high);
-            if (self.at(on_ray(middle)) < wanted) == below { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
-    }
-
-    /// Unit vector down the gradient, by differences over a small cell; the upright one where there is none.
+    /// Unit vector down the gradient, by differences over two cells; the upright one where there is none.
     fn normal(&self, at_m: [f64; 3]) -> [f64; 3] {
-        let reach = 2.0 * self.step_m;
+        let cell = self.cell(at_m);
         let slope: [f64; 3] = std::array::from_fn(|d| {
+            let reach_m = self.axis_m[d][cell[d] + 1] - self.axis_m[d][cell[d]];
             let (mut low, mut high) = (at_m, at_m);
-            low[d] -= reach;
-            high[d] += reach;
-            self.at(low) - self.at(high)
+            (low[d], high[d]) = (low[d] - reach_m, high[d] + reach_m);
+            (self.at(low) - self.at(high)) / reach_m
         });
         let length = slope.iter().map(|s| s * s).sum::<f64>().sqrt();
         if length > 0.0 { slope.map(|s| s / length) } else { [0.0, 0.0, 1.0] }
-    }
-}
-
-/// Smallest and largest value with one more; NaN has no side of any level and is never passed.
-#[inline]
-fn with_value([low, high]: [f32; 2], value: f32) -> [f32; 2] {
-    if value.is_nan() { [f32::NEG_INFINITY, f32::INFINITY] } else { [low.min(value), high.max(value)] }
-}
-
-/// Smallest and largest value of each block of cells.
-fn extremes([nx, ny, nz]: [usize; 3], values: &[f32]) -> Vec<[f32; 2]> {
-    let [bx, by, bz] = [nx, ny, nz].map(|points| (points - 1).div_ceil(BLOCK));
-    let points = |block: usize, count: usize| block * BLOCK..=((block + 1) * BLOCK).min(count - 1);
-    let mut out = Vec::with_capacity(bx * by * bz);
-    for block in 0..bx * by * bz {
-        let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
-        for k in points(block / (bx * by), nz) {
-            for j in points(block / bx % by, ny) {
-                let row = (k * ny + j) * nx;
-                let cells = points(block % bx, nx);
-                for value in &values[row + cells.start()..=row + cells.end()] {
-                    ends = with_value(ends, *value);
-                }
-            }
-        }
-        out.push(ends);
-    }
-    out
-}
-
-impl Bins {
-    fn new(axis: &[f64]) -> Self {
-        let count = 8 * axis.len();
-        let width = (axis[axis.len() - 1] - axis[0]) / count as f64;
-        let first = (0..count)
-            .map(|bin| {
-                let low = axis[0] + bin as f64 * width;
-                axis.partition_point(|a| *a <= low).clamp(1, axis.len() - 1) as u32 - 1
-            })
-            .collect();
-        Self { per_m: 1.0 / width, first }
-    }
-
-    /// Interval of a position and the fraction of it that lies below.
-    #[inline]
-    fn place(&self, axis: &[f64], at_m: f64) -> (usize, f64) {
-        let last = axis.len() - 2;
-        let bin = ((at_m - axis[0]) * self.per_m).clamp(0.0, (self.first.len() - 1) as f64) as usize;
-        let mut index = self.first[bin] as usize;
-        while index < last && axis[index + 1] <= at_m {
-            index += 1;
-        }
-        let fraction = (at_m - axis[index]) / (axis[index + 1] - axis[index]);
-        (index, fraction.clamp(0.0, 1.0))
     }
 }
 
@@ -331,24 +252,41 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn blocks_are_passed_without_losing_a_crossing() {
-        let whole = cone(37);
-        let mut slow = whole.clone();
-        slow.blocks.iter_mut().for_each(|block| *block = [f32::NEG_INFINITY, f32::INFINITY]);
+    fn small_steps_along_a_ray_find_the_same_crossings() {
+        let volume = cone(37);
+        let levels = [-0.5, -0.8, -1.1];
+        let mut all = 0;
         for ray in 0..200 {
             let [a, b, c] = [0.618, 0.755, 0.57].map(|part| 2.0 * (f64::from(ray) * part).fract() - 1.0);
             let length = (a * a + b * b + 1.0_f64).sqrt();
             let along = [a / length, b / length, if ray % 2 == 0 { 1.0 } else { -1.0 } / length];
-            let meet = |volume: &Volume| {
-                let mut met = Vec::new();
-                volume.cast([c, -a, 0.3 * b], along, &[-0.5, -0.8, -1.1], |crossing| {
-                    met.push(crossing);
-                    true
-                });
-                met
+            let from = [c, -a, 0.3 * b];
+            let mut met = Vec::new();
+            volume.cast(from, along, &levels, |crossing| {
+                met.push((crossing.level, crossing.at_m));
+                true
+            });
+            let Some((start, end)) = volume.span_m(from, along) else {
+                assert!(met.is_empty());
+                continue;
             };
-            assert_eq!(meet(&whole), meet(&slow), "ray {ray}");
+            let at = |step: u32| start + f64::from(step) * 1e-3 * (end - start);
+            let value = |step: u32| volume.at(std::array::from_fn(|d| from[d] + at(step) * along[d]));
+            let values: Vec<f64> = (0..=1000).map(value).collect();
+            let mut expected = Vec::new();
+            for (step, pair) in (0..).zip(values.windows(2)) {
+                let crossed =
+                    levels.iter().enumerate().filter(|(_, wanted)| (pair[0] < **wanted) != (pair[1] < **wanted));
+                expected.extend(crossed.map(|(level, _)| (level, at(step))));
+            }
+            assert_eq!(met.len(), expected.len(), "ray {ray}");
+            for ((level, at_m), (expected, from_m)) in met.iter().zip(&expected) {
+                let near = (from_m - 1e-9..=from_m + 1.001e-3 * (end - start)).contains(at_m);
+                assert!(level == expected && near, "ray {ray}: {at_m} after {from_m}");
+            }
+            all += met.len();
         }
+        assert!(all > 300, "{all}");
     }
 
     #[test]

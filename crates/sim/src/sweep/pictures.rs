@@ -46,18 +46,13 @@ pub(super) fn names(definition: &Definition) -> Vec<String> {
 
 /// Adds the pictures to the files of a sweep.
 pub(super) fn add(files: &mut FileGroup, definition: &Definition, rows: &[Row]) -> Result<(), Error> {
-    let mut put = |stem: &str, figure: &Figure| -> Result<(), Error> {
-        let (svg, png) = figure.svg_and_png(&definition.origin)?;
-        files.add(&format!("{stem}.svg"), svg)?;
-        Ok(files.add(&format!("{stem}.png"), png)?)
-    };
     for (place, name) in drawn(definition) {
         let panels = PANELS.map(|panel| against(definition, rows, (place, name), &panel));
         let mut figure = Figure::stacked(panels.into_iter().flatten());
         (figure.columns, figure.width) = (2, 1240.0);
-        put(&stem(name), &figure)?;
+        figure.add_to(files, &stem(name), &definition.origin)?;
     }
-    put(FRONT, &Figure::stacked([of_front(rows)]))
+    Ok(Figure::stacked([of_front(rows)]).add_to(files, FRONT, &definition.origin)?)
 }
 
 /// A panel of a result against a key; none where no case has any.

@@ -128,7 +128,7 @@ pub(super) fn add_map(
             panel("rms", "root mean square error")?,
         ]
     };
-    let has_gaps = panels.iter().any(|plot| plot.cells.values().iter().any(|v| v.is_nan()));
+    let has_gaps = panels.iter().any(|plot| plot.cells.values.iter().any(|v| v.is_nan()));
     let mut figure = Figure::stacked(panels).titled(&title(plan, has_gaps));
     (figure.columns, figure.width) = (3, 1560.0);
     add(files, plan, "map", &figure, origin)

@@ -7,7 +7,7 @@ use super::finished::FinishedWake;
 use crate::Error;
 use crate::io::FileGroup;
 #[cfg(feature = "netcdf")]
-use crate::plot::animation::apng;
+use crate::plot::apng;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
 use std::path::PathBuf;
 use wakescope_les::VortexPair;
@@ -89,9 +89,7 @@ impl FinishedWake {
         pictures.extend(self.surfaces_figure()?.map(|figure| ("surfaces", figure)));
         let mut group = FileGroup::new(&self.folder);
         for (name, figure) in &pictures {
-            let (svg, png) = figure.svg_and_png(&self.origin)?;
-            group.add(&format!("{name}.svg"), svg)?;
-            group.add(&format!("{name}.png"), png)?;
+            figure.add_to(&mut group, name, &self.origin)?;
         }
         #[cfg(feature = "netcdf")]
         if let frames = self.frames()?

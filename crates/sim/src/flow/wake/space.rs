@@ -4,8 +4,7 @@ use super::finished::FinishedWake;
 use crate::Error;
 use crate::flow::read::{read_field, read_planes};
 use crate::io::CrossPlanes;
-use crate::plot::polar::PlaneCells;
-use crate::plot::{ColourMap, Figure, IsosurfacePlot, MapPlot, Surface, Volume};
+use crate::plot::{Cells, ColourMap, Figure, IsosurfacePlot, MapPlot, Surface, Volume};
 use std::sync::Arc;
 
 /// Times that the box is repeated along the flight, so that waves can be seen as such.
@@ -69,8 +68,8 @@ impl FinishedWake {
         for planes in read_planes(&name)? {
             for (place, tau) in planes.tau.iter().enumerate() {
                 let vorticity = axial_vorticity_per_s(&planes, place).into_iter().map(|w| w / unit_per_s).collect();
-                let cells = PlaneCells::about(&planes.y_m, &planes.z_m, vorticity);
-                let map = MapPlot::of_plane(cells, "ω_{x} b₀²/Γ₀", true)
+                let cells = Cells::of_plane(&planes.y_m, &planes.z_m, vorticity);
+                let map = MapPlot::of_cells(cells, "ω_{x} b₀²/Γ₀", true)
                     .coloured(ColourMap::Diverging { limit: 10.0 })
                     .titled(&format!("τ = {tau:.1}"));
                 let mut figure = Figure::stacked([map]);
