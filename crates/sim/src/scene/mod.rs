@@ -29,7 +29,6 @@ mod check_pattern;
 mod check_receiver;
 mod estimator;
 mod flow;
-mod format1;
 mod idle;
 mod instrument;
 mod pattern;

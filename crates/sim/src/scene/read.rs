@@ -1,6 +1,6 @@
 //! Reading a scene file, with errors that name the key, the value, what is allowed and the line.
 
-use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, format1, idle};
+use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
 use crate::Error;
 use crate::io::text_file;
 use crate::keys::{Document, Format, Key, Source, keys_of};
@@ -38,7 +38,6 @@ impl SceneFile {
     /// As [`SceneFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
         let document = Document::parse(text, path)?;
-        format1::refuse(&document)?;
         let scene: Scene = document.read(document.vet(&scene_format())?)?;
         let mut problems = scene.problems_where(&|key| document.line(key).is_some());
         problems.extend(idle::problems(&scene, &document));
@@ -159,6 +158,14 @@ mod tests {
         let elsewhere = message("wavelength_m = 1.5e-6\n");
         assert!(elsewhere.starts_with("s.toml:1: wavelength_m = 1.5e-6 is not allowed"), "{elsewhere}");
         assert!(elsewhere.contains("it is a key of [laser]"), "{elsewhere}");
+    }
+
+    #[test]
+    fn a_scene_of_another_format_is_told_the_format_and_where_its_keys_are() {
+        assert_eq!(message("format = 1\n"), "s.toml:1: format = 1 is not allowed: 2, the format of this program");
+        let moved = message("[pulse]\nduration_s = 400e-9\n[estimator]\norder = 16\n");
+        assert!(moved.contains("s.toml:2: pulse.duration_s = 400e-9") && moved.contains("[pulse.shape]"), "{moved}");
+        assert!(moved.contains("s.toml:4: estimator.order = 16") && moved.contains("[estimator.method]"), "{moved}");
     }
 
     #[test]
