@@ -32,7 +32,7 @@
 //! | [`measure`] | signals, velocities and their errors |
 //! | [`detection`] | whether scans hold a wake, at a rate of false alarms that is calibrated for them |
 //! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
-//! | [`mod@run`], [`rehearsal`] | running a plan, and a run in small before it |
+//! | [`mod@run`] | running a plan |
 //! | [`mod@write`] | writing the results of a run |
 //! | `sweep` | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
@@ -53,7 +53,6 @@ pub mod measure;
 pub mod plan;
 #[cfg(feature = "mpi")]
 pub mod processes;
-pub mod rehearsal;
 pub mod retrieve;
 pub mod run;
 pub mod scene;

@@ -171,7 +171,9 @@ impl NoiseTest {
             let (own_mean, own_deviation) = seen(0.5 * band * (part as f64 + 0.5) / PARTS as f64);
             (own_mean / mean, own_deviation / deviation)
         };
-        let start = |gate: usize| (gate * gates.step_samples) as f64 / (every * shorter) as f64;
+        // Windows that are farther apart than one of them see noise of their own.
+        let step = gates.step_samples.min(2 * samples);
+        let start = |gate: usize| (gate * step) as f64 / (every * shorter) as f64;
         let moments = |gates: usize| {
             let length = size + start(gates - 1).round() as usize;
             let mut sum = Array2::<C64>::zeros((length, length));
@@ -406,5 +408,16 @@ mod tests {
         assert!(of(&[taper], None, &Gates { step_samples: 0, ..gates }).is_err());
         let empty = test.region(std::iter::empty());
         assert!(empty.n_eff == 0.0 && test.threshold(&empty, 0.01).unwrap().is_nan());
+    }
+
+    #[test]
+    fn windows_far_apart_see_noise_as_independent_as_that_of_pulses() {
+        let taper = [Taper::unit(vec![1.0; 16]).unwrap()];
+        for step in [40, 1_000_000_000] {
+            let gates = Gates::new(16, step, 0.0).unwrap();
+            let test = NoiseTest::new(&table_2(), &gates, &taper, None, 64, Noise::White).unwrap();
+            let level = |gates, pulses| test.threshold(&test.region([(gates, pulses)].into_iter()), 0.01).unwrap();
+            assert!((level(2, 1) / level(1, 2) - 1.0).abs() < 1e-9, "{step}: {} {}", level(2, 1), level(1, 2));
+        }
     }
 }

@@ -19,7 +19,6 @@ mod wake;
 use crate::io::Existing;
 use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
 use crate::plan::{Plan, Stage, Target};
-use crate::rehearsal::rehearse;
 use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::setup::efficiency_model::model;
 use crate::{Error, run, write};
@@ -214,7 +213,7 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     say(cli.json, &object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
 }
 
-/// The plan of a scene, with all that can be known before the computing: limits, memory, a small rehearsal, the folder.
+/// The plan of a scene, with all that can be known before the computing: limits, memory, the folder.
 fn planned(
     scene: &Path,
     target: Target,
@@ -230,7 +229,6 @@ fn planned(
         let names = write::names(&plan);
         write::prepare(folder, names.iter().map(String::as_str), existing)?;
     }
-    rehearse(&plan)?;
     Ok(plan)
 }
 

@@ -8,9 +8,6 @@ use crate::keys::Checker;
 impl Scene {
     pub(super) fn check_outputs(&self, c: &mut Checker<'_>) {
         let o = &self.outputs;
-        c.within("outputs.profile_range_min_m", o.profile_range_min_m, 1.0, 1e6, "m");
-        c.within("outputs.profile_range_max_m", o.profile_range_max_m, 1.0, 1e6, "m");
-        c.count("outputs.profile_points", o.profile_points, 2, 100_000);
         let any = o.csv || o.netcdf || o.hpl || o.svg || o.png;
         let allowed = "true, or else one of csv, netcdf, hpl, svg and png: nothing would be written";
         c.require(any, "outputs.csv", o.csv, allowed);
@@ -20,9 +17,6 @@ impl Scene {
         let site = &self.site;
         let fits = site.name.chars().count() <= 80 && !site.name.chars().any(char::is_control);
         c.require(fits, "site.name", &site.name, "one line of at most 80 characters");
-        c.within("site.latitude_deg", site.latitude_deg, -90.0, 90.0, "degrees north");
-        c.within("site.longitude_deg", site.longitude_deg, -180.0, 180.0, "degrees east");
-        c.within("site.altitude_m", site.altitude_m, -1e3, 1e4, "m above the sea");
         let is_date = UtcTime::parse(&site.start_utc).is_some();
         let allowed = format!("a date from 1900 to 2199 like \"{}\"", UtcTime::FORM);
         c.require(is_date, "site.start_utc", &site.start_utc, allowed);

@@ -3,8 +3,8 @@
 
 use super::{HeadMotion, HeadMotionKeys, Pattern, Scene, SweepDirection, WindOfPulses};
 use crate::io::MAX_TIME_S;
-use crate::keys::Checker;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use crate::keys::{Checker, Limit};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Lines of a scan, at most.
 const MOST_LINES: f64 = 1e5;
@@ -12,68 +12,26 @@ const MOST_LINES: f64 = 1e5;
 impl Scene {
     /// Each key for itself.
     pub(super) fn check_pattern(&self, c: &mut Checker<'_>) {
-        let s = &self.scan;
-        let elevation = |c: &mut Checker<'_>, key: &str, value_rad: f64| {
-            c.within(key, value_rad, -FRAC_PI_2, FRAC_PI_2, "rad");
-        };
-        match &s.pattern {
-            Pattern::Rhi {} => {}
+        match &self.scan.pattern {
             Pattern::Ppi(p) => {
                 let list = format!("{:?}", p.elevations_rad);
-                let is_list = (1..=1000).contains(&p.elevations_rad.len());
-                if !is_list {
+                if !(1..=1000).contains(&p.elevations_rad.len()) {
                     c.refuse("scan.pattern.elevations_rad", &list, "a list of 1 to 1000 elevations");
                 }
                 for (i, value_rad) in p.elevations_rad.iter().enumerate() {
-                    elevation(c, &format!("scan.pattern.elevations_rad[{i}]"), *value_rad);
+                    (-FRAC_PI_2..=FRAC_PI_2).hold(&format!("scan.pattern.elevations_rad[{i}]"), value_rad, c);
                 }
-                self.check_azimuths([p.azimuth_min_rad, p.azimuth_max_rad, p.azimuth_step_rad], TAU, c);
-            }
-            Pattern::Vad(p) => {
-                c.within("scan.pattern.elevation_rad", p.elevation_rad, 1e-3, FRAC_PI_2 - 1e-3, "rad");
-                c.count("scan.pattern.beams", p.beams, 4, 10_000);
-            }
-            Pattern::Dbs(p) => {
-                c.within("scan.pattern.elevation_rad", p.elevation_rad, 1e-3, FRAC_PI_2 - 1e-3, "rad");
-            }
-            Pattern::Stare(p) => {
-                elevation(c, "scan.pattern.elevation_rad", p.elevation_rad);
-                c.count("scan.pattern.lines", p.lines, 1, MOST_LINES as usize);
-            }
-            Pattern::Axial(p) => {
-                self.check_azimuths([p.azimuth_min_rad, p.azimuth_max_rad, p.azimuth_step_rad], FRAC_PI_2, c);
             }
             Pattern::List { file } => {
                 c.require(!file.is_empty(), "scan.pattern.file", file, "the name of a file with the lines of the scan");
             }
+            _ => {}
         }
         self.check_head(c);
-        let l = &s.lidar;
-        c.within("scan.lidar.x_m", l.x_m, -1e6, 1e6, "m");
-        c.within("scan.lidar.y_m", l.y_m, -1e6, 1e6, "m");
-        for v in l.velocity_m_s {
-            c.within("scan.lidar.velocity_m_s", v, -1e3, 1e3, "m/s");
-        }
-        if let Some(azimuth_rad) = l.flight_azimuth_rad {
-            c.within("scan.lidar.flight_azimuth_rad", azimuth_rad, -TAU, TAU, "rad");
-        }
-        if let WindOfPulses::Groups { groups } = s.wind_of_pulses {
-            c.count("scan.wind_of_pulses.groups", groups, 1, 1_000_000);
-        }
-    }
-
-    fn check_azimuths(&self, [low_rad, high_rad, step_rad]: [f64; 3], most_rad: f64, c: &mut Checker<'_>) {
-        let good = c.within("scan.pattern.azimuth_min_rad", low_rad, -TAU, TAU, "rad")
-            && c.within("scan.pattern.azimuth_max_rad", high_rad, -TAU, 2.0 * TAU, "rad")
-            && c.within("scan.pattern.azimuth_step_rad", step_rad, 1e-7, PI, "rad");
-        let allowed = format!("from scan.pattern.azimuth_min_rad, {low_rad} rad, to {most_rad:.4} rad beyond it");
-        let fits = (0.0..=most_rad * (1.0 + 1e-9)).contains(&(high_rad - low_rad));
-        c.require(!good || fits, "scan.pattern.azimuth_max_rad", high_rad, allowed);
     }
 
     fn check_head(&self, c: &mut Checker<'_>) {
-        let HeadMotionKeys { motion, sweeps, direction, rate_rad_s, acceleration_rad_s2, dead_time_s, .. } =
-            self.scan.head;
+        let HeadMotionKeys { motion, sweeps, direction, rate_rad_s, acceleration_rad_s2, .. } = self.scan.head;
         let moves = motion == HeadMotion::Continuous;
         c.require(
             rate_rad_s > 0.0,
@@ -83,8 +41,6 @@ impl Scene {
         );
         let fast = acceleration_rad_s2 > 0.0;
         c.require(fast, "scan.head.acceleration_rad_s2", acceleration_rad_s2, "a number above 0 in rad/s^2, or inf");
-        c.within("scan.head.dead_time_s", dead_time_s, 0.0, 1e5, "s");
-        c.count("scan.head.sweeps", sweeps, 1, 100_000);
         let pattern = self.scan.pattern.name();
         let turning = matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Ppi(_) | Pattern::Axial(_));
         let allowed =
@@ -110,6 +66,18 @@ impl Scene {
     /// Limits that make sense only where each key is within its own.
     pub(super) fn check_scan_between(&self, c: &mut Checker<'_>) {
         let s = &self.scan;
+        let azimuths = match &s.pattern {
+            Pattern::Ppi(p) => Some((p.azimuth_min_rad, p.azimuth_max_rad, TAU)),
+            Pattern::Axial(p) => Some((p.azimuth_min_rad, p.azimuth_max_rad, FRAC_PI_2)),
+            _ => None,
+        };
+        if let Some((low_rad, high_rad, most_rad)) = azimuths {
+            let fits = (0.0..=most_rad * (1.0 + 1e-9)).contains(&(high_rad - low_rad));
+            let allowed = format!("from scan.pattern.azimuth_min_rad, {low_rad} rad, to {most_rad:.4} rad beyond it");
+            if !c.require(fits, "scan.pattern.azimuth_max_rad", high_rad, allowed) {
+                return;
+            }
+        }
         let moves = s.head.motion == HeadMotion::Continuous;
         let rows = (s.elevation_max_rad - s.elevation_min_rad) / s.elevation_step_rad + 1.0;
         let (turn_rad, step_rad, rows, key) = match &s.pattern {

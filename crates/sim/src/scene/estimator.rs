@@ -1,24 +1,25 @@
 //! From signals to velocities: the estimator of a scene, its method with its own keys, and what all methods share.
 
+use crate::keys::{Checker, Keys, Limit, Limited, join};
 use serde::{Deserialize, Serialize};
 
 section! {
     /// From signals to velocities.
     Estimator {
         /// Samples N of a window.
-        window_samples: usize = 64,
+        window_samples: usize = 64 => 4..=65_536,
         /// Weighting h of the window, (29).
         weighting: Weighting = Weighting::Gaussian,
         /// Samples between windows that are accumulated.
-        window_step_samples: usize = 1,
+        window_step_samples: usize = 1 => 1..=1_000_000,
         /// Samples between gates of the map.
-        gate_step_samples: usize = 5,
+        gate_step_samples: usize = 5 => 1..=1_000_000,
         /// Points of the zero-padded spectrum; `window_samples` for the literal (29).
-        padded_samples: usize = 1024,
+        padded_samples: usize = 1024 => 1..=1 << 22,
         /// How the peak is refined between the points of the spectrum.
         refinement: Refinement = Refinement::Parabola,
         /// Radius of the circular region of accumulation, m.
-        radius_m: f64 = 2.0,
+        radius_m: f64 = 2.0 => 0.0..=1e5,
         /// Which correlogram the estimator is given.
         correlogram: CorrelogramForm = CorrelogramForm::Biased,
         /// Whether the lines of a region are shifted to the velocity of its centre before they are added, by a first map.
@@ -27,9 +28,9 @@ section! {
         /// that often are flagged. 0: no test.
         false_alarm: f64 = 0.01,
         /// Which estimator, with the keys that are its own.
-        method: Method = Method::PeriodogramAccumulation {},
+        method: Method = Method::PeriodogramAccumulation {} => Keys,
         /// How the radius depends on range.
-        radius: RegionRadius = RegionRadius::Fixed {},
+        radius: RegionRadius = RegionRadius::Fixed {} => Keys,
     }
 }
 
@@ -64,7 +65,7 @@ section! {
     #[derive(Copy)]
     ModelOrder {
         /// The order; the largest one if it is chosen.
-        order: usize = 16,
+        order: usize = 16 => 1..=65_535,
         /// How the order is found.
         order_choice: OrderChoice = OrderChoice::Fixed,
     }
@@ -75,7 +76,7 @@ section! {
     #[derive(Copy)]
     LagWindow {
         /// Lag at which it falls to 0.
-        lag_window_lags: usize = 16,
+        lag_window_lags: usize = 16 => 1..=65_535,
     }
 }
 
@@ -84,7 +85,7 @@ section! {
     #[derive(Copy)]
     FirstMoment {
         /// Half width of the part of the spectrum that is averaged, in its standard deviations.
-        moment_reach: f64 = 3.5,
+        moment_reach: f64 = 3.5 => 0.1..=100.0,
     }
 }
 
@@ -94,7 +95,7 @@ section! {
     Likelihood {
         /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
         #[serde(skip_serializing_if = "Option::is_none")]
-        likelihood_snr_db: Option<f64> = None,
+        likelihood_snr_db: Option<f64> = None => -100.0..=100.0,
     }
 }
 
@@ -104,11 +105,26 @@ section! {
     GradientLikelihood {
         /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
         #[serde(skip_serializing_if = "Option::is_none")]
-        likelihood_snr_db: Option<f64> = None,
+        likelihood_snr_db: Option<f64> = None => -100.0..=100.0,
         /// Gradients reach from minus to plus this, 1/s.
-        gradient_max_per_s: f64 = 0.6,
+        gradient_max_per_s: f64 = 0.6 => 1e-6..=1e3,
         /// How many there are; odd, so that 0 is among them.
-        gradients: usize = 7,
+        gradients: usize = 7 => 1..=999,
+    }
+}
+
+impl Limited for Method {
+    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
+        match self {
+            Self::Periodogram {} | Self::PeriodogramAccumulation {} | Self::PulsePair {} => {}
+            Self::Autoregressive(model) | Self::AutoregressivePole(model) | Self::Capon(model) => {
+                model.check_limits(at, c)
+            }
+            Self::LagWindow(own) => own.check_limits(at, c),
+            Self::FirstMoment(own) => own.check_limits(at, c),
+            Self::Likelihood(own) => own.check_limits(at, c),
+            Self::GradientLikelihood(own) => own.check_limits(at, c),
+        }
     }
 }
 
@@ -178,6 +194,15 @@ pub enum RegionRadius {
         /// Largest radius, m.
         largest_m: f64,
     },
+}
+
+impl Limited for RegionRadius {
+    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
+        if let Self::Target { standard_deviation_m_s, largest_m } = self {
+            (1e-6..=1e3).hold(&join(at, "standard_deviation_m_s"), standard_deviation_m_s, c);
+            (1e-3..=1e5).hold(&join(at, "largest_m"), largest_m, c);
+        }
+    }
 }
 
 /// Weighting of the samples of a window.

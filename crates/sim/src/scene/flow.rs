@@ -1,6 +1,8 @@
 //! The wind of a scene.
 
+use crate::keys::{Checker, Keys, Limit, Limited, join};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 
 /// The wind that the lidar sees.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,6 +29,23 @@ pub enum Flow {
     Fields(FieldFlow),
 }
 
+impl Limited for Flow {
+    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
+        match self {
+            Self::Calm {} => {}
+            Self::Uniform { lateral_m_s, vertical_m_s } => {
+                (-1e3..=1e3).hold(&join(at, "lateral_m_s"), lateral_m_s, c);
+                (-1e3..=1e3).hold(&join(at, "vertical_m_s"), vertical_m_s, c);
+            }
+            Self::Linear(wind) => wind.check_limits(at, c),
+            Self::VortexLines(lines) => lines.check_limits(at, c),
+            Self::VortexPair(pair) => pair.check_limits(at, c),
+            Self::Simulated(flow) => flow.check_limits(at, c),
+            Self::Fields(flow) => flow.check_limits(at, c),
+        }
+    }
+}
+
 impl Default for Flow {
     fn default() -> Self {
         Flow::VortexPair(VortexPair::default())
@@ -38,26 +57,26 @@ section! {
     #[derive(Copy)]
     VortexPair {
         /// Circulation Gamma0 of each vortex, m^2/s.
-        circulation_m2_s: f64 = 500.0,
+        circulation_m2_s: f64 = 500.0 => 0.0..=1e5,
         /// Distance b0 between the vortices when they were released, m.
-        spacing_m: f64 = 47.0,
+        spacing_m: f64 = 47.0 => 1e-2..=1e4,
         /// Core radius r_c, m.
-        core_radius_m: f64 = 2.35,
+        core_radius_m: f64 = 2.35 => 1e-3..=1e3,
         /// Distance from the lidar to the midpoint of the pair, m.
-        lateral_position_m: f64 = 400.0,
+        lateral_position_m: f64 = 400.0 => -1e5..=1e5,
         /// Height at which the pair was released, m.
-        height_m: f64 = 47.0,
+        height_m: f64 = 47.0 => 1e-2..=1e4,
         /// Circulation profile.
         profile: VortexProfile = VortexProfile::Algebraic,
         /// Whether the pair moves.
         motion: VortexMotion = VortexMotion::Frozen,
         /// Age of the pair when the scan begins, in tau = t V0/b0; not 0 only if it moves.
-        age_tau: f64 = 0.0,
+        age_tau: f64 = 0.0 => 0.0..=1e3,
         /// Uniform cross wind added to the pair, m/s, positive away from the lidar.
-        cross_wind_m_s: f64 = 0.0,
+        cross_wind_m_s: f64 = 0.0 => -1e3..=1e3,
         /// The aircraft, if the wake is the older the farther it is behind it; absent: of one age everywhere.
         #[serde(skip_serializing_if = "Option::is_none")]
-        aircraft: Option<Aircraft> = None,
+        aircraft: Option<Aircraft> = None => Keys,
     }
 }
 
@@ -66,9 +85,9 @@ section! {
     #[derive(Copy)]
     Aircraft {
         /// Speed, m/s.
-        speed_m_s: f64 = 70.0,
+        speed_m_s: f64 = 70.0 => 1.0..=1e3,
         /// Where it is when the scan begins, m.
-        x_m: f64 = 0.0,
+        x_m: f64 = 0.0 => -1e6..=1e6,
     }
 }
 
@@ -77,15 +96,15 @@ section! {
     #[derive(Copy)]
     LinearWind {
         /// Wind at the origin when the scan begins (u, v, w), m/s.
-        velocity_m_s: [f64; 3] = [0.0; 3],
+        velocity_m_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
         /// How fast u changes along x, y, z, 1/s.
-        gradient_u_per_s: [f64; 3] = [0.0; 3],
+        gradient_u_per_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
         /// How fast v does.
-        gradient_v_per_s: [f64; 3] = [0.0; 3],
+        gradient_v_per_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
         /// How fast w does.
-        gradient_w_per_s: [f64; 3] = [0.0; 3],
+        gradient_w_per_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
         /// How fast they change in time, m/s^2.
-        acceleration_m_s2: [f64; 3] = [0.0; 3],
+        acceleration_m_s2: [f64; 3] = [0.0; 3] => -1e3..=1e3,
     }
 }
 
@@ -93,13 +112,13 @@ section! {
     /// Straight vortices without end, or polylines; one entry of each list for each vortex.
     VortexLines {
         /// Places (x, y, z) that each vortex goes through, m: two of an endless one, all corners of another.
-        nodes_m: Vec<Vec<[f64; 3]>> = Vec::new(),
+        nodes_m: Vec<Vec<[f64; 3]>> = Vec::new() => -1e7..=1e7,
         /// Circulation of each, m^2/s.
-        circulation_m2_s: Vec<f64> = Vec::new(),
+        circulation_m2_s: Vec<f64> = Vec::new() => -1e5..=1e5,
         /// Core radius of all, m.
-        core_radius_m: f64 = 2.35,
+        core_radius_m: f64 = 2.35 => 1e-3..=1e3,
         /// Speed of the air in the middle of each against the direction of its nodes, m/s.
-        axial_deficit_m_s: f64 = 0.0,
+        axial_deficit_m_s: f64 = 0.0 => -1e3..=1e3,
         /// Whether they go on beyond their ends.
         endless: bool = true,
         /// Whether there are images below the ground.
@@ -118,17 +137,17 @@ section! {
         motion: SimulatedMotion = SimulatedMotion::Moving,
         /// Time of the flow when the scan begins, s; its first one if absent.
         #[serde(skip_serializing_if = "Option::is_none")]
-        time_s: Option<f64> = None,
+        time_s: Option<f64> = None => -1e9..=1e9,
         /// Place in the scene of the origin of the file's axes, m.
-        origin_m: [f64; 3] = [0.0; 3],
+        origin_m: [f64; 3] = [0.0; 3] => -1e7..=1e7,
         /// Angle from the scene's x to the file's x, clockwise seen from above, rad.
-        rotation_rad: f64 = 0.0,
+        rotation_rad: f64 = 0.0 => -TAU..=TAU,
         /// Whether the file's axes are right-handed, y to the left of x: y and v change their sign.
         mirror_y: bool = false,
         /// Metres in the unit of length of the file.
-        length_unit_m: f64 = 1.0,
+        length_unit_m: f64 = 1.0 => 1e-6..=1e6,
         /// Metres per second in its unit of velocity.
-        velocity_unit_m_s: f64 = 1.0,
+        velocity_unit_m_s: f64 = 1.0 => 1e-6..=1e6,
         /// Whether the flow repeats itself along the file's x.
         periodic_x: bool = false,
         /// Whether it does along its y.
@@ -137,7 +156,7 @@ section! {
         ground: FieldGround = FieldGround::Open,
         /// Backscatter that the air carries, in place of that of the atmosphere; absent: none.
         #[serde(skip_serializing_if = "Option::is_none")]
-        backscatter: Option<CarriedBackscatter> = None,
+        backscatter: Option<CarriedBackscatter> = None => Keys,
     }
 }
 
@@ -147,7 +166,7 @@ section! {
         /// Name of its variable in the file.
         name: String = String::new(),
         /// Backscatter coefficient in the unit of the file, 1/(m sr).
-        unit_per_m_sr: f64 = 1.0,
+        unit_per_m_sr: f64 = 1.0 => 0.0..=1e6,
     }
 }
 
@@ -193,16 +212,16 @@ section! {
         motion: SimulatedMotion = SimulatedMotion::Moving,
         /// Time of the flow when the scan begins, s; the first of the planes if neither this nor `age_tau` is given.
         #[serde(skip_serializing_if = "Option::is_none")]
-        time_s: Option<f64> = None,
+        time_s: Option<f64> = None => -1e9..=1e9,
         /// The same as an age of the wake.
         #[serde(skip_serializing_if = "Option::is_none")]
-        age_tau: Option<f64> = None,
+        age_tau: Option<f64> = None => -1e9..=1e9,
         /// Distance from the lidar to y = 0 of the flow, m.
-        lateral_position_m: f64 = 400.0,
+        lateral_position_m: f64 = 400.0 => -1e5..=1e5,
         /// Metres in the unit of length of the flow: 1 if that is the metre, b0 for the case `vortex_pair`.
-        length_unit_m: f64 = 1.0,
+        length_unit_m: f64 = 1.0 => 1e-6..=1e6,
         /// Metres per second in its unit of velocity: 1, or V0 = Gamma0/(2 pi b0).
-        velocity_unit_m_s: f64 = 1.0,
+        velocity_unit_m_s: f64 = 1.0 => 1e-6..=1e6,
     }
 }
 
@@ -229,4 +248,12 @@ pub enum Outside {
         /// Radial velocity, m/s, positive away from the lidar.
         radial_velocity_m_s: f64,
     },
+}
+
+impl Limited for Outside {
+    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
+        if let Self::Constant { radial_velocity_m_s } = self {
+            (-1e3..=1e3).hold(&join(at, "radial_velocity_m_s"), radial_velocity_m_s, c);
+        }
+    }
 }

@@ -1,24 +1,25 @@
 //! The instrument of a scene: laser, pulse, detector, telescope.
 
 use super::receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, is_nothing_db, is_zero};
+use crate::keys::{Checker, Keys, Limit, Limited, NothingOr, join};
 use serde::{Deserialize, Serialize};
 
 section! {
     /// The laser source.
     Laser {
         /// Wavelength, m.
-        wavelength_m: f64 = 1.55e-6,
+        wavelength_m: f64 = 1.55e-6 => 1e-7..=2e-5,
         /// Pulse repetition frequency, Hz.
-        pulse_repetition_hz: f64 = 400.0,
+        pulse_repetition_hz: f64 = 400.0 => 1e-3..=1e6,
         /// Full width at half maximum of the Lorentzian line, Hz; 0 for none.
         #[serde(skip_serializing_if = "is_zero")]
-        linewidth_hz: f64 = 0.0,
+        linewidth_hz: f64 = 0.0 => 0.0..=1e12,
         /// What sets the energy of the pulses, in place of `pulse.energy_j`.
         #[serde(skip_serializing_if = "Option::is_none")]
-        amplifier: Option<LaserAmplifier> = None,
+        amplifier: Option<LaserAmplifier> = None => Keys,
         /// The fibre of the power amplifier, for a warning of Brillouin scattering.
         #[serde(skip_serializing_if = "Option::is_none")]
-        fibre: Option<AmplifierFibre> = None,
+        fibre: Option<AmplifierFibre> = None => Keys,
     }
 }
 
@@ -26,11 +27,11 @@ section! {
     /// The transmitted pulse, (6)-(8).
     Pulse {
         /// Pulse energy at the telescope, before its aperture truncates the beam, J.
-        energy_j: f64 = 150e-6,
+        energy_j: f64 = 150e-6 => 1e-12..=1e3,
         /// Rate of the linear chirp, Hz/s: the frequency rises by it.
-        chirp_hz_s: f64 = 0.0,
+        chirp_hz_s: f64 = 0.0 => -1e18..=1e18,
         /// Shape of |f|^2, with its duration.
-        shape: PulseShape = PulseShape::Gaussian(GaussianShape::default()),
+        shape: PulseShape = PulseShape::Gaussian(GaussianShape::default()) => Keys,
     }
 }
 
@@ -42,6 +43,15 @@ pub enum PulseShape {
     Gaussian(GaussianShape),
     /// A table.
     Sampled(SampledShape),
+}
+
+impl Limited for PulseShape {
+    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
+        match self {
+            Self::Gaussian(shape) => shape.check_limits(at, c),
+            Self::Sampled(_) => {}
+        }
+    }
 }
 
 impl PulseShape {
@@ -56,7 +66,7 @@ section! {
     #[derive(Copy)]
     GaussianShape {
         /// Pulse duration, s, as [`PulseDefinition`] has it.
-        duration_s: f64 = 200e-9,
+        duration_s: f64 = 200e-9 => 1e-9..=1e-4,
         /// What `duration_s` means.
         definition: PulseDefinition = PulseDefinition::Fwhm,
     }
@@ -104,26 +114,26 @@ section! {
     /// Photodetector and digitiser, (12)-(14).
     Detector {
         /// Detector bandwidth B_w, Hz, centred on the intermediate frequency.
-        bandwidth_hz: f64 = 50e6,
+        bandwidth_hz: f64 = 50e6 => 1e3..=1e11,
         /// Intermediate frequency f_c, Hz.
-        intermediate_frequency_hz: f64 = 80e6,
+        intermediate_frequency_hz: f64 = 80e6 => 1e3..=1e11,
         /// Sampling frequency, Hz.
-        sampling_hz: f64 = 250e6,
+        sampling_hz: f64 = 250e6 => 1e3..=1e11,
         /// Quantum efficiency eta_Q.
-        quantum_efficiency: f64 = 1.0,
+        quantum_efficiency: f64 = 1.0 => 1e-6..=1.0,
         /// Power of the local oscillator on the detector, W. The SNR depends on it only through `front_end`.
-        local_oscillator_w: f64 = 1e-3,
+        local_oscillator_w: f64 = 1e-3 => 1e-12..=1e3,
         /// Spectrum of the shot noise.
         noise: NoiseKind = NoiseKind::Band,
         /// What the receiver delivers.
         signal: DetectorSignal = DetectorSignal::IntermediateFrequency,
         /// What the receiver has beyond shot noise.
         #[serde(skip_serializing_if = "Option::is_none")]
-        front_end: Option<FrontEnd> = None,
+        front_end: Option<FrontEnd> = None => Keys,
         /// The analogue-to-digital converter.
-        digitiser: Digitiser = Digitiser::None {},
+        digitiser: Digitiser = Digitiser::None {} => Keys,
         /// What sets the signal-to-noise ratio.
-        snr: SnrReference = SnrReference::Physical {},
+        snr: SnrReference = SnrReference::Physical {} => Keys,
     }
 }
 
@@ -150,6 +160,15 @@ pub enum Digitiser {
         /// Full scale over the root mean square of the noise in the detector band, (13).
         full_scale_over_noise: f64,
     },
+}
+
+impl Limited for Digitiser {
+    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
+        if let Self::Quantised { bits, full_scale_over_noise } = self {
+            (1..=32).hold(&join(at, "bits"), bits, c);
+            (1e-6..=1e12).hold(&join(at, "full_scale_over_noise"), full_scale_over_noise, c);
+        }
+    }
 }
 
 /// Spectrum of the shot noise.
@@ -179,15 +198,23 @@ pub enum SnrReference {
     },
 }
 
+impl Limited for SnrReference {
+    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
+        if let Self::Fixed { snr_db } = self {
+            (-100.0..=100.0).hold(&join(at, "snr_db"), snr_db, c);
+        }
+    }
+}
+
 section! {
     /// Telescope and beam.
     Telescope {
         /// Radius of the hard aperture, m.
-        aperture_radius_m: f64 = 0.05,
+        aperture_radius_m: f64 = 0.05 => 1e-4..=10.0,
         /// Radius of a central obscuration, m; 0 for none.
-        obscuration_radius_m: f64 = 0.0,
+        obscuration_radius_m: f64 = 0.0 => 0.0..=10.0,
         /// 1/e radius of the Gaussian beam at the aperture, m.
-        beam_radius_m: f64 = 0.03,
+        beam_radius_m: f64 = 0.03 => 1e-4..=10.0,
         /// Whether `beam_radius_m` is that of the irradiance or of the field.
         beam_radius_definition: BeamRadiusDefinition = BeamRadiusDefinition::Intensity,
         /// Distance of the focus, m; `inf` for a collimated beam.
@@ -196,16 +223,16 @@ section! {
         receiver: ReceiverPath = ReceiverPath::Monostatic,
         /// Loss of the optics, out and back together, dB.
         #[serde(skip_serializing_if = "is_zero")]
-        optics_loss_db: f64 = 0.0,
+        optics_loss_db: f64 = 0.0 => 0.0..=200.0,
         /// Loss of light whose polarisation does not beat, dB.
         #[serde(skip_serializing_if = "is_zero")]
-        polarisation_loss_db: f64 = 0.0,
+        polarisation_loss_db: f64 = 0.0 => 0.0..=200.0,
         /// Part of the pulse that the telescope sends straight to the detector, dB; `-inf` for none.
         #[serde(skip_serializing_if = "is_nothing_db")]
-        reflection_db: f64 = f64::NEG_INFINITY,
+        reflection_db: f64 = f64::NEG_INFINITY => NothingOr(-300.0..=0.0),
         /// Range up to which nothing is seen, because the detector recovers from the reflection, m; 0 for none.
         #[serde(skip_serializing_if = "is_zero")]
-        blind_range_m: f64 = 0.0,
+        blind_range_m: f64 = 0.0 => 0.0..=1e6,
     }
 }
 

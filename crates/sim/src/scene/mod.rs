@@ -5,14 +5,24 @@
 //! a test holds it equal to [`Scene::default`]. Unknown keys are refused. Units are in the key
 //! names; a key without a unit has none.
 
+/// A table of keys: name, type, default and, after `=>`, what the value must be.
 macro_rules! section {
-    ($(#[$doc:meta])* $name:ident { $($(#[$fdoc:meta])* $field:ident: $ty:ty = $default:expr,)* }) => {
+    ($(#[$doc:meta])* $name:ident { $($(#[$fdoc:meta])* $field:ident: $ty:ty = $default:expr $(=> $limit:expr)?,)* }) => {
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name { $($(#[$fdoc])* pub $field: $ty,)* }
         impl Default for $name {
             fn default() -> Self { Self { $($field: $default,)* } }
+        }
+        impl $crate::keys::Limited for $name {
+            #[allow(unused_variables)]
+            fn check_limits(&self, at: &str, c: &mut $crate::keys::Checker<'_>) {
+                $($({
+                    use $crate::keys::Limit;
+                    ($limit).hold(&$crate::keys::join(at, stringify!($field)), &self.$field, c);
+                })?)*
+            }
         }
     };
 }
@@ -62,8 +72,10 @@ pub use read::SceneFile;
 pub use receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, SecondTrip};
 pub use retrieval::{FollowingAircraft, LiftSlope, Retrieval, RetrievalMethod};
 
+use crate::keys::Keys;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// The commented scene that `wakescope init` writes: every key with its default.
 pub const TABLE2_TOML: &str = include_str!("table2.toml");
@@ -82,31 +94,31 @@ section! {
         /// Seed of every random number of the run.
         seed: u64 = 1,
         /// The laser source.
-        laser: Laser = Laser::default(),
+        laser: Laser = Laser::default() => Keys,
         /// The transmitted pulse, (6)-(8).
-        pulse: Pulse = Pulse::default(),
+        pulse: Pulse = Pulse::default() => Keys,
         /// Photodetector and digitiser, (12)-(14).
-        detector: Detector = Detector::default(),
+        detector: Detector = Detector::default() => Keys,
         /// Telescope and beam.
-        telescope: Telescope = Telescope::default(),
+        telescope: Telescope = Telescope::default() => Keys,
         /// Aerosol and refractive turbulence.
-        atmosphere: Atmosphere = Atmosphere::default(),
+        atmosphere: Atmosphere = Atmosphere::default() => Keys,
         /// The wind that the lidar sees.
-        flow: Flow = Flow::default(),
+        flow: Flow = Flow::default() => Keys,
         /// Further winds that are added to it.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         added_flows: Vec<Flow> = Vec::new(),
         /// Where the lidar looks.
-        scan: Scan = Scan::default(),
+        scan: Scan = Scan::default() => Keys,
         /// From signals to velocities.
-        estimator: Estimator = Estimator::default(),
+        estimator: Estimator = Estimator::default() => Keys,
         /// Vortices from each realisation; absent: none are looked for.
         #[serde(skip_serializing_if = "Option::is_none")]
-        retrieval: Option<Retrieval> = None,
+        retrieval: Option<Retrieval> = None => Keys,
         /// What is written.
-        outputs: Outputs = Outputs::default(),
+        outputs: Outputs = Outputs::default() => Keys,
         /// Place and date, for the files.
-        site: Site = Site::default(),
+        site: Site = Site::default() => Keys,
     }
 }
 
@@ -114,42 +126,42 @@ section! {
     /// Where the lidar looks: a vertical scan (RHI) across the runway, if no other pattern is stated.
     Scan {
         /// Height of the telescope above the ground, m.
-        lidar_height_m: f64 = 0.0,
+        lidar_height_m: f64 = 0.0 => 0.0..=1e4,
         /// Azimuth of the scan plane, rad, clockwise from north; only written to the files.
-        azimuth_rad: f64 = std::f64::consts::FRAC_PI_2,
+        azimuth_rad: f64 = std::f64::consts::FRAC_PI_2 => 0.0..=TAU,
         /// Lowest line of sight, rad above the horizon.
-        elevation_min_rad: f64 = 0.0,
+        elevation_min_rad: f64 = 0.0 => -FRAC_PI_2..=FRAC_PI_2,
         /// Upper limit of the lines of sight, rad.
-        elevation_max_rad: f64 = 0.2304,
+        elevation_max_rad: f64 = 0.2304 => -FRAC_PI_2..=FRAC_PI_2,
         /// Angle between lines of sight, rad.
-        elevation_step_rad: f64 = 1.25e-3,
+        elevation_step_rad: f64 = 1.25e-3 => 1e-7..=FRAC_PI_2,
         /// Range of the first recorded sample, m.
-        range_min_m: f64 = 280.0,
+        range_min_m: f64 = 280.0 => 1.0..=1e6,
         /// No sample beyond this range is recorded, m.
-        range_max_m: f64 = 520.0,
+        range_max_m: f64 = 520.0 => 1.0..=1e6,
         /// Pulses sent along each line.
-        pulses_per_line: usize = 16,
+        pulses_per_line: usize = 16 => 1..=1_000_000,
         /// Independent repetitions of the whole scan, for the errors.
-        realisations: usize = 4,
+        realisations: usize = 4 => 1..=1_000_000,
         /// The echo of the pulse before; absent: it is long gone.
         #[serde(skip_serializing_if = "Option::is_none")]
-        second_trip: Option<SecondTrip> = None,
+        second_trip: Option<SecondTrip> = None => Keys,
         /// What lines below the ground meet.
-        below_ground: Outside = Outside::Error {},
+        below_ground: Outside = Outside::Error {} => Keys,
         /// What lines that leave a simulated flow meet.
-        outside_flow: Outside = Outside::Error {},
+        outside_flow: Outside = Outside::Error {} => Keys,
         /// Which way the lidar looks, line after line.
         #[serde(skip_serializing_if = "Pattern::is_default")]
-        pattern: Pattern = Pattern::default(),
+        pattern: Pattern = Pattern::default() => Keys,
         /// How the lines follow each other.
         #[serde(skip_serializing_if = "pattern::is_default")]
-        head: HeadMotionKeys = HeadMotionKeys::default(),
+        head: HeadMotionKeys = HeadMotionKeys::default() => Keys,
         /// Where the lidar is.
         #[serde(skip_serializing_if = "pattern::is_default")]
-        lidar: LidarPlace = LidarPlace::default(),
+        lidar: LidarPlace = LidarPlace::default() => Keys,
         /// How many airs the pulses of a line meet.
         #[serde(skip_serializing_if = "pattern::is_default")]
-        wind_of_pulses: WindOfPulses = WindOfPulses::default(),
+        wind_of_pulses: WindOfPulses = WindOfPulses::default() => Keys,
     }
 }
 
@@ -174,11 +186,11 @@ section! {
         /// Of which realisations.
         signals_of: SignalsOf = SignalsOf::First,
         /// First range of the efficiency and SNR profile, m.
-        profile_range_min_m: f64 = 100.0,
+        profile_range_min_m: f64 = 100.0 => 1.0..=1e6,
         /// Last range of the profile, m.
-        profile_range_max_m: f64 = 3000.0,
+        profile_range_max_m: f64 = 3000.0 => 1.0..=1e6,
         /// Ranges in the profile.
-        profile_points: usize = 59,
+        profile_points: usize = 59 => 2..=100_000,
     }
 }
 
@@ -198,11 +210,11 @@ section! {
         /// Name of the place.
         name: String = "simulated runway".into(),
         /// Latitude, degrees north.
-        latitude_deg: f64 = 0.0,
+        latitude_deg: f64 = 0.0 => -90.0..=90.0,
         /// Longitude, degrees east.
-        longitude_deg: f64 = 0.0,
+        longitude_deg: f64 = 0.0 => -180.0..=180.0,
         /// Height of the ground above the sea, m.
-        altitude_m: f64 = 0.0,
+        altitude_m: f64 = 0.0 => -1e3..=1e4,
         /// Date of the start of the flow, UTC.
         start_utc: String = "2024-01-01T00:00:00Z".into(),
     }

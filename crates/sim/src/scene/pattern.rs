@@ -1,6 +1,8 @@
 //! The kinds of scans of a scene, and how the head moves.
 
+use crate::keys::{Checker, Limit, Limited, join};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI, TAU};
 
 /// Which way the lidar looks, line after line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,17 +53,30 @@ impl Pattern {
     }
 }
 
+impl Limited for Pattern {
+    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
+        match self {
+            Self::Rhi {} | Self::List { .. } => {}
+            Self::Ppi(ppi) => ppi.check_limits(at, c),
+            Self::Vad(vad) => vad.check_limits(at, c),
+            Self::Dbs(dbs) => dbs.check_limits(at, c),
+            Self::Stare(stare) => stare.check_limits(at, c),
+            Self::Axial(axial) => axial.check_limits(at, c),
+        }
+    }
+}
+
 section! {
     /// Sweeps of azimuth.
     Ppi {
         /// Elevation of each sweep, rad.
         elevations_rad: Vec<f64> = vec![0.05],
         /// First azimuth, rad.
-        azimuth_min_rad: f64 = 0.0,
+        azimuth_min_rad: f64 = 0.0 => -TAU..=TAU,
         /// Last azimuth, rad; a full turn from the first ends one step before it.
-        azimuth_max_rad: f64 = std::f64::consts::TAU,
+        azimuth_max_rad: f64 = TAU => -TAU..=2.0 * TAU,
         /// Angle between lines, rad; a head that moves during a line has its own.
-        azimuth_step_rad: f64 = std::f64::consts::TAU / 360.0,
+        azimuth_step_rad: f64 = TAU / 360.0 => 1e-7..=PI,
     }
 }
 
@@ -70,9 +85,9 @@ section! {
     #[derive(Copy)]
     Vad {
         /// Elevation of the beams, rad.
-        elevation_rad: f64 = std::f64::consts::FRAC_PI_3,
+        elevation_rad: f64 = FRAC_PI_3 => 1e-3..=FRAC_PI_2 - 1e-3,
         /// Beams of a turn.
-        beams: usize = 24,
+        beams: usize = 24 => 4..=10_000,
     }
 }
 
@@ -81,7 +96,7 @@ section! {
     #[derive(Copy)]
     Dbs {
         /// Elevation of the slanted beams, rad.
-        elevation_rad: f64 = 62.0 * std::f64::consts::PI / 180.0,
+        elevation_rad: f64 = 62.0 * PI / 180.0 => 1e-3..=FRAC_PI_2 - 1e-3,
     }
 }
 
@@ -90,9 +105,9 @@ section! {
     #[derive(Copy)]
     Stare {
         /// Elevation, rad.
-        elevation_rad: f64 = std::f64::consts::FRAC_PI_2,
+        elevation_rad: f64 = FRAC_PI_2 => -FRAC_PI_2..=FRAC_PI_2,
         /// Lines, one after the other.
-        lines: usize = 60,
+        lines: usize = 60 => 1..=100_000,
     }
 }
 
@@ -103,11 +118,11 @@ section! {
         /// Towards which end of the flight path the lidar looks.
         towards: Towards = Towards::PlusX,
         /// First azimuth beside the path, rad.
-        azimuth_min_rad: f64 = -0.05,
+        azimuth_min_rad: f64 = -0.05 => -TAU..=TAU,
         /// Last azimuth beside the path, rad.
-        azimuth_max_rad: f64 = 0.05,
+        azimuth_max_rad: f64 = 0.05 => -TAU..=2.0 * TAU,
         /// Angle between lines of a row, rad.
-        azimuth_step_rad: f64 = 5e-3,
+        azimuth_step_rad: f64 = 5e-3 => 1e-7..=PI,
     }
 }
 
@@ -150,7 +165,7 @@ section! {
         /// What the head does during a line.
         motion: HeadMotion = HeadMotion::Stepped,
         /// How often the whole pattern is repeated: its sweeps, turns or cycles.
-        sweeps: usize = 1,
+        sweeps: usize = 1 => 1..=100_000,
         /// The way of one sweep after another.
         direction: SweepDirection = SweepDirection::Same,
         /// Largest rate of the head, rad/s; without one it jumps.
@@ -158,7 +173,7 @@ section! {
         /// Acceleration of the head, rad/s^2.
         acceleration_rad_s2: f64 = f64::INFINITY,
         /// Time that each line takes beside its pulses, s.
-        dead_time_s: f64 = 0.0,
+        dead_time_s: f64 = 0.0 => 0.0..=1e5,
         /// Standard deviations of azimuth and elevation of each pulse, rad.
         pointing_jitter_rad: [f64; 2] = [0.0; 2],
     }
@@ -169,14 +184,14 @@ section! {
     #[derive(Copy)]
     LidarPlace {
         /// Place along the flight, m.
-        x_m: f64 = 0.0,
+        x_m: f64 = 0.0 => -1e6..=1e6,
         /// Place across it, m.
-        y_m: f64 = 0.0,
+        y_m: f64 = 0.0 => -1e6..=1e6,
         /// Velocity of the lidar (u, v, w), m/s.
-        velocity_m_s: [f64; 3] = [0.0; 3],
+        velocity_m_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
         /// Azimuth of the flight, +x, rad; absent: that of a plane across it is `scan.azimuth_rad`, and else north.
         #[serde(skip_serializing_if = "Option::is_none")]
-        flight_azimuth_rad: Option<f64> = None,
+        flight_azimuth_rad: Option<f64> = None => -TAU..=TAU,
     }
 }
 
@@ -198,6 +213,14 @@ pub enum WindOfPulses {
 impl Default for WindOfPulses {
     fn default() -> Self {
         Self::Line {}
+    }
+}
+
+impl Limited for WindOfPulses {
+    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
+        if let Self::Groups { groups } = self {
+            (1..=1_000_000).hold(&join(at, "groups"), groups, c);
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a real laser and a real receiver add to a scene; every part of it is off by default, and then not written.
 
+use crate::keys::{AboveZeroOrInf, NothingOr};
 use serde::{Deserialize, Serialize};
 use wakescope_signal::transmitter;
 
@@ -8,23 +9,23 @@ section! {
     #[derive(Copy)]
     FrontEnd {
         /// Current noise of the amplifier, A/sqrt(Hz).
-        amplifier_noise_a_rthz: f64 = 0.0,
+        amplifier_noise_a_rthz: f64 = 0.0 => 0.0..=1.0,
         /// Resistor whose thermal noise the amplifier sees, ohm; `inf` for none.
-        load_ohm: f64 = f64::INFINITY,
+        load_ohm: f64 = f64::INFINITY => AboveZeroOrInf,
         /// Its temperature, K.
-        load_temperature_k: f64 = 290.0,
+        load_temperature_k: f64 = 290.0 => 1e-3..=1e4,
         /// Dark current of the detector, A.
-        dark_current_a: f64 = 0.0,
+        dark_current_a: f64 = 0.0 => 0.0..=1.0,
         /// Relative intensity noise of the local oscillator, dB/Hz; `-inf` for none.
-        intensity_noise_db_hz: f64 = f64::NEG_INFINITY,
+        intensity_noise_db_hz: f64 = f64::NEG_INFINITY => NothingOr(-400.0..=0.0),
         /// Rejection of what both halves of a balanced detector see, electrical, dB.
-        rejection_db: f64 = 0.0,
+        rejection_db: f64 = 0.0 => 0.0..=200.0,
         /// Power at which the current has fallen to half of the linear one, W; `inf` for none.
-        saturation_w: f64 = f64::INFINITY,
+        saturation_w: f64 = f64::INFINITY => AboveZeroOrInf,
         /// Frequency at which the response of the detector has fallen to half the power, Hz; `inf` for none.
-        half_power_hz: f64 = f64::INFINITY,
+        half_power_hz: f64 = f64::INFINITY => AboveZeroOrInf,
         /// Poles of this response, a Butterworth low pass.
-        poles: u32 = 1,
+        poles: u32 = 1 => 1..=20,
     }
 }
 
@@ -33,11 +34,11 @@ section! {
     #[derive(Copy)]
     LaserAmplifier {
         /// Mean power at high repetition rates, W.
-        mean_power_w: f64 = 1.0,
+        mean_power_w: f64 = 1.0 => 1e-9..=1e6,
         /// Time over which the medium keeps its energy, s.
-        storage_time_s: f64 = 2e-4,
+        storage_time_s: f64 = 2e-4 => 1e-9..=1e3,
         /// Largest energy of a pulse, J; `inf` for none.
-        largest_energy_j: f64 = f64::INFINITY,
+        largest_energy_j: f64 = f64::INFINITY => AboveZeroOrInf,
     }
 }
 
@@ -46,15 +47,15 @@ section! {
     #[derive(Copy)]
     AmplifierFibre {
         /// Effective area of the mode, m^2.
-        effective_area_m2: f64 = 3e-10,
+        effective_area_m2: f64 = 3e-10 => 1e-14..=1.0,
         /// Length, m.
-        length_m: f64 = 2.0,
+        length_m: f64 = 2.0 => 1e-6..=1e6,
         /// Gain from end to end, dB.
-        gain_db: f64 = 0.0,
+        gain_db: f64 = 0.0 => 0.0..=200.0,
         /// Gain coefficient of the Brillouin scattering, m/W.
-        brillouin_gain_m_w: f64 = 2.5e-11,
+        brillouin_gain_m_w: f64 = 2.5e-11 => 1e-15..=1e-6,
         /// Its width, Hz.
-        brillouin_width_hz: f64 = 50e6,
+        brillouin_width_hz: f64 = 50e6 => 1e3..=1e12,
     }
 }
 
@@ -63,7 +64,7 @@ section! {
     #[derive(Copy)]
     SecondTrip {
         /// Radial velocity of the air there where the flow is not known, m/s.
-        radial_velocity_m_s: f64 = 0.0,
+        radial_velocity_m_s: f64 = 0.0 => -1e3..=1e3,
     }
 }
 

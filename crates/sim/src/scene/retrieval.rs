@@ -1,7 +1,7 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
 use super::{Flow, NoiseKind, Pattern, PulseShape, Scan, Scene, Weighting};
-use crate::keys::Checker;
+use crate::keys::{Checker, Keys};
 use crate::setup::beams::direction::sin_cos_of_turn;
 use serde::{Deserialize, Serialize};
 
@@ -43,13 +43,13 @@ section! {
         methods: Vec<RetrievalMethod> = vec![RetrievalMethod::Fit],
         /// Core radius that fits keep, m; fitted if absent.
         #[serde(skip_serializing_if = "Option::is_none")]
-        core_radius_m: Option<f64> = None,
+        core_radius_m: Option<f64> = None => 1e-3..=1e3,
         /// Rate of false alarms of a scan at which the maps are tested for a wake; absent: no test.
         #[serde(skip_serializing_if = "Option::is_none")]
-        false_alarm: Option<f64> = None,
+        false_alarm: Option<f64> = None => 1e-9..=0.5,
         /// The aircraft that follows; absent: none.
         #[serde(skip_serializing_if = "Option::is_none")]
-        follower: Option<FollowingAircraft> = None,
+        follower: Option<FollowingAircraft> = None => Keys,
     }
 }
 
@@ -58,11 +58,11 @@ section! {
     #[derive(Copy)]
     FollowingAircraft {
         /// Span of the wing, m.
-        span_m: f64 = 34.0,
+        span_m: f64 = 34.0 => 0.1..=1e3,
         /// Span squared over the area of the wing.
-        aspect_ratio: f64 = 9.4,
+        aspect_ratio: f64 = 9.4 => 0.1..=1e3,
         /// True air speed, m/s.
-        speed_m_s: f64 = 70.0,
+        speed_m_s: f64 = 70.0 => 0.1..=1e3,
         /// Slope of the lift.
         slope: LiftSlope = LiftSlope::Span,
     }
@@ -96,18 +96,9 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let one = "another method with more than one sweep (scan.head.sweeps)";
     let alone = scene.scan.head.sweeps == 1 || !r.methods.contains(&RetrievalMethod::Envelope);
     c.require(alone, key, "envelope", one);
-    if let Some(core_m) = r.core_radius_m {
-        c.within("retrieval.core_radius_m", core_m, 1e-3, 1e3, "m");
-    }
     if let Some(rate) = r.false_alarm {
-        c.within("retrieval.false_alarm", rate, 1e-9, 0.5, "");
         let noise = scene.detector.noise != NoiseKind::None;
         c.require(noise, "retrieval.false_alarm", rate, "absent where detector.noise = \"none\": nothing is by chance");
-    }
-    if let Some(f) = &r.follower {
-        c.within("retrieval.follower.span_m", f.span_m, 0.1, 1e3, "m");
-        c.within("retrieval.follower.aspect_ratio", f.aspect_ratio, 0.1, 1e3, "");
-        c.within("retrieval.follower.speed_m_s", f.speed_m_s, 0.1, 1e3, "m/s");
     }
     let across = "absent but for scan.pattern.kind = \"rhi\" in the plane across the flight, where vortices are sought: with \
                   scan.lidar.velocity_m_s = [0.0, 0.0, 0.0], y_m = 0.0, and flight_azimuth_rad absent or a quarter turn before scan.azimuth_rad";

@@ -13,7 +13,6 @@ use crate::measure::map::VelocityEstimates;
 use crate::measure::profile::Efficiencies;
 use crate::plan::units::seconds;
 use crate::plan::{Plan, Target};
-use crate::rehearsal::rehearse;
 use crate::scene::{Estimator, Outputs, Scene, SceneFile, Site, WindOfPulses, hash_of};
 use crate::setup::progress::Observer;
 use crate::setup::wind::SceneWind;
@@ -171,14 +170,13 @@ pub fn maps(scenes: &[SceneFile], observer: &dyn Observer) -> Result<Vec<(Plan, 
     Ok(out.into_iter().map(|(_, found)| found).collect())
 }
 
-/// Plans and rehearses every case, and finds out whether it fits the memory; returns the forecast of the time of each, s of one core.
+/// Plans every case, and finds out whether it fits the memory; returns the forecast of the time of each, s of one core.
 fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<Vec<f64>, Error> {
     let checked = |case: &Case| -> Result<f64, Error> {
         let plan = plan(&case.scene, winds)?;
         if !allow_large {
             plan.fits()?;
         }
-        rehearse(&plan)?;
         Ok(plan.total().core_s)
     };
     let found: Vec<_> = sweep.cases.par_iter().map(checked).collect();
