@@ -55,13 +55,8 @@ fn check_fields(flow: &FieldFlow, at: &str, c: &mut Checker<'_>) {
     if flow.files.is_empty() {
         c.refuse(&key("files"), Problem::ABSENT, "a file of fields, or the beginning of the names of numbered ones");
     }
-    if let Some(backscatter) = &flow.backscatter {
-        if backscatter.name.is_empty() {
-            c.refuse(
-                &key("backscatter.name"),
-                Problem::ABSENT,
-                "the name of a variable of the file over (time, z, y, x)",
-            );
-        }
+    if flow.backscatter.as_ref().is_some_and(|carried| carried.name.is_empty()) {
+        let allowed = "the name of a variable of the file over (time, z, y, x)";
+        c.refuse(&key("backscatter.name"), Problem::ABSENT, allowed);
     }
 }
