@@ -208,8 +208,10 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         let mut wake = options.free.start(guess);
         let (mut averaging, mut last, mut sigmas_left) = (Averaging::default(), [0.0; PARAMETERS], f64::INFINITY);
         let mut slopes: Option<(Wake, Vec<Array2<f64>>)> = None;
-        let mut alike = 1.0;
-        for step in 1..=STEPS {
+        let (mut alike, mut released) = (1.0, false);
+        let (mut step, mut most) = (0, STEPS);
+        while step < most {
+            step += 1;
             let here = self.prepared.velocities(&wake);
             let known = slopes.take().filter(|(at, slopes)| near(at, &wake) && slopes.len() == groups.len());
             let moved = known.is_none();
@@ -236,6 +238,12 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
             let share = averaging.part(with_last, of_last);
             sigmas_left = share * (problem.product(&wake, &way, &way, scale) / alike).sqrt();
             if sigmas_left <= near_sigmas.max(options.tolerance_sigmas) {
+                // a core that shrank on the way, as where the pair was narrow, may show where it ends
+                if groups.len() < fit.groups.len() && !released {
+                    (groups, released, most) = (&fit.groups, true, step + STEPS);
+                    (averaging, last) = (Averaging::default(), [0.0; PARAMETERS]);
+                    continue;
+                }
                 return fit.outcome(&problem, wake, scale, step);
             }
             let next = halved(share.min(tangent.reach(&next)), |part| {
@@ -248,7 +256,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
                 groups = &coreless;
             }
         }
-        Err(Error::NotConverged { iterations: STEPS, sigmas_left })
+        Err(Error::NotConverged { iterations: step, sigmas_left })
     }
 }
 
