@@ -33,8 +33,8 @@ const DISTANCES: (f64, f64) = (0.25, 1.5);
 const CORE_OVER_HEIGHT: f64 = 0.12;
 const GRID_OVER_HEIGHT: f64 = 0.12;
 /// Least gain of the logarithm of the likelihood by both, with velocities that say the same counted once.
-const LEAST_GAIN: f64 = 15.0;
-const LEAST_SEARCHED: f64 = 6.0;
+const LEAST_GAIN: f64 = 20.0;
+const LEAST_SEARCHED: f64 = 3.0;
 /// Numbers of the secondary vortices that are fitted.
 const NUMBERS: usize = 6;
 /// Most steps, rounds of weights in each, and what is left of the last in standard deviations.
@@ -78,12 +78,16 @@ impl State {
         if side == 0 { &self.wake.left } else { &self.wake.right }
     }
 
+    /// Circulation of a secondary vortex over that of its vortex, and distance over the height of the latter.
+    fn relative(&self, side: usize) -> (f64, f64) {
+        let (own, other) = (self.primary(side), &self.secondary[side]);
+        (other.circulation_m2_s / own.circulation_m2_s, distance_m(own, other) / own.height_m)
+    }
+
     /// How far what is known of the secondary vortices is missed, in deviations.
     fn away(&self) -> [f64; 4] {
         let of = |side: usize| {
-            let (own, other) = (self.primary(side), &self.secondary[side]);
-            let ratio = other.circulation_m2_s / own.circulation_m2_s;
-            let distance = distance_m(own, other) / own.height_m;
+            let (ratio, distance) = self.relative(side);
             [(ratio - KNOWN_RATIO.0) / KNOWN_RATIO.1, (distance - KNOWN_DISTANCE.0) / KNOWN_DISTANCE.1]
         };
         let ([a, b], [c, d]) = (of(0), of(1));
@@ -152,22 +156,20 @@ impl Setting<'_, '_> {
         if gain / counted < LEAST_SEARCHED {
             return None;
         }
-        let state = self.descend(State { wake: *pair, secondary }, counted)?;
-        let here = self.velocities(&state);
-        let four = self.linear(&state.wake, here, Vec::new());
+        let (state, four) = self.descend(State { wake: *pair, secondary }, counted)?;
+        // what two vortices miss looks like noise that neighbours share: what four leave tells how many velocities count as one
+        let counted = alike(&self.cells(&four), self.options.correlated_lines).min(counted);
         let known: f64 = state.away().iter().map(|away| 0.5 * away * away).sum();
         let gain = (self.log_likelihood(&four) - self.log_likelihood(&alone) - of_profile) / counted - known;
         // one far from its vortex stands for something else; a little beyond the scan it may be
         let stands = (0..2).all(|side| {
-            let (own, other) = (state.primary(side), &state.secondary[side]);
-            let ratio = other.circulation_m2_s / own.circulation_m2_s;
-            let distance = distance_m(own, other) / own.height_m;
+            let (ratio, distance) = state.relative(side);
             (RATIOS.0..0.0).contains(&ratio) && is_near(distance)
         });
         if gain < LEAST_GAIN || !stands {
             return None;
         }
-        let covariance = self.covariance(&state, counted).ok()?;
+        let covariance = self.covariance(&state, &four, counted).ok()?;
         Some(Found { wake: state.wake, secondary: state.secondary, covariance })
     }
 
@@ -191,16 +193,6 @@ impl Setting<'_, '_> {
                 velocities
             }
         }
-    }
-
-    fn linear(&self, wake: &Wake, here: Array2<f64>, slopes: Vec<Array2<f64>>) -> Linear {
-        let deviation = match self.prepared {
-            Some(prepared) => Tangent::new(prepared, *wake, here.view(), &[], self.map).deviation,
-            None => Array2::ones(here.dim()),
-        };
-        let mut linear = Linear { here, slopes, deviation, scale: 1.0 };
-        linear.scale = robust_scale(self.residuals(&linear).map(|(_, residual, _)| residual)).max(1e-6);
-        linear
     }
 
     /// Places with a velocity, their residuals and units \[m/s\]: a scale times what each scatters.
@@ -391,7 +383,13 @@ impl Setting<'_, '_> {
             (self.velocities(&self.moved(state, &one)) - &here) / steps[number]
         };
         let slopes = (0..steps.len()).map(quotient).collect();
-        self.linear(&state.wake, here, slopes)
+        let deviation = match self.prepared {
+            Some(prepared) => Tangent::new(prepared, state.wake, here.view(), &[], self.map).deviation,
+            None => Array2::ones(here.dim()),
+        };
+        let mut linear = Linear { here, slopes, deviation, scale: 1.0 };
+        linear.scale = robust_scale(self.residuals(&linear).map(|(_, residual, _)| residual)).max(1e-6);
+        linear
     }
 
     /// Sums over the places after a step, with the weights of the loss there.
@@ -419,8 +417,8 @@ impl Setting<'_, '_> {
         sums
     }
 
-    /// The nearest minimum of the cost, if the steps come to an end and it is possible.
-    fn descend(&self, start: State, counted: f64) -> Option<State> {
+    /// The nearest minimum of the cost and the velocities about it, if the steps come to an end and it is possible.
+    fn descend(&self, start: State, counted: f64) -> Option<(State, Linear)> {
         let mut state = start;
         let (mut averaging, mut last) = (Averaging::default(), vec![0.0; self.groups.len() + NUMBERS]);
         for _ in 0..STEPS {
@@ -442,7 +440,7 @@ impl Setting<'_, '_> {
                 |a: &[f64], b: &[f64]| -> f64 { curvature.indexed_iter().map(|((i, j), c)| c * a[i] * b[j]).sum() };
             let share = averaging.part(product(&way, &last), product(&last, &last));
             if share * (product(&way, &way) / counted).sqrt() <= NEAR_SIGMAS {
-                return Some(state);
+                return Some((state, linear));
             }
             let reach = way.iter().zip(&steps).map(|(way, step)| REACH * step / way.abs().max(f64::MIN_POSITIVE));
             let next = halved(reach.fold(share, f64::min), |part| {
@@ -455,13 +453,12 @@ impl Setting<'_, '_> {
     }
 
     /// Of the wake, whatever the secondary vortices are: its part of the sandwich of all numbers.
-    fn covariance(&self, state: &State, counted: f64) -> Result<Array2<f64>, Error> {
+    fn covariance(&self, state: &State, linear: &Linear, counted: f64) -> Result<Array2<f64>, Error> {
         let steps = self.quotients(state);
-        let linear = self.about(state, &steps);
         let known = self.known(state, &steps);
-        let curvature = self.sums(&linear, &known, counted, &vec![0.0; steps.len()]).curvature;
+        let curvature = self.sums(linear, &known, counted, &vec![0.0; steps.len()]).curvature;
         let bread = inverse("curvature of the fit", &curvature)?;
-        let (mut filling, _) = filling(&self.cells(&linear), &bread, self.options.correlated_lines);
+        let (mut filling, _) = filling(&self.cells(linear), &bread, self.options.correlated_lines);
         for (_, slopes) in &known {
             filling.indexed_iter_mut().for_each(|((i, j), sum)| *sum += counted * counted * slopes[i] * slopes[j]);
         }
