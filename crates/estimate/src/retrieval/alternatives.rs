@@ -9,7 +9,8 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::retrieval::expected::Expected;
-use crate::retrieval::hypotheses::{End, Fits, Kind, ROUGH};
+use crate::retrieval::hypotheses::{AS_IT_IS, End, Fits, Kind, ROUGH};
+use crate::retrieval::problem::Problem;
 use crate::retrieval::report::{COMPETES, Chosen, Report};
 use crate::retrieval::{Flag, Measured, ScanResult, VortexResult};
 use crate::vortex_fit::damped_newton::Stop;
@@ -50,7 +51,8 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
     if end.kind == Kind::Wind {
         return Ok(report.told(end, covariance, statistic));
     }
-    let mut all = vec![Alternative::new(report, end.clone())?];
+    let vortices = report.vortices(end, &covariance);
+    let mut all = vec![Alternative { end: end.clone(), covariance, vortices, weight: 1.0 }];
     let variance = report.scale.powi(2) * alike;
     let most = end.chi2 + NEGLIGIBLE * variance;
     // where the curvature of an end tells nothing, those of the others do
@@ -130,12 +132,14 @@ fn with_spacing(wake: &Wake, spacing_m: f64) -> Wake {
 fn of_other_profile(report: &Report<'_>, end: &End, most: f64) -> Result<Option<Alternative>, Error> {
     let mut options = report.options.clone();
     options.model.profile = options.model.profile.other();
-    let moving = Expected::rough(report.map, &options)?.fine(&options)?;
-    let expected = if report.problem.expected.moves() { moving } else { moving.frozen() };
-    let mut problem = report.problem.clone();
-    problem.expected = &expected;
-    let fits = Fits { problem: &problem, options: &options };
-    let other = fits.lowest(end.kind, &end.wake, end.groups.clone(), ROUGH).filter(|other| other.chi2 <= most);
+    let moving = Expected::on_grid(report.map, &options, 1)?;
+    let dense = if report.problem.expected.moves() { moving } else { moving.frozen() };
+    let fine = dense.fine(&options)?;
+    let mut problem = Problem { expected: &dense, ..report.problem.clone() };
+    let near = Fits { problem: &problem, options: &options }.onwards(std::slice::from_ref(end), |_| ROUGH);
+    problem.expected = &fine;
+    let other = Fits { problem: &problem, options: &options }.onwards(&near, |_| AS_IT_IS).pop();
+    let other = other.filter(|other| other.chi2 <= most);
     let report = Report { problem: &problem, options: &options, ..*report };
     Ok(other.and_then(|end| Alternative::new(&report, end).ok()))
 }

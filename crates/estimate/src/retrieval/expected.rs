@@ -29,17 +29,23 @@ pub(crate) struct Expected<'a> {
 }
 
 impl<'a> Expected<'a> {
-    /// For the search of a wake: the points of a Gaussian weight lie on one grid with the gates, which is quick.
+    /// For the search of a wake, with few points.
     pub(crate) fn rough(map: &'a ScanMap, options: &'a RetrievalOptions) -> Result<Self, Error> {
+        Self::on_grid(map, options, COARSER)
+    }
+
+    /// For the way to the end of a fit: the points of a Gaussian weight lie on one grid with the gates, which is quick, `coarser` times as far
+    /// apart as in the end at most.
+    pub(crate) fn on_grid(map: &'a ScanMap, options: &'a RetrievalOptions, coarser: usize) -> Result<Self, Error> {
         options.gate.validate(&map.range_m)?;
         let step_m = uniform_step_m(&map.range_m);
         let kernel = match &options.gate {
             Gate::Gaussian { std_m } if *std_m > 0.0 => {
-                let longest_m = COARSER as f64 * 2.0 * REACH * std_m / (POINTS - 1) as f64;
+                let longest_m = coarser as f64 * 2.0 * REACH * std_m / (POINTS - 1) as f64;
                 let spacing_m = step_m.map_or(longest_m, |step| step / (step / longest_m).ceil());
                 gaussian(*std_m, spacing_m, (REACH * std_m / spacing_m).ceil() as usize)?
             }
-            Gate::Kernel(kernel) => kernel.coarser(COARSER),
+            Gate::Kernel(kernel) => kernel.coarser(coarser),
             Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, step_m.unwrap_or(1.0), &[1.0])?,
         };
         let ((first_s, last_s), reference_time_s) = (map.ends_s(), map.middle_s());

@@ -7,7 +7,7 @@
 use crate::error::Error;
 use crate::retrieval::alternatives::with_alternatives;
 use crate::retrieval::expected::Expected;
-use crate::retrieval::hypotheses::{End, Fits, least, rivals, starts};
+use crate::retrieval::hypotheses::{End, Fits, ROUGH, least, rivals, starts};
 use crate::retrieval::problem::{Cell, Problem};
 use crate::retrieval::report::{OUTLIER, Report};
 use crate::retrieval::whitening::Whitening;
@@ -87,23 +87,26 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
             loss => loss,
         };
     }
-    let fine = expected.fine(options)?;
-    problem.expected = &fine;
-    let mut ends = Fits { problem: &problem, options }.fine(&rivals(&ends, scale));
-    let frozen = fine.frozen();
-    let likely = least(&ends, problem.cells.len()).filter(|_| options.movement == Movement::Auto && fine.moves());
+    let dense = Expected::on_grid(map, options, 1)?;
+    problem.expected = &dense;
+    let mut ends = Fits { problem: &problem, options }.onwards(&rivals(&ends, scale), |_| ROUGH);
+    let frozen = dense.frozen();
+    let likely = least(&ends, problem.cells.len()).filter(|_| options.movement == Movement::Auto && dense.moves());
     if let Some(likely) = likely {
         problem.expected = &frozen;
         let fits = Fits { problem: &problem, options };
-        let still = fits.fine(std::slice::from_ref(likely));
+        let still = fits.onwards(std::slice::from_ref(likely), |_| ROUGH);
         let sense = if map.lasts_s() < RetrievalOptions::SHORT_S { -1.0 } else { 1.0 };
         let margin = RetrievalOptions::MOVES * scale.powi(2) * sense;
         if still.first().is_some_and(|still| still.chi2 + margin < likely.chi2) {
-            ends = fits.fine(&ends);
+            ends = fits.onwards(&ends, |_| ROUGH);
         } else {
-            problem.expected = &fine;
+            problem.expected = &dense;
         }
     }
+    let fine = problem.expected.fine(options)?;
+    problem.expected = &fine;
+    let ends = Fits { problem: &problem, options }.fine(&ends);
     let wind = Fits { problem: &problem, options }.wind(&about)?;
     let (problem, wind, ends) = (&problem, &wind, &ends[..]);
     with_alternatives(&Report { map, options, problem, scale, rejected, thinned, is_noise_left: true, wind, ends })

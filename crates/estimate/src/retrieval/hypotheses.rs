@@ -36,6 +36,7 @@ const HOPELESS: f64 = 50.0;
 const FAR: Stop = Stop { iterations: 25, sigmas: 0.3, learns: false };
 pub(crate) const ROUGH: Stop = Stop { iterations: 40, sigmas: 1e-2, learns: false };
 const FINE: Stop = Stop { iterations: 50, sigmas: 1e-4, learns: false };
+pub(crate) const AS_IT_IS: Stop = Stop { iterations: 1, sigmas: f64::INFINITY, learns: false };
 
 /// Which vortices there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,14 +50,10 @@ pub(crate) enum Kind {
 impl Kind {
     /// Whether the parameter belongs to a vortex that there is, or to the wind.
     fn has(self, place: usize) -> bool {
-        let left = [Parameter::LeftCirculation, Parameter::LeftLateral, Parameter::LeftHeight, Parameter::LeftCore];
-        let is_left = left.iter().any(|parameter| *parameter as usize == place);
-        match self {
-            _ if place >= Parameter::Wind as usize => true,
-            Self::Wind => false,
-            Self::Left => is_left,
-            Self::Right => !is_left,
-            Self::Both => true,
+        match place {
+            0 | 2 | 3 | 6 => matches!(self, Self::Left | Self::Both),
+            1 | 4 | 5 | 7 => matches!(self, Self::Right | Self::Both),
+            _ => true,
         }
     }
 
@@ -239,15 +236,15 @@ impl Fits<'_> {
         ends
     }
 
-    /// The ends for another problem, such as another scale of the loss; the likely one, which is told, to the last.
+    /// The ends for another problem, such as another scale of the loss.
+    pub(crate) fn onwards(&self, ends: &[End], stop: impl Fn(&End) -> Stop) -> Vec<End> {
+        ends.iter().filter_map(|end| self.lowest(end.kind, &end.wake, end.groups.clone(), stop(end))).collect()
+    }
+
+    /// The ends with each gate's own points: the likely one, which is told, to the last; of the others the chi-square.
     pub(crate) fn fine(&self, ends: &[End]) -> Vec<End> {
-        let to = |end: &End, stop: Stop| self.lowest(end.kind, &end.wake, end.groups.clone(), stop);
-        let mut ends: Vec<End> = ends.iter().filter_map(|end| to(end, ROUGH)).collect();
-        let likely = least(&ends, self.problem.cells.len()).map(|likely| likely.chi2);
-        for end in ends.iter_mut().filter(|end| Some(end.chi2) == likely) {
-            *end = to(end, FINE).unwrap_or_else(|| end.clone());
-        }
-        ends
+        let likely = least(ends, self.problem.cells.len()).map(|likely| likely.chi2);
+        self.onwards(ends, |end| if Some(end.chi2) == likely { FINE } else { AS_IT_IS })
     }
 
     /// Ends for a problem with more velocities, from those of one with fewer.

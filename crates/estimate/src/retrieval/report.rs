@@ -66,15 +66,18 @@ impl<'a> Report<'a> {
             without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2)
         };
         let likely = least(self.ends, cells);
-        let alike = match likely {
-            Some(end) if self.is_noise_left => self.uncertainty(end)?.alike(&end.wake, self.scale.powi(2)),
+        let mut of_likely = likely.map(|end| self.uncertainty(end)).transpose()?;
+        let alike = match (likely, &of_likely) {
+            (Some(end), Some(known)) if self.is_noise_left => known.alike(&end.wake, self.scale.powi(2)),
             _ => 1.0,
         };
         let gain = |without: Option<&End>, with: &End| gain(without, with) / alike;
         let statistic = likely.map_or(0.0, |end| gain(Some(self.wind), end));
         let (left, right) = (best(self.ends, Kind::Left), best(self.ends, Kind::Right));
         let lone = [left, right].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        // the likely one comes first
         for end in likely.into_iter().chain(lone.filter(|_| likely.is_some_and(|end| end.kind == Kind::Both))) {
+            let known = of_likely.take();
             let seen = match end.kind {
                 Kind::Both => gain(left, end).min(gain(right, end)),
                 _ => gain(Some(self.wind), end),
@@ -82,7 +85,7 @@ impl<'a> Report<'a> {
             if seen.min(statistic) < self.options.threshold {
                 continue;
             }
-            let uncertainty = self.uncertainty(end)?;
+            let uncertainty = known.map_or_else(|| self.uncertainty(end), Ok)?;
             let circulations = self.sides(end).into_iter().map(|side| side.parameters()[0] as usize);
             let threshold = self.options.threshold;
             let certain = circulations.map(|place| uncertainty.certain(&end.wake, place, threshold));
