@@ -125,24 +125,6 @@ pub enum ByteOrder {
     Big,
 }
 
-impl ByteOrder {
-    /// Its name.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Little => "little",
-            Self::Big => "big",
-        }
-    }
-
-    /// The other one.
-    pub(crate) fn other(self) -> Self {
-        match self {
-            Self::Little => Self::Big,
-            Self::Big => Self::Little,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

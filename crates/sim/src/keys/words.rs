@@ -79,31 +79,13 @@ fn list(names: &[&str]) -> String {
     names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
 }
 
-/// The name that is nearest to a word, if it is near enough to be meant.
+/// The name that is nearest to a word, if it is near enough to be meant: by letters that must be put in, taken out, changed or
+/// swapped with their neighbour to get from one to the other.
 pub(crate) fn near<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let word: Vec<char> = word.chars().take(LONGEST_QUOTE).map(|c| c.to_ascii_lowercase()).collect();
-    let far = (word.len() / 3).max(1);
-    names.map(|name| (distance(&word, name), name)).filter(|(d, _)| *d <= far).min_by_key(|(d, _)| *d).map(|(_, n)| n)
-}
-
-/// Letters that must be put in, taken out, changed or swapped with their neighbour to get from one word to the other.
-fn distance(word: &[char], name: &str) -> usize {
-    let name: Vec<char> = name.chars().collect();
-    let mut before = vec![0; name.len() + 1];
-    let mut row: Vec<usize> = (0..=name.len()).collect();
-    for (i, letter) in word.iter().enumerate() {
-        let mut next = vec![i + 1];
-        for (j, other) in name.iter().enumerate() {
-            let changed = row[j] + usize::from(letter != other);
-            let mut least = changed.min(row[j + 1] + 1).min(next[j] + 1);
-            if i > 0 && j > 0 && word[i - 1] == *other && *letter == name[j - 1] {
-                least = least.min(before[j - 1] + 1);
-            }
-            next.push(least);
-        }
-        before = std::mem::replace(&mut row, next);
-    }
-    row[name.len()]
+    let word: String = word.chars().take(LONGEST_QUOTE).map(|c| c.to_ascii_lowercase()).collect();
+    let far = (word.chars().count() / 3).max(1);
+    let distances = names.map(|name| (strsim::osa_distance(&word, name), name));
+    distances.filter(|(d, _)| *d <= far).min_by_key(|(d, _)| *d).map(|(_, name)| name)
 }
 
 /// A piece of a file, on one line and not too long.

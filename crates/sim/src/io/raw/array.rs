@@ -150,61 +150,6 @@ impl ArrayInFile {
             put(sample, numbers);
         }
     }
-
-    /// What speaks against the order of the bytes, from the beginning of the data: a text for the user.
-    pub(super) fn doubt(&mut self) -> std::io::Result<Option<String>> {
-        let length = self.sample_bytes() * (self.records as u64 * self.samples as u64).min(1 << 14);
-        if self.number.bytes() == 1 {
-            return Ok(None);
-        }
-        let mut raw = Vec::new();
-        self.bytes(self.begin, length, &mut raw)?;
-        let bytes = self.number.bytes() as usize;
-        let read = |order| -> Vec<f64> {
-            raw.chunks_exact(bytes).map(|number| self.number.ordered_value(number, order)).collect()
-        };
-        let (here, there) = (read(self.byte_order), read(self.byte_order.other()));
-        let worse = match self.number.is_float() {
-            // Samples of one signal do not differ by tens of orders of magnitude.
-            true => decades(&here) > 25.0 && decades(&there) < 15.0,
-            // Swapped integers fill their whole range evenly; a signal that does is in saturation.
-            false => spread(&here) > 0.2 * spread_of_all(self.number) && spread(&there) < 0.25 * spread(&here),
-        };
-        let other = self.byte_order.other().name();
-        Ok(worse.then(|| {
-            format!(
-                "its numbers make no signal with the {} byte first: --byte-order {other}",
-                match self.byte_order {
-                    ByteOrder::Little => "lowest",
-                    ByteOrder::Big => "highest",
-                }
-            )
-        }))
-    }
-}
-
-/// Orders of magnitude between the largest and the smallest of most numbers that are not 0.
-fn decades(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> =
-        values.iter().filter(|v| **v != 0.0).map(|v| if v.is_finite() { v.abs().log10() } else { 400.0 }).collect();
-    sizes.sort_by(f64::total_cmp);
-    let cut = sizes.len() / 50;
-    match (sizes.get(cut), sizes.get(sizes.len().saturating_sub(1 + cut))) {
-        (Some(low), Some(high)) => high - low,
-        _ => 0.0,
-    }
-}
-
-/// Standard deviation.
-fn spread(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
-}
-
-/// Standard deviation of all integers of a kind.
-fn spread_of_all(number: NumberType) -> f64 {
-    (8.0 * number.bytes() as f64).exp2() / 12f64.sqrt()
 }
 
 #[cfg(test)]
@@ -282,14 +227,5 @@ mod tests {
         let mut apart = ArrayInFile { parts: Parts::Apart(12), record_bytes: 6, ..together };
         let found = apart.read(0..2, 0..3).unwrap();
         assert!(found.iter().enumerate().all(|(i, z)| *z == Complex::new(i as f64, i as f64 + 6.0)), "{found:?}");
-    }
-
-    #[test]
-    fn bytes_in_the_wrong_order_are_seen() {
-        let signal: Vec<f64> = (0..12).map(|i| (900.0 * f64::from(i * i).sin()).round()).collect();
-        let mut right = array(&signal, Order::LineMajor);
-        assert_eq!(right.doubt().unwrap(), None);
-        right.byte_order = ByteOrder::Little;
-        assert!(right.doubt().unwrap().is_some_and(|text| text.contains("--byte-order big")));
     }
 }

@@ -165,15 +165,11 @@ impl RawRecords {
             }
         };
         let mut records = Self { path: path.to_owned(), store, outsized: f64::INFINITY, about };
-        if let Store::Array(array) = &mut records.store {
-            // Of a converter's codes each may be a sample.
-            if array.number.is_float() {
-                array.fills.extend(MissingSamples::default().fill);
-            }
-            let doubt = array.doubt().map_err(unreadable)?;
-            if let Some(doubt) = doubt.filter(|_| format.number.is_some()) {
-                return Err(refuse(doubt));
-            }
+        // Of a converter's codes each may be a sample.
+        if let Store::Array(array) = &mut records.store
+            && array.number.is_float()
+        {
+            array.fills.extend(MissingSamples::default().fill);
         }
         if records.records() == 0 || records.samples() == 0 {
             return Err(refuse("it holds no records".into()));
