@@ -43,6 +43,7 @@ const WITHOUT: &[(&str, &str)] = &[
     ),
     ("budget limits: intensity_equals_shot_w", "where (R4) meets (R1): held by the stored budget"),
     ("budget limits: reflex_range_m", "where (R7) falls below -20 dB: held by the stored curve of the reflex"),
+    ("map.csv: v_spread_m_s", "of beams that jitter at random: held by tests of the jitter and of winds of pulses"),
     ("map.csv: v_mean_m_s", "random: its bias and scatter are held, and the estimators by stored windows"),
     ("map.nc: antenna_transition", "no number: always 0"),
     ("map.nc: follow_mode", "a word of the format"),
