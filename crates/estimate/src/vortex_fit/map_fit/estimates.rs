@@ -241,7 +241,6 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
                 // a core that shrank on the way, as where the pair was narrow, may show where it ends
                 if groups.len() < fit.groups.len() && !released {
                     (groups, released, most) = (&fit.groups, true, step + STEPS);
-                    (averaging, last) = (Averaging::default(), [0.0; PARAMETERS]);
                     continue;
                 }
                 return fit.outcome(&problem, wake, scale, step);
