@@ -169,6 +169,17 @@ impl Figure {
     }
 }
 
+/// The figures as one animated PNG, each shown for `frame_s` \[s\], over and over.
+///
+/// # Errors
+/// No figures, figures of different sizes, a time that is not between 0.01 s and 60 s, and what [`Figure::png`] finds.
+pub fn apng(figures: &[Figure], frame_s: f64, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+    if !(0.01..=60.0).contains(&frame_s) {
+        return Err(OutputError::value("frame_s", frame_s, "0.01 to 60 s"));
+    }
+    encode(figures.iter().map(|figure| paint(&figure.draw()?)), frame_s, Some(provenance))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,11 +2,10 @@
 //! free the plot makes room above its curves.
 //! Check: tests fill all places but one and find the legend there.
 
-use super::colour::curve_colour;
-use super::curves::Series;
 use super::drawing::{Anchor, Frame, Shape};
 use super::font::Font;
 use super::frame::{GRID, HALF_HEIGHT, TICK_SIZE};
+use super::series::{Series, marker};
 
 const SAMPLE: f64 = 34.0;
 const LINE: f64 = 21.0;
@@ -39,17 +38,6 @@ pub(crate) fn legend(series: &[(usize, &Series)], place: Frame, out: &mut Vec<Sh
         }
         out.push(Shape::text((x + SAMPLE + PAD, y + HALF_HEIGHT), &series.label, TICK_SIZE, Anchor::Start));
     }
-}
-
-/// The marker of a series: its shape differs as well as its colour.
-pub(crate) fn marker(at: (f64, f64), index: usize) -> Shape {
-    let (corners, radius, turn): (u32, f64, f64) =
-        [(24, 4.6, 0.0), (4, 5.6, 0.125), (3, 6.2, -0.25), (4, 5.8, 0.0)][index % 4];
-    let corner = |i: u32| {
-        let angle = std::f64::consts::TAU * (f64::from(i) / f64::from(corners) + turn);
-        (at.0 + radius * angle.cos(), at.1 + radius * angle.sin())
-    };
-    Shape::area((0..corners).map(corner).collect::<Vec<_>>(), curve_colour(index))
 }
 
 /// The place with the fewest points under the legend, and how many these are. Of equal ones it is the first: the corners

@@ -5,7 +5,7 @@
 //! | module | draws |
 //! |---|---|
 //! | [`figure`] | panels side by side or stacked, as SVG text or PNG bytes |
-//! | [`curves`] | curves with bands and markers, linear or logarithmic |
+//! | [`curves`], [`series`] | curves with bands and markers, linear or logarithmic |
 //! | [`map`] | one field of a sweep or of a plane over distance and height, equal scales, with colour bar |
 //! | [`cells`] | (inside a map) pixels from polar and rectangular cells |
 //! | [`isosurface`] | lit surfaces of equal value of a field in space |
@@ -25,16 +25,17 @@ pub mod isosurface;
 mod legend;
 pub mod map;
 mod png_file;
+pub mod series;
 mod svg;
 pub mod volume;
 
 pub use axis::Axis;
 pub use cells::Cells;
 pub use colour::ColourMap;
-pub use curves::{CurvePlot, Series, Style};
-pub use figure::{Figure, Panel};
+pub use curves::CurvePlot;
+pub use figure::{Figure, Panel, apng};
 pub use isosurface::{IsosurfacePlot, Surface};
 pub use map::MapPlot;
-pub use png_file::apng;
+pub use series::{Series, Style};
 pub use svg::escape;
 pub use volume::Volume;

@@ -4,7 +4,6 @@
 
 use super::colour::Rgb;
 use super::drawing::{Drawing, INK, Shape, Text};
-use super::figure::Figure;
 use super::font::Font;
 use crate::io::{OutputError, OutputResult, Provenance};
 use tiny_skia::{
@@ -118,17 +117,6 @@ fn path(points: &[(f64, f64)]) -> Option<Path> {
     builder.finish()
 }
 
-/// The figures as one animated PNG, each shown for `frame_s` \[s\], over and over.
-///
-/// # Errors
-/// No figures, figures of different sizes, a time that is not between 0.01 s and 60 s, and what [`Figure::png`] finds.
-pub fn apng(figures: &[Figure], frame_s: f64, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-    if !(0.01..=60.0).contains(&frame_s) {
-        return Err(OutputError::value("frame_s", frame_s, "0.01 to 60 s"));
-    }
-    encode(figures.iter().map(|figure| paint(&figure.draw()?)), frame_s, Some(provenance))
-}
-
 /// PNG bytes of one picture, APNG bytes of several, with the provenance in iTXt chunks where it is given.
 pub(crate) fn encode(
     pictures: impl IntoIterator<Item = OutputResult<Pixmap>, IntoIter: ExactSizeIterator>,
@@ -170,7 +158,7 @@ mod tests {
     use super::*;
     use crate::io::provenance::example;
     use crate::plot::drawing::Frame;
-    use crate::plot::{Axis, CurvePlot, Series, Style};
+    use crate::plot::{Axis, CurvePlot, Figure, Series, Style, apng};
 
     fn pixel(picture: &Pixmap, x: f64, y: f64) -> [u8; 3] {
         let at = picture.pixel((x * SCALE) as u32, (y * SCALE) as u32).unwrap();

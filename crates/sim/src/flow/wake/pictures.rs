@@ -84,6 +84,10 @@ impl FinishedWake {
         }
         let mut figure = Figure::side_by_side([self.circulation_plot()?, paths]).titled(&self.words());
         figure.width = 1200.0;
+        #[cfg_attr(
+            not(feature = "netcdf"),
+            expect(unused_mut, reason = "surfaces are those of fields that were written")
+        )]
         let mut pictures = vec![("wake", figure)];
         #[cfg(feature = "netcdf")]
         pictures.extend(self.surfaces_figure()?.map(|figure| ("surfaces", figure)));
