@@ -120,7 +120,7 @@ pub enum Error {
         available: String,
         /// The stage that takes most of it.
         stage: &'static str,
-        /// Keys and values that would make it fit.
+        /// What would take less: keys, for a flow with values that would fit.
         remedy: String,
     },
     /// The number of threads cannot be had.

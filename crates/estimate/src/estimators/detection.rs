@@ -171,8 +171,10 @@ impl NoiseTest {
             let (own_mean, own_deviation) = seen(0.5 * band * (part as f64 + 0.5) / PARTS as f64);
             (own_mean / mean, own_deviation / deviation)
         };
-        // Windows that are farther apart than one of them see noise of their own.
-        let step = gates.step_samples.min(2 * samples);
+        // Windows see noise of their own where they are so far apart that even noise of the band alone has forgotten: sinc(20)^2 is below
+        // 3e-4. Beyond that a wider step changes nothing but the size of the covariance.
+        let forgotten = (20.0 / band).min(8.0 * samples as f64) as usize;
+        let step = gates.step_samples.min(samples + forgotten.max(samples));
         let start = |gate: usize| (gate * step) as f64 / (every * shorter) as f64;
         let moments = |gates: usize| {
             let length = size + start(gates - 1).round() as usize;
@@ -412,12 +414,20 @@ mod tests {
 
     #[test]
     fn windows_far_apart_see_noise_as_independent_as_that_of_pulses() {
-        let taper = [Taper::unit(vec![1.0; 16]).unwrap()];
-        for step in [40, 1_000_000_000] {
-            let gates = Gates::new(16, step, 0.0).unwrap();
-            let test = NoiseTest::new(&table_2(), &gates, &taper, None, 64, Noise::White).unwrap();
+        let of_two = |samples: usize, step, noise| {
+            let taper = [Taper::unit(vec![1.0; samples]).unwrap()];
+            let gates = Gates::new(samples, step, 0.0).unwrap();
+            let test = NoiseTest::new(&table_2(), &gates, &taper, None, 64, noise).unwrap();
             let level = |gates, pulses| test.threshold(&test.region([(gates, pulses)].into_iter()), 0.01).unwrap();
-            assert!((level(2, 1) / level(1, 2) - 1.0).abs() < 1e-9, "{step}: {} {}", level(2, 1), level(1, 2));
+            level(2, 1) / level(1, 2) - 1.0
+        };
+        // White noise has forgotten at once, that of a fifth of the frequencies after some 100 samples.
+        assert!(of_two(16, 40, Noise::White).abs() < 1e-9 && of_two(16, 1_000_000_000, Noise::White).abs() < 1e-9);
+        for samples in [4, 16, 64] {
+            let band = |step| of_two(samples, step, Noise::Band { floor: 1e-3 }).abs();
+            let (near, far) = (band(2 * samples), band(1_000_000_000));
+            // Four samples apart it remembers.
+            assert!(far < 5e-4 && (samples > 4 || near > 1e-2), "{samples}: {near} {far}");
         }
     }
 }

@@ -50,10 +50,14 @@ pub(crate) enum Kind {
 impl Kind {
     /// Whether the parameter belongs to a vortex that there is, or to the wind.
     fn has(self, place: usize) -> bool {
-        match place {
-            0 | 2 | 3 | 6 => matches!(self, Self::Left | Self::Both),
-            1 | 4 | 5 | 7 => matches!(self, Self::Right | Self::Both),
-            _ => true,
+        let left = [Parameter::LeftCirculation, Parameter::LeftLateral, Parameter::LeftHeight, Parameter::LeftCore];
+        let is_left = left.iter().any(|parameter| *parameter as usize == place);
+        match self {
+            _ if place >= Parameter::Wind as usize => true,
+            Self::Wind => false,
+            Self::Left => is_left,
+            Self::Right => !is_left,
+            Self::Both => true,
         }
     }
 

@@ -2,11 +2,12 @@
 //!
 //! Check: a scene that needs far more than the machine has is refused with keys that, made smaller, are accepted.
 
-use super::Plan;
 use super::sizes::Sizes;
 use super::stage::{Forecast, PlannedStage, total};
 use super::stages::of_bound;
 use super::units::bytes;
+use super::{Plan, Target};
+use crate::scene::{Pattern, ScreenSampling, Turbulence};
 use crate::setup::progress::Stage;
 use crate::{Error, machine};
 
@@ -27,17 +28,32 @@ impl Plan {
     /// # Errors
     /// As [`Plan::fits`].
     pub fn fits_in(&self, available_bytes: f64) -> Result<(), Error> {
-        self.hold(&self.stages, available_bytes, |stage| match stage {
-            Stage::PhaseScreens => "fewer atmosphere.turbulence.grid_points",
-            Stage::CrossPlane | Stage::Efficiency => "fewer outputs.profile_points, or outputs.flow = false",
-            _ if self.keeps_signals() => {
-                "outputs.signals = false, a larger scan.elevation_step_rad, fewer scan.pulses_per_line"
+        self.hold(&self.stages, available_bytes, |stage| self.smaller(stage))
+    }
+
+    /// What makes a stage smaller, by the keys that this scene has a use for.
+    fn smaller(&self, stage: Stage) -> String {
+        let scene = &self.scene.scene;
+        let lines = match scene.scan.pattern {
+            Pattern::Rhi {} => "a larger scan.elevation_step_rad",
+            Pattern::Ppi(_) | Pattern::Axial(_) => "a larger scan.pattern.azimuth_step_rad",
+            _ => "fewer lines of sight",
+        };
+        let is_derived =
+            matches!(scene.atmosphere.turbulence, Turbulence::Refractive(t) if t.sampling == ScreenSampling::Derived);
+        match stage {
+            Stage::PhaseScreens if is_derived => "a smaller scan.range_max_m and outputs.profile_range_max_m".into(),
+            Stage::PhaseScreens => "fewer atmosphere.turbulence.grid_points".into(),
+            Stage::CrossPlane | Stage::Efficiency => "fewer outputs.profile_points, or outputs.flow = false".into(),
+            _ if self.keeps_signals() && self.target == Target::Run => {
+                format!("outputs.signals = false, {lines} or fewer scan.pulses_per_line")
             }
+            _ if self.keeps_signals() => format!("{lines} or fewer scan.pulses_per_line"),
             Stage::Estimates | Stage::Errors | Stage::Retrieval | Stage::Files => {
-                "a larger scan.elevation_step_rad, estimator.gate_step_samples or estimator.window_step_samples"
+                format!("{lines}, estimator.gate_step_samples or estimator.window_step_samples")
             }
-            _ => "a larger scan.elevation_step_rad or a smaller scan.range_max_m",
-        })
+            _ => format!("{lines} or a smaller scan.range_max_m"),
+        }
     }
 
     /// Whether the memory for the Cramer-Rao bound of the scene is there: matrices of a record's samples by as many.
@@ -54,7 +70,7 @@ impl Plan {
     /// As [`Plan::fits`].
     pub fn bound_fits_in(&self, available_bytes: f64) -> Result<(), Error> {
         let stages = of_bound(&self.stages, &Sizes::new(&self.scene.scene, self.target, &self.geometry));
-        self.hold(&stages, available_bytes, |_| "fewer estimator.window_samples")
+        self.hold(&stages, available_bytes, |_| "fewer estimator.window_samples".into())
     }
 
     /// Holds the memory of some stages against what is available; `smaller` says what makes a stage smaller.
@@ -62,13 +78,13 @@ impl Plan {
         &self,
         stages: &[PlannedStage],
         available_bytes: f64,
-        smaller: impl Fn(Stage) -> &'static str,
+        smaller: impl Fn(Stage) -> String,
     ) -> Result<(), Error> {
         let Forecast { memory_bytes, largest, .. } = total(stages);
         if memory_bytes <= SHARE * available_bytes {
             return Ok(());
         }
-        let remedy = largest.map_or("", smaller);
+        let remedy = largest.map(smaller).unwrap_or_default();
         Err(Error::TooLarge {
             needed: bytes(memory_bytes),
             available: bytes(available_bytes),
@@ -81,7 +97,6 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::Target;
     use crate::scene::SceneFile;
 
     fn plan(text: &str) -> Plan {
@@ -96,6 +111,15 @@ mod tests {
         assert!(refused.contains("--allow-large"), "{refused}");
         assert!(refused.contains("a larger scan.elevation_step_rad"), "{refused}");
         plan(&text.replace("1.1e-5", "1.1e-3")).fits_in(2e10).unwrap();
+        // The keys are those of the pattern and of the sampling.
+        let of = |text: &str| plan(text).fits_in(1e6).unwrap_err().to_string();
+        let around = of("[scan.pattern]\nkind = \"ppi\"\n");
+        assert!(around.contains("scan.pattern.azimuth_step_rad") && !around.contains("elevation_step"), "{around}");
+        let screens = "[scan]\nelevation_max_rad = 0.01\n[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-14\nsampling = ";
+        let derived = of(&format!("{screens}\"derived\"\n"));
+        assert!(derived.contains("phase screens") && derived.contains("profile_range_max_m"), "{derived}");
+        let explicit = of(&format!("{screens}\"explicit\"\ngrid_points = 1024\nlayers = 12\n"));
+        assert!(explicit.contains("grid_points"), "{explicit}");
     }
 
     #[test]
