@@ -2,6 +2,7 @@
 
 use super::Begin;
 use super::case::{FileFormat, Output};
+use super::forecast::FileForecast;
 use super::shared::{agree, commit};
 use super::wake::{self, Due};
 use crate::Error;
@@ -19,9 +20,59 @@ pub(super) const CASE: &str = "case.toml";
 /// The table of the steps.
 const STEPS: &str = "steps.csv";
 
-fn numbered(stem: &str, index: usize, extension: &str) -> String {
-    format!("{stem}_{:04}.{extension}", index + 1)
+/// What a file of an output holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Holds {
+    /// The field at the centres of the cells.
+    Field,
+    /// The velocities on their faces.
+    Faces,
+    /// The plane of this number.
+    Plane(usize),
+    /// The names of all files with the same beginning up to this one.
+    Collection { of_planes: bool },
 }
+
+/// A file of an output.
+#[derive(Debug, Clone, PartialEq)]
+struct OutputFile {
+    stem: String,
+    /// Number of the output, from 0.
+    index: usize,
+    ending: &'static str,
+    holds: Holds,
+}
+
+impl OutputFile {
+    fn name(&self) -> String {
+        match self.holds {
+            Holds::Collection { .. } => format!("{}.{}", self.stem, self.ending),
+            _ => numbered(&self.stem, self.index, self.ending),
+        }
+    }
+
+    /// Its size, about, of a flow of so many cells \[bytes\].
+    fn bytes(&self, cells: f64, plane: f64, variables: f64) -> f64 {
+        match (self.holds, self.ending) {
+            (Holds::Collection { .. }, _) => 0.0,
+            (Holds::Field, "csv") => cells * CSV_CELL_BYTES,
+            (Holds::Field, _) => cells * variables * 4.0,
+            (Holds::Faces, _) => cells * 24.0,
+            (Holds::Plane(_), "csv") => plane * CSV_PLANE_BYTES,
+            (Holds::Plane(_), _) => plane * 8.0,
+        }
+    }
+}
+
+fn numbered(stem: &str, index: usize, ending: &str) -> String {
+    format!("{stem}_{:04}.{ending}", index + 1)
+}
+
+/// Row of a field as a table, of a plane, of `steps.csv`, of a record of a wake but for its centres \[bytes\].
+const CSV_CELL_BYTES: f64 = 140.0;
+const CSV_PLANE_BYTES: f64 = 90.0;
+const STEP_ROW_BYTES: f64 = 220.0;
+const RECORD_BYTES: f64 = 2500.0;
 
 /// The plan of the files.
 #[derive(Debug)]
@@ -40,6 +91,33 @@ pub(super) struct Files {
 }
 
 impl Files {
+    /// The files of an output, in the order in which they are written; those of a format that this build lacks were refused.
+    fn of_output(&self, due: Due) -> Vec<OutputFile> {
+        let mut out = Vec::new();
+        let mut add = |stem: &str, index: usize, format: FileFormat, holds: Holds| {
+            let mut file = |stem: &str, ending, holds| out.push(OutputFile { stem: stem.into(), index, ending, holds });
+            match format {
+                FileFormat::Csv => file(stem, "csv", holds),
+                FileFormat::Netcdf => file(stem, "nc", holds),
+                FileFormat::InitialNetcdf => file("initial", "nc", Holds::Faces),
+                FileFormat::Vtr => {
+                    file(stem, "vtr", holds);
+                    file(stem, "pvd", Holds::Collection { of_planes: holds != Holds::Field });
+                }
+            }
+        };
+        if let Some(index) = due.fields {
+            self.output.fields.iter().for_each(|format| add("fields", index, *format, Holds::Field));
+        }
+        if let Some(index) = due.planes {
+            for number in 0..self.output.planes_x_m.len() {
+                let stem = format!("plane{}", number + 1);
+                self.output.planes.iter().for_each(|format| add(&stem, index, *format, Holds::Plane(number)));
+            }
+        }
+        out
+    }
+
     /// Names of all files of a run, but for its checkpoints.
     pub(super) fn names(&self, due: &[Due], is_wake: bool) -> Vec<String> {
         let mut out = vec![CASE.to_owned()];
@@ -49,23 +127,36 @@ impl Files {
             #[cfg(feature = "plots")]
             out.extend(wake::PICTURES.map(str::to_owned));
         }
-        let mut add = |stem: &str, index: usize, format: FileFormat| match format {
-            FileFormat::Csv => out.push(numbered(stem, index, "csv")),
-            FileFormat::Netcdf => out.push(numbered(stem, index, "nc")),
-            FileFormat::Vtr => {
-                out.push(numbered(stem, index, "vtr"));
-                out.push(format!("{stem}.pvd"));
-            }
-            FileFormat::InitialNetcdf => out.push(numbered("initial", index, "nc")),
+        out.extend(due.iter().flat_map(|due| self.of_output(*due)).map(|file| file.name()));
+        out
+    }
+
+    /// Number and size of the files of a run of so many steps, those of all outputs together.
+    pub(super) fn forecast(
+        &self,
+        due: &[Due],
+        cells: [usize; 3],
+        steps: f64,
+        writes_checkpoints: bool,
+    ) -> Vec<FileForecast> {
+        let [nx, ny, nz] = cells.map(|n| n as f64);
+        let variables = if self.with_vorticity { 5.0 } else { 4.0 };
+        let mut out: Vec<FileForecast> = Vec::new();
+        let mut add = |name: &str, count: usize, bytes: f64| match out.iter_mut().find(|kind| kind.name == name) {
+            Some(kind) => (kind.count, kind.bytes) = (kind.count + count, kind.bytes + bytes),
+            None if count > 0 => out.push(FileForecast { name: name.into(), count, bytes }),
+            None => {}
         };
-        for due in due {
-            for (index, format) in due.fields.iter().flat_map(|i| self.output.fields.iter().map(move |f| (*i, *f))) {
-                add("fields", index, format);
-            }
-            for (index, format) in due.planes.iter().flat_map(|i| self.output.planes.iter().map(move |f| (*i, *f))) {
-                (1..=self.output.planes_x_m.len()).for_each(|n| add(&format!("plane{n}"), index, format));
-            }
+        for file in due.iter().flat_map(|due| self.of_output(*due)) {
+            let stem = if matches!(file.holds, Holds::Plane(_)) { "plane*" } else { &file.stem };
+            let bytes = file.bytes(nx * ny * nz, ny * nz, variables);
+            add(&format!("{stem}_*.{}", file.ending), usize::from(bytes > 0.0), bytes);
         }
+        add(STEPS, usize::from(self.output.steps), steps * STEP_ROW_BYTES);
+        let histories = if cfg!(feature = "netcdf") { 2 } else { 1 };
+        let records = due.iter().filter(|due| due.record).count() as f64;
+        add("wake.*", if self.with_vorticity { histories } else { 0 }, records * (RECORD_BYTES + 40.0 * nx));
+        add("flow.checkpoint*", if writes_checkpoints { 2 } else { 0 }, 2.0 * 7.0 * 8.0 * nx * ny * nz);
         out
     }
 
@@ -83,15 +174,12 @@ impl Files {
     pub(super) fn write(&self, flow: &Flow, due: Due, ranks: &Arc<dyn Ranks>) -> Result<Vec<PathBuf>, Error> {
         let is_first = ranks.rank() == 0;
         let shown = agree(ranks, self.shown(flow, due, ranks))?;
-        let mut group = FileGroup::new(&self.folder);
-        let mut rows = Vec::new();
+        let (mut group, mut rows) = (FileGroup::new(&self.folder), Vec::new());
         let mut add = || {
-            if let Some(index) = due.fields {
-                self.add_fields(&mut group, &mut rows, &shown, index)?;
-            }
-            if let Some(index) = due.planes {
-                for (number, plane) in shown.planes.iter().enumerate() {
-                    self.add_plane(&mut group, plane, index, &format!("plane{}", number + 1), is_first)?;
+            for file in self.of_output(due) {
+                match self.parts(&file, &shown, is_first)? {
+                    Some(parts) => group.add_parts(&file.name(), parts)?,
+                    None => rows.push((file.name(), self.rows(&shown)?)),
                 }
             }
             Ok(())
@@ -129,89 +217,60 @@ impl Files {
         })
     }
 
-    /// Adds the fields to the group, or as texts whose places in their files are not known yet.
-    #[cfg_attr(
-        not(any(feature = "netcdf", feature = "vtk")),
-        expect(unused_variables, reason = "texts are not in the group")
-    )]
-    fn add_fields(
-        &self,
-        group: &mut FileGroup,
-        rows: &mut Vec<(String, String)>,
-        shown: &Shown,
-        index: usize,
-    ) -> Result<(), Error> {
-        let name = |extension: &str| numbered("fields", index, extension);
-        if let Some(field) = &shown.field {
-            for format in &self.output.fields {
-                match format {
-                    FileFormat::Csv => {
-                        let table = field.table()?;
-                        let text = if field.share.is_first { table.to_csv(&self.origin)? } else { table.rows()? };
-                        rows.push((name("csv"), text));
-                    }
-                    #[cfg(feature = "netcdf")]
-                    FileFormat::Netcdf => {
-                        group.add_parts(&name("nc"), crate::io::cf_fields::cf_field_parts(field, &self.origin)?)?;
-                    }
-                    #[cfg(feature = "vtk")]
-                    FileFormat::Vtr => {
-                        let file = crate::io::vtr::field_parts(field, shown.behind.as_deref(), &self.origin)?;
-                        group.add_parts(&name("vtr"), file)?;
-                        let collection = self.collection("fields", index, &self.times_s[0], 1.0);
-                        group.add_parts("fields.pvd", of_first(collection, field.share.is_first))?;
-                    }
-                    // A case that names a format which this build lacks was refused.
-                    _ => {}
-                }
+    /// What this rank has of a file; none of the table of a field, in which the place of its text is not known yet.
+    fn parts(&self, file: &OutputFile, shown: &Shown, is_first: bool) -> Result<Option<FileParts>, Error> {
+        // What all ranks have the first one writes.
+        let whole = |bytes: Vec<u8>| {
+            let length = bytes.len() as u64;
+            Some(FileParts { length, parts: if is_first { vec![(0, bytes)] } else { Vec::new() } })
+        };
+        Ok(match (file.holds, file.ending) {
+            #[cfg(feature = "netcdf")]
+            (Holds::Field, "nc") => shown
+                .field
+                .as_ref()
+                .map(|field| crate::io::cf_fields::cf_field_parts(field, &self.origin))
+                .transpose()?,
+            #[cfg(feature = "vtk")]
+            (Holds::Field, "vtr") => {
+                let parts = |field| crate::io::vtr::field_parts(field, shown.behind.as_deref(), &self.origin);
+                shown.field.as_ref().map(parts).transpose()?
             }
-        }
-        #[cfg(feature = "netcdf")]
-        if let Some(faces) = &shown.faces {
-            let file = crate::io::cf_fields::cf_faces_parts(faces, &self.origin)?;
-            group.add_parts(&numbered("initial", index, "nc"), file)?;
-        }
-        Ok(())
+            #[cfg(feature = "netcdf")]
+            (Holds::Faces, _) => shown
+                .faces
+                .as_ref()
+                .map(|faces| crate::io::cf_fields::cf_faces_parts(faces, &self.origin))
+                .transpose()?,
+            (Holds::Plane(number), "csv") => {
+                whole(tables::planes_table(&shown.planes[number])?.to_csv(&self.origin)?.into_bytes())
+            }
+            #[cfg(feature = "netcdf")]
+            (Holds::Plane(number), "nc") => {
+                whole(crate::io::cf_planes::cf_planes_bytes(&shown.planes[number], &self.origin)?)
+            }
+            #[cfg(feature = "vtk")]
+            (Holds::Plane(number), "vtr") => whole(crate::io::vtr::plane_file(&shown.planes[number], &self.origin)?),
+            #[cfg(feature = "vtk")]
+            (Holds::Collection { of_planes }, _) => whole(self.collection(file, of_planes)),
+            _ => None,
+        })
     }
 
-    fn add_plane(
-        &self,
-        group: &mut FileGroup,
-        plane: &CrossPlanes,
-        index: usize,
-        stem: &str,
-        is_first: bool,
-    ) -> Result<(), Error> {
-        let mut add = |name: &str, bytes: Vec<u8>| group.add_parts(name, of_first(bytes, is_first));
-        for format in &self.output.planes {
-            match format {
-                FileFormat::Csv => {
-                    let table = tables::planes_table(plane)?.to_csv(&self.origin)?;
-                    add(&numbered(stem, index, "csv"), table.into_bytes())?;
-                }
-                #[cfg(feature = "netcdf")]
-                FileFormat::Netcdf => {
-                    let bytes = crate::io::cf_planes::cf_planes_bytes(plane, &self.origin)?;
-                    add(&numbered(stem, index, "nc"), bytes)?;
-                }
-                #[cfg(feature = "vtk")]
-                FileFormat::Vtr => {
-                    let bytes = crate::io::vtr::plane_file(plane, &self.origin)?;
-                    add(&numbered(stem, index, "vtr"), bytes)?;
-                    add(&format!("{stem}.pvd"), self.collection(stem, index, &self.times_s[1], self.tau_per_s))?;
-                }
-                _ => {}
-            }
-        }
-        Ok(())
+    /// The rows of the field that this rank has, on the first one below their names.
+    fn rows(&self, shown: &Shown) -> Result<String, Error> {
+        let Some(field) = &shown.field else { return Ok(String::new()) };
+        let table = field.table()?;
+        Ok(if field.share.is_first { table.to_csv(&self.origin)? } else { table.rows()? })
     }
 
     /// The collection of all outputs up to this one.
     #[cfg(feature = "vtk")]
-    fn collection(&self, stem: &str, index: usize, times_s: &[f64], per_s: f64) -> Vec<u8> {
-        let names: Vec<String> = (0..=index).map(|i| numbered(stem, i, "vtr")).collect();
-        let members = times_s.iter().map(|t| t * per_s).zip(names.iter().map(String::as_str));
-        crate::io::vtr::pvd_bytes(members, &self.origin)
+    fn collection(&self, file: &OutputFile, of_planes: bool) -> Vec<u8> {
+        let names: Vec<String> = (0..=file.index).map(|i| numbered(&file.stem, i, "vtr")).collect();
+        let per_s = if of_planes { self.tau_per_s } else { 1.0 };
+        let members = self.times_s[usize::from(of_planes)].iter().map(|t| t * per_s);
+        crate::io::vtr::pvd_bytes(members.zip(names.iter().map(String::as_str)), &self.origin)
     }
 
     fn field(&self, flow: &Flow, share: Share) -> Result<VelocityField, Error> {
@@ -289,12 +348,6 @@ struct Shown {
     #[cfg(feature = "netcdf")]
     faces: Option<crate::io::cf_fields::FaceVelocities>,
     planes: Vec<CrossPlanes>,
-}
-
-/// A file that the first rank writes alone.
-fn of_first(bytes: Vec<u8>, is_first: bool) -> FileParts {
-    let length = bytes.len() as u64;
-    FileParts { length, parts: if is_first { vec![(0, bytes)] } else { Vec::new() } }
 }
 
 /// Values of a field in the first cell of the next rank that has any.

@@ -78,13 +78,10 @@ impl FlowForecast {
             TimeScheme::AdamsBashforth2 => (Scheme::AdamsBashforth2, 1.0),
             TimeScheme::RungeKutta3 => (Scheme::RungeKutta3, 3.0),
         };
-        let model = if case.solver.subgrid == (Subgrid::None {}) { 0.0 } else { MODEL_S };
         let matrices: f64 = dense.iter().map(|n| *n as f64).sum();
         let start_s: f64 = dense.iter().map(|n| (*n as f64).powi(3) * EIGEN_S).sum();
-        // In the plane a velocity and the transforms along x are left out.
-        let (cell_s, multigrid_s) = if cells[0] == 1 { PLANE_S } else { SPACE_S };
-        let multigrid_s = if setup.settings.pressure.is_multigrid(&setup.mesh) { multigrid_s } else { 0.0 };
-        let pass_s = count(cells) * (cell_s + model + multigrid_s + matrices * MATRIX_S);
+        let cell_s = CELL_S[usize::from(setup.settings.pressure.is_multigrid(&setup.mesh))];
+        let pass_s = count(cells) * (cell_s + matrices * MATRIX_S);
         Self {
             case_hash: file.hash.clone(),
             cells,
@@ -106,7 +103,7 @@ impl FlowForecast {
             memory_bytes: memory_bytes(case, [cells; 2], &dense),
             ranks: setup.settings.ranks.count(),
             rank_bytes: rank_bytes(case, setup, &dense),
-            files: file_forecasts(case, files, schedule, cells, steps),
+            files: files.forecast(&schedule.due, cells, steps, case.checkpoint.write),
         }
     }
 
@@ -124,10 +121,7 @@ impl fmt::Display for FlowForecast {
         let age =
             if self.end_tau == self.end_s { String::new() } else { format!(", tau = {:?}", rounded(self.end_tau)) };
         writeln!(f, "  end      t = {:?} s{age}", rounded(self.end_s))?;
-        let scheme = match self.scheme {
-            Scheme::AdamsBashforth2 => "adams_bashforth2",
-            Scheme::RungeKutta3 => "runge_kutta3",
-        };
+        let scheme = self.scheme.name();
         let reason = self.scheme_reason.as_ref().map_or(String::new(), |reason| format!(", {reason}"));
         writeln!(f, "  steps    about {:.0} of {:.3e} s, {scheme}{reason}", self.steps, self.step_s)?;
         if self.damped_courant.is_finite() {
@@ -211,22 +205,14 @@ pub(super) fn refuse_too_large(
     Err(Error::TooLarge { needed: bytes(needed), available: bytes(available), stage, remedy })
 }
 
-/// Cells in the same proportions that fit.
+/// Cells in the same proportions that fit, two digits of each, rounded down. Nothing grows faster than the cube of a direction.
 fn fitting(case: &FlowCase, cells: [usize; 3], dense: &[usize], available_bytes: f64) -> [usize; 3] {
-    let scaled = |factor: f64| cells.map(|n| if n == 1 { 1 } else { ((n as f64 * factor) as usize).max(4) });
-    let fits = |factor: f64| {
-        let dense: Vec<usize> = dense.iter().map(|n| (*n as f64 * factor) as usize).collect();
-        memory_bytes(case, [scaled(factor); 2], &dense) <= available_bytes
-    };
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if fits(middle) { low = middle } else { high = middle }
-    }
-    // Two digits, rounded down.
-    scaled(low).map(|n| {
-        let unit = 10_usize.pow(n.max(1).ilog10().saturating_sub(1));
-        n / unit * unit
+    let varying = cells.iter().filter(|n| **n > 1).count().max(1) as f64;
+    let share = (available_bytes - PROGRAM_BYTES).max(0.0) / (memory_bytes(case, [cells; 2], dense) - PROGRAM_BYTES);
+    cells.map(|n| {
+        let most = if n == 1 { 1 } else { ((n as f64 * share.powf(1.0 / varying)) as usize).max(4) };
+        let unit = 10_usize.pow(most.ilog10().saturating_sub(1));
+        most / unit * unit
     })
 }
 
@@ -242,7 +228,8 @@ fn memory_bytes(case: &FlowCase, [cells, whole]: [[usize; 3]; 2], dense: &[usize
         CaseKind::Free(free) if free.starts_from_file() => 3.0,
         _ => 0.0,
     };
-    let outputs = case.output.fields.iter().map(|format| output_arrays(*format)).fold(0.0, f64::max);
+    let of_output = |format: &FileFormat| if *format == FileFormat::Csv { CSV_ARRAYS } else { OUTPUT_ARRAYS };
+    let outputs = case.output.fields.iter().map(of_output).fold(0.0, f64::max);
     let meter = if matches!(case.case, CaseKind::Wake(_)) { METER_ARRAYS } else { 0.0 };
     let rotational = f64::from(u8::from(case.solver.rotational));
     // At the start the given field, which every rank has whole; in the first step of Adams-Bashforth its terms; later what is written.
@@ -267,89 +254,25 @@ fn matrix_bytes(n: usize) -> f64 {
     6.0 * 8.0 * (n as f64).powi(2)
 }
 
-/// Arrays that an output of the whole field needs while it is written.
-fn output_arrays(format: FileFormat) -> f64 {
-    match format {
-        FileFormat::Csv => 28.0,
-        FileFormat::Netcdf | FileFormat::Vtr => 10.0,
-        FileFormat::InitialNetcdf => 10.0,
-    }
-}
-
-fn file_forecasts(
-    case: &FlowCase,
-    files: &Files,
-    schedule: &Schedule,
-    cells: [usize; 3],
-    steps: f64,
-) -> Vec<FileForecast> {
-    let all = count(cells);
-    let plane = cells[1] as f64 * cells[2] as f64;
-    let due = |of: fn(&super::wake::Due) -> bool| schedule.due.iter().filter(|due| of(due)).count();
-    let [fields, planes] = [due(|due| due.fields.is_some()), due(|due| due.planes.is_some())];
-    let mut out = Vec::new();
-    let mut add = |name: String, count: usize, bytes: f64| {
-        if count > 0 {
-            out.push(FileForecast { name, count, bytes });
-        }
-    };
-    let variables = if files.with_vorticity { 5.0 } else { 4.0 };
-    for format in &case.output.fields {
-        let (name, each) = match format {
-            FileFormat::Csv => ("fields_*.csv", all * CSV_CELL_BYTES),
-            FileFormat::Netcdf => ("fields_*.nc", all * variables * 4.0),
-            FileFormat::Vtr => ("fields_*.vtr", all * variables * 4.0),
-            FileFormat::InitialNetcdf => ("initial_*.nc", all * 24.0),
-        };
-        add(name.into(), fields, fields as f64 * each);
-    }
-    let positions = files.output.planes_x_m.len();
-    for format in case.output.planes.iter().filter(|_| positions > 0) {
-        let (end, each) = match format {
-            FileFormat::Csv => ("csv", plane * CSV_PLANE_BYTES),
-            _ => ("nc", plane * 8.0),
-        };
-        let end = if *format == FileFormat::Vtr { "vtr" } else { end };
-        add(format!("plane*_*.{end}"), planes * positions, (planes * positions) as f64 * each);
-    }
-    if case.output.steps {
-        add("steps.csv".into(), 1, steps * STEP_ROW_BYTES);
-    }
-    if case.wake.is_some() {
-        let records = due(|due| due.record);
-        let histories = if cfg!(feature = "netcdf") { 2 } else { 1 };
-        add("wake.*".into(), histories, records as f64 * (RECORD_BYTES + 40.0 * cells[0] as f64));
-    }
-    if case.checkpoint.write {
-        add("flow.checkpoint*".into(), 2, 2.0 * 7.0 * 8.0 * all);
-    }
-    out
-}
-
 /// Arrays of a flow: velocity, history, pressure; the velocity before the projection, the increment; two of the refinement.
 const FLOW_ARRAYS: f64 = 13.0;
 /// Arrays that the first step of Adams-Bashforth needs.
 const FIRST_STEP_ARRAYS: f64 = 3.0;
+/// Arrays that an output of the whole field needs while it is written, as a table or else.
+const CSV_ARRAYS: f64 = 28.0;
+const OUTPUT_ARRAYS: f64 = 10.0;
 /// Arrays that the record of a wake needs.
 const METER_ARRAYS: f64 = 4.0;
 /// The program without a flow \[bytes\].
 const PROGRAM_BYTES: f64 = 1.5e7;
-/// Row of a field as a table, of a plane, of `steps.csv`, of a record of a wake but for its centres \[bytes\].
-const CSV_CELL_BYTES: f64 = 140.0;
-const CSV_PLANE_BYTES: f64 = 90.0;
-const STEP_ROW_BYTES: f64 = 220.0;
-const RECORD_BYTES: f64 = 2500.0;
-
 /// Planes of a halo.
 const HALO_PLANES: usize = 4;
 /// Parts of a run in which the step of a wake is taken as constant.
 const SPREADING_PARTS: usize = 100;
 
-// Unit costs on one core: a cell of one stage of a step and what the passes of multigrid add to it, in the plane and in space;
-// the subgrid model, a cell of a dense direction, the eigenvectors.
-const PLANE_S: (f64, f64) = (0.9e-7, 0.4e-7);
-const SPACE_S: (f64, f64) = (1.1e-7, 1.6e-7);
-const MODEL_S: f64 = 5.0e-8;
+// Unit costs on one core, good to a factor of two: a cell of one stage of a step without and with multigrid; a cell of a dense
+// direction, the eigenvectors.
+const CELL_S: [f64; 2] = [1.2e-7, 2.2e-7];
 const MATRIX_S: f64 = 1.5e-10;
 const EIGEN_S: f64 = 5e-9;
 

@@ -2,53 +2,48 @@
 
 use super::setup::{Initial, Setup};
 use crate::Error;
-use crate::keys::Checker;
-use crate::scene::{VortexProfile, section};
-use serde::{Deserialize, Serialize};
+use crate::keys::{ABOVE_ZERO, Checker, FINITE, Is, ZERO_OR_MORE, keys};
+use crate::scene::VortexProfile;
 use std::path::Path;
 use wakescope_les::solver::Ends;
 use wakescope_les::{
     Direction, FlowSettings, Ground, Mapping, Mesh, Motion, TimeScheme, TimeStep, VortexPair, Wall, Wind,
 };
 
-/// How the cells of a direction are spread.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MappingName {
-    /// Equal cells.
-    Uniform,
-    /// Finer and coarser by a sine; `stretch` is its amplitude, -1 to 1.
-    Sine,
-    /// Fine at the low end.
-    TanhLow,
-    /// Fine at the high end.
-    TanhHigh,
-    /// Fine at both ends.
-    TanhBoth,
-    /// Fine in the middle.
-    SinhMiddle,
-    /// Fine about `place`, for periodic directions: the finest cell is `exp(-stretch)` times the mean.
-    Cluster,
-}
+keys! {
+    /// How the cells of a direction are spread.
+    choice MappingName {
+        /// Equal cells.
+        Uniform = "uniform",
+        /// Finer and coarser by a sine; `stretch` is its amplitude, -1 to 1.
+        Sine = "sine",
+        /// Fine at the low end.
+        TanhLow = "tanh_low",
+        /// Fine at the high end.
+        TanhHigh = "tanh_high",
+        /// Fine at both ends.
+        TanhBoth = "tanh_both",
+        /// Fine in the middle.
+        SinhMiddle = "sinh_middle",
+        /// Fine about `place`, for periodic directions: the finest cell is `exp(-stretch)` times the mean.
+        Cluster = "cluster",
+    }
 
-/// What bounds a direction at one end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EndName {
-    /// The flow repeats itself; both ends must say so.
-    Periodic,
-    /// A frictionless plane.
-    Slip,
-    /// A wall to which the air sticks.
-    NoSlip,
-}
+    /// What bounds a direction at one end.
+    choice EndName {
+        /// The flow repeats itself; both ends must say so.
+        Periodic = "periodic",
+        /// A frictionless plane.
+        Slip = "slip",
+        /// A wall to which the air sticks.
+        NoSlip = "no_slip",
+    }
 
-section! {
     /// One direction of the mesh.
     #[derive(Copy)]
-    Axis {
+    table Axis {
         /// Number of cells; 1 if nothing varies.
-        cells: usize = 1,
+        cells: usize = 1 => 1..=100_000,
         /// Position of the low end \[m\].
         low_m: f64 = 0.0,
         /// Position of the high end \[m\].
@@ -58,7 +53,6 @@ section! {
         /// Strength of the mapping, or amplitude of the sine.
         stretch: f64 = 0.0,
         /// Where a cluster is finest, as a fraction of the length.
-        #[serde(skip_serializing_if = "Option::is_none")]
         place: Option<f64> = None,
         /// What bounds it at the low end.
         low_end: EndName = EndName::Periodic,
@@ -69,50 +63,47 @@ section! {
         /// Velocity of a no-slip wall at the high end \[m/s\].
         high_velocity_m_s: [f64; 3] = [0.0; 3],
     }
-}
 
-/// The field that the flow starts from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum InitialName {
-    /// The same velocity everywhere.
-    Uniform {
-        /// Velocity `(u, v, w)` \[m/s\].
-        velocity_m_s: [f64; 3],
-    },
-    /// The analytic vortex pair with its images below the ground.
-    VortexPair(InitialPair),
-    /// Velocities `u`, `v`, `w` of a classic NetCDF file, each on its own axes, which need not be those of the mesh.
-    Netcdf {
-        /// The file; a relative path counts from the case file.
-        path: String,
-    },
-}
+    /// The field that the flow starts from.
+    kinds InitialName by "kind" {
+        /// The same velocity everywhere.
+        "uniform" => Uniform {
+            /// Velocity `(u, v, w)` \[m/s\].
+            velocity_m_s: [f64; 3] => FINITE,
+        },
+        /// The analytic vortex pair with its images below the ground.
+        "vortex_pair" => VortexPair(InitialPair),
+        /// Velocities `u`, `v`, `w` of a classic NetCDF file, each on its own axes, which need not be those of the mesh.
+        "netcdf" => Netcdf {
+            /// The file; a relative path counts from the case file.
+            path: String => Is(
+                |_: &String| cfg!(feature = "netcdf"),
+                "absent: this build lacks the feature `netcdf`",
+            ),
+        },
+    }
 
-section! {
     /// A vortex pair in still air or a cross wind.
     #[derive(Copy)]
-    InitialPair {
+    table InitialPair {
         /// Circulation of each vortex \[m^2/s\].
-        circulation_m2_s: f64 = 500.0,
+        circulation_m2_s: f64 = 500.0 => ABOVE_ZERO,
         /// Distance between the vortices \[m\].
-        spacing_m: f64 = 47.0,
+        spacing_m: f64 = 47.0 => ABOVE_ZERO,
         /// Core radius \[m\].
-        core_radius_m: f64 = 4.7,
+        core_radius_m: f64 = 4.7 => ABOVE_ZERO,
         /// Position of the midpoint of the pair \[m\].
-        lateral_position_m: f64 = 0.0,
+        lateral_position_m: f64 = 0.0 => FINITE,
         /// Height \[m\].
-        height_m: f64 = 47.0,
+        height_m: f64 = 47.0 => ABOVE_ZERO,
         /// Circulation against radius.
         profile: VortexProfile = VortexProfile::Algebraic,
         /// Uniform cross wind \[m/s\].
-        cross_wind_m_s: f64 = 0.0,
+        cross_wind_m_s: f64 = 0.0 => FINITE,
     }
-}
 
-section! {
     /// A flow of one's own.
-    Free {
+    table Free {
         /// Direction x, along the flight.
         x: Axis = Axis::default(),
         /// Direction y, across it.
@@ -122,9 +113,9 @@ section! {
             cells: 48, high_m: 120.0, low_end: EndName::NoSlip, high_end: EndName::Slip, ..Axis::default()
         },
         /// Kinematic viscosity \[m^2/s\].
-        viscosity_m2_s: f64 = 0.1,
+        viscosity_m2_s: f64 = 0.1 => ZERO_OR_MORE,
         /// Body force per mass along x, y, z \[m/s^2\].
-        force_m_s2: [f64; 3] = [0.0; 3],
+        force_m_s2: [f64; 3] = [0.0; 3] => FINITE,
         /// The field that the flow starts from.
         initial: InitialName = InitialName::VortexPair(InitialPair::default()),
     }
@@ -133,7 +124,6 @@ section! {
 impl Axis {
     fn check(&self, name: &str, p: &mut Checker<'_>) {
         let key = |field: &str| format!("case.{name}.{field}");
-        p.cells(&key("cells"), &[self.cells]);
         let ordered = self.low_m.is_finite() && self.high_m.is_finite() && self.high_m > self.low_m;
         p.require(ordered, &key("high_m"), self.high_m, "finite, above low_m");
         match self.mapping {
@@ -204,26 +194,6 @@ impl Free {
     pub(super) fn check(&self, p: &mut Checker<'_>) {
         for (name, axis) in [("x", self.x), ("y", self.y), ("z", self.z)] {
             axis.check(name, p);
-        }
-        p.not_negative("case.viscosity_m2_s", self.viscosity_m2_s);
-        p.require(self.force_m_s2.iter().all(|f| f.is_finite()), "case.force_m_s2", self.force_m_s2, "finite");
-        match &self.initial {
-            InitialName::Uniform { velocity_m_s: v } => {
-                p.require(v.iter().all(|v| v.is_finite()), "case.initial.velocity_m_s", v, "finite");
-            }
-            InitialName::VortexPair(pair) => {
-                p.positive("case.initial.circulation_m2_s", pair.circulation_m2_s);
-                p.positive("case.initial.spacing_m", pair.spacing_m);
-                p.positive("case.initial.core_radius_m", pair.core_radius_m);
-                p.positive("case.initial.height_m", pair.height_m);
-                let [y, wind] = [pair.lateral_position_m, pair.cross_wind_m_s];
-                p.require(y.is_finite(), "case.initial.lateral_position_m", y, "finite");
-                p.require(wind.is_finite(), "case.initial.cross_wind_m_s", wind, "finite");
-            }
-            InitialName::Netcdf { path } => {
-                let ok = cfg!(feature = "netcdf");
-                p.require(ok, "case.initial.path", path, "absent: this build lacks the feature `netcdf`");
-            }
         }
     }
 

@@ -1,135 +1,126 @@
 //! The parameters of the flows with known answers.
 
-use crate::keys::Checker;
-use crate::scene::{VortexProfile, section};
-use serde::{Deserialize, Serialize};
+use crate::keys::{ABOVE_ZERO, Checker, FINITE, Is, Number, ZERO_OR_MORE, keys};
+use crate::scene::VortexProfile;
+
 use wakescope_les::cases::{Case, VortexPairCase};
 
-section! {
+/// Strength of the stretching of a mesh.
+pub(super) const STRETCH: Number = Number(|a| (0.0..=20.0).contains(&a), "a number from 0 (equal cells) to 20");
+
+keys! {
     /// `v = sin(2 pi y) cos(2 pi z) exp(-8 pi^2 nu t)` on the unit square.
     #[derive(Copy)]
-    TaylorGreenPlane {
+    table TaylorGreenPlane {
         /// Cells along y and along z.
-        cells: usize = 64,
+        cells: usize = 64 => 1..=100_000,
         /// Amplitudes of the sines that stretch y and z, -1 to 1.
-        stretch: [f64; 2] = [0.4, -0.3],
+        stretch: [f64; 2] = [0.4, -0.3] => Is(
+            |stretch: &[f64; 2]| stretch.iter().all(|a| a.abs() < 1.0),
+            "two numbers between -1 and 1",
+        ),
         /// Kinematic viscosity \[m^2/s\].
-        viscosity_m2_s: f64 = 0.01,
+        viscosity_m2_s: f64 = 0.01 => ZERO_OR_MORE,
     }
-}
 
-section! {
     /// Vortices in the box `2 pi` wide.
     #[derive(Copy)]
-    TaylorGreen {
+    table TaylorGreen {
         /// Cells along each direction.
-        cells: usize = 64,
+        cells: usize = 64 => 1..=100_000,
         /// Reynolds number of unit length and speed.
-        reynolds: f64 = 1600.0,
+        reynolds: f64 = 1600.0 => ABOVE_ZERO,
     }
-}
 
-section! {
     /// Plates at z = -1 and 1.
     #[derive(Copy)]
-    PlateDriven {
+    table PlateDriven {
         /// Cells between the plates.
-        cells: usize = 32,
+        cells: usize = 32 => 1..=100_000,
         /// Strength of the stretching towards the plates; 0 for equal cells.
-        stretch: f64 = 1.5,
+        stretch: f64 = 1.5 => STRETCH,
         /// Kinematic viscosity \[m^2/s\].
-        viscosity_m2_s: f64 = 0.1,
+        viscosity_m2_s: f64 = 0.1 => ABOVE_ZERO,
         /// Share of the steady profile at the start, of Poiseuille's and Couette's flow.
-        initial_share: f64 = 0.0,
+        initial_share: f64 = 0.0 => FINITE,
     }
-}
 
-section! {
     /// A wave of Tollmien and Schlichting, one wave length long, between plates at z = -1 and 1.
     #[derive(Copy)]
-    OrrSommerfeld {
+    table OrrSommerfeld {
         /// Cells along the wave and between the plates.
-        cells: [usize; 2] = [64, 128],
+        cells: [usize; 2] = [64, 128] => 1..=100_000,
         /// Strength of the stretching towards the plates.
-        stretch: f64 = 1.5,
+        stretch: f64 = 1.5 => STRETCH,
         /// Reynolds number of the half height and the centre velocity.
-        reynolds: f64 = 7500.0,
+        reynolds: f64 = 7500.0 => 500.0..=1e6,
         /// Wave number per half height.
-        wave_number: f64 = 1.0,
+        wave_number: f64 = 1.0 => 0.3..=2.0,
         /// Largest `u` of the wave.
-        amplitude: f64 = 1e-4,
+        amplitude: f64 = 1e-4 => FINITE,
     }
-}
 
-section! {
     /// Two shielded vortices in the box `[-1, 1]^2`, running along z.
     #[derive(Copy)]
-    Dipole {
+    table Dipole {
         /// Cells along y and z.
-        cells: [usize; 2] = [384, 384],
+        cells: [usize; 2] = [384, 384] => 1..=100_000,
         /// Strength of the stretching towards the walls.
-        stretch: f64 = 1.5,
+        stretch: f64 = 1.5 => STRETCH,
         /// Strength of the refinement of y about its middle: the finest cell is `exp(-strength)` times the mean where y is
         /// periodic; 0 for equal cells. If absent 0 where y is periodic, else as `stretch`.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        lateral_stretch: Option<f64> = None,
+        lateral_stretch: Option<f64> = None => STRETCH,
         /// Reynolds number.
-        reynolds: f64 = 625.0,
+        reynolds: f64 = 625.0 => ABOVE_ZERO,
         /// Whether walls stand at the sides too; else y is periodic.
         closed_sides: bool = false,
     }
-}
 
-section! {
     /// The unit square with a moving lid.
     #[derive(Copy)]
-    LidDrivenCavity {
+    table LidDrivenCavity {
         /// Cells along y and along z.
-        cells: usize = 128,
+        cells: usize = 128 => 1..=100_000,
         /// Strength of the stretching towards the walls.
-        stretch: f64 = 1.5,
+        stretch: f64 = 1.5 => STRETCH,
         /// Reynolds number.
-        reynolds: f64 = 1000.0,
+        reynolds: f64 = 1000.0 => ABOVE_ZERO,
     }
-}
 
-section! {
     /// Turbulent flow in a box of `2 pi x pi x 2` half heights.
     #[derive(Copy)]
-    Channel {
+    table Channel {
         /// Cells along x, y, z.
-        cells: [usize; 3] = [96, 96, 96],
+        cells: [usize; 3] = [96, 96, 96] => 1..=100_000,
         /// Strength of the stretching towards the plates.
-        stretch: f64 = 1.8,
+        stretch: f64 = 1.8 => STRETCH,
         /// Reynolds number of the half height and the friction velocity.
-        reynolds_tau: f64 = 180.0,
+        reynolds_tau: f64 = 180.0 => ABOVE_ZERO,
     }
-}
 
-section! {
     /// A vortex pair above ground, lengths in `b0`, velocities in `V0`; time is `tau`. Defaults: the coarse case.
     #[derive(Copy)]
-    VortexPairFlow {
+    table VortexPairFlow {
         /// Cells along x (1 for a plane flow), y, z.
-        cells: [usize; 3] = [24, 128, 80],
+        cells: [usize; 3] = [24, 128, 80] => 1..=100_000,
         /// Length, width and height of the box.
-        size: [f64; 3] = [1.0, 4.0, 2.5],
+        size: [f64; 3] = [1.0, 4.0, 2.5] => ABOVE_ZERO,
         /// Strength of the stretching towards the ground; 0 for equal cells.
-        ground_stretch: f64 = 1.5,
+        ground_stretch: f64 = 1.5 => STRETCH,
         /// Height of both vortices.
         height: f64 = 1.0,
         /// Core radius.
-        core_radius: f64 = 0.1,
+        core_radius: f64 = 0.1 => ABOVE_ZERO,
         /// Circulation against radius.
         profile: VortexProfile = VortexProfile::Algebraic,
         /// `Gamma0/nu`.
-        reynolds: f64 = 5000.0,
+        reynolds: f64 = 5000.0 => ABOVE_ZERO,
         /// The ground: no-slip if true, else a frictionless plane.
         sticky_ground: bool = true,
         /// Whether the sides are frictionless planes instead of periodic.
         slip_sides: bool = false,
         /// Root-mean-square of each component of the perturbation near the vortices.
-        perturbation: f64 = 0.01,
+        perturbation: f64 = 0.01 => ZERO_OR_MORE,
         /// Uniform cross wind.
         cross_wind: f64 = 0.0,
     }
@@ -143,15 +134,8 @@ impl Dipole {
 
 impl VortexPairFlow {
     pub(super) fn check(&self, p: &mut Checker<'_>) {
-        p.cells("case.cells", &self.cells);
-        let ok = self.size.iter().all(|l| l.is_finite() && *l > 0.0);
-        p.require(ok, "case.size", self.size, "three finite numbers above 0");
-        p.stretch("case.ground_stretch", self.ground_stretch);
         let height = self.height;
         p.require(height > 0.0 && height < self.size[2], "case.height", height, "above 0 and below the top");
-        p.positive("case.core_radius", self.core_radius);
-        p.positive("case.reynolds", self.reynolds);
-        p.not_negative("case.perturbation", self.perturbation);
         let still = self.cross_wind == 0.0;
         let wind = self.cross_wind.is_finite() && (still || !self.slip_sides);
         p.require(wind, "case.cross_wind", self.cross_wind, "finite, and 0 between frictionless sides");

@@ -41,7 +41,12 @@ pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<F
 }
 
 fn vetted(document: &Document<'_>, kind: Option<&str>, defaults: &Table) -> Result<Table, SceneError> {
-    static KEYS: LazyLock<Vec<Key>> = LazyLock::new(keys_of::<FlowCase>);
+    static KEYS: LazyLock<Vec<Key>> = LazyLock::new(|| {
+        let mut keys = keys_of::<FlowCase>();
+        // Which flow is no matter of defaults.
+        keys.iter_mut().for_each(|key| key.is_required = key.name == "case");
+        keys
+    });
     let format = Format { keys: &KEYS, defaults, examples: &examples_of(kind) };
     document.vet(&format)
 }

@@ -50,38 +50,4 @@ impl<'s> Checker<'s> {
         }
         ok
     }
-
-    /// Finite and in `[low, high]`.
-    pub(crate) fn within(&mut self, key: &str, value: f64, low: f64, high: f64, unit: &str) -> bool {
-        let ok = value >= low && value <= high && value.is_finite();
-        self.require(ok, key, value, format!("a number from {low:?} to {high:?} {unit}").trim_end())
-    }
-
-    /// A whole number in `[low, high]`.
-    pub(crate) fn count(&mut self, key: &str, value: usize, low: usize, high: usize) -> bool {
-        self.require((low..=high).contains(&value), key, value, format!("a whole number from {low} to {high}"))
-    }
-
-    #[cfg(feature = "flow")]
-    pub(crate) fn positive(&mut self, key: &str, value: f64) {
-        self.require(value.is_finite() && value > 0.0, key, value, "a finite number above 0");
-    }
-
-    #[cfg(feature = "flow")]
-    pub(crate) fn not_negative(&mut self, key: &str, value: f64) {
-        self.require(value.is_finite() && value >= 0.0, key, value, "a finite number, 0 or more");
-    }
-
-    /// Numbers of cells of a mesh.
-    #[cfg(feature = "flow")]
-    pub(crate) fn cells(&mut self, key: &str, cells: &[usize]) {
-        let ok = cells.iter().all(|n| (1..=100_000).contains(n));
-        self.require(ok, key, cells, "whole numbers from 1 to 100000");
-    }
-
-    /// Strength of the stretching of a mesh.
-    #[cfg(feature = "flow")]
-    pub(crate) fn stretch(&mut self, key: &str, value: f64) {
-        self.require((0.0..=20.0).contains(&value), key, value, "a number from 0 (equal cells) to 20");
-    }
 }

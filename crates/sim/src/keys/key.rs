@@ -1,5 +1,7 @@
 //! The description of a key: its name and what it may hold.
 
+use super::declare::Declared;
+
 /// What a key may hold.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Kind {
@@ -32,8 +34,6 @@ pub(crate) enum Kind {
         /// Its values, each with the further keys.
         kinds: Vec<(&'static str, Vec<Key>)>,
     },
-    /// Something else, which is not looked at.
-    Other,
 }
 
 /// A key of a table.
@@ -45,6 +45,18 @@ pub(crate) struct Key {
     pub(crate) kind: Kind,
     /// Whether it has no default.
     pub(crate) is_required: bool,
+}
+
+impl Key {
+    /// A key of a table that has a default for it.
+    pub(crate) fn with_default<T: Declared>(name: &'static str) -> Self {
+        Self { name, kind: T::kind(), is_required: false }
+    }
+
+    /// A key of a table that has none.
+    pub(crate) fn without_default<T: Declared>(name: &'static str) -> Self {
+        Self { name, kind: T::kind(), is_required: !T::IS_OPTIONAL }
+    }
 }
 
 /// The path of a key in the table at `path`.

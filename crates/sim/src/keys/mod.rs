@@ -1,28 +1,27 @@
 //! Reading scenes and case files: every key is held against what it may hold, before anything is made of it.
 //!
-//! What a file may say is asked of the types that it becomes ([`probe`]), so that a new key needs no list of keys. [`vet`]
-//! walks a text beside that description and says of each key that does not fit its path, its line, its value and what is
-//! allowed, with an example. What limits a value alone stands beside its default ([`limit`]); what limits it beside
-//! others is asked for; a [`Checker`] collects both.
+//! What a file may say is declared once, beside the types that it becomes ([`declare`]): names, defaults, and what limits a
+//! value alone ([`limit`]). [`vet`] walks a text beside that declaration and says of each key that does not fit its path, its
+//! line, its value and what is allowed, with an example. What limits a value beside others is asked for; a [`Checker`] collects
+//! both.
 //!
 //! Check: each key of a scene and of every case is given values of the wrong kind; the refusal names that key.
 
 mod checker;
+mod declare;
 mod key;
 mod limit;
-mod offer;
-mod probe;
 mod problem;
 mod source;
 mod vet;
 mod words;
 
 pub(crate) use checker::{Checker, Side};
-#[cfg(any(test, feature = "sweep"))]
-pub(crate) use key::Kind;
-pub(crate) use key::{Key, join};
-pub(crate) use limit::{AboveZeroOrInf, Keys, Limit, Limited, NothingOr};
-pub(crate) use probe::keys_of;
+pub(crate) use declare::{Declared, choice, held, keys, keys_of, kinds, second, table};
+pub(crate) use key::{Key, Kind, join};
+#[cfg(feature = "flow")]
+pub(crate) use limit::{ABOVE_ZERO, FINITE};
+pub(crate) use limit::{ABOVE_ZERO_OR_INF, Is, Limit, NothingOr, Number, ZERO_OR_MORE};
 pub use problem::{Located, Problem, SceneError};
 pub(crate) use source::Source;
 pub(crate) use vet::{Document, Format};

@@ -1,7 +1,6 @@
 //! A text beside the description of its keys: what does not fit, and the table that it stands for.
 
 use super::key::{Key, Kind, join};
-use super::offer::Offer;
 use super::problem::{Located, Problem, SceneError};
 use super::words::{near, one_of, quote, tables_with, wanted};
 use serde::de::DeserializeOwned;
@@ -54,7 +53,7 @@ impl<'a> Document<'a> {
     /// The line of a key, from 1; none if the text does not state it.
     pub(crate) fn line(&self, path: &str) -> Option<usize> {
         // The values of a list stand where it does.
-        let path = path.strip_suffix(']').and_then(|path| path.rsplit_once('[')).map_or(path, |(list, _)| list);
+        let path = if path.ends_with(']') { path.split_once('[')?.0 } else { path };
         find(&self.table, path).map(|(span, _)| line_of(&self.breaks, span.start))
     }
 
@@ -93,7 +92,7 @@ impl<'a> Document<'a> {
     /// # Errors
     /// What the type says that refuses it nevertheless.
     pub(crate) fn read<T: DeserializeOwned>(&self, table: toml::Table) -> Result<T, SceneError> {
-        T::deserialize(Offer::from(table)).map_err(|e| SceneError::Malformed {
+        T::deserialize(table).map_err(|e| SceneError::Malformed {
             path: self.path.to_owned(),
             line: 1,
             message: e.to_string(),
@@ -354,7 +353,7 @@ impl Walk<'_> {
     fn wanted(&self, path: &str, name: &str, kind: &Kind) -> String {
         let what = wanted(name, kind);
         match kind {
-            Kind::Switch | Kind::Choice(_) | Kind::Other => what,
+            Kind::Switch | Kind::Choice(_) => what,
             Kind::Table(keys) => {
                 let inner =
                     keys.first().map(|k| format!("{} = {}", k.name, self.example(&join(path, k.name), &k.kind)));
@@ -376,7 +375,7 @@ impl Walk<'_> {
             Kind::Switch => "true".into(),
             Kind::Choice(names) => format!("\"{}\"", names.first().unwrap_or(&"")),
             Kind::List { of, len } => format!("[{}]", vec![self.example("", of); len.unwrap_or(2)].join(", ")),
-            Kind::Text | Kind::Table(_) | Kind::Tagged { .. } | Kind::Other => "\"name\"".into(),
+            Kind::Text | Kind::Table(_) | Kind::Tagged { .. } => "\"name\"".into(),
         })
     }
 }

@@ -66,7 +66,6 @@ pub(super) fn wanted(key: &str, kind: &Kind) -> String {
             }
         }
         Kind::Table(_) | Kind::Tagged { .. } => "a table".into(),
-        Kind::Other => "another value".into(),
     }
 }
 

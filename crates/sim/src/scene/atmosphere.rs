@@ -1,26 +1,22 @@
 //! Aerosol and refractive turbulence of a scene.
 
-use crate::keys::{AboveZeroOrInf, Checker, Keys, Limited};
-use serde::{Deserialize, Serialize};
+use crate::keys::{ABOVE_ZERO_OR_INF, keys};
 
-section! {
+keys! {
     /// Aerosol and refractive turbulence.
-    Atmosphere {
+    table Atmosphere {
         /// Aerosol backscatter coefficient, 1/(m sr).
         backscatter_per_m_sr: f64 = 1e-7 => 0.0..=1.0,
         /// Extinction coefficient, 1/m, one way.
         extinction_per_m: f64 = 7e-5 => 0.0..=1.0,
         /// Aerosol that changes with range, in place of the two values above.
-        #[serde(skip_serializing_if = "Option::is_none")]
         profile: Option<AirProfile> = None,
         /// Refractive turbulence.
-        turbulence: Turbulence = Turbulence::None {} => Keys,
+        turbulence: Turbulence = Turbulence::None {},
     }
-}
 
-section! {
     /// Aerosol along the lines of sight: straight lines between the ranges, beyond them as at the ends.
-    AirProfile {
+    table AirProfile {
         /// Ranges, m, increasing.
         range_m: Vec<f64> = Vec::new(),
         /// Backscatter coefficient at each, 1/(m sr).
@@ -28,40 +24,27 @@ section! {
         /// Extinction coefficient at each, 1/m, one way.
         extinction_per_m: Vec<f64> = Vec::new(),
     }
-}
 
-/// Which efficiency the pulses have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EfficiencyOfPulse {
-    /// All the mean.
-    Mean,
-    /// Each that of one realisation of the path, in turn.
-    Realisation,
-}
-
-/// Refractive turbulence along the beam.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Turbulence {
-    /// None: the free-space efficiency by quadrature, no phase screens.
-    None {},
-    /// Turbulence of constant strength along the path.
-    Refractive(RefractiveTurbulence),
-}
-
-impl Limited for Turbulence {
-    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
-        if let Self::Refractive(turbulence) = self {
-            turbulence.check_limits(at, c);
-        }
+    /// Which efficiency the pulses have.
+    choice EfficiencyOfPulse {
+        /// All the mean.
+        Mean = "mean",
+        /// Each that of one realisation of the path, in turn.
+        Realisation = "realisation",
     }
-}
 
-section! {
+    /// Refractive turbulence along the beam.
+    #[derive(Copy)]
+    kinds Turbulence by "kind" {
+        /// None: the free-space efficiency by quadrature, no phase screens.
+        "none" => None {},
+        /// Turbulence of constant strength along the path.
+        "refractive" => Refractive(RefractiveTurbulence),
+    }
+
     /// Turbulence of constant strength along the path, and how a Monte Carlo samples it.
     #[derive(Copy)]
-    RefractiveTurbulence {
+    table RefractiveTurbulence {
         /// Structure constant Cn2, m^(-2/3).
         cn2_m_m23: f64 = 1e-15 => 0.0..=1e-9,
         /// Shape of the spectrum.
@@ -69,7 +52,7 @@ section! {
         /// Inner scale l0, m; 0 for none.
         inner_scale_m: f64 = 0.01 => 0.0..=1.0,
         /// Outer scale L0, m; `inf` for none.
-        outer_scale_m: f64 = 1.0 => AboveZeroOrInf,
+        outer_scale_m: f64 = 1.0 => ABOVE_ZERO_OR_INF,
         /// Wave number of the outer scale.
         outer_scale_wavenumber: OuterScaleWavenumber = OuterScaleWavenumber::Inverse,
         /// Who chooses grid and layers of the phase screens.
@@ -85,38 +68,32 @@ section! {
         /// Which efficiency the pulses have.
         efficiency: EfficiencyOfPulse = EfficiencyOfPulse::Mean,
     }
-}
 
-/// Who chooses grid and layers of the phase screens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ScreenSampling {
-    /// The scene; what cannot be resolved is refused, what is doubtful is warned of.
-    Explicit,
-    /// The planner, from beam, turbulence and range.
-    Derived,
-}
+    /// Who chooses grid and layers of the phase screens.
+    choice ScreenSampling {
+        /// The scene; what cannot be resolved is refused, what is doubtful is warned of.
+        Explicit = "explicit",
+        /// The planner, from beam, turbulence and range.
+        Derived = "derived",
+    }
 
-/// Shape of the refractive-index spectrum.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SpectrumKind {
-    /// (17), with outer scale and Gaussian inner scale.
-    VonKarman,
-    /// Kolmogorov: neither scale.
-    Kolmogorov,
-    /// Tatarskii: the inner scale only.
-    Tatarskii,
-    /// Hill's bump near the inner scale, in Andrews' form.
-    HillAndrews,
-}
+    /// Shape of the refractive-index spectrum.
+    choice SpectrumKind {
+        /// (17), with outer scale and Gaussian inner scale.
+        VonKarman = "von_karman",
+        /// Kolmogorov: neither scale.
+        Kolmogorov = "kolmogorov",
+        /// Tatarskii: the inner scale only.
+        Tatarskii = "tatarskii",
+        /// Hill's bump near the inner scale, in Andrews' form.
+        HillAndrews = "hill_andrews",
+    }
 
-/// How the outer scale gives the wave number kappa_0 of (17).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OuterScaleWavenumber {
-    /// 1/L0, as (17) has it.
-    Inverse,
-    /// 2 pi/L0.
-    TwoPiOver,
+    /// How the outer scale gives the wave number kappa_0 of (17).
+    choice OuterScaleWavenumber {
+        /// 1/L0, as (17) has it.
+        Inverse = "inverse",
+        /// 2 pi/L0.
+        TwoPiOver = "two_pi_over",
+    }
 }

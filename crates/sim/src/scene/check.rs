@@ -9,7 +9,7 @@ use super::retrieval::check_retrieval;
 use super::{
     EfficiencyOfPulse, FORMAT, FieldFlow, Flow, PulseShape, Scan, Scene, SnrReference, SpectrumKind, Turbulence,
 };
-use crate::keys::{Checker, Limited, Problem};
+use crate::keys::{Checker, Declared as _, Problem};
 
 impl Scene {
     /// Everything in this scene that cannot be simulated; empty for a good scene.
@@ -21,16 +21,11 @@ impl Scene {
     pub(super) fn problems_where(&self, is_stated: &dyn Fn(&str) -> bool) -> Vec<Problem> {
         let mut c = Checker::new(is_stated);
         c.require(self.format == FORMAT, "format", self.format, format!("{FORMAT}, the format of this program"));
-        // TOML integers are signed 64-bit: a larger seed could not be written back.
-        c.require(self.seed <= i64::MAX as u64, "seed", self.seed, format!("a whole number from 0 to {}", i64::MAX));
         self.check_limits("", &mut c);
         self.check_instrument(&mut c);
         self.check_receiver(&mut c);
         let added = self.added_flows.iter().enumerate().map(|(i, flow)| (format!("added_flows[{i}]"), flow));
         for (at, flow) in std::iter::once(("flow".to_owned(), &self.flow)).chain(added) {
-            if at != "flow" {
-                flow.check_limits(&at, &mut c);
-            }
             check_flow(flow, &at, &mut c);
             if let (Flow::Fields(FieldFlow { backscatter: Some(carried), .. }), SnrReference::Fixed { .. }) =
                 (flow, self.detector.snr)
@@ -39,11 +34,10 @@ impl Scene {
                 c.refuse(&format!("{at}.backscatter.name"), &format!("{:?}", carried.name), allowed);
             }
         }
-        self.check_pattern(&mut c);
+        self.check_head(&mut c);
         check_estimator(self, &mut c);
         check_retrieval(self, &mut c);
         self.check_outputs(&mut c);
-        self.check_site(&mut c);
         // Limits between keys make sense only once each key does.
         if c.is_good() {
             self.check_between(&mut c);
@@ -58,15 +52,7 @@ impl Scene {
             let lists = lists.into_iter().chain((!phase.1.is_empty()).then_some(phase));
             let counts: Vec<(&str, usize)> = lists.map(|(key, list)| (key, list.len())).collect();
             check_lengths(&counts, "pulse.shape", c);
-            for (i, power) in shape.power.iter().enumerate() {
-                let good = power.is_finite() && *power >= 0.0;
-                c.require(good, &format!("pulse.shape.power[{i}]"), power, "a finite number, 0 or more");
-            }
         }
-        let focus_m = self.telescope.focus_m;
-        let focus_ok = !focus_m.is_nan() && focus_m != 0.0 && focus_m != f64::NEG_INFINITY;
-        let allowed = "a distance in m other than 0, or inf for a collimated beam";
-        c.require(focus_ok, "telescope.focus_m", focus_m, allowed);
         if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
             c.require(
                 t.spectrum != SpectrumKind::HillAndrews || t.inner_scale_m > 0.0,

@@ -2,7 +2,6 @@
 //! Check: impossible values are named with what is allowed.
 
 use super::Scene;
-use crate::io::UtcTime;
 use crate::keys::Checker;
 
 impl Scene {
@@ -11,15 +10,6 @@ impl Scene {
         let any = o.csv || o.netcdf || o.hpl || o.svg || o.png;
         let allowed = "true, or else one of csv, netcdf, hpl, svg and png: nothing would be written";
         c.require(any, "outputs.csv", o.csv, allowed);
-    }
-
-    pub(super) fn check_site(&self, c: &mut Checker<'_>) {
-        let site = &self.site;
-        let fits = site.name.chars().count() <= 80 && !site.name.chars().any(char::is_control);
-        c.require(fits, "site.name", &site.name, "one line of at most 80 characters");
-        let is_date = UtcTime::parse(&site.start_utc).is_some();
-        let allowed = format!("a date from 1900 to 2199 like \"{}\"", UtcTime::FORM);
-        c.require(is_date, "site.start_utc", &site.start_utc, allowed);
     }
 
     /// A HALO raw file counts gates from the lidar and knows their length alone.

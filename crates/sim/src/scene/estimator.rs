@@ -1,11 +1,10 @@
 //! From signals to velocities: the estimator of a scene, its method with its own keys, and what all methods share.
 
-use crate::keys::{Checker, Keys, Limit, Limited, join};
-use serde::{Deserialize, Serialize};
+use crate::keys::{Is, Number, keys};
 
-section! {
+keys! {
     /// From signals to velocities.
-    Estimator {
+    table Estimator {
         /// Samples N of a window.
         window_samples: usize = 64 => 4..=65_536,
         /// Weighting h of the window, (29).
@@ -26,105 +25,80 @@ section! {
         follow_wind: bool = false,
         /// Probability that noise alone passes for a signal at a gate; estimates whose peak is not above what noise reaches
         /// that often are flagged. 0: no test.
-        false_alarm: f64 = 0.01,
+        false_alarm: f64 = 0.01 => Number(
+            |rate| rate == 0.0 || (1e-12..=0.5).contains(&rate),
+            "0 for no test, or from 1e-12 to 0.5: the probability that noise passes at a gate, for example 0.01",
+        ),
         /// Which estimator, with the keys that are its own.
-        method: Method = Method::PeriodogramAccumulation {} => Keys,
+        method: Method = Method::PeriodogramAccumulation {},
         /// How the radius depends on range.
-        radius: RegionRadius = RegionRadius::Fixed {} => Keys,
+        radius: RegionRadius = RegionRadius::Fixed {},
     }
-}
 
-/// Which estimator makes the map, with the keys that only it has.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Method {
-    /// Mean periodogram of the pulses of one line at one range, no region.
-    Periodogram {},
-    /// PA: mean periodogram of all windows of the region (Table 3).
-    PeriodogramAccumulation {},
-    /// CA: peak of the autoregressive spectrum of the mean correlogram (Table 3).
-    Autoregressive(ModelOrder),
-    /// Pole of the same model that is nearest to the unit circle.
-    AutoregressivePole(ModelOrder),
-    /// Peak of Capon's spectrum of the mean correlogram.
-    Capon(ModelOrder),
-    /// Peak of the transform of the mean correlogram times a Hann window of lags.
-    LagWindow(LagWindow),
-    /// Phase of the first lag.
-    PulsePair {},
-    /// Mean of the main peak of the spectrum.
-    FirstMoment(FirstMoment),
-    /// Maximum likelihood of the velocity for the known pulse, by tapers.
-    Likelihood(Likelihood),
-    /// Maximum likelihood of velocity and gradient along the line of sight.
-    GradientLikelihood(GradientLikelihood),
-}
+    /// Which estimator makes the map, with the keys that only it has.
+    #[derive(Copy)]
+    kinds Method by "kind" {
+        /// Mean periodogram of the pulses of one line at one range, no region.
+        "periodogram" => Periodogram {},
+        /// PA: mean periodogram of all windows of the region (Table 3).
+        "periodogram_accumulation" => PeriodogramAccumulation {},
+        /// CA: peak of the autoregressive spectrum of the mean correlogram (Table 3).
+        "autoregressive" => Autoregressive(ModelOrder),
+        /// Pole of the same model that is nearest to the unit circle.
+        "autoregressive_pole" => AutoregressivePole(ModelOrder),
+        /// Peak of Capon's spectrum of the mean correlogram.
+        "capon" => Capon(ModelOrder),
+        /// Peak of the transform of the mean correlogram times a Hann window of lags.
+        "lag_window" => LagWindow(LagWindow),
+        /// Phase of the first lag.
+        "pulse_pair" => PulsePair {},
+        /// Mean of the main peak of the spectrum.
+        "first_moment" => FirstMoment(FirstMoment),
+        /// Maximum likelihood of the velocity for the known pulse, by tapers.
+        "likelihood" => Likelihood(Likelihood),
+        /// Maximum likelihood of velocity and gradient along the line of sight.
+        "gradient_likelihood" => GradientLikelihood(GradientLikelihood),
+    }
 
-section! {
     /// The order of autoregressive models and of Capon's filter.
     #[derive(Copy)]
-    ModelOrder {
+    table ModelOrder {
         /// The order; the largest one if it is chosen.
         order: usize = 16 => 1..=65_535,
         /// How the order is found.
         order_choice: OrderChoice = OrderChoice::Fixed,
     }
-}
 
-section! {
     /// The window of lags.
     #[derive(Copy)]
-    LagWindow {
+    table LagWindow {
         /// Lag at which it falls to 0.
         lag_window_lags: usize = 16 => 1..=65_535,
     }
-}
 
-section! {
     /// The first moment of a peak.
     #[derive(Copy)]
-    FirstMoment {
+    table FirstMoment {
         /// Half width of the part of the spectrum that is averaged, in its standard deviations.
         moment_reach: f64 = 3.5 => 0.1..=100.0,
     }
-}
 
-section! {
     /// The likelihood of the velocity.
     #[derive(Copy)]
-    Likelihood {
+    table Likelihood {
         /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
-        #[serde(skip_serializing_if = "Option::is_none")]
         likelihood_snr_db: Option<f64> = None => -100.0..=100.0,
     }
-}
 
-section! {
     /// The likelihood of velocity and gradient.
     #[derive(Copy)]
-    GradientLikelihood {
+    table GradientLikelihood {
         /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
-        #[serde(skip_serializing_if = "Option::is_none")]
         likelihood_snr_db: Option<f64> = None => -100.0..=100.0,
         /// Gradients reach from minus to plus this, 1/s.
         gradient_max_per_s: f64 = 0.6 => 1e-6..=1e3,
         /// How many there are; odd, so that 0 is among them.
-        gradients: usize = 7 => 1..=999,
-    }
-}
-
-impl Limited for Method {
-    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
-        match self {
-            Self::Periodogram {} | Self::PeriodogramAccumulation {} | Self::PulsePair {} => {}
-            Self::Autoregressive(model) | Self::AutoregressivePole(model) | Self::Capon(model) => {
-                model.check_limits(at, c)
-            }
-            Self::LagWindow(own) => own.check_limits(at, c),
-            Self::FirstMoment(own) => own.check_limits(at, c),
-            Self::Likelihood(own) => own.check_limits(at, c),
-            Self::GradientLikelihood(own) => own.check_limits(at, c),
-        }
+        gradients: usize = 7 => 1..=999 => Is(|n: &usize| n % 2 == 1, "an odd number, so that 0 is among them"),
     }
 }
 
@@ -152,79 +126,65 @@ impl Method {
     }
 }
 
-/// How the order of a model is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OrderChoice {
-    /// It is `order`.
-    Fixed,
-    /// Akaike's criterion.
-    Aic,
-    /// Rissanen's minimum description length.
-    Mdl,
-}
-
-/// Which correlogram.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CorrelogramForm {
-    /// Divided by the number of samples: positive semi-definite.
-    Biased,
-    /// Divided by the number of products; often no model of it exists.
-    Unbiased,
-}
-
-/// How the radius of the region depends on range.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum RegionRadius {
-    /// `radius_m` at every range.
-    Fixed {},
-    /// Straight lines between the points of a table; beyond its ends as at the ends.
-    OfRange {
-        /// Ranges, m, increasing.
-        range_m: Vec<f64>,
-        /// Radius at each, m.
-        radius_m: Vec<f64>,
-    },
-    /// The smallest for which the bound on the velocity reaches a standard deviation.
-    Target {
-        /// That standard deviation, m/s.
-        standard_deviation_m_s: f64,
-        /// Largest radius, m.
-        largest_m: f64,
-    },
-}
-
-impl Limited for RegionRadius {
-    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
-        if let Self::Target { standard_deviation_m_s, largest_m } = self {
-            (1e-6..=1e3).hold(&join(at, "standard_deviation_m_s"), standard_deviation_m_s, c);
-            (1e-3..=1e5).hold(&join(at, "largest_m"), largest_m, c);
-        }
+keys! {
+    /// How the order of a model is found.
+    choice OrderChoice {
+        /// It is `order`.
+        Fixed = "fixed",
+        /// Akaike's criterion.
+        Aic = "aic",
+        /// Rissanen's minimum description length.
+        Mdl = "mdl",
     }
-}
 
-/// Weighting of the samples of a window.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Weighting {
-    /// Gaussian, as the chapter's default.
-    Gaussian,
-    /// All samples alike.
-    Rectangular,
-    /// Hann.
-    Hann,
-}
+    /// Which correlogram.
+    choice CorrelogramForm {
+        /// Divided by the number of samples: positive semi-definite.
+        Biased = "biased",
+        /// Divided by the number of products; often no model of it exists.
+        Unbiased = "unbiased",
+    }
 
-/// How a spectral peak is refined between the points of the spectrum.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Refinement {
-    /// Parabola through the logarithms of three points.
-    Parabola,
-    /// Maximum of the exact spectrum, where the estimator is a spectrum; else as the parabola.
-    Exact,
-    /// None: the velocity of the highest point.
-    None,
+    /// How the radius of the region depends on range.
+    kinds RegionRadius by "kind" {
+        /// `radius_m` at every range.
+        "fixed" => Fixed {},
+        /// Straight lines between the points of a table; beyond its ends as at the ends.
+        "of_range" => OfRange {
+            /// Ranges, m, increasing.
+            range_m: Vec<f64> => Is(
+                |r: &Vec<f64>| !r.is_empty() && r.windows(2).all(|r| r[1] > r[0]) && r.iter().all(|r| r.is_finite()),
+                "at least one range, finite and increasing",
+            ),
+            /// Radius at each, m.
+            radius_m: Vec<f64>,
+        },
+        /// The smallest for which the bound on the velocity reaches a standard deviation.
+        "target" => Target {
+            /// That standard deviation, m/s.
+            standard_deviation_m_s: f64 => 1e-6..=1e3,
+            /// Largest radius, m.
+            largest_m: f64 => 1e-3..=1e5,
+        },
+    }
+
+    /// Weighting of the samples of a window.
+    choice Weighting {
+        /// Gaussian, as the chapter's default.
+        Gaussian = "gaussian",
+        /// All samples alike.
+        Rectangular = "rectangular",
+        /// Hann.
+        Hann = "hann",
+    }
+
+    /// How a spectral peak is refined between the points of the spectrum.
+    choice Refinement {
+        /// Parabola through the logarithms of three points.
+        Parabola = "parabola",
+        /// Maximum of the exact spectrum, where the estimator is a spectrum; else as the parabola.
+        Exact = "exact",
+        /// None: the velocity of the highest point.
+        None = "none",
+    }
 }

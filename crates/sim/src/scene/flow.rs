@@ -1,48 +1,30 @@
 //! The wind of a scene.
 
-use crate::keys::{Checker, Keys, Limit, Limited, join};
-use serde::{Deserialize, Serialize};
+use crate::keys::keys;
 use std::f64::consts::TAU;
 
-/// The wind that the lidar sees.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Flow {
-    /// No wind.
-    Calm {},
-    /// The same wind everywhere.
-    Uniform {
-        /// Wind away from the lidar, m/s.
-        lateral_m_s: f64,
-        /// Wind upwards, m/s.
-        vertical_m_s: f64,
-    },
-    /// A wind that is linear in place and time.
-    Linear(LinearWind),
-    /// Vortices of any axis.
-    VortexLines(VortexLines),
-    /// The analytic vortex pair (3)-(5) with its images below the ground.
-    VortexPair(VortexPair),
-    /// Cross-planes that `wakescope flow` wrote.
-    Simulated(SimulatedFlow),
-    /// Whole fields: those of `wakescope flow` and `wake`, or of other programs.
-    Fields(FieldFlow),
-}
-
-impl Limited for Flow {
-    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
-        match self {
-            Self::Calm {} => {}
-            Self::Uniform { lateral_m_s, vertical_m_s } => {
-                (-1e3..=1e3).hold(&join(at, "lateral_m_s"), lateral_m_s, c);
-                (-1e3..=1e3).hold(&join(at, "vertical_m_s"), vertical_m_s, c);
-            }
-            Self::Linear(wind) => wind.check_limits(at, c),
-            Self::VortexLines(lines) => lines.check_limits(at, c),
-            Self::VortexPair(pair) => pair.check_limits(at, c),
-            Self::Simulated(flow) => flow.check_limits(at, c),
-            Self::Fields(flow) => flow.check_limits(at, c),
-        }
+keys! {
+    /// The wind that the lidar sees.
+    kinds Flow by "kind" {
+        /// No wind.
+        "calm" => Calm {},
+        /// The same wind everywhere.
+        "uniform" => Uniform {
+            /// Wind away from the lidar, m/s.
+            lateral_m_s: f64 => -1e3..=1e3,
+            /// Wind upwards, m/s.
+            vertical_m_s: f64 => -1e3..=1e3,
+        },
+        /// A wind that is linear in place and time.
+        "linear" => Linear(LinearWind),
+        /// Vortices of any axis.
+        "vortex_lines" => VortexLines(VortexLines),
+        /// The analytic vortex pair (3)-(5) with its images below the ground.
+        "vortex_pair" => VortexPair(VortexPair),
+        /// Cross-planes that `wakescope flow` wrote.
+        "simulated" => Simulated(SimulatedFlow),
+        /// Whole fields: those of `wakescope flow` and `wake`, or of other programs.
+        "fields" => Fields(FieldFlow),
     }
 }
 
@@ -52,10 +34,10 @@ impl Default for Flow {
     }
 }
 
-section! {
+keys! {
     /// The analytic vortex pair (3)-(5).
     #[derive(Copy)]
-    VortexPair {
+    table VortexPair {
         /// Circulation Gamma0 of each vortex, m^2/s.
         circulation_m2_s: f64 = 500.0 => 0.0..=1e5,
         /// Distance b0 between the vortices when they were released, m.
@@ -75,26 +57,21 @@ section! {
         /// Uniform cross wind added to the pair, m/s, positive away from the lidar.
         cross_wind_m_s: f64 = 0.0 => -1e3..=1e3,
         /// The aircraft, if the wake is the older the farther it is behind it; absent: of one age everywhere.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        aircraft: Option<Aircraft> = None => Keys,
+        aircraft: Option<Aircraft> = None,
     }
-}
 
-section! {
     /// An aircraft on its way along +x.
     #[derive(Copy)]
-    Aircraft {
+    table Aircraft {
         /// Speed, m/s.
         speed_m_s: f64 = 70.0 => 1.0..=1e3,
         /// Where it is when the scan begins, m.
         x_m: f64 = 0.0 => -1e6..=1e6,
     }
-}
 
-section! {
     /// `u + G x + a t`, from the place of the lidar's foot and the start of the scan.
     #[derive(Copy)]
-    LinearWind {
+    table LinearWind {
         /// Wind at the origin when the scan begins (u, v, w), m/s.
         velocity_m_s: [f64; 3] = [0.0; 3] => -1e3..=1e3,
         /// How fast u changes along x, y, z, 1/s.
@@ -106,11 +83,9 @@ section! {
         /// How fast they change in time, m/s^2.
         acceleration_m_s2: [f64; 3] = [0.0; 3] => -1e3..=1e3,
     }
-}
 
-section! {
     /// Straight vortices without end, or polylines; one entry of each list for each vortex.
-    VortexLines {
+    table VortexLines {
         /// Places (x, y, z) that each vortex goes through, m: two of an endless one, all corners of another.
         nodes_m: Vec<Vec<[f64; 3]>> = Vec::new() => -1e7..=1e7,
         /// Circulation of each, m^2/s.
@@ -124,11 +99,9 @@ section! {
         /// Whether there are images below the ground.
         images: bool = true,
     }
-}
 
-section! {
     /// Fields over (time, z, y, x), in one file or one for each time.
-    FieldFlow {
+    table FieldFlow {
         /// The file, or the beginning of the names of numbered files, relative to the folder of the scene.
         files: String = String::new(),
         /// Names of the variables of u, v, w in the file.
@@ -136,7 +109,6 @@ section! {
         /// Whether the flow moves during the scan.
         motion: SimulatedMotion = SimulatedMotion::Moving,
         /// Time of the flow when the scan begins, s; its first one if absent.
-        #[serde(skip_serializing_if = "Option::is_none")]
         time_s: Option<f64> = None => -1e9..=1e9,
         /// Place in the scene of the origin of the file's axes, m.
         origin_m: [f64; 3] = [0.0; 3] => -1e7..=1e7,
@@ -155,66 +127,53 @@ section! {
         /// What lies below its lowest nodes.
         ground: FieldGround = FieldGround::Open,
         /// Backscatter that the air carries, in place of that of the atmosphere; absent: none.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        backscatter: Option<CarriedBackscatter> = None => Keys,
+        backscatter: Option<CarriedBackscatter> = None,
     }
-}
 
-section! {
     /// Backscatter that a field brings for each of its nodes.
-    CarriedBackscatter {
+    table CarriedBackscatter {
         /// Name of its variable in the file.
         name: String = String::new(),
         /// Backscatter coefficient in the unit of the file, 1/(m sr).
         unit_per_m_sr: f64 = 1.0 => 0.0..=1e6,
     }
-}
 
-/// What lies below the lowest nodes of fields.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FieldGround {
-    /// Nothing is known there.
-    Open,
-    /// A wall at z = 0 to which the air sticks.
-    NoSlip,
-    /// A wall at z = 0 without friction.
-    Slip,
-}
+    /// What lies below the lowest nodes of fields.
+    choice FieldGround {
+        /// Nothing is known there.
+        Open = "open",
+        /// A wall at z = 0 to which the air sticks.
+        NoSlip = "no_slip",
+        /// A wall at z = 0 without friction.
+        Slip = "slip",
+    }
 
-/// Circulation profile of a vortex.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum VortexProfile {
-    /// Gamma0 r^2/(r^2 + r_c^2), (3).
-    Algebraic,
-    /// Lamb-Oseen with the same radius of maximum speed.
-    LambOseen,
-}
+    /// Circulation profile of a vortex.
+    choice VortexProfile {
+        /// Gamma0 r^2/(r^2 + r_c^2), (3).
+        Algebraic = "algebraic",
+        /// Lamb-Oseen with the same radius of maximum speed.
+        LambOseen = "lamb_oseen",
+    }
 
-/// Whether the analytic pair moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum VortexMotion {
-    /// It stays where it was released.
-    Frozen,
-    /// It follows the inviscid hyperbola over the ground, also during the scan.
-    Inviscid,
-}
+    /// Whether the analytic pair moves.
+    choice VortexMotion {
+        /// It stays where it was released.
+        Frozen = "frozen",
+        /// It follows the inviscid hyperbola over the ground, also during the scan.
+        Inviscid = "inviscid",
+    }
 
-section! {
     /// Cross-planes of a simulated flow.
-    SimulatedFlow {
+    table SimulatedFlow {
         /// The file of planes, or the beginning of the names of numbered files (`out/plane1` for `out/plane1_0001.nc`, ...),
         /// relative to the folder of the scene.
         planes: String = String::new(),
         /// Whether the flow moves during the scan.
         motion: SimulatedMotion = SimulatedMotion::Moving,
         /// Time of the flow when the scan begins, s; the first of the planes if neither this nor `age_tau` is given.
-        #[serde(skip_serializing_if = "Option::is_none")]
         time_s: Option<f64> = None => -1e9..=1e9,
         /// The same as an age of the wake.
-        #[serde(skip_serializing_if = "Option::is_none")]
         age_tau: Option<f64> = None => -1e9..=1e9,
         /// Distance from the lidar to y = 0 of the flow, m.
         lateral_position_m: f64 = 400.0 => -1e5..=1e5,
@@ -223,37 +182,26 @@ section! {
         /// Metres per second in its unit of velocity: 1, or V0 = Gamma0/(2 pi b0).
         velocity_unit_m_s: f64 = 1.0 => 1e-6..=1e6,
     }
-}
 
-/// Whether a simulated flow moves during the scan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SimulatedMotion {
-    /// It stands still as it was when the scan began.
-    Frozen,
-    /// It moves from plane to plane; the planes must reach to the end of the scan.
-    Moving,
-}
+    /// Whether a simulated flow moves during the scan.
+    choice SimulatedMotion {
+        /// It stands still as it was when the scan began.
+        Frozen = "frozen",
+        /// It moves from plane to plane; the planes must reach to the end of the scan.
+        Moving = "moving",
+    }
 
-/// What a line of sight meets where the wind is not known.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "policy", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Outside {
-    /// The scene is refused.
-    Error {},
-    /// Nothing that returns light.
-    Mask {},
-    /// Air with this radial velocity.
-    Constant {
-        /// Radial velocity, m/s, positive away from the lidar.
-        radial_velocity_m_s: f64,
-    },
-}
-
-impl Limited for Outside {
-    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
-        if let Self::Constant { radial_velocity_m_s } = self {
-            (-1e3..=1e3).hold(&join(at, "radial_velocity_m_s"), radial_velocity_m_s, c);
-        }
+    /// What a line of sight meets where the wind is not known.
+    #[derive(Copy)]
+    kinds Outside by "policy" {
+        /// The scene is refused.
+        "error" => Error {},
+        /// Nothing that returns light.
+        "mask" => Mask {},
+        /// Air with this radial velocity.
+        "constant" => Constant {
+            /// Radial velocity, m/s, positive away from the lidar.
+            radial_velocity_m_s: f64 => -1e3..=1e3,
+        },
     }
 }

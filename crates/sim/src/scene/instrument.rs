@@ -1,12 +1,11 @@
 //! The instrument of a scene: laser, pulse, detector, telescope.
 
 use super::receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, is_nothing_db, is_zero};
-use crate::keys::{Checker, Keys, Limit, Limited, NothingOr, join};
-use serde::{Deserialize, Serialize};
+use crate::keys::{NothingOr, Number, ZERO_OR_MORE, keys};
 
-section! {
+keys! {
     /// The laser source.
-    Laser {
+    table Laser {
         /// Wavelength, m.
         wavelength_m: f64 = 1.55e-6 => 1e-7..=2e-5,
         /// Pulse repetition frequency, Hz.
@@ -15,42 +14,27 @@ section! {
         #[serde(skip_serializing_if = "is_zero")]
         linewidth_hz: f64 = 0.0 => 0.0..=1e12,
         /// What sets the energy of the pulses, in place of `pulse.energy_j`.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        amplifier: Option<LaserAmplifier> = None => Keys,
+        amplifier: Option<LaserAmplifier> = None,
         /// The fibre of the power amplifier, for a warning of Brillouin scattering.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        fibre: Option<AmplifierFibre> = None => Keys,
+        fibre: Option<AmplifierFibre> = None,
     }
-}
 
-section! {
     /// The transmitted pulse, (6)-(8).
-    Pulse {
+    table Pulse {
         /// Pulse energy at the telescope, before its aperture truncates the beam, J.
         energy_j: f64 = 150e-6 => 1e-12..=1e3,
         /// Rate of the linear chirp, Hz/s: the frequency rises by it.
         chirp_hz_s: f64 = 0.0 => -1e18..=1e18,
         /// Shape of |f|^2, with its duration.
-        shape: PulseShape = PulseShape::Gaussian(GaussianShape::default()) => Keys,
+        shape: PulseShape = PulseShape::Gaussian(GaussianShape::default()),
     }
-}
 
-/// Shape of the pulse.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum PulseShape {
-    /// The Gaussian (7).
-    Gaussian(GaussianShape),
-    /// A table.
-    Sampled(SampledShape),
-}
-
-impl Limited for PulseShape {
-    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
-        match self {
-            Self::Gaussian(shape) => shape.check_limits(at, c),
-            Self::Sampled(_) => {}
-        }
+    /// Shape of the pulse.
+    kinds PulseShape by "kind" {
+        /// The Gaussian (7).
+        "gaussian" => Gaussian(GaussianShape),
+        /// A table.
+        "sampled" => Sampled(SampledShape),
     }
 }
 
@@ -61,24 +45,22 @@ impl PulseShape {
     }
 }
 
-section! {
+keys! {
     /// The Gaussian pulse (7).
     #[derive(Copy)]
-    GaussianShape {
+    table GaussianShape {
         /// Pulse duration, s, as [`PulseDefinition`] has it.
         duration_s: f64 = 200e-9 => 1e-9..=1e-4,
         /// What `duration_s` means.
         definition: PulseDefinition = PulseDefinition::Fwhm,
     }
-}
 
-section! {
     /// A pulse given by samples.
-    SampledShape {
+    table SampledShape {
         /// Times of the samples, s, increasing.
         time_s: Vec<f64> = Vec::new(),
         /// Power |f|^2 at these times, in any unit.
-        power: Vec<f64> = Vec::new(),
+        power: Vec<f64> = Vec::new() => ZERO_OR_MORE,
         /// Phase of f at these times, rad; empty for none.
         phase_rad: Vec<f64> = Vec::new(),
         /// How the envelope is continued between the samples.
@@ -86,33 +68,27 @@ section! {
         /// Whether ranges count from the centroid of the power instead of from time 0.
         centred: bool = true,
     }
-}
 
-/// How a sampled envelope is continued between its samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PulseResampling {
-    /// The cubic spline.
-    CubicSpline,
-    /// The function without frequencies beyond half the sampling rate; evenly spaced times only.
-    BandLimited,
-    /// Straight lines.
-    Linear,
-}
+    /// How a sampled envelope is continued between its samples.
+    choice PulseResampling {
+        /// The cubic spline.
+        CubicSpline = "cubic_spline",
+        /// The function without frequencies beyond half the sampling rate; evenly spaced times only.
+        BandLimited = "band_limited",
+        /// Straight lines.
+        Linear = "linear",
+    }
 
-/// What a pulse duration means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PulseDefinition {
-    /// Full width at half maximum of |f|^2: 2 sqrt(ln 2) sigma.
-    Fwhm,
-    /// Half width at 1/e of |f|^2: the sigma of (7) itself.
-    OneOverEHalfWidth,
-}
+    /// What a pulse duration means.
+    choice PulseDefinition {
+        /// Full width at half maximum of |f|^2: 2 sqrt(ln 2) sigma.
+        Fwhm = "fwhm",
+        /// Half width at 1/e of |f|^2: the sigma of (7) itself.
+        OneOverEHalfWidth = "one_over_e_half_width",
+    }
 
-section! {
     /// Photodetector and digitiser, (12)-(14).
-    Detector {
+    table Detector {
         /// Detector bandwidth B_w, Hz, centred on the intermediate frequency.
         bandwidth_hz: f64 = 50e6 => 1e3..=1e11,
         /// Intermediate frequency f_c, Hz.
@@ -128,87 +104,61 @@ section! {
         /// What the receiver delivers.
         signal: DetectorSignal = DetectorSignal::IntermediateFrequency,
         /// What the receiver has beyond shot noise.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        front_end: Option<FrontEnd> = None => Keys,
+        front_end: Option<FrontEnd> = None,
         /// The analogue-to-digital converter.
-        digitiser: Digitiser = Digitiser::None {} => Keys,
+        digitiser: Digitiser = Digitiser::None {},
         /// What sets the signal-to-noise ratio.
-        snr: SnrReference = SnrReference::Physical {} => Keys,
+        snr: SnrReference = SnrReference::Physical {},
     }
-}
 
-/// What the receiver delivers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DetectorSignal {
-    /// The real current at the intermediate frequency.
-    IntermediateFrequency,
-    /// Two quadratures about zero frequency.
-    Baseband,
-}
-
-/// The analogue-to-digital converter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Digitiser {
-    /// Samples are neither rounded nor clipped.
-    None {},
-    /// Rounding to 2^bits codes, and saturation.
-    Quantised {
-        /// Bits of a sample.
-        bits: u32,
-        /// Full scale over the root mean square of the noise in the detector band, (13).
-        full_scale_over_noise: f64,
-    },
-}
-
-impl Limited for Digitiser {
-    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
-        if let Self::Quantised { bits, full_scale_over_noise } = self {
-            (1..=32).hold(&join(at, "bits"), bits, c);
-            (1e-6..=1e12).hold(&join(at, "full_scale_over_noise"), full_scale_over_noise, c);
-        }
+    /// What the receiver delivers.
+    choice DetectorSignal {
+        /// The real current at the intermediate frequency.
+        IntermediateFrequency = "intermediate_frequency",
+        /// Two quadratures about zero frequency.
+        Baseband = "baseband",
     }
-}
 
-/// Spectrum of the shot noise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NoiseKind {
-    /// Flat in the detector band, nothing outside, variance (13).
-    Band,
-    /// The same density up to half the sampling frequency.
-    White,
-    /// No noise, and no random numbers drawn for it.
-    None,
-}
-
-/// What sets the signal-to-noise ratio.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "reference", rename_all = "snake_case", deny_unknown_fields)]
-pub enum SnrReference {
-    /// (14) with Planck's constant h: the shot-noise limit.
-    Physical {},
-    /// (14) as the chapter prints it, with h/(2 pi): 8 dB more.
-    Chapter {},
-    /// The same value at every range, whatever the optics and the aerosol.
-    Fixed {
-        /// Signal-to-noise ratio in the detector band, dB.
-        snr_db: f64,
-    },
-}
-
-impl Limited for SnrReference {
-    fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
-        if let Self::Fixed { snr_db } = self {
-            (-100.0..=100.0).hold(&join(at, "snr_db"), snr_db, c);
-        }
+    /// The analogue-to-digital converter.
+    #[derive(Copy)]
+    kinds Digitiser by "kind" {
+        /// Samples are neither rounded nor clipped.
+        "none" => None {},
+        /// Rounding to 2^bits codes, and saturation.
+        "quantised" => Quantised {
+            /// Bits of a sample.
+            bits: u32 => 1..=32,
+            /// Full scale over the root mean square of the noise in the detector band, (13).
+            full_scale_over_noise: f64 => 1e-6..=1e12,
+        },
     }
-}
 
-section! {
+    /// Spectrum of the shot noise.
+    choice NoiseKind {
+        /// Flat in the detector band, nothing outside, variance (13).
+        Band = "band",
+        /// The same density up to half the sampling frequency.
+        White = "white",
+        /// No noise, and no random numbers drawn for it.
+        None = "none",
+    }
+
+    /// What sets the signal-to-noise ratio.
+    #[derive(Copy)]
+    kinds SnrReference by "reference" {
+        /// (14) with Planck's constant h: the shot-noise limit.
+        "physical" => Physical {},
+        /// (14) as the chapter prints it, with h/(2 pi): 8 dB more.
+        "chapter" => Chapter {},
+        /// The same value at every range, whatever the optics and the aerosol.
+        "fixed" => Fixed {
+            /// Signal-to-noise ratio in the detector band, dB.
+            snr_db: f64 => -100.0..=100.0,
+        },
+    }
+
     /// Telescope and beam.
-    Telescope {
+    table Telescope {
         /// Radius of the hard aperture, m.
         aperture_radius_m: f64 = 0.05 => 1e-4..=10.0,
         /// Radius of a central obscuration, m; 0 for none.
@@ -218,7 +168,10 @@ section! {
         /// Whether `beam_radius_m` is that of the irradiance or of the field.
         beam_radius_definition: BeamRadiusDefinition = BeamRadiusDefinition::Intensity,
         /// Distance of the focus, m; `inf` for a collimated beam.
-        focus_m: f64 = f64::INFINITY,
+        focus_m: f64 = f64::INFINITY => Number(
+            |focus_m| !focus_m.is_nan() && focus_m != 0.0 && focus_m != f64::NEG_INFINITY,
+            "a distance in m other than 0, or inf for a collimated beam",
+        ),
         /// Whether transmitted and received light cross the same turbulence.
         receiver: ReceiverPath = ReceiverPath::Monostatic,
         /// Loss of the optics, out and back together, dB.
@@ -234,24 +187,20 @@ section! {
         #[serde(skip_serializing_if = "is_zero")]
         blind_range_m: f64 = 0.0 => 0.0..=1e6,
     }
-}
 
-/// Whether transmitted and received light cross the same turbulence.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ReceiverPath {
-    /// One telescope: the same path out and back.
-    Monostatic,
-    /// Two telescopes: independent paths; in free space they are taken to coincide.
-    Bistatic,
-}
+    /// Whether transmitted and received light cross the same turbulence.
+    choice ReceiverPath {
+        /// One telescope: the same path out and back.
+        Monostatic = "monostatic",
+        /// Two telescopes: independent paths; in free space they are taken to coincide.
+        Bistatic = "bistatic",
+    }
 
-/// Which 1/e radius is meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BeamRadiusDefinition {
-    /// Of the irradiance, |E|^2 ~ exp(-r^2/w^2).
-    Intensity,
-    /// Of the field, E ~ exp(-r^2/w^2).
-    Field,
+    /// Which 1/e radius is meant.
+    choice BeamRadiusDefinition {
+        /// Of the irradiance, |E|^2 ~ exp(-r^2/w^2).
+        Intensity = "intensity",
+        /// Of the field, E ~ exp(-r^2/w^2).
+        Field = "field",
+    }
 }

@@ -5,30 +5,6 @@
 //! a test holds it equal to [`Scene::default`]. Unknown keys are refused. Units are in the key
 //! names; a key without a unit has none.
 
-/// A table of keys: name, type, default and, after `=>`, what the value must be.
-macro_rules! section {
-    ($(#[$doc:meta])* $name:ident { $($(#[$fdoc:meta])* $field:ident: $ty:ty = $default:expr $(=> $limit:expr)?,)* }) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-        #[serde(default, deny_unknown_fields)]
-        pub struct $name { $($(#[$fdoc])* pub $field: $ty,)* }
-        impl Default for $name {
-            fn default() -> Self { Self { $($field: $default,)* } }
-        }
-        impl $crate::keys::Limited for $name {
-            #[allow(unused_variables)]
-            fn check_limits(&self, at: &str, c: &mut $crate::keys::Checker<'_>) {
-                $($({
-                    use $crate::keys::Limit;
-                    ($limit).hold(&$crate::keys::join(at, stringify!($field)), &self.$field, c);
-                })?)*
-            }
-        }
-    };
-}
-#[cfg(feature = "flow")]
-pub(crate) use section;
-
 mod atmosphere;
 mod between;
 mod check;
@@ -72,8 +48,8 @@ pub use read::SceneFile;
 pub use receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, SecondTrip};
 pub use retrieval::{FollowingAircraft, LiftSlope, Retrieval, RetrievalMethod};
 
-use crate::keys::Keys;
-use serde::{Deserialize, Serialize};
+use crate::io::UtcTime;
+use crate::keys::{Is, keys};
 use sha2::{Digest, Sha256};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -86,45 +62,42 @@ const SCENE_EXAMPLES: &str = include_str!("examples.toml");
 /// The version of the scene format that this program reads and writes.
 pub const FORMAT: u32 = 2;
 
-section! {
+keys! {
     /// A whole measurement. See the [module documentation](self).
-    Scene {
+    table Scene {
         /// Version of the scene format; only [`FORMAT`] is read.
         format: u32 = FORMAT,
-        /// Seed of every random number of the run.
-        seed: u64 = 1,
+        /// Seed of every random number of the run; TOML integers are signed, a larger one could not be written back.
+        seed: u64 = 1 => 0..=i64::MAX as u64,
         /// The laser source.
-        laser: Laser = Laser::default() => Keys,
+        laser: Laser = Laser::default(),
         /// The transmitted pulse, (6)-(8).
-        pulse: Pulse = Pulse::default() => Keys,
+        pulse: Pulse = Pulse::default(),
         /// Photodetector and digitiser, (12)-(14).
-        detector: Detector = Detector::default() => Keys,
+        detector: Detector = Detector::default(),
         /// Telescope and beam.
-        telescope: Telescope = Telescope::default() => Keys,
+        telescope: Telescope = Telescope::default(),
         /// Aerosol and refractive turbulence.
-        atmosphere: Atmosphere = Atmosphere::default() => Keys,
+        atmosphere: Atmosphere = Atmosphere::default(),
         /// The wind that the lidar sees.
-        flow: Flow = Flow::default() => Keys,
+        flow: Flow = Flow::default(),
         /// Further winds that are added to it.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         added_flows: Vec<Flow> = Vec::new(),
         /// Where the lidar looks.
-        scan: Scan = Scan::default() => Keys,
+        scan: Scan = Scan::default(),
         /// From signals to velocities.
-        estimator: Estimator = Estimator::default() => Keys,
+        estimator: Estimator = Estimator::default(),
         /// Vortices from each realisation; absent: none are looked for.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        retrieval: Option<Retrieval> = None => Keys,
+        retrieval: Option<Retrieval> = None,
         /// What is written.
-        outputs: Outputs = Outputs::default() => Keys,
+        outputs: Outputs = Outputs::default(),
         /// Place and date, for the files.
-        site: Site = Site::default() => Keys,
+        site: Site = Site::default(),
     }
-}
 
-section! {
     /// Where the lidar looks: a vertical scan (RHI) across the runway, if no other pattern is stated.
-    Scan {
+    table Scan {
         /// Height of the telescope above the ground, m.
         lidar_height_m: f64 = 0.0 => 0.0..=1e4,
         /// Azimuth of the scan plane, rad, clockwise from north; only written to the files.
@@ -144,31 +117,28 @@ section! {
         /// Independent repetitions of the whole scan, for the errors.
         realisations: usize = 4 => 1..=1_000_000,
         /// The echo of the pulse before; absent: it is long gone.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        second_trip: Option<SecondTrip> = None => Keys,
+        second_trip: Option<SecondTrip> = None,
         /// What lines below the ground meet.
-        below_ground: Outside = Outside::Error {} => Keys,
+        below_ground: Outside = Outside::Error {},
         /// What lines that leave a simulated flow meet.
-        outside_flow: Outside = Outside::Error {} => Keys,
+        outside_flow: Outside = Outside::Error {},
         /// Which way the lidar looks, line after line.
         #[serde(skip_serializing_if = "Pattern::is_default")]
-        pattern: Pattern = Pattern::default() => Keys,
+        pattern: Pattern = Pattern::default(),
         /// How the lines follow each other.
         #[serde(skip_serializing_if = "pattern::is_default")]
-        head: HeadMotionKeys = HeadMotionKeys::default() => Keys,
+        head: HeadMotionKeys = HeadMotionKeys::default(),
         /// Where the lidar is.
         #[serde(skip_serializing_if = "pattern::is_default")]
-        lidar: LidarPlace = LidarPlace::default() => Keys,
+        lidar: LidarPlace = LidarPlace::default(),
         /// How many airs the pulses of a line meet.
         #[serde(skip_serializing_if = "pattern::is_default")]
-        wind_of_pulses: WindOfPulses = WindOfPulses::default() => Keys,
+        wind_of_pulses: WindOfPulses = WindOfPulses::default(),
     }
-}
 
-section! {
     /// What is written.
     #[derive(Copy)]
-    Outputs {
+    table Outputs {
         /// Tables of every number.
         csv: bool = true,
         /// NetCDF: the map as CfRadial, the flow as CF.
@@ -192,23 +162,22 @@ section! {
         /// Ranges in the profile.
         profile_points: usize = 59 => 2..=100_000,
     }
-}
 
-/// Which realisations of the raw signals are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SignalsOf {
-    /// The first.
-    First,
-    /// Every one.
-    All,
-}
+    /// Which realisations of the raw signals are kept.
+    choice SignalsOf {
+        /// The first.
+        First = "first",
+        /// Every one.
+        All = "all",
+    }
 
-section! {
     /// Where the lidar stands and when the flow began; only written to the files.
-    Site {
+    table Site {
         /// Name of the place.
-        name: String = "simulated runway".into(),
+        name: String = "simulated runway".into() => Is(
+            |name: &String| name.chars().count() <= 80 && !name.chars().any(char::is_control),
+            "one line of at most 80 characters",
+        ),
         /// Latitude, degrees north.
         latitude_deg: f64 = 0.0 => -90.0..=90.0,
         /// Longitude, degrees east.
@@ -216,7 +185,10 @@ section! {
         /// Height of the ground above the sea, m.
         altitude_m: f64 = 0.0 => -1e3..=1e4,
         /// Date of the start of the flow, UTC.
-        start_utc: String = "2024-01-01T00:00:00Z".into(),
+        start_utc: String = "2024-01-01T00:00:00Z".into() => Is(
+            |date: &String| UtcTime::parse(date).is_some(),
+            format!("a date from 1900 to 2199 like \"{}\"", UtcTime::FORM),
+        ),
     }
 }
 

@@ -1,17 +1,16 @@
 //! What a real laser and a real receiver add to a scene; every part of it is off by default, and then not written.
 
-use crate::keys::{AboveZeroOrInf, NothingOr};
-use serde::{Deserialize, Serialize};
+use crate::keys::{ABOVE_ZERO_OR_INF, NothingOr, keys};
 use wakescope_signal::transmitter;
 
-section! {
+keys! {
     /// What the receiver has beyond shot noise.
     #[derive(Copy)]
-    FrontEnd {
+    table FrontEnd {
         /// Current noise of the amplifier, A/sqrt(Hz).
         amplifier_noise_a_rthz: f64 = 0.0 => 0.0..=1.0,
         /// Resistor whose thermal noise the amplifier sees, ohm; `inf` for none.
-        load_ohm: f64 = f64::INFINITY => AboveZeroOrInf,
+        load_ohm: f64 = f64::INFINITY => ABOVE_ZERO_OR_INF,
         /// Its temperature, K.
         load_temperature_k: f64 = 290.0 => 1e-3..=1e4,
         /// Dark current of the detector, A.
@@ -21,31 +20,27 @@ section! {
         /// Rejection of what both halves of a balanced detector see, electrical, dB.
         rejection_db: f64 = 0.0 => 0.0..=200.0,
         /// Power at which the current has fallen to half of the linear one, W; `inf` for none.
-        saturation_w: f64 = f64::INFINITY => AboveZeroOrInf,
+        saturation_w: f64 = f64::INFINITY => ABOVE_ZERO_OR_INF,
         /// Frequency at which the response of the detector has fallen to half the power, Hz; `inf` for none.
-        half_power_hz: f64 = f64::INFINITY => AboveZeroOrInf,
+        half_power_hz: f64 = f64::INFINITY => ABOVE_ZERO_OR_INF,
         /// Poles of this response, a Butterworth low pass.
         poles: u32 = 1 => 1..=20,
     }
-}
 
-section! {
     /// An amplifier that a steady pump fills between the pulses.
     #[derive(Copy)]
-    LaserAmplifier {
+    table LaserAmplifier {
         /// Mean power at high repetition rates, W.
         mean_power_w: f64 = 1.0 => 1e-9..=1e6,
         /// Time over which the medium keeps its energy, s.
         storage_time_s: f64 = 2e-4 => 1e-9..=1e3,
         /// Largest energy of a pulse, J; `inf` for none.
-        largest_energy_j: f64 = f64::INFINITY => AboveZeroOrInf,
+        largest_energy_j: f64 = f64::INFINITY => ABOVE_ZERO_OR_INF,
     }
-}
 
-section! {
     /// The fibre of the power amplifier.
     #[derive(Copy)]
-    AmplifierFibre {
+    table AmplifierFibre {
         /// Effective area of the mode, m^2.
         effective_area_m2: f64 = 3e-10 => 1e-14..=1.0,
         /// Length, m.
@@ -57,12 +52,10 @@ section! {
         /// Its width, Hz.
         brillouin_width_hz: f64 = 50e6 => 1e3..=1e12,
     }
-}
 
-section! {
     /// The echo of the pulse before, from c/(2 PRF) farther away.
     #[derive(Copy)]
-    SecondTrip {
+    table SecondTrip {
         /// Radial velocity of the air there where the flow is not known, m/s.
         radial_velocity_m_s: f64 = 0.0 => -1e3..=1e3,
     }

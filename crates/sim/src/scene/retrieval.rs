@@ -1,62 +1,45 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
 use super::{Flow, NoiseKind, Pattern, PulseShape, Scan, Scene, Weighting};
-use crate::keys::{Checker, Keys};
+use crate::keys::{Checker, Is, keys};
 use crate::setup::beams::direction::sin_cos_of_turn;
-use serde::{Deserialize, Serialize};
 
-/// How circulations are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-#[serde(rename_all = "snake_case")]
-pub enum RetrievalMethod {
-    /// Fit of the wake to the map.
-    #[default]
-    Fit,
-    /// Fit of the wake to all raw signals.
-    Signals,
-    /// Radial-velocity method: places from extremes, circulations by linear least squares.
-    Rv,
-    /// Velocity envelopes of the spectra of raw signals about the wake that is fitted to their map.
-    Envelope,
-    /// Fit to the map, and circulation against radius by integrals over the map beside it.
-    Integral,
-}
-
-impl RetrievalMethod {
-    /// The name in scenes and tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fit => "fit",
-            Self::Signals => "signals",
-            Self::Rv => "rv",
-            Self::Envelope => "envelope",
-            Self::Integral => "integral",
-        }
+keys! {
+    /// How circulations are found.
+    #[derive(Default)]
+    #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+    choice RetrievalMethod {
+        /// Fit of the wake to the map.
+        #[default]
+        Fit = "fit",
+        /// Fit of the wake to all raw signals.
+        Signals = "signals",
+        /// Radial-velocity method: places from extremes, circulations by linear least squares.
+        Rv = "rv",
+        /// Velocity envelopes of the spectra of raw signals about the wake that is fitted to their map.
+        Envelope = "envelope",
+        /// Fit to the map, and circulation against radius by integrals over the map beside it.
+        Integral = "integral",
     }
-}
 
-section! {
     /// Vortices from each realisation, held against the truth of the flow.
-    Retrieval {
+    table Retrieval {
         /// How circulations are found, each method beside the others.
-        methods: Vec<RetrievalMethod> = vec![RetrievalMethod::Fit],
+        methods: Vec<RetrievalMethod> = vec![RetrievalMethod::Fit] => Is(
+            |list: &Vec<RetrievalMethod>| !list.is_empty() && (1..list.len()).all(|i| !list[..i].contains(&list[i])),
+            "at least one of \"fit\", \"signals\", \"rv\", \"envelope\", \"integral\", each once, for example [\"fit\", \"rv\"]",
+        ),
         /// Core radius that fits keep, m; fitted if absent.
-        #[serde(skip_serializing_if = "Option::is_none")]
         core_radius_m: Option<f64> = None => 1e-3..=1e3,
         /// Rate of false alarms of a scan at which the maps are tested for a wake; absent: no test.
-        #[serde(skip_serializing_if = "Option::is_none")]
         false_alarm: Option<f64> = None => 1e-9..=0.5,
         /// The aircraft that follows; absent: none.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        follower: Option<FollowingAircraft> = None => Keys,
+        follower: Option<FollowingAircraft> = None,
     }
-}
 
-section! {
     /// An aircraft in the wake: rectangular wing, strip theory.
     #[derive(Copy)]
-    FollowingAircraft {
+    table FollowingAircraft {
         /// Span of the wing, m.
         span_m: f64 = 34.0 => 0.1..=1e3,
         /// Span squared over the area of the wing.
@@ -66,25 +49,20 @@ section! {
         /// Slope of the lift.
         slope: LiftSlope = LiftSlope::Span,
     }
-}
 
-/// Slope of the lift of a wing of aspect ratio A.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LiftSlope {
-    /// 2 pi A/(A + 2).
-    Span,
-    /// 2 pi A/(A + 4).
-    Semispan,
+    /// Slope of the lift of a wing of aspect ratio A.
+    choice LiftSlope {
+        /// 2 pi A/(A + 2).
+        Span = "span",
+        /// 2 pi A/(A + 4).
+        Semispan = "semispan",
+    }
 }
 
 /// What a scene may say of its retrievals.
 pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let Some(r) = &scene.retrieval else { return };
     let key = "retrieval.methods";
-    let distinct = r.methods.iter().enumerate().all(|(i, method)| !r.methods[..i].contains(method));
-    let allowed = "at least one of \"fit\", \"signals\", \"rv\", \"envelope\", \"integral\", each once, for example [\"fit\", \"rv\"]";
-    c.require(distinct && !r.methods.is_empty(), key, &r.methods, allowed);
     let estimator = &scene.estimator;
     let has_edges = estimator.weighting == Weighting::Gaussian && !estimator.method.has_own_tapers();
     c.require(

@@ -49,7 +49,7 @@ fn leaves(keys: &[Key], path: &str, out: &mut Vec<Leaf>) {
             Kind::Switch => Some(Takes::Switch),
             Kind::Text => Some(Takes::Text),
             Kind::Choice(names) => Some(Takes::Choice(names.to_vec())),
-            Kind::List { .. } | Kind::Other => None,
+            Kind::List { .. } => None,
         };
         if !out.iter().any(|(known, _)| *known == here) {
             out.push((here, takes));

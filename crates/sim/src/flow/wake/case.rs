@@ -1,58 +1,56 @@
 //! The wake of an aircraft near the ground: the keys of its case, their limits, the case of the solver.
 
+use super::super::named::STRETCH;
 use super::super::setup::{Setup, WakeSetup};
 use crate::Error;
-use crate::keys::Checker;
-use crate::scene::section;
-use serde::{Deserialize, Serialize};
+use crate::keys::{ABOVE_ZERO, Checker, Is, ZERO_OR_MORE, keys};
 use wakescope_les::cases::{Case, VortexPairCase};
 use wakescope_les::{CirculationProfile, analysis::WakeScales, winds::Aircraft};
 
 /// Longest step, in `tau`.
 const LONGEST_STEP: f64 = 0.01;
 
-/// Circulation against radius.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum WakeProfile {
-    /// `Gamma0 r^2/(r^2 + r_c^2)`, (3).
-    Algebraic,
-    /// Lamb and Oseen's.
-    LambOseen,
-    /// A viscous core inside a broad distribution over the span `4 b0/pi`.
-    TwoScale,
-}
+keys! {
+    /// Circulation against radius.
+    choice WakeProfile {
+        /// `Gamma0 r^2/(r^2 + r_c^2)`, (3).
+        Algebraic = "algebraic",
+        /// Lamb and Oseen's.
+        LambOseen = "lamb_oseen",
+        /// A viscous core inside a broad distribution over the span `4 b0/pi`.
+        TwoScale = "two_scale",
+    }
 
-/// Spacing and circulation of the pair.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "from", rename_all = "snake_case", deny_unknown_fields)]
-pub enum PairScale {
-    /// As given.
-    Circulation {
-        /// Distance `b0` between the vortices \[m\].
-        spacing_m: f64,
-        /// Circulation `Gamma0` of each \[m^2/s\].
-        circulation_m2_s: f64,
-    },
-    /// From mass, speed and span, (5).
-    Aircraft {
-        /// Mass \[kg\].
-        mass_kg: f64,
-        /// Flight speed \[m/s\].
-        speed_m_s: f64,
-        /// Wing span \[m\].
-        span_m: f64,
-        /// Density of the air \[kg/m^3\].
-        air_density_kg_m3: f64,
-    },
-    /// An A320 at landing.
-    A320 {},
-    /// An A340-300 at landing.
-    A340 {},
-    /// A B747-400 at landing.
-    B747 {},
-    /// An A380-800 at landing.
-    A380 {},
+    /// Spacing and circulation of the pair.
+    #[derive(Copy)]
+    kinds PairScale by "from" {
+        /// As given.
+        "circulation" => Circulation {
+            /// Distance `b0` between the vortices \[m\].
+            spacing_m: f64,
+            /// Circulation `Gamma0` of each \[m^2/s\].
+            circulation_m2_s: f64,
+        },
+        /// From mass, speed and span, (5).
+        "aircraft" => Aircraft {
+            /// Mass \[kg\].
+            mass_kg: f64,
+            /// Flight speed \[m/s\].
+            speed_m_s: f64,
+            /// Wing span \[m\].
+            span_m: f64,
+            /// Density of the air \[kg/m^3\].
+            air_density_kg_m3: f64,
+        },
+        /// An A320 at landing.
+        "a320" => A320 {},
+        /// An A340-300 at landing.
+        "a340" => A340 {},
+        /// A B747-400 at landing.
+        "b747" => B747 {},
+        /// An A380-800 at landing.
+        "a380" => A380 {},
+    }
 }
 
 impl PairScale {
@@ -75,68 +73,57 @@ impl PairScale {
     }
 }
 
-section! {
+keys! {
     /// The wake of an aircraft near the ground. Lengths without a unit are in `b0`, velocities in `V0`. Defaults: `coarse`.
-    WakeFlow {
+    table WakeFlow {
         /// Spacing and circulation.
         pair: PairScale = PairScale::Circulation { spacing_m: 47.0, circulation_m2_s: 500.0 },
         /// Cells along x (1 for a plane flow), y, z.
-        cells: [usize; 3] = [24, 128, 80],
+        cells: [usize; 3] = [24, 128, 80] => 1..=100_000,
         /// Length, width and height of the box.
-        size: [f64; 3] = [1.0, 4.0, 2.5],
+        size: [f64; 3] = [1.0, 4.0, 2.5] => ABOVE_ZERO,
         /// Strength of the refinement towards the ground; 0 for equal cells.
-        ground_stretch: f64 = 1.5,
+        ground_stretch: f64 = 1.5 => STRETCH,
         /// Refinement towards the middle of y, 0 to 0.9: cells are `1 - a` of the mean there, `1 + a` at the sides.
-        lateral_stretch: f64 = 0.0,
+        lateral_stretch: f64 = 0.0 => 0.0..=0.9,
         /// Height of both vortices.
         height: f64 = 1.0,
         /// Core radius.
-        core_radius: f64 = 0.1,
+        core_radius: f64 = 0.1 => ABOVE_ZERO,
         /// Circulation against radius.
         profile: WakeProfile = WakeProfile::Algebraic,
         /// `Gamma0/nu`.
-        reynolds: f64 = 5000.0,
+        reynolds: f64 = 5000.0 => ABOVE_ZERO,
         /// The ground: no-slip if true, else a frictionless plane.
         sticky_ground: bool = true,
         /// Whether the sides are frictionless planes instead of periodic.
         slip_sides: bool = false,
         /// Root-mean-square of each component of the noise within 0.3 of the vortices.
-        perturbation: f64 = 0.01,
+        perturbation: f64 = 0.01 => ZERO_OR_MORE,
         /// Seed of noise and background; without one the noise is a closed formula.
-        #[serde(skip_serializing_if = "Option::is_none")]
         seed: Option<u64> = None,
         /// Root-mean-square of each component of turbulence that fills the box.
-        background: f64 = 0.0,
+        background: f64 = 0.0 => ZERO_OR_MORE,
         /// Cross wind at the height of the vortices \[m/s\].
         cross_wind_m_s: f64 = 0.0,
         /// Roughness length of a logarithmic wind \[m\]; 0 for the same wind at all heights.
-        wind_roughness_m: f64 = 0.0,
+        wind_roughness_m: f64 = 0.0 => ZERO_OR_MORE,
         /// Radii between which `Gamma_5-15` is averaged \[m\].
-        circulation_radii_m: [f64; 2] = [5.0, 15.0],
+        circulation_radii_m: [f64; 2] = [5.0, 15.0] => Is(
+            |[from, to]: &[f64; 2]| *from > 0.0 && to > from && to.is_finite(),
+            "two numbers above 0 that increase",
+        ),
     }
 }
 
 impl WakeFlow {
     pub(in super::super) fn check(&self, p: &mut Checker<'_>) {
-        p.cells("case.cells", &self.cells);
-        let ok = self.size.iter().all(|l| l.is_finite() && *l > 0.0);
-        p.require(ok, "case.size", self.size, "three finite numbers above 0");
-        p.stretch("case.ground_stretch", self.ground_stretch);
-        p.within("case.lateral_stretch", self.lateral_stretch, 0.0, 0.9, "");
         let height = self.height;
         p.require(height > 0.0 && height < self.size[2], "case.height", height, "above 0 and below the top");
-        p.positive("case.core_radius", self.core_radius);
-        p.positive("case.reynolds", self.reynolds);
-        p.not_negative("case.perturbation", self.perturbation);
-        p.not_negative("case.background", self.background);
-        p.not_negative("case.wind_roughness_m", self.wind_roughness_m);
         let open = !self.slip_sides;
         let still = self.cross_wind_m_s == 0.0;
         let wind = self.cross_wind_m_s.is_finite() && (still || open);
         p.require(wind, "case.cross_wind_m_s", self.cross_wind_m_s, "finite, and 0 between frictionless sides");
-        let [from, to] = self.circulation_radii_m;
-        let radii = from > 0.0 && to > from && to.is_finite();
-        p.require(radii, "case.circulation_radii_m", self.circulation_radii_m, "two numbers above 0 that increase");
         if let Err(error) = self.pair.scales().and_then(|scales| scales.validate()) {
             p.require(false, "case.pair", self.pair, error.to_string());
         }

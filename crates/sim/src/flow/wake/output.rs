@@ -1,29 +1,24 @@
 //! What is measured and written of a wake, by its age.
 
-use crate::keys::Checker;
-use crate::scene::section;
-use serde::{Deserialize, Serialize};
+use crate::keys::{ABOVE_ZERO, Checker, FINITE, keys};
 
-section! {
+keys! {
     /// What is measured and written of a wake, by its age `tau`.
-    WakeOutput {
+    table WakeOutput {
         /// Age at which the run ends.
-        end_tau: f64 = 5.0,
+        end_tau: f64 = 5.0 => ABOVE_ZERO,
         /// Time between rows of `wake.csv`, and between the records of `wake.nc`.
-        every_tau: f64 = 0.05,
+        every_tau: f64 = 0.05 => ABOVE_ZERO,
         /// Ages of whole fields; 0.5, the whole numbers and the end if absent.
-        #[serde(skip_serializing_if = "Option::is_none")]
         fields_tau: Option<Vec<f64>> = None,
         /// Ages of cross-planes; half the end and the end if absent.
-        #[serde(skip_serializing_if = "Option::is_none")]
         planes_tau: Option<Vec<f64>> = None,
         /// First and last age of a series of cross-planes, for scans during which the flow moves.
-        #[serde(skip_serializing_if = "Option::is_none")]
         series_tau: Option<[f64; 2]> = None,
         /// Time between the planes of the series.
-        series_every_tau: f64 = 0.02,
+        series_every_tau: f64 = 0.02 => ABOVE_ZERO,
         /// Positions of the planes along the flight, in `b0`.
-        planes_x: Vec<f64> = vec![0.5],
+        planes_x: Vec<f64> = vec![0.5] => FINITE,
     }
 }
 
@@ -66,9 +61,6 @@ impl WakeOutput {
     }
 
     pub(in super::super) fn check(&self, p: &mut Checker<'_>) {
-        p.positive("wake.end_tau", self.end_tau);
-        p.positive("wake.every_tau", self.every_tau);
-        p.positive("wake.series_every_tau", self.series_every_tau);
         let end = self.end_tau;
         let within =
             |list: &[f64]| list.windows(2).all(|w| w[1] > w[0]) && list.iter().all(|tau| (0.0..=end).contains(tau));
@@ -79,6 +71,5 @@ impl WakeOutput {
         if let Some(range) = self.series_tau {
             p.require(within(&range), "wake.series_tau", range, "two ages that increase, from 0 to wake.end_tau");
         }
-        p.require(self.planes_x.iter().all(|x| x.is_finite()), "wake.planes_x", &self.planes_x, "finite");
     }
 }
