@@ -63,7 +63,7 @@ fn heterodyne(criterion: &mut Criterion) {
     });
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     group.bench_function("baseband with noise, 225 scatterers", |bench| {
-        bench.iter(|| noisy.baseband_into(&line, &mut rng, &mut scratch, &mut envelope_a));
+        bench.iter(|| noisy.record_into(&line, &mut rng, &mut scratch, &mut envelope_a));
     });
     group.sample_size(10);
     group.bench_function("plain form, 225 scatterers", |bench| {

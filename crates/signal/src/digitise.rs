@@ -3,10 +3,8 @@
 //! Check: the error of rounding has the variance `step^2/12`, a full-scale tone the ratio `6.02 bits + 1.76` dB; what
 //! lies beyond full scale is clipped and counted.
 
-use num_complex::Complex;
-
-use crate::Error;
 use crate::error::{check, check_positive};
+use crate::{Error, Sample};
 
 /// A converter with `2^bits` codes, from `-2^(bits-1)` to `2^(bits-1) - 1`; code 0 is no current.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,39 +87,31 @@ impl Digitiser {
         Ok(self.codes(current_a).1 as i64)
     }
 
-    /// Replaces each current by that of its code, and counts those beyond full scale.
+    /// Replaces each current by that of its code, and counts those beyond full scale. Complex samples have a converter for each
+    /// part.
     ///
     /// # Errors
     /// [`Error::ElementOutOfRange`] with the first sample that is NaN; then nothing was changed.
-    pub fn digitise(&self, samples_a: &mut [f64]) -> Result<Clipped, Error> {
-        if let Some(index) = samples_a.iter().position(|i| i.is_nan()) {
-            let allowed = "a number";
-            return Err(Error::ElementOutOfRange { field: "samples_a", index, value: samples_a[index], allowed });
+    pub fn digitise<T: Sample>(&self, samples_a: &mut [T]) -> Result<Clipped, Error> {
+        let mut bad = None;
+        for (index, sample) in samples_a.iter_mut().enumerate() {
+            sample.for_each_part(|part| {
+                if part.is_nan() {
+                    bad = bad.or(Some((index, *part)));
+                }
+            });
+        }
+        if let Some((index, value)) = bad {
+            return Err(Error::ElementOutOfRange { field: "samples_a", index, value, allowed: "a number" });
         }
         let (step_a, mut clipped) = (self.step_a(), Clipped::default());
         for sample in samples_a {
-            let (code, kept) = self.codes(*sample);
-            clipped.low += u64::from(code < kept);
-            clipped.high += u64::from(code > kept);
-            *sample = kept * step_a;
-        }
-        Ok(clipped)
-    }
-
-    /// The same for the two parts of complex samples, each with a converter of its own.
-    ///
-    /// # Errors
-    /// As [`Digitiser::digitise`].
-    pub fn digitise_complex(&self, samples_a: &mut [Complex<f64>]) -> Result<Clipped, Error> {
-        if let Some((index, i)) = samples_a.iter().enumerate().find(|(_, i)| i.is_nan()) {
-            let value = if i.re.is_nan() { i.re } else { i.im };
-            return Err(Error::ElementOutOfRange { field: "samples_a", index, value, allowed: "a number" });
-        }
-        let mut clipped = Clipped::default();
-        for sample in samples_a {
-            let mut parts = [sample.re, sample.im];
-            clipped += self.digitise(&mut parts)?;
-            *sample = Complex::new(parts[0], parts[1]);
+            sample.for_each_part(|part| {
+                let (code, kept) = self.codes(*part);
+                clipped.low += u64::from(code < kept);
+                clipped.high += u64::from(code > kept);
+                *part = kept * step_a;
+            });
         }
         Ok(clipped)
     }
@@ -131,6 +121,7 @@ impl Digitiser {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+    use num_complex::Complex;
 
     #[test]
     fn a_full_scale_tone_has_6_db_per_bit() {
@@ -157,7 +148,7 @@ mod tests {
         assert_eq!(digitiser.code(f64::INFINITY), Ok(3));
         assert_eq!(digitiser.code(-2.2), Ok(-2));
         let mut pair = [Complex::new(9.0, -1.2)];
-        assert_eq!(digitiser.digitise_complex(&mut pair).unwrap().total(), 1);
+        assert_eq!(digitiser.digitise(&mut pair).unwrap().total(), 1);
         assert_eq!(pair[0], Complex::new(3.0, -1.0));
     }
 
@@ -179,7 +170,7 @@ mod tests {
         assert!(matches!(digitiser.digitise(&mut samples), Err(Error::ElementOutOfRange { index: 1, .. })));
         assert_eq!(samples[0], 0.123);
         assert!(matches!(digitiser.code(f64::NAN), Err(Error::OutOfRange { field: "current_a", .. })));
-        let complex = digitiser.digitise_complex(&mut [Complex::new(0.0, f64::NAN)]);
+        let complex = digitiser.digitise(&mut [Complex::new(0.0, f64::NAN)]);
         assert!(matches!(complex, Err(Error::ElementOutOfRange { index: 0, .. })));
     }
 }

@@ -85,6 +85,29 @@ pub(crate) fn check_length(field: &'static str, found: usize, expected: usize) -
     if found == expected { Ok(()) } else { Err(Error::LengthMismatch { field, found, expected }) }
 }
 
+/// Elements that `accept` holds for, or [`Error::ElementOutOfRange`] with the first of which it does not.
+pub(crate) fn check_each(
+    field: &'static str,
+    values: &[f64],
+    allowed: &'static str,
+    accept: impl Fn(f64) -> bool,
+) -> Result<(), Error> {
+    match values.iter().position(|v| !accept(*v)) {
+        Some(index) => Err(Error::ElementOutOfRange { field, index, value: values[index], allowed }),
+        None => Ok(()),
+    }
+}
+
+/// [`Error::Overflow`] at the first element of a result that is not finite.
+pub(crate) fn check_overflow(field: &'static str, mut finite: impl Iterator<Item = bool>) -> Result<(), Error> {
+    finite.position(|finite| !finite).map_or(Ok(()), |index| Err(Error::Overflow { field, index }))
+}
+
+/// Elements that are finite and not negative, or [`Error::ElementOutOfRange`].
+pub(crate) fn check_amounts(field: &'static str, values: &[f64]) -> Result<(), Error> {
+    check_each(field, values, "finite and not negative", |v| v.is_finite() && v >= 0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

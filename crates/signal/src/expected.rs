@@ -6,7 +6,7 @@
 use ndarray::Array2;
 use num_complex::Complex;
 
-use crate::error::check_length;
+use crate::error::{check_length, check_overflow};
 use crate::{Error, Scratch, Shot, Simulator};
 
 impl Simulator {
@@ -24,23 +24,15 @@ impl Simulator {
         let shot = shot.into();
         check_length("out_a2", out_a2.len(), self.record().samples)?;
         shot.validate()?;
-        let line = shot.line;
-        self.prepare(line, scratch)?;
-        let gain = self.amplitude_gain_a_sqrt_s(line).powi(2);
+        self.illuminate(shot.line, &[], scratch)?;
+        let gain = self.amplitude_gain_a_sqrt_s(shot.line).powi(2);
         for (k, out) in out_a2.iter_mut().enumerate() {
             let (first, _) = scratch.window.layers_at(k);
-            let lit = scratch.window.amplitudes_at(self.pulse(), line.layer_thickness_m, k);
-            let power = |j: usize| lit.re[j] * lit.re[j] + lit.im.get(j).map_or(0.0, |im| im * im);
-            let sum: f64 = (0..lit.re.len())
-                .filter(|j| !line.radial_velocity_m_s[first + j].is_nan())
-                .map(|j| power(j) * shot.weight_per_m(first + j))
-                .sum();
-            *out = gain * sum;
+            let lit = scratch.window.amplitudes_at(self.pulse(), shot.line.layer_thickness_m, k);
+            let layers = (first..).zip(lit.amplitudes()).filter(|(layer, _)| !shot.line.is_masked(*layer));
+            *out = gain * layers.map(|(layer, f)| f.norm_sqr() * shot.weight_per_m(layer)).sum::<f64>();
         }
-        match out_a2.iter().position(|power| !power.is_finite()) {
-            Some(index) => Err(Error::Overflow { field: "out_a2", index }),
-            None => Ok(()),
-        }
+        check_overflow("out_a2", out_a2.iter().map(|power| power.is_finite()))
     }
 
     /// Writes the signal-to-noise ratio of each sample, (14), corrected: mean signal power over the noise power in the
@@ -67,22 +59,20 @@ impl Simulator {
         shot.validate()?;
         let (line, samples) = (shot.line, self.record().samples);
         let mut scratch = Scratch::default();
-        self.prepare(line, &mut scratch)?;
+        self.illuminate(line, &[], &mut scratch)?;
         let gain = self.amplitude_gain_a_sqrt_s(line);
         let mut responses = Vec::with_capacity(samples);
         for k in 0..samples {
             let (first, _) = scratch.window.layers_at(k);
             let lit = scratch.window.amplitudes_at(self.pulse(), line.layer_thickness_m, k);
-            let response = |j: usize| {
-                let velocity_m_s = line.radial_velocity_m_s[first + j];
-                if velocity_m_s.is_nan() {
+            let response = |(layer, envelope): (usize, Complex<f64>)| {
+                if line.is_masked(layer) {
                     return Complex::ZERO;
                 }
-                let envelope = Complex::new(lit.re[j], lit.im.get(j).copied().unwrap_or(0.0));
-                let phase_rad = self.phase_rate_rad_s(velocity_m_s) * self.time_s(k);
-                envelope * Complex::cis(phase_rad) * (gain * shot.weight_per_m(first + j).sqrt())
+                let phase_rad = self.phase_rate_rad_s(line.radial_velocity_m_s[layer]) * self.time_s(k);
+                envelope * Complex::cis(phase_rad) * (gain * shot.weight_per_m(layer).sqrt())
             };
-            responses.push((first, (0..lit.re.len()).map(response).collect::<Vec<_>>()));
+            responses.push((first, (first..).zip(lit.amplitudes()).map(response).collect::<Vec<_>>()));
         }
         let mut covariance = Array2::zeros((samples, samples));
         for (m, (first_m, row)) in responses.iter().enumerate() {
@@ -95,10 +85,7 @@ impl Simulator {
                 covariance[(n, m)] = sum.conj();
             }
         }
-        if covariance.iter().all(|c: &Complex<f64>| c.is_finite()) {
-            Ok(covariance)
-        } else {
-            Err(Error::Overflow { field: "covariance_a2", index: 0 })
-        }
+        check_overflow("covariance_a2", covariance.iter().map(|c: &Complex<f64>| c.is_finite()))?;
+        Ok(covariance)
     }
 }

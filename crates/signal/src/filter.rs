@@ -9,7 +9,7 @@
 //! Check: a constant is kept to round-off, a linear profile is kept (seen `c T_s/4` before R through a gate), and the
 //! discrete weights agree with a fine quadrature.
 
-use crate::error::{check, check_length, check_positive};
+use crate::error::{check, check_each, check_length, check_positive};
 use crate::{Error, Pulse, SPEED_OF_LIGHT_M_S};
 
 /// Ranges are placed between layers to this many parts of a layer, so that equal positions share their weights
@@ -58,15 +58,9 @@ impl RangeFilter {
         if window.is_empty() {
             return Err(Error::Empty { field: "window" });
         }
-        let refuse =
-            |index: usize, allowed| Error::ElementOutOfRange { field: "window", index, value: window[index], allowed };
-        if let Some(index) = window.iter().position(|h| !h.is_finite()) {
-            return Err(refuse(index, "finite"));
-        }
+        check_each("window", window, "finite", f64::is_finite)?;
         let largest = window.iter().fold(0.0_f64, |largest, h| largest.max(h.abs()));
-        if largest == 0.0 {
-            return Err(refuse(0, "not zero in every place"));
-        }
+        check_each("window", &window[..1], "not zero in every place", |_| largest > 0.0)?;
         let half = 0.5 * window.len() as f64;
         let squares = window.iter().map(|h| (h / largest) * (h / largest));
         let sum: f64 = squares.clone().sum();

@@ -11,17 +11,20 @@
 //! Check: [`literal_envelope`](crate::literal::literal_envelope) is the sum as written; the mean power is (14), whatever the layer
 //! thickness; the covariance in a uniform wind is `exp(-tau^2/(4 sigma^2)) exp(-j 4 pi v tau/lambda)`.
 
-use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
 
 use num_complex::Complex;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-use crate::error::{check, check_length};
+use crate::error::{check, check_length, check_overflow};
 use crate::kernel::Phasors;
-use crate::noise::{BasebandNoise, NoiseScratch, NoiseSource};
+use crate::noise::{BasebandNoise, NoiseScratch, RealNoise};
 use crate::window::Window;
-use crate::{Error, LineOfSight, Pulse, Receiver, Shot};
+use crate::{Error, LineOfSight, Pulse, Receiver, Sample, Shot};
 
 /// Samples after which all phasors are computed afresh, so that rounding cannot build up.
 const RENEWAL_SAMPLES: usize = 1024;
@@ -42,20 +45,28 @@ pub struct Scratch {
     phasors: Phasors,
     speckle: Vec<Complex<f64>>,
     envelope: Vec<Complex<f64>>,
-    noise: NoiseScratch,
+    pub(crate) noise: NoiseScratch,
 }
 
 /// Makes records: pulse, receiver and sampling times, planned once and used for every line and pulse.
 ///
 /// Shared between threads; each needs its own [`Scratch`] and random generator.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Simulator {
     pulse: Pulse,
     receiver: Receiver,
     record: Record,
-    noise: NoiseSource,
-    baseband_noise: BasebandNoise,
-    carrier: Vec<Complex<f64>>,
+    pub(crate) noise: Arc<RealNoise>,
+    pub(crate) baseband_noise: Arc<BasebandNoise>,
+    pub(crate) carrier: Vec<Complex<f64>>,
+}
+
+impl fmt::Debug for Simulator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { pulse, receiver, record, .. } = self;
+        let mut shown = f.debug_struct("Simulator");
+        shown.field("pulse", pulse).field("receiver", receiver).field("record", record).finish_non_exhaustive()
+    }
 }
 
 impl Simulator {
@@ -68,7 +79,7 @@ impl Simulator {
         Self::planned(pulse.into(), receiver, record)
     }
 
-    /// Plans complex records, [`Simulator::baseband_into`]: the band may be wider than a real current of this rate holds.
+    /// Plans complex records, those of `Complex<f64>`: the band may be wider than a real current of this rate holds.
     ///
     /// # Errors
     /// As [`Simulator::new`], with [`Receiver::validate_baseband`].
@@ -89,8 +100,8 @@ impl Simulator {
                 Complex::cis(2.0 * PI * (cycles - cycles.floor()))
             })
             .collect();
-        let noise = NoiseSource::new(&receiver, record.samples);
-        let baseband_noise = BasebandNoise::new(&receiver, record.samples);
+        let noise = Arc::new(RealNoise::new(&receiver, record.samples));
+        let baseband_noise = Arc::new(BasebandNoise::new(&receiver, record.samples));
         Ok(Self { pulse, receiver, record, noise, baseband_noise, carrier })
     }
 
@@ -114,60 +125,35 @@ impl Simulator {
         self.record.time_of_first_sample_s + k as f64 / self.receiver.sample_rate_hz
     }
 
-    /// Writes the measured current `i(t_k) = sqrt(2) Re{s(t_k) exp(j 2 pi f_c t_k)} + i_N`, (12) \[A\], of one pulse.
+    /// Writes the samples of one pulse \[A\]: the measured current (12) into `f64`, both quadratures of the baseband into
+    /// `Complex<f64>`; see [`Sample`].
     ///
     /// Draws, in this order: for each layer of the line, first to last, the real and the imaginary part of its speckle
     /// (masked and weightless layers too, so that they do not shift the others); then the noise: none for
-    /// [`NoiseModel::None`](crate::NoiseModel::None), one normal number per sample for `White`, two per frequency
+    /// [`NoiseModel::None`](crate::NoiseModel::None), one normal number per real number for `White`, two per frequency
     /// for `BandLimited`.
     ///
     /// # Errors
     /// As [`Shot::validate`]; [`Error::LengthMismatch`] if `out_a` has not one place per sample;
     /// [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any use; [`Error::Overflow`];
     /// [`Error::BandBeyondNyquist`] if the simulator was planned for complex records and a real one does not hold the band.
-    pub fn record_into<'a, R: Rng + ?Sized>(
+    pub fn record_into<'a, T: Sample, R: Rng + ?Sized>(
         &self,
         shot: impl Into<Shot<'a>>,
         rng: &mut R,
         scratch: &mut Scratch,
-        out_a: &mut [f64],
+        out_a: &mut [T],
     ) -> Result<(), Error> {
         check_length("out_a", out_a.len(), self.record.samples)?;
-        self.receiver.validate_band()?;
-        let mut envelope = std::mem::take(&mut scratch.envelope);
-        envelope.resize(self.record.samples, Complex::ZERO);
-        let result = self.envelope_into(shot, rng, scratch, &mut envelope);
+        T::check_band(&self.receiver)?;
+        let mut envelope_a = std::mem::take(&mut scratch.envelope);
+        envelope_a.resize(self.record.samples, Complex::ZERO);
+        let result = self.envelope_into(shot, rng, scratch, &mut envelope_a);
         if result.is_ok() {
-            for ((out, s), carrier) in out_a.iter_mut().zip(&envelope).zip(&self.carrier) {
-                *out = SQRT_2 * (s.re * carrier.re - s.im * carrier.im);
-            }
-            self.noise.add_to(rng, &mut scratch.noise, out_a);
+            T::receive(self, &envelope_a, rng, scratch, out_a);
         }
-        scratch.envelope = envelope;
+        scratch.envelope = envelope_a;
         result
-    }
-
-    /// Writes the complex baseband signal of one pulse, `s(t_k)` with circular noise of the detector band about zero
-    /// frequency \[A\]: what a receiver with two quadratures delivers.
-    ///
-    /// The real current is `sqrt(2) Re{(s + n) exp(j 2 pi f_c t)}`, so the mean square of the noise is (13), and the
-    /// signal-to-noise ratio is (14), as for [`Simulator::record_into`]. `White` noise fills `-F_s/2` to `F_s/2` with the
-    /// density of the band.
-    ///
-    /// Draws the speckle as [`Simulator::record_into`] does, then two normal numbers per sample or per frequency.
-    ///
-    /// # Errors
-    /// As [`Simulator::record_into`].
-    pub fn baseband_into<'a, R: Rng + ?Sized>(
-        &self,
-        shot: impl Into<Shot<'a>>,
-        rng: &mut R,
-        scratch: &mut Scratch,
-        out_a: &mut [Complex<f64>],
-    ) -> Result<(), Error> {
-        self.envelope_into(shot, rng, scratch, out_a)?;
-        self.baseband_noise.add_to(rng, &mut scratch.noise, out_a);
-        Ok(())
     }
 
     /// Writes the complex envelope `s(t_k)` of one pulse, (15), corrected \[A\], without noise; with the phases of the laser, the
@@ -190,14 +176,14 @@ impl Simulator {
         let mut speckle = std::mem::take(&mut scratch.speckle);
         draw_speckle(shot.line.layers(), rng, &mut speckle);
         let result = match self.is_plain(&shot) {
-            true => self.sum_into(shot, &speckle, scratch, out_a),
-            false => self.sum_with_asides_into(shot, &speckle, scratch, out_a),
+            true => self.sum_into(shot, &speckle, &[], scratch, out_a),
+            false => self.sum_with_impairments_into(shot, &speckle, scratch, out_a),
         };
         scratch.speckle = speckle;
         result
     }
 
-    /// Writes the complex envelope for given speckle amplitudes `g_l` (mean square 1), one per layer \[A\].
+    /// Writes the envelope (15) for given speckle amplitudes `g_l` (mean square 1), one per layer \[A\].
     ///
     /// # Errors
     /// As [`Simulator::record_into`]; [`Error::LengthMismatch`] if there is not one amplitude per layer.
@@ -212,46 +198,34 @@ impl Simulator {
         check_length("out_a", out_a.len(), self.record.samples)?;
         shot.validate()?;
         check_length("speckle", speckle.len(), shot.line.layers())?;
-        self.sum_into(shot, speckle, scratch, out_a)
+        self.sum_into(shot, speckle, &[], scratch, out_a)
     }
 
-    /// The sum (15) of a shot that is valid, with one amplitude per layer.
-    fn sum_into(
+    /// The sum (15) of a shot that is valid, with one amplitude per layer; `phases` are those of the laser
+    /// over the lit layers, none for a quiet one.
+    pub(crate) fn sum_into(
         &self,
         shot: Shot<'_>,
         speckle: &[Complex<f64>],
-        scratch: &mut Scratch,
-        out_a: &mut [Complex<f64>],
-    ) -> Result<(), Error> {
-        self.prepare(shot.line, scratch)?;
-        self.sum_prepared_into(shot, speckle, scratch, out_a)
-    }
-
-    /// The same with a window that is prepared for the line.
-    pub(crate) fn sum_prepared_into(
-        &self,
-        shot: Shot<'_>,
-        speckle: &[Complex<f64>],
+        phases: &[Complex<f64>],
         scratch: &mut Scratch,
         out_a: &mut [Complex<f64>],
     ) -> Result<(), Error> {
         let line = shot.line;
+        self.illuminate(line, phases, scratch)?;
         let Scratch { window, phasors, .. } = scratch;
         phasors.resize(line.layers());
         for (block, outs) in out_a.chunks_mut(RENEWAL_SAMPLES).enumerate() {
             let start = block * RENEWAL_SAMPLES;
-            self.renew(shot, speckle, window, phasors, start, outs.len());
-            for (i, out) in outs.iter_mut().enumerate() {
-                let (first, _) = window.layers_at(start + i);
-                let envelope = window.amplitudes_at(&self.pulse, line.layer_thickness_m, start + i);
+            self.renew(shot, speckle, window, phasors, start..start + outs.len());
+            for (k, out) in (start..).zip(outs) {
+                let (first, _) = window.layers_at(k);
+                let envelope = window.amplitudes_at(&self.pulse, line.layer_thickness_m, k);
                 let (re, im) = phasors.sum_and_rotate(first, envelope);
                 *out = Complex::new(re, im);
             }
         }
-        match out_a.iter().position(|s| !s.is_finite()) {
-            Some(index) => Err(Error::Overflow { field: "out_a", index }),
-            None => Ok(()),
-        }
+        check_overflow("out_a", out_a.iter().map(|s| s.is_finite()))
     }
 
     /// `sqrt(2) S sqrt(E_t P_LO) sqrt(DeltaR)`: what `f b_l` is multiplied with in (15) \[A s^1/2 m^1/2\].
@@ -265,54 +239,45 @@ impl Simulator {
         -4.0 * PI * radial_velocity_m_s / self.receiver.wavelength_m
     }
 
-    pub(crate) fn prepare(&self, line: &LineOfSight, scratch: &mut Scratch) -> Result<(), Error> {
-        scratch.window.prepare(
-            &self.pulse,
-            line,
-            self.record.time_of_first_sample_s,
-            1.0 / self.receiver.sample_rate_hz,
-            self.record.samples,
-        )
+    /// Finds which layers of a line the pulse lights at each sample; `phases` as in [`Simulator::sum_into`].
+    pub(crate) fn illuminate(
+        &self,
+        line: &LineOfSight,
+        phases: &[Complex<f64>],
+        scratch: &mut Scratch,
+    ) -> Result<(), Error> {
+        scratch.window.prepare(&self.pulse, line, phases, &self.record, self.receiver.sample_rate_hz)
     }
 
-    /// Sets the phasors of all layers that are lit in the `samples` samples from `start`: each as it is at `start`, or at
-    /// the first sample that lights it.
+    /// Sets the phasors of all layers that are lit in some samples, each as it is at the first of them that lights it, and their
+    /// rotation per sample; nothing returns from a masked layer.
     fn renew(
         &self,
         shot: Shot<'_>,
         speckle: &[Complex<f64>],
         window: &Window,
         phasors: &mut Phasors,
-        start: usize,
-        samples: usize,
+        samples: Range<usize>,
     ) {
         let line = shot.line;
         let gain = self.amplitude_gain_a_sqrt_s(line);
-        let mut next = window.layers_at(start).0;
-        for k in start..start + samples {
+        let interval_s = 1.0 / self.receiver.sample_rate_hz;
+        let mut next = window.layers_at(samples.start).0;
+        for k in samples {
             let time_s = self.time_s(k);
             let (first, end) = window.layers_at(k);
-            let from = next.max(first);
-            for (layer, g) in (from..end).zip(&speckle[from.min(end)..end]) {
-                let velocity_m_s = line.radial_velocity_m_s[layer];
-                let amplitude = gain * shot.weight_per_m(layer).sqrt() * g;
-                self.set_phasor(phasors, layer, velocity_m_s, amplitude, time_s);
+            for layer in next.max(first)..end {
+                let amplitude = gain * shot.weight_per_m(layer).sqrt() * speckle[layer];
+                let rate_rad_s = self.phase_rate_rad_s(line.radial_velocity_m_s[layer]);
+                let (phasor, rotation) = match rate_rad_s.is_nan() {
+                    true => (Complex::ZERO, Complex::ONE),
+                    false => (amplitude * Complex::cis(rate_rad_s * time_s), Complex::cis(rate_rad_s * interval_s)),
+                };
+                (phasors.re[layer], phasors.im[layer]) = (phasor.re, phasor.im);
+                (phasors.rotation_re[layer], phasors.rotation_im[layer]) = (rotation.re, rotation.im);
             }
             next = next.max(end);
         }
-    }
-
-    /// Sets the phasor of one layer as it is at `time_s`, and its rotation per sample; nothing returns from a masked layer.
-    fn set_phasor(&self, phasors: &mut Phasors, layer: usize, velocity_m_s: f64, amplitude: Complex<f64>, time_s: f64) {
-        let (phasor, rotation) = if velocity_m_s.is_nan() {
-            (Complex::ZERO, Complex::ONE)
-        } else {
-            let rate = self.phase_rate_rad_s(velocity_m_s);
-            let interval_s = 1.0 / self.receiver.sample_rate_hz;
-            (amplitude * Complex::cis(rate * time_s), Complex::cis(rate * interval_s))
-        };
-        (phasors.re[layer], phasors.im[layer]) = (phasor.re, phasor.im);
-        (phasors.rotation_re[layer], phasors.rotation_im[layer]) = (rotation.re, rotation.im);
     }
 }
 

@@ -41,7 +41,8 @@
 //! | [`receiver`] | sampling, responsivity, noise power (13), signal-to-noise ratio (14); what a real receiver adds |
 //! | [`transmitter`] | energy against repetition rate, Brillouin threshold |
 //! | `heterodyne` | [`Simulator`]: one record per pulse, (15), (12), fast form |
-//! | `asides` | what a signal holds beside (15): laser phases, reflex of the telescope, echo of the pulse before |
+//! | `sample` | [`Sample`]: the current, or both quadratures of the baseband |
+//! | `impairments` | effects beside (15): laser phases, reflex of the telescope, echo of the pulse before |
 //! | `window`, `kernel` | which layers are lit at a sample; the inner loop |
 //! | [`literal`] | the same sum term by term, as oracle |
 //! | `noise` | band-limited or white shot noise, real or complex |
@@ -53,7 +54,6 @@
 //!
 //! Feature `rayon` (default): the pulses of a scan in the caller's thread pool; the bits of the result do not depend on it.
 
-mod asides;
 pub mod constants;
 pub mod digitise;
 pub mod efficiency;
@@ -61,6 +61,7 @@ mod error;
 mod expected;
 mod filter;
 mod heterodyne;
+mod impairments;
 mod kernel;
 mod line;
 pub mod literal;
@@ -70,6 +71,7 @@ mod parallel;
 mod piecewise;
 mod pulse;
 pub mod receiver;
+mod sample;
 pub mod sampled;
 pub mod scan;
 mod shot;
@@ -86,6 +88,7 @@ pub use line::{LayerLimits, LineOfSight};
 pub use medium::Medium;
 pub use pulse::{GaussianPulse, PulseDuration};
 pub use receiver::{NoiseModel, Receiver};
+pub use sample::Sample;
 pub use scan::Scan;
 pub use shot::Shot;
 pub use transmitted::Pulse;

@@ -3,7 +3,7 @@
 //!
 //! Check: the thickness divides the range step of one sample and obeys the rule of the steepest gradient.
 
-use crate::error::{check, check_length, check_positive};
+use crate::error::{check, check_amounts, check_each, check_length, check_positive};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 
 /// The air along one line of sight, cut into layers of equal thickness.
@@ -34,22 +34,19 @@ impl LineOfSight {
             return Err(Error::Empty { field: "radial_velocity_m_s" });
         }
         check_length("weight_per_m", self.weight_per_m.len(), self.radial_velocity_m_s.len())?;
-        let refuse = |field, allowed, list: &[f64], bad: &dyn Fn(f64) -> bool| match list.iter().position(|&v| bad(v)) {
-            Some(index) => Err(Error::ElementOutOfRange { field, index, value: list[index], allowed }),
-            None => Ok(()),
-        };
-        refuse(
-            "radial_velocity_m_s",
-            "finite, or NaN where there are no scatterers",
-            &self.radial_velocity_m_s,
-            &|v| v.is_infinite(),
-        )?;
-        refuse("weight_per_m", "finite and not negative", &self.weight_per_m, &|w| !(w.is_finite() && w >= 0.0))
+        let allowed = "finite, or NaN where there are no scatterers";
+        check_each("radial_velocity_m_s", &self.radial_velocity_m_s, allowed, |v| !v.is_infinite())?;
+        check_amounts("weight_per_m", &self.weight_per_m)
     }
 
     /// Number of layers.
     pub fn layers(&self) -> usize {
         self.radial_velocity_m_s.len()
+    }
+
+    /// Whether nothing returns from layer `index`.
+    pub(crate) fn is_masked(&self, index: usize) -> bool {
+        self.radial_velocity_m_s[index].is_nan()
     }
 
     /// Range of the centre of layer `index` \[m\].

@@ -3,7 +3,7 @@
 //! Check: uniform air gives the closed form; extinction integrates exactly, so a table of more points with the same values
 //! changes nothing; a cloud darkens what lies behind it.
 
-use crate::error::check_positive;
+use crate::error::{check_each, check_positive};
 use crate::table::{check_ranges, check_values, locate, value};
 use crate::{Error, LineOfSight};
 
@@ -27,10 +27,7 @@ impl Medium {
     /// value that is negative or not finite; [`Error::LengthMismatch`] unless there is one value per range.
     pub fn new(range_m: Vec<f64>, backscatter_per_m_sr: Vec<f64>, extinction_per_m: Vec<f64>) -> Result<Self, Error> {
         check_ranges(&range_m)?;
-        if range_m[0] < 0.0 {
-            let allowed = "not negative";
-            return Err(Error::ElementOutOfRange { field: "range_m", index: 0, value: range_m[0], allowed });
-        }
+        check_each("range_m", &range_m, "not negative", |r| r >= 0.0)?;
         check_values("backscatter_per_m_sr", &backscatter_per_m_sr, range_m.len())?;
         check_values("extinction_per_m", &extinction_per_m, range_m.len())?;
         let mut depth = vec![range_m[0] * extinction_per_m[0]];

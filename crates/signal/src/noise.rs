@@ -7,7 +7,6 @@
 //!
 //! Check: variance (13); nothing outside the band; flat inside.
 
-use std::fmt;
 use std::sync::Arc;
 
 use num_complex::Complex;
@@ -26,58 +25,47 @@ pub(crate) struct NoiseScratch {
     transform: Vec<Complex<f64>>,
 }
 
-/// Complex circular noise of one receiver about zero frequency, for records of one length.
-#[derive(Clone)]
-pub(crate) enum BasebandNoise {
+/// Noise of one receiver for records of one length; `T` is the transform from its spectrum.
+pub(crate) enum Noise<T: ?Sized> {
     None,
-    /// Standard deviation of each part.
+    /// Standard deviation of a sample, or of each part of a complex one.
     White {
         sd_a: f64,
     },
     Band {
-        transform: Arc<dyn Fft<f64>>,
-        /// Standard deviation of each part at the frequencies 0, 1, ... and, of the same size, at their mirrors.
+        transform: Arc<T>,
+        /// Index of the first frequency of the band.
+        first: usize,
+        /// Standard deviation of the real and of the imaginary part at each frequency from `first` on.
         sd_a: Vec<f64>,
     },
 }
 
-/// Noise of one receiver for records of one length.
-#[derive(Clone)]
-pub(crate) enum NoiseSource {
-    None,
-    White { sd_a: f64 },
-    Band(BandNoise),
-}
+/// Noise of the measured current, at the intermediate frequency.
+pub(crate) type RealNoise = Noise<dyn ComplexToReal<f64>>;
 
-impl fmt::Debug for NoiseSource {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::None => f.write_str("None"),
-            Self::White { sd_a } => write!(f, "White {{ sd_a: {sd_a} }}"),
-            Self::Band(band) => write!(f, "Band {{ frequencies: {} }}", band.sd_a.len()),
-        }
-    }
-}
+/// Complex circular noise about zero frequency.
+pub(crate) type BasebandNoise = Noise<dyn Fft<f64>>;
 
-/// Noise synthesised from the frequencies of its band.
-#[derive(Clone)]
-pub(crate) struct BandNoise {
-    transform: Arc<dyn ComplexToReal<f64>>,
-    /// Index of the first frequency of the band.
-    first: usize,
-    /// Standard deviation of the real and of the imaginary part at each frequency from `first` on.
-    sd_a: Vec<f64>,
-}
-
-impl NoiseSource {
+impl RealNoise {
     pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {
+        let density_a2_hz = receiver.noise_density_a2_hz();
         match receiver.noise {
             NoiseModel::None => Self::None,
-            NoiseModel::White => {
-                let variance_a2 = receiver.noise_density_a2_hz() * 0.5 * receiver.sample_rate_hz;
-                Self::White { sd_a: variance_a2.sqrt() }
+            NoiseModel::White => Self::White { sd_a: (density_a2_hz * 0.5 * receiver.sample_rate_hz).sqrt() },
+            NoiseModel::BandLimited => {
+                let length = smooth_even_length(2 * samples);
+                let (centre_hz, half_hz) = (receiver.intermediate_frequency_hz, 0.5 * receiver.bandwidth_hz);
+                let cell_hz = receiver.sample_rate_hz / length as f64;
+                let last = length / 2;
+                let (first, width_hz) = cells_of_band((centre_hz - half_hz, centre_hz + half_hz), cell_hz, last);
+                let sd_a = (first..).zip(width_hz).map(|(cell, width_hz)| {
+                    let sd_a = (density_a2_hz * width_hz).sqrt();
+                    // Inside, a frequency and its mirror give 2 Re{X}: variance 4 sd^2. The two ends have no mirror.
+                    if cell == 0 || cell == last { sd_a } else { 0.5 * sd_a }
+                });
+                Self::Band { transform: RealFftPlanner::new().plan_fft_inverse(length), first, sd_a: sd_a.collect() }
             }
-            NoiseModel::BandLimited => Self::Band(BandNoise::new(receiver, samples)),
         }
     }
 
@@ -86,68 +74,22 @@ impl NoiseSource {
         match self {
             Self::None => {}
             Self::White { sd_a } => {
-                for out in out_a {
-                    let normal: f64 = rng.sample(StandardNormal);
-                    *out += sd_a * normal;
-                }
+                out_a.iter_mut().for_each(|out| *out += sd_a * rng.sample::<f64, _>(StandardNormal));
             }
-            Self::Band(band) => band.add_to(rng, scratch, out_a),
-        }
-    }
-}
-
-impl BandNoise {
-    fn new(receiver: &Receiver, samples: usize) -> Self {
-        let length = smooth_even_length(2 * samples);
-        let cell_hz = receiver.sample_rate_hz / length as f64;
-        let low_hz = receiver.intermediate_frequency_hz - 0.5 * receiver.bandwidth_hz;
-        let high_hz = receiver.intermediate_frequency_hz + 0.5 * receiver.bandwidth_hz;
-        let density = receiver.noise_density_a2_hz();
-        let last = length / 2;
-        let first = ((low_hz / cell_hz - 0.5).ceil().max(0.0) as usize).min(last);
-        let end = ((high_hz / cell_hz + 0.5).floor() as usize).min(last);
-        let sd_a = (first..=end)
-            .map(|bin| {
-                let centre_hz = bin as f64 * cell_hz;
-                let upper = (centre_hz + 0.5 * cell_hz).min(high_hz);
-                let lower = (centre_hz - 0.5 * cell_hz).max(low_hz);
-                let variance_a2 = density * (upper - lower).max(0.0);
-                // Inside, a frequency and its mirror give 2 Re{X}: variance 4 sd^2. The two ends have no mirror.
-                if bin == 0 || bin == last { variance_a2.sqrt() } else { 0.5 * variance_a2.sqrt() }
-            })
-            .collect();
-        let transform = RealFftPlanner::new().plan_fft_inverse(length);
-        Self { transform, first, sd_a }
-    }
-
-    fn add_to<R: Rng + ?Sized>(&self, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [f64]) {
-        let length = self.transform.len();
-        scratch.spectrum.clear();
-        scratch.spectrum.resize(length / 2 + 1, Complex::ZERO);
-        scratch.circular.resize(length, 0.0);
-        scratch.transform.resize(self.transform.get_scratch_len(), Complex::ZERO);
-        for (value, sd) in scratch.spectrum[self.first..].iter_mut().zip(&self.sd_a) {
-            let re: f64 = rng.sample(StandardNormal);
-            let im: f64 = rng.sample(StandardNormal);
-            *value = Complex::new(re, im) * *sd;
-        }
-        scratch.spectrum[0].im = 0.0;
-        scratch.spectrum[length / 2].im = 0.0;
-        let done =
-            self.transform.process_with_scratch(&mut scratch.spectrum, &mut scratch.circular, &mut scratch.transform);
-        debug_assert!(done.is_ok(), "buffers have the lengths of the plan and the end frequencies are real");
-        for (out, noise) in out_a.iter_mut().zip(&scratch.circular) {
-            *out += noise;
-        }
-    }
-}
-
-impl fmt::Debug for BasebandNoise {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::None => f.write_str("None"),
-            Self::White { sd_a } => write!(f, "White {{ sd_a: {sd_a} }}"),
-            Self::Band { sd_a, .. } => write!(f, "Band {{ frequencies: {} }}", 2 * sd_a.len() - 1),
+            Self::Band { transform, first, sd_a } => {
+                let NoiseScratch { spectrum, circular, transform: work } = scratch;
+                let length = transform.len();
+                spectrum.clear();
+                spectrum.resize(length / 2 + 1, Complex::ZERO);
+                circular.resize(length, 0.0);
+                work.resize(transform.get_scratch_len(), Complex::ZERO);
+                spectrum[*first..].iter_mut().zip(sd_a).for_each(|(value, sd_a)| *value = normal(rng, *sd_a));
+                spectrum[0].im = 0.0;
+                spectrum[length / 2].im = 0.0;
+                let done = transform.process_with_scratch(spectrum, circular, work);
+                debug_assert!(done.is_ok(), "buffers have the lengths of the plan and the end frequencies are real");
+                out_a.iter_mut().zip(circular).for_each(|(out, noise)| *out += *noise);
+            }
         }
     }
 }
@@ -155,69 +97,74 @@ impl fmt::Debug for BasebandNoise {
 impl BasebandNoise {
     pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {
         // A complex envelope has its power on both sides of zero, with the one-sided density of the real noise.
-        let density = receiver.noise_density_a2_hz();
+        let density_a2_hz = 0.5 * receiver.noise_density_a2_hz();
         match receiver.noise {
             NoiseModel::None => Self::None,
-            NoiseModel::White => Self::White { sd_a: (0.5 * density * receiver.sample_rate_hz).sqrt() },
+            NoiseModel::White => Self::White { sd_a: (density_a2_hz * receiver.sample_rate_hz).sqrt() },
             NoiseModel::BandLimited => {
                 let length = smooth_even_length(2 * samples);
-                let cell_hz = receiver.sample_rate_hz / length as f64;
                 let edge_hz = 0.5 * receiver.bandwidth_hz;
-                let last = ((edge_hz / cell_hz + 0.5).floor() as usize).min(length / 2 - 1);
-                let sd_a = (0..=last)
-                    .map(|bin| {
-                        let centre_hz = bin as f64 * cell_hz;
-                        let upper_hz = (centre_hz + 0.5 * cell_hz).min(edge_hz);
-                        let lower_hz = (centre_hz - 0.5 * cell_hz).max(-edge_hz);
-                        (0.5 * density * (upper_hz - lower_hz).max(0.0)).sqrt()
-                    })
-                    .collect();
-                Self::Band { transform: FftPlanner::new().plan_fft_inverse(length), sd_a }
+                let cell_hz = receiver.sample_rate_hz / length as f64;
+                let (first, width_hz) = cells_of_band((-edge_hz, edge_hz), cell_hz, length / 2 - 1);
+                let sd_a = width_hz.into_iter().map(|width_hz| (density_a2_hz * width_hz).sqrt()).collect();
+                Self::Band { transform: FftPlanner::new().plan_fft_inverse(length), first, sd_a }
             }
         }
     }
 
     /// Adds the noise of one record to `out_a`.
     pub(crate) fn add_to<R: Rng + ?Sized>(&self, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [Complex<f64>]) {
-        let mut normal = |sd_a: f64| {
-            let (re, im): (f64, f64) = (rng.sample(StandardNormal), rng.sample(StandardNormal));
-            Complex::new(re, im) * sd_a
-        };
         match self {
             Self::None => {}
-            Self::White { sd_a } => out_a.iter_mut().for_each(|out| *out += normal(*sd_a)),
-            Self::Band { transform, sd_a } => {
+            Self::White { sd_a } => out_a.iter_mut().for_each(|out| *out += normal(rng, *sd_a)),
+            Self::Band { transform, first, sd_a } => {
+                let NoiseScratch { spectrum, transform: work, .. } = scratch;
                 let length = transform.len();
-                scratch.spectrum.clear();
-                scratch.spectrum.resize(length, Complex::ZERO);
-                scratch.transform.resize(transform.get_inplace_scratch_len(), Complex::ZERO);
-                for (bin, sd_a) in sd_a.iter().enumerate() {
-                    scratch.spectrum[bin] = normal(*sd_a);
-                    if bin > 0 {
-                        scratch.spectrum[length - bin] = normal(*sd_a);
+                spectrum.clear();
+                spectrum.resize(length, Complex::ZERO);
+                work.resize(transform.get_inplace_scratch_len(), Complex::ZERO);
+                for (cell, sd_a) in (*first..).zip(sd_a) {
+                    spectrum[cell] = normal(rng, *sd_a);
+                    if cell > 0 {
+                        spectrum[length - cell] = normal(rng, *sd_a);
                     }
                 }
-                transform.process_with_scratch(&mut scratch.spectrum, &mut scratch.transform);
-                out_a.iter_mut().zip(&scratch.spectrum).for_each(|(out, noise)| *out += noise);
+                transform.process_with_scratch(spectrum, work);
+                out_a.iter_mut().zip(spectrum).for_each(|(out, noise)| *out += *noise);
             }
         }
     }
 }
 
+/// A complex number whose parts have the standard deviation `sd_a`.
+fn normal<R: Rng + ?Sized>(rng: &mut R, sd_a: f64) -> Complex<f64> {
+    let re: f64 = rng.sample(StandardNormal);
+    let im: f64 = rng.sample(StandardNormal);
+    Complex::new(re, im) * sd_a
+}
+
+/// The cells of a spectrum, from the one about zero to `last`, that a band reaches: the first of them, and how much of each lies
+/// in the band \[Hz\].
+fn cells_of_band((low_hz, high_hz): (f64, f64), cell_hz: f64, last: usize) -> (usize, Vec<f64>) {
+    let first = ((low_hz / cell_hz - 0.5).ceil().max(0.0) as usize).min(last);
+    let end = ((high_hz / cell_hz + 0.5).floor() as usize).min(last);
+    let width_hz = |cell: usize| {
+        let centre_hz = cell as f64 * cell_hz;
+        ((centre_hz + 0.5 * cell_hz).min(high_hz) - (centre_hz - 0.5 * cell_hz).max(low_hz)).max(0.0)
+    };
+    (first, (first..=end).map(width_hz).collect())
+}
+
 /// Smallest even product of powers of 2, 3 and 5 that is at least `least` (and 512, so that the band of a short
 /// record is resolved).
 fn smooth_even_length(least: usize) -> usize {
-    let mut length = least.max(512).next_multiple_of(2);
-    loop {
-        let mut rest: usize = length;
-        for factor in [2, 3, 5] {
+    let is_smooth = |length: &usize| {
+        [2, 3, 5].into_iter().fold(*length, |mut rest, factor| {
             while rest.is_multiple_of(factor) {
                 rest /= factor;
             }
-        }
-        if rest == 1 {
-            return length;
-        }
-        length += 2;
-    }
+            rest
+        }) == 1
+    };
+    (least.max(512).next_multiple_of(2)..).step_by(2).find(is_smooth).unwrap_or(least)
 }

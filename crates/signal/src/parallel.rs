@@ -22,16 +22,3 @@ pub(crate) fn map_chunks<T: Send, S, O: Send>(
         data.chunks_mut(size).enumerate().map(|(index, chunk)| f(&mut worker, index, chunk)).collect()
     }
 }
-
-/// `f(index)` for every index below `count`.
-pub(crate) fn map_indices<O: Send>(count: usize, f: impl Fn(usize) -> O + Sync + Send) -> Vec<O> {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        (0..count).into_par_iter().map(f).collect()
-    }
-    #[cfg(not(feature = "rayon"))]
-    {
-        (0..count).map(f).collect()
-    }
-}

@@ -8,7 +8,7 @@ use num_complex::Complex;
 use rustfft::FftPlanner;
 
 use crate::Error;
-use crate::error::{check, check_length, check_positive};
+use crate::error::{check, check_amounts, check_each, check_length, check_positive};
 use crate::piecewise::{Moments, Piecewise};
 
 /// Energy cut off at each end, as a part of the whole.
@@ -41,10 +41,11 @@ pub enum Resampling {
 /// A transmitted pulse of any sampled shape.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampledPulse {
-    envelope: Piecewise,
-    moments: Moments,
-    energy_j: f64,
-    real: bool,
+    pub(crate) envelope: Piecewise,
+    pub(crate) moments: Moments,
+    pub(crate) energy_j: f64,
+    /// Whether the envelope has no imaginary part.
+    pub(crate) real: bool,
 }
 
 impl SampledPulse {
@@ -86,10 +87,7 @@ impl SampledPulse {
     /// # Errors
     /// As [`SampledPulse::new`]; [`Error::ElementOutOfRange`] for a negative power.
     pub fn from_power(time_s: &[f64], power: &[f64], resampling: Resampling, energy_j: f64) -> Result<Self, Error> {
-        if let Some(index) = power.iter().position(|p| !(p.is_finite() && *p >= 0.0)) {
-            let allowed = "finite and not negative";
-            return Err(Error::ElementOutOfRange { field: "power", index, value: power[index], allowed });
-        }
+        check_amounts("power", power)?;
         let amplitude: Vec<_> = power.iter().map(|p| Complex::new(p.sqrt(), 0.0)).collect();
         Self::new(time_s, &amplitude, resampling, energy_j)
     }
@@ -103,28 +101,9 @@ impl SampledPulse {
         self
     }
 
-    /// Energy of the pulse, `E_t` \[J\].
-    pub fn energy_j(&self) -> f64 {
-        self.energy_j
-    }
-
-    /// First and last time at which the envelope is not zero \[s\].
-    pub fn support_s(&self) -> (f64, f64) {
-        self.envelope.support_s()
-    }
-
     /// Complex envelope `f(t)` \[s^-1/2\]; `|f|^2` integrates to 1.
     pub fn envelope_per_sqrt_s(&self, time_s: f64) -> Complex<f64> {
         self.envelope.value(time_s)
-    }
-
-    /// Whether the envelope has no imaginary part.
-    pub(crate) fn is_real(&self) -> bool {
-        self.real
-    }
-
-    pub(crate) fn moments(&self) -> &Moments {
-        &self.moments
     }
 }
 
@@ -133,9 +112,7 @@ fn check_samples(time_s: &[f64], amplitude: &[Complex<f64>]) -> Result<f64, Erro
     check("samples of the envelope", time_s.len() as f64, "2 or more", |n| n >= 2.0)?;
     check_length("amplitude", amplitude.len(), time_s.len())?;
     let bad_time = |index, allowed| Error::ElementOutOfRange { field: "time_s", index, value: time_s[index], allowed };
-    if let Some(index) = time_s.iter().position(|t| !t.is_finite()) {
-        return Err(bad_time(index, "finite"));
-    }
+    check_each("time_s", time_s, "finite", f64::is_finite)?;
     if let Some(before) = time_s.windows(2).position(|t| t[1] <= t[0]) {
         return Err(bad_time(before + 1, "later than the time before"));
     }
@@ -229,11 +206,11 @@ mod tests {
         let power: Vec<f64> = times.iter().map(|t| gaussian().intensity_per_s(*t)).collect();
         let late: Vec<f64> = times.iter().map(|t| t + 3e-6).collect();
         let pulse = SampledPulse::from_power(&late, &power, Resampling::CubicSpline, 1e-4).unwrap();
-        assert_relative_eq!(pulse.moments().mean_s, 3e-6, max_relative = 1e-9);
+        assert_relative_eq!(pulse.moments.mean_s, 3e-6, max_relative = 1e-9);
         let centred = pulse.centred();
-        assert!(centred.moments().mean_s.abs() < 1e-15);
-        assert_relative_eq!(centred.moments().square_s2, 0.5 * gaussian().sigma_s().powi(2), max_relative = 1e-5);
-        let (first, last) = centred.support_s();
+        assert!(centred.moments.mean_s.abs() < 1e-15);
+        assert_relative_eq!(centred.moments.square_s2, 0.5 * gaussian().sigma_s().powi(2), max_relative = 1e-5);
+        let (first, last) = centred.envelope.support_s();
         assert!(first < -3.7 * gaussian().sigma_s() && last > 3.7 * gaussian().sigma_s());
         assert!(first > -4.0 * gaussian().sigma_s() && last < 4.0 * gaussian().sigma_s());
     }

@@ -1,26 +1,20 @@
 //! The pulses of a whole scan: in parallel, in bounded memory, with one random stream for each pulse.
 //!
-//! Pulses are numbered line after line and made in batches of fixed size; what is done with them happens in their order, or
-//! in blocks of fixed size whose results are merged in order. So neither the numbers nor their sums depend on the number of
-//! threads.
+//! Pulses are numbered line after line and made in batches of fixed size; what is done with them happens in their order. So neither
+//! the numbers nor their sums depend on the number of threads.
 //!
-//! Check: records of a scan are those made one by one; sums have the same bits with 1, 2 and 5 threads.
+//! Check: records of a scan are those made one by one; they have the same bits with 1, 2 and 5 threads.
 
 use ndarray::Array2;
-use num_complex::Complex;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::digitise::{Clipped, Digitiser};
-use crate::parallel::{map_chunks, map_indices};
-use crate::{Error, Scratch, Shot, Simulator};
+use crate::parallel::map_chunks;
+use crate::{Error, Sample, Scratch, Shot, Simulator};
 
 /// Records that are in memory at a time.
 const BATCH: usize = 256;
-
-/// Records summed one after the other by [`Scan::fold`], and blocks of them that are in memory at a time.
-const BLOCK: usize = 32;
-const BLOCKS: usize = 128;
 
 /// Which pulse of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -50,42 +44,6 @@ pub fn pulse_generator(seed: u64, key: PulseKey) -> Xoshiro256PlusPlus {
         bytes.copy_from_slice(&hash.to_le_bytes());
     }
     Xoshiro256PlusPlus::from_seed(state)
-}
-
-/// The two kinds of samples: `f64`, the current at the intermediate frequency
-/// ([`Simulator::record_into`]), and `Complex<f64>`, the baseband ([`Simulator::baseband_into`]).
-pub trait Sample: sealed::Make {}
-
-impl Sample for f64 {}
-impl Sample for Complex<f64> {}
-
-mod sealed {
-    use super::{Clipped, Complex, Digitiser, Error, Rng, Scratch, Shot, Simulator};
-
-    pub trait Make: Copy + Default + Send + Sync {
-        fn make<R: Rng>(s: &Simulator, shot: Shot<'_>, rng: R, w: &mut Scratch, out: &mut [Self]) -> Result<(), Error>;
-        fn digitise(digitiser: &Digitiser, samples: &mut [Self]) -> Result<Clipped, Error>;
-    }
-
-    impl Make for f64 {
-        fn make<R: Rng>(s: &Simulator, shot: Shot<'_>, rng: R, w: &mut Scratch, out: &mut [Self]) -> Result<(), Error> {
-            s.record_into(shot, &mut { rng }, w, out)
-        }
-
-        fn digitise(digitiser: &Digitiser, samples: &mut [Self]) -> Result<Clipped, Error> {
-            digitiser.digitise(samples)
-        }
-    }
-
-    impl Make for Complex<f64> {
-        fn make<R: Rng>(s: &Simulator, shot: Shot<'_>, rng: R, w: &mut Scratch, out: &mut [Self]) -> Result<(), Error> {
-            s.baseband_into(shot, &mut { rng }, w, out)
-        }
-
-        fn digitise(digitiser: &Digitiser, samples: &mut [Self]) -> Result<Clipped, Error> {
-            digitiser.digitise_complex(samples)
-        }
-    }
 }
 
 /// A scan: which pulses there are, what each meets, and its random numbers.
@@ -132,10 +90,7 @@ where
         for first in (0..self.records()).step_by(BATCH) {
             let count = BATCH.min(self.records() - first);
             let rows = &mut batch_a[..count * samples];
-            let made = map_chunks(rows, samples, Scratch::default, |scratch, i, out| {
-                self.make(self.key(first + i), scratch, out)
-            });
-            for ((i, result), row) in made.into_iter().enumerate().zip(rows.chunks(samples)) {
+            for ((i, result), row) in self.make(first, rows).into_iter().enumerate().zip(rows.chunks(samples)) {
                 clipped += result?;
                 sink(self.key(first + i), row)?;
             }
@@ -143,52 +98,16 @@ where
         Ok(clipped)
     }
 
-    /// Sums up the records in parallel: each block of records is added, in order, to an accumulator of its own made by
-    /// `new`; `merge` joins them in order. Memory is bounded by some hundred accumulators.
-    ///
-    /// # Errors
-    /// As [`Scan::for_each`], with the errors of `add`.
-    pub fn fold<T: Sample, A: Send, E: From<Error> + Send>(
-        &self,
-        new: impl Fn() -> A + Sync + Send,
-        add: impl Fn(&mut A, PulseKey, &[T]) -> Result<(), E> + Sync + Send,
-        mut merge: impl FnMut(&mut A, A),
-    ) -> Result<(A, Clipped), E> {
-        let block = |index: usize| -> Result<(A, Clipped), E> {
-            let (mut sum, mut clipped, mut scratch) = (new(), Clipped::default(), Scratch::default());
-            let mut row_a = vec![T::default(); self.simulator.record().samples];
-            for record in index * BLOCK..((index + 1) * BLOCK).min(self.records()) {
-                clipped += self.make(self.key(record), &mut scratch, &mut row_a)?;
-                add(&mut sum, self.key(record), &row_a)?;
-            }
-            Ok((sum, clipped))
-        };
-        let blocks = self.records().div_ceil(BLOCK);
-        let (mut sum, mut clipped) = (new(), Clipped::default());
-        for first in (0..blocks).step_by(BLOCKS) {
-            for part in map_indices(BLOCKS.min(blocks - first), |i| block(first + i)) {
-                let (part, part_clipped) = part?;
-                merge(&mut sum, part);
-                clipped += part_clipped;
-            }
-        }
-        Ok((sum, clipped))
-    }
-
     /// All records in memory \[record, sample\], A, the pulses of a line together; and how many samples were clipped.
     ///
     /// # Errors
     /// As [`Scan::for_each`].
     pub fn collect<T: Sample>(&self) -> Result<(Array2<T>, Clipped), Error> {
-        let samples = self.simulator.record().samples;
-        let mut records_a = Array2::from_elem((self.records(), samples), T::default());
+        let mut records_a = Array2::from_elem((self.records(), self.simulator.record().samples), T::default());
+        let made = records_a.as_slice_mut().map_or_else(Vec::new, |rows| self.make(0, rows));
         let mut clipped = Clipped::default();
-        if let Some(rows) = records_a.as_slice_mut() {
-            let made =
-                map_chunks(rows, samples, Scratch::default, |scratch, i, out| self.make(self.key(i), scratch, out));
-            for result in made {
-                clipped += result?;
-            }
+        for result in made {
+            clipped += result?;
         }
         Ok((records_a, clipped))
     }
@@ -197,11 +116,12 @@ where
         PulseKey { line: record / self.pulses_per_line, pulse: record % self.pulses_per_line }
     }
 
-    fn make<T: Sample>(&self, key: PulseKey, scratch: &mut Scratch, out_a: &mut [T]) -> Result<Clipped, Error> {
-        T::make(self.simulator, (self.shot)(key), (self.generator)(key), scratch, out_a)?;
-        match &self.digitiser {
-            Some(digitiser) => T::digitise(digitiser, out_a),
-            None => Ok(Clipped::default()),
-        }
+    /// Makes the records from `first` on, in parallel.
+    fn make<T: Sample>(&self, first: usize, rows_a: &mut [T]) -> Vec<Result<Clipped, Error>> {
+        map_chunks(rows_a, self.simulator.record().samples, Scratch::default, |scratch, i, out_a| {
+            let key = self.key(first + i);
+            self.simulator.record_into((self.shot)(key), &mut (self.generator)(key), scratch, out_a)?;
+            self.digitiser.map_or(Ok(Clipped::default()), |digitiser| digitiser.digitise(out_a))
+        })
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Check: a factor of one changes nothing; a factor scales the mean power of its layer.
 
-use crate::error::check_length;
+use crate::error::{check_amounts, check_length};
 use crate::{Error, LineOfSight};
 
 /// One pulse along a line of sight.
@@ -20,12 +20,12 @@ pub struct Shot<'a> {
     pub previous: Option<&'a LineOfSight>,
     /// Seed of what is random beside speckle and noise: phases of the laser and of the telescope's reflex, speckle of
     /// `previous`. Not used where the receiver has none of them.
-    pub aside_seed: u64,
+    pub impairment_seed: u64,
 }
 
 impl<'a> From<&'a LineOfSight> for Shot<'a> {
     fn from(line: &'a LineOfSight) -> Self {
-        Self { line, efficiency: None, previous: None, aside_seed: 0 }
+        Self { line, efficiency: None, previous: None, impairment_seed: 0 }
     }
 }
 
@@ -40,21 +40,11 @@ impl Shot<'_> {
         self.previous.map_or(Ok(()), LineOfSight::validate)?;
         let Some(efficiency) = self.efficiency else { return Ok(()) };
         check_length("efficiency", efficiency.len(), self.line.layers())?;
-        match efficiency.iter().position(|e| !(e.is_finite() && *e >= 0.0)) {
-            Some(index) => {
-                let allowed = "finite and not negative";
-                Err(Error::ElementOutOfRange { field: "efficiency", index, value: efficiency[index], allowed })
-            }
-            None => Ok(()),
-        }
+        check_amounts("efficiency", efficiency)
     }
 
     /// Return of a layer per metre of range for this pulse \[1/m\].
     pub(crate) fn weight_per_m(&self, layer: usize) -> f64 {
-        let weight_per_m = self.line.weight_per_m[layer];
-        match self.efficiency {
-            Some(efficiency) => weight_per_m * efficiency[layer],
-            None => weight_per_m,
-        }
+        self.line.weight_per_m[layer] * self.efficiency.map_or(1.0, |efficiency| efficiency[layer])
     }
 }

@@ -3,19 +3,19 @@
 //! Check: the tests of `medium` and `efficiency`.
 
 use crate::Error;
-use crate::error::check_length;
+use crate::error::{check_amounts, check_each, check_length};
 
 /// Ranges that are finite and increase, at least one.
 pub(crate) fn check_ranges(range_m: &[f64]) -> Result<(), Error> {
     if range_m.is_empty() {
         return Err(Error::Empty { field: "range_m" });
     }
-    let refuse = |index, allowed| Error::ElementOutOfRange { field: "range_m", index, value: range_m[index], allowed };
-    if let Some(index) = range_m.iter().position(|r| !r.is_finite()) {
-        return Err(refuse(index, "finite"));
-    }
+    check_each("range_m", range_m, "finite", f64::is_finite)?;
     match range_m.windows(2).position(|r| r[1] <= r[0]) {
-        Some(before) => Err(refuse(before + 1, "larger than the range before")),
+        Some(before) => {
+            let (index, allowed) = (before + 1, "larger than the range before");
+            Err(Error::ElementOutOfRange { field: "range_m", index, value: range_m[index], allowed })
+        }
         None => Ok(()),
     }
 }
@@ -23,12 +23,7 @@ pub(crate) fn check_ranges(range_m: &[f64]) -> Result<(), Error> {
 /// One value per range, finite and not negative.
 pub(crate) fn check_values(field: &'static str, values: &[f64], ranges: usize) -> Result<(), Error> {
     check_length(field, values.len(), ranges)?;
-    match values.iter().position(|v| !(v.is_finite() && *v >= 0.0)) {
-        Some(index) => {
-            Err(Error::ElementOutOfRange { field, index, value: values[index], allowed: "finite and not negative" })
-        }
-        None => Ok(()),
-    }
+    check_amounts(field, values)
 }
 
 /// Interval of a table that holds a range, and the part of it that lies before the range; `None` beyond the table.

@@ -62,7 +62,7 @@ impl From<SampledPulse> for Pulse {
     fn from(pulse: SampledPulse) -> Self {
         let allowed_s = thickest_layer_s(&pulse, ALLOWED_ENERGY_ERROR);
         let advised_s = thickest_layer_s(&pulse, ADVISED_ENERGY_ERROR);
-        Self { moments: *pulse.moments(), shape: Shape::Sampled(pulse), chirp_hz_s: 0.0, allowed_s, advised_s }
+        Self { moments: pulse.moments, shape: Shape::Sampled(pulse), chirp_hz_s: 0.0, allowed_s, advised_s }
     }
 }
 
@@ -100,7 +100,7 @@ impl Pulse {
     pub fn energy_j(&self) -> f64 {
         match &self.shape {
             Shape::Gaussian(pulse) => pulse.energy_j(),
-            Shape::Sampled(pulse) => pulse.energy_j(),
+            Shape::Sampled(pulse) => pulse.energy_j,
         }
     }
 
@@ -135,7 +135,7 @@ impl Pulse {
     pub fn support_s(&self) -> (f64, f64) {
         match &self.shape {
             Shape::Gaussian(pulse) => (-HALF_LENGTH_SIGMAS * pulse.sigma_s(), HALF_LENGTH_SIGMAS * pulse.sigma_s()),
-            Shape::Sampled(pulse) => pulse.support_s(),
+            Shape::Sampled(pulse) => pulse.envelope.support_s(),
         }
     }
 
@@ -235,7 +235,7 @@ impl Pulse {
         self.chirp_hz_s == 0.0
             && match &self.shape {
                 Shape::Gaussian(_) => true,
-                Shape::Sampled(pulse) => pulse.is_real(),
+                Shape::Sampled(pulse) => pulse.real,
             }
     }
 
@@ -245,7 +245,7 @@ impl Pulse {
             // |f|^2 is 2e-16 of its peak there.
             Shape::Gaussian(pulse) => (-6.0 * pulse.sigma_m(), 6.0 * pulse.sigma_m()),
             Shape::Sampled(pulse) => {
-                let (first_s, last_s) = pulse.support_s();
+                let (first_s, last_s) = pulse.envelope.support_s();
                 (-0.5 * SPEED_OF_LIGHT_M_S * last_s, -0.5 * SPEED_OF_LIGHT_M_S * first_s)
             }
         }
@@ -258,7 +258,7 @@ fn thickest_layer_s(pulse: &SampledPulse, limit: f64) -> f64 {
     /// Steps tried for each factor of two, and places where a sum begins.
     const PER_OCTAVE: i32 = 4;
     const PLACES: u32 = 8;
-    let (first_s, last_s) = pulse.support_s();
+    let (first_s, last_s) = pulse.envelope.support_s();
     let sum = |step_s: f64, place: u32| {
         let start_s = first_s + step_s * f64::from(place) / f64::from(PLACES);
         let steps = ((last_s - start_s) / step_s).ceil() as usize;

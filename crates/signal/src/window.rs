@@ -6,11 +6,9 @@
 //! Check: the energy outside the sum is below 1e-6 of the whole.
 
 use num_complex::Complex;
-use rand::Rng;
 
 use crate::error::check;
-use crate::receiver::phase_noise::walk;
-use crate::{Error, LineOfSight, Pulse, SPEED_OF_LIGHT_M_S};
+use crate::{Error, LineOfSight, Pulse, Record, SPEED_OF_LIGHT_M_S};
 
 /// Most layers to one side of the nearest one: a bound on memory, far beyond any useful layer thickness.
 const MAX_REACH: f64 = 1e7;
@@ -31,6 +29,11 @@ pub(crate) fn reach(pulse: &Pulse, layer_thickness_m: f64) -> Result<(i64, i64),
     let allowed = "at most max_layer_thickness_m() of the pulse";
     check("layer_thickness_m", layer_thickness_m, allowed, |t| t <= pulse.max_layer_thickness_m())?;
     Ok((near as i64, far as i64))
+}
+
+/// Number of layers from the nearest to the farthest of [`reach`].
+pub(crate) fn lit_layers((near, far): (i64, i64)) -> usize {
+    (near + far + 1).max(1) as usize
 }
 
 /// The lit layers of each sample of a record, and the amplitudes `f(t_k - 2 R_l/c)` \[s^-1/2\] of the present sample.
@@ -65,49 +68,40 @@ pub(crate) struct Lit<'a> {
     pub(crate) im: &'a [f64],
 }
 
+impl Lit<'_> {
+    /// The amplitudes as complex numbers.
+    pub(crate) fn amplitudes(&self) -> impl Iterator<Item = Complex<f64>> {
+        self.re.iter().enumerate().map(|(j, re)| Complex::new(*re, self.im.get(j).copied().unwrap_or(0.0)))
+    }
+}
+
 impl Window {
-    /// Prepares the window for a record of `samples` samples.
+    /// Prepares the window for a record; `turns` are factors of the laser's phase, one for each of [`lit_layers`], or none.
     pub(crate) fn prepare(
         &mut self,
         pulse: &Pulse,
         line: &LineOfSight,
-        first_time_s: f64,
-        interval_s: f64,
-        samples: usize,
+        turns: &[Complex<f64>],
+        record: &Record,
+        sample_rate_hz: f64,
     ) -> Result<(), Error> {
         let thickness_m = line.layer_thickness_m;
         self.layers = line.layers();
         (self.near, self.far) = reach(pulse, thickness_m)?;
-        self.start = (0.5 * SPEED_OF_LIGHT_M_S * first_time_s - line.first_range_m) / thickness_m;
-        self.step = 0.5 * SPEED_OF_LIGHT_M_S * interval_s / thickness_m;
+        self.start = (0.5 * SPEED_OF_LIGHT_M_S * record.time_of_first_sample_s - line.first_range_m) / thickness_m;
+        self.step = 0.5 * SPEED_OF_LIGHT_M_S * (1.0 / sample_rate_hz) / thickness_m;
         let whole = self.step.round();
-        let aligned = (self.step - whole).abs() * samples as f64 <= ALIGNMENT_TOLERANCE;
+        let aligned = (self.step - whole).abs() * record.samples as f64 <= ALIGNMENT_TOLERANCE;
         self.aligned_step = aligned.then_some(whole as i64);
-        let count = (self.near + self.far + 1).max(1) as usize;
-        self.turns.clear();
+        turns.clone_into(&mut self.turns);
+        let count = lit_layers((self.near, self.far));
+        let real = pulse.is_real() && turns.is_empty();
         self.amplitude.re.resize(count, 0.0);
-        self.amplitude.im.resize(if pulse.is_real() { 0 } else { count }, 0.0);
+        self.amplitude.im.resize(if real { 0 } else { count }, 0.0);
         if aligned {
             self.fill_amplitudes(pulse, thickness_m, self.start - self.start.round());
         }
         Ok(())
-    }
-
-    /// Gives a prepared window the phases of a laser of finite linewidth, new for each pulse and the same for all its ranges.
-    pub(crate) fn draw_phases<R: Rng + ?Sized>(
-        &mut self,
-        pulse: &Pulse,
-        thickness_m: f64,
-        linewidth_hz: f64,
-        rng: &mut R,
-    ) {
-        let count = self.amplitude.re.len();
-        self.turns.resize(count, Complex::ONE);
-        walk(linewidth_hz, 2.0 * thickness_m / SPEED_OF_LIGHT_M_S, rng, &mut self.turns);
-        self.amplitude.im.resize(count, 0.0);
-        if self.aligned_step.is_some() {
-            self.fill_amplitudes(pulse, thickness_m, self.start - self.start.round());
-        }
     }
 
     /// Factor of the laser's phase `time_s` after the middle of the pulse; beyond its support that of the end.

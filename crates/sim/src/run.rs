@@ -109,7 +109,7 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
 }
 
 /// Signals and the map, as the plan has them.
-fn signals_and_map<S: Sample + wakescope_signal::scan::Sample>(
+fn signals_and_map<S: Sample + wakescope_signal::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     observer: &dyn Observer,

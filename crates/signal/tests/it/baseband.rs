@@ -23,7 +23,7 @@ fn noise(model: NoiseModel, samples: usize) -> Vec<Vec<Complex<f64>>> {
     (0..RECORDS)
         .map(|_| {
             let mut out = vec![Complex::ZERO; samples];
-            simulator.baseband_into(&silent(), &mut rng, &mut scratch, &mut out).unwrap();
+            simulator.record_into(&silent(), &mut rng, &mut scratch, &mut out).unwrap();
             out.iter().map(|n| n / sd_a).collect()
         })
         .collect()
@@ -83,7 +83,7 @@ fn without_noise_the_current_is_sqrt_2_times_the_real_part_of_the_baseband_on_it
     let (mut baseband, mut current) = (vec![Complex::ZERO; 200], vec![0.0; 200]);
     let stream = || Xoshiro256PlusPlus::seed_from_u64(3);
     let mut scratch = Scratch::default();
-    simulator.baseband_into(&air, &mut stream(), &mut scratch, &mut baseband).unwrap();
+    simulator.record_into(&air, &mut stream(), &mut scratch, &mut baseband).unwrap();
     simulator.record_into(&air, &mut stream(), &mut scratch, &mut current).unwrap();
     let largest = baseband.iter().map(|s| s.norm()).fold(0.0, f64::max);
     for (k, (s, i)) in baseband.iter().zip(&current).enumerate() {
@@ -100,12 +100,12 @@ fn quadratures_hold_a_band_as_wide_as_their_rate_and_a_real_current_of_it_is_ref
     let simulator = Simulator::for_baseband(gaussian(200e-9), wide, record).unwrap();
     let (mut scratch, mut rng) = (Scratch::default(), Xoshiro256PlusPlus::seed_from_u64(21));
     let air = LineOfSight { weight_per_m: vec![0.0; 100], ..line(400.0, 460.05, STEP_M, |_| 0.0) };
-    let refused = simulator.record_into(&air, &mut rng, &mut scratch, &mut [0.0; 400]);
+    let refused = simulator.record_into(&air, &mut rng, &mut scratch, &mut [0.0_f64; 400]);
     assert!(matches!(refused, Err(Error::BandBeyondNyquist { .. })));
     let mut sum = 0.0;
     for _ in 0..50 {
         let mut out = [Complex::ZERO; 400];
-        simulator.baseband_into(&air, &mut rng, &mut scratch, &mut out).unwrap();
+        simulator.record_into(&air, &mut rng, &mut scratch, &mut out).unwrap();
         sum += out.iter().map(|n| n.norm_sqr()).sum::<f64>();
     }
     let relative = sum / (50.0 * 400.0) / wide.noise_variance_a2() - 1.0;

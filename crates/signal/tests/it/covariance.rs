@@ -96,18 +96,14 @@ fn sampled(simulator: &Simulator, shot: Shot<'_>, pulses: usize, seed: u64) -> A
         generator: |key| pulse_generator(seed, key),
         digitiser: None,
     };
-    let (sum, _) = scan
-        .fold::<Complex<f64>, _, Error>(
-            || Array2::<Complex<f64>>::zeros((WINDOW, WINDOW)),
-            |sum, _, window| {
-                for (a, mut row) in window.iter().zip(sum.rows_mut()) {
-                    row.iter_mut().zip(window).for_each(|(to, b)| *to += a * b.conj());
-                }
-                Ok(())
-            },
-            |sum, part| *sum += &part,
-        )
-        .unwrap();
+    let mut sum = Array2::<Complex<f64>>::zeros((WINDOW, WINDOW));
+    scan.for_each::<Complex<f64>, Error>(|_, window| {
+        for (a, mut row) in window.iter().zip(sum.rows_mut()) {
+            row.iter_mut().zip(window).for_each(|(to, b)| *to += a * b.conj());
+        }
+        Ok(())
+    })
+    .unwrap();
     sum / Complex::from(pulses as f64)
 }
 

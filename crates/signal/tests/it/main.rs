@@ -2,12 +2,12 @@
 //! extreme cases.
 #![allow(clippy::unwrap_used)] // a helper of a test may panic as the test may
 
-mod asides;
 mod baseband;
 mod covariance;
 mod envelopes;
 mod extremes;
 mod heterodyne;
+mod impairments;
 mod noise;
 mod power;
 mod receiver_tables;

@@ -87,16 +87,12 @@ fn simulated(pulses: usize, seed: u64) -> (Vec<f64>, Vec<f64>) {
         generator: |key| pulse_generator(seed, key),
         digitiser: None,
     };
-    let (sum, _) = scan
-        .fold::<num_complex::Complex<f64>, _, Error>(
-            || vec![0.0; SAMPLES],
-            |sum, _, record| {
-                sum.iter_mut().zip(record).for_each(|(to, s)| *to += s.norm_sqr());
-                Ok(())
-            },
-            |sum, part| sum.iter_mut().zip(part).for_each(|(to, s)| *to += s),
-        )
-        .unwrap();
+    let mut sum = vec![0.0; SAMPLES];
+    scan.for_each::<num_complex::Complex<f64>, Error>(|_, record| {
+        sum.iter_mut().zip(record).for_each(|(to, s)| *to += s.norm_sqr());
+        Ok(())
+    })
+    .unwrap();
     (sum.iter().map(|s| s / pulses as f64).collect(), mean_power(&simulator, &line))
 }
 

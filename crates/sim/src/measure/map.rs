@@ -283,7 +283,7 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
 /// Runs the estimates of all realisations, of several plans that differ in their estimators alone: the signals of each are made
 /// once. The records of those that the files will have go to `kept`, too, piece after piece; `seen` is given the place of the plan
 /// and the velocities, m/s, of each map as it comes.
-pub(crate) fn estimates<S: Sample + wakescope_signal::scan::Sample>(
+pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
     plans: &[&Plan],
     scanner: &Scanner<'_>,
     observer: &dyn Observer,

@@ -17,10 +17,11 @@ use ndarray::{Array2, ArrayView2};
 use rand_xoshiro::rand_core::Rng;
 use rayon::prelude::*;
 use std::ops::Range;
+use wakescope_signal::Sample;
 use wakescope_signal::digitise::Clipped;
 use wakescope_signal::efficiency::{EfficiencyTable, LayerEfficiency};
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
-use wakescope_signal::scan::{PulseKey, Sample};
+use wakescope_signal::scan::PulseKey;
 use wakescope_signal::{LineOfSight, Pulse, RangeFilter, Record, Scan, Shot, Simulator};
 
 /// The lines of sight of a scan, and what makes signals of them.
@@ -232,10 +233,10 @@ impl<'a> Scanner<'a> {
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
                 let previous = self.previous.as_ref().map(|lines| &lines[line]);
                 let is_plain = self.is_plain();
-                let aside_seed =
+                let impairment_seed =
                     if is_plain { 0 } else { stream(self.scene.seed, "asides", index(key) as u64).next_u64() };
                 let air = air_of.get(key.pulse).and_then(|air| airs.get(*air));
-                Shot { line: air.unwrap_or(&self.lines[line]), efficiency, previous, aside_seed }
+                Shot { line: air.unwrap_or(&self.lines[line]), efficiency, previous, impairment_seed }
             },
             generator: |key| stream(self.scene.seed, "signal", index(key) as u64),
             digitiser: self.instrument.digitiser,

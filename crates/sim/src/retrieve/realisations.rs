@@ -62,7 +62,7 @@ pub struct SceneRetrieval {
 ///
 /// # Errors
 /// What the crates refuse; a fit that does not come to an end is none.
-pub(crate) fn of_realisations<S: Sample + wakescope_signal::scan::Sample>(
+pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     maps: &[Array2<f64>],
@@ -153,7 +153,7 @@ fn read_scan(plan: &Plan, lines: &[usize], velocity_m_s: &Array2<f64>) -> ReadSc
 
 /// What the signals of some lines of a realisation, which are made again, give by fit or envelopes; the wake of the map starts them.
 /// Nothing where the map shows no pair, or the fit does not come to an end.
-fn of_signals<S: Sample + wakescope_signal::scan::Sample>(
+fn of_signals<S: Sample + wakescope_signal::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
     (method, own): (Method, &OwnScene),

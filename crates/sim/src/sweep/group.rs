@@ -59,7 +59,7 @@ struct Collected<'p> {
     velocity_m_s: Vec<f64>,
 }
 
-fn of_samples<S: Sample + wakescope_signal::scan::Sample>(
+fn of_samples<S: Sample + wakescope_signal::Sample>(
     plans: &[Plan],
     scanner: &Scanner<'_>,
     observer: &dyn Observer,

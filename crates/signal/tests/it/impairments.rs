@@ -137,12 +137,12 @@ fn point_target(range_m: f64) -> LineOfSight {
 }
 
 /// Envelopes of a point target at 400 m by a laser of some linewidth, 65 samples within the flat pulse.
-fn target_envelope(linewidth_hz: f64, range_m: f64, aside_seed: u64) -> Vec<Complex<f64>> {
+fn target_envelope(linewidth_hz: f64, range_m: f64, impairment_seed: u64) -> Vec<Complex<f64>> {
     let front_end = FrontEnd { linewidth_hz, ..FrontEnd::IDEAL };
     let simulator = planned(flat(), Receiver { front_end, ..receiver(NoiseModel::None) }, 400.0 - 32.0 * STEP_M, 65);
     let mut out = vec![Complex::ZERO; 65];
     let target = point_target(range_m);
-    let shot = Shot { aside_seed, ..Shot::from(&target) };
+    let shot = Shot { impairment_seed, ..Shot::from(&target) };
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     simulator.envelope_into(shot, &mut rng, &mut Scratch::default(), &mut out).unwrap();
     out
@@ -235,7 +235,7 @@ fn the_pulse_before_adds_its_power_and_leaves_speckle_and_noise_alone() {
         out
     };
     let plain = record(Shot::from(&air), 4);
-    let with = |previous, aside_seed| Shot { previous: Some(previous), aside_seed, ..Shot::from(&air) };
+    let with = |previous, impairment_seed| Shot { previous: Some(previous), impairment_seed, ..Shot::from(&air) };
     for (a, b) in plain.iter().zip(&record(with(&dark, 9), 4)) {
         assert_relative_eq!(*a, *b, max_relative = 1e-12);
     }

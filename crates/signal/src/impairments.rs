@@ -1,5 +1,5 @@
-//! What a signal holds beside (15): phases of a laser of finite linewidth, the reflex of the telescope, the echo of the pulse
-//! before. Nothing of it is computed where it is off, and its random numbers are a stream of their own.
+//! Effects beside (15): phase noise of the laser, reflex of the telescope, echo of the pulse before, each off by default. Nothing of
+//! it is computed where it is off, and its random numbers are a stream of their own.
 //!
 //! Check: speckle and noise keep their numbers; power of the reflex and of the echo; velocities of a point target.
 
@@ -11,7 +11,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::heterodyne::draw_speckle;
 use crate::receiver::phase_noise::walk;
-use crate::{Error, Scratch, Shot, Simulator};
+use crate::window::{lit_layers, reach};
+use crate::{Error, LineOfSight, SPEED_OF_LIGHT_M_S, Scratch, Shot, Simulator};
 
 impl Simulator {
     /// Whether the envelope of a shot is (15) and nothing else.
@@ -24,21 +25,20 @@ impl Simulator {
     ///
     /// Draws from the stream of the shot's own seed: phases of the local oscillator over the record and of the pulse, the phase of
     /// the reflex, phases and speckle of the pulse before.
-    pub(crate) fn sum_with_asides_into(
+    pub(crate) fn sum_with_impairments_into(
         &self,
         shot: Shot<'_>,
         speckle: &[Complex<f64>],
         scratch: &mut Scratch,
         out_a: &mut [Complex<f64>],
     ) -> Result<(), Error> {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(shot.aside_seed);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(shot.impairment_seed);
         let front = self.receiver().front_end;
         let thickness_m = shot.line.layer_thickness_m;
         let mut oscillator = vec![Complex::ONE; out_a.len()];
         walk(front.linewidth_hz, 1.0 / self.receiver().sample_rate_hz, &mut rng, &mut oscillator);
-        self.prepare(shot.line, scratch)?;
-        scratch.window.draw_phases(self.pulse(), thickness_m, front.linewidth_hz, &mut rng);
-        self.sum_prepared_into(shot, speckle, scratch, out_a)?;
+        let phases = self.laser_phases(shot.line, &mut rng)?;
+        self.sum_into(shot, speckle, &phases, scratch, out_a)?;
         let reflex_rad = 2.0 * PI * rng.random::<f64>();
         if front.reflection > 0.0 {
             let gain = self.receiver().heterodyne_gain_a2_w() * self.pulse().energy_j() * front.reflection;
@@ -50,14 +50,20 @@ impl Simulator {
             }
         }
         if let Some(previous) = shot.previous {
-            self.prepare(previous, scratch)?;
-            scratch.window.draw_phases(self.pulse(), previous.layer_thickness_m, front.linewidth_hz, &mut rng);
+            let phases = self.laser_phases(previous, &mut rng)?;
             let (mut speckle, mut echo) = (Vec::new(), vec![Complex::ZERO; out_a.len()]);
             draw_speckle(previous.layers(), &mut rng, &mut speckle);
-            self.sum_prepared_into(Shot::from(previous), &speckle, scratch, &mut echo)?;
+            self.sum_into(Shot::from(previous), &speckle, &phases, scratch, &mut echo)?;
             out_a.iter_mut().zip(&echo).for_each(|(out, echo)| *out += echo);
         }
         out_a.iter_mut().zip(&oscillator).for_each(|(out, turn)| *out *= turn.conj());
         Ok(())
+    }
+    /// Factors `exp(j phase)` of the laser while it sends a pulse, one for each layer that a sample sees.
+    fn laser_phases(&self, line: &LineOfSight, rng: &mut Xoshiro256PlusPlus) -> Result<Vec<Complex<f64>>, Error> {
+        let mut phases = vec![Complex::ONE; lit_layers(reach(self.pulse(), line.layer_thickness_m)?)];
+        let layer_s = 2.0 * line.layer_thickness_m / SPEED_OF_LIGHT_M_S;
+        walk(self.receiver().front_end.linewidth_hz, layer_s, rng, &mut phases);
+        Ok(phases)
     }
 }
