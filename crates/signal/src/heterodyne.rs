@@ -266,8 +266,9 @@ impl Simulator {
         for k in samples {
             let time_s = self.time_s(k);
             let (first, end) = window.layers_at(k);
-            for layer in next.max(first)..end {
-                let amplitude = gain * shot.weight_per_m(layer).sqrt() * speckle[layer];
+            let lit = next.max(first).min(end)..end;
+            for (layer, g) in lit.clone().zip(&speckle[lit]) {
+                let amplitude = gain * shot.weight_per_m(layer).sqrt() * g;
                 let rate_rad_s = self.phase_rate_rad_s(line.radial_velocity_m_s[layer]);
                 let (phasor, rotation) = match rate_rad_s.is_nan() {
                     true => (Complex::ZERO, Complex::ONE),

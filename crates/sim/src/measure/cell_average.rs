@@ -37,18 +37,21 @@ impl CellAverage {
     pub fn over(map: &VelocityEstimates, cells: &[(usize, usize)]) -> Self {
         let has_estimate = |cell: &(usize, usize)| map.rms_m_s.get(*cell).is_some_and(|rms| rms.is_finite());
         let known: Vec<(usize, usize)> = cells.iter().copied().filter(has_estimate).collect();
-        let mean = |field: &Array2<f64>, power: i32| {
-            known.iter().map(|c| field[*c].powi(power)).sum::<f64>() / known.len() as f64
+        // A cell with one estimate has an error, but no scatter.
+        let scattered: Vec<_> = known.iter().copied().filter(|cell| map.std_m_s[*cell].is_finite()).collect();
+        let mean = |cells: &[(usize, usize)], field: &Array2<f64>, power: i32| {
+            cells.iter().map(|c| field[*c].powi(power)).sum::<f64>() / cells.len() as f64
         };
-        let (bias_m_s, variance, square) = (mean(&map.bias_m_s, 1), mean(&map.std_m_s, 2), mean(&map.rms_m_s, 2));
+        let (bias_m_s, square) = (mean(&known, &map.bias_m_s, 1), mean(&known, &map.rms_m_s, 2));
+        let variance = mean(&scattered, &map.std_m_s, 2);
         let errors = map.law.as_ref().filter(|_| !known.is_empty()).map(|law| {
             let error = |scan: &ScanErrors, cell| scan.error_m_s[cell];
-            let scatter = |values: fn(&[f64]) -> Vec<f64>| variance_of_mean(map, law, &known, error, values);
+            let squared = |scan: &ScanErrors, cell| scan.error_m_s[cell].powi(2);
             let (unseen, of_bias) = law.unseen(&known);
             [
-                (scatter(about_mean) + of_bias).sqrt(),
-                error_of_root(variance, scatter(of_variance), unseen),
-                error_of_root(square, scatter(|e| about_mean(&e.iter().map(|e| e * e).collect::<Vec<_>>())), unseen),
+                (variance_of_mean(map, law, &known, error, about_mean) + of_bias).sqrt(),
+                error_of_root(variance, variance_of_mean(map, law, &scattered, error, of_variance), unseen),
+                error_of_root(square, variance_of_mean(map, law, &known, squared, about_mean), unseen),
             ]
         });
         let [bias_standard_error_m_s, std_standard_error_m_s, standard_error_m_s] = errors.unwrap_or([f64::NAN; 3]);
@@ -64,7 +67,10 @@ pub fn flagged_fraction(map: &VelocityEstimates) -> [f64; 2] {
     let fraction = map.flagged.sum() / cells.len() as f64;
     let flag = |scan: &ScanErrors, cell| f64::from(u8::from(scan.flagged[cell]));
     let scattered = map.law.as_ref().map(|law| variance_of_mean(map, law, &cells, flag, about_mean).sqrt());
-    let least = error_of_fraction(fraction, (cells.len() * map.scans.len()) as f64);
+    // Cells that share windows may be flagged together; where none is, nothing tells how many: between one and all of them.
+    let shared = map.law.as_ref().filter(|_| fraction == 0.0).map_or(1.0, |law| law.shared.iter().product());
+    let together = f64::sqrt(shared).max(1.0);
+    let least = error_of_fraction(fraction, (cells.len() * map.scans.len()) as f64 / together);
     [fraction, scattered.map_or(f64::NAN, |error| error.max(least))]
 }
 
@@ -91,8 +97,8 @@ fn of_variance(errors: &[f64]) -> Vec<f64> {
     about_mean(&apart.iter().map(|x| n / (n - 2.0) * x * x).collect::<Vec<_>>())
 }
 
-/// Variance of the mean over cells and realisations of a value, by deviations over the realisations of a cell. With few degrees of
-/// freedom, by Satterthwaite's rule, it is wider: with Student's factor for two standard errors.
+/// Variance of the mean over cells and realisations of a value, by deviations over the realisations of a cell; where a cell has one
+/// value, by that from the mean of all cells. With few degrees of freedom, by Satterthwaite's rule, it is wider: with Student's factor for two standard errors.
 fn variance_of_mean(
     map: &VelocityEstimates,
     law: &ErrorLaw,
@@ -101,11 +107,16 @@ fn variance_of_mean(
     deviations: fn(&[f64]) -> Vec<f64>,
 ) -> f64 {
     let mut of_scans = vec![Array2::<f64>::zeros(map.flagged.dim()); map.scans.len()];
+    let value = &value;
+    let values_of =
+        |cell| map.scans.iter().map(move |scan| value(scan, cell)).enumerate().filter(|(_, v)| v.is_finite());
+    let all: Vec<f64> = cells.iter().flat_map(|cell| values_of(*cell)).map(|(_, value)| value).collect();
+    let middle = all.iter().sum::<f64>() / all.len() as f64;
     for &cell in cells {
-        let all = map.scans.iter().map(|scan| value(scan, cell)).enumerate();
-        let (scans, values): (Vec<usize>, Vec<f64>) = all.filter(|(_, value)| value.is_finite()).unzip();
+        let (scans, values): (Vec<usize>, Vec<f64>) = values_of(cell).unzip();
         let share = 1.0 / (values.len() * cells.len()) as f64;
-        for (scan, deviation) in scans.into_iter().zip(deviations(&values)) {
+        let apart = if values.len() == 1 { vec![values[0] - middle] } else { deviations(&values) };
+        for (scan, deviation) in scans.into_iter().zip(apart) {
             of_scans[scan][cell] = share * deviation;
         }
     }

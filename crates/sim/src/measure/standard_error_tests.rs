@@ -82,20 +82,25 @@ impl Law {
             });
             scans.push(ScanErrors { error_m_s, flagged });
         }
-        let errors = |cell| scans.iter().map(move |scan| scan.error_m_s[cell]);
-        let statistics = Array2::from_shape_fn(SHAPE, |cell| ErrorStatistics::of(errors(cell)));
-        let flags = |cell| scans.iter().filter(|scan| scan.flagged[cell]).count() as f64 / scans.len() as f64;
-        let law = ErrorLaw::new(&scans, SHARED);
-        VelocityEstimates {
-            bias_m_s: statistics.mapv(|s| s.bias_m_s),
-            std_m_s: statistics.mapv(|s| s.std_m_s),
-            rms_m_s: statistics.mapv(|s| s.rms_m_s),
-            standard_error_m_s: law.as_ref().unwrap().rms_standard_errors(),
-            flagged: Array2::from_shape_fn(SHAPE, flags),
-            law,
-            scans,
-            ..VelocityEstimates::default()
-        }
+        map_of(scans)
+    }
+}
+
+/// What a map says of its realisations.
+fn map_of(scans: Vec<ScanErrors>) -> VelocityEstimates {
+    let errors = |cell| scans.iter().map(move |scan| scan.error_m_s[cell]);
+    let statistics = Array2::from_shape_fn(SHAPE, |cell| ErrorStatistics::of(errors(cell)));
+    let flags = |cell| scans.iter().filter(|scan| scan.flagged[cell]).count() as f64 / scans.len() as f64;
+    let law = ErrorLaw::new(&scans, SHARED);
+    VelocityEstimates {
+        bias_m_s: statistics.mapv(|s| s.bias_m_s),
+        std_m_s: statistics.mapv(|s| s.std_m_s),
+        rms_m_s: statistics.mapv(|s| s.rms_m_s),
+        standard_error_m_s: law.as_ref().unwrap().rms_standard_errors(),
+        flagged: Array2::from_shape_fn(SHAPE, flags),
+        law,
+        scans,
+        ..VelocityEstimates::default()
     }
 }
 
@@ -275,4 +280,28 @@ fn cells_without_estimates_leave_their_neighbours_theirs() {
     // Without noise errors are those of the bias alone, which all realisations have.
     scans.iter_mut().for_each(|scan| scan.error_m_s.fill(0.3));
     assert!(ErrorLaw::new(&scans, SHARED).unwrap().rms_standard_errors().iter().all(|error| *error == 0.0));
+}
+
+#[test]
+fn cells_with_one_estimate_have_no_scatter_and_widen_that_of_the_bias() {
+    let law = Law { scans: 3, bias_m_s: 0.0, bad: 0.0 };
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let all = cells(|_| true);
+    let truth = law.truth(&all)[1].sqrt();
+    let mut found = [const { Found(Vec::new()) }; 3];
+    for _ in 0..150 {
+        let mut scans = law.map(&mut rng).scans;
+        // Two of three estimates are missing: most cells have one, some none, few two.
+        scans.iter_mut().for_each(|scan| {
+            scan.error_m_s.mapv_inplace(|error| if uniform(&mut rng) < 0.67 { f64::NAN } else { error });
+        });
+        let a = CellAverage::over(&map_of(scans), &all);
+        found[0].0.push([a.bias_m_s, a.bias_standard_error_m_s]);
+        found[1].0.push([a.std_m_s - truth, a.std_standard_error_m_s]);
+        found[2].0.push([a.rms_m_s - truth, a.standard_error_m_s]);
+    }
+    for (name, found) in ["bias", "std", "rms"].iter().zip(&found) {
+        let [one, two, size] = found.covered();
+        assert!((0.55..0.95).contains(&one) && two > 0.9 && (0.8..1.7).contains(&size), "{name}: {one} {two} {size}");
+    }
 }
