@@ -18,9 +18,6 @@ pub(crate) struct Cost {
 }
 
 impl Cost {
-    /// Of what was not timed.
-    pub(crate) const NONE: Self = Self { cpu_s: f64::NAN, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
-
     /// The same for one of `count` equal pieces of work.
     pub(crate) fn per(self, count: usize) -> Self {
         let n = count as f64;
@@ -33,7 +30,7 @@ pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(
     let (before_s, start) = (cpu_s(), Instant::now());
     let value = work()?;
     let cpu_s = cpu_s() - before_s;
-    Ok((value, Cost { cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: peak_mem_bytes() }))
+    Ok((value, Cost { cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: peak_bytes("self") }))
 }
 
 /// Processor time of the process so far, s: of all its threads, those that have ended included.
@@ -51,11 +48,11 @@ fn seconds(clock: ClockId) -> f64 {
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// Largest resident memory of this process so far, bytes; NaN where the system does not tell.
-fn peak_mem_bytes() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).map_or(f64::NAN, |kb| 1024.0 * kb)
+/// Largest resident memory of a process so far, bytes; NaN where the system does not tell.
+pub(crate) fn peak_bytes(process: &str) -> f64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse::<f64>().ok());
+    peak.map_or(f64::NAN, |kb| 1024.0 * kb)
 }
 
 /// Shortest piece of work whose time is told by one of three runs: a call into the system and a full cache count little beside it \[s\].

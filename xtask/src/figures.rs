@@ -14,8 +14,7 @@ mod fig09;
 mod fig10;
 mod fig11;
 mod fig12;
-mod fig13;
-mod fig14;
+mod fig13_14;
 mod fig15;
 mod fig16;
 mod fig17;
@@ -38,7 +37,7 @@ pub(crate) struct Figure {
     pub(crate) id: &'static str,
     pub(crate) number: u32,
     pub(crate) title: &'static str,
-    pub(crate) make: fn(&Context) -> Result<Rendered, Failure>,
+    pub(crate) make: Make,
 }
 
 /// Which figures are drawn one after the other.
@@ -68,34 +67,35 @@ impl Figure {
     }
 }
 
+type Make = fn(&Context) -> Result<Rendered, Failure>;
+
+const fn figure(id: &'static str, number: u32, title: &'static str, make: Make) -> Figure {
+    Figure { id, number, title, make }
+}
+
 /// All figures, in the order of the report.
 pub(crate) const ALL: [Figure; 23] = [
-    Figure { id: "fig01", number: 1, title: "Vertical velocity through the cores of the pair", make: fig01::make },
-    Figure { id: "tab01", number: 1, title: "ICAO separations behind a landing aircraft", make: tab01::make },
-    Figure {
-        id: "tab02",
-        number: 2,
-        title: "Lidar parameters as read back from the scene that was run",
-        make: tab02::make,
-    },
-    Figure { id: "fig03", number: 3, title: "Scan pattern across the runway", make: fig03::make },
-    Figure { id: "fig04", number: 4, title: "Signal-to-noise ratio and system efficiency", make: fig04::make },
-    Figure { id: "fig05", number: 5, title: "M'4 stencil on a line of sight", make: fig05::make },
-    Figure { id: "fig06", number: 6, title: "Surfaces of equal vorticity", make: fig06::make },
-    Figure { id: "fig07", number: 7, title: "Circulation and paths of the vortices", make: fig07::make },
-    Figure { id: "fig08", number: 8, title: "Radial velocity of the wake, early and late", make: fig08::make },
-    Figure { id: "fig09", number: 9, title: "Accumulation level against range", make: fig09::make },
-    Figure { id: "fig10", number: 10, title: "Estimation error and gradient", make: fig10::make },
-    Figure { id: "fig11", number: 11, title: "Estimated map, late, 400 ns", make: fig11::make },
-    Figure { id: "fig12", number: 12, title: "Error against pulse energy", make: fig12::make },
-    Figure { id: "fig13", number: 13, title: "Correlogram against periodogram accumulation", make: fig13::make },
-    Figure { id: "fig14", number: 14, title: "The same at 200 and 400 ns about the centre", make: fig14::make },
-    Figure { id: "fig15", number: 15, title: "Error against run time", make: fig15::make },
-    Figure { id: "fig16", number: 16, title: "Stiff and extreme cases", make: fig16::make },
-    Figure { id: "fig17", number: 17, title: "Circulation and positions from single scans", make: fig17::make },
-    Figure { id: "fig18", number: 18, title: "Velocity estimators against the Cramer-Rao bound", make: fig18::make },
-    Figure { id: "fig19", number: 19, title: "Detection of wakes", make: fig19::make },
-    Figure { id: "fig20", number: 20, title: "Map, model and residual of one scan", make: fig20::make },
-    Figure { id: "fig21", number: 21, title: "One wake across, round and along the flight", make: fig21::make },
-    Figure { id: "fig25", number: 25, title: "Where correlogram accumulation errs less", make: fig25::make },
+    figure("fig01", 1, "Vertical velocity through the cores of the pair", fig01::make),
+    figure("tab01", 1, "ICAO separations behind a landing aircraft", tab01::make),
+    figure("tab02", 2, "Lidar parameters as read back from the scene that was run", tab02::make),
+    figure("fig03", 3, "Scan pattern across the runway", fig03::make),
+    figure("fig04", 4, "Signal-to-noise ratio and system efficiency", fig04::make),
+    figure("fig05", 5, "M'4 stencil on a line of sight", fig05::make),
+    figure("fig06", 6, "Surfaces of equal vorticity", fig06::make),
+    figure("fig07", 7, "Circulation and paths of the vortices", fig07::make),
+    figure("fig08", 8, "Radial velocity of the wake, early and late", fig08::make),
+    figure("fig09", 9, "Accumulation level against range", fig09::make),
+    figure("fig10", 10, "Estimation error and gradient", fig10::make),
+    figure("fig11", 11, "Estimated map, late, 400 ns", fig11::make),
+    figure("fig12", 12, "Error against pulse energy", fig12::make),
+    figure("fig13", 13, "Correlogram against periodogram accumulation", fig13_14::make_13),
+    figure("fig14", 14, "The same at 200 and 400 ns about the centre", fig13_14::make_14),
+    figure("fig15", 15, "Error against run time", fig15::make),
+    figure("fig16", 16, "Stiff and extreme cases", fig16::make),
+    figure("fig17", 17, "Circulation and positions from single scans", fig17::make),
+    figure("fig18", 18, "Velocity estimators against the Cramer-Rao bound", fig18::make),
+    figure("fig19", 19, "Detection of wakes", fig19::make),
+    figure("fig20", 20, "Map, model and residual of one scan", fig20::make),
+    figure("fig21", 21, "One wake across, round and along the flight", fig21::make),
+    figure("fig25", 25, "Where correlogram accumulation errs less", fig25::make),
 ];

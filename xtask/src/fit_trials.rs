@@ -3,16 +3,22 @@
 //! Every scan is fitted from its map on: the map with the core kept at the typical one, about it and free, then all signals with one core radius
 //! fitted or the true one, and once more from the truth on. Each row has its standard error; one thread tells the processor time.
 
+mod banded;
+mod map_bound;
+mod posterior;
+pub(crate) mod trial;
+
 use crate::cost::measured;
-use crate::trials::fits::{FitTrial, RADIUS_M};
-use crate::trials::map_bound::{MapBound, MapSetting};
+use crate::statistics::{Estimate, mean};
 use fixtures::WINDOW;
 use fixtures::failure::{Failure, Outcome};
 use fixtures::pair::{PairCase, PairScan};
+use map_bound::{MapBound, MapSetting};
 use ndarray::Array2;
-use wakescope_estimate::Error;
+use trial::{FitTrial, RADIUS_M};
 use wakescope_estimate::vortex_fit::{
     CorePrior, FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
+    WindFit,
 };
 use wakescope_signal::NoiseModel;
 
@@ -76,15 +82,17 @@ const TOLD: [(&str, Parameter); 7] = [
 ];
 
 /// Whose likelihood is looked at scan by scan.
-const HEIGHTS: [Parameter; 2] = [Parameter::LeftHeight, Parameter::RightHeight];
+const HEIGHTS: [(&str, Parameter); 2] = [("left", Parameter::LeftHeight), ("right", Parameter::RightHeight)];
 
-/// Fits of one kind over the scans.
+/// Wake and covariance of a fit.
+type Found = (Wake, Array2<f64>);
+
+/// Fits of one kind over the scans: what was found, and how many failed; what they took.
 #[derive(Default)]
 struct Fits {
     name: &'static str,
-    /// Wake and standard deviations.
-    found: Vec<(Wake, [f64; PARAMETERS])>,
-    failures: Vec<String>,
+    found: Vec<Found>,
+    failures: usize,
     cpu_s: f64,
 }
 
@@ -93,45 +101,39 @@ impl Fits {
         Self { name, ..Default::default() }
     }
 
-    /// Keeps a fit, of which `read` tells wake and covariance, or why there is none.
-    fn keep<F>(
-        &mut self,
-        scan: usize,
-        (fit, cpu_s): (Result<F, Error>, f64),
-        read: impl Fn(&F) -> (Wake, &Array2<f64>),
-    ) -> Option<F> {
-        match &fit {
-            Ok(fit) => {
-                let (wake, covariance) = read(fit);
-                self.found.push((wake, std::array::from_fn(|i| covariance[[i, i]].sqrt())));
+    /// Keeps a fit, or tells why there is none.
+    fn keep(&mut self, scan: usize, fit: Result<Found, String>, cpu_s: f64) -> Option<Wake> {
+        match fit {
+            Ok(found) => {
                 self.cpu_s += cpu_s;
+                self.found.push(found);
+                self.found.last().map(|found| found.0)
             }
-            Err(error) => self.failures.push(format!("scan {scan}: {error}")),
+            Err(error) => {
+                println!("scan {scan}, {}: {error}", self.name);
+                self.failures += 1;
+                None
+            }
         }
-        fit.ok()
     }
 
     fn show(&self, truth: &Wake, bound: &[f64; PARAMETERS]) {
         let n = self.found.len() as f64;
-        println!(
-            "{}: {} fits, {} failed, {:.2} s of processor each",
-            self.name,
-            self.found.len(),
-            self.failures.len(),
-            self.cpu_s / n
-        );
-        self.failures.iter().for_each(|why| println!("  {why}"));
+        let (name, failures, each_s) = (self.name, self.failures, self.cpu_s / n);
+        println!("{name}: {n} fits, {failures} failed, {each_s:.2} s of processor each");
         for (label, parameter) in TOLD {
             let place = parameter as usize;
             let errors: Vec<f64> =
-                self.found.iter().map(|(w, _)| w.to_array()[place] - truth.to_array()[place]).collect();
-            let mean = errors.iter().sum::<f64>() / n;
-            let scatter = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-            let stated = (self.found.iter().map(|(_, s)| s[place].powi(2)).sum::<f64>() / n).sqrt();
+                self.found.iter().map(|(wake, _)| wake.to_array()[place] - truth.to_array()[place]).collect();
+            let bias = Estimate::mean(&errors);
+            let scatter = Estimate::deviation(&errors);
+            let variances: Vec<f64> = self.found.iter().map(|(_, covariance)| covariance[[place; 2]]).collect();
             println!(
-                "  {label:<25} bias {mean:8.3} +- {:.3}, scatter {scatter:7.3} +- {:.3}, stated {stated:7.3}, bound {:.3}",
-                scatter / n.sqrt(),
+                "  {label:<25} bias {:8.3} +- {:.3}, scatter {scatter:7.3} +- {:.3}, stated {:7.3}, bound {:.3}",
+                bias.value,
+                bias.standard_error,
                 scatter / (2.0 * (n - 1.0)).sqrt(),
+                mean(&variances, None).sqrt(),
                 bound[place]
             );
         }
@@ -154,46 +156,23 @@ fn show_map_bound(options: &Options, pair: &PairScan, truth: &Wake, circulation:
     };
     let (model, map) = (ScanModel::new(&setup, |_, _| pair.snr, truth)?, MapBound::new(&setting, truth)?);
     let strongest = Parameter::LeftCirculation as usize;
-    let truth_m2_s = truth.to_array()[strongest];
     let show = |name: &str, deviation: f64| {
-        println!("  {name:<56} {deviation:6.2} m^2/s, {:.2} %", 100.0 * deviation / truth_m2_s);
+        println!("  {name:<56} {deviation:6.2} m^2/s, {:.2} %", 100.0 * deviation / truth.to_array()[strongest]);
     };
     for (name, core_radius) in [("one core radius free", Sharing::Common), ("core known", Sharing::Fixed)] {
         println!("left circulation, {name}:");
         let free = FreeParameters { circulation, core_radius, ..Default::default() };
         let bound = model.bound(truth, Powers::default(), &free, true)?;
         show("all signals, Cramer-Rao bound", bound[[strongest; 2]].sqrt());
-        let groups = groups(circulation, core_radius);
+        let groups = FreeParameters { wind: WindFit::Linear, ..free }.groups();
         for (what, widths) in [("velocities", false), ("velocities and widths", true)] {
-            let found = map.deviations(&groups, widths).ok_or_else(|| {
-                Failure::new("a free number does not show in the map, or its covariance is singular".to_owned())
-            })?;
+            let found = map.deviations(&groups, widths);
+            let found = found.ok_or_else(|| Failure::new("the covariance of the map is singular".into()))?;
             show(&format!("{what} of the map, weights of their covariance"), found.best[0]);
             show(&format!("{what} of the map, weights of their variances"), found.by_variance[0]);
         }
     }
     Ok(())
-}
-
-/// Places of the parameters that each free number moves, circulations first.
-fn groups(circulation: Sharing, core_radius: Sharing) -> Vec<Vec<usize>> {
-    let shared = |a: Parameter, b: Parameter, sharing| match sharing {
-        Sharing::Common => vec![vec![a as usize, b as usize]],
-        Sharing::Separate => vec![vec![a as usize], vec![b as usize]],
-        Sharing::Fixed => Vec::new(),
-    };
-    let mut groups = shared(Parameter::LeftCirculation, Parameter::RightCirculation, circulation);
-    groups.extend(shared(Parameter::LeftCore, Parameter::RightCore, core_radius));
-    let alone = [
-        Parameter::LeftLateral,
-        Parameter::LeftHeight,
-        Parameter::RightLateral,
-        Parameter::RightHeight,
-        Parameter::Wind,
-        Parameter::Shear,
-    ];
-    groups.extend(alone.map(|parameter| vec![parameter as usize]));
-    groups
 }
 
 pub(crate) fn run(options: &Options) -> Outcome {
@@ -216,67 +195,53 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let mut maps =
         [Fits::of("map, core kept"), Fits::of("map, core about the typical one"), Fits::of("map, core fitted freely")];
     let mut signals = [Fits::of("signals"), Fits::of("signals, started at the truth")];
-    let mut below = Vec::new();
-    let mut widths = HEIGHTS.map(|_| Vec::new());
-    let groups = groups(circulation, if options.known_core { Sharing::Fixed } else { Sharing::Common });
+    let (mut below, mut widths) = (Vec::new(), HEIGHTS.map(|_| Vec::new()));
     for scan in 0..options.scans as usize {
         let trial = FitTrial::new(&pair, scan, options.radius_m)?;
         let mut guess = None;
         let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
         for (fits, (core, prior)) in maps.iter_mut().zip(cores).take(if options.signals_only { 1 } else { 3 }) {
             let (fit, cost) = measured(|| trial.map(free(core), prior))?;
-            let kept = fits.keep(scan, (fit, cost.cpu_s), |fit: &MapFit| (fit.wake, &fit.covariance));
-            guess = guess.or(kept.map(|fit| fit.wake));
+            let found = fit.map(|MapFit { wake, covariance, .. }| (wake, covariance)).map_err(|e| e.to_string());
+            let kept = fits.keep(scan, found, cost.cpu_s);
+            guess = guess.or(kept);
         }
         let (false, Some(mut guess)) = (options.maps_only, guess) else { continue };
         if options.known_core {
-            (guess.left.core_radius_m, guess.right.core_radius_m) =
-                (truth.left.core_radius_m, truth.right.core_radius_m);
+            (guess.left.core_radius_m, guess.right.core_radius_m) = (case.core_radius_m, case.core_radius_m);
         }
         let mut fit = |place: usize, guess: &Wake, starts| -> Result<Option<SignalFit>, Failure> {
             let (fit, cost) = measured(|| trial.signals(of_signals, guess, starts))?;
-            Ok(signals[place].keep(scan, (fit, cost.cpu_s), |fit: &SignalFit| (fit.wake, &fit.covariance)))
+            let found = fit.as_ref().map(|fit| (fit.wake, fit.covariance.clone())).map_err(ToString::to_string);
+            signals[place].keep(scan, found, cost.cpu_s);
+            Ok(fit.ok())
         };
-        let (found, at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?);
-        if let (true, Some(found)) = (options.widths, &found) {
-            for (widths, parameter) in widths.iter_mut().zip(HEIGHTS) {
-                widths.extend(trial.width(&model, found, parameter as usize, (&covariance, &groups))?);
-            }
+        let (Some(found), at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?) else {
+            continue;
+        };
+        for (widths, (_, height)) in widths.iter_mut().zip(HEIGHTS).filter(|_| options.widths) {
+            widths.extend(trial.width(&model, &found, height as usize, (&covariance, &of_signals.groups()))?);
         }
-        if let (Some(found), Some(at_truth)) = (found, at_truth) {
+        if let Some(at_truth) = at_truth {
             let less = at_truth.log_likelihood - found.log_likelihood;
-            let off = |place: usize| (found.wake.to_array()[place] - truth.to_array()[place]) / bound[place];
-            let fitted = TOLD.iter().filter(|told| bound[told.1 as usize] > 0.0);
-            let worst = fitted.max_by(|a, b| off(a.1 as usize).abs().total_cmp(&off(b.1 as usize).abs()));
-            println!(
-                "scan {scan}: ln p {less:+.2} below that of the start at the truth; tops {:.2?}; {} off by {:+.1} bounds",
-                found.tops.iter().map(|top| top.log_likelihood - found.log_likelihood).collect::<Vec<_>>(),
-                worst.map_or("nothing", |told| told.0),
-                worst.map_or(0.0, |told| off(told.1 as usize)),
-            );
+            let tops: Vec<f64> = found.tops.iter().map(|top| top.log_likelihood - found.log_likelihood).collect();
+            println!("scan {scan}: ln p {less:+.2} below that of the start at the truth; tops {tops:.2?}");
             below.push(less);
         }
     }
     maps.iter().chain(&signals).filter(|fits| fits.found.len() > 1).for_each(|fits| fits.show(&truth, &bound));
-    for ((name, widths), parameter) in ["left", "right"].into_iter().zip(&widths).zip(HEIGHTS) {
-        let n = widths.len() as f64;
-        let over: Vec<f64> = widths.iter().map(|width| width / bound[parameter as usize]).collect();
-        let squares: Vec<f64> = over.iter().map(|o| o * o).collect();
-        let mean = squares.iter().sum::<f64>() / n;
-        let error = (squares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
-        if n > 1.0 {
-            println!(
-                "posterior of the {name} height: {:.2} +- {:.2} of the bound, from {:.2} to {:.2} by scan",
-                mean.sqrt(),
-                0.5 * error / mean.sqrt(),
-                over.iter().copied().fold(f64::INFINITY, f64::min),
-                over.iter().copied().fold(0.0, f64::max),
-            );
-        }
+    for (widths, (name, height)) in widths.iter().zip(HEIGHTS).filter(|(widths, _)| widths.len() > 1) {
+        let mut over: Vec<f64> = widths.iter().map(|width| width / bound[height as usize]).collect();
+        over.sort_by(f64::total_cmp);
+        let square = Estimate::mean(&over.iter().map(|o| o * o).collect::<Vec<_>>());
+        let (root, error) = (square.value.sqrt(), 0.5 * square.standard_error / square.value.sqrt());
+        let (least, most) = (over[0], over[over.len() - 1]);
+        println!(
+            "posterior of the {name} height: {root:.2} +- {error:.2} of the bound, from {least:.2} to {most:.2} by scan"
+        );
     }
-    if !below.is_empty() {
+    if let Some(most) = below.iter().copied().max_by(f64::total_cmp) {
         let lower = below.iter().filter(|less| **less > 0.1).count();
-        let most = below.iter().fold(f64::NEG_INFINITY, |most, less| most.max(*less));
         println!("{lower} of {} fits of signals end on a top lower by 0.1 or more; the most is {most:.2}", below.len());
     }
     Ok(())

@@ -17,6 +17,7 @@ mod histories;
 mod process;
 mod profile;
 mod ranks;
+#[cfg(test)]
 mod ranks_model;
 mod references;
 mod regress;
@@ -25,7 +26,6 @@ mod sources;
 mod stability;
 mod statistics;
 mod tidy;
-mod trials;
 mod validate;
 mod wakes;
 mod work_precision;

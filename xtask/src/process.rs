@@ -2,9 +2,9 @@
 //!
 //! Linux only: the figures come from /proc.
 
+use crate::cost;
 use crate::workspace::root;
 use fixtures::failure::Failure;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -66,21 +66,14 @@ pub(crate) fn watch(program: &Path, words: &[&str], folder: &Path, seconds: f64)
         std::thread::sleep(Duration::from_millis(1));
     }
     let code = child.wait().map_err(io)?.code();
-    let read = |path: &Path| {
-        let mut bytes = Vec::new();
-        std::fs::File::open(path).and_then(|mut f| f.read_to_end(&mut bytes)).map_err(io)?;
-        Ok::<_, Failure>(String::from_utf8_lossy(&bytes).into_owned())
-    };
+    let read = |path: &Path| Ok::<_, Failure>(String::from_utf8_lossy(&std::fs::read(path).map_err(io)?).into_owned());
     Ok(Watched { code, hung, cpu_s, peak_bytes, stdout: read(&out)?, stderr: read(&err)? })
 }
 
 /// Brings time and memory up to date; whether the process has ended.
 fn sample(child: &Child, cpu_s: &mut f64, peak_bytes: &mut f64) -> bool {
-    let read = |name: &str| std::fs::read_to_string(format!("/proc/{}/{name}", child.id())).unwrap_or_default();
-    let status = read("status");
-    let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse::<f64>().ok());
-    *peak_bytes = peak_bytes.max(1024.0 * peak.unwrap_or(0.0));
-    let stat = read("stat");
+    *peak_bytes = peak_bytes.max(cost::peak_bytes(&child.id().to_string()));
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap_or_default();
     // Behind the name in brackets: state, then utime and stime at places 11 and 12, in hundredths of a second.
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or("").split_whitespace().collect();
     let ticks = |place: usize| fields.get(place).and_then(|t| t.parse::<f64>().ok()).unwrap_or(0.0);

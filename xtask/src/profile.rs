@@ -1,7 +1,7 @@
 //! How much a task computes.
 
 /// Resolution and sample counts of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub(crate) enum Profile {
     /// Minutes: every component, coarse meshes and small samples; most bars of flows are then wider.
     Quick,

@@ -1,8 +1,12 @@
-//! Weak scaling of a flow on ranks: every rank has the same slab, and all ranks exchange halos and lines that cross slabs. Nothing is
-//! hidden behind the work, as in the solver. By a model, in which every rank is a machine of 64 cores, and by what was measured of single
-//! exchanges.
-//!
-//! Check: what the solver sends in a stage; the table of the book.
+//! The model of the book for weak scaling on ranks: every rank is a machine of 64 cores with the same slab, and all ranks exchange halos and
+//! lines that cross slabs. Nothing is hidden behind the work, as in the solver.
+
+use crate::ranks::{PLANES, TURNS};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use wakescope_les::cases::taylor_green_3d;
+use wakescope_les::ranks::{Ranks, on_threads};
+use wakescope_les::{Error, FlowSettings, SubgridModel, TimeScheme};
 
 /// Cells of a rank: its planes lie across the last axis.
 const SLAB: [f64; 3] = [512.0, 512.0, 64.0];
@@ -14,28 +18,19 @@ const LINES: f64 = 0.1;
 /// Between two machines: time of a message, and bytes in a second.
 const MESSAGE_S: f64 = 2e-6;
 const BYTES_PER_S: f64 = 1e10;
-/// Planes of the whole halos of one field, on either side of a slab.
-const WHOLE: f64 = 8.0;
-/// Turns of a field in a stage.
-const TURNS: f64 = 2.0;
 
 /// Planes that leave a slab in a stage, and in how many exchanges.
 #[derive(Clone, Copy)]
-pub(crate) struct Halos {
+struct Halos {
     planes: f64,
     exchanges: f64,
 }
 
 impl Halos {
-    /// Three of the third component before the divergence; whole halos of the pressure and of the velocity.
-    const PLAIN: Self = Self { planes: 3.0 + 4.0 * WHOLE, exchanges: 3.0 };
+    /// Three of the third component before the divergence; whole halos, eight planes, of the pressure and of the velocity.
+    const PLAIN: Self = Self { planes: 3.0 + 4.0 * 8.0, exchanges: 3.0 };
     /// Before them four of the eddy viscosity and of each component of the small scales; four of each stress that acts across planes.
-    pub(crate) const MULTISCALE: Self = Self { planes: Self::PLAIN.planes + 7.0 * 4.0, exchanges: 5.0 };
-}
-
-/// Part of the time of a stage that is work, from that of the work, of a turn, and of whole halos of one field \[s\].
-pub(crate) fn efficiency(work_s: f64, turn_s: f64, halo_s: f64, halos: Halos) -> f64 {
-    work_s / (work_s + TURNS * turn_s + halos.planes / WHOLE * halo_s)
+    const MULTISCALE: Self = Self { planes: PLANES, exchanges: 5.0 };
 }
 
 /// Time of a stage in which nothing is exchanged, and of turns and halos \[s\], on `ranks`.
@@ -53,7 +48,7 @@ fn stage_s(ranks: f64, halos: Halos) -> [f64; 3] {
 }
 
 /// The table of the book.
-pub(crate) fn table() -> String {
+fn table() -> String {
     let mut text = "| ranks | planes | turns, ms a stage | halos, ms a stage | efficiency | halos with the multiscale model | efficiency with it |\n\
                     |---|---|---|---|---|---|---|\n"
         .to_owned();
@@ -73,72 +68,60 @@ pub(crate) fn table() -> String {
     text
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicUsize, Ordering};
-    use wakescope_les::cases::taylor_green_3d;
-    use wakescope_les::ranks::{Ranks, on_threads};
-    use wakescope_les::{Error, FlowSettings, SubgridModel, TimeScheme};
+/// Ranks that count what leaves them, in messages of more than `least` values.
+#[derive(Debug)]
+struct Counting {
+    ranks: Arc<dyn Ranks>,
+    least: usize,
+    values: AtomicUsize,
+    messages: AtomicUsize,
+}
 
-    /// Ranks that count what leaves them, in messages of more than `least` values.
-    #[derive(Debug)]
-    struct Counting {
-        ranks: Arc<dyn Ranks>,
-        least: usize,
-        values: AtomicUsize,
-        messages: AtomicUsize,
+impl Ranks for Counting {
+    fn rank(&self) -> usize {
+        self.ranks.rank()
     }
 
-    impl Ranks for Counting {
-        fn rank(&self) -> usize {
-            self.ranks.rank()
-        }
-
-        fn count(&self) -> usize {
-            self.ranks.count()
-        }
-
-        fn turn(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
-            let leaving = to.iter().sum::<usize>() - to[self.rank()];
-            if leaving > self.least {
-                self.values.fetch_add(leaving, Ordering::Relaxed);
-                self.messages.fetch_add(1, Ordering::Relaxed);
-            }
-            self.ranks.turn(send, to, receive, from)
-        }
+    fn count(&self) -> usize {
+        self.ranks.count()
     }
 
-    #[test]
-    fn the_solver_sends_what_the_model_says() {
-        let n = 24;
-        for (subgrid, halos) in [(SubgridModel::None, Halos::PLAIN), (SubgridModel::MULTISCALE_WALE, Halos::MULTISCALE)]
-        {
-            let sent = on_threads(2, |ranks| {
-                let counting =
-                    Arc::new(Counting { ranks, least: n * n, values: 0.into(), messages: AtomicUsize::new(0) });
-                let mut case = taylor_green_3d(n, 1600.0).unwrap();
-                case.settings =
-                    FlowSettings { ranks: counting.clone(), scheme: TimeScheme::RungeKutta3, subgrid, ..case.settings };
-                let (mut flow, _) = case.initial.start(case.mesh, case.settings).unwrap();
-                let seen = || [&counting.values, &counting.messages].map(|count| count.load(Ordering::Relaxed));
-                let before = seen();
-                flow.step().unwrap();
-                let after = seen();
-                [after[0] - before[0], after[1] - before[1]]
-            });
-            let stages = 3.0;
-            // half of the slab of one rank leaves it in a turn
-            let values = stages * (n * n) as f64 * (halos.planes + TURNS * n as f64 / 4.0);
-            let messages = stages * (halos.exchanges + TURNS);
-            assert_eq!(sent, vec![Some([values as usize, messages as usize]); 2], "{subgrid:?}");
+    fn turn(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
+        let leaving = to.iter().sum::<usize>() - to[self.rank()];
+        if leaving > self.least {
+            self.values.fetch_add(leaving, Ordering::Relaxed);
+            self.messages.fetch_add(1, Ordering::Relaxed);
         }
+        self.ranks.turn(send, to, receive, from)
     }
+}
 
-    #[test]
-    fn the_book_has_the_table_of_the_model() {
-        let page = std::fs::read_to_string(crate::workspace::root().join("docs/src/ranks.md")).unwrap();
-        assert!(page.contains(&table()), "docs/src/ranks.md lacks\n{}", table());
+#[test]
+fn the_solver_sends_what_the_model_says() {
+    let n = 24;
+    for (subgrid, halos) in [(SubgridModel::None, Halos::PLAIN), (SubgridModel::MULTISCALE_WALE, Halos::MULTISCALE)] {
+        let sent = on_threads(2, |ranks| {
+            let counting = Arc::new(Counting { ranks, least: n * n, values: 0.into(), messages: AtomicUsize::new(0) });
+            let mut case = taylor_green_3d(n, 1600.0).unwrap();
+            case.settings =
+                FlowSettings { ranks: counting.clone(), scheme: TimeScheme::RungeKutta3, subgrid, ..case.settings };
+            let (mut flow, _) = case.initial.start(case.mesh, case.settings).unwrap();
+            let seen = || [&counting.values, &counting.messages].map(|count| count.load(Ordering::Relaxed));
+            let before = seen();
+            flow.step().unwrap();
+            let after = seen();
+            [after[0] - before[0], after[1] - before[1]]
+        });
+        let stages = 3.0;
+        // half of the slab of one rank leaves it in a turn
+        let values = stages * (n * n) as f64 * (halos.planes + TURNS * n as f64 / 4.0);
+        let messages = stages * (halos.exchanges + TURNS);
+        assert_eq!(sent, vec![Some([values as usize, messages as usize]); 2], "{subgrid:?}");
     }
+}
+
+#[test]
+fn the_book_has_the_table_of_the_model() {
+    let page = std::fs::read_to_string(crate::workspace::root().join("docs/src/ranks.md")).unwrap();
+    assert!(page.contains(&table()), "docs/src/ranks.md lacks\n{}", table());
 }

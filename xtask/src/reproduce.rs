@@ -5,7 +5,6 @@
 //! leaves a core idle at times; those that measure times come last, alone.
 
 mod cache;
-mod html;
 mod lists;
 mod report;
 

@@ -1,5 +1,6 @@
-//! Source files as text: their lines of code, and which files of the workspace import which.
+//! Source files as tokens: which files of the workspace import which names from which.
 
+use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Whether a source file holds nothing but tests.
@@ -8,44 +9,15 @@ pub(crate) fn is_test_file(file: &str) -> bool {
     file.ends_with(".rs") && of_tests || file.ends_with("/tests.rs") || file.ends_with("_tests.rs")
 }
 
-/// Lines of code of a source text: neither blank, nor comment, nor part of an item that is compiled for tests alone.
-pub(crate) fn code_lines(text: &str) -> Vec<&str> {
-    let mut out = Vec::new();
-    let mut lines = text.lines();
-    while let Some(line) = lines.next() {
-        if line.trim() == "#[cfg(test)]" {
-            let end = format!("{}}}", &line[..line.len() - line.trim_start().len()]);
-            // The item ends with a semicolon before any brace, or with the brace below its beginning.
-            let mut is_open = false;
-            for inner in lines.by_ref() {
-                let has_brace = inner.contains('{') && !inner.trim_start().starts_with("use ");
-                if inner == end || !is_open && (inner.ends_with(';') || has_brace && inner.ends_with('}')) {
-                    break;
-                }
-                is_open |= has_brace;
-            }
-        } else if !line.trim().is_empty() && !line.trim_start().starts_with("//") {
-            out.push(line);
-        }
-    }
-    out
-}
-
-/// What an item is, as far as importing it matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    /// A constant or the name of a type: whoever states it needs nothing of who uses it.
-    Constant,
-    Other,
-}
-
 /// A file of a crate: its folder and the path of its module.
 type Place = (String, Vec<String>);
 
 /// One file as a module.
+#[derive(Default)]
 struct Module<'a> {
     file: &'a str,
-    items: BTreeMap<String, Kind>,
+    /// Names of items, and whether each is a constant or the name of a type: whoever states it needs nothing of who uses it.
+    items: BTreeMap<String, bool>,
     uses: Vec<Use>,
     /// Paths outside of `use`, such as `crate::a::f` or `child::g`.
     paths: Vec<Vec<String>>,
@@ -65,9 +37,14 @@ pub(crate) type Imports<'a> = BTreeMap<&'a str, BTreeMap<&'a str, BTreeSet<Strin
 pub(crate) struct Modules<'a>(BTreeMap<Place, Module<'a>>);
 
 impl<'a> Modules<'a> {
-    /// Of source files and their texts; what is not below a `src` is left out.
+    /// Of source files and their texts; what is not below a `src` is left out, and what is no Rust has no imports.
     pub(crate) fn new(files: &[(&'a str, &str)]) -> Self {
-        Self(files.iter().filter_map(|(file, text)| Some((place(file)?, Module::new(file, text)))).collect())
+        let module = |file: &'a str, text: &str| {
+            let mut module = Module { file, ..Module::default() };
+            module.read(&text.parse::<TokenStream>().unwrap_or_default().into_iter().collect::<Vec<_>>());
+            module
+        };
+        Self(files.iter().filter_map(|(file, text)| Some((place(file)?, module(file, text)))).collect())
     }
 
     /// Which file takes which names from which; constants that a module takes from the one above it do not count if
@@ -82,7 +59,7 @@ impl<'a> Modules<'a> {
                     continue;
                 };
                 let is_above = to.1.len() < from.1.len() && from.1.starts_with(&to.1);
-                let is_constant = self.0[to].items.get(&name) == Some(&Kind::Constant);
+                let is_constant = self.0[to].items.get(&name) == Some(&true);
                 if to != from && !(but_constants && is_above && is_constant) {
                     out.entry(module.file).or_default().entry(self.0[to].file).or_default().insert(name);
                 }
@@ -93,27 +70,20 @@ impl<'a> Modules<'a> {
 
     /// The path from the root of the crate; none if it leads to another crate.
     fn absolute(&self, at: &Place, path: &[String]) -> Option<Vec<String>> {
-        let (first, mut rest) = (path.first()?.as_str(), &path[1..]);
         let mut base = at.1.clone();
-        match first {
-            "crate" => base.clear(),
-            "self" => {}
-            "super" => {
-                base.pop();
-                while rest.first().is_some_and(|word| word == "super") {
-                    base.pop();
-                    rest = &rest[1..];
-                }
+        let mut rest = path;
+        while let Some((word @ ("crate" | "self" | "super"), more)) =
+            rest.split_first().map(|(word, more)| (word.as_str(), more))
+        {
+            match word {
+                "crate" => base.clear(),
+                "super" => drop(base.pop()),
+                _ => {}
             }
-            child => {
-                base.push(child.into());
-                if !self.0.contains_key(&(at.0.clone(), base.clone())) {
-                    return None;
-                }
-            }
+            rest = more;
         }
-        base.extend_from_slice(rest);
-        Some(base)
+        let is_child = || self.0.contains_key(&(at.0.clone(), [&base[..], &rest[..1]].concat()));
+        (rest.len() < path.len() || is_child()).then(|| [&base[..], rest].concat())
     }
 
     /// The module that holds what a path names, through what modules hand on.
@@ -142,19 +112,12 @@ pub(crate) fn circles<'a>(imports: &Imports<'a>) -> Vec<Vec<&'a str>> {
             out.push(seen.iter().copied().filter(|to| all.get(to).is_some_and(|back| back.contains(file))).collect());
         }
     }
-    out.retain(|circle| {
-        !circle.iter().any(|above| circle.iter().all(|file| file == above || is_right_below(file, above)))
-    });
+    let above = |file: &str| place(file).map(|(folder, mut path)| path.pop().map(|_| (folder, path)));
+    let is_family = |circle: &Vec<&str>, parent: &str| {
+        circle.iter().all(|file| *file == parent || above(file).is_some_and(|of| of == place(parent)))
+    };
+    out.retain(|circle| !circle.iter().any(|parent| is_family(circle, parent)));
     out
-}
-
-fn is_right_below(file: &str, above: &str) -> bool {
-    match (place(file), place(above)) {
-        (Some((folder, path)), Some(above)) => {
-            path.split_last().is_some_and(|(_, rest)| above == (folder, rest.to_vec()))
-        }
-        _ => false,
-    }
 }
 
 /// What a file imports, in one step or several.
@@ -176,97 +139,88 @@ fn place(file: &str) -> Option<Place> {
     Some((folder.into(), path))
 }
 
-impl<'a> Module<'a> {
-    fn new(file: &'a str, text: &str) -> Self {
-        let lines = code_lines(text);
-        let items = lines.iter().filter_map(|line| item(line)).collect();
-        let (mut uses, mut paths) = (Vec::new(), Vec::new());
-        let mut open: Option<(String, String)> = None;
-        for line in &lines {
-            match &mut open {
-                Some((_, tree)) => tree.push_str(line),
-                None => {
-                    let (visibility, item) = visibility(line);
-                    open = item.strip_prefix("use ").map(|tree| (visibility.to_owned(), tree.to_owned()));
-                    if open.is_none() {
-                        paths.extend(inline_paths(item));
-                    }
+/// The name at a place of some tokens; empty where there is none.
+fn name(tokens: &[TokenTree], place: usize) -> String {
+    match tokens.get(place) {
+        Some(TokenTree::Ident(name)) => name.to_string(),
+        _ => String::new(),
+    }
+}
+
+/// Whether there are two colons at a place of some tokens.
+fn is_joint(tokens: &[TokenTree], place: usize) -> bool {
+    let is_colon = |token: Option<&TokenTree>| matches!(token, Some(TokenTree::Punct(p)) if p.as_char() == ':');
+    is_colon(tokens.get(place)) && is_colon(tokens.get(place + 1))
+}
+
+fn is_end(token: &TokenTree) -> bool {
+    matches!(token, TokenTree::Punct(p) if p.as_char() == ';')
+}
+
+impl Module<'_> {
+    /// Takes what items, imports and paths some tokens have; items for tests alone are left out.
+    fn read(&mut self, tokens: &[TokenTree]) {
+        let mut at = 0;
+        while let Some(token) = tokens.get(at) {
+            let (word, next) = (name(tokens, at), name(tokens, at + 1));
+            match (token, word.as_str()) {
+                (TokenTree::Group(group), _) if group.to_string().replace(' ', "") == "[cfg(test)]" => {
+                    let ends = |t: &TokenTree| matches!(t, TokenTree::Group(g) if g.delimiter() == Delimiter::Brace);
+                    at += tokens[at..].iter().position(|t| is_end(t) || ends(t)).unwrap_or(tokens.len());
                 }
+                // who may see an item
+                (TokenTree::Group(_), _) if at > 0 && name(tokens, at - 1) == "pub" => {}
+                (TokenTree::Group(group), _) => self.read(&group.stream().into_iter().collect::<Vec<_>>()),
+                (_, "use") => {
+                    let end = tokens[at..].iter().position(is_end).map_or(tokens.len(), |length| at + length);
+                    let is_exported = at > 0 && name(tokens, at - 1) == "pub";
+                    let is_public = is_exported || at > 1 && name(tokens, at - 2) == "pub";
+                    let mut paths = Vec::new();
+                    write_out(&tokens[at + 1..end], &[], &mut paths);
+                    self.uses.push(Use { is_public, is_exported, paths });
+                    at = end;
+                }
+                (_, "const" | "static" | "type") if !["fn", "unsafe", "async", ""].contains(&next.as_str()) => {
+                    self.items.insert(next, true);
+                }
+                (_, "fn" | "struct" | "enum" | "trait" | "mod") if !next.is_empty() => {
+                    self.items.insert(next, false);
+                }
+                (_, "macro_rules") => {
+                    self.items.insert(name(tokens, at + 2), false);
+                }
+                (_, word) if !(word.is_empty() || at > 1 && is_joint(tokens, at - 2)) => {
+                    let mut path = vec![word.to_owned()];
+                    while is_joint(tokens, at + 1) && !name(tokens, at + 3).is_empty() {
+                        path.push(name(tokens, at + 3));
+                        at += 3;
+                    }
+                    self.paths.extend((path.len() > 1).then_some(path));
+                }
+                _ => {}
             }
-            if let Some((visibility, tree)) = open.take_if(|(_, tree)| tree.contains(';')) {
-                let paths = written_out(tree.split(';').next().unwrap_or_default());
-                uses.push(Use { is_public: !visibility.is_empty(), is_exported: visibility == "pub", paths });
-            }
-        }
-        Self { file, items, uses, paths }
-    }
-}
-
-/// What stands before an item, and the item.
-fn visibility(line: &str) -> (&str, &str) {
-    let line = line.trim_start();
-    let Some(rest) = line.strip_prefix("pub") else { return ("", line) };
-    let end = if rest.starts_with('(') { rest.find(')').map_or(0, |i| i + 1) } else { 0 };
-    match rest[end..].strip_prefix(' ') {
-        Some(item) => (&line[..3 + end], item),
-        None => ("", line),
-    }
-}
-
-/// Name and kind of the item that a line begins.
-fn item(line: &str) -> Option<(String, Kind)> {
-    let mut words = visibility(line).1.split_whitespace().peekable();
-    loop {
-        let word = words.next()?;
-        let next = *words.peek()?;
-        let kind = match word {
-            "unsafe" | "async" => continue,
-            "const" if ["fn", "unsafe", "async"].contains(&next) => continue,
-            "const" | "static" | "type" => Kind::Constant,
-            "fn" | "struct" | "enum" | "trait" | "mod" | "macro_rules!" => Kind::Other,
-            _ => return None,
-        };
-        return Some((next.chars().take_while(|c| is_word(*c)).collect(), kind));
-    }
-}
-
-fn is_word(c: char) -> bool {
-    c.is_alphanumeric() || c == '_'
-}
-
-/// The paths of a tree such as `a::{b, c::{self, d as e}}`.
-fn written_out(tree: &str) -> Vec<Vec<String>> {
-    let words = |path: &str| -> Vec<String> {
-        let path = path.split(" as ").next().unwrap_or_default();
-        path.split("::").map(str::trim).filter(|word| !word.is_empty()).map(String::from).collect()
-    };
-    let Some((before, inside)) = tree.split_once('{') else { return vec![words(tree)] };
-    let inside = inside.trim_end().strip_suffix('}').unwrap_or(inside);
-    let (mut depth, mut from, mut parts) = (0, 0, Vec::new());
-    for (i, c) in inside.char_indices() {
-        match c {
-            '{' => depth += 1,
-            '}' => depth -= 1,
-            ',' if depth == 0 => {
-                parts.push(&inside[from..i]);
-                from = i + 1;
-            }
-            _ => {}
+            at += 1;
         }
     }
-    parts.push(&inside[from..]);
-    let below = parts.into_iter().filter(|part| !part.trim().is_empty()).flat_map(written_out);
-    below.map(|path| words(before).into_iter().chain(path).collect()).collect()
 }
 
-/// Paths of a line, of two words and more.
-fn inline_paths(line: &str) -> Vec<Vec<String>> {
-    let paths = line.split(|c: char| !is_word(c) && c != ':').map(|path| {
-        let words =
-            path.trim_start_matches(':').split("::").take_while(|word| !word.is_empty() && word.chars().all(is_word));
-        words.map(String::from).collect::<Vec<_>>()
-    });
-    paths.filter(|path| path.len() > 1).collect()
+/// Adds the paths of a tree such as `a::{b, c::{self, d as e}}` below a path.
+fn write_out(tree: &[TokenTree], below: &[String], out: &mut Vec<Vec<String>>) {
+    for part in tree.split(|token| matches!(token, TokenTree::Punct(p) if p.as_char() == ',')) {
+        let mut path = below.to_vec();
+        let mut is_whole = !part.is_empty();
+        for token in part.iter().take_while(|token| token.to_string() != "as") {
+            match token {
+                TokenTree::Ident(name) => path.push(name.to_string()),
+                TokenTree::Group(group) => {
+                    write_out(&group.stream().into_iter().collect::<Vec<_>>(), &path, out);
+                    is_whole = false;
+                }
+                _ => {}
+            }
+        }
+        out.extend(is_whole.then_some(path));
+    }
 }
 
 #[cfg(test)]
@@ -322,11 +276,14 @@ mod tests {
     }
 
     #[test]
-    fn tests_make_no_circle_and_are_no_code() {
+    fn tests_make_no_circle() {
         let a = ("c/src/a.rs", "use super::b::f;\nfn g() {}\n");
         let b = ("c/src/b.rs", "pub fn f() {}\n\n#[cfg(test)]\nmod tests {\n    use crate::a::g;\n}\n");
         assert!(found(&[a, b], false).is_empty());
-        let text = "//! x\n\n#[cfg(test)]\nmod more_tests;\n#[cfg(test)]\nuse a::{\n    b,\n};\nfn f() {\n    g(); // c\n}\n    #[cfg(test)]\n    fn h() {\n    }\nfn k() {}\n";
-        assert_eq!(code_lines(text), ["fn f() {", "    g(); // c", "}", "fn k() {}"]);
+        let c = (
+            "c/src/b.rs",
+            "#[cfg(test)]\nmod more;\n#[cfg(test)]\nuse crate::{\n    a::g,\n};\nfn f() {\n    // crate::a::g()\n}\n",
+        );
+        assert!(found(&[a, c], false).is_empty());
     }
 }

@@ -5,7 +5,7 @@
 //! Check: the factors are those of tables; intervals cover the truth as often as they say.
 
 use serde::{Deserialize, Serialize};
-use std::f64::consts::FRAC_PI_2;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Batches into which scans are put, and below which nothing is decided.
 pub(crate) const BATCHES: usize = 8;
@@ -32,13 +32,8 @@ impl Verdict {
     pub(crate) fn of_all(mut parts: impl Iterator<Item = Self> + Clone) -> Self {
         match (parts.clone().any(|part| part == Self::Fail), parts.all(|part| part == Self::Pass)) {
             (true, _) => Self::Fail,
-            (_, all) => {
-                if all {
-                    Self::Pass
-                } else {
-                    Self::Open
-                }
-            }
+            (_, true) => Self::Pass,
+            _ => Self::Open,
         }
     }
 
@@ -72,6 +67,11 @@ impl Estimate {
     /// The mean of independent numbers.
     pub(crate) fn mean(of: &[f64]) -> Self {
         Self::of(of.len(), |without| mean(of, without))
+    }
+
+    /// Their standard deviation.
+    pub(crate) fn deviation(of: &[f64]) -> f64 {
+        Self::mean(of).standard_error * (of.len() as f64).sqrt()
     }
 
     /// A number of many parts whose error is known from their law.
@@ -163,19 +163,9 @@ fn decimals(error: f64) -> usize {
     if error.is_finite() && error > 0.0 { (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize } else { 3 }
 }
 
-/// Student's factor of a two-sided interval: with t = sqrt(n) tan x, n degrees of freedom, x has the density cos(x)^(n - 1).
+/// Student's factor of a two-sided interval.
 fn student(confidence: f64, freedom: f64) -> f64 {
-    const STEPS: usize = 20_000;
-    let freedom = freedom.clamp(1.0, 1e4);
-    let step = FRAC_PI_2 / STEPS as f64;
-    let weight = |i: usize| ((i as f64 + 0.5) * step).cos().powf(freedom - 1.0);
-    let mut left = confidence * (0..STEPS).map(weight).sum::<f64>();
-    let cell = (0..STEPS).find(|&i| {
-        left -= weight(i);
-        left <= 0.0
-    });
-    let cell = cell.unwrap_or(STEPS - 1);
-    freedom.sqrt() * ((cell as f64 + 1.0 + left / weight(cell)) * step).tan()
+    StudentsT::new(0.0, 1.0, freedom.clamp(1.0, 1e4)).map_or(f64::NAN, |law| law.inverse_cdf(0.5 + 0.5 * confidence))
 }
 
 #[cfg(test)]

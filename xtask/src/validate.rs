@@ -3,24 +3,20 @@
 //! The bars are printed with what was measured; the pictures and tables go to `target/validation`, from where the book takes
 //! them. A bar that is missed is printed plainly and fails the task at its end.
 
-mod cavity;
-mod channel;
-mod dipole;
-mod order;
+mod bars;
+pub(crate) mod flows;
 mod pair;
-mod shown;
-mod vortices;
-mod wake;
-mod waves;
+mod parameters;
+mod runs;
 
 use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::workspace::{provenance, root};
 use fixtures::failure::{Failure, Outcome};
-use shown::Shown;
 use std::path::PathBuf;
 use std::time::Instant;
 use wakescope_sim::io::{FileGroup, Table};
+use wakescope_sim::plot::Figure;
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
@@ -39,22 +35,30 @@ pub(crate) struct Options {
     out: Option<PathBuf>,
 }
 
+/// What the comparison of a flow with its reference gives.
+struct Shown {
+    checks: Vec<Claim>,
+    table: Table,
+    figure: Figure,
+}
+
 type CaseFn = fn(Profile) -> Result<Shown, Failure>;
 
-const CASES: [(&str, CaseFn); 13] = [
-    ("les_order", order::show),
-    ("les_waves", waves::show),
-    ("les_dipole_625", dipole::show_625),
-    ("les_dipole_1250", dipole::show_1250),
-    ("les_cavity", cavity::show),
-    ("les_vortices", vortices::show),
-    ("les_pair", pair::show),
-    ("les_hyperbola", pair::show_hyperbola),
-    ("les_wake_coarse", wake::bars::show_coarse),
-    ("les_wake_medium", wake::bars::show_medium),
-    ("wake_onset", wake::onset::show),
-    ("wake_crosswind", wake::crosswind::show),
-    ("les_channel", channel::show),
+/// The cases, and the first profile that takes so long.
+const CASES: [(&str, Profile, CaseFn); 13] = [
+    ("les_order", Profile::Quick, flows::order),
+    ("les_waves", Profile::Quick, flows::waves),
+    ("les_dipole_625", Profile::Quick, |profile| flows::dipole(625.0, profile)),
+    ("les_dipole_1250", Profile::Quick, |profile| flows::dipole(1250.0, profile)),
+    ("les_cavity", Profile::Quick, flows::cavity),
+    ("les_vortices", Profile::Quick, flows::turbulent_vortices),
+    ("les_pair", Profile::Quick, pair::show),
+    ("les_hyperbola", Profile::Quick, pair::show_hyperbola),
+    ("les_wake_coarse", Profile::Quick, |_| bars::show_coarse()),
+    ("les_wake_medium", Profile::Standard, |_| bars::show_medium()),
+    ("wake_onset", Profile::Quick, parameters::onset_by_noise),
+    ("wake_crosswind", Profile::Quick, parameters::cross_wind),
+    ("les_channel", Profile::Full, |_| flows::channel()),
 ];
 
 /// Runs the cases, prints the checks, writes tables and pictures.
@@ -63,35 +67,27 @@ const CASES: [(&str, CaseFn); 13] = [
 /// A case that cannot be run, a bar that is missed, an unusable output.
 pub(crate) fn run(options: &Options) -> Outcome {
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/validation"));
-    let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
     println!("{:<16} {:<46} {:>13} {:>24}  verdict", "case", "quantity", "measured", "reference");
     let mut missed = Vec::new();
-    type Make<'a> = Box<dyn Fn() -> Result<Shown, Failure> + 'a>;
-    let is_long = |name: &str| {
-        (name == "les_channel" && options.profile != Profile::Full)
-            || (name == "les_wake_medium" && options.profile == Profile::Quick)
-    };
-    let cases: Vec<(&str, Make)> = match &options.wake {
-        Some(run) => vec![("les_wake_files", Box::new(move || wake::bars::show_files(run)))],
-        None => CASES
-            .into_iter()
-            .filter(|case| wanted(case.0) && !is_long(case.0))
-            .map(|(name, show)| (name, Box::new(move || show(options.profile)) as Make))
-            .collect(),
-    };
-    for (name, show) in cases {
-        let start = Instant::now();
-        let shown = show()?;
+    let mut show = |name: &str, shown: Result<Shown, Failure>, start: Instant| -> Outcome {
+        let shown = shown?;
         for claim in &shown.checks {
             let Claim { statement, expected, measured, .. } = claim;
             let verdict = if claim.passes() { "pass" } else { "MISSED" };
             println!("{name:<16} {statement:<46} {measured:>13} {expected:>24}  {verdict}");
-            if !claim.passes() {
-                missed.push(format!("{name}: {statement}"));
-            }
+            missed.extend((!claim.passes()).then(|| format!("{name}: {statement}")));
         }
         println!("{name:<16} took {:.1} s", start.elapsed().as_secs_f64());
-        write(name, options.profile, &shown, &folder)?;
+        write(name, options.profile, &shown, &folder)
+    };
+    if let Some(run) = &options.wake {
+        show("les_wake_files", bars::show_files(run), Instant::now())?;
+    } else {
+        let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
+        for (name, _, of) in CASES.into_iter().filter(|case| wanted(case.0) && options.profile >= case.1) {
+            let start = Instant::now();
+            show(name, of(options.profile), start)?;
+        }
     }
     println!("pictures and tables in {}", folder.display());
     if missed.is_empty() { Ok(()) } else { Err(Failure::new(format!("bars missed: {}", missed.join("; ")))) }

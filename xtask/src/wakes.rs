@@ -80,6 +80,12 @@ pub(crate) fn whole(context: &Context) -> Result<FinishedWake, Failure> {
     run(&pictured(case), &context.stages, context.anew)
 }
 
+/// Mean of both vortices against tau, the left one times a sign.
+pub(crate) fn mean(wake: &FinishedWake, name: &str, sign: f64) -> Result<Vec<(f64, f64)>, Failure> {
+    let (left, right) = (wake.curve(&format!("{name}_left"))?, wake.curve(&format!("{name}_right"))?);
+    Ok(left.iter().zip(right).map(|(l, r)| (l.0, 0.5 * (sign * l.1 + r.1))).collect())
+}
+
 /// Writes the stored wake anew.
 ///
 /// # Errors
@@ -96,7 +102,7 @@ pub(crate) fn bless() -> Outcome {
 }
 
 /// A wake from the cache, or run.
-fn run(case: &FlowCase, stages: &Path, anew: bool) -> Result<FinishedWake, Failure> {
+pub(crate) fn run(case: &FlowCase, stages: &Path, anew: bool) -> Result<FinishedWake, Failure> {
     let file = CaseFile::parse(&toml::to_string(case)?, Path::new("wake"))?;
     let folder = stages.join(format!("wake-{}", cause(&root(), &[&file.hash], &COMPUTED_BY)?));
     let done = folder.join("done");

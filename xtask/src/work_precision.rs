@@ -1,22 +1,20 @@
-//! `cargo xtask work-precision`: error against run time of every solver, every estimator and the whole chain, knob by knob.
+//! `cargo xtask work-precision`: error against run time of solvers, estimators and the whole chain, knob by knob.
 //!
 //! Every row is measured in this run, on one thread; the time is the smallest of three runs, of one beyond 0.2 s. Errors are relative, with their standard
-//! errors; a setting that fails is a row. Tables, pictures and the cheapest settings go to `target/work-precision`.
+//! errors; a setting that fails is a row.
 
 mod chain;
 mod estimate;
 mod front;
-mod les;
-mod optics;
-pub(crate) mod show;
-mod signal;
+mod physics;
 
 use crate::cost::{Cost, machine};
 use crate::workspace::{provenance, root};
 use fixtures::failure::{Failure, Outcome};
-use front::Measured;
+use front::{Measured, cheapest, on_front};
 use std::path::PathBuf;
-use wakescope_sim::io::FileGroup;
+use wakescope_sim::io::{FileGroup, Table};
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
@@ -33,7 +31,7 @@ pub(crate) struct Options {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Group {
+enum Group {
     Optics,
     Les,
     Signal,
@@ -42,61 +40,63 @@ pub(crate) enum Group {
     Chain,
 }
 
-impl Group {
-    pub(crate) const ALL: [Self; 5] = [Self::Optics, Self::Les, Self::Signal, Self::Estimate, Self::Chain];
+/// What is measured: the groups, their names, and the rows of each, few and coarse ones if asked.
+type Rows = fn(bool) -> Result<Vec<Row>, Failure>;
+const GROUPS: [(Group, &str, Rows); 5] = [
+    (Group::Optics, "optics", physics::optics),
+    (Group::Les, "les", physics::les),
+    (Group::Signal, "signal", physics::signal),
+    (Group::Estimate, "estimate", estimate::rows),
+    (Group::Chain, "chain", chain::rows),
+];
 
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Optics => "optics",
-            Self::Les => "les",
-            Self::Signal => "signal",
-            Self::Estimate => "estimate",
-            Self::Chain => "chain",
-        }
-    }
+/// Relative errors for which the cheapest settings are sought.
+const TARGETS: [(&str, f64); 3] =
+    [("is_cheapest_for_0.1", 0.10), ("is_cheapest_for_0.03", 0.03), ("is_cheapest_for_0.01", 0.01)];
 
-    /// What is measured of it.
-    fn rows(self, quick: bool) -> Result<Vec<Row>, Failure> {
-        match self {
-            Self::Optics => optics::rows(quick),
-            Self::Les => les::rows(quick),
-            Self::Signal => signal::rows(quick),
-            Self::Estimate => estimate::rows(quick),
-            Self::Chain => chain::rows(quick),
-        }
-    }
+/// What the settings of a knob have in common.
+#[derive(Clone, Copy)]
+struct Knob {
+    case: &'static str,
+    method: &'static str,
+    knob: &'static str,
+    metric: &'static str,
+    reference: &'static str,
 }
 
 /// One measurement.
 pub(crate) struct Row {
-    case: &'static str,
-    method: String,
-    knob: &'static str,
+    knob: Knob,
     value: f64,
     /// Relative; NaN where the setting fails.
     error: f64,
     /// Zero where the error is exact.
     standard_error: f64,
-    metric: &'static str,
-    reference: &'static str,
     cost: Cost,
+    group: &'static str,
+    is_on_front: bool,
+    /// For each of the [`TARGETS`].
+    is_cheapest: [bool; TARGETS.len()],
 }
 
-impl Row {
-    /// A setting (knob, value) with its error and that one's standard error; words are metric and reference.
-    fn new(
-        case: &'static str,
-        method: &str,
-        (knob, value): (&'static str, f64),
-        (error, standard_error): (f64, f64),
-        [metric, reference]: [&'static str; 2],
-        cost: Cost,
-    ) -> Self {
-        Self { case, method: method.into(), knob, value, error, standard_error, metric, reference, cost }
+impl Knob {
+    fn new([case, method, knob, metric, reference]: [&'static str; 5]) -> Self {
+        Self { case, method, knob, metric, reference }
     }
 
-    fn measured(&self) -> Measured {
-        Measured { core_s: self.cost.cpu_s, error: self.error, standard_error: self.standard_error }
+    fn row(self, value: f64, (error, standard_error): (f64, f64), cost: Cost) -> Row {
+        Row { knob: self, value, error, standard_error, cost, group: "", is_on_front: false, is_cheapest: [false; 3] }
+    }
+
+    /// A row for each value, the first two alone if `quick`, from the error, its standard error and the cost there.
+    fn rows(
+        self,
+        quick: bool,
+        values: &[f64],
+        measure: impl Fn(f64) -> Result<((f64, f64), Cost), Failure>,
+    ) -> Result<Vec<Row>, Failure> {
+        let one = |value: &f64| measure(*value).map(|(error, cost)| self.row(*value, error, cost));
+        few(values, quick).iter().map(one).collect()
     }
 }
 
@@ -105,18 +105,71 @@ fn few<T>(values: &[T], quick: bool) -> &[T] {
     if quick { &values[..values.len().min(2)] } else { values }
 }
 
-/// Mean and its standard error.
-fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
+/// The rows of all groups.
+pub(crate) fn measure(quick: bool) -> Result<Vec<Row>, Failure> {
+    measure_some(None, quick)
 }
 
-/// The rows of some groups, on one thread.
-pub(crate) fn measure(groups: &[Group], quick: bool) -> Result<Vec<(Group, Vec<Row>)>, Failure> {
+/// The rows of a group or of all, on one thread; each case at a stretch, judged among its own.
+fn measure_some(wanted: Option<Group>, quick: bool) -> Result<Vec<Row>, Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    groups.iter().map(|group| Ok((*group, pool.install(|| group.rows(quick))?))).collect()
+    let mut all = Vec::new();
+    for (_, name, rows) in GROUPS.into_iter().filter(|group| wanted.is_none_or(|wanted| wanted == group.0)) {
+        let mut rows = pool.install(|| rows(quick))?;
+        rows.sort_by_key(|row| row.knob.case);
+        for of_case in rows.chunk_by_mut(|a, b| a.knob.case == b.knob.case) {
+            let of = |r: &Row| Measured { core_s: r.cost.cpu_s, error: r.error, standard_error: r.standard_error };
+            let measured: Vec<Measured> = of_case.iter().map(of).collect();
+            of_case.iter_mut().zip(on_front(&measured)).for_each(|(row, is_on)| row.is_on_front = is_on);
+            for (place, (_, target)) in TARGETS.into_iter().enumerate() {
+                cheapest(&measured, target).into_iter().for_each(|best| of_case[best].is_cheapest[place] = true);
+            }
+        }
+        rows.iter_mut().for_each(|row| row.group = name);
+        all.extend(rows);
+    }
+    Ok(all)
+}
+
+/// One row a setting.
+pub(crate) fn table(rows: &[Row]) -> Table {
+    let text = |get: fn(&Knob) -> &'static str| rows.iter().map(move |r| get(&r.knob));
+    let float = |get: fn(&Row) -> f64| rows.iter().map(get);
+    let table = Table::new()
+        .text("case", text(|k| k.case))
+        .text("method", text(|k| k.method))
+        .text("knob", text(|k| k.knob))
+        .float("value", float(|r| r.value))
+        .float("error", float(|r| r.error))
+        .text("metric", text(|k| k.metric))
+        .text("reference", text(|k| k.reference))
+        .float("cpu_s", float(|r| r.cost.cpu_s))
+        .float("wall_s", float(|r| r.cost.wall_s))
+        .int("threads", rows.iter().map(|_| 1))
+        .float("peak_mem_bytes", float(|r| r.cost.peak_mem_bytes))
+        .float("standard_error", float(|r| r.standard_error))
+        .text("group", rows.iter().map(|r| r.group))
+        .int("is_on_front", rows.iter().map(|r| r.is_on_front.into()));
+    let targets = TARGETS.iter().enumerate();
+    targets.fold(table, |table, (k, target)| table.int(target.0, rows.iter().map(|r| r.is_cheapest[k].into())))
+}
+
+/// A panel for each group, in it the front of each case: what no other setting beats in error and in time.
+pub(crate) fn picture(rows: &[Row]) -> Figure {
+    let panel = |of_group: &[Row]| {
+        let axes = (Axis::log("processor time [s]"), Axis::log("relative error"));
+        let mut plot = CurvePlot::new(of_group[0].group, axes.0, axes.1);
+        for of_case in of_group.chunk_by(|a, b| a.knob.case == b.knob.case) {
+            let shown = of_case.iter().filter(|r| r.is_on_front && r.error > 0.0 && r.cost.cpu_s > 0.0);
+            let mut points: Vec<(f64, f64)> = shown.map(|r| (r.cost.cpu_s, r.error)).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            if !points.is_empty() {
+                plot = plot.with(Series::new(of_case[0].knob.case, Style::LineMarkers, points));
+            }
+        }
+        plot
+    };
+    Figure::stacked(rows.chunk_by(|a, b| a.group == b.group).map(panel))
 }
 
 /// Measures, prints and writes.
@@ -124,23 +177,19 @@ pub(crate) fn measure(groups: &[Group], quick: bool) -> Result<Vec<(Group, Vec<R
 /// # Errors
 /// What a crate refuses, or an unusable output.
 pub(crate) fn run(options: &Options) -> Outcome {
-    let groups = options.group.map_or(Group::ALL.to_vec(), |group| vec![group]);
-    let measured = measure(&groups, options.quick)?;
-    let machine = machine();
-    let parameters = format!("machine = {machine:?}\nthreads = 1\nquick = {}\n", options.quick);
-    let origin = provenance(&parameters, optics::SEED);
+    let rows = measure_some(options.group, options.quick)?;
+    println!("{:<28} {:<34} {:<34} {:>8} {:>22} {:>10}", "case", "method", "knob", "value", "error", "cpu");
+    for Row { knob, value, error, standard_error, cost, .. } in &rows {
+        let Knob { case, method, knob, metric, reference } = knob;
+        let (error, cost) = (format!("{error:.2e} +- {standard_error:.1e}"), format!("{:.1e} s", cost.cpu_s));
+        println!("{case:<28} {method:<34} {knob:<34} {value:>8} {error:>22} {cost:>10} {metric}, {reference}");
+    }
+    let parameters = format!("machine = {:?}\nthreads = 1\nquick = {}\n", machine(), options.quick);
+    let origin = provenance(&parameters, physics::SEED);
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/work-precision"));
     let mut files = FileGroup::new(&folder);
-    for (group, rows) in &measured {
-        show::print(*group, rows);
-        let one = [(*group, rows.as_slice())];
-        files.add(&format!("{}.csv", group.name()), show::table(&one).to_csv(&origin)?)?;
-        files.add(&format!("{}.svg", group.name()), show::panels(rows).svg(&origin)?)?;
-    }
-    let all: Vec<(Group, &[Row])> = measured.iter().map(|(group, rows)| (*group, rows.as_slice())).collect();
-    files.add("work_precision.csv", show::table(&all).to_csv(&origin)?)?;
-    files.add("work_precision.svg", show::fronts(&all).svg(&origin)?)?;
-    files.add("cheapest.csv", show::cheapest_table(&all).to_csv(&origin)?)?;
+    files.add("work_precision.csv", table(&rows).to_csv(&origin)?)?;
+    files.add("work_precision.svg", picture(&rows).svg(&origin)?)?;
     files.commit()?;
     println!("wrote {}", folder.join("work_precision.csv").display());
     Ok(())

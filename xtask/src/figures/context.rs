@@ -1,13 +1,19 @@
 //! What every figure takes, and what it gives.
 
-use crate::claim::Claim;
-use crate::profile::Profile;
 use crate::workspace::provenance;
-use fixtures::failure::Failure;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-use wakescope_sim::io::{Provenance, Table};
-use wakescope_sim::plot::Figure;
-use wakescope_sim::scene::Scene;
+use wakescope_sim::io::Provenance;
+
+// What nearly every figure is made of.
+pub(super) use crate::claim::Claim;
+pub(super) use crate::profile::Profile;
+pub(super) use crate::statistics::{BATCHES, Bar, Estimate, Verdict};
+pub(super) use fixtures::failure::Failure;
+pub(super) use wakescope_sim::io::Table;
+pub(super) use wakescope_sim::plan::{Plan, Target};
+pub(super) use wakescope_sim::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
+pub(super) use wakescope_sim::scene::{Scene, SceneFile};
 
 /// What a figure may depend on.
 #[derive(Debug, Clone)]
@@ -24,25 +30,16 @@ pub(crate) struct Context {
 }
 
 impl Context {
-    /// One of three values, by profile.
-    pub(crate) fn choose<T>(&self, quick: T, standard: T, full: T) -> T {
-        self.profile.choose(quick, standard, full)
-    }
-
-    pub(crate) fn profile_name(&self) -> &'static str {
-        self.profile.name()
-    }
-
     /// The scene of a figure as a checked file, with this run's seed.
-    pub(crate) fn scene_file(&self, mut scene: Scene) -> Result<wakescope_sim::scene::SceneFile, Failure> {
+    pub(crate) fn scene_file(&self, mut scene: Scene) -> Result<SceneFile, Failure> {
         scene.seed = self.seed;
-        wakescope_sim::scene::SceneFile::new(scene)
+        SceneFile::new(scene)
             .map_err(|problems| Failure::new(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")))
     }
 
     /// Provenance of what belongs to no scene: the tables over all figures.
     pub(crate) fn provenance_of_run(&self) -> Provenance {
-        self.provenance_of_formula(&format!("profile = \"{}\"\n", self.profile_name()))
+        self.provenance_of_formula(&format!("profile = \"{}\"\n", self.profile.name()))
     }
 
     /// Provenance of a figure that follows from formulas and the parameters given as TOML.
@@ -52,9 +49,10 @@ impl Context {
 }
 
 /// What a figure gives.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Rendered {
     /// Extension and content of each file.
+    #[serde(skip)]
     pub(crate) files: Vec<(String, Vec<u8>)>,
     /// What is drawn, for the report.
     pub(crate) caption: String,
@@ -92,4 +90,10 @@ impl Rendered {
     pub(crate) fn file(&self, extension: &str) -> Option<&[u8]> {
         self.files.iter().find(|(e, _)| e == extension).map(|(_, bytes)| bytes.as_slice())
     }
+}
+
+/// A table of numbers, row by row.
+pub(super) fn numbers_table<const N: usize>(names: [&str; N], rows: &[[f64; N]]) -> Table {
+    let columns = names.into_iter().enumerate();
+    columns.fold(Table::new(), |table, (k, name)| table.float(name, rows.iter().map(|row| row[k])))
 }

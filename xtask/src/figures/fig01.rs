@@ -1,12 +1,8 @@
 //! Figure 1: vertical velocity through the two cores of the pair, and the potential profiles.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use fixtures::failure::Failure;
+use super::context::*;
 use std::f64::consts::PI;
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const GAMMA_M2_S: f64 = 500.0;
 const SPACING_M: f64 = 47.0;
@@ -30,12 +26,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut velocity_m_s = vec![[0.0; 3]; POINTS];
     pair.wind()?.velocity_into(&points_m, 0.0, &mut velocity_m_s)?;
     let w_m_s: Vec<f64> = velocity_m_s.iter().map(|v| v[2]).collect();
-    let potential_m_s: Vec<f64> = y_m.iter().map(|&y| potential_m_s(y)).collect();
 
-    let table = Table::new()
-        .float("y_m", y_m.iter().copied())
-        .float("w_m_s", w_m_s.iter().copied())
-        .float("w_potential_m_s", potential_m_s.iter().copied());
+    let rows: Vec<[f64; 3]> = y_m.iter().zip(&w_m_s).map(|(y, w)| [*y, *w, potential_m_s(*y)]).collect();
+    let table = numbers_table(["y_m", "w_m_s", "w_potential_m_s"], &rows);
     let parameters =
         format!("circulation_m2_s = {GAMMA_M2_S:?}\nspacing_m = {SPACING_M:?}\ncore_radius_m = {CORE_M:?}\n");
     let origin = context.provenance_of_formula(&parameters);
@@ -46,7 +39,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let y = Axis::linear("w / (Γ₀ / 4π r_c)").between(-1.6, 1.6);
     // The potential profile is cut where it leaves the frame, or a line would join its two ends.
     let inside = |v: &f64| if (v / top_m_s).abs() < 1.7 { *v } else { f64::NAN };
-    let drawn_m_s: Vec<f64> = potential_m_s.iter().map(inside).collect();
+    let drawn_m_s: Vec<f64> = rows.iter().map(|row| inside(&row[2])).collect();
     let plot = CurvePlot::new("Vertical velocity through the cores", x, y)
         .with(Series::new("algebraic profile (3)", Style::Line, scaled(&w_m_s)))
         .with(Series::new("potential vortices", Style::DashDot, scaled(&drawn_m_s)));

@@ -1,11 +1,7 @@
 //! Figure 3: the scan pattern on the runway, with the vortices and the lines of sight.
 
-use super::context::{Context, Rendered};
-use fixtures::failure::Failure;
-use wakescope_sim::io::Table;
-use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
-use wakescope_sim::scene::{Flow, Scene};
+use super::context::*;
+use wakescope_sim::scene::Flow;
 use wakescope_sim::setup::wind;
 
 /// Every so many lines are drawn; the table has all.

@@ -1,17 +1,13 @@
 //! Figure 4: signal-to-noise ratio and system efficiency against range, in free space and through turbulence.
 
-use super::context::{Context, Rendered};
-use crate::claim::{Claim, Part};
-use crate::statistics::{Bar, Estimate};
-use fixtures::failure::Failure;
+use super::context::*;
+use crate::claim::Part;
 use std::ops::ControlFlow;
 use wakescope_optics::air::StructureTable;
 use wakescope_optics::monte_carlo::EfficiencyEstimate;
 use wakescope_optics::{
     EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Stop, Telescope, Turbulence, theory,
 };
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const WEAK_M_M23: f64 = 1e-15;
 const MEDIUM_M_M23: f64 = 1e-13;
@@ -27,7 +23,7 @@ struct Curve {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let realisations = context.choose(48, 400, 400);
+    let realisations = context.profile.choose(48, 400, 400);
     // A range in the middle and at the end of each layer of the chapter's path.
     let range_m: Vec<f64> = (1..=20).map(|i| 150.0 * f64::from(i)).collect();
     // weak turbulence scatters a tenth of the other
@@ -41,19 +37,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         theory::bistatic_efficiency(&telescope, &Misalignment::NONE, &turbulence, r)
     })?;
     let bistatic = medium.bistatic.clone().ok_or_else(|| Failure::new("one realisation has no pairs".into()))?;
+    let curve = |name, label, style, profile| Curve { name, label, style, profile };
     let curves = [
-        Curve { name: "free_space", label: "free space", style: Style::Line, profile: free },
-        Curve {
-            name: "monostatic_1e-15", label: "monostatic, 10^{−15}", style: Style::Dash, profile: weak.monostatic
-        },
-        Curve { name: "bistatic_1e-13", label: "bistatic, 10^{−13}", style: Style::Markers, profile: bistatic },
-        Curve {
-            name: "monostatic_1e-13",
-            label: "monostatic, 10^{−13}",
-            style: Style::DashDot,
-            profile: medium.monostatic,
-        },
-        Curve { name: "bistatic_1e-13_exact", label: "bistatic, 10^{−13}, exact", style: Style::Dot, profile: exact },
+        curve("free_space", "free space", Style::Line, free),
+        curve("monostatic_1e-15", "monostatic, 10^{−15}", Style::Dash, weak.monostatic),
+        curve("bistatic_1e-13", "bistatic, 10^{−13}", Style::Markers, bistatic),
+        curve("monostatic_1e-13", "monostatic, 10^{−13}", Style::DashDot, medium.monostatic),
+        curve("bistatic_1e-13_exact", "bistatic, 10^{−13}, exact", Style::Dot, exact),
     ];
 
     let parameters = format!(
@@ -171,33 +161,21 @@ fn claims(curves: &[Curve; 5], screens: &EfficiencyProfile, [few, many]: [usize;
     let sure = |i: &usize| excess[*i].value.abs() > excess[*i].half_width_of(places);
     let above: Vec<usize> = (0..places).filter(|i| sure(i) && excess[*i].value > 0.0).collect();
     let best = (0..places).max_by(|&a, &b| excess[a].value.total_cmp(&excess[b].value)).unwrap_or(0);
-    let f4c = Claim {
-        standard_error: excess[best].standard_error,
-        ..Claim::exact(
-            "F4c",
-            match (above.first(), above.last()) {
-                (Some(&first), Some(&last)) => {
-                    let db = 10.0 * (medium.mean[best] / weak.mean[best]).log10();
-                    let most = excess[best].words();
-                    format!(
-                        "from {} to {} m; most at {} m: {most}, {db:.1} dB",
-                        range_m[first], range_m[last], range_m[best]
-                    )
-                }
-                _ => format!("nowhere; most at {} m: {}", range_m[best], excess[best].words()),
-            },
-            !above.is_empty(),
-        )
+    let most = format!("most at {} m: {}", range_m[best], excess[best].words());
+    let told = match (above.first(), above.last()) {
+        (Some(&first), Some(&last)) => {
+            let db = 10.0 * (medium.mean[best] / weak.mean[best]).log10();
+            format!("from {} to {} m; {most}, {db:.1} dB", range_m[first], range_m[last])
+        }
+        _ => format!("nowhere; {most}"),
     };
+    let f4c = Claim { standard_error: excess[best].standard_error, ..Claim::exact("F4c", told, !above.is_empty()) };
     let after = (best..places).find(|&i| excess[i].value < 0.0);
-    let f4d = Claim::exact(
-        "F4d",
-        after.map_or_else(
-            || format!("none out to {} m", range_m[places - 1]),
-            |i| format!("between {} and {} m", range_m[i.max(1) - 1], range_m[i]),
-        ),
-        after.is_some(),
-    );
+    let told = match after {
+        Some(i) => format!("between {} and {} m", range_m[i.max(1) - 1], range_m[i]),
+        None => format!("none out to {} m", range_m[places - 1]),
+    };
+    let f4d = Claim::exact("F4d", told, after.is_some());
     let ends = after.is_none() || (best..places).any(|i| sure(&i) && excess[i].value < 0.0);
     let f4d = if ends { f4d } else { f4d.open("profile standard: eight times the realisations") };
     Ok(vec![f4a, f4b, f4c, f4d, free_space_claim()?])

@@ -1,56 +1,37 @@
 //! Figure 5: the M'4 stencil of a point on a line of sight.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use fixtures::failure::Failure;
+use super::context::*;
 use wakescope_les::winds::m4_prime;
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Spacing of the grid, m.
 const SPACING_M: f64 = 1.0;
 /// The point on the line of sight, m.
 const TARGET_M: (f64, f64) = (400.37, 47.61);
 
-/// A grid point with its weight.
-struct Node {
-    y_m: f64,
-    z_m: f64,
-    weight: f64,
-}
-
-fn stencil(target: (f64, f64)) -> Vec<Node> {
+/// Grid points (y, z) \[m\] about a target with their weights.
+fn stencil(target: (f64, f64)) -> Vec<[f64; 3]> {
     let first = |x: f64| (x / SPACING_M).floor() - 1.0;
-    let (j0, k0) = (first(target.0), first(target.1));
-    let mut nodes = Vec::new();
-    for k in 0..4 {
-        for j in 0..4 {
-            let (y_m, z_m) = (SPACING_M * (j0 + f64::from(j)), SPACING_M * (k0 + f64::from(k)));
-            let weight = m4_prime((target.0 - y_m) / SPACING_M) * m4_prime((target.1 - z_m) / SPACING_M);
-            nodes.push(Node { y_m, z_m, weight });
-        }
-    }
-    nodes
+    let place = |at: f64, node: usize| SPACING_M * (first(at) + node as f64);
+    let weight = |at: f64, node: usize| m4_prime((at - place(at, node)) / SPACING_M);
+    let node = |n: usize| (n % 4, n / 4);
+    let all = (0..16).map(node);
+    all.map(|(j, k)| [place(target.0, j), place(target.1, k), weight(target.0, j) * weight(target.1, k)]).collect()
 }
 
-/// Largest error of interpolating the nine products of 1, y, y^2 with 1, z, z^2 about the target.
-fn quadratic_error(nodes: &[Node], target: (f64, f64)) -> f64 {
-    let mut worst: f64 = 0.0;
-    for (p, q) in (0..3).flat_map(|p| (0..3).map(move |q| (p, q))) {
+/// Largest error of interpolating the nine products of 1, y, y^2 with 1, z, z^2 about the target; the first is that of the sum.
+fn errors(nodes: &[[f64; 3]], target: (f64, f64)) -> [f64; 9] {
+    std::array::from_fn(|n| {
+        let (p, q) = ((n % 3) as i32, (n / 3) as i32);
         // An offset origin, so that no power of the target itself vanishes.
         let f = |y: f64, z: f64| (y - target.0 + 0.7).powi(p) * (z - target.1 - 0.4).powi(q);
-        let sum: f64 = nodes.iter().map(|n| n.weight * f(n.y_m, n.z_m)).sum();
-        worst = worst.max((sum - f(target.0, target.1)).abs());
-    }
-    worst
+        let sum: f64 = nodes.iter().map(|[y, z, weight]| weight * f(*y, *z)).sum();
+        (sum - f(target.0, target.1)).abs()
+    })
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let nodes = stencil(TARGET_M);
-    let table = Table::new()
-        .float("y_m", nodes.iter().map(|n| n.y_m))
-        .float("z_m", nodes.iter().map(|n| n.z_m))
-        .float("weight", nodes.iter().map(|n| n.weight));
+    let table = numbers_table(["y_m", "z_m", "weight"], &nodes);
     let parameters =
         format!("spacing_m = {SPACING_M:?}\ntarget_y_m = {:?}\ntarget_z_m = {:?}\n", TARGET_M.0, TARGET_M.1);
     let origin = context.provenance_of_formula(&parameters);
@@ -80,9 +61,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let (mut sum_error, mut quadratic): (f64, f64) = (0.0, 0.0);
     for (a, b) in (0..20).flat_map(|a| (0..20).map(move |b| (a, b))) {
         let target = (400.0 + 0.05 * f64::from(a), 47.0 + 0.05 * f64::from(b));
-        let nodes = stencil(target);
-        sum_error = sum_error.max((nodes.iter().map(|n| n.weight).sum::<f64>() - 1.0).abs());
-        quadratic = quadratic.max(quadratic_error(&nodes, target));
+        let errors = errors(&stencil(target), target);
+        sum_error = sum_error.max(errors[0]);
+        quadratic = errors.into_iter().fold(quadratic, f64::max);
     }
     out.claims.push(Claim::exact(
         "F5",

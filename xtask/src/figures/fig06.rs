@@ -1,12 +1,9 @@
 //! Figure 6: surfaces of equal vorticity of the wake, and an animation of a cross-plane.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
+use super::context::*;
 use crate::wakes;
-use fixtures::failure::Failure;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::flow::{FinishedWake, REPEATS};
-use wakescope_sim::io::Table;
 use wakescope_sim::plot::apng;
 
 const FRAME_S: f64 = 0.15;

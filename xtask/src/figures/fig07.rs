@@ -1,15 +1,11 @@
 //! Figure 7: circulation and paths of the two vortices of the simulated wake.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
+use super::context::*;
 use crate::histories::{by_noise, swing};
 use crate::references::numbers;
-use crate::wakes;
-use fixtures::failure::Failure;
+use crate::wakes::{self, mean};
 use wakescope_les::analysis::decay::{knee, onset, value_at};
 use wakescope_sim::flow::FinishedWake;
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{CurvePlot, Figure, Series, Style};
 
 /// The Reynolds number and core of the chapter.
 const CHAPTER: (f64, f64) = (2e4, 0.05);
@@ -76,12 +72,6 @@ fn paths(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
         plot = plot.with(Series::new(name, Style::Dash, path.collect::<Vec<_>>()));
     }
     Ok(plot)
-}
-
-/// Mean of both vortices against tau.
-fn mean(wake: &FinishedWake, name: &str, sign: f64) -> Result<Vec<(f64, f64)>, Failure> {
-    let (left, right) = (wake.curve(&format!("{name}_left"))?, wake.curve(&format!("{name}_right"))?);
-    Ok(left.iter().zip(right).map(|(l, r)| (l.0, 0.5 * (sign * l.1 + r.1))).collect())
 }
 
 fn claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {

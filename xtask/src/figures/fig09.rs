@@ -1,13 +1,7 @@
 //! Figure 9: accumulation level against range for three radii of the region.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use crate::statistics::Verdict;
-use fixtures::failure::Failure;
+use super::context::*;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
-use wakescope_sim::scene::Scene;
 use wakescope_sim::setup::estimators;
 use wakescope_sim::setup::geometry::Geometry;
 use wakescope_sim::setup::instrument::Instrument;

@@ -1,25 +1,17 @@
 //! Figure 10: the radial velocity of the early pair, the scatter of its estimates, and their relation to the gradient.
 
-use super::context::{Context, Rendered};
-use super::study::{Age, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method};
-use crate::claim::Claim;
-use crate::statistics::{BATCHES, Bar, Estimate};
-use fixtures::failure::Failure;
+use super::context::*;
+use super::study::{EARLY_TAU, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method};
 use ndarray::Array2;
 use wakescope_sim::io::tables::map_table;
-use wakescope_sim::plot::{Figure, MapPlot};
 use wakescope_sim::write;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let realisations = context.choose(16, 128, 400);
-    let sight = Sight::of(context, Age::Early)?;
+    let realisations = context.profile.choose(16, 128, 400);
+    let sight = Sight::of(context, EARLY_TAU)?;
     let (mut tables, mut panels, mut found) = (Vec::new(), Vec::new(), Vec::new());
-    let scene = |(_, reference)| {
-        let mut scene = with_method(early_scene(realisations), METHODS[0]);
-        scene.detector.snr = reference;
-        scene
-    };
-    let studies = Study::runs(context, &sight, REFERENCES.map(scene).to_vec())?;
+    let scene = with_method(early_scene(realisations), METHODS[0]);
+    let studies = Study::at_references(context, &sight, &scene)?;
     for ((name, _), study) in REFERENCES.into_iter().zip(&studies) {
         let map = write::velocity_map(&study.plan, &study.map);
         tables.push((name, map_table(&map)?));

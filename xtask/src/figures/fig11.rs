@@ -1,51 +1,32 @@
 //! Figure 11: estimated map and its error, late, 400 ns, Cn2 = 1e-15, windows of 64 samples.
 
-use super::context::{Context, Rendered};
-use super::study::{Age, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method, with_turbulence};
-use crate::claim::Claim;
-use crate::statistics::{BATCHES, Bar, Estimate};
-use fixtures::failure::Failure;
+use super::context::*;
+use super::study::{LATE_TAU, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method, with_turbulence};
+use crate::claim::Part;
 use wakescope_sim::io::tables::map_table;
-use wakescope_sim::plot::{Figure, MapPlot};
-use wakescope_sim::scene::{PulseShape, Scene};
+use wakescope_sim::scene::PulseShape;
 use wakescope_sim::write;
 
 /// Cells that count as those of a vortex, m from its centre.
 const NEAR_M: f64 = 15.0;
 
 fn scene(context: &Context, sight: &Sight) -> Scene {
-    let mut scene = with_method(early_scene(context.choose(8, 24, 104)), METHODS[0]);
+    let mut scene = with_method(early_scene(context.profile.choose(8, 24, 104)), METHODS[0]);
     // An inviscid pair has spread far over the ground by then.
     let cores = &sight.cores;
     let (near_m, far_m) = cores.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), c| (a.min(c.0), b.max(c.0)));
     let highest_rad = cores.iter().map(|c| (c.1 + NEAR_M).atan2(c.0)).fold(0.0, f64::max);
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.0, highest_rad);
     (scene.scan.range_min_m, scene.scan.range_max_m) = ((near_m - 45.0).max(140.0), far_m + 45.0);
-    scene.estimator.gate_step_samples = context.choose(8, 5, 1);
+    scene.estimator.gate_step_samples = context.profile.choose(8, 5, 1);
     scene.pulse.shape = PulseShape::gaussian(400e-9);
     with_turbulence(context, scene, 1e-15)
 }
 
-/// What the claim compares, of one map.
-struct Measured {
-    name: &'static str,
-    /// Largest modulus of the mean estimate less that of the exact velocity, m/s.
-    weaker_m_s: Estimate,
-    /// Root mean square distance of the mean estimate to the pulse-weighted field less that to the exact one, m/s.
-    closer_m_s: Estimate,
-    /// Largest modulus of the pulse-weighted and of the exact velocity, m/s.
-    extremes_m_s: [f64; 2],
-}
-
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let (mut tables, mut panels, mut measured) = (Vec::new(), Vec::new(), Vec::new());
-    let sight = Sight::of(context, Age::Late)?;
-    let scene = |(_, reference)| {
-        let mut scene = scene(context, &sight);
-        scene.detector.snr = reference;
-        scene
-    };
-    let studies = Study::runs(context, &sight, REFERENCES.map(scene).to_vec())?;
+    let (mut tables, mut panels, mut told, mut parts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let sight = Sight::of(context, LATE_TAU)?;
+    let studies = Study::at_references(context, &sight, &scene(context, &sight))?;
     for ((name, _), study) in REFERENCES.into_iter().zip(&studies) {
         let map = write::velocity_map(&study.plan, &study.map);
         tables.push((name, map_table(&map)?));
@@ -57,7 +38,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         panels.push(mean.titled(&format!("Mean estimate, {name} signal-to-noise ratio")).labelled("v_R [m/s]"));
         let error = MapPlot::new(&map, 0, "rms")?;
         panels.push(error.titled(&format!("Root mean square error, {name}")).labelled("rms [m/s]"));
-        measured.push(measure(name, study));
+        let (words, of_map) = measure(study);
+        told.push(format!("{name}: {words}"));
+        // At the physical ratio of one pulse the map is mostly noise; the chapter's own figure has the printed ratio.
+        if name == "chapter" {
+            parts = of_map;
+        }
     }
     let origin = studies[0].provenance();
     let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
@@ -69,11 +55,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         studies[0].map.scans.len(),
         sight.words
     );
-    out.claims.push(claim(&measured));
+    out.claims.push(Claim::judged("F11", &parts).beside(&told.join("; ")));
     Ok(out)
 }
 
-fn measure(name: &'static str, study: &Study) -> Measured {
+/// Of a map, how far its largest estimate is from the largest exact velocity, and how much nearer its estimates are to the pulse-weighted
+/// field than to the exact one: in words, and as parts of the claim.
+fn measure(study: &Study) -> (String, Vec<Part>) {
     let m = &study.map;
     let mut near = study.cells(|d, _| d < NEAR_M);
     near.retain(|cell| m.v_mean_m_s[*cell].is_finite());
@@ -83,28 +71,18 @@ fn measure(name: &'static str, study: &Study) -> Measured {
     let distance = |field: &ndarray::Array2<f64>, without| {
         (near.iter().map(|c| (mean(*c, without) - field[*c]).powi(2)).sum::<f64>() / near.len() as f64).sqrt()
     };
-    let extremes_m_s = [pulse, exact].map(|field| extreme(&|cell| field[cell]));
-    Measured {
-        name,
-        weaker_m_s: Estimate::of(BATCHES, |without| extreme(&|cell| mean(cell, without)) - extremes_m_s[1]),
-        closer_m_s: Estimate::of(BATCHES, |without| distance(pulse, without) - distance(exact, without)),
-        extremes_m_s,
-    }
-}
-
-fn claim(measured: &[Measured]) -> Claim {
-    let told = measured.iter().map(|m| {
-        let [pulse, exact] = m.extremes_m_s;
-        let [weaker, closer] = [m.weaker_m_s, m.closer_m_s].map(|of| of.words());
-        format!("{}: extremes {weaker} m/s beyond {exact:.2} exact, {pulse:.2} pulse-weighted; distances differ by {closer} m/s", m.name)
-    });
-    // At the physical ratio of one pulse the map is mostly noise; the chapter's own figure has the printed ratio.
-    let parts = measured.iter().filter(|m| m.name == "chapter").flat_map(|m| {
-        let part = |name: &str, of| (name.into(), of, " m/s", Bar::Below(0.0));
-        [
-            part("largest estimate less the largest exact velocity", m.weaker_m_s),
-            part("distance to the pulse-weighted field less that to the exact one", m.closer_m_s),
-        ]
-    });
-    Claim::judged("F11", &parts.collect::<Vec<_>>()).beside(&told.collect::<Vec<_>>().join("; "))
+    let [most_pulse, most_exact] = [pulse, exact].map(|field| extreme(&|cell| field[cell]));
+    let weaker = Estimate::of(BATCHES, |without| extreme(&|cell| mean(cell, without)) - most_exact);
+    let closer = Estimate::of(BATCHES, |without| distance(pulse, without) - distance(exact, without));
+    let told = format!(
+        "extremes {} m/s beyond {most_exact:.2} exact, {most_pulse:.2} pulse-weighted; distances differ by {} m/s",
+        weaker.words(),
+        closer.words()
+    );
+    let part = |name: &str, of| (name.into(), of, " m/s", Bar::Below(0.0));
+    let parts = vec![
+        part("largest estimate less the largest exact velocity", weaker),
+        part("distance to the pulse-weighted field less that to the exact one", closer),
+    ];
+    (told, parts)
 }

@@ -1,22 +1,15 @@
 //! Figure 12: error of correlogram accumulation against range for four pulse energies, Cn2 = 1e-13, 200 ns.
 
-use super::context::{Context, Rendered};
+use super::context::*;
 use super::study::{
-    Age, INSIDE_M, METHODS, OUTSIDE_M, REFERENCES, Sight, Study, Zone, batches, early_scene, with_method,
+    EARLY_TAU, INSIDE_M, METHODS, OUTSIDE_M, REFERENCES, Sight, Study, Zone, batches, early_scene, with_method,
     with_turbulence,
 };
-use crate::claim::{Claim, Part};
-use crate::statistics::{Bar, NO_DIFFERENCE};
-use fixtures::failure::Failure;
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
-use wakescope_sim::scene::Scene;
+use crate::claim::Part;
+use crate::statistics::NO_DIFFERENCE;
 use wakescope_sim::setup::instrument::Instrument;
 
 const ENERGIES_J: [f64; 4] = [50e-6, 150e-6, 300e-6, 600e-6];
-
-/// The same as a sweep, whose cases share the flow and the phase screens.
-const VARY: [&str; 2] = ["detector.snr.reference=physical,chapter", "pulse.energy_j=50e-6,150e-6,300e-6,600e-6"];
 
 /// Errors of inside that differ by less are those of one energy.
 const NO_INFLUENCE: f64 = 0.1;
@@ -36,7 +29,7 @@ struct Curve {
 }
 
 fn scene(context: &Context) -> Scene {
-    with_turbulence(context, with_method(early_scene(context.choose(16, 48, 104)), METHODS[2]), 1e-13)
+    with_turbulence(context, with_method(early_scene(context.profile.choose(16, 48, 104)), METHODS[2]), 1e-13)
 }
 
 fn curve(study: &Study, reference: &'static str, energy_j: f64) -> Curve {
@@ -57,11 +50,17 @@ fn curve(study: &Study, reference: &'static str, energy_j: f64) -> Curve {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let sight = Sight::of(context, Age::Early)?;
-    let studies = Study::sweep(context, &sight, scene(context), &VARY)?;
-    let names = REFERENCES.iter().flat_map(|(name, _)| ENERGIES_J.map(|energy_j| (*name, energy_j)));
+    let sight = Sight::of(context, EARLY_TAU)?;
+    let cases: Vec<_> =
+        REFERENCES.iter().flat_map(|(name, snr)| ENERGIES_J.map(|energy_j| (*name, *snr, energy_j))).collect();
+    let scenes = cases.iter().map(|(_, snr, energy_j)| {
+        let mut scene = scene(context);
+        (scene.detector.snr, scene.pulse.energy_j) = (*snr, *energy_j);
+        scene
+    });
+    let studies = Study::runs(context, &sight, scenes.collect())?;
     let curves: Vec<Curve> =
-        studies.iter().zip(names).map(|(study, (name, energy_j))| curve(study, name, energy_j)).collect();
+        studies.iter().zip(&cases).map(|(study, (name, _, energy_j))| curve(study, name, *energy_j)).collect();
     let origin = context.provenance_of_formula(&sight.scene(context, scene(context)).to_toml());
     let styles = [Style::Dash, Style::Dot, Style::DashDot, Style::Line];
     let panel = |reference: &str| {

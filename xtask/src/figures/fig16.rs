@@ -1,15 +1,12 @@
 //! Figure 16: stiff and extreme cases of the crates, what each must come to and what it came to.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use crate::profile::Profile;
+use super::context::*;
 use crate::stability;
 use fixtures::extreme::rows;
-use fixtures::failure::Failure;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let rows = rows(|_, case| !(case.long && context.profile == Profile::Quick));
-    let origin = context.provenance_of_formula(&format!("profile = \"{}\"\n", context.profile_name()));
+    let origin = context.provenance_of_formula(&format!("profile = \"{}\"\n", context.profile.name()));
     let mut out = Rendered::new(&stability::table(&rows), &stability::picture(&rows), &origin)?;
     let missed: Vec<&str> = rows.iter().filter(|row| !row.ended.passes).map(|row| row.case.name).collect();
     out.caption = format!(

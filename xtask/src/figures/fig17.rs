@@ -1,18 +1,14 @@
 //! Figure 17: circulation and positions of the vortices, retrieved from maps and from all raw signals, against the truth.
 
-use super::context::{Context, Rendered};
+use super::context::*;
 use super::fig17_flows as flows;
-use crate::claim::Claim;
-use crate::statistics::{BATCHES, Bar, Estimate, mean};
-use crate::trials::fits::{FitTrial, RADIUS_M};
-use fixtures::failure::Failure;
+use crate::fit_trials::trial::{FitTrial, RADIUS_M};
+use crate::statistics::mean;
 use fixtures::pair::{CIRCULATION_M2_S, PairScan, truth};
 use ndarray::Array2;
 use rayon::prelude::*;
 use wakescope_estimate::vortex_fit::{CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake};
 use wakescope_signal::NoiseModel;
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const METHODS: [&str; 4] = ["map, typical core", "map, core fitted", "signals, core known", "signals, core fitted"];
 
@@ -34,8 +30,8 @@ fn free() -> FreeParameters {
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     // Eight scans decide the claims on maps; of gates every 8 samples, which overlap, every third is taken in quick. Fits of signals
     // take longest: the few that quick could make decide no claim on their scatter.
-    let (scans, of_signals, every) = context.choose((BATCHES, 0, 24), (100, 100, 8), (100, 100, 8));
-    let levels_db = context.choose(vec![0.0], vec![0.0], vec![0.0, 10.0]);
+    let (scans, of_signals, every) = context.profile.choose((BATCHES, 0, 24), (100, 100, 8), (100, 100, 8));
+    let levels_db = context.profile.choose(vec![0.0], vec![0.0], vec![0.0, 10.0]);
     let mut fits = Vec::new();
     let mut bounds = Vec::new();
     for &snr_db in &levels_db {
@@ -43,18 +39,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         bounds.push(bound(&pair)?);
         let found: Vec<Fits> = (0..scans)
             .into_par_iter()
-            .map(|scan| {
-                fit(&pair, scan, scan < of_signals)
-                    .map(|by_method| Fits { snr_db, scan, by_method })
-                    .map_err(|e| e.to_string())
-            })
-            .collect::<Result<_, _>>()
-            .map_err(Failure::new)?;
+            .map(|scan| Ok(Fits { snr_db, scan, by_method: fit(&pair, scan, scan < of_signals)? }))
+            .collect::<Result<_, Failure>>()?;
         fits.extend(found);
     }
     let parameters = format!(
         "profile = \"{}\"\nscans = {scans}\nscans_of_signals = {of_signals}\ngate_step_samples = {every}\nsnr_db = {levels_db:?}\n",
-        context.profile_name()
+        context.profile.name()
     );
     let origin = context.provenance_of_formula(&parameters);
     let by_flow = flows::all(context)?;

@@ -1,22 +1,15 @@
 //! Figure 17, all methods side by side: the scenes of the analytic pair and of the simulated wake at several ages, retrieved as `run` does it.
 
-use super::context::Context;
-use crate::claim::Claim;
-use crate::statistics::{Bar, Estimate, Verdict, mean};
+use super::context::*;
+use super::study::Sight;
+use crate::statistics::mean;
 use crate::wakes;
-use fixtures::failure::Failure;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use std::path::Path;
 use wakescope_sim::Silent;
-use wakescope_sim::io::Table;
-use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::plot::{Axis, CurvePlot, Series, Style};
+use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::retrieve::{Method, RetrievalRow};
-use wakescope_sim::scene::{
-    FirstMoment, Flow, Method as Estimator, Outside, Retrieval, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
-    SnrReference, VortexPair, Weighting,
-};
+use wakescope_sim::scene::{FirstMoment, Method as Estimator, Retrieval, SnrReference, VortexPair, Weighting};
 
 /// Ages of the simulated wake; the pair has none.
 const AGES: [Option<f64>; 4] = [None, Some(1.0), Some(2.5), Some(4.0)];
@@ -49,60 +42,57 @@ impl OfFlow {
         self.tau.map_or("analytic pair".into(), |tau| format!("simulated wake, tau = {tau}"))
     }
 
-    /// Errors of the circulation over 5 to 15 m in per cent of the truth by scan, and retrievals in which a vortex is missing.
-    fn errors(&self, method: &str) -> (Vec<(usize, f64)>, usize) {
+    /// Errors of the circulation over 5 to 15 m in per cent of the truth, scan by scan; nothing where a vortex is missing.
+    fn errors(&self, method: &str) -> Vec<Vec<Option<f64>>> {
         let rows: Vec<&RetrievalRow> =
             self.rows.iter().filter(|(name, _)| *name == method).map(|(_, row)| row).collect();
         let error = |row: &&RetrievalRow| {
-            let found = row.found?.circulation_5_15_m2_s.value;
-            (found.is_finite()).then(|| (row.realisation, 100.0 * (found / row.truth.circulation_5_15_m2_s - 1.0)))
+            let error = 100.0 * (row.found?.circulation_5_15_m2_s.value / row.truth.circulation_5_15_m2_s - 1.0);
+            error.is_finite().then_some(error)
         };
-        let errors: Vec<(usize, f64)> = rows.iter().filter_map(error).collect();
-        (errors.clone(), rows.len() - errors.len())
+        rows.chunk_by(|a, b| a.realisation == b.realisation).map(|scan| scan.iter().map(error).collect()).collect()
+    }
+
+    /// Those that are known, and how many are not.
+    fn known(&self, method: &str) -> (Vec<f64>, usize) {
+        let all = self.errors(method).concat();
+        let known: Vec<f64> = all.iter().copied().flatten().collect();
+        let missing = all.len() - known.len();
+        (known, missing)
     }
 
     /// Their mean, each scan a batch.
     fn bias(&self, method: &str) -> Estimate {
-        let errors = self.errors(method).0;
-        let scans: BTreeSet<usize> = errors.iter().map(|of| of.0).collect();
-        let of_scan =
-            |scan: usize| mean(&errors.iter().filter(|of| of.0 == scan).map(|of| of.1).collect::<Vec<_>>(), None);
-        Estimate::mean(&scans.into_iter().map(of_scan).collect::<Vec<_>>())
+        let of_scan = |errors: &Vec<Option<f64>>| mean(&errors.iter().copied().flatten().collect::<Vec<_>>(), None);
+        let of_scans = self.errors(method).iter().map(of_scan).filter(|mean| mean.is_finite()).collect::<Vec<_>>();
+        Estimate::mean(&of_scans)
     }
 }
 
 pub(super) fn all(context: &Context) -> Result<Vec<OfFlow>, Failure> {
-    let wake = wakes::of(context)?.folder;
-    let of = |tau| of_flow(context, tau, &wake).map_err(|e| e.to_string());
-    let flows: Vec<_> = AGES.par_iter().map(|tau| of(*tau)).collect();
-    flows.into_iter().collect::<Result<_, _>>().map_err(Failure::new)
+    let wake = wakes::of(context)?;
+    AGES.par_iter().map(|tau| of_flow(context, *tau, &wake)).collect()
 }
 
-fn of_flow(context: &Context, tau: Option<f64>, wake: &Path) -> Result<OfFlow, Failure> {
-    let mut scene = Scene { seed: context.seed, ..Scene::default() };
+fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<OfFlow, Failure> {
+    let pair = || Ok(Sight::of_pair(VortexPair::default()));
+    let sight = tau.map_or_else(pair, |tau| Sight::of_wake(wake, tau))?;
+    let mut scene = sight.scene(context, Scene { seed: 0, ..Scene::default() });
     scene.detector.snr = SnrReference::Fixed { snr_db: SNR_DB };
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.02, 0.2);
-    scene.scan.elevation_step_rad = context.choose(2.5e-3, 1.25e-3, 1.25e-3);
-    scene.estimator.gate_step_samples = context.choose(15, 5, 5);
+    scene.scan.elevation_step_rad = context.profile.choose(2.5e-3, 1.25e-3, 1.25e-3);
+    scene.estimator.gate_step_samples = context.profile.choose(15, 5, 5);
     scene.scan.pulses_per_line = 4;
-    scene.scan.realisations = context.choose(3, 16, 32);
-    scene.flow = match tau {
-        None => Flow::VortexPair(VortexPair::default()),
-        Some(age_tau) => {
-            scene.scan.outside_flow = Outside::Mask {};
-            let motion = SimulatedMotion::Frozen;
-            let planes = "plane1".into();
-            Flow::Simulated(SimulatedFlow { planes, motion, age_tau: Some(age_tau), ..SimulatedFlow::default() })
-        }
-    };
+    scene.scan.realisations = context.profile.choose(3, 16, 32);
     (scene.outputs.flow, scene.outputs.signals) = (false, false);
     // Signals take longest: the fits of all samples of the pair are in the other part of the figure.
-    let some = METHODS[..context.choose(4, 5, 5)].iter().map(|(method, _)| *method).collect();
+    let some = METHODS[..context.profile.choose(4, 5, 5)].iter().map(|(method, _)| *method).collect();
     let name = |method: Method| METHODS.iter().find(|(of, _)| *of == method).map_or("", |(_, name)| *name);
-    let mut rows: Vec<_> = retrieved(&scene, some, wake)?.into_iter().map(|row| (name(row.method), row)).collect();
+    let mut rows: Vec<_> =
+        retrieved(&scene, some, &sight.folder)?.into_iter().map(|row| (name(row.method), row)).collect();
     scene.estimator.method = Estimator::FirstMoment(FirstMoment::default());
     scene.estimator.weighting = Weighting::Rectangular;
-    rows.extend(retrieved(&scene, vec![Method::Rv], wake)?.into_iter().map(|row| (OF_MEANS, row)));
+    rows.extend(retrieved(&scene, vec![Method::Rv], &sight.folder)?.into_iter().map(|row| (OF_MEANS, row)));
     Ok(OfFlow { tau, rows })
 }
 
@@ -154,24 +144,16 @@ pub(super) fn picture(flows: &[OfFlow]) -> CurvePlot {
     let title = "all methods: bias and scatter of Γ_{5-15} (age 0: analytic pair)";
     let mut plot = CurvePlot::new(title, Axis::linear("τ"), Axis::linear("error [%]"));
     for (k, name) in names().enumerate() {
-        let known = flows.iter().filter_map(|flow| Some((flow.tau.unwrap_or(0.0), moments(&flow.errors(name).0)?)));
-        let points: Vec<(f64, (f64, f64))> = known.collect();
-        let stds: Vec<f64> = points.iter().map(|(_, (_, std))| *std).collect();
+        let known = flows.iter().map(|flow| (flow.tau.unwrap_or(0.0), flow.known(name).0));
+        let points: Vec<(f64, Vec<f64>)> = known.filter(|(_, errors)| !errors.is_empty()).collect();
+        let stds: Vec<f64> = points.iter().map(|(_, errors)| Estimate::deviation(errors)).collect();
+        let means = points.iter().map(|(tau, errors)| (tau + 0.05 * (k as f64 - 2.0), mean(errors, None)));
         if points.is_empty() {
             continue;
         }
-        let means = points.iter().map(|(tau, (mean, _))| (tau + 0.05 * (k as f64 - 2.0), *mean));
         plot = plot.with(Series::new(name, Style::Markers, means).with_band(&stds).in_colour(k));
     }
     plot.with(Series::new("", Style::Dash, [(-0.2, 0.0), (4.2, 0.0)]).in_colour(6))
-}
-
-/// Mean and standard deviation of some numbers; nothing of none.
-fn moments(errors: &[(usize, f64)]) -> Option<(f64, f64)> {
-    let n = errors.len() as f64;
-    let mean = errors.iter().map(|of| of.1).sum::<f64>() / n;
-    let variance = errors.iter().map(|of| (of.1 - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    (n > 0.0).then(|| (mean, variance.sqrt()))
 }
 
 pub(super) fn claims(flows: &[OfFlow]) -> Vec<Claim> {
@@ -181,12 +163,12 @@ pub(super) fn claims(flows: &[OfFlow]) -> Vec<Claim> {
 
 /// The bias of the method that is judged; all are told.
 fn claim(id: &str, flow: &OfFlow) -> Claim {
-    let told = names().filter(|name| *name != JUDGED && !flow.errors(name).0.is_empty()).map(|name| {
-        let (errors, failures) = flow.errors(name);
-        let scatter = moments(&errors).map_or(f64::NAN, |of| of.1);
+    let told = names().filter(|name| *name != JUDGED && !flow.known(name).0.is_empty()).map(|name| {
+        let (errors, failures) = flow.known(name);
+        let scatter = Estimate::deviation(&errors);
         format!("{name} {} %, scatter {scatter:.1} %, {failures} failed", flow.bias(name).words())
     });
-    let failures = flow.errors(JUDGED).1;
+    let failures = flow.known(JUDGED).1;
     let part = (String::new(), flow.bias(JUDGED), " %", Bar::Between(-5.0, 5.0));
     let claim = Claim::judged(id, &[part]);
     let claim = if failures > 0 { Claim { verdict: Verdict::Fail, ..claim } } else { claim };

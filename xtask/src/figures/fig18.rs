@@ -1,10 +1,6 @@
 //! Figure 18: velocity error of every estimator against the Cramer-Rao bound, in a uniform random wind.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use crate::statistics::{Bar, Estimate};
-use crate::trials::noise_name;
-use fixtures::failure::Failure;
+use super::context::*;
 use fixtures::methods::Known;
 use fixtures::uniform::{Air, BAND_M_S, errors};
 use fixtures::{WINDOW, sampling};
@@ -15,10 +11,8 @@ use wakescope_estimate::{
     map::{GoodAndBad, good_and_bad},
 };
 use wakescope_signal::NoiseModel;
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
-const NOISES: [NoiseModel; 2] = [NoiseModel::White, NoiseModel::BandLimited];
+const NOISES: [(NoiseModel, &str); 2] = [(NoiseModel::White, "white"), (NoiseModel::BandLimited, "band")];
 /// Estimators that are drawn; the table has all.
 const DRAWN: [&str; 7] =
     ["PA", "CA, AR(16)", "CA-BT, 16 lags", "first moment", "pulse pair", "likelihood", "likelihood with gradient"];
@@ -45,16 +39,16 @@ impl Row {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let pulses_s = context.choose(vec![200e-9], vec![200e-9, 400e-9], vec![200e-9, 400e-9]);
-    let counts = context.choose(vec![1, 20, 60], vec![1, 20, 60], vec![1, 20, 60, 200]);
+    let pulses_s = context.profile.choose(vec![200e-9], vec![200e-9, 400e-9], vec![200e-9, 400e-9]);
+    let counts = context.profile.choose(vec![1, 20, 60], vec![1, 20, 60], vec![1, 20, 60, 200]);
     // the quick profile accumulates the largest number only where a claim asks for it
-    let quick = context.choose(true, false, false);
+    let quick = context.profile.choose(true, false, false);
     let counts_at =
         |snr_db: f64| &counts[..if quick && snr_db != MANY_PULSES_DB { counts.len() - 1 } else { counts.len() }];
-    let trials = context.choose(250, 2000, 20_000);
+    let trials = context.profile.choose(250, 2000, 20_000);
     let mut cases = Vec::new();
     for &pulse_s in &pulses_s {
-        for noise in NOISES {
+        for (noise, _) in NOISES {
             cases.extend((-20..=20).step_by(5).map(|snr_db| (pulse_s, noise, f64::from(snr_db))));
         }
     }
@@ -77,7 +71,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let rows: Vec<Row> = rows.into_iter().flatten().collect();
     let parameters = format!(
         "profile = \"{}\"\ntrials = {trials}\nwindow_samples = {WINDOW}\npulses = {counts:?}\n",
-        context.profile_name()
+        context.profile.name()
     );
     let origin = context.provenance_of_formula(&parameters);
     let mut out = Rendered::new(&table(&rows), &picture(&rows), &origin)?;
@@ -96,7 +90,7 @@ fn table(rows: &[Row]) -> Table {
     let float = |get: fn(&Row) -> f64| rows.iter().map(get).collect::<Vec<_>>();
     Table::new()
         .text("estimator", rows.iter().map(|r| r.method))
-        .text("noise", rows.iter().map(|r| noise_name(r.noise)))
+        .text("noise", rows.iter().map(|r| if r.noise == NoiseModel::White { "white" } else { "band" }))
         .float("pulse_s", float(|r| r.pulse_s))
         .int("n_pulses", rows.iter().map(|r| r.pulses as i64))
         .float("snr_db", float(|r| r.snr_db))
@@ -119,9 +113,9 @@ fn picture(rows: &[Row]) -> Figure {
         ("bias", Axis::linear("bias [m/s]").between(-0.4, 0.4), |m| (m.bias_m_s, m.bias_error_m_s)),
     ];
     for (title, y, read) in kinds {
-        for noise in NOISES {
+        for (noise, name) in NOISES {
             let here = |r: &&Row| r.noise == noise && r.pulses == DRAWN_PULSES && r.pulse_s == 200e-9;
-            let title = format!("{title}, {} noise", noise_name(noise));
+            let title = format!("{title}, {name} noise");
             let mut plot = CurvePlot::new(&title, Axis::linear("SNR [dB]"), y.clone());
             plot.shape = 0.62;
             for (k, method) in DRAWN.into_iter().enumerate() {
@@ -129,7 +123,7 @@ fn picture(rows: &[Row]) -> Figure {
                 let points = of.iter().map(|r| (r.snr_db, read(&r.found).0));
                 let errors: Vec<f64> = of.iter().map(|r| read(&r.found).1).collect();
                 // one legend is enough
-                let label = if noise == NOISES[0] && title.starts_with("bad") { method } else { "" };
+                let label = if noise == NoiseModel::White && title.starts_with("bad") { method } else { "" };
                 plot = plot.with(Series::new(label, Style::LineMarkers, points).with_band(&errors).in_colour(k));
             }
             if title.starts_with("good") {

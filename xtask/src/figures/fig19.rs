@@ -1,20 +1,14 @@
 //! Figure 19: detection of wakes in maps, operating curves and the smallest circulation that is found against range.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use crate::statistics::{Bar, Estimate};
-use fixtures::failure::Failure;
+use super::context::*;
 use wakescope_estimate::retrieval::{ScanMap, Turbulence};
 use wakescope_estimate::wake_detection::{DetectorOptions, Share};
 use wakescope_sim::Silent;
 use wakescope_sim::detection::{Calibration, DetectionSettings, Power, SceneNoise, detect, strided};
-use wakescope_sim::io::Table;
 use wakescope_sim::measure::budget::snr_without_screens_db;
 use wakescope_sim::measure::map::velocities;
-use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::retrieve::gate_of;
-use wakescope_sim::scene::{Flow, Scene};
+use wakescope_sim::scene::Flow;
 
 const FALSE_ALARM: f64 = 1e-2;
 /// The turbulence of the second background.
@@ -63,10 +57,11 @@ fn settings(
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let ranges_m = context.choose(vec![400.0], vec![300.0, 400.0, 600.0, 900.0], vec![300.0, 400.0, 600.0, 900.0]);
-    let step_m = context.choose(1.0, 0.5, 0.5);
+    let ranges_m =
+        context.profile.choose(vec![400.0], vec![300.0, 400.0, 600.0, 900.0], vec![300.0, 400.0, 600.0, 900.0]);
+    let step_m = context.profile.choose(1.0, 0.5, 0.5);
     // Few scans tell a high rate alone.
-    let (scans, rate) = context.choose((24, 0.3), (300, 0.1), (1000, 0.1));
+    let (scans, rate) = context.profile.choose((24, 0.3), (300, 0.1), (1000, 0.1));
     let (mut cases, mut alarmed) = (Vec::new(), None);
     for &range_m in &ranges_m {
         let plan = Plan::new(context.scene_file(scene(range_m, step_m))?, Target::Map)?;
@@ -85,7 +80,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let alarmed = alarmed.ok_or_else(|| Failure::new(format!("no scan at {ALARM_RANGE_M} m")))?;
     let parameters = format!(
         "profile = \"{}\"\nrange_m = {ranges_m:?}\nline_spacing_m = {step_m}\nfalse_alarm = {FALSE_ALARM}\nturbulence = [{}, {}]\nscans_of_still_air = {scans}\nrate_counted = {rate}\n",
-        context.profile_name(),
+        context.profile.name(),
         AIR.deviation_m_s,
         AIR.length_m
     );

@@ -1,17 +1,12 @@
 //! Figure 20: one scan of the pair, the wake that was fitted to it, and what is left.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use crate::statistics::{Bar, Estimate};
-use fixtures::failure::Failure;
+use super::context::*;
 use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, expected_velocities};
 use wakescope_estimate::vortex_fit::CorePrior;
 use wakescope_sim::Silent;
-use wakescope_sim::io::Table;
 use wakescope_sim::io::scans::ReadScan;
-use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::retrieve::{Method, OwnScene, RetrievedScan, Velocities, figure, gate_of, retrieve_map};
-use wakescope_sim::scene::{Scene, SnrReference};
+use wakescope_sim::scene::SnrReference;
 
 const TRUE_M2_S: f64 = 500.0;
 
@@ -19,7 +14,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut scene = Scene::default();
     scene.detector.snr = SnrReference::Fixed { snr_db: 10.0 };
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.03, 0.21);
-    scene.scan.elevation_step_rad = context.choose(2.5e-3, 1.25e-3, 1.25e-3);
+    scene.scan.elevation_step_rad = context.profile.choose(2.5e-3, 1.25e-3, 1.25e-3);
     (scene.scan.pulses_per_line, scene.scan.realisations) = (4, 1);
     let plan = Plan::new(context.scene_file(scene)?, Target::Map)?;
     let map = wakescope_sim::run(&plan, &Silent)?.map.ok_or_else(|| Failure::new("a run without a map".into()))?;
@@ -54,22 +49,27 @@ fn table(found: &RetrievedScan) -> Result<Table, Failure> {
     let map = &found.scan.map;
     let wake = found.result.wake.ok_or_else(|| Failure::new("no wake in the scan of a pair".into()))?;
     let model = expected_velocities(map, &found.options, &wake, false)?;
-    let cells: Vec<(usize, usize)> = map.velocity_m_s.indexed_iter().map(|(at, _)| at).collect();
-    let column = |get: &dyn Fn((usize, usize)) -> f64| cells.iter().map(|at| get(*at)).collect::<Vec<_>>();
     let fitted = |side: Side, get: fn(&Measured) -> f64| {
-        let value = found.result.vortex(side).map_or(f64::NAN, |vortex| get(&vortex.circulation_m2_s));
-        vec![value; cells.len()]
+        found.result.vortex(side).map_or(f64::NAN, |vortex| get(&vortex.circulation_m2_s))
     };
-    Ok(Table::new()
-        .float("range_m", column(&|at| map.range_m[at.1]))
-        .float("elevation_rad", column(&|at| map.elevation_rad[at.0]))
-        .float("velocity_m_s", column(&|at| map.velocity_m_s[at]))
-        .float("model_m_s", column(&|at| model[at]))
-        .float("residual_m_s", column(&|at| map.velocity_m_s[at] - model[at]))
-        .float("gamma_left_m2_s", fitted(Side::Left, |of| of.value))
-        .float("gamma_left_std_m2_s", fitted(Side::Left, |of| of.std))
-        .float("gamma_right_m2_s", fitted(Side::Right, |of| of.value))
-        .float("gamma_right_std_m2_s", fitted(Side::Right, |of| of.std)))
+    let [left, right] = [Side::Left, Side::Right].map(|side| [fitted(side, |of| of.value), fitted(side, |of| of.std)]);
+    let row = |((line, gate), velocity_m_s): ((usize, usize), &f64)| {
+        let (range_m, elevation_rad, model_m_s) = (map.range_m[gate], map.elevation_rad[line], model[[line, gate]]);
+        let residual_m_s = velocity_m_s - model_m_s;
+        [range_m, elevation_rad, *velocity_m_s, model_m_s, residual_m_s, left[0], left[1], right[0], right[1]]
+    };
+    let names = [
+        "range_m",
+        "elevation_rad",
+        "velocity_m_s",
+        "model_m_s",
+        "residual_m_s",
+        "gamma_left_m2_s",
+        "gamma_left_std_m2_s",
+        "gamma_right_m2_s",
+        "gamma_right_std_m2_s",
+    ];
+    Ok(numbers_table(names, &map.velocity_m_s.indexed_iter().map(row).collect::<Vec<_>>()))
 }
 
 fn claims(found: &RetrievedScan) -> Vec<Claim> {

@@ -1,20 +1,15 @@
 //! Figure 21: one wake seen across, round and along the flight path at the same energy, and what each scan says of its circulation.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use crate::statistics::{Bar, Estimate, Verdict};
-use fixtures::failure::Failure;
+use super::context::*;
 use ndarray::Array2;
 use rayon::prelude::*;
 use wakescope_les::{VortexPair, Wind};
 use wakescope_signal::RangeFilter;
 use wakescope_sim::Silent;
-use wakescope_sim::io::Table;
 use wakescope_sim::measure::map::VelocityEstimates;
-use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, MapPlot, Panel, Series, Style};
+use wakescope_sim::plot::Panel;
 use wakescope_sim::retrieve::{Method, RetrievalRow};
-use wakescope_sim::scene::{self, Axial, Flow, Pattern, Ppi, Retrieval, Scene, SnrReference};
+use wakescope_sim::scene::{self, Axial, Flow, Pattern, Ppi, Retrieval, SnrReference};
 use wakescope_sim::setup::estimators::weighting;
 use wakescope_sim::setup::wind::vortex_pair;
 use wakescope_sim::write::{provenance, velocity_map};
@@ -43,11 +38,12 @@ struct View {
     scans: Vec<Scan>,
 }
 
-/// Circulations of all scans by one method.
+/// Circulations \[m^2/s\] of all scans of a view by one method, and how many fits failed.
 struct Fits<'a> {
     view: &'a View,
     method: &'static str,
     known_m2_s: Vec<f64>,
+    failures: usize,
 }
 
 /// Circulation of the pair \[m^2/s\].
@@ -85,7 +81,7 @@ fn scenes() -> [(&'static str, Scene); 3] {
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let scans = context.choose(2, 40, 100);
+    let scans = context.profile.choose(2, 40, 100);
     let views = scenes().into_iter().map(|(name, scene)| view(context, name, &scene, scans));
     let views = views.collect::<Result<Vec<View>, Failure>>()?;
     let mut out = Rendered::new(&table(&views), &picture(&views)?, &provenance(&views[0].scans[0].plan))?;
@@ -111,9 +107,7 @@ fn view(context: &Context, name: &'static str, scene: &Scene, scans: u64) -> Res
         found_m2_s.extend(result.retrieval.map(|retrieval| ("fit", retrieved(&retrieval.rows))));
         Ok(Scan { plan, map, found_m2_s })
     };
-    let all: Result<Vec<Scan>, String> =
-        (0..scans).into_par_iter().map(|scan| one(scan).map_err(|e| e.to_string())).collect();
-    Ok(View { name, scans: all.map_err(Failure::new)? })
+    Ok(View { name, scans: (0..scans).into_par_iter().map(one).collect::<Result<_, _>>()? })
 }
 
 /// The mean of both circulations that the scene's own retrieval finds, m^2/s.
@@ -209,19 +203,6 @@ fn solved(mut m: [[f64; 5]; 4]) -> Parameters {
     std::array::from_fn(|i| m[i][4] / m[i][i])
 }
 
-impl Fits<'_> {
-    /// Mean and standard deviation over the scans, m^2/s.
-    fn mean_and_std_m2_s(&self) -> (f64, f64) {
-        let n = self.known_m2_s.len() as f64;
-        let mean = self.known_m2_s.iter().sum::<f64>() / n;
-        (mean, (self.known_m2_s.iter().map(|found| (found - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
-    }
-
-    fn failures(&self) -> usize {
-        self.view.scans.len() - self.known_m2_s.len()
-    }
-}
-
 impl View {
     fn energy_j(&self) -> f64 {
         let plan = &self.scans[0].plan;
@@ -231,8 +212,9 @@ impl View {
     /// By method.
     fn fits(&self) -> Vec<Fits<'_>> {
         let of = |(place, (method, _)): (usize, &(&'static str, Option<f64>))| {
-            let known_m2_s = self.scans.iter().filter_map(|scan| scan.found_m2_s[place].1).collect();
-            Fits { view: self, method, known_m2_s }
+            let known_m2_s: Vec<f64> = self.scans.iter().filter_map(|scan| scan.found_m2_s[place].1).collect();
+            let failures = self.scans.len() - known_m2_s.len();
+            Fits { view: self, method, known_m2_s, failures }
         };
         self.scans[0].found_m2_s.iter().enumerate().map(of).collect()
     }
@@ -247,9 +229,9 @@ fn table(views: &[View]) -> Table {
         .float("duration_s", column(&|row| row.view.scans[0].plan.geometry.schedule.duration_s()))
         .text("method", rows.iter().map(|row| row.method))
         .float("gamma_true_m2_s", column(&|_| true_m2_s()))
-        .float("gamma_m2_s", column(&|row| row.mean_and_std_m2_s().0))
-        .float("gamma_std_m2_s", column(&|row| row.mean_and_std_m2_s().1))
-        .int("failures", rows.iter().map(|row| row.failures() as i64))
+        .float("gamma_m2_s", column(&|row| Estimate::mean(&row.known_m2_s).value))
+        .float("gamma_std_m2_s", column(&|row| Estimate::deviation(&row.known_m2_s)))
+        .int("failures", rows.iter().map(|row| row.failures as i64))
         .int("scans", rows.iter().map(|row| row.view.scans.len() as i64))
 }
 
@@ -284,7 +266,7 @@ fn claims(views: &[View]) -> Vec<Claim> {
     let energies: Vec<String> = views.iter().map(|view| format!("{:.4}", view.energy_j())).collect();
     let of = |name: &str, method: &str| {
         let fits = views.iter().flat_map(View::fits).find(|fits| fits.view.name == name && fits.method == method);
-        fits.map(|fits| (Estimate::mean(&fits.known_m2_s), fits.failures()))
+        fits.map(|fits| (Estimate::mean(&fits.known_m2_s), fits.failures))
     };
     let mut out = vec![Claim::exact("F21a", energies.join(", "), energies.iter().all(|energy| *energy == energies[0]))];
     for (id, name, method) in [("F21b", "rhi", "fit"), ("F21c", "axial", "means")] {

@@ -1,15 +1,10 @@
 //! Figure 25, beyond the chapter: where correlogram accumulation errs less than periodogram accumulation, and where not.
 
-use super::context::{Context, Rendered};
+use super::context::*;
 use super::profiles::{self, Profiles};
-use super::study::{Age, METHODS, Sight, Study, near_scene, with_method};
-use crate::claim::Claim;
-use crate::profile::Profile;
-use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE, Verdict};
+use super::study::{EARLY_TAU, METHODS, Sight, Study, near_scene, with_method};
+use crate::statistics::NO_DIFFERENCE;
 use crate::wakes;
-use fixtures::failure::Failure;
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_sim::scene::{NoiseKind, Refinement, SnrReference, VortexPair};
 
 /// Ratio at which cores and bins are compared, near that of the chapter, and the one at which noise is, near the physical one, dB.
@@ -50,7 +45,7 @@ const WAYS: [Case; 4] = [
 ];
 
 fn cases(context: &Context) -> Vec<Case> {
-    let levels_db = context.choose(
+    let levels_db = context.profile.choose(
         vec![WEAK_DB, -5.0, CHAPTER_DB, 10.0, STRONG_DB],
         vec![WEAK_DB, -5.0, CHAPTER_DB, 5.0, 10.0, 15.0, STRONG_DB],
         vec![WEAK_DB, -7.5, -5.0, -2.5, CHAPTER_DB, 5.0, 10.0, 15.0, STRONG_DB],
@@ -90,23 +85,21 @@ struct Measured {
 impl Measured {
     /// CA less PA, without or with the Gaussian weighting, over PA: inside the vortices or outside.
     fn share(&self, pa: usize, is_inside: bool) -> Estimate {
-        let zone =
-            |p: &Profiles, without| if is_inside { p.inside.rms_m_s(without) } else { p.outside.rms_m_s(without) };
-        let [pa, ca] = [&self.of[pa], &self.of[2]];
-        Estimate::of(BATCHES, |without| zone(ca, without) / zone(pa, without) - 1.0)
+        let zone = |p: usize| if is_inside { &self.of[p].inside } else { &self.of[p].outside };
+        zone(2).over(zone(pa))
     }
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let scans = context.choose(8, 48, 200);
-    let sight = Sight::of(context, Age::Early)?;
+    let scans = context.profile.choose(8, 48, 200);
+    let sight = Sight::of(context, EARLY_TAU)?;
     let cases = cases(context);
     let mut all = Vec::new();
     // The pair is looked at from where the wake is.
     for of_flow in cases.chunk_by(|a, b| a.seen == b.seen) {
         let sight = match of_flow[0].seen {
             Seen::Wake => &sight,
-            Seen::Coarse => &Sight::of_wake(wakes::whole(context)?, Age::Early)?,
+            Seen::Coarse => &Sight::of_wake(&wakes::whole(context)?, EARLY_TAU)?,
             Seen::Pair(core) => &Sight::of_pair(VortexPair {
                 core_radius_m: core * VortexPair::default().spacing_m,
                 ..VortexPair::default()
@@ -117,7 +110,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             scene.detector.snr = SnrReference::Fixed { snr_db: case.snr_db };
             scene.detector.noise = case.noise;
             scene.scan.pulses_per_line = case.pulses;
-            scene.estimator.gate_step_samples = context.choose(10, 5, 5);
+            scene.estimator.gate_step_samples = context.profile.choose(10, 5, 5);
             if case.bins {
                 (scene.estimator.refinement, scene.estimator.padded_samples) =
                     (Refinement::None, scene.estimator.window_samples);

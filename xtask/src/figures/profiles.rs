@@ -4,13 +4,11 @@
 //! Outside the error changes with the signal-to-noise ratio along the line: a straight line in range, each gate with the weight of its
 //! estimates, which is taken away.
 
+use super::context::*;
 use super::study::{INSIDE_M, METHODS, OUTSIDE_M, Study, Zone, batches};
 use crate::claim::Part;
-use crate::statistics::{BATCHES, Bar, Estimate, NO_DIFFERENCE, Verdict};
-use fixtures::failure::Failure;
-use wakescope_sim::io::Table;
+use crate::statistics::NO_DIFFERENCE;
 use wakescope_sim::measure::cell_average::CellAverage;
-use wakescope_sim::plot::{Axis, CurvePlot, Series, Style};
 
 /// Lines of sight count that pass a centre within this distance, m.
 const CORE_M: f64 = 4.0;

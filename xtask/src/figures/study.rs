@@ -1,29 +1,30 @@
 //! What figures 10 to 14 and 25 share: scans of the simulated wake or of the analytic pair in batches, regions about the cores.
 
-use super::context::Context;
-use crate::statistics::{BATCHES, Estimate};
+use super::context::*;
 use crate::wakes;
-use fixtures::failure::Failure;
 use std::path::PathBuf;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::flow::FinishedWake;
+use wakescope_sim::io::Provenance;
 use wakescope_sim::io::csv::Column;
-use wakescope_sim::io::{Provenance, Table};
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
-use wakescope_sim::plan::Plan;
 use wakescope_sim::scene::{
-    Flow, Method, ModelOrder, Outside, RefractiveTurbulence, Scene, SceneFile, SimulatedFlow, SimulatedMotion,
-    SnrReference, Turbulence, VortexMotion, VortexPair, Weighting,
+    Flow, Method, ModelOrder, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion, SnrReference, Turbulence,
+    VortexMotion, VortexPair, Weighting,
 };
 use wakescope_sim::setup::progress::Silent;
-use wakescope_sim::sweep::{self, Request, Sweep};
+use wakescope_sim::sweep;
 use wakescope_sim::{setup::wind, write};
 
 /// What counts as inside a vortex, m from its centre.
 pub(super) const INSIDE_M: f64 = 8.0;
 /// What counts as outside of both, m.
 pub(super) const OUTSIDE_M: f64 = 30.0;
+
+/// The two ages of the chapter.
+pub(super) const EARLY_TAU: f64 = 2.5;
+pub(super) const LATE_TAU: f64 = 5.0;
 
 /// The two references of the signal-to-noise ratio for which the chapter's figures are drawn.
 pub(super) const REFERENCES: [(&str, SnrReference); 2] =
@@ -64,8 +65,8 @@ pub(super) fn near_scene(realisations: usize) -> Scene {
 pub(super) fn with_turbulence(context: &Context, mut scene: Scene, cn2_m_m23: f64) -> Scene {
     let turbulence = RefractiveTurbulence {
         cn2_m_m23,
-        realisations: context.choose(8, 100, 400),
-        grid_points: context.choose(256, 512, 512),
+        realisations: context.profile.choose(8, 100, 400),
+        grid_points: context.profile.choose(256, 512, 512),
         ..RefractiveTurbulence::default()
     };
     scene.atmosphere.turbulence = Turbulence::Refractive(turbulence);
@@ -76,7 +77,7 @@ pub(super) fn with_turbulence(context: &Context, mut scene: Scene, cn2_m_m23: f6
 pub(super) struct Sight {
     flow: Flow,
     /// Folder from which the flow is read.
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     /// Centres of the vortices, (y, z), m.
     pub(super) cores: Vec<(f64, f64)>,
     /// Which flow it is, for captions.
@@ -87,34 +88,31 @@ pub(super) struct Sight {
 
 impl Sight {
     /// The wake of an age, simulated or analytic: at its start if early, on its inviscid path if late.
-    pub(super) fn of(context: &Context, age: Age) -> Result<Self, Failure> {
-        if context.analytic {
-            let motion = VortexMotion::Inviscid;
-            return Ok(Self::of_pair(match age {
-                Age::Early => VortexPair::default(),
-                Age::Late => VortexPair { motion, age_tau: age.tau(), ..VortexPair::default() },
-            }));
+    pub(super) fn of(context: &Context, tau: f64) -> Result<Self, Failure> {
+        let (motion, pair) = (VortexMotion::Inviscid, VortexPair::default());
+        match (context.analytic, tau) {
+            (true, EARLY_TAU) => Ok(Self::of_pair(pair)),
+            (true, age_tau) => Ok(Self::of_pair(VortexPair { motion, age_tau, ..pair })),
+            (false, tau) => Self::of_wake(&wakes::of(context)?, tau),
         }
-        Self::of_wake(wakes::of(context)?, age)
     }
 
     /// A simulated wake of an age.
-    pub(super) fn of_wake(wake: FinishedWake, age: Age) -> Result<Self, Failure> {
+    pub(super) fn of_wake(wake: &FinishedWake, tau: f64) -> Result<Self, Failure> {
         let b0_m = wake.flow.pair.scales()?.spacing_m;
-        let flow = SimulatedFlow {
-            planes: "plane1".into(),
-            motion: SimulatedMotion::Frozen,
-            age_tau: Some(age.tau()),
-            ..SimulatedFlow::default()
-        };
-        let core = |side: &str| -> Result<(f64, f64), Failure> {
-            let at =
-                |name: &str| Ok::<f64, Failure>(b0_m * value_at(&wake.curve(&format!("{name}_{side}"))?, age.tau()));
-            Ok((flow.lateral_position_m + at("y")?, at("z")?))
-        };
-        let cores = vec![core("left")?, core("right")?];
-        let words = format!("tau = {}, {}", age.tau(), wake.words());
-        Ok(Self { flow: Flow::Simulated(flow), folder: wake.folder, cores, words, mark: "simulated flow".into() })
+        let (planes, motion, age_tau) = ("plane1".into(), SimulatedMotion::Frozen, Some(tau));
+        let flow = SimulatedFlow { planes, motion, age_tau, ..SimulatedFlow::default() };
+        let at = |name: &str| Ok::<f64, Failure>(b0_m * value_at(&wake.curve(name)?, tau));
+        let core = |y, z| Ok::<_, Failure>((flow.lateral_position_m + at(y)?, at(z)?));
+        let cores = vec![core("y_left", "z_left")?, core("y_right", "z_right")?];
+        let words = format!("tau = {tau}, {}", wake.words());
+        Ok(Self {
+            flow: Flow::Simulated(flow),
+            folder: wake.folder.clone(),
+            cores,
+            words,
+            mark: "simulated flow".into(),
+        })
     }
 
     /// An analytic pair.
@@ -124,13 +122,9 @@ impl Sight {
             tau => format!("ANALYTIC PAIR at tau = {tau} on its inviscid path, core {} m", pair.core_radius_m),
         };
         let scene = Scene { flow: Flow::VortexPair(pair), ..Scene::default() };
-        let cores = cores_of(&scene);
+        let c = wind::vortex_pair(&pair).centres(wind::start_time_s(&scene));
+        let cores = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
         Self { flow: scene.flow, folder: PathBuf::new(), cores, words, mark: "analytic pair".into() }
-    }
-
-    /// Where the files of its scenes are looked for.
-    fn path(&self) -> PathBuf {
-        self.folder.join("scene.toml")
     }
 
     /// The scene with this flow; its seed is counted from that of the figures.
@@ -141,22 +135,6 @@ impl Sight {
             scene.scan.outside_flow = Outside::Mask {};
         }
         scene
-    }
-}
-
-/// The two ages of the chapter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Age {
-    Early,
-    Late,
-}
-
-impl Age {
-    fn tau(self) -> f64 {
-        match self {
-            Self::Early => 2.5,
-            Self::Late => 5.0,
-        }
     }
 }
 
@@ -172,20 +150,19 @@ pub(super) struct Study {
 impl Study {
     /// Runs the maps of scenes; what they have in common is computed once.
     pub(super) fn runs(context: &Context, sight: &Sight, scenes: Vec<Scene>) -> Result<Vec<Self>, Failure> {
-        let file = |scene| SceneFile::parse(&sight.scene(context, scene).to_toml(), &sight.path());
-        Self::of_files(sight, &scenes.into_iter().map(file).collect::<Result<Vec<_>, _>>()?)
+        let file = |scene| SceneFile::parse(&sight.scene(context, scene).to_toml(), &sight.folder.join("scene.toml"));
+        let files = scenes.into_iter().map(file).collect::<Result<Vec<_>, _>>()?;
+        Ok(sweep::maps(&files, &Silent)?.into_iter().map(|(plan, map)| Self::of(sight, plan, map)).collect())
     }
 
-    /// Runs the maps of a scene with keys that vary, the last one fastest.
-    pub(super) fn sweep(context: &Context, sight: &Sight, scene: Scene, vary: &[&str]) -> Result<Vec<Self>, Failure> {
-        let toml = sight.scene(context, scene).to_toml();
-        let request = Request { vary: vary.iter().map(ToString::to_string).collect(), ..Request::default() };
-        let sweep = Sweep::parse(&toml, &sight.path(), &request)?;
-        Self::of_files(sight, &sweep.cases.into_iter().map(|case| case.scene).collect::<Vec<_>>())
-    }
-
-    fn of_files(sight: &Sight, files: &[SceneFile]) -> Result<Vec<Self>, Failure> {
-        Ok(sweep::maps(files, &Silent)?.into_iter().map(|(plan, map)| Self::of(sight, plan, map)).collect())
+    /// The same for both references of the signal-to-noise ratio.
+    pub(super) fn at_references(context: &Context, sight: &Sight, scene: &Scene) -> Result<Vec<Self>, Failure> {
+        let at = |(_, reference)| {
+            let mut scene = scene.clone();
+            scene.detector.snr = reference;
+            scene
+        };
+        Self::runs(context, sight, REFERENCES.map(at).to_vec())
     }
 
     fn of(sight: &Sight, plan: Plan, map: VelocityEstimates) -> Self {
@@ -294,17 +271,6 @@ pub(super) fn batches<'z>(zones: impl Iterator<Item = (String, &'static str, f64
         .int("batch", rows.iter().map(|r| r.4 as i64))
         .float("sum_of_squares_m2_s2", rows.iter().map(|r| r.5.0))
         .int("estimates", rows.iter().map(|r| r.5.1 as i64))
-}
-
-/// Centres of the vortices when the scan begins, (y, z), m; none where the flow is no pair.
-fn cores_of(scene: &Scene) -> Vec<(f64, f64)> {
-    match &scene.flow {
-        Flow::VortexPair(pair) => {
-            let c = wind::vortex_pair(pair).centres(wind::start_time_s(scene));
-            vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)]
-        }
-        _ => Vec::new(),
-    }
 }
 
 /// Tables of the same columns one below the other, with a last column that tells them apart.

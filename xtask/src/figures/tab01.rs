@@ -1,9 +1,6 @@
 //! Table 1: ICAO separations, as distances and as times at approach speed.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use fixtures::failure::Failure;
-use wakescope_sim::io::Table;
+use super::context::*;
 
 const NAUTICAL_MILE_M: f64 = 1852.0;
 const APPROACH_SPEED_M_S: f64 = 70.0;

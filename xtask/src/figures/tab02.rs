@@ -1,12 +1,8 @@
 //! Table 2: the lidar's parameters, read back from a scene that went through a file.
 
-use super::context::{Context, Rendered};
-use crate::claim::Claim;
-use fixtures::failure::Failure;
+use super::context::*;
 use std::path::Path;
-use wakescope_sim::io::Table;
-use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::scene::{Scene, SceneFile, TABLE2_TOML};
+use wakescope_sim::scene::TABLE2_TOML;
 
 /// A row: name, value of the chapter, and where a scene has it.
 type Row = (&'static str, f64, fn(&Scene) -> f64);

@@ -38,7 +38,7 @@ pub(super) fn scene(seed: u64, index: u64) -> String {
             2 => {
                 let (section, key, value) = ABSENT[pick(&mut rng, ABSENT.len())];
                 let value = changed(&Value::Float(value), key, &mut rng);
-                table_at(&mut scene, section).insert(key.into(), value);
+                put(&mut scene, section, key, value);
             }
             _ => change_a_key(&mut scene, &mut rng),
         }
@@ -65,15 +65,16 @@ fn stated(scene: &Table, usual: &Table) -> Table {
 
 /// A short scan, so that a change may make it longer and yet let it end soon.
 fn shorten(scene: &mut Table) {
-    let scan = table_at(scene, "scan");
-    scan.insert("elevation_min_rad".into(), Value::Float(0.1));
-    scan.insert("elevation_max_rad".into(), Value::Float(0.11));
-    scan.insert("pulses_per_line".into(), Value::Integer(2));
-    scan.insert("realisations".into(), Value::Integer(2));
-    let outputs = table_at(scene, "outputs");
-    outputs.insert("profile_points".into(), Value::Integer(5));
+    for (key, angle_rad) in [("elevation_min_rad", 0.1), ("elevation_max_rad", 0.11)] {
+        put(scene, "scan", key, Value::Float(angle_rad));
+    }
+    for (section, key, count) in
+        [("scan", "pulses_per_line", 2), ("scan", "realisations", 2), ("outputs", "profile_points", 5)]
+    {
+        put(scene, section, key, Value::Integer(count));
+    }
     for picture in ["svg", "png"] {
-        outputs.insert(picture.into(), Value::Boolean(false));
+        put(scene, "outputs", picture, Value::Boolean(false));
     }
 }
 
@@ -81,24 +82,22 @@ fn pick(rng: &mut Xoshiro256PlusPlus, below: usize) -> usize {
     (rng.next_u64() % below.max(1) as u64) as usize
 }
 
-/// A section, or the scene itself.
-fn table_at<'a>(scene: &'a mut Table, section: &str) -> &'a mut Table {
+/// Puts a value into a section, or into the scene itself.
+fn put(scene: &mut Table, section: &str, key: &str, value: Value) {
     if section.is_empty() {
-        return scene;
+        scene.insert(key.into(), value);
+        return;
     }
-    let entry = scene.entry(section).or_insert_with(|| Value::Table(Table::new()));
-    if !entry.is_table() {
-        *entry = Value::Table(Table::new());
-    }
-    match entry {
-        Value::Table(table) => table,
-        _ => unreachable!("it was made a table"),
+    let inside = scene.entry(section).or_insert_with(|| Value::Table(Table::new()));
+    match inside {
+        Value::Table(table) => drop(table.insert(key.into(), value)),
+        other => *other = Value::Table(Table::from_iter([(key.into(), value)])),
     }
 }
 
 fn other_kind(scene: &mut Table, rng: &mut Xoshiro256PlusPlus) {
     let (section, key, table) = &CHANGES.kinds[pick(rng, CHANGES.kinds.len())];
-    table_at(scene, section).insert(key.clone(), Value::Table(table.clone()));
+    put(scene, section, key, Value::Table(table.clone()));
 }
 
 /// Goes down the tables at random until it meets a value.

@@ -4,7 +4,6 @@
 //! used. The value is a folder with the figure's files and one TOML index. What cannot be read is drawn anew.
 
 use crate::cause::cause;
-use crate::claim::Claim;
 use crate::figures::context::{Context, Rendered};
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
@@ -28,29 +27,25 @@ pub(super) struct Place {
 
 #[derive(Serialize, Deserialize)]
 struct Index {
-    caption: String,
-    marks: Vec<String>,
-    words: String,
     extensions: Vec<String>,
-    claims: Vec<Claim>,
-    timings: Vec<(String, [f64; 2])>,
+    rendered: Rendered,
 }
 
 impl Place {
     pub(super) fn new(id: &'static str, context: &Context) -> Result<Self, Failure> {
         let (root, seed, flow) = (root(), context.seed.to_string(), if context.analytic { "analytic" } else { "" });
-        let key = cause(&root, &[id, context.profile_name(), &seed, flow], &DRAWN_BY)?;
+        let key = cause(&root, &[id, context.profile.name(), &seed, flow], &DRAWN_BY)?;
         Ok(Self { id, folder: folder().join(format!("{id}-{key}")) })
     }
 
     /// The figure, if it was made before and can be read.
     pub(super) fn load(&self) -> Option<Rendered> {
-        let index: Index = toml::from_str(&std::fs::read_to_string(self.folder.join("index.toml")).ok()?).ok()?;
+        let Index { extensions, rendered }: Index =
+            toml::from_str(&std::fs::read_to_string(self.folder.join("index.toml")).ok()?).ok()?;
         let name = |extension: &String| format!("{}.{extension}", self.id);
         let file = |e: &String| Some((e.clone(), std::fs::read(self.folder.join(name(e))).ok()?));
-        let files = index.extensions.iter().map(file).collect::<Option<_>>()?;
-        let Index { caption, marks, words, claims, timings, .. } = index;
-        Some(Rendered { files, caption, marks, words, claims, timings })
+        let files = extensions.iter().map(file).collect::<Option<_>>()?;
+        Some(Rendered { files, ..rendered })
     }
 
     pub(super) fn store(&self, rendered: &Rendered) -> Outcome {
@@ -58,9 +53,8 @@ impl Place {
         for (extension, bytes) in &rendered.files {
             group.add(&format!("{}.{extension}", self.id), bytes.clone())?;
         }
-        let Rendered { files, caption, marks, words, claims, timings } = rendered.clone();
-        let extensions = files.into_iter().map(|(extension, _)| extension).collect();
-        group.add("index.toml", toml::to_string(&Index { caption, marks, words, extensions, claims, timings })?)?;
+        let extensions = rendered.files.iter().map(|(extension, _)| extension.clone()).collect();
+        group.add("index.toml", toml::to_string(&Index { extensions, rendered: rendered.clone() })?)?;
         group.commit()?;
         Ok(())
     }
@@ -69,6 +63,7 @@ impl Place {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::claim::Claim;
 
     #[test]
     fn what_is_stored_comes_back_and_damage_is_no_hit() {

@@ -1,6 +1,8 @@
-//! The report of a run: one page with all figures, claims and run times.
+//! The report of a run as one HTML page that opens from disk: findings, figures, claims, run times; pictures inside, no script, nothing
+//! fetched.
+//!
+//! Check: every text is escaped, the page names nothing outside itself, verdicts are marked by colour and by word.
 
-use super::html::{Finding, HtmlTable, Report, ReportEntry};
 use super::lists::Kind;
 use crate::claim::Claim;
 use crate::cost::machine;
@@ -8,31 +10,86 @@ use crate::figures::Figure;
 use crate::figures::context::{Context, Rendered};
 use crate::statistics::{Verdict, two_digits};
 use fixtures::failure::Failure;
+use wakescope_sim::plot::escape;
 
-/// The page as HTML.
-pub(super) fn html(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> Result<String, Failure> {
-    let heads: [(&str, bool, Verdict); 4] = [
-        ("What the chapter says and this run does not find", true, Verdict::Fail),
-        ("What the chapter says and this run does not decide", true, Verdict::Open),
-        ("The program's own claims that fail", false, Verdict::Fail),
-        ("The program's own claims that this run does not decide", false, Verdict::Open),
-    ];
-    let findings = heads.map(|(heading, of_chapter, verdict)| {
+/// Figures with what they gave.
+type Done<'a> = [(&'a Figure, Rendered)];
+
+const STYLE: &str = "\
+:root{color-scheme:light}
+body{font:16px/1.5 system-ui,'Segoe UI','Helvetica Neue',Arial,sans-serif;color:#222;background:#fff;max-width:1040px;margin:0 auto;padding:24px 20px 80px}
+h1{font-size:28px;line-height:1.25;margin:8px 0 4px}h2{font-size:21px;margin:44px 0 10px;border-bottom:1px solid #ddd;padding-bottom:4px}
+h3{font-size:17px;margin:0 0 6px}.found{font-size:18px;margin:14px 0}
+.finding{margin:10px 0;padding:8px 14px;border-left:4px solid #b8ab73;background:#faf8f0}.finding.first{border-color:#b03a00;background:#fdf3ee}
+.finding p{margin:2px 0}.reason{color:#444;font-size:14.5px;overflow-wrap:anywhere}
+nav ul{columns:2;font-size:14.5px;padding-left:22px;margin:14px 0}a{color:#0063a6}
+dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 18px;font-size:14px;margin:14px 0}dt{color:#666}dd{margin:0;overflow-wrap:anywhere}
+figure{margin:26px 0;padding:16px;border:1px solid #e3e3e3;border-radius:6px;background:#fff}
+figure svg{display:block;width:100%;height:auto}figcaption{font-size:14.5px;color:#333;margin-top:10px;white-space:pre-line;overflow-wrap:anywhere}
+.mark{display:inline-block;font-size:12px;font-weight:normal;background:#eef3f8;border:1px solid #cbd9e6;border-radius:10px;padding:1px 9px;margin-left:8px;vertical-align:2px}
+.scroll{overflow-x:auto}table{border-collapse:collapse;font-size:14px;width:100%}
+th,td{border-bottom:1px solid #e6e6e6;padding:5px 10px;text-align:left;vertical-align:top;overflow-wrap:anywhere}th{background:#f6f6f6;font-weight:600}
+td.pass{color:#00643f;font-weight:600}td.fail{color:#b03a00;font-weight:600}td.open{color:#6b5a00;font-weight:600}
+@media (max-width:700px){body{padding:12px 12px 60px}h1{font-size:23px}nav ul{columns:1}dl{grid-template-columns:1fr}dt{margin-top:6px}
+figure{padding:8px;margin:18px 0}thead{display:none}tr{display:block;border-bottom:2px solid #ccc;padding:6px 0}
+td{display:flex;gap:10px;border:0;padding:2px 4px}td::before{content:attr(data-label);flex:0 0 7.5em;color:#666;font-weight:normal}}
+@media print{body{max-width:none;padding:0;font-size:10.5pt}nav{display:none}a{color:inherit;text-decoration:none}
+figure,.finding,tr{break-inside:avoid}h2,h3{break-after:avoid}figure{border:0;padding:0}figure svg{max-height:22cm}thead{display:table-header-group}table{font-size:8.5pt}}
+";
+
+/// What stands before the figures: a heading, whether of the chapter's claims, and how they came out.
+const FINDINGS: [(&str, bool, Verdict); 4] = [
+    ("What the chapter says and this run does not find", true, Verdict::Fail),
+    ("What the chapter says and this run does not decide", true, Verdict::Open),
+    ("The program's own claims that fail", false, Verdict::Fail),
+    ("The program's own claims that this run does not decide", false, Verdict::Open),
+];
+
+/// The page.
+///
+/// # Errors
+/// A row with another number of cells than its header, a picture that is not an `<svg>` element, two figures of one id.
+pub(super) fn html(context: &Context, done: &Done<'_>, run_s: f64) -> Result<String, Failure> {
+    let title = "wakescope: figures and claims";
+    let mut out = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n<p class=\"found\">{}</p>\n",
+        escape(&found(context, done, run_s))
+    );
+    let mut class = "finding first";
+    for (heading, of_chapter, verdict) in FINDINGS {
         let here = |c: &&Claim| c.verdict == verdict && matches!(Kind::of(&c.id), Kind::Chapter(..)) == of_chapter;
-        let of =
-            |(_, r): &(_, Rendered)| r.claims.iter().filter(here).map(|c| finding(c, core_s(r))).collect::<Vec<_>>();
-        (heading.into(), done.iter().flat_map(of).collect())
-    });
-    let report = Report {
-        title: "wakescope: figures and claims".into(),
-        found: found(context, done, run_s),
-        findings: findings.into(),
-        facts: facts(context),
-        entries: done.iter().map(|(figure, rendered)| entry(figure, rendered)).collect(),
-        claims: claims(done),
-        timings: timings(done),
-    };
-    report.to_html()
+        let of = |(_, r): &(_, Rendered)| {
+            r.claims.iter().filter(here).map(|claim| finding(class, claim, core_s(r))).collect::<String>()
+        };
+        let list: String = done.iter().map(of).collect();
+        if !list.is_empty() {
+            out += &format!("<h2>{heading}</h2>\n{list}");
+            class = "finding";
+        }
+    }
+    let link = |id: &str, name: &str| format!("<li><a href=\"#{id}\">{}</a></li>\n", escape(name));
+    let links: String = done.iter().map(|(figure, _)| link(figure.id, &figure.heading())).collect();
+    let links = links + &link("claims", "All claims") + &link("timings", "Run times");
+    out += &format!("<h2>Figures and tables</h2>\n<nav><ul>\n{links}</ul></nav>\n");
+    for (place, (figure, rendered)) in done.iter().enumerate() {
+        if done[..place].iter().any(|(before, _)| before.id == figure.id) {
+            return Err(Failure::new(format!("two figures of the report are called '{}'", figure.id)));
+        }
+        out += &entry(figure, rendered)?;
+    }
+    out += &format!("<h2 id=\"claims\">All claims</h2>\n{}", claims(done)?);
+    out += &format!("<h2 id=\"timings\">Run times</h2>\n{}<h2>How it was made</h2>\n<dl>\n", timings(done)?);
+    let (profile, seed) = (context.profile.name(), context.seed);
+    for (name, value) in [
+        ("version", wakescope_sim::PROGRAM.into()),
+        ("seed", seed.to_string()),
+        ("profile", profile.into()),
+        ("machine", machine()),
+        ("command", format!("cargo xtask reproduce-figs --profile {profile} --seed {seed}")),
+    ] {
+        out += &format!("<dt>{name}</dt><dd>{}</dd>\n", escape(&value));
+    }
+    Ok(out + "</dl>\n</body>\n</html>\n")
 }
 
 /// Of a list of claims how many hold, do not, are open.
@@ -44,7 +101,7 @@ pub(super) fn counted(name: &str, claims: &[&Claim]) -> String {
 }
 
 /// How many claims hold, what the figures say in words, and what it took.
-fn found(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> String {
+fn found(context: &Context, done: &Done<'_>, run_s: f64) -> String {
     let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
     let core_s: f64 = done.iter().map(|(_, r)| core_s(r)).sum();
     let words: Vec<&str> = done.iter().map(|(_, r)| r.words.as_str()).filter(|words| !words.is_empty()).collect();
@@ -53,7 +110,7 @@ fn found(context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> String 
          run, with those that it found in the cache, {run_s:.0} s.",
         counted("chapter", &claims),
         counted("own", &claims),
-        context.profile_name(),
+        context.profile.name(),
         words.join(" "),
         done.len()
     )
@@ -64,57 +121,45 @@ fn core_s(rendered: &Rendered) -> f64 {
     rendered.timings.iter().map(|(_, [_, core_s])| core_s).sum()
 }
 
-fn finding(claim: &Claim, core_s: f64) -> Finding {
-    let kind = Kind::of(&claim.id);
+/// A claim that does not hold or is not decided, and why.
+fn finding(class: &str, claim: &Claim, core_s: f64) -> String {
+    let Claim { id, figure, statement, expected, measured, decided_by, .. } = claim;
+    let kind = Kind::of(id);
     let said = if let Kind::Chapter(..) = kind { format!("{} ", kind.source()) } else { String::new() };
-    let decided = match claim.decided_by.as_str() {
+    let decided = match decided_by.as_str() {
         "" => String::new(),
         by => format!(" Would decide: {by}; the figure took {core_s:.0} s of processor time."),
     };
-    Finding {
-        name: claim.id.clone(),
-        entry: claim.figure.clone(),
-        statement: claim.statement.clone(),
-        reason: format!("{said}Expected: {}. Measured: {}.{decided}", claim.expected, claim.measured),
-    }
+    let [id, figure, statement] = [id, figure, statement].map(|text| escape(text));
+    let reason = escape(&format!("{said}Expected: {expected}. Measured: {measured}.{decided}"));
+    format!(
+        "<div class=\"{class}\"><p><a href=\"#{figure}\">{id}</a> {statement}</p><p class=\"reason\">{reason}</p></div>\n"
+    )
 }
 
-fn facts(context: &Context) -> Vec<(String, String)> {
-    let fact = |name: &str, value: String| (name.to_owned(), value);
-    vec![
-        fact("version", wakescope_sim::PROGRAM.into()),
-        fact("seed", context.seed.to_string()),
-        fact("profile", context.profile_name().into()),
-        fact("machine", machine()),
-        fact(
-            "command",
-            format!("cargo xtask reproduce-figs --profile {} --seed {}", context.profile_name(), context.seed),
-        ),
-    ]
-}
-
-fn entry(figure: &Figure, rendered: &Rendered) -> ReportEntry {
-    let svg = rendered.file("svg").map(|bytes| String::from_utf8_lossy(bytes).into_owned());
-    // A table shows its own rows; a figure's rows are in its file.
-    let table = match (&svg, rendered.file("csv")) {
-        (None, Some(csv)) => Some(table_of_csv(&String::from_utf8_lossy(csv))),
-        _ => None,
+/// A figure, or a table with its rows.
+fn entry(figure: &Figure, rendered: &Rendered) -> Result<String, Failure> {
+    let Figure { id, .. } = figure;
+    let marks: String =
+        rendered.marks.iter().map(|mark| format!("<span class=\"mark\">{}</span>", escape(mark))).collect();
+    let text = |extension: &str| rendered.file(extension).map(String::from_utf8_lossy);
+    let shown = match (text("svg"), text("csv")) {
+        (Some(svg), _) if svg.starts_with("<svg") && !svg.contains("<script") => svg.into_owned(),
+        (Some(svg), _) => {
+            let start: String = svg.chars().take(20).collect();
+            return Err(Failure::new(format!("picture of {id} = {start}: one <svg> element without script")));
+        }
+        (None, Some(csv)) => {
+            let mut rows = csv.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(','));
+            let header: Vec<&str> = rows.next().into_iter().flatten().collect();
+            table(id, &header, rows.map(|row| row.map(five_digits).collect()))?
+        }
+        (None, None) => String::new(),
     };
-    ReportEntry {
-        id: figure.id.into(),
-        title: figure.heading(),
-        caption: rendered.caption.clone(),
-        svg,
-        table,
-        marks: rendered.marks.clone(),
-    }
-}
-
-/// The rows of a table whose cells hold no commas; its numbers come from four digits at most and are shown with five.
-fn table_of_csv(csv: &str) -> HtmlTable {
-    let mut rows =
-        csv.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').map(five_digits).collect::<Vec<_>>());
-    HtmlTable { header: rows.next().unwrap_or_default(), rows: rows.collect() }
+    let (heading, caption) = (escape(&figure.heading()), escape(&rendered.caption));
+    Ok(format!(
+        "<figure id=\"{id}\">\n<h3>{heading}{marks}</h3>\n{shown}<figcaption>{caption}</figcaption>\n</figure>\n"
+    ))
 }
 
 /// A cell; if it is a number, rounded to five digits.
@@ -124,29 +169,101 @@ fn five_digits(cell: &str) -> String {
         .map_or_else(|| cell.to_owned(), |x| if x.abs() < 1e-3 && x != 0.0 { format!("{x:e}") } else { x.to_string() })
 }
 
-fn words(list: &[&str]) -> Vec<String> {
-    list.iter().map(|&w| w.to_owned()).collect()
-}
-
-fn claims(done: &[(&Figure, Rendered)]) -> HtmlTable {
+fn claims(done: &Done<'_>) -> Result<String, Failure> {
     let row = |c: &Claim| {
         let error = if c.standard_error.is_nan() { String::new() } else { two_digits(c.standard_error) };
-        let list = Kind::of(&c.id).name().to_owned();
-        let told = [&c.statement, &c.expected, &c.measured, &error].map(String::clone);
-        [vec![c.id.clone(), list], told.to_vec(), vec![c.verdict.name().into()]].concat()
+        let (list, verdict) = (Kind::of(&c.id).name().to_owned(), c.verdict.name().to_owned());
+        vec![c.id.clone(), list, c.statement.clone(), c.expected.clone(), c.measured.clone(), error, verdict]
     };
-    HtmlTable {
-        header: words(&["id", "list", "statement", "expected", "measured", "standard error", "verdict"]),
-        rows: done.iter().flat_map(|(_, r)| r.claims.iter().map(row)).collect(),
-    }
+    let header = ["id", "list", "statement", "expected", "measured", "standard error", "verdict"];
+    table("claims", &header, done.iter().flat_map(|(_, r)| r.claims.iter().map(row)))
 }
 
-fn timings(done: &[(&Figure, Rendered)]) -> HtmlTable {
+fn timings(done: &Done<'_>) -> Result<String, Failure> {
     let row = |title: &str, (stage, [wall_s, core_s]): &(String, [f64; 2])| {
         vec![title.to_owned(), stage.clone(), format!("{wall_s:.1}"), format!("{core_s:.1}")]
     };
-    HtmlTable {
-        header: words(&["figure", "stage", "wall-clock time [s]", "processor time [s]"]),
-        rows: done.iter().flat_map(|(f, r)| r.timings.iter().map(|t| row(f.title, t))).collect(),
+    let header = ["figure", "stage", "wall-clock time [s]", "processor time [s]"];
+    table("timings", &header, done.iter().flat_map(|(f, r)| r.timings.iter().map(|t| row(f.title, t))))
+}
+
+/// A table; on a narrow screen each row becomes a block of named cells. The words of verdicts are coloured.
+fn table(name: &str, header: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Result<String, Failure> {
+    let header: Vec<String> = header.iter().map(|column| escape(column)).collect();
+    let names: String = header.iter().map(|column| format!("<th>{column}</th>")).collect();
+    let mut out = format!("<div class=\"scroll\"><table>\n<thead><tr>{names}</tr></thead>\n<tbody>\n");
+    for row in rows {
+        if row.len() != header.len() {
+            return Err(Failure::new(format!("table {name}: {} cells under {} names", row.len(), header.len())));
+        }
+        let cell = |(cell, column): (&String, &String)| {
+            let is_verdict = ["pass", "fail", "open"].contains(&cell.as_str());
+            let class = if is_verdict { format!(" class=\"{cell}\"") } else { String::new() };
+            format!("<td{class} data-label=\"{column}\">{}</td>", escape(cell))
+        };
+        out += &format!("<tr>{}</tr>\n", row.iter().zip(&header).map(cell).collect::<String>());
+    }
+    Ok(out + "</tbody></table></div>\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::profile::Profile;
+
+    const WILD: &str = "<script>alert('x & \"y\"')</script>";
+
+    /// A figure and a table, all of whose texts are wild.
+    fn page(change: impl Fn(&mut Vec<(&Figure, Rendered)>)) -> Result<String, Failure> {
+        let make: fn(&Context) -> Result<Rendered, Failure> = |_| Ok(Rendered::default());
+        let figure = |id| Figure { id, number: 1, title: WILD, make };
+        let (drawn, listed) = (figure("fig01"), figure("tab01"));
+        let claim = |id: &str| Claim {
+            statement: WILD.into(),
+            expected: WILD.into(),
+            figure: WILD.into(),
+            ..Claim::exact(id, WILD.into(), false).open(WILD)
+        };
+        let rendered = |extension: &str, bytes: &str| Rendered {
+            files: vec![(extension.into(), bytes.as_bytes().to_vec())],
+            caption: WILD.into(),
+            marks: vec![WILD.into()],
+            words: WILD.into(),
+            claims: vec![claim(WILD)],
+            timings: vec![(WILD.into(), [1.0, 2.0])],
+        };
+        let picture = "<svg xmlns=\"http://www.w3.org/2000/svg\"></svg>\n";
+        let rows = format!("# head\n{WILD}\n{WILD}\n");
+        let mut done = vec![(&drawn, rendered("svg", picture)), (&listed, rendered("csv", &rows))];
+        change(&mut done);
+        let (stages, anew, wake, analytic) = (".".into(), false, None, false);
+        html(&Context { profile: Profile::Quick, seed: 1, stages, anew, wake, analytic }, &done, 1.0)
+    }
+
+    #[test]
+    fn every_text_is_escaped_and_nothing_is_fetched() {
+        let page = page(|_| {}).unwrap();
+        assert!(!page.contains("<script"), "{page}");
+        // Of both: words; link, heading, caption, mark; figure, title and stage of the run times; of the claims six in the finding, four in
+        // the table; names and two cells of the table of rows.
+        assert_eq!(page.matches("&lt;script&gt;").count(), 2 * (1 + 4 + 2 + 6 + 4) + 3);
+        assert!(page.contains("<td class=\"open\" data-label="));
+        // What does not hold stands before the figures, and an empty list has no heading.
+        assert!(page.find("class=\"finding first\"").unwrap() < page.find("<figure").unwrap());
+        assert!(!page.contains(FINDINGS[0].0) && page.contains(FINDINGS[3].0));
+        for outside in ["src=", "url(", "@import", "<link", "href=\"http"] {
+            assert!(!page.contains(outside), "{outside}");
+        }
+        assert_eq!(page.matches("<figure").count(), page.matches("</figure>").count());
+    }
+
+    #[test]
+    fn broken_reports_are_refused() {
+        let uneven = page(|done| done[1].1.files[0].1.extend(b"a,b\n"));
+        assert!(uneven.unwrap_err().to_string().contains("2 cells under 1 names"));
+        let twice = page(|done| done.push(done[0].clone()));
+        assert!(twice.unwrap_err().to_string().contains("two figures"));
+        let foreign = page(|done| done[0].1.files[0].1 = b"<script>".to_vec());
+        assert!(foreign.unwrap_err().to_string().contains("without script"));
     }
 }

@@ -1,18 +1,23 @@
 //! The plane vortex pair above ground at Re 2500 against a spectral code; over a frictionless ground against the hyperbola.
 
-use super::shown::Shown;
-use super::wake::history::{run, run_with, worst};
+use super::Shown;
+use super::flows::advance;
+use super::runs::{Curve, apart, relative, run, stored_curve, worst};
 use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::references::numbers;
 use fixtures::failure::Failure;
+use std::f64::consts::TAU;
 use wakescope_les::CirculationProfile;
-use wakescope_les::analysis::WakeScales;
+use wakescope_les::analysis::{WakeRecord, WakeScales};
 use wakescope_les::cases::VortexPairCase;
+use wakescope_sim::flow::{Subgrid, WakePreset, WakeProfile};
 use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const END: f64 = 3.0;
+/// Records per unit of tau.
+const PER_TAU: f64 = 20.0;
 /// The stored centre is the place of the strongest vorticity: a small circle finds it.
 const PEAK_RADIUS: f64 = 0.05;
 
@@ -28,18 +33,21 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
         ..VortexPairCase::coarse()
     };
     let meter = pair.meter(&WakeScales::REDUCED)?.with_window([0.1, 0.3])?.with_core_radius(PEAK_RADIUS)?;
-    let flow = run_with(&pair, meter, END)?;
+    let (mut meter, mut flow) = (meter, pair.case(VortexPairCase::steps(0.01))?.start()?.0);
+    let mut records = vec![meter.measure(&flow)?];
+    for record in 1..=(END * PER_TAU).round() as usize {
+        advance(&mut flow, record as f64 / PER_TAU)?;
+        records.push(meter.measure(&flow)?);
+    }
+    let curve = |of: fn(&WakeRecord) -> f64| records.iter().map(|r| (r.time_s, of(r))).collect::<Curve>();
     let stored = numbers("wake_2d_ground_re2500.csv")?;
-    let column = |column: usize| stored.iter().map(move |r| (r[0], r[column])).collect::<Vec<_>>();
-    let [y, z] = ["y_right", "z_right"].map(|name| flow.curve(name));
-    let gamma = flow.curve("gamma_5_15_right");
-    let [energy, enstrophy] = ["energy", "enstrophy"].map(|name| flow.curve(name));
+    let column = |column: usize| stored_curve(&stored, column);
+    let (y, z) = (curve(|r| r.right.y_m), curve(|r| r.right.z_m));
+    let gamma = curve(|r| r.right.gamma_5_15_m2_s / TAU);
+    let (energy, enstrophy) = (curve(|r| r.energy_m4_s2), curve(|r| r.enstrophy_m2_s2));
     let range = [0.1, END];
-    let apart = |a: f64, b: f64| (a - b).abs();
-    let relative = |a: f64, b: f64| (a / b - 1.0).abs();
     let off = worst(&y, &column(1), range, apart).max(worst(&z, &column(2), range, apart));
-    let sides = flow.column("y_left").iter().zip(flow.column("y_right"));
-    let asymmetry = sides.map(|(left, right)| (left + right).abs()).fold(0.0, f64::max);
+    let asymmetry = records.iter().map(|r| (r.left.y_m + r.right.y_m).abs()).fold(0.0, f64::max);
     let wide = if profile == Profile::Quick { 4.0 } else { 1.0 };
     let checks = vec![
         Claim::at_most("largest error of the path, b₀", off, 0.01 * wide),
@@ -76,26 +84,16 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
 /// Point vortices and their images follow `1/y^2 + 1/z^2 = 5`; compact cores in a wide box without friction should, too.
 pub(super) fn show_hyperbola(profile: Profile) -> Result<Shown, Failure> {
     let cells = if profile == Profile::Quick { [1, 384, 128] } else { [1, 560, 176] };
-    let pair = VortexPairCase {
-        cells,
-        size: [1.0, 36.0, 11.0],
-        ground_stretch: 2.0,
-        lateral_stretch: 0.55,
-        core_radius: 0.12,
-        profile: CirculationProfile::LambOseen,
-        reynolds: 1e7,
-        sticky_ground: false,
-        slip_sides: true,
-        perturbation: 0.0,
-        ..VortexPairCase::coarse()
-    };
-    let flow = run(&pair, 4.0)?;
+    let flow = run(WakePreset::Coarse, Subgrid::None {}, 4.0, |flow| {
+        (flow.cells, flow.size) = (cells, [1.0, 36.0, 11.0]);
+        (flow.ground_stretch, flow.lateral_stretch) = (2.0, 0.55);
+        (flow.core_radius, flow.profile) = (0.12, WakeProfile::LambOseen);
+        (flow.reynolds, flow.perturbation) = (1e7, 0.0);
+        (flow.sticky_ground, flow.slip_sides) = (false, true);
+    })?;
     let stored = numbers("vortex_pair_inviscid_ground_h1.csv")?;
-    let column = |column: usize| stored.iter().map(move |r| (r[0], r[column])).collect::<Vec<_>>();
-    let [y, z] = ["y_right", "z_right"].map(|name| flow.curve(name));
-    let apart = |a: f64, b: f64| (a - b).abs();
-    let off = [(&y, 1), (&z, 2)].map(|(curve, c)| worst(curve, &column(c), [0.0, 4.0], apart));
-    let energy = flow.curve("energy");
+    let (y, z, energy) = (flow.curve("y_right")?, flow.curve("z_right")?, flow.curve("energy")?);
+    let off = [(&y, 1), (&z, 2)].map(|(curve, c)| worst(curve, &stored_curve(&stored, c), [0.0, 4.0], apart));
     let lost = 1.0 - energy[energy.len() - 1].1 / energy[0].1;
     let checks = vec![
         Claim::at_most("largest error of y to tau = 4, b₀", off[0], 0.01),

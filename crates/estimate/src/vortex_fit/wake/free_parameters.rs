@@ -65,7 +65,8 @@ impl FreeParameters {
     }
 
     /// Places of the parameters that each free number moves.
-    pub(crate) fn groups(&self) -> Vec<Vec<usize>> {
+    #[must_use]
+    pub fn groups(&self) -> Vec<Vec<usize>> {
         let mut groups = Vec::new();
         for (sharing, places) in [
             (self.circulation, [0, 1]),

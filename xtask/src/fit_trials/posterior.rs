@@ -16,7 +16,7 @@ const MOST_GAIN: f64 = 4.0;
 
 /// Standard deviation of the posterior of parameter `place` about `top`, from `likelihood`, ln p and its derivatives by the
 /// parameters, and the covariance \[10, 10\] of the free `groups` at the bound. Nothing if there is no likelihood anywhere.
-pub(crate) fn posterior_deviation(
+pub(super) fn posterior_deviation(
     top: &Wake,
     place: usize,
     (covariance, groups): (&Array2<f64>, &[Vec<usize>]),

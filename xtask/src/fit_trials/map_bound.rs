@@ -15,7 +15,7 @@
 
 use super::banded::Banded;
 use fixtures::failure::Failure;
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 use num_complex::Complex;
 use rayon::prelude::*;
 use std::f64::consts::{PI, SQRT_2};
@@ -33,6 +33,8 @@ const LAYER_M: f64 = 0.25;
 const AT_ONCE: usize = 4;
 /// Velocities are rounded: part of their variance that is independent.
 const ROUNDING: f64 = 1e-4;
+/// Times its variance, a number tells nothing.
+const USELESS: f64 = 1e12;
 /// Places of the spectrum among which the highest is sought.
 const PLACES: usize = 512;
 
@@ -40,37 +42,36 @@ const PLACES: usize = 512;
 const KINDS: usize = 2;
 
 /// How a map is made.
-#[derive(Debug, Clone)]
-pub(crate) struct MapSetting<'a> {
-    pub(crate) model: WakeModel,
+pub(super) struct MapSetting<'a> {
+    pub(super) model: WakeModel,
     /// Real samples as they are recorded.
-    pub(crate) sampling: Sampling,
+    pub(super) sampling: Sampling,
     /// Samples of a window; a multiple of 4.
-    pub(crate) window: usize,
+    pub(super) window: usize,
     /// Half-width of |f|^2 at 1/e \[s\].
-    pub(crate) sigma_s: f64,
-    pub(crate) snr: f64,
-    pub(crate) noise: Noise,
+    pub(super) sigma_s: f64,
+    pub(super) snr: f64,
+    pub(super) noise: Noise,
     /// Of the regions \[m\].
-    pub(crate) radius_m: f64,
-    pub(crate) elevation_rad: &'a [f64],
+    pub(super) radius_m: f64,
+    pub(super) elevation_rad: &'a [f64],
     /// A multiple of 4 samples apart.
-    pub(crate) range_m: &'a [f64],
+    pub(super) range_m: &'a [f64],
 }
 
 /// First-order slopes and covariance of a map.
-pub(crate) struct MapBound {
+pub(super) struct MapBound {
     /// By cell and kind: lines, then gates, then kinds.
     slopes: Vec<[f64; PARAMETERS]>,
     covariance: Banded,
 }
 
 /// Standard deviations of free numbers.
-pub(crate) struct Deviations {
+pub(super) struct Deviations {
     /// With the best weights, those of the covariance.
-    pub(crate) best: Vec<f64>,
+    pub(super) best: Vec<f64>,
     /// With weights of the variances alone.
-    pub(crate) by_variance: Vec<f64>,
+    pub(super) by_variance: Vec<f64>,
 }
 
 /// The grid of the complex samples.
@@ -106,7 +107,7 @@ struct Cell {
 }
 
 impl MapBound {
-    pub(crate) fn new(setting: &MapSetting<'_>, wake: &Wake) -> Result<Self, Failure> {
+    pub(super) fn new(setting: &MapSetting<'_>, wake: &Wake) -> Result<Self, Failure> {
         let grid = Grid::new(setting)?;
         let lines: Vec<Line> = setting
             .elevation_rad
@@ -144,60 +145,49 @@ impl MapBound {
     }
 
     /// Deviations of free numbers, each of which moves some parameters; with the widths of the spectra or without.
-    pub(crate) fn deviations(&self, groups: &[Vec<usize>], widths: bool) -> Option<Deviations> {
-        let used = |i: usize| widths || i.is_multiple_of(KINDS);
-        let covariance = self.covariance.part(used);
-        let column = |group: &Vec<usize>| -> Vec<f64> {
-            let rows = self.slopes.iter().enumerate().filter(|(i, _)| used(*i));
-            rows.map(|(_, slopes)| group.iter().map(|&place| slopes[place]).sum()).collect()
+    pub(super) fn deviations(&self, groups: &[Vec<usize>], widths: bool) -> Option<Deviations> {
+        let mut covariance = self.covariance.clone();
+        if !widths {
+            // what varies so much tells nothing
+            (1..self.slopes.len()).step_by(KINDS).for_each(|i| *covariance.at(i, i) *= USELESS);
+        }
+        let slope = |(i, group): (usize, usize)| groups[group].iter().map(|&place| self.slopes[i][place]).sum::<f64>();
+        let slopes = Array2::from_shape_fn((self.slopes.len(), groups.len()), slope);
+        let weighted = &slopes / &covariance.diagonal().insert_axis(Axis(1));
+        let of_columns = |a: &Array2<f64>, of: &dyn Fn(ArrayView1<'_, f64>) -> Array1<f64>| {
+            let mut out = a.clone();
+            Zip::from(out.columns_mut()).and(a.columns()).for_each(|mut out, column| out.assign(&of(column)));
+            out
         };
-        let slopes: Vec<Vec<f64>> = groups.iter().map(column).collect();
-        let weighted: Vec<Vec<f64>> =
-            slopes.iter().map(|j| j.iter().zip(covariance.diagonal()).map(|(j, c)| j / c).collect()).collect();
-        let products = |a: &[Vec<f64>], b: &[Vec<f64>]| {
-            let of = |(i, j): (usize, usize)| a[i].iter().zip(&b[j]).map(|(a, b)| a * b).sum::<f64>();
-            Array2::from_shape_fn((groups.len(), groups.len()), of)
-        };
-        let bread = inverse(&products(&weighted, &slopes))?;
-        let about: Vec<Vec<f64>> = weighted.iter().map(|x| covariance.times(x)).collect();
-        let sandwich = bread.dot(&products(&weighted, &about)).dot(&bread);
+        let bread = inverse(&weighted.t().dot(&slopes))?;
+        let about = of_columns(&weighted, &|x| covariance.times(x));
+        let sandwich = bread.dot(&weighted.t().dot(&about)).dot(&bread);
         let factor = covariance.factor()?;
-        let white: Vec<Vec<f64>> = slopes.into_iter().map(|j| factor.forward(j)).collect();
-        let best = inverse(&products(&white, &white))?;
+        let white = of_columns(&slopes, &|j| factor.forward(j.to_owned()));
         let roots = |a: &Array2<f64>| a.diag().iter().map(|v| v.sqrt()).collect();
-        Some(Deviations { best: roots(&best), by_variance: roots(&sandwich) })
+        Some(Deviations { best: roots(&inverse(&white.t().dot(&white))?), by_variance: roots(&sandwich) })
     }
 }
 
 /// Inverse of a small positive definite matrix.
 fn inverse(a: &Array2<f64>) -> Option<Array2<f64>> {
-    let n = a.nrows();
-    let mut band = Banded::zeros(n, n);
-    for i in 0..n {
-        for j in 0..=i {
-            *band.at(i, j) = a[[i, j]];
-        }
-    }
+    let mut band = Banded::zeros(a.nrows(), a.nrows());
+    a.indexed_iter().filter(|((i, j), _)| j <= i).for_each(|((i, j), value)| *band.at(i, j) = *value);
     let factor = band.factor()?;
-    let unit = |k: usize| (0..n).map(|i| if i == k { 1.0 } else { 0.0 }).collect();
-    let columns: Vec<Vec<f64>> = (0..n).map(|k| factor.forward(unit(k))).collect();
-    Some(Array2::from_shape_fn((n, n), |(i, j)| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum()))
+    let unit = Array2::<f64>::eye(a.nrows());
+    let columns: Vec<Array1<f64>> = unit.rows().into_iter().map(|row| factor.forward(row.to_owned())).collect();
+    Some(Array2::from_shape_fn(a.dim(), |(i, j)| columns[i].dot(&columns[j])))
 }
 
 impl Grid {
     fn new(setting: &MapSetting<'_>) -> Result<Self, Failure> {
-        let refused = |what: &str| Failure::new(format!("the bound of a map wants {what} of 4 samples"));
-        let period_s = 4.0 * setting.sampling.period_s();
-        let window = setting.window / 4;
-        if !setting.window.is_multiple_of(4) || window == 0 {
-            return Err(refused("windows that are a multiple"));
-        }
+        let (period_s, window) = (4.0 * setting.sampling.period_s(), setting.window / 4);
         let gap_m = setting.range_m.windows(2).next().map_or(0.0, |pair| pair[1] - pair[0]);
         let step = 2.0 * gap_m / SPEED_OF_LIGHT_M_S / period_s;
-        if (step - step.round()).abs() > 1e-6 {
-            return Err(refused("gates a multiple"));
+        if !setting.window.is_multiple_of(4) || window == 0 || (step - step.round()).abs() > 1e-6 {
+            return Err(Failure::new("the bound of a map wants windows and gates of a multiple of 4 samples".into()));
         }
-        let (step, first_m) = (step.round() as usize, setting.range_m.first().copied().unwrap_or(0.0));
+        let step = step.round() as usize;
         let band_hz = setting.sampling.band_hz.1 - setting.sampling.band_hz.0;
         let baseband = Sampling::baseband(period_s.recip(), setting.sampling.wavelength_m, band_hz)?;
         let model = WindowModel::gaussian_pulse(&baseband, window, setting.sigma_s, Noise::White)?;
@@ -207,29 +197,18 @@ impl Grid {
                 *w += taper.factor * taper.weights[p] * taper.weights[q];
             });
         }
-        let samples = window + setting.range_m.len().saturating_sub(1) * step;
-        let noise = |lag: usize| match setting.noise {
-            Noise::White => {
-                if lag == 0 {
-                    (band_hz * period_s).recip()
-                } else {
-                    0.0
-                }
-            }
-            _ => {
+        let samples = window + (setting.range_m.len() - 1) * step;
+        let noise = |lag: usize| match (setting.noise, lag) {
+            (Noise::White, 0) => (band_hz * period_s).recip(),
+            (Noise::White, _) => 0.0,
+            (_, 0) => 1.0,
+            (_, lag) => {
                 let turns = PI * band_hz * period_s * lag as f64;
-                if lag == 0 { 1.0 } else { turns.sin() / turns }
+                turns.sin() / turns
             }
         };
-        Ok(Self {
-            period_s,
-            first_s: 2.0 * first_m / SPEED_OF_LIGHT_M_S - 0.5 * window as f64 * period_s,
-            window,
-            samples,
-            step,
-            tapers,
-            noise: (0..samples).map(noise).collect(),
-        })
+        let first_s = 2.0 * setting.range_m[0] / SPEED_OF_LIGHT_M_S - 0.5 * window as f64 * period_s;
+        Ok(Self { period_s, first_s, window, samples, step, tapers, noise: (0..samples).map(noise).collect() })
     }
 
     /// Phase per velocity of a lag, k T m \[rad s/m\].
@@ -262,7 +241,7 @@ impl Line {
                 part.columns_mut().into_iter().enumerate().for_each(|(layer, mut column)| column *= weight(layer));
             }
             let (real, imaginary) = (by.0.dot(&re.t()) + by.1.dot(&im.t()), by.1.dot(&re.t()) - by.0.dot(&im.t()));
-            ndarray::Zip::from(&real).and(&imaginary).map_collect(|&re, &im| C64::new(re, im))
+            Zip::from(&real).and(&imaginary).map_collect(|&re, &im| C64::new(re, im))
         };
         let mut covariance = summed(&|_| 1.0);
         covariance.indexed_iter_mut().for_each(|((p, q), c)| *c += grid.noise[p.abs_diff(q)]);

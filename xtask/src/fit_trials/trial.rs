@@ -1,6 +1,6 @@
 //! Fits to scans of a pair: to the map of the likelihood with tapers, and to all raw signals.
 
-use crate::trials::profile::posterior_deviation;
+use super::posterior::posterior_deviation;
 use fixtures::WINDOW;
 use fixtures::failure::Failure;
 use fixtures::pair::PairScan;
@@ -60,7 +60,7 @@ impl<'a> FitTrial<'a> {
     }
 
     /// How wide the likelihood of the signals is about a fit in one parameter, in its unit; see [`posterior_deviation`].
-    pub(crate) fn width(
+    pub(super) fn width(
         &self,
         model: &ScanModel,
         fit: &SignalFit,

@@ -1,0 +1,80 @@
+//! Figures 13 and 14: correlogram against periodogram accumulation on the early pair, at 200 and 400 ns, without refractive turbulence and
+//! with Cn2 = 1e-15.
+
+use super::context::*;
+use super::profiles::{self, Profiles};
+use super::study::{EARLY_TAU, METHODS, REFERENCES, Sight, Study, near_scene, with_method, with_turbulence};
+use wakescope_sim::scene::{PulseShape, SnrReference};
+
+const DURATIONS_S: [f64; 2] = [200e-9, 400e-9];
+/// The reference at which the chapter is judged.
+const CHAPTER: &str = REFERENCES[1].0;
+/// What errors across a core are.
+const ACROSS: &str = "Root mean square error against the range from the vortex centre, over the lines within 4 m of a core, both vortices together, less its \
+     evolution with range, a straight line through what it is beyond 30 m from both; \u{3c1} = 2 m, bands of one standard error over batches of scans.";
+
+pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
+    let words = "Periodogram accumulation (PA), unweighted and with the Gaussian weighting, and correlogram accumulation (CA, AR(16), unweighted) \
+         on the same signals; no refractive turbulence";
+    let (mut out, chapter) = compare(context, words, 1, |scene| scene)?;
+    let parts = profiles::parts(&chapter, " m/s", Profiles::inside_m_s);
+    let whole = profiles::parts(&chapter, " m/s", |p, without| p.inside.rms_m_s(without));
+    out.words = format!(
+        "Does correlogram accumulation err less than periodogram accumulation inside the vortices, as the chapter has it, at its ratio? As it is: \
+         {}. Less what each errs outside, as the chapter draws it: {} (figure 13).",
+        profiles::told(&whole),
+        profiles::told(&parts)
+    );
+    out.claims = vec![Claim::judged("F13", &parts).beside(&format!("with the evolution: {}", profiles::told(&whole)))];
+    Ok(out)
+}
+
+pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
+    let words =
+        "PA, unweighted and with the Gaussian weighting, and CA (unweighted) at 200 and 400 ns, Cn2 = 1e-15 m^(-2/3)";
+    let (mut out, chapter) = compare(context, words, 2, |scene| with_turbulence(context, scene, 1e-15))?;
+    let peaks = profiles::parts(&chapter, " m/s", Profiles::peak_m_s);
+    let widths = profiles::parts(&chapter, " m", Profiles::width_m);
+    out.words = format!("Is its profile across a core narrower, too? {} (figure 14).", profiles::told(&widths));
+    out.claims = vec![Claim::judged("F14a", &peaks), Claim::judged("F14b", &widths)];
+    Ok(out)
+}
+
+/// PA and CA on the same signals for both references and durations, so many of these in a panel, for scenes about the cores that may be
+/// changed: the figure, and the profiles at the chapter's reference.
+fn compare(
+    context: &Context,
+    words: &str,
+    durations: usize,
+    change: impl Fn(Scene) -> Scene,
+) -> Result<(Rendered, Vec<Profiles>), Failure> {
+    let scans = context.profile.choose([16, 96], [32, 192], [96, 400]);
+    let sight = Sight::of(context, EARLY_TAU)?;
+    let mut cases = Vec::new();
+    for ((name, reference), scans) in REFERENCES.into_iter().zip(scans) {
+        for duration_s in DURATIONS_S {
+            cases.extend(METHODS.map(|method| (name, reference, scans, duration_s, method)));
+        }
+    }
+    let scene = |(_, reference, scans, duration_s, method): &(&str, SnrReference, usize, f64, &str)| {
+        let mut scene = with_method(near_scene(*scans), method);
+        scene.detector.snr = *reference;
+        scene.pulse.shape = PulseShape::gaussian(*duration_s);
+        change(scene)
+    };
+    let studies = Study::runs(context, &sight, cases.iter().map(scene).collect())?;
+    let all = cases.iter().zip(&studies).map(|((name, .., method), study)| Profiles::of(method, name, study));
+    let all = all.collect::<Result<Vec<_>, _>>()?;
+    let panels = all.chunks(durations * METHODS.len()).map(|of| {
+        let several = || format!("{} signal-to-noise ratio, {:.1} dB", of[0].name, of[0].snr_db);
+        profiles::plot(&if durations == 1 { of[0].title() } else { several() }, of)
+    });
+    let origin = context.provenance_of_formula(&sight.scene(context, near_scene(scans[1])).to_toml());
+    let mut out = Rendered::new(&profiles::table(&all), &Figure::stacked(panels), &origin)?;
+    out.add("batches.csv", &profiles::batches_table(all.iter().map(|p| (p.title(), p)), true), &origin)?;
+    let [few, many] = scans;
+    out.caption =
+        format!("{ACROSS} {words}, {many} scans ({few} at the physical ratio) of one pulse a line; {}.", sight.words);
+    out.marks = vec![sight.mark];
+    Ok((out, all.into_iter().filter(|p| p.name == CHAPTER).collect()))
+}
