@@ -25,22 +25,42 @@ pub(crate) struct Claim {
 /// A part of a statement: its name, what was found in a unit, and where it must lie.
 pub(crate) type Part = (String, Estimate, &'static str, Bar);
 
+/// Which of the three lists a claim is on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// What the chapter says, in its words.
+    Chapter,
+    Own,
+    /// Arithmetic, copies, geometry: counted nowhere.
+    Check,
+}
+
+impl Kind {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Chapter => "chapter",
+            Self::Own => "own",
+            Self::Check => "check",
+        }
+    }
+}
+
 /// What the list says of a claim.
 #[derive(Deserialize)]
-pub(crate) struct Listed {
-    pub(crate) id: String,
+struct Listed {
+    id: String,
     statement: String,
     /// Absent where it depends on the run.
     #[serde(default)]
     expected: String,
     /// Whether it cannot fail unless the program is wrong.
     #[serde(default)]
-    pub(crate) check: bool,
+    check: bool,
     /// The chapter's sentence, word for word; none of the program's own claims.
-    pub(crate) quote: Option<String>,
+    quote: Option<String>,
     /// Where the chapter's is judged, and what of that it does not say.
     #[serde(default)]
-    pub(crate) case: String,
+    case: String,
 }
 
 #[derive(Deserialize)]
@@ -49,15 +69,17 @@ struct List {
 }
 
 /// All claims of figures; the test reads it.
-pub(crate) static LIST: LazyLock<Vec<Listed>> =
+static LIST: LazyLock<Vec<Listed>> =
     LazyLock::new(|| toml::from_str(include_str!("claims.toml")).map_or(Vec::new(), |list: List| list.claim));
 
 impl Claim {
     /// A claim of the list that a computation without random numbers decides.
     pub(crate) fn exact(id: &str, measured: String, pass: bool) -> Self {
-        let listed = LIST.iter().find(|listed| listed.id == id);
-        let [statement, expected] = listed.map_or(["", ""], |listed| [&listed.statement, &listed.expected]);
-        Self { id: id.into(), ..Self::of(statement, expected, measured, pass) }
+        let claim = Self { id: id.into(), ..Self::of("", "", measured, pass) };
+        claim.listed().map_or(claim.clone(), |listed| {
+            let (statement, expected) = (listed.statement.clone(), listed.expected.clone());
+            Self { statement, expected, ..claim }
+        })
     }
 
     fn of(statement: &str, expected: &str, measured: String, pass: bool) -> Self {
@@ -95,6 +117,29 @@ impl Claim {
         };
         let more = if times < 100.0 { format!("about {times:.1} times the data") } else { "no sample in reach".into() };
         if claim.verdict == Verdict::Open { claim.open(&more) } else { claim }
+    }
+
+    fn listed(&self) -> Option<&'static Listed> {
+        LIST.iter().find(|listed| listed.id == self.id)
+    }
+
+    pub(crate) fn kind(&self) -> Kind {
+        match self.listed() {
+            Some(Listed { quote: Some(_), .. }) => Kind::Chapter,
+            Some(Listed { check: true, .. }) => Kind::Check,
+            _ => Kind::Own,
+        }
+    }
+
+    /// The sentence and its case, or what else the claim comes from.
+    pub(crate) fn source(&self) -> String {
+        match (self.kind(), self.listed()) {
+            (Kind::Chapter, Some(Listed { quote: Some(quote), case, .. })) => {
+                format!("\"{quote}\" Judged at: {case}.")
+            }
+            (Kind::Check, _) => "arithmetic, a copy or geometry: cannot fail unless the program is wrong".into(),
+            _ => "of this program".into(),
+        }
     }
 
     /// The claim with what is expected of it in this run.
@@ -155,6 +200,7 @@ impl fmt::Display for Claim {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::workspace::root;
 
     #[test]
     fn bars_hold_their_ends_and_nothing_that_is_no_number() {
@@ -180,5 +226,25 @@ mod tests {
         assert_eq!(claim.measured, "p: 2.00 ± 0.10 m/s; p: 1.10 ± 0.10 m/s; p: 0.50 ± 0.10 m/s");
         assert_eq!(of(&[0.9]).decided_by, "about 3.8 times the data");
         assert_eq!(of(&[f64::NAN]).decided_by, "no sample in reach");
+    }
+
+    #[test]
+    fn every_entry_is_a_claim_of_a_figure() {
+        let folder = std::fs::read_dir(root().join("xtask/src/figures")).unwrap();
+        let code: String = folder.map(|file| std::fs::read_to_string(file.unwrap().path()).unwrap()).collect();
+        for Listed { id, .. } in LIST.iter() {
+            assert!(code.contains(&format!("\"{id}\"")), "no figure claims {id}");
+        }
+        assert_eq!(LIST.iter().filter(|listed| listed.quote.is_some()).count(), 19);
+        // And every claim of a figure is on the list.
+        let is_claim = |word: &&str| {
+            let number = word.strip_prefix("CP").or(word.strip_prefix('F')).or(word.strip_prefix('T')).unwrap_or("");
+            number.starts_with(|c: char| c.is_ascii_digit()) && number.len() < 4
+        };
+        for id in code.split('"').filter(is_claim) {
+            assert!(LIST.iter().any(|listed| listed.id == id), "{id} is not in claims.toml");
+        }
+        let kinds = ["F13", "F5", "F18a"].map(|id| Claim::exact(id, String::new(), true).kind().name());
+        assert_eq!(kinds, ["chapter", "check", "own"]);
     }
 }

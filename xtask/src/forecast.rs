@@ -46,23 +46,19 @@ pub(crate) fn run(options: &Options) -> Outcome {
     std::fs::create_dir_all(&folder)?;
     let empty = measured(&program, &folder, EMPTY, "run")?;
     println!("a run of next to nothing: {:.1} MB", empty.actual.1 / 1e6);
-    println!("{:<28} {:>21} {:>6}   {:>21} {:>6}", "scene", "time [s]", "", "memory [MB]", "");
-    println!(
-        "{:<28} {:>10} {:>10} {:>6}   {:>10} {:>10} {:>6}",
-        "", "forecast", "run", "ratio", "forecast", "run", "ratio"
-    );
+    println!("{:<28} time: forecast, run [s], ratio; memory: forecast, run [MB], ratio", "scene");
     let mut beyond = Vec::new();
     let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
     let Scenes { scene } = toml::from_str(include_str!("forecast.toml"))?;
     for Scene { name, command, text } in scene.iter().filter(|s| wanted(&s.name)) {
         let found = measured(&program, &folder, text, command)?;
-        let (time, memory) = (found.actual.0, (found.actual.1 - empty.actual.1).max(1e5));
-        let ratios = (found.forecast.0 / time, found.forecast.1 / memory);
+        let (forecast, time, memory) = (found.forecast, found.actual.0, (found.actual.1 - empty.actual.1).max(1e5));
+        let ratios = (forecast.0 / time, forecast.1 / memory);
         println!(
             "{name:<28} {:>10.2} {time:>10.2} {:>6.2}   {:>10.1} {:>10.1} {:>6.2}",
-            found.forecast.0,
+            forecast.0,
             ratios.0,
-            found.forecast.1 / 1e6,
+            forecast.1 / 1e6,
             memory / 1e6,
             ratios.1
         );

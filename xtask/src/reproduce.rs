@@ -5,10 +5,9 @@
 //! leaves a core idle at times; those that measure times come last, alone.
 
 mod cache;
-mod lists;
 mod report;
 
-use crate::claim::Claim;
+use crate::claim::{Claim, Kind};
 use crate::cost::{cpu_s, thread_cpu_s};
 use crate::figures::context::{Context, Rendered};
 use crate::figures::{self, Figure, Lane};
@@ -16,7 +15,6 @@ use crate::profile::Profile;
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
-use lists::Kind;
 use rayon::ThreadPool;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -169,12 +167,12 @@ fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f6
     write_atomic(&out.join("timings.csv"), table.to_csv(&context.provenance_of_run())?)?;
     write_atomic(&out.join("index.html"), report::html(context, done, run_s)?)?;
     for claim in &claims {
-        println!("{:<8}{claim}", Kind::of(&claim.id).name());
+        println!("{:<8}{claim}", claim.kind().name());
     }
     println!(
         "the chapter's {}\nthe program's own {}\nreport: {}",
-        report::counted("chapter", &claims),
-        report::counted("own", &claims),
+        report::counted(Kind::Chapter, &claims),
+        report::counted(Kind::Own, &claims),
         out.join("index.html").display()
     );
     Ok(())
@@ -190,7 +188,7 @@ fn claims_table(claims: &[&Claim]) -> Table {
         .text("measured", text(|c| c.measured.clone()))
         .float("standard_error", claims.iter().map(|c| c.standard_error))
         .text("verdict", text(|c| c.verdict.name().to_owned()))
-        .text("kind", text(|c| Kind::of(&c.id).name().to_owned()))
-        .text("source", text(|c| Kind::of(&c.id).source()))
+        .text("kind", text(|c| c.kind().name().to_owned()))
+        .text("source", text(|c| c.source()))
         .text("decided_by", text(|c| c.decided_by.clone()))
 }

@@ -3,8 +3,7 @@
 //!
 //! Check: every text is escaped, the page names nothing outside itself, verdicts are marked by colour and by word.
 
-use super::lists::Kind;
-use crate::claim::Claim;
+use crate::claim::{Claim, Kind};
 use crate::cost::machine;
 use crate::figures::Figure;
 use crate::figures::context::{Context, Rendered};
@@ -57,7 +56,7 @@ pub(super) fn html(context: &Context, done: &Done<'_>, run_s: f64) -> Result<Str
     );
     let mut class = "finding first";
     for (heading, of_chapter, verdict) in FINDINGS {
-        let here = |c: &&Claim| c.verdict == verdict && matches!(Kind::of(&c.id), Kind::Chapter(..)) == of_chapter;
+        let here = |c: &&Claim| c.verdict == verdict && (c.kind() == Kind::Chapter) == of_chapter;
         let of = |(_, r): &(_, Rendered)| {
             r.claims.iter().filter(here).map(|claim| finding(class, claim, core_s(r))).collect::<String>()
         };
@@ -93,8 +92,8 @@ pub(super) fn html(context: &Context, done: &Done<'_>, run_s: f64) -> Result<Str
 }
 
 /// Of a list of claims how many hold, do not, are open.
-pub(super) fn counted(name: &str, claims: &[&Claim]) -> String {
-    let of: Vec<&&Claim> = claims.iter().filter(|claim| Kind::of(&claim.id).name() == name).collect();
+pub(super) fn counted(kind: Kind, claims: &[&Claim]) -> String {
+    let of: Vec<&&Claim> = claims.iter().filter(|claim| claim.kind() == kind).collect();
     let count = |verdict| of.iter().filter(|claim| claim.verdict == verdict).count();
     let [holds, fails, open] = [Verdict::Pass, Verdict::Fail, Verdict::Open].map(count);
     format!("{} claims: {holds} hold, {fails} do not, {open} are open", of.len())
@@ -108,8 +107,8 @@ fn found(context: &Context, done: &Done<'_>, run_s: f64) -> String {
     format!(
         "The chapter's {}; the program's own {} (profile {}). {} {} figures and tables took {core_s:.0} s of processor time; this \
          run, with those that it found in the cache, {run_s:.0} s.",
-        counted("chapter", &claims),
-        counted("own", &claims),
+        counted(Kind::Chapter, &claims),
+        counted(Kind::Own, &claims),
         context.profile.name(),
         words.join(" "),
         done.len()
@@ -124,8 +123,7 @@ fn core_s(rendered: &Rendered) -> f64 {
 /// A claim that does not hold or is not decided, and why.
 fn finding(class: &str, claim: &Claim, core_s: f64) -> String {
     let Claim { id, figure, statement, expected, measured, decided_by, .. } = claim;
-    let kind = Kind::of(id);
-    let said = if let Kind::Chapter(..) = kind { format!("{} ", kind.source()) } else { String::new() };
+    let said = if claim.kind() == Kind::Chapter { format!("{} ", claim.source()) } else { String::new() };
     let decided = match decided_by.as_str() {
         "" => String::new(),
         by => format!(" Would decide: {by}; the figure took {core_s:.0} s of processor time."),
@@ -172,7 +170,7 @@ fn five_digits(cell: &str) -> String {
 fn claims(done: &Done<'_>) -> Result<String, Failure> {
     let row = |c: &Claim| {
         let error = if c.standard_error.is_nan() { String::new() } else { two_digits(c.standard_error) };
-        let (list, verdict) = (Kind::of(&c.id).name().to_owned(), c.verdict.name().to_owned());
+        let (list, verdict) = (c.kind().name().to_owned(), c.verdict.name().to_owned());
         vec![c.id.clone(), list, c.statement.clone(), c.expected.clone(), c.measured.clone(), error, verdict]
     };
     let header = ["id", "list", "statement", "expected", "measured", "standard error", "verdict"];
