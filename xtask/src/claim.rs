@@ -76,10 +76,8 @@ impl Claim {
     /// A claim of the list that a computation without random numbers decides.
     pub(crate) fn exact(id: &str, measured: String, pass: bool) -> Self {
         let claim = Self { id: id.into(), ..Self::of("", "", measured, pass) };
-        claim.listed().map_or(claim.clone(), |listed| {
-            let (statement, expected) = (listed.statement.clone(), listed.expected.clone());
-            Self { statement, expected, ..claim }
-        })
+        let Some(Listed { statement, expected, .. }) = claim.listed() else { return claim };
+        Self { statement: statement.clone(), expected: expected.clone(), ..claim }
     }
 
     fn of(statement: &str, expected: &str, measured: String, pass: bool) -> Self {

@@ -19,7 +19,6 @@ mod profile;
 mod ranks;
 #[cfg(test)]
 mod ranks_model;
-mod references;
 mod regress;
 mod reproduce;
 mod sources;

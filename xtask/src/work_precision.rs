@@ -31,7 +31,7 @@ pub(crate) struct Options {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Group {
+pub(crate) enum Group {
     Optics,
     Les,
     Signal,
@@ -105,13 +105,8 @@ fn few<T>(values: &[T], quick: bool) -> &[T] {
     if quick { &values[..values.len().min(2)] } else { values }
 }
 
-/// The rows of all groups.
-pub(crate) fn measure(quick: bool) -> Result<Vec<Row>, Failure> {
-    measure_some(None, quick)
-}
-
 /// The rows of a group or of all, on one thread; each case at a stretch, judged among its own.
-fn measure_some(wanted: Option<Group>, quick: bool) -> Result<Vec<Row>, Failure> {
+pub(crate) fn measure(wanted: Option<Group>, quick: bool) -> Result<Vec<Row>, Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut all = Vec::new();
     for (_, name, rows) in GROUPS.into_iter().filter(|group| wanted.is_none_or(|wanted| wanted == group.0)) {
@@ -177,7 +172,7 @@ pub(crate) fn picture(rows: &[Row]) -> Figure {
 /// # Errors
 /// What a crate refuses, or an unusable output.
 pub(crate) fn run(options: &Options) -> Outcome {
-    let rows = measure_some(options.group, options.quick)?;
+    let rows = measure(options.group, options.quick)?;
     println!("{:<28} {:<34} {:<34} {:>8} {:>22} {:>10}", "case", "method", "knob", "value", "error", "cpu");
     for Row { knob, value, error, standard_error, cost, .. } in &rows {
         let Knob { case, method, knob, metric, reference } = knob;

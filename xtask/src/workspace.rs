@@ -21,6 +21,14 @@ pub(crate) fn read(file: &str) -> Result<String, Failure> {
     std::fs::read_to_string(root().join(file)).map_err(|e| Failure::new(format!("cannot read {file}: {e}")))
 }
 
+/// Numbers of a reference file without its comments, row by row.
+pub(crate) fn numbers(file: &str) -> Result<Vec<Vec<f64>>, Failure> {
+    let text = read(&format!("tests/reference/les/{file}"))?;
+    let rows = text.lines().filter(|line| !line.starts_with('#'));
+    let parse = |line: &str| line.split(',').map(|cell| cell.trim().parse().ok()).collect::<Option<Vec<f64>>>();
+    Ok(rows.filter_map(parse).collect())
+}
+
 /// Paths, from the root, of the files that git tracks or would track.
 pub(crate) fn tracked_files() -> Result<Vec<String>, Failure> {
     let out = Command::new("git")

@@ -2,8 +2,8 @@
 
 use super::context::*;
 use crate::histories::{by_noise, swing};
-use crate::references::numbers;
 use crate::wakes::{self, mean};
+use crate::workspace::numbers;
 use wakescope_les::analysis::decay::{knee, onset, value_at};
 use wakescope_sim::flow::FinishedWake;
 

@@ -6,7 +6,7 @@ use crate::work_precision::{measure, picture, table};
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let quick = context.profile == Profile::Quick;
-    let rows = measure(quick)?;
+    let rows = measure(None, quick)?;
     let origin = context.provenance_of_formula(&format!("profile = \"{}\"\nthreads = 1\n", context.profile.name()));
     let mut out = Rendered::new(&table(&rows), &picture(&rows), &origin)?;
     out.caption = format!(

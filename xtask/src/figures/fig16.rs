@@ -6,7 +6,7 @@ use fixtures::extreme::rows;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let rows = rows(|_, case| !(case.long && context.profile == Profile::Quick));
-    let origin = context.provenance_of_formula(&format!("profile = \"{}\"\n", context.profile.name()));
+    let origin = context.provenance_of_run();
     let mut out = Rendered::new(&stability::table(&rows), &stability::picture(&rows), &origin)?;
     let missed: Vec<&str> = rows.iter().filter(|row| !row.ended.passes).map(|row| row.case.name).collect();
     out.caption = format!(

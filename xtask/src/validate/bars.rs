@@ -4,8 +4,8 @@
 use super::Shown;
 use super::runs::{Curve, MULTISCALE, apart, plane, relative, run, stored_curve, worst};
 use crate::claim::Claim;
-use crate::references::numbers;
 use crate::wakes::mean;
+use crate::workspace::numbers;
 use fixtures::failure::Failure;
 use std::f64::consts::TAU;
 use std::path::Path;

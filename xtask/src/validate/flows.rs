@@ -4,8 +4,7 @@
 use super::Shown;
 use crate::claim::Claim;
 use crate::profile::Profile;
-use crate::references::{numbers, parabola_vertex};
-use crate::workspace::read;
+use crate::workspace::{numbers, read};
 use fixtures::failure::Failure;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use wakescope_les::analysis::decay::value_at;
@@ -377,4 +376,23 @@ pub(super) fn channel() -> Result<Shown, Failure> {
         .with(Series::new("48 x 48 x 64, multiscale model", Style::Line, profile))
         .with(Series::new("Moser, Kim and Mansour", Style::Markers, stored));
     Ok(Shown { checks, table, figure: Figure::stacked([plot]) })
+}
+
+/// The extremum of the parabola through three points.
+fn parabola_vertex([a, b, c]: [(f64, f64); 3]) -> (f64, f64) {
+    let (left, right) = ((b.1 - a.1) / (b.0 - a.0), (c.1 - b.1) / (c.0 - b.0));
+    let bend = (right - left) / (c.0 - a.0);
+    let x = 0.5 * (a.0 + b.0) - left / (2.0 * bend);
+    (x, a.1 + left * (x - a.0) + bend * (x - a.0) * (x - b.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_vertex_of_a_parabola_is_found_from_uneven_points() {
+        let (x, y) = parabola_vertex([0.0, 1.0, 4.0].map(|x: f64| (x, 3.0 - 2.0 * (x - 1.5).powi(2))));
+        assert!((x - 1.5).abs() < 1e-12 && (y - 3.0).abs() < 1e-12);
+    }
 }

@@ -5,7 +5,7 @@ use super::flows::advance;
 use super::runs::{Curve, apart, relative, run, stored_curve, worst};
 use crate::claim::Claim;
 use crate::profile::Profile;
-use crate::references::numbers;
+use crate::workspace::numbers;
 use fixtures::failure::Failure;
 use std::f64::consts::TAU;
 use wakescope_les::CirculationProfile;
