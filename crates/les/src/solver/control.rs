@@ -2,7 +2,7 @@
 
 use super::flow::Flow;
 use super::mesh::Mesh;
-use super::settings::{FlowSettings, TimeStep, ViscousTreatment};
+use super::settings::{FlowSettings, TimeStep};
 use crate::Error;
 
 /// Largest symbol of the Laplacian times the square of the spacing.
@@ -35,11 +35,7 @@ pub(super) fn metrics(mesh: &Mesh) -> [Vec<f64>; 3] {
 /// Along which of x, y, z viscosity is implicit in a flow whose largest `sum |u_i|/h_i` is `courant_per_s` at first.
 pub(super) fn implicit_axes(mesh: &Mesh, settings: &FlowSettings, courant_per_s: f64) -> [bool; 3] {
     let (nu, step_s) = (settings.viscosity_m2_s, settings.time_step.step_s(courant_per_s));
-    match settings.viscous {
-        _ if nu == 0.0 => [false; 3],
-        ViscousTreatment::Implicit(directions) => directions,
-        ViscousTreatment::Auto => metrics(mesh).map(|m| m.len() > 1 && step_s * decay_per_s(&m, nu) > IMPLICIT_SHARE),
-    }
+    metrics(mesh).map(|m| m.len() > 1 && step_s * decay_per_s(&m, nu) > IMPLICIT_SHARE)
 }
 
 /// The two largest decay rates of viscosity along implicit axes \[1/s\].

@@ -17,7 +17,7 @@ use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
 use super::momentum::{Momentum, Scratch, add_laplacian_row};
 use super::pressure::{self, PressureSolver, Solved};
-use super::projection::{Divergence, correct, divide_by_volume, weighted_dot};
+use super::projection::{Divergence, correct, weighted_dot};
 use super::report::{StartReport, StepReport};
 use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
 use super::slabs::WHOLE;
@@ -66,8 +66,6 @@ pub(crate) struct State {
 struct Work {
     star: [Aligned; 3],
     phi: Aligned,
-    /// Weighted divergence, kept for the rotational form.
-    divergence: Aligned,
 }
 
 impl Flow {
@@ -81,17 +79,21 @@ impl Flow {
         settings: FlowSettings,
         initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
     ) -> Result<(Self, StartReport), Error> {
-        let mut flow = Self::at_rest(mesh, settings)?;
+        Self::at_rest(mesh, settings)?.filled(initial)
+    }
+
+    /// Starts from `initial`.
+    fn filled(mut self, initial: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Result<(Self, StartReport), Error> {
         for axis in 0..3 {
-            let layout = &flow.layout;
+            let layout = &self.layout;
             let direction = layout.direction;
             let position: [Vec<f64>; 3] = std::array::from_fn(|b| {
                 let d = direction[b];
-                if b == axis { flow.mesh.face_m(d) } else { flow.mesh.centre_m(d) }
+                if b == axis { self.mesh.face_m(d) } else { self.mesh.centre_m(d) }
             });
             let (n0, shape) = (layout.shape.n[0], layout.shape);
             let first = layout.line[axis].first_face();
-            let own = &mut flow.state.velocity[axis][shape.own_places()];
+            let own = &mut self.state.velocity[axis][shape.own_places()];
             own.par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
                 for (place, value) in plane.iter_mut().enumerate() {
                     let index = [place % n0, place / n0, k];
@@ -103,15 +105,20 @@ impl Flow {
                 }
             });
         }
-        let report = flow.start()?;
-        Ok((flow, report))
+        let report = self.start()?;
+        Ok((self, report))
     }
 
     /// All arrays zero; nothing projected yet.
     pub(crate) fn at_rest(mesh: Mesh, settings: FlowSettings) -> Result<Self, Error> {
+        let layout = Layout::on(&mesh, settings.ranks.clone())?;
+        Self::laid_out(mesh, settings, layout)
+    }
+
+    /// The same with the memory axes of a layout.
+    fn laid_out(mesh: Mesh, settings: FlowSettings, layout: Layout) -> Result<Self, Error> {
         settings.check()?;
         refuse_sticking_without_viscosity(&mesh, settings.viscosity_m2_s)?;
-        let layout = Layout::on(&mesh, settings.memory_order, settings.ranks.clone())?;
         let n = layout.shape.len();
         let field = || Aligned::zeros(n);
         let fields = || [field(), field(), field()];
@@ -126,14 +133,13 @@ impl Flow {
             energy: 0.0,
             implicit: [false; 3],
         };
-        let divergence = if settings.rotational { field() } else { Aligned::default() };
         Ok(Self {
             ops: std::array::from_fn(|axis| Momentum::new(&layout, axis)),
             divergence: Divergence::new(&layout),
             pressure_solver: pressure::build(&layout, settings.pressure)?,
             model: Subgrid::new(&layout, settings.subgrid)?,
             line_solvers: Vec::new(),
-            work: Work { star: fields(), phi: field(), divergence },
+            work: Work { star: fields(), phi: field() },
             mesh,
             settings,
             layout,
@@ -214,7 +220,7 @@ impl Flow {
             powers.get_or_insert(found);
             self.solve_lines(stage_s * self.settings.viscosity_m2_s, is_damped)?;
             solved = Some(self.project(stage_s)?);
-            self.update_pressure();
+            self.add_pressure();
         }
         if let Some(terms) = first_terms {
             self.state.history = terms;
@@ -344,24 +350,20 @@ impl Flow {
             self.layout.slabs.halos(&mut [&mut star[*component]], WHOLE)?;
             viscous_increment(&self.layout, &self.ops[*component], (solver.axis, a_m2), &star[*component], phi);
             solver.solve(&self.layout.slabs, &mut phi[own.clone()])?;
-            add_multiple(&mut star[*component], 1.0, phi, self.layout.shape);
+            add(&mut star[*component], phi, self.layout.shape);
         }
         if is_damped {
             return Ok(());
         }
         for (star, velocity) in self.work.star.iter_mut().zip(&self.state.velocity) {
-            add_multiple(&mut star[own.clone()], 1.0, &velocity[own.clone()], self.layout.shape);
+            add(&mut star[own.clone()], &velocity[own.clone()], self.layout.shape);
         }
         Ok(())
     }
 
-    /// (25), or the rotational form.
-    fn update_pressure(&mut self) {
-        add_multiple(&mut self.state.pressure, 1.0, &self.work.phi, self.layout.shape);
-        if self.settings.rotational {
-            let share_m2_s = -0.5 * self.settings.viscosity_m2_s;
-            add_multiple(&mut self.state.pressure, share_m2_s, &self.work.divergence, self.layout.shape);
-        }
+    /// (25).
+    fn add_pressure(&mut self) {
+        add(&mut self.state.pressure, &self.work.phi, self.layout.shape);
     }
 
     /// Kinetic energy of each plane that is owned.
@@ -399,10 +401,24 @@ fn viscous_increment(layout: &Layout, ops: &Momentum, (axis, a_m2): (usize, f64)
     );
 }
 
-/// `to += factor from`, plane by plane.
-fn add_multiple(to: &mut [f64], factor: f64, from: &[f64], shape: Shape) {
+/// `to += from`, plane by plane.
+fn add(to: &mut [f64], from: &[f64], shape: Shape) {
     let planes = to.par_chunks_mut(shape.plane()).zip(from.par_chunks(shape.plane()));
-    planes.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from));
+    planes.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += from));
+}
+
+#[cfg(test)]
+impl Flow {
+    /// As [`Self::new`], with the directions of the memory axes given.
+    pub(crate) fn in_order(
+        direction: [usize; 3],
+        mesh: Mesh,
+        settings: FlowSettings,
+        initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
+    ) -> Result<Self, Error> {
+        let layout = Layout::on_in_order(&mesh, settings.ranks.clone(), direction)?;
+        Self::laid_out(mesh, settings, layout)?.filled(initial).map(|(flow, _)| flow)
+    }
 }
 
 #[cfg(test)]

@@ -89,3 +89,42 @@ fn convection_makes_no_energy_and_no_momentum_on_stretched_meshes_with_and_witho
         }
     }
 }
+
+#[test]
+fn flows_that_do_not_vary_along_x_are_plane_flows_bit_for_bit() {
+    for scheme in [TimeScheme::AdamsBashforth2, TimeScheme::RungeKutta3] {
+        let run = |x: Direction| {
+            let z = Direction::between(16, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST);
+            let y = Direction::periodic(12, 0.0, 1.0).stretched(Mapping::Sine { amplitude: 0.2 });
+            let mesh = Mesh::new(x, y, z.stretched(Mapping::TanhBoth { strength: 1.0 })).unwrap();
+            let mut settings = FlowSettings::new(1e-3, TimeStep::Fixed { step_s: 0.01 });
+            settings.scheme = scheme;
+            let field = |[_, y, z]: [f64; 3]| {
+                [
+                    z * (std::f64::consts::TAU * y).cos(),
+                    (std::f64::consts::TAU * z).sin(),
+                    0.3 * (std::f64::consts::TAU * y).sin(),
+                ]
+            };
+            let mut flow = Flow::in_order([0, 1, 2], mesh, settings, field).unwrap();
+            for _ in 0..4 {
+                flow.step().unwrap();
+            }
+            flow
+        };
+        let plane = run(Direction::thin(0.7));
+        for cells in [4, 8] {
+            let deep = run(Direction::periodic(cells, 0.0, 0.7));
+            for d in 0..3 {
+                let (plane, deep) = (plane.face_velocity_m_s(d), deep.face_velocity_m_s(d));
+                for (place, value) in deep.iter().enumerate() {
+                    let expected = plane[place / cells];
+                    assert!(
+                        value.to_bits() == expected.to_bits(),
+                        "{scheme:?}, {d}, {place}: {value:e} is not {expected:e}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -292,7 +292,6 @@ impl Flow {
 #[cfg(test)]
 mod tests {
     use super::super::mesh::Direction;
-    use super::super::settings::ViscousTreatment;
     use super::*;
 
     const AB2: TimeScheme = TimeScheme::AdamsBashforth2;
@@ -305,10 +304,11 @@ mod tests {
             Mesh::new(Direction::thin(1.0), y, Direction::periodic(4, 0.0, 4.0)).unwrap()
         };
         let mut settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s: courant });
-        settings.viscous = ViscousTreatment::Implicit([false, implicit, implicit]);
         settings.scheme = scheme;
         let wave = std::f64::consts::TAU / cells_per_wave;
-        Flow::new(mesh(), settings, |[_, y, _]| [1e-3 * (wave * y).cos(), 1.0, 0.0]).unwrap().0
+        let mut flow = Flow::new(mesh(), settings, |[_, y, _]| [1e-3 * (wave * y).cos(), 1.0, 0.0]).unwrap().0;
+        flow.state.implicit = flow.layout.direction.map(|d| d > 0 && implicit);
+        flow
     }
 
     /// Growth of the energy of such a wave per second, and what is said of it.

@@ -180,7 +180,7 @@ mod tests {
         ];
         for shift in 0..3 {
             let d = |i: usize| kinds[(i + shift) % 3].clone();
-            let layout = Layout::new(&Mesh::new(d(0), d(1), d(2)).unwrap(), None);
+            let layout = Layout::new(&Mesh::new(d(0), d(1), d(2)).unwrap());
             let shape = layout.shape;
             let [nx, ny, _] = shape.n;
             for component in 0..3 {

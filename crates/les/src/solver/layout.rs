@@ -30,21 +30,31 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// The operators of `mesh` in one process, with the memory axes in the order `direction`, or in the best one.
-    pub(crate) fn new(mesh: &Mesh, direction: Option<[usize; 3]>) -> Self {
-        let direction = order(mesh, direction);
+    /// The operators of `mesh` in one process, with the memory axes in the best order.
+    pub(crate) fn new(mesh: &Mesh) -> Self {
+        Self::in_order(mesh, order(mesh))
+    }
+
+    /// The same with the directions of the memory axes given.
+    pub(crate) fn in_order(mesh: &Mesh, direction: [usize; 3]) -> Self {
         let shape = Shape::whole(direction.map(|d| mesh.cells()[d]));
         Self::of(mesh, direction, Slabs { ranks: Arc::new(Timed::new(Arc::new(Single))), shape })
     }
 
-    /// The same of one of several ranks.
+    /// The operators of one of several ranks.
     ///
     /// # Errors
     /// [`Error::TooManyRanks`].
-    pub(crate) fn on(mesh: &Mesh, direction: Option<[usize; 3]>, ranks: Arc<dyn Ranks>) -> Result<Self, Error> {
-        let direction = order(mesh, direction);
-        let slabs = Slabs::new(ranks, direction.map(|d| mesh.cells()[d]))?;
-        Ok(Self::of(mesh, direction, slabs))
+    pub(crate) fn on(mesh: &Mesh, ranks: Arc<dyn Ranks>) -> Result<Self, Error> {
+        Self::on_in_order(mesh, ranks, order(mesh))
+    }
+
+    /// The same with the directions of the memory axes given.
+    ///
+    /// # Errors
+    /// As [`Self::on`].
+    pub(crate) fn on_in_order(mesh: &Mesh, ranks: Arc<dyn Ranks>, direction: [usize; 3]) -> Result<Self, Error> {
+        Ok(Self::of(mesh, direction, Slabs::new(ranks, direction.map(|d| mesh.cells()[d]))?))
     }
 
     fn of(mesh: &Mesh, direction: [usize; 3], slabs: Slabs) -> Self {
@@ -70,14 +80,14 @@ impl Layout {
     }
 }
 
-/// The order of the directions in memory: that asked for, or the best one.
-fn order(mesh: &Mesh, asked: Option<[usize; 3]>) -> [usize; 3] {
-    asked.unwrap_or(match mesh.cells() {
+/// The best order of the directions in memory.
+fn order(mesh: &Mesh) -> [usize; 3] {
+    match mesh.cells() {
         [1, ny, nz] if ny > 1 && ny >= nz => [1, 0, 2],
         [1, _, nz] if nz > 1 => [2, 0, 1],
         [nx, ny, _] if ny > nx && Operators1d::new(&mesh.directions()[1]).is_fourier() => [1, 0, 2],
         _ => [0, 1, 2],
-    })
+    }
 }
 
 #[cfg(test)]
@@ -88,12 +98,12 @@ mod tests {
     #[test]
     fn rows_are_long_where_that_costs_no_transform() {
         let d = |n| Direction::periodic(n, 0.0, 1.0);
-        let order = |nx, ny, nz| Layout::new(&Mesh::new(d(nx), d(ny), d(nz)).unwrap(), None).direction;
+        let order = |nx, ny, nz| Layout::new(&Mesh::new(d(nx), d(ny), d(nz)).unwrap()).direction;
         assert_eq!(order(8, 16, 32), [1, 0, 2]);
         assert_eq!(order(16, 16, 32), [0, 1, 2]);
         let sine = d(16).stretched(Mapping::Sine { amplitude: 0.3 });
         for y in [Direction::between(16, 0.0, 1.0, Wall::Slip, Wall::Slip), sine] {
-            assert_eq!(Layout::new(&Mesh::new(d(8), y, d(32)).unwrap(), None).direction, [0, 1, 2]);
+            assert_eq!(Layout::new(&Mesh::new(d(8), y, d(32)).unwrap()).direction, [0, 1, 2]);
         }
         assert_eq!(order(1, 64, 32), [1, 0, 2]);
         assert_eq!(order(1, 32, 64), [2, 0, 1]);

@@ -64,10 +64,9 @@ mod tests {
             [slip(5), closed(18), waves(5)],
             [Direction::thin(1.0), sine(12), ground(18)],
         ];
-        let orders = [None, Some([2, 1, 0])];
         let both = |[x, y, z]: [Direction; 3]| {
             let mesh = Mesh::new(x, y, z).unwrap();
-            orders.map(|order| Layout::new(&mesh, order))
+            [Layout::new(&mesh), Layout::in_order(&mesh, [2, 1, 0])]
         };
         meshes.into_iter().flat_map(both).collect()
     }

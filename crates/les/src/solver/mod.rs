@@ -47,5 +47,5 @@ pub use run::{
     CheckpointPlan, EnergyBudget, Interval, NOTICED_GROWTH, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent,
     StepEnergy, StepRecord, Stepping,
 };
-pub use settings::{FlowSettings, TimeScheme, TimeStep, ViscousTreatment};
+pub use settings::{FlowSettings, TimeScheme, TimeStep};
 pub use subgrid::SubgridModel;

@@ -119,8 +119,8 @@ mod tests {
             let field = |[x, y, z]: [f64; 3]| [(7.0 * x + z).sin(), (5.0 * y - x).cos(), (3.0 * z + 2.0 * y).sin()];
             let start = |ranks, order| {
                 let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
-                let settings = FlowSettings { memory_order: Some(order), ranks, ..settings };
-                Flow::new(mesh.clone(), settings, field).unwrap().0
+                let settings = FlowSettings { ranks, ..settings };
+                Flow::in_order(order, mesh.clone(), settings, field).unwrap()
             };
             for &order in orders {
                 let alone = start(std::sync::Arc::new(crate::ranks::Single), order);

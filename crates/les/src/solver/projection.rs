@@ -101,21 +101,6 @@ fn divergence_row(
     ops.columns.add(out, padded);
 }
 
-/// `scale` times a weighted field over the masses of the cells.
-pub(super) fn divide_by_volume(layout: &Layout, scale: f64, field: &mut [f64]) {
-    let shape = layout.shape;
-    let mass: [&[f64]; 3] = std::array::from_fn(|b| layout.line[b].cell_mass_m.as_slice());
-    let planes = field[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
-    planes.for_each(|(plane, k)| {
-        for (j, row) in plane.chunks_mut(shape.n[0]).enumerate() {
-            let factor = scale / (mass[1][j] * mass[2][k]);
-            for (value, mass) in row.iter_mut().zip(mass[0]) {
-                *value *= factor / mass;
-            }
-        }
-    });
-}
-
 /// `1/h` at the stored faces of each axis \[1/m\]; zero where the flow cannot vary.
 fn inverse_metrics(layout: &Layout) -> [Vec<f64>; 3] {
     std::array::from_fn(|a| {

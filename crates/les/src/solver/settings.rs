@@ -106,18 +106,8 @@ impl TimeStep {
     }
 }
 
-/// Along which directions viscosity is implicit (Crank-Nicolson with line solves). The others are integrated as
-/// convection is, which costs no line solve but limits the time step.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum ViscousTreatment {
-    /// Implicit along the directions in which the first time step exceeds a tenth of the explicit limit.
-    #[default]
-    Auto,
-    /// Implicit along x, y, z where true.
-    Implicit([bool; 3]),
-}
-
-/// The physical and numerical settings of a [`Flow`](super::Flow).
+/// The physical and numerical settings of a [`Flow`](super::Flow). Viscosity is implicit (Crank-Nicolson with line solves) along the
+/// directions in which the first time step exceeds a tenth of the explicit limit, and integrated as convection is along the others.
 #[derive(Debug, Clone)]
 pub struct FlowSettings {
     /// Kinematic viscosity \[m^2/s\]; zero is allowed between slip walls.
@@ -128,8 +118,6 @@ pub struct FlowSettings {
     pub scheme: TimeScheme,
     /// Length of the time step.
     pub time_step: TimeStep,
-    /// Directions of implicit viscosity.
-    pub viscous: ViscousTreatment,
     /// Number of first steps in which viscosity is backward Euler instead of Crank-Nicolson (Rannacher 1984). Crank-Nicolson
     /// keeps the wiggles of an impulsive start at a wall for many steps when `nu dt/h^2` is large; four damped steps remove
     /// them and leave the order at two.
@@ -138,14 +126,8 @@ pub struct FlowSettings {
     pub pressure: PressureMethod,
     /// Relative residual at which the pressure equation counts as solved.
     pub pressure_tolerance: f64,
-    /// Rotational form of the pressure update (Timmermans, Minev and Van de Vosse 1996): `p += phi - nu/2 div u*`, which
-    /// removes the numerical boundary layer of the pressure at walls. It takes one more array.
-    pub rotational: bool,
     /// Subgrid model.
     pub subgrid: SubgridModel,
-    /// Order of the directions in memory, slowest last. `None` chooses: x, y, z, but y, x, z where y has more cells than x, all equal
-    /// and periodic, and in plane flows the long direction first. It changes rounding, nothing else.
-    pub memory_order: Option<[usize; 3]>,
     /// The ranks that share the flow; one process unless told otherwise. They change nothing of a result. All ranks must have
     /// the same settings but for their own number, and make the same calls.
     pub ranks: Arc<dyn Ranks>,
@@ -159,13 +141,10 @@ impl FlowSettings {
             force_m_s2: [0.0; 3],
             scheme: TimeScheme::default(),
             time_step,
-            viscous: ViscousTreatment::default(),
             damped_steps: 0,
             pressure: PressureMethod::Auto,
             pressure_tolerance: 1e-10,
-            rotational: false,
             subgrid: SubgridModel::None,
-            memory_order: None,
             ranks: Arc::new(Single),
         }
     }
@@ -177,7 +156,7 @@ impl FlowSettings {
     pub fn validate(&self, mesh: &Mesh) -> Result<(), Error> {
         self.check()?;
         subgrid::check_constants(self.subgrid)?;
-        Layout::on(mesh, self.memory_order, self.ranks.clone())?;
+        Layout::on(mesh, self.ranks.clone())?;
         refuse_sticking_without_viscosity(mesh, self.viscosity_m2_s)
     }
 
@@ -193,13 +172,6 @@ impl FlowSettings {
                 check("courant", courant, "finite and positive", |c| c > 0.0)?;
                 check("longest_s", longest_s, "finite and positive", |dt| dt > 0.0)?;
             }
-        }
-        let order = self.memory_order.unwrap_or([0, 1, 2]);
-        let mut sorted = order;
-        sorted.sort_unstable();
-        if sorted != [0, 1, 2] {
-            let value = order[0] as f64;
-            return Err(Error::OutOfRange { field: "memory_order", value, allowed: "a permutation of 0, 1, 2" });
         }
         Ok(())
     }

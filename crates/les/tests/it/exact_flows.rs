@@ -3,7 +3,6 @@
 use std::f64::consts::{PI, TAU};
 
 use wakescope_les::cases::{self, Case, TollmienSchlichting};
-use wakescope_les::solver::ViscousTreatment;
 use wakescope_les::{Direction, Flow, FlowSettings, Mapping, Mesh, TimeScheme, TimeStep};
 
 fn run(case: &Case, steps: usize) -> Flow {
@@ -142,14 +141,12 @@ fn plane_vortices_converge_with_fourth_order_on_periodic_directions_refined_abou
 #[test]
 fn both_schemes_are_of_second_order_in_time() {
     // Vortices that a mean flow carries along: the convection then has to follow in time.
-    let nu = 0.01;
     let mesh = || {
         Mesh::new(Direction::thin(1.0), Direction::periodic(32, 0.0, 1.0), Direction::periodic(32, 0.0, 1.0)).unwrap()
     };
-    let velocity = |scheme: TimeScheme, steps: usize, implicit: bool| {
+    let velocity = |scheme: TimeScheme, steps: usize, nu: f64| {
         let mut settings = FlowSettings::new(nu, TimeStep::Fixed { step_s: 0.2 / steps as f64 });
         settings.scheme = scheme;
-        settings.viscous = ViscousTreatment::Implicit([implicit; 3]);
         let initial = |at_m: [f64; 3]| {
             let [_, v, w] = cases::taylor_green_plane_exact(at_m, 0.0, nu);
             [0.0, v + 1.0, w + 0.5]
@@ -161,11 +158,12 @@ fn both_schemes_are_of_second_order_in_time() {
         flow.face_velocity_m_s(2)
     };
     let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    for implicit in [false, true] {
+    // Explicit and implicit at all these steps.
+    for nu in [0.003, 0.1] {
         for scheme in [TimeScheme::AdamsBashforth2, TimeScheme::RungeKutta3] {
-            let [coarse, middle, fine] = [40, 80, 160].map(|steps| velocity(scheme, steps, implicit));
+            let [coarse, middle, fine] = [40, 80, 160].map(|steps| velocity(scheme, steps, nu));
             let order = (distance(&coarse, &middle) / distance(&middle, &fine)).log2();
-            assert!(order > 1.9, "{scheme:?}, implicit {implicit}: order {order}");
+            assert!(order > 1.9, "{scheme:?}, viscosity {nu}: order {order}");
         }
     }
 }

@@ -96,38 +96,15 @@ keys! {
         },
     }
 
-    /// A direction of the mesh.
-    choice AxisName {
-        /// Along the flight.
-        X = "x",
-        /// Across it.
-        Y = "y",
-        /// Up.
-        Z = "z",
-    }
 }
-
-/// Directions in the order of their numbers.
-pub(super) const ALL_AXES: [AxisName; 3] = [AxisName::X, AxisName::Y, AxisName::Z];
 
 keys! {
     /// How the equations are solved.
     table Solver {
-        /// Directions of implicit viscosity; chosen by the first time step if absent.
-        implicit_viscosity: Option<Vec<AxisName>> = None,
-        /// Order of the directions in memory, that of neighbours first; ranks share the planes across the last one. Absent: x, y, z, but
-        /// y, x, z where y has more cells than x, all equal and periodic, and in plane flows the long direction first. Another order
-        /// rounds in another way.
-        memory_order: Option<[AxisName; 3]> = None => Is(
-            |order: &Option<[AxisName; 3]>| order.is_none_or(|order| ALL_AXES.iter().all(|axis| order.contains(axis))),
-            "each of \"x\", \"y\", \"z\" once, e.g. [\"x\", \"z\", \"y\"]",
-        ),
         /// How the pressure equation is solved.
         pressure: Pressure = Pressure::Auto,
         /// Relative residual at which it counts as solved.
         pressure_tolerance: f64 = 1e-10 => 1e-15..=0.1,
-        /// Rotational form of the pressure update.
-        rotational: bool = false,
         /// The subgrid model.
         subgrid: Subgrid = Subgrid::None {},
     }

@@ -231,10 +231,9 @@ fn memory_bytes(case: &FlowCase, [cells, whole]: [[usize; 3]; 2], dense: &[usize
     let of_output = |format: &FileFormat| if *format == FileFormat::Csv { CSV_ARRAYS } else { OUTPUT_ARRAYS };
     let outputs = case.output.fields.iter().map(of_output).fold(0.0, f64::max);
     let meter = if matches!(case.case, CaseKind::Wake(_)) { METER_ARRAYS } else { 0.0 };
-    let rotational = f64::from(u8::from(case.solver.rotational));
     // At the start the given field, which every rank has whole; in the first step of Adams-Bashforth its terms; later what is written.
     let later = count(cells) * [FIRST_STEP_ARRAYS, outputs, meter].into_iter().fold(0.0, f64::max);
-    let values = count(cells) * (FLOW_ARRAYS + rotational + model) + f64::max(count(whole) * given, later);
+    let values = count(cells) * (FLOW_ARRAYS + model) + f64::max(count(whole) * given, later);
     8.0 * values + dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>() + PROGRAM_BYTES
 }
 
@@ -243,8 +242,7 @@ fn rank_bytes(case: &FlowCase, setup: &Setup, dense: &[usize]) -> f64 {
     let (whole, ranks) = (setup.mesh.cells(), setup.settings.ranks.count());
     let mut cells = whole;
     if ranks > 1 {
-        let last = setup.settings.memory_order.map_or(2, |order| order[2]);
-        cells[last] = (cells[last].div_ceil(ranks) + 2 * HALO_PLANES).min(cells[last]);
+        cells[2] = (cells[2].div_ceil(ranks) + 2 * HALO_PLANES).min(cells[2]);
     }
     memory_bytes(case, [cells, whole], dense)
 }

@@ -1,10 +1,10 @@
 //! From a case file to the setup of its simulation: the flow, and how the case has it integrated.
 
-use super::case::{ALL_AXES, FlowCase, Pressure, Scheme, Subgrid};
+use super::case::{FlowCase, Pressure, Scheme, Subgrid};
 use super::setup::Setup;
 use crate::Error;
 use std::path::Path;
-use wakescope_les::{SubgridModel, TimeScheme, TimeStep, solver::PressureMethod, solver::ViscousTreatment};
+use wakescope_les::{SubgridModel, TimeScheme, TimeStep, solver::PressureMethod};
 
 impl Setup {
     /// The setup of a case whose file lies in `folder`.
@@ -12,17 +12,12 @@ impl Setup {
         let mut setup = case.case.setup(folder)?;
         let (s, solver) = (&mut setup.settings, &case.solver);
         s.damped_steps = case.time.damped_steps;
-        if let Some(axes) = &solver.implicit_viscosity {
-            s.viscous = ViscousTreatment::Implicit(ALL_AXES.map(|axis| axes.contains(&axis)));
-        }
-        s.memory_order = solver.memory_order.map(|order| order.map(|axis| axis as usize));
         s.pressure = match solver.pressure {
             Pressure::Auto => PressureMethod::Auto,
             Pressure::Direct => PressureMethod::Direct,
             Pressure::Multigrid => PressureMethod::Multigrid,
         };
         s.pressure_tolerance = solver.pressure_tolerance;
-        s.rotational = solver.rotational;
         s.subgrid = subgrid(solver.subgrid);
         match case.time.scheme {
             Some(Scheme::AdamsBashforth2) => setup.integrate(case, TimeScheme::AdamsBashforth2),

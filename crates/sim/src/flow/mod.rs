@@ -29,7 +29,7 @@ mod text;
 mod wake;
 mod writer;
 
-pub use case::{AxisName, Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time};
+pub use case::{Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time};
 pub use examples::{EXAMPLES, example};
 pub use execute::{RunOptions, check, check_on, run, run_on, run_with};
 pub use forecast::{FileForecast, FlowForecast};

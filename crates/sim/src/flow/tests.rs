@@ -336,10 +336,7 @@ fn wrong_cases_are_refused_with_key_value_and_what_is_allowed() {
         (dipole("[time]\nstep_s = 0.1\ncourant = 0.3\n"), ["time.step_s = 0.1", "absent"]),
         (dipole("[time]\nscheme = \"euler\"\n"), ["euler", "adams_bashforth2"]),
         (dipole("[solver]\npressure_tolerance = 2.0\n"), ["case.toml:4: solver.pressure_tolerance", "1e-15 to 0.1"]),
-        (
-            dipole("[solver]\nmemory_order = [\"x\", \"x\", \"z\"]\n"),
-            ["case.toml:4: solver.memory_order", "[\"x\", \"z\", \"y\"]"],
-        ),
+        (dipole("[solver]\nrotational = true\n"), ["case.toml:4: solver.rotational", "no such key"]),
         (dipole("[solver]\nsubgrid = { model = \"magic\" }\n"), ["magic", "multiscale_wale"]),
         (dipole("[output]\ntimes_s = [0.2, 0.1]\n"), ["output.times_s", "increasing"]),
         (dipole("[output]\nplanes = [\"initial_netcdf\"]\n"), ["output.planes", "whole field"]),

@@ -3,7 +3,7 @@
 //! A file holds the state (velocity, the terms of the step before, pressure, time, step lengths, implicit directions), what
 //! mesh and settings it belongs to, and bytes of the caller. It is versioned, has a checksum for each plane and is put in place by
 //! renaming. Each rank writes and reads its own planes.
-//! Mesh, walls, viscosity, force, scheme, viscous treatment, form of the pressure update, subgrid model and memory order must
+//! Mesh, walls, viscosity, force, scheme, subgrid model and memory order must
 //! be the same to continue; time step, pressure method and tolerance may be changed.
 //!
 //! Check: restarts of every scheme against uninterrupted runs bit for bit; damaged, foreign and unfitting files.
@@ -23,7 +23,7 @@ use container::{Content, Planes, Reader, Tag};
 
 /// Version of the content. Raise it with every change of the sections, of the texts in [`identity`], or of what a run keeps
 /// beside the flow.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 const IDENTITY: &Tag = b"IDENTITY";
 const METRICS: [&Tag; 3] = [b"METRIC X", b"METRIC Y", b"METRIC Z"];
@@ -103,7 +103,7 @@ impl Flow {
     pub fn restore(path: impl AsRef<Path>, mesh: Mesh, settings: FlowSettings) -> Result<(Self, Vec<u8>), Error> {
         let read = Self::read(path.as_ref(), &mesh, &settings);
         // The ranks that share the flow must agree on that, too.
-        let (mut flow, user_data) = Layout::on(&mesh, settings.memory_order, settings.ranks)?.slabs.agree(read)?;
+        let (mut flow, user_data) = Layout::on(&mesh, settings.ranks)?.slabs.agree(read)?;
         let [u, v, w] = flow.state.velocity.each_mut().map(Aligned::as_mut_slice);
         flow.layout.slabs.halos(&mut [u, v, w, &mut flow.state.pressure], WHOLE)?;
         Ok((flow, user_data))
@@ -114,7 +114,7 @@ impl Flow {
         let mut file = Reader::open(path, VERSION)?;
         let text = file.bytes(IDENTITY)?;
         let Ok(text) = std::str::from_utf8(&text) else { return Err(file.damaged("its properties are no text")) };
-        let wanted = identity(mesh, settings, &Layout::new(mesh, settings.memory_order));
+        let wanted = identity(mesh, settings, &Layout::new(mesh));
         compare_identity(path, text, &wanted)?;
         for (axis, tag) in METRICS.iter().enumerate() {
             let direction = &mesh.directions()[axis];
@@ -166,8 +166,6 @@ fn identity(mesh: &Mesh, settings: &FlowSettings, layout: &Layout) -> Vec<(Strin
     add("viscosity_m2_s", format!("{:?}", settings.viscosity_m2_s));
     add("force_m_s2", format!("{:?}", settings.force_m_s2));
     add("the time scheme", format!("{:?}", settings.scheme));
-    add("the viscous treatment", format!("{:?}", settings.viscous));
-    add("the rotational pressure update", settings.rotational.to_string());
     add("the subgrid model", format!("{:?}", settings.subgrid));
     add("the order of the directions in memory", format!("{:?}", layout.direction));
     list

@@ -7,7 +7,7 @@
 //!
 //! Check: divergence right after the start on strongly stretched meshes and flat cells; steps in a long domain.
 
-use super::{Flow, Solved, add_multiple, correct, divide_by_volume};
+use super::{Flow, Solved, add, correct};
 use crate::error::{Error, PressureFailure};
 use crate::solver::aligned::Aligned;
 use crate::solver::pressure::norm;
@@ -30,12 +30,6 @@ impl Flow {
         self.layout.slabs.halos(&mut [&mut self.work.star[2]], self.divergence.reach)?;
         let star = self.work.star.each_ref().map(Aligned::as_slice);
         self.divergence.apply(star, 1.0 / stage_s, &mut self.work.phi);
-        if self.settings.rotational {
-            self.work.divergence.copy_from_slice(&self.work.phi);
-            // The pressure takes the plain divergence of u*.
-            divide_by_volume(&self.layout, stage_s, &mut self.work.divergence);
-            self.layout.slabs.halos(&mut [&mut self.work.divergence], WHOLE)?;
-        }
         let tolerance = self.settings.pressure_tolerance;
         let solved = self.pressure_solver.solve(&mut self.work.phi, tolerance);
         let phi = std::mem::take(&mut self.work.phi);
@@ -82,7 +76,7 @@ impl Flow {
             }
             std::mem::swap(&mut self.work.star, &mut self.state.velocity);
             self.correct(stage_s, &rest)?;
-            add_multiple(&mut self.work.phi, 1.0, &rest, self.layout.shape);
+            add(&mut self.work.phi, &rest, self.layout.shape);
         }
         Ok(last)
     }

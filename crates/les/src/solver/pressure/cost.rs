@@ -11,7 +11,7 @@ impl PressureMethod {
     /// Cells of the directions that this method transforms by products with a dense matrix on `mesh`: a matrix of `n` x `n` takes
     /// the time of `n^3` to find, and its products that of `n` per cell and solve.
     pub fn dense_directions(self, mesh: &Mesh) -> Vec<usize> {
-        let layout = Layout::new(mesh, None);
+        let layout = Layout::new(mesh);
         let mut dense = if self.takes_multigrid(&layout) { Vec::new() } else { direct::dense_axes(&layout) };
         if RowTransform::is_dense(&layout.line[0]) {
             dense.push(0);
@@ -21,7 +21,7 @@ impl PressureMethod {
 
     /// Whether this method solves the planes of `mesh` by multigrid, in passes over all cells.
     pub fn is_multigrid(self, mesh: &Mesh) -> bool {
-        self.takes_multigrid(&Layout::new(mesh, None))
+        self.takes_multigrid(&Layout::new(mesh))
     }
 
     fn takes_multigrid(self, layout: &Layout) -> bool {
@@ -52,7 +52,7 @@ mod tests {
             let mesh = Mesh::new(x, y, z).unwrap();
             for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
                 let dense = method.dense_directions(&mesh);
-                let named = super::super::build(&Layout::new(&mesh, None), method).unwrap().describe();
+                let named = super::super::build(&Layout::new(&mesh), method).unwrap().describe();
                 assert_eq!(named.matches("dense").count(), dense.len(), "{dense:?}: {named}");
                 assert_eq!(named.contains("multigrid"), method.is_multigrid(&mesh), "{named}");
                 assert!(dense.iter().all(|n| mesh.cells().contains(n)));

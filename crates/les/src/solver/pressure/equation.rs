@@ -45,7 +45,7 @@ impl PressureEquation {
     pub fn new(mesh: &Mesh, method: PressureMethod) -> Result<Self, Error> {
         // With one cell in x, `[z][y][x]` has y contiguous.
         let order = if mesh.cells()[0] == 1 { [1, 2, 0] } else { [0, 1, 2] };
-        let layout = Layout::new(mesh, Some(order));
+        let layout = Layout::in_order(mesh, order);
         Ok(Self { operator: Operator::new(&layout), solver: build(&layout, method)?, layout })
     }
 

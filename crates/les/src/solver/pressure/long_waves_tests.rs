@@ -13,7 +13,7 @@ fn slip(cells: usize, length_m: f64) -> Direction {
 }
 
 fn layout([x, y, z]: [Direction; 3]) -> Layout {
-    Layout::new(&Mesh::new(x, y, z).unwrap(), None)
+    Layout::new(&Mesh::new(x, y, z).unwrap())
 }
 
 /// A balanced right side from a divergence at the places of the cells, as fractions of the three lengths.

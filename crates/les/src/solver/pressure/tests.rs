@@ -119,7 +119,7 @@ fn meshes() -> Vec<(&'static str, [Direction; 3], f64)> {
 }
 
 fn layout([x, y, z]: [Direction; 3]) -> Layout {
-    Layout::new(&Mesh::new(x, y, z).unwrap(), None)
+    Layout::new(&Mesh::new(x, y, z).unwrap())
 }
 
 fn mean_of(layout: &Layout, phi: &[f64]) -> f64 {

@@ -274,7 +274,7 @@ mod tests {
             Direction::periodic(10, 0.0, 1.0),
             Direction::periodic(12, 0.0, 1.0),
         );
-        let layout = Layout::new(&mesh.unwrap(), Some([0, 1, 2]));
+        let layout = Layout::in_order(&mesh.unwrap(), [0, 1, 2]);
         for order in 1..=HIGHEST_ORDER {
             for waves in [[1, 0, 0], [0, 3, 0], [0, 0, 6], [5, 2, 3], [12, 0, 1]] {
                 let theta: [f64; 3] =

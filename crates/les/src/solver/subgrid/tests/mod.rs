@@ -26,7 +26,7 @@ impl Modelled {
         let [x, y, z] = directions;
         let mesh = Mesh::new(x, y, z).unwrap();
         // The memory axes are x, y, z, so that a test can name them.
-        let layout = Layout::new(&mesh, Some([0, 1, 2]));
+        let layout = Layout::in_order(&mesh, [0, 1, 2]);
         let velocity = faces(&mesh, &layout, field);
         let model = Subgrid::new(&layout, model).unwrap().unwrap();
         let field = || Aligned::zeros(layout.shape.len());
@@ -174,7 +174,7 @@ fn waves(seed: f64, shortest: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
 #[test]
 fn models_that_are_absent_or_wrong_are_told_apart() {
     let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), Direction::periodic(4, 0.0, 1.0)).unwrap();
-    let layout = Layout::new(&mesh, None);
+    let layout = Layout::new(&mesh);
     assert!(Subgrid::new(&layout, SubgridModel::None).unwrap().is_none());
     for bad in [0.0, -0.1, f64::NAN] {
         let message = Subgrid::new(&layout, SubgridModel::Wale { constant: bad }).unwrap_err().to_string();
