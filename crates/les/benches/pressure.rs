@@ -43,7 +43,7 @@ fn solve(
     strength: Option<f64>,
     (method, tolerance): (PressureMethod, f64),
 ) -> Result<(), Error> {
-    let mut equation = PressureEquation::new(&mesh(cells, strength)?, method)?;
+    let mut equation = PressureEquation::new(&mesh(cells, strength)?, method);
     let right = right_side(&equation, cells)?;
     let mut field = right.clone();
     let name = format!("{method:?} to {tolerance:.0e}, {cells:?} stretched by {:.0}", strength.unwrap_or(0.0));

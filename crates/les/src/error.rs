@@ -269,7 +269,7 @@ pub enum Error {
     /// The pressure equation was not solved to the tolerance asked for.
     #[error(
         "the {method} did not reach the tolerance {tolerance:.1e} of the pressure equation: {reason}; \
-         relative residuals after each pass: {}",
+         relative residuals after each solve: {}",
         listed(history)
     )]
     PressureNotSolved {
@@ -279,7 +279,9 @@ pub enum Error {
         tolerance: f64,
         /// Why it went no further.
         reason: PressureFailure,
-        /// Relative residual after each pass or iteration.
+        /// Iterations of multigrid; 0 of the direct solver.
+        iterations: usize,
+        /// Relative residual after each solve.
         history: Vec<f64>,
     },
     /// More ranks than a flow can be shared among.

@@ -166,7 +166,12 @@ impl Flow {
         settings: FlowSettings,
         velocity_m_s: [&[f64]; 3],
     ) -> Result<(Self, super::StartReport), Error> {
-        let mut flow = Self::at_rest(mesh, settings)?;
+        Self::at_rest(mesh, settings)?.with_faces(velocity_m_s)
+    }
+
+    /// Starts from these velocities.
+    pub(super) fn with_faces(mut self, velocity_m_s: [&[f64]; 3]) -> Result<(Self, super::StartReport), Error> {
+        let flow = &mut self;
         let cells = Shape::whole(flow.layout.shape.n).len();
         for (direction, values) in velocity_m_s.into_iter().enumerate() {
             if values.len() != cells {
@@ -184,8 +189,8 @@ impl Flow {
             }
             flow.layout.slabs.take_own(&field, &mut flow.state.velocity[axis]);
         }
-        let report = flow.start()?;
-        Ok((flow, report))
+        let report = self.start()?;
+        Ok((self, report))
     }
 }
 

@@ -16,7 +16,7 @@ use super::implicit::LineSolver;
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
 use super::momentum::{Momentum, Scratch, add_laplacian_row};
-use super::pressure::{self, PressureSolver, Solved};
+use super::pressure::{PressureSolver, Solved};
 use super::projection::{Divergence, correct, weighted_dot};
 use super::report::{StartReport, StepReport};
 use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
@@ -38,7 +38,7 @@ pub struct Flow {
     pub(crate) layout: Layout,
     ops: [Momentum; 3],
     pub(super) divergence: Divergence,
-    pressure_solver: Box<dyn PressureSolver>,
+    pressure_solver: PressureSolver,
     pub(super) model: Option<Subgrid>,
     line_solvers: Vec<(f64, Vec<(usize, LineSolver)>)>,
     work: Work,
@@ -136,7 +136,7 @@ impl Flow {
         Ok(Self {
             ops: std::array::from_fn(|axis| Momentum::new(&layout, axis)),
             divergence: Divergence::new(&layout),
-            pressure_solver: pressure::build(&layout, settings.pressure)?,
+            pressure_solver: PressureSolver::new(&layout, settings.pressure),
             model: Subgrid::new(&layout, settings.subgrid)?,
             line_solvers: Vec::new(),
             work: Work { star: fields(), phi: field() },
@@ -414,10 +414,15 @@ impl Flow {
         direction: [usize; 3],
         mesh: Mesh,
         settings: FlowSettings,
-        initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
+        initial: &super::cases::Initial,
     ) -> Result<Self, Error> {
         let layout = Layout::on_in_order(&mesh, settings.ranks.clone(), direction)?;
-        Self::laid_out(mesh, settings, layout)?.filled(initial).map(|(flow, _)| flow)
+        let flow = Self::laid_out(mesh, settings, layout)?;
+        let started = match initial {
+            super::cases::Initial::Field(field) => flow.filled(field),
+            super::cases::Initial::Faces(faces) => flow.with_faces(faces.each_ref().map(Vec::as_slice)),
+        };
+        started.map(|(flow, _)| flow)
     }
 }
 

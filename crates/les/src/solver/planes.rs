@@ -102,7 +102,7 @@ fn in_planes(layout: &Layout, shown: Shape, field: &[f64]) -> Result<Vec<f64>, E
 
 #[cfg(test)]
 mod tests {
-    use super::super::cases::taylor_green_3d;
+    use super::super::cases::{Initial, taylor_green_3d};
     use super::super::mesh::{Direction, Mesh};
     use super::super::settings::{FlowSettings, TimeStep};
     use super::*;
@@ -120,7 +120,7 @@ mod tests {
             let start = |ranks, order| {
                 let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
                 let settings = FlowSettings { ranks, ..settings };
-                Flow::in_order(order, mesh.clone(), settings, field).unwrap()
+                Flow::in_order(order, mesh.clone(), settings, &Initial::Field(Box::new(field))).unwrap()
             };
             for &order in orders {
                 let alone = start(std::sync::Arc::new(crate::ranks::Single), order);

@@ -193,11 +193,10 @@ fn records_scale_with_the_pair() {
 fn records_on_ranks_have_the_bits_of_one_process_in_every_order_in_memory() {
     let pair = VortexPairCase { cells: [10, 32, 29], perturbation: 0.1, ..VortexPairCase::coarse() };
     let case = pair.case(TimeStep::Courant { courant: 0.65, longest_s: 0.1 }).unwrap();
-    let crate::solver::cases::Initial::Field(initial) = &case.initial else { panic!("a formula") };
     for (order, counts) in [([0, 1, 2], &[2, 5, 7][..]), ([0, 2, 1], &[3, 8]), ([1, 2, 0], &[2])] {
         let records = |ranks: Arc<dyn Ranks>| {
             let settings = FlowSettings { ranks, ..case.settings.clone() };
-            let mut flow = Flow::in_order(order, case.mesh.clone(), settings, initial)?;
+            let mut flow = Flow::in_order(order, case.mesh.clone(), settings, &case.initial)?;
             let mut meter = meter(&flow);
             let first = meter.measure(&flow)?;
             flow.step()?;

@@ -36,7 +36,7 @@ impl Flow {
         let corrected = self.correct(stage_s, &phi);
         self.work.phi = phi;
         corrected?;
-        let Err(Error::PressureNotSolved { reason, history, .. }) = &solved else { return solved };
+        let Err(Error::PressureNotSolved { reason, iterations, history, .. }) = &solved else { return solved };
         match reason {
             PressureFailure::RoundOff { .. } => {
                 let mut right = Aligned::zeros(self.layout.shape.len());
@@ -48,7 +48,12 @@ impl Flow {
                 if left > tolerance * size && self.measure_divergence()? > tolerance {
                     return solved;
                 }
-                Ok(Solved { residual: left / size, iterations: history.len(), factor: None, imbalance: 0.0 })
+                Ok(Solved {
+                    residual: left / size,
+                    iterations: (*iterations).max(history.len()),
+                    factor: None,
+                    imbalance: 0.0,
+                })
             }
             // The step names the place where the velocity is not finite.
             PressureFailure::NotFinite => {

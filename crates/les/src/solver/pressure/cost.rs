@@ -24,7 +24,7 @@ impl PressureMethod {
         self.takes_multigrid(&Layout::new(mesh))
     }
 
-    fn takes_multigrid(self, layout: &Layout) -> bool {
+    pub(super) fn takes_multigrid(self, layout: &Layout) -> bool {
         match self {
             Self::Auto => direct::dense_cells(layout) > DENSE_LIMIT,
             Self::Direct => false,
@@ -52,7 +52,7 @@ mod tests {
             let mesh = Mesh::new(x, y, z).unwrap();
             for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
                 let dense = method.dense_directions(&mesh);
-                let named = super::super::build(&Layout::new(&mesh), method).unwrap().describe();
+                let named = super::super::solver::PressureSolver::new(&Layout::new(&mesh), method).describe();
                 assert_eq!(named.matches("dense").count(), dense.len(), "{dense:?}: {named}");
                 assert_eq!(named.contains("multigrid"), method.is_multigrid(&mesh), "{named}");
                 assert!(dense.iter().all(|n| mesh.cells().contains(n)));

@@ -18,15 +18,13 @@ use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
 use super::super::mesh::AXIS_NAMES;
-use super::apply::Operator;
 use super::banded_cholesky::{BandedCholesky, Scratch};
 use super::kernel;
 use super::lines::bundles;
-use super::refine::{Pass, Refinement};
-use super::solver::{PressureSolver, Solved, check_request};
+use super::solver::Method;
 use super::transform::{LineTransform, RowTransform, Work};
 use crate::Error;
-use crate::solver::aligned::Aligned;
+use crate::solver::slabs::Slabs;
 
 /// What is done along axis 1 or 2.
 #[derive(Debug)]
@@ -38,7 +36,7 @@ enum Along {
 /// The direct solver of one mesh.
 #[derive(Debug)]
 pub(crate) struct Direct {
-    operator: Operator,
+    slabs: Slabs,
     direction: [usize; 3],
     rows: RowTransform,
     along: [Along; 2],
@@ -46,20 +44,14 @@ pub(crate) struct Direct {
     value: [Vec<f64>; 3],
     /// Factor that the transforms leave out, with the sign of the right side.
     scale: f64,
-    refinement: Refinement,
 }
 
 /// Planes from which a transform of both axes of a plane at a time keeps the cores busy.
 const ENOUGH_PLANES: usize = 8;
 
-/// A direct solver for `layout`.
-pub(crate) fn direct(layout: &Layout) -> Result<Box<dyn PressureSolver>, Error> {
-    Ok(Box::new(Direct::new(layout)?))
-}
-
 impl Direct {
     /// Factorises the mesh.
-    pub(crate) fn new(layout: &Layout) -> Result<Self, Error> {
+    pub(crate) fn new(layout: &Layout) -> Self {
         let (rows, values, factor) = RowTransform::new(&layout.line[0]);
         let mut value = [values, Vec::new(), Vec::new()];
         let banded = banded_axis(layout);
@@ -73,27 +65,7 @@ impl Direct {
             Along::Transformed(transform)
         };
         let along = [along(1), along(2)];
-        Ok(Self {
-            operator: Operator::new(layout),
-            direction: layout.direction,
-            rows,
-            along,
-            value,
-            scale: -factor,
-            refinement: Refinement::default(),
-        })
-    }
-
-    fn shape(&self) -> Shape {
-        self.operator.shape()
-    }
-
-    /// One solve for the planes that are owned.
-    fn solve_once(&self, own: &mut [f64]) -> Result<(), Error> {
-        self.rows_forward(own);
-        self.operator.slabs().turned(own, 1, |field, shape, first| self.lines_once(field, shape, first))?;
-        self.rows_inverse(own);
-        Ok(())
+        Self { slabs: layout.slabs.clone(), direction: layout.direction, rows, along, value, scale: -factor }
     }
 
     /// What is done along the axes 1 and 2 of the places from `first` on of axis 0.
@@ -117,17 +89,17 @@ impl Direct {
 
     /// Whether axes 0 and 1 are transformed together, plane by plane.
     fn by_planes(&self) -> bool {
-        self.shape().n[2] >= ENOUGH_PLANES
+        self.slabs.shape.n[2] >= ENOUGH_PLANES
     }
 
     /// Values handled at a time by the transform of the rows.
     fn slab(&self) -> usize {
-        let [n0, n1, n2] = self.shape().n;
+        let [n0, n1, n2] = self.slabs.shape.n;
         if self.by_planes() { n0 * n1 } else { n0 * (n1 * n2).div_ceil(64).next_multiple_of(6) }
     }
 
     fn rows_forward(&self, field: &mut [f64]) {
-        let n0 = self.shape().n[0];
+        let n0 = self.slabs.shape.n[0];
         field.par_chunks_mut(self.slab()).for_each_init(Work::default, |work, slab| {
             self.rows.forward(slab, work);
             if let (true, Along::Transformed(axis)) = (self.by_planes(), &self.along[0]) {
@@ -138,7 +110,7 @@ impl Direct {
     }
 
     fn rows_inverse(&self, field: &mut [f64]) {
-        let n0 = self.shape().n[0];
+        let n0 = self.slabs.shape.n[0];
         field.par_chunks_mut(self.slab()).for_each_init(Work::default, |work, slab| {
             if let (true, Along::Transformed(axis)) = (self.by_planes(), &self.along[0]) {
                 let mut rows: Vec<&mut [f64]> = slab.chunks_mut(n0).collect();
@@ -185,23 +157,19 @@ impl Direct {
     }
 }
 
-impl PressureSolver for Direct {
-    fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
-        check_request(self.shape(), field, tolerance)?;
-        let mut refinement = std::mem::take(&mut self.refinement);
-        let own = self.shape().own_places();
-        let solved = refinement.run(&self.operator, field, tolerance, "direct solver", |field, _, _| {
-            self.solve_once(&mut field[own.clone()]).map(|()| Pass(Vec::new()))
-        });
-        self.refinement = refinement;
-        solved
+impl Method for Direct {
+    fn name(&self) -> &'static str {
+        "direct solver"
     }
 
-    fn spare(&mut self) -> &mut Aligned {
-        self.refinement.spare()
+    fn solve(&self, own: &mut [f64], _: f64, _: f64) -> Result<usize, Error> {
+        self.rows_forward(own);
+        self.slabs.turned(own, 1, |field, shape, first| self.lines_once(field, shape, first))?;
+        self.rows_inverse(own);
+        Ok(0)
     }
 
-    fn describe(&self) -> String {
+    fn describe(&self, condition: f64) -> String {
         let along = |which: usize| match &self.along[which] {
             Along::Transformed(transform) => transform.name(),
             Along::Factorised(_) => "banded",
@@ -209,7 +177,7 @@ impl PressureSolver for Direct {
         let names = [self.rows.name(), along(0), along(1)];
         let parts: Vec<String> =
             (0..3).map(|axis| format!("{} {}", AXIS_NAMES[self.direction[axis]], names[axis])).collect();
-        let round_off = f64::EPSILON * self.operator.condition();
+        let round_off = f64::EPSILON * condition;
         format!("direct: {}; of long waves round-off may leave {round_off:.0e} before refinement", parts.join(", "))
     }
 }

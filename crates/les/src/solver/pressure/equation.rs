@@ -2,9 +2,8 @@
 
 use super::super::layout::Layout;
 use super::super::mesh::Mesh;
-use super::apply::Operator;
+use super::PressureMethod;
 use super::solver::{PressureSolver, Solved, check_length};
-use super::{PressureMethod, build};
 use crate::Error;
 
 /// Poisson's equation on a staggered mesh, `div grad phi = d` with zero normal gradient at the planes that bound the mesh, in
@@ -21,7 +20,7 @@ use crate::Error;
 /// let x = Direction::periodic(16, 0.0, 2.0);
 /// let y = Direction::between(20, -1.0, 1.0, Wall::Slip, Wall::Slip);
 /// let z = Direction::between(24, 0.0, 3.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 2.0 });
-/// let mut equation = PressureEquation::new(&Mesh::new(x, y, z)?, PressureMethod::Auto)?;
+/// let mut equation = PressureEquation::new(&Mesh::new(x, y, z)?, PressureMethod::Auto);
 /// let mut right = vec![0.0; 16 * 20 * 24];
 /// right[5] = 1.0;
 /// right[5000] = -1.0; // A source and a sink of the same strength.
@@ -33,20 +32,16 @@ use crate::Error;
 #[derive(Debug)]
 pub struct PressureEquation {
     layout: Layout,
-    operator: Operator,
-    solver: Box<dyn PressureSolver>,
+    solver: PressureSolver,
 }
 
 impl PressureEquation {
     /// Prepares the solver that `method` asks for.
-    ///
-    /// # Errors
-    /// Those of the method.
-    pub fn new(mesh: &Mesh, method: PressureMethod) -> Result<Self, Error> {
+    pub fn new(mesh: &Mesh, method: PressureMethod) -> Self {
         // With one cell in x, `[z][y][x]` has y contiguous.
         let order = if mesh.cells()[0] == 1 { [1, 2, 0] } else { [0, 1, 2] };
         let layout = Layout::in_order(mesh, order);
-        Ok(Self { operator: Operator::new(&layout), solver: build(&layout, method)?, layout })
+        Self { solver: PressureSolver::new(&layout, method), layout }
     }
 
     /// Turns a divergence `d` into the equation's right side `g`: multiplies each value by the mass of its cell, which is its
@@ -56,7 +51,7 @@ impl PressureEquation {
     /// [`Error::WrongFieldLength`].
     pub fn weigh(&self, divergence: &mut [f64]) -> Result<(), Error> {
         check_length(self.layout.shape, divergence)?;
-        self.operator.weigh(divergence);
+        self.solver.operator.weigh(divergence);
         Ok(())
     }
 
@@ -78,7 +73,7 @@ impl PressureEquation {
     pub fn residual(&self, g: &[f64], phi: &[f64]) -> Result<f64, Error> {
         check_length(self.layout.shape, g)?;
         check_length(self.layout.shape, phi)?;
-        self.operator.relative_residual(g, phi)
+        self.solver.operator.relative_residual(g, phi)
     }
 
     /// The method and what it does in each direction.

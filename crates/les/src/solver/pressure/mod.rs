@@ -14,7 +14,6 @@ mod gemm;
 mod kernel;
 mod lines;
 mod multigrid;
-mod refine;
 mod solver;
 mod transform;
 
@@ -23,12 +22,7 @@ mod long_waves_tests;
 #[cfg(test)]
 mod tests;
 
-use super::layout::Layout;
-use crate::Error;
-use multigrid::Multigrid;
-
 pub(crate) use apply::norm;
-pub(crate) use direct::direct;
 pub use equation::PressureEquation;
 pub(crate) use solver::PressureSolver;
 pub use solver::Solved;
@@ -48,15 +42,3 @@ pub enum PressureMethod {
 
 /// Cells of a dense direction from which multigrid is faster to a residual of 1e-6.
 const DENSE_LIMIT: usize = 3000;
-
-/// The solver that `method` asks for.
-///
-/// # Errors
-/// Those of the solvers.
-pub(crate) fn build(layout: &Layout, method: PressureMethod) -> Result<Box<dyn PressureSolver>, Error> {
-    match method {
-        PressureMethod::Auto if direct::dense_cells(layout) > DENSE_LIMIT => Ok(Box::new(Multigrid::new(layout))),
-        PressureMethod::Auto | PressureMethod::Direct => direct(layout),
-        PressureMethod::Multigrid => Ok(Box::new(Multigrid::new(layout))),
-    }
-}

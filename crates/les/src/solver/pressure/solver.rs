@@ -1,24 +1,27 @@
-//! What a solver of the pressure equation is asked for and what it tells.
+//! The solver of the pressure equation of one mesh: a method, called again for what it leaves till the residual of the field is
+//! what was asked for. The residual is computed anew from the field, so that it holds the round-off of everything.
 
-use super::super::layout::Shape;
-use crate::Error;
-use crate::error::check;
+use rayon::prelude::*;
+
+use super::PressureMethod;
+use super::apply::Operator;
+use super::direct::Direct;
+use super::multigrid::Multigrid;
+use crate::error::{Error, PressureFailure, check};
 use crate::solver::aligned::Aligned;
+use crate::solver::layout::{Layout, Shape};
+use crate::solver::slabs::WHOLE;
 
-/// Refuses a field of another size and a tolerance that is no number.
-pub(super) fn check_request(shape: Shape, field: &[f64], tolerance: f64) -> Result<(), Error> {
-    check_length(shape, field)?;
-    check("tolerance", tolerance, "above 0 and below 1", |t| t > 0.0 && t < 1.0)
-}
-
-/// Refuses a field of another size.
-pub(super) fn check_length(shape: Shape, field: &[f64]) -> Result<(), Error> {
-    if field.len() == shape.len() {
-        Ok(())
-    } else {
-        Err(Error::WrongFieldLength { values: field.len(), cells: shape.n })
-    }
-}
+/// Solves after which the residual no longer falls.
+const MAX_SOLVES: usize = 8;
+/// A solve that leaves more than this has stalled.
+const STALLED: f64 = 0.5;
+/// Part of the tolerance asked of a solve: the residual it sees is not exactly the field's.
+const SAFETY: f64 = 0.999;
+/// A solution that improves no more is held up by round-off if it leaves at most this multiple of the last digit's share.
+const ROUND_OFF: f64 = 4.0;
+/// Part of the tolerance that an imbalance may add to the residual.
+const BALANCED: f64 = 0.01;
 
 /// What a solve did.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,18 +36,108 @@ pub struct Solved {
     pub imbalance: f64,
 }
 
-/// A solver of the pressure equation of one mesh.
-pub(crate) trait PressureSolver: Send + std::fmt::Debug {
-    /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean.
+/// A way to solve the pressure equation.
+pub(super) trait Method: Send + std::fmt::Debug {
+    /// Its name in errors.
+    fn name(&self) -> &'static str;
+
+    /// Replaces the right side in the planes that are owned, of norm `size` over all, by a solution of about the relative residual
+    /// `tolerance`; returns the iterations, 0 of a direct method.
     ///
     /// # Errors
-    /// If the residual does not reach `tolerance` (2-norm, relative to the right side); `field` is then the best solution
-    /// found.
-    fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error>;
+    /// Those of the exchange between ranks.
+    fn solve(&self, own: &mut [f64], size: f64, tolerance: f64) -> Result<usize, Error>;
 
-    /// A field of this solver that is free between its solves.
-    fn spare(&mut self) -> &mut Aligned;
+    /// The method and what it is made of, for the log; `condition` is that of the operator.
+    fn describe(&self, condition: f64) -> String;
+}
 
-    /// The method and what it is made of, for the log.
-    fn describe(&self) -> String;
+/// A solver of the pressure equation of one mesh.
+#[derive(Debug)]
+pub(crate) struct PressureSolver {
+    pub(super) operator: Operator,
+    method: Box<dyn Method>,
+    right: Aligned,
+    left: Aligned,
+}
+
+impl PressureSolver {
+    /// The solver that `method` asks for.
+    pub(crate) fn new(layout: &Layout, method: PressureMethod) -> Self {
+        let method: Box<dyn Method> = if method.takes_multigrid(layout) {
+            Box::new(Multigrid::new(layout))
+        } else {
+            Box::new(Direct::new(layout))
+        };
+        Self { operator: Operator::new(layout), method, right: Aligned::default(), left: Aligned::default() }
+    }
+
+    /// The method and what it does in each direction.
+    pub(crate) fn describe(&self) -> String {
+        self.method.describe(self.operator.condition())
+    }
+
+    /// A field that is free between solves.
+    pub(crate) fn spare(&mut self) -> &mut Aligned {
+        &mut self.right
+    }
+
+    /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean, halos included.
+    ///
+    /// # Errors
+    /// [`Error::PressureNotSolved`] if the residual does not reach `tolerance` (2-norm, relative to the right side); the field is then
+    /// the last solution found.
+    pub(crate) fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
+        let Self { operator, method, right, left } = self;
+        check_length(operator.shape(), field)?;
+        check("tolerance", tolerance, "above 0 and below 1", |t| t > 0.0 && t < 1.0)?;
+        // The methods ignore what no pressure can balance; only the residual must not hold it against them.
+        right.fit(field.len());
+        let [size, imbalance] = operator.copy_balanced(field, right, BALANCED * tolerance)?;
+        if size == 0.0 {
+            field.fill(0.0);
+            return Ok(Solved { residual: 0.0, iterations: 0, factor: None, imbalance });
+        }
+        let own = operator.shape().own_places();
+        let (mut iterations, mut history, mut last, mut attainable) = (0, Vec::new(), 1.0, 0.0);
+        let reason = loop {
+            // Of a later solve the right side is what the field so far leaves.
+            let refines = !history.is_empty();
+            let unknown = if refines { &mut left[own.clone()] } else { &mut field[own.clone()] };
+            iterations += method.solve(unknown, last * size, f64::max(SAFETY * tolerance, 0.25 * attainable) / last)?;
+            if refines {
+                field.par_iter_mut().zip(&left[..]).for_each(|(phi, more)| *phi += more);
+            }
+            operator.slabs().halos(&mut [field], WHOLE)?;
+            let residual = operator.residual_norm(right, field)? / size;
+            history.push(residual);
+            if residual <= tolerance {
+                let factor = (iterations > 0).then(|| residual.powf(1.0 / iterations as f64));
+                return Ok(Solved { residual, iterations, factor, imbalance });
+            }
+            if residual.is_nan() {
+                break PressureFailure::NotFinite;
+            }
+            attainable = operator.round_off(field)? / size;
+            if residual > STALLED * last || history.len() == MAX_SOLVES {
+                let at_round_off = residual.min(last) <= ROUND_OFF * attainable;
+                break if at_round_off { PressureFailure::RoundOff { attainable } } else { PressureFailure::Stalled };
+            }
+            last = residual;
+            left.fit(field.len());
+            operator.residual(right, field, left);
+            // The methods take the negative of their right side.
+            left.par_iter_mut().for_each(|value| *value = -*value);
+        };
+        Err(Error::PressureNotSolved { method: method.name(), tolerance, reason, iterations, history })
+    }
+}
+
+/// Refuses a field of another size.
+pub(super) fn check_length(shape: Shape, field: &[f64]) -> Result<(), Error> {
+    if field.len() == shape.len() {
+        Ok(())
+    } else {
+        Err(Error::WrongFieldLength { values: field.len(), cells: shape.n })
+    }
 }

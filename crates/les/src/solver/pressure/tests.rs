@@ -1,11 +1,10 @@
 //! Checks that concern all solvers: residuals on the meshes of the table, null space, threads.
 
-use super::super::layout::Shape;
+use super::super::layout::{Layout, Shape};
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::*;
-use crate::error::PressureFailure;
+use crate::error::{Error, PressureFailure};
 use apply::Operator;
-use direct::Direct;
 use rayon::prelude::*;
 
 /// The weighted divergence of a flow with eddies of all sizes and one per cent of noise at the grid scale: what the time step
@@ -134,7 +133,7 @@ fn the_direct_solver_leaves_round_off_on_every_mesh() {
     for (name, directions, allowed) in meshes() {
         let layout = layout(directions);
         let operator = Operator::new(&layout);
-        let mut solver = Direct::new(&layout).unwrap();
+        let mut solver = PressureSolver::new(&layout, PressureMethod::Direct);
         let g = turbulent_right_side(&layout);
         let mut phi = g.clone();
         let solved = solver.solve(&mut phi, 1e-6).unwrap();
@@ -203,7 +202,7 @@ fn mass_of(layout: &Layout, at: [usize; 3]) -> f64 {
 #[test]
 fn refinement_reaches_what_one_solve_does_not_and_says_where_it_ends() {
     let layout = layout([waves(16), slip(64).stretched(sinh(5.0)), ground(64).stretched(tanh(5.0))]);
-    let mut solver = Direct::new(&layout).unwrap();
+    let mut solver = PressureSolver::new(&layout, PressureMethod::Direct);
     let operator = Operator::new(&layout);
     let g = turbulent_right_side(&layout);
     let mut once = g.clone();
@@ -228,7 +227,7 @@ fn what_no_pressure_balances_is_removed_and_reported() {
     {
         let layout = layout(directions);
         let operator = Operator::new(&layout);
-        let mut solver = Direct::new(&layout).unwrap();
+        let mut solver = PressureSolver::new(&layout, PressureMethod::Direct);
         let balanced = turbulent_right_side(&layout);
         let mut mass = vec![1.0; balanced.len()];
         operator.weigh(&mut mass);
@@ -248,7 +247,7 @@ fn with_threads(layout: &Layout, method: PressureMethod, threads: usize) -> Vec<
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
         let mut phi = turbulent_right_side(layout);
-        build(layout, method).unwrap().solve(&mut phi, 1e-8).unwrap();
+        PressureSolver::new(layout, method).solve(&mut phi, 1e-8).unwrap();
         phi
     })
 }
@@ -276,7 +275,7 @@ fn a_scale_of_the_mesh_scales_the_solution() {
         let d = |n: usize, length: f64| Direction::between(n, 0.0, size * length, Wall::AT_REST, Wall::Slip);
         let layout = layout([Direction::periodic(16, 0.0, size), d(20, 1.0), d(24, 2.0).stretched(tanh(3.0))]);
         let mut phi = turbulent_right_side(&layout);
-        build(&layout, method).unwrap().solve(&mut phi, 1e-8).unwrap();
+        PressureSolver::new(&layout, method).solve(&mut phi, 1e-8).unwrap();
         phi
     };
     for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
@@ -294,7 +293,7 @@ fn a_scale_of_the_mesh_scales_the_solution() {
 #[test]
 fn fields_and_tolerances_that_make_no_sense_are_refused() {
     let layout = layout([waves(8), waves(8), waves(8)]);
-    let mut solver = build(&layout, PressureMethod::Auto).unwrap();
+    let mut solver = PressureSolver::new(&layout, PressureMethod::Auto);
     assert!(solver.solve(&mut [0.0; 511], 1e-6).unwrap_err().to_string().contains("511"));
     for tolerance in [0.0, 1.0, f64::NAN] {
         assert!(solver.solve(&mut [0.0; 512], tolerance).unwrap_err().to_string().contains("tolerance"));
@@ -310,7 +309,7 @@ fn multigrid_agrees_with_the_direct_solver_and_converges_as_fast_on_every_mesh()
         let layout = layout(directions);
         let operator = Operator::new(&layout);
         let g = turbulent_right_side(&layout);
-        let mut multigrid = Multigrid::new(&layout);
+        let mut multigrid = PressureSolver::new(&layout, PressureMethod::Multigrid);
         let mut phi = g.clone();
         let solved = multigrid.solve(&mut phi, 1e-6).unwrap();
         let (factor, residual) = (solved.factor.unwrap_or(0.0), operator.relative_residual(&g, &phi).unwrap());
@@ -322,7 +321,7 @@ fn multigrid_agrees_with_the_direct_solver_and_converges_as_fast_on_every_mesh()
         let mean = mean_of(&layout, &phi);
         assert!(mean.abs() <= 1e-12, "{name}: mean {mean:e}");
         let mut exact = g;
-        Direct::new(&layout).unwrap().solve(&mut exact, 1e-6).unwrap();
+        PressureSolver::new(&layout, PressureMethod::Direct).solve(&mut exact, 1e-6).unwrap();
         let largest = exact.iter().fold(0.0_f64, |m, phi| m.max(phi.abs()));
         let apart = exact.iter().zip(&phi).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
         assert!(apart <= 3e-10 * largest, "{name}: the fields differ by {apart:e} of {largest:e}");
@@ -332,16 +331,19 @@ fn multigrid_agrees_with_the_direct_solver_and_converges_as_fast_on_every_mesh()
 #[test]
 fn multigrid_that_cannot_reach_the_tolerance_tells_its_history() {
     let layout = layout([waves(16), slip(20), ground(24).stretched(tanh(3.0))]);
-    match Multigrid::new(&layout).solve(&mut turbulent_right_side(&layout), 1e-17).unwrap_err() {
-        Error::PressureNotSolved { history, method, .. } => {
+    match PressureSolver::new(&layout, PressureMethod::Multigrid)
+        .solve(&mut turbulent_right_side(&layout), 1e-17)
+        .unwrap_err()
+    {
+        Error::PressureNotSolved { iterations, history, method, .. } => {
             assert_eq!(method, "multigrid");
             let least = history.iter().copied().fold(1.0, f64::min);
-            assert!(history.len() > 10 && history[5] < 1e-4 && least < 1e-13, "{history:?}");
+            assert!(iterations > 10 && history.len() > 1 && least < 1e-13, "{iterations}, {history:?}");
         }
         other => panic!("{other}"),
     }
     let mut field = turbulent_right_side(&layout);
     field[77] = f64::NAN;
-    let refused = Multigrid::new(&layout).solve(&mut field, 1e-6).unwrap_err();
+    let refused = PressureSolver::new(&layout, PressureMethod::Multigrid).solve(&mut field, 1e-6).unwrap_err();
     assert!(matches!(refused, Error::PressureNotSolved { reason: PressureFailure::NotFinite, .. }), "{refused}");
 }
