@@ -12,23 +12,20 @@ use rayon::prelude::*;
 
 mod project;
 
-use super::implicit::LineSolver;
+use project::unless_stalled;
+
+use super::implicit::LineSolvers;
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
 use super::momentum::{Momentum, Scratch, add_laplacian_row};
 use super::pressure::{PressureSolver, Solved};
 use super::projection::{Divergence, correct, weighted_dot};
 use super::report::{StartReport, StepReport};
-use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
+use super::settings::{FlowSettings, TimeScheme, refuse_sticking_without_viscosity};
 use super::slabs::WHOLE;
-use super::stage::{Powers, Task, blocks};
-use super::subgrid::{Lent, Subgrid};
+use super::subgrid::Subgrid;
 use crate::Error;
 use crate::solver::aligned::Aligned;
-
-/// Share of the explicit limit beyond which the subgrid viscosity is cut. In the core of a vortex WALE's viscosity has no
-/// work to do but would make an explicit step unstable; the cut keeps the step that convection allows.
-const SUBGRID_SHARE: f64 = 0.8;
 
 /// An incompressible flow that is being simulated.
 #[derive(Debug)]
@@ -36,12 +33,12 @@ pub struct Flow {
     pub(super) mesh: Mesh,
     pub(super) settings: FlowSettings,
     pub(crate) layout: Layout,
-    ops: [Momentum; 3],
+    pub(super) ops: [Momentum; 3],
     pub(super) divergence: Divergence,
     pressure_solver: PressureSolver,
     pub(super) model: Option<Subgrid>,
-    line_solvers: Vec<(f64, Vec<(usize, LineSolver)>)>,
-    work: Work,
+    line_solvers: LineSolvers,
+    pub(super) work: Work,
     pub(crate) state: State,
 }
 
@@ -63,8 +60,8 @@ pub(crate) struct State {
 }
 
 #[derive(Debug, Default)]
-struct Work {
-    star: [Aligned; 3],
+pub(super) struct Work {
+    pub(super) star: [Aligned; 3],
     phi: Aligned,
 }
 
@@ -138,7 +135,7 @@ impl Flow {
             divergence: Divergence::new(&layout),
             pressure_solver: PressureSolver::new(&layout, settings.pressure),
             model: Subgrid::new(&layout, settings.subgrid)?,
-            line_solvers: Vec::new(),
+            line_solvers: LineSolvers::default(),
             work: Work { star: fields(), phi: field() },
             mesh,
             settings,
@@ -147,27 +144,21 @@ impl Flow {
         })
     }
 
-    /// Projects the initial field, finds its pressure, decides which directions are implicit.
+    /// Projects the initial field, decides which directions are implicit, finds the pressure that keeps the field's acceleration free of
+    /// divergence.
     pub(crate) fn start(&mut self) -> Result<StartReport, Error> {
-        let slabs = self.layout.slabs.clone();
         if let (true, axis, place) = self.first_not_finite()? {
             return Err(self.diverged(axis, place, "initial velocity"));
         }
-        let [given] = slabs.sums(self.kinetic_energy())?;
+        let [given] = self.layout.slabs.sums(self.kinetic_energy())?;
         std::mem::swap(&mut self.state.velocity, &mut self.work.star);
         self.project(1.0)?;
         self.repeat(1.0, 0.0)?;
         self.state.implicit = self.choose_implicit();
-        // The pressure that belongs to the field: that which keeps its acceleration free of divergence.
-        let summary = (self.state.energy, self.state.courant_per_s);
-        self.accelerations()?;
-        // The fields of the history, which begins with the first step, keep the velocity meanwhile.
-        std::mem::swap(&mut self.state.velocity, &mut self.state.history);
-        self.project(1.0)?;
-        std::mem::swap(&mut self.state.pressure, &mut self.work.phi);
-        std::mem::swap(&mut self.state.velocity, &mut self.state.history);
-        self.state.history.iter_mut().for_each(|terms| terms.fill(0.0));
-        (self.state.energy, self.state.courant_per_s) = summary;
+        self.accelerate()?;
+        self.take_divergence(1.0)?;
+        unless_stalled(self.pressure_solver.solve(&mut self.work.phi, self.settings.pressure_tolerance))?;
+        self.state.pressure.copy_from_slice(&self.work.phi);
         Ok(StartReport { given_energy_m5_s2: given, kinetic_energy_m5_s2: self.state.energy })
     }
 
@@ -199,32 +190,23 @@ impl Flow {
         Ok(report)
     }
 
+    /// Stage by stage: predicts the velocity, solves for implicit viscosity, projects, adds the pressure.
     fn step_by(&mut self, step_s: f64) -> Result<StepReport, Error> {
         let courant = step_s * self.state.courant_per_s;
         self.refuse_courant(courant, step_s)?;
         let ratio = (self.state.last_step_s > 0.0).then(|| step_s / self.state.last_step_s);
         let is_damped = self.state.step < self.settings.damped_steps;
-        // Adams-Bashforth starts with a step of Runge-Kutta and then wants the terms of the initial field.
-        let starting = self.settings.scheme == TimeScheme::AdamsBashforth2 && ratio.is_none();
-        let mut first_terms = None;
-        let mut powers = None;
-        let mut solved = None;
+        let (mut begun, mut solved) = (None, None);
         for stage in self.settings.scheme.stages(ratio) {
             let stage_s = stage.fraction * step_s;
-            // The report tells the powers of the field that the step began with.
-            let first = powers.is_none();
-            let found = self.increments(&stage, stage_s, first, is_damped)?;
-            if first && starting {
-                first_terms = Some(self.state.history.clone());
-            }
-            powers.get_or_insert(found);
-            self.solve_lines(stage_s * self.settings.viscosity_m2_s, is_damped)?;
+            let powers = self.predict(&stage, stage_s, is_damped, begun.is_none())?;
+            begun.get_or_insert_with(|| (powers, self.first_terms(ratio)));
+            self.solve_viscous(stage_s * self.settings.viscosity_m2_s, is_damped)?;
             solved = Some(self.project(stage_s)?);
             self.add_pressure();
         }
-        if let Some(terms) = first_terms {
-            self.state.history = terms;
-        }
+        let ([viscous, subgrid, force], first_terms) = begun.unwrap_or_default();
+        self.state.history = first_terms.unwrap_or_else(|| std::mem::take(&mut self.state.history));
         self.state.step += 1;
         self.state.time_s += step_s;
         self.state.last_step_s = step_s;
@@ -232,131 +214,56 @@ impl Flow {
             let (_, axis, place) = self.first_not_finite()?;
             return Err(self.diverged(axis, place, "velocity"));
         }
-        let powers = powers.unwrap_or_default();
+        let largest = self.model.as_ref().map(Subgrid::largest).unwrap_or_default();
         Ok(StepReport {
             step: self.state.step,
             time_s: self.state.time_s,
             step_s,
             courant,
             kinetic_energy_m5_s2: self.state.energy,
-            viscous_power_m5_s3: powers[0],
-            subgrid_power_m5_s3: powers[1],
-            force_power_m5_s3: powers[2],
-            subgrid_viscosity_m2_s: self.model.as_ref().map_or(0.0, Subgrid::max_viscosity_m2_s),
-            subgrid_decay: step_s * self.model.as_ref().map_or(0.0, Subgrid::max_decay_per_s),
+            viscous_power_m5_s3: viscous,
+            subgrid_power_m5_s3: subgrid,
+            force_power_m5_s3: force,
+            subgrid_viscosity_m2_s: largest.viscosity_m2_s,
+            subgrid_decay: step_s * largest.decay_per_s,
             pressure_iterations: solved.map_or(0, |s| s.iterations),
             pressure_residual: solved.map(|s| s.residual),
             pressure_factor: solved.and_then(|s| s.factor),
         })
     }
 
-    /// The right side of (22) into `star`, or the velocity with all but implicit viscosity if no line solve follows or a damped one;
-    /// the work of its terms if `measured`.
-    fn increments(&mut self, stage: &Stage, stage_s: f64, measured: bool, is_damped: bool) -> Result<Powers, Error> {
-        let explicit_per_s = self.settings.scheme.largest_decay() * stage.fraction / stage_s;
-        self.update_model((SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0))?;
-        let shape = self.layout.shape;
-        let (task, star, history) = self.task();
-        let keep = if is_damped || task.implicit == [false; 3] { 1.0 } else { 0.0 };
-        let powers: Vec<[Powers; 3]> = blocks(shape, star, history)
-            .into_par_iter()
-            .map_init(
-                || std::array::from_fn(|_| Scratch::new(shape.n[0])),
-                |scratch, block| task.increments(block, (stage, stage_s, keep, measured), scratch),
-            )
-            .collect();
-        let mut total = Powers::default();
-        if measured {
-            // Those of each plane, component after component, then of all.
-            let of_plane = |k| -> [f64; 9] {
-                let blocks = || powers.iter().skip(k).step_by(shape.own().len());
-                std::array::from_fn(|i| blocks().map(|powers| powers[i / 3][i % 3]).sum())
-            };
-            let planes = self.layout.slabs.planes((0..shape.own().len()).map(of_plane).collect())?;
-            for (component, plane) in (0..3).flat_map(|component| planes.iter().map(move |plane| (component, plane))) {
-                total = std::array::from_fn(|i| total[i] + plane[3 * component + i]);
-            }
-        }
-        Ok(total)
-    }
-
-    /// The acceleration by everything but pressure into `star`.
-    fn accelerations(&mut self) -> Result<(), Error> {
-        // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long.
-        self.update_model(f64::INFINITY)?;
-        let shape = self.layout.shape;
-        let (task, star, _) = self.task();
-        for (axis, star) in star.iter_mut().enumerate() {
-            let planes = star[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
-            planes.for_each_init(
-                || Scratch::new(shape.n[0]),
-                |scratch, (star, k)| task.accelerations([axis, k], star, scratch),
-            );
-        }
-        Ok(())
-    }
-
-    /// The viscosity of the model for the present field, at most such that it decays by `limit_per_s`; a part of its acceleration
-    /// into `star`.
-    fn update_model(&mut self, limit_per_s: f64) -> Result<(), Error> {
-        let Self { state, work, pressure_solver, model: Some(model), .. } = self else { return Ok(()) };
-        let lent = Lent { in_plane: &mut work.star, small: [&mut work.phi, pressure_solver.spare()] };
-        model.update(state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, lent)
-    }
-
-    /// What the momentum equation reads, and what it writes: `star` and the history.
-    fn task(&mut self) -> (Task<'_>, &mut [Aligned; 3], &mut [Aligned; 3]) {
-        let Self { ops, state, work, model, layout, settings, .. } = self;
-        let task = Task {
-            layout,
-            ops,
-            velocity: state.velocity.each_ref().map(Aligned::as_slice),
-            pressure: &state.pressure,
-            model: model.as_ref(),
-            viscosity_m2_s: settings.viscosity_m2_s,
-            force_m_s2: layout.direction.map(|d| settings.force_m_s2[d]),
-            implicit: state.implicit,
-        };
-        (task, &mut work.star, &mut state.history)
+    /// The terms of the initial field: Adams-Bashforth begins with a step of Runge-Kutta and then wants them.
+    fn first_terms(&self, ratio: Option<f64>) -> Option<[Aligned; 3]> {
+        let begins = self.settings.scheme == TimeScheme::AdamsBashforth2 && ratio.is_none();
+        begins.then(|| self.state.history.clone())
     }
 
     /// Takes `nu_s_m2`, viscosity times the stage, along the implicit axes: solves for the increments by Crank-Nicolson and adds the
     /// velocity, or by backward Euler along one axis after the other. The factored increments of backward Euler would leave waves
     /// that are stiff along two axes as they are, `1 - (d1 + d2)/((1 + d1) (1 + d2))`; one after the other it is
     /// `1/((1 + d1) (1 + d2))`.
-    fn solve_lines(&mut self, nu_s_m2: f64, is_damped: bool) -> Result<(), Error> {
-        if self.state.implicit == [false; 3] {
+    fn solve_viscous(&mut self, nu_s_m2: f64, is_damped: bool) -> Result<(), Error> {
+        let Self { state, layout, ops, work: Work { star, phi }, .. } = self;
+        if state.implicit == [false; 3] {
             return Ok(());
         }
         let a_m2 = if is_damped { nu_s_m2 } else { 0.5 * nu_s_m2 };
-        if !self.line_solvers.iter().any(|(a, _)| *a == a_m2) {
-            // A fixed step has at most three stages of different length; a variable one always needs new factors.
-            self.line_solvers.truncate(2);
-            let implicit = self.state.implicit;
-            let solvers = (0..3)
-                .flat_map(|component| (0..3).filter(|&axis| implicit[axis]).map(move |axis| (component, axis)))
-                .map(|(component, axis)| (component, LineSolver::new(&self.ops[component], axis, a_m2)))
-                .collect();
-            self.line_solvers.insert(0, (a_m2, solvers));
-        }
-        let Some((_, solvers)) = self.line_solvers.iter().find(|(a, _)| *a == a_m2) else { return Ok(()) };
-        let own = self.layout.shape.own_places();
-        let Work { star, phi, .. } = &mut self.work;
-        for (component, solver) in solvers {
-            if !is_damped {
-                solver.solve(&self.layout.slabs, &mut star[*component][own.clone()])?;
-                continue;
+        let own = layout.shape.own_places();
+        for solver in self.line_solvers.of(ops, state.implicit, a_m2) {
+            let star = &mut star[solver.component];
+            if is_damped {
+                layout.slabs.halos(&mut [star], WHOLE)?;
+                viscous_increment(layout, &ops[solver.component], (solver.axis, a_m2), star, phi);
+                solver.solve(&layout.slabs, &mut phi[own.clone()])?;
+                add(star, phi, layout.shape);
+            } else {
+                solver.solve(&layout.slabs, &mut star[own.clone()])?;
             }
-            self.layout.slabs.halos(&mut [&mut star[*component]], WHOLE)?;
-            viscous_increment(&self.layout, &self.ops[*component], (solver.axis, a_m2), &star[*component], phi);
-            solver.solve(&self.layout.slabs, &mut phi[own.clone()])?;
-            add(&mut star[*component], phi, self.layout.shape);
         }
-        if is_damped {
-            return Ok(());
-        }
-        for (star, velocity) in self.work.star.iter_mut().zip(&self.state.velocity) {
-            add(&mut star[own.clone()], &velocity[own.clone()], self.layout.shape);
+        if !is_damped {
+            for (star, velocity) in star.iter_mut().zip(&state.velocity) {
+                add(&mut star[own.clone()], &velocity[own.clone()], layout.shape);
+            }
         }
         Ok(())
     }

@@ -19,12 +19,32 @@ use crate::Error;
 /// Factors of `1 - a L` along one axis for one component.
 #[derive(Debug, Clone)]
 pub(crate) struct LineSolver {
+    pub(super) component: usize,
     pub(super) axis: usize,
     mass: Vec<f64>,
     inverse_pivot: Vec<f64>,
     /// Rows of `-L` below the diagonal and of `-L^T` above it.
     lower: Vec<Taps>,
     upper: Vec<Taps>,
+}
+
+/// The factors for the last lengths of a stage.
+#[derive(Debug, Default)]
+pub(crate) struct LineSolvers(Vec<(f64, Vec<LineSolver>)>);
+
+impl LineSolvers {
+    /// Those of all components along the implicit axes, `a_m2` being viscosity times the implicit part of a stage \[m^2\].
+    pub(crate) fn of(&mut self, ops: &[Momentum; 3], implicit: [bool; 3], a_m2: f64) -> &[LineSolver] {
+        let found = self.0.iter().position(|(a, _)| *a == a_m2).unwrap_or_else(|| {
+            // A fixed step has at most three stages of different length; a variable one always needs new factors.
+            self.0.truncate(2);
+            let axes = (0..3).filter(|&axis| implicit[axis]);
+            let solvers = ops.iter().flat_map(|ops| axes.clone().map(move |axis| LineSolver::new(ops, axis, a_m2)));
+            self.0.insert(0, (a_m2, solvers.collect()));
+            0
+        });
+        &self.0[found].1
+    }
 }
 
 /// Lines of axis 0 that are solved side by side.
@@ -72,7 +92,7 @@ impl LineSolver {
                 upper[j].push((i, -l));
             }
         }
-        Self { axis, mass, inverse_pivot: pivot.iter().map(|d| 1.0 / d).collect(), lower, upper }
+        Self { component: ops.axis, axis, mass, inverse_pivot: pivot.iter().map(|d| 1.0 / d).collect(), lower, upper }
     }
 
     /// Replaces the planes of a field that are owned by the solution.

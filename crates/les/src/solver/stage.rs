@@ -1,23 +1,30 @@
 //! The right side of the momentum equation, in blocks of rows.
 
 use multiversion::multiversion;
+use rayon::prelude::*;
 
 use super::aligned::Aligned;
+use super::flow::Flow;
 use super::layout::{Layout, Shape};
 use super::momentum::{Momentum, Scratch};
 use super::projection::weighted_dot;
 use super::settings::Stage;
 use super::subgrid::Subgrid;
+use crate::Error;
 
 /// Work done on the fluid per time by viscosity, the subgrid stress and the force.
 pub(super) type Powers = [f64; 3];
+
+/// Share of the explicit limit beyond which the subgrid viscosity is cut. In the core of a vortex WALE's viscosity has no
+/// work to do but would make an explicit step unstable; the cut keeps the step that convection allows.
+const SUBGRID_SHARE: f64 = 0.8;
 
 /// Values of a block: what its stencils reach, and the fluxes that are kept for it, stay in the cache of a core.
 const BLOCK: usize = 4096;
 
 /// Some rows of one plane, of the three components.
 #[derive(Debug)]
-pub(super) struct Block<'a> {
+struct Block<'a> {
     plane: usize,
     /// The first of its rows.
     row: usize,
@@ -27,7 +34,7 @@ pub(super) struct Block<'a> {
 
 /// Cuts the planes that are owned into blocks of the same rows of one plane after the other, so that rows of the planes about a
 /// block have just been read.
-pub(super) fn blocks<'a>(shape: Shape, star: &'a mut [Aligned; 3], history: &'a mut [Aligned; 3]) -> Vec<Block<'a>> {
+fn blocks<'a>(shape: Shape, star: &'a mut [Aligned; 3], history: &'a mut [Aligned; 3]) -> Vec<Block<'a>> {
     let [n0, n1, _] = shape.n;
     let rows = n1.div_ceil((n0 * n1).div_ceil(BLOCK));
     let pieces = |field: &'a mut Aligned| {
@@ -46,22 +53,97 @@ pub(super) fn blocks<'a>(shape: Shape, star: &'a mut [Aligned; 3], history: &'a 
     blocks.into_iter().flatten().collect()
 }
 
+impl Flow {
+    /// The right side of (22) into `star`, or the velocity with all but implicit viscosity if no line solve follows or a damped one; its
+    /// terms into the history. The work of the terms if `measured`.
+    pub(super) fn predict(
+        &mut self,
+        stage: &Stage,
+        stage_s: f64,
+        is_damped: bool,
+        measured: bool,
+    ) -> Result<Powers, Error> {
+        let explicit_per_s = self.settings.scheme.largest_decay() * stage.fraction / stage_s;
+        self.update_model((SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0))?;
+        let shape = self.layout.shape;
+        let (task, star, history) = self.task();
+        let keep = if is_damped || task.implicit == [false; 3] { 1.0 } else { 0.0 };
+        let powers: Vec<[Powers; 3]> = blocks(shape, star, history)
+            .into_par_iter()
+            .map_init(
+                || std::array::from_fn(|_| Scratch::new(shape.n[0])),
+                |scratch, block| task.increments(block, (stage, stage_s, keep, measured), scratch),
+            )
+            .collect();
+        if !measured {
+            return Ok(Powers::default());
+        }
+        // Those of each plane, component after component, then of all.
+        let of_plane = |k| -> [f64; 9] {
+            let blocks = || powers.iter().skip(k).step_by(shape.own().len());
+            std::array::from_fn(|i| blocks().map(|powers| powers[i / 3][i % 3]).sum())
+        };
+        let planes = self.layout.slabs.planes((0..shape.own().len()).map(of_plane).collect())?;
+        let terms = (0..3).flat_map(|component| planes.iter().map(move |plane| &plane[3 * component..]));
+        Ok(terms.fold(Powers::default(), |total, plane| std::array::from_fn(|i| total[i] + plane[i])))
+    }
+
+    /// The acceleration by everything but pressure into `star`.
+    pub(super) fn accelerate(&mut self) -> Result<(), Error> {
+        // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long.
+        self.update_model(f64::INFINITY)?;
+        let shape = self.layout.shape;
+        let (task, star, _) = self.task();
+        for (axis, star) in star.iter_mut().enumerate() {
+            let planes = star[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+            planes.for_each_init(
+                || Scratch::new(shape.n[0]),
+                |scratch, (star, k)| task.accelerations([axis, k], star, scratch),
+            );
+        }
+        Ok(())
+    }
+
+    /// The viscosity of the model for the present field, at most such that it decays by `limit_per_s`; its acceleration by stresses in
+    /// planes into `star`, where the terms of the momentum equation are summed.
+    fn update_model(&mut self, limit_per_s: f64) -> Result<(), Error> {
+        let Some(model) = &mut self.model else { return Ok(()) };
+        model.update(self.state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, &mut self.work.star)
+    }
+
+    /// What the momentum equation reads, and what it writes: `star` and the history.
+    fn task(&mut self) -> (Task<'_>, &mut [Aligned; 3], &mut [Aligned; 3]) {
+        let Self { ops, state, work, model, layout, settings, .. } = self;
+        let task = Task {
+            layout,
+            ops,
+            velocity: state.velocity.each_ref().map(Aligned::as_slice),
+            pressure: &state.pressure,
+            model: model.as_ref(),
+            viscosity_m2_s: settings.viscosity_m2_s,
+            force_m_s2: layout.direction.map(|d| settings.force_m_s2[d]),
+            implicit: state.implicit,
+        };
+        (task, &mut work.star, &mut state.history)
+    }
+}
+
 /// What the planes of the momentum equation read.
-pub(super) struct Task<'a> {
-    pub(super) layout: &'a Layout,
-    pub(super) ops: &'a [Momentum; 3],
-    pub(super) velocity: [&'a [f64]; 3],
-    pub(super) pressure: &'a [f64],
-    pub(super) model: Option<&'a Subgrid>,
-    pub(super) viscosity_m2_s: f64,
-    pub(super) force_m_s2: [f64; 3],
-    pub(super) implicit: [bool; 3],
+struct Task<'a> {
+    layout: &'a Layout,
+    ops: &'a [Momentum; 3],
+    velocity: [&'a [f64]; 3],
+    pressure: &'a [f64],
+    model: Option<&'a Subgrid>,
+    viscosity_m2_s: f64,
+    force_m_s2: [f64; 3],
+    implicit: [bool; 3],
 }
 
 impl Task<'_> {
     /// `star = dt (c N + c' N' - grad p + nu L u) + keep u`, without `nu L u` if `keep` is 1, in the rows of a block, with the history; returns the work of each
     /// component if `measured`.
-    pub(super) fn increments(
+    fn increments(
         &self,
         block: Block<'_>,
         (stage, stage_s, keep, measured): (&Stage, f64, f64, bool),
@@ -94,7 +176,7 @@ impl Task<'_> {
     }
 
     /// `star = N + nu L u` in plane `k` of component `axis`.
-    pub(super) fn accelerations(&self, [axis, k]: [usize; 2], star: &mut [f64], scratch: &mut Scratch) {
+    fn accelerations(&self, [axis, k]: [usize; 2], star: &mut [f64], scratch: &mut Scratch) {
         for (j, star) in star.chunks_mut(self.layout.shape.n[0]).enumerate() {
             if self.ops[axis].is_wall_row(j, k) {
                 star.fill(0.0);
@@ -108,7 +190,7 @@ impl Task<'_> {
         }
     }
 
-    /// `N`, the terms that are integrated explicitly, of one row into `out`, which holds what the model was lent; the Laplacian along
+    /// `N`, the terms that are integrated explicitly, of one row into `out`, which has the model's acceleration by stresses in planes; the Laplacian along
     /// the implicit axes into the scratch.
     fn terms(&self, [axis, j, k]: [usize; 3], out: &mut [f64], scratch: &mut Scratch, powers: Option<&mut Powers>) {
         let ops = &self.ops[axis];

@@ -27,9 +27,7 @@ impl Flow {
     /// If the residual of the pressure equation, which is the divergence of the new velocity, does not reach the tolerance,
     /// neither relative to what was to be corrected nor to the velocity over the cell.
     pub(super) fn project(&mut self, stage_s: f64) -> Result<Solved, Error> {
-        self.layout.slabs.halos(&mut [&mut self.work.star[2]], self.divergence.reach)?;
-        let star = self.work.star.each_ref().map(Aligned::as_slice);
-        self.divergence.apply(star, 1.0 / stage_s, &mut self.work.phi);
+        self.take_divergence(stage_s)?;
         let tolerance = self.settings.pressure_tolerance;
         let solved = self.pressure_solver.solve(&mut self.work.phi, tolerance);
         let phi = std::mem::take(&mut self.work.phi);
@@ -63,6 +61,14 @@ impl Flow {
         }
     }
 
+    /// The weighted divergence of `star` over `stage_s` into `phi`.
+    pub(super) fn take_divergence(&mut self, stage_s: f64) -> Result<(), Error> {
+        self.layout.slabs.halos(&mut [&mut self.work.star[2]], self.divergence.reach)?;
+        let star = self.work.star.each_ref().map(Aligned::as_slice);
+        self.divergence.apply(star, 1.0 / stage_s, &mut self.work.phi);
+        Ok(())
+    }
+
     /// Projects the velocity again till the norm of its weighted divergence over `stage_s` is at most `enough`, or falls no
     /// more; returns that norm. What the pressure adds goes to `phi`.
     pub(super) fn repeat(&mut self, stage_s: f64, enough: f64) -> Result<f64, Error> {
@@ -75,10 +81,8 @@ impl Flow {
                 return Ok(size);
             }
             last = size;
-            match self.pressure_solver.solve(&mut rest, self.settings.pressure_tolerance.max(REPETITION_TOLERANCE)) {
-                Ok(_) | Err(Error::PressureNotSolved { reason: PressureFailure::RoundOff { .. }, .. }) => {}
-                Err(other) => return Err(other),
-            }
+            let tolerance = self.settings.pressure_tolerance.max(REPETITION_TOLERANCE);
+            unless_stalled(self.pressure_solver.solve(&mut rest, tolerance))?;
             std::mem::swap(&mut self.work.star, &mut self.state.velocity);
             self.correct(stage_s, &rest)?;
             add(&mut self.work.phi, &rest, self.layout.shape);
@@ -97,5 +101,14 @@ impl Flow {
         self.state.energy = planes.iter().fold(0.0, |sum, plane| sum + plane[0]);
         self.state.courant_per_s = planes.iter().fold(0.0, |most, plane| if plane[1] > most { plane[1] } else { most });
         Ok(())
+    }
+}
+
+/// Takes what a solve reached whose residual round-off holds up, and what is not finite, which the step finds.
+pub(super) fn unless_stalled(solved: Result<Solved, Error>) -> Result<(), Error> {
+    match solved {
+        Err(Error::PressureNotSolved { reason: PressureFailure::Stalled, .. }) => solved.map(drop),
+        Err(Error::PressureNotSolved { .. }) => Ok(()),
+        other => other.map(drop),
     }
 }

@@ -77,11 +77,6 @@ impl PressureSolver {
         self.method.describe(self.operator.condition())
     }
 
-    /// A field that is free between solves.
-    pub(crate) fn spare(&mut self) -> &mut Aligned {
-        &mut self.right
-    }
-
     /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean, halos included.
     ///
     /// # Errors

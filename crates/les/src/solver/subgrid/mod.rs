@@ -23,7 +23,7 @@
 //! 150 steps; a step short enough gave the same noise and, to 5e-5, the same energy as the cut.
 //!
 //! Where no model is asked for there is none: no arrays, no work. A model takes 4 arrays of the size of the mesh, the multiscale
-//! one 5.
+//! one 7.
 //!
 //! Check: closed forms, laminar flows, walls, vortices, the energy identity, bits against threads.
 
@@ -40,7 +40,8 @@ use crate::solver::aligned::Aligned;
 use filter::{Filter, HIGHEST_ORDER};
 use operators::Operators;
 use stress::Stress;
-use viscosity::{Formula, Largest, eddy_viscosity};
+pub(crate) use viscosity::Largest;
+use viscosity::{Formula, eddy_viscosity};
 
 /// How the eddies below the mesh are modelled.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -85,22 +86,13 @@ impl SubgridModel {
     }
 }
 
-/// Fields of the flow that are free while a model is updated.
-#[derive(Debug)]
-pub(crate) struct Lent<'a> {
-    /// Gets the acceleration by the stresses whose divergence is taken in planes \[m/s^2\].
-    pub(crate) in_plane: &'a mut [Aligned; 3],
-    /// Get small scales of the first two components; made if they are not there.
-    pub(crate) small: [&'a mut Aligned; 2],
-}
-
 /// A subgrid model at work on one mesh.
 #[derive(Debug)]
 pub(crate) struct Subgrid {
     formula: Formula,
     operators: Operators,
-    /// The filter of the multiscale model, and the small scales of the last component.
-    small: Option<(Filter, Aligned)>,
+    /// The filter of the multiscale model, and the small scales of the flow.
+    small: Option<(Filter, [Aligned; 3])>,
     /// At the centres \[m^2/s\].
     viscosity: Aligned,
     largest: Largest,
@@ -119,7 +111,7 @@ impl Subgrid {
         Ok(Some(Self {
             formula,
             operators: Operators::new(layout),
-            small: order.map(|order| (Filter::new(layout, order), Aligned::zeros(cells))),
+            small: order.map(|order| (Filter::new(layout, order), [0, 1, 2].map(|_| Aligned::zeros(cells)))),
             viscosity: Aligned::zeros(cells),
             largest: Largest::default(),
             stress: Stress::new(cells),
@@ -128,22 +120,24 @@ impl Subgrid {
     }
 
     /// Eddy viscosity and stress of the flow `velocity_m_s`. The viscosity is cut where the shortest waves would decay faster
-    /// than `limit_per_s`, which an explicit time step could not follow; infinity leaves it as it is. What is lent keeps a part of
-    /// the divergence of the stress, for [`Self::add_divergence_row`].
+    /// than `limit_per_s`, which an explicit time step could not follow; infinity leaves it as it is. `in_plane` gets the acceleration by
+    /// the stresses whose divergence is taken in planes \[m/s^2\]; [`Self::add_divergence_row`] adds the rest.
     ///
     /// # Errors
     /// Those of the exchange between ranks.
-    pub(crate) fn update(&mut self, velocity_m_s: [&[f64]; 3], limit_per_s: f64, lent: Lent<'_>) -> Result<(), Error> {
+    pub(crate) fn update(
+        &mut self,
+        velocity_m_s: [&[f64]; 3],
+        limit_per_s: f64,
+        in_plane: &mut [Aligned; 3],
+    ) -> Result<(), Error> {
         let Self { operators, formula, viscosity, small, slabs, .. } = self;
         let largest = eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity);
         let [viscosity_m2_s, decay_per_s] = slabs.largest([largest.viscosity_m2_s, largest.decay_per_s])?;
         self.largest = Largest { viscosity_m2_s, decay_per_s };
         let strained = match small {
-            Some((filter, third)) => {
-                let [first, second] = lent.small;
-                first.fit(third.len());
-                second.fit(third.len());
-                let mut small = [first.as_mut_slice(), second, third];
+            Some((filter, small)) => {
+                let mut small = small.each_mut().map(Aligned::as_mut_slice);
                 filter.small_scales(velocity_m_s, &mut small);
                 let [a, b, c] = small;
                 slabs.halos(&mut [viscosity, &mut *a, &mut *b, &mut *c], operators.reach)?;
@@ -154,25 +148,20 @@ impl Subgrid {
                 velocity_m_s
             }
         };
-        self.stress.update(operators, viscosity, strained, lent.in_plane);
+        self.stress.update(operators, viscosity, strained, in_plane);
         let [a, b, c] = self.stress.across.each_mut().map(Aligned::as_mut_slice);
         slabs.halos(&mut [a, b, c], operators.reach)
     }
 
-    /// Adds the rest of the divergence of the stress to the acceleration of row `(j, k)` of one component, which has the part
-    /// that was lent \[m/s^2\]. Rows of walls get nothing.
+    /// Adds the rest of the divergence of the stress to the acceleration of row `(j, k)` of one component, which has that in
+    /// planes \[m/s^2\]. Rows of walls get nothing.
     pub(crate) fn add_divergence_row(&self, component: usize, j: usize, k: usize, out_m_s2: &mut [f64]) {
         self.stress.add_divergence_row(&self.operators, component, [j, k], out_m_s2);
     }
 
-    /// Largest eddy viscosity \[m^2/s\].
-    pub(crate) fn max_viscosity_m2_s(&self) -> f64 {
-        self.largest.viscosity_m2_s
-    }
-
-    /// Largest decay rate of the shortest waves by the eddy viscosity, before it was cut \[1/s\].
-    pub(crate) fn max_decay_per_s(&self) -> f64 {
-        self.largest.decay_per_s
+    /// The largest viscosity and decay rate of the last update.
+    pub(crate) fn largest(&self) -> Largest {
+        self.largest
     }
 
     /// Eddy viscosity at the centres, in the order of memory \[m^2/s\].

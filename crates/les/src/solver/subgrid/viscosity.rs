@@ -60,11 +60,11 @@ pub(super) fn eddy_viscosity(
 
 /// Extremes of the eddy viscosity.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Largest {
+pub(crate) struct Largest {
     /// \[m^2/s\].
-    pub(super) viscosity_m2_s: f64,
+    pub(crate) viscosity_m2_s: f64,
     /// Decay rate of the shortest waves, before the limit \[1/s\].
-    pub(super) decay_per_s: f64,
+    pub(crate) decay_per_s: f64,
 }
 
 impl Largest {

@@ -17,8 +17,6 @@ struct Modelled {
     velocity: [Vec<f64>; 3],
     model: Subgrid,
     in_plane: [Aligned; 3],
-    /// Small scales of the first two components.
-    small: [Aligned; 2],
 }
 
 impl Modelled {
@@ -30,21 +28,20 @@ impl Modelled {
         let velocity = faces(&mesh, &layout, field);
         let model = Subgrid::new(&layout, model).unwrap().unwrap();
         let field = || Aligned::zeros(layout.shape.len());
-        let (small, in_plane) = ([field(), field()], [field(), field(), field()]);
-        let mut modelled = Self { mesh, layout, velocity, model, in_plane, small };
+        let in_plane = [field(), field(), field()];
+        let mut modelled = Self { mesh, layout, velocity, model, in_plane };
         modelled.update(f64::INFINITY);
         modelled
     }
 
     fn update(&mut self, limit_per_s: f64) {
-        let lent = Lent { in_plane: &mut self.in_plane, small: self.small.each_mut() };
-        self.model.update(self.velocity.each_ref().map(Vec::as_slice), limit_per_s, lent).unwrap();
+        let velocity = self.velocity.each_ref().map(Vec::as_slice);
+        self.model.update(velocity, limit_per_s, &mut self.in_plane).unwrap();
     }
 
     /// The small scales of the multiscale model.
     fn small(&self) -> Option<[Vec<f64>; 3]> {
-        let [first, second] = &self.small;
-        self.model.small.as_ref().map(|(_, third)| [first, second, third].map(|scales| scales.to_vec()))
+        self.model.small.as_ref().map(|(_, small)| small.each_ref().map(|scales| scales.to_vec()))
     }
 
     fn index(&self, place: usize) -> [usize; 3] {
