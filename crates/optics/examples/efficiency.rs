@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("Cn2 = {cn2_m_m23:e} m^(-2/3), {} realisations, {seconds:.1} s", estimate.realisations);
     println!("  R/m  free     grid/exact-1 monostatic          bistatic            exact    z     lost");
     for (i, &range_m) in run.range_m.iter().enumerate() {
-        let screens = run.layers.screens_to(range_m, &run.turbulence.cn2)?;
+        let screens = run.layers.split_at(&run.range_m).screens_to(range_m, &run.turbulence.cn2)?;
         let exact = theory::bistatic_efficiency_screens(&run.telescope, &run.misalignment, &screens, &table, range_m)?;
         let mono = &estimate.monostatic;
         let (bi, bi_error) =

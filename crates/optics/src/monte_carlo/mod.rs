@@ -13,7 +13,6 @@ mod against_theory;
 #[cfg(test)]
 mod mutation;
 pub(crate) mod path;
-mod prepared;
 mod statistics;
 mod walk;
 
@@ -22,14 +21,13 @@ pub use walk::Sampling;
 
 use crate::beam::source::{aperture_field, check_grid};
 use crate::efficiency::EfficiencyProfile;
-use crate::monte_carlo::path::Program;
-use crate::monte_carlo::prepared::Prepared;
+use crate::monte_carlo::path::Path;
 use crate::monte_carlo::statistics::{Folding, Sample, bistatic, mean_and_variance};
 use crate::monte_carlo::walk::{GroupSums, Walker};
 use crate::screens::generator::ScreenGenerator;
 use crate::screens::grid::Grid;
 use crate::screens::kernel::Real;
-use crate::screens::propagate::Propagator;
+use crate::screens::propagate::{Propagator, Transfer};
 use crate::{Error, Misalignment, Telescope, Turbulence, theory};
 use rustfft::num_complex::Complex;
 use std::ops::ControlFlow;
@@ -66,6 +64,20 @@ pub struct Progress {
     pub relative_standard_error: f64,
 }
 
+/// Everything that is planned once and shared by all realisations.
+pub(crate) struct Prepared<T: Real> {
+    path: Path,
+    propagator: Propagator<T>,
+    transfers: Vec<Transfer<T>>,
+    screens: Option<ScreenGenerator<T>>,
+    /// Start fields: transmitted beam and, if displaced, BPLO.
+    start: Vec<Vec<Complex<T>>>,
+    folding: Folding,
+    /// lambda^2 R^2 / A_R times the area of a pixel, at each range.
+    scale: Vec<f64>,
+    power: f64,
+}
+
 /// A Monte-Carlo run: everything it depends on.
 #[derive(Debug, Clone)]
 pub struct MonteCarlo {
@@ -77,7 +89,7 @@ pub struct MonteCarlo {
     pub turbulence: Turbulence,
     /// Transverse grid.
     pub grid: Grid,
-    /// Layers of the path, one screen each.
+    /// Layers of the path, one screen each; a range inside a layer cuts it ([`Layers::split_at`]).
     pub layers: Layers,
     /// Ranges at which the efficiency is wanted \[m\], in any order, within the layers; results come in increasing
     /// order, each range once.
@@ -161,12 +173,12 @@ impl MonteCarlo {
         Ok(sums.samples.iter().map(|s| s[0].same_path).collect())
     }
 
-    /// The same run with its ranges in increasing order; one that is not a number is refused later, by name.
+    /// The same run with its ranges in increasing order, at which layers end; one that is not a number is refused later, by name.
     fn in_order(&self) -> Self {
         let mut range_m = self.range_m.clone();
         range_m.sort_by(f64::total_cmp);
         range_m.dedup();
-        Self { range_m, ..self.clone() }
+        Self { layers: self.layers.split_at(&range_m), range_m, ..self.clone() }
     }
 
     pub(crate) fn prepare<T: Real>(&self) -> Result<Prepared<T>, Error> {
@@ -177,10 +189,10 @@ impl MonteCarlo {
         let furthest = *self.range_m.last().ok_or(Error::Length { field: "range_m", found: 0, expected: 1 })?;
         check_grid(&telescope, &misalignment, &self.grid, furthest)?;
         let lambda = telescope.wavelength_m;
-        let program = Program::compile(&self.layers, &self.range_m, &cn2, &self.grid, lambda)?;
+        let path = Path::new(&self.layers, &self.range_m, &cn2, &self.grid, lambda)?;
         let propagator = Propagator::new(self.grid, lambda)?;
-        let transfers = program.distance_m.iter().map(|&d| propagator.transfer(d)).collect::<Result<_, _>>()?;
-        let screens = if program.strength.is_empty() {
+        let transfers = path.distance_m.iter().map(|&d| propagator.transfer(d)).collect::<Result<_, _>>()?;
+        let screens = if path.strength.is_empty() {
             None
         } else {
             Some(ScreenGenerator::new(self.grid, self.turbulence.spectrum.clone())?)
@@ -194,7 +206,7 @@ impl MonteCarlo {
         let scale = self.range_m.iter().map(|r| (lambda * r).powi(2) / telescope.aperture_area_m2() * pixel).collect();
         let power = start[0].iter().map(|e| e.norm_sqr().wide()).sum::<f64>() * pixel;
         Ok(Prepared {
-            program,
+            path,
             propagator,
             transfers,
             screens,

@@ -1,8 +1,7 @@
-//! The path as layers with one screen each, compiled into a list of steps that serves every output range in one pass.
+//! The path as layers with one screen each, laid out as legs from screen to screen that serve every range in one pass.
 //!
-//! The screen stands in the middle of its layer (half step, screen, half step). An output range inside a layer branches
-//! off at the start of the layer: half of what is left, the layer's screen weakened to that part, the other half.
-//! Check: the steps add up to each range; the screens of a range carry the turbulence of the path up to it.
+//! The screen stands in the middle of its layer (half step, screen, half step), and layers end at the ranges.
+//! Check: the legs add up to each range; the screens of a range carry the turbulence of the path up to it.
 
 use crate::Error;
 use crate::air::cn2::Cn2Path;
@@ -44,6 +43,17 @@ impl Layers {
         &self.end_m
     }
 
+    /// The layers of a run to these ranges: one with a range inside ends there, and the next begins.
+    #[must_use]
+    pub fn split_at(&self, range_m: &[f64]) -> Self {
+        let last = self.end_m[self.end_m.len() - 1];
+        let inside = |r: &&f64| **r > 0.0 && **r < last && !self.end_m.iter().any(|end| same(*end, **r));
+        let mut end_m: Vec<f64> = self.end_m.iter().chain(range_m.iter().filter(inside)).copied().collect();
+        end_m.sort_by(f64::total_cmp);
+        end_m.dedup_by(|b, a| same(*a, *b));
+        Self { end_m }
+    }
+
     /// Start and end of layer i \[m\].
     pub(crate) fn bounds_m(&self, i: usize) -> (f64, f64) {
         (if i == 0 { 0.0 } else { self.end_m[i - 1] }, self.end_m[i])
@@ -75,81 +85,47 @@ fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-9 * a.abs().max(b.abs())
 }
 
-/// One instruction of a compiled path.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Op {
-    /// `times` steps with transfer function `transfer`; the screen of a layer, if any, before the first.
-    Step { screen: Option<usize>, transfer: usize, times: usize },
-    /// A step that also leaves the field of output `output` on its way: transfer functions to the output and to the end.
-    Tap { screen: Option<usize>, transfers: [usize; 2], output: usize },
-    /// The field is that at output `output`.
-    Output { output: usize },
-    /// From here to output `output` on a copy: step, the screen of `layer` times `weight`, step.
-    Branch(Branch),
-}
-
-/// The way to an output inside a layer.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Branch {
-    pub(crate) layer: usize,
-    /// Factor of the layer's screen: the part of its turbulence that is crossed.
-    pub(crate) weight: f64,
-    /// Transfer function of a step, and how many there are on either side of the screen.
-    pub(crate) transfer: usize,
+/// The way from one place at which something happens to the next, after the screen of a layer, if any.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Leg {
+    pub(crate) screen: Option<usize>,
+    /// A range on the way, and the distance to it, where one transform from the same field serves both.
+    pub(crate) tap: Option<(usize, usize)>,
+    /// Distance of a step, and how many lead to the end.
+    pub(crate) distance: usize,
     pub(crate) times: usize,
-    pub(crate) output: usize,
+    /// Ranges at the end.
+    pub(crate) outputs: Vec<usize>,
 }
 
-/// Steps, distances and screen strengths of one path.
-#[derive(Debug, Clone)]
-pub(crate) struct Program {
-    pub(crate) ops: Vec<Op>,
-    /// Distances of the transfer functions \[m\].
+/// Legs, distances and screen strengths of one path.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Path {
+    pub(crate) legs: Vec<Leg>,
+    /// Distances of the steps \[m\].
     pub(crate) distance_m: Vec<f64>,
     /// sqrt(k^2 Cn2 dz) of each layer; empty without turbulence.
     pub(crate) strength: Vec<f64>,
-    /// Index of each distance by its logarithm in steps of rounding: paths of thousands of layers and ranges are compiled too.
+    /// Index of each distance by its logarithm in steps of rounding: paths of thousands of layers and ranges are laid out too.
     known: BTreeMap<i64, usize>,
 }
 
-struct Compiler<'a> {
-    program: Program,
-    position_m: f64,
-    pending: Option<usize>,
-    grid: &'a Grid,
-    wavelength_m: f64,
+/// A place on the path with a screen or ranges.
+struct Stop {
+    at_m: f64,
+    screen: Option<usize>,
+    outputs: Vec<usize>,
 }
 
-impl Compiler<'_> {
-    /// Index of a transfer function and how often it is applied.
-    fn transfer(&mut self, distance_m: f64) -> (usize, usize) {
-        let limit = self.grid.largest_step_m(self.wavelength_m);
-        let times = (distance_m / limit - 1e-9).ceil().max(1.0) as usize;
-        let piece = distance_m / times as f64;
-        let index = self.program.transfer_index(piece);
-        (index, times)
-    }
-
-    fn advance(&mut self, to_m: f64) {
-        if to_m > self.position_m && !same(to_m, self.position_m) {
-            let (transfer, times) = self.transfer(to_m - self.position_m);
-            self.program.ops.push(Op::Step { screen: self.pending.take(), transfer, times });
-            self.position_m = to_m;
-        }
-    }
-}
-
-impl Program {
-    /// Compiles the path for output ranges in any order. Without turbulence there are no screens.
-    pub(crate) fn compile(
+impl Path {
+    /// The path to ranges in increasing order, at which layers end. Without turbulence there are no screens.
+    pub(crate) fn new(
         layers: &Layers,
         range_m: &[f64],
         cn2: &Cn2Path,
         grid: &Grid,
         wavelength_m: f64,
     ) -> Result<Self, Error> {
-        let mut order: Vec<usize> = (0..range_m.len()).collect();
-        order.sort_by(|&a, &b| range_m[a].total_cmp(&range_m[b]));
         let last = layers.end_m[layers.end_m.len() - 1];
         for &r in range_m {
             crate::error::positive("range_m", r)?;
@@ -157,77 +133,64 @@ impl Program {
                 return Err(Error::OutOfRange { field: "range_m", value: r, allowed: "within the layers of the path" });
             }
         }
-        let program = Program { ops: Vec::new(), distance_m: Vec::new(), strength: Vec::new(), known: BTreeMap::new() };
-        let mut c = Compiler { program, position_m: 0.0, pending: None, grid, wavelength_m };
-        if cn2.is_none() {
-            for output in order {
-                c.advance(range_m[output]);
-                c.program.ops.push(Op::Output { output });
-            }
-            return Ok(c.program.with_taps(grid.largest_step_m(wavelength_m)));
-        }
-        let k = 2.0 * std::f64::consts::PI / wavelength_m;
-        let furthest = order.last().map_or(0.0, |&o| range_m[o]);
-        let mut next = 0;
-        for layer in 0..layers.end_m.len() {
-            let (start, end) = layers.bounds_m(layer);
+        let mut path = Self::default();
+        let mut stops: Vec<Stop> = Vec::new();
+        let mut output = 0;
+        let furthest = range_m.last().copied().unwrap_or_default();
+        for (start, end) in (0..layers.end_m.len()).map(|i| layers.bounds_m(i)) {
             if start >= furthest || same(start, furthest) {
                 break;
             }
-            let cn2_thickness = cn2.mean(start, end)? * (end - start);
-            c.program.strength.push(k * cn2_thickness.sqrt());
-            while next < order.len() && range_m[order[next]] < end && !same(range_m[order[next]], end) {
-                let output = order[next];
-                let part = range_m[output] - start;
-                c.advance(start);
-                let (transfer, times) = c.transfer(0.5 * part);
-                let ratio = cn2.mean(start, range_m[output])? * part / cn2_thickness;
-                let weight = if cn2_thickness > 0.0 { ratio.sqrt() } else { 0.0 };
-                c.program.ops.push(Op::Branch(Branch { layer, weight, transfer, times, output }));
-                next += 1;
+            if !cn2.is_none() {
+                let cn2_thickness = cn2.mean(start, end)? * (end - start);
+                let screen = Some(path.strength.len());
+                path.strength.push(2.0 * std::f64::consts::PI / wavelength_m * cn2_thickness.sqrt());
+                stops.push(Stop { at_m: 0.5 * (start + end), screen, outputs: Vec::new() });
             }
-            if next == order.len() {
-                break;
-            }
-            c.advance(0.5 * (start + end));
-            c.pending = Some(layer);
-            while next < order.len() && same(range_m[order[next]], end) {
-                c.advance(end);
-                c.program.ops.push(Op::Output { output: order[next] });
-                next += 1;
-            }
-        }
-        Ok(c.program.with_taps(grid.largest_step_m(wavelength_m)))
-    }
-
-    /// Joins step, output, step into one step with a tap where one transfer function reaches.
-    fn with_taps(mut self, largest_step_m: f64) -> Self {
-        let mut ops: Vec<Op> = Vec::with_capacity(self.ops.len());
-        for op in std::mem::take(&mut self.ops) {
-            let joined = match (&ops[..], op) {
-                (
-                    [.., Op::Step { screen, transfer: first, times: 1 }, Op::Output { output }],
-                    Op::Step { screen: None, transfer: second, times: 1 },
-                ) => Some((*screen, *first, second, *output)),
-                _ => None,
-            };
-            match joined {
-                Some((screen, first, second, output))
-                    if self.distance_m[first] + self.distance_m[second] <= largest_step_m =>
-                {
-                    let end = self.transfer_index(self.distance_m[first] + self.distance_m[second]);
-                    ops.truncate(ops.len() - 2);
-                    ops.push(Op::Tap { screen, transfers: [first, end], output });
+            while let Some(&r) = range_m.get(output).filter(|r| **r < end || same(**r, end)) {
+                match stops.last_mut().filter(|stop| same(stop.at_m, r)) {
+                    Some(stop) => stop.outputs.push(output),
+                    None => stops.push(Stop {
+                        at_m: if same(r, end) && !cn2.is_none() { end } else { r },
+                        screen: None,
+                        outputs: vec![output],
+                    }),
                 }
-                _ => ops.push(op),
+                output += 1;
             }
         }
-        self.ops = ops;
-        self
+        path.lay(stops, grid.largest_step_m(wavelength_m));
+        Ok(path)
     }
 
-    /// Index of the transfer function of a distance, new if need be.
-    fn transfer_index(&mut self, distance_m: f64) -> usize {
+    /// Legs from stop to stop; two become one with a tap where one step reaches past a range.
+    fn lay(&mut self, stops: Vec<Stop>, largest_step_m: f64) {
+        let mut legs: Vec<Leg> = Vec::new();
+        let mut from = Stop { at_m: 0.0, screen: None, outputs: Vec::new() };
+        for mut stop in stops {
+            let length_m = stop.at_m - from.at_m;
+            let times = (length_m / largest_step_m - 1e-9).ceil().max(1.0);
+            let (distance, outputs) = (self.step(length_m / times), std::mem::take(&mut stop.outputs));
+            legs.push(Leg { screen: from.screen, tap: None, distance, times: times as usize, outputs });
+            from = stop;
+        }
+        for leg in legs {
+            match self.legs.pop() {
+                Some(Leg { screen, tap: None, distance, times: 1, outputs })
+                    if outputs.len() == 1
+                        && (leg.screen, leg.times) == (None, 1)
+                        && self.distance_m[distance] + self.distance_m[leg.distance] <= largest_step_m =>
+                {
+                    let whole = self.step(self.distance_m[distance] + self.distance_m[leg.distance]);
+                    self.legs.push(Leg { screen, tap: Some((outputs[0], distance)), distance: whole, ..leg });
+                }
+                before => self.legs.extend(before.into_iter().chain([leg])),
+            }
+        }
+    }
+
+    /// Index of the distance of a step, new if need be.
+    fn step(&mut self, distance_m: f64) -> usize {
         let key = (distance_m.ln() * 1e9).round() as i64;
         let near = self.known.range(key - 1..=key + 1).find(|(_, i)| same(self.distance_m[**i], distance_m));
         if let Some((_, index)) = near {
@@ -240,13 +203,7 @@ impl Program {
 
     /// Fourier transform pairs of one realisation.
     pub(crate) fn transform_pairs(&self) -> f64 {
-        let pairs = |op: &Op| match *op {
-            Op::Step { times, .. } => times as f64,
-            Op::Tap { .. } => 1.5,
-            Op::Branch(Branch { times, .. }) => 2.0 * times as f64,
-            Op::Output { .. } => 0.0,
-        };
-        self.ops.iter().map(pairs).sum()
+        self.legs.iter().map(|leg| if leg.tap.is_some() { 1.5 } else { leg.times as f64 }).sum()
     }
 }
 
@@ -257,34 +214,26 @@ mod tests {
 
     const UNIFORM: Cn2Path = Cn2Path::Uniform { cn2_m_m23: 1e-14 };
 
-    fn compile(layers: &Layers, range_m: &[f64], cn2: &Cn2Path) -> Program {
-        Program::compile(layers, range_m, cn2, &Grid::table2(), 1.55e-6).unwrap()
+    fn path(layers: &Layers, range_m: &[f64], cn2: &Cn2Path) -> Path {
+        Path::new(&layers.split_at(range_m), range_m, cn2, &Grid::table2(), 1.55e-6).unwrap()
     }
 
     #[test]
-    fn steps_add_up_to_each_range_in_any_order() {
+    fn legs_add_up_to_each_range_and_taps_are_passed() {
         let layers = Layers::equal(10, 3000.0).unwrap();
-        let range_m = [900.0, 40.0, 3000.0, 300.0, 500.0];
+        let range_m = [40.0, 300.0, 500.0, 900.0, 3000.0];
         for cn2 in [UNIFORM, Cn2Path::None] {
-            let p = compile(&layers, &range_m, &cn2);
+            let p = path(&layers, &range_m, &cn2);
             let (mut at, mut seen) = (0.0, 0);
-            for op in &p.ops {
-                match *op {
-                    Op::Step { transfer, times, .. } => at += p.distance_m[transfer] * times as f64,
-                    Op::Tap { transfers, output, .. } => {
-                        assert!((at + p.distance_m[transfers[0]] - range_m[output]).abs() < 1e-9);
-                        at += p.distance_m[transfers[1]];
-                        seen += 1;
-                    }
-                    Op::Output { output } => {
-                        assert!((at - range_m[output]).abs() < 1e-9);
-                        seen += 1;
-                    }
-                    Op::Branch(Branch { transfer, times, output, .. }) => {
-                        let end = at + 2.0 * p.distance_m[transfer] * times as f64;
-                        assert!((end - range_m[output]).abs() < 1e-9);
-                        seen += 1;
-                    }
+            for leg in &p.legs {
+                if let Some((output, distance)) = leg.tap {
+                    assert!((at + p.distance_m[distance] - range_m[output]).abs() < 1e-9);
+                    seen += 1;
+                }
+                at += p.distance_m[leg.distance] * leg.times as f64;
+                for &output in &leg.outputs {
+                    assert!((at - range_m[output]).abs() < 1e-9);
+                    seen += 1;
                 }
             }
             assert_eq!(seen, range_m.len());
@@ -292,13 +241,26 @@ mod tests {
     }
 
     #[test]
-    fn no_turbulence_compiles_to_no_screens() {
+    fn no_turbulence_means_no_screens() {
         let layers = Layers::equal(10, 3000.0).unwrap();
-        let p = compile(&layers, &[3000.0], &Cn2Path::Uniform { cn2_m_m23: 0.0 });
+        let p = path(&layers, &[3000.0], &Cn2Path::Uniform { cn2_m_m23: 0.0 });
         assert!(p.strength.is_empty());
-        assert!(p.ops.iter().all(|op| !matches!(op, Op::Step { screen: Some(_), .. } | Op::Branch(_))));
+        assert!(p.legs.iter().all(|leg| leg.screen.is_none()));
         // 3 km exceeds the limit of one step on this grid.
         assert_eq!(p.transform_pairs(), 3.0);
+    }
+
+    #[test]
+    fn layers_end_at_ranges_and_each_has_its_part_of_the_turbulence() {
+        let layers = Layers::equal(3, 900.0).unwrap();
+        let range_m = [50.0, 300.0, 450.0, 900.0];
+        let split = layers.split_at(&range_m);
+        assert_eq!(split.end_m(), [50.0, 300.0, 450.0, 600.0, 900.0]);
+        let p = path(&layers, &range_m, &UNIFORM);
+        let k = 2.0 * std::f64::consts::PI / 1.55e-6;
+        for (strength, thickness_m) in p.strength.iter().zip([50.0, 250.0, 150.0, 150.0, 300.0]) {
+            assert!((strength.powi(2) / (k * k * 1e-14 * thickness_m) - 1.0).abs() < 1e-12);
+        }
     }
 
     #[test]
@@ -315,7 +277,7 @@ mod tests {
     #[test]
     fn outputs_at_layer_ends_cost_half_a_transform_pair() {
         let layers = Layers::equal(10, 3000.0).unwrap();
-        let p = compile(&layers, layers.end_m(), &UNIFORM);
+        let p = path(&layers, layers.end_m(), &UNIFORM);
         // First half step, nine layers with a tap, last half step.
         assert_eq!(p.transform_pairs(), 1.0 + 9.0 * 1.5 + 1.0);
     }
@@ -323,7 +285,7 @@ mod tests {
     #[test]
     fn ranges_beyond_the_path_are_refused() {
         let layers = Layers::equal(4, 1000.0).unwrap();
-        assert_eq!(refused(Program::compile(&layers, &[1000.5], &UNIFORM, &Grid::table2(), 1.55e-6)), "range_m");
+        assert_eq!(refused(Path::new(&layers, &[1000.5], &UNIFORM, &Grid::table2(), 1.55e-6)), "range_m");
         assert_eq!(refused(Layers::equal(0, 1000.0)), "end_m");
         assert_eq!(refused(Layers::new(vec![10.0, 5.0])), "end_m");
     }

@@ -3,8 +3,8 @@
 //! Check: the Monte-Carlo tests; a group does not depend on which other groups exist.
 
 use crate::Error;
-use crate::monte_carlo::path::{Branch, Op};
-use crate::monte_carlo::prepared::Prepared;
+use crate::monte_carlo::Prepared;
+use crate::monte_carlo::path::Leg;
 use crate::monte_carlo::statistics::Sample;
 use crate::screens::generator::{ScreenWork, stream};
 use crate::screens::kernel::Real;
@@ -60,12 +60,16 @@ pub(crate) struct Walker<'a, T: Real> {
     rows: [Vec<T>; 4],
 }
 
-/// One realisation under way: its fields (transmitted beam, and BPLO if displaced) and its two screens at hand.
+/// Fields of both beams at one place (transmitted beam, and BPLO if displaced), and the power of the first.
+struct Fields<T: Real> {
+    beams: Vec<Vec<Complex<T>>>,
+    power: f64,
+}
+
+/// One realisation under way: its fields, those that a tap leaves, and its two screens at hand.
 struct Lane<T: Real> {
-    fields: Vec<Vec<Complex<T>>>,
-    /// Fields that a tap leaves.
-    taps: Vec<Vec<Complex<T>>>,
-    power: Vec<f64>,
+    here: Fields<T>,
+    tap: Fields<T>,
     screens: [Vec<T>; 2],
     /// Synthesis that filled `screens`.
     synthesis: Option<usize>,
@@ -80,44 +84,38 @@ struct Mark<T> {
     planes: Vec<Vec<T>>,
 }
 
-/// Output, marks of the lanes, and the product of two different realisations.
-type Measured<T> = (usize, Vec<Mark<T>>, Option<f64>);
-
 impl<'a, T: Real> Walker<'a, T> {
     pub(crate) fn new(prepared: &'a Prepared<T>, seed: u64, sampling: Sampling) -> Self {
         let grid = prepared.propagator.grid();
         let empty = || vec![T::zero(); if prepared.screens.is_some() { grid.points() } else { 0 }];
         let count = if prepared.screens.is_some() { 2 } else { 1 };
-        let lanes = (0..count)
-            .map(|_| Lane {
-                fields: prepared.start.clone(),
-                taps: prepared.start.clone(),
-                power: vec![prepared.power; prepared.start.len()],
-                screens: [empty(), empty()],
-                synthesis: None,
-                stream: 0,
-                sign: 1.0,
-            })
-            .collect();
+        let fields = || Fields { beams: prepared.start.clone(), power: prepared.power };
+        let lane = || Lane {
+            here: fields(),
+            tap: fields(),
+            screens: [empty(), empty()],
+            synthesis: None,
+            stream: 0,
+            sign: 1.0,
+        };
         Self {
             prepared,
             seed,
             sampling,
             work: prepared.propagator.work(),
             screen_work: prepared.screens.as_ref().map(|s| s.work()),
-            lanes,
+            lanes: (0..count).map(|_| lane()).collect(),
             rows: std::array::from_fn(|_| vec![T::zero(); grid.nx]),
         }
     }
 
     /// Realisations `first` to `first + count`, two side by side.
     pub(crate) fn group(mut self, first: usize, count: usize) -> Result<GroupSums<T>, Error> {
-        let outputs = self.prepared.scale.len();
-        let points = self.prepared.folding.points();
-        let beams = self.prepared.start.len();
-        let zero = |on: bool| if on { vec![vec![T::zero(); points]; outputs] } else { Vec::new() };
+        let prepared = self.prepared;
+        let outputs = prepared.scale.len();
+        let zero = |on: bool| vec![vec![T::zero(); prepared.folding.points()]; if on { outputs } else { 0 }];
         let mut sums = GroupSums {
-            planes: [zero(true), zero(beams > 1)],
+            planes: [zero(true), zero(prepared.start.len() > 1)],
             samples: vec![Vec::new(); outputs],
             products: vec![Vec::new(); outputs],
         };
@@ -128,15 +126,18 @@ impl<'a, T: Real> Walker<'a, T> {
             for lane in 0..active {
                 self.start_lane(lane, (pair + lane) as u64);
             }
-            let partner = self.sampling == Sampling::Antithetic && (pair / 2) % 2 == 1;
-            for op in &self.prepared.program.ops {
-                if let Some((output, marks, product)) = self.execute(*op, active)? {
+            let waits = self.sampling == Sampling::Antithetic && (pair / 2) % 2 == 0 && pair + 2 < first + count;
+            for leg in &prepared.path.legs {
+                for lane in 0..active {
+                    self.propagate(lane, leg)?;
+                }
+                let tapped = leg.tap.map(|(output, _)| (output, true));
+                for (output, is_tap) in tapped.into_iter().chain(leg.outputs.iter().map(|&output| (output, false))) {
+                    let (marks, product) = self.measure(output, active, is_tap);
                     sums.products[output].extend(product);
                     waiting[output].push(marks);
-                    let more = self.sampling == Sampling::Antithetic && !partner && pair + 2 < first + count;
-                    if !more {
-                        let marks = std::mem::take(&mut waiting[output]);
-                        self.collect(output, marks, &mut sums);
+                    if !waits {
+                        self.collect(output, std::mem::take(&mut waiting[output]), &mut sums);
                     }
                 }
             }
@@ -146,10 +147,9 @@ impl<'a, T: Real> Walker<'a, T> {
 
     fn start_lane(&mut self, lane: usize, realisation: u64) {
         let state = &mut self.lanes[lane];
-        for (field, start) in state.fields.iter_mut().zip(&self.prepared.start) {
+        for (field, start) in state.here.beams.iter_mut().zip(&self.prepared.start) {
             field.copy_from_slice(start);
         }
-        state.power.fill(self.prepared.power);
         state.synthesis = None;
         (state.stream, state.sign) = match self.sampling {
             Sampling::Independent => (realisation, 1.0),
@@ -161,132 +161,63 @@ impl<'a, T: Real> Walker<'a, T> {
         };
     }
 
-    /// Makes sure that the lane holds the screen of `layer`; two layers share one synthesis.
-    fn fetch_screen(&mut self, lane: usize, layer: usize) -> Result<(), Error> {
-        let (Some(generator), Some(work)) = (&self.prepared.screens, &mut self.screen_work) else {
-            return Ok(());
-        };
+    /// One leg of a lane: the screen, then free space, past a tap or in equal steps.
+    fn propagate(&mut self, lane: usize, leg: &Leg) -> Result<(), Error> {
+        let Self { prepared, work, .. } = self;
         let state = &mut self.lanes[lane];
-        if state.synthesis != Some(layer / 2) {
-            state.synthesis = Some(layer / 2);
-            let mut rng = stream(self.seed, state.stream, (layer / 2) as u64);
-            let [first, second] = &mut state.screens;
-            generator.fill_pair(&mut rng, work, first, second)?;
+        if let (Some(layer), Some(generator), Some(work)) = (leg.screen, &prepared.screens, &mut self.screen_work) {
+            // Two layers share one synthesis.
+            if state.synthesis.replace(layer / 2) != Some(layer / 2) {
+                let [first, second] = &mut state.screens;
+                generator.fill_pair(&mut stream(self.seed, state.stream, (layer / 2) as u64), work, first, second)?;
+            }
+        }
+        let Lane { here, tap, screens, sign, .. } = state;
+        let phase = |layer: usize| (&screens[layer % 2][..], T::of(*sign * prepared.path.strength[layer]));
+        let step = &prepared.transfers[leg.distance];
+        for beam in (0..here.beams.len()).rev() {
+            let field = &mut here.beams[beam];
+            let mut screen = leg.screen.map(phase);
+            if let Some((_, distance)) = leg.tap {
+                let steps = [&prepared.transfers[distance], step];
+                [tap.power, here.power] =
+                    prepared.propagator.step_with_tap(field, &mut tap.beams[beam], screen, steps, work)?;
+                continue;
+            }
+            for _ in 0..leg.times {
+                here.power = prepared.propagator.step(field, screen.take(), step, work)?;
+            }
         }
         Ok(())
     }
 
-    fn execute(&mut self, op: Op, active: usize) -> Result<Option<Measured<T>>, Error> {
-        let strength = &self.prepared.program.strength;
-        match op {
-            Op::Step { screen, transfer, times } => {
-                for lane in 0..active {
-                    if let Some(layer) = screen {
-                        self.fetch_screen(lane, layer)?;
-                    }
-                    let state = &mut self.lanes[lane];
-                    for (field, power) in state.fields.iter_mut().zip(&mut state.power) {
-                        for time in 0..times {
-                            let at_hand = screen.filter(|_| time == 0);
-                            let phase = at_hand.map(|layer| phase(&state.screens, layer, state.sign * strength[layer]));
-                            let transfer = &self.prepared.transfers[transfer];
-                            *power = self.prepared.propagator.step(field, phase, transfer, &mut self.work)?;
-                        }
-                    }
-                }
-                Ok(None)
-            }
-            Op::Tap { screen, transfers, output } => {
-                let mut kept = Vec::with_capacity(active);
-                for lane in 0..active {
-                    kept.push(self.tap(lane, screen, transfers)?);
-                }
-                let (marks, product) = self.measure(output, active);
-                for (state, power) in self.lanes.iter_mut().zip(kept) {
-                    std::mem::swap(&mut state.fields, &mut state.taps);
-                    state.power = power;
-                }
-                Ok(Some((output, marks, product)))
-            }
-            Op::Output { output } => {
-                let (marks, product) = self.measure(output, active);
-                Ok(Some((output, marks, product)))
-            }
-            Op::Branch(branch) => self.branch(branch, active).map(Some),
-        }
-    }
-
-    /// A step of one lane with a tap, after which the tapped fields stand in the place of the fields; the powers at the end.
-    fn tap(&mut self, lane: usize, screen: Option<usize>, transfers: [usize; 2]) -> Result<Vec<f64>, Error> {
-        if let Some(layer) = screen {
-            self.fetch_screen(lane, layer)?;
-        }
-        let strength = &self.prepared.program.strength;
-        let state = &mut self.lanes[lane];
-        let mut ends = Vec::with_capacity(state.fields.len());
-        let steps = transfers.map(|t| &self.prepared.transfers[t]);
-        for ((field, tap), power) in state.fields.iter_mut().zip(&mut state.taps).zip(&mut state.power) {
-            let phase = screen.map(|layer| phase(&state.screens, layer, state.sign * strength[layer]));
-            let [at_tap, at_end] = self.prepared.propagator.step_with_tap(field, tap, phase, steps, &mut self.work)?;
-            *power = at_tap;
-            ends.push(at_end);
-        }
-        std::mem::swap(&mut state.fields, &mut state.taps);
-        Ok(ends)
-    }
-
-    /// To an output inside a layer, and back to where it began.
-    fn branch(&mut self, branch: Branch, active: usize) -> Result<Measured<T>, Error> {
-        let Branch { layer, weight, transfer, times, output } = branch;
-        let mut kept = Vec::new();
-        for lane in 0..active {
-            self.fetch_screen(lane, layer)?;
-            let state = &mut self.lanes[lane];
-            let strength = state.sign * weight * self.prepared.program.strength[layer];
-            kept.push((state.fields.clone(), state.power.clone()));
-            let step = &self.prepared.transfers[transfer];
-            for (field, power) in state.fields.iter_mut().zip(&mut state.power) {
-                for time in 0..2 * times {
-                    let phase = (time == times).then(|| phase(&state.screens, layer, strength));
-                    *power = self.prepared.propagator.step(field, phase, step, &mut self.work)?;
-                }
-            }
-        }
-        let (marks, product) = self.measure(output, active);
-        for (lane, (fields, power)) in kept.into_iter().enumerate() {
-            self.lanes[lane].fields = fields;
-            self.lanes[lane].power = power;
-        }
-        Ok((output, marks, product))
-    }
-
     /// Overlaps and folded planes of the lanes at an output, and the product of the two lanes.
-    fn measure(&mut self, output: usize, active: usize) -> (Vec<Mark<T>>, Option<f64>) {
-        let prepared = self.prepared;
+    fn measure(&mut self, output: usize, active: usize, is_tap: bool) -> (Vec<Mark<T>>, Option<f64>) {
+        let Self { prepared, lanes, rows, .. } = self;
         let (nx, ny) = (prepared.propagator.grid().nx, prepared.propagator.grid().ny);
         let beams = prepared.start.len();
-        let mut marks: Vec<Mark<T>> = (0..active)
-            .map(|lane| Mark {
+        let fields: Vec<&Fields<T>> = lanes[..active].iter().map(|l| if is_tap { &l.tap } else { &l.here }).collect();
+        let mut marks: Vec<Mark<T>> = fields
+            .iter()
+            .map(|fields| Mark {
                 same_path: 0.0,
-                lost: 1.0 - self.lanes[lane].power[0] / prepared.power,
+                lost: 1.0 - fields.power / prepared.power,
                 planes: vec![vec![T::zero(); prepared.folding.points()]; beams],
             })
             .collect();
         let mut product = 0.0;
         for y in 0..ny {
-            for (lane, mark) in marks.iter_mut().enumerate() {
+            for (lane, (fields, mark)) in fields.iter().zip(&mut marks).enumerate() {
                 for beam in 0..beams {
-                    let row = &mut self.rows[2 * lane + beam];
-                    T::intensity(&self.lanes[lane].fields[beam][y * nx..(y + 1) * nx], T::one(), row);
+                    let row = &mut rows[2 * lane + beam];
+                    T::intensity(&fields.beams[beam][y * nx..(y + 1) * nx], T::one(), row);
                     prepared.folding.add_row(y, row, &mut mark.planes[beam]);
                 }
-                let (sent, received) = (&self.rows[2 * lane], &self.rows[2 * lane + beams - 1]);
-                mark.same_path += T::dot(sent, received);
+                mark.same_path += T::dot(&rows[2 * lane], &rows[2 * lane + beams - 1]);
             }
             if active == 2 {
-                let last = beams - 1;
-                product += 0.5 * T::dot(&self.rows[0], &self.rows[2 + last]);
-                product += 0.5 * T::dot(&self.rows[2], &self.rows[last]);
+                product += 0.5 * T::dot(&rows[0], &rows[1 + beams]);
+                product += 0.5 * T::dot(&rows[2], &rows[beams - 1]);
             }
         }
         for mark in &mut marks {
@@ -295,13 +226,13 @@ impl<'a, T: Real> Walker<'a, T> {
         (marks, (active == 2).then_some(product * prepared.scale[output]))
     }
 
-    /// Joins the marks of each lane into one sample and adds them up.
-    fn collect(&mut self, output: usize, marks: Vec<Vec<Mark<T>>>, sums: &mut GroupSums<T>) {
+    /// Joins the marks of each lane, those of partners side by side, into one sample and adds them up.
+    fn collect(&self, output: usize, marks: Vec<Vec<Mark<T>>>, sums: &mut GroupSums<T>) {
         let folding = &self.prepared.folding;
-        let mut lanes: Vec<Vec<Mark<T>>> = (0..2).map(|_| Vec::new()).collect();
+        let mut lanes: [Vec<Mark<T>>; 2] = [Vec::new(), Vec::new()];
         for side_by_side in marks {
-            for (lane, mark) in side_by_side.into_iter().enumerate() {
-                lanes[lane].push(mark);
+            for (lane, mark) in lanes.iter_mut().zip(side_by_side) {
+                lane.push(mark);
             }
         }
         for mut marks in lanes {
@@ -310,10 +241,8 @@ impl<'a, T: Real> Walker<'a, T> {
             let lost = marks.iter().map(|m| m.lost).sum::<f64>() / count;
             let Some(mut joined) = marks.pop() else { continue };
             for other in marks {
-                for (a, b) in joined.planes.iter_mut().zip(other.planes) {
-                    for (a, b) in a.iter_mut().zip(b) {
-                        *a = (*a + b) * T::of(0.5);
-                    }
+                for (a, b) in joined.planes.iter_mut().flatten().zip(other.planes.into_iter().flatten()) {
+                    *a = (*a + b) * T::of(0.5);
                 }
             }
             let last = joined.planes.len() - 1;
@@ -334,9 +263,4 @@ impl<'a, T: Real> Walker<'a, T> {
             }
         }
     }
-}
-
-/// The screen of a layer with its strength.
-fn phase<T: Real>(screens: &[Vec<T>; 2], layer: usize, strength: f64) -> (&[T], T) {
-    (&screens[layer % 2], T::of(strength))
 }

@@ -18,7 +18,7 @@ pub use violation::{Limit, SetUp, Violation};
 
 use crate::air::cn2::Cn2Path;
 use crate::air::turbulence::path_rytov_variance;
-use crate::monte_carlo::path::{Layers, Program};
+use crate::monte_carlo::path::{Layers, Path};
 use crate::monte_carlo::{GROUP, GROUPS_PER_WAVE};
 use crate::screens::generator::ScreenGenerator;
 use crate::screens::grid::Grid;
@@ -202,13 +202,14 @@ impl Limits<'_> {
         runs: &[&[f64]],
     ) -> Result<Plan, Error> {
         let (lambda, furthest) = (self.telescope.wavelength_m, last(range_m)?);
-        let program = Program::compile(layers, range_m, &self.cn2, grid, lambda)?;
-        let layer_rytov_variance = worst_rytov(&self.cn2, lambda, layers, furthest)?;
-        let gap_list = self.gaps(range_m)?.of(layers)?;
+        let split = layers.split_at(range_m);
+        let path = Path::new(&split, range_m, &self.cn2, grid, lambda)?;
+        let layer_rytov_variance = worst_rytov(&self.cn2, lambda, &split, furthest)?;
+        let gap_list = self.gaps(range_m)?.of(&split)?;
         let beams = if self.misalignment == Misalignment::NONE { 1 } else { 2 };
         let warnings = self.warnings(grid, layer_rytov_variance, &gap_list, range_m, verdict, runs)?;
-        let pairs = program.transform_pairs() * beams as f64;
-        let transfers = program.distance_m.len() * (grid.nx + grid.ny) * 8;
+        let pairs = path.transform_pairs() * beams as f64;
+        let transfers = path.distance_m.len() * (grid.nx + grid.ny) * 8;
         let group_bytes = group_bytes(grid, range_m.len(), beams);
         Ok(Plan {
             grid: *grid,
@@ -218,7 +219,7 @@ impl Limits<'_> {
             gaps: gap_list,
             memory_bytes: GROUPS_PER_WAVE * group_bytes + shared_bytes(grid, range_m.len(), beams) + transfers,
             group_bytes,
-            realisation_cpu_s: grid.points() as f64 * (LAYER_S * pairs + SCREEN_S * program.strength.len() as f64),
+            realisation_cpu_s: grid.points() as f64 * (LAYER_S * pairs + SCREEN_S * path.strength.len() as f64),
             warnings,
         })
     }

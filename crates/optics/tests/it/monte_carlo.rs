@@ -28,7 +28,8 @@ pub(crate) fn bistatic_z(run: &MonteCarlo, estimate: &EfficiencyEstimate) -> Vec
         .iter()
         .enumerate()
         .map(|(i, &range_m)| {
-            let screens = run.layers.screens_to(range_m, &run.turbulence.cn2).expect("screens");
+            let layers = run.layers.split_at(&run.range_m);
+            let screens = layers.screens_to(range_m, &run.turbulence.cn2).expect("screens");
             let exact = bistatic_efficiency_screens(&run.telescope, &run.misalignment, &screens, &table, range_m);
             (bistatic.mean[i] - exact.expect("theory")) / bistatic.standard_error[i]
         })
