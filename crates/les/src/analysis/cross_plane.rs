@@ -91,15 +91,7 @@ impl Flow {
         self.plane_snapshot(&self.cross_plane(x_m)?, outside)
     }
 
-    /// The velocity averaged along the flight, at the centres of the cells; its `x_m` is the middle of the mesh.
-    ///
-    /// # Errors
-    /// [`Error::RankLost`].
-    pub fn mean_cross_plane(&self) -> Result<CrossPlane, Error> {
-        self.mean_plane_of(&self.faces()?)
-    }
-
-    /// The same of the velocity at the faces.
+    /// The velocity at the faces averaged along the flight, at the centres of the cells; its `x_m` is the middle of the mesh.
     pub(super) fn mean_plane_of(&self, faces: &Faces) -> Result<CrossPlane, Error> {
         let mesh = self.mesh();
         let along = &mesh.directions()[0];

@@ -71,18 +71,6 @@ impl GridSnapshot {
         Ok(Self { y, z, outside: mesh.outside, velocity_m_s, max_gradient_per_s })
     }
 
-    /// Samples `wind` at the nodes of a mesh, in the plane x = 0 at `time_s`.
-    ///
-    /// # Errors
-    /// As [`GridSnapshot::new`], and what `wind` returns.
-    pub fn sample_from(wind: &dyn Wind, mesh: &PlaneMesh, time_s: f64) -> Result<Self, Error> {
-        let points_m: Vec<[f64; 3]> =
-            mesh.z_m.iter().flat_map(|&z_m| mesh.y_m.iter().map(move |&y_m| [0.0, y_m, z_m])).collect();
-        let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-        wind.velocity_into(&points_m, time_s, &mut velocity_m_s)?;
-        Self::new(mesh, &velocity_m_s)
-    }
-
     /// Velocity at `(y, z)`, or `None` outside, (26).
     fn interpolate(&self, y_m: f64, z_m: f64) -> Option<[f64; 3]> {
         let (first_y, weights_y) = self.y.stencil(y_m)?;

@@ -200,8 +200,13 @@ fn records_on_ranks_have_the_bits_of_one_process_in_every_order_in_memory() {
             let mut meter = meter(&flow);
             let first = meter.measure(&flow)?;
             flow.step()?;
-            let planes = [flow.cross_plane(0.13)?, flow.mean_cross_plane()?];
-            Ok::<_, Error>((first, meter.measure(&flow)?, planes, bits(&flow.vorticity_magnitude_per_s()?)))
+            let planes = [flow.cross_plane(0.13)?, flow.mean_plane_of(&flow.faces()?)?];
+            Ok::<_, Error>((
+                first,
+                meter.measure(&flow)?,
+                planes,
+                bits(&flow.whole(flow.own_vorticity_magnitude_per_s())),
+            ))
         };
         let alone = records(Arc::new(Single)).unwrap();
         assert!(alone.1.left.slices_m.iter().all(|slice| slice[0] < 0.0), "{:?}", alone.1.left.slices_m);

@@ -10,6 +10,8 @@
 mod cores;
 mod meter;
 mod record;
+#[cfg(test)]
+mod reduced;
 mod scales;
 mod slope;
 mod spectrum;

@@ -205,16 +205,8 @@ impl Curl {
 }
 
 impl Flow {
-    /// Magnitude of the vorticity at the centres of the cells \[1/s\], `[z][y][x]`, for flows that are periodic in x and
-    /// bounded in z.
-    ///
-    /// # Errors
-    /// [`Error::BadDirection`] for other flows.
-    pub fn vorticity_magnitude_per_s(&self) -> Result<Vec<f64>, Error> {
-        Ok(self.whole(Ok(self.own_vorticity_magnitude_per_s()?)))
-    }
-
-    /// The same in the planes of [`Self::own_planes`].
+    /// Magnitude of the vorticity at the centres of the cells in the planes of [`Self::own_planes`] \[1/s\], `[z][y][x]`, for flows that
+    /// are periodic in x and bounded in z.
     ///
     /// # Errors
     /// [`Error::BadDirection`] for other flows, [`Error::RankLost`].
@@ -256,7 +248,7 @@ mod tests {
             PI * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]).sqrt()
         };
         let flow = start(48, 0.01, field);
-        let found = flow.vorticity_magnitude_per_s().unwrap();
+        let found = flow.own_vorticity_magnitude_per_s().unwrap();
         let (x_m, y_m, z_m) = (flow.mesh().centre_m(0), flow.mesh().centre_m(1), flow.mesh().centre_m(2));
         let largest = 3.0 * PI;
         for (place, found) in found.iter().enumerate() {
