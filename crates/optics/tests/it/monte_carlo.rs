@@ -51,7 +51,7 @@ fn bistatic_mean_agrees_with_exact_theory_and_monostatic_exceeds_it() {
 }
 
 #[test]
-fn branches_profiles_and_displaced_beams_agree_with_exact_theory() {
+fn ranges_inside_layers_profiles_and_displaced_beams_agree_with_exact_theory() {
     let mut run = coarse(1e-13, 9);
     run.telescope.focus = Focus::At(900.0);
     run.misalignment = Misalignment { offset_m: [0.01, 0.0], tilt_rad: [0.0, 1e-5] };
