@@ -20,29 +20,12 @@ const MAGIC: [u8; 16] = *b"\x89WAKEFLOW\r\n\x1a\n\0\0\0";
 const CHECKSUM_BYTES: u64 = 32;
 /// Bytes before the first section.
 const HEAD_BYTES: u64 = 48;
-/// Values converted at once.
-const BATCH: usize = 8192;
 
 /// SHA-256.
 pub(super) type Checksum = [u8; CHECKSUM_BYTES as usize];
 
 /// Name of a section.
 pub(super) type Tag = [u8; 8];
-
-/// Content of a section.
-pub(super) enum Content<'a> {
-    Bytes(&'a [u8]),
-    Floats(&'a [f64]),
-}
-
-impl Content<'_> {
-    fn bytes(&self) -> u64 {
-        match self {
-            Self::Bytes(bytes) => bytes.len() as u64,
-            Self::Floats(values) => 8 * values.len() as u64,
-        }
-    }
-}
 
 /// [`Error::File`] of a refusal.
 pub(super) fn refused(action: &'static str, path: &Path, error: &io::Error) -> Error {
@@ -60,17 +43,14 @@ pub(super) struct Planes {
 pub(super) fn begin(
     path: &Path,
     version: u32,
-    sections: &[(Tag, Content<'_>)],
+    sections: &[(Tag, Vec<u8>)],
     [planes, plane_bytes]: [u64; 2],
 ) -> Result<Planes, Error> {
     let mut bytes = Vec::new();
     for (tag, content) in sections {
         bytes.extend(tag);
-        bytes.extend(content.bytes().to_le_bytes());
-        match content {
-            Content::Bytes(content) => bytes.extend(*content),
-            Content::Floats(values) => bytes.extend(values.iter().flat_map(|v| v.to_le_bytes())),
-        }
+        bytes.extend((content.len() as u64).to_le_bytes());
+        bytes.extend(content);
     }
     let numbers = [bytes.len() as u64, planes, plane_bytes].into_iter().flat_map(u64::to_le_bytes);
     let counts = [version, sections.len() as u32].into_iter().flat_map(u32::to_le_bytes);
@@ -148,14 +128,12 @@ fn beside(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// A file whose checksum is right, read section after section.
+/// A file whose sections are whole, and whose planes are read one by one.
 #[derive(Debug)]
 pub(super) struct Reader {
     path: PathBuf,
     file: BufReader<File>,
-    sections_left: u32,
-    /// Bytes of sections that are not read yet.
-    left: u64,
+    sections: Vec<(Tag, Vec<u8>)>,
     planes: Planes,
     /// Number of planes, and bytes of each.
     counts: [u64; 2],
@@ -196,26 +174,19 @@ impl Reader {
         let mut reader = Self {
             path: path.to_owned(),
             file: BufReader::with_capacity(1 << 18, file),
-            sections_left: (counts >> 32) as u32,
-            left: sections,
+            sections: Vec::new(),
             planes: Planes { start, checksum: [0; CHECKSUM_BYTES as usize] },
             counts: [planes, plane_bytes],
         };
-        reader.check(&head)?;
-        Ok(reader)
-    }
-
-    /// Reads the sections once against their checksum and goes back to the first one.
-    fn check(&mut self, head: &[u8]) -> Result<(), Error> {
-        let mut sections = vec![0; self.left as usize];
-        self.fill(&mut sections)?;
-        let mut stored = self.planes.checksum;
-        self.fill(&mut stored)?;
-        self.planes.checksum = Sha256::new().chain_update(head).chain_update(sections).finalize().into();
-        if self.planes.checksum != stored {
-            return Err(self.damaged("its checksum is wrong, so it was cut off or altered"));
+        let (mut content, mut stored) = (vec![0; sections as usize], reader.planes.checksum);
+        reader.fill(&mut content)?;
+        reader.fill(&mut stored)?;
+        reader.planes.checksum = Sha256::new().chain_update(head).chain_update(&content).finalize().into();
+        if reader.planes.checksum != stored {
+            return Err(damaged("its checksum is wrong, so it was cut off or altered"));
         }
-        self.seek(HEAD_BYTES)
+        reader.sections = sections_of(&content).ok_or_else(|| damaged("a section is not where it should be"))?;
+        Ok(reader)
     }
 
     fn seek(&mut self, place: u64) -> Result<(), Error> {
@@ -227,7 +198,7 @@ impl Reader {
         self.counts
     }
 
-    /// The bytes of a plane; sections cannot be read any more.
+    /// The bytes of a plane.
     pub(super) fn plane(&mut self, number: usize) -> Result<Vec<u8>, Error> {
         let [_, plane_bytes] = self.counts;
         self.seek(self.planes.start + number as u64 * (plane_bytes + CHECKSUM_BYTES))?;
@@ -252,48 +223,32 @@ impl Reader {
         })
     }
 
-    /// Length in bytes of the next section, which must have this tag.
-    fn section(&mut self, tag: &Tag) -> Result<u64, Error> {
-        let mut head = [0; 16];
-        if self.sections_left == 0 || self.left < head.len() as u64 {
-            return Err(self.damaged("a section is missing"));
-        }
-        self.fill(&mut head)?;
-        self.sections_left -= 1;
-        self.left -= head.len() as u64;
-        let [a, b, c, d, e, f, g, h] = head[8..] else { return Err(self.damaged("a section is missing")) };
-        let bytes = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
-        if head[..8] != tag[..] || bytes > self.left {
-            return Err(self.damaged("a section is not where it should be"));
-        }
-        self.left -= bytes;
-        Ok(bytes)
+    /// The section of this tag as bytes.
+    pub(super) fn bytes(&self, tag: &Tag) -> Result<&[u8], Error> {
+        let found = self.sections.iter().find(|section| section.0 == *tag);
+        found.map(|section| &section.1[..]).ok_or_else(|| self.damaged("a section is missing"))
     }
 
-    /// The next section as bytes.
-    pub(super) fn bytes(&mut self, tag: &Tag) -> Result<Vec<u8>, Error> {
-        let mut content = vec![0; self.section(tag)? as usize];
-        self.fill(&mut content)?;
-        Ok(content)
+    /// The section of this tag as numbers.
+    pub(super) fn floats(&self, tag: &Tag) -> Result<Vec<f64>, Error> {
+        match self.bytes(tag)?.as_chunks::<8>() {
+            (numbers, []) => Ok(numbers.iter().map(|b| f64::from_le_bytes(*b)).collect()),
+            _ => Err(self.damaged("a section is not made of numbers")),
+        }
     }
+}
 
-    /// The next section as numbers.
-    pub(super) fn floats(&mut self, tag: &Tag) -> Result<Vec<f64>, Error> {
-        let bytes = self.section(tag)?;
-        if bytes % 8 != 0 {
-            return Err(self.damaged("a section is not made of numbers"));
-        }
-        let mut values = Vec::with_capacity((bytes / 8) as usize);
-        let mut buffer = vec![0; 8 * BATCH];
-        let mut left = bytes;
-        while left > 0 {
-            let count = left.min(buffer.len() as u64) as usize;
-            self.fill(&mut buffer[..count])?;
-            values.extend(buffer[..count].as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)));
-            left -= count as u64;
-        }
-        Ok(values)
+/// The sections that follow one another in `bytes`.
+fn sections_of(mut bytes: &[u8]) -> Option<Vec<(Tag, Vec<u8>)>> {
+    let mut sections = Vec::new();
+    while !bytes.is_empty() {
+        let (tag, rest) = bytes.split_first_chunk::<8>()?;
+        let (length, rest) = rest.split_first_chunk::<8>()?;
+        let (content, rest) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+        sections.push((*tag, content.to_vec()));
+        bytes = rest;
     }
+    Some(sections)
 }
 
 /// Reads as many bytes as there are, at most the length of `buffer`.

@@ -19,7 +19,7 @@ use super::settings::FlowSettings;
 use crate::Error;
 use crate::solver::aligned::Aligned;
 use crate::solver::slabs::WHOLE;
-use container::{Content, Planes, Reader, Tag};
+use container::{Planes, Reader, Tag};
 
 /// Version of the content. Raise it with every change of the sections, of the texts in [`identity`], or of what a run keeps
 /// beside the flow.
@@ -69,11 +69,11 @@ impl Flow {
         let text: String =
             identity(self.mesh(), self.settings(), &self.layout).iter().map(|(k, v)| format!("{k}\t{v}\n")).collect();
         let metrics = self.mesh().directions().each_ref().map(|d| metrics(d.cells, |xi| d.at(xi)));
-        let scalars = scalars(&self.state);
-        let mut sections = vec![(*IDENTITY, Content::Bytes(text.as_bytes()))];
-        sections.extend(METRICS.iter().zip(&metrics).map(|(tag, m)| (**tag, Content::Floats(m))));
-        sections.push((*SCALARS, Content::Bytes(&scalars)));
-        sections.push((*USER, Content::Bytes(user_data)));
+        let mut sections = vec![(*IDENTITY, text.into_bytes())];
+        let bytes = |values: &Vec<f64>| values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        sections.extend(METRICS.iter().zip(&metrics).map(|(tag, metrics)| (**tag, bytes(metrics))));
+        sections.push((*SCALARS, scalars(&self.state)));
+        sections.push((*USER, user_data.to_vec()));
         container::begin(path, VERSION, &sections, [self.layout.shape.n[2] as u64, self.plane_bytes()])
     }
 
@@ -113,7 +113,7 @@ impl Flow {
     fn read(path: &Path, mesh: &Mesh, settings: &FlowSettings) -> Result<(Self, Vec<u8>), Error> {
         let mut file = Reader::open(path, VERSION)?;
         let text = file.bytes(IDENTITY)?;
-        let Ok(text) = std::str::from_utf8(&text) else { return Err(file.damaged("its properties are no text")) };
+        let Ok(text) = std::str::from_utf8(text) else { return Err(file.damaged("its properties are no text")) };
         let wanted = identity(mesh, settings, &Layout::new(mesh));
         compare_identity(path, text, &wanted)?;
         for (axis, tag) in METRICS.iter().enumerate() {
@@ -122,9 +122,8 @@ impl Flow {
             compare_metrics(path, axis, &file.floats(tag)?, &present)?;
         }
         let mut flow = Self::at_rest(mesh.clone(), settings.clone())?;
-        read_scalars(&file.bytes(SCALARS)?, &mut flow.state)
-            .ok_or_else(|| file.damaged("its scalars are not whole"))?;
-        let user_data = file.bytes(USER)?;
+        read_scalars(file.bytes(SCALARS)?, &mut flow.state).ok_or_else(|| file.damaged("its scalars are not whole"))?;
+        let user_data = file.bytes(USER)?.to_vec();
         let shape = flow.layout.shape;
         if file.counts() != [shape.n[2] as u64, flow.plane_bytes()] {
             return Err(file.damaged("its fields are not of the size of the mesh"));
