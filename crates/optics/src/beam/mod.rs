@@ -136,14 +136,6 @@ impl Telescope {
         (-inner).exp() * -(inner - outer).exp_m1()
     }
 
-    /// Irradiance at the aperture \[1/m^2\] at distance `radius_m` from the axis, for unit power before truncation.
-    pub fn aperture_irradiance_per_m2(&self, radius_m: f64) -> f64 {
-        if radius_m > self.aperture_radius_m || radius_m < self.obscuration_radius_m {
-            return 0.0;
-        }
-        self.peak_irradiance_per_m2() * self.relative_irradiance(radius_m)
-    }
-
     /// Irradiance of the untruncated beam on its axis \[1/m^2\].
     pub(crate) fn peak_irradiance_per_m2(&self) -> f64 {
         let s = self.intensity_radius_m();
@@ -210,8 +202,8 @@ mod tests {
         for beam_radius_m in [0.01, 0.03, 1e6, f64::INFINITY] {
             for obscuration_radius_m in [0.0, 0.02] {
                 let t = Telescope { beam_radius_m, obscuration_radius_m, ..Telescope::table2() };
-                let power =
-                    rule.composite(obscuration_radius_m, 0.05, 20, |r| 2.0 * PI * r * t.aperture_irradiance_per_m2(r));
+                let irradiance = |r: f64| t.peak_irradiance_per_m2() * t.relative_irradiance(r);
+                let power = rule.composite(obscuration_radius_m, 0.05, 20, |r| 2.0 * PI * r * irradiance(r));
                 assert!((power / t.transmitted_fraction() - 1.0).abs() < 1e-9);
             }
         }

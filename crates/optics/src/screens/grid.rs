@@ -140,20 +140,10 @@ impl<T: Real> Fft2<T> {
 
     /// Stores a block of rows of `length` points, of which the first is row `first`, as columns of `out`.
     fn store_transposed(out: &mut [Complex<T>], length: usize, first: usize, block: &[Complex<T>]) {
-        let count = out.len() / length;
-        let height = block.len() / length;
-        if height == ROWS {
-            for (i, column) in out.chunks_exact_mut(count).enumerate() {
-                let target = &mut column[first..first + ROWS];
-                for (b, value) in target.iter_mut().enumerate() {
-                    *value = block[b * length + i];
-                }
-            }
-        } else {
-            for (i, column) in out.chunks_exact_mut(count).enumerate() {
-                for b in 0..height {
-                    column[first + b] = block[b * length + i];
-                }
+        let (count, height) = (out.len() / length, block.len() / length);
+        for (i, column) in out.chunks_exact_mut(count).enumerate() {
+            for (b, value) in column[first..first + height].iter_mut().enumerate() {
+                *value = block[b * length + i];
             }
         }
     }
@@ -171,49 +161,30 @@ impl<T: Real> Fft2<T> {
             let start = first * self.nx;
             block.copy_from_slice(&field[start..start + block.len()]);
             before(first, block);
-            self.forward[0].process_with_scratch(block, &mut inner[..self.forward[0].get_inplace_scratch_len()]);
+            transform(&self.forward[0], block, inner);
         });
     }
 
-    /// Rows `[kx][y]`: forward along y, `middle` on the spectrum `[kx][ky]` of each block, inverse along y, transposed
-    /// into `out` `[y]\[kx\]`.
-    pub(crate) fn filter_y(
+    /// Rows `[kx][y]`: forward along y, then for each of the fields `outs`, whose number `middle` is told: `middle` on the spectrum
+    /// `[kx][ky]` of each block, inverse along y, transposed into it, `[y]\[kx\]`.
+    pub(crate) fn filter_y<const N: usize>(
         &self,
         field: &[Complex<T>],
-        out: &mut [Complex<T>],
-        scratch: &mut FftScratch<T>,
-        mut middle: impl FnMut(usize, &mut [Complex<T>]),
-    ) {
-        let FftScratch { block, inner, .. } = scratch;
-        Self::transposing(out, self.ny, block, |first, block| {
-            let start = first * self.ny;
-            block.copy_from_slice(&field[start..start + block.len()]);
-            self.forward[1].process_with_scratch(block, &mut inner[..self.forward[1].get_inplace_scratch_len()]);
-            middle(first, block);
-            self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);
-        });
-    }
-
-    /// As [`Fft2::filter_y`] with two filters of the same spectrum into two fields: one forward transform serves both.
-    pub(crate) fn filter_y_twice(
-        &self,
-        field: &[Complex<T>],
-        outs: [&mut [Complex<T>]; 2],
+        mut outs: [&mut [Complex<T>]; N],
         scratch: &mut FftScratch<T>,
         mut middle: impl FnMut(usize, usize, &mut [Complex<T>]),
     ) {
         let FftScratch { block, spectrum, inner } = scratch;
-        let [first_out, second_out] = outs;
         for (index, rows) in field.chunks(ROWS * self.ny).enumerate() {
             let first = index * ROWS;
             let spectrum = &mut spectrum[..rows.len()];
             spectrum.copy_from_slice(rows);
-            self.forward[1].process_with_scratch(spectrum, &mut inner[..self.forward[1].get_inplace_scratch_len()]);
-            for (which, out) in [&mut *first_out, &mut *second_out].into_iter().enumerate() {
+            transform(&self.forward[1], spectrum, inner);
+            for (which, out) in outs.iter_mut().enumerate() {
                 let block = &mut block[..rows.len()];
                 block.copy_from_slice(spectrum);
                 middle(which, first, block);
-                self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);
+                transform(&self.inverse[1], block, inner);
                 Self::store_transposed(out, self.ny, first, block);
             }
         }
@@ -229,7 +200,7 @@ impl<T: Real> Fft2<T> {
         let FftScratch { block, inner, .. } = scratch;
         Self::transposing(out, self.ny, block, |first, block| {
             fill(first, block);
-            self.inverse[1].process_with_scratch(block, &mut inner[..self.inverse[1].get_inplace_scratch_len()]);
+            transform(&self.inverse[1], block, inner);
         });
     }
 
@@ -241,11 +212,15 @@ impl<T: Real> Fft2<T> {
         mut after: impl FnMut(usize, &mut [Complex<T>]),
     ) {
         for (block_index, block) in field.chunks_mut(ROWS * self.nx).enumerate() {
-            self.inverse[0]
-                .process_with_scratch(block, &mut scratch.inner[..self.inverse[0].get_inplace_scratch_len()]);
+            transform(&self.inverse[0], block, &mut scratch.inner);
             after(block_index * ROWS, block);
         }
     }
+}
+
+/// Transforms the rows of a block with a buffer that is large enough for all transforms.
+fn transform<T: Real>(plan: &Arc<dyn Fft<T>>, block: &mut [Complex<T>], inner: &mut [Complex<T>]) {
+    plan.process_with_scratch(block, &mut inner[..plan.get_inplace_scratch_len()]);
 }
 
 #[cfg(test)]
@@ -264,7 +239,7 @@ mod tests {
         let mut found = Complex::default();
         let (kx, ky) = (5usize, 3usize);
         let mut out = field.clone();
-        fft.filter_y(&b, &mut out, &mut scratch, |first, block| {
+        fft.filter_y(&b, [&mut out[..]], &mut scratch, |_, first, block| {
             if (first..first + block.len() / 23).contains(&kx) {
                 found = block[(kx - first) * 23 + ky];
             }

@@ -96,9 +96,8 @@ impl<T: Real> Propagator<T> {
         work: &mut PropagatorWork<T>,
     ) -> Result<f64, Error> {
         self.forward(field, screen, work)?;
-        let PropagatorWork { transposed, scratch } = work;
-        self.fft.filter_y(transposed, field, scratch, |kx, block| self.multiply(transfer, kx, block));
-        Ok(self.arrive(field, scratch))
+        let [power] = self.arrive([field], [transfer], work);
+        Ok(power)
     }
 
     /// Two steps of different length from the same field: `tap` gets the field at the distance of `transfers[0]`, `field`
@@ -119,11 +118,7 @@ impl<T: Real> Propagator<T> {
             return Err(Error::Length { field: "tap", found: tap.len(), expected });
         }
         self.forward(field, screen, work)?;
-        let PropagatorWork { transposed, scratch } = work;
-        self.fft.filter_y_twice(transposed, [&mut *tap, &mut *field], scratch, |which, kx, block| {
-            self.multiply(transfers[which], kx, block);
-        });
-        Ok([self.arrive(tap, scratch), self.arrive(field, scratch)])
+        Ok(self.arrive([tap, field], transfers, work))
     }
 
     /// Screen and transform along x into the transposed buffer.
@@ -152,23 +147,29 @@ impl<T: Real> Propagator<T> {
         Ok(())
     }
 
-    /// Transfer function on a block of rows `[kx][ky]`.
-    fn multiply(&self, transfer: &Transfer<T>, kx: usize, block: &mut [Complex<T>]) {
-        let ny = self.grid.ny;
-        for (i, line) in block.chunks_exact_mut(ny).enumerate() {
-            T::multiply_scaled(line, transfer.x[kx + i], &transfer.y);
-        }
-    }
-
-    /// Transform back along x and absorbing border; the power left.
-    fn arrive(&self, field: &mut [Complex<T>], scratch: &mut FftScratch<T>) -> f64 {
-        let mut power = 0.0;
-        self.fft.inverse_x(field, scratch, |y, block| {
-            for (i, line) in block.chunks_exact_mut(self.grid.nx).enumerate() {
-                power += T::absorb(line, self.window[1][y + i], &self.window[0]);
+    /// Transfer functions, transforms back and absorbing border; the powers left.
+    fn arrive<const N: usize>(
+        &self,
+        mut fields: [&mut [Complex<T>]; N],
+        transfers: [&Transfer<T>; N],
+        work: &mut PropagatorWork<T>,
+    ) -> [f64; N] {
+        let PropagatorWork { transposed, scratch } = work;
+        let Grid { nx, ny, dx_m, dy_m } = self.grid;
+        self.fft.filter_y(transposed, fields.each_mut().map(|field| &mut **field), scratch, |which, kx, block| {
+            for (i, line) in block.chunks_exact_mut(ny).enumerate() {
+                T::multiply_scaled(line, transfers[which].x[kx + i], &transfers[which].y);
             }
         });
-        power * self.grid.dx_m * self.grid.dy_m
+        fields.map(|field| {
+            let mut power = 0.0;
+            self.fft.inverse_x(field, scratch, |y, block| {
+                for (i, line) in block.chunks_exact_mut(nx).enumerate() {
+                    power += T::absorb(line, self.window[1][y + i], &self.window[0]);
+                }
+            });
+            power * dx_m * dy_m
+        })
     }
 }
 

@@ -6,7 +6,7 @@
 
 use crate::Error;
 use crate::beam::Telescope;
-use crate::error::{not_negative, positive};
+use crate::error::positive;
 use crate::quadrature::GaussLegendre;
 use crate::theory::overlap::check_fresnel_number;
 use num_complex::Complex;
@@ -53,23 +53,6 @@ impl Aperture {
     }
 }
 
-/// Irradiance of the transmitted beam at `range_m` in free space \[1/m^2\], for unit power before truncation.
-///
-/// # Errors
-/// [`Error::OutOfRange`] for a telescope, range (<= 0) or radius (< 0) that is not allowed, [`Error::FresnelNumber`] where the
-/// quadrature would need too many nodes.
-pub fn free_space_irradiance_per_m2(telescope: &Telescope, range_m: f64, radius_m: &[f64]) -> Result<Vec<f64>, Error> {
-    let telescope = telescope.validated()?;
-    let range_m = positive("range_m", range_m)?;
-    let mut largest = 0f64;
-    for &r in radius_m {
-        largest = largest.max(not_negative("radius_m", r)?);
-    }
-    check_fresnel_number(&telescope, range_m)?;
-    let aperture = Aperture::new(&telescope, range_m, largest);
-    Ok(radius_m.iter().map(|&r| aperture.irradiance_per_m2(r)).collect())
-}
-
 /// Free-space efficiency eta_s (19) by the Fresnel-Hankel integral: the independent check of
 /// [`crate::theory::free_space_efficiency`], slower, limited to about 1e-8 by the cut of its tail.
 ///
@@ -104,8 +87,9 @@ mod tests {
         let range_m = 900.0;
         let width2 = (s * (1.0 - range_m / 400.0)).powi(2) + (range_m / (t.wavenumber_rad_m() * s)).powi(2);
         let radius = [0.0, 0.01, 0.03, 0.06];
-        let found = free_space_irradiance_per_m2(&t, range_m, &radius).unwrap();
-        for (r, j) in radius.iter().zip(found) {
+        let aperture = Aperture::new(&t, range_m, 0.06);
+        for r in radius {
+            let j = aperture.irradiance_per_m2(r);
             let exact = (-r * r / width2).exp() / (PI * width2);
             assert!((j / exact - 1.0).abs() < 1e-10, "{r} {j} {exact}");
         }
@@ -114,9 +98,9 @@ mod tests {
     #[test]
     fn power_at_the_target_is_the_transmitted_fraction() {
         let t = Telescope { obscuration_radius_m: 0.01, ..Telescope::table2() };
-        let radius: Vec<f64> = (0..4000).map(|i| (f64::from(i) + 0.5) * 5e-4).collect();
-        let j = free_space_irradiance_per_m2(&t, 1500.0, &radius).unwrap();
-        let power: f64 = radius.iter().zip(&j).map(|(r, j)| 2.0 * PI * r * 5e-4 * j).sum();
+        let aperture = Aperture::new(&t, 1500.0, 2.0);
+        let radius = (0..4000).map(|i| (f64::from(i) + 0.5) * 5e-4);
+        let power: f64 = radius.map(|r| 2.0 * PI * r * 5e-4 * aperture.irradiance_per_m2(r)).sum();
         assert!((power / t.transmitted_fraction() - 1.0).abs() < 5e-3, "{power}");
     }
 }

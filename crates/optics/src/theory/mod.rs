@@ -14,6 +14,6 @@ pub use exact::{
     free_space_antenna_efficiency, free_space_efficiency, free_space_efficiency_misaligned, square_law_efficiency,
     untruncated_efficiency,
 };
-pub use hankel::{free_space_efficiency_hankel, free_space_irradiance_per_m2};
+pub use hankel::free_space_efficiency_hankel;
 pub use overlap::{LARGEST_FRESNEL_NUMBER, fresnel_number, quadrature_cost_s};
 pub use weak::{WeakTurbulence, weak_turbulence_efficiency};
