@@ -62,7 +62,7 @@ pub(crate) struct State {
 #[derive(Debug, Default)]
 pub(super) struct Work {
     pub(super) star: [Aligned; 3],
-    phi: Aligned,
+    pub(super) phi: Aligned,
 }
 
 impl Flow {

@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::aligned::Aligned;
-use super::flow::Flow;
+use super::flow::{Flow, Work};
 use super::layout::{Layout, Shape};
 use super::momentum::{Momentum, Scratch};
 use super::projection::weighted_dot;
@@ -107,8 +107,8 @@ impl Flow {
     /// The viscosity of the model for the present field, at most such that it decays by `limit_per_s`; its acceleration by stresses in
     /// planes into `star`, where the terms of the momentum equation are summed.
     fn update_model(&mut self, limit_per_s: f64) -> Result<(), Error> {
-        let Some(model) = &mut self.model else { return Ok(()) };
-        model.update(self.state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, &mut self.work.star)
+        let Self { model: Some(model), work: Work { star, phi }, .. } = self else { return Ok(()) };
+        model.update(self.state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, star, phi)
     }
 
     /// What the momentum equation reads, and what it writes: `star` and the history.

@@ -220,7 +220,7 @@ fn fitting(case: &FlowCase, cells: [usize; 3], dense: &[usize], available_bytes:
 fn memory_bytes(case: &FlowCase, [cells, whole]: [[usize; 3]; 2], dense: &[usize]) -> f64 {
     let model = match case.solver.subgrid {
         Subgrid::None {} => 0.0,
-        Subgrid::MultiscaleWale { .. } => 7.0,
+        Subgrid::MultiscaleWale { .. } => 6.0,
         Subgrid::Smagorinsky { .. } | Subgrid::Wale { .. } => 4.0,
     };
     let given = match &case.case {

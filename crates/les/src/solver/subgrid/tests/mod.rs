@@ -17,6 +17,8 @@ struct Modelled {
     velocity: [Vec<f64>; 3],
     model: Subgrid,
     in_plane: [Aligned; 3],
+    /// Small scales of the first component.
+    first: Aligned,
 }
 
 impl Modelled {
@@ -28,20 +30,23 @@ impl Modelled {
         let velocity = faces(&mesh, &layout, field);
         let model = Subgrid::new(&layout, model).unwrap().unwrap();
         let field = || Aligned::zeros(layout.shape.len());
-        let in_plane = [field(), field(), field()];
-        let mut modelled = Self { mesh, layout, velocity, model, in_plane };
+        let (in_plane, first) = ([field(), field(), field()], field());
+        let mut modelled = Self { mesh, layout, velocity, model, in_plane, first };
         modelled.update(f64::INFINITY);
         modelled
     }
 
     fn update(&mut self, limit_per_s: f64) {
         let velocity = self.velocity.each_ref().map(Vec::as_slice);
-        self.model.update(velocity, limit_per_s, &mut self.in_plane).unwrap();
+        self.model.update(velocity, limit_per_s, &mut self.in_plane, &mut self.first).unwrap();
     }
 
     /// The small scales of the multiscale model.
     fn small(&self) -> Option<[Vec<f64>; 3]> {
-        self.model.small.as_ref().map(|(_, small)| small.each_ref().map(|scales| scales.to_vec()))
+        self.model.small.as_ref().map(|(_, small)| {
+            let [second, third] = small;
+            [&self.first, second, third].map(|scales| scales.to_vec())
+        })
     }
 
     fn index(&self, place: usize) -> [usize; 3] {
