@@ -23,6 +23,7 @@ use super::projection::{Divergence, correct, weighted_dot};
 use super::report::{StartReport, StepReport};
 use super::settings::{FlowSettings, TimeScheme, refuse_sticking_without_viscosity};
 use super::slabs::WHOLE;
+use super::stage::Powers;
 use super::subgrid::Subgrid;
 use crate::Error;
 use crate::solver::aligned::Aligned;
@@ -190,23 +191,10 @@ impl Flow {
         Ok(report)
     }
 
-    /// Stage by stage: predicts the velocity, solves for implicit viscosity, projects, adds the pressure.
     fn step_by(&mut self, step_s: f64) -> Result<StepReport, Error> {
         let courant = step_s * self.state.courant_per_s;
         self.refuse_courant(courant, step_s)?;
-        let ratio = (self.state.last_step_s > 0.0).then(|| step_s / self.state.last_step_s);
-        let is_damped = self.state.step < self.settings.damped_steps;
-        let (mut begun, mut solved) = (None, None);
-        for stage in self.settings.scheme.stages(ratio) {
-            let stage_s = stage.fraction * step_s;
-            let powers = self.predict(&stage, stage_s, is_damped, begun.is_none())?;
-            begun.get_or_insert_with(|| (powers, self.first_terms(ratio)));
-            self.solve_viscous(stage_s * self.settings.viscosity_m2_s, is_damped)?;
-            solved = Some(self.project(stage_s)?);
-            self.add_pressure();
-        }
-        let ([viscous, subgrid, force], first_terms) = begun.unwrap_or_default();
-        self.state.history = first_terms.unwrap_or_else(|| std::mem::take(&mut self.state.history));
+        let ([viscous_power_m5_s3, subgrid_power_m5_s3, force_power_m5_s3], solved) = self.advance(step_s)?;
         self.state.step += 1;
         self.state.time_s += step_s;
         self.state.last_step_s = step_s;
@@ -221,15 +209,34 @@ impl Flow {
             step_s,
             courant,
             kinetic_energy_m5_s2: self.state.energy,
-            viscous_power_m5_s3: viscous,
-            subgrid_power_m5_s3: subgrid,
-            force_power_m5_s3: force,
+            viscous_power_m5_s3,
+            subgrid_power_m5_s3,
+            force_power_m5_s3,
             subgrid_viscosity_m2_s: largest.viscosity_m2_s,
             subgrid_decay: step_s * largest.decay_per_s,
             pressure_iterations: solved.map_or(0, |s| s.iterations),
             pressure_residual: solved.map(|s| s.residual),
             pressure_factor: solved.and_then(|s| s.factor),
         })
+    }
+
+    /// The stages of a step: each predicts the velocity, solves for implicit viscosity, projects, and adds the pressure. Returns the
+    /// powers of the field that it began with, and the last solution of the pressure.
+    fn advance(&mut self, step_s: f64) -> Result<(Powers, Option<Solved>), Error> {
+        let ratio = (self.state.last_step_s > 0.0).then(|| step_s / self.state.last_step_s);
+        let is_damped = self.state.step < self.settings.damped_steps;
+        let (mut begun, mut solved) = (None, None);
+        for stage in self.settings.scheme.stages(ratio) {
+            let stage_s = stage.fraction * step_s;
+            let powers = self.predict(&stage, stage_s, is_damped, begun.is_none())?;
+            begun.get_or_insert_with(|| (powers, self.first_terms(ratio)));
+            self.solve_viscous(stage_s * self.settings.viscosity_m2_s, is_damped)?;
+            solved = Some(self.project(stage_s)?);
+            self.add_pressure();
+        }
+        let (powers, first_terms) = begun.unwrap_or_default();
+        self.state.history = first_terms.unwrap_or_else(|| std::mem::take(&mut self.state.history));
+        Ok((powers, solved))
     }
 
     /// The terms of the initial field: Adams-Bashforth begins with a step of Runge-Kutta and then wants them.
