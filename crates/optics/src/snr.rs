@@ -126,6 +126,26 @@ mod tests {
     use crate::error::refused;
 
     #[test]
+    fn pulse_integral_tends_to_the_narrow_pulse_form() {
+        let model = SnrModel::table2();
+        let range_m = 1000.0;
+        let narrow = model.snr(range_m, 0.05).unwrap();
+        // The ratio (14) of each layer, weighted with the pulse |f|^2 of (7), within 6 sigma.
+        let gap = |sigma_s: f64| {
+            let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * sigma_s;
+            let layer = |x: f64| (-x * x).exp() / PI.sqrt() * model.snr(range_m + x * sigma_m, 0.05).unwrap();
+            crate::quadrature::GaussLegendre::new(16).composite(-6.0, 6.0, 6, layer) / narrow - 1.0
+        };
+        // Second order in the length: sigma_R^2/4 times the second derivative of K^2/R^2 over itself.
+        let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * 120e-9;
+        let a = 2.0 * model.extinction_per_m;
+        let curvature = 6.0 / range_m.powi(2) + 4.0 * a / range_m + a * a;
+        let expected = 0.25 * sigma_m * sigma_m * curvature;
+        assert!((gap(120e-9) / expected - 1.0).abs() < 0.02);
+        assert!(gap(1e-9).abs() < 1e-7);
+    }
+
+    #[test]
     fn hbar_is_two_pi_higher_and_bad_input_is_named() {
         let h = SnrModel::table2();
         let hbar = SnrModel { planck: PlanckConvention::Hbar, ..h };

@@ -12,18 +12,15 @@ use rayon::prelude::*;
 
 mod project;
 
-use project::unless_stalled;
-
 use super::implicit::LineSolvers;
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
 use super::momentum::{Momentum, Scratch, add_laplacian_row};
-use super::pressure::{PressureSolver, Solved};
+use super::pressure::{PressureSolver, Solved, unless_stalled};
 use super::projection::{Divergence, correct, weighted_dot};
-use super::report::{StartReport, StepReport};
+use super::report::{Powers, StartReport, StepReport};
 use super::settings::{FlowSettings, TimeScheme, refuse_sticking_without_viscosity};
 use super::slabs::WHOLE;
-use super::stage::Powers;
 use super::subgrid::Subgrid;
 use crate::Error;
 use crate::solver::aligned::Aligned;

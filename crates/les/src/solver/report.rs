@@ -1,5 +1,8 @@
 //! What a step and the start of a flow report.
 
+/// Work done on the fluid per time by viscosity, the subgrid stress and the force \[m^5/s^3\].
+pub(crate) type Powers = [f64; 3];
+
 /// What one step did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {

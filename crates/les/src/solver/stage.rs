@@ -8,12 +8,10 @@ use super::flow::{Flow, Work};
 use super::layout::{Layout, Shape};
 use super::momentum::{Momentum, Scratch};
 use super::projection::weighted_dot;
+use super::report::Powers;
 use super::settings::Stage;
 use super::subgrid::Subgrid;
 use crate::Error;
-
-/// Work done on the fluid per time by viscosity, the subgrid stress and the force.
-pub(super) type Powers = [f64; 3];
 
 /// Share of the explicit limit beyond which the subgrid viscosity is cut. In the core of a vortex WALE's viscosity has no
 /// work to do but would make an explicit step unstable; the cut keeps the step that convection allows.

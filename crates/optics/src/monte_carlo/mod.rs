@@ -13,6 +13,7 @@ mod against_theory;
 #[cfg(test)]
 mod mutation;
 pub(crate) mod path;
+mod prepared;
 mod statistics;
 mod walk;
 
@@ -22,12 +23,13 @@ pub use walk::Sampling;
 use crate::beam::source::{aperture_field, check_grid};
 use crate::efficiency::EfficiencyProfile;
 use crate::monte_carlo::path::Path;
+use crate::monte_carlo::prepared::Prepared;
 use crate::monte_carlo::statistics::{Folding, Sample, bistatic, mean_and_variance};
 use crate::monte_carlo::walk::{GroupSums, Walker};
 use crate::screens::generator::ScreenGenerator;
 use crate::screens::grid::Grid;
 use crate::screens::kernel::Real;
-use crate::screens::propagate::{Propagator, Transfer};
+use crate::screens::propagate::Propagator;
 use crate::{Error, Misalignment, Telescope, Turbulence, theory};
 use rustfft::num_complex::Complex;
 use std::ops::ControlFlow;
@@ -62,20 +64,6 @@ pub struct Progress {
     pub total: usize,
     /// Largest relative standard error of the monostatic mean over the ranges, so far.
     pub relative_standard_error: f64,
-}
-
-/// Everything that is planned once and shared by all realisations.
-pub(crate) struct Prepared<T: Real> {
-    path: Path,
-    propagator: Propagator<T>,
-    transfers: Vec<Transfer<T>>,
-    screens: Option<ScreenGenerator<T>>,
-    /// Start fields: transmitted beam and, if displaced, BPLO.
-    start: Vec<Vec<Complex<T>>>,
-    folding: Folding,
-    /// lambda^2 R^2 / A_R times the area of a pixel, at each range.
-    scale: Vec<f64>,
-    power: f64,
 }
 
 /// A Monte-Carlo run: everything it depends on.

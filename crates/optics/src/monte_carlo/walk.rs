@@ -3,8 +3,8 @@
 //! Check: the Monte-Carlo tests; a group does not depend on which other groups exist.
 
 use crate::Error;
-use crate::monte_carlo::Prepared;
 use crate::monte_carlo::path::Leg;
+use crate::monte_carlo::prepared::Prepared;
 use crate::monte_carlo::statistics::Sample;
 use crate::screens::generator::{ScreenWork, stream};
 use crate::screens::kernel::Real;

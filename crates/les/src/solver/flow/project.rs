@@ -10,7 +10,7 @@
 use super::{Flow, Solved, add, correct};
 use crate::error::{Error, PressureFailure};
 use crate::solver::aligned::Aligned;
-use crate::solver::pressure::norm;
+use crate::solver::pressure::{norm, unless_stalled};
 use crate::solver::slabs::WHOLE;
 
 /// Most repetitions.
@@ -101,14 +101,5 @@ impl Flow {
         self.state.energy = planes.iter().fold(0.0, |sum, plane| sum + plane[0]);
         self.state.courant_per_s = planes.iter().fold(0.0, |most, plane| if plane[1] > most { plane[1] } else { most });
         Ok(())
-    }
-}
-
-/// Takes what a solve reached whose residual round-off holds up, and what is not finite, which the step finds.
-pub(super) fn unless_stalled(solved: Result<Solved, Error>) -> Result<(), Error> {
-    match solved {
-        Err(Error::PressureNotSolved { reason: PressureFailure::Stalled, .. }) => solved.map(drop),
-        Err(Error::PressureNotSolved { .. }) => Ok(()),
-        other => other.map(drop),
     }
 }

@@ -1,11 +1,27 @@
-//! What a pressure solver needs for a mesh, before one is built.
+//! Which pressure solver a mesh gets, and what it needs, before one is built.
 //!
 //! Check: the directions that a solver names as products with a matrix.
 
 use super::super::layout::Layout;
 use super::super::mesh::Mesh;
+use super::direct;
 use super::transform::RowTransform;
-use super::{DENSE_LIMIT, PressureMethod, direct};
+
+/// How the pressure equation is solved.
+#[non_exhaustive]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PressureMethod {
+    /// The faster one for the mesh.
+    #[default]
+    Auto,
+    /// Transforms and a banded factorisation: the residual is round-off.
+    Direct,
+    /// A transform along one direction, and for each of its modes conjugate gradients with multigrid in the other two.
+    Multigrid,
+}
+
+/// Cells of a dense direction from which multigrid is faster to a residual of 1e-6.
+const DENSE_LIMIT: usize = 3000;
 
 impl PressureMethod {
     /// Cells of the directions that this method transforms by products with a dense matrix on `mesh`: a matrix of `n` x `n` takes

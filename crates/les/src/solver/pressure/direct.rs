@@ -21,7 +21,7 @@ use super::super::mesh::AXIS_NAMES;
 use super::banded_cholesky::{BandedCholesky, Scratch};
 use super::kernel;
 use super::lines::bundles;
-use super::solver::Method;
+use super::method::Method;
 use super::transform::{LineTransform, RowTransform, Work};
 use crate::Error;
 use crate::solver::slabs::Slabs;

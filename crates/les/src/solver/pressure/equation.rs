@@ -2,7 +2,7 @@
 
 use super::super::layout::Layout;
 use super::super::mesh::Mesh;
-use super::PressureMethod;
+use super::cost::PressureMethod;
 use super::solver::{PressureSolver, Solved, check_length};
 use crate::Error;
 

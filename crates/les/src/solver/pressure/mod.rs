@@ -13,6 +13,7 @@ mod fold;
 mod gemm;
 mod kernel;
 mod lines;
+mod method;
 mod multigrid;
 mod solver;
 mod transform;
@@ -23,22 +24,7 @@ mod long_waves_tests;
 mod tests;
 
 pub(crate) use apply::norm;
+pub use cost::PressureMethod;
 pub use equation::PressureEquation;
-pub(crate) use solver::PressureSolver;
 pub use solver::Solved;
-
-/// How the pressure equation is solved.
-#[non_exhaustive]
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum PressureMethod {
-    /// The faster one for the mesh.
-    #[default]
-    Auto,
-    /// Transforms and a banded factorisation: the residual is round-off.
-    Direct,
-    /// A transform along one direction, and for each of its modes conjugate gradients with multigrid in the other two.
-    Multigrid,
-}
-
-/// Cells of a dense direction from which multigrid is faster to a residual of 1e-6.
-const DENSE_LIMIT: usize = 3000;
+pub(crate) use solver::{PressureSolver, unless_stalled};

@@ -21,7 +21,7 @@ use super::super::operators_1d::{Operators1d, Taps};
 use super::super::slabs::Slabs;
 use super::apply::stiffness;
 use super::lines::columns;
-use super::solver::Method;
+use super::method::Method;
 use super::transform::{self, RowTransform};
 use crate::Error;
 

@@ -3,9 +3,10 @@
 
 use rayon::prelude::*;
 
-use super::PressureMethod;
 use super::apply::Operator;
+use super::cost::PressureMethod;
 use super::direct::Direct;
+use super::method::Method;
 use super::multigrid::Multigrid;
 use crate::error::{Error, PressureFailure, check};
 use crate::solver::aligned::Aligned;
@@ -34,22 +35,6 @@ pub struct Solved {
     pub factor: Option<f64>,
     /// Sum of the right side over the sum of its moduli: what no pressure can balance, and was removed.
     pub imbalance: f64,
-}
-
-/// A way to solve the pressure equation.
-pub(super) trait Method: Send + std::fmt::Debug {
-    /// Its name in errors.
-    fn name(&self) -> &'static str;
-
-    /// Replaces the right side in the planes that are owned, of norm `size` over all, by a solution of about the relative residual
-    /// `tolerance`; returns the iterations, 0 of a direct method.
-    ///
-    /// # Errors
-    /// Those of the exchange between ranks.
-    fn solve(&self, own: &mut [f64], size: f64, tolerance: f64) -> Result<usize, Error>;
-
-    /// The method and what it is made of, for the log; `condition` is that of the operator.
-    fn describe(&self, condition: f64) -> String;
 }
 
 /// A solver of the pressure equation of one mesh.
@@ -125,6 +110,18 @@ impl PressureSolver {
             left.par_iter_mut().for_each(|value| *value = -*value);
         };
         Err(Error::PressureNotSolved { method: method.name(), tolerance, reason, iterations, history })
+    }
+}
+
+/// Takes what a solve reached whose residual round-off holds up, and what is not finite, which a step finds.
+///
+/// # Errors
+/// Those of a solve that stalled, or of the exchange between ranks.
+pub(crate) fn unless_stalled(solved: Result<Solved, Error>) -> Result<(), Error> {
+    match solved {
+        Err(Error::PressureNotSolved { reason: PressureFailure::Stalled, .. }) => solved.map(drop),
+        Err(Error::PressureNotSolved { .. }) => Ok(()),
+        other => other.map(drop),
     }
 }
 
