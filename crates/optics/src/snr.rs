@@ -1,10 +1,12 @@
 //! Signal-to-noise ratio (14) of a heterodyne lidar, with h nu in place of the chapter's hbar nu.
 //!
-//! Check: the stored narrow-pulse curve for the chapter's Table 2 (-8.436 dB at 400 m).
+//! Check: the stored narrow-pulse curve for the chapter's Table 2 (-8.436 dB at 400 m), and that the pulse integral
+//! tends to it for short pulses.
 
 use crate::Error;
 use crate::beam::Telescope;
-use crate::error::{not_negative, positive};
+use crate::error::{finite, not_negative, positive};
+use crate::quadrature::GaussLegendre;
 use std::f64::consts::PI;
 
 /// Speed of light \[m/s\].
@@ -118,6 +120,50 @@ impl SnrModel {
         let efficiency = not_negative("efficiency", efficiency)?;
         Ok(model.photon_factor() * 0.5 * SPEED_OF_LIGHT_M_S * model.backscatter_factor_per_m(range_m) * efficiency)
     }
+
+    /// SNR (14), corrected, at time `time_s` after the centre of the pulse left: the integral over range weighted with
+    /// the pulse |f(t - 2R/c)|^2 of (7).
+    ///
+    /// `pulse_sigma_s` is sigma of (7) \[s\] (1/e half-width of |f|^2); `efficiency(range_m)` is eta_s. The part of the
+    /// pulse within 6 sigma counts, and only ranges above 0.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a model or time that is not allowed, or what `efficiency` returns.
+    pub fn snr_pulse(
+        &self,
+        time_s: f64,
+        pulse_sigma_s: f64,
+        mut efficiency: impl FnMut(f64) -> Result<f64, Error>,
+    ) -> Result<f64, Error> {
+        let model = self.validated()?;
+        let time_s = finite("time_s", time_s)?;
+        let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * positive("pulse_sigma_s", pulse_sigma_s)?;
+        let centre_m = 0.5 * SPEED_OF_LIGHT_M_S * time_s;
+        let low_m = centre_m - 6.0 * sigma_m;
+        if low_m <= 0.0 {
+            return Err(Error::OutOfRange {
+                field: "time_s",
+                value: time_s,
+                allowed: "beyond 6 pulse_sigma_s, so that the whole pulse has left the telescope",
+            });
+        }
+        let rule = GaussLegendre::new(16);
+        let panels = 6;
+        let width_m = 12.0 * sigma_m / f64::from(panels);
+        let mut sum = 0.0;
+        for panel in 0..panels {
+            let a = low_m + width_m * f64::from(panel);
+            for (range_m, weight_m) in rule.mapped(a, a + width_m) {
+                let x = (range_m - centre_m) / sigma_m;
+                let pulse_per_s = (-x * x).exp() / (PI.sqrt() * pulse_sigma_s);
+                sum += weight_m
+                    * pulse_per_s
+                    * model.backscatter_factor_per_m(range_m)
+                    * not_negative("efficiency", efficiency(range_m)?)?;
+            }
+        }
+        Ok(model.photon_factor() * sum)
+    }
 }
 
 #[cfg(test)]
@@ -129,13 +175,9 @@ mod tests {
     fn pulse_integral_tends_to_the_narrow_pulse_form() {
         let model = SnrModel::table2();
         let range_m = 1000.0;
+        let time_s = 2.0 * range_m / SPEED_OF_LIGHT_M_S;
         let narrow = model.snr(range_m, 0.05).unwrap();
-        // The ratio (14) of each layer, weighted with the pulse |f|^2 of (7), within 6 sigma.
-        let gap = |sigma_s: f64| {
-            let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * sigma_s;
-            let layer = |x: f64| (-x * x).exp() / PI.sqrt() * model.snr(range_m + x * sigma_m, 0.05).unwrap();
-            crate::quadrature::GaussLegendre::new(16).composite(-6.0, 6.0, 6, layer) / narrow - 1.0
-        };
+        let gap = |sigma_s: f64| model.snr_pulse(time_s, sigma_s, |_| Ok(0.05)).unwrap() / narrow - 1.0;
         // Second order in the length: sigma_R^2/4 times the second derivative of K^2/R^2 over itself.
         let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * 120e-9;
         let a = 2.0 * model.extinction_per_m;
@@ -154,5 +196,6 @@ mod tests {
         assert_eq!(refused(h.snr(-1.0, 0.01)), "range_m");
         assert_eq!(refused(h.snr(500.0, f64::NAN)), "efficiency");
         assert_eq!(refused(SnrModel { quantum_efficiency: 1.5, ..h }.validated()), "quantum_efficiency");
+        assert_eq!(refused(h.snr_pulse(1e-9, 120e-9, |_| Ok(0.1))), "time_s");
     }
 }
