@@ -4,7 +4,7 @@ use wakescope_optics::theory::free_space_efficiency;
 use wakescope_optics::{EfficiencyProfile, snr::SPEED_OF_LIGHT_M_S};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::run;
-use wakescope_sim::scene::{Flow, NoiseKind, Scene, SceneFile};
+use wakescope_sim::scene::{Flow, NoiseModel, Scene, SceneFile};
 use wakescope_sim::setup::progress::Silent;
 
 fn plan(change: impl Fn(&mut Scene)) -> Plan {
@@ -28,7 +28,7 @@ fn mean_square_a2(plan: &Plan) -> (f64, f64) {
 
 #[test]
 fn mean_signal_power_over_noise_power_is_the_snr_of_14() {
-    let plan = plan(|s| s.detector.noise = NoiseKind::None);
+    let plan = plan(|s| s.detector.noise = NoiseModel::None);
     let (power_a2, error_a2) = mean_square_a2(&plan);
     let noise_a2 = plan.instrument.receiver.noise_variance_a2();
     let (model, telescope) = (&plan.instrument.snr, &plan.instrument.telescope);
@@ -46,7 +46,7 @@ fn mean_signal_power_over_noise_power_is_the_snr_of_14() {
 
 #[test]
 fn noise_power_is_13_in_the_band_and_two_and_a_half_times_that_if_white() {
-    for (kind, factor) in [(NoiseKind::Band, 1.0), (NoiseKind::White, 2.5)] {
+    for (kind, factor) in [(NoiseModel::BandLimited, 1.0), (NoiseModel::White, 2.5)] {
         let plan = plan(|s| {
             s.detector.noise = kind;
             s.atmosphere.backscatter_per_m_sr = 0.0;
@@ -64,7 +64,7 @@ fn noise_power_is_13_in_the_band_and_two_and_a_half_times_that_if_white() {
 #[test]
 fn power_does_not_depend_on_the_layer_thickness() {
     // A steep flow makes the layers thinner; at rest the same scene has layers of one sample.
-    let [thick, mut thin] = [(), ()].map(|()| plan(|s| s.detector.noise = NoiseKind::None));
+    let [thick, mut thin] = [(), ()].map(|()| plan(|s| s.detector.noise = NoiseModel::None));
     let factor = 4;
     let g = &mut thin.setup.geometry;
     g.layer_thickness_m /= factor as f64;
@@ -80,7 +80,7 @@ fn power_through_a_near_focus_is_14_over_the_pulse() {
         [(300.0, [0.05, 0.03], [150.0, 900.0], 180.0), (600.0, [0.15, 0.09], [200.0, 1500.0], 555.0)]
     {
         let plan = plan(|s| {
-            s.detector.noise = NoiseKind::None;
+            s.detector.noise = NoiseModel::None;
             s.telescope.focus_m = focus_m;
             [s.telescope.aperture_radius_m, s.telescope.beam_radius_m] = radii_m;
             [s.scan.range_min_m, s.scan.range_max_m] = ends_m;

@@ -50,6 +50,7 @@ pub mod io;
 mod keys;
 mod machine;
 pub mod measure;
+mod outputs;
 pub mod plan;
 #[cfg(feature = "mpi")]
 pub mod processes;

@@ -11,128 +11,25 @@ pub use recorded::{recorded_names, write_recorded};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::io::OutputError;
-use crate::io::atomic::try_folder;
-use crate::io::lock::FolderLock;
+#[cfg(feature = "plots")]
 use crate::io::own::refuse_foreign;
 use crate::io::signals::{LineVelocities, RawSignals, Recording};
-use crate::io::{Existing, FileGroup, Provenance, Table, VelocityMap, hpl, tables};
+use crate::io::{Existing, Table, VelocityMap, hpl, tables};
 use crate::measure::beam_winds;
 use crate::measure::profile::RangeProfile;
+use crate::outputs::Outputs;
 use crate::plan::{Plan, Stage, Target};
 use crate::run::RunResult;
-use crate::scene::{DetectorSignal, NoiseKind, Pattern, SceneFile};
-use crate::setup::beams::{Schedule, SweepMode};
+use crate::scene::{DetectorSignal, NoiseModel, Pattern};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Names of the CfRadial files: one for each kind of sweep.
-fn map_stems(scan: &Schedule) -> Vec<String> {
-    let mut modes: Vec<SweepMode> = Vec::new();
-    for (mode, _) in &scan.sweeps {
-        if !modes.contains(mode) {
-            modes.push(*mode);
-        }
-    }
-    match modes.len() {
-        0 | 1 => vec!["map".into()],
-        _ => modes.iter().map(|mode| format!("map_{}", mode.name())).collect(),
-    }
-}
-
-/// Names of the HALO files, one for each sweep; their tables have the same.
-fn halo_stems(sweeps: usize) -> Vec<String> {
-    match sweeps {
-        0 | 1 => vec!["halo".into()],
-        _ => (1..=sweeps).map(|sweep| format!("halo_{sweep:04}")).collect(),
-    }
-}
-
-/// The sweeps of a map as HALO files, each with its table, where the scene asks for them.
-fn add_halo(files: &mut FileGroup, plan: &Plan, map: &VelocityMap, origin: &Provenance) -> Result<(), Error> {
-    let outputs = &plan.scene.scene.outputs;
-    for (sweep, stem) in halo_stems(map.sweeps.len()).iter().enumerate().filter(|_| outputs.hpl) {
-        let name = format!("{stem}.hpl");
-        files.add(&name, hpl::hpl_bytes(map, sweep, &name)?)?;
-        if outputs.csv {
-            files.add(&format!("{stem}.csv"), hpl::hpl_table(map, sweep)?.to_csv(origin)?)?;
-        }
-    }
-    Ok(())
-}
-
-/// Finds out, before any computing, whether files of these names can be written to a folder; leaves no trace.
-///
-/// # Errors
-/// The folder cannot be made, is a file, cannot be written to, or another run writes to it; a folder is in the way of a file,
-/// or a file that this program did not write and may not replace.
-pub fn prepare<'a>(folder: &Path, names: impl IntoIterator<Item = &'a str>, existing: Existing) -> Result<(), Error> {
-    prepare_among_others(folder, names, existing, || Ok(FolderLock::take(folder).map(drop)?))
-}
-
-/// [`prepare`] for a folder to which several processes may write, each its own files: what else must hold is the caller's.
-///
-/// # Errors
-/// As [`prepare`], and what the caller finds.
-pub(crate) fn prepare_among_others<'a>(
-    folder: &Path,
-    names: impl IntoIterator<Item = &'a str>,
-    existing: Existing,
-    also: impl FnOnce() -> Result<(), Error>,
-) -> Result<(), Error> {
-    refuse_foreign(folder, names, existing)?;
-    let missing: Vec<&Path> =
-        folder.ancestors().filter(|p| !p.as_os_str().is_empty()).take_while(|p| !p.exists()).collect();
-    let made = std::fs::create_dir_all(folder);
-    let made = made.map_err(|source| Error::Io { action: "make the folder", path: folder.to_owned(), source });
-    let tried = made.and_then(|()| {
-        try_folder(folder)?;
-        also()
-    });
-    for path in missing {
-        // Innermost first; one that was not made cannot be removed, which is what is wanted.
-        let _ = std::fs::remove_dir(path);
-    }
-    tried
-}
-
 /// Names of the files that a plan will write.
-pub fn names(plan: &Plan) -> Vec<String> {
-    let o = &plan.scene.scene.outputs;
-    let mut out = vec!["scene.toml".to_owned()];
-    let mut add = |stem: &str, kinds: &[(bool, &str)]| {
-        out.extend(kinds.iter().filter(|kind| kind.0).map(|kind| format!("{stem}.{}", kind.1)));
-    };
-    let (netcdf, plots) = (o.netcdf && cfg!(feature = "netcdf"), cfg!(feature = "plots"));
-    let pictures = [(o.svg && plots, "svg"), (o.png && plots, "png")];
-    if matches!(plan.target, Target::Run | Target::Efficiency) {
-        add("profile", &[(o.csv, "csv"), pictures[0], pictures[1]]);
-    }
-    if plan.runs(Stage::CrossPlane) {
-        add("flow", &[(o.csv, "csv"), (netcdf, "nc")]);
-    }
-    if plan.keeps_signals() {
-        add("signals", &[(o.csv, "csv"), (netcdf, "nc")]);
-    }
-    if plan.runs(Stage::Estimates) {
-        add("map", &[(o.csv, "csv")]);
-        for stem in map_stems(&plan.geometry.schedule) {
-            add(&stem, &[(o.csv && stem != "map", "csv"), (netcdf, "nc")]);
-        }
-        add("map", &[pictures[0], pictures[1]]);
-        for stem in halo_stems(plan.geometry.schedule.sweeps.len()) {
-            add(&stem, &[(o.hpl, "hpl"), (o.hpl && o.csv, "csv")]);
-        }
-        let pattern = &plan.scene.scene.scan.pattern;
-        let tells_wind = matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_));
-        add("wind", &[(o.csv && tells_wind, "csv")]);
-        let plans = *pattern != Pattern::default();
-        add("scan", &[(pictures[0].0 && plans, "svg"), (pictures[1].0 && plans, "png")]);
-    }
-    if plan.runs(Stage::Retrieval) {
-        add("retrieval", &[(o.csv, "csv")]);
-        add("retrieval_summary", &[(o.csv, "csv")]);
-    }
-    out
+///
+/// # Errors
+/// As [`write`], but for what the files hold.
+pub fn names(plan: &Plan) -> Result<Vec<String>, Error> {
+    Outputs::names(plan.scene.scene.outputs, |files| list(plan, &RunResult::default(), files))
 }
 
 /// Writes the results that the plan's scene asks for; returns the paths of the files.
@@ -141,7 +38,80 @@ pub fn names(plan: &Plan) -> Vec<String> {
 /// A result that a format cannot hold, a file in the way that may not be replaced, or what the system says. Nothing is
 /// left half-written.
 pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
-    put(files(plan, result, folder)?, folder, existing)
+    let formats = plan.scene.scene.outputs;
+    Outputs::write(folder, existing, (formats, plan.scene.provenance()), |files| list(plan, result, files))
+}
+
+/// The files of a run.
+fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Result<(), Error> {
+    files.add("scene.toml", Some(plan), |_, origin| Ok(origin.scene_file()))?;
+    if matches!(plan.target, Target::Run | Target::Efficiency) {
+        let profile = result.profile.as_ref();
+        files.table("profile", profile, |profile| Ok(profile_table(profile)))?;
+        #[cfg(feature = "plots")]
+        files.figure("profile", profile, |profile| Ok(pictures::profile(plan, profile)))?;
+    }
+    if plan.runs(Stage::CrossPlane) {
+        let plane = result.plane.as_ref();
+        files.table("flow", plane, |plane| Ok(tables::planes_table(plane)?))?;
+        #[cfg(feature = "netcdf")]
+        files.netcdf("flow", plane, |plane, origin| Ok(crate::io::cf_planes::cf_planes_bytes(plane, origin)?))?;
+    }
+    if plan.keeps_signals() {
+        let signals = raw_signals(plan, result);
+        files.table("signals", signals.as_ref(), |signals| Ok(signals.table()?))?;
+        #[cfg(feature = "netcdf")]
+        files.netcdf("signals", signals.as_ref(), |signals, origin| {
+            Ok(crate::io::cf_signals::cf_signals_bytes(signals, origin)?)
+        })?;
+    }
+    if plan.runs(Stage::Estimates) {
+        let pattern = &plan.scene.scene.scan.pattern;
+        let map = result.map.as_ref().map(|estimates| velocity_map(plan, estimates));
+        list_map(plan, map.as_ref(), files)?;
+        let winds = result.map.as_ref().map(|estimates| beam_winds::beam_winds(plan, estimates)).transpose()?.flatten();
+        if matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_)) {
+            files.table("wind", winds.as_deref(), |winds| Ok(beam_winds::table(winds)))?;
+        }
+        #[cfg(feature = "plots")]
+        files.figure("map", map.as_ref(), |map| pictures::map(plan, map, winds.as_deref()))?;
+        #[cfg(feature = "plots")]
+        if *pattern != Pattern::default() {
+            files.figure("scan", map.as_ref(), |_| Ok(pictures::scan(plan)))?;
+        }
+    }
+    if plan.runs(Stage::Retrieval) {
+        files.table("retrieval", result.retrieval.as_ref(), |found| Ok(found.table()))?;
+        files.table("retrieval_summary", result.retrieval.as_ref(), |found| Ok(found.error_table()))?;
+    }
+    Ok(())
+}
+
+/// A map as tables, CfRadial and HALO files.
+fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Result<(), Error> {
+    let schedule = &plan.geometry.schedule;
+    let modes = schedule.modes();
+    files.table("map", map, |map| Ok(tables::map_table(map)?))?;
+    for mode in &modes {
+        // Readers take the kind of a CfRadial file from its first sweep: one for each kind.
+        let (stem, own) = match modes.len() {
+            1 => ("map".to_owned(), map.map(Cow::Borrowed)),
+            _ => (format!("map_{}", mode.name()), map.map(|map| Cow::Owned(map.of_mode(*mode)))),
+        };
+        if modes.len() > 1 {
+            files.table(&stem, own.as_deref(), |map| Ok(tables::map_table(map)?))?;
+        }
+        #[cfg(feature = "netcdf")]
+        files.netcdf(&stem, own.as_deref(), |map, origin| Ok(crate::io::cfradial::cfradial_bytes(map, origin)?))?;
+    }
+    let sweeps = map.map_or(schedule.sweeps.len(), |map| map.sweeps.len());
+    for sweep in (0..sweeps).filter(|_| plan.scene.scene.outputs.hpl) {
+        let stem = if sweeps == 1 { "halo".to_owned() } else { format!("halo_{:04}", sweep + 1) };
+        let name = format!("{stem}.hpl");
+        files.add(&name, map, |map, _| Ok(hpl::hpl_bytes(map, sweep, &name)?))?;
+        files.table(&stem, map, |map| Ok(hpl::hpl_table(map, sweep)?))?;
+    }
+    Ok(())
 }
 
 /// Writes a picture of the set-up: lidar, lines of sight, ground, vortices. The ending of the path says whether SVG or PNG.
@@ -150,7 +120,7 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing)
 /// [`Error::Input`] for another ending; a file in the way that this program did not write, or what the system says.
 #[cfg(feature = "plots")]
 pub fn write_set_up(plan: &Plan, path: &Path) -> Result<(), Error> {
-    let (figure, origin) = (pictures::scan(plan), provenance(plan));
+    let (figure, origin) = (pictures::scan(plan), plan.scene.provenance());
     let bytes = match path.extension().and_then(|ending| ending.to_str()) {
         Some("svg") => figure.svg(&origin)?.into_bytes(),
         Some("png") => figure.png(&origin)?,
@@ -169,106 +139,6 @@ pub fn write_set_up(plan: &Plan, path: &Path) -> Result<(), Error> {
         other => other.into(),
     })?;
     Ok(crate::io::write_atomic(path, bytes)?)
-}
-
-/// The files of a run, still in memory.
-pub(crate) fn files(plan: &Plan, result: &RunResult, folder: &Path) -> Result<FileGroup, Error> {
-    let outputs = &plan.scene.scene.outputs;
-    let origin = provenance(plan);
-    let mut files = FileGroup::new(folder);
-    files.add("scene.toml", scene_text(&origin))?;
-    if let Some(profile) = &result.profile {
-        if outputs.csv {
-            files.add("profile.csv", profile_table(profile).to_csv(&origin)?)?;
-        }
-        #[cfg(feature = "plots")]
-        pictures::add(&mut files, plan, "profile", &pictures::profile(plan, profile), &origin)?;
-    }
-    if let Some(plane) = &result.plane {
-        if outputs.csv {
-            files.add("flow.csv", tables::planes_table(plane)?.to_csv(&origin)?)?;
-        }
-        #[cfg(feature = "netcdf")]
-        if outputs.netcdf {
-            files.add("flow.nc", crate::io::cf_planes::cf_planes_bytes(plane, &origin)?)?;
-        }
-    }
-    if let Some(signals) = raw_signals(plan, result) {
-        if outputs.csv {
-            files.add("signals.csv", signals.table()?.to_csv(&origin)?)?;
-        }
-        #[cfg(feature = "netcdf")]
-        if outputs.netcdf {
-            files.add("signals.nc", crate::io::cf_signals::cf_signals_bytes(&signals, &origin)?)?;
-        }
-    }
-    if let Some(estimates) = &result.map {
-        let map = velocity_map(plan, estimates);
-        if outputs.csv {
-            files.add("map.csv", tables::map_table(&map)?.to_csv(&origin)?)?;
-        }
-        let stems = map_stems(&plan.geometry.schedule);
-        for (stem, mode) in stems.iter().zip(map.modes()) {
-            // Readers take the kind of a file from its first sweep.
-            let own = if stems.len() == 1 { Cow::Borrowed(&map) } else { Cow::Owned(map.of_mode(mode)) };
-            if outputs.csv && stems.len() > 1 {
-                files.add(&format!("{stem}.csv"), tables::map_table(&own)?.to_csv(&origin)?)?;
-            }
-            #[cfg(feature = "netcdf")]
-            if outputs.netcdf {
-                files.add(&format!("{stem}.nc"), crate::io::cfradial::cfradial_bytes(&own, &origin)?)?;
-            }
-        }
-        add_halo(&mut files, plan, &map, &origin)?;
-        let winds = beam_winds::beam_winds(plan, estimates)?;
-        if let Some(winds) = winds.as_deref().filter(|_| outputs.csv) {
-            files.add("wind.csv", beam_winds::table(winds).to_csv(&origin)?)?;
-        }
-        #[cfg(feature = "plots")]
-        {
-            pictures::add_map(&mut files, plan, &map, winds.as_deref(), &origin)?;
-            if plan.scene.scene.scan.pattern != Pattern::default() {
-                pictures::add(&mut files, plan, "scan", &pictures::scan(plan), &origin)?;
-            }
-        }
-    }
-    if let Some(retrieval) = result.retrieval.as_ref().filter(|_| outputs.csv) {
-        files.add("retrieval.csv", retrieval.table().to_csv(&origin)?)?;
-        files.add("retrieval_summary.csv", retrieval.error_table().to_csv(&origin)?)?;
-    }
-    Ok(files)
-}
-
-/// Puts the files of a run into their folder, where no other run may be writing.
-pub(crate) fn put(files: FileGroup, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
-    let there = folder.exists();
-    let lock = there.then(|| FolderLock::take(folder)).transpose()?;
-    // Again: a file may have come while the run computed.
-    let names: Vec<String> = files.names().map(str::to_owned).collect();
-    refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
-    let written = files.commit()?;
-    drop(lock);
-    Ok(written)
-}
-
-/// Where the files of a run come from.
-pub fn provenance(plan: &Plan) -> Provenance {
-    provenance_of(Some(&plan.scene))
-}
-
-/// The same of a scene that may be unknown.
-pub(crate) fn provenance_of(scene: Option<&SceneFile>) -> Provenance {
-    Provenance {
-        program: crate::PROGRAM.into(),
-        scene_toml: scene.map_or_else(String::new, |scene| scene.toml.clone()),
-        scene_hash: scene.map_or_else(String::new, |scene| scene.hash.clone()),
-        seed: scene.map_or(0, |scene| scene.scene.seed),
-    }
-}
-
-/// The scene with every default written out: running it again gives the same files.
-pub(crate) fn scene_text(origin: &Provenance) -> String {
-    format!("# {}, scene {}\n{}", origin.program, origin.scene_hash, origin.scene_toml)
 }
 
 /// Efficiency and SNR as a table.
@@ -319,10 +189,10 @@ fn recording(plan: &Plan) -> Recording {
     let is_baseband = d.signal == DetectorSignal::Baseband;
     // (13) in the band; white noise goes to half the sampling frequency, and to both sides of zero in two quadratures.
     let noise_band_hz = match d.noise {
-        NoiseKind::None => 0.0,
-        NoiseKind::Band => d.bandwidth_hz,
-        NoiseKind::White if is_baseband => d.sampling_hz,
-        NoiseKind::White => 0.5 * d.sampling_hz,
+        NoiseModel::None => 0.0,
+        NoiseModel::BandLimited => d.bandwidth_hz,
+        NoiseModel::White if is_baseband => d.sampling_hz,
+        NoiseModel::White => 0.5 * d.sampling_hz,
     };
     Recording {
         sampling_hz: d.sampling_hz,

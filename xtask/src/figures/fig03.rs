@@ -23,7 +23,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("z_first_sample_m", column(|p| p.1, near_m))
         .float("y_last_sample_m", column(|p| p.0, far_m))
         .float("z_last_sample_m", column(|p| p.1, far_m));
-    let origin = wakescope_sim::write::provenance(&plan);
+    let origin = plan.scene.provenance();
 
     let mut fan = Vec::new();
     for &el in elevation_rad.iter().step_by(DRAWN) {

@@ -34,7 +34,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     };
     let own = OwnScene::new(&plan.scene, &Silent)?;
     let found = retrieve_map(scan, Method::Fit, options, own.as_ref().map_or(Velocities::Unknown, Velocities::Shown))?;
-    let origin = wakescope_sim::write::provenance(&plan);
+    let origin = plan.scene.provenance();
     let mut out = Rendered::new(&table(&found)?, &figure(&found, 1)?, &origin)?;
     out.marks = vec!["analytic pair".into()];
     out.caption = "ANALYTIC PAIR, not a simulated flow: velocities of one scan at 10 dB with four pulses a line, gate means of the fitted wake, and the \

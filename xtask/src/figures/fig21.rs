@@ -12,7 +12,7 @@ use wakescope_sim::retrieve::{Method, RetrievalRow};
 use wakescope_sim::scene::{self, Axial, Flow, Pattern, Ppi, Retrieval, SnrReference};
 use wakescope_sim::setup::estimators::weighting;
 use wakescope_sim::setup::wind::vortex_pair;
-use wakescope_sim::write::{provenance, velocity_map};
+use wakescope_sim::write::velocity_map;
 
 /// Lines of sight of each scan.
 const LINES: usize = 72;
@@ -84,7 +84,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let scans = context.profile.choose(2, 40, 100);
     let views = scenes().into_iter().map(|(name, scene)| view(context, name, &scene, scans));
     let views = views.collect::<Result<Vec<View>, Failure>>()?;
-    let mut out = Rendered::new(&table(&views), &picture(&views)?, &provenance(&views[0].scans[0].plan))?;
+    let mut out = Rendered::new(&table(&views), &picture(&views)?, &views[0].scans[0].plan.scene.provenance())?;
     out.marks = vec!["analytic pair".into()];
     out.caption = format!(
         "ANALYTIC PAIR, not a simulated flow: the same wake, {LINES} lines of 16 pulses at 5 dB in each scan; velocities of one of {scans} scans, \

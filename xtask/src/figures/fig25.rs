@@ -5,7 +5,7 @@ use super::profiles::{self, Profiles};
 use super::study::{EARLY_TAU, METHODS, Sight, Study, near_scene, with_method};
 use crate::statistics::NO_DIFFERENCE;
 use crate::wakes;
-use wakescope_sim::scene::{NoiseKind, Refinement, SnrReference, VortexPair};
+use wakescope_sim::scene::{NoiseModel, Refinement, SnrReference, VortexPair};
 
 /// Ratio at which cores and bins are compared, near that of the chapter, and the one at which noise is, near the physical one, dB.
 const CHAPTER_DB: f64 = 0.0;
@@ -29,17 +29,18 @@ enum Seen {
 struct Case {
     seen: Seen,
     snr_db: f64,
-    noise: NoiseKind,
+    noise: NoiseModel,
     pulses: usize,
     /// Whether the velocity is that of the highest bin, as (30) has it.
     bins: bool,
 }
 
-const WAKE: Case = Case { seen: Seen::Wake, snr_db: CHAPTER_DB, noise: NoiseKind::Band, pulses: 1, bins: false };
+const WAKE: Case =
+    Case { seen: Seen::Wake, snr_db: CHAPTER_DB, noise: NoiseModel::BandLimited, pulses: 1, bins: false };
 /// What is followed along the ratio.
 const WAYS: [Case; 4] = [
     WAKE,
-    Case { noise: NoiseKind::White, ..WAKE },
+    Case { noise: NoiseModel::White, ..WAKE },
     Case { pulses: 8, ..WAKE },
     Case { seen: Seen::Pair(CORES[0]), ..WAKE },
 ];
@@ -70,7 +71,7 @@ impl Case {
             Seen::Coarse => "coarse wake".into(),
             Seen::Pair(core) => format!("pair, core {core} b₀"),
         };
-        let noise = if self.noise == NoiseKind::White { "white noise" } else { "band noise" };
+        let noise = if self.noise == NoiseModel::White { "white noise" } else { "band noise" };
         let bins = if self.bins { ", raw bins" } else { "" };
         format!("{flow}, {noise}, {} a line{bins}", if self.pulses == 1 { "one pulse" } else { "eight pulses" })
     }
@@ -215,7 +216,7 @@ fn words(all: &[Measured]) -> Result<String, Failure> {
         "Where that reaches (figure 25, error of CA less that of unweighted PA over the latter, inside): on the wake {}; at {WEAK_DB} dB in white noise \
          {}; inside a core of {} b₀ at {CHAPTER_DB} dB {}, of {} b₀ {}{coarse}.",
         holds.join(", "),
-        per_cent(Case { noise: NoiseKind::White, snr_db: WEAK_DB, ..WAKE })?,
+        per_cent(Case { noise: NoiseModel::White, snr_db: WEAK_DB, ..WAKE })?,
         CORES[0],
         per_cent(Case { seen: Seen::Pair(CORES[0]), ..WAKE })?,
         CORES[3],
@@ -230,7 +231,7 @@ fn claims(all: &[Measured]) -> Result<Vec<Claim>, Failure> {
     };
     let less = Bar::Less(NO_DIFFERENCE);
     let [weak, strong] = [WEAK_DB, STRONG_DB].map(|snr_db| Case { snr_db, ..WAKE });
-    let white = Case { noise: NoiseKind::White, ..weak };
+    let white = Case { noise: NoiseModel::White, ..weak };
     let pair = Case { seen: Seen::Pair(CORES[0]), ..WAKE };
     let between = |name: &str, a: Case, b: Case| {
         let [a, b] = [find(all, a)?, find(all, b)?];

@@ -14,8 +14,8 @@ use wakescope_sim::scene::{
     VortexMotion, VortexPair, Weighting,
 };
 use wakescope_sim::setup::progress::Silent;
+use wakescope_sim::setup::wind;
 use wakescope_sim::sweep;
-use wakescope_sim::{setup::wind, write};
 
 /// What counts as inside a vortex, m from its centre.
 pub(super) const INSIDE_M: f64 = 8.0;
@@ -177,7 +177,7 @@ impl Study {
     }
 
     pub(super) fn provenance(&self) -> Provenance {
-        write::provenance(&self.plan)
+        self.plan.scene.provenance()
     }
 
     /// Centres of the vortices in the polar coordinates of the scan: (range, elevation).

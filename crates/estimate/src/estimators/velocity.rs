@@ -127,12 +127,13 @@ impl GateVelocity {
 /// How the peak is placed between the frequencies of the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Refinement {
-    /// Not at all: the frequency of the highest bin, as (30) is printed.
-    None,
     /// Parabola through the logarithm of the highest bin and its neighbours.
     #[default]
     Parabola,
     /// Maximum of the exact spectrum, by Newton steps from the parabola, to round-off.
     Exact,
+    /// Not at all: the frequency of the highest bin, as (30) is printed.
+    None,
 }

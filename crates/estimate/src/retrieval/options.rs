@@ -41,6 +41,7 @@ pub struct Turbulence {
 
 /// How the covariance of a fit is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Covariance {
     /// From the residuals and their correlation (sandwich): right for any noise that is much the same over the map.
     Sandwich,
@@ -50,13 +51,16 @@ pub enum Covariance {
 
 /// Whether vortices move while a scan lasts, each with the velocity that the other one, the images and the wind give it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Movement {
     /// They stand still in scans of less than 2 s and move in longer ones, unless the other is better by 9 in chi-square: the times of a
     /// file need not be those of the air (averaged scans, frozen simulations), and short scans hardly show which.
     Auto,
     /// They move.
+    #[cfg_attr(feature = "clap", value(name = "yes"))]
     Moving,
     /// They stand still.
+    #[cfg_attr(feature = "clap", value(name = "no"))]
     Frozen,
 }
 

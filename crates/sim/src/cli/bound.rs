@@ -1,26 +1,22 @@
 //! `wakescope bound`: the Cramer-Rao bound for a scene.
 
+use super::words::TableWords;
 use super::{Cli, load, say};
-use crate::io::Existing;
-use crate::io::own::refuse_foreign;
+use crate::Error;
+use crate::measure::bound::{bound as of_plan, points};
 use crate::plan::{Plan, Target};
 use crate::setup::progress::Silent;
-use crate::{Error, measure::bound, write};
 use clap::Args;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Words of `wakescope bound`.
 #[derive(Debug, Args)]
 pub(super) struct BoundWords {
     /// The scene.
     scene: PathBuf,
-    /// File for the whole table, as CSV.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Replace the file although this program did not write it, or it was changed since.
-    #[arg(long)]
-    overwrite: bool,
+    #[command(flatten)]
+    table: TableWords,
     /// Compute even if the forecast of the memory is more than the machine has.
     #[arg(long)]
     allow_large: bool,
@@ -31,29 +27,14 @@ pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
     if !words.allow_large {
         plan.bound_fits()?;
     }
-    if let Some(path) = &words.out {
-        let existing = if words.overwrite { Existing::Any } else { Existing::Own };
-        let name = path.file_name().and_then(|name| name.to_str());
-        refuse_foreign(path.parent().unwrap_or(Path::new("")), name, existing)?;
-    }
-    let found = bound::bound(&plan, &Silent)?;
+    words.table.prepare()?;
+    let found = of_plan(&plan, &Silent)?;
     let mut text = found.text();
-    if let Some(path) = &words.out {
-        crate::io::write_atomic(path, found.table().to_csv(&write::provenance(&plan))?)?;
-        text += &format!("wrote {}\n", path.display());
-    }
-    let points = |points: &[bound::BoundPoint]| -> Vec<serde_json::Value> {
-        let object = |p: &bound::BoundPoint| {
-            json!({
-                "range_m": p.range_m, "snr_db": p.snr_db, "bound_window_m_s": p.window_m_s, "level": p.level,
-                "n_eff": p.n_eff, "bound_region_m_s": p.region_m_s,
-            })
-        };
-        points.iter().map(object).collect()
-    };
+    let file = words.table.write(&found.table(), &plan.scene.provenance(), &mut text)?;
     let object = json!({
-        "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr),
-        "by_range": points(&found.by_range), "files": words.out.as_ref().map(|out| out.to_string_lossy()),
+        "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr).objects(),
+        "by_range": points(&found.by_range).objects(),
+        "files": file,
     });
     say(cli.json, &object, &text)
 }

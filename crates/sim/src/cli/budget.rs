@@ -1,11 +1,11 @@
 //! `wakescope budget`: the power budget of a scene.
 
-use super::{Cli, load, paths, progress, say};
-use crate::Error;
-use crate::io::{Existing, FileGroup};
+use super::words::{existing, range};
+use super::{Cli, load, paths, say};
 use crate::measure::budget::{Budget, scan_ranges_m};
+use crate::outputs::{Outputs, prepare};
 use crate::plan::{Plan, Target};
-use crate::write;
+use crate::{Error, scene};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -26,30 +26,22 @@ pub(super) struct BudgetWords {
     overwrite: bool,
 }
 
-fn range(word: &str) -> Result<f64, String> {
-    let range_m = word.trim().parse().ok().filter(|m| (1.0..=1e6).contains(m));
-    range_m.ok_or_else(|| "a range from 1 to 1e6 m, or several with commas between them, e.g. 280,400".into())
-}
-
 pub(super) fn budget(words: &BudgetWords, cli: &Cli) -> Result<(), Error> {
-    const NAME: &str = "budget.csv";
     let plan = Plan::new(load(&words.scene, cli)?, Target::Efficiency)?;
-    let existing = if words.overwrite { Existing::Any } else { Existing::Own };
+    let existing = existing(words.overwrite);
     if let Some(folder) = &words.out {
-        write::prepare(folder, [NAME], existing)?;
+        prepare(folder, &["budget.csv".into()], existing, true)?;
     }
     let ranges_m = if words.range.is_empty() { scan_ranges_m(&plan.scene.scene) } else { words.range.clone() };
-    let found = match cli.quiet {
-        true => Budget::new(&plan, &ranges_m, &progress::Quiet)?,
-        false => Budget::new(&plan, &ranges_m, &progress::Bars::new())?,
-    };
+    let found = Budget::new(&plan, &ranges_m, &*cli.observer())?;
     let mut text = found.text();
     let mut files = Vec::new();
     if let Some(folder) = &words.out {
-        let mut group = FileGroup::new(folder);
-        group.add(NAME, found.table().to_csv(&write::provenance(&plan))?)?;
-        files = write::put(group, folder, existing)?;
-        text += &format!("wrote {}\n", folder.join(NAME).display());
+        let of = (scene::Outputs::default(), plan.scene.provenance());
+        files = Outputs::write(folder, existing, of, |files| {
+            files.table("budget", Some(&found), |found| Ok(found.table()))
+        })?;
+        text += &format!("wrote {}\n", folder.join("budget.csv").display());
     }
     let rows: Vec<serde_json::Value> = found
         .rows

@@ -1,8 +1,8 @@
 //! `wakescope estimate`: velocities from raw signals, simulated or measured.
 
-use super::{Cli, load, paths, progress, say};
+use super::words::{FolderWords, noise, positive};
+use super::{Cli, load, paths, say};
 use crate::Error;
-use crate::io::Existing;
 use crate::io::number::ByteOrder;
 use crate::io::raw::{Order, RawFormat, RawRecords};
 use crate::measure::recorded::{self, NoiseLevel, RayTable, Recorded, RecordedOptions, record_shape};
@@ -21,9 +21,8 @@ pub(super) struct EstimateWords {
     /// The scene whose instrument recorded them and whose estimator they go through.
     #[arg(long, value_name = "SCENE.toml")]
     scene: PathBuf,
-    /// Folder to write to; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[command(flatten)]
+    folder: FolderWords,
     /// Numbers of a binary file.
     #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(["i8", "u8", "i16", "u16", "i32", "u32", "f32", "f64"]))]
     format: Option<String>,
@@ -57,24 +56,6 @@ pub(super) struct EstimateWords {
     /// Write the spectrum of each gate, spectra.nc.
     #[arg(long)]
     spectra: bool,
-    /// Replace files in the folder that this program did not write, or that were changed since.
-    #[arg(long)]
-    overwrite: bool,
-}
-
-fn positive(word: &str) -> Result<f64, String> {
-    let value = word.trim().parse::<f64>().ok().filter(|v| *v > 0.0 && v.is_finite());
-    value.ok_or_else(|| "a number above 0, e.g. 1e-6".into())
-}
-
-fn noise(word: &str) -> Result<NoiseLevel, String> {
-    match word {
-        "scene" => Ok(NoiseLevel::OfScene),
-        "quietest" => Ok(NoiseLevel::Quietest),
-        word => {
-            positive(word).map(NoiseLevel::Given).map_err(|_| "scene, quietest or a power above 0, e.g. 2.5e-13".into())
-        }
-    }
 }
 
 pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
@@ -92,21 +73,16 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     let mut records = RawRecords::open(&words.data, &format, record_shape(&scene.scene))?;
     let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
     let (plan, is_own) = recorded::plan(scene, &records)?;
-    let existing = if words.overwrite { Existing::Any } else { Existing::Own };
-    let names = write::recorded_names(&plan);
-    write::prepare(&words.out, names.iter().map(String::as_str), existing)?;
+    words.folder.prepare(&write::recorded_names(&plan)?)?;
     let options = RecordedOptions { rays, noise: words.noise, spectra: words.spectra, block_bytes: None };
-    let found = match cli.quiet {
-        true => recorded::estimate((&plan, is_own), &mut records, &options, &progress::Quiet)?,
-        false => recorded::estimate((&plan, is_own), &mut records, &options, &progress::Bars::new())?,
-    };
+    let found = recorded::estimate((&plan, is_own), &mut records, &options, &*cli.observer())?;
     let (text, results) = told(&plan, &found, records.records());
-    let files = write::write_recorded(&plan, found, &words.out, existing)?;
+    let files = write::write_recorded(&plan, found, &words.folder.out, words.folder.existing())?;
     let object = json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "data": words.data.to_string_lossy(), "results": results,
         "files": paths(&files),
     });
-    say(cli.json, &object, &format!("{text}wrote {} files to {}", files.len(), words.out.display()))
+    say(cli.json, &object, &(text + &words.folder.wrote(&files)))
 }
 
 /// The result in a few numbers.

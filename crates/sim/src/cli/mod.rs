@@ -12,16 +12,18 @@ mod output;
 mod progress;
 mod ranked;
 mod retrieve;
-mod retrieved;
 mod sweep;
 mod wake;
+mod words;
 
 use crate::io::Existing;
+use crate::io::csv::digits;
 use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
 use crate::plan::{Plan, Stage, Target};
 use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::setup::efficiency_model::model;
-use crate::{Error, run, write};
+use crate::setup::progress::Observer;
+use crate::{Error, outputs, run, write};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 use output::{paths, say};
@@ -29,6 +31,7 @@ use serde_json::{Value, json};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use wakescope_optics::plan::Model;
+use words::FolderWords;
 
 /// Simulator of coherent Doppler lidar measurements of aircraft wake vortices.
 #[derive(Debug, Parser)]
@@ -98,12 +101,8 @@ enum Command {
 struct Io {
     /// The scene.
     scene: PathBuf,
-    /// Folder to write to; made if it does not exist.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Replace files in the folder that this program did not write, or that were changed since.
-    #[arg(long)]
-    overwrite: bool,
+    #[command(flatten)]
+    folder: FolderWords,
     /// Run even if the forecast of the memory is more than the machine has.
     #[arg(long)]
     allow_large: bool,
@@ -124,6 +123,13 @@ struct CheckWords {
     #[cfg(feature = "plots")]
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+}
+
+impl Cli {
+    /// Who is told of the progress: bars, unless quiet was asked for.
+    fn observer(&self) -> Box<dyn Observer> {
+        if self.quiet { Box::new(progress::Quiet) } else { Box::new(progress::Bars::new()) }
+    }
 }
 
 /// Runs the program with the words of the command line; returns its exit code.
@@ -181,9 +187,11 @@ fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(),
 }
 
 fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
-    // What is in the way of a run is in the way of it here, too.
-    let out = words.out.as_deref().map(|folder| (folder, Existing::Own));
-    let plan = planned(&words.scene, Target::Run, out, words.allow_large, cli)?;
+    let plan = planned(&words.scene, Target::Run, words.allow_large, cli)?;
+    if let Some(folder) = &words.out {
+        // What is in the way of a run is in the way of it here, too.
+        outputs::prepare(folder, &write::names(&plan)?, Existing::Own, true)?;
+    }
     #[cfg(feature = "plots")]
     if let Some(path) = &words.picture {
         write::write_set_up(&plan, path)?;
@@ -213,48 +221,37 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     say(cli.json, &object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
 }
 
-/// The plan of a scene, with all that can be known before the computing: limits, memory, the folder.
-fn planned(
-    scene: &Path,
-    target: Target,
-    out: Option<(&Path, Existing)>,
-    allow_large: bool,
-    cli: &Cli,
-) -> Result<Plan, Error> {
+/// The plan of a scene, with all that can be known before the computing: limits, memory.
+fn planned(scene: &Path, target: Target, allow_large: bool, cli: &Cli) -> Result<Plan, Error> {
     let plan = Plan::new(load(scene, cli)?, target)?;
     if !allow_large {
         plan.fits()?;
-    }
-    if let Some((folder, existing)) = out {
-        let names = write::names(&plan);
-        write::prepare(folder, names.iter().map(String::as_str), existing)?;
     }
     Ok(plan)
 }
 
 fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
-    let existing = if io.overwrite { Existing::Any } else { Existing::Own };
-    let plan = planned(&io.scene, target, Some((&io.out, existing)), io.allow_large, cli)?;
-    let outcome = if cli.quiet {
-        run::run(&plan, &progress::Quiet)?
-    } else {
+    let plan = planned(&io.scene, target, io.allow_large, cli)?;
+    io.folder.prepare(&write::names(&plan)?)?;
+    if !cli.quiet {
         let _ = write!(std::io::stderr(), "{plan}");
-        let bars = progress::Bars::new();
-        run::run(&plan, &bars)?
-    };
-    let files = write::write(&plan, &outcome, &io.out, existing)?;
+    }
+    let outcome = run::run(&plan, &*cli.observer())?;
+    let files = write::write(&plan, &outcome, &io.folder.out, io.folder.existing())?;
     let summary = outcome.summary();
-    let mut text: Vec<String> = summary.iter().map(|line| format!("{:<44} {}", line.text, shown(line.value))).collect();
-    text.extend(outcome.retrieval.as_ref().map(retrieved::text));
-    text.push(format!("wrote {} files to {}", files.len(), io.out.display()));
+    let mut text: String = summary.iter().map(|line| format!("{:<44} {}\n", line.text, digits(line.value))).collect();
     let values: serde_json::Map<String, Value> = summary.iter().map(|l| (l.key.to_owned(), json!(l.value))).collect();
     let mut object = plan_json(&plan);
     object["results"] = Value::Object(values);
     if let Some(retrieval) = &outcome.retrieval {
-        object["retrieval"] = retrieved::as_json(retrieval);
+        let (errors, detected) = (retrieval.error_table(), retrieval.detected());
+        text += &errors.aligned();
+        let share = "share of scans in which the test finds a wake";
+        text.extend(detected.map(|found| format!("{share:<44} {}\n", digits(found))));
+        object["retrieval"] = json!({ "errors": errors.objects(), "detected": detected });
     }
     object["files"] = json!(paths(&files));
-    say(cli.json, &object, &text.join("\n"))
+    say(cli.json, &object, &(text + &io.folder.wrote(&files)))
 }
 
 fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
@@ -300,13 +297,4 @@ fn plan_json(plan: &Plan) -> Value {
         },
         "stages": stages, "core_s": total.core_s, "memory_bytes": total.memory_bytes, "warnings": plan.warnings,
     })
-}
-
-/// Four digits; what cannot be given is a dash.
-fn shown(value: f64) -> String {
-    match value {
-        v if v.is_nan() => "-".into(),
-        v if v != 0.0 && !(1e-3..1e5).contains(&v.abs()) => format!("{v:.3e}"),
-        v => format!("{v:.4}"),
-    }
 }

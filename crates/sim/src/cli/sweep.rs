@@ -1,16 +1,15 @@
 //! `wakescope sweep` and `wakescope pareto`: design studies.
 
 use super::progress::{Quiet, SweepBar};
+use super::words::{TableWords, existing};
 use super::{Cli, paths, say};
 use crate::io::csv_input::TextTable;
-use crate::io::own::refuse_foreign;
-use crate::io::{Existing, write_atomic};
 use crate::sweep::front_table::{FrontTable, Wanted};
 use crate::sweep::{Request, Settings, Shard, Sweep, merge, run};
 use crate::{Error, sweep};
 use clap::Args;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Words of `wakescope sweep`.
 #[derive(Debug, Args)]
@@ -66,7 +65,7 @@ pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
         seed: cli.seed,
     };
     let sweep = words.scene.as_deref().map(|scene| Sweep::new(scene, &request)).transpose()?;
-    let existing = if words.overwrite { Existing::Any } else { Existing::Own };
+    let existing = existing(words.overwrite);
     let Some(sweep) = sweep.as_ref().filter(|_| words.merge.is_empty()) else {
         let files = merge(&words.merge, sweep.as_ref(), &words.out, existing)?;
         let text = format!("wrote {} files to {}", files.len(), words.out.display());
@@ -115,27 +114,16 @@ pub(super) struct ParetoWords {
     /// Only rows for which this holds, e.g. "resolution_m <= 35".
     #[arg(long = "where", value_name = "CONDITION")]
     conditions: Vec<String>,
-    /// File for the rows of the front, as CSV.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Replace a file that this program did not write.
-    #[arg(long)]
-    overwrite: bool,
+    #[command(flatten)]
+    front: TableWords,
 }
 
 pub(super) fn pareto(words: &ParetoWords, cli: &Cli) -> Result<(), Error> {
-    if let Some(path) = &words.out {
-        let name = path.file_name().and_then(|name| name.to_str());
-        let existing = if words.overwrite { Existing::Any } else { Existing::Own };
-        refuse_foreign(path.parent().unwrap_or(Path::new("")), name, existing)?;
-    }
+    words.front.prepare()?;
     let wanted = Wanted { min: &words.min, max: &words.max, conditions: &words.conditions };
     let refuse = |reason| Error::Input { path: words.table.clone(), reason };
     let found = FrontTable::new(TextTable::read(&words.table)?, &wanted).map_err(refuse)?;
     let mut text = found.text();
-    if let Some(path) = &words.out {
-        write_atomic(path, found.csv()?)?;
-        text += &format!("wrote {}\n", path.display());
-    }
+    words.front.write(&found.rows(), &found.origin(), &mut text)?;
     say(cli.json, &found.json(), &text)
 }

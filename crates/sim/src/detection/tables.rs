@@ -2,19 +2,21 @@
 
 use super::{Power, ScanDetection};
 use crate::io::Table;
+use crate::io::scans::ReadScan;
 
-/// The table of scans; `names` has file, sweep and time of each. A vortex that the best wake lacks has no place.
+/// The table of scans, with the time of the first line of each. A vortex that the best wake lacks has no place.
 #[must_use]
-pub fn scan_table(names: &[(String, usize, f64)], found: &[ScanDetection]) -> Table {
+pub fn scan_table(scans: &[ReadScan], found: &[ScanDetection]) -> Table {
+    let time_s = |scan: &ReadScan| scan.map.time_s.iter().copied().fold(f64::NAN, f64::min);
     let column = |get: &dyn Fn(&ScanDetection) -> f64| found.iter().map(get).collect::<Vec<_>>();
     let side = |get: &dyn Fn(&ScanDetection) -> (f64, f64)| {
         found.iter().map(|f| Some(get(f)).filter(|(c, _)| *c > 0.0).map_or(f64::NAN, |(_, x)| x)).collect::<Vec<_>>()
     };
     let (left, right) = (|f: &ScanDetection| f.statistic.wake.left, |f: &ScanDetection| f.statistic.wake.right);
     Table::new()
-        .text("file", names.iter().map(|name| name.0.clone()))
-        .int("sweep", names.iter().map(|name| name.1 as i64))
-        .float("time_s", names.iter().map(|name| name.2))
+        .text("file", scans.iter().map(ReadScan::file_name))
+        .int("sweep", scans.iter().map(|scan| scan.sweep as i64))
+        .float("time_s", scans.iter().map(time_s))
         .int("wake", found.iter().map(|f| i64::from(f.is_wake())))
         .float("statistic", column(&|f| f.statistic.value))
         .float("threshold", column(&|f| f.threshold))

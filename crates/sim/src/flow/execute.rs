@@ -268,7 +268,7 @@ fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
     {
         return Err(Error::CheckpointInTheWay { path });
     }
-    crate::write::prepare(folder, [], Existing::Own)
+    crate::outputs::prepare(folder, &[], Existing::Own, true)
 }
 
 /// The setup and the plan of a case, with all that can be refused before the computing.

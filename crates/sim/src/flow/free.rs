@@ -3,7 +3,7 @@
 use super::setup::{Initial, Setup};
 use crate::Error;
 use crate::keys::{ABOVE_ZERO, Checker, FINITE, Is, ZERO_OR_MORE, keys};
-use crate::scene::VortexProfile;
+use crate::scene::CoreProfile;
 use std::path::Path;
 use wakescope_les::solver::Ends;
 use wakescope_les::{
@@ -97,7 +97,7 @@ keys! {
         /// Height \[m\].
         height_m: f64 = 47.0 => ABOVE_ZERO,
         /// Circulation against radius.
-        profile: VortexProfile = VortexProfile::Algebraic,
+        profile: CoreProfile = CoreProfile::Algebraic,
         /// Uniform cross wind \[m/s\].
         cross_wind_m_s: f64 = 0.0 => FINITE,
     }

@@ -168,13 +168,9 @@ impl CaseFile {
     }
 
     fn provenance(&self) -> Provenance {
-        Provenance {
-            program: crate::PROGRAM.into(),
-            scene_toml: self.toml.clone(),
-            scene_hash: self.hash.clone(),
-            // 0 stands for noise by a closed formula, and for none.
-            seed: if let CaseKind::Wake(wake) = &self.case.case { wake.seed.unwrap_or(0) } else { 0 },
-        }
+        // 0 stands for noise by a closed formula, and for none.
+        let seed = if let CaseKind::Wake(wake) = &self.case.case { wake.seed.unwrap_or(0) } else { 0 };
+        Provenance::new(&self.toml, &self.hash, seed)
     }
 }
 

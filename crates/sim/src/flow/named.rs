@@ -1,7 +1,7 @@
 //! The parameters of the flows with known answers.
 
 use crate::keys::{ABOVE_ZERO, Checker, FINITE, Is, Number, ZERO_OR_MORE, keys};
-use crate::scene::VortexProfile;
+use crate::scene::CoreProfile;
 
 use wakescope_les::cases::{Case, VortexPairCase};
 
@@ -112,7 +112,7 @@ keys! {
         /// Core radius.
         core_radius: f64 = 0.1 => ABOVE_ZERO,
         /// Circulation against radius.
-        profile: VortexProfile = VortexProfile::Algebraic,
+        profile: CoreProfile = CoreProfile::Algebraic,
         /// `Gamma0/nu`.
         reynolds: f64 = 5000.0 => ABOVE_ZERO,
         /// The ground: no-slip if true, else a frictionless plane.

@@ -91,6 +91,13 @@ impl Table {
         self
     }
 
+    /// Adds the columns of another table.
+    #[must_use]
+    pub fn beside(mut self, other: Self) -> Self {
+        self.columns.extend(other.columns);
+        self
+    }
+
     /// The rows of several tables, one table after the other.
     ///
     /// # Errors
@@ -124,6 +131,42 @@ impl Table {
         &self.columns
     }
 
+    /// The rows as objects, each with the names of the columns; what is missing is null.
+    #[cfg(feature = "cli")]
+    pub(crate) fn objects(&self) -> Vec<serde_json::Value> {
+        use serde_json::json;
+        let value = |column: &Column, row: usize| match column {
+            Column::Float(v) => json!(v[row]),
+            Column::Int(v) => json!(v[row]),
+            Column::Text(v) => json!(v[row]),
+        };
+        let object = |row| self.columns.iter().map(|(name, column)| (name.clone(), value(column, row))).collect();
+        (0..self.len()).map(object).collect()
+    }
+
+    fn len(&self) -> usize {
+        self.columns.first().map_or(0, |(_, column)| column.len())
+    }
+
+    /// The table for people: columns side by side, floats as [`digits`] has them.
+    pub fn aligned(&self) -> String {
+        let cell = |(name, column): &(String, Column), line: usize| match (line.checked_sub(1), column) {
+            (None, _) => name.clone(),
+            (Some(row), Column::Float(v)) => digits(v[row]),
+            (Some(row), Column::Int(v)) => v[row].to_string(),
+            (Some(row), Column::Text(v)) => v[row].clone(),
+        };
+        let lines = || 0..=self.len();
+        let width = |column| lines().map(|line| cell(column, line).chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = self.columns.iter().map(width).collect();
+        let padded = |line: usize| {
+            let cells =
+                self.columns.iter().zip(&widths).map(|(column, width)| format!("{:>width$}", cell(column, line)));
+            cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+        };
+        lines().map(padded).collect()
+    }
+
     /// The table as CSV text.
     ///
     /// # Errors
@@ -153,7 +196,7 @@ impl Table {
     fn push_rows(&self, out: &mut String) {
         // Room for most texts at once, so that growing does not copy what is there.
         out.reserve(self.columns.iter().map(|(_, column)| column.len() * column.usual_width()).sum());
-        for row in 0..self.columns[0].1.len() {
+        for row in 0..self.len() {
             for (i, (_, column)) in self.columns.iter().enumerate() {
                 if i > 0 {
                     out.push(',');
@@ -191,6 +234,15 @@ pub(crate) fn float_text(value: f64) -> String {
         "0.0".into()
     } else {
         format!("{value:?}")
+    }
+}
+
+/// A number for people: four decimals, or the form with an exponent where they do not show it; what is not known is a dash.
+pub(crate) fn digits(value: f64) -> String {
+    match value {
+        v if v.is_nan() => "-".into(),
+        v if v != 0.0 && !(1e-3..1e5).contains(&v.abs()) => format!("{v:.3e}"),
+        v => format!("{v:.4}"),
     }
 }
 

@@ -260,17 +260,6 @@ impl VelocityMap {
         self.place_m(ray)[2] + self.range_m[gate] * self.rays[ray].elevation_rad.sin()
     }
 
-    /// The kinds of its sweeps, each once, in their order.
-    pub fn modes(&self) -> Vec<SweepMode> {
-        let mut modes: Vec<SweepMode> = Vec::new();
-        for sweep in &self.sweeps {
-            if !modes.contains(&sweep.mode) {
-                modes.push(sweep.mode);
-            }
-        }
-        modes
-    }
-
     /// The sweeps of one kind alone.
     #[must_use]
     pub fn of_mode(&self, mode: SweepMode) -> Self {

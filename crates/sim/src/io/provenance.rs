@@ -16,6 +16,16 @@ pub struct Provenance {
 }
 
 impl Provenance {
+    /// Of this program.
+    pub fn new(scene_toml: &str, scene_hash: &str, seed: u64) -> Self {
+        Self { program: crate::PROGRAM.into(), scene_toml: scene_toml.into(), scene_hash: scene_hash.into(), seed }
+    }
+
+    /// The scene with every default written out, as a file that this program knows for its own: running it again gives the same files.
+    pub fn scene_file(&self) -> String {
+        format!("# {}, scene {}\n{}", self.program, self.scene_hash, self.scene_toml)
+    }
+
     /// The entries as (key, text), in the order in which every writer puts them.
     pub fn entries(&self) -> [(&'static str, String); 4] {
         [

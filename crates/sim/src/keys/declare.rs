@@ -132,7 +132,16 @@ macro_rules! second {
     };
 }
 
-pub(crate) use {choice, held, keys, kinds, second, table};
+/// Choices of another crate, by the names that they have in files.
+macro_rules! foreign_choices {
+    ($($ty:ty: $($word:literal)|*,)*) => {
+        $(impl $crate::keys::Declared for $ty {
+            fn kind() -> $crate::keys::Kind { $crate::keys::Kind::Choice(&[$($word),*]) }
+        })*
+    };
+}
+
+pub(crate) use {choice, foreign_choices, held, keys, kinds, second, table};
 
 /// Plain values.
 macro_rules! plain {

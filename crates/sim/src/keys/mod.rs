@@ -17,7 +17,7 @@ mod vet;
 mod words;
 
 pub(crate) use checker::{Checker, Side};
-pub(crate) use declare::{Declared, choice, held, keys, keys_of, kinds, second, table};
+pub(crate) use declare::{Declared, choice, foreign_choices, held, keys, keys_of, kinds, second, table};
 pub(crate) use key::{Key, Kind, join};
 #[cfg(feature = "flow")]
 pub(crate) use limit::{ABOVE_ZERO, FINITE};

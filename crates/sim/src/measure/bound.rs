@@ -12,7 +12,7 @@ use crate::setup::progress::Observer;
 use crate::setup::ray_information::RayInformation;
 use crate::setup::region::{places, region_radius};
 use crate::setup::table::of_table;
-use crate::{Error, scene::NoiseKind};
+use crate::{Error, scene::NoiseModel};
 use wakescope_estimate::{
     Radius,
     map::{PolarPoint, ScanGeometry, WindowCovariance},
@@ -60,7 +60,7 @@ struct Setting {
 impl Setting {
     fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, layer_snr) = (&plan.scene.scene, scanner.layer_snr());
-        if scene.detector.noise == NoiseKind::None {
+        if scene.detector.noise == NoiseModel::None {
             return Err(Error::NoBound);
         }
         let places = places(scene, &plan.geometry)?;
@@ -125,37 +125,32 @@ pub(crate) fn bound_in_the_middle(plan: &Plan, scanner: &Scanner<'_>) -> Result<
     Setting::new(plan, scanner)?.at(plan.geometry.gate_range_m[plan.geometry.gate_range_m.len() / 2])
 }
 
+/// The table `range_m,snr_db,bound_window_m_s,level,n_eff,bound_region_m_s`.
+pub fn points(points: &[BoundPoint]) -> Table {
+    let column = |get: fn(&BoundPoint) -> f64| points.iter().map(get).collect::<Vec<_>>();
+    Table::new()
+        .float("range_m", column(|p| p.range_m))
+        .float("snr_db", column(|p| p.snr_db))
+        .float("bound_window_m_s", column(|p| p.window_m_s))
+        .int("level", points.iter().map(|p| p.level as i64))
+        .float("n_eff", column(|p| p.n_eff))
+        .float("bound_region_m_s", column(|p| p.region_m_s))
+}
+
 impl SceneBound {
-    /// The table `curve,range_m,snr_db,bound_window_m_s,level,n_eff,bound_region_m_s`; `curve` is `snr` or `range`.
+    /// All points in one table, behind a column `curve` that is `snr` or `range`.
     pub fn table(&self) -> Table {
-        let named =
-            |name: &'static str, points: &[BoundPoint]| points.iter().map(move |p| (name, *p)).collect::<Vec<_>>();
-        let rows = [named("snr", &self.by_snr), named("range", &self.by_range)].concat();
-        let column = |get: fn(&BoundPoint) -> f64| rows.iter().map(move |(_, p)| get(p)).collect::<Vec<_>>();
+        let curve = |name: &'static str, points: &[BoundPoint]| std::iter::repeat_n(name, points.len());
         Table::new()
-            .text("curve", rows.iter().map(|(name, _)| *name))
-            .float("range_m", column(|p| p.range_m))
-            .float("snr_db", column(|p| p.snr_db))
-            .float("bound_window_m_s", column(|p| p.window_m_s))
-            .int("level", rows.iter().map(|(_, p)| p.level as i64))
-            .float("n_eff", column(|p| p.n_eff))
-            .float("bound_region_m_s", column(|p| p.region_m_s))
+            .text("curve", curve("snr", &self.by_snr).chain(curve("range", &self.by_range)))
+            .beside(points(&[self.by_snr.as_slice(), &self.by_range].concat()))
     }
 
     /// A few lines for people: every tenth decibel, and five ranges.
     pub fn text(&self) -> String {
-        let mut out = String::from(
-            "       SNR      range  one window  windows    n_eff    region\n        dB          m         m/s                         m/s\n",
-        );
         let spread = (self.by_range.len().max(2) - 1) as f64 / 4.0;
         let ranges = (0..5).map(|i| (f64::from(i) * spread) as usize).filter_map(|i| self.by_range.get(i));
-        for p in self.by_snr.iter().step_by(10).chain(ranges) {
-            out += &format!(
-                "{:>10.2} {:>10.1} {:>11.4} {:>8} {:>8.2} {:>9.4}\n",
-                p.snr_db, p.range_m, p.window_m_s, p.level, p.n_eff, p.region_m_s
-            );
-        }
-        out
+        points(&self.by_snr.iter().step_by(10).chain(ranges).copied().collect::<Vec<_>>()).aligned()
     }
 }
 
@@ -163,7 +158,7 @@ impl SceneBound {
 mod tests {
     use super::*;
     use crate::plan::Target;
-    use crate::scene::{DetectorSignal, NoiseKind, Scene, SceneFile, SnrReference};
+    use crate::scene::{DetectorSignal, NoiseModel, Scene, SceneFile, SnrReference};
     use crate::setup::progress::Silent;
 
     fn of(change: impl FnOnce(&mut Scene)) -> Result<SceneBound, Error> {
@@ -187,7 +182,7 @@ mod tests {
     #[test]
     fn the_bound_of_one_window_of_table_2_is_the_stored_curve() {
         for (signal, column) in [(DetectorSignal::Baseband, 1), (DetectorSignal::IntermediateFrequency, 2)] {
-            let found = of(|s| (s.detector.noise, s.detector.signal) = (NoiseKind::White, signal)).unwrap().by_snr;
+            let found = of(|s| (s.detector.noise, s.detector.signal) = (NoiseModel::White, signal)).unwrap().by_snr;
             let mut compared = 0;
             for (snr_db, expected_m_s) in stored(column) {
                 if let Some(p) = found.iter().find(|p| (p.snr_db - snr_db).abs() < 1e-9) {
@@ -301,7 +296,7 @@ mod tests {
 
     #[test]
     fn a_scene_without_noise_has_no_bound() {
-        let refused = of(|s| s.detector.noise = NoiseKind::None).unwrap_err();
+        let refused = of(|s| s.detector.noise = NoiseModel::None).unwrap_err();
         assert!(matches!(refused, Error::NoBound), "{refused}");
     }
 }

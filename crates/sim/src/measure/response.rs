@@ -5,7 +5,7 @@
 use crate::Error;
 use crate::measure::scan::median_snr;
 use crate::plan::Plan;
-use crate::scene::{NoiseKind, PulseShape as Shape, Scene};
+use crate::scene::{NoiseModel, PulseShape as Shape, Scene};
 use crate::setup::estimators::{Response, response, sampling, signal_kind};
 use crate::setup::ray_information::RayInformation;
 use crate::setup::region::{places, region_radius};
@@ -32,9 +32,9 @@ impl SceneResponse {
         let (scene, pulse) = (&plan.scene.scene, &plan.instrument.pulse);
         let is_gaussian = matches!(scene.pulse.shape, Shape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
         let noise = match scene.detector.noise {
-            NoiseKind::Band => Noise::Band { floor: 0.0 },
-            NoiseKind::White => Noise::White,
-            NoiseKind::None => return Ok(None),
+            NoiseModel::BandLimited => Noise::Band { floor: 0.0 },
+            NoiseModel::White => Noise::White,
+            NoiseModel::None => return Ok(None),
         };
         if !is_gaussian {
             return Ok(None);

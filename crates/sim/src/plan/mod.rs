@@ -189,7 +189,7 @@ impl fmt::Display for Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Flow, NoiseKind, RefractiveTurbulence, SnrReference, Turbulence};
+    use crate::scene::{Flow, NoiseModel, RefractiveTurbulence, SnrReference, Turbulence};
 
     fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
         let mut scene = Scene::default();
@@ -215,7 +215,7 @@ mod tests {
     fn what_the_scene_does_not_need_is_left_out_with_a_reason() {
         let lean = plan(Target::Map, |s| {
             s.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
-            s.detector.noise = NoiseKind::None;
+            s.detector.noise = NoiseModel::None;
         });
         assert_eq!(run_stages(&lean), ["lines of sight", "signals", "estimates", "errors", "files"]);
         assert!(lean.stages.iter().filter(|s| s.cost.is_none()).all(|s| !s.reason.is_empty()));

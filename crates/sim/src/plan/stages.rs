@@ -6,7 +6,7 @@
 use super::files::files;
 use super::sizes::{MAP_FIELDS, Sizes, is_calm, keeps_few_lags};
 use super::stage::{PlannedStage, Target, run, skip};
-use crate::scene::{Flow, Method, NoiseKind, RegionRadius, RetrievalMethod, Scene, WindOfPulses};
+use crate::scene::{Flow, Method, NoiseModel, RegionRadius, RetrievalMethod, Scene, WindOfPulses};
 use crate::setup::geometry::Geometry;
 use crate::setup::progress::Stage;
 use crate::setup::sizes::{AIRS_BYTES, records_at_once};
@@ -158,7 +158,7 @@ fn signals(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
 }
 
 fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {
-    if scene.detector.noise == NoiseKind::None {
+    if scene.detector.noise == NoiseModel::None {
         return skip(Stage::Noise, "detector.noise is \"none\"");
     }
     let values = n.realisations * n.records * n.samples * n.parts;

@@ -39,7 +39,7 @@ pub use retrieved_scan::RetrievedScan;
 pub use summary::RetrievalErrors;
 #[cfg(feature = "sweep")]
 pub use table::json;
-pub use table::rows;
+pub use table::{rows, side};
 #[cfg(feature = "plots")]
 pub use tracks::track_figure;
 pub use tracks::{track_of, track_table};

@@ -67,7 +67,7 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
 fn title(scan: &RetrievedScan, number: usize) -> String {
     let of = |side: Side| {
         let vortex = scan.result.vortex(side)?;
-        let name = if side == Side::Left { "left" } else { "right" };
+        let name = super::side(side);
         let mean = vortex.circulation_5_15_m2_s;
         Some(format!("{name} Γ(5-15 m) = {:.0} ± {:.0} m²/s", mean.value, mean.std))
     };

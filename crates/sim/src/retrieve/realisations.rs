@@ -7,18 +7,18 @@ use super::one_scan::{Velocities, retrieve_map};
 use super::others::envelopes;
 use super::own::OwnScene;
 use super::retrieved_scan::RetrievedScan;
-use super::truth::{TrueVortex, core_profile, true_vortices, true_wake};
+use super::truth::{TrueVortex, true_vortices, true_wake};
 use crate::Error;
 use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
 use crate::io::scans::ReadScan;
 use crate::measure::recorded::Spectra;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
-use crate::scene::{Flow, FollowingAircraft, LiftSlope as Slope, Retrieval, RetrievalMethod as Method, Scene};
+use crate::scene::{Flow, FollowingAircraft, Retrieval, RetrievalMethod as Method, Scene};
 use crate::setup::progress::{Observer, Silent};
 use ndarray::{Array2, ArrayView2, Axis};
 use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, VortexResult, circulation_profile};
-use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Follower, LiftSlope, Sharing, Wake, WakeModel};
+use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Follower, Sharing, Wake, WakeModel};
 use wakescope_estimate::window::Sample;
 
 /// Radii of the circulation from integrals over the map, m.
@@ -107,7 +107,7 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
 /// How the scans of a scene are retrieved: its gates, ground and profile, cores fitted unless the scene keeps them.
 fn options(scene: &Scene, wanted: &Retrieval) -> Result<RetrievalOptions, Error> {
     let profile = match scene.flow {
-        Flow::VortexPair(pair) => core_profile(pair.profile),
+        Flow::VortexPair(pair) => pair.profile,
         _ => CoreProfile::Algebraic,
     };
     let mut options = RetrievalOptions {
@@ -232,10 +232,6 @@ fn rows_of(
 
 fn follower(aircraft: FollowingAircraft) -> Follower {
     let FollowingAircraft { span_m, aspect_ratio, speed_m_s, slope } = aircraft;
-    let slope = match slope {
-        Slope::Span => LiftSlope::Span,
-        Slope::Semispan => LiftSlope::Semispan,
-    };
     Follower { span_m, aspect_ratio, speed_m_s, slope }
 }
 

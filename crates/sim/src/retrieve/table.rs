@@ -25,7 +25,7 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
         |result: &ScanResult, vortex: Option<&VortexResult>| vortex.map_or(result.reference_time_s, |v| v.time_s);
     let mut table = Table::new()
         .int("scan", of.iter().map(|(number, ..)| *number as i64))
-        .text("file", text(&|scan, _| scan.scan.path.file_name().unwrap_or_default().to_string_lossy().into_owned()))
+        .text("file", text(&|scan, _| scan.scan.file_name()))
         .int("sweep", of.iter().map(|(_, scan, _)| scan.scan.sweep as i64))
         .float("time_s", number(&time))
         .text("side", text(&|_, vortex| vortex.map_or("none", |v| side(v.side)).to_owned()));
@@ -69,7 +69,8 @@ fn with_std(name: &str) -> String {
     format!("{}_std{unit}", name.strip_suffix(unit).unwrap_or(name))
 }
 
-pub(super) fn side(side: Side) -> &'static str {
+/// The name of a side.
+pub fn side(side: Side) -> &'static str {
     match side {
         Side::Left => "left",
         Side::Right => "right",

@@ -6,10 +6,10 @@
 
 use crate::Error;
 use crate::plan::Plan;
-use crate::scene::{Flow, VortexProfile};
+use crate::scene::Flow;
 use crate::setup::wind::vortex_pair;
 use wakescope_estimate::retrieval::Side;
-use wakescope_estimate::vortex_fit::{CoreProfile, Vortex, Wake};
+use wakescope_estimate::vortex_fit::{Vortex, Wake};
 use wakescope_les::analysis::mean_circulation_5_15_m2_s;
 
 /// Distance of the points at which vorticity is looked for, m, first and about a centre.
@@ -46,7 +46,7 @@ pub struct TrueVortex {
 pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[TrueVortex; 2], Error> {
     match &plan.scene.scene.flow {
         Flow::VortexPair(pair) => {
-            let (air, profile) = (vortex_pair(pair), core_profile(pair.profile));
+            let (air, profile) = (vortex_pair(pair), pair.profile);
             // Behind an aircraft, the wake in the plane of the scan has its age there.
             let x_m = plan.scene.scene.scan.lidar.x_m;
             let since_s = pair.aircraft.map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
@@ -83,14 +83,6 @@ pub(crate) fn true_wake(truth: &[TrueVortex; 2]) -> Option<Wake> {
     let [left, right] = truth.each_ref().map(vortex);
     let wake = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
     wake.validate().is_ok().then_some(wake)
-}
-
-/// The profile of a scene's vortices in the words of the fits.
-pub(crate) fn core_profile(profile: VortexProfile) -> CoreProfile {
-    match profile {
-        VortexProfile::Algebraic => CoreProfile::Algebraic,
-        VortexProfile::LambOseen => CoreProfile::LambOseen,
-    }
 }
 
 /// Place of a centre that moves, and the time, when the line of sight passes it.

@@ -1,6 +1,7 @@
 //! Aerosol and refractive turbulence of a scene.
 
 use crate::keys::{ABOVE_ZERO_OR_INF, keys};
+use wakescope_optics::air::OuterScaleConvention;
 
 keys! {
     /// Aerosol and refractive turbulence.
@@ -54,7 +55,7 @@ keys! {
         /// Outer scale L0, m; `inf` for none.
         outer_scale_m: f64 = 1.0 => ABOVE_ZERO_OR_INF,
         /// Wave number of the outer scale.
-        outer_scale_wavenumber: OuterScaleWavenumber = OuterScaleWavenumber::Inverse,
+        outer_scale_wavenumber: OuterScaleConvention = OuterScaleConvention::Inverse,
         /// Who chooses grid and layers of the phase screens.
         sampling: ScreenSampling = ScreenSampling::Explicit,
         /// Points along each side of the phase screens; not used with `sampling = "derived"`.
@@ -87,13 +88,5 @@ keys! {
         Tatarskii = "tatarskii",
         /// Hill's bump near the inner scale, in Andrews' form.
         HillAndrews = "hill_andrews",
-    }
-
-    /// How the outer scale gives the wave number kappa_0 of (17).
-    choice OuterScaleWavenumber {
-        /// 1/L0, as (17) has it.
-        Inverse = "inverse",
-        /// 2 pi/L0.
-        TwoPiOver = "two_pi_over",
     }
 }

@@ -1,6 +1,7 @@
 //! From signals to velocities: the estimator of a scene, its method with its own keys, and what all methods share.
 
 use crate::keys::{Is, Number, keys};
+use wakescope_estimate::Refinement;
 
 keys! {
     /// From signals to velocities.
@@ -176,15 +177,5 @@ keys! {
         Rectangular = "rectangular",
         /// Hann.
         Hann = "hann",
-    }
-
-    /// How a spectral peak is refined between the points of the spectrum.
-    choice Refinement {
-        /// Parabola through the logarithms of three points.
-        Parabola = "parabola",
-        /// Maximum of the exact spectrum, where the estimator is a spectrum; else as the parabola.
-        Exact = "exact",
-        /// None: the velocity of the highest point.
-        None = "none",
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::keys::keys;
 use std::f64::consts::TAU;
+use wakescope_estimate::vortex_fit::CoreProfile;
 
 keys! {
     /// The wind that the lidar sees.
@@ -49,7 +50,7 @@ keys! {
         /// Height at which the pair was released, m.
         height_m: f64 = 47.0 => 1e-2..=1e4,
         /// Circulation profile.
-        profile: VortexProfile = VortexProfile::Algebraic,
+        profile: CoreProfile = CoreProfile::Algebraic,
         /// Whether the pair moves.
         motion: VortexMotion = VortexMotion::Frozen,
         /// Age of the pair when the scan begins, in tau = t V0/b0; not 0 only if it moves.
@@ -146,14 +147,6 @@ keys! {
         NoSlip = "no_slip",
         /// A wall at z = 0 without friction.
         Slip = "slip",
-    }
-
-    /// Circulation profile of a vortex.
-    choice VortexProfile {
-        /// Gamma0 r^2/(r^2 + r_c^2), (3).
-        Algebraic = "algebraic",
-        /// Lamb-Oseen with the same radius of maximum speed.
-        LambOseen = "lamb_oseen",
     }
 
     /// Whether the analytic pair moves.

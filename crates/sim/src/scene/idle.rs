@@ -3,7 +3,7 @@
 //! They are refused, so that nobody turns a knob that turns nothing. Keys that stand in the file of `wakescope init` may stay
 //! there with their default.
 
-use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseKind, OuterScaleWavenumber, Pattern, RefractiveTurbulence};
+use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseModel, OuterScaleConvention, Pattern, RefractiveTurbulence};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
 use super::{Refinement, RegionRadius, Scan, SignalsOf};
 use crate::keys::Document;
@@ -38,7 +38,7 @@ fn idle(scene: &Scene) -> Vec<Idle> {
     let none = !scene.outputs.signals && scene.outputs.signals_of == SignalsOf::All;
     unused(none, &["outputs.signals_of"], "outputs.signals = false writes none".into());
     let untested = scene.estimator.false_alarm != Estimator::default().false_alarm;
-    let without_noise = untested && scene.detector.noise == NoiseKind::None;
+    let without_noise = untested && scene.detector.noise == NoiseModel::None;
     unused(without_noise, &["estimator.false_alarm"], "detector.noise = \"none\" leaves nothing to test".into());
     let without_spectrum = *method == (Method::PulsePair {});
     unused(without_spectrum, &["estimator.padded_samples"], format!("{kind} has no spectrum"));
@@ -97,7 +97,7 @@ fn of_turbulence(turbulence: &RefractiveTurbulence, mut unused: impl FnMut(bool,
     unused(without_outer, &OUTER, purpose("outer"));
     // A spectrum without outer scale has no wave number of it.
     let endless = !without_outer && turbulence.outer_scale_m == f64::INFINITY;
-    let unset = turbulence.outer_scale_wavenumber == OuterScaleWavenumber::Inverse;
+    let unset = turbulence.outer_scale_wavenumber == OuterScaleConvention::Inverse;
     unused(endless && !unset, &OUTER[1..], "atmosphere.turbulence.outer_scale_m = inf is no outer scale".into());
 }
 

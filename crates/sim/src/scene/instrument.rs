@@ -2,6 +2,10 @@
 
 use super::receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, is_nothing_db, is_zero};
 use crate::keys::{NothingOr, Number, ZERO_OR_MORE, keys};
+use wakescope_optics::RadiusDefinition;
+use wakescope_optics::plan::Receiver as ReceiverPath;
+use wakescope_signal::NoiseModel;
+use wakescope_signal::sampled::Resampling;
 
 keys! {
     /// The laser source.
@@ -64,19 +68,9 @@ keys! {
         /// Phase of f at these times, rad; empty for none.
         phase_rad: Vec<f64> = Vec::new(),
         /// How the envelope is continued between the samples.
-        resampling: PulseResampling = PulseResampling::CubicSpline,
+        resampling: Resampling = Resampling::CubicSpline,
         /// Whether ranges count from the centroid of the power instead of from time 0.
         centred: bool = true,
-    }
-
-    /// How a sampled envelope is continued between its samples.
-    choice PulseResampling {
-        /// The cubic spline.
-        CubicSpline = "cubic_spline",
-        /// The function without frequencies beyond half the sampling rate; evenly spaced times only.
-        BandLimited = "band_limited",
-        /// Straight lines.
-        Linear = "linear",
     }
 
     /// What a pulse duration means.
@@ -100,7 +94,7 @@ keys! {
         /// Power of the local oscillator on the detector, W. The SNR depends on it only through `front_end`.
         local_oscillator_w: f64 = 1e-3 => 1e-12..=1e3,
         /// Spectrum of the shot noise.
-        noise: NoiseKind = NoiseKind::Band,
+        noise: NoiseModel = NoiseModel::BandLimited,
         /// What the receiver delivers.
         signal: DetectorSignal = DetectorSignal::IntermediateFrequency,
         /// What the receiver has beyond shot noise.
@@ -133,16 +127,6 @@ keys! {
         },
     }
 
-    /// Spectrum of the shot noise.
-    choice NoiseKind {
-        /// Flat in the detector band, nothing outside, variance (13).
-        Band = "band",
-        /// The same density up to half the sampling frequency.
-        White = "white",
-        /// No noise, and no random numbers drawn for it.
-        None = "none",
-    }
-
     /// What sets the signal-to-noise ratio.
     #[derive(Copy)]
     kinds SnrReference by "reference" {
@@ -166,7 +150,7 @@ keys! {
         /// 1/e radius of the Gaussian beam at the aperture, m.
         beam_radius_m: f64 = 0.03 => 1e-4..=10.0,
         /// Whether `beam_radius_m` is that of the irradiance or of the field.
-        beam_radius_definition: BeamRadiusDefinition = BeamRadiusDefinition::Intensity,
+        beam_radius_definition: RadiusDefinition = RadiusDefinition::Intensity,
         /// Distance of the focus, m; `inf` for a collimated beam.
         focus_m: f64 = f64::INFINITY => Number(
             |focus_m| !focus_m.is_nan() && focus_m != 0.0 && focus_m != f64::NEG_INFINITY,
@@ -186,21 +170,5 @@ keys! {
         /// Range up to which nothing is seen, because the detector recovers from the reflection, m; 0 for none.
         #[serde(skip_serializing_if = "is_zero")]
         blind_range_m: f64 = 0.0 => 0.0..=1e6,
-    }
-
-    /// Whether transmitted and received light cross the same turbulence.
-    choice ReceiverPath {
-        /// One telescope: the same path out and back.
-        Monostatic = "monostatic",
-        /// Two telescopes: independent paths; in free space they are taken to coincide.
-        Bistatic = "bistatic",
-    }
-
-    /// Which 1/e radius is meant.
-    choice BeamRadiusDefinition {
-        /// Of the irradiance, |E|^2 ~ exp(-r^2/w^2).
-        Intensity = "intensity",
-        /// Of the field, E ~ exp(-r^2/w^2).
-        Field = "field",
     }
 }

@@ -25,20 +25,19 @@ mod retrieval;
 
 pub use crate::keys::{Located, Problem, SceneError};
 pub use atmosphere::{
-    AirProfile, Atmosphere, EfficiencyOfPulse, OuterScaleWavenumber, RefractiveTurbulence, ScreenSampling,
-    SpectrumKind, Turbulence,
+    AirProfile, Atmosphere, EfficiencyOfPulse, RefractiveTurbulence, ScreenSampling, SpectrumKind, Turbulence,
 };
 pub use estimator::{
     CorrelogramForm, Estimator, FirstMoment, GradientLikelihood, LagWindow, Likelihood, Method, ModelOrder,
-    OrderChoice, Refinement, RegionRadius, Weighting,
+    OrderChoice, RegionRadius, Weighting,
 };
 pub use flow::{
     Aircraft, FieldFlow, FieldGround, Flow, LinearWind, Outside, SimulatedFlow, SimulatedMotion, VortexLines,
-    VortexMotion, VortexPair, VortexProfile,
+    VortexMotion, VortexPair,
 };
 pub use instrument::{
-    BeamRadiusDefinition, Detector, DetectorSignal, Digitiser, GaussianShape, Laser, NoiseKind, Pulse, PulseDefinition,
-    PulseResampling, PulseShape, ReceiverPath, SampledShape, SnrReference, Telescope,
+    Detector, DetectorSignal, Digitiser, GaussianShape, Laser, Pulse, PulseDefinition, PulseShape, SampledShape,
+    SnrReference, Telescope,
 };
 pub use pattern::{
     Axial, Dbs, HeadMotion, HeadMotionKeys, LidarPlace, Pattern, Ppi, Stare, SweepDirection, Towards, Vad, WindOfPulses,
@@ -46,12 +45,27 @@ pub use pattern::{
 pub use presets::{preset_names, preset_toml};
 pub use read::SceneFile;
 pub use receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, SecondTrip};
-pub use retrieval::{FollowingAircraft, LiftSlope, Retrieval, RetrievalMethod};
+pub use retrieval::{FollowingAircraft, Retrieval, RetrievalMethod};
+pub use wakescope_estimate::Refinement;
+pub use wakescope_estimate::vortex_fit::{CoreProfile, LiftSlope};
+pub use wakescope_optics::{RadiusDefinition, air::OuterScaleConvention, plan::Receiver as ReceiverPath};
+pub use wakescope_signal::{NoiseModel, sampled::Resampling};
 
 use crate::io::UtcTime;
 use crate::keys::{Is, keys};
 use sha2::{Digest, Sha256};
 use std::f64::consts::{FRAC_PI_2, TAU};
+
+crate::keys::foreign_choices! {
+    CoreProfile: "algebraic" | "lamb_oseen",
+    LiftSlope: "span" | "semispan",
+    NoiseModel: "band" | "white" | "none",
+    OuterScaleConvention: "inverse" | "two_pi_over",
+    RadiusDefinition: "intensity" | "field",
+    ReceiverPath: "monostatic" | "bistatic",
+    Refinement: "parabola" | "exact" | "none",
+    Resampling: "cubic_spline" | "band_limited" | "linear",
+}
 
 /// The commented scene that `wakescope init` writes: every key with its default.
 pub const TABLE2_TOML: &str = include_str!("table2.toml");
@@ -224,6 +238,25 @@ mod tests {
 
     fn scene_of(text: &str) -> Scene {
         SceneFile::without_limits(text, Path::new("s.toml")).unwrap()
+    }
+
+    #[test]
+    fn choices_of_other_crates_are_read_by_the_names_that_are_offered() {
+        fn check<T: crate::keys::Declared + serde::de::DeserializeOwned>(count: usize) {
+            let Kind::Choice(words) = T::kind() else { panic!("no choice") };
+            assert_eq!(words.len(), count);
+            for word in words {
+                assert!(toml::Value::from(*word).try_into::<T>().is_ok(), "{word}");
+            }
+        }
+        check::<CoreProfile>(2);
+        check::<LiftSlope>(2);
+        check::<NoiseModel>(3);
+        check::<OuterScaleConvention>(2);
+        check::<RadiusDefinition>(2);
+        check::<ReceiverPath>(2);
+        check::<Refinement>(3);
+        check::<Resampling>(3);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
 use crate::Error;
-use crate::io::text_file;
+use crate::io::{Provenance, text_file};
 use crate::keys::{Document, Format, Key, Source, keys_of};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -22,6 +22,11 @@ pub struct SceneFile {
 }
 
 impl SceneFile {
+    /// Where the files of this scene come from.
+    pub fn provenance(&self) -> Provenance {
+        Provenance::new(&self.toml, &self.hash, self.scene.seed)
+    }
+
     /// Reads and checks a scene file.
     ///
     /// # Errors

@@ -1,8 +1,9 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
-use super::{Flow, NoiseKind, Pattern, PulseShape, Scan, Scene, Weighting};
+use super::{Flow, NoiseModel, Pattern, PulseShape, Scan, Scene, Weighting};
 use crate::keys::{Checker, Is, keys};
 use crate::setup::beams::direction::sin_cos_of_turn;
+use wakescope_estimate::vortex_fit::LiftSlope;
 
 keys! {
     /// How circulations are found.
@@ -49,14 +50,6 @@ keys! {
         /// Slope of the lift.
         slope: LiftSlope = LiftSlope::Span,
     }
-
-    /// Slope of the lift of a wing of aspect ratio A.
-    choice LiftSlope {
-        /// 2 pi A/(A + 2).
-        Span = "span",
-        /// 2 pi A/(A + 4).
-        Semispan = "semispan",
-    }
 }
 
 /// What a scene may say of its retrievals.
@@ -75,7 +68,7 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let alone = scene.scan.head.sweeps == 1 || !r.methods.contains(&RetrievalMethod::Envelope);
     c.require(alone, key, "envelope", one);
     if let Some(rate) = r.false_alarm {
-        let noise = scene.detector.noise != NoiseKind::None;
+        let noise = scene.detector.noise != NoiseModel::None;
         c.require(noise, "retrieval.false_alarm", rate, "absent where detector.noise = \"none\": nothing is by chance");
     }
     let across = "absent but for scan.pattern.kind = \"rhi\" in the plane across the flight, where vortices are sought: with \
@@ -93,7 +86,7 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let plain = matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
     for (method, word) in [(RetrievalMethod::Signals, "signals"), (RetrievalMethod::Envelope, "envelope")] {
         c.require(
-            !r.methods.contains(&method) || (plain && scene.detector.noise != NoiseKind::None),
+            !r.methods.contains(&method) || (plain && scene.detector.noise != NoiseModel::None),
             key,
             word,
             "another method where detector.noise = \"none\" or the pulse is sampled or has a chirp: their signals have no likelihood here",

@@ -5,7 +5,6 @@
 
 use crate::scene::{EfficiencyOfPulse, RefractiveTurbulence, Scene, SnrReference, Turbulence};
 use crate::setup::geometry::Geometry;
-use crate::setup::instrument::receiver_path;
 use wakescope_optics::Cn2Path;
 use wakescope_optics::plan::{Model, cheapest_model};
 
@@ -15,7 +14,7 @@ pub(crate) fn model(scene: &Scene) -> Model {
         None => Cn2Path::None,
         Some(t) => Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 },
     };
-    cheapest_model(receiver_path(scene), &cn2)
+    cheapest_model(scene.telescope.receiver, &cn2)
 }
 
 /// The turbulence of a scene, if there is any.

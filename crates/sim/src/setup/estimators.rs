@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::scene::{
-    CorrelogramForm, DetectorSignal, Estimator as Words, GradientLikelihood, Method, ModelOrder, NoiseKind,
-    OrderChoice, PulseShape, Refinement, Scene, Weighting,
+    CorrelogramForm, DetectorSignal, Estimator as Words, GradientLikelihood, Method, ModelOrder, NoiseModel,
+    OrderChoice, PulseShape, Scene, Weighting,
 };
 use crate::setup::instrument::Instrument;
 use crate::setup::table::{of_table, spaced};
@@ -58,15 +58,6 @@ pub fn weighting(scene: &Scene) -> estimate::Weighting {
     }
 }
 
-/// How a peak is refined.
-pub fn refinement(scene: &Scene) -> estimate::Refinement {
-    match scene.estimator.refinement {
-        Refinement::Parabola => estimate::Refinement::Parabola,
-        Refinement::Exact => estimate::Refinement::Exact,
-        Refinement::None => estimate::Refinement::None,
-    }
-}
-
 /// Real part of the autocorrelation of the pulse at a lag of its samples, its mean frequency taken out; 1 at lag 0.
 ///
 /// `exp(-(1 + (2 pi chi sigma^2)^2) tau^2/(4 sigma^2))` for a Gaussian with a chirp of chi hertz per second.
@@ -106,13 +97,13 @@ const NOISE_FLOOR: f64 = 1e-6;
 /// What the estimators refuse; a checked scene gives none.
 pub fn window_model(
     scene: &Scene,
-    noise: NoiseKind,
+    noise: NoiseModel,
     pulse: &Pulse,
 ) -> Result<Option<estimate::bound::WindowModel>, Error> {
     let noise = match noise {
-        NoiseKind::White => estimate::bound::Noise::White,
-        NoiseKind::Band => estimate::bound::Noise::Band { floor: NOISE_FLOOR },
-        NoiseKind::None => return Ok(None),
+        NoiseModel::White => estimate::bound::Noise::White,
+        NoiseModel::BandLimited => estimate::bound::Noise::Band { floor: NOISE_FLOOR },
+        NoiseModel::None => return Ok(None),
     };
     let correlation = pulse_correlation(scene, pulse);
     let n = scene.estimator.window_samples;
@@ -127,8 +118,8 @@ pub fn window_model(
 /// What the estimators refuse; a checked scene gives none.
 pub fn record_model(scene: &Scene, pulse: &Pulse) -> Result<estimate::bound::RecordModel, Error> {
     let noise = match scene.detector.noise {
-        NoiseKind::Band => estimate::bound::Noise::Band { floor: NOISE_FLOOR },
-        NoiseKind::White | NoiseKind::None => estimate::bound::Noise::White,
+        NoiseModel::BandLimited => estimate::bound::Noise::Band { floor: NOISE_FLOOR },
+        NoiseModel::White | NoiseModel::None => estimate::bound::Noise::White,
     };
     let is_gaussian = matches!(scene.pulse.shape, PulseShape::Gaussian(_));
     let correlation = pulse_correlation(scene, pulse);
@@ -147,11 +138,11 @@ pub fn window_covariance(scene: &Scene, pulse: &Pulse) -> Result<estimate::map::
     // Half of a real signal and half of its noise stand at the frequency of the peak.
     let band = d.bandwidth_hz / d.sampling_hz;
     let noise = |lag: usize| match (d.noise, lag) {
-        (NoiseKind::None, _) => 0.0,
-        (NoiseKind::White, 0) => 1.0 / band,
-        (NoiseKind::White, _) => 0.0,
-        (NoiseKind::Band, 0) => 1.0,
-        (NoiseKind::Band, _) => {
+        (NoiseModel::None, _) => 0.0,
+        (NoiseModel::White, 0) => 1.0 / band,
+        (NoiseModel::White, _) => 0.0,
+        (NoiseModel::BandLimited, 0) => 1.0,
+        (NoiseModel::BandLimited, _) => {
             (std::f64::consts::PI * band * lag as f64).sin() / (std::f64::consts::PI * band * lag as f64)
         }
     };
@@ -245,7 +236,7 @@ impl<S: Sample> Toolkit<S> {
             Method::GradientLikelihood(own) => gradient_likelihood(scene, instrument, &own, snr),
             Method::Likelihood(_) => {
                 // The tapers are those of white noise and need no inverse, whatever the noise.
-                let model = window_model(scene, NoiseKind::White, &instrument.pulse)?
+                let model = window_model(scene, NoiseModel::White, &instrument.pulse)?
                     .ok_or(estimate::Error::Empty { field: "noise" })?;
                 let tapers = estimate::estimators::likelihood_tapers(&model, snr)?;
                 let statistic = estimate::Correlogram::<S>::with_tapers(tapers.clone())?;
@@ -350,7 +341,7 @@ impl ExpectedBias {
 pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error> {
     let (e, sampling, kind) = (&scene.estimator, sampling(scene)?, signal_kind(scene));
     let weights = estimate::Correlogram::<f64>::new(weighting(scene), e.window_samples)?.lag_weights();
-    let peak = estimate::SpectralPeak::new(&sampling, kind, weights.len(), e.padded_samples, refinement(scene))?;
+    let peak = estimate::SpectralPeak::new(&sampling, kind, weights.len(), e.padded_samples, e.refinement)?;
     let step_m_s = 0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / e.padded_samples as f64;
     let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
     let off_m_s = |part: i32| {
@@ -380,7 +371,7 @@ pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<
     if signal_kind(scene) == SignalKind::Complex || e.follow_wind || matches!(e.method, Method::GradientLikelihood(_)) {
         return Ok(None);
     }
-    let correlogram = match (e.method, window_model(scene, NoiseKind::White, pulse)?) {
+    let correlogram = match (e.method, window_model(scene, NoiseModel::White, pulse)?) {
         (Method::Likelihood(own), Some(model)) => {
             let snr = own.likelihood_snr_db.map_or(snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8);
             estimate::Correlogram::with_tapers(estimate::estimators::likelihood_tapers(&model, snr)?)?
@@ -395,9 +386,9 @@ pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<
 /// Spectrum of a scene's noise.
 fn noise_kind(scene: &Scene) -> Option<estimate::bound::Noise> {
     match scene.detector.noise {
-        NoiseKind::White => Some(estimate::bound::Noise::White),
-        NoiseKind::Band => Some(estimate::bound::Noise::Band { floor: 0.0 }),
-        NoiseKind::None => None,
+        NoiseModel::White => Some(estimate::bound::Noise::White),
+        NoiseModel::BandLimited => Some(estimate::bound::Noise::Band { floor: 0.0 }),
+        NoiseModel::None => None,
     }
 }
 
@@ -432,7 +423,8 @@ fn of_correlogram(
     lag_weights: &[f64],
     known: &WindowStatistics,
 ) -> Result<Box<dyn Estimator>, Error> {
-    let (e, sampling, refine) = (&scene.estimator, sampling(scene)?, refinement(scene));
+    let (e, sampling) = (&scene.estimator, sampling(scene)?);
+    let refine = e.refinement;
     let (lags, padded) = (lag_weights.len(), e.padded_samples);
     // Divided by their weights, all lags count alike.
     let alike = vec![1.0; lags];

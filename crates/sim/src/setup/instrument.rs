@@ -2,9 +2,8 @@
 
 use crate::Error;
 use crate::scene::{
-    AirProfile, Atmosphere, BeamRadiusDefinition, DetectorSignal, Digitiser, NoiseKind, OuterScaleWavenumber, Pulse,
-    PulseDefinition, PulseResampling, PulseShape, ReceiverPath, RefractiveTurbulence, Scene, ScreenSampling,
-    SnrReference, SpectrumKind, Turbulence,
+    AirProfile, Atmosphere, DetectorSignal, Digitiser, NoiseModel, Pulse, PulseDefinition, PulseShape,
+    RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence,
 };
 use num_complex::Complex;
 use std::sync::Arc;
@@ -195,20 +194,17 @@ fn telescope(scene: &Scene) -> optics::Telescope {
         aperture_radius_m: t.aperture_radius_m,
         obscuration_radius_m: t.obscuration_radius_m,
         beam_radius_m: t.beam_radius_m,
-        radius_definition: match t.beam_radius_definition {
-            BeamRadiusDefinition::Intensity => optics::RadiusDefinition::Intensity,
-            BeamRadiusDefinition::Field => optics::RadiusDefinition::Field,
-        },
+        radius_definition: t.beam_radius_definition,
         focus: if t.focus_m.is_infinite() { optics::Focus::Collimated } else { optics::Focus::At(t.focus_m) },
     }
 }
 
 fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Error> {
-    let convention = match t.outer_scale_wavenumber {
-        OuterScaleWavenumber::Inverse => optics::air::OuterScaleConvention::Inverse,
-        OuterScaleWavenumber::TwoPiOver => optics::air::OuterScaleConvention::TwoPiOver,
+    let scales = optics::air::Scales {
+        outer_scale_m: t.outer_scale_m,
+        inner_scale_m: t.inner_scale_m,
+        convention: t.outer_scale_wavenumber,
     };
-    let scales = optics::air::Scales { outer_scale_m: t.outer_scale_m, inner_scale_m: t.inner_scale_m, convention };
     let spectrum: Arc<dyn optics::Spectrum> = match t.spectrum {
         SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(scales, optics::air::CHAPTER_CONSTANT)?),
         SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
@@ -216,14 +212,6 @@ fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Er
         SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
     };
     Ok(optics::Turbulence { spectrum, cn2: optics::Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 }.validated()? })
-}
-
-/// Which paths the two beams of a scene take.
-pub fn receiver_path(scene: &Scene) -> optics::plan::Receiver {
-    match scene.telescope.receiver {
-        ReceiverPath::Monostatic => optics::plan::Receiver::Monostatic,
-        ReceiverPath::Bistatic => optics::plan::Receiver::Bistatic,
-    }
 }
 
 /// The pulse of a scene.
@@ -240,11 +228,7 @@ pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
             signal::Pulse::from(signal::GaussianPulse::new(duration, p.energy_j)?)
         }
         PulseShape::Sampled(shape) => {
-            let resampling = match shape.resampling {
-                PulseResampling::CubicSpline => signal::sampled::Resampling::CubicSpline,
-                PulseResampling::BandLimited => signal::sampled::Resampling::BandLimited,
-                PulseResampling::Linear => signal::sampled::Resampling::Linear,
-            };
+            let resampling = shape.resampling;
             let sampled = if shape.phase_rad.is_empty() {
                 signal::sampled::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
             } else {
@@ -286,11 +270,7 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
             SnrReference::Chapter {} => signal::receiver::PlanckConvention::Hbar,
             _ => signal::receiver::PlanckConvention::H,
         },
-        noise: match d.noise {
-            NoiseKind::Band => signal::NoiseModel::BandLimited,
-            NoiseKind::White => signal::NoiseModel::White,
-            NoiseKind::None => signal::NoiseModel::None,
-        },
+        noise: d.noise,
         front_end: front_end(scene),
     }
 }
@@ -306,7 +286,7 @@ fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
             bandwidth_hz: d.bandwidth_hz,
             sample_rate_hz: d.sampling_hz,
             input_over_noise: match (d.noise, d.signal) {
-                (NoiseKind::White, _) => (0.5 * d.sampling_hz / d.bandwidth_hz).sqrt(),
+                (NoiseModel::White, _) => (0.5 * d.sampling_hz / d.bandwidth_hz).sqrt(),
                 (_, DetectorSignal::IntermediateFrequency) => 1.0,
                 (_, DetectorSignal::Baseband) => std::f64::consts::FRAC_1_SQRT_2,
             },

@@ -2,7 +2,7 @@
 //!
 //! Check: the stored bound of one window; estimates of whole regions, which no bound may pass.
 
-use crate::scene::NoiseKind;
+use crate::scene::NoiseModel;
 use crate::setup::Setup;
 use crate::setup::estimators;
 use crate::setup::table::of_table;
@@ -45,7 +45,7 @@ impl RayInformation {
             filter: RangeFilter::pulse(pulse, g.layer_thickness_m)?,
             layer_m,
             layer_snr,
-            is_noisy: scene.detector.noise != NoiseKind::None,
+            is_noisy: scene.detector.noise != NoiseModel::None,
         })
     }
 

@@ -5,7 +5,7 @@
 //! treats as the scene says. Check: a scanned map shows the flow as sampled from the planes, frozen and moving.
 
 use crate::Error;
-use crate::scene::{Flow, Scene, SceneFile, VortexLines, VortexMotion, VortexPair, VortexProfile};
+use crate::scene::{CoreProfile, Flow, Scene, SceneFile, VortexLines, VortexMotion, VortexPair};
 use std::fmt;
 use wakescope_les::{self as les, Wind};
 
@@ -216,10 +216,10 @@ pub fn vortex_pair(pair: &VortexPair) -> les::VortexPair {
 }
 
 /// The circulation profile of a scene or a flow case.
-pub(crate) fn circulation_profile(profile: VortexProfile) -> les::CirculationProfile {
+pub(crate) fn circulation_profile(profile: CoreProfile) -> les::CirculationProfile {
     match profile {
-        VortexProfile::Algebraic => les::CirculationProfile::Algebraic,
-        VortexProfile::LambOseen => les::CirculationProfile::LambOseen,
+        CoreProfile::Algebraic => les::CirculationProfile::Algebraic,
+        CoreProfile::LambOseen => les::CirculationProfile::LambOseen,
     }
 }
 

@@ -388,12 +388,9 @@ impl Builder<'_> {
         let names = columns.iter().map(|column| column.name.as_str());
         let identity: Vec<&str> = names.chain(cases.iter().map(|case| case.scene.hash.as_str())).collect();
         let seed = self.base.get("seed").and_then(Value::as_integer).and_then(|seed| u64::try_from(seed).ok());
-        Provenance {
-            program: crate::PROGRAM.into(),
-            scene_toml: format!("# sweep {}\n{}", words.join(" "), text_of(&self.base)),
-            scene_hash: hash_of(&identity.join("\n")),
-            seed: self.request.seed.or(seed).unwrap_or(Scene::default().seed),
-        }
+        let scene_toml = format!("# sweep {}\n{}", words.join(" "), text_of(&self.base));
+        let seed = self.request.seed.or(seed).unwrap_or(Scene::default().seed);
+        Provenance::new(&scene_toml, &hash_of(&identity.join("\n")), seed)
     }
 }
 

@@ -6,13 +6,13 @@
 use crate::measure::response::{SceneResponse, gate_step, spacing_m};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
-use crate::scene::{Flow, VortexPair, VortexProfile};
+use crate::scene::{Flow, VortexPair};
 use crate::setup::wind::vortex_pair;
 use ndarray::Array2;
 use wakescope_estimate::map::ErrorStatistics;
 use wakescope_estimate::vortex_fit::{
-    CoreProfile, EstimatorResponse, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap,
-    Vortex, Wake, WakeModel, fit_map_of_estimator,
+    EstimatorResponse, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake,
+    WakeModel, fit_map_of_estimator,
 };
 
 /// Circulation fitted to the maps of a case.
@@ -57,10 +57,7 @@ impl<'p> Retrieval<'p> {
 
     fn model(&self) -> WakeModel {
         WakeModel {
-            profile: match self.pair.profile {
-                VortexProfile::Algebraic => CoreProfile::Algebraic,
-                VortexProfile::LambOseen => CoreProfile::LambOseen,
-            },
+            profile: self.pair.profile,
             lidar_height_m: self.plan.scene.scene.scan.lidar_height_m,
             ..WakeModel::default()
         }
@@ -142,7 +139,7 @@ fn free() -> FreeParameters {
 mod tests {
     use super::*;
     use crate::plan::Target;
-    use crate::scene::{NoiseKind, Scene, SceneFile, SnrReference};
+    use crate::scene::{NoiseModel, Scene, SceneFile, SnrReference};
     use crate::{Silent, measure::map};
 
     fn plan(change: impl FnOnce(&mut Scene)) -> Plan {
@@ -198,7 +195,7 @@ mod tests {
     fn air_without_a_pair_and_signals_without_noise_have_no_circulation() {
         for change in [
             (|scene| scene.flow = Flow::Calm {}) as fn(&mut Scene),
-            |scene| scene.detector.noise = NoiseKind::None,
+            |scene| scene.detector.noise = NoiseModel::None,
             |scene| scene.pulse.chirp_hz_s = 1e12,
             |scene| scene.scan.pattern = crate::scene::Pattern::Ppi(crate::scene::Ppi::default()),
             |scene| scene.scan.head.sweeps = 2,

@@ -6,7 +6,7 @@ use super::expression::Condition;
 use super::pareto::{NEAR, Objective, Place, Sense, front};
 use super::results::standard_error_of;
 use crate::io::csv_input::TextTable;
-use crate::io::{OutputError, Table};
+use crate::io::{Provenance, Table};
 use crate::keys::near;
 use serde_json::{Map, Value, json};
 
@@ -90,40 +90,29 @@ impl FrontTable {
 
     /// The front for people.
     pub fn text(&self) -> String {
-        let shown = self.shown();
-        let cell = |row: usize, column: usize| self.table.rows[row][column].clone();
-        let mut lines = vec![shown.iter().map(|column| self.table.header[*column].clone()).collect::<Vec<_>>()];
-        for (row, doubtful) in self.members() {
-            let mut line: Vec<String> = shown.iter().map(|column| cell(row, *column)).collect();
-            line.extend(doubtful.then(|| "doubtful".to_owned()));
-            lines.push(line);
-        }
-        let width = |column: usize| lines.iter().filter_map(|l| l.get(column)).map(String::len).max().unwrap_or(0);
-        let padded = |line: &Vec<String>| {
-            let cells = line.iter().enumerate().map(|(i, cell)| format!("{cell:>0$}", width(i)));
-            cells.collect::<Vec<_>>().join("  ")
-        };
         let on = self.members().count();
-        let mut text = lines.iter().map(|line| padded(line) + "\n").collect::<String>();
-        text += &format!(
-            "{on} of {} rows are on the front; doubtful: within {NEAR} standard errors of being beaten\n",
+        format!(
+            "{}{on} of {} rows are on the front; doubtful: within {NEAR} standard errors of being beaten\n",
+            self.of(&self.shown()).aligned(),
             self.rows.len()
-        );
-        text
+        )
     }
 
     /// All columns of the front, and whether a row is doubtful.
-    ///
-    /// # Errors
-    /// A header that no table can have, such as a column twice.
-    pub fn csv(&self) -> Result<String, OutputError> {
-        let members: Vec<(usize, bool)> = self.members().collect();
-        let mut out = Table::new();
-        for (column, name) in self.table.header.iter().enumerate() {
-            out = out.text(name, members.iter().map(|(row, _)| self.table.rows[*row][column].clone()));
-        }
-        out.text("front", members.iter().map(|(_, doubtful)| if *doubtful { "doubtful" } else { "on" }))
-            .to_csv(&self.table.origin())
+    pub fn rows(&self) -> Table {
+        self.of(&(0..self.table.header.len()).collect::<Vec<_>>())
+    }
+
+    /// Where the table comes from.
+    pub fn origin(&self) -> Provenance {
+        self.table.origin()
+    }
+
+    fn of(&self, columns: &[usize]) -> Table {
+        let of_rows = columns.iter().fold(Table::new(), |table, &column| {
+            table.text(&self.table.header[column], self.members().map(|(row, _)| self.table.rows[row][column].clone()))
+        });
+        of_rows.text("front", self.members().map(|(_, doubtful)| if doubtful { "doubtful" } else { "on" }))
     }
 
     /// The front for programs.

@@ -11,7 +11,7 @@ use crate::measure::profile::Efficiencies;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::run::ScanMiddle;
-use crate::scene::{DetectorSignal, Method, NoiseKind};
+use crate::scene::{DetectorSignal, Method, NoiseModel};
 use crate::setup::progress::Observer;
 use ndarray::Array2;
 use num_complex::Complex;
@@ -86,7 +86,7 @@ fn of_samples<S: Sample + wakescope_signal::Sample>(
         let e = &plan.scene.scene;
         // The bound of velocity alone is none on a velocity beside a gradient.
         let bounded =
-            e.detector.noise != NoiseKind::None && !matches!(e.estimator.method, Method::GradientLikelihood(_));
+            e.detector.noise != NoiseModel::None && !matches!(e.estimator.method, Method::GradientLikelihood(_));
         let bound = bounded.then(|| bound_in_the_middle(plan, scanner)).transpose()?;
         let middle = ScanMiddle::of(plan, None, Some(scanner))
             .ok_or(wakescope_estimate::Error::Empty { field: "layers of a line" })?;

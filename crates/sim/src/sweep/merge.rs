@@ -5,9 +5,9 @@
 use super::cases::Sweep;
 use super::stored::{Definition, Row, SWEEP, stored};
 use super::tables;
-use crate::Error;
 use crate::io::Existing;
-use crate::write::put;
+use crate::scene::Outputs;
+use crate::{Error, outputs};
 use std::path::{Path, PathBuf};
 
 /// Writes the tables of a sweep whose cases are all in some folders, of shards or of a whole run; returns the paths.
@@ -68,5 +68,6 @@ pub(super) fn write_tables(
     out: &Path,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, Error> {
-    put(tables::files(definition, rows, out)?, out, existing)
+    let of = (Outputs::default(), definition.origin.clone());
+    outputs::Outputs::write(out, existing, of, |files| tables::list(definition, Some(rows), files))
 }

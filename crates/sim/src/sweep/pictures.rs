@@ -6,7 +6,7 @@ use super::pareto::{Objective, Place, Sense, front};
 use super::results::{RESULTS, standard_error_of};
 use super::stored::{Definition, Holds, Row};
 use crate::Error;
-use crate::io::FileGroup;
+use crate::outputs::Outputs;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Panels of a picture: title, axis, whether it is logarithmic, the result and a bound, which is dashed.
@@ -27,32 +27,16 @@ const PANELS: [(&str, &str, bool, [&str; 2]); 6] = [
 /// Curves of a panel that a legend can tell apart; more are drawn as points alone.
 const MOST_CURVES: usize = 6;
 
-/// Name of the picture of the front.
-const FRONT: &str = "front";
-
-fn stem(key: &str) -> String {
-    format!("results_{}", key.replace('.', "_"))
-}
-
-fn drawn(definition: &Definition) -> impl Iterator<Item = (usize, &str)> {
-    definition.free().filter(|(place, _)| definition.keys[*place].holds != Holds::Texts)
-}
-
-/// Names of the files.
-pub(super) fn names(definition: &Definition) -> Vec<String> {
-    let stems = drawn(definition).map(|(_, name)| stem(name)).chain([FRONT.to_owned()]);
-    stems.flat_map(|stem| [format!("{stem}.svg"), format!("{stem}.png")]).collect()
-}
-
-/// Adds the pictures to the files of a sweep.
-pub(super) fn add(files: &mut FileGroup, definition: &Definition, rows: &[Row]) -> Result<(), Error> {
-    for (place, name) in drawn(definition) {
-        let panels = PANELS.map(|panel| against(definition, rows, (place, name), &panel));
-        let mut figure = Figure::stacked(panels.into_iter().flatten());
-        (figure.columns, figure.width) = (2, 1240.0);
-        figure.add_to(files, &stem(name), &definition.origin)?;
+/// The pictures: of each key that is a number, and the front.
+pub(super) fn list(definition: &Definition, rows: Option<&[Row]>, files: &mut Outputs) -> Result<(), Error> {
+    for (place, name) in definition.free().filter(|(place, _)| definition.keys[*place].holds != Holds::Texts) {
+        files.figure(&format!("results_{}", name.replace('.', "_")), rows, |rows| {
+            let panels = PANELS.map(|panel| against(definition, rows, (place, name), &panel));
+            let figure = Figure::stacked(panels.into_iter().flatten());
+            Ok(Figure { columns: 2, width: 1240.0, ..figure })
+        })?;
     }
-    Ok(Figure::stacked([of_front(rows)]).add_to(files, FRONT, &definition.origin)?)
+    files.figure("front", rows, |rows| Ok(Figure::stacked([of_front(rows)])))
 }
 
 /// A panel of a result against a key; none where no case has any.

@@ -16,8 +16,7 @@ use crate::plan::{Plan, Target};
 use crate::scene::{Estimator, Outputs, Scene, SceneFile, Site, WindOfPulses, hash_of};
 use crate::setup::progress::Observer;
 use crate::setup::wind::SceneWind;
-use crate::write::prepare_among_others;
-use crate::{Error, machine};
+use crate::{Error, machine, outputs};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -112,10 +111,11 @@ pub fn run<'s>(
     let times = settings.shard.map_or("times.csv".into(), |s| format!("times-{}-of-{}.csv", s.number, s.of));
     let mut names = vec![SWEEP.to_owned(), times.clone()];
     if settings.shard.is_none() {
-        names.extend(tables::names(&definition));
+        let list = |files: &mut outputs::Outputs| tables::list(&definition, None, files);
+        names.extend(outputs::Outputs::names(Outputs::default(), list)?);
     }
     // Shards may begin at the same time, in one folder: each writes files of its own.
-    prepare_among_others(out, names.iter().map(String::as_str), settings.existing, || Ok(()))?;
+    outputs::prepare(out, &names, settings.existing, false)?;
     definition.write(out, settings.existing)?;
     let mine: Vec<&Case> = sweep.cases.iter().filter(|c| settings.shard.is_none_or(|s| s.has(c.index))).collect();
     let is_due = |case: &&Case| !(settings.resume && stored(out, &definition, case.index).is_some());

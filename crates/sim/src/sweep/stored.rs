@@ -6,9 +6,9 @@
 use super::cases::Sweep;
 use super::key_path::Takes;
 use super::results::RESULTS;
-use crate::Error;
-use crate::io::{Existing, FileGroup, Provenance, csv::float_text, write_atomic};
-use crate::write::{put, scene_text};
+use crate::io::{Existing, Provenance, csv::float_text, write_atomic};
+use crate::scene::Outputs;
+use crate::{Error, outputs};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
@@ -204,21 +204,16 @@ pub(super) fn store(
     let keys: Map<String, Value> = sweep.keys().map(str::to_owned).zip(of.values.iter().map(|v| json!(v))).collect();
     let names = RESULTS.iter().map(|(name, ..)| (*name).to_owned());
     let results: Map<String, Value> = names.zip(results.iter().map(|value| json!(float_text(*value)))).collect();
-    let scene = Provenance {
-        program: crate::PROGRAM.into(),
-        scene_toml: of.scene.toml.clone(),
-        scene_hash: of.scene.hash.clone(),
-        seed: of.scene.scene.seed,
-    };
     let object = json!({
         "source": crate::PROGRAM, "scene_hash": of.scene.hash, "case": case, "keys": keys, "circulation": fits,
         "results": results,
     });
-    let path = folder_of(folder, case);
-    let mut files = FileGroup::new(&path);
-    files.add("scene.toml", scene_text(&scene))?;
-    files.add(RESULT, format!("{object:#}\n"))?;
-    put(files, &path, existing).map(drop)
+    let (path, formats) = (folder_of(folder, case), Outputs::default());
+    outputs::Outputs::write(&path, existing, (formats, of.scene.provenance()), |files| {
+        files.add("scene.toml", Some(of), |_, origin| Ok(origin.scene_file()))?;
+        files.add(RESULT, Some(&object), |object, _| Ok(format!("{object:#}\n")))
+    })
+    .map(drop)
 }
 
 /// The result of a case in a folder; none where there is none of this scene by this version of the program.

@@ -5,31 +5,17 @@
 use super::results::RESULTS;
 use super::stored::{Definition, Holds, Row, VaryingKey};
 use crate::Error;
-use crate::io::{FileGroup, Table};
-use std::path::Path;
+use crate::io::Table;
+use crate::outputs::Outputs;
 
-/// Names of the files.
-pub(super) fn names(definition: &Definition) -> Vec<String> {
-    let mut out = vec!["results.csv".to_owned()];
-    if cfg!(feature = "netcdf") {
-        out.push("results.nc".into());
-    }
-    #[cfg(feature = "plots")]
-    out.extend(super::pictures::names(definition));
-    #[cfg(not(feature = "plots"))]
-    let _ = definition;
-    out
-}
-
-/// The files, still in memory.
-pub(super) fn files(definition: &Definition, rows: &[Row], out: &Path) -> Result<FileGroup, Error> {
-    let mut files = FileGroup::new(out);
-    files.add("results.csv", table(definition, rows).to_csv(&definition.origin)?)?;
+/// The files of all cases, whose rows are not there before they are run.
+pub(super) fn list(definition: &Definition, rows: Option<&[Row]>, files: &mut Outputs) -> Result<(), Error> {
+    files.table("results", rows, |rows| Ok(table(definition, rows)))?;
     #[cfg(feature = "netcdf")]
-    files.add("results.nc", netcdf(definition, rows)?)?;
+    files.netcdf("results", rows, |rows, _| netcdf(definition, rows))?;
     #[cfg(feature = "plots")]
-    super::pictures::add(&mut files, definition, rows)?;
-    Ok(files)
+    super::pictures::list(definition, rows, files)?;
+    Ok(())
 }
 
 fn table(definition: &Definition, rows: &[Row]) -> Table {

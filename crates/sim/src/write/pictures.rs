@@ -2,7 +2,7 @@
 //! Check: by eye; a test of the program compares the names of the files.
 
 use crate::Error;
-use crate::io::{FileGroup, Provenance, VelocityMap};
+use crate::io::VelocityMap;
 use crate::measure::beam_winds::BeamWind;
 use crate::measure::profile::RangeProfile;
 use crate::plan::Plan;
@@ -10,24 +10,6 @@ use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 use crate::scene::{Flow, SnrReference};
 use crate::setup::beams::{Direction, SweepMode};
 use wakescope_optics::EfficiencyProfile;
-
-/// Adds a figure in the formats that the scene asks for.
-pub(super) fn add(
-    files: &mut FileGroup,
-    plan: &Plan,
-    name: &str,
-    figure: &Figure,
-    origin: &Provenance,
-) -> Result<(), Error> {
-    let outputs = &plan.scene.scene.outputs;
-    if outputs.svg {
-        files.add(&format!("{name}.svg"), figure.svg(origin)?)?;
-    }
-    if outputs.png {
-        files.add(&format!("{name}.png"), figure.png(origin)?)?;
-    }
-    Ok(())
-}
 
 /// Signal-to-noise ratio and efficiency against range, each with its standard error as a band.
 pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
@@ -84,24 +66,16 @@ fn snr_band_db(profile: &RangeProfile) -> Vec<(f64, f64)> {
 ///
 /// Sweeps of elevation are seen from the side, those of azimuth from above, the middle one of several; beams of few directions
 /// are curves over range. A VAD has its sine curve beside it.
-pub(super) fn add_map(
-    files: &mut FileGroup,
-    plan: &Plan,
-    map: &VelocityMap,
-    winds: Option<&[BeamWind]>,
-    origin: &Provenance,
-) -> Result<(), Error> {
+pub(super) fn map(plan: &Plan, map: &VelocityMap, winds: Option<&[BeamWind]>) -> Result<Figure, Error> {
     let centres_m = centres_m(plan);
     let sweep = if plan.geometry.schedule.is_plane() { 0 } else { map.sweeps.len() / 2 };
     let from_above = match map.sweeps.get(sweep).map(|sweep| sweep.mode) {
         None | Some(SweepMode::Rhi) => false,
         Some(SweepMode::AzimuthSurveillance | SweepMode::Sector) => true,
-        Some(SweepMode::VerticalPointing | SweepMode::Pointing) => {
-            return add(files, plan, "map", &lines(plan, map), origin);
-        }
+        Some(SweepMode::VerticalPointing | SweepMode::Pointing) => return Ok(lines(plan, map)),
     };
     if let Some(winds) = winds {
-        return add(files, plan, "map", &azimuth_display(plan, map, winds), origin);
+        return Ok(azimuth_display(plan, map, winds));
     }
     let panel = |field: &str, title: &str| -> Result<MapPlot, Error> {
         let plot = if from_above { MapPlot::from_above(map, sweep, field)? } else { MapPlot::new(map, sweep, field)? };
@@ -131,16 +105,11 @@ pub(super) fn add_map(
     let has_gaps = panels.iter().any(|plot| plot.cells.values.iter().any(|v| v.is_nan()));
     let mut figure = Figure::stacked(panels).titled(&title(plan, has_gaps));
     (figure.columns, figure.width) = (3, 1560.0);
-    add(files, plan, "map", &figure, origin)
+    Ok(figure)
 }
 
 /// The first scan of recorded signals: velocity, its predicted error, signal-to-noise ratio.
-pub(super) fn add_measured(
-    files: &mut FileGroup,
-    plan: &Plan,
-    map: &VelocityMap,
-    origin: &Provenance,
-) -> Result<(), Error> {
+pub(super) fn measured(map: &VelocityMap) -> Result<Figure, Error> {
     let panel = |field: &str, title: &str, unit: &str| -> Result<MapPlot, Error> {
         Ok(MapPlot::new(map, 0, field)?.titled(title).labelled(unit))
     };
@@ -151,7 +120,7 @@ pub(super) fn add_measured(
     ];
     let mut figure = Figure::stacked(panels).titled("One scan of recorded signals; grey: no value");
     (figure.columns, figure.width) = (3, 1560.0);
-    add(files, plan, "map", &figure, origin)
+    Ok(figure)
 }
 
 /// Curves of the first lines over range: the air, and the mean estimates.

@@ -3,22 +3,24 @@
 
 #[cfg(feature = "plots")]
 use super::pictures;
-use super::{add_halo, provenance, put, scene_text};
+use super::{list, list_map};
 use crate::Error;
-use crate::io::{Existing, FileGroup, VelocityMap, tables};
-use crate::measure::recorded::{Recorded, measured_map, predicted_table};
-use crate::plan::{Plan, Stage};
+use crate::io::{Existing, VelocityMap};
+use crate::measure::recorded::{Recorded, Spectra, measured_map, predicted_table};
+use crate::outputs::Outputs;
+use crate::plan::Plan;
 use crate::run::RunResult;
 use std::path::{Path, PathBuf};
 
-const SPECTRA: &str = "spectra.nc";
-const PREDICTED: &str = "predicted.csv";
-
 /// Names of the files that estimates from records may have.
-pub fn recorded_names(plan: &Plan) -> Vec<String> {
-    let of_run = super::names(plan).into_iter().filter(|name| !name.starts_with("signals."));
-    debug_assert!(plan.runs(Stage::Estimates));
-    of_run.chain([SPECTRA, PREDICTED].map(str::to_owned)).collect()
+///
+/// # Errors
+/// As [`super::write`], but for what the files hold.
+pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
+    let mut names = Outputs::names(plan.scene.scene.outputs, |files| of_run(plan, &RunResult::default(), None, files))?;
+    // Those that are estimated stay where they are.
+    names.retain(|name| !name.starts_with("signals."));
+    Ok(names)
 }
 
 /// Writes what records gave; returns the paths of the files.
@@ -26,48 +28,40 @@ pub fn recorded_names(plan: &Plan) -> Vec<String> {
 /// # Errors
 /// As [`super::write`].
 pub fn write_recorded(plan: &Plan, found: Recorded, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
-    let origin = provenance(plan);
-    let outputs = &plan.scene.scene.outputs;
-    let (mut files, spectra) = match found {
+    Outputs::write(folder, existing, (plan.scene.scene.outputs, plan.scene.provenance()), |files| match found {
         Recorded::OfRun { map, spectra } => {
-            let predicted = predicted_table(plan, &map)?;
-            let result = RunResult { map: Some(*map), ..RunResult::default() };
-            let mut files = super::files(plan, &result, folder)?;
-            if outputs.csv {
-                files.add(PREDICTED, predicted.to_csv(&origin)?)?;
-            }
-            (files, spectra)
+            of_run(plan, &RunResult { map: Some(*map), ..RunResult::default() }, spectra, files)
         }
         Recorded::Measured { scans, spectra } => {
             let map = measured_map(plan, &scans)?;
             drop(scans);
-            let mut files = FileGroup::new(folder);
-            files.add("scene.toml", scene_text(&origin))?;
-            add_map(&mut files, plan, &map)?;
-            (files, spectra)
+            measured(plan, &map, files)?;
+            list_spectra(spectra, files)
         }
-    };
-    #[cfg(feature = "netcdf")]
-    if let Some(spectra) = &spectra {
-        files.add(SPECTRA, crate::io::cf_spectra::cf_spectra_bytes(spectra, &origin)?)?;
-    }
-    #[cfg(not(feature = "netcdf"))]
-    let _ = (&mut files, spectra);
-    put(files, folder, existing)
+    })
 }
 
-/// The map in the formats that the scene asks for.
-fn add_map(files: &mut FileGroup, plan: &Plan, map: &VelocityMap) -> Result<(), Error> {
-    let (outputs, origin) = (&plan.scene.scene.outputs, provenance(plan));
-    if outputs.csv {
-        files.add("map.csv", tables::map_table(map)?.to_csv(&origin)?)?;
-    }
-    #[cfg(feature = "netcdf")]
-    if outputs.netcdf {
-        files.add("map.nc", crate::io::cfradial::cfradial_bytes(map, &origin)?)?;
-    }
-    add_halo(files, plan, map, &origin)?;
+/// Of signals whose truth is known: what a run gives, and what is predicted of its errors.
+fn of_run(plan: &Plan, result: &RunResult, spectra: Option<Spectra>, files: &mut Outputs) -> Result<(), Error> {
+    list(plan, result, files)?;
+    files.table("predicted", result.map.as_ref(), |map| predicted_table(plan, map))?;
+    list_spectra(spectra, files)
+}
+
+fn measured(plan: &Plan, map: &VelocityMap, files: &mut Outputs) -> Result<(), Error> {
+    files.add("scene.toml", Some(plan), |_, origin| Ok(origin.scene_file()))?;
+    list_map(plan, Some(map), files)?;
     #[cfg(feature = "plots")]
-    pictures::add_measured(files, plan, map, &origin)?;
+    files.figure("map", Some(map), pictures::measured)?;
+    Ok(())
+}
+
+fn list_spectra(spectra: Option<Spectra>, files: &mut Outputs) -> Result<(), Error> {
+    #[cfg(feature = "netcdf")]
+    files.add("spectra.nc", spectra.as_ref(), |spectra, origin| {
+        Ok(crate::io::cf_spectra::cf_spectra_bytes(spectra, origin)?)
+    })?;
+    #[cfg(not(feature = "netcdf"))]
+    let _ = (spectra, files);
     Ok(())
 }

@@ -7,7 +7,7 @@ use wakescope_estimate::{Scratch, SignalKind, window::Sample};
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::run::{RunResult, run};
-use wakescope_sim::scene::{NoiseKind, SceneFile};
+use wakescope_sim::scene::{NoiseModel, SceneFile};
 use wakescope_sim::setup::estimators::{self, Toolkit, WindowStatistics};
 use wakescope_sim::setup::progress::Silent;
 
@@ -272,8 +272,8 @@ fn shown_db<S: Sample>(plan: &Plan, velocity_m_s: f64, sinusoid: fn(f64, f64) ->
     }
     // Twice as white as it is wide: the density of the band on all frequencies of the samples.
     let (low_hz, high_hz) = match (d.noise, S::KIND) {
-        (NoiseKind::White, SignalKind::Real) => (0.0, 0.5 * d.sampling_hz),
-        (NoiseKind::White, SignalKind::Complex) => (-0.5 * d.sampling_hz, 0.5 * d.sampling_hz),
+        (NoiseModel::White, SignalKind::Real) => (0.0, 0.5 * d.sampling_hz),
+        (NoiseModel::White, SignalKind::Complex) => (-0.5 * d.sampling_hz, 0.5 * d.sampling_hz),
         _ => sampling.band_hz,
     };
     let lines = 8 * n;

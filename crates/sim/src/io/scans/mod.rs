@@ -60,6 +60,11 @@ pub struct ReadScan {
 }
 
 impl ReadScan {
+    /// Name of the file without its folder.
+    pub fn file_name(&self) -> String {
+        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
     /// A map that was just made by this program, named `name` in messages.
     pub fn own(name: &str, map: ScanMap) -> Self {
         Self {

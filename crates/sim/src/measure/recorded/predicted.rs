@@ -7,7 +7,7 @@ use crate::Error;
 use crate::io::Table;
 use crate::measure::map::VelocityEstimates;
 use crate::plan::Plan;
-use crate::scene::NoiseKind;
+use crate::scene::NoiseModel;
 use crate::setup::estimators::{ExpectedBias, WindowStatistics};
 use crate::setup::ray_information::RayInformation;
 use crate::setup::region::places;
@@ -31,7 +31,7 @@ impl PredictedError {
     /// For regions of a scan of a scene that have at most the radius `largest_m` and about `n_eff` independent windows; nothing without
     /// noise.
     pub(super) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64, n_eff: f64) -> Result<Option<Self>, Error> {
-        if plan.scene.scene.detector.noise == NoiseKind::None {
+        if plan.scene.scene.detector.noise == NoiseModel::None {
             return Ok(None);
         }
         let (of_rays, count) = (RayInformation::new(plan, &[])?, places.most_gates(largest_m));

@@ -117,6 +117,17 @@ pub struct Schedule {
 }
 
 impl Schedule {
+    /// The kinds of the sweeps, each once, in their order.
+    pub fn modes(&self) -> Vec<SweepMode> {
+        let mut modes: Vec<SweepMode> = Vec::new();
+        for (mode, _) in &self.sweeps {
+            if !modes.contains(mode) {
+                modes.push(*mode);
+            }
+        }
+        modes
+    }
+
     /// The lines of sweeps one after the other.
     pub fn new(paths: &[SweepPath], pace: &Pace, mount: Mount) -> Self {
         let mut scan = Self { lines: Vec::new(), sweeps: Vec::new(), prt_s: pace.prt_s, mount };

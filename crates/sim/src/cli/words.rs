@@ -1,0 +1,253 @@
+//! What words of several commands have in common: where files go, scans that are read, and how numbers are written.
+
+use super::output::paths;
+use crate::io::own::refuse_foreign;
+use crate::io::raw::{RawFormat, RawRecords};
+use crate::io::scans::{self, ReadScan, ScanFormat};
+use crate::io::{Existing, Provenance, Table, write_atomic};
+use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape};
+use crate::plan::Plan;
+use crate::scene::SceneFile;
+use crate::setup::progress::Silent;
+use crate::{Error, outputs, retrieve};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{ArgAction, Args};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use wakescope_estimate::retrieval::Turbulence;
+
+/// What may be replaced.
+pub(super) fn existing(overwrite: bool) -> Existing {
+    if overwrite { Existing::Any } else { Existing::Own }
+}
+
+/// The folder of a command.
+#[derive(Debug, Args)]
+pub(super) struct FolderWords {
+    /// Folder to write to; made if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+    /// Replace files in the folder that this program did not write, or that were changed since.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+impl FolderWords {
+    pub(super) fn existing(&self) -> Existing {
+        existing(self.overwrite)
+    }
+
+    /// Finds out whether files of these names can be written.
+    pub(super) fn prepare(&self, names: &[String]) -> Result<(), Error> {
+        outputs::prepare(&self.out, names, self.existing(), true)
+    }
+
+    /// The last line of a text.
+    pub(super) fn wrote(&self, files: &[PathBuf]) -> String {
+        format!("wrote {} files to {}", files.len(), self.out.display())
+    }
+}
+
+/// The file of a command that prints its result as well.
+#[derive(Debug, Args)]
+pub(super) struct TableWords {
+    /// File for the whole table, as CSV.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace the file although this program did not write it, or it was changed since.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+impl TableWords {
+    /// Finds out whether the file can be written.
+    pub(super) fn prepare(&self) -> Result<(), Error> {
+        let Some(path) = &self.out else { return Ok(()) };
+        let name = path.file_name().and_then(|name| name.to_str());
+        Ok(refuse_foreign(path.parent().unwrap_or(Path::new("")), name, existing(self.overwrite))?)
+    }
+
+    /// Writes the file, if there is to be one, and says so in the text; returns its path for an object.
+    pub(super) fn write(&self, table: &Table, origin: &Provenance, text: &mut String) -> Result<Value, Error> {
+        let Some(path) = &self.out else { return Ok(Value::Null) };
+        write_atomic(path, table.to_csv(origin)?)?;
+        *text += &format!("wrote {}\n", path.display());
+        Ok(json!(paths(&[path])[0]))
+    }
+}
+
+/// What is known of the air and of the gates.
+#[derive(Debug, Args)]
+pub(super) struct AirWords {
+    /// Standard deviation, m/s, and length, m, of turbulence that neighbouring velocities share, e.g. 1.2,25.
+    #[arg(long, value_name = "SIGMA,LENGTH", value_parser = turbulence)]
+    pub(super) turbulence: Option<Turbulence>,
+    /// Standard deviation of the weight of a gate along the line, m, for velocities that are taken for means; 0 for those at points.
+    #[arg(long, value_name = "M", value_parser = not_negative)]
+    pub(super) gate_std: Option<f64>,
+    /// Whether image vortices make the ground a streamline.
+    #[arg(long = "ground", action = ArgAction::Set, default_value = "yes", value_parser = switch(["yes", "no"]))]
+    pub(super) images: bool,
+}
+
+/// How scans of files are read.
+#[derive(Debug, Args)]
+pub(super) struct ScanWords {
+    /// What raw samples are multiplied with, such as ampere per count; the noise is then that of the scene.
+    #[arg(long, value_name = "A", value_parser = positive)]
+    scale: Option<f64>,
+    /// The variable or column that holds the velocities.
+    #[arg(long, value_name = "NAME")]
+    field: Option<String>,
+    /// Velocities are positive towards the lidar.
+    #[arg(long)]
+    towards: bool,
+    /// Leave out velocities below this signal-to-noise ratio, dB.
+    #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = finite)]
+    min_snr: Option<f64>,
+}
+
+/// What a file of scans holds.
+pub(super) enum Scans {
+    /// Maps, and what was left out.
+    Maps(Vec<ReadScan>, Vec<String>),
+    /// Raw signals with the maps of their scans.
+    Signals(Box<Signals>),
+}
+
+/// Raw signals of scans.
+pub(super) struct Signals {
+    pub(super) path: PathBuf,
+    pub(super) records: RawRecords,
+    pub(super) plan: Plan,
+    pub(super) scans: Vec<MeasuredScan>,
+    pub(super) spectra: Option<Spectra>,
+}
+
+impl Signals {
+    /// The map of a scan.
+    pub(super) fn map(&self, sweep: usize) -> ReadScan {
+        retrieve::scan_of_signals(&self.path, sweep, &self.plan, &self.scans[sweep])
+    }
+}
+
+impl ScanWords {
+    /// The scans of a file; raw signals go through the estimator of the scene, whose spectra are kept if asked for.
+    pub(super) fn read(&self, path: &Path, scene: Option<&SceneFile>, spectra: bool) -> Result<Scans, Error> {
+        if is_signals(path) {
+            return Ok(Scans::Signals(Box::new(self.signals(path, scene, spectra)?)));
+        }
+        let format = ScanFormat { field: self.field.clone(), towards: self.towards, min_snr_db: self.min_snr };
+        let (found, left_out) = scans::read(path, &format)?;
+        Ok(Scans::Maps(found, left_out))
+    }
+
+    fn signals(&self, path: &Path, scene: Option<&SceneFile>, spectra: bool) -> Result<Signals, Error> {
+        let Some(scene) = scene else {
+            let reason = "it holds raw signals: --scene says which instrument recorded them".into();
+            return Err(Error::Input { path: path.to_owned(), reason });
+        };
+        let format = RawFormat { scale: self.scale.unwrap_or(1.0), ..RawFormat::default() };
+        let mut records = RawRecords::open(path, &format, record_shape(&scene.scene))?;
+        let (plan, is_own) = recorded::plan(scene.clone(), &records)?;
+        let noise = if is_own || self.scale.is_some() { NoiseLevel::OfScene } else { NoiseLevel::Quietest };
+        // What is known of the air is not looked at: this is a retrieval.
+        let options = RecordedOptions { noise: Some(noise), spectra, ..RecordedOptions::default() };
+        let (scans, spectra) = match recorded::estimate((&plan, false), &mut records, &options, &Silent)? {
+            Recorded::Measured { scans, spectra } => (scans, spectra),
+            Recorded::OfRun { .. } => (Vec::new(), None),
+        };
+        Ok(Signals { path: path.to_owned(), records, plan, scans, spectra })
+    }
+}
+
+/// Whether a file holds raw signals and no map.
+pub(super) fn is_signals(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    if ["npy", "npz"].contains(&extension) {
+        return true;
+    }
+    #[cfg(feature = "netcdf")]
+    return crate::io::netcdf_input::open(path).is_ok_and(|file| file.has("current_a"));
+    #[cfg(not(feature = "netcdf"))]
+    false
+}
+
+/// A number of which `is_allowed` holds, or what is allowed.
+fn read<T: FromStr>(word: &str, is_allowed: impl Fn(&T) -> bool, allowed: &str) -> Result<T, String> {
+    word.trim().parse().ok().filter(is_allowed).ok_or_else(|| allowed.to_owned())
+}
+
+/// Two numbers with a comma between.
+fn two<T: FromStr>(word: &str, are_allowed: impl Fn(&(T, T)) -> bool, allowed: &str) -> Result<(T, T), String> {
+    let both = word.split_once(',').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+    both.filter(are_allowed).ok_or_else(|| allowed.to_owned())
+}
+
+pub(super) fn finite(word: &str) -> Result<f64, String> {
+    read(word, |value: &f64| value.is_finite(), "a number, e.g. 1.5")
+}
+
+pub(super) fn not_negative(word: &str) -> Result<f64, String> {
+    read(word, |value| (0.0..f64::INFINITY).contains(value), "a number from 0 on, e.g. 14.4")
+}
+
+pub(super) fn positive(word: &str) -> Result<f64, String> {
+    read(word, |value: &f64| *value > 0.0 && value.is_finite(), "a number above 0, e.g. 2.35 or 1e-6")
+}
+
+pub(super) fn rate(word: &str) -> Result<f64, String> {
+    read(word, |rate| (1e-9..=0.5).contains(rate), "a rate from 1e-9 to 0.5, e.g. 0.01")
+}
+
+pub(super) fn range(word: &str) -> Result<f64, String> {
+    let allowed = "a range from 1 to 1e6 m, or several with commas between them, e.g. 280,400";
+    read(word, |range_m| (1.0..=1e6).contains(range_m), allowed)
+}
+
+pub(super) fn turbulence(word: &str) -> Result<Turbulence, String> {
+    let is_good = |value: &f64| *value > 0.0 && value.is_finite();
+    let allowed = "two numbers above 0, m/s and m, with a comma between, e.g. 1.2,25";
+    let (deviation_m_s, length_m) = two(word, |(a, b)| is_good(a) && is_good(b), allowed)?;
+    Ok(Turbulence { deviation_m_s, length_m })
+}
+
+pub(super) fn spacing(word: &str) -> Result<(f64, f64), String> {
+    let allowed = "two distances from 1 to 1e4 m, the smaller one first, e.g. 16,63";
+    two(word, |(least, most)| *least >= 1.0 && least <= most && *most <= 1e4, allowed)
+}
+
+pub(super) fn stride(word: &str) -> Result<(usize, usize), String> {
+    let is_good = |n: &usize| (1..=1000).contains(n);
+    two(word, |(lines, gates)| is_good(lines) && is_good(gates), "two whole numbers from 1 to 1000, e.g. 4,8")
+}
+
+pub(super) fn noise(word: &str) -> Result<NoiseLevel, String> {
+    match word {
+        "scene" => Ok(NoiseLevel::OfScene),
+        "quietest" => Ok(NoiseLevel::Quietest),
+        _ => positive(word)
+            .map(NoiseLevel::Given)
+            .map_err(|_| "scene, quietest or a power above 0, e.g. 2.5e-13".to_owned()),
+    }
+}
+
+/// Words of which the first one is true.
+pub(super) fn switch([on, off]: [&'static str; 2]) -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new([on, off]).map(move |word| word == on)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_read_or_refused_with_an_example() {
+        assert_eq!((spacing("47,47"), stride("4,8"), rate("1e-3")), (Ok((47.0, 47.0)), Ok((4, 8)), Ok(1e-3)));
+        assert!(
+            spacing("60,20").is_err() && spacing("0,20").is_err() && stride("0,1").is_err() && stride("a").is_err()
+        );
+        assert!(rate("0").is_err() && rate("0.7").is_err() && rate("inf").is_err());
+    }
+}

@@ -1,0 +1,154 @@
+//! The files of a command: one list gives their names before anything is computed, and makes them afterwards.
+//!
+//! Check: the names that commands announce are those that they write; folders in use, in the way or not writable are refused.
+
+use crate::Error;
+use crate::io::atomic::try_folder;
+use crate::io::lock::FolderLock;
+use crate::io::own::refuse_foreign;
+use crate::io::{Existing, FileGroup, Provenance, Table};
+#[cfg(feature = "plots")]
+use crate::plot::Figure;
+use crate::scene::Outputs as Formats;
+use std::path::{Path, PathBuf};
+
+/// Files of a folder in the formats that are wanted. A list of them is a function that adds each with what it is made of, which is
+/// absent as long as it is not computed.
+pub(crate) struct Outputs {
+    formats: Formats,
+    names: Vec<String>,
+    /// The files, and what is written into each; none where names alone are wanted.
+    made: Option<(FileGroup, Provenance)>,
+}
+
+impl Outputs {
+    /// The names of a list.
+    ///
+    /// # Errors
+    /// What the list finds before it makes a file.
+    pub(crate) fn names(
+        formats: Formats,
+        list: impl FnOnce(&mut Self) -> Result<(), Error>,
+    ) -> Result<Vec<String>, Error> {
+        let mut files = Self { formats, names: Vec::new(), made: None };
+        list(&mut files)?;
+        Ok(files.names)
+    }
+
+    /// Makes the files of a list and puts them into their folder, all or none; returns their paths.
+    ///
+    /// # Errors
+    /// What the makers find; a file in the way that may not be replaced; another run that writes there; what the system says.
+    pub(crate) fn write(
+        folder: &Path,
+        existing: Existing,
+        (formats, origin): (Formats, Provenance),
+        list: impl FnOnce(&mut Self) -> Result<(), Error>,
+    ) -> Result<Vec<PathBuf>, Error> {
+        let mut files = Self { formats, names: Vec::new(), made: Some((FileGroup::new(folder), origin)) };
+        list(&mut files)?;
+        let Some((group, _)) = files.made else { return Ok(Vec::new()) };
+        let there = folder.exists();
+        let lock = there.then(|| FolderLock::take(folder)).transpose()?;
+        // Again: a file may have come while the run computed.
+        refuse_foreign(folder, group.names(), existing)?;
+        let written = group.commit()?;
+        drop(lock);
+        Ok(written)
+    }
+
+    /// Adds a file that is made of `of`; where that is absent, its name alone.
+    ///
+    /// # Errors
+    /// What the maker finds; a name that is there already.
+    pub(crate) fn add<T: ?Sized, B: Into<Vec<u8>>>(
+        &mut self,
+        name: &str,
+        of: Option<&T>,
+        make: impl FnOnce(&T, &Provenance) -> Result<B, Error>,
+    ) -> Result<(), Error> {
+        match (&mut self.made, of) {
+            (None, _) => self.names.push(name.into()),
+            (Some((group, origin)), Some(of)) => group.add(name, make(of, origin)?)?,
+            (Some(_), None) => {}
+        }
+        Ok(())
+    }
+
+    /// Adds a table as `STEM.csv`, where tables are wanted.
+    ///
+    /// # Errors
+    /// As [`Self::add`].
+    pub(crate) fn table<T: ?Sized>(
+        &mut self,
+        stem: &str,
+        of: Option<&T>,
+        make: impl FnOnce(&T) -> Result<Table, Error>,
+    ) -> Result<(), Error> {
+        match self.formats.csv {
+            true => self.add(&format!("{stem}.csv"), of, |of, origin| Ok(make(of)?.to_csv(origin)?)),
+            false => Ok(()),
+        }
+    }
+
+    /// Adds `STEM.nc`, where NetCDF is wanted.
+    ///
+    /// # Errors
+    /// As [`Self::add`].
+    #[cfg(feature = "netcdf")]
+    pub(crate) fn netcdf<T: ?Sized>(
+        &mut self,
+        stem: &str,
+        of: Option<&T>,
+        make: impl FnOnce(&T, &Provenance) -> Result<Vec<u8>, Error>,
+    ) -> Result<(), Error> {
+        if self.formats.netcdf { self.add(&format!("{stem}.nc"), of, make) } else { Ok(()) }
+    }
+
+    /// Adds a figure as `STEM.svg` and `STEM.png`, as far as these are wanted.
+    ///
+    /// # Errors
+    /// As [`Self::add`].
+    #[cfg(feature = "plots")]
+    pub(crate) fn figure<T: ?Sized>(
+        &mut self,
+        stem: &str,
+        of: Option<&T>,
+        make: impl FnOnce(&T) -> Result<Figure, Error>,
+    ) -> Result<(), Error> {
+        let Formats { svg, png, .. } = self.formats;
+        let figure = of.filter(|_| svg || png).map(make).transpose()?;
+        if svg {
+            self.add(&format!("{stem}.svg"), figure.as_ref(), |figure, origin| Ok(figure.svg(origin)?))?;
+        }
+        if png {
+            self.add(&format!("{stem}.png"), figure.as_ref(), |figure, origin| Ok(figure.png(origin)?))?;
+        }
+        Ok(())
+    }
+}
+
+/// Finds out, before any computing, whether files of these names can be written to a folder; leaves no trace. `alone`: no other
+/// process may be writing there.
+///
+/// # Errors
+/// The folder cannot be made, is a file, cannot be written to, or another run writes to it; a folder is in the way of a file,
+/// or a file that this program did not write and may not replace.
+pub(crate) fn prepare(folder: &Path, names: &[String], existing: Existing, alone: bool) -> Result<(), Error> {
+    refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
+    let missing: Vec<&Path> =
+        folder.ancestors().filter(|p| !p.as_os_str().is_empty()).take_while(|p| !p.exists()).collect();
+    let made = std::fs::create_dir_all(folder);
+    let made = made.map_err(|source| Error::Io { action: "make the folder", path: folder.to_owned(), source });
+    let tried = made.and_then(|()| {
+        try_folder(folder)?;
+        let lock = alone.then(|| FolderLock::take(folder)).transpose()?;
+        drop(lock);
+        Ok(())
+    });
+    for path in missing {
+        // Innermost first; one that was not made cannot be removed, which is what is wanted.
+        let _ = std::fs::remove_dir(path);
+    }
+    tried
+}
