@@ -20,7 +20,7 @@ use crate::io::Existing;
 use crate::io::csv::digits;
 use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
 use crate::plan::{Plan, Stage, Target};
-use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
+use crate::scene::{Scene, SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::setup::efficiency_model::model;
 use crate::setup::progress::Observer;
 use crate::{Error, outputs, run, write};
@@ -255,14 +255,11 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
 }
 
 fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
-    let mut file = SceneFile::read(path)?;
-    if let Some(seed) = cli.seed {
-        file.scene.seed = seed;
-        let origin = file.clone();
-        file = SceneFile::new(file.scene).map_err(|problems| origin.located(problems))?;
-        file = file.with_file_of(origin);
+    let file = SceneFile::read(path)?;
+    match cli.seed {
+        Some(seed) => Ok(file.with(Scene { seed, ..file.scene.clone() })?),
+        None => Ok(file),
     }
-    Ok(file)
 }
 
 fn with_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> T + Send) -> Result<T, Error> {

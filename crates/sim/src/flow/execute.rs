@@ -17,7 +17,7 @@ use crate::{Error, machine};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wakescope_les::ranks::{Ranks, Single, together};
-use wakescope_les::solver::{CheckpointPlan, Ends, Interval, NOTICED_GROWTH, Run, RunPlan};
+use wakescope_les::solver::{CheckpointPlan, Ends, Interval, NOTICED_GROWTH, Run, RunPlan, check_checkpoint};
 use wakescope_les::{SubgridModel, TimeStep};
 
 /// Steps between checkpoints where a case states nothing.
@@ -37,16 +37,7 @@ struct Prepared {
     setup: Setup,
     plan: RunPlan,
     files: Files,
-    schedule: Schedule,
     forecast: FlowForecast,
-}
-
-/// As [`check_on`], in one process.
-///
-/// # Errors
-/// As there.
-pub fn check(file: &CaseFile, folder: Option<&Path>, options: RunOptions) -> Result<FlowForecast, Error> {
-    check_on(&(Arc::new(Single) as Arc<dyn Ranks>), file, folder, options)
 }
 
 /// What a run on ranks would take, of which one calls this; nothing is written. With the folder that it would write to this is checked, too.
@@ -72,25 +63,13 @@ pub fn check_on(
     Ok(prepared.forecast)
 }
 
-/// As [`run_with`], for a case that fits into the memory of the machine.
+/// As [`run_on`], in one process, for a case that fits into the memory of the machine.
 ///
 /// # Errors
 /// As there.
 pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) -> Result<FlowOutcome, Error> {
-    run_with(file, folder, RunOptions { begin, allow_large: false }, watch)
-}
-
-/// As [`run_on`], in one process.
-///
-/// # Errors
-/// As there.
-pub fn run_with(
-    file: &CaseFile,
-    folder: &Path,
-    options: RunOptions,
-    watch: &mut dyn Watch,
-) -> Result<FlowOutcome, Error> {
-    run_on(&(Arc::new(Single) as Arc<dyn Ranks>), file, folder, options, watch)
+    let alone = Arc::new(Single) as Arc<dyn Ranks>;
+    run_on(&alone, file, folder, RunOptions { begin, allow_large: false }, watch)
 }
 
 /// Runs a case on ranks, all of which call this, and writes its files to `folder`, in which no other run may be writing. The
@@ -110,22 +89,22 @@ pub fn run_on(
     let is_first = ranks.rank() == 0;
     let prepared = if is_first { refuse_folder(folder, options.begin) } else { Ok(()) };
     let prepared = prepared.and_then(|()| prepare(file, folder, options, ranks));
-    let Prepared { mut setup, plan, files, schedule, forecast } = agree(ranks, prepared)?;
+    let Prepared { mut setup, plan, files, forecast } = agree(ranks, prepared)?;
     let mut warnings = forecast.notes.clone();
     let opened = is_first.then(|| {
-        files.refuse_foreign(&schedule.due, setup.wake.is_some(), options.begin)?;
+        files.refuse_foreign(options.begin)?;
         watch.forecast(&forecast);
         open(folder, options.begin, &mut warnings)
     });
     let opened = agree(ranks, opened.transpose())?;
-    // From where the run goes on, rank 0 says.
-    let source = opened.as_ref().map_or(Source::Nothing, |(_, source)| *source);
-    let source = Source::of(together(&**ranks, &[source as u8 as f64]).map_err(Error::Flow)?[0]);
-    let [checkpoint, previous] = checkpoint_paths(folder);
+    // From where the run goes on, rank 0 says: the number of the checkpoint, from 1, or 0.
+    let number = [opened.as_ref().map_or(0.0, |(_, number)| *number as f64)];
+    let number = together(&**ranks, &number).map_err(Error::Flow)?[0] as usize;
+    let checkpoint = number.checked_sub(1).and_then(|place| checkpoint_paths(folder).into_iter().nth(place));
     let tau_per_s = setup.tau_per_s;
     let meter = setup.wake.take().map(|wake| (wake.meter, wake.circulation_radii_m));
-    let (mut run, kept) = match source {
-        Source::Nothing => {
+    let (mut run, kept) = match &checkpoint {
+        None => {
             let (flow, start) = setup.start()?;
             let removed = 1.0 - start.kinetic_energy_m5_s2 / start.given_energy_m5_s2;
             if removed > 0.01 {
@@ -136,8 +115,7 @@ pub fn run_on(
             }
             (Run::new(flow, plan).map_err(Error::Flow)?, Vec::new())
         }
-        Source::Checkpoint => resume(&checkpoint, setup, plan, &file.case)?,
-        Source::Previous => resume(&previous, setup, plan, &file.case)?,
+        Some(path) => resume(path, setup, plan, &file.case)?,
     };
     let (reached_s, end_s) = (run.flow().time_s(), run.plan().end_s);
     if reached_s > (1.0 + 1e-9) * end_s {
@@ -151,22 +129,11 @@ pub fn run_on(
         warnings.iter().for_each(|text| watch.note(text));
     }
     let wake = meter.map(|meter| WakeRun::new(meter, run.flow(), (folder.to_owned(), file.provenance()), is_first));
-    let begun = begin_files(file, folder, &files, wake, (source != Source::Nothing, &kept), is_first);
+    let begun = begin_files(file, folder, &files, wake, (checkpoint.is_some(), &kept), is_first);
     let Begun { wake, steps, written } = agree(ranks, begun)?;
     let start_s = reached_s;
-    let mut writer = Writer {
-        ranks: ranks.clone(),
-        files,
-        schedule,
-        steps,
-        wake,
-        written,
-        warnings,
-        watch,
-        start_s,
-        end_s,
-        error: None,
-    };
+    let mut writer =
+        Writer { ranks: ranks.clone(), files, steps, wake, written, warnings, watch, start_s, end_s, error: None };
     let result = run.to_end(&mut writer);
     // Also of a run that failed: its last row is what one wants to see.
     let finished = writer.finish();
@@ -187,23 +154,9 @@ pub fn run_on(
     })
 }
 
-/// From where a run goes on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Source {
-    Nothing,
-    Checkpoint,
-    Previous,
-}
-
-impl Source {
-    fn of(number: f64) -> Self {
-        let all = [Self::Nothing, Self::Checkpoint, Self::Previous];
-        all.into_iter().find(|source| *source as u8 as f64 == number).unwrap_or(Self::Nothing)
-    }
-}
-
-/// Takes the folder, and finds from where the run goes on.
-fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(FolderLock, Source), Error> {
+/// Takes the folder, and finds from which checkpoint the run goes on: the newer one, 1, or the one before it where that is gone or
+/// damaged, 2; 0 for none.
+fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(FolderLock, usize), Error> {
     std::fs::create_dir_all(folder).map_err(|source| Error::Io {
         action: "make the folder",
         path: folder.to_owned(),
@@ -211,16 +164,22 @@ fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(Fold
     })?;
     let lock = FolderLock::take(folder)?;
     let [checkpoint, previous] = checkpoint_paths(folder);
-    let source = match begin {
+    let number = match begin {
+        Begin::New | Begin::Overwrite => 0,
         // Killed before there was anything to continue from.
         Begin::Restart if !checkpoint.exists() && !previous.exists() => {
             warnings.push(format!("there is no checkpoint in {}: the run begins anew", folder.display()));
-            Source::Nothing
+            0
         }
-        Begin::Restart => readable(&checkpoint, &previous, warnings),
-        Begin::New | Begin::Overwrite => Source::Nothing,
+        Begin::Restart => match check_checkpoint(&checkpoint) {
+            Err(error) if check_checkpoint(&previous).is_ok() => {
+                warnings.push(format!("{error}: the one before it is used, {}", previous.display()));
+                2
+            }
+            _ => 1,
+        },
     };
-    Ok((lock, source))
+    Ok((lock, number))
 }
 
 /// The files that grow with a run, and the paths of all that were begun.
@@ -295,10 +254,10 @@ fn prepare(file: &CaseFile, folder: &Path, options: RunOptions, ranks: &Arc<dyn 
     if options.begin != Begin::Restart {
         refuse_unstable(file, &setup)?;
     }
-    let (plan, files, schedule) = plan(file, &setup, folder)?;
+    let (plan, files) = plan(file, &setup, folder)?;
     plan.check(if options.begin == Begin::Restart { f64::NEG_INFINITY } else { 0.0 }).map_err(Error::Flow)?;
-    let forecast = FlowForecast::new(file, &setup, &plan, &files, &schedule);
-    Ok(Prepared { setup, plan, files, schedule, forecast })
+    let forecast = FlowForecast::new(file, &setup, &plan, &files);
+    Ok(Prepared { setup, plan, files, forecast })
 }
 
 /// Refuses a step that the run would refuse at its start.
@@ -333,19 +292,8 @@ fn resume(path: &Path, setup: Setup, plan: RunPlan, case: &FlowCase) -> Result<(
     resumed.map_err(Error::Flow)
 }
 
-/// The newer checkpoint, or the one before it where that is gone or damaged.
-fn readable(checkpoint: &Path, previous: &Path, warnings: &mut Vec<String>) -> Source {
-    match wakescope_les::solver::check_checkpoint(checkpoint) {
-        Err(error) if wakescope_les::solver::check_checkpoint(previous).is_ok() => {
-            warnings.push(format!("{error}: the one before it is used, {}", previous.display()));
-            Source::Previous
-        }
-        _ => Source::Checkpoint,
-    }
-}
-
 /// The plan of the run and of its files, with all that can be refused before the computing.
-fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files, Schedule), Error> {
+fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files), Error> {
     let case = &file.case;
     let wake_end_s = case.wake.as_ref().map(|wake| wake.end_tau / setup.tau_per_s);
     let Some(end_s) = case.time.end_s.or(wake_end_s).or(setup.end_s) else {
@@ -386,13 +334,12 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
         folder: folder.to_owned(),
         output,
         origin: file.provenance(),
-        #[cfg(feature = "vtk")]
-        times_s: [schedule.times_of(|due| due.fields), schedule.times_of(|due| due.planes)],
-        with_vorticity: setup.wake.is_some(),
+        schedule,
+        is_wake: setup.wake.is_some(),
         tau_per_s: setup.tau_per_s,
         title: format!("Simulated flow, case {}", file.hash),
     };
-    Ok((run, files, schedule))
+    Ok((run, files))
 }
 
 #[cfg(test)]

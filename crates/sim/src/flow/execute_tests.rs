@@ -25,6 +25,10 @@ fn vortices(case: &str, time: &str) -> CaseFile {
     ))
 }
 
+fn check(file: &CaseFile, folder: Option<&Path>, options: RunOptions) -> Result<FlowForecast, Error> {
+    check_on(&(Arc::new(Single) as Arc<dyn Ranks>), file, folder, options)
+}
+
 #[test]
 fn a_second_run_in_a_folder_is_refused_and_what_a_crashed_one_left_is_swept() {
     let folder = tempfile::tempdir().unwrap();

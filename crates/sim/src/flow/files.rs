@@ -4,9 +4,13 @@ use super::Begin;
 use super::case::{FileFormat, Output};
 use super::forecast::FileForecast;
 use super::shared::{agree, commit};
-use super::wake::{self, Due};
+use super::wake::{self, Due, Schedule};
 use crate::Error;
+#[cfg(feature = "netcdf")]
+use crate::io::cf_fields;
 use crate::io::own::refuse_foreign;
+#[cfg(feature = "vtk")]
+use crate::io::vtr;
 use crate::io::{CrossPlanes, Existing, FileGroup, FileParts, Provenance, Share, VelocityField, tables};
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
@@ -80,11 +84,9 @@ pub(super) struct Files {
     pub(super) folder: PathBuf,
     pub(super) output: Output,
     pub(super) origin: Provenance,
-    /// Times of the fields, and of the planes \[s\].
-    #[cfg(feature = "vtk")]
-    pub(super) times_s: [Vec<f64>; 2],
-    /// Whether fields have the vorticity, too.
-    pub(super) with_vorticity: bool,
+    pub(super) schedule: Schedule,
+    /// Whether a wake is recorded; fields then have the vorticity, too.
+    pub(super) is_wake: bool,
     /// Age of the wake per time \[1/s\].
     pub(super) tau_per_s: f64,
     pub(super) title: String,
@@ -118,53 +120,51 @@ impl Files {
         out
     }
 
+    fn of_outputs(&self) -> impl Iterator<Item = OutputFile> {
+        self.schedule.due.iter().flat_map(|due| self.of_output(*due))
+    }
+
     /// Names of all files of a run, but for its checkpoints.
-    pub(super) fn names(&self, due: &[Due], is_wake: bool) -> Vec<String> {
+    fn names(&self) -> Vec<String> {
         let mut out = vec![CASE.to_owned()];
         out.extend(self.output.steps.then(|| STEPS.to_owned()));
-        if is_wake {
+        if self.is_wake {
             out.extend(wake::file_names().into_iter().map(str::to_owned));
             #[cfg(feature = "plots")]
             out.extend(wake::PICTURES.map(str::to_owned));
         }
-        out.extend(due.iter().flat_map(|due| self.of_output(*due)).map(|file| file.name()));
+        out.extend(self.of_outputs().map(|file| file.name()));
         out
     }
 
     /// Number and size of the files of a run of so many steps, those of all outputs together.
-    pub(super) fn forecast(
-        &self,
-        due: &[Due],
-        cells: [usize; 3],
-        steps: f64,
-        writes_checkpoints: bool,
-    ) -> Vec<FileForecast> {
+    pub(super) fn forecast(&self, cells: [usize; 3], steps: f64, writes_checkpoints: bool) -> Vec<FileForecast> {
         let [nx, ny, nz] = cells.map(|n| n as f64);
-        let variables = if self.with_vorticity { 5.0 } else { 4.0 };
+        let variables = if self.is_wake { 5.0 } else { 4.0 };
         let mut out: Vec<FileForecast> = Vec::new();
         let mut add = |name: &str, count: usize, bytes: f64| match out.iter_mut().find(|kind| kind.name == name) {
             Some(kind) => (kind.count, kind.bytes) = (kind.count + count, kind.bytes + bytes),
             None if count > 0 => out.push(FileForecast { name: name.into(), count, bytes }),
             None => {}
         };
-        for file in due.iter().flat_map(|due| self.of_output(*due)) {
+        for file in self.of_outputs() {
             let stem = if matches!(file.holds, Holds::Plane(_)) { "plane*" } else { &file.stem };
             let bytes = file.bytes(nx * ny * nz, ny * nz, variables);
             add(&format!("{stem}_*.{}", file.ending), usize::from(bytes > 0.0), bytes);
         }
         add(STEPS, usize::from(self.output.steps), steps * STEP_ROW_BYTES);
         let histories = if cfg!(feature = "netcdf") { 2 } else { 1 };
-        let records = due.iter().filter(|due| due.record).count() as f64;
-        add("wake.*", if self.with_vorticity { histories } else { 0 }, records * (RECORD_BYTES + 40.0 * nx));
+        let records = self.schedule.due.iter().filter(|due| due.record).count() as f64;
+        add("wake.*", if self.is_wake { histories } else { 0 }, records * (RECORD_BYTES + 40.0 * nx));
         add("flow.checkpoint*", if writes_checkpoints { 2 } else { 0 }, 2.0 * 7.0 * 8.0 * nx * ny * nz);
         out
     }
 
     /// Refuses a folder with files in the way that this program did not write. On a restart the case may have been edited: its
     /// end and its outputs may change.
-    pub(super) fn refuse_foreign(&self, due: &[Due], is_wake: bool, begin: Begin) -> Result<(), Error> {
+    pub(super) fn refuse_foreign(&self, begin: Begin) -> Result<(), Error> {
         let existing = if begin == Begin::Overwrite { Existing::Any } else { Existing::Own };
-        let mut names = self.names(due, is_wake);
+        let mut names = self.names();
         names.retain(|name| begin != Begin::Restart || name != CASE);
         Ok(refuse_foreign(&self.folder, names.iter().map(String::as_str), existing)?)
     }
@@ -224,35 +224,25 @@ impl Files {
             let length = bytes.len() as u64;
             Some(FileParts { length, parts: if is_first { vec![(0, bytes)] } else { Vec::new() } })
         };
-        Ok(match (file.holds, file.ending) {
+        let origin = &self.origin;
+        Ok(match (file.holds, file.ending, &shown.field) {
             #[cfg(feature = "netcdf")]
-            (Holds::Field, "nc") => shown
-                .field
-                .as_ref()
-                .map(|field| crate::io::cf_fields::cf_field_parts(field, &self.origin))
-                .transpose()?,
+            (Holds::Field, "nc", Some(field)) => Some(cf_fields::cf_field_parts(field, origin)?),
             #[cfg(feature = "vtk")]
-            (Holds::Field, "vtr") => {
-                let parts = |field| crate::io::vtr::field_parts(field, shown.behind.as_deref(), &self.origin);
-                shown.field.as_ref().map(parts).transpose()?
+            (Holds::Field, "vtr", Some(field)) => Some(vtr::field_parts(field, shown.behind.as_deref(), origin)?),
+            #[cfg(feature = "netcdf")]
+            (Holds::Faces, ..) => {
+                shown.faces.as_ref().map(|faces| cf_fields::cf_faces_parts(faces, origin)).transpose()?
+            }
+            (Holds::Plane(at), "csv", _) => {
+                whole(tables::planes_table(&shown.planes[at])?.to_csv(origin)?.into_bytes())
             }
             #[cfg(feature = "netcdf")]
-            (Holds::Faces, _) => shown
-                .faces
-                .as_ref()
-                .map(|faces| crate::io::cf_fields::cf_faces_parts(faces, &self.origin))
-                .transpose()?,
-            (Holds::Plane(number), "csv") => {
-                whole(tables::planes_table(&shown.planes[number])?.to_csv(&self.origin)?.into_bytes())
-            }
-            #[cfg(feature = "netcdf")]
-            (Holds::Plane(number), "nc") => {
-                whole(crate::io::cf_planes::cf_planes_bytes(&shown.planes[number], &self.origin)?)
-            }
+            (Holds::Plane(at), "nc", _) => whole(crate::io::cf_planes::cf_planes_bytes(&shown.planes[at], origin)?),
             #[cfg(feature = "vtk")]
-            (Holds::Plane(number), "vtr") => whole(crate::io::vtr::plane_file(&shown.planes[number], &self.origin)?),
+            (Holds::Plane(at), "vtr", _) => whole(vtr::plane_file(&shown.planes[at], origin)?),
             #[cfg(feature = "vtk")]
-            (Holds::Collection { of_planes }, _) => whole(self.collection(file, of_planes)),
+            (Holds::Collection { of_planes }, ..) => whole(self.collection(file, of_planes)),
             _ => None,
         })
     }
@@ -269,15 +259,16 @@ impl Files {
     fn collection(&self, file: &OutputFile, of_planes: bool) -> Vec<u8> {
         let names: Vec<String> = (0..=file.index).map(|i| numbered(&file.stem, i, "vtr")).collect();
         let per_s = if of_planes { self.tau_per_s } else { 1.0 };
-        let members = self.times_s[usize::from(of_planes)].iter().map(|t| t * per_s);
-        crate::io::vtr::pvd_bytes(members.zip(names.iter().map(String::as_str)), &self.origin)
+        let times_s = self.schedule.times_of(|due| if of_planes { due.planes } else { due.fields });
+        let members = times_s.iter().map(|t| t * per_s);
+        vtr::pvd_bytes(members.zip(names.iter().map(String::as_str)), &self.origin)
     }
 
     fn field(&self, flow: &Flow, share: Share) -> Result<VelocityField, Error> {
         let mesh = flow.mesh();
         let velocity = |axis| flow.own_centre_velocity_m_s(axis).map_err(Error::Flow);
         let vorticity_per_s =
-            if self.with_vorticity { Some(flow.own_vorticity_magnitude_per_s().map_err(Error::Flow)?) } else { None };
+            if self.is_wake { Some(flow.own_vorticity_magnitude_per_s().map_err(Error::Flow)?) } else { None };
         Ok(VelocityField {
             title: self.title.clone(),
             time_s: flow.time_s(),
@@ -296,10 +287,10 @@ impl Files {
     }
 
     #[cfg(feature = "netcdf")]
-    fn faces(&self, flow: &Flow, share: Share) -> Result<crate::io::cf_fields::FaceVelocities, Error> {
+    fn faces(&self, flow: &Flow, share: Share) -> Result<cf_fields::FaceVelocities, Error> {
         let mesh = flow.mesh();
         let velocity = |axis| flow.own_face_velocity_m_s(axis).map_err(Error::Flow);
-        Ok(crate::io::cf_fields::FaceVelocities {
+        Ok(cf_fields::FaceVelocities {
             title: self.title.clone(),
             time_s: flow.time_s(),
             centre_m: [0, 1, 2].map(|axis| mesh.centre_m(axis)),
@@ -346,7 +337,7 @@ struct Shown {
     #[cfg(feature = "vtk")]
     behind: Option<Vec<f64>>,
     #[cfg(feature = "netcdf")]
-    faces: Option<crate::io::cf_fields::FaceVelocities>,
+    faces: Option<cf_fields::FaceVelocities>,
     planes: Vec<CrossPlanes>,
 }
 

@@ -9,7 +9,6 @@
 use super::case::{FileFormat, FlowCase, Scheme, Subgrid};
 use super::files::Files;
 use super::setup::Setup;
-use super::wake::Schedule;
 use super::{CaseFile, CaseKind, WakeOutput};
 use crate::plan::units::{bytes, seconds};
 use crate::{Error, machine};
@@ -66,7 +65,7 @@ pub struct FileForecast {
 }
 
 impl FlowForecast {
-    pub(super) fn new(file: &CaseFile, setup: &Setup, plan: &RunPlan, files: &Files, schedule: &Schedule) -> Self {
+    pub(super) fn new(file: &CaseFile, setup: &Setup, plan: &RunPlan, files: &Files) -> Self {
         let case = &file.case;
         let dense = setup.settings.pressure.dense_directions(&setup.mesh);
         let stability = setup.stability();
@@ -103,7 +102,7 @@ impl FlowForecast {
             memory_bytes: memory_bytes(case, [cells; 2], &dense),
             ranks: setup.settings.ranks.count(),
             rank_bytes: rank_bytes(case, setup, &dense),
-            files: files.forecast(&schedule.due, cells, steps, case.checkpoint.write),
+            files: files.forecast(cells, steps, case.checkpoint.write),
         }
     }
 

@@ -31,7 +31,7 @@ mod writer;
 
 pub use case::{Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time};
 pub use examples::{EXAMPLES, example};
-pub use execute::{RunOptions, check, check_on, run, run_on, run_with};
+pub use execute::{RunOptions, check_on, run, run_on};
 pub use forecast::{FileForecast, FlowForecast};
 pub use free::{Axis, EndName, Free, InitialName, InitialPair, MappingName};
 pub use kind::CaseKind;
@@ -48,7 +48,7 @@ pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakePr
 use crate::Error;
 use crate::io::Provenance;
 use crate::io::text_file;
-use crate::keys::{Located, Problem, SceneError, Source};
+use crate::keys::{Problem, SceneError, Source};
 use crate::scene::hash_of;
 use std::path::{Path, PathBuf};
 use wakescope_les::solver::{StepRecord, Stepping};
@@ -71,8 +71,7 @@ impl CaseFile {
     /// # Errors
     /// What the system says; [`SceneError`] names the file, the line, the key, the value and what is allowed.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = case_text(path)?;
-        Ok(Self::parse(&text, path)?)
+        Ok(Self::parse(&case_text(path)?, path)?)
     }
 
     /// Checks the text of a case file; `path` serves the messages, and its folder is where files of the case are looked for.
@@ -83,57 +82,12 @@ impl CaseFile {
         Ok(Self::of(text::read(text, path, None)?, Source::new(path, text)))
     }
 
-    /// The same case with another end: the age `tau` of a wake, of other flows a time \[s\]. Outputs behind it are left out.
-    ///
-    /// # Errors
-    /// An end that is no finite number above 0.
-    pub fn with_end(&self, end: f64) -> Result<Self, SceneError> {
-        let mut case = self.case.clone();
-        case.time.end_s = None;
-        match &mut case.wake {
-            Some(wake) => wake.end_at(end, ["wake.fields_tau", "wake.planes_tau"].map(|key| self.source.has(key))),
-            None => {
-                case.time.end_s = Some(end);
-                case.output.times_s.retain(|time_s| *time_s <= end);
-            }
-        }
-        let problems = case.problems();
-        if problems.is_empty() {
-            return Ok(Self::of(case, self.source.clone()));
-        }
-        // The end is of the command line, whatever the file says of it.
-        let of_command = |problem: Problem| match problem.key.as_str() {
-            "time.end_s" | "wake.end_tau" => Problem { key: "--end".into(), ..problem },
-            _ => problem,
-        };
-        let problems =
-            problems.into_iter().map(|problem| Located { problem: of_command(problem), line: None }).collect();
-        Err(SceneError::Invalid { path: self.source.path().to_owned(), problems })
-    }
-
-    /// The same case with another seed of its noise.
-    ///
-    /// # Errors
-    /// A flow whose noise has no seed.
-    pub fn with_seed(&self, seed: u64) -> Result<Self, SceneError> {
-        let mut case = self.case.clone();
-        let CaseKind::Wake(wake) = &mut case.case else {
-            let allowed = "absent: this flow has no noise; it is for case.kind = \"wake\"".into();
-            let problem = Problem { key: "--seed".into(), value: seed.to_string(), allowed };
-            let problems = vec![Located { problem, line: None }];
-            return Err(SceneError::Invalid { path: self.source.path().to_owned(), problems });
-        };
-        wake.seed = Some(seed);
-        Ok(Self::of(case, self.source.clone()))
-    }
-
     /// A preset.
     ///
     /// # Errors
     /// None of a preset as it is.
     pub fn preset(preset: WakePreset) -> Result<Self, SceneError> {
-        let toml = toml::to_string(&preset.case()).unwrap_or_else(|e| unreachable!("a case is plain data: {e}"));
-        Self::parse(&toml, Path::new("preset"))
+        Self::parse_over(preset, "", Path::new("preset"))
     }
 
     /// Reads a case file of a wake over a preset.
@@ -150,6 +104,44 @@ impl CaseFile {
     /// As [`CaseFile::parse`].
     pub fn parse_over(preset: WakePreset, text: &str, path: &Path) -> Result<Self, SceneError> {
         Ok(Self::of(text::read(text, path, Some(&preset.case()))?, Source::new(path, text)))
+    }
+
+    /// The same case with another end: the age `tau` of a wake, of other flows a time \[s\]. Outputs behind it are left out.
+    ///
+    /// # Errors
+    /// An end that is no finite number above 0.
+    pub fn with_end(&self, end: f64) -> Result<Self, SceneError> {
+        let mut case = self.case.clone();
+        case.time.end_s = None;
+        match &mut case.wake {
+            Some(wake) => wake.end_at(end, ["wake.fields_tau", "wake.planes_tau"].map(|key| self.source.has(key))),
+            None => {
+                case.time.end_s = Some(end);
+                case.output.times_s.retain(|time_s| *time_s <= end);
+            }
+        }
+        // The end is of the command line, whatever the file says of it.
+        let of_command = |problem: Problem| match problem.key.as_str() {
+            "time.end_s" | "wake.end_tau" => Problem { key: "--end".into(), ..problem },
+            _ => problem,
+        };
+        let problems: Vec<Problem> = case.problems().into_iter().map(of_command).collect();
+        if problems.is_empty() { Ok(Self::of(case, self.source.clone())) } else { Err(self.source.refused(problems)) }
+    }
+
+    /// The same case with another seed of its noise.
+    ///
+    /// # Errors
+    /// A flow whose noise has no seed.
+    pub fn with_seed(&self, seed: u64) -> Result<Self, SceneError> {
+        let mut case = self.case.clone();
+        let CaseKind::Wake(wake) = &mut case.case else {
+            let allowed = "absent: this flow has no noise; it is for case.kind = \"wake\"".into();
+            let problem = Problem { key: "--seed".into(), value: seed.to_string(), allowed };
+            return Err(self.source.refused(vec![problem]));
+        };
+        wake.seed = Some(seed);
+        Ok(Self::of(case, self.source.clone()))
     }
 
     fn of(case: FlowCase, source: Source) -> Self {

@@ -6,7 +6,7 @@ use super::Watch;
 use super::files::Files;
 use super::shared::agree;
 use super::steps::StepTable;
-use super::wake::{Schedule, WakeRun};
+use super::wake::WakeRun;
 use crate::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -40,7 +40,6 @@ impl Kept {
 pub(super) struct Writer<'a> {
     pub(super) ranks: Arc<dyn Ranks>,
     pub(super) files: Files,
-    pub(super) schedule: Schedule,
     pub(super) steps: Option<StepTable>,
     pub(super) wake: Option<WakeRun>,
     pub(super) written: Vec<PathBuf>,
@@ -86,7 +85,7 @@ impl RunObserver for Writer<'_> {
     }
 
     fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
-        let due = self.schedule.due.get(index).copied().unwrap_or_default();
+        let due = self.files.schedule.due.get(index).copied().unwrap_or_default();
         if due.record {
             let recorded = self.wake.as_mut().map_or(Ok(()), |wake| wake.record(flow));
             let recorded = agree(&self.ranks, recorded);

@@ -24,7 +24,7 @@ pub(crate) use limit::{ABOVE_ZERO, FINITE};
 pub(crate) use limit::{ABOVE_ZERO_OR_INF, Is, Limit, NothingOr, Number, ZERO_OR_MORE};
 pub use problem::{Located, Problem, SceneError};
 pub(crate) use source::Source;
-pub(crate) use vet::{Document, Format};
+pub(crate) use vet::{Document, Format, value_at};
 #[cfg(all(feature = "sweep", feature = "netcdf"))]
 pub(crate) use words::unit_of;
 #[cfg(feature = "sweep")]

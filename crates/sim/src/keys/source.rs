@@ -1,5 +1,7 @@
 //! A text and the file that it came from, by which problems that are found later are given their lines.
 
+#[cfg(feature = "flow")]
+use super::problem::Located;
 use super::problem::{Problem, SceneError};
 use super::vet::Document;
 use std::path::{Path, PathBuf};
@@ -24,6 +26,13 @@ impl Source {
     /// The folder from which files that the text names are looked for.
     pub(crate) fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Problems of what was asked for beside the text.
+    #[cfg(feature = "flow")]
+    pub(crate) fn refused(&self, problems: Vec<Problem>) -> SceneError {
+        let problems = problems.into_iter().map(|problem| Located { problem, line: None }).collect();
+        SceneError::Invalid { path: self.path.clone(), problems }
     }
 
     /// Whether the text gives a value to a key.

@@ -242,8 +242,8 @@ impl Walk<'_> {
             }
             (Kind::Switch, DeValue::Boolean(value)) => Some(Value::Boolean(*value)),
             (Kind::Text, DeValue::String(text)) => Some(Value::String(text.to_string())),
-            (Kind::Choice(names), DeValue::String(text)) => {
-                names.contains(&text.as_ref()).then(|| Value::String(text.to_string()))
+            (Kind::Choice(names), _) => {
+                return self.named(names, value, path.to_owned(), at).map(|name| Value::String(name.to_owned()));
             }
             (Kind::List { of, len }, DeValue::Array(values)) if len.is_none_or(|len| len == values.len()) => {
                 // Each value that does not fit is named itself.
@@ -263,16 +263,27 @@ impl Walk<'_> {
             _ => None,
         };
         if read.is_none() {
-            let mut allowed = self.wanted(path, name, kind);
-            if let (Kind::Choice(names), DeValue::String(text)) = (kind, inner)
-                && let Some(name) = near(text, names.iter().copied())
-            {
-                allowed += &format!("; did you mean \"{name}\"?");
-            }
-            let shown = self.shown(value);
-            self.refuse(path.to_owned(), shown, allowed, at);
+            self.refuse(path.to_owned(), self.shown(value), self.wanted(path, name, kind), at);
         }
         read
+    }
+
+    /// One of some names.
+    fn named<'n>(
+        &mut self,
+        names: &[&'n str],
+        value: &Spanned<DeValue<'_>>,
+        path: String,
+        at: usize,
+    ) -> Option<&'n str> {
+        let text = value.get_ref().as_str();
+        let found = names.iter().copied().find(|name| Some(*name) == text);
+        if found.is_none() {
+            let meant = text.and_then(|text| near(text, names.iter().copied()));
+            let hint = meant.map(|name| format!("; did you mean \"{name}\"?")).unwrap_or_default();
+            self.refuse(path, self.shown(value), one_of(names) + &hint, at);
+        }
+        found
     }
 
     fn tagged(
@@ -287,25 +298,13 @@ impl Walk<'_> {
         let of_default = defaults.and_then(|d| d.get(tag)).and_then(Value::as_str);
         let at = join(path, tag);
         let stated = table.iter().find(|(key, _)| key.get_ref() == tag);
-        let name = match stated {
-            Some((key, value)) => {
-                let name = value.get_ref().as_str().filter(|text| kinds.iter().any(|(name, _)| name == text));
-                if name.is_none() {
-                    let names = names(kinds);
-                    let text = value.get_ref().as_str().unwrap_or_default();
-                    let meant = near(text, names.iter().copied());
-                    let hint = meant.map(|name| format!("; did you mean \"{name}\"?")).unwrap_or_default();
-                    self.refuse(at, self.document.quote(value.span()), one_of(&names) + &hint, key.span().start);
-                }
-                name?
+        let name = match (stated, of_default) {
+            (Some((key, value)), _) => self.named(&names(kinds), value, at, key.span().start)?,
+            (None, Some(name)) => name,
+            (None, None) => {
+                self.refuse_on(at, Problem::ABSENT.into(), one_of(&names(kinds)), line);
+                return None;
             }
-            None => match of_default {
-                Some(name) => name,
-                None => {
-                    self.refuse_on(at, Problem::ABSENT.into(), one_of(&names(kinds)), line);
-                    return None;
-                }
-            },
         };
         let keys = kinds.iter().find(|(n, _)| *n == name).map_or(&[][..], |(_, keys)| keys);
         let same = defaults.filter(|_| of_default == Some(name));
@@ -398,16 +397,19 @@ impl Format<'_> {
             Some(document.quote(span))
         };
         let of_defaults = || {
-            let mut keys = whole.split('.');
-            let value = keys.try_fold(None, |table: Option<&Value>, key| match table {
-                None => self.defaults.get(key).map(Some),
-                Some(table) => table.get(key).map(Some),
-            })??;
+            let (first, rest) = whole.split_once('.').map_or((whole, None), |(first, rest)| (first, Some(rest)));
+            let value = self.defaults.get(first)?;
+            let value = rest.map_or(Some(value), |rest| value_at(value, rest))?;
             let plain = !value.is_array() && !value.is_table() && !element;
             plain.then(|| value.to_string())
         };
         self.examples.iter().find_map(of_text).or_else(of_defaults)
     }
+}
+
+/// The value of the key with this path.
+pub(crate) fn value_at<'v>(table: &'v Value, path: &str) -> Option<&'v Value> {
+    path.split('.').try_fold(table, |table, key| table.get(key))
 }
 
 fn names(kinds: &[(&'static str, Vec<Key>)]) -> Vec<&'static str> {

@@ -9,11 +9,10 @@ use crate::scene::Scene;
 use crate::setup::geometry::Geometry;
 use crate::setup::progress::Stage;
 
-// Unit costs on one core, s.
-const TABLE_NUMBER_S: f64 = 7e-8;
-const NETCDF_NUMBER_S: f64 = 2e-8;
-const MAP_PIXEL_S: f64 = 2.5e-7;
+// Unit costs on one core, s: of a byte of a file, of a picture, of a point of its rasters.
+const BYTE_S: f64 = 4.5e-9;
 const PICTURE_S: f64 = 2.5e-2;
+const RASTER_PIXEL_S: f64 = 2.5e-7;
 
 /// Columns of the table of a map.
 const MAP_COLUMNS: f64 = 25.0;
@@ -25,17 +24,19 @@ const DRAWING_BYTES: f64 = 7e5;
 /// Pixels of the picture of a profile.
 const PROFILE_PIXELS: f64 = 1344.0 * 520.0;
 
-/// Memory of files that are made one after the other: what is there already, and the most that was held.
+/// Files that are made one after the other: their time, the memory of what is there already, and the most that was held.
 #[derive(Default)]
-struct Memory {
+struct Written {
+    core_s: f64,
     done_bytes: f64,
     most_bytes: f64,
 }
 
-impl Memory {
+impl Written {
     /// A file, and what is held beside it until it is there.
     fn add(&mut self, wanted: bool, file_bytes: f64, beside_bytes: f64) {
         if wanted {
+            self.core_s += file_bytes * BYTE_S;
             self.most_bytes = self.most_bytes.max(self.done_bytes + file_bytes + beside_bytes);
             self.done_bytes += file_bytes;
         }
@@ -54,8 +55,11 @@ impl Memory {
         // Rasters are in the drawing, four bytes a pixel, and one at a time is coded or fitted, in growing buffers; the painted picture has four, and
         // one where its panels are cut out.
         let mask = if raster_pixels > 0.0 { 1.0 } else { 0.0 };
-        self.add(svg, raster_pixels * 0.5, raster_pixels * 4.0 * 1.5 + DRAWING_BYTES);
-        self.add(png, pixels * 0.2, raster_pixels * 4.0 * 1.5 + pixels * (4.0 + mask) + DRAWING_BYTES);
+        let held_bytes = raster_pixels * 4.0 * 1.5 + DRAWING_BYTES;
+        for (wanted, file_bytes, painted) in [(svg, raster_pixels * 0.5, 0.0), (png, pixels * 0.2, 4.0 + mask)] {
+            self.add(wanted, file_bytes, held_bytes + pixels * painted);
+            self.core_s += if wanted { raster_pixels * RASTER_PIXEL_S + PICTURE_S } else { 0.0 };
+        }
     }
 }
 
@@ -63,45 +67,35 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
     let o = &scene.outputs;
     let (netcdf, plots) = (o.netcdf && cfg!(feature = "netcdf"), cfg!(feature = "plots"));
     let pictures = [o.svg && plots, o.png && plots];
-    let on = |wanted: bool| f64::from(u8::from(wanted));
-    let (mut core_s, mut memory) = (5e-3, Memory::default());
+    let mut written = Written { core_s: 5e-3, ..Written::default() };
     if matches!(target, Target::Run | Target::Efficiency) {
-        let points = o.profile_points as f64;
-        core_s += on(o.csv) * points * 10.0 * TABLE_NUMBER_S + on(pictures != [false; 2]) * (PICTURE_S + points * 1e-6);
-        memory.table(o.csv, points, 10.0);
-        memory.picture(pictures, PROFILE_PIXELS, 0.0);
+        written.table(o.csv, o.profile_points as f64, 10.0);
+        written.picture(pictures, PROFILE_PIXELS, 0.0);
     }
     if target == Target::Run && o.flow && !is_calm(scene) {
         let (ny, nz) = crate::setup::sizes::PLANE_POINTS;
         let points = (ny * nz) as f64;
-        core_s += on(o.csv) * 8e-3 + on(netcdf) * 1e-3;
-        memory.table(o.csv, points, 6.0);
-        memory.netcdf(netcdf, points * 8.0);
+        written.table(o.csv, points, 6.0);
+        written.netcdf(netcdf, points * 8.0);
     }
     if n.kept > 0.0 {
-        let numbers = n.kept * n.records * n.samples * n.parts;
-        core_s += on(o.csv) * n.lines * n.samples * (2.0 + n.parts) * TABLE_NUMBER_S;
-        core_s += on(netcdf) * numbers * 1.5 * NETCDF_NUMBER_S;
-        memory.table(o.csv, n.lines * n.samples, 2.0 + n.parts);
+        written.table(o.csv, n.lines * n.samples, 2.0 + n.parts);
         let others = n.kept * n.records * 28.0 + n.lines * n.layers * 4.0;
-        memory.netcdf(netcdf, numbers * 8.0 + others);
+        written.netcdf(netcdf, n.kept * n.records * n.samples * n.parts * 8.0 + others);
     }
     if matches!(target, Target::Run | Target::Map) {
-        let copied = n.cells * MAP_FIELDS * 8.0;
-        memory.done_bytes += copied;
-        core_s += n.cells * (on(o.csv) * MAP_COLUMNS * TABLE_NUMBER_S + on(netcdf) * MAP_FIELDS * NETCDF_NUMBER_S);
-        memory.table(o.csv, n.cells, MAP_COLUMNS);
-        memory.netcdf(netcdf, n.cells * MAP_FIELDS * 4.0);
-        memory.add(o.hpl, n.cells * 40.0, 0.0);
-        memory.table(o.hpl && o.csv, n.cells, 6.0);
+        written.done_bytes += n.cells * MAP_FIELDS * 8.0;
+        written.table(o.csv, n.cells, MAP_COLUMNS);
+        written.netcdf(netcdf, n.cells * MAP_FIELDS * 4.0);
+        written.add(o.hpl, n.cells * 40.0, 0.0);
+        written.table(o.hpl && o.csv, n.cells, 6.0);
         let (panels, pixels, whole_pixels) = map_pixels(scene, g);
-        core_s += (on(pictures[0]) + on(pictures[1])) * (pixels * MAP_PIXEL_S + PICTURE_S);
-        memory.done_bytes += panels * n.cells * 8.0;
-        memory.picture(pictures, whole_pixels, pixels);
+        written.done_bytes += panels * n.cells * 8.0;
+        written.picture(pictures, whole_pixels, pixels);
     }
     let kinds = [(o.csv, "CSV"), (o.netcdf, "NetCDF"), (o.svg, "SVG"), (o.png, "PNG")];
     let kinds: Vec<&str> = kinds.into_iter().filter(|k| k.0).map(|k| k.1).collect();
-    run(Stage::Files, kinds.join(", "), core_s, [memory.most_bytes, 0.0])
+    run(Stage::Files, kinds.join(", "), written.core_s, [written.most_bytes, 0.0])
 }
 
 /// Panels of the picture of a map, the pixels of their rasters and those of the whole: three panels side by side, each as high

@@ -6,6 +6,7 @@ use super::stage::Target;
 use crate::scene::{DetectorSignal, Flow, Method, Scene, SignalsOf, Weighting};
 use crate::setup::efficiency_model::drawn_turbulence;
 use crate::setup::geometry::Geometry;
+use crate::setup::region::largest_radius_m;
 
 /// Fields of a map of estimates.
 pub(super) const MAP_FIELDS: f64 = 16.0;
@@ -57,7 +58,7 @@ impl Sizes {
         let window = e.window_samples as f64;
         let maps = matches!(target, Target::Run | Target::Map);
         let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
-        let radius_m = if e.method == (Method::Periodogram {}) { 0.0 } else { largest_radius_m(scene) };
+        let radius_m = g.gate_range_m.iter().map(|range_m| largest_radius_m(scene, *range_m)).fold(0.0, f64::max);
         let half_rad = if radius_m < middle_m { (radius_m / middle_m).asin() } else { std::f64::consts::PI };
         let samples_kept = window + g.layers_per_sample as f64 * g.layer_thickness_m / g.sample_spacing_m;
         Self {
@@ -123,16 +124,6 @@ fn numbers(scene: &Scene, parts: f64) -> f64 {
 pub(super) fn keeps_few_lags(scene: &Scene) -> bool {
     let e = &scene.estimator;
     e.method.order().is_some() && e.weighting == Weighting::Rectangular
-}
-
-/// The largest radius of a region, m.
-fn largest_radius_m(scene: &Scene) -> f64 {
-    use crate::scene::RegionRadius;
-    match &scene.estimator.radius {
-        RegionRadius::Fixed {} => scene.estimator.radius_m,
-        RegionRadius::OfRange { radius_m, .. } => radius_m.iter().copied().fold(0.0, f64::max),
-        RegionRadius::Target { largest_m, .. } => *largest_m,
-    }
 }
 
 /// Whether the air is at rest everywhere.

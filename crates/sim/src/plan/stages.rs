@@ -25,7 +25,6 @@ const TRANSFORM_POINT_S: f64 = 4.2e-10;
 const SLIDING_LAG_S: f64 = 2e-9;
 const GRADIENT_PAIR_S: f64 = 7e-10;
 const SUMMED_NUMBER_S: f64 = 5e-9;
-const NEW_BYTE_S: f64 = 2.5e-10;
 const SPECTRUM_LAG_S: f64 = 6e-11;
 const SPECTRUM_POINT_S: f64 = 6e-9;
 const TRUTH_LAYER_S: f64 = 5e-10;
@@ -67,7 +66,7 @@ pub(super) fn stages(
 /// Vortices of every realisation, if the scene asks for them.
 fn retrieval(scene: &Scene, target: Target, n: &Sizes) -> Option<PlannedStage> {
     let wanted = scene.retrieval.as_ref().filter(|_| target == Target::Run)?;
-    let record_s = n.layers * LAYER_OF_RECORD_S + n.samples * (n.layers_per_sample * LAYER_OF_SAMPLE_S + SAMPLE_S);
+    let record_s = record_s(n);
     let of_method = |method: &RetrievalMethod| match method {
         RetrievalMethod::Fit | RetrievalMethod::Integral => 0.0,
         RetrievalMethod::Envelope => n.records * record_s + n.cells * ENVELOPE_CELL_S,
@@ -142,7 +141,6 @@ fn signals(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
         "{} x {} records of {} samples, {} layers each",
         n.realisations, n.records, g.samples, g.layers_per_sample
     );
-    let record_s = n.layers * LAYER_OF_RECORD_S + n.samples * (n.layers_per_sample * LAYER_OF_SAMPLE_S + SAMPLE_S);
     let kept =
         n.kept * n.records * n.samples * n.parts * 8.0 + if n.kept > 0.0 { n.lines * n.layers * 8.0 } else { 0.0 };
     // The echo of the pulse before is a record of its own, made of lines of its own.
@@ -154,7 +152,17 @@ fn signals(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     } else {
         (0.0, more)
     };
-    run(Stage::Signals, reason, n.realisations * n.records * record_s * trips + wind_s, [scan_bytes(g, n) + more, kept])
+    run(
+        Stage::Signals,
+        reason,
+        n.realisations * n.records * record_s(n) * trips + wind_s,
+        [scan_bytes(g, n) + more, kept],
+    )
+}
+
+/// Time of one record, s.
+fn record_s(n: &Sizes) -> f64 {
+    n.layers * LAYER_OF_RECORD_S + n.samples * (n.layers_per_sample * LAYER_OF_SAMPLE_S + SAMPLE_S)
 }
 
 fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {
@@ -177,8 +185,7 @@ fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     };
     let reason = format!("{} x {} gates, {region}", n.lines, g.gate_range_m.len());
     let sums_bytes = n.lines * n.windows * n.numbers * 8.0;
-    let realisation_s =
-        n.records * n.windows * window_s(scene, n) + n.cells * point_s(scene, n) + sums_bytes * NEW_BYTE_S;
+    let realisation_s = n.records * n.windows * window_s(scene, n) + n.cells * point_s(scene, n);
     let (planning_s, planned_bytes, planning_bytes) = planning(scene, n);
     // Of each point: sums over the realisations, their errors, truth and thresholds; then the velocities of one realisation.
     let scans_bytes = n.cells * n.realisations * SCAN_POINT_BYTES;
@@ -213,18 +220,17 @@ fn window_s(scene: &Scene, n: &Sizes) -> f64 {
         Method::GradientLikelihood(g) => {
             g.gradients as f64 * GRADIENT_PAIR_S * n.window * n.window + n.numbers * SUMMED_NUMBER_S
         }
-        Method::Likelihood(_) => transform_s * (2.0 + 0.5 * tapers(scene, n)),
+        // As many tapers as a window has independent parts, about.
+        Method::Likelihood(_) => {
+            let parts = (n.window / (scene.detector.sampling_hz * scene.pulse_sigma_s())).min(n.window);
+            transform_s * (2.0 + 0.5 * parts)
+        }
         _ if keeps_few_lags(scene) => {
             let pairs = (2.0 * e.window_step_samples as f64).min(n.window);
             pairs * n.numbers * SLIDING_LAG_S
         }
         _ => transform_s,
     }
-}
-
-/// Tapers of the likelihood: about as many as a window has independent parts.
-fn tapers(scene: &Scene, n: &Sizes) -> f64 {
-    (n.window / (scene.detector.sampling_hz * scene.pulse_sigma_s())).min(n.window)
 }
 
 /// Time of the velocity at one point of the map, s.
@@ -235,19 +241,13 @@ fn point_s(scene: &Scene, n: &Sizes) -> f64 {
     let spectrum_s = n.frequencies * (lags * SPECTRUM_LAG_S + SPECTRUM_POINT_S);
     let estimate_s = match e.method {
         Method::GradientLikelihood(g) => 2.0 * g.gradients as f64 * spectrum_s,
-        Method::Autoregressive(_) => spectrum_s + order * order * 1.5e-9,
-        Method::Capon(_) => spectrum_s + order * order * 2e-9,
         Method::AutoregressivePole(_) => order * order * 7.5e-8,
-        Method::FirstMoment(_) => 2.0 * spectrum_s,
         Method::PulsePair {} => 1e-7,
         _ => spectrum_s,
     };
-    let pulses = scene.scan.pulses_per_line as f64;
-    let region_s = n.chords * (n.numbers * SUMMED_NUMBER_S + pulses * 1e-9 + 2e-8);
-    match e.follow_wind {
-        true => 2.0 * (region_s + estimate_s) + n.chords * n.numbers * SUMMED_NUMBER_S,
-        false => region_s + estimate_s,
-    }
+    let region_s = n.chords * (n.numbers * SUMMED_NUMBER_S + scene.scan.pulses_per_line as f64 * 1e-9);
+    // A first map, and the shifts that follow it.
+    (region_s + estimate_s) * if e.follow_wind { 2.5 } else { 1.0 }
 }
 
 /// What is prepared once: tapers from a covariance, weights of the lags, correlation of the windows. Its time, s, the memory
@@ -260,17 +260,15 @@ fn planning(scene: &Scene, n: &Sizes) -> (f64, f64, f64) {
             let gradients = g.gradients as f64;
             (2.5e-7 * cubed * gradients, 2.0 * gradients, 2.0 * gradients + 24.0)
         }
-        _ => (0.0, 0.0, 0.0),
+        // The windows of a record that share samples or the pulse.
+        _ => (n.window * (n.window + 2.0 * n.layers_per_sample).min(n.samples) * 2e-9, 0.0, 0.0),
     };
     let (model_s, model_matrices) = match scene.estimator.radius {
-        RegionRadius::Target { .. } => (16.0 * 3e-9 * n.chord.powi(3), BOUND_MATRICES * (n.chord / n.window).powi(2)),
+        RegionRadius::Target { .. } => (5e-8 * n.chord.powi(3), BOUND_MATRICES * (n.chord / n.window).powi(2)),
         _ => (0.0, 0.0),
     };
-    // The windows of a record that share samples or the pulse.
-    let reach = (n.window + 2.0 * n.layers_per_sample).min(n.samples);
-    let correlation_s = squared * 1e-9 + reach * n.window * 2e-9;
     let kept_bytes = kept_matrices * squared * 8.0 + n.frequencies * 32.0;
-    (core_s + model_s + correlation_s, kept_bytes, kept_bytes + matrices.max(model_matrices) * squared * 8.0)
+    (core_s + model_s, kept_bytes, kept_bytes + matrices.max(model_matrices) * squared * 8.0)
 }
 
 /// Matrices of the bound of a record: the signal, the covariance and its derivative, its factor, a turned copy.
@@ -287,8 +285,7 @@ pub(super) fn of_bound(stages: &[PlannedStage], n: &Sizes) -> Vec<PlannedStage> 
 
 fn errors(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let reason = format!("against v_pulse (28) and v_gate over {} realisations", n.realisations);
-    let window_layers = n.window * g.sample_spacing_m / g.layer_thickness_m;
-    let seen = 3.0 * n.layers_per_sample + window_layers;
-    let core_s = n.cells * (seen * TRUTH_LAYER_S + wind_point_s(scene)) + n.window * n.layers_per_sample * 1e-8;
+    let seen = 3.0 * n.layers_per_sample + n.window * g.sample_spacing_m / g.layer_thickness_m;
+    let core_s = n.cells * (seen * TRUTH_LAYER_S + wind_point_s(scene));
     run(Stage::Errors, reason, core_s, [0.0, 0.0])
 }

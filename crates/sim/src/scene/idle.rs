@@ -6,7 +6,7 @@
 use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseModel, OuterScaleConvention, Pattern, RefractiveTurbulence};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
 use super::{Refinement, RegionRadius, Scan, SignalsOf};
-use crate::keys::Document;
+use crate::keys::{Document, value_at};
 
 /// A key without use.
 struct Idle {
@@ -18,8 +18,7 @@ struct Idle {
 /// Keys of a scene without use.
 fn idle(scene: &Scene) -> Vec<Idle> {
     let method = &scene.estimator.method;
-    let kind = toml::Value::try_from(method).ok().and_then(|table| table.get("kind").map(ToString::to_string));
-    let kind = format!("estimator.method.kind = {}", kind.unwrap_or_default());
+    let kind = format!("estimator.method.kind = \"{}\"", method.name());
     let mut found = Vec::new();
     let mut unused = |is_idle: bool, keys: &[&'static str], purpose: String| {
         if is_idle {
@@ -89,10 +88,10 @@ fn of_turbulence(turbulence: &RefractiveTurbulence, mut unused: impl FnMut(bool,
     const OUTER: [&str; 2] = ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.outer_scale_wavenumber"];
     let derived = turbulence.sampling == ScreenSampling::Derived;
     unused(derived, &SCREENS, "this key is for atmosphere.turbulence.sampling = \"explicit\"".into());
-    let spectrum = name(&turbulence.spectrum);
     let without_inner = turbulence.spectrum == SpectrumKind::Kolmogorov;
     let without_outer = without_inner || turbulence.spectrum == SpectrumKind::Tatarskii;
-    let purpose = |scale| format!("atmosphere.turbulence.spectrum = {spectrum} has no {scale} scale");
+    let purpose =
+        |scale| format!("atmosphere.turbulence.spectrum = \"{}\" has no {scale} scale", turbulence.spectrum.name());
     unused(without_inner, &["atmosphere.turbulence.inner_scale_m"], purpose("inner"));
     unused(without_outer, &OUTER, purpose("outer"));
     // A spectrum without outer scale has no wave number of it.
@@ -111,11 +110,6 @@ impl Scene {
     }
 }
 
-/// A variant as the file writes it.
-fn name(variant: &impl serde::Serialize) -> String {
-    toml::Value::try_from(variant).map(|value| value.to_string()).unwrap_or_default()
-}
-
 /// What a text states in vain.
 pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
     let idle: Vec<Idle> = idle(scene).into_iter().filter(|idle| document.line(idle.key).is_some()).collect();
@@ -125,14 +119,13 @@ pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
     let mut usual = Scene::default();
     usual.detector.front_end = Some(FrontEnd::default());
     usual.atmosphere.turbulence = Turbulence::Refractive(RefractiveTurbulence::default());
-    let value = |scene: &Scene, key: &str| {
-        let whole = toml::Value::try_from(scene).ok()?;
-        key.split('.').try_fold(whole, |table, name| table.get(name).cloned())
-    };
+    let table =
+        |scene: &Scene| toml::Value::try_from(scene).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
+    let (own, usual) = (table(scene), table(&usual));
     idle.into_iter()
-        .filter(|idle| value(scene, idle.key) != value(&usual, idle.key))
+        .filter(|idle| value_at(&own, idle.key) != value_at(&usual, idle.key))
         .map(|idle| {
-            let value = value(scene, idle.key).map(|value| value.to_string()).unwrap_or_default();
+            let value = value_at(&own, idle.key).map(|value| value.to_string()).unwrap_or_default();
             Problem { key: idle.key.into(), value, allowed: format!("{}: take the line out", idle.purpose) }
         })
         .collect()

@@ -3,7 +3,7 @@
 use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
 use crate::Error;
 use crate::io::{Provenance, text_file};
-use crate::keys::{Document, Format, Key, Source, keys_of};
+use crate::keys::{Document, Format, Key, Source, keys_of, value_at};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
@@ -46,12 +46,14 @@ impl SceneFile {
         let scene: Scene = document.read(document.vet(&scene_format())?)?;
         let mut problems = scene.problems_where(&|key| document.line(key).is_some());
         problems.extend(idle::problems(&scene, &document));
-        if !problems.is_empty() {
-            return Err(document.located(problems));
-        }
-        let source = Source::new(path, text);
-        let file = Self::new(scene).map_err(|problems| document.located(problems))?;
-        Ok(Self { folder: source.folder().to_owned(), source, ..file })
+        if problems.is_empty() { Ok(Self::of(scene, Source::new(path, text))) } else { Err(document.located(problems)) }
+    }
+
+    /// A scene whose limits were checked.
+    fn of(scene: Scene, source: Source) -> Self {
+        let toml = scene.to_toml();
+        let (hash, folder) = (super::hash_of(&toml), source.folder().to_owned());
+        Self { scene, toml, hash, folder, source }
     }
 
     /// The keys that a scene may state.
@@ -85,12 +87,16 @@ impl SceneFile {
     /// All problems of the scene.
     pub fn new(scene: Scene) -> Result<Self, Vec<Problem>> {
         let problems = scene.problems();
-        if !problems.is_empty() {
-            return Err(problems);
-        }
-        let toml = scene.to_toml();
-        let hash = super::hash_of(&toml);
-        Ok(Self { scene, toml, hash, folder: PathBuf::new(), source: Source::new(Path::new("scene"), "") })
+        if problems.is_empty() { Ok(Self::of(scene, Source::new(Path::new("scene"), ""))) } else { Err(problems) }
+    }
+
+    /// A scene that comes of this one, with the folder and the lines of its file.
+    ///
+    /// # Errors
+    /// All problems of the scene.
+    pub(crate) fn with(&self, scene: Scene) -> Result<Self, SceneError> {
+        let problems = scene.problems();
+        if problems.is_empty() { Ok(Self::of(scene, self.source.clone())) } else { Err(self.located(problems)) }
     }
 
     /// The same instrument and scan in still air, of which nothing is retrieved: what says how velocities were measured, without the
@@ -102,7 +108,7 @@ impl SceneFile {
         let mut scene = self.scene.clone();
         (scene.flow, scene.added_flows, scene.retrieval) = (super::Flow::Calm {}, Vec::new(), None);
         scene.outputs.signals = false;
-        Self::new(scene).map_err(|problems| self.located(problems))
+        self.with(scene)
     }
 
     /// Whether the file gives a value to a key.
@@ -118,15 +124,10 @@ impl SceneFile {
     /// An error of a key with the line of the file that states it.
     pub(crate) fn of_key(&self, error: Error) -> Error {
         let Error::Key { key, reason } = error else { return error };
-        let value = toml::Value::try_from(&self.scene).ok();
-        let value = key.split('.').try_fold(value, |table, name| Some(table?.get(name).cloned())).flatten();
-        let value = value.filter(|value| !value.is_table()).map(|value| value.to_string()).unwrap_or_default();
+        let whole = toml::Value::try_from(&self.scene).ok();
+        let value = whole.as_ref().and_then(|whole| value_at(whole, key)).filter(|value| !value.is_table());
+        let value = value.map(|value| value.to_string()).unwrap_or_default();
         self.located(vec![Problem { key: key.into(), value, allowed: reason }]).into()
-    }
-
-    /// The same scene with the folder and the lines of the file that `other` was read from.
-    pub(crate) fn with_file_of(self, other: Self) -> Self {
-        Self { folder: other.folder, source: other.source, ..self }
     }
 }
 

@@ -10,96 +10,64 @@ use std::path::PathBuf;
 use wakescope_les::Flow;
 use wakescope_les::analysis::{VortexRecord, WakeMeter, WakeRecord, WakeScales};
 
-/// What a number is, for its unit and its scale.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
-    Length,
-    Gamma,
-    Rate,
-    Energy,
-    Enstrophy,
-    Number,
-}
-
-impl Kind {
-    fn suffix(self) -> &'static str {
-        match self {
-            Self::Length => "_m",
-            Self::Gamma => "_m2_s",
-            // The tag of 1/s in column names, which readers of tables know: `_per_s` would read as seconds.
-            Self::Rate => "_hz",
-            Self::Energy => "_m4_s2",
-            Self::Enstrophy => "_m2_s2",
-            Self::Number => "",
-        }
-    }
-
+/// What a number is.
+#[derive(Debug)]
+#[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
+struct Kind {
+    /// The end of its name in tables.
+    suffix: &'static str,
     /// Its unit in NetCDF.
-    #[cfg(feature = "netcdf")]
-    fn udunits(self) -> &'static str {
-        match self {
-            Self::Length => "m",
-            Self::Gamma => "m2 s-1",
-            Self::Rate => "s-1",
-            Self::Energy => "m4 s-2",
-            Self::Enstrophy => "m2 s-2",
-            Self::Number => "1",
-        }
-    }
-
-    /// What its NetCDF variable is called: a unit that is no tag of column names stays in the name.
-    #[cfg(feature = "netcdf")]
-    fn variable(self, name: &str) -> String {
-        match self {
-            Self::Energy | Self::Enstrophy => format!("{name}{}", self.suffix()),
-            _ => name.into(),
-        }
-    }
-
+    udunits: &'static str,
+    /// Whether a NetCDF variable has the end of the name, too: where it is no tag of column names.
+    is_named: bool,
     /// Its unit in the scales of the pair; circulations in `Gamma0`.
-    fn unit(self, scales: &WakeScales) -> f64 {
-        let speed = scales.descent_speed_m_s();
-        match self {
-            Self::Length => scales.spacing_m,
-            Self::Gamma => scales.circulation_m2_s,
-            Self::Rate => 1.0 / scales.time_unit_s(),
-            Self::Energy => (scales.spacing_m * speed).powi(2),
-            Self::Enstrophy => speed * speed,
-            Self::Number => 1.0,
-        }
-    }
+    unit: fn(&WakeScales) -> f64,
 }
 
-type OfVortex = (&'static str, Kind, &'static str, fn(&VortexRecord) -> f64);
-type OfFlow = (&'static str, Kind, &'static str, fn(&WakeRecord) -> f64);
+const LENGTH: &Kind = &Kind { suffix: "_m", udunits: "m", is_named: false, unit: |s| s.spacing_m };
+const GAMMA: &Kind = &Kind { suffix: "_m2_s", udunits: "m2 s-1", is_named: false, unit: |s| s.circulation_m2_s };
+/// The tag of 1/s in column names, which readers of tables know: `_per_s` would read as seconds.
+const RATE: &Kind = &Kind { suffix: "_hz", udunits: "s-1", is_named: false, unit: |s| 1.0 / s.time_unit_s() };
+const ENERGY: &Kind = &Kind {
+    suffix: "_m4_s2",
+    udunits: "m4 s-2",
+    is_named: true,
+    unit: |s| (s.spacing_m * s.descent_speed_m_s()).powi(2),
+};
+const ENSTROPHY: &Kind = &Kind {
+    suffix: "_m2_s2",
+    udunits: "m2 s-2",
+    is_named: true,
+    unit: |s| s.descent_speed_m_s() * s.descent_speed_m_s(),
+};
+const NUMBER: &Kind = &Kind { suffix: "", udunits: "1", is_named: false, unit: |_| 1.0 };
+
+type OfVortex = (&'static str, &'static Kind, &'static str, fn(&VortexRecord) -> f64);
+type OfFlow = (&'static str, &'static Kind, &'static str, fn(&WakeRecord) -> f64);
 
 /// Numbers of each vortex with what they are; the first is the one whose ratio to its start is given, too.
 const VORTEX: [OfVortex; 12] = [
     // Name and text have the radii of the case.
-    ("gamma", Kind::Gamma, "circulation averaged over radii", |v| v.gamma_5_15_m2_s),
-    ("y", Kind::Length, "lateral position of the centroid of axial vorticity", |v| v.y_m),
-    ("z", Kind::Length, "height of the centroid of axial vorticity", |v| v.z_m),
-    ("y_spread", Kind::Length, "standard deviation along x of the lateral position", |v| v.y_spread_m),
-    ("z_spread", Kind::Length, "standard deviation along x of the height", |v| v.z_spread_m),
-    ("gamma_opposite", Kind::Gamma, "vorticity of the other sign on this side", |v| v.gamma_opposite_m2_s),
-    ("secondary_gamma", Kind::Gamma, "circulation of the secondary vortex", |v| v.secondary.gamma_m2_s),
-    ("secondary_y", Kind::Length, "lateral position of the secondary vortex", |v| v.secondary.y_m),
-    ("secondary_z", Kind::Length, "height of the secondary vortex", |v| v.secondary.z_m),
-    ("secondary_y_spread", Kind::Length, "standard deviation along x of its lateral position", |v| {
-        v.secondary.y_spread_m
-    }),
-    ("secondary_z_spread", Kind::Length, "standard deviation along x of its height", |v| v.secondary.z_spread_m),
-    ("outward_shear", Kind::Rate, "least shear at the ground of the outward velocity", |v| v.outward_shear_per_s),
+    ("gamma", GAMMA, "circulation averaged over radii", |v| v.gamma_5_15_m2_s),
+    ("y", LENGTH, "lateral position of the centroid of axial vorticity", |v| v.y_m),
+    ("z", LENGTH, "height of the centroid of axial vorticity", |v| v.z_m),
+    ("y_spread", LENGTH, "standard deviation along x of the lateral position", |v| v.y_spread_m),
+    ("z_spread", LENGTH, "standard deviation along x of the height", |v| v.z_spread_m),
+    ("gamma_opposite", GAMMA, "vorticity of the other sign on this side", |v| v.gamma_opposite_m2_s),
+    ("secondary_gamma", GAMMA, "circulation of the secondary vortex", |v| v.secondary.gamma_m2_s),
+    ("secondary_y", LENGTH, "lateral position of the secondary vortex", |v| v.secondary.y_m),
+    ("secondary_z", LENGTH, "height of the secondary vortex", |v| v.secondary.z_m),
+    ("secondary_y_spread", LENGTH, "standard deviation along x of its lateral position", |v| v.secondary.y_spread_m),
+    ("secondary_z_spread", LENGTH, "standard deviation along x of its height", |v| v.secondary.z_spread_m),
+    ("outward_shear", RATE, "least shear at the ground of the outward velocity", |v| v.outward_shear_per_s),
 ];
 /// Numbers of the flow with what they are.
 const FLOW: [OfFlow; 5] = [
-    ("energy", Kind::Energy, "kinetic energy per length of x", |r| r.energy_m4_s2),
-    ("energy_3d", Kind::Energy, "kinetic energy of all that varies along x, per length of x", |r| r.energy_3d_m4_s2()),
-    ("enstrophy", Kind::Enstrophy, "half the integral of the squared vorticity, per length of x", |r| {
-        r.enstrophy_m2_s2
-    }),
-    ("wall_shear", Kind::Rate, "largest shear at the ground", |r| r.wall_shear_per_s),
-    ("wall_units", Kind::Number, "height of the first centre in wall units of that shear", |r| r.wall_units),
+    ("energy", ENERGY, "kinetic energy per length of x", |r| r.energy_m4_s2),
+    ("energy_3d", ENERGY, "kinetic energy of all that varies along x, per length of x", |r| r.energy_3d_m4_s2()),
+    ("enstrophy", ENSTROPHY, "half the integral of the squared vorticity, per length of x", |r| r.enstrophy_m2_s2),
+    ("wall_shear", RATE, "largest shear at the ground", |r| r.wall_shear_per_s),
+    ("wall_units", NUMBER, "height of the first centre in wall units of that shear", |r| r.wall_units),
 ];
 const SIDES: [&str; 2] = ["left", "right"];
 /// Axial modes as columns of the table and variables of the same names; the list in NetCDF has all.
@@ -120,15 +88,15 @@ pub(in super::super) fn file_names() -> Vec<&'static str> {
     ]
 }
 
-/// One number of a record.
-struct Single {
+/// A number of all records.
+struct Column {
     name: String,
-    kind: Kind,
+    kind: &'static Kind,
     /// What it is, in words.
     #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
     text: String,
-    /// Its place in a row.
-    place: usize,
+    /// In SI units.
+    values: Vec<f64>,
 }
 
 /// Lengths of the lists of a record.
@@ -250,34 +218,38 @@ impl WakeRun {
         row
     }
 
-    /// The single numbers.
-    fn singles(&self) -> Vec<Single> {
+    /// The numbers that tables have, those over their first value first.
+    fn columns(&self) -> Vec<Column> {
         let [from, to] = self.circulation_radii_m;
-        let of_vortex = |side: usize| {
-            VORTEX.iter().enumerate().map(move |(i, (name, kind, text, _))| {
-                let (radii, text) = match i {
-                    0 => (format!("_{from}_{to}").replace('.', "p"), format!("{text} from {from:?} to {to:?} m")),
-                    _ => (String::new(), (*text).to_owned()),
-                };
-                Single {
-                    name: format!("{name}{radii}_{}", SIDES[side]),
-                    kind: *kind,
-                    text: format!("{} vortex: {text}", SIDES[side]),
-                    place: 1 + side * VORTEX.len() + i,
-                }
-            })
-        };
-        let of_flow = FLOW.iter().enumerate().map(|(i, (name, kind, text, _))| Single {
-            name: (*name).into(),
-            kind: *kind,
-            text: (*text).into(),
-            place: 1 + 2 * VORTEX.len() + i,
-        });
-        of_vortex(0).chain(of_vortex(1)).chain(of_flow).collect()
+        let radii = [format!("_{from}_{to}").replace('.', "p"), format!(" from {from:?} to {to:?} m")];
+        let mut out = Vec::new();
+        let mut add = |name: String, kind, text: String, values| out.push(Column { name, kind, text, values });
+        for (side, which) in SIDES.iter().enumerate() {
+            let gamma = self.column(1 + side * VORTEX.len());
+            let first = gamma.first().copied().unwrap_or(f64::NAN);
+            let text = format!("{}{}, over its first value", VORTEX[0].2, radii[1]);
+            add(format!("gamma_ratio_{which}"), NUMBER, text, gamma.iter().map(|g| g / first).collect());
+        }
+        for (side, which) in SIDES.iter().enumerate() {
+            for (i, (name, kind, text, _)) in VORTEX.iter().enumerate() {
+                let [in_name, in_text] = if i == 0 { radii.clone() } else { Default::default() };
+                let values = self.column(1 + side * VORTEX.len() + i);
+                add(format!("{name}{in_name}_{which}"), kind, format!("{which} vortex: {text}{in_text}"), values);
+            }
+        }
+        for (i, (name, kind, text, _)) in FLOW.iter().enumerate() {
+            add((*name).into(), kind, (*text).into(), self.column(1 + 2 * VORTEX.len() + i));
+        }
+        let [.., modes, _] = self.lengths.starts();
+        for mode in 0..self.lengths.modes.min(TABLE_MODES + 1) {
+            let text = format!("kinetic energy of axial mode {mode}, per length of x");
+            add(format!("energy_mode_{mode}"), ENERGY, text, self.column(modes + mode));
+        }
+        out
     }
 
-    fn column(&self, place: usize, unit: f64) -> Vec<f64> {
-        self.rows.iter().map(|row| row[place] / unit).collect()
+    fn column(&self, place: usize) -> Vec<f64> {
+        self.rows.iter().map(|row| row[place]).collect()
     }
 
     fn tau(&self) -> Vec<f64> {
@@ -285,44 +257,20 @@ impl WakeRun {
         self.rows.iter().map(|row| super::super::age_tau(row[0], 1.0 / time_unit_s)).collect()
     }
 
-    /// Circulation of each vortex over its first value.
-    fn gamma_ratios(&self) -> [(String, Vec<f64>); 2] {
-        [0, 1].map(|side| {
-            let gamma = self.column(1 + side * VORTEX.len(), 1.0);
-            let first = gamma.first().copied().unwrap_or(f64::NAN);
-            (format!("gamma_ratio_{}", SIDES[side]), gamma.iter().map(|g| g / first).collect())
-        })
-    }
-
-    /// Names and energies of the axial modes that the tables have, in a unit.
-    fn modes(&self, suffix: &str, unit: f64) -> Vec<(String, Vec<f64>)> {
-        let [.., modes, _] = self.lengths.starts();
-        let shown = self.lengths.modes.min(TABLE_MODES + 1);
-        (0..shown).map(|mode| (format!("energy_mode_{mode}{suffix}"), self.column(modes + mode, unit))).collect()
-    }
-
     /// The history in SI units: the columns of which NetCDF has a variable each.
     fn table(&self) -> Table {
-        let mut table = Table::new().float("tau", self.tau()).float("time_s", self.column(0, 1.0));
-        for (name, values) in self.gamma_ratios() {
-            table = table.float(&name, values);
-        }
-        for single in self.singles() {
-            table = table.float(&format!("{}{}", single.name, single.kind.suffix()), self.column(single.place, 1.0));
-        }
-        self.modes(Kind::Energy.suffix(), 1.0)
-            .into_iter()
-            .fold(table, |table, (name, values)| table.float(&name, values))
+        let table = Table::new().float("tau", self.tau()).float("time_s", self.column(0));
+        let named = |c: Column| (format!("{}{}", c.name, c.kind.suffix), c.values);
+        self.columns().into_iter().map(named).fold(table, |table, (name, values)| table.float(&name, values))
     }
 
     /// The history in the scales of the pair, circulations in `Gamma0`.
     fn scaled_table(&self) -> Table {
-        let mut table = Table::new().float("tau", self.tau());
-        for single in self.singles() {
-            table = table.float(&single.name, self.column(single.place, single.kind.unit(&self.scales)));
-        }
-        let energy = Kind::Energy.unit(&self.scales);
-        self.modes("", energy).into_iter().fold(table, |table, (name, values)| table.float(&name, values))
+        let table = Table::new().float("tau", self.tau());
+        self.columns().iter().skip(SIDES.len()).fold(table, |table, column| {
+            let unit = (column.kind.unit)(&self.scales);
+            table.float(&column.name, column.values.iter().map(|value| value / unit))
+        })
     }
 
     fn write_table(&self) -> Result<(), Error> {
@@ -343,7 +291,7 @@ impl WakeRun {
         let middle = slices + 2 * self.lengths.slices;
         let mut variables = vec![
             lists("tau", &["tau"], self.tau(), "1", "age of the wake, t Gamma0 / (2 pi b0^2)"),
-            lists("time", &["tau"], self.column(0, 1.0), "s", "time since the start of the flow"),
+            lists("time", &["tau"], self.column(0), "s", "time since the start of the flow"),
             lists("radius", &["radius"], self.radius_m.clone(), "m", "radius of a circle about the centre of a vortex"),
             lists("x", &["x"], self.x_m.clone(), "m", "position along the flight direction"),
             lists("vortex", &["vortex"], vec![0.0, 1.0], "1", "0: began at smaller y; 1: at larger y"),
@@ -371,7 +319,10 @@ impl WakeRun {
                 "kinetic energy of an axial mode, per length of x",
             ),
         ];
-        variables.extend(self.series());
+        variables.extend(self.columns().into_iter().map(|c| {
+            let name = if c.kind.is_named { format!("{}{}", c.name, c.kind.suffix) } else { c.name };
+            lists(&name, &["tau"], c.values, c.kind.udunits, &c.text).text("coordinates", "time")
+        }));
         let dims = vec![
             ("tau", self.rows.len()),
             ("vortex", 2),
@@ -387,32 +338,5 @@ impl WakeRun {
             ("circulation_m2_s", format!("{:?}", self.scales.circulation_m2_s)),
         ];
         Ok(Layout { dims, globals, variables }.into_bytes(&self.origin)?)
-    }
-
-    /// The columns of the table over `tau`.
-    #[cfg(feature = "netcdf")]
-    fn series(&self) -> Vec<crate::io::netcdf::Variable> {
-        use crate::io::netcdf::{Data, Variable};
-        let variable = |name: &str, values: Vec<f64>, units: &str, long_name: &str| {
-            Variable::new(name, &["tau"], Data::F64(values))
-                .text("units", units)
-                .text("long_name", long_name)
-                .text("coordinates", "time")
-        };
-        let [from, to] = self.circulation_radii_m;
-        let ratio_text = format!("{} from {from:?} to {to:?} m", VORTEX[0].2);
-        let ratio = |(name, values): (String, Vec<f64>)| {
-            variable(&name, values, "1", &format!("{ratio_text}, over its first value"))
-        };
-        let mut out: Vec<Variable> = self.gamma_ratios().into_iter().map(ratio).collect();
-        for single in self.singles() {
-            let (name, units) = (single.kind.variable(&single.name), single.kind.udunits());
-            out.push(variable(&name, self.column(single.place, 1.0), units, &single.text));
-        }
-        for (mode, (name, values)) in self.modes(Kind::Energy.suffix(), 1.0).into_iter().enumerate() {
-            let text = format!("kinetic energy of axial mode {mode}, per length of x");
-            out.push(variable(&name, values, Kind::Energy.udunits(), &text));
-        }
-        out
     }
 }

@@ -126,7 +126,7 @@ pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Erro
     } else {
         let mut own = scene.scene.clone();
         own.scan.realisations = repetitions;
-        SceneFile::new(own).map_err(|problems| scene.located(problems))?.with_file_of(scene)
+        scene.with(own)?
     };
     Ok((Plan::new(file, Target::Map)?, is_own))
 }
