@@ -109,7 +109,9 @@ impl Files {
             }
         };
         if let Some(index) = due.fields {
-            self.output.fields.iter().for_each(|format| add("fields", index, *format, Holds::Field));
+            let mut formats = self.output.fields.clone();
+            formats.sort_by_key(|format| *format == FileFormat::InitialNetcdf);
+            formats.into_iter().for_each(|format| add("fields", index, format, Holds::Field));
         }
         if let Some(index) = due.planes {
             for number in 0..self.output.planes_x_m.len() {
@@ -147,7 +149,9 @@ impl Files {
             None if count > 0 => out.push(FileForecast { name: name.into(), count, bytes }),
             None => {}
         };
-        for file in self.of_outputs() {
+        let (planes, fields): (Vec<_>, Vec<_>) =
+            self.of_outputs().partition(|file| matches!(file.holds, Holds::Plane(_)));
+        for file in fields.into_iter().chain(planes) {
             let stem = if matches!(file.holds, Holds::Plane(_)) { "plane*" } else { &file.stem };
             let bytes = file.bytes(nx * ny * nz, ny * nz, variables);
             add(&format!("{stem}_*.{}", file.ending), usize::from(bytes > 0.0), bytes);

@@ -1,7 +1,8 @@
 //! The one validator of scenes and cases: it collects every value that is out of its limits.
 
 use super::problem::Problem;
-use std::fmt::Debug;
+use super::words::unit_of;
+use std::fmt::{Debug, Display};
 
 /// One side of a limit between keys: the key, its value, what is allowed beside the others.
 pub(crate) type Side<'a> = (&'a str, String, String);
@@ -40,6 +41,27 @@ impl<'s> Checker<'s> {
             self.refuse(key, &format!("{value:?}"), allowed);
         }
         ok
+    }
+
+    /// Two keys of the same unit, of which the first is `word` the second: "above", "below", "at least" or "at most".
+    pub(crate) fn compare<T: PartialOrd + Debug + Display>(
+        &mut self,
+        keys: [&str; 2],
+        values: [T; 2],
+        word: &str,
+    ) -> bool {
+        let [a, b] = &values;
+        let (ok, reverse) = match word {
+            "above" => (a > b, "below"),
+            "below" => (a < b, "above"),
+            "at least" => (a >= b, "at most"),
+            _ => (a <= b, "at least"),
+        };
+        let side = |i: usize, word: &str| {
+            let other = format!("{word} {}, {} {}", keys[1 - i], values[1 - i], unit_of(keys[0]).unwrap_or_default());
+            (keys[i], format!("{:?}", values[i]), other.trim_end().to_owned())
+        };
+        self.between(ok, &[side(0, word), side(1, reverse)])
     }
 
     /// A limit between keys: the first that the file states has to give way, or else the first.

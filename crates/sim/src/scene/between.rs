@@ -7,14 +7,6 @@ fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
     (key, format!("{value:?}"), allowed)
 }
 
-/// Two lengths, m, of which the first is `words[0]` the second, and the second `words[1]` the first.
-fn apart(c: &mut Checker<'_>, keys: [&str; 2], values_m: [f64; 2], words: [&str; 2]) -> bool {
-    let [a_m, b_m] = values_m;
-    let ok = if words[0] == "above" { a_m > b_m } else { a_m < b_m };
-    let allowed = |i: usize| format!("{} {}, {} m", words[i], keys[1 - i], values_m[1 - i]);
-    c.between(ok, &[side(keys[0], a_m, allowed(0)), side(keys[1], b_m, allowed(1))])
-}
-
 impl Scene {
     /// Limits that make sense only where each key is within its own.
     pub(super) fn check_between(&self, c: &mut Checker<'_>) {
@@ -30,16 +22,16 @@ impl Scene {
         }
         let o = &self.outputs;
         let ends = [o.profile_range_max_m, o.profile_range_min_m];
-        apart(c, ["outputs.profile_range_max_m", "outputs.profile_range_min_m"], ends, ["above", "below"]);
+        c.compare(["outputs.profile_range_max_m", "outputs.profile_range_min_m"], ends, "above");
     }
 
     fn check_instrument_between(&self, c: &mut Checker<'_>) {
         let t = &self.telescope;
         let radii = [t.obscuration_radius_m, t.aperture_radius_m];
-        apart(c, ["telescope.obscuration_radius_m", "telescope.aperture_radius_m"], radii, ["below", "above"]);
+        c.compare(["telescope.obscuration_radius_m", "telescope.aperture_radius_m"], radii, "below");
         if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
             let keys = ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.inner_scale_m"];
-            apart(c, keys, [t.outer_scale_m, t.inner_scale_m], ["above", "below"]);
+            c.compare(keys, [t.outer_scale_m, t.inner_scale_m], "above");
         }
         if let Flow::VortexPair(p) = &self.flow {
             let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
@@ -128,13 +120,7 @@ impl Scene {
     fn check_lines(&self, c: &mut Checker<'_>) {
         let s = &self.scan;
         let (low_rad, high_rad, step_rad) = (s.elevation_min_rad, s.elevation_max_rad, s.elevation_step_rad);
-        c.between(
-            high_rad >= low_rad,
-            &[
-                side("scan.elevation_max_rad", high_rad, format!("at least scan.elevation_min_rad, {low_rad} rad")),
-                side("scan.elevation_min_rad", low_rad, format!("at most scan.elevation_max_rad, {high_rad} rad")),
-            ],
-        );
+        c.compare(["scan.elevation_max_rad", "scan.elevation_min_rad"], [high_rad, low_rad], "at least");
         let lines = (high_rad - low_rad) / step_rad;
         let allowed = format!("at most 100000 lines of sight; there would be {:.3e}", lines + 1.0);
         c.between(
@@ -186,7 +172,7 @@ impl Scene {
             }
         }
         c.between(first_m > reach_m, &sides);
-        let ordered = apart(c, ["scan.range_max_m", "scan.range_min_m"], [last_m, first_m], ["above", "below"]);
+        let ordered = c.compare(["scan.range_max_m", "scan.range_min_m"], [last_m, first_m], "above");
         if ordered {
             self.check_record(c);
         }

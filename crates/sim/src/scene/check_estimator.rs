@@ -1,33 +1,22 @@
 //! What the estimator of a scene may say.
 
 use super::{CorrelogramForm, Estimator, Method, PulseShape, RegionRadius, Scene};
-use crate::keys::{Checker, Side};
+use crate::keys::Checker;
 
 /// Every limit of the estimator's keys, and those between them.
 pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
     let e = &scene.estimator;
-    let window = e.window_samples;
-    let beside_window = |key, value: usize, limit: &str| -> [Side<'_>; 2] {
-        [
-            (key, value.to_string(), format!("{limit} estimator.window_samples, {window}")),
-            ("estimator.window_samples", window.to_string(), format!("{} {key}, {value}", other_side(limit))),
-        ]
-    };
-    c.between(e.padded_samples >= window, &beside_window("estimator.padded_samples", e.padded_samples, "at least"));
+    let mut beside_window =
+        |key, value, word| c.compare([key, "estimator.window_samples"], [value, e.window_samples], word);
+    beside_window("estimator.padded_samples", e.padded_samples, "at least");
     if let Method::LagWindow(own) = e.method {
-        let (key, lags) = ("estimator.method.lag_window_lags", own.lag_window_lags);
-        c.between(lags < window, &beside_window(key, lags, "below"));
+        beside_window("estimator.method.lag_window_lags", own.lag_window_lags, "below");
     }
     if let Some(model) = e.method.order() {
-        c.between(model.order < window, &beside_window("estimator.method.order", model.order, "below"));
+        beside_window("estimator.method.order", model.order, "below");
     }
     check_radius(e, c);
     check_combinations(scene, c);
-}
-
-/// What one key must be beside another, seen from the other.
-fn other_side(limit: &str) -> &'static str {
-    if limit == "below" { "above" } else { "at most" }
 }
 
 fn check_radius(e: &Estimator, c: &mut Checker<'_>) {

@@ -1,6 +1,7 @@
 //! The instrument of a scene: laser, pulse, detector, telescope.
 
-use super::receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, is_nothing_db, is_zero};
+use super::pattern::is_default;
+use super::receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, is_nothing_db};
 use crate::keys::{NothingOr, Number, ZERO_OR_MORE, keys};
 use wakescope_optics::RadiusDefinition;
 use wakescope_optics::plan::Receiver as ReceiverPath;
@@ -15,7 +16,7 @@ keys! {
         /// Pulse repetition frequency, Hz.
         pulse_repetition_hz: f64 = 400.0 => 1e-3..=1e6,
         /// Full width at half maximum of the Lorentzian line, Hz; 0 for none.
-        #[serde(skip_serializing_if = "is_zero")]
+        #[serde(skip_serializing_if = "is_default")]
         linewidth_hz: f64 = 0.0 => 0.0..=1e12,
         /// What sets the energy of the pulses, in place of `pulse.energy_j`.
         amplifier: Option<LaserAmplifier> = None,
@@ -159,16 +160,16 @@ keys! {
         /// Whether transmitted and received light cross the same turbulence.
         receiver: ReceiverPath = ReceiverPath::Monostatic,
         /// Loss of the optics, out and back together, dB.
-        #[serde(skip_serializing_if = "is_zero")]
+        #[serde(skip_serializing_if = "is_default")]
         optics_loss_db: f64 = 0.0 => 0.0..=200.0,
         /// Loss of light whose polarisation does not beat, dB.
-        #[serde(skip_serializing_if = "is_zero")]
+        #[serde(skip_serializing_if = "is_default")]
         polarisation_loss_db: f64 = 0.0 => 0.0..=200.0,
         /// Part of the pulse that the telescope sends straight to the detector, dB; `-inf` for none.
         #[serde(skip_serializing_if = "is_nothing_db")]
         reflection_db: f64 = f64::NEG_INFINITY => NothingOr(-300.0..=0.0),
         /// Range up to which nothing is seen, because the detector recovers from the reflection, m; 0 for none.
-        #[serde(skip_serializing_if = "is_zero")]
+        #[serde(skip_serializing_if = "is_default")]
         blind_range_m: f64 = 0.0 => 0.0..=1e6,
     }
 }

@@ -137,7 +137,7 @@ keys! {
         /// What lines that leave a simulated flow meet.
         outside_flow: Outside = Outside::Error {},
         /// Which way the lidar looks, line after line.
-        #[serde(skip_serializing_if = "Pattern::is_default")]
+        #[serde(skip_serializing_if = "pattern::is_default")]
         pattern: Pattern = Pattern::default(),
         /// How the lines follow each other.
         #[serde(skip_serializing_if = "pattern::is_default")]

@@ -32,13 +32,6 @@ impl Default for Pattern {
     }
 }
 
-impl Pattern {
-    /// Whether it is the scan of a scene that states none.
-    pub(super) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
 keys! {
     /// Sweeps of azimuth.
     table Ppi {
@@ -188,7 +181,7 @@ impl WindOfPulses {
     }
 }
 
-/// Whether a table says nothing.
+/// Whether a value is the one of a scene that does not state it.
 pub(super) fn is_default<T: Default + PartialEq>(table: &T) -> bool {
     *table == T::default()
 }

@@ -61,10 +61,6 @@ keys! {
     }
 }
 
-pub(super) fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
 pub(super) fn is_nothing_db(value: &f64) -> bool {
     *value == f64::NEG_INFINITY
 }
