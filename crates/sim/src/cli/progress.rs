@@ -8,6 +8,11 @@ use std::io::Write as _;
 use std::sync::Mutex;
 use wakescope_les::solver::StepRecord;
 
+/// How a bar looks.
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ")
+}
+
 /// One bar at a time, for the stage that runs.
 pub(super) struct Bars {
     style: ProgressStyle,
@@ -16,10 +21,7 @@ pub(super) struct Bars {
 
 impl Bars {
     pub(super) fn new() -> Self {
-        let style =
-            ProgressStyle::with_template("  {prefix:<16} [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left")
-                .unwrap_or_else(|_| ProgressStyle::default_bar())
-                .progress_chars("=> ");
+        let style = style("  {prefix:<16} [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left");
         Self { style, current: Mutex::new(ProgressBar::hidden()) }
     }
 
@@ -65,9 +67,7 @@ pub(super) struct SweepBar(ProgressBar);
 
 impl SweepBar {
     pub(super) fn new() -> Self {
-        let style = ProgressStyle::with_template("  cases [{bar:32}] {pos}/{len}  {elapsed} gone, {eta} left  {msg}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar())
-            .progress_chars("=> ");
+        let style = style("  cases [{bar:32}] {pos}/{len}  {elapsed} gone, {eta} left  {msg}");
         Self(ProgressBar::no_length().with_style(style))
     }
 
@@ -93,9 +93,7 @@ pub(super) struct FlowBar(ProgressBar);
 
 impl FlowBar {
     pub(super) fn new() -> Self {
-        let style = ProgressStyle::with_template("  flow [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left  {msg}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar())
-            .progress_chars("=> ");
+        let style = style("  flow [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left  {msg}");
         Self(ProgressBar::new(FLOW_DIVISIONS as u64).with_style(style))
     }
 }

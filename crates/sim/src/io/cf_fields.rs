@@ -126,12 +126,7 @@ fn file(
     provenance: &Provenance,
     share: &Share,
 ) -> OutputResult<FileParts> {
-    let globals = vec![
-        ("Conventions", "CF-1.10".into()),
-        ("title", title.to_owned()),
-        ("history", format!("written by {}", provenance.program)),
-    ];
-    Layout { dims, globals, variables }.into_parts(provenance, share.is_first)
+    Layout::cf(title, dims, variables, provenance).into_parts(provenance, share.is_first)
 }
 
 #[cfg(test)]

@@ -39,16 +39,8 @@ pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputR
         wind("v", &planes.v_m_s, "horizontal wind across the flight direction").text("standard_name", "y_wind"),
         wind("w", &planes.w_m_s, "vertical wind").text("standard_name", "upward_air_velocity"),
     ];
-    let layout = Layout {
-        dims: vec![("tau", planes.tau.len()), ("z", planes.z_m.len()), ("y", planes.y_m.len())],
-        globals: vec![
-            ("Conventions", "CF-1.10".into()),
-            ("title", planes.title.clone()),
-            ("history", format!("written by {}", provenance.program)),
-        ],
-        variables,
-    };
-    layout.into_bytes(provenance)
+    let dims = vec![("tau", planes.tau.len()), ("z", planes.z_m.len()), ("y", planes.y_m.len())];
+    Layout::cf(&planes.title, dims, variables, provenance).into_bytes(provenance)
 }
 
 fn wind(name: &str, values: &Array3<f64>, long_name: &str) -> Variable {

@@ -27,14 +27,9 @@ pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> Ou
     }
     variables.extend(recording(signals));
     variables.extend(truth(signals));
-    let globals = vec![
-        ("Conventions", "CF-1.10".to_owned()),
-        ("title", "Raw heterodyne signals".to_owned()),
-        ("history", format!("written by {}", provenance.program)),
-    ];
     let (lines, ranges) = signals.truth.radial_velocity_m_s.dim();
     let dims = vec![("ray", rays), ("time", samples), ("line", lines), ("range", ranges)];
-    Layout { dims, globals, variables }.into_bytes(provenance)
+    Layout::cf("Raw heterodyne signals", dims, variables, provenance).into_bytes(provenance)
 }
 
 /// Bytes of data that the file has with so many pulses of so many samples, of one or two quadratures, and lines of so many

@@ -34,10 +34,5 @@ pub fn cf_spectra_bytes(spectra: &Spectra, provenance: &Provenance) -> OutputRes
         ("range", spectra.range_m.len()),
         ("velocity", spectra.velocity_m_s.len()),
     ];
-    let globals = vec![
-        ("Conventions", "CF-1.10".to_owned()),
-        ("title", "Spectra of recorded signals".to_owned()),
-        ("history", format!("written by {}", provenance.program)),
-    ];
-    Layout { dims, globals, variables }.into_bytes(provenance)
+    Layout::cf("Spectra of recorded signals", dims, variables, provenance).into_bytes(provenance)
 }

@@ -130,6 +130,18 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
+    /// A file of the CF conventions.
+    pub(crate) fn cf(
+        title: &str,
+        dims: Vec<(&'static str, usize)>,
+        variables: Vec<Variable>,
+        provenance: &Provenance,
+    ) -> Self {
+        let history = format!("written by {}", provenance.program);
+        let globals = vec![("Conventions", "CF-1.10".into()), ("title", title.into()), ("history", history)];
+        Self { dims, globals, variables }
+    }
+
     /// The bytes of the file. The provenance follows the global attributes, each entry as text.
     pub(crate) fn into_bytes(self, provenance: &Provenance) -> OutputResult<Vec<u8>> {
         self.into_parts(provenance, true).map(FileParts::into_bytes)

@@ -3,7 +3,7 @@
 //! Check: means and deviations by hand; failures are counted and not averaged.
 
 use super::realisations::{RetrievalRow, SceneRetrieval};
-use super::table::side as side_name;
+use super::table::{side as side_name, with};
 use crate::io::Table;
 use crate::scene::RetrievalMethod as Method;
 use wakescope_estimate::retrieval::{Measured, Side, VortexResult};
@@ -128,12 +128,6 @@ impl SceneRetrieval {
             .float("threshold", number(&|row| of_test(row).1))
             .text("flags", self.rows.iter().map(|row| row.flags.clone()))
     }
-}
-
-/// `gamma_m2_s` to `gamma_std_m2_s`: the unit stays at the end.
-fn with(quantity: &str, word: &str) -> String {
-    let unit = ["_m2_s", "_m"].into_iter().find(|unit| quantity.ends_with(unit)).unwrap_or_default();
-    format!("{}_{word}{unit}", quantity.strip_suffix(unit).unwrap_or(quantity))
 }
 
 fn errors(of: (Method, Side), (quantity, found, truth): &Quantity, rows: &[&RetrievalRow]) -> Option<RetrievalErrors> {

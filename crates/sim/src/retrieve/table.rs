@@ -31,10 +31,10 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
         .text("side", text(&|_, vortex| vortex.map_or("none", |v| side(v.side)).to_owned()));
     for (name, get) in VORTEX {
         let of = |vortex: Option<&VortexResult>| vortex.and_then(get).unwrap_or(UNKNOWN);
-        table = table.float(name, number(&|_, v| of(v).value)).float(&with_std(name), number(&|_, v| of(v).std));
+        table = table.float(name, number(&|_, v| of(v).value)).float(&with(name, "std"), number(&|_, v| of(v).std));
     }
     for (name, get) in WIND {
-        table = table.float(name, number(&|r, _| get(r).value)).float(&with_std(name), number(&|r, _| get(r).std));
+        table = table.float(name, number(&|r, _| get(r).value)).float(&with(name, "std"), number(&|r, _| get(r).std));
     }
     table
         .float("chi2_per_dof", number(&|result, _| result.chi2_per_dof))
@@ -64,9 +64,9 @@ type OfScan = (&'static str, fn(&ScanResult) -> Measured);
 const WIND: [OfScan; 2] = [("wind_m_s", |r| r.lateral_wind_m_s), ("shear_per_s", |r| r.wind_shear_per_s)];
 
 /// `gamma_m2_s` to `gamma_std_m2_s`: the unit stays at the end.
-fn with_std(name: &str) -> String {
+pub(super) fn with(name: &str, word: &str) -> String {
     let unit = ["_m2_s", "_m_s", "_per_s", "_m"].into_iter().find(|unit| name.ends_with(unit)).unwrap_or_default();
-    format!("{}_std{unit}", name.strip_suffix(unit).unwrap_or(name))
+    format!("{}_{word}{unit}", name.strip_suffix(unit).unwrap_or(name))
 }
 
 /// The name of a side.

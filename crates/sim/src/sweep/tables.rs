@@ -74,11 +74,7 @@ fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
         let variable = variable.attr("_FillValue", Attr::F64(f64::NAN));
         variables.push(variable.text("units", unit).text("long_name", meaning));
     }
-    let globals = vec![
-        ("Conventions", "CF-1.10".to_owned()),
-        ("title", "Results of a sweep over scenes".to_owned()),
-        ("history", format!("written by {}", definition.origin.program)),
-    ];
     let dims = vec![("case", rows.len()), ("string_length", width)];
-    Ok(Layout { dims, globals, variables }.into_bytes(&definition.origin)?)
+    let origin = &definition.origin;
+    Ok(Layout::cf("Results of a sweep over scenes", dims, variables, origin).into_bytes(origin)?)
 }
