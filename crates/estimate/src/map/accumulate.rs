@@ -175,26 +175,37 @@ impl Scan {
         correlation: Option<&WindowCorrelation>,
         estimator: &(impl Estimator + ?Sized),
     ) -> Result<Vec<MapPoint>, Error> {
-        length("statistic", estimator.statistic_len(), self.numbers)?;
-        map_indexed(
-            points.len(),
-            || (Scratch::new(), vec![0.0; self.numbers]),
-            |(scratch, mean), index| {
-                let point = points[index];
-                let radius_m = radius.at_m(point.range_m)?;
-                let level = self.region_mean(point, radius_m, mean)?;
-                let n_eff = correlation.map_or(f64::NAN, |gamma| self.n_eff(point, radius_m, gamma));
-                let mut estimate = GateVelocity::none(Quality::Empty);
-                if level > 0 {
-                    estimate = estimator.estimate(mean, scratch);
-                    estimate.scale_power(self.scale * self.scale);
-                }
-                let left_out = self.windows(point, radius_m) - level;
-                Ok(MapPoint { estimate, level, left_out, n_eff })
-            },
+        let n_eff = |point, radius_m| correlation.map_or(f64::NAN, |gamma| self.n_eff(point, radius_m, gamma));
+        self.velocities(
+            (points, radius),
+            self.numbers,
+            |point, radius_m, mean| Ok((self.region_mean(point, radius_m, mean)?, n_eff(point, radius_m))),
+            estimator,
         )
-        .into_iter()
-        .collect()
+    }
+
+    /// Velocities at points from means of so many numbers that `region` writes, giving the number of windows and n_eff.
+    fn velocities(
+        &self,
+        (points, radius): (&[PolarPoint], &Radius),
+        numbers: usize,
+        region: impl Fn(PolarPoint, f64, &mut [f64]) -> Result<(usize, f64), Error> + Sync + Send,
+        estimator: &(impl Estimator + ?Sized),
+    ) -> Result<Vec<MapPoint>, Error> {
+        length("statistic", estimator.statistic_len(), numbers)?;
+        let state = || (Scratch::new(), vec![0.0; numbers]);
+        let found = map_indexed(points.len(), state, |(scratch, mean), index| {
+            let point = points[index];
+            let radius_m = radius.at_m(point.range_m)?;
+            let (level, n_eff) = region(point, radius_m, mean)?;
+            let mut estimate = GateVelocity::none(Quality::Empty);
+            if level > 0 {
+                estimate = estimator.estimate(mean, scratch);
+                estimate.scale_power(self.scale * self.scale);
+            }
+            Ok(MapPoint { estimate, level, left_out: self.windows(point, radius_m) - level, n_eff })
+        });
+        found.into_iter().collect()
     }
 
     /// Mean correlogram of the valid windows within `radius_m` of `point`, each line of sight shifted to the velocity
@@ -208,12 +219,10 @@ impl Scan {
     ///
     /// # Errors
     /// [`Error::Length`] if `mean` has not two places per lag.
-    pub fn region_mean_following(
+    fn region_mean_following(
         &self,
-        point: PolarPoint,
-        radius_m: f64,
-        kind: SignalKind,
-        sampling: &Sampling,
+        (point, radius_m): (PolarPoint, f64),
+        (kind, sampling): (SignalKind, &Sampling),
         relative_m_s: &dyn Fn(PolarPoint) -> f64,
         mean: &mut [f64],
     ) -> Result<usize, Error> {
@@ -261,27 +270,17 @@ impl Scan {
         estimator: &(impl Estimator + ?Sized),
     ) -> Result<Vec<MapPoint>, Error> {
         let numbers = 2 * self.numbers / kind.lag_numbers(1);
-        length("statistic", estimator.statistic_len(), numbers)?;
-        map_indexed(
-            points.len(),
-            || (Scratch::new(), vec![0.0; numbers]),
-            |(scratch, mean), index| {
-                let point = points[index];
-                let radius_m = radius.at_m(point.range_m)?;
+        self.velocities(
+            (points, radius),
+            numbers,
+            |point, radius_m, mean| {
                 let here_m_s = guess_m_s(point);
                 let relative = |place: PolarPoint| guess_m_s(place) - here_m_s;
-                let level = self.region_mean_following(point, radius_m, kind, sampling, &relative, mean)?;
-                let mut estimate = GateVelocity::none(Quality::Empty);
-                if level > 0 {
-                    estimate = estimator.estimate(mean, scratch);
-                    estimate.scale_power(self.scale * self.scale);
-                }
-                let left_out = self.windows(point, radius_m) - level;
-                Ok(MapPoint { estimate, level, left_out, n_eff: f64::NAN })
+                let level = self.region_mean_following((point, radius_m), (kind, sampling), &relative, mean)?;
+                Ok((level, f64::NAN))
             },
+            estimator,
         )
-        .into_iter()
-        .collect()
     }
 
     /// Effective number of independent windows of a region, (sum n)^2 / sum of gamma^2 over pairs of one pulse.

@@ -8,6 +8,7 @@ use crate::retrieval::{RetrievalOptions, ScanMap};
 use crate::vortex_fit::damped_newton::{Stop, inverse};
 use crate::vortex_fit::map_fit::guess::Search;
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
+use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake};
 
 /// Pairs of places that fits start from.
@@ -303,11 +304,6 @@ pub(crate) fn tops<'a>(ends: &'a [End], best: &End, covariance: &ndarray::Array2
         }
     }
     tops
-}
-
-/// Whether a free number moves core radii.
-fn is_core(group: &[usize]) -> bool {
-    crate::vortex_fit::wake::core_prior::is_core(group)
 }
 
 fn with_cores(wake: &Wake, core_radius_m: f64) -> Wake {

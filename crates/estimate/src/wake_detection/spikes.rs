@@ -5,14 +5,12 @@
 use ndarray::Array2;
 
 use crate::retrieval::{ScanMap, Turbulence};
-use crate::vortex_fit::map_fit::data::median;
+use crate::vortex_fit::map_fit::data::{median, robust_scale};
 
 /// A velocity so many deviations off the median of its neighbours is an outlier: noise is so once in a million.
 const FAR: f64 = 5.0;
 /// Deviation of a normal number less the median of eight others, over its own.
 const WITH_MEDIAN: f64 = 1.09;
-/// Median of the absolute value of a normal number.
-const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
 /// The map without its outliers, and their number. Velocities that repeat are put about their median before. Where no deviations
 /// are stated, the distances from the neighbours tell them.
@@ -20,8 +18,7 @@ const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 pub fn without_spikes(map: &ScanMap, turbulence: Option<&Turbulence>) -> (ScanMap, usize) {
     let mut kept = map.unfolded();
     let off = Array2::from_shape_fn(kept.velocity_m_s.raw_dim(), |at| off_neighbours(&kept.velocity_m_s, at));
-    let mut sizes: Vec<f64> = off.iter().copied().filter(|x| x.is_finite()).map(f64::abs).collect();
-    let of_all = median(&mut sizes) / NORMAL_MEDIAN;
+    let of_all = robust_scale(off.iter().copied().filter(|x| x.is_finite()));
     let air_m_s = turbulence.map_or(0.0, |turbulence| turbulence.deviation_m_s);
     let mut spikes = 0;
     for (at, off) in off.indexed_iter() {
