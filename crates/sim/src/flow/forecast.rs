@@ -17,7 +17,7 @@ use wakescope_les::solver::{RunPlan, Stability};
 use wakescope_les::{TimeScheme, TimeStep};
 
 /// Forecast of a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct FlowForecast {
     /// Name of the case by its hash.
     pub case_hash: String,
@@ -54,7 +54,7 @@ pub struct FlowForecast {
 }
 
 /// Files of one kind.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct FileForecast {
     /// Name, `*` standing for the number of the output.
     pub name: String,

@@ -1,6 +1,6 @@
 //! The optics of a plan: phase screens only where no theory is valid, or where they are asked for beside it.
 
-use super::stage::{Cost, PlannedStage, Target};
+use super::stage::{PlannedStage, Target, run, skip};
 use crate::Error;
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
 use crate::setup::efficiency_model::{OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, stretches, turbulence};
@@ -43,10 +43,9 @@ pub(super) fn stages(
     // A table through turbulence has the free-space and the exact bistatic curves beside the Monte Carlo.
     let places = if turbulence(scene).is_some() { 16 } else { 0 };
     let quadratures_s: f64 = ranges_m.iter().map(|&r| theory::quadrature_cost_s(telescope, places, r)).sum();
-    let planned = |stage, reason: String, cost| PlannedStage { stage, reason, cost };
 
     let screens = match turbulence(scene) {
-        None => planned(Stage::PhaseScreens, "no turbulence: atmosphere.turbulence".into(), None),
+        None => skip(Stage::PhaseScreens, "no turbulence: atmosphere.turbulence"),
         Some(t) => {
             let drawn = layers.filter(|_| signals_cross_screens(scene));
             let mut across: Vec<f64> = table.iter().chain(&drawn).flatten().copied().collect();
@@ -57,15 +56,15 @@ pub(super) fn stages(
             match (runs.is_empty(), model) {
                 (false, _) => screens(file, instrument, &t, &runs, warnings)?,
                 (true, Model::ExactBistatic) => {
-                    planned(Stage::PhaseScreens, "the bistatic efficiency has an exact theory".into(), None)
+                    skip(Stage::PhaseScreens, "the bistatic efficiency has an exact theory")
                 }
-                (true, _) => planned(Stage::PhaseScreens, "not asked for".into(), None),
+                (true, _) => skip(Stage::PhaseScreens, "not asked for"),
             }
         }
     };
     let efficiency = match fixed {
         Some(snr_db) if ranges_m.is_empty() => {
-            planned(Stage::Efficiency, format!("detector.snr fixes {snr_db} dB at every range"), None)
+            skip(Stage::Efficiency, &format!("detector.snr fixes {snr_db} dB at every range"))
         }
         _ => {
             let how = match model {
@@ -76,8 +75,8 @@ pub(super) fn stages(
             // Mean, scatter and error of each model.
             let models = if turbulence(scene).is_some() { 5.0 } else { 1.0 };
             let kept_bytes = ranges_m.len() as f64 * (16.0 + 24.0 * models);
-            let cost = Cost { core_s: quadratures_s, working_bytes: 0.0, kept_bytes };
-            planned(Stage::Efficiency, format!("{how}, at {} ranges", ranges_m.len()), Some(cost))
+            let reason = format!("{how}, at {} ranges", ranges_m.len());
+            run(Stage::Efficiency, reason, quadratures_s, [0.0, kept_bytes])
         }
     };
     Ok([screens, efficiency])
@@ -121,14 +120,14 @@ fn screens(
     runs: &[Vec<f64>],
     warnings: &mut Vec<String>,
 ) -> Result<PlannedStage, Error> {
-    let mut cost = Cost::default();
+    let (mut core_s, mut working_bytes) = (0.0, 0.0_f64);
     let mut what = Vec::new();
     let lists: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
     let plans = instrument.screen_plans(t, &lists).map_err(|e| refused(file, t, e))?;
     for (range_m, plan) in runs.iter().zip(plans) {
-        cost.core_s += plan.realisation_cpu_s * t.realisations as f64;
+        core_s += plan.realisation_cpu_s * t.realisations as f64;
         let memory_bytes = plan.memory_bytes_of(t.realisations, rayon::current_num_threads());
-        cost.working_bytes = cost.working_bytes.max(memory_bytes as f64);
+        working_bytes = working_bytes.max(memory_bytes as f64);
         let last_m = range_m.last().copied().unwrap_or(0.0);
         let g = plan.grid;
         let mut words = format!(
@@ -156,7 +155,7 @@ fn screens(
         }
     }
     let reason = format!("{} realisations of {}", t.realisations, what.join("; "));
-    Ok(PlannedStage { stage: Stage::PhaseScreens, reason, cost: Some(cost) })
+    Ok(run(Stage::PhaseScreens, reason, core_s, [working_bytes, 0.0]))
 }
 
 /// A refusal of the optics in the keys of the scene; the strongest limit of each key is named.

@@ -5,8 +5,15 @@
 /// One lidar a line; what the columns are stands in the file.
 const TABLE: &str = include_str!("presets.csv");
 
+/// What a scene of each has, with the names of the columns, and of what follows from them, in braces.
+const TEMPLATE: &str = include_str!("preset.toml");
+
+fn cells(line: &'static str) -> Vec<&'static str> {
+    line.split('|').collect()
+}
+
 fn rows() -> impl Iterator<Item = Vec<&'static str>> {
-    TABLE.lines().filter(|line| !line.starts_with('#')).map(|line| line.split('|').collect())
+    TABLE.lines().filter(|line| !line.starts_with('#')).skip(1).map(cells)
 }
 
 /// Names of the presets.
@@ -17,60 +24,29 @@ pub fn preset_names() -> impl Iterator<Item = &'static str> {
 /// The scene of a preset: what differs from the defaults, with its sources as comments.
 pub fn preset_toml(name: &str) -> Option<String> {
     let row = rows().find(|row| row.first() == Some(&name))?;
-    let [
-        name,
-        wavelength,
-        energy,
-        rate,
-        fwhm,
-        aperture,
-        beam,
-        sampling,
-        signal,
-        window,
-        pulses,
-        lines,
-        pair,
-        blind,
-        scans,
-        stated,
-        recalled,
-        source,
-    ] = row[..]
-    else {
-        return None;
-    };
-    let number = |text: &str| text.parse::<f64>().ok();
-    let (window_samples, lines, pair_m) = (number(window)?, number(lines)?, number(pair)?);
+    let header = cells(TABLE.lines().find(|line| !line.starts_with('#'))?);
+    let cell = |column: &str| header.iter().position(|name| *name == column).and_then(|at| row.get(at).copied());
+    let number = |column: &str| cell(column)?.parse::<f64>().ok();
+    let pair_m = number("pair_m")?;
     // As high above the pair as in the default scene, and as far before and behind it.
     let highest_rad = (0.2304 * 400.0 / pair_m * 1e4).round() / 1e4;
     // A little less than the last line takes, so that rounding does not lose it.
-    let step_rad = ((highest_rad / (lines - 1.0)) * 1e6).floor() / 1e6;
-    let (first_m, last_m) = (pair_m - 120.0, pair_m + 120.0);
-    let gate_step = (window_samples * 5.0 / 64.0).round().max(1.0);
-    let mut text = format!(
-        "# A wakescope scene with the lidar {name}. Nominal: a set-up like that of the instrument, not a calibrated one.\n\
-         # Stated by the source: {stated}.\n# Recalled or assumed: {recalled}.\n# Source: {source}.\n\
-         # Scans of the instrument: {scans}. This one is a vertical scan across a wake {pair} m away.\n\
-         # Every other key has the default of `wakescope init`: assumed are an ideal receiver (quantum efficiency 1, no loss in optics\n\
-         # and polarisation) and air without turbulence, which together are 4 to 9 dB too good for most instruments.\n\n\
-         format = 2\nseed = 1 \n\n[laser]\nwavelength_m = {wavelength}\npulse_repetition_hz = {rate}\n\n\
-         [pulse]\nenergy_j = {energy}\nshape.duration_s = {fwhm}\n\n[detector]\nsampling_hz = {sampling}\nsignal = \"{signal}\"\n"
-    );
-    if signal == "baseband" {
-        // The quadratures see almost all of what their rate can hold.
-        text += &format!("bandwidth_hz = {:?} # assumed\n", 0.98 * number(sampling)?);
-    }
-    text += &format!("\n[telescope]\naperture_radius_m = {aperture}\nbeam_radius_m = {beam}\n");
-    if blind != "0" {
-        text += &format!("blind_range_m = {blind}\n");
-    }
-    text += &format!(
-        "\n[flow]\nlateral_position_m = {pair}\n\n[scan]\nelevation_max_rad = {highest_rad:?}\nelevation_step_rad = {step_rad:?}\n\
-         range_min_m = {first_m:?}\nrange_max_m = {last_m:?}\npulses_per_line = {pulses}\n\n\
-         [estimator]\nwindow_samples = {window}\ngate_step_samples = {gate_step}\n"
-    );
-    Some(text)
+    let step_rad = ((highest_rad / (number("lines")? - 1.0)) * 1e6).floor() / 1e6;
+    // The quadratures see almost all of what their rate can hold.
+    let bandwidth = format!("bandwidth_hz = {:?} # assumed\n", 0.98 * number("sampling_hz")?);
+    let blind_range = format!("blind_range_m = {}\n", cell("blind_range_m")?);
+    let made = [
+        ("highest_rad", format!("{highest_rad:?}")),
+        ("step_rad", format!("{step_rad:?}")),
+        ("first_m", format!("{:?}", pair_m - 120.0)),
+        ("last_m", format!("{:?}", pair_m + 120.0)),
+        ("gate_step", (number("window_samples")? * 5.0 / 64.0).round().max(1.0).to_string()),
+        ("bandwidth", if cell("signal")? == "baseband" { bandwidth } else { String::new() }),
+        ("blind_range", if cell("blind_range_m")? == "0" { String::new() } else { blind_range }),
+    ];
+    let stated = header.iter().copied().zip(row.iter().map(|cell| (*cell).to_owned()));
+    let fill = |text: String, (name, value): (&str, String)| text.replace(&format!("{{{name}}}"), &value);
+    Some(stated.chain(made).fold(TEMPLATE.to_owned(), fill))
 }
 
 #[cfg(test)]
