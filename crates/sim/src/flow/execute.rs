@@ -8,7 +8,7 @@ use super::setup::{Setup, WakeSetup};
 use super::shared::agree;
 use super::steps::StepTable;
 use super::wake::{Schedule, WakeRun};
-use super::writer::{Kept, Writer, growth_note};
+use super::writer::{Writer, growth_note, kept};
 use super::{Begin, CaseFile, FlowCase, FlowOutcome, Watch, age_tau};
 use crate::io::lock::FolderLock;
 use crate::io::{Existing, write_atomic};
@@ -195,13 +195,13 @@ fn begin_files(
     folder: &Path,
     files: &Files,
     mut wake: Option<WakeRun>,
-    (continues, kept): (bool, &[u8]),
+    (continues, bytes): (bool, &[u8]),
     is_first: bool,
 ) -> Result<Begun, Error> {
-    let kept = Kept::read(kept, wake.is_some());
+    let (row, history) = kept(bytes, wake.is_some());
     if let (Some(wake), true) = (&mut wake, continues) {
         let ([path, _], what) = (checkpoint_paths(folder), "its history of the wake is not that of this case");
-        wake.restore(&kept.wake).ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
+        wake.restore(history).ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
     }
     if !is_first {
         return Ok(Begun { wake, steps: None, written: Vec::new() });
@@ -211,7 +211,7 @@ fn begin_files(
     let steps_path = files.steps_path();
     let steps = match (files.output.steps, continues) {
         (false, _) => None,
-        (true, true) => Some(StepTable::resume(&steps_path, &files.origin, &kept.steps)?),
+        (true, true) => Some(StepTable::resume(&steps_path, &files.origin, row)?),
         (true, false) => Some(StepTable::begin(&steps_path, &files.origin)?),
     };
     let mut written = vec![case_toml];

@@ -29,15 +29,13 @@ mod text;
 mod wake;
 mod writer;
 
-pub use case::{Checkpoint, FORMAT, FileFormat, FlowCase, Output, Pressure, Scheme, Solver, Subgrid, Time};
+pub use case::*;
 pub use examples::{EXAMPLES, example};
 pub use execute::{RunOptions, check_on, run, run_on};
 pub use forecast::{FileForecast, FlowForecast};
-pub use free::{Axis, EndName, Free, InitialName, InitialPair, MappingName};
+pub use free::*;
 pub use kind::CaseKind;
-pub use named::{
-    Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
-};
+pub use named::*;
 
 #[cfg(feature = "netcdf")]
 pub use read::{FieldInSpace, read_field, read_planes};

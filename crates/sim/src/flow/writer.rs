@@ -14,26 +14,15 @@ use wakescope_les::Flow;
 use wakescope_les::ranks::Ranks;
 use wakescope_les::solver::{RunObserver, RunWarning, StepRecord, UndampedGrowth};
 
-/// What a checkpoint keeps for the files.
-#[derive(Debug, Default)]
-pub(super) struct Kept {
-    /// The row of the table of the steps that waits.
-    pub(super) steps: Vec<u8>,
-    /// The history of a wake.
-    pub(super) wake: Vec<u8>,
-}
-
-impl Kept {
-    /// From the bytes of a checkpoint; those of a wake begin with the length of the row.
-    pub(super) fn read(bytes: &[u8], is_wake: bool) -> Self {
-        if !is_wake {
-            return Self { steps: bytes.to_vec(), wake: Vec::new() };
-        }
-        let Some((length, rest)) = bytes.split_first_chunk::<8>() else { return Self::default() };
-        let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
-        let (steps, wake) = rest.split_at_checked(length).unwrap_or_default();
-        Self { steps: steps.to_vec(), wake: wake.to_vec() }
+/// What a checkpoint keeps for the files: the row of the table of the steps that waits, and the history of a wake, whose bytes begin
+/// with the length of the row.
+pub(super) fn kept(bytes: &[u8], is_wake: bool) -> (&[u8], &[u8]) {
+    if !is_wake {
+        return (bytes, &[]);
     }
+    let Some((length, rest)) = bytes.split_first_chunk::<8>() else { return Default::default() };
+    let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
+    rest.split_at_checked(length).unwrap_or_default()
 }
 
 /// Writes what the run gives, on each rank what that has; tables, and what is told, on rank 0.

@@ -24,28 +24,15 @@ mod receiver;
 mod retrieval;
 
 pub use crate::keys::{Located, Problem, SceneError};
-pub use atmosphere::{
-    AirProfile, Atmosphere, EfficiencyOfPulse, RefractiveTurbulence, ScreenSampling, SpectrumKind, Turbulence,
-};
-pub use estimator::{
-    CorrelogramForm, Estimator, FirstMoment, GradientLikelihood, LagWindow, Likelihood, Method, ModelOrder,
-    OrderChoice, RegionRadius, Weighting,
-};
-pub use flow::{
-    Aircraft, FieldFlow, FieldGround, Flow, LinearWind, Outside, SimulatedFlow, SimulatedMotion, VortexLines,
-    VortexMotion, VortexPair,
-};
-pub use instrument::{
-    Detector, DetectorSignal, Digitiser, GaussianShape, Laser, Pulse, PulseDefinition, PulseShape, SampledShape,
-    SnrReference, Telescope,
-};
-pub use pattern::{
-    Axial, Dbs, HeadMotion, HeadMotionKeys, LidarPlace, Pattern, Ppi, Stare, SweepDirection, Towards, Vad, WindOfPulses,
-};
+pub use atmosphere::*;
+pub use estimator::*;
+pub use flow::*;
+pub use instrument::*;
+pub use pattern::*;
 pub use presets::{preset_names, preset_toml};
 pub use read::SceneFile;
-pub use receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, SecondTrip};
-pub use retrieval::{FollowingAircraft, Retrieval, RetrievalMethod};
+pub use receiver::*;
+pub use retrieval::*;
 pub use wakescope_estimate::Refinement;
 pub use wakescope_estimate::vortex_fit::{CoreProfile, LiftSlope};
 pub use wakescope_optics::{RadiusDefinition, air::OuterScaleConvention, plan::Receiver as ReceiverPath};
