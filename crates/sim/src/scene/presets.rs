@@ -6,7 +6,7 @@
 const TABLE: &str = include_str!("presets.csv");
 
 /// What a scene of each has, with the names of the columns, and of what follows from them, in braces.
-const TEMPLATE: &str = include_str!("preset.toml");
+const TEMPLATE: &str = include_str!("preset.txt");
 
 fn cells(line: &'static str) -> Vec<&'static str> {
     line.split('|').collect()
