@@ -2,7 +2,6 @@
 
 use super::Begin;
 use super::case::{FileFormat, Output};
-use super::forecast::FileForecast;
 use super::shared::{agree, commit};
 use super::wake::{self, Due, Schedule};
 use crate::Error;
@@ -77,6 +76,17 @@ const CSV_CELL_BYTES: f64 = 140.0;
 const CSV_PLANE_BYTES: f64 = 90.0;
 const STEP_ROW_BYTES: f64 = 220.0;
 const RECORD_BYTES: f64 = 2500.0;
+
+/// Files of one kind.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct FileForecast {
+    /// Name, `*` standing for the number of the output.
+    pub name: String,
+    /// How many.
+    pub count: usize,
+    /// All of them \[bytes\].
+    pub bytes: f64,
+}
 
 /// The plan of the files.
 #[derive(Debug)]

@@ -7,7 +7,7 @@
 //! Check: memory against the arrays of a run, sizes that fit, cases too large are refused at once.
 
 use super::case::{FileFormat, FlowCase, Scheme, Subgrid};
-use super::files::Files;
+use super::files::{FileForecast, Files};
 use super::setup::Setup;
 use super::{CaseFile, CaseKind, WakeOutput};
 use crate::plan::units::{bytes, seconds};
@@ -51,17 +51,6 @@ pub struct FlowForecast {
     pub rank_bytes: f64,
     /// Files, by kind.
     pub files: Vec<FileForecast>,
-}
-
-/// Files of one kind.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct FileForecast {
-    /// Name, `*` standing for the number of the output.
-    pub name: String,
-    /// How many.
-    pub count: usize,
-    /// All of them \[bytes\].
-    pub bytes: f64,
 }
 
 impl FlowForecast {
