@@ -282,7 +282,7 @@ fn seeds(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
 /// Through a focus in turbulence: the ratio of the signals and that of the budget, each a Monte Carlo of its own.
 fn through_turbulence(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     let mut s = Scene::default();
-    s.number("telescope.focus_m", r.between(250.0, 500.0)).word("atmosphere.turbulence.kind", "refractive");
+    s.number("telescope.focus_m", r.between(260.0, 500.0)).word("atmosphere.turbulence.kind", "refractive");
     s.number("atmosphere.turbulence.cn2_m_m23", 1e-14).set("atmosphere.turbulence.grid_points", 320);
     s.set("atmosphere.turbulence.layers", 10).set("atmosphere.turbulence.realisations", 24);
     s.number("scan.elevation_min_rad", 0.1).number("scan.elevation_max_rad", 0.1).set("scan.pulses_per_line", 1);
