@@ -23,20 +23,12 @@ use rand_distr::StandardNormal;
 use crate::error::{check, check_length, check_overflow};
 use crate::kernel::Phasors;
 use crate::noise::{BasebandNoise, NoiseScratch, RealNoise};
+use crate::record::{Detector, Record};
 use crate::window::Window;
 use crate::{Error, LineOfSight, Pulse, Receiver, Sample, Shot};
 
 /// Samples after which all phasors are computed afresh, so that rounding cannot build up.
 const RENEWAL_SAMPLES: usize = 1024;
-
-/// When and how long the receiver samples after each pulse.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Record {
-    /// Time of the first sample after the middle of the pulse leaves \[s\]; it sees the range `c t/2`.
-    pub time_of_first_sample_s: f64,
-    /// Number of samples.
-    pub samples: usize,
-}
 
 /// Buffers of one worker, reused from pulse to pulse.
 #[derive(Debug, Default)]
@@ -45,7 +37,7 @@ pub struct Scratch {
     phasors: Phasors,
     speckle: Vec<Complex<f64>>,
     envelope: Vec<Complex<f64>>,
-    pub(crate) noise: NoiseScratch,
+    noise: NoiseScratch,
 }
 
 /// Makes records: pulse, receiver and sampling times, planned once and used for every line and pulse.
@@ -56,9 +48,7 @@ pub struct Simulator {
     pulse: Pulse,
     receiver: Receiver,
     record: Record,
-    pub(crate) noise: Arc<RealNoise>,
-    pub(crate) baseband_noise: Arc<BasebandNoise>,
-    pub(crate) carrier: Vec<Complex<f64>>,
+    detector: Arc<Detector>,
 }
 
 impl fmt::Debug for Simulator {
@@ -100,9 +90,9 @@ impl Simulator {
                 Complex::cis(2.0 * PI * (cycles - cycles.floor()))
             })
             .collect();
-        let noise = Arc::new(RealNoise::new(&receiver, record.samples));
-        let baseband_noise = Arc::new(BasebandNoise::new(&receiver, record.samples));
-        Ok(Self { pulse, receiver, record, noise, baseband_noise, carrier })
+        let noise = RealNoise::new(&receiver, record.samples);
+        let baseband_noise = BasebandNoise::new(&receiver, record.samples);
+        Ok(Self { pulse, receiver, record, detector: Arc::new(Detector { carrier, noise, baseband_noise }) })
     }
 
     /// The pulse.
@@ -150,7 +140,7 @@ impl Simulator {
         envelope_a.resize(self.record.samples, Complex::ZERO);
         let result = self.envelope_into(shot, rng, scratch, &mut envelope_a);
         if result.is_ok() {
-            T::receive(self, &envelope_a, rng, scratch, out_a);
+            T::receive(&self.detector, &envelope_a, rng, &mut scratch.noise, out_a);
         }
         scratch.envelope = envelope_a;
         result

@@ -41,6 +41,7 @@
 //! | [`receiver`] | sampling, responsivity, noise power (13), signal-to-noise ratio (14); what a real receiver adds |
 //! | [`transmitter`] | energy against repetition rate, Brillouin threshold |
 //! | `heterodyne` | [`Simulator`]: one record per pulse, (15), (12), fast form |
+//! | `record` | [`Record`]: when the receiver samples; carrier and noise of the samples |
 //! | `sample` | [`Sample`]: the current, or both quadratures of the baseband |
 //! | `impairments` | effects beside (15): laser phases, reflex of the telescope, echo of the pulse before |
 //! | `window`, `kernel` | which layers are lit at a sample; the inner loop |
@@ -71,6 +72,7 @@ mod parallel;
 mod piecewise;
 mod pulse;
 pub mod receiver;
+mod record;
 mod sample;
 pub mod sampled;
 pub mod scan;
@@ -83,11 +85,12 @@ mod window;
 pub use constants::SPEED_OF_LIGHT_M_S;
 pub use error::Error;
 pub use filter::RangeFilter;
-pub use heterodyne::{Record, Scratch, Simulator};
+pub use heterodyne::{Scratch, Simulator};
 pub use line::{LayerLimits, LineOfSight};
 pub use medium::Medium;
 pub use pulse::{GaussianPulse, PulseDuration};
 pub use receiver::{NoiseModel, Receiver};
+pub use record::Record;
 pub use sample::Sample;
 pub use scan::Scan;
 pub use shot::Shot;

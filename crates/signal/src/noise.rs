@@ -19,7 +19,7 @@ use crate::{NoiseModel, Receiver};
 
 /// Buffers for the synthesis of noise.
 #[derive(Debug, Default)]
-pub(crate) struct NoiseScratch {
+pub struct NoiseScratch {
     spectrum: Vec<Complex<f64>>,
     circular: Vec<f64>,
     transform: Vec<Complex<f64>>,

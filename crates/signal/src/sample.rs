@@ -4,8 +4,10 @@
 
 use num_complex::Complex;
 
+use crate::Error;
+use crate::noise::NoiseScratch;
 use crate::receiver::Receiver;
-use crate::{Error, Scratch, Simulator};
+use crate::record::Detector;
 
 /// `f64`: the measured current `i(t_k) = sqrt(2) Re{s(t_k) exp(j 2 pi f_c t_k)} + i_N`, (12). `Complex<f64>`: the baseband signal
 /// `s(t_k)` with circular noise of the detector band about zero frequency, as a receiver with two quadratures delivers it.
@@ -22,7 +24,7 @@ pub(crate) mod sealed {
 
     use rand::Rng;
 
-    use super::{Complex, Error, Receiver, Scratch, Simulator};
+    use super::{Complex, Detector, Error, NoiseScratch, Receiver};
 
     pub trait Received: Copy + Default + Send + Sync {
         /// Whether samples of this kind hold the band of the receiver.
@@ -30,10 +32,10 @@ pub(crate) mod sealed {
 
         /// The samples of an envelope, with noise.
         fn receive<R: Rng + ?Sized>(
-            simulator: &Simulator,
+            detector: &Detector,
             envelope_a: &[Complex<f64>],
             rng: &mut R,
-            scratch: &mut Scratch,
+            scratch: &mut NoiseScratch,
             out_a: &mut [Self],
         );
 
@@ -47,16 +49,16 @@ pub(crate) mod sealed {
         }
 
         fn receive<R: Rng + ?Sized>(
-            simulator: &Simulator,
+            detector: &Detector,
             envelope_a: &[Complex<f64>],
             rng: &mut R,
-            scratch: &mut Scratch,
+            scratch: &mut NoiseScratch,
             out_a: &mut [Self],
         ) {
-            for ((out, s), carrier) in out_a.iter_mut().zip(envelope_a).zip(&simulator.carrier) {
+            for ((out, s), carrier) in out_a.iter_mut().zip(envelope_a).zip(&detector.carrier) {
                 *out = SQRT_2 * (s.re * carrier.re - s.im * carrier.im);
             }
-            simulator.noise.add_to(rng, &mut scratch.noise, out_a);
+            detector.noise.add_to(rng, scratch, out_a);
         }
 
         fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {
@@ -70,14 +72,14 @@ pub(crate) mod sealed {
         }
 
         fn receive<R: Rng + ?Sized>(
-            simulator: &Simulator,
+            detector: &Detector,
             envelope_a: &[Self],
             rng: &mut R,
-            scratch: &mut Scratch,
+            scratch: &mut NoiseScratch,
             out_a: &mut [Self],
         ) {
             out_a.copy_from_slice(envelope_a);
-            simulator.baseband_noise.add_to(rng, &mut scratch.noise, out_a);
+            detector.baseband_noise.add_to(rng, scratch, out_a);
         }
 
         fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {

@@ -8,7 +8,8 @@
 use num_complex::Complex;
 
 use crate::error::check;
-use crate::{Error, LineOfSight, Pulse, Record, SPEED_OF_LIGHT_M_S};
+use crate::record::Record;
+use crate::{Error, LineOfSight, Pulse, SPEED_OF_LIGHT_M_S};
 
 /// Most layers to one side of the nearest one: a bound on memory, far beyond any useful layer thickness.
 const MAX_REACH: f64 = 1e7;
