@@ -476,5 +476,8 @@ fn pulses_have_the_efficiency_of_a_realisation_each_and_their_mean_power_is_that
         (relative_variance(&fixed) / fixed.len() as f64 + relative_variance(&drawn) / drawn.len() as f64).sqrt();
     let difference = average(&drawn) / average(&fixed) - 1.0;
     assert!(difference.abs() < 4.0 * error, "{difference} {error}");
-    assert!(relative_variance(&drawn) > 1.2 * relative_variance(&fixed), "the efficiency adds its own scatter");
+    // Both have the same speckle: their ratio scatters with the efficiency alone, by 0.3 to 0.43 at one range and less over a record.
+    let ratios: Vec<f64> = drawn.iter().zip(&fixed).map(|(drawn, fixed)| drawn / fixed).collect();
+    let own = relative_variance(&ratios);
+    assert!((0.03..0.2).contains(&own), "the efficiency adds its own scatter: {own}");
 }
