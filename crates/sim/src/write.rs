@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 /// Names of the files that a plan will write.
 ///
 /// # Errors
-/// As [`write`], but for what the files hold.
+/// As [`write()`], but for what the files hold.
 pub fn names(plan: &Plan) -> Result<Vec<String>, Error> {
     Outputs::names(plan.scene.scene.outputs, |files| list(plan, &RunResult::default(), files))
 }

@@ -255,7 +255,7 @@ impl Scan {
         Ok(level)
     }
 
-    /// Velocities at `points` by [`Scan::region_mean_following`]; `guess_m_s` gives the wind of a first estimate
+    /// Velocities at `points` by `Scan::region_mean_following`; `guess_m_s` gives the wind of a first estimate
     /// anywhere, NaN where it has none.
     ///
     /// # Errors

@@ -148,7 +148,7 @@ impl Table {
         self.columns.first().map_or(0, |(_, column)| column.len())
     }
 
-    /// The table for people: columns side by side, floats as [`digits`] has them.
+    /// The table for people: columns side by side, floats as `digits` has them.
     pub fn aligned(&self) -> String {
         let cell = |(name, column): &(String, Column), line: usize| match (line.checked_sub(1), column) {
             (None, _) => name.clone(),
