@@ -1,7 +1,7 @@
 //! `cargo xtask tidy`: the rules of the house that no compiler checks.
 //!
-//! Who may depend on whom, no circles of imports, file lengths, units in public names, reference curves with a header, tests and files
-//! that pages name, and no private paths.
+//! Who may depend on whom, no circles of imports, one line of documentation at the head of each file, file lengths, units
+//! in public names, reference curves with a header, tests and files that pages name, and no stray files or private paths.
 
 use crate::sources::{Modules, circles, is_test_file};
 use crate::workspace::{read, tracked_files};
@@ -25,6 +25,13 @@ const WITH_THREADS: [&str; 3] = ["wakescope-optics", "wakescope-signal", "wakesc
 
 /// Longest source file, in lines of code: what explains them may take the room that it needs.
 const MAX_CODE_LINES: usize = 500;
+
+/// Files and folders that may stand at the top.
+const TOP_LEVEL: &str = ".cargo .ci .gitignore CHANGELOG.md CITATION.cff Cargo.lock Cargo.toml LICENSE README.md clippy.toml crates \
+    docs rustfmt.toml tests xtask";
+
+/// File types that may stand anywhere below.
+const EXTENSIONS: [&str; 11] = ["rs", "toml", "csv", "md", "svg", "png", "lock", "cff", "css", "json", "py"];
 
 /// What only a machine knows must not stand in the repository.
 const PRIVATE: [&str; 5] = ["/home/", "/root/", "/work/", "/tmp/", "C:\\Users"];
@@ -59,6 +66,7 @@ pub(crate) fn run() -> Outcome {
     let mut sources = Vec::new();
     let mut pages = Vec::new();
     for file in &files {
+        check_place(file, &mut found);
         let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("");
         if !["rs", "md", "toml", "csv"].contains(&extension) {
             continue;
@@ -95,13 +103,35 @@ fn listed(list: &str, word: &str) -> bool {
     list.split(' ').any(|of| of == word)
 }
 
+fn check_place(file: &str, found: &mut Vec<String>) {
+    let top = file.split('/').next().unwrap_or(file);
+    if !listed(TOP_LEVEL, top) {
+        found.push(format!("{file}: a stray file at the top level"));
+    }
+    let path = Path::new(file);
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    // The template of presets is no TOML until its braces are filled.
+    let named = ["LICENSE", ".gitignore", ".ci/run", "crates/sim/src/scene/preset.txt"].contains(&file);
+    // Files that other programs wrote, for readers to be held against.
+    let of_others = file.starts_with("tests/reference/") && ["nc", "npz"].contains(&extension);
+    if !named && !of_others && !EXTENSIONS.contains(&extension) {
+        found.push(format!("{file}: no file of this type belongs here"));
+    }
+}
+
 fn check_source(file: &str, text: &str, found: &mut Vec<String>) {
+    if !text.starts_with("//!") && !text.starts_with("#![") {
+        found.push(format!("{file}:1: begin with `//!`: what the file is for"));
+    }
     let is_code = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with("//");
     let lines = text.lines().filter(is_code).count();
     if lines > MAX_CODE_LINES {
         found.push(format!("{file}: {lines} lines of code, at most {MAX_CODE_LINES}: split it by subject"));
     }
     for (i, line) in text.lines().enumerate() {
+        if ["TODO", "FIXME"].iter().any(|word| line.contains(word)) && !file.ends_with("tidy.rs") {
+            found.push(format!("{file}:{}: unfinished work", i + 1));
+        }
         let bare = public_number(line).filter(|name| lacks_unit(name) && !excused(file, name));
         if let Some(name) = bare.filter(|_| file.starts_with("crates/")) {
             found.push(format!("{file}:{}: `{name}` needs its unit, as in `{name}_m`", i + 1));
@@ -203,6 +233,9 @@ fn check_manifest(folder: &str, allowed: &[&str], text: &str, found: &mut Vec<St
         if name.strip_prefix("wakescope-").is_some_and(|own| !allowed.contains(&own)) {
             found.push(format!("{folder}/Cargo.toml:{}: must not know `{name}`", i + 1));
         }
+        if name == "ndarray-linalg" && folder != "crates/estimate" {
+            found.push(format!("{folder}/Cargo.toml:{}: ndarray-linalg belongs to estimate alone", i + 1));
+        }
         // The workspace turns their default features off, and builds of the whole workspace hide that one is missing.
         let program = folder == "crates/sim" || folder == "xtask";
         if program && WITH_THREADS.contains(&name) && !line.contains("\"rayon\"") {
@@ -241,7 +274,10 @@ mod tests {
     }
 
     #[test]
-    fn headless_curves_and_private_paths_are_found() {
+    fn stray_files_and_headless_sources_are_found() {
+        assert!(!complaints(|f| check_place("notes.txt", f)).is_empty());
+        assert!(!complaints(|f| check_source("crates/les/src/a.rs", "fn a() {}\n", f)).is_empty());
+        assert!(!complaints(|f| check_source("crates/les/src/a.rs", "//! x\n// TODO\n", f)).is_empty());
         assert!(!complaints(|f| check_reference("tests/reference/a.csv", "x,y\n", f)).is_empty());
         assert!(!complaints(|f| check_private("docs/a.md", "see /home/me\n", f)).is_empty());
     }

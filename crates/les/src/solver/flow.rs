@@ -78,7 +78,10 @@ impl Flow {
     }
 
     /// Starts from `initial`.
-    fn filled(mut self, initial: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Result<(Self, StartReport), Error> {
+    pub(super) fn filled(
+        mut self,
+        initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
+    ) -> Result<(Self, StartReport), Error> {
         for axis in 0..3 {
             let layout = &self.layout;
             let direction = layout.direction;
@@ -111,7 +114,7 @@ impl Flow {
     }
 
     /// The same with the memory axes of a layout.
-    fn laid_out(mesh: Mesh, settings: FlowSettings, layout: Layout) -> Result<Self, Error> {
+    pub(super) fn laid_out(mesh: Mesh, settings: FlowSettings, layout: Layout) -> Result<Self, Error> {
         settings.check()?;
         refuse_sticking_without_viscosity(&mesh, settings.viscosity_m2_s)?;
         let n = layout.shape.len();
@@ -316,25 +319,6 @@ fn viscous_increment(layout: &Layout, ops: &Momentum, (axis, a_m2): (usize, f64)
 fn add(to: &mut [f64], from: &[f64], shape: Shape) {
     let planes = to.par_chunks_mut(shape.plane()).zip(from.par_chunks(shape.plane()));
     planes.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += from));
-}
-
-#[cfg(test)]
-impl Flow {
-    /// As [`Self::new`], with the directions of the memory axes given.
-    pub(crate) fn in_order(
-        direction: [usize; 3],
-        mesh: Mesh,
-        settings: FlowSettings,
-        initial: &super::cases::Initial,
-    ) -> Result<Self, Error> {
-        let layout = Layout::on_in_order(&mesh, settings.ranks.clone(), direction)?;
-        let flow = Self::laid_out(mesh, settings, layout)?;
-        let started = match initial {
-            super::cases::Initial::Field(field) => flow.filled(field),
-            super::cases::Initial::Faces(faces) => flow.with_faces(faces.each_ref().map(Vec::as_slice)),
-        };
-        started.map(|(flow, _)| flow)
-    }
 }
 
 #[cfg(test)]

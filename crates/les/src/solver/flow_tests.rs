@@ -106,9 +106,8 @@ fn flows_that_do_not_vary_along_x_are_plane_flows_bit_for_bit() {
                     0.3 * (std::f64::consts::TAU * y).sin(),
                 ]
             };
-            let mut flow =
-                Flow::in_order([0, 1, 2], mesh, settings, &super::super::cases::Initial::Field(Box::new(field)))
-                    .unwrap();
+            let initial = crate::solver::cases::Initial::Field(Box::new(field));
+            let mut flow = initial.start_in_order([0, 1, 2], mesh, settings).unwrap();
             for _ in 0..4 {
                 flow.step().unwrap();
             }

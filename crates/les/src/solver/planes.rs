@@ -105,7 +105,6 @@ mod tests {
     use super::super::cases::{Initial, taylor_green_3d};
     use super::super::mesh::{Direction, Mesh};
     use super::super::settings::{FlowSettings, TimeStep};
-    use super::*;
     use crate::ranks::on_threads;
 
     #[test]
@@ -120,7 +119,7 @@ mod tests {
             let start = |ranks, order| {
                 let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
                 let settings = FlowSettings { ranks, ..settings };
-                Flow::in_order(order, mesh.clone(), settings, &Initial::Field(Box::new(field))).unwrap()
+                Initial::Field(Box::new(field)).start_in_order(order, mesh.clone(), settings).unwrap()
             };
             for &order in orders {
                 let alone = start(std::sync::Arc::new(crate::ranks::Single), order);

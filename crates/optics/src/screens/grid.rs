@@ -181,8 +181,14 @@ impl<T: Real> Fft2<T> {
             spectrum.copy_from_slice(rows);
             transform(&self.forward[1], spectrum, inner);
             for (which, out) in outs.iter_mut().enumerate() {
-                let block = &mut block[..rows.len()];
-                block.copy_from_slice(spectrum);
+                // The last filter needs no copy.
+                let block = if which + 1 < N {
+                    let block = &mut block[..rows.len()];
+                    block.copy_from_slice(spectrum);
+                    block
+                } else {
+                    &mut *spectrum
+                };
                 middle(which, first, block);
                 transform(&self.inverse[1], block, inner);
                 Self::store_transposed(out, self.ny, first, block);

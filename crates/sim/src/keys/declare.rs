@@ -18,6 +18,18 @@ pub(crate) trait Declared {
     fn check_limits(&self, _at: &str, _c: &mut Checker<'_>) {}
 }
 
+impl Key {
+    /// A key of a table that has a default for it.
+    pub(crate) fn with_default<T: Declared>(name: &'static str) -> Self {
+        Self { name, kind: T::kind(), is_required: false }
+    }
+
+    /// A key of a table that has none.
+    pub(crate) fn without_default<T: Declared>(name: &'static str) -> Self {
+        Self { name, kind: T::kind(), is_required: !T::IS_OPTIONAL }
+    }
+}
+
 /// The keys of the table that `T` is read from.
 pub(crate) fn keys_of<T: Declared>() -> Vec<Key> {
     match T::kind() {

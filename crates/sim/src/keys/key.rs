@@ -1,7 +1,5 @@
 //! The description of a key: its name and what it may hold.
 
-use super::declare::Declared;
-
 /// What a key may hold.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Kind {
@@ -45,18 +43,6 @@ pub(crate) struct Key {
     pub(crate) kind: Kind,
     /// Whether it has no default.
     pub(crate) is_required: bool,
-}
-
-impl Key {
-    /// A key of a table that has a default for it.
-    pub(crate) fn with_default<T: Declared>(name: &'static str) -> Self {
-        Self { name, kind: T::kind(), is_required: false }
-    }
-
-    /// A key of a table that has none.
-    pub(crate) fn without_default<T: Declared>(name: &'static str) -> Self {
-        Self { name, kind: T::kind(), is_required: !T::IS_OPTIONAL }
-    }
 }
 
 /// The path of a key in the table at `path`.

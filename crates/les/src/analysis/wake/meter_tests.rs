@@ -196,7 +196,7 @@ fn records_on_ranks_have_the_bits_of_one_process_in_every_order_in_memory() {
     for (order, counts) in [([0, 1, 2], &[2, 5, 7][..]), ([0, 2, 1], &[3, 8]), ([1, 2, 0], &[2])] {
         let records = |ranks: Arc<dyn Ranks>| {
             let settings = FlowSettings { ranks, ..case.settings.clone() };
-            let mut flow = Flow::in_order(order, case.mesh.clone(), settings, &case.initial)?;
+            let mut flow = case.initial.start_in_order(order, case.mesh.clone(), settings)?;
             let mut meter = meter(&flow);
             let first = meter.measure(&flow)?;
             flow.step()?;

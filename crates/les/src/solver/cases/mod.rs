@@ -49,6 +49,25 @@ impl Initial {
     }
 }
 
+#[cfg(test)]
+impl Initial {
+    /// As [`Self::start`], with the directions of the memory axes given.
+    pub(crate) fn start_in_order(
+        &self,
+        direction: [usize; 3],
+        mesh: Mesh,
+        settings: FlowSettings,
+    ) -> Result<Flow, Error> {
+        let layout = super::layout::Layout::on_in_order(&mesh, settings.ranks.clone(), direction)?;
+        let flow = Flow::laid_out(mesh, settings, layout)?;
+        let started = match self {
+            Self::Field(field) => flow.filled(field),
+            Self::Faces(faces) => flow.with_faces(faces.each_ref().map(Vec::as_slice)),
+        };
+        started.map(|(flow, _)| flow)
+    }
+}
+
 /// A flow ready to be simulated.
 pub struct Case {
     /// The mesh.
