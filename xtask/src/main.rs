@@ -24,6 +24,9 @@ mod reproduce;
 mod sources;
 mod stability;
 mod statistics;
+#[cfg(test)]
+#[path = "../../crates/les/src/ranks/threads.rs"]
+mod thread_ranks;
 mod tidy;
 mod validate;
 mod wakes;

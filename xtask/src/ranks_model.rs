@@ -2,10 +2,11 @@
 //! lines that cross slabs. Nothing is hidden behind the work, as in the solver.
 
 use crate::ranks::{PLANES, TURNS};
+use crate::thread_ranks::on_threads;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wakescope_les::cases::taylor_green_3d;
-use wakescope_les::ranks::{Ranks, on_threads};
+use wakescope_les::ranks::Ranks;
 use wakescope_les::{Error, FlowSettings, SubgridModel, TimeScheme};
 
 /// Cells of a rank: its planes lie across the last axis.
@@ -86,13 +87,13 @@ impl Ranks for Counting {
         self.ranks.count()
     }
 
-    fn turn(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
+    fn all_to_all(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
         let leaving = to.iter().sum::<usize>() - to[self.rank()];
         if leaving > self.least {
             self.values.fetch_add(leaving, Ordering::Relaxed);
             self.messages.fetch_add(1, Ordering::Relaxed);
         }
-        self.ranks.turn(send, to, receive, from)
+        self.ranks.all_to_all(send, to, receive, from)
     }
 }
 

@@ -40,6 +40,10 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+// The threads that stand for ranks in tests name the crate as other crates do.
+#[cfg(test)]
+extern crate self as wakescope_les;
+
 pub mod analysis;
 mod error;
 #[cfg(feature = "solver")]

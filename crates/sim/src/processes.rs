@@ -84,7 +84,7 @@ impl Ranks for Processes {
         self.count
     }
 
-    fn turn(
+    fn all_to_all(
         &self,
         send: &[f64],
         to: &[usize],

@@ -1,14 +1,14 @@
 //! The ranks that share a flow: processes of one machine or of many, each with a slab of the mesh and threads of its own.
 //!
-//! All that the solver exchanges is one operation, [`Ranks::turn`]: halos, lines that cross slabs, numbers of all planes.
+//! All that the solver exchanges is one operation, [`Ranks::all_to_all`]: halos, lines that cross slabs, numbers of all planes.
 //! Sums are made from the numbers of single planes in the order of the mesh, so that results have the same bits for any
 //! number of ranks.
 //!
 //! Check: the solver on ranks against one process, bit for bit (`solver::slabs_tests`); a rank that is lost.
 
+#[cfg(test)]
 mod threads;
 
-use std::borrow::Cow;
 use std::fmt::{Debug, Display};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,7 +16,8 @@ use std::time::Instant;
 
 use crate::Error;
 
-pub use threads::{ThreadRanks, on_threads};
+#[cfg(test)]
+pub(crate) use threads::on_threads;
 
 /// The ranks that share a flow. All of them call the same operations in the same order.
 pub trait Ranks: Debug + Send + Sync {
@@ -31,7 +32,7 @@ pub trait Ranks: Debug + Send + Sync {
     ///
     /// # Errors
     /// [`Error::RankLost`] if a rank has ended that was to send something.
-    fn turn(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error>;
+    fn all_to_all(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error>;
 }
 
 /// One process.
@@ -47,7 +48,7 @@ impl Ranks for Single {
         1
     }
 
-    fn turn(&self, send: &[f64], _: &[usize], receive: &mut [f64], _: &[usize]) -> Result<(), Error> {
+    fn all_to_all(&self, send: &[f64], _: &[usize], receive: &mut [f64], _: &[usize]) -> Result<(), Error> {
         receive.copy_from_slice(send);
         Ok(())
     }
@@ -80,48 +81,47 @@ impl Ranks for Timed {
         self.ranks.count()
     }
 
-    fn turn(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
+    fn all_to_all(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
         let begun = Instant::now();
-        let turned = self.ranks.turn(send, to, receive, from);
+        let sent = self.ranks.all_to_all(send, to, receive, from);
         self.spent_ns.fetch_add(begun.elapsed().as_nanos() as u64, Ordering::Relaxed);
-        turned
+        sent
     }
 }
 
 /// Everybody's numbers in the order of the ranks.
 ///
 /// # Errors
-/// Those of [`Ranks::turn`].
-pub fn together<'a>(ranks: &dyn Ranks, own: &'a [f64]) -> Result<Cow<'a, [f64]>, Error> {
+/// Those of [`Ranks::all_to_all`].
+pub fn all_gather(ranks: &dyn Ranks, own: Vec<f64>) -> Result<Vec<f64>, Error> {
     let count = ranks.count();
     if count == 1 {
-        return Ok(Cow::Borrowed(own));
+        return Ok(own);
     }
     let share = |own: &[f64], from: &[usize]| {
         let mut all = vec![0.0; from.iter().sum()];
-        ranks.turn(&own.repeat(count), &vec![own.len(); count], &mut all, from).map(|()| all)
+        ranks.all_to_all(&own.repeat(count), &vec![own.len(); count], &mut all, from).map(|()| all)
     };
     let lengths = share(&[own.len() as f64], &vec![1; count])?;
     let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
-    share(own, &lengths).map(Cow::Owned)
+    share(&own, &lengths)
 }
 
 /// An error of one rank is the error of all, that of the lowest if there are several; `other` makes it from
 /// [`Error::OtherRank`], which has its words, where it did not happen.
 ///
 /// # Errors
-/// It; those of [`Ranks::turn`].
-pub fn agree<T, E: Display>(ranks: &dyn Ranks, result: Result<T, E>, other: impl Fn(Error) -> E) -> Result<T, E> {
+/// It; those of [`Ranks::all_to_all`].
+pub fn all_agree<T, E: Display>(ranks: &dyn Ranks, result: Result<T, E>, other: impl Fn(Error) -> E) -> Result<T, E> {
     if ranks.count() == 1 {
         return result;
     }
     let own = result.as_ref().err().map(ToString::to_string);
-    let failed = [f64::from(u8::from(own.is_some()))];
-    let failed = together(ranks, &failed).map_err(&other)?;
+    let failed = all_gather(ranks, vec![f64::from(u8::from(own.is_some()))]).map_err(&other)?;
     let Some(rank) = failed.iter().position(|failed| *failed > 0.0) else { return result };
     let told = own.as_deref().filter(|_| ranks.rank() == rank).unwrap_or_default();
-    let bytes: Vec<f64> = told.bytes().map(f64::from).collect();
-    let bytes: Vec<u8> = together(ranks, &bytes).map_err(&other)?.iter().map(|byte| *byte as u8).collect();
+    let bytes = all_gather(ranks, told.bytes().map(f64::from).collect()).map_err(&other)?;
+    let bytes: Vec<u8> = bytes.iter().map(|byte| *byte as u8).collect();
     let message = String::from_utf8_lossy(&bytes).into_owned();
     match result {
         // Every rank that found the same keeps what it knows of it.

@@ -1,14 +1,13 @@
-//! Threads as ranks: what runs on many machines, on one without MPI.
+//! Threads as ranks, for the tests of this crate and of those that include the file: what runs on many machines, on one without MPI.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-use super::Ranks;
-use crate::Error;
+use wakescope_les::{Error, ranks::Ranks};
 
 /// One of several threads that share a flow.
 #[derive(Debug)]
-pub struct ThreadRanks {
+struct ThreadRanks {
     rank: usize,
     office: Arc<Office>,
 }
@@ -28,7 +27,7 @@ struct Mail {
 
 impl ThreadRanks {
     /// `count` ranks, one for each thread.
-    pub fn new(count: usize) -> Vec<Self> {
+    fn new(count: usize) -> Vec<Self> {
         let boxes = (0..count).map(|_| vec![VecDeque::new(); count]).collect();
         let mail = Mutex::new(Mail { boxes, has_left: vec![false; count] });
         let office = Arc::new(Office { mail, news: Condvar::new() });
@@ -41,20 +40,7 @@ impl ThreadRanks {
 }
 
 /// Runs `work` on `count` threads as ranks and returns what each of them did, or `None` for one that panicked.
-///
-/// ```
-/// use wakescope_les::{FlowSettings, cases::taylor_green_3d, ranks::on_threads};
-///
-/// let case = taylor_green_3d(16, 100.0)?;
-/// let energy = on_threads(3, |ranks| {
-///     let settings = FlowSettings { ranks, ..case.settings.clone() };
-///     let (mut flow, _) = case.initial.start(case.mesh.clone(), settings)?;
-///     flow.step().map(|report| report.kinetic_energy_m5_s2)
-/// });
-/// assert!(energy.iter().all(|found| matches!(found, Some(Ok(_))) && *found == energy[0]));
-/// # Ok::<(), wakescope_les::Error>(())
-/// ```
-pub fn on_threads<T: Send>(count: usize, work: impl Fn(Arc<dyn Ranks>) -> T + Sync) -> Vec<Option<T>> {
+pub(crate) fn on_threads<T: Send>(count: usize, work: impl Fn(Arc<dyn Ranks>) -> T + Sync) -> Vec<Option<T>> {
     std::thread::scope(|scope| {
         let work = &work;
         let spawn = |rank| scope.spawn(move || work(Arc::new(rank)));
@@ -72,7 +58,7 @@ impl Ranks for ThreadRanks {
         self.mail().has_left.len()
     }
 
-    fn turn(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
+    fn all_to_all(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
         let (mut send, mut receive) = (send, receive);
         let mut mail = self.mail();
         for (rank, &length) in to.iter().enumerate() {
@@ -122,10 +108,10 @@ mod tests {
             let mut got = vec![f64::NAN; from.iter().sum()];
             for round in 0..3 {
                 let send = vec![(10 * round + own) as f64; to.iter().sum()];
-                ranks.turn(&send, &to, &mut got, &from).unwrap();
+                ranks.all_to_all(&send, &to, &mut got, &from).unwrap();
             }
             assert!(own != 1, "this one ends early");
-            (got, ranks.turn(&[1.0; 3], &[1; 3], &mut [0.0; 3], &[1; 3]))
+            (got, ranks.all_to_all(&[1.0; 3], &[1; 3], &mut [0.0; 3], &[1; 3]))
         });
         let lost = Err(Error::RankLost { rank: 1 });
         assert_eq!(found, [Some((vec![], lost.clone())), None, Some((vec![20.0, 21.0, 21.0], lost))]);

@@ -6,7 +6,7 @@ use super::settings::{FlowSettings, TimeStep};
 use crate::Error;
 
 /// Largest symbol of the Laplacian times the square of the spacing.
-const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
+pub(super) const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
 /// Share of the explicit viscous limit beyond which a direction is taken implicitly.
 const IMPLICIT_SHARE: f64 = 0.1;
 /// Largest share of the explicit viscous limit that a variable time step may use.
@@ -155,7 +155,7 @@ impl Flow {
         let of = |axis: usize, place: usize| [of(axis, place), axis as f64, (place - own.start + first) as f64];
         let all = (0..3).flat_map(|axis| own.clone().map(move |place| (axis, place)));
         let best = all.fold(none, |best, (axis, place)| larger(best, of(axis, place)));
-        let ranks = self.layout.slabs.together(&best)?;
+        let ranks = self.layout.slabs.all_gather(best.to_vec())?;
         let [value, axis, place] = ranks.as_chunks::<3>().0.iter().fold(none, |best, next| larger(best, *next));
         Ok(if value > 0.0 { (value, axis as usize, place as usize) } else { (0.0, 0, 0) })
     }

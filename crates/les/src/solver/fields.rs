@@ -5,7 +5,6 @@
 //!
 //! Check: round trip, interpolation exact for cubics, values against the closed form they were set from.
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -93,12 +92,7 @@ impl Flow {
 
     /// From the planes of all ranks to the whole field.
     pub(crate) fn whole(&self, own: Result<Vec<f64>, Error>) -> Vec<f64> {
-        let slabs = &self.layout.slabs;
-        let whole = match own {
-            Ok(own) if slabs.is_alone() => Ok(own),
-            Ok(own) => slabs.together(&own).map(Cow::into_owned),
-            Err(lost) => Err(lost),
-        };
+        let whole = own.and_then(|own| self.layout.slabs.all_gather(own));
         whole.unwrap_or_else(|_| vec![f64::NAN; Shape::whole(self.layout.shape.n).len()])
     }
 

@@ -257,8 +257,8 @@ impl Flow {
             let place = own.contains(&index[2]).then(|| shape.place(index));
             place.map_or([0.0; 3], |place| axis.map(|a| velocity[a][place]))
         });
-        let own = rates.concat();
-        self.layout.slabs.together(&own)?.chunks(own.len()).for_each(|others| larger(&mut rates, others));
+        let (own, count) = (rates.concat(), rates.iter().map(Vec::len).sum());
+        self.layout.slabs.all_gather(own)?.chunks(count).for_each(|others| larger(&mut rates, others));
         let implicit = axis.map(|a| self.state.implicit[a]);
         Ok(Stability::at_rates(&self.mesh, &self.settings, implicit, &rates))
     }

@@ -104,7 +104,7 @@ impl LineSolver {
         match self.axis {
             0 => own.par_chunks_mut(shape.n[0] * TILE).for_each(|rows| self.solve_tile(rows, shape.n[0])),
             1 => own.par_chunks_mut(shape.plane()).for_each(|plane| solve_block(self, plane, shape.n[0])),
-            _ => slabs.turned(own, 1, |field, shape, _| self.solve_across_planes(shape, field))?,
+            _ => slabs.transposed(own, 1, |field, shape, _| self.solve_across_planes(shape, field))?,
         }
         Ok(())
     }

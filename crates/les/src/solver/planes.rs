@@ -31,7 +31,7 @@ impl Flow {
     /// Velocity at the faces in these planes.
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
+    /// Those of [`Ranks::all_to_all`].
     pub(crate) fn faces(&self) -> Result<Faces, Error> {
         Ok(Faces { shape: self.shown(), field: [self.face(0)?, self.face(1)?, self.face(2)?] })
     }
@@ -39,7 +39,7 @@ impl Flow {
     /// One component of it.
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
+    /// Those of [`Ranks::all_to_all`].
     pub(crate) fn face(&self, direction: usize) -> Result<Vec<f64>, Error> {
         self.in_planes(&self.state.velocity[self.layout.axis_of(direction)])
     }
@@ -47,7 +47,7 @@ impl Flow {
     /// A field of this rank, whose halos are up to date, in the planes that it shows, halos included.
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
+    /// Those of [`Ranks::all_to_all`].
     pub(crate) fn in_planes(&self, field: &[f64]) -> Result<Vec<f64>, Error> {
         in_planes(&self.layout, self.shown(), field)
     }
@@ -93,7 +93,7 @@ fn in_planes(layout: &Layout, shown: Shape, field: &[f64]) -> Result<Vec<f64>, E
         send.extend(pieces(ranks.rank(), of_rank(rank)).map(|at| field[place(at)]));
     }
     let mut came = vec![0.0; from.iter().sum()];
-    ranks.turn(&send, &to, &mut came, &from)?;
+    ranks.all_to_all(&send, &to, &mut came, &from)?;
     for (at, value) in (0..count).flat_map(|rank| pieces(rank, shown)).zip(came) {
         out[shown.place(at)] = value;
     }

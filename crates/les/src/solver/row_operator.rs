@@ -50,6 +50,13 @@ impl RowOperator {
         add_across(out, plane, 1.0, &self.rows[j], Starts::every(self.shape.n[0], 0));
     }
 
+    /// `out =` an operator of axis 0 on one row.
+    #[inline(always)]
+    pub(crate) fn along(&self, out: &mut [f64], row: &[f64], padded: &mut [f64]) {
+        out.fill(0.0);
+        self.add_along(out, row, padded);
+    }
+
     /// `out +=` an operator of axis 0 on one row.
     #[inline(always)]
     pub(crate) fn add_along(&self, out: &mut [f64], row: &[f64], padded: &mut [f64]) {

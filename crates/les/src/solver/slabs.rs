@@ -4,7 +4,6 @@
 //!
 //! Check: the tests of the flow on ranks.
 
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -69,7 +68,7 @@ impl Slabs {
     /// Brings `below` and `above` planes of the halos of fields up to date, at most [`HALO`] each.
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
+    /// Those of [`Ranks::all_to_all`].
     pub(crate) fn halos(&self, fields: &mut [&mut [f64]], [below, above]: [usize; 2]) -> Result<(), Error> {
         if self.is_alone() {
             return Ok(());
@@ -99,7 +98,7 @@ impl Slabs {
             }
         }
         let mut receive = vec![0.0; send.len()];
-        self.ranks.turn(&send, &to, &mut receive, &from)?;
+        self.ranks.all_to_all(&send, &to, &mut receive, &from)?;
         let mut came = receive.chunks(plane);
         if before == after {
             neighbours.reverse();
@@ -115,30 +114,27 @@ impl Slabs {
         Ok(())
     }
 
-    /// As [`ranks::together`].
+    /// As [`ranks::all_gather`].
     ///
     /// # Errors
     /// As there.
-    pub(crate) fn together<'a>(&self, own: &'a [f64]) -> Result<Cow<'a, [f64]>, Error> {
-        ranks::together(&*self.ranks, own)
+    pub(crate) fn all_gather(&self, own: Vec<f64>) -> Result<Vec<f64>, Error> {
+        ranks::all_gather(&*self.ranks, own)
     }
 
     /// The numbers of all planes, from those of the planes that are owned: what is summed in their order does not depend on
     /// the ranks.
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
+    /// Those of [`Ranks::all_to_all`].
     pub(crate) fn planes<const M: usize>(&self, own: Vec<[f64; M]>) -> Result<Vec<[f64; M]>, Error> {
-        if self.is_alone() {
-            return Ok(own);
-        }
-        Ok(self.together(own.as_flattened())?.as_chunks::<M>().0.to_vec())
+        Ok(self.all_gather(own.into_flattened())?.as_chunks::<M>().0.to_vec())
     }
 
     /// Sums over the planes that are owned to sums over all, one after the other.
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
+    /// Those of [`Ranks::all_to_all`].
     pub(crate) fn sums<const M: usize>(&self, own: Vec<[f64; M]>) -> Result<[f64; M], Error> {
         let planes = self.planes(own)?;
         Ok(planes.iter().fold([0.0; M], |sum, plane| std::array::from_fn(|i| sum[i] + plane[i])))
@@ -147,9 +143,9 @@ impl Slabs {
     /// The largest of each of some numbers.
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
+    /// Those of [`Ranks::all_to_all`].
     pub(crate) fn largest<const M: usize>(&self, own: [f64; M]) -> Result<[f64; M], Error> {
-        let all = self.together(&own)?;
+        let all = self.all_gather(own.to_vec())?;
         Ok(all.as_chunks::<M>().0.iter().fold(own, |a, b| std::array::from_fn(|i| a[i].max(b[i]))))
     }
 
@@ -158,8 +154,8 @@ impl Slabs {
     /// without places does nothing.
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
-    pub(crate) fn turned<R: Default>(
+    /// Those of [`Ranks::all_to_all`].
+    pub(crate) fn transposed<R: Default>(
         &self,
         own: &mut [f64],
         step: usize,
@@ -179,13 +175,13 @@ impl Slabs {
         pack(own, &mut pieces, shape, (0..count).map(columns), |row, piece| piece.copy_from_slice(row));
         // In the order of the ranks the planes follow one another.
         let mut turned = vec![0.0; mine.len() * n1 * n2];
-        self.ranks.turn(&pieces, &to, &mut turned, &from)?;
+        self.ranks.all_to_all(&pieces, &to, &mut turned, &from)?;
         let found = if mine.is_empty() {
             R::default()
         } else {
             work(&mut turned, Shape::whole([mine.len(), n1, n2]), mine.start)
         };
-        self.ranks.turn(&turned, &from, &mut pieces, &to)?;
+        self.ranks.all_to_all(&turned, &from, &mut pieces, &to)?;
         pack(own, &mut pieces, shape, (0..count).map(columns), |row, piece| row.copy_from_slice(piece));
         Ok(found)
     }
@@ -194,10 +190,9 @@ impl Slabs {
     /// the machines differ.
     ///
     /// # Errors
-    /// Those of [`Ranks::turn`].
-    pub(crate) fn of_first(&self, numbers: impl FnOnce() -> Vec<f64>) -> Result<Vec<f64>, Error> {
-        let own = if self.is_first() { numbers() } else { Vec::new() };
-        self.together(&own).map(Cow::into_owned)
+    /// Those of [`Ranks::all_to_all`].
+    pub(crate) fn broadcast(&self, numbers: impl FnOnce() -> Vec<f64>) -> Result<Vec<f64>, Error> {
+        self.all_gather(if self.is_first() { numbers() } else { Vec::new() })
     }
 
     /// The part of a whole field that is owned, into a field of this rank.
@@ -206,12 +201,12 @@ impl Slabs {
         field[self.shape.own_places()].copy_from_slice(&whole[own.start * plane..own.end * plane]);
     }
 
-    /// As [`ranks::agree`].
+    /// As [`ranks::all_agree`].
     ///
     /// # Errors
     /// As there.
-    pub(crate) fn agree<T>(&self, result: Result<T, Error>) -> Result<T, Error> {
-        ranks::agree(&*self.ranks, result, |other| other)
+    pub(crate) fn all_agree<T>(&self, result: Result<T, Error>) -> Result<T, Error> {
+        ranks::all_agree(&*self.ranks, result, |other| other)
     }
 }
 

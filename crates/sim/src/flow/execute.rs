@@ -16,7 +16,7 @@ use crate::keys::Problem;
 use crate::{Error, machine};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use wakescope_les::ranks::{Ranks, Single, together};
+use wakescope_les::ranks::{Ranks, Single, all_gather};
 use wakescope_les::solver::{CheckpointPlan, Ends, Interval, NOTICED_GROWTH, Run, RunPlan, check_checkpoint};
 use wakescope_les::{SubgridModel, TimeStep};
 
@@ -98,8 +98,8 @@ pub fn run_on(
     });
     let opened = agree(ranks, opened.transpose())?;
     // From where the run goes on, rank 0 says: the number of the checkpoint, from 1, or 0.
-    let number = [opened.as_ref().map_or(0.0, |(_, number)| *number as f64)];
-    let number = together(&**ranks, &number).map_err(Error::Flow)?[0] as usize;
+    let number = vec![opened.as_ref().map_or(0.0, |(_, number)| *number as f64)];
+    let number = all_gather(&**ranks, number).map_err(Error::Flow)?[0] as usize;
     let checkpoint = number.checked_sub(1).and_then(|place| checkpoint_paths(folder).into_iter().nth(place));
     let tau_per_s = setup.tau_per_s;
     let meter = setup.wake.take().map(|wake| (wake.meter, wake.circulation_radii_m));

@@ -15,7 +15,7 @@ use ndarray::Array3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wakescope_les::Flow;
-use wakescope_les::ranks::{Ranks, together};
+use wakescope_les::ranks::{Ranks, all_gather};
 use wakescope_les::solver::Ends;
 
 /// The case with every default.
@@ -202,8 +202,7 @@ impl Files {
         // The numbers are larger than the files.
         drop(shown);
         for (name, text) in rows {
-            let own = [text.len() as f64];
-            let lengths = together(&**ranks, &own).map_err(Error::Flow)?;
+            let lengths = all_gather(&**ranks, vec![text.len() as f64]).map_err(Error::Flow)?;
             let before = lengths[..ranks.rank()].iter().sum::<f64>() as u64;
             let length = lengths.iter().sum::<f64>() as u64;
             group.add_parts(&name, FileParts { length, parts: vec![(before, text.into_bytes())] })?;
@@ -360,10 +359,9 @@ struct Shown {
 fn behind(field: &VelocityField, ranks: &Arc<dyn Ranks>) -> Result<Option<Vec<f64>>, Error> {
     let first: Vec<f64> = field.named().filter_map(|(_, values)| values.first().copied()).collect();
     let count = field.named().count();
-    let mut own = vec![field.share.planes.start as f64];
-    own.extend(&first);
-    let own = if first.is_empty() { &[][..] } else { &own };
-    let all = together(&**ranks, own).map_err(Error::Flow)?;
+    let place = (!first.is_empty()).then_some(field.share.planes.start as f64);
+    let own = place.into_iter().chain(first).collect();
+    let all = all_gather(&**ranks, own).map_err(Error::Flow)?;
     let next = all.chunks(count + 1).find(|values| values[0] == field.share.planes.end as f64);
     Ok(next.map(|values| values[1..].to_vec()))
 }

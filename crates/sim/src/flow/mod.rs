@@ -26,6 +26,9 @@ mod setup;
 mod shared;
 mod steps;
 mod text;
+#[cfg(test)]
+#[path = "../../../les/src/ranks/threads.rs"]
+mod thread_ranks;
 mod wake;
 mod writer;
 

@@ -1,11 +1,11 @@
 //! Runs on ranks: the files of one process, byte for byte.
 
 use super::execute::{RunOptions, run_on};
+use super::thread_ranks::on_threads;
 use super::{Begin, CaseFile, Unwatched, Watch};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use wakescope_les::ranks::on_threads;
 
 /// A small wake with records, fields and planes in all formats, and checkpoints.
 fn wake(more: &str) -> String {

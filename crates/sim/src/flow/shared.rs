@@ -7,11 +7,11 @@ use crate::Error;
 use crate::io::FileGroup;
 use std::path::PathBuf;
 use std::sync::Arc;
-use wakescope_les::ranks::{self, Ranks, together};
+use wakescope_les::ranks::{self, Ranks, all_gather};
 
 /// An error of one rank is that of all.
 pub(super) fn agree<T>(ranks: &Arc<dyn Ranks>, result: Result<T, Error>) -> Result<T, Error> {
-    ranks::agree(&**ranks, result, Error::Flow)
+    ranks::all_agree(&**ranks, result, Error::Flow)
 }
 
 /// Writes the files of a group, which has the same names on all ranks, all of them or none; the folder exists.
@@ -23,17 +23,17 @@ pub(super) fn commit(group: &FileGroup, ranks: &Arc<dyn Ranks>) -> Result<Vec<Pa
     let begun = if is_first { group.begin().map(Some) } else { Ok(None) };
     let stage = agree(ranks, begun.map_err(Error::from))?;
     let name = stage.as_ref().map_or_else(Vec::new, |stage| stage.name().bytes().map(f64::from).collect());
-    let name: Vec<u8> = together(&**ranks, &name).map_err(Error::Flow)?.iter().map(|byte| *byte as u8).collect();
+    let name: Vec<u8> = all_gather(&**ranks, name).map_err(Error::Flow)?.iter().map(|byte| *byte as u8).collect();
     agree(ranks, group.write(&String::from_utf8_lossy(&name)).map_err(Error::from))?;
     agree(ranks, stage.map_or(Ok(Vec::new()), |stage| group.put(&stage).map_err(Error::from)))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::thread_ranks::on_threads;
     use super::*;
     use crate::io::FileParts;
     use std::fs;
-    use wakescope_les::ranks::on_threads;
 
     #[test]
     fn a_file_is_whole_or_not_there() {

@@ -2,8 +2,6 @@
 //!
 //! Check: an analytic pair with its images on a mesh: centres, circulation against radius, secondary vortices, spread.
 
-use std::borrow::Cow;
-
 use rayon::prelude::*;
 
 use super::cores::{Core, EdgePlane};
@@ -174,8 +172,8 @@ impl WakeMeter {
             left: vortex(0)?,
             right: vortex(1)?,
             energy_m4_s2: flow.kinetic_energy_m5_s2() / length_m,
-            mode_energy_m4_s2: mode_energies_m4_s2(&self.curl, &seen.faces, |own| seen.together(own))?,
-            enstrophy_m2_s2: self.curl.enstrophy_m2_s2(&seen.faces, |own| seen.together(own))?,
+            mode_energy_m4_s2: mode_energies_m4_s2(&self.curl, &seen.faces, |own| seen.slabs.all_gather(own))?,
+            enstrophy_m2_s2: self.curl.enstrophy_m2_s2(&seen.faces, |own| seen.slabs.all_gather(own))?,
             wall_shear_per_s,
             wall_units,
         };
@@ -207,7 +205,7 @@ impl WakeMeter {
                 *out = row.iter().zip(x_m).map(|(w, x_m)| w * x_m).sum::<f64>() / length_m;
             }
         });
-        seen.together(mean).map(|mean| self.edge_plane(mean))
+        seen.slabs.all_gather(mean).map(|mean| self.edge_plane(mean))
     }
 
     /// The core in each cross-plane about the one of the mean; NaN where there is none. Each rank seeks it in some of the planes.
@@ -236,7 +234,7 @@ impl WakeMeter {
         let send: Vec<f64> = (0..count).flat_map(give).copied().collect();
         drop(values);
         let mut came = vec![0.0; from.iter().sum()];
-        ranks.turn(&send, &to, &mut came, &from)?;
+        ranks.all_to_all(&send, &to, &mut came, &from)?;
         let own: Vec<[f64; 2]> = sought(rank)
             .into_par_iter()
             .map(|i| {
@@ -340,7 +338,7 @@ impl WakeMeter {
     fn wall_shear(&self, seen: &Seen<'_>) -> Result<(Vec<f64>, f64), Error> {
         let (nx, ny) = (self.curl.cell_m[0].len(), self.curl.cell_m[1].len());
         // The first rank has the lowest planes.
-        let mut found = seen.slabs.of_first(|| {
+        let mut found = seen.slabs.broadcast(|| {
             let (mut along, mut across) = (vec![0.0; nx], vec![0.0; nx]);
             let mut found = Vec::with_capacity(ny + 1);
             let mut largest = 0.0_f64;
@@ -366,14 +364,10 @@ struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    fn together(&self, own: Vec<f64>) -> Result<Vec<f64>, Error> {
-        if self.slabs.is_alone() { Ok(own) } else { self.slabs.together(&own).map(Cow::into_owned) }
-    }
-
     /// The core that rank 0 finds: which planes are looked at depends on it.
     fn core(&self, find: impl FnOnce() -> Option<Core>) -> Result<Option<Core>, Error> {
         let numbers = |core: Core| vec![core.centre_m[0], core.centre_m[1], core.circulation_m2_s];
-        let found = self.slabs.of_first(|| find().map_or_else(Vec::new, numbers))?;
+        let found = self.slabs.broadcast(|| find().map_or_else(Vec::new, numbers))?;
         let core = |&[y_m, z_m, circulation_m2_s]: &[f64; 3]| Core { centre_m: [y_m, z_m], circulation_m2_s };
         Ok(found.first_chunk().map(core))
     }

@@ -10,14 +10,14 @@ use crate::Error;
 use crate::solver::planes::Faces;
 
 /// Energy per length of x \[m^4/s^2\] of each axial mode `m = 0..=n/2`, wavelength `L_x/m`, all velocity components together.
-/// `together` gives the numbers of all ranks in their order from those of the planes that are owned.
+/// `all_gather` gives the numbers of all ranks in their order from those of the planes that are owned.
 ///
 /// # Errors
-/// Those of `together`.
+/// Those of `all_gather`.
 pub(super) fn mode_energies_m4_s2(
     curl: &Curl,
     velocity: &Faces,
-    together: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
+    all_gather: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
 ) -> Result<Vec<f64>, Error> {
     let nx = curl.cell_m[0].len();
     let transform = RealFftPlanner::new().plan_fft_forward(nx);
@@ -43,7 +43,7 @@ pub(super) fn mode_energies_m4_s2(
         };
         let own = field[velocity.shape.own_places()].par_chunks(velocity.shape.plane());
         let own: Vec<Vec<f64>> = own.map(plane).collect();
-        for (sums, z_m) in together(own.concat())?.chunks(modes).zip(z_m) {
+        for (sums, z_m) in all_gather(own.concat())?.chunks(modes).zip(z_m) {
             for (energy, sum) in energies.iter_mut().zip(sums) {
                 *energy += 0.5 * z_m * sum;
             }

@@ -135,15 +135,15 @@ impl Curl {
         if own.end == self.cells[2] { own.start..self.faces[2] } else { own }
     }
 
-    /// Half the integral of the squared vorticity over the box, per length of x \[m^2/s^2\]. `together` gives the numbers of all
+    /// Half the integral of the squared vorticity over the box, per length of x \[m^2/s^2\]. `all_gather` gives the numbers of all
     /// ranks in their order from those of the planes that are owned.
     ///
     /// # Errors
-    /// Those of `together`.
+    /// Those of `all_gather`.
     pub(super) fn enstrophy_m2_s2(
         &self,
         velocity: &Faces,
-        together: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
+        all_gather: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
     ) -> Result<f64, Error> {
         let nx = self.cells[0];
         let component = |c: usize| {
@@ -163,7 +163,7 @@ impl Curl {
             let own = velocity.shape.own();
             let own = if c == 2 { own } else { self.own_faces(own) };
             // Collected first, so that the order of the sum is that of the planes.
-            let planes = together(own.into_par_iter().map(plane).collect())?;
+            let planes = all_gather(own.into_par_iter().map(plane).collect())?;
             Ok(0.5 * planes.iter().zip(z_m).map(|(sum, z_m)| sum * z_m).sum::<f64>())
         };
         let components = [component(0)?, component(1)?, component(2)?];

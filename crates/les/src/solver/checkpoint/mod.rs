@@ -50,8 +50,8 @@ impl Flow {
     pub(crate) fn save_and_keep(&self, path: &Path, previous: Option<&Path>, user_data: &[u8]) -> Result<(), Error> {
         let slabs = &self.layout.slabs;
         let begun = if slabs.is_first() { self.begin(path, user_data).map(Some) } else { Ok(None) };
-        let written = slabs.agree(begun).and_then(|begun| slabs.agree(self.write_planes(path, begun)));
-        let put = |()| slabs.agree(if slabs.is_first() { container::finish(path, previous) } else { Ok(()) });
+        let written = slabs.all_agree(begun).and_then(|begun| slabs.all_agree(self.write_planes(path, begun)));
+        let put = |()| slabs.all_agree(if slabs.is_first() { container::finish(path, previous) } else { Ok(()) });
         let result = written.and_then(put);
         if result.is_err() && slabs.is_first() {
             container::abandon(path);
@@ -82,7 +82,7 @@ impl Flow {
         let told = begun.map_or_else(Vec::new, |planes| {
             [planes.start as f64].into_iter().chain(planes.checksum.map(f64::from)).collect::<Vec<f64>>()
         });
-        let told = self.layout.slabs.together(&told)?;
+        let told = self.layout.slabs.all_gather(told)?;
         let checksum = std::array::from_fn(|i| told.get(i + 1).map_or(0, |byte| *byte as u8));
         let planes = Planes { start: told.first().map_or(0, |start| *start as u64), checksum };
         let (shape, state) = (self.layout.shape, &self.state);
@@ -103,7 +103,7 @@ impl Flow {
     pub fn restore(path: impl AsRef<Path>, mesh: Mesh, settings: FlowSettings) -> Result<(Self, Vec<u8>), Error> {
         let read = Self::read(path.as_ref(), &mesh, &settings);
         // The ranks that share the flow must agree on that, too.
-        let (mut flow, user_data) = Layout::on(&mesh, settings.ranks)?.slabs.agree(read)?;
+        let (mut flow, user_data) = Layout::on(&mesh, settings.ranks)?.slabs.all_agree(read)?;
         let [u, v, w] = flow.state.velocity.each_mut().map(Aligned::as_mut_slice);
         flow.layout.slabs.halos(&mut [u, v, w, &mut flow.state.pressure], WHOLE)?;
         Ok((flow, user_data))

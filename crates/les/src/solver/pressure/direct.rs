@@ -164,7 +164,7 @@ impl Method for Direct {
 
     fn solve(&self, own: &mut [f64], _: f64, _: f64) -> Result<usize, Error> {
         self.rows_forward(own);
-        self.slabs.turned(own, 1, |field, shape, first| self.lines_once(field, shape, first))?;
+        self.slabs.transposed(own, 1, |field, shape, first| self.lines_once(field, shape, first))?;
         self.rows_inverse(own);
         Ok(0)
     }

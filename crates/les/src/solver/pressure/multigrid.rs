@@ -241,7 +241,7 @@ impl Method for Multigrid {
     fn solve(&self, own: &mut [f64], size: f64, tolerance: f64) -> Result<usize, Error> {
         self.transform(own, RowTransform::forward);
         let allowed = (tolerance * size * self.scale).powi(2);
-        let most = self.slabs.turned(own, LANES, |field, shape, first| {
+        let most = self.slabs.transposed(own, LANES, |field, shape, first| {
             let mut groups = columns(field, shape, LANES);
             let groups = groups.par_iter_mut().enumerate().map_init(Work::default, |work, (group, rows)| {
                 self.group(first / LANES + group, rows, allowed, tolerance, work)

@@ -268,7 +268,7 @@ impl Run {
                 return Err(Error::StepTooShort { step, time_s: report.time_s, step_s, end_s });
             }
             let record = self.record(report, energy)?;
-            self.agree(observer.step(&self.flow, &record))?;
+            self.all_agree(observer.step(&self.flow, &record))?;
             self.kept.energy.pass(&self.flow, energy, report.step_s)?;
             self.watch(&report, observer)?;
             self.give_outputs(&mut next_output, observer)?;
@@ -290,17 +290,17 @@ impl Run {
 
     fn give_outputs(&mut self, next: &mut usize, observer: &mut dyn RunObserver) -> Result<(), Error> {
         while self.plan.output_times_s.get(*next).is_some_and(|&t| self.is_reached(t)) {
-            self.agree(observer.output(&self.flow, *next))?;
+            self.all_agree(observer.output(&self.flow, *next))?;
             *next += 1;
         }
         Ok(())
     }
 
     /// What stops one rank stops all.
-    fn agree(&self, seen: Result<(), String>) -> Result<(), Error> {
+    fn all_agree(&self, seen: Result<(), String>) -> Result<(), Error> {
         let flow = &self.flow;
         let stopped = |reason| Error::Stopped { step: flow.steps(), time_s: flow.time_s(), reason };
-        flow.layout.slabs.agree(seen.map_err(stopped))
+        flow.layout.slabs.all_agree(seen.map_err(stopped))
     }
 
     /// Tells who watches, once for all ranks.

@@ -12,12 +12,12 @@ use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
 use super::super::operators_1d::{Operators1d, resolve_cell, resolve_face};
-use super::super::rows::HALO;
+use super::super::rows::{HALO, cut_rows};
 
 /// Highest order: the stencil must fit the halo of a padded row.
 pub(super) const HIGHEST_ORDER: usize = HALO;
 
-/// A value beyond the end of an axis: `sign * value[index] + offset`.
+/// What stands for the value at an index, which may lie beyond the end of an axis: `sign * value[index] + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Ghost {
     index: usize,
@@ -25,22 +25,22 @@ struct Ghost {
     offset: f64,
 }
 
-/// The filter of one component along one axis.
-#[derive(Debug, Clone)]
-struct AxisFilter {
-    /// For each place along the axis the values at distances 1 to `order` below and above; empty along a thin axis.
-    neighbours: Vec<[[Ghost; 2]; HIGHEST_ORDER]>,
-    /// Places whose neighbours are all plain values.
-    plain: Vec<bool>,
+impl Ghost {
+    /// A value as it is.
+    const PLAIN: Self = Self { index: 0, sign: 1.0, offset: 0.0 };
 }
+
+/// For each place along an axis what stands for the values at distances 1, 2, ... below and above; empty along a thin axis.
+type Neighbours = Vec<Vec<[Ghost; 2]>>;
 
 /// The filter of all components.
 #[derive(Debug, Clone)]
 pub(super) struct Filter {
     shape: Shape,
-    order: usize,
+    /// Weights of the pairs of neighbours at distances 1, 2, ...
+    weights: Vec<f64>,
     /// `[component][axis]`.
-    axes: [[AxisFilter; 3]; 3],
+    axes: [[Neighbours; 3]; 3],
 }
 
 /// Scratch of one task.
@@ -57,57 +57,35 @@ impl Filter {
             std::array::from_fn(|axis| {
                 let line = &layout.line[axis];
                 if component == axis {
-                    return AxisFilter::new(line, order, |index| face_ghost(line, index));
+                    return neighbours(line, order, |index| face_ghost(line, index));
                 }
                 let wall_m_s = layout.wall_velocity_m_s(axis, component);
-                AxisFilter::new(line, order, |index| cell_ghost(line, wall_m_s, index))
+                neighbours(line, order, |index| cell_ghost(line, wall_m_s, index))
             })
         });
-        Self { shape: layout.shape, order, axes }
+        Self { shape: layout.shape, weights: weights(order), axes }
     }
 
     /// Writes the small scales of `velocity` to `small`.
     pub(super) fn small_scales(&self, velocity: [&[f64]; 3], small: &mut [&mut [f64]; 3]) {
         let shape = self.shape;
-        for (component, (field, small)) in velocity.into_iter().zip(small).enumerate() {
-            small[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own()).for_each_init(
-                || Scratch {
-                    plane: vec![0.0; shape.plane()],
-                    row: vec![0.0; shape.n[0]],
-                    padded: vec![0.0; shape.n[0] + 2 * HALO],
-                },
-                |scratch, (out, k)| match self.order {
-                    1 => plane_of_order_1(self, field, component, k, out, scratch),
-                    2 => plane_of_order_2(self, field, component, k, out, scratch),
-                    3 => plane_of_order_3(self, field, component, k, out, scratch),
-                    _ => plane_of_order_4(self, field, component, k, out, scratch),
-                },
-            );
+        let scratch = || Scratch {
+            plane: vec![0.0; shape.plane()],
+            row: vec![0.0; shape.n[0]],
+            padded: vec![0.0; shape.n[0] + 2 * HALO],
+        };
+        for (axes, (field, small)) in self.axes.iter().zip(velocity.into_iter().zip(small)) {
+            let planes = small[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+            planes.for_each_init(scratch, |scratch, (out, k)| small_plane(self, axes, field, k, out, scratch));
         }
     }
 }
 
-impl AxisFilter {
-    /// The filter whose values at any index, also beyond the ends, are given by `ghost`.
-    fn new(line: &Operators1d, order: usize, ghost: impl Fn(isize) -> Ghost) -> Self {
-        if line.is_thin() {
-            return Self { neighbours: Vec::new(), plain: Vec::new() };
-        }
-        let own = Ghost { index: 0, sign: 1.0, offset: 0.0 };
-        let neighbours: Vec<_> = (0..line.cells)
-            .map(|place| {
-                let mut near = [[own; 2]; HIGHEST_ORDER];
-                for (m, pair) in near.iter_mut().enumerate().take(order) {
-                    let distance = m as isize + 1;
-                    *pair = [-distance, distance].map(|d| ghost(place as isize + d));
-                }
-                near
-            })
-            .collect();
-        let plain =
-            |near: &[[Ghost; 2]; HIGHEST_ORDER]| near.iter().flatten().all(|g| g.sign == 1.0 && g.offset == 0.0);
-        Self { plain: neighbours.iter().map(plain).collect(), neighbours }
-    }
+/// The neighbours of the places along an axis; `ghost` tells what stands for the value at any index, also beyond the ends.
+fn neighbours(line: &Operators1d, order: usize, ghost: impl Fn(isize) -> Ghost) -> Neighbours {
+    let at = |place: isize| (1..=order as isize).map(|d| [-d, d].map(|d| ghost(place + d))).collect();
+    let places = if line.is_thin() { 0 } else { line.cells as isize };
+    (0..places).map(at).collect()
 }
 
 /// What stands for the normal velocity at face `index`, which may lie beyond the ends.
@@ -131,134 +109,85 @@ fn cell_ghost(line: &Operators1d, wall_m_s: [f64; 2], index: isize) -> Ghost {
     }
 }
 
-/// Weights of the pairs of neighbours in `1 - (-delta^2/4)^N`, to be applied to `(q_m - q_0) + (q_-m - q_0)`.
-fn weights<const N: usize>() -> [f64; N] {
-    let mut weights = [0.0; N];
-    // The coefficient of q_m in (-delta^2/4)^N is (-1)^m C(2N, N + m)/4^N.
-    let mut binomial = 1.0;
-    for i in 0..N {
-        binomial *= (2 * N - i) as f64 / (i + 1) as f64;
-    }
-    for (i, weight) in weights.iter_mut().enumerate() {
-        let m = i + 1;
-        binomial *= (N - i) as f64 / (N + m) as f64;
-        let sign = if m % 2 == 0 { 1.0 } else { -1.0 };
-        *weight = -sign * binomial / 4.0_f64.powi(N as i32);
-    }
-    weights
+/// Weights of the pairs of neighbours in `1 - (-delta^2/4)^order`, to be applied to `(q_m - q_0) + (q_-m - q_0)`.
+fn weights(order: usize) -> Vec<f64> {
+    // The coefficient of q_m in (-delta^2/4)^n is (-1)^m C(2n, n + m)/4^n.
+    let mut binomial = (0..order).fold(1.0, |product, i| product * ((2 * order - i) as f64 / (i + 1) as f64));
+    let weight = |m: usize| {
+        binomial *= (order + 1 - m) as f64 / (order + m) as f64;
+        let sign = if m.is_multiple_of(2) { 1.0 } else { -1.0 };
+        -sign * binomial / 4.0_f64.powi(order as i32)
+    };
+    (1..=order).map(weight).collect()
 }
 
-macro_rules! planes {
-    ($($name:ident $order:literal),*) => {$(
-        #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-        fn $name(filter: &Filter, field: &[f64], component: usize, k: usize, out: &mut [f64], scratch: &mut Scratch) {
-            plane::<$order>(filter, field, component, k, out, scratch);
-        }
-    )*};
-}
-planes!(plane_of_order_1 1, plane_of_order_2 2, plane_of_order_3 3, plane_of_order_4 4);
-
-/// The small scales of plane `k`.
-#[inline(always)]
-fn plane<const N: usize>(
+/// The small scales of plane `k` of the component whose neighbours along the axes are `axes`.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn small_plane(
     filter: &Filter,
+    [along, across, over]: &[Neighbours; 3],
     field: &[f64],
-    component: usize,
     k: usize,
     out: &mut [f64],
     scratch: &mut Scratch,
 ) {
-    let shape = filter.shape;
-    let n = shape.n[0];
-    let weights = weights::<N>();
-    let [along, across, over] = &filter.axes[component];
-    for j in 0..shape.n[1] {
-        let low = &mut scratch.plane[j * n..(j + 1) * n];
-        smooth_rows::<N>(low, over, &weights, k, |index| &field[shape.row(j, index)]);
+    let (shape, n) = (filter.shape, filter.shape.n[0]);
+    let Scratch { plane, row, padded } = scratch;
+    for (j, low) in plane.chunks_mut(n).enumerate() {
+        smooth(low, &filter.weights, &over[..], k, |index| &field[shape.row(j, index)]);
     }
-    for j in 0..shape.n[1] {
-        let plane = &scratch.plane;
-        smooth_rows::<N>(&mut scratch.row, across, &weights, j, |index| &plane[index * n..(index + 1) * n]);
-        let (out, own) = (&mut out[j * n..(j + 1) * n], &field[shape.row(j, k)]);
-        if along.neighbours.is_empty() {
-            for ((out, own), low) in out.iter_mut().zip(own).zip(&scratch.row) {
-                *out = own - low;
+    for (j, out) in out.chunks_mut(n).enumerate() {
+        smooth(row, &filter.weights, &across[..], j, |index| &plane[index * n..(index + 1) * n]);
+        let own = &field[shape.row(j, k)];
+        if let [first, .., last] = &along[..] {
+            pad_with_ghosts(padded, row, first, last);
+            for (m, weight) in filter.weights.iter().enumerate() {
+                let beside = [&padded[HALO - 1 - m..], &padded[HALO + 1 + m..]];
+                add_pair(row, &padded[HALO..], *weight, beside, [Ghost::PLAIN; 2]);
             }
-        } else {
-            pad_with_ghosts::<N>(&mut scratch.padded, &scratch.row, along);
-            difference::<N>(out, own, &scratch.padded, &weights);
+        }
+        for ((out, own), low) in out.iter_mut().zip(own).zip(row.iter()) {
+            *out = own - low;
         }
     }
 }
 
 /// `out` = the row at `index` of an axis, smoothed along it.
 #[inline(always)]
-fn smooth_rows<'a, const N: usize>(
+fn smooth<'a>(
     out: &mut [f64],
-    axis: &AxisFilter,
-    weights: &[f64; N],
+    weights: &[f64],
+    axis: &[Vec<[Ghost; 2]>],
     index: usize,
     row: impl Fn(usize) -> &'a [f64],
 ) {
-    let n = out.len();
-    let own = &row(index)[..n];
-    let Some(near) = axis.neighbours.get(index) else {
-        out.copy_from_slice(own);
-        return;
-    };
-    let mut rows: [[&[f64]; 2]; N] = [[&[]; 2]; N];
-    for (rows, [low, high]) in rows.iter_mut().zip(near) {
-        *rows = [&row(low.index)[..n], &row(high.index)[..n]];
-    }
-    if axis.plain[index] {
-        for i in 0..n {
-            let mut sum = own[i];
-            for (weight, [low, high]) in weights.iter().zip(&rows) {
-                sum += weight * ((high[i] - own[i]) + (low[i] - own[i]));
-            }
-            out[i] = sum;
-        }
-    } else {
-        for i in 0..n {
-            let mut sum = own[i];
-            for ((weight, rows), ghosts) in weights.iter().zip(&rows).zip(near) {
-                let low = ghosts[0].sign * rows[0][i] + ghosts[0].offset;
-                let high = ghosts[1].sign * rows[1][i] + ghosts[1].offset;
-                sum += weight * ((high - own[i]) + (low - own[i]));
-            }
-            out[i] = sum;
-        }
+    let own = row(index);
+    out.copy_from_slice(own);
+    for (weight, pair) in weights.iter().zip(axis.get(index).into_iter().flatten()) {
+        add_pair(out, own, *weight, [row(pair[0].index), row(pair[1].index)], *pair);
     }
 }
 
-/// Copies `row` between halos that continue it.
+/// `out += weight [(q_m - q_0) + (q_-m - q_0)]` of a row `own` and the rows beside it.
 #[inline(always)]
-fn pad_with_ghosts<const N: usize>(padded: &mut [f64], row: &[f64], axis: &AxisFilter) {
+fn add_pair(out: &mut [f64], own: &[f64], weight: f64, rows: [&[f64]; 2], [low, high]: [Ghost; 2]) {
+    let n = out.len();
+    let (own, [x, y]) = (&own[..n], cut_rows!(rows, n, 0 1));
+    for i in 0..n {
+        let (below, above) = (low.sign * x[i] + low.offset, high.sign * y[i] + high.offset);
+        out[i] += weight * ((above - own[i]) + (below - own[i]));
+    }
+}
+
+/// Copies `row` between halos that continue it by the neighbours of its first and its last value.
+#[inline(always)]
+fn pad_with_ghosts(padded: &mut [f64], row: &[f64], first: &[[Ghost; 2]], last: &[[Ghost; 2]]) {
     let n = row.len();
     padded[HALO..HALO + n].copy_from_slice(row);
-    let value = |ghost: &Ghost| ghost.sign * row[ghost.index] + ghost.offset;
-    for m in 0..N {
-        padded[HALO - 1 - m] = value(&axis.neighbours[0][m][0]);
-        padded[HALO + n + m] = value(&axis.neighbours[n - 1][m][1]);
-    }
-}
-
-/// `out = own -` the padded row smoothed along itself.
-#[inline(always)]
-fn difference<const N: usize>(out: &mut [f64], own: &[f64], padded: &[f64], weights: &[f64; N]) {
-    let n = out.len();
-    let (own, centre) = (&own[..n], &padded[HALO..HALO + n]);
-    let (mut low, mut high): ([&[f64]; N], [&[f64]; N]) = ([&[]; N], [&[]; N]);
-    for m in 0..N {
-        low[m] = &padded[HALO - 1 - m..][..n];
-        high[m] = &padded[HALO + 1 + m..][..n];
-    }
-    for i in 0..n {
-        let mut sum = centre[i];
-        for m in 0..N {
-            sum += weights[m] * ((high[m][i] - centre[i]) + (low[m][i] - centre[i]));
-        }
-        out[i] = own[i] - sum;
+    let value = |ghost: Ghost| ghost.sign * row[ghost.index] + ghost.offset;
+    for (m, (first, last)) in first.iter().zip(last).enumerate() {
+        padded[HALO - 1 - m] = value(first[0]);
+        padded[HALO + n + m] = value(last[1]);
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Check: adjointness through the energy identity, linear and wall-bounded profiles (tests of the model).
 
+use super::super::control::LAPLACIAN_SYMBOL;
 use super::super::layout::{Layout, Shape};
 use super::super::operators_1d::{Operators1d, Taps};
 use super::super::row_operator::RowOperator;
@@ -27,8 +28,12 @@ pub(super) struct Operators {
     pub(super) decay: [Vec<f64>; 3],
 }
 
-/// Largest symbol of the fourth-order Laplacian times the square of the spacing.
-const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
+/// A row of cells, by its indices along the axes 1 and 2, and the velocity about it.
+pub(super) struct Row<'a> {
+    pub(super) operators: &'a Operators,
+    pub(super) velocity: [&'a [f64]; 3],
+    pub(super) at: [usize; 2],
+}
 
 impl Operators {
     pub(super) fn new(layout: &Layout) -> Self {

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::super::row_operator::RowOperator;
 use super::super::rows::{HALO, cut_rows, pad};
-use super::operators::Operators;
+use super::operators::{Operators, Row};
 use crate::solver::aligned::Aligned;
 
 /// What the divergence needs of the stress.
@@ -34,12 +34,6 @@ struct Scratch {
     row: Vec<f64>,
     viscosity: Vec<f64>,
     padded: Vec<f64>,
-}
-
-/// One plane of each array that is written.
-struct Planes<'a> {
-    in_plane: [&'a mut [f64]; 3],
-    across: [&'a mut [f64]; 3],
 }
 
 impl Stress {
@@ -69,8 +63,7 @@ impl Stress {
                 padded: vec![0.0; n + 2 * HALO],
             },
             |scratch, (a0, a1, a2, t0, t1, t2, k)| {
-                let mut planes = Planes { in_plane: [a0, a1, a2], across: [t0, t1, t2] };
-                stress_plane(operators, viscosity, velocity, k, &mut planes, scratch);
+                stress_plane(operators, (viscosity, velocity), k, [a0, a1, a2], [t0, t1, t2], scratch);
             },
         );
     }
@@ -87,106 +80,77 @@ fn add_divergence_row(operator: &RowOperator, across: &[f64], at: [usize; 2], ou
     operator.add_across(out, across, at);
 }
 
+/// The stresses of plane `k` and the acceleration by those in it.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn stress_plane(
     operators: &Operators,
-    viscosity: &[f64],
-    velocity: [&[f64]; 3],
+    (viscosity, velocity): (&[f64], [&[f64]; 3]),
     k: usize,
-    planes: &mut Planes<'_>,
-    scratch: &mut Scratch,
+    [in_0, in_1, in_2]: [&mut [f64]; 3],
+    [across_0, across_1, across_2]: [&mut [f64]; 3],
+    Scratch { shear, normal, row: diagonal, viscosity: sum, padded }: &mut Scratch,
 ) {
     let shape = operators.shape;
     let n = shape.n[0];
     for j in 0..shape.n[1] {
-        let (at, place) = ([j, k], j * n..(j + 1) * n);
-        let [in_0, in_1, in_2] = &mut planes.in_plane;
-        let (in_0, in_1, in_2) = (&mut in_0[place.clone()], &mut in_1[place.clone()], &mut in_2[place.clone()]);
-        let [across_0, across_1, across_2] = &mut planes.across;
-        let (across_0, across_1) = (&mut across_0[place.clone()], &mut across_1[place.clone()]);
-        let across_2 = &mut across_2[place.clone()];
-        let Scratch { shear, normal, row, viscosity: sum, padded } = scratch;
-        let (shear, normal) = (&mut shear[place.clone()], &mut normal[place]);
+        let (row, place) = (Row { operators, velocity, at: [j, k] }, j * n..(j + 1) * n);
         let (before_j, before_k) = (operators.before(1, j), operators.before(2, k));
         let nu = |j: usize, k: usize| &viscosity[shape.row(j, k)];
 
-        diagonal(operators, nu(j, k), velocity, 0, at, row, padded);
-        in_0.fill(0.0);
-        operators.to_faces[0].add_along(in_0, row, padded);
-        diagonal(operators, nu(j, k), velocity, 1, at, normal, padded);
-        diagonal(operators, nu(j, k), velocity, 2, at, across_2, padded);
+        row.diagonal(nu(j, k), 0, diagonal, padded);
+        operators.to_faces[0].along(&mut in_0[place.clone()], diagonal, padded);
+        row.diagonal(nu(j, k), 1, &mut normal[place.clone()], padded);
+        row.diagonal(nu(j, k), 2, &mut across_2[place.clone()], padded);
 
         sum_of_two(sum, nu(before_j, k), nu(j, k));
-        edge_along(operators, sum, velocity, 1, at, shear, padded);
-        in_1.fill(0.0);
-        operators.to_cells[0].add_along(in_1, shear, padded);
+        row.edge_along(sum, 1, &mut shear[place.clone()], padded);
+        operators.to_cells[0].along(&mut in_1[place.clone()], &shear[place.clone()], padded);
 
         sum_of_two(sum, nu(j, before_k), nu(j, k));
-        edge_along(operators, sum, velocity, 2, at, across_0, padded);
-        in_2.fill(0.0);
-        operators.to_cells[0].add_along(in_2, across_0, padded);
+        row.edge_along(sum, 2, &mut across_0[place.clone()], padded);
+        operators.to_cells[0].along(&mut in_2[place.clone()], &across_0[place.clone()], padded);
 
-        shear_strain(operators, velocity, [1, 2], at, across_1, padded);
+        let across_1 = &mut across_1[place];
+        row.shear_strain([1, 2], across_1, padded);
         scale_by_mean(across_1, [nu(before_j, before_k), nu(j, before_k), nu(before_j, k), nu(j, k)]);
     }
     for j in 0..shape.n[1] {
-        let [in_0, in_1, in_2] = planes.in_plane.each_mut().map(|plane| &mut plane[j * n..(j + 1) * n]);
-        operators.to_cells[1].add_in_plane(in_0, &scratch.shear, j);
-        operators.to_faces[1].add_in_plane(in_1, &scratch.normal, j);
-        operators.to_cells[1].add_in_plane(in_2, planes.across[1], j);
+        let place = j * n..(j + 1) * n;
+        operators.to_cells[1].add_in_plane(&mut in_0[place.clone()], shear, j);
+        operators.to_faces[1].add_in_plane(&mut in_1[place.clone()], normal, j);
+        operators.to_cells[1].add_in_plane(&mut in_2[place], across_1, j);
     }
 }
 
-/// `tau_aa` at the centres.
-#[inline(always)]
-fn diagonal(
-    operators: &Operators,
-    viscosity: &[f64],
-    velocity: [&[f64]; 3],
-    axis: usize,
-    at: [usize; 2],
-    out: &mut [f64],
-    padded: &mut [f64],
-) {
-    out.fill(0.0);
-    operators.to_cells[axis].add(out, velocity[axis], at, padded);
-    for (out, viscosity) in out.iter_mut().zip(viscosity) {
-        *out *= 2.0 * viscosity;
+impl Row<'_> {
+    /// `tau_aa` at the centres.
+    #[inline(always)]
+    fn diagonal(&self, viscosity: &[f64], axis: usize, out: &mut [f64], padded: &mut [f64]) {
+        out.fill(0.0);
+        self.operators.to_cells[axis].add(out, self.velocity[axis], self.at, padded);
+        for (out, viscosity) in out.iter_mut().zip(viscosity) {
+            *out *= 2.0 * viscosity;
+        }
     }
-}
 
-/// `2 S_ab` at the edges.
-#[inline(always)]
-fn shear_strain(
-    operators: &Operators,
-    velocity: [&[f64]; 3],
-    [a, b]: [usize; 2],
-    at: [usize; 2],
-    out: &mut [f64],
-    padded: &mut [f64],
-) {
-    out.fill(0.0);
-    operators.to_faces[b].add(out, velocity[a], at, padded);
-    operators.to_faces[a].add(out, velocity[b], at, padded);
-}
+    /// `2 S_ab` at the edges.
+    #[inline(always)]
+    fn shear_strain(&self, [a, b]: [usize; 2], out: &mut [f64], padded: &mut [f64]) {
+        out.fill(0.0);
+        self.operators.to_faces[b].add(out, self.velocity[a], self.at, padded);
+        self.operators.to_faces[a].add(out, self.velocity[b], self.at, padded);
+    }
 
-/// `tau_0b` at the edges from the viscosity summed over the two centres beside each face of axis `b`.
-#[inline(always)]
-fn edge_along(
-    operators: &Operators,
-    viscosity: &[f64],
-    velocity: [&[f64]; 3],
-    b: usize,
-    at: [usize; 2],
-    out: &mut [f64],
-    padded: &mut [f64],
-) {
-    let n = out.len();
-    shear_strain(operators, velocity, [0, b], at, out, padded);
-    pad(padded, viscosity, operators.periodic[0]);
-    let (low, high) = (&padded[HALO - 1..][..n], &padded[HALO..][..n]);
-    for i in 0..n {
-        out[i] *= 0.25 * (low[i] + high[i]);
+    /// `tau_0b` at the edges from the viscosity summed over the two centres beside each face of axis `b`.
+    #[inline(always)]
+    fn edge_along(&self, viscosity: &[f64], b: usize, out: &mut [f64], padded: &mut [f64]) {
+        let n = out.len();
+        self.shear_strain([0, b], out, padded);
+        pad(padded, viscosity, self.operators.periodic[0]);
+        let (low, high) = (&padded[HALO - 1..][..n], &padded[HALO..][..n]);
+        for i in 0..n {
+            out[i] *= 0.25 * (low[i] + high[i]);
+        }
     }
 }
 

@@ -8,8 +8,8 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::super::rows::HALO;
-use super::operators::Operators;
+use super::super::rows::{HALO, cut_rows};
+use super::operators::{Operators, Row};
 
 /// Which formula gives the eddy viscosity, with the square of its constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,7 +89,7 @@ fn viscosity_plane(
     let n = operators.shape.n[0];
     let mut largest = Largest::default();
     for (j, row) in plane.chunks_mut(n).enumerate() {
-        gradient_rows(operators, velocity, [j, k], scratch);
+        Row { operators, velocity, at: [j, k] }.gradient(scratch);
         let across = operators.width[1][j] * operators.width[2][k];
         let (gradient, width) = (&scratch.gradient, &operators.width[0]);
         match formula {
@@ -121,84 +121,68 @@ fn limit(row: &mut [f64], along: &[f64], across: f64, limit_per_s: f64) -> Large
 /// Maxima that are kept side by side.
 const LANES: usize = 8;
 
-/// The nine derivatives at the centres of the row `at`.
-#[inline(always)]
-fn gradient_rows(operators: &Operators, velocity: [&[f64]; 3], at: [usize; 2], scratch: &mut Scratch) {
-    let Scratch { gradient, row, padded } = scratch;
-    for (component, gradient) in gradient.iter_mut().enumerate() {
-        let field = velocity[component];
-        for (axis, out) in gradient.iter_mut().enumerate() {
-            if axis == component {
-                out.fill(0.0);
-                operators.to_cells[axis].add(out, field, at, padded);
-            } else if component == 0 {
-                mean_along(operators, field, axis, at, out, row, padded);
-            } else {
-                mean_across(operators, field, [component, axis], at, out, row, padded);
+impl Row<'_> {
+    /// The nine derivatives at the centres.
+    #[inline(always)]
+    fn gradient(&self, Scratch { gradient, row, padded }: &mut Scratch) {
+        for (component, gradient) in gradient.iter_mut().enumerate() {
+            for (axis, out) in gradient.iter_mut().enumerate() {
+                if axis == component {
+                    out.fill(0.0);
+                    self.operators.to_cells[axis].add(out, self.velocity[axis], self.at, padded);
+                } else if component == 0 {
+                    self.mean_along(axis, out, row, padded);
+                } else {
+                    self.mean_across([component, axis], out, row, padded);
+                }
             }
         }
     }
-}
 
-/// Derivative along `axis` of the component along axis 0: taken at the faces, then averaged over those of each cell.
-#[inline(always)]
-fn mean_along(
-    operators: &Operators,
-    field: &[f64],
-    axis: usize,
-    at: [usize; 2],
-    out: &mut [f64],
-    row: &mut [f64],
-    padded: &mut [f64],
-) {
-    let n = out.len();
-    row.fill(operators.wall_source[axis][0][at[axis - 1]]);
-    operators.half_mean_gradient[axis].add(&mut row[..n], field, at, padded);
-    if operators.periodic[0] {
-        row[n] = row[0];
+    /// Derivative along `axis` of the component along axis 0: taken at the faces, then averaged over those of each cell.
+    #[inline(always)]
+    fn mean_along(&self, axis: usize, out: &mut [f64], row: &mut [f64], padded: &mut [f64]) {
+        let (n, operators) = (out.len(), self.operators);
+        row.fill(operators.wall_source[axis][0][self.at[axis - 1]]);
+        operators.half_mean_gradient[axis].add(&mut row[..n], self.velocity[0], self.at, padded);
+        if operators.periodic[0] {
+            row[n] = row[0];
+        }
+        let (low, high) = (&row[..n], &row[1..n + 1]);
+        for i in 0..n {
+            out[i] = low[i] + high[i];
+        }
     }
-    let (low, high) = (&row[..n], &row[1..n + 1]);
-    for i in 0..n {
-        out[i] = low[i] + high[i];
-    }
-}
 
-/// Derivative along `axis` of a component along axis 1 or 2, averaged over the two faces of each cell of the row.
-#[inline(always)]
-fn mean_across(
-    operators: &Operators,
-    field: &[f64],
-    [component, axis]: [usize; 2],
-    at: [usize; 2],
-    out: &mut [f64],
-    row: &mut [f64],
-    padded: &mut [f64],
-) {
-    let n = out.len();
-    let gradient = &operators.half_mean_gradient[axis];
-    let source = &operators.wall_source[axis][component];
-    let next = operators.after(component, at[component - 1]).map(|index| {
-        let mut next = at;
-        next[component - 1] = index;
-        next
-    });
-    if axis == 0 {
-        let row = &mut row[..n];
-        row.copy_from_slice(&field[operators.shape.row(at[0], at[1])]);
-        if let Some([j, k]) = next {
-            for (sum, value) in row.iter_mut().zip(&field[operators.shape.row(j, k)]) {
-                *sum += value;
+    /// Derivative along `axis` of a component along axis 1 or 2, averaged over the two faces of each cell of the row.
+    #[inline(always)]
+    fn mean_across(&self, [component, axis]: [usize; 2], out: &mut [f64], row: &mut [f64], padded: &mut [f64]) {
+        let (operators, field, at) = (self.operators, self.velocity[component], self.at);
+        let gradient = &operators.half_mean_gradient[axis];
+        let source = &operators.wall_source[axis][component];
+        let next = operators.after(component, at[component - 1]).map(|index| {
+            let mut next = at;
+            next[component - 1] = index;
+            next
+        });
+        if axis == 0 {
+            let row = &mut row[..out.len()];
+            row.copy_from_slice(&field[operators.shape.row(at[0], at[1])]);
+            if let Some([j, k]) = next {
+                for (sum, value) in row.iter_mut().zip(&field[operators.shape.row(j, k)]) {
+                    *sum += value;
+                }
             }
-        }
-        for (out, source) in out.iter_mut().zip(source) {
-            *out = 2.0 * source;
-        }
-        gradient.add_along(out, row, padded);
-    } else {
-        out.fill(2.0 * source[at[axis - 1]]);
-        gradient.add_across(out, field, at);
-        if let Some(next) = next {
-            gradient.add_across(out, field, next);
+            for (out, source) in out.iter_mut().zip(source) {
+                *out = 2.0 * source;
+            }
+            gradient.add_along(out, row, padded);
+        } else {
+            out.fill(2.0 * source[at[axis - 1]]);
+            gradient.add_across(out, field, at);
+            if let Some(next) = next {
+                gradient.add_across(out, field, next);
+            }
         }
     }
 }
@@ -232,10 +216,9 @@ fn apply(
 ) {
     let n = out.len();
     let width = &width[..n];
-    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = gradient;
-    let (xx, xy, xz) = (&xx[..n], &xy[..n], &xz[..n]);
-    let (yx, yy, yz) = (&yx[..n], &yy[..n], &yz[..n]);
-    let (zx, zy, zz) = (&zx[..n], &zy[..n], &zz[..n]);
+    let [x, y, z] = gradient;
+    let ([xx, xy, xz], [yx, yy, yz]) = (cut_rows!(x, n, 0 1 2), cut_rows!(y, n, 0 1 2));
+    let [zx, zy, zz] = cut_rows!(z, n, 0 1 2);
     for i in 0..n {
         let g = [[xx[i], xy[i], xz[i]], [yx[i], yy[i], yz[i]], [zx[i], zy[i], zz[i]]];
         out[i] = scale * width[i] * formula(g);
