@@ -4,7 +4,7 @@
 
 use crate::Error;
 #[cfg(any(feature = "cli", feature = "flow", feature = "sweep"))]
-use crate::io::atomic::try_folder;
+use crate::io::atomic::{in_folder, try_folder};
 use crate::io::lock::FolderLock;
 use crate::io::own::refuse_foreign;
 use crate::io::{Existing, FileGroup, Provenance, Table};
@@ -138,19 +138,10 @@ impl Outputs {
 #[cfg(any(feature = "cli", feature = "flow", feature = "sweep"))]
 pub(crate) fn prepare(folder: &Path, names: &[String], existing: Existing, alone: bool) -> Result<(), Error> {
     refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
-    let missing: Vec<&Path> =
-        folder.ancestors().filter(|p| !p.as_os_str().is_empty()).take_while(|p| !p.exists()).collect();
-    let made = std::fs::create_dir_all(folder);
-    let made = made.map_err(|source| Error::Io { action: "make the folder", path: folder.to_owned(), source });
-    let tried = made.and_then(|()| {
+    in_folder(folder, false, || {
         try_folder(folder)?;
         let lock = alone.then(|| FolderLock::take(folder)).transpose()?;
         drop(lock);
         Ok(())
-    });
-    for path in missing {
-        // Innermost first; one that was not made cannot be removed, which is what is wanted.
-        let _ = std::fs::remove_dir(path);
-    }
-    tried
+    })
 }

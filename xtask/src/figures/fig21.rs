@@ -240,10 +240,8 @@ fn picture(views: &[View]) -> Result<Figure, Failure> {
     for view in views {
         let map = velocity_map(&view.scans[0].plan, &view.scans[0].map);
         // The row through the vortices.
-        let plot = match view.name {
-            "rhi" => MapPlot::new(&map, 0, "v_scan")?,
-            _ => MapPlot::from_above(&map, map.sweeps.len() / 2, "v_scan")?,
-        };
+        let sweep = if view.name == "rhi" { 0 } else { map.sweeps.len() / 2 };
+        let plot = MapPlot::new(&map, sweep, "v_scan")?;
         panels.push(plot.titled(&format!("{}, one scan", view.name)).labelled("m/s").into());
     }
     let axis = Axis::linear("scan and method");

@@ -33,7 +33,7 @@ pub fn read_field(path: &Path, variable: &str) -> Result<FieldInSpace, Error> {
             return Err(format!("{} times: one is needed", times_s.len()));
         };
         let axis_m = [file.coordinate(x)?, file.coordinate(y)?, file.coordinate(z)?];
-        Ok(FieldInSpace { time_s, axis_m, values: file.ordered(variable, &dims)? })
+        Ok(FieldInSpace { time_s, axis_m, values: file.ordered(variable, &dims, None)? })
     };
     read().map_err(|reason| file.refuse(reason))
 }

@@ -66,13 +66,7 @@ impl FileGroup {
     /// # Errors
     /// The first refusal of the system. The folder is then as it was before, and a folder made by this call is gone again.
     pub fn commit(self) -> OutputResult<Vec<PathBuf>> {
-        let made = make_folders(&self.folder)?;
-        let result = self.commit_inside();
-        if result.is_err() {
-            // Deepest first; `remove_dir` leaves a folder that somebody else has used meanwhile.
-            made.iter().rev().for_each(|f| drop(fs::remove_dir(f)));
-        }
-        result
+        in_folder(&self.folder, true, || self.commit_inside())
     }
 
     fn commit_inside(&self) -> OutputResult<Vec<PathBuf>> {
@@ -296,20 +290,25 @@ impl Drop for Stage {
     }
 }
 
-/// Makes the folder and its parents; returns those that did not exist, outermost first.
-fn make_folders(folder: &Path) -> OutputResult<Vec<PathBuf>> {
-    let mut missing: Vec<PathBuf> = folder
-        .ancestors()
-        .filter(|p| !p.as_os_str().is_empty())
-        .take_while(|p| !p.exists())
-        .map(Path::to_owned)
-        .collect();
-    missing.reverse();
-    fs::create_dir_all(folder).map_err(|e| {
-        missing.iter().rev().for_each(|f| drop(fs::remove_dir(f)));
-        io_error("create folder", folder, e)
-    })?;
-    Ok(missing)
+/// Makes a folder and its parents for what is done in it; those that this call made are gone again where it fails, and where they are
+/// not to stay.
+///
+/// # Errors
+/// The folder cannot be made; what fails in it.
+pub(crate) fn in_folder<T, E: From<OutputError>>(
+    folder: &Path,
+    stays: bool,
+    inside: impl FnOnce() -> Result<T, E>,
+) -> Result<T, E> {
+    let is_missing = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
+    let missing: Vec<&Path> = folder.ancestors().take_while(is_missing).collect();
+    let made = fs::create_dir_all(folder).map_err(|e| io_error("create folder", folder, e).into());
+    let done = made.and_then(|()| inside());
+    if done.is_err() || !stays {
+        // Deepest first; `remove_dir` leaves a folder that somebody else has used meanwhile.
+        missing.into_iter().for_each(|f| drop(fs::remove_dir(f)));
+    }
+    done
 }
 
 /// Asks for the renames to reach the disk. Not every system can sync a folder; the files themselves are complete either way.

@@ -5,7 +5,7 @@
 use super::edges;
 use super::error::{OutputResult, same_length};
 use super::fields::VelocityField;
-use super::netcdf::{Attr, Data, FILL, Layout, Variable};
+use super::netcdf::{Data, FILL, Layout, Variable};
 use super::parts::{FileParts, Share};
 use super::provenance::Provenance;
 use wakescope_les::winds::Edges;
@@ -22,7 +22,7 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
         Variable::part(name, DIMS, Data::filled(values), field.first())
             .text("long_name", long_name)
             .text("units", units)
-            .attr("_FillValue", Attr::F32(FILL))
+            .attr("_FillValue", Data::f32([FILL]))
     };
     // By which readers close a period of cells that are not equal.
     let across = |name: &str, dims: &'static [&'static str], values: &[f64], long_name: &str, period_m: Option<f64>| {
@@ -34,7 +34,7 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
     };
     let [x_period_m, y_period_m] = field.period_m;
     let mut variables = vec![
-        Variable::new("time", &["time"], Data::F64(vec![field.time_s]))
+        Variable::new("time", &["time"], Data::f64([field.time_s]))
             .text("long_name", "time since the start of the flow")
             .text("units", "s"),
         axis("z", &["z"], &field.z_m, "height of the cell centre above the ground").text("positive", "up"),
@@ -82,7 +82,7 @@ pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> Output
     const DIMS: [&[&str]; 3] = [&["z", "y", "x_face"], &["z", "y_face", "x"], &["z_face", "y", "x"]];
     let mut dims = Vec::new();
     let mut variables = vec![
-        Variable::new("time", &[], Data::F64(vec![faces.time_s]))
+        Variable::new("time", &[], Data::f64([faces.time_s]))
             .text("long_name", "time since the start of the flow")
             .text("units", "s"),
     ];
@@ -95,10 +95,11 @@ pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> Output
     let plane = faces.centre_m[0].len() * faces.centre_m[1].len();
     for (d, (name, values)) in ["u", "v", "w"].into_iter().zip(&faces.velocity_m_s).enumerate() {
         same_length(name, values.len(), "z x y x x", faces.share.planes.len() * plane)?;
-        let variable = Variable::part(name, DIMS[d], Data::F64(values.clone()), faces.share.planes.start * plane)
-            .text("standard_name", ["x_wind", "y_wind", "upward_air_velocity"][d])
-            .text("long_name", ["wind along the flight direction", "horizontal wind across it", "vertical wind"][d])
-            .text("units", "m s-1");
+        let variable =
+            Variable::part(name, DIMS[d], Data::f64(values.iter().copied()), faces.share.planes.start * plane)
+                .text("standard_name", ["x_wind", "y_wind", "upward_air_velocity"][d])
+                .text("long_name", ["wind along the flight direction", "horizontal wind across it", "vertical wind"][d])
+                .text("units", "m s-1");
         variables.push(variable);
     }
     file(&faces.title, dims, variables, provenance, &faces.share)
@@ -112,7 +113,7 @@ fn axis(name: &str, dims: &'static [&'static str], values: &[f64], long_name: &s
     } else {
         "Z"
     };
-    let variable = Variable::new(name, dims, Data::F64(values.to_vec()))
+    let variable = Variable::new(name, dims, Data::f64(values.iter().copied()))
         .text("long_name", long_name)
         .text("units", "m")
         .text("axis", letter);

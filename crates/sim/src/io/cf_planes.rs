@@ -5,7 +5,7 @@
 use super::edges;
 use super::error::OutputResult;
 use super::map::CrossPlanes;
-use super::netcdf::{Attr, Data, FILL, Layout, Variable};
+use super::netcdf::{Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
 use ndarray::Array3;
 
@@ -16,7 +16,7 @@ use ndarray::Array3;
 pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     planes.check()?;
     let axis = |name: &str, dims: &'static [&'static str], values: &[f64]| {
-        Variable::new(name, dims, Data::F64(values.to_vec()))
+        Variable::new(name, dims, Data::f64(values.iter().copied()))
     };
     let variables = vec![
         axis("tau", &["tau"], &planes.tau)
@@ -48,7 +48,7 @@ fn wind(name: &str, values: &Array3<f64>, long_name: &str) -> Variable {
         .text("long_name", long_name)
         .text("units", "m s-1")
         .text("coordinates", "time")
-        .attr("_FillValue", Attr::F32(FILL))
+        .attr("_FillValue", Data::f32([FILL]))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! Check: the tests read the bytes back and compare values, axes and units.
 
 use super::error::OutputResult;
-use super::netcdf::{Attr, Data, FILL, Layout, Variable};
+use super::netcdf::{Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
 use super::signals::RawSignals;
 
@@ -15,7 +15,7 @@ pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> Ou
     signals.check()?;
     let (rays, samples) = signals.current_a.dim();
     let mut variables = vec![
-        variable("time", &["time"], Data::F64(signals.time_s.clone()), "s")
+        variable("time", &["time"], Data::f64(signals.time_s.clone()), "s")
             .text("standard_name", "time")
             .text("long_name", "time after the middle of the pulse left the telescope"),
     ];
@@ -43,7 +43,7 @@ fn variable(name: &str, dims: &'static [&'static str], data: Data, units: &str) 
 }
 
 fn current<'a>(name: &str, values: impl Iterator<Item = &'a f64>, long_name: &str) -> Variable {
-    variable(name, &["ray", "time"], Data::F64(values.copied().collect()), "A").text("long_name", long_name)
+    variable(name, &["ray", "time"], Data::f64(values.copied()), "A").text("long_name", long_name)
 }
 
 /// Which line, pulse and realisation each record belongs to.
@@ -52,12 +52,12 @@ fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
     let line_of = |ray: usize| signals.first_pulse.partition_point(|first| *first <= ray % scan).saturating_sub(1);
     let before = |ray: usize| signals.first_pulse.get(line_of(ray)).copied().unwrap_or(0);
     let number = |name: &str, of: &dyn Fn(usize) -> usize, text: &str| {
-        let values = (0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX)).collect();
-        variable(name, &["ray"], Data::I32(values), "1").text("long_name", text)
+        let values = (0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX));
+        variable(name, &["ray"], Data::i32(values), "1").text("long_name", text)
     };
     let value = |name: &str, of: &[f64], units: &str, text: &str| {
-        let values = (0..rays).map(|ray| of[ray % scan]).collect();
-        variable(name, &["ray"], Data::F64(values), units).text("long_name", text)
+        let values = (0..rays).map(|ray| of[ray % scan]);
+        variable(name, &["ray"], Data::f64(values), units).text("long_name", text)
     };
     let azimuth = (!signals.azimuth_rad.is_empty())
         .then(|| value("azimuth", &signals.azimuth_rad, "rad", "azimuth of the line of sight, clockwise from north"));
@@ -77,7 +77,7 @@ fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
 fn recording(signals: &RawSignals<'_>) -> Vec<Variable> {
     let r = &signals.recording;
     let scalar = |name: &str, value: f64, units: &str, text: &str| {
-        variable(name, &[], Data::F64(vec![value]), units).text("long_name", text)
+        variable(name, &[], Data::f64([value]), units).text("long_name", text)
     };
     vec![
         scalar("sampling_frequency", r.sampling_hz, "Hz", "sampling frequency"),
@@ -104,14 +104,14 @@ fn recording(signals: &RawSignals<'_>) -> Vec<Variable> {
 fn truth(signals: &RawSignals<'_>) -> Vec<Variable> {
     let elevation = signals.first_pulse.iter().filter_map(|first| signals.elevation_rad.get(*first));
     vec![
-        variable("range", &["range"], Data::F64(signals.truth.range_m.clone()), "m")
+        variable("range", &["range"], Data::f64(signals.truth.range_m.clone()), "m")
             .text("long_name", "range of the true velocities"),
-        variable("line_elevation", &["line"], Data::F64(elevation.copied().collect()), "rad")
+        variable("line_elevation", &["line"], Data::f64(elevation.copied()), "rad")
             .text("long_name", "elevation of the line of sight above the horizon"),
         variable("radial_velocity", &["line", "range"], Data::filled(signals.truth.radial_velocity_m_s), "m s-1")
             .text("standard_name", "radial_velocity_of_scatterers_away_from_instrument")
             .text("long_name", "true radial velocity of the air on the line of sight, positive away from the lidar")
-            .attr("_FillValue", Attr::F32(FILL)),
+            .attr("_FillValue", Data::f32([FILL])),
     ]
 }
 

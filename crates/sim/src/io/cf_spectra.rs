@@ -12,7 +12,7 @@ use crate::measure::recorded::Spectra;
 /// A result too large for one file.
 pub fn cf_spectra_bytes(spectra: &Spectra, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     let axis = |name: &'static str, dims: &'static [&'static str], values: &[f64], units: &str, text: &str| {
-        Variable::new(name, dims, Data::F64(values.to_vec())).text("units", units).text("long_name", text)
+        Variable::new(name, dims, Data::f64(values.iter().copied())).text("units", units).text("long_name", text)
     };
     let variables = vec![
         axis(
@@ -25,7 +25,7 @@ pub fn cf_spectra_bytes(spectra: &Spectra, provenance: &Provenance) -> OutputRes
         axis("range", &["range"], &spectra.range_m, "m", "range to the centre of the window"),
         axis("elevation", &["line"], &spectra.elevation_rad, "rad", "elevation of the line of sight above the horizon"),
         axis("time", &["line"], &spectra.time_s, "s", "time of the line"),
-        Variable::new("density", &["line", "range", "velocity"], Data::F32(spectra.density.clone()))
+        Variable::new("density", &["line", "range", "velocity"], Data::f32(spectra.density.iter().copied()))
             .text("units", "1")
             .text("long_name", "mean power density of the region of a gate over that of noise"),
     ];

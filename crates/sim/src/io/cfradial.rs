@@ -5,7 +5,7 @@
 
 use super::error::{OutputError, OutputResult};
 use super::map::{Field, FieldKind, Unit, VelocityMap};
-use super::netcdf::{Attr, Data, FILL, Layout, Variable};
+use super::netcdf::{Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
 use super::site::MAX_TIME_S;
 use crate::setup::beams::SweepMode;
@@ -96,10 +96,9 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
     let spacing = if gates.len() > 1 { gates[1] - gates[0] } else { 0.0 };
     // Gate centres come from sums and products of a few terms: equal to a part in 1e6 is constant.
     let constant = gates.windows(2).all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
-    let degrees =
-        |angle: fn(&super::map::Ray) -> f64| Data::F32(map.rays.iter().map(|r| angle(r).to_degrees() as f32).collect());
+    let degrees = |angle: fn(&super::map::Ray) -> f64| Data::f32(map.rays.iter().map(|r| angle(r).to_degrees() as f32));
     vec![
-        Variable::new("time", &["time"], Data::F64(times))
+        Variable::new("time", &["time"], Data::f64(times))
             .text("standard_name", "time")
             .text("long_name", "time since the start of the flow")
             .text("units", &format!("seconds since {}", map.site.start))
@@ -109,8 +108,8 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
             .text("long_name", "range to centre of measurement volume")
             .text("units", "meters")
             .text("spacing_is_constant", if constant { "true" } else { "false" })
-            .attr("meters_to_center_of_first_gate", Attr::F32(gates[0] as f32))
-            .attr("meters_between_gates", Attr::F32(spacing as f32))
+            .attr("meters_to_center_of_first_gate", Data::f32([gates[0] as f32]))
+            .attr("meters_between_gates", Data::f32([spacing as f32]))
             .text("axis", "radial_range_coordinate"),
         Variable::new("azimuth", &["time"], degrees(|r| turn(r.azimuth_rad)))
             .text("standard_name", "ray_azimuth_angle")
@@ -156,7 +155,7 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
         None => vec![place(here_m)],
     };
     let dims = if map.carrier.is_some() { EACH } else { ONE };
-    let values = |d: usize| Data::F64(places.iter().map(|p| p[d]).collect());
+    let values = |d: usize| Data::f64(places.iter().map(|p| p[d]));
     let mut out = vec![
         Variable::new("latitude", dims, values(0)).text("standard_name", "latitude").text("units", "degrees_north"),
         Variable::new("longitude", dims, values(1)).text("standard_name", "longitude").text("units", "degrees_east"),
@@ -191,7 +190,7 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
             ("vertical_velocity", METRES, "upward velocity of the platform", each(&|i| carrier[i].1[2] as f32)),
         ];
         out.extend(motion.map(|(name, units, long_name, values)| {
-            Variable::new(name, EACH, Data::F32(values)).text("long_name", long_name).text("units", units)
+            Variable::new(name, EACH, Data::f32(values)).text("long_name", long_name).text("units", units)
         }));
     }
     out
@@ -199,8 +198,8 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
 
 fn sweeps(map: &VelocityMap) -> Vec<Variable> {
     let bounds = map.sweep_bounds();
-    let ints = |values: &mut dyn Iterator<Item = usize>| Data::I32(values.map(|v| v as i32).collect());
-    let floats = |get: fn(&super::map::Sweep) -> f64| Data::F32(map.sweeps.iter().map(|s| get(s) as f32).collect());
+    let ints = |values: &mut dyn Iterator<Item = usize>| Data::i32(values.map(|v| v as i32));
+    let floats = |get: fn(&super::map::Sweep) -> f64| Data::f32(map.sweeps.iter().map(|s| get(s) as f32));
     let is_rhi = map.sweeps.iter().all(|sweep| sweep.mode == SweepMode::Rhi);
     let fixed = floats(|s| {
         let angle_rad = if s.mode == SweepMode::Rhi { turn(s.fixed_angle_rad) } else { s.fixed_angle_rad };
@@ -208,7 +207,7 @@ fn sweeps(map: &VelocityMap) -> Vec<Variable> {
     });
     let fixed_name = if is_rhi { "azimuth of the scan plane" } else { "angle that stays during the sweep" };
     let mut out = vec![
-        Variable::new("volume_number", &[], Data::I32(vec![0])).text("long_name", "volume number"),
+        Variable::new("volume_number", &[], Data::i32([0])).text("long_name", "volume number"),
         Variable::new("sweep_number", &["sweep"], ints(&mut (0..bounds.len())))
             .text("long_name", "sweep number, from 0"),
         Variable::new("fixed_angle", &["sweep"], fixed).text("long_name", fixed_name).text("units", "degrees"),
@@ -233,8 +232,8 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
     const EACH: &[&str] = &["sweep", "string_length_32"];
     let start = map.site.start;
     let time = |ray: Option<&super::map::Ray>| start.after_s(ray.map_or(0.0, |r| r.time_s)).to_string();
-    let one = |name: &str, text: &str| Variable::new(name, ONE, Data::Char(padded(text)));
-    let each = |name: &str, text: &str| Variable::new(name, EACH, Data::Char(padded(text).repeat(map.sweeps.len())));
+    let one = |name: &str, text: &str| Variable::new(name, ONE, Data::text(padded(text)));
+    let each = |name: &str, text: &str| Variable::new(name, EACH, Data::text(padded(text).repeat(map.sweeps.len())));
     vec![
         one("time_coverage_start", &time(map.rays.first())),
         one("time_coverage_end", &time(map.rays.last())),
@@ -242,7 +241,11 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
         one("platform_type", if map.carrier.is_some() { "aircraft" } else { "fixed" }),
         one("instrument_type", "lidar"),
         one("primary_axis", "axis_z"),
-        Variable::new("sweep_mode", EACH, Data::Char(map.sweeps.iter().flat_map(|s| padded(s.mode.name())).collect())),
+        Variable::new(
+            "sweep_mode",
+            EACH,
+            Data::text(map.sweeps.iter().flat_map(|s| padded(s.mode.name())).collect::<Vec<u8>>()),
+        ),
         each("follow_mode", "none"),
         each("prt_mode", "fixed"),
     ]
@@ -250,41 +253,23 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
 
 fn instrument(map: &VelocityMap) -> Vec<Variable> {
     let (rays, pulse) = (map.rays.len(), &map.pulse);
-    let each = |value: f64| Data::F32(vec![value as f32; rays]);
     let samples = map.ray_pulses.clone().unwrap_or_else(|| vec![pulse.samples; rays]);
+    let samples = Data::i32(samples.into_iter().map(|n| i32::try_from(n).unwrap_or(i32::MAX)));
     let group = |v: Variable, units: &str| v.text("units", units).text("meta_group", "instrument_parameters");
-    let named =
-        |name: &str, data: Data, long_name: &str| Variable::new(name, &["time"], data).text("long_name", long_name);
+    let each = |name: &str, value: f64, long_name: &str| {
+        Variable::new(name, &["time"], single(&vec![value; rays])).text("long_name", long_name)
+    };
     let folding = if pulse.is_mirrored() { MIRRORED } else { "modulo" };
+    let frequency = Variable::new("frequency", &["frequency"], single(&[pulse.frequency_hz]));
+    let width = "full width at half maximum of the power of the pulse";
+    let nyquist = "largest velocity that the samples tell from others";
     vec![
-        group(
-            Variable::new("frequency", &["frequency"], Data::F32(vec![pulse.frequency_hz as f32]))
-                .text("standard_name", "radiation_frequency"),
-            "s-1",
-        ),
-        group(named("prt", each(pulse.prt_s), "time between pulses"), "seconds"),
-        group(
-            named("pulse_width", each(pulse.pulse_width_s), "full width at half maximum of the power of the pulse"),
-            "seconds",
-        ),
-        group(
-            named(
-                "nyquist_velocity",
-                each(pulse.nyquist_velocity_m_s),
-                "largest velocity that the samples tell from others",
-            )
-            .text("folding", folding),
-            METRES,
-        ),
-        group(
-            named(
-                "n_samples",
-                Data::I32(samples.into_iter().map(|n| i32::try_from(n).unwrap_or(i32::MAX)).collect()),
-                "pulses of the ray",
-            ),
-            "1",
-        ),
-        Variable::new("antenna_transition", &["time"], Data::I8(vec![0; rays]))
+        group(frequency.text("standard_name", "radiation_frequency"), "s-1"),
+        group(each("prt", pulse.prt_s, "time between pulses"), "seconds"),
+        group(each("pulse_width", pulse.pulse_width_s, width), "seconds"),
+        group(each("nyquist_velocity", pulse.nyquist_velocity_m_s, nyquist).text("folding", folding), METRES),
+        group(Variable::new("n_samples", &["time"], samples).text("long_name", "pulses of the ray"), "1"),
+        Variable::new("antenna_transition", &["time"], Data::i8(vec![0; rays]))
             .text("long_name", "1 while the telescope moves between sweeps"),
     ]
 }
@@ -325,7 +310,7 @@ fn field_variable(field: &Field) -> Variable {
     const DIMS: &[&str] = &["time", "range"];
     let data = match &field.kind {
         FieldKind::Float => Data::filled(&field.values),
-        FieldKind::Flag { .. } => Data::I8(field.values.iter().map(|v| *v as i8).collect()),
+        FieldKind::Flag { .. } => Data::i8(field.values.iter().map(|v| *v as i8)),
     };
     let mut out = Variable::new(&field.name, DIMS, data)
         .text("long_name", &field.long_name)
@@ -341,18 +326,17 @@ fn field_variable(field: &Field) -> Variable {
         out = out.text("ancillary_variables", &field.ancillary.join(" "));
     }
     match &field.kind {
-        FieldKind::Float => out.attr("_FillValue", Attr::F32(FILL)),
+        FieldKind::Float => out.attr("_FillValue", Data::f32([FILL])),
         // A fill value would make xarray turn the flags into floats.
         FieldKind::Flag { meanings } => {
             let words: Vec<&str> = meanings.iter().map(|(_, m)| m.as_str()).collect();
-            out.attr("flag_values", Attr::I8(meanings.iter().map(|(c, _)| *c).collect()))
-                .text("flag_meanings", &words.join(" "))
+            out.attr("flag_values", Data::i8(meanings.iter().map(|(c, _)| *c))).text("flag_meanings", &words.join(" "))
         }
     }
 }
 
 fn single(values: &[f64]) -> Data {
-    Data::F32(values.iter().map(|v| *v as f32).collect())
+    Data::f32(values.iter().map(|v| *v as f32))
 }
 
 /// Angle in 0 .. 2 pi.

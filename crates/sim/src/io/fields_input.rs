@@ -111,7 +111,7 @@ fn component(
     let nodes_m = [nodes(file, x, place)?, nodes(file, y, place)?, nodes(file, z, place)?];
     let values = match is_velocity {
         true => file.velocities(name, &dims, place)?,
-        false => file.ordered_part(name, &dims, place)?,
+        false => file.ordered(name, &dims, place)?,
     };
     if let Some(at) = values.iter().position(|v| !v.is_finite()) {
         return Err(format!("{name} is missing or not finite at place {at}: cut what the terrain hides, or fill it"));
@@ -145,7 +145,7 @@ fn levels(file: &mut NetcdfFile, staggered: bool, place: Option<usize>) -> Resul
         let dims = file.roles(name, [TIME, Z, Y, X]).map(|[_, z, y, x]| [z, y, x]);
         dims.or_else(|_| file.roles(name, [Z, Y, X])).and_then(|dims| {
             let count = file.length(&dims[0]).unwrap_or(0) as usize;
-            Ok((count, file.ordered_part(name, &dims, place)?))
+            Ok((count, file.ordered(name, &dims, place)?))
         })
     });
     let [(count, disturbed), (_, base)] = match both {
@@ -178,15 +178,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fields_0001.nc");
         let wind = |name: &str| {
-            let values = (0..64).map(|i| 100.0 * f64::from(i)).collect();
-            Variable::new(name, &["time", "z", "y", "x"], Data::F64(values)).text("units", "cm s-1")
+            let values = (0..64).map(|i| 100.0 * f64::from(i));
+            Variable::new(name, &["time", "z", "y", "x"], Data::f64(values)).text("units", "cm s-1")
         };
         let axis = |name: &str, dims: &'static [&'static str]| {
-            Variable::new(name, dims, Data::F64((0..4).map(|i| 0.01 * f64::from(i)).collect())).text("units", "km")
+            Variable::new(name, dims, Data::f64((0..4).map(|i| 0.01 * f64::from(i)))).text("units", "km")
         };
-        let time = Variable::new("time", &["time"], Data::F64(vec![0.5])).text("units", "days since 2024-01-01");
+        let time = Variable::new("time", &["time"], Data::f64([0.5])).text("units", "days since 2024-01-01");
         let scalar =
-            Variable::new("beta", &["time", "z", "y", "x"], Data::F64(vec![2.0; 64])).text("units", "km-1 sr-1");
+            Variable::new("beta", &["time", "z", "y", "x"], Data::f64(vec![2.0; 64])).text("units", "km-1 sr-1");
         let variables = vec![
             time,
             axis("z", &["z"]),

@@ -15,14 +15,8 @@ use wakescope_les::winds::{Edges, Side};
 pub enum Unit {
     /// Dimensionless; no tag.
     One,
-    /// Metre, tag `m`.
-    Metre,
     /// Metre per second, tag `m_s`.
     MetrePerSecond,
-    /// Square metre per second, tag `m2_s`.
-    SquareMetrePerSecond,
-    /// Hertz, tag `hz`.
-    Hertz,
     /// Decibel, tag `db`.
     Decibel,
 }
@@ -32,10 +26,7 @@ impl Unit {
     pub fn tag(self) -> &'static str {
         match self {
             Self::One => "",
-            Self::Metre => "m",
             Self::MetrePerSecond => "m_s",
-            Self::SquareMetrePerSecond => "m2_s",
-            Self::Hertz => "hz",
             Self::Decibel => "db",
         }
     }
@@ -44,10 +35,7 @@ impl Unit {
     pub fn udunits(self) -> &'static str {
         match self {
             Self::One => "1",
-            Self::Metre => "m",
             Self::MetrePerSecond => "m s-1",
-            Self::SquareMetrePerSecond => "m2 s-1",
-            Self::Hertz => "Hz",
             Self::Decibel => "dB",
         }
     }

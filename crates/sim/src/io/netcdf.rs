@@ -16,76 +16,55 @@ const LARGEST_VARIABLE: u64 = u32::MAX as u64 - 3;
 /// Stored in place of a missing float.
 pub(crate) const FILL: f32 = -9999.0;
 
-/// Values of a variable in their stored type.
-pub(crate) enum Data {
-    F64(Vec<f64>),
-    F32(Vec<f32>),
-    I32(Vec<i32>),
-    I8(Vec<i8>),
-    Char(Vec<u8>),
+/// Values of a variable or of an attribute as they stand in the file, without what fills the last word.
+pub(crate) struct Data {
+    /// Code of their type in the format.
+    code: usize,
+    /// Bytes of a value.
+    width: usize,
+    bytes: Vec<u8>,
 }
 
 impl Data {
+    fn new<const N: usize>(code: usize, values: impl Iterator<Item = [u8; N]>) -> Self {
+        let mut bytes = Vec::with_capacity(N * values.size_hint().0);
+        values.for_each(|value| bytes.extend(value));
+        Self { code, width: N, bytes }
+    }
+
+    pub(crate) fn i8(values: impl IntoIterator<Item = i8>) -> Self {
+        Self::new(1, values.into_iter().map(i8::to_be_bytes))
+    }
+
+    pub(crate) fn text(text: impl Into<Vec<u8>>) -> Self {
+        Self { code: 2, width: 1, bytes: text.into() }
+    }
+
+    pub(crate) fn i32(values: impl IntoIterator<Item = i32>) -> Self {
+        Self::new(4, values.into_iter().map(i32::to_be_bytes))
+    }
+
+    pub(crate) fn f32(values: impl IntoIterator<Item = f32>) -> Self {
+        Self::new(5, values.into_iter().map(f32::to_be_bytes))
+    }
+
+    pub(crate) fn f64(values: impl IntoIterator<Item = f64>) -> Self {
+        Self::new(6, values.into_iter().map(f64::to_be_bytes))
+    }
+
+    /// 32-bit floats with [`FILL`] for NaN.
+    pub(crate) fn filled<'a>(values: impl IntoIterator<Item = &'a f64>) -> Self {
+        Self::f32(values.into_iter().map(|v| if v.is_nan() { FILL } else { *v as f32 }))
+    }
+
     fn len(&self) -> usize {
-        match self {
-            Self::F64(v) => v.len(),
-            Self::F32(v) => v.len(),
-            Self::I32(v) => v.len(),
-            Self::I8(v) => v.len(),
-            Self::Char(v) => v.len(),
-        }
-    }
-
-    /// Code of the type in the format, and bytes of a value.
-    fn kind(&self) -> (u32, usize) {
-        match self {
-            Self::I8(_) => (1, 1),
-            Self::Char(_) => (2, 1),
-            Self::I32(_) => (4, 4),
-            Self::F32(_) => (5, 4),
-            Self::F64(_) => (6, 8),
-        }
-    }
-
-    fn bytes(&self) -> usize {
-        self.len() * self.kind().1
-    }
-
-    /// The values as they stand in the file, without what fills the last word.
-    fn into_encoded(self) -> Vec<u8> {
-        match self {
-            Self::F64(v) => v.iter().flat_map(|v| v.to_be_bytes()).collect(),
-            Self::F32(v) => v.iter().flat_map(|v| v.to_be_bytes()).collect(),
-            Self::I32(v) => v.iter().flat_map(|v| v.to_be_bytes()).collect(),
-            Self::I8(v) => v.iter().flat_map(|v| v.to_be_bytes()).collect(),
-            Self::Char(v) => v,
-        }
+        self.bytes.len() / self.width
     }
 
     /// What fills the last word.
     fn padding(&self) -> u8 {
         // The value that the library of NetCDF stores where nothing was written.
-        if matches!(self, Self::I8(_)) { (-127_i8) as u8 } else { 0 }
-    }
-
-    /// 32-bit floats with [`FILL`] for NaN.
-    pub(crate) fn filled<'a>(values: impl IntoIterator<Item = &'a f64>) -> Self {
-        let store = |v: &f64| if v.is_nan() { FILL } else { *v as f32 };
-        Self::F32(values.into_iter().map(store).collect())
-    }
-}
-
-/// Value of an attribute.
-pub(crate) enum Attr {
-    Text(String),
-    F32(f32),
-    F64(f64),
-    I8(Vec<i8>),
-}
-
-impl From<&str> for Attr {
-    fn from(text: &str) -> Self {
-        Self::Text(text.into())
+        if self.code == 1 { (-127_i8) as u8 } else { 0 }
     }
 }
 
@@ -94,7 +73,7 @@ pub(crate) struct Variable {
     pub(crate) name: String,
     pub(crate) dims: &'static [&'static str],
     pub(crate) data: Data,
-    pub(crate) attrs: Vec<(&'static str, Attr)>,
+    pub(crate) attrs: Vec<(&'static str, Data)>,
     /// The first of its values that are here, of a variable that ranks share.
     pub(crate) first: Option<usize>,
 }
@@ -110,13 +89,12 @@ impl Variable {
     }
 
     /// Adds a text attribute.
-    pub(crate) fn text(mut self, name: &'static str, value: &str) -> Self {
-        self.attrs.push((name, value.into()));
-        self
+    pub(crate) fn text(self, name: &'static str, value: &str) -> Self {
+        self.attr(name, Data::text(value))
     }
 
     /// Adds an attribute of any type.
-    pub(crate) fn attr(mut self, name: &'static str, value: Attr) -> Self {
+    pub(crate) fn attr(mut self, name: &'static str, value: Data) -> Self {
         self.attrs.push((name, value));
         self
     }
@@ -152,7 +130,7 @@ impl Layout {
         self.check()?;
         self.globals.extend(provenance.entries());
         self.check_names()?;
-        let sizes: Vec<u64> = self.variables.iter().map(|v| (self.count(v) * v.data.kind().1) as u64).collect();
+        let sizes: Vec<u64> = self.variables.iter().map(|v| (self.count(v) * v.data.width) as u64).collect();
         if let Some(size) = sizes.iter().find(|size| **size > LARGEST_VARIABLE) {
             let reason = format!("a variable of {size} bytes, at most {LARGEST_VARIABLE}: take fewer cells");
             return Err(OutputError::Unsupported { format: "NetCDF", reason });
@@ -172,11 +150,10 @@ impl Layout {
             parts.push((0, self.head(&sizes, &begins)));
         }
         for (variable, begin) in self.variables.into_iter().zip(begins) {
-            let (padding, each) = (variable.data.padding(), variable.data.kind().1);
+            let (padding, each, mut bytes) = (variable.data.padding(), variable.data.width, variable.data.bytes);
             match variable.first {
-                Some(first) => parts.push((begin + (first * each) as u64, variable.data.into_encoded())),
+                Some(first) => parts.push((begin + (first * each) as u64, bytes)),
                 None if is_first => {
-                    let mut bytes = variable.data.into_encoded();
                     bytes.resize(bytes.len().next_multiple_of(4), padding);
                     parts.push((begin, bytes));
                 }
@@ -203,7 +180,7 @@ impl Layout {
             }
         }
         let own = self.variables.iter().filter(|variable| variable.first.is_none());
-        let total: usize = own.map(|v| v.data.bytes()).sum();
+        let total: usize = own.map(|v| v.data.bytes.len()).sum();
         if total > MAX_BYTES {
             return Err(OutputError::Unsupported {
                 format: "NetCDF",
@@ -244,7 +221,7 @@ impl Layout {
         }
         head.list(0x0C, self.globals.len());
         for (name, text) in &self.globals {
-            head.attribute(name, 2, text.len(), text.as_bytes());
+            head.attribute(name, &Data::text(text.as_str()));
         }
         head.list(0x0B, self.variables.len());
         for ((variable, size), begin) in self.variables.iter().zip(sizes).zip(begins) {
@@ -256,17 +233,9 @@ impl Layout {
             }
             head.list(0x0C, variable.attrs.len());
             for (name, value) in &variable.attrs {
-                match value {
-                    Attr::Text(text) => head.attribute(name, 2, text.len(), text.as_bytes()),
-                    Attr::F32(value) => head.attribute(name, 5, 1, &value.to_be_bytes()),
-                    Attr::F64(value) => head.attribute(name, 6, 1, &value.to_be_bytes()),
-                    Attr::I8(values) => {
-                        let bytes: Vec<u8> = values.iter().map(|value| *value as u8).collect();
-                        head.attribute(name, 1, values.len(), &bytes);
-                    }
-                }
+                head.attribute(name, value);
             }
-            head.number(variable.data.kind().0 as usize);
+            head.number(variable.data.code);
             head.number(size.next_multiple_of(4) as usize);
             head.0.extend(begin.to_be_bytes());
         }
@@ -293,11 +262,11 @@ impl Head {
         self.bytes(name.as_bytes());
     }
 
-    fn attribute(&mut self, name: &str, code: usize, count: usize, bytes: &[u8]) {
+    fn attribute(&mut self, name: &str, value: &Data) {
         self.name(name);
-        self.number(code);
-        self.number(count);
-        self.bytes(bytes);
+        self.number(value.code);
+        self.number(value.len());
+        self.bytes(&value.bytes);
     }
 
     fn bytes(&mut self, bytes: &[u8]) {
@@ -317,14 +286,13 @@ mod tests {
             dims: vec![("time", 3), ("range", 2), ("letters", 5)],
             globals: vec![("title", "A, b".into()), ("empty", String::new())],
             variables: vec![
-                Variable::new("v", &["time", "range"], Data::F32((0..6).map(|i| i as f32 - 2.5).collect()))
+                Variable::new("v", &["time", "range"], Data::f32((0..6).map(|i| i as f32 - 2.5)))
                     .text("units", "m s-1")
-                    .attr("_FillValue", Attr::F32(FILL)),
-                Variable::new("once", &[], Data::F64(vec![1.0 / 3.0])),
-                Variable::new("flag", &["letters"], Data::I8(vec![1, -2, 3, 4, 5]))
-                    .attr("values", Attr::I8(vec![1, 2])),
-                Variable::new("word", &["letters"], Data::Char(b"lidar".to_vec())),
-                Variable::new("count", &["time"], Data::I32(vec![7, -8, 9])).text("long_name", ""),
+                    .attr("_FillValue", Data::f32([FILL])),
+                Variable::new("once", &[], Data::f64([1.0 / 3.0])),
+                Variable::new("flag", &["letters"], Data::i8([1, -2, 3, 4, 5])).attr("values", Data::i8([1, 2])),
+                Variable::new("word", &["letters"], Data::text("lidar")),
+                Variable::new("count", &["time"], Data::i32([7, -8, 9])).text("long_name", ""),
             ],
         }
     }
@@ -362,7 +330,7 @@ mod tests {
     fn parts_of_several_ranks_are_the_file_of_one() {
         let rank = |first: usize, values: &[f32]| {
             let mut layout = layout();
-            layout.variables[0].data = Data::F32(values.to_vec());
+            layout.variables[0].data = Data::f32(values.iter().copied());
             layout.variables[0].first = Some(first);
             layout.into_parts(&example(), first == 0).unwrap()
         };
@@ -396,7 +364,7 @@ mod tests {
         let layout = Layout {
             dims: vec![("time", 3), ("range", 2)],
             globals: vec![],
-            variables: vec![Variable::new("v", &["time", "range"], Data::F32(vec![0.0; 5]))],
+            variables: vec![Variable::new("v", &["time", "range"], Data::f32([0.0; 5]))],
         };
         let error = layout.into_bytes(&example()).unwrap_err();
         assert!(matches!(error, OutputError::Length { expected: 6, actual: 5, .. }), "{error}");

@@ -23,7 +23,7 @@ const MOST_EXPANDED: f64 = 1032.0;
 
 /// A file whose groups are sound, and how long it is.
 pub(super) struct Nc4File {
-    pub(super) file: NcFile,
+    file: NcFile,
     bytes: u64,
 }
 
@@ -52,11 +52,63 @@ impl Nc4File {
         Ok(Self { file: NcFile::open(path).map_err(|_| UNREADABLE.to_owned())?, bytes })
     }
 
-    /// Values of a variable, unpacked and NaN where they are missing: all, or those at one place of its slowest dimension.
+    /// Names of the root, which is empty, and of the groups in it.
+    ///
+    /// # Errors
+    /// A damaged file.
+    pub(super) fn groups(&self) -> Result<Vec<String>, String> {
+        let root = self.file.root_group().map_err(|_| UNREADABLE.to_owned())?;
+        Ok(std::iter::once(String::new()).chain(root.groups.iter().map(|group| group.name.clone())).collect())
+    }
+
+    /// Dimensions and variables of a group, with the attributes of the root.
+    ///
+    /// # Errors
+    /// A damaged file, no such group.
+    pub(super) fn header(&self, group: &str) -> Result<Header, String> {
+        let root = self.file.root_group().map_err(|_| UNREADABLE.to_owned())?;
+        let own = if group.is_empty() { Some(root) } else { root.groups.iter().find(|own| own.name == group) };
+        let mut header = Header { attributes: attributes(&root.attributes), ..Header::default() };
+        for variable in &own.ok_or(UNREADABLE)?.variables {
+            let mut dims = Vec::new();
+            for dim in variable.dimensions() {
+                let known = header.dims.iter().position(|(name, size)| *name == dim.name && *size == dim.size);
+                dims.push(known.unwrap_or_else(|| {
+                    header.dims.push((dim.name.clone(), dim.size));
+                    header.dims.len() - 1
+                }));
+            }
+            let number = match variable.dtype() {
+                NcType::Byte | NcType::Short | NcType::Int | NcType::Float | NcType::Double => NumberType::F64,
+                NcType::UByte | NcType::UShort | NcType::UInt | NcType::Int64 | NcType::UInt64 => NumberType::F64,
+                _ => NumberType::Text,
+            };
+            let run = variable.shape().iter().try_fold(1_u64, |n, length| n.checked_mul(*length));
+            header.variables.push(Variable {
+                name: variable.name().to_owned(),
+                dims,
+                attributes: attributes(variable.attributes()),
+                number,
+                begin: 0,
+                run: run.ok_or("a variable has more values than can be counted")?,
+                runs: 1,
+            });
+        }
+        Ok(header)
+    }
+
+    /// Values of a variable of a group, unpacked and NaN where they are missing: all, or those at one place of its slowest dimension.
     ///
     /// # Errors
     /// A variable that is damaged, packed in a way that is not read, or larger than the file and the memory can hold.
-    pub(super) fn read(&self, name: &str, shape: &[u64], place: Option<usize>) -> Result<Vec<f64>, String> {
+    pub(super) fn read(
+        &self,
+        group: &str,
+        name: &str,
+        shape: &[u64],
+        place: Option<usize>,
+    ) -> Result<Vec<f64>, String> {
+        let path = if group.is_empty() { name.to_owned() } else { format!("{group}/{name}") };
         let place = place.filter(|_| !shape.is_empty());
         let numbers: f64 = shape[usize::from(place.is_some())..].iter().map(|length| *length as f64).product();
         if numbers > MOST_EXPANDED * self.bytes as f64 {
@@ -68,50 +120,14 @@ impl Nc4File {
             Some(place) => {
                 let mut part = NcSliceInfo::all(shape.len());
                 part.selections[0] = NcSliceInfoElem::Index(place as u64);
-                self.file.read_variable_slice_unpacked_masked(name, &part)
+                self.file.read_variable_slice_unpacked_masked(&path, &part)
             }
-            None => self.file.read_variable_unpacked_masked(name),
+            None => self.file.read_variable_unpacked_masked(&path),
         };
         let values = values.map_err(|_| format!("variable {name} cannot be read: {UNREADABLE}"))?;
         // The library knows fills that the file states, not those of values that were never written.
         Ok(values.into_iter().map(|value| if is_default_fill(value) { f64::NAN } else { value }).collect())
     }
-}
-
-/// Opens a file; dimensions, variables and attributes of its root group.
-///
-/// # Errors
-/// As [`Nc4File::open`].
-pub(super) fn open(path: &Path) -> Result<(Nc4File, Header), String> {
-    let file = Nc4File::open(path)?;
-    let root = file.file.root_group().map_err(|_| UNREADABLE.to_owned())?;
-    let mut header = Header { attributes: attributes(&root.attributes), ..Header::default() };
-    for variable in &root.variables {
-        let mut dims = Vec::new();
-        for dim in variable.dimensions() {
-            let known = header.dims.iter().position(|(name, size)| *name == dim.name && *size == dim.size);
-            dims.push(known.unwrap_or_else(|| {
-                header.dims.push((dim.name.clone(), dim.size));
-                header.dims.len() - 1
-            }));
-        }
-        let number = match variable.dtype() {
-            NcType::Byte | NcType::Short | NcType::Int | NcType::Float | NcType::Double => NumberType::F64,
-            NcType::UByte | NcType::UShort | NcType::UInt | NcType::Int64 | NcType::UInt64 => NumberType::F64,
-            _ => NumberType::Text,
-        };
-        let run = variable.shape().iter().try_fold(1_u64, |n, length| n.checked_mul(*length));
-        header.variables.push(Variable {
-            name: variable.name().to_owned(),
-            dims,
-            attributes: attributes(variable.attributes()),
-            number,
-            begin: 0,
-            run: run.ok_or("a variable has more values than can be counted")?,
-            runs: 1,
-        });
-    }
-    Ok((file, header))
 }
 
 fn attributes(list: &[NcAttribute]) -> Vec<(String, Attribute)> {
@@ -202,7 +218,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.nc");
         std::fs::write(&path, bytes).unwrap();
-        open(&path)
+        let file = Nc4File::open(&path)?;
+        let header = file.header("")?;
+        Ok((file, header))
     }
 
     #[test]
@@ -225,7 +243,7 @@ mod tests {
             let root = object(&[("g", 96 + object(&[("g", 0)], &[]).len() as u64)], &[]);
             let (file, header) = opened(&file(&[root, array(&[count], u64::MAX)])).unwrap();
             assert_eq!(header.variables[0].run, count);
-            file.read("g", &[count], None)
+            file.read("", "g", &[count], None)
         };
         assert_eq!(read(5).map(|values| values.len()), Ok(5));
         let refused = read(1 << 24).unwrap_err();

@@ -3,7 +3,7 @@
 //!
 //! Nothing of the file is repeated in a message. Check: each word of a good header is replaced by large and negative counts.
 
-use crate::io::number::NumberType;
+use crate::io::number::{ByteOrder, NumberType};
 
 /// A variable of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +27,16 @@ pub(crate) enum Attribute {
     Text(String),
     /// The first number.
     Number(f64),
+}
+
+impl Attribute {
+    pub(crate) fn text(&self) -> Option<&str> {
+        if let Self::Text(text) = self { Some(text) } else { None }
+    }
+
+    pub(crate) fn number(&self) -> Option<f64> {
+        if let Self::Number(value) = self { Some(*value) } else { None }
+    }
 }
 
 /// What the file holds.
@@ -203,7 +213,7 @@ impl<'a> Words<'a> {
             if number == NumberType::Text {
                 found.push((name, Attribute::Text(String::from_utf8_lossy(values).trim_end_matches('\0').to_owned())));
             } else if let Some(first) = values.get(..number.bytes() as usize) {
-                found.push((name, Attribute::Number(number.value(first))));
+                found.push((name, Attribute::Number(number.value(first, ByteOrder::Big))));
             }
         }
         Ok(found)

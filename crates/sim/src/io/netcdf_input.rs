@@ -6,7 +6,7 @@
 //! back what the writers wrote; files of another hand and damaged ones in the tests below.
 
 use crate::io::netcdf_header::{self as header, Attribute, Header, Variable, is_default_fill};
-use crate::io::number::NumberType;
+use crate::io::number::{ByteOrder, NumberType};
 use crate::io::units::Quantity;
 use crate::{Error, io::text_file, machine};
 use std::fs::File;
@@ -54,7 +54,7 @@ pub(crate) const Z: Role = Role {
     ],
 };
 
-/// A NetCDF file, open.
+/// A NetCDF file, open, or a group of one.
 pub(crate) struct NetcdfFile {
     path: PathBuf,
     numbers: Numbers,
@@ -64,8 +64,9 @@ pub(crate) struct NetcdfFile {
 /// What the numbers of a file are read from.
 enum Numbers {
     Classic(File),
+    /// A group of a NetCDF-4 file, whose name is empty for the root.
     #[cfg(feature = "netcdf4")]
-    Hdf5(Box<super::netcdf4_input::Nc4File>),
+    Hdf5(std::rc::Rc<super::netcdf4_input::Nc4File>, String),
 }
 
 /// Where the numbers of a variable are.
@@ -77,37 +78,57 @@ pub(crate) struct NumbersInFile {
     pub(crate) stride: Option<u64>,
 }
 
-/// Opens a NetCDF file and reads its header.
+/// Opens a NetCDF file and reads its header, in NetCDF-4 that of its root.
 ///
 /// # Errors
 /// What the system says; a file of another kind, or one whose header does not fit its length.
 pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
-    #[cfg(feature = "netcdf4")]
-    {
-        let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
-        let mut magic = Vec::new();
-        text_file::open(path).and_then(|(file, _)| file.take(4).read_to_end(&mut magic)).map_err(unreadable)?;
-        if magic == b"\x89HDF" {
-            let (file, header) =
-                super::netcdf4_input::open(path).map_err(|reason| Error::Input { path: path.to_owned(), reason })?;
-            return Ok(NetcdfFile { path: path.to_owned(), numbers: Numbers::Hdf5(Box::new(file)), header });
-        }
-    }
-    open_classic(path)
-}
-
-/// The same of a classic file alone, whose numbers lie where [`NetcdfFile::layout`] says.
-///
-/// # Errors
-/// As [`open`]; a NetCDF-4 file.
-pub(crate) fn open_classic(path: &Path) -> Result<NetcdfFile, Error> {
     let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
+    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
     let (mut file, length) = text_file::open(path).map_err(unreadable)?;
     let mut beginning = Vec::new();
+    Read::by_ref(&mut file).take(4).read_to_end(&mut beginning).map_err(unreadable)?;
+    #[cfg(feature = "netcdf4")]
+    if beginning == b"\x89HDF" {
+        let file = std::rc::Rc::new(super::netcdf4_input::Nc4File::open(path).map_err(refuse)?);
+        return of_group(path, &file, String::new()).map_err(refuse);
+    }
     Read::by_ref(&mut file).take(LONGEST_HEADER_BYTES).read_to_end(&mut beginning).map_err(unreadable)?;
-    let header = header::read(&beginning, length)
-        .map_err(|reason| Error::Input { path: path.to_owned(), reason: reason.into() })?;
+    let header = header::read(&beginning, length).map_err(|reason| refuse(reason.into()))?;
     Ok(NetcdfFile { path: path.to_owned(), numbers: Numbers::Classic(file), header })
+}
+
+#[cfg(feature = "netcdf4")]
+fn of_group(
+    path: &Path,
+    file: &std::rc::Rc<super::netcdf4_input::Nc4File>,
+    name: String,
+) -> Result<NetcdfFile, String> {
+    let header = file.header(&name)?;
+    Ok(NetcdfFile { path: path.to_owned(), numbers: Numbers::Hdf5(std::rc::Rc::clone(file), name), header })
+}
+
+/// Opens the root of a file and the groups in it, as far as they have the variable `needed`, with their names; attributes of the file
+/// are those of its root. A classic file is its root alone.
+///
+/// # Errors
+/// As [`open`]; a NetCDF-4 file without that variable.
+pub(crate) fn open_groups(path: &Path, needed: &str) -> Result<Vec<(String, NetcdfFile)>, Error> {
+    let root = open(path)?;
+    match &root.numbers {
+        Numbers::Classic(_) => Ok(vec![(String::new(), root)]),
+        #[cfg(feature = "netcdf4")]
+        Numbers::Hdf5(file, _) => {
+            let named = |name: String| Ok((name.clone(), of_group(path, file, name)?));
+            let all: Result<Vec<_>, String> = file.groups().and_then(|names| names.into_iter().map(named).collect());
+            let mut found = all.map_err(|reason| root.refuse(reason))?;
+            found.retain(|(_, group)| group.has(needed));
+            if found.is_empty() {
+                return Err(root.refuse(format!("neither it nor one of its groups has a variable {needed}")));
+            }
+            Ok(found)
+        }
+    }
 }
 
 impl NetcdfFile {
@@ -126,8 +147,8 @@ impl NetcdfFile {
     }
 
     /// Names of all variables.
-    pub(crate) fn names(&self) -> Vec<String> {
-        self.header.variables.iter().map(|variable| variable.name.clone()).collect()
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.header.variables.iter().map(|variable| variable.name.as_str())
     }
 
     /// Lengths of the dimensions of a variable, slowest first.
@@ -151,10 +172,7 @@ impl NetcdfFile {
 
     /// A text attribute of the file.
     pub(crate) fn global_text(&self, name: &str) -> Option<&str> {
-        self.header.attributes.iter().find(|(own, _)| own == name).and_then(|(_, value)| match value {
-            Attribute::Text(text) => Some(text.as_str()),
-            Attribute::Number(_) => None,
-        })
+        of_name(&self.header.attributes, name)?.text()
     }
 
     /// The open file, for who reads places of it.
@@ -162,7 +180,7 @@ impl NetcdfFile {
         match &self.numbers {
             Numbers::Classic(file) => file.try_clone(),
             #[cfg(feature = "netcdf4")]
-            Numbers::Hdf5(_) => Err(std::io::ErrorKind::Unsupported.into()),
+            Numbers::Hdf5(..) => Err(std::io::ErrorKind::Unsupported.into()),
         }
     }
 
@@ -174,29 +192,16 @@ impl NetcdfFile {
 
     /// A text attribute of a variable.
     pub(crate) fn text(&self, variable: &str, name: &str) -> Option<&str> {
-        match self.attribute(variable, name)? {
-            Attribute::Text(text) => Some(text),
-            Attribute::Number(_) => None,
-        }
+        of_name(&self.variable(variable)?.attributes, name)?.text()
     }
 
     fn number(&self, variable: &str, name: &str) -> Option<f64> {
-        match self.attribute(variable, name)? {
-            Attribute::Number(value) => Some(*value),
-            Attribute::Text(_) => None,
-        }
-    }
-
-    fn attribute(&self, variable: &str, name: &str) -> Option<&Attribute> {
-        self.variable(variable)?.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value)
+        of_name(&self.variable(variable)?.attributes, name)?.number()
     }
 
     /// A number among the attributes of the whole file.
     pub(crate) fn global_number(&self, name: &str) -> Option<f64> {
-        self.header.attributes.iter().find_map(|(n, value)| match value {
-            Attribute::Number(number) if n == name => Some(*number),
-            _ => None,
-        })
+        of_name(&self.header.attributes, name)?.number()
     }
 
     /// A variable as `f64`, whatever its type of number; NaN where a value is missing.
@@ -236,15 +241,13 @@ impl NetcdfFile {
         // As they are in the file and as they are handed on, perhaps in another order.
         machine::holds(&format!("variable {name}"), 3.0 * 8.0 * (bytes / number.bytes()) as f64)?;
         #[cfg(feature = "netcdf4")]
-        if let Numbers::Hdf5(file) = &self.numbers {
-            return file.read(name, &self.shape(name).unwrap_or_default(), place);
+        if let Numbers::Hdf5(file, group) = &self.numbers {
+            return file.read(group, name, &self.shape(name).unwrap_or_default(), place);
         }
-        let fills = ["_FillValue", "missing_value"].map(|fill| self.number(name, fill));
-        let scale = self.number(name, "scale_factor").unwrap_or(1.0);
-        let offset = self.number(name, "add_offset").unwrap_or(0.0);
+        let (fills, scale, offset) = self.packing(name);
         let packed = scale != 1.0 || offset != 0.0;
         let unpack = |value: f64| {
-            let missing = fills.contains(&Some(value)) || is_default_fill(value);
+            let missing = fills.contains(&value) || is_default_fill(value);
             match (missing, packed) {
                 (true, _) => f64::NAN,
                 (_, true) => value * scale + offset,
@@ -260,7 +263,9 @@ impl NetcdfFile {
             file.seek(at)
                 .and_then(|_| file.read_exact(&mut raw))
                 .map_err(|e| format!("variable {name} cannot be read: {e}"))?;
-            values.extend(raw.chunks_exact(number.bytes() as usize).map(|bytes| unpack(number.value(bytes))));
+            values.extend(
+                raw.chunks_exact(number.bytes() as usize).map(|bytes| unpack(number.value(bytes, ByteOrder::Big))),
+            );
         }
         Ok(values)
     }
@@ -366,7 +371,7 @@ impl NetcdfFile {
         Ok(scaled(self.floats(name)?, unit_s))
     }
 
-    /// Velocities in m/s with their dimensions in this order, as [`Self::ordered_part`].
+    /// Velocities in m/s with their dimensions in this order, as [`Self::ordered`].
     ///
     /// # Errors
     /// As there; a unit that is no velocity.
@@ -377,27 +382,15 @@ impl NetcdfFile {
         place: Option<usize>,
     ) -> Result<Vec<f64>, String> {
         let unit_m_s = self.unit(name, Quantity::Velocity)?;
-        Ok(scaled(self.ordered_part(name, order, place)?, unit_m_s))
+        Ok(scaled(self.ordered(name, order, place)?, unit_m_s))
     }
 
-    /// Values of a variable with its dimensions in this order, the last one fastest.
+    /// Values of a variable with its dimensions in this order, the last one fastest: all, or those of one place of the slowest dimension,
+    /// which `order` then leaves out.
     ///
     /// # Errors
     /// As [`Self::floats`].
-    pub(crate) fn ordered(&mut self, name: &str, order: &[String]) -> Result<Vec<f64>, String> {
-        self.ordered_part(name, order, None)
-    }
-
-    /// The same of one place of the slowest dimension, which `order` then leaves out.
-    ///
-    /// # Errors
-    /// As [`Self::floats`].
-    pub(crate) fn ordered_part(
-        &mut self,
-        name: &str,
-        order: &[String],
-        place: Option<usize>,
-    ) -> Result<Vec<f64>, String> {
+    pub(crate) fn ordered(&mut self, name: &str, order: &[String], place: Option<usize>) -> Result<Vec<f64>, String> {
         let mut dims: Vec<String> = self.dims(name).unwrap_or_default().into_iter().map(str::to_owned).collect();
         if place.is_some() && !dims.is_empty() {
             dims.remove(0);
@@ -423,6 +416,10 @@ impl NetcdfFile {
         }
         Ok(out)
     }
+}
+
+fn of_name<'a>(attributes: &'a [(String, Attribute)], name: &str) -> Option<&'a Attribute> {
+    attributes.iter().find(|(own, _)| own == name).map(|(_, value)| value)
 }
 
 /// The values in another unit; with the same bits in the same.

@@ -2,7 +2,7 @@
 //!
 //! Check: every kind comes back from its bytes in both orders.
 
-/// How a number is stored. Some kinds are of NetCDF alone.
+/// How a number is stored, in the order of [`ALL`]. Some kinds are of NetCDF alone.
 #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NumberType {
@@ -19,41 +19,31 @@ pub(crate) enum NumberType {
     U64,
 }
 
+/// All kinds in the order of their codes in classic NetCDF, from 1, with their names and bytes; text has no name, for it is no number.
+const ALL: [(NumberType, &str, u64); 11] = [
+    (NumberType::I8, "i8", 1),
+    (NumberType::Text, "", 1),
+    (NumberType::I16, "i16", 2),
+    (NumberType::I32, "i32", 4),
+    (NumberType::F32, "f32", 4),
+    (NumberType::F64, "f64", 8),
+    (NumberType::U8, "u8", 1),
+    (NumberType::U16, "u16", 2),
+    (NumberType::U32, "u32", 4),
+    (NumberType::I64, "i64", 8),
+    (NumberType::U64, "u64", 8),
+];
+
 impl NumberType {
     /// By its code in classic NetCDF.
     #[cfg(feature = "netcdf")]
     pub(crate) fn of_netcdf(code: u32) -> Option<Self> {
-        const ALL: [NumberType; 11] = [
-            NumberType::I8,
-            NumberType::Text,
-            NumberType::I16,
-            NumberType::I32,
-            NumberType::F32,
-            NumberType::F64,
-            NumberType::U8,
-            NumberType::U16,
-            NumberType::U32,
-            NumberType::I64,
-            NumberType::U64,
-        ];
-        ALL.get(usize::try_from(code).ok()?.checked_sub(1)?).copied()
+        ALL.get(usize::try_from(code).ok()?.checked_sub(1)?).map(|(number, ..)| *number)
     }
 
     /// By its name with the number of bits, such as `i16`.
     pub(crate) fn named(name: &str) -> Option<Self> {
-        Some(match name {
-            "i8" => Self::I8,
-            "u8" => Self::U8,
-            "i16" => Self::I16,
-            "u16" => Self::U16,
-            "i32" => Self::I32,
-            "u32" => Self::U32,
-            "i64" => Self::I64,
-            "u64" => Self::U64,
-            "f32" => Self::F32,
-            "f64" => Self::F64,
-            _ => return None,
-        })
+        ALL.iter().find(|(_, own, _)| !name.is_empty() && *own == name).map(|(number, ..)| *number)
     }
 
     /// By its name in numpy, which counts bytes: `i2`.
@@ -64,12 +54,7 @@ impl NumberType {
 
     /// Bytes of one number.
     pub(crate) fn bytes(self) -> u64 {
-        match self {
-            Self::I8 | Self::U8 | Self::Text => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 | Self::I64 | Self::U64 => 8,
-        }
+        ALL[self as usize].2
     }
 
     pub(crate) fn is_float(self) -> bool {
@@ -86,19 +71,13 @@ impl NumberType {
         }
     }
 
-    /// A number from its bytes, the first one highest.
-    pub(crate) fn value(self, bytes: &[u8]) -> f64 {
-        self.of_bits(bytes.iter().fold(0_u64, |bits, byte| bits << 8 | u64::from(*byte)))
-    }
-
-    /// A number from its bytes in the order of the file.
-    pub(crate) fn ordered_value(self, bytes: &[u8], order: ByteOrder) -> f64 {
-        match order {
-            ByteOrder::Big => self.value(bytes),
-            ByteOrder::Little => {
-                self.of_bits(bytes.iter().rev().fold(0_u64, |bits, byte| bits << 8 | u64::from(*byte)))
-            }
-        }
+    /// A number from its bytes in this order.
+    pub(crate) fn value(self, bytes: &[u8], order: ByteOrder) -> f64 {
+        let join = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
+        self.of_bits(match order {
+            ByteOrder::Big => bytes.iter().fold(0, join),
+            ByteOrder::Little => bytes.iter().rev().fold(0, join),
+        })
     }
 
     fn of_bits(self, bits: u64) -> f64 {
@@ -139,9 +118,9 @@ mod tests {
             (NumberType::F32, &1.5_f32.to_be_bytes(), 1.5),
             (NumberType::F64, &(-0.1_f64).to_be_bytes(), -0.1),
         ] {
-            assert_eq!(number.value(big), value);
+            assert_eq!(number.value(big, ByteOrder::Big), value);
             let little: Vec<u8> = big.iter().rev().copied().collect();
-            assert_eq!(number.ordered_value(&little, ByteOrder::Little), value);
+            assert_eq!(number.value(&little, ByteOrder::Little), value);
             assert_eq!(big.len() as u64, number.bytes());
         }
         assert_eq!(NumberType::of_numpy("i2"), Some(NumberType::I16));

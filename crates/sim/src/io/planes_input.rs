@@ -141,8 +141,8 @@ mod tests {
         use crate::io::netcdf::{Data, Layout, Variable};
         let [velocity, length, time] = scale;
         let axis = |name: &str, dims: &'static [&'static str], values: &[f64], scale: f64, units: &str| {
-            let values = values.iter().map(|v| v / scale).collect();
-            Variable::new(name, dims, Data::F64(values)).text("units", units)
+            let values = values.iter().map(|v| v / scale);
+            Variable::new(name, dims, Data::f64(values)).text("units", units)
         };
         let planes = whole();
         let flat = |field: &Array3<f64>| field.iter().copied().collect::<Vec<f64>>();

@@ -9,6 +9,7 @@ use super::font::Font;
 use super::frame::{BOTTOM, Decor, LEFT, Side, TICK_SIZE, axis, inner, top_room};
 use super::png_file::pixels;
 use crate::io::{OutputError, OutputResult, Unit, VelocityMap};
+use crate::setup::beams::SweepMode;
 
 /// Room to the right of the box, for the colour bar and its label.
 const RIGHT: f64 = 118.0;
@@ -38,25 +39,13 @@ pub struct MapPlot {
 }
 
 impl MapPlot {
-    /// The picture of a field of sweep `sweep`. Fields named `v_...`, `radial_velocity` and `bias` get symmetric
-    /// colours, others light to dark; the limits are those of the sweep. The lidar is shown where it stands less than
+    /// The picture of a field of sweep `sweep`, one of azimuth as seen from above. Fields named `v_...`, `radial_velocity` and `bias` get
+    /// symmetric colours, others light to dark; the limits are those of the sweep. The lidar is shown where it stands less than
     /// half the width of the scan away.
     ///
     /// # Errors
     /// What [`VelocityMap::check`] finds, no such sweep or field.
     pub fn new(map: &VelocityMap, sweep: usize, field: &str) -> OutputResult<Self> {
-        Self::of_sweep(map, sweep, field, false)
-    }
-
-    /// The picture of a field of a sweep of azimuth, seen from above.
-    ///
-    /// # Errors
-    /// As [`MapPlot::new`].
-    pub fn from_above(map: &VelocityMap, sweep: usize, field: &str) -> OutputResult<Self> {
-        Self::of_sweep(map, sweep, field, true)
-    }
-
-    fn of_sweep(map: &VelocityMap, sweep: usize, field: &str, from_above: bool) -> OutputResult<Self> {
         map.check()?;
         if sweep >= map.sweeps.len() {
             return Err(OutputError::value("sweep", sweep, format!("below {}", map.sweeps.len())));
@@ -65,6 +54,7 @@ impl MapPlot {
             what: format!("field {field}"),
             needed: "the map must have the field that is to be drawn".into(),
         })?;
+        let from_above = matches!(map.sweeps[sweep].mode, SweepMode::AzimuthSurveillance | SweepMode::Sector);
         let cells = Cells::of_sweep(map, sweep, from_above, |r, g| field.values[[r, g]]);
         let is_signed = field.name.starts_with("v_") || field.name == "radial_velocity" || field.name == "bias";
         let ((left, right), _) = cells.extent_m();
@@ -217,10 +207,7 @@ fn bar_label(long_name: &str, unit: Unit) -> String {
     let short = long_name.split(',').next().unwrap_or(long_name);
     let unit = match unit {
         Unit::One => return short.into(),
-        Unit::Metre => "m",
         Unit::MetrePerSecond => "m/s",
-        Unit::SquareMetrePerSecond => "m²/s",
-        Unit::Hertz => "Hz",
         Unit::Decibel => "dB",
     };
     format!("{short} [{unit}]")

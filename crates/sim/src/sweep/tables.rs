@@ -41,7 +41,7 @@ const EXACT_BELOW: f64 = 9_007_199_254_740_992.0;
 
 #[cfg(feature = "netcdf")]
 fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
-    use crate::io::netcdf::{Attr, Data, Layout, Variable};
+    use crate::io::netcdf::{Data, Layout, Variable};
     use crate::keys::unit_of;
     let text = |row: &Row, place: usize| row.keys.get(place).cloned().unwrap_or_default();
     let texts = (0..definition.keys.len()).flat_map(|place| rows.iter().map(move |row| text(row, place).len()));
@@ -50,16 +50,16 @@ fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
     let words = |name: &str, of: &dyn Fn(&Row) -> String| {
         let padded =
             |row: &Row| of(row).into_bytes().into_iter().chain(std::iter::repeat(0)).take(width).collect::<Vec<u8>>();
-        Variable::new(name, &["case", "string_length"], Data::Char(rows.iter().flat_map(padded).collect()))
+        Variable::new(name, &["case", "string_length"], Data::text(rows.iter().flat_map(padded).collect::<Vec<u8>>()))
     };
-    let case = rows.iter().map(|row| i32::try_from(row.case).unwrap_or(i32::MAX)).collect();
-    let mut variables = vec![Variable::new("case", &["case"], Data::I32(case)).text("long_name", "number of the case")];
+    let case = rows.iter().map(|row| i32::try_from(row.case).unwrap_or(i32::MAX));
+    let mut variables = vec![Variable::new("case", &["case"], Data::i32(case)).text("long_name", "number of the case")];
     for (place, VaryingKey { name, holds, .. }) in definition.keys.iter().enumerate() {
         // Whole numbers that a double would round, such as drawn seeds, are words.
         let is_round = rows.iter().all(|row| row.key(place).abs() < EXACT_BELOW || *holds == Holds::Numbers);
         let variable = match holds {
             Holds::Numbers | Holds::WholeNumbers if is_round => {
-                Variable::new(name, &["case"], Data::F64(rows.iter().map(|row| row.key(place)).collect()))
+                Variable::new(name, &["case"], Data::f64(rows.iter().map(|row| row.key(place))))
                     .text("units", unit_of(name).unwrap_or("1"))
             }
             _ => words(name, &|row| text(row, place)),
@@ -69,9 +69,9 @@ fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
     variables
         .push(words("scene_hash", &|row| row.scene_hash.clone()).text("long_name", "hash of the scene of the case"));
     for (name, unit, meaning) in RESULTS {
-        let values = rows.iter().map(|row| row.result(name)).collect();
-        let variable = Variable::new(name, &["case"], Data::F64(values));
-        let variable = variable.attr("_FillValue", Attr::F64(f64::NAN));
+        let values = rows.iter().map(|row| row.result(name));
+        let variable = Variable::new(name, &["case"], Data::f64(values));
+        let variable = variable.attr("_FillValue", Data::f64([f64::NAN]));
         variables.push(variable.text("units", unit).text("long_name", meaning));
     }
     let dims = vec![("case", rows.len()), ("string_length", width)];

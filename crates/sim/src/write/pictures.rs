@@ -69,18 +69,15 @@ fn snr_band_db(profile: &RangeProfile) -> Vec<(f64, f64)> {
 pub(super) fn map(plan: &Plan, map: &VelocityMap, winds: Option<&[BeamWind]>) -> Result<Figure, Error> {
     let centres_m = centres_m(plan);
     let sweep = if plan.geometry.schedule.is_plane() { 0 } else { map.sweeps.len() / 2 };
-    let from_above = match map.sweeps.get(sweep).map(|sweep| sweep.mode) {
-        None | Some(SweepMode::Rhi) => false,
-        Some(SweepMode::AzimuthSurveillance | SweepMode::Sector) => true,
-        Some(SweepMode::VerticalPointing | SweepMode::Pointing) => return Ok(lines(plan, map)),
-    };
+    if let Some(SweepMode::VerticalPointing | SweepMode::Pointing) = map.sweeps.get(sweep).map(|sweep| sweep.mode) {
+        return Ok(lines(plan, map));
+    }
     if let Some(winds) = winds {
         return Ok(azimuth_display(plan, map, winds));
     }
     let panel = |field: &str, title: &str| -> Result<MapPlot, Error> {
-        let plot = if from_above { MapPlot::from_above(map, sweep, field)? } else { MapPlot::new(map, sweep, field)? };
-        let mut plot = plot.titled(title).labelled("m/s");
-        if !from_above {
+        let mut plot = MapPlot::new(map, sweep, field)?.titled(title).labelled("m/s");
+        if !plot.from_above {
             plot.points_m.clone_from(&centres_m);
         }
         Ok(plot)

@@ -286,7 +286,7 @@ impl WakeRun {
         let part =
             |from: usize, to: usize| self.rows.iter().flat_map(|row| row[from..to].to_vec()).collect::<Vec<f64>>();
         let lists = |name: &str, dims: &'static [&'static str], values: Vec<f64>, units: &str, long_name: &str| {
-            Variable::new(name, dims, Data::F64(values)).text("units", units).text("long_name", long_name)
+            Variable::new(name, dims, Data::f64(values)).text("units", units).text("long_name", long_name)
         };
         let middle = slices + 2 * self.lengths.slices;
         let mut variables = vec![

@@ -2,6 +2,7 @@
 //!
 //! Check: every order of an array gives the same records.
 
+use super::RawFormat;
 use crate::io::number::{ByteOrder, NumberType};
 use num_complex::Complex;
 use std::fs::File;
@@ -43,8 +44,8 @@ pub(super) struct ArrayInFile {
     pub(super) order: Order,
     /// Where the first number is.
     pub(super) begin: u64,
-    /// Bytes from one record to the next where samples run fastest.
-    pub(super) record_bytes: u64,
+    /// Bytes from one record to the next where there is something else between them.
+    pub(super) stride: Option<u64>,
     pub(super) records: usize,
     pub(super) samples: usize,
     /// Pulses of a line, for [`Order::PulseMajor`].
@@ -56,6 +57,35 @@ pub(super) struct ArrayInFile {
 }
 
 impl ArrayInFile {
+    /// Records with so many samples, as a user states them for a file of nothing but numbers.
+    pub(super) fn new(
+        file: File,
+        number: NumberType,
+        [records, samples]: [usize; 2],
+        (format, pulses_per_line): (&RawFormat, usize),
+    ) -> Self {
+        Self {
+            file,
+            number,
+            byte_order: format.byte_order,
+            parts: if format.complex { Parts::Together } else { Parts::Real },
+            order: format.order,
+            begin: format.header_bytes,
+            stride: None,
+            records,
+            samples,
+            pulses_per_line,
+            fills: Vec::new(),
+            scale: format.scale,
+            offset: 0.0,
+        }
+    }
+
+    /// Bytes from one record to the next where samples run fastest.
+    pub(super) fn record_bytes(&self) -> u64 {
+        self.stride.unwrap_or(self.samples as u64 * self.sample_bytes())
+    }
+
     /// Numbers of a sample.
     fn numbers(&self) -> usize {
         if self.parts == Parts::Together { 2 } else { 1 }
@@ -110,14 +140,14 @@ impl ArrayInFile {
         }
         let row_bytes = count as u64 * sample_bytes;
         // Records without a gap between them are read at once.
-        let together = match self.order == Order::LineMajor && self.record_bytes == row_bytes {
+        let together = match self.order == Order::LineMajor && self.record_bytes() == row_bytes {
             true => records.len().max(1),
             false => 1,
         };
         let firsts = records.clone().step_by(together);
         for (first, out) in firsts.zip(out.chunks_mut(together * count)) {
             let length = row_bytes * (out.len() / count.max(1)) as u64;
-            let at = self.row(first) * self.record_bytes + samples.start as u64 * sample_bytes;
+            let at = self.row(first) * self.record_bytes() + samples.start as u64 * sample_bytes;
             self.bytes(begin + at, length, &mut raw)?;
             self.decode(&raw, out.iter_mut(), &put);
         }
@@ -138,7 +168,7 @@ impl ArrayInFile {
     ) {
         let bytes = self.number.bytes() as usize;
         let value = |bytes: &[u8]| {
-            let stored = self.number.ordered_value(bytes, self.byte_order);
+            let stored = self.number.value(bytes, self.byte_order);
             if self.fills.contains(&stored) { f64::NAN } else { stored * self.scale + self.offset }
         };
         let mut numbers = [0.0; 2];
@@ -175,7 +205,7 @@ mod tests {
             parts: Parts::Real,
             order,
             begin: 0,
-            record_bytes: 6,
+            stride: None,
             records: 4,
             samples: 3,
             pulses_per_line: 2,
@@ -219,12 +249,12 @@ mod tests {
 
     #[test]
     fn complex_samples_may_stand_together_or_apart() {
-        let mut together = ArrayInFile { samples: 3, records: 2, record_bytes: 12, ..array(&[], Order::LineMajor) };
+        let mut together = ArrayInFile { samples: 3, records: 2, ..array(&[], Order::LineMajor) };
         together.file = file(&(0..12).map(f64::from).collect::<Vec<_>>(), ByteOrder::Big);
         (together.parts, together.scale, together.offset) = (Parts::Together, 1.0, 0.0);
         let found = together.read(1..2, 0..3).unwrap();
         assert_eq!(found, [(6.0, 7.0), (8.0, 9.0), (10.0, 11.0)].map(|(re, im)| Complex::new(re, im)));
-        let mut apart = ArrayInFile { parts: Parts::Apart(12), record_bytes: 6, ..together };
+        let mut apart = ArrayInFile { parts: Parts::Apart(12), ..together };
         let found = apart.read(0..2, 0..3).unwrap();
         assert!(found.iter().enumerate().all(|(i, z)| *z == Complex::new(i as f64, i as f64 + 6.0)), "{found:?}");
     }

@@ -261,26 +261,11 @@ fn binary(file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Re
     let name = format.number.as_deref().unwrap_or_default();
     let number =
         NumberType::named(name).ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
-    let parts = if format.complex { Parts::Together } else { Parts::Real };
-    let mut array = ArrayInFile {
-        file,
-        number,
-        byte_order: format.byte_order,
-        parts,
-        order: format.order,
-        begin: format.header_bytes,
-        record_bytes: 0,
-        records: 0,
-        samples: shape.samples,
-        pulses_per_line: shape.pulses_per_line,
-        fills: Vec::new(),
-        scale: format.scale,
-        offset: 0.0,
-    };
-    array.record_bytes = shape.samples as u64 * array.sample_bytes();
+    let mut array = ArrayInFile::new(file, number, [0, shape.samples], (format, shape.pulses_per_line));
+    let record_bytes = array.record_bytes();
     let data = length.checked_sub(format.header_bytes);
     let data = data.ok_or_else(|| format!("it has {length} bytes, --header-bytes says {}", format.header_bytes))?;
-    let rest = data.checked_rem(array.record_bytes).unwrap_or(data);
+    let rest = data.checked_rem(record_bytes).unwrap_or(data);
     if rest != 0 {
         return Err(format!(
             "behind a header of {} bytes it holds {data} bytes, no whole number of records of {} samples of {} bytes: {rest} \
@@ -290,7 +275,7 @@ fn binary(file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Re
             array.sample_bytes()
         ));
     }
-    array.records = (data / array.record_bytes) as usize;
+    array.records = (data / record_bytes) as usize;
     Ok(Store::Array(array))
 }
 
@@ -314,23 +299,14 @@ fn of_numpy(file: File, found: &NumpyArray, format: &RawFormat, shape: RecordSha
     };
     let samples = samples.ok_or("it holds a single number, no records")?;
     let parts = if found.is_complex || pairs { Parts::Together } else { Parts::Real };
-    let mut array = ArrayInFile {
-        file,
-        number: found.number,
+    let places = [lengths.iter().product::<u64>() as usize, samples as usize];
+    Ok(Store::Array(ArrayInFile {
         byte_order: found.byte_order,
         parts,
         order,
         begin: found.begin,
-        record_bytes: 0,
-        records: lengths.iter().product::<u64>() as usize,
-        samples: samples as usize,
-        pulses_per_line: shape.pulses_per_line,
-        fills: Vec::new(),
-        scale: format.scale,
-        offset: 0.0,
-    };
-    array.record_bytes = samples * array.sample_bytes();
-    Ok(Store::Array(array))
+        ..ArrayInFile::new(file, found.number, places, (format, shape.pulses_per_line))
+    }))
 }
 
 fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Result<(Store, About), String> {

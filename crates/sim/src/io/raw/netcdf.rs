@@ -61,35 +61,26 @@ fn signals(file: &mut NetcdfFile, format: &RawFormat) -> Result<(Store, About), 
         return Ok((store, about(file, records)?));
     }
     let layout = file.layout(&name).ok_or("it has no such variable")?;
-    let of_parts = if parts == Parts::Together { 2 } else { 1 };
-    let tight = samples * layout.number.bytes() * of_parts;
-    let record_bytes = match layout.stride {
-        None => tight,
-        // The dimension that grows is the first; one record of the file must be one of the signals.
-        Some(stride) if shape.len() <= 1 => stride,
-        Some(_) => {
-            return Err(format!("variable {name} grows along a dimension and has two more: nccopy -u makes it fixed"));
-        }
-    };
+    // The dimension that grows is the first; one record of the file must be one of the signals.
+    if layout.stride.is_some() && shape.len() > 1 {
+        return Err(format!("variable {name} grows along a dimension and has two more: nccopy -u makes it fixed"));
+    }
     let (mut fills, scale, offset) = file.packing(&name);
     if fills.is_empty() {
         // What stands where nothing was written.
         fills.extend(layout.number.netcdf_fill());
     }
+    let handle = file.handle().map_err(|e| e.to_string())?;
     let array = ArrayInFile {
-        file: file.handle().map_err(|e| e.to_string())?,
-        number: layout.number,
         byte_order: ByteOrder::Big,
         parts,
         order: Order::LineMajor,
         begin: layout.begin,
-        record_bytes,
-        records,
-        samples: samples as usize,
-        pulses_per_line: 1,
+        stride: layout.stride,
         fills,
         scale: scale * format.scale,
         offset: offset * format.scale,
+        ..ArrayInFile::new(handle, layout.number, [records, samples as usize], (format, 1))
     };
     let about = about(file, records)?;
     Ok((Store::Array(array), about))

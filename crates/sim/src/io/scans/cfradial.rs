@@ -5,8 +5,8 @@
 //! xradar in the tests of the program; files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
 use super::grid::{RayRow, between_turns, mean_count, of_mean, one_plane, scan_map};
-use super::source::Source;
 use super::{ReadScan, ScanFormat};
+use crate::io::netcdf_input::NetcdfFile;
 use crate::io::units::Quantity;
 use crate::io::{UtcTime, cfradial::MIRRORED};
 use crate::machine;
@@ -28,14 +28,14 @@ const VELOCITIES: [&str; 9] = [
 ];
 /// Names of its standard deviation.
 const SIGMAS: [&str; 4] = ["velocity_standard_deviation", "sigma_m_s", "radial_velocity_error", "velocity_error"];
-/// Names of the signal-to-noise ratio in dB.
 /// Whether a Windcube trusts a velocity; its times are those of the ends of rays.
 const STATUS: &str = "radial_wind_speed_status";
+/// Names of the signal-to-noise ratio in dB.
 const RATIOS: [&str; 4] = ["signal_to_noise_ratio", "SNR", "snr", "cnr"];
 
 /// The scans of a file or a group, and what was left out; `sweep` is the number of its first sweep.
 pub(super) fn scans(
-    file: &mut dyn Source,
+    file: &mut NetcdfFile,
     path: &Path,
     format: &ScanFormat,
     sweep: usize,
@@ -71,9 +71,7 @@ pub(super) fn scans(
     let ray = |ray: usize| {
         let cells = || (ray * gates..(ray + 1) * gates).map(|at| (at, velocity_m_s[at]));
         let noisy = |at: usize| {
-            let below =
-                |ratios: &Vec<f64>| format.min_snr_db.is_some_and(|least| ratios[at].is_nan() || ratios[at] < least);
-            ratio_db.as_ref().is_some_and(below)
+            ratio_db.as_ref().is_some_and(|ratios_db| format.is_noise(ratios_db[at]))
                 || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
                 || status.as_ref().is_some_and(|status| status[at] != 1.0)
         };
@@ -92,18 +90,17 @@ pub(super) fn scans(
     let (mut out, mut left_out) = (Vec::new(), Vec::new());
     let pulse_width_s = if file.has("pulse_width") { first(file, "pulse_width")? } else { None };
     let step_m = range_m.get(1).zip(range_m.first()).map(|(second, first)| second - first);
-    let of_field = |file: &dyn Source, name| file.text(&velocity.name, name);
-    let scene_toml =
-        file.global_text("scene").or_else(|| of_field(file, "scene")).or_else(|| of_field(file, "instrument"));
+    let of_field = |name| file.text(&velocity.name, name);
+    let scene_toml = file.global_text("scene").or_else(|| of_field("scene")).or_else(|| of_field("instrument"));
+    let scene_toml = scene_toml.map(str::to_owned);
     let is_own = file.global_text("source").is_some_and(|source| source.starts_with("wakescope "));
     for (number, rays) in sweeps(file, count)?.into_iter().enumerate() {
         let number = number + sweep;
         let what = format!("sweep {number}");
         let is_still = |ray: &usize| moving.get(*ray).is_none_or(|moves| *moves != 1.0);
         let rows: Vec<RayRow> = rays.filter(is_still).map(&ray).collect();
-        if let Err((low, high)) = one_plane(&rows) {
-            left_out
-                .push(format!("{what}: its azimuths go from {low:.2} to {high:.2} degrees, those of an RHI are one"));
+        if let Err(reason) = one_plane(&rows, &what) {
+            left_out.push(reason);
             continue;
         }
         let heights: Vec<f64> = rows.iter().map(|row| row.elevation_rad).collect();
@@ -116,15 +113,13 @@ pub(super) fn scans(
             match scan_map(rows, range_m.clone(), fold_m_s, &what) {
                 Err(reason) => left_out.push(reason),
                 Ok(map) => out.push(ReadScan {
-                    path: path.to_owned(),
-                    sweep: number,
-                    map,
                     reference,
                     gate_length_m: step_m,
                     pulse_width_s,
                     scene_toml: scene_toml.clone(),
                     is_own,
                     scans,
+                    ..ReadScan::new(path, number, map)
                 }),
             }
         }
@@ -142,24 +137,21 @@ struct Field {
 }
 
 impl Field {
-    fn velocity(file: &dyn Source, format: &ScanFormat) -> Result<Self, String> {
+    fn velocity(file: &NetcdfFile, format: &ScanFormat) -> Result<Self, String> {
         let standard = |name: &str| file.text(name, "standard_name").unwrap_or_default();
         let name = match &format.field {
             Some(name) if file.has(name) => name.clone(),
             Some(name) => return Err(format!("it has no variable {name}, which --field names")),
             None => {
                 let known = VELOCITIES.iter().find(|name| file.has(name)).map(|name| (*name).to_owned());
-                let by_standard = || {
-                    let names = file.names();
-                    names.into_iter().find(|name| [AWAY, TOWARDS].contains(&standard(name).as_str()))
-                };
+                let by_standard =
+                    || file.names().find(|name| [AWAY, TOWARDS].contains(&standard(name))).map(str::to_owned);
                 known.or_else(by_standard).ok_or(
                     "it has no radial velocity: none of its variables has that standard name or a usual name; --field names it",
                 )?
             }
         };
-        let units = file.text(&name, "units").unwrap_or_default();
-        let unit_m_s = Quantity::Velocity.si(&units).map_err(|needed| format!("the units of {name}: {needed}"))?;
+        let unit_m_s = file.unit(&name, Quantity::Velocity)?;
         let is_towards = standard(&name) == TOWARDS || format.towards;
         let is_mean = file.text(&name, "cell_methods").is_some_and(|methods| methods.contains("realization: mean"));
         Ok(Self { name, sign: if is_towards { -unit_m_s } else { unit_m_s }, is_mean })
@@ -175,7 +167,7 @@ enum GateLayout {
 }
 
 impl GateLayout {
-    fn new(file: &mut dyn Source, name: &str, rays: usize, gates: usize) -> Result<Self, String> {
+    fn new(file: &mut NetcdfFile, name: &str, rays: usize, gates: usize) -> Result<Self, String> {
         let shape = file.shape(name).unwrap_or_default();
         let dims = shape.len();
         match (dims, &shape[..]) {
@@ -184,7 +176,7 @@ impl GateLayout {
                 Err(format!("variable {name} is {} x {}; {rays} rays x {gates} ranges are needed", shape[0], shape[1]))
             }
             (1, _) if file.has("ray_start_index") && file.has("ray_n_gates") => {
-                let whole = |name: &str, file: &mut dyn Source| -> Result<Vec<usize>, String> {
+                let whole = |name: &str, file: &mut NetcdfFile| -> Result<Vec<usize>, String> {
                     let values = file.floats(name)?;
                     let bad = values.iter().any(|v| !(*v >= 0.0 && *v < 1e9));
                     match bad || values.len() != rays {
@@ -205,7 +197,7 @@ impl GateLayout {
     }
 
     /// The values \[ray, gate\], one ray after the other.
-    fn read(&self, file: &mut dyn Source, name: &str) -> Result<Vec<f64>, String> {
+    fn read(&self, file: &mut NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
         let values = file.floats(name)?;
         match self {
             Self::Full { rays, gates } if values.len() == rays * gates => Ok(values),
@@ -225,7 +217,7 @@ impl GateLayout {
     }
 
     /// The first of some variables that is there.
-    fn optional(&self, file: &mut dyn Source, names: &[&str]) -> Result<Option<Vec<f64>>, String> {
+    fn optional(&self, file: &mut NetcdfFile, names: &[&str]) -> Result<Option<Vec<f64>>, String> {
         match names.iter().find(|name| file.has(name)) {
             Some(name) => self.read(file, name).map(Some),
             None => Ok(None),
@@ -234,8 +226,8 @@ impl GateLayout {
 }
 
 /// An angle of each ray, rad.
-fn angles(file: &mut dyn Source, name: &str) -> Result<Vec<f64>, String> {
-    let units = file.text(name, "units").unwrap_or("degrees".into()).to_ascii_lowercase();
+fn angles(file: &mut NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
+    let units = file.text(name, "units").unwrap_or_default().to_ascii_lowercase();
     let values = file.floats(name)?;
     match values.iter().position(|value| !value.is_finite()) {
         Some(ray) => Err(format!("{name} of ray {ray} is missing")),
@@ -245,9 +237,8 @@ fn angles(file: &mut dyn Source, name: &str) -> Result<Vec<f64>, String> {
 }
 
 /// Ranges of the centres of the gates, m.
-fn ranges(file: &mut dyn Source) -> Result<Vec<f64>, String> {
-    let units = file.text("range", "units").unwrap_or_default();
-    let unit_m = Quantity::Length.si(&units).map_err(|needed| format!("the units of range: {needed}"))?;
+fn ranges(file: &mut NetcdfFile) -> Result<Vec<f64>, String> {
+    let unit_m = file.unit("range", Quantity::Length)?;
     // One row for each ray where gates differ.
     if file.shape("range").is_some_and(|shape| shape.len() > 1) {
         return Err("range has two dimensions: gates that are the same for all rays are needed".into());
@@ -256,13 +247,12 @@ fn ranges(file: &mut dyn Source) -> Result<Vec<f64>, String> {
 }
 
 /// Times of the rays in s, and the date from which they count.
-fn times(file: &mut dyn Source, count: usize) -> Result<(Vec<f64>, Option<UtcTime>), String> {
+fn times(file: &mut NetcdfFile, count: usize) -> Result<(Vec<f64>, Option<UtcTime>), String> {
     if !file.has("time") {
         return Ok((vec![f64::NAN; count], None));
     }
-    let units = file.text("time", "units").unwrap_or_default().trim().to_owned();
-    let (unit, since) = units.split_once(" since ").unwrap_or((&units, ""));
-    let unit_s = Quantity::Time.si(unit).map_err(|needed| format!("the units of time: {needed}"))?;
+    let units = file.text("time", "units").unwrap_or_default();
+    let since = units.split_once(" since ").map_or("", |(_, since)| since);
     // 2024-01-31T12:00:00Z, or with a blank, without the time, with parts of a second or another zone at the end.
     let mut text = since.trim().replace(' ', "T");
     text.truncate(text.char_indices().nth(19).map_or(text.len(), |(at, _)| at));
@@ -270,15 +260,15 @@ fn times(file: &mut dyn Source, count: usize) -> Result<(Vec<f64>, Option<UtcTim
         text += "T00:00:00";
     }
     let reference = UtcTime::parse(&format!("{text}Z"));
-    let values = file.floats("time")?;
-    match values.len() == count {
-        true => Ok((values.into_iter().map(|value| unit_s * value).collect(), reference)),
-        false => Err(format!("time has {} values, elevation {count}: one for each ray", values.len())),
+    let time_s = file.seconds("time")?;
+    match time_s.len() {
+        found if found == count => Ok((time_s, reference)),
+        found => Err(format!("time has {found} values, elevation {count}: one for each ray")),
     }
 }
 
 /// The rays of each sweep.
-fn sweeps(file: &mut dyn Source, count: usize) -> Result<Vec<std::ops::Range<usize>>, String> {
+fn sweeps(file: &mut NetcdfFile, count: usize) -> Result<Vec<std::ops::Range<usize>>, String> {
     let (start, end) = ("sweep_start_ray_index", "sweep_end_ray_index");
     if !(file.has(start) && file.has(end)) {
         return Ok(std::iter::once(0..count).collect());
@@ -299,7 +289,7 @@ fn sweeps(file: &mut dyn Source, count: usize) -> Result<Vec<std::ops::Range<usi
 }
 
 /// The largest velocity that can be told apart, m/s: that of the file's first ray.
-fn nyquist(file: &mut dyn Source) -> Result<Option<f64>, String> {
+fn nyquist(file: &mut NetcdfFile) -> Result<Option<f64>, String> {
     const NAME: &str = "nyquist_velocity";
     let is_mirrored = file.text(NAME, "folding").is_some_and(|folding| folding == MIRRORED);
     // Mirrored velocities are no multiple away from those of the air.
@@ -307,13 +297,16 @@ fn nyquist(file: &mut dyn Source) -> Result<Option<f64>, String> {
 }
 
 /// The first value of a variable, if it is above 0.
-fn first(file: &mut dyn Source, name: &str) -> Result<Option<f64>, String> {
+fn first(file: &mut NetcdfFile, name: &str) -> Result<Option<f64>, String> {
     Ok(file.floats(name)?.first().copied().filter(|value| *value > 0.0 && value.is_finite()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::netcdf::{self, Data};
+    use crate::io::netcdf_input::open;
+    use crate::io::provenance::example;
     use std::collections::BTreeMap;
 
     /// Variables with their lengths, text attributes and values.
@@ -322,22 +315,30 @@ mod tests {
 
     type Variable = (Vec<u64>, Vec<(&'static str, &'static str)>, Vec<f64>);
 
-    impl Source for Made {
-        fn names(&self) -> Vec<String> {
-            self.0.keys().map(|name| (*name).to_owned()).collect()
-        }
-        fn shape(&self, name: &str) -> Option<Vec<u64>> {
-            Some(self.0.get(name)?.0.clone())
-        }
-        fn text(&self, variable: &str, name: &str) -> Option<String> {
-            let attributes = &self.0.get(variable)?.1;
-            attributes.iter().find(|(own, _)| *own == name).map(|(_, text)| (*text).to_owned())
-        }
-        fn global_text(&self, _: &str) -> Option<String> {
-            None
-        }
-        fn floats(&mut self, name: &str) -> Result<Vec<f64>, String> {
-            Ok(self.0.get(name).ok_or_else(|| format!("it has no variable {name}"))?.2.clone())
+    impl Made {
+        /// A file that holds them. Dimensions are called by their lengths; many values are zeros, in a byte each.
+        fn open(&self) -> NetcdfFile {
+            let (mut dims, mut variables) = (Vec::new(), Vec::new());
+            for (name, (shape, attributes, values)) in &self.0 {
+                let shape = if shape.len() == 1 { vec![values.len() as u64] } else { shape.clone() };
+                let mut own: Vec<&'static str> = Vec::new();
+                for length in &shape {
+                    own.push(format!("of_{length}").leak());
+                    if !dims.contains(&(own[own.len() - 1], *length as usize)) {
+                        dims.push((own[own.len() - 1], *length as usize));
+                    }
+                }
+                let mut values = values.clone();
+                values.resize(shape.iter().product::<u64>() as usize, 0.0);
+                let are_zero = values.len() > 1_000_000 && values.iter().all(|value| *value == 0.0);
+                let data = if are_zero { Data::i8(vec![0; values.len()]) } else { Data::f64(values) };
+                let variable = netcdf::Variable::new(name, own.leak(), data);
+                variables.push(attributes.iter().fold(variable, |variable, (name, text)| variable.text(name, text)));
+            }
+            let layout = netcdf::Layout { dims, globals: Vec::new(), variables };
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), layout.into_bytes(&example()).unwrap()).unwrap();
+            open(file.path()).unwrap()
         }
     }
 
@@ -368,13 +369,13 @@ mod tests {
         made
     }
 
-    fn read(made: &mut Made) -> Result<(Vec<ReadScan>, Vec<String>), String> {
-        scans(made, Path::new("x.nc"), &ScanFormat::default(), 0)
+    fn read(made: &Made) -> Result<(Vec<ReadScan>, Vec<String>), String> {
+        scans(&mut made.open(), Path::new("x.nc"), &ScanFormat::default(), 0)
     }
 
     #[test]
     fn the_sweep_in_elevation_is_read_and_others_are_told() {
-        let (found, left_out) = read(&mut made()).unwrap();
+        let (found, left_out) = read(&made()).unwrap();
         assert_eq!((found.len(), left_out.len()), (1, 1));
         assert!(left_out[0].contains("sweep 1") && left_out[0].contains("azimuths"), "{left_out:?}");
         let map = &found[0].map;
@@ -391,11 +392,11 @@ mod tests {
         towards.0.insert("nyquist_velocity", (vec![RAYS as u64], vec![], vec![12.0; RAYS]));
         let moving = (0..RAYS).map(|ray| f64::from(u8::from(ray == 2))).collect();
         towards.0.insert("antenna_transition", (vec![RAYS as u64], vec![], moving));
-        let map = read(&mut towards).unwrap().0.remove(0).map;
+        let map = read(&towards).unwrap().0.remove(0).map;
         assert_eq!((map.velocity_m_s[[4, 5]], map.fold_m_s, map.elevation_rad.len()), (-3.5, Some(24.0), 5));
         // Real currents are mirrored: no multiple is lost.
         towards.0.insert("nyquist_velocity", (vec![RAYS as u64], vec![("folding", MIRRORED)], vec![12.0; RAYS]));
-        assert_eq!(read(&mut towards).unwrap().0.remove(0).map.fold_m_s, None);
+        assert_eq!(read(&towards).unwrap().0.remove(0).map.fold_m_s, None);
         // The same gates one ray after the other, the last gate of the first ray missing.
         let mut ragged = made();
         let own = values.iter().enumerate().filter(|(i, _)| *i != 5).map(|(_, v)| *v).collect::<Vec<_>>();
@@ -404,7 +405,7 @@ mod tests {
         ragged.0.insert("VEL", (vec![own.len() as u64], vec![], own));
         ragged.0.insert("ray_start_index", (vec![RAYS as u64], vec![], starts));
         ragged.0.insert("ray_n_gates", (vec![RAYS as u64], vec![], counts));
-        let map = read(&mut ragged).unwrap().0.remove(0).map;
+        let map = read(&ragged).unwrap().0.remove(0).map;
         assert!(
             map.velocity_m_s[[0, 5]].is_nan() && map.velocity_m_s[[0, 4]] == 0.4 && map.velocity_m_s[[5, 5]] == 3.5
         );
@@ -420,7 +421,7 @@ mod tests {
             made.0.insert(name, many(0.0));
         }
         made.0.insert("range", (vec![MANY as u64], vec![], (0..MANY).map(|i| i as f64).collect()));
-        let refused = read(&mut made).unwrap_err();
+        let refused = read(&made).unwrap_err();
         assert!(refused.contains("3000000 rays x 3000000 ranges would take"), "{refused}");
     }
 
@@ -429,7 +430,7 @@ mod tests {
         let refused = |change: &dyn Fn(&mut Made)| {
             let mut made = made();
             change(&mut made);
-            read(&mut made).unwrap_err()
+            read(&made).unwrap_err()
         };
         assert!(refused(&|m| m.0.get_mut("VEL").unwrap().0 = vec![7, 6]).contains("VEL is 7 x 6; 12 rays x 6 ranges"));
         assert!(refused(&|m| drop(m.0.remove("VEL"))).contains("no radial velocity"));
@@ -444,7 +445,7 @@ mod tests {
         let (found, left_out) = {
             let mut made = made();
             all_missing(&mut made);
-            read(&mut made).unwrap()
+            read(&made).unwrap()
         };
         assert!(found.is_empty() && left_out[0].contains("all of its velocities are missing"));
     }

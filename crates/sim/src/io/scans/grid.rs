@@ -145,8 +145,8 @@ fn times(of_lines: &[f64]) -> Vec<f64> {
     if known { of_lines.to_vec() } else { vec![f64::NAN; of_lines.len()] }
 }
 
-/// Whether the rays lie in one vertical plane on one side of the lidar; else the lowest and the highest azimuth, degrees.
-pub(super) fn one_plane(rays: &[RayRow]) -> Result<(), (f64, f64)> {
+/// Refuses rays that do not lie in one vertical plane on one side of the lidar; `what` names the scan in messages.
+pub(super) fn one_plane(rays: &[RayRow], what: &str) -> Result<(), String> {
     let Some(first) = rays.iter().map(|ray| ray.azimuth_rad).find(|azimuth| azimuth.is_finite()) else { return Ok(()) };
     let apart = |azimuth: f64| {
         (azimuth - first + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI
@@ -155,10 +155,11 @@ pub(super) fn one_plane(rays: &[RayRow]) -> Result<(), (f64, f64)> {
     let known = rays.iter().filter(|ray| ray.azimuth_rad.is_finite() && ray.elevation_rad.cos() > 0.05);
     let (low, high) =
         known.map(|ray| apart(ray.azimuth_rad)).fold((0.0_f64, 0.0_f64), |(low, high), a| (low.min(a), high.max(a)));
-    match high - low <= ONE_PLANE_RAD {
-        true => Ok(()),
-        false => Err(((first + low).to_degrees(), (first + high).to_degrees())),
+    if high - low <= ONE_PLANE_RAD {
+        return Ok(());
     }
+    let [low, high] = [first + low, first + high].map(f64::to_degrees);
+    Err(format!("{what}: it has azimuths from {low:.2} to {high:.2} degrees; a scan in elevation (RHI) has one"))
 }
 
 /// Scans that follow each other: a line that goes back by more than a tenth of all elevations begins another.
@@ -244,10 +245,10 @@ mod tests {
         missing.iter_mut().for_each(|ray| ray.velocity_m_s = vec![-9999.0; 12]);
         assert!(refused(missing, range_m()).contains("fill value"));
         let mut planes = rays([0.1, 0.2, 0.3]);
-        assert_eq!(one_plane(&planes), Ok(()));
+        assert_eq!(one_plane(&planes, "scan 1"), Ok(()));
         planes[1].azimuth_rad = 1.0 + std::f64::consts::TAU;
-        assert_eq!(one_plane(&planes), Ok(()));
+        assert_eq!(one_plane(&planes, "scan 1"), Ok(()));
         planes[1].azimuth_rad = 1.5;
-        assert!(one_plane(&planes).is_err());
+        assert!(one_plane(&planes, "scan 1").is_err());
     }
 }

@@ -81,19 +81,12 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
     for (sweep, part) in between_turns(&elevation_rad).into_iter().enumerate() {
         let rays = rays[part].to_vec();
         let what = format!("scan {}", sweep + 1);
-        one_plane(&rays).map_err(|(low, high)| {
-            format!("{what}: it has azimuths from {low:.2} to {high:.2} degrees; a scan in elevation (RHI) has one")
-        })?;
+        one_plane(&rays, &what)?;
         out.push(ReadScan {
-            path: path.to_owned(),
-            sweep,
-            map: scan_map(rays, range_m.clone(), None, &what)?,
             reference: header.start,
             gate_length_m: Some(header.gate_length_m),
-            pulse_width_s: None,
-            scene_toml: None,
             is_own: head.contains(&crate::io::hpl::SYSTEM_ID),
-            scans: 1.0,
+            ..ReadScan::new(path, sweep, scan_map(rays, range_m.clone(), None, &what)?)
         });
     }
     Ok(out)
@@ -152,11 +145,10 @@ fn mask_noise(rays: &mut [RayRow], intensities: &[Vec<f64>], format: &ScanFormat
             1.0 + SIGMAS_ABOVE_NOISE * deviation
         }
     };
-    let sign = if format.towards { -1.0 } else { 1.0 };
     for (ray, intensity) in rays.iter_mut().zip(intensities) {
         for (velocity, intensity) in ray.velocity_m_s.iter_mut().zip(intensity) {
             // This program writes intensity 1 where there is none.
-            *velocity = if *intensity > 1.0 && *intensity >= least { sign * *velocity } else { f64::NAN };
+            *velocity = if *intensity > 1.0 && *intensity >= least { format.sign() * *velocity } else { f64::NAN };
         }
     }
 }

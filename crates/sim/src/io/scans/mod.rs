@@ -12,10 +12,6 @@
 mod cfradial;
 mod grid;
 mod hpl;
-#[cfg(feature = "netcdf4")]
-mod netcdf4;
-#[cfg(feature = "netcdf")]
-mod source;
 mod table;
 
 use crate::Error;
@@ -34,6 +30,18 @@ pub struct ScanFormat {
     pub towards: bool,
     /// Least signal-to-noise ratio, dB, where the file has one.
     pub min_snr_db: Option<f64>,
+}
+
+impl ScanFormat {
+    /// 1 where velocities of the file are positive away from the lidar, -1 where they are not.
+    fn sign(&self) -> f64 {
+        if self.towards { -1.0 } else { 1.0 }
+    }
+
+    /// Whether a velocity with this signal-to-noise ratio, dB, is left out; that of an unknown one is.
+    fn is_noise(&self, snr_db: f64) -> bool {
+        self.min_snr_db.is_some_and(|least| snr_db.is_nan() || snr_db < least)
+    }
 }
 
 /// One scan of a file.
@@ -67,15 +75,20 @@ impl ReadScan {
 
     /// A map that was just made by this program, named `name` in messages.
     pub fn own(name: &str, map: ScanMap) -> Self {
+        Self { is_own: true, ..Self::new(Path::new(name), 0, map) }
+    }
+
+    /// A map of which nothing else is known.
+    fn new(path: &Path, sweep: usize, map: ScanMap) -> Self {
         Self {
-            path: name.into(),
-            sweep: 0,
+            path: path.to_owned(),
+            sweep,
             map,
             reference: None,
             gate_length_m: None,
             pulse_width_s: None,
             scene_toml: None,
-            is_own: true,
+            is_own: false,
             scans: 1.0,
         }
     }
@@ -92,10 +105,11 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
     let mut magic = Vec::new();
     file.take(8).read_to_end(&mut magic).map_err(unreadable)?;
     match &magic[..] {
-        #[cfg(feature = "netcdf4")]
-        [0x89, b'H', b'D', b'F', ..] => {
+        #[cfg(feature = "netcdf")]
+        [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
             let (mut out, mut left_out) = (Vec::new(), Vec::new());
-            for (sweep, (name, mut group)) in netcdf4::groups(path)?.into_iter().enumerate() {
+            let groups = crate::io::netcdf_input::open_groups(path, "elevation")?;
+            for (sweep, (name, mut group)) in groups.into_iter().enumerate() {
                 let found = cfradial::scans(&mut group, path, format, sweep);
                 let (scans, others) = found.map_err(|reason| match name.as_str() {
                     "" => refuse(reason),
@@ -104,17 +118,12 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
                 out.extend(scans);
                 left_out.extend(others);
             }
-            some_scan(path, out, left_out)
+            if out.is_empty() {
+                let left_out = left_out.join("; ");
+                return Err(refuse(format!("it has no scan in elevation (RHI) that can be used: {left_out}")));
+            }
+            Ok((out, left_out))
         }
-        #[cfg(feature = "netcdf")]
-        [b'C', b'D', b'F', ..] => {
-            let mut file = crate::io::netcdf_input::open(path)?;
-            let (out, left_out) = cfradial::scans(&mut file, path, format, 0).map_err(refuse)?;
-            some_scan(path, out, left_out)
-        }
-        // The reader of classic files tells what to do about others.
-        #[cfg(all(feature = "netcdf", not(feature = "netcdf4")))]
-        [0x89, b'H', b'D', b'F', ..] => crate::io::netcdf_input::open(path).map(|_| Default::default()),
         #[cfg(not(feature = "netcdf"))]
         [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
             Err(refuse("it is NetCDF, which this program was built without: feature netcdf".into()))
@@ -136,16 +145,6 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
             found.map(|scans| (scans, Vec::new())).map_err(refuse)
         }
     }
-}
-
-/// A file needs one scan at least.
-#[cfg(feature = "netcdf")]
-fn some_scan(path: &Path, found: Vec<ReadScan>, left_out: Vec<String>) -> Result<(Vec<ReadScan>, Vec<String>), Error> {
-    if found.is_empty() {
-        let reason = format!("it has no scan in elevation (RHI) that can be used: {}", left_out.join("; "));
-        return Err(Error::Input { path: path.to_owned(), reason });
-    }
-    Ok((found, left_out))
 }
 
 /// Largest text that is read \[bytes\].

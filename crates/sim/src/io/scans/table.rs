@@ -33,9 +33,9 @@ struct Columns {
 
 impl Columns {
     fn new(table: &TextTable, format: &ScanFormat) -> Result<Self, String> {
-        let needed = |names: &[&str]| -> Result<usize, String> {
-            let found = names.iter().find_map(|name| table.column(name));
-            found.ok_or_else(|| {
+        let one_of = |names: &[&str]| names.iter().find_map(|name| table.column(name));
+        let needed = |names: &[&str]| {
+            one_of(names).ok_or_else(|| {
                 format!(
                     "it has no column {}: range_m, elevation_rad (or elevation_deg), velocity_m_s and, if known, time_s and sigma_m_s \
                      are read",
@@ -44,30 +44,22 @@ impl Columns {
             })
         };
         let angle = |name: &str| {
-            let degrees = 1f64.to_radians();
-            table
-                .column(&format!("{name}_rad"))
-                .map(|c| (c, 1.0))
-                .or(table.column(&format!("{name}_deg")).map(|c| (c, degrees)))
-        };
-        let elevation = match angle("elevation") {
-            Some(elevation) => elevation,
-            None => (needed(&["elevation_rad"])?, 1.0),
+            let in_degrees = || Some((table.column(&format!("{name}_deg"))?, 1f64.to_radians()));
+            table.column(&format!("{name}_rad")).map(|column| (column, 1.0)).or_else(in_degrees)
         };
         let velocity = match &format.field {
             Some(name) => needed(&[name])?,
             None => needed(&VELOCITIES)?,
         };
         let is_mean = table.header.get(velocity).is_some_and(|name| name == OWN);
-        let sigma = SIGMAS.iter().find_map(|name| table.column(name));
         Ok(Self {
+            elevation: angle("elevation").map_or_else(|| Ok((needed(&["elevation_rad"])?, 1.0)), Ok::<_, String>)?,
+            velocity,
             range: needed(&["range_m"])?,
-            elevation,
             azimuth: angle("azimuth"),
             time: table.column("time_s"),
-            velocity,
-            sigma,
-            sweep: table.column("sweep").or(table.column("scan")),
+            sigma: one_of(&SIGMAS),
+            sweep: one_of(&["sweep", "scan"]),
             snr: table.column("snr_db"),
             flagged: table.column("flagged"),
             // The mean of so many scans.
@@ -96,20 +88,13 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
         .map(|(sweep, rows)| {
             let (rays, range_m) = cells(&table, &columns, &rows, format)?;
             let what = format!("sweep {sweep}");
-            one_plane(&rays).map_err(|(low, high)| {
-                format!("{what}: it has azimuths from {low:.2} to {high:.2} degrees; a scan in elevation (RHI) has one")
-            })?;
+            one_plane(&rays, &what)?;
             Ok(ReadScan {
-                path: path.to_owned(),
-                sweep: sweep as usize,
-                map: scan_map(rays, range_m, None, &what)?,
-                reference: None,
-                gate_length_m: None,
-                pulse_width_s: None,
                 scene_toml: Some(origin.scene_toml.clone()).filter(|text| !text.is_empty()),
                 scans: mean_count(columns.count.iter().flat_map(|c| rows.iter().map(|row| table.number(*row, *c)))),
                 // Programs that write it again keep the names of its columns.
                 is_own: table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some(),
+                ..ReadScan::new(path, sweep as usize, scan_map(rays, range_m, None, &what)?)
             })
         })
         .collect()
@@ -151,7 +136,6 @@ fn cells(
     };
     let mut rays: Vec<RayRow> = elevation_rad.iter().map(empty).collect();
     let mut seen = vec![false; range_m.len() * elevation_rad.len()];
-    let sign = if format.towards { -1.0 } else { 1.0 };
     for (&row, (range, elevation)) in rows.iter().zip(places) {
         let (line, gate) = (nearest(&elevation_rad, elevation), nearest(&range_m, range));
         if std::mem::replace(&mut seen[line * range_m.len() + gate], true) {
@@ -166,12 +150,10 @@ fn cells(
         if velocity_m_s.is_nan() && !(text.is_empty() || text.eq_ignore_ascii_case("nan")) {
             return Err(format!("row {}: its velocity is no number; an empty cell is a missing one", row + 1));
         }
-        let noisy = columns
-            .snr
-            .is_some_and(|c| format.min_snr_db.is_some_and(|least| number(row, c).is_nan() || number(row, c) < least));
+        let noisy = columns.snr.is_some_and(|c| format.is_noise(number(row, c)));
         let is_flagged = columns.flagged.is_some_and(|c| number(row, c) > 0.5);
         if !noisy && !is_flagged {
-            ray.velocity_m_s[gate] = sign * velocity_m_s;
+            ray.velocity_m_s[gate] = format.sign() * velocity_m_s;
         }
         if let Some(column) = columns.sigma {
             let count = columns.count.map(|c| number(row, c));
