@@ -2,6 +2,17 @@
 
 use std::path::PathBuf;
 
+/// Where a velocity component is worth a word.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// The component, `"u"`, `"v"` or `"w"`.
+    pub component: &'static str,
+    /// Cell, indices along x, y, z.
+    pub cell: [usize; 3],
+    /// Its position \[m\].
+    pub position_m: [f64; 3],
+}
+
 /// A kinetic energy that nothing can have given.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EnergyGrowth {
@@ -15,19 +26,16 @@ pub struct EnergyGrowth {
     pub allowed_m5_s2: f64,
     /// Growth rate of the energy in this step \[1/s\].
     pub rate_per_s: f64,
-    /// Velocity component whose shortest waves are strongest.
-    pub component: &'static str,
-    /// Cell where they are, indices along x, y, z.
-    pub cell: [usize; 3],
-    /// Its position \[m\].
-    pub position_m: [f64; 3],
+    /// Where the shortest waves are strongest.
+    pub place: Place,
     /// The likeliest cause, and what to do.
     pub cause: String,
 }
 
 impl std::fmt::Display for EnergyGrowth {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { step, time_s, energy_m5_s2, allowed_m5_s2, rate_per_s, component, cell, position_m, cause } = self;
+        let Self { step, time_s, energy_m5_s2, allowed_m5_s2, rate_per_s, place, cause } = self;
+        let Place { component, cell, position_m } = place;
         write!(
             f,
             "step {step} (t = {time_s:?} s): the kinetic energy has grown to {energy_m5_s2:.6e} m^5/s^2, at most \
@@ -93,8 +101,9 @@ pub enum Error {
     },
     /// A simulation has produced values that are not finite.
     #[error(
-        "the {field} {component} is not finite at step {step} (t = {time_s:?} s), cell {cell:?}, x, y, z = {position_m:?} m: \
-         the time step is too long, the mesh too coarse for the viscosity, or the initial field was not finite"
+        "the {field} {} is not finite at step {step} (t = {time_s:?} s), cell {:?}, x, y, z = {:?} m: \
+         the time step is too long, the mesh too coarse for the viscosity, or the initial field was not finite",
+        place.component, place.cell, place.position_m
     )]
     Diverged {
         /// Which field.
@@ -103,17 +112,14 @@ pub enum Error {
         step: u64,
         /// Time that it reached \[s\].
         time_s: f64,
-        /// Velocity component, `"u"`, `"v"` or `"w"`.
-        component: &'static str,
-        /// First such cell, indices along x, y, z.
-        cell: [usize; 3],
-        /// Its position \[m\].
-        position_m: [f64; 3],
+        /// The first such place.
+        place: Place,
     },
     /// A time step is so long that the scheme would be unstable.
     #[error(
-        "step {step} of {step_s:?} s at t = {time_s:?} s has Courant number {courant:?}, above {limit:?}: fastest is {component} in cell \
-         {cell:?}, x, y, z = {position_m:?} m; shorten the step or let a Courant number control it"
+        "step {step} of {step_s:?} s at t = {time_s:?} s has Courant number {courant:?}, above {limit:?}: fastest is {} in cell \
+         {:?}, x, y, z = {:?} m; shorten the step or let a Courant number control it",
+        place.component, place.cell, place.position_m
     )]
     CourantTooLarge {
         /// Number of the step that was refused.
@@ -126,12 +132,8 @@ pub enum Error {
         courant: f64,
         /// Largest allowed.
         limit: f64,
-        /// Fastest velocity component.
-        component: &'static str,
-        /// Where it is: cell along x, y, z.
-        cell: [usize; 3],
-        /// Position of that cell \[m\].
-        position_m: [f64; 3],
+        /// Where a component is fastest.
+        place: Place,
     },
     /// A flow has more kinetic energy than it started with and force or moving walls can have given it.
     #[error("{0}")]

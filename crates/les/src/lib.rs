@@ -52,7 +52,7 @@ pub mod ranks;
 pub mod solver;
 pub mod winds;
 
-pub use error::{EnergyGrowth, Error, PressureFailure};
+pub use error::{EnergyGrowth, Error, Place, PressureFailure};
 #[cfg(feature = "solver")]
 pub use solver::{Direction, Flow, FlowSettings, Mapping, Mesh, SubgridModel, TimeScheme, TimeStep, Wall, cases};
 pub use winds::{CirculationProfile, GridSnapshot, Ground, Motion, VortexPair, Wind};

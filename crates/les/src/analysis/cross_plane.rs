@@ -71,7 +71,7 @@ impl Flow {
                 for (source, weight) in taps {
                     let value = match source {
                         Source::Node(i) => node(i),
-                        Source::Ghost(ghost) => ghost_value(ghost, 0, node),
+                        Source::Ghost(ghost) => std::array::from_fn(|c| ghost_value(ghost, 0, c, |i| node(i)[c])),
                     };
                     for (sum, value) in sum.iter_mut().zip(value) {
                         *sum += weight * value;

@@ -3,7 +3,7 @@
 use super::flow::Flow;
 use super::mesh::Mesh;
 use super::settings::{FlowSettings, TimeStep};
-use crate::Error;
+use crate::error::{Error, Place};
 
 /// Largest symbol of the Laplacian times the square of the spacing.
 pub(super) const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
@@ -21,21 +21,23 @@ const RESOLVED_DECAY: f64 = 4.0;
 /// Largest growth of the time step from one step to the next.
 const LARGEST_GROWTH: f64 = 1.1;
 
-/// Largest decay rate of the viscous term along a direction of cells of these lengths \[1/s\].
-pub(super) fn decay_per_s(metric_m: &[f64], viscosity_m2_s: f64) -> f64 {
-    let least_m = metric_m.iter().copied().fold(f64::INFINITY, f64::min);
-    LAPLACIAN_SYMBOL * viscosity_m2_s / least_m.powi(2)
-}
-
 /// Lengths of the cells along each direction \[m\].
 pub(super) fn metrics(mesh: &Mesh) -> [Vec<f64>; 3] {
     mesh.directions().each_ref().map(|d| (0..d.cells).map(|i| d.at(i as f64 + 0.5).1).collect())
 }
 
+/// Largest decay rate of the viscous term along x, y, z \[1/s\]; zero along a direction of one cell.
+pub(super) fn viscous_rates_per_s(mesh: &Mesh, viscosity_m2_s: f64) -> [f64; 3] {
+    metrics(mesh).map(|metric_m| {
+        let least_m = metric_m.iter().copied().fold(f64::INFINITY, f64::min);
+        if metric_m.len() > 1 { LAPLACIAN_SYMBOL * viscosity_m2_s / least_m.powi(2) } else { 0.0 }
+    })
+}
+
 /// Along which of x, y, z viscosity is implicit in a flow whose largest `sum |u_i|/h_i` is `courant_per_s` at first.
 pub(super) fn implicit_axes(mesh: &Mesh, settings: &FlowSettings, courant_per_s: f64) -> [bool; 3] {
-    let (nu, step_s) = (settings.viscosity_m2_s, settings.time_step.step_s(courant_per_s));
-    metrics(mesh).map(|m| m.len() > 1 && step_s * decay_per_s(&m, nu) > IMPLICIT_SHARE)
+    let step_s = settings.time_step.step_s(courant_per_s);
+    viscous_rates_per_s(mesh, settings.viscosity_m2_s).map(|rate_per_s| step_s * rate_per_s > IMPLICIT_SHARE)
 }
 
 /// The two largest decay rates of viscosity along implicit axes \[1/s\].
@@ -43,8 +45,9 @@ pub(super) fn implicit_axes(mesh: &Mesh, settings: &FlowSettings, courant_per_s:
 pub(super) struct Stiffness([f64; 2]);
 
 impl Stiffness {
-    /// From the rates along all axes; zero where viscosity is not implicit.
-    pub(super) fn new(mut rates_per_s: [f64; 3]) -> Self {
+    /// From the rates along all axes and whether viscosity is implicit there.
+    pub(super) fn new(rates_per_s: [f64; 3], implicit: [bool; 3]) -> Self {
+        let mut rates_per_s: [f64; 3] = std::array::from_fn(|a| if implicit[a] { rates_per_s[a] } else { 0.0 });
         rates_per_s.sort_by(|a, b| b.total_cmp(a));
         Self([rates_per_s[0], rates_per_s[1]])
     }
@@ -81,8 +84,7 @@ impl Stiffness {
 impl Flow {
     /// How stiff viscosity is along the implicit axes.
     pub(super) fn stiffness(&self) -> Stiffness {
-        let rate = |axis: usize| if self.state.implicit[axis] { self.viscous_rate_per_s(axis) } else { 0.0 };
-        Stiffness::new([rate(0), rate(1), rate(2)])
+        Stiffness::new(self.viscous_per_s, self.state.implicit)
     }
 
     /// Length of the next step \[s\].
@@ -104,22 +106,8 @@ impl Flow {
         }
     }
 
-    /// Largest decay rate of the viscous term along one memory axis \[1/s\].
-    pub(super) fn viscous_rate_per_s(&self, axis: usize) -> f64 {
-        let line = &self.layout.line[axis];
-        if line.is_thin() {
-            return 0.0;
-        }
-        decay_per_s(&line.cell_metric_m, self.settings.viscosity_m2_s)
-    }
-
     pub(super) fn explicit_viscous_rate_per_s(&self) -> f64 {
-        (0..3).filter(|&axis| !self.state.implicit[axis]).map(|axis| self.viscous_rate_per_s(axis)).sum()
-    }
-
-    pub(super) fn choose_implicit(&self) -> [bool; 3] {
-        let implicit = implicit_axes(&self.mesh, &self.settings, self.state.courant_per_s);
-        self.layout.direction.map(|d| implicit[d])
+        (0..3).filter(|&axis| !self.state.implicit[axis]).map(|axis| self.viscous_per_s[axis]).sum()
     }
 
     pub(super) fn refuse_courant(&self, courant: f64, step_s: f64) -> Result<(), Error> {
@@ -136,9 +124,7 @@ impl Flow {
             time_s: self.state.time_s,
             courant,
             limit,
-            component: self.component_name(axis),
-            cell: self.cell(place),
-            position_m: self.position_m(place),
+            place: self.place(axis, place),
         })
     }
 
@@ -167,31 +153,17 @@ impl Flow {
     }
 
     pub(super) fn diverged(&self, axis: usize, place: usize, field: &'static str) -> Error {
-        Error::Diverged {
-            field,
-            step: self.state.step,
-            time_s: self.state.time_s,
-            component: self.component_name(axis),
-            cell: self.cell(place),
-            position_m: self.position_m(place),
-        }
+        let place = self.place(axis, place);
+        Error::Diverged { field, step: self.state.step, time_s: self.state.time_s, place }
     }
 
-    pub(super) fn component_name(&self, axis: usize) -> &'static str {
-        ["u", "v", "w"][self.layout.direction[axis]]
-    }
-
-    /// Indices along x, y, z of a place in a whole field.
-    pub(super) fn cell(&self, place: usize) -> [usize; 3] {
+    /// Component and cell of a memory axis and a place in a whole field.
+    pub(super) fn place(&self, axis: usize, place: usize) -> Place {
         let mut cell = [0; 3];
         for (axis, index) in self.layout.shape.index(place).into_iter().enumerate() {
             cell[self.layout.direction[axis]] = index;
         }
-        cell
-    }
-
-    pub(super) fn position_m(&self, place: usize) -> [f64; 3] {
-        let cell = self.cell(place);
-        std::array::from_fn(|d| self.mesh.directions()[d].at(cell[d] as f64 + 0.5).0)
+        let position_m = std::array::from_fn(|d| self.mesh.directions()[d].at(cell[d] as f64 + 0.5).0);
+        Place { component: ["u", "v", "w"][self.layout.direction[axis]], cell, position_m }
     }
 }

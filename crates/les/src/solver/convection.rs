@@ -4,10 +4,33 @@
 
 use multiversion::multiversion;
 
-use super::kept_fluxes::{KeptFluxes, SLOTS};
 use super::momentum::{Momentum, Scratch};
 use super::rows::{HALO, add_product, add_transport, cut_rows, even_mean, from_places, pad, round, rows_from};
 use super::transport::{MEAN, Transport};
+
+/// Fluxes along one axis that act on one row.
+const SLOTS: usize = 4;
+
+/// Fluxes along the axes 1 and 2 of one component of one velocity field: each acts on four rows and is computed once, as long as rows
+/// are asked for in the order of memory.
+#[derive(Debug, Default)]
+pub(super) struct FluxCache {
+    /// For each axis the last four rows of each place across it.
+    values: [Vec<f64>; 2],
+    /// Offset in the field of each row that is cached, `usize::MAX` of none.
+    offsets: [Vec<usize>; 2],
+}
+
+impl FluxCache {
+    /// Room on a mesh of `n` cells.
+    #[inline(always)]
+    fn fit(&mut self, n: [usize; 3]) {
+        for (axis, places) in [SLOTS, SLOTS * n[1]].into_iter().enumerate() {
+            self.offsets[axis].resize(places, usize::MAX);
+            self.values[axis].resize(places * n[0], 0.0);
+        }
+    }
+}
 
 /// The row that is computed: indices `j` and `k` along the axes 1 and 2.
 struct Row<'a> {
@@ -18,11 +41,11 @@ struct Row<'a> {
 }
 
 impl Scratch {
-    /// Convection of one row into `self.convection`. A scratch belongs to one velocity field.
+    /// Convection of one row into `self.convection`. A scratch belongs to one component of one velocity field.
     pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
-        self.kept.fit(ops.axis, ops.n);
+        self.fluxes.fit(ops.n);
         let row = Row { ops, velocity, j, k };
-        convection_row(&row, &mut self.convection, &mut self.padded, &mut self.flux, &mut self.kept);
+        convection_row(&row, &mut self.convection, &mut self.padded, &mut self.flux, &mut self.fluxes);
     }
 }
 
@@ -33,7 +56,7 @@ fn convection_row(
     out: &mut [f64],
     padded: &mut [Vec<f64>; 2],
     flux: &mut [Vec<f64>; 2],
-    kept: &mut KeptFluxes,
+    cache: &mut FluxCache,
 ) {
     let &Row { ops, j, k, .. } = row;
     out.fill(0.0);
@@ -42,7 +65,7 @@ fn convection_row(
     }
     for axis in 1..3 {
         if !ops.thin[axis] {
-            across_rows(row, axis, out, padded, (&mut flux[0], kept));
+            across_rows(row, axis, out, padded, (&mut flux[0], cache));
         }
     }
     match ops.axis {
@@ -128,7 +151,7 @@ fn across_rows(
     axis: usize,
     out: &mut [f64],
     padded: &mut [Vec<f64>; 2],
-    (fresh, kept): (&mut [f64], &mut KeptFluxes),
+    (fresh, cache): (&mut [f64], &mut FluxCache),
 ) {
     let &Row { ops, ref velocity, j, k } = target;
     let length = out.len();
@@ -137,12 +160,12 @@ fn across_rows(
     let transport = &ops.transport[axis];
     let scale = if axis == ops.axis { 1.0 } else { ops.inverse_cell_mass[axis][index] };
     let values = velocity[ops.axis];
-    let rows = ops.shape.starts(axis, [j, k]);
+    let rows = ops.shape.row_offsets(axis, [j, k]);
     if ops.periodic[axis] || transport.regular.contains(&index) {
         // The row itself is the fourth; a regular row of a bounded direction never wraps.
         let first = index + count - 3;
         let q = rows_from::<7>(values, length, rows, first, count);
-        let (values, starts) = (&mut kept.values[axis - 1], &mut kept.starts[axis - 1]);
+        let (values, offsets) = (&mut cache.values[axis - 1], &mut cache.offsets[axis - 1]);
         // The flux at offset 2 to 5 from the row has the same place for all four rows on which it acts.
         let (across, j_of) = if axis == 1 { (1, 0) } else { (ops.n[1], j) };
         let mut places = [0; SLOTS];
@@ -151,8 +174,8 @@ fn across_rows(
             let face = round(first + slot + 2, count);
             let start = rows.of(face);
             places[slot] = place * length;
-            if starts[place] != start {
-                starts[place] = start;
+            if offsets[place] != start {
+                offsets[place] = start;
                 let flux = &mut values[place * length..][..length];
                 if axis == ops.axis {
                     mean_row(flux, [q[slot], q[slot + 1], q[slot + 2], q[slot + 3]]);
@@ -212,7 +235,7 @@ fn flux_row(target: &Row<'_>, along: usize, face: usize, out: &mut [f64], padded
     let own = if ops.axis == 1 { j } else { k };
     if let Some(mass) = ops.equal_mass {
         let count = ops.n[ops.axis];
-        even_mean(out, mass, &rows_from(field, n, ops.shape.starts(ops.axis, [j, k]), own + 2 * count - 2, count));
+        even_mean(out, mass, &rows_from(field, n, ops.shape.row_offsets(ops.axis, [j, k]), own + 2 * count - 2, count));
         return;
     }
     out.fill(0.0);

@@ -10,11 +10,11 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::flow::Flow;
-use super::layout::{Layout, Shape};
+use super::layout::Shape;
 use super::mesh::{Ends, Mesh};
 use super::planes::without_halos;
 use super::settings::FlowSettings;
-use crate::Error;
+use crate::error::{Error, check_lengths};
 use crate::solver::aligned::Aligned;
 
 /// Fourth-order interpolation from the faces to the first centre at a wall.
@@ -101,6 +101,17 @@ impl Flow {
         self.whole(self.own_face_velocity_m_s(direction))
     }
 
+    /// Largest difference of a component, at the faces where it lies, from `exact(position_m, time_s) -> velocity_m_s` at the present time
+    /// \[m/s\]; not finite where a rank is lost.
+    pub fn largest_error_m_s(&self, exact: impl Fn([f64; 3], f64) -> [f64; 3]) -> f64 {
+        let at_m = [0, 1, 2].map(|axis| self.face_position_m(axis));
+        let error = |axis: usize, place: usize| {
+            let velocity_m_s = exact(at_m[axis](self.layout.shape.index_held(place)), self.state.time_s);
+            (self.state.velocity[axis][place] - velocity_m_s[self.layout.direction[axis]]).abs()
+        };
+        self.first_largest(error).map_or(f64::NAN, |(largest, ..)| largest)
+    }
+
     /// Velocity along `direction` at the centres of the cells, interpolated with fourth order \[m/s\], `[z][y][x]`.
     pub fn centre_velocity_m_s(&self, direction: usize) -> Vec<f64> {
         self.whole(self.own_centre_velocity_m_s(direction))
@@ -163,42 +174,18 @@ impl Flow {
         Self::at_rest(mesh, settings)?.with_faces(velocity_m_s)
     }
 
-    /// Starts from these velocities.
-    pub(super) fn with_faces(mut self, velocity_m_s: [&[f64]; 3]) -> Result<(Self, super::StartReport), Error> {
-        let flow = &mut self;
-        let cells = Shape::whole(flow.layout.shape.n).len();
-        for (direction, values) in velocity_m_s.into_iter().enumerate() {
-            if values.len() != cells {
-                return Err(Error::LengthMismatch { points: cells, out: values.len() });
-            }
-            let axis = flow.layout.axis_of(direction);
-            let first = flow.layout.line[axis].first_face();
-            let stride = [1, flow.layout.shape.n[0], flow.layout.shape.plane()][axis];
-            let count = flow.layout.shape.n[axis];
-            let mut field = from_xyz(&flow.layout, values);
-            for (place, value) in field.iter_mut().enumerate() {
-                if place / stride % count < first {
-                    *value = 0.0;
-                }
-            }
-            flow.layout.slabs.take_own(&field, &mut flow.state.velocity[axis]);
+    /// RowOffsets from these velocities.
+    pub(super) fn with_faces(self, velocity_m_s: [&[f64]; 3]) -> Result<(Self, super::StartReport), Error> {
+        let ([nx, ny, nz], direction) = (self.mesh.cells(), self.layout.direction);
+        for values in velocity_m_s {
+            check_lengths(nx * ny * nz, values.len())?;
         }
-        let report = self.start()?;
-        Ok((self, report))
+        self.started(|axis, index| {
+            let mut at = [0; 3];
+            (0..3).for_each(|b| at[direction[b]] = index[b]);
+            velocity_m_s[direction[axis]][(at[2] * ny + at[1]) * nx + at[0]]
+        })
     }
-}
-
-/// The values given in the order `[z][y][x]`, in the order of memory.
-fn from_xyz(layout: &Layout, values: &[f64]) -> Vec<f64> {
-    let shape = Shape::whole(layout.shape.n);
-    let count = |d: usize| shape.n[layout.axis_of(d)];
-    let [nx, ny] = [count(0), count(1)];
-    let mut field = vec![0.0; values.len()];
-    for (at, value) in values.iter().enumerate() {
-        let index = [at % nx, at / nx % ny, at / nx / ny];
-        field[shape.place(layout.direction.map(|d| index[d]))] = *value;
-    }
-    field
 }
 
 #[cfg(test)]

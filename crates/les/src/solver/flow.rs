@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 mod project;
 
+use super::control::{implicit_axes, viscous_rates_per_s};
 use super::implicit::LineSolvers;
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
@@ -19,7 +20,7 @@ use super::momentum::{Momentum, Scratch, add_laplacian_row};
 use super::pressure::{PressureSolver, Solved, unless_stalled};
 use super::projection::{Divergence, correct, weighted_dot};
 use super::report::{Powers, StartReport, StepReport};
-use super::settings::{FlowSettings, TimeScheme, refuse_sticking_without_viscosity};
+use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
 use super::slabs::WHOLE;
 use super::subgrid::Subgrid;
 use crate::Error;
@@ -36,6 +37,8 @@ pub struct Flow {
     pressure_solver: PressureSolver,
     pub(super) model: Option<Subgrid>,
     line_solvers: LineSolvers,
+    /// Largest decay rate of the viscous term along each memory axis \[1/s\].
+    pub(super) viscous_per_s: [f64; 3],
     pub(super) work: Work,
     pub(crate) state: State,
 }
@@ -44,7 +47,7 @@ pub struct Flow {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct State {
     pub(crate) velocity: [Aligned; 3],
-    pub(crate) history: [Aligned; 3],
+    pub(crate) previous_terms: [Aligned; 3],
     pub(crate) pressure: Aligned,
     pub(crate) time_s: f64,
     pub(crate) step: u64,
@@ -59,7 +62,7 @@ pub(crate) struct State {
 
 #[derive(Debug, Default)]
 pub(super) struct Work {
-    pub(super) star: [Aligned; 3],
+    pub(super) predicted: [Aligned; 3],
     pub(super) phi: Aligned,
 }
 
@@ -77,29 +80,25 @@ impl Flow {
         Self::at_rest(mesh, settings)?.filled(initial)
     }
 
-    /// Starts from `initial`.
-    pub(super) fn filled(
+    /// RowOffsets from `initial`.
+    pub(super) fn filled(self, initial: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Result<(Self, StartReport), Error> {
+        let (direction, at_m) = (self.layout.direction, [0, 1, 2].map(|axis| self.face_position_m(axis)));
+        self.started(|axis, index| initial(at_m[axis](index))[direction[axis]])
+    }
+
+    /// RowOffsets from the velocity along each memory axis at the indices of its faces; nothing flows through walls.
+    pub(super) fn started(
         mut self,
-        initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
+        velocity_m_s: impl Fn(usize, [usize; 3]) -> f64 + Sync,
     ) -> Result<(Self, StartReport), Error> {
+        let shape = self.layout.shape;
         for axis in 0..3 {
-            let layout = &self.layout;
-            let direction = layout.direction;
-            let position: [Vec<f64>; 3] = std::array::from_fn(|b| {
-                let d = direction[b];
-                if b == axis { self.mesh.face_m(d) } else { self.mesh.centre_m(d) }
-            });
-            let (n0, shape) = (layout.shape.n[0], layout.shape);
-            let first = layout.line[axis].first_face();
+            let first = self.layout.line[axis].first_face();
             let own = &mut self.state.velocity[axis][shape.own_places()];
             own.par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
                 for (place, value) in plane.iter_mut().enumerate() {
-                    let index = [place % n0, place / n0, k];
-                    let mut at_m = [0.0; 3];
-                    for b in 0..3 {
-                        at_m[direction[b]] = position[b][index[b]];
-                    }
-                    *value = if index[axis] < first { 0.0 } else { initial(at_m)[direction[axis]] };
+                    let index = [place % shape.n[0], place / shape.n[0], k];
+                    *value = if index[axis] < first { 0.0 } else { velocity_m_s(axis, index) };
                 }
             });
         }
@@ -107,9 +106,22 @@ impl Flow {
         Ok((self, report))
     }
 
+    /// Where a component lies at the indices along the memory axes, x, y, z \[m\].
+    pub(super) fn face_position_m(&self, axis: usize) -> impl Fn([usize; 3]) -> [f64; 3] + Sync + use<> {
+        let direction = self.layout.direction;
+        let along: [Vec<f64>; 3] = std::array::from_fn(|b| {
+            if b == axis { self.mesh.face_m(direction[b]) } else { self.mesh.centre_m(direction[b]) }
+        });
+        move |index| {
+            let mut at_m = [0.0; 3];
+            (0..3).for_each(|b| at_m[direction[b]] = along[b][index[b]]);
+            at_m
+        }
+    }
+
     /// All arrays zero; nothing projected yet.
     pub(crate) fn at_rest(mesh: Mesh, settings: FlowSettings) -> Result<Self, Error> {
-        let layout = Layout::on(&mesh, settings.ranks.clone())?;
+        let layout = Layout::new(&mesh).shared(settings.ranks.clone())?;
         Self::laid_out(mesh, settings, layout)
     }
 
@@ -122,7 +134,7 @@ impl Flow {
         let fields = || [field(), field(), field()];
         let state = State {
             velocity: fields(),
-            history: fields(),
+            previous_terms: fields(),
             pressure: field(),
             time_s: 0.0,
             step: 0,
@@ -137,7 +149,8 @@ impl Flow {
             pressure_solver: PressureSolver::new(&layout, settings.pressure),
             model: Subgrid::new(&layout, settings.subgrid)?,
             line_solvers: LineSolvers::default(),
-            work: Work { star: fields(), phi: field() },
+            viscous_per_s: layout.direction.map(|d| viscous_rates_per_s(&mesh, settings.viscosity_m2_s)[d]),
+            work: Work { predicted: fields(), phi: field() },
             mesh,
             settings,
             layout,
@@ -152,11 +165,15 @@ impl Flow {
             return Err(self.diverged(axis, place, "initial velocity"));
         }
         let [given] = self.layout.slabs.sums(self.kinetic_energy())?;
-        std::mem::swap(&mut self.state.velocity, &mut self.work.star);
+        std::mem::swap(&mut self.state.velocity, &mut self.work.predicted);
         self.project(1.0)?;
         self.repeat(1.0, 0.0)?;
-        self.state.implicit = self.choose_implicit();
-        self.accelerate()?;
+        let implicit = implicit_axes(&self.mesh, &self.settings, self.state.courant_per_s);
+        self.state.implicit = self.layout.direction.map(|d| implicit[d]);
+        // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long. The terms are no history.
+        self.update_model(1.0, 0.0)?;
+        self.predict(&Stage { fraction: 1.0, new: 1.0, old: 0.0 }, 1.0, false, false)?;
+        self.state.previous_terms.iter_mut().for_each(|terms| terms.fill(0.0));
         self.take_divergence(1.0)?;
         unless_stalled(self.pressure_solver.solve(&mut self.work.phi, self.settings.pressure_tolerance))?;
         self.state.pressure.copy_from_slice(&self.work.phi);
@@ -171,6 +188,17 @@ impl Flow {
     pub fn step(&mut self) -> Result<StepReport, Error> {
         let step_s = self.next_step_s();
         self.step_by(step_s)
+    }
+
+    /// Makes time steps until `end_s` \[s\].
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn run_to(&mut self, end_s: f64) -> Result<(), Error> {
+        while self.state.time_s < end_s {
+            self.step_towards(end_s)?;
+        }
+        Ok(())
     }
 
     /// Makes one time step, shortened if it would pass `end_s`; steps are evened out so that no sliver is left.
@@ -225,24 +253,26 @@ impl Flow {
     fn advance(&mut self, step_s: f64) -> Result<(Powers, Option<Solved>), Error> {
         let ratio = (self.state.last_step_s > 0.0).then(|| step_s / self.state.last_step_s);
         let is_damped = self.state.step < self.settings.damped_steps;
+        let keeps = is_damped || self.state.implicit == [false; 3];
         let (mut begun, mut solved) = (None, None);
         for stage in self.settings.scheme.stages(ratio) {
             let stage_s = stage.fraction * step_s;
-            let powers = self.predict(&stage, stage_s, is_damped, begun.is_none())?;
+            self.update_model(stage.fraction, stage_s)?;
+            let powers = self.predict(&stage, stage_s, keeps, begun.is_none())?;
             begun.get_or_insert_with(|| (powers, self.first_terms(ratio)));
             self.solve_viscous(stage_s * self.settings.viscosity_m2_s, is_damped)?;
             solved = Some(self.project(stage_s)?);
             self.add_pressure();
         }
         let (powers, first_terms) = begun.unwrap_or_default();
-        self.state.history = first_terms.unwrap_or_else(|| std::mem::take(&mut self.state.history));
+        self.state.previous_terms = first_terms.unwrap_or_else(|| std::mem::take(&mut self.state.previous_terms));
         Ok((powers, solved))
     }
 
     /// The terms of the initial field: Adams-Bashforth begins with a step of Runge-Kutta and then wants them.
     fn first_terms(&self, ratio: Option<f64>) -> Option<[Aligned; 3]> {
         let begins = self.settings.scheme == TimeScheme::AdamsBashforth2 && ratio.is_none();
-        begins.then(|| self.state.history.clone())
+        begins.then(|| self.state.previous_terms.clone())
     }
 
     /// Takes `nu_s_m2`, viscosity times the stage, along the implicit axes: solves for the increments by Crank-Nicolson and adds the
@@ -250,26 +280,26 @@ impl Flow {
     /// that are stiff along two axes as they are, `1 - (d1 + d2)/((1 + d1) (1 + d2))`; one after the other it is
     /// `1/((1 + d1) (1 + d2))`.
     fn solve_viscous(&mut self, nu_s_m2: f64, is_damped: bool) -> Result<(), Error> {
-        let Self { state, layout, ops, work: Work { star, phi }, .. } = self;
+        let Self { state, layout, ops, work: Work { predicted, phi }, .. } = self;
         if state.implicit == [false; 3] {
             return Ok(());
         }
         let a_m2 = if is_damped { nu_s_m2 } else { 0.5 * nu_s_m2 };
         let own = layout.shape.own_places();
         for solver in self.line_solvers.of(ops, state.implicit, a_m2) {
-            let star = &mut star[solver.component];
+            let predicted = &mut predicted[solver.component];
             if is_damped {
-                layout.slabs.halos(&mut [star], WHOLE)?;
-                viscous_increment(layout, &ops[solver.component], (solver.axis, a_m2), star, phi);
+                layout.slabs.halos(&mut [predicted], WHOLE)?;
+                viscous_increment(layout, &ops[solver.component], (solver.axis, a_m2), predicted, phi);
                 solver.solve(&layout.slabs, &mut phi[own.clone()])?;
-                add(star, phi, layout.shape);
+                add(predicted, phi, layout.shape);
             } else {
-                solver.solve(&layout.slabs, &mut star[own.clone()])?;
+                solver.solve(&layout.slabs, &mut predicted[own.clone()])?;
             }
         }
         if !is_damped {
-            for (star, velocity) in star.iter_mut().zip(&state.velocity) {
-                add(&mut star[own.clone()], &velocity[own.clone()], layout.shape);
+            for (predicted, velocity) in predicted.iter_mut().zip(&state.velocity) {
+                add(&mut predicted[own.clone()], &velocity[own.clone()], layout.shape);
             }
         }
         Ok(())
@@ -304,7 +334,7 @@ fn viscous_increment(layout: &Layout, ops: &Momentum, (axis, a_m2): (usize, f64)
             for (j, row) in plane.chunks_mut(n).enumerate() {
                 row.fill(0.0);
                 if !ops.is_wall_row(j, k) {
-                    add_laplacian_row(ops, field, axis, j, k, row, &mut scratch.padded[0]);
+                    add_laplacian_row(ops, field, axis, [j, k], row, &mut scratch.padded[0]);
                 }
                 row.iter_mut().for_each(|value| *value *= a_m2);
                 if starts_at_wall {

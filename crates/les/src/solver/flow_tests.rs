@@ -22,12 +22,12 @@ fn rough(at_m: [f64; 3]) -> [f64; 3] {
 /// Convection of every component of the present field, and what it makes of energy and momentum over sums of moduli.
 fn production(flow: &Flow) -> (f64, [f64; 3]) {
     let shape = flow.layout.shape;
-    let mut scratch = Scratch::new(shape.n[0]);
     let velocity = flow.state.velocity.each_ref().map(Aligned::as_slice);
     let (mut energy, mut energy_moduli) = (0.0, 0.0);
     let mut momentum = [0.0; 3];
     for axis in 0..3 {
         let (mut sum, mut moduli) = (0.0, 0.0);
+        let mut scratch = Scratch::new(shape.n[0]);
         for k in 0..shape.n[2] {
             for j in 0..shape.n[1] {
                 let ops = &flow.ops[axis];

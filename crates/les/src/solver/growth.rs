@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 use num_complex::Complex;
 use rayon::prelude::*;
 
-use super::control::{Stiffness, decay_per_s, implicit_axes, metrics};
+use super::control::{Stiffness, implicit_axes, metrics, viscous_rates_per_s};
 use super::flow::Flow;
 use super::mesh::{Mesh, Wall};
 use super::settings::{FlowSettings, ROUND_OFF, TimeScheme, TimeStep};
@@ -99,9 +99,7 @@ impl Stability {
         }
         let transport = TRANSPORT[usize::from(sticks)];
         let nu = settings.viscosity_m2_s;
-        let decay = |d: usize, m: &[f64]| if implicit[d] && m.len() > 1 { decay_per_s(m, nu) } else { 0.0 };
-        let [x, y, z] = metrics(mesh);
-        let stiffness = Stiffness::new([decay(0, &x), decay(1, &y), decay(2, &z)]);
+        let stiffness = Stiffness::new(viscous_rates_per_s(mesh, nu), implicit);
         Self { scheme: settings.scheme, transport, viscosity_m2_s: nu, cells, stiffness }
     }
 
@@ -267,9 +265,8 @@ impl Flow {
     pub(super) fn strongest_short_wave(&self) -> Result<(usize, usize), Error> {
         let shape = self.layout.shape;
         let n = shape.n;
-        let first = shape.own().start * shape.plane();
         let (_, component, place) = self.first_largest(|component, place| {
-            let index = shape.index(place - shape.own_places().start + first);
+            let index = shape.index_held(place);
             let field = &self.state.velocity[component];
             let of = |axis: usize| {
                 let at_end = index[axis] == 0 || index[axis] + 1 == n[axis];

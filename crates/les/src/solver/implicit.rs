@@ -11,9 +11,10 @@ use rayon::prelude::*;
 use super::layout::Shape;
 use super::momentum::Momentum;
 use super::operators_1d::Taps;
+use super::pressure::{Pencil, pencils};
+use super::row_offsets::RowOffsets;
 use super::rows::add_across;
 use super::slabs::Slabs;
-use super::starts::Starts;
 use crate::Error;
 
 /// Factors of `1 - a L` along one axis for one component.
@@ -126,23 +127,19 @@ impl LineSolver {
         }
     }
 
-    /// Lines along axis 2: some neighbours of a plane are gathered from all planes, for rows of the same place in all planes get in
-    /// each other's way in the caches.
+    /// Lines along axis 2: some neighbours are gathered from all planes, for rows of the same place in all planes get in each other's
+    /// way in the caches.
     fn solve_across_planes(&self, shape: Shape, field: &mut [f64]) {
-        let strip = || Vec::with_capacity(shape.n[2]);
-        let mut strips: Vec<Vec<&mut [f64]>> = (0..shape.plane().div_ceil(COLUMNS)).map(|_| strip()).collect();
-        for plane in field.chunks_mut(shape.plane()) {
-            strips.iter_mut().zip(plane.chunks_mut(COLUMNS)).for_each(|(strip, part)| strip.push(part));
-        }
-        strips.par_iter_mut().for_each_init(Vec::new, |block: &mut Vec<f64>, strip| {
-            let width = strip.first().map_or(0, |part| part.len());
-            block.clear();
-            strip.iter().for_each(|part| block.extend_from_slice(part));
-            solve_block(self, block, width);
-            for (from, to) in block.chunks(width).zip(strip.iter_mut()) {
-                to.copy_from_slice(from);
-            }
-        });
+        pencils(field, shape, 2, COLUMNS).par_iter_mut().for_each_init(
+            Vec::new,
+            |block: &mut Vec<f64>, Pencil { rows, .. }| {
+                let width = rows[0].len();
+                block.clear();
+                rows.iter().for_each(|row| block.extend_from_slice(row));
+                solve_block(self, block, width);
+                rows.iter_mut().zip(block.chunks(width)).for_each(|(row, solved)| row.copy_from_slice(solved));
+            },
+        );
     }
 }
 
@@ -179,7 +176,7 @@ fn add_taps(row: &mut [f64], other: &[f64], taps: &[(usize, f64)], first: usize)
                 row[i] += (a.1 * x[i] + b.1 * y[i]) + c.1 * z[i];
             }
         } else {
-            add_across(row, other, 1.0, taps, Starts::every(n, first));
+            add_across(row, other, 1.0, taps, RowOffsets::every(n, first));
         }
     }
 }

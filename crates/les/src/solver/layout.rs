@@ -37,29 +37,18 @@ impl Layout {
 
     /// The same with the directions of the memory axes given.
     pub(crate) fn in_order(mesh: &Mesh, direction: [usize; 3]) -> Self {
+        let line = direction.map(|d| Operators1d::new(&mesh.directions()[d]));
         let shape = Shape::whole(direction.map(|d| mesh.cells()[d]));
-        Self::of(mesh, direction, Slabs { ranks: Arc::new(Timed::new(Arc::new(Single))), shape })
+        Self { line, direction, shape, slabs: Slabs { ranks: Arc::new(Timed::new(Arc::new(Single))), shape } }
     }
 
-    /// The operators of one of several ranks.
+    /// The same for one of several ranks.
     ///
     /// # Errors
     /// [`Error::TooManyRanks`].
-    pub(crate) fn on(mesh: &Mesh, ranks: Arc<dyn Ranks>) -> Result<Self, Error> {
-        Self::on_in_order(mesh, ranks, order(mesh))
-    }
-
-    /// The same with the directions of the memory axes given.
-    ///
-    /// # Errors
-    /// As [`Self::on`].
-    pub(crate) fn on_in_order(mesh: &Mesh, ranks: Arc<dyn Ranks>, direction: [usize; 3]) -> Result<Self, Error> {
-        Ok(Self::of(mesh, direction, Slabs::new(ranks, direction.map(|d| mesh.cells()[d]))?))
-    }
-
-    fn of(mesh: &Mesh, direction: [usize; 3], slabs: Slabs) -> Self {
-        let line = direction.map(|d| Operators1d::new(&mesh.directions()[d]));
-        Self { line, direction, shape: slabs.shape, slabs }
+    pub(crate) fn shared(self, ranks: Arc<dyn Ranks>) -> Result<Self, Error> {
+        let slabs = Slabs::new(ranks, self.shape.n)?;
+        Ok(Self { shape: slabs.shape, slabs, ..self })
     }
 
     /// The memory axis of direction `d` (0, 1, 2 for x, y, z).

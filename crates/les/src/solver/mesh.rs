@@ -107,51 +107,39 @@ impl Direction {
 
     /// Refuses what the schemes cannot take: too few cells, folds, jumps, walls that blow.
     pub(crate) fn check(&self, axis: usize) -> Result<(), Error> {
-        let name = AXIS_NAMES[axis];
-        let bad = |what: &'static str, value: f64, allowed: &'static str| Error::BadDirection {
-            axis: name,
-            what,
-            value,
-            allowed,
-        };
+        let bad = |what, value, allowed| Err(refused(axis, what, value, allowed));
         if !(self.low_m.is_finite() && self.high_m.is_finite() && self.length_m() > 0.0) {
-            return Err(bad("high_m - low_m", self.length_m(), "finite and positive"));
+            return bad("high_m - low_m", self.length_m(), "finite and positive");
         }
         if let Some((what, value)) = self.mapping.parameter() {
             let sine = matches!(self.mapping, Mapping::Sine { .. });
             let fine = if sine { value.abs() < 1.0 } else { value > 0.0 && value <= 20.0 };
             if !fine {
-                return Err(bad(what, value, if sine { "between -1 and 1" } else { "above 0 and at most 20" }));
+                return bad(what, value, if sine { "between -1 and 1" } else { "above 0 and at most 20" });
             }
         }
         if let Mapping::Cluster { place, .. } = self.mapping
             && !(0.0..=1.0).contains(&place)
         {
-            return Err(bad("place", place, "a fraction of the length, 0 to 1"));
+            return bad("place", place, "a fraction of the length, 0 to 1");
         }
         self.check_cells(axis)?;
-        self.check_spacing(name)?;
+        self.check_spacing(axis)?;
         if self.ends == Ends::Periodic && !self.mapping.is_periodic() {
             let ratio = self.at(self.cells as f64).1 / self.at(0.0).1;
             let allowed =
                 "1, with the same growth on both sides: a periodic direction takes equal cells, a sine or a cluster";
-            return Err(bad("metric dx/dxi at its high end over that at its low end", ratio, allowed));
+            return bad("metric dx/dxi at its high end over that at its low end", ratio, allowed);
         }
         Ok(())
     }
 
     fn check_cells(&self, axis: usize) -> Result<(), Error> {
-        let name = AXIS_NAMES[axis];
         for wall in self.ends.walls() {
             let Wall::NoSlip { velocity_m_s: velocity } = wall else { continue };
             if !velocity.iter().all(|v| v.is_finite()) || velocity[axis] != 0.0 {
                 let allowed = "finite, and zero across the wall: the fluid cannot flow through it";
-                return Err(Error::BadDirection {
-                    axis: name,
-                    what: "velocity of the wall across itself",
-                    value: velocity[axis],
-                    allowed,
-                });
+                return Err(refused(axis, "velocity of the wall across itself", velocity[axis], allowed));
             }
         }
         let sticking = self.ends.no_slip().into_iter().filter(|sticks| *sticks).count();
@@ -161,31 +149,29 @@ impl Direction {
             _ => (16, "at least 16 between two no-slip walls"),
         };
         if self.cells < least && !(self.cells == 1 && sticking == 0) {
-            return Err(Error::BadDirection { axis: name, what: "cells", value: self.cells as f64, allowed });
+            return Err(refused(axis, "cells", self.cells as f64, allowed));
         }
         Ok(())
     }
 
-    fn check_spacing(&self, name: &'static str) -> Result<(), Error> {
+    fn check_spacing(&self, axis: usize) -> Result<(), Error> {
         let metric: Vec<f64> = (0..=2 * self.cells).map(|i| self.at(0.5 * i as f64).1).collect();
-        if let Some(index) = metric.iter().position(|h| !(h.is_finite() && *h > 0.0)) {
-            return Err(Error::BadDirection {
-                axis: name,
-                what: "metric dx/dxi",
-                value: metric[index],
-                allowed: "finite and positive in every cell: the mapping must not fold",
-            });
+        if let Some(folded) = metric.iter().find(|h| !(h.is_finite() && **h > 0.0)) {
+            let allowed = "finite and positive in every cell: the mapping must not fold";
+            return Err(refused(axis, "metric dx/dxi", *folded, allowed));
         }
         let centres: Vec<f64> = metric.iter().skip(1).step_by(2).copied().collect();
         let ratio = |i: usize| (centres[i + 1] / centres[i]).max(centres[i] / centres[i + 1]);
         let worst = (0..centres.len().saturating_sub(1)).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)));
-        match worst {
-            Some(index) if ratio(index) > MAX_NEIGHBOUR_RATIO => {
-                Err(Error::StretchTooAbrupt { axis: name, index, ratio: ratio(index), allowed: MAX_NEIGHBOUR_RATIO })
-            }
-            _ => Ok(()),
-        }
+        let Some(index) = worst.filter(|&index| ratio(index) > MAX_NEIGHBOUR_RATIO) else { return Ok(()) };
+        let (axis, allowed) = (AXIS_NAMES[axis], MAX_NEIGHBOUR_RATIO);
+        Err(Error::StretchTooAbrupt { axis, index, ratio: ratio(index), allowed })
     }
+}
+
+/// What is wrong with direction `axis` (0, 1, 2 for x, y, z).
+pub(crate) fn refused(axis: usize, what: &'static str, value: f64, allowed: &'static str) -> Error {
+    Error::BadDirection { axis: AXIS_NAMES[axis], what, value, allowed }
 }
 
 /// Largest ratio of neighbouring cells.

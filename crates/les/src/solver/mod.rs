@@ -12,7 +12,6 @@ mod fields;
 pub(crate) mod flow;
 mod growth;
 mod implicit;
-mod kept_fluxes;
 mod layout;
 #[cfg(test)]
 mod literal;
@@ -24,6 +23,7 @@ pub(crate) mod planes;
 mod pressure;
 mod projection;
 mod report;
+mod row_offsets;
 mod row_operator;
 mod rows;
 mod run;
@@ -33,7 +33,6 @@ pub(crate) mod slabs;
 #[cfg(test)]
 mod slabs_tests;
 mod stage;
-mod starts;
 mod subgrid;
 mod transport;
 

@@ -8,11 +8,11 @@
 
 use multiversion::multiversion;
 
-use super::kept_fluxes::KeptFluxes;
+use super::convection::FluxCache;
 use super::layout::{Layout, Shape};
 use super::operators_1d::{DIFFERENCE, Taps};
 use super::row_operator::RowOperator;
-use super::rows::{HALO, add_even, from_places, pad, rows_from};
+use super::rows::HALO;
 use super::transport::{Stencil, Transport};
 
 /// The operators of one component.
@@ -34,11 +34,12 @@ pub(crate) struct Momentum {
     pub(super) inverse_cell_mass: [Vec<f64>; 3],
     /// `1/f` at the faces of `axis`, zero at a wall.
     pub(super) inverse_face_mass: Vec<f64>,
+    /// `1/h` at the faces of `axis` \[1/m\]; zero where the flow cannot vary.
+    pub(super) inverse_metric: Vec<f64>,
     /// Mass of the control volume of this component along each axis.
     mass: [Vec<f64>; 3],
-    /// Laplacian along each axis, by its symmetric coefficients where all rows are the same, and the source from moving walls.
+    /// Laplacian along each axis, and the source from moving walls; none along an axis of equal periodic cells.
     laplacian: [RowOperator; 3],
-    even_laplacian: [Option<[f64; 3]>; 3],
     wall_source: [Vec<f64>; 3],
     gradient: RowOperator,
 }
@@ -55,7 +56,7 @@ const SECOND_DIFFERENCE: [f64; 3] = [
 pub(crate) struct Scratch {
     pub(super) padded: [Vec<f64>; 2],
     pub(super) flux: [Vec<f64>; 2],
-    pub(super) kept: KeptFluxes,
+    pub(super) fluxes: FluxCache,
     pub(crate) convection: Vec<f64>,
     pub(crate) explicit: Vec<f64>,
     pub(crate) implicit: Vec<f64>,
@@ -70,7 +71,7 @@ impl Scratch {
         Self {
             padded: [padded(), padded()],
             flux: [row(), row()],
-            kept: KeptFluxes::default(),
+            fluxes: FluxCache::default(),
             convection: row(),
             explicit: row(),
             implicit: row(),
@@ -88,17 +89,20 @@ impl Momentum {
         let inverse = |x: &f64| 1.0 / x;
         let inverse_face_mass =
             (0..n[axis]).map(|face| if face < own.first_face() { 0.0 } else { 1.0 / own.face_mass_m[face] }).collect();
-        let mut wall_source: [Vec<f64>; 3] = std::array::from_fn(|b| vec![0.0; n[b]]);
+        let mut wall_source: [Vec<f64>; 3] =
+            std::array::from_fn(|b| vec![0.0; if line[b].is_fourier() { 0 } else { n[b] }]);
         let laplacian = std::array::from_fn(|b| {
+            let per_h2 = line[b].cell_mass_m[0].powi(-2);
+            let pairs = line[b].is_fourier().then(|| SECOND_DIFFERENCE.map(|c| c * per_h2));
             if b == axis {
-                return RowOperator::new(layout, b, line[b].laplacian_at_faces());
+                return RowOperator::new(layout, b, line[b].laplacian_at_faces()).with_pairs(pairs);
             }
             let (rows, walls) = line[b].laplacian_at_cells();
             let [low, high] = layout.wall_velocity_m_s(b, axis);
             for (source, wall) in wall_source[b].iter_mut().zip(walls) {
                 *source = wall[0] * low + wall[1] * high;
             }
-            RowOperator::new(layout, b, rows)
+            RowOperator::new(layout, b, rows).with_pairs(pairs)
         });
         let stencil = Stencil::of(line);
         Self {
@@ -114,14 +118,15 @@ impl Momentum {
             }),
             inverse_cell_mass: std::array::from_fn(|b| line[b].cell_mass_m.iter().map(inverse).collect()),
             inverse_face_mass,
+            inverse_metric: if own.is_thin() {
+                vec![0.0]
+            } else {
+                own.face_metric_m[..n[axis]].iter().map(inverse).collect()
+            },
             mass: std::array::from_fn(|b| {
                 if b == axis { own.face_mass_m[..n[b]].to_vec() } else { line[b].cell_mass_m.clone() }
             }),
             laplacian,
-            even_laplacian: std::array::from_fn(|b| {
-                let per_h2 = line[b].cell_mass_m[0].powi(-2);
-                line[b].is_fourier().then(|| SECOND_DIFFERENCE.map(|c| c * per_h2))
-            }),
             wall_source,
             gradient: RowOperator::new(layout, axis, own.gradient()),
         }
@@ -152,42 +157,23 @@ impl Momentum {
     }
 }
 
-/// Adds the Laplacian of the component along `axis` to row `(j, k)` \[1/(m s)\].
+/// Adds the Laplacian of the component along `axis` to the row `at` \[1/(m s)\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn add_laplacian_row(
     ops: &Momentum,
     field: &[f64],
     axis: usize,
-    j: usize,
-    k: usize,
+    at: [usize; 2],
     out: &mut [f64],
     padded: &mut [f64],
 ) {
-    let n = out.len();
+    ops.laplacian[axis].add(out, field, at, padded);
+    let sources = &ops.wall_source[axis];
     if axis == 0 {
-        let row = &field[ops.shape.row(j, k)];
-        if let Some(c) = ops.even_laplacian[0] {
-            pad(padded, row, ops.periodic[0]);
-            let first = HALO - 3;
-            let places = from_places!(padded, first, first + 1, first + 2, first + 3, first + 4, first + 5, first + 6);
-            add_even(out, c, &places);
-            return;
-        }
-        ops.laplacian[0].add_along(out, row, padded);
-        for (out, source) in out.iter_mut().zip(&ops.wall_source[0]) {
+        for (out, source) in out.iter_mut().zip(sources) {
             *out += source;
         }
-        return;
-    }
-    let index = if axis == 1 { j } else { k };
-    if let Some(c) = ops.even_laplacian[axis] {
-        let count = ops.n[axis];
-        add_even(out, c, &rows_from(field, n, ops.shape.starts(axis, [j, k]), index + 3 * count - 3, count));
-        return;
-    }
-    ops.laplacian[axis].add_across(out, field, [j, k]);
-    let source = ops.wall_source[axis][index];
-    if source != 0.0 {
+    } else if let Some(source) = sources.get(at[axis - 1]).filter(|source| **source != 0.0) {
         for out in out.iter_mut() {
             *out += source;
         }
@@ -209,7 +195,7 @@ impl Scratch {
         for axis in 0..3 {
             if !ops.thin[axis] {
                 let out = if implicit[axis] { &mut self.implicit } else { &mut self.explicit };
-                add_laplacian_row(ops, field, axis, j, k, out, &mut self.padded[0]);
+                add_laplacian_row(ops, field, axis, [j, k], out, &mut self.padded[0]);
             }
         }
     }

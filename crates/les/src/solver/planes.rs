@@ -10,7 +10,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::flow::Flow;
-use super::layout::{Layout, Shape};
+use super::layout::Shape;
 use crate::Error;
 use crate::ranks::Ranks;
 
@@ -49,7 +49,43 @@ impl Flow {
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
     pub(crate) fn in_planes(&self, field: &[f64]) -> Result<Vec<f64>, Error> {
-        in_planes(&self.layout, self.shown(), field)
+        let (layout, shown) = (&self.layout, self.shown());
+        let [nx, ny, _] = shown.n;
+        let place = |at: [usize; 3]| layout.shape.place(layout.direction.map(|d| at[d]));
+        let mut out = vec![0.0; shown.len()];
+        if layout.direction[2] == 2 || layout.slabs.is_alone() {
+            let held: Vec<usize> = shown.held().collect();
+            out.par_chunks_mut(nx * ny).zip(held).for_each(|(plane, k)| {
+                for (j, row) in plane.chunks_mut(nx).enumerate() {
+                    row.iter_mut().enumerate().for_each(|(i, value)| *value = field[place([i, j, k])]);
+                }
+            });
+            return Ok(out);
+        }
+        let (ranks, cut) = (&layout.slabs.ranks, layout.direction[2]);
+        let count = ranks.count();
+        // What a rank has of a plane: some columns, or some rows.
+        let piece = |rank: usize, k: usize| {
+            let part = layout.shape.planes_of(rank, count);
+            let of = |d: usize, cells: usize| if d == cut { part.clone() } else { 0..cells };
+            let (columns, rows): (Range<usize>, Range<usize>) = (of(0, nx), of(1, ny));
+            rows.flat_map(move |j| columns.clone().map(move |i| [i, j, k]))
+        };
+        let pieces = |rank: usize, shape: Shape| shape.held().flat_map(move |k| piece(rank, k));
+        let size = |rank: usize, shape: Shape| shape.len() / shown.n[cut] * layout.shape.planes_of(rank, count).len();
+        let of_rank = |rank: usize| Shape::slab(shown.n, rank, count);
+        let to: Vec<usize> = (0..count).map(|rank| size(ranks.rank(), of_rank(rank))).collect();
+        let from: Vec<usize> = (0..count).map(|rank| size(rank, shown)).collect();
+        let mut send = Vec::with_capacity(to.iter().sum());
+        for rank in 0..count {
+            send.extend(pieces(ranks.rank(), of_rank(rank)).map(|at| field[place(at)]));
+        }
+        let mut came = vec![0.0; from.iter().sum()];
+        ranks.all_to_all(&send, &to, &mut came, &from)?;
+        for (at, value) in (0..count).flat_map(|rank| pieces(rank, shown)).zip(came) {
+            out[shown.place(at)] = value;
+        }
+        Ok(out)
     }
 }
 
@@ -59,45 +95,6 @@ pub(crate) fn without_halos(shown: Shape, mut planes: Vec<f64>) -> Vec<f64> {
     planes.truncate(own.end);
     planes.drain(..own.start);
     planes
-}
-
-fn in_planes(layout: &Layout, shown: Shape, field: &[f64]) -> Result<Vec<f64>, Error> {
-    let [nx, ny, _] = shown.n;
-    let place = |at: [usize; 3]| layout.shape.place(layout.direction.map(|d| at[d]));
-    let mut out = vec![0.0; shown.len()];
-    if layout.direction[2] == 2 || layout.slabs.is_alone() {
-        let held: Vec<usize> = shown.held().collect();
-        out.par_chunks_mut(nx * ny).zip(held).for_each(|(plane, k)| {
-            for (j, row) in plane.chunks_mut(nx).enumerate() {
-                row.iter_mut().enumerate().for_each(|(i, value)| *value = field[place([i, j, k])]);
-            }
-        });
-        return Ok(out);
-    }
-    let (ranks, cut) = (&layout.slabs.ranks, layout.direction[2]);
-    let count = ranks.count();
-    // What a rank has of a plane: some columns, or some rows.
-    let piece = |rank: usize, k: usize| {
-        let part = layout.shape.planes_of(rank, count);
-        let of = |d: usize, cells: usize| if d == cut { part.clone() } else { 0..cells };
-        let (columns, rows): (Range<usize>, Range<usize>) = (of(0, nx), of(1, ny));
-        rows.flat_map(move |j| columns.clone().map(move |i| [i, j, k]))
-    };
-    let pieces = |rank: usize, shape: Shape| shape.held().flat_map(move |k| piece(rank, k));
-    let size = |rank: usize, shape: Shape| shape.len() / shown.n[cut] * layout.shape.planes_of(rank, count).len();
-    let of_rank = |rank: usize| Shape::slab(shown.n, rank, count);
-    let to: Vec<usize> = (0..count).map(|rank| size(ranks.rank(), of_rank(rank))).collect();
-    let from: Vec<usize> = (0..count).map(|rank| size(rank, shown)).collect();
-    let mut send = Vec::with_capacity(to.iter().sum());
-    for rank in 0..count {
-        send.extend(pieces(ranks.rank(), of_rank(rank)).map(|at| field[place(at)]));
-    }
-    let mut came = vec![0.0; from.iter().sum()];
-    ranks.all_to_all(&send, &to, &mut came, &from)?;
-    for (at, value) in (0..count).flat_map(|rank| pieces(rank, shown)).zip(came) {
-        out[shown.place(at)] = value;
-    }
-    Ok(out)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::layout::{Layout, Shape};
 use super::momentum::{Momentum, Scratch};
 use super::operators_1d::Taps;
-use super::rows::{Columns, HALO, add_across, wrap};
+use super::rows::{Columns, HALO, add_across, cut_rows, wrap};
 
 /// The weighted divergence `sum_b (prod_{d != b} m_d) Dw_b u_b` \[m^3/s\].
 #[derive(Debug, Clone)]
@@ -87,8 +87,8 @@ fn divergence_row(
     let n = out.len();
     let (mass_1, mass_2) = (scale * ops.cell_mass[1][j], scale * ops.cell_mass[2][k]);
     out.fill(0.0);
-    add_across(out, velocity[1], mass_2, &ops.rows[1][j], ops.shape.starts(1, [j, k]));
-    add_across(out, velocity[2], mass_1, &ops.rows[2][k], ops.shape.starts(2, [j, k]));
+    add_across(out, velocity[1], mass_2, &ops.rows[1][j], ops.shape.row_offsets(1, [j, k]));
+    add_across(out, velocity[2], mass_1, &ops.rows[2][k], ops.shape.row_offsets(2, [j, k]));
     for (out, mass) in out.iter_mut().zip(&ops.cell_mass[0]) {
         *out *= mass;
     }
@@ -101,59 +101,39 @@ fn divergence_row(
     ops.columns.add(out, padded);
 }
 
-/// `1/h` at the stored faces of each axis \[1/m\]; zero where the flow cannot vary.
-fn inverse_metrics(layout: &Layout) -> [Vec<f64>; 3] {
-    std::array::from_fn(|a| {
-        let line = &layout.line[a];
-        let inverse = |h: &f64| if line.is_thin() { 0.0 } else { 1.0 / h };
-        line.face_metric_m[..line.cells].iter().map(inverse).collect()
-    })
-}
-
-/// `velocity = star - scale grad(phi)`; returns of each plane `1/2 sum mass u^2` \[m^5/s^2\] and the largest `sum_a |u_a|/h_a`
+/// `velocity = predicted - scale grad(phi)`; returns of each plane `1/2 sum mass u^2` \[m^5/s^2\] and the largest `sum_a |u_a|/h_a`
 /// \[1/s\].
 pub(crate) fn correct(
     ops: &[Momentum; 3],
     layout: &Layout,
-    star: [&[f64]; 3],
+    predicted: [&[f64]; 3],
     phi: &[f64],
     scale: f64,
     velocity: [&mut [f64]; 3],
 ) -> Vec<[f64; 2]> {
     let shape = layout.shape;
     let n = shape.n[0];
-    let inverse_metric = inverse_metrics(layout);
     let [u, v, w] = velocity.map(|field| field[shape.own_places()].par_chunks_mut(shape.plane()));
     (u, v, w, shape.own())
         .into_par_iter()
         .map_init(
-            || (Scratch::new(n), vec![0.0; n]),
-            |(scratch, rate), (u, v, w, k)| {
+            || (Scratch::new(n), vec![0.0; n], vec![0.0; n]),
+            |(scratch, rate, across_metric), (u, v, w, k)| {
                 let mut planes = [u, v, w];
                 let (mut energy, mut courant_per_s) = (0.0, 0.0);
                 for j in 0..shape.n[1] {
                     rate.fill(0.0);
-                    for (a, plane) in planes.iter_mut().enumerate() {
-                        let at = shape.row(j, k);
-                        let row = &mut plane[j * n..(j + 1) * n];
-                        scratch.gradient(&ops[a], phi, j, k);
-                        let (across, along) = ops[a].row_mass(j, k);
-                        let own = match a {
-                            0 => 1.0,
-                            1 => inverse_metric[1][j],
-                            _ => inverse_metric[2][k],
+                    for ((a, ops), plane) in ops.iter().enumerate().zip(&mut planes) {
+                        scratch.gradient(ops, phi, j, k);
+                        let (across, mass) = ops.row_mass(j, k);
+                        let metric = if a == 0 {
+                            &ops.inverse_metric
+                        } else {
+                            across_metric.fill(ops.inverse_metric[[j, k][a - 1]]);
+                            &*across_metric
                         };
-                        let sum = correct_row(
-                            row,
-                            &star[a][at],
-                            &scratch.pressure,
-                            scale,
-                            along,
-                            rate,
-                            own,
-                            (a == 0).then_some(&inverse_metric[0]),
-                        );
-                        energy += 0.5 * across * sum;
+                        let read = [&predicted[a][shape.row(j, k)], &scratch.pressure, mass, metric];
+                        energy += 0.5 * across * correct_row(&mut plane[j * n..(j + 1) * n], read, scale, rate);
                     }
                     for &value in rate.iter() {
                         if value > courant_per_s {
@@ -169,41 +149,14 @@ pub(crate) fn correct(
 
 /// Corrects one row, adds its part of the Courant rate, and returns `sum mass u^2`.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn correct_row(
-    row: &mut [f64],
-    star: &[f64],
-    gradient: &[f64],
-    scale: f64,
-    mass: &[f64],
-    rate: &mut [f64],
-    inverse_metric: f64,
-    inverse_metric_columns: Option<&Vec<f64>>,
-) -> f64 {
+fn correct_row(row: &mut [f64], read: [&[f64]; 4], scale: f64, rate: &mut [f64]) -> f64 {
     let n = row.len();
-    let (star, gradient, mass, rate) = (&star[..n], &gradient[..n], &mass[..n], &mut rate[..n]);
+    let ([predicted, gradient, mass, inverse_metric], rate) = (cut_rows!(read, n, 0 1 2 3), &mut rate[..n]);
     for i in 0..n {
-        row[i] = star[i] - scale * gradient[i];
+        row[i] = predicted[i] - scale * gradient[i];
+        rate[i] += row[i].abs() * inverse_metric[i];
     }
-    match inverse_metric_columns {
-        Some(columns) => {
-            let columns = &columns[..n];
-            for i in 0..n {
-                rate[i] += row[i].abs() * columns[i];
-            }
-        }
-        None => {
-            for i in 0..n {
-                rate[i] += row[i].abs() * inverse_metric;
-            }
-        }
-    }
-    weighted_square(row, mass)
-}
-
-/// `sum mass x^2` with fixed lanes.
-#[inline(always)]
-fn weighted_square(x: &[f64], mass: &[f64]) -> f64 {
-    weighted_dot(x, x, mass)
+    weighted_dot(row, row, mass)
 }
 
 /// `sum mass x y` with fixed lanes, so that the sum vectorises and does not depend on the instruction set.

@@ -2,8 +2,8 @@
 
 use super::layout::{Layout, Shape};
 use super::operators_1d::Taps;
-use super::rows::{Columns, add_across, pad};
-use super::starts::Starts;
+use super::row_offsets::RowOffsets;
+use super::rows::{Columns, HALO, add_across, add_even, from_places, pad, rows_from};
 
 /// A linear operator along one axis.
 #[derive(Debug, Clone)]
@@ -13,6 +13,8 @@ pub(crate) struct RowOperator {
     periodic: bool,
     rows: Vec<Taps>,
     columns: Columns,
+    /// Coefficients of the pairs at the distances 1, 2 and 3, the same in all rows, of a second difference on equal periodic cells.
+    even: Option<[f64; 3]>,
 }
 
 impl RowOperator {
@@ -20,7 +22,12 @@ impl RowOperator {
     pub(crate) fn new(layout: &Layout, axis: usize, rows: Vec<Taps>) -> Self {
         let periodic = layout.line[axis].is_periodic();
         let columns = if axis == 0 { Columns::new(&rows, periodic) } else { Columns::default() };
-        Self { axis, shape: layout.shape, periodic, rows, columns }
+        Self { axis, shape: layout.shape, periodic, rows, columns, even: None }
+    }
+
+    /// The same, which is a second difference with these coefficients of pairs if there are any.
+    pub(crate) fn with_pairs(self, even: Option<[f64; 3]>) -> Self {
+        Self { even, ..self }
     }
 
     /// Its rows: for each target the places and their coefficients.
@@ -41,13 +48,19 @@ impl RowOperator {
     /// `out +=` an operator of axis 1 or 2 on `field` at the targets of the row `at`.
     #[inline(always)]
     pub(crate) fn add_across(&self, out: &mut [f64], field: &[f64], at: [usize; 2]) {
-        add_across(out, field, 1.0, &self.rows[at[self.axis - 1]], self.shape.starts(self.axis, at));
+        let (index, starts) = (at[self.axis - 1], self.shape.row_offsets(self.axis, at));
+        if let Some(pairs) = self.even {
+            let count = self.shape.n[self.axis];
+            add_even(out, pairs, &rows_from(field, out.len(), starts, index + 3 * count - 3, count));
+        } else {
+            add_across(out, field, 1.0, &self.rows[index], starts);
+        }
     }
 
     /// `out +=` an operator of axis 1 at row `j` of a plane that stands alone.
     #[inline(always)]
     pub(crate) fn add_in_plane(&self, out: &mut [f64], plane: &[f64], j: usize) {
-        add_across(out, plane, 1.0, &self.rows[j], Starts::every(self.shape.n[0], 0));
+        add_across(out, plane, 1.0, &self.rows[j], RowOffsets::every(self.shape.n[0], 0));
     }
 
     /// `out =` an operator of axis 0 on one row.
@@ -61,6 +74,12 @@ impl RowOperator {
     #[inline(always)]
     pub(crate) fn add_along(&self, out: &mut [f64], row: &[f64], padded: &mut [f64]) {
         pad(padded, row, self.periodic);
-        self.columns.add(out, padded);
+        if let Some(pairs) = self.even {
+            const FIRST: usize = HALO - 3;
+            let places = from_places!(padded, FIRST, FIRST + 1, FIRST + 2, FIRST + 3, FIRST + 4, FIRST + 5, FIRST + 6);
+            add_even(out, pairs, &places);
+        } else {
+            self.columns.add(out, padded);
+        }
     }
 }

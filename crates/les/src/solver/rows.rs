@@ -2,7 +2,7 @@
 //! products and sums are kept apart, so that each version gives the same bits.
 
 use super::operators_1d::Taps;
-use super::starts::Starts;
+use super::row_offsets::RowOffsets;
 use super::transport::{MEAN, Stencil};
 
 /// Some rows of an array, cut to `n` values. Closures given to `map` or `from_fn` stay calls in functions that are compiled for
@@ -122,7 +122,7 @@ pub(crate) fn wrap(padded: &mut [f64], n: usize, periodic: bool) {
 
 /// `out += scale sum c row` over the taps of an operator across rows.
 #[inline(always)]
-pub(crate) fn add_across(out: &mut [f64], field: &[f64], scale: f64, mut taps: &[(usize, f64)], starts: Starts) {
+pub(crate) fn add_across(out: &mut [f64], field: &[f64], scale: f64, mut taps: &[(usize, f64)], starts: RowOffsets) {
     let n = out.len();
     while let [a, b, c, d, rest @ ..] = taps {
         let (x0, x1) = (&field[starts.of(a.0)..][..n], &field[starts.of(b.0)..][..n]);
@@ -146,7 +146,7 @@ pub(crate) fn add_across(out: &mut [f64], field: &[f64], scale: f64, mut taps: &
 pub(crate) fn rows_from<const N: usize>(
     field: &[f64],
     n: usize,
-    starts: Starts,
+    starts: RowOffsets,
     first: usize,
     count: usize,
 ) -> [&[f64]; N] {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::layout::Layout;
-use super::mesh::{AXIS_NAMES, Mesh};
+use super::mesh::{Mesh, refused};
 use super::pressure::PressureMethod;
 use super::subgrid::{self, SubgridModel};
 use crate::Error;
@@ -156,7 +156,7 @@ impl FlowSettings {
     pub fn validate(&self, mesh: &Mesh) -> Result<(), Error> {
         self.check()?;
         subgrid::check_constants(self.subgrid)?;
-        Layout::on(mesh, self.ranks.clone())?;
+        Layout::new(mesh).shared(self.ranks.clone())?;
         refuse_sticking_without_viscosity(mesh, self.viscosity_m2_s)
     }
 
@@ -180,13 +180,7 @@ impl FlowSettings {
 /// Without viscosity nothing can stick to a wall.
 pub(super) fn refuse_sticking_without_viscosity(mesh: &Mesh, viscosity_m2_s: f64) -> Result<(), Error> {
     let found = (0..3).find(|&axis| mesh.directions()[axis].ends.no_slip() != [false; 2]);
-    match found {
-        Some(axis) if viscosity_m2_s == 0.0 => Err(Error::BadDirection {
-            axis: AXIS_NAMES[axis],
-            what: "no-slip wall with viscosity_m2_s",
-            value: 0.0,
-            allowed: "positive: an inviscid flow cannot stick to a wall, so make it a slip wall",
-        }),
-        _ => Ok(()),
-    }
+    let Some(axis) = found.filter(|_| viscosity_m2_s == 0.0) else { return Ok(()) };
+    let allowed = "positive: an inviscid flow cannot stick to a wall, so make it a slip wall";
+    Err(refused(axis, "no-slip wall with viscosity_m2_s", 0.0, allowed))
 }

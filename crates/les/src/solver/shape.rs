@@ -7,8 +7,8 @@
 
 use std::ops::Range;
 
+use super::row_offsets::RowOffsets;
 use super::rows::HALO;
-use super::starts::Starts;
 
 /// Number of values along the three memory axes, and the slab of them that is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +76,12 @@ impl Shape {
         [place % self.n[0], place / self.n[0] % self.n[1], place / self.plane()]
     }
 
+    /// Indices along the axes of a place in memory.
+    pub(crate) fn index_held(self, place: usize) -> [usize; 3] {
+        let [i, j, k] = self.index(place);
+        [i, j, (self.lowest + k) % self.n[2]]
+    }
+
     /// Place in memory of indices along the axes. That of a plane that is not held lies beyond the end.
     #[inline(always)]
     pub(crate) fn place(self, [i, j, k]: [usize; 3]) -> usize {
@@ -85,12 +91,12 @@ impl Shape {
 
     /// Where the rows begin whose index along `axis` (1 or 2) takes the place of that in `[j, k]`.
     #[inline(always)]
-    pub(crate) fn starts(self, axis: usize, [j, k]: [usize; 2]) -> Starts {
+    pub(crate) fn row_offsets(self, axis: usize, [j, k]: [usize; 2]) -> RowOffsets {
         if axis == 1 {
-            return Starts { first: self.place([0, 0, k]), step: self.n[0], lowest: 0, round: 0 };
+            return RowOffsets { first: self.place([0, 0, k]), step: self.n[0], lowest: 0, round: 0 };
         }
         let (step, first) = (self.plane(), j * self.n[0]);
-        Starts { first: first.wrapping_sub(self.lowest * step), step, lowest: self.lowest, round: self.n[2] * step }
+        RowOffsets { first: first.wrapping_sub(self.lowest * step), step, lowest: self.lowest, round: self.n[2] * step }
     }
 
     /// Places in memory of the row at indices `j` of axis 1 and `k` of axis 2.
@@ -116,7 +122,7 @@ mod tests {
                 shape.own().for_each(|k| owners[k] += 1);
                 for (at, k) in shape.own().enumerate() {
                     assert_eq!(
-                        [shape.starts(1, [0, k]).of(1), shape.starts(2, [1, 0]).of(k)],
+                        [shape.row_offsets(1, [0, k]).of(1), shape.row_offsets(2, [1, 0]).of(k)],
                         [shape.place([0, 1, k]); 2]
                     );
                     assert_eq!(shape.place([1, 1, k]), shape.own_places().start + 6 * at + 4);

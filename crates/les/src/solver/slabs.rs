@@ -195,12 +195,6 @@ impl Slabs {
         self.all_gather(if self.is_first() { numbers() } else { Vec::new() })
     }
 
-    /// The part of a whole field that is owned, into a field of this rank.
-    pub(crate) fn take_own(&self, whole: &[f64], field: &mut [f64]) {
-        let (plane, own) = (self.shape.plane(), self.shape.own());
-        field[self.shape.own_places()].copy_from_slice(&whole[own.start * plane..own.end * plane]);
-    }
-
     /// As [`ranks::all_agree`].
     ///
     /// # Errors

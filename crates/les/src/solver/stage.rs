@@ -26,47 +26,45 @@ struct Block<'a> {
     plane: usize,
     /// The first of its rows.
     row: usize,
-    star: [&'a mut [f64]; 3],
-    history: [&'a mut [f64]; 3],
+    predicted: [&'a mut [f64]; 3],
+    previous: [&'a mut [f64]; 3],
 }
 
 /// Cuts the planes that are owned into blocks of the same rows of one plane after the other, so that rows of the planes about a
 /// block have just been read.
-fn blocks<'a>(shape: Shape, star: &'a mut [Aligned; 3], history: &'a mut [Aligned; 3]) -> Vec<Block<'a>> {
+fn blocks<'a>(shape: Shape, predicted: &'a mut [Aligned; 3], previous: &'a mut [Aligned; 3]) -> Vec<Block<'a>> {
     let [n0, n1, _] = shape.n;
     let rows = n1.div_ceil((n0 * n1).div_ceil(BLOCK));
     let pieces = |field: &'a mut Aligned| {
         let planes = field[shape.own_places()].chunks_mut(shape.plane());
         planes.flat_map(move |plane| plane.chunks_mut(rows * n0))
     };
-    let (mut star, mut history) = (star.each_mut().map(pieces), history.each_mut().map(pieces));
+    let (mut predicted, mut previous) = (predicted.each_mut().map(pieces), previous.each_mut().map(pieces));
     let mut blocks: Vec<Vec<Block<'_>>> = (0..n1.div_ceil(rows)).map(|_| Vec::new()).collect();
     for plane in shape.own() {
         for (at, blocks) in blocks.iter_mut().enumerate() {
-            let star = star.each_mut().map(|pieces| pieces.next().unwrap_or_default());
-            let history = history.each_mut().map(|pieces| pieces.next().unwrap_or_default());
-            blocks.push(Block { plane, row: at * rows, star, history });
+            let predicted = predicted.each_mut().map(|pieces| pieces.next().unwrap_or_default());
+            let previous = previous.each_mut().map(|pieces| pieces.next().unwrap_or_default());
+            blocks.push(Block { plane, row: at * rows, predicted, previous });
         }
     }
     blocks.into_iter().flatten().collect()
 }
 
 impl Flow {
-    /// The right side of (22) into `star`, or the velocity with all but implicit viscosity if no line solve follows or a damped one; its
-    /// terms into the history. The work of the terms if `measured`.
+    /// The right side of (22) into `predicted`, or the velocity with all but implicit viscosity if `keeps` says that no line solve of the
+    /// increments follows; its terms into the previous ones. The work of the terms if `measured`.
     pub(super) fn predict(
         &mut self,
         stage: &Stage,
         stage_s: f64,
-        is_damped: bool,
+        keeps: bool,
         measured: bool,
     ) -> Result<Powers, Error> {
-        let explicit_per_s = self.settings.scheme.largest_decay() * stage.fraction / stage_s;
-        self.update_model((SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0))?;
         let shape = self.layout.shape;
-        let (task, star, history) = self.task();
-        let keep = if is_damped || task.implicit == [false; 3] { 1.0 } else { 0.0 };
-        let powers: Vec<[Powers; 3]> = blocks(shape, star, history)
+        let (task, predicted, previous) = self.task();
+        let keep = if keeps { 1.0 } else { 0.0 };
+        let powers: Vec<[Powers; 3]> = blocks(shape, predicted, previous)
             .into_par_iter()
             .map_init(
                 || std::array::from_fn(|_| Scratch::new(shape.n[0])),
@@ -86,30 +84,16 @@ impl Flow {
         Ok(terms.fold(Powers::default(), |total, plane| std::array::from_fn(|i| total[i] + plane[i])))
     }
 
-    /// The acceleration by everything but pressure into `star`.
-    pub(super) fn accelerate(&mut self) -> Result<(), Error> {
-        // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long.
-        self.update_model(f64::INFINITY)?;
-        let shape = self.layout.shape;
-        let (task, star, _) = self.task();
-        for (axis, star) in star.iter_mut().enumerate() {
-            let planes = star[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
-            planes.for_each_init(
-                || Scratch::new(shape.n[0]),
-                |scratch, (star, k)| task.accelerations([axis, k], star, scratch),
-            );
-        }
-        Ok(())
+    /// The viscosity of the model for the present field, at most such that `stage_s`, this fraction of a step, is stable; its
+    /// acceleration by stresses in planes into `predicted`, where the terms of the momentum equation are summed.
+    pub(super) fn update_model(&mut self, fraction: f64, stage_s: f64) -> Result<(), Error> {
+        let explicit_per_s = self.settings.scheme.largest_decay() * fraction / stage_s;
+        let limit_per_s = (SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0);
+        let Self { model: Some(model), work: Work { predicted, phi }, .. } = self else { return Ok(()) };
+        model.update(self.state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, predicted, phi)
     }
 
-    /// The viscosity of the model for the present field, at most such that it decays by `limit_per_s`; its acceleration by stresses in
-    /// planes into `star`, where the terms of the momentum equation are summed.
-    fn update_model(&mut self, limit_per_s: f64) -> Result<(), Error> {
-        let Self { model: Some(model), work: Work { star, phi }, .. } = self else { return Ok(()) };
-        model.update(self.state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, star, phi)
-    }
-
-    /// What the momentum equation reads, and what it writes: `star` and the history.
+    /// What the momentum equation reads, and what it writes: the predicted velocity and the previous terms.
     fn task(&mut self) -> (Task<'_>, &mut [Aligned; 3], &mut [Aligned; 3]) {
         let Self { ops, state, work, model, layout, settings, .. } = self;
         let task = Task {
@@ -122,7 +106,7 @@ impl Flow {
             force_m_s2: layout.direction.map(|d| settings.force_m_s2[d]),
             implicit: state.implicit,
         };
-        (task, &mut work.star, &mut state.history)
+        (task, &mut work.predicted, &mut state.previous_terms)
     }
 }
 
@@ -139,7 +123,7 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// `star = dt (c N + c' N' - grad p + nu L u) + keep u`, without `nu L u` if `keep` is 1, in the rows of a block, with the history; returns the work of each
+    /// `predicted = dt (c N + c' N' - grad p + nu L u) + keep u`, without `nu L u` if `keep` is 1, in the rows of a block, with the previous terms; returns the work of each
     /// component if `measured`.
     fn increments(
         &self,
@@ -149,43 +133,28 @@ impl Task<'_> {
     ) -> [Powers; 3] {
         let (n, k) = (self.layout.shape.n[0], block.plane);
         let mut powers = [Powers::default(); 3];
-        let components = block.star.into_iter().zip(block.history).zip(scratch).zip(&mut powers).enumerate();
-        for (axis, (((star, history), scratch), powers)) in components {
-            let rows = star.chunks_mut(n).zip(history.chunks_mut(n));
-            for ((star, history), j) in rows.zip(block.row..) {
+        let components = block.predicted.into_iter().zip(block.previous).zip(scratch).zip(&mut powers).enumerate();
+        for (axis, (((predicted, previous), scratch), powers)) in components {
+            let rows = predicted.chunks_mut(n).zip(previous.chunks_mut(n));
+            for ((predicted, previous), j) in rows.zip(block.row..) {
                 if self.ops[axis].is_wall_row(j, k) {
-                    star.fill(0.0);
+                    predicted.fill(0.0);
                     continue;
                 }
-                self.terms([axis, j, k], star, scratch, measured.then_some(&mut *powers));
+                self.terms([axis, j, k], predicted, scratch, measured.then_some(&mut *powers));
                 scratch.gradient(&self.ops[axis], self.pressure, j, k);
                 let own = &self.velocity[axis][self.layout.shape.row(j, k)];
                 let nu = if keep == 1.0 { 0.0 } else { self.viscosity_m2_s };
                 advance_row(
                     [stage.new, stage.old, nu, stage_s, keep],
-                    star,
-                    history,
+                    predicted,
+                    previous,
                     [&scratch.implicit, &scratch.pressure, own],
                 );
-                self.hold_at_wall(axis, star);
+                self.hold_at_wall(axis, predicted);
             }
         }
         powers
-    }
-
-    /// `star = N + nu L u` in plane `k` of component `axis`.
-    fn accelerations(&self, [axis, k]: [usize; 2], star: &mut [f64], scratch: &mut Scratch) {
-        for (j, star) in star.chunks_mut(self.layout.shape.n[0]).enumerate() {
-            if self.ops[axis].is_wall_row(j, k) {
-                star.fill(0.0);
-                continue;
-            }
-            self.terms([axis, j, k], star, scratch, None);
-            for (star, implicit) in star.iter_mut().zip(&scratch.implicit) {
-                *star += self.viscosity_m2_s * implicit;
-            }
-            self.hold_at_wall(axis, star);
-        }
     }
 
     /// `N`, the terms that are integrated explicitly, of one row into `out`, which has the model's acceleration by stresses in planes; the Laplacian along
@@ -244,21 +213,21 @@ fn explicit_terms(out: &mut [f64], nu: f64, explicit: &[f64], convection: &[f64]
     }
 }
 
-/// `star = dt (c N + c' N' - grad p + nu L u) + keep u`, `N` being what `star` held, which goes into the history.
+/// `predicted = dt (c N + c' N' - grad p + nu L u) + keep u`, `N` being what `predicted` held, which goes into the previous terms.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn advance_row(
     [new, old, nu, stage_s, keep]: [f64; 5],
-    star: &mut [f64],
-    history: &mut [f64],
+    predicted: &mut [f64],
+    previous: &mut [f64],
     [implicit, pressure, own]: [&[f64]; 3],
 ) {
-    let n = star.len();
-    let (history, implicit, pressure, own) = (&mut history[..n], &implicit[..n], &pressure[..n], &own[..n]);
+    let n = predicted.len();
+    let (previous, implicit, pressure, own) = (&mut previous[..n], &implicit[..n], &pressure[..n], &own[..n]);
     for i in 0..n {
-        let term = star[i];
-        let total = new * term + old * history[i] - pressure[i] + nu * implicit[i];
-        history[i] = term;
-        star[i] = stage_s * total + keep * own[i];
+        let term = predicted[i];
+        let total = new * term + old * previous[i] - pressure[i] + nu * implicit[i];
+        previous[i] = term;
+        predicted[i] = stage_s * total + keep * own[i];
     }
 }
 
@@ -270,15 +239,15 @@ mod tests {
     fn blocks_hold_every_value_that_is_owned_once_and_in_its_place() {
         for shape in [Shape::whole([100, 130, 5]), Shape::slab([100, 41, 16], 1, 3), Shape::whole([5000, 2, 9])] {
             let values = |axis| (0..shape.len()).map(move |place| (3 * place + axis) as f64).collect::<Vec<f64>>();
-            let mut star = [0, 1, 2].map(|axis| Aligned::from(&values(axis)[..]));
-            let mut history = star.clone();
+            let mut predicted = [0, 1, 2].map(|axis| Aligned::from(&values(axis)[..]));
+            let mut previous = predicted.clone();
             let mut seen = 0;
-            for Block { plane, row, star, history } in blocks(shape, &mut star, &mut history) {
-                assert!(star[0].len() <= BLOCK.max(shape.n[0]));
-                for (axis, (star, history)) in star.into_iter().zip(history).enumerate() {
-                    assert_eq!(star[0], (3 * shape.place([0, row, plane]) + axis) as f64);
-                    assert_eq!(star, history);
-                    seen += star.len();
+            for Block { plane, row, predicted, previous } in blocks(shape, &mut predicted, &mut previous) {
+                assert!(predicted[0].len() <= BLOCK.max(shape.n[0]));
+                for (axis, (predicted, previous)) in predicted.into_iter().zip(previous).enumerate() {
+                    assert_eq!(predicted[0], (3 * shape.place([0, row, plane]) + axis) as f64);
+                    assert_eq!(predicted, previous);
+                    seen += predicted.len();
                 }
             }
             assert_eq!(seen, 3 * shape.own_places().len());

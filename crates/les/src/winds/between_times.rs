@@ -2,12 +2,9 @@
 //!
 //! Check: the series of planes and of fields.
 
-use super::wind::Wind;
+use super::wind::{Wind, combine};
 use crate::Error;
 use crate::error::check;
-
-/// Points handled at once, so that the scratch stays on the stack.
-pub(super) const BATCH: usize = 256;
 
 /// Refuses no times, and times that are not finite or do not increase \[s\].
 pub(super) fn check_times(time_s: &[f64]) -> Result<(), Error> {
@@ -34,21 +31,11 @@ pub(super) fn about(times_s: &[f64], time_s: f64) -> Result<(usize, Option<f64>)
 
 /// Moves velocities by the share `weight` towards those of a later wind.
 pub(super) fn blend(
-    later: &impl Wind,
+    later: &dyn Wind,
     weight: f64,
     points_m: &[[f64; 3]],
     time_s: f64,
     out_m_s: &mut [[f64; 3]],
 ) -> Result<(), Error> {
-    let mut scratch = [[0.0; 3]; BATCH];
-    for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
-        let part = &mut scratch[..points.len()];
-        later.velocity_into(points, time_s, part)?;
-        for (out, later) in outs.iter_mut().zip(part.iter()) {
-            for (o, l) in out.iter_mut().zip(later) {
-                *o += weight * (l - *o);
-            }
-        }
-    }
-    Ok(())
+    combine(later, points_m, time_s, out_m_s, |out, later| *out += weight * (later - *out))
 }

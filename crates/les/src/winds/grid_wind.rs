@@ -120,13 +120,13 @@ fn with_ghosts(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let start = (i_z + GHOSTS) * width;
         padded[start + GHOSTS..start + GHOSTS + nodes_y].copy_from_slice(row);
         for (i, ghost) in ghost_places(y) {
-            padded[start + i] = ghost_value(ghost, 1, |node| row[node]);
+            padded[start + i] = std::array::from_fn(|c| ghost_value(ghost, 1, c, |node| row[node][c]));
         }
     }
     for (i, ghost) in ghost_places(z) {
         for column in 0..width {
-            let value = ghost_value(ghost, 2, |node| padded[(node + GHOSTS) * width + column]);
-            padded[i * width + column] = value;
+            let at = |node: usize| padded[(node + GHOSTS) * width + column];
+            padded[i * width + column] = std::array::from_fn(|c| ghost_value(ghost, 2, c, |node| at(node)[c]));
         }
     }
     debug_assert_eq!(padded.len(), width * (nodes_z + 2 * GHOSTS));
@@ -140,22 +140,18 @@ pub(crate) fn ghost_places(axis: &Axis) -> impl Iterator<Item = (usize, Ghost)> 
     [(GHOSTS - 1, low[0]), (GHOSTS - 2, low[1]), (above, high[0]), (above + 1, high[1])].into_iter()
 }
 
-/// Velocity of a ghost; `normal` is the component across the wall.
-pub(crate) fn ghost_value(ghost: Ghost, normal: usize, at: impl Fn(usize) -> [f64; 3]) -> [f64; 3] {
+/// Component `component` of the velocity of a ghost beyond an end across direction `across`, from those at the nodes.
+pub(crate) fn ghost_value(ghost: Ghost, across: usize, component: usize, at: impl Fn(usize) -> f64) -> f64 {
     match ghost {
         Ghost::Copy(node) => at(node),
-        Ghost::Parabola(nodes) => {
-            let [a, b, c] = nodes.map(at);
-            std::array::from_fn(|k| 3.0 * a[k] - 3.0 * b[k] + c[k])
-        }
-        Ghost::Image(node, Side::NoSlipWall { velocity_m_s: wall, .. }) => {
-            let inside = at(node);
-            std::array::from_fn(|k| 2.0 * wall[k] - inside[k])
-        }
+        Ghost::Parabola([a, b, c]) => 3.0 * at(a) - 3.0 * at(b) + at(c),
+        Ghost::Image(node, Side::NoSlipWall { velocity_m_s: wall, .. }) => 2.0 * wall[component] - at(node),
         Ghost::Image(node, Side::Open | Side::SlipWall { .. }) => {
-            let mut image = at(node);
-            image[normal] = -image[normal];
-            image
+            if across == component {
+                -at(node)
+            } else {
+                at(node)
+            }
         }
     }
 }

@@ -69,7 +69,7 @@ impl Wind for GridSeries {
 
 #[cfg(test)]
 mod tests {
-    use super::super::between_times::BATCH;
+    use super::super::wind::BATCH;
     use super::super::{Edges, OutsidePolicy, PlaneMesh, Side};
     use super::*;
 

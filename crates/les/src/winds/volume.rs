@@ -175,20 +175,13 @@ impl Padded {
             [0..px, 0..py, 0..1],
         ];
         for d in 0..3 {
-            let number = number(d);
             let [xs, ys, zs] = &spans[d];
             for (ghost_at, ghost) in ghost_places(&axes[d]) {
                 for (k, j) in zs.clone().flat_map(|k| ys.clone().map(move |j| (k, j))) {
                     for i in xs.clone() {
                         let base = i + j * strides[1] + k * strides[2];
-                        // The rules of a wall know all components by their number.
-                        let vector = |node: usize| {
-                            let mut v = [0.0; 3];
-                            v[number] = padded[base + (node + GHOSTS) * strides[d]];
-                            v
-                        };
-                        let value = ghost_value(ghost, d, vector)[number];
-                        padded[base + ghost_at * strides[d]] = value;
+                        let at = |node: usize| padded[base + (node + GHOSTS) * strides[d]];
+                        padded[base + ghost_at * strides[d]] = ghost_value(ghost, d, number(d), at);
                     }
                 }
             }

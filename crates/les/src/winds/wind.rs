@@ -100,26 +100,31 @@ pub struct Sum {
     pub winds: Vec<Box<dyn Wind>>,
 }
 
-/// Points handled at once by [`Sum`], so that its scratch stays on the stack.
-const SUM_BATCH: usize = 256;
+/// Points handled at once, so that the scratch stays on the stack.
+pub(super) const BATCH: usize = 256;
+
+/// Lets `act` change each component of `out_m_s` by that of another wind at the same point.
+pub(super) fn combine(
+    wind: &dyn Wind,
+    points_m: &[[f64; 3]],
+    time_s: f64,
+    out_m_s: &mut [[f64; 3]],
+    act: impl Fn(&mut f64, f64),
+) -> Result<(), Error> {
+    let mut scratch = [[0.0; 3]; BATCH];
+    for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
+        let part = &mut scratch[..points.len()];
+        wind.velocity_into(points, time_s, part)?;
+        outs.as_flattened_mut().iter_mut().zip(part.as_flattened()).for_each(|(out, other)| act(out, *other));
+    }
+    Ok(())
+}
 
 impl Wind for Sum {
     fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         out_m_s.fill([0.0; 3]);
-        let mut scratch = [[0.0; 3]; SUM_BATCH];
-        for (points, outs) in points_m.chunks(SUM_BATCH).zip(out_m_s.chunks_mut(SUM_BATCH)) {
-            let part = &mut scratch[..points.len()];
-            for wind in &self.winds {
-                wind.velocity_into(points, time_s, part)?;
-                for (out, add) in outs.iter_mut().zip(part.iter()) {
-                    for (o, a) in out.iter_mut().zip(add) {
-                        *o += a;
-                    }
-                }
-            }
-        }
-        Ok(())
+        self.winds.iter().try_for_each(|wind| combine(&**wind, points_m, time_s, out_m_s, |sum, other| *sum += other))
     }
 
     /// The sum of the bounds: sharp when one wind dominates.
@@ -148,7 +153,7 @@ mod tests {
     fn sum_adds_velocities_and_gradients_over_more_than_one_batch() {
         let uniform = |v| Box::new(Uniform::new(v).unwrap()) as Box<dyn Wind>;
         let sum = Sum { winds: vec![uniform([1.0, 2.0, 3.0]), Box::new(Calm), uniform([0.5, -4.0, 0.25])] };
-        let points = vec![[0.0; 3]; 2 * SUM_BATCH + 7];
+        let points = vec![[0.0; 3]; 2 * BATCH + 7];
         let mut out = vec![[9.0; 3]; points.len()];
         sum.velocity_into(&points, 0.0, &mut out).unwrap();
         assert!(out.iter().all(|&v| v == [1.5, -2.0, 3.25]));

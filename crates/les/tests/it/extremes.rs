@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use wakescope_les::solver::PressureMethod;
 use wakescope_les::{
-    Direction, Error, Flow, FlowSettings, Mapping, Mesh, SubgridModel, TimeScheme, TimeStep, Wall, cases,
+    Direction, Error, Flow, FlowSettings, Mapping, Mesh, Place, SubgridModel, TimeScheme, TimeStep, Wall, cases,
 };
 
 /// A flow without symmetries between a no-slip wall and a slip wall, all lengths in `length` and velocities in `speed`.
@@ -310,7 +310,7 @@ fn numbers_that_are_not_finite_are_refused_with_their_place() {
         Flow::new(mesh, settings, field).unwrap_err()
     };
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let Error::Diverged { step: 0, component: "u", cell, position_m, .. } = start(value, 0) else {
+        let Error::Diverged { step: 0, place: Place { component: "u", cell, position_m }, .. } = start(value, 0) else {
             panic!("{}", start(value, 0));
         };
         assert_eq!(cell, [0, 3, 5]);
@@ -354,7 +354,9 @@ fn a_courant_number_above_the_limit_is_refused_with_place_and_component() {
             settings.scheme = scheme;
             Flow::new(mesh(), settings, |_| [0.0, 0.0, 1.0]).unwrap().0
         };
-        let Err(Error::CourantTooLarge { step: 1, component: "w", courant, limit, .. }) = start(1.5).step() else {
+        let Err(Error::CourantTooLarge { step: 1, place: Place { component: "w", .. }, courant, limit, .. }) =
+            start(1.5).step()
+        else {
             panic!("{scheme:?}")
         };
         assert!((courant - 1.5).abs() < 1e-9 && limit > 0.4 && limit < 1.2, "{limit}");

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::slope::Slope;
 use crate::Error;
 use crate::solver::flow::Flow;
-use crate::solver::mesh::{AXIS_NAMES, Ends, Mesh};
+use crate::solver::mesh::{Ends, Mesh, refused};
 use crate::solver::planes::Faces;
 
 /// Weights of the first faces over those of the trapezoidal rule: 3/8, 7/6, 23/24 for 1/2, 1, 1.
@@ -38,14 +38,12 @@ impl Curl {
     /// # Errors
     /// [`Error::BadDirection`] if x is bounded or z periodic: that is no wake above ground.
     pub(super) fn new(mesh: &Mesh) -> Result<Self, Error> {
-        let wrong =
-            |axis: usize, what, allowed| Error::BadDirection { axis: AXIS_NAMES[axis], what, value: 0.0, allowed };
         let ends = |axis: usize| mesh.directions()[axis].ends;
         if ends(0) != Ends::Periodic {
-            return Err(wrong(0, "period", "there: a wake repeats itself along the flight"));
+            return Err(refused(0, "period", 0.0, "there: a wake repeats itself along the flight"));
         }
         if ends(2) == Ends::Periodic {
-            return Err(wrong(2, "ground", "there: z must be bounded"));
+            return Err(refused(2, "ground", 0.0, "there: z must be bounded"));
         }
         let directions = mesh.directions();
         let periodic: [bool; 3] = [0, 1, 2].map(|d| ends(d) == Ends::Periodic);

@@ -2,7 +2,7 @@
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
-use super::{Case, Initial};
+use super::{Case, Initial, stretched};
 use crate::Error;
 
 /// The unit square in y and z, at rest, whose lid z = 1 moves along y with speed 1; `1/reynolds` is the viscosity.
@@ -13,7 +13,7 @@ pub fn lid_driven_cavity(cells: usize, strength: f64, reynolds: f64) -> Result<C
     let lid = Wall::NoSlip { velocity_m_s: [0.0, 1.0, 0.0] };
     let direction = |high| {
         let uniform = Direction::between(cells, 0.0, 1.0, Wall::AT_REST, high);
-        if strength == 0.0 { uniform } else { uniform.stretched(Mapping::TanhBoth { strength }) }
+        stretched(uniform, strength, Mapping::TanhBoth { strength })
     };
     let mesh = Mesh::new(Direction::thin(1.0), direction(Wall::AT_REST), direction(lid))?;
     let settings = FlowSettings::new(1.0 / reynolds, TimeStep::Courant { courant: 0.35, longest_s: 0.02 });

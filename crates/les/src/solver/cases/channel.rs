@@ -2,14 +2,13 @@
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
-use super::{Case, Initial};
+use super::{Case, Initial, stretched};
 use crate::Error;
 
 /// The plates at z = -1 and 1 with the velocities of the walls along x, `strength` 0 giving equal cells.
 pub(super) fn between_plates(cells: usize, strength: f64, velocity_m_s: [f64; 2]) -> Direction {
     let [low, high] = velocity_m_s.map(|u| Wall::NoSlip { velocity_m_s: [u, 0.0, 0.0] });
-    let uniform = Direction::between(cells, -1.0, 1.0, low, high);
-    if strength == 0.0 { uniform } else { uniform.stretched(Mapping::TanhBoth { strength }) }
+    stretched(Direction::between(cells, -1.0, 1.0, low, high), strength, Mapping::TanhBoth { strength })
 }
 
 /// A laminar flow between the plates at z = -1 and 1, one cell in x and y.

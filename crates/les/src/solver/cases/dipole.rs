@@ -2,7 +2,7 @@
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
-use super::{Case, Initial};
+use super::{Case, Initial, stretched};
 use crate::Error;
 
 /// Vorticity at the centres of the two vortices \[1/s\]: makes the energy of the box 2 and its enstrophy 800.
@@ -32,10 +32,6 @@ pub fn dipole_in_a_box(cells: [usize; 2], strength: [f64; 2], reynolds: f64) -> 
 
 fn walls(cells: usize) -> Direction {
     Direction::between(cells, -1.0, 1.0, Wall::AT_REST, Wall::AT_REST)
-}
-
-fn stretched(direction: Direction, strength: f64, mapping: Mapping) -> Direction {
-    if strength == 0.0 { direction } else { direction.stretched(mapping) }
 }
 
 fn dipole(y: Direction, cells: usize, strength: f64, reynolds: f64) -> Result<Case, Error> {

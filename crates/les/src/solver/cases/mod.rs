@@ -20,7 +20,7 @@ pub use taylor_green::{taylor_green_3d, taylor_green_eighth, taylor_green_plane,
 pub use vortex_pair::VortexPairCase;
 
 use super::flow::Flow;
-use super::mesh::Mesh;
+use super::mesh::{Direction, Mapping, Mesh};
 use super::report::StartReport;
 use super::settings::FlowSettings;
 use crate::Error;
@@ -58,7 +58,7 @@ impl Initial {
         mesh: Mesh,
         settings: FlowSettings,
     ) -> Result<Flow, Error> {
-        let layout = super::layout::Layout::on_in_order(&mesh, settings.ranks.clone(), direction)?;
+        let layout = super::layout::Layout::in_order(&mesh, direction).shared(settings.ranks.clone())?;
         let flow = Flow::laid_out(mesh, settings, layout)?;
         let started = match self {
             Self::Field(field) => flow.filled(field),
@@ -66,6 +66,11 @@ impl Initial {
         };
         started.map(|(flow, _)| flow)
     }
+}
+
+/// A direction with its cells spread by `mapping`, or equal ones for the strength 0.
+fn stretched(direction: Direction, strength: f64, mapping: Mapping) -> Direction {
+    if strength == 0.0 { direction } else { direction.stretched(mapping) }
 }
 
 /// A flow ready to be simulated.

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::super::mesh::{Direction, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
-use super::{Case, Initial};
+use super::{Case, Initial, stretched};
 use crate::Error;
 
 /// The vortices of the plane on `cells` x `cells` of the unit square in y and z, stretched by sines of the amplitudes
@@ -13,10 +13,8 @@ use crate::Error;
 /// # Errors
 /// Cells, stretching or viscosity out of range.
 pub fn taylor_green_plane(cells: usize, stretch: [f64; 2], viscosity_m2_s: f64, step_s: f64) -> Result<Case, Error> {
-    let direction = |a: f64| {
-        let uniform = Direction::periodic(cells, 0.0, 1.0);
-        if a == 0.0 { uniform } else { uniform.stretched(Mapping::Sine { amplitude: a }) }
-    };
+    let direction =
+        |amplitude: f64| stretched(Direction::periodic(cells, 0.0, 1.0), amplitude, Mapping::Sine { amplitude });
     let mesh = Mesh::new(Direction::thin(1.0), direction(stretch[0]), direction(stretch[1]))?;
     let initial = move |at_m: [f64; 3]| taylor_green_plane_exact(at_m, 0.0, viscosity_m2_s);
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });

@@ -16,7 +16,7 @@ use super::super::mesh::{Direction, Ends, Mapping, Mesh, Wall};
 use super::super::settings::{FlowSettings, TimeScheme, TimeStep};
 use super::super::subgrid::SubgridModel;
 use super::perturbation::Perturbation;
-use super::{Case, Initial};
+use super::{Case, Initial, stretched};
 use crate::Error;
 use crate::analysis::{WakeMeter, WakeScales};
 use crate::error::check;
@@ -207,15 +207,10 @@ impl VortexPairCase {
         if self.slip_sides {
             y.ends = Ends::Walls { low: Wall::Slip, high: Wall::Slip };
         }
-        if self.lateral_stretch != 0.0 {
-            y = y.stretched(Mapping::Sine { amplitude: self.lateral_stretch });
-        }
+        let y = stretched(y, self.lateral_stretch, Mapping::Sine { amplitude: self.lateral_stretch });
         let ground = if self.sticky_ground { Wall::AT_REST } else { Wall::Slip };
-        let mut z = Direction::between(self.cells[2], 0.0, height, ground, Wall::Slip);
-        if self.ground_stretch != 0.0 {
-            z = z.stretched(Mapping::TanhLow { strength: self.ground_stretch });
-        }
-        Mesh::new(x, y, z)
+        let z = Direction::between(self.cells[2], 0.0, height, ground, Wall::Slip);
+        Mesh::new(x, y, stretched(z, self.ground_stretch, Mapping::TanhLow { strength: self.ground_stretch }))
     }
 
     /// The initial velocities at the low faces of the cells of the mesh, in the units of the pair.

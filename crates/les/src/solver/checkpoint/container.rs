@@ -145,23 +145,18 @@ impl Reader {
         let io = |error: &io::Error| refused("read", path, error);
         let mut file = File::open(path).map_err(|e| io(&e))?;
         let length = file.metadata().map_err(|e| io(&e))?.len();
-        let mut head = [0; HEAD_BYTES as usize];
-        let found = read_up_to(&mut file, &mut head).map_err(|e| io(&e))?;
-        let magic = found.min(MAGIC.len());
-        if found == 0 || head[..magic] != MAGIC[..magic] {
+        let mut head = Vec::new();
+        (&mut file).take(HEAD_BYTES).read_to_end(&mut head).map_err(|e| io(&e))?;
+        let magic = head.len().min(MAGIC.len());
+        if head.is_empty() || head[..magic] != MAGIC[..magic] {
             return Err(Error::NotACheckpoint { path: path.to_owned() });
         }
         let damaged = |what| Error::CheckpointDamaged { path: path.to_owned(), what };
-        let (words, _) = head[16..].as_chunks::<8>();
-        let [counts, sections, planes, plane_bytes] =
-            words.iter().map(|w| u64::from_le_bytes(*w)).collect::<Vec<_>>()[..]
-        else {
+        let words: Vec<u64> = head[magic..].as_chunks().0.iter().map(|word| u64::from_le_bytes(*word)).collect();
+        let [counts, sections, planes, plane_bytes] = words[..] else {
             return Err(damaged("it ends within its first bytes"));
         };
         let version = counts as u32;
-        if found < head.len() {
-            return Err(damaged("it ends within its first bytes"));
-        }
         if version != supported {
             return Err(Error::CheckpointVersion { path: path.to_owned(), found: version, supported });
         }
@@ -249,16 +244,4 @@ fn sections_of(mut bytes: &[u8]) -> Option<Vec<(Tag, Vec<u8>)>> {
         bytes = rest;
     }
     Some(sections)
-}
-
-/// Reads as many bytes as there are, at most the length of `buffer`.
-fn read_up_to(file: &mut File, buffer: &mut [u8]) -> io::Result<usize> {
-    let mut found = 0;
-    while found < buffer.len() {
-        match file.read(&mut buffer[found..])? {
-            0 => break,
-            count => found += count,
-        }
-    }
-    Ok(found)
 }

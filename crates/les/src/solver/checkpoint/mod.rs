@@ -14,7 +14,7 @@ use std::path::Path;
 
 use super::flow::{Flow, State};
 use super::layout::Layout;
-use super::mesh::{AXIS_NAMES, Mesh};
+use super::mesh::{AXIS_NAMES, Direction, Mesh};
 use super::settings::FlowSettings;
 use crate::Error;
 use crate::solver::aligned::Aligned;
@@ -68,7 +68,7 @@ impl Flow {
     fn begin(&self, path: &Path, user_data: &[u8]) -> Result<Planes, Error> {
         let text: String =
             identity(self.mesh(), self.settings(), &self.layout).iter().map(|(k, v)| format!("{k}\t{v}\n")).collect();
-        let metrics = self.mesh().directions().each_ref().map(|d| metrics(d.cells, |xi| d.at(xi)));
+        let metrics = self.mesh().directions().each_ref().map(metrics);
         let mut sections = vec![(*IDENTITY, text.into_bytes())];
         let bytes = |values: &Vec<f64>| values.iter().flat_map(|v| v.to_le_bytes()).collect();
         sections.extend(METRICS.iter().zip(&metrics).map(|(tag, metrics)| (**tag, bytes(metrics))));
@@ -88,7 +88,7 @@ impl Flow {
         let (shape, state) = (self.layout.shape, &self.state);
         container::write_planes(path, planes, shape.own(), self.plane_bytes(), |k, bytes| {
             let start = shape.place([0, 0, k]);
-            for field in state.velocity.iter().chain(&state.history).chain([&state.pressure]) {
+            for field in state.velocity.iter().chain(&state.previous_terms).chain([&state.pressure]) {
                 bytes.extend(field[start..start + shape.plane()].iter().flat_map(|value| value.to_le_bytes()));
             }
         })
@@ -103,7 +103,7 @@ impl Flow {
     pub fn restore(path: impl AsRef<Path>, mesh: Mesh, settings: FlowSettings) -> Result<(Self, Vec<u8>), Error> {
         let read = Self::read(path.as_ref(), &mesh, &settings);
         // The ranks that share the flow must agree on that, too.
-        let (mut flow, user_data) = Layout::on(&mesh, settings.ranks)?.slabs.all_agree(read)?;
+        let (mut flow, user_data) = Layout::new(&mesh).shared(settings.ranks)?.slabs.all_agree(read)?;
         let [u, v, w] = flow.state.velocity.each_mut().map(Aligned::as_mut_slice);
         flow.layout.slabs.halos(&mut [u, v, w, &mut flow.state.pressure], WHOLE)?;
         Ok((flow, user_data))
@@ -117,9 +117,7 @@ impl Flow {
         let wanted = identity(mesh, settings, &Layout::new(mesh));
         compare_identity(path, text, &wanted)?;
         for (axis, tag) in METRICS.iter().enumerate() {
-            let direction = &mesh.directions()[axis];
-            let present = metrics(direction.cells, |xi| direction.at(xi));
-            compare_metrics(path, axis, &file.floats(tag)?, &present)?;
+            compare_metrics(path, axis, &file.floats(tag)?, &metrics(&mesh.directions()[axis]))?;
         }
         let mut flow = Self::at_rest(mesh.clone(), settings.clone())?;
         read_scalars(file.bytes(SCALARS)?, &mut flow.state).ok_or_else(|| file.damaged("its scalars are not whole"))?;
@@ -132,8 +130,8 @@ impl Flow {
             let bytes = file.plane(k)?;
             let mut values = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b));
             let start = shape.place([0, 0, k]);
-            let State { velocity, history, pressure, .. } = &mut flow.state;
-            for field in velocity.iter_mut().chain(history).chain([pressure]) {
+            let State { velocity, previous_terms, pressure, .. } = &mut flow.state;
+            for field in velocity.iter_mut().chain(previous_terms).chain([pressure]) {
                 field[start..start + shape.plane()].iter_mut().zip(&mut values).for_each(|(to, value)| *to = value);
             }
         }
@@ -189,13 +187,8 @@ fn compare_identity(path: &Path, stored: &str, wanted: &[(String, String)]) -> R
 }
 
 /// Position and metric at all faces and centres \[m\].
-fn metrics(cells: usize, at: impl Fn(f64) -> (f64, f64)) -> Vec<f64> {
-    (0..=2 * cells)
-        .flat_map(|i| {
-            let (x, h) = at(0.5 * i as f64);
-            [x, h]
-        })
-        .collect()
+fn metrics(direction: &Direction) -> Vec<f64> {
+    (0..=2 * direction.cells).flat_map(|i| <[f64; 2]>::from(direction.at(0.5 * i as f64))).collect()
 }
 
 /// Tells custom mappings apart, which have no name.
@@ -221,8 +214,17 @@ fn compare_metrics(path: &Path, axis: usize, stored: &[f64], wanted: &[f64]) -> 
 
 /// The numbers of the state, eight bytes each.
 fn scalars(state: &State) -> Vec<u8> {
-    let State { velocity: _, history: _, pressure: _, time_s, step, last_step_s, courant_per_s, energy, implicit } =
-        state;
+    let State {
+        velocity: _,
+        previous_terms: _,
+        pressure: _,
+        time_s,
+        step,
+        last_step_s,
+        courant_per_s,
+        energy,
+        implicit,
+    } = state;
     let numbers = [
         time_s.to_bits(),
         *step,

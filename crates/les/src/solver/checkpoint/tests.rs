@@ -81,7 +81,7 @@ fn a_restart_after_any_step_continues_with_the_same_bits_on_other_threads() {
 
 #[test]
 fn the_terms_of_the_step_before_matter() {
-    // What this crate's history array is for: without it the restart would be an Euler step.
+    // What this crate's array of previous terms is for: without it the restart would be an Euler step.
     let mut flow = start(settings());
     for _ in 0..3 {
         flow.step().unwrap();
@@ -89,7 +89,7 @@ fn the_terms_of_the_step_before_matter() {
     let folder = tempfile::tempdir().unwrap();
     flow.save(file(&folder), &[]).unwrap();
     let (mut again, _) = Flow::restore(file(&folder), mesh(), settings()).unwrap();
-    for field in &mut again.state.history {
+    for field in &mut again.state.previous_terms {
         field.fill(0.0);
     }
     flow.step().unwrap();

@@ -21,7 +21,7 @@ const GAIN: f64 = 0.5;
 const REPETITION_TOLERANCE: f64 = 1e-6;
 
 impl Flow {
-    /// Projects `star` to the new velocity; `phi` is left in the work array.
+    /// Projects `predicted` to the new velocity; `phi` is left in the work array.
     ///
     /// # Errors
     /// If the residual of the pressure equation, which is the divergence of the new velocity, does not reach the tolerance,
@@ -38,7 +38,7 @@ impl Flow {
         match reason {
             PressureFailure::RoundOff { .. } => {
                 let mut right = Aligned::zeros(self.layout.shape.len());
-                self.divergence.apply(self.work.star.each_ref().map(Aligned::as_slice), 1.0 / stage_s, &mut right);
+                self.divergence.apply(self.work.predicted.each_ref().map(Aligned::as_slice), 1.0 / stage_s, &mut right);
                 let size = norm(&self.layout.slabs, &right)?;
                 let left = self.repeat(stage_s, tolerance * size)?;
                 // A step that hardly changes the flow has so little to correct that round-off of the velocity is more than the
@@ -61,11 +61,11 @@ impl Flow {
         }
     }
 
-    /// The weighted divergence of `star` over `stage_s` into `phi`.
+    /// The weighted divergence of `predicted` over `stage_s` into `phi`.
     pub(super) fn take_divergence(&mut self, stage_s: f64) -> Result<(), Error> {
-        self.layout.slabs.halos(&mut [&mut self.work.star[2]], self.divergence.reach)?;
-        let star = self.work.star.each_ref().map(Aligned::as_slice);
-        self.divergence.apply(star, 1.0 / stage_s, &mut self.work.phi);
+        self.layout.slabs.halos(&mut [&mut self.work.predicted[2]], self.divergence.reach)?;
+        let predicted = self.work.predicted.each_ref().map(Aligned::as_slice);
+        self.divergence.apply(predicted, 1.0 / stage_s, &mut self.work.phi);
         Ok(())
     }
 
@@ -83,19 +83,19 @@ impl Flow {
             last = size;
             let tolerance = self.settings.pressure_tolerance.max(REPETITION_TOLERANCE);
             unless_stalled(self.pressure_solver.solve(&mut rest, tolerance))?;
-            std::mem::swap(&mut self.work.star, &mut self.state.velocity);
+            std::mem::swap(&mut self.work.predicted, &mut self.state.velocity);
             self.correct(stage_s, &rest)?;
             add(&mut self.work.phi, &rest, self.layout.shape);
         }
         Ok(last)
     }
 
-    /// `velocity = star - stage_s grad(phi)`.
+    /// `velocity = predicted - stage_s grad(phi)`.
     fn correct(&mut self, stage_s: f64, phi: &[f64]) -> Result<(), Error> {
-        let star = self.work.star.each_ref().map(Aligned::as_slice);
+        let predicted = self.work.predicted.each_ref().map(Aligned::as_slice);
         let mut velocity = self.state.velocity.each_mut().map(Aligned::as_mut_slice);
         let planes =
-            correct(&self.ops, &self.layout, star, phi, stage_s, velocity.each_mut().map(|field| &mut **field));
+            correct(&self.ops, &self.layout, predicted, phi, stage_s, velocity.each_mut().map(|field| &mut **field));
         self.layout.slabs.halos(&mut velocity, WHOLE)?;
         let planes = self.layout.slabs.planes(planes)?;
         self.state.energy = planes.iter().fold(0.0, |sum, plane| sum + plane[0]);

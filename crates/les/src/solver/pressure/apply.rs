@@ -288,13 +288,7 @@ fn condition(layout: &Layout, rows: &[Vec<Taps>; 3]) -> f64 {
 
 /// Rows of `Dw F^-1 Dw^T`.
 pub(crate) fn stiffness(line: &Operators1d) -> Vec<Taps> {
-    let divergence = line.stored_divergence();
-    let mut faces = vec![Taps::new(); line.cells];
-    for (cell, row) in divergence.iter().enumerate() {
-        for &(face, c) in row {
-            faces[face].push((cell, c));
-        }
-    }
+    let faces = line.adjoint();
     let row = |taps: &Taps| {
         let mut sums = vec![0.0; line.cells];
         for &(face, c) in taps {
@@ -304,7 +298,7 @@ pub(crate) fn stiffness(line: &Operators1d) -> Vec<Taps> {
         }
         sums.into_iter().enumerate().filter(|(_, c)| *c != 0.0).collect()
     };
-    divergence.iter().map(row).collect()
+    line.stored_divergence().iter().map(row).collect()
 }
 
 /// 2-norm of a field: the sums of the planes are added in their order.

@@ -9,6 +9,7 @@
 use multiversion::multiversion;
 
 use super::super::operators_1d::Operators1d;
+use super::apply::stiffness;
 
 /// Lines that are solved side by side.
 const LANES: usize = 16;
@@ -51,19 +52,12 @@ impl BandedCholesky {
         let n = line.cells;
         let mut columns: Vec<Column> =
             line.cell_mass_m.iter().map(|mass| Column { mass: *mass, ..Column::default() }).collect();
-        let divergence = line.stored_divergence();
-        for (i, row) in divergence.iter().enumerate() {
-            for (j, other) in divergence.iter().enumerate().take(i + 1) {
-                let sum: f64 = row
-                    .iter()
-                    .flat_map(|a| other.iter().filter(move |b| b.0 == a.0).map(move |b| (a, b)))
-                    .map(|(a, b)| a.1 * b.1 / line.face_mass_m[a.0])
-                    .sum();
+        for (i, row) in stiffness(line).iter().enumerate() {
+            for &(j, c) in row.iter().filter(|tap| tap.0 <= i) {
                 match i - j {
-                    0 => columns[j].diagonal = sum,
-                    below @ 1..=3 => columns[j].below[below - 1] = sum,
-                    4 if j == 0 || i == n - 1 => columns[j].corner = sum,
-                    _ if sum == 0.0 => {}
+                    0 => columns[j].diagonal = c,
+                    below @ 1..=3 => columns[j].below[below - 1] = c,
+                    4 if j == 0 || i == n - 1 => columns[j].corner = c,
                     _ => return None,
                 }
             }

@@ -20,9 +20,9 @@ use super::super::layout::{Layout, Shape};
 use super::super::mesh::AXIS_NAMES;
 use super::banded_cholesky::{BandedCholesky, Scratch};
 use super::kernel;
-use super::lines::bundles;
+use super::lines::pencils;
 use super::method::Method;
-use super::transform::{LineTransform, RowTransform, Work};
+use super::transform::{LineTransform, RowTransform, Way, Work};
 use crate::Error;
 use crate::solver::slabs::Slabs;
 
@@ -71,19 +71,19 @@ impl Direct {
     /// What is done along the axes 1 and 2 of the places from `first` on of axis 0.
     fn lines_once(&self, field: &mut [f64], shape: Shape, first: usize) {
         if !self.by_planes() {
-            self.lines(0, field, shape, LineTransform::forward);
+            self.lines(Way::There, 0, field, shape);
         }
         match &self.along {
             [Along::Factorised(band), _] => {
-                self.lines(1, field, shape, LineTransform::forward);
+                self.lines(Way::There, 1, field, shape);
                 self.banded(1, band, field, shape, first);
-                self.lines(1, field, shape, LineTransform::inverse);
+                self.lines(Way::Back, 1, field, shape);
             }
             [_, Along::Factorised(band)] => self.banded(2, band, field, shape, first),
             [_, Along::Transformed(transform)] => self.divide(transform, field, shape, first),
         }
         if !self.by_planes() {
-            self.lines(0, field, shape, LineTransform::inverse);
+            self.lines(Way::Back, 0, field, shape);
         }
     }
 
@@ -98,60 +98,49 @@ impl Direct {
         if self.by_planes() { n0 * n1 } else { n0 * (n1 * n2).div_ceil(64).next_multiple_of(6) }
     }
 
-    fn rows_forward(&self, field: &mut [f64]) {
+    /// Transforms along axis 0, and along axis 1 where that is done plane by plane.
+    fn rows(&self, way: Way, field: &mut [f64]) {
         let n0 = self.slabs.shape.n[0];
         field.par_chunks_mut(self.slab()).for_each_init(Work::default, |work, slab| {
-            self.rows.forward(slab, work);
+            if way == Way::There {
+                self.rows.apply(way, slab, work);
+            }
             if let (true, Along::Transformed(axis)) = (self.by_planes(), &self.along[0]) {
                 let mut rows: Vec<&mut [f64]> = slab.chunks_mut(n0).collect();
-                axis.forward(&mut rows, work);
+                axis.apply(way, &mut rows, work);
+            }
+            if way == Way::Back {
+                self.rows.apply(way, slab, work);
             }
         });
     }
 
-    fn rows_inverse(&self, field: &mut [f64]) {
-        let n0 = self.slabs.shape.n[0];
-        field.par_chunks_mut(self.slab()).for_each_init(Work::default, |work, slab| {
-            if let (true, Along::Transformed(axis)) = (self.by_planes(), &self.along[0]) {
-                let mut rows: Vec<&mut [f64]> = slab.chunks_mut(n0).collect();
-                axis.inverse(&mut rows, work);
-            }
-            self.rows.inverse(slab, work);
-        });
-    }
-
-    /// Transforms along axis `which + 1`, there or back, if it is transformed.
-    fn lines(
-        &self,
-        which: usize,
-        field: &mut [f64],
-        shape: Shape,
-        apply: impl Fn(&LineTransform, &mut [&mut [f64]], &mut Work) + Sync,
-    ) {
+    /// Transforms along axis `which + 1` if it is transformed.
+    fn lines(&self, way: Way, which: usize, field: &mut [f64], shape: Shape) {
         let Along::Transformed(transform) = &self.along[which] else { return };
-        let mut bundles = bundles(field, shape, which + 1);
-        let each = bundles.par_iter_mut();
-        each.for_each_init(Work::default, |work, bundle| apply(transform, &mut bundle.rows, work));
+        let mut pencils = pencils(field, shape, which + 1, usize::MAX);
+        let each = pencils.par_iter_mut();
+        each.for_each_init(Work::default, |work, pencil| transform.apply(way, &mut pencil.rows, work));
     }
 
     /// Solves for the coefficients of the eigenvectors of the other axes along the factorised one.
     fn banded(&self, axis: usize, band: &BandedCholesky, field: &mut [f64], shape: Shape, first: usize) {
         let along = &self.value[0][first..first + shape.n[0]];
         let other = &self.value[3 - axis];
-        bundles(field, shape, axis).par_iter_mut().for_each_init(Scratch::default, |scratch, bundle| {
-            let width = bundle.rows.first().map_or(0, |row| row.len());
-            let shifts = &along[bundle.start..bundle.start + width];
-            band.solve(&mut bundle.rows, other[bundle.other], shifts, self.scale, scratch);
+        pencils(field, shape, axis, usize::MAX).par_iter_mut().for_each_init(Scratch::default, |scratch, pencil| {
+            let width = pencil.rows.first().map_or(0, |row| row.len());
+            let shifts = &along[pencil.start..pencil.start + width];
+            band.solve(&mut pencil.rows, other[pencil.other], shifts, self.scale, scratch);
         });
     }
 
     /// Divides the coefficients of the eigenvectors of all axes by their values, on the way along axis 2 there and back.
     fn divide(&self, transform: &LineTransform, field: &mut [f64], shape: Shape, first: usize) {
         let value = &self.value;
-        bundles(field, shape, 2).par_iter_mut().for_each_init(Work::default, |work, bundle| {
-            let along = &value[0][first + bundle.start..];
-            transform.there_and_back(&mut bundle.rows, work, |mode, start, values| {
-                kernel::divide(values, value[1][bundle.other] + value[2][mode], &along[start..], self.scale);
+        pencils(field, shape, 2, usize::MAX).par_iter_mut().for_each_init(Work::default, |work, pencil| {
+            let along = &value[0][first + pencil.start..];
+            transform.there_and_back(&mut pencil.rows, work, |mode, start, values| {
+                kernel::divide(values, value[1][pencil.other] + value[2][mode], &along[start..], self.scale);
             });
         });
     }
@@ -163,9 +152,9 @@ impl Method for Direct {
     }
 
     fn solve(&self, own: &mut [f64], _: f64, _: f64) -> Result<usize, Error> {
-        self.rows_forward(own);
+        self.rows(Way::There, own);
         self.slabs.transposed(own, 1, |field, shape, first| self.lines_once(field, shape, first))?;
-        self.rows_inverse(own);
+        self.rows(Way::Back, own);
         Ok(0)
     }
 

@@ -31,6 +31,12 @@ impl Fold {
         fold
     }
 
+    /// The matrix as it is.
+    pub(crate) fn none(n: usize, matrix: &[f64]) -> Self {
+        let column = |m: usize| matrix.iter().skip(m).step_by(n).copied().collect();
+        Self { pairs: Vec::new(), blocks: vec![(0, (0..n).map(column).collect())], columns: (0..n).collect() }
+    }
+
     /// Adds a block of columns that begins at the place `start`, folded as often as it can be.
     fn add(&mut self, start: usize, columns: Vec<(usize, Vec<f64>)>) {
         let n = columns.len();

@@ -56,17 +56,9 @@ impl Pairs {
     }
 }
 
-/// A square matrix packed for products from the right, `f B`: panels of 32 columns, row by row.
-#[derive(Debug)]
-pub(crate) struct Right {
-    n: usize,
-    panels: Vec<Vec<TileRow>>,
-}
-
 /// Space for one packed operand.
 #[derive(Debug, Default)]
 pub(crate) struct Packed {
-    rows: Vec<[f64; ROWS]>,
     columns: Vec<TileRow>,
     product: Vec<TileRow>,
 }
@@ -103,6 +95,20 @@ impl Left {
             take(&self.before, f, columns, panel);
             self.multiply(panel, columns, product);
             give(&self.after, product, f, columns);
+        }
+    }
+
+    /// Replaces each row `f` of `n` values, all of which follow one another, by `A f`; of a matrix without symmetries.
+    pub(crate) fn apply_to_rows(&self, f: &mut [f64], packed: &mut Packed) {
+        let (panel, product) = packed.panels(self.n);
+        for rows in f.chunks_mut(COLUMNS * self.n) {
+            for (i, row) in rows.chunks(self.n).enumerate() {
+                panel.iter_mut().zip(row).for_each(|(packed, value)| packed[i] = *value);
+            }
+            self.multiply(panel, [0, rows.len() / self.n], product);
+            for (i, row) in rows.chunks_mut(self.n).enumerate() {
+                row.iter_mut().zip(&*product).for_each(|(value, packed)| *value = packed[i]);
+            }
         }
     }
 
@@ -202,37 +208,6 @@ fn sum_and_difference(a: &[f64], b: &[f64], sum: &mut [f64], difference: &mut [f
     }
 }
 
-impl Right {
-    /// The `n x n` matrix of elements `at(row, column)`.
-    pub(crate) fn new(n: usize, at: impl Fn(usize, usize) -> f64) -> Self {
-        let panel = |first: usize| -> Vec<TileRow> {
-            let entry = |k: usize, l: usize| if first + l < n { at(k, first + l) } else { 0.0 };
-            (0..n).map(|k| std::array::from_fn(|l| entry(k, l))).collect()
-        };
-        Self { n, panels: (0..n).step_by(COLUMNS).map(panel).collect() }
-    }
-
-    /// Replaces the rows of `n` values in `f` by `f B`.
-    pub(crate) fn apply(&self, f: &mut [f64], packed: &mut Packed) {
-        packed.rows.resize(self.n, [0.0; ROWS]);
-        for rows in f.chunks_mut(ROWS * self.n) {
-            for (i, row) in rows.chunks(self.n).enumerate() {
-                for (packed, value) in packed.rows.iter_mut().zip(row) {
-                    packed[i] = *value;
-                }
-            }
-            for (panel, start) in self.panels.iter().zip((0..self.n).step_by(COLUMNS)) {
-                let columns = COLUMNS.min(self.n - start);
-                let mut tile = [[0.0; COLUMNS]; ROWS];
-                multiply(&packed.rows, panel, columns, &mut tile);
-                for (row, tile) in rows.chunks_mut(self.n).zip(&tile) {
-                    paste(tile, &mut row[start..start + columns]);
-                }
-            }
-        }
-    }
-}
-
 /// Copies into a row of a panel; a whole row at once where it can.
 #[inline(always)]
 fn copy(from: &[f64], to: &mut TileRow) {
@@ -299,7 +274,7 @@ mod tests {
             let matrix: Vec<f64> = (0..n * n).map(|p| entry(p / n, p % n)).collect();
             Left::same(&Fold::new(n, &matrix)).apply(&mut rows, &mut Packed::default());
             let mut right = f.clone();
-            Right::new(n, entry).apply(&mut right, &mut Packed::default());
+            Left::transpose(&Fold::none(n, &matrix)).apply_to_rows(&mut right, &mut Packed::default());
             for r in 0..n {
                 for c in 0..width {
                     let sum: f64 = (0..n).map(|k| entry(r, k) * f[k * width + c]).sum();

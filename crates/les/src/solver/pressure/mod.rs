@@ -26,5 +26,6 @@ mod tests;
 pub(crate) use apply::norm;
 pub use cost::PressureMethod;
 pub use equation::PressureEquation;
+pub(crate) use lines::{Pencil, pencils};
 pub use solver::Solved;
 pub(crate) use solver::{PressureSolver, unless_stalled};

@@ -22,7 +22,7 @@ use super::super::slabs::Slabs;
 use super::apply::stiffness;
 use super::lines::columns;
 use super::method::Method;
-use super::transform::{self, RowTransform};
+use super::transform::{self, RowTransform, Way};
 use crate::Error;
 
 /// Modes that are solved side by side.
@@ -98,6 +98,12 @@ struct Work {
     p: Vec<Wide>,
     q: Vec<Wide>,
     fields: Vec<[Vec<Lanes>; 2]>,
+    lines: Lines,
+}
+
+/// A few lines that are solved together, and a coarse row.
+#[derive(Debug, Default)]
+struct Lines {
     line: Vec<[Cell; TOGETHER]>,
     row: Vec<Lanes>,
 }
@@ -144,7 +150,7 @@ impl Multigrid {
     fn group(&self, group: usize, rows: &mut [&mut [f64]], allowed: f64, tolerance: f64, work: &mut Work) -> usize {
         let (mode, single) = (&self.mode[group], self.mode[group].map(|lambda| lambda as f32));
         let masses = self.levels[0].axes.each_ref().map(|axis| &*axis.mass);
-        let Work { x, r, p, q, fields, line, row } = work;
+        let Work { x, r, p, q, fields, lines } = work;
         for field in [&mut *x, &mut *r, &mut *p, &mut *q] {
             field.clear();
             field.resize(rows.len(), [0.0; LANES]);
@@ -168,7 +174,7 @@ impl Multigrid {
         let [mut rz, mut alpha] = [[0.0; LANES]; 2];
         let (mut iterations, mut least, mut since) = (0, f64::INFINITY, 0);
         while squares > enough && iterations < MAX_ITERATIONS && since < PATIENCE {
-            let z = self.cycle(r, &single, fields, line, row);
+            let z = self.cycle(r, &single, fields, lines);
             let before = rz;
             rz = dot(z, r);
             let zq = dot(z, q);
@@ -209,27 +215,26 @@ impl Multigrid {
         r: &[Wide],
         mode: &Lanes,
         fields: &'a mut Vec<[Vec<Lanes>; 2]>,
-        line: &mut Vec<[Cell; TOGETHER]>,
-        row: &mut Vec<Lanes>,
+        lines: &mut Lines,
     ) -> &'a [Lanes] {
         fields.resize_with(self.levels.len(), Default::default);
         for (fields, Level { axes, .. }) in fields.iter_mut().zip(&self.levels) {
             fields.iter_mut().for_each(|field| field.resize(axes[0].len() * axes[1].len(), [0.0; LANES]));
         }
         let [first, second] = &self.levels[0].axes;
-        line.resize(first.len().max(second.len()), [NO_CELL; TOGETHER]);
-        row.resize(first.len(), [0.0; LANES]);
+        lines.line.resize(first.len().max(second.len()), [NO_CELL; TOGETHER]);
+        lines.row.resize(first.len(), [0.0; LANES]);
         fields[0][1].iter_mut().zip(r).for_each(|(f, r)| *f = r.map(|r| r as f32));
-        v_cycle(&self.levels, mode, fields, line, row);
+        v_cycle(&self.levels, mode, fields, lines);
         &fields[0][0]
     }
 
-    /// Transforms the rows, there or back.
-    fn transform(&self, field: &mut [f64], apply: impl Fn(&RowTransform, &mut [f64], &mut transform::Work) + Sync) {
+    /// Transforms the rows.
+    fn transform(&self, way: Way, field: &mut [f64]) {
         let n0 = self.slabs.shape.n[0];
         let rows = (field.len() / n0).div_ceil(64).next_multiple_of(6);
         let slabs = field.par_chunks_mut(rows * n0);
-        slabs.for_each_init(transform::Work::default, |work, slab| apply(&self.rows, slab, work));
+        slabs.for_each_init(transform::Work::default, |work, slab| self.rows.apply(way, slab, work));
     }
 }
 
@@ -239,7 +244,7 @@ impl Method for Multigrid {
     }
 
     fn solve(&self, own: &mut [f64], size: f64, tolerance: f64) -> Result<usize, Error> {
-        self.transform(own, RowTransform::forward);
+        self.transform(Way::There, own);
         let allowed = (tolerance * size * self.scale).powi(2);
         let most = self.slabs.transposed(own, LANES, |field, shape, first| {
             let mut groups = columns(field, shape, LANES);
@@ -248,7 +253,7 @@ impl Method for Multigrid {
             });
             groups.max()
         })?;
-        self.transform(own, RowTransform::inverse);
+        self.transform(Way::Back, own);
         let [most] = self.slabs.largest([most.unwrap_or(0) as f64])?;
         Ok(most as usize)
     }
@@ -353,28 +358,22 @@ impl Level {
 }
 
 /// One V-cycle from zero: relaxation afterwards in reverse order makes it symmetric.
-fn v_cycle(
-    levels: &[Level],
-    mode: &Lanes,
-    fields: &mut [[Vec<Lanes>; 2]],
-    line: &mut [[Cell; TOGETHER]],
-    row: &mut [Lanes],
-) {
+fn v_cycle(levels: &[Level], mode: &Lanes, fields: &mut [[Vec<Lanes>; 2]], lines: &mut Lines) {
     let ([level, coarser @ ..], [[u, f], below @ ..]) = (levels, fields) else { return };
     u.fill([0.0; LANES]);
     for _ in 0..level.sweeps {
-        relax(level, 0, mode, u, f, false, line);
-        relax(level, 1, mode, u, f, false, line);
+        relax(level, 0, mode, u, f, false, &mut lines.line);
+        relax(level, 1, mode, u, f, false, &mut lines.line);
     }
     if let Some(coarse) = coarser.first() {
-        let row = &mut row[..coarse.axes[0].len()];
-        restrict(level, mode, u, f, &mut below[0][1], row);
-        v_cycle(coarser, mode, below, line, row);
-        interpolate(level, &below[0][0], u, row);
+        let n = coarse.axes[0].len();
+        restrict(level, mode, u, f, &mut below[0][1], &mut lines.row[..n]);
+        v_cycle(coarser, mode, below, lines);
+        interpolate(level, &below[0][0], u, &mut lines.row[..n]);
     }
     for _ in 0..level.sweeps {
-        relax(level, 1, mode, u, f, true, line);
-        relax(level, 0, mode, u, f, true, line);
+        relax(level, 1, mode, u, f, true, &mut lines.line);
+        relax(level, 0, mode, u, f, true, &mut lines.line);
     }
 }
 

@@ -33,7 +33,8 @@ fn a_cycle_is_symmetric() {
     let cycled = |f: f32| {
         let sizes = levels.iter().map(|level| level.axes[0].len() * level.axes[1].len());
         let mut fields: Vec<[Vec<Lanes>; 2]> = sizes.map(|n| [vec![[0.0; LANES]; n], wave(n, f)]).collect();
-        v_cycle(&levels, &mode, &mut fields, &mut [[NO_CELL; TOGETHER]; 25], &mut [[0.0; LANES]; 25]);
+        let mut lines = Lines { line: vec![[NO_CELL; TOGETHER]; 25], row: vec![[0.0; LANES]; 25] };
+        v_cycle(&levels, &mode, &mut fields, &mut lines);
         fields.swap_remove(0)
     };
     let ([bf, f], [bg, g]) = (cycled(0.71), cycled(1.3));

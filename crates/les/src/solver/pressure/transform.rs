@@ -15,7 +15,7 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use super::super::operators_1d::Operators1d;
 use super::eigen::Basis;
 use super::fold::Fold;
-use super::gemm::{Left, Packed, Right};
+use super::gemm::{Left, Packed};
 
 /// Space that a thread needs for transforms.
 #[derive(Debug, Default)]
@@ -25,14 +25,23 @@ pub(crate) struct Work {
     scratch: Vec<Complex<f64>>,
 }
 
+/// Which way a transform goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Way {
+    /// To the modes.
+    There,
+    /// To the values.
+    Back,
+}
+
 /// Transform of the rows along axis 0.
 pub(crate) enum RowTransform {
     /// One cell: nothing to do.
     Thin,
     /// Fourier transform; the modes are stored as real and imaginary parts in the places of the row.
     Fourier { cells: usize, forward: Arc<dyn RealToComplex<f64>>, inverse: Arc<dyn ComplexToReal<f64>> },
-    /// Products with the eigenvectors and their transpose.
-    Dense { forward: Right, inverse: Right },
+    /// Products with the transpose of the eigenvectors, and with them.
+    Dense(Box<[Left; 2]>),
 }
 
 impl fmt::Debug for RowTransform {
@@ -70,18 +79,17 @@ impl RowTransform {
             (transform, Basis::wave_values(n, h), 1.0 / (n as f64 * h))
         } else {
             let Basis { value, vector } = Basis::new(line);
-            let forward = Right::new(n, |i, m| vector[i * n + m]);
-            let inverse = Right::new(n, |m, i| vector[i * n + m]);
-            (Self::Dense { forward, inverse }, value, 1.0)
+            let vectors = Fold::none(n, &vector);
+            (Self::Dense(Box::new([Left::transpose(&vectors), Left::same(&vectors)])), value, 1.0)
         }
     }
 
-    /// Rows to modes.
-    pub(crate) fn forward(&self, rows: &mut [f64], work: &mut Work) {
+    /// Rows to modes, or back.
+    pub(crate) fn apply(&self, way: Way, rows: &mut [f64], work: &mut Work) {
         match self {
             Self::Thin => {}
-            Self::Dense { forward, .. } => forward.apply(rows, &mut work.packed),
-            Self::Fourier { cells, forward, .. } => {
+            Self::Dense(ways) => ways[way as usize].apply_to_rows(rows, &mut work.packed),
+            Self::Fourier { cells, forward, .. } if way == Way::There => {
                 let (spectrum, scratch) = work.fourier(*cells, forward.get_scratch_len());
                 for row in rows.chunks_mut(*cells) {
                     if forward.process_with_scratch(row, spectrum, scratch).is_err() {
@@ -97,14 +105,6 @@ impl RowTransform {
                     }
                 }
             }
-        }
-    }
-
-    /// Modes to rows.
-    pub(crate) fn inverse(&self, rows: &mut [f64], work: &mut Work) {
-        match self {
-            Self::Thin => {}
-            Self::Dense { inverse, .. } => inverse.apply(rows, &mut work.packed),
             Self::Fourier { cells, inverse, .. } => {
                 let (spectrum, scratch) = work.fourier(*cells, inverse.get_scratch_len());
                 for row in rows.chunks_mut(*cells) {
@@ -133,7 +133,7 @@ impl RowTransform {
                 if single { 1.0 / *cells as f64 } else { 2.0 / *cells as f64 }
             }
             Self::Thin => 1.0,
-            Self::Dense { .. } => mass_m,
+            Self::Dense(_) => mass_m,
         }
     }
 
@@ -142,7 +142,7 @@ impl RowTransform {
         match self {
             Self::Thin => "one cell",
             Self::Fourier { .. } => "Fourier",
-            Self::Dense { .. } => "dense",
+            Self::Dense(_) => "dense",
         }
     }
 }
@@ -183,19 +183,11 @@ impl LineTransform {
         (Self::Dense(Box::new([Left::transpose(&fold), Left::same(&fold)])), value)
     }
 
-    /// Lines to modes.
-    pub(crate) fn forward(&self, rows: &mut [&mut [f64]], work: &mut Work) {
+    /// Lines to modes, or back.
+    pub(crate) fn apply(&self, way: Way, rows: &mut [&mut [f64]], work: &mut Work) {
         match self {
             Self::Thin(scale) => scale_rows(rows, *scale),
-            Self::Dense(ways) => ways[0].apply(rows, &mut work.packed),
-        }
-    }
-
-    /// Modes to lines.
-    pub(crate) fn inverse(&self, rows: &mut [&mut [f64]], work: &mut Work) {
-        match self {
-            Self::Thin(scale) => scale_rows(rows, *scale),
-            Self::Dense(ways) => ways[1].apply(rows, &mut work.packed),
+            Self::Dense(ways) => ways[way as usize].apply(rows, &mut work.packed),
         }
     }
 
@@ -257,7 +249,7 @@ mod tests {
             assert_eq!(value, basis.value);
             let row: Vec<f64> = (0..n).map(|i| (1.0 + i as f64).sqrt().sin()).collect();
             let mut modes = row.clone();
-            transform.forward(&mut modes, &mut Work::default());
+            transform.apply(Way::There, &mut modes, &mut Work::default());
             for (m, mode) in modes.iter().enumerate() {
                 let product: f64 = (0..n).map(|i| basis.vector[i * n + m] * row[i]).sum();
                 // The Fourier transform has no norm; waves in pairs have twice the norm of single ones.
@@ -266,7 +258,7 @@ mod tests {
                 let scaled = mode * norm * if single { 1.0 } else { 2.0 };
                 assert!((product - scaled).abs() < 1e-13, "{n}, mode {m}: {product} against {scaled}");
             }
-            transform.inverse(&mut modes, &mut Work::default());
+            transform.apply(Way::Back, &mut modes, &mut Work::default());
             for (a, b) in modes.iter().zip(&row) {
                 assert!((a / n as f64 - b).abs() < 1e-14);
             }
@@ -298,7 +290,7 @@ mod tests {
             let field: Vec<f64> = (0..n * width).map(|i| (0.7 * i as f64).sin()).collect();
             let mut modes = field.clone();
             let mut rows: Vec<&mut [f64]> = modes.chunks_mut(width).collect();
-            transform.forward(&mut rows, &mut Work::default());
+            transform.apply(Way::There, &mut rows, &mut Work::default());
             for (at, &m) in fold.columns.iter().enumerate() {
                 assert_eq!(values[at], value[m]);
                 for l in 0..width {
@@ -308,7 +300,7 @@ mod tests {
                 }
             }
             let mut rows: Vec<&mut [f64]> = modes.chunks_mut(width).collect();
-            transform.inverse(&mut rows, &mut Work::default());
+            transform.apply(Way::Back, &mut rows, &mut Work::default());
             for (place, (back, given)) in modes.iter().zip(&field).enumerate() {
                 let back = back * line.cell_mass_m[place / width];
                 assert!((back - given).abs() < 1e-12, "{direction:?}: {back} for {given}");

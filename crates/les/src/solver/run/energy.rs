@@ -73,9 +73,7 @@ fn grew(flow: &Flow, allowed_m5_s2: f64, rate_per_s: f64) -> Result<Error, Error
         energy_m5_s2: flow.kinetic_energy_m5_s2(),
         allowed_m5_s2,
         rate_per_s,
-        component: flow.component_name(axis),
-        cell: flow.cell(place),
-        position_m: flow.position_m(place),
+        place: flow.place(axis, place),
         cause: cause(flow)?,
     })))
 }

@@ -4,7 +4,7 @@ use super::super::cases::taylor_green_plane;
 use super::super::mesh::{Direction, Wall};
 use super::super::settings::{TimeScheme, TimeStep};
 use super::*;
-use crate::error::EnergyGrowth;
+use crate::error::{EnergyGrowth, Place};
 
 const NU_M2_S: f64 = 0.01;
 
@@ -165,7 +165,7 @@ fn a_flow_that_blows_up_stops_with_its_place_and_leaves_a_checkpoint_that_can_be
     let blown = RunPlan { checkpoint, ..plan(10.0, &[]) };
     let mut witness = Witness::default();
     let error = Run::new(flow, blown.clone()).unwrap().to_end(&mut witness).unwrap_err();
-    let Error::CourantTooLarge { step, component, courant, .. } = error else { panic!("{error}") };
+    let Error::CourantTooLarge { step, place: Place { component, .. }, courant, .. } = error else { panic!("{error}") };
     assert_eq!((component, step), ("v", witness.records.len() as u64 + 1));
     assert!(courant > 0.4);
     // The last state was refused; the one before it is the last that could be stepped from.
@@ -277,7 +277,7 @@ fn steps_that_feed_a_flow_more_than_it_loses_are_told_of_and_stop_it() {
 fn values_that_are_not_finite_are_found_at_once() {
     let mut flow = vortices(TimeStep::Fixed { step_s: 0.01 }, TimeScheme::AdamsBashforth2);
     flow.step().unwrap();
-    flow.state.history[1][17] = f64::NAN;
+    flow.state.previous_terms[1][17] = f64::NAN;
     let error = Run::new(flow, plan(1.0, &[])).unwrap().to_end(&mut Silent).unwrap_err();
     assert!(matches!(error, Error::Diverged { step: 2..=11, .. }), "{error}");
 }

@@ -5,7 +5,7 @@
 
 /// Where the rows of some index begin in an array.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Starts {
+pub(crate) struct RowOffsets {
     /// That of index 0 in an array that goes on downwards.
     pub(crate) first: usize,
     pub(crate) step: usize,
@@ -14,7 +14,7 @@ pub(crate) struct Starts {
     pub(crate) round: usize,
 }
 
-impl Starts {
+impl RowOffsets {
     /// Rows of `step` values, of which that of index `lowest` is the first.
     #[inline(always)]
     pub(crate) fn every(step: usize, lowest: usize) -> Self {
