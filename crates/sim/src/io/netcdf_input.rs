@@ -112,23 +112,24 @@ fn of_group(
 /// are those of its root. A classic file is its root alone.
 ///
 /// # Errors
-/// As [`open`]; a NetCDF-4 file without that variable.
+/// As [`open`]; a file without that variable.
 pub(crate) fn open_groups(path: &Path, needed: &str) -> Result<Vec<(String, NetcdfFile)>, Error> {
     let root = open(path)?;
-    match &root.numbers {
-        Numbers::Classic(_) => Ok(vec![(String::new(), root)]),
+    let mut found = match &root.numbers {
         #[cfg(feature = "netcdf4")]
         Numbers::Hdf5(file, _) => {
             let named = |name: String| Ok((name.clone(), of_group(path, file, name)?));
             let all: Result<Vec<_>, String> = file.groups().and_then(|names| names.into_iter().map(named).collect());
-            let mut found = all.map_err(|reason| root.refuse(reason))?;
-            found.retain(|(_, group)| group.has(needed));
-            if found.is_empty() {
-                return Err(root.refuse(format!("neither it nor one of its groups has a variable {needed}")));
-            }
-            Ok(found)
+            all.map_err(|reason| root.refuse(reason))?
         }
+        Numbers::Classic(_) => vec![(String::new(), root)],
+    };
+    found.retain(|(_, group)| group.has(needed));
+    if found.is_empty() {
+        let reason = format!("neither it nor one of its groups has a variable {needed}");
+        return Err(Error::Input { path: path.to_owned(), reason });
     }
+    Ok(found)
 }
 
 impl NetcdfFile {
