@@ -74,11 +74,7 @@ impl EfficiencyProfile {
     /// # Errors
     /// [`Error::Extrapolation`] outside the profile, [`Error::OutOfRange`] for a range that is not a number.
     pub fn interpolated(&self, range_m: f64) -> Result<f64, Error> {
-        self.interpolate(&self.mean, range_m)
-    }
-
-    fn interpolate(&self, y: &[f64], range_m: f64) -> Result<f64, Error> {
-        let x = &self.range_m;
+        let (x, y) = (&self.range_m, &self.mean);
         if x.is_empty() || y.len() != x.len() {
             return Err(Error::Length { field: "mean", found: y.len(), expected: x.len().max(1) });
         }

@@ -121,27 +121,24 @@ pub enum Error {
     },
 }
 
+/// `value` where it is `good`, else an error that names `field` and says what is `allowed`.
+pub(crate) fn within(field: &'static str, value: f64, good: bool, allowed: &'static str) -> Result<f64, Error> {
+    if good { Ok(value) } else { Err(Error::OutOfRange { field, value, allowed }) }
+}
+
 /// `value` when it is finite and positive, else an error that names `field`.
 pub(crate) fn positive(field: &'static str, value: f64) -> Result<f64, Error> {
-    if value.is_finite() && value > 0.0 {
-        Ok(value)
-    } else {
-        Err(Error::OutOfRange { field, value, allowed: "a finite number above 0" })
-    }
+    within(field, value, value.is_finite() && value > 0.0, "a finite number above 0")
 }
 
 /// `value` when it is finite and not negative, else an error that names `field`.
 pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<f64, Error> {
-    if value.is_finite() && value >= 0.0 {
-        Ok(value)
-    } else {
-        Err(Error::OutOfRange { field, value, allowed: "a finite number, 0 or above" })
-    }
+    within(field, value, value.is_finite() && value >= 0.0, "a finite number, 0 or above")
 }
 
 /// `value` when it is finite, else an error that names `field`.
 pub(crate) fn finite(field: &'static str, value: f64) -> Result<f64, Error> {
-    if value.is_finite() { Ok(value) } else { Err(Error::OutOfRange { field, value, allowed: "a finite number" }) }
+    within(field, value, value.is_finite(), "a finite number")
 }
 
 /// The field that an error names.

@@ -1,4 +1,4 @@
-//! Gauss-Legendre rules and an adaptive integral built on them.
+//! Gauss-Legendre rules, an adaptive integral built on them, and the interpolation of tables.
 //!
 //! Check: a rule of n nodes integrates polynomials of degree 2n - 1 exactly; the adaptive integral reproduces
 //! closed forms to its tolerance.
@@ -127,6 +127,19 @@ pub(crate) fn adaptive(
     } else {
         Err(Error::Convergence { quantity, error: missed / scale, tolerance })
     }
+}
+
+/// Value at `x` of the polynomial that is 1 at `node[j]` and 0 at the other nodes.
+pub(crate) fn lagrange(node: &[f64], j: usize, x: f64) -> f64 {
+    node.iter().enumerate().filter(|(i, _)| *i != j).map(|(_, z)| (x - z) / (node[j] - z)).product()
+}
+
+/// Cubic interpolation in a table of `count` values at 0, 1, 2, ...: the first of four neighbours of `t`, and their weights.
+pub(crate) fn cubic(t: f64, count: usize) -> (usize, [f64; 4]) {
+    let at = (t as usize).clamp(1, count - 3);
+    let u = t - at as f64;
+    let (a, b, c) = (u + 1.0, u - 1.0, u - 2.0);
+    (at - 1, [-u * b * c / 6.0, a * b * c / 2.0, -a * u * c / 2.0, a * u * b / 6.0])
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! Check: the profile integrates exactly on straight pieces, however thin.
 
 use crate::Error;
-use crate::error::{finite, not_negative};
-use crate::quadrature::GaussLegendre;
+use crate::error::{finite, not_negative, within};
+use crate::quadrature::{GaussLegendre, lagrange};
 
 /// Cn2 along the line of sight.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,13 +43,8 @@ impl Cn2Path {
                 let last = height_m.len() - 1;
                 // A horizontal path along the lowest or highest point must not fail by a rounding error.
                 let slack = 1e-9 * (height_m[last] - height_m[0]);
-                if !(h >= height_m[0] - slack && h <= height_m[last] + slack) {
-                    return Err(Error::OutOfRange {
-                        field: "height_m",
-                        value: h,
-                        allowed: "within the heights of the Cn2 profile along the whole path",
-                    });
-                }
+                let inside = h >= height_m[0] - slack && h <= height_m[last] + slack;
+                within("height_m", h, inside, "within the heights of the Cn2 profile along the whole path")?;
                 let i = height_m.partition_point(|&v| v <= h).clamp(1, last) - 1;
                 let t = ((h - height_m[i]) / (height_m[i + 1] - height_m[i])).clamp(0.0, 1.0);
                 Ok(cn2_m_m23[i] * (1.0 - t) + cn2_m_m23[i + 1] * t)
@@ -140,12 +135,9 @@ impl Cn2Path {
                 not_negative("cn2_m_m23", *cn2_m_m23)?;
             }
             Self::Heights { height_m, cn2_m_m23, telescope_height_m, elevation_rad } => {
-                if height_m.len() < 2 || cn2_m_m23.len() != height_m.len() {
-                    return Err(Error::Length {
-                        field: "cn2_m_m23",
-                        found: cn2_m_m23.len(),
-                        expected: height_m.len().max(2),
-                    });
+                let (found, expected) = (cn2_m_m23.len(), height_m.len().max(2));
+                if found != expected || height_m.len() < 2 {
+                    return Err(Error::Length { field: "cn2_m_m23", found, expected });
                 }
                 finite("height_m", height_m[0])?;
                 for index in 1..height_m.len() {
@@ -162,11 +154,6 @@ impl Cn2Path {
         }
         Ok(self)
     }
-}
-
-/// Value at `x` of the polynomial that is 1 at `at[j]` and 0 at the other places.
-fn lagrange(at: &[f64], j: usize, x: f64) -> f64 {
-    at.iter().enumerate().filter(|(i, _)| *i != j).map(|(_, z)| (x - z) / (at[j] - z)).product()
 }
 
 /// Hufnagel-Valley 5/7 up to `top_m`, with knots dense near the ground.

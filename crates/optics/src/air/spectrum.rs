@@ -5,7 +5,7 @@
 //! form of the Kolmogorov spectrum.
 
 use crate::Error;
-use crate::error::{not_negative, positive};
+use crate::error::{not_negative, positive, within};
 use std::fmt::Debug;
 
 /// Constant of (17) as the chapter prints it.
@@ -49,26 +49,15 @@ impl Scales {
     /// kappa_0, and kappa_m = `cut`/l0, after the checks that every spectrum needs \[rad/m\].
     fn wavenumbers_rad_m(self, cut: f64) -> Result<(f64, f64), Error> {
         let Self { outer_scale_m, inner_scale_m, convention } = self;
-        if outer_scale_m.is_nan() || outer_scale_m <= 0.0 {
-            return Err(Error::OutOfRange {
-                field: "outer_scale_m",
-                value: outer_scale_m,
-                allowed: "a number above 0, infinity for none",
-            });
-        }
+        within("outer_scale_m", outer_scale_m, outer_scale_m > 0.0, "a number above 0, infinity for none")?;
         not_negative("inner_scale_m", inner_scale_m)?;
         let outer_rad_m = match convention {
             OuterScaleConvention::Inverse => 1.0 / outer_scale_m,
             OuterScaleConvention::TwoPiOver => 2.0 * std::f64::consts::PI / outer_scale_m,
         };
         let inner_rad_m = cut / inner_scale_m;
-        if outer_rad_m >= inner_rad_m || outer_scale_m <= inner_scale_m {
-            return Err(Error::OutOfRange {
-                field: "inner_scale_m",
-                value: inner_scale_m,
-                allowed: "below outer_scale_m, with kappa_m above kappa_0",
-            });
-        }
+        let apart = outer_rad_m < inner_rad_m && outer_scale_m > inner_scale_m;
+        within("inner_scale_m", inner_scale_m, apart, "below outer_scale_m, with kappa_m above kappa_0")?;
         Ok((outer_rad_m, inner_rad_m))
     }
 }

@@ -7,7 +7,7 @@
 pub(crate) mod source;
 
 use crate::Error;
-use crate::error::{finite, not_negative, positive};
+use crate::error::{finite, not_negative, positive, within};
 use std::f64::consts::{PI, SQRT_2};
 
 /// What `beam_radius_m` means: the radius at which one quantity has fallen to 1/e of its value on the axis.
@@ -80,29 +80,12 @@ impl Telescope {
         positive("wavelength_m", self.wavelength_m)?;
         positive("aperture_radius_m", self.aperture_radius_m)?;
         not_negative("obscuration_radius_m", self.obscuration_radius_m)?;
-        if self.obscuration_radius_m >= self.aperture_radius_m {
-            return Err(Error::OutOfRange {
-                field: "obscuration_radius_m",
-                value: self.obscuration_radius_m,
-                allowed: "below aperture_radius_m",
-            });
-        }
-        if self.beam_radius_m.is_nan() || self.beam_radius_m <= 0.0 {
-            return Err(Error::OutOfRange {
-                field: "beam_radius_m",
-                value: self.beam_radius_m,
-                allowed: "a number above 0, infinity for a uniformly lit aperture",
-            });
-        }
+        let (hidden, lit) = (self.obscuration_radius_m, self.beam_radius_m);
+        within("obscuration_radius_m", hidden, hidden < self.aperture_radius_m, "below aperture_radius_m")?;
+        within("beam_radius_m", lit, lit > 0.0, "a number above 0, infinity for a uniformly lit aperture")?;
         if let Focus::At(focus_m) = self.focus {
             finite("focus_m", focus_m)?;
-            if focus_m == 0.0 {
-                return Err(Error::OutOfRange {
-                    field: "focus_m",
-                    value: focus_m,
-                    allowed: "a finite number other than 0",
-                });
-            }
+            within("focus_m", focus_m, focus_m != 0.0, "a finite number other than 0")?;
         }
         Ok(self)
     }

@@ -7,7 +7,7 @@
 
 use crate::beam::Telescope;
 use crate::plan::violation::{Limit, Violation};
-use crate::quadrature::GaussLegendre;
+use crate::quadrature::{GaussLegendre, cubic};
 use crate::screens::grid::{Fft2, Grid};
 use crate::screens::kernel::Real;
 use crate::{Error, Misalignment};
@@ -48,12 +48,8 @@ impl Transform {
 
     /// Cubic interpolation; the step is 1/50 of the finest structure.
     fn at(&self, kappa_rad_m: f64) -> f64 {
-        let t = kappa_rad_m / self.step_rad_m;
-        let i = (t as usize).clamp(1, self.value.len() - 3);
-        let u = t - i as f64;
-        let v = &self.value[i - 1..i + 3];
-        let (a, b, c) = (u + 1.0, u - 1.0, u - 2.0);
-        -u * b * c / 6.0 * v[0] + a * b * c / 2.0 * v[1] - a * u * c / 2.0 * v[2] + a * u * b / 6.0 * v[3]
+        let (first, weight) = cubic(kappa_rad_m / self.step_rad_m, self.value.len());
+        weight.iter().zip(&self.value[first..]).map(|(w, v)| w * v).sum()
     }
 }
 
@@ -135,45 +131,36 @@ pub(crate) fn slope_rad(telescope: &Telescope, misalignment: &Misalignment) -> f
 /// Whether the grid can hold the telescope and its beam out to `range_m`.
 ///
 /// # Errors
-/// [`Error::Sampling`] names every limit that is violated, with the value that is needed and the one the grid has.
+/// [`Error::Sampling`] names every limit that is violated, with the value that is needed and the one the grid has;
+/// [`Error::OutOfRange`] for a telescope, misalignment or grid that is none.
 pub(crate) fn check_grid(
     telescope: &Telescope,
     misalignment: &Misalignment,
     grid: &Grid,
     range_m: f64,
 ) -> Result<(), Error> {
-    let violations = grid_violations(telescope, misalignment, grid, range_m)?;
+    let limits = beam_limits_m(&telescope.validated()?, &misalignment.validated()?, range_m);
+    let grid = grid.validated()?;
+    let violated = |row| Violation::of(row, grid.largest_spacing_m(), grid.smallest_width_m());
+    let violations: Vec<_> = limits.into_iter().filter_map(violated).collect();
     if violations.is_empty() { Ok(()) } else { Err(Error::Sampling { violations, would_do: None }) }
 }
 
-/// What [`check_grid`] refuses.
-///
-/// # Errors
-/// [`Error::OutOfRange`] for a telescope, misalignment or grid that is none.
-pub(crate) fn grid_violations(
-    telescope: &Telescope,
-    misalignment: &Misalignment,
-    grid: &Grid,
-    range_m: f64,
-) -> Result<Vec<Violation>, Error> {
-    let telescope = telescope.validated()?;
-    let misalignment = misalignment.validated()?;
-    let grid = grid.validated()?;
-    let (spacing, width) = (grid.dx_m.max(grid.dy_m), grid.smallest_width_m());
-    let (a, lambda) = (telescope.aperture_radius_m, telescope.wavelength_m);
-    let resolved = (0.5 * (a - telescope.obscuration_radius_m)).min(a / 3.0).min(telescope.intensity_radius_m());
+/// What telescope and beam out to `range_m` demand of any grid: largest spacings and least widths \[m\].
+pub(crate) fn beam_limits_m(t: &Telescope, misalignment: &Misalignment, range_m: f64) -> [(Limit, f64); 4] {
+    let (a, lambda) = (t.aperture_radius_m, t.wavelength_m);
+    let resolved = (0.5 * (a - t.obscuration_radius_m)).min(a / 3.0).min(t.intensity_radius_m());
     let offset = misalignment.offset_m[0].hypot(misalignment.offset_m[1]);
     let tilt = misalignment.tilt_rad[0].hypot(misalignment.tilt_rad[1]);
-    let reach = a.min(3.0 * telescope.intensity_radius_m());
-    let geometric = reach * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
+    let reach = a.min(3.0 * t.intensity_radius_m());
+    let geometric = reach * (1.0 - range_m * t.focus.curvature_per_m()).abs();
     let beam = geometric + lambda * range_m / (2.0 * reach) + offset + tilt * range_m;
-    let found = [
-        Violation::too_large(Limit::Aperture, resolved, spacing),
-        Violation::too_large(Limit::WaveFront, 0.5 * lambda / slope_rad(&telescope, &misalignment), spacing),
-        Violation::too_small(Limit::Border, 2.5 * (a + offset), width),
-        Violation::too_small(Limit::Beam, 2.0 * beam / 0.9, width),
-    ];
-    Ok(found.into_iter().flatten().collect())
+    [
+        (Limit::Aperture, resolved),
+        (Limit::WaveFront, 0.5 * lambda / slope_rad(t, misalignment)),
+        (Limit::Border, 2.5 * (a + offset)),
+        (Limit::Beam, 2.0 * beam / 0.9),
+    ]
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ pub use walk::Sampling;
 
 use crate::beam::source::{aperture_field, check_grid};
 use crate::efficiency::EfficiencyProfile;
+use crate::error::{positive, within};
 use crate::monte_carlo::path::Path;
 use crate::monte_carlo::prepared::Prepared;
 use crate::monte_carlo::statistics::{Folding, Sample, bistatic, mean_and_variance};
@@ -211,12 +212,8 @@ impl MonteCarlo {
         stop: Stop,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<EfficiencyEstimate, Error> {
-        if stop.realisations == 0 {
-            return Err(Error::OutOfRange { field: "realisations", value: 0.0, allowed: "at least 1" });
-        }
-        if let Some(target) = stop.relative_standard_error {
-            crate::error::positive("relative_standard_error", target)?;
-        }
+        within("realisations", stop.realisations as f64, stop.realisations > 0, "at least 1")?;
+        stop.relative_standard_error.map_or(Ok(0.0), |target| positive("relative_standard_error", target))?;
         // Without turbulence every realisation is the same.
         let total = if prepared.screens.is_some() { stop.realisations } else { 1 };
         let mut sums: Option<GroupSums<T>> = None;

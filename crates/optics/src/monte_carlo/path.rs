@@ -6,6 +6,7 @@
 use crate::Error;
 use crate::air::cn2::Cn2Path;
 use crate::efficiency::check_increasing;
+use crate::error::{positive, within};
 use crate::screens::grid::Grid;
 use crate::theory::ScreenStrength;
 use std::collections::BTreeMap;
@@ -34,7 +35,7 @@ impl Layers {
     /// # Errors
     /// [`Error::OutOfRange`] for a range that is not positive or no layers.
     pub fn equal(count: usize, range_m: f64) -> Result<Self, Error> {
-        crate::error::positive("range_m", range_m)?;
+        positive("range_m", range_m)?;
         Self::new((1..=count).map(|i| range_m * i as f64 / count as f64).collect())
     }
 
@@ -128,10 +129,8 @@ impl Path {
     ) -> Result<Self, Error> {
         let last = layers.end_m[layers.end_m.len() - 1];
         for &r in range_m {
-            crate::error::positive("range_m", r)?;
-            if r > last && !same(r, last) {
-                return Err(Error::OutOfRange { field: "range_m", value: r, allowed: "within the layers of the path" });
-            }
+            positive("range_m", r)?;
+            within("range_m", r, r <= last || same(r, last), "within the layers of the path")?;
         }
         let mut path = Self::default();
         let mut stops: Vec<Stop> = Vec::new();

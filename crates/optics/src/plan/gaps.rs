@@ -47,21 +47,16 @@ impl LayerGap {
     }
 }
 
-/// Rytov variance of a layer of the mean Cn2 from `start_m` to `end_m`.
-pub(super) fn layer_rytov(cn2: &Cn2Path, wavelength_m: f64, start_m: f64, end_m: f64) -> Result<f64, Error> {
+/// Largest Rytov variance of a layer before `furthest_m`.
+pub(super) fn worst_rytov(cn2: &Cn2Path, wavelength_m: f64, layers: &Layers, furthest_m: f64) -> Result<f64, Error> {
     if cn2.is_none() {
         return Ok(0.0);
     }
-    rytov_variance(cn2.mean(start_m, end_m)?, wavelength_m, end_m - start_m)
-}
-
-/// Largest Rytov variance of a layer before `furthest_m`.
-pub(super) fn worst_rytov(cn2: &Cn2Path, wavelength_m: f64, layers: &Layers, furthest_m: f64) -> Result<f64, Error> {
     let mut worst = 0f64;
-    for i in 0..layers.end_m().len() {
-        let (start, end) = layers.bounds_m(i);
+    for (start, end) in (0..layers.end_m().len()).map(|i| layers.bounds_m(i)) {
         if start < furthest_m {
-            worst = worst.max(layer_rytov(cn2, wavelength_m, start, end.min(furthest_m))?);
+            let end = end.min(furthest_m);
+            worst = worst.max(rytov_variance(cn2.mean(start, end)?, wavelength_m, end - start)?);
         }
     }
     Ok(worst)

@@ -2,8 +2,7 @@
 
 use crate::air::cn2::Cn2Path;
 use crate::air::structure::StructureTable;
-use crate::air::turbulence::path_coherence_radius_m;
-use crate::screens::grid::Grid;
+use crate::air::turbulence::coherence_radius_m;
 use crate::theory::encircled::mean_power_beyond;
 use crate::{Error, Misalignment, Telescope};
 
@@ -70,11 +69,6 @@ impl Light {
         })
     }
 
-    /// As [`Light::lost`] for a grid.
-    pub(super) fn lost_from(&self, grid: &Grid) -> f64 {
-        self.lost(grid.smallest_width_m(), grid.dx_m.max(grid.dy_m))
-    }
-
     /// Width \[m\] of a grid whose border takes at most `fraction`.
     pub(super) fn width_m(&self, fraction: f64, spacing_m: f64) -> f64 {
         let (mut low, mut high) = (0.0, spacing_m);
@@ -111,6 +105,6 @@ pub(super) fn scatter_rad(telescope: &Telescope, cn2: &Cn2Path, range_m: f64) ->
     if cn2.is_none() {
         return Ok(0.0);
     }
-    let rho_0 = path_coherence_radius_m(cn2, telescope.wavelength_m, range_m)?;
+    let rho_0 = coherence_radius_m(cn2, telescope.wavelength_m, range_m)?;
     Ok(telescope.wavelength_m / (std::f64::consts::PI * rho_0))
 }

@@ -1,12 +1,12 @@
-//! The limits of a grid for one telescope and one turbulence: what a set-up violates, and one that does not.
+//! The table of the limits of a grid for one telescope and one turbulence: what a set-up violates, and one that does not.
 
-use super::case::Case;
+use super::Case;
 use super::gaps::{Gaps, thin_layers};
 use super::light::{Light, scatter_rad};
 use super::violation::{Limit, SetUp, Violation, not_above, not_below};
 use crate::air::cn2::Cn2Path;
 use crate::air::structure::StructureTable;
-use crate::beam::source::{grid_violations, slope_rad};
+use crate::beam::source::{beam_limits_m, slope_rad};
 use crate::screens::grid::Grid;
 use crate::theory::fresnel_number;
 use crate::{Error, Misalignment, Telescope, Turbulence};
@@ -31,10 +31,12 @@ pub(super) struct Limits<'a> {
     realisations: usize,
 }
 
-/// What a grid violates, and the light that its border takes.
-pub(super) struct Verdict {
-    pub(super) violations: Vec<Violation>,
-    pub(super) light_lost: f64,
+/// A row of the table of largest spacings through turbulence \[m\]: the one to plan with, and the one up to which a grid is
+/// accepted.
+struct Spacing {
+    limit: Limit,
+    planned_m: f64,
+    accepted_m: f64,
 }
 
 impl<'a> Limits<'a> {
@@ -61,85 +63,77 @@ impl<'a> Limits<'a> {
 
     /// Width \[m\] at which the border takes three quarters of what is doubtful, at the spacing of a grid.
     pub(super) fn width_for_light_m(&self, grid: &Grid, range_m: &[f64]) -> Result<f64, Error> {
-        Ok(not_below(self.light(range_m)?.width_m(DERIVED_LOSS, grid.dx_m.max(grid.dy_m))))
+        Ok(not_below(self.light(range_m)?.width_m(DERIVED_LOSS, grid.largest_spacing_m())))
     }
 
-    /// Spacings \[m\] that the aperture wants: the one to plan with, and the largest that is accepted.
+    /// The table: what turbulence and the aperture demand of the spacing, beside what the beam demands of any grid
+    /// ([`beam_limits_m`]).
     ///
     /// Where every range is in the far field, the pattern at the target is that of the aperture's few lowest waves, and a sixth
-    /// of the points give the efficiency as well (within 1e-4 in free space).
-    fn aperture_spacings_m(&self, range_m: &[f64]) -> [f64; 2] {
+    /// of the points give the efficiency as well (within 1e-4 in free space). For the angles into which focus, tilt and
+    /// turbulence send the beam the plan keeps a margin of two: what lies within it is left to the monitored border.
+    fn spacings(&self, range_m: &[f64]) -> Result<[Spacing; 2], Error> {
+        let (a, lambda) = (self.telescope.aperture_radius_m, self.telescope.wavelength_m);
         let fresnel = range_m.iter().fold(0f64, |worst, &r| worst.max(fresnel_number(&self.telescope, r)));
-        let points = if fresnel < FAR_FIELD { [4.0, 3.0] } else { [25.0, 12.5] };
-        points.map(|n| self.telescope.aperture_radius_m / n)
-    }
-
-    /// Spacings \[m\] for the angles into which focus, tilt and turbulence send the beam: to plan with, and the largest that is
-    /// accepted. The rule keeps a margin of two: what lies within it is left to the monitored border.
-    fn scatter_spacings_m(&self, range_m: &[f64]) -> Result<[f64; 2], Error> {
+        let [planned, accepted] = if fresnel < FAR_FIELD { [4.0, 3.0] } else { [25.0, 12.5] };
         let scatter = scatter_rad(&self.telescope, &self.cn2, last(range_m)?)?;
-        let slope = slope_rad(&self.telescope, &self.misalignment) + 2.0 * scatter;
-        Ok([0.5, 1.0].map(|waves| waves * self.telescope.wavelength_m / slope.max(1e-30)))
+        let slope = (slope_rad(&self.telescope, &self.misalignment) + 2.0 * scatter).max(1e-30);
+        Ok([
+            Spacing { limit: Limit::Aperture, planned_m: a / planned, accepted_m: a / accepted },
+            Spacing { limit: Limit::Scatter, planned_m: 0.5 * lambda / slope, accepted_m: lambda / slope },
+        ])
     }
 
-    /// What a grid violates for these ranges.
-    pub(super) fn verdict(&self, grid: &Grid, range_m: &[f64]) -> Result<Verdict, Error> {
-        let furthest = last(range_m)?;
-        let mut violations = grid_violations(&self.telescope, &self.misalignment, grid, furthest)?;
-        let (width, spacing) = (grid.smallest_width_m(), grid.dx_m.max(grid.dy_m));
-        let light = self.light(range_m)?;
+    /// What a grid violates for these ranges, and the share of the light that its border takes.
+    pub(super) fn verdict(&self, grid: &Grid, range_m: &[f64]) -> Result<(Vec<Violation>, f64), Error> {
+        let grid = grid.validated()?;
+        let mut limits_m = beam_limits_m(&self.telescope, &self.misalignment, last(range_m)?).to_vec();
         if !self.cn2.is_none() {
-            let [_, aperture] = self.aperture_spacings_m(range_m);
-            violations.extend(Violation::too_large(Limit::Aperture, aperture, spacing));
-            let [_, scatter] = self.scatter_spacings_m(range_m)?;
-            violations.extend(Violation::too_large(Limit::Scatter, scatter, spacing));
+            limits_m.extend(self.spacings(range_m)?.map(|row| (row.limit, row.accepted_m)));
         }
-        let light_lost = light.lost_from(grid);
+        let (light, spacing_m, width_m) = (self.light(range_m)?, grid.largest_spacing_m(), grid.smallest_width_m());
+        let light_lost = light.lost(width_m, spacing_m);
         if light_lost > LARGEST_LOSS {
-            violations.extend(Violation::too_small(Limit::Light, light.width_m(LARGEST_LOSS, spacing), width));
+            limits_m.push((Limit::Light, light.width_m(LARGEST_LOSS, spacing_m)));
         }
-        Ok(Verdict { violations, light_lost })
+        let violated = |row| Violation::of(row, spacing_m, width_m);
+        Ok((limits_m.into_iter().filter_map(violated).collect(), light_lost))
     }
 
     /// A grid for these ranges: with the spacing to plan with, or else with the largest that is accepted; with the border that takes next
     /// to nothing, or else with the narrowest that is accepted.
     pub(super) fn grid(&self, range_m: &[f64]) -> Result<Grid, Error> {
-        let (aperture, scatter, light) =
-            (self.aperture_spacings_m(range_m), self.scatter_spacings_m(range_m)?, self.light(range_m)?);
-        let [mut spacing, largest] = [0, 1].map(|i| aperture[i].min(scatter[i]));
-        let inner = self.turbulence.spectrum.inner_wavenumber_rad_m();
-        if inner.is_finite() && !self.cn2.is_none() {
-            // Half the inner scale if that costs no more than a factor of two.
-            let fine = 2.96 / inner;
-            if fine < spacing && fine >= 0.5 * spacing {
-                spacing = fine;
-            }
+        let ([aperture, scatter], light) = (self.spacings(range_m)?, self.light(range_m)?);
+        let mut planned_m = aperture.planned_m.min(scatter.planned_m);
+        let accepted_m = aperture.accepted_m.min(scatter.accepted_m);
+        // Half the inner scale if that costs no more than a factor of two.
+        let fine_m = 2.96 / self.turbulence.spectrum.inner_wavenumber_rad_m();
+        if !self.cn2.is_none() && fine_m < planned_m && fine_m >= 0.5 * planned_m {
+            planned_m = fine_m;
         }
-        let grid = |spacing, loss| self.grid_of(spacing, light.width_m(loss, spacing), last(range_m)?);
-        match grid(spacing, DERIVED_LOSS) {
+        let grid = |spacing_m, loss| self.grid_of(spacing_m, light.width_m(loss, spacing_m), last(range_m)?);
+        match grid(planned_m, DERIVED_LOSS) {
             Ok(grid) if grid.nx <= COMFORTABLE_POINTS => Ok(grid),
-            _ => grid(largest, DERIVED_LOSS).or_else(|_| grid(largest, LARGEST_LOSS)),
+            _ => grid(accepted_m, DERIVED_LOSS).or_else(|_| grid(accepted_m, LARGEST_LOSS)),
         }
     }
 
     /// A grid of at most this spacing and at least this width that holds the beam to `furthest_m`.
-    fn grid_of(&self, mut spacing: f64, mut width: f64, furthest_m: f64) -> Result<Grid, Error> {
-        // The limits of the grid itself, at no width at all: the largest of their widths, the least of their spacings.
-        let nothing = Grid { nx: Grid::SMALLEST, ny: Grid::SMALLEST, dx_m: spacing, dy_m: spacing };
-        for violation in grid_violations(&self.telescope, &self.misalignment, &nothing, furthest_m)? {
-            match violation.limit.is_spacing() {
-                true => spacing = spacing.min(violation.needed),
-                false => width = width.max(violation.needed),
+    fn grid_of(&self, mut spacing_m: f64, mut width_m: f64, furthest_m: f64) -> Result<Grid, Error> {
+        for (limit, limit_m) in beam_limits_m(&self.telescope, &self.misalignment, furthest_m) {
+            match limit.is_spacing() {
+                true => spacing_m = spacing_m.min(limit_m),
+                false => width_m = width_m.max(not_below(limit_m)),
             }
         }
-        let spacing = not_above(spacing);
-        let points = good_size((width / spacing).ceil() as usize).max(128);
+        let spacing_m = not_above(spacing_m);
+        let points = good_size((width_m / spacing_m).ceil() as usize).max(128);
         if points > LARGEST_POINTS {
             let (needed, found) = (points as f64, LARGEST_POINTS as f64);
             let violations = vec![Violation { limit: Limit::Points, needed, found }];
             return Err(Error::Sampling { violations, would_do: None });
         }
-        Grid::square(points, spacing)
+        Grid::square(points, spacing_m)
     }
 
     /// A set-up of equal layers that holds for every one of these lists of ranges, tried on each.
@@ -149,7 +143,7 @@ impl<'a> Limits<'a> {
         all.dedup();
         let grid = self.grid(&all).ok()?;
         let layers = self.equal_layers(runs).ok()??;
-        let good = |range_m: &&[f64]| self.verdict(&grid, range_m).is_ok_and(|v| v.violations.is_empty());
+        let good = |range_m: &&[f64]| self.verdict(&grid, range_m).is_ok_and(|(violations, _)| violations.is_empty());
         runs.iter().all(good).then_some(SetUp { points: grid.nx, spacing_m: grid.dx_m, layers })
     }
 
@@ -183,15 +177,13 @@ pub(super) fn last(range_m: &[f64]) -> Result<f64, Error> {
 
 /// The next size with only the factors 2, 3 and 5, even.
 fn good_size(at_least: usize) -> usize {
-    (at_least.max(2)..)
-        .find(|&n| {
-            let mut rest = n;
-            for prime in [2, 3, 5] {
-                while rest % prime == 0 {
-                    rest /= prime;
-                }
+    let rest = |n: usize| {
+        [2, 3, 5].into_iter().fold(n, |mut rest, prime| {
+            while rest % prime == 0 {
+                rest /= prime;
             }
-            rest == 1 && n % 2 == 0
+            rest
         })
-        .unwrap_or(at_least)
+    };
+    (at_least.max(2)..).find(|&n| n % 2 == 0 && rest(n) == 1).unwrap_or(at_least)
 }

@@ -6,13 +6,11 @@
 //! continuous path, at every range. Check: the chapter's set-up passes for Cn2 up to 1e-13 at 1 km, 1e-12 beyond 1 km on 512
 //! points is refused, what the plan proposes passes its own test, and runs of derived set-ups lose less than 0.01 of the light.
 
-mod case;
 mod gaps;
 mod light;
 mod limits;
 pub(crate) mod violation;
 
-pub use case::Case;
 pub use gaps::{LARGEST_GAP_SHARE, LARGEST_LAYER_RYTOV, LayerGap};
 pub use violation::{Limit, SetUp, Violation};
 
@@ -22,9 +20,9 @@ use crate::monte_carlo::path::{Layers, Path};
 use crate::monte_carlo::{GROUP, GROUPS_PER_WAVE};
 use crate::screens::generator::ScreenGenerator;
 use crate::screens::grid::Grid;
-use crate::{Error, Misalignment, Turbulence};
+use crate::{Error, Misalignment, Telescope, Turbulence};
 use gaps::{thin_layers, worst_rytov};
-use limits::{Limits, Verdict, last};
+use limits::{Limits, last};
 
 /// CPU time of one f32 layer per point, transforms included \[s\]; f64 takes twice as long. Measured, one core of 2023.
 const LAYER_S: f64 = 9e-9;
@@ -132,6 +130,19 @@ pub enum Warning {
     },
 }
 
+/// What a Monte Carlo is to simulate.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// Telescope of both beams.
+    pub telescope: Telescope,
+    /// Displacement of the BPLO against the transmitted beam.
+    pub misalignment: Misalignment,
+    /// Turbulence along the path.
+    pub turbulence: Turbulence,
+    /// Realisations to be done: their standard error bounds that of the layers.
+    pub realisations: usize,
+}
+
 impl Case {
     /// Derives grid and layers for ranges \[m\], increasing; layers end at the largest.
     ///
@@ -141,13 +152,9 @@ impl Case {
         crate::efficiency::check_increasing("range_m", range_m)?;
         let limits = Limits::new(self)?;
         let grid = limits.grid(range_m)?;
-        let gaps = limits.gaps(range_m)?;
-        let layers = gaps.refined(thin_layers(&limits.cn2, limits.telescope.wavelength_m, last(range_m)?)?)?;
-        let verdict = limits.verdict(&grid, range_m)?;
-        if !verdict.violations.is_empty() {
-            return Err(Error::Sampling { violations: verdict.violations, would_do: None });
-        }
-        limits.judge(&grid, &layers, range_m, &verdict, &[range_m])
+        let thin = thin_layers(&limits.cn2, limits.telescope.wavelength_m, last(range_m)?)?;
+        let layers = limits.gaps(range_m)?.refined(thin)?;
+        self.examine(&grid, &layers, range_m)
     }
 
     /// Examines a set-up that someone else chose, the chapter's 512 x 2 mm and 10 layers for example.
@@ -155,7 +162,7 @@ impl Case {
     /// # Errors
     /// As [`Case::examine_runs`].
     pub fn examine(&self, grid: &Grid, layers: &Layers, range_m: &[f64]) -> Result<Plan, Error> {
-        let plan = Limits::new(self)?.examine(grid, &[(layers.clone(), range_m)])?.pop();
+        let plan = Limits::new(self)?.plans(grid, &[(layers.clone(), range_m)])?.pop();
         plan.ok_or(Error::Length { field: "range_m", found: 0, expected: 1 })
     }
 
@@ -170,91 +177,82 @@ impl Case {
         for range_m in runs {
             set_ups.push((Layers::equal(layers, last(range_m)?)?, *range_m));
         }
-        Limits::new(self)?.examine(grid, &set_ups)
+        Limits::new(self)?.plans(grid, &set_ups)
     }
 }
 
 impl Limits<'_> {
-    fn examine(&self, grid: &Grid, runs: &[(Layers, &[f64])]) -> Result<Vec<Plan>, Error> {
+    /// A plan for each of the runs on one grid.
+    fn plans(&self, grid: &Grid, runs: &[(Layers, &[f64])]) -> Result<Vec<Plan>, Error> {
         let all: Vec<&[f64]> = runs.iter().map(|(_, range_m)| *range_m).collect();
-        let mut verdicts: Vec<Verdict> = Vec::new();
-        for (_, range_m) in runs {
+        let (mut violations, mut light_lost) = (Vec::new(), Vec::new());
+        for range_m in &all {
             crate::efficiency::check_increasing("range_m", range_m)?;
-            verdicts.push(self.verdict(grid, range_m)?);
+            let (violated, lost) = self.verdict(grid, range_m)?;
+            violations.extend(violated);
+            light_lost.push(lost);
         }
-        let violations: Vec<_> = verdicts.iter().flat_map(|v| v.violations.iter().copied()).collect();
         if !violations.is_empty() {
             return Err(Error::Sampling { violations, would_do: self.set_up(&all) });
         }
-        let mut plans = Vec::new();
-        for ((layers, range_m), verdict) in runs.iter().zip(&verdicts) {
-            plans.push(self.judge(grid, layers, range_m, verdict, &all)?);
-        }
-        Ok(plans)
+        let each = runs.iter().zip(light_lost);
+        each.map(|((layers, range_m), lost)| self.costs(grid, layers, range_m, lost, &all)).collect()
     }
 
-    /// Cost and warnings of a set-up whose grid is accepted; layers that would do, do for all runs.
-    fn judge(
+    /// Cost and warnings of a set-up whose grid is accepted; layers that would do, do for all `runs`.
+    fn costs(
         &self,
         grid: &Grid,
         layers: &Layers,
         range_m: &[f64],
-        verdict: &Verdict,
+        light_lost: f64,
         runs: &[&[f64]],
     ) -> Result<Plan, Error> {
-        let (lambda, furthest) = (self.telescope.wavelength_m, last(range_m)?);
+        let lambda = self.telescope.wavelength_m;
         let split = layers.split_at(range_m);
         let path = Path::new(&split, range_m, &self.cn2, grid, lambda)?;
-        let layer_rytov_variance = worst_rytov(&self.cn2, lambda, &split, furthest)?;
-        let gap_list = self.gaps(range_m)?.of(&split)?;
         let beams = if self.misalignment == Misalignment::NONE { 1 } else { 2 };
-        let warnings = self.warnings(grid, layer_rytov_variance, &gap_list, range_m, verdict, runs)?;
-        let pairs = path.transform_pairs() * beams as f64;
         let transfers = path.distance_m.len() * (grid.nx + grid.ny) * 8;
         let group_bytes = group_bytes(grid, range_m.len(), beams);
-        Ok(Plan {
+        let steps_s = LAYER_S * path.transform_pairs() * beams as f64 + SCREEN_S * path.strength.len() as f64;
+        let mut plan = Plan {
             grid: *grid,
             layers: layers.clone(),
-            layer_rytov_variance,
-            light_lost: verdict.light_lost,
-            gaps: gap_list,
+            layer_rytov_variance: worst_rytov(&self.cn2, lambda, &split, last(range_m)?)?,
+            light_lost,
+            gaps: self.gaps(range_m)?.of(&split)?,
             memory_bytes: GROUPS_PER_WAVE * group_bytes + shared_bytes(grid, range_m.len(), beams) + transfers,
             group_bytes,
-            realisation_cpu_s: grid.points() as f64 * (LAYER_S * pairs + SCREEN_S * path.strength.len() as f64),
-            warnings,
-        })
+            realisation_cpu_s: grid.points() as f64 * steps_s,
+            warnings: Vec::new(),
+        };
+        plan.warnings = self.warnings(&plan, range_m, runs)?;
+        Ok(plan)
     }
 
-    fn warnings(
-        &self,
-        grid: &Grid,
-        layer_rytov_variance: f64,
-        gap_list: &[LayerGap],
-        range_m: &[f64],
-        verdict: &Verdict,
-        runs: &[&[f64]],
-    ) -> Result<Vec<Warning>, Error> {
+    /// What is allowed in a plan but deserves a word.
+    fn warnings(&self, plan: &Plan, range_m: &[f64], runs: &[&[f64]]) -> Result<Vec<Warning>, Error> {
         let mut warnings = Vec::new();
-        let (lambda, furthest) = (self.telescope.wavelength_m, last(range_m)?);
-        let thick = (layer_rytov_variance > LARGEST_LAYER_RYTOV).then_some(layer_rytov_variance);
-        let worst = gap_list.iter().filter(|g| g.is_large()).max_by(|a, b| a.excess().total_cmp(&b.excess()));
-        if thick.is_some() || worst.is_some() {
+        let rytov_variance = plan.layer_rytov_variance;
+        let is_thick = rytov_variance > LARGEST_LAYER_RYTOV;
+        let worst = plan.gaps.iter().filter(|g| g.is_large()).max_by(|a, b| a.excess().total_cmp(&b.excess()));
+        if is_thick || worst.is_some() {
             // One number clears both warnings, of every run.
             let layers_needed = self.equal_layers(runs)?;
-            warnings.extend(thick.map(|rytov_variance| Warning::ThickLayers { rytov_variance, layers_needed }));
+            warnings.extend(is_thick.then_some(Warning::ThickLayers { rytov_variance, layers_needed }));
             warnings.extend(worst.map(|&worst| Warning::LayerGap { worst, layers_needed }));
         }
-        if verdict.light_lost > DOUBTFUL_LOSS {
-            let width_m = self.width_for_light_m(grid, range_m)?;
-            warnings.push(Warning::LightLost { fraction: verdict.light_lost, width_m });
+        if plan.light_lost > DOUBTFUL_LOSS {
+            let width_m = self.width_for_light_m(&plan.grid, range_m)?;
+            warnings.push(Warning::LightLost { fraction: plan.light_lost, width_m });
         }
         if !self.cn2.is_none() {
-            let whole = path_rytov_variance(&self.cn2, lambda, furthest)?;
-            if whole < 1e-3 {
-                warnings.push(Warning::WeakTurbulence { rytov_variance: whole });
+            let rytov_variance = path_rytov_variance(&self.cn2, self.telescope.wavelength_m, last(range_m)?)?;
+            if rytov_variance < 1e-3 {
+                warnings.push(Warning::WeakTurbulence { rytov_variance });
             }
-            if self.turbulence.spectrum.inner_wavenumber_rad_m() * grid.dx_m.max(grid.dy_m) > 2.97 {
-                warnings.push(Warning::InnerScale { missing: missing_at_one_spacing(self.turbulence, grid)? });
+            if self.turbulence.spectrum.inner_wavenumber_rad_m() * plan.grid.largest_spacing_m() > 2.97 {
+                warnings.push(Warning::InnerScale { missing: missing_at_one_spacing(self.turbulence, &plan.grid)? });
             }
         }
         Ok(warnings)

@@ -54,29 +54,24 @@ pub struct Violation {
 }
 
 impl Violation {
-    /// A width or number of points below `needed`.
-    pub(crate) fn too_small(limit: Limit, needed: f64, found: f64) -> Option<Self> {
-        (found < needed).then(|| Self { limit, needed: not_below(needed), found })
-    }
-
-    /// A spacing above `needed`.
-    pub(crate) fn too_large(limit: Limit, needed: f64, found: f64) -> Option<Self> {
-        (found > needed).then(|| Self { limit, needed: not_above(needed), found })
+    /// What a grid of this spacing and width violates of a limit: a largest spacing, or a least width \[m\].
+    pub(crate) fn of((limit, limit_m): (Limit, f64), spacing_m: f64, width_m: f64) -> Option<Self> {
+        if limit.is_spacing() {
+            return (spacing_m > limit_m).then(|| Self { limit, needed: not_above(limit_m), found: spacing_m });
+        }
+        (width_m < limit_m).then(|| Self { limit, needed: not_below(limit_m), found: width_m })
     }
 }
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { limit, needed, found } = self;
-        let (what, most) = match limit {
-            Limit::Points => ("points along an axis", "at most"),
-            l if l.is_spacing() => ("grid spacing [m]", "at most"),
-            _ => ("grid width [m]", "at least"),
-        };
-        if *limit == Limit::Points {
-            return write!(f, "{needed} points along an axis are needed {}, {found} at most", limit.purpose());
+        let purpose = limit.purpose();
+        match limit {
+            Limit::Points => write!(f, "{needed} points along an axis are needed {purpose}, {found} at most"),
+            spacing if spacing.is_spacing() => write!(f, "grid spacing [m] {found:.6}, at most {needed} {purpose}"),
+            _ => write!(f, "grid width [m] {found:.6}, at least {needed} {purpose}"),
         }
-        write!(f, "{what} {found:.6}, {most} {needed} {}", limit.purpose())
     }
 }
 

@@ -95,7 +95,7 @@ impl<T: Real> ScreenGenerator<T> {
     /// the spectrum is cut at Nyquist and the expected structure function is too small at small separations.
     pub fn folds(&self) -> bool {
         // kappa_m = 5.92/l0 for (17); kappa_m <= 2.96/dx is l0 >= 2 dx.
-        self.spectrum.inner_wavenumber_rad_m() * self.grid.dx_m.max(self.grid.dy_m) <= 2.97
+        self.spectrum.inner_wavenumber_rad_m() * self.grid.largest_spacing_m() <= 2.97
     }
 
     /// The grid.

@@ -5,7 +5,7 @@
 //! together. Check: against the direct sum, for odd and prime sizes too.
 
 use crate::Error;
-use crate::error::positive;
+use crate::error::{positive, within};
 use crate::screens::kernel::Real;
 use rustfft::Fft;
 use rustfft::num_complex::Complex;
@@ -50,9 +50,7 @@ impl Grid {
     /// [`Error::OutOfRange`] for fewer than 16 points along an axis, or a spacing that is not positive.
     pub fn validated(self) -> Result<Self, Error> {
         for (field, n) in [("nx", self.nx), ("ny", self.ny)] {
-            if !(Self::SMALLEST..=1 << 15).contains(&n) {
-                return Err(Error::OutOfRange { field, value: n as f64, allowed: "16 to 32768 points" });
-            }
+            within(field, n as f64, (Self::SMALLEST..=1 << 15).contains(&n), "16 to 32768 points")?;
         }
         positive("dx_m", self.dx_m)?;
         positive("dy_m", self.dy_m)?;
@@ -62,6 +60,11 @@ impl Grid {
     /// Number of points.
     pub fn points(&self) -> usize {
         self.nx * self.ny
+    }
+
+    /// Larger of the two spacings \[m\].
+    pub(crate) fn largest_spacing_m(&self) -> f64 {
+        self.dx_m.max(self.dy_m)
     }
 
     /// Shorter side \[m\].

@@ -7,6 +7,7 @@
 //! At most 1.5 waves cross the grid: a polynomial of degree 15 in each direction carries their sum to 5e-8.
 
 use crate::air::spectrum::Spectrum;
+use crate::quadrature;
 use crate::screens::kernel::{LOW_ORDER, Real};
 use rand::Rng;
 use rustfft::num_complex::Complex;
@@ -39,7 +40,7 @@ impl<T: Real> LowFrequencies<T> {
     pub(crate) fn new(size: [usize; 2], spacing_m: [f64; 2], spectrum: &dyn Spectrum) -> Self {
         let delta = [0, 1].map(|a| 2.0 * PI / (size[a] as f64 * spacing_m[a]));
         let point = [0, 1].map(|a| chebyshev(size[a]));
-        let basis = [0, 1].map(|a| lagrange(&point[a], size[a]));
+        let basis = [0, 1].map(|a| sampled_basis(&point[a], size[a]));
         let centre_m = [0, 1].map(|a| 0.5 * size[a] as f64 * spacing_m[a]);
         let width = (size[0] as f64 * spacing_m[0]).max(size[1] as f64 * spacing_m[1]);
         Self { cells: cells(delta, levels(spectrum, delta, width)), point, basis, spacing_m, centre_m }
@@ -130,17 +131,9 @@ fn chebyshev(size: usize) -> [f64; LOW_ORDER] {
     std::array::from_fn(|i| half - half * (PI * (i as f64 + 0.5) / LOW_ORDER as f64).cos())
 }
 
-fn lagrange<T: Real>(point: &[f64; LOW_ORDER], size: usize) -> Vec<Vec<T>> {
-    (0..LOW_ORDER)
-        .map(|i| {
-            (0..size)
-                .map(|x| {
-                    let others = point.iter().enumerate().filter(|(j, _)| *j != i);
-                    T::of(others.map(|(_, p)| (x as f64 - p) / (point[i] - p)).product())
-                })
-                .collect()
-        })
-        .collect()
+/// Lagrange polynomials of the points, sampled at `size` grid points.
+fn sampled_basis<T: Real>(point: &[f64; LOW_ORDER], size: usize) -> Vec<Vec<T>> {
+    (0..LOW_ORDER).map(|i| (0..size).map(|x| T::of(quadrature::lagrange(point, i, x as f64))).collect()).collect()
 }
 
 #[cfg(test)]

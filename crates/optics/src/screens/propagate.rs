@@ -5,7 +5,7 @@
 //! conserved power, a step forth and back.
 
 use crate::Error;
-use crate::error::{finite, positive};
+use crate::error::{finite, positive, within};
 use crate::screens::grid::{Fft2, FftScratch, Grid};
 use crate::screens::kernel::Real;
 use rustfft::num_complex::Complex;
@@ -63,13 +63,8 @@ impl<T: Real> Propagator<T> {
     /// [`Error::OutOfRange`] for a distance beyond N dx^2/lambda: see [`Propagator::pieces`].
     pub fn transfer(&self, distance_m: f64) -> Result<Transfer<T>, Error> {
         finite("distance_m", distance_m)?;
-        if self.pieces(distance_m) > 1 {
-            return Err(Error::OutOfRange {
-                field: "distance_m",
-                value: distance_m,
-                allowed: "at most N dx^2 / lambda in one step: cut the step",
-            });
-        }
+        let one_step = self.pieces(distance_m) == 1;
+        within("distance_m", distance_m, one_step, "at most N dx^2 / lambda in one step: cut the step")?;
         let Grid { nx, ny, dx_m, dy_m } = self.grid;
         // The inverse transform of rustfft is not normalised.
         let scale = 1.0 / (nx * ny) as f64;

@@ -7,7 +7,7 @@
 use crate::Error;
 use crate::air::cn2::Cn2Path;
 use crate::air::structure::StructureTable;
-use crate::air::turbulence::{Turbulence, coherence_radius_m};
+use crate::air::turbulence::Turbulence;
 use crate::beam::{Misalignment, Telescope};
 use crate::error::{not_negative, positive};
 use crate::theory::overlap::efficiency_with;
@@ -69,19 +69,6 @@ fn untruncated_radius2_m2(telescope: &Telescope, range_m: f64) -> f64 {
     let geometric = s * (1.0 - range_m * telescope.focus.curvature_per_m());
     let diffraction = range_m / (telescope.wavenumber_rad_m() * s);
     geometric * geometric + diffraction * diffraction
-}
-
-/// Bistatic efficiency of an untruncated beam for a square-law structure function, l0 = 0, L0 infinite and a constant Cn2
-/// (Frehlich and Kavaya 1991): sigma_R^2 -> s^2 (1 - R/F)^2 + (R/(k s))^2 + (2 R/(k rho_0))^2.
-///
-/// # Errors
-/// [`Error::OutOfRange`] names the argument that is not allowed.
-pub fn square_law_efficiency(telescope: &Telescope, cn2_m_m23: f64, range_m: f64) -> Result<f64, Error> {
-    let free = untruncated_efficiency(telescope, range_m)?;
-    let rho_0 = coherence_radius_m(cn2_m_m23, telescope.wavelength_m, positive("range_m", range_m)?)?;
-    let width2 = untruncated_radius2_m2(telescope, range_m);
-    let spread = 2.0 * range_m / (telescope.wavenumber_rad_m() * rho_0);
-    Ok(free * width2 / (width2 + spread * spread))
 }
 
 /// One phase screen of a simulated path, for [`bistatic_efficiency_screens`].
@@ -159,15 +146,24 @@ pub fn bistatic_efficiency_screens(
 mod tests {
     use super::*;
     use crate::Focus;
+    use crate::air::turbulence::coherence_radius_m;
+
+    /// Bistatic efficiency of an untruncated beam for a square-law structure function, l0 = 0, L0 infinite and a constant Cn2
+    /// (Frehlich and Kavaya 1991): sigma_R^2 -> s^2 (1 - R/F)^2 + (R/(k s))^2 + (2 R/(k rho_0))^2.
+    fn square_law_efficiency(telescope: &Telescope, rho_0: f64, range_m: f64) -> f64 {
+        let width2 = untruncated_radius2_m2(telescope, range_m);
+        let spread = 2.0 * range_m / (telescope.wavenumber_rad_m() * rho_0);
+        untruncated_efficiency(telescope, range_m).unwrap() * width2 / (width2 + spread * spread)
+    }
 
     #[test]
     fn square_law_quadrature_gives_the_closed_form() {
         // An aperture of ten radii and a quadratic structure function 2 (rho/rho_0)^2 are what the closed form assumes.
         let t =
             Telescope { aperture_radius_m: 0.2, beam_radius_m: 0.02, focus: Focus::At(700.0), ..Telescope::table2() };
-        let (cn2, range_m) = (3e-14, 1200.0);
-        let closed = square_law_efficiency(&t, cn2, range_m).unwrap();
-        let rho_0 = coherence_radius_m(cn2, 1.55e-6, range_m).unwrap();
+        let (cn2, range_m) = (Cn2Path::Uniform { cn2_m_m23: 3e-14 }, 1200.0);
+        let rho_0 = coherence_radius_m(&cn2, 1.55e-6, range_m).unwrap();
+        let closed = square_law_efficiency(&t, rho_0, range_m);
         let exact = efficiency_with(&t, &Misalignment::NONE, range_m, &|rho| 2.0 * (rho / rho_0).powi(2)).unwrap();
         assert!((closed / exact - 1.0).abs() < 1e-9);
         assert!(closed < untruncated_efficiency(&t, range_m).unwrap());
@@ -182,7 +178,7 @@ mod tests {
             cn2: Cn2Path::Uniform { cn2_m_m23: 1e-13 },
         };
         let path = bistatic_efficiency(&t, &Misalignment::NONE, &turbulence, 1500.0).unwrap();
-        let rho_0 = coherence_radius_m(1e-13, 1.55e-6, 1500.0).unwrap();
+        let rho_0 = coherence_radius_m(&turbulence.cn2, 1.55e-6, 1500.0).unwrap();
         let law = efficiency_with(&t, &Misalignment::NONE, 1500.0, &|rho| 2.0 * (rho / rho_0).powf(5.0 / 3.0)).unwrap();
         assert!((path / law - 1.0).abs() < 2e-4, "{path} {law}");
     }

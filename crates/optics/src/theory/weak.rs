@@ -15,7 +15,7 @@ use crate::Error;
 use crate::air::spectrum::Spectrum;
 use crate::air::turbulence::{Turbulence, path_rytov_variance};
 use crate::beam::{Misalignment, Telescope};
-use crate::quadrature::GaussLegendre;
+use crate::quadrature::{GaussLegendre, cubic};
 use crate::theory::exact::bistatic_efficiency;
 use crate::theory::hankel::Aperture;
 use crate::theory::overlap::fresnel_number;
@@ -188,12 +188,8 @@ fn lattice(telescope: &Telescope, range_m: f64, step_m: f64, reach: usize) -> Ve
     let mut out = Vec::with_capacity((reach + 1) * (reach + 1));
     for i in 0..=reach {
         for j in 0..=reach {
-            let t = FINER * (i as f64).hypot(j as f64);
-            let at = (t as usize).clamp(1, count - 3);
-            let u = t - at as f64;
-            let (a, b, c) = (u + 1.0, u - 1.0, u - 2.0);
-            let weight = [-u * b * c / 6.0, a * b * c / 2.0, -a * u * c / 2.0, a * u * b / 6.0];
-            out.push(weight.iter().zip(&radial[at - 1..]).map(|(w, v)| v * w).sum());
+            let (first, weight) = cubic(FINER * (i as f64).hypot(j as f64), count);
+            out.push(weight.iter().zip(&radial[first..]).map(|(w, v)| v * w).sum());
         }
     }
     out
