@@ -4,10 +4,9 @@
 
 #![allow(clippy::print_stdout)]
 
-use std::ops::ControlFlow;
 use std::time::Instant;
 use wakescope_optics::air::StructureTable;
-use wakescope_optics::{MonteCarlo, Stop, theory};
+use wakescope_optics::{MonteCarlo, theory};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -17,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let run = MonteCarlo::table2(cn2_m_m23, seed)?;
     let start = Instant::now();
-    let estimate = run.run::<f32>(Stop::after(realisations), |_| ControlFlow::Continue(()))?;
+    let estimate = run.run(realisations)?;
     let seconds = start.elapsed().as_secs_f64();
 
     let table = StructureTable::new(&*run.turbulence.spectrum);

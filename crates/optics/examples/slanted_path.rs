@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ..MonteCarlo::table2(0.0, 1)?
     };
     let stop = Stop { realisations: 4000, relative_standard_error: Some(relative_error) };
-    let found = run.run::<f32>(stop, |_| ControlFlow::Continue(()))?;
+    let found = run.run_in::<f32>(stop, |_| ControlFlow::Continue(()))?;
     println!("{} realisations on {} x {} points", found.realisations, run.grid.nx, run.grid.ny);
     println!("  R/m  free space  independent paths  one path out and back");
     for (i, &range_m) in range_m.iter().enumerate() {

@@ -40,6 +40,28 @@ impl EfficiencyProfile {
         .validated()
     }
 
+    /// A profile without ranges, to which they are added one by one.
+    #[cfg(feature = "screens")]
+    pub(crate) fn nowhere() -> Self {
+        let none = Vec::new;
+        Self { range_m: none(), mean: none(), standard_deviation: none(), standard_error: none() }
+    }
+
+    /// Adds a range with its mean, standard deviation and standard error.
+    #[cfg(feature = "screens")]
+    pub(crate) fn push(&mut self, range_m: f64, [mean, standard_deviation, standard_error]: [f64; 3]) {
+        self.range_m.push(range_m);
+        self.mean.push(mean);
+        self.standard_deviation.push(standard_deviation);
+        self.standard_error.push(standard_error);
+    }
+
+    /// Range \[m\], mean and standard error, range by range.
+    pub fn rows(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        let errors = self.mean.iter().zip(&self.standard_error);
+        self.range_m.iter().zip(errors).map(|(range_m, (mean, error))| (*range_m, *mean, *error))
+    }
+
     /// The profile itself when its lists belong together and hold allowed numbers.
     ///
     /// # Errors

@@ -2,12 +2,9 @@
 
 use super::context::*;
 use crate::claim::Part;
-use std::ops::ControlFlow;
 use wakescope_optics::air::StructureTable;
 use wakescope_optics::monte_carlo::EfficiencyEstimate;
-use wakescope_optics::{
-    EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Stop, Telescope, Turbulence, theory,
-};
+use wakescope_optics::{EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Telescope, Turbulence, theory};
 
 const WEAK_M_M23: f64 = 1e-15;
 const MEDIUM_M_M23: f64 = 1e-13;
@@ -65,7 +62,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
 fn monte_carlo(cn2_m_m23: f64, range_m: &[f64], realisations: usize, seed: u64) -> Result<EfficiencyEstimate, Failure> {
     let set_up = MonteCarlo { range_m: range_m.to_vec(), ..MonteCarlo::table2(cn2_m_m23, seed)? };
-    Ok(set_up.run::<f32>(Stop::after(realisations), |_| ControlFlow::Continue(()))?)
+    Ok(set_up.run(realisations)?)
 }
 
 /// Exact bistatic efficiency for the ten screens that the Monte Carlo uses.

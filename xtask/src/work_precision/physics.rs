@@ -28,7 +28,7 @@ fn screens(layers: usize, grid: Grid) -> Result<MonteCarlo, Failure> {
 
 fn efficiency(screens: &MonteCarlo, realisations: usize, double: bool) -> Result<EfficiencyEstimate, Failure> {
     let (stop, go) = (Stop::after(realisations), |_| ControlFlow::Continue(()));
-    Ok(if double { screens.run::<f64>(stop, go)? } else { screens.run::<f32>(stop, go)? })
+    Ok(if double { screens.run_in::<f64>(stop, go)? } else { screens.run_in::<f32>(stop, go)? })
 }
 
 /// What a finite number of screens does to the exact bistatic efficiency, the grid to that of free space before it is corrected, and

@@ -3,13 +3,12 @@
 //! Nothing else shows that a grid is too coarse or too narrow for the field: what (P12) corrects does not show in the result.
 //! Check: a grid of twice the spacing that its focus needs is refused, and so is a mistake put in on purpose; good runs are not.
 
+use crate::Error;
 use crate::air::StructureTable;
-use crate::efficiency::EfficiencyProfile;
-use crate::monte_carlo::MonteCarlo;
+use crate::monte_carlo::{EfficiencyEstimate, MonteCarlo};
 use crate::screens::generator::ScreenGenerator;
 use crate::screens::kernel::Real;
 use crate::theory::{ScreenStrength, bistatic_efficiency_screens};
-use crate::{Error, Telescope};
 
 /// Standard errors by which mean and theory may differ.
 const SIGMAS: f64 = 5.0;
@@ -18,43 +17,33 @@ const OF_SCREENS: f64 = 2e-3;
 /// Share of what (P12) corrects that turbulence may change.
 const OF_CORRECTION: f64 = 0.1;
 
-/// What a run found at one range.
-pub(super) struct Found {
-    /// Exact over grid free-space efficiency, (P12).
-    pub(super) correction: f64,
-    /// Fraction of the power that the border took.
-    pub(super) lost: f64,
-}
-
-/// Refuses a bistatic mean, from so many independent samples, that the layers of the run cannot have.
+/// Refuses a bistatic mean that the layers of the run cannot have.
 ///
 /// # Errors
 /// [`Error::AgainstTheory`] at the first such range.
 pub(super) fn check<T: Real>(
     run: &MonteCarlo,
     screens: &ScreenGenerator<T>,
-    bistatic: &EfficiencyProfile,
-    found: &[Found],
-    samples: usize,
+    found: &EfficiencyEstimate,
 ) -> Result<(), Error> {
+    let Some(bistatic) = &found.bistatic else { return Ok(()) };
     let table = StructureTable::new(&*run.turbulence.spectrum);
     // Of a spectrum that is cut at Nyquist less than this is missing at any separation.
     let missing = if screens.folds() { 0.0 } else { screens.missing_at_one_spacing()?.max(0.0) };
-    let telescope: Telescope = run.telescope.validated()?;
     for (i, &range_m) in run.range_m.iter().enumerate() {
         let layers = run.layers.screens_to(range_m, &run.turbulence.cn2)?;
         let with = |share: f64| {
             let weaker = |s: &ScreenStrength| ScreenStrength { cn2_thickness_m13: share * s.cn2_thickness_m13, ..*s };
             let layers: Vec<ScreenStrength> = layers.iter().map(weaker).collect();
-            bistatic_efficiency_screens(&telescope, &run.misalignment, &layers, &table, range_m)
+            bistatic_efficiency_screens(&run.telescope, &run.misalignment, &layers, &table, range_m)
         };
         let exact = with(1.0)?;
         let most = if missing > 0.0 { with(1.0 - missing)? } else { exact };
         let (mean, standard_error) = (bistatic.mean[i], bistatic.standard_error[i]);
-        let Found { correction, lost } = found[i];
+        let correction = found.exact_free_space[i] / found.grid_free_space[i];
         let of_grid = OF_SCREENS + OF_CORRECTION * (correction - 1.0).abs();
-        let allowed = errors_of(samples) * standard_error + of_grid * exact;
-        if mean < exact - allowed - 2.0 * lost * exact || mean > most + allowed {
+        let allowed = errors_of(found.independent_samples) * standard_error + of_grid * exact;
+        if mean < exact - allowed - 2.0 * found.lost_power_fraction[i] * exact || mean > most + allowed {
             return Err(Error::AgainstTheory { range_m, mean, standard_error, exact });
         }
     }
@@ -72,6 +61,7 @@ fn errors_of(samples: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::EfficiencyProfile;
 
     #[test]
     fn means_beyond_five_errors_of_theory_are_refused_and_others_are_not() {
@@ -88,13 +78,20 @@ mod tests {
                 .unwrap()
         };
         let tried = |spacing_m: f64, off: f64, error: f64, samples: usize, lost: f64| {
-            let bistatic = EfficiencyProfile {
-                range_m: vec![600.0],
-                mean: vec![(1.0 + off) * exact],
-                standard_deviation: vec![0.0],
-                standard_error: vec![error * exact],
+            let mut bistatic = EfficiencyProfile::nowhere();
+            bistatic.push(600.0, [(1.0 + off) * exact, 0.0, error * exact]);
+            let found = EfficiencyEstimate {
+                monostatic: EfficiencyProfile::nowhere(),
+                bistatic: Some(bistatic),
+                monostatic_realisations: Vec::new(),
+                bistatic_realisations: Vec::new(),
+                realisations: samples,
+                independent_samples: samples,
+                grid_free_space: vec![1.0],
+                exact_free_space: vec![1.0],
+                lost_power_fraction: vec![lost],
             };
-            check(&run, &grid(spacing_m), &bistatic, &[Found { correction: 1.0, lost }], samples).is_ok()
+            check(&run, &grid(spacing_m), &found).is_ok()
         };
         for sign in [-1.0, 1.0] {
             assert!(tried(4e-3, sign * 0.048, 0.01, 10_000, 0.0) && !tried(4e-3, sign * 0.056, 0.01, 10_000, 0.0));

@@ -13,7 +13,6 @@ mod against_theory;
 #[cfg(test)]
 mod mutation;
 pub(crate) mod path;
-mod prepared;
 mod statistics;
 mod walk;
 
@@ -24,9 +23,8 @@ use crate::beam::source::{aperture_field, check_grid};
 use crate::efficiency::EfficiencyProfile;
 use crate::error::{positive, within};
 use crate::monte_carlo::path::Path;
-use crate::monte_carlo::prepared::Prepared;
-use crate::monte_carlo::statistics::{Folding, Sample, bistatic, mean_and_variance};
-use crate::monte_carlo::walk::{GroupSums, Walker};
+use crate::monte_carlo::statistics::{Folding, bistatic, mean_and_variance};
+use crate::monte_carlo::walk::{AtRange, Prepared, Walker};
 use crate::screens::generator::ScreenGenerator;
 use crate::screens::grid::Grid;
 use crate::screens::kernel::Real;
@@ -135,13 +133,21 @@ impl MonteCarlo {
         })
     }
 
+    /// Runs so many realisations in single precision.
+    ///
+    /// # Errors
+    /// As [`MonteCarlo::run_in`].
+    pub fn run(&self, realisations: usize) -> Result<EfficiencyEstimate, Error> {
+        self.run_in::<f32>(Stop::after(realisations), |_| ControlFlow::Continue(()))
+    }
+
     /// Runs in the number type `T` (f32 is twice as fast; its rounding is far below a Monte-Carlo error).
     ///
     /// `progress` is called between groups of realisations; `ControlFlow::Break` cancels.
     ///
     /// # Errors
     /// [`Error`] for a set-up that is not allowed, [`Error::PowerLost`], [`Error::AgainstTheory`], [`Error::Cancelled`].
-    pub fn run<T: Real>(
+    pub fn run_in<T: Real>(
         &self,
         stop: Stop,
         mut progress: impl FnMut(Progress) -> ControlFlow<()>,
@@ -154,12 +160,12 @@ impl MonteCarlo {
     /// Mean irradiance overlap without turbulence on this very grid, at each range: the grid's free-space efficiency.
     ///
     /// # Errors
-    /// As [`MonteCarlo::run`].
+    /// As [`MonteCarlo::run_in`].
     pub fn grid_free_space<T: Real>(&self) -> Result<Vec<f64>, Error> {
         let calm = Self { turbulence: Turbulence::none(), ..self.in_order() };
         let prepared = calm.prepare::<T>()?;
-        let sums = Walker::new(&prepared, calm.seed, calm.sampling).group(0, 1)?;
-        Ok(sums.samples.iter().map(|s| s[0].same_path).collect())
+        let ranges = Walker::new(&prepared, calm.seed, calm.sampling).group(0, 1)?;
+        Ok(ranges.iter().map(|at| at.samples[0].same_path).collect())
     }
 
     /// The same run with its ranges in increasing order, at which layers end; one that is not a number is refused later, by name.
@@ -180,29 +186,20 @@ impl MonteCarlo {
         let lambda = telescope.wavelength_m;
         let path = Path::new(&self.layers, &self.range_m, &cn2, &self.grid, lambda)?;
         let propagator = Propagator::new(self.grid, lambda)?;
-        let transfers = path.distance_m.iter().map(|&d| propagator.transfer(d)).collect::<Result<_, _>>()?;
-        let screens = if path.strength.is_empty() {
-            None
-        } else {
-            Some(ScreenGenerator::new(self.grid, self.turbulence.spectrum.clone())?)
-        };
-        let mut start: Vec<Vec<Complex<T>>> = vec![aperture_field(&telescope, &Misalignment::NONE, &self.grid)];
+        let generator = || ScreenGenerator::new(self.grid, self.turbulence.spectrum.clone());
         let displaced = misalignment != Misalignment::NONE;
-        if displaced {
-            start.push(aperture_field(&telescope, &misalignment, &self.grid));
-        }
+        let beams = if displaced { vec![Misalignment::NONE, misalignment] } else { vec![Misalignment::NONE] };
+        let start: Vec<Vec<Complex<T>>> = beams.iter().map(|m| aperture_field(&telescope, m, &self.grid)).collect();
         let pixel = self.grid.dx_m * self.grid.dy_m;
-        let scale = self.range_m.iter().map(|r| (lambda * r).powi(2) / telescope.aperture_area_m2() * pixel).collect();
-        let power = start[0].iter().map(|e| e.norm_sqr().wide()).sum::<f64>() * pixel;
         Ok(Prepared {
+            transfers: path.distance_m.iter().map(|&d| propagator.transfer(d)).collect::<Result<_, _>>()?,
+            screens: (!path.strength.is_empty()).then(generator).transpose()?,
+            folding: if displaced { Folding::none(&self.grid) } else { Folding::onto_quadrant(&self.grid) },
+            scale: self.range_m.iter().map(|r| (lambda * r).powi(2) / telescope.aperture_area_m2() * pixel).collect(),
+            power: start[0].iter().map(|e| e.norm_sqr().wide()).sum::<f64>() * pixel,
             path,
             propagator,
-            transfers,
-            screens,
             start,
-            folding: if displaced { Folding::none(&self.grid) } else { Folding::onto_quadrant(&self.grid) },
-            scale,
-            power,
         })
     }
 
@@ -216,123 +213,100 @@ impl MonteCarlo {
         stop.relative_standard_error.map_or(Ok(0.0), |target| positive("relative_standard_error", target))?;
         // Without turbulence every realisation is the same.
         let total = if prepared.screens.is_some() { stop.realisations } else { 1 };
-        let mut sums: Option<GroupSums<T>> = None;
+        let mut ranges: Vec<AtRange<T>> = Vec::new();
         let mut done = 0;
         while done < total {
-            let wave: Vec<(usize, usize)> = (0..GROUPS_PER_WAVE)
-                .map(|g| (done + g * GROUP, (done + (g + 1) * GROUP).min(total)))
-                .filter(|(a, b)| a < b)
-                .collect();
-            done = wave.last().map_or(total, |w| w.1);
-            let walk = |&(first, end): &(usize, usize)| {
-                Walker::new(prepared, self.seed, self.sampling).group(first, end - first)
-            };
-            for group in in_parallel(&wave, walk) {
+            let firsts: Vec<usize> = (done..total).step_by(GROUP).take(GROUPS_PER_WAVE).collect();
+            let group =
+                |&first: &usize| Walker::new(prepared, self.seed, self.sampling).group(first, GROUP.min(total - first));
+            for group in in_parallel(&firsts, group) {
                 let group = group?;
-                match &mut sums {
-                    None => sums = Some(group),
-                    Some(all) => all.add(group),
+                if ranges.is_empty() {
+                    ranges = group;
+                } else {
+                    ranges.iter_mut().zip(group).for_each(|(all, more)| all.add(more));
                 }
             }
-            let error = sums.as_ref().map_or(f64::INFINITY, worst_error);
-            let flow = progress(Progress { done, total, relative_standard_error: error });
-            if flow.is_break() {
+            done = (done + GROUPS_PER_WAVE * GROUP).min(total);
+            let error = ranges.iter().map(relative_error).fold(0.0, f64::max);
+            if progress(Progress { done, total, relative_standard_error: error }).is_break() {
                 return Err(Error::Cancelled { realisations: done });
             }
             if stop.relative_standard_error.is_some_and(|target| error <= target) {
                 break;
             }
         }
-        let sums = sums.ok_or(Error::Cancelled { realisations: 0 })?;
-        self.estimate(prepared, &sums, done)
+        self.estimate(prepared, &ranges, done)
     }
 
+    /// Means, scatter and errors of both receivers at each range, times the ratio of exact to grid free-space efficiency.
     fn estimate<T: Real>(
         &self,
         prepared: &Prepared<T>,
-        sums: &GroupSums<T>,
+        ranges: &[AtRange<T>],
         realisations: usize,
     ) -> Result<EfficiencyEstimate, Error> {
-        let grid_free_space = if prepared.screens.is_some() {
-            self.grid_free_space::<T>()?
-        } else {
-            sums.samples.iter().map(|s| s[0].same_path).collect()
+        let is_calm = prepared.screens.is_none();
+        let grid_free_space = match is_calm {
+            true => ranges.iter().map(|at| at.samples[0].same_path).collect(),
+            false => self.grid_free_space::<T>()?,
         };
-        let exact_free_space = self
-            .range_m
-            .iter()
-            .map(|&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r))
-            .collect::<Result<Vec<_>, _>>()?;
-        let (mut lost_power_fraction, mut found) = (Vec::new(), Vec::new());
-        let none = Vec::new;
-        let mut mono = EfficiencyProfile {
-            range_m: self.range_m.clone(),
-            mean: none(),
-            standard_deviation: none(),
-            standard_error: none(),
+        let exact = |&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r);
+        let mut out = EfficiencyEstimate {
+            monostatic: EfficiencyProfile::nowhere(),
+            bistatic: None,
+            monostatic_realisations: Vec::new(),
+            bistatic_realisations: Vec::new(),
+            realisations,
+            independent_samples: ranges.first().map_or(0, |at| at.samples.len()),
+            grid_free_space,
+            exact_free_space: self.range_m.iter().map(exact).collect::<Result<_, _>>()?,
+            lost_power_fraction: Vec::new(),
         };
-        let mut bi = mono.clone();
-        let [mut single, mut pairs] = [Vec::new(), Vec::new()];
-        for (i, samples) in sums.samples.iter().enumerate() {
-            let (fraction, _) = mean_and_variance(samples.iter().map(|s| s.lost));
+        let mut pairs = EfficiencyProfile::nowhere();
+        for (i, (at, &range_m)) in ranges.iter().zip(&self.range_m).enumerate() {
+            let (fraction, _) = mean_and_variance(at.samples.iter().map(|s| s.lost));
             if fraction.is_nan() || fraction > 0.05 {
-                return Err(Error::PowerLost { range_m: self.range_m[i], fraction });
+                return Err(Error::PowerLost { range_m, fraction });
             }
-            lost_power_fraction.push(fraction);
-            let factor = exact_free_space[i] / grid_free_space[i];
-            found.push(against_theory::Found { correction: factor, lost: fraction });
-            single.push(samples.iter().flat_map(|s| s.single.iter().map(|eta| factor * eta)).collect());
-            pairs.push(sums.products[i].iter().map(|eta| factor * eta).collect());
-            if prepared.screens.is_none() {
-                push(&mut mono, factor * grid_free_space[i], 0.0, 0.0);
-                push(&mut bi, factor * grid_free_space[i], 0.0, 0.0);
+            out.lost_power_fraction.push(fraction);
+            let factor = out.exact_free_space[i] / out.grid_free_space[i];
+            let single = at.samples.iter().flat_map(|s| &s.single);
+            out.monostatic_realisations.push(single.map(|eta| factor * eta).collect());
+            out.bistatic_realisations.push(at.products.iter().map(|eta| factor * eta).collect());
+            if is_calm {
+                out.monostatic.push(range_m, [factor * out.grid_free_space[i], 0.0, 0.0]);
+                pairs.push(range_m, [factor * out.grid_free_space[i], 0.0, 0.0]);
                 continue;
             }
-            let (mean, variance) = mean_and_variance(samples.iter().map(|s| s.same_path));
-            let spread = mean_and_variance(samples.iter().flat_map(|s| s.single.iter().copied())).1.sqrt();
-            push(&mut mono, factor * mean, factor * spread, factor * (variance / samples.len() as f64).sqrt());
-            if samples.len() > 1 {
-                let list: Vec<&Sample> = samples.iter().collect();
-                let second = if prepared.start.len() > 1 { &sums.planes[1][i] } else { &sums.planes[0][i] };
-                let total = prepared.folding.overlap(&sums.planes[0][i], second) * prepared.scale[i];
-                let (mean, error) = bistatic(&list, total, &prepared.folding, prepared.scale[i]);
-                let spread = mean_and_variance(sums.products[i].iter().copied()).1.sqrt();
-                push(&mut bi, factor * mean, factor * spread, factor * error);
+            out.monostatic.push(range_m, monostatic(at).map(|v| factor * v));
+            if at.samples.len() > 1 {
+                let total =
+                    prepared.folding.overlap(&at.planes[0], &at.planes[at.planes.len() - 1]) * prepared.scale[i];
+                let (mean, error) = bistatic(&at.samples, total, &prepared.folding, prepared.scale[i]);
+                let spread = mean_and_variance(at.products.iter().copied()).1.sqrt();
+                pairs.push(range_m, [mean, spread, error].map(|v| factor * v));
             }
         }
-        let has_pairs = !bi.mean.is_empty();
-        let independent_samples = sums.samples.first().map_or(0, Vec::len);
-        if let (Some(screens), true) = (&prepared.screens, has_pairs) {
-            against_theory::check(self, screens, &bi, &found, independent_samples)?;
+        out.bistatic = (!pairs.range_m.is_empty()).then_some(pairs);
+        if let Some(screens) = &prepared.screens {
+            against_theory::check(self, screens, &out)?;
         }
-        Ok(EfficiencyEstimate {
-            monostatic: mono,
-            bistatic: has_pairs.then_some(bi),
-            monostatic_realisations: single,
-            bistatic_realisations: pairs,
-            realisations: if prepared.screens.is_some() { realisations } else { 1 },
-            independent_samples,
-            grid_free_space,
-            exact_free_space,
-            lost_power_fraction,
-        })
+        Ok(out)
     }
 }
 
-/// Adds the next range to a profile.
-fn push(profile: &mut EfficiencyProfile, mean: f64, standard_deviation: f64, standard_error: f64) {
-    profile.mean.push(mean);
-    profile.standard_deviation.push(standard_deviation);
-    profile.standard_error.push(standard_error);
+/// Mean, standard deviation of one realisation and standard error of the mean, both beams through the same path.
+fn monostatic<T>(at: &AtRange<T>) -> [f64; 3] {
+    let (mean, variance) = mean_and_variance(at.samples.iter().map(|s| s.same_path));
+    let spread = mean_and_variance(at.samples.iter().flat_map(|s| s.single.iter().copied())).1.sqrt();
+    [mean, spread, (variance / at.samples.len() as f64).sqrt()]
 }
 
-/// Largest relative standard error of the monostatic mean over the ranges.
-fn worst_error<T>(sums: &GroupSums<T>) -> f64 {
-    sums.samples.iter().fold(0.0, |worst, samples| {
-        let (mean, variance) = mean_and_variance(samples.iter().map(|s| s.same_path));
-        let relative = (variance / samples.len() as f64).sqrt() / mean;
-        if samples.len() > 1 { worst.max(relative) } else { f64::INFINITY }
-    })
+/// Relative standard error of the monostatic mean; infinite while it is not known.
+fn relative_error<T>(at: &AtRange<T>) -> f64 {
+    let [mean, _, error] = monostatic(at);
+    if at.samples.len() > 1 { error / mean } else { f64::INFINITY }
 }
 
 /// The results of `work` in the order of `items`.

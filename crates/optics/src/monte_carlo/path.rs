@@ -99,6 +99,14 @@ pub(crate) struct Leg {
     pub(crate) outputs: Vec<usize>,
 }
 
+impl Leg {
+    /// Ranges that the leg reaches: index, and whether it is one on the way.
+    pub(crate) fn ranges(&self) -> impl Iterator<Item = (usize, bool)> {
+        let at_the_end = self.outputs.iter().map(|&output| (output, false));
+        self.tap.iter().map(|&(output, _)| (output, true)).chain(at_the_end)
+    }
+}
+
 /// Legs, distances and screen strengths of one path.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Path {

@@ -7,7 +7,7 @@
 //! Check: against the double sum over pairs and the full jackknife.
 
 use crate::screens::grid::Grid;
-use crate::screens::kernel::Real;
+use crate::screens::kernel::{self, Real};
 
 /// Width of a ring in grid spacings.
 const RING: f64 = 2.0;
@@ -101,7 +101,7 @@ impl Folding {
         for y in 0..self.size[1] {
             let row = y * width..(y + 1) * width;
             let (a, b) = (&a[row.clone()], &b[row]);
-            let whole = T::dot(a, b);
+            let whole = kernel::dot(a, b);
             if !self.folded {
                 sum += whole;
                 continue;
@@ -157,7 +157,7 @@ pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f
 /// Bistatic efficiency of all pairs and its jackknife standard error, NaN for fewer than three samples.
 ///
 /// `total` is the overlap of the two summed planes, `scale` turns a product of ring sums (per point) into an efficiency.
-pub(crate) fn bistatic(samples: &[&Sample], total: f64, folding: &Folding, scale: f64) -> (f64, f64) {
+pub(crate) fn bistatic(samples: &[Sample], total: f64, folding: &Folding, scale: f64) -> (f64, f64) {
     let n = samples.len() as f64;
     let own: f64 = samples.iter().map(|s| s.folded).sum();
     let mean = (total - own) / (n * (n - 1.0));
@@ -256,8 +256,7 @@ mod tests {
                 lost: 0.0,
             });
         }
-        let list: Vec<&Sample> = samples.iter().collect();
-        let (mean, error) = bistatic(&list, folding.overlap(&total, &total), &folding, 1.0);
+        let (mean, error) = bistatic(&samples, folding.overlap(&total, &total), &folding, 1.0);
         let pairs = |left_out: Option<usize>| {
             let (mut sum, mut count) = (0.0, 0.0);
             for i in (0..7).filter(|i| Some(*i) != left_out) {
@@ -302,7 +301,7 @@ mod tests {
             Sample { same_path: own, single: vec![own], folded: own, rings: [rings, Vec::new()], lost: 0.0 }
         };
         let samples: Vec<Sample> = planes.iter().map(sample).collect();
-        let (_, error) = bistatic(&samples.iter().collect::<Vec<_>>(), dot(&total, &total), &folding, 1.0);
+        let (_, error) = bistatic(&samples, dot(&total, &total), &folding, 1.0);
         let pairs = |left_out: usize| {
             let others = || (0..5).filter(move |i| *i != left_out);
             let of = |i: usize| others().filter(move |j| *j != i).map(|j| dot(&planes[i], &planes[j])).sum::<f64>();

@@ -14,7 +14,7 @@ use crate::Error;
 use crate::air::spectrum::Spectrum;
 use crate::quadrature::GaussLegendre;
 use crate::screens::grid::{Fft2, FftScratch, Grid};
-use crate::screens::kernel::{LowRow, Real};
+use crate::screens::kernel::{self, LowRow, Real};
 use crate::screens::low_frequency::{LowFrequencies, unit};
 use rand::Rng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -222,7 +222,7 @@ impl<T: Real> ScreenGenerator<T> {
                     (*u, *v) = ((word >> 32) as u32, word as u32);
                 }
                 self.shifted_row(ix + i, shift, row);
-                T::normals(radius, angle, row, line);
+                kernel::normals(radius, angle, row, line);
             }
         });
         // The shift of the frequencies is a linear phase over the points.
@@ -240,7 +240,7 @@ impl<T: Real> ScreenGenerator<T> {
                 let low =
                     LowRow { coefficient: &coefficient, basis: &self.low.basis[0], ramp: shifted(ny, shift[1], y) };
                 let span = y * nx..(y + 1) * nx;
-                T::finish_screen(line, ramp, &low, [&mut first[span.clone()], &mut second[span]]);
+                kernel::finish_screen(line, ramp, &low, [&mut first[span.clone()], &mut second[span]]);
             }
         });
         Ok(())

@@ -11,6 +11,7 @@
 use multiversion::multiversion;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftNum, FftPlanner};
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 /// Points handled at a time by the kernels that need temporaries.
@@ -21,48 +22,37 @@ const LANES: usize = 16;
 pub(crate) const LOW_ORDER: usize = 16;
 
 mod sealed {
-    pub trait Sealed {}
-    impl Sealed for f32 {}
-    impl Sealed for f64 {}
+    use super::{Arc, Fft, FftNum};
+
+    /// What the inner loops need of a number beside its arithmetic.
+    pub trait Scalar: FftNum {
+        /// The forward and the inverse transform of a length; of each type by itself, so that the planner is compiled with this
+        /// crate and not again by each program that names the type.
+        fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2];
+        /// The nearest number of this type.
+        fn of_i32(value: i32) -> Self;
+        /// Square root; 0 below 0.
+        fn root(self) -> Self;
+        /// Sine and cosine.
+        fn sin_cos(self) -> (Self, Self);
+        /// Sine and cosine of `self` + `quadrant` pi/2 for |self| <= pi/4.
+        fn sin_cos_of_quadrant(self, quadrant: u32) -> (Self, Self);
+        /// -2 ln(self) for 0 < self <= 1.
+        fn minus_two_ln(self) -> Self;
+    }
 }
 
 /// Number type of the wave-optics code: `f32` or `f64`.
-pub trait Real: sealed::Sealed + FftNum + Default + PartialOrd {
+pub trait Real: sealed::Scalar + FftNum + Default + PartialOrd {
     /// The nearest number of this type.
     fn of(value: f64) -> Self;
     /// The number as f64.
     fn wide(self) -> f64;
-    /// The forward and the inverse transform of a length; of each type by itself, so that the planner is compiled with this crate
-    /// and not again by each program that names the type.
-    #[doc(hidden)]
-    fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2];
-    /// field *= exp(j scale phase).
-    #[doc(hidden)]
-    fn multiply_cis(field: &mut [Complex<Self>], phase: &[Self], scale: Self);
-    /// out = amplitude (a + j b) with a, b standard normal, from two random 32-bit words each (Box and Muller 1958).
-    #[doc(hidden)]
-    fn normals(radius: &[u32], angle: &[u32], amplitude: &[Self], out: &mut [Complex<Self>]);
-    /// row *= factor * other.
-    #[doc(hidden)]
-    fn multiply_scaled(row: &mut [Complex<Self>], factor: Complex<Self>, other: &[Complex<Self>]);
-    /// row *= factor * window, and the sum of |row|^2 after it.
-    #[doc(hidden)]
-    fn absorb(row: &mut [Complex<Self>], factor: Self, window: &[Self]) -> f64;
-    /// out = |row|^2 scale.
-    #[doc(hidden)]
-    fn intensity(row: &[Complex<Self>], scale: Self, out: &mut [Self]);
-    /// Sum of a b.
-    #[doc(hidden)]
-    fn dot(a: &[Self], b: &[Self]) -> f64;
-    /// Real and imaginary part of row * ramp + the low-frequency polynomial, into two rows.
-    #[doc(hidden)]
-    fn finish_screen(row: &[Complex<Self>], ramp: &[Complex<Self>], low: &LowRow<'_, Self>, outs: [&mut [Self]; 2]);
 }
 
 /// Low-frequency part of one row: coefficients times the polynomials sampled along the row.
-#[doc(hidden)]
 #[derive(Debug)]
-pub struct LowRow<'a, T> {
+pub(crate) struct LowRow<'a, T> {
     /// Coefficients of the real and of the imaginary part.
     pub(crate) coefficient: &'a [[T; 2]; LOW_ORDER],
     /// `LOW_ORDER` polynomials, each sampled along the row.
@@ -71,37 +61,151 @@ pub struct LowRow<'a, T> {
     pub(crate) ramp: Complex<T>,
 }
 
-macro_rules! kernels {
-    ($module:ident, $real:ident, $bits:ident, $mantissa:expr, $sqrt_half:expr, $one_exp:expr,
-     $pi_half:expr, $sin:expr, $cos:expr, $log:expr) => {
-        mod $module {
-            use super::*;
+/// field *= exp(j scale phase).
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn multiply_cis<T: Real>(field: &mut [Complex<T>], phase: &[T], scale: T) {
+    let mut sin = [T::zero(); BLOCK];
+    let mut cos = [T::zero(); BLOCK];
+    for (field, phase) in field.chunks_mut(BLOCK).zip(phase.chunks(BLOCK)) {
+        for ((s, c), &p) in sin.iter_mut().zip(&mut cos).zip(phase) {
+            (*s, *c) = (p * scale).sin_cos();
+        }
+        for ((e, &s), &c) in field.iter_mut().zip(&sin).zip(&cos) {
+            *e = Complex::new(e.re * c - e.im * s, e.re * s + e.im * c);
+        }
+    }
+}
 
-            const PI_HALF: [$real; 3] = $pi_half;
-            const SIN: &[$real] = &$sin;
-            const COS: &[$real] = &$cos;
-            const LOG: &[$real] = &$log;
-            const SIGN: u32 = $bits::BITS - 2;
-            /// Adding 1.5 2^mantissa rounds to an integer, which then stands in the lowest bits.
-            const ROUND: $real = 1.5 * (1u64 << $mantissa) as $real;
+/// out = amplitude (a + j b) with a, b standard normal, from two random 32-bit words each (Box and Muller 1958).
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn normals<T: Real>(radius: &[u32], angle: &[u32], amplitude: &[T], out: &mut [Complex<T>]) {
+    let mut a = [T::zero(); BLOCK];
+    let mut b = [T::zero(); BLOCK];
+    let chunks = radius.chunks(BLOCK).zip(angle.chunks(BLOCK)).zip(amplitude.chunks(BLOCK));
+    for (((radius, angle), amplitude), out) in chunks.zip(out.chunks_mut(BLOCK)) {
+        let words = radius.iter().zip(angle).zip(amplitude);
+        for (((&u, &v), &amplitude), (a, b)) in words.zip(a.iter_mut().zip(&mut b)) {
+            let unit = (T::of_i32((u >> 1) as i32) + T::of(0.5)) * T::of(1.0 / 2_147_483_648.0);
+            let r = unit.minus_two_ln().root() * amplitude;
+            let part = T::of_i32((v & 0x3fff_ffff) as i32) * T::of(1.0 / 1_073_741_824.0) - T::of(0.5);
+            let (s, c) = (part * T::of(FRAC_PI_2)).sin_cos_of_quadrant(v >> 30);
+            (*a, *b) = (r * c, r * s);
+        }
+        for ((o, &a), &b) in out.iter_mut().zip(&a).zip(&b) {
+            *o = Complex::new(a, b);
+        }
+    }
+}
 
-            #[inline(always)]
-            fn polynomial(coefficient: &[$real], t: $real) -> $real {
-                let mut sum = coefficient[coefficient.len() - 1];
-                let mut i = coefficient.len() - 1;
-                while i > 0 {
-                    i -= 1;
-                    sum = sum * t + coefficient[i];
-                }
-                sum
+/// row *= factor * other.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn multiply_scaled<T: Real>(row: &mut [Complex<T>], factor: Complex<T>, other: &[Complex<T>]) {
+    for (e, h) in row.iter_mut().zip(other) {
+        let w = Complex::new(factor.re * h.re - factor.im * h.im, factor.re * h.im + factor.im * h.re);
+        *e = Complex::new(e.re * w.re - e.im * w.im, e.re * w.im + e.im * w.re);
+    }
+}
+
+/// row *= factor * window, and the sum of |row|^2 after it.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn absorb<T: Real>(row: &mut [Complex<T>], factor: T, window: &[T]) -> f64 {
+    let mut sum = [T::zero(); LANES];
+    for (row, window) in row.chunks_mut(LANES).zip(window.chunks(LANES)) {
+        for ((e, &w), sum) in row.iter_mut().zip(window).zip(&mut sum) {
+            let w = w * factor;
+            let damped = Complex::new(e.re * w, e.im * w);
+            *sum = *sum + (damped.re * damped.re + damped.im * damped.im);
+            *e = damped;
+        }
+    }
+    sum.iter().map(|s| s.wide()).sum()
+}
+
+/// out = |row|^2.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn intensity<T: Real>(row: &[Complex<T>], out: &mut [T]) {
+    for (e, o) in row.iter().zip(out) {
+        *o = e.re * e.re + e.im * e.im;
+    }
+}
+
+/// Sum of a b.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
+    let mut sum = [T::zero(); LANES];
+    for (a, b) in a.chunks(LANES).zip(b.chunks(LANES)) {
+        for ((&a, &b), sum) in a.iter().zip(b).zip(&mut sum) {
+            *sum = *sum + a * b;
+        }
+    }
+    sum.iter().map(|s| s.wide()).sum()
+}
+
+/// Real and imaginary part of row * ramp + the low-frequency polynomial, into two rows.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn finish_screen<T: Real>(
+    row: &[Complex<T>],
+    ramp: &[Complex<T>],
+    low: &LowRow<'_, T>,
+    [first, second]: [&mut [T]; 2],
+) {
+    let factor = low.ramp;
+    for start in (0..row.len()).step_by(BLOCK) {
+        let end = (start + BLOCK).min(row.len());
+        let mut re = [T::zero(); BLOCK];
+        let mut im = [T::zero(); BLOCK];
+        for (basis, &[cre, cim]) in low.basis.iter().zip(low.coefficient) {
+            for ((&p, re), im) in basis[start..end].iter().zip(&mut re).zip(&mut im) {
+                *re = *re + cre * p;
+                *im = *im + cim * p;
+            }
+        }
+        let values = row[start..end].iter().zip(&ramp[start..end]);
+        let sums = re.iter().zip(&im);
+        let outs = first[start..end].iter_mut().zip(&mut second[start..end]);
+        for (((e, p), (&re, &im)), (a, b)) in values.zip(sums).zip(outs) {
+            let w = Complex::new(p.re * factor.re - p.im * factor.im, p.re * factor.im + p.im * factor.re);
+            *a = e.re * w.re - e.im * w.im + re;
+            *b = e.re * w.im + e.im * w.re + im;
+        }
+    }
+}
+
+macro_rules! scalar {
+    ($real:ident, $bits:ident, $mantissa:expr, $sqrt_half:expr, $one_exp:expr, $pi_half:expr, $sin:expr, $cos:expr, $log:expr) => {
+        impl sealed::Scalar for $real {
+            fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2] {
+                let mut planner = FftPlanner::new();
+                [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
             }
 
-            /// Sine and cosine of `r` + `quadrant` pi/2 for |r| <= pi/4.
             #[inline(always)]
-            fn sin_cos_of_quadrant(r: $real, quadrant: $bits) -> ($real, $real) {
-                let t = r * r;
-                let s = r + r * t * polynomial(SIN, t);
-                let c = 1.0 - 0.5 * t + t * t * polynomial(COS, t);
+            fn of_i32(value: i32) -> Self {
+                value as $real
+            }
+
+            #[inline(always)]
+            fn root(self) -> Self {
+                self.max(0.0).sqrt()
+            }
+
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                const PI_HALF: [$real; 3] = $pi_half;
+                /// Adding 1.5 2^mantissa rounds to an integer, which then stands in the lowest bits.
+                const ROUND: $real = 1.5 * (1u64 << $mantissa) as $real;
+                let rounded = self * (1.0 / std::$real::consts::FRAC_PI_2) + ROUND;
+                let n = rounded - ROUND;
+                let r = ((self - n * PI_HALF[0]) - n * PI_HALF[1]) - n * PI_HALF[2];
+                r.sin_cos_of_quadrant((rounded.to_bits() & 3) as u32)
+            }
+
+            #[inline(always)]
+            fn sin_cos_of_quadrant(self, quadrant: u32) -> (Self, Self) {
+                const SIGN: u32 = $bits::BITS - 2;
+                let (t, quadrant) = (self * self, $bits::from(quadrant));
+                let s = self + self * t * polynomial(&$sin, t);
+                let c = 1.0 - 0.5 * t + t * t * polynomial(&$cos, t);
                 let swap = (quadrant & 1).wrapping_neg();
                 let (s, c) = (s.to_bits(), c.to_bits());
                 let sin = (s & !swap) | (c & swap);
@@ -113,137 +217,17 @@ macro_rules! kernels {
             }
 
             #[inline(always)]
-            pub(super) fn sin_cos(x: $real) -> ($real, $real) {
-                let rounded = x * (1.0 / PI_HALF_FULL) + ROUND;
-                let n = rounded - ROUND;
-                let r = ((x - n * PI_HALF[0]) - n * PI_HALF[1]) - n * PI_HALF[2];
-                sin_cos_of_quadrant(r, rounded.to_bits())
-            }
-            const PI_HALF_FULL: $real = std::$real::consts::FRAC_PI_2;
-
-            /// -2 ln(u) for 0 < u <= 1.
-            #[inline(always)]
-            pub(super) fn minus_two_ln(u: $real) -> $real {
+            fn minus_two_ln(self) -> Self {
                 const BIAS: $bits = ($one_exp as $bits) << $mantissa;
-                // u = m 2^e with m from sqrt(1/2) to sqrt(2); integers below 2^mantissa turn into numbers by their bits.
-                let bits = u.to_bits();
+                // self = m 2^e with m from sqrt(1/2) to sqrt(2); integers below 2^mantissa turn into numbers by their bits.
+                let bits = self.to_bits();
                 let exponent = (bits.wrapping_sub($sqrt_half).wrapping_add(BIAS)) >> $mantissa;
                 let m = $real::from_bits(bits.wrapping_sub(exponent << $mantissa).wrapping_add(BIAS));
                 let integer = (1u64 << $mantissa) as $real;
                 let exponent = $real::from_bits(integer.to_bits() | exponent) - integer - $one_exp as $real;
                 let t = (m - 1.0) / (m + 1.0);
-                let w = t * t;
-                let ln_m = 2.0 * t * polynomial(LOG, w);
+                let ln_m = 2.0 * t * polynomial(&$log, t * t);
                 -2.0 * (ln_m + exponent * std::$real::consts::LN_2)
-            }
-
-            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-            pub(super) fn multiply_cis(field: &mut [Complex<$real>], phase: &[$real], scale: $real) {
-                let mut sin = [0.0; BLOCK];
-                let mut cos = [0.0; BLOCK];
-                for (field, phase) in field.chunks_mut(BLOCK).zip(phase.chunks(BLOCK)) {
-                    for ((s, c), &p) in sin.iter_mut().zip(&mut cos).zip(phase) {
-                        (*s, *c) = sin_cos(p * scale);
-                    }
-                    for ((e, &s), &c) in field.iter_mut().zip(&sin).zip(&cos) {
-                        *e = Complex::new(e.re * c - e.im * s, e.re * s + e.im * c);
-                    }
-                }
-            }
-
-            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-            pub(super) fn normals(radius: &[u32], angle: &[u32], amplitude: &[$real], out: &mut [Complex<$real>]) {
-                let mut a = [0.0; BLOCK];
-                let mut b = [0.0; BLOCK];
-                let chunks = radius.chunks(BLOCK).zip(angle.chunks(BLOCK)).zip(amplitude.chunks(BLOCK));
-                for (((radius, angle), amplitude), out) in chunks.zip(out.chunks_mut(BLOCK)) {
-                    let words = radius.iter().zip(angle).zip(amplitude);
-                    for (((&u, &v), &amplitude), (a, b)) in words.zip(a.iter_mut().zip(&mut b)) {
-                        let unit = ((u >> 1) as i32 as $real + 0.5) * (1.0 / 2_147_483_648.0);
-                        let r = minus_two_ln(unit).max(0.0).sqrt() * amplitude;
-                        let part = (v & 0x3fff_ffff) as i32 as $real * (1.0 / 1_073_741_824.0) - 0.5;
-                        let (s, c) = sin_cos_of_quadrant(part * PI_HALF_FULL, $bits::from(v >> 30));
-                        (*a, *b) = (r * c, r * s);
-                    }
-                    for ((o, &a), &b) in out.iter_mut().zip(&a).zip(&b) {
-                        *o = Complex::new(a, b);
-                    }
-                }
-            }
-
-            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-            pub(super) fn multiply_scaled(
-                row: &mut [Complex<$real>],
-                factor: Complex<$real>,
-                other: &[Complex<$real>],
-            ) {
-                for (e, h) in row.iter_mut().zip(other) {
-                    let w = Complex::new(factor.re * h.re - factor.im * h.im, factor.re * h.im + factor.im * h.re);
-                    *e = Complex::new(e.re * w.re - e.im * w.im, e.re * w.im + e.im * w.re);
-                }
-            }
-
-            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-            pub(super) fn absorb(row: &mut [Complex<$real>], factor: $real, window: &[$real]) -> f64 {
-                let mut sum = [0.0; LANES];
-                for (row, window) in row.chunks_mut(LANES).zip(window.chunks(LANES)) {
-                    for ((e, &w), sum) in row.iter_mut().zip(window).zip(&mut sum) {
-                        let w = w * factor;
-                        let damped = Complex::new(e.re * w, e.im * w);
-                        *sum += damped.re * damped.re + damped.im * damped.im;
-                        *e = damped;
-                    }
-                }
-                sum.iter().map(|&s| f64::from(s)).sum()
-            }
-
-            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-            pub(super) fn intensity(row: &[Complex<$real>], scale: $real, out: &mut [$real]) {
-                for (e, o) in row.iter().zip(out) {
-                    *o = (e.re * e.re + e.im * e.im) * scale;
-                }
-            }
-
-            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-            pub(super) fn dot(a: &[$real], b: &[$real]) -> f64 {
-                let mut sum = [0.0; LANES];
-                for (a, b) in a.chunks(LANES).zip(b.chunks(LANES)) {
-                    for ((&a, &b), sum) in a.iter().zip(b).zip(&mut sum) {
-                        *sum += a * b;
-                    }
-                }
-                sum.iter().map(|&s| f64::from(s)).sum()
-            }
-
-            #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-            pub(super) fn finish_screen(
-                row: &[Complex<$real>],
-                ramp: &[Complex<$real>],
-                low: &LowRow<'_, $real>,
-                [first, second]: [&mut [$real]; 2],
-            ) {
-                let factor = low.ramp;
-                let mut start = 0;
-                while start < row.len() {
-                    let end = (start + BLOCK).min(row.len());
-                    let mut re = [0.0; BLOCK];
-                    let mut im = [0.0; BLOCK];
-                    for (basis, &[cre, cim]) in low.basis.iter().zip(low.coefficient) {
-                        for ((&p, re), im) in basis[start..end].iter().zip(&mut re).zip(&mut im) {
-                            *re += cre * p;
-                            *im += cim * p;
-                        }
-                    }
-                    let values = row[start..end].iter().zip(&ramp[start..end]);
-                    let sums = re.iter().zip(&im);
-                    let outs = first[start..end].iter_mut().zip(&mut second[start..end]);
-                    for (((e, p), (&re, &im)), (a, b)) in values.zip(sums).zip(outs) {
-                        let w = Complex::new(p.re * factor.re - p.im * factor.im, p.re * factor.im + p.im * factor.re);
-                        *a = e.re * w.re - e.im * w.im + re;
-                        *b = e.re * w.im + e.im * w.re + im;
-                    }
-                    start = end;
-                }
             }
         }
 
@@ -254,39 +238,25 @@ macro_rules! kernels {
             fn wide(self) -> f64 {
                 f64::from(self)
             }
-            fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2] {
-                let mut planner = FftPlanner::new();
-                [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
-            }
-            fn multiply_cis(field: &mut [Complex<Self>], phase: &[Self], scale: Self) {
-                $module::multiply_cis(field, phase, scale);
-            }
-            fn normals(radius: &[u32], angle: &[u32], amplitude: &[Self], out: &mut [Complex<Self>]) {
-                $module::normals(radius, angle, amplitude, out);
-            }
-            fn multiply_scaled(row: &mut [Complex<Self>], factor: Complex<Self>, other: &[Complex<Self>]) {
-                $module::multiply_scaled(row, factor, other);
-            }
-            fn absorb(row: &mut [Complex<Self>], factor: Self, window: &[Self]) -> f64 {
-                $module::absorb(row, factor, window)
-            }
-            fn intensity(row: &[Complex<Self>], scale: Self, out: &mut [Self]) {
-                $module::intensity(row, scale, out);
-            }
-            fn dot(a: &[Self], b: &[Self]) -> f64 {
-                $module::dot(a, b)
-            }
-            fn finish_screen(r: &[Complex<Self>], ramp: &[Complex<Self>], low: &LowRow<'_, Self>, o: [&mut [Self]; 2]) {
-                $module::finish_screen(r, ramp, low, o);
-            }
         }
     };
 }
 
+/// Sum of coefficient\[i\] t^i.
+#[inline(always)]
+fn polynomial<T: Real>(coefficient: &[T], t: T) -> T {
+    let mut sum = coefficient[coefficient.len() - 1];
+    let mut i = coefficient.len() - 1;
+    while i > 0 {
+        i -= 1;
+        sum = sum * t + coefficient[i];
+    }
+    sum
+}
+
 // pi/2 in three parts whose first two are exact in products with the integers that occur; near-minimax polynomials
 // (Chebyshev interpolation in r^2) of (sin r - r)/r^3 and (cos r - 1 + r^2/2)/r^4; series of artanh.
-kernels!(
-    single,
+scalar!(
     f32,
     u32,
     23,
@@ -297,8 +267,7 @@ kernels!(
     [0.041_666_664_54, -0.001_388_827_945, 0.000_024_542_896_34],
     [1.0, 1.0 / 3.0, 0.2, 1.0 / 7.0, 1.0 / 9.0]
 );
-kernels!(
-    double,
+scalar!(
     f64,
     u64,
     52,
@@ -326,16 +295,17 @@ kernels!(
 
 #[cfg(test)]
 mod tests {
+    use super::sealed::Scalar;
     use super::*;
 
     #[test]
     fn sine_and_cosine_agree_with_the_standard_library() {
         for i in 0..200_000 {
             let x = (f64::from(i) - 1e5) * 0.003_171_3;
-            let (s, c) = double::sin_cos(x);
+            let (s, c) = Scalar::sin_cos(x);
             assert!((s - x.sin()).abs() < 3e-16 && (c - x.cos()).abs() < 3e-16, "{x}");
             let y = x as f32;
-            let (s, c) = single::sin_cos(y);
+            let (s, c) = Scalar::sin_cos(y);
             let wide = f64::from(y);
             assert!((f64::from(s) - wide.sin()).abs() < 1.5e-7 && (f64::from(c) - wide.cos()).abs() < 1.5e-7, "{y}");
         }
@@ -346,11 +316,11 @@ mod tests {
         for i in 1..100_000u32 {
             let u = f64::from(i) / 1e5;
             let exact = -2.0 * u.ln();
-            assert!((double::minus_two_ln(u) - exact).abs() < 1e-15 * exact.max(1.0));
-            let single = f64::from(single::minus_two_ln(u as f32));
+            assert!((u.minus_two_ln() - exact).abs() < 1e-15 * exact.max(1.0));
+            let single = f64::from((u as f32).minus_two_ln());
             assert!((single + 2.0 * f64::from(u as f32).ln()).abs() < 3e-7 * exact.max(1.0));
         }
-        assert_eq!(single::minus_two_ln(1.0), 0.0);
+        assert_eq!(1f32.minus_two_ln(), 0.0);
     }
 
     #[test]
@@ -361,10 +331,10 @@ mod tests {
         const N: usize = 200_000;
         let words: Vec<(u32, u32)> = (0..N).map(|_| (rng.next_u32(), rng.next_u32())).collect();
         let (radius, angle): (Vec<_>, Vec<_>) = words.into_iter().unzip();
-        let mut out = vec![Complex::default(); N];
-        f64::normals(&radius, &angle, &vec![1.0; N], &mut out);
-        let mut single = vec![Complex::default(); N];
-        f32::normals(&radius, &angle, &vec![1.0; N], &mut single);
+        let mut out = vec![Complex::<f64>::default(); N];
+        normals(&radius, &angle, &vec![1.0; N], &mut out);
+        let mut single = vec![Complex::<f32>::default(); N];
+        normals(&radius, &angle, &vec![1.0; N], &mut single);
         for (a, b) in out.iter().zip(&single) {
             assert!((a.re - f64::from(b.re)).abs() < 1e-5 && (a.im - f64::from(b.im)).abs() < 1e-5);
         }

@@ -7,7 +7,7 @@
 use crate::Error;
 use crate::error::{finite, positive, within};
 use crate::screens::grid::{Fft2, FftScratch, Grid};
-use crate::screens::kernel::Real;
+use crate::screens::kernel::{self, Real};
 use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
 
@@ -136,7 +136,7 @@ impl<T: Real> Propagator<T> {
         self.fft.forward_x(field, transposed, scratch, |row, block| {
             if let Some((phase, scale)) = screen {
                 let start = row * self.grid.nx;
-                T::multiply_cis(block, &phase[start..start + block.len()], scale);
+                kernel::multiply_cis(block, &phase[start..start + block.len()], scale);
             }
         });
         Ok(())
@@ -153,14 +153,14 @@ impl<T: Real> Propagator<T> {
         let Grid { nx, ny, dx_m, dy_m } = self.grid;
         self.fft.filter_y(transposed, fields.each_mut().map(|field| &mut **field), scratch, |which, kx, block| {
             for (i, line) in block.chunks_exact_mut(ny).enumerate() {
-                T::multiply_scaled(line, transfers[which].x[kx + i], &transfers[which].y);
+                kernel::multiply_scaled(line, transfers[which].x[kx + i], &transfers[which].y);
             }
         });
         fields.map(|field| {
             let mut power = 0.0;
             self.fft.inverse_x(field, scratch, |y, block| {
                 for (i, line) in block.chunks_exact_mut(nx).enumerate() {
-                    power += T::absorb(line, self.window[1][y + i], &self.window[0]);
+                    power += kernel::absorb(line, self.window[1][y + i], &self.window[0]);
                 }
             });
             power * dx_m * dy_m

@@ -23,7 +23,7 @@ fn fast_walk_is_the_literal_loop_to_round_off() {
         range_m: vec![range_m],
         ..MonteCarlo::table2(cn2, seed).expect("set-up")
     };
-    let fast = run.run::<f64>(Stop::after(2), |_| ControlFlow::Continue(())).expect("run");
+    let fast = run.run_in::<f64>(Stop::after(2), |_| ControlFlow::Continue(())).expect("run");
     // The numbers of the fast walk are freed of their correction to the exact free-space efficiency.
     let raw = fast.grid_free_space[0] / fast.exact_free_space[0];
 

@@ -40,7 +40,7 @@ pub(crate) fn bistatic_z(run: &MonteCarlo, estimate: &EfficiencyEstimate) -> Vec
 fn bistatic_mean_agrees_with_exact_theory_and_monostatic_exceeds_it() {
     for (cn2, seed) in [(1e-15, 3), (1e-14, 4), (1e-13, 5)] {
         let run = coarse(cn2, seed);
-        let estimate = run.run::<f32>(Stop::after(240), go).expect("run");
+        let estimate = run.run_in::<f32>(Stop::after(240), go).expect("run");
         let z = bistatic_z(&run, &estimate);
         assert!(z.iter().all(|z| z.abs() < 3.0), "{cn2:e}: {z:?}");
         let bistatic = estimate.bistatic.as_ref().expect("pairs");
@@ -64,7 +64,7 @@ fn ranges_inside_layers_profiles_and_displaced_beams_agree_with_exact_theory() {
     run.layers = Layers::new(vec![150.0, 400.0, 700.0, 1100.0]).expect("layers");
     // Before the first screen, inside layers, and at the end of one.
     run.range_m = vec![60.0, 300.0, 700.0, 1000.0];
-    let estimate = run.run::<f32>(Stop::after(240), go).expect("run");
+    let estimate = run.run_in::<f32>(Stop::after(240), go).expect("run");
     let z = bistatic_z(&run, &estimate);
     assert!(z.iter().all(|z| z.abs() < 3.2), "{z:?}");
     // Different beams: the same-path value may fall below, but not by much of its error.
@@ -80,7 +80,7 @@ fn free_space_on_the_chapters_grid_is_within_1e_3_raw_and_exact_when_corrected()
         let exact = free_space_efficiency(&run.telescope, *range_m).expect("theory");
         assert!((eta / exact - 1.0).abs() < 1e-3, "{range_m}: {}", eta / exact - 1.0);
     }
-    let corrected = run.run::<f64>(Stop::after(400), go).expect("run");
+    let corrected = run.run_in::<f64>(Stop::after(400), go).expect("run");
     for (eta, exact) in corrected.monostatic.mean.iter().zip(&corrected.exact_free_space) {
         assert!((eta / exact - 1.0).abs() < 1e-13);
     }
@@ -96,7 +96,7 @@ fn infinite_outer_scale_agrees_with_exact_theory() {
     let spectrum = VonKarman::new(Scales { outer_scale_m: f64::INFINITY, inner_scale_m: 0.01, convention }, 0.033);
     run.turbulence.spectrum = std::sync::Arc::new(spectrum.expect("spectrum"));
     run.range_m = vec![900.0, 2100.0];
-    let estimate = run.run::<f32>(Stop::after(200), go).expect("run");
+    let estimate = run.run_in::<f32>(Stop::after(200), go).expect("run");
     let z = bistatic_z(&run, &estimate);
     assert!(z.iter().all(|z| z.abs() < 3.0), "{z:?}");
 }
@@ -106,10 +106,10 @@ fn antithetic_paths_are_unbiased_and_worth_half_as_many_again() {
     let mut run = coarse(1e-13, 77);
     run.layers = Layers::equal(4, 1000.0).expect("layers");
     run.range_m = vec![500.0, 1000.0];
-    let plain = run.run::<f32>(Stop::after(400), go).expect("run");
+    let plain = run.run_in::<f32>(Stop::after(400), go).expect("run");
     run.seed = 78;
     run.sampling = Sampling::Antithetic;
-    let paired = run.run::<f32>(Stop::after(400), go).expect("run");
+    let paired = run.run_in::<f32>(Stop::after(400), go).expect("run");
     let z = bistatic_z(&run, &paired);
     assert!(z.iter().all(|z| z.abs() < 3.0), "{z:?}");
     for i in 0..2 {
@@ -126,7 +126,7 @@ fn long_waves_give_free_space_too() {
     let mut run = coarse(0.0, 1);
     run.telescope.wavelength_m = 10.6e-6;
     run.range_m = vec![200.0, 500.0, 1000.0];
-    let estimate = run.run::<f64>(Stop::after(1), go).expect("run");
+    let estimate = run.run_in::<f64>(Stop::after(1), go).expect("run");
     for (eta, exact) in estimate.grid_free_space.iter().zip(&estimate.exact_free_space) {
         assert!((eta / exact - 1.0).abs() < 2e-3, "{eta} {exact}");
     }
@@ -140,7 +140,7 @@ fn focused_obscured_and_uniform_beams_are_right_on_the_grid() {
         let mut run = MonteCarlo::table2(0.0, 1).expect("set-up");
         run.telescope = Telescope { focus, obscuration_radius_m, beam_radius_m, ..run.telescope };
         run.range_m = vec![400.0, 600.0, 1000.0];
-        let estimate = run.run::<f64>(Stop::after(1), go).expect("run");
+        let estimate = run.run_in::<f64>(Stop::after(1), go).expect("run");
         for (eta, exact) in estimate.grid_free_space.iter().zip(&estimate.exact_free_space) {
             assert!((eta / exact - 1.0).abs() < 2e-3, "{focus:?}: {eta} {exact}");
         }
@@ -151,7 +151,7 @@ fn focused_obscured_and_uniform_beams_are_right_on_the_grid() {
 fn very_weak_turbulence_differs_from_free_space_by_little() {
     let mut run = coarse(1e-18, 1);
     run.range_m = vec![1500.0];
-    let estimate = run.run::<f64>(Stop::after(4), go).expect("run");
+    let estimate = run.run_in::<f64>(Stop::after(4), go).expect("run");
     let change = estimate.monostatic.mean[0] / estimate.exact_free_space[0] - 1.0;
     assert!(change.abs() < 5e-3, "{change}");
     assert!(estimate.monostatic.standard_error[0] > 0.0);
@@ -161,13 +161,13 @@ fn very_weak_turbulence_differs_from_free_space_by_little() {
 fn single_realisation_has_no_bistatic_value() {
     let mut run = coarse(1e-14, 1);
     run.range_m = vec![300.0];
-    let estimate = run.run::<f32>(Stop::after(1), go).expect("run");
+    let estimate = run.run_in::<f32>(Stop::after(1), go).expect("run");
     assert!(estimate.bistatic.is_none());
     assert_eq!((estimate.realisations, estimate.independent_samples), (1, 1));
     // Nothing is known of its error, least of all that it is 0.
     assert!(estimate.monostatic.standard_error[0].is_nan() && estimate.monostatic.standard_deviation[0].is_nan());
     estimate.monostatic.validated().expect("a profile without errors is a profile");
-    assert!(matches!(run.run::<f32>(Stop::after(0), go), Err(Error::OutOfRange { field: "realisations", .. })));
+    assert!(matches!(run.run_in::<f32>(Stop::after(0), go), Err(Error::OutOfRange { field: "realisations", .. })));
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn errors_that_too_few_samples_leave_open_are_not_known() {
     run.sampling = Sampling::Antithetic;
     // Order +A +B -A -B +C: three realisations are two samples, five are three.
     for (realisations, samples, bistatic_known) in [(2, 2, false), (3, 2, false), (5, 3, true)] {
-        let estimate = run.run::<f32>(Stop::after(realisations), go).expect("run");
+        let estimate = run.run_in::<f32>(Stop::after(realisations), go).expect("run");
         assert_eq!(estimate.independent_samples, samples, "{realisations}");
         let monostatic = estimate.monostatic.validated().expect("profile");
         let bistatic = estimate.bistatic.expect("pairs").validated().expect("profile");
@@ -201,7 +201,7 @@ fn few_realisations_state_the_error_that_they_have() {
         let (mut z, mut stated, mut means) = (Vec::new(), Vec::new(), Vec::new());
         for seed in 0..runs {
             let run = MonteCarlo { seed: 100 + seed, sampling, ..set_up.clone() };
-            let estimate = run.run::<f32>(Stop::after(realisations), go).expect("run");
+            let estimate = run.run_in::<f32>(Stop::after(realisations), go).expect("run");
             z.extend(bistatic_z(&run, &estimate));
             let bistatic = estimate.bistatic.expect("pairs");
             stated.push(bistatic.standard_error[0]);
@@ -227,8 +227,8 @@ fn single_and_double_precision_agree_far_below_the_monte_carlo_error() {
     let mut run = coarse(1e-13, 6);
     run.grid = Grid { nx: 128, ny: 135, dx_m: 4e-3, dy_m: 4e-3 };
     run.range_m = vec![300.0, 600.0];
-    let single = run.run::<f32>(Stop::after(6), go).expect("run");
-    let double = run.run::<f64>(Stop::after(6), go).expect("run");
+    let single = run.run_in::<f32>(Stop::after(6), go).expect("run");
+    let double = run.run_in::<f64>(Stop::after(6), go).expect("run");
     for (a, b) in single.monostatic.mean.iter().zip(&double.monostatic.mean) {
         assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
     }
@@ -240,7 +240,7 @@ fn odd_and_rectangular_grids_agree_with_exact_theory() {
     run.grid = Grid { nx: 131, ny: 192, dx_m: 5e-3, dy_m: 4e-3 };
     run.layers = Layers::equal(4, 1000.0).expect("layers");
     run.range_m = vec![500.0, 1000.0];
-    let estimate = run.run::<f32>(Stop::after(200), go).expect("run");
+    let estimate = run.run_in::<f32>(Stop::after(200), go).expect("run");
     let z = bistatic_z(&run, &estimate);
     assert!(z.iter().all(|z| z.abs() < 3.0), "{z:?}");
 }
@@ -254,7 +254,7 @@ fn result_has_the_same_bits_for_one_two_and_eight_threads() {
         run.range_m = vec![200.0, 600.0];
         run.sampling = sampling;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
-        pool.install(|| run.run::<T>(Stop::after(76), go)).expect("run")
+        pool.install(|| run.run_in::<T>(Stop::after(76), go)).expect("run")
     }
     for sampling in [Sampling::Independent, Sampling::Antithetic] {
         let one = with_threads::<f32>(1, sampling);
@@ -269,10 +269,10 @@ fn run_ends_at_the_target_error_and_can_be_cancelled() {
     run.grid = Grid::square(128, 4e-3).expect("grid");
     run.range_m = vec![300.0];
     let stop = Stop { realisations: 100_000, relative_standard_error: Some(0.02) };
-    let estimate = run.run::<f32>(stop, go).expect("run");
+    let estimate = run.run_in::<f32>(stop, go).expect("run");
     let relative = estimate.monostatic.standard_error[0] / estimate.monostatic.mean[0];
     assert!(relative <= 0.02 && estimate.realisations < 10_000, "{relative}");
-    let cancelled = run.run::<f32>(Stop::after(1000), |p| {
+    let cancelled = run.run_in::<f32>(Stop::after(1000), |p| {
         if p.done >= 128 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     assert_eq!(cancelled, Err(Error::Cancelled { realisations: 128 }));
@@ -282,12 +282,12 @@ fn run_ends_at_the_target_error_and_can_be_cancelled() {
 fn beam_that_leaves_the_grid_is_refused() {
     let mut run = coarse(1e-13, 2);
     run.telescope = Telescope { focus: Focus::At(200.0), ..run.telescope };
-    assert!(matches!(run.run::<f32>(Stop::after(2), go), Err(Error::Sampling { .. })));
+    assert!(matches!(run.run_in::<f32>(Stop::after(2), go), Err(Error::Sampling { .. })));
     // Strong turbulence on a narrow grid: the border takes the scattered light.
     let mut run = coarse(1e-12, 2);
     run.grid = Grid::square(128, 3e-3).expect("grid");
     run.telescope.beam_radius_m = 0.03;
-    assert!(matches!(run.run::<f32>(Stop::after(8), go), Err(Error::PowerLost { .. } | Error::Sampling { .. })));
+    assert!(matches!(run.run_in::<f32>(Stop::after(8), go), Err(Error::PowerLost { .. } | Error::Sampling { .. })));
     assert!(matches!(Turbulence::table2(-1.0), Err(Error::OutOfRange { field: "cn2_m_m23", .. })));
 }
 
@@ -295,10 +295,10 @@ fn beam_that_leaves_the_grid_is_refused() {
 fn ranges_may_be_listed_in_any_order() {
     let sorted = MonteCarlo { range_m: vec![300.0, 700.0, 900.0], ..coarse(1e-14, 3) };
     let mixed = MonteCarlo { range_m: vec![900.0, 300.0, 700.0, 300.0], ..coarse(1e-14, 3) };
-    let run = |set_up: &MonteCarlo| set_up.run::<f32>(Stop::after(4), go).expect("run");
+    let run = |set_up: &MonteCarlo| set_up.run_in::<f32>(Stop::after(4), go).expect("run");
     assert_eq!(run(&mixed), run(&sorted));
     let bad = MonteCarlo { range_m: vec![900.0, f64::NAN], ..coarse(1e-14, 3) };
-    assert!(matches!(bad.run::<f32>(Stop::after(4), go), Err(Error::OutOfRange { field: "range_m", .. })));
+    assert!(matches!(bad.run_in::<f32>(Stop::after(4), go), Err(Error::OutOfRange { field: "range_m", .. })));
 }
 
 #[test]
@@ -307,7 +307,7 @@ fn efficiencies_of_the_realisations_have_the_mean_and_the_scatter_of_the_profile
     run.grid = Grid::square(128, 4e-3).expect("grid");
     run.range_m = vec![200.0, 600.0];
     run.sampling = Sampling::Antithetic;
-    let estimate = run.run::<f32>(Stop::after(48), go).expect("run");
+    let estimate = run.run_in::<f32>(Stop::after(48), go).expect("run");
     let bistatic = estimate.bistatic.as_ref().expect("pairs");
     for (range, list) in estimate.monostatic_realisations.iter().enumerate() {
         assert_eq!(list.len(), 48);
@@ -323,7 +323,7 @@ fn efficiencies_of_the_realisations_have_the_mean_and_the_scatter_of_the_profile
 
 /// z of the monostatic mean against first-order theory, at each range.
 fn weak_z(run: &MonteCarlo, realisations: usize) -> Vec<f64> {
-    let estimate = run.run::<f32>(Stop::after(realisations), go).expect("run");
+    let estimate = run.run_in::<f32>(Stop::after(realisations), go).expect("run");
     let of = |(i, &range_m): (usize, &f64)| {
         let weak = weak_turbulence_efficiency(&run.telescope, &run.turbulence, range_m).expect("theory");
         assert!(weak.valid && weak.monostatic > weak.bistatic, "{weak:?}");

@@ -30,7 +30,7 @@ fn derived_grids_hold_the_light_that_was_forecast() {
             sampling: Sampling::Antithetic,
             ..MonteCarlo::table2(cn2, 1).expect("set-up")
         };
-        let estimate = run.run::<f32>(Stop::after(8), go).expect("run");
+        let estimate = run.run_in::<f32>(Stop::after(8), go).expect("run");
         let lost = estimate.lost_power_fraction.iter().fold(0f64, |a, b| a.max(*b));
         assert!(lost < 0.01 && lost < 1.3 * planned.light_lost, "{cn2:e}: {lost} {}", planned.light_lost);
         assert!(planned.warnings.is_empty(), "{:?}", planned.warnings);
@@ -45,7 +45,7 @@ fn derived_grids_hold_the_light_that_was_forecast() {
         matches!(warnings[..], [Warning::LightLost { fraction, width_m }] if fraction > 0.01 && width_m > 0.3),
         "{warnings:?}"
     );
-    let estimate = run.run::<f32>(Stop::after(8), go).expect("run");
+    let estimate = run.run_in::<f32>(Stop::after(8), go).expect("run");
     assert!(estimate.lost_power_fraction[0] > 0.01);
 }
 
@@ -66,7 +66,7 @@ fn far_field_of_a_small_aperture_needs_fewer_points() {
     }
     // Four points across the radius give the exact mean, where the aperture is in the far field.
     let run = coarse_run(telescope);
-    let estimate = run.run::<f32>(Stop::after(160), go).expect("run");
+    let estimate = run.run_in::<f32>(Stop::after(160), go).expect("run");
     let z = bistatic_z(&run, &estimate);
     assert!(z.iter().all(|z| z.abs() < 3.0), "{z:?}");
     for (grid, exact) in estimate.grid_free_space.iter().zip(&estimate.exact_free_space) {
@@ -132,7 +132,7 @@ fn derived_grids_give_the_exact_mean_in_and_beside_a_near_focus() {
         let (grid, layers, sampling) = (planned.grid, planned.layers.clone(), Sampling::Antithetic);
         let set_up = MonteCarlo::table2(cn2, 7).expect("set-up");
         let run = MonteCarlo { telescope, grid, layers, range_m, sampling, ..set_up };
-        let estimate = run.run::<f32>(Stop::after(realisations), go).expect("run");
+        let estimate = run.run_in::<f32>(Stop::after(realisations), go).expect("run");
         let z = bistatic_z(&run, &estimate);
         assert!(z.iter().all(|z| z.abs() < 3.5), "{focus_m}: {z:?}");
         for (raw, exact) in estimate.grid_free_space.iter().zip(&estimate.exact_free_space) {

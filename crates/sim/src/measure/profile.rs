@@ -209,7 +209,7 @@ impl Screens {
         let mut seen = 0;
         // Single precision: its rounding is far below the error of any number of realisations.
         let estimate =
-            instrument.monte_carlo(t, &range_m, scene.seed)?.run::<f32>(Stop::after(t.realisations), |progress| {
+            instrument.monte_carlo(t, &range_m, scene.seed)?.run_in::<f32>(Stop::after(t.realisations), |progress| {
                 observer.advance((progress.done - seen) as u64);
                 seen = progress.done;
                 ControlFlow::Continue(())
