@@ -45,17 +45,12 @@ impl EfficiencyTable {
     /// # Errors
     /// [`Error::OutOfRange`] if a layer lies beyond the table.
     pub fn onto_layers(&self, line: &LineOfSight) -> Result<LayerEfficiency, Error> {
-        let places = (0..line.layers())
-            .map(|layer| {
-                let range_m = line.range_m(layer);
-                let allowed = "within the ranges of the efficiency table";
-                locate(&self.range_m, range_m).ok_or(Error::OutOfRange {
-                    field: "range of a layer, m",
-                    value: range_m,
-                    allowed,
-                })
-            })
-            .collect::<Result<Vec<_>, _>>()?;
+        let (field, allowed) = ("range of a layer, m", "within the ranges of the efficiency table");
+        let place = |layer| {
+            let value = line.range_m(layer);
+            locate(&self.range_m, value).ok_or(Error::OutOfRange { field, value, allowed })
+        };
+        let places = (0..line.layers()).map(place).collect::<Result<Vec<_>, _>>()?;
         if places.is_empty() {
             return Err(Error::Empty { field: "radial_velocity_m_s" });
         }

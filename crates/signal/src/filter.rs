@@ -97,10 +97,8 @@ impl RangeFilter {
     /// Full width of the weights at half their maximum \[m\], between the outermost ranges that have half of it: the range
     /// resolution.
     pub fn full_width_half_maximum_m(&self) -> f64 {
-        let (near_m, far_m) = self.pulse.weight_reach_m();
-        let sample_m = |tap: Option<&(f64, f64)>| 0.5 * SPEED_OF_LIGHT_M_S * tap.map_or(0.0, |&(time_s, _)| time_s);
-        let first_m = sample_m(self.taps.first()) + near_m;
-        let length_m = sample_m(self.taps.last()) + far_m - first_m;
+        let (first_m, last_m) = self.reach_m();
+        let length_m = last_m - first_m;
         // Half a sample at most, so that samples apart are not passed over.
         let apart_m = sample_m(self.taps.get(1)) - sample_m(self.taps.first());
         let fine_m = if apart_m > 0.0 { 0.5 * apart_m } else { length_m };
@@ -175,20 +173,29 @@ impl RangeFilter {
         Ok(())
     }
 
+    /// Offsets \[m\] beyond a range between which the weights are not negligible.
+    fn reach_m(&self) -> (f64, f64) {
+        let (near_m, far_m) = self.pulse.weight_reach_m();
+        (sample_m(self.taps.first()) + near_m, sample_m(self.taps.last()) + far_m)
+    }
+
     /// Weights for a range that lies `part` of a layer beyond the centre of one: offset of the first in layers from that
     /// one, and one weight per layer; they sum to 1.
     fn weights(&self, part: f64) -> (i64, Vec<f64>) {
-        let (near_m, far_m) = self.pulse.weight_reach_m();
-        let sample_m = |tap: Option<&(f64, f64)>| 0.5 * SPEED_OF_LIGHT_M_S * tap.map_or(0.0, |&(time_s, _)| time_s);
-        let layers = |offset_m: f64| (offset_m / self.layer_thickness_m) as i64;
-        let first = layers(sample_m(self.taps.first()) + near_m) - 1;
-        let last = layers(sample_m(self.taps.last()) + far_m) + 1;
+        let (first_m, last_m) = self.reach_m();
+        let first = (first_m / self.layer_thickness_m) as i64 - 1;
+        let last = (last_m / self.layer_thickness_m) as i64 + 1;
         let mut weights: Vec<f64> =
             (first..=last).map(|l| self.weight_per_m((l as f64 - part) * self.layer_thickness_m)).collect();
         let sum: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|weight| *weight /= sum);
         (first, weights)
     }
+}
+
+/// Offset \[m\] of the range that a sample sees.
+fn sample_m(tap: Option<&(f64, f64)>) -> f64 {
+    0.5 * SPEED_OF_LIGHT_M_S * tap.map_or(0.0, |&(time_s, _)| time_s)
 }
 
 /// Mean of the part of a profile that the weights cover; the first weight belongs to layer `first`, which may be negative.

@@ -146,6 +146,20 @@ impl Simulator {
         result
     }
 
+    /// The samples of one pulse \[A\], as [`Simulator::record_into`] writes them, in memory of their own.
+    ///
+    /// # Errors
+    /// As [`Simulator::record_into`].
+    pub fn record_of<'a, T: Sample, R: Rng + ?Sized>(
+        &self,
+        shot: impl Into<Shot<'a>>,
+        rng: &mut R,
+    ) -> Result<Vec<T>, Error> {
+        let mut samples_a = vec![T::default(); self.record.samples];
+        self.record_into(shot, rng, &mut Scratch::default(), &mut samples_a)?;
+        Ok(samples_a)
+    }
+
     /// Writes the complex envelope `s(t_k)` of one pulse, (15), corrected \[A\], without noise; with the phases of the laser, the
     /// reflex of the telescope and the echo of the pulse before, if the receiver or the shot has them.
     ///

@@ -11,16 +11,13 @@
 //!
 //! let (pulse, receiver) = (Pulse::from(GaussianPulse::table2()), Receiver::table2());
 //! let simulator = Simulator::new(&pulse, receiver, Record { time_of_first_sample_s: 2e-6, samples: 256 })?;
-//! let limits = LayerLimits {
-//!     sample_rate_hz: receiver.sample_rate_hz, wavelength_m: receiver.wavelength_m, max_gradient_per_s: 0.5,
-//! };
+//! let limits = receiver.layer_limits(0.5);
 //! let line = LineOfSight {
 //!     first_range_m: 250.0, layer_thickness_m: pulse.layer_thickness_m(limits)?,
 //!     radial_velocity_m_s: vec![3.0; 500], weight_per_m: vec![4e-17; 500],
 //! };
 //! let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(1);
-//! let mut current_a = [0.0; 256];
-//! simulator.record_into(&line, &mut rng, &mut Scratch::default(), &mut current_a)?;
+//! let current_a: Vec<f64> = simulator.record_of(&line, &mut rng)?;
 //! assert!(current_a.iter().all(|i| i.is_finite() && *i != 0.0));
 //! # Ok::<(), Error>(())
 //! ```
@@ -29,9 +26,8 @@
 //!
 //! | module | what is in it |
 //! |---|---|
-//! | `pulse` | [`GaussianPulse`]: envelope (7), its range weight |
+//! | `pulse` | [`Pulse`]: [`GaussianPulse`] (7) or sampled, with chirp; its moments and range weight, and the layers it needs |
 //! | [`sampled`] | [`SampledPulse`](sampled::SampledPulse): any envelope given by samples, and how it is resampled |
-//! | `transmitted` | [`Pulse`]: either of them, with chirp; its moments, and the layers it needs |
 //! | `piecewise` | the cubic pieces that a sampled envelope is kept in |
 //! | `medium` | [`Medium`]: backscatter and extinction by range |
 //! | [`efficiency`] | [`EfficiencyTable`](efficiency::EfficiencyTable): heterodyne efficiency, one curve or one realisation per pulse |
@@ -78,7 +74,6 @@ pub mod sampled;
 pub mod scan;
 mod shot;
 mod table;
-mod transmitted;
 pub mod transmitter;
 mod window;
 
@@ -88,13 +83,12 @@ pub use filter::RangeFilter;
 pub use heterodyne::{Scratch, Simulator};
 pub use line::{LayerLimits, LineOfSight};
 pub use medium::Medium;
-pub use pulse::{GaussianPulse, PulseDuration};
+pub use pulse::{GaussianPulse, Pulse, PulseDuration};
 pub use receiver::{NoiseModel, Receiver};
 pub use record::Record;
 pub use sample::Sample;
 pub use scan::Scan;
 pub use shot::Shot;
-pub use transmitted::Pulse;
 
 /// The example of the README is run as a test.
 #[cfg(doctest)]

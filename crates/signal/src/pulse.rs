@@ -1,13 +1,28 @@
-//! The Gaussian pulse: its envelope (7), its energy and the weight that it gives to each range, (28), corrected.
+//! The transmitted pulse of any shape: Gaussian, (7), or sampled, with or without chirp; its energy, and the weight that it
+//! gives to each range, (28), corrected.
 //!
 //! Check: `|f|^2` integrates to 1 over time, falls to one half at half the full width at half maximum, and the range
-//! weight integrates to 1 over range.
+//! weight integrates to 1 over range; a chirp leaves the power alone and spreads the spectrum as its closed form says; the
+//! advised layers hold the energy of each shape.
 
 use std::f64::consts::PI;
 
-use crate::Error;
-use crate::SPEED_OF_LIGHT_M_S;
-use crate::error::check_positive;
+use num_complex::Complex;
+
+use crate::error::{check, check_positive};
+use crate::piecewise::{Moments, Piecewise};
+use crate::sampled::SampledPulse;
+use crate::{Error, LayerLimits, SPEED_OF_LIGHT_M_S};
+
+/// Half-length of the sum over a Gaussian in units of `sigma` (Frehlich 1997): outside lies `erfc(3.72)` = 1.4e-7 of the
+/// energy.
+const HALF_LENGTH_SIGMAS: f64 = 3.72;
+
+/// Largest error of the energy in a sum over layers that a record may have.
+const ALLOWED_ENERGY_ERROR: f64 = 5e-3;
+
+/// Largest error of the energy in a sum over layers of the advised thickness.
+const ADVISED_ENERGY_ERROR: f64 = 5e-4;
 
 /// The two usual meanings of "pulse duration", both of the power `|f|^2`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,11 +71,6 @@ impl GaussianPulse {
         self.sigma_s
     }
 
-    /// Full width at half maximum of the power \[s\].
-    pub fn full_width_half_maximum_s(&self) -> f64 {
-        2.0 * 2.0_f64.ln().sqrt() * self.sigma_s
-    }
-
     /// Energy of the pulse, `E_t` \[J\].
     pub fn energy_j(&self) -> f64 {
         self.energy_j
@@ -82,30 +92,281 @@ impl GaussianPulse {
         let ratio = time_s / self.sigma_s;
         (-ratio * ratio).exp() / (PI.sqrt() * self.sigma_s)
     }
+}
 
-    /// Weight of the air at `offset_m` from the range in question, `|f(2 offset/c)|^2 2/c` \[1/m\]: (28), corrected by
-    /// the Jacobian `2/c`, so that it integrates to 1 over range.
+/// A pulse as it leaves the telescope: envelope `f(t)`, of unit energy, and energy.
+///
+/// Made from a [`GaussianPulse`] or a [`SampledPulse`] by `into()`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pulse {
+    shape: Shape,
+    energy_j: f64,
+    /// Whether the shape has no imaginary part.
+    real: bool,
+    moments: Moments,
+    support_s: (f64, f64),
+    /// Thickest layer of a record, and of good ones, in time `2 DeltaR/c` \[s\], without regard to the chirp.
+    allowed_s: f64,
+    advised_s: f64,
+    chirp_hz_s: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Shape {
+    Gaussian(GaussianPulse),
+    Sampled(Piecewise),
+}
+
+impl From<GaussianPulse> for Pulse {
+    fn from(pulse: GaussianPulse) -> Self {
+        let GaussianPulse { sigma_s, energy_j } = pulse;
+        let moments = Moments {
+            energy: 1.0,
+            mean_s: 0.0,
+            square_s2: 0.5 * sigma_s * sigma_s,
+            mean_hz: 0.0,
+            square_hz2: 1.0 / (8.0 * PI * PI * sigma_s * sigma_s),
+            cross: 0.0,
+        };
+        // The sum over a Gaussian in steps d is wrong by 2 exp(-(pi sigma/d)^2): 1e-4 at d = sigma.
+        let allowed_s = PI * sigma_s / (2.0 / ALLOWED_ENERGY_ERROR).ln().sqrt();
+        let support_s = (-HALF_LENGTH_SIGMAS * sigma_s, HALF_LENGTH_SIGMAS * sigma_s);
+        let (shape, advised_s) = (Shape::Gaussian(pulse), sigma_s);
+        Self { shape, energy_j, real: true, moments, support_s, allowed_s, advised_s, chirp_hz_s: 0.0 }
+    }
+}
+
+impl From<SampledPulse> for Pulse {
+    fn from(SampledPulse { envelope, moments, energy_j, real }: SampledPulse) -> Self {
+        let (allowed_s, advised_s) =
+            (thickest_layer_s(&envelope, ALLOWED_ENERGY_ERROR), thickest_layer_s(&envelope, ADVISED_ENERGY_ERROR));
+        let (support_s, shape) = (envelope.support_s(), Shape::Sampled(envelope));
+        Self { shape, energy_j, real, moments, support_s, allowed_s, advised_s, chirp_hz_s: 0.0 }
+    }
+}
+
+impl From<&GaussianPulse> for Pulse {
+    fn from(pulse: &GaussianPulse) -> Self {
+        Self::from(*pulse)
+    }
+}
+
+impl From<&Self> for Pulse {
+    fn from(pulse: &Self) -> Self {
+        pulse.clone()
+    }
+}
+
+impl Pulse {
+    /// The same pulse with a linear chirp: the envelope times `exp(j pi chirp t^2)`, so that the frequency rises by
+    /// `chirp_hz_s` hertz per second (and so does the intermediate frequency), crossing its nominal value at `t = 0`.
+    /// Replaces a chirp given before. A chirp of another form is part of a [`SampledPulse`].
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the rate is not finite.
+    pub fn with_chirp(mut self, chirp_hz_s: f64) -> Result<Self, Error> {
+        check("chirp_hz_s", chirp_hz_s, "finite", |_| true)?;
+        self.chirp_hz_s = chirp_hz_s;
+        Ok(self)
+    }
+
+    /// Rate of the linear chirp \[Hz/s\].
+    pub fn chirp_hz_s(&self) -> f64 {
+        self.chirp_hz_s
+    }
+
+    /// Energy of the pulse, `E_t` \[J\].
+    pub fn energy_j(&self) -> f64 {
+        self.energy_j
+    }
+
+    /// Complex envelope `f(t)`, (7) for a Gaussian \[s^-1/2\]; `|f|^2` integrates to 1, (8).
+    pub fn envelope_per_sqrt_s(&self, time_s: f64) -> Complex<f64> {
+        let shape = match &self.shape {
+            Shape::Gaussian(pulse) => Complex::new(pulse.envelope_per_sqrt_s(time_s), 0.0),
+            Shape::Sampled(envelope) => envelope.value(time_s),
+        };
+        if self.chirp_hz_s == 0.0 {
+            return shape;
+        }
+        shape * Complex::cis(PI * self.chirp_hz_s * time_s * time_s)
+    }
+
+    /// Power `|f(t)|^2` for unit energy \[1/s\].
+    pub fn intensity_per_s(&self, time_s: f64) -> f64 {
+        match &self.shape {
+            Shape::Gaussian(pulse) => pulse.intensity_per_s(time_s),
+            Shape::Sampled(envelope) => envelope.value(time_s).norm_sqr(),
+        }
+    }
+
+    /// Weight `|f(2 offset/c)|^2 2/c` \[1/m\] of the air at `offset_m` on this side of the range in question, (28), corrected;
+    /// integrates to 1 over range.
     pub fn range_weight_per_m(&self, offset_m: f64) -> f64 {
         let per_range = 2.0 / SPEED_OF_LIGHT_M_S;
         self.intensity_per_s(offset_m * per_range) * per_range
     }
+
+    /// First and last time at which the envelope enters the sum (15) \[s\]: at most 2e-7 of the energy lies outside.
+    pub fn support_s(&self) -> (f64, f64) {
+        self.support_s
+    }
+
+    /// The 1/e half-width `sigma` \[s\] of the Gaussian with the same spread in time: `sqrt 2` times the standard deviation
+    /// of `|f|^2`.
+    pub fn sigma_s(&self) -> f64 {
+        (2.0 * (self.moments.square_s2 - self.moments.mean_s.powi(2))).max(0.0).sqrt()
+    }
+
+    /// `sigma` of (7) \[s\], if the power is Gaussian.
+    pub(crate) fn gaussian_sigma_s(&self) -> Option<f64> {
+        matches!(self.shape, Shape::Gaussian(_)).then(|| self.sigma_s())
+    }
+
+    /// Length scale of the pulse in range, `c sigma/2` \[m\].
+    pub fn sigma_m(&self) -> f64 {
+        0.5 * SPEED_OF_LIGHT_M_S * self.sigma_s()
+    }
+
+    /// Centroid of the power \[s\]; ranges count from time 0.
+    pub fn mean_time_s(&self) -> f64 {
+        self.moments.mean_s
+    }
+
+    /// Mean frequency of the envelope \[Hz\]: an estimator that knows nothing of it reads the velocity
+    /// `-lambda/2` times this in still air.
+    pub fn mean_frequency_hz(&self) -> f64 {
+        self.moments.mean_hz + self.chirp_hz_s * self.moments.mean_s
+    }
+
+    /// Standard deviation of the spectrum `|F(nu)|^2` of the envelope, chirp included \[Hz\]: `1/(2 sqrt2 pi sigma)` for a
+    /// Gaussian without chirp.
+    pub fn spectral_width_hz(&self) -> f64 {
+        let (m, chirp) = (&self.moments, self.chirp_hz_s);
+        let square = m.square_hz2 + 2.0 * chirp * m.cross + chirp * chirp * m.square_s2;
+        (square - self.mean_frequency_hz().powi(2)).max(0.0).sqrt()
+    }
+
+    /// Full width at half maximum of the spectrum `|F(nu)|^2` of the envelope, chirp included \[Hz\]: between its outermost points
+    /// at half of its largest value.
+    pub fn spectral_full_width_half_maximum_hz(&self) -> f64 {
+        if let Shape::Gaussian(_) = self.shape {
+            return 2.0 * (2.0 * std::f64::consts::LN_2).sqrt() * self.spectral_width_hz();
+        }
+        let ((first_s, last_s), reach_hz) = (self.support_s(), 8.0 * self.spectral_width_hz());
+        let length_s = last_s - first_s;
+        // Sixteen frequencies in the finest structure of a pulse of this length, and eight points in the fastest of its waves.
+        let times = (8.0 * reach_hz * length_s).max(2000.0) as u32;
+        let point = |i: u32| first_s + length_s * (f64::from(i) + 0.5) / f64::from(times);
+        let envelope: Vec<_> = (0..times).map(point).map(|s| (s, self.envelope_per_sqrt_s(s))).collect();
+        let frequencies = (32.0 * reach_hz * length_s).ceil() as u32;
+        let step_hz = 2.0 * reach_hz / f64::from(frequencies);
+        let power = |i: u32| {
+            let hz = self.mean_frequency_hz() - reach_hz + f64::from(i) * step_hz;
+            envelope.iter().map(|(s, f)| f * Complex::cis(-2.0 * PI * hz * s)).sum::<Complex<f64>>().norm_sqr()
+        };
+        let found: Vec<f64> = (0..=frequencies).map(power).collect();
+        let half = 0.5 * found.iter().copied().fold(0.0, f64::max);
+        // From one outer neighbour below half to the other, less what of these steps lies below.
+        let first = found.iter().position(|p| *p >= half).unwrap_or(0).max(1);
+        let last = found.iter().rposition(|p| *p >= half).unwrap_or(0).min(found.len() - 2);
+        let below = |inside: usize, outside: usize| (half - found[outside]) / (found[inside] - found[outside]);
+        step_hz * ((last - first) as f64 + 2.0 - below(first, first - 1) - below(last, last + 1))
+    }
+
+    /// Thickness of the layers \[m\] for this pulse: the largest that divides the range step of a sample, `c/(2 F_s)`, and is
+    /// at most `lambda/(16 sigma g_max)` and `c sigma/2`, holds the energy of the pulse within 5e-4, and resolves its chirp
+    /// (`2 DeltaR/c` at most an eighth of the inverse spectral width).
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if a limit is not positive (the gradient may be zero).
+    pub fn layer_thickness_m(&self, limits: LayerLimits) -> Result<f64, Error> {
+        let by_gradient_m = limits.thickness_m(self.sigma_s())?;
+        if matches!(self.shape, Shape::Gaussian(_)) && self.chirp_hz_s == 0.0 {
+            return Ok(by_gradient_m);
+        }
+        let step_m = SPEED_OF_LIGHT_M_S / (2.0 * limits.sample_rate_hz);
+        let limit_m = 0.5 * SPEED_OF_LIGHT_M_S * self.advised_s.min(0.125 / self.spectral_width_hz());
+        let parts = (step_m / by_gradient_m).round().max((step_m / limit_m).ceil());
+        Ok(step_m / parts)
+    }
+
+    /// Thickest layer that a record accepts \[m\]: the energy in a sum over layers is then within 5e-3, and the chirp is
+    /// sampled.
+    pub fn max_layer_thickness_m(&self) -> f64 {
+        0.5 * SPEED_OF_LIGHT_M_S * self.allowed_s.min(0.25 / self.spectral_width_hz())
+    }
+
+    /// Whether the envelope has no imaginary part.
+    pub(crate) fn is_real(&self) -> bool {
+        self.chirp_hz_s == 0.0 && self.real
+    }
+
+    /// Offsets \[m\] beyond a range between which the weight (28) is not negligible.
+    pub(crate) fn weight_reach_m(&self) -> (f64, f64) {
+        match &self.shape {
+            // |f|^2 is 2e-16 of its peak there.
+            Shape::Gaussian(_) => (-6.0 * self.sigma_m(), 6.0 * self.sigma_m()),
+            Shape::Sampled(_) => {
+                (-0.5 * SPEED_OF_LIGHT_M_S * self.support_s.1, -0.5 * SPEED_OF_LIGHT_M_S * self.support_s.0)
+            }
+        }
+    }
+}
+
+/// Largest step \[s\] in which sums over `|f|^2`, wherever they begin, differ from its integral by at most `limit`, and so do
+/// those in the next smaller steps.
+fn thickest_layer_s(envelope: &Piecewise, limit: f64) -> f64 {
+    /// Steps tried for each factor of two, and places where a sum begins.
+    const PER_OCTAVE: i32 = 4;
+    const PLACES: u32 = 8;
+    let (first_s, last_s) = envelope.support_s();
+    let sum = |step_s: f64, place: u32| {
+        let start_s = first_s + step_s * f64::from(place) / f64::from(PLACES);
+        let steps = ((last_s - start_s) / step_s).ceil() as usize;
+        let power = |i: usize| envelope.value(start_s + i as f64 * step_s).norm_sqr();
+        step_s * (0..=steps).map(power).sum::<f64>()
+    };
+    let mut good = 0;
+    let mut step_s = last_s - first_s;
+    for octave in 0..12 * PER_OCTAVE {
+        step_s = (last_s - first_s) * (-f64::from(octave) / f64::from(PER_OCTAVE)).exp2();
+        good = if (0..PLACES).all(|place| (sum(step_s, place) - 1.0).abs() <= limit) { good + 1 } else { 0 };
+        if good == PER_OCTAVE {
+            return step_s * (f64::from(PER_OCTAVE - 1) / f64::from(PER_OCTAVE)).exp2();
+        }
+    }
+    step_s
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampled::Resampling;
     use approx::assert_relative_eq;
 
-    fn pulse() -> GaussianPulse {
+    fn limits(max_gradient_per_s: f64) -> LayerLimits {
+        LayerLimits { sample_rate_hz: 250e6, wavelength_m: 1.55e-6, max_gradient_per_s }
+    }
+
+    fn gaussian() -> GaussianPulse {
         GaussianPulse::table2()
+    }
+
+    /// A rise of 40 ns, a flat top, a long tail.
+    fn skewed() -> SampledPulse {
+        let times: Vec<f64> = (0..400).map(|i| f64::from(i) * 2e-9).collect();
+        let power: Vec<f64> =
+            times.iter().map(|t| (1.0 - (-(t / 4e-8).powi(2)).exp()) * (-(t / 2.5e-7).powi(3)).exp()).collect();
+        SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4).unwrap().centred()
     }
 
     #[test]
     fn power_is_half_its_peak_at_half_the_full_width() {
-        let half = pulse().intensity_per_s(100e-9) / pulse().intensity_per_s(0.0);
+        let half = gaussian().intensity_per_s(100e-9) / gaussian().intensity_per_s(0.0);
         assert_relative_eq!(half, 0.5, max_relative = 1e-14);
-        assert_relative_eq!(pulse().sigma_s(), 120.112_241e-9, max_relative = 1e-8);
-        assert_relative_eq!(pulse().full_width_half_maximum_s(), 200e-9, max_relative = 1e-15);
+        assert_relative_eq!(gaussian().sigma_s(), 120.112_241e-9, max_relative = 1e-8);
+        assert_relative_eq!(2.0 * 2.0_f64.ln().sqrt() * gaussian().sigma_s(), 200e-9, max_relative = 1e-15);
     }
 
     #[test]
@@ -117,7 +378,7 @@ mod tests {
 
     #[test]
     fn power_integrates_to_one_and_is_the_square_of_the_envelope() {
-        let (pulse, step_s) = (pulse(), 10e-9);
+        let (pulse, step_s) = (gaussian(), 10e-9);
         let times = (-200..=200).map(|i| f64::from(i) * step_s);
         let sum: f64 = times.clone().map(|t| pulse.intensity_per_s(t) * step_s).sum();
         assert_relative_eq!(sum, 1.0, max_relative = 1e-13);
@@ -129,7 +390,7 @@ mod tests {
 
     #[test]
     fn range_weight_integrates_to_one_and_its_half_width_is_half_the_pulse_length() {
-        let (pulse, step_m) = (pulse(), 1.5);
+        let (pulse, step_m) = (Pulse::from(gaussian()), 1.5);
         let sum: f64 = (-200..=200).map(|i| pulse.range_weight_per_m(f64::from(i) * step_m) * step_m).sum();
         assert_relative_eq!(sum, 1.0, max_relative = 1e-13);
         let half_power_m = 0.5 * SPEED_OF_LIGHT_M_S * 100e-9;
@@ -145,5 +406,112 @@ mod tests {
             let energy = GaussianPulse::new(PulseDuration::OneOverEHalfWidth(1e-7), bad);
             assert!(matches!(energy, Err(Error::OutOfRange { field: "energy_j", .. })));
         }
+    }
+
+    #[test]
+    fn a_chirp_leaves_the_power_alone_and_spreads_the_spectrum() {
+        let (plain, chirp_hz_s) = (Pulse::from(gaussian()), 2e14);
+        let chirped = plain.clone().with_chirp(chirp_hz_s).unwrap();
+        let sigma_s = gaussian().sigma_s();
+        for time_s in [-1e-7, 0.0, 3e-8] {
+            let expected = gaussian().envelope_per_sqrt_s(time_s);
+            assert_relative_eq!(chirped.envelope_per_sqrt_s(time_s).norm(), expected, max_relative = 1e-14);
+            assert_relative_eq!(chirped.intensity_per_s(time_s), plain.intensity_per_s(time_s));
+        }
+        let unchirped_hz = 1.0 / (8.0_f64.sqrt() * PI * sigma_s);
+        assert_relative_eq!(plain.spectral_width_hz(), unchirped_hz, max_relative = 1e-14);
+        let expected = unchirped_hz.hypot(chirp_hz_s * sigma_s / 2f64.sqrt());
+        assert_relative_eq!(chirped.spectral_width_hz(), expected, max_relative = 1e-14);
+        assert!(matches!(plain.with_chirp(f64::INFINITY), Err(Error::OutOfRange { field: "chirp_hz_s", .. })));
+    }
+
+    #[test]
+    fn the_spectrum_of_samples_is_as_wide_as_that_of_what_they_were_taken_of() {
+        let times: Vec<f64> = (-200..=200).map(|i| f64::from(i) * 2.5e-9).collect();
+        let power: Vec<f64> = times.iter().map(|t| gaussian().intensity_per_s(*t)).collect();
+        let sampled = Pulse::from(SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4).unwrap());
+        for chirp_hz_s in [0.0, 3e13, -1e14] {
+            let [closed, found] = [Pulse::from(gaussian()), sampled.clone()]
+                .map(|p| p.with_chirp(chirp_hz_s).unwrap().spectral_full_width_half_maximum_hz());
+            // What the samples leave out of the energy, 1e-4, has the widest frequencies.
+            assert_relative_eq!(found, closed, max_relative = 1e-3);
+        }
+        // A rectangle of T, whose tails make its standard deviation say nothing: |sinc|^2 is half at 0.4429/T.
+        let (times, power) = ([-1.0005e-7, -0.9995e-7, 0.9995e-7, 1.0005e-7], [0.0, 1.0, 1.0, 0.0]);
+        let flat = Pulse::from(SampledPulse::from_power(&times, &power, Resampling::Linear, 1e-4).unwrap());
+        // What is left out of the energy at both ends shortens it.
+        assert_relative_eq!(flat.spectral_full_width_half_maximum_hz(), 0.885_89 / 200e-9, max_relative = 3e-3);
+        assert!(flat.spectral_width_hz() > 5.0 * flat.spectral_full_width_half_maximum_hz());
+    }
+
+    #[test]
+    fn a_chirp_raises_the_mean_frequency_of_a_late_pulse() {
+        let times: Vec<f64> = (-200..=200).map(|i| 5e-8 + f64::from(i) * 4e-9).collect();
+        let power: Vec<f64> = times.iter().map(|t| gaussian().intensity_per_s(t - 5e-8)).collect();
+        let late = SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4).unwrap();
+        let chirped = Pulse::from(late.clone()).with_chirp(1e14).unwrap();
+        assert_relative_eq!(chirped.mean_frequency_hz(), 1e14 * 5e-8, max_relative = 1e-6);
+        let centred = Pulse::from(late.centred()).with_chirp(1e14).unwrap();
+        assert!(centred.mean_frequency_hz().abs() < 1.0);
+    }
+
+    #[test]
+    fn a_sampled_chirp_is_the_chirp() {
+        let chirp_hz_s = -1.5e14;
+        let whole = Pulse::from(gaussian()).with_chirp(chirp_hz_s).unwrap();
+        let times: Vec<f64> = (-400..=400).map(|i| f64::from(i) * 2e-9).collect();
+        let amplitude: Vec<_> = times.iter().map(|t| whole.envelope_per_sqrt_s(*t)).collect();
+        let sampled = Pulse::from(SampledPulse::new(&times, &amplitude, Resampling::BandLimited, 1e-4).unwrap());
+        assert!(!sampled.is_real() && !whole.is_real());
+        for time_s in [-2.3e-7, 1.1e-9, 1.77e-7] {
+            let (a, b) = (sampled.envelope_per_sqrt_s(time_s), whole.envelope_per_sqrt_s(time_s));
+            assert!((a - b).norm() < 1e-5 * whole.envelope_per_sqrt_s(0.0).norm());
+        }
+        assert_relative_eq!(sampled.spectral_width_hz(), whole.spectral_width_hz(), max_relative = 1e-4);
+    }
+
+    #[test]
+    fn advised_layers_hold_the_energy_of_every_shape() {
+        let corners = [-1.01e-7, -1e-7, 1e-7, 1.01e-7];
+        let box_shaped = SampledPulse::from_power(&corners, &[0.0, 1.0, 1.0, 0.0], Resampling::Linear, 1e-4).unwrap();
+        let short = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(2e-9), 1e-4).unwrap();
+        for pulse in [gaussian().into(), short.into(), skewed().into(), Pulse::from(box_shaped)] {
+            let thickness_m = pulse.layer_thickness_m(limits(0.0)).unwrap();
+            assert!(thickness_m <= pulse.max_layer_thickness_m());
+            let layer_s = 2.0 * thickness_m / SPEED_OF_LIGHT_M_S;
+            let (first_s, last_s) = pulse.support_s();
+            for place in [0.0, 0.13, 0.5, 0.77] {
+                let steps = ((last_s - first_s) / layer_s) as i32 + 1;
+                let sum: f64 = (0..=steps)
+                    .map(|i| layer_s * pulse.intensity_per_s(first_s + (f64::from(i) + place) * layer_s))
+                    .sum();
+                assert!((sum - 1.0).abs() < 1e-3, "{sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_gaussian_needs_the_layers_of_its_sigma_and_a_chirp_thinner_ones() {
+        let plain = Pulse::from(gaussian());
+        assert_eq!(plain.layer_thickness_m(limits(3.6)), limits(3.6).thickness_m(gaussian().sigma_s()));
+        let chirped = plain.with_chirp(8e14).unwrap();
+        let thickness_m = chirped.layer_thickness_m(limits(0.0)).unwrap();
+        assert!(2.0 * thickness_m / SPEED_OF_LIGHT_M_S <= 0.125 / chirped.spectral_width_hz());
+        assert!(thickness_m <= chirped.max_layer_thickness_m());
+    }
+
+    #[test]
+    fn width_of_a_shape_is_that_of_the_gaussian_with_its_spread() {
+        let pulse = Pulse::from(skewed());
+        let step_s = 1e-10;
+        let (first_s, last_s) = pulse.support_s();
+        let moment = |power: i32| {
+            let steps = ((last_s - first_s) / step_s) as i32;
+            let at = |i: i32| first_s + f64::from(i) * step_s;
+            (0..=steps).map(|i| step_s * at(i).powi(power) * pulse.intensity_per_s(at(i))).sum::<f64>()
+        };
+        assert_relative_eq!(moment(0), 1.0, max_relative = 1e-5);
+        assert!((moment(1) - pulse.mean_time_s()).abs() < 1e-12 && pulse.mean_time_s().abs() < 1e-14);
+        assert_relative_eq!(pulse.sigma_s(), (2.0 * moment(2)).sqrt(), max_relative = 1e-5);
     }
 }

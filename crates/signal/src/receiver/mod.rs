@@ -22,9 +22,9 @@ pub use penalties::{NoiseDensities, Penalties};
 
 use std::f64::consts::PI;
 
-use crate::Error;
 use crate::constants::{ELEMENTARY_CHARGE_C, PLANCK_J_S, SPEED_OF_LIGHT_M_S};
 use crate::error::{check, check_positive};
+use crate::{Error, LayerLimits};
 
 /// Which quantum of energy (14) divides by.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -88,6 +88,12 @@ impl Receiver {
             noise: NoiseModel::BandLimited,
             front_end: FrontEnd::IDEAL,
         }
+    }
+
+    /// What bounds the layers of air for this receiver in a wind of that largest gradient along any line \[1/s\].
+    pub fn layer_limits(&self, max_gradient_per_s: f64) -> LayerLimits {
+        let Self { sample_rate_hz, wavelength_m, .. } = *self;
+        LayerLimits { sample_rate_hz, wavelength_m, max_gradient_per_s }
     }
 
     /// Says what is wrong with the receiver, if anything.

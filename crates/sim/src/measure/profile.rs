@@ -208,12 +208,14 @@ impl Screens {
         observer.begin(Stage::PhaseScreens, t.realisations as u64);
         let mut seen = 0;
         // Single precision: its rounding is far below the error of any number of realisations.
-        let estimate =
-            instrument.monte_carlo(t, &range_m, scene.seed)?.run_in::<f32>(Stop::after(t.realisations), |progress| {
+        let estimate = instrument.monte_carlo(t, &range_m, scene.seed)?.run_in::<f32>(
+            Stop::after(t.realisations),
+            |progress| {
                 observer.advance((progress.done - seen) as u64);
                 seen = progress.done;
                 ControlFlow::Continue(())
-            })?;
+            },
+        )?;
         observer.end();
         let lost_power_fraction = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
         if lost_power_fraction > DOUBTFUL_LOSS {
