@@ -5,7 +5,8 @@
 
 use crate::Error;
 use crate::beam::Telescope;
-use crate::error::{not_negative, positive, within};
+use crate::error::{finite, not_negative, positive};
+use crate::quadrature::GaussLegendre;
 use std::f64::consts::PI;
 
 /// Speed of light \[m/s\].
@@ -69,8 +70,13 @@ impl SnrModel {
         positive("bandwidth_hz", self.bandwidth_hz)?;
         not_negative("backscatter_per_m_sr", self.backscatter_per_m_sr)?;
         not_negative("extinction_per_m", self.extinction_per_m)?;
-        let quantum = self.quantum_efficiency;
-        within("quantum_efficiency", quantum, quantum > 0.0 && quantum <= 1.0, "above 0, at most 1")?;
+        if !(self.quantum_efficiency > 0.0 && self.quantum_efficiency <= 1.0) {
+            return Err(Error::OutOfRange {
+                field: "quantum_efficiency",
+                value: self.quantum_efficiency,
+                allowed: "above 0, at most 1",
+            });
+        }
         Ok(self)
     }
 
@@ -89,9 +95,13 @@ impl SnrModel {
     /// # Errors
     /// [`Error::OutOfRange`] for a model or range that is not allowed.
     pub fn return_per_m(&self, range_m: f64) -> Result<f64, Error> {
-        let (model, range_m) = (self.validated()?, positive("range_m", range_m)?);
-        let both_ways = (-2.0 * model.extinction_per_m * range_m).exp();
-        Ok(both_ways * model.backscatter_per_m_sr * model.aperture_area_m2 / (range_m * range_m))
+        Ok(self.validated()?.backscatter_factor_per_m(positive("range_m", range_m)?))
+    }
+
+    /// K^2 beta A_R / R^2 at `range_m` \[1/m\], the variance (9) per unit length and unit efficiency.
+    fn backscatter_factor_per_m(&self, range_m: f64) -> f64 {
+        (-2.0 * self.extinction_per_m * range_m).exp() * self.backscatter_per_m_sr * self.aperture_area_m2
+            / (range_m * range_m)
     }
 
     /// eta_Q E_t / (h nu B_w) of (14).
@@ -105,9 +115,54 @@ impl SnrModel {
     /// # Errors
     /// [`Error::OutOfRange`] for a model, range or efficiency that is not allowed.
     pub fn snr(&self, range_m: f64, efficiency: f64) -> Result<f64, Error> {
-        let return_per_m = self.return_per_m(range_m)?;
+        let model = self.validated()?;
+        let range_m = positive("range_m", range_m)?;
         let efficiency = not_negative("efficiency", efficiency)?;
-        Ok(self.photon_factor() * 0.5 * SPEED_OF_LIGHT_M_S * return_per_m * efficiency)
+        Ok(model.photon_factor() * 0.5 * SPEED_OF_LIGHT_M_S * model.backscatter_factor_per_m(range_m) * efficiency)
+    }
+
+    /// SNR (14), corrected, at time `time_s` after the centre of the pulse left: the integral over range weighted with
+    /// the pulse |f(t - 2R/c)|^2 of (7).
+    ///
+    /// `pulse_sigma_s` is sigma of (7) \[s\] (1/e half-width of |f|^2); `efficiency(range_m)` is eta_s. The part of the
+    /// pulse within 6 sigma counts, and only ranges above 0.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a model or time that is not allowed, or what `efficiency` returns.
+    pub fn snr_pulse(
+        &self,
+        time_s: f64,
+        pulse_sigma_s: f64,
+        mut efficiency: impl FnMut(f64) -> Result<f64, Error>,
+    ) -> Result<f64, Error> {
+        let model = self.validated()?;
+        let time_s = finite("time_s", time_s)?;
+        let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * positive("pulse_sigma_s", pulse_sigma_s)?;
+        let centre_m = 0.5 * SPEED_OF_LIGHT_M_S * time_s;
+        let low_m = centre_m - 6.0 * sigma_m;
+        if low_m <= 0.0 {
+            return Err(Error::OutOfRange {
+                field: "time_s",
+                value: time_s,
+                allowed: "beyond 6 pulse_sigma_s, so that the whole pulse has left the telescope",
+            });
+        }
+        let rule = GaussLegendre::new(16);
+        let panels = 6;
+        let width_m = 12.0 * sigma_m / f64::from(panels);
+        let mut sum = 0.0;
+        for panel in 0..panels {
+            let a = low_m + width_m * f64::from(panel);
+            for (range_m, weight_m) in rule.mapped(a, a + width_m) {
+                let x = (range_m - centre_m) / sigma_m;
+                let pulse_per_s = (-x * x).exp() / (PI.sqrt() * pulse_sigma_s);
+                sum += weight_m
+                    * pulse_per_s
+                    * model.backscatter_factor_per_m(range_m)
+                    * not_negative("efficiency", efficiency(range_m)?)?;
+            }
+        }
+        Ok(model.photon_factor() * sum)
     }
 }
 
@@ -115,19 +170,6 @@ impl SnrModel {
 mod tests {
     use super::*;
     use crate::error::refused;
-    use crate::quadrature::GaussLegendre;
-
-    /// (14), corrected, at time `time_s` after the centre of a pulse of 1/e half-width `sigma_s` of |f|^2 left: the return
-    /// integrated over range with the weight |f(t - 2R/c)|^2 of (7), within 6 sigma.
-    fn snr_pulse(model: &SnrModel, time_s: f64, sigma_s: f64, efficiency: f64) -> f64 {
-        let [sigma_m, centre_m] = [sigma_s, time_s].map(|s| 0.5 * SPEED_OF_LIGHT_M_S * s);
-        let integral =
-            GaussLegendre::new(16).composite(centre_m - 6.0 * sigma_m, centre_m + 6.0 * sigma_m, 6, |range_m| {
-                let x = (range_m - centre_m) / sigma_m;
-                (-x * x).exp() / (PI.sqrt() * sigma_s) * model.return_per_m(range_m).unwrap() * efficiency
-            });
-        model.photon_factor() * integral
-    }
 
     #[test]
     fn pulse_integral_tends_to_the_narrow_pulse_form() {
@@ -135,7 +177,7 @@ mod tests {
         let range_m = 1000.0;
         let time_s = 2.0 * range_m / SPEED_OF_LIGHT_M_S;
         let narrow = model.snr(range_m, 0.05).unwrap();
-        let gap = |sigma_s: f64| snr_pulse(&model, time_s, sigma_s, 0.05) / narrow - 1.0;
+        let gap = |sigma_s: f64| model.snr_pulse(time_s, sigma_s, |_| Ok(0.05)).unwrap() / narrow - 1.0;
         // Second order in the length: sigma_R^2/4 times the second derivative of K^2/R^2 over itself.
         let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * 120e-9;
         let a = 2.0 * model.extinction_per_m;
@@ -154,5 +196,6 @@ mod tests {
         assert_eq!(refused(h.snr(-1.0, 0.01)), "range_m");
         assert_eq!(refused(h.snr(500.0, f64::NAN)), "efficiency");
         assert_eq!(refused(SnrModel { quantum_efficiency: 1.5, ..h }.validated()), "quantum_efficiency");
+        assert_eq!(refused(h.snr_pulse(1e-9, 120e-9, |_| Ok(0.1))), "time_s");
     }
 }
