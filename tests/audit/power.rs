@@ -304,16 +304,18 @@ pub(crate) fn hold_profile(ledger: &mut Ledger, s: &Scene, profile: &Csv) {
     let points = s.n("outputs.profile_points");
     ledger.equal("profile.csv: rows", ranges.len() as f64, points as f64, 0.0);
     let (efficiency, snr_db) = (profile.f("efficiency"), profile.f("snr_db"));
-    let (deviation, error) = (profile.f("efficiency_standard_deviation"), profile.f("efficiency_standard_error"));
+    let deviation = profile.f("efficiency_standard_deviation");
+    let standard_error = profile.f("efficiency_standard_error");
     for i in (0..points).step_by(1 + points / 5) {
         let r = first + (last - first) * i as f64 / (points - 1) as f64;
         ledger.equal("profile.csv: range_m", ranges[i], r, 1e-9 * r);
         let right = free_space_efficiency(s, r);
         // In a null of the efficiency by the quadrature of its parts, which cancel there.
-        ledger.equal("profile.csv: efficiency", efficiency[i], right, quadrature_error(s) * (right + 1e-5));
-        ledger.equal("profile.csv: snr_db", snr_db[i], free_space_snr_db(s, r), 5.0 * quadrature_error(s));
+        let error = quadrature_error(s) * (1.0 + 1e-5 / right);
+        ledger.equal("profile.csv: efficiency", efficiency[i], right, error * right);
+        ledger.equal("profile.csv: snr_db", snr_db[i], free_space_snr_db(s, r), 5.0 * error);
         ledger.equal("profile.csv: efficiency_standard_deviation, of theory", deviation[i], 0.0, 0.0);
-        ledger.equal("profile.csv: efficiency_standard_error, of theory", error[i], 0.0, 0.0);
+        ledger.equal("profile.csv: efficiency_standard_error, of theory", standard_error[i], 0.0, 0.0);
     }
 }
 

@@ -101,7 +101,11 @@ impl RecordModel {
         let cycles = sampling.intermediate_frequency_hz * sampling.period_s();
         let slope = -4.0 * std::f64::consts::PI * sampling.period_s() / sampling.wavelength_m;
         let density = sampling.sample_rate_hz / (sampling.band_hz.1 - sampling.band_hz.0);
-        let own: Vec<f64> = places.iter().map(|place| snr(*place)).collect();
+        // Two samples of a Gaussian pulse share the air in the middle between them: ratios at every half sample.
+        let [first, last] = [f64::min, f64::max].map(|of| places.iter().copied().fold(places[0], of));
+        let halves = 0..=(2.0 * (last - first)) as usize;
+        let ratios: Vec<f64> = halves.map(|half| snr(first + 0.5 * half as f64)).collect();
+        let between = |n: usize, m: usize| ratios[(places[n] + places[m] - 2.0 * first) as usize];
         let of_lag = |lag: f64, noise: Noise| noise.covariance(sampling, lag, self.kind).re * density;
         let signal = |(n, m): (usize, usize)| {
             let lag = (places[n] - places[m]).abs() as usize;
@@ -110,9 +114,8 @@ impl RecordModel {
                 return 0.0;
             }
             let power = match self.is_gaussian {
-                true if n == m => own[n],
-                true => snr(0.5 * (places[n] + places[m])),
-                false => (own[n] * own[m]).sqrt(),
+                true => between(n, m),
+                false => (between(n, n) * between(m, m)).sqrt(),
             };
             correlation * power
         };

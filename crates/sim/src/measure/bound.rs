@@ -74,9 +74,19 @@ impl Setting {
 
     /// At a range, with the scene's own signal-to-noise ratios about it.
     fn at(&self, range_m: f64) -> Result<BoundPoint, Error> {
-        let (layer_m, snr) = &self.layer_snr;
-        let by_gates = self.of_rays.at(range_m, self.places.most_gates(self.radius.at_m(range_m)?))?;
+        let ((layer_m, snr), radius_m) = (&self.layer_snr, self.radius.at_m(range_m)?);
+        let mut by_gates = self.of_rays.at(self.middle_m(range_m, radius_m), self.places.most_gates(radius_m))?;
+        // One window is about the range itself.
+        by_gates[0] = self.of_rays.at(range_m, 1)?[0];
         self.point(range_m, of_table(layer_m, snr, range_m), self.of_rays.snr_at(range_m)?, &by_gates)
+    }
+
+    /// Range in the middle of the longest chord of a region, which the ends of the scan may cut, m.
+    fn middle_m(&self, range_m: f64, radius_m: f64) -> f64 {
+        let gates_m = self.places.gate_ranges_m();
+        let chords = self.places.chords(PolarPoint { range_m, elevation_rad: self.elevation_rad }, radius_m);
+        let longest = chords.max_by_key(|chord| chord.gates());
+        longest.map_or(range_m, |chord| 0.5 * (gates_m[chord.first] + gates_m[chord.last]))
     }
 
     /// At a range, all samples having one signal-to-noise ratio.
@@ -292,6 +302,23 @@ mod tests {
         assert!((ratio(far) - 1.0).abs() < 1e-9 && ratio(near) < 0.7, "{} {}", ratio(far), ratio(near));
         assert!((cloudy.1[far] / clear.1[far] - 1.0).abs() < 1e-9, "{} {}", cloudy.1[far], clear.1[far]);
         assert!((cloudy.1[far] / cloudy.0[far].n_eff - 1.0).abs() < 1e-9, "map and bound differ");
+    }
+
+    #[test]
+    fn behind_a_focus_the_bound_rises_without_a_step() {
+        let scene = plan(
+            "[telescope]\nfocus_m = 254.0\naperture_radius_m = 0.086\nbeam_radius_m = 0.068\n[pulse]\nenergy_j = 3.4e-5\n\
+             [pulse.shape]\nduration_s = 400e-9\n[atmosphere]\nbackscatter_per_m_sr = 1e-6\n[scan]\nelevation_min_rad = 0.1\n\
+             elevation_max_rad = 0.1\nrange_min_m = 300.0\nrange_max_m = 460.0\n[estimator]\nwindow_samples = 32\ngate_step_samples = 16\n\
+             radius_m = 4.0\n",
+        );
+        let points = bound(&scene, &Silent).unwrap().by_range;
+        for of in [|p: &BoundPoint| p.window_m_s, |p: &BoundPoint| p.region_m_s] {
+            // Apart from the ends, which cut regions.
+            let rise: Vec<f64> = points[1..points.len() - 1].windows(2).map(|p| of(&p[1]) / of(&p[0])).collect();
+            assert!(rise.iter().all(|rise| *rise > 1.05), "{rise:?}");
+            assert!(rise.windows(2).all(|rise| rise[1] < 1.01 * rise[0]), "{rise:?}");
+        }
     }
 
     #[test]

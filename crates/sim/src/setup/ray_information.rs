@@ -63,20 +63,15 @@ impl RayInformation {
         Ok(snr[0])
     }
 
-    /// Information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows about a range. A ratio that changes by less than a factor of two
-    /// along their samples is that at the middle, since what one half has more the other has less.
+    /// Information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows about a range, each sample having the ratio that it sees.
     pub(crate) fn at(&self, range_m: f64, count: usize) -> Result<Vec<f64>, Error> {
         if !self.is_noisy {
             return self.of_snr(*SNR.end(), count);
         }
-        let here = self.snr_at(range_m)?;
         // The samples of a window are centred half a sample before its range.
-        let snr = |samples: f64| self.seen_snr(range_m + (samples - 0.5) * self.spacing_m).unwrap_or(f64::NAN);
-        let half = ((count - 1) * self.gates.step_samples + self.gates.window_samples).div_ceil(2) as i64;
-        match (-half..=half).step_by(4).all(|samples| alike(here, snr(samples as f64))) {
-            true => self.of_snr(here, count),
-            false => Ok(self.model.information(&self.gates, count, snr)?),
-        }
+        let seen = |samples: f64| self.seen_snr(range_m + (samples - 0.5) * self.spacing_m);
+        let snr = |samples: f64| seen(samples).map_or(f64::NAN, |snr| snr.min(*SNR.end()));
+        Ok(self.model.information(&self.gates, count, snr)?)
     }
 
     /// The same where all samples have one signal-to-noise ratio.
