@@ -8,12 +8,11 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::retrieval::expected::Expected;
-use crate::retrieval::hypotheses::{AS_IT_IS, End, Fits, Kind, ROUGH};
-use crate::retrieval::problem::Problem;
+use crate::retrieval::hypotheses::{AS_IT_IS, End, Kind, ROUGH, Stage};
 use crate::retrieval::report::{COMPETES, Chosen, Report};
 use crate::retrieval::{Flag, Measured, ScanResult, VortexResult};
 use crate::vortex_fit::damped_newton::Stop;
+use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::{Parameter, Vortex, Wake};
 
 /// Spacings of the pairs behind aircraft in service \[m\]: pi/4 of spans of 20 to 80 m, one as likely as another in its logarithm.
@@ -58,7 +57,7 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
     // where the curvature of an end tells nothing, those of the others do
     all.extend(other_spacings(report, end, most).into_iter().filter_map(|end| Alternative::new(report, end).ok()));
     let spacings = all.len();
-    if report.options.other_profile {
+    if report.stage.options.other_profile {
         all.extend(of_other_profile(report, end, most)?);
     }
     let least = all.iter().fold(f64::INFINITY, |least, one| least.min(one.end.chi2));
@@ -81,15 +80,15 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
 /// Fits of pairs with given spacings, where gates are long: away from that of the end as far as chi-squares stay below `most`.
 fn other_spacings(report: &Report<'_>, end: &End, most: f64) -> Vec<End> {
     let lateral = [Parameter::LeftLateral as usize, Parameter::RightLateral as usize];
-    let gate_m = report.problem.expected.kernel.width_m();
+    let gate_m = report.stage.gates.kernel.width_m();
     let spacing_m = end.wake.spacing_m();
     let is_free = |place: &usize| end.groups.iter().any(|group| group == &[*place]);
     if end.kind != Kind::Both || !lateral.iter().all(is_free) || gate_m < LONG * spacing_m.min(TYPICAL_M) {
         return Vec::new();
     }
-    let fits = Fits { problem: report.problem, options: report.options };
+    let fits = report.stage;
     // both move alike: the spacing stays; cores of which something is known are free, as what suits one spacing does not suit another
-    let known = report.problem.prior.is_some();
+    let known = report.stage.squares.prior.is_some();
     let mut groups = if known { fits.groups(end.kind) } else { end.groups.clone() };
     groups.retain(|group| !lateral.iter().any(|place| group == &[*place]));
     groups.push(lateral.to_vec());
@@ -130,17 +129,17 @@ fn with_spacing(wake: &Wake, spacing_m: f64) -> Wake {
 
 /// The fit with the other profile, from the end of the stated one, unless its chi-square is above `most`.
 fn of_other_profile(report: &Report<'_>, end: &End, most: f64) -> Result<Option<Alternative>, Error> {
-    let mut options = report.options.clone();
+    let mut options = report.stage.options.clone();
     options.model.profile = options.model.profile.other();
-    let moving = Expected::on_grid(report.map, &options, 1)?;
-    let dense = if report.problem.expected.moves() { moving } else { moving.frozen() };
-    let fine = dense.fine(&options)?;
-    let mut problem = Problem { expected: &dense, ..report.problem.clone() };
-    let near = Fits { problem: &problem, options: &options }.onwards(std::slice::from_ref(end), |_| ROUGH);
-    problem.expected = &fine;
-    let other = Fits { problem: &problem, options: &options }.onwards(&near, |_| AS_IT_IS).pop();
+    let moving = Gates::on_grid(report.stage.map, &options, 1)?;
+    let dense = if report.stage.gates.seconds.is_some() { moving } else { moving.frozen() };
+    let fine = dense.clone().fine(&options.gate)?;
+    let stage = Stage { options: &options, ..report.stage.clone() }.through(&dense);
+    let near = stage.onwards(std::slice::from_ref(end), |_| ROUGH);
+    let stage = stage.through(&fine);
+    let other = stage.onwards(&near, |_| AS_IT_IS).pop();
     let other = other.filter(|other| other.chi2 <= most);
-    let report = Report { problem: &problem, options: &options, ..*report };
+    let report = Report { stage: &stage, ..*report };
     Ok(other.and_then(|end| Alternative::new(&report, end).ok()))
 }
 

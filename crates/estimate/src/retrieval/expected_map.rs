@@ -5,10 +5,9 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::retrieval::expected::Expected;
 use crate::retrieval::{Movement, RetrievalOptions, ScanMap};
 use crate::vortex_fit::Wake;
-use crate::vortex_fit::wake::range_kernel::LineScratch;
+use crate::vortex_fit::map_fit::gates::Gates;
 
 /// Radial velocities \[m/s\] \[line, gate\] of `wake`, given at the reference time of the scan, as the options see it; vortices stand
 /// still unless `moving`.
@@ -25,16 +24,7 @@ pub fn expected_velocities(
     map.validate()?;
     let movement = if moving { Movement::Moving } else { Movement::Frozen };
     let options = RetrievalOptions { movement, ..options.clone() };
-    let expected = Expected::rough(map, &options)?.fine(&options)?;
-    let motion = expected.motion(wake);
-    let mut out = Array2::zeros(map.velocity_m_s.dim());
-    let mut scratch = LineScratch::default();
-    for line in 0..map.elevation_rad.len() {
-        expected.line((wake, motion.as_ref(), line), false, &mut scratch, |gate, velocity, _| {
-            out[[line, gate]] = velocity;
-        });
-    }
-    Ok(out)
+    Ok(Gates::rough(map, &options)?.fine(&options.gate)?.velocities(wake))
 }
 
 #[cfg(test)]

@@ -3,10 +3,12 @@
 //! Check: the reference maps; wakes of which one vortex is in view.
 
 use crate::error::Error;
-use crate::retrieval::problem::Problem;
 use crate::retrieval::{RetrievalOptions, ScanMap};
 use crate::vortex_fit::damped_newton::{Stop, inverse};
+use crate::vortex_fit::map_fit::cells::{cells, products};
+use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::Search;
+use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Minimum};
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake};
@@ -98,52 +100,84 @@ pub(crate) struct End {
     pub(crate) groups: Vec<Vec<usize>>,
 }
 
-/// Where fits of a scan start.
-pub(crate) fn starts(
-    map: &ScanMap,
-    problem: &Problem<'_>,
-    options: &RetrievalOptions,
-) -> Result<Vec<(Kind, Wake)>, Error> {
-    let expected = problem.expected;
-    let search = Search::new(&map.view(), expected.model, &expected.kernel)?;
-    let mut pairs = search.pairs();
-    pairs.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-    let mut wakes: Vec<Wake> = options.start.into_iter().collect();
-    let given = wakes.len();
-    for pair in &pairs {
-        let wake = search.wake(pair);
-        let near = |a: &Vortex, b: &Vortex| {
-            (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m) < APART_M
-        };
-        if wakes.len() < given + PAIRS
-            && !wakes.iter().skip(given).any(|known| near(&known.left, &wake.left) && near(&known.right, &wake.right))
-        {
-            wakes.push(wake);
-        }
-    }
-    let mut starts: Vec<(Kind, Wake)> = wakes.into_iter().map(|wake| (Kind::Both, wake)).collect();
-    for (kind, sense) in [(Kind::Left, -1.0), (Kind::Right, 1.0)] {
-        let single = search.single(sense);
-        starts.extend(single.map(|(circulation_m2_s, lateral_position_m, height_m)| {
-            let vortex = Vortex { circulation_m2_s, lateral_position_m, height_m, core_radius_m: LONE_CORE_M };
-            (kind, kind.of(&Wake { left: vortex, right: vortex, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }))
-        }));
-    }
-    Ok(starts)
-}
-
-/// Fits of one scan.
-pub(crate) struct Fits<'a> {
-    pub(crate) problem: &'a Problem<'a>,
+/// Fits of one scan with one sight of it.
+#[derive(Clone)]
+pub(crate) struct Stage<'a> {
+    pub(crate) map: &'a ScanMap,
     pub(crate) options: &'a RetrievalOptions,
+    pub(crate) gates: &'a Gates<'a>,
+    pub(crate) squares: LeastSquares<'a>,
 }
 
-impl Fits<'_> {
+impl<'a> Stage<'a> {
+    /// With all velocities of the map, as independent ones of the stated deviations.
+    pub(crate) fn new(map: &'a ScanMap, options: &'a RetrievalOptions, gates: &'a Gates<'a>) -> Self {
+        let squares = LeastSquares {
+            prediction: gates,
+            fold_m_s: map.fold_m_s,
+            cells: cells(&map.view()),
+            whitening: None,
+            loss: options.loss,
+            prior: options.core_prior,
+            counted: 1.0,
+        };
+        Self { map, options, gates, squares }
+    }
+
+    /// The same with other gates.
+    pub(crate) fn through(self, gates: &'a Gates<'a>) -> Self {
+        Self { gates, squares: LeastSquares { prediction: gates, ..self.squares }, ..self }
+    }
+
+    /// Where no deviations are stated, they are those of the residuals of an end.
+    pub(crate) fn rescaled(mut self, end: &End) -> Self {
+        let scale = self.residual_scale(end);
+        self.squares = self.squares.rescaled(scale);
+        self
+    }
+
+    /// Scale of the residuals over their deviations.
+    pub(crate) fn residual_scale(&self, end: &End) -> f64 {
+        self.squares.residual_scale(&end.wake.to_array())
+    }
+
     pub(crate) fn groups(&self, kind: Kind) -> Vec<Vec<usize>> {
         let all = self.options.free.groups().into_iter();
         all.map(|group| group.into_iter().filter(|place| kind.has(*place)).collect::<Vec<usize>>())
             .filter(|group| !group.is_empty())
             .collect()
+    }
+
+    /// Where fits of a scan start.
+    pub(crate) fn starts(&self) -> Result<Vec<(Kind, Wake)>, Error> {
+        let search = Search::new(&self.map.view(), self.gates.model, &self.gates.kernel)?;
+        let mut pairs = search.pairs();
+        pairs.sort_by(|a, b| b.explained.total_cmp(&a.explained));
+        let mut wakes: Vec<Wake> = self.options.start.into_iter().collect();
+        let given = wakes.len();
+        for pair in &pairs {
+            let wake = search.wake(pair);
+            let near = |a: &Vortex, b: &Vortex| {
+                (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m) < APART_M
+            };
+            if wakes.len() < given + PAIRS
+                && !wakes
+                    .iter()
+                    .skip(given)
+                    .any(|known| near(&known.left, &wake.left) && near(&known.right, &wake.right))
+            {
+                wakes.push(wake);
+            }
+        }
+        let mut starts: Vec<(Kind, Wake)> = wakes.into_iter().map(|wake| (Kind::Both, wake)).collect();
+        for (kind, sense) in [(Kind::Left, -1.0), (Kind::Right, 1.0)] {
+            let single = search.single(sense);
+            starts.extend(single.map(|(circulation_m2_s, lateral_position_m, height_m)| {
+                let vortex = Vortex { circulation_m2_s, lateral_position_m, height_m, core_radius_m: LONE_CORE_M };
+                (kind, kind.of(&Wake { left: vortex, right: vortex, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }))
+            }));
+        }
+        Ok(starts)
     }
 
     /// The wind alone.
@@ -157,8 +191,8 @@ impl Fits<'_> {
 
     /// The end from a start on, with those free numbers.
     pub(crate) fn lowest(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>, stop: Stop) -> Option<End> {
-        let (wake, chi2, sigmas_left) = self.problem.minimum(start, &groups, stop)?;
-        Some(End { kind, wake, chi2, sigmas_left, groups })
+        let Minimum { p, cost, sigmas_left, .. } = self.squares.minimum(&start.to_array(), &groups, stop)?;
+        Some(End { kind, wake: Wake::from_list(&p), chi2: 2.0 * cost, sigmas_left, groups })
     }
 
     fn end(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>) -> Option<End> {
@@ -210,9 +244,8 @@ impl Fits<'_> {
 
     /// Places of the core radii that the scan does not resolve.
     fn vague_cores(&self, end: &End, largest_m: f64) -> Vec<usize> {
-        let rows = self.problem.rows(&end.wake, &end.groups);
-        let ones = vec![1.0; rows.residuals.len()];
-        let curvature = crate::retrieval::problem::products(&ones, &rows.slopes);
+        let rows = self.squares.rows(&end.wake.to_array(), &end.groups);
+        let curvature = products(&vec![1.0; rows.residuals.len()], &rows.slopes);
         let covariance = inverse("curvature of the fit", &curvature);
         let p = end.wake.to_array();
         let vague = |(i, group): (usize, &Vec<usize>)| {
@@ -248,7 +281,7 @@ impl Fits<'_> {
 
     /// The ends with each gate's own points: the likely one, which is told, to the last; of the others the chi-square.
     pub(crate) fn fine(&self, ends: &[End]) -> Vec<End> {
-        let likely = least(ends, self.problem.cells.len()).map(|likely| likely.chi2);
+        let likely = least(ends, self.squares.cells.len()).map(|likely| likely.chi2);
         self.onwards(ends, |end| if Some(end.chi2) == likely { FINE } else { AS_IT_IS })
     }
 

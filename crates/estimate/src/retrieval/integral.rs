@@ -14,10 +14,9 @@ use ndarray::Array2;
 use std::f64::consts::PI;
 
 use crate::error::{Error, positive};
-use crate::retrieval::expected::Expected;
 use crate::retrieval::{RetrievalOptions, ScanMap, Side};
 use crate::vortex_fit::Wake;
-use crate::vortex_fit::wake::range_kernel::LineScratch;
+use crate::vortex_fit::map_fit::gates::Gates;
 
 /// Points of a circle.
 const POINTS: usize = 72;
@@ -59,10 +58,10 @@ pub fn circulation_profile(
     map.validate()?;
     wake.validate()?;
     radius_m.iter().try_for_each(|radius| positive("radius_m", *radius))?;
-    let expected = Expected::rough(map, options)?.frozen().fine(options)?;
+    let gates = Gates::rough(map, options)?.frozen().fine(&options.gate)?;
     let mut calm = *wake;
     (calm.left.circulation_m2_s, calm.right.circulation_m2_s) = (0.0, 0.0);
-    let (of_wake, of_wind) = (velocities(&expected, wake), velocities(&expected, &calm));
+    let (of_wake, of_wind) = (gates.velocities(wake), gates.velocities(&calm));
     let measured = Field::new(map, &map.velocity_m_s - &of_wind);
     let fitted = Field::new(map, of_wake - of_wind);
     let (vortex, sense) = if side == Side::Left { (wake.left, -1.0) } else { (wake.right, 1.0) };
@@ -83,16 +82,6 @@ pub fn circulation_profile(
         }
     };
     Ok(radius_m.iter().map(point).collect())
-}
-
-/// What the gates show of a wake.
-fn velocities(expected: &Expected<'_>, wake: &Wake) -> Array2<f64> {
-    let (lines, mut scratch) = (expected.map.elevation_rad.len(), LineScratch::default());
-    let mut out = Array2::zeros((lines, expected.map.range_m.len()));
-    for line in 0..lines {
-        expected.line((wake, None, line), false, &mut scratch, |gate, velocity, _| out[[line, gate]] = velocity);
-    }
-    out
 }
 
 impl<'a> Field<'a> {

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `scan_map`, `options`, `result` | what goes in, how, what comes out |
 //! | `fit`, `hypotheses`, `report` | fits of wind alone, one vortex and two; which it is; deviations and flags |
-//! | `expected`, `motion`, `problem`, `whitening`, `correlated_residuals` | gates that see moving vortices; cost and its minimum; correlated velocities, given or learnt from the residuals |
+//! | `gates`, `whitening` | what a velocity is of the air; correlated velocities |
 //! | `secondary` | the fit again with secondary vortices, if the scan shows them |
 //! | `radial_velocity`, `envelope`, `integral` | the methods of the literature beside it, with their errors |
 //! | `track` | many scans: filter and smoother |
@@ -25,16 +25,13 @@
 //! ```
 
 mod alternatives;
-mod correlated_residuals;
 mod envelope;
-mod expected;
 mod expected_map;
 mod fit;
+mod gates;
 mod hypotheses;
 mod integral;
-pub(crate) mod motion;
 mod options;
-mod problem;
 mod radial_velocity;
 mod report;
 mod result;

@@ -9,12 +9,10 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::retrieval::expected::Expected;
-use crate::retrieval::fit::{cells, rescale};
-use crate::retrieval::hypotheses::{End, Fits, Kind};
-use crate::retrieval::problem::Problem;
+use crate::retrieval::hypotheses::{End, Kind, Stage};
 use crate::retrieval::report::Report;
 use crate::retrieval::{Measured, Movement, RetrievalOptions, ScanMap, ScanResult};
+use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
 use crate::vortex_fit::{FreeParameters, Loss, Sharing, Vortex, Wake};
 
@@ -43,25 +41,25 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
         ..options.clone()
     };
     let unfolded = map.unfolded();
-    let expected = Expected::rough(&unfolded, &linear)?.fine(&linear)?;
-    let cells = cells(map);
-    let mut problem = Problem { expected: &expected, cells, whitening: None, loss: options.loss, prior: None };
+    let gates = Gates::rough(&unfolded, &linear)?.fine(&linear.gate)?;
+    let mut stage = Stage::new(&unfolded, &linear, &gates);
+    stage.squares.loss = options.loss;
     let nothing = Wake::from_array(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
-    let calm = Fits { problem: &problem, options: &linear }.wind(&nothing)?;
     if map.sigma_m_s.is_none() {
-        rescale(&mut problem, &calm);
+        let calm = stage.wind(&nothing)?;
+        stage = stage.rescaled(&calm);
     }
-    let calm = Fits { problem: &problem, options: &linear }.wind(&nothing)?;
-    problem.loss = Loss::Squares;
+    let calm = stage.wind(&nothing)?;
+    stage.squares.loss = Loss::Squares;
     let mut rest = Array2::from_elem(map.velocity_m_s.dim(), f64::NAN);
-    for (cell, residual) in problem.cells.iter().zip(problem.rows(&calm.wake, &[]).residuals) {
+    for (cell, residual) in stage.squares.cells.iter().zip(stage.squares.rows(&calm.wake.to_array(), &[]).residuals) {
         rest[[cell.line, cell.gate]] = residual * cell.sigma_m_s;
     }
     let centre = |left: bool| {
         let (range_m, elevation_rad) = core(map, &rest, left)?;
         Some(options.model.position_m(range_m, elevation_rad))
     };
-    let fits = |problem: &Problem<'_>| -> Vec<End> {
+    let fits = |stage: &Stage<'_>| -> Vec<End> {
         let (Some(left), Some(right)) = (centre(true), centre(false)) else { return vec![] };
         let core_radius_m = options.core_radius_m.unwrap_or(CORE_OVER_SPACING * (right.0 - left.0).abs());
         let vortex = |(lateral_position_m, height_m), circulation_m2_s| Vortex {
@@ -76,27 +74,24 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
             wake: kind.of(&wake),
             chi2: f64::INFINITY,
             sigmas_left: f64::INFINITY,
-            groups: Fits { problem, options: &linear }.groups(kind),
+            groups: stage.groups(kind),
         });
-        Fits { problem, options: &linear }.fine(&kinds)
+        stage.fine(&kinds)
     };
-    let mut ends = fits(&problem);
+    let mut ends = fits(&stage);
     if let (None, Some(best)) = (&map.sigma_m_s, ends.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2)).cloned()) {
-        rescale(&mut problem, &best);
-        ends = fits(&problem);
+        stage = stage.rescaled(&best);
+        ends = fits(&stage);
     }
-    let wind = Fits { problem: &problem, options: &linear }.wind(&calm.wake)?;
-    let (problem, ends) = (&problem, &ends[..]);
+    let wind = stage.wind(&calm.wake)?;
     let report = Report {
-        map,
-        options: &linear,
-        problem,
+        stage: &stage,
         scale: 1.0,
         rejected: 0,
         thinned: false,
         is_noise_left: false,
         wind: &wind,
-        ends,
+        ends: &ends,
     };
     let mut result = report.result()?;
     for vortex in &mut result.vortices {

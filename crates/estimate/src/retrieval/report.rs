@@ -5,13 +5,11 @@
 use ndarray::{Array1, Array2, Axis};
 
 use crate::error::Error;
-use crate::retrieval::correlated_residuals::filling;
-use crate::retrieval::hypotheses::{End, Kind, best, least, tops};
-use crate::retrieval::problem::{Problem, products};
-use crate::retrieval::{Covariance, Flag, Measured, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult};
-use crate::vortex_fit::damped_newton::{inverse, solve};
-use crate::vortex_fit::wake::free_parameters::spread;
-use crate::vortex_fit::{Loss, Parameter, Wake};
+use crate::retrieval::hypotheses::{End, Kind, Stage, best, least, tops};
+use crate::retrieval::{Covariance, Flag, Measured, ScanResult, Side, Top, VortexResult};
+use crate::vortex_fit::damped_newton::solve;
+use crate::vortex_fit::map_fit::least_squares::{Scores, Uncertainty};
+use crate::vortex_fit::{Parameter, Wake};
 
 /// Velocities with larger residuals, in their deviations, are outliers.
 pub(crate) const OUTLIER: f64 = 4.0;
@@ -32,9 +30,7 @@ const AT_END: f64 = 0.1;
 const BLOCKS: usize = 2000;
 
 pub(crate) struct Report<'a> {
-    pub(crate) map: &'a ScanMap,
-    pub(crate) options: &'a RetrievalOptions,
-    pub(crate) problem: &'a Problem<'a>,
+    pub(crate) stage: &'a Stage<'a>,
     /// Scale of the residuals over the stated deviations, at least 1.
     pub(crate) scale: f64,
     pub(crate) rejected: usize,
@@ -61,14 +57,16 @@ impl<'a> Report<'a> {
 
     /// The likely end if it is a wake, a lone vortex instead of a pair of which one is not seen, or the wind.
     pub(crate) fn chosen(&self) -> Result<Chosen<'a>, Error> {
-        let cells = self.problem.cells.len();
+        let cells = self.stage.squares.cells.len();
         let gain = |without: Option<&End>, with: &End| {
             without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2)
         };
         let likely = least(self.ends, cells);
         let mut of_likely = likely.map(|end| self.uncertainty(end)).transpose()?;
         let alike = match (likely, &of_likely) {
-            (Some(end), Some(known)) if self.is_noise_left => known.alike(&end.wake, self.scale.powi(2)),
+            (Some(end), Some(known)) if self.is_noise_left && self.stage.options.covariance == Covariance::Sandwich => {
+                known.excess(&end.wake, self.scale.powi(2))
+            }
             _ => 1.0,
         };
         let gain = |without: Option<&End>, with: &End| gain(without, with) / alike;
@@ -82,12 +80,12 @@ impl<'a> Report<'a> {
                 Kind::Both => gain(left, end).min(gain(right, end)),
                 _ => gain(Some(self.wind), end),
             };
-            if seen.min(statistic) < self.options.threshold {
+            if seen.min(statistic) < self.stage.options.threshold {
                 continue;
             }
             let uncertainty = known.map_or_else(|| self.uncertainty(end), Ok)?;
             let circulations = self.sides(end).into_iter().map(|side| side.parameters()[0] as usize);
-            let threshold = self.options.threshold;
+            let threshold = self.stage.options.threshold;
             let certain = circulations.map(|place| uncertainty.certain(&end.wake, place, threshold));
             if certain.collect::<Result<Vec<bool>, _>>()?.into_iter().all(|certain| certain) {
                 return Ok(Chosen { end, covariance: uncertainty.covariance(|_| true)?, statistic, alike });
@@ -103,8 +101,8 @@ impl<'a> Report<'a> {
 
     /// The vortices of an end with that covariance, each at its line.
     pub(crate) fn vortices(&self, end: &End, covariance: &Array2<f64>) -> Vec<VortexResult> {
-        let (model, moves) = (self.problem.expected.model, self.problem.expected.moves());
-        let vortex = |side| VortexResult::at_its_line(self.map, model, (&end.wake, covariance), side, moves);
+        let (model, moves) = (self.stage.gates.model, self.stage.gates.seconds.is_some());
+        let vortex = |side| VortexResult::at_its_line(self.stage.map, model, (&end.wake, covariance), side, moves);
         self.sides(end).into_iter().map(vortex).collect()
     }
 
@@ -118,43 +116,19 @@ impl<'a> Report<'a> {
     }
 
     fn uncertainty<'b>(&self, end: &'b End) -> Result<Uncertainty<'b>, Error> {
-        let rows = self.problem.rows(&end.wake, &end.groups);
-        let losses: Vec<_> = rows.residuals.iter().map(|r| self.problem.loss.at(*r)).collect();
-        let (weights, curved): (Vec<f64>, Vec<f64>) =
-            losses.iter().map(|(_, weight, second)| (*weight, *second)).unzip();
-        let mut known = Array2::<f64>::zeros((end.groups.len(), end.groups.len()));
-        for (_, slope) in self.problem.known(&end.wake, &end.groups) {
-            known.indexed_iter_mut().for_each(|((i, j), k)| *k += slope[i] * slope[j]);
-        }
-        let curvature = |weights: &[f64]| products(weights, &rows.slopes) + &known;
-        let (curvature, scores) = match self.options.covariance {
-            Covariance::Model => {
-                let information = curvature(&vec![1.0; weights.len()]);
-                let scores = &information * inflation(self.options.loss);
-                (information, scores)
-            }
-            Covariance::Sandwich => {
-                // with many outliers the second derivatives need not be positive: their weights are, and are larger
-                let mut bread = curvature(&curved);
-                if inverse(CURVATURE, &bread).is_err() {
-                    bread = curvature(&weights);
-                }
-                let weighted: Vec<f64> = rows.residuals.iter().zip(&weights).map(|(r, w)| r * w).collect();
-                let blocks = self.map.view().blocks(BLOCKS);
-                let (filling, _) = filling(&self.problem.cells, &weighted, &rows.slopes, blocks);
-                (bread, filling + &known)
-            }
+        let from = match self.stage.options.covariance {
+            Covariance::Model => Scores::Stated,
+            Covariance::Sandwich => Scores::Decaying { blocks: self.stage.map.view().blocks(BLOCKS) },
         };
-        let from_residuals = self.options.covariance == Covariance::Sandwich;
-        Ok(Uncertainty { groups: &end.groups, curvature, scores, from_residuals })
+        self.stage.squares.uncertainty(&end.wake.to_array(), &end.groups, from)
     }
 
     pub(crate) fn told(&self, end: &End, covariance: Array2<f64>, statistic: f64) -> ScanResult {
-        let residuals = self.problem.rows(&end.wake, &[]).residuals;
+        let residuals = self.stage.squares.rows(&end.wake.to_array(), &[]).residuals;
         let used = residuals.iter().filter(|r| r.abs() <= OUTLIER * self.scale);
         let (count, squares) = used.fold((0, 0.0), |(count, sum), r| (count + 1, sum + r * r));
         let cells_rejected = self.rejected + residuals.len() - count;
-        let moves = self.problem.expected.moves();
+        let moves = self.stage.gates.seconds.is_some();
         let mut vortices = self.vortices(end, &covariance);
         // what is beyond the sector is hardly known, though it acts
         if vortices.iter().any(|vortex| self.margin_m(vortex) >= 0.0) {
@@ -171,7 +145,7 @@ impl<'a> Report<'a> {
             .get(1)
             .zip(tops.first())
             .is_some_and(|(second, first)| second.chi2 - first.chi2 < COMPETES * self.scale.powi(2));
-        let instant = self.map.has_times() && self.map.time_s.windows(2).all(|pair| pair[0] == pair[1]);
+        let instant = self.stage.map.has_times() && self.stage.map.time_s.windows(2).all(|pair| pair[0] == pair[1]);
         let unmoved = !moves && !instant;
         let flags = [
             (Flag::NoWake, vortices.is_empty()),
@@ -188,14 +162,14 @@ impl<'a> Report<'a> {
         ];
         ScanResult {
             wake: (!vortices.is_empty()).then_some(end.wake),
-            reference_time_s: self.problem.expected.reference_time_s,
+            reference_time_s: self.stage.map.middle_s(),
             lateral_wind_m_s: measured(Parameter::Wind),
             wind_shear_per_s: measured(Parameter::Shear),
             chi2_per_dof: squares / (count.saturating_sub(end.groups.len()).max(1)) as f64,
             cells_used: count,
             cells_rejected,
             statistic,
-            threshold: self.options.threshold,
+            threshold: self.stage.options.threshold,
             flags: flags.into_iter().filter(|(_, set)| *set).map(|(flag, _)| flag).collect(),
             vortices,
             covariance,
@@ -210,38 +184,18 @@ impl<'a> Report<'a> {
     /// How far the sector reaches beyond a centre \[m\]; negative outside.
     fn margin_m(&self, vortex: &VortexResult) -> f64 {
         let place_m = (vortex.lateral_position_m.value, vortex.height_m.value);
-        let (range_m, elevation_rad) = self.options.model.range_and_elevation(place_m);
+        let (range_m, elevation_rad) = self.stage.options.model.range_and_elevation(place_m);
         let within = |axis: &[f64], value: f64| {
             axis.first().zip(axis.last()).map_or(f64::NAN, |(first, last)| (value - first).min(last - value))
         };
-        within(&self.map.range_m, range_m).min(range_m * within(&self.map.elevation_rad, elevation_rad))
+        within(&self.stage.map.range_m, range_m).min(range_m * within(&self.stage.map.elevation_rad, elevation_rad))
     }
-}
-
-const CURVATURE: &str = "curvature of the fit";
-
-/// What a scan tells of the free numbers of a fit: the curvature A of its cost and the covariance B of the gradient.
-struct Uncertainty<'a> {
-    groups: &'a [Vec<usize>],
-    curvature: Array2<f64>,
-    scores: Array2<f64>,
-    /// Whether the residuals tell the covariance, and so what is correlated.
-    from_residuals: bool,
 }
 
 impl Uncertainty<'_> {
-    /// Covariance A^-1 B A^-1 of all parameters where only those of the wanted groups are free.
-    fn covariance(&self, wanted: impl Fn(&[usize]) -> bool) -> Result<Array2<f64>, Error> {
-        let free: Vec<usize> = (0..self.groups.len()).filter(|i| wanted(&self.groups[*i])).collect();
-        let of = |all: &Array2<f64>| all.select(Axis(0), &free).select(Axis(1), &free);
-        let bread = inverse(CURVATURE, &of(&self.curvature))?;
-        let groups: Vec<Vec<usize>> = free.iter().map(|i| self.groups[*i].clone()).collect();
-        Ok(spread(&groups, &bread.dot(&of(&self.scores)).dot(&bread)))
-    }
-
     /// Variance of the size of a wake at its places over that in independent noise of the variance that was taken, at least 1: a gain of chi-square
     /// is so many times larger by chance. What wind takes from the wake is left out.
-    fn alike(&self, wake: &Wake, variance: f64) -> f64 {
+    fn excess(&self, wake: &Wake, variance: f64) -> f64 {
         let p = wake.to_array();
         let (wind, vortices): (Vec<usize>, Vec<usize>) =
             (0..self.groups.len()).partition(|i| self.groups[*i][0] >= Parameter::Wind as usize);
@@ -258,7 +212,7 @@ impl Uncertainty<'_> {
         let along = Array1::from_vec(along);
         let ratio = along.dot(&self.scores.dot(&along)) / along.dot(&self.curvature.dot(&along));
         // also 1 for NaN, where no circulation is free
-        if self.from_residuals { (ratio / variance).max(1.0) } else { 1.0 }
+        (ratio / variance).max(1.0)
     }
 
     /// Whether a circulation is positive beyond doubt, or is so by far where all but it and the wind is as found: long gates show little
@@ -271,18 +225,4 @@ impl Uncertainty<'_> {
         Ok(beyond(self.covariance(|_| true)?, LEAST_SIGMAS)
             || beyond(self.covariance(alone)?, (BY_FAR * threshold.sqrt()).max(LEAST_SIGMAS)))
     }
-}
-
-/// Variance of a fit with that loss over that of least squares, for normal residuals.
-fn inflation(loss: Loss) -> f64 {
-    let (mut squares, mut curvature, mut sum) = (0.0, 0.0, 0.0);
-    for i in -800..=800 {
-        let r = 0.01 * f64::from(i);
-        let density = (-0.5 * r * r).exp();
-        let (_, weight, second) = loss.at(r);
-        sum += density;
-        squares += density * (weight * r).powi(2);
-        curvature += density * second;
-    }
-    squares * sum / (curvature * curvature)
 }

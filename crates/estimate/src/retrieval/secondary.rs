@@ -5,9 +5,9 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::retrieval::expected::Expected;
 use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, VortexResult, fit_scan};
-use crate::vortex_fit::map_fit::secondary::Setting;
+use crate::vortex_fit::map_fit::gates::Gates;
+use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::{MapFitOptions, Parameter};
 
 /// What [`fit_scan`] finds with secondary vortices in the model, and the options with them, if the scan shows them beside the pair that it has
@@ -26,7 +26,6 @@ pub fn with_secondary_vortices(
         return Ok(None);
     };
     let moves = map.has_times() && !found.has(Flag::MotionIgnored);
-    let seconds = moves.then(|| map.after_middle_s());
     options.validate()?;
     let map_options = MapFitOptions {
         free: options.free,
@@ -36,17 +35,17 @@ pub fn with_secondary_vortices(
         ..MapFitOptions::default()
     };
     let unfolded = map.unfolded();
-    let kernel = Expected::rough(&unfolded, options)?.kernel;
+    let gates = Gates::rough(&unfolded, options)?;
+    let gates = Gates { seconds: moves.then(|| map.after_middle_s()), shared_points: true, ..gates };
     let setting = Setting {
         map: &unfolded.view(),
         model: &options.model,
-        prepared: None,
-        kernel: &kernel,
-        seconds: seconds.as_deref(),
+        prediction: &gates,
+        kernel: &gates.kernel,
         options: &map_options,
-        groups: &options.free.groups(),
+        least_core_m: 0.0,
     };
-    let Some(four) = setting.find(&pair) else { return Ok(None) };
+    let Some(four) = setting.with_secondary(&pair) else { return Ok(None) };
     // what another profile would do was free in the search
     let mut options = RetrievalOptions { other_profile: false, ..options.clone() };
     options.model.secondary = Some(four.secondary);

@@ -2,8 +2,8 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `wake` | `pair`: the vortices with their images and the wind, derivatives; `free_parameters`: which a fit may change; `core_prior`: what is known of cores; `range_kernel`, `wake_map`: what a range gate and a region see in the mean; `pulse` |
-//! | `map_fit` | `data`: the map; `guess`: search for the best pair; `means`, `problem`: robust least squares; `starts`; `residual_covariance`: correlated residuals; `estimator_response`, `tangent`, `estimates`: the same for what an estimator makes of the spectra |
+//! | `wake` | `pair`: the vortices with their images and the wind, derivatives; `motion`; `free_parameters`: which a fit may change; `core_prior`: what is known before; `range_kernel`, `wake_map`: what a range gate and a region see in the mean; `pulse` |
+//! | `map_fit` | `data`, `cells`: the map; `prediction`: what is expected of it, by `gates` at rest or in motion or by an estimator (`estimator_response`); `least_squares`: what is minimised and what is known at the minimum; `residual_covariance`; `setting`: both ways to the minimum; `guess`, `starts`, `estimates`: fits of our own maps; `secondary`: four vortices |
 //! | `signal_fit` | `baseband`, `scan_model`: signals at the rate of the detector band, lines cut into layers; `line_covariance`, `banded_cholesky`, `likelihood`: covariance of a line, its factor and derivatives, Fisher information; `fit`, `ascent`, `tops`: the fit and the tops of its likelihood |
 //! | `damped_newton` | the iteration of Levenberg and Marquardt that both fits share |
 //!
@@ -38,9 +38,8 @@ mod signal_fit;
 pub(crate) mod wake;
 
 pub use map_fit::data::{Loss, MapFit, MapFitOptions, MapTop, VelocityMap};
-pub use map_fit::estimates::{fit_map_of_estimator, fit_secondary_vortices, refine_map_fit_of_estimator};
+pub use map_fit::estimates::{fit_map, fit_map_of_estimator, fit_secondary_vortices, refine_map_fit_of_estimator};
 pub use map_fit::estimator_response::EstimatorResponse;
-pub use map_fit::means::{fit_map, refine_map_fit};
 pub use signal_fit::baseband::Baseband;
 pub use signal_fit::fit::{SignalFit, fit_signals};
 pub use signal_fit::likelihood::{LikelihoodValue, Powers, ScanSignals};

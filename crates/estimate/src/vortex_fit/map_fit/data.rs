@@ -130,15 +130,10 @@ pub struct MapFitOptions {
     pub loss: Loss,
     /// Neighbouring lines that share windows: 2 rho over their distance for an accumulated map, 0 for independent lines.
     pub correlated_lines: usize,
-    /// Most evaluations of the map in a round.
-    pub max_iterations: usize,
-    /// The fit ends when the step that is left is below this part of its standard deviations; for the map of an estimator with velocities
-    /// that say the same as their neighbours counted once.
-    pub tolerance_sigmas: f64,
 }
 
 impl Default for MapFitOptions {
-    /// All parameters, core radii as they typically are, the loss of Cauchy, 8 correlated lines, at most 200 evaluations, to 0.01 standard deviations.
+    /// All parameters, core radii as they typically are, the loss of Cauchy, 8 correlated lines.
     fn default() -> Self {
         Self {
             free: FreeParameters::default(),
@@ -146,8 +141,6 @@ impl Default for MapFitOptions {
             core_prior: Some(CorePrior::TYPICAL),
             loss: Loss::Cauchy { width: 2.385 },
             correlated_lines: 8,
-            max_iterations: 200,
-            tolerance_sigmas: 1e-2,
         }
     }
 }

@@ -8,29 +8,26 @@
 use ndarray::Array2;
 
 use crate::error::Error;
-use crate::vortex_fit::damped_newton::{Averaging, halved};
 use crate::vortex_fit::map_fit::coarse::Coarse;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
+use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::first_guess;
-use crate::vortex_fit::map_fit::means::Fit;
-use crate::vortex_fit::map_fit::problem::{Expected, Problem};
-use crate::vortex_fit::map_fit::secondary::{Found, Setting};
+use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, quotients};
+use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::map_fit::starts::{best_of, distinct, starts, with_typical_core};
-use crate::vortex_fit::map_fit::tangent::{Tangent, near};
 use crate::vortex_fit::{
-    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, PARAMETERS, RangeKernel, Sharing, VelocityMap, Vortex,
-    Wake, WakeModel, refine_map_fit,
+    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, Sharing, VelocityMap, Vortex, Wake,
+    WakeModel,
 };
 
-/// Most steps of Gauss and Newton.
-const STEPS: usize = 40;
 /// The least core radius over a region's radius, or over the distance of lines.
 const SMALLEST_CORE: f64 = 0.25;
 /// Fits end at a step of this many standard deviations at the latest, with neighbours that are alike counted once: estimators
 /// round.
 const NEAR_SIGMAS: f64 = 0.03;
-/// Fits that only lead to a start may end at such a step.
+/// Fits that only lead to a start may end at such a step, and fits of means for themselves.
 const ROUGH_SIGMAS: f64 = 0.1;
+const FINE_SIGMAS: f64 = 0.01;
 /// So may those to few places, which all places correct at once.
 const COARSE_SIGMAS: f64 = 0.5;
 /// Places that tell nearly all of a map: no farther apart than this part of the radius of its regions, for starts and for slopes (half the
@@ -40,12 +37,41 @@ const GATES_OVER_WIDTH: f64 = 0.6;
 /// Nodes of the air are so much farther apart there.
 const COARSER_NODES: f64 = 2.0;
 
-/// Fits the wake to a map that an estimator of this crate made, without any prior knowledge: as [`fit_map`](crate::vortex_fit::fit_map) with its
-/// mean gate, then [`refine_map_fit_of_estimator`] of every few lines and gates with each of a few core radii, if they are fitted, then of all
-/// from the ends that differ.
+/// Fits the wake to a map whose velocities are means over gates, without any prior knowledge: a search for the best pair, then a fit from there with
+/// each of a few core radii, if they are fitted. `kernel` is what each velocity sees of the air about its range.
 ///
 /// # Errors
-/// As [`fit_map`](crate::vortex_fit::fit_map) and [`refine_map_fit_of_estimator`].
+/// [`Error::NoVortex`] if no pair stands out; [`Error::Length`], [`Error::OutOfRange`] for impossible input; [`Error::TooFewVelocities`] with less
+/// than a hundred, or ten for each free number; [`Error::NotConverged`]; [`Error::Linalg`] if a free parameter does not show in the map.
+pub fn fit_map(
+    map: &VelocityMap<'_>,
+    model: &WakeModel,
+    kernel: &RangeKernel,
+    options: &MapFitOptions,
+) -> Result<MapFit, Error> {
+    let guess = first_guess(map, model, kernel)?;
+    let refine = |start: &Wake| of_means(map, model, kernel, options, (start, FINE_SIGMAS));
+    with_typical_core(best_of(&starts(&guess, options), refine)?, options, refine)
+}
+
+/// The fit to a map of means over gates from a start on, to steps of so many standard deviations.
+fn of_means(
+    map: &VelocityMap<'_>,
+    model: &WakeModel,
+    kernel: &RangeKernel,
+    options: &MapFitOptions,
+    (start, sigmas): (&Wake, f64),
+) -> Result<MapFit, Error> {
+    let gates = Gates::at_rest(model, kernel.clone(), (map.elevation_rad, map.range_m));
+    Setting { map, model, prediction: &gates, kernel, options, least_core_m: 0.0 }.descended(start, sigmas)
+}
+
+/// Fits the wake to a map that an estimator of this crate made, without any prior knowledge: as [`fit_map`] with its mean gate, then
+/// [`refine_map_fit_of_estimator`] of every few lines and gates with each of a few core radii, if they are fitted, then of all from the ends that
+/// differ.
+///
+/// # Errors
+/// As [`fit_map`].
 pub fn fit_map_of_estimator(
     map: &VelocityMap<'_>,
     model: &WakeModel,
@@ -53,28 +79,27 @@ pub fn fit_map_of_estimator(
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
     map.validate()?;
-    let whole = Shown::new(*map, model, response, options, 1.0)?;
-    let coarse = LINES_OVER_RADIUS.map(|part| whole.coarse(response, part));
-    let few = |place: usize| coarse[place].as_ref().map(|few| Few::new(few, model, response, options)).transpose();
-    let (for_starts, for_slopes) = (few(0)?, few(1)?);
-    let guess = first_guess(map, model, &whole.kernel)?;
+    let all = Shown::new(map, model, response, options, 1.0)?;
+    let guess = first_guess(map, model, &all.kernel)?;
+    let coarse = all.coarse(response, LINES_OVER_RADIUS[0]);
+    let few = coarse.as_ref().map(|coarse| coarse.shown(model, response, options)).transpose()?;
     // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
-    let free = FreeParameters { core_radius: Sharing::Fixed, ..options.free };
-    let rough = MapFitOptions { free, tolerance_sigmas: ROUGH_SIGMAS, ..*options };
-    let by_means = match &for_starts {
-        Some(Few { shown, .. }) => refine_map_fit(&shown.map, model, &shown.kernel, &guess, &rough),
-        None => refine_map_fit(map, model, &whole.kernel.coarser(2), &guess, &rough),
+    let rough = MapFitOptions { free: FreeParameters { core_radius: Sharing::Fixed, ..options.free }, ..*options };
+    let by_means = match &few {
+        Some(few) => of_means(&few.map, model, &few.kernel, &rough, (&guess, ROUGH_SIGMAS)),
+        None => of_means(map, model, &all.kernel.coarser(2), &rough, (&guess, ROUGH_SIGMAS)),
     };
-    let by_means = by_means.map(|fit| fit.wake);
-    let refine = |start: &Wake| whole.refined(start, for_slopes.as_ref(), NEAR_SIGMAS);
+    let for_slopes = all.coarse(response, LINES_OVER_RADIUS[1]);
+    let all = all.with_slopes_at(for_slopes.as_ref(), response)?;
+    let refine = |start: &Wake| all.setting().refined(start, NEAR_SIGMAS);
     let from = |about: &Wake| {
         let starts = starts(about, options);
-        let ends = for_starts.as_ref().map_or_else(Vec::new, |few| few.ends(&starts));
+        let ends = few.as_ref().map_or_else(Vec::new, |few| few.ends(&starts));
         best_of(if ends.is_empty() { &starts } else { &ends }, refine)
     };
-    let fit = match (from(by_means.as_ref().unwrap_or(&guess)), by_means) {
-        (Err(Error::NotConverged { .. }), Ok(_)) => from(&guess),
-        (first, _) => first,
+    let fit = match from(by_means.as_ref().map_or(&guess, |fit| &fit.wake)) {
+        Err(Error::NotConverged { .. }) if by_means.is_ok() => from(&guess),
+        first => first,
     };
     with_typical_core(fit?, options, refine)
 }
@@ -83,7 +108,7 @@ pub fn fit_map_of_estimator(
 /// expected correlograms. A vortex that has no circulation at the start is none: its numbers are not fitted.
 ///
 /// # Errors
-/// As [`refine_map_fit`].
+/// As [`fit_map`], but for a map without a wake.
 pub fn refine_map_fit_of_estimator(
     map: &VelocityMap<'_>,
     model: &WakeModel,
@@ -92,10 +117,9 @@ pub fn refine_map_fit_of_estimator(
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
     map.validate()?;
-    let whole = Shown::new(*map, model, response, options, 1.0)?;
-    let coarse = whole.coarse(response, LINES_OVER_RADIUS[1]);
-    let few = coarse.as_ref().map(|coarse| Few::new(coarse, model, response, options)).transpose()?;
-    whole.refined(guess, few.as_ref(), NEAR_SIGMAS)
+    let all = Shown::new(map, model, response, options, 1.0)?;
+    let for_slopes = all.coarse(response, LINES_OVER_RADIUS[1]);
+    all.with_slopes_at(for_slopes.as_ref(), response)?.setting().refined(guess, NEAR_SIGMAS)
 }
 
 /// The pair of a fit with secondary vortices beside it, if the map shows them: both are fitted at once, then the pair once more with the others
@@ -112,12 +136,12 @@ pub fn fit_secondary_vortices(
 ) -> Result<Option<(MapFit, [Vortex; 2])>, Error> {
     map.validate()?;
     pair.validate()?;
-    let whole = Shown::new(*map, model, response, options, 1.0)?;
-    let coarse = whole.coarse(response, LINES_OVER_RADIUS[0]);
-    let few = coarse.as_ref().map(|coarse| Few::new(coarse, model, response, options)).transpose()?;
+    let all = Shown::new(map, model, response, options, 1.0)?;
+    let coarse = all.coarse(response, LINES_OVER_RADIUS[0]);
+    let few = coarse.as_ref().map(|coarse| coarse.shown(model, response, options)).transpose()?;
     let found = match &few {
-        Some(few) => few.shown.with_secondary(pair),
-        None => whole.with_secondary(pair),
+        Some(few) => few.setting().with_secondary(pair),
+        None => all.setting().with_secondary(pair),
     };
     let Some(found) = found else { return Ok(None) };
     let model = WakeModel { secondary: Some(found.secondary), ..*model };
@@ -125,45 +149,13 @@ pub fn fit_secondary_vortices(
     Ok(Some((MapFit { covariance: found.covariance, ..fit }, found.secondary)))
 }
 
-/// The few places of a map that tell nearly all of it, and what an estimator shows there.
-struct Few<'a> {
-    coarse: &'a Coarse,
-    shown: Shown<'a, 'a>,
-}
-
-impl<'a> Few<'a> {
-    fn new(
-        coarse: &'a Coarse,
-        model: &'a WakeModel,
-        response: &'a EstimatorResponse<'a>,
-        options: &MapFitOptions,
-    ) -> Result<Self, Error> {
-        let correlated_lines = options.correlated_lines.div_ceil(coarse.line_step());
-        let options = MapFitOptions { correlated_lines, ..*options };
-        Ok(Self { coarse, shown: Shown::new(coarse.map(), model, response, &options, COARSER_NODES)? })
-    }
-
-    /// Where the fits from some starts end that do, without those that are one.
-    fn ends(&self, starts: &[Wake]) -> Vec<Wake> {
-        let refine = |start: &Wake| self.shown.refined(start, None, COARSE_SIGMAS);
-        let end = |start: &Wake| with_typical_core(refine(start)?, &self.shown.options, refine);
-        distinct(starts.iter().filter_map(|start| end(start).ok()).collect())
-    }
-
-    /// Slopes at all places of a map of that size, from those at the few.
-    fn slopes(&self, at: &Wake, groups: &[Vec<usize>], size: (usize, usize)) -> Vec<Array2<f64>> {
-        let prepared = &self.shown.prepared;
-        let here = prepared.velocities(at);
-        let some = Tangent::slopes(prepared, at, here.view(), groups);
-        some.iter().map(|slope| self.coarse.everywhere(slope, size)).collect()
-    }
-}
-
 /// A map, and what an estimator shows at its places.
 struct Shown<'a, 'm> {
     map: VelocityMap<'m>,
-    model: &'a WakeModel,
     prepared: Prepared<'a>,
+    /// Some places at which slopes are taken, if not at all of them; between they are linear.
+    slopes_at: Option<(&'a Coarse, Prepared<'a>)>,
+    /// What gates see in the mean.
     kernel: RangeKernel,
     options: MapFitOptions,
     /// Core radii below this do not show \[m\].
@@ -173,7 +165,7 @@ struct Shown<'a, 'm> {
 impl<'a, 'm: 'a> Shown<'a, 'm> {
     /// With nodes of the air `coarser` times as far apart as need be.
     fn new(
-        map: VelocityMap<'m>,
+        map: &VelocityMap<'m>,
         model: &'a WakeModel,
         response: &'a EstimatorResponse<'a>,
         options: &MapFitOptions,
@@ -182,14 +174,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         let prepared = response.prepared(model, (map.elevation_rad, map.range_m), coarser);
         let kernel = prepared.kernel()?;
         let least_core_m = SMALLEST_CORE * map.line_spacing_m().max(response.least_radius_m(map.range_m));
-        Ok(Self { map, model, prepared, kernel, options: *options, least_core_m })
-    }
-
-    /// Four vortices in place of a pair, if they explain the map better.
-    fn with_secondary(&self, pair: &Wake) -> Option<Found> {
-        let Self { map, model, prepared, kernel, options, .. } = self;
-        let groups = &options.free.groups();
-        Setting { map, model, prepared: Some(prepared), kernel, seconds: None, options, groups }.find(pair)
+        Ok(Self { map: *map, prepared, slopes_at: None, kernel, options: *options, least_core_m })
     }
 
     /// The places that tell nearly all of the map.
@@ -198,75 +183,71 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         Coarse::of(&self.map, line_m, GATES_OVER_WIDTH * self.kernel.width_m())
     }
 
-    /// The fit from a start on until the step that is left is below `near_sigmas` or the tolerance, with slopes from `few` places, if there
-    /// are such.
-    fn refined(&self, guess: &Wake, few: Option<&Few<'_>>, near_sigmas: f64) -> Result<MapFit, Error> {
-        let options = &self.options;
-        let fit = Fit::new(&self.map, self.model, &self.kernel, guess, options)?;
-        let coreless = fit.coreless();
-        let mut groups = &fit.groups;
-        let mut wake = options.free.start(guess);
-        let (mut averaging, mut last, mut sigmas_left) = (Averaging::default(), [0.0; PARAMETERS], f64::INFINITY);
-        let mut slopes: Option<(Wake, Vec<Array2<f64>>)> = None;
-        let (mut alike, mut released) = (1.0, false);
-        let (mut step, mut most) = (0, STEPS);
-        while step < most {
-            step += 1;
-            let here = self.prepared.velocities(&wake);
-            let known = slopes.take().filter(|(at, slopes)| near(at, &wake) && slopes.len() == groups.len());
-            let moved = known.is_none();
-            let known = known.unwrap_or_else(|| {
-                let slopes = match few {
-                    Some(few) => few.slopes(&wake, groups, here.dim()),
-                    None => Tangent::slopes(&self.prepared, &wake, here.view(), groups),
-                };
-                (wake, slopes)
-            });
-            let tangent = Tangent::new(&self.prepared, wake, here.view(), &known.1, &self.map);
-            slopes = Some(known);
-            let learnt = Some(&tangent.deviation);
-            let mut problem = Problem { learnt, ..fit.problem(groups, Expected::Shown(&tangent)) };
-            let scale = problem.scale(&wake)?;
-            if moved {
-                alike = fit.alike(&problem, &wake, scale);
-            }
-            problem.prior = fit.prior(groups, alike);
-            let next = problem.reweighted(wake, scale, fit.stop)?;
-            let (from, to) = (wake.to_array(), next.to_array());
-            let way: [f64; PARAMETERS] = std::array::from_fn(|i| to[i] - from[i]);
-            let [with_last, of_last] = [&way, &last].map(|step| problem.product(&wake, step, &last, scale));
-            let share = averaging.part(with_last, of_last);
-            sigmas_left = share * (problem.product(&wake, &way, &way, scale) / alike).sqrt();
-            if sigmas_left <= near_sigmas.max(options.tolerance_sigmas) {
-                // a core that shrank on the way, as where the pair was narrow, may show where it ends
-                if groups.len() < fit.groups.len() && !released {
-                    (groups, released, most) = (&fit.groups, true, step + STEPS);
-                    continue;
-                }
-                return fit.outcome(&problem, wake, scale, step);
-            }
-            let next = halved(share.min(tangent.reach(&next)), |part| {
-                let trial = Wake::from_array(&std::array::from_fn(|i| from[i] + part * way[i]));
-                fit.allows(&trial).then_some(trial)
-            });
-            wake = next.ok_or(Error::NotConverged { iterations: step, sigmas_left })?;
-            last = way;
-            if groups.len() > coreless.len() && raised(&mut wake, self.least_core_m) {
-                groups = &coreless;
-            }
-        }
-        Err(Error::NotConverged { iterations: step, sigmas_left })
+    /// The same with slopes at some places.
+    fn with_slopes_at(self, places: Option<&'a Coarse>, response: &'a EstimatorResponse<'a>) -> Result<Self, Error> {
+        let model = self.prepared.model;
+        let slopes_at = places.map(|coarse| Ok((coarse, coarse.shown(model, response, &self.options)?.prepared)));
+        Ok(Self { slopes_at: slopes_at.transpose()?, ..self })
+    }
+
+    fn setting(&self) -> Setting<'_, 'm> {
+        let Self { map, prepared, kernel, options, least_core_m, .. } = self;
+        Setting { map, model: prepared.model, prediction: self, kernel, options, least_core_m: *least_core_m }
+    }
+
+    /// Where the fits from some starts end that do, without those that are one.
+    fn ends(&self, starts: &[Wake]) -> Vec<Wake> {
+        let refine = |start: &Wake| self.setting().refined(start, COARSE_SIGMAS);
+        let end = |start: &Wake| with_typical_core(refine(start)?, &self.options, refine);
+        distinct(starts.iter().filter_map(|start| end(start).ok()).collect())
     }
 }
 
-/// Raises core radii below the least one, and tells whether there were any.
-fn raised(wake: &mut Wake, least_m: f64) -> bool {
-    let mut any = false;
-    for core_m in [&mut wake.left.core_radius_m, &mut wake.right.core_radius_m] {
-        any |= *core_m < least_m;
-        *core_m = core_m.max(least_m);
+impl Coarse {
+    /// What an estimator shows there.
+    fn shown<'a>(
+        &'a self,
+        model: &'a WakeModel,
+        response: &'a EstimatorResponse<'a>,
+        options: &MapFitOptions,
+    ) -> Result<Shown<'a, 'a>, Error> {
+        let correlated_lines = options.correlated_lines.div_ceil(self.line_step());
+        let options = MapFitOptions { correlated_lines, ..*options };
+        Shown::new(&self.map(), model, response, &options, COARSER_NODES)
     }
-    any
+}
+
+impl Prediction for Shown<'_, '_> {
+    fn allows(&self, p: &[f64]) -> bool {
+        let (model, wake) = self.prepared.model.with(p);
+        model.allows(&wake)
+    }
+
+    fn predict(&self, p: &[f64], groups: &[Vec<usize>]) -> Predicted {
+        let of = |prepared: &Prepared<'_>, p: &[f64]| {
+            let (model, wake) = prepared.model.with(p);
+            prepared.velocities(&model, &wake)
+        };
+        let velocity_m_s = of(&self.prepared, p);
+        let slopes = match &self.slopes_at {
+            None => quotients(|p| of(&self.prepared, p), p, &velocity_m_s, groups),
+            Some(_) if groups.is_empty() => Vec::new(),
+            Some((coarse, few)) => {
+                let slopes = quotients(|p| of(few, p), p, &of(few, p), groups);
+                slopes.iter().map(|slope| coarse.everywhere(slope, velocity_m_s.dim())).collect()
+            }
+        };
+        Predicted { velocity_m_s, slopes }
+    }
+
+    fn of_other_profile(&self, wake: &Wake) -> Array2<f64> {
+        let model = self.prepared.model;
+        self.prepared.velocities(&WakeModel { profile: model.profile.other(), ..*model }, wake)
+    }
+
+    fn air_variances(&self, p: &[f64]) -> Option<Array2<f64>> {
+        Some(self.prepared.variances(&Wake::from_list(p)))
+    }
 }
 
 #[cfg(test)]
@@ -299,13 +280,13 @@ mod tests {
             velocity_m_s: velocity_m_s.view(),
             standard_deviation_m_s: None,
         };
-        let whole = Shown::new(map, &model, &response, &options, 1.0).unwrap();
+        let whole = Shown::new(&map, &model, &response, &options, 1.0).unwrap();
         let coarse = whole.coarse(&response, LINES_OVER_RADIUS[1]).unwrap();
         assert!(2 * coarse.map().velocity_m_s.len() <= velocity_m_s.len());
-        let few = Few::new(&coarse, &model, &response, &options).unwrap();
         let groups = options.free.groups();
-        let some = few.slopes(&wake, &groups, velocity_m_s.dim());
-        let all = Tangent::slopes(&whole.prepared, &wake, velocity_m_s.view(), &groups);
+        let all = whole.predict(&wake.to_array(), &groups).slopes;
+        let whole = whole.with_slopes_at(Some(&coarse), &response).unwrap();
+        let some = whole.predict(&wake.to_array(), &groups).slopes;
         for ((group, some), all) in groups.iter().zip(&some).zip(&all) {
             let product = |a: &Array2<f64>, b: &Array2<f64>| (a * b).sum();
             let size = (product(some, some) / product(all, all)).sqrt();

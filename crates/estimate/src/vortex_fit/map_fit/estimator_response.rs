@@ -21,8 +21,8 @@ use crate::error::{Error, length, not_negative, positive};
 use crate::estimators::Estimator;
 use crate::linalg::dot;
 use crate::parallel::map_indexed;
-use crate::retrieval::motion::Motion;
 use crate::spectrum::{Correlogram, Taper};
+use crate::vortex_fit::wake::motion::Motion;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::wake_map::region;
 use crate::vortex_fit::{PulseShape, RangeKernel, Wake, WakeModel};
@@ -130,7 +130,7 @@ impl<'a> EstimatorResponse<'a> {
     ) -> Result<Array2<f64>, Error> {
         wake.validate()?;
         crate::vortex_fit::map_fit::data::validate_axes(elevation_rad, range_m)?;
-        Ok(self.prepared(model, (elevation_rad, range_m), 1.0).velocities(wake))
+        Ok(self.prepared(model, (elevation_rad, range_m), 1.0).velocities(model, wake))
     }
 
     /// Least radius of the regions at those ranges \[m\].
@@ -208,7 +208,7 @@ impl<'a> EstimatorResponse<'a> {
 /// A response at the places of a map, with its weights on nodes.
 pub(crate) struct Prepared<'r> {
     response: &'r EstimatorResponse<'r>,
-    model: &'r WakeModel,
+    pub(crate) model: &'r WakeModel,
     elevation_rad: &'r [f64],
     range_m: &'r [f64],
     first_offset_m: f64,
@@ -247,13 +247,8 @@ impl Prepared<'_> {
         self.seconds.iter().map(|seconds| motion.wake_after(wake, *seconds)).collect()
     }
 
-    /// The map of a wake.
-    pub(crate) fn velocities(&self, wake: &Wake) -> Array2<f64> {
-        self.velocities_of(self.model, wake)
-    }
-
-    /// The map of a wake by another model.
-    pub(crate) fn velocities_of(&self, model: &WakeModel, wake: &Wake) -> Array2<f64> {
+    /// The map of a wake by a model.
+    pub(crate) fn velocities(&self, model: &WakeModel, wake: &Wake) -> Array2<f64> {
         let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
         let wakes = self.wakes(model, wake);
         let correlograms = map_indexed(lines, Vec::new, |phasors, line| {

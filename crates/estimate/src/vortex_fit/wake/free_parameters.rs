@@ -114,27 +114,32 @@ impl FreeParameters {
 
 /// The wake after a step of the free numbers.
 pub(crate) fn moved(groups: &[Vec<usize>], wake: &Wake, step: &[f64]) -> Wake {
-    let mut p = wake.to_array();
+    Wake::from_list(&stepped(groups, &wake.to_array(), step))
+}
+
+/// Parameters after a step of the free numbers.
+pub(crate) fn stepped(groups: &[Vec<usize>], p: &[f64], step: &[f64]) -> Vec<f64> {
+    let mut p = p.to_vec();
     for (places, by) in groups.iter().zip(step) {
         places.iter().for_each(|&place| p[place] += by);
     }
-    Wake::from_array(&p)
+    p
 }
 
-/// Derivatives with respect to the free numbers.
-pub(crate) fn gathered(groups: &[Vec<usize>], slope: &[f64; PARAMETERS], out: &mut [f64]) {
+/// Derivatives with respect to the free numbers, of what does not depend on parameters beyond those given.
+pub(crate) fn gathered(groups: &[Vec<usize>], slope: &[f64], out: &mut [f64]) {
     for (places, out) in groups.iter().zip(out) {
-        *out = places.iter().map(|&place| slope[place]).sum();
+        *out = places.iter().filter_map(|&place| slope.get(place)).sum();
     }
 }
 
-/// Covariance of all parameters \[10, 10\] from that of the free numbers; fixed parameters have zeros.
+/// Covariance of the parameters of a wake \[10, 10\] from that of the free numbers; fixed parameters have zeros.
 pub(crate) fn spread(groups: &[Vec<usize>], covariance: &Array2<f64>) -> Array2<f64> {
     let mut all = Array2::zeros((PARAMETERS, PARAMETERS));
     for (i, rows) in groups.iter().enumerate() {
         for (j, columns) in groups.iter().enumerate() {
-            for &row in rows {
-                for &column in columns {
+            for &row in rows.iter().filter(|row| **row < PARAMETERS) {
+                for &column in columns.iter().filter(|column| **column < PARAMETERS) {
                     all[[row, column]] = covariance[[i, j]];
                 }
             }

@@ -14,6 +14,9 @@ use crate::error::{Error, finite, positive};
 /// Root of 2 s + 1 = exp(s): makes the core radius that of the largest speed of a Lamb-Oseen vortex.
 pub(crate) const LAMB_OSEEN_BETA: f64 = 1.256_431_208_626_169_6;
 
+/// Core radius of a fitted secondary vortex over the height of its vortex.
+pub(crate) const SECONDARY_CORE_OVER_HEIGHT: f64 = 0.12;
+
 /// Number of parameters of a [`Wake`].
 pub const PARAMETERS: usize = 10;
 
@@ -112,6 +115,11 @@ impl Wake {
             lateral_wind_m_s: p[8],
             wind_shear_per_s: p[9],
         }
+    }
+
+    /// The wake of a list of parameters that begins with those of a wake.
+    pub(crate) fn from_list(p: &[f64]) -> Self {
+        Self::from_array(&std::array::from_fn(|i| p[i]))
     }
 
     /// Checks that all numbers are finite, cores positive, the left vortex left of the right one.
@@ -251,6 +259,29 @@ impl WakeModel {
     #[must_use]
     pub fn gradient(&self, wake: &Wake, range_m: f64, elevation_rad: f64) -> (f64, [f64; PARAMETERS]) {
         self.gradients(wake, &[range_m], Ray::new(elevation_rad))[0]
+    }
+
+    /// Whether the model exists for a wake: with images, above the ground only.
+    pub(crate) fn allows(&self, wake: &Wake) -> bool {
+        let mut all = [&wake.left, &wake.right].into_iter().chain(self.secondary.iter().flatten());
+        wake.validate().is_ok() && (!self.images || all.all(|vortex| vortex.height_m > 0.0))
+    }
+
+    /// The model and the wake of a list of parameters: those of a wake and, if there are more, circulation, lateral position and height of a
+    /// secondary vortex beside each vortex.
+    pub(crate) fn with(&self, p: &[f64]) -> (Self, Wake) {
+        let wake = Wake::from_list(p);
+        let of = |own: &Vortex, [circulation_m2_s, lateral_position_m, height_m]: [f64; 3]| Vortex {
+            circulation_m2_s,
+            lateral_position_m,
+            height_m,
+            core_radius_m: SECONDARY_CORE_OVER_HEIGHT * own.height_m,
+        };
+        let secondary = match p[PARAMETERS..].as_chunks().0 {
+            [left, right] => Some([of(&wake.left, *left), of(&wake.right, *right)]),
+            _ => self.secondary,
+        };
+        (Self { secondary, ..*self }, wake)
     }
 
     /// Distance at which a line of sight passes the centre of a vortex \[m\].

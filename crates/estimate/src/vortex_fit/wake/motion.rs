@@ -3,9 +3,6 @@
 //! Over a scan of some seconds the velocity changes by per cents, so it is that of the middle of the scan.
 //! Check: the stored velocities of an independent program; difference quotients.
 
-use ndarray::Array2;
-
-use crate::retrieval::{Measured, ScanMap, Side, VortexResult};
 use crate::vortex_fit::{PARAMETERS, Parameter, Wake, WakeModel};
 
 /// Places of the moving coordinates among the parameters.
@@ -54,54 +51,6 @@ impl Motion {
         let then = *slope;
         for (place, row) in MOVING.iter().zip(&self.slopes) {
             slope.iter_mut().zip(row).for_each(|(slope, by)| *slope += then[*place] * seconds * by);
-        }
-    }
-}
-
-impl VortexResult {
-    /// A vortex of a wake, given with its covariance \[10, 10\] for the middle of the scan, when the line through its core is measured.
-    /// A core without variance was not fitted.
-    #[must_use]
-    pub fn at_its_line(
-        map: &ScanMap,
-        model: &WakeModel,
-        (wake, covariance): (&Wake, &Array2<f64>),
-        side: Side,
-        moves: bool,
-    ) -> Self {
-        let [circulation, lateral, height, core] = side.parameters().map(|parameter| parameter as usize);
-        let motion = moves.then(|| Motion::new(model, wake));
-        let after = |seconds: f64| motion.as_ref().map_or(*wake, |motion| motion.wake_after(wake, seconds)).to_array();
-        let reference_s = map.middle_s();
-        let mut seconds = 0.0;
-        // the line is that of the place then
-        for _ in 0..4 {
-            let p = after(seconds);
-            let (_, elevation_rad) = model.range_and_elevation((p[lateral], p[height]));
-            let away = |line: &usize| (map.elevation_rad[*line] - elevation_rad).abs();
-            let nearest = (0..map.elevation_rad.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
-            seconds = nearest.map_or(f64::NAN, |line| map.time_s[line] - reference_s);
-        }
-        let then = after(seconds);
-        let measured = |place: usize| {
-            let mut slope = [0.0; PARAMETERS];
-            slope[place] = 1.0;
-            if let Some(motion) = &motion {
-                motion.carry_back(seconds, &mut slope);
-            }
-            let terms = covariance.indexed_iter().map(|((i, j), c)| slope[i] * c * slope[j]);
-            Measured { value: then[place], std: terms.sum::<f64>().max(0.0).sqrt() }
-        };
-        let [left, right] = wake.mean_circulations_5_15_m2_s(model.profile, covariance.view());
-        let (value, std) = if side == Side::Left { left } else { right };
-        Self {
-            side,
-            time_s: reference_s + seconds,
-            circulation_m2_s: measured(circulation),
-            circulation_5_15_m2_s: Measured { value, std },
-            lateral_position_m: measured(lateral),
-            height_m: measured(height),
-            core_radius_m: (covariance[[core, core]] > 0.0).then(|| measured(core)),
         }
     }
 }

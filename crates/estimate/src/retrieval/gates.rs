@@ -1,0 +1,74 @@
+//! What a velocity of a scan is of the air about its range, on points that are as many as a fit needs.
+//!
+//! Check: the reference maps.
+
+use crate::error::Error;
+use crate::retrieval::{Gate, Movement, RetrievalOptions, ScanMap};
+use crate::vortex_fit::RangeKernel;
+use crate::vortex_fit::map_fit::gates::Gates;
+
+/// A Gaussian weight is cut off after so many standard deviations, and sampled at so many points at last.
+const REACH: f64 = 3.5;
+const POINTS: usize = 41;
+/// A search is content with points so many times as far apart.
+const COARSER: usize = 2;
+
+impl<'a> Gates<'a> {
+    /// For the search of a wake, with few points.
+    pub(crate) fn rough(map: &'a ScanMap, options: &'a RetrievalOptions) -> Result<Self, Error> {
+        Self::on_grid(map, options, COARSER)
+    }
+
+    /// For the way to the end of a fit: the points of a Gaussian weight lie on one grid with the gates, which is quick, `coarser` times as far
+    /// apart as in the end at most.
+    pub(crate) fn on_grid(map: &'a ScanMap, options: &'a RetrievalOptions, coarser: usize) -> Result<Self, Error> {
+        options.gate.validate(&map.range_m)?;
+        let step_m = uniform_step_m(&map.range_m);
+        let kernel = match &options.gate {
+            Gate::Gaussian { std_m } if *std_m > 0.0 => {
+                let longest_m = coarser as f64 * 2.0 * REACH * std_m / (POINTS - 1) as f64;
+                let spacing_m = step_m.map_or(longest_m, |step| step / (step / longest_m).ceil());
+                gaussian(*std_m, spacing_m, (REACH * std_m / spacing_m).ceil() as usize)?
+            }
+            Gate::Kernel(kernel) => kernel.coarser(coarser),
+            Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, step_m.unwrap_or(1.0), &[1.0])?,
+        };
+        let moves = options.movement != Movement::Frozen && map.lasts_s() > 0.0;
+        let seconds = moves.then(|| map.after_middle_s());
+        let places = (&map.elevation_rad[..], &map.range_m[..]);
+        Ok(Self { seconds, shared_points: step_m.is_some(), ..Self::at_rest(&options.model, kernel, places) })
+    }
+
+    /// For the end of a fit: every gate has its own points, each at its place.
+    pub(crate) fn fine(mut self, gate: &Gate) -> Result<Self, Error> {
+        match gate {
+            Gate::Kernel(kernel) => self.kernel = kernel.clone(),
+            Gate::Gaussian { std_m } if *std_m > 0.0 => {
+                self.kernel = gaussian(*std_m, 2.0 * REACH * std_m / (POINTS - 1) as f64, POINTS / 2)?;
+                self.shared_points = false;
+            }
+            Gate::Point | Gate::Gaussian { .. } => {}
+        }
+        Ok(self)
+    }
+
+    /// The same with vortices that stand still.
+    pub(crate) fn frozen(self) -> Self {
+        Self { seconds: None, ..self }
+    }
+}
+
+/// A Gaussian weight of so many points on either side.
+fn gaussian(std_m: f64, spacing_m: f64, points: usize) -> Result<RangeKernel, Error> {
+    let weight = |i: usize| (-0.5 * ((i as f64 - points as f64) * spacing_m / std_m).powi(2)).exp();
+    let weights: Vec<f64> = (0..=2 * points).map(weight).collect();
+    RangeKernel::new(-(points as f64) * spacing_m, spacing_m, &weights)
+}
+
+/// Distance of the gates if it is the same everywhere.
+fn uniform_step_m(range_m: &[f64]) -> Option<f64> {
+    let (first, last) = (range_m.first()?, range_m.last()?);
+    let step = (last - first) / (range_m.len() - 1) as f64;
+    let even = range_m.iter().enumerate().all(|(i, r)| (r - first - i as f64 * step).abs() < 1e-4 * step);
+    (even && step > 0.0).then_some(step)
+}

@@ -1,0 +1,42 @@
+//! The velocities of a map that a fit uses, and sums over them.
+
+use ndarray::Array2;
+
+use crate::linalg::dot;
+use crate::vortex_fit::VelocityMap;
+
+/// A velocity that is used \[m/s\]: where it is, and its standard deviation.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cell {
+    pub(crate) line: usize,
+    pub(crate) gate: usize,
+    pub(crate) velocity_m_s: f64,
+    pub(crate) sigma_m_s: f64,
+}
+
+/// The velocities that there are, each with its stated deviation.
+pub(crate) fn cells(map: &VelocityMap<'_>) -> Vec<Cell> {
+    let cell = |((line, gate), velocity_m_s): ((usize, usize), &f64)| {
+        let sigma_m_s = map.deviation(line, gate);
+        Cell { line, gate, velocity_m_s: *velocity_m_s, sigma_m_s }
+    };
+    map.velocity_m_s.indexed_iter().map(cell).filter(|cell| cell.velocity_m_s.is_finite()).collect()
+}
+
+/// Numbers times their weights.
+pub(crate) fn scaled(weights: &[f64], numbers: &[f64]) -> Vec<f64> {
+    weights.iter().zip(numbers).map(|(w, x)| w * x).collect()
+}
+
+/// Sums of products of columns of numbers with those weights.
+pub(crate) fn products(weights: &[f64], columns: &[Vec<f64>]) -> Array2<f64> {
+    let mut out = Array2::zeros((columns.len(), columns.len()));
+    for (i, a) in columns.iter().enumerate() {
+        let scaled = scaled(weights, a);
+        for (j, b) in columns.iter().enumerate().take(i + 1) {
+            let product = dot(&scaled, b);
+            (out[[i, j]], out[[j, i]]) = (product, product);
+        }
+    }
+    out
+}

@@ -1,0 +1,124 @@
+//! What is expected of the velocities of a map, with slopes.
+//!
+//! The parameters are a list: the ten of a wake and, if secondary vortices are fitted, circulation, lateral position and height of each. What
+//! gates show in the mean ([`Gates`](crate::vortex_fit::map_fit::gates::Gates)) and what an estimator shows have no more in common than this
+//! trait; of the latter, least squares see the [`Tangent`]. Check: fits of exact maps; difference quotients.
+
+use ndarray::{Array2, Zip};
+
+use crate::vortex_fit::wake::free_parameters::stepped;
+use crate::vortex_fit::{PARAMETERS, Wake};
+
+/// Velocities \[m/s\] \[line, gate\], and their derivatives by free number; NaN where there are none.
+pub(crate) struct Predicted {
+    pub(crate) velocity_m_s: Array2<f64>,
+    pub(crate) slopes: Vec<Array2<f64>>,
+}
+
+/// A model of the velocities of a map.
+pub(crate) trait Prediction: Sync {
+    /// Whether the model exists there.
+    fn allows(&self, p: &[f64]) -> bool;
+
+    /// Velocities at the parameters `p`, and their slopes by `groups` of them.
+    fn predict(&self, p: &[f64], groups: &[Vec<usize>]) -> Predicted;
+
+    /// Where the model is exact: everywhere, or where it was linearised.
+    fn about<'p>(&'p self, p: &'p [f64]) -> &'p [f64] {
+        p
+    }
+
+    /// Velocities with the other profile of the cores.
+    fn of_other_profile(&self, wake: &Wake) -> Array2<f64>;
+
+    /// Variance of the air's velocities at each place \[m^2/s^2\], if measured ones scatter the more the larger it is.
+    fn air_variances(&self, _p: &[f64]) -> Option<Array2<f64>> {
+        None
+    }
+}
+
+/// Slopes of a map about `p`, where it is `here`: difference quotients over steps of about a third of what a scan tells of a parameter. Peaks
+/// of spectra jump, and over such a step enough of them do for a mean slope.
+pub(crate) fn quotients(
+    velocities: impl Fn(&[f64]) -> Array2<f64>,
+    p: &[f64],
+    here: &Array2<f64>,
+    groups: &[Vec<usize>],
+) -> Vec<Array2<f64>> {
+    let quotient = |group: &Vec<usize>| {
+        let step = step(p, group[0]);
+        (velocities(&stepped(std::slice::from_ref(group), p, &[step])) - here) / step
+    };
+    groups.iter().map(quotient).collect()
+}
+
+/// Slopes about one list of parameters serve for another while no parameter is more than so many steps, each a third of an error, away.
+const NEAR: f64 = 3.0;
+/// The map is linear enough over this many steps.
+const REACH: f64 = 12.0;
+/// Spacing that stands for that of a vortex without a partner \[m\].
+const LONE_M: f64 = 45.0;
+/// Steps of secondary vortices over the circulation and the height of their vortex.
+const SECONDARY: f64 = 0.02;
+
+/// Step of a difference quotient.
+fn step(p: &[f64], place: usize) -> f64 {
+    let wake = Wake::from_list(p);
+    let spacing_m = if wake.is_pair() { wake.spacing_m() } else { LONE_M };
+    match place {
+        0 | 1 => 0.01 * p[place].abs().max(1.0),
+        2..=5 => 0.006 * spacing_m,
+        6 | 7 => 0.002 * spacing_m,
+        8 => 0.1,
+        9 => 0.1 / spacing_m,
+        _ => {
+            let (side, number) = ((place - PARAMETERS) / 3, (place - PARAMETERS) % 3);
+            let own = [wake.left, wake.right][side];
+            SECONDARY * if number == 0 { own.circulation_m2_s.abs().max(1.0) } else { own.height_m }
+        }
+    }
+}
+
+/// Whether slopes about one list of parameters serve for another.
+pub(crate) fn near(a: &[f64], b: &[f64]) -> bool {
+    (0..a.len()).all(|place| (b[place] - a[place]).abs() <= NEAR * step(a, place))
+}
+
+/// A model to first order about `at`.
+pub(crate) struct Tangent {
+    pub(crate) at: Vec<f64>,
+    pub(crate) here: Predicted,
+}
+
+impl Tangent {
+    /// The part of the way to other parameters that the slopes can speak for.
+    pub(crate) fn reach(&self, to: &[f64]) -> f64 {
+        let part =
+            |place: usize| REACH * step(&self.at, place) / (to[place] - self.at[place]).abs().max(f64::MIN_POSITIVE);
+        (0..to.len()).map(part).fold(1.0, f64::min)
+    }
+}
+
+impl Prediction for Tangent {
+    /// To first order everything is possible.
+    fn allows(&self, _p: &[f64]) -> bool {
+        true
+    }
+
+    fn predict(&self, p: &[f64], groups: &[Vec<usize>]) -> Predicted {
+        let mut velocity_m_s = self.here.velocity_m_s.clone();
+        for (group, slope) in groups.iter().zip(&self.here.slopes) {
+            let away = p[group[0]] - self.at[group[0]];
+            Zip::from(&mut velocity_m_s).and(slope).for_each(|velocity, slope| *velocity += slope * away);
+        }
+        Predicted { velocity_m_s, slopes: self.here.slopes.clone() }
+    }
+
+    fn about<'p>(&'p self, _p: &'p [f64]) -> &'p [f64] {
+        &self.at
+    }
+
+    fn of_other_profile(&self, _wake: &Wake) -> Array2<f64> {
+        self.here.velocity_m_s.clone()
+    }
+}

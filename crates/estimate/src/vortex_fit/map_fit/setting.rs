@@ -1,0 +1,294 @@
+//! A map with what is expected of it, and its fit from a start on: the problem, and both ways to its minimum.
+//!
+//! Means over gates are smooth, and their slopes known: Levenberg and Marquardt, with the scale of the residuals, their median, taken anew in each
+//! of a few rounds. What an estimator shows is neither: damped steps of Gauss and Newton, each to the least squares of the model made linear, with
+//! slopes that are taken anew when the wake has moved by more than its error. Its velocities scatter the more the broader the air's are: the
+//! logarithm of the residuals is fitted by a straight line over ln(1 + variance of the air / its median), whose slope p gives standard deviations
+//! (1 + ...)^p. Check: exact maps; the power of made-up residuals; the spread of fits over many maps.
+
+use ndarray::{Array1, Array2};
+
+use crate::error::{Error, finite};
+use crate::vortex_fit::damped_newton::{Averaging, Stop, halved};
+use crate::vortex_fit::map_fit::cells::{Cell, cells};
+use crate::vortex_fit::map_fit::data::{median, robust_scale};
+use crate::vortex_fit::map_fit::gates::Gates;
+use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Minimum, Scores};
+use crate::vortex_fit::map_fit::prediction::{Prediction, Tangent, near};
+use crate::vortex_fit::wake::core_prior::is_core;
+use crate::vortex_fit::{
+    CorePrior, MapFit, MapFitOptions, MapTop, Parameter, RangeKernel, VelocityMap, Wake, WakeModel,
+};
+
+/// Most evaluations in a descent, and the step that is left at its end \[standard deviations\].
+const DESCENT: Stop = Stop { iterations: 200, sigmas: 1e-2, learns: false };
+/// The scale of residuals from means is taken anew this often.
+const ROUNDS: usize = 5;
+/// Most steps of Gauss and Newton.
+const STEPS: usize = 40;
+
+/// What is fitted, and to what.
+pub(crate) struct Setting<'a, 'm> {
+    pub(crate) map: &'a VelocityMap<'m>,
+    pub(crate) model: &'a WakeModel,
+    pub(crate) prediction: &'a dyn Prediction,
+    /// What gates see in the mean.
+    pub(crate) kernel: &'a RangeKernel,
+    pub(crate) options: &'a MapFitOptions,
+    /// Core radii below this do not show \[m\].
+    pub(crate) least_core_m: f64,
+}
+
+/// The model made linear about some parameters, with the deviations that the residuals tell there.
+pub(crate) struct Linear {
+    pub(crate) tangent: Tangent,
+    pub(crate) cells: Vec<Cell>,
+    /// Of the residuals over the stated deviations in uniform wind.
+    scale: f64,
+}
+
+/// The end of steps of Gauss and Newton.
+pub(crate) struct Settled {
+    pub(crate) linear: Linear,
+    pub(crate) groups: Vec<Vec<usize>>,
+    /// Velocities that count as one.
+    pub(crate) counted: f64,
+    steps: usize,
+}
+
+impl Setting<'_, '_> {
+    /// Free numbers of a fit from that start on.
+    fn groups(&self, start: &Wake) -> Result<Vec<Vec<usize>>, Error> {
+        let found = self.map.validate()?;
+        start.validate()?;
+        self.options.core_prior.as_ref().map_or(Ok(()), CorePrior::validate)?;
+        let groups = self.options.free.groups_of(start);
+        let needed = 10 * groups.len().max(1);
+        if found < needed { Err(Error::TooFewVelocities { found, needed }) } else { Ok(groups) }
+    }
+
+    fn squares<'s>(&'s self, prediction: &'s dyn Prediction, cells: Vec<Cell>, counted: f64) -> LeastSquares<'s> {
+        let (loss, prior) = (self.options.loss, self.options.core_prior);
+        LeastSquares { prediction, fold_m_s: None, cells, whitening: None, loss, prior, counted }
+    }
+
+    /// Least squares about the parameters at which the model was made linear.
+    pub(crate) fn about<'s>(&'s self, linear: &'s Linear, counted: f64) -> LeastSquares<'s> {
+        self.squares(&linear.tangent, linear.cells.clone(), counted)
+    }
+
+    /// The fit by descent from a start on, to steps of `sigmas`.
+    pub(crate) fn descended(&self, start: &Wake, sigmas: f64) -> Result<MapFit, Error> {
+        let stop = Stop { sigmas, ..DESCENT };
+        let mut groups = self.groups(start)?;
+        let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
+        let mut p = self.options.free.start(start).to_array().to_vec();
+        let mut iterations = 0;
+        let scaled = |p: &[f64]| {
+            let squares = self.squares(self.prediction, cells(self.map), 1.0);
+            let scale = squares.residual_scale(p);
+            finite("scale of the residuals", scale)?;
+            let squares = squares.rescaled(scale.max(1e-6));
+            let counted = squares.alike(p, self.options.correlated_lines);
+            Ok((LeastSquares { counted, ..squares }, scale))
+        };
+        for round in 0..ROUNDS {
+            let (squares, _) = scaled(&p)?;
+            let converged = |end: Option<Minimum>| match end {
+                Some(end) if end.sigmas_left <= stop.sigmas => Ok(end),
+                end => {
+                    let (iterations, sigmas_left) =
+                        end.map_or((0, f64::INFINITY), |end| (end.iterations, end.sigmas_left));
+                    Err(Error::NotConverged { iterations, sigmas_left })
+                }
+            };
+            let mut end = converged(squares.minimum(&p, &groups, stop));
+            // a core that the map does not resolve may run away to nothing: it keeps what the last round gave
+            if end.is_err() && round > 0 && coreless.len() < groups.len() {
+                groups.clone_from(&coreless);
+                end = converged(squares.minimum(&p, &groups, stop));
+            }
+            Minimum { p, iterations, .. } = end?;
+        }
+        let (squares, scale) = scaled(&p)?;
+        self.outcome(&squares, &p, &groups, (scale, iterations))
+    }
+
+    /// The fit by steps of Gauss and Newton from a start on, until the step that is left is below `near_sigmas`, with neighbours that are alike
+    /// counted once.
+    pub(crate) fn refined(&self, start: &Wake, near_sigmas: f64) -> Result<MapFit, Error> {
+        let groups = self.groups(start)?;
+        let start = self.options.free.start(start).to_array().to_vec();
+        let settled = self.settled(start, &groups, near_sigmas, None)?;
+        let squares = self.about(&settled.linear, settled.counted);
+        let told = (settled.linear.scale, settled.steps);
+        self.outcome(&squares, &settled.linear.tangent.at, &settled.groups, told)
+    }
+
+    /// Steps of Gauss and Newton, with so many velocities counted as one or as many as the residuals say.
+    pub(crate) fn settled(
+        &self,
+        mut p: Vec<f64>,
+        all: &[Vec<usize>],
+        near_sigmas: f64,
+        counted: Option<f64>,
+    ) -> Result<Settled, Error> {
+        let coreless: Vec<Vec<usize>> = all.iter().filter(|group| !is_core(group)).cloned().collect();
+        let (mut groups, mut released) = (all, false);
+        let (mut averaging, mut last, mut sigmas_left) = (Averaging::default(), vec![0.0; p.len()], f64::INFINITY);
+        let mut known: Option<(Vec<f64>, Vec<Array2<f64>>)> = None;
+        let (mut alike, mut steps, mut most) = (counted.unwrap_or(1.0), 0, STEPS);
+        while steps < most {
+            steps += 1;
+            let kept = known.take().filter(|(at, slopes)| near(at, &p) && slopes.len() == groups.len());
+            let is_kept = kept.is_some();
+            let (linear, about) = self.linear(&p, groups, kept)?;
+            if !is_kept && counted.is_none() {
+                alike = self.about(&linear, 1.0).alike(&p, self.options.correlated_lines);
+            }
+            let squares = self.about(&linear, alike);
+            let no_way = |sigmas_left| Error::NotConverged { iterations: steps, sigmas_left };
+            let next = squares.reweighted(&p, groups, DESCENT)?;
+            let curvature = squares.normal(&p, groups).ok_or(no_way(sigmas_left))?.curvature;
+            let way: Vec<f64> = next.iter().zip(&p).map(|(next, p)| next - p).collect();
+            let free = |step: &[f64]| groups.iter().map(|group| step[group[0]]).collect::<Array1<f64>>();
+            let product = |a: &[f64], b: &[f64]| free(a).dot(&curvature.dot(&free(b)));
+            let share = averaging.part(product(&way, &last), product(&last, &last));
+            sigmas_left = share * (product(&way, &way) / alike).sqrt();
+            if sigmas_left <= near_sigmas {
+                // a core that shrank on the way, as where the pair was narrow, may show where it ends
+                if groups.len() < all.len() && !released {
+                    (groups, released, most) = (all, true, steps + STEPS);
+                    continue;
+                }
+                return Ok(Settled { linear, groups: groups.to_vec(), counted: alike, steps });
+            }
+            let there = halved(share.min(linear.tangent.reach(&next)), |part| {
+                let trial: Vec<f64> = p.iter().zip(&way).map(|(p, way)| p + part * way).collect();
+                self.prediction.allows(&trial).then_some(trial)
+            });
+            p = there.ok_or(no_way(sigmas_left))?;
+            (last, known) = (way, Some((about, linear.tangent.here.slopes)));
+            if groups.len() > coreless.len() && raised(&mut p, self.least_core_m) {
+                groups = &coreless;
+            }
+        }
+        Err(Error::NotConverged { iterations: steps, sigmas_left })
+    }
+
+    /// The model made linear about `p`, with slopes that are known from parameters near by or taken anew; and those parameters.
+    pub(crate) fn linear(
+        &self,
+        p: &[f64],
+        groups: &[Vec<usize>],
+        known: Option<(Vec<f64>, Vec<Array2<f64>>)>,
+    ) -> Result<(Linear, Vec<f64>), Error> {
+        let mut here = self.prediction.predict(p, if known.is_some() { &[] } else { groups });
+        let mut about = p.to_vec();
+        if let Some(known) = known {
+            (about, here.slopes) = known;
+        }
+        let mut cells = cells(self.map);
+        cells.retain(|cell| {
+            let place = [cell.line, cell.gate];
+            here.velocity_m_s[place].is_finite() && here.slopes.iter().all(|slope| slope[place].is_finite())
+        });
+        let residual = |cell: &Cell| (cell.velocity_m_s - here.velocity_m_s[[cell.line, cell.gate]]) / cell.sigma_m_s;
+        if let Some(variances) = self.prediction.air_variances(p) {
+            let deviations = learnt_deviations(&variances, &cells, residual);
+            cells.iter_mut().zip(deviations).for_each(|(cell, deviation)| cell.sigma_m_s *= deviation);
+        }
+        let scale = robust_scale(cells.iter().map(residual));
+        finite("scale of the residuals", scale)?;
+        let scale = scale.max(1e-6);
+        cells.iter_mut().for_each(|cell| cell.sigma_m_s *= scale);
+        Ok((Linear { tangent: Tangent { at: p.to_vec(), here }, cells, scale }, about))
+    }
+
+    fn outcome(
+        &self,
+        squares: &LeastSquares<'_>,
+        p: &[f64],
+        groups: &[Vec<usize>],
+        (scale, iterations): (f64, usize),
+    ) -> Result<MapFit, Error> {
+        let from = Scores::OfNeighbours { lines: self.options.correlated_lines };
+        let uncertainty = squares.uncertainty(p, groups, from)?;
+        let residuals = squares.rows(p, &[]).residuals;
+        let cost: f64 = residuals.iter().map(|r| self.options.loss.at(*r).0).sum();
+        // without vortices a gate shows its mean, which is the wind at its middle, as that is linear in height
+        let places = (self.map.elevation_rad, self.map.range_m);
+        let middle = Gates::at_rest(self.model, self.kernel.middle(), places);
+        let wind: Vec<Vec<usize>> =
+            groups.iter().filter(|group| group[0] >= Parameter::Wind as usize).cloned().collect();
+        let mut calm = p.to_vec();
+        calm[..2].fill(0.0);
+        let calm = LeastSquares { prediction: &middle, prior: None, ..squares.clone() }.minimum(&calm, &wind, DESCENT);
+        let wake = Wake::from_list(p);
+        Ok(MapFit {
+            wake,
+            covariance: uncertainty.covariance(|_| true)?,
+            cores_fitted: groups.iter().any(|group| is_core(group)),
+            used: self.map.validate()?,
+            outliers: residuals.iter().filter(|r| r.abs() > 3.0).count(),
+            residual_scale: scale,
+            explained_fraction: 1.0 - cost / calm.map_or(f64::NAN, |calm| calm.cost),
+            iterations,
+            tops: vec![MapTop { wake, log_likelihood: squares.log_likelihood(p, groups) / uncertainty.alike }],
+        })
+    }
+}
+
+/// Standard deviations of the velocities of cells over those in uniform wind, as their residuals tell: ln|r| is a straight line over ln(1 +
+/// variance / its median).
+fn learnt_deviations(variances: &Array2<f64>, cells: &[Cell], residual: impl Fn(&Cell) -> f64) -> Vec<f64> {
+    let typical = median(&mut variances.iter().copied().collect::<Vec<f64>>()).max(f64::MIN_POSITIVE);
+    let broad: Vec<f64> = cells.iter().map(|cell| (variances[[cell.line, cell.gate]] / typical).ln_1p()).collect();
+    let [mut n, mut x, mut y, mut xx, mut xy] = [0.0; 5];
+    for (cell, broad) in cells.iter().zip(&broad) {
+        let log = residual(cell).abs().ln();
+        if log.is_finite() {
+            (n, x, y, xx, xy) = (n + 1.0, x + broad, y + log, xx + broad * broad, xy + broad * log);
+        }
+    }
+    let power = ((n * xy - x * y) / (n * xx - x * x)).clamp(0.0, 1.0);
+    broad.into_iter().map(|broad| if power.is_finite() { (power * broad).exp() } else { 1.0 }).collect()
+}
+
+/// Raises core radii below the least one, and tells whether there were any.
+fn raised(p: &mut [f64], least_m: f64) -> bool {
+    let mut any = false;
+    for place in [Parameter::LeftCore as usize, Parameter::RightCore as usize] {
+        any |= p[place] < least_m;
+        p[place] = p[place].max(least_m);
+    }
+    any
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Residuals whose size grows with the variance of the air to a known power.
+    #[test]
+    fn the_power_of_the_scatter_is_learnt_from_the_residuals() {
+        let variance = Array2::from_shape_fn((40, 50), |(i, j)| 0.1 * (0.2 * i as f64).exp() + 0.01 * j as f64);
+        let typical = median(&mut variance.iter().copied().collect::<Vec<f64>>());
+        let grown = |power: f64| variance.mapv(|v| (1.0 + v / typical).powf(power));
+        for (power, learnt) in [(0.4, 0.4), (0.0, 0.0), (-0.3, 0.0)] {
+            let mut place = 0.0_f64;
+            // uniform numbers between -0.5 and 0.5
+            let residual = grown(power).mapv(|size| {
+                place += 1.0;
+                let number = (place * 12.9898).sin() * 43_758.545;
+                size * (number - number.floor() - 0.5)
+            });
+            let cell =
+                |((line, gate), v): ((usize, usize), &f64)| Cell { line, gate, velocity_m_s: *v, sigma_m_s: 1.0 };
+            let cells: Vec<Cell> = residual.indexed_iter().map(cell).collect();
+            let found = learnt_deviations(&variance, &cells, |cell| cell.velocity_m_s);
+            let worst = found.iter().zip(&grown(learnt)).fold(0.0_f64, |worst, (a, b)| worst.max((a / b).ln().abs()));
+            assert!(worst < 0.2, "{power}: {worst}");
+        }
+    }
+}
