@@ -28,7 +28,7 @@ const FEATURES: [(&str, &[&str]); 5] = [
     ("wakescope-les", &["", "solver"]),
     ("wakescope-signal", &["", "rayon"]),
     ("wakescope-estimate", &["", "rayon", "bundled-lapack"]),
-    ("wakescope-sim", &["", "cli", "flow", "netcdf", "netcdf4", "plots", "sweep", "vtk"]),
+    ("wakescope-sim", &["", "cli", "flow", "netcdf4", "plots", "vtk"]),
 ];
 
 /// The wake that the figures show in continuous integration, and where it is put.

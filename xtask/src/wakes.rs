@@ -15,9 +15,8 @@ use fixtures::failure::{Failure, Outcome};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use wakescope_sim::flow::{
-    self, Begin, CaseFile, CaseKind, FileFormat, FinishedWake, FlowCase, Subgrid, Unwatched, WakePreset,
-};
+use wakescope_sim::Silent;
+use wakescope_sim::flow::{self, Begin, CaseFile, CaseKind, FileFormat, FinishedWake, FlowCase, Subgrid, WakePreset};
 
 /// Ages of the cross-planes that are kept, for pictures that move.
 const SERIES_EVERY: f64 = 0.1;
@@ -113,7 +112,7 @@ pub(crate) fn run(case: &FlowCase, stages: &Path, anew: bool) -> Result<Finished
         }
         if !done.exists() {
             // From its last good checkpoint, or anew where there is none.
-            flow::run(&file, &folder, Begin::Restart, &mut Unwatched)?;
+            flow::run(&file, &folder, Begin::Restart, &Silent)?;
             std::fs::write(&done, &file.hash)?;
         }
         made.insert(folder.clone());

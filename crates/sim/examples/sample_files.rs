@@ -25,7 +25,6 @@ fn main() -> OutputResult<()> {
     for stem in ["planes", "wake"] {
         files.add(&format!("{stem}.csv"), planes_table(&wind)?.to_csv(&origin)?)?;
     }
-    #[cfg(feature = "netcdf")]
     {
         use wakescope_sim::io::{cf_planes::cf_planes_bytes, cfradial::cfradial_bytes};
         files.add("map.nc", cfradial_bytes(&both, &origin)?)?;

@@ -133,6 +133,19 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// The error of a file that a key names.
+    pub(crate) fn of_key(key: &'static str) -> impl Fn(Self) -> Self + Copy {
+        move |source| Self::OfKey { key, source: Box::new(source) }
+    }
+
+    /// What the system says of a file or folder.
+    pub(crate) fn io(action: &'static str, path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { action, path, source }
+    }
+}
+
 fn others_in_words(others: usize) -> String {
     if others == 0 { String::new() } else { format!("\nand {others} more cases are refused") }
 }

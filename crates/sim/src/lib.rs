@@ -34,14 +34,14 @@
 //! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
 //! | [`mod@run`] | running a plan |
 //! | [`mod@write`] | writing the results of a run |
-//! | `sweep` | design studies: many scenes, their results, the Pareto front |
+//! | [`sweep`] | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |
 //! | `processes` | the processes of `mpirun` as ranks of a flow |
 //! | [`cli`] | the program `wakescope` |
 //!
-//! Features, all but the last two on by default: `cli` (the program), `netcdf` (NetCDF files), `plots` (SVG and
-//! PNG, the report page), `sweep` (design studies, with `cli`), `vtk` (fields for ParaView), `mpi` (flows on several machines).
+//! Features, all but the last two on by default: `cli` (the program), `flow` (simulations of the air, with `cli`), `netcdf4` (reading
+//! of NetCDF-4), `plots` (SVG and PNG), `vtk` (fields for ParaView), `mpi` (flows on several machines).
 
 pub mod detection;
 #[cfg(feature = "flow")]
@@ -58,7 +58,6 @@ pub mod retrieve;
 pub mod run;
 pub mod scene;
 pub mod setup;
-#[cfg(feature = "sweep")]
 pub mod sweep;
 
 pub mod write;

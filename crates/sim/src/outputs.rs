@@ -3,7 +3,6 @@
 //! Check: the names that commands announce are those that they write; folders in use, in the way or not writable are refused.
 
 use crate::Error;
-#[cfg(any(feature = "cli", feature = "flow", feature = "sweep"))]
 use crate::io::atomic::{in_folder, try_folder};
 use crate::io::lock::FolderLock;
 use crate::io::own::refuse_foreign;
@@ -96,7 +95,6 @@ impl Outputs {
     ///
     /// # Errors
     /// As [`Self::add`].
-    #[cfg(feature = "netcdf")]
     pub(crate) fn netcdf<T: ?Sized>(
         &mut self,
         stem: &str,
@@ -135,7 +133,6 @@ impl Outputs {
 /// # Errors
 /// The folder cannot be made, is a file, cannot be written to, or another run writes to it; a folder is in the way of a file,
 /// or a file that this program did not write and may not replace.
-#[cfg(any(feature = "cli", feature = "flow", feature = "sweep"))]
 pub(crate) fn prepare(folder: &Path, names: &[String], existing: Existing, alone: bool) -> Result<(), Error> {
     refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
     in_folder(folder, false, || {

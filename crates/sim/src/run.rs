@@ -115,12 +115,15 @@ fn signals_and_map<S: Sample + wakescope_signal::Sample>(
     observer: &dyn Observer,
     result: &mut RunResult,
 ) -> Result<(), Error> {
-    let realisations = plan.kept_realisations();
-    let mut kept =
-        (realisations > 0).then(|| Kept::new(realisations * scanner.pulses() * plan.geometry.samples, S::KIND));
+    // The records that are kept for the files, as real numbers.
+    let shape = (plan.kept_realisations() * scanner.pulses(), plan.geometry.samples);
+    let samples = shape.0 * shape.1;
+    let mut in_phase = Vec::with_capacity(samples);
+    let mut quadrature = (S::KIND == SignalKind::Complex).then(|| Vec::with_capacity(samples));
     let mut keep = |records: ArrayView2<'_, S>| {
-        if let Some(kept) = &mut kept {
-            kept.add(records);
+        if samples > 0 {
+            in_phase.extend(records.iter().map(|sample| sample.to_complex().re));
+            quadrature.iter_mut().for_each(|q| q.extend(records.iter().map(|sample| sample.to_complex().im)));
         }
     };
     if plan.runs(Stage::Estimates) {
@@ -145,39 +148,15 @@ fn signals_and_map<S: Sample + wakescope_signal::Sample>(
         }
         observer.end();
     }
-    if let Some(Kept { in_phase, quadrature }) = kept {
-        let shape = (realisations * scanner.pulses(), plan.geometry.samples);
+    if samples > 0 {
         result.signals_a = Array2::from_shape_vec(shape, in_phase).ok();
         result.quadrature_a = quadrature.and_then(|values| Array2::from_shape_vec(shape, values).ok());
-        result.line_velocity_m_s = Some(line_velocities(scanner));
+        let lines = scanner.lines();
+        let layers = lines.first().map_or(0, |line| line.radial_velocity_m_s.len());
+        let velocity_m_s = |(i, l): (usize, usize)| lines[i].radial_velocity_m_s[l];
+        result.line_velocity_m_s = Some(Array2::from_shape_fn((lines.len(), layers), velocity_m_s));
     }
     Ok(())
-}
-
-fn line_velocities(scanner: &Scanner<'_>) -> Array2<f64> {
-    let lines = scanner.lines();
-    let layers = lines.first().map_or(0, |line| line.radial_velocity_m_s.len());
-    Array2::from_shape_fn((lines.len(), layers), |(i, l)| lines[i].radial_velocity_m_s[l])
-}
-
-/// The records that are kept for the files, as real numbers.
-struct Kept {
-    in_phase: Vec<f64>,
-    quadrature: Option<Vec<f64>>,
-}
-
-impl Kept {
-    fn new(samples: usize, kind: SignalKind) -> Self {
-        let quadrature = (kind == SignalKind::Complex).then(|| Vec::with_capacity(samples));
-        Self { in_phase: Vec::with_capacity(samples), quadrature }
-    }
-
-    fn add<S: Sample>(&mut self, records: ArrayView2<'_, S>) {
-        self.in_phase.extend(records.iter().map(|sample| sample.to_complex().re));
-        if let Some(quadrature) = &mut self.quadrature {
-            quadrature.extend(records.iter().map(|sample| sample.to_complex().im));
-        }
-    }
 }
 
 impl RunResult {

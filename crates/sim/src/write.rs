@@ -54,13 +54,11 @@ fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Result<(), Erro
     if plan.runs(Stage::CrossPlane) {
         let plane = result.plane.as_ref();
         files.table("flow", plane, |plane| Ok(tables::planes_table(plane)?))?;
-        #[cfg(feature = "netcdf")]
         files.netcdf("flow", plane, |plane, origin| Ok(crate::io::cf_planes::cf_planes_bytes(plane, origin)?))?;
     }
     if plan.keeps_signals() {
         let signals = raw_signals(plan, result);
         files.table("signals", signals.as_ref(), |signals| Ok(signals.table()?))?;
-        #[cfg(feature = "netcdf")]
         files.netcdf("signals", signals.as_ref(), |signals, origin| {
             Ok(crate::io::cf_signals::cf_signals_bytes(signals, origin)?)
         })?;
@@ -101,7 +99,6 @@ fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Resu
         if modes.len() > 1 {
             files.table(&stem, own.as_deref(), |map| Ok(tables::map_table(map)?))?;
         }
-        #[cfg(feature = "netcdf")]
         files.netcdf(&stem, own.as_deref(), |map, origin| Ok(crate::io::cfradial::cfradial_bytes(map, origin)?))?;
     }
     let sweeps = map.map_or(schedule.sweeps.len(), |map| map.sweeps.len());

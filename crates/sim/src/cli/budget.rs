@@ -1,13 +1,15 @@
 //! `wakescope budget`: the power budget of a scene.
 
-use super::words::{existing, range};
+use super::words::range;
 use super::{Cli, load, paths, say};
+use crate::io::Existing;
 use crate::measure::budget::{Budget, scan_ranges_m};
 use crate::outputs::{Outputs, prepare};
 use crate::plan::{Plan, Target};
 use crate::{Error, scene};
 use clap::Args;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Words of `wakescope budget`.
@@ -28,7 +30,7 @@ pub(super) struct BudgetWords {
 
 pub(super) fn budget(words: &BudgetWords, cli: &Cli) -> Result<(), Error> {
     let plan = Plan::new(load(&words.scene, cli)?, Target::Efficiency)?;
-    let existing = existing(words.overwrite);
+    let existing = Existing::with_overwrite(words.overwrite);
     if let Some(folder) = &words.out {
         prepare(folder, &["budget.csv".into()], existing, true)?;
     }
@@ -43,16 +45,9 @@ pub(super) fn budget(words: &BudgetWords, cli: &Cli) -> Result<(), Error> {
         })?;
         text += &format!("wrote {}\n", folder.join("budget.csv").display());
     }
-    let rows: Vec<serde_json::Value> = found
-        .rows
-        .iter()
-        .map(|row| json!({ "row": row.name, "symbol": row.symbol, "value": row.value, "db": row.db }))
-        .collect();
-    let limits: serde_json::Map<_, _> =
-        found.limits.values.iter().map(|(key, value)| ((*key).to_owned(), json!(value))).collect();
     let object = json!({
-        "version": crate::VERSION, "scene_hash": plan.scene.hash, "range_m": found.range_m, "rows": rows,
-        "limits": limits, "warnings": found.warnings, "files": paths(&files),
+        "version": crate::VERSION, "scene_hash": plan.scene.hash, "range_m": found.range_m, "rows": found.rows,
+        "limits": found.limits.values.iter().copied().collect::<BTreeMap<_, _>>(), "warnings": found.warnings, "files": paths(&files),
     });
     say(cli.json, &object, &text)
 }

@@ -2,6 +2,7 @@
 
 use super::words::{AirWords, FolderWords, ScanWords, Scans, finite, rate, spacing, stride};
 use super::{Cli, load, paths, say};
+use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test, gate_table,
     power_table, roc_table, scan_table, strided,
@@ -14,7 +15,6 @@ use crate::plan::{Plan, Target};
 use crate::retrieve::{gate_of, scene_of};
 use crate::scene::{NoiseModel, SceneFile};
 use crate::setup::progress::Observer;
-use crate::{Error, scene};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -71,14 +71,18 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     let observer = cli.observer();
     let task = Task::new(words, cli, &*observer)?;
     let maps: Vec<ScanMap> = task.scans.iter().map(|scan| scan.map.clone()).collect();
-    let (found, calibration) = test(&maps, &task.settings).map_err(|error| task.of_file(error))?;
+    let (found, calibration) = test(&maps, &task.settings).map_err(|error| match &task.scans[..] {
+        [only] => Error::Input { path: only.path.clone(), reason: error.to_string() },
+        _ => error,
+    })?;
     let calibration = match (calibration, &task.empty) {
         (None, Some(empty)) => Some(Calibration::new(&strided(empty, task.settings.stride), &task.settings)?),
         (known, _) => known,
     };
     let power = calibration.map(|known| known.power(&task.settings)).transpose()?;
-    let of = (scene::Outputs::default(), task.provenance());
-    let files = Outputs::write(&words.folder.out, words.folder.existing(), of, |files| {
+    let none = || Provenance::new("", "", task.settings.seed);
+    let origin = task.scene.as_ref().map_or_else(none, SceneFile::provenance);
+    let files = words.folder.write(origin, |files| {
         list(words, task.plan.as_ref(), Some((&task.scans, &found, power.as_ref())), &*observer, files)
     })?;
     let has_sigma = found.iter().all(|scan| scan.assumed_sigma_m_s.is_none());
@@ -120,8 +124,7 @@ impl Task {
         };
         let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;
         let plan = still.map(|scene| Plan::new(scene, Target::Map)).transpose()?;
-        let names = |files: &mut Outputs| list(words, plan.as_ref(), None, observer, files);
-        words.folder.prepare(&Outputs::names(scene::Outputs::default(), names)?)?;
+        words.folder.prepare(|files| list(words, plan.as_ref(), None, observer, files))?;
         let mut settings = DetectionSettings {
             false_alarm: words.false_alarm,
             options: DetectorOptions {
@@ -148,19 +151,6 @@ impl Task {
         }
         settings.stride = words.stride.unwrap_or(settings.stride);
         Ok(Self { scans, settings, empty, scene, plan, notes })
-    }
-
-    /// An error of a test with the file it is of, if there is one.
-    fn of_file(&self, error: Error) -> Error {
-        match self.scans.as_slice() {
-            [only] => Error::Input { path: only.path.clone(), reason: error.to_string() },
-            _ => error,
-        }
-    }
-
-    fn provenance(&self) -> Provenance {
-        let none = || Provenance::new("", "", self.settings.seed);
-        self.scene.as_ref().map_or_else(none, SceneFile::provenance)
     }
 
     fn told(&self, found: &[ScanDetection], power: Option<&Power>) -> Vec<String> {
@@ -222,15 +212,11 @@ fn list(
     files.table("detection_roc", power, |power| Ok(roc_table(power)))?;
     #[cfg(feature = "plots")]
     files.figure("detection", power, |power| Ok(crate::detection::picture(power)))?;
-    if let Some(plan) = plan.filter(|plan| has_gates(plan)) {
+    // The closed forms of single gates are those of noise.
+    if let Some(plan) = plan.filter(|plan| plan.scene.scene.detector.noise != NoiseModel::None) {
         files.table("detection_gates", tested.as_ref(), |_| gate_table(plan, words.false_alarm, observer))?;
     }
     Ok(())
-}
-
-/// Whether the closed forms of single gates are known: there must be noise.
-fn has_gates(plan: &Plan) -> bool {
-    plan.scene.scene.detector.noise != NoiseModel::None
 }
 
 fn as_json((scan, found): (&ReadScan, &ScanDetection)) -> Value {

@@ -3,13 +3,11 @@
 use super::words::{FolderWords, noise, positive};
 use super::{Cli, load, paths, say};
 use crate::Error;
-use crate::io::number::ByteOrder;
-use crate::io::raw::{Order, RawFormat, RawRecords};
+use crate::io::raw::{RawFormat, RawRecords};
 use crate::measure::recorded::{self, NoiseLevel, RayTable, Recorded, RecordedOptions, record_shape};
 use crate::plan::Plan;
 use crate::write;
 use clap::Args;
-use clap::builder::PossibleValuesParser;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -23,30 +21,11 @@ pub(super) struct EstimateWords {
     scene: PathBuf,
     #[command(flatten)]
     folder: FolderWords,
-    /// Numbers of a binary file.
-    #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(["i8", "u8", "i16", "u16", "i32", "u32", "f32", "f64"]))]
-    format: Option<String>,
-    /// Their byte order: the lowest or the highest byte first.
-    #[arg(long, value_enum, default_value_t, requires = "format")]
-    byte_order: ByteOrder,
-    /// Bytes before the first number.
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "format")]
-    header_bytes: u64,
-    /// Samples are pairs of numbers, in phase and quadrature.
-    #[arg(long)]
-    complex: bool,
-    /// Which index runs fastest: [line, pulse, sample], [pulse, line, sample] or [sample, line, pulse].
-    #[arg(long, value_enum, default_value_t)]
-    order: Order,
+    #[command(flatten)]
+    format: RawFormat,
     /// What the numbers are multiplied with, such as ampere per count.
     #[arg(long, value_name = "A", default_value_t = 1.0, value_parser = positive)]
     scale: f64,
-    /// The variable of a NetCDF file, or the array of an NPZ file, that holds the samples.
-    #[arg(long, value_name = "NAME")]
-    variable: Option<String>,
-    /// The variable of a NetCDF file that holds the second quadrature.
-    #[arg(long, value_name = "NAME")]
-    quadrature: Option<String>,
     /// Table of elevation_rad or elevation_deg, and time_s, of each record or line.
     #[arg(long, value_name = "FILE.csv")]
     rays: Option<PathBuf>,
@@ -60,20 +39,11 @@ pub(super) struct EstimateWords {
 
 pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     let scene = load(&words.scene, cli)?;
-    let format = RawFormat {
-        number: words.format.clone(),
-        byte_order: words.byte_order,
-        complex: words.complex,
-        order: words.order,
-        header_bytes: words.header_bytes,
-        scale: words.scale,
-        variable: words.variable.clone(),
-        quadrature: words.quadrature.clone(),
-    };
+    let format = RawFormat { scale: words.scale, ..words.format.clone() };
     let mut records = RawRecords::open(&words.data, &format, record_shape(&scene.scene))?;
     let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
     let (plan, is_own) = recorded::plan(scene, &records)?;
-    words.folder.prepare(&write::recorded_names(&plan)?)?;
+    words.folder.prepare_names(&write::recorded_names(&plan)?)?;
     let options = RecordedOptions { rays, noise: words.noise, spectra: words.spectra, block_bytes: None };
     let found = recorded::estimate((&plan, is_own), &mut records, &options, &*cli.observer())?;
     let (text, results) = told(&plan, &found, records.records());

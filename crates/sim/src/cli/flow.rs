@@ -1,13 +1,15 @@
 //! `wakescope flow`: simulations from case files.
 
 use super::output::print;
-use super::{Cli, paths, progress, say};
+use super::progress::Quiet;
+use super::{Cli, paths, say};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
-use crate::flow::{Begin, CaseFile, EXAMPLES, FlowForecast, RunOptions, Watch, check_on, example, run_on};
+use crate::flow::{Begin, CaseFile, EXAMPLES, RunOptions, check_on, example, run_on};
+use crate::setup::progress::{Observer, Silent};
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
 use wakescope_les::ranks::Ranks;
@@ -60,10 +62,13 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
 /// Runs a case and says what came of it, on rank 0.
 pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
     let is_first = ranks.rank() == 0;
-    let ended = words.end.map(|end| file.with_end(end)).transpose()?;
-    let file = ended.as_ref().unwrap_or(file);
-    let seeded = cli.seed.map(|seed| file.with_seed(seed)).transpose()?;
-    let file = seeded.as_ref().unwrap_or(file);
+    let mut file = file.clone();
+    if let Some(end) = words.end {
+        file = file.with_end(end)?;
+    }
+    if let Some(seed) = cli.seed {
+        file = file.with_seed(seed)?;
+    }
     let begin = match (words.restart, words.overwrite) {
         (true, _) => Begin::Restart,
         (_, true) => Begin::Overwrite,
@@ -74,24 +79,18 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc
         if !is_first {
             return Ok(());
         }
-        let forecast = check_on(ranks, file, words.out.as_deref(), options)?;
-        forecast.notes.iter().for_each(|text| progress::NotesOnly.note(text));
-        return say(cli.json, &forecast_json(&forecast), &format!("good\n{forecast}"));
+        let forecast = check_on(ranks, &file, words.out.as_deref(), options)?;
+        forecast.notes.iter().for_each(|text| Quiet.warn(text));
+        let mut object = json!(forecast);
+        object["version"] = crate::VERSION.into();
+        return say(cli.json, &object, &format!("good\n{forecast}"));
     }
     let Some(out) = &words.out else {
-        let reason = "a run needs a folder to write to".into();
-        return Err(Error::Input { path: PathBuf::from("--out DIR"), reason });
+        return Err(Error::Input { path: "--out DIR".into(), reason: "a run needs a folder to write to".into() });
     };
-    let mut quiet = progress::NotesOnly;
-    let mut bar;
-    let watch: &mut dyn Watch = if cli.quiet || !is_first {
-        &mut quiet
-    } else {
-        bar = progress::FlowBar::new();
-        &mut bar
-    };
+    let observer: Box<dyn Observer> = if is_first { cli.observer() } else { Box::new(Silent) };
     #[cfg_attr(not(feature = "plots"), expect(unused_mut, reason = "there is nothing to draw with"))]
-    let mut outcome = run_on(ranks, file, out, options, watch)?;
+    let mut outcome = run_on(ranks, &file, out, options, &*observer)?;
     if !is_first {
         return Ok(());
     }
@@ -102,7 +101,7 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc
             // The run is done all the same.
             Err(error) => {
                 let text = format!("the wake is not drawn: {error}");
-                progress::NotesOnly.note(&text);
+                Quiet.warn(&text);
                 outcome.warnings.push(text);
             }
         }
@@ -115,12 +114,11 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc
     });
     let state = if outcome.is_complete { "done" } else { "paused, --restart continues it" };
     let stepping = outcome.stepping;
-    let exchange = if ranks.count() > 1 {
+    let mut exchange = String::new();
+    if ranks.count() > 1 {
         let share = 100.0 * stepping.exchange_s / stepping.wall_s;
-        format!("steps took {:.1} s, {share:.1} % of it in turns and halos\n", stepping.wall_s)
-    } else {
-        String::new()
-    };
+        exchange = format!("steps took {:.1} s, {share:.1} % of it in turns and halos\n", stepping.wall_s);
+    }
     let text = format!(
         "{state}: step {}, t = {:?} s, energy {:.6e} m^5/s^2, relative divergence {:.1e}\n{exchange}wrote {} files to {}",
         outcome.steps,
@@ -131,10 +129,4 @@ pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc
         out.display()
     );
     say(cli.json, &object, &text)
-}
-
-fn forecast_json(forecast: &FlowForecast) -> Value {
-    let mut object = json!(forecast);
-    object["version"] = crate::VERSION.into();
-    object
 }

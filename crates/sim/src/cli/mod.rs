@@ -232,7 +232,7 @@ fn planned(scene: &Path, target: Target, allow_large: bool, cli: &Cli) -> Result
 
 fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     let plan = planned(&io.scene, target, io.allow_large, cli)?;
-    io.folder.prepare(&write::names(&plan)?)?;
+    io.folder.prepare_names(&write::names(&plan)?)?;
     if !cli.quiet {
         let _ = write!(std::io::stderr(), "{plan}");
     }
@@ -284,14 +284,8 @@ fn plan_json(plan: &Plan) -> Value {
         })
         .collect();
     let total = plan.total();
-    let scan = plan.schedule();
     json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.scene.seed,
-        "scan": {
-            "pattern": scan.pattern, "lines": scan.lines, "sweeps": scan.sweeps, "pulses": scan.pulses,
-            "duration_s": scan.duration_s, "revisit_s": scan.revisit_s, "wake_moves_m": scan.wake_moves_m,
-            "ambiguous_range_m": scan.ambiguous_range_m, "smear_rad": scan.smear_rad, "smear_m": scan.smear_m,
-        },
-        "stages": stages, "core_s": total.core_s, "memory_bytes": total.memory_bytes, "warnings": plan.warnings,
+        "scan": plan.schedule(), "stages": stages, "core_s": total.core_s, "memory_bytes": total.memory_bytes, "warnings": plan.warnings,
     })
 }

@@ -2,6 +2,7 @@
 
 use super::words::{AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive, switch};
 use super::{Cli, load, paths, say};
+use crate::Error;
 use crate::io::Provenance;
 use crate::io::scans::ReadScan;
 use crate::outputs::Outputs;
@@ -9,7 +10,6 @@ use crate::plan::Stage;
 use crate::retrieve::{self, Method, OwnScene, RetrievedScan, StatedEstimator, Velocities, gate_of};
 use crate::scene::{Flow, SceneFile};
 use crate::setup::progress::{Observer, Silent};
-use crate::{Error, scene};
 use clap::{ArgAction, Args};
 use serde_json::json;
 use std::path::PathBuf;
@@ -140,15 +140,13 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
             Scans::Signals(signals) => count += signals.scans.len(),
             Scans::Maps(maps, left_out) => {
                 count += maps.len();
-                maps.iter().try_for_each(|scan| words.scene_of(scan, stated.as_ref()).map(drop))?;
+                maps.iter().try_for_each(|scan| scene_of(scan, stated.as_ref()).map(drop))?;
                 left_out.iter().for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));
             }
         }
         inputs.push(scans);
     }
-    words
-        .folder
-        .prepare(&Outputs::names(scene::Outputs::default(), |files| list(words.method, count, None, files))?)?;
+    words.folder.prepare(|files| list(words.method, count, None, files))?;
     let mut found = Found::default();
     observer.begin(Stage::Retrieval, count as u64);
     for input in inputs {
@@ -156,7 +154,7 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
             Scans::Maps(maps, _) => {
                 for scan in maps {
                     let start = prediction(&found.scans, &scan);
-                    let scene = words.scene_of(&scan, stated.as_ref())?;
+                    let scene = scene_of(&scan, stated.as_ref())?;
                     found.scans.push(of_map(words, scene.as_ref(), scan, start, &*observer)?);
                     found.scenes.push(scene);
                     observer.advance(1);
@@ -168,10 +166,7 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     observer.end();
     same_origin(&mut found.scans);
     found.track = retrieve::track_of(&found.scans)?;
-    let of = (scene::Outputs::default(), found.provenance());
-    let files = Outputs::write(&words.folder.out, words.folder.existing(), of, |files| {
-        list(words.method, count, Some(&found), files)
-    })?;
+    let files = words.folder.write(found.provenance(), |files| list(words.method, count, Some(&found), files))?;
     let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found.scans), "files": paths(&files) });
     let is_of_signals =
         words.method == Method::Signals && found.scans.iter().any(|scan| !scan.result.vortices.is_empty());
@@ -189,19 +184,9 @@ fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
     retrieve::track_of(before).ok().flatten()?.prediction(time_s, core_m)
 }
 
-impl RetrieveWords {
-    /// The scene of a map: as stated, else its own.
-    fn scene_of(&self, scan: &ReadScan, stated: Option<&SceneFile>) -> Result<Option<SceneFile>, Error> {
-        match stated {
-            Some(scene) => Ok(Some(scene.clone())),
-            None => retrieve::scene_of(scan),
-        }
-    }
-
-    fn estimator(&self) -> StatedEstimator {
-        let Self { estimator, pulse, window, weighting, .. } = self;
-        StatedEstimator { method: estimator.clone(), pulse_s: *pulse, window_s: *window, weighting: weighting.clone() }
-    }
+/// The scene of a map: as stated, else its own.
+fn scene_of(scan: &ReadScan, stated: Option<&SceneFile>) -> Result<Option<SceneFile>, Error> {
+    stated.map_or_else(|| retrieve::scene_of(scan), |scene| Ok(Some(scene.clone())))
 }
 
 /// The word for velocities that are means over the gates.
@@ -217,7 +202,9 @@ fn of_map(
     start: Option<Wake>,
     observer: &dyn Observer,
 ) -> Result<RetrievedScan, Error> {
-    let stated = words.estimator();
+    let RetrieveWords { estimator, pulse: pulse_s, window: window_s, weighting, .. } = words;
+    let (method, weighting) = (estimator.clone(), weighting.clone());
+    let stated = StatedEstimator { method, pulse_s: *pulse_s, window_s: *window_s, weighting };
     let are_means = stated.method.as_deref() == Some(MEANS) || words.air.gate_std == Some(0.0);
     // What is stated goes before what the file says.
     let (instrument, is_likely) = match (words.air.gate_std, &stated.method, scene) {

@@ -1,26 +1,23 @@
 //! What words of several commands have in common: where files go, scans that are read, and how numbers are written.
 
 use super::output::paths;
+use crate::io::netcdf_input;
 use crate::io::own::refuse_foreign;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
 use crate::io::{Existing, Provenance, Table, write_atomic};
 use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape};
+use crate::outputs::{self, Outputs};
 use crate::plan::Plan;
 use crate::scene::SceneFile;
 use crate::setup::progress::Silent;
-use crate::{Error, outputs, retrieve};
+use crate::{Error, retrieve, scene};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use wakescope_estimate::retrieval::Turbulence;
-
-/// What may be replaced.
-pub(super) fn existing(overwrite: bool) -> Existing {
-    if overwrite { Existing::Any } else { Existing::Own }
-}
 
 /// The folder of a command.
 #[derive(Debug, Args)]
@@ -35,12 +32,26 @@ pub(super) struct FolderWords {
 
 impl FolderWords {
     pub(super) fn existing(&self) -> Existing {
-        existing(self.overwrite)
+        Existing::with_overwrite(self.overwrite)
+    }
+
+    /// Finds out whether the files of a list can be written.
+    pub(super) fn prepare(&self, list: impl FnOnce(&mut Outputs) -> Result<(), Error>) -> Result<(), Error> {
+        self.prepare_names(&Outputs::names(scene::Outputs::default(), list)?)
     }
 
     /// Finds out whether files of these names can be written.
-    pub(super) fn prepare(&self, names: &[String]) -> Result<(), Error> {
+    pub(super) fn prepare_names(&self, names: &[String]) -> Result<(), Error> {
         outputs::prepare(&self.out, names, self.existing(), true)
+    }
+
+    /// Writes the files of a list in every format.
+    pub(super) fn write(
+        &self,
+        origin: Provenance,
+        list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
+    ) -> Result<Vec<PathBuf>, Error> {
+        Outputs::write(&self.out, self.existing(), (scene::Outputs::default(), origin), list)
     }
 
     /// The last line of a text.
@@ -65,7 +76,7 @@ impl TableWords {
     pub(super) fn prepare(&self) -> Result<(), Error> {
         let Some(path) = &self.out else { return Ok(()) };
         let name = path.file_name().and_then(|name| name.to_str());
-        Ok(refuse_foreign(path.parent().unwrap_or(Path::new("")), name, existing(self.overwrite))?)
+        Ok(refuse_foreign(path.parent().unwrap_or(Path::new("")), name, Existing::with_overwrite(self.overwrite))?)
     }
 
     /// Writes the file, if there is to be one, and says so in the text; returns its path for an object.
@@ -165,13 +176,7 @@ impl ScanWords {
 /// Whether a file holds raw signals and no map.
 pub(super) fn is_signals(path: &Path) -> bool {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    if ["npy", "npz"].contains(&extension) {
-        return true;
-    }
-    #[cfg(feature = "netcdf")]
-    return crate::io::netcdf_input::open(path).is_ok_and(|file| file.has("current_a"));
-    #[cfg(not(feature = "netcdf"))]
-    false
+    ["npy", "npz"].contains(&extension) || netcdf_input::open(path).is_ok_and(|file| file.has("current_a"))
 }
 
 /// A number of which `is_allowed` holds, or what is allowed.

@@ -220,8 +220,7 @@ impl FileFormat {
     /// The feature of this program that the format needs and this build lacks.
     fn missing_feature(self) -> Option<&'static str> {
         match self {
-            Self::Csv => None,
-            Self::Netcdf | Self::InitialNetcdf => (!cfg!(feature = "netcdf")).then_some("netcdf"),
+            Self::Csv | Self::Netcdf | Self::InitialNetcdf => None,
             Self::Vtr => (!cfg!(feature = "vtk")).then_some("vtk"),
         }
     }

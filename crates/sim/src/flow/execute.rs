@@ -8,11 +8,12 @@ use super::setup::{Setup, WakeSetup};
 use super::shared::agree;
 use super::steps::StepTable;
 use super::wake::{Schedule, WakeRun};
-use super::writer::{Writer, growth_note, kept};
-use super::{Begin, CaseFile, FlowCase, FlowOutcome, Watch, age_tau};
+use super::writer::{DIVISIONS, Writer, growth_note, kept};
+use super::{Begin, CaseFile, FlowCase, FlowOutcome, age_tau};
 use crate::io::lock::FolderLock;
 use crate::io::{Existing, write_atomic};
 use crate::keys::Problem;
+use crate::setup::progress::{Observer, Stage};
 use crate::{Error, machine};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -33,12 +34,7 @@ pub struct RunOptions {
 }
 
 /// All that a run needs, found without computing.
-struct Prepared {
-    setup: Setup,
-    plan: RunPlan,
-    files: Files,
-    forecast: FlowForecast,
-}
+type Prepared = (Setup, RunPlan, Files, FlowForecast);
 
 /// What a run on ranks would take, of which one calls this; nothing is written. With the folder that it would write to this is checked, too.
 ///
@@ -53,28 +49,27 @@ pub fn check_on(
     if let Some(folder) = folder {
         refuse_folder(folder, options.begin)?;
     }
-    let mut prepared = prepare(file, folder.unwrap_or(Path::new("")), options, ranks)?;
+    let (setup, _, _, mut forecast) = prepare(file, folder.unwrap_or(Path::new("")), options, ranks)?;
     // A run tells of these itself, as it goes.
-    let (setup, forecast) = (&prepared.setup, &mut prepared.forecast);
     let growth = setup.stability().undamped(forecast.step_s);
     let is_modelled = setup.settings.subgrid != SubgridModel::None;
     let noticed = growth.filter(|g| !is_modelled && g.rate_per_s * forecast.end_s > NOTICED_GROWTH);
     forecast.notes.extend(noticed.as_ref().map(growth_note));
-    Ok(prepared.forecast)
+    Ok(forecast)
 }
 
 /// As [`run_on`], in one process, for a case that fits into the memory of the machine.
 ///
 /// # Errors
 /// As there.
-pub fn run(file: &CaseFile, folder: &Path, begin: Begin, watch: &mut dyn Watch) -> Result<FlowOutcome, Error> {
+pub fn run(file: &CaseFile, folder: &Path, begin: Begin, observer: &dyn Observer) -> Result<FlowOutcome, Error> {
     let alone = Arc::new(Single) as Arc<dyn Ranks>;
-    run_on(&alone, file, folder, RunOptions { begin, allow_large: false }, watch)
+    run_on(&alone, file, folder, RunOptions { begin, allow_large: false }, observer)
 }
 
 /// Runs a case on ranks, all of which call this, and writes its files to `folder`, in which no other run may be writing. The
 /// files have the same bytes for any number of ranks; of fields and checkpoints each writes what it has, rank 0 the rest, and it
-/// alone tells `watch` anything.
+/// alone tells the observer anything.
 ///
 /// # Errors
 /// A case that the solver refuses or that needs more memory than there is, a checkpoint that does not fit, a flow that blows
@@ -84,16 +79,16 @@ pub fn run_on(
     file: &CaseFile,
     folder: &Path,
     options: RunOptions,
-    watch: &mut dyn Watch,
+    observer: &dyn Observer,
 ) -> Result<FlowOutcome, Error> {
     let is_first = ranks.rank() == 0;
     let prepared = if is_first { refuse_folder(folder, options.begin) } else { Ok(()) };
     let prepared = prepared.and_then(|()| prepare(file, folder, options, ranks));
-    let Prepared { mut setup, plan, files, forecast } = agree(ranks, prepared)?;
+    let (mut setup, plan, files, forecast) = agree(ranks, prepared)?;
     let mut warnings = forecast.notes.clone();
     let opened = is_first.then(|| {
         files.refuse_foreign(options.begin)?;
-        watch.forecast(&forecast);
+        observer.forecast(&forecast.to_string());
         open(folder, options.begin, &mut warnings)
     });
     let opened = agree(ranks, opened.transpose())?;
@@ -126,20 +121,35 @@ pub fn run_on(
         return Err(Error::Input { path: file.source.path().to_owned(), reason });
     }
     if is_first {
-        warnings.iter().for_each(|text| watch.note(text));
+        warnings.iter().for_each(|text| observer.warn(text));
+        observer.begin(Stage::FlowSimulation, DIVISIONS as u64);
     }
     let wake = meter.map(|meter| WakeRun::new(meter, run.flow(), (folder.to_owned(), file.provenance()), is_first));
     let begun = begin_files(file, folder, &files, wake, (checkpoint.is_some(), &kept), is_first);
-    let Begun { wake, steps, written } = agree(ranks, begun)?;
+    let (wake, steps, written) = agree(ranks, begun)?;
     let start_s = reached_s;
-    let mut writer =
-        Writer { ranks: ranks.clone(), files, steps, wake, written, warnings, watch, start_s, end_s, error: None };
+    let mut writer = Writer {
+        ranks: ranks.clone(),
+        files,
+        steps,
+        wake,
+        written,
+        warnings,
+        observer,
+        done: 0,
+        start_s,
+        end_s,
+        error: None,
+    };
     let result = run.to_end(&mut writer);
     // Also of a run that failed: its last row is what one wants to see.
     let finished = writer.finish();
     let error = writer.error.take();
     let summary = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
     agree(ranks, finished)?;
+    if is_first && summary.is_complete {
+        observer.end();
+    }
     let (files, warnings) = (writer.written, writer.warnings);
     let flow = run.flow();
     Ok(FlowOutcome {
@@ -157,11 +167,7 @@ pub fn run_on(
 /// Takes the folder, and finds from which checkpoint the run goes on: the newer one, 1, or the one before it where that is gone or
 /// damaged, 2; 0 for none.
 fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(FolderLock, usize), Error> {
-    std::fs::create_dir_all(folder).map_err(|source| Error::Io {
-        action: "make the folder",
-        path: folder.to_owned(),
-        source,
-    })?;
+    std::fs::create_dir_all(folder).map_err(Error::io("make the folder", folder))?;
     let lock = FolderLock::take(folder)?;
     let [checkpoint, previous] = checkpoint_paths(folder);
     let number = match begin {
@@ -183,11 +189,7 @@ fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(Fold
 }
 
 /// The files that grow with a run, and the paths of all that were begun.
-struct Begun {
-    wake: Option<WakeRun>,
-    steps: Option<StepTable>,
-    written: Vec<PathBuf>,
-}
+type Begun = (Option<WakeRun>, Option<StepTable>, Vec<PathBuf>);
 
 /// Begins the files of a run, or continues them from what a checkpoint kept; ranks other than the first have none.
 fn begin_files(
@@ -204,7 +206,7 @@ fn begin_files(
         wake.restore(history).ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
     }
     if !is_first {
-        return Ok(Begun { wake, steps: None, written: Vec::new() });
+        return Ok((wake, None, Vec::new()));
     }
     let case_toml = folder.join(CASE);
     write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
@@ -217,7 +219,7 @@ fn begin_files(
     let mut written = vec![case_toml];
     written.extend(steps.is_some().then_some(steps_path));
     written.extend(wake.iter().flat_map(WakeRun::paths));
-    Ok(Begun { wake, steps, written })
+    Ok((wake, steps, written))
 }
 
 /// Refuses a folder that holds a run that is not to be overwritten, that cannot be written to, or that is in use.
@@ -257,7 +259,7 @@ fn prepare(file: &CaseFile, folder: &Path, options: RunOptions, ranks: &Arc<dyn 
     let (plan, files) = plan(file, &setup, folder)?;
     plan.check(if options.begin == Begin::Restart { f64::NEG_INFINITY } else { 0.0 }).map_err(Error::Flow)?;
     let forecast = FlowForecast::new(file, &setup, &plan, &files);
-    Ok(Prepared { setup, plan, files, forecast })
+    Ok((setup, plan, files, forecast))
 }
 
 /// Refuses a step that the run would refuse at its start.

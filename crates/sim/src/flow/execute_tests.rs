@@ -1,16 +1,17 @@
 //! Runs that meet, that were killed early, that end elsewhere, that gain energy.
 
 use super::*;
-use crate::flow::{Unwatched, WakePreset};
+use crate::flow::WakePreset;
+use crate::setup::progress::Silent;
 use std::fs;
 
 /// Keeps what it is told.
 #[derive(Default)]
-struct Notes(Vec<String>);
+struct Notes(std::sync::Mutex<Vec<String>>);
 
-impl Watch for Notes {
-    fn note(&mut self, text: &str) {
-        self.0.push(text.to_owned());
+impl Observer for Notes {
+    fn warn(&self, text: &str) {
+        self.0.lock().unwrap().push(text.to_owned());
     }
 }
 
@@ -38,10 +39,10 @@ fn a_second_run_in_a_folder_is_refused_and_what_a_crashed_one_left_is_swept() {
     fs::write(stage.join("lock"), "").unwrap();
     let case = vortices("", "end_s = 0.05\n");
     let lock = FolderLock::take(folder.path()).unwrap();
-    let error = run(&case, folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
+    let error = run(&case, folder.path(), Begin::New, &Silent).unwrap_err().to_string();
     assert!(error.contains(folder.path().to_str().unwrap()) && error.contains("another run"), "{error}");
     drop(lock);
-    assert!(run(&case, folder.path(), Begin::New, &mut Unwatched).unwrap().is_complete);
+    assert!(run(&case, folder.path(), Begin::New, &Silent).unwrap().is_complete);
     assert!(!stage.exists() && fs::read_dir(folder.path()).unwrap().count() >= 3);
 }
 
@@ -52,11 +53,11 @@ fn a_run_killed_before_its_first_checkpoint_begins_anew_and_says_so() {
     let half = format!("# source: {}\nstep,time_s\n1,0.0", crate::PROGRAM);
     fs::write(folder.path().join("steps.csv"), half).unwrap();
     let case = vortices("", "end_s = 0.05\n");
-    let mut notes = Notes::default();
-    let outcome = run(&case, folder.path(), Begin::Restart, &mut notes).unwrap();
-    assert!(outcome.is_complete && notes.0[0].contains("begins anew"), "{:?}", notes.0);
+    let notes = Notes::default();
+    let outcome = run(&case, folder.path(), Begin::Restart, &notes).unwrap();
+    assert!(outcome.is_complete && notes.0.lock().unwrap()[0].contains("begins anew"), "{:?}", notes.0);
     let fresh = tempfile::tempdir().unwrap();
-    run(&case, fresh.path(), Begin::New, &mut Unwatched).unwrap();
+    run(&case, fresh.path(), Begin::New, &Silent).unwrap();
     let steps = |folder: &Path| fs::read(folder.join("steps.csv")).unwrap();
     assert!(steps(folder.path()) == steps(fresh.path()));
 }
@@ -99,10 +100,10 @@ fn energy_from_nowhere_stops_a_run_whose_checkpoints_are_good() {
     let folder = tempfile::tempdir().unwrap();
     let inviscid = "viscosity_m2_s = 0.0\n";
     let case = vortices(inviscid, "end_s = 1000.0\nscheme = \"adams_bashforth2\"\ncourant = 0.4\n");
-    let mut notes = Notes::default();
-    let error = run(&case, folder.path(), Begin::New, &mut notes).unwrap_err();
+    let notes = Notes::default();
+    let error = run(&case, folder.path(), Begin::New, &notes).unwrap_err();
     assert!(matches!(error, Error::Flow(wakescope_les::Error::EnergyGrew { .. })), "{error}");
-    assert!(notes.0[0].contains("runge_kutta3"), "{:?}", notes.0);
+    assert!(notes.0.lock().unwrap()[0].contains("runge_kutta3"), "{:?}", notes.0);
     let steps = fs::read_to_string(folder.path().join("steps.csv")).unwrap();
     let energies: Vec<f64> = steps
         .lines()
@@ -114,7 +115,7 @@ fn energy_from_nowhere_stops_a_run_whose_checkpoints_are_good() {
     // Where the case names no scheme, one is taken that loses energy, if anything.
     let long = vortices(inviscid, "end_s = 20.0\ncourant = 0.35\n");
     let folder = tempfile::tempdir().unwrap();
-    let outcome = run(&long, folder.path(), Begin::New, &mut Unwatched).unwrap();
+    let outcome = run(&long, folder.path(), Begin::New, &Silent).unwrap();
     let kept = outcome.kinetic_energy_m5_s2 / energies[0];
     assert!(kept < 1.0 && kept > 0.99 && outcome.warnings.is_empty(), "{kept}, {:?}", outcome.warnings);
 }
@@ -130,11 +131,11 @@ fn a_run_goes_on_with_the_scheme_of_its_checkpoint() {
         [scheme(&slow), scheme(&fast)],
         [wakescope_les::TimeScheme::AdamsBashforth2, wakescope_les::TimeScheme::RungeKutta3]
     );
-    run(&slow, folder.path(), Begin::New, &mut Unwatched).unwrap();
-    assert!(run(&fast, folder.path(), Begin::Restart, &mut Unwatched).unwrap().is_complete);
+    run(&slow, folder.path(), Begin::New, &Silent).unwrap();
+    assert!(run(&fast, folder.path(), Begin::Restart, &Silent).unwrap().is_complete);
     // One that is named must be the same.
     let named = case("end_s = 0.3\nscheme = \"runge_kutta3\"\n");
-    let error = run(&named, folder.path(), Begin::Restart, &mut Unwatched).unwrap_err().to_string();
+    let error = run(&named, folder.path(), Begin::Restart, &Silent).unwrap_err().to_string();
     assert!(error.contains("time scheme"), "{error}");
 }
 
@@ -185,13 +186,12 @@ fn tiny_wake(case: &str, wake: &str) -> CaseFile {
 fn a_finished_wake_is_left_as_it_is_by_a_restart_and_refuses_an_earlier_end() {
     let folder = tempfile::tempdir().unwrap();
     let case = tiny_wake("", "");
-    run(&case, folder.path(), Begin::New, &mut Unwatched).unwrap();
+    run(&case, folder.path(), Begin::New, &Silent).unwrap();
     let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
     let kept = ["flow.checkpoint", "flow.checkpoint.previous", CASE].map(read);
     assert!(kept[0] != kept[1]);
-    assert!(run(&case, folder.path(), Begin::Restart, &mut Unwatched).unwrap().is_complete);
-    let error =
-        run(&case.with_end(0.1).unwrap(), folder.path(), Begin::Restart, &mut Unwatched).unwrap_err().to_string();
+    assert!(run(&case, folder.path(), Begin::Restart, &Silent).unwrap().is_complete);
+    let error = run(&case.with_end(0.1).unwrap(), folder.path(), Begin::Restart, &Silent).unwrap_err().to_string();
     assert!(error.contains("the end") && error.contains("tau = 0.2"), "{error}");
     assert!(kept == ["flow.checkpoint", "flow.checkpoint.previous", CASE].map(read));
 }
@@ -215,7 +215,7 @@ fn columns_and_texts_of_the_circulation_have_the_radii_of_the_case() {
     ] {
         let folder = tempfile::tempdir().unwrap();
         let case = tiny_wake(&format!("circulation_radii_m = {radii}\n"), "");
-        run(&case, folder.path(), Begin::New, &mut Unwatched).unwrap();
+        run(&case, folder.path(), Begin::New, &Silent).unwrap();
         let table = fs::read_to_string(folder.path().join("wake.csv")).unwrap();
         let names = table.lines().find(|line| line.starts_with("tau,")).unwrap();
         assert!(names.split(',').any(|column| column == name), "{names}");

@@ -5,7 +5,6 @@ use super::case::{FileFormat, Output};
 use super::shared::{agree, commit};
 use super::wake::{self, Due, Schedule};
 use crate::Error;
-#[cfg(feature = "netcdf")]
 use crate::io::cf_fields;
 use crate::io::own::refuse_foreign;
 #[cfg(feature = "vtk")]
@@ -167,7 +166,7 @@ impl Files {
             add(&format!("{stem}_*.{}", file.ending), usize::from(bytes > 0.0), bytes);
         }
         add(STEPS, usize::from(self.output.steps), steps * STEP_ROW_BYTES);
-        let histories = if cfg!(feature = "netcdf") { 2 } else { 1 };
+        let histories = 2;
         let records = self.schedule.due.iter().filter(|due| due.record).count() as f64;
         add("wake.*", if self.is_wake { histories } else { 0 }, records * (RECORD_BYTES + 40.0 * nx));
         add("flow.checkpoint*", if writes_checkpoints { 2 } else { 0 }, 2.0 * 7.0 * 8.0 * nx * ny * nz);
@@ -224,7 +223,6 @@ impl Files {
             field,
             #[cfg(feature = "vtk")]
             behind,
-            #[cfg(feature = "netcdf")]
             faces: if wants(&initial) { Some(self.faces(flow, share)?) } else { None },
             planes,
         })
@@ -239,18 +237,15 @@ impl Files {
         };
         let origin = &self.origin;
         Ok(match (file.holds, file.ending, &shown.field) {
-            #[cfg(feature = "netcdf")]
             (Holds::Field, "nc", Some(field)) => Some(cf_fields::cf_field_parts(field, origin)?),
             #[cfg(feature = "vtk")]
             (Holds::Field, "vtr", Some(field)) => Some(vtr::field_parts(field, shown.behind.as_deref(), origin)?),
-            #[cfg(feature = "netcdf")]
             (Holds::Faces, ..) => {
                 shown.faces.as_ref().map(|faces| cf_fields::cf_faces_parts(faces, origin)).transpose()?
             }
             (Holds::Plane(at), "csv", _) => {
                 whole(tables::planes_table(&shown.planes[at])?.to_csv(origin)?.into_bytes())
             }
-            #[cfg(feature = "netcdf")]
             (Holds::Plane(at), "nc", _) => whole(crate::io::cf_planes::cf_planes_bytes(&shown.planes[at], origin)?),
             #[cfg(feature = "vtk")]
             (Holds::Plane(at), "vtr", _) => whole(vtr::plane_file(&shown.planes[at], origin)?),
@@ -299,7 +294,6 @@ impl Files {
         })
     }
 
-    #[cfg(feature = "netcdf")]
     fn faces(&self, flow: &Flow, share: Share) -> Result<cf_fields::FaceVelocities, Error> {
         let mesh = flow.mesh();
         let velocity = |axis| flow.own_face_velocity_m_s(axis).map_err(Error::Flow);
@@ -349,7 +343,6 @@ struct Shown {
     /// Values of the field in the cell behind the last one that is here.
     #[cfg(feature = "vtk")]
     behind: Option<Vec<f64>>,
-    #[cfg(feature = "netcdf")]
     faces: Option<cf_fields::FaceVelocities>,
     planes: Vec<CrossPlanes>,
 }

@@ -2,7 +2,7 @@
 
 use super::setup::{Initial, Setup};
 use crate::Error;
-use crate::keys::{ABOVE_ZERO, Checker, FINITE, Is, ZERO_OR_MORE, keys};
+use crate::keys::{ABOVE_ZERO, Checker, FINITE, ZERO_OR_MORE, keys};
 use crate::scene::CoreProfile;
 use std::path::Path;
 use wakescope_les::solver::Ends;
@@ -76,10 +76,7 @@ keys! {
         /// Velocities `u`, `v`, `w` of a classic NetCDF file, each on its own axes, which need not be those of the mesh.
         "netcdf" => Netcdf {
             /// The file; a relative path counts from the case file.
-            path: String => Is(
-                |_: &String| cfg!(feature = "netcdf"),
-                "absent: this build lacks the feature `netcdf`",
-            ),
+            path: String,
         },
     }
 
@@ -219,21 +216,12 @@ impl Free {
                 let speed_m_s = pair.circulation_m2_s / (std::f64::consts::TAU * pair.spacing_m);
                 Ok((pair.field()?, speed_m_s / pair.spacing_m))
             }
-            InitialName::Netcdf { path } => Ok((from_file(&folder.join(path), mesh)?, 1.0)),
+            InitialName::Netcdf { path } => {
+                let faces = super::initial_file::read(&folder.join(path), mesh);
+                Ok((Initial::Faces(faces.map_err(Error::of_key("case.initial.path"))?), 1.0))
+            }
         }
     }
-}
-
-#[cfg(feature = "netcdf")]
-fn from_file(path: &Path, mesh: &Mesh) -> Result<Initial, Error> {
-    let of_key = |e| Error::OfKey { key: "case.initial.path", source: Box::new(e) };
-    super::initial_file::read(path, mesh).map(Initial::Faces).map_err(of_key)
-}
-
-#[cfg(not(feature = "netcdf"))]
-fn from_file(path: &Path, _: &Mesh) -> Result<Initial, Error> {
-    // A checked case does not come here.
-    Err(Error::Input { path: path.to_owned(), reason: "NetCDF needs a build with the feature `netcdf`".into() })
 }
 
 impl InitialPair {

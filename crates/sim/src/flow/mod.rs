@@ -13,14 +13,12 @@ mod execute;
 mod files;
 mod forecast;
 mod free;
-#[cfg(feature = "netcdf")]
 mod initial_file;
 mod integration;
 mod kind;
 mod named;
 #[cfg(test)]
 mod ranks_tests;
-#[cfg(feature = "netcdf")]
 mod read;
 mod setup;
 mod shared;
@@ -41,9 +39,8 @@ pub use free::*;
 pub use kind::CaseKind;
 pub use named::*;
 
-#[cfg(feature = "netcdf")]
 pub use read::{FieldInSpace, read_field, read_planes};
-#[cfg(all(feature = "netcdf", feature = "plots"))]
+#[cfg(feature = "plots")]
 pub use wake::REPEATS;
 pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};
 
@@ -53,7 +50,7 @@ use crate::io::text_file;
 use crate::keys::{Problem, SceneError, Source};
 use crate::scene::hash_of;
 use std::path::{Path, PathBuf};
-use wakescope_les::solver::{StepRecord, Stepping};
+use wakescope_les::solver::Stepping;
 
 /// A valid case, with what names it.
 #[derive(Debug, Clone, PartialEq)]
@@ -176,7 +173,7 @@ fn age_tau(time_s: f64, tau_per_s: f64) -> f64 {
 
 /// The text of a case file.
 fn case_text(path: &Path) -> Result<String, Error> {
-    text_file::read(path).map_err(|source| Error::Io { action: "read the case", path: path.to_owned(), source })
+    text_file::read(path).map_err(Error::io("read the case", path))
 }
 
 /// Whether a run begins or continues.
@@ -190,30 +187,6 @@ pub enum Begin {
     /// From the checkpoint in the folder.
     Restart,
 }
-
-/// Told of the progress of a run.
-pub trait Watch {
-    /// Before anything is computed.
-    fn forecast(&mut self, forecast: &FlowForecast) {
-        let _ = forecast;
-    }
-
-    /// After every step, with the share of the run that is done.
-    fn step(&mut self, share: f64, record: &StepRecord) {
-        let _ = (share, record);
-    }
-
-    /// Something that deserves attention.
-    fn note(&mut self, text: &str) {
-        let _ = text;
-    }
-}
-
-/// A watch that looks away.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Unwatched;
-
-impl Watch for Unwatched {}
 
 /// What a run did.
 #[derive(Debug, Clone, PartialEq)]

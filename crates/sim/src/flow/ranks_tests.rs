@@ -2,7 +2,8 @@
 
 use super::execute::{RunOptions, run_on};
 use super::thread_ranks::on_threads;
-use super::{Begin, CaseFile, Unwatched, Watch};
+use super::{Begin, CaseFile};
+use crate::setup::progress::{Observer, Silent};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -10,10 +11,10 @@ use std::path::Path;
 /// A small wake with records, fields and planes in all formats, and checkpoints.
 fn wake(more: &str) -> String {
     let mut planes = vec!["csv"];
-    planes.extend(cfg!(feature = "netcdf").then_some("netcdf"));
+    planes.push("netcdf");
     planes.extend(cfg!(feature = "vtk").then_some("vtr"));
     let mut fields = planes.clone();
-    fields.extend(cfg!(feature = "netcdf").then_some("initial_netcdf"));
+    fields.push("initial_netcdf");
     format!(
         "[case]\nkind = \"wake\"\ncells = [6, 32, 24]\nreynolds = 1000.0\nperturbation = 0.05\n\
          [wake]\nend_tau = 0.1\nevery_tau = 0.02\nfields_tau = [0.1]\nplanes_tau = [0.05, 0.1]\n\
@@ -26,7 +27,7 @@ fn wake(more: &str) -> String {
 fn run(text: &str, folder: &Path, begin: Begin, count: usize) -> Vec<Option<String>> {
     let file = CaseFile::parse(text, Path::new("case.toml")).unwrap();
     let options = RunOptions { begin, allow_large: false };
-    let run = |ranks| run_on(&ranks, &file, folder, options, &mut Unwatched).err().map(|e| e.to_string());
+    let run = |ranks| run_on(&ranks, &file, folder, options, &Silent).err().map(|e| e.to_string());
     on_threads(count, run).into_iter().map(|error| error.unwrap()).collect()
 }
 
@@ -67,14 +68,14 @@ fn every_file_has_the_bytes_of_one_process_also_after_a_restart_on_other_ranks()
 fn an_output_that_one_rank_cannot_write_stops_all_and_leaves_no_part_of_it() {
     let folder = tempfile::tempdir().unwrap();
     // A folder in the way of the fields: rank 0 sees it when all have written their parts.
-    let name = if cfg!(feature = "netcdf") { "fields_0001.nc" } else { "fields_0001.csv" };
+    let name = "fields_0001.nc";
     let text = wake("");
     let file = CaseFile::parse(&text, Path::new("case.toml")).unwrap();
     let blocked = folder.path().join(name);
     let found = on_threads(3, |ranks| {
-        let mut blocks = Blocks(&blocked);
+        let blocks = Blocks(&blocked);
         let options = RunOptions { begin: Begin::New, allow_large: false };
-        run_on(&ranks, &file, folder.path(), options, &mut blocks).err().map(|e| e.to_string())
+        run_on(&ranks, &file, folder.path(), options, &blocks).err().map(|e| e.to_string())
     });
     assert!(found.iter().all(|one| matches!(one, Some(Some(words)) if words.contains(name))), "{found:?}");
     let left = files(folder.path());
@@ -85,8 +86,8 @@ fn an_output_that_one_rank_cannot_write_stops_all_and_leaves_no_part_of_it() {
 /// Puts a folder in the way of a file when the run has begun.
 struct Blocks<'a>(&'a Path);
 
-impl Watch for Blocks<'_> {
-    fn step(&mut self, _: f64, _: &wakescope_les::solver::StepRecord) {
+impl Observer for Blocks<'_> {
+    fn reach(&self, _: &str) {
         fs::create_dir_all(self.0).unwrap();
     }
 }

@@ -48,8 +48,9 @@ pub fn read_planes(name: &Path) -> Result<Vec<CrossPlanes>, Error> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Begin, CaseFile, Unwatched, WakePreset, run};
+    use super::super::{Begin, CaseFile, WakePreset, run};
     use super::*;
+    use crate::Silent;
 
     #[test]
     fn fields_and_planes_of_a_run_come_back() {
@@ -63,7 +64,7 @@ mod tests {
         }
         let file = CaseFile::parse(&toml::to_string(&case).unwrap(), Path::new("case.toml")).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let outcome = run(&file, folder.path(), Begin::New, &mut Unwatched).unwrap();
+        let outcome = run(&file, folder.path(), Begin::New, &Silent).unwrap();
         let field = read_field(&folder.path().join("fields_0001.nc"), "vorticity_magnitude").unwrap();
         assert_eq!(field.axis_m.each_ref().map(Vec::len), [4, 16, 12]);
         assert!((field.time_s - outcome.time_s).abs() < 1e-9);

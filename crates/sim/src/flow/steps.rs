@@ -46,7 +46,7 @@ impl StepTable {
     }
 
     fn open(path: &Path, waiting: Option<String>) -> Result<Self, Error> {
-        let file = OpenOptions::new().append(true).open(path).map_err(|e| write_error(path, e))?;
+        let file = OpenOptions::new().append(true).open(path).map_err(Error::io("write", path))?;
         Ok(Self { path: path.to_owned(), file, waiting })
     }
 
@@ -89,10 +89,6 @@ impl StepTable {
         let Some(row) = self.waiting.take() else { return Ok(()) };
         let [rate, residual] = budget.map_or([f64::NAN; 2], |b| [b.rate_m5_s3, b.residual_m5_s3()]);
         let line = format!("{row},{},{}\n", float_text(rate), float_text(residual));
-        self.file.write_all(line.as_bytes()).map_err(|e| write_error(&self.path, e))
+        self.file.write_all(line.as_bytes()).map_err(Error::io("write", &self.path))
     }
-}
-
-fn write_error(path: &Path, source: std::io::Error) -> Error {
-    Error::Io { action: "write", path: path.to_owned(), source }
 }

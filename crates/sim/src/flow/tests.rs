@@ -1,6 +1,7 @@
 //! Case files, interrupted runs, wrong input.
 
 use super::*;
+use crate::setup::progress::{Observer, Silent};
 use std::collections::BTreeMap;
 use std::fs;
 
@@ -70,7 +71,7 @@ fn every_example_is_a_good_case_that_keeps_its_meaning_and_runs() {
         assert!(text.contains(&format!("kind = \"{name}\"")), "{name}");
         let out = folder.path().join(name);
         let outcome =
-            run(&parse(&tiny(name, text)), &out, Begin::New, &mut Unwatched).unwrap_or_else(|e| panic!("{name}: {e}"));
+            run(&parse(&tiny(name, text)), &out, Begin::New, &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!((outcome.steps, outcome.is_complete), (3, false), "{name}");
         assert!(outcome.relative_divergence < 1e-8, "{name}: {}", outcome.relative_divergence);
         assert!(outcome.files.iter().all(|path| path.exists()));
@@ -83,8 +84,8 @@ fn every_example_is_a_good_case_that_keeps_its_meaning_and_runs() {
 /// Decaying vortices with all outputs.
 fn vortices(pause: Option<u64>) -> CaseFile {
     let pause = pause.map_or(String::new(), |steps| format!("pause_after_steps = {steps}\n"));
-    let formats = if cfg!(feature = "netcdf") { "\"csv\", \"netcdf\", \"initial_netcdf\"" } else { "\"csv\"" };
-    let planes = if cfg!(feature = "netcdf") { "\"csv\", \"netcdf\"" } else { "\"csv\"" };
+    let formats = "\"csv\", \"netcdf\", \"initial_netcdf\"";
+    let planes = "\"csv\", \"netcdf\"";
     parse(&format!(
         "[case]\nkind = \"taylor_green_plane\"\ncells = 12\n[time]\nend_s = 0.2\ncourant = 0.3\n{pause}\
          [output]\ntimes_s = [0.0, 0.1, 0.2]\nfields = [{formats}]\nplanes_x_m = [0.5]\nplanes = [{planes}]\n\
@@ -96,15 +97,15 @@ fn vortices(pause: Option<u64>) -> CaseFile {
 fn an_interrupted_run_leaves_the_same_files_byte_for_byte_as_one_that_was_not() {
     let folder = tempfile::tempdir().unwrap();
     let [whole, parts] = ["whole", "parts"].map(|name| folder.path().join(name));
-    let outcome = run(&vortices(None), &whole, Begin::New, &mut Unwatched).unwrap();
+    let outcome = run(&vortices(None), &whole, Begin::New, &Silent).unwrap();
     assert!(outcome.is_complete && outcome.steps > 6, "{outcome:?}");
-    run(&vortices(Some(3)), &parts, Begin::New, &mut Unwatched).unwrap();
+    run(&vortices(Some(3)), &parts, Begin::New, &Silent).unwrap();
     // As if the machine had failed behind the checkpoint: a row too many, and half of one.
     let mut steps = fs::read_to_string(parts.join("steps.csv")).unwrap();
     steps += "4,0.1,0.0";
     fs::write(parts.join("steps.csv"), steps).unwrap();
-    run(&vortices(Some(5)), &parts, Begin::Restart, &mut Unwatched).unwrap();
-    let last = run(&vortices(None), &parts, Begin::Restart, &mut Unwatched).unwrap();
+    run(&vortices(Some(5)), &parts, Begin::Restart, &Silent).unwrap();
+    let last = run(&vortices(None), &parts, Begin::Restart, &Silent).unwrap();
     assert_eq!((last.steps, last.time_s), (outcome.steps, outcome.time_s));
     let (whole, parts) = (contents(&whole), contents(&parts));
     assert!(whole.keys().any(|name| name == "plane1_0003.csv"), "{:?}", whole.keys());
@@ -126,7 +127,7 @@ fn an_interrupted_run_leaves_the_same_files_byte_for_byte_as_one_that_was_not() 
 /// A small wake with records, fields, planes and checkpoints.
 fn small_wake(pause: Option<u64>) -> CaseFile {
     let pause = pause.map_or(String::new(), |steps| format!("pause_after_steps = {steps}\n"));
-    let format = if cfg!(feature = "netcdf") { "netcdf" } else { "csv" };
+    let format = "netcdf";
     parse(&format!(
         "[case]\nkind = \"wake\"\npair = {{ from = \"a340\" }}\ncells = [6, 32, 24]\ncross_wind_m_s = 0.5\n\
          [wake]\nend_tau = 0.2\nevery_tau = 0.04\nfields_tau = [0.1]\nplanes_tau = [0.0]\nseries_tau = [0.1, 0.2]\n\
@@ -139,20 +140,18 @@ fn small_wake(pause: Option<u64>) -> CaseFile {
 fn an_interrupted_wake_leaves_the_same_histories_fields_and_planes() {
     let folder = tempfile::tempdir().unwrap();
     let [whole, parts] = ["whole", "parts"].map(|name| folder.path().join(name));
-    let outcome = run(&small_wake(None), &whole, Begin::New, &mut Unwatched).unwrap();
+    let outcome = run(&small_wake(None), &whole, Begin::New, &Silent).unwrap();
     assert!(outcome.is_complete && outcome.steps > 12, "{outcome:?}");
-    run(&small_wake(Some(7)), &parts, Begin::New, &mut Unwatched).unwrap();
-    let last = run(&small_wake(None), &parts, Begin::Restart, &mut Unwatched).unwrap();
+    run(&small_wake(Some(7)), &parts, Begin::New, &Silent).unwrap();
+    let last = run(&small_wake(None), &parts, Begin::Restart, &Silent).unwrap();
     assert_eq!(last.steps, outcome.steps);
     let (whole, parts) = (contents(&whole), contents(&parts));
-    let end = if cfg!(feature = "netcdf") { "nc" } else { "csv" };
+    let end = "nc";
     assert!(whole["wake.csv"] == parts["wake.csv"] && whole["flow.checkpoint"] == parts["flow.checkpoint"]);
     for name in ["plane1_0004", "fields_0001"].map(|stem| format!("{stem}.{end}")) {
         assert!(whole[&name] == parts[&name], "{name}");
     }
-    if cfg!(feature = "netcdf") {
-        assert!(whole["wake.nc"] == parts["wake.nc"]);
-    }
+    assert!(whole["wake.nc"] == parts["wake.nc"]);
     let text = |file: &str| {
         let text = String::from_utf8(whole[file].clone()).unwrap();
         let rows: Vec<String> = text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect();
@@ -173,11 +172,10 @@ fn an_interrupted_wake_leaves_the_same_histories_fields_and_planes() {
     assert!(of(6, "gamma_5_15_left_m2_s") < 0.0 && of(6, "gamma_ratio_left") < 1.0);
 }
 
-#[cfg(feature = "netcdf")]
 #[test]
 fn the_history_of_a_wake_opens_with_its_axes() {
     let folder = tempfile::tempdir().unwrap();
-    run(&small_wake(None), folder.path(), Begin::New, &mut Unwatched).unwrap();
+    run(&small_wake(None), folder.path(), Begin::New, &Silent).unwrap();
     let mut file = netcdf3::FileReader::open(folder.path().join("wake.nc")).unwrap();
     let [tau, radius, mode] = ["tau", "radius", "mode"].map(|name| file.read_var_f64(name).unwrap());
     assert_eq!((tau.len(), radius.len(), mode.len()), (6, 24, 4));
@@ -214,9 +212,7 @@ fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
     let mut commented = parse(text).case;
     (commented.time.scheme, commented.time.courant) = (None, None);
     commented.checkpoint.every_steps = None;
-    if cfg!(feature = "netcdf") {
-        assert_eq!(commented, coarse.case, "the commented example is the preset");
-    }
+    assert_eq!(commented, coarse.case, "the commented example is the preset");
     for preset in [WakePreset::Coarse, WakePreset::Medium, WakePreset::Fine, WakePreset::Chapter] {
         let file = CaseFile::preset(preset).unwrap();
         let CaseKind::Wake(flow) = &file.case.case else { panic!("{preset:?}") };
@@ -244,22 +240,22 @@ fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
 #[test]
 fn a_checkpoint_is_not_lost_by_mistake_and_a_damaged_one_gives_way_to_the_one_before() {
     let folder = tempfile::tempdir().unwrap();
-    run(&vortices(Some(5)), folder.path(), Begin::New, &mut Unwatched).unwrap();
-    let error = run(&vortices(None), folder.path(), Begin::New, &mut Unwatched).unwrap_err();
+    run(&vortices(Some(5)), folder.path(), Begin::New, &Silent).unwrap();
+    let error = run(&vortices(None), folder.path(), Begin::New, &Silent).unwrap_err();
     assert!(matches!(error, Error::CheckpointInTheWay { .. }), "{error}");
     let path = folder.path().join("flow.checkpoint");
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-    let outcome = run(&vortices(None), folder.path(), Begin::Restart, &mut Unwatched).unwrap();
+    let outcome = run(&vortices(None), folder.path(), Begin::Restart, &Silent).unwrap();
     assert!(outcome.is_complete && outcome.warnings[0].contains("damaged"), "{outcome:?}");
     let fresh = tempfile::tempdir().unwrap();
-    run(&vortices(None), fresh.path(), Begin::New, &mut Unwatched).unwrap();
+    run(&vortices(None), fresh.path(), Begin::New, &Silent).unwrap();
     let steps = |folder: &Path| fs::read(folder.join("steps.csv")).unwrap();
     assert!(steps(folder.path()) == steps(fresh.path()));
-    run(&vortices(Some(1)), folder.path(), Begin::Overwrite, &mut Unwatched).unwrap();
+    run(&vortices(Some(1)), folder.path(), Begin::Overwrite, &Silent).unwrap();
     // Another flow does not continue this one.
     let other = parse(&vortices(None).toml.replace("cells = 12", "cells = 14"));
-    let error = run(&other, folder.path(), Begin::Restart, &mut Unwatched).unwrap_err().to_string();
+    let error = run(&other, folder.path(), Begin::Restart, &Silent).unwrap_err().to_string();
     assert!(error.contains("cells along y") && error.contains("12") && error.contains("14"), "{error}");
 }
 
@@ -267,8 +263,8 @@ fn a_checkpoint_is_not_lost_by_mistake_and_a_damaged_one_gives_way_to_the_one_be
 fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
     /// Puts a folder where an output will go while the flow runs.
     struct Mischief(PathBuf);
-    impl Watch for Mischief {
-        fn step(&mut self, _: f64, _: &StepRecord) {
+    impl Observer for Mischief {
+        fn reach(&self, _: &str) {
             fs::create_dir_all(&self.0).unwrap();
         }
     }
@@ -276,16 +272,16 @@ fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
     let in_the_way = folder.path().join("fields_0002.csv");
     // Before the run it is found before any computing.
     fs::create_dir_all(&in_the_way).unwrap();
-    let error = run(&vortices(None), folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
+    let error = run(&vortices(None), folder.path(), Begin::New, &Silent).unwrap_err().to_string();
     assert!(error.contains("fields_0002.csv") && error.contains("folder"), "{error}");
     fs::remove_dir(&in_the_way).unwrap();
     assert!(contents(folder.path()).is_empty(), "nothing was written");
-    let mut mischief = Mischief(in_the_way);
-    let error = run(&vortices(None), folder.path(), Begin::New, &mut mischief).unwrap_err();
+    let mischief = Mischief(in_the_way);
+    let error = run(&vortices(None), folder.path(), Begin::New, &mischief).unwrap_err();
     assert!(matches!(error, Error::Export(_)), "{error}");
     assert!(wakescope_les::solver::check_checkpoint(folder.path().join("flow.checkpoint")).is_ok());
     fs::remove_dir(folder.path().join("fields_0002.csv")).unwrap();
-    assert!(run(&vortices(None), folder.path(), Begin::Restart, &mut Unwatched).unwrap().is_complete);
+    assert!(run(&vortices(None), folder.path(), Begin::Restart, &Silent).unwrap().is_complete);
     assert!(folder.path().join("fields_0002.csv").is_file());
 }
 
@@ -293,7 +289,7 @@ fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
 fn a_flow_that_blows_up_names_step_and_place() {
     let folder = tempfile::tempdir().unwrap();
     let text = "[case]\nkind = \"taylor_green_plane\"\ncells = 12\n[time]\nend_s = 1.0\nstep_s = 0.2\n";
-    let error = run(&parse(text), folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
+    let error = run(&parse(text), folder.path(), Begin::New, &Silent).unwrap_err().to_string();
     assert!(error.contains("time.step_s = 0.2") && error.contains("Courant number"), "{error}");
     // A force that brings the air to a speed that the step does not allow.
     let z = "[case.z]\ncells = 8\nlow_m = 0.0\nhigh_m = 8.0\n";
@@ -302,7 +298,7 @@ fn a_flow_that_blows_up_names_step_and_place() {
          [case.initial]\nkind = \"uniform\"\nvelocity_m_s = [0.0, 0.1, 0.0]\n[time]\nend_s = 10.0\nstep_s = 0.2\nscheme = \"runge_kutta3\"\n"
     );
     let folder = tempfile::tempdir().unwrap();
-    let error = run(&parse(&text), folder.path(), Begin::New, &mut Unwatched).unwrap_err().to_string();
+    let error = run(&parse(&text), folder.path(), Begin::New, &Silent).unwrap_err().to_string();
     assert!(error.starts_with("flow: step ") && error.contains("fastest is v"), "{error}");
 }
 
@@ -313,7 +309,7 @@ fn a_mesh_that_does_not_resolve_core_and_boundary_layer_is_said_to() {
         let text = format!(
             "[case]\nkind = \"dipole\"\n{keys}\n[time]\nend_s = 1e-3\nstep_s = 5e-4\n[checkpoint]\nwrite = false\n"
         );
-        run(&parse(&text), folder.path(), Begin::New, &mut Unwatched).unwrap().warnings
+        run(&parse(&text), folder.path(), Begin::New, &Silent).unwrap().warnings
     };
     let found = warnings("cells = [48, 48]\nreynolds = 2500.0");
     assert!(found.iter().any(|text| text.contains("core radius along y has 2.40 cells, at least 2.5")), "{found:?}");
@@ -364,7 +360,7 @@ fn wrong_cases_are_refused_with_key_value_and_what_is_allowed() {
 fn what_only_the_mesh_tells_is_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let start = |text: &str| run(&parse(text), &out, Begin::New, &mut Unwatched).unwrap_err().to_string();
+    let start = |text: &str| run(&parse(text), &out, Begin::New, &Silent).unwrap_err().to_string();
     let message = start("[case]\nkind = \"free\"\n");
     assert!(message.contains("time.end_s is missing"), "{message}");
     let walls = "[case]\nkind = \"free\"\n[case.x]\ncells = 8\nlow_end = \"slip\"\nhigh_end = \"slip\"\n\
@@ -380,7 +376,6 @@ fn what_only_the_mesh_tells_is_refused_before_anything_is_written() {
     assert!(!out.exists());
 }
 
-#[cfg(feature = "netcdf")]
 #[test]
 fn a_field_written_by_a_run_starts_another_with_the_same_velocities() {
     let folder = tempfile::tempdir().unwrap();
@@ -398,9 +393,9 @@ fn a_field_written_by_a_run_starts_another_with_the_same_velocities() {
         )
     };
     let pair = "kind = \"vortex_pair\"\ncirculation_m2_s = 6.28\nspacing_m = 2.0\ncore_radius_m = 0.8\nheight_m = 2.0";
-    run(&case(pair, &mesh(24)), &folder.path().join("a"), Begin::New, &mut Unwatched).unwrap();
+    run(&case(pair, &mesh(24)), &folder.path().join("a"), Begin::New, &Silent).unwrap();
     let again = "kind = \"netcdf\"\npath = \"a/initial_0001.nc\"";
-    run(&case(again, &mesh(24)), &folder.path().join("b"), Begin::New, &mut Unwatched).unwrap();
+    run(&case(again, &mesh(24)), &folder.path().join("b"), Begin::New, &Silent).unwrap();
     let speeds = |name: &str| -> Vec<f64> {
         let text = fs::read_to_string(folder.path().join(name)).unwrap();
         let rows = text.lines().filter(|l| !l.starts_with('#')).skip(1);
@@ -413,7 +408,7 @@ fn a_field_written_by_a_run_starts_another_with_the_same_velocities() {
         assert!(worst < 1e-12, "{output}: {worst}");
     }
     // Also on a mesh of its own: both runs then differ by the error of the coarser one.
-    let outcome = run(&case(again, &mesh(20)), &folder.path().join("c"), Begin::New, &mut Unwatched).unwrap();
+    let outcome = run(&case(again, &mesh(20)), &folder.path().join("c"), Begin::New, &Silent).unwrap();
     let energy = |folder_name: &str| {
         let text = fs::read_to_string(folder.path().join(folder_name).join("steps.csv")).unwrap();
         text.lines().last().unwrap().split(',').nth(4).unwrap().parse::<f64>().unwrap()
@@ -427,7 +422,7 @@ fn a_field_written_by_a_run_starts_another_with_the_same_velocities() {
         ("a/initial_0001.nc", mesh(24).replace("high_m = 4.0\nlow_end", "high_m = 9.0\nlow_end"), "not covered"),
     ] {
         let file = case(&format!("kind = \"netcdf\"\npath = \"{path}\""), &mesh);
-        let message = run(&file, &folder.path().join("d"), Begin::New, &mut Unwatched).unwrap_err().to_string();
+        let message = run(&file, &folder.path().join("d"), Begin::New, &Silent).unwrap_err().to_string();
         assert!(message.contains(wanted), "{wanted} is not in: {message}");
     }
 }

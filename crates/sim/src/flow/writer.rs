@@ -2,12 +2,12 @@
 //!
 //! Check: the tests of `flow` interrupt runs and compare the bytes.
 
-use super::Watch;
 use super::files::Files;
 use super::shared::agree;
 use super::steps::StepTable;
 use super::wake::WakeRun;
 use crate::Error;
+use crate::setup::progress::Observer;
 use std::path::PathBuf;
 use std::sync::Arc;
 use wakescope_les::Flow;
@@ -25,6 +25,9 @@ pub(super) fn kept(bytes: &[u8], is_wake: bool) -> (&[u8], &[u8]) {
     rest.split_at_checked(length).unwrap_or_default()
 }
 
+/// Parts of the simulated time of which an observer is told.
+pub(super) const DIVISIONS: f64 = 10_000.0;
+
 /// Writes what the run gives, on each rank what that has; tables, and what is told, on rank 0.
 pub(super) struct Writer<'a> {
     pub(super) ranks: Arc<dyn Ranks>,
@@ -33,7 +36,9 @@ pub(super) struct Writer<'a> {
     pub(super) wake: Option<WakeRun>,
     pub(super) written: Vec<PathBuf>,
     pub(super) warnings: Vec<String>,
-    pub(super) watch: &'a mut dyn Watch,
+    pub(super) observer: &'a dyn Observer,
+    /// Of the divisions of the run, those that the observer knows of.
+    pub(super) done: u64,
     pub(super) start_s: f64,
     pub(super) end_s: f64,
     /// What stopped the run, in full.
@@ -67,8 +72,14 @@ impl RunObserver for Writer<'_> {
         if self.ranks.rank() > 0 {
             return Ok(());
         }
-        let done = (record.report.time_s - self.start_s) / (self.end_s - self.start_s);
-        self.watch.step(done, record);
+        let r = &record.report;
+        let done = (DIVISIONS * (r.time_s - self.start_s) / (self.end_s - self.start_s)) as u64;
+        self.observer.advance(done.saturating_sub(self.done));
+        self.done = done.max(self.done);
+        // Four decimals, or the exponent form of what these would not show.
+        let is_plain = (1e-2..1e9).contains(&r.time_s);
+        let time = if is_plain { format!("{:.4}", r.time_s) } else { format!("{:.3e}", r.time_s) };
+        self.observer.reach(&format!("step {}, t = {time} s, Courant {:.2}", r.step, r.courant));
         let pushed = self.steps.as_mut().map_or(Ok(()), |steps| steps.push(record));
         self.keep(pushed)
     }
@@ -94,7 +105,7 @@ impl RunObserver for Writer<'_> {
             RunWarning::UndampedGrowth { growth, .. } => growth_note(growth),
             _ => format!("{warning:?}"),
         };
-        self.watch.note(&text);
+        self.observer.warn(&text);
         self.warnings.push(text);
     }
 

@@ -151,7 +151,6 @@ pub fn write_atomic(path: &Path, content: impl Into<Vec<u8>>) -> OutputResult<()
 ///
 /// # Errors
 /// The refusal of the system.
-#[cfg(any(feature = "cli", feature = "flow", feature = "sweep"))]
 pub(crate) fn try_folder(folder: &Path) -> OutputResult<()> {
     Stage::make(folder).map(drop)
 }

@@ -23,8 +23,7 @@ impl TextTable {
     /// # Errors
     /// A file that cannot be read; no header; rows with more or fewer cells than it.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            text_file::read(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
+        let text = text_file::read(path).map_err(Error::io("read", path))?;
         Self::parse(&text).map_err(|reason| Error::Input { path: path.to_owned(), reason })
     }
 

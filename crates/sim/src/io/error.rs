@@ -92,7 +92,6 @@ pub enum OutputError {
 pub type OutputResult<T> = Result<T, OutputError>;
 
 impl OutputError {
-    #[cfg(any(feature = "netcdf", feature = "plots", feature = "vtk"))]
     pub(crate) fn encode(format: &'static str, error: impl std::fmt::Display) -> Self {
         Self::Encode { format, message: error.to_string() }
     }

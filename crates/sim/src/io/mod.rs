@@ -25,40 +25,28 @@
 //! | `vtr` | VTK rectilinear grids and their collection | `vtk` |
 
 pub mod atomic;
-#[cfg(feature = "netcdf")]
 pub(crate) mod fields_input;
 #[cfg(feature = "netcdf4")]
 pub(crate) mod netcdf4_input;
-#[cfg(feature = "netcdf")]
 pub(crate) mod netcdf_header;
-#[cfg(feature = "netcdf")]
 pub(crate) mod netcdf_input;
-#[cfg(feature = "netcdf")]
 pub(crate) mod planes_input;
 pub(crate) mod text_file;
-#[cfg(feature = "netcdf")]
 pub(crate) mod units;
 
-#[cfg(feature = "netcdf")]
 pub mod cf_fields;
-#[cfg(feature = "netcdf")]
 pub mod cf_planes;
-#[cfg(feature = "netcdf")]
 pub mod cf_signals;
-#[cfg(feature = "netcdf")]
 pub mod cf_spectra;
-#[cfg(feature = "netcdf")]
 pub mod cfradial;
 pub mod csv;
 pub mod csv_input;
-#[cfg(feature = "netcdf")]
 pub(crate) mod edges;
 mod error;
 pub mod fields;
 pub mod hpl;
 pub(crate) mod lock;
 pub mod map;
-#[cfg(feature = "netcdf")]
 pub(crate) mod netcdf;
 pub mod number;
 pub mod own;

@@ -3,7 +3,6 @@
 //! Check: every kind comes back from its bytes in both orders.
 
 /// How a number is stored, in the order of [`ALL`]. Some kinds are of NetCDF alone.
-#[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NumberType {
     I8,
@@ -36,7 +35,6 @@ const ALL: [(NumberType, &str, u64); 11] = [
 
 impl NumberType {
     /// By its code in classic NetCDF.
-    #[cfg(feature = "netcdf")]
     pub(crate) fn of_netcdf(code: u32) -> Option<Self> {
         ALL.get(usize::try_from(code).ok()?.checked_sub(1)?).map(|(number, ..)| *number)
     }
@@ -62,7 +60,6 @@ impl NumberType {
     }
 
     /// What classic NetCDF holds where no integer was written; every byte may be a number.
-    #[cfg(feature = "netcdf")]
     pub(crate) fn netcdf_fill(self) -> Option<f64> {
         match self {
             Self::I16 => Some(-32767.0),

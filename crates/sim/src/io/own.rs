@@ -24,6 +24,13 @@ pub enum Existing {
     Any,
 }
 
+impl Existing {
+    /// Any file for one who asked for that.
+    pub fn with_overwrite(overwrite: bool) -> Self {
+        if overwrite { Self::Any } else { Self::Own }
+    }
+}
+
 /// Refuses names in a folder that cannot be written: a folder of that name is in the way, or a file that this program
 /// did not write.
 ///
@@ -108,7 +115,6 @@ mod tests {
                 format!("# {}, scene {}\nseed = 1\n", crate::PROGRAM, hash_of("seed = 1\n")).into_bytes(),
             ),
         ];
-        #[cfg(feature = "netcdf")]
         files.push(("map.nc".into(), super::super::cfradial::cfradial_bytes(&map, &origin).unwrap()));
         #[cfg(feature = "plots")]
         {

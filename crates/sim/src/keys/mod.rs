@@ -25,7 +25,5 @@ pub(crate) use limit::{ABOVE_ZERO_OR_INF, Is, Limit, NothingOr, Number, ZERO_OR_
 pub use problem::{Located, Problem, SceneError};
 pub(crate) use source::Source;
 pub(crate) use vet::{Document, Format, value_at};
-#[cfg(all(feature = "sweep", feature = "netcdf"))]
 pub(crate) use words::unit_of;
-#[cfg(feature = "sweep")]
 pub(crate) use words::{near, one_of};

@@ -80,7 +80,7 @@ impl<'a> Document<'a> {
     /// Every key that is not known, has a value of the wrong kind or is missing, in the order of the lines.
     pub(crate) fn vet(&self, format: &Format<'_>) -> Result<toml::Table, SceneError> {
         let mut walk = Walk { document: self, format, found: Vec::new() };
-        let table = walk.table(format.keys, &self.table, "", &[], Some(format.defaults), 1);
+        let table = walk.table(format.keys, &self.table, "", None, Some(format.defaults), 1);
         if walk.found.is_empty() {
             return Ok(table);
         }
@@ -165,8 +165,12 @@ struct Walk<'w> {
 }
 
 impl Walk<'_> {
-    fn refuse(&mut self, key: String, value: String, allowed: String, at: usize) {
-        self.refuse_on(key, value, allowed, line_of(&self.document.breaks, at));
+    fn refuse(&mut self, key: String, value: String, allowed: String, line: usize) {
+        self.found.push(Located { problem: Problem { key, value, allowed }, line: Some(line) });
+    }
+
+    fn line_of(&self, at: &Range<usize>) -> usize {
+        line_of(&self.document.breaks, at.start)
     }
 
     /// A value as the text writes it; nothing for tables, which no line can show.
@@ -178,31 +182,30 @@ impl Walk<'_> {
         if is_table { String::new() } else { self.document.quote(value.span()) }
     }
 
-    fn refuse_on(&mut self, key: String, value: String, allowed: String, line: usize) {
-        self.found.push(Located { problem: Problem { key, value, allowed }, line: Some(line) });
-    }
-
     /// A table with these keys; `kinds` are those of a table with a tag.
     fn table(
         &mut self,
         keys: &[Key],
         table: &DeTable<'_>,
         path: &str,
-        kinds: &[Kinds<'_>],
+        kinds: Option<Kinds<'_>>,
         defaults: Option<&toml::Table>,
         line: usize,
     ) -> toml::Table {
         let mut out = toml::Table::new();
         for (name, value) in table {
-            let at = join(path, name.get_ref());
-            let default = defaults.and_then(|d| d.get(name.get_ref().as_ref()));
-            match keys.iter().find(|key| key.name == name.get_ref()) {
+            let (here, line) = (name.get_ref().as_ref(), self.line_of(&name.span()));
+            match keys.iter().find(|key| key.name == here) {
                 Some(key) => {
-                    let read = self.value(&key.kind, value, &at, key.name, default, name.span().start);
-                    out.extend(read.map(|value| (key.name.to_owned(), value)));
+                    let default = defaults.and_then(|d| d.get(here));
+                    let read = self.value(&key.kind, value, &join(path, here), default, line);
+                    out.extend(read.map(|value| (here.to_owned(), value)));
                 }
-                None if kinds.iter().any(|(tag, ..)| tag == name.get_ref()) => {}
-                None => self.unknown(keys, name, value, path, kinds),
+                None if kinds.is_some_and(|(tag, ..)| tag == here) => {}
+                None => {
+                    let allowed = self.unknown(keys, here, path, kinds);
+                    self.refuse(join(path, &quote(here)), self.shown(value), allowed, line);
+                }
             }
         }
         for key in keys.iter().filter(|key| key.is_required && !table.contains_key(key.name)) {
@@ -218,9 +221,9 @@ impl Walk<'_> {
         // Of a table with a tag, the tag is what must be said.
         let (path, allowed) = match &key.kind {
             Kind::Tagged { tag, kinds } => (join(path, tag), one_of(&names(kinds))),
-            kind => (path.to_owned(), self.wanted(path, key.name, kind)),
+            kind => (path.to_owned(), self.wanted(path, kind)),
         };
-        self.refuse_on(path, Problem::ABSENT.into(), allowed, line);
+        self.refuse(path, Problem::ABSENT.into(), allowed, line);
     }
 
     fn value(
@@ -228,11 +231,9 @@ impl Walk<'_> {
         kind: &Kind,
         value: &Spanned<DeValue<'_>>,
         path: &str,
-        name: &str,
         default: Option<&Value>,
-        at: usize,
+        line: usize,
     ) -> Option<Value> {
-        let line = line_of(&self.document.breaks, at);
         let defaults = default.and_then(Value::as_table);
         let inner = value.get_ref();
         let read = match (kind, inner) {
@@ -243,19 +244,19 @@ impl Walk<'_> {
             (Kind::Switch, DeValue::Boolean(value)) => Some(Value::Boolean(*value)),
             (Kind::Text, DeValue::String(text)) => Some(Value::String(text.to_string())),
             (Kind::Choice(names), _) => {
-                return self.named(names, value, path.to_owned(), at).map(|name| Value::String(name.to_owned()));
+                return self.named(names, value, path, line).map(|name| Value::String(name.to_owned()));
             }
             (Kind::List { of, len }, DeValue::Array(values)) if len.is_none_or(|len| len == values.len()) => {
                 // Each value that does not fit is named itself.
                 let mut list = Vec::with_capacity(values.len());
                 for (i, value) in values.iter().enumerate() {
-                    let at = value.span().start;
-                    list.extend(self.value(of, value, &format!("{path}[{i}]"), name, None, at));
+                    let line = self.line_of(&value.span());
+                    list.extend(self.value(of, value, &format!("{path}[{i}]"), None, line));
                 }
                 return Some(Value::Array(list));
             }
             (Kind::Table(keys), DeValue::Table(table)) => {
-                return Some(Value::Table(self.table(keys, table, path, &[], defaults, line)));
+                return Some(Value::Table(self.table(keys, table, path, None, defaults, line)));
             }
             (Kind::Tagged { tag, kinds }, DeValue::Table(table)) => {
                 return self.tagged(tag, kinds, table, path, defaults, line).map(Value::Table);
@@ -263,7 +264,7 @@ impl Walk<'_> {
             _ => None,
         };
         if read.is_none() {
-            self.refuse(path.to_owned(), self.shown(value), self.wanted(path, name, kind), at);
+            self.refuse(path.to_owned(), self.shown(value), self.wanted(path, kind), line);
         }
         read
     }
@@ -273,15 +274,15 @@ impl Walk<'_> {
         &mut self,
         names: &[&'n str],
         value: &Spanned<DeValue<'_>>,
-        path: String,
-        at: usize,
+        path: &str,
+        line: usize,
     ) -> Option<&'n str> {
         let text = value.get_ref().as_str();
         let found = names.iter().copied().find(|name| Some(*name) == text);
         if found.is_none() {
             let meant = text.and_then(|text| near(text, names.iter().copied()));
             let hint = meant.map(|name| format!("; did you mean \"{name}\"?")).unwrap_or_default();
-            self.refuse(path, self.shown(value), one_of(names) + &hint, at);
+            self.refuse(path.to_owned(), self.shown(value), one_of(names) + &hint, line);
         }
         found
     }
@@ -299,39 +300,32 @@ impl Walk<'_> {
         let at = join(path, tag);
         let stated = table.iter().find(|(key, _)| key.get_ref() == tag);
         let name = match (stated, of_default) {
-            (Some((key, value)), _) => self.named(&names(kinds), value, at, key.span().start)?,
+            (Some((key, value)), _) => {
+                let line = self.line_of(&key.span());
+                self.named(&names(kinds), value, &at, line)?
+            }
             (None, Some(name)) => name,
             (None, None) => {
-                self.refuse_on(at, Problem::ABSENT.into(), one_of(&names(kinds)), line);
+                self.refuse(at, Problem::ABSENT.into(), one_of(&names(kinds)), line);
                 return None;
             }
         };
         let keys = kinds.iter().find(|(n, _)| *n == name).map_or(&[][..], |(_, keys)| keys);
         let same = defaults.filter(|_| of_default == Some(name));
-        let mut out = self.table(keys, table, path, &[(tag, name, kinds)], same, line);
+        let mut out = self.table(keys, table, path, Some((tag, name, kinds)), same, line);
         out.insert(tag.to_owned(), Value::String(name.to_owned()));
         Some(out)
     }
 
-    fn unknown(
-        &mut self,
-        keys: &[Key],
-        name: &Spanned<toml::de::DeString<'_>>,
-        value: &Spanned<DeValue<'_>>,
-        path: &str,
-        kinds: &[Kinds<'_>],
-    ) {
-        let here = name.get_ref().as_ref();
-        let shown = self.shown(value);
-        for (tag, chosen, all) in kinds {
-            let others: Vec<&str> =
-                all.iter().filter(|(_, keys)| keys.iter().any(|key| key.name == here)).map(|(name, _)| *name).collect();
+    /// What to write in place of a key that is not known in the table at `path`.
+    fn unknown(&self, keys: &[Key], here: &str, path: &str, kinds: Option<Kinds<'_>>) -> String {
+        if let Some((tag, chosen, all)) = kinds {
+            let has = |(_, keys): &&(&str, Vec<Key>)| keys.iter().any(|key| key.name == here);
+            let others: Vec<String> = all.iter().filter(has).map(|(name, _)| format!("\"{name}\"")).collect();
             if !others.is_empty() {
-                let needed = others.iter().map(|o| format!("\"{o}\"")).collect::<Vec<_>>().join(" or ");
-                let tag = join(path, tag);
+                let (tag, needed) = (join(path, tag), others.join(" or "));
                 let stated = if self.document.value(&tag).is_some() { "" } else { ", the default" };
-                let allowed = format!("this key is for {tag} = {needed}, and {tag} is \"{chosen}\"{stated}");
-                return self.refuse(join(path, &quote(here)), shown, allowed, name.span().start);
+                return format!("this key is for {tag} = {needed}, and {tag} is \"{chosen}\"{stated}");
             }
         }
         let meant = near(here, keys.iter().map(|key| key.name));
@@ -342,15 +336,14 @@ impl Walk<'_> {
             (None, Some(table)) => format!("; it is a key of [{table}]."),
             (None, None) => ".".into(),
         };
-        let tags = kinds.iter().map(|(tag, ..)| *tag);
-        let known: Vec<&str> = tags.chain(keys.iter().map(|key| key.name)).collect();
-        let allowed = format!("there is no such key{hint} Known here: {}", known.join(", "));
-        self.refuse(join(path, &quote(here)), shown, allowed, name.span().start);
+        let known: Vec<&str> = kinds.iter().map(|(tag, ..)| *tag).chain(keys.iter().map(|key| key.name)).collect();
+        format!("there is no such key{hint} Known here: {}", known.join(", "))
     }
 
     /// What a key takes, with an example.
-    fn wanted(&self, path: &str, name: &str, kind: &Kind) -> String {
-        let what = wanted(name, kind);
+    fn wanted(&self, path: &str, kind: &Kind) -> String {
+        let name = path.rsplit('.').next().and_then(|name| name.split('[').next());
+        let what = wanted(name.unwrap_or(path), kind);
         match kind {
             Kind::Switch | Kind::Choice(_) => what,
             Kind::Table(keys) => {

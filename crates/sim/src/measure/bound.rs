@@ -130,7 +130,6 @@ pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> 
 ///
 /// # Errors
 /// As [`bound`].
-#[cfg(feature = "sweep")]
 pub(crate) fn bound_in_the_middle(plan: &Plan, scanner: &Scanner<'_>) -> Result<BoundPoint, Error> {
     Setting::new(plan, scanner)?.at(plan.geometry.gate_range_m[plan.geometry.gate_range_m.len() / 2])
 }

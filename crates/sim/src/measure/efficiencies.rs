@@ -31,7 +31,6 @@ impl<T> Known<T> {
     }
 
     /// How many were made.
-    #[cfg(feature = "sweep")]
     pub(crate) fn len(&self) -> usize {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).len()
     }

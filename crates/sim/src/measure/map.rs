@@ -318,12 +318,25 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
 pub fn velocities(plan: &Plan, observer: &dyn Observer) -> Result<Vec<Array2<f64>>, Error> {
     let scanner = Scanner::new(plan, observer)?;
     let mut maps = Vec::with_capacity(plan.realisations());
-    let seen = |_, velocity_m_s: &Array2<f64>| maps.push(velocity_m_s.clone());
-    match plan.scene.scene.detector.signal {
-        DetectorSignal::IntermediateFrequency => estimates::<f64>(&[plan], &scanner, observer, |_| (), seen)?,
-        DetectorSignal::Baseband => estimates::<Complex<f64>>(&[plan], &scanner, observer, |_| (), seen)?,
-    };
+    of_plans(&[plan], &scanner, observer, |_, velocity_m_s| maps.push(velocity_m_s.clone()))?;
     Ok(maps)
+}
+
+/// [`estimates()`] of samples of the kind that the scenes have, none of which are kept.
+///
+/// # Errors
+/// As there.
+pub(crate) fn of_plans(
+    plans: &[&Plan],
+    scanner: &Scanner<'_>,
+    observer: &dyn Observer,
+    seen: impl FnMut(usize, &Array2<f64>),
+) -> Result<Vec<VelocityEstimates>, Error> {
+    let Some(first) = plans.first() else { return Ok(Vec::new()) };
+    match first.scene.scene.detector.signal {
+        DetectorSignal::IntermediateFrequency => estimates::<f64>(plans, scanner, observer, |_| (), seen),
+        DetectorSignal::Baseband => estimates::<Complex<f64>>(plans, scanner, observer, |_| (), seen),
+    }
 }
 
 /// What takes the records of pulses from a number on.

@@ -277,7 +277,6 @@ impl Efficiencies {
     }
 
     /// How many were computed.
-    #[cfg(feature = "sweep")]
     pub(crate) fn computed(&self) -> usize {
         self.layers.len()
     }

@@ -9,6 +9,7 @@ use crate::scene::{NoiseModel, PulseShape as Shape, Scene};
 use crate::setup::estimators::{Response, response, sampling, signal_kind};
 use crate::setup::ray_information::RayInformation;
 use crate::setup::region::{places, region_radius};
+use ndarray::{Array2, Axis};
 use wakescope_estimate::Radius;
 use wakescope_estimate::bound::Noise;
 use wakescope_estimate::vortex_fit::{EstimatorResponse, PulseShape, ScanSetup, WakeModel};
@@ -87,12 +88,15 @@ impl SceneResponse {
     }
 }
 
-/// Gates of a scene's maps, `spacing_m` apart, of which neighbours share most of their window say the same: every so-manyth says all.
-pub(crate) fn gate_step(scene: &Scene, spacing_m: f64) -> usize {
+/// Ranges, m, and velocities \[line, gate\] of a scene's map at every so-manyth gate: neighbours that share most of their window say
+/// the same.
+pub(crate) fn independent_gates(scene: &Scene, range_m: &[f64], velocity_m_s: &Array2<f64>) -> (Vec<f64>, Array2<f64>) {
     let period_s = 1.0 / scene.detector.sampling_hz;
     let apart_m = 0.25 * scene.estimator.window_samples as f64 * 0.5 * crate::SPEED_OF_LIGHT_M_S * period_s;
     // files round their ranges
-    ((apart_m / spacing_m - 1e-3).ceil() as usize).max(1)
+    let step = ((apart_m / spacing_m(range_m) - 1e-3).ceil() as usize).max(1);
+    let gates: Vec<usize> = (0..range_m.len()).step_by(step).collect();
+    (gates.iter().map(|gate| range_m[*gate]).collect(), velocity_m_s.select(Axis(1), &gates))
 }
 
 /// Mean distance of ranges, m.

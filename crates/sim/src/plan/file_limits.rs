@@ -5,7 +5,6 @@ use super::{Plan, Stage};
 use crate::Error;
 use crate::io::UtcTime;
 use crate::io::hpl::within_a_day;
-#[cfg(feature = "netcdf")]
 use crate::scene::DetectorSignal;
 
 /// Refuses results that do not fit into the files that their scene asks for.
@@ -15,7 +14,6 @@ use crate::scene::DetectorSignal;
 pub(super) fn check(plan: &Plan) -> Result<(), Error> {
     let (scene, has_map) = (&plan.scene.scene, plan.runs(Stage::Estimates));
     let (first_s, last_s) = (plan.wind.start_s, plan.scan_end_s());
-    #[cfg(feature = "netcdf")]
     if scene.outputs.netcdf {
         let (g, kept_realisations) = (&plan.geometry, plan.kept_realisations());
         let rays = g.elevation_rad.len() as f64;
@@ -49,7 +47,6 @@ pub(super) fn check(plan: &Plan) -> Result<(), Error> {
     Ok(())
 }
 
-#[cfg(feature = "netcdf")]
 fn fits(key: &'static str, file: &str, bytes: f64, remedy: &str) -> Result<(), Error> {
     let most = crate::io::netcdf::MAX_BYTES as f64;
     if bytes <= most {
@@ -74,7 +71,6 @@ mod tests {
         Plan::new(SceneFile::new(scene).unwrap(), Target::Run).map_or_else(|e| e.to_string(), |_| String::new())
     }
 
-    #[cfg(feature = "netcdf")]
     #[test]
     fn signals_that_no_file_can_hold_are_refused_before_the_run() {
         let many = |of: SignalsOf| {

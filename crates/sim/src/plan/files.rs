@@ -65,7 +65,7 @@ impl Written {
 
 pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> PlannedStage {
     let o = &scene.outputs;
-    let (netcdf, plots) = (o.netcdf && cfg!(feature = "netcdf"), cfg!(feature = "plots"));
+    let (netcdf, plots) = (o.netcdf, cfg!(feature = "plots"));
     let pictures = [o.svg && plots, o.png && plots];
     let mut written = Written { core_s: 5e-3, ..Written::default() };
     if matches!(target, Target::Run | Target::Efficiency) {

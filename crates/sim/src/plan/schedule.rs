@@ -6,7 +6,7 @@ use crate::SPEED_OF_LIGHT_M_S;
 use crate::scene::Flow;
 
 /// What is to be known of a scan before it runs.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ScanSchedule {
     /// The word of the scene for its pattern.
     pub pattern: &'static str,

@@ -36,8 +36,6 @@ pub use own::{OwnScene, retrieve_signals, scan_of_signals};
 pub use pictures::figure;
 pub use realisations::{RetrievalRow, SceneRetrieval};
 pub use retrieved_scan::RetrievedScan;
-pub use summary::RetrievalErrors;
-#[cfg(feature = "sweep")]
 pub use table::json;
 pub use table::{rows, side};
 #[cfg(feature = "plots")]

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::io::raw::RawRecords;
 use crate::io::scans::ReadScan;
 use crate::measure::recorded::{FromParts, MeasuredScan};
-use crate::measure::response::{SceneResponse, gate_step, spacing_m};
+use crate::measure::response::{SceneResponse, independent_gates, spacing_m};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Target};
 use crate::scene::{DetectorSignal, Scene, SceneFile};
@@ -82,10 +82,7 @@ impl OwnScene {
             0 => 0.5 * (map.range_m.first()? + map.range_m.last()?),
             count => found.vortices.iter().map(|vortex| place(vortex).0).sum::<f64>() / count as f64,
         };
-        let gate_step = gate_step(&self.scene, spacing_m(&map.range_m));
-        let some: Vec<usize> = (0..map.range_m.len()).step_by(gate_step).collect();
-        let ranges_m: Vec<f64> = some.iter().map(|gate| map.range_m[*gate]).collect();
-        let velocity_m_s = map.velocity_m_s.select(Axis(1), &some);
+        let (ranges_m, velocity_m_s) = independent_gates(&self.scene, &map.range_m, &map.velocity_m_s);
         let fits = Fits {
             scan: map,
             // Maps of one scan know no deviation, and those of a few scans hardly any.

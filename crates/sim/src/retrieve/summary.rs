@@ -8,30 +8,10 @@ use crate::io::Table;
 use crate::scene::RetrievalMethod as Method;
 use wakescope_estimate::retrieval::{Measured, Side, VortexResult};
 
-/// Errors of one quantity of one vortex by one method.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RetrievalErrors {
-    /// The method.
-    pub method: Method,
-    /// The vortex.
-    pub side: Side,
-    /// Name of the quantity, with its unit.
-    pub quantity: &'static str,
-    /// Its true value, that of the first realisation and sweep.
-    pub truth: f64,
-    /// Realisations, each as often as it has sweeps.
-    pub realisations: usize,
-    /// Those without a value.
-    pub failures: usize,
-    /// Mean error and its standard error.
-    pub bias: (f64, f64),
-    /// Standard deviation of the values; NaN for one.
-    pub std: f64,
-    /// Root mean square error.
-    pub rms: f64,
-    /// Root mean square of the deviations that the retrievals state.
-    pub stated_std: f64,
-}
+/// Errors of one quantity of one vortex by one method: realisations, each as often as it has sweeps, and those without a value; the truth
+/// of the first one, mean error and its standard error, standard deviation, root mean square error, and root mean square of the
+/// deviations that the retrievals state.
+type Errors = (Method, Side, &'static str, [usize; 2], [f64; 6]);
 
 /// A quantity: its name, what was found, and the truth.
 type Quantity = (&'static str, fn(&RetrievalRow) -> Option<Measured>, fn(&RetrievalRow) -> f64);
@@ -54,24 +34,21 @@ const QUANTITIES: [Quantity; 5] = [
 
 impl SceneRetrieval {
     /// The errors of all quantities whose truth is known.
-    #[must_use]
-    pub fn errors(&self) -> Vec<RetrievalErrors> {
-        let mut methods: Vec<Method> = Vec::new();
+    fn errors(&self) -> Vec<Errors> {
+        let mut of: Vec<(Method, Side)> = Vec::new();
         for row in &self.rows {
-            if !methods.contains(&row.method) {
-                methods.push(row.method);
+            if !of.iter().any(|(method, _)| *method == row.method) {
+                of.extend([Side::Left, Side::Right].map(|side| (row.method, side)));
             }
         }
-        let mut all = Vec::new();
-        for method in methods {
-            for side in [Side::Left, Side::Right] {
-                let rows: Vec<&RetrievalRow> =
-                    self.rows.iter().filter(|row| row.method == method && row.side == side).collect();
-                let errors = QUANTITIES.iter().filter_map(|quantity| errors((method, side), quantity, &rows));
-                all.extend(errors);
-            }
-        }
-        all
+        let of_vortex = |(method, side): (Method, Side)| {
+            let rows: Vec<_> = self.rows.iter().filter(|row| (row.method, row.side) == (method, side)).collect();
+            QUANTITIES.iter().filter_map(move |(quantity, found, truth)| {
+                let (counts, numbers) = errors(*found, *truth, &rows)?;
+                Some((method, side, *quantity, counts, numbers))
+            })
+        };
+        of.into_iter().flat_map(of_vortex).collect()
     }
 
     /// Share of the maps whose test says wake; nothing without a test.
@@ -85,19 +62,20 @@ impl SceneRetrieval {
     #[must_use]
     pub fn error_table(&self) -> Table {
         let all = self.errors();
-        let column = |get: fn(&RetrievalErrors) -> f64| all.iter().map(get).collect::<Vec<_>>();
+        let number = |i: usize| all.iter().map(move |(.., numbers)| numbers[i]);
+        let count = |i: usize| all.iter().map(move |(_, _, _, counts, _)| counts[i] as i64);
         Table::new()
-            .text("method", all.iter().map(|e| e.method.name()))
-            .text("side", all.iter().map(|e| side_name(e.side)))
-            .text("quantity", all.iter().map(|e| e.quantity))
-            .float("truth", column(|e| e.truth))
-            .int("realisations", all.iter().map(|e| e.realisations as i64))
-            .int("failures", all.iter().map(|e| e.failures as i64))
-            .float("bias", column(|e| e.bias.0))
-            .float("bias_standard_error", column(|e| e.bias.1))
-            .float("std", column(|e| e.std))
-            .float("rms", column(|e| e.rms))
-            .float("stated_std", column(|e| e.stated_std))
+            .text("method", all.iter().map(|(method, ..)| method.name()))
+            .text("side", all.iter().map(|(_, side, ..)| side_name(*side)))
+            .text("quantity", all.iter().map(|(_, _, quantity, ..)| *quantity))
+            .float("truth", number(0))
+            .int("realisations", count(0))
+            .int("failures", count(1))
+            .float("bias", number(1))
+            .float("bias_standard_error", number(2))
+            .float("std", number(3))
+            .float("rms", number(4))
+            .float("stated_std", number(5))
     }
 
     /// The table of all vortices.
@@ -130,7 +108,11 @@ impl SceneRetrieval {
     }
 }
 
-fn errors(of: (Method, Side), (quantity, found, truth): &Quantity, rows: &[&RetrievalRow]) -> Option<RetrievalErrors> {
+fn errors(
+    found: fn(&RetrievalRow) -> Option<Measured>,
+    truth: fn(&RetrievalRow) -> f64,
+    rows: &[&RetrievalRow],
+) -> Option<([usize; 2], [f64; 6])> {
     let first = truth(rows.first()?);
     if !first.is_finite() {
         return None;
@@ -141,16 +123,8 @@ fn errors(of: (Method, Side), (quantity, found, truth): &Quantity, rows: &[&Retr
     let mean = |get: &dyn Fn(&(f64, f64)) -> f64| values.iter().map(get).sum::<f64>() / n;
     let bias = mean(&|v| v.0);
     let std = (values.iter().map(|v| (v.0 - bias).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-    Some(RetrievalErrors {
-        method: of.0,
-        side: of.1,
-        quantity,
-        truth: first,
-        realisations: rows.len(),
-        failures: rows.len() - values.len(),
-        bias: (bias, std / n.sqrt()),
-        std: if values.len() > 1 { std } else { f64::NAN },
-        rms: mean(&|v| v.0 * v.0).sqrt(),
-        stated_std: mean(&|v| v.1 * v.1).sqrt(),
-    })
+    let (rms, stated) = (mean(&|v| v.0 * v.0).sqrt(), mean(&|v| v.1 * v.1).sqrt());
+    // One value has no deviation.
+    let own = if values.len() > 1 { std } else { f64::NAN };
+    Some(([rows.len(), rows.len() - values.len()], [first, bias, std / n.sqrt(), own, rms, stated]))
 }

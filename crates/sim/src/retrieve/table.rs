@@ -82,7 +82,6 @@ fn flags(result: &ScanResult) -> Vec<&'static str> {
 }
 
 /// Everything that was found, with covariances and competing tops.
-#[cfg(feature = "sweep")]
 pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
     use serde_json::{Value, json};
     // JSON has no NaN: what is not known is null.
@@ -117,7 +116,6 @@ pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
 }
 
 /// Names of the parameters of a wake in their order.
-#[cfg(feature = "sweep")]
 const PARAMETER_NAMES: [&str; 10] = [
     "gamma_left_m2_s",
     "gamma_right_m2_s",

@@ -8,22 +8,14 @@ use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulen
 use super::{Refinement, RegionRadius, Scan, SignalsOf};
 use crate::keys::{Document, value_at};
 
-/// A key without use.
-struct Idle {
-    key: &'static str,
-    /// What the key is for, and what the scene has instead.
-    purpose: String,
-}
-
-/// Keys of a scene without use.
-fn idle(scene: &Scene) -> Vec<Idle> {
+/// Keys of a scene without use: what each is for, and what the scene has instead.
+fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
     let method = &scene.estimator.method;
     let kind = format!("estimator.method.kind = \"{}\"", method.name());
     let mut found = Vec::new();
     let mut unused = |is_idle: bool, keys: &[&'static str], purpose: String| {
         if is_idle {
-            let idle = |key: &&'static str| Idle { key, purpose: purpose.clone() };
-            found.extend(keys.iter().map(idle));
+            found.extend(keys.iter().map(|key| (*key, purpose.clone())));
         }
     };
     let without_peak = matches!(method, Method::PulsePair {} | Method::FirstMoment(_));
@@ -112,7 +104,8 @@ impl Scene {
 
 /// What a text states in vain.
 pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
-    let idle: Vec<Idle> = idle(scene).into_iter().filter(|idle| document.line(idle.key).is_some()).collect();
+    let mut idle = idle(scene);
+    idle.retain(|(key, _)| document.line(key).is_some());
     if idle.is_empty() {
         return Vec::new();
     }
@@ -122,13 +115,12 @@ pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
     let table =
         |scene: &Scene| toml::Value::try_from(scene).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
     let (own, usual) = (table(scene), table(&usual));
-    idle.into_iter()
-        .filter(|idle| value_at(&own, idle.key) != value_at(&usual, idle.key))
-        .map(|idle| {
-            let value = value_at(&own, idle.key).map(|value| value.to_string()).unwrap_or_default();
-            Problem { key: idle.key.into(), value, allowed: format!("{}: take the line out", idle.purpose) }
-        })
-        .collect()
+    idle.retain(|(key, _)| value_at(&own, key) != value_at(&usual, key));
+    let problem = |(key, purpose): (&str, String)| {
+        let value = value_at(&own, key).map(|value| value.to_string()).unwrap_or_default();
+        Problem { key: key.into(), value, allowed: format!("{purpose}: take the line out") }
+    };
+    idle.into_iter().map(problem).collect()
 }
 
 /// The text of a scene without the keys that it has no use for.
@@ -141,7 +133,7 @@ fn without_idle(scene: &Scene, toml: &str) -> String {
             section = name.trim_end_matches(']').to_owned();
         }
         let key = line.split_once(" = ").map(|(key, _)| crate::keys::join(&section, key));
-        if !key.is_some_and(|key| idle.iter().any(|idle| idle.key == key)) {
+        if !key.is_some_and(|key| idle.iter().any(|(idle, _)| *idle == key)) {
             out += line;
             out.push('\n');
         }

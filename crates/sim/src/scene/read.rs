@@ -66,7 +66,6 @@ impl SceneFile {
     ///
     /// # Errors
     /// Keys that do not exist, values of the wrong kind.
-    #[cfg(feature = "sweep")]
     pub(crate) fn whole_table(text: &str, path: &Path) -> Result<toml::Table, SceneError> {
         Ok(toml::Table::try_from(Self::without_limits(text, path)?).unwrap_or_default())
     }
@@ -75,7 +74,6 @@ impl SceneFile {
     ///
     /// # Errors
     /// Keys that do not exist, values of the wrong kind.
-    #[cfg(any(test, feature = "sweep"))]
     pub(crate) fn without_limits(text: &str, path: &Path) -> Result<Scene, SceneError> {
         let document = Document::parse(text, path)?;
         document.read(document.vet(&scene_format())?)

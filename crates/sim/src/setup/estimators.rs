@@ -9,8 +9,14 @@ use crate::setup::instrument::Instrument;
 use crate::setup::table::{of_table, spaced};
 use ndarray::Array2;
 use num_complex::Complex;
-use wakescope_estimate as estimate;
-use wakescope_estimate::{Estimator, SignalKind, Statistic, window::Sample};
+use wakescope_estimate::bound::{GradientModel, Noise, RecordModel, WindowModel};
+use wakescope_estimate::estimators::{
+    AutoregressivePeak, AutoregressivePole, CaponPeak, FirstMoment, LagWindowPeak, NoiseTest, PulsePair, Unbiased,
+    likelihood_tapers, model_lag_weights,
+};
+use wakescope_estimate::spectrum::{ShortCorrelogram, Taper};
+use wakescope_estimate::{self as estimate, Correlogram, Estimator, Scratch, SignalKind, SpectralPeak, Statistic};
+use wakescope_estimate::{map::WindowCovariance, window::Sample};
 use wakescope_signal::Pulse;
 
 /// The sampling of the records, in the words of the estimators.
@@ -89,48 +95,59 @@ fn pulse_correlation(scene: &Scene, pulse: &Pulse) -> Vec<f64> {
 /// Density of noise outside its band over that inside, which keeps covariances regular.
 const NOISE_FLOOR: f64 = 1e-6;
 
-/// Second-order model of a window of the scene in a uniform wind and a noise, for the likelihood.
-///
-/// `None` without noise.
+/// Correlogram of the windows of a scene; those of the likelihood have tapers that are planned for a signal-to-noise ratio.
 ///
 /// # Errors
-/// What the estimators refuse; a checked scene gives none.
-pub fn window_model(
-    scene: &Scene,
-    noise: NoiseModel,
-    pulse: &Pulse,
-) -> Result<Option<estimate::bound::WindowModel>, Error> {
-    let noise = match noise {
-        NoiseModel::White => estimate::bound::Noise::White,
-        NoiseModel::BandLimited => estimate::bound::Noise::Band { floor: NOISE_FLOOR },
-        NoiseModel::None => return Ok(None),
-    };
-    let correlation = pulse_correlation(scene, pulse);
+/// What the estimators refuse, such as a covariance that cannot be diagonalised.
+fn correlogram<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Correlogram<S>, Error> {
     let n = scene.estimator.window_samples;
-    let at = |m: usize| correlation.get(m).copied().unwrap_or(0.0);
-    let envelope = Array2::from_shape_fn((n, n), |(a, b)| at(a.abs_diff(b)));
-    Ok(Some(estimate::bound::WindowModel::with_envelope(&sampling(scene)?, envelope, noise)?))
+    if !matches!(scene.estimator.method, Method::Likelihood(_)) {
+        return Ok(Correlogram::new(weighting(scene), n)?);
+    }
+    let correlation = pulse_correlation(scene, pulse);
+    let envelope = Array2::from_shape_fn((n, n), |(a, b)| correlation.get(a.abs_diff(b)).copied().unwrap_or(0.0));
+    // The tapers are those of white noise and need no inverse, whatever the noise.
+    let model = WindowModel::with_envelope(&sampling(scene)?, envelope, Noise::White)?;
+    Ok(Correlogram::with_tapers(likelihood_tapers(&model, snr)?)?)
+}
+
+/// Signal-to-noise ratio for which a likelihood is planned: as the scene states it, else as it is.
+fn planned_snr(scene: &Scene, snr: f64) -> f64 {
+    scene.estimator.method.likelihood_snr_db().map_or(snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8)
+}
+
+/// Lags of a line at a velocity, whose sizes are given, as numbers of signals of a kind.
+fn lags_at<'a>(
+    sampling: &estimate::Sampling,
+    kind: SignalKind,
+    velocity_m_s: f64,
+    sizes: impl Iterator<Item = f64> + 'a,
+) -> impl Iterator<Item = f64> + 'a {
+    let turn = std::f64::consts::TAU * sampling.frequency_hz(velocity_m_s) * sampling.period_s();
+    let lag = move |(m, size): (usize, f64)| Complex::from_polar(size, turn * m as f64);
+    let numbers = kind.lag_numbers(1);
+    sizes.enumerate().map(lag).flat_map(move |lag| [lag.re, lag.im].into_iter().take(numbers))
 }
 
 /// Second-order model of the record of a pulse of the scene in a uniform wind, for the bound; white noise stands for none.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn record_model(scene: &Scene, pulse: &Pulse) -> Result<estimate::bound::RecordModel, Error> {
+pub fn record_model(scene: &Scene, pulse: &Pulse) -> Result<RecordModel, Error> {
     let noise = match scene.detector.noise {
-        NoiseModel::BandLimited => estimate::bound::Noise::Band { floor: NOISE_FLOOR },
-        NoiseModel::White | NoiseModel::None => estimate::bound::Noise::White,
+        NoiseModel::BandLimited => Noise::Band { floor: NOISE_FLOOR },
+        NoiseModel::White | NoiseModel::None => Noise::White,
     };
     let is_gaussian = matches!(scene.pulse.shape, PulseShape::Gaussian(_));
     let correlation = pulse_correlation(scene, pulse);
-    Ok(estimate::bound::RecordModel::new(&sampling(scene)?, signal_kind(scene), noise, correlation, is_gaussian)?)
+    Ok(RecordModel::new(&sampling(scene)?, signal_kind(scene), noise, correlation, is_gaussian)?)
 }
 
 /// Covariance between windows of one pulse: of speckle of unit power, and of noise whose power in the detector band is one.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn window_covariance(scene: &Scene, pulse: &Pulse) -> Result<estimate::map::WindowCovariance, Error> {
+pub fn window_covariance(scene: &Scene, pulse: &Pulse) -> Result<WindowCovariance, Error> {
     let (e, d) = (&scene.estimator, &scene.detector);
     let window = weighting(scene).weights(e.window_samples)?;
     let correlation = pulse_correlation(scene, pulse);
@@ -147,7 +164,7 @@ pub fn window_covariance(scene: &Scene, pulse: &Pulse) -> Result<estimate::map::
         }
     };
     let samples = scene.samples_per_record();
-    Ok(estimate::map::WindowCovariance::new(&window, e.window_step_samples, samples, signal, noise)?)
+    Ok(WindowCovariance::new(&window, e.window_step_samples, samples, signal, noise)?)
 }
 
 /// What is known of the windows before any is seen, for estimators that are planned for it.
@@ -168,7 +185,7 @@ pub struct Toolkit<S> {
     /// The same for the complex mean of lines that were shifted, if the scene follows the wind.
     pub following: Option<Box<dyn Estimator>>,
     /// The test against noise, if the scene has noise and the method one.
-    pub test: Option<estimate::estimators::NoiseTest>,
+    pub test: Option<NoiseTest>,
     /// What the estimator finds in the mean statistic of the scene's noise.
     pub noise: Option<NoiseSeen>,
     /// Weights that the windows give the lags; empty where the statistic is no correlogram.
@@ -199,16 +216,14 @@ impl NoiseSeen {
             return Ok(None);
         };
         let n = scene.estimator.window_samples;
-        let found = |lags: Vec<f64>| Ok::<_, Error>(estimator.estimate(&seen(lags)?, &mut estimate::Scratch::new()));
+        let found = |lags: Vec<f64>| Ok::<_, Error>(estimator.estimate(&seen(lags)?, &mut Scratch::new()));
         let of_noise = found(noise.expected_correlogram(&sampling, kind, 1.0, &vec![1.0; n])?)?;
         let pulse = pulse_correlation(scene, &instrument.pulse);
         let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
         let cells = n as f64 * scene.detector.bandwidth_hz / scene.detector.sampling_hz;
         let velocity_m_s = spaced(low_m_s, high_m_s, (8.0 * cells).ceil().clamp(65.0, 257.0) as usize);
         let gain = |velocity_m_s: &f64| {
-            let turn = std::f64::consts::TAU * sampling.frequency_hz(*velocity_m_s) * sampling.period_s();
-            let lag = |m: usize| Complex::from_polar(pulse.get(m).copied().unwrap_or(0.0), turn * m as f64);
-            let lags = (0..n).map(lag).flat_map(|lag| [lag.re, lag.im].into_iter().take(kind.lag_numbers(1)));
+            let lags = lags_at(&sampling, kind, *velocity_m_s, pulse.iter().copied().take(n));
             Ok(of_noise.power / found(lags.collect())?.power)
         };
         let gain = velocity_m_s.iter().map(gain).collect::<Result<Vec<f64>, Error>>()?;
@@ -231,32 +246,18 @@ impl<S: Sample> Toolkit<S> {
     /// What the estimators refuse, such as a covariance that cannot be diagonalised.
     pub fn new(scene: &Scene, instrument: &Instrument, known: &WindowStatistics) -> Result<Self, Error> {
         let e = &scene.estimator;
-        let snr = e.method.likelihood_snr_db().map_or(known.snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8);
-        match e.method {
-            Method::GradientLikelihood(own) => gradient_likelihood(scene, instrument, &own, snr),
-            Method::Likelihood(_) => {
-                // The tapers are those of white noise and need no inverse, whatever the noise.
-                let model = window_model(scene, NoiseModel::White, &instrument.pulse)?
-                    .ok_or(estimate::Error::Empty { field: "noise" })?;
-                let tapers = estimate::estimators::likelihood_tapers(&model, snr)?;
-                let statistic = estimate::Correlogram::<S>::with_tapers(tapers.clone())?;
-                let weights = statistic.lag_weights();
-                Self::planned(scene, instrument, Box::new(statistic), &weights, &tapers, known)
-            }
-            Method::Autoregressive(model) | Method::AutoregressivePole(model) | Method::Capon(model)
-                if e.weighting == Weighting::Rectangular =>
-            {
-                let statistic = estimate::spectrum::ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
-                let weights = statistic.lag_weights();
-                let taper = estimate::spectrum::Taper::unit(vec![1.0; e.window_samples])?;
-                Self::planned(scene, instrument, Box::new(statistic), &weights, &[taper], known)
-            }
-            _ => {
-                let statistic = estimate::Correlogram::<S>::new(weighting(scene), e.window_samples)?;
-                let (weights, tapers) = (statistic.lag_weights(), statistic.tapers().to_vec());
-                Self::planned(scene, instrument, Box::new(statistic), &weights, &tapers, known)
-            }
+        if let Method::GradientLikelihood(own) = e.method {
+            return gradient_likelihood(scene, instrument, &own, planned_snr(scene, known.snr));
         }
+        if let Some(model) = e.method.order().filter(|_| e.weighting == Weighting::Rectangular) {
+            let statistic = ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
+            let weights = statistic.lag_weights();
+            let taper = Taper::unit(vec![1.0; e.window_samples])?;
+            return Self::planned(scene, instrument, Box::new(statistic), &weights, &[taper], known);
+        }
+        let statistic = correlogram::<S>(scene, &instrument.pulse, planned_snr(scene, known.snr))?;
+        let (weights, tapers) = (statistic.lag_weights(), statistic.tapers().to_vec());
+        Self::planned(scene, instrument, Box::new(statistic), &weights, &tapers, known)
     }
 
     fn planned(
@@ -264,7 +265,7 @@ impl<S: Sample> Toolkit<S> {
         instrument: &Instrument,
         statistic: Box<dyn Statistic<S>>,
         lag_weights: &[f64],
-        tapers: &[estimate::spectrum::Taper],
+        tapers: &[Taper],
         known: &WindowStatistics,
     ) -> Result<Self, Error> {
         let estimator = of_correlogram(scene, S::KIND, lag_weights, known)?;
@@ -317,20 +318,15 @@ impl ExpectedBias {
         };
         let noise = noise.expected_correlogram(&sampling, kind, 1.0, &lag_weights)?;
         let correlation = pulse_correlation(scene, &instrument.pulse);
-        let signal =
-            lag_weights.iter().enumerate().map(|(m, weight)| weight * correlation.get(m).unwrap_or(&0.0)).collect();
+        let signal = lag_weights.iter().zip(correlation).map(|(weight, lag)| weight * lag).collect();
         Ok(Some(Self { estimator, sampling, kind, signal, noise }))
     }
 
     /// The velocity that it finds less the true one, m/s, at a signal-to-noise ratio.
     pub(crate) fn m_s(&self, velocity_m_s: f64, snr: f64) -> f64 {
-        let step = std::f64::consts::TAU * self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
-        let lags = self.signal.iter().enumerate().flat_map(|(m, power)| {
-            let lag = Complex::from_polar(snr * power, step * m as f64);
-            [lag.re, lag.im].into_iter().take(self.kind.lag_numbers(1))
-        });
+        let lags = lags_at(&self.sampling, self.kind, velocity_m_s, self.signal.iter().map(|power| snr * power));
         let mean: Vec<f64> = lags.zip(&self.noise).map(|(signal, noise)| signal + noise).collect();
-        self.estimator.estimate(&mean, &mut estimate::Scratch::new()).velocity_m_s - velocity_m_s
+        self.estimator.estimate(&mean, &mut Scratch::new()).velocity_m_s - velocity_m_s
     }
 }
 
@@ -340,16 +336,14 @@ impl ExpectedBias {
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error> {
     let (e, sampling, kind) = (&scene.estimator, sampling(scene)?, signal_kind(scene));
-    let weights = estimate::Correlogram::<f64>::new(weighting(scene), e.window_samples)?.lag_weights();
-    let peak = estimate::SpectralPeak::new(&sampling, kind, weights.len(), e.padded_samples, e.refinement)?;
+    let weights = Correlogram::<f64>::new(weighting(scene), e.window_samples)?.lag_weights();
+    let peak = SpectralPeak::new(&sampling, kind, weights.len(), e.padded_samples, e.refinement)?;
     let step_m_s = 0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / e.padded_samples as f64;
     let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
     let off_m_s = |part: i32| {
         let velocity_m_s = 0.5 * (low_m_s + high_m_s) + step_m_s * f64::from(part) / 64.0;
-        let turn = std::f64::consts::TAU * sampling.frequency_hz(velocity_m_s) * sampling.period_s();
-        let lag = |(m, weight): (usize, &f64)| Complex::from_polar(*weight, turn * m as f64);
-        let lags = weights.iter().enumerate().map(lag).flat_map(|z| [z.re, z.im].into_iter().take(kind.lag_numbers(1)));
-        let found = peak.estimate(&lags.collect::<Vec<f64>>(), &mut estimate::Scratch::new());
+        let lags: Vec<f64> = lags_at(&sampling, kind, velocity_m_s, weights.iter().copied()).collect();
+        let found = peak.estimate(&lags, &mut Scratch::new());
         (found.velocity_m_s - velocity_m_s).abs()
     };
     Ok((step_m_s, (-32..32).map(off_m_s).fold(0.0, f64::max)))
@@ -357,7 +351,7 @@ pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error>
 
 /// Correlogram of all lags and the scene's estimator of it, for what a mean of very many pulses would show.
 pub(crate) struct Response {
-    pub(crate) correlogram: estimate::Correlogram<f64>,
+    pub(crate) correlogram: Correlogram<f64>,
     pub(crate) estimator: Box<dyn Estimator>,
 }
 
@@ -371,39 +365,29 @@ pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<
     if signal_kind(scene) == SignalKind::Complex || e.follow_wind || matches!(e.method, Method::GradientLikelihood(_)) {
         return Ok(None);
     }
-    let correlogram = match (e.method, window_model(scene, NoiseModel::White, pulse)?) {
-        (Method::Likelihood(own), Some(model)) => {
-            let snr = own.likelihood_snr_db.map_or(snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8);
-            estimate::Correlogram::with_tapers(estimate::estimators::likelihood_tapers(&model, snr)?)?
-        }
-        _ => estimate::Correlogram::new(weighting(scene), e.window_samples)?,
-    };
+    let correlogram = correlogram(scene, pulse, planned_snr(scene, snr))?;
     let known = WindowStatistics { snr, n_eff: 1.0 };
     let estimator = of_correlogram(scene, SignalKind::Real, &correlogram.lag_weights(), &known)?;
     Ok(Some(Response { correlogram, estimator }))
 }
 
 /// Spectrum of a scene's noise.
-fn noise_kind(scene: &Scene) -> Option<estimate::bound::Noise> {
+fn noise_kind(scene: &Scene) -> Option<Noise> {
     match scene.detector.noise {
-        NoiseModel::White => Some(estimate::bound::Noise::White),
-        NoiseModel::BandLimited => Some(estimate::bound::Noise::Band { floor: 0.0 }),
+        NoiseModel::White => Some(Noise::White),
+        NoiseModel::BandLimited => Some(Noise::Band { floor: 0.0 }),
         NoiseModel::None => None,
     }
 }
 
 /// The test against noise of an estimator of correlograms; none without noise, and none of the spectrum of an unbiased
 /// correlogram with all its lags, which need not be positive.
-fn noise_test(
-    scene: &Scene,
-    tapers: &[estimate::spectrum::Taper],
-    lag_weights: &[f64],
-) -> Result<Option<estimate::estimators::NoiseTest>, Error> {
+fn noise_test(scene: &Scene, tapers: &[Taper], lag_weights: &[f64]) -> Result<Option<NoiseTest>, Error> {
     let e = &scene.estimator;
     let Some(noise) = noise_kind(scene) else { return Ok(None) };
     let window = match e.method {
-        Method::LagWindow(window) => Some(estimate::estimators::model_lag_weights(window.lag_window_lags - 1)),
-        method => method.order().map(|model| estimate::estimators::model_lag_weights(model.order)),
+        Method::LagWindow(window) => Some(model_lag_weights(window.lag_window_lags - 1)),
+        method => method.order().map(|model| model_lag_weights(model.order)),
     };
     let unbiased = e.correlogram == CorrelogramForm::Unbiased;
     if unbiased && window.is_none() {
@@ -413,7 +397,7 @@ fn noise_test(
     let window = window.map(|at| at.iter().zip(lag_weights).map(seen).collect::<Vec<f64>>());
     let padded = if e.method == (Method::PulsePair {}) { 4 * lag_weights.len() } else { e.padded_samples };
     let (sampling, gates) = (sampling(scene)?, gates(scene)?);
-    Ok(Some(estimate::estimators::NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded, noise)?))
+    Ok(Some(NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded, noise)?))
 }
 
 /// The estimator of a mean correlogram whose lags carry `lag_weights`.
@@ -434,40 +418,31 @@ fn of_correlogram(
         | Method::PeriodogramAccumulation {}
         | Method::Likelihood(_)
         | Method::GradientLikelihood(_) => {
-            let peak = estimate::SpectralPeak::new(&sampling, kind, lags, padded, refine)?;
+            let peak = SpectralPeak::new(&sampling, kind, lags, padded, refine)?;
             finish(e, kind, lag_weights, peak.with_lag_weights(seen)?)
         }
         Method::Autoregressive(model) => {
-            let peak =
-                estimate::estimators::AutoregressivePeak::new(&sampling, kind, lags, model.order, padded, refine)?;
+            let peak = AutoregressivePeak::new(&sampling, kind, lags, model.order, padded, refine)?;
             finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
         }
         Method::AutoregressivePole(model) => {
-            let pole =
-                estimate::estimators::AutoregressivePole::new(&sampling, kind, lags, model.order, padded, refine)?;
+            let pole = AutoregressivePole::new(&sampling, kind, lags, model.order, padded, refine)?;
             finish(e, kind, lag_weights, pole.choosing(order_choice(e, &model, known)))
         }
         Method::Capon(model) => {
-            let peak = estimate::estimators::CaponPeak::new(&sampling, kind, lags, model.order, padded, refine)?;
+            let peak = CaponPeak::new(&sampling, kind, lags, model.order, padded, refine)?;
             finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
         }
         Method::LagWindow(window) => {
-            let peak = estimate::estimators::LagWindowPeak::new(
-                &sampling,
-                kind,
-                lags,
-                window.lag_window_lags,
-                padded,
-                refine,
-            )?;
+            let peak = LagWindowPeak::new(&sampling, kind, lags, window.lag_window_lags, padded, refine)?;
             finish(e, kind, lag_weights, peak.with_lag_weights(seen)?)
         }
         Method::PulsePair {} => {
-            let pair = estimate::estimators::PulsePair::new(&sampling, kind, lags)?;
+            let pair = PulsePair::new(&sampling, kind, lags)?;
             finish(e, kind, lag_weights, pair.with_lag_weights(seen)?)
         }
         Method::FirstMoment(own) => {
-            let moment = estimate::estimators::FirstMoment::new(&sampling, kind, lags, padded, own.moment_reach)?;
+            let moment = FirstMoment::new(&sampling, kind, lags, padded, own.moment_reach)?;
             finish(e, kind, lag_weights, moment.with_lag_weights(seen)?)
         }
     }
@@ -482,7 +457,7 @@ fn finish<E: Estimator + 'static>(
 ) -> Result<Box<dyn Estimator>, Error> {
     Ok(match words.correlogram {
         CorrelogramForm::Biased => Box::new(estimator),
-        CorrelogramForm::Unbiased => Box::new(estimate::estimators::Unbiased::new(estimator, kind, lag_weights)?),
+        CorrelogramForm::Unbiased => Box::new(Unbiased::new(estimator, kind, lag_weights)?),
     })
 }
 
@@ -502,9 +477,9 @@ fn gradient_likelihood<S: Sample>(
     snr: f64,
 ) -> Result<Toolkit<S>, Error> {
     let e = &scene.estimator;
-    let noise = noise_kind(scene).unwrap_or(estimate::bound::Noise::Band { floor: 0.0 });
+    let noise = noise_kind(scene).unwrap_or(Noise::Band { floor: 0.0 });
     let sampling = sampling(scene)?;
-    let model = estimate::bound::GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
+    let model = GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
     let half = (own.gradients / 2) as f64;
     let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
     let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();

@@ -25,6 +25,8 @@ pub enum Stage {
     Retrieval,
     /// Tables and pictures.
     Files,
+    /// Cases of a sweep.
+    Cases,
 }
 
 impl Stage {
@@ -42,19 +44,24 @@ impl Stage {
             Stage::Errors => "errors",
             Stage::Retrieval => "retrieval",
             Stage::Files => "files",
+            Stage::Cases => "cases",
         }
     }
 }
 
-/// Told of the progress of a run, from any thread.
+/// Told of the progress of a run, from any thread. A stage may be part of another one.
 pub trait Observer: Sync {
+    /// What will be done, before it begins.
+    fn forecast(&self, _text: &str) {}
     /// A stage begins, with so many steps.
-    fn begin(&self, stage: Stage, steps: u64);
+    fn begin(&self, _stage: Stage, _steps: u64) {}
     /// So many steps of the current stage are done.
-    fn advance(&self, steps: u64);
+    fn advance(&self, _steps: u64) {}
+    /// How far the current stage is, in words.
+    fn reach(&self, _text: &str) {}
     /// The current stage is done.
-    fn end(&self);
-    /// Something that makes a result doubtful; to be shown even where progress is not.
+    fn end(&self) {}
+    /// Something that deserves attention; to be shown even where progress is not.
     fn warn(&self, _text: &str) {}
 }
 
@@ -62,8 +69,4 @@ pub trait Observer: Sync {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 
-impl Observer for Silent {
-    fn begin(&self, _: Stage, _: u64) {}
-    fn advance(&self, _: u64) {}
-    fn end(&self) {}
-}
+impl Observer for Silent {}

@@ -25,7 +25,7 @@ pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
     };
     let scan = match &s.pattern {
         Pattern::List { file: list } => {
-            let of_key = |e: Error| Error::OfKey { key: "scan.pattern.file", source: Box::new(e) };
+            let of_key = Error::of_key("scan.pattern.file");
             let path = file.folder.join(list);
             let stops = scan_list::read(&path).map_err(of_key)?;
             Schedule::of_stops(&stops, &pace, mount(scene)).map_err(|(i, reason)| {

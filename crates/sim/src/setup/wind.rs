@@ -60,7 +60,10 @@ impl SceneWind {
     /// Both winds, each from its own start.
     fn plus(self, other: Self) -> Self {
         let by_s = other.start_s - self.start_s;
-        let later: Box<dyn Wind> = if by_s == 0.0 { other.wind } else { Box::new(Later { wind: other.wind, by_s }) };
+        let later: Box<dyn Wind> = match by_s {
+            0.0 => other.wind,
+            _ => Box::new(Retimed { wind: other.wind, time_s: move |time_s| time_s + by_s }),
+        };
         let mut field_times_s = self.field_times_s;
         field_times_s.extend(other.field_times_s.iter().map(|t| t - by_s));
         field_times_s.sort_by(f64::total_cmp);
@@ -76,20 +79,32 @@ impl SceneWind {
     }
 
     fn analytic(flow: &Flow) -> Result<Self, Error> {
-        let tau = match flow {
-            Flow::VortexPair(pair) => pair.age_tau,
-            _ => 0.0,
-        };
-        Ok(Self {
-            wind: analytic_wind(flow)?,
-            start_s: start_s(flow),
-            tau,
+        let tau = if let Flow::VortexPair(pair) = flow { pair.age_tau } else { 0.0 };
+        Ok(Self { start_s: start_s(flow), tau, ..Self::of(analytic_wind(flow)?, "the flow is analytic".into()) })
+    }
+
+    /// A wind without an end.
+    fn of(wind: Box<dyn Wind>, source: String) -> Self {
+        Self {
+            wind,
+            start_s: 0.0,
+            tau: 0.0,
             end_s: f64::INFINITY,
             max_speed_m_s: 0.0,
-            source: "the flow is analytic".into(),
+            source,
             field_times_s: Vec::new(),
             carries_backscatter: false,
-        })
+        }
+    }
+
+    /// A flow of files that starts at one time and whose last one is known, s.
+    fn of_files(wind: Box<dyn Wind>, motion: SimulatedMotion, [start_s, last_s]: [f64; 2], source: String) -> Self {
+        match motion {
+            SimulatedMotion::Moving => Self { start_s, end_s: last_s, ..Self::of(wind, source) },
+            SimulatedMotion::Frozen => {
+                Self { start_s, ..Self::of(Box::new(Retimed { wind, time_s: move |_| start_s }), source) }
+            }
+        }
     }
 
     /// Largest gradient of the radial velocity at times from the start of the scan, s; what lies beyond the end of the flow
@@ -129,23 +144,23 @@ impl SceneWind {
     }
 }
 
-/// A wind that is asked for at later times.
-struct Later {
+/// A wind that is asked for at other times.
+struct Retimed<T> {
     wind: Box<dyn Wind>,
-    by_s: f64,
+    time_s: T,
 }
 
-impl Wind for Later {
+impl<T: Fn(f64) -> f64 + Send + Sync> Wind for Retimed<T> {
     fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), les::Error> {
-        self.wind.velocity_into(points_m, time_s + self.by_s, out_m_s)
+        self.wind.velocity_into(points_m, (self.time_s)(time_s), out_m_s)
     }
 
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
-        self.wind.max_gradient_per_s(time_s + self.by_s)
+        self.wind.max_gradient_per_s((self.time_s)(time_s))
     }
 
     fn scalar_into(&self, points_m: &[[f64; 3]], time_s: f64, out: &mut [f64]) -> Result<(), les::Error> {
-        self.wind.scalar_into(points_m, time_s + self.by_s, out)
+        self.wind.scalar_into(points_m, (self.time_s)(time_s), out)
     }
 }
 
@@ -237,36 +252,14 @@ fn start_s(flow: &Flow) -> f64 {
     }
 }
 
-#[cfg(not(feature = "netcdf"))]
-fn simulated(_: &crate::scene::SimulatedFlow, _: &SceneFile) -> Result<SceneWind, Error> {
-    Err(Error::Input { path: "flow.planes".into(), reason: "this build lacks the feature `netcdf`".into() })
-}
-
-#[cfg(not(feature = "netcdf"))]
-fn fields(_: &crate::scene::FieldFlow, _: &SceneFile) -> Result<SceneWind, Error> {
-    Err(Error::Input { path: "flow.files".into(), reason: "this build lacks the feature `netcdf`".into() })
-}
-
-#[cfg(feature = "netcdf")]
 mod fields;
-#[cfg(feature = "netcdf")]
-use planes::simulated;
+use {crate::scene::SimulatedMotion, fields::fields, planes::simulated};
 
-#[cfg(feature = "netcdf")]
-fn fields(flow: &crate::scene::FieldFlow, file: &SceneFile) -> Result<SceneWind, Error> {
-    let fields::FieldWind { wind, start_s, end_s, max_speed_m_s, source, times_s: field_times_s } =
-        fields::fields(flow, file)?;
-    let carries_backscatter = flow.backscatter.is_some();
-    Ok(SceneWind { wind, start_s, tau: 0.0, end_s, max_speed_m_s, source, field_times_s, carries_backscatter })
-}
-
-#[cfg(feature = "netcdf")]
 mod planes {
     use crate::io::CrossPlanes;
     use crate::io::planes_input::{files, read};
-    use crate::scene::{SimulatedFlow, SimulatedMotion};
-    use crate::setup::wind::fields::Frozen;
-    use crate::setup::wind::{SceneWind, Wind};
+    use crate::scene::SimulatedFlow;
+    use crate::setup::wind::SceneWind;
     use crate::{Error, scene::SceneFile};
     use wakescope_les::winds::{Edges, GridSeries, OutsidePolicy, PlaneMesh, Side};
     use wakescope_les::{Error as LesError, GridSnapshot};
@@ -320,7 +313,7 @@ mod planes {
             shift_y_m: flow.lateral_position_m,
         };
         let path = file.folder.join(&flow.planes);
-        let of_key = |e: Error| Error::OfKey { key: "flow.planes", source: Box::new(e) };
+        let of_key = Error::of_key("flow.planes");
         let refuse = |reason: String| Error::Input { path: path.clone(), reason };
         let (mut times, mut snapshots) = (Vec::new(), Vec::new());
         for path in files(&path).map_err(of_key)? {
@@ -336,20 +329,7 @@ mod planes {
         let (start_s, tau) = start(flow, &times).map_err(&refuse)?;
         let (first_s, last_s) = (times[0].1, times[count - 1].1);
         let source = format!("{count} planes of {first_s:.4} to {last_s:.4} s from {}", path.display());
-        let (wind, end_s): (Box<dyn Wind>, f64) = match flow.motion {
-            SimulatedMotion::Moving => (Box::new(series), last_s),
-            SimulatedMotion::Frozen => (Box::new(Frozen { wind: series, time_s: start_s }), f64::INFINITY),
-        };
-        Ok(SceneWind {
-            wind,
-            start_s,
-            tau,
-            end_s,
-            max_speed_m_s: 0.0,
-            source,
-            field_times_s: Vec::new(),
-            carries_backscatter: false,
-        })
+        Ok(SceneWind { tau, ..SceneWind::of_files(Box::new(series), flow.motion, [start_s, last_s], source) })
     }
 
     /// Time \[s\] and age of the flow when the scan begins; `times` are (tau, s) of the planes.

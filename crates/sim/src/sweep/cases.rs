@@ -4,7 +4,7 @@
 //! stored cases, to the last bit.
 
 use super::expression::{Condition, Expression};
-use super::key_path::{SceneKey, resolve};
+use super::key_path::{Holds, SceneKey, VaryingKey, resolve};
 use crate::Error;
 use crate::io::csv_input::TextTable;
 use crate::io::{Provenance, csv::float_text, text_file};
@@ -18,31 +18,49 @@ use toml::{Table, Value};
 /// Most cases of a sweep, before and after conditions.
 pub const MOST_CASES: usize = 10_000;
 
-/// What is to be swept, as the command line has it.
+/// What is to be swept.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct Request {
-    /// `KEY=a,b,c`, `KEY=lin:a:b:n` or `KEY=log:a:b:n`, the last one fastest.
+    /// A key and its values: KEY=a,b,c or KEY=lin:FIRST:LAST:COUNT or KEY=log:FIRST:LAST:COUNT; the last --vary is fastest.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "KEY=VALUES"))]
     pub vary: Vec<String>,
-    /// A table with a column for each key and a row for each case.
+    /// A table of cases: a column for each key, a row for each case.
+    #[cfg_attr(feature = "cli", arg(long = "cases", value_name = "FILE.csv"))]
     pub list: Option<PathBuf>,
-    /// `KEY = expression` of keys, in this order after all others.
+    /// A key by arithmetic on others, e.g. "pulse.energy_j = 0.06/laser.pulse_repetition_hz".
+    #[cfg_attr(feature = "cli", arg(long = "let", value_name = "KEY = EXPRESSION"))]
     pub lets: Vec<String>,
-    /// Comparisons of expressions; a case for which one does not hold is left out.
+    /// Leave out the cases for which this does not hold, e.g. "pulse.energy_j*laser.pulse_repetition_hz <= 2".
+    #[cfg_attr(feature = "cli", arg(long = "where", value_name = "CONDITION"))]
     pub conditions: Vec<String>,
-    /// Whether each case has a seed of its own, drawn from the scene's.
+    /// A seed for each case; without it all have the scene's, and differences between cases are the clearer.
+    #[cfg_attr(feature = "cli", arg(long))]
     pub independent: bool,
     /// Seed in place of the scene's.
+    #[cfg_attr(feature = "cli", arg(skip))]
     pub seed: Option<u64>,
 }
 
-/// A key that varies, as a column of the results.
+/// A key that varies.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Column {
+struct Column {
     /// As the user wrote it.
-    pub(super) name: String,
-    pub(super) key: SceneKey,
+    name: String,
+    key: SceneKey,
     /// Whether others determine it.
-    pub(super) tied: bool,
+    tied: bool,
+}
+
+impl Column {
+    /// The key that a word names; `value` is what it is to be.
+    fn named(word: &str, value: &str, tied: bool) -> Result<Self, Problem> {
+        Ok(Self { name: word.trim().into(), key: resolve(word.trim(), value.trim())?, tied })
+    }
+
+    fn described(&self) -> VaryingKey {
+        VaryingKey { name: self.name.clone(), holds: Holds::of(&self.key.kind), tied: self.tied }
+    }
 }
 
 /// One case.
@@ -59,7 +77,7 @@ pub struct Case {
 /// All cases of a sweep, each within the limits of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sweep {
-    pub(super) columns: Vec<Column>,
+    pub(super) keys: Vec<VaryingKey>,
     /// The cases in their order.
     pub cases: Vec<Case>,
     /// Scene, words and hash of the sweep.
@@ -81,41 +99,46 @@ impl Sweep {
     /// # Errors
     /// As [`Sweep::new`].
     pub fn parse(text: &str, path: &Path, request: &Request) -> Result<Self, Error> {
-        let base = match toml::from_str::<Table>(text) {
-            Ok(base) => base,
-            // The reader of scenes says it better.
-            Err(e) => {
-                let plain = SceneError::Malformed { path: path.to_owned(), line: 1, message: e.message().into() };
-                return Err(SceneFile::parse(text, path).err().unwrap_or(plain).into());
-            }
-        };
-        let grid = Grid::new(request)?;
-        let builder = Builder { path, base, grid, request };
-        match builder.cases() {
-            // What is wrong without the sweep is told with its line.
-            Err(error) => Err(SceneFile::parse(text, path).err().map_or(error, Error::from)),
-            Ok(cases) => {
-                let columns = builder.columns();
-                let origin = builder.origin(&columns, &cases);
-                Ok(Self { columns, cases, origin })
-            }
-        }
+        // The reader of scenes says better what is no TOML.
+        let of_scene = |other: Error| SceneFile::parse(text, path).err().map_or(other, Error::from);
+        let base = toml::from_str::<Table>(text).map_err(|e| {
+            of_scene(SceneError::Malformed { path: path.to_owned(), line: 1, message: e.message().into() }.into())
+        })?;
+        let grid = Grid::new(path, base, request)?;
+        // What is wrong without the sweep is told with its line.
+        let cases = grid.cases().map_err(of_scene)?;
+        let seed = request.independent.then(|| Column::named("seed", "", true)).and_then(Result::ok);
+        let keys: Vec<VaryingKey> = grid.columns().chain(&seed).map(Column::described).collect();
+        let origin = grid.origin(&keys, &cases);
+        Ok(Self { keys, cases, origin })
     }
 
     /// Names of the keys that vary, as they were written.
     pub fn keys(&self) -> impl Iterator<Item = &str> {
-        self.columns.iter().map(|column| column.name.as_str())
+        self.keys.iter().map(|key| key.name.as_str())
     }
 
     /// The keys of a case with their values, for messages.
     pub(super) fn described(&self, case: &Case) -> String {
-        described(&self.columns, &case.values)
+        described(self.keys(), &case.values)
+    }
+
+    /// What went wrong with a case, and with how many others.
+    pub(super) fn failed(&self, case: &Case, others: usize, error: Error) -> Error {
+        failed(case.index, self.described(case), others, error)
     }
 }
 
-fn described(columns: &[Column], values: &[String]) -> String {
-    let pairs = columns.iter().zip(values).map(|(column, value)| format!("{} = {value}", column.name));
-    pairs.collect::<Vec<_>>().join(", ")
+fn described<'a>(names: impl Iterator<Item = &'a str>, values: &[String]) -> String {
+    names.zip(values).map(|(name, value)| format!("{name} = {value}")).collect::<Vec<_>>().join(", ")
+}
+
+/// An error of a case; the lines of its text are no lines of a file.
+fn failed(case: usize, keys: String, others: usize, mut error: Error) -> Error {
+    if let Error::Scene(SceneError::Invalid { problems, .. }) = &mut error {
+        problems.iter_mut().for_each(|located| located.line = None);
+    }
+    Error::Case { case, keys, others, source: Box::new(error) }
 }
 
 /// A refusal of a word of the command line.
@@ -127,44 +150,45 @@ fn problem(key: &str, value: &str, allowed: impl Into<String>) -> Problem {
     Problem { key: key.into(), value: value.into(), allowed: allowed.into() }
 }
 
-/// Keys, and the values of each combination of them.
-struct Grid {
-    list: (Vec<Column>, Vec<Vec<Value>>),
-    axes: Vec<(Column, Vec<Value>)>,
+/// Keys that vary together, and their values.
+struct Axis {
+    columns: Vec<Column>,
+    rows: Vec<Vec<Value>>,
+}
+
+/// A scene, keys, and the values of each combination of them.
+struct Grid<'a> {
+    path: &'a Path,
+    base: Table,
+    request: &'a Request,
+    /// The slowest first.
+    axes: Vec<Axis>,
     lets: Vec<(Column, Expression)>,
     conditions: Vec<Condition>,
 }
 
-impl Grid {
-    fn new(request: &Request) -> Result<Self, Error> {
-        let axes = request.vary.iter().map(|word| axis(word).map_err(|p| refused("--vary", p)));
-        let grid = Self {
-            list: request.list.as_deref().map_or(Ok((Vec::new(), vec![Vec::new()])), list)?,
-            axes: axes.collect::<Result<_, _>>()?,
-            lets: request
-                .lets
-                .iter()
-                .map(|word| binding(word).map_err(|p| refused("--let", p)))
-                .collect::<Result<_, _>>()?,
-            conditions: request
-                .conditions
-                .iter()
-                .map(|word| Condition::parse(word).map_err(|why| refused("--where", problem("condition", word, why))))
-                .collect::<Result<_, _>>()?,
-        };
-        let columns: Vec<&Column> = grid.columns().collect();
-        for (i, column) in columns.iter().enumerate() {
-            if columns[..i].iter().any(|other| other.key.path == column.key.path) {
-                let why = "each key varies once, by --vary, --cases or --let";
-                return Err(refused("sweep", problem(&column.name, "", why)));
-            }
+impl<'a> Grid<'a> {
+    fn new(path: &'a Path, base: Table, request: &'a Request) -> Result<Self, Error> {
+        fn each<T>(word: &str, all: &[String], read: fn(&str) -> Result<T, Problem>) -> Result<Vec<T>, Error> {
+            all.iter().map(|text| read(text).map_err(|problem| refused(word, problem))).collect()
         }
-        let seeded = columns.iter().any(|column| column.key.path == "seed");
-        if request.independent && seeded {
+        let condition = |text: &str| Condition::parse(text).map_err(|why| problem("condition", text, why));
+        let mut axes: Vec<Axis> = request.list.as_deref().map(list).transpose()?.into_iter().collect();
+        axes.extend(each("--vary", &request.vary, axis)?);
+        let lets = each("--let", &request.lets, binding)?;
+        let conditions = each("--where", &request.conditions, condition)?;
+        let grid = Self { path, base, request, axes, lets, conditions };
+        let columns: Vec<&Column> = grid.columns().collect();
+        let again = |(i, column): &(usize, &&Column)| columns[..*i].iter().any(|c| c.key.path == column.key.path);
+        if let Some((_, column)) = columns.iter().enumerate().find(again) {
+            let why = "each key varies once, by --vary, --cases or --let";
+            return Err(refused("sweep", problem(&column.name, "", why)));
+        }
+        if request.independent && columns.iter().any(|column| column.key.path == "seed") {
             let why = "with --independent each case has a seed of its own: leave one of the two out";
             return Err(refused("sweep", problem("seed", "", why)));
         }
-        let count = grid.axes.iter().map(|(_, values)| values.len() as f64).product::<f64>() * grid.list.1.len() as f64;
+        let count = grid.axes.iter().map(|axis| axis.rows.len() as f64).product::<f64>();
         if count > MOST_CASES as f64 {
             let why = format!("a sweep has 1 to {MOST_CASES} cases: fewer values, or several sweeps");
             return Err(refused("sweep", problem("number of cases", &format!("{count:?}"), why)));
@@ -173,45 +197,123 @@ impl Grid {
     }
 
     fn columns(&self) -> impl Iterator<Item = &Column> {
-        let list = self.list.0.iter();
-        list.chain(self.axes.iter().map(|(column, _)| column)).chain(self.lets.iter().map(|(column, _)| column))
+        self.axes.iter().flat_map(|axis| &axis.columns).chain(self.lets.iter().map(|(column, _)| column))
     }
 
-    fn len(&self) -> usize {
-        self.list.1.len() * self.axes.iter().map(|(_, values)| values.len()).product::<usize>()
-    }
-
-    /// The values of combination `index`, the last axis fastest.
-    fn values(&self, index: usize) -> Vec<&Value> {
-        let mut rest = index;
-        let mut of_axes: Vec<&Value> = Vec::with_capacity(self.axes.len());
-        for (_, values) in self.axes.iter().rev() {
-            of_axes.extend(values.get(rest % values.len()));
-            rest /= values.len();
+    fn cases(&self) -> Result<Vec<Case>, Error> {
+        let (mut cases, mut refusals) = (Vec::new(), Vec::new());
+        let combinations = self.axes.iter().map(|axis| axis.rows.len()).product();
+        for combination in 0..combinations {
+            let (index, mut values) = (cases.len(), Vec::new());
+            match self.scene(combination, index, &mut values) {
+                Ok(scene) => cases.extend(scene.map(|scene| Case { index, scene, values })),
+                Err(error) => refusals.push((combination, values, error)),
+            }
         }
-        let row = self.list.1.get(rest).map(Vec::as_slice).unwrap_or_default();
-        row.iter().chain(of_axes.into_iter().rev()).collect()
+        let others = refusals.len().saturating_sub(1);
+        if let Some((combination, values, error)) = refusals.into_iter().next() {
+            let names = self.columns().map(|column| column.name.as_str());
+            return Err(failed(combination, described(names, &values), others, error));
+        }
+        if cases.is_empty() {
+            let all: Vec<String> = self.conditions.iter().map(ToString::to_string).collect();
+            let why = format!("none of the {combinations} cases is left");
+            return Err(refused("--where", problem("condition", &all.join(" and "), why)));
+        }
+        Ok(cases)
+    }
+
+    /// The values of a combination, the last axis fastest.
+    fn values(&self, combination: usize) -> impl Iterator<Item = &Value> {
+        let (mut rest, mut rows) = (combination, Vec::with_capacity(self.axes.len()));
+        for axis in self.axes.iter().rev() {
+            rows.push(&axis.rows[rest % axis.rows.len()]);
+            rest /= axis.rows.len();
+        }
+        rows.into_iter().rev().flatten()
+    }
+
+    /// The scene of a combination, whose values are told one after the other; none where a condition does not hold.
+    fn scene(&self, combination: usize, index: usize, values: &mut Vec<String>) -> Result<Option<SceneFile>, Error> {
+        let mut table = self.base.clone();
+        if let Some(seed) = self.request.seed {
+            table.insert("seed".into(), Value::Integer(i64::try_from(seed).unwrap_or(i64::MAX)));
+        }
+        let of_axes = self.axes.iter().flat_map(|axis| &axis.columns);
+        for (column, value) in of_axes.zip(self.values(combination)) {
+            values.push(shown(value));
+            set(&mut table, &column.key.path, value.clone());
+        }
+        for (column, expression) in &self.lets {
+            let refused = |why: String| refused("--let", problem(&column.name, &expression.to_string(), why));
+            let whole = self.whole(&table)?;
+            let number = expression.value(&|name| value_of(&whole, name)).map_err(refused)?;
+            let value = column.key.of_number(number).map_err(|problem| refused(problem.allowed))?;
+            values.push(shown(&value));
+            set(&mut table, &column.key.path, value);
+        }
+        if !self.conditions.is_empty() {
+            let whole = self.whole(&table)?;
+            for condition in &self.conditions {
+                let refused = |why| refused("--where", problem("condition", &condition.to_string(), why));
+                if !condition.holds(&|name| value_of(&whole, name)).map_err(refused)? {
+                    return Ok(None);
+                }
+            }
+        }
+        if self.request.independent {
+            let seed = seed_of(&table).unwrap_or(Scene::default().seed);
+            // TOML has signed whole numbers.
+            let own = stream(seed, "sweep", index as u64).next_u64() >> 1;
+            table.insert("seed".into(), Value::Integer(own as i64));
+            values.push(own.to_string());
+        }
+        Ok(Some(SceneFile::parse(&text_of(&table), self.path)?))
+    }
+
+    /// A table with all defaults.
+    fn whole(&self, table: &Table) -> Result<Table, Error> {
+        Ok(SceneFile::whole_table(&text_of(table), self.path)?)
+    }
+
+    fn origin(&self, keys: &[VaryingKey], cases: &[Case]) -> Provenance {
+        let Request { vary, list, lets, conditions, independent, seed } = self.request;
+        let mut words: Vec<String> = vary.iter().map(|word| format!("--vary {word}")).collect();
+        words.extend(list.as_ref().map(|_| "--cases FILE".to_owned()));
+        words.extend(lets.iter().map(|word| format!("--let \"{word}\"")));
+        words.extend(conditions.iter().map(|word| format!("--where \"{word}\"")));
+        words.extend(independent.then(|| "--independent".to_owned()));
+        let names = keys.iter().map(|key| key.name.as_str());
+        let identity: Vec<&str> = names.chain(cases.iter().map(|case| case.scene.hash.as_str())).collect();
+        let scene_toml = format!("# sweep {}\n{}", words.join(" "), text_of(&self.base));
+        let seed = seed.or(seed_of(&self.base)).unwrap_or(Scene::default().seed);
+        Provenance::new(&scene_toml, &hash_of(&identity.join("\n")), seed)
     }
 }
 
+fn seed_of(table: &Table) -> Option<u64> {
+    u64::try_from(table.get("seed")?.as_integer()?).ok()
+}
+
 /// `KEY=VALUES`.
-fn axis(word: &str) -> Result<(Column, Vec<Value>), Problem> {
+fn axis(word: &str) -> Result<Axis, Problem> {
     let example = "KEY=VALUES, e.g. pulse.energy_j=50e-6,150e-6 or pulse.energy_j=log:50e-6:600e-6:7";
     let (name, text) = word.split_once('=').ok_or_else(|| problem("--vary", word, example))?;
     let (name, text) = (name.trim(), text.trim());
-    let key = resolve(name, text)?;
+    let column = Column::named(name, text, false)?;
+    let key = &column.key;
     if text.is_empty() {
         return Err(problem(name, "an empty list", format!("at least one value is needed: {example}")));
     }
     let range = text.split_once(':').filter(|(kind, _)| key.is_numeric() && matches!(*kind, "lin" | "log"));
-    let values: Vec<Value> = match range {
+    let values = match range {
         Some((kind, rest)) => {
             let numbers = range_of(kind == "log", rest).map_err(|why| problem(name, text, why))?;
-            numbers.into_iter().map(|number| key.of_number(number)).collect::<Result<_, _>>()?
+            numbers.into_iter().map(|number| key.of_number(number)).collect::<Result<Vec<Value>, _>>()?
         }
         None => text.split(',').map(|value| key.read(value)).collect::<Result<_, _>>()?,
     };
-    Ok((Column { name: name.into(), key, tied: false }, values))
+    Ok(Axis { columns: vec![column], rows: values.into_iter().map(|value| vec![value]).collect() })
 }
 
 /// `a:b:n`: from a to b, both as written.
@@ -247,31 +349,30 @@ fn range_of(is_log: bool, text: &str) -> Result<Vec<f64>, String> {
 fn binding(word: &str) -> Result<(Column, Expression), Problem> {
     let example = "KEY = EXPRESSION, e.g. pulse.energy_j = 0.06/laser.pulse_repetition_hz";
     let (name, text) = word.split_once('=').ok_or_else(|| problem("--let", word, example))?;
-    let key = resolve(name.trim(), text.trim())?;
-    if !key.is_numeric() {
-        return Err(problem(name.trim(), text.trim(), "an expression is a number, and this key takes none"));
+    let column = Column::named(name, text, true)?;
+    let refuse = |why: String| problem(&column.name, text.trim(), why);
+    if !column.key.is_numeric() {
+        return Err(refuse("an expression is a number, and this key takes none".into()));
     }
-    let expression = Expression::parse(text).map_err(|why| problem(name.trim(), text.trim(), why))?;
-    Ok((Column { name: name.trim().into(), key, tied: true }, expression))
+    let expression = Expression::parse(text).map_err(refuse)?;
+    Ok((column, expression))
 }
 
 /// The keys and rows of a list file.
-fn list(path: &Path) -> Result<(Vec<Column>, Vec<Vec<Value>>), Error> {
+fn list(path: &Path) -> Result<Axis, Error> {
     let of_file = |problem: Problem| refused(&path.display().to_string(), problem);
     let table = TextTable::read(path)?;
-    let column = |name: &String| {
-        Ok(Column { name: name.trim().into(), key: resolve(name.trim(), "").map_err(of_file)?, tied: false })
-    };
-    let columns: Vec<Column> = table.header.iter().map(column).collect::<Result<_, Error>>()?;
     if table.rows.is_empty() {
         return Err(of_file(problem("rows", "0", "at least one row below the names of the keys")));
     }
-    let row = |cells: &Vec<String>| {
-        let values = columns.iter().zip(cells).map(|(column, cell)| column.key.read(cell));
-        values.collect::<Result<Vec<Value>, Problem>>().map_err(of_file)
+    let read = || {
+        let columns: Vec<Column> =
+            table.header.iter().map(|name| Column::named(name, "", false)).collect::<Result<_, _>>()?;
+        let row = |cells: &Vec<String>| columns.iter().zip(cells).map(|(column, cell)| column.key.read(cell)).collect();
+        let rows = table.rows.iter().map(row).collect::<Result<_, Problem>>()?;
+        Ok(Axis { columns, rows })
     };
-    let rows = table.rows.iter().map(row).collect::<Result<_, _>>()?;
-    Ok((columns, rows))
+    read().map_err(of_file)
 }
 
 /// A value as the results show it.
@@ -280,117 +381,6 @@ fn shown(value: &Value) -> String {
         Value::Float(number) => float_text(*number),
         Value::String(text) => text.clone(),
         other => other.to_string(),
-    }
-}
-
-struct Builder<'a> {
-    path: &'a Path,
-    base: Table,
-    grid: Grid,
-    request: &'a Request,
-}
-
-impl Builder<'_> {
-    fn cases(&self) -> Result<Vec<Case>, Error> {
-        let mut cases = Vec::new();
-        let (mut first, mut refusals) = (None, 0);
-        for combination in 0..self.grid.len() {
-            match self.case(combination, cases.len()) {
-                Ok(case) => cases.extend(case),
-                Err(error) => {
-                    first = first.or(Some(error));
-                    refusals += 1;
-                }
-            }
-        }
-        match first {
-            Some(Error::Case { case, keys, source, .. }) => {
-                Err(Error::Case { case, keys, source, others: refusals - 1 })
-            }
-            Some(error) => Err(error),
-            None if cases.is_empty() => {
-                let all: Vec<String> = self.grid.conditions.iter().map(ToString::to_string).collect();
-                let why = format!("none of the {} cases is left", self.grid.len());
-                Err(refused("--where", problem("condition", &all.join(" and "), why)))
-            }
-            None => Ok(cases),
-        }
-    }
-
-    /// The columns of the results: all keys that vary, and the seed if each case has its own.
-    fn columns(&self) -> Vec<Column> {
-        let seed = self.request.independent.then(|| resolve("seed", "").ok()).flatten();
-        let seed = seed.map(|key| Column { name: "seed".into(), key, tied: true });
-        self.grid.columns().cloned().chain(seed).collect()
-    }
-
-    /// The case of a combination; none where a condition does not hold.
-    fn case(&self, combination: usize, index: usize) -> Result<Option<Case>, Error> {
-        let mut table = self.base.clone();
-        let given: Vec<&Column> = self.grid.columns().collect();
-        let mut values = Vec::with_capacity(given.len());
-        let failed = |values: &[String], source: Error| {
-            let columns: Vec<Column> = given.iter().map(|column| (*column).clone()).collect();
-            let source = Box::new(without_lines(source));
-            Error::Case { case: combination, keys: described(&columns, values), others: 0, source }
-        };
-        if let Some(seed) = self.request.seed {
-            table.insert("seed".into(), Value::Integer(i64::try_from(seed).unwrap_or(i64::MAX)));
-        }
-        for (column, value) in given.iter().zip(self.grid.values(combination)) {
-            set(&mut table, &column.key.path, value.clone());
-            values.push(shown(value));
-        }
-        for ((column, expression), word) in self.grid.lets.iter().zip(&self.request.lets) {
-            let of_let = |why: String| {
-                let text = word.split_once('=').map_or("", |(_, text)| text.trim());
-                refused("--let", problem(&column.name, text, why))
-            };
-            let whole = self.whole(&table).map_err(|e| failed(&values, e))?;
-            let number = expression.value(&|name| value_of(&whole, name)).map_err(|e| failed(&values, of_let(e)))?;
-            let value = column.key.of_number(number).map_err(|p| failed(&values, of_let(p.allowed)))?;
-            values.push(shown(&value));
-            set(&mut table, &column.key.path, value);
-        }
-        if !self.grid.conditions.is_empty() {
-            let whole = self.whole(&table).map_err(|e| failed(&values, e))?;
-            for condition in &self.grid.conditions {
-                let of_condition = |why| refused("--where", problem("condition", &condition.to_string(), why));
-                let holds = condition.holds(&|name| value_of(&whole, name));
-                if !holds.map_err(|why| failed(&values, of_condition(why)))? {
-                    return Ok(None);
-                }
-            }
-        }
-        if self.request.independent {
-            let seed = table.get("seed").and_then(Value::as_integer).and_then(|seed| u64::try_from(seed).ok());
-            // TOML has signed whole numbers.
-            let own = stream(seed.unwrap_or(Scene::default().seed), "sweep", index as u64).next_u64() >> 1;
-            table.insert("seed".into(), Value::Integer(own as i64));
-            values.push(own.to_string());
-        }
-        let scene = SceneFile::parse(&text_of(&table), self.path).map_err(|e| failed(&values, e.into()))?;
-        Ok(Some(Case { index, scene, values }))
-    }
-
-    /// The table of a case with all defaults.
-    fn whole(&self, table: &Table) -> Result<Table, Error> {
-        Ok(SceneFile::whole_table(&text_of(table), self.path)?)
-    }
-
-    fn origin(&self, columns: &[Column], cases: &[Case]) -> Provenance {
-        let Request { vary, list, lets, conditions, independent, .. } = self.request;
-        let mut words: Vec<String> = vary.iter().map(|word| format!("--vary {word}")).collect();
-        words.extend(list.as_ref().map(|_| "--cases FILE".to_owned()));
-        words.extend(lets.iter().map(|word| format!("--let \"{word}\"")));
-        words.extend(conditions.iter().map(|word| format!("--where \"{word}\"")));
-        words.extend(independent.then(|| "--independent".to_owned()));
-        let names = columns.iter().map(|column| column.name.as_str());
-        let identity: Vec<&str> = names.chain(cases.iter().map(|case| case.scene.hash.as_str())).collect();
-        let seed = self.base.get("seed").and_then(Value::as_integer).and_then(|seed| u64::try_from(seed).ok());
-        let scene_toml = format!("# sweep {}\n{}", words.join(" "), text_of(&self.base));
-        let seed = self.request.seed.or(seed).unwrap_or(Scene::default().seed);
-        Provenance::new(&scene_toml, &hash_of(&identity.join("\n")), seed)
     }
 }
 
@@ -423,16 +413,5 @@ fn value_of(whole: &Table, name: &str) -> Result<f64, String> {
         Some(Value::Integer(number)) => Ok(*number as f64),
         Some(other) => Err(format!("{name} is {other}, and only numbers can be computed with")),
         None => Err(format!("{name} is no key of this scene")),
-    }
-}
-
-/// The lines of a case's text are no lines of a file.
-pub(super) fn without_lines(error: Error) -> Error {
-    match error {
-        Error::Scene(SceneError::Invalid { path, mut problems }) => {
-            problems.iter_mut().for_each(|located| located.line = None);
-            Error::Scene(SceneError::Invalid { path, problems })
-        }
-        other => other,
     }
 }

@@ -3,7 +3,7 @@
 //! The fit keeps the core of `[retrieval] core_radius_m`, or one of 4.5 % of the spacing; the bound is for known cores. Check: against the truth
 //! of the scene, and the bound of Table 2's scan against the stored one.
 
-use crate::measure::response::{SceneResponse, gate_step, spacing_m};
+use crate::measure::response::{SceneResponse, independent_gates};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::scene::{Flow, VortexPair};
@@ -14,23 +14,6 @@ use wakescope_estimate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake,
     WakeModel, fit_map_of_estimator,
 };
-
-/// Circulation fitted to the maps of a case.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Circulation {
-    /// Mean error, m^2/s; NaN with all others but the bound where no fit was tried.
-    pub(super) bias_m2_s: f64,
-    /// Its standard error, m^2/s.
-    pub(super) bias_standard_error_m2_s: f64,
-    /// Root mean square error, m^2/s.
-    pub(super) rms_m2_s: f64,
-    /// Its standard error, m^2/s.
-    pub(super) standard_error_m2_s: f64,
-    /// Part of the maps whose fit did not come to an end.
-    pub(super) failed_fraction: f64,
-    /// Cramer-Rao bound of all raw signals of one scan, m^2/s.
-    pub(super) bound_m2_s: f64,
-}
 
 /// What fits and bound need of a case whose flow is a pair.
 pub(super) struct Retrieval<'p> {
@@ -72,10 +55,7 @@ impl<'p> Retrieval<'p> {
 
     fn fit(&self, velocity_m_s: &Array2<f64>, shown: &EstimatorResponse<'_>) -> Option<f64> {
         let (scene, g) = (&self.plan.scene.scene, &self.plan.geometry);
-        let some: Vec<usize> =
-            (0..g.gate_range_m.len()).step_by(gate_step(scene, spacing_m(&g.gate_range_m))).collect();
-        let range_m: Vec<f64> = some.iter().map(|i| g.gate_range_m[*i]).collect();
-        let velocity_m_s = velocity_m_s.select(ndarray::Axis(1), &some);
+        let (range_m, velocity_m_s) = independent_gates(scene, &g.gate_range_m, velocity_m_s);
         let map = VelocityMap {
             elevation_rad: &g.elevation_rad,
             range_m: &range_m,
@@ -115,18 +95,14 @@ impl<'p> Retrieval<'p> {
         Ok(bound[[Parameter::LeftCirculation as usize; 2]].sqrt())
     }
 
-    /// Errors of the fits, and the bound.
-    pub(super) fn result(&self) -> Circulation {
+    /// Mean error of the fits and root mean square, m^2/s, each with its standard error; the part of the fits that did not come to an
+    /// end; the bound, m^2/s. NaN with all others but the bound where no fit was tried.
+    pub(super) fn result(&self) -> [f64; 6] {
         let errors = ErrorStatistics::of(self.circulations_m2_s.iter().map(|found| found - self.pair.circulation_m2_s));
-        Circulation {
-            bias_m2_s: errors.bias_m_s,
-            bias_standard_error_m2_s: errors.bias_standard_error_m_s,
-            rms_m2_s: errors.rms_m_s,
-            standard_error_m2_s: errors.rms_standard_error_m_s,
-            // No number where none was tried.
-            failed_fraction: errors.missing as f64 / (errors.missing + errors.count) as f64,
-            bound_m2_s: self.bound_m2_s().unwrap_or(f64::NAN),
-        }
+        let [bias, rms] =
+            [[errors.bias_m_s, errors.bias_standard_error_m_s], [errors.rms_m_s, errors.rms_standard_error_m_s]];
+        let failed = errors.missing as f64 / (errors.missing + errors.count) as f64;
+        [bias[0], bias[1], rms[0], rms[1], failed, self.bound_m2_s().unwrap_or(f64::NAN)]
     }
 }
 
@@ -170,10 +146,11 @@ mod tests {
         let mut retrieval = Retrieval::new(&plan, &scanner).unwrap();
         map::estimates::<f64>(&[&plan], &scanner, &Silent, |_| (), |_, v_m_s| retrieval.add(v_m_s)).unwrap();
         let found = retrieval.result();
-        assert_eq!(found.failed_fraction, 0.0);
+        let [_, _, rms_m2_s, _, failed, bound_m2_s] = found;
+        assert_eq!(failed, 0.0);
         // A map of one scan at 0 dB and twice the lines has 19 m^2/s; at 10 dB speckle is left.
-        assert!(found.rms_m2_s < 3.0 * 19.0 && found.bound_m2_s < 5.0, "{found:?}");
-        assert!(found.rms_m2_s > 0.2 * found.bound_m2_s, "no fit is so much better than the bound: {found:?}");
+        assert!(rms_m2_s < 3.0 * 19.0 && bound_m2_s < 5.0, "{found:?}");
+        assert!(rms_m2_s > 0.2 * bound_m2_s, "no fit is so much better than the bound: {found:?}");
     }
 
     #[test]
@@ -187,7 +164,7 @@ mod tests {
             let mut retrieval = Retrieval::new(&plan, &Scanner::new(&plan, &Silent).unwrap()).unwrap();
             retrieval.add(&Array2::zeros((plan.geometry.elevation_rad.len(), plan.geometry.gate_range_m.len())));
             let found = retrieval.result();
-            assert!(found.failed_fraction.is_nan() && found.rms_m2_s.is_nan() && found.bound_m2_s > 0.0, "{found:?}");
+            assert!(found[4].is_nan() && found[2].is_nan() && found[5] > 0.0, "{found:?}");
         }
     }
 

@@ -208,9 +208,15 @@ impl Condition {
     }
 }
 
+impl fmt::Display for Expression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
 impl fmt::Display for Condition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {} {}", self.left.text, self.operator, self.right.text)
+        write!(f, "{} {} {}", self.left, self.operator, self.right)
     }
 }
 

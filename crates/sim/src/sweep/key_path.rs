@@ -5,60 +5,39 @@
 
 use crate::keys::{Key, Kind, Problem, join, near, one_of};
 use crate::scene::SceneFile;
+use serde::{Deserialize, Serialize};
 use toml::Value;
 
 /// Sections that change no result.
 const WITHOUT_RESULT: [&str; 3] = ["format", "outputs", "site"];
 
-/// What a key takes that can vary.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Takes {
-    Number,
-    Whole { largest: u64 },
-    Switch,
-    Text,
-    Choice(Vec<&'static str>),
-}
-
-/// A key of the scene that can vary.
+/// A key of the scene with what it takes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SceneKey {
     /// Its path, such as `pulse.shape.duration_s`.
     pub(super) path: String,
-    pub(super) takes: Takes,
+    pub(super) kind: Kind,
 }
 
-/// A path and what it takes; none for lists and tables, which cannot vary.
-type Leaf = (String, Option<Takes>);
-
-fn leaves(keys: &[Key], path: &str, out: &mut Vec<Leaf>) {
+fn leaves(keys: &[Key], path: &str, out: &mut Vec<SceneKey>) {
     for key in keys {
         let here = join(path, key.name);
-        let takes = match &key.kind {
-            Kind::Table(inner) => {
-                leaves(inner, &here, out);
-                continue;
-            }
+        match &key.kind {
+            Kind::Table(inner) => leaves(inner, &here, out),
             Kind::Tagged { tag, kinds } => {
-                out.push((join(&here, tag), Some(Takes::Choice(kinds.iter().map(|(name, _)| *name).collect()))));
+                // Made once for the whole program.
+                let names: &[&str] = kinds.iter().map(|(name, _)| *name).collect::<Vec<_>>().leak();
+                out.push(SceneKey { path: join(&here, tag), kind: Kind::Choice(names) });
                 kinds.iter().for_each(|(_, inner)| leaves(inner, &here, out));
-                continue;
             }
-            Kind::Number => Some(Takes::Number),
-            Kind::Whole { largest } => Some(Takes::Whole { largest: *largest }),
-            Kind::Switch => Some(Takes::Switch),
-            Kind::Text => Some(Takes::Text),
-            Kind::Choice(names) => Some(Takes::Choice(names.to_vec())),
-            Kind::List { .. } => None,
-        };
-        if !out.iter().any(|(known, _)| *known == here) {
-            out.push((here, takes));
+            _ if out.iter().any(|known| known.path == here) => {}
+            kind => out.push(SceneKey { path: here, kind: kind.clone() }),
         }
     }
 }
 
-fn all() -> &'static [Leaf] {
-    static ALL: std::sync::LazyLock<Vec<Leaf>> = std::sync::LazyLock::new(|| {
+fn all() -> &'static [SceneKey] {
+    static ALL: std::sync::LazyLock<Vec<SceneKey>> = std::sync::LazyLock::new(|| {
         let mut out = Vec::new();
         leaves(SceneFile::keys(), "", &mut out);
         out
@@ -83,35 +62,37 @@ fn shortens(short: &str, path: &str) -> bool {
 /// The key that a path names; `value` is what it was to be, for the message.
 pub(super) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
     let refuse = |allowed: String| Problem { key: written.into(), value: value.into(), allowed };
-    let exact = all().iter().find(|(path, _)| path == written);
-    let short: Vec<&Leaf> = match exact {
-        Some(leaf) => vec![leaf],
-        None => all().iter().filter(|(path, _)| shortens(written, path)).collect(),
+    let exact = all().iter().find(|key| key.path == written);
+    let named: Vec<&SceneKey> = match exact {
+        Some(key) => vec![key],
+        None => all().iter().filter(|key| shortens(written, &key.path)).collect(),
     };
-    let (path, takes) = match short[..] {
+    let key = match named[..] {
         [one] => one,
         [] => return Err(refuse(unknown(written))),
         _ => {
-            let paths: Vec<&str> = short.iter().map(|(path, _)| path.as_str()).collect();
+            let paths: Vec<&str> = named.iter().map(|key| key.path.as_str()).collect();
             return Err(refuse(format!("several keys have this name; one of {} is needed", paths.join(", "))));
         }
     };
-    let section = path.split('.').next().unwrap_or_default();
+    let section = key.path.split('.').next().unwrap_or_default();
     if WITHOUT_RESULT.contains(&section) {
         return Err(refuse(format!("a key of [{section}] changes no result of a sweep and cannot vary")));
     }
-    let takes = takes.clone().ok_or_else(|| refuse("a list cannot vary, only numbers, names and switches".into()))?;
-    Ok(SceneKey { path: path.clone(), takes })
+    if let Kind::List { .. } = key.kind {
+        return Err(refuse("a list cannot vary, only numbers, names and switches".into()));
+    }
+    Ok(key.clone())
 }
 
 /// What to write instead of a path that no key has.
 fn unknown(written: &str) -> String {
-    let below: Vec<&str> = all().iter().filter_map(|(path, _)| path.strip_prefix(&format!("{written}."))).collect();
+    let paths = || all().iter().map(|key| key.path.as_str());
+    let below: Vec<&str> = paths().filter_map(|path| path.strip_prefix(&format!("{written}."))).collect();
     if !below.is_empty() {
         return format!("this is a table and cannot vary, its keys can: {}", below.join(", "));
     }
     let name = |path: &'static str| path.rsplit('.').next().unwrap_or(path);
-    let paths = || all().iter().map(|(path, _)| path.as_str());
     let last = written.rsplit('.').next().unwrap_or(written);
     let meant = near(written, paths())
         .or_else(|| near(last, paths().map(name)).and_then(|meant| paths().find(|path| name(path) == meant)));
@@ -131,54 +112,82 @@ fn unknown(written: &str) -> String {
 impl SceneKey {
     /// A text as a value of the key.
     pub(super) fn read(&self, text: &str) -> Result<Value, Problem> {
-        let unquoted = text.trim().trim_matches('"');
-        let read = match &self.takes {
-            Takes::Number | Takes::Whole { .. } => match text.trim().parse() {
-                Ok(number) => {
-                    let as_written = |problem| Problem { value: text.trim().into(), ..problem };
-                    return self.of_number(number).map_err(as_written);
-                }
-                Err(_) => None,
-            },
-            Takes::Switch => unquoted.parse().ok().map(Value::Boolean),
-            Takes::Text => Some(Value::String(unquoted.into())),
-            Takes::Choice(names) => names.contains(&unquoted).then(|| Value::String(unquoted.into())),
+        let (text, word) = (text.trim(), text.trim().trim_matches('"'));
+        let value = match &self.kind {
+            Kind::Number | Kind::Whole { .. } => text.parse().ok().and_then(|number| self.number(number)),
+            Kind::Switch => word.parse().ok().map(Value::Boolean),
+            Kind::Choice(names) if !names.contains(&word) => None,
+            _ => Some(Value::String(word.into())),
         };
-        read.ok_or_else(|| self.refused(text.trim()))
+        value.ok_or_else(|| self.refused(text))
     }
 
     /// A number as a value of the key; whole ones may be off by rounding.
     pub(super) fn of_number(&self, number: f64) -> Result<Value, Problem> {
+        self.number(number).ok_or_else(|| self.refused(&format!("{number:?}")))
+    }
+
+    fn number(&self, number: f64) -> Option<Value> {
         let whole = number.round();
-        match self.takes {
-            Takes::Number => Ok(Value::Float(number)),
-            Takes::Whole { largest } if (number - whole).abs() <= 1e-9 * whole.abs().max(1.0) && whole >= 0.0 => {
+        match self.kind {
+            Kind::Number => Some(Value::Float(number)),
+            Kind::Whole { largest } => {
+                let is_whole = (number - whole).abs() <= 1e-9 * whole.abs().max(1.0);
                 // What is beyond the exact whole numbers of f64 is read as text elsewhere.
-                (whole <= largest.min(1 << 53) as f64).then_some(Value::Integer(whole as i64))
+                let fits = (0.0..=largest.min(1 << 53) as f64).contains(&whole);
+                (is_whole && fits).then_some(Value::Integer(whole as i64))
             }
-            .ok_or_else(|| self.refused(&format!("{number:?}"))),
-            _ => Err(self.refused(&format!("{number:?}"))),
+            _ => None,
         }
     }
 
     /// Whether ranges of numbers make sense.
     pub(super) fn is_numeric(&self) -> bool {
-        matches!(self.takes, Takes::Number | Takes::Whole { .. })
+        matches!(self.kind, Kind::Number | Kind::Whole { .. })
     }
 
     fn refused(&self, value: &str) -> Problem {
-        let allowed = match &self.takes {
-            Takes::Number => "a number, e.g. 1.5e-6".into(),
-            Takes::Whole { .. } => "a whole number from 0, e.g. 16".into(),
-            Takes::Switch => "true or false".into(),
-            Takes::Text => "a text".into(),
-            Takes::Choice(names) => {
+        let allowed = match &self.kind {
+            Kind::Number => "a number, e.g. 1.5e-6".into(),
+            Kind::Whole { .. } => "a whole number from 0, e.g. 16".into(),
+            Kind::Choice(names) => {
                 let hint = near(value, names.iter().copied()).map(|name| format!("; did you mean \"{name}\"?"));
                 one_of(names) + &hint.unwrap_or_default()
             }
+            _ => "true or false".into(),
         };
         Problem { key: self.path.clone(), value: value.into(), allowed }
     }
+}
+
+/// What a column of keys holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Holds {
+    Numbers,
+    #[serde(rename = "whole numbers")]
+    WholeNumbers,
+    Texts,
+}
+
+impl Holds {
+    pub(super) fn of(kind: &Kind) -> Self {
+        match kind {
+            Kind::Number => Self::Numbers,
+            Kind::Whole { .. } => Self::WholeNumbers,
+            _ => Self::Texts,
+        }
+    }
+}
+
+/// A key that varies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct VaryingKey {
+    #[serde(rename = "key")]
+    pub(super) name: String,
+    pub(super) holds: Holds,
+    /// Whether others determine it.
+    pub(super) tied: bool,
 }
 
 #[cfg(test)]
@@ -188,13 +197,14 @@ mod tests {
     #[test]
     fn every_key_that_can_vary_is_found_by_its_path_and_unique_ones_by_a_shorter_one() {
         let mut varying = 0;
-        for (path, takes) in all() {
-            match resolve(path, "1") {
+        for own in all() {
+            let is_list = matches!(own.kind, Kind::List { .. });
+            match resolve(&own.path, "1") {
                 Ok(key) => {
-                    assert_eq!((&key.path, Some(&key.takes)), (path, takes.as_ref()));
+                    assert!(key == *own && !is_list);
                     varying += 1;
                 }
-                Err(problem) => assert!(takes.is_none() || problem.allowed.contains("changes no result"), "{problem}"),
+                Err(problem) => assert!(is_list || problem.allowed.contains("changes no result"), "{problem}"),
             }
         }
         assert!(varying > 70, "{varying}");

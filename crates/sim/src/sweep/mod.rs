@@ -5,17 +5,16 @@
 //! | `key_path`, `expression` | keys of a scene by their paths; arithmetic on them |
 //! | `cases` | grids and lists of values; all cases as checked scenes |
 //! | `run` | checking all, running what is not there yet, sharing what cases have in common |
-//! | `group`, `circulation`, `results` | cases of the same signals measured together; their numbers |
-//! | `stored`, `merge`, `tables`, `pictures` | a folder for each case; tables and pictures of all |
+//! | `results`, `circulation` | cases of the same signals measured together; their numbers |
+//! | `stored` | a folder for each case |
+//! | `tables`, `pictures` | tables and pictures of all, from one folder or those of shards |
 //! | [`pareto`], [`front_table`] | set-ups that no other one beats; the rows of a table that are such |
 
 mod cases;
 mod circulation;
 mod expression;
 pub mod front_table;
-mod group;
 mod key_path;
-mod merge;
 pub mod pareto;
 #[cfg(feature = "plots")]
 mod pictures;
@@ -25,9 +24,9 @@ mod stored;
 mod tables;
 
 pub use cases::{Case, MOST_CASES, Request, Sweep};
-pub use merge::merge;
 pub use results::RESULTS;
-pub use run::{Settings, Shard, Shared, Summary, Told, maps, run};
+pub use run::{Settings, Shard, Shared, Summary, maps, run};
+pub use tables::merge;
 
 #[cfg(test)]
 mod sweep_tests;

@@ -2,9 +2,10 @@
 //!
 //! Check: by eye; a test of the program compares the names of the files.
 
+use super::key_path::Holds;
 use super::pareto::{Objective, Place, Sense, front};
 use super::results::{RESULTS, standard_error_of};
-use super::stored::{Definition, Holds, Row};
+use super::stored::{Definition, Row};
 use crate::Error;
 use crate::outputs::Outputs;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -29,9 +30,9 @@ const MOST_CURVES: usize = 6;
 
 /// The pictures: of each key that is a number, and the front.
 pub(super) fn list(definition: &Definition, rows: Option<&[Row]>, files: &mut Outputs) -> Result<(), Error> {
-    for (place, name) in definition.free().filter(|(place, _)| definition.keys[*place].holds != Holds::Texts) {
+    for name in definition.free().filter(|key| key.holds != Holds::Texts).map(|key| &key.name) {
         files.figure(&format!("results_{}", name.replace('.', "_")), rows, |rows| {
-            let panels = PANELS.map(|panel| against(definition, rows, (place, name), &panel));
+            let panels = PANELS.map(|panel| against(definition, rows, name, &panel));
             let figure = Figure::stacked(panels.into_iter().flatten());
             Ok(Figure { columns: 2, width: 1240.0, ..figure })
         })?;
@@ -43,21 +44,21 @@ pub(super) fn list(definition: &Definition, rows: Option<&[Row]>, files: &mut Ou
 fn against(
     definition: &Definition,
     rows: &[Row],
-    (place, key): (usize, &str),
+    key: &str,
     (title, label, is_log, [result, bound]): &(&str, &str, bool, [&str; 2]),
 ) -> Option<CurvePlot> {
-    let x: Vec<f64> = rows.iter().map(|row| row.key(place)).filter(|x| x.is_finite()).collect();
+    let x: Vec<f64> = rows.iter().map(|row| row.key(key)).filter(|x| x.is_finite()).collect();
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
     let axis = if low > 0.0 && high >= 8.0 * low { Axis::log(key) } else { Axis::linear(key) };
     let mut plot = CurvePlot::new(title, axis, if *is_log { Axis::log(label) } else { Axis::linear(label) });
     plot.shape = 0.6;
     let error = standard_error_of(result, RESULTS.iter().map(|(name, ..)| *name));
-    let (curves, mut any) = (curves(definition, rows, place), false);
+    let (curves, mut any) = (curves(definition, rows, key), false);
     // Without a name either no other key varies, or there are too many curves.
     let curves_are_whole = definition.free().count() == 1;
     for (colour, (curve, members)) in curves.iter().enumerate() {
         let points = |name: &str| {
-            let found = members.iter().map(|row| (row.key(place), row.result(name)));
+            let found = members.iter().map(|row| (row.key(key), row.result(name)));
             let mut points: Vec<(f64, f64)> = found.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             points
@@ -78,13 +79,12 @@ fn against(
 }
 
 /// Cases that differ in one key alone belong to one curve; all to one without a name where there are too many.
-fn curves<'r>(definition: &Definition, rows: &'r [Row], place: usize) -> Vec<(String, Vec<&'r Row>)> {
+fn curves<'r>(definition: &Definition, rows: &'r [Row], key: &str) -> Vec<(String, Vec<&'r Row>)> {
     let mut curves: Vec<(String, Vec<&Row>)> = Vec::new();
     for row in rows {
-        let short = |name: &str| name.rsplit('.').next().unwrap_or_default().to_owned();
-        let value = |place: usize| row.keys.get(place).map_or("", String::as_str);
-        let others = definition.free().filter(|(other, _)| *other != place);
-        let label: Vec<String> = others.map(|(other, name)| format!("{} {}", short(name), value(other))).collect();
+        let others = definition.free().map(|key| key.name.as_str()).filter(|name| *name != key);
+        let short = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
+        let label: Vec<String> = others.map(|name| format!("{} {}", short(name), row.text(name))).collect();
         let label = label.join(", ");
         match curves.iter_mut().find(|(known, _)| *known == label) {
             Some((_, members)) => members.push(row),

@@ -1,17 +1,20 @@
-//! What a case gives in numbers: a row of the results.
+//! What a case gives in numbers: a row of the results. Cases that share their signals are measured together.
 //!
 //! Errors are averages over cells of the map, with standard errors from their scatter over the realisations. Check: the columns of a run against its map; resolution against the stored table.
 
-use super::circulation::Circulation;
+use super::circulation::Retrieval;
 use crate::Error;
-use crate::measure::bound::BoundPoint;
+use crate::measure::bound::bound_in_the_middle;
 use crate::measure::cell_average::{CellAverage, error_of_fraction, flagged_fraction};
 use crate::measure::error_law::{range_filter, shared_cells};
-use crate::measure::map::VelocityEstimates;
+use crate::measure::map::{self, VelocityEstimates};
+use crate::measure::profile::Efficiencies;
+use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::run::ScanMiddle;
-use crate::scene::{Flow, Scene};
+use crate::scene::{Flow, Method, NoiseModel, Scene};
 use crate::setup::estimators;
+use crate::setup::progress::Observer;
 use crate::setup::wind::vortex_pair;
 use ndarray::Array2;
 
@@ -64,39 +67,65 @@ pub(crate) fn standard_error_of<'a>(name: &str, mut columns: impl Iterator<Item 
     columns.find(|column| column.contains("_standard_error") && column.replacen("_standard_error", "", 1) == name)
 }
 
-/// What was measured in a case.
-pub(super) struct Measured<'a> {
-    pub(super) middle: ScanMiddle,
-    pub(super) bound: Option<BoundPoint>,
-    pub(super) map: &'a VelocityEstimates,
-    /// Errors of single estimates outside the vortices, m/s, one of each group of cells that share windows.
-    pub(super) errors_m_s: &'a [f64],
-    pub(super) circulation: Option<Circulation>,
+/// What is collected of the maps of a case.
+struct Collected<'p> {
+    plan: &'p Plan,
+    cells: Cells,
+    retrieval: Option<Retrieval<'p>>,
+    /// Cells outside the vortices, one of each group that shares windows, and their velocities, m/s, map after map.
+    apart: Vec<(usize, usize)>,
+    velocity_m_s: Vec<f64>,
 }
 
-/// The row of a case, in the order of [`RESULTS`].
+/// The rows of plans whose scenes differ in estimator, outputs and site alone, each in the order of [`RESULTS`]: the records of each
+/// realisation are made once.
 ///
 /// # Errors
 /// What the crates refuse; a checked scene gives none.
-pub(super) fn row(plan: &Plan, measured: &Measured<'_>) -> Result<Vec<f64>, Error> {
-    let filter = range_filter(plan)?;
-    let cells = Cells::new(plan)?;
-    let mut out = vec![
-        measured.middle.snr_db,
-        filter.full_width_half_maximum_m(),
-        filter.standard_deviation_m(),
-        measured.bound.map_or(f64::NAN, |bound| bound.region_m_s),
-    ];
-    for part in [Part::All, Part::Inside, Part::Outside] {
-        out.extend(cells.averages(measured.map, part));
+pub(super) fn rows(
+    plans: &[Plan],
+    known: &Efficiencies,
+    observer: &dyn Observer,
+    fits: bool,
+) -> Result<Vec<Vec<f64>>, Error> {
+    let Some(first) = plans.first() else { return Ok(Vec::new()) };
+    let scanner = Scanner::with(first, known, observer)?;
+    let mut all = Vec::with_capacity(plans.len());
+    for plan in plans {
+        let retrieval = if fits { Retrieval::new(plan, &scanner) } else { None };
+        let cells = Cells::new(plan)?;
+        all.push(Collected { plan, apart: cells.apart(), cells, retrieval, velocity_m_s: Vec::new() });
     }
-    out.extend(flagged_fraction(measured.map));
-    out.extend(bad_fraction(plan, measured.errors_m_s)?);
-    out.extend(measured.circulation.map_or([f64::NAN; 6], |c| {
-        let Circulation { bias_m2_s, bias_standard_error_m2_s, rms_m2_s, standard_error_m2_s, .. } = c;
-        [bias_m2_s, bias_standard_error_m2_s, rms_m2_s, standard_error_m2_s, c.failed_fraction, c.bound_m2_s]
-    }));
-    Ok(out)
+    let of_plans: Vec<&Plan> = plans.iter().collect();
+    let maps = map::of_plans(&of_plans, &scanner, observer, |i, velocity_m_s| {
+        let own = &mut all[i];
+        own.velocity_m_s.extend(own.apart.iter().map(|cell| velocity_m_s[*cell]));
+        own.retrieval.iter_mut().for_each(|retrieval| retrieval.add(velocity_m_s));
+    })?;
+    all.iter().zip(&maps).map(|(own, map)| own.row(map, &scanner)).collect()
+}
+
+impl Collected<'_> {
+    fn row(&self, map: &VelocityEstimates, scanner: &Scanner<'_>) -> Result<Vec<f64>, Error> {
+        let (plan, scene) = (self.plan, &self.plan.scene.scene);
+        let middle = ScanMiddle::of(plan, None, Some(scanner))
+            .ok_or(wakescope_estimate::Error::Empty { field: "layers of a line" })?;
+        // The bound of velocity alone is none on a velocity beside a gradient.
+        let has_bound = scene.detector.noise != NoiseModel::None
+            && !matches!(scene.estimator.method, Method::GradientLikelihood(_));
+        let bound_m_s = if has_bound { bound_in_the_middle(plan, scanner)?.region_m_s } else { f64::NAN };
+        let filter = range_filter(plan)?;
+        let mut out = vec![middle.snr_db, filter.full_width_half_maximum_m(), filter.standard_deviation_m(), bound_m_s];
+        for part in [Part::All, Part::Inside, Part::Outside] {
+            out.extend(self.cells.averages(map, part));
+        }
+        out.extend(flagged_fraction(map));
+        let truths_m_s = self.apart.iter().map(|cell| map.v_gate_m_s[*cell]).cycle();
+        let known = self.velocity_m_s.iter().zip(truths_m_s).filter(|(_, truth)| truth.is_finite());
+        out.extend(bad_fraction(plan, &known.map(|(velocity, truth)| velocity - truth).collect::<Vec<_>>())?);
+        out.extend(self.retrieval.as_ref().map_or([f64::NAN; 6], Retrieval::result));
+        Ok(out)
+    }
 }
 
 /// Part of the estimates that say nothing of the air, and its standard error: those farther from it than any part of a peak, and
@@ -125,7 +154,7 @@ enum Part {
 }
 
 /// The cells of a map by their distance from the vortices.
-pub(super) struct Cells {
+struct Cells {
     /// Distance from the nearer centre over the spacing, \[line, gate\]; infinite in air without vortices, NaN where centres are
     /// not known.
     distance: Array2<f64>,
@@ -137,8 +166,8 @@ impl Cells {
     /// Of the map of a plan.
     ///
     /// # Errors
-    /// As [`row`].
-    pub(super) fn new(plan: &Plan) -> Result<Self, Error> {
+    /// What the regions refuse; a checked scene gives none.
+    fn new(plan: &Plan) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let distance = Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
             let (y_m, z_m) = position_m(scene, g.elevation_rad[i], g.gate_range_m[j]);
@@ -165,7 +194,7 @@ impl Cells {
     }
 
     /// Cells outside the vortices, all where these are not known, so far apart that they share no window.
-    pub(super) fn apart(&self) -> Vec<(usize, usize)> {
+    fn apart(&self) -> Vec<(usize, usize)> {
         let [lines, gates] = self.shared.map(|cells| cells.ceil() as usize);
         let cells = if self.of(Part::Outside).is_empty() { self.of(Part::All) } else { self.of(Part::Outside) };
         cells.into_iter().filter(|(i, j)| i.is_multiple_of(lines) && j.is_multiple_of(gates)).collect()

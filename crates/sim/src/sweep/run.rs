@@ -2,19 +2,19 @@
 //!
 //! Check: counts of what is computed; the bytes of the results for threads, shards, kills.
 
-use super::cases::{Case, Sweep, without_lines};
-use super::group::{self, rows};
-use super::merge::write_tables;
-use super::stored::{Definition, SWEEP, store, stored};
+use super::cases::{Case, Sweep};
+use super::results::rows;
+use super::stored::{Definition, SWEEP};
 use super::tables;
 use crate::io::{Existing, Table};
 use crate::measure::efficiencies::Known;
-use crate::measure::map::VelocityEstimates;
+use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::profile::Efficiencies;
+use crate::measure::scan::Scanner;
 use crate::plan::units::seconds;
 use crate::plan::{Plan, Target};
 use crate::scene::{Estimator, Outputs, Scene, SceneFile, Site, WindOfPulses, hash_of};
-use crate::setup::progress::Observer;
+use crate::setup::progress::{Observer, Stage};
 use crate::setup::wind::SceneWind;
 use crate::{Error, machine, outputs};
 use rayon::prelude::*;
@@ -54,17 +54,23 @@ impl std::str::FromStr for Shard {
 
 /// How a sweep is run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct Settings {
-    /// Only this part of the cases; no tables of all are written.
+    /// Run part NUMBER of COUNT of the cases, e.g. 2/8; --merge makes the tables of all.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "NUMBER/COUNT"))]
     pub shard: Option<Shard>,
-    /// Cases whose result is there are left as they are.
+    /// Leave cases as they are whose result is there.
+    #[cfg_attr(feature = "cli", arg(long))]
     pub resume: bool,
-    /// Cases may need more memory than the machine has.
+    /// Leave out the fits of the circulation, which take longer than the maps where regions are small.
+    #[cfg_attr(feature = "cli", arg(long))]
+    pub no_circulation: bool,
+    /// Run even if the forecast of the memory of a case is more than the machine has.
+    #[cfg_attr(feature = "cli", arg(long))]
     pub allow_large: bool,
-    /// Whether the circulation is fitted to each map.
-    pub fits: bool,
-    /// What may be replaced: results of this sweep, or another sweep and files of somebody else, too.
-    pub existing: Existing,
+    /// Replace another sweep, or files that this program did not write.
+    #[cfg_attr(feature = "cli", arg(long))]
+    pub overwrite: bool,
 }
 
 /// What was computed once for all cases that have it in common.
@@ -91,21 +97,13 @@ pub struct Summary {
     pub files: Vec<PathBuf>,
 }
 
-/// Told of each case that is done: its description and how many of how many are.
-pub type Told<'t> = &'t mut dyn FnMut(&str, usize, usize);
-
 /// Checks all cases as `wakescope check` does, runs those of the shard that have no result, and writes the tables.
 ///
 /// # Errors
 /// The first case that is refused, before anything is written; a case that cannot be run; what the system says.
-pub fn run<'s>(
-    sweep: &'s Sweep,
-    out: &Path,
-    settings: Settings,
-    observer: &dyn Observer,
-    told: Told<'_>,
-) -> Result<Summary, Error> {
-    let definition = Definition::of(sweep, settings.fits);
+pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn Observer) -> Result<Summary, Error> {
+    let (definition, existing) =
+        (Definition::of(sweep, !settings.no_circulation), Existing::with_overwrite(settings.overwrite));
     let winds = Known::default();
     let core_s = check(sweep, &winds, settings.allow_large)?;
     let times = settings.shard.map_or("times.csv".into(), |s| format!("times-{}-of-{}.csv", s.number, s.of));
@@ -115,39 +113,42 @@ pub fn run<'s>(
         names.extend(outputs::Outputs::names(Outputs::default(), list)?);
     }
     // Shards may begin at the same time, in one folder: each writes files of its own.
-    outputs::prepare(out, &names, settings.existing, false)?;
-    definition.write(out, settings.existing)?;
+    outputs::prepare(out, &names, existing, false)?;
+    definition.write(out, existing)?;
     let mine: Vec<&Case> = sweep.cases.iter().filter(|c| settings.shard.is_none_or(|s| s.has(c.index))).collect();
-    let is_due = |case: &&Case| !(settings.resume && stored(out, &definition, case.index).is_some());
+    let is_due = |case: &&Case| !(settings.resume && definition.stored(out, case.index).is_some());
     let due: Vec<&Case> = mine.iter().copied().filter(is_due).collect();
+    observer.begin(Stage::Cases, due.len() as u64);
     let of_due_s = due.iter().filter_map(|case| core_s.get(case.index)).sum();
-    told(&format!("forecast: {} of one core, an order of magnitude", seconds(of_due_s)), 0, due.len());
+    observer.reach(&format!("forecast: {} of one core, an order of magnitude", seconds(of_due_s)));
     let known = Efficiencies::default();
-    let (mut signals, mut done, mut walls) = (0, 0, Vec::new());
+    let (mut signals, mut walls) = (0, Vec::new());
     for group in groups(due.iter().map(|case| &case.scene)) {
         let planned = |&place: &usize| {
             let case: &'s Case = due[place];
-            Ok((case, plan(&case.scene, &winds).map_err(|e| failed(sweep, case, e))?))
+            Ok((case, plan(&case.scene, &winds).map_err(|e| sweep.failed(case, 0, e))?))
         };
         for batch in batches(group.iter().map(planned).collect::<Result<_, Error>>()?) {
             let begun = Instant::now();
             let (cases, plans): (Vec<&Case>, Vec<Plan>) = batch.into_iter().unzip();
-            let found = rows(&plans, &known, observer, settings.fits).map_err(|e| of_batch(sweep, &cases, e))?;
+            let found = rows(&plans, &known, observer, !settings.no_circulation);
+            let found = found.map_err(|e| sweep.failed(cases[0], 0, e))?;
             signals += 1;
             let wall_s = begun.elapsed().as_secs_f64() / found.len() as f64;
             for (row, case) in found.iter().zip(&cases) {
-                store(out, sweep, case.index, row, (settings.fits, settings.existing))?;
+                definition.store(out, case, row, existing)?;
                 walls.push((case.index, wall_s));
-                done += 1;
-                told(&sweep.described(case), done, due.len());
+                observer.advance(1);
+                observer.reach(&sweep.described(case));
             }
         }
     }
+    observer.end();
     let mut files = vec![write_times(out, &times, &definition, &mut walls)?];
     if settings.shard.is_none() {
-        let all: Option<Vec<_>> = (0..sweep.cases.len()).map(|case| stored(out, &definition, case)).collect();
+        let all: Option<Vec<_>> = (0..sweep.cases.len()).map(|case| definition.stored(out, case)).collect();
         let gone = || Error::Input { path: out.join("cases"), reason: "a result that was written is gone".into() };
-        files.extend(write_tables(&definition, &all.ok_or_else(gone)?, out, settings.existing)?);
+        files.extend(tables::write(&definition, &all.ok_or_else(gone)?, out, existing)?);
     }
     let shared = Shared { flows: winds.len(), efficiencies: known.computed(), signals };
     Ok(Summary { run: due.len(), kept: mine.len() - due.len(), shared, files })
@@ -163,7 +164,8 @@ pub fn maps(scenes: &[SceneFile], observer: &dyn Observer) -> Result<Vec<(Plan, 
     let mut out: Vec<(usize, (Plan, VelocityEstimates))> = Vec::with_capacity(scenes.len());
     for places in groups(scenes.iter()) {
         let plans: Vec<Plan> = places.iter().map(|&i| plan(&scenes[i], &winds)).collect::<Result<_, _>>()?;
-        let found = group::maps(&plans.iter().collect::<Vec<_>>(), &known, observer)?;
+        let scanner = Scanner::with(&plans[0], &known, observer)?;
+        let found = map::of_plans(&plans.iter().collect::<Vec<_>>(), &scanner, observer, |_, _| ())?;
         out.extend(places.into_iter().zip(plans.into_iter().zip(found)));
     }
     out.sort_by_key(|(place, _)| *place);
@@ -181,27 +183,7 @@ fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<V
     };
     let found: Vec<_> = sweep.cases.par_iter().map(checked).collect();
     let others = found.iter().filter(|found| found.is_err()).count().saturating_sub(1);
-    let mut core_s = Vec::with_capacity(found.len());
-    for (case, found) in sweep.cases.iter().zip(found) {
-        core_s.push(found.map_err(|error| match failed(sweep, case, error) {
-            Error::Case { case, keys, source, .. } => Error::Case { case, keys, others, source },
-            other => other,
-        })?);
-    }
-    Ok(core_s)
-}
-
-fn failed(sweep: &Sweep, case: &Case, source: Error) -> Error {
-    let source = Box::new(without_lines(source));
-    Error::Case { case: case.index, keys: sweep.described(case), others: 0, source }
-}
-
-/// What went wrong with cases that were measured together, told of the first of them.
-fn of_batch(sweep: &Sweep, cases: &[&Case], error: Error) -> Error {
-    match cases.first() {
-        Some(case) => failed(sweep, case, error),
-        None => error,
-    }
+    sweep.cases.iter().zip(found).map(|(case, found)| found.map_err(|e| sweep.failed(case, others, e))).collect()
 }
 
 /// The plan of a scene, with a wind that others may share.
@@ -263,6 +245,6 @@ fn write_times(out: &Path, name: &str, definition: &Definition, walls: &mut [(us
         .int("case", walls.iter().map(|(case, _)| *case as i64))
         .float("wall_s", walls.iter().map(|(_, wall_s)| *wall_s))
         .int("threads", walls.iter().map(|_| rayon::current_num_threads() as i64));
-    crate::io::write_atomic(&out.join(name), table.to_csv(&definition.origin)?)?;
+    crate::io::write_atomic(&out.join(name), table.to_csv(&definition.origin())?)?;
     Ok(out.join(name))
 }

@@ -185,8 +185,6 @@ impl Observer for Counter {
     fn begin(&self, stage: Stage, _: u64) {
         self.0.lock().unwrap().push(stage);
     }
-    fn advance(&self, _: u64) {}
-    fn end(&self) {}
 }
 
 /// A scene that runs in a moment.
@@ -197,7 +195,7 @@ fn ran(scene: &str, request: &Request) -> (Counter, Summary, crate::io::csv_inpu
     let temp = tempfile::tempdir().unwrap();
     let counter = Counter::default();
     let found = sweep(scene, request).unwrap();
-    let summary = run(&found, temp.path(), Settings::default(), &counter, &mut |_, _, _| ()).unwrap();
+    let summary = run(&found, temp.path(), Settings { no_circulation: true, ..Settings::default() }, &counter).unwrap();
     (counter, summary, crate::io::csv_input::TextTable::read(&temp.path().join("results.csv")).unwrap())
 }
 

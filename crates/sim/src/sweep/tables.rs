@@ -1,17 +1,82 @@
-//! The results of all cases as tables: CSV, NetCDF, and the pictures of them.
+//! The results of all cases as tables, from the folders of a run or of its shards: CSV, NetCDF, and the pictures of them.
 //!
 //! Check: the same rows give the same bytes; the NetCDF file is read back by an independent reader.
 
+use super::cases::Sweep;
+use super::key_path::{Holds, VaryingKey};
 use super::results::RESULTS;
-use super::stored::{Definition, Holds, Row, VaryingKey};
+use super::stored::{Definition, Row, SWEEP};
 use crate::Error;
-use crate::io::Table;
+use crate::io::{Existing, Table};
 use crate::outputs::Outputs;
+use crate::scene::Outputs as Formats;
+use std::path::{Path, PathBuf};
+
+/// Writes the tables of a sweep whose cases are all in some folders, of shards or of a whole run; returns the paths.
+///
+/// # Errors
+/// Folders that are of different sweeps, or of another one than `sweep`; cases that none of them has; what the system says.
+pub fn merge(
+    folders: &[PathBuf],
+    sweep: Option<&Sweep>,
+    out: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, Error> {
+    let refuse = |reason: String| Error::Input { path: "--merge".into(), reason };
+    let mut first: Option<(Definition, String)> = None;
+    for folder in folders {
+        let found = Definition::read(folder)?;
+        let asked =
+            sweep.map(|sweep| (Definition::of(sweep, found.circulation), "the sweep that was asked for".into()));
+        for (other, of) in first.iter().chain(&asked) {
+            if !other.is_same(&found) {
+                let reason = format!(
+                    "it is of sweep {} by {}, {of} is {} by {}: only shards of one sweep by one version, all with or all \
+                     without --no-circulation, fit together",
+                    found.sweep_hash, found.source, other.sweep_hash, other.source
+                );
+                return Err(Error::Input { path: folder.join(SWEEP), reason });
+            }
+        }
+        first = first.or(Some((found, folder.display().to_string())));
+    }
+    let Some((definition, _)) = first else {
+        return Err(refuse("at least one folder of a sweep is needed".into()));
+    };
+    let (mut rows, mut missing) = (Vec::new(), Vec::new());
+    for case in 0..definition.scene_hashes.len() {
+        match folders.iter().find_map(|folder| definition.stored(folder, case)) {
+            Some(row) => rows.push(row),
+            None => missing.push(case.to_string()),
+        }
+    }
+    if !missing.is_empty() {
+        let more = if missing.len() > 10 { ", ..." } else { "" };
+        return Err(refuse(format!(
+            "{} of the {} cases have no result in the folders to merge, numbers {}{more}: run their shards, or those that were \
+             cut off with --resume",
+            missing.len(),
+            definition.scene_hashes.len(),
+            missing[..missing.len().min(10)].join(", ")
+        )));
+    }
+    write(&definition, &rows, out, existing)
+}
+
+/// Writes the tables of all rows.
+pub(super) fn write(
+    definition: &Definition,
+    rows: &[Row],
+    out: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, Error> {
+    let of = (Formats::default(), definition.origin());
+    Outputs::write(out, existing, of, |files| list(definition, Some(rows), files))
+}
 
 /// The files of all cases, whose rows are not there before they are run.
 pub(super) fn list(definition: &Definition, rows: Option<&[Row]>, files: &mut Outputs) -> Result<(), Error> {
     files.table("results", rows, |rows| Ok(table(definition, rows)))?;
-    #[cfg(feature = "netcdf")]
     files.netcdf("results", rows, |rows, _| netcdf(definition, rows))?;
     #[cfg(feature = "plots")]
     super::pictures::list(definition, rows, files)?;
@@ -20,12 +85,10 @@ pub(super) fn list(definition: &Definition, rows: Option<&[Row]>, files: &mut Ou
 
 fn table(definition: &Definition, rows: &[Row]) -> Table {
     let mut table = Table::new().int("case", rows.iter().map(|row| row.case as i64));
-    for (place, VaryingKey { name, holds, .. }) in definition.keys.iter().enumerate() {
+    for VaryingKey { name, holds, .. } in &definition.keys {
         table = match holds {
-            Holds::Numbers => table.float(name, rows.iter().map(|row| row.key(place))),
-            Holds::WholeNumbers | Holds::Texts => {
-                table.text(name, rows.iter().map(|row| row.keys.get(place).cloned().unwrap_or_default()))
-            }
+            Holds::Numbers => table.float(name, rows.iter().map(|row| row.key(name))),
+            Holds::WholeNumbers | Holds::Texts => table.text(name, rows.iter().map(|row| row.text(name))),
         };
     }
     table = table.text("scene_hash", rows.iter().map(|row| row.scene_hash.clone()));
@@ -36,38 +99,33 @@ fn table(definition: &Definition, rows: &[Row]) -> Table {
 }
 
 /// Whole numbers below this are doubles without a loss.
-#[cfg(feature = "netcdf")]
 const EXACT_BELOW: f64 = 9_007_199_254_740_992.0;
 
-#[cfg(feature = "netcdf")]
 fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
     use crate::io::netcdf::{Data, Layout, Variable};
     use crate::keys::unit_of;
-    let text = |row: &Row, place: usize| row.keys.get(place).cloned().unwrap_or_default();
-    let texts = (0..definition.keys.len()).flat_map(|place| rows.iter().map(move |row| text(row, place).len()));
+    let texts = definition.keys.iter().flat_map(|key| rows.iter().map(|row| row.text(&key.name).len()));
     let width = texts.chain(rows.iter().map(|row| row.scene_hash.len())).chain([1]).max().unwrap_or(1);
     // What is not used is NUL: blanks stay in the words of readers.
-    let words = |name: &str, of: &dyn Fn(&Row) -> String| {
-        let padded =
-            |row: &Row| of(row).into_bytes().into_iter().chain(std::iter::repeat(0)).take(width).collect::<Vec<u8>>();
+    let words = |name: &str, of: &dyn Fn(&Row) -> &str| {
+        let padded = |row: &Row| of(row).bytes().chain(std::iter::repeat(0)).take(width).collect::<Vec<u8>>();
         Variable::new(name, &["case", "string_length"], Data::text(rows.iter().flat_map(padded).collect::<Vec<u8>>()))
     };
     let case = rows.iter().map(|row| i32::try_from(row.case).unwrap_or(i32::MAX));
     let mut variables = vec![Variable::new("case", &["case"], Data::i32(case)).text("long_name", "number of the case")];
-    for (place, VaryingKey { name, holds, .. }) in definition.keys.iter().enumerate() {
+    for VaryingKey { name, holds, .. } in &definition.keys {
         // Whole numbers that a double would round, such as drawn seeds, are words.
-        let is_round = rows.iter().all(|row| row.key(place).abs() < EXACT_BELOW || *holds == Holds::Numbers);
+        let is_round = rows.iter().all(|row| row.key(name).abs() < EXACT_BELOW || *holds == Holds::Numbers);
         let variable = match holds {
             Holds::Numbers | Holds::WholeNumbers if is_round => {
-                Variable::new(name, &["case"], Data::f64(rows.iter().map(|row| row.key(place))))
+                Variable::new(name, &["case"], Data::f64(rows.iter().map(|row| row.key(name))))
                     .text("units", unit_of(name).unwrap_or("1"))
             }
-            _ => words(name, &|row| text(row, place)),
+            _ => words(name, &|row| row.text(name)),
         };
         variables.push(variable.text("long_name", &format!("key {name} of the scene")));
     }
-    variables
-        .push(words("scene_hash", &|row| row.scene_hash.clone()).text("long_name", "hash of the scene of the case"));
+    variables.push(words("scene_hash", &|row| &row.scene_hash).text("long_name", "hash of the scene of the case"));
     for (name, unit, meaning) in RESULTS {
         let values = rows.iter().map(|row| row.result(name));
         let variable = Variable::new(name, &["case"], Data::f64(values));
@@ -75,6 +133,6 @@ fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
         variables.push(variable.text("units", unit).text("long_name", meaning));
     }
     let dims = vec![("case", rows.len()), ("string_length", width)];
-    let origin = &definition.origin;
+    let origin = &definition.origin();
     Ok(Layout::cf("Results of a sweep over scenes", dims, variables, origin).into_bytes(origin)?)
 }

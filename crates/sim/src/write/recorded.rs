@@ -57,11 +57,7 @@ fn measured(plan: &Plan, map: &VelocityMap, files: &mut Outputs) -> Result<(), E
 }
 
 fn list_spectra(spectra: Option<Spectra>, files: &mut Outputs) -> Result<(), Error> {
-    #[cfg(feature = "netcdf")]
     files.add("spectra.nc", spectra.as_ref(), |spectra, origin| {
         Ok(crate::io::cf_spectra::cf_spectra_bytes(spectra, origin)?)
-    })?;
-    #[cfg(not(feature = "netcdf"))]
-    let _ = (spectra, files);
-    Ok(())
+    })
 }

@@ -3,29 +3,29 @@
 // A test that cannot set up its input has failed.
 #![allow(clippy::unwrap_used)]
 
-#[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
+#[cfg(all(feature = "cli", feature = "plots"))]
 mod book;
 #[cfg(feature = "cli")]
 mod cli;
-#[cfg(all(feature = "cli", feature = "netcdf"))]
+#[cfg(feature = "cli")]
 mod detection;
-#[cfg(all(feature = "cli", feature = "netcdf"))]
+#[cfg(feature = "cli")]
 mod estimate;
-#[cfg(all(feature = "cli", feature = "netcdf"))]
+#[cfg(feature = "cli")]
 mod hostile_files;
 #[cfg(feature = "cli")]
 mod messages;
 mod receiver;
-#[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
+#[cfg(all(feature = "cli", feature = "plots"))]
 mod retrieve;
-#[cfg(all(feature = "netcdf", feature = "plots"))]
+#[cfg(feature = "plots")]
 mod scan_fields;
-#[cfg(all(feature = "netcdf", feature = "plots"))]
+#[cfg(feature = "plots")]
 mod scans;
 mod scene_features;
-#[cfg(all(feature = "flow", feature = "netcdf"))]
+#[cfg(feature = "flow")]
 mod simulated_flow;
-#[cfg(all(feature = "cli", feature = "netcdf", feature = "plots"))]
+#[cfg(all(feature = "cli", feature = "plots"))]
 mod sweep;
 #[cfg(feature = "cli")]
 mod wake;

@@ -4,7 +4,7 @@ use netcdf3::FileReader;
 use std::path::Path;
 use wakescope_les::winds::{Edges, OutsidePolicy, PlaneMesh, Side};
 use wakescope_les::{GridSnapshot, Wind};
-use wakescope_sim::flow::{Begin, CaseFile, Unwatched};
+use wakescope_sim::flow::{Begin, CaseFile};
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::scene::SceneFile;
@@ -59,7 +59,7 @@ SCAN
 
 fn flow(folder: &Path) {
     let case = CaseFile::parse(CASE, Path::new("case.toml")).unwrap();
-    wakescope_sim::flow::run(&case, &folder.join("wake"), Begin::New, &mut Unwatched).unwrap();
+    wakescope_sim::flow::run(&case, &folder.join("wake"), Begin::New, &Silent).unwrap();
 }
 
 fn plan(folder: &Path, more: &str, scan: &str) -> Result<Plan, Error> {

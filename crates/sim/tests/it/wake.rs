@@ -43,11 +43,8 @@ fn a_run_that_is_killed_and_continued_ends_with_the_same_bits() {
     let rest = wakescope(temp.path(), &words("killed", &["--restart"]));
     assert!(rest.status.success(), "{}", String::from_utf8_lossy(&rest.stderr));
     let read = |folder: &str, name: &str| std::fs::read(temp.path().join(folder).join(name)).unwrap();
-    let mut names = vec!["case.toml", "wake.csv", "wake_scaled.csv", "steps.csv", "flow.checkpoint"];
-    if cfg!(feature = "netcdf") {
-        names.extend(["wake.nc", "plane1_0001.nc"]);
-    }
-    for name in names {
+    let tables = ["case.toml", "wake.csv", "wake_scaled.csv", "steps.csv", "flow.checkpoint"];
+    for name in tables.into_iter().chain(["wake.nc", "plane1_0001.nc"]) {
         assert!(read("whole", name) == read("killed", name), "{name} differs");
     }
 }

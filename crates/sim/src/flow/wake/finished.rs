@@ -7,6 +7,7 @@ use super::super::{CaseFile, Subgrid};
 use super::case::WakeFlow;
 use crate::Error;
 use crate::io::Provenance;
+use crate::io::csv_input::TextTable;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -107,17 +108,15 @@ impl FinishedWake {
 /// # Errors
 /// A file that cannot be read; a value that is no number.
 pub fn table(path: &Path) -> Result<HashMap<String, Vec<f64>>, Error> {
-    let text =
-        std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
-    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
-    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let mut columns = vec![Vec::new(); names.len()];
-    for line in lines {
-        for (column, value) in columns.iter_mut().zip(line.split(',')) {
-            let number = if value.is_empty() { Ok(f64::NAN) } else { value.parse() };
-            let refuse = |_| Error::Input { path: path.to_owned(), reason: format!("{value} is no number") };
-            column.push(number.map_err(refuse)?);
-        }
-    }
-    Ok(names.into_iter().map(String::from).zip(columns).collect())
+    let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+    let table = TextTable::parse(&text).map_err(&refuse)?;
+    let number = |cell: &String| match cell.as_str() {
+        "" => Ok(f64::NAN),
+        text => text.parse().map_err(|_| refuse(format!("{text} is no number"))),
+    };
+    let column = |(place, name): (usize, &String)| {
+        Ok((name.clone(), table.rows.iter().map(|row| number(&row[place])).collect::<Result<_, Error>>()?))
+    };
+    table.header.iter().enumerate().map(column).collect()
 }

@@ -12,7 +12,6 @@ use wakescope_les::analysis::{VortexRecord, WakeMeter, WakeRecord, WakeScales};
 
 /// What a number is.
 #[derive(Debug)]
-#[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
 struct Kind {
     /// The end of its name in tables.
     suffix: &'static str,
@@ -75,17 +74,11 @@ const TABLE_MODES: usize = 8;
 /// Files of the history.
 const TABLE: &str = "wake.csv";
 const SCALED_TABLE: &str = "wake_scaled.csv";
-#[cfg(feature = "netcdf")]
 const NETCDF: &str = "wake.nc";
 
 /// Names of the files of a history.
 pub(in super::super) fn file_names() -> Vec<&'static str> {
-    vec![
-        TABLE,
-        SCALED_TABLE,
-        #[cfg(feature = "netcdf")]
-        NETCDF,
-    ]
+    vec![TABLE, SCALED_TABLE, NETCDF]
 }
 
 /// A number of all records.
@@ -93,7 +86,6 @@ struct Column {
     name: String,
     kind: &'static Kind,
     /// What it is, in words.
-    #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
     text: String,
     /// In SI units.
     values: Vec<f64>,
@@ -124,10 +116,8 @@ pub(in super::super) struct WakeRun {
     scales: WakeScales,
     /// Between which the circulation of a vortex is averaged.
     circulation_radii_m: [f64; 2],
-    #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
     radius_m: Vec<f64>,
     lengths: Lengths,
-    #[cfg(feature = "netcdf")]
     x_m: Vec<f64>,
     /// Rows of numbers in SI units.
     rows: Vec<Vec<f64>>,
@@ -147,19 +137,7 @@ impl WakeRun {
     ) -> Self {
         let (scales, radius_m, x_m) = (*meter.scales(), meter.radii_m(), flow.mesh().centre_m(0));
         let lengths = Lengths { radii: radius_m.len(), slices: x_m.len(), modes: x_m.len() / 2 + 1 };
-        Self {
-            meter,
-            scales,
-            circulation_radii_m,
-            radius_m,
-            lengths,
-            #[cfg(feature = "netcdf")]
-            x_m,
-            rows: Vec::new(),
-            folder,
-            origin,
-            writes,
-        }
+        Self { meter, scales, circulation_radii_m, radius_m, lengths, x_m, rows: Vec::new(), folder, origin, writes }
     }
 
     /// Takes back what [`Self::kept`] gave.
@@ -200,7 +178,6 @@ impl WakeRun {
             return Ok(());
         }
         self.write_table()?;
-        #[cfg(feature = "netcdf")]
         write_atomic(&self.folder.join(NETCDF), self.netcdf()?)?;
         Ok(())
     }
@@ -279,7 +256,6 @@ impl WakeRun {
     }
 
     /// All columns of the table and all lists over their axes, in SI units.
-    #[cfg(feature = "netcdf")]
     fn netcdf(&self) -> Result<Vec<u8>, Error> {
         use crate::io::netcdf::{Data, Layout, Variable};
         let [gamma, slices, modes, end] = self.lengths.starts();

@@ -13,7 +13,7 @@ mod output;
 mod pictures;
 mod preset;
 mod schedule;
-#[cfg(all(feature = "netcdf", feature = "plots"))]
+#[cfg(feature = "plots")]
 mod space;
 
 pub use case::{PairScale, WakeFlow, WakeProfile};
@@ -24,5 +24,5 @@ pub use output::WakeOutput;
 pub(super) use pictures::PICTURES;
 pub use preset::WakePreset;
 pub(super) use schedule::{Due, Schedule};
-#[cfg(all(feature = "netcdf", feature = "plots"))]
+#[cfg(feature = "plots")]
 pub use space::REPEATS;

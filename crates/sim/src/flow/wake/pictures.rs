@@ -6,7 +6,6 @@
 use super::finished::FinishedWake;
 use crate::Error;
 use crate::io::FileGroup;
-#[cfg(feature = "netcdf")]
 use crate::plot::apng;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
 use std::path::PathBuf;
@@ -17,7 +16,6 @@ pub(in super::super) const PICTURES: [&str; 5] =
     ["wake.svg", "wake.png", "surfaces.svg", "surfaces.png", "plane1.apng"];
 
 /// How long a cross-plane is shown, s.
-#[cfg(feature = "netcdf")]
 const FRAME_S: f64 = 0.15;
 
 /// The names of the two vortices in the columns of the history.
@@ -84,18 +82,12 @@ impl FinishedWake {
         }
         let mut figure = Figure::side_by_side([self.circulation_plot()?, paths]).titled(&self.words());
         figure.width = 1200.0;
-        #[cfg_attr(
-            not(feature = "netcdf"),
-            expect(unused_mut, reason = "surfaces are those of fields that were written")
-        )]
         let mut pictures = vec![("wake", figure)];
-        #[cfg(feature = "netcdf")]
         pictures.extend(self.surfaces_figure()?.map(|figure| ("surfaces", figure)));
         let mut group = FileGroup::new(&self.folder);
         for (name, figure) in &pictures {
             figure.add_to(&mut group, name, &self.origin)?;
         }
-        #[cfg(feature = "netcdf")]
         if let frames = self.frames()?
             && frames.len() > 1
         {
@@ -107,8 +99,9 @@ impl FinishedWake {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{Begin, CaseFile, CaseKind, FlowCase, Unwatched, WakePreset, run};
+    use super::super::super::{Begin, CaseFile, CaseKind, FlowCase, WakePreset, run};
     use super::*;
+    use crate::Silent;
     use std::path::Path;
 
     #[test]
@@ -124,14 +117,14 @@ mod tests {
         let file = |case: &FlowCase| CaseFile::parse(&toml::to_string(case).unwrap(), Path::new("case.toml")).unwrap();
         let folder = tempfile::tempdir().unwrap();
         case.time.pause_after_steps = Some(1);
-        run(&file(&case), folder.path(), Begin::New, &mut Unwatched).unwrap();
+        run(&file(&case), folder.path(), Begin::New, &Silent).unwrap();
         assert!(FinishedWake::read(folder.path()).unwrap_err().to_string().contains("the run stands at tau = "));
         case.time.pause_after_steps = None;
-        run(&file(&case), folder.path(), Begin::Restart, &mut Unwatched).unwrap();
+        run(&file(&case), folder.path(), Begin::Restart, &Silent).unwrap();
         let wake = FinishedWake::read(folder.path()).unwrap();
         let written = wake.draw().unwrap();
         let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
-        let count = if cfg!(feature = "netcdf") { 5 } else { 2 };
+        let count = 5;
         assert_eq!(names, PICTURES[..count]);
         // The pair begins where the inviscid one does and has hardly sunk.
         let [left, right] = wake.inviscid_path().unwrap();

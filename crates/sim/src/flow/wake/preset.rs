@@ -38,7 +38,7 @@ impl WakePreset {
         let multiscale = pair.subgrid == SubgridModel::MULTISCALE_WALE;
         let subgrid =
             if multiscale { Subgrid::MultiscaleWale { constant: None, order: None } } else { Subgrid::None {} };
-        let format = if cfg!(feature = "netcdf") { FileFormat::Netcdf } else { FileFormat::Csv };
+        let format = FileFormat::Netcdf;
         let flow = WakeFlow {
             cells: pair.cells,
             size: pair.size,

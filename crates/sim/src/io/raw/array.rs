@@ -17,7 +17,6 @@ pub(super) enum Parts {
     /// Both parts of a sample stand together.
     Together,
     /// The second parts are an array of their own, which begins here; of NetCDF alone.
-    #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
     Apart(u64),
 }
 

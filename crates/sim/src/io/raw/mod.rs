@@ -11,7 +11,6 @@
 //! Check: the same records come from every format.
 
 mod array;
-#[cfg(feature = "netcdf")]
 mod netcdf;
 mod numpy;
 mod text;
@@ -34,24 +33,37 @@ use wakescope_estimate::window::MissingSamples;
 
 /// How the numbers of a file stand, as far as the file does not say it.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct RawFormat {
-    /// Kind of the numbers of a binary file, such as `i16` or `f32`.
+    /// Numbers of a binary file.
+    #[cfg_attr(feature = "cli", arg(id = "format", long, value_name = "KIND", value_parser = KINDS))]
     pub number: Option<String>,
-    /// Their byte order.
+    /// Their byte order: the lowest or the highest byte first.
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t, requires = "format"))]
     pub byte_order: ByteOrder,
-    /// Whether samples are pairs of numbers, the first quadrature before the second.
+    /// Samples are pairs of numbers, in phase and quadrature.
+    #[cfg_attr(feature = "cli", arg(long))]
     pub complex: bool,
-    /// Which index runs fastest.
+    /// Which index runs fastest: `line, pulse, sample`, `pulse, line, sample` or `sample, line, pulse`.
+    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub order: Order,
     /// Bytes before the first number.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "N", default_value_t = 0, requires = "format"))]
     pub header_bytes: u64,
     /// What a number is multiplied with, A for signals in counts.
+    #[cfg_attr(feature = "cli", arg(skip = 1.0))]
     pub scale: f64,
-    /// The variable or array that holds the samples.
+    /// The variable of a NetCDF file, or the array of an NPZ file, that holds the samples.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "NAME"))]
     pub variable: Option<String>,
-    /// The variable that holds the second quadrature.
+    /// The variable of a NetCDF file that holds the second quadrature.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "NAME"))]
     pub quadrature: Option<String>,
 }
+
+/// Kinds of the numbers of binary files.
+#[cfg(feature = "cli")]
+const KINDS: [&str; 8] = ["i8", "u8", "i16", "u16", "i32", "u32", "f32", "f64"];
 
 impl Default for RawFormat {
     fn default() -> Self {
@@ -108,7 +120,6 @@ enum Store {
     Array(ArrayInFile),
     Text(TextRecords),
     /// Of files whose numbers lie in compressed pieces.
-    #[cfg_attr(not(feature = "netcdf"), allow(dead_code))]
     Whole(WholeRecords),
 }
 
@@ -144,7 +155,6 @@ impl RawRecords {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         let (store, about) = match &magic[..] {
             _ if format.number.is_some() => (binary(file, length, format, shape).map_err(refuse)?, About::default()),
-            #[cfg(feature = "netcdf")]
             [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => netcdf::read(path, format)?,
             [0x93, b'N', b'U', b'M', ..] => {
                 let array = NumpyArray::read(&mut file, 0, length).map_err(refuse)?;

@@ -8,7 +8,6 @@
 //!
 //! Check: what the writers write comes back; files of other hands; damaged ones are refused with their field.
 
-#[cfg(feature = "netcdf")]
 mod cfradial;
 mod grid;
 mod hpl;
@@ -105,7 +104,6 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
     let mut magic = Vec::new();
     file.take(8).read_to_end(&mut magic).map_err(unreadable)?;
     match &magic[..] {
-        #[cfg(feature = "netcdf")]
         [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
             let (mut out, mut left_out) = (Vec::new(), Vec::new());
             let groups = crate::io::netcdf_input::open_groups(path, "elevation")?;
@@ -123,10 +121,6 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
                 return Err(refuse(format!("it has no scan in elevation (RHI) that can be used: {left_out}")));
             }
             Ok((out, left_out))
-        }
-        #[cfg(not(feature = "netcdf"))]
-        [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
-            Err(refuse("it is NetCDF, which this program was built without: feature netcdf".into()))
         }
         _ => {
             if length > LARGEST_TEXT_BYTES {

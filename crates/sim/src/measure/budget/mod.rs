@@ -24,9 +24,10 @@ use wakescope_optics::EfficiencyProfile;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 
 /// One factor of the signal-to-noise ratio, or one of its sums.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Row {
     /// What it is; sums begin with an equals sign.
+    #[serde(rename = "row")]
     pub name: &'static str,
     /// The factor as a formula.
     pub symbol: &'static str,

@@ -7,43 +7,9 @@ use crate::io::fields_input::{FieldPlace, periods_m, places, read, read_scalar};
 use crate::io::planes_input::files;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
 use crate::setup::beams::direction::sin_cos_of_turn;
+use crate::setup::wind::SceneWind;
 use wakescope_les::winds::{Edges, Side, VolumeComponent, VolumeSeries, VolumeSnapshot};
 use wakescope_les::{Error as LesError, Wind};
-
-/// Fields as a wind, with what a run needs to know of them.
-pub(super) struct FieldWind {
-    pub(super) wind: Box<dyn Wind>,
-    /// Time of the flow when the scan begins, s.
-    pub(super) start_s: f64,
-    /// Last time that it can be asked for, s.
-    pub(super) end_s: f64,
-    /// A speed that no node exceeds, m/s.
-    pub(super) max_speed_m_s: f64,
-    /// Where it comes from, in words.
-    pub(super) source: String,
-    /// Times of the fields that are read when they are needed, s.
-    pub(super) times_s: Vec<f64>,
-}
-
-/// A wind that stands still as it was at one time.
-pub(super) struct Frozen<W> {
-    pub(super) wind: W,
-    pub(super) time_s: f64,
-}
-
-impl<W: Wind> Wind for Frozen<W> {
-    fn velocity_into(&self, points_m: &[[f64; 3]], _: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), LesError> {
-        self.wind.velocity_into(points_m, self.time_s, out_m_s)
-    }
-
-    fn scalar_into(&self, points_m: &[[f64; 3]], _: f64, out: &mut [f64]) -> Result<(), LesError> {
-        self.wind.scalar_into(points_m, self.time_s, out)
-    }
-
-    fn max_gradient_per_s(&self, _: f64) -> f64 {
-        self.wind.max_gradient_per_s(self.time_s)
-    }
-}
 
 /// A wind in axes of its own.
 struct Placed {
@@ -137,9 +103,9 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
 }
 
 /// Reads fields: their times, and once each for its gradient; the rest when it is needed.
-pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<FieldWind, Error> {
+pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Error> {
     let path = file.folder.join(&flow.files);
-    let of_key = |e: Error| Error::OfKey { key: "flow.files", source: Box::new(e) };
+    let of_key = Error::of_key("flow.files");
     let refuse = |reason: String| Error::Input { path: path.clone(), reason };
     let mut all = Vec::new();
     for path in files(&path).map_err(of_key)? {
@@ -179,14 +145,16 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<FieldWind, Er
     };
     let series = VolumeSeries::new(times_s.clone(), steepest_per_s, reader)
         .map_err(|e| refuse(format!("the times of the fields: {e}")))?;
-    let (wind, end_s): (Box<dyn Wind>, f64) = match flow.motion {
-        SimulatedMotion::Moving => (Box::new(series), last_s),
-        SimulatedMotion::Frozen => (Box::new(Frozen { wind: series, time_s: start_s }), f64::INFINITY),
-    };
+    let found = SceneWind::of_files(Box::new(series), flow.motion, [start_s, last_s], source);
     let (sin, cos) = sin_cos_of_turn(flow.rotation_rad);
     let side = if flow.mirror_y { -1.0 } else { 1.0 };
     let plain = flow.origin_m == [0.0; 3] && (sin, cos) == (0.0, 1.0) && !flow.mirror_y;
-    let wind = if plain { wind } else { Box::new(Placed { wind, origin_m: flow.origin_m, sin, cos, side }) };
-    let times_s = if end_s.is_finite() { times_s } else { Vec::new() };
-    Ok(FieldWind { wind, start_s, end_s, max_speed_m_s: fastest_m_s, source, times_s })
+    let placed = |wind| Box::new(Placed { wind, origin_m: flow.origin_m, sin, cos, side }) as Box<dyn Wind>;
+    Ok(SceneWind {
+        wind: if plain { found.wind } else { placed(found.wind) },
+        max_speed_m_s: fastest_m_s,
+        field_times_s: if found.end_s.is_finite() { times_s } else { Vec::new() },
+        carries_backscatter: flow.backscatter.is_some(),
+        ..found
+    })
 }
